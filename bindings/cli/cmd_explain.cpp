@@ -153,6 +153,30 @@ void print_integrators(const JsonValue &plan) {
   }
 }
 
+// Which point bounds explicit sub-steps, how many do nearly, and what mass_scaling has done or would do.
+void print_light(const JsonValue &plan) {
+  for (const JsonValue &body : plan.list("bodies")) {
+    const JsonValue *const own = body.find("light");
+    if (!own) continue;
+    const std::vector<JsonValue> &at = own->list("at");
+    std::printf(
+        "  %-20s  at rest point %s (%s %s %s m in the mesh) bounds explicit sub-steps, to %s s; %s of %s "
+        "points allow less than twice that\n",
+        body.get("name").c_str(), own->get("point").c_str(), at[0].text.c_str(), at[1].text.c_str(),
+        at[2].text.c_str(), own->get("step_s").c_str(), own->get("below_twice").c_str(),
+        body.get("points").c_str());
+    if (own->scalar("mass_moved") > 0)
+      std::printf(
+          "  %-20s  %.3g %% of its mass was moved to such points, which changes the frequencies of "
+          "bending and torsion by %.3g %% at most\n",
+          "", 100 * own->scalar("mass_moved"), 100 * own->scalar("frequency_change"));
+    for (const JsonValue &row : own->list("would"))
+      if (row.scalar("step_s") > own->scalar("step_s"))
+        std::printf("  %-20s  \"mass_scaling\": %s would allow at least %s s\n", "",
+                    row.get("mass_scaling").c_str(), row.get("step_s").c_str());
+  }
+}
+
 // Bodies whose forces are asked for in single precision.
 void print_precision(const JsonValue &plan) {
   for (const JsonValue &body : plan.list("bodies")) {
@@ -193,7 +217,10 @@ int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
   print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
   print_list(plan, "absent", "left out", {"why"});
   print_list(plan, "bodies", "bodies", {"model", "kind", "surface", "cells", "points", "surfels"});
-  if (scene.value("/time/mode") != "\"static\"") print_integrators(plan);
+  if (scene.value("/time/mode") != "\"static\"") {
+    print_integrators(plan);
+    print_light(plan);
+  }
   print_precision(plan);
   print_changes(plan);
   print_cuts(plan);

@@ -1,6 +1,7 @@
 // Counts, quality, defects, groups and warnings of a mesh, as a table or as JSON.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdio>
 
 #include "cmd_mesh.h"
@@ -92,6 +93,79 @@ std::vector<uint32_t> boundary_of(const uint32_t *tets, uint32_t ntet) {
   return out;
 }
 
+// A cell by itself allows explicit sub-steps of (sum of 1 / altitude^2)^-1/2 sqrt(density / Young's modulus):
+// its stiffness is at most E V times that sum, the mass at each corner rho V / 4.
+struct CellBound {
+  uint32_t cell;
+  double volume, sum, altitude;  // m3, 1/m2, m: the least
+};
+
+CellBound bound_of(const double *x, const uint32_t *t, uint32_t cell) {
+  using Vec = std::array<double, 3>;
+  const auto side = [&](int i, int j) {
+    Vec out;
+    for (size_t k = 0; k < 3; ++k) out[k] = x[size_t{3} * t[j] + k] - x[size_t{3} * t[i] + k];
+    return out;
+  };
+  const auto cross = [](const Vec &a, const Vec &b) {
+    return Vec{a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+  };
+  const auto dot = [](const Vec &a, const Vec &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; };
+  const double six = dot(side(0, 1), cross(side(0, 2), side(0, 3)));
+  double sum = 0, most = 0;
+  for (const auto &[a, b, c] : {std::array{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}}) {
+    const Vec area = cross(side(a, b), side(a, c));  // twice
+    sum += dot(area, area) / (six * six);
+    most = std::max(most, dot(area, area) / (six * six));
+  }
+  return {cell, six / 6, sum, 1 / std::sqrt(most)};
+}
+
+// m, of sub-steps in units of sqrt(density / Young's modulus): the least 2 sqrt(m / k) of all points, where
+// the first `absent` cells of the list have no stiffness.
+double mesh_step(const std::vector<CellBound> &cells, size_t absent, const uint32_t *tets, uint32_t npoint) {
+  std::vector<double> mass(npoint), stiffness(npoint);
+  for (size_t n = 0; n < cells.size(); ++n)
+    for (int k = 0; k < 4; ++k) {
+      const uint32_t p = tets[size_t{4} * cells[n].cell + size_t(k)];
+      mass[p] += cells[n].volume / 4;
+      if (n >= absent) stiffness[p] += cells[n].volume * cells[n].sum;
+    }
+  double most = 0;
+  for (uint32_t p = 0; p < npoint; ++p)
+    if (mass[p] > 0) most = std::max(most, stiffness[p] / mass[p]);
+  return 2 / std::sqrt(most);
+}
+
+// Which cells bound explicit sub-steps, and what they cost.
+void report_steps(Report &r, const double *x, uint32_t npoint, const uint32_t *tets, uint32_t ntet) {
+  std::vector<CellBound> cells;
+  for (uint32_t t = 0; t < ntet; ++t) {
+    const CellBound cell = bound_of(x, tets + size_t{4} * t, t);
+    if (cell.volume > 0) cells.push_back(cell);
+  }
+  if (cells.empty()) return;
+  std::stable_sort(cells.begin(), cells.end(),
+                   [](const CellBound &a, const CellBound &b) { return a.sum > b.sum; });
+  const double all = mesh_step(cells, 0, tets, npoint);
+  const double most = mesh_step(cells, (cells.size() + 99) / 100, tets, npoint);
+  r.measures.emplace_back("step", all);
+  r.measures.emplace_back("step_without_worst", most);
+  r.lines.emplace_back("explicit sub-step", text("about %.4g m sqrt(density / Young's modulus)", all) +
+                                                text(", without the worst 1 %% of cells %.4g m", most));
+  for (size_t n = 0; n < std::min<size_t>(3, cells.size()); ++n) {
+    const CellBound &c = cells[n];
+    const uint32_t *const t = tets + size_t{4} * c.cell;
+    double center[3] = {};
+    for (int k = 0; k < 3; ++k)
+      for (int i = 0; i < 4; ++i) center[k] += x[size_t{3} * t[i] + size_t(k)] / 4;
+    char line[200];
+    std::snprintf(line, sizeof line, "%u at %.4g %.4g %.4g m: least altitude %.3g m, alone %.3g m", c.cell,
+                  center[0], center[1], center[2], c.altitude, 1 / std::sqrt(c.sum));
+    r.lines.emplace_back("bounded by cell", line);
+  }
+}
+
 void report_crossings(Report &r, const double *points, uint32_t npoint, const uint32_t *triangles,
                       uint32_t ntriangle) {
   const size_t pairs = crossing::Counter()
@@ -148,6 +222,7 @@ bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
   const double *points = nullptr;
   const uint32_t *tets = nullptr;
   if (crossings && dfm_tetmesh_data(mesh, &points, &tets, nullptr) >= 0) {
+    report_steps(r, points, i.npoint, tets, i.ntet);
     const std::vector<uint32_t> boundary = boundary_of(tets, i.ntet);
     report_crossings(r, points, i.npoint, boundary.data(), uint32_t(boundary.size() / 3));
   }

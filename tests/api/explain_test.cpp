@@ -53,6 +53,7 @@ TEST(Explain, Step_NamesBoundAndSubSteps) {
   const test::CommandResult result = test::deform({"explain", scene("step", kOneBody)});
   EXPECT_NE(result.out.find("\"lone\""), std::string::npos) << result.out;
   EXPECT_NE(result.out.find("the scene asks for 0.1 s: at least "), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("bounds explicit sub-steps, to "), std::string::npos) << result.out;
 }
 
 TEST(Explain, Step_ReportsWhetherStiffnessOrDampingBoundsIt) {

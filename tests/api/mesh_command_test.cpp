@@ -39,6 +39,7 @@ TEST(MeshCommand, Info_PrintsCountsGroupsAndWarnings) {
   for (const char *word :
        {"points            8", "tetrahedra        6", "surface triangles 12", "edges             19",
         "volume            1 m3", "skin (triangles, 8 points)", "high end (cells, 6 points)",
+        "explicit sub-step about 0.4082 m", "m: least altitude 0.707 m, alone 0.408 m",
         "warning: 1 point that no tetrahedron uses was dropped"})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }

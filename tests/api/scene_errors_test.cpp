@@ -130,6 +130,7 @@ TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
          {"/contact/friction=0.5", {"/contact/friction", "\"law\": \"coulomb\"", "found number 0.5"}},
          {"/gravity=[0,0]", {"/gravity", "three numbers"}},
          {"/gravity=[0,0,\"down\"]", {"/gravity/2", "number"}},
+         {"/bodies/0/mass_scaling=0.2", {"/bodies/0/mass_scaling", "0.1"}},
          {"/bodies={}", {"/bodies", "array"}},
          {"/bodies/0=[]", {"/bodies/0", "expected an object"}},
          {"/bodies/0/name=5", {"/bodies/0/name", "string"}},

@@ -168,6 +168,7 @@ struct Made {
     dfm_body_def d = dfm_body_def_default();
     d.name = name;
     d.material = material;
+    d.mass_scaling = 0.01;
     test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
     d.npoint = info.npoint;
     d.ntet = info.ntet;
@@ -188,6 +189,7 @@ TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   const std::string path = folder_of("program") + "/program.json";
   EXPECT_EQ(all(write(made.world, path, DFM_SCENE_SNAPSHOT)), "");
   EXPECT_NE(test::read_file(path).find("\"max_sweeps\":77"), std::string::npos) << test::read_file(path);
+  EXPECT_NE(test::read_file(path).find("\"mass_scaling\": 0.01"), std::string::npos);
   const dfm_world back = load(made.context, path);
   ASSERT_TRUE(back);
   const std::vector<unsigned char> bytes = read(folder_of("program") + "/program_files/snapshot.state");

@@ -36,6 +36,12 @@ class Building(unittest.TestCase):
             self.assertAlmostEqual(world.time, 1.0)
             self.assertEqual(world.stats.steps, 120)
 
+    def test_mass_scaling_is_told(self):
+        with deform.World() as world:
+            self.assertEqual(ball(world, mass_scaling=0.02).mass_scaled, (0, 0))  # no point is light
+            with self.assertRaisesRegex(deform.ArgumentError, "mass_scaling"):
+                ball(world, z=1, mass_scaling=0.2)
+
     def test_body_from_arrays(self):
         points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
         with deform.World(gravity=(0, 0, 0)) as world:

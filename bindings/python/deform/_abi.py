@@ -344,13 +344,13 @@ class dfm_body_def(_Structure):
                 ("spin", f64 * 3), ("fixed", ptr), ("category", u32), ("collides_with", u32),
                 ("user", ptr), ("surface", ptr), ("nfield", u32), ("fields", ptr),
                 ("cell_materials", ptr), ("cell_share", ptr), ("groups", ptr), ("integrator", i32),
-                ("reserved", u32), ("cookie", u64)]
+                ("reserved", u32), ("cookie", u64), ("mass_scaling", f64)]
 
 
 class dfm_body_info(_Structure):
     _fields_ = [("size", u32), ("npoint", u32), ("ntet", u32), ("nsurfel", u32), ("ntriangle", u32),
                 ("nedge", u32), ("world", u64), ("name", text), ("model", text), ("mass", f64),
-                ("rest_volume", f64), ("user", ptr)]
+                ("rest_volume", f64), ("user", ptr), ("mass_moved", f64), ("frequency_change", f64)]
 
 
 class dfm_spring_def(_Structure):

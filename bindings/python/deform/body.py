@@ -392,6 +392,14 @@ class Body(_Part):
         check(quick.dfm_body_get_info(self.handle, ctypes.byref(info)))
         return (info.model or b"").decode()
 
+    @property
+    def mass_scaled(self) -> tuple[float, float]:
+        """By mass_scaling of add_body: the share of the mass that was moved, and the share by which the
+        frequency of a mode quadratic in the place may change."""
+        info = sized(_abi.dfm_body_info)
+        check(quick.dfm_body_get_info(self.handle, ctypes.byref(info)))
+        return info.mass_moved, info.frequency_change
+
     def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
         """A pair touches if each one's category is among the bits that the other collides with."""
         self.world.free()

@@ -283,7 +283,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  velocity: Sequence[float] = (0, 0, 0), spin: Sequence[float] = (0, 0, 0), fixed: Any = None,
                  surface: TriMesh | str | None = None, coupling: str = "barycentric",
                  fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
-                 collides_with: int = EVERYTHING, scale: float = 1, on: Obstacle | None = None) -> Body:
+                 collides_with: int = EVERYTHING, scale: float = 1, on: Obstacle | None = None,
+                 mass_scaling: float = 0) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
         model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
@@ -292,7 +293,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         components that are; or [n,3] True for these. surface: a finer one that hangs on the cells, a TriMesh
         or the path of its file. fields: model parameters that differ by cell, [m] or [m,width] by key. scale:
         of the points of mesh and surface, 0.001 where they are in millimeters. on: an obstacle, onto which
-        the body is moved from its position along gravity.
+        the body is moved from its position along gravity. mass_scaling: share of its mass, at most 0.1, that
+        may be moved to the points that bound explicit sub-steps.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -350,6 +352,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
             keep.append(field)
         definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
         definition.integrator = word("integrator", integrator, INTEGRATORS)
+        definition.mass_scaling = mass_scaling
         definition.category = whole(category, "category")
         definition.collides_with = whole(collides_with, "collides_with")
         out = ctypes.c_uint64()

@@ -68,6 +68,10 @@ typedef struct dfm_body_def {
   int32_t integrator;               /* DFM_INTEGRATOR_* of this body; AUTO: the world's */
   uint32_t reserved;
   uint64_t cookie; /* set by the default function */
+  /* Share of its mass, at most 0.1, that may be moved to the points that bound its explicit sub-steps:
+   * slivers and light points. Mass, center and moments of inertia at rest stay exact; dfm_body_info has what
+   * was moved and what it changes (doc/concepts/step.md). Such a body cannot be cut. 0: none. */
+  double mass_scaling;
 } dfm_body_def;
 
 /** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
@@ -91,6 +95,9 @@ typedef struct dfm_body_info {
   const char *name, *model; /* valid while the body lives */
   double mass, rest_volume; /* kg, m3 */
   void *user;
+  /* shares, by dfm_body_def.mass_scaling: of the mass, what was moved; of a frequency, what a mode whose
+   * displacement is quadratic in the place (bending, torsion) may change by. */
+  double mass_moved, frequency_change;
 } dfm_body_info;
 /** Sizes, names and mass of a body. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out);

@@ -154,6 +154,8 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
       i.nedge = static_cast<uint32_t>(b.edges.size() / 2);
       i.mass = b.mass;
       i.rest_volume = b.rest_volume;
+      i.mass_moved = b.scaling.moved;
+      i.frequency_change = b.scaling.frequency;
     }
     i.world = b.world->handle;
     i.name = b.name.c_str();

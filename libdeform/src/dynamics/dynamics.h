@@ -27,6 +27,7 @@
 namespace dfm {
 
 class ImplicitSystem;
+struct RestRows;
 class Tasks;
 
 struct SubStep {
@@ -99,6 +100,8 @@ class Dynamics {
   // spectrum: share is wanted, too. The lag is points().dampers.lag from the next bound() on.
   // placed: of the rest positions that the model was made with.
   virtual ExplicitTime measure(const Pose & /*placed*/, bool /*spectrum*/) { return {}; }
+  // What bounds sub-steps at rest, with the dampers as they are. False: nothing does, or it is not known.
+  virtual bool rest_rows(const Pose & /*placed*/, double /*share*/, RestRows &) { return false; }
   // share: that of the model as it was made. False: the model gives none.
   virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
   // s, the longest sub-step with contacts, at the last bound; infinite: any.

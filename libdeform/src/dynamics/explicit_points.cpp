@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "body/rigid_motion.h"
+#include "dynamics/mass_scaling.h"
 #include "dynamics/symplectic_euler.h"
 #include "math/lanczos.h"
 
@@ -194,6 +195,22 @@ ExplicitTime ExplicitPoints::measure(const Pose &placed, bool spectrum) {
   out.lag = find_lag(rest, edge);
   if (spectrum && model_.state.empty()) out.share = find_share(rest, out.lag, edge);
   return out;
+}
+
+bool ExplicitPoints::rest_rows(const Pose &placed, double share, RestRows &out) {
+  const Trial rest(*this, placed);
+  const bool lagged = p_.dampers.lag > 0;
+  double cell = 0;
+  if (!model_.ops->bound || (lagged && !find_drag()) || !row_sums(rest.kin, cell)) return false;
+  if (lagged) lag_rows(p_.dampers.lag);
+  out.stiffness.assign(p_.n, 0.0);
+  out.damping.assign(p_.n, 0.0);
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    if ((p_.held[i] & 7) == 7) continue;
+    out.stiffness[i] = share * (stiffness_[i] + (lagged ? lagged_[i] : 0));
+    out.damping[i] = damping_[i];
+  }
+  return true;
 }
 
 dfm_kin ExplicitPoints::seen(double time, double h, bool trial) const {

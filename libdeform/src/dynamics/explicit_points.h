@@ -19,6 +19,7 @@ class ExplicitPoints : public Dynamics {
     return {.forces = true, .springs = true, .placed = true, .energy = true};
   }
   ExplicitTime measure(const Pose &placed, bool spectrum) override;
+  bool rest_rows(const Pose &placed, double share, RestRows &out) override;
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double strain_rate() const override;
   bool add_forces(const SubStep &now, bool keep) override;

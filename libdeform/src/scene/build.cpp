@@ -327,6 +327,7 @@ class Builder {
     d.material = material(b.material);
     d.model = b.model.c_str();
     d.integrator = b.integrator;
+    d.mass_scaling = b.mass_scaling;
     d.model_params = b.params.view();
     d.fixed = fixed.data();
     d.nfield = uint32_t(fields.size());

@@ -123,6 +123,7 @@ struct Body {
   bool sensor = false;
   bool model_open = false;  // the planner chooses; `model` holds a placeholder
   int32_t integrator = DFM_INTEGRATOR_AUTO;
+  double mass_scaling = 0;
   MadeMesh made;
   OwnSurface surface;
   Start start;

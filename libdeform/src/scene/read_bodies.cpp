@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynamics/mass_scaling.h"
 #include "scene/read.h"
 #include "scene/rotation.h"
 
@@ -379,6 +380,7 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   for (const Node &entry : node.items("attach")) b.attach.push_back(read_attach(entry));
+  b.mass_scaling = node.number("mass_scaling", 0.0, Range{0, kMostScaled, false, false});
   b.cut_delay = node.number("cut_delay", 0.0, kNotNegative);
   if (node.has("separate")) b.separate = read_separate(node.member("separate"));
   read_carriers(node, type, context, b);

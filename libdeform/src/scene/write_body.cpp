@@ -152,6 +152,7 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
   }
   write_choice(type, given, out["model"]);
   if (const char *const word = integrator_word(b.origin.integrator)) out["integrator"] = word;
+  if (b.scaling.asked > 0) out["mass_scaling"] = b.scaling.asked;
 }
 
 void write_fields(SceneWriter &to, const Body &b, Written &out) {

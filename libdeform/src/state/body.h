@@ -7,6 +7,7 @@
 #include "body/zones.h"
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
+#include "dynamics/mass_scaling.h"
 #include "state/change_book.h"
 #include "state/cut_record.h"
 #include "state/cuts_ahead.h"
@@ -146,6 +147,7 @@ struct Body : Discretization {
   Integrator integrator;
   ModelOrigin origin;
   Withheld withheld;
+  MassScaling scaling;           // of p.mass, for the model that it was made with
   std::vector<Switch> switches;  // future changes, by time
   std::vector<SwitchRule> rule;  // one or none
   uint64_t first_model = 0;      // hash of the model's inputs when the world took its first step

@@ -90,6 +90,28 @@ void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out, const ModelO
   if (had != (found.lag > 0)) settle_dampers(b.p);
 }
 
+bool rest_rows(const Body &b, double share, RestRows &out) {
+  return b.dynamics->rest_rows(rests_unplaced(*b.model.type) ? Pose{} : b.origin.frame, share, out);
+}
+
+void give_scaled_mass(Body &b, double share) {
+  const char *const name = b.name.c_str();
+  if (!(share > 0 && share <= kMostScaled))
+    fail(DFM_E_ARG, "body '%s': mass_scaling %g; it is a share of the body's mass in [0, %g]", name, share,
+         kMostScaled);
+  RestRows rows;
+  if (!rest_rows(b, 1, rows))
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s': mass_scaling lengthens the explicit sub-steps of a body, and nothing bounds those of "
+         "this "
+         "one (model %s%s); leave it out",
+         name, b.model.type->id, b.model.stepper ? ", which steps itself" : "");
+  std::vector<double> mass;
+  b.scaling = scale_mass(b.p, rows, share, mass);
+  std::copy(mass.begin(), mass.end(), b.p.mass.begin());
+  update_inverse_mass(b.p);
+}
+
 namespace {
 
 // [n,3] rest positions transformed by the frame, for a model whose forces do not rotate with the body; empty

@@ -30,6 +30,12 @@ std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type 
 void give_dynamics(World &w, Body &b, const double *bound_at);
 // How long its explicit sub-steps may be, with its present parameters and the model's origin.
 void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out, const ModelOrigin &origin);
+// What bounds its explicit sub-steps at rest, with this share of the row sums of stiffness; 1: for certain.
+// False: nothing, or its points do not move explicitly.
+bool rest_rows(const Body &b, double share, RestRows &out);
+// Moves this share of its mass at most to points that bound its explicit sub-steps; its model is to be made
+// again. Throws Error.
+void give_scaled_mass(Body &b, double share);
 // Logs a message if an integrator is named for a body whose model steps itself.
 void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
                        int32_t integrator);

@@ -122,8 +122,12 @@ void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials 
                      to_pose(def.pose),
                      static_cast<uint32_t>(def.integrator),
                      {b.p.held.begin(), b.p.held.end()}};
-  const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), def.integrator);
-  exchange(b, *made);
+  const auto make = [&] { exchange(b, *make_body_model(w, b, type, origin, def.integrator)); };
+  make();
+  if (def.mass_scaling != 0) {
+    give_scaled_mass(b, def.mass_scaling);
+    make();
+  }
   b.first_model = model_hash(b);
 }
 

@@ -206,6 +206,11 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
          "touches: "
          "steps as large as its %u cells in place of %u triangles",
          name, b.ncell(), b.surface.ntri);
+  if (b.scaling.moved > 0)
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s' can be neither cut nor torn: mass has been moved between its points; create it without "
+         "mass_scaling",
+         name);
   if (!topology_of(model))
     fail(DFM_E_UNSUPPORTED,
          "body '%s' can be neither cut nor torn: model '%s' needs all of its cells; take msm or "

@@ -11,7 +11,9 @@
 #include "step/impact.h"
 #include "step/context.h"
 #include "step/energy_watch.h"
+#include "step/step_bound.h"
 #include "world/body_effects.h"
+#include "world/body_model.h"
 #include "world/create.h"
 #include "world/idle.h"
 
@@ -60,6 +62,31 @@ std::string integrator(const Body &b) {
                  (i.chosen == Chosen::implicit ? "automatic steps, or with " : "") +
                  "a restitution of the pair");
   return out + "}";
+}
+
+// Which point bounds explicit sub-steps at rest, how many nearly do, and what mass_scaling would give.
+std::string light(const Body &b) {
+  RestRows rows;
+  if (!rest_rows(b, b.integrator.share, rows)) return "";
+  uint32_t worst = 0, near = 0;
+  for (uint32_t i = 1; i < b.p.n; ++i)
+    if (step_of_point(b.p, rows, i) < step_of_point(b.p, rows, worst)) worst = i;
+  const double step = step_of_point(b.p, rows, worst);
+  if (!std::isfinite(step)) return "";
+  for (uint32_t i = 0; i < b.p.n; ++i) near += step_of_point(b.p, rows, i) < 2 * step;
+  const double *const at = &b.p.rest[size_t{3} * worst];
+  std::vector<std::string> scaled;
+  if (!rest_rows(b, 1, rows)) return "";
+  std::vector<double> mass;
+  for (const double share : {0.001, 0.01, kMostScaled})
+    if (b.scaling.moved == 0)
+      scaled.push_back(format("{\"mass_scaling\":%g,\"step_s\":%.4g}", share,
+                              kBoundShare * scale_mass(b.p, rows, share, mass).step));
+  return format(",\"light\":{\"point\":%u,\"at\":[%.6g,%.6g,%.6g],\"step_s\":%.4g,\"below_twice\":%u", worst,
+                at[0], at[1], at[2], kBoundShare * step, near) +
+         format(",\"mass_moved\":%.4g,\"frequency_change\":%.4g,\"would\":[", b.scaling.moved,
+                b.scaling.frequency) +
+         join(scaled, ",") + "]}";
 }
 
 // Of the forces that move the body.
@@ -222,7 +249,8 @@ std::string body(const Body &b) {
     out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) +
                              format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
   }
-  out += "]," + effects(b) + "," + facts(b) + "," + integrator(b) + "," + precision(b) + ",\"idle\":[";
+  out += "]," + effects(b) + "," + facts(b) + "," + integrator(b) + "," + precision(b) + light(b) +
+         ",\"idle\":[";
   bool first = true;
   for (const IdleParam &p : idle_params(b)) {
     out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");

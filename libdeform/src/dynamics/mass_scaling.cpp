@@ -1,0 +1,164 @@
+// A sub-step of h needs m >= (h^2 k + 2 h c) / 4 at each point. Points that have less for the wished h get
+// the difference d. All points pay for it by a share of their masses that is a quadratic polynomial q of the
+// place at rest,
+//
+//     m' = m + d - m q,     with   sum m' g = sum m g   for each quadratic polynomial g:
+//
+// q is the projection of d / m on these. So the total mass, the center and the moments of inertia stay, and
+// with the second moments the kinetic energy of every velocity that is an affine function of the place: of
+// any rigid motion and any uniform strain. Where u is a quadratic polynomial, as in bending and
+// torsion, the kinetic energy changes by u.(m' - m) u, of which the largest share of u.m u is told.
+#include "dynamics/mass_scaling.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+namespace dfm {
+namespace {
+
+constexpr size_t kTerms = 10;      // of a quadratic polynomial in space
+constexpr int kTurns = 6;          // of what points get and what they pay
+constexpr double kMostPaid = 0.5;  // of its own mass, by a point
+constexpr double kWorth = 1.25;    // longer sub-steps: they have four sizes to the octave
+constexpr double kFlat = 1e-10;    // of a polynomial's square: it depends on those before it
+constexpr int kHalvings = 40;      // of the interval in which the sub-step lies
+
+using Terms = std::array<double, kTerms>;
+
+double step_of(double k, double c, double m) {
+  const double bottom = c + std::sqrt(c * c + 4 * m * k);
+  return bottom > 0 ? 4 * m / bottom : std::numeric_limits<double>::infinity();
+}
+
+class Mover {
+ public:
+  Mover(const Phyxels &p, const RestRows &rows) : p_(p), rows_(rows), terms_(p.n), added_(p.n) {
+    for (uint32_t i = 0; i < p.n; ++i) total_ += p.mass[i];
+    make_terms();
+  }
+
+  double total() const { return total_; }
+
+  // kg, what points get for sub-steps of h; infinite: some point would pay too much. Who gets also pays, so
+  // what points get and pay are found in turn.
+  double move(double h) {
+    double moved = 0;
+    paid_ = {};
+    for (int turn = 0; turn < kTurns; ++turn) {
+      Terms paid{};
+      moved = 0;
+      for (uint32_t i = 0; i < p_.n; ++i) {
+        const double share = share_paid(i),
+                     needed = 0.25 * h * (h * rows_.stiffness[i] + 2 * rows_.damping[i]);
+        added_[i] = std::max(0.0, needed - p_.mass[i] * (1 - std::max(0.0, share)));
+        moved += added_[i];
+        for (size_t k = 0; added_[i] > 0 && k < kTerms; ++k) paid[k] += added_[i] * terms_[i][k];
+      }
+      paid_ = paid;
+    }
+    for (uint32_t i = 0; i < p_.n; ++i)
+      if (!(share_paid(i) <= kMostPaid)) return std::numeric_limits<double>::infinity();
+    return moved;
+  }
+
+  double changed(uint32_t i) const { return added_[i] - p_.mass[i] * share_paid(i); }
+
+  // At least the largest share of u.m u that u.(m' - m) u has for a quadratic u, and at most 1.16 of it: the
+  // eighth root of the Frobenius norm of the eighth power of the matrix between these.
+  double energy_change() const {
+    std::array<Terms, kTerms> change{};
+    for (uint32_t i = 0; i < p_.n; ++i)
+      for (size_t k = 0; k < kTerms; ++k)
+        for (size_t l = 0; l < kTerms; ++l) change[k][l] += changed(i) * terms_[i][k] * terms_[i][l];
+    for (int power = 1; power < 8; power *= 2) {
+      const std::array<Terms, kTerms> a = std::exchange(change, {});
+      for (size_t k = 0; k < kTerms; ++k)
+        for (size_t l = 0; l < kTerms; ++l)
+          for (size_t j = 0; j < kTerms; ++j) change[k][l] += a[k][j] * a[j][l];
+    }
+    double square = 0;
+    for (const Terms &row : change)
+      for (const double x : row) square += x * x;
+    return std::sqrt(std::sqrt(std::sqrt(std::sqrt(square))));
+  }
+
+ private:
+  const Phyxels &p_;
+  const RestRows &rows_;
+  std::vector<Terms> terms_;   // at the points; orthonormal with the masses as weights
+  std::vector<double> added_;  // [n] kg
+  Terms paid_{};
+  double total_ = 0;
+
+  double share_paid(uint32_t i) const {
+    double sum = 0;
+    for (size_t k = 0; k < kTerms; ++k) sum += paid_[k] * terms_[i][k];
+    return sum;
+  }
+
+  void make_terms() {
+    Vec3 center;
+    double square = 0;
+    for (uint32_t i = 0; i < p_.n; ++i) center += (p_.mass[i] / total_) * load3(&p_.rest[size_t{3} * i]);
+    for (uint32_t i = 0; i < p_.n; ++i)
+      square += p_.mass[i] / total_ * norm2(load3(&p_.rest[size_t{3} * i]) - center);
+    for (uint32_t i = 0; i < p_.n; ++i) {
+      const Vec3 x = (1 / std::sqrt(square)) * (load3(&p_.rest[size_t{3} * i]) - center);
+      terms_[i] = {1, x.x, x.y, x.z, x.x * x.x, x.y * x.y, x.z * x.z, x.x * x.y, x.y * x.z, x.z * x.x};
+    }
+    for (size_t k = 0; k < kTerms; ++k) {
+      const double before = product(k, k);
+      for (int again = 0; again < 2; ++again)  // the second time for what rounding has left
+        for (size_t l = 0; l < k; ++l) {
+          const double part = product(k, l);
+          for (Terms &t : terms_) t[k] -= part * t[l];
+        }
+      const double left = product(k, k);
+      const double scale = left > kFlat * before ? 1 / std::sqrt(left) : 0;
+      for (Terms &t : terms_) t[k] *= scale;
+    }
+  }
+
+  double product(size_t k, size_t l) const {
+    double sum = 0;
+    for (uint32_t i = 0; i < p_.n; ++i) sum += p_.mass[i] * terms_[i][k] * terms_[i][l];
+    return sum;
+  }
+};
+
+}  // namespace
+
+double step_of_point(const Phyxels &p, const RestRows &rows, uint32_t point) {
+  return step_of(rows.stiffness[point], rows.damping[point], p.mass[point]);
+}
+
+MassScaling scale_mass(const Phyxels &p, const RestRows &rows, double share, std::vector<double> &mass) {
+  mass.assign(p.mass.begin(), p.mass.end());
+  std::vector<double> steps;
+  for (uint32_t i = 0; i < p.n; ++i) steps.push_back(step_of_point(p, rows, i));
+  const auto median = steps.begin() + p.n / 2;
+  std::nth_element(steps.begin(), median, steps.end());
+  const double least = *std::min_element(steps.begin(), median + 1);
+  const MassScaling none{.asked = share, .step = least};
+  if (!(*median > kWorth * least) || !std::isfinite(*median)) return none;
+  Mover mover(p, rows);
+  double low = least, high = *median;  // a level at which half of the points bound is that of the body
+  for (int k = 0; k < kHalvings; ++k) {
+    const double middle = 0.5 * (low + high);
+    (mover.move(middle) > share * mover.total() ? high : low) = middle;
+  }
+  MassScaling out{.asked = share, .moved = mover.move(low) / mover.total(), .step = *median};
+  for (uint32_t i = 0; i < p.n; ++i) {
+    mass[i] += mover.changed(i);
+    out.step = std::min(out.step, step_of(rows.stiffness[i], rows.damping[i], mass[i]));
+  }
+  out.frequency = 0.5 * mover.energy_change();
+  if (out.step > kWorth * least) return out;
+  mass.assign(p.mass.begin(), p.mass.end());
+  return none;
+}
+
+}  // namespace dfm
