@@ -189,6 +189,8 @@ bool ContactNewton::solve(double tolerance, double normal) {
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
+  double best = std::numeric_limits<double>::infinity();
+  bool spent = false;
   uint32_t slow = 0, stood = 0;
   Array<double> &before = kept_;
   for (passes_ = 0; passes_ < set_.passes;) {
@@ -209,8 +211,14 @@ bool ContactNewton::solve(double tolerance, double normal) {
     if (!host_->judge(residual_)) return false;
     const double off = error(), due = std::max(residual_.relative, off / tolerance);
     found_ = due <= set_.within;
-    if (found_ || steps_ >= limit_) break;
-    if (!host_->goes_on(products_)) return true;
+    const double now = std::max(residual_.speed, off);
+    if (now < best) {
+      best = now;
+      best_v_.assign(v_.begin(), v_.end());
+      best_g_.assign(g_.begin(), g_.end());
+      best_l_.assign(l_.begin(), l_.end());
+    }
+    if (found_ || steps_ >= limit_ || (spent = !host_->goes_on(products_))) break;
     lh_.assign(l_.begin(), l_.end());
     double moved = 0;
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
@@ -223,7 +231,6 @@ bool ContactNewton::solve(double tolerance, double normal) {
       if (found_) break;
       scale_penalties(set_.grows);
     }
-    const double now = std::max(residual_.speed, off);
     aim = stands ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
@@ -231,8 +238,15 @@ bool ContactNewton::solve(double tolerance, double normal) {
     slow = 0;
     scale_penalties(set_.grows);
   }
+  if (!found_ && std::max(residual_.speed, error()) > best) {
+    v_.swap(best_v_);
+    g_.swap(best_g_);
+    l_.swap(best_l_);
+    put_rows();
+    if (!host_->judge(residual_)) return false;
+  }
   if (found_ && residual_.due > 1) residual_.due = residual_.relative = 1;
-  return found_ || residual_.due <= 1 || !gains(normal) || penalties_alone();
+  return found_ || spent || residual_.due <= 1 || !gains(normal) || penalties_alone();
 }
 
 // Whether normal impulses do more work than residuals of this size explain.
@@ -243,7 +257,8 @@ bool ContactNewton::gains(double normal) const {
     const uint32_t i = row_[k].row;
     const double l = l_[3 * size_t{k}];
     all += l;
-    work += l * (u_[3 * size_t{k}] + rows_->rate[i] + given(l, &rows_->yields[3 * size_t{i}]));
+    const Vec3 u = times(k, v_.data(), kStride) + load3(&bias_[3 * size_t{k}]);
+    work += l * (u.x + rows_->rate[i] + given(l, &rows_->yields[3 * size_t{i}]));
   }
   return work > normal * all;
 }

@@ -115,18 +115,20 @@ class ContactNewton {
   Array<double> bias_;   // [row_,3] m/s
   Array<double> heavy_;  // [points,4] kg, of single points; zero where held
   // present state
-  Array<double> v_, base_;                // [nodes,4]
-  Array<double> g_, kept_, way_, minus_;  // [nodes,3]
-  Array<double> inverse_;                 // [nodes,3] of A's diagonal; zero where held
-  Array<double> u_, l_, lh_;              // [row_,3]
-  Array<double> rho_;                     // [row_,2]
-  Array<double> response_;                // [rows] 1/rho_t, by row
-  Array<double> slope_;                   // [row_,9] G, row-major
+  Array<double> v_, base_;                  // [nodes,4]
+  Array<double> g_, kept_, way_, minus_;    // [nodes,3]
+  Array<double> inverse_;                   // [nodes,3] of A's diagonal; zero where held
+  Array<double> u_, l_, lh_;                // [row_,3]
+  Array<double> best_v_, best_g_, best_l_;  // of the pass that leaves least
+  Array<double> rho_;                       // [row_,2]
+  Array<double> response_;                  // [rows] 1/rho_t, by row
+  Array<double> slope_;                     // [row_,9] G, row-major
   Array<double> frozen_;  // [row_] limit of friction, N s, or the normal impulse of a smooth law
   // matrix
   BlockPattern pattern_;
   Array<uint64_t> keys_;
   Array<uint32_t> pairs_;          // [nb,2]
+  Array<uint32_t> analysed_;       // of the order that factor_ has, by minimum degree
   Array<uint32_t> at_;             // blocks of the bodies' patterns among them
   Array<uint32_t> own_;            // [nodes] diagonal block
   Array<uint32_t> spot_;           // of each pair of entries of each row

@@ -10,8 +10,8 @@ namespace dfm {
 
 ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
   use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, bias_, heavy_, v_, base_, g_,
-             kept_, way_, minus_, inverse_, u_, l_, lh_, rho_, response_, slope_, frozen_, keys_, pairs_, at_,
-             own_, spot_, blocks_, matrix_, places_);
+             kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
+             frozen_, keys_, pairs_, at_, own_, spot_, blocks_, matrix_, places_, analysed_);
   use_memory(m, motions_.g, motions_.columns, motions_.left, motions_.first_column, motions_.column_count,
              motions_.first_value);
 }
@@ -259,9 +259,11 @@ bool ContactNewton::evaluate(bool frozen) {
   for (uint32_t k = points_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c) g_[3 * size_t{k} + c] = v_[size_t{kStride} * k + c];
   bool laws = false;
+  double finite = 0;  // NaN if a velocity is not: no law is asked there
   for (uint32_t k = 0; k < row_.size(); ++k) {
     const Vec3 u = times(k, v_.data(), kStride) + load3(&bias_[3 * size_t{k}]);
     store3(&u_[3 * size_t{k}], u);
+    finite += 0.0 * (u.x + u.y + u.z);
     if (row_[k].kind != Kind::contact) {
       evaluate_bond(k);
       continue;
@@ -282,7 +284,7 @@ bool ContactNewton::evaluate(bool frozen) {
     s.ft_stop[stride + i] = (lh[2] - rub * u.z) / h_;
     laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
   }
-  if (laws && !host_->answer(response_.data())) return false;
+  if (finite != 0 || (laws && !host_->answer(response_.data()))) return false;
   for (uint32_t k = 0; k < row_.size(); ++k) {
     double *const l = &l_[3 * size_t{k}];
     if (row_[k].kind == Kind::contact) {
@@ -524,9 +526,13 @@ bool ContactNewton::refactor() {
       }
     }
   }
-  if (!factored_) {
-    if (nodes_ < kDissected) factor_.analyse(pattern_);
-    else factor_.analyse(pattern_, places_.data());
+  const bool dissected = nodes_ >= kDissected;
+  if (!factored_ && dissected) {
+    factor_.analyse(pattern_, places_.data());
+    analysed_.clear();
+  } else if (!factored_ && analysed_ != pairs_) {
+    factor_.analyse(pattern_);
+    analysed_.assign(pairs_.begin(), pairs_.end());
   }
   ++factors_;
   return factored_ = factor_.factor(blocks_.data());
