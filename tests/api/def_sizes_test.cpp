@@ -60,10 +60,11 @@ TEST(DefSizes, DefaultsOfAnOlderOrANewerHeader_FillItsStructAndNothingBehind) {
         SCOPED_TRACE(name);
         using T = std::remove_cvref_t<decltype(defaults)>;
         const uint32_t known = sizeof(T);
-        uint32_t grown = 0;  // the cookie, of those that began without one
+        uint32_t grown = 0;  // the cookie, of those that began without one, and later members
         if constexpr (requires { defaults.cookie; } && !std::is_same_v<T, dfm_attach_def> &&
                       !std::is_same_v<T, dfm_scene_write_def> && !std::is_same_v<T, dfm_tool_def>)
           grown = sizeof defaults.cookie;
+        if constexpr (requires { defaults.mass_scaling; }) grown += sizeof defaults.mass_scaling;
         EXPECT_EQ(first + grown, known)
             << "it has grown: this number stays, and the line above takes the new size";
         EXPECT_EQ(defaults.size, known);
@@ -223,6 +224,7 @@ void check_report(F ask, uint32_t first, const char *name) {
   uint32_t grown = 0;
   if constexpr (requires(T t) { t.cookie; }) grown = sizeof(T::cookie);
   if constexpr (requires(T t) { t.shortened; }) grown = sizeof(T::shortened);
+  if constexpr (requires(T t) { t.mass_moved; }) grown = sizeof(T::mass_moved) + sizeof(T::frequency_change);
   EXPECT_EQ(first + grown, sizeof(T))
       << "it has grown: this number stays, and the line above takes the new size";
   for (const uint32_t asked : {0u, 8u, first - 8, first, uint32_t(sizeof(T)) + 32}) {

@@ -230,7 +230,8 @@ TEST(RigidTouch, WhatMoves_TakesItAlong) {
   EXPECT_NEAR(test::state(r).position[2], 0.14, 3e-6);
 }
 
-// A tower of five, and it stays; both momenta of two boxes that meet in the air.
+// A tower of five, and it stays. Edges that are parallel but for 1e-9 rad cross anywhere, so each sub-step
+// shares the load in another way, which its solve finds to a hundredth of what may creep at rest.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, ATower_Stands) {
   for (const double dt : kStep) {
@@ -249,12 +250,13 @@ TEST(RigidTouch, ATower_Stands) {
     for (const dfm_rigid one : r) start.push_back(test::state(one));
     go(w, dt, 5);
     for (size_t i = 0; i < r.size(); ++i) {
-      EXPECT_LT(moved(start[i], test::state(r[i])), 1e-12) << i;
+      EXPECT_LT(moved(start[i], test::state(r[i])), 1e-9) << i;
       EXPECT_NEAR(test::state(r[i]).position[2], 0.02 + 0.04 * double(i), 1e-5);
     }
   }
 }
 
+// Both momenta of two boxes that meet in the air.
 TEST(RigidTouch, TwoBoxesThatMeet_KeepBothMomenta) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});

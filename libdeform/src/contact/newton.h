@@ -65,7 +65,7 @@ class NewtonHost {
 
 class ContactNewton {
  public:
-  explicit ContactNewton(const Memory &memory);
+  explicit ContactNewton(const Memory &memory, const NewtonSettings &settings = {});
 
   // systems: by source; null: not an implicit body. mass: of one. Rows and host stay valid until the solve
   // has ended. rows.impulse is the start of lh.
@@ -112,6 +112,7 @@ class ContactNewton {
   Array<uint32_t> entry_;  // [row_+1] into node_, jac_
   Array<uint32_t> node_;
   Array<double> jac_;    // [entries,9] rows: the contact's axes
+  Array<double> seen_;   // the same of what velocities see where that differs (ContactRows::arc); else empty
   Array<double> bias_;   // [row_,3] m/s
   Array<double> heavy_;  // [points,4] kg, of single points; zero where held
   // present state

@@ -8,12 +8,14 @@
 
 namespace dfm {
 
-ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
-  use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, bias_, heavy_, v_, base_, g_,
-             kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
-             frozen_, keys_, pairs_, at_, own_, spot_, blocks_, matrix_, places_, analysed_);
-  use_memory(m, motions_.g, motions_.columns, motions_.left, motions_.first_column, motions_.column_count,
-             motions_.first_value);
+ContactNewton::ContactNewton(const Memory &m, const NewtonSettings &settings)
+    : set_(settings), factor_(m), gmres_(m) {
+  use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, seen_, bias_, heavy_, v_,
+             base_, g_, kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_,
+             response_, slope_, frozen_, keys_, pairs_, at_, own_, spot_, blocks_, matrix_, places_,
+             analysed_);
+  use_memory(m, motions_.g, motions_.s, motions_.columns, motions_.left, motions_.first_column,
+             motions_.column_count, motions_.first_value);
 }
 
 void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
@@ -121,6 +123,8 @@ void ContactNewton::list_rows() {
   entry_.assign(1, 0);
   node_.clear();
   jac_.clear();
+  seen_.clear();
+  const bool turns = motions_.rank > 0 && !motions_.s.empty();
   const size_t width = (size_t{motions_.rank} + 3) & ~size_t{3};
   const auto add = [&](uint32_t i, Kind kind) {
     const size_t k = row_.size();
@@ -134,19 +138,24 @@ void ContactNewton::list_rows() {
         for (size_t c = 0; c < 3; ++c)
           jac_.push_back(inverse_[3 * size_t{node} + c] > 0 ? rows.weight[j] * f[3 * r + c] : 0);
     }
-    const double *const g = motions_.rank ? &motions_.g[3 * k * width] : nullptr;
     for (uint32_t q = 0; points_ + q < nodes_; ++q) {
       double part[9];
-      bool any = false;
-      for (size_t r = 0; r < 3; ++r)
-        for (size_t c = 0; c < 3; ++c) {
-          const size_t column = 3 * size_t{q} + c;
-          part[3 * r + c] = column < motions_.rank ? g[r * width + column] : 0;
-          any = any || part[3 * r + c] != 0;
-        }
-      if (!any) continue;
+      const auto take = [&](const Array<double> &from) {
+        bool any = false;
+        for (size_t r = 0; r < 3; ++r)
+          for (size_t c = 0; c < 3; ++c) {
+            const size_t column = 3 * size_t{q} + c;
+            part[3 * r + c] = column < motions_.rank ? from[(3 * k + r) * width + column] : 0;
+            any = any || part[3 * r + c] != 0;
+          }
+        return any;
+      };
+      if (!take(motions_.g)) continue;
       node_.push_back(points_ + q);
       jac_.insert(jac_.end(), part, part + 9);
+      if (!turns) continue;
+      take(motions_.s);
+      seen_.insert(seen_.end(), part, part + 9);
     }
     entry_.push_back(static_cast<uint32_t>(node_.size()));
   };
@@ -210,7 +219,7 @@ void ContactNewton::set_penalties(double factor) {
 }
 
 Vec3 ContactNewton::entry_times(uint32_t e, const double *x) const {
-  const double *const j = &jac_[size_t{9} * e];
+  const double *const j = &(seen_.empty() ? jac_ : seen_)[size_t{9} * e];
   return {j[0] * x[0] + j[1] * x[1] + j[2] * x[2], j[3] * x[0] + j[4] * x[1] + j[5] * x[2],
           j[6] * x[0] + j[7] * x[1] + j[8] * x[2]};
 }

@@ -13,7 +13,8 @@ ContactRows::ContactRows(const Memory &m)
       loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
              given_, frame, drive, rate, borne, start_depth, yields, wn, wt, cross, impulse, bond,
-             dof_of_point_, dof_of_node_, place_, rigid, arm, dof_of_group_, every_block_, whole_of);
+             dof_of_point_, dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_,
+             every_block_, whole_of);
 }
 
 // Of the dofs from `first` on.
@@ -21,6 +22,17 @@ void ContactRows::add_block(uint32_t from, uint32_t first, uint32_t group) {
   const uint32_t count = ndof - first;
   blocks.push_back({from, first, count, response_.size(), group});
   response_.resize(response_.size() + size_t(12) * count * count);
+}
+
+void ContactRows::add_rigid_block(uint32_t group, uint32_t bodies) {
+  dof_of_group_[group] = ndof;
+  for (uint32_t k = 0; k < 2 * bodies; ++k) {
+    source.push_back(kNone);
+    point.push_back(k);
+    block.push_back(static_cast<uint32_t>(blocks.size()));
+  }
+  ndof += 2 * bodies;
+  add_block(kNone, dof_of_group_[group], group);
 }
 
 // Blocks of the rigid groups that are touched, in their order.
@@ -35,17 +47,41 @@ void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const Rigi
   };
   for (const ContactPoint &c : contacts) touch(c);
   for (const Bond &b : bonds) touch(b);
-  for (uint32_t g = 0; g < rigids.group_size.size(); ++g) {
-    if (dof_of_group_[g] == kNone) continue;
-    const uint32_t count = 2 * rigids.group_size[g];
-    dof_of_group_[g] = ndof;
-    for (uint32_t k = 0; k < count; ++k) {
-      source.push_back(kNone);
-      point.push_back(k);
-      block.push_back(static_cast<uint32_t>(blocks.size()));
-    }
-    ndof += count;
-    add_block(kNone, ndof - count, g);
+  for (uint32_t g = 0; g < rigids.group_size.size(); ++g)
+    if (dof_of_group_[g] != kNone) add_rigid_block(g, rigids.group_size[g]);
+}
+
+void ContactRows::clear() {
+  for (Array<uint32_t> *a : {&begin, &dof, &source, &point, &block, &rigid, &rigid_a}) a->clear();
+  for (Array<double> *a : {&weight, &response_, &whole_of, &arc, &arc_a}) a->clear();
+  blocks.clear();
+  ndof = 0;
+}
+
+void ContactRows::build(std::span<const RigidSides> contacts, std::span<const uint32_t> group_size) {
+  n = static_cast<uint32_t>(contacts.size());
+  nbond = 0;
+  clear();
+  begin.assign(n + 1, 0);
+  dof_of_group_.resize(group_size.size());
+  for (uint32_t g = 0; g < group_size.size(); ++g) add_rigid_block(g, group_size[g]);
+  for (Array<double> *a : {&y, &y_free, &alone}) a->assign(size_t(4) * ndof, 0.0);
+  for (Array<double> *a : {&arm, &arm_a, &drive, &yields, &impulse}) a->resize(size_t(3) * n);
+  for (Array<double> *a : {&rate, &wn, &wt}) a->resize(n);
+  this->cross.resize(size_t(2) * n);
+  frame.resize(size_t(9) * n);
+  for (uint32_t i = 0; i < n; ++i) {
+    const RigidSides &c = contacts[i];
+    const auto set = [&](const RigidPlace &r, Array<uint32_t> &of, Array<double> &arms) {
+      of.push_back(r.group == kNone ? kNone : dof_of_group_[r.group] + 2 * r.place);
+      store3(&arms[size_t(3) * i], c.at - r.center);
+    };
+    set(c.b, rigid, arm);
+    set(c.a, rigid_a, arm_a);
+    double *const f = &frame[size_t(9) * i];
+    store3(f, c.normal);
+    store3(f + 3, c.tangent);
+    store3(f + 6, dfm::cross(c.normal, c.tangent));
   }
 }
 
@@ -85,17 +121,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     nnode = std::max(nnode, s.first_node + s.nnode);
     npoint = std::max(npoint, s.first_point + s.npoint);
   }
-  begin.clear();
-  dof.clear();
-  weight.clear();
-  source.clear();
-  point.clear();
-  block.clear();
-  blocks.clear();
-  response_.clear();
-  whole_of.clear();
+  clear();
   for (const DofSource &s : sources) whole_of.push_back(s.whole);
-  ndof = 0;
 
   auto source_of = [&](uint32_t node) {
     // sources are in ascending first_node order
@@ -127,7 +154,6 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     }
     if (ndof > first) add_block(s, first, kNone);
   }
-  rigid.clear();
   if (!rigids.of_obstacle.empty()) {
     build_rigid(contacts, rigids, bonds);
     set_arms(contacts, sources, rigids, bonds);
@@ -427,12 +453,18 @@ void ContactRows::turn_frames() {
 Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
   Vec3 u;
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(of + size_t(dof[j]) * 4);
-  if (!rigid.empty() && rigid[i] != kNone) {
-    const double *const v = of + size_t(rigid[i]) * 4;
-    u -= load3(v) + dfm::cross(load3(v + 4), load3(&arm[size_t(3) * i]));
-  }
+  Vec3 turned;
+  each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *turns) {
+    const double *const v = of + size_t(d) * 4;
+    const Vec3 spin = load3(v + 4);
+    u += sign * (load3(v) + dfm::cross(spin, r));
+    if (turns)
+      turned +=
+          sign * Vec3{dot(load3(turns), spin), dot(load3(turns + 3), spin), dot(load3(turns + 6), spin)};
+  });
   const double *const f = &frame[size_t(i) * 9];
-  return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&drive[size_t(i) * 3]);
+  return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} + turned -
+         load3(&drive[size_t(i) * 3]);
 }
 
 void ContactRows::take_response(const Block &b) {
@@ -466,11 +498,10 @@ void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
 void ContactRows::apply(uint32_t i, Vec3 q) {
   const double *const f = &frame[size_t(i) * 9];
   const Vec3 p = q.x * load3(f) + q.y * load3(f + 3) + q.z * load3(f + 6);
-  if (!rigid.empty() && rigid[i] != kNone) {
-    const Block &b = blocks[block[rigid[i]]];
-    response_apply(b, rigid[i], -p);
-    response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
-  }
+  each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
+    response_apply(blocks[block[d]], d, sign * p);
+    response_apply(blocks[block[d]], d + 1, sign * dfm::cross(r, p));
+  });
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
     if (block[d] != kNone) {
@@ -539,28 +570,41 @@ void ContactRows::motions(std::span<const uint32_t> contacts, std::span<const ui
   out.rank = static_cast<uint32_t>(found);
   const size_t width = (found + 3) & ~size_t{3};
   g.assign(size_t(3) * contacts.size() * width, 0.0);
+  out.s.resize(arc.empty() ? 0 : g.size());
   for (size_t k = 0; k < contacts.size(); ++k) {
     const uint32_t i = contacts[k];
     const double *const f = &frame[size_t(9) * i];
     double *const to = &g[3 * k * width];
-    // what each motion of its block makes of the contact's velocity
-    const auto put = [&](uint32_t d, auto &&change) {
+    // use(column of G, values of the motion at dof d)
+    const auto each_motion = [&](uint32_t d, auto &&use) {
       const uint32_t number = block[d];
       if (number == kNone) return;
       const Block &b = blocks[number];
-      for (size_t c = 0; c < column_count[number]; ++c) {
-        const size_t at = first_value[number] + c * 3 * b.count + size_t(3) * (d - b.first);
-        const Vec3 u = change(&columns[at]);
-        for (size_t row = 0; row < 3; ++row)
-          to[row * width + first_column[number] + c] += dot(load3(f + 3 * row), u);
-      }
+      for (size_t c = 0; c < column_count[number]; ++c)
+        use(first_column[number] + c,
+            &columns[first_value[number] + c * 3 * b.count + size_t(3) * (d - b.first)]);
+    };
+    // what each motion of its block makes of the contact's velocity
+    const auto put = [&](uint32_t d, auto &&change) {
+      each_motion(d, [&](size_t column, const double *at) {
+        const Vec3 u = change(at);
+        for (size_t row = 0; row < 3; ++row) to[row * width + column] += dot(load3(f + 3 * row), u);
+      });
     };
     for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
       put(dof[j], [&](const double *at) { return weight[j] * load3(at); });
-    if (!rigid.empty() && rigid[i] != kNone)
-      put(rigid[i], [&](const double *at) {
-        return -(load3(at) + dfm::cross(load3(at + 3), load3(&arm[size_t(3) * i])));
+    each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
+      put(d, [&](const double *at) { return sign * (load3(at) + dfm::cross(load3(at + 3), r)); });
+    });
+    if (arc.empty()) continue;
+    double *const seen = &out.s[3 * k * width];
+    std::copy_n(to, 3 * width, seen);
+    each_rigid(i, [&](uint32_t d, Vec3, double sign, const double *turns) {
+      each_motion(d, [&](size_t column, const double *at) {
+        for (size_t row = 0; row < 3; ++row)
+          seen[row * width + column] += sign * dot(load3(turns + 3 * row), load3(at + 3));
       });
+    });
   }
 }
 

@@ -48,6 +48,11 @@ struct RigidPlaces {
   std::span<const RigidPlace> of_obstacle;  // by obstacle slot; empty: no rigid bodies
   std::span<const uint32_t> group_size;     // bodies per group
 };
+// A contact between two rigid things at this place; normal: from b to a.
+struct RigidSides {
+  RigidPlace a, b;
+  Vec3 at, normal, tangent;
+};
 
 struct ContactRows {
   // Dofs [first, first+count) of a self-stepping body, or of a rigid group: per body its linear velocity,
@@ -73,6 +78,12 @@ struct ContactRows {
   // [all] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
   Array<uint32_t> rigid;
   Array<double> arm;  // [all,3] m, where there are any
+  // the same of the body on the other side of contacts between rigid things alone
+  Array<uint32_t> rigid_a;
+  Array<double> arm_a;
+  // [n,3,3] m, of both: what a change of spin adds to the velocity in the frame beside spin x arm, since the
+  // arm turns in the sub-step. Empty: nothing.
+  Array<double> arc, arc_a;
   Array<Block> blocks;
 
   // [all,9] normal, tangent, normal x tangent; of a bond the world's axes. It and `drive` have a vector more.
@@ -112,6 +123,9 @@ struct ContactRows {
   // finish().
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
              const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {});
+  // The same of contacts between rigid things, all of whose groups are touched, with their frames. The caller
+  // gives drive, rate, yields, wn, wt, cross and impulse as well.
+  void build(std::span<const RigidSides> contacts, std::span<const uint32_t> group_size);
   // fill(matrix) writes the block's response, [3 count, 3 count] row-major, 1/kg.
   template <class Fill>
   void set_response(const Block &b, const Fill &fill) {
@@ -161,10 +175,10 @@ struct ContactRows {
   void apply_last();
   // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore(const RowsPart &part);
-  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks. Padded: rank rounded up
-  // to fours, with zeros.
+  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks; with arcs, by S G^T
+  // impulse. Padded: rank rounded up to fours, with zeros.
   struct Motions {
-    Array<double> g;
+    Array<double> g, s;
     uint32_t rank = 0;
     // columns of the blocks, what is left of a diagonal; [blocks] first column, columns, and place of their
     // first value
@@ -192,7 +206,17 @@ struct ContactRows {
   // of whole()
   RowRun every_row_[2] = {};
   Array<uint32_t> every_block_;
+  void clear();
   void add_block(uint32_t from, uint32_t first, uint32_t group);
+  void add_rigid_block(uint32_t group, uint32_t bodies);
+  // f(dof of its velocity, arm, sign, arc or null): the rigid bodies of row i
+  template <class F>
+  void each_rigid(uint32_t i, const F &f) const {
+    const auto turns = [&](const Array<double> &of) { return of.empty() ? nullptr : &of[size_t(9) * i]; };
+    if (!rigid.empty() && rigid[i] != kNone) f(rigid[i], load3(&arm[size_t(3) * i]), -1.0, turns(arc));
+    if (!rigid_a.empty() && rigid_a[i] != kNone)
+      f(rigid_a[i], load3(&arm_a[size_t(3) * i]), 1.0, turns(arc_a));
+  }
   void take_response(const Block &b);
   void take_answers(const Block &b);
   // Of block b, at dof k's component `row`, by a unit impulse of that column.

@@ -2,8 +2,8 @@
 // joints and the motors that hold (dynamics/rigid/builtin.cpp), so contact never violates joints.
 //
 //   near     the matrix is computed for groups that something is near, because it costs more than a free body
-//   basis    of rank deficient matrices: response = basis basis^T. Newton's unknowns y of a group are those
-//            of its velocities, basis y, and their mass matrix is the identity
+//   rank     of a matrix is that of the motions that joints and motors allow; the rest of it is rounding, and
+//            taken out
 //   motors   decided again in each pass, by the impulses of soft bodies and of the rows
 #include <algorithm>
 #include <cmath>
@@ -24,7 +24,7 @@ constexpr double kStronger = 0.1;  // of what a place yields where a motor holds
 constexpr double kMostStrong = 1e-6;  // of it: no place gives less
 constexpr double kDriven = 0.01;      // sine: a motor moves a place along a direction
 constexpr double kNever = 1e3;        // m/s, to part by: such a place has no impulse
-constexpr double kRank = 1e-12;       // of the answer without joints: what is left out of the basis
+constexpr double kRank = 1e-12;       // of the answer without joints: less is rounding
 
 bool gives_way(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
 
@@ -84,8 +84,6 @@ bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacl
 void ToolTouch::list_joints(Moved &m) {
   const RigidSet &set = *m.set;
   m.jointed.assign(set.ngroup, 0);
-  m.basis_first.assign(set.ngroup, kNone);
-  m.rank.assign(set.ngroup, 0);
   for (const dfm_joint_def &j : set.joints) {
     m.drives = m.drives || j.motor;
     for (const uint32_t body : {j.body, j.with})
@@ -97,9 +95,10 @@ void ToolTouch::ask_response(Moved &m, uint32_t g) {
   RigidSet &set = *m.set;
   const size_t at = m.first[g] != kNone ? m.first[g] : m.response.size();
   if (m.first[g] == kNone) m.response.resize(at + m.wide[g] * m.wide[g], 0.0);
-  m.basis_first[g] = kNone;
   m.first[g] = kNone;
-  if (set.respond(g, static_cast<uint32_t>(m.wide[g] / 6), &m.response[at])) m.first[g] = at;
+  if (!set.respond(g, static_cast<uint32_t>(m.wide[g] / 6), &m.response[at])) return;
+  m.first[g] = at;
+  if (m.jointed[g]) clean_response(m, g);
 }
 
 // Of the group of this side, if it has joints and its response has not been needed yet.
@@ -176,7 +175,6 @@ void ToolTouch::renew_rows() {
       row.rate = -kNever;
       row.impulse = row.opens = 0;
     }
-    if (i < response_.size()) response_[i] = row.response;
     if (!(row.response > 0 && row.impulse > 0)) row.along[0] = row.along[1] = 0;
   }
   push_all();
@@ -247,14 +245,12 @@ void ToolTouch::add_to_revised(RigidSet &set) {
   }
 }
 
-// response = B B^T by Cholesky's method with pivots; what has a smaller pivot than rounding is left out.
-void ToolTouch::find_basis(Moved &m, uint32_t g) {
-  if (m.basis_first[g] != kNone) return;
-  const size_t wide = m.wide[g], at = m.basis.size();
-  const double *const response = &m.response[m.first[g]];
-  m.basis.resize(at + wide * wide + 2 * wide, 0.0);
-  double *const basis = &m.basis[at];  // [wide,wide] of which the first columns are used
-  double *const left = basis + wide * wide, *const least = left + wide;
+// response = B B^T by Cholesky's method with pivots, without what has a smaller pivot than rounding.
+void ToolTouch::clean_response(Moved &m, uint32_t g) {
+  const size_t wide = m.wide[g];
+  double *const response = &m.response[m.first[g]];
+  std::vector<double> basis(wide * wide + 2 * wide);  // [wide,rank] by columns, and two columns more
+  double *const left = &basis[wide * wide], *const least = left + wide;
   for (size_t i = 0; i < m.set->defs.size(); ++i) {
     if (m.set->group[i] != g) continue;
     const dfm_rigid_def &d = m.set->defs[i];
@@ -272,33 +268,19 @@ void ToolTouch::find_basis(Moved &m, uint32_t g) {
       if (left[r] * least[pivot] > left[pivot] * least[r]) pivot = r;
     if (!(left[pivot] > least[pivot])) break;
     const double scale = 1 / std::sqrt(left[pivot]);
+    double *const column = &basis[rank * wide];
     for (size_t r = 0; r < wide; ++r) {
       double sum = response[r * wide + pivot];
-      for (size_t c = 0; c < rank; ++c) sum -= basis[r * wide + c] * basis[pivot * wide + c];
-      basis[r * wide + rank] = scale * sum;
+      for (size_t c = 0; c < rank; ++c) sum -= basis[c * wide + r] * basis[c * wide + pivot];
+      column[r] = scale * sum;
+      left[r] -= column[r] * column[r];
     }
-    for (size_t r = 0; r < wide; ++r) left[r] -= basis[r * wide + rank] * basis[r * wide + rank];
     left[pivot] = 0;
   }
-  m.basis_first[g] = at;
-  m.rank[g] = rank;
-}
-
-const double *ToolTouch::basis_of(const Moved &m, uint32_t part) const {
-  const uint32_t g = m.set->group[part];
-  return &m.basis[m.basis_first[g] + 6 * size_t{m.set->place[part]} * m.wide[g]];
-}
-
-// The spin of a side in Newton's method.
-Vec3 ToolTouch::spin_of(const Motion &motion, const Side &side) const {
-  if (!motion.jointed) return motion.spin;
-  const Moved &m = sides_[side.tool];
-  const double *const b = basis_of(m, side.part);
-  const size_t wide = m.wide[motion.group];
-  Vec3 w = load3(&m.base[6 * size_t{side.part} + 3]);
-  for (int d = 0; d < 3; ++d)
-    for (size_t c = 0; c < motion.size; ++c) w[d] += b[(3 + size_t(d)) * wide + c] * newton_.x[motion.at + c];
-  return w;
+  std::fill_n(response, wide * wide, 0.0);
+  for (size_t c = 0; c < rank; ++c)
+    for (size_t r = 0; r < wide; ++r)
+      for (size_t k = 0; k < wide; ++k) response[r * wide + k] += basis[c * wide + r] * basis[c * wide + k];
 }
 
 }  // namespace dfm

@@ -18,22 +18,20 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostSweeps = 60;
-constexpr double kDone = 1e-13;            // of the largest speed that a row is to change
-constexpr double kSharper = 1e-3;          // of the change by a pass: tolerance of its sweeps
+constexpr double kDone = 1e-10;            // of the largest speed that a row is to change
+constexpr double kSharper = 1e-2;          // of the change by a pass: tolerance of its solve
 constexpr double kSame = 1e-9;             // of it: soft bodies need not be solved again
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
 constexpr double kCross = 1e-6;            // sine between edges that have a normal
 constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
-constexpr double kArc = 0.2;               // rad in a sub-step, of a free body that touches
 constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
+constexpr double kOff = 0.2;               // of d_c, that places may be off after the passes: else it is, too
 constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
 constexpr double kNear = 0.5;        // of the least thickness: a row with an impulse is no longer than this
-constexpr uint32_t kSweeps = 6;      // between two leaps
-constexpr double kFaster = 0.5;      // of what the best sweep has left, by a leap: else the pass ends
-constexpr uint32_t kMostPasses = 6;  // over the laws, and what turning adds, until both change no more
+constexpr double kFaster = 0.5;      // of the change by the pass before: else passes end
+constexpr uint32_t kMostPasses = 6;  // over what turning adds, until it changes no more
 constexpr uint32_t kMostRevisions = 6;  // of motors, by contact
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
@@ -101,8 +99,9 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : islands_(m), batches_(m), next_(m), next_report_(m) {
-  use_memory(m, start_, tangents_, match_, points_, response_, best_);
+ToolTouch::ToolTouch(const Memory &m)
+    : solved_(m), acceleration_(m), islands_(m), batches_(m), next_(m), next_report_(m) {
+  use_memory(m, start_, tangents_, match_, points_, swept_);
   state_.use(m);
 }
 
@@ -263,7 +262,6 @@ void ToolTouch::add_rows_to(size_t k, RigidSet &set) const {
 // counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
 double ToolTouch::follow_spin() {
   double most = 0;
-  off_joints_ = 0;
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     if (!m.set || m.set->of_tool || !m.touched) continue;
@@ -286,7 +284,7 @@ double ToolTouch::follow_spin() {
       add(change, &m.base[at]);
       add(change, &m.turn[at]);
       most = std::max(most, m.reach[i] * norm(change));
-      if (m.jointed[m.set->group[i]]) off_joints_ = std::max(off_joints_, h_ * most);
+      if (m.jointed[m.set->group[i]]) off_ = std::max(off_, h_ * most);
     }
   }
   return most;
@@ -300,14 +298,8 @@ Vec3 ToolTouch::spin(const Side &side) const {
 
 // (exp(h w) - 1) r / h less its first term. Without it, what a turning tool holds would creep outwards.
 Vec3 ToolTouch::bend(Vec3 spin, Vec3 arm) const {
-  const bool large = h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn;
-  return bend(spin, large ? turned(Quat{}, h_ * spin) : Quat{}, arm);
-}
-
-// turn: by the spin in the sub-step.
-Vec3 ToolTouch::bend(Vec3 spin, const Quat &turn, Vec3 arm) const {
   if (h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn)
-    return (1 / h_) * (rotate(turn, arm) - arm) - cross(spin, arm);
+    return (1 / h_) * (rotate(turned(Quat{}, h_ * spin), arm) - arm) - cross(spin, arm);
   const Vec3 second = cross(spin, cross(spin, arm)), third = cross(spin, second), fourth = cross(spin, third);
   return (h_ / 2) * second + (h_ * h_ / 6) * third + (h_ * h_ * h_ / 24) * fourth +
          (h_ * h_ * h_ * h_ / 120) * cross(spin, fourth);
@@ -392,9 +384,11 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
 
 // How the two sides yield along the normal (inverse 0: they do not) and in the tangent plane.
 void ToolTouch::set_answers(Row &row) {
-  const double w = dot(row.normal, answer_to(row, row.normal));
+  const Vec3 pressed = answer_to(row, row.normal);
+  const double w = dot(row.normal, pressed);
   const bool held = !(w > rounding_of(row, row.normal));
   row.inverse = row.response = 0;
+  for (size_t k = 0; k < 2; ++k) row.cross[k] = dot(row.tangent[k], pressed);
   if (!row.jaw) row.soft = held && motor_holds(row) ? give_of_motor(row) : 0;
   if (held && !(row.soft > 0)) return;
   row.inverse = 1 / (w + row.soft);
@@ -506,40 +500,6 @@ void ToolTouch::find(const World &w, const StepContext &step) {
   });
 }
 
-// One sweep of Gauss-Seidel; the rows are few. Returns the largest change, m/s.
-double ToolTouch::sweep() {
-  double most = 0;
-  for (uint32_t i = 0; i < rows_.size(); ++i) {
-    Row &row = rows_[i];
-    const Vec3 u = speed(row);
-    const double free = row.rate - row.lift - dot(row.normal, u);
-    double next = std::max(0.0, row.impulse + row.inverse * (free - row.soft * row.impulse));
-    if (row.opens > 0)
-      next = std::max({0.0, (row.impulse + row.inverse * free) / (1 + row.inverse * row.opens),
-                       row.impulse + row.inverse * (free - row.rate)});
-    const double more = next - row.impulse;
-    if (more != 0) {
-      row.impulse = next;
-      push(row, more * row.normal);
-      most = std::max(most, std::fabs(more) / row.inverse);
-    }
-    if (!(row.response > 0) || (next == 0 && row.along[0] == 0 && row.along[1] == 0)) continue;
-    const std::array<double, 2> t = next > 0 ? rub(i) : std::array<double, 2>{};
-    const double change[2] = {t[0] - row.along[0], t[1] - row.along[1]};
-    if (change[0] == 0 && change[1] == 0) continue;
-    std::copy(t.begin(), t.end(), row.along);
-    push(row, change[0] * row.tangent[0] + change[1] * row.tangent[1]);
-    most = std::max(most, row.response * std::sqrt(change[0] * change[0] + change[1] * change[1]));
-  }
-  return most;
-}
-
-void ToolTouch::take_impulses(Array<double> &to) const {
-  to.resize(3 * rows_.size());
-  for (size_t i = 0; i < rows_.size(); ++i)
-    store3(&to[3 * i], {rows_[i].impulse, rows_[i].along[0], rows_[i].along[1]});
-}
-
 // Computes the velocities from the impulses of the rows.
 void ToolTouch::push_all() {
   for (Moved &m : sides_) {
@@ -549,32 +509,8 @@ void ToolTouch::push_all() {
   for (const Row &row : rows_) push(row, row.given());
 }
 
-// Sweeps; where they converge slowly, Newton's method after every few of them. The result is that of a plain
-// sweep, the best one. If more places stick than there are motions, there is no solution until the terms of
-// turning are those of this pass: so a pass ends when nothing is gained.
-void ToolTouch::sweep_until(double done) {
-  double best = HUGE_VAL, before = HUGE_VAL;
-  for (uint32_t k = 1;; ++k) {
-    const double left = sweep();
-    if (!(left > done)) return;
-    if (left < best) {
-      best = left;
-      take_impulses(best_);
-    }
-    if (k % kSweeps > 0) continue;
-    if (k == kMostSweeps || !(best < kFaster * before)) break;
-    before = best;
-    leap(done);
-  }
-  for (size_t i = 0; i < rows_.size(); ++i) {
-    rows_[i].impulse = best_[3 * i];
-    std::copy_n(&best_[3 * i + 1], 2, rows_[i].along);
-  }
-  push_all();
-}
-
-// Passes over the laws, as for soft bodies (step/solve_islands.cpp). The terms of turning beyond the first
-// order depend on the solution as well, and are updated in each pass.
+// Passes over what the rows take as given: the terms of turning beyond the first order, spins and motors
+// depend on the solution.
 void ToolTouch::solve(World &w, StepContext &step) {
   double scale = 0;
   for (const Row &row : rows_)
@@ -582,10 +518,9 @@ void ToolTouch::solve(World &w, StepContext &step) {
         scale, std::fabs(row.rate) + std::fabs(dot(row.normal, speed(row))) + row.impulse / row.inverse);
   const double done = kDone * scale;
   double before = HUGE_VAL;
-  newton_.yields = 0;
-  off_joints_ = 0;
+  off_ = 0;
   uint32_t revisions = 0;
-  for (uint32_t pass = 0; pass < kMostPasses; ++pass) {
+  for (uint32_t pass = 0;; ++pass) {
     double changed = 0;
     charge(w, step, 0);
     if (pass > 0 && is_used_up(step)) return;  // a pass takes long where joints connect many bodies
@@ -593,13 +528,17 @@ void ToolTouch::solve(World &w, StepContext &step) {
       ++revisions;
       pass = 0;
     }
-    for (Row &row : rows_) changed = std::max(changed, follow_arc(row));
+    off_ = 0;
+    for (Row &row : rows_) {
+      const double lift = row.lift;
+      changed = std::max(changed, follow_arc(row));
+      if (pass > 0 && row.impulse > 0) off_ = std::max(off_, h_ * std::fabs(row.lift - lift));
+    }
     if (pass > 0) changed = std::max(changed, follow_spin());
     for (Moved &m : sides_) m.stale = m.stale || revisions == kMostRevisions;
-    changed = std::max(changed, ask_laws(done));
-    if (pass > 0 && (!(changed > done) || !(changed < kFaster * before))) return;
+    if (pass > 0 && (!(changed > done) || !(changed < kFaster * before) || pass == kMostPasses)) return;
     if (pass > 0) before = changed;
-    sweep_until(std::max(done, kSharper * changed));
+    solve_rows(w, step, std::max(done, kSharper * changed));
   }
 }
 
@@ -618,7 +557,6 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     m.touched = m.responds = m.drives = m.stale = false;
     m.jaws.clear();
     m.response.clear();
-    m.basis.clear();
     m.jointed.clear();
     if (!m.set) {
       m.center.resize(n);
@@ -657,8 +595,8 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 // A corner moves along an arc. The passes of solve() over it converge by a factor of about h w each; from
 // about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
 // touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
-// w)^2 r / 2: what stays farther away than that does not touch. Where joints turn one body by the motion of
-// another, what the passes have left is taken instead.
+// w)^2 r / 2: what stays farther away than that does not touch. Nor may places be off by what the passes have
+// left.
 bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
@@ -678,7 +616,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (off_joints_ > offset_) arrives = std::min(arrives, 0.5);
+  if (off_ > kOff * offset_) arrives = std::min(arrives, 0.5);
   if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
     return true;
   step.guard.again = step.guard.fast = true;

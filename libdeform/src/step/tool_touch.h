@@ -26,9 +26,12 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "contact/contact_set.h"
+#include "contact/newton.h"
+#include "contact/rows.h"
 #include "contact/store.h"
 #include "core/disjoint_sets.h"
 #include "friction/laws.h"
@@ -98,6 +101,7 @@ class ToolTouch {
     double opens;             // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
     double inverse;           // kg
     double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
+    double cross[2];          // 1/kg, along the tangents by a unit impulse along the normal
     uint32_t law;
     double impulse, along[2];  // N s on a: along the normal and the tangents
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
@@ -111,14 +115,11 @@ class ToolTouch {
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
-    RigidSet *set;                    // nullptr: things that do not yield
-    std::vector<Vec3> center, belt;   // [n] of these things; m/s
-    std::vector<double> response;     // [6 bodies,6 bodies] 1/kg, of one group after another
-    std::vector<size_t> first, wide;  // [groups] where it begins (kNone: none), 6 bodies
-    std::vector<uint8_t> jointed;     // [groups]
-    // response = basis basis^T for groups with joints: [6 bodies,rank], of one group after another
-    std::vector<double> basis;
-    std::vector<size_t> basis_first, rank;   // [groups] where it begins (kNone: not computed yet)
+    RigidSet *set;                           // nullptr: things that do not yield
+    std::vector<Vec3> center, belt;          // [n] of these things; m/s
+    std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
+    std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
+    std::vector<uint8_t> jointed;            // [groups]
     std::vector<double> free, base, change;  // [6n] m/s, rad/s
     std::vector<double> turn;                // [6n] what impulses change beyond the response
     std::vector<double> given;               // [6n] N s, N m s of soft bodies
@@ -181,7 +182,6 @@ class ToolTouch {
   void straighten(Moved &m) const;
   Vec3 bend(const Side &side, const Side &other) const;
   Vec3 bend(Vec3 spin, Vec3 arm) const;
-  Vec3 bend(Vec3 spin, const Quat &turn, Vec3 arm) const;
   Vec3 bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const;
   double follow_arc(Row &row) const;
   Vec3 spin(const Side &side) const;
@@ -191,79 +191,24 @@ class ToolTouch {
   void set_base(size_t k);
   void set_answers(Row &row);
   double follow_spin();
-  double sweep();
-  void sweep_until(double done);
-  void take_impulses(Array<double> &to) const;
   void solve(World &w, StepContext &step);
   Vec3 change_of(const Row &row) const;
   void push_all();
-  // tool_newton.cpp
-  struct Motion {
-    size_t tool, at, size;  // at: first of its unknowns
-    uint32_t group, jaw, part;
-    Vec3 center;
-    bool solved;   // of an island
-    bool jointed;  // its unknowns are those of the basis of its group
-    Vec3 spin;     // rad/s, so far
-    Quat turn;     // by it in the sub-step
+  // tool_solve.cpp
+  // A group of bodies that answer each other's impulses, with their jaws; or a jaw that moves alone.
+  struct Group {
+    size_t tool;
+    uint32_t group, jaw;  // one of them kNone; jaw: its part
+    bool operator==(const Group &) const = default;
   };
-  struct Lever {
-    uint32_t motion;
-    bool of_a;      // else of b
-    size_t values;  // in lever_values_, where they begin
-  };
-  // [3,size] m/s along normal and tangents by the unknowns of its motion; and what turning adds to it beyond
-  // the first order, by the spin so far.
-  const double *by(const Lever &lever, size_t c) const {
-    return &lever_values_[lever.values + c * motions_[lever.motion].size];
-  }
-  double *bent(const Lever &lever, size_t c) {
-    return &lever_values_[lever.values + (3 + c) * motions_[lever.motion].size];
-  }
-  std::array<uint32_t, 2> movers_of(const Side &side);
-  void list_motions();
-  std::array<double, 2> rub_at(uint32_t i, double yields, const double last[3], double normal, double u1,
-                               double u2) const;
-  struct NewtonRow {
-    uint32_t row;
-    // along normal and tangents: m/s without impulses, with bend and lift; N s of the last round, and now; kg
-    double start[3], last[3], now[3], rho[3];
-    bool arcs[3];   // bend and lift follow the spin, and are not in `start`
-    LinearLaw law;  // to come back to
-  };
-  // Of one island; kept for its memory.
-  struct NewtonScratch {
-    size_t n = 0;       // unknowns
-    double yields = 0;  // of the last rounds of this solve; 0: none yet
-    std::vector<NewtonRow> rows;
-    std::vector<uint32_t> order;      // [motions], by which they are eliminated
-    std::vector<uint8_t> joined;      // [motions,motions] while that is found
-    std::vector<size_t> first, live;  // [n] place of the motion that an unknown is of; scratch
-    std::vector<double> mass, system, x, left, from, force, good;  // [n,n], [n,n], [n], ...
-    std::vector<double> slopes;                                    // [n,3]
-  };
-  void order_motions(uint32_t island);
-  void put_masses();
-  void turn_motions();
-  Vec3 spin_of(const Motion &motion, const Side &side) const;
-  bool number_unknowns(uint32_t island);
-  bool set_masses(uint32_t island);
-  void start_rows(uint32_t island);
-  void set_rho(double yields);
-  void add_motion(uint32_t row, const std::vector<double> &x, double u[3]) const;
-  void add_arc(const NewtonRow &l, double u[3], bool slopes);
-  void impulse_at(NewtonRow &l, const double u[3]) const;
-  double force_along(const std::vector<double> &way);
-  void shorten(double at_start);
-  void gather_impulses();
-  void answer_at(NewtonRow &l, const double u[3], double slope[3][3]) const;
-  void add_slopes(uint32_t row, const double slope[3][3]);
-  double newton_step();
-  double end_round();
-  bool solve_round(double done);
-  bool solve_rounds(double done);
-  bool newton(uint32_t island, double done);
-  void leap(double done);
+  RigidPlace place_of(const Side &side);
+  void fill_response(const Group &of, double *matrix) const;
+  void build_rows();
+  void set_arcs(uint32_t i);
+  void find_islands();
+  bool sweep_island(NewtonHost &laws, const RowsPart &part, const Tolerance &tolerance, Residual &left);
+  void solve_island(World &w, StepContext &step, size_t island, double tolerance);
+  void solve_rows(World &w, StepContext &step, double tolerance);
   // tool_joints.cpp
   bool belong_together(const World &w, const Obstacle &a, const Obstacle &b);
   static void list_joints(Moved &m);
@@ -278,8 +223,7 @@ class ToolTouch {
   void renew_rows();
   bool press_harder();
   void ask_again(Moved &m);
-  static void find_basis(Moved &m, uint32_t group);
-  const double *basis_of(const Moved &m, uint32_t part) const;
+  static void clean_response(Moved &m, uint32_t group);
   void take_host(size_t k);
   bool decide_motors();
   // tool_swept.cpp
@@ -300,9 +244,7 @@ class ToolTouch {
   void give_velocities();
   // tool_rub.cpp
   void take_last(const World &w);
-  double ask_laws(double least);
   Vec3 slip(const Row &row) const;
-  std::array<double, 2> rub(uint32_t i) const;
   void keep_next();
   // tool_report.cpp
   void list_contact(uint32_t row);
@@ -310,11 +252,12 @@ class ToolTouch {
   void report(World &w) noexcept;
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
+  static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
 
   double h_ = 0, offset_ = 0;
   double planned_ = 0;        // s, the sub-step before it was shortened
   std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
-  double off_joints_ = 0;     // m, that places of bodies with joints may be off after a solve
+  double off_ = 0;            // m, that places with load or joints may be off after a solve
   double strong_ = 1;         // of the answer without joints, that places give where a motor holds
   double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,
@@ -325,20 +268,25 @@ class ToolTouch {
   ToolShape shapes_[2];
   std::vector<Row> rows_;
   std::vector<Hit> hits_;
-  std::vector<Motion> motions_;
-  DisjointSets islands_;  // of motions that rows connect
-  std::vector<Lever> levers_;
-  std::vector<double> lever_values_;
-  std::vector<uint32_t> first_lever_;  // [rows+1]
-  NewtonScratch newton_;
+  // the rows as a contact problem
+  ContactRows solved_;
+  std::vector<std::unique_ptr<ContactNewton>> newtons_;  // [islands]
+  Acceleration acceleration_;
+  Array<double> swept_;  // [3 rows] impulses of the best sweep
+  std::vector<RigidSides> places_;
+  std::vector<Group> groups_;
+  std::vector<uint32_t> group_size_;           // [groups] bodies
+  DisjointSets islands_;                       // of groups that rows connect
+  std::vector<std::vector<RowRun>> runs_;      // [islands]
+  std::vector<std::vector<uint32_t>> blocks_;  // [islands]
+  std::vector<double> tolerance_;              // [rows] m/s
   std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
   LawBatches batches_;
   std::vector<LawInstance *> laws_;  // of the world
   Array<ContactPoint> points_;       // key and normal
-  Array<double> start_, tangents_, response_;
-  Array<double> best_;  // [3 rows] impulses
+  Array<double> start_, tangents_;
   Array<uint32_t> match_;
   ContactStore next_;
   RigidReport next_report_;
