@@ -118,7 +118,7 @@ TEST(SelectOnFilled, Box_TakesTheSurfaceInIt) {
   Skin &skin = c.body.skin;
   skin.points = {0.3, 0.3, 0.31};
   skin.npoint = 1;
-  Selection where;
+  dfm::scene::Selection where;
   for (int k = 0; k < 3; ++k) {
     where.lo[k] = 0.29;
     where.hi[k] = 0.32;
