@@ -184,8 +184,8 @@ void set_forces(World &w, StepContext &step, const Buffers &r) {
       const Body &b = body_of_node(w, step, c.node[k], s);
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const double *const force = &r.lagged[b.slot][at];
-      for (int j = 0; j < 3; ++j)
-        pull[j] += c.weight[k] * (step.h * (b.dynamics->diagonal()[at + size_t(j)] * force[j]));
+      const double *const d = b.dynamics->diagonal() + at;
+      pull += c.weight[k] * (step.h * Vec3{d[0] * force[0], d[1] * force[1], d[2] * force[2]});
     }
     const double *const f = &step.rows.frame[size_t(i) * 9];
     const Vec3 u = step.rows.velocity(i);

@@ -11,7 +11,7 @@
 //                 the normal impulse of this pass and the slip u + (l - lh)/rho.
 //   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J. It is
 //                 taken where it makes g smaller. Where it does not, limits of friction are frozen: g is then
-//                 the gradient of a convex function, and steps with a line search lower that.
+//                 the gradient of a convex function (but for arcs), and steps with a line search lower that.
 //
 // Impulses of redundant contacts are not unique, velocities are: passes end by velocities. A contact that
 // sticks keeps lh, so that it acts as a spring of stiffness rho/h^2 with memory and does not creep, whatever

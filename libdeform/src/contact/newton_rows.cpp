@@ -535,12 +535,13 @@ bool ContactNewton::refactor() {
       }
     }
   }
-  const bool dissected = nodes_ >= kDissected;
-  if (!factored_ && dissected) {
-    factor_.analyse(pattern_, places_.data());
+  const bool dissected = points_ >= kDissected;  // motions of blocks have no place
+  if (!factored_ && (dissected || analysed_ != pairs_)) {
     analysed_.clear();
-  } else if (!factored_ && analysed_ != pairs_) {
-    factor_.analyse(pattern_);
+    if (dissected) factor_.analyse(pattern_, places_.data());
+    else factor_.analyse(pattern_);
+  }
+  if (!factored_ && !dissected) {
     analysed_.assign(pairs_.begin(), pairs_.end());
   }
   ++factors_;

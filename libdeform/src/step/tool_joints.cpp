@@ -249,7 +249,8 @@ void ToolTouch::add_to_revised(RigidSet &set) {
 void ToolTouch::clean_response(Moved &m, uint32_t g) {
   const size_t wide = m.wide[g];
   double *const response = &m.response[m.first[g]];
-  std::vector<double> basis(wide * wide + 2 * wide);  // [wide,rank] by columns, and two columns more
+  std::vector<double> &basis = m.basis;  // [wide,rank] by columns, and two columns more
+  basis.resize(wide * wide + 2 * wide);
   double *const left = &basis[wide * wide], *const least = left + wide;
   for (size_t i = 0; i < m.set->defs.size(); ++i) {
     if (m.set->group[i] != g) continue;

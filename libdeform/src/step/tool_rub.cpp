@@ -6,9 +6,7 @@
 //
 // A place where two rigid things meet has no area. Laws that use the area get one square centimeter.
 #include <algorithm>
-#include <cmath>
 
-#include "contact/friction_kernel.h"
 #include "core/hash.h"
 #include "state/world.h"
 #include "step/context.h"

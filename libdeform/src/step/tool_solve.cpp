@@ -38,7 +38,11 @@ class RigidLaws final : public NewtonHost {
     // a law is asked where slip is known to a tenth of what may be left of it
     return !(bad = batches_.answer(step_.h, response, 0.1 * tolerance_.bond, 1e-3, state_));
   }
-  bool slopes() override { return !(bad = batches_.slopes(step_.h, state_)); }
+  bool slopes() override {
+    if ((bad = batches_.slopes(step_.h, state_))) return false;
+    if (batches_.differences()) linearize(rows_, part_, step_.h, state_);
+    return true;
+  }
   bool judge(Residual &residual) override {
     set_trial(rows_, part_, step_.h, rows_.wt.data(), state_);
     if (!answer(rows_.wt.data())) return false;
@@ -149,7 +153,7 @@ void ToolTouch::build_rows() {
     solved_.rate[i] = -row.rate;
     solved_.wn[i] = 1 / row.inverse;
     solved_.wt[i] = row.response;
-    std::copy_n(row.cross, 2, &solved_.cross[2 * size_t{i}]);
+    for (size_t k = 0; k < 2; ++k) solved_.cross[2 * size_t{i} + k] = dot(row.tangent[k], row.pressed);
     const bool opens = row.opens > 0;
     store3(&solved_.yields[3 * size_t{i}],
            {opens ? row.opens : row.soft, opens ? row.rate : std::numeric_limits<double>::max(), 0});
@@ -172,7 +176,9 @@ void ToolTouch::find_islands() {
   for (uint32_t b = 0; b < solved_.blocks.size(); ++b)
     blocks_[islands_.of[solved_.blocks[b].group]].push_back(b);
   for (uint32_t i = 0; i < places_.size(); ++i) {
-    std::vector<RowRun> &runs = runs_[islands_.of[group_of(places_[i])]];
+    const uint32_t group = group_of(places_[i]);
+    if (group == kNone) continue;  // a host that has failed to answer
+    std::vector<RowRun> &runs = runs_[islands_.of[group]];
     if (!runs.empty() && runs.back().first + runs.back().n == i) ++runs.back().n;
     else runs.push_back({i, 1});
   }
@@ -223,18 +229,19 @@ void ToolTouch::solve_island(World &w, StepContext &step, size_t island, double 
   RigidLaws laws(w, step, solved_, part, state_, batches_, tolerance);
   solved_.restore(part);
   Residual left;
-  if (laws.judge(left)) {
+  // slopes of an earlier sub-step are of no use for the residual of the start
+  if (laws.judge(left) && (!batches_.differences() || (laws.slopes() && laws.judge(left)))) {
     tolerance.bond = std::max(least, kDisturbed * left.speed);
     each_row(part.contacts, [&](uint32_t i) { tolerance_[i] = tolerance.bond; });
     bool found = sweep_island(laws, part, tolerance, left);
-    if (!found && !laws.bad && left.speed > rest) {
+    if (!found && !laws.bad && left.speed > rest && !is_used_up(step)) {
       if (island >= newtons_.size()) newtons_.resize(island + 1);
       auto &newton = newtons_[island];
       if (!newton) newton = std::make_unique<ContactNewton>(step.contact_memory, kNewton);
       newton->begin(solved_, part, {}, state_, laws, h_);
       found = newton->solve(tolerance.bond, tolerance.most_normal) && newton->residual().speed < left.speed;
     }
-    if (!found && !laws.bad) {
+    if (!found) {  // a law that fails on the way need not fail there
       solved_.impulse.assign(swept_.begin(), swept_.end());
       solved_.restore(part);
       laws.judge(left);

@@ -388,7 +388,7 @@ void ToolTouch::set_answers(Row &row) {
   const double w = dot(row.normal, pressed);
   const bool held = !(w > rounding_of(row, row.normal));
   row.inverse = row.response = 0;
-  for (size_t k = 0; k < 2; ++k) row.cross[k] = dot(row.tangent[k], pressed);
+  row.pressed = pressed;
   if (!row.jaw) row.soft = held && motor_holds(row) ? give_of_motor(row) : 0;
   if (held && !(row.soft > 0)) return;
   row.inverse = 1 / (w + row.soft);
@@ -627,6 +627,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
 
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
+  off_ = 0;
   if (next_.n > 0) keep_next();
   next_report_.contacts.clear();
   next_report_.touching.clear();

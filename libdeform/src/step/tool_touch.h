@@ -101,7 +101,7 @@ class ToolTouch {
     double opens;             // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
     double inverse;           // kg
     double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
-    double cross[2];          // 1/kg, along the tangents by a unit impulse along the normal
+    Vec3 pressed;             // 1/kg, the change of velocity by a unit impulse along the normal
     uint32_t law;
     double impulse, along[2];  // N s on a: along the normal and the tangents
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
@@ -118,6 +118,7 @@ class ToolTouch {
     RigidSet *set;                           // nullptr: things that do not yield
     std::vector<Vec3> center, belt;          // [n] of these things; m/s
     std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
+    std::vector<double> basis;               // scratch of clean_response()
     std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
     std::vector<uint8_t> jointed;            // [groups]
     std::vector<double> free, base, change;  // [6n] m/s, rad/s
