@@ -595,8 +595,8 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 // A corner moves along an arc. The passes of solve() over it converge by a factor of about h w each; from
 // about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
 // touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
-// w)^2 r / 2: what stays farther away than that does not touch. Nor may places be off by what the passes have
-// left.
+// w)^2 r / 2: what stays farther away than that does not touch. Where places are off by what the passes have
+// left, the sub-step goes on in its shortest pieces, which then grow again.
 bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
@@ -616,7 +616,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (off_ > kOff * offset_) arrives = std::min(arrives, 0.5);
+  if (off_ > kOff * offset_) arrives = std::min(arrives, kLeastPiece * step.guard.planned / step.h);
   if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
     return true;
   step.guard.again = step.guard.fast = true;
