@@ -487,10 +487,10 @@ TEST(RigidTouch, AHeapOfBoxes_MakesNoEnergy) {
 
 namespace {
 
-struct Fall { double deepest = 0, made = 0, start = 0, last = 0; };  // m, J
+struct ShaftFall { double deepest = 0, made = 0, start = 0, last = 0; };  // m, J
 
 // Twenty boxes that fall into a shaft of six times their size, moved by `shift` at the start.
-void fall_into_shaft(double shift, Fall &out) {
+void fall_into_shaft(double shift, ShaftFall &out) {
   const double half = 0.15;
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, -kG});
@@ -539,7 +539,7 @@ void fall_into_shaft(double shift, Fall &out) {
 // They jam, turn and carry each other: no corner goes into a wall or the floor, and no step makes energy.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, BoxesInAShaft_StayInside) {
-  Fall fall;
+  ShaftFall fall;
   fall_into_shaft(0, fall);
   EXPECT_LT(fall.deepest, 2e-5) << "m";
   EXPECT_LT(fall.made, 1e-6 * fall.start) << "J in a step";
@@ -550,7 +550,7 @@ TEST(RigidTouch, BoxesInAShaft_StayInside) {
 TEST(RigidTouch, EightShafts_AreNotPassed) {
   double deepest = 0;
   for (int i = 0; i < 8; ++i) {
-    Fall fall;
+    ShaftFall fall;
     fall_into_shaft(0.0007 * i, fall);
     deepest = std::max(deepest, fall.deepest);
     EXPECT_LT(fall.made, 1e-6 * fall.start) << i;
