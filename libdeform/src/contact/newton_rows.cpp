@@ -137,6 +137,7 @@ void ContactNewton::list_rows() {
       for (size_t r = 0; r < 3; ++r)
         for (size_t c = 0; c < 3; ++c)
           jac_.push_back(inverse_[3 * size_t{node} + c] > 0 ? rows.weight[j] * f[3 * r + c] : 0);
+      if (turns) seen_.insert(seen_.end(), jac_.end() - 9, jac_.end());
     }
     for (uint32_t q = 0; points_ + q < nodes_; ++q) {
       double part[9];

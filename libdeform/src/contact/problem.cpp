@@ -17,6 +17,8 @@ constexpr std::string_view kHead = "deform contact problem 1\n";
 class Writer {
  public:
   std::string out{kHead};
+  // Whether what only some problems have follows.
+  static bool more(bool has) { return has; }
   template <class T>
   void one(const T &x) {
     out.append(reinterpret_cast<const char *>(&x), sizeof x);
@@ -61,6 +63,7 @@ class Reader {
   }
   [[noreturn]] static void refuse() { fail(DFM_E_FORMAT, "the contact problem is cut short or damaged"); }
   bool ended() const { return left_.empty(); }
+  bool more(bool) const { return !ended(); }
 
  private:
   std::string_view left_;
@@ -193,6 +196,8 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   motions.resize(number_all(sources));
   take_dofs(from, number);
   rows.n = part.n;
+  rows.nrigid = static_cast<uint32_t>(
+      std::ranges::count_if(contacts, [&](uint32_t i) { return i >= from.soft(); }));
   rows.nbond = part.nbond;
   rows.whole_of.clear();
   for (size_t s = 0; s < systems.size(); ++s) {
@@ -212,17 +217,26 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   rows.begin.assign(1, 0);
   rows.dof.clear();
   rows.weight.clear();
-  rows.rigid.clear();
-  rows.arm.clear();
+  for (Array<uint32_t> *a : {&rows.rigid, &rows.rigid_a}) a->clear();
+  for (Array<double> *a : {&rows.arm, &rows.arm_a, &rows.arc, &rows.arc_a}) a->clear();
   for (const uint32_t i : list) {
     for (uint32_t j = from.begin[i]; j < from.begin[i + 1]; ++j) {
       rows.dof.push_back(number[from.dof[j]]);
       rows.weight.push_back(from.weight[j]);
     }
     rows.begin.push_back(static_cast<uint32_t>(rows.dof.size()));
-    if (!from.rigid.empty()) rows.rigid.push_back(from.rigid[i] == kNone ? kNone : number[from.rigid[i]]);
+    const auto take_side = [&](const Array<uint32_t> &side, Array<uint32_t> &to) {
+      if (!side.empty()) to.push_back(side[i] == kNone ? kNone : number[side[i]]);
+    };
+    take_side(from.rigid, rows.rigid);
+    if (rows.nrigid) take_side(from.rigid_a, rows.rigid_a);
   }
   if (!from.rigid.empty()) copy_rows(from.arm, 3, list, rows.arm);
+  if (rows.nrigid) copy_rows(from.arm_a, 3, list, rows.arm_a);
+  if (rows.nrigid && !from.arc.empty()) {
+    copy_rows(from.arc, 9, list, rows.arc);
+    copy_rows(from.arc_a, 9, list, rows.arc_a);
+  }
   copy_rows(from.frame, 9, list, rows.frame);
   copy_rows(from.drive, 3, list, rows.drive);
   copy_rows(from.wn, 1, list, rows.wn);
@@ -287,6 +301,10 @@ void ContactProblem::transfer(Transfer &t) {
   t.many(state.bristle);
   t.count(motions);
   for (LinearMotion &m : motions) m.transfer(t);
+  if (!t.more(rows.nrigid > 0)) return;
+  t.one(rows.nrigid);
+  t.many(rows.rigid_a);
+  for (Array<double> *a : {&rows.arm_a, &rows.arc, &rows.arc_a}) t.many(*a);
 }
 
 std::string ContactProblem::bytes() {
@@ -310,6 +328,9 @@ void ContactProblem::check() const {
               state.dwell.size() == stride && (state.scale.empty() || state.scale.size() == n) &&
               state.bristle.size() == stride * state.nstate &&
               (rows.rigid.empty() || (rows.rigid.size() == all && rows.arm.size() == 3 * all));
+  const size_t sides = rows.nrigid ? all : 0, arcs = rows.arc.empty() ? 0 : 9 * all;
+  good = good && rows.nrigid <= n && rows.rigid.size() >= sides && rows.rigid_a.size() == sides &&
+         rows.arm_a.size() == 3 * sides && rows.arc.size() == arcs && rows.arc_a.size() == arcs;
   size_t values = 0;
   for (const ContactRows::Block &b : rows.blocks) {
     good = good && b.response == values;
@@ -319,8 +340,8 @@ void ContactProblem::check() const {
   }
   good = good && rows.response_.size() == values && std::ranges::all_of(motions, &LinearMotion::sound);
   for (uint32_t i = 0; i < rows.dof.size() && good; ++i) good = rows.dof[i] < ndof;
-  for (uint32_t i = 0; i < rows.rigid.size() && good; ++i)
-    good = rows.rigid[i] == kNone || size_t{rows.rigid[i]} + 1 < ndof;
+  for (const Array<uint32_t> *const side : {&rows.rigid, &rows.rigid_a})
+    for (const uint32_t d : *side) good = good && (d == kNone || size_t{d} + 1 < ndof);
   for (uint32_t i = 0; i < n && good; ++i) good = state.law[i] < laws.size();
   for (uint32_t d = 0; d < ndof && good; ++d)
     good = rows.block[d] != kNone

@@ -37,43 +37,39 @@ void ContactRows::add_rigid_block(uint32_t group, uint32_t bodies) {
 
 // Blocks of the rigid groups that are touched, in their order.
 void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids,
-                              std::span<const Bond> bonds) {
+                              std::span<const Bond> bonds, std::span<const RigidSides> between_rigids) {
   rigid.assign(all(), kNone);
   arm.resize(size_t(3) * all());
   dof_of_group_.assign(rigids.group_size.size(), kNone);
-  const auto touch = [&](const auto &c) {
-    if (c.obstacle && rigids.of_obstacle[c.slot_b].group != kNone)
-      dof_of_group_[rigids.of_obstacle[c.slot_b].group] = 0;
+  const auto touch = [&](uint32_t group) {
+    if (group != kNone) dof_of_group_[group] = 0;
   };
-  for (const ContactPoint &c : contacts) touch(c);
-  for (const Bond &b : bonds) touch(b);
+  for (const ContactPoint &c : contacts)
+    if (c.obstacle) touch(rigids.of_obstacle[c.slot_b].group);
+  for (const Bond &b : bonds)
+    if (b.obstacle) touch(rigids.of_obstacle[b.slot_b].group);
+  for (const RigidSides &c : between_rigids) {
+    touch(c.a.group);
+    touch(c.b.group);
+  }
   for (uint32_t g = 0; g < rigids.group_size.size(); ++g)
     if (dof_of_group_[g] != kNone) add_rigid_block(g, rigids.group_size[g]);
 }
 
-void ContactRows::clear() {
-  for (Array<uint32_t> *a : {&begin, &dof, &source, &point, &block, &rigid, &rigid_a}) a->clear();
-  for (Array<double> *a : {&weight, &response_, &whole_of, &arc, &arc_a}) a->clear();
-  blocks.clear();
-  ndof = 0;
-}
-
-void ContactRows::build(std::span<const RigidSides> contacts, std::span<const uint32_t> group_size) {
-  n = static_cast<uint32_t>(contacts.size());
-  nbond = 0;
-  clear();
-  begin.assign(n + 1, 0);
-  dof_of_group_.resize(group_size.size());
-  for (uint32_t g = 0; g < group_size.size(); ++g) add_rigid_block(g, group_size[g]);
-  for (Array<double> *a : {&y, &y_free, &alone}) a->assign(size_t(4) * ndof, 0.0);
-  for (Array<double> *a : {&arm, &arm_a, &drive, &yields, &impulse}) a->resize(size_t(3) * n);
-  for (Array<double> *a : {&rate, &wn, &wt}) a->resize(n);
+// Both sides of the last contacts, and their frames.
+void ContactRows::set_rigid_sides(std::span<const RigidSides> between_rigids) {
+  rigid_a.assign(all(), kNone);
+  arm_a.resize(size_t(3) * all());
+  frame.resize(size_t(9) * all());
+  for (Array<double> *a : {&drive, &impulse}) a->resize(size_t(3) * all());
+  for (Array<double> *a : {&wn, &wt}) a->resize(all());
+  yields.resize(size_t(3) * n);
   this->cross.resize(size_t(2) * n);
-  frame.resize(size_t(9) * n);
-  for (uint32_t i = 0; i < n; ++i) {
-    const RigidSides &c = contacts[i];
+  rate.resize(n);
+  for (uint32_t i = soft(); i < n; ++i) {
+    const RigidSides &c = between_rigids[i - soft()];
     const auto set = [&](const RigidPlace &r, Array<uint32_t> &of, Array<double> &arms) {
-      of.push_back(r.group == kNone ? kNone : dof_of_group_[r.group] + 2 * r.place);
+      if (r.group != kNone) of[i] = dof_of_group_[r.group] + 2 * r.place;
       store3(&arms[size_t(3) * i], c.at - r.center);
     };
     set(c.b, rigid, arm);
@@ -83,6 +79,13 @@ void ContactRows::build(std::span<const RigidSides> contacts, std::span<const ui
     store3(f + 3, c.tangent);
     store3(f + 6, dfm::cross(c.normal, c.tangent));
   }
+}
+
+void ContactRows::clear() {
+  for (Array<uint32_t> *a : {&begin, &dof, &source, &point, &block, &rigid, &rigid_a}) a->clear();
+  for (Array<double> *a : {&weight, &response_, &whole_of, &arc, &arc_a}) a->clear();
+  blocks.clear();
+  ndof = 0;
 }
 
 // From the rigid body's center to where the impulse acts on the soft body: the same point on both sides, so
@@ -106,15 +109,17 @@ void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<con
     }
     store3(&arm[size_t(3) * i], at - r.center);
   };
-  for (uint32_t i = 0; i < n; ++i) set(i, contacts[i]);
+  for (uint32_t i = 0; i < soft(); ++i) set(i, contacts[i]);
   for (uint32_t i = 0; i < nbond; ++i) set(n + i, bonds[i]);
 }
 
 void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
-                        const RigidPlaces &rigids, std::span<const Bond> bonds) {
+                        const RigidPlaces &rigids, std::span<const Bond> bonds,
+                        std::span<const RigidSides> between_rigids) {
   // Dofs are numbered in order of first use, except that those of a self-stepping body follow each other (its
   // response is one block).
-  n = static_cast<uint32_t>(contacts.size());
+  nrigid = static_cast<uint32_t>(between_rigids.size());
+  n = static_cast<uint32_t>(contacts.size()) + nrigid;
   nbond = static_cast<uint32_t>(bonds.size());
   uint32_t nnode = 0, npoint = 0;
   for (const DofSource &s : sources) {
@@ -154,8 +159,9 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     }
     if (ndof > first) add_block(s, first, kNone);
   }
-  if (!rigids.of_obstacle.empty()) {
-    build_rigid(contacts, rigids, bonds);
+  if (!rigids.group_size.empty()) {
+    build_rigid(contacts, rigids, bonds, between_rigids);
+    if (nrigid) set_rigid_sides(between_rigids);
     set_arms(contacts, sources, rigids, bonds);
   }
   // Pass 2: contacts to dofs. A coupled surfel expands to its phyxels; a phyxel that comes twice in one
@@ -173,6 +179,10 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     return d;
   };
   for (uint32_t i = 0; i < all(); ++i) {
+    if (i >= soft() && i < n) {
+      begin.push_back(static_cast<uint32_t>(dof.size()));
+      continue;
+    }
     const bool contact = i < n;
     const uint32_t nodes = contact ? contacts[i].nnode : bonds[i - n].nnode;
     const uint32_t *const node = contact ? contacts[i].node : bonds[i - n].node;
@@ -411,13 +421,13 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
     wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b) + body;
   };
-  each_row_in_blocks(n, tasks, fill);
+  each_row_in_blocks(soft(), tasks, fill);
   if (nbond) finish_bonds(bonds);
   turn_frames();
 }
 
 void ContactRows::soften_openings(std::span<const double> firm) {
-  for (uint32_t i = 0; i < n; ++i) {
+  for (uint32_t i = 0; i < soft(); ++i) {
     const double speed = -rate[i];
     if (!(speed > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
     double *const yield = &yields[3 * size_t(i)];
@@ -515,11 +525,13 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
 
 void ContactRows::push_rigid(const Block &b) {
   for (uint32_t i = 0; i < all(); ++i) {
-    if (rigid[i] == kNone || rigid[i] < b.first || rigid[i] >= b.first + b.count) continue;
     const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
-    const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
-    response_apply(b, rigid[i], -p);
-    response_apply(b, rigid[i] + 1, -dfm::cross(load3(&arm[size_t(3) * i]), p));
+    each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
+      if (d < b.first || d >= b.first + b.count) return;
+      const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
+      response_apply(b, d, sign * p);
+      response_apply(b, d + 1, sign * dfm::cross(r, p));
+    });
   }
 }
 

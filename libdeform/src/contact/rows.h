@@ -64,6 +64,8 @@ struct ContactRows {
   };
 
   uint32_t n = 0, ndof = 0;
+  uint32_t nrigid = 0;  // of the n contacts, the last ones: between rigid things alone
+  uint32_t soft() const { return n - nrigid; }
   uint32_t nbond = 0;  // rows behind the contacts: three to a bond
   uint32_t all() const { return n + nbond; }
   Array<uint32_t> begin;  // [all+1] into dof, weight
@@ -78,10 +80,10 @@ struct ContactRows {
   // [all] dof of the rigid body's velocity, its spin is the next one; kNone. Empty: no contact has any
   Array<uint32_t> rigid;
   Array<double> arm;  // [all,3] m, where there are any
-  // the same of the body on the other side of contacts between rigid things alone
+  // the same of the body on the other side of contacts between rigid things alone; empty: there are none
   Array<uint32_t> rigid_a;
   Array<double> arm_a;
-  // [n,3,3] m, of both: what a change of spin adds to the velocity in the frame beside spin x arm, since the
+  // [all,3,3] m, of both: what a change of spin adds to the velocity in the frame beside spin x arm, since the
   // arm turns in the sub-step. Empty: nothing.
   Array<double> arc, arc_a;
   Array<Block> blocks;
@@ -120,12 +122,10 @@ struct ContactRows {
 
   explicit ContactRows(const Memory &memory);
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller gives their responses, then calls
-  // finish().
+  // finish(). Of contacts between rigid things it also gives drive, rate, yields, wn, wt, cross and impulse.
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
-             const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {});
-  // The same of contacts between rigid things, all of whose groups are touched, with their frames. The caller
-  // gives drive, rate, yields, wn, wt, cross and impulse as well.
-  void build(std::span<const RigidSides> contacts, std::span<const uint32_t> group_size);
+             const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {},
+             std::span<const RigidSides> between_rigids = {});
   // fill(matrix) writes the block's response, [3 count, 3 count] row-major, 1/kg.
   template <class Fill>
   void set_response(const Block &b, const Fill &fill) {
@@ -224,7 +224,8 @@ struct ContactRows {
     return response_[b.response + (column * b.count + k) * 4 + row];
   }
   void build_rigid(std::span<const ContactPoint> contacts, const RigidPlaces &rigids,
-                   std::span<const Bond> bonds);
+                   std::span<const Bond> bonds, std::span<const RigidSides> between_rigids);
+  void set_rigid_sides(std::span<const RigidSides> between_rigids);
   void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                 const RigidPlaces &rigids, std::span<const Bond> bonds);
   Vec3 answer(uint32_t d, Vec3 p) const {  // of a dof that is in no block

@@ -274,7 +274,7 @@ namespace {
 template <class T, class F>
 void each_side(const uint32_t *sides, uint32_t i, T *disturbance, F &&f) {
   const uint32_t *const side = sides + 2 * size_t{i};
-  f(disturbance + 2 * size_t{side[0]});
+  if (side[0] != kNone) f(disturbance + 2 * size_t{side[0]});
   if (side[1] != kNone) f(disturbance + 2 * size_t{side[1]});
 }
 
@@ -304,7 +304,8 @@ void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<cons
   tolerance.most_normal = bounds.most_normal;
   each_row(part.contacts, [&](uint32_t i) {
     // what a gap is off by where coordinates are large: a few roundings of them
-    double normal = std::max(bounds.normal, 0x1p-49 * norm(load3(contacts[i].point)) / h);
+    double normal = bounds.normal;
+    if (i < rows.soft()) normal = std::max(normal, 0x1p-49 * norm(load3(contacts[i].point)) / h);
     double tangent = bounds.tangent;
     each_side(sides, i, disturbance, [&](const double *d) {
       tangent = std::max(tangent, 1e-2 * d[0]);

@@ -153,7 +153,7 @@ void share_areas(World &w, StepContext &step) {
     step.exchange.clear();
     return step.aim.clear();
   }
-  const uint32_t n = step.rows.n;
+  const uint32_t n = step.rows.soft();
   step.sharing.resize(n);
   step.aim.resize(n);
   step.stands.resize(n);
@@ -214,7 +214,7 @@ void follow_load(World &w, StepContext &step) {
 void fit_bristles(World &w, StepContext &step) {
   ContactState &s = step.state;
   if (s.nstate == 0) return;
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const uint32_t m = step.match[i];
     if (m == kNone || !(w.store.area[m] < s.area[i])) continue;
     const LawInstance &law = *w.pairs.laws[s.law[i]];
@@ -226,7 +226,7 @@ void fit_bristles(World &w, StepContext &step) {
 void turn_frames(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   ObstacleTurn obstacle(w, step);
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const LawInstance &law = *w.pairs.laws[step.state.law[i]];
     if (!law.turns || !to.touching[i]) continue;
     const ContactPoint &c = step.contacts[i];

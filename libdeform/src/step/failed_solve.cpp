@@ -30,7 +30,7 @@ const Body &fastest(const World &w) {
 
 // The first contact with a value that is not finite after the solve, or kNone.
 uint32_t spoilt(const StepContext &step) {
-  for (uint32_t i = 0; i < step.rows.n; ++i)
+  for (uint32_t i = 0; i < step.rows.soft(); ++i)
     for (size_t k = 0; k < 3; ++k)
       if (!std::isfinite(step.rows.impulse[3 * size_t{i} + k])) return i;
   return kNone;
@@ -95,7 +95,7 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, 
 
 uint32_t tell_jam(World &w, StepContext &step) {
   uint32_t worst = kNone;
-  for (uint32_t i = 0; i < step.rows.n; ++i)
+  for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
   const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
   const std::string held = c && c->obstacle ? tell_held_at(w, c->slot_a, c->slot_b) : std::string();

@@ -113,7 +113,7 @@ Impact impact_on(const StepContext &step, const Body &b, uint32_t slot) {
 
 // Does a contact press on the body of this slot that did not press in the last sub-step?
 bool meets(const World &w, const StepContext &step, uint32_t slot) {
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
     if (c.slot_a != slot && (c.obstacle || c.slot_b != slot)) continue;
     if (!(step.rows.impulse[3 * size_t{i}] > 0)) continue;
@@ -415,7 +415,7 @@ bool wake_hit(World &w, StepContext &step) {
 // the start have no solution either, but are led apart (concepts/overlaps.md).
 bool overloaded(const World &w, const StepContext &step) {
   if (!(step.residual.due > 1) || !w.overlaps.found.empty()) return false;
-  for (uint32_t i = 0; i < step.rows.n; ++i)
+  for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight) return true;
   return false;
 }

@@ -243,7 +243,7 @@ void guard_add_hits(World &w, StepContext &step) {
   };
   Array<Guard::Kept> before;
   before.swap(g.kept);
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
     g.kept.push_back({step.contacts[i].key, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6),
                       step.rows.rate[i], false});
@@ -305,7 +305,7 @@ const Guard::Kept *find_kept(const Guard &g, uint64_t key) {
 }  // namespace
 
 void guard_impulses(StepContext &step) {
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key);
     if (!k) continue;
     const double *const f = &step.rows.frame[size_t(i) * 9];
@@ -317,7 +317,7 @@ void guard_impulses(StepContext &step) {
 }
 
 void guard_rates(StepContext &step) {
-  for (uint32_t i = 0; i < step.rows.n; ++i)
+  for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key); k && k->hit)
       step.rows.rate[i] = k->rate;
 }

@@ -73,7 +73,7 @@ bool damps(const Body &b) {
 void tell_blow(World &w, const StepContext &step, const Body &b, double speed) {
   const ContactPoint *at = nullptr;  // where it presses most
   double most = 0;
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
     const double normal = step.rows.impulse[size_t(3) * i];
     if ((c.slot_a != b.slot && (c.obstacle || c.slot_b != b.slot)) || !(normal > most)) continue;
@@ -129,7 +129,7 @@ bool chosen_by_library(const World &w, double dt) {
 }
 
 bool is_struck(World &w, const StepContext &step) {
-  if (step.rows.n == 0 || w.prescribed.stands()) return false;
+  if (step.rows.soft() == 0 || w.prescribed.stands()) return false;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
     const bool repeats =

@@ -18,14 +18,14 @@ namespace dfm {
 
 // Reserves all memory of keep_contacts(), so that it cannot fail after bodies have moved.
 void reserve_contacts(World &w, StepContext &step) {
-  const uint32_t n = step.rows.n + (w.sleepers ? w.store.n : 0), S = step.state.nstate;
+  const uint32_t n = step.rows.soft() + (w.sleepers ? w.store.n : 0), S = step.state.nstate;
   ContactStore &to = step.next_store;
   // the report that keep_contacts(w, step) will write
   Report &next = w.sleepers ? step.last_report : w.report;
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
-  step.pairs_made.reserve(step.rows.n);
+  step.pairs_made.reserve(step.rows.soft());
   step.before.resize(n);
   step.goes_on.reserve(w.store.n);
   reserve_reports(w, step);
@@ -34,7 +34,7 @@ void reserve_contacts(World &w, StepContext &step) {
 void reserve_reports(World &w, const StepContext &step) {
   const size_t rigid = step.tools->next_report().touching.size();
   size_t contacts = 0;
-  if (w.plan.touches()) contacts = step.rows.n + (w.sleepers ? size_t{w.store.n} : 0);
+  if (w.plan.touches()) contacts = step.rows.soft() + (w.sleepers ? size_t{w.store.n} : 0);
   const size_t pairs = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
   w.work.reserve(w.work.size() + std::min(contacts, pairs) + rigid);
   reserve_events(w, contacts + w.store.n + w.attachments.size() + step.tools->most_events(w));
@@ -173,7 +173,7 @@ void order_keys(const World &w, StepContext &step) {
 }  // namespace
 
 void keep_contacts(World &w, StepContext &step) {
-  const uint32_t n = step.rows.n, S = step.state.nstate;
+  const uint32_t n = step.rows.soft(), S = step.state.nstate;
   ContactStore &to = step.next_store;
   if (w.sleepers) std::swap(w.report, step.last_report);
   to.n = n;

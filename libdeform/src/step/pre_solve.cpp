@@ -101,8 +101,8 @@ void take_choices(StepContext &step) {
     scaled = scaled || step.chosen[i].scale != 1;
   }
   if (!scaled) return;
-  step.state.scale.resize(step.state.stride);
-  for (uint32_t i = 0; i < step.state.n; ++i) step.state.scale[i] = step.chosen[i].scale;
+  step.state.scale.assign(step.state.stride, 1.0);
+  for (uint32_t i = 0; i < step.contacts.size(); ++i) step.state.scale[i] = step.chosen[i].scale;
 }
 
 void run_belts(StepContext &step) {

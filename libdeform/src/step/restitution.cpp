@@ -60,7 +60,7 @@ void find_throws(const World &w, StepContext &step) {
   const auto has = [](const LawInstance *law) { return law->restitution > 0; };
   if (std::ranges::none_of(w.pairs.laws, has)) return;
   const ContactRows &rows = step.rows;
-  step.thrown.assign(rows.n, 0);
+  step.thrown.assign(rows.soft(), 0);
   step.motions.resize(w.bodies.size());
   step.marked.assign(w.bodies.size(), 0);
   const auto motion = [&](uint32_t slot) -> const RigidMotion & {
@@ -69,7 +69,7 @@ void find_throws(const World &w, StepContext &step) {
   };
   const double falls = step.h * norm(w.gravity.now),
                least = kWeights * step.guard.planned * norm(w.gravity.now);
-  for (uint32_t i = 0; i < rows.n; ++i) {
+  for (uint32_t i = 0; i < rows.soft(); ++i) {
     const double e = restitution(w, step, i);
     if (!(e > 0)) continue;
     const ContactPoint &c = step.contacts[i];
@@ -109,11 +109,11 @@ double lands_at(const World &w, StepContext &step) {
     return gap_of(w, c) <= kNear * edge;
   };
   step.marked.assign(w.bodies.size(), 0);  // touches, or is about to
-  for (uint32_t i = 0; i < rows.n; ++i)
+  for (uint32_t i = 0; i < rows.soft(); ++i)
     if (rows.impulse[size_t(3) * i] > 0 || (step.thrown[i] > 0 && is_near(step.contacts[i])))
       each_body(step.contacts[i], [&](uint32_t slot) { step.marked[slot] = 1; });
   double first = 1;
-  for (uint32_t i = 0; i < rows.n; ++i) {
+  for (uint32_t i = 0; i < rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
     if (!(step.thrown[i] > 0) || is_near(c) || all_marked(step.marked, c)) continue;
     const double closing = -rows.velocity(i).x * step.h, gap = gap_of(w, c);
@@ -125,7 +125,7 @@ double lands_at(const World &w, StepContext &step) {
 
 bool has_restitution(const World &w, const StepContext &step, const Body &b) {
   bool any = false;
-  for (uint32_t i = 0; i < step.rows.n; ++i) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
     if (c.slot_a != b.slot && (c.obstacle || c.slot_b != b.slot)) continue;
     if (!(step.rows.impulse[size_t(3) * i] > 0)) continue;

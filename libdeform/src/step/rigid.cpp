@@ -132,28 +132,43 @@ RigidSet &set_of_group(World &w, uint32_t group) {
 
 void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
   RigidSet &set = set_of_group(w, block.group);
+  const double *const shared = step.tools->shared_response(set, block.group - set.first_group);
   step.rows.set_response(block, [&](double *matrix) {
-    if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
+    if (shared) std::copy_n(shared, 9 * size_t{block.count} * block.count, matrix);
+    else if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
            set.host_name.c_str(), set.defs[0].name);
   });
 }
 
+namespace {
+
+// y of the block where its bodies have these velocities, less those that detection has used and what rows
+// between rigid things have added, whose impulses are unknowns here.
+void start_rigids(const StepContext &step, const ContactRows::Block &block, const RigidSet &set,
+                  const Array<double> &velocity, Array<double> &y) {
+  for (uint32_t i = 0; i < set.defs.size(); ++i) {
+    if (set.group[i] == DFM_RIGID_STILL || set.first_group + set.group[i] != block.group) continue;
+    const double *const now = &velocity[6 * size_t{i}], *const then = &set.first[6 * size_t{i}];
+    Vec3 change = load3(now) - load3(then), turn = load3(now + 3) - load3(then + 3);
+    step.tools->take_off_shared(set, i, change, turn);
+    double *const to = &y[4 * size_t{block.first + 2 * set.place[i]}];
+    store3(to, change);
+    store3(to + 4, turn);
+  }
+}
+
+}  // namespace
+
 // A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once
 // more with its new velocities. Detection has been done with the first ones, so the difference enters the
 // rows as the rigid bodies' change of velocity before any impulse.
 void correct_rigids(World &w, StepContext &step) {
-  for (const ContactRows::Block &block : step.rows.blocks) {
-    if (block.group == kNone) continue;
-    const RigidSet &set = set_of_group(w, block.group);
-    for (uint32_t i = 0; i < set.defs.size(); ++i) {
-      if (set.group[i] == DFM_RIGID_STILL || set.first_group + set.group[i] != block.group) continue;
-      const double *const now = &set.velocity[6 * size_t{i}], *const then = &set.first[6 * size_t{i}];
-      double *const y = &step.rows.y[4 * size_t{block.first + 2 * set.place[i]}];
-      store3(y, load3(now) - load3(then));
-      store3(y + 4, load3(now + 3) - load3(then + 3));
+  for (const ContactRows::Block &block : step.rows.blocks)
+    if (block.group != kNone) {
+      const RigidSet &set = set_of_group(w, block.group);
+      start_rigids(step, block, set, set.velocity, step.rows.y);
     }
-  }
 }
 
 void sum_rigid_impulses(World &w, StepContext &step) {
@@ -161,7 +176,7 @@ void sum_rigid_impulses(World &w, StepContext &step) {
   const ContactRows &rows = step.rows;
   if (!w.plan.touches() || rows.rigid.empty()) return;
   for (uint32_t i = 0; i < rows.all(); ++i) {
-    if (rows.rigid[i] == kNone) continue;
+    if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
     const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
     const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
     const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
@@ -192,13 +207,8 @@ bool revise_rigids(World &w, StepContext &step) {
           block.group >= set->first_group + set->ngroup)
         continue;
       rigid_response(w, step, block);
-      for (uint32_t i = 0; i < set->defs.size(); ++i) {
-        if (set->group[i] != block.group - set->first_group) continue;
-        for (uint32_t k = 0; k < 2; ++k)
-          for (Array<double> *y : {&step.rows.y, &step.rows.y_free})
-            store3(&(*y)[size_t(block.first + 2 * set->place[i] + k) * 4],
-                   load3(&set->revised[6 * size_t{i} + 3 * k]) - load3(&set->first[6 * size_t{i} + 3 * k]));
-      }
+      for (Array<double> *y : {&step.rows.y, &step.rows.y_free})
+        start_rigids(step, block, *set, set->revised, *y);
       step.rows.push_rigid(block);
     }
   }

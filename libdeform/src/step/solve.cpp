@@ -28,6 +28,7 @@
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/stuck_slip.h"
+#include "step/tool_touch.h"
 
 namespace dfm {
 namespace {
@@ -103,9 +104,15 @@ void give_impulses(StepContext &step) {
 // Makes rows of the contacts, with the impulses of the last sub-step, which are not applied yet.
 void make_rows(World &w, StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
+  const bool again = step.rigid_again || step.guard.resolving;
+  if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
+  make_bonds(w, step, again);
+  make_cut_drags(w, step, again);
+  step.tools->find_shared(w, step);
+  const std::span<const RigidSides> between_rigids = step.tools->shared_sides();
   uint32_t nstate = 0;
   for (const LawInstance *law : w.pairs.laws) nstate = std::max(nstate, law->nstate);
-  step.state.resize(n, nstate);
+  step.state.resize(n + static_cast<uint32_t>(between_rigids.size()), nstate);
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = step.contacts[i];
     step.state.law[i] = pair_law(w, c.slot_a, c.obstacle, c.slot_b);
@@ -118,10 +125,6 @@ void make_rows(World &w, StepContext &step) {
     for (uint32_t i = 0; i < n; ++i)
       if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].give = 0;
   take_choices(step);
-  if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
-  const bool again = step.rigid_again || step.guard.resolving;
-  make_bonds(w, step, again);
-  make_cut_drags(w, step, again);
   for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
     step.sources[i].velocity = b.dynamics->contact_velocity();
@@ -130,7 +133,8 @@ void make_rows(World &w, StepContext &step) {
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
     step.sources[i].place = set_back ? b.p.x.data() : nullptr;
   }
-  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds);
+  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds,
+                  between_rigids);
   correct_rigids(w, step);
   fill_responses(w, step);
   step.tangents.resize(size_t(3) * n);
@@ -153,7 +157,9 @@ void make_rows(World &w, StepContext &step) {
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
   if (!step.guard.kept.empty()) guard_rates(step);
-  if (step.rigid_again) step.rows.impulse.assign(step.best_impulse.begin(), step.best_impulse.end());
+  if (step.rigid_again)
+    std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
+  step.tools->put_shared(step.rows, step.state, again);
   step.solve_islands->find(w, step);
   // an equilibrium has no velocity that an opening could leave
   if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);

@@ -269,7 +269,8 @@ void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const
     const RowRun run = pairs_[k].rows;
     for (uint32_t i = run.first; i < run.first + run.n; ++i) {
       for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) move(rows.dof[j]);
-      if (!rows.rigid.empty() && rows.rigid[i] != kNone) move(rows.rigid[i]);
+      for (const Array<uint32_t> *const rigid : {&rows.rigid, &rows.rigid_a})
+        if (!rigid->empty() && (*rigid)[i] != kNone) move((*rigid)[i]);
       if (!points) break;
     }
   }
@@ -277,10 +278,11 @@ void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const
   count_ = joined_.count;
 }
 
-// Numbers the bodies on both sides of contacts. A body in two islands gets two numbers.
-void SolveIslands::number_sides(size_t bodies, size_t of_contacts) {
-  met_.assign(bodies, kNone);
-  side_.resize(bodies);
+// Numbers the bodies on both sides of contacts. A body in two islands gets two numbers. Where rows between
+// rigid things are solved with soft bodies, rigid bodies have numbers as well.
+void SolveIslands::number_sides(const ContactRows &rows, uint32_t bodies, size_t of_contacts) {
+  met_.assign(bodies + (rows.nrigid ? rows.ndof : 0), kNone);
+  side_.resize(met_.size());
   body_of_.clear();
   const auto number = [&](uint32_t body, uint32_t island) {
     if (body == kNone) return kNone;
@@ -298,6 +300,9 @@ void SolveIslands::number_sides(size_t bodies, size_t of_contacts) {
       for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
         sides_[2 * size_t{i}] = a;
         sides_[2 * size_t{i} + 1] = b;
+        if (rows.nrigid == 0) continue;
+        if (rows.rigid_a[i] != kNone) sides_[2 * size_t{i}] = number(bodies + rows.rigid_a[i], k);
+        if (rows.rigid[i] != kNone) sides_[2 * size_t{i} + 1] = number(bodies + rows.rigid[i], k);
       }
     }
 }
@@ -334,7 +339,7 @@ void SolveIslands::find(const World &w, StepContext &step) {
   const size_t of_contacts = find_pairs(step);
   join(step.rows, step.systems);
   sides_.resize(2 * size_t{step.rows.n});
-  number_sides(w.bodies.size(), of_contacts);
+  number_sides(step.rows, static_cast<uint32_t>(w.bodies.size()), of_contacts);
   find_cuts(w, step);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
   give_rows(of_contacts);
@@ -357,6 +362,7 @@ size_t SolveIslands::find_pairs(const StepContext &step) {
     }
   };
   add(step.contacts, 0);
+  for (uint32_t i = step.rows.soft(); i < step.rows.n; ++i) pairs_.push_back({kNone, kNone, {i, 1}});
   const size_t of_contacts = pairs_.size();
   add(step.bonds, step.rows.n);
   return of_contacts;

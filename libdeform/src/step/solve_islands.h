@@ -112,7 +112,7 @@ class SolveIslands {
   std::vector<SolveIsland> islands_;  // those of this sub-step come first, and stay for later ones
   uint32_t count_ = 0;
   void join(const ContactRows &rows, std::span<ImplicitSystem *const> systems);
-  void number_sides(size_t bodies, size_t of_contacts);
+  void number_sides(const ContactRows &rows, uint32_t bodies, size_t of_contacts);
   void find_cuts(const World &w, const StepContext &step);
   size_t find_pairs(const StepContext &step);  // returns how many are of contacts
   // Rows of these pairs by island.

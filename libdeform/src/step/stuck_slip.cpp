@@ -50,7 +50,7 @@ bool holds_places(const World &w) {
 template <class F>
 void each_pair(const StepContext &step, const RowsPart &part, F &&f) {
   for (const RowRun &run : part.contacts)
-    for (uint32_t i = run.first, end = run.first + run.n; i < end;) {
+    for (uint32_t i = run.first, end = std::min(run.first + run.n, step.rows.soft()); i < end;) {
       const uint32_t first = i;
       const ContactPoint &c = step.contacts[first];
       const auto belongs = [&](const ContactPoint &o) {
@@ -124,6 +124,7 @@ void ask_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   double *const owed = step.owed.data(), *const asked = step.asked_back.data();
   bool owes = false;
   each_row(own.part.contacts, [&](uint32_t i) {
+    if (i >= step.rows.soft()) return;
     const uint32_t m = step.match[i];
     if (m == kNone || w.store.law[m] != step.state.law[i]) return;
     const double *const e = &w.store.owed[3 * size_t{m}];
@@ -162,7 +163,7 @@ void ask_slip_back(const World &w, StepContext &step, SolveIsland &own) {
 void restore_drive(StepContext &step, const SolveIsland &own) {
   if (!own.owes) return;
   each_row(own.part.contacts, [&](uint32_t i) {
-    for (size_t k = 0; k < 2; ++k)
+    for (size_t k = 0; k < 2 && i < step.rows.soft(); ++k)
       step.rows.drive[3 * size_t{i} + 1 + k] += step.asked_back[2 * size_t{i} + k];
   });
 }
@@ -175,6 +176,7 @@ void find_owed(const World &w, StepContext &step) {
   for (const SolveIsland &own : step.solve_islands->all()) {
     if (own.implicit) continue;
     each_row(own.part.contacts, [&](uint32_t i) {
+      if (i >= step.rows.soft()) return;
       double &v1 = s.vt[i], &v2 = s.vt[s.stride + i];
       double *const e = &step.owed[3 * size_t{i}];
       const double r = step.tolerance.tangent[i];

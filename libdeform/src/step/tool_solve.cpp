@@ -105,19 +105,27 @@ void ToolTouch::fill_response(const Group &of, double *matrix) const {
   }
 }
 
+// [6] of the side's body where the unknowns of the problem are zero: in one with soft bodies, what detection
+// has used.
+const double *ToolTouch::start_velocity(const Side &side, bool shared) const {
+  const Moved &m = sides_[side.tool];
+  const size_t at = 6 * size_t{side.part};
+  return !shared ? &m.base[at] : m.set ? &m.set->first[at] : &m.free[at];
+}
+
 // What turning adds follows the spins of the solution, to first order about the present ones, where these are
 // no larger than contact allows (follows_arcs). On rounded corners the place of contact stays behind the
 // turn, so slips do not follow it.
-void ToolTouch::set_arcs(uint32_t i) {
-  const Row &row = rows_[i];
+void ToolTouch::set_arcs(const Row &row, ContactRows &to, uint32_t r, bool shared) const {
   if (h_ * std::max(norm(spin(row.a)), norm(spin(row.b))) > kArc) return;
   const Vec3 axes[3] = {row.normal, row.tangent[0], row.tangent[1]};
   const bool round = norm2(row.a.arm - row.a.bone) > 0 || norm2(row.b.arm - row.b.bone) > 0;
-  double *const drive = &solved_.drive[3 * size_t{i}];
-  const auto set = [&](const Side &side, double sign, Array<double> &to) {
-    double *const arc = &to[9 * size_t{i}];
-    const double *const change = &sides_[side.tool].change[6 * size_t{side.part} + 3];
+  double *const drive = &to.drive[3 * size_t{r}];
+  const auto set = [&](const Side &side, double sign, Array<double> &arcs) {
+    double *const arc = &arcs[9 * size_t{r}];
+    const Vec3 now = spin(side) - load3(start_velocity(side, shared) + 3);  // of the unknowns
     const Vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const double change[3] = {now.x, now.y, now.z};
     for (size_t d = 0; d < 3; ++d) {
       const Vec3 slope = bend_slope(spin(side), side.bone, unit[d]);
       for (size_t c = 0; c < (round ? 1 : 3); ++c) {
@@ -126,8 +134,28 @@ void ToolTouch::set_arcs(uint32_t i) {
       }
     }
   };
-  set(row.a, 1, solved_.arc_a);
-  set(row.b, -1, solved_.arc);
+  set(row.a, 1, to.arc_a);
+  set(row.b, -1, to.arc);
+}
+
+void ToolTouch::fill_row(const Row &row, ContactRows &to, uint32_t r, bool shared) const {
+  const auto at = [&](const Side &side) {
+    const double *const v = start_velocity(side, shared);
+    return load3(v) + cross(load3(v + 3), side.arm);
+  };
+  const Vec3 without = at(row.a) - at(row.b);
+  store3(&to.drive[3 * size_t{r}],
+         {-(dot(row.normal, without) + row.lift), -dot(row.tangent[0], without + row.bend),
+          -dot(row.tangent[1], without + row.bend)});
+  if (row.frees) set_arcs(row, to, r, shared);
+  store3(&to.impulse[3 * size_t{r}], {row.impulse, row.along[0], row.along[1]});
+  to.rate[r] = -row.rate;
+  to.wn[r] = 1 / row.inverse;
+  to.wt[r] = row.response;
+  for (size_t k = 0; k < 2; ++k) to.cross[2 * size_t{r} + k] = dot(row.tangent[k], row.pressed);
+  const bool opens = row.opens > 0;
+  store3(&to.yields[3 * size_t{r}],
+         {opens ? row.opens : row.soft, opens ? row.rate : std::numeric_limits<double>::max(), 0});
 }
 
 void ToolTouch::build_rows() {
@@ -137,27 +165,13 @@ void ToolTouch::build_rows() {
   for (const Row &row : rows_)
     places_.push_back(
         {place_of(row.a), place_of(row.b), center(row.a) + row.a.arm, row.normal, row.tangent[0]});
-  solved_.build(places_, group_size_);
+  solved_.build({}, {}, {{}, group_size_}, {}, places_);
+  solved_.y_free.assign(solved_.y.begin(), solved_.y.end());
   for (const ContactRows::Block &b : solved_.blocks)
     solved_.set_response(b, [&](double *matrix) { fill_response(groups_[b.group], matrix); });
   if (std::any_of(rows_.begin(), rows_.end(), [](const Row &row) { return row.frees; }))
     for (Array<double> *arc : {&solved_.arc, &solved_.arc_a}) arc->assign(9 * rows_.size(), 0.0);
-  for (uint32_t i = 0; i < rows_.size(); ++i) {
-    const Row &row = rows_[i];
-    const Vec3 without = speed(row) - change_of(row);
-    store3(&solved_.drive[3 * size_t{i}],
-           {-(dot(row.normal, without) + row.lift), -dot(row.tangent[0], without + row.bend),
-            -dot(row.tangent[1], without + row.bend)});
-    if (row.frees) set_arcs(i);
-    store3(&solved_.impulse[3 * size_t{i}], {row.impulse, row.along[0], row.along[1]});
-    solved_.rate[i] = -row.rate;
-    solved_.wn[i] = 1 / row.inverse;
-    solved_.wt[i] = row.response;
-    for (size_t k = 0; k < 2; ++k) solved_.cross[2 * size_t{i} + k] = dot(row.tangent[k], row.pressed);
-    const bool opens = row.opens > 0;
-    store3(&solved_.yields[3 * size_t{i}],
-           {opens ? row.opens : row.soft, opens ? row.rate : std::numeric_limits<double>::max(), 0});
-  }
+  for (uint32_t i = 0; i < rows_.size(); ++i) fill_row(rows_[i], solved_, i, false);
 }
 
 // Groups that rows connect, and the rows of each.

@@ -14,13 +14,13 @@
 #include "step/budget.h"
 #include "step/context.h"
 #include "step/pair_table.h"
+#include "step/tolerance.h"
 
 namespace dfm {
 namespace {
 
 constexpr double kDone = 1e-10;            // of the largest speed that a row is to change
 constexpr double kSharper = 1e-2;          // of the change by a pass: tolerance of its solve
-constexpr double kSame = 1e-9;             // of it: soft bodies need not be solved again
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
@@ -174,11 +174,11 @@ Vec3 ToolTouch::speed(const Row &row) const {
   return at(row.a) - at(row.b);
 }
 
-// The part of it that the rows have added.
-Vec3 ToolTouch::change_of(const Row &row) const {
+// Without what the rows have added.
+Vec3 ToolTouch::base_speed(const Row &row) const {
   const auto at = [&](const Side &side) {
-    const double *const d = &sides_[side.tool].change[6 * size_t{side.part}];
-    return load3(d) + cross(load3(d + 3), side.arm);
+    const double *const v = &sides_[side.tool].base[6 * size_t{side.part}];
+    return load3(v) + cross(load3(v + 3), side.arm);
   };
   return at(row.a) - at(row.b);
 }
@@ -602,7 +602,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   for (const Row &row : rows_) {
     if (row.jaw) continue;
     if (row.far && row.impulse > 0) {
-      const double closes = -h_ * dot(row.normal, speed(row) - change_of(row)), gap = offset_ - h_ * row.rate;
+      const double closes = -h_ * dot(row.normal, base_speed(row)), gap = offset_ - h_ * row.rate;
       arrives = std::min(arrives, closes > gap ? kAims * gap / closes : 0.5);
     }
     double most = 0, leaves = 0;
@@ -645,7 +645,6 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   take_last(w);
   solve_past_hits(w, step);
   if (!follows_arcs(w, step)) return false;
-  for (Row &row : rows_) row.before = row.given();
   give_velocities();
   return true;
 }
@@ -654,6 +653,29 @@ void ToolTouch::give_velocities() {
   for (Moved &m : sides_)
     for (size_t i = 0; m.set && i < m.free.size(); ++i)
       m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
+  remember_known();
+}
+
+void ToolTouch::remember_known() {
+  for (Moved &m : sides_) {
+    m.known.resize(m.change.size());
+    for (size_t i = 0; i < m.known.size(); ++i) m.known[i] = m.change[i] + m.turn[i];
+  }
+}
+
+// m/s, at most, by which places differ from what soft bodies know.
+double ToolTouch::news() const {
+  double most = 0;
+  for (const Moved &m : sides_)
+    for (size_t i = 0; i < m.reach.size(); ++i) {
+      if (!m.set || !(m.reach[i] > 0)) continue;
+      const size_t at = 6 * i;
+      const auto differs = [&](size_t k) {
+        return norm(load3(&m.change[k]) + load3(&m.turn[k]) - load3(&m.known[k]));
+      };
+      most = std::max(most, differs(at) + m.reach[i] * differs(at + 3));
+    }
+  return most;
 }
 
 void ToolTouch::correct() {
@@ -667,7 +689,6 @@ void ToolTouch::correct() {
     renew_rows();
   }
   give_velocities();
-  for (Row &row : rows_) row.before = row.given();
 }
 
 // base: what the set does without the rows.
@@ -682,6 +703,10 @@ void ToolTouch::set_base(size_t k) {
 
 bool ToolTouch::answer(World &w, StepContext &step) {
   if (rows_.empty()) return false;
+  if (!shared_.empty()) {
+    take_shared(step.rows);
+    remember_known();
+  }
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     if (!m.set) continue;
@@ -693,12 +718,7 @@ bool ToolTouch::answer(World &w, StepContext &step) {
   for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
   keep_next();
   list_contacts(w);
-  double scale = 0, most = 0;
-  for (const Row &row : rows_) {
-    scale = std::max(scale, std::fabs(row.rate) + norm(row.given()) / row.inverse);
-    most = std::max(most, norm(row.given() - row.before) / row.inverse);
-  }
-  return most > kSame * scale;
+  return news() > tangent_at_rest(w, h_);
 }
 
 }  // namespace dfm

@@ -21,7 +21,8 @@
 //            load. Jaws of a tool without a coupling pass through obstacles, as the tool does
 //   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
 //   order    The rows are solved first without soft bodies, whose contacts then use the resulting motion of
-//            tools; the impulses of soft bodies come back into the same rows, until neither changes the other
+//            tools; those of bodies that soft ones touch are solved with soft contacts (tool_shared.cpp). The
+//            impulses of soft bodies come back into all rows, until neither changes the other
 #pragma once
 #include <array>
 #include <cstdint>
@@ -61,6 +62,16 @@ class ToolTouch {
   // Called before the solve: finds and solves the rows of this sub-step, and changes the sets' velocities by
   // their impulses. Returns false if the sub-step must be repeated, shorter (Guard::again).
   bool begin(World &w, StepContext &step);
+  // Rows that are solved with the contacts of soft bodies (tool_shared.cpp).
+  void find_shared(const World &w, const StepContext &step);  // once contacts and bonds are known
+  std::span<const RigidSides> shared_sides() const { return shared_sides_; }
+  // [6 bodies,6 bodies] 1/kg, of a group that has such rows; null: it has none
+  const double *shared_response(const RigidSet &set, uint32_t group) const;
+  // from m/s, rad/s of a body, what these rows have added
+  void take_off_shared(const RigidSet &set, uint32_t body, Vec3 &velocity, Vec3 &spin) const;
+  // again: from the impulses that `to` has
+  void put_shared(ContactRows &to, ContactState &state, bool again);
+
   // Called after the hosts have predicted their velocities again.
   void correct();
   // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
@@ -111,7 +122,6 @@ class ToolTouch {
     Vec3 at;                   // m, of the place
     double gap;                // m
     double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
-    Vec3 before;               // the impulse on a that velocities have
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
@@ -124,6 +134,8 @@ class ToolTouch {
     std::vector<double> free, base, change;  // [6n] m/s, rad/s
     std::vector<double> turn;                // [6n] what impulses change beyond the response
     std::vector<double> given;               // [6n] N s, N m s of soft bodies
+    std::vector<double> known;               // [6n] what soft bodies know of change and turn
+    std::vector<uint8_t> shared;             // [groups] its rows are solved with soft bodies
     std::vector<double> reach;               // [n] m, of its rows from its center
     bool responds;                           // the response is not zero
     bool touched;                            // a row is its own
@@ -193,7 +205,9 @@ class ToolTouch {
   void set_answers(Row &row);
   double follow_spin();
   void solve(World &w, StepContext &step);
-  Vec3 change_of(const Row &row) const;
+  Vec3 base_speed(const Row &row) const;
+  void remember_known();
+  double news() const;
   void push_all();
   // tool_solve.cpp
   // A group of bodies that answer each other's impulses, with their jaws; or a jaw that moves alone.
@@ -205,7 +219,12 @@ class ToolTouch {
   RigidPlace place_of(const Side &side);
   void fill_response(const Group &of, double *matrix) const;
   void build_rows();
-  void set_arcs(uint32_t i);
+  // shared: in the problem of soft bodies
+  const double *start_velocity(const Side &side, bool shared) const;
+  void fill_row(const Row &row, ContactRows &to, uint32_t r, bool shared) const;
+  void set_arcs(const Row &row, ContactRows &to, uint32_t r, bool shared) const;
+  // tool_shared.cpp
+  void take_shared(const ContactRows &from);
   void find_islands();
   bool sweep_island(NewtonHost &laws, const RowsPart &part, const Tolerance &tolerance, Residual &left);
   void solve_island(World &w, StepContext &step, size_t island, double tolerance);
@@ -281,6 +300,9 @@ class ToolTouch {
   std::vector<std::vector<RowRun>> runs_;      // [islands]
   std::vector<std::vector<uint32_t>> blocks_;  // [islands]
   std::vector<double> tolerance_;              // [rows] m/s
+  std::vector<uint32_t> shared_;               // rows that are solved with soft bodies
+  std::vector<RigidSides> shared_sides_;       // theirs
+  std::vector<uint8_t> shared_groups_, shared_islands_;  // scratch
   std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
