@@ -55,6 +55,32 @@ TEST(RigidOnBed, Box_LandsAndRests) {
   const test::SceneRun pushed("rigid_on_bed", {"--set", "/rigid/bodies/0/velocity=[0.8,0,0]"});
   EXPECT_FALSE(landed(pushed));
 }
+// A stack whose load goes through a light box: its three motions are one problem. Explicit steps, and long
+// implicit ones.
+TEST(RigidOnBed, StackOfBoxes_Rests) {
+  for (const char *const step : {"0.001", "0.016666666666666666"})
+    for (const auto &[low, high] : {std::pair(1.0, 1.0), std::pair(0.05, 10.0)}) {
+      SCOPED_TRACE(std::string(step) + " " + std::to_string(low) + " kg below " + std::to_string(high));
+      const auto box = [](const char *name, double mass, double z) {
+        return R"({"name": ")" + std::string(name) +
+               R"(", "shape": "box", "half_size": [0.03, 0.03, 0.02], )" + R"("mass": )" +
+               std::to_string(mass) + R"(, "pose": {"position": [0.05, 0.05, )" + std::to_string(z) + "]}}";
+      };
+      const test::SceneRun run(
+          "rigid_on_bed",
+          {"--set", std::string("/time/step=") + step, "--set", "/time/duration=1", "--set",
+           "/materials/foam/young=1e6", "--set",
+           "/rigid/bodies=[" + box("low", low, 0.1215) + ", " + box("high", high, 0.163) + "]"});
+      run.expect_sound(10, "stack on bed");
+      const test::BodyRow below = run.last("low"), above = run.last("high");
+      EXPECT_NEAR(above.com[2] - below.com[2], 0.04, 1e-4);
+      EXPECT_GT(below.com[2], 0.119);
+      const double weight = (low + 2 * high) * kG;  // "low" carries both, and bears the upper one
+      EXPECT_NEAR(run.contact_force("low"), weight, 0.01 * weight);
+      EXPECT_LT(above.kinetic, 1e-6);
+      EXPECT_EQ(run.number("unconverged_steps"), 0);
+    }
+}
 TEST(RigidOnBed, JitteredRuns_AllLand) { test::expect_jittered("rigid_on_bed", 1, 10, {}, 5, landed); }
 
 TEST(RigidPinch, Ball_IsLifted) {

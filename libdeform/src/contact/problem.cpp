@@ -196,8 +196,8 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   motions.resize(number_all(sources));
   take_dofs(from, number);
   rows.n = part.n;
-  rows.nrigid = static_cast<uint32_t>(
-      std::ranges::count_if(contacts, [&](uint32_t i) { return i >= from.soft(); }));
+  rows.nrigid =
+      static_cast<uint32_t>(std::ranges::count_if(contacts, [&](uint32_t i) { return i >= from.soft(); }));
   rows.nbond = part.nbond;
   rows.whole_of.clear();
   for (size_t s = 0; s < systems.size(); ++s) {

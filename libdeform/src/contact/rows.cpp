@@ -159,7 +159,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     }
     if (ndof > first) add_block(s, first, kNone);
   }
-  if (!rigids.group_size.empty()) {
+  if (!rigids.group_size.empty() || nrigid) {
     build_rigid(contacts, rigids, bonds, between_rigids);
     if (nrigid) set_rigid_sides(between_rigids);
     set_arms(contacts, sources, rigids, bonds);

@@ -157,8 +157,7 @@ void make_rows(World &w, StepContext &step) {
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
   if (!step.guard.kept.empty()) guard_rates(step);
-  if (step.rigid_again)
-    std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
+  if (step.rigid_again) std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
   step.tools->put_shared(step.rows, step.state, again);
   step.solve_islands->find(w, step);
   // an equilibrium has no velocity that an opening could leave

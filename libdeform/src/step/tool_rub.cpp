@@ -6,6 +6,7 @@
 //
 // A place where two rigid things meet has no area. Laws that use the area get one square centimeter.
 #include <algorithm>
+#include <cmath>
 
 #include "core/hash.h"
 #include "state/world.h"
@@ -58,6 +59,21 @@ void ToolTouch::take_last(const World &w) {
       m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
     }
   }
+  drop_bad_start();
+}
+
+// Impulses of rows that contradict each other may be large while what they do cancels. Where the rows have
+// changed it does not: then none are the better start.
+void ToolTouch::drop_bad_start() {
+  double with = 0, without = 0;
+  for (const Row &row : rows_) {
+    with = std::max(with, norm(speed(row)));
+    without = std::max(without, norm(base_speed(row)) + std::fabs(row.rate));
+  }
+  if (with <= without) return;
+  for (Row &row : rows_) row.impulse = row.along[0] = row.along[1] = 0;
+  std::fill(start_.begin(), start_.end(), 0.0);
+  push_all();
 }
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }

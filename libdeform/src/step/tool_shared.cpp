@@ -90,8 +90,7 @@ void ToolTouch::put_shared(ContactRows &to, ContactState &state, bool again) {
     state.area[r] = state_.area[i];
     state.dwell[r] = state_.dwell[i];
     for (size_t s = 0; s < state.nstate; ++s)
-      state.bristle[s * state.stride + r] =
-          s < state_.nstate ? state_.bristle[s * state_.stride + i] : 0;
+      state.bristle[s * state.stride + r] = s < state_.nstate ? state_.bristle[s * state_.stride + i] : 0;
   }
 }
 

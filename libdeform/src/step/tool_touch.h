@@ -264,6 +264,7 @@ class ToolTouch {
   void give_velocities();
   // tool_rub.cpp
   void take_last(const World &w);
+  void drop_bad_start();
   Vec3 slip(const Row &row) const;
   void keep_next();
   // tool_report.cpp
@@ -295,15 +296,15 @@ class ToolTouch {
   Array<double> swept_;  // [3 rows] impulses of the best sweep
   std::vector<RigidSides> places_;
   std::vector<Group> groups_;
-  std::vector<uint32_t> group_size_;           // [groups] bodies
-  DisjointSets islands_;                       // of groups that rows connect
-  std::vector<std::vector<RowRun>> runs_;      // [islands]
-  std::vector<std::vector<uint32_t>> blocks_;  // [islands]
-  std::vector<double> tolerance_;              // [rows] m/s
-  std::vector<uint32_t> shared_;               // rows that are solved with soft bodies
-  std::vector<RigidSides> shared_sides_;       // theirs
+  std::vector<uint32_t> group_size_;                     // [groups] bodies
+  DisjointSets islands_;                                 // of groups that rows connect
+  std::vector<std::vector<RowRun>> runs_;                // [islands]
+  std::vector<std::vector<uint32_t>> blocks_;            // [islands]
+  std::vector<double> tolerance_;                        // [rows] m/s
+  std::vector<uint32_t> shared_;                         // rows that are solved with soft bodies
+  std::vector<RigidSides> shared_sides_;                 // theirs
   std::vector<uint8_t> shared_groups_, shared_islands_;  // scratch
-  std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
+  std::vector<std::array<uint64_t, 2>> told_;            // pairs that have met and pass each other
   // By row.
   ContactState state_;
   LawBatches batches_;

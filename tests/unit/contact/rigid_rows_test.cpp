@@ -26,6 +26,7 @@ struct Pair {
     const RigidSides contact{{0, 0, kA.center}, {1, 0, kB.center}, kAt, kNormal, kTangent};
     const uint32_t bodies[2] = {1, 1};
     rows.build({}, {}, {{}, bodies}, {}, {&contact, 1});
+    rows.y_free.assign(rows.y.begin(), rows.y.end());
     for (const ContactRows::Block &b : rows.blocks)
       rows.set_response(b, [&](double *matrix) {
         const Ball &ball = b.group == 0 ? kA : kB;
