@@ -451,8 +451,8 @@ TEST(RigidTouch, VoxelsOnAPlane_AreTold) {
   EXPECT_EQ(context.log.find("the center of", first + 1), std::string::npos) << "once";
 }
 
-// Twenty boxes that fall on a heap: no step has more energy than the one before, from the fall to rest. Starts
-// that differ by a nanometer make other heaps.
+// Twenty boxes that fall on a heap: no step has more energy than the one before, from the fall to rest.
+// Starts that differ by a nanometer make other heaps.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, HeapsOfBoxes_MakeNoEnergy) {
   const double dt = 1.0 / 60;

@@ -83,8 +83,8 @@ struct ContactRows {
   // the same of the body on the other side of contacts between rigid things alone; empty: there are none
   Array<uint32_t> rigid_a;
   Array<double> arm_a;
-  // [all,3,3] m, of both: what a change of spin adds to the velocity in the frame beside spin x arm, since the
-  // arm turns in the sub-step. Empty: nothing.
+  // [all,3,3] m, of both: what a change of spin adds to the velocity in the frame beside spin x arm, since
+  // the arm turns in the sub-step. Empty: nothing.
   Array<double> arc, arc_a;
   Array<Block> blocks;
 

@@ -1,7 +1,7 @@
-// Rows between rigid things whose bodies soft bodies touch as well. They are solved together with the contacts
-// of soft bodies (solve.cpp): a light body between a heavy and a soft one has one motion, which two solves in
-// turns do not find. Before that they are solved alone, so that detection knows about where rigid things go,
-// and after it once more, to the accuracy that places of rigid things need.
+// Rows between rigid things whose bodies soft bodies touch as well. They are solved together with the
+// contacts of soft bodies (solve.cpp): a light body between a heavy and a soft one has one motion, which two
+// solves in turns do not find. Before that they are solved alone, so that detection knows where rigid things
+// go, and after it once more, to the accuracy that places of rigid things need.
 //
 //   left out   islands of rows with jaws, whose springs soft bodies do not move, and with motors, which are
 //              decided between solves (tool_joints.cpp)
