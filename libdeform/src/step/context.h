@@ -101,6 +101,7 @@ struct StepContext {
   std::unique_ptr<ToolTouch> tools;  // with each other
   // a rigid host has revised its response, and the solve continues from its last impulses
   bool rigid_again = false;
+  uint32_t rigid_rounds = 0;  // of solves that rigid things have requested
   AreaShares areas;
   AreaExchange exchange;
   // law of contacts whose areas follow the load, else kNone

@@ -467,47 +467,42 @@ void look_at_motion(const World &w, StepContext &step, uint32_t i) {
     step.guard.common[i] = common_motion(w.bodies[i]->surface);
 }
 
-// False: trouble, or guard.again: the sub-step is to be repeated, guard.cut times as long.
-bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
-  step.guard.kept.clear();
-  double safe = 1;
-  for (uint32_t solve = 0;; ++solve) {
-    if (overloaded(w, step)) {
-      *trouble |= tell_jam(w, step);
-      return false;
-    }
-    if (!find_ends(w, step, trouble)) return false;
-    bound_speeds(w, step);
-    follow_lists(w, step);
-    set_sides(w, step);
-    set_fraction(w, step, 1);
-    guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,
-               &w.context->tasks);
-    safe = find_hits(w, step);
-    if (step.guard.hits.empty()) return withstands_impacts(w, step);
-    step.guard.acted = true;
-    if (w.sleepers > 0 && may_repeat(w, step) && wake_hit(w, step)) {
-      step.guard.again = true;
-      return false;
-    }
-    if (solve == kSolves || !may_solve_again(w, step, step.guard.hits.size())) break;
+// Next::stop: trouble, or guard.again: the sub-step is to be repeated, guard.cut times as long.
+Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
+  if (step.guard.solves == 0) step.guard.kept.clear();
+  if (overloaded(w, step)) {
+    *trouble |= tell_jam(w, step);
+    return Next::stop;
+  }
+  if (!find_ends(w, step, trouble)) return Next::stop;
+  bound_speeds(w, step);
+  follow_lists(w, step);
+  set_sides(w, step);
+  set_fraction(w, step, 1);
+  guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,
+             &w.context->tasks);
+  const double safe = find_hits(w, step);
+  if (step.guard.hits.empty()) return go_on(withstands_impacts(w, step));
+  step.guard.acted = true;
+  if (w.sleepers > 0 && may_repeat(w, step) && wake_hit(w, step)) {
+    step.guard.again = true;
+    return Next::stop;
+  }
+  if (step.guard.solves < kSolves && may_solve_again(w, step, step.guard.hits.size())) {
     guard_add_hits(w, step);
     if (step.residual.due > 1) --w.stats.unconverged;  // counted once, by the last solve
     for (const uint32_t i : step.active) w.bodies[i]->dynamics->free_again(sub_step_of(w, step));
     step.guard.resolving = true;
-    const bool solved = stage_solve(w, step, trouble);
-    step.guard.resolving = false;
-    // a host may have it solved once more
-    if (!solved || (!w.rigid_sets.empty() && !stage_rigid_commit(w, step, trouble))) return false;
+    ++step.guard.solves;
     ++w.stats.guard_solves;
-    row::distribute(w, step, trouble);
+    return Next::solve;
   }
   if (step.guard.pieces < kCuts && may_repeat(w, step)) {
     ++step.guard.pieces;
     ++w.stats.guard_cuts;
     step.guard.cut = std::max(safe, kLeastCut);
     step.guard.again = true;
-    return false;
+    return Next::stop;
   }
   // Teeth of a cut that interlock may leave no way at all, where the rest of the world has one: what contact
   // does not keep apart there crosses. Where pieces are left out to save work, only if there is no way.
@@ -524,11 +519,11 @@ bool stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   }
   if (jammed(w, step)) {
     *trouble |= tell_jam(w, step);
-    return false;
+    return Next::stop;
   }
-  if (!withstands_impacts(w, step)) return false;
+  if (!withstands_impacts(w, step)) return Next::stop;
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
-  return true;
+  return Next::stage;
 }
 
 }  // namespace dfm

@@ -47,7 +47,8 @@ struct Guard {
   };
   // sorted by key: results of the previous solve, and rates of contacts made from hits
   Array<Kept> kept;
-  bool resolving = false;  // a solve that starts from `kept`
+  bool resolving = false;  // the next solve starts from `kept`
+  uint32_t solves = 0;     // of this sub-step, with hits
 
   double planned = 0;  // s, the sub-step before it was shortened
   // Sub-steps into which a hard impact divides it and each later one; limit.
@@ -66,6 +67,7 @@ struct Guard {
     through.clear();
     crossed.clear();
     cut = motion = 1;
+    solves = 0;
     acted = again = refines = resolving = lets_slits = fast = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed other than by a step

@@ -1,5 +1,4 @@
-// Contacts of the sub-step, without impossible depths. A contact of a sleeping body wakes its island; its
-// bodies then run the stages model to broad before contacts are found again.
+// Contacts of the sub-step, without impossible depths. A contact of a sleeping body wakes its island.
 #include <algorithm>
 #include <cmath>
 
@@ -90,35 +89,20 @@ void turn_false_depths(World &w, StepContext &step) {
 
 }  // namespace
 
-bool stage_narrow(World &w, StepContext &step, uint32_t *trouble) {
-  struct Restored {
-    World &w;
-    ~Restored() { gather_active(w); }
-  };
-  for (;;) {
-    step.narrow.forget_speeds();
-    for (const uint32_t i : step.active) step.narrow.tell_speed(step.body_views, i, step.broad.speed(i));
-    find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
-                  w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks);
-    turn_false_depths(w, step);
-    step.woken.clear();
-    if (w.sleepers == 0) return true;
-    for (const ContactPoint &c : step.contacts) {
-      if (w.bodies[c.slot_a]->slumber.asleep) wake(w, *w.bodies[c.slot_a]);
-      if (!c.obstacle && w.bodies[c.slot_b]->slumber.asleep) wake(w, *w.bodies[c.slot_b]);
-    }
-    if (step.woken.empty()) return true;
-    std::sort(step.woken.begin(), step.woken.end());
-    {
-      const Restored all{w};
-      step.active.swap(step.woken);
-      const SubStep now = sub_step_of(w, step);
-      if (!stage_model(w, step.active, now, trouble)) return false;
-      if (!stage_predict(w, step.active, now, step.free_kinetic, trouble)) return false;
-      stage_gather(w, step.active);
-    }
-    row::broad(w, step, trouble);
+Next stage_narrow(World &w, StepContext &step, uint32_t *) {
+  step.narrow.forget_speeds();
+  for (const uint32_t i : step.active) step.narrow.tell_speed(step.body_views, i, step.broad.speed(i));
+  find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
+                w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks);
+  turn_false_depths(w, step);
+  step.woken.clear();
+  if (w.sleepers == 0) return Next::stage;
+  for (const ContactPoint &c : step.contacts) {
+    if (w.bodies[c.slot_a]->slumber.asleep) wake(w, *w.bodies[c.slot_a]);
+    if (!c.obstacle && w.bodies[c.slot_b]->slumber.asleep) wake(w, *w.bodies[c.slot_b]);
   }
+  std::sort(step.woken.begin(), step.woken.end());
+  return step.woken.empty() ? Next::stage : Next::woken;
 }
 
 }  // namespace dfm

@@ -229,23 +229,23 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
   return again ? 2 : 1;
 }
 
-bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
-  for (uint32_t round = 0;; ++round) {
-    sum_rigid_impulses(w, step);
-    bool differ = false;
-    if (!solved(w, trouble, [&] { differ = step.tools->answer(w, step); })) return false;
-    const int end = ask_rigid_ends(w, trouble);
-    if (end == 0) return false;
-    if ((end == 1 && !differ) || round == DFM_RIGID_MOST_AGAIN || !w.plan.touches() || step.rows.all() == 0)
-      break;
-    step.rigid_again = true;
+Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
+  sum_rigid_impulses(w, step);
+  bool differ = false;
+  if (!solved(w, trouble, [&] { differ = step.tools->answer(w, step); })) return Next::stop;
+  const int end = ask_rigid_ends(w, trouble);
+  if (end == 0) return Next::stop;
+  step.rigid_again = (end == 2 || differ) && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.touches() &&
+                     step.rows.all() > 0;
+  if (step.rigid_again) {
+    ++step.rigid_rounds;
     ++w.stats.rigid_again;
-    if (!ask_rigids(w, trouble)) return false;
+    if (!ask_rigids(w, trouble)) return Next::stop;
     step.tools->correct();
-    if (!stage_solve(w, step, trouble)) return false;
+    return Next::solve;
   }
-  step.rigid_again = false;
-  if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return false;
+  step.rigid_rounds = 0;
+  if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return Next::stop;
   step.tools->turn_jaws();
   reserve_reports(w, step);
   // From here on (guard) their true motion is used.
@@ -258,7 +258,7 @@ bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
         (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation));
     step.obstacle_views[o->slot].linear = {};
   }
-  return true;
+  return Next::stage;
 }
 
 void keep_rigids(World &w, StepContext &step) {

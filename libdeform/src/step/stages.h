@@ -1,5 +1,6 @@
-// The stages of a sub-step, and shared functions. The table has their order (step/step.cpp). Return false if
-// the sub-step failed; `trouble` and dfm_last_error() give the reason, and nothing of it has been committed.
+// The stages of a sub-step, and shared functions. The table has their order (step/step.cpp), which no stage
+// changes: what has to run again is told by Next. Return false or Next::stop if the sub-step failed;
+// `trouble` and dfm_last_error() give the reason, and nothing of it has been committed.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -20,10 +21,19 @@ struct LawInstance;
 struct StepContext;
 struct World;
 
+// What follows a stage.
+enum class Next {
+  stage,  // the one behind it
+  woken,  // bodies have woken: they catch up with the others, and the stage runs again
+  solve,  // the contact solve once more, and what is behind it
+  stop,   // the sub-step has failed, or is to be repeated (Guard::again)
+};
+inline Next go_on(bool succeeded) { return succeeded ? Next::stage : Next::stop; }
+
 // A row of the table of stages, which is in the order of a sub-step.
 struct Stage {
   const char *name;
-  bool (*run)(World &w, StepContext &step, uint32_t *trouble);
+  Next (*run)(World &w, StepContext &step, uint32_t *trouble);
   std::string (*cost)(const World &w);           // what its cost grows with
   StageChoice (*when)(const SceneFacts &facts);  // whether it runs, and why
   StageRole role = StageRole::none;
@@ -57,14 +67,17 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 // The rows of the table in step.cpp that pass to a stage the parts of world and context that it reads and
 // writes; doc/concepts/architecture.md lists these parts.
 namespace row {
-bool motion(World &w, StepContext &step, uint32_t *trouble);
-bool model(World &w, StepContext &step, uint32_t *trouble);
-bool predict(World &w, StepContext &step, uint32_t *trouble);
-bool gather(World &w, StepContext &step, uint32_t *trouble);
-bool broad(World &w, StepContext &step, uint32_t *trouble);
-bool self(World &w, StepContext &step, uint32_t *trouble);
-bool distribute(World &w, StepContext &step, uint32_t *trouble);
-bool sleep(World &w, StepContext &step, uint32_t *trouble);
+Next motion(World &w, StepContext &step, uint32_t *trouble);
+Next model(World &w, StepContext &step, uint32_t *trouble);
+Next predict(World &w, StepContext &step, uint32_t *trouble);
+Next rigid_predict(World &w, StepContext &step, uint32_t *trouble);
+Next gather(World &w, StepContext &step, uint32_t *trouble);
+Next broad(World &w, StepContext &step, uint32_t *trouble);
+Next self(World &w, StepContext &step, uint32_t *trouble);
+Next solve(World &w, StepContext &step, uint32_t *trouble);
+Next distribute(World &w, StepContext &step, uint32_t *trouble);
+Next commit(World &w, StepContext &step, uint32_t *trouble);
+Next sleep(World &w, StepContext &step, uint32_t *trouble);
 }  // namespace row
 
 using Active = std::span<const uint32_t>;  // slots of the bodies that stages work on, ascending
@@ -87,12 +100,12 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // ri
 void stage_gather(World &w, Active active);
 void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                  const PairFilter &filter, double h, double offset, Tasks &tasks, BroadPhase &out);
-bool stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
+Next stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
 void stage_self(World &w, StepContext &step);                       // self_contact.cpp
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
 // rigid.cpp: end states, stored separately until keep_rigids()
-bool stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
-bool stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
+Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
+Next stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
 void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 

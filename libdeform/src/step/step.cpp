@@ -6,12 +6,10 @@
 //     pieces                         advance(), piece(): shorter where the guard requires it
 //       stages                       sub_step(): all rows of the table that the plan has chosen,
 //                                    or none
-//         waking                     narrow runs model to broad again for bodies that it has woken
-//                                    (narrow.cpp)
-//         a rigid host's revision    solve again if a motor reaches its limit, or if a host requests it in
-//                                    rigid commit (rigid.cpp)
-//         hits                       guard runs solve and distribute again with the pairs that would cross
-//                                    (guard.cpp)
+//         Next::woken                narrow has found bodies that contacts wake: catch_up(), narrow again
+//         Next::solve                rigid commit: a host requests another solve, or rigid things move
+//                                    otherwise than soft bodies know (rigid.cpp); guard: with the pairs that
+//                                    would cross (guard.cpp)
 #include <algorithm>
 #include <chrono>
 #include <cmath>
@@ -41,23 +39,23 @@ constexpr Stage kTable[] = {
     {"motion", row::motion, cost::prescribed, when::motion},
     {"model", row::model, cost::cells, when::model},
     {"predict", row::predict, cost::points, when::predict},
-    {"rigid predict", stage_rigid_predict, cost::rigid_states, when::rigid_predict},
+    {"rigid predict", row::rigid_predict, cost::rigid_states, when::rigid_predict},
     {"gather", row::gather, cost::weights, when::gather},
     {"broad", row::broad, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
     {"narrow", stage_narrow, cost::candidates, when::narrow, StageRole::finds_contacts},
     {"self contact", row::self, cost::self_surfels, when::self},
-    {"contact+friction", stage_solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
+    {"contact+friction", row::solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
     {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
     {"distribute", row::distribute, cost::contacts_and_surfels, when::distribute, StageRole::gives_impulses},
     {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
-    {"commit", stage_commit, cost::points, when::commit},
+    {"commit", row::commit, cost::points, when::commit},
     {"sleep", row::sleep, cost::awake, when::sleep},
 };
 
 using Clock = std::chrono::steady_clock;
 
 // Runs a row of the table, with timing and tracing. since: in, end of the row before; out, of this one.
-bool run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time_point &since) {
+Next run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time_point &since) {
   const Stage &stage = kTable[row];
   struct Timer {
     const Stage &stage;
@@ -98,38 +96,47 @@ Plan make_plan(const SceneFacts &facts) {
 
 namespace row {
 
-bool motion(World &w, StepContext &step, uint32_t *) {
+Next motion(World &w, StepContext &step, uint32_t *) {
   stage_motion(w, step.h, step.rest, step.driven);
-  return true;
+  return Next::stage;
 }
-bool model(World &w, StepContext &step, uint32_t *trouble) {
-  return stage_model(w, step.active, sub_step_of(w, step), trouble);
+Next model(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage_model(w, step.active, sub_step_of(w, step), trouble));
 }
-bool predict(World &w, StepContext &step, uint32_t *trouble) {
-  return stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
-         watch_energy(w, step, trouble);
+Next predict(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
+               watch_energy(w, step, trouble));
 }
-bool gather(World &w, StepContext &step, uint32_t *) {
+Next rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage_rigid_predict(w, step, trouble));
+}
+Next gather(World &w, StepContext &step, uint32_t *) {
   stage_gather(w, step.active);
-  return true;
+  return Next::stage;
 }
-bool broad(World &w, StepContext &step, uint32_t *) {
+Next broad(World &w, StepContext &step, uint32_t *) {
   stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, w.context->tasks,
               step.broad);
-  return true;
+  return Next::stage;
 }
-bool self(World &w, StepContext &step, uint32_t *) {
+Next self(World &w, StepContext &step, uint32_t *) {
   stage_self(w, step);
-  return true;
+  return Next::stage;
 }
-bool distribute(World &, StepContext &step, uint32_t *) {
+Next solve(World &w, StepContext &step, uint32_t *trouble) {
+  const bool solved = stage_solve(w, step, trouble);
+  step.guard.resolving = false;
+  return go_on(solved);
+}
+Next distribute(World &, StepContext &step, uint32_t *) {
   step.ended = false;
   give_impulses(step);
-  return true;
+  return Next::stage;
 }
-bool sleep(World &w, StepContext &step, uint32_t *) {
+Next commit(World &w, StepContext &step, uint32_t *trouble) { return go_on(stage_commit(w, step, trouble)); }
+Next sleep(World &w, StepContext &step, uint32_t *) {
   stage_sleep(w, step);
-  return true;
+  return Next::stage;
 }
 
 }  // namespace row
@@ -351,6 +358,30 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   return true;
 }
 
+// Stages model to broad for bodies that contacts have woken.
+bool catch_up(World &w, StepContext &step, uint32_t *trouble) {
+  struct Restored {
+    World &w;
+    ~Restored() { gather_active(w); }
+  };
+  {
+    const Restored all{w};
+    step.active.swap(step.woken);
+    const SubStep now = sub_step_of(w, step);
+    if (!stage_model(w, step.active, now, trouble)) return false;
+    if (!stage_predict(w, step.active, now, step.free_kinetic, trouble)) return false;
+    stage_gather(w, step.active);
+  }
+  row::broad(w, step, trouble);
+  return true;
+}
+
+// The place of a role among the planned stages.
+size_t place_of(const Plan &plan, StageRole role) {
+  const auto has = [&](const PlannedStage &s) { return s.role == role; };
+  return size_t(std::find_if(plan.stages.begin(), plan.stages.end(), has) - plan.stages.begin());
+}
+
 // All stages or none: if one fails or throws, the state is that before the sub-step.
 bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   struct Undo {
@@ -364,12 +395,17 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.driven.clear();
   step.guard.start();
   step.ended = step.struck = false;
+  step.rigid_rounds = 0;
   step.budget.rows = w.store.n;
   const uint64_t damping = w.sizes.damping > 0 ? 2 : 0;  // evaluations of the forces
   charge(w, step, (1 + damping) * body_work(w, step) + surface_work(w, step));
   Clock::time_point since = Clock::now();
-  for (const PlannedStage &planned : w.plan.stages)
-    if (!run(planned.row, w, step, trouble, since)) return false;
+  for (size_t at = 0; at < w.plan.stages.size();) {
+    const Next next = run(w.plan.stages[at].row, w, step, trouble, since);
+    if (next == Next::stop || (next == Next::woken && !catch_up(w, step, trouble))) return false;
+    if (next == Next::solve) at = place_of(w.plan, StageRole::solves);
+    if (next == Next::stage) ++at;
+  }
   keep_rigids(w, step);
   return undo.kept = true;
 }
