@@ -111,15 +111,13 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
 
 void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out) {
   dfm_body_def d{};
-  d.size = sizeof d;
   d.category = 1;
   d.collides_with = ~0u;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");
     dfm_body_def own = take_def(def, dfm_body_def_default());
     check_flags(own, 0, "dfm_body_def");
@@ -134,8 +132,7 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
 }
 
 dfm_status dfm_body_destroy(dfm_body body) {
-  return as_status([&] {
-    Body &b = any_body_of(body);
+  return as_status(any_body_of, body, [&](Body &b) {
     if (!b.emptied && !b.undone) body_of(body);  // with all of its points
     exclusive(*b.world);
     destroy_body(b);
@@ -143,8 +140,7 @@ dfm_status dfm_body_destroy(dfm_body body) {
 }
 
 dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
-  return as_status([&] {
-    const Body &b = any_body_of(body);
+  return as_status(any_body_of, body, [&](const Body &b) {
     dfm_body_info i{};
     if (!b.emptied && !b.undone) {
       i.npoint = b.p.n;
@@ -170,8 +166,7 @@ dfm_status dfm_body_set_user(dfm_body body, void *user) {
 }
 
 dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     b.category = category;
     b.collides_with = collides_with;
     disturb(b);
@@ -181,8 +176,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
 }
 
 dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = body_of(body);
+  return as_status(body_of, body, [&](const Body &b) {
     if (!room(b.p.n, capacity, x ? x : v, n)) return;
     for (uint32_t i = 0; i < b.p.n; ++i) {
       if (x) store3(x + size_t(3) * i, load3(&b.p.x[size_t(i) * kStride]));
@@ -192,8 +186,7 @@ dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, doubl
 }
 
 dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
@@ -225,16 +218,14 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
 
 dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets,
                              uint32_t *tets) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
     if (tets && room(b.ncell(), capacity_tets, tets, nullptr)) std::copy(b.tets.begin(), b.tets.end(), tets);
   });
 }
 
 dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
     if (b.model.stepper)
@@ -254,8 +245,7 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
 
 dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
                               const dfm_pose_key *keys, const dfm_sine *sine) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
@@ -281,8 +271,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
 
 dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                              uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
@@ -303,8 +292,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
 }
 
 dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
       fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
     sum_loads(b);
@@ -312,8 +300,7 @@ dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
 }
 
 dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     b.springs.push_back(make_spring(
         b,
         take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
@@ -324,8 +311,7 @@ dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_
 }
 
 dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(to, "to");
     Spring &s = spring_of(b, spring);
     if (!all_finite(to, 3)) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
@@ -336,24 +322,21 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
 }
 
 dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     need(force, "force");
     store3(force, spring_force(b, spring_of(b, spring), b.world->time, 0));
   });
 }
 
 dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     b.springs.erase(b.springs.begin() + (&spring_of(b, spring) - b.springs.data()));
     springs_changed(b);
   });
 }
 
 dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(point, "point");
     need(impulse, "impulse");
     if (!all_finite(point, 3) || !all_finite(impulse, 3))
@@ -370,8 +353,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
 }
 
 dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(params, "params");
     const HostWork work(b);
     set_model_params(b, *params);
@@ -380,15 +362,11 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
 }
 
 dfm_status dfm_body_wake(dfm_body body) {
-  return as_status([&] {
-    Body &b = body_of(body);
-    wake(exclusive(*b.world), b);
-  });
+  return as_status(body_of, body, [&](Body &b) { wake(exclusive(*b.world), b); });
 }
 
 dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     need(asleep, "asleep");
     *asleep = b.slumber.asleep;
   });
@@ -399,16 +377,14 @@ dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
 }
 
 dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     if (!room(b.ncell(), capacity, out, nullptr)) return;
     energy_density(b, out);
   });
 }
 
 dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     if (!room(b.ncell(), capacity, out, nullptr)) return;
     cell_stress(b, out);
   });

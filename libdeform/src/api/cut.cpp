@@ -84,14 +84,12 @@ SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
 
 void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out) {
   dfm_cut_def d{};
-  d.size = sizeof d;
   d.pose.rotation[3] = 1;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(def, "def");
     const dfm_cut_def own = take_def(def, dfm_cut_def_default());
     check_flags(own, 0, "dfm_cut_def");
@@ -102,8 +100,7 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
 }
 
 dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (!def) return plan_no_cuts(b);
     const double now = b.world->time;
     if (!(t >= now - kRounding * now && std::isfinite(t)))
@@ -119,8 +116,7 @@ dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
 }
 
 dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cells, dfm_cut_info *out) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (n) need(cells, "cells");
     Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
     for (uint32_t i = 0; i < n; ++i) {
@@ -137,8 +133,7 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
 
 dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
                             uint32_t capacity_cells, uint32_t *cells) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     const uint32_t ntet = b.ncell();
     const bool give_points = points && room(b.p.n, capacity_points, points, nullptr);
     const bool give_cells = cells && room(ntet, capacity_cells, cells, nullptr);
@@ -149,14 +144,12 @@ dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *p
 
 void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out) {
   dfm_separate_def d{};
-  d.size = sizeof d;
   d.least_cells = 1;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     const SeparateRule rule = rule_of(b, def);
     CutReport report;
     separate(b, rule, report);
@@ -165,8 +158,7 @@ dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut
 }
 
 dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
     if (rule.on) check_may_cut(b, b.model);
     rule.waits = rule.on && b.separate.waits;
@@ -187,13 +179,11 @@ dfm_status dfm_body_cut_delay(dfm_body body, double *delay, uint32_t *waiting) {
 }
 
 dfm_status dfm_body_pieces(dfm_body body, uint32_t capacity, dfm_body *pieces, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = any_body_of(body);
+  return as_status(any_body_of, body, [&](const Body &b) {
     const uint64_t whole = b.piece_of ? b.piece_of : b.id;
     std::vector<dfm_body> found;
     for (const Body *const other : all_bodies(*b.world))
       if (other->piece_of == whole) found.push_back(other->handle);
-    if (!room(static_cast<uint32_t>(found.size()), capacity, pieces, n)) return;
-    std::copy(found.begin(), found.end(), pieces);
+    give_list(found, capacity, pieces, n);
   });
 }

@@ -42,7 +42,6 @@ struct Prepared {
 struct Law {
   dfm_context &context;
   const dfm_type &type;
-  uint64_t handle = 0;
   std::mutex mutex;
   // for the last parameters: a rig or plot calls repeatedly with the same ones
   std::shared_ptr<const Prepared> prepared;
@@ -63,10 +62,7 @@ void destroy(uint64_t handle) {
 
 Law &law_at(dfm_law handle) {
   Law &law = resolve<Law>(Kind::law, handle);
-  Call::now().hold(&law);
-  Call::now().hold(&law.context);
-  Call::now().count(law.context.calls);
-  return law;
+  return held(law, law.context);
 }
 
 uint32_t state_width(const Law &law, const double *params) {
@@ -267,21 +263,13 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
     used(*context);
     const dfm_type &type =
         path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);
-    std::unique_ptr<Law> law(new Law{*context, type, 0, {}, nullptr});
-    law->handle = handle_create(Kind::law, law.get());
-    try {
-      context->add_live(law->handle, destroy);
-    } catch (...) {
-      handle_destroy(law->handle);
-      throw;
-    }
-    *out = law.release()->handle;
+    std::unique_ptr<Law> law(new Law{*context, type, {}, nullptr});
+    *out = keep_live(*context, Kind::law, std::move(law), destroy);
   });
 }
 
 dfm_status dfm_law_close(dfm_law law) {
-  return as_status([&] {
-    Law &l = law_at(law);
+  return as_status(law_at, law, [&](Law &l) {
     Call::now().need_alone(&l, "law");
     l.context.remove_live(law);
     destroy(law);

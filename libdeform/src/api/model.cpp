@@ -76,8 +76,7 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
 }  // namespace
 
 dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params *params) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     World &w = exclusive(*b.world);
     need(type, "type");
     const ModelChoice to = choose_model(b, type, params_of(params), DFM_INTEGRATOR_AUTO);
@@ -90,8 +89,7 @@ dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params 
 }
 
 dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *switches) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (n) need(switches, "switches");
     std::vector<Switch> made;
     const char *const from = "start from dfm_switch_default()";
@@ -104,27 +102,24 @@ dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *sw
 
 void dfm_switch_default_sized(uint32_t size, dfm_switch *out) {
   dfm_switch s{};
-  s.size = sizeof s;
   s.integrator = DFM_INTEGRATOR_AUTO;
   s.params.size = sizeof s.params;
-  dfm::give_default(size, out, s);
+  give_default(size, out, s);
 }
 
 void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
   dfm_switch_rule r{};
-  r.size = sizeof r;
   for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) {
     c->size = sizeof *c;
     c->params.size = sizeof c->params;
   }
   r.hysteresis = 0.1;
   r.wait = 0.1;
-  dfm::give_default(size, out, r);
+  give_default(size, out, r);
 }
 
 dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     std::vector<SwitchRule> made;
     if (rule) made.push_back(make_rule(b, take_def(rule, dfm_switch_rule_default())));
     rehearse(b, b.switches, made, false);
@@ -133,8 +128,7 @@ dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) 
 }
 
 dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(point, "point");
     if (!all_finite(point, 3)) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
     if (b.rule.empty() || b.rule[0].near.type.empty())
@@ -149,7 +143,7 @@ dfm_status dfm_world_swaps_sized(dfm_world world, uint32_t row_size, uint32_t ca
   return as_status([&] {
     Rows<dfm_swap> rows(out, row_size, "dfm_swap");
     World &w = exclusive(world_of(world));
-    if (!room(static_cast<uint32_t>(w.swaps.size()), capacity, out, n)) return;
+    if (!room(w.swaps.size(), capacity, out, n)) return;
     for (const Swap &s : w.swaps)
       rows.add({0, s.refused ? uint32_t{DFM_SWAP_REFUSED} : 0, s.body, s.t, s.from->id, s.to->id, s.before,
                 s.after, s.max_jump});
