@@ -83,15 +83,13 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
 
 dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
   return as_status(body_of, body, [&](const Body &b) {
-    if (!room(b.p.n, capacity, u, n)) return;
-    for (uint32_t i = 0; i < b.p.n; ++i) store3(u + size_t(3) * i, displacement(b, i));
+    give_vectors(b.p.n, capacity, u, n, [&](uint32_t i) { return displacement(b, i); });
   });
 }
 
 dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
   return as_status(body_of, body, [&](const Body &b) {
-    if (!room(b.surface.nsurfel, capacity, u, n)) return;
-    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(u + size_t(3) * s, surfel_displacement(b, s));
+    give_vectors(b.surface.nsurfel, capacity, u, n, [&](uint32_t s) { return surfel_displacement(b, s); });
   });
 }
 

@@ -183,6 +183,12 @@ void give_list(const List &list, uint32_t capacity, T *out, uint32_t *n, Of of =
   if (!room(std::size(list), capacity, out, n)) return;
   for (const auto &x : list) *out++ = of(x);
 }
+// [count,3] by it, of(i) each.
+template <class Of>
+void give_vectors(uint32_t count, uint32_t capacity, double *out, uint32_t *n, Of of) {
+  if (!room(count, capacity, out, n)) return;
+  for (uint32_t i = 0; i < count; ++i) store3(out + size_t(3) * i, of(i));
+}
 // Handles of things.
 inline constexpr auto kHandle = [](const auto &thing) { return thing->handle; };
 

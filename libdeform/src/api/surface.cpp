@@ -7,31 +7,25 @@
 
 using namespace dfm;
 
-namespace {
-
-// Copies one [nsurfel,4] column; get(s) gives the vector of surfel s.
-template <class Get>
-dfm_status column(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n, Get get) {
+dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
-    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(xyz + size_t(3) * s, get(b, s));
+    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) { return surfel_vector(b, b.p.x, s); });
   });
 }
 
-}  // namespace
-
-dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) { return surfel_vector(b, b.p.x, s); });
-}
-
 dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) { return surfel_vector(b, b.p.v, s); });
+  return as_status(shown_body_of, body, [&](const Body &b) {
+    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) { return surfel_vector(b, b.p.v, s); });
+  });
 }
 
 dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) {
+  return as_status(shown_body_of, body, [&](const Body &b) {
     const double h = b.impulse_time();
-    return b.world->plan.touches() && h > 0 ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
+    const bool acts = b.world->plan.touches() && h > 0;
+    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) {
+      return acts ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
+    });
   });
 }
 

@@ -8,7 +8,6 @@
 #include "scene/table.h"
 
 namespace dfm::scene {
-namespace {
 
 std::string columns_of(uint32_t width) {
   if (width == 1) return "value";
@@ -18,8 +17,10 @@ std::string columns_of(uint32_t width) {
   return out;
 }
 
+namespace {
+
 // Without spaces around its names.
-std::string tidy(std::string_view header) {
+std::string tidy(const std::string &header) {
   std::string out;
   for (char c : header)
     if (c != ' ' && c != '\t' && c != '\r') out += c;
@@ -36,28 +37,22 @@ void make_unit(double *v) {
 
 std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
   const std::string plain = columns_of(field.width), numbered = "cell," + plain;
-  const std::string expected = plain + " or " + numbered;
   const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
-  Table table(path, expected, nfile, int(w) + 1);
-  std::string header;
-  std::string_view text;
-  if (table.next(text)) header = tidy(text);
+  Table table(path, plain + " or " + numbered, nfile, int(w) + 1);
+  std::string header = tidy(table.first());
   if (field.width == 1 && header == field.key) header = plain;
   if (field.width == 1 && header == "cell," + field.key) header = numbered;
-  if (header != plain && header != numbered)
-    fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), expected.c_str());
+  if (header != plain && header != numbered) table.refuse_header();
+  table.begin(header);
   const bool has_cell = header == numbered;
-  const int columns = int(field.width) + has_cell;
 
   std::vector<uint32_t> cell_of(nfile, UINT32_MAX);
   for (uint32_t t = 0; t < mesh.ntet; ++t) cell_of[mesh.file_cell ? mesh.file_cell[t] : t] = t;
   std::vector<uint8_t> seen(nfile, 0);
-  std::vector<double> out(size_t(mesh.ntet) * w), row(static_cast<size_t>(columns));
+  std::vector<double> out(size_t(mesh.ntet) * w), row(size_t{w} + has_cell);
   uint32_t next = 0;
-  for (size_t line = 2; table.next(text); ++line) {
-    const std::string_view trimmed = trim(text);
-    if (trimmed.empty()) continue;
-    split_row(path, line, trimmed, header.c_str(), columns, row.data());
+  while (table.next(row.data())) {
+    const size_t line = table.line();
     const double number = has_cell ? row[0] : double(next);
     if (!has_cell && next == nfile)
       fail(DFM_E_FORMAT, "%s:%zu: more rows than the %u tetrahedra of the mesh file", path.c_str(), line,

@@ -13,26 +13,20 @@ constexpr const char *kHeader = "node,fixx,fixy,fixz,fx,fy,fz";
 }  // namespace
 
 std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) {
-  uint32_t highest = 0;
-  for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
-  Table table(path, kHeader, highest + uint64_t(1), 7);
-  std::vector<uint32_t> point_of(size_t(highest) + 1, UINT32_MAX);
-  for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
+  const std::vector<uint32_t> point_of = points_of_nodes(mesh);
+  Table table(path, kHeader, point_of.size(), 7);
+  if (table.empty())
+    fail(DFM_E_FORMAT, "%s: nothing to read; expected the header %s and a row for each node", path.c_str(),
+         kHeader);
+  if (table.first() != kHeader) table.refuse_header();
+  table.begin(kHeader);
   std::vector<NodalRow> rows;
-  std::string_view text;
-  size_t line = 1;
-  for (; table.next(text); ++line) {
-    const std::string_view trimmed = trim(text);
-    if (line == 1) {
-      if (trimmed != kHeader) fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), kHeader);
-      continue;
-    }
-    if (trimmed.empty()) continue;
-    double cell[7];
-    split_row(path, line, trimmed, kHeader, 7, cell);
-    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] > highest)
-      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %u", path.c_str(), line,
-           cell[0], highest);
+  double cell[7];
+  while (table.next(cell)) {
+    const size_t line = table.line();
+    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()))
+      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %zu", path.c_str(), line,
+           cell[0], point_of.size() - 1);
     NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};
     for (int k = 0; k < 3; ++k) {
       if (cell[1 + k] != 0 && cell[1 + k] != 1)
@@ -48,9 +42,6 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
     }
     rows.push_back(row);
   }
-  if (line == 1)
-    fail(DFM_E_FORMAT, "%s: nothing to read; expected the header %s and a row for each node", path.c_str(),
-         kHeader);
   return rows;
 }
 

@@ -60,12 +60,11 @@ std::string Node::kind_found() const {
   return value_->is_null() ? "null" : std::string(value_->type_name()) + " " + excerpt(*value_);
 }
 
-void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
+const Node &Node::object(const std::string &kind, const std::vector<std::string> &further) const {
   const std::vector<Key> &keys = keys_of(kind);
   if (!value_->is_object()) {
-    const bool typed = value_->is_string() && std::any_of(keys.begin(), keys.end(), [](const Key &k) {
-                         return k.name == std::string("type");
-                       });
+    const bool typed = value_->is_string() &&
+                       std::any_of(keys.begin(), keys.end(), [](const Key &k) { return k.name == "type"; });
     fail("expected an object with %s, found %s%s", join(delivered(keys)).c_str(), kind_found().c_str(),
          typed ? ("; write {\"type\": " + excerpt(*value_) + "}").c_str() : "");
   }
@@ -85,6 +84,12 @@ void Node::object(const std::string &kind, const std::vector<std::string> &furth
     if (!near.empty()) child.fail("unknown key \"%s\"; did you mean \"%s\"?", it.key().c_str(), near.c_str());
     child.fail("unknown key \"%s\"; expected one of: %s", it.key().c_str(), join(delivered(keys)).c_str());
   }
+  return *this;
+}
+
+Node Node::part(const std::string &kind) const {
+  if (!has(kind.c_str())) (*value_)[kind] = json::object();
+  return member(kind).object(kind);
 }
 
 Node Node::member(const std::string &key) const {

@@ -35,11 +35,12 @@ class Node {
 
   // Checks that this is an object whose keys are those of `kind`; unknown ones and those not
   // delivered are refused.
-  void object(const std::string &kind, const std::vector<std::string> &further = {}) const;
+  const Node &object(const std::string &kind, const std::vector<std::string> &further = {}) const;
   bool has(const char *key) const { return value_->is_object() && value_->contains(key); }
-  Node at(const std::string &key) const;           // an error if absent: the key is required
-  Node member(const std::string &key) const;       // must exist
-  std::vector<Node> items() const;                 // an error if this is no array
+  Node at(const std::string &key) const;      // an error if absent: the key is required
+  Node member(const std::string &key) const;  // must exist
+  Node part(const std::string &kind) const;   // the object under the key of its kind's name, made if absent
+  std::vector<Node> items() const;            // an error if this is no array
   std::vector<Node> items(const char *key) const;  // empty where the key is absent
 
   double number(const Range &range = kAny) const;

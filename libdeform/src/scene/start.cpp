@@ -40,27 +40,18 @@ std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, co
 }
 
 StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
-  uint32_t highest = 0;
-  for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
-  std::vector<uint32_t> point_of(size_t(highest) + 1, UINT32_MAX);
-  for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
-  Table table(path, kStateHeader, highest + uint64_t(1), 7);
+  const std::vector<uint32_t> point_of = points_of_nodes(mesh);
+  Table table(path, kStateHeader, point_of.size(), 7);
+  if (!table.empty() && table.first() != kStateHeader) table.refuse_header();
+  table.begin(kStateHeader);
   StartState out;
   out.x.resize(3 * size_t(mesh.npoint));
   out.v.resize(out.x.size());
   std::vector<uint8_t> seen(mesh.npoint, 0);
-  std::string_view text;
-  for (size_t line = 1; table.next(text); ++line) {
-    const std::string_view trimmed = trim(text);
-    if (line == 1) {
-      if (trimmed != kStateHeader)
-        fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), kStateHeader);
-      continue;
-    }
-    if (trimmed.empty()) continue;
-    double cell[7];
-    split_row(path, line, trimmed, kStateHeader, 7, cell);
-    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] > highest ||
+  double cell[7];
+  while (table.next(cell)) {
+    const size_t line = table.line();
+    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()) ||
         point_of[size_t(cell[0])] == UINT32_MAX)
       fail(DFM_E_ARG, "%s:%zu: no tetrahedron of the mesh file has a node %g", path.c_str(), line, cell[0]);
     const size_t point = point_of[size_t(cell[0])];

@@ -7,20 +7,26 @@
 
 namespace dfm::scene {
 
-// The lines of a table of about `rows` rows, read whole; a sentence with what was expected where
-// there is none.
+// A table of about `rows` rows, read whole; a sentence with what was expected where there is none.
 class Table {
  public:
-  Table(const std::string &path, const std::string &header, uint64_t rows, int columns);
-  bool next(std::string_view &line);  // without its line end
+  Table(std::string path, std::string expected, uint64_t rows, int columns);
+  bool empty() const { return bytes_.empty(); }
+  std::string first();  // the first line
+  [[noreturn]] void refuse_header() const;
+  // Rows have the columns of this header from now on.
+  void begin(const std::string &header);
+  bool next(double *row);  // of finite numbers; lines without any are skipped
+  size_t line() const { return line_; }
 
  private:
+  bool next_line(std::string_view &line);  // trimmed
+  void split(std::string_view text, double *row) const;
+
+  std::string path_, expected_, header_;
   Array<char> bytes_;
-  size_t at_ = 0;
+  size_t at_ = 0, line_ = 0;
+  int columns_ = 0;
 };
-std::string_view trim(std::string_view text);
-// The columns of a row, as many as the header names; each a finite number.
-void split_row(const std::string &path, size_t line, std::string_view text, const char *header, int columns,
-               double *out);
 
 }  // namespace dfm::scene
