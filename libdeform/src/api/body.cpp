@@ -20,21 +20,17 @@ namespace {
 
 // A count of keys without keys, and a sine that is not finite.
 void check_motion(const Body &b, uint32_t nkey, const void *keys, const dfm_sine *sine) {
-  if (nkey && !keys)
-    fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", b.name.c_str(), nkey);
+  if (nkey && !keys) refuse(b, ": %u keys are announced, but keys is NULL", nkey);
   if (!sine) return;
   for (double v : {sine->amplitude[0], sine->amplitude[1], sine->amplitude[2], sine->frequency, sine->phase})
     if (!std::isfinite(v))
-      fail(DFM_E_ARG, "body '%s': the sine is not finite; give amplitude, frequency (Hz) and phase (rad)",
-           b.name.c_str());
+      refuse(b, ": the sine is not finite; give amplitude, frequency (Hz) and phase (rad)");
 }
 
 void check_points(const Body &b, uint32_t n, const uint32_t *points) {
   if (n) need(points, "points");
   for (uint32_t i = 0; i < n; ++i)
-    if (points[i] >= b.p.n)
-      fail(DFM_E_ARG, "body '%s': point %u does not exist; it has %u points", b.name.c_str(), points[i],
-           b.p.n);
+    if (points[i] >= b.p.n) refuse(b, ": point %u does not exist; it has %u points", points[i], b.p.n);
 }
 
 // Held components keep the velocity of the hold: zero unless a motion moves them.
@@ -65,7 +61,7 @@ void sum_loads(Body &b) {
 Spring &spring_of(Body &b, uint32_t number) {
   for (Spring &s : b.springs)
     if (s.number == number) return s;
-  fail(DFM_E_ARG, "body '%s' has no spring %u", b.name.c_str(), number);
+  refuse(b, " has no spring %u", number);
 }
 
 // They count in the step bound and act from the next sub-step on.
@@ -82,27 +78,24 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
          "'%s' does not have; choose another model",
          name, b.model.type->id);
   check_points(b, d.npoint, d.points);
-  if (d.npoint == 0) fail(DFM_E_ARG, "body '%s': a spring needs at least one point", name);
-  if (d.nkey && !d.keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", name, d.nkey);
+  if (d.npoint == 0) refuse(b, ": a spring needs at least one point");
+  if (d.nkey && !d.keys) refuse(b, ": %u keys are announced, but keys is NULL", d.nkey);
   if (!(d.stiffness >= 0) || !(d.damping >= 0) || std::isinf(d.stiffness) || std::isinf(d.damping))
-    fail(DFM_E_ARG,
-         "body '%s': a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m",
-         name, d.stiffness, d.damping);
+    refuse(b, ": a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m",
+           d.stiffness, d.damping);
   Spring s{b.next_load, {d.points, d.points + d.npoint}, {}, {}, load3(d.to), d.stiffness, d.damping};
   if (d.nkey) s.keys.assign(d.keys, d.keys + d.nkey);
   check_keys(s.keys, name);
   double sum = 0, poison = 0;
   for (uint32_t i = 0; i < d.npoint; ++i) {
     const double w = d.weights ? d.weights[i] : b.p.mass[d.points[i]];
-    if (!(w >= 0))
-      fail(DFM_E_ARG, "body '%s': weight %u of a spring is %g; weights are not negative", name, i, w);
+    if (!(w >= 0)) refuse(b, ": weight %u of a spring is %g; weights are not negative", i, w);
     s.weights.push_back(w);
     sum += w;
   }
   for (double x : d.to) poison += 0.0 * x;
   if (!(sum > 0) || std::isinf(sum) || poison != 0)
-    fail(DFM_E_ARG, "body '%s': a spring's end and the sum of its weights must be finite, the sum above 0",
-         name);
+    refuse(b, ": a spring's end and the sum of its weights must be finite, the sum above 0");
   for (double &w : s.weights) w /= sum;
   return s;
 }
@@ -187,11 +180,10 @@ dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, doubl
 
 dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
-    if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
+    if (n != b.p.n) refuse(b, " has %u points, %u were given", b.p.n, n);
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
-        fail(DFM_E_ARG, "body '%s': the state of point %zu is not finite; nothing was changed",
-             b.name.c_str(), i / 3);
+        refuse(b, ": the state of point %zu is not finite; nothing was changed", i / 3);
     for (uint32_t i = 0; v && i < n; ++i) check_velocity("body", b.name.c_str(), load3(v + size_t(3) * i));
     if (x) {
       const double far = largest_coordinate(x, n, 3);
@@ -248,17 +240,15 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
   return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
-    if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
-    if (n == 0) fail(DFM_E_ARG, "body '%s': a motion needs points", b.name.c_str());
+    if (nkey == 0 && !sine) refuse(b, ": a motion needs keys or a sine");
+    if (n == 0) refuse(b, ": a motion needs points");
     HeldMotion m;
     m.points.assign(points, points + n);
     if (nkey) m.keys.assign(keys, keys + nkey);
     check_keys(m.keys, b.name.c_str());
     if (sine) m.sine = *sine;
     for (uint32_t i = 0; i < n; ++i) {
-      if (!b.p.held[points[i]])
-        fail(DFM_E_ARG, "body '%s': point %u is not held; call dfm_body_hold first", b.name.c_str(),
-             points[i]);
+      if (!b.p.held[points[i]]) refuse(b, ": point %u is not held; call dfm_body_hold first", points[i]);
       for (int k = 0; k < 3; ++k) m.start.push_back(b.p.x[size_t(points[i]) * kStride + size_t(k)]);
     }
     b.motions.reserve(b.motions.size() + 1);
@@ -279,8 +269,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
     l.number = b.next_load;
     l.points.assign(points, points + n);
     l.force.assign(force, force + size_t(3) * n);
-    if (!all_finite(l.force.data(), l.force.size()))
-      fail(DFM_E_ARG, "body '%s': a load is not finite", b.name.c_str());
+    if (!all_finite(l.force.data(), l.force.size())) refuse(b, ": a load is not finite");
     if (nkey) l.keys.assign(keys, keys + nkey);
     check_keys(l.keys, b.name.c_str());
     if (sine) l.sine = *sine;
@@ -294,7 +283,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
 dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
     if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
-      fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
+      refuse(b, " has no load %u", load);
     sum_loads(b);
   });
 }
@@ -314,7 +303,7 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
   return as_status(to_change<body_of>, body, [&](Body &b) {
     need(to, "to");
     Spring &s = spring_of(b, spring);
-    if (!all_finite(to, 3)) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
+    if (!all_finite(to, 3)) refuse(b, ": a spring's end must be finite");
     s.to = load3(to);
     s.keys.clear();
     disturb(b);
@@ -339,8 +328,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
   return as_status(to_change<body_of>, body, [&](Body &b) {
     need(point, "point");
     need(impulse, "impulse");
-    if (!all_finite(point, 3) || !all_finite(impulse, 3))
-      fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
+    if (!all_finite(point, 3) || !all_finite(impulse, 3)) refuse(b, ": point and impulse must be finite");
     const TriangleNearPoint near = closest_on_body(b, load3(point));
     disturb(b);
     const HostWork work(b);

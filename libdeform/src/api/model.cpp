@@ -21,12 +21,9 @@ dfm_params params_of(const dfm_params *given) {
 Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   need(s.type, "type");
   if (!std::isfinite(s.t) || s.t < after)
-    fail(DFM_E_ARG, "body '%s': a switch at %g s; times must be finite and must not decrease", b.name.c_str(),
-         s.t);
+    refuse(b, ": a switch at %g s; times must be finite and must not decrease", s.t);
   Switch out{s.t, choose_model(b, s.type, s.params, s.integrator)};
-  if (!(s.max_jump >= 0))
-    fail(DFM_E_ARG, "body '%s': max_jump is %g J; it must be above 0, or 0 for any jump", b.name.c_str(),
-         s.max_jump);
+  if (!(s.max_jump >= 0)) refuse(b, ": max_jump is %g J; it must be above 0, or 0 for any jump", s.max_jump);
   if (s.max_jump > 0) out.to.max_jump = s.max_jump;
   return out;
 }
@@ -34,8 +31,8 @@ Switch make_switch(const Body &b, const dfm_switch &s, double after) {
 // It is a member of dfm_switch_rule, so its size is the same in every version.
 ModelChoice make_choice(const Body &b, const char *name, const dfm_model_choice &c, double max_jump) {
   if (c.size != sizeof c && (c.type || c.size))
-    fail(DFM_E_ARG, "body '%s': the size of '%s' is %u, expected %zu; start from dfm_switch_rule_default()",
-         b.name.c_str(), name, c.size, sizeof c);
+    refuse(b, ": the size of '%s' is %u, expected %zu; start from dfm_switch_rule_default()", name, c.size,
+           sizeof c);
   if (!c.type) return {};
   ModelChoice out = choose_model(b, c.type, c.params, c.integrator);
   // before a change to another model
@@ -45,18 +42,13 @@ ModelChoice make_choice(const Body &b, const char *name, const dfm_model_choice 
 }
 
 SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
-  const char *const name = b.name.c_str();
   if (!r.otherwise.type || (!r.touching.type && !r.near_by.type))
-    fail(DFM_E_ARG,
-         "body '%s': a rule needs a model for otherwise (far), and a model for touching, near_by (near) or "
-         "both",
-         name);
+    refuse(b, ": a rule needs a model for otherwise (far), and a model for touching, near_by (near) or both");
   if (!(r.max_jump >= 0))
-    fail(DFM_E_ARG, "body '%s': max_jump is %g J; give a number above 0, or 0 for no limit", name,
-         r.max_jump);
+    refuse(b, ": max_jump is %g J; give a number above 0, or 0 for no limit", r.max_jump);
   for (const double x : {r.hysteresis, r.wait})
     if (!(x >= 0 && std::isfinite(x)))
-      fail(DFM_E_ARG, "body '%s': hysteresis and wait (s) are finite and not negative; found %g", name, x);
+      refuse(b, ": hysteresis and wait (s) are finite and not negative; found %g", x);
   SwitchRule out;
   out.touching = make_choice(b, "touching", r.touching, r.max_jump);
   out.near = make_choice(b, "near_by", r.near_by, r.max_jump);
@@ -64,10 +56,9 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
   out.hysteresis = r.hysteresis;
   out.wait = r.wait;
   if (!r.near_by.type) return out;
-  if (!all_finite(r.point, 3)) fail(DFM_E_ARG, "body '%s': the point of a rule is not finite", name);
+  if (!all_finite(r.point, 3)) refuse(b, ": the point of a rule is not finite");
   if (!(r.distance > 0 && std::isfinite(r.distance)))
-    fail(DFM_E_ARG, "body '%s': the distance of a rule is %g m; it must be positive and finite", name,
-         r.distance);
+    refuse(b, ": the distance of a rule is %g m; it must be positive and finite", r.distance);
   out.point = load3(r.point);
   out.distance = r.distance;
   return out;
@@ -130,10 +121,9 @@ dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) 
 dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
     need(point, "point");
-    if (!all_finite(point, 3)) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
+    if (!all_finite(point, 3)) refuse(b, ": the point is not finite");
     if (b.rule.empty() || b.rule[0].near.type.empty())
-      fail(DFM_E_ARG, "body '%s' has no rule that depends on a point; call dfm_body_set_switch_rule first",
-           b.name.c_str());
+      refuse(b, " has no rule that depends on a point; call dfm_body_set_switch_rule first");
     b.rule[0].point = load3(point);
   });
 }

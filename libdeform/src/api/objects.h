@@ -1,5 +1,7 @@
 // Objects of handles, for the files of api/: each function throws Error(DFM_E_HANDLE).
 #pragma once
+#include <cstdarg>
+#include <cstdio>
 #include <functional>
 #include <memory>
 
@@ -116,6 +118,18 @@ inline dfm_context &used(dfm_context &context) {
 inline dfm_context &exclusive(dfm_context &context) {
   Call::now().need_alone(&context, "context");
   return used(context);
+}
+
+// Error(DFM_E_ARG) with the body's name before the sentence.
+[[noreturn]] inline void refuse(const Body &b, const char *sentence, ...)
+    __attribute__((format(printf, 2, 3)));
+inline void refuse(const Body &b, const char *sentence, ...) {
+  char text[1024];
+  va_list rest;
+  va_start(rest, sentence);
+  std::vsnprintf(text, sizeof text, sentence, rest);
+  va_end(rest);
+  fail(DFM_E_ARG, "body '%s'%s", b.name.c_str(), text);
 }
 
 inline void need(const void *p, const char *name) {

@@ -87,13 +87,15 @@ const Node &Node::object(const std::string &kind, const std::vector<std::string>
   return *this;
 }
 
-Node Node::part(const std::string &kind) const {
-  if (!has(kind.c_str())) (*value_)[kind] = json::object();
-  return member(kind).object(kind);
-}
+Node Node::part(const std::string &kind) const { return member(kind, json::object()).object(kind); }
 
 Node Node::member(const std::string &key) const {
   return Node(&(*value_)[key], pointer_ + "/" + escape_pointer(key), file_);
+}
+
+Node Node::member(const std::string &key, json otherwise) const {
+  if (!has(key.c_str())) (*value_)[key] = std::move(otherwise);
+  return member(key);
 }
 
 Node Node::at(const std::string &key) const {
@@ -124,19 +126,9 @@ double Node::number(const Range &range) const {
   return x;
 }
 
-double Node::number(const char *key, double otherwise, const Range &range) const {
-  if (!has(key)) (*value_)[key] = otherwise;
-  return member(key).number(range);
-}
-
 bool Node::boolean() const {
   if (!value_->is_boolean()) fail("expected true or false, found %s", kind_found().c_str());
   return value_->get<bool>();
-}
-
-bool Node::boolean(const char *key, bool otherwise) const {
-  if (!has(key)) (*value_)[key] = otherwise;
-  return member(key).boolean();
 }
 
 std::string Node::text() const {
@@ -162,21 +154,11 @@ std::string Node::word(const std::string &set) const {
   fail("\"%s\" is not known; expected one of: %s", s.c_str(), join(delivered(keys)).c_str());
 }
 
-std::string Node::word(const char *key, const char *otherwise, const std::string &set) const {
-  if (!has(key)) (*value_)[key] = otherwise;
-  return member(key).word(set);
-}
-
 void Node::vector(double out[3]) const {
   if (!value_->is_array() || value_->size() != 3)
     fail("expected three numbers [x, y, z], found %s", kind_found().c_str());
   const std::vector<Node> parts = items();
   for (int i = 0; i < 3; ++i) out[i] = parts[i].number();
-}
-
-void Node::vector(const char *key, double out[3], double x, double y, double z) const {
-  if (!has(key)) (*value_)[key] = json::array({x, y, z});
-  member(key).vector(out);
 }
 
 std::string Node::name() const {

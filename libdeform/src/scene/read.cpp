@@ -247,8 +247,7 @@ dfm_sine read_sine(const Node &sine, bool scalar) {
 namespace {
 
 void read_gravity(const Node &scene, Definition &def) {
-  if (!scene.has("gravity")) scene.value()["gravity"] = json::array({0.0, 0.0, -9.81});
-  const Node gravity = scene.member("gravity");
+  const Node gravity = scene.member("gravity", json::array({0.0, 0.0, -9.81}));
   if (gravity.value().is_array()) return gravity.vector(def.world.gravity);
   if (!gravity.value().is_object())
     gravity.fail("expected [x, y, z] in m/s2 or an object with keyframes, found %s",
@@ -264,13 +263,12 @@ void read_time(const Node &scene, Definition &def) {
   const Node time = scene.at("time").object("time");
   def.begin = time.number("start", 0.0, kNotNegative);
   def.duration = time.at("duration").number(kPositive);
-  if (!time.has("step")) time.value()["step"] = "auto";
   if (time.has("max_time")) def.world.max_time = time.member("max_time").number(kPositive);
   if (time.has("max_work")) {
     const double work = time.member("max_work").number(Range{1, HUGE_VAL, false, true});
     def.world.max_work = work < 1.8e19 ? static_cast<uint64_t>(work) : UINT64_MAX;
   }
-  const Node step = time.member("step");
+  const Node step = time.member("step", "auto");
   if (step.value().is_string()) {
     if (step.text() != "auto")
       step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());
@@ -337,8 +335,7 @@ void read_solver(const Node &scene, Definition &def) {
 }
 
 void read_effects(const Node &scene, Definition &def) {
-  if (!scene.has("effects")) scene.value()["effects"] = "auto";
-  const Node effects = scene.member("effects");
+  const Node effects = scene.member("effects", "auto");
   if (effects.value().is_string()) {
     if (effects.text() != "auto")
       effects.fail("expected \"auto\" or a list of effects, found \"%s\"", effects.text().c_str());
@@ -535,8 +532,7 @@ void read_color_range(const Node &range, const std::string &color) {
 void read_output(const Node &scene, Definition &def) {
   const Node output = scene.part("output");
   def.every = output.number("every", 0.02, kPositive);
-  if (!output.has("frames")) output.value()["frames"] = false;
-  const Node frames = output.member("frames");
+  const Node frames = output.member("frames", false);
   if (frames.value().is_number()) {
     def.frame_rate = frames.number(Range{0, 1e6, true, false});
     def.frames = true;

@@ -26,8 +26,8 @@ const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
 int32_t integrator_of(const Node &holder);  // its key `integrator`, DFM_INTEGRATOR_*
 dfm_sine read_sine(const Node &sine, bool scalar);
 void check_rising(const Node &key, double previous, double t);
-// The key "keyframes", with times that rise; read(node, key) reads all but the time. some: an empty list is an
-// error.
+// The key "keyframes", with times that rise; read(node, key) reads all but the time. some: an empty list is
+// refused.
 template <class Key, class Read>
 std::vector<Key> read_keyframes(const Node &holder, const char *kind, Read read, bool some = true) {
   std::vector<Key> keys;

@@ -112,8 +112,7 @@ Motion read_motion(const Node &motion, const dfm_pose &base, Quat turn) {
 }
 
 uint8_t read_axes(const Node &entry) {
-  if (!entry.has("axes")) entry.value()["axes"] = "xyz";
-  const Node node = entry.member("axes");
+  const Node node = entry.member("axes", "xyz");
   uint8_t bits = 0;
   for (char c : node.text()) {
     if (c < 'x' || c > 'z') node.fail("expected letters out of \"xyz\", found \"%s\"", node.text().c_str());
@@ -209,8 +208,7 @@ MadeMesh read_made(const Node &node) {
   } else {
     read_sizes(node.at("size"), "edges", made.size);
   }
-  if (!node.has("cells")) node.value()["cells"] = 1000;
-  made.cells = read_count(node.at("cells"), 1, 1e8);
+  made.cells = read_count(node.member("cells", 1000), 1, 1e8);
   return made;
 }
 
@@ -392,8 +390,7 @@ Quat read_plane(const Node &node, dfm_obstacle_def &def) {
   if (node.has("pose") && node.has("point"))
     node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
   if (!node.has("pose")) node.vector("point", def.pose.position, 0, 0, 0);
-  if (!node.has("normal")) node.value()["normal"] = json::array({0.0, 0.0, 1.0});
-  read_direction(node.member("normal"), "the normal of a plane", normal);
+  read_direction(node.member("normal", json::array({0.0, 0.0, 1.0})), "the normal of a plane", normal);
   const Quat turn = rotation_to(normal);
   store_quat(def.pose.rotation, load_quat(def.pose.rotation) * turn);
   return turn;

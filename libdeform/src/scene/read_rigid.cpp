@@ -71,8 +71,7 @@ Rigid read_rigid(const Node &scene, ReadContext &context) {
   if (!scene.has("rigid")) return out;
   const Node rigid = scene.member("rigid").object("rigid");
   out.pointer = rigid.pointer();
-  if (!rigid.has("host")) rigid.value()["host"] = "builtin";
-  out.host = rigid.member("host").text();
+  out.host = rigid.member("host", "builtin").text();
   std::vector<std::string> names;
   const std::vector<Node> nodes = rigid.items("bodies");
   for (const Node &node : nodes) {

@@ -67,17 +67,4 @@ Shared share(const Force &force, const BodyMesh &mesh, const std::string &file);
 // see Locator::find
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
 
-// Values of a field for each cell of the mesh, [ntet,width].
-std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh);
-
-std::string columns_of(uint32_t width);  // the header of such a file, without "cell"
-
-// Held components and forces by the file's node numbers.
-struct NodalRow {
-  uint32_t point;
-  uint8_t axes;
-  double force[3];
-};
-std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh);
-
 }  // namespace dfm::scene

@@ -9,7 +9,7 @@
 #include "mesh/tri_mesh.h"
 #include "plugin/context.h"
 #include "scene/keys.h"
-#include "scene/start.h"
+#include "scene/table.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
 #include "step/attach.h"
@@ -269,7 +269,7 @@ void write_held(SceneWriter &to, const Body &b, Written &out) {
 
 void write_nodal(SceneWriter &to, const Body &b, const std::map<uint32_t, Vec3> &forces, Written &out) {
   if (forces.empty()) return;
-  std::string rows = "node,fixx,fixy,fixz,fx,fy,fz\n";
+  std::string rows = std::string(scene::kNodalHeader) + "\n";
   for (const auto &[point, f] : forces) rows += format("%u,0,0,0,%.17g,%.17g,%.17g\n", point, f.x, f.y, f.z);
   out["nodal_bc"] = to.text_file(b.name + "_forces.csv", std::move(rows));
 }
