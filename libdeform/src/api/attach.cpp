@@ -7,15 +7,10 @@
 
 using namespace dfm;
 
-void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) {
-  dfm_attach_def d{};
-  d.size = sizeof d;
-  dfm::give_default(size, out, d);
-}
+void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) { give_default(size, out, {}); }
 
 dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *attachment) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(def, "def");
     const dfm_attach_def own = take_def(def, dfm_attach_def_default());
     check_flags(own, DFM_ATTACH_TOUCH, "dfm_attach_def");
@@ -31,11 +26,10 @@ dfm_status dfm_body_detach(dfm_body body, uint32_t attachment) {
 }
 
 dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     const auto own = [&](const Attachment &a) { return a.body == b.id; };
     const auto &list = b.world->attachments;
-    if (!room(static_cast<uint32_t>(std::count_if(list.begin(), list.end(), own)), capacity, out, n)) return;
+    if (!room(size_t(std::count_if(list.begin(), list.end(), own)), capacity, out, n)) return;
     for (const Attachment &a : list)
       if (own(a)) *out++ = a.number;
   });

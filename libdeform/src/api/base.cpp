@@ -6,18 +6,14 @@
 #include "core/file.h"
 #include "plugin/context.h"
 
-using dfm::fail;
-using dfm::require;
-using dfm::as_status;
-using dfm::exclusive;
-using dfm::used;
+using namespace dfm;
 
 namespace {
 
 dfm_context_def checked(const dfm_context_def *given) {
   if (given && given->size < offsetof(dfm_context_def, alloc))
     fail(DFM_E_ARG, "dfm_context_def.size is %u; start from dfm_context_def_default()", given->size);
-  const dfm_context_def def = dfm::take_def(given, dfm_context_def_default());
+  const dfm_context_def def = take_def(given, dfm_context_def_default());
   if (!def.alloc != !def.release)
     fail(DFM_E_ARG, "set both hooks alloc and release, or neither; %s is missing",
          def.alloc ? "release" : "alloc");
@@ -57,28 +53,28 @@ const char *dfm_status_name(dfm_status s) {
   return "unknown status";
 }
 
-const char *dfm_last_error(void) { return dfm::last_error(); }
+const char *dfm_last_error(void) { return last_error(); }
 
 dfm_status dfm_fail(dfm_status status, const char *sentence) {
-  dfm::set_last_error(sentence ? sentence : "");
+  set_last_error(sentence ? sentence : "");
   return status;
 }
 
 dfm_status dfm_file_read(const char *path, uint64_t limit, const char *expected, dfm_file_take_fn take,
                          void *user) {
-  return dfm::as_status([&] {
+  return as_status([&] {
     if (!path || !*path || !expected || !take)
-      dfm::fail(DFM_E_ARG, "dfm_file_read: path is empty, or path, expected or take is NULL");
-    const dfm::Array<char> bytes = dfm::read_whole_file(dfm::Memory::standard(), path, limit, expected);
+      fail(DFM_E_ARG, "dfm_file_read: path is empty, or path, expected or take is NULL");
+    const Array<char> bytes = read_whole_file(Memory::standard(), path, limit, expected);
     take(user, bytes.data(), bytes.size());
   });
 }
 
 dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
-  return dfm::as_status([&] {
+  return as_status([&] {
     if (!path || !*path || (n && !bytes))
-      dfm::fail(DFM_E_ARG, "dfm_file_write: path is empty, or path or bytes is NULL");
-    dfm::AtomicFile file(path);
+      fail(DFM_E_ARG, "dfm_file_write: path is empty, or path or bytes is NULL");
+    AtomicFile file(path);
     file.write(bytes, n);
     file.commit();
   });
@@ -86,9 +82,8 @@ dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
 
 void dfm_context_def_default_sized(uint32_t size, dfm_context_def *out) {
   dfm_context_def def{};
-  def.size = sizeof def;
   def.threads = 1;
-  dfm::give_default(size, out, def);
+  give_default(size, out, def);
 }
 
 dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
@@ -99,7 +94,7 @@ dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
     if (context->hooks.plugin_dir) {
       try {
         context->loader.scan(context->hooks.plugin_dir);
-      } catch (const dfm::Error &e) {
+      } catch (const Error &e) {
         fail(DFM_E_ARG, "plugin_dir: %s", e.what());
       }
       context->hooks.plugin_dir = nullptr;  // the caller's string need not outlive this call
@@ -113,10 +108,10 @@ dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {
 void dfm_context_destroy(dfm_context *context) {
   if (!context) return;
   if (context->calls != 0 || context->ending.exchange(true)) {
-    dfm::set_last_error(
+    set_last_error(
         "dfm_context_destroy was called by a hook, plugin or host inside another call of this context; "
         "nothing was destroyed; call it after that call has returned");
-    context->log(DFM_LOG_ERROR, dfm::last_error());
+    context->log(DFM_LOG_ERROR, last_error());
     return;
   }
   delete context;
@@ -147,7 +142,7 @@ dfm_status dfm_plugin_register_static(dfm_context *context, dfm_plugin_fn entry,
 dfm_status dfm_plugin_visit(dfm_context *context, dfm_plugin_visit_fn visit, void *user) {
   return as_status([&] {
     if (!visit) fail(DFM_E_ARG, "dfm_plugin_visit: visit is NULL");
-    const dfm::Registry &registry = used(require(context)).registry;
+    const Registry &registry = used(require(context)).registry;
     for (const dfm_type *type : registry.list()) visit(user, type, registry.file_of(*type).c_str());
   });
 }

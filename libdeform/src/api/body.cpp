@@ -20,21 +20,17 @@ namespace {
 
 // A count of keys without keys, and a sine that is not finite.
 void check_motion(const Body &b, uint32_t nkey, const void *keys, const dfm_sine *sine) {
-  if (nkey && !keys)
-    fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", b.name.c_str(), nkey);
+  if (nkey && !keys) refuse(b, ": %u keys are announced, but keys is NULL", nkey);
   if (!sine) return;
   for (double v : {sine->amplitude[0], sine->amplitude[1], sine->amplitude[2], sine->frequency, sine->phase})
     if (!std::isfinite(v))
-      fail(DFM_E_ARG, "body '%s': the sine is not finite; give amplitude, frequency (Hz) and phase (rad)",
-           b.name.c_str());
+      refuse(b, ": the sine is not finite; give amplitude, frequency (Hz) and phase (rad)");
 }
 
 void check_points(const Body &b, uint32_t n, const uint32_t *points) {
   if (n) need(points, "points");
   for (uint32_t i = 0; i < n; ++i)
-    if (points[i] >= b.p.n)
-      fail(DFM_E_ARG, "body '%s': point %u does not exist; it has %u points", b.name.c_str(), points[i],
-           b.p.n);
+    if (points[i] >= b.p.n) refuse(b, ": point %u does not exist; it has %u points", points[i], b.p.n);
 }
 
 // Held components keep the velocity of the hold: zero unless a motion moves them.
@@ -65,7 +61,7 @@ void sum_loads(Body &b) {
 Spring &spring_of(Body &b, uint32_t number) {
   for (Spring &s : b.springs)
     if (s.number == number) return s;
-  fail(DFM_E_ARG, "body '%s' has no spring %u", b.name.c_str(), number);
+  refuse(b, " has no spring %u", number);
 }
 
 // They count in the step bound and act from the next sub-step on.
@@ -82,27 +78,24 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
          "'%s' does not have; choose another model",
          name, b.model.type->id);
   check_points(b, d.npoint, d.points);
-  if (d.npoint == 0) fail(DFM_E_ARG, "body '%s': a spring needs at least one point", name);
-  if (d.nkey && !d.keys) fail(DFM_E_ARG, "body '%s': %u keys are announced, but keys is NULL", name, d.nkey);
+  if (d.npoint == 0) refuse(b, ": a spring needs at least one point");
+  if (d.nkey && !d.keys) refuse(b, ": %u keys are announced, but keys is NULL", d.nkey);
   if (!(d.stiffness >= 0) || !(d.damping >= 0) || std::isinf(d.stiffness) || std::isinf(d.damping))
-    fail(DFM_E_ARG,
-         "body '%s': a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m",
-         name, d.stiffness, d.damping);
+    refuse(b, ": a spring's stiffness and damping are finite and not negative; found %g N/m and %g N s/m",
+           d.stiffness, d.damping);
   Spring s{b.next_load, {d.points, d.points + d.npoint}, {}, {}, load3(d.to), d.stiffness, d.damping};
   if (d.nkey) s.keys.assign(d.keys, d.keys + d.nkey);
   check_keys(s.keys, name);
   double sum = 0, poison = 0;
   for (uint32_t i = 0; i < d.npoint; ++i) {
     const double w = d.weights ? d.weights[i] : b.p.mass[d.points[i]];
-    if (!(w >= 0))
-      fail(DFM_E_ARG, "body '%s': weight %u of a spring is %g; weights are not negative", name, i, w);
+    if (!(w >= 0)) refuse(b, ": weight %u of a spring is %g; weights are not negative", i, w);
     s.weights.push_back(w);
     sum += w;
   }
   for (double x : d.to) poison += 0.0 * x;
   if (!(sum > 0) || std::isinf(sum) || poison != 0)
-    fail(DFM_E_ARG, "body '%s': a spring's end and the sum of its weights must be finite, the sum above 0",
-         name);
+    refuse(b, ": a spring's end and the sum of its weights must be finite, the sum above 0");
   for (double &w : s.weights) w /= sum;
   return s;
 }
@@ -111,15 +104,13 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
 
 void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out) {
   dfm_body_def d{};
-  d.size = sizeof d;
   d.category = 1;
   d.collides_with = ~0u;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");
     dfm_body_def own = take_def(def, dfm_body_def_default());
     check_flags(own, 0, "dfm_body_def");
@@ -134,8 +125,7 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
 }
 
 dfm_status dfm_body_destroy(dfm_body body) {
-  return as_status([&] {
-    Body &b = any_body_of(body);
+  return as_status(any_body_of, body, [&](Body &b) {
     if (!b.emptied && !b.undone) body_of(body);  // with all of its points
     exclusive(*b.world);
     destroy_body(b);
@@ -143,8 +133,7 @@ dfm_status dfm_body_destroy(dfm_body body) {
 }
 
 dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
-  return as_status([&] {
-    const Body &b = any_body_of(body);
+  return as_status(any_body_of, body, [&](const Body &b) {
     dfm_body_info i{};
     if (!b.emptied && !b.undone) {
       i.npoint = b.p.n;
@@ -170,8 +159,7 @@ dfm_status dfm_body_set_user(dfm_body body, void *user) {
 }
 
 dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     b.category = category;
     b.collides_with = collides_with;
     disturb(b);
@@ -181,8 +169,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
 }
 
 dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = body_of(body);
+  return as_status(body_of, body, [&](const Body &b) {
     if (!room(b.p.n, capacity, x ? x : v, n)) return;
     for (uint32_t i = 0; i < b.p.n; ++i) {
       if (x) store3(x + size_t(3) * i, load3(&b.p.x[size_t(i) * kStride]));
@@ -192,13 +179,11 @@ dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, doubl
 }
 
 dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const double *v) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
-    if (n != b.p.n) fail(DFM_E_ARG, "body '%s' has %u points, %u were given", b.name.c_str(), b.p.n, n);
+  return as_status(to_change<body_of>, body, [&](Body &b) {
+    if (n != b.p.n) refuse(b, " has %u points, %u were given", b.p.n, n);
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
-        fail(DFM_E_ARG, "body '%s': the state of point %zu is not finite; nothing was changed",
-             b.name.c_str(), i / 3);
+        refuse(b, ": the state of point %zu is not finite; nothing was changed", i / 3);
     for (uint32_t i = 0; v && i < n; ++i) check_velocity("body", b.name.c_str(), load3(v + size_t(3) * i));
     if (x) {
       const double far = largest_coordinate(x, n, 3);
@@ -225,16 +210,14 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
 
 dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets,
                              uint32_t *tets) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
     if (tets && room(b.ncell(), capacity_tets, tets, nullptr)) std::copy(b.tets.begin(), b.tets.end(), tets);
   });
 }
 
 dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint8_t axes) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
     if (b.model.stepper)
@@ -254,21 +237,18 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
 
 dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points, uint32_t nkey,
                               const dfm_pose_key *keys, const dfm_sine *sine) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
-    if (nkey == 0 && !sine) fail(DFM_E_ARG, "body '%s': a motion needs keys or a sine", b.name.c_str());
-    if (n == 0) fail(DFM_E_ARG, "body '%s': a motion needs points", b.name.c_str());
+    if (nkey == 0 && !sine) refuse(b, ": a motion needs keys or a sine");
+    if (n == 0) refuse(b, ": a motion needs points");
     HeldMotion m;
     m.points.assign(points, points + n);
     if (nkey) m.keys.assign(keys, keys + nkey);
     check_keys(m.keys, b.name.c_str());
     if (sine) m.sine = *sine;
     for (uint32_t i = 0; i < n; ++i) {
-      if (!b.p.held[points[i]])
-        fail(DFM_E_ARG, "body '%s': point %u is not held; call dfm_body_hold first", b.name.c_str(),
-             points[i]);
+      if (!b.p.held[points[i]]) refuse(b, ": point %u is not held; call dfm_body_hold first", points[i]);
       for (int k = 0; k < 3; ++k) m.start.push_back(b.p.x[size_t(points[i]) * kStride + size_t(k)]);
     }
     b.motions.reserve(b.motions.size() + 1);
@@ -281,8 +261,7 @@ dfm_status dfm_body_move_held(dfm_body body, uint32_t n, const uint32_t *points,
 
 dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, const double *force,
                              uint32_t nkey, const dfm_scale_key *keys, const dfm_sine *sine, uint32_t *load) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     check_points(b, n, points);
     check_motion(b, nkey, keys, sine);
     if (n) need(force, "force");
@@ -290,8 +269,7 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
     l.number = b.next_load;
     l.points.assign(points, points + n);
     l.force.assign(force, force + size_t(3) * n);
-    if (!all_finite(l.force.data(), l.force.size()))
-      fail(DFM_E_ARG, "body '%s': a load is not finite", b.name.c_str());
+    if (!all_finite(l.force.data(), l.force.size())) refuse(b, ": a load is not finite");
     if (nkey) l.keys.assign(keys, keys + nkey);
     check_keys(l.keys, b.name.c_str());
     if (sine) l.sine = *sine;
@@ -303,17 +281,15 @@ dfm_status dfm_body_add_load(dfm_body body, uint32_t n, const uint32_t *points, 
 }
 
 dfm_status dfm_body_remove_load(dfm_body body, uint32_t load) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (std::erase_if(b.loads, [&](const Load &l) { return l.number == load; }) == 0)
-      fail(DFM_E_ARG, "body '%s' has no load %u", b.name.c_str(), load);
+      refuse(b, " has no load %u", load);
     sum_loads(b);
   });
 }
 
 dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_t *spring) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     b.springs.push_back(make_spring(
         b,
         take_def(def, dfm_spring_def{sizeof(dfm_spring_def), 0, nullptr, nullptr, {}, nullptr, 0, 0, 0, 0})));
@@ -324,11 +300,10 @@ dfm_status dfm_body_add_spring(dfm_body body, const dfm_spring_def *def, uint32_
 }
 
 dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const double to[3]) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(to, "to");
     Spring &s = spring_of(b, spring);
-    if (!all_finite(to, 3)) fail(DFM_E_ARG, "body '%s': a spring's end must be finite", b.name.c_str());
+    if (!all_finite(to, 3)) refuse(b, ": a spring's end must be finite");
     s.to = load3(to);
     s.keys.clear();
     disturb(b);
@@ -336,28 +311,24 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
 }
 
 dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     need(force, "force");
     store3(force, spring_force(b, spring_of(b, spring), b.world->time, 0));
   });
 }
 
 dfm_status dfm_body_remove_spring(dfm_body body, uint32_t spring) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     b.springs.erase(b.springs.begin() + (&spring_of(b, spring) - b.springs.data()));
     springs_changed(b);
   });
 }
 
 dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const double impulse[3]) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(point, "point");
     need(impulse, "impulse");
-    if (!all_finite(point, 3) || !all_finite(impulse, 3))
-      fail(DFM_E_ARG, "body '%s': point and impulse must be finite", b.name.c_str());
+    if (!all_finite(point, 3) || !all_finite(impulse, 3)) refuse(b, ": point and impulse must be finite");
     const TriangleNearPoint near = closest_on_body(b, load3(point));
     disturb(b);
     const HostWork work(b);
@@ -370,8 +341,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
 }
 
 dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(params, "params");
     const HostWork work(b);
     set_model_params(b, *params);
@@ -380,15 +350,11 @@ dfm_status dfm_body_set_params(dfm_body body, const dfm_params *params) {
 }
 
 dfm_status dfm_body_wake(dfm_body body) {
-  return as_status([&] {
-    Body &b = body_of(body);
-    wake(exclusive(*b.world), b);
-  });
+  return as_status(body_of, body, [&](Body &b) { wake(exclusive(*b.world), b); });
 }
 
 dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     need(asleep, "asleep");
     *asleep = b.slumber.asleep;
   });
@@ -399,16 +365,14 @@ dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
 }
 
 dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     if (!room(b.ncell(), capacity, out, nullptr)) return;
     energy_density(b, out);
   });
 }
 
 dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     if (!room(b.ncell(), capacity, out, nullptr)) return;
     cell_stress(b, out);
   });

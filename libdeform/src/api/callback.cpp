@@ -18,16 +18,14 @@ void ask_pairs_again(World &w) {
 }  // namespace
 
 dfm_status dfm_world_set_may_touch(dfm_world world, dfm_may_touch_fn may_touch, void *user) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     w.may_touch = {may_touch, user, {}};
     ask_pairs_again(w);
   });
 }
 
 dfm_status dfm_world_ask_again(dfm_world world, uint64_t a, uint64_t b) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     uint64_t first = a ? id_of(w, a, "a") : 0, second = b ? id_of(w, b, "b") : 0;
     if (first == 0) std::swap(first, second);
     std::erase_if(w.may_touch.answers, [&](const PairAnswer &p) {
@@ -39,8 +37,7 @@ dfm_status dfm_world_ask_again(dfm_world world, uint64_t a, uint64_t b) {
 }
 
 dfm_status dfm_world_set_pre_solve(dfm_world world, dfm_pre_solve_fn pre_solve, void *user) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     w.pre_solve = {pre_solve, user};
     wake_all(w);
   });

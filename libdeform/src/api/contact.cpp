@@ -197,8 +197,7 @@ std::span<const dfm_param_value> values_of(const dfm_params &params, const char 
 }  // namespace
 
 dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(given, "def");
     const dfm_friction_def def = take_def(given, dfm_friction_def{});
     check_flags(def, DFM_FRICTION_RESTITUTION, "dfm_friction_def");
@@ -216,8 +215,7 @@ dfm_status dfm_world_add_friction(dfm_world world, const dfm_friction_def *given
 }
 
 dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b, const dfm_params *params) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(a, "a");
     need(b, "b");
     need(params, "params");
@@ -226,8 +224,7 @@ dfm_status dfm_world_set_friction(dfm_world world, const char *a, const char *b,
 }
 
 dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char *b) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(a, "a");
     need(b, "b");
     remove_friction_rule(w, a, b);
@@ -235,8 +232,7 @@ dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char 
 }
 
 dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
     if (collide) w.overlaps.all = true;
     wake_all(w);
@@ -245,8 +241,7 @@ dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, 
 }
 
 dfm_status dfm_world_remove_filter(dfm_world world, const char *a, const char *b) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(a, "a");
     need(b, "b");
     const std::string between[2] = {a, b};
@@ -270,7 +265,7 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
     for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
     std::vector<const RigidContact *> rigid;
     for (const RigidContact &c : w.rigid_report.contacts) rigid.push_back(&c);
-    if (!room(count + static_cast<uint32_t>(rigid.size()), capacity, out, n)) return;
+    if (!room(count + rigid.size(), capacity, out, n)) return;
     if (w.report.n)
       for (uint32_t i : w.store.by_key)
         if (touching(w, i)) rows.add(report(w, i));
@@ -280,8 +275,7 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
 }
 
 dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info) {
-  return as_status([&] {
-    const World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](const World &w) {
     if (law >= w.laws.size())
       fail(DFM_E_ARG,
            "there is no law %u in this world, which has %zu; take the number from a dfm_contact or a "
@@ -344,15 +338,14 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
     }
     add_rigid_pairs(w, pairs);
-    if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
+    if (!room(pairs.size(), capacity, out, n)) return;
     for (const PairRow &p : pairs) rows.add(p.report);
   });
 }
 
 dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const double point[3],
                                  double force[3], double moment[3]) {
-  return as_status([&] {
-    const World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](const World &w) {
     need(point, "point");
     if (!all_finite(point, 3)) fail(DFM_E_ARG, "the point about which the moment is taken is not finite");
     const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
@@ -388,7 +381,7 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
     const World &w = world_of(world);
     Array<StepImpulses::Pair> pairs(HookAllocator<StepImpulses::Pair>(w.memory()));
     list_impulses(w, pairs);
-    if (!room(static_cast<uint32_t>(pairs.size()), capacity, out, n)) return;
+    if (!room(pairs.size(), capacity, out, n)) return;
     for (const StepImpulses::Pair &p : pairs) {
       dfm_pair_impulse r{};
       r.a = w.handle_of(p.a);
@@ -410,15 +403,14 @@ dfm_status dfm_world_events_sized(dfm_world world, uint32_t row_size, uint32_t c
   return as_status([&] {
     Rows<dfm_contact_event> rows(out, row_size, "dfm_contact_event");
     World &w = exclusive(world_of(world));
-    if (!room(static_cast<uint32_t>(w.events.size()), capacity, out, n)) return;
+    if (!room(w.events.size(), capacity, out, n)) return;
     for (const dfm_contact_event &e : w.events) rows.add(e);
     w.events.clear();
   });
 }
 
 dfm_status dfm_world_hold_begin(dfm_world world) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     w.hold.on = true;
     w.hold.start = w.time;
     std::fill(w.store.held.begin(), w.store.held.end(), uint8_t(0));
@@ -428,8 +420,7 @@ dfm_status dfm_world_hold_begin(dfm_world world) {
 }
 
 dfm_status dfm_world_hold(dfm_world world, double *creep, uint32_t *count) {
-  return as_status([&] {
-    const World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](const World &w) {
     need(creep, "creep");
     double longest = 0;
     uint32_t n = 0;

@@ -16,24 +16,20 @@ namespace {
 constexpr double kRounding = 1e-9;  // of the time of a world, which is a sum of steps
 
 CutShape shape_of(const Body &b, const dfm_cut_def &def) {
-  const char *const name = b.name.c_str();
   if (def.shape > DFM_CUT_PLANE)
-    fail(DFM_E_ARG,
-         "body '%s': unknown shape of a cut, %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX, DFM_CUT_BLADE or "
-         "DFM_CUT_PLANE",
-         name, def.shape);
+    refuse(b,
+           ": unknown shape of a cut, %u; use DFM_CUT_ELLIPSOID, DFM_CUT_BOX, DFM_CUT_BLADE or DFM_CUT_PLANE",
+           def.shape);
   if (def.how > DFM_CUT_SPLIT)
-    fail(DFM_E_ARG, "body '%s': unknown way of cutting, %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name,
-         def.how);
+    refuse(b, ": unknown way of cutting, %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", def.how);
   const bool flat = def.shape == DFM_CUT_BLADE || def.shape == DFM_CUT_PLANE;
   if (def.how == DFM_CUT_SPLIT && !flat)
-    fail(DFM_E_ARG,
-         "body '%s': DFM_CUT_SPLIT opens faces along a blade or a plane; take the shape DFM_CUT_BLADE or "
-         "DFM_CUT_PLANE, or remove cells by DFM_CUT_REMOVE",
-         name);
+    refuse(b,
+           ": DFM_CUT_SPLIT opens faces along a blade or a plane; take the shape DFM_CUT_BLADE or "
+           "DFM_CUT_PLANE, or remove cells by DFM_CUT_REMOVE");
   if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) || !all_finite(def.motion, 3) ||
       !all_finite(def.blade, 12))
-    fail(DFM_E_ARG, "body '%s': pose, motion and blade of a cut must be finite", name);
+    refuse(b, ": pose, motion and blade of a cut must be finite");
   CutShape s;
   s.kind = CutKind(def.shape);
   const Pose pose = to_pose(def.pose);
@@ -44,13 +40,11 @@ CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   for (int k = 0; k < 4; ++k) s.corner[k] = load3(def.blade + 3 * k);
   const double length = norm(s.corner[1]);
   if (def.shape == DFM_CUT_PLANE && !(length > 0 && std::isfinite(length)))
-    fail(DFM_E_ARG, "body '%s': the normal of a plane that cuts it has the length %g; give a direction", name,
-         length);
+    refuse(b, ": the normal of a plane that cuts it has the length %g; give a direction", length);
   if (!flat)
     for (const double size : def.half_size)
       if (!(size > 0 && std::isfinite(size)))
-        fail(DFM_E_ARG, "body '%s': half_size of a cut has %g m; all three must be positive and finite", name,
-             size);
+        refuse(b, ": half_size of a cut has %g m; all three must be positive and finite", size);
   return s;
 }
 
@@ -75,8 +69,7 @@ SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
   const dfm_separate_def own = def ? take_def(def, dfm_separate_def_default()) : dfm_separate_def_default();
   check_flags(own, 0, "dfm_separate_def");
   if (own.crumbs > DFM_CRUMBS_REMOVE)
-    fail(DFM_E_ARG, "body '%s': crumbs %u; use DFM_CRUMBS_STAY or DFM_CRUMBS_REMOVE", b.name.c_str(),
-         own.crumbs);
+    refuse(b, ": crumbs %u; use DFM_CRUMBS_STAY or DFM_CRUMBS_REMOVE", own.crumbs);
   return {true, own.crumbs == DFM_CRUMBS_REMOVE, std::max(own.least_cells, 1u)};
 }
 
@@ -84,14 +77,12 @@ SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
 
 void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out) {
   dfm_cut_def d{};
-  d.size = sizeof d;
   d.pose.rotation[3] = 1;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(def, "def");
     const dfm_cut_def own = take_def(def, dfm_cut_def_default());
     check_flags(own, 0, "dfm_cut_def");
@@ -102,16 +93,14 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
 }
 
 dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (!def) return plan_no_cuts(b);
     const double now = b.world->time;
     if (!(t >= now - kRounding * now && std::isfinite(t)))
-      fail(
-          DFM_E_ARG,
-          "body '%s': a cut at %g s, and the time of the world is %g s; give a finite time that is not past, "
-          "or cut now by dfm_body_cut",
-          b.name.c_str(), t, now);
+      refuse(b,
+             ": a cut at %g s, and the time of the world is %g s; give a finite time that is not past, or "
+             "cut now by dfm_body_cut",
+             t, now);
     const dfm_cut_def own = take_def(def, dfm_cut_def_default());
     check_flags(own, 0, "dfm_cut_def");
     plan_cut(b, {t, own.how, own.most, shape_of(b, own)});
@@ -119,14 +108,12 @@ dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
 }
 
 dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cells, dfm_cut_info *out) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (n) need(cells, "cells");
     Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
     for (uint32_t i = 0; i < n; ++i) {
       if (cells[i] >= removed.size())
-        fail(DFM_E_ARG, "body '%s' has no cell %u to remove; it has %zu", b.name.c_str(), cells[i],
-             removed.size());
+        refuse(b, " has no cell %u to remove; it has %zu", cells[i], removed.size());
       removed[cells[i]] = 1;
     }
     CutReport report = remove_cells(b, removed);
@@ -137,8 +124,7 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
 
 dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *points,
                             uint32_t capacity_cells, uint32_t *cells) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     const uint32_t ntet = b.ncell();
     const bool give_points = points && room(b.p.n, capacity_points, points, nullptr);
     const bool give_cells = cells && room(ntet, capacity_cells, cells, nullptr);
@@ -149,14 +135,12 @@ dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *p
 
 void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out) {
   dfm_separate_def d{};
-  d.size = sizeof d;
   d.least_cells = 1;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     const SeparateRule rule = rule_of(b, def);
     CutReport report;
     separate(b, rule, report);
@@ -165,8 +149,7 @@ dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut
 }
 
 dfm_status dfm_body_set_separate(dfm_body body, const dfm_separate_def *def) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     SeparateRule rule = def ? rule_of(b, def) : SeparateRule{};
     if (rule.on) check_may_cut(b, b.model);
     rule.waits = rule.on && b.separate.waits;
@@ -187,13 +170,11 @@ dfm_status dfm_body_cut_delay(dfm_body body, double *delay, uint32_t *waiting) {
 }
 
 dfm_status dfm_body_pieces(dfm_body body, uint32_t capacity, dfm_body *pieces, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = any_body_of(body);
+  return as_status(any_body_of, body, [&](const Body &b) {
     const uint64_t whole = b.piece_of ? b.piece_of : b.id;
     std::vector<dfm_body> found;
     for (const Body *const other : all_bodies(*b.world))
       if (other->piece_of == whole) found.push_back(other->handle);
-    if (!room(static_cast<uint32_t>(found.size()), capacity, pieces, n)) return;
-    std::copy(found.begin(), found.end(), pieces);
+    give_list(found, capacity, pieces, n);
   });
 }

@@ -29,8 +29,7 @@ double von_mises(const double *s) {
 }  // namespace
 
 dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     need(path, "path");
     const std::vector<double> x = packed(b.p.x, b.p.n), v = packed(b.p.v, b.p.n);
     std::vector<double> u(x.size()), energy, stress, mises;
@@ -59,8 +58,7 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
 }
 
 dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     need(path, "path");
     const uint32_t n = b.surface.nsurfel;
     std::vector<double> x(size_t(3) * n), v(size_t(3) * n), u(size_t(3) * n), force(size_t(3) * n);
@@ -84,24 +82,19 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
 }
 
 dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = body_of(body);
-    if (!room(b.p.n, capacity, u, n)) return;
-    for (uint32_t i = 0; i < b.p.n; ++i) store3(u + size_t(3) * i, displacement(b, i));
+  return as_status(body_of, body, [&](const Body &b) {
+    give_vectors(b.p.n, capacity, u, n, [&](uint32_t i) { return displacement(b, i); });
   });
 }
 
 dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = body_of(body);
-    if (!room(b.surface.nsurfel, capacity, u, n)) return;
-    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(u + size_t(3) * s, surfel_displacement(b, s));
+  return as_status(body_of, body, [&](const Body &b) {
+    give_vectors(b.surface.nsurfel, capacity, u, n, [&](uint32_t s) { return surfel_displacement(b, s); });
   });
 }
 
 dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line, void *user) {
-  return as_status([&] {
-    const World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](const World &w) {
     if (!line) fail(DFM_E_ARG, "argument 'line' is NULL");
     double longest = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) longest = std::max(longest, w.report.impulse[size_t(3) * i]);
@@ -145,8 +138,7 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
 }
 
 dfm_status dfm_debug_contact_problems(dfm_world world, const char *folder, uint32_t every) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     w.steps->capture = folder ? std::make_unique<Capture>(Capture{folder, every}) : nullptr;
   });
 }

@@ -1,24 +1,23 @@
 #include "api/mesh_objects.h"
 #include "deform/mesh.h"
 
-using dfm::as_status;
-using dfm::need;
+using namespace dfm;
 
 dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out) {
   return as_status([&] {
     need(out, "out");
-    const dfm::TriMeshObject &object = dfm::TriMeshObject::of(surface);
-    dfm::TetMesh mesh = dfm::fill_surface(object.mesh, cells);
+    const TriMeshObject &object = TriMeshObject::of(surface);
+    TetMesh mesh = dfm::fill_surface(object.mesh, cells);
     for (const std::string &w : mesh.warnings)
       object.context.logf(DFM_LOG_WARNING, "filling a surface: %s", w.c_str());
-    *out = dfm::TetMeshObject::keep(object.context, std::move(mesh));
+    *out = TetMeshObject::keep(object.context, std::move(mesh));
   });
 }
 
 dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share) {
   return as_status([&] {
     need(share, "share");
-    const dfm::TetMesh &m = dfm::TetMeshObject::of(mesh).mesh;
+    const TetMesh &m = TetMeshObject::of(mesh).mesh;
     *share = m.share.empty() ? nullptr : m.share.data();
   });
 }

@@ -42,7 +42,6 @@ struct Prepared {
 struct Law {
   dfm_context &context;
   const dfm_type &type;
-  uint64_t handle = 0;
   std::mutex mutex;
   // for the last parameters: a rig or plot calls repeatedly with the same ones
   std::shared_ptr<const Prepared> prepared;
@@ -63,10 +62,7 @@ void destroy(uint64_t handle) {
 
 Law &law_at(dfm_law handle) {
   Law &law = resolve<Law>(Kind::law, handle);
-  Call::now().hold(&law);
-  Call::now().hold(&law.context);
-  Call::now().count(law.context.calls);
-  return law;
+  return held(law, law.context);
 }
 
 uint32_t state_width(const Law &law, const double *params) {
@@ -119,6 +115,27 @@ void check_input(const Law &law, const dfm_friction_in &in) {
       fail(DFM_E_ARG, "dfm_law_eval (%s): the law needs %s, which is NULL", id, column.name);
 }
 
+// f(column, width) for the columns of a batch, and f(column of one, column of the other, width).
+template <class F>
+void each_in(dfm_friction_in &in, uint32_t nstate, F &&f) {
+  f(in.fn, 1u);
+  f(in.vt, 2u);
+  f(in.ft_stop, 2u);
+  f(in.area, 1u);
+  f(in.dwell, 1u);
+  f(in.state, nstate);
+}
+template <class F>
+void each_out(const dfm_friction_out &a, dfm_friction_out &b, uint32_t nstate, F &&f) {
+  f(a.ft, b.ft, 2u);
+  f(a.state, b.state, nstate);
+  f(a.dft_dvt, b.dft_dvt, 4u);
+  f(a.dft_dfn, b.dft_dfn, 2u);
+  f(a.limit, b.limit, 1u);
+  f(a.mode, b.mode, 1u);
+  f(a.stored, b.stored, 1u);
+}
+
 // Plugins may rely on 64-byte alignment and a stride of whole vectors; callers may pass plain arrays.
 class Aligned {
  public:
@@ -130,67 +147,42 @@ class Aligned {
         nstate_(nstate),
         stride_((in.n + 7) & ~7u) {
     bool aligned = in.stride % 8 == 0;
-    for (const void *p : {static_cast<const void *>(in.fn), static_cast<const void *>(in.vt),
-                          static_cast<const void *>(in.ft_stop), static_cast<const void *>(in.area),
-                          static_cast<const void *>(in.dwell), static_cast<const void *>(in.state),
-                          static_cast<const void *>(out.ft), static_cast<const void *>(out.state),
-                          static_cast<const void *>(out.dft_dvt), static_cast<const void *>(out.dft_dfn),
-                          static_cast<const void *>(out.limit), static_cast<const void *>(out.mode),
-                          static_cast<const void *>(out.stored)})
-      aligned &= reinterpret_cast<uintptr_t>(p) % 64 == 0;
+    const auto look = [&](const void *p) { aligned &= reinterpret_cast<uintptr_t>(p) % 64 == 0; };
+    each_in(in_, nstate, [&](auto *p, uint32_t) { look(p); });
+    each_out(given_, out_, nstate, [&](auto *p, auto *, uint32_t) { look(p); });
     if (aligned) return;
     copied_ = true;
     from_ = in.stride;
     in_.stride = stride_;
-    copy_in(in_.fn, 1);
-    copy_in(in_.vt, 2);
-    copy_in(in_.ft_stop, 2);
-    copy_in(in_.area, 1);
-    copy_in(in_.dwell, 1);
-    copy_in(in_.state, nstate);
-    make(out_.ft, 2);
-    make(out_.state, nstate);
-    make(out_.dft_dvt, 4);
-    make(out_.dft_dfn, 2);
-    make(out_.limit, 1);
-    make(out_.mode, 1);
-    make(out_.stored, 1);
+    each_in(in_, nstate, [&](const double *&column, uint32_t width) {
+      if (!column) return;
+      double *const to = take<double>(width);
+      for (uint32_t c = 0; c < width; ++c)
+        std::copy_n(column + size_t(c) * from_, in_.n, to + size_t(c) * stride_);
+      column = to;
+    });
+    each_out(given_, out_, nstate, [&]<class T>(T *, T *&column, uint32_t width) {
+      if (column) column = take<T>(width);
+    });
   }
   const dfm_friction_in *in() const { return &in_; }
   dfm_friction_out *out() { return &out_; }
-  void finish() const {
+  void finish() {
     if (!copied_) return;
-    copy_out(given_.ft, out_.ft, 2);
-    copy_out(given_.state, out_.state, nstate_);
-    copy_out(given_.dft_dvt, out_.dft_dvt, 4);
-    copy_out(given_.dft_dfn, out_.dft_dfn, 2);
-    copy_out(given_.limit, out_.limit, 1);
-    copy_out(given_.mode, out_.mode, 1);
-    copy_out(given_.stored, out_.stored, 1);
+    each_out(given_, out_, nstate_, [&](auto *to, const auto *column, uint32_t width) {
+      for (uint32_t c = 0; to && c < width; ++c)
+        std::copy_n(column + size_t(c) * stride_, in_.n, to + size_t(c) * from_);
+    });
   }
 
  private:
-  void *take(size_t bytes) const {
+  template <class T>
+  T *take(uint32_t width) const {
+    const size_t bytes = sizeof(T) * stride_ * width;
     void *p = arena_ ? arena_->take(bytes) : nullptr;
     if (!p) throw std::bad_alloc();
     std::memset(p, 0, bytes);
-    return p;
-  }
-  void copy_in(const double *&column, uint32_t width) const {
-    if (!column) return;
-    double *to = static_cast<double *>(take(sizeof(double) * stride_ * width));
-    for (uint32_t c = 0; c < width; ++c)
-      std::copy_n(column + size_t(c) * from_, in_.n, to + size_t(c) * stride_);
-    column = to;
-  }
-  template <class T>
-  void make(T *&column, uint32_t width) const {
-    if (column) column = static_cast<T *>(take(sizeof(T) * stride_ * width));
-  }
-  template <class T>
-  void copy_out(T *to, const T *column, uint32_t width) const {
-    for (uint32_t c = 0; to && c < width; ++c)
-      std::copy_n(column + size_t(c) * stride_, in_.n, to + size_t(c) * from_);
+    return static_cast<T *>(p);
   }
 
   ScratchArena *arena_;
@@ -267,21 +259,13 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
     used(*context);
     const dfm_type &type =
         path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);
-    std::unique_ptr<Law> law(new Law{*context, type, 0, {}, nullptr});
-    law->handle = handle_create(Kind::law, law.get());
-    try {
-      context->add_live(law->handle, destroy);
-    } catch (...) {
-      handle_destroy(law->handle);
-      throw;
-    }
-    *out = law.release()->handle;
+    std::unique_ptr<Law> law(new Law{*context, type, {}, nullptr});
+    *out = keep_live(*context, Kind::law, std::move(law), destroy);
   });
 }
 
 dfm_status dfm_law_close(dfm_law law) {
-  return as_status([&] {
-    Law &l = law_at(law);
+  return as_status(law_at, law, [&](Law &l) {
     Call::now().need_alone(&l, "law");
     l.context.remove_live(law);
     destroy(law);

@@ -8,18 +8,28 @@
 
 using namespace dfm;
 
+namespace {
+
+// Entries of one value that the library itself reads. zero: whether that is one.
+constexpr struct {
+  const char *key, *unit, *must;
+  bool zero;
+} kEntries[] = {{kFrictionKey, "", "coefficient, zero or positive, and finite", true},
+                {kTearKey, "", "strain, positive and finite", false},
+                {kToughnessKey, " J/m2", "value, zero or positive, and finite", true}};
+
+}  // namespace
+
 void dfm_material_def_default_sized(uint32_t size, dfm_material_def *out) {
   dfm_material_def d{};
-  d.size = sizeof d;
   d.density = 1000;
   d.young = 1e5;
   d.poisson = 0.3;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");
     auto m = std::make_unique<Material>();
     m->def = take_def(def, dfm_material_def_default());
@@ -49,22 +59,11 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
       const dfm_param_value &v = m->def.extra.values[i];
       if (!v.key || !v.value)
         fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");
-      if (!std::strcmp(v.key, kFrictionKey) &&
-          !(v.width == 1 && v.value[0] >= 0 && std::isfinite(v.value[0])))
-        fail(DFM_E_ARG,
-             "material '%s': friction is %g of %u values; it must be one coefficient, zero or positive, and "
-             "finite",
-             name, v.width ? v.value[0] : 0.0, v.width);
-      if (!std::strcmp(v.key, kTearKey) && !(v.width == 1 && v.value[0] > 0 && std::isfinite(v.value[0])))
-        fail(DFM_E_ARG, "material '%s': tear is %g of %u values; it must be one strain, positive and finite",
-             name, v.width ? v.value[0] : 0.0, v.width);
-      if (!std::strcmp(v.key, kToughnessKey) &&
-          !(v.width == 1 && v.value[0] >= 0 && std::isfinite(v.value[0])))
-        fail(
-            DFM_E_ARG,
-            "material '%s': fracture_energy is %g J/m2 of %u values; it must be one value, zero or positive, "
-            "and finite",
-            name, v.width ? v.value[0] : 0.0, v.width);
+      for (const auto &[key, unit, must, zero] : kEntries)
+        if (!std::strcmp(v.key, key) &&
+            !(v.width == 1 && (zero ? v.value[0] >= 0 : v.value[0] > 0) && std::isfinite(v.value[0])))
+          fail(DFM_E_ARG, "material '%s': %s is %g%s of %u values; it must be one %s", name, key,
+               v.width ? v.value[0] : 0.0, unit, v.width, must);
       m->extra_keys.push_back(v.key);
       m->extra_values.emplace_back(v.value, v.value + v.width);
     }
@@ -78,8 +77,7 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
 }
 
 dfm_status dfm_material_destroy(dfm_material material) {
-  return as_status([&] {
-    Material &m = material_of(material);
+  return as_status(material_of, material, [&](Material &m) {
     World &w = exclusive(*m.world);
     handle_destroy(material);
     std::erase_if(w.materials, [&](auto &p) { return p.get() == &m; });

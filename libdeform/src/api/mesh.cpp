@@ -6,54 +6,52 @@
 #include "api/mesh_objects.h"
 #include "mesh/raw_mesh.h"
 
-using dfm::fail;
-using dfm::as_status;
-using dfm::need;
-using Object = dfm::TetMeshObject;
+using namespace dfm;
+using Object = TetMeshObject;
 
 namespace {
 // "About" so many cells are asked for; who gets others by more than a quarter is told.
-void tell_count(dfm::TetMesh &mesh, const char *kind, uint32_t asked) {
+void tell_count(TetMesh &mesh, const char *kind, uint32_t asked) {
   constexpr double kAbout = 1.25;
   const double made = double(mesh.tets.size() / 4);
   if (std::max(made, double(asked)) > kAbout * std::min(made, double(asked)))
     mesh.warnings.push_back(
-        dfm::format("%.0f tetrahedra are made where %u were asked for: the lattice of a %s has no number of "
-                    "well-shaped cells nearer to that",
-                    made, asked, kind));
+        format("%.0f tetrahedra are made where %u were asked for: the lattice of a %s has no number of "
+               "well-shaped cells nearer to that",
+               made, asked, kind));
 }
 }  // namespace
 
 dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(path, "path");
     need(out, "out");
-    dfm::TetMesh mesh = dfm::read_tet_mesh(context->memory, path);
-    dfm::log_warnings(*context, path, mesh.warnings);
+    TetMesh mesh = read_tet_mesh(context->memory, path);
+    log_warnings(*context, path, mesh.warnings);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
 
 dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(path, "path");
     need(kind, "kind");
-    *kind = dfm::has_cells(path, dfm::read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
+    *kind = has_cells(path, read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
   });
 }
 
 dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(path, "path");
     need(cells, "cells");
     need(surface, "surface");
-    dfm::AnyMesh mesh = dfm::read_any_mesh(context->memory, path);
-    dfm::log_warnings(*context, path, mesh.cells ? mesh.cells->warnings : mesh.surface->warnings);
+    AnyMesh mesh = read_any_mesh(context->memory, path);
+    log_warnings(*context, path, mesh.cells ? mesh.cells->warnings : mesh.surface->warnings);
     const dfm_tetmesh c = mesh.cells ? Object::keep(*context, std::move(*mesh.cells)) : 0;
-    *surface = mesh.surface ? dfm::TriMeshObject::keep(*context, std::move(*mesh.surface)) : 0;
+    *surface = mesh.surface ? TriMeshObject::keep(*context, std::move(*mesh.surface)) : 0;
     *cells = c;
   });
 }
@@ -61,20 +59,20 @@ dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *ce
 dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells,
                             dfm_tetmesh *out) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(kind, "kind");
     need(size, "size");
     need(out, "out");
     const std::string name = kind;
-    const dfm::Memory &memory = context->memory;
-    const auto keep = [&](dfm::TetMesh mesh) {
+    const Memory &memory = context->memory;
+    const auto keep = [&](TetMesh mesh) {
       tell_count(mesh, kind, cells);
       *out = Object::keep(*context, std::move(mesh));
     };
-    if (name == "cylinder") keep(dfm::make_cylinder(memory, size[0], size[1], cells));
-    else if (name == "beam") keep(dfm::make_beam(memory, size[0], size[1], size[2], cells));
-    else if (name == "ball") keep(dfm::make_ball(memory, size[0], cells));
-    else if (name == "tube") keep(dfm::make_tube(memory, size[0], size[1], size[2], cells));
+    if (name == "cylinder") keep(make_cylinder(memory, size[0], size[1], cells));
+    else if (name == "beam") keep(make_beam(memory, size[0], size[1], size[2], cells));
+    else if (name == "ball") keep(make_ball(memory, size[0], cells));
+    else if (name == "tube") keep(make_tube(memory, size[0], size[1], size[2], cells));
     else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, ball or tube", kind);
   });
 }
@@ -84,12 +82,11 @@ dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
 }
 
 dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
-  return as_status([&] {
-    const Object &object = Object::of(mesh);
-    const dfm::TetMesh &m = object.mesh;
-    const dfm::MeshStatistics &s = object.statistics;
+  return as_status(Object::of, mesh, [&](const Object &object) {
+    const TetMesh &m = object.mesh;
+    const MeshStatistics &s = object.statistics;
     dfm_tetmesh_info info{};
-    dfm::put_shared(info, object);
+    put_shared(info, object);
     info.ntet = s.ntet;
     info.ntriangle = s.ntriangle;
     info.dropped_cells = m.dropped_cells;
@@ -97,14 +94,14 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
     info.duplicate_points = s.duplicate_points;
     info.overlapping_faces = m.overlapping;
     info.wave_path = s.wave_path;
-    dfm::give(out, info);
+    give(out, info);
   });
 }
 
 dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
                             const uint32_t **file_point) {
   return as_status([&] {
-    const dfm::TetMesh &m = Object::of(mesh).mesh;
+    const TetMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();
     if (tets) *tets = m.tets.data();
     if (file_point) *file_point = m.file_point.data();
@@ -114,14 +111,13 @@ dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint3
 dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) {
   return as_status([&] {
     need(file_cell, "file_cell");
-    const dfm::TetMesh &m = Object::of(mesh).mesh;
+    const TetMesh &m = Object::of(mesh).mesh;
     *file_cell = m.file_cell.empty() ? nullptr : m.file_cell.data();
   });
 }
 
 dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group) {
-  return as_status([&] {
-    const Object &object = Object::of(mesh);
+  return as_status(Object::of, mesh, [&](const Object &object) {
     if (names) *names = object.names.data();
     if (cell_group) *cell_group = object.mesh.tet_group.data();
   });
@@ -130,7 +126,7 @@ dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const
 dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group,
                                  uint32_t *n) {
   return as_status([&] {
-    const dfm::TetMesh &m = Object::of(mesh).mesh;
+    const TetMesh &m = Object::of(mesh).mesh;
     if (triangles) *triangles = m.tris.data();
     if (group) *group = m.tri_group.data();
     if (n) *n = static_cast<uint32_t>(m.tri_group.size());
@@ -140,10 +136,10 @@ dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, c
 dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension,
                                     const uint32_t **points, uint32_t *n) {
   return as_status([&] {
-    const dfm::TetMesh &m = Object::of(mesh).mesh;
+    const TetMesh &m = Object::of(mesh).mesh;
     if (group >= m.groups.size())
       fail(DFM_E_ARG, "there is no group %u; the mesh has %zu", group, m.groups.size());
-    const dfm::MeshGroup &g = m.groups[group];
+    const MeshGroup &g = m.groups[group];
     if (dimension) *dimension = static_cast<uint32_t>(g.dimension);
     if (points) *points = g.points.data();
     if (n) *n = static_cast<uint32_t>(g.points.size());
@@ -154,7 +150,7 @@ dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
   return as_status([&] {
     need(path, "path");
     const Object &object = Object::of(mesh);
-    if (!dfm::write_tet_mesh(object.mesh, path))
+    if (!write_tet_mesh(object.mesh, path))
       object.context.logf(
           DFM_LOG_WARNING,
           "%s does not keep how much of each cell is material: a body of this file counts every cell "

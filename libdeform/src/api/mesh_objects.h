@@ -29,24 +29,12 @@ struct MeshObject {
 
   static MeshObject &of(uint64_t handle) {
     MeshObject &object = resolve<MeshObject>(kKind, handle);
-    Call::now().hold(&object);
-    Call::now().hold(&object.context);
-    Call::now().count(object.context.calls);
-    return object;
+    return held(object, object.context);
   }
 
   // Moves the mesh into the context and returns its handle.
   static uint64_t keep(dfm_context &context, Mesh &&mesh) {
-    auto object = std::make_unique<MeshObject>(context, std::move(mesh));
-    const uint64_t handle = handle_create(kKind, object.get());
-    try {
-      context.add_live(handle, end);
-    } catch (...) {
-      handle_destroy(handle);
-      throw;
-    }
-    object.release();
-    return handle;
+    return keep_live(context, kKind, std::make_unique<MeshObject>(context, std::move(mesh)), end);
   }
 
   static void destroy(uint64_t handle) {

@@ -21,12 +21,9 @@ dfm_params params_of(const dfm_params *given) {
 Switch make_switch(const Body &b, const dfm_switch &s, double after) {
   need(s.type, "type");
   if (!std::isfinite(s.t) || s.t < after)
-    fail(DFM_E_ARG, "body '%s': a switch at %g s; times must be finite and must not decrease", b.name.c_str(),
-         s.t);
+    refuse(b, ": a switch at %g s; times must be finite and must not decrease", s.t);
   Switch out{s.t, choose_model(b, s.type, s.params, s.integrator)};
-  if (!(s.max_jump >= 0))
-    fail(DFM_E_ARG, "body '%s': max_jump is %g J; it must be above 0, or 0 for any jump", b.name.c_str(),
-         s.max_jump);
+  if (!(s.max_jump >= 0)) refuse(b, ": max_jump is %g J; it must be above 0, or 0 for any jump", s.max_jump);
   if (s.max_jump > 0) out.to.max_jump = s.max_jump;
   return out;
 }
@@ -34,8 +31,8 @@ Switch make_switch(const Body &b, const dfm_switch &s, double after) {
 // It is a member of dfm_switch_rule, so its size is the same in every version.
 ModelChoice make_choice(const Body &b, const char *name, const dfm_model_choice &c, double max_jump) {
   if (c.size != sizeof c && (c.type || c.size))
-    fail(DFM_E_ARG, "body '%s': the size of '%s' is %u, expected %zu; start from dfm_switch_rule_default()",
-         b.name.c_str(), name, c.size, sizeof c);
+    refuse(b, ": the size of '%s' is %u, expected %zu; start from dfm_switch_rule_default()", name, c.size,
+           sizeof c);
   if (!c.type) return {};
   ModelChoice out = choose_model(b, c.type, c.params, c.integrator);
   // before a change to another model
@@ -45,18 +42,13 @@ ModelChoice make_choice(const Body &b, const char *name, const dfm_model_choice 
 }
 
 SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
-  const char *const name = b.name.c_str();
   if (!r.otherwise.type || (!r.touching.type && !r.near_by.type))
-    fail(DFM_E_ARG,
-         "body '%s': a rule needs a model for otherwise (far), and a model for touching, near_by (near) or "
-         "both",
-         name);
+    refuse(b, ": a rule needs a model for otherwise (far), and a model for touching, near_by (near) or both");
   if (!(r.max_jump >= 0))
-    fail(DFM_E_ARG, "body '%s': max_jump is %g J; give a number above 0, or 0 for no limit", name,
-         r.max_jump);
+    refuse(b, ": max_jump is %g J; give a number above 0, or 0 for no limit", r.max_jump);
   for (const double x : {r.hysteresis, r.wait})
     if (!(x >= 0 && std::isfinite(x)))
-      fail(DFM_E_ARG, "body '%s': hysteresis and wait (s) are finite and not negative; found %g", name, x);
+      refuse(b, ": hysteresis and wait (s) are finite and not negative; found %g", x);
   SwitchRule out;
   out.touching = make_choice(b, "touching", r.touching, r.max_jump);
   out.near = make_choice(b, "near_by", r.near_by, r.max_jump);
@@ -64,10 +56,9 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
   out.hysteresis = r.hysteresis;
   out.wait = r.wait;
   if (!r.near_by.type) return out;
-  if (!all_finite(r.point, 3)) fail(DFM_E_ARG, "body '%s': the point of a rule is not finite", name);
+  if (!all_finite(r.point, 3)) refuse(b, ": the point of a rule is not finite");
   if (!(r.distance > 0 && std::isfinite(r.distance)))
-    fail(DFM_E_ARG, "body '%s': the distance of a rule is %g m; it must be positive and finite", name,
-         r.distance);
+    refuse(b, ": the distance of a rule is %g m; it must be positive and finite", r.distance);
   out.point = load3(r.point);
   out.distance = r.distance;
   return out;
@@ -76,8 +67,7 @@ SwitchRule make_rule(const Body &b, const dfm_switch_rule &r) {
 }  // namespace
 
 dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params *params) {
-  return as_status([&] {
-    Body &b = body_of(body);
+  return as_status(body_of, body, [&](Body &b) {
     World &w = exclusive(*b.world);
     need(type, "type");
     const ModelChoice to = choose_model(b, type, params_of(params), DFM_INTEGRATOR_AUTO);
@@ -90,8 +80,7 @@ dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm_params 
 }
 
 dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *switches) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     if (n) need(switches, "switches");
     std::vector<Switch> made;
     const char *const from = "start from dfm_switch_default()";
@@ -104,27 +93,24 @@ dfm_status dfm_body_set_switches(dfm_body body, uint32_t n, const dfm_switch *sw
 
 void dfm_switch_default_sized(uint32_t size, dfm_switch *out) {
   dfm_switch s{};
-  s.size = sizeof s;
   s.integrator = DFM_INTEGRATOR_AUTO;
   s.params.size = sizeof s.params;
-  dfm::give_default(size, out, s);
+  give_default(size, out, s);
 }
 
 void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
   dfm_switch_rule r{};
-  r.size = sizeof r;
   for (dfm_model_choice *c : {&r.touching, &r.near_by, &r.otherwise}) {
     c->size = sizeof *c;
     c->params.size = sizeof c->params;
   }
   r.hysteresis = 0.1;
   r.wait = 0.1;
-  dfm::give_default(size, out, r);
+  give_default(size, out, r);
 }
 
 dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     std::vector<SwitchRule> made;
     if (rule) made.push_back(make_rule(b, take_def(rule, dfm_switch_rule_default())));
     rehearse(b, b.switches, made, false);
@@ -133,13 +119,11 @@ dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) 
 }
 
 dfm_status dfm_body_set_interest(dfm_body body, const double point[3]) {
-  return as_status([&] {
-    Body &b = exclusive(body_of(body));
+  return as_status(to_change<body_of>, body, [&](Body &b) {
     need(point, "point");
-    if (!all_finite(point, 3)) fail(DFM_E_ARG, "body '%s': the point is not finite", b.name.c_str());
+    if (!all_finite(point, 3)) refuse(b, ": the point is not finite");
     if (b.rule.empty() || b.rule[0].near.type.empty())
-      fail(DFM_E_ARG, "body '%s' has no rule that depends on a point; call dfm_body_set_switch_rule first",
-           b.name.c_str());
+      refuse(b, " has no rule that depends on a point; call dfm_body_set_switch_rule first");
     b.rule[0].point = load3(point);
   });
 }
@@ -149,7 +133,7 @@ dfm_status dfm_world_swaps_sized(dfm_world world, uint32_t row_size, uint32_t ca
   return as_status([&] {
     Rows<dfm_swap> rows(out, row_size, "dfm_swap");
     World &w = exclusive(world_of(world));
-    if (!room(static_cast<uint32_t>(w.swaps.size()), capacity, out, n)) return;
+    if (!room(w.swaps.size(), capacity, out, n)) return;
     for (const Swap &s : w.swaps)
       rows.add({0, s.refused ? uint32_t{DFM_SWAP_REFUSED} : 0, s.body, s.t, s.from->id, s.to->id, s.before,
                 s.after, s.max_jump});

@@ -1,5 +1,10 @@
 // Objects of handles, for the files of api/: each function throws Error(DFM_E_HANDLE).
 #pragma once
+#include <cstdarg>
+#include <cstdio>
+#include <functional>
+#include <memory>
+
 #include "api/as_status.h"
 #include "api/structs.h"
 #include "core/error.h"
@@ -11,12 +16,15 @@
 
 namespace dfm {
 
-inline World &held(World &w) {
-  Call::now().hold(&w);
-  Call::now().hold(w.context);
-  Call::now().count(w.context->calls);
-  return w;
+// Registers an object of a context as in use by this call.
+template <class T>
+T &held(T &object, dfm_context &context) {
+  Call::now().hold(&object);
+  Call::now().hold(&context);
+  Call::now().count(context.calls);
+  return object;
 }
+inline World &held(World &w) { return held(w, *w.context); }
 inline World &world_of(dfm_world h) { return held(resolve<World>(Kind::world, h)); }
 template <class Part>
 Part &part_of(Kind kind, uint64_t h) {
@@ -79,6 +87,20 @@ Part &settled(Part &part) {
   return part;
 }
 
+// Gives an object to a context, which ends it by `end` if the host does not; returns its handle.
+template <class T>
+uint64_t keep_live(dfm_context &context, Kind kind, std::unique_ptr<T> object, void (*end)(uint64_t)) {
+  const uint64_t handle = handle_create(kind, object.get());
+  try {
+    context.add_live(handle, end);
+  } catch (...) {
+    handle_destroy(handle);
+    throw;
+  }
+  object.release();
+  return handle;
+}
+
 inline dfm_context &require(dfm_context *context) {
   if (!context) fail(DFM_E_ARG, "the context is NULL; create one with dfm_context_create");
   return *context;
@@ -98,8 +120,37 @@ inline dfm_context &exclusive(dfm_context &context) {
   return used(context);
 }
 
+// Error(DFM_E_ARG) with the body's name before the sentence.
+[[noreturn]] inline void refuse(const Body &b, const char *sentence, ...)
+    __attribute__((format(printf, 2, 3)));
+inline void refuse(const Body &b, const char *sentence, ...) {
+  char text[1024];
+  va_list rest;
+  va_start(rest, sentence);
+  std::vsnprintf(text, sizeof text, sentence, rest);
+  va_end(rest);
+  fail(DFM_E_ARG, "body '%s'%s", b.name.c_str(), text);
+}
+
 inline void need(const void *p, const char *name) {
   if (!p) fail(DFM_E_ARG, "argument '%s' is NULL", name);
+}
+
+// How a call takes the object of a handle, for as_status() below.
+template <auto kOf>
+auto &to_change(uint64_t h) {
+  return exclusive(kOf(h));
+}
+template <auto kOf>
+auto &to_read(uint64_t h) {
+  return settled(kOf(h));
+}
+inline World &whole_to_change(uint64_t h) { return whole(exclusive(world_of(h))); }
+
+// A call on one object: `of` finds and takes it, f gets it.
+template <class Of, class F>
+dfm_status as_status(Of of, uint64_t handle, F &&f) noexcept {
+  return as_status([&] { return f(of(handle)); });
 }
 
 // The handle of the one with this name among those for which counts() is true. what: "tool", for the error.
@@ -130,7 +181,8 @@ inline uint64_t id_of(const World &w, uint64_t handle, const char *what) {
 
 // The two-call convention: writes the count always, the data if there is room. Returns true if the data
 // should be copied.
-inline bool room(uint32_t count, uint32_t capacity, const void *out, uint32_t *n) {
+inline bool room(size_t size, uint32_t capacity, const void *out, uint32_t *n) {
+  const uint32_t count = static_cast<uint32_t>(size);
   if (n) *n = count;
   if (!out && capacity == 0) return false;
   if (capacity < count || !out)
@@ -138,6 +190,21 @@ inline bool room(uint32_t count, uint32_t capacity, const void *out, uint32_t *n
          capacity, count);
   return true;
 }
+
+// of(x) for each x of a list, by that convention.
+template <class List, class T, class Of = std::identity>
+void give_list(const List &list, uint32_t capacity, T *out, uint32_t *n, Of of = {}) {
+  if (!room(std::size(list), capacity, out, n)) return;
+  for (const auto &x : list) *out++ = of(x);
+}
+// [count,3] by it, of(i) each.
+template <class Of>
+void give_vectors(uint32_t count, uint32_t capacity, double *out, uint32_t *n, Of of) {
+  if (!room(count, capacity, out, n)) return;
+  for (uint32_t i = 0; i < count; ++i) store3(out + size_t(3) * i, of(i));
+}
+// Handles of things.
+inline constexpr auto kHandle = [](const auto &thing) { return thing->handle; };
 
 // The rows of a list in the caller's memory, row_size bytes each: members unknown to the caller's header are
 // left out, those unknown to this library are zero. `size`, if the row has one, is the number of bytes

@@ -12,26 +12,23 @@ using namespace dfm;
 
 void dfm_obstacle_def_default_sized(uint32_t size, dfm_obstacle_def *out) {
   dfm_obstacle_def d{};
-  d.size = sizeof d;
   d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
   d.radius = 0.5;
   d.half_length = 0.5;
   d.category = 1;
   d.collides_with = ~0u;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(out, "out");
     *out = create_obstacle(w, take_def(def, dfm_obstacle_def_default())).handle;
   });
 }
 
 dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
-  return as_status([&] {
-    Obstacle &o = exclusive(obstacle_of(obstacle));
+  return as_status(to_change<obstacle_of>, obstacle, [&](Obstacle &o) {
     if (o.rigid && !o.added)
       fail(DFM_E_STATE, "'%s' is a rigid body; remove it with dfm_rigid_destroy, which removes its whole set",
            o.name.c_str());
@@ -40,8 +37,7 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
 }
 
 dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
-  return as_status([&] {
-    const Obstacle &o = obstacle_of(obstacle);
+  return as_status(obstacle_of, obstacle, [&](const Obstacle &o) {
     need(out, "out");
     store_pose(*out, o.pose);
   });
@@ -92,8 +88,7 @@ dfm_status dfm_obstacle_teleport(dfm_obstacle obstacle, const dfm_pose *pose) {
 }
 
 dfm_status dfm_obstacle_set_velocity_surface(dfm_obstacle obstacle, const double velocity[3]) {
-  return as_status([&] {
-    Obstacle &o = exclusive(obstacle_of(obstacle));
+  return as_status(to_change<obstacle_of>, obstacle, [&](Obstacle &o) {
     need(velocity, "velocity");
     set_belt(o, load3(velocity));
   });
@@ -104,10 +99,8 @@ dfm_status dfm_obstacle_set_filter(dfm_obstacle obstacle, uint32_t category, uin
 }
 
 dfm_status dfm_obstacle_set_material(dfm_obstacle obstacle, dfm_material material) {
-  return as_status([&] {
-    Obstacle &o = exclusive(obstacle_of(obstacle));
-    set_material(o, material ? &material_of(material) : nullptr);
-  });
+  return as_status(to_change<obstacle_of>, obstacle,
+                   [&](Obstacle &o) { set_material(o, material ? &material_of(material) : nullptr); });
 }
 
 dfm_status dfm_world_find_obstacle(dfm_world world, const char *name, dfm_obstacle *out) {

@@ -11,14 +11,12 @@ using namespace dfm;
 
 void dfm_query_shape_default_sized(uint32_t size, dfm_query_shape *out) {
   dfm_query_shape d{};
-  d.size = sizeof d;
   d.shape = DFM_SHAPE_SPHERE;
   give_default(size, out, d);
 }
 
 void dfm_query_filter_default_sized(uint32_t size, dfm_query_filter *out) {
   dfm_query_filter d{};
-  d.size = sizeof d;
   d.what = DFM_QUERY_BODIES | DFM_QUERY_OBSTACLES | DFM_QUERY_RIGIDS;
   d.category = d.collides_with = ~0u;
   give_default(size, out, d);
@@ -122,8 +120,7 @@ void list_overlaps(World &w, const Given &given, const Convex &shape, uint32_t c
 
 dfm_status dfm_world_query_ray(dfm_world world, const double origin[3], const double direction[3],
                                double max_distance, const dfm_query_filter *filter, dfm_query_hit *hit) {
-  return as_status([&] {
-    World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](World &w) {
     const Ray ray = taken_ray(origin, direction, max_distance);
     const Given given(filter);
     give(hit, find_first_on_ray(w, given.filter(), ray.origin, ray.unit, ray.limit));
@@ -152,8 +149,7 @@ dfm_status dfm_world_query_ray_all_sized(dfm_world world, const double origin[3]
 
 dfm_status dfm_world_query_closest(dfm_world world, const double point[3], double max_distance,
                                    const dfm_query_filter *filter, dfm_query_hit *hit) {
-  return as_status([&] {
-    World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](World &w) {
     const Vec3 p = finite(point, "point");
     if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be above 0", max_distance);
     const Given given(filter);
@@ -164,8 +160,7 @@ dfm_status dfm_world_query_closest(dfm_world world, const double point[3], doubl
 dfm_status dfm_world_query_overlap(dfm_world world, const dfm_query_shape *shape,
                                    const dfm_query_filter *filter, uint32_t capacity, uint64_t *things,
                                    uint32_t *n) {
-  return as_status([&] {
-    World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](World &w) {
     const Convex asked = taken_shape(shape);
     list_overlaps(w, Given(filter), asked, capacity, things, n);
   });
@@ -173,8 +168,7 @@ dfm_status dfm_world_query_overlap(dfm_world world, const dfm_query_shape *shape
 
 dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box, const dfm_query_filter *filter,
                                 uint32_t capacity, uint64_t *things, uint32_t *n) {
-  return as_status([&] {
-    World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](World &w) {
     need(box, "box");
     const Vec3 lo = finite(box->lo, "box.lo"), hi = finite(box->hi, "box.hi");
     Convex asked;
@@ -190,8 +184,7 @@ dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box, const dfm_
 
 dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape, uint32_t capacity,
                                     uint32_t *triangles, uint32_t *n) {
-  return as_status([&] {
-    Body &b = settled(shown_body_of(body));
+  return as_status(to_read<shown_body_of>, body, [&](Body &b) {
     const Convex asked = taken_shape(shape);
     need_room(triangles, capacity);
     const uint32_t count = triangles_touched(search(b), asked, capacity, triangles);
@@ -201,8 +194,7 @@ dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape,
 
 dfm_status dfm_world_query_cast(dfm_world world, const dfm_query_shape *shape, const double path[3],
                                 const dfm_query_filter *filter, dfm_query_hit *hit) {
-  return as_status([&] {
-    World &w = settled(world_of(world));
+  return as_status(to_read<world_of>, world, [&](World &w) {
     const Convex asked = taken_shape(shape);
     const Vec3 way = finite(path, "path");
     if (!std::isfinite(norm(way))) fail(DFM_E_ARG, "the length of the path is too large for a double");

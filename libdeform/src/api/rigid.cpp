@@ -44,7 +44,6 @@ dfm_status dfm_rigid_host_register(const char *name, const dfm_rigid_host *table
 
 void dfm_rigid_def_default_sized(uint32_t size, dfm_rigid_def *out) {
   dfm_rigid_def d{};
-  d.size = sizeof d;
   d.shape = 1;  // DFM_SHAPE_SPHERE
   d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.5;
   d.radius = 0.5;
@@ -52,12 +51,11 @@ void dfm_rigid_def_default_sized(uint32_t size, dfm_rigid_def *out) {
   d.mass = 1;
   d.category = 1;
   d.collides_with = ~0u;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(set, "set");
     need(out, "out");
     dfm_rigid_set_def def = take_def(set, dfm_rigid_set_def{});
@@ -78,8 +76,7 @@ dfm_status dfm_rigid_destroy(dfm_rigid rigid) {
 }
 
 dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm_obstacle *out) {
-  return as_status([&] {
-    Obstacle &o = exclusive(rigid_of(rigid));
+  return as_status(to_change<rigid_of>, rigid, [&](Obstacle &o) {
     need(def, "def");
     need(out, "out");
     *out = add_rigid_shape(o, take_def(def, dfm_obstacle_def_default())).handle;
@@ -87,8 +84,7 @@ dfm_status dfm_rigid_add_shape(dfm_rigid rigid, const dfm_obstacle_def *def, dfm
 }
 
 dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
-  return as_status([&] {
-    const World &w = world_of(world);
+  return as_status(world_of, world, [&](const World &w) {
     if (!room(listed_rigids(w), capacity, out, n)) return;
     for (auto &o : w.obstacles)
       if (is_listed(*o)) *out++ = o->handle;
@@ -97,8 +93,7 @@ dfm_status dfm_world_rigids(dfm_world world, uint32_t capacity, dfm_rigid *out, 
 
 dfm_status dfm_world_rigid_states(dfm_world world, uint32_t capacity, dfm_rigid *rigids,
                                   dfm_rigid_state *states, uint32_t *n) {
-  return as_status([&] {
-    const World &w = world_of(world);
+  return as_status(world_of, world, [&](const World &w) {
     if (!states && rigids) need(states, "states");
     if (!room(listed_rigids(w), capacity, states, n)) return;
     for (auto &o : w.obstacles) {
@@ -117,15 +112,11 @@ dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *ou
 }
 
 dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out) {
-  return as_status([&] {
-    const Obstacle &o = rigid_of(rigid);
-    give(out, o.rigid->defs[o.rigid_body]);
-  });
+  return as_status(rigid_of, rigid, [&](const Obstacle &o) { give(out, o.rigid->defs[o.rigid_body]); });
 }
 
 dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
-  return as_status([&] {
-    const Obstacle &o = rigid_of(rigid);
+  return as_status(rigid_of, rigid, [&](const Obstacle &o) {
     need(out, "out");
     *out = o.rigid->state[o.rigid_body];
   });
@@ -144,15 +135,12 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
 }
 
 dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out) {
-  return as_status([&] {
-    const Obstacle &o = rigid_of(rigid);
-    give(out, measure_rigid(*o.rigid, o.rigid_body));
-  });
+  return as_status(rigid_of, rigid,
+                   [&](const Obstacle &o) { give(out, measure_rigid(*o.rigid, o.rigid_body)); });
 }
 
 dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]) {
-  return as_status([&] {
-    const Obstacle &o = rigid_of(rigid);
+  return as_status(rigid_of, rigid, [&](const Obstacle &o) {
     need(force, "force");
     need(moment, "moment");
     const double h = o.rigid->last_h, *const p = &o.rigid->impulse[6 * size_t{o.rigid_body}];
@@ -164,10 +152,8 @@ dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double mom
 }
 
 dfm_status dfm_rigid_set_motor(dfm_rigid rigid, uint32_t joint, double velocity, double max) {
-  return as_status([&] {
-    Obstacle &o = exclusive(rigid_of(rigid));
-    set_rigid_motor(*o.rigid, joint, velocity, max);
-  });
+  return as_status(to_change<rigid_of>, rigid,
+                   [&](Obstacle &o) { set_rigid_motor(*o.rigid, joint, velocity, max); });
 }
 
 dfm_status dfm_rigid_joint(dfm_rigid rigid, uint32_t joint, double *position, double *rate, double *effort) {

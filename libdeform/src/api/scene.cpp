@@ -9,97 +9,84 @@
 #include "scene/scene.h"
 #include "scene/write.h"
 
+using namespace dfm;
+using scene::Scene;
+
 namespace {
 
-using dfm::scene::Scene;
-
 Scene &scene_of(dfm_scene handle) {
-  Scene &scene = dfm::resolve<Scene>(dfm::Kind::scene, handle);
-  dfm::Call::now().hold(&scene);
-  dfm::Call::now().hold(scene.context());
-  dfm::Call::now().count(scene.context()->calls);
-  return scene;
+  Scene &scene = resolve<Scene>(Kind::scene, handle);
+  return held(scene, *scene.context());
 }
 
 void close_scene(dfm_scene handle) {
   Scene *scene = &scene_of(handle);
-  dfm::Call::now().need_alone(scene, "scene");
+  Call::now().need_alone(scene, "scene");
   // destroyed with the scene
-  if (const auto *world = static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, scene->world()))) {
-    dfm::Call::now().need_alone(world, "scene's world");
-    if (world->busy) dfm::Call::refuse("scene's world");
+  if (const auto *world = static_cast<World *>(handle_find(Kind::world, scene->world()))) {
+    Call::now().need_alone(world, "scene's world");
+    if (world->busy) Call::refuse("scene's world");
   }
   scene->context()->remove_live(handle);
-  dfm::handle_destroy(handle);
+  handle_destroy(handle);
   delete scene;
 }
 
 void check_call(const dfm_context *context, const char *path, const void *out) {
-  if (!context) dfm::fail(DFM_E_ARG, "dfm_scene: context is NULL; create one with dfm_context_create");
+  if (!context) fail(DFM_E_ARG, "dfm_scene: context is NULL; create one with dfm_context_create");
   if (!path || !*path)
-    dfm::fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
-  if (!out) dfm::fail(DFM_E_ARG, "dfm_scene: out is NULL");
+    fail(DFM_E_ARG, "dfm_scene: path is %s; expected a scene file", path ? "empty" : "NULL");
+  if (!out) fail(DFM_E_ARG, "dfm_scene: out is NULL");
 }
 
 }  // namespace
 
 dfm_status dfm_scene_load(dfm_context *context, const char *path, dfm_world *out) {
-  return dfm::as_status([&] {
+  return as_status([&] {
     check_call(context, path, out);
-    dfm::used(*context);
+    used(*context);
     *out = Scene(context, path, nullptr).release_world();
   });
 }
 
 dfm_status dfm_scene_open(dfm_context *context, const char *path, const dfm_scene_options *options,
                           dfm_scene *out) {
-  return dfm::as_status([&] {
+  return as_status([&] {
     check_call(context, path, out);
-    dfm::used(*context);
-    const dfm_scene_options given = dfm::take_def(options, dfm_scene_options{});
+    used(*context);
+    const dfm_scene_options given = take_def(options, dfm_scene_options{});
     auto scene = std::make_unique<Scene>(context, path, &given);
-    const uint64_t handle = dfm::handle_create(dfm::Kind::scene, scene.get());
-    try {
-      context->add_live(handle, [](uint64_t h) { dfm_scene_close(h); });
-    } catch (...) {
-      dfm::handle_destroy(handle);
-      throw;
-    }
-    scene.release();
-    *out = handle;
+    *out = keep_live(*context, Kind::scene, std::move(scene), [](uint64_t h) { dfm_scene_close(h); });
   });
 }
 
 dfm_status dfm_scene_close(dfm_scene scene) {
-  return dfm::as_status([&] { close_scene(scene); });
+  return as_status([&] { close_scene(scene); });
 }
 
 dfm_status dfm_scene_world(dfm_scene scene, dfm_world *out) {
-  return dfm::as_status([&] {
-    if (!out) dfm::fail(DFM_E_ARG, "dfm_scene_world: out is NULL");
+  return as_status([&] {
+    if (!out) fail(DFM_E_ARG, "dfm_scene_world: out is NULL");
     *out = scene_of(scene).world();
   });
 }
 
 dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, size_t *bytes) {
-  return dfm::as_status([&] {
-    if (!pointer || !bytes)
-      dfm::fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
+  return as_status([&] {
+    if (!pointer || !bytes) fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
     const std::string value = scene_of(scene).value(pointer);
     const size_t capacity = *bytes;
     *bytes = value.size() + 1;
     if (!text) return;
     if (capacity < value.size() + 1)
-      dfm::fail(DFM_E_ARG, "dfm_scene_value: the text needs %zu bytes, %zu given", value.size() + 1,
-                capacity);
+      fail(DFM_E_ARG, "dfm_scene_value: the text needs %zu bytes, %zu given", value.size() + 1, capacity);
     std::memcpy(text, value.c_str(), value.size() + 1);
   });
 }
 
 dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
-  return dfm::as_status([&] {
-    const Scene &s = scene_of(scene);
-    const dfm::scene::Definition &d = s.definition();
+  return as_status(scene_of, scene, [&](const Scene &s) {
+    const scene::Definition &d = s.definition();
     dfm_scene_settings r = {};
     r.nprobe = uint32_t(s.probe_count());
     r.duration = d.duration;
@@ -114,17 +101,15 @@ dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
     std::memcpy(r.eye, d.eye, sizeof r.eye);
     std::memcpy(r.look_at, d.look_at, sizeof r.look_at);
     r.has_camera = d.has_camera;
-    dfm::give(out, r);
+    give(out, r);
   });
 }
 
 dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, double position[3],
                            double velocity[3]) {
-  return dfm::as_status([&] {
-    Scene &s = scene_of(scene);
+  return as_status(scene_of, scene, [&](Scene &s) {
     if (probe >= s.probe_count())
-      dfm::fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe,
-                s.probe_count());
+      fail(DFM_E_ARG, "dfm_scene_probe: there is no probe %u, the scene has %zu", probe, s.probe_count());
     double x[3], v[3];
     s.probe_state(probe, x, v);
     if (name) *name = s.probe(probe).name.c_str();
@@ -135,26 +120,24 @@ dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, d
 
 void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) {
   dfm_scene_write_def d{};
-  d.size = sizeof d;
   d.duration = 1;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 namespace {
 
 // call: name of the function, for its errors; beside: data of the scene that are not part of the world.
-void write_scene(const char *call, dfm::World &w, const char *path, const dfm_scene_write_def &d,
-                 dfm::writing::Beside beside, uint32_t *notes) {
+void write_scene(const char *call, World &w, const char *path, const dfm_scene_write_def &d,
+                 writing::Beside beside, uint32_t *notes) {
   if (!path || !*path)
-    dfm::fail(DFM_E_ARG, "%s: path is %s; expected a file name that ends in .json", call,
-              path ? "empty" : "NULL");
-  dfm::check_flags(d, DFM_SCENE_SNAPSHOT | DFM_SCENE_PARTIAL, call);
+    fail(DFM_E_ARG, "%s: path is %s; expected a file name that ends in .json", call, path ? "empty" : "NULL");
+  check_flags(d, DFM_SCENE_SNAPSHOT | DFM_SCENE_PARTIAL, call);
   if (!(d.duration > 0 && std::isfinite(d.duration)) || !(d.step >= 0 && std::isfinite(d.step)))
-    dfm::fail(DFM_E_ARG,
-              "%s: a duration of %g s and a step of %g s; both are finite, the duration is positive and the "
-              "step not negative",
-              call, d.duration, d.step);
-  dfm::writing::WriteOptions options;
+    fail(DFM_E_ARG,
+         "%s: a duration of %g s and a step of %g s; both are finite, the duration is positive and the "
+         "step not negative",
+         call, d.duration, d.step);
+  writing::WriteOptions options;
   options.duration = d.duration;
   options.step = d.step;
   options.snapshot = d.flags & DFM_SCENE_SNAPSHOT;
@@ -167,34 +150,30 @@ void write_scene(const char *call, dfm::World &w, const char *path, const dfm_sc
   uint32_t told = 0;
   if (!notes) notes = &told;
   *notes = 0;
-  dfm::writing::write_scene(w, path, options, *notes);
+  writing::write_scene(w, path, options, *notes);
 }
 
 }  // namespace
 
 dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_scene_write_def *def,
                                  uint32_t *notes) {
-  return dfm::as_status([&] {
-    dfm::World &w = dfm::exclusive(dfm::world_of(world));
-    write_scene("dfm_world_write_scene", w, path, dfm::take_def(def, dfm_scene_write_def_default()), {},
-                notes);
+  return as_status(to_change<world_of>, world, [&](World &w) {
+    write_scene("dfm_world_write_scene", w, path, take_def(def, dfm_scene_write_def_default()), {}, notes);
   });
 }
 
 dfm_status dfm_scene_write(dfm_scene scene, const char *path, const dfm_scene_write_def *def,
                            uint32_t *notes) {
-  return dfm::as_status([&] {
-    const Scene &s = scene_of(scene);
-    const dfm::scene::Definition &has = s.definition();
+  return as_status(scene_of, scene, [&](const Scene &s) {
+    const scene::Definition &has = s.definition();
     dfm_scene_write_def usual = dfm_scene_write_def_default();
     usual.duration = has.duration;
-    dfm_scene_write_def d = dfm::take_def(def, usual);
+    dfm_scene_write_def d = take_def(def, usual);
     if (d.step == 0) d.step = has.step;
-    dfm::writing::Beside beside;
+    writing::Beside beside;
     if (!has.probes.empty()) beside.probes = s.value("/probes");
     beside.output = s.value("/output");
     beside.equilibrium = has.equilibrium;
-    write_scene("dfm_scene_write", dfm::exclusive(dfm::world_of(s.world())), path, d, std::move(beside),
-                notes);
+    write_scene("dfm_scene_write", exclusive(world_of(s.world())), path, d, std::move(beside), notes);
   });
 }

@@ -3,6 +3,7 @@
 #pragma once
 #include <algorithm>
 #include <cstring>
+#include <type_traits>
 #include <vector>
 
 #include "api/first_size.h"
@@ -99,8 +100,9 @@ void take_pointed(const T *&given, T &own) {
 
 // The defaults of a def in the size of the caller's struct: members unknown to this library are zero.
 template <class T>
-void give_default(uint32_t size, T *out, T value) noexcept {
+void give_default(uint32_t size, T *out, std::type_identity_t<T> value) noexcept {
   if (!out) return;
+  value.size = sizeof value;
   if constexpr (requires { value.cookie; }) value.cookie = kCookie;
   std::memset(static_cast<void *>(out), 0, size);
   std::memcpy(static_cast<void *>(out), &value, std::min<size_t>(size, sizeof(T)));

@@ -7,38 +7,30 @@
 
 using namespace dfm;
 
-namespace {
-
-// Copies one [nsurfel,4] column; get(s) gives the vector of surfel s.
-template <class Get>
-dfm_status column(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n, Get get) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
-    if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
-    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) store3(xyz + size_t(3) * s, get(b, s));
+dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
+  return as_status(shown_body_of, body, [&](const Body &b) {
+    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) { return surfel_vector(b, b.p.x, s); });
   });
 }
 
-}  // namespace
-
-dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) { return surfel_vector(b, b.p.x, s); });
-}
-
 dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) { return surfel_vector(b, b.p.v, s); });
+  return as_status(shown_body_of, body, [&](const Body &b) {
+    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) { return surfel_vector(b, b.p.v, s); });
+  });
 }
 
 dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return column(body, capacity, xyz, n, [](const Body &b, uint32_t s) {
+  return as_status(shown_body_of, body, [&](const Body &b) {
     const double h = b.impulse_time();
-    return b.world->plan.touches() && h > 0 ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
+    const bool acts = b.world->plan.touches() && h > 0;
+    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) {
+      return acts ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
+    });
   });
 }
 
 dfm_status dfm_surface_normals(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     if (!room(b.surface.nsurfel, capacity, xyz, n)) return;
     surface_normals(b, xyz);
   });
@@ -52,8 +44,7 @@ dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri
 }
 
 dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n) {
-  return as_status([&] {
-    const Body &b = shown_body_of(body);
+  return as_status(shown_body_of, body, [&](const Body &b) {
     if (!b.surface.identity())
       fail(DFM_E_UNSUPPORTED,
            "body '%s': each of its surfels depends on several points, so there is no single point per surfel",
@@ -65,8 +56,7 @@ dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point,
 
 dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
                          double max_distance, dfm_ray_hit *hit) {
-  return as_status([&] {
-    World &w = world_of(world);
+  return as_status(world_of, world, [&](World &w) {
     need(origin, "origin");
     need(direction, "direction");
     const Vec3 d = normalized(load3(direction));
@@ -78,8 +68,7 @@ dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double d
 }
 
 dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance, dfm_ray_hit *hit) {
-  return as_status([&] {
-    World &w = world_of(world);
+  return as_status(world_of, world, [&](World &w) {
     need(point, "point");
     if (!all_finite(point, 3)) fail(DFM_E_ARG, "the point is not finite");
     if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be positive", max_distance);

@@ -17,18 +17,16 @@ Tool &tool_of(dfm_tool h) { return part_of<Tool>(Kind::tool, h); }
 
 void dfm_tool_def_default_sized(uint32_t size, dfm_tool_def *out) {
   dfm_tool_def d{};
-  d.size = sizeof d;
   d.radius = 0.005;
   d.mass = 0.05;
   d.inertia = 1e-5;
   d.category = 1;
   d.collides_with = ~0u;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_tool_create(dfm_world world, const dfm_tool_def *def, dfm_tool *out) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(def, "def");
     need(out, "out");
     const dfm_tool_def own = take_def(def, dfm_tool_def_default());
@@ -42,11 +40,7 @@ dfm_status dfm_tool_destroy(dfm_tool tool) {
 }
 
 dfm_status dfm_world_tools(dfm_world world, uint32_t capacity, dfm_tool *out, uint32_t *n) {
-  return as_status([&] {
-    const World &w = world_of(world);
-    if (!room(static_cast<uint32_t>(w.tools.size()), capacity, out, n)) return;
-    for (auto &t : w.tools) *out++ = t->handle;
-  });
+  return as_status(world_of, world, [&](const World &w) { give_list(w.tools, capacity, out, n, kHandle); });
 }
 
 dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out) {
@@ -59,16 +53,11 @@ dfm_status dfm_tool_get_def(dfm_tool tool, dfm_tool_def *out) {
 }
 
 dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
-  return as_status([&] {
-    const Tool &t = tool_of(tool);
-    if (!room(static_cast<uint32_t>(t.parts.size()), capacity, out, n)) return;
-    for (const uint64_t part : t.parts) *out++ = part;
-  });
+  return as_status(tool_of, tool, [&](const Tool &t) { give_list(t.parts, capacity, out, n); });
 }
 
 dfm_status dfm_tool_set_pose(dfm_tool tool, const dfm_pose *pose, const double velocity[6]) {
-  return as_status([&] {
-    Tool &t = exclusive(tool_of(tool));
+  return as_status(to_change<tool_of>, tool, [&](Tool &t) {
     need(pose, "pose");
     set_tool_pose(t, *pose, velocity);
   });
@@ -83,8 +72,7 @@ dfm_status dfm_tool_follow_keys(dfm_tool tool) {
 }
 
 dfm_status dfm_tool_keys_at(dfm_tool tool, double t, dfm_pose *pose, double *opening) {
-  return as_status([&] {
-    const Tool &own = settled(tool_of(tool));
+  return as_status(to_read<tool_of>, tool, [&](const Tool &own) {
     dfm_pose at{};
     double angle = 0;
     keys_at(own, t, at, angle);
@@ -94,16 +82,14 @@ dfm_status dfm_tool_keys_at(dfm_tool tool, double t, dfm_pose *pose, double *ope
 }
 
 dfm_status dfm_tool_teleport(dfm_tool tool, const dfm_pose *pose) {
-  return as_status([&] {
-    Tool &t = exclusive(tool_of(tool));
+  return as_status(to_change<tool_of>, tool, [&](Tool &t) {
     need(pose, "pose");
     teleport_tool(t, *pose);
   });
 }
 
 dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]) {
-  return as_status([&] {
-    const Tool &t = settled(tool_of(tool));
+  return as_status(to_read<tool_of>, tool, [&](const Tool &t) {
     need(force, "force");
     need(torque, "torque");
     tool_force(t, force, torque);
@@ -111,8 +97,7 @@ dfm_status dfm_tool_force(dfm_tool tool, double force[3], double torque[3]) {
 }
 
 dfm_status dfm_tool_feedback(dfm_tool tool, double force[3], double torque[3]) {
-  return as_status([&] {
-    const Tool &t = settled(tool_of(tool));
+  return as_status(to_read<tool_of>, tool, [&](const Tool &t) {
     need(force, "force");
     need(torque, "torque");
     tool_feedback(t, force, torque);
@@ -125,8 +110,7 @@ dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out) {
 
 dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release, uint32_t capacity,
                          uint32_t *attachment, uint32_t *n) {
-  return as_status([&] {
-    Tool &t = exclusive(tool_of(tool));
+  return as_status(to_change<tool_of>, tool, [&](Tool &t) {
     need(attachment, "attachment");
     need(n, "n");
     const std::vector<uint32_t> made = grab(t, body_of(body), reach, release, capacity);
@@ -136,8 +120,7 @@ dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double rele
 }
 
 dfm_status dfm_tool_set_cuts(dfm_tool tool, uint32_t how, uint32_t most, uint32_t n, const dfm_body *bodies) {
-  return as_status([&] {
-    Tool &t = exclusive(tool_of(tool));
+  return as_status(to_change<tool_of>, tool, [&](Tool &t) {
     if (n) need(bodies, "bodies");
     std::vector<Body *> list;
     for (uint32_t i = 0; i < n; ++i) list.push_back(&body_of(bodies[i]));
@@ -147,21 +130,18 @@ dfm_status dfm_tool_set_cuts(dfm_tool tool, uint32_t how, uint32_t most, uint32_
 
 dfm_status dfm_tool_cuts(dfm_tool tool, uint32_t *how, uint32_t *most, uint32_t capacity, dfm_body *bodies,
                          uint32_t *n) {
-  return as_status([&] {
-    const Tool &t = tool_of(tool);
+  return as_status(tool_of, tool, [&](const Tool &t) {
     std::vector<dfm_body> list;
     for (const uint64_t id : t.cuts.bodies)
       if (const uint64_t handle = t.world->handle_of(id)) list.push_back(handle);
     if (how) *how = t.cuts.how;
     if (most) *most = t.cuts.most;
-    if (room(static_cast<uint32_t>(list.size()), capacity, bodies, n))
-      std::copy(list.begin(), list.end(), bodies);
+    give_list(list, capacity, bodies, n);
   });
 }
 
 dfm_status dfm_tool_set_device(dfm_tool tool, const dfm_device *device) {
-  return as_status([&] {
-    Tool &t = exclusive(tool_of(tool));
+  return as_status(to_change<tool_of>, tool, [&](Tool &t) {
     if (!device) return set_device(t, nullptr);
     const dfm_device own = take_known(device, dfm_device{});
     refuse_unknown(device);

@@ -4,18 +4,16 @@
 #include "deform/mesh.h"
 #include "mesh/raw_mesh.h"
 
-using dfm::fail;
-using dfm::as_status;
-using dfm::need;
-using Object = dfm::TriMeshObject;
+using namespace dfm;
+using Object = TriMeshObject;
 
 dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(path, "path");
     need(out, "out");
-    dfm::TriMesh mesh = dfm::read_tri_mesh(context->memory, path);
-    dfm::log_warnings(*context, path, mesh.warnings);
+    TriMesh mesh = read_tri_mesh(context->memory, path);
+    log_warnings(*context, path, mesh.warnings);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
@@ -23,7 +21,7 @@ dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh 
 dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
                               const uint32_t *triangles, dfm_trimesh *out) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(points, "points");
     need(triangles, "triangles");
     need(out, "out");
@@ -31,11 +29,11 @@ dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const doubl
       if (triangles[i] >= npoint)
         fail(DFM_E_ARG, "triangle %zu (counted from 0) uses point %u, there are %u; numbers count from 0",
              i / 3, triangles[i], npoint);
-    dfm::RawMesh raw(context->memory);
+    RawMesh raw(context->memory);
     raw.points.assign(points, points + 3 * size_t(npoint));
     raw.tris.assign(triangles, triangles + 3 * size_t(ntriangle));
-    dfm::TriMesh mesh = dfm::finish_surface("dfm_trimesh_create", std::move(raw));
-    dfm::log_warnings(*context, "dfm_trimesh_create", mesh.warnings);
+    TriMesh mesh = finish_surface("dfm_trimesh_create", std::move(raw));
+    log_warnings(*context, "dfm_trimesh_create", mesh.warnings);
     *out = Object::keep(*context, std::move(mesh));
   });
 }
@@ -43,18 +41,18 @@ dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const doubl
 dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t triangles,
                             dfm_trimesh *out) {
   return as_status([&] {
-    dfm::used(dfm::require(context));
+    used(require(context));
     need(kind, "kind");
     need(size, "size");
     need(out, "out");
     const std::string name = kind;
-    const dfm::Memory &memory = context->memory;
-    const auto keep = [&](dfm::TriMesh &&mesh) { *out = Object::keep(*context, std::move(mesh)); };
-    if (name == "cylinder") keep(dfm::make_cylinder_surface(memory, size[0], size[1], triangles));
-    else if (name == "beam") keep(dfm::make_beam_surface(memory, size[0], size[1], size[2], triangles));
-    else if (name == "ball") keep(dfm::make_ball_surface(memory, size[0], triangles));
-    else if (name == "tube") keep(dfm::make_tube_surface(memory, size[0], size[1], size[2], triangles));
-    else if (name == "torus") keep(dfm::make_torus_surface(memory, size[0], size[1], triangles));
+    const Memory &memory = context->memory;
+    const auto keep = [&](TriMesh &&mesh) { *out = Object::keep(*context, std::move(mesh)); };
+    if (name == "cylinder") keep(make_cylinder_surface(memory, size[0], size[1], triangles));
+    else if (name == "beam") keep(make_beam_surface(memory, size[0], size[1], size[2], triangles));
+    else if (name == "ball") keep(make_ball_surface(memory, size[0], triangles));
+    else if (name == "tube") keep(make_tube_surface(memory, size[0], size[1], size[2], triangles));
+    else if (name == "torus") keep(make_torus_surface(memory, size[0], size[1], triangles));
     else
       fail(DFM_E_ARG, "no surface generator is called '%s'; expected cylinder, beam, ball, tube or torus",
            kind);
@@ -66,12 +64,11 @@ dfm_status dfm_trimesh_destroy(dfm_trimesh mesh) {
 }
 
 dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
-  return as_status([&] {
-    const Object &object = Object::of(mesh);
-    const dfm::TriMesh &m = object.mesh;
-    const dfm::TriMeshStatistics &s = object.statistics;
+  return as_status(Object::of, mesh, [&](const Object &object) {
+    const TriMesh &m = object.mesh;
+    const TriMeshStatistics &s = object.statistics;
     dfm_trimesh_info info{};
-    dfm::put_shared(info, object);
+    put_shared(info, object);
     info.ntriangle = s.ntri;
     info.merged_points = m.merged_points;
     info.dropped_triangles = m.dropped_tris;
@@ -79,14 +76,14 @@ dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
     info.holes = s.holes;
     info.closed = s.closed;
     info.area = s.area;
-    dfm::give(out, info);
+    give(out, info);
   });
 }
 
 dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles,
                             const uint32_t **file_point) {
   return as_status([&] {
-    const dfm::TriMesh &m = Object::of(mesh).mesh;
+    const TriMesh &m = Object::of(mesh).mesh;
     if (points) *points = m.points.data();
     if (triangles) *triangles = m.tris.data();
     if (file_point) *file_point = m.file_point.data();
@@ -94,8 +91,7 @@ dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint3
 }
 
 dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const uint32_t **triangle_group) {
-  return as_status([&] {
-    const Object &object = Object::of(mesh);
+  return as_status(Object::of, mesh, [&](const Object &object) {
     if (names) *names = object.names.data();
     if (triangle_group) *triangle_group = object.mesh.tri_group.data();
   });
@@ -104,6 +100,6 @@ dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names, const
 dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path) {
   return as_status([&] {
     need(path, "path");
-    dfm::write_tri_mesh(Object::of(mesh).mesh, path);
+    write_tri_mesh(Object::of(mesh).mesh, path);
   });
 }

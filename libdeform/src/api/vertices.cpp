@@ -12,7 +12,6 @@ using namespace dfm;
 
 void dfm_vertex_layout_default_sized(uint32_t size, dfm_vertex_layout *out) {
   dfm_vertex_layout d{};
-  d.size = sizeof d;
   d.stride = 24;
   d.normal = 12;
   d.velocity = d.displacement = d.stick = DFM_VERTEX_NONE;
@@ -113,8 +112,7 @@ void put_vertices(Body &b, const dfm_vertex_layout &l, unsigned char *out) {
 
 dfm_status dfm_surface_vertices(dfm_body body, const dfm_vertex_layout *layout, size_t bytes, void *out,
                                 uint32_t *n) {
-  return as_status([&] {
-    Body &b = settled(shown_body_of(body));
+  return as_status(to_read<shown_body_of>, body, [&](Body &b) {
     const dfm_vertex_layout l = take_def(layout, dfm_vertex_layout_default());
     const uint32_t end = check_layout(l), count = b.surface.nsurfel;
     if (n) *n = count;

@@ -137,7 +137,6 @@ void select_effects(World &w) {
 
 void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
   dfm_world_def d{};
-  d.size = sizeof d;
   d.gravity[2] = -9.81;
   d.max_sweeps = 50;
   d.max_passes = 20;
@@ -145,7 +144,7 @@ void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
   d.sleep_speed = 0.01;
   d.sleep_time = 0.5;
   d.energy_watch = 0.01;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
@@ -193,20 +192,13 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     select_effects(*w);
     prepare(*w);
     w->changed = true;
-    w->handle = handle_create(Kind::world, w.get());
-    try {
-      context->add_live(w->handle, destroy_world);
-    } catch (...) {
-      handle_destroy(w->handle);
-      throw;
-    }
-    *out = w.release()->handle;
+    World &made = *w;
+    *out = made.handle = keep_live(*context, Kind::world, std::move(w), destroy_world);
   });
 }
 
 dfm_status dfm_world_destroy(dfm_world world) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     w.context->remove_live(world);
     Call::now().let_go();
     destroy_world(world);
@@ -214,8 +206,7 @@ dfm_status dfm_world_destroy(dfm_world world) {
 }
 
 dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     need(gravity, "gravity");
     for (int k = 0; k < 3; ++k)
       if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
@@ -228,8 +219,7 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
 }
 
 dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vector_key *keys) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     if (n) need(keys, "keys");
     std::vector<dfm_vector_key> copy(keys, keys + n);
     check_keys(copy, "gravity");
@@ -241,8 +231,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 }
 
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     wake_all(w);
     w.def.sleep = sleep;
     w.changed = true;
@@ -250,8 +239,7 @@ dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
 }
 
 dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
-  return as_status([&]() -> dfm_status {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) -> dfm_status {
     if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
     if (const double floor = shortest_step(w, dt); dt < floor)
       fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
@@ -275,16 +263,14 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
 
 void dfm_equilibrium_def_default_sized(uint32_t size, dfm_equilibrium_def *out) {
   dfm_equilibrium_def d{};
-  d.size = sizeof d;
   d.load_steps = 1;
   d.load_to = 1;
-  dfm::give_default(size, out, d);
+  give_default(size, out, d);
 }
 
 dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
                                  dfm_equilibrium_info *info) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     const dfm_equilibrium_def d = take_def(def, dfm_equilibrium_def_default());
     for (const double value : {d.load_from, d.load_to, d.time, d.tolerance})
       if (!std::isfinite(value) || value < 0)
@@ -299,8 +285,7 @@ dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def
 }
 
 dfm_status dfm_world_set_budget(dfm_world world, double max_time, uint64_t max_work) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     check_max_time(max_time);
     w.def.max_time = max_time;
     w.def.max_work = max_work;
@@ -323,8 +308,7 @@ dfm_status dfm_world_interrupt(dfm_world world) {
 }
 
 dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, uint32_t *point) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     need(dt, "dt");
     prepare(w);
     // The bound that the next step uses, recomputed only when the step would recompute it, so that reading it
@@ -344,7 +328,7 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
     Rows<dfm_overlap> rows(out, row_size, "dfm_overlap");
     World &w = exclusive(world_of(world));
     prepare(w);
-    if (!room(static_cast<uint32_t>(w.overlaps.found.size()), capacity, out, n)) return;
+    if (!room(w.overlaps.found.size(), capacity, out, n)) return;
     for (const Overlap &o : w.overlaps.found) {
       const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0;
       const uint32_t parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
@@ -355,8 +339,7 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
 }
 
 dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     prepare(w);
     const bool told = w.overlaps.told;
     w.overlaps.all = w.overlaps.look_only = true;
@@ -367,8 +350,7 @@ dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
 }
 
 dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     w.overlaps.all = w.overlaps.untangle = true;
     prepare(w);
     const auto &found = w.overlaps.found;
@@ -389,8 +371,7 @@ uint64_t dfm_world_hash(dfm_world world) {
 }
 
 dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     prepare(w);
     std::vector<unsigned char> data;
     world_snapshot(w, data);
@@ -399,8 +380,7 @@ dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
 }
 
 dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) {
-  return as_status([&] {
-    World &w = whole(exclusive(world_of(world)));
+  return as_status(whole_to_change, world, [&](World &w) {
     need(buffer, "buffer");
     world_restore(w, buffer, bytes);
     look_at_sensors(w, false);
@@ -408,8 +388,7 @@ dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) 
 }
 
 dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out) {
-  return as_status([&] {
-    World &w = world_of(world);
+  return as_status(world_of, world, [&](World &w) {
     need(name, "name");
     need(out, "out");
     const Body *const b = w.find_body(name);
@@ -425,24 +404,16 @@ dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out)
 }
 
 dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n) {
-  return as_status([&] {
-    World &w = world_of(world);
-    if (!room(static_cast<uint32_t>(w.bodies.size()), capacity, bodies, n)) return;
-    for (size_t i = 0; i < w.bodies.size(); ++i) bodies[i] = w.bodies[i]->handle;
-  });
+  return as_status(world_of, world, [&](World &w) { give_list(w.bodies, capacity, bodies, n, kHandle); });
 }
 
 dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle *obstacles, uint32_t *n) {
-  return as_status([&] {
-    World &w = world_of(world);
-    if (!room(static_cast<uint32_t>(w.obstacles.size()), capacity, obstacles, n)) return;
-    for (size_t i = 0; i < w.obstacles.size(); ++i) obstacles[i] = w.obstacles[i]->handle;
-  });
+  return as_status(world_of, world,
+                   [&](World &w) { give_list(w.obstacles, capacity, obstacles, n, kHandle); });
 }
 
 dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
-  return as_status([&] {
-    const World &w = world_of(world);
+  return as_status(world_of, world, [&](const World &w) {
     dfm_world_stats s = w.stats;
     s.rebuilds = w.steps->broad.stats().rebuilds;
     s.refits = w.steps->broad.stats().refits;
@@ -461,7 +432,7 @@ dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t 
     Rows<dfm_stage_time> rows(out, row_size, "dfm_stage_time");
     World &w = exclusive(world_of(world));
     prepare(w);
-    if (!room(static_cast<uint32_t>(w.plan.stages.size()), capacity, out, n)) return;
+    if (!room(w.plan.stages.size(), capacity, out, n)) return;
     for (size_t i = 0; i < w.plan.stages.size(); ++i) {
       const size_t row = w.plan.stages[i].row;
       const StageTime &time = w.steps->stage_times[row];
@@ -471,8 +442,7 @@ dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t 
 }
 
 dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
-  return as_status([&] {
-    World &w = exclusive(world_of(world));
+  return as_status(to_change<world_of>, world, [&](World &w) {
     prepare(w);
     if (bound_due(w)) update_bound(w);
     const std::string json = explain(w);

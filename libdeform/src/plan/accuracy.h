@@ -86,6 +86,7 @@ struct Wish {
   bool force = false;      // a force of contact counts, with its own error
   double duration = 0;     // s
   double step = 0;         // s, that the scene names; 0: to be chosen
+  bool any() const { return target > 0 || ms_per_step > 0; }
 };
 
 // ---- results --------------------------------------------------------------------------------------

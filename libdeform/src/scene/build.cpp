@@ -13,11 +13,11 @@
 #include "math/extent.h"
 #include "math/turn.h"
 #include "plugin/context.h"
-#include "scene/hand.h"
 #include "scene/jitter.h"
 #include "scene/load.h"
 #include "scene/place.h"
 #include "scene/start.h"
+#include "scene/table.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "world/equilibrium.h"
@@ -119,138 +119,105 @@ class Builder {
   }
   Builder(const Builder &) = delete;
 
-  Built run() {
-    create_world();
-    for (Material &m : def_.materials) create_material(m);
-    create_things();
-    tell_back_side(context_, resolve<World>(Kind::world, world_), load3(def_.gravity));
-    for (const Tool &t : def_.tools) set_cuts(t);
-    for (Friction &f : def_.friction) add_friction(f);
-    for (const Filter &f : def_.filters)
-      check(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide), f.pointer);
-    for (const Body &b : def_.bodies) {
-      for (const Attach &a : b.attach) add_attachment(b, a);
-      if (b.separate) add_separation(b);
-      if (b.cut_delay > 0) set_cut_delay(b);
-    }
-    // Makes the plan now, so that a missing effect is an error of the scene and not of its first step.
-    double step = 0;
-    check(dfm_world_stable_step(world_, &step, nullptr, nullptr), def_.effects_auto ? "/bodies" : "/effects");
-    if (def_.equilibrium) check_static();
-    else if (def_.step > 0) tell_long_step(context_, resolve<World>(Kind::world, world_), def_.step);
-    for (Body &b : def_.bodies) check_model(b);
-    for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which check them
-    for (Body &b : def_.bodies) add_switches(b);
-    return {std::exchange(world_, 0), std::move(probes_)};
-  }
-
- private:
-  void check(dfm_status status, const std::string &pointer) const {
-    if (status < 0) fail(status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), dfm_last_error());
-  }
-
-  void create_world() {
-    dfm_world_def w = dfm_world_def_default();
-    std::copy_n(def_.gravity, 3, w.gravity);
-    w.integrator = def_.integrator;
-    if (!def_.equilibrium) w.step = std::min(def_.step > 0 ? def_.step : kFrame, def_.duration);
-    w.solver = def_.solver.c_str();
-    w.solver_tolerance = def_.solver_tolerance;
-    w.solver_iterations = def_.solver_iterations;
-    w.newton_iterations = def_.newton;
-    w.contact_offset = def_.offset;
-    w.contact_tolerance = def_.tolerance;
-    w.sleep = def_.sleep;
-    w.self_contact = def_.self;
-    w.max_time = def_.max_time;
-    w.max_work = def_.max_work < 1.8e19 ? static_cast<uint64_t>(def_.max_work) : UINT64_MAX;
-    w.energy_watch = def_.energy_watch;
-    if (!def_.guard) w.flags |= DFM_WORLD_UNGUARDED;
-    if (def_.untangle) w.flags |= DFM_WORLD_UNTANGLE;
-    w.recovery_speed = def_.recovery_speed;
-    w.obstacle_speed = def_.obstacle_speed;
-    if (def_.max_sweeps > 0) w.max_sweeps = def_.max_sweeps;
-    std::vector<const char *> effects;
-    for (const std::string &e : def_.effects) effects.push_back(e.c_str());
-    effects.push_back(nullptr);
-    if (!def_.effects_auto) w.effects = effects.data();
-    check(dfm_world_create(context_, &w, &world_), def_.effects_auto ? "/contact" : "/effects");
-    resolve<World>(Kind::world, world_).time = def_.begin;
-    if (def_.gravity_keys.empty()) return;
-    check(dfm_world_set_gravity_keys(world_, uint32_t(def_.gravity_keys.size()), def_.gravity_keys.data()),
-          "/gravity/keyframes");
-  }
-
-  // Bodies, obstacles, rigid bodies, tools, in the order of the scene, or of their ids.
-  void create_things() {
-    struct Thing {
-      uint64_t id;
-      std::string pointer;
-      std::function<void()> create;
-    };
-    std::vector<Thing> things;
-    for (Body &b : def_.bodies) things.push_back({b.id, b.pointer, [this, &b] { create_body(b); }});
-    for (Obstacle &o : def_.obstacles)
-      things.push_back({o.id, o.pointer, [this, &o] { create_obstacle(o); }});
-    const auto set = [this] { create_rigid(def_.rigid); };
-    if (def_.rigid.bodies.empty()) things.push_back({0, "/rigid", set});
-    else things.push_back({def_.rigid.bodies[0].id, def_.rigid.bodies[0].pointer, set});
-    for (Tool &t : def_.tools)
-      things.push_back({t.solid.id, t.solid.pointer, [this, &t] { create_tool(t); }});
-    std::stable_sort(things.begin(), things.end(), [](const Thing &a, const Thing &b) {
-      return (a.id ? a.id : UINT64_MAX) < (b.id ? b.id : UINT64_MAX);
-    });
-    World &w = resolve<World>(Kind::world, world_);
-    for (const Thing &thing : things) {
-      if (thing.id && thing.id < w.next_id)
-        fail(DFM_E_ARG,
-             "%s: %s/id: %llu is taken; ids of bodies, obstacles, rigid bodies and tools are unique",
-             def_.file.c_str(), thing.pointer.c_str(), static_cast<unsigned long long>(thing.id));
-      if (thing.id) w.next_id = thing.id;
-      thing.create();
-    }
-  }
-
-  void create_material(Material &m) {
-    dfm_material_def d = dfm_material_def_default();
-    d.name = m.title.empty() ? nullptr : m.title.c_str();
-    d.density = m.density;
-    d.young = m.young;
-    d.poisson = m.poisson;
-    d.damping_mass = m.damping_mass;
-    d.damping_stiffness = m.damping_stiffness;
-    d.extra = m.extra.view();
-    check(dfm_material_create(world_, &d, &materials_[m.name]), m.pointer);
-  }
-
-  dfm_material material(const std::string &name) const { return name.empty() ? 0 : materials_.at(name); }
-
   // Adds the scene's key to errors of the called function.
   template <class Call>
   auto with_pointer(const std::string &pointer, Call &&call) const {
     try {
       return call();
     } catch (const Error &e) {
-      fail(e.status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), e.what());
+      def_.refuse(pointer, e.what(), e.status);
     }
   }
 
-  // Before anything is written.
-  void check_static() const {
-    with_pointer("/time/mode", [&] {
-      check_equilibrium(resolve<World>(Kind::world, world_));
-      return 0;
-    });
+  Built run() {
+    create_world();
+    for (Material &m : def_.materials) create_material(m);
+    create_things();
+    tell_back_side(context_, world(), load3(def_.world.gravity));
+    for (const Tool &t : def_.tools) set_cuts(t);
+    for (Friction &f : def_.friction) add_friction(f);
+    for (const Filter &f : def_.filters)
+      def_.require(dfm_world_filter_pair(world_, f.between[0].c_str(), f.between[1].c_str(), f.collide),
+                   f.pointer);
+    for (const Body &b : def_.bodies) {
+      const dfm_body body = find_body(b.name, b.pointer);
+      for (const Attach &a : b.attach) add_attachment(body, a);
+      if (b.separate) def_.require(dfm_body_set_separate(body, &*b.separate), b.pointer + "/separate");
+      if (b.cut_delay > 0) def_.require(dfm_body_set_cut_delay(body, b.cut_delay), b.pointer + "/cut_delay");
+    }
+    // Makes the plan now, so that a missing effect is an error of the scene and not of its first step.
+    double step = 0;
+    def_.require(dfm_world_stable_step(world_, &step, nullptr, nullptr),
+                 def_.effects_auto ? "/bodies" : "/effects");
+    if (def_.equilibrium) with_pointer("/time/mode", [&] { check_equilibrium(world()); });
+    else if (def_.step > 0) tell_long_step(context_, world(), def_.step);
+    // What a model that steps itself would refuse in the first step.
+    for (const Body &b : def_.bodies)
+      with_pointer(b.pointer + "/model", [&] { check_first_step(world(), *world().find_body(b.name)); });
+    for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which check them
+    for (Body &b : def_.bodies) add_switches(b);
+    return {std::exchange(world_, 0), std::move(probes_)};
   }
 
-  // What a model that steps itself would refuse in the first step.
-  void check_model(const Body &b) const {
-    with_pointer(b.pointer + "/model", [&] {
-      World &w = resolve<World>(Kind::world, world_);
-      check_first_step(w, *w.find_body(b.name));
-      return 0;
-    });
+ private:
+  World &world() const { return resolve<World>(Kind::world, world_); }
+
+  dfm_body find_body(const std::string &name, const std::string &pointer) const {
+    dfm_body body = 0;
+    def_.require(dfm_world_find_body(world_, name.c_str(), &body), pointer);
+    return body;
   }
+
+  void create_world() {
+    dfm_world_def w = def_.world;
+    if (!def_.equilibrium) w.step = std::min(def_.step > 0 ? def_.step : kFrame, def_.duration);
+    w.solver = def_.solver.c_str();
+    std::vector<const char *> effects;
+    for (const std::string &e : def_.effects) effects.push_back(e.c_str());
+    effects.push_back(nullptr);
+    if (!def_.effects_auto) w.effects = effects.data();
+    def_.require(dfm_world_create(context_, &w, &world_), def_.effects_auto ? "/contact" : "/effects");
+    world().time = def_.begin;
+    if (def_.gravity_keys.empty()) return;
+    def_.require(
+        dfm_world_set_gravity_keys(world_, uint32_t(def_.gravity_keys.size()), def_.gravity_keys.data()),
+        "/gravity/keyframes");
+  }
+
+  // Bodies, obstacles, rigid bodies, tools, in the order of the scene, or of their ids.
+  void create_things() {
+    struct Made {
+      const Thing *thing;
+      std::function<void()> create;
+      uint64_t rank() const { return thing->id ? thing->id : UINT64_MAX; }
+    };
+    std::vector<Made> things;
+    for (Body &b : def_.bodies) things.push_back({&b, [this, &b] { create_body(b); }});
+    for (Obstacle &o : def_.obstacles) things.push_back({&o, [this, &o] { create_obstacle(o); }});
+    const Thing none;
+    const Thing *const first = def_.rigid.bodies.empty() ? &none : &def_.rigid.bodies[0];
+    things.push_back({first, [this] { create_rigid(def_.rigid); }});
+    for (Tool &t : def_.tools) things.push_back({&t.solid, [this, &t] { create_tool(t); }});
+    std::stable_sort(things.begin(), things.end(),
+                     [](const Made &a, const Made &b) { return a.rank() < b.rank(); });
+    World &w = world();
+    for (const auto &[thing, create] : things) {
+      if (thing->id && thing->id < w.next_id)
+        fail(DFM_E_ARG,
+             "%s: %s/id: %llu is taken; ids of bodies, obstacles, rigid bodies and tools are unique",
+             def_.file.c_str(), thing->pointer.c_str(), static_cast<unsigned long long>(thing->id));
+      if (thing->id) w.next_id = thing->id;
+      create();
+    }
+  }
+
+  void create_material(Material &m) {
+    m.def.name = m.title.empty() ? nullptr : m.title.c_str();
+    m.def.extra = m.extra.view();
+    def_.require(dfm_material_create(world_, &m.def, &materials_[m.name]), m.pointer);
+  }
+
+  dfm_material material(const std::string &name) const { return name.empty() ? 0 : materials_.at(name); }
 
   // Material of each cell; empty if no group has its own material.
   std::vector<dfm_material> materials_by_group(const Body &b, const BodyMesh &mesh) const {
@@ -290,7 +257,7 @@ class Builder {
     std::vector<double> out;
     if (!mesh.share && materials.empty()) return out;
     std::map<dfm_material, double> density = {{0, dfm_material_def_default().density}};
-    for (const Material &m : def_.materials) density[materials_.at(m.name)] = m.density;
+    for (const Material &m : def_.materials) density[materials_.at(m.name)] = m.def.density;
     for (uint32_t t = 0; t < mesh.ntet; ++t)
       out.push_back((mesh.share ? mesh.share[t] : 1) * (materials.empty() ? 1 : density.at(materials[t])));
     return out;
@@ -318,7 +285,7 @@ class Builder {
     }
     for (const NodalRow &row : nodal) fixed[row.point] |= row.axes;
 
-    dfm_body_def d = dfm_body_def_default();
+    dfm_body_def &d = b.def;
     d.name = b.name.c_str();
     d.npoint = mesh.npoint;
     d.ntet = mesh.ntet;
@@ -326,8 +293,6 @@ class Builder {
     d.tets = mesh.tets;
     d.material = material(b.material);
     d.model = b.model.c_str();
-    d.integrator = b.integrator;
-    d.mass_scaling = b.mass_scaling;
     d.model_params = b.params.view();
     d.fixed = fixed.data();
     d.nfield = uint32_t(fields.size());
@@ -344,18 +309,16 @@ class Builder {
     if (jittered_) {
       const double center[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2,
                                 (mesh.lo[2] + mesh.hi[2]) / 2};
-      jitter_.apply(mesh.size, center, b.pose, b.velocity, b.spin);
+      jitter_.apply(mesh.size, center, d.pose, d.velocity, d.spin);
     }
     if (!b.on.empty()) put_on(b, mesh);
-    d.pose = b.pose;
-    std::copy_n(b.velocity, 3, d.velocity);
-    std::copy_n(b.spin, 3, d.spin);
     dfm_body body = 0;
-    check(dfm_body_create(world_, &d, &body), b.pointer);
-    if (b.sensor) check(dfm_body_set_sensor(body, true), b.pointer);
+    def_.require(dfm_body_create(world_, &d, &body), b.pointer);
+    if (b.sensor) def_.require(dfm_body_set_sensor(body, true), b.pointer);
     if (b.start.kind != StartKind::rest && b.start.kind != StartKind::state)
-      check(dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, b.pose).data(), nullptr),
-            b.start.pointer);
+      def_.require(
+          dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, d.pose).data(), nullptr),
+          b.start.pointer);
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
     for (const Spring &s : b.springs) add_spring(body, s, b.name, mesh);
@@ -379,15 +342,15 @@ class Builder {
     o.def.keys = o.keys.data();
     std::vector<double> scaled, points = mesh.wears_skin ? mesh.skin.points : mesh.points;
     if (!o.mesh.empty()) files_.load(o, scaled);
-    const Quat turn = unit_quat(b.pose.rotation);
+    const Quat turn = unit_quat(b.def.pose.rotation);
     for (size_t i = 0; i < points.size(); i += 3)
-      store3(&points[i], rotate(turn, load3(&points[i])) + load3(b.pose.position));
-    const Vec3 down = load3(def_.gravity);
+      store3(&points[i], rotate(turn, load3(&points[i])) + load3(b.def.pose.position));
+    const Vec3 down = load3(def_.world.gravity);
     double up[3];
     store3(up, norm(down) > 0 ? (-1 / norm(down)) * down : Vec3{0, 0, 1});
     const double lift =
         with_pointer(b.pointer + "/place", [&] { return lift_onto(context_, o.def, points, up); });
-    for (size_t k = 0; k < 3; ++k) b.pose.position[k] += (lift + kGap * mesh.size) * up[k];
+    for (size_t k = 0; k < 3; ++k) b.def.pose.position[k] += (lift + kGap * mesh.size) * up[k];
   }
 
   // Also moves held points, which dfm_body_set_state does not move.
@@ -406,15 +369,14 @@ class Builder {
           made.p.x[kStride * size_t{i} + k] = state.x[3 * size_t{i} + k];
           made.p.v[kStride * size_t{i} + k] = state.v[3 * size_t{i} + k];
         }
-    check(dfm_body_set_state(body, mesh.npoint, state.x.data(), state.v.data()), pointer);
+    def_.require(dfm_body_set_state(body, mesh.npoint, state.x.data(), state.v.data()), pointer);
   }
 
   // Checks the complete world, so that an impossible change is an error of the scene.
   void add_switches(Body &b) const {
     if (b.switches.empty() && b.rule.far.type.empty()) return;
     const std::string pointer = b.pointer + "/switch";
-    dfm_body body = 0;
-    check(dfm_world_find_body(world_, b.name.c_str(), &body), pointer);
+    const dfm_body body = find_body(b.name, pointer);
     std::vector<dfm_switch> switches;
     for (Switch &s : b.switches) {
       dfm_switch to = dfm_switch_default();
@@ -431,20 +393,19 @@ class Builder {
                        b.name.c_str(), s.model.type.c_str(), s.t, s.pointer.c_str());
     }
     if (!switches.empty())
-      check(dfm_body_set_switches(body, uint32_t(switches.size()), switches.data()), pointer);
+      def_.require(dfm_body_set_switches(body, uint32_t(switches.size()), switches.data()), pointer);
     if (!b.rule.far.type.empty()) {
       dfm_switch_rule rule = b.rule.values;
       rule.touching = b.rule.touching.view();
       rule.near_by = b.rule.near.view();
       rule.otherwise = b.rule.far.view();
-      check(dfm_body_set_switch_rule(body, &rule), pointer);
+      def_.require(dfm_body_set_switch_rule(body, &rule), pointer);
     }
     tell_idle_changes(resolve<dfm::Body>(Kind::body, body), pointer);
     if (!def_.equilibrium) return;
     with_pointer(pointer, [&] {
       dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
       rehearse(made, made.switches, made.rule, true);
-      return 0;
     });
   }
 
@@ -485,9 +446,9 @@ class Builder {
 
   void move_held(dfm_body body, const Fix &f, const std::vector<uint32_t> &points) const {
     if (!f.motion.any()) return;
-    check(dfm_body_move_held(body, uint32_t(points.size()), points.data(), uint32_t(f.motion.keys.size()),
-                             f.motion.keys.data(), &f.motion.sine),
-          f.where.pointer + "/motion");
+    def_.require(dfm_body_move_held(body, uint32_t(points.size()), points.data(),
+                                    uint32_t(f.motion.keys.size()), f.motion.keys.data(), &f.motion.sine),
+                 f.where.pointer + "/motion");
   }
 
   void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh,
@@ -498,9 +459,10 @@ class Builder {
       for (double w : shared.weights)
         for (double t : f.total) forces.push_back(w * t);
       const bool sine = f.sine.amplitude[0] != 0;
-      check(dfm_body_add_load(body, uint32_t(shared.points.size()), shared.points.data(), forces.data(),
-                              uint32_t(f.keys.size()), f.keys.data(), sine ? &f.sine : nullptr, nullptr),
-            f.where.pointer);
+      def_.require(
+          dfm_body_add_load(body, uint32_t(shared.points.size()), shared.points.data(), forces.data(),
+                            uint32_t(f.keys.size()), f.keys.data(), sine ? &f.sine : nullptr, nullptr),
+          f.where.pointer);
     }
     std::vector<uint32_t> points;
     std::vector<double> forces;
@@ -510,9 +472,9 @@ class Builder {
       forces.insert(forces.end(), row.force, row.force + 3);
     }
     if (points.empty()) return;
-    check(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr, nullptr,
-                            nullptr),
-          b.pointer + "/nodal_bc");
+    def_.require(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr,
+                                   nullptr, nullptr),
+                 b.pointer + "/nodal_bc");
   }
 
   // The cell that contains a point of the body at rest, or the nearest one if the point is close to it.
@@ -537,22 +499,19 @@ class Builder {
     } else {
       points = select(s.where, mesh, def_.file);
     }
-    dfm_spring_def d{};
+    dfm_spring_def d = s.def;
     d.size = sizeof d;
     d.npoint = uint32_t(points.size());
     d.points = points.data();
     d.weights = s.at_point ? weights.data() : nullptr;
-    std::copy_n(s.to, 3, d.to);
     d.keys = s.keys.data();
     d.nkey = uint32_t(s.keys.size());
-    d.stiffness = s.stiffness;
-    d.damping = s.damping;
-    check(dfm_body_add_spring(body, &d, nullptr), s.pointer);
+    def_.require(dfm_body_add_spring(body, &d, nullptr), s.pointer);
   }
 
   // A body, an obstacle or a rigid body by its name.
   uint64_t find_thing(const Attach &a) const {
-    const World &w = resolve<World>(Kind::world, world_);
+    const World &w = world();
     std::vector<std::string> names;
     for (const auto &b : w.bodies) {
       if (b->name == a.to) return b->handle;
@@ -566,31 +525,14 @@ class Builder {
          a.pointer.c_str(), a.to.c_str(), did_you_mean(a.to, names).c_str());
   }
 
-  void add_separation(const Body &b) const {
-    dfm_body body = 0;
-    check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
-    check(dfm_body_set_separate(body, &*b.separate), b.pointer + "/separate");
-  }
-  void set_cut_delay(const Body &b) const {
-    dfm_body body = 0;
-    check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
-    check(dfm_body_set_cut_delay(body, b.cut_delay), b.pointer + "/cut_delay");
-  }
-  void add_attachment(const Body &b, const Attach &a) const {
-    dfm_body body = 0;
-    check(dfm_world_find_body(world_, b.name.c_str(), &body), b.pointer);
-    dfm_attach_def d = dfm_attach_def_default();
-    d.flags = a.touch ? DFM_ATTACH_TOUCH : 0;
+  void add_attachment(dfm_body body, const Attach &a) const {
+    dfm_attach_def d = a.def;
     d.to = find_thing(a);
     d.points = a.points.data();
     d.npoint = uint32_t(a.points.size());
     d.surfels = a.surfels.data();
     d.nsurfel = uint32_t(a.surfels.size());
-    d.max_distance = a.max_distance;
-    d.stiffness = a.stiffness;
-    d.damping = a.damping;
-    d.release = a.release;
-    check(dfm_body_attach(body, &d, nullptr), a.pointer);
+    def_.require(dfm_body_attach(body, &d, nullptr), a.pointer);
   }
 
   void add_probe(dfm_body body, const Probe &p, const BodyMesh &mesh) {
@@ -614,19 +556,15 @@ class Builder {
     std::vector<double> points;
     if (!o.mesh.empty()) files_.load(o, points);
     dfm_obstacle obstacle = 0;
-    check(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
-    if (o.sensor) check(dfm_obstacle_set_sensor(obstacle, true), o.pointer);
-    if (o.start) check(dfm_obstacle_teleport(obstacle, &*o.start), o.pointer + "/start");
+    def_.require(dfm_obstacle_create(world_, &o.def, &obstacle), o.pointer);
+    if (o.sensor) def_.require(dfm_obstacle_set_sensor(obstacle, true), o.pointer);
+    if (o.start) def_.require(dfm_obstacle_teleport(obstacle, &*o.start), o.pointer + "/start");
   }
 
   void create_rigid(Rigid &rigid) {
     if (rigid.bodies.empty()) {
       // a missing host is an error in any case
-      with_pointer(rigid.pointer + "/host", [&] {
-        find_host(rigid.host);
-        return 0;
-      });
-      return;
+      return with_pointer(rigid.pointer + "/host", [&] { find_host(rigid.host); });
     }
     std::vector<dfm_rigid_def> bodies;
     std::vector<dfm_joint_def> joints;
@@ -656,12 +594,14 @@ class Builder {
                                    0,          bodies.data(),           joints.data(),
                                    nullptr};
     std::vector<dfm_rigid> made(bodies.size());
-    check(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
+    def_.require(dfm_rigid_create(world_, rigid.host.c_str(), &set, made.data()), rigid.pointer);
     for (size_t i = 0; i < made.size(); ++i)
-      if (rigid.bodies[i].sensor) check(dfm_obstacle_set_sensor(made[i], true), rigid.bodies[i].pointer);
+      if (rigid.bodies[i].sensor)
+        def_.require(dfm_obstacle_set_sensor(made[i], true), rigid.bodies[i].pointer);
     for (size_t i = 0; i < made.size(); ++i)
       if (rigid.bodies[i].start)
-        check(dfm_rigid_set_state(made[i], &*rigid.bodies[i].start), rigid.bodies[i].pointer + "/start");
+        def_.require(dfm_rigid_set_state(made[i], &*rigid.bodies[i].start),
+                     rigid.bodies[i].pointer + "/start");
   }
 
   void create_tool(Tool &t) {
@@ -682,24 +622,21 @@ class Builder {
       t.def.triangles = t.solid.def.triangles;
     }
     dfm_tool tool = 0;
-    check(dfm_tool_create(world_, &t.def, &tool), t.solid.pointer);
+    def_.require(dfm_tool_create(world_, &t.def, &tool), t.solid.pointer);
   }
 
   void set_cuts(const Tool &t) const {
     if (t.cuts.bodies.empty()) return;
     dfm_tool tool = 0;
-    check(dfm_world_find_tool(world_, t.solid.name.c_str(), &tool), t.cuts.pointer);
-    std::vector<dfm_body> bodies(t.cuts.bodies.size());
-    for (size_t i = 0; i < bodies.size(); ++i)
-      check(dfm_world_find_body(world_, t.cuts.bodies[i].c_str(), &bodies[i]), t.cuts.pointer);
-    check(dfm_tool_set_cuts(tool, t.cuts.how, t.cuts.most, uint32_t(bodies.size()), bodies.data()),
-          t.cuts.pointer);
+    def_.require(dfm_world_find_tool(world_, t.solid.name.c_str(), &tool), t.cuts.pointer);
+    std::vector<dfm_body> bodies;
+    for (const std::string &name : t.cuts.bodies) bodies.push_back(find_body(name, t.cuts.pointer));
+    def_.require(dfm_tool_set_cuts(tool, t.cuts.how, t.cuts.most, uint32_t(bodies.size()), bodies.data()),
+                 t.cuts.pointer);
   }
 
   void plan_cut(const Cut &c) const {
-    dfm_body body = 0;
-    check(dfm_world_find_body(world_, c.body.c_str(), &body), c.pointer);
-    check(dfm_body_plan_cut(body, c.t, &c.def), c.pointer);
+    def_.require(dfm_body_plan_cut(find_body(c.body, c.pointer), c.t, &c.def), c.pointer);
     if (c.t > def_.begin + def_.duration)
       context_->logf(DFM_LOG_WARNING,
                      "body '%s': its cut at %g s (%s/t) is never made, because the run ends before; give an "
@@ -708,17 +645,13 @@ class Builder {
   }
 
   void add_friction(Friction &f) {
-    dfm_friction_def d = {};
+    dfm_friction_def &d = f.def;
     d.size = sizeof d;
     d.between[0] = f.between[0].c_str();
     d.between[1] = f.between[1].c_str();
     d.law = f.law.c_str();
     d.params = f.params.view();
-    if (f.restitution) {
-      d.flags = DFM_FRICTION_RESTITUTION;
-      d.restitution = *f.restitution;
-    }
-    check(dfm_world_add_friction(world_, &d), f.pointer);
+    def_.require(dfm_world_add_friction(world_, &d), f.pointer);
   }
 
   dfm_context *context_;

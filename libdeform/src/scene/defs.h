@@ -6,7 +6,9 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "deform/deform.h"
+#include "plan/accuracy.h"
 
 namespace dfm::scene {
 
@@ -50,7 +52,8 @@ struct Spring {
   std::string pointer;
   Selection where;  // unless by point
   bool at_point = false;
-  double point[3] = {}, to[3] = {}, stiffness = 0, damping = 0;
+  double point[3] = {};
+  dfm_spring_def def = {};
   std::vector<dfm_vector_key> keys;
 };
 
@@ -66,8 +69,7 @@ struct FieldFile {
 struct Attach {
   std::string pointer, to;
   Selection where;
-  double max_distance = 0, stiffness = 0, damping = 0, release = 0;
-  bool touch = false;
+  dfm_attach_def def = dfm_attach_def_default();
   std::vector<uint32_t> points, surfels;
 };
 
@@ -117,13 +119,17 @@ struct Start {
   std::string state;  // a file
 };
 
-struct Body {
-  std::string pointer, name, mesh, material, model, nodal_bc;
+// What rules name.
+struct Thing {
+  std::string pointer, name, material;
   uint64_t id = 0;  // 0: as it comes
   bool sensor = false;
+};
+
+struct Body : Thing {
+  dfm_body_def def = dfm_body_def_default();
+  std::string mesh, model, nodal_bc;
   bool model_open = false;  // the planner chooses; `model` holds a placeholder
-  int32_t integrator = DFM_INTEGRATOR_AUTO;
-  double mass_scaling = 0;
   MadeMesh made;
   OwnSurface surface;
   Start start;
@@ -131,9 +137,8 @@ struct Body {
   std::vector<GroupMaterial> by_group;
   std::vector<FieldFile> fields;
   Params params;
-  dfm_pose pose = {};
   std::string on;  // the obstacle that it is put on; empty: it stays where its pose has it
-  double scale = 1, velocity[3] = {}, spin[3] = {};
+  double scale = 1;
   bool has_scale = false;  // the scene says it
   std::vector<Fix> fixes;
   std::vector<Force> forces;
@@ -145,12 +150,10 @@ struct Body {
   SwitchRule rule;
 };
 
-struct Obstacle {
-  std::string pointer, name, material, mesh;
-  uint64_t id = 0;
+struct Obstacle : Thing {
+  std::string mesh;
   std::optional<dfm_pose> start;  // its initial pose
   double scale = 1;               // of the mesh
-  bool sensor = false;
   dfm_obstacle_def def = {};
   std::vector<dfm_pose_key> keys;
 };
@@ -160,11 +163,8 @@ struct Joint {
   dfm_joint_def def = {};
 };
 
-struct RigidBody {
-  std::string pointer, name, material;
-  uint64_t id = 0;
+struct RigidBody : Thing {
   std::optional<dfm_rigid_state> start;
-  bool sensor = false;
   dfm_rigid_def def = {};
   std::vector<Joint> joints;
 };
@@ -196,14 +196,14 @@ struct Cut {
 
 struct Material {
   std::string pointer, name, title;  // the key; the name in the world, empty: none
-  double density = 1000, young = 1e5, poisson = 0.3, damping_mass = 0, damping_stiffness = 0;
+  dfm_material_def def = dfm_material_def_default();
   Params extra;
 };
 
 struct Friction {
   std::string pointer, between[2], law;
   Params params;
-  std::optional<double> restitution;
+  dfm_friction_def def = {};
 };
 
 struct Filter {
@@ -216,27 +216,19 @@ struct Probe {
   double point[3] = {};
 };
 
-// The goal of the planner (planner.h): either an error or a time.
-struct Wanted {
-  double target = 0;       // relative error, 0: none
-  double weight = 1;       // errors of the quantity over those of positions
-  bool force = false;      // the goal is the error of a contact force, or a time only
-  double ms_per_step = 0;  // milliseconds of processor time, 0: none
-  bool any() const { return target > 0 || ms_per_step > 0; }
-};
-
 struct Definition {
   std::string file, folder;
-  double gravity[3] = {0, 0, -9.81};
+  // Errors with the file and a pointer to the key that they belong to.
+  [[noreturn]] void refuse(const std::string &pointer, const std::string &sentence,
+                           dfm_status status = DFM_E_ARG) const {
+    fail(status, "%s: %s: %s", file.c_str(), pointer.c_str(), sentence.c_str());
+  }
+  void require(dfm_status status, const std::string &pointer) const {
+    if (status < 0) refuse(pointer, dfm_last_error(), status);
+  }
+  dfm_world_def world = dfm_world_def_default();
   std::vector<dfm_vector_key> gravity_keys;
-  int32_t integrator = DFM_INTEGRATOR_AUTO;
-  double offset = 0, tolerance = 0, max_time = 0, max_work = 0, recovery_speed = 0, obstacle_speed = 0,
-         energy_watch = dfm_world_def_default().energy_watch;
   std::string solver = "auto";  // of the implicit step
-  double solver_tolerance = 0;
-  uint32_t solver_iterations = 0, newton = 0, max_sweeps = 0;
-  uint32_t self = DFM_SELF_OFF;
-  bool sleep = false, guard = true, untangle = false;
   bool effects_auto = true;
   std::vector<std::string> effects;
   std::vector<Material> materials;
@@ -248,7 +240,7 @@ struct Definition {
   std::vector<Friction> friction;
   std::vector<Filter> filters;
   std::vector<Probe> probes;
-  Wanted wanted;
+  Wish wanted;  // the goal of the planner (planner.h)
   // used by the runner only
   double begin = 0, duration = 0, step = 0, every = 0, frame_rate = 0;
   bool equilibrium = false;  // mode static

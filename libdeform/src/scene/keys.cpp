@@ -1,312 +1,155 @@
 #include "scene/keys.h"
 
+#include <algorithm>
+#include <cstring>
 #include <stdexcept>
 
 namespace dfm::scene {
 namespace {
 
-using Table = std::vector<std::pair<std::string, std::vector<Key>>>;
+// Names in the order in which messages list them. A "-" before one: named in the format, not delivered.
+struct Row { const char *of, *names; };
 
-const Table &objects() {
-  static const Table table = {
-      {"scene",
-       {{"format", true},
-        {"version", true},
-        {"gravity", true},
-        {"time", true},
-        {"effects", true},
-        {"accuracy", true},
-        {"budget", true},
-        {"materials", true},
-        {"bodies", true},
-        {"obstacles", true},
-        {"rigid", true},
-        {"tools", true},
-        {"cuts", true},
-        {"contact", true},
-        {"solver", true},
-        {"probes", true},
-        {"output", true}}},
-      {"solver", {{"type", true}, {"tolerance", true}, {"max_iterations", true}, {"newton", true}}},
-      {"accuracy", {{"target", true}, {"quantity", true}}},
-      {"budget", {{"ms_per_step", true}}},
-      {"gravity", {{"keyframes", true}}},
-      {"gravity_key", {{"t", true}, {"value", true}}},
-      {"time",
-       {{"start", true},
-        {"duration", true},
-        {"step", true},
-        {"integrator", true},
-        {"max_time", true},
-        {"max_work", true},
-        {"mode", true}}},
-      // A material may hold, beside these, any parameter of a loaded model.
-      {"material",
-       {{"name", true},
-        {"density", true},
-        {"young", true},
-        {"poisson", true},
-        {"damping", true},
-        {"friction", true},
-        {"tear", true},
-        {"fracture_energy", true}}},
-      {"damping", {{"mass", true}, {"stiffness", true}}},
-      {"body",
-       {{"name", true},       {"mesh", true},      {"material", true},    {"model", true},
-        {"integrator", true}, {"pose", true},      {"velocity", true},    {"spin", true},
-        {"fix", true},        {"forces", true},    {"surface", true},     {"nodal_bc", true},
-        {"fill", true},       {"springs", true},   {"anisotropy", true},  {"materials_by_group", true},
-        {"fields", true},     {"start", true},     {"switch", true},      {"attach", true},
-        {"sensor", true},     {"id", true},        {"separate", true},    {"cut_delay", true},
-        {"place", true},      {"pressure", false}, {"mass_scaling", true}}},
-      {"place", {{"on", true}}},
-      {"separate", {{"least_cells", true}, {"crumbs", true}}},
-      {"model", {{"type", true}, {"params", true}, {"precision", true}}},
-      {"switch_rule",
-       {{"touching", true},
-        {"near", true},
-        {"far", true},
-        {"point", true},
-        {"distance", true},
-        {"hysteresis", true},
-        {"wait", true},
-        {"max_jump", true}}},
-      {"switch_model", {{"type", true}, {"params", true}, {"precision", true}, {"integrator", true}}},
-      {"switch",
-       {{"t", true},
-        {"type", true},
-        {"params", true},
-        {"precision", true},
-        {"integrator", true},
-        {"max_jump", true}}},
-      {"pose", {{"position", true}, {"rotation", true}, {"scale", true}}},
-      {"rotation", {{"axis", true}, {"angle_deg", true}, {"quaternion", true}}},
-      {"fix", {{"box", true}, {"group", true}, {"points", true}, {"axes", true}, {"motion", true}}},
-      {"force",
-       {{"box", true},
-        {"group", true},
-        {"points", true},
-        {"total", true},
-        {"by", true},
-        {"keyframes", true},
-        {"sine", true}}},
-      {"spring",
-       {{"box", true},
-        {"group", true},
-        {"points", true},
-        {"point", true},
-        {"to", true},
-        {"keyframes", true},
-        {"stiffness", true},
-        {"damping", true}}},
-      {"attach",
-       {{"to", true},
-        {"box", true},
-        {"group", true},
-        {"points", true},
-        {"max_distance", true},
-        {"stiffness", true},
-        {"damping", true},
-        {"release", true},
-        {"touch", true}}},
-      {"spring_key", {{"t", true}, {"position", true}}},
-      {"force_key", {{"t", true}, {"scale", true}}},
-      {"motion", {{"keyframes", true}, {"sine", true}}},
-      {"motion_key", {{"t", true}, {"position", true}, {"rotation", true}}},
-      {"sine", {{"amplitude", true}, {"frequency", true}, {"phase", true}}},
-      {"surface", {{"from", true}, {"mesh", true}, {"coupling", true}, {"support", true}}},
-      {"made_mesh",
-       {{"make", true},
-        {"radius", true},
-        {"inner", true},
-        {"length", true},
-        {"size", true},
-        {"cells", true}}},
-      {"fill", {{"cells", true}}},
-      {"start", {{"scramble", true}, {"flatten", true}, {"invert", true}, {"state", true}}},
-      {"anisotropy", {{"axis", true}, {"field", true}, {"params", true}}},
-      {"obstacle",
-       {{"name", true},
-        {"shape", true},
-        {"point", true},
-        {"normal", true},
-        {"radius", true},
-        {"half_size", true},
-        {"half_length", true},
-        {"pose", true},
-        {"motion", true},
-        {"velocity_surface", true},
-        {"material", true},
-        {"sensor", true},
-        {"start", true},
-        {"id", true},
-        {"mesh", true},
-        {"cells", true}}},
-      {"obstacle_pose", {{"position", true}, {"rotation", true}, {"scale", true}}},
-      {"rigid", {{"host", true}, {"bodies", true}}},
-      {"rigid_body",
-       {{"name", true},
-        {"shape", true},
-        {"radius", true},
-        {"half_size", true},
-        {"half_length", true},
-        {"mass", true},
-        {"inertia", true},
-        {"pose", true},
-        {"velocity", true},
-        {"spin", true},
-        {"fixed", true},
-        {"joints", true},
-        {"material", true},
-        {"sensor", true},
-        {"start", true},
-        {"id", true}}},
-      {"rigid_start", {{"position", true}, {"rotation", true}, {"velocity", true}, {"spin", true}}},
-      {"rigid_pose", {{"position", true}, {"rotation", true}}},
-      {"obstacle_start", {{"position", true}, {"rotation", true}}},
-      {"joint", {{"type", true}, {"with", true}, {"anchor", true}, {"axis", true}, {"motor", true}}},
-      {"motor", {{"velocity", true}, {"max", true}}},
-      {"tool",
-       {{"name", true},
-        {"shape", true},
-        {"radius", true},
-        {"half_size", true},
-        {"half_length", true},
-        {"mesh", true},
-        {"pose", true},
-        {"motion", true},
-        {"opening_deg", true},
-        {"coupling", true},
-        {"cuts", true},
-        {"id", true},
-        {"material", true}}},
-      {"tool_cuts", {{"bodies", true}, {"mode", true}, {"most", true}}},
-      {"cut",
-       {{"body", true},
-        {"t", true},
-        {"shape", true},
-        {"point", true},
-        {"normal", true},
-        {"corners", true},
-        {"radius", true},
-        {"half_size", true},
-        {"pose", true},
-        {"mode", true},
-        {"most", true}}},
-      {"cut_pose", {{"position", true}, {"rotation", true}}},
-      {"tool_motion", {{"keyframes", true}, {"file", true}}},
-      {"opening", {{"keyframes", true}}},
-      {"opening_key", {{"t", true}, {"value", true}}},
-      {"coupling",
-       {{"stiffness", true},
-        {"damping", true},
-        {"turn_stiffness", true},
-        {"turn_damping", true},
-        {"mass", true},
-        {"inertia", true},
-        {"late", true},
-        {"passive", true}}},
-      {"contact",
-       {{"method", true},
-        {"self", true},
-        {"untangle", true},
-        {"sleep", true},
-        {"tolerance", true},
-        {"offset", true},
-        {"guard", true},
-        {"energy_watch", true},
-        {"recovery_speed", true},
-        {"obstacle_speed", true},
-        {"max_sweeps", true},
-        {"friction", true},
-        {"filter", true}}},
-      {"friction", {{"between", true}, {"law", true}, {"params", true}, {"restitution", true}}},
-      {"filter", {{"between", true}, {"collide", true}}},
-      {"probe", {{"name", true}, {"body", true}, {"point", true}}},
-      {"output",
-       {{"every", true},
-        {"frames", true},
-        {"states", true},
-        {"nodes", true},
-        {"contacts", true},
-        {"check", true},
-        {"camera", true},
-        {"color", true},
-        {"color_range", true}}},
-      {"camera", {{"eye", true}, {"look_at", true}}},
-  };
-  return table;
+constexpr Row kObjects[] = {
+    {"scene",
+     "format version gravity time effects accuracy budget materials bodies obstacles rigid tools cuts "
+     "contact solver probes output"},
+    {"solver", "type tolerance max_iterations newton"},
+    {"accuracy", "target quantity"},
+    {"budget", "ms_per_step"},
+    {"gravity", "keyframes"},
+    {"gravity_key", "t value"},
+    {"time", "start duration step integrator max_time max_work mode"},
+    // A material may hold, beside these, any parameter of a loaded model.
+    {"material", "name density young poisson damping friction tear fracture_energy"},
+    {"damping", "mass stiffness"},
+    {"body",
+     "name mesh material model integrator pose velocity spin fix forces surface nodal_bc fill springs "
+     "anisotropy materials_by_group fields start switch attach sensor id separate cut_delay place "
+     "-pressure mass_scaling"},
+    {"place", "on"},
+    {"separate", "least_cells crumbs"},
+    {"model", "type params precision"},
+    {"switch_rule", "touching near far point distance hysteresis wait max_jump"},
+    {"switch_model", "type params precision integrator"},
+    {"switch", "t type params precision integrator max_jump"},
+    {"pose", "position rotation scale"},
+    {"rotation", "axis angle_deg quaternion"},
+    {"fix", "box group points axes motion"},
+    {"force", "box group points total by keyframes sine"},
+    {"spring", "box group points point to keyframes stiffness damping"},
+    {"attach", "to box group points max_distance stiffness damping release touch"},
+    {"spring_key", "t position"},
+    {"force_key", "t scale"},
+    {"motion", "keyframes sine"},
+    {"motion_key", "t position rotation"},
+    {"sine", "amplitude frequency phase"},
+    {"surface", "from mesh coupling support"},
+    {"made_mesh", "make radius inner length size cells"},
+    {"fill", "cells"},
+    {"start", "scramble flatten invert state"},
+    {"anisotropy", "axis field params"},
+    {"obstacle",
+     "name shape point normal radius half_size half_length pose motion velocity_surface material sensor "
+     "start id mesh cells"},
+    {"obstacle_pose", "position rotation scale"},
+    {"rigid", "host bodies"},
+    {"rigid_body",
+     "name shape radius half_size half_length mass inertia pose velocity spin fixed joints material "
+     "sensor start id"},
+    {"rigid_start", "position rotation velocity spin"},
+    {"rigid_pose", "position rotation"},
+    {"obstacle_start", "position rotation"},
+    {"joint", "type with anchor axis motor"},
+    {"motor", "velocity max"},
+    {"tool",
+     "name shape radius half_size half_length mesh pose motion opening_deg coupling cuts id material"},
+    {"tool_cuts", "bodies mode most"},
+    {"cut", "body t shape point normal corners radius half_size pose mode most"},
+    {"cut_pose", "position rotation"},
+    {"tool_motion", "keyframes file"},
+    {"opening", "keyframes"},
+    {"opening_key", "t value"},
+    {"coupling", "stiffness damping turn_stiffness turn_damping mass inertia late passive"},
+    {"contact",
+     "method self untangle sleep tolerance offset guard energy_watch recovery_speed obstacle_speed "
+     "max_sweeps friction filter"},
+    {"friction", "between law params restitution"},
+    {"filter", "between collide"},
+    {"probe", "name body point"},
+    {"output", "every frames states nodes contacts check camera color color_range"},
+    {"camera", "eye look_at"},
+};
+
+// The place of a word is its number in the public headers, where these have one.
+constexpr Row kWords[] = {
+    {"mode", "dynamic static"},
+    {"integrator", "auto symplectic_euler implicit_euler tr_bdf2 -verlet"},
+    {"method", "auto velocity implicit rollback"},
+    {"shape", "plane sphere box capsule mesh voxels"},
+    {"rigid_shape", "sphere box capsule -mesh -voxels"},
+    {"tool_shape", "sphere capsule box mesh grasper scissors ellipsoid blade"},
+    {"cut_shape", "plane blade sphere box ellipsoid"},
+    {"cut_mode", "remove split"},
+    {"joint_type", "hinge slider ball fixed"},
+    {"make", "beam cylinder ball tube"},
+    {"crumbs", "stay remove"},
+    {"from", "boundary"},
+    {"flatten", "plane line point"},
+    {"precision", "double single"},
+    {"coupling", "barycentric mls thesis"},
+    {"by", "auto area mass"},
+    {"color", "body contact speed displacement stress"},
+};
+
+class Names {
+ public:
+  template <size_t n>
+  explicit Names(const Row (&rows)[n]) {
+    for (const Row &row : rows) {
+      kinds.push_back(row.of);
+      keys_.emplace_back();
+      for (const char *at = row.names; *at; at += std::strspn(at, " ")) {
+        const char *const end = at + std::strcspn(at, " ");
+        const bool delivered = *at != '-';
+        keys_.back().push_back({{delivered ? at : at + 1, end}, delivered});
+        at = end;
+      }
+    }
+  }
+  const std::vector<Key> &operator[](const std::string &kind) const {
+    for (size_t i = 0; i < kinds.size(); ++i)
+      if (kinds[i] == kind) return keys_[i];
+    throw std::logic_error("no such table in scene/keys: " + kind);
+  }
+  std::vector<std::string> kinds;
+
+ private:
+  std::vector<std::vector<Key>> keys_;
+};
+
+const Names &objects() {
+  static const Names names(kObjects);
+  return names;
 }
-
-const Table &words() {
-  static const Table table = {
-      {"mode", {{"dynamic", true}, {"static", true}}},
-      {"integrator",
-       {{"auto", true},
-        {"symplectic_euler", true},
-        {"verlet", false},
-        {"implicit_euler", true},
-        {"tr_bdf2", true}}},
-      {"method", {{"auto", true}, {"velocity", true}, {"implicit", true}, {"rollback", true}}},
-      {"shape",
-       {{"plane", true},
-        {"sphere", true},
-        {"box", true},
-        {"capsule", true},
-        {"mesh", true},
-        {"voxels", true}}},
-      {"rigid_shape",
-       {{"sphere", true}, {"box", true}, {"capsule", true}, {"mesh", false}, {"voxels", false}}},
-      {"tool_shape",
-       {{"sphere", true},
-        {"capsule", true},
-        {"box", true},
-        {"mesh", true},
-        {"grasper", true},
-        {"scissors", true},
-        {"ellipsoid", true},
-        {"blade", true}}},
-      {"cut_shape", {{"plane", true}, {"blade", true}, {"sphere", true}, {"box", true}, {"ellipsoid", true}}},
-      {"cut_mode", {{"remove", true}, {"split", true}}},
-      {"joint_type", {{"hinge", true}, {"slider", true}, {"ball", true}, {"fixed", true}}},
-      {"make", {{"beam", true}, {"cylinder", true}, {"ball", true}, {"tube", true}}},
-      {"crumbs", {{"stay", true}, {"remove", true}}},
-      {"from", {{"boundary", true}}},
-      {"flatten", {{"plane", true}, {"line", true}, {"point", true}}},
-      {"precision", {{"double", true}, {"single", true}}},
-      {"coupling", {{"barycentric", true}, {"mls", true}, {"thesis", true}}},
-      {"by", {{"auto", true}, {"area", true}, {"mass", true}}},
-      {"color",
-       {{"body", true}, {"contact", true}, {"speed", true}, {"displacement", true}, {"stress", true}}},
-  };
-  return table;
-}
-
-const std::vector<Key> &find(const Table &table, const std::string &name) {
-  for (const auto &[key, rows] : table)
-    if (key == name) return rows;
-  throw std::logic_error("no such table in scene/keys: " + name);
-}
-
-std::vector<std::string> names(const Table &table) {
-  std::vector<std::string> out;
-  for (const auto &row : table) out.push_back(row.first);
-  return out;
+const Names &words() {
+  static const Names names(kWords);
+  return names;
 }
 
 }  // namespace
 
-const std::vector<Key> &keys_of(const std::string &kind) { return find(objects(), kind); }
-const std::vector<Key> &words_of(const std::string &what) { return find(words(), what); }
-
-const std::vector<std::string> &object_kinds() {
-  static const std::vector<std::string> list = names(objects());
-  return list;
+const std::vector<Key> &keys_of(const std::string &kind) { return objects()[kind]; }
+const std::vector<Key> &words_of(const std::string &what) { return words()[what]; }
+uint32_t number_of(const std::string &what, const std::string &word) {
+  const std::vector<Key> &rows = words_of(what);
+  const auto at = std::find_if(rows.begin(), rows.end(), [&](const Key &k) { return k.name == word; });
+  return static_cast<uint32_t>(at - rows.begin());
 }
 
-const std::vector<std::string> &word_sets() {
-  static const std::vector<std::string> list = names(words());
-  return list;
-}
+const std::string &word_of(const std::string &what, uint32_t number) { return words_of(what)[number].name; }
+
+const std::vector<std::string> &object_kinds() { return objects().kinds; }
+const std::vector<std::string> &word_sets() { return words().kinds; }
 
 }  // namespace dfm::scene

@@ -1,13 +1,14 @@
 // The table of all names in scene files; reader, error messages and the shipped schema are checked against
 // it.
 #pragma once
+#include <cstdint>
 #include <string>
 #include <vector>
 
 namespace dfm::scene {
 
 struct Key {
-  const char *name;
+  std::string name;
   bool delivered;  // false: named in the format, refused with "not available yet: POINTER"
 };
 
@@ -18,5 +19,8 @@ const std::vector<Key> &keys_of(const std::string &kind);
 // The allowed words of a value, if the format fixes them ("time.mode", "shape", ...).
 const std::vector<Key> &words_of(const std::string &what);
 const std::vector<std::string> &word_sets();
+// A word's place among them: its number in the public headers where it has one there; and back.
+uint32_t number_of(const std::string &what, const std::string &word);
+const std::string &word_of(const std::string &what, uint32_t number);
 
 }  // namespace dfm::scene

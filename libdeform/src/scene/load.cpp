@@ -36,12 +36,18 @@ MeshFiles::~MeshFiles() {
   for (auto &[path, mesh] : surfaces_) dfm_trimesh_destroy(mesh);
 }
 
-void MeshFiles::check(dfm_status status, const std::string &pointer) const {
-  if (status < 0) fail(status, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), dfm_last_error());
+dfm_tetmesh_info MeshFiles::info_of(dfm_tetmesh mesh, const std::string &pointer) const {
+  dfm_tetmesh_info info = {};
+  info.size = sizeof info;
+  def_.require(dfm_tetmesh_get_info(mesh, &info), pointer);
+  return info;
 }
 
-void MeshFiles::refuse(const std::string &pointer, const std::string &sentence) const {
-  fail(DFM_E_ARG, "%s: %s: %s", def_.file.c_str(), pointer.c_str(), sentence.c_str());
+dfm_trimesh_info MeshFiles::surface_info(dfm_trimesh mesh, const std::string &pointer) const {
+  dfm_trimesh_info info = {};
+  info.size = sizeof info;
+  def_.require(dfm_trimesh_get_info(mesh, &info), pointer);
+  return info;
 }
 
 std::string MeshFiles::path_of(const std::string &path) const {
@@ -56,14 +62,14 @@ bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
   if (surface_only_.count(path)) return false;
   dfm_tetmesh cells = 0;
   dfm_trimesh surface = 0;
-  check(dfm_mesh_read(context_, path.c_str(), &cells, &surface), pointer);
+  def_.require(dfm_mesh_read(context_, path.c_str(), &cells, &surface), pointer);
   if (cells) {
     cells_[path] = cells;
     return true;
   }
   surface_only_.insert(path);
   // already known as the surface of a body
-  if (!surfaces_.try_emplace(path, surface).second) check(dfm_trimesh_destroy(surface), pointer);
+  if (!surfaces_.try_emplace(path, surface).second) def_.require(dfm_trimesh_destroy(surface), pointer);
   return false;
 }
 
@@ -74,10 +80,8 @@ std::string MeshFiles::make(const Body &b) {
       format("/dev/null/%s %a %a %a %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells);
   dfm_tetmesh &mesh = cells_[name];
   if (mesh) return name;
-  check(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
-  dfm_tetmesh_info info = {};
-  info.size = sizeof info;
-  check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
+  def_.require(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
+  const dfm_tetmesh_info info = info_of(mesh, b.pointer + "/mesh");
   if (info.ntet > 2 * uint64_t{m.cells} && info.ntet > m.cells + kCheapCells)
     context_->logf(
         DFM_LOG_WARNING,
@@ -89,13 +93,13 @@ std::string MeshFiles::make(const Body &b) {
 
 dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer) {
   dfm_tetmesh &mesh = cells_[path];
-  if (!mesh) check(dfm_tetmesh_read(context_, path.c_str(), &mesh), pointer);
+  if (!mesh) def_.require(dfm_tetmesh_read(context_, path.c_str(), &mesh), pointer);
   return mesh;
 }
 
 dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &pointer) {
   dfm_trimesh &mesh = surfaces_[path];
-  if (!mesh) check(dfm_trimesh_read(context_, path.c_str(), &mesh), pointer);
+  if (!mesh) def_.require(dfm_trimesh_read(context_, path.c_str(), &mesh), pointer);
   return mesh;
 }
 
@@ -103,17 +107,13 @@ dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
   const uint32_t wanted = b.fill ? b.fill : kFillCells;
   dfm_tetmesh &mesh = fillings_[{path, wanted}];
   if (!mesh)
-    check(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
-          b.pointer + (b.fill ? "/fill" : "/mesh"));
-  if (!b.fill) {
-    dfm_tetmesh_info info = {};
-    info.size = sizeof info;
-    check(dfm_tetmesh_get_info(mesh, &info), b.pointer + "/mesh");
+    def_.require(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
+                 b.pointer + (b.fill ? "/fill" : "/mesh"));
+  if (!b.fill)
     context_->logf(DFM_LOG_WARNING,
                    "body '%s': %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": "
                    "{\"cells\": N} chooses",
-                   b.name.c_str(), path.c_str(), info.ntet);
-  }
+                   b.name.c_str(), path.c_str(), info_of(mesh, b.pointer + "/mesh").ntet);
   return mesh;
 }
 
@@ -121,36 +121,36 @@ dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
 void MeshFiles::check_keys(const Body &b, bool filled) const {
   if (filled) {
     if (!b.nodal_bc.empty())
-      refuse(b.pointer + "/nodal_bc",
-             "the mesh is a surface, and its nodes are not points of the filled body; use \"fix\" and "
-             "\"forces\"");
+      def_.refuse(b.pointer + "/nodal_bc",
+                  "the mesh is a surface, and its nodes are not points of the filled body; use \"fix\" and "
+                  "\"forces\"");
     if (!b.fields.empty())
-      refuse(b.fields[0].pointer,
-             "the mesh is a surface, so its file has no cells to give values for; fill it first with deform "
-             "mesh fill and use the result as mesh");
+      def_.refuse(
+          b.fields[0].pointer,
+          "the mesh is a surface, so its file has no cells to give values for; fill it first with deform "
+          "mesh fill and use the result as mesh");
     if (!b.by_group.empty())
-      refuse(b.by_group[0].pointer, "the mesh is a surface, and the cells that fill it belong to no group");
+      def_.refuse(b.by_group[0].pointer,
+                  "the mesh is a surface, and the cells that fill it belong to no group");
     return;
   }
   if (b.fill)
-    refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
+    def_.refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
   if (b.surface.coupled && b.surface.mesh.empty())
-    refuse(b.surface.pointer + "/coupling",
-           "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
-           "\"mesh\"");
+    def_.refuse(b.surface.pointer + "/coupling",
+                "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
+                "\"mesh\"");
 }
 
 void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const {
   const std::string pointer = b.pointer + "/mesh";
-  dfm_tetmesh_info info = {};
-  info.size = sizeof info;
+  const dfm_tetmesh_info info = info_of(mesh, pointer);
   const double *points = nullptr;
-  check(dfm_tetmesh_get_info(mesh, &info), pointer);
-  check(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), pointer);
-  check(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), pointer);
-  check(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
-  check(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
-  check(dfm_tetmesh_share(mesh, &out.share), pointer);
+  def_.require(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), pointer);
+  def_.require(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), pointer);
+  def_.require(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
+  def_.require(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
+  def_.require(dfm_tetmesh_share(mesh, &out.share), pointer);
   out.handle = mesh;
   out.npoint = info.npoint;
   out.ntet = info.ntet;
@@ -167,13 +167,11 @@ void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const
 }
 
 void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &pointer, BodyMesh &out) const {
-  dfm_trimesh_info info = {};
-  info.size = sizeof info;
+  const dfm_trimesh_info info = surface_info(mesh, pointer);
   const double *points = nullptr;
   Skin &skin = out.skin;
-  check(dfm_trimesh_get_info(mesh, &info), pointer);
-  check(dfm_trimesh_data(mesh, &points, &skin.triangles, nullptr), pointer);
-  check(dfm_trimesh_groups(mesh, &skin.group_names, &skin.triangle_group), pointer);
+  def_.require(dfm_trimesh_data(mesh, &points, &skin.triangles, nullptr), pointer);
+  def_.require(dfm_trimesh_groups(mesh, &skin.group_names, &skin.triangle_group), pointer);
   skin.npoint = info.npoint;
   skin.ntriangle = info.ntriangle;
   skin.ngroup = info.ngroup;
@@ -231,9 +229,7 @@ void MeshFiles::tell_of_unit(const Body &b, const BodyMesh &mesh) const {
 
 // A cut needs the border of the cells as surface, which is not the shape that the file has.
 void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
-  dfm_tetmesh_info cells = {};
-  cells.size = sizeof cells;
-  check(dfm_tetmesh_get_info(mesh.handle, &cells), b.surface.pointer);
+  const dfm_tetmesh_info cells = info_of(mesh.handle, b.surface.pointer);
   double filled = 0;  // cells of the lattice are alike
   for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share[t];
   context_->logf(
@@ -248,10 +244,8 @@ void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
 void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
   const std::string pointer = o.pointer + "/mesh";
   const dfm_trimesh mesh = surface(path_of(o.mesh), pointer);
-  dfm_trimesh_info info = {};
-  info.size = sizeof info;
-  check(dfm_trimesh_get_info(mesh, &info), pointer);
-  check(dfm_trimesh_data(mesh, &o.def.points, &o.def.triangles, nullptr), pointer);
+  const dfm_trimesh_info info = surface_info(mesh, pointer);
+  def_.require(dfm_trimesh_data(mesh, &o.def.points, &o.def.triangles, nullptr), pointer);
   o.def.npoint = info.npoint;
   o.def.ntriangle = info.ntriangle;
   if (o.scale == 1) return;

@@ -22,13 +22,13 @@ class MeshFiles {
   std::string path_of(const std::string &path) const;  // relative to the scene file
   // Cells, surface and groups of a body, scaled. Borrows from this object.
   BodyMesh load(const Body &body);
+  dfm_tetmesh_info info_of(dfm_tetmesh mesh, const std::string &pointer) const;
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
   // rest is borrowed from this object.
   void load(Obstacle &obstacle, std::vector<double> &points);
 
  private:
-  void check(dfm_status status, const std::string &pointer) const;
-  [[noreturn]] void refuse(const std::string &pointer, const std::string &sentence) const;
+  dfm_trimesh_info surface_info(dfm_trimesh mesh, const std::string &pointer) const;
   // reads the file; else it has a surface alone
   bool has_cells(const std::string &path, const std::string &pointer);
   // gives the name under which `cells` knows it

@@ -7,12 +7,13 @@
 #include "scene/select.h"
 
 namespace dfm::scene {
-namespace {
 
 double volume6(const double *const p[4]) {
   const Vec3 a = load3(p[0]);
   return dot(load3(p[1]) - a, cross(load3(p[2]) - a, load3(p[3]) - a));
 }
+
+namespace {
 
 // Distance of a point from a segment, and from a triangle: inside its prism the height, else the
 // nearest of its edges.

@@ -8,6 +8,8 @@ namespace dfm::scene {
 
 struct BodyMesh;
 
+double volume6(const double *const corner[4]);  // six times that of a cell, with sign
+
 class Locator {
  public:
   explicit Locator(const BodyMesh &mesh);  // borrows the mesh

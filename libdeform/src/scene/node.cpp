@@ -60,12 +60,11 @@ std::string Node::kind_found() const {
   return value_->is_null() ? "null" : std::string(value_->type_name()) + " " + excerpt(*value_);
 }
 
-void Node::object(const std::string &kind, const std::vector<std::string> &further) const {
+const Node &Node::object(const std::string &kind, const std::vector<std::string> &further) const {
   const std::vector<Key> &keys = keys_of(kind);
   if (!value_->is_object()) {
-    const bool typed = value_->is_string() && std::any_of(keys.begin(), keys.end(), [](const Key &k) {
-                         return k.name == std::string("type");
-                       });
+    const bool typed = value_->is_string() &&
+                       std::any_of(keys.begin(), keys.end(), [](const Key &k) { return k.name == "type"; });
     fail("expected an object with %s, found %s%s", join(delivered(keys)).c_str(), kind_found().c_str(),
          typed ? ("; write {\"type\": " + excerpt(*value_) + "}").c_str() : "");
   }
@@ -85,10 +84,18 @@ void Node::object(const std::string &kind, const std::vector<std::string> &furth
     if (!near.empty()) child.fail("unknown key \"%s\"; did you mean \"%s\"?", it.key().c_str(), near.c_str());
     child.fail("unknown key \"%s\"; expected one of: %s", it.key().c_str(), join(delivered(keys)).c_str());
   }
+  return *this;
 }
+
+Node Node::part(const std::string &kind) const { return member(kind, json::object()).object(kind); }
 
 Node Node::member(const std::string &key) const {
   return Node(&(*value_)[key], pointer_ + "/" + escape_pointer(key), file_);
+}
+
+Node Node::member(const std::string &key, json otherwise) const {
+  if (!has(key.c_str())) (*value_)[key] = std::move(otherwise);
+  return member(key);
 }
 
 Node Node::at(const std::string &key) const {
@@ -119,19 +126,9 @@ double Node::number(const Range &range) const {
   return x;
 }
 
-double Node::number(const char *key, double otherwise, const Range &range) const {
-  if (!has(key)) (*value_)[key] = otherwise;
-  return member(key).number(range);
-}
-
 bool Node::boolean() const {
   if (!value_->is_boolean()) fail("expected true or false, found %s", kind_found().c_str());
   return value_->get<bool>();
-}
-
-bool Node::boolean(const char *key, bool otherwise) const {
-  if (!has(key)) (*value_)[key] = otherwise;
-  return member(key).boolean();
 }
 
 std::string Node::text() const {
@@ -157,21 +154,11 @@ std::string Node::word(const std::string &set) const {
   fail("\"%s\" is not known; expected one of: %s", s.c_str(), join(delivered(keys)).c_str());
 }
 
-std::string Node::word(const char *key, const char *otherwise, const std::string &set) const {
-  if (!has(key)) (*value_)[key] = otherwise;
-  return member(key).word(set);
-}
-
 void Node::vector(double out[3]) const {
   if (!value_->is_array() || value_->size() != 3)
     fail("expected three numbers [x, y, z], found %s", kind_found().c_str());
   const std::vector<Node> parts = items();
   for (int i = 0; i < 3; ++i) out[i] = parts[i].number();
-}
-
-void Node::vector(const char *key, double out[3], double x, double y, double z) const {
-  if (!has(key)) (*value_)[key] = json::array({x, y, z});
-  member(key).vector(out);
 }
 
 std::string Node::name() const {

@@ -35,22 +35,30 @@ class Node {
 
   // Checks that this is an object whose keys are those of `kind`; unknown ones and those not
   // delivered are refused.
-  void object(const std::string &kind, const std::vector<std::string> &further = {}) const;
+  const Node &object(const std::string &kind, const std::vector<std::string> &further = {}) const;
   bool has(const char *key) const { return value_->is_object() && value_->contains(key); }
-  Node at(const std::string &key) const;           // an error if absent: the key is required
-  Node member(const std::string &key) const;       // must exist
-  std::vector<Node> items() const;                 // an error if this is no array
+  Node at(const std::string &key) const;                      // an error if absent: the key is required
+  Node member(const std::string &key) const;                  // must exist
+  Node member(const std::string &key, json otherwise) const;  // the latter where it is absent
+  Node part(const std::string &kind) const;  // the object under the key of its kind's name, made if absent
+  std::vector<Node> items() const;           // an error if this is no array
   std::vector<Node> items(const char *key) const;  // empty where the key is absent
 
   double number(const Range &range = kAny) const;
-  double number(const char *key, double otherwise, const Range &range = kAny) const;
+  double number(const char *key, double otherwise, const Range &range = kAny) const {
+    return member(key, otherwise).number(range);
+  }
   bool boolean() const;
-  bool boolean(const char *key, bool otherwise) const;
+  bool boolean(const char *key, bool otherwise) const { return member(key, otherwise).boolean(); }
   std::string text() const;
   std::string word(const std::string &set) const;  // one of words_of(set)
-  std::string word(const char *key, const char *otherwise, const std::string &set) const;
+  std::string word(const char *key, const char *otherwise, const std::string &set) const {
+    return member(key, otherwise).word(set);
+  }
   void vector(double out[3]) const;
-  void vector(const char *key, double out[3], double x, double y, double z) const;
+  void vector(const char *key, double out[3], double x, double y, double z) const {
+    member(key, json::array({x, y, z})).vector(out);
+  }
   // A name for a file or a table: no separators, no control characters.
   std::string name() const;
   std::string kind_found() const;  // "number 5", for sentences

@@ -1,5 +1,6 @@
 // Text to tree. A scan before the JSON parser limits nesting (so that neither the parser nor later use of the
 // tree can exhaust the stack) and finds duplicate keys, which the parser would silently drop.
+#include <algorithm>
 #include <cctype>
 #include <cmath>
 #include <cstdlib>
@@ -17,19 +18,13 @@ namespace {
 constexpr uint64_t kMaxBytes = 64 * kMiB;
 constexpr size_t kMaxDepth = 64;
 
-struct Place { size_t line = 1, column = 1; };
-
-Place place_of(const std::string &text, size_t byte) {
-  Place p;
-  for (size_t i = 0; i < byte && i < text.size(); ++i) {
-    if (text[i] == '\n') {
-      ++p.line;
-      p.column = 1;
-    } else {
-      ++p.column;
-    }
-  }
-  return p;
+// With line and column of a byte of the text.
+[[noreturn]] void refuse(const std::string &file, const std::string &text, size_t byte,
+                         const std::string &sentence) {
+  const std::string_view before = std::string_view(text).substr(0, byte);
+  const size_t line = 1 + size_t(std::count(before.begin(), before.end(), '\n'));
+  const size_t column = before.size() - (before.rfind('\n') + 1) + 1;  // npos + 1 is 0
+  fail(DFM_E_FORMAT, "%s:%zu:%zu: %s", file.c_str(), line, column, sentence.c_str());
 }
 
 // End of the string that begins at the quote `i` (index of its closing quote, or text.size()).
@@ -40,22 +35,15 @@ size_t string_end(const std::string &text, size_t i) {
 }
 
 void scan(const std::string &text, const std::string &file) {
-  if (const size_t nul = text.find('\0'); nul != std::string::npos) {
-    const Place p = place_of(text, nul);
-    fail(
-        DFM_E_FORMAT,
-        "%s:%zu:%zu: not JSON: it contains a NUL character, and readers would ignore what follows; remove it",
-        file.c_str(), p.line, p.column);
-  }
+  if (const size_t nul = text.find('\0'); nul != std::string::npos)
+    refuse(file, text, nul,
+           "not JSON: it contains a NUL character, and readers would ignore what follows; remove it");
   std::vector<std::set<std::string>> keys;  // of each open object; arrays hold none
   for (size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if (c == '{' || c == '[') {
-      if (keys.size() == kMaxDepth) {
-        const Place p = place_of(text, i);
-        fail(DFM_E_FORMAT, "%s:%zu:%zu: brackets nested deeper than %zu levels", file.c_str(), p.line,
-             p.column, kMaxDepth);
-      }
+      if (keys.size() == kMaxDepth)
+        refuse(file, text, i, format("brackets nested deeper than %zu levels", kMaxDepth));
       keys.emplace_back();
     } else if (c == '}' || c == ']') {
       if (!keys.empty()) keys.pop_back();
@@ -68,11 +56,9 @@ void scan(const std::string &text, const std::string &file) {
         if (key.find('\\') != std::string::npos)  // "\u0061" is "a" as well
           if (const json plain = json::parse(text.substr(i, end - i + 1), nullptr, false); plain.is_string())
             key = plain.get<std::string>();
-        if (!keys.back().insert(key).second) {
-          const Place p = place_of(text, i);
-          fail(DFM_E_FORMAT, "%s:%zu:%zu: the key \"%.60s\" is given twice in one object; keep one",
-               file.c_str(), p.line, p.column, key.c_str());
-        }
+        if (!keys.back().insert(key).second)
+          refuse(file, text, i,
+                 format("the key \"%.60s\" is given twice in one object; keep one", key.c_str()));
       }
       i = end;
     }
@@ -124,15 +110,13 @@ json parse_text(const std::string &text, const std::string &file) {
   try {
     return json::parse(text);
   } catch (const json::parse_error &e) {
-    const Place p = place_of(text, e.byte > 0 ? e.byte - 1 : 0);
-    fail(DFM_E_FORMAT, "%s:%zu:%zu: not JSON: %s%s", file.c_str(), p.line, p.column, reason(e.what()).c_str(),
-         is_not_finite(text, e.byte) ? "; numbers must be finite" : "");
+    refuse(file, text, e.byte > 0 ? e.byte - 1 : 0,
+           "not JSON: " + reason(e.what()) + (is_not_finite(text, e.byte) ? "; numbers must be finite" : ""));
   } catch (const json::exception &e) {
-    if (const auto [begin, end] = too_large_number(text); end > begin) {
-      const Place p = place_of(text, begin);
-      fail(DFM_E_FORMAT, "%s:%zu:%zu: the number %.60s is too large; numbers are at most 1.8e308 in size",
-           file.c_str(), p.line, p.column, text.substr(begin, end - begin).c_str());
-    }
+    if (const auto [begin, end] = too_large_number(text); end > begin)
+      refuse(file, text, begin,
+             format("the number %.60s is too large; numbers are at most 1.8e308 in size",
+                    text.substr(begin, end - begin).c_str()));
     fail(DFM_E_FORMAT, "%s: not JSON: %s", file.c_str(), reason(e.what()).c_str());
   }
 }

@@ -99,14 +99,14 @@ class Reader {
  public:
   Reader(dfm_context *context, const Definition &def, const Types &types)
       : def_(def), types_(types), files_(context, def) {
-    g_ = length(def.gravity);
-    for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? def.gravity[k] / g_ : 0;
+    g_ = length(def.world.gravity);
+    for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? def.world.gravity[k] / g_ : 0;
   }
 
   std::vector<BodyRegime> run(const Measured &measured) {
     for (const Body &b : def_.bodies) meshes_.push_back(files_.load(b));
     for (size_t i = 0; i < meshes_.size(); ++i)
-      boxes_.push_back(place(load3(meshes_[i].lo), load3(meshes_[i].hi), def_.bodies[i].pose));
+      boxes_.push_back(place(load3(meshes_[i].lo), load3(meshes_[i].hi), def_.bodies[i].def.pose));
     std::vector<BodyRegime> out;
     for (size_t i = 0; i < meshes_.size(); ++i) out.push_back(regime(i, measured));
     return out;
@@ -121,7 +121,7 @@ class Reader {
   }
 
   static bool moves(const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; }
-  static bool thrown(const Body &b) { return length(b.velocity) > 0 || length(b.spin) > 0; }
+  static bool thrown(const Body &b) { return length(b.def.velocity) > 0 || length(b.def.spin) > 0; }
   static bool held(const Body &b) { return !b.fixes.empty() || !b.nodal_bc.empty(); }
 
   // Something moves toward it, independent of gravity.
@@ -214,10 +214,7 @@ class Reader {
     const Body &b = def_.bodies[i];
     const BodyMesh &mesh = meshes_[i];
     const Material &m = material(b);
-    dfm_tetmesh_info info = {};
-    info.size = sizeof info;
-    if (const dfm_status status = dfm_tetmesh_get_info(mesh.handle, &info); status < 0)
-      fail(status, "%s: %s/mesh: %s", def_.file.c_str(), b.pointer.c_str(), dfm_last_error());
+    const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
     BodyRegime r;
     r.name = b.name;
     r.points = mesh.npoint;
@@ -227,16 +224,16 @@ class Reader {
     r.thickness = *std::min_element(side, side + 3);
     r.edge = info.edge_median * b.scale;
     r.cell_size = info.wave_path * b.scale;
-    r.young = m.young;
-    r.poisson = m.poisson;
-    r.density = m.density;
-    r.damping_mass = m.damping_mass;
-    r.damping_stiffness = m.damping_stiffness;
+    r.young = m.def.young;
+    r.poisson = m.def.poisson;
+    r.density = m.def.density;
+    r.damping_mass = m.def.damping_mass;
+    r.damping_stiffness = m.def.damping_stiffness;
     r.load = g_;
     for (const Force &f : b.forces)
-      r.load += length(f.total) / (m.density * info.volume * std::pow(b.scale, 3));
+      r.load += length(f.total) / (m.def.density * info.volume * std::pow(b.scale, 3));
     r.held = held(b);
-    const double thrown = length(b.velocity);
+    const double thrown = length(b.def.velocity);
     const double falls = g_ > 0 ? 0.5 * g_ * def_.duration * def_.duration : 0;
     double fall = HUGE_VAL;
     r.presses = def_.rigid.bodies.empty() && !one_is_thrown() ? 0 : HUGE_VAL;
@@ -244,7 +241,7 @@ class Reader {
     r.below = fall;
     const double s = r.held ? HUGE_VAL : fall;
     r.touches = s <= falls || r.meets_body || something_moves();
-    r.speed = thrown + 0.5 * length(b.spin) * r.length;
+    r.speed = thrown + 0.5 * length(b.def.spin) * r.length;
     if (!r.held) {
       const double way = std::min(s, falls);
       r.travel = thrown * def_.duration + way;
@@ -252,9 +249,9 @@ class Reader {
       if (r.touches && r.speed + g_ * meets > 0) r.after = std::max(0.0, 1 - meets / def_.duration);
       r.speed = std::sqrt(r.speed * r.speed + 2 * g_ * way);
     }
-    r.turns = !r.held && (r.touches || length(b.spin) > 0);
+    r.turns = !r.held && (r.touches || length(b.def.spin) > 0);
     if (!b.model_open) r.model = short_id(b.model);
-    const int32_t named = b.integrator != DFM_INTEGRATOR_AUTO ? b.integrator : def_.integrator;
+    const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
     r.models = candidates(measured);
     return r;
@@ -292,18 +289,13 @@ json way_json(const Way &way, const Definition &def) {
 }  // namespace
 
 json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree) {
-  const Wanted &wanted = def.wanted;
-  const Measured measured = read_costs();
-  const std::vector<BodyRegime> bodies = Reader(context, def, types).run(measured);
-  Wish wish;
-  wish.target = wanted.target;
-  wish.ms_per_step = wanted.ms_per_step;
-  wish.weight = wanted.weight;
-  wish.force = wanted.force;
+  Wish wish = def.wanted;
   wish.duration = def.duration;
   wish.step = def.step;
+  const Measured measured = read_costs();
+  const std::vector<BodyRegime> bodies = Reader(context, def, types).run(measured);
   PlannedWay plan = plan_accuracy(bodies, measured, wish);
-  const char *const key = wanted.target > 0 ? "accuracy" : "budget";
+  const char *const key = wish.target > 0 ? "accuracy" : "budget";
   if (!plan.found)
     fail(DFM_E_UNSUPPORTED,
          "%s: /%s: there are no measured costs for the models and integrators that this scene names; run "
@@ -319,20 +311,20 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   for (size_t i = 0; i < bodies.size(); ++i) {
     const BodyWay &way = plan.way.bodies[i];
     if (def.bodies[i].model_open) write(def.bodies[i].pointer + "/model/type", way.model);
-    if (way.scheme != Scheme::explicit_euler && def.integrator == DFM_INTEGRATOR_AUTO && !implicit) {
+    if (way.scheme != Scheme::explicit_euler && def.world.integrator == DFM_INTEGRATOR_AUTO && !implicit) {
       write("/time/integrator", scheme_name(way.scheme));
       implicit = true;
     }
   }
-  if (!implicit && def.integrator == DFM_INTEGRATOR_AUTO)
+  if (!implicit && def.world.integrator == DFM_INTEGRATOR_AUTO)
     write("/time/integrator", scheme_name(Scheme::explicit_euler));
   if (!(def.step > 0) && plan.way.step > 0) write("/time/step", plan.way.step);
   // The allowed creep of a resting contact over the whole time is a tenth of the error.
   double scale = HUGE_VAL;
   for (const BodyRegime &b : bodies)
     if (b.touches) scale = std::min(scale, std::max({estimate(b, def.duration).sag, b.travel, b.depth}));
-  const double creep = 0.1 * wanted.target * scale / def.duration;
-  if (creep > 0 && !(def.tolerance > 0) && creep < kDefaultTolerance) {
+  const double creep = 0.1 * wish.target * scale / def.duration;
+  if (creep > 0 && !(def.world.contact_tolerance > 0) && creep < kDefaultTolerance) {
     const double tolerance = std::max(creep, kLeastTolerance);
     write("/contact/tolerance", tolerance);
     plan.assumed.push_back(

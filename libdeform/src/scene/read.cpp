@@ -190,7 +190,7 @@ const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types) {
 
 std::string known(const Node &name, const std::vector<std::string> &valid, const char *what) {
   const std::string s = name.text();
-  if (std::find(valid.begin(), valid.end(), s) != valid.end()) return s;
+  if (listed(valid, s)) return s;
   const std::string near = nearest(s, valid);
   if (!near.empty()) name.fail("there is no %s \"%s\"; did you mean \"%s\"?", what, s.c_str(), near.c_str());
   name.fail("there is no %s \"%s\"; there %s: %s", what, s.c_str(), valid.size() == 1 ? "is" : "are",
@@ -199,21 +199,37 @@ std::string known(const Node &name, const std::vector<std::string> &valid, const
 
 void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken,
                  const char *what) {
-  if (std::find(taken.begin(), taken.end(), value) != taken.end())
+  if (listed(taken, value))
     name.fail("the name \"%s\" is taken by another %s; names are unique", value.c_str(), what);
 }
 
-void check_rising(const Node &key, size_t i, double previous, double t) {
-  if (i > 0 && !(t > previous))
-    key.at("t").fail("times of keyframes must increase; found %g after %g", t, previous);
+void check_rising(const Node &key, double previous, double t) {
+  if (!(t > previous)) key.at("t").fail("times of keyframes must increase; found %g after %g", t, previous);
 }
 
 int32_t integrator_of(const Node &holder) {
-  const std::string word = holder.word("integrator", "auto", "integrator");
-  return word == "symplectic_euler" ? DFM_INTEGRATOR_SYMPLECTIC_EULER
-         : word == "implicit_euler" ? DFM_INTEGRATOR_IMPLICIT_EULER
-         : word == "tr_bdf2"        ? DFM_INTEGRATOR_TR_BDF2
-                                    : DFM_INTEGRATOR_AUTO;
+  return int32_t(number_of("integrator", holder.word("integrator", "auto", "integrator")));
+}
+
+void read_direction(const Node &node, const char *what, double out[3]) {
+  node.vector(out);
+  if (out[0] == 0 && out[1] == 0 && out[2] == 0) node.fail("%s cannot be zero", what);
+}
+
+void read_sizes(const Node &node, const char *what, double out[3]) {
+  node.vector(out);
+  for (int k = 0; k < 3; ++k)
+    if (!(out[k] > 0)) node.fail("%s are above 0, found %g", what, out[k]);
+}
+
+void read_thing(const Node &node, ReadContext &context, Thing &out) {
+  out.pointer = node.pointer();
+  out.name = node.at("name").name();
+  check_fresh(node.at("name"), out.name, context.sides, "body or obstacle");
+  context.sides.push_back(out.name);
+  if (node.has("material")) out.material = known(node.member("material"), context.materials, "material");
+  out.sensor = node.boolean("sensor", false);
+  out.id = read_id(node);
 }
 
 dfm_sine read_sine(const Node &sine, bool scalar) {
@@ -231,35 +247,28 @@ dfm_sine read_sine(const Node &sine, bool scalar) {
 namespace {
 
 void read_gravity(const Node &scene, Definition &def) {
-  if (!scene.has("gravity")) scene.value()["gravity"] = json::array({0.0, 0.0, -9.81});
-  const Node gravity = scene.member("gravity");
-  if (gravity.value().is_array()) return gravity.vector(def.gravity);
+  const Node gravity = scene.member("gravity", json::array({0.0, 0.0, -9.81}));
+  if (gravity.value().is_array()) return gravity.vector(def.world.gravity);
   if (!gravity.value().is_object())
     gravity.fail("expected [x, y, z] in m/s2 or an object with keyframes, found %s",
                  gravity.kind_found().c_str());
-  gravity.object("gravity");
-  const std::vector<Node> keys = gravity.at("keyframes").items();
-  if (keys.empty()) gravity.at("keyframes").fail("expected at least one keyframe");
-  for (size_t i = 0; i < keys.size(); ++i) {
-    keys[i].object("gravity_key");
-    dfm_vector_key key = {};
-    key.t = keys[i].at("t").number();
-    keys[i].at("value").vector(key.value);
-    check_rising(keys[i], i, i ? def.gravity_keys.back().t : 0, key.t);
-    def.gravity_keys.push_back(key);
-  }
-  std::copy_n(def.gravity_keys[0].value, 3, def.gravity);
+  gravity.object("gravity").at("keyframes");
+  def.gravity_keys = read_keyframes<dfm_vector_key>(
+      gravity, "gravity_key",
+      [](const Node &node, dfm_vector_key &key) { node.at("value").vector(key.value); });
+  std::copy_n(def.gravity_keys[0].value, 3, def.world.gravity);
 }
 
 void read_time(const Node &scene, Definition &def) {
-  const Node time = scene.at("time");
-  time.object("time");
+  const Node time = scene.at("time").object("time");
   def.begin = time.number("start", 0.0, kNotNegative);
   def.duration = time.at("duration").number(kPositive);
-  if (!time.has("step")) time.value()["step"] = "auto";
-  if (time.has("max_time")) def.max_time = time.member("max_time").number(kPositive);
-  if (time.has("max_work")) def.max_work = time.member("max_work").number(Range{1, HUGE_VAL, false, true});
-  const Node step = time.member("step");
+  if (time.has("max_time")) def.world.max_time = time.member("max_time").number(kPositive);
+  if (time.has("max_work")) {
+    const double work = time.member("max_work").number(Range{1, HUGE_VAL, false, true});
+    def.world.max_work = work < 1.8e19 ? static_cast<uint64_t>(work) : UINT64_MAX;
+  }
+  const Node step = time.member("step", "auto");
   if (step.value().is_string()) {
     if (step.text() != "auto")
       step.fail("expected a number of seconds or \"auto\", found \"%s\"", step.text().c_str());
@@ -270,7 +279,7 @@ void read_time(const Node &scene, Definition &def) {
       step.fail("%g s at %g s a step are more than 1e12 steps", def.duration, def.step);
   }
   def.equilibrium = time.word("mode", "dynamic", "mode") == "static";
-  def.integrator = integrator_of(time);
+  def.world.integrator = integrator_of(time);
 }
 
 // How many times the relative error of positions that of a quantity is: energies go with squares, and forces
@@ -291,7 +300,7 @@ double weight_of(const Node &quantity, const std::vector<Probe> &probes, bool &f
   json stem = family;
   known(Node(&stem, quantity.pointer(), &quantity.file()), valid, "quantity");
   force = family == "force" || family == "work";
-  return std::find(twice.begin(), twice.end(), family) == twice.end() ? 1 : 2;
+  return listed(twice, family) ? 2 : 1;
 }
 
 void read_wanted(const Node &scene, Definition &def) {
@@ -316,19 +325,17 @@ void read_wanted(const Node &scene, Definition &def) {
 
 void read_solver(const Node &scene, Definition &def) {
   if (!scene.has("solver")) return;
-  const Node solver = scene.member("solver");
-  solver.object("solver");
+  const Node solver = scene.member("solver").object("solver");
   if (solver.has("type")) def.solver = solver.member("type").text();
   if (solver.has("tolerance"))
-    def.solver_tolerance = solver.member("tolerance").number(Range{0, 1, true, true});
+    def.world.solver_tolerance = solver.member("tolerance").number(Range{0, 1, true, true});
   if (solver.has("max_iterations"))
-    def.solver_iterations = read_count(solver.member("max_iterations"), 1, 1e9);
-  if (solver.has("newton")) def.newton = read_count(solver.member("newton"), 1, 1e9);
+    def.world.solver_iterations = read_count(solver.member("max_iterations"), 1, 1e9);
+  if (solver.has("newton")) def.world.newton_iterations = read_count(solver.member("newton"), 1, 1e9);
 }
 
 void read_effects(const Node &scene, Definition &def) {
-  if (!scene.has("effects")) scene.value()["effects"] = "auto";
-  const Node effects = scene.member("effects");
+  const Node effects = scene.member("effects", "auto");
   if (effects.value().is_string()) {
     if (effects.text() != "auto")
       effects.fail("expected \"auto\" or a list of effects, found \"%s\"", effects.text().c_str());
@@ -371,22 +378,19 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
   if (!materials.value().is_object()) materials.fail("expected an object of materials by name");
   const std::vector<std::string> model_keys = context.types.model_keys();
   for (const auto &entry : materials.value().items()) {
-    const Node node = materials.member(entry.key());
-    node.object("material", model_keys);
+    const Node node = materials.member(entry.key()).object("material", model_keys);
     Material m;
     m.pointer = node.pointer();
     m.name = m.title = entry.key();
     if (node.has("name")) m.title = node.value()["name"].is_null() ? "" : node.member("name").text();
     json copy = entry.key();
     Node(&copy, node.pointer(), &node.file()).name();
-    m.density = node.number("density", m.density, kPositive);
-    m.young = node.number("young", m.young, kPositive);
-    m.poisson = node.number("poisson", m.poisson, Range{-1, 0.5, true, true});
-    if (!node.has("damping")) node.value()["damping"] = json::object();
-    const Node damping = node.member("damping");
-    damping.object("damping");
-    m.damping_mass = damping.number("mass", 0.0, kNotNegative);
-    m.damping_stiffness = damping.number("stiffness", 0.0, kNotNegative);
+    m.def.density = node.number("density", m.def.density, kPositive);
+    m.def.young = node.number("young", m.def.young, kPositive);
+    m.def.poisson = node.number("poisson", m.def.poisson, Range{-1, 0.5, true, true});
+    const Node damping = node.part("damping");
+    m.def.damping_mass = damping.number("mass", 0.0, kNotNegative);
+    m.def.damping_stiffness = damping.number("stiffness", 0.0, kNotNegative);
     for (const auto &further : node.value().items()) {
       const std::string &key = further.key();
       const std::vector<Key> &own = keys_of("material");
@@ -431,37 +435,36 @@ void read_between(const Node &entry, const ReadContext &context, bool grouped, s
 }
 
 void read_contact(const Node &scene, Definition &def, const ReadContext &context) {
-  if (!scene.has("contact")) scene.value()["contact"] = json::object();
-  const Node contact = scene.member("contact");
-  contact.object("contact");
+  const Node contact = scene.part("contact");
+  dfm_world_def &w = def.world;
   const std::string method = contact.word("method", "auto", "method");  // for one version
   if (method == "rollback")
     contact.member("method").fail(
         "\"rollback\" is a program of its own now: remove \"method\" and run `deform rollback`");
-  if (method != "auto" && def.integrator == DFM_INTEGRATOR_AUTO)
-    def.integrator = method == "implicit" ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
-  def.sleep = contact.boolean("sleep", false);
+  if (method != "auto" && w.integrator == DFM_INTEGRATOR_AUTO)
+    w.integrator = method == "implicit" ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  w.sleep = contact.boolean("sleep", false);
   const bool self_given = contact.has("self");
-  const bool listed = std::find(def.effects.begin(), def.effects.end(), "self_contact") != def.effects.end();
-  if (self_given && contact.value()["self"] == "auto") def.self = DFM_SELF_AUTO;
+  const bool asked = listed(def.effects, "self_contact");
+  if (self_given && contact.value()["self"] == "auto") w.self_contact = DFM_SELF_AUTO;
   else if (self_given && !contact.value()["self"].is_boolean())
     contact.member("self").fail("expected true, false or \"auto\"");
-  else def.self = contact.boolean("self", listed) ? DFM_SELF_ON : DFM_SELF_OFF;
-  if (self_given && def.self != DFM_SELF_ON && listed)
+  else w.self_contact = contact.boolean("self", asked) ? DFM_SELF_ON : DFM_SELF_OFF;
+  if (self_given && w.self_contact != DFM_SELF_ON && asked)
     contact.member("self").fail(
         "\"self\" is not true, but /effects asks for \"self_contact\"; remove one of the two");
-  def.untangle = contact.boolean("untangle", false);
-  def.guard = contact.boolean("guard", true);
+  if (contact.boolean("untangle", false)) w.flags |= DFM_WORLD_UNTANGLE;
+  if (!contact.boolean("guard", true)) w.flags |= DFM_WORLD_UNGUARDED;
   if (contact.has("energy_watch")) {
     const Node watch = contact.member("energy_watch");
-    if (watch.value().is_boolean()) def.energy_watch = watch.value().get<bool>() ? def.energy_watch : 0;
-    else def.energy_watch = watch.number(kNotNegative);
+    if (watch.value().is_boolean()) w.energy_watch = watch.value().get<bool>() ? w.energy_watch : 0;
+    else w.energy_watch = watch.number(kNotNegative);
   }
-  if (contact.has("tolerance")) def.tolerance = contact.member("tolerance").number(kPositive);
-  if (contact.has("offset")) def.offset = contact.member("offset").number(kPositive);
-  if (contact.has("recovery_speed")) def.recovery_speed = contact.member("recovery_speed").number(kPositive);
-  if (contact.has("obstacle_speed")) def.obstacle_speed = contact.member("obstacle_speed").number(kPositive);
-  if (contact.has("max_sweeps")) def.max_sweeps = read_count(contact.member("max_sweeps"), 1, 1e6);
+  if (contact.has("tolerance")) w.contact_tolerance = contact.member("tolerance").number(kPositive);
+  if (contact.has("offset")) w.contact_offset = contact.member("offset").number(kPositive);
+  if (contact.has("recovery_speed")) w.recovery_speed = contact.member("recovery_speed").number(kPositive);
+  if (contact.has("obstacle_speed")) w.obstacle_speed = contact.member("obstacle_speed").number(kPositive);
+  if (contact.has("max_sweeps")) w.max_sweeps = read_count(contact.member("max_sweeps"), 1, 1e6);
   if (contact.has("friction") && !contact.value()["friction"].is_array())
     contact.member("friction")
         .fail(
@@ -478,8 +481,9 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     if (entry.has("params")) f.params = read_params(entry.member("params"), type);
     if (entry.has("restitution")) {
       const Node e = entry.member("restitution");
-      f.restitution = e.number(kNotNegative);
-      if (*f.restitution > 1) e.fail("expected a number from 0 to 1, found %g", *f.restitution);
+      f.def.flags = DFM_FRICTION_RESTITUTION;
+      f.def.restitution = e.number(kNotNegative);
+      if (f.def.restitution > 1) e.fail("expected a number from 0 to 1, found %g", f.def.restitution);
     }
     def.friction.push_back(std::move(f));
   }
@@ -526,12 +530,9 @@ void read_color_range(const Node &range, const std::string &color) {
 }
 
 void read_output(const Node &scene, Definition &def) {
-  if (!scene.has("output")) scene.value()["output"] = json::object();
-  const Node output = scene.member("output");
-  output.object("output");
+  const Node output = scene.part("output");
   def.every = output.number("every", 0.02, kPositive);
-  if (!output.has("frames")) output.value()["frames"] = false;
-  const Node frames = output.member("frames");
+  const Node frames = output.member("frames", false);
   if (frames.value().is_number()) {
     def.frame_rate = frames.number(Range{0, 1e6, true, false});
     def.frames = true;
@@ -545,8 +546,7 @@ void read_output(const Node &scene, Definition &def) {
   def.color = output.word("color", "body", "color");
   if (output.has("color_range")) read_color_range(output.member("color_range"), def.color);
   if (output.has("camera")) {
-    const Node camera = output.member("camera");
-    camera.object("camera");
+    const Node camera = output.member("camera").object("camera");
     camera.at("eye").vector(def.eye);
     camera.vector("look_at", def.look_at, 0, 0, 0);
     if (std::equal(def.eye, def.eye + 3, def.look_at))
@@ -575,12 +575,15 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   read_effects(scene, def);
   read_solver(scene, def);
   read_materials(scene, def, context);
-  def.bodies = read_bodies(scene, context);
-  def.obstacles = read_obstacles(scene, context);
+  for (const Node &node : scene.items("bodies")) def.bodies.push_back(read_body(node, context));
+  for (const Node &node : scene.items("obstacles")) def.obstacles.push_back(read_obstacle(node, context));
   check_places(scene, def);
   def.rigid = read_rigid(scene, context);
-  def.tools = read_tools(scene, context);
-  def.cuts = read_cuts(scene, context, def);
+  for (const Node &node : scene.items("tools")) def.tools.push_back(read_tool(node, context));
+  for (const Node &node : scene.items("cuts")) def.cuts.push_back(read_cut(node, context, def.begin));
+  if (def.equilibrium && !def.cuts.empty())
+    scene.member("cuts").fail(
+        "cuts are made in steps, and /time/mode \"static\" takes none; remove one of the two");
   read_contact(scene, def, context);
   read_probes(scene, def);
   if (scene.has("accuracy") && scene.member("accuracy").has("quantity"))

@@ -1,5 +1,8 @@
 // Scene tree -> Definition. Every key is checked: name, type, range, references to other names.
 #pragma once
+#include <algorithm>
+
+#include "math/turn.h"
 #include "scene/defs.h"
 #include "scene/node.h"
 
@@ -22,25 +25,51 @@ std::vector<double> read_param(const Node &value, const dfm_param &row);
 const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
 int32_t integrator_of(const Node &holder);  // its key `integrator`, DFM_INTEGRATOR_*
 dfm_sine read_sine(const Node &sine, bool scalar);
-void check_rising(const Node &keys, size_t i, double previous, double t);
+void check_rising(const Node &key, double previous, double t);
+// The key "keyframes", with times that rise; read(node, key) reads all but the time. some: an empty list is
+// refused.
+template <class Key, class Read>
+std::vector<Key> read_keyframes(const Node &holder, const char *kind, Read read, bool some = true) {
+  std::vector<Key> keys;
+  for (const Node &node : holder.items("keyframes")) {
+    node.object(kind);
+    Key key = {};
+    key.t = node.at("t").number();
+    read(node, key);
+    if (!keys.empty()) check_rising(node, keys.back().t, key.t);
+    keys.push_back(key);
+  }
+  if (some && keys.empty() && holder.has("keyframes"))
+    holder.at("keyframes").fail("expected at least one keyframe");
+  return keys;
+}
+void read_direction(const Node &node, const char *what, double out[3]);  // not zero
+void read_sizes(const Node &node, const char *what, double out[3]);      // above 0; what: "half sizes"
+// Name, id, material, sensor.
+void read_thing(const Node &node, ReadContext &context, Thing &out);
+inline bool listed(const std::vector<std::string> &list, const std::string &name) {
+  return std::find(list.begin(), list.end(), name) != list.end();
+}
 void check_fresh(const Node &name, const std::string &value, const std::vector<std::string> &taken,
                  const char *what);
 std::string known(const Node &name, const std::vector<std::string> &valid, const char *what);
 // Fields, materials by group, anisotropy, surface and filling of a body. read_carriers.cpp
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &out);
-std::vector<Body> read_bodies(const Node &scene, ReadContext &context);
-std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context);
+Body read_body(const Node &node, ReadContext &context);
+Obstacle read_obstacle(const Node &node, ReadContext &context);
 // Size and pose of a shape, for obstacles and rigid bodies; kind: of the pose's object.
 void check_shape_keys(const Node &node, const std::string &shape);
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale);
 // Reads a "start"; missing keys keep their usual values.
 dfm_pose read_placed(const Node &start, const dfm_pose &otherwise);
 uint64_t read_id(const Node &node);  // 0: none is given
-void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],
-                double &radius, double &half_length);
+template <class Def>                 // dfm_obstacle_def, dfm_rigid_def
+void read_solid(const Node &node, const std::string &shape, Def &def);
 Rigid read_rigid(const Node &scene, ReadContext &context);
-std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base);
-std::vector<Tool> read_tools(const Node &scene, ReadContext &context);
-std::vector<Cut> read_cuts(const Node &scene, const ReadContext &context, const Definition &def);
+// A key that leaves out position or rotation keeps that of `base`. `turn`: what every rotation is applied to
+// (a plane's normal).
+std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, Quat turn = {});
+Tool read_tool(const Node &node, ReadContext &context);
+Cut read_cut(const Node &node, const ReadContext &context, double start);
 
 }  // namespace dfm::scene

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "dynamics/mass_scaling.h"
+#include "scene/keys.h"
 #include "scene/read.h"
 #include "scene/rotation.h"
 
@@ -28,13 +29,10 @@ void read_quaternion(const Node &rotation, double out[4]) {
 void read_rotation(const Node &holder, double out[4]) {
   Quat q;
   if (holder.has("rotation")) {
-    const Node node = holder.member("rotation");
-    node.object("rotation");
+    const Node node = holder.member("rotation").object("rotation");
     if (node.has("quaternion")) return read_quaternion(node, out);
     double axis[3];
-    node.at("axis").vector(axis);
-    if (axis[0] == 0 && axis[1] == 0 && axis[2] == 0)
-      node.at("axis").fail("the axis of a rotation cannot be zero");
+    read_direction(node.at("axis"), "the axis of a rotation", axis);
     q = rotation(axis, node.at("angle_deg").number());
   }
   store_quat(out, q);
@@ -56,8 +54,7 @@ uint64_t read_id(const Node &node) {
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale) {
   dfm_pose pose = {{0, 0, 0}, {0, 0, 0, 1}};
   if (!holder.has("pose")) return pose;
-  const Node node = holder.member("pose");
-  node.object(kind);
+  const Node node = holder.member("pose").object(kind);
   node.vector("position", pose.position, 0, 0, 0);
   read_rotation(node, pose.rotation);
   if (scale) *scale = node.number("scale", 1.0, kPositive);
@@ -93,25 +90,16 @@ Selection read_selection(const Node &entry) {
   return s;
 }
 
-// A key that leaves out position or rotation keeps that of `base`. `turn`: what every rotation is applied to
-// (a plane's normal).
+}  // namespace
+
 std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, Quat turn) {
-  std::vector<dfm_pose_key> keys;
-  const std::vector<Node> nodes = motion.items("keyframes");
-  for (size_t i = 0; i < nodes.size(); ++i) {
-    nodes[i].object("motion_key");
-    dfm_pose_key key = {nodes[i].at("t").number(), base};
-    check_rising(nodes[i], i, i ? keys.back().t : 0, key.t);
-    if (nodes[i].has("position")) nodes[i].member("position").vector(key.pose.position);
-    if (nodes[i].has("rotation")) {
-      double q[4];
-      read_rotation(nodes[i], q);
-      store_quat(key.pose.rotation, load_quat(q) * turn);
-    }
-    keys.push_back(key);
-  }
-  return keys;
+  return read_keyframes<dfm_pose_key>(motion, "motion_key", [&](const Node &node, dfm_pose_key &key) {
+    key.pose = read_placed(node, base);
+    if (node.has("rotation")) store_quat(key.pose.rotation, load_quat(key.pose.rotation) * turn);
+  });
 }
+
+namespace {
 
 Motion read_motion(const Node &motion, const dfm_pose &base, Quat turn) {
   Motion out;
@@ -119,15 +107,12 @@ Motion read_motion(const Node &motion, const dfm_pose &base, Quat turn) {
   if (!motion.has("keyframes") && !motion.has("sine"))
     motion.fail("expected \"keyframes\", \"sine\" or both");
   out.keys = read_keys(motion, base, turn);
-  if (motion.has("keyframes") && out.keys.empty())
-    motion.at("keyframes").fail("expected at least one keyframe");
   if (motion.has("sine")) out.sine = read_sine(motion.member("sine"), false);
   return out;
 }
 
 uint8_t read_axes(const Node &entry) {
-  if (!entry.has("axes")) entry.value()["axes"] = "xyz";
-  const Node node = entry.member("axes");
+  const Node node = entry.member("axes", "xyz");
   uint8_t bits = 0;
   for (char c : node.text()) {
     if (c < 'x' || c > 'z') node.fail("expected letters out of \"xyz\", found \"%s\"", node.text().c_str());
@@ -152,13 +137,8 @@ Force read_force(const Node &entry) {
   force.where = read_selection(entry);
   entry.at("total").vector(force.total);
   force.by = entry.word("by", "auto", "by");
-  const std::vector<Node> keys = entry.items("keyframes");
-  for (size_t i = 0; i < keys.size(); ++i) {
-    keys[i].object("force_key");
-    const dfm_scale_key key = {keys[i].at("t").number(), keys[i].at("scale").number()};
-    check_rising(keys[i], i, i ? force.keys.back().t : 0, key.t);
-    force.keys.push_back(key);
-  }
+  const auto scale = [](const Node &node, dfm_scale_key &key) { key.value = node.at("scale").number(); };
+  force.keys = read_keyframes<dfm_scale_key>(entry, "force_key", scale, false);
   if (entry.has("sine")) force.sine = read_sine(entry.member("sine"), true);
   return force;
 }
@@ -176,18 +156,12 @@ Spring read_spring(const Node &entry) {
   else spring.where = read_selection(entry);
   if (entry.has("to") == entry.has("keyframes"))
     entry.fail("expected either \"to\" or \"keyframes\" to say where the spring ends");
-  if (entry.has("to")) entry.member("to").vector(spring.to);
-  const std::vector<Node> keys = entry.items("keyframes");
-  if (entry.has("keyframes") && keys.empty()) entry.at("keyframes").fail("expected at least one keyframe");
-  for (size_t i = 0; i < keys.size(); ++i) {
-    keys[i].object("spring_key");
-    dfm_vector_key key = {keys[i].at("t").number(), {}};
-    keys[i].at("position").vector(key.value);
-    check_rising(keys[i], i, i ? spring.keys.back().t : 0, key.t);
-    spring.keys.push_back(key);
-  }
-  spring.stiffness = entry.at("stiffness").number(kNotNegative);
-  spring.damping = entry.number("damping", 0.0, kNotNegative);
+  if (entry.has("to")) entry.member("to").vector(spring.def.to);
+  spring.keys = read_keyframes<dfm_vector_key>(
+      entry, "spring_key",
+      [](const Node &node, dfm_vector_key &key) { node.at("position").vector(key.value); });
+  spring.def.stiffness = entry.at("stiffness").number(kNotNegative);
+  spring.def.damping = entry.number("damping", 0.0, kNotNegative);
   return spring;
 }
 
@@ -197,11 +171,11 @@ Attach read_attach(const Node &entry) {
   attach.pointer = entry.pointer();
   attach.to = entry.at("to").text();
   attach.where = read_selection(entry);
-  attach.max_distance = entry.number("max_distance", 0.0, kNotNegative);
-  attach.stiffness = entry.number("stiffness", 0.0, kNotNegative);
-  attach.damping = entry.number("damping", 0.0, kNotNegative);
-  attach.release = entry.number("release", 0.0, kNotNegative);
-  attach.touch = entry.boolean("touch", false);
+  attach.def.max_distance = entry.number("max_distance", 0.0, kNotNegative);
+  attach.def.stiffness = entry.number("stiffness", 0.0, kNotNegative);
+  attach.def.damping = entry.number("damping", 0.0, kNotNegative);
+  attach.def.release = entry.number("release", 0.0, kNotNegative);
+  if (entry.boolean("touch", false)) attach.def.flags = DFM_ATTACH_TOUCH;
   return attach;
 }
 
@@ -209,7 +183,7 @@ dfm_separate_def read_separate(const Node &node) {
   dfm_separate_def def = dfm_separate_def_default();
   node.object("separate");
   def.least_cells = node.has("least_cells") ? read_count(node.at("least_cells"), 1, 1e9) : 1;
-  def.crumbs = node.word("crumbs", "stay", "crumbs") == "remove" ? DFM_CRUMBS_REMOVE : DFM_CRUMBS_STAY;
+  def.crumbs = number_of("crumbs", node.word("crumbs", "stay", "crumbs"));
   return def;
 }
 
@@ -232,12 +206,9 @@ MadeMesh read_made(const Node &node) {
     made.size[k++] = radius;
     if (along) made.size[k] = node.at("length").number(kPositive);
   } else {
-    node.at("size").vector(made.size);
-    for (const double edge : made.size)
-      if (!(edge > 0)) node.at("size").fail("edges are above 0, found %g", edge);
+    read_sizes(node.at("size"), "edges", made.size);
   }
-  if (!node.has("cells")) node.value()["cells"] = 1000;
-  made.cells = read_count(node.at("cells"), 1, 1e8);
+  made.cells = read_count(node.member("cells", 1000), 1, 1e8);
   return made;
 }
 
@@ -252,8 +223,8 @@ Start read_start(const Node &node) {
     out.kind = StartKind::scramble;
     out.seed = read_count(node.member("scramble"), 0, kLargestSeed);
   } else if (node.has("flatten")) {
-    const std::string onto = node.member("flatten").word("flatten");
-    out.kind = onto == "plane" ? StartKind::plane : onto == "line" ? StartKind::line : StartKind::point;
+    constexpr StartKind kOnto[] = {StartKind::plane, StartKind::line, StartKind::point};
+    out.kind = kOnto[number_of("flatten", node.member("flatten").word("flatten"))];
   } else if (node.has("state")) {
     out.kind = StartKind::state;
     out.state = node.member("state").text();
@@ -304,10 +275,7 @@ void read_switches(const Node &list, const Types &types, Body &b) {
 ModelWords read_word(const Node &rule, const char *key, const Types &types) {
   if (!rule.has(key)) return {};
   const Node node = rule.member(key);
-  if (node.value().is_object()) {
-    node.object("switch_model");
-    return read_model(node, types);
-  }
+  if (node.value().is_object()) return read_model(node.object("switch_model"), types);
   ModelWords out;
   out.type = read_type(node, DFM_KIND_MODEL, types)->id;
   return out;
@@ -343,44 +311,34 @@ void check_open(const Node &body, const Node &model) {
     if (body.has(key)) body.member(key).fail("%s", sentence);
 }
 
+}  // namespace
+
 Body read_body(const Node &node, ReadContext &context) {
   Body b;
-  node.object("body");
-  b.pointer = node.pointer();
-  b.name = node.at("name").name();
-  check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
-  context.sides.push_back(b.name);
+  read_thing(node.object("body"), context, b);
   context.bodies.push_back(b.name);
   const Node mesh = node.at("mesh");
   if (mesh.value().is_object()) b.made = read_made(mesh);
   else b.mesh = mesh.text();
-  if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
-  b.sensor = node.boolean("sensor", false);
-  b.id = read_id(node);
-  if (!node.has("model")) node.value()["model"] = json::object();
-  const Node model = node.member("model");
-  model.object("model");
+  const Node model = node.part("model");
   if (context.planned) b.model_open = !model.has("type") || model.value()["type"] == "auto";
   if (b.model_open) check_open(node, model);
   if (!model.has("type") || b.model_open) model.value()["type"] = "msm";
   const dfm_type *type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
   b.model = type->id;
-  b.integrator = integrator_of(node);
+  b.def.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
   read_precision(model, b.params);
   b.has_scale = node.has("pose") && node.member("pose").has("scale");  // reading fills in the default
-  b.pose = read_pose(node, "pose", &b.scale);
-  if (node.has("place")) {
-    node.member("place").object("place");
-    b.on = node.member("place").at("on").text();
-  }
-  node.vector("velocity", b.velocity, 0, 0, 0);
-  node.vector("spin", b.spin, 0, 0, 0);
+  b.def.pose = read_pose(node, "pose", &b.scale);
+  if (node.has("place")) b.on = node.member("place").object("place").at("on").text();
+  node.vector("velocity", b.def.velocity, 0, 0, 0);
+  node.vector("spin", b.def.spin, 0, 0, 0);
   for (const Node &entry : node.items("fix")) b.fixes.push_back(read_fix(entry));
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   for (const Node &entry : node.items("attach")) b.attach.push_back(read_attach(entry));
-  b.mass_scaling = node.number("mass_scaling", 0.0, Range{0, kMostScaled, false, false});
+  b.def.mass_scaling = node.number("mass_scaling", 0.0, Range{0, kMostScaled, false, false});
   b.cut_delay = node.number("cut_delay", 0.0, kNotNegative);
   if (node.has("separate")) b.separate = read_separate(node.member("separate"));
   read_carriers(node, type, context, b);
@@ -398,8 +356,6 @@ Body read_body(const Node &node, ReadContext &context) {
   return b;
 }
 
-}  // namespace
-
 // Which of the keys that place or size a shape belong to it.
 void check_shape_keys(const Node &node, const std::string &shape) {
   const std::vector<std::pair<std::string, std::vector<std::string>>> wanted = {
@@ -409,7 +365,7 @@ void check_shape_keys(const Node &node, const std::string &shape) {
     for (const std::string &key : keys) {
       bool mine = false;
       for (const auto &[other, others] : wanted)
-        if (other == shape) mine = std::find(others.begin(), others.end(), key) != others.end();
+        if (other == shape) mine = listed(others, key);
       if (!mine && node.has(key.c_str()))
         node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key.c_str(),
                               name.c_str());
@@ -417,23 +373,15 @@ void check_shape_keys(const Node &node, const std::string &shape) {
   }
 }
 
-void read_solid(const Node &node, const std::string &shape, uint32_t &number, double half_size[3],
-                double &radius, double &half_length) {
-  if (shape == "sphere") {
-    number = DFM_SHAPE_SPHERE;
-    radius = node.at("radius").number(kPositive);
-  } else if (shape == "box") {
-    number = DFM_SHAPE_BOX;
-    const Node half = node.at("half_size");
-    half.vector(half_size);
-    for (int k = 0; k < 3; ++k)
-      if (!(half_size[k] > 0)) half.fail("half sizes are above 0, found %g", half_size[k]);
-  } else {
-    number = DFM_SHAPE_CAPSULE;
-    radius = node.at("radius").number(kPositive);
-    half_length = node.at("half_length").number(kNotNegative);
-  }
+template <class Def>
+void read_solid(const Node &node, const std::string &shape, Def &def) {
+  def.shape = number_of("shape", shape);
+  if (shape == "box") return read_sizes(node.at("half_size"), "half sizes", def.half_size);
+  def.radius = node.at("radius").number(kPositive);
+  if (shape == "capsule") def.half_length = node.at("half_length").number(kNotNegative);
 }
+template void read_solid(const Node &node, const std::string &shape, dfm_obstacle_def &def);
+template void read_solid(const Node &node, const std::string &shape, dfm_rigid_def &def);
 
 namespace {
 
@@ -442,9 +390,7 @@ Quat read_plane(const Node &node, dfm_obstacle_def &def) {
   if (node.has("pose") && node.has("point"))
     node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
   if (!node.has("pose")) node.vector("point", def.pose.position, 0, 0, 0);
-  node.vector("normal", normal, 0, 0, 1);
-  if (normal[0] == 0 && normal[1] == 0 && normal[2] == 0)
-    node.at("normal").fail("the normal of a plane cannot be zero");
+  read_direction(node.member("normal", json::array({0.0, 0.0, 1.0})), "the normal of a plane", normal);
   const Quat turn = rotation_to(normal);
   store_quat(def.pose.rotation, load_quat(def.pose.rotation) * turn);
   return turn;
@@ -452,14 +398,12 @@ Quat read_plane(const Node &node, dfm_obstacle_def &def) {
 
 constexpr double kFewestVoxels = 64, kMostVoxels = 1 << 28;
 
+}  // namespace
+
 Obstacle read_obstacle(const Node &node, ReadContext &context) {
   Obstacle o;
   o.def = dfm_obstacle_def_default();
-  node.object("obstacle");
-  o.pointer = node.pointer();
-  o.name = node.at("name").name();
-  check_fresh(node.at("name"), o.name, context.sides, "body or obstacle");
-  context.sides.push_back(o.name);
+  read_thing(node.object("obstacle"), context, o);
   const std::string shape = node.at("shape").word("shape");
   check_shape_keys(node, shape);
   const bool of_triangles = shape == "mesh" || shape == "voxels";
@@ -467,16 +411,15 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     node.member("pose").at("scale").fail("a %s has its own size; \"scale\" is for the shapes mesh and voxels",
                                          shape.c_str());
   o.def.pose = read_pose(node, "obstacle_pose", of_triangles ? &o.scale : nullptr);
+  o.def.shape = number_of("shape", shape);
   Quat turn;
   if (shape == "plane") {
-    o.def.shape = DFM_SHAPE_PLANE;
     turn = read_plane(node, o.def);
   } else if (of_triangles) {
-    o.def.shape = shape == "mesh" ? DFM_SHAPE_MESH : DFM_SHAPE_VOXELS;
     o.mesh = node.at("mesh").text();
     if (node.has("cells")) o.def.cells = read_count(node.at("cells"), kFewestVoxels, kMostVoxels);
   } else {
-    read_solid(node, shape, o.def.shape, o.def.half_size, o.def.radius, o.def.half_length);
+    read_solid(node, shape, o.def);
   }
   if (node.has("motion")) {
     Motion motion = read_motion(node.member("motion"), o.def.pose, turn);
@@ -484,35 +427,13 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     o.def.sine = motion.sine;
   }
   node.vector("velocity_surface", o.def.velocity_surface, 0, 0, 0);
-  if (node.has("material")) o.material = known(node.member("material"), context.materials, "material");
-  o.sensor = node.boolean("sensor", false);
-  o.id = read_id(node);
   if (node.has("start")) {
-    const Node start = node.member("start");
-    start.object("obstacle_start");
+    const Node start = node.member("start").object("obstacle_start");
     if (node.has("motion"))
       start.fail("a \"motion\" gives the place of the obstacle at every time; remove one of the two");
     o.start = read_placed(start, o.def.pose);
   }
   return o;
-}
-
-}  // namespace
-
-std::vector<Body> read_bodies(const Node &scene, ReadContext &context) {
-  std::vector<Body> out;
-  for (const Node &node : scene.items("bodies")) out.push_back(read_body(node, context));
-  return out;
-}
-
-std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base) {
-  return read_keys(motion, base, Quat{});
-}
-
-std::vector<Obstacle> read_obstacles(const Node &scene, ReadContext &context) {
-  std::vector<Obstacle> out;
-  for (const Node &node : scene.items("obstacles")) out.push_back(read_obstacle(node, context));
-  return out;
 }
 
 }  // namespace dfm::scene

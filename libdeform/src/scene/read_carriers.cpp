@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/names.h"
+#include "scene/keys.h"
 #include "scene/read.h"
 
 namespace dfm::scene {
@@ -28,7 +29,7 @@ void read_fields(const Node &node, const dfm_type *model, Body &b) {
       value.fail("%s has no parameter \"%s\" that may differ by cell%s; %s", model->id, entry.key().c_str(),
                  meant.c_str(), has.c_str());
     }
-    if (std::find(b.params.keys.begin(), b.params.keys.end(), entry.key()) != b.params.keys.end())
+    if (listed(b.params.keys, entry.key()))
       value.fail("\"%s\" is given in the model's params too; keep one", entry.key().c_str());
     b.fields.push_back({value.pointer(), entry.key(), value.text(), row->width ? row->width : 1, false});
   }
@@ -59,7 +60,7 @@ void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) 
                  did_you_mean(entry.key(), valid).c_str(), valid.empty() ? "none" : join(valid).c_str());
     if (std::string(row->key) == kAxis)
       value.fail("the direction is given by \"axis\" or \"field\" beside \"params\"");
-    if (std::find(b.params.keys.begin(), b.params.keys.end(), row->key) != b.params.keys.end())
+    if (listed(b.params.keys, row->key))
       value.fail("\"%s\" is given in the model's params too; keep one", row->key);
     b.params.keys.push_back(row->key);
     b.params.values.push_back(read_param(value, *row));
@@ -80,7 +81,7 @@ void read_anisotropy(const Node &node, const dfm_type *model, const Types &types
   if (node.has("axis") == node.has("field"))
     node.fail("expected either \"axis\" or \"field\" to say the direction");
   const bool taken =
-      std::find(b.params.keys.begin(), b.params.keys.end(), kAxis) != b.params.keys.end() ||
+      listed(b.params.keys, kAxis) ||
       std::any_of(b.fields.begin(), b.fields.end(), [](const FieldFile &f) { return f.key == kAxis; });
   if (taken) node.fail("the direction is given as \"%s\" too; keep one", kAxis);
   if (node.has("axis")) {
@@ -117,9 +118,7 @@ void read_surface(const Node &node, OwnSurface &out) {
     node.member("coupling")
         .fail("the boundary's points are the body's own; a coupling is for a surface of its own");
   const std::string coupling = out.coupled ? node.member("coupling").word("coupling") : "barycentric";
-  out.coupling = coupling == "mls"      ? DFM_COUPLING_MLS
-                 : coupling == "thesis" ? DFM_COUPLING_THESIS
-                                        : DFM_COUPLING_BARYCENTRIC;
+  out.coupling = int32_t(number_of("coupling", coupling));
   if (!node.has("support")) return;
   if (coupling == "barycentric")
     node.member("support").fail(
@@ -132,9 +131,7 @@ void read_surface(const Node &node, OwnSurface &out) {
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &b) {
   if (body.has("surface")) read_surface(body.member("surface"), b.surface);
   if (body.has("fill")) {
-    const Node fill = body.member("fill");
-    fill.object("fill");
-    const Node cells = fill.at("cells");
+    const Node cells = body.member("fill").object("fill").at("cells");
     const double n = cells.number(Range{1, kMostCells, false, false});
     if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
     b.fill = uint32_t(n);

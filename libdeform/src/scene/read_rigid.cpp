@@ -2,6 +2,7 @@
 #include <algorithm>
 
 #include "math/turn.h"
+#include "scene/keys.h"
 #include "scene/read.h"
 
 namespace dfm::scene {
@@ -11,31 +12,18 @@ RigidBody read_rigid_body(const Node &node, ReadContext &context) {
   RigidBody b;
   b.def = dfm_rigid_def_default();
   b.def.half_length = 0;
-  node.object("rigid_body");
-  b.pointer = node.pointer();
-  b.name = node.at("name").name();
-  check_fresh(node.at("name"), b.name, context.sides, "body or obstacle");
-  context.sides.push_back(b.name);
+  read_thing(node.object("rigid_body"), context, b);
   const std::string shape = node.at("shape").word("rigid_shape");
   check_shape_keys(node, shape);
-  read_solid(node, shape, b.def.shape, b.def.half_size, b.def.radius, b.def.half_length);
+  read_solid(node, shape, b.def);
   b.def.pose = read_pose(node, "rigid_pose", nullptr);
   b.def.fixed = node.boolean("fixed", false);
   if (!b.def.fixed || node.has("mass")) b.def.mass = node.at("mass").number(kPositive);
-  if (node.has("inertia")) {
-    const Node inertia = node.member("inertia");
-    inertia.vector(b.def.inertia);
-    for (double i : b.def.inertia)
-      if (!(i > 0)) inertia.fail("moments of inertia are above 0, found %g", i);
-  }
+  if (node.has("inertia")) read_sizes(node.member("inertia"), "moments of inertia", b.def.inertia);
   node.vector("velocity", b.def.velocity, 0, 0, 0);
   node.vector("spin", b.def.spin, 0, 0, 0);
-  if (node.has("material")) b.material = known(node.member("material"), context.materials, "material");
-  b.sensor = node.boolean("sensor", false);
-  b.id = read_id(node);
   if (!node.has("start")) return b;
-  const Node start = node.member("start");
-  start.object("rigid_start");
+  const Node start = node.member("start").object("rigid_start");
   if (b.def.fixed) start.fail("a fixed body stays where it is; remove \"start\" or \"fixed\"");
   const dfm_pose pose = read_placed(start, b.def.pose);
   dfm_rigid_state state{};
@@ -51,12 +39,8 @@ Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std:
   j.def.size = sizeof j.def;
   node.object("joint");
   j.pointer = node.pointer();
-  const Node type_node = node.at("type");
-  const std::string type = type_node.word("joint_type");
-  j.def.type = type == "hinge"    ? DFM_JOINT_HINGE
-               : type == "slider" ? DFM_JOINT_SLIDER
-               : type == "ball"   ? DFM_JOINT_BALL
-                                  : DFM_JOINT_FIXED;
+  const std::string type = node.at("type").word("joint_type");
+  j.def.type = number_of("joint_type", type);
   const bool has_axis = j.def.type == DFM_JOINT_HINGE || j.def.type == DFM_JOINT_SLIDER;
   if (node.has("with") && !node.member("with").value().is_null()) {
     j.with = known(node.member("with"), names, "rigid body");
@@ -65,17 +49,14 @@ Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std:
   const double *const p = body.def.pose.position;
   node.vector("anchor", j.def.anchor, p[0], p[1], p[2]);
   if (has_axis) {
-    node.at("axis").vector(j.def.axis);
-    if (j.def.axis[0] == 0 && j.def.axis[1] == 0 && j.def.axis[2] == 0)
-      node.at("axis").fail("the axis of a joint cannot be zero");
+    read_direction(node.at("axis"), "the axis of a joint", j.def.axis);
   } else {
     for (const char *key : {"axis", "motor"})
       if (node.has(key))
         node.member(key).fail("a %s joint has no \"%s\"; that is for a hinge or a slider", type.c_str(), key);
   }
   if (node.has("motor")) {
-    const Node motor = node.member("motor");
-    motor.object("motor");
+    const Node motor = node.member("motor").object("motor");
     j.def.motor = 1;
     j.def.velocity = motor.at("velocity").number();
     j.def.max = motor.at("max").number(kNotNegative);
@@ -88,11 +69,9 @@ Joint read_joint(const Node &node, const RigidBody &body, const std::vector<std:
 Rigid read_rigid(const Node &scene, ReadContext &context) {
   Rigid out;
   if (!scene.has("rigid")) return out;
-  const Node rigid = scene.member("rigid");
-  rigid.object("rigid");
+  const Node rigid = scene.member("rigid").object("rigid");
   out.pointer = rigid.pointer();
-  if (!rigid.has("host")) rigid.value()["host"] = "builtin";
-  out.host = rigid.member("host").text();
+  out.host = rigid.member("host", "builtin").text();
   std::vector<std::string> names;
   const std::vector<Node> nodes = rigid.items("bodies");
   for (const Node &node : nodes) {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 
 #include "core/error.h"
 #include "core/names.h"
@@ -14,12 +13,6 @@ namespace {
 
 double triangle_area(const double *a, const double *b, const double *c) {
   return 0.5 * norm(cross(load3(b) - load3(a), load3(c) - load3(a)));
-}
-
-double tet_volume6(const BodyMesh &mesh, const uint32_t *t) {
-  const Vec3 a = load3(&mesh.points[3 * t[0]]);
-  return dot(load3(&mesh.points[3 * t[1]]) - a,
-             cross(load3(&mesh.points[3 * t[2]]) - a, load3(&mesh.points[3 * t[3]]) - a));
 }
 
 // Position of each point within the selection; UINT32_MAX: not selected.
@@ -36,6 +29,14 @@ void normalize(std::vector<double> &weights) {
 }
 
 }  // namespace
+
+std::vector<uint32_t> points_of_nodes(const BodyMesh &mesh) {
+  uint32_t highest = 0;
+  for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
+  std::vector<uint32_t> out(size_t(highest) + 1, UINT32_MAX);
+  for (uint32_t i = 0; i < mesh.npoint; ++i) out[mesh.file_point[i]] = i;
+  return out;
+}
 
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]) {
   if (!mesh.locator) mesh.locator = std::make_shared<const Locator>(mesh);
@@ -115,15 +116,13 @@ std::vector<uint32_t> select_nodes(const Selection &where, const BodyMesh &mesh,
          "%s: %s: the mesh is a surface, and its nodes are not points of the filled body; use \"box\" or "
          "\"group\"",
          file.c_str(), pointer.c_str());
-  std::map<uint32_t, uint32_t> point_of;
-  for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
+  const std::vector<uint32_t> point_of = points_of_nodes(mesh);
   std::vector<uint8_t> point(mesh.npoint, 0);
   for (const uint32_t node : where.points) {
-    const auto at = point_of.find(node);
-    if (at == point_of.end())
+    if (node >= point_of.size() || point_of[node] == UINT32_MAX)
       fail(DFM_E_ARG, "%s: %s: no tetrahedron of the mesh file has a node %u; nodes are numbered from 0",
            file.c_str(), pointer.c_str(), node);
-    point[at->second] = 1;
+    point[point_of[node]] = 1;
   }
   return marked(point);
 }
@@ -208,8 +207,11 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
   std::vector<double> weights(points.size(), 0.0);
   for (uint32_t c = 0; c < mesh.ntet; ++c) {
     const uint32_t *t = mesh.tets + 4 * size_t(c);
+    const double *const p = mesh.points.data();
+    const double *const corner[4] = {p + 3 * size_t(t[0]), p + 3 * size_t(t[1]), p + 3 * size_t(t[2]),
+                                     p + 3 * size_t(t[3])};
     const double quarter =
-        std::fabs(tet_volume6(mesh, t)) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
+        std::fabs(volume6(corner)) / 24 * (mesh.cell_weight.empty() ? 1 : mesh.cell_weight[c]);
     for (int k = 0; k < 4; ++k)
       if (rank[t[k]] != UINT32_MAX) weights[rank[t[k]]] += quarter;
   }

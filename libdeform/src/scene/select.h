@@ -36,6 +36,9 @@ struct BodyMesh {
   mutable std::shared_ptr<const Locator> locator;  // made at first use
 };
 
+// The point of each node of the mesh file; UINT32_MAX: none.
+std::vector<uint32_t> points_of_nodes(const BodyMesh &mesh);
+
 // Points to hold: by physical group of the cells or of the skin (then the corners of the cells that hold its
 // points), or those in a box. On a filled body the box takes the skin's points in it too, by the corners of
 // their cells: what is held then includes the given surface.
@@ -63,16 +66,5 @@ Shared share(const Force &force, const BodyMesh &mesh, const std::string &file);
 
 // see Locator::find
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);
-
-// Values of a field for each cell of the mesh, [ntet,width].
-std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh);
-
-// Held components and forces by the file's node numbers.
-struct NodalRow {
-  uint32_t point;
-  uint8_t axes;
-  double force[3];
-};
-std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh);
 
 }  // namespace dfm::scene

@@ -1,12 +1,7 @@
 #include "scene/start.h"
 
-#include <algorithm>
-#include <cmath>
-
-#include "core/error.h"
 #include "scene/jitter.h"
 #include "scene/rotation.h"
-#include "scene/table.h"
 
 namespace dfm::scene {
 
@@ -37,43 +32,6 @@ std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, co
     for (size_t k = 0; k < 3; ++k) x[i + k] = turned[k] + pose.position[k];
   }
   return x;
-}
-
-StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
-  uint32_t highest = 0;
-  for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
-  std::vector<uint32_t> point_of(size_t(highest) + 1, UINT32_MAX);
-  for (uint32_t i = 0; i < mesh.npoint; ++i) point_of[mesh.file_point[i]] = i;
-  Table table(path, kStateHeader, highest + uint64_t(1), 7);
-  StartState out;
-  out.x.resize(3 * size_t(mesh.npoint));
-  out.v.resize(out.x.size());
-  std::vector<uint8_t> seen(mesh.npoint, 0);
-  std::string_view text;
-  for (size_t line = 1; table.next(text); ++line) {
-    const std::string_view trimmed = trim(text);
-    if (line == 1) {
-      if (trimmed != kStateHeader)
-        fail(DFM_E_FORMAT, "%s:1: expected the header %s", path.c_str(), kStateHeader);
-      continue;
-    }
-    if (trimmed.empty()) continue;
-    double cell[7];
-    split_row(path, line, trimmed, kStateHeader, 7, cell);
-    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] > highest ||
-        point_of[size_t(cell[0])] == UINT32_MAX)
-      fail(DFM_E_ARG, "%s:%zu: no tetrahedron of the mesh file has a node %g", path.c_str(), line, cell[0]);
-    const size_t point = point_of[size_t(cell[0])];
-    if (seen[point]) fail(DFM_E_ARG, "%s:%zu: node %g has a row already", path.c_str(), line, cell[0]);
-    seen[point] = 1;
-    std::copy_n(cell + 1, 3, &out.x[3 * point]);
-    std::copy_n(cell + 4, 3, &out.v[3 * point]);
-  }
-  const auto missing = std::find(seen.begin(), seen.end(), uint8_t(0));
-  if (missing != seen.end())
-    fail(DFM_E_FORMAT, "%s: node %u of the mesh file has no row", path.c_str(),
-         mesh.file_point[size_t(missing - seen.begin())]);
-  return out;
 }
 
 }  // namespace dfm::scene

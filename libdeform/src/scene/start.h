@@ -9,9 +9,4 @@ namespace dfm::scene {
 // their box, then the pose.
 std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, const dfm_pose &pose);
 
-inline constexpr const char *kStateHeader = "node,x,y,z,vx,vy,vz";
-// [npoint,3] m and m/s, in the world, from a file that names every node once.
-struct StartState { std::vector<double> x, v; };
-StartState read_start_state(const std::string &path, const BodyMesh &mesh);
-
 }  // namespace dfm::scene

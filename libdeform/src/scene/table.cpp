@@ -1,32 +1,17 @@
-#include "scene/table.h"
-
+// The tables that a scene names: boundary conditions and states by node, fields by cell, recorded hands.
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstring>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "scene/table.h"
 
 namespace dfm::scene {
-
 namespace {
 
 constexpr uint64_t kCellBytes = 64;  // a number of 17 digits has 24
-
-}  // namespace
-
-Table::Table(const std::string &path, const std::string &header, uint64_t rows, int columns)
-    : bytes_(read_whole_file(Memory::standard(), path,
-                             std::max(kMiB, 2 * rows * uint64_t(columns) * kCellBytes),
-                             ("a table with the header " + header).c_str())) {}
-
-bool Table::next(std::string_view &line) {
-  if (at_ >= bytes_.size()) return false;
-  const std::string_view rest(bytes_.data() + at_, bytes_.size() - at_);
-  line = rest.substr(0, rest.find('\n'));
-  at_ += line.size() + 1;
-  return true;
-}
 
 std::string_view trim(std::string_view s) {
   while (!s.empty() && std::strchr(" \t\r", s.front())) s.remove_prefix(1);
@@ -34,23 +19,246 @@ std::string_view trim(std::string_view s) {
   return s;
 }
 
-void split_row(const std::string &path, size_t line, std::string_view text, const char *header, int columns,
-               double *out) {
-  int n = 0;
-  for (size_t i = 0; i <= text.size(); ++n) {
-    const size_t comma = std::min(text.find(',', i), text.size());
-    const std::string_view cell = trim(text.substr(i, comma - i));
-    i = comma + 1;
-    if (n >= columns) continue;
-    const char *first = cell.data() + (!cell.empty() && cell.front() == '+');
-    const auto result = std::from_chars(first, cell.data() + cell.size(), out[n]);
-    if (result.ec != std::errc() || result.ptr != cell.data() + cell.size() || !std::isfinite(out[n]))
-      fail(DFM_E_FORMAT, "%s:%zu: expected a finite number in column %d of %s, found \"%.*s\"", path.c_str(),
-           line, n + 1, header, int(std::min<size_t>(cell.size(), 40)), cell.data());
+// A table of about `rows` rows, read whole, with file and line in every complaint; a sentence with what was
+// expected where there is none.
+class Table {
+ public:
+  Table(std::string path, std::string expected, uint64_t rows, int columns)
+      : path_(std::move(path)),
+        expected_(std::move(expected)),
+        bytes_(read_whole_file(Memory::standard(), path_,
+                               std::max(kMiB, 2 * rows * uint64_t(columns) * kCellBytes),
+                               ("a table with the header " + expected_).c_str())) {}
+  bool empty() const { return bytes_.empty(); }
+  size_t line() const { return line_; }
+
+  std::string first() {  // the first line
+    std::string_view line;
+    return next_line(line) ? std::string(line) : "";
   }
-  if (n != columns)
-    fail(DFM_E_FORMAT, "%s:%zu: expected the %d column%s %s, found %d", path.c_str(), line, columns,
-         columns == 1 ? "" : "s", header, n);
+  [[noreturn]] void refuse_header() const {
+    fail(DFM_E_FORMAT, "%s:1: expected the header %s", path_.c_str(), expected_.c_str());
+  }
+  // Rows have the columns of this header from now on.
+  void begin(const std::string &header) {
+    header_ = header;
+    columns_ = 1 + int(std::count(header.begin(), header.end(), ','));
+  }
+  bool next(double *row) {  // of finite numbers; lines without any are skipped
+    std::string_view text;
+    do {
+      if (!next_line(text)) return false;
+    } while (text.empty());
+    split(text, row);
+    return true;
+  }
+
+ private:
+  bool next_line(std::string_view &line) {
+    if (at_ >= bytes_.size()) return false;
+    const std::string_view rest(bytes_.data() + at_, bytes_.size() - at_);
+    line = rest.substr(0, rest.find('\n'));
+    at_ += line.size() + 1;
+    line = trim(line);
+    ++line_;
+    return true;
+  }
+  void split(std::string_view text, double *row) const {
+    int n = 0;
+    for (size_t i = 0; i <= text.size(); ++n) {
+      const size_t comma = std::min(text.find(',', i), text.size());
+      const std::string_view cell = trim(text.substr(i, comma - i));
+      i = comma + 1;
+      if (n >= columns_) continue;
+      const char *first = cell.data() + (!cell.empty() && cell.front() == '+');
+      const auto result = std::from_chars(first, cell.data() + cell.size(), row[n]);
+      if (result.ec != std::errc() || result.ptr != cell.data() + cell.size() || !std::isfinite(row[n]))
+        fail(DFM_E_FORMAT, "%s:%zu: expected a finite number in column %d of %s, found \"%.*s\"",
+             path_.c_str(), line_, n + 1, header_.c_str(), int(std::min<size_t>(cell.size(), 40)),
+             cell.data());
+    }
+    if (n != columns_)
+      fail(DFM_E_FORMAT, "%s:%zu: expected the %d column%s %s, found %d", path_.c_str(), line_, columns_,
+           columns_ == 1 ? "" : "s", header_.c_str(), n);
+  }
+
+  std::string path_, expected_, header_;
+  Array<char> bytes_;
+  size_t at_ = 0, line_ = 0;
+  int columns_ = 0;
+};
+
+}  // namespace
+
+// ---- by the mesh file's node numbers from 0 ---------------------------------------------------------------
+
+std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) {
+  const std::vector<uint32_t> point_of = points_of_nodes(mesh);
+  Table table(path, kNodalHeader, point_of.size(), 7);
+  if (table.empty())
+    fail(DFM_E_FORMAT, "%s: nothing to read; expected the header %s and a row for each node", path.c_str(),
+         kNodalHeader);
+  if (table.first() != kNodalHeader) table.refuse_header();
+  table.begin(kNodalHeader);
+  std::vector<NodalRow> rows;
+  double cell[7];
+  while (table.next(cell)) {
+    const size_t line = table.line();
+    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()))
+      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %zu", path.c_str(), line,
+           cell[0], point_of.size() - 1);
+    NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};
+    for (int k = 0; k < 3; ++k) {
+      if (cell[1 + k] != 0 && cell[1 + k] != 1)
+        fail(DFM_E_ARG, "%s:%zu: fix%c is 0 or 1, found %g", path.c_str(), line, "xyz"[k], cell[1 + k]);
+      if (cell[1 + k] == 1) row.axes = uint8_t(row.axes | (1u << k));
+    }
+    if (row.point == UINT32_MAX) {
+      // A node without cells has no phyxel: holding it has no effect, and a force on it would be lost.
+      if (cell[4] != 0 || cell[5] != 0 || cell[6] != 0)
+        fail(DFM_E_ARG, "%s:%zu: node %g belongs to no tetrahedron, so no force can act on it", path.c_str(),
+             line, cell[0]);
+      continue;
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
+  const std::vector<uint32_t> point_of = points_of_nodes(mesh);
+  Table table(path, kStateHeader, point_of.size(), 7);
+  if (!table.empty() && table.first() != kStateHeader) table.refuse_header();
+  table.begin(kStateHeader);
+  StartState out;
+  out.x.resize(3 * size_t(mesh.npoint));
+  out.v.resize(out.x.size());
+  std::vector<uint8_t> seen(mesh.npoint, 0);
+  double cell[7];
+  while (table.next(cell)) {
+    const size_t line = table.line();
+    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()) ||
+        point_of[size_t(cell[0])] == UINT32_MAX)
+      fail(DFM_E_ARG, "%s:%zu: no tetrahedron of the mesh file has a node %g", path.c_str(), line, cell[0]);
+    const size_t point = point_of[size_t(cell[0])];
+    if (seen[point]) fail(DFM_E_ARG, "%s:%zu: node %g has a row already", path.c_str(), line, cell[0]);
+    seen[point] = 1;
+    std::copy_n(cell + 1, 3, &out.x[3 * point]);
+    std::copy_n(cell + 4, 3, &out.v[3 * point]);
+  }
+  const auto missing = std::find(seen.begin(), seen.end(), uint8_t(0));
+  if (missing != seen.end())
+    fail(DFM_E_FORMAT, "%s: node %u of the mesh file has no row", path.c_str(),
+         mesh.file_point[size_t(missing - seen.begin())]);
+  return out;
+}
+
+// ---- by cell ----------------------------------------------------------------------------------------------
+
+// One row per tetrahedron of the mesh file, in the file's order, or with a column `cell` of its number from 0
+// in any order.
+
+std::string columns_of(uint32_t width) {
+  if (width == 1) return "value";
+  if (width == 3) return "x,y,z";
+  std::string out = "value0";
+  for (uint32_t k = 1; k < width; ++k) out += ",value" + std::to_string(k);
+  return out;
+}
+
+namespace {
+
+// Without spaces around its names.
+std::string tidy(const std::string &header) {
+  std::string out;
+  for (char c : header)
+    if (c != ' ' && c != '\t' && c != '\r') out += c;
+  return out;
+}
+
+void make_unit(double *v) {
+  const double norm = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+  if (norm > 0)
+    for (int k = 0; k < 3; ++k) v[k] /= norm;
+}
+
+}  // namespace
+
+std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
+  const std::string plain = columns_of(field.width), numbered = "cell," + plain;
+  const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
+  Table table(path, plain + " or " + numbered, nfile, int(w) + 1);
+  std::string header = tidy(table.first());
+  if (field.width == 1 && header == field.key) header = plain;
+  if (field.width == 1 && header == "cell," + field.key) header = numbered;
+  if (header != plain && header != numbered) table.refuse_header();
+  table.begin(header);
+  const bool has_cell = header == numbered;
+
+  std::vector<uint32_t> cell_of(nfile, UINT32_MAX);
+  for (uint32_t t = 0; t < mesh.ntet; ++t) cell_of[mesh.file_cell ? mesh.file_cell[t] : t] = t;
+  std::vector<uint8_t> seen(nfile, 0);
+  std::vector<double> out(size_t(mesh.ntet) * w), row(size_t{w} + has_cell);
+  uint32_t next = 0;
+  while (table.next(row.data())) {
+    const size_t line = table.line();
+    const double number = has_cell ? row[0] : double(next);
+    if (!has_cell && next == nfile)
+      fail(DFM_E_FORMAT, "%s:%zu: more rows than the %u tetrahedra of the mesh file", path.c_str(), line,
+           nfile);
+    if (number < 0 || number != std::floor(number) || number >= nfile)
+      fail(DFM_E_ARG, "%s:%zu: there is no cell %g; the mesh file has the tetrahedra 0 to %u", path.c_str(),
+           line, number, nfile - 1);
+    const uint32_t cell = uint32_t(number);
+    if (seen[cell]) fail(DFM_E_ARG, "%s:%zu: cell %u has a row already", path.c_str(), line, cell);
+    seen[cell] = 1;
+    ++next;
+    if (cell_of[cell] == UINT32_MAX) continue;  // a duplicate that was dropped when reading
+    double *const to = &out[size_t(cell_of[cell]) * w];
+    std::copy_n(&row[has_cell], w, to);
+    if (field.directions) make_unit(to);
+  }
+  for (uint32_t c = 0; c < nfile; ++c)
+    if (!seen[c] && cell_of[c] != UINT32_MAX)
+      fail(DFM_E_FORMAT,
+           "%s: cell %u has no row; expected one for each of the %u tetrahedra of the mesh file, found %u",
+           path.c_str(), c, nfile, next);
+  return out;
+}
+
+// ---- a recorded hand: the pose of a tool, and the opening of its jaws, over time --------------------------
+
+namespace {
+
+constexpr char kPose[] = "t,x,y,z,qx,qy,qz,qw", kOpening[] = "t,x,y,z,qx,qy,qz,qw,opening_deg";
+constexpr uint64_t kMostRows = 4000000;                          // more than an hour at 1 kHz
+constexpr double kRadian = 0.017453292519943295, kWidest = 170;  // degrees
+
+}  // namespace
+
+void read_hand(const std::string &path, Tool &tool) {
+  Table table(path, kPose, kMostRows, 9);
+  const std::string header = table.first();
+  const bool opens = header == kOpening;
+  if (!opens && header != kPose)
+    fail(DFM_E_FORMAT, "%s:1: expected the header %s or %s", path.c_str(), kPose, kOpening);
+  table.begin(header);
+  const bool jaws = tool.def.shape == DFM_TOOL_GRASPER || tool.def.shape == DFM_TOOL_SCISSORS;
+  double v[9];
+  while (table.next(v)) {
+    if (!tool.keys.empty() && !(v[0] > tool.keys.back().t))
+      fail(DFM_E_FORMAT, "%s:%zu: times must increase, but %g s follows %g s", path.c_str(), table.line(),
+           v[0], tool.keys.back().t);
+    if (!(v[4] * v[4] + v[5] * v[5] + v[6] * v[6] + v[7] * v[7] > 0))
+      fail(DFM_E_FORMAT, "%s:%zu: the quaternion qx,qy,qz,qw is zero", path.c_str(), table.line());
+    tool.keys.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7]}}});
+    if (!opens || !jaws) continue;
+    if (!(v[8] >= 0 && v[8] <= kWidest))
+      fail(DFM_E_FORMAT, "%s:%zu: an opening of %g degrees; it is between 0 and %g", path.c_str(),
+           table.line(), v[8], kWidest);
+    tool.opening_keys.push_back({v[0], kRadian * v[8]});
+  }
+  if (tool.keys.empty()) fail(DFM_E_FORMAT, "%s: no rows below the header", path.c_str());
 }
 
 }  // namespace dfm::scene

@@ -1,26 +1,29 @@
-// Rows of numbers in a CSV file, with file and line in every complaint.
+// The tables that a scene names, CSV files of numbers: each reader throws with file and line.
 #pragma once
-#include <string>
-#include <string_view>
-
-#include "core/memory.h"
+#include "scene/select.h"
 
 namespace dfm::scene {
 
-// The lines of a table of about `rows` rows, read whole; a sentence with what was expected where
-// there is none.
-class Table {
- public:
-  Table(const std::string &path, const std::string &header, uint64_t rows, int columns);
-  bool next(std::string_view &line);  // without its line end
+// Values of a field for each cell of the mesh, [ntet,width].
+std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh);
 
- private:
-  Array<char> bytes_;
-  size_t at_ = 0;
+std::string columns_of(uint32_t width);  // the header of such a file, without "cell"
+
+// Held components and forces by the file's node numbers.
+inline constexpr const char *kNodalHeader = "node,fixx,fixy,fixz,fx,fy,fz";
+struct NodalRow {
+  uint32_t point;
+  uint8_t axes;
+  double force[3];
 };
-std::string_view trim(std::string_view text);
-// The columns of a row, as many as the header names; each a finite number.
-void split_row(const std::string &path, size_t line, std::string_view text, const char *header, int columns,
-               double *out);
+std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh);
+
+inline constexpr const char *kStateHeader = "node,x,y,z,vx,vy,vz";
+// [npoint,3] m and m/s, in the world, from a file that names every node once.
+struct StartState { std::vector<double> x, v; };
+StartState read_start_state(const std::string &path, const BodyMesh &mesh);
+
+// A recorded hand (reference/scenes.md, "tools"): the tool's keys; those of the opening where it has jaws.
+void read_hand(const std::string &path, Tool &tool);
 
 }  // namespace dfm::scene

@@ -10,7 +10,9 @@
 #include "core/handle.h"
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
+#include "mesh/tri_mesh.h"
 #include "plugin/shared_object.h"
+#include "scene/keys.h"
 #include "scene/node.h"
 #include "scene/scene.h"
 #include "state/obstacle.h"
@@ -38,6 +40,21 @@ Written pose_of(const dfm_pose &pose) {
   if (p[0] != 0 || p[1] != 0 || p[2] != 0) out["position"] = vector_of(p);
   if (turned(q)) out["rotation"] = rotation_of(q);
   return out;
+}
+
+Written pose_of(const Pose &pose) {
+  dfm_pose out{};
+  store_pose(out, pose);
+  return pose_of(out);
+}
+
+void put(Written &out, const char *key, Written value) {
+  if (!value.is_null()) out[key] = std::move(value);
+}
+
+void put_integrator(Written &out, int64_t integrator) {
+  if (integrator > DFM_INTEGRATOR_AUTO && integrator <= DFM_INTEGRATOR_TR_BDF2)
+    out["integrator"] = scene::word_of("integrator", uint32_t(integrator));
 }
 
 Written key_of(const dfm_pose_key &k) {
@@ -120,6 +137,15 @@ std::string SceneWriter::text_file(const std::string &name, std::string text) {
     out.write(text);
     out.commit();
   });
+}
+
+std::string SceneWriter::triangles(const std::string &name, const Obstacle &of) {
+  TriMesh mesh;
+  mesh.points.assign(of.points.begin(), of.points.end());
+  mesh.tris.assign(of.triangles.begin(), of.triangles.end());
+  mesh.tri_group.assign(mesh.ntri(), kNoGroup);
+  return file(name + ".vtu",
+              [mesh = std::move(mesh)](const std::string &to_path) { write_tri_mesh(mesh, to_path); });
 }
 
 void SceneWriter::check_name(const char *kind, const std::string &name) const {
@@ -210,6 +236,10 @@ std::string SceneWriter::material(const std::string &name, double friction) {
     m.extra_values = {{friction}};
   }
   return material(m);
+}
+
+void SceneWriter::put_material(Written &out, const Obstacle &of) {
+  if (const std::string key = material(of.material, of.zone.friction); !key.empty()) out["material"] = key;
 }
 
 namespace {
@@ -335,12 +365,7 @@ Written write_time(const SceneWriter &to) {
   const double step = to.options.step > 0 ? to.options.step : w.def.step;
   if (step > 0) out["step"] = step;
   else out["step"] = "auto";
-  switch (w.def.integrator) {
-    case DFM_INTEGRATOR_SYMPLECTIC_EULER: out["integrator"] = "symplectic_euler"; break;
-    case DFM_INTEGRATOR_IMPLICIT_EULER:
-    case DFM_INTEGRATOR_TR_BDF2: out["integrator"] = integrator_name(w.def.integrator); break;
-    default: break;
-  }
+  put_integrator(out, w.def.integrator);
   if (to.options.beside.equilibrium) out["mode"] = "static";
   if (w.def.max_time > 0) out["max_time"] = w.def.max_time;
   if (w.def.max_work > 0) out["max_work"] = double(w.def.max_work);
@@ -427,13 +452,13 @@ Written write_root(SceneWriter &to) {
   for (const auto &b : to.w.bodies) root["bodies"].push_back(write_body(to, *b));
   for (const auto &o : to.w.obstacles)
     if (!o->rigid) root["obstacles"].push_back(write_obstacle(to, *o));
-  if (Written rigid = write_rigid(to); !rigid.is_null()) root["rigid"] = std::move(rigid);
+  put(root, "rigid", write_rigid(to));
   for (const auto &t : to.w.tools) root["tools"].push_back(write_tool(to, *t));
   for (const auto &b : to.w.bodies)
     if (!b->planned_cuts.empty()) write_cuts(to, *b, root["cuts"]);
-  if (Written contact = write_contact(to); !contact.is_null()) root["contact"] = std::move(contact);
-  if (Written solver = write_solver(to.w); !solver.is_null()) root["solver"] = std::move(solver);
-  if (Written probes = write_probes(to); !probes.is_null()) root["probes"] = std::move(probes);
+  put(root, "contact", write_contact(to));
+  put(root, "solver", write_solver(to.w));
+  put(root, "probes", write_probes(to));
   if (const std::string &output = to.options.beside.output; !output.empty())
     root["output"] = Written::parse(output);
   tell_what_is_left_out(to);

@@ -32,7 +32,7 @@ struct WriteOptions {
 // notes: how many sentences there were. Throws Error; the scene file itself is written last, and as a whole.
 void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes);
 
-// ---- for its parts: write_body.cpp, write_things.cpp, write_tools.cpp, write_cuts.cpp --------------------
+// ---- for its parts: write_body.cpp, write_things.cpp, write_tools.cpp ------------------------------------
 
 struct SceneWriter {
   World &w;
@@ -59,7 +59,9 @@ struct SceneWriter {
   // The key of a material; empty: it is that of things without one. Adds it to `materials`.
   std::string material(const Material &m);
   std::string material(const std::string &name, double friction);  // of a thing that has no more of it
+  void put_material(Written &out, const Obstacle &of);
   std::string text_file(const std::string &name, std::string text);
+  std::string triangles(const std::string &name, const Obstacle &of);  // of a mesh, as a file
   void check_name(const char *kind, const std::string &name) const;  // throws where a scene has no such name
   bool knows(const std::string &name) const { return w.find_body(name) || w.find_obstacle(name); }
 };
@@ -68,6 +70,9 @@ Written vector_of(const double *v);
 inline Written vector_of(Vec3 v) { return {v.x, v.y, v.z}; }
 Written rotation_of(const double *q);   // x y z w
 Written pose_of(const dfm_pose &pose);  // null: at the origin, not turned
+Written pose_of(const Pose &pose);
+void put(Written &out, const char *key, Written value);  // unless it is null
+void put_integrator(Written &out, int64_t integrator);   // unless it is left to the library
 Written key_of(const dfm_pose_key &key);
 Written sine_of(const dfm_sine &sine, bool scalar);
 bool moves(const dfm_sine &sine);

@@ -8,7 +8,8 @@
 #include "core/error.h"
 #include "mesh/tri_mesh.h"
 #include "plugin/context.h"
-#include "scene/start.h"
+#include "scene/keys.h"
+#include "scene/table.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
 #include "step/attach.h"
@@ -84,9 +85,7 @@ void write_surface(SceneWriter &to, const Body &b, Written &out) {
   own["mesh"] = to.file(b.name + "_surface.vtu", [mesh = std::move(mesh)](const std::string &to_path) {
     write_tri_mesh(mesh, to_path);
   });
-  own["coupling"] = b.coupling == DFM_COUPLING_MLS      ? "mls"
-                    : b.coupling == DFM_COUPLING_THESIS ? "thesis"
-                                                        : "barycentric";
+  own["coupling"] = scene::word_of("coupling", uint32_t(b.coupling));
   if (b.coupling != DFM_COUPLING_BARYCENTRIC && b.support > 0) own["support"] = b.support;
 }
 
@@ -110,28 +109,13 @@ std::vector<GivenParam> rows_of(const ModelParams &params) {
   return out;
 }
 
-const dfm_param *row_of(const dfm_type &type, const std::string &key) {
-  for (uint32_t i = 0; i < type.nparam; ++i)
-    if (key == type.params[i].key) return &type.params[i];
-  return nullptr;
-}
-
 // "type", "params" and "precision".
 void write_choice(const dfm_type &type, const std::vector<GivenParam> &given, Written &out) {
   out["type"] = type.id;
   for (const GivenParam &p : given) {
-    const dfm_param *const row = row_of(type, p.key);
+    const dfm_param *const row = scene::find_row(&type, p.key);
     if (row) out["params"][p.key] = value_of(*row, p.values.data());
     else if (p.values[0] == 1) out["precision"] = "single";
-  }
-}
-
-const char *integrator_word(uint32_t integrator) {
-  switch (integrator) {
-    case DFM_INTEGRATOR_SYMPLECTIC_EULER: return "symplectic_euler";
-    case DFM_INTEGRATOR_IMPLICIT_EULER: return "implicit_euler";
-    case DFM_INTEGRATOR_TR_BDF2: return "tr_bdf2";
-    default: return nullptr;
   }
 }
 
@@ -151,21 +135,19 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
     given.push_back({row.key, {&now[at], &now[at] + row.width}});
   }
   write_choice(type, given, out["model"]);
-  if (const char *const word = integrator_word(b.origin.integrator)) out["integrator"] = word;
+  put_integrator(out, b.origin.integrator);
   if (b.scaling.asked > 0) out["mass_scaling"] = b.scaling.asked;
 }
 
 void write_fields(SceneWriter &to, const Body &b, Written &out) {
   for (const CellField &f : b.makeup.given) {
-    const dfm_param *const row = row_of(*b.model.type, f.key);
+    const dfm_param *const row = scene::find_row(b.model.type, f.key);
     if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
       to.note("body '%s': the field '%s' is left out, since the model '%s' has no such parameter",
               b.name.c_str(), f.key.c_str(), b.model.type->id);
       continue;
     }
-    std::string rows = f.width == 3 ? "x,y,z" : f.width == 1 ? "value" : "value0";
-    for (uint32_t k = 1; f.width != 3 && k < f.width; ++k) rows += format(",value%u", k);
-    rows += "\n";
+    std::string rows = scene::columns_of(f.width) + "\n";
     for (size_t i = 0; i < f.values.size(); ++i)
       rows += format("%.17g%s", f.values[i], (i + 1) % f.width ? "," : "\n");
     out["fields"][f.key] = to.text_file(b.name + "_" + f.key + ".csv", std::move(rows));
@@ -175,8 +157,7 @@ void write_fields(SceneWriter &to, const Body &b, Written &out) {
 Written choice_of(SceneWriter &to, const ModelChoice &c) {
   Written out;
   write_choice(to.w.context->registry.find(DFM_KIND_MODEL, c.type.c_str()), rows_of(c.params), out);
-  if (c.integrator != kSameIntegrator)
-    if (const char *const word = integrator_word(c.integrator)) out["integrator"] = word;
+  put_integrator(out, c.integrator);  // kSameIntegrator is none of the words
   return out;
 }
 
@@ -214,9 +195,7 @@ Vec3 made_at(const Body &b, uint32_t point) {
 }
 
 void write_state(SceneWriter &to, const Body &b, Written &out) {
-  dfm_pose pose{};
-  store_pose(pose, b.origin.frame);
-  if (Written made = pose_of(pose); !made.is_null()) out["pose"] = std::move(made);
+  put(out, "pose", pose_of(b.origin.frame));
   bool rests = true;
   for (uint32_t i = 0; i < b.p.n && rests; ++i) {
     const Vec3 x = made_at(b, i), v = load3(&b.p.v[kStride * size_t{i}]);
@@ -290,7 +269,7 @@ void write_held(SceneWriter &to, const Body &b, Written &out) {
 
 void write_nodal(SceneWriter &to, const Body &b, const std::map<uint32_t, Vec3> &forces, Written &out) {
   if (forces.empty()) return;
-  std::string rows = "node,fixx,fixy,fixz,fx,fy,fz\n";
+  std::string rows = std::string(scene::kNodalHeader) + "\n";
   for (const auto &[point, f] : forces) rows += format("%u,0,0,0,%.17g,%.17g,%.17g\n", point, f.x, f.y, f.z);
   out["nodal_bc"] = to.text_file(b.name + "_forces.csv", std::move(rows));
 }
@@ -407,7 +386,8 @@ Written write_body(SceneWriter &to, Body &b) {
   write_springs(to, b, out);
   write_attachments(to, b, out);
   if (b.separate.on)
-    out["separate"] = {{"least_cells", b.separate.least}, {"crumbs", b.separate.removes ? "remove" : "stay"}};
+    out["separate"] = {{"least_cells", b.separate.least},
+                       {"crumbs", scene::word_of("crumbs", b.separate.removes)}};
   if (b.ahead.delay > 0) out["cut_delay"] = b.ahead.delay;
   if (!b.ahead.faces.empty())
     to.note(

@@ -1,42 +1,20 @@
-// Obstacles and rigid bodies as a scene says them.
+// Obstacles, rigid bodies and cuts to come as a scene says them.
 #include <algorithm>
 
 #include "dynamics/rigid/rigid_set.h"
-#include "mesh/tri_mesh.h"
+#include "scene/keys.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
 
 namespace dfm::writing {
 namespace {
 
-const char *shape_word(uint32_t shape) {
-  switch (shape) {
-    case DFM_SHAPE_SPHERE: return "sphere";
-    case DFM_SHAPE_BOX: return "box";
-    case DFM_SHAPE_CAPSULE: return "capsule";
-    case DFM_SHAPE_MESH: return "mesh";
-    case DFM_SHAPE_VOXELS: return "voxels";
-    default: return "plane";
-  }
-}
-
 template <class Def>
 void write_size(const Def &d, Written &out) {
-  out["shape"] = shape_word(d.shape);
+  out["shape"] = scene::word_of("shape", d.shape);
   if (d.shape == DFM_SHAPE_BOX) out["half_size"] = vector_of(d.half_size);
   if (d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE) out["radius"] = d.radius;
   if (d.shape == DFM_SHAPE_CAPSULE) out["half_length"] = d.half_length;
-}
-
-void write_triangles(SceneWriter &to, const Obstacle &o, Written &out) {
-  TriMesh mesh;
-  mesh.points.assign(o.points.begin(), o.points.end());
-  mesh.tris.assign(o.triangles.begin(), o.triangles.end());
-  mesh.tri_group.assign(mesh.ntri(), kNoGroup);
-  out["mesh"] = to.file(o.name + ".vtu", [mesh = std::move(mesh)](const std::string &to_path) {
-    write_tri_mesh(mesh, to_path);
-  });
-  if (o.def.shape == DFM_SHAPE_VOXELS && o.def.cells) out["cells"] = o.def.cells;
 }
 
 void write_motion(const Obstacle &o, Written &out) {
@@ -54,9 +32,9 @@ Written write_obstacle(SceneWriter &to, const Obstacle &o) {
   out["name"] = o.name;
   out["id"] = o.id;
   write_size(o.def, out);
-  if (!o.points.empty()) write_triangles(to, o, out);
-  const Written pose = pose_of(o.def.pose);
-  if (!pose.is_null()) out["pose"] = pose;
+  if (!o.points.empty()) out["mesh"] = to.triangles(o.name, o);
+  if (!o.points.empty() && o.def.shape == DFM_SHAPE_VOXELS && o.def.cells) out["cells"] = o.def.cells;
+  put(out, "pose", pose_of(o.def.pose));
   if (o.moves()) {
     write_motion(o, out);
   } else if (const Pose made = to_pose(o.def.pose); !same_bits(&made, &o.pose, sizeof made)) {
@@ -68,7 +46,7 @@ Written write_obstacle(SceneWriter &to, const Obstacle &o) {
     to.note("obstacle '%s': the pose that it is to reach in the next step is left out", o.name.c_str());
   const double *const belt = o.def.velocity_surface;
   if (belt[0] != 0 || belt[1] != 0 || belt[2] != 0) out["velocity_surface"] = vector_of(belt);
-  if (const std::string key = to.material(o.material, o.zone.friction); !key.empty()) out["material"] = key;
+  to.put_material(out, o);
   if (o.sensor) out["sensor"] = true;
   return out;
 }
@@ -115,9 +93,8 @@ void write_rigid_start(const RigidSet &set, uint32_t i, Written &out) {
 }
 
 Written joint_of(const RigidSet &set, const dfm_joint_def &j) {
-  static const char *const types[] = {"hinge", "slider", "ball", "fixed"};
   Written out;
-  out["type"] = types[j.type];
+  out["type"] = scene::word_of("joint_type", j.type);
   if (j.with != DFM_RIGID_WORLD) out["with"] = set.defs[j.with].name;
   out["anchor"] = vector_of(j.anchor);
   if (j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER) out["axis"] = vector_of(j.axis);
@@ -147,16 +124,13 @@ Written rigid_body_of(SceneWriter &to, const RigidSet &set, uint32_t i) {
   if (d.fixed) out["fixed"] = true;
   else out["mass"] = d.mass;
   if (!d.fixed) out["inertia"] = vector_of(d.inertia);
-  const Written pose = pose_of(d.pose);
-  if (!pose.is_null()) out["pose"] = pose;
+  put(out, "pose", pose_of(d.pose));
   if (!d.fixed) {
     out["velocity"] = vector_of(d.velocity);
     out["spin"] = vector_of(d.spin);
   }
   write_rigid_start(set, i, out);
-  const Obstacle &touched = other ? *other : o;
-  if (const std::string key = to.material(touched.material, touched.zone.friction); !key.empty())
-    out["material"] = key;
+  to.put_material(out, other ? *other : o);
   if (o.sensor) out["sensor"] = true;
   return out;
 }
@@ -212,6 +186,39 @@ Written write_rigid(SceneWriter &to) {
   if (sets.size() > 1)
     for (Written &row : bodies) row.erase("id");
   return out;
+}
+
+// ---- cuts to come -----------------------------------------------------------------------------------------
+
+void write_cuts(SceneWriter &to, const Body &b, Written &out) {
+  for (const PlannedCut &c : b.planned_cuts) {
+    const CutShape &s = c.shape;
+    static const char *const words[] = {"ellipsoid", "box", "blade", "plane"};
+    Written entry;
+    entry["body"] = b.name;
+    entry["t"] = std::max(c.t, to.w.time);
+    entry["shape"] = words[size_t(s.kind)];
+    switch (s.kind) {
+      case CutKind::plane:
+        entry["point"] = vector_of(s.corner[0]);
+        entry["normal"] = vector_of(s.corner[1]);
+        break;
+      case CutKind::blade:
+        for (const Vec3 &x : s.corner) entry["corners"].push_back(vector_of(x));
+        break;
+      case CutKind::ellipsoid:
+      case CutKind::box:
+        entry["half_size"] = vector_of(s.half_size);
+        put(entry, "pose", pose_of(Pose{s.position, s.rotation}));
+    }
+    if (s.kind != CutKind::plane && s.kind != CutKind::blade && norm2(s.way) > 0)
+      to.note(
+          "body '%s': the shape of its cut at %g s has a motion; in the scene it stands where that begins",
+          b.name.c_str(), c.t);
+    entry["mode"] = scene::word_of("cut_mode", c.how);
+    if (c.most > 0) entry["most"] = c.most;
+    out.push_back(std::move(entry));
+  }
 }
 
 }  // namespace dfm::writing

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mesh/tri_mesh.h"
+#include "scene/keys.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
@@ -11,12 +11,6 @@ namespace dfm::writing {
 namespace {
 
 constexpr double kRadian = 0.017453292519943295;  // of a degree
-
-const char *shape_word(uint32_t shape) {
-  static const char *const words[] = {"sphere",  "capsule",  "box",       "mesh",
-                                      "grasper", "scissors", "ellipsoid", "blade"};
-  return words[shape];
-}
 
 // In degrees, so that the reader gets the same radians where any number gives them.
 double degrees_of(double radians) {
@@ -33,27 +27,19 @@ double degrees_of(double radians) {
 
 void write_sizes(SceneWriter &to, const Tool &t, Written &out) {
   const dfm_tool_def &d = t.def;
-  out["shape"] = shape_word(d.shape);
+  out["shape"] = scene::word_of("tool_shape", d.shape);
   const bool round = d.shape == DFM_TOOL_SPHERE || d.shape == DFM_TOOL_CAPSULE;
   if (round || (t.has_jaws() && d.radius > 0)) out["radius"] = d.radius;
   if (d.shape == DFM_TOOL_CAPSULE || (t.has_jaws() && d.radius > 0)) out["half_length"] = d.half_length;
   if (!round && d.shape != DFM_TOOL_MESH) out["half_size"] = vector_of(d.half_size);
-  if (d.shape != DFM_TOOL_MESH) return;
-  const Obstacle &skin = *to.w.find_obstacle(t.name + ".shape");
-  TriMesh mesh;
-  mesh.points.assign(skin.points.begin(), skin.points.end());
-  mesh.tris.assign(skin.triangles.begin(), skin.triangles.end());
-  mesh.tri_group.assign(mesh.ntri(), kNoGroup);
-  out["mesh"] = to.file(t.name + ".vtu", [mesh = std::move(mesh)](const std::string &to_path) {
-    write_tri_mesh(mesh, to_path);
-  });
+  if (d.shape == DFM_TOOL_MESH) out["mesh"] = to.triangles(t.name, *to.w.find_obstacle(t.name + ".shape"));
 }
 
 void write_motion(const Tool &t, const ToolValues &v, Written &out) {
   // keys go on from where they are; without keys the tool does not move
   dfm_pose at = t.def.pose;
   if (v.keyed == 0) store_pose(at, t.motion.coupled() ? load_place(v.device) : load_pose(t.set->state[0]));
-  if (const Written pose = pose_of(at); !pose.is_null()) out["pose"] = pose;
+  put(out, "pose", pose_of(at));
   if (v.keyed == 0) return;
   Written &keys = out["motion"]["keyframes"] = Written::array();
   for (const dfm_pose_key &k : t.keys) keys.push_back(key_of(k));
@@ -84,7 +70,7 @@ void write_cuts(const SceneWriter &to, const Tool &t, Written &out) {
   for (const auto &b : to.w.bodies)
     if (t.cuts_body(*b)) names.push_back(b->name);
   if (names.empty()) return;
-  out["cuts"] = {{"bodies", names}, {"mode", t.cuts.how == DFM_CUT_SPLIT ? "split" : "remove"}};
+  out["cuts"] = {{"bodies", names}, {"mode", scene::word_of("cut_mode", t.cuts.how)}};
   if (t.cuts.most > 0) out["cuts"]["most"] = t.cuts.most;
 }
 
@@ -116,8 +102,7 @@ Written write_tool(SceneWriter &to, const Tool &t) {
   write_cuts(to, t, out);
   const auto touched = std::find_if(to.w.obstacles.begin(), to.w.obstacles.end(),
                                     [&](const auto &o) { return o->id == t.set->obstacle[0]; });
-  if (const std::string key = to.material((*touched)->material, (*touched)->zone.friction); !key.empty())
-    out["material"] = key;
+  to.put_material(out, **touched);
   tell(to, t, v);
   return out;
 }

@@ -8,6 +8,7 @@
 #include "scene/node.h"
 #include "scene/rotation.h"
 #include "scene/select.h"
+#include "scene/table.h"
 #include "support.h"
 
 using namespace dfm::scene;
