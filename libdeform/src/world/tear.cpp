@@ -19,12 +19,6 @@ namespace {
 
 constexpr uint32_t kMostPoints = 64;  // per body and step; the most stretched points come first
 
-double limit_of(const Material &m) {
-  for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    if (m.extra_keys[i] == kTearKey) return m.extra_values[i][0];
-  return 0;
-}
-
 // Symmetric: xx, yy, zz, xy, yz, zx.
 struct Tensor {
   double a[6] = {};
@@ -70,7 +64,7 @@ double largest_eigenvalue(const Tensor &t, Vec3 &vector) {
 class Tear {
  public:
   explicit Tear(const Body &b) : b_(b), ncell_(b.ncell()), points_(b.p.n) {
-    for (const Material &m : b.makeup.materials) limits_.push_back(limit_of(m));
+    for (const Material &m : b.makeup.materials) limits_.push_back(m.entry(kTearKey, 0));
     for (uint32_t c = 0; c < ncell_; ++c) add(c);
   }
 
@@ -100,19 +94,15 @@ class Tear {
     bool split = false;
   };
 
-  Vec3 x(uint32_t cell, size_t k) const {
-    return load3(&b_.p.x[size_t{kStride} * b_.tets[size_t{4} * cell + k]]);
-  }
-  Vec3 rest(uint32_t cell, size_t k) const {
-    return load3(&b_.p.rest[size_t{3} * b_.tets[size_t{4} * cell + k]]);
-  }
+  Vec3 x(uint32_t cell, size_t k) const { return b_.corner(cell, k); }
+  Vec3 rest(uint32_t cell, size_t k) const { return b_.p.rest_at(b_.tets[size_t{4} * cell + k]); }
   bool shares(uint32_t cell, uint32_t point) const {
     const uint32_t *const c = &b_.tets[size_t{4} * cell];
     return std::find(c, c + 4, point) != c + 4;
   }
   bool side(uint32_t cell, uint32_t point) const {
     const Vec3 middle = 0.25 * ((x(cell, 0) + x(cell, 1)) + (x(cell, 2) + x(cell, 3)));
-    return dot(points_[point].way, middle - load3(&b_.p.x[size_t{kStride} * point])) >= 0;
+    return dot(points_[point].way, middle - b_.p.x_at(point)) >= 0;
   }
 
   void add(uint32_t cell) {
@@ -195,7 +185,7 @@ class Tear {
 
 bool may_tear(const Body &b) {
   const std::vector<Material> &list = b.makeup.materials;
-  return std::any_of(list.begin(), list.end(), [](const Material &m) { return limit_of(m) > 0; });
+  return std::any_of(list.begin(), list.end(), [](const Material &m) { return m.entry(kTearKey, 0) > 0; });
 }
 
 void tear_bodies(World &w) {
