@@ -304,14 +304,14 @@ ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
   return out;
 }
 
-void check_params(const World &w, const Body &b, const dfm_type &type, const ModelParams &params) {
+std::vector<double> values_asked(const World &w, const Body &b, const dfm_type &type,
+                                 const ModelParams &params) {
   MadeModel unused;
-  values_for(w, b, type, params, unused);
+  return values_for(w, b, type, params, unused);
 }
 
 std::vector<double> values_asked(const World &w, const Body &b) {
-  MadeModel unused;
-  return values_for(w, b, *b.model.type, b.origin.params, unused);
+  return values_asked(w, b, *b.model.type, b.origin.params);
 }
 
 std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,

@@ -36,10 +36,11 @@ void warn_of_own_steps(const World &w, const std::string &body, const ModelInsta
                        int32_t integrator);
 // Hash of type and origin, to compare bodies that are equal otherwise.
 uint64_t model_hash(const Body &b);
-// The values that origin and makeup specify, in the order of the type's table.
+// The values that these parameters, or the origin's, and the makeup specify, in the order of the type's
+// table. Throws the errors of make_body_model() about parameters.
+std::vector<double> values_asked(const World &w, const Body &b, const dfm_type &type,
+                                 const ModelParams &params);
 std::vector<double> values_asked(const World &w, const Body &b);
-// Throws the errors of make_body_model() about parameters.
-void check_params(const World &w, const Body &b, const dfm_type &type, const ModelParams &params);
 void exchange(Body &b, MadeModel &other) noexcept;
 
 }  // namespace dfm

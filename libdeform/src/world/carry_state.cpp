@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "core/error.h"
@@ -203,15 +204,11 @@ class Names {
 
 uint32_t find_edge(const Surface &s, uint32_t a, uint32_t b) {
   if (a == kNone || b == kNone) return kNone;
-  const std::pair key = std::minmax(a, b);
-  uint32_t low = 0, high = s.nedge;
+  const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
   const auto at = [&](uint32_t e) { return std::pair(s.edge[2 * size_t{e}], s.edge[2 * size_t{e} + 1]); };
-  while (low < high) {
-    const uint32_t middle = low + (high - low) / 2;
-    if (at(middle) < std::pair<uint32_t, uint32_t>(key)) low = middle + 1;
-    else high = middle;
-  }
-  return low < s.nedge && at(low) == std::pair<uint32_t, uint32_t>(key) ? low : kNone;
+  const auto all = std::views::iota(0u, s.nedge);
+  const auto found = std::ranges::lower_bound(all, key, {}, at);
+  return found != all.end() && at(*found) == key ? *found : kNone;
 }
 
 uint32_t above_all(const Array<uint32_t> &names) {

@@ -310,7 +310,7 @@ ModelChoice choose_model(const Body &b, const char *type, const dfm_params &para
   }
   std::erase_if(own, limit);
   out.params = keep_params(found, {sizeof(dfm_params), static_cast<uint32_t>(own.size()), own.data()});
-  check_params(*b.world, b, found, out.params);
+  values_asked(*b.world, b, found, out.params);
   return out;
 }
 

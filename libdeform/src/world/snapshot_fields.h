@@ -3,9 +3,9 @@
 // host may change between two steps (loads, holds, motions, gravity, filters, friction rules, runtime
 // parameters) is state too.
 //
-// A field is one line in one of the ..._fields() functions: its name, its location and its valid values.
-// Writing, reading and checking (snapshot.cpp) use this line; conditions between
-// fields are in check() there.
+// A field is a member of BodyState, OnPoints, ObstacleState or WorldState, which a restore exchanges whole,
+// and one line in one of the ..._fields() functions: its name, its location and its valid values.
+// Writing, reading and checking (snapshot.cpp) use this line; conditions between fields are in check() there.
 #pragma once
 #include <algorithm>
 #include <cmath>
