@@ -1,13 +1,36 @@
 // A surfel moves with the tetrahedron that contains it: its barycentric coordinates at rest are its weights.
 // They reproduce linear fields, also outside the cell, where they extrapolate.
-#include <limits>
+#include "body/coupling.h"
 
-#include "body/coupling_rows.h"
+#include <algorithm>
+#include <limits>
+#include <optional>
+
 #include "core/error.h"
 #include "geometry/closest.h"
+#include "geometry/rest_tree.h"
+#include "math/extent.h"
 
 namespace dfm {
 namespace {
+
+struct RowEntry {
+  uint32_t col;
+  double weight;
+};
+
+// Positions relative to the first point: differences of neighbors are exact, so the weights do not depend on
+// the distance from the origin of the world.
+struct LocalRest {
+  Array<Vec3> point, surfel;
+  LocalRest(const Memory &memory, const CouplingInput &in)
+      : point(in.npoint, Vec3{}, HookAllocator<Vec3>(memory)),
+        surfel(in.nsurfel, Vec3{}, HookAllocator<Vec3>(memory)) {
+    const Vec3 origin = in.npoint ? load3(in.point) : Vec3{};
+    for (uint32_t i = 0; i < in.npoint; ++i) point[i] = load3(in.point + size_t{3} * i) - origin;
+    for (uint32_t s = 0; s < in.nsurfel; ++s) surfel[s] = load3(in.surfel + size_t{3} * s) - origin;
+  }
+};
 
 // a weight above -kInside is inside: a point on a face belongs to the cells on both sides
 constexpr double kInside = 1e-10;
@@ -25,34 +48,18 @@ double cell_distance2(Vec3 x, const Vec3 c[4]) {
 Array<RestBox> cell_boxes(const Memory &memory, const CouplingInput &in, const LocalRest &rest) {
   Array<RestBox> boxes(in.ntet, RestBox{}, HookAllocator<RestBox>(memory));
   for (uint32_t t = 0; t < in.ntet; ++t) {
-    RestBox &b = boxes[t];
-    b.lo = b.hi = rest.point[in.tet[size_t{4} * t]];
-    for (int k = 1; k < 4; ++k) {
-      const Vec3 x = rest.point[in.tet[size_t{4} * t + size_t(k)]];
-      for (int a = 0; a < 3; ++a) {
-        b.lo[a] = std::min(b.lo[a], x[a]);
-        b.hi[a] = std::max(b.hi[a], x[a]);
-      }
-    }
+    Extent box;
+    for (size_t k = 0; k < 4; ++k) box.add(rest.point[in.tet[size_t{4} * t + k]]);
     // points accepted by kInside may be outside by that share of the cell
-    const Vec3 size = b.hi - b.lo;
-    const double more = 4 * kInside * std::max({size.x, size.y, size.z});
-    b.lo -= {more, more, more};
-    b.hi += {more, more, more};
+    const double more = 4 * kInside * box.longest();
+    box.grow({more, more, more});
+    boxes[t] = {box.lo, box.hi};
   }
   return boxes;
 }
 
-}  // namespace
-
-LocalRest::LocalRest(const Memory &memory, const CouplingInput &in)
-    : point(in.npoint, Vec3{}, HookAllocator<Vec3>(memory)),
-      surfel(in.nsurfel, Vec3{}, HookAllocator<Vec3>(memory)) {
-  const Vec3 origin = in.npoint ? load3(in.point) : Vec3{};
-  for (uint32_t i = 0; i < in.npoint; ++i) point[i] = load3(in.point + size_t{3} * i) - origin;
-  for (uint32_t s = 0; s < in.nsurfel; ++s) surfel[s] = load3(in.surfel + size_t{3} * s) - origin;
-}
-
+// Barycentric coordinates of x in the tetrahedron c, refined once so that sum w c = x to rounding in cells of
+// any shape.
 void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   const Vec3 e1 = c[1] - c[0], e2 = c[2] - c[0], e3 = c[3] - c[0];
   const Vec3 n1 = cross(e2, e3), n2 = cross(e3, e1), n3 = cross(e1, e2);
@@ -71,10 +78,23 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   w[3] = g;
 }
 
-RestCells::RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
-    : in_(in), rest_(rest), box_(cell_boxes(memory, in, rest)), tree_(memory, box_) {}
+class RestCells {
+ public:
+  RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
+      : in_(in), rest_(rest), box_(cell_boxes(memory, in, rest)), tree_(memory, box_) {}
+  // The lowest cell that contains x (away 0), else the nearest one (away: its distance, m).
+  uint32_t find(Vec3 x, double &away) const;
+  // Appends the row of a surfel at x, from the cell that find() gives; returns away.
+  double row(Vec3 x, Array<RowEntry> &out) const;
 
-uint32_t RestCells::find(Vec3 x, double *away) const {
+ private:
+  const CouplingInput &in_;
+  const LocalRest &rest_;
+  Array<RestBox> box_;
+  RestTree tree_;
+};
+
+uint32_t RestCells::find(Vec3 x, double &away) const {
   Vec3 c[4];
   double w[4];
   const auto corners = [&](uint32_t t) {
@@ -99,35 +119,34 @@ uint32_t RestCells::find(Vec3 x, double *away) const {
       }
     });
   }
-  if (away) *away = std::sqrt(far2);
+  away = std::sqrt(far2);
   return cell;
 }
 
-double RestCells::row(Vec3 x, RowEntry out[4]) const {
+double RestCells::row(Vec3 x, Array<RowEntry> &out) const {
   double away;
-  const uint32_t *const corner = in_.tet + size_t{4} * find(x, &away);
+  const uint32_t *const corner = in_.tet + size_t{4} * find(x, away);
   Vec3 c[4];
   double w[4];
   for (int k = 0; k < 4; ++k) c[k] = rest_.point[corner[k]];
   tet_weights(x, c, w);
-  for (int k = 0; k < 4; ++k) out[k] = {corner[k], w[k]};
+  for (int k = 0; k < 4; ++k) out.push_back({corner[k], w[k]});
   return away;
 }
 
-void append_row(Coupling &out, RowEntry *entries, size_t n) {
+// Entries ascending by column, zeros left out, the last weight moved by the bits that the sum lacks of one.
+void append_row(Coupling &out, Array<RowEntry> &row) {
   double largest = 0;
-  for (size_t i = 0; i < n; ++i) largest = std::max(largest, std::fabs(entries[i].weight));
-  n = size_t(std::remove_if(entries, entries + n,
-                            [&](const RowEntry &e) { return std::fabs(e.weight) <= kNothing * largest; }) -
-             entries);
-  std::sort(entries, entries + n, [](const RowEntry &a, const RowEntry &b) { return a.col < b.col; });
+  for (const RowEntry &e : row) largest = std::max(largest, std::fabs(e.weight));
+  std::erase_if(row, [&](const RowEntry &e) { return std::fabs(e.weight) <= kNothing * largest; });
+  std::ranges::sort(row, {}, &RowEntry::col);
   // Summed in the order of gather_surface(); the last weight completes the sum.
   double before = 0;
-  for (size_t i = 0; i + 1 < n; ++i) before += entries[i].weight;
-  entries[n - 1].weight = 1 - before;
-  for (size_t i = 0; i < n; ++i) {
-    out.col.push_back(entries[i].col);
-    out.weight.push_back(entries[i].weight);
+  for (size_t i = 0; i + 1 < row.size(); ++i) before += row[i].weight;
+  row.back().weight = 1 - before;
+  for (const RowEntry &e : row) {
+    out.col.push_back(e.col);
+    out.weight.push_back(e.weight);
   }
   if (out.col.size() > UINT32_MAX)
     fail(DFM_E_NOMEM,
@@ -144,13 +163,15 @@ Coupling empty_coupling(const Memory &memory, uint32_t nsurfel) {
   return out;
 }
 
-void append_cell_row(const Memory &memory, const CouplingInput &in, const LocalRest &rest, uint32_t surfel,
-                     std::optional<RestCells> &cells, Coupling &out) {
-  if (!cells) cells.emplace(memory, in, rest);
-  RowEntry row[4];
-  out.farthest = std::max(out.farthest, cells->row(rest.surfel[surfel], row));
-  ++out.outside;
-  append_row(out, row, 4);
+}  // namespace
+
+Array<uint32_t> cells_of_surfels(const Memory &memory, const CouplingInput &in) {
+  const LocalRest rest(memory, in);
+  const RestCells cells(memory, in, rest);
+  Array<uint32_t> out(in.nsurfel, 0u, HookAllocator<uint32_t>(memory));
+  double away;
+  for (uint32_t s = 0; s < in.nsurfel; ++s) out[s] = cells.find(rest.surfel[s], away);
+  return out;
 }
 
 Coupling couple_barycentric(const Memory &memory, const CouplingInput &in) {
@@ -159,14 +180,297 @@ Coupling couple_barycentric(const Memory &memory, const CouplingInput &in) {
   Coupling out = empty_coupling(memory, in.nsurfel);
   out.col.reserve(size_t{4} * in.nsurfel);
   out.weight.reserve(size_t{4} * in.nsurfel);
+  Array<RowEntry> row(HookAllocator<RowEntry>{memory});
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
-    RowEntry row[4];
+    row.clear();
     const double far = cells.row(rest.surfel[s], row);
     out.outside += far > 0;
     out.farthest = std::max(out.farthest, far);
-    append_row(out, row, 4);
+    append_row(out, row);
   }
   return out;
+}
+
+namespace {
+
+// ---- by reach ---------------------------------------------------------------------------------------------
+// A surfel takes the motion of the phyxels that reach it, each extrapolated to the surfel by its gradient
+// (Zerbato 2010, (3.9), with the corrections of doc/concepts/couplings.md):
+//
+//   u_s = sum_i W_i (u_i + H_i (X_s - X_i)),   W_i = w(|X_s - X_i|, h_i) / sum,
+//   H_i = sum_j w_ij (u_j - u_i) X_ij^T A_i^-1,   A_i = sum_j w_ij X_ij X_ij^T,   X_ij = X_j - X_i,
+//   w_ij = w(|X_ij|, h_i),   w(r, h) = 315/(64 pi h^9) (h^2 - r^2)^3  (3.11)
+//
+// All positions are rest positions, so that this is one row of N. h_i, the support, belongs to the phyxel i.
+// Every term in the sum over i extrapolates linear fields exactly, hence so does the row; without the
+// gradient (Shepard, couple_thesis) only constants are.
+
+constexpr uint32_t kNeighbors = 10;  // their mean distance is the unit of the support
+// det(A / trace A) below this: the neighbors lie in a plane (1/27 for a sphere of them)
+constexpr double kFlat = 1e-10;
+
+// (3.11) without its constant factor, which cancels in every quotient; (1 - r2/h2)^3 / h^3 neither over- nor
+// underflows at any scale of length.
+double kernel(double r2, double h) {
+  const double q = 1 - r2 / (h * h);
+  return q > 0 ? q * q * q / (h * h * h) : 0;
+}
+
+struct Symmetric {
+  double xx = 0, yy = 0, zz = 0, xy = 0, xz = 0, yz = 0;
+  void add(double w, Vec3 a) {
+    xx += w * a.x * a.x;
+    yy += w * a.y * a.y;
+    zz += w * a.z * a.z;
+    xy += w * a.x * a.y;
+    xz += w * a.x * a.z;
+    yz += w * a.y * a.z;
+  }
+};
+
+// The inverse, unless the vectors lie in a plane.
+bool invert(const Symmetric &s, Symmetric &out) {
+  const double trace = s.xx + s.yy + s.zz;
+  if (!(trace > 0)) return false;
+  const double f = 1 / trace;
+  const double a = f * s.xx;
+  const double b = f * s.yy;
+  const double c = f * s.zz;
+  const double d = f * s.xy;
+  const double e = f * s.xz;
+  const double g = f * s.yz;
+  const double cxx = b * c - g * g, cxy = e * g - d * c, cxz = d * g - b * e;
+  const double det = a * cxx + d * cxy + e * cxz;
+  if (!(det > kFlat)) return false;
+  const double scale = f / det;
+  out = {scale * cxx, scale * (a * c - e * e), scale * (a * b - d * d), scale * cxy,
+         scale * cxz, scale * (d * e - a * g)};
+  return true;
+}
+Vec3 operator*(const Symmetric &s, Vec3 v) {
+  return {s.xx * v.x + s.xy * v.y + s.xz * v.z, s.xy * v.x + s.yy * v.y + s.yz * v.z,
+          s.xz * v.x + s.yz * v.y + s.zz * v.z};
+}
+
+class Cloud {
+ public:
+  Cloud(const Memory &memory, const CouplingInput &in)
+      : rest(memory, in),
+        support(in.npoint, 0.0, HookAllocator<double>(memory)),
+        dots_(dots(memory, rest.point)),
+        dot_tree_(memory, dots_),
+        cubes_(find_supports(memory, in.support)),
+        cube_tree_(memory, cubes_) {}
+
+  LocalRest rest;
+  Array<double> support;  // [npoint] h_i, m
+
+  // Phyxels that reach x, ascending.
+  void reaching(Vec3 x, Array<uint32_t> &out) const {
+    out.clear();
+    cube_tree_.holding(x, [&](uint32_t i) {
+      if (norm2(x - rest.point[i]) < support[i] * support[i]) out.push_back(i);
+    });
+    std::sort(out.begin(), out.end());
+  }
+  // Other phyxels within the support of i, ascending.
+  void around(uint32_t i, Array<uint32_t> &out) const {
+    const double h2 = support[i] * support[i];
+    dot_tree_.near(rest.point[i], h2, [&](uint32_t j) {
+      if (j != i && norm2(rest.point[j] - rest.point[i]) < h2) out.push_back(j);
+    });
+    std::sort(out.begin(), out.end());
+  }
+
+ private:
+  Array<RestBox> dots_;
+  RestTree dot_tree_;
+  Array<RestBox> cubes_;
+  RestTree cube_tree_;
+
+  static Array<RestBox> dots(const Memory &memory, const Array<Vec3> &x) {
+    Array<RestBox> out(HookAllocator<RestBox>{memory});
+    for (const Vec3 p : x) out.push_back({p, p});
+    return out;
+  }
+  // Sets the supports; returns the cubes around them.
+  Array<RestBox> find_supports(const Memory &memory, double factor) {
+    Array<RestBox> cubes(HookAllocator<RestBox>{memory});
+    for (uint32_t i = 0; i < support.size(); ++i) {
+      double nearest[kNeighbors], limit2 = std::numeric_limits<double>::infinity();
+      uint32_t n = 0;
+      dot_tree_.near(rest.point[i], limit2, [&](uint32_t j) {
+        if (j == i) return;
+        const double d2 = norm2(rest.point[j] - rest.point[i]);
+        if (n == kNeighbors && d2 >= limit2) return;
+        uint32_t at = n < kNeighbors ? n++ : kNeighbors - 1;
+        for (; at > 0 && nearest[at - 1] > d2; --at) nearest[at] = nearest[at - 1];
+        nearest[at] = d2;
+        if (n == kNeighbors) limit2 = nearest[kNeighbors - 1];
+      });
+      double sum = 0;
+      for (uint32_t k = 0; k < n; ++k) sum += std::sqrt(nearest[k]);
+      const double h = n ? factor * sum / n : 0;
+      support[i] = h;
+      cubes.push_back({rest.point[i] - Vec3{h, h, h}, rest.point[i] + Vec3{h, h, h}});
+    }
+    return cubes;
+  }
+};
+
+// Neighborhoods of the phyxels that reach a surfel, computed at first use.
+class Neighborhoods {
+ public:
+  Neighborhoods(const Memory &memory, const Cloud &cloud)
+      : cloud_(cloud),
+        known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)),
+        neighbor_(HookAllocator<uint32_t>(memory)),
+        list_(HookAllocator<uint32_t>(memory)) {}
+  // state 0 not computed, 1 spans space, 2 flat
+  struct Known {
+    size_t begin = 0, end = 0;
+    Symmetric inverse;
+    uint8_t state = 0;
+  };
+  const Known &of(uint32_t i) {
+    Known &k = known_[i];
+    if (k.state) return k;
+    list_.clear();
+    cloud_.around(i, list_);
+    k.begin = neighbor_.size();
+    neighbor_.insert(neighbor_.end(), list_.begin(), list_.end());
+    k.end = neighbor_.size();
+    Symmetric a;
+    for (uint32_t j : list_) {
+      const Vec3 d = cloud_.rest.point[j] - cloud_.rest.point[i];
+      a.add(kernel(norm2(d), cloud_.support[i]), d);
+    }
+    k.state = invert(a, k.inverse) ? 1 : 2;
+    return k;
+  }
+  uint32_t operator[](size_t k) const { return neighbor_[k]; }
+
+ private:
+  const Cloud &cloud_;
+  Array<Known> known_;
+  Array<uint32_t> neighbor_, list_;
+};
+
+// Sorts a row by columns and adds up the entries of each, in the order in which they came.
+void add_up(Array<RowEntry> &row) {
+  std::ranges::stable_sort(row, {}, &RowEntry::col);
+  size_t n = 0;
+  for (const RowEntry &e : row)
+    if (n && row[n - 1].col == e.col) row[n - 1].weight += e.weight;
+    else row[n++] = e;
+  row.resize(n);
+  std::erase_if(row, [](const RowEntry &e) { return e.weight == 0; });
+}
+
+// Rounding in A^-1 of a flat neighborhood grows with its condition number: linear fields are restored in the
+// row by the smallest change relative to |w_j|: w_j += |w_j| p_j . M^-1 (p_s - sum w p), p = (1, X - X_s), M
+// = sum |w| p p^T.
+void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
+  double extent2 = 0;
+  for (const RowEntry &e : row) extent2 = std::max(extent2, norm2(point[e.col] - x));
+  const double unit = extent2 > 0 ? 1 / std::sqrt(extent2) : 0;
+  const auto basis = [&](uint32_t i, double p[4]) {
+    p[0] = 1;
+    store3(p + 1, unit * (point[i] - x));
+  };
+  double m[4][4] = {}, r[4] = {1, 0, 0, 0}, p[4];
+  for (const RowEntry &e : row) {
+    basis(e.col, p);
+    for (int a = 0; a < 4; ++a) {
+      r[a] -= e.weight * p[a];
+      for (int b = 0; b <= a; ++b) m[a][b] += std::fabs(e.weight) * p[a] * p[b];
+    }
+  }
+  for (int a = 0; a < 4; ++a) {  // Cholesky: m = L L^T
+    for (int b = 0; b <= a; ++b) {
+      double s = m[a][b];
+      for (int k = 0; k < b; ++k) s -= m[a][k] * m[b][k];
+      if (a == b && !(s > 1e-14 * m[0][0])) return;  // nearly flat: the row cannot be improved
+      m[a][b] = a == b ? std::sqrt(s) : s / m[b][b];
+    }
+    for (int k = 0; k < a; ++k) r[a] -= m[a][k] * r[k];
+    r[a] /= m[a][a];
+  }
+  for (int a = 3; a >= 0; --a) {
+    for (int k = a + 1; k < 4; ++k) r[a] -= m[k][a] * r[k];
+    r[a] /= m[a][a];
+  }
+  for (RowEntry &e : row) {
+    basis(e.col, p);
+    e.weight += std::fabs(e.weight) * (r[0] * p[0] + r[1] * p[1] + r[2] * p[2] + r[3] * p[3]);
+  }
+}
+
+// One row for each surfel, filled by `fill`, from the phyxels that reach it and are not excluded; if there is
+// none, the row of its cell.
+template <class StandsBack, class Fill>
+Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
+                         const StandsBack &stands_back, const Fill &fill) {
+  std::optional<RestCells> cells;
+  Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
+  Array<RowEntry> row(HookAllocator<RowEntry>{memory});
+  Coupling out = empty_coupling(memory, in.nsurfel);
+  for (uint32_t s = 0; s < in.nsurfel; ++s) {
+    const Vec3 x = cloud.rest.surfel[s];
+    cloud.reaching(x, reach);
+    std::erase_if(reach, stands_back);
+    double sum = 0;
+    for (uint32_t i : reach) sum += kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]);
+    row.clear();
+    if (sum > 0) {
+      fill(x, reach, sum, row);
+    } else {
+      if (!cells) cells.emplace(memory, in, cloud.rest);
+      out.farthest = std::max(out.farthest, cells->row(x, row));
+      ++out.outside;
+    }
+    append_row(out, row);
+  }
+  return out;
+}
+
+}  // namespace
+
+Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
+  const Cloud cloud(memory, in);
+  const Array<Vec3> &point = cloud.rest.point;
+  Neighborhoods near(memory, cloud);
+  // A phyxel whose neighbors are in a plane has no gradient: it is excluded if others reach the surfel.
+  const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
+  return couple_by_reach(memory, in, cloud, stands_back,
+                         [&](Vec3 x, const Array<uint32_t> &reach, double sum, Array<RowEntry> &row) {
+                           for (uint32_t i : reach) {
+                             const Neighborhoods::Known &k = near.of(i);
+                             const double share = kernel(norm2(x - point[i]), cloud.support[i]) / sum;
+                             const Vec3 a = share * (k.inverse * (x - point[i]));
+                             double back = 0;
+                             for (size_t e = k.begin; e < k.end; ++e) {
+                               const Vec3 d = point[near[e]] - point[i];
+                               const double w = kernel(norm2(d), cloud.support[i]) * dot(d, a);
+                               row.push_back({near[e], w});
+                               back += w;
+                             }
+                             row.push_back({i, share - back});
+                           }
+                           add_up(row);
+                           for (int pass = 0; pass < 2; ++pass) restore_linear(point, x, row);
+                         });
+}
+
+Coupling couple_thesis(const Memory &memory, const CouplingInput &in) {
+  const Cloud cloud(memory, in);
+  const auto never = [](uint32_t) { return false; };
+  return couple_by_reach(
+      memory, in, cloud, never, [&](Vec3 x, const Array<uint32_t> &reach, double sum, Array<RowEntry> &row) {
+        for (uint32_t i : reach)
+          row.push_back({i, kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]) / sum});
+        add_up(row);
+      });
 }
 
 }  // namespace dfm

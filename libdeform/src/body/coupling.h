@@ -25,6 +25,9 @@ struct CouplingInput {
   double support = 3;              // mean distances to the ten nearest phyxels
 };
 
+// [nsurfel] the lowest cell that contains each surfel, else the nearest one.
+Array<uint32_t> cells_of_surfels(const Memory &memory, const CouplingInput &in);
+
 Coupling couple_barycentric(const Memory &memory, const CouplingInput &in);
 Coupling couple_mls(const Memory &memory, const CouplingInput &in);
 Coupling couple_thesis(const Memory &memory, const CouplingInput &in);

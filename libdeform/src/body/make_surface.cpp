@@ -109,10 +109,7 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
 
   const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
   Array<Vec3> normal(ntri, Vec3{}, HookAllocator<Vec3>(memory));
-  for (uint32_t t = 0; t < ntri; ++t) {
-    const uint32_t *c = &out.tri[3 * t];
-    normal[t] = normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0])));
-  }
+  for (uint32_t t = 0; t < ntri; ++t) normal[t] = normalized(out.area2(t, at));
   find_patches(normal, out);
   find_fans(out);
 
@@ -274,10 +271,8 @@ Vec3 least_squares_of(const double *normals, std::span<const uint32_t> which) {
 
 void ways_back(Surface &s, const double *x, const std::function<void(uint32_t surfel, Vec3 way)> &use) {
   const auto at = [&](uint32_t i) { return load3(x + 4 * size_t{i}); };
-  for (size_t l = 0; l < s.laid.size(); ++l) {
-    const uint32_t *const c = &s.tri[3 * size_t{s.laid[l]}];
-    store3(&s.laid_normal[3 * l], normalized(cross(at(c[1]) - at(c[0]), at(c[2]) - at(c[0]))));
-  }
+  for (size_t l = 0; l < s.laid.size(); ++l)
+    store3(&s.laid_normal[3 * l], normalized(s.area2(s.laid[l], at)));
   for (size_t i = 0; i < s.laid_surfel.size(); ++i) {
     const std::span<const uint32_t> around{s.laid_around.data() + s.laid_begin[i],
                                            s.laid_around.data() + s.laid_begin[i + 1]};

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "body/make_surface.h"
+#include "body/phyxels.h"
 #include "geometry/convex.h"
 #include "geometry/tree_walk.h"
 
@@ -124,14 +125,7 @@ uint64_t ObstacleMesh::triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &o
 }
 
 const ObstacleMesh::Bounds &ObstacleMesh::bounds() {
-  if (bounded_) return bounds_;
-  Vec3 lo = {HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi = -lo;
-  for (uint32_t s = 0; s < surface.nsurfel; ++s) {
-    const Vec3 p = load3(&surface.x[4 * size_t{s}]);
-    lo = {std::min(lo.x, p.x), std::min(lo.y, p.y), std::min(lo.z, p.z)};
-    hi = {std::max(hi.x, p.x), std::max(hi.y, p.y), std::max(hi.z, p.z)};
-  }
-  bounds_ = {lo, hi};
+  if (!bounded_) bounds_ = extent_of(surface.x.data(), surface.nsurfel, 4);
   bounded_ = true;
   return bounds_;
 }

@@ -8,6 +8,7 @@
 #include "core/memory.h"
 #include "geometry/box_tree.h"
 #include "geometry/surface.h"
+#include "math/extent.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -36,7 +37,7 @@ struct ObstacleMesh {
   // parallel to the axes of the world. Returns how many boxes of the tree it has looked at.
   uint64_t triangles_near(Vec3 lo, Vec3 hi, std::vector<uint32_t> &out) const;
   // Of x, axis-parallel; computed once in each place.
-  struct Bounds { Vec3 lo, hi; };
+  using Bounds = Extent;
   const Bounds &bounds();
 
  private:

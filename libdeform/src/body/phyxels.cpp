@@ -4,9 +4,25 @@
 
 namespace dfm {
 
+void Phyxels::size(const Memory &m, uint32_t points) {
+  n = points;
+  const auto zeros = [&](size_t count) { return Array<double>(count, 0.0, HookAllocator<double>(m)); };
+  rest = zeros(size_t{3} * n);
+  mass = zeros(n);
+  held = Array<uint8_t>(n, 0, HookAllocator<uint8_t>(m));
+  for (Array<double> *a : {&x, &v, &v_free, &x_end, &v_end, &f, &load, &impulse, &inv_mass})
+    *a = zeros(size_t{kStride} * n);
+}
+
 void settle_dampers(Phyxels &p) {
   if (p.dampers.lag > 0) p.dampers.v.assign(p.v.begin(), p.v.end());
   else p.dampers.v.clear();
+}
+
+Extent extent_of(const double *x, size_t n, size_t stride) {
+  Extent out;
+  for (size_t i = 0; i < n; ++i) out.add(load3(x + stride * i));
+  return out;
 }
 
 double tet_volume(const double *x, uint32_t stride, const uint32_t t[4]) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/memory.h"
+#include "math/extent.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -32,6 +33,10 @@ struct Phyxels {
   Array<uint8_t> held;         // [n] bits 1 x, 2 y, 4 z
   Dampers dampers;
 
+  Vec3 rest_at(size_t i) const { return load3(&rest[3 * i]); }
+  Vec3 x_at(size_t i) const { return load3(&x[kStride * i]); }
+  Vec3 v_at(size_t i) const { return load3(&v[kStride * i]); }
+  void size(const Memory &m, uint32_t points);  // all arrays but those of the dampers, with zeros
   bool moves(size_t component) const { return inv_mass[component] > 0; }  // of [n,4]: not held
 };
 
@@ -43,6 +48,7 @@ LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const u
 void update_inverse_mass(Phyxels &p);  // and least_mass
 void settle_dampers(Phyxels &p);       // as if v had been the same for long
 
+Extent extent_of(const double *x, size_t n, size_t stride);  // of n points
 double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);
 
 }  // namespace dfm

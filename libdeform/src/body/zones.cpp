@@ -6,13 +6,6 @@
 namespace dfm {
 namespace {
 
-// Twice the present vector area of a triangle.
-Vec3 area_normal(const Surface &s, uint32_t t) {
-  const uint32_t *const c = &s.tri[size_t{3} * t];
-  const Vec3 a = load3(&s.x[size_t{4} * c[0]]);
-  return cross(load3(&s.x[size_t{4} * c[1]]) - a, load3(&s.x[size_t{4} * c[2]]) - a);
-}
-
 // tris: ascending, all of them triangles.
 uint32_t facing_zone(const Surface &s, const Array<uint32_t> &of, std::span<const uint32_t> tris,
                      Vec3 outward) {
@@ -27,7 +20,7 @@ uint32_t facing_zone(const Surface &s, const Array<uint32_t> &of, std::span<cons
     for (size_t j = 0; j < tris.size(); ++j) {
       if (s.patch[tris[j]] != s.patch[tris[i]]) continue;
       first = first && j >= i;
-      sum += area_normal(s, tris[j]);
+      sum += s.area2(tris[j], [&](uint32_t surfel) { return load3(&s.x[size_t{4} * surfel]); });
     }
     if (!first) continue;
     const double length = norm(sum), facing = length > 0 ? dot(sum, outward) / length : -1;

@@ -174,14 +174,18 @@ bool ModelInstance::works(std::string_view effect) const {
   return false;
 }
 
-std::vector<EffectRow> ModelInstance::effect_rows() const {
+const void *ModelInstance::extension(const char *id) const noexcept {
   const void *table = nullptr;
   if (ops->extension)
     call("extension", [&] {
-      table = ops->extension(self, DFM_EXT_EFFECT_ROWS);
+      table = ops->extension(self, id);
       return DFM_OK;
     });
-  return copy_effect_rows(*type, table);
+  return table;
+}
+
+std::vector<EffectRow> ModelInstance::effect_rows() const {
+  return copy_effect_rows(*type, extension(DFM_EXT_EFFECT_ROWS));
 }
 
 uint32_t ModelInstance::limited_cells() const {

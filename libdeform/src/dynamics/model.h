@@ -35,8 +35,12 @@ struct ModelInstance {
   Array<double> state, state_out;  // slots end to end
 
   ModelInstance() = default;
-  ModelInstance(const ModelInstance &) = delete;
-  ModelInstance &operator=(const ModelInstance &) = delete;
+  // exchange the two
+  ModelInstance(ModelInstance &&other) noexcept { swap(other); }
+  ModelInstance &operator=(ModelInstance &&other) noexcept {
+    swap(other);
+    return *this;
+  }
   ~ModelInstance() {
     if (self && ops->destroy)
       call("destroy", [&] {
@@ -48,6 +52,7 @@ struct ModelInstance {
   // Creates the instance and its state; throws Error, which names the plugin, if it refuses.
   void create(const dfm_type &t, const dfm_host &host, const dfm_mesh &mesh, const Memory &memory,
               std::vector<double> values);
+  const void *extension(const char *id) const noexcept;  // its table; null: none
   // Runs f, which calls into the plugin: an exception becomes a status, a failure is logged as `what`.
   template <class F>
   dfm_status call(const char *what, F &&f) const noexcept {

@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "core/memory.h"
+#include "math/vec3.h"
 
 namespace dfm {
 
@@ -64,6 +65,13 @@ struct Surface {
   void each_phyxel(uint32_t s, F &&f) const {
     if (identity()) return f(point[s], 1.0);
     for (uint32_t j = row[s]; j < row[s + 1]; ++j) f(col[j], weight[j]);
+  }
+
+  // Twice the area of a triangle whose surfels are at these places, along its normal.
+  template <class At>
+  Vec3 area2(size_t t, At &&at) const {
+    const Vec3 a = at(tri[3 * t]);
+    return cross(at(tri[3 * t + 1]) - a, at(tri[3 * t + 2]) - a);
   }
 
   // Triangles that coincided with others when a cut opened the face between them, and their surfels; `slit`:

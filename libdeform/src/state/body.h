@@ -8,9 +8,7 @@
 #include "deform/deform.h"
 #include "dynamics/dynamics.h"
 #include "dynamics/mass_scaling.h"
-#include "state/change_book.h"
 #include "state/cut_record.h"
-#include "state/cuts_ahead.h"
 #include "state/energy_book.h"
 #include "state/model_choice.h"
 #include "state/motion.h"
@@ -80,11 +78,11 @@ struct Withheld {
 std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<CellField> &fields);
 
 struct SpareModel {
-  std::unique_ptr<ModelInstance> instance;
+  ModelInstance instance;
   ModelOrigin origin;
   Withheld withheld;
   const std::vector<double> &asked() const {
-    return withheld.asked.empty() ? instance->params : withheld.asked;
+    return withheld.asked.empty() ? instance.params : withheld.asked;
   }
 };
 
@@ -96,9 +94,19 @@ struct Squeezed {
   bool told = false;
 };
 
-// Points and cells of a body, and what depends on them. A cut exchanges it for another (world/body_shape.h).
-struct Discretization {
-  Phyxels p;
+// How a body moves: model instance and dynamics, with the inputs of both.
+struct BodyModel {
+  ModelInstance model;
+  std::unique_ptr<Dynamics> dynamics;  // of points and model of the body that has it
+  std::vector<CellField> fields;
+  std::vector<Unused> unused;
+  ModelOrigin origin;
+  Withheld withheld;
+  Integrator integrator;
+};
+
+// Cells of a body, and what follows from them and from the points at rest alone.
+struct Structure {
   Array<uint32_t> tets, edges;
   Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
   Surface surface;
@@ -106,57 +114,65 @@ struct Discretization {
   CutRecord cut;
   // a new number after each cut: what is derived from points, cells or surface is out of date
   uint64_t shape = 0;
-  Array<double> share;           // [ntet] how much of each cell is material; empty: all
-  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
-  Array<double> anchor;          // [n,4] m, positions at the start of its calm; empty if sleep is off
+  Array<double> share;  // [ntet] how much of each cell is material; empty: all
   Makeup makeup;
-  double mass = 0, rest_volume = 0;
+};
+
+// What lasts by points. Snapshots have it.
+struct OnPoints {
   std::vector<Load> loads;
   std::vector<Spring> springs;
   std::vector<HeldMotion> motions;
+  std::vector<BladeTrack> blades;  // of the last cuts
+  Array<double> anchor;            // [n,4] m, positions at the start of its calm; empty if sleep is off
+};
+
+// Points and cells of a body, and what depends on them. A cut exchanges it for another (world/body_shape.h).
+struct BodyShape : Structure, OnPoints, BodyModel {
+  Phyxels p;
+  Vec3 corner(size_t cell, size_t k) const { return p.x_at(tets[4 * cell + k]); }
+  uint32_t ncell() const { return static_cast<uint32_t>(tets.size() / 4); }
+  Array<double> surfel_impulse;  // [nsurfel,3] N s of the last sub-step
+  double mass = 0, rest_volume = 0;
   // instances for future changes; they keep what they computed from the mesh
   std::vector<SpareModel> spares;
-  std::vector<BladeTrack> blades;       // of the last cuts
   std::unique_ptr<SearchTree> search;   // rays and closest points
   std::unique_ptr<SelfRest> self_rest;  // made with a cut; null: made when it is needed
 };
 
-struct Body : Discretization {
+// What lasts of a body beside its points and its model. Snapshots have it.
+struct BodyState {
+  uint32_t category = 1, collides_with = ~0u;
+  SeparateRule separate;
+  std::vector<PlannedCut> planned_cuts;  // by time
+  std::vector<Switch> switches;          // future changes, by time
+  std::vector<SwitchRule> rule;          // one or none
+  uint64_t first_model = 0;              // hash of the model's inputs when the world took its first step
+  uint32_t next_load = 1;                // number of the next load or spring
+  Vec3 contact_impulse;                  // N s since creation
+  EnergyBook energy;
+  ChangeBook changes;
+  Slumber slumber;
+};
+
+struct Body : BodyShape, BodyState {
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
   uint32_t slot = 0;
   std::string name, material;
-  uint32_t category = 1, collides_with = ~0u;
   bool sensor = false;  // reports what overlaps it, and pushes nothing
   bool tears = false;   // a material of its cells tears at a limited strain
   void *user = nullptr;
 
   uint64_t x_version = 1;  // increases whenever p.x may have changed
-  uint32_t ncell() const { return static_cast<uint32_t>(tets.size() / 4); }
   bool emptied = false;    // a cut has removed all cells; the body is in World::emptied
   uint64_t piece_of = 0;   // id of the body, made by the host, of which this one is a piece; 0: none
   std::string whole_name;  // name of that body; its rules of friction and contact apply to this piece too
   bool undone = false;     // a piece that a restore has removed; it is in World::undone
-  SeparateRule separate;
-  std::vector<PlannedCut> planned_cuts;  // by time
   CutsAhead ahead;
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   double support = 0;              // of that coupling, as in the def
-  ModelInstance model;
-  std::unique_ptr<Dynamics> dynamics;  // how it moves
-  Integrator integrator;
-  ModelOrigin origin;
-  Withheld withheld;
-  MassScaling scaling;           // of p.mass, for the model that it was made with
-  std::vector<Switch> switches;  // future changes, by time
-  std::vector<SwitchRule> rule;  // one or none
-  uint64_t first_model = 0;      // hash of the model's inputs when the world took its first step
-  std::vector<CellField> fields;
-  std::vector<Unused> unused;
-  uint32_t next_load = 1;  // number of the next load or spring
-  Vec3 contact_impulse;    // N s since creation
-  EnergyBook energy;
-  ChangeBook changes;
+  MassScaling scaling;             // of p.mass, for the model that it was made with
   // as last computed; valid while asleep
   struct {
     bool known = false, near = false;  // near: it has contacts or attachments
@@ -165,7 +181,6 @@ struct Body : Discretization {
     double strain_rate = 0;  // 1/s, of the edge that stretches fastest
   } bound;
   Squeezed squeezed;
-  Slumber slumber;
   // until prepare() has seen it: the surface before the last cut, and where its features are now
   std::unique_ptr<FormerSurface> former_surface;
 

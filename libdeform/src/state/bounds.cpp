@@ -4,10 +4,8 @@
 #include <cmath>
 #include <cstdio>
 
-#include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "geometry/obstacle_shape.h"
-#include "geometry/voxel_grid.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 
@@ -28,13 +26,8 @@ double speed_limit(const World &w) {
 
 // Radius at which a rotation of an obstacle is measured. A plane has no extent; its tilt is measured at 1 m.
 double turned(const Obstacle &o) {
-  ObstacleView v{};
-  v.shape = Shape(o.def.shape);
-  v.half_size = load3(o.def.half_size);
-  v.radius = o.def.radius;
-  v.half_length = o.def.half_length;
-  v.extent = o.mesh ? o.mesh->extent : o.grid ? o.grid->extent() : 0;
-  return v.shape == Shape::plane || v.shape == Shape::none ? 1 : ObstacleShape(v).extent();
+  const Shape shape = Shape(o.def.shape);
+  return shape == Shape::plane || shape == Shape::none ? 1 : o.standing().extent();
 }
 
 double speed_of(const Obstacle &o, const Pose &from, const Pose &to, double seconds) {
@@ -87,14 +80,10 @@ void check_resolved(const char *name, double far, double edge) {
 double thickness(const Body &b) {
   const Surface &s = b.surface;
   double area = 0;
-  for (uint32_t t = 0; t < s.ntri; ++t) {
-    const auto x = [&](size_t k) {
-      const uint32_t surfel = s.tri[size_t{3} * t + k];
-      return s.identity() ? load3(&b.p.rest[size_t{3} * s.point[surfel]])
-                          : load3(&s.rest[size_t{3} * surfel]);
-    };
-    area += 0.5 * norm(cross(x(1) - x(0), x(2) - x(0)));
-  }
+  const auto at = [&](uint32_t surfel) {
+    return s.identity() ? b.p.rest_at(s.point[surfel]) : load3(&s.rest[size_t{3} * surfel]);
+  };
+  for (uint32_t t = 0; t < s.ntri; ++t) area += 0.5 * norm(s.area2(t, at));
   return area > 0 ? 2 * b.rest_volume / area : 0;
 }
 

@@ -1,4 +1,4 @@
-// Lasting state of the energy watch (step/energy_watch.h).
+// Lasting state of the energy watch (step/energy_watch.h), and energy that changes of models have added.
 #pragma once
 #include <cstdint>
 
@@ -10,6 +10,18 @@ struct EnergyBook {
   double base = 0;     // J, least balance so far, plus the energy that stiff modes may return
   double work = 0;     // J, since base was first taken
   double kinetic = 0;  // J, after predict, at the last check
+};
+
+// Energy that changes of a body's model have added, and that the body has lost since (world/change_energy.h).
+// Begins with the first change. Lasting state.
+struct ChangeBook {
+  bool open = false;
+  bool told = false;   // a warning that a change was refused because of the sum has been given
+  double unpaid = 0;   // J that changes have put in and that had not been lost by the last look; below 0:
+                       // that they have taken out
+  double level = 0;    // J, kinetic and elastic energy at the last check
+  double work = 0;     // J of external work on the body since
+  double largest = 0;  // J, largest energy so far, minus the unpaid part
 };
 
 inline constexpr uint32_t kMostCredit = 4096;  // sub-steps

@@ -65,11 +65,10 @@ namespace {
 
 // A model parameter that the body does not give comes from the material's entry of the same key.
 std::vector<double> values_of(const dfm_type &type, const dfm_params &given, const Material &m) {
-  std::vector<dfm_param_value> entries;
-  const double *const values[] = {&m.def.young, &m.def.poisson, &m.def.damping_mass,
-                                  &m.def.damping_stiffness};
-  const char *const keys[] = {"young", "poisson", "damping_mass", "damping_stiffness"};
-  for (int i = 0; i < 4; ++i) entries.push_back({keys[i], values[i], 1});
+  std::vector<dfm_param_value> entries = {{"young", &m.def.young, 1},
+                                          {"poisson", &m.def.poisson, 1},
+                                          {"damping_mass", &m.def.damping_mass, 1},
+                                          {"damping_stiffness", &m.def.damping_stiffness, 1}};
   for (size_t i = 0; i < m.extra_keys.size(); ++i)
     entries.push_back(
         {m.extra_keys[i].c_str(), m.extra_values[i].data(), static_cast<uint32_t>(m.extra_values[i].size())});
@@ -81,18 +80,12 @@ std::vector<double> values_of(const dfm_type &type, const dfm_params &given, con
                      });
 }
 
-std::vector<std::string> keys_by_cell(const dfm_type &type) {
+[[noreturn]] void unknown_field(const dfm_type &type, const std::string &body, const char *key) {
   std::vector<std::string> keys;
   for (uint32_t i = 0; i < type.nparam; ++i)
     if (type.params[i].flags & DFM_PARAM_PER_CELL) keys.push_back(type.params[i].key);
-  return keys;
-}
-
-[[noreturn]] void unknown_field(const dfm_type &type, const std::string &body, const char *key) {
-  const std::vector<std::string> keys = keys_by_cell(type);
-  bool row = false;
-  for (uint32_t i = 0; i < type.nparam; ++i) row = row || std::strcmp(type.params[i].key, key) == 0;
-  const std::string meant = row ? ", it holds for the whole body" : did_you_mean(key, keys, '\'');
+  const std::string meant =
+      find_row(type, key) ? ", it holds for the whole body" : did_you_mean(key, keys, '\'');
   const std::string has = keys.empty() ? "it takes no parameter by cell" : "by cell it takes: " + join(keys);
   fail(DFM_E_ARG, "body '%s': field '%s': %s has no such parameter by cell%s; %s", body.c_str(), key, type.id,
        meant.c_str(), has.c_str());
@@ -117,12 +110,11 @@ void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t 
 void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body) {
   if (def.nfield && !def.fields)
     fail(DFM_E_ARG, "body '%s': %u fields are announced, but fields is NULL", body.c_str(), def.nfield);
-  const std::vector<std::string> keys = keys_by_cell(type);
   for (uint32_t n = 0; n < def.nfield; ++n) {
     const dfm_cell_field &f = def.fields[n];
     if (!f.key || !f.values)
       fail(DFM_E_ARG, "body '%s': field %u has no %s", body.c_str(), n, f.key ? "values" : "key");
-    if (std::find(keys.begin(), keys.end(), f.key) == keys.end()) unknown_field(type, body, f.key);
+    if (!by_cell(type, f.key)) unknown_field(type, body, f.key);
     for (uint32_t k = 0; k < n; ++k)
       if (std::strcmp(def.fields[k].key, f.key) == 0)
         fail(DFM_E_ARG, "body '%s': the field '%s' is given twice", body.c_str(), f.key);
@@ -130,8 +122,7 @@ void check_fields(const dfm_type &type, const dfm_body_def &def, const std::stri
       if (def.model_params.values[k].key && std::strcmp(def.model_params.values[k].key, f.key) == 0)
         fail(DFM_E_ARG, "body '%s': '%s' is given both as one value and as a field; keep one", body.c_str(),
              f.key);
-    for (uint32_t i = 0; i < type.nparam; ++i)
-      if (std::strcmp(type.params[i].key, f.key) == 0) check_field_values(type.params[i], f, def.ntet, body);
+    check_field_values(*find_row(type, f.key), f, def.ntet, body);
   }
 }
 
@@ -183,15 +174,14 @@ void scale_young(const Body &b, const World &w, const char *model, const Row &ro
 }  // namespace
 
 bool by_cell(const dfm_type &type, const std::string &key) {
-  const std::vector<std::string> keys = keys_by_cell(type);
-  return std::find(keys.begin(), keys.end(), key) != keys.end();
+  const dfm_param *const row = find_row(type, key.c_str());
+  return row && (row->flags & DFM_PARAM_PER_CELL);
 }
 
 std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<CellField> &fields) {
   std::vector<uint8_t> out(type.nparam);
   for (uint32_t row = 0; row < type.nparam; ++row)
-    out[row] = std::any_of(fields.begin(), fields.end(),
-                           [&](const CellField &f) { return f.key == type.params[row].key; });
+    out[row] = std::ranges::find(fields, type.params[row].key, &CellField::key) != fields.end();
   return out;
 }
 

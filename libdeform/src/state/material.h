@@ -22,6 +22,12 @@ struct Material {
   dfm_material_def def{};
   std::vector<std::string> extra_keys;
   std::vector<std::vector<double>> extra_values;
+  // The first value of the entry of this key, or `none` if it has no such entry.
+  double entry(const char *key, double none) const {
+    for (size_t i = 0; i < extra_keys.size(); ++i)
+      if (extra_keys[i] == key) return extra_values[i][0];
+    return none;
+  }
 };
 
 // The materials of a body's cells. One entry in `list`: the same everywhere, and `of` is empty.

@@ -33,12 +33,6 @@ void check(const std::vector<Key> &keys, const char *what, Finite finite) {
   }
 }
 
-bool all_finite(const double *p, int n) {
-  for (int i = 0; i < n; ++i)
-    if (!std::isfinite(p[i])) return false;
-  return true;
-}
-
 }  // namespace
 
 Vec3 spin_between(Quat a, Quat b, double h) {

@@ -1,6 +1,7 @@
 #include "state/obstacle.h"
 
 #include "body/obstacle_mesh.h"
+#include "geometry/obstacle_shape.h"
 #include "geometry/voxel_grid.h"
 #include "state/search_tree.h"
 
@@ -14,6 +15,18 @@ Pose Obstacle::pose_at_time(double t) const {
   if (def.sine.frequency != 0 || def.sine.phase != 0)
     p.position += sine_at(def.sine, t) * load3(def.sine.amplitude);
   return p;
+}
+
+ObstacleShape Obstacle::standing() const {
+  ObstacleView v{};
+  v.shape = Shape(def.shape);
+  v.position = pose.position;
+  v.rotation = pose.rotation;
+  v.half_size = load3(def.half_size);
+  v.radius = def.radius;
+  v.half_length = def.half_length;
+  v.extent = mesh ? mesh->extent : grid ? grid->extent() : 0;
+  return ObstacleShape(v);
 }
 
 }  // namespace dfm

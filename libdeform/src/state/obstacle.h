@@ -10,23 +10,29 @@
 
 namespace dfm {
 
+class ObstacleShape;
 struct ObstacleMesh;
 struct RigidSet;
 class SearchTree;
 class VoxelGrid;
 struct World;
 
-struct Obstacle {
-  World *world = nullptr;
-  uint64_t id = 0, handle = 0;
-  uint32_t slot = 0;
-  std::string name, material;
+// What lasts of an obstacle. Snapshots have it, and some members of its def.
+struct ObstacleState {
+  std::string material;
   SurfaceZones::Zone zone{"", "", kDefaultFriction};
-  dfm_obstacle_def def{};
   std::vector<dfm_pose_key> keys;
   Pose pose;    // now
   Pose target;  // at the end of the next step, if move_to was called
   bool has_target = false;
+};
+
+struct Obstacle : ObstacleState {
+  World *world = nullptr;
+  uint64_t id = 0, handle = 0;
+  uint32_t slot = 0;
+  std::string name;
+  dfm_obstacle_def def{};
   bool sensor = false;        // reports what overlaps it, and pushes nothing
   RigidSet *rigid = nullptr;  // if it is a body of a rigid host: its index in `rigid`
   uint32_t rigid_body = 0;
@@ -45,6 +51,7 @@ struct Obstacle {
   Obstacle();
   ~Obstacle();
   Pose pose_at_time(double t) const;
+  ObstacleShape standing() const;  // where it is now; of a mesh and voxels the extent alone
   // Of a sub-step, in a step whose remaining time from t is `left`. rest: s, to the end of the planned
   // sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has to be then:
   // what it was held back earlier, it catches up in that time and not in the first piece, however short.

@@ -10,13 +10,13 @@
 
 #include "contact/report.h"
 #include "contact/store.h"
+#include "core/memory.h"
 #include "plan/plan.h"
 #include "plugin/selection.h"
 #include "state/attachment.h"
 #include "state/body.h"
 #include "state/energy_book.h"
 #include "state/impulses.h"
-#include "state/meters.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
 #include "state/rigid_report.h"
@@ -87,7 +87,6 @@ struct Sensed {
   auto operator<=>(const Sensed &) const = default;
 };
 
-// A measurement of creep (dfm_world_hold_begin).
 // Simulated time by integrator, where the library chooses implicit time; not in snapshots.
 struct IntegratorTimes {
   double all = 0, implicit = 0;  // s
@@ -96,6 +95,7 @@ struct IntegratorTimes {
   bool told_blow = false;  // and one that a body did not rebound
 };
 
+// A measurement of creep (dfm_world_hold_begin).
 struct Hold {
   bool on = false;
   double start = 0;  // s
@@ -106,9 +106,49 @@ struct Hold {
 inline constexpr size_t kMostEvents = 65536;
 inline constexpr size_t kEventsAtOnce = 1024;
 
-struct World {
+// What lasts of a world beside its bodies and obstacles. Snapshots have it.
+struct WorldState {
+  uint64_t next_id = 1;
+  double time = 0;  // s
+  uint64_t step_count = 0;
+  StepSizes sizes;
+  EnergyWatch watch;
+  double struck_until = 0;  // s, until which bodies are explicit because of an impact; 0: none
+  Hold hold;
+  dfm_world_stats stats{};
+  std::vector<FrictionRule> friction;
+  std::vector<FilterRule> filters;
+  std::vector<Attachment> attachments;  // in order of creation
+  ContactStore store;
+  ContactStore tool_store;  // of tools with each other and with rigid bodies (step/tool_touch.h)
+  Report report;
+  RigidReport rigid_report;
+  std::vector<PairWork> work;             // sorted by (a, b)
+  std::vector<dfm_contact_event> events;  // a restore drops them
+  std::vector<Swap> swaps;                // not yet read by the host; a restore drops them
+  explicit WorldState(const Memory &contacts)
+      : store(contacts), tool_store(contacts), report(contacts), rigid_report(contacts) {}
+};
+
+// Memory of the parts of a world (dfm_world_memory). Each part allocates through its meter.
+struct Meters {
+  Meter bodies;     // points, cells, surfaces, couplings, data of models for each body
+  Meter dynamics;   // dynamics of bodies: matrices and factors of implicit ones
+  Meter obstacles;  // surfaces, voxels
+  Meter detection;  // trees, lists of pairs
+  Meter contacts;   // rows, states of laws, lasting contacts, reports
+  Meter steps;      // other buffers of a step
+  explicit Meters(const Memory &m)
+      : bodies(m), dynamics(m), obstacles(m), detection(m), contacts(m), steps(m) {}
+};
+
+// Before everything that allocates through the meters.
+struct WorldMemory {
   dfm_context *context;
-  Meters meters;  // declared before everything that they count
+  Meters meters;
+};
+
+struct World : WorldMemory, WorldState {
   uint64_t handle = 0;
   dfm_world_def def{};
   Selection selection;            // by the list of effects
@@ -129,9 +169,6 @@ struct World {
   std::vector<std::unique_ptr<RigidSet>> rigid_sets;
   std::vector<std::unique_ptr<Tool>> tools;        // in order of creation; the parts of each are a set
   std::vector<std::unique_ptr<LawInstance>> laws;  // the first is the default law, made when first needed
-  std::vector<FrictionRule> friction;
-  std::vector<FilterRule> filters;
-  std::vector<Attachment> attachments;  // in order of creation
   MayTouch may_touch;
   PreSolve pre_solve;
   uint32_t sensors = 0;        // how many there are
@@ -140,7 +177,6 @@ struct World {
   Overlaps overlaps;
   // increases when positions or d_c change other than by a step
   uint64_t placements = 0;
-  uint64_t next_id = 1;
 
   // Derived from the above by prepare() whenever something changed.
   bool changed = true;
@@ -149,30 +185,15 @@ struct World {
   PairTables pairs;
   double offset = 0;  // d_c, m
 
-  // Time.
-  double time = 0;  // s
-  uint64_t step_count = 0;
   WorldBound bound;
-  StepSizes sizes;
-  EnergyWatch watch;
-  double struck_until = 0;  // s, until which bodies are explicit because of an impact; 0: none
   IntegratorTimes integrator_times;
   std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
 
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h
 
-  ContactStore store;
-  ContactStore tool_store;  // of tools with each other and with rigid bodies (step/tool_touch.h)
-  Report report;
-  RigidReport rigid_report;
-  std::vector<PairWork> work;  // sorted by (a, b)
-  std::vector<dfm_contact_event> events;
-  std::vector<Swap> swaps;  // not yet read by the host
   StepImpulses step_impulses;
-  Hold hold;
   uint32_t sleepers = 0;
 
-  dfm_world_stats stats{};
   std::unique_ptr<Aside> aside;  // null: nothing has been made beside the steps
 
   explicit World(dfm_context *c);

@@ -60,10 +60,7 @@ class LineMotion {
 };
 
 double toughness(const Body &b, uint32_t cell) {
-  const Material &m = b.makeup.materials[b.makeup.of.empty() ? 0 : b.makeup.of[cell]];
-  for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    if (m.extra_keys[i] == kToughnessKey) return m.extra_values[i][0];
-  return 0;
+  return b.makeup.materials[b.makeup.of.empty() ? 0 : b.makeup.of[cell]].entry(kToughnessKey, 0);
 }
 
 // m2, of the face between two cells, with its normal from i to j.
@@ -72,8 +69,7 @@ Vec3 area_between(const Body &b, uint32_t i, uint32_t j, Vec3 way) {
   size_t n = 0;
   const uint32_t *const c = &b.tets[size_t{4} * j];
   for (size_t k = 0; k < 4 && n < 3; ++k)
-    if (const uint32_t p = b.tets[size_t{4} * i + k]; std::find(c, c + 4, p) != c + 4)
-      x[n++] = load3(&b.p.x[size_t{kStride} * p]);
+    if (const uint32_t p = b.tets[size_t{4} * i + k]; std::find(c, c + 4, p) != c + 4) x[n++] = b.p.x_at(p);
   const Vec3 area = 0.5 * cross(x[1] - x[0], x[2] - x[0]);
   return dot(area, way) < 0 ? -area : area;
 }
@@ -81,7 +77,7 @@ Vec3 area_between(const Body &b, uint32_t i, uint32_t j, Vec3 way) {
 // Or will be.
 bool is_open(const Body &b, uint32_t i, uint32_t j) {
   if (b.cut.open.empty() && b.ahead.faces.empty()) return false;
-  const uint64_t face = face_of_whole(b, i, j);
+  const uint64_t face = face_of_whole(b, open_face(i, j));
   return std::binary_search(b.cut.open.begin(), b.cut.open.end(), face) || b.ahead.has(face);
 }
 

@@ -13,18 +13,6 @@
 namespace dfm {
 namespace {
 
-// The table of an extension; head: bytes that every version of it has.
-template <class Table>
-std::optional<Table> ask(const Body &b, const char *id, size_t head, const char *name) {
-  const void *table = nullptr;
-  if (b.model.ops->extension)
-    b.model.call("extension", [&] {
-      table = b.model.ops->extension(b.model.self, id);
-      return DFM_OK;
-    });
-  return copy_table<Table>(table, head, b.model.type->id, name);
-}
-
 // Row i of a list whose rows may be longer or shorter than those of this library.
 template <class Row>
 Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
@@ -36,6 +24,7 @@ Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
 
 // The first fields of a row of ABI 1.
 constexpr uint32_t kFactHead = offsetof(dfm_fact, value) + sizeof(double);
+constexpr size_t kFactsHead = offsetof(dfm_facts, list) + sizeof(void *);  // of their table
 
 }  // namespace
 
@@ -78,7 +67,7 @@ std::vector<LeftOut> left_out_of(const Body &b) {
 std::vector<BodyFact> body_facts(const Body &b) {
   std::vector<BodyFact> out;
   const auto table =
-      ask<dfm_facts>(b, DFM_EXT_FACTS, offsetof(dfm_facts, list) + sizeof(void *), "dfm_facts");
+      copy_table<dfm_facts>(b.model.extension(DFM_EXT_FACTS), kFactsHead, b.model.type->id, "dfm_facts");
   if (!table || !table->list || table->row_size < kFactHead) return out;
   uint32_t n = 0;
   const dfm_fact *facts = nullptr;

@@ -24,9 +24,7 @@ namespace {
 constexpr char kPrecision[] = "precision";
 
 bool is_precision(const dfm_type &type, const char *key) {
-  if (!key || std::strcmp(key, kPrecision) != 0) return false;
-  return std::none_of(type.params, type.params + type.nparam,
-                      [](const dfm_param &row) { return std::strcmp(row.key, kPrecision) == 0; });
+  return key && std::strcmp(key, kPrecision) == 0 && !find_row(type, kPrecision);
 }
 
 // Calls use(key, value, width) for each; keys end in a zero.
@@ -54,14 +52,28 @@ bool asks_single(const dfm_type &type, const ModelParams &params) {
   return single;
 }
 
-// None: its points move explicitly, or the integrator is not chosen yet (out.open).
-std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t asked,
-                                           Integrator &out) {
-  if (asked < DFM_INTEGRATOR_AUTO || asked > DFM_INTEGRATOR_TR_BDF2)
+}  // namespace
+
+void check_integrator(const std::string &body, int32_t integrator) {
+  if (integrator < DFM_INTEGRATOR_AUTO || integrator > DFM_INTEGRATOR_TR_BDF2)
     fail(DFM_E_UNSUPPORTED,
          "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
          "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
-         name.c_str(), asked);
+         body.c_str(), integrator);
+}
+
+void check_given(const Body &b, const dfm_params &params) {
+  if (params.n && !params.values)
+    fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(),
+         params.n);
+}
+
+namespace {
+
+// None: its points move explicitly, or the integrator is not chosen yet (out.open).
+std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t asked,
+                                           Integrator &out) {
+  check_integrator(name, asked);
   const int32_t which = asked == DFM_INTEGRATOR_AUTO ? w.def.integrator : asked;
   out.open = which == DFM_INTEGRATOR_AUTO;
   if (out.open || which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
@@ -72,26 +84,28 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
 }
 
 // The longest explicit sub-step of the body, for the choice of the integrator.
-void ask_explicit_bound(const World &w, double time, Dynamics &dynamics, Integrator &out) {
+void ask_explicit_bound(const World &w, double time, Body &b) {
+  Integrator &out = b.integrator;
   StepBound bound;
-  if (w.def.step == 0 || !dynamics.bound(time, out.share, [](double *, double *) {}, bound)) return;
+  if (w.def.step == 0 || !b.dynamics->bound(time, out.share, [](double *, double *) {}, bound)) return;
   out.step = kBoundShare * bound.step;
   out.point = bound.point;
 }
 
+Pose rest_frame(const Body &b) { return rests_unplaced(*b.model.type) ? Pose{} : b.origin.frame; }
+
 }  // namespace
 
-void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out, const ModelOrigin &origin) {
-  const Pose placed = rests_unplaced(*b.model.type) ? Pose{} : origin.frame;
-  const ExplicitTime found = dynamics.measure(placed, b.shape == 0);
-  out.share = found.share;
+void measure_explicit(Body &b) {
+  const ExplicitTime found = b.dynamics->measure(rest_frame(b), b.shape == 0);
+  b.integrator.share = found.share;
   const bool had = b.p.dampers.lag > 0;
   b.p.dampers.lag = found.lag;
   if (had != (found.lag > 0)) settle_dampers(b.p);
 }
 
 bool rest_rows(const Body &b, double share, RestRows &out) {
-  return b.dynamics->rest_rows(rests_unplaced(*b.model.type) ? Pose{} : b.origin.frame, share, out);
+  return b.dynamics->rest_rows(rest_frame(b), share, out);
 }
 
 void give_scaled_mass(Body &b, double share) {
@@ -136,7 +150,7 @@ std::vector<dfm_cell_field> fields_for(const dfm_type &type, const Body &b, std:
 
 // Also sets what depends on them: fields, unused entries.
 std::vector<double> values_for(const World &w, const Body &b, const dfm_type &type, const ModelParams &params,
-                               BodyModel &out) {
+                               MadeModel &out) {
   CellMaterials cells;
   for (const Material &m : b.makeup.materials) cells.list.push_back(&m);
   cells.of = b.makeup.of;
@@ -156,24 +170,24 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
 }
 
 // An instance that the body had before with the same inputs, or none.
-bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, BodyModel &out) {
+bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values, MadeModel &out) {
   const ModelOrigin &origin = out.origin;
   const bool turns = rests_unplaced(type);
   const auto fits = [&](const SpareModel &s) {
-    return s.instance->type == &type && s.asked() == values && s.origin.params == origin.params &&
+    return s.instance.type == &type && s.asked() == values && s.origin.params == origin.params &&
            s.origin.held == origin.held &&
            (turns || std::memcmp(&s.origin.frame, &origin.frame, sizeof origin.frame) == 0);
   };
   const auto found = std::find_if(b.spares.begin(), b.spares.end(), fits);
   if (found == b.spares.end()) return false;
-  found->instance->start();
-  out.instance.swap(*found->instance);
+  found->instance.start();
+  out.model.swap(found->instance);
   out.withheld = std::move(found->withheld);
   b.spares.erase(found);
   return true;
 }
 
-void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> values, BodyModel &out) {
+void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> values, MadeModel &out) {
   const Memory &m = w.memory();
   const MeshCoupling coupling(m, b.surface);
   std::vector<const char *> field_keys;
@@ -199,68 +213,60 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.edges = b.edges.data();
   mesh.fixed = out.origin.held.data();
   coupling.tell(mesh);
-  if (!take_spare(b, type, values, out))
-    out.instance.create(type, w.context->host, mesh, m, std::move(values));
-  if (asks_single(type, out.origin.params)) out.instance.use_single();
+  if (!take_spare(b, type, values, out)) out.model.create(type, w.context->host, mesh, m, std::move(values));
+  if (asks_single(type, out.origin.params)) out.model.use_single();
 }
 
 void drop_fields(const dfm_type &type, const Withheld &withheld, std::vector<CellField> &fields) {
   std::erase_if(fields, [&](const CellField &f) {
-    for (uint32_t row = 0; row < type.nparam; ++row)
-      if (f.key == type.params[row].key) return withheld.by_cell[row] != 0;
-    return false;
+    const dfm_param *const row = find_row(type, f.key.c_str());
+    return row && withheld.by_cell[size_t(row - type.params)] != 0;
   });
 }
 
 // Leaves out effects that are not in the list of effects. First makes an instance with all parameters: it
 // knows which effects are active and what switches them off.
-void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> values, BodyModel &out) {
+void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> values, MadeModel &out) {
   make_instance(w, b, type, values, out);
   if (!w.selection.listed()) return;
   if (!out.withheld.asked.empty()) return drop_fields(type, out.withheld, out.fields);  // from the spares
   Withheld withheld{values, differs_by_cell(type, out.fields)};
   std::vector<uint8_t> left = withheld.by_cell;
-  const auto works = [&](const std::string &effect) { return out.instance.works(effect); };
-  if (!leave_out(type, out.instance.effect_rows(), w.selection, works, values, left)) return;
+  const auto works = [&](const std::string &effect) { return out.model.works(effect); };
+  if (!leave_out(type, out.model.effect_rows(), w.selection, works, values, left)) return;
   for (uint32_t row = 0; row < type.nparam; ++row)
     withheld.by_cell[row] = withheld.by_cell[row] && !left[row];
   drop_fields(type, withheld, out.fields);
-  ModelInstance().swap(out.instance);
+  ModelInstance().swap(out.model);
   make_instance(w, b, type, std::move(values), out);
   out.withheld = std::move(withheld);
 }
 
 void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
-                BodyModel &out) {
+                MadeModel &out) {
   const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
   const OnBehalf speaks(b.name);
   make_selected(w, b, type, std::move(values), out);
   // the dynamics of a body refer to its own instance and points, which are the new ones by now
   struct Lent {
     Body &b;
-    BodyModel &made;
-    Lent(Body &x, BodyModel &y) : b(x), made(y) { exchange_own(); }
+    MadeModel &made;
+    Lent(Body &x, MadeModel &y) : b(x), made(y) { exchange(b, made); }
     Lent(const Lent &) = delete;
-    Lent &operator=(const Lent &) = delete;
-    ~Lent() { exchange_own(); }
-    void exchange_own() {
-      b.model.swap(made.instance);
-      std::swap(b.p.dampers, made.dampers);
-    }
+    ~Lent() { exchange(b, made); }
   } lent(b, out);
   use_memory(w.meters.dynamics.memory(), b.p.dampers.v);
-  out.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
-                               implicit ? &*implicit : nullptr);
-  if (!implicit) {
-    measure_explicit(b, *out.dynamics, out.integrator, out.origin);
-    ask_explicit_bound(w, w.time, *out.dynamics, out.integrator);
-  }
+  b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
+                             implicit ? &*implicit : nullptr);
+  if (implicit) return;
+  measure_explicit(b);
+  ask_explicit_bound(w, w.time, b);
 }
 
 }  // namespace
 
-std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin) {
-  auto out = std::make_unique<BodyModel>();
+std::unique_ptr<MadeModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin) {
+  auto out = std::make_unique<MadeModel>();
   out->origin = std::move(origin);
   const OnBehalf speaks(b.name);
   make_selected(w, b, type, values_for(w, b, type, out->origin.params, *out), *out);
@@ -271,7 +277,7 @@ void give_dynamics(World &w, Body &b, const double *bound_at) {
   const auto implicit = implicit_of(w, b.name, static_cast<int32_t>(b.integrator.used), b.integrator);
   b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                              implicit ? &*implicit : nullptr);
-  if (!implicit && bound_at) ask_explicit_bound(w, *bound_at, *b.dynamics, b.integrator);
+  if (!implicit && bound_at) ask_explicit_bound(w, *bound_at, b);
 }
 
 ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
@@ -298,19 +304,19 @@ ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
   return out;
 }
 
-void check_params(const World &w, const Body &b, const dfm_type &type, const ModelParams &params) {
-  BodyModel unused;
-  values_for(w, b, type, params, unused);
+std::vector<double> values_asked(const World &w, const Body &b, const dfm_type &type,
+                                 const ModelParams &params) {
+  MadeModel unused;
+  return values_for(w, b, type, params, unused);
 }
 
 std::vector<double> values_asked(const World &w, const Body &b) {
-  BodyModel unused;
-  return values_for(w, b, *b.model.type, b.origin.params, unused);
+  return values_asked(w, b, *b.model.type, b.origin.params);
 }
 
-std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
+std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
                                            int32_t integrator) {
-  auto out = std::make_unique<BodyModel>();
+  auto out = std::make_unique<MadeModel>();
   out->origin = std::move(origin);
   make_model(w, b, type, values_for(w, b, type, out->origin.params, *out), integrator, *out);
   return out;
@@ -336,14 +342,8 @@ uint64_t model_hash(const Body &b) {
   return h.value;
 }
 
-void exchange(Body &b, BodyModel &other) noexcept {
-  b.model.swap(other.instance);
-  b.dynamics.swap(other.dynamics);
-  b.fields.swap(other.fields);
-  b.unused.swap(other.unused);
-  std::swap(b.withheld, other.withheld);
-  std::swap(b.origin, other.origin);
-  std::swap(b.integrator, other.integrator);
+void exchange(Body &b, MadeModel &other) noexcept {
+  std::swap<BodyModel>(b, other);
   std::swap(b.p.dampers, other.dampers);
   b.bound.known = false;
 }

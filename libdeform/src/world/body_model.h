@@ -5,31 +5,26 @@
 
 namespace dfm {
 
-struct BodyModel {
-  ModelInstance instance;
-  std::unique_ptr<Dynamics> dynamics;  // usable after the exchange
-  std::vector<CellField> fields;
-  std::vector<Unused> unused;
-  ModelOrigin origin;
-  Withheld withheld;
-  Integrator integrator;
-  Dampers dampers;
-};
+// Its dynamics are usable after the exchange.
+struct MadeModel : BodyModel { Dampers dampers; };
 
+// Throw Error for another integrator than DFM_INTEGRATOR_*, and for parameters without values.
+void check_integrator(const std::string &body, int32_t integrator);
+void check_given(const Body &b, const dfm_params &params);
 // Copies the parameters of the type. Throws Error for others.
 ModelParams keep_params(const dfm_type &type, const dfm_params &given);
 // Makes one for the body, whose points, cells, surface and makeup are complete. Parameters that the origin
 // does not name follow from the makeup. integrator: DFM_INTEGRATOR_*; AUTO: that of the world, or chosen by
 // prepare(). Throws Error.
-std::unique_ptr<BodyModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
+std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
                                            int32_t integrator);
 // The same in two parts, for a model whose points the library moves: the instance, which any thread may make
 // while other bodies step; and the dynamics of a body that has it, by the integrator that it uses. bound_at:
 // s, and the longest explicit sub-step at its present state then; null: not that.
-std::unique_ptr<BodyModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin);
+std::unique_ptr<MadeModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin);
 void give_dynamics(World &w, Body &b, const double *bound_at);
-// How long its explicit sub-steps may be, with its present parameters and the model's origin.
-void measure_explicit(Body &b, Dynamics &dynamics, Integrator &out, const ModelOrigin &origin);
+// How long its explicit sub-steps may be, with its present parameters.
+void measure_explicit(Body &b);
 // What bounds its explicit sub-steps at rest, with this share of the row sums of stiffness; 1: for certain.
 // False: nothing, or its points do not move explicitly.
 bool rest_rows(const Body &b, double share, RestRows &out);
@@ -41,10 +36,11 @@ void warn_of_own_steps(const World &w, const std::string &body, const ModelInsta
                        int32_t integrator);
 // Hash of type and origin, to compare bodies that are equal otherwise.
 uint64_t model_hash(const Body &b);
-// The values that origin and makeup specify, in the order of the type's table.
+// The values that these parameters, or the origin's, and the makeup specify, in the order of the type's
+// table. Throws the errors of make_body_model() about parameters.
+std::vector<double> values_asked(const World &w, const Body &b, const dfm_type &type,
+                                 const ModelParams &params);
 std::vector<double> values_asked(const World &w, const Body &b);
-// Throws the errors of make_body_model() about parameters.
-void check_params(const World &w, const Body &b, const dfm_type &type, const ModelParams &params);
-void exchange(Body &b, BodyModel &other) noexcept;
+void exchange(Body &b, MadeModel &other) noexcept;
 
 }  // namespace dfm

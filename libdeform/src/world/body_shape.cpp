@@ -11,29 +11,9 @@
 #include "state/world.h"
 #include "step/self_contact.h"
 #include "world/carry_state.h"
-#include "world/feature_names.h"
 
 namespace dfm {
 namespace {
-
-Surface blank_surface(const Memory &m) {
-  Surface s;
-  use_memory(m, s.tri, s.edge, s.edge_tri, s.tri_edge, s.tri_owns, s.patch, s.name[0], s.name[1], s.name[2],
-             s.named, s.fan_begin, s.fan, s.point, s.row, s.col, s.weight, s.rest, s.x, s.v);
-  return s;
-}
-
-void size_points(const Memory &m, Phyxels &p, uint32_t n) {
-  p.n = n;
-  const auto make = [&](Array<double> &a, size_t size) {
-    a = Array<double>(size, 0.0, HookAllocator<double>(m));
-  };
-  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.x_end, &p.v_end, &p.f, &p.load, &p.impulse, &p.inv_mass})
-    make(*a, size_t{kStride} * n);
-  make(p.rest, size_t{3} * n);
-  make(p.mass, n);
-  p.held = Array<uint8_t>(n, 0, HookAllocator<uint8_t>(m));
-}
 
 // Copies rows of `width` values by their previous number.
 template <class List, class From>
@@ -47,10 +27,13 @@ void take_rows(const From &from, const Array<uint32_t> &number, size_t width, Li
   else take(width);
 }
 
-// Data by cell: share, materials, fields.
-void take_cells(const Memory &m, const Array<double> &share, const Makeup &makeup, const CutMesh &mesh,
-                BodyShape &out) {
-  use_memory(m, out.share);
+// The cells of a mesh that is cut from a body with this rest shape, share and makeup, and their surface.
+// inner: with the list of inner faces, which takes the same sorted faces.
+void take_cells(const Memory &m, const Array<double> &rest, const Array<double> &share, const Makeup &makeup,
+                const CutMesh &mesh, bool inner, BodyShape &out) {
+  use_memory(m, out.anchor, out.surfel_impulse, out.share, out.surface.named);
+  out.p.size(m, static_cast<uint32_t>(mesh.point.size()));
+  take_rows(rest, mesh.point, 3, out.p.rest);
   if (!share.empty()) take_rows(share, mesh.cell, 1, out.share);
   out.makeup.materials = makeup.materials;
   if (!makeup.of.empty()) take_rows(makeup.of, mesh.cell, 1, out.makeup.of);
@@ -58,6 +41,18 @@ void take_cells(const Memory &m, const Array<double> &share, const Makeup &makeu
     out.makeup.given.push_back({f.key, f.from, f.width, Array<double>(HookAllocator<double>(m))});
     take_rows(f.values, mesh.cell, f.width, out.makeup.given.back().values);
   }
+  const uint32_t ntet = static_cast<uint32_t>(mesh.cell.size());
+  out.tets = Array<uint32_t>(mesh.tets);
+  out.edges = unique_edges(m, ntet, out.tets.data());
+  const Array<TetFace> faces = sorted_faces(m, ntet, out.tets.data());
+  if (inner) out.inner = inner_faces(faces);
+  const Array<uint32_t> boundary = boundary_triangles(faces, out.tets.data());
+  make_surface(m, out.p.n, out.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
+               out.surface);
+}
+
+void put_at_rest(Phyxels &p) {
+  for (uint32_t i = 0; i < p.n; ++i) store3(&p.x[size_t{kStride} * i], p.rest_at(i));
 }
 
 void weigh(Body &b) {
@@ -71,19 +66,6 @@ void weigh(Body &b) {
   update_inverse_mass(b.p);
 }
 
-// inner: with the list of inner faces, which takes the same sorted faces.
-void make_skin(const Memory &m, const CutMesh &mesh, bool inner, BodyShape &out) {
-  const uint32_t ntet = static_cast<uint32_t>(mesh.cell.size());
-  out.tets = Array<uint32_t>(mesh.tets);
-  out.edges = unique_edges(m, ntet, out.tets.data());
-  const Array<TetFace> faces = sorted_faces(m, ntet, out.tets.data());
-  if (inner) out.inner = inner_faces(faces);
-  const Array<uint32_t> boundary = boundary_triangles(faces, out.tets.data());
-  out.surface = blank_surface(m);
-  make_surface(m, out.p.n, out.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
-               out.surface);
-}
-
 // Keeps the chosen integrator.
 void keep_integrator(Body &b, const Integrator &was) {
   b.integrator.chosen = was.chosen;
@@ -91,7 +73,7 @@ void keep_integrator(Body &b, const Integrator &was) {
   if (was.chosen == Chosen::implicit) b.integrator.step = was.step;
 }
 
-void keep_params(Body &b, const Former &before) {
+void keep_params(Body &b, const BodyShape &before) {
   const std::vector<double> values = before.model.params;
   if (values == b.model.params) return;
   if (const dfm_status s = b.model.put_params(values, b.dynamics->claims()); s != DFM_OK)
@@ -101,13 +83,12 @@ void keep_params(Body &b, const Former &before) {
 }
 
 // Makes the present model of the body for its present mesh.
-void make_model_again(Body &b, const Former &before, ModelOrigin origin) {
-  const Integrator was = before.integrator;
+void make_model_again(Body &b, const BodyShape &before, ModelOrigin origin) {
   Dampers kept = b.p.dampers;
   exchange(b, *make_body_model(*b.world, b, *before.model.type, std::move(origin),
-                               static_cast<int32_t>(was.used)));
+                               static_cast<int32_t>(before.integrator.used)));
   std::swap(b.p.dampers, kept);
-  keep_integrator(b, was);
+  keep_integrator(b, before.integrator);
   keep_params(b, before);
 }
 
@@ -130,9 +111,8 @@ std::unique_ptr<BodyShape> put(Body &b, std::unique_ptr<BodyShape> shape, Finish
 }  // namespace
 
 void exchange(Body &b, BodyShape &other) noexcept {
-  std::swap<Discretization>(b, other);
-  exchange(b, other.model);
-  std::swap(b.p.dampers, other.model.dampers);  // they stay with the points
+  std::swap<BodyShape>(b, other);
+  b.bound.known = false;
   ++b.x_version;
 }
 
@@ -151,13 +131,6 @@ std::shared_ptr<const WholeBody> whole_of(const Body &b) {
   out->makeup = b.makeup;
   out->zones = b.zones;
   return out;
-}
-
-Former former(const BodyShape &s) {
-  return {s.p, s.tets, s.edges, s.loads, s.springs, s.motions, s.model.instance, s.model.integrator};
-}
-Former former(const Body &b) {
-  return {b.p, b.tets, b.edges, b.loads, b.springs, b.motions, b.model, b.integrator};
 }
 
 namespace {
@@ -197,11 +170,7 @@ std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh,
   for (const uint32_t c : mesh.cell) out.cut.cell.push_back(again ? b.cut.cell[c] : c);
   out.cut.open = std::move(open);
 
-  size_points(m, out.p, static_cast<uint32_t>(mesh.point.size()));
-  take_rows(b.p.rest, mesh.point, 3, out.p.rest);
-  use_memory(m, out.anchor, out.surfel_impulse);
-  take_cells(m, b.share, b.makeup, mesh, out);
-  make_skin(m, mesh, inner, out);
+  take_cells(m, b.p.rest, b.share, b.makeup, mesh, inner, out);
   name_features(b, mesh, out.surface, out.cut);
   find_laid(m, *out.cut.whole, out.cut, out.surface);
   make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
@@ -209,19 +178,18 @@ std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh,
 }
 
 // The state of its points and surfels, and where blades are.
-template <class Shape>
-void take_points(const Memory &m, const Shape &from, const CutMesh &mesh, const std::vector<uint32_t> &surfel,
-                 Phyxels &p, Array<double> &anchor, std::vector<BladeTrack> &blades, Surface &surface,
-                 Array<double> &surfel_impulse) {
+void take_points(const Memory &m, const BodyShape &from, const CutMesh &mesh,
+                 const std::vector<uint32_t> &surfel, BodyShape &to) {
+  Phyxels &p = to.p;
   take_rows(from.p.x, mesh.point, kStride, p.x);
   take_rows(from.p.v, mesh.point, kStride, p.v);
   p.dampers.lag = from.p.dampers.lag;
   use_memory(m, p.dampers.v);
   if (!from.p.dampers.v.empty()) take_rows(from.p.dampers.v, mesh.point, kStride, p.dampers.v);
   take_rows(from.p.held, mesh.point, 1, p.held);
-  if (!from.anchor.empty()) take_rows(from.anchor, mesh.point, kStride, anchor);
+  if (!from.anchor.empty()) take_rows(from.anchor, mesh.point, kStride, to.anchor);
   for (const BladeTrack &t : from.blades) {
-    BladeTrack &track = blades.emplace_back();
+    BladeTrack &track = to.blades.emplace_back();
     use_memory(m, track.x, track.sides, track.dues);
     std::copy_n(t.edge, 6, track.edge);
     track.lead = t.lead;
@@ -237,9 +205,9 @@ void take_points(const Memory &m, const Shape &from, const CutMesh &mesh, const 
     track.part = t.part;
     carry_dues(mesh, t, track);
   }
-  surface.back = from.surface.back;
-  carry_surfels(from.surfel_impulse, surfel, surfel_impulse);
-  gather_surface(surface, p.x.data(), p.v.data());
+  to.surface.back = from.surface.back;
+  carry_surfels(from.surfel_impulse, surfel, to.surfel_impulse);
+  gather_surface(to.surface, p.x.data(), p.v.data());
 }
 
 std::shared_ptr<const BoxTree> tree_at_rest(const Memory &m, const Body &b) {
@@ -251,8 +219,7 @@ std::shared_ptr<const BoxTree> tree_at_rest(const Memory &m, const Body &b) {
 // The part of the present mesh of b, without what put() adds.
 std::unique_ptr<BodyShape> part_of(const Body &b, const CutMesh &mesh, Array<uint64_t> &&open) {
   std::unique_ptr<BodyShape> out = structure_of_part(b, mesh, std::move(open), false);
-  take_points(b.world->memory(), b, mesh, surfels_before(b, mesh, out->surface), out->p, out->anchor,
-              out->blades, out->surface, out->surfel_impulse);
+  take_points(b.world->memory(), b, mesh, surfels_before(b, mesh, out->surface), *out);
   return out;
 }
 
@@ -282,8 +249,7 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   like.material = b.material;
   ModelOrigin origin = origin_of(b, out->mesh);
   exchange(like, shape);
-  for (uint32_t i = 0; i < like.p.n; ++i)
-    std::copy_n(&like.p.rest[size_t{3} * i], 3, &like.p.x[size_t{kStride} * i]);
+  put_at_rest(like.p);
   weigh(like);
   exchange(like, *make_body_instance(w, like, *b.model.type, std::move(origin)));
   like.integrator.used = b.integrator.used;
@@ -305,18 +271,17 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
   shape->shape = ++w.shapes;
   exchange(b, *shape);
   try {
-    Former before = former(*shape);
-    before.parts = parts;
-    take_points(w.memory(), *shape, mesh, made.surfel, b.p, b.anchor, b.blades, b.surface, b.surfel_impulse);
+    const BodyShape &before = *shape;
+    take_points(w.memory(), before, mesh, made.surfel, b);
     update_inverse_mass(b.p);
-    carry_loads(before, mesh, b);
+    carry_loads(before, mesh, parts, b);
     const double step = b.integrator.step;
     give_dynamics(w, b, ahead ? nullptr : &w.time);
     if (ahead) b.integrator.step = step;
     keep_integrator(b, before.integrator);
     keep_params(b, before);
     carry_state(before, mesh, made.edge, b);
-    b.former_surface.reset(new FormerSurface{shape->shape, b.shape, made.features, std::move(made.list)});
+    b.former_surface.reset(new FormerSurface{before.shape, b.shape, made.features, std::move(made.list)});
   } catch (...) {
     exchange(b, *shape);
     throw;
@@ -328,16 +293,7 @@ std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&o
   return take_shape(b, *make_shape(b, std::move(mesh), std::move(open), nullptr), parts, false);
 }
 
-namespace {
-
-// With the memory that it is in.
-template <class T>
-T copy(const T &x) {
-  return x;
-}
-
-}  // namespace
-
+// Copies are moved, so that they stay in the memory of the body.
 std::unique_ptr<Body> structure_of(const Body &b) {
   auto out = std::make_unique<Body>();
   out->world = b.world;
@@ -345,17 +301,9 @@ std::unique_ptr<Body> structure_of(const Body &b) {
   out->name = b.name;
   out->material = b.material;
   out->p.n = b.p.n;
-  out->p.rest = copy(b.p.rest);
-  out->p.mass = copy(b.p.mass);
-  out->tets = copy(b.tets);
-  out->edges = copy(b.edges);
-  out->inner = copy(b.inner);
-  out->surface = copy(b.surface);
-  out->zones = copy(b.zones);
-  out->cut = copy(b.cut);
-  out->shape = b.shape;
-  out->share = copy(b.share);
-  out->makeup = copy(b.makeup);
+  out->p.rest = Array<double>(b.p.rest);
+  out->p.mass = Array<double>(b.p.mass);
+  static_cast<Structure &>(*out) = Structure(b);
   out->origin = b.origin;
   out->integrator = b.integrator;
   out->p.dampers.lag = b.p.dampers.lag;
@@ -383,12 +331,10 @@ void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body 
   std::copy(shape->cut.next_name, shape->cut.next_name + kFeatureKinds, there.below);
   s.named.push_back(there);
   ModelOrigin origin = origin_of(from, mesh);
-  put(piece, std::move(shape), [&](BodyShape &) {
-    Former before = former(from);
-    before.parts = true;
-    carry_loads(before, mesh, piece);
-    make_model_again(piece, before, std::move(origin));
-    carry_state(before, mesh, edges_before(before.edges, mesh, piece.edges), piece);
+  put(piece, std::move(shape), [&](const BodyShape &) {
+    carry_loads(from, mesh, true, piece);
+    make_model_again(piece, from, std::move(origin));
+    carry_state(from, mesh, edges_before(from.edges, mesh, piece.edges), piece);
   });
 }
 
@@ -397,14 +343,9 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
-  size_points(m, out.p, static_cast<uint32_t>(mesh.point.size()));
-  take_rows(whole->rest, mesh.point, 3, out.p.rest);
-  for (uint32_t i = 0; i < out.p.n; ++i)
-    std::copy_n(&out.p.rest[size_t{3} * i], 3, &out.p.x[size_t{kStride} * i]);
-  use_memory(m, out.anchor, out.surfel_impulse);
+  take_cells(m, whole->rest, whole->share, whole->makeup, mesh, false, out);
+  put_at_rest(out.p);
   if (b.world->def.sleep) out.anchor = out.p.x;
-  take_cells(m, whole->share, whole->makeup, mesh, out);
-  make_skin(m, mesh, false, out);
   out.surfel_impulse.assign(size_t{3} * out.surface.nsurfel, 0.0);
   if (names) {
     out.cut.whole = whole;
@@ -419,10 +360,11 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
     out.zones = whole->zones;
   }
   gather_surface(out.surface, out.p.x.data(), out.p.v.data());
-  return put(b, std::move(shape), [&](BodyShape &had) {
-    ModelOrigin origin = &like == &b ? had.model.origin : like.origin;
+  return put(b, std::move(shape), [&](const BodyShape &had) {
+    const BodyShape &before = &like == &b ? had : like;
+    ModelOrigin origin = before.origin;
     origin.held.assign(b.p.n, 0);
-    make_model_again(b, &like == &b ? former(had) : former(like), std::move(origin));
+    make_model_again(b, before, std::move(origin));
   });
 }
 

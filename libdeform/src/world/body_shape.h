@@ -10,23 +10,7 @@
 
 namespace dfm {
 
-struct BodyShape : Discretization { BodyModel model; };
-
 void exchange(Body &b, BodyShape &other) noexcept;
-
-// What a shape takes over from the previous one.
-struct Former {
-  const Phyxels &p;
-  const Array<uint32_t> &tets, &edges;
-  const std::vector<Load> &loads;
-  const std::vector<Spring> &springs;
-  const std::vector<HeldMotion> &motions;
-  const ModelInstance &model;
-  Integrator integrator;
-  bool parts = false;  // another body takes the other cells: springs are shared
-};
-Former former(const BodyShape &s);
-Former former(const Body &b);
 
 // Names of the features of the surface and the next free names; empty lists: make_shape() finds them.
 struct FeatureNames {

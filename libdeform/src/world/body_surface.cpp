@@ -7,6 +7,7 @@
 #include "mesh/mesh.h"
 #include "plugin/context.h"
 #include "state/world.h"
+#include "world/triangle_list.h"
 
 namespace dfm {
 namespace {
@@ -28,25 +29,9 @@ void check_surface(const dfm_surface_def &def, const char *name) {
     fail(DFM_E_ARG,
          "body '%s': surface->support is %g mean distances; it must lie between 0 (which means 3) and %g",
          name, def.support, kMostSupport);
-  if (def.npoint < 3 || def.ntriangle < 1 || !def.points || !def.triangles)
-    fail(DFM_E_ARG,
-         "body '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle",
-         name, def.npoint, def.ntriangle);
-  for (size_t i = 0; i < size_t{3} * def.npoint; ++i)
-    if (!std::isfinite(def.points[i]))
-      fail(DFM_E_ARG, "body '%s': surface point %zu is not finite", name, i / 3);
+  check_triangles(def, "body", name, "surface ");
   std::vector<uint8_t> used(def.npoint);
-  for (uint32_t t = 0; t < def.ntriangle; ++t) {
-    const uint32_t *const c = def.triangles + size_t{3} * t;
-    for (int k = 0; k < 3; ++k) {
-      if (c[k] >= def.npoint)
-        fail(DFM_E_ARG, "body '%s': surface triangle %u names point %u of %u", name, t, c[k], def.npoint);
-      used[c[k]] = 1;
-    }
-    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
-      fail(DFM_E_ARG, "body '%s': surface triangle %u names a point twice; drop it (dfm_trimesh_create does)",
-           name, t);
-  }
+  for (size_t i = 0; i < size_t{3} * def.ntriangle; ++i) used[def.triangles[i]] = 1;
   for (uint32_t i = 0; i < def.npoint; ++i)
     if (!used[i])
       fail(DFM_E_ARG, "body '%s': surface point %u belongs to no triangle; drop it (dfm_trimesh_create does)",
@@ -69,16 +54,6 @@ void check_outward(const Surface &s, const char *name) {
          name);
 }
 
-double diagonal(const Phyxels &p) {
-  Vec3 lo = load3(&p.rest[0]), hi = lo;
-  for (uint32_t i = 1; i < p.n; ++i)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], p.rest[size_t{3} * i + size_t(k)]);
-      hi[k] = std::max(hi[k], p.rest[size_t{3} * i + size_t(k)]);
-    }
-  return norm(hi - lo);
-}
-
 void couple(Body &b, const dfm_surface_def &def) {
   const Memory &m = b.world->memory();
   CouplingInput in;
@@ -93,7 +68,8 @@ void couple(Body &b, const dfm_surface_def &def) {
                : def.coupling == DFM_COUPLING_THESIS ? couple_thesis(m, in)
                                                      : couple_barycentric(m, in);
   const char *const name = b.name.c_str();
-  const double size = diagonal(b.p);
+  const Extent box = extent_of(b.p.rest.data(), b.p.n, 3);
+  const double size = norm(box.hi - box.lo);
   if (c.farthest > size)
     fail(DFM_E_ARG,
          "body '%s': its surface lies up to %g m from its cells, which are %g m across; both must be in the "
@@ -111,8 +87,7 @@ void couple(Body &b, const dfm_surface_def &def) {
 void tell_of_long_edges(const Body &b) {
   double cells = 0, longest = 0;
   for (size_t e = 0; e < b.edges.size(); e += 2)
-    cells = std::max(
-        cells, norm(load3(&b.p.rest[size_t{3} * b.edges[e]]) - load3(&b.p.rest[size_t{3} * b.edges[e + 1]])));
+    cells = std::max(cells, norm(b.p.rest_at(b.edges[e]) - load3(&b.p.rest[size_t{3} * b.edges[e + 1]])));
   const Surface &s = b.surface;
   for (size_t e = 0; e < s.edge.size(); e += 2)
     longest =

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "body/coupling_rows.h"
+#include "body/coupling.h"
 #include "core/error.h"
 #include "mesh/mesh.h"
 #include "state/world.h"
@@ -90,20 +90,14 @@ std::vector<uint32_t> triangle_materials(const Body &b, const dfm_body_def &def,
   in.point = def.points;
   in.tet = def.tets;
   in.surfel = middle.data();
-  const Memory &m = b.world->memory();
-  const LocalRest rest(m, in);
-  const RestCells cells(m, in, rest);
-  for (uint32_t t = 0; t < b.surface.ntri; ++t) out[t] = materials.of[cells.find(rest.surfel[t])];
+  const Array<uint32_t> cell = cells_of_surfels(b.world->memory(), in);
+  for (uint32_t t = 0; t < b.surface.ntri; ++t) out[t] = materials.of[cell[t]];
   return out;
 }
 
 }  // namespace
 
-double friction_of(const Material &m) {
-  for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    if (m.extra_keys[i] == kFrictionKey) return m.extra_values[i][0];
-  return kDefaultFriction;
-}
+double friction_of(const Material &m) { return m.entry(kFrictionKey, kDefaultFriction); }
 
 void make_zones(Body &b, const dfm_body_def &def, const CellMaterials &materials, const Material &plain) {
   const auto name = [&](uint32_t k) {

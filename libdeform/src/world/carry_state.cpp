@@ -2,11 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 #include <utility>
 
 #include "core/error.h"
+#include "mesh/mesh.h"
 #include "plugin/context.h"
 #include "plugin/tables.h"
+#include "world/body_shape.h"
+#include "world/body_zones.h"
+#include "world/triangle_list.h"
 
 namespace dfm {
 namespace {
@@ -78,7 +83,7 @@ std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh 
   return out;
 }
 
-void carry_loads(const Former &before, const CutMesh &mesh, Body &b) {
+void carry_loads(const BodyShape &before, const CutMesh &mesh, bool parts, Body &b) {
   const bool loaded = std::ranges::any_of(before.p.load, [](double f) { return f != 0 || std::signbit(f); });
   if (!loaded && before.loads.empty() && before.springs.empty() && before.motions.empty()) return;
   const Copies copies(mesh, b, before.p.n);
@@ -94,8 +99,7 @@ void carry_loads(const Former &before, const CutMesh &mesh, Body &b) {
     b.loads.push_back(std::move(out));
   }
   for (const Spring &s : before.springs)
-    if (Spring out = carried(s, copies, before.parts); !out.points.empty())
-      b.springs.push_back(std::move(out));
+    if (Spring out = carried(s, copies, parts); !out.points.empty()) b.springs.push_back(std::move(out));
   for (const HeldMotion &m : before.motions) {
     HeldMotion out = m;
     out.points.clear();
@@ -115,16 +119,11 @@ void carry_loads(const Former &before, const CutMesh &mesh, Body &b) {
 }
 
 std::optional<dfm_topology> topology_of(const ModelInstance &model) {
-  const void *table = nullptr;
-  if (model.ops->extension)
-    model.call("extension", [&] {
-      table = model.ops->extension(model.self, DFM_EXT_TOPOLOGY);
-      return DFM_OK;
-    });
-  return copy_table<dfm_topology>(table, kTopologyHead, model.type->id, "dfm_topology");
+  return copy_table<dfm_topology>(model.extension(DFM_EXT_TOPOLOGY), kTopologyHead, model.type->id,
+                                  "dfm_topology");
 }
 
-void carry_state(const Former &before, const CutMesh &mesh, const std::vector<uint32_t> &edge, Body &b) {
+void carry_state(const BodyShape &before, const CutMesh &mesh, const std::vector<uint32_t> &edge, Body &b) {
   const ModelInstance &old = before.model;
   ModelInstance &now = b.model;
   const auto same = [](const dfm_slot &l, const dfm_slot &r) {
@@ -181,6 +180,201 @@ void carry_surfels(const Array<double> &from, const std::vector<uint32_t> &surfe
   to.assign(3 * surfel.size(), 0.0);
   for (size_t s = 0; s < surfel.size(); ++s)
     if (surfel[s] != kNone) std::copy_n(&from[size_t{3} * surfel[s]], 3, &to[3 * s]);
+}
+
+// ---- names and zones --------------------------------------------------------------------------------
+
+namespace {
+
+// Gives out each old name once, and new names from `next` on.
+class Names {
+ public:
+  Names(const Array<uint32_t> &old, uint32_t n, uint32_t &next) : old_(old), taken_(n), next_(next) {}
+  uint32_t of(uint32_t feature) {  // kNone: no feature before
+    if (feature == kNone || taken_[feature]) return next_++;
+    taken_[feature] = 1;
+    return old_.empty() ? feature : old_[feature];
+  }
+
+ private:
+  const Array<uint32_t> &old_;
+  std::vector<uint8_t> taken_;
+  uint32_t &next_;
+};
+
+uint32_t find_edge(const Surface &s, uint32_t a, uint32_t b) {
+  if (a == kNone || b == kNone) return kNone;
+  const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
+  const auto at = [&](uint32_t e) { return std::pair(s.edge[2 * size_t{e}], s.edge[2 * size_t{e} + 1]); };
+  const auto all = std::views::iota(0u, s.nedge);
+  const auto found = std::ranges::lower_bound(all, key, {}, at);
+  return found != all.end() && at(*found) == key ? *found : kNone;
+}
+
+uint32_t above_all(const Array<uint32_t> &names) {
+  return names.empty() ? 0 : *std::max_element(names.begin(), names.end()) + 1;
+}
+
+// old [ntri]: the previous number of each triangle, or kNone.
+void name_patches(const Surface &before, const std::vector<uint32_t> &old, Surface &surface, uint32_t &next) {
+  std::vector<uint32_t> name(above_all(surface.patch), kNone);
+  std::vector<uint8_t> taken(above_all(before.patch));
+  for (uint32_t t = 0; t < surface.ntri; ++t) {
+    if (old[t] == kNone || name[surface.patch[t]] != kNone || taken[before.patch[old[t]]]) continue;
+    name[surface.patch[t]] = before.patch[old[t]];
+    taken[before.patch[old[t]]] = 1;
+  }
+  for (uint32_t &n : name)
+    if (n == kNone) n = next++;
+  for (uint32_t &p : surface.patch) p = name[p];
+}
+
+}  // namespace
+
+void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutRecord &record) {
+  const Surface &before = b.surface;
+  if (b.cut.whole) {
+    std::copy(b.cut.next_name, b.cut.next_name + kFeatureKinds, record.next_name);
+  } else {
+    const uint32_t next[kFeatureKinds] = {before.nsurfel, before.nedge, before.ntri, above_all(before.patch)};
+    std::copy(next, next + kFeatureKinds, record.next_name);
+  }
+  std::vector<uint32_t> surfel_of(b.p.n, kNone);
+  for (uint32_t s = 0; s < before.nsurfel; ++s) surfel_of[before.point[s]] = s;
+  std::vector<uint32_t> was(surface.nsurfel);  // surfel before
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) was[s] = surfel_of[mesh.point[surface.point[s]]];
+
+  Names surfels(before.name[0], before.nsurfel, record.next_name[0]);
+  for (uint32_t s = 0; s < surface.nsurfel; ++s) surface.name[0].push_back(surfels.of(was[s]));
+  Names edges(before.name[1], before.nedge, record.next_name[1]);
+  for (size_t e = 0; e < surface.edge.size(); e += 2)
+    surface.name[1].push_back(edges.of(find_edge(before, was[surface.edge[e]], was[surface.edge[e + 1]])));
+  const TriangleList list(before.ntri, [&](size_t k) { return before.tri[k]; });
+  std::vector<uint32_t> old(surface.ntri);
+  Names triangles(before.name[2], before.ntri, record.next_name[2]);
+  for (uint32_t t = 0; t < surface.ntri; ++t) {
+    const uint32_t *const c = &surface.tri[3 * size_t{t}];
+    old[t] = list.find(sorted(was[c[0]], was[c[1]], was[c[2]]));
+    surface.name[2].push_back(triangles.of(old[t]));
+  }
+  name_patches(before, old, surface, record.next_name[3]);
+}
+
+void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
+  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.origin,
+             surface.laid_begin, surface.laid_around, surface.laid_normal);
+  if (record.open.empty()) return;
+  std::vector<Corners> open;
+  for (const uint64_t face : record.open) {
+    const uint32_t *const a = &whole.tets[4 * size_t(face >> 32)], *const b = &whole.tets[4 * (face & kNone)];
+    std::vector<uint32_t> common;
+    for (int k = 0; k < 4; ++k)
+      if (std::find(b, b + 4, a[k]) != b + 4) common.push_back(a[k]);
+    if (common.size() == 3) open.push_back(sorted(common[0], common[1], common[2]));
+  }
+  std::sort(open.begin(), open.end());
+  std::vector<std::pair<Corners, uint32_t>> found;  // and the place in `laid`
+  for (uint32_t t = 0; t < surface.ntri; ++t) {
+    const auto point = [&](size_t k) { return record.point[surface.point[surface.tri[3 * size_t{t} + k]]]; };
+    const Corners corners = sorted(point(0), point(1), point(2));
+    if (!std::binary_search(open.begin(), open.end(), corners)) continue;
+    found.push_back({corners, static_cast<uint32_t>(surface.laid.size())});
+    surface.laid.push_back(t);
+    for (size_t k = 0; k < 3; ++k) surface.laid_surfel.push_back(surface.tri[3 * size_t{t} + k]);
+  }
+  std::sort(surface.laid_surfel.begin(), surface.laid_surfel.end());
+  surface.laid_surfel.erase(std::unique(surface.laid_surfel.begin(), surface.laid_surfel.end()),
+                            surface.laid_surfel.end());
+  std::sort(found.begin(), found.end());
+  surface.laid_tip.assign(surface.laid.size(), 0);
+  for (size_t i = 1; i < found.size(); ++i) {
+    if (found[i].first != found[i - 1].first) continue;
+    surface.slit = true;
+    const uint32_t l = found[i].second, other = found[i - 1].second;
+    for (const uint32_t side : {l, other}) surface.laid_tip[side] |= kOfSlit;
+    const uint32_t *const c = &surface.tri[3 * size_t{surface.laid[l]}],
+                          *const d = &surface.tri[3 * size_t{surface.laid[other]}];
+    for (uint32_t k = 0; k < 3; ++k)
+      for (uint32_t j = 0; j < 3; ++j) {
+        if (c[k] != d[j]) continue;
+        surface.laid_tip[l] = static_cast<uint8_t>(surface.laid_tip[l] | 1u << k);
+        surface.laid_tip[other] = static_cast<uint8_t>(surface.laid_tip[other] | 1u << j);
+      }
+  }
+  if (surface.laid.empty()) return;
+  surface.laid_normal.assign(3 * surface.laid.size(), 0.0);
+  std::vector<std::pair<uint32_t, uint32_t>> around;  // surfel, triangle of `laid`
+  for (uint32_t l = 0; l < surface.laid.size(); ++l)
+    for (uint32_t k = 0; k < 3; ++k)
+      if (!(surface.laid_tip[l] >> k & 1))
+        around.push_back({surface.tri[3 * size_t{surface.laid[l]} + k], l});
+  std::sort(around.begin(), around.end());
+  for (const uint32_t surfel : surface.laid_surfel) {
+    const auto at = std::lower_bound(around.begin(), around.end(), std::pair(surfel, 0u));
+    surface.laid_begin.push_back(static_cast<uint32_t>(at - around.begin()));
+  }
+  surface.laid_begin.push_back(static_cast<uint32_t>(around.size()));
+  for (const auto &a : around) surface.laid_around.push_back(a.second);
+  surface.place.assign(size_t{4} * surface.nsurfel, 0.0);
+  for (const uint32_t p : surface.point) surface.origin.push_back(record.point[p]);
+}
+
+void take_names(const std::string &body, FeatureNames &names, Surface &surface, CutRecord &record) {
+  const uint32_t counts[kFeatureKinds] = {surface.nsurfel, surface.nedge, surface.ntri, surface.ntri};
+  for (uint32_t k = 0; k < kFeatureKinds; ++k) {
+    const Array<uint32_t> &of = names.of[k];
+    if (of.size() != counts[k] || above_all(of) > names.next[k])
+      fail(DFM_E_FORMAT,
+           "the snapshot is damaged: body '%s': names of its surface: expected one for each feature; "
+           "nothing was restored",
+           body.c_str());
+    record.next_name[k] = names.next[k];
+    (k < 3 ? surface.name[k] : surface.patch).swap(names.of[k]);
+  }
+  surface.named.swap(names.named);
+}
+
+void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &record, const Makeup &makeup,
+                    const Array<uint32_t> &tets, const Surface &surface, SurfaceZones &out) {
+  const TriangleList skin(static_cast<uint32_t>(whole.tri.size() / 3),
+                          [&](size_t k) { return whole.tri[k]; });
+  const auto point = [&](size_t k) { return surface.point[surface.tri[k]]; };
+  out.list = whole.zones.list;
+  use_memory(m, out.of);
+  out.of.assign(surface.ntri, 0);
+  bool one = true;
+  const auto of_material = [&](const Material &made_of) {
+    const auto same = [&](const SurfaceZones::Zone &z) {
+      return z.group == kCutGroup && z.material == made_of.name;
+    };
+    const auto at = std::find_if(out.list.begin(), out.list.end(), same);
+    const uint32_t zone = uint32_t(at - out.list.begin());
+    if (at == out.list.end()) out.list.push_back({kCutGroup, made_of.name, friction_of(made_of)});
+    return zone;
+  };
+  // whose: the material of the cell that has it
+  const auto find_zone = [&](uint32_t t, const Corners &face, const Material &whose) {
+    const uint32_t was =
+        skin.find(sorted(record.point[face[0]], record.point[face[1]], record.point[face[2]]));
+    if (was == kNone) out.of[t] = of_material(whose);
+    else out.of[t] = whole.zones.of.empty() ? 0 : whole.zones.of[was];
+    one = one && out.of[t] == 0;
+  };
+  if (makeup.of.empty()) {  // of one material: the cells need not be looked at
+    for (uint32_t t = 0; t < surface.ntri; ++t) {
+      const size_t k = 3 * size_t{t};
+      find_zone(t, sorted(point(k), point(k + 1), point(k + 2)), makeup.materials[0]);
+    }
+  } else {
+    const TriangleList own(surface.ntri, point);
+    for (size_t c = 0; c < tets.size(); c += 4)
+      for (const auto &f : kTetFace) {
+        const Corners face = sorted(tets[c + f[0]], tets[c + f[1]], tets[c + f[2]]);
+        if (const uint32_t t = own.find(face); t != kNone)
+          find_zone(t, face, makeup.materials[makeup.of[c / 4]]);
+      }
+  }
+  if (one && out.list.size() == 1) out.of.clear();
 }
 
 }  // namespace dfm

@@ -29,6 +29,7 @@
 #include "world/sensors.h"
 #include "world/separate.h"
 #include "world/tear.h"
+#include "world/triangle_list.h"
 
 namespace dfm {
 namespace {
@@ -78,12 +79,10 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
   }
   com = (1 / b.mass) * com;
   for (uint32_t i = 0; i < p.n; ++i) {
-    const Vec3 v = load3(def.velocity) + cross(load3(def.spin), load3(&p.x[size_t(i) * kStride]) - com);
+    const Vec3 v = load3(def.velocity) + cross(load3(def.spin), p.x_at(i) - com);
     for (int k = 0; k < 3; ++k) p.v[size_t(i) * kStride + size_t(k)] = p.held[i] & (1 << k) ? 0 : v[k];
   }
 }
-
-Array<double> zeros(const Memory &m, size_t n) { return Array<double>(n, 0.0, HookAllocator<double>(m)); }
 
 // Copies, valid after the def and its materials are gone.
 void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials &cells) {
@@ -101,12 +100,8 @@ void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials
 void take_points(World &w, Body &b, const dfm_body_def &def) {
   const Memory &m = w.memory();
   Phyxels &p = b.p;
-  p.n = def.npoint;
-  p.rest = Array<double>(def.points, def.points + size_t(3) * p.n, HookAllocator<double>(m));
-  for (Array<double> *a : {&p.x, &p.v, &p.v_free, &p.x_end, &p.v_end, &p.f, &p.load, &p.impulse, &p.inv_mass})
-    *a = zeros(m, size_t(kStride) * p.n);
-  p.mass = zeros(m, p.n);
-  p.held = Array<uint8_t>(p.n, 0, HookAllocator<uint8_t>(m));
+  p.size(m, def.npoint);
+  std::copy_n(def.points, p.rest.size(), p.rest.begin());
   if (def.fixed)
     for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
   b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
@@ -131,17 +126,15 @@ void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials 
   b.first_model = model_hash(b);
 }
 
-// The body is complete: from here on it is the world's. Whatever may fail comes first.
-void add_to_world(World &w, std::unique_ptr<Body> owned) {
-  Body &b = *owned;
-  w.bodies.reserve(w.bodies.size() + 1);
-  reserve_sleep(w, *w.steps, static_cast<uint32_t>(w.bodies.size() + 1));
+// The thing is complete: from here on it is the world's. Whatever may fail comes first.
+template <class Thing>
+void add_to_world(World &w, Kind kind, std::unique_ptr<Thing> thing,
+                  std::vector<std::unique_ptr<Thing>> &list) {
+  list.reserve(list.size() + 1);
   w.overlaps.place(w.next_id);
-  b.id = w.next_id;
-  b.handle = handle_create(Kind::body, &b);
-  ++w.next_id;
-  w.bodies.push_back(std::move(owned));
-  w.tearing += b.tears;
+  thing->handle = handle_create(kind, thing.get());
+  thing->id = w.next_id++;
+  list.push_back(std::move(thing));
   w.changed = true;
 }
 
@@ -182,13 +175,16 @@ Body &create_body(World &w, const dfm_body_def &def) {
     b.support = def.surface->support;
   }
   make_zones(b, def, materials, plain);
-  b.surfel_impulse = zeros(w.memory(), size_t(3) * b.surface.nsurfel);
+  use_memory(w.memory(), b.surfel_impulse);
+  b.surfel_impulse.assign(size_t(3) * b.surface.nsurfel, 0.0);
 
   take_model(w, b, def, materials);
   b.tears = may_tear(b);
   if (b.tears) check_may_cut(b, b.model);
 
-  add_to_world(w, std::move(owned));
+  reserve_sleep(w, *w.steps, static_cast<uint32_t>(w.bodies.size() + 1));
+  add_to_world(w, Kind::body, std::move(owned), w.bodies);
+  w.tearing += b.tears;
   warn_of_idle(b);
   warn_of_own_steps(w, b.name, b.model, def.integrator);
   for (const LeftOut &o : left_out_of(b)) warn_of(*w.context, o);
@@ -201,24 +197,7 @@ constexpr uint32_t kVoxelCells = 262144, kMostVoxelCells = 1u << 28, kFewestVoxe
 
 // Points and triangles of a mesh or of voxels: checked and kept.
 void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
-  const char *const name = o.name.c_str();
-  if (def.npoint < 3 || def.ntriangle < 1 || !def.points || !def.triangles)
-    fail(DFM_E_ARG,
-         "obstacle '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 "
-         "triangle",
-         name, def.npoint, def.ntriangle);
-  for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!all_finite(def.points + size_t(3) * i, 3))
-      fail(DFM_E_ARG, "obstacle '%s': point %u is not finite", name, i);
-  for (uint32_t t = 0; t < def.ntriangle; ++t) {
-    const uint32_t *const c = def.triangles + size_t(3) * t;
-    for (int k = 0; k < 3; ++k)
-      if (c[k] >= def.npoint)
-        fail(DFM_E_ARG, "obstacle '%s': triangle %u names point %u of %u", name, t, c[k], def.npoint);
-    if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
-      fail(DFM_E_ARG, "obstacle '%s': triangle %u names a point twice; drop it (dfm_trimesh_create does)",
-           name, t);
-  }
+  check_triangles(def, "obstacle", o.name.c_str(), "");
   const Memory &m = o.world->meters.obstacles.memory();
   o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, HookAllocator<double>(m));
   o.triangles =
@@ -320,15 +299,9 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
   check_velocity("obstacle", name, load3(def.velocity_surface));
-  w.obstacles.reserve(w.obstacles.size() + 1);
-  w.overlaps.place(w.next_id);
-  o.id = w.next_id;
-  o.handle = handle_create(Kind::obstacle, &o);
-  ++w.next_id;
   o.def.name = o.name.c_str();
-  w.obstacles.push_back(std::move(owned));
+  add_to_world(w, Kind::obstacle, std::move(owned), w.obstacles);
   wake_all(w);  // it may be where a body sleeps
-  w.changed = true;
   return o;
 }
 

@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "core/error.h"
-#include "math/extent.h"
 #include "mesh/cut_mesh.h"
 #include "plugin/on_behalf.h"
 #include "state/material.h"
@@ -30,20 +29,13 @@ constexpr double kRounding = 1e-12;  // of the mass of a point that copies share
 // Open faces, ascending: of the whole body, and those between present cells.
 struct OpenFaces { Array<uint64_t> whole, own; };
 
-void corners_of(const Body &b, uint32_t cell, Vec3 x[4]) {
-  for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[size_t{kStride} * b.tets[size_t{4} * cell + k]]);
-}
-
 // Area at rest, m2, of the triangles that the surface did not have before.
 double new_area(const Body &b, const BodyShape &before) {
   uint32_t next = before.cut.whole ? before.cut.next_name[2] : before.surface.ntri;
   double sum = 0;
   for (uint32_t t = 0; t < b.surface.ntri; ++t) {
     if (b.surface.name[2][t] < next) continue;
-    const auto x = [&](size_t k) {
-      return load3(&b.p.rest[size_t{3} * b.surface.point[b.surface.tri[size_t{3} * t + k]]]);
-    };
-    sum += 0.5 * norm(cross(x(1) - x(0), x(2) - x(0)));
+    sum += 0.5 * norm(b.surface.area2(t, [&](uint32_t s) { return b.p.rest_at(b.surface.point[s]); }));
   }
   return sum;
 }
@@ -55,7 +47,7 @@ void sum_up_removed(const BodyShape &before, const CutMesh &mesh, const Body &b,
   for (uint32_t i = 0; i < before.p.n; ++i) {
     const double mass = std::fabs(lost[i]) > kRounding * before.p.mass[i] ? lost[i] : 0;
     out.mass += mass;
-    out.momentum += mass * load3(&before.p.v[size_t{kStride} * i]);
+    out.momentum += mass * before.p.v_at(i);
   }
 }
 
@@ -66,7 +58,7 @@ CutReport empty(Body &b) {
   CutReport out;
   out.removed = b.ncell();
   out.mass = b.mass;
-  for (uint32_t i = 0; i < b.p.n; ++i) out.momentum += b.p.mass[i] * load3(&b.p.v[size_t{kStride} * i]);
+  for (uint32_t i = 0; i < b.p.n; ++i) out.momentum += b.p.mass[i] * b.p.v_at(i);
   out.kinetic = kinetic_of(b);
   out.elastic = elastic_energy(b);
   reserve_places(w, 0);
@@ -138,7 +130,7 @@ OpenFaces with_open(const Body &b, const Array<uint64_t> &more) {
   out.whole.insert(out.whole.end(), more.begin(), more.end());
   sort_out(out.whole);
   for (const uint64_t face : out.whole) {
-    const uint32_t i = present_cell(b, uint32_t(face >> 32)), j = present_cell(b, uint32_t(face & kNone));
+    const auto [i, j] = present_cells(b, face);
     if (i != kNone && j != kNone) out.own.push_back(open_face(i, j));
   }
   sort_out(out.own);
@@ -151,8 +143,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &mor
   prepare(*b.world);
   check_may_cut(b, b.model);
   Array<uint64_t> whole(HookAllocator<uint64_t>(b.world->memory()));
-  for (const uint64_t face : more)
-    whole.push_back(face_of_whole(b, uint32_t(face >> 32), uint32_t(face & kNone)));
+  for (const uint64_t face : more) whole.push_back(face_of_whole(b, face));
   OpenFaces open = with_open(b, whole);
   const bool opens = open.whole.size() > b.cut.open.size();
   if (!opens && std::find(removed.begin(), removed.end(), 1) == removed.end()) {
@@ -171,8 +162,7 @@ Array<uint8_t> none_removed(const Body &b) {
 // triangles: no line of the body meets the edge between them.
 CutShape through(const Body &b, const CutShape &shape) {
   if (shape.kind != CutKind::plane) return shape;
-  Extent box;
-  for (uint32_t i = 0; i < b.p.n; ++i) box.add(load3(&b.p.x[size_t{kStride} * i]));
+  const Extent box = extent_of(b.p.x.data(), b.p.n, kStride);
   const Vec3 normal = normalized(shape.corner[1]), middle = 0.5 * (box.lo + box.hi);
   const Vec3 other = std::fabs(normal.x) < 0.5 ? Vec3{1, 0, 0} : Vec3{0, 1, 0};
   const Vec3 u = normalized(cross(normal, other)), v = cross(normal, u);
@@ -193,7 +183,7 @@ void reserve_cut_events(World &w, size_t n) { reserve_events(w, w.store.n + w.at
 
 double kinetic_of(const Body &b) {
   double sum = 0;
-  for (uint32_t i = 0; i < b.p.n; ++i) sum += 0.5 * b.p.mass[i] * norm2(load3(&b.p.v[size_t{kStride} * i]));
+  for (uint32_t i = 0; i < b.p.n; ++i) sum += 0.5 * b.p.mass[i] * norm2(b.p.v_at(i));
   return sum;
 }
 
@@ -218,15 +208,18 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
          name, model.type->id);
 }
 
-uint32_t present_cell(const Body &b, uint32_t whole) {
-  if (!b.cut.whole) return whole < b.ncell() ? whole : kNone;
-  const auto at = std::lower_bound(b.cut.cell.begin(), b.cut.cell.end(), whole);
-  return at != b.cut.cell.end() && *at == whole ? uint32_t(at - b.cut.cell.begin()) : kNone;
+std::array<uint32_t, 2> present_cells(const Body &b, uint64_t face) {
+  const auto present = [&](uint32_t whole) {
+    if (!b.cut.whole) return whole < b.ncell() ? whole : kNone;
+    const auto at = std::lower_bound(b.cut.cell.begin(), b.cut.cell.end(), whole);
+    return at != b.cut.cell.end() && *at == whole ? uint32_t(at - b.cut.cell.begin()) : kNone;
+  };
+  return {present(uint32_t(face >> 32)), present(uint32_t(face & kNone))};
 }
 
-uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j) {
-  const auto whole = [&](uint32_t cell) { return b.cut.whole ? b.cut.cell[cell] : cell; };
-  return open_face(whole(i), whole(j));
+uint64_t face_of_whole(const Body &b, uint64_t face) {
+  if (!b.cut.whole) return face;
+  return open_face(b.cut.cell[face >> 32], b.cut.cell[face & kNone]);
 }
 
 CutReport open_faces(Body &b, const Array<uint64_t> &faces) { return cut(b, none_removed(b), faces); }
@@ -252,11 +245,10 @@ CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {
 
 CutReport remove_by_shape(Body &b, const CutShape &asked, uint32_t most) {
   const CutShape shape = through(b, asked);
-  Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
+  Array<uint8_t> removed = none_removed(b);
   uint32_t n = 0, left = 0;
   for (uint32_t c = 0; c < b.ncell(); ++c) {
-    Vec3 x[4];
-    corners_of(b, c, x);
+    const Vec3 x[4] = {b.corner(c, 0), b.corner(c, 1), b.corner(c, 2), b.corner(c, 3)};
     if (!meets_tetrahedron(shape, x)) continue;
     if (most > 0 && n == most) {
       ++left;

@@ -1,5 +1,6 @@
 // Cuts of a body between two steps: cells are removed, faces between cells open (doc/concepts/cutting.md).
 #pragma once
+#include <array>
 #include <new>
 
 #include "core/error.h"
@@ -45,8 +46,9 @@ CutReport open_faces(Body &b, const Array<uint64_t> &faces);
 std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due);
 std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made);
 
-uint32_t present_cell(const Body &b, uint32_t whole);           // kNone: it was removed
-uint64_t face_of_whole(const Body &b, uint32_t i, uint32_t j);  // between present cells
+// Present cells on both sides of a face of the whole body; kNone: it was removed.
+std::array<uint32_t, 2> present_cells(const Body &b, uint64_t face);
+uint64_t face_of_whole(const Body &b, uint64_t face);  // between present cells
 
 // Reserves memory for n events beside those of contacts and attachments that a cut ends.
 void reserve_cut_events(World &w, size_t n);

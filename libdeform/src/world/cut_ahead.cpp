@@ -103,8 +103,8 @@ void renew_structure(Body &b) {
 }
 
 bool is_there(const Body &b, const AheadFace &f) {
-  return present_cell(b, uint32_t(f.face >> 32)) != kNone &&
-         present_cell(b, uint32_t(f.face & kNone)) != kNone;
+  const auto [i, j] = present_cells(b, f.face);
+  return i != kNone && j != kNone;
 }
 
 // The made cut, by whoever has made it. It is for one use: an exchange that fails leaves nothing of it.
@@ -194,8 +194,7 @@ void open_later(Body &b, std::span<const uint64_t> faces, uint64_t by) {
   const bool first = a.faces.empty();
   std::vector<AheadFace> &list = first ? a.faces : a.later;
   std::vector<AheadFace> more(list);
-  for (const uint64_t face : faces)
-    more.push_back({face_of_whole(b, uint32_t(face >> 32), uint32_t(face & kNone)), by});
+  for (const uint64_t face : faces) more.push_back({face_of_whole(b, face), by});
   std::sort(more.begin(), more.end());
   list.swap(more);
   if (first) a.due = b.world->time + a.delay;

@@ -74,36 +74,30 @@ void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vect
 }
 
 // Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone.
+template <class Number>
+bool renumber(const std::vector<CutTarget> &targets, Number CutTarget::*number, size_t kind, Number &at,
+              uint32_t &feature) {
+  const Found now = find(targets, kind, feature);
+  if (now.target == kNone) return false;
+  at = targets[now.target].*number;
+  feature = now.feature;
+  return true;
+}
+
 bool renumber(ContactPoint &c, const std::vector<CutTarget> &targets) {
-  const uint32_t slot = targets[0].slot;
-  bool there = true;
-  const auto side = [&](uint32_t &at, uint32_t &feature, size_t kind) {
-    const Found now = find(targets, kind, feature);
-    there = there && now.target != kNone;
-    if (now.target == kNone) return;
-    at = targets[now.target].slot;
-    feature = now.feature;
-  };
-  const bool a = c.slot_a == slot, b = !c.obstacle && c.slot_b == slot;
-  if (a) side(c.slot_a, c.feature_a, c.type_a);
-  if (b) side(c.slot_b, c.feature_b, c.kind == kEdgeEdge ? 1 : 2);
+  const auto slot = &CutTarget::slot;
+  const bool a = c.slot_a == targets[0].slot, b = !c.obstacle && c.slot_b == targets[0].slot;
+  bool there = !a || renumber(targets, slot, c.type_a, c.slot_a, c.feature_a);
+  there &= !b || renumber(targets, slot, c.kind == kEdgeEdge ? 1 : 2, c.slot_b, c.feature_b);
   if (!there) c.feature_a = c.feature_b = 0;  // of a contact that has ended
   return there;
 }
 
 bool renumber(Crossing &c, const std::vector<CutTarget> &targets, const World &w) {
-  const uint64_t id = targets[0].id;
-  bool there = true;
-  const auto side = [&](uint64_t &at, uint32_t &edge) {
-    if (at != id) return;
-    const Found now = find(targets, 1, edge);
-    there = there && now.target != kNone;
-    if (now.target == kNone) return;
-    at = targets[now.target].id;
-    edge = now.feature;
-  };
-  side(c.id_a, c.edge_a);
-  side(c.id_b, c.edge_b);
+  const auto id = &CutTarget::id;
+  const bool a = c.id_a == targets[0].id, b = c.id_b == targets[0].id;
+  bool there = !a || renumber(targets, id, 1, c.id_a, c.edge_a);
+  there &= !b || renumber(targets, id, 1, c.id_b, c.edge_b);
   // of two bodies the older one is side a; an obstacle is side b
   if (c.id_b < c.id_a && slot_of(w, c.id_b) != kNone) {
     std::swap(c.id_a, c.id_b);

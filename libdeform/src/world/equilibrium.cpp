@@ -13,7 +13,6 @@
 #include "step/stages.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
-#include "world/settle.h"
 
 namespace dfm {
 namespace {

@@ -99,13 +99,9 @@ std::string precision(const Body &b) {
          ",\"why\":" + quote(why) + "}";
 }
 
-bool planned(const World &w, const std::string &effect) {
-  const auto same = [&](const PlannedEffect &e) { return e.name == effect; };
-  return std::any_of(w.plan.effects.begin(), w.plan.effects.end(), same);
-}
-
 bool used(const World &w, const std::string &effect) {
-  return w.selection.wants(effect) && planned(w, effect);
+  const auto same = [&](const PlannedEffect &e) { return e.name == effect; };
+  return w.selection.wants(effect) && std::any_of(w.plan.effects.begin(), w.plan.effects.end(), same);
 }
 
 // Laws of pairs, and their effects.
@@ -140,35 +136,27 @@ std::string left_out(const World &w) {
 
 // Effects of the model, which of them the scene uses, and what switches them off.
 std::string effects(const Body &b) {
-  std::string out = "\"effects\":[";
-  bool first = true;
+  std::vector<std::string> rows;
   for (const BodyEffect &e : body_effects(b)) {
-    out += std::string(first ? "" : ",") + "{\"name\":" + quote(e.name) +
-           ",\"works\":" + (e.works ? "true" : "false") +
-           ",\"used\":" + (e.works && used(*b.world, e.name) ? "true" : "false") + ",\"switches\":[";
-    first = false;
-    for (size_t i = 0; i < e.switches.size(); ++i) {
-      const EffectSwitch &s = e.switches[i];
-      out += (i ? "," : "") +
-             ("{\"key\":" + quote(s.row->key) + ",\"now\":" + param_text(*s.row, s.now) +
-              ",\"off\":" + param_text(*s.row, s.off) + ",\"off_value\":" + format("%.17g", s.off) + "}");
-    }
-    out += "]}";
+    std::vector<std::string> switches;
+    for (const EffectSwitch &s : e.switches)
+      switches.push_back("{\"key\":" + quote(s.row->key) + ",\"now\":" + param_text(*s.row, s.now) +
+                         ",\"off\":" + param_text(*s.row, s.off) + format(",\"off_value\":%.17g}", s.off));
+    rows.push_back("{\"name\":" + quote(e.name) + ",\"works\":" + (e.works ? "true" : "false") +
+                   ",\"used\":" + (e.works && used(*b.world, e.name) ? "true" : "false") + ",\"switches\":[" +
+                   join(switches, ",") + "]}");
   }
-  return out + "]";
+  return "\"effects\":[" + join(rows, ",") + "]";
 }
 
 // Facts that the model computed at creation.
 std::string facts(const Body &b) {
-  std::string out = "\"facts\":[";
-  bool first = true;
-  for (const BodyFact &f : body_facts(b)) {
-    out += (first ? "" : ",") +
-           ("{\"key\":" + quote(f.key) + ",\"label\":" + quote(f.label) + ",\"unit\":" + quote(f.unit) +
-            ",\"value\":" + (std::isfinite(f.value) ? format("%.9g", f.value) : "null") + "}");
-    first = false;
-  }
-  return out + "]";
+  std::vector<std::string> rows;
+  for (const BodyFact &f : body_facts(b))
+    rows.push_back("{\"key\":" + quote(f.key) + ",\"label\":" + quote(f.label) +
+                   ",\"unit\":" + quote(f.unit) +
+                   ",\"value\":" + (std::isfinite(f.value) ? format("%.9g", f.value) : "null") + "}");
+  return "\"facts\":[" + join(rows, ",") + "]";
 }
 
 std::string change(const ModelChoice &c, const std::string &when) {
@@ -224,9 +212,7 @@ std::string cuts(const Body &b) {
                    ",\"how\":" + quote(c.how == DFM_CUT_SPLIT ? "opens faces" : "removes cells") +
                    format(",\"most\":%u}", c.most));
   double least = HUGE_VAL;
-  for (const Material &m : b.makeup.materials)
-    for (size_t i = 0; i < m.extra_keys.size(); ++i)
-      if (m.extra_keys[i] == kTearKey) least = std::min(least, m.extra_values[i][0]);
+  for (const Material &m : b.makeup.materials) least = std::min(least, m.entry(kTearKey, HUGE_VAL));
   return ",\"cuts\":[" + join(rows, ",") +
          "],\"tears_beyond\":" + (b.tears ? format("%.9g", least) : std::string("null"));
 }
@@ -241,23 +227,19 @@ std::string body(const Body &b) {
                               : b.coupling == DFM_COUPLING_MLS    ? "own, mls"
                               : b.coupling == DFM_COUPLING_THESIS ? "own, thesis"
                                                                   : "own, barycentric";
-  out += std::string(",\"surface\":") + quote(surface) +
-         ",\"filled\":" + (b.share.empty() ? "false" : "true") + ",\"fields\":[";
-  for (size_t i = 0; i < b.fields.size(); ++i) {
-    const CellField &f = b.fields[i];
+  out +=
+      std::string(",\"surface\":") + quote(surface) + ",\"filled\":" + (b.share.empty() ? "false" : "true");
+  std::vector<std::string> fields, idle;
+  for (const CellField &f : b.fields) {
     const auto [lo, hi] = std::minmax_element(f.values.begin(), f.values.end());
-    out += (i ? "," : "") + ("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) +
-                             format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
+    fields.push_back("{\"name\":" + quote(f.key) + ",\"from\":" + quote(f.from) +
+                     format(",\"min\":%.9g,\"max\":%.9g}", *lo, *hi));
   }
-  out += "]," + effects(b) + "," + facts(b) + "," + integrator(b) + "," + precision(b) + light(b) +
-         ",\"idle\":[";
-  bool first = true;
-  for (const IdleParam &p : idle_params(b)) {
-    out += (first ? "" : ",") + ("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");
-    first = false;
-  }
-  return out + "]" + changes(b) + attachments(b) + cuts(b) +
-         ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
+  for (const IdleParam &p : idle_params(b))
+    idle.push_back("{\"name\":" + quote(p.key) + ",\"why\":" + quote(p.why) + "}");
+  return out + ",\"fields\":[" + join(fields, ",") + "]," + effects(b) + "," + facts(b) + "," +
+         integrator(b) + "," + precision(b) + light(b) + ",\"idle\":[" + join(idle, ",") + "]" + changes(b) +
+         attachments(b) + cuts(b) + ",\"unwatched\":" + quote(unwatched(*b.world, b)) + "}";
 }
 
 std::string seconds(double s) { return std::isfinite(s) ? format("%.3g s", s) : "any step"; }
@@ -288,28 +270,23 @@ std::string reason(const World &w) {
 }  // namespace
 
 std::string explain(const World &w) {
-  std::string out = "{\"effects\":[";
-  for (size_t i = 0; i < w.plan.effects.size(); ++i) {
-    const PlannedEffect &e = w.plan.effects[i];
-    out += (i ? "," : "") + ("{\"name\":" + quote(e.name) + ",\"asked_by\":" + quote(e.asked_by) +
-                             ",\"provided_by\":" + quote(e.provided_by) + ",\"state\":" +
-                             (w.selection.lists(e.name) ? "\"asked\"" : "\"called for\"") + "}");
-  }
-  out += "]," + left_out(w) + "," + laws(w) + ",\"stages\":[";
-  for (size_t i = 0; i < w.plan.stages.size(); ++i) {
-    const PlannedStage &s = w.plan.stages[i];
+  std::vector<std::string> effects, stages, absent, bodies;
+  for (const PlannedEffect &e : w.plan.effects)
+    effects.push_back("{\"name\":" + quote(e.name) + ",\"asked_by\":" + quote(e.asked_by) +
+                      ",\"provided_by\":" + quote(e.provided_by) +
+                      ",\"state\":" + (w.selection.lists(e.name) ? "\"asked\"" : "\"called for\"") + "}");
+  for (const PlannedStage &s : w.plan.stages) {
     const Stage &stage = stage_table()[s.row];
-    out += (i ? "," : "") + ("{\"name\":" + quote(stage.name) + ",\"why\":" + quote(s.why));
-    out += ",\"cost\":" + quote(stage.cost(w)) + "}";
+    stages.push_back("{\"name\":" + quote(stage.name) + ",\"why\":" + quote(s.why) +
+                     ",\"cost\":" + quote(stage.cost(w)) + "}");
   }
-  out += "],\"absent\":[";
-  for (size_t i = 0; i < w.plan.absent.size(); ++i) {
-    const AbsentStage &s = w.plan.absent[i];
-    out += (i ? "," : "") + ("{\"name\":" + quote(s.name) + ",\"why\":" + quote(s.why) + "}");
-  }
-  out += "],\"bodies\":[";
-  for (size_t i = 0; i < w.bodies.size(); ++i) out += (i ? "," : "") + body(*w.bodies[i]);
-  out += "],\"step\":{\"stable_s\":" +
+  for (const AbsentStage &s : w.plan.absent)
+    absent.push_back("{\"name\":" + quote(s.name) + ",\"why\":" + quote(s.why) + "}");
+  for (const auto &b : w.bodies) bodies.push_back(body(*b));
+  std::string out = "{\"effects\":[" + join(effects, ",") + "]," + left_out(w) + "," + laws(w) +
+                    ",\"stages\":[" + join(stages, ",") + "],\"absent\":[" + join(absent, ",") +
+                    "],\"bodies\":[" + join(bodies, ",") + "]";
+  out += ",\"step\":{\"stable_s\":" +
          (std::isfinite(w.bound.step) ? format("%.9g", w.bound.step) : std::string("null")) +
          ",\"worst_body\":" + (w.bound.body ? quote(w.bound.body->name) : "null") +
          ",\"worst_point\":" + std::to_string(w.bound.point) +

@@ -21,13 +21,20 @@ dfm_query_hit nothing() {
   return hit;
 }
 
-dfm_query_hit hit_of(const Thing &thing, uint32_t triangle, double distance, Vec3 point, Vec3 normal) {
+// Where a ray, a point or a shape on its way meets a thing.
+struct Met {
+  double distance = kFar;
+  uint32_t triangle = kNone;
+  Vec3 point, normal;
+};
+
+dfm_query_hit hit_of(const Thing &thing, const Met &met) {
   dfm_query_hit hit = nothing();
   hit.thing = thing.handle();
-  hit.triangle = triangle;
-  hit.distance = distance;
-  store3(hit.point, point);
-  store3(hit.normal, normal);
+  hit.triangle = met.triangle;
+  hit.distance = met.distance;
+  store3(hit.point, met.point);
+  store3(hit.normal, met.normal);
   return hit;
 }
 
@@ -40,18 +47,6 @@ double above_plane(const Convex &shape, const Obstacle &o, Vec3 *lowest = nullpt
   const Vec3 n = plane_normal(o), p = shape.support(-n);
   if (lowest) *lowest = p - shape.radius * n;
   return dot(n, p - o.pose.position) - shape.radius;
-}
-
-// Closed forms except planes, in place.
-ObstacleShape closed_form(const Obstacle &o) {
-  ObstacleView v{};
-  v.shape = shape_of(o);
-  v.position = o.pose.position;
-  v.rotation = o.pose.rotation;
-  v.half_size = load3(o.def.half_size);
-  v.radius = o.def.radius;
-  v.half_length = o.def.half_length;
-  return ObstacleShape(v);
 }
 
 bool closed(const Surface &s) {
@@ -192,94 +187,124 @@ bool overlap(const Thing &a, const Thing &b) {
                                                                           : surfaces_overlap(b, a);
 }
 
-dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 o, Vec3 d, double limit) {
-  dfm_query_hit hit = nothing();
-  each_thing(w, filter, [&](const Thing &thing) {
-    const double most = std::min(limit, hit.distance);
-    if (has_triangles(thing)) {
-      const Triangles m = triangles_of(thing);
-      const TriangleOnRay on = first_on_ray(m, seen_by(thing, o), turned_by(thing, d), most);
-      if (on.triangle != kNone && on.distance < hit.distance)
-        hit = hit_of(thing, on.triangle, on.distance, o + on.distance * d,
-                     turned_back(thing, normal_of(m, on.triangle)));
-      return true;
-    }
-    Vec3 n;
-    const double at = ray_obstacle(*thing.obstacle, o, d, most, &n, nullptr);
-    if (at <= limit && at < hit.distance) hit = hit_of(thing, kNone, at, o + at * d, n);
-    return true;
-  });
-  return hit;
-}
-
 double distance_from(Obstacle &o, Vec3 p, double limit) {
-  if (!of_triangles(o)) return closed_form(o).closest(p).distance;
+  if (!of_triangles(o)) return o.standing().closest(p).distance;
   const Vec3 local = rotate_back(o.pose.rotation, p - o.pose.position);
   return closest_to(search(o), local, DistanceKey::root, limit).key;
 }
 
-dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit) {
-  dfm_query_hit hit = nothing();
-  each_thing(w, filter, [&](const Thing &thing) {
-    const double most = std::min(limit, hit.distance);
-    if (has_triangles(thing)) {
-      const Triangles m = triangles_of(thing);
-      const TriangleNearPoint near = closest_to(m, seen_by(thing, p), DistanceKey::root, most);
-      if (near.triangle != kNone && near.key < hit.distance)
-        hit = hit_of(thing, near.triangle, near.key, back(thing, near.at.point),
-                     turned_back(thing, normal_of(m, near.triangle)));
+namespace {
+
+Met first_of(const Thing &thing, Vec3 o, Vec3 d, double limit, SearchCount *count = nullptr) {
+  if (has_triangles(thing)) {
+    const Triangles m = triangles_of(thing);
+    const TriangleOnRay on = first_on_ray(m, seen_by(thing, o), turned_by(thing, d), limit, count);
+    if (on.triangle == kNone) return {};
+    return {on.distance, on.triangle, o + on.distance * d, turned_back(thing, normal_of(m, on.triangle))};
+  }
+  Vec3 n;
+  const double at = ray_obstacle(*thing.obstacle, o, d, &n);
+  return at <= limit && at < kFar ? Met{at, kNone, o + at * d, n} : Met{};
+}
+
+Met closest_of(const Thing &thing, Vec3 p, double limit, SearchCount *count = nullptr) {
+  if (has_triangles(thing)) {
+    const Triangles m = triangles_of(thing);
+    const TriangleNearPoint near = closest_to(m, seen_by(thing, p), DistanceKey::root, limit, count);
+    if (near.triangle == kNone) return {};
+    return {near.key, near.triangle, back(thing, near.at.point),
+            turned_back(thing, normal_of(m, near.triangle))};
+  }
+  if (shape_of(*thing.obstacle) == Shape::none) return {};
+  const ObstaclePoint near = thing.obstacle->standing().closest(p);
+  const double distance = std::fabs(near.distance);
+  return distance <= limit ? Met{distance, kNone, near.point, near.normal} : Met{};
+}
+
+// meet(thing, limit): where it meets a thing within the limit.
+struct Nearest {
+  Thing thing;
+  Met met;
+  template <class Meet>
+  Nearest(World &w, const ThingFilter &filter, double limit, const Meet &meet) {
+    each_thing(w, filter, [&](const Thing &other) {
+      const Met found = meet(other, std::min(limit, met.distance));
+      if (!(found.distance < met.distance)) return true;
+      thing = other;
+      met = found;
       return true;
-    }
-    const Obstacle &o = *thing.obstacle;
-    if (shape_of(o) == Shape::none) return true;
-    const ObstaclePoint near = closed_form(o).closest(p);
-    const double distance = std::fabs(near.distance);
-    if (distance <= most && distance < hit.distance)
-      hit = hit_of(thing, kNone, distance, near.point, near.normal);
-    return true;
-  });
-  return hit;
+    });
+  }
+  dfm_query_hit hit() const { return met.distance < kFar ? hit_of(thing, met) : nothing(); }
+  dfm_ray_hit ray_hit() const {  // of a body's triangles alone
+    dfm_ray_hit hit{};
+    hit.triangle = thing.body ? met.triangle : kNone;
+    hit.distance = met.distance;
+    if (thing.body) hit.body = thing.handle();
+    else if (thing.obstacle) hit.obstacle = thing.handle();
+    store3(hit.point, met.point);
+    store3(hit.normal, met.normal);
+    return hit;
+  }
+};
+
+}  // namespace
+
+dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 o, Vec3 d, double limit) {
+  const auto meet = [&](const Thing &thing, double most) { return first_of(thing, o, d, most); };
+  return Nearest(w, filter, limit, meet).hit();
+}
+
+dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit) {
+  const auto meet = [&](const Thing &thing, double most) { return closest_of(thing, p, most); };
+  return Nearest(w, filter, limit, meet).hit();
+}
+
+dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount *count) {
+  const auto meet = [&](const Thing &thing, double most) { return first_of(thing, o, d, most, count); };
+  return Nearest(w, ThingFilter(nullptr), max_distance, meet).ray_hit();
+}
+
+dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count) {
+  const auto meet = [&](const Thing &thing, double most) {
+    return thing.body ? closest_of(thing, p, most, count) : Met{};
+  };
+  return Nearest(w, ThingFilter(nullptr), max_distance, meet).ray_hit();
 }
 
 dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Convex &shape, Vec3 path) {
   dfm_query_hit hit = nothing();
   const double length = norm(path);
   const Vec3 unit = normalized(path);
-  const auto take = [&](const Thing &thing, const ConvexHit &found, uint32_t triangle) {
-    if (!found.hit || !(found.way < hit.distance)) return;
-    hit = hit_of(thing, triangle, found.way, back(thing, found.point), turned_back(thing, found.normal));
-    if (found.inside) hit.flags = DFM_QUERY_INSIDE;
+  const auto take = [&](const Thing &thing, const Met &met, bool inside) {
+    if (!(met.distance < hit.distance)) return;
+    hit = hit_of(thing, met);
+    if (inside) hit.flags = DFM_QUERY_INSIDE;
   };
-  const ConvexHit inside{true, true, 0, -unit, shape.position};
+  const Met start{0, kNone, shape.position, -unit};
   each_thing(w, filter, [&](const Thing &thing) {
     const double most = std::min(length, hit.distance);
     if (has_triangles(thing)) {
       const Triangles m = triangles_of(thing);
       const Convex seen = seen_by(thing, shape);
-      const TriangleOnPath found = first_on_path(m, seen, turned_by(thing, unit), most);
-      take(thing, found.hit, found.triangle);
+      const auto [found, triangle] = first_on_path(m, seen, turned_by(thing, unit), most);
+      if (found.hit)
+        take(thing, {found.way, triangle, back(thing, found.point), turned_back(thing, found.normal)},
+             found.inside);
       // a shape inside a closed surface may hit it from inside later
-      if (hit.distance > 0 && encloses(thing, m, seen.any())) {
-        hit = hit_of(thing, kNone, 0, inside.point, inside.normal);
-        hit.flags = DFM_QUERY_INSIDE;
-      }
+      if (hit.distance > 0 && encloses(thing, m, seen.any())) take(thing, start, true);
       return hit.distance > 0;
     }
     const Obstacle &o = *thing.obstacle;
     if (shape_of(o) == Shape::plane) {
       Vec3 lowest;
       const double above = above_plane(shape, o, &lowest), closing = -dot(unit, plane_normal(o));
-      const double way = above <= 0 ? 0 : closing > 0 ? above / closing : kFar;
-      if (!(way <= most && way < hit.distance)) return true;
-      hit = hit_of(thing, kNone, way, above <= 0 ? inside.point : lowest + way * unit,
-                   above <= 0 ? inside.normal : plane_normal(o));
-      if (above <= 0) hit.flags = DFM_QUERY_INSIDE;
+      const double way = closing > 0 ? above / closing : kFar;
+      if (above <= 0) take(thing, start, true);
+      else if (way <= most) take(thing, {way, kNone, lowest + way * unit, plane_normal(o)}, false);
     } else if (is_convex(o)) {
       const ConvexHit found = convex_cast(shape, convex_of(o), unit, most);
-      if (found.hit && found.way < hit.distance) {
-        hit = hit_of(thing, kNone, found.way, found.point, found.normal);
-        if (found.inside) hit.flags = DFM_QUERY_INSIDE;
-      }
+      if (found.hit) take(thing, {found.way, kNone, found.point, found.normal}, found.inside);
     }
     return hit.distance > 0;
   });
@@ -312,20 +337,20 @@ void find_all_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit
     if (has_triangles(thing)) {
       const Triangles m = triangles_of(thing);
       all_on_ray(m, seen_by(thing, origin), turned_by(thing, unit), limit, [&](double at, uint32_t t) {
-        rows.offer(hit_of(thing, t, at, origin + at * unit, turned_back(thing, normal_of(m, t))));
+        rows.offer(hit_of(thing, {at, t, origin + at * unit, turned_back(thing, normal_of(m, t))}));
       });
       return true;
     }
-    Obstacle &o = *thing.obstacle;
+    const Obstacle &o = *thing.obstacle;
     Vec3 n;
-    const double first = ray_obstacle(o, origin, unit, limit, &n, nullptr);
+    const double first = ray_obstacle(o, origin, unit, &n);
     if (!(first < kFar)) return true;
-    if (first <= limit) rows.offer(hit_of(thing, kNone, first, origin + first * unit, n));
+    if (first <= limit) rows.offer(hit_of(thing, {first, kNone, origin + first * unit, n}));
     // The exit point is the entry point of the reversed line.
     if (!is_convex(o) || !(dot(n, unit) < 0)) return true;
     const double beyond = first + 2 * convex_of(o).reach() + 1;
-    const double last = beyond - ray_obstacle(o, origin + beyond * unit, -unit, beyond, &n, nullptr);
-    if (last >= first && last <= limit) rows.offer(hit_of(thing, kNone, last, origin + last * unit, n));
+    const double last = beyond - ray_obstacle(o, origin + beyond * unit, -unit, &n);
+    if (last >= first && last <= limit) rows.offer(hit_of(thing, {last, kNone, origin + last * unit, n}));
     return true;
   });
 }

@@ -6,16 +6,11 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "plugin/context.h"
+#include "plugin/params.h"
 #include "state/world.h"
 
 namespace dfm {
 namespace {
-
-bool has_row(const dfm_type &type, const std::string &key) {
-  for (uint32_t i = 0; i < type.nparam; ++i)
-    if (key == type.params[i].key) return true;
-  return false;
-}
 
 // Keys that every material has, which users expect to have an effect at any value.
 bool from_material(const char *key) {
@@ -28,16 +23,10 @@ bool from_material(const char *key) {
 std::string meant(const Body &b, const std::string &key) {
   if (from_material(key.c_str())) return {};
   for (const dfm_type *model : b.world->context->registry.list(DFM_KIND_MODEL))
-    if (has_row(*model, key)) return {};
+    if (find_row(*model, key.c_str())) return {};
   std::vector<std::string> known = {"density", "friction", kTearKey, kToughnessKey};
   for (uint32_t i = 0; i < b.model.type->nparam; ++i) known.push_back(b.model.type->params[i].key);
   return did_you_mean(key, known, '\'');
-}
-
-const CellField *field_of(const Body &b, const char *key) {
-  for (const CellField &f : b.fields)
-    if (f.key == key) return &f;
-  return nullptr;
 }
 
 }  // namespace
@@ -47,7 +36,8 @@ std::vector<Unused> find_unused(const dfm_type &type, const CellMaterials &cells
   const dfm_material_def plain = dfm_material_def_default();
   const auto note = [&](const std::string &key, const std::string &material) {
     const auto same = [&](const Unused &u) { return u.key == key; };
-    if (!has_row(type, key) && std::none_of(out.begin(), out.end(), same)) out.push_back({key, material});
+    if (!find_row(type, key.c_str()) && std::none_of(out.begin(), out.end(), same))
+      out.push_back({key, material});
   };
   for (const Material *m : cells.list) {
     const dfm_material_def &d = m->def;
@@ -82,8 +72,8 @@ std::vector<IdleParam> idle_params(const Body &b) {
     const std::string why = b.model.idle_reason(i);
     if (why.empty()) continue;
     const double *const now = &b.model.params[at];
-    const bool chosen =
-        field_of(b, row.key) || std::any_of(now, now + row.width, [&](double x) { return x != row.def; });
+    const bool chosen = std::ranges::find(b.fields, row.key, &CellField::key) != b.fields.end() ||
+                        std::any_of(now, now + row.width, [&](double x) { return x != row.def; });
     if (chosen || from_material(row.key)) out.push_back({row.key, why, chosen});
   }
   return out;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "core/error.h"
 #include "plugin/on_behalf.h"
@@ -31,7 +32,7 @@ dfm_body_measure measure(Body &b) {
   Vec3 com, momentum;
   double kinetic = 0, fastest = 0;
   for (uint32_t i = 0; i < p.n; ++i) {
-    const Vec3 x = load3(&p.x[size_t(i) * kStride]), v = load3(&p.v[size_t(i) * kStride]);
+    const Vec3 x = p.x_at(i), v = p.v_at(i);
     com += p.mass[i] * x;
     momentum += p.mass[i] * v;
     kinetic += 0.5 * p.mass[i] * norm2(v);
@@ -40,9 +41,7 @@ dfm_body_measure measure(Body &b) {
   com = (1 / b.mass) * com;
   const Vec3 velocity = (1 / b.mass) * momentum;
   Vec3 angular;
-  for (uint32_t i = 0; i < p.n; ++i)
-    angular += p.mass[i] *
-               cross(load3(&p.x[size_t(i) * kStride]) - com, load3(&p.v[size_t(i) * kStride]) - velocity);
+  for (uint32_t i = 0; i < p.n; ++i) angular += p.mass[i] * cross(p.x_at(i) - com, p.v_at(i) - velocity);
   for (size_t t = 0; t < b.tets.size(); t += 4) {
     const double v = tet_volume(p.x.data(), kStride, &b.tets[t]);
     m.volume += b.share.empty() ? v : b.share[t / 4] * v;
@@ -62,50 +61,32 @@ dfm_body_measure measure(Body &b) {
 
 namespace {
 
-const void *extension_of(const Body &b, const char *id) {
-  const void *found = nullptr;
-  if (b.model.ops->extension)
-    b.model.call("extension", [&] {
-      found = b.model.ops->extension(b.model.self, id);
-      return DFM_OK;
-    });
-  return found;
-}
-
-// Values of a model by cell, at the present positions.
-template <class Give>
-void ask_by_cell(Body &b, const char *entry, const char *what, const Give &give) {
+// Values of a model by cell at the present positions. give: the function of an extension that has one.
+template <class Table, class Give>
+void ask_by_cell(Body &b, const char *id, const char *name, const char *what, const Give &give, double *out) {
+  const char *const type = b.model.type->id;
+  const auto table =
+      copy_table<Table>(b.model.extension(id), 2 * sizeof(uint32_t) + sizeof(void *), type, name);
+  if (!table || !give(*table))
+    fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no %s per cell", type, b.name.c_str(), what);
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
-  if (b.model.call(entry, [&] { return give(&k); }) != DFM_OK)
-    fail(DFM_E_FATAL, "model '%s' could not give its %s", b.model.type->id, what);
-}
-
-// The table of an extension with one function.
-template <class T>
-std::optional<T> table_of(const Body &b, const char *id, const char *name) {
-  return copy_table<T>(extension_of(b, id), 2 * sizeof(uint32_t) + sizeof(void *), b.model.type->id, name);
+  const char *const entry = name + std::strlen("dfm_");
+  if (b.model.call(entry, [&] { return give(*table)(b.model.self, &k, out); }) != DFM_OK)
+    fail(DFM_E_FATAL, "model '%s' could not give its %s per cell", type, what);
 }
 
 }  // namespace
 
-bool offers(const Body &b, const char *extension) { return extension_of(b, extension) != nullptr; }
+bool offers(const Body &b, const char *extension) { return b.model.extension(extension) != nullptr; }
 
 void energy_density(Body &b, double *out) {
-  const auto e = table_of<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy");
-  if (!e || !e->cell_energy)
-    fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no energy per cell", b.model.type->id,
-         b.name.c_str());
-  ask_by_cell(b, "cell_energy", "energy per cell",
-              [&](const dfm_kin *k) { return e->cell_energy(b.model.self, k, out); });
+  const auto give = [](const dfm_cell_energy &table) { return table.cell_energy; };
+  ask_by_cell<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy", "energy", give, out);
 }
 
 void cell_stress(Body &b, double *out) {
-  const auto e = table_of<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress");
-  if (!e || !e->cell_stress)
-    fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no stress per cell", b.model.type->id,
-         b.name.c_str());
-  ask_by_cell(b, "cell_stress", "stress per cell",
-              [&](const dfm_kin *k) { return e->cell_stress(b.model.self, k, out); });
+  const auto give = [](const dfm_cell_stress &table) { return table.cell_stress; };
+  ask_by_cell<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress", "stress", give, out);
 }
 
 namespace {
@@ -149,9 +130,7 @@ void give_params(Body &b, const std::vector<double> &values) {
 
 void set_model_params(Body &b, const dfm_params &params) {
   const dfm_type &type = *b.model.type;
-  if (params.n && !params.values)
-    fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(),
-         params.n);
+  check_given(b, params);
   const std::span<const dfm_param_value> given(params.values, params.n);
   for (const dfm_param_value &value : given)
     for (const CellField &f : b.fields)
@@ -187,7 +166,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
   b.integrator.share = 1;                         // what holds if it cannot be measured
-  if (b.dynamics->diagonal()) measure_explicit(b, *b.dynamics, b.integrator, b.origin);
+  if (b.dynamics->diagonal()) measure_explicit(b);
 }
 
 }  // namespace dfm

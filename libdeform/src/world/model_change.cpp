@@ -9,7 +9,6 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
-#include "math/extent.h"
 #include "math/polar.h"
 #include "math/turn.h"
 #include "plugin/context.h"
@@ -24,6 +23,7 @@
 #include "world/cut.h"
 #include "world/idle.h"
 #include "world/measure.h"
+#include "world/queries.h"
 #include "world/tool_cut.h"
 
 namespace dfm {
@@ -41,8 +41,8 @@ constexpr size_t kSpares = 2;  // a rule has three models
 
 // ---- rigid placement of the body ------------------------------------------------------------------
 
-Vec3 rest_of(const Body &b, uint32_t i) { return load3(&b.p.rest[size_t{3} * i]); }
-Vec3 now_of(const Body &b, uint32_t i) { return load3(&b.p.x[size_t{kStride} * i]); }
+Vec3 rest_of(const Body &b, uint32_t i) { return b.p.rest_at(i); }
+Vec3 now_of(const Body &b, uint32_t i) { return b.p.x_at(i); }
 
 // Orthonormal axes: the first along a, the second in the plane of a and b; row-major, by rows. Returns false
 // if a and b are parallel.
@@ -130,11 +130,7 @@ Pose frame_of(const Body &b) {
 
 // ---- checks of the new model ------------------------------------------------------------------
 
-double size_of(const Body &b) {
-  Extent box;
-  for (size_t i = 0; i < b.p.n; ++i) box.add(load3(&b.p.rest[3 * i]));
-  return box.longest();
-}
+double size_of(const Body &b) { return extent_of(b.p.rest.data(), b.p.n, 3).longest(); }
 
 // A model that steps itself may represent only some shapes. A sub-step that is too short for any motion, with
 // the forces of the last one, shows where it would put the surface; the result is discarded.
@@ -212,12 +208,9 @@ void check_jump(const Body &b, const Swap &swap) {
 
 // A model whose forces do not rotate with the body has strain if the body has rotated.
 void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
-  double kinetic = 0;
-  for (uint32_t i = 0; i < b.p.n; ++i)
-    kinetic += 0.5 * b.p.mass[i] * norm2(load3(&b.p.v[size_t{kStride} * i]));
   const double jump = std::fabs(swap.after - swap.before);
-  if (!std::isinf(swap.max_jump) || !(jump > std::min(swap.before, swap.after) + kinetic + kSmallJump))
-    return;
+  const double has = std::min(swap.before, swap.after) + kinetic_of(b);
+  if (!std::isinf(swap.max_jump) || !(jump > has + kSmallJump)) return;
   w.context->logf(
       DFM_LOG_WARNING,
       "t = %g s, body '%s': from '%s' to '%s' its elastic energy jumps from %g J to %g J, by more "
@@ -238,14 +231,13 @@ void judge(World &w, Body &b, const ModelInstance &old, const ChangeBook &book, 
 }
 
 // Keeps an instance for later changes; replaces an older one with the same inputs. There is room.
-void keep_spare(std::vector<SpareModel> &spares, BodyModel &left, std::unique_ptr<ModelInstance> place) {
+void keep_spare(std::vector<SpareModel> &spares, MadeModel &left) {
   const auto same = [&](const SpareModel &s) {
-    return s.instance->type == left.instance.type && s.origin.params == left.origin.params;
+    return s.instance.type == left.model.type && s.origin.params == left.origin.params;
   };
   std::erase_if(spares, same);
   if (spares.size() == kSpares) spares.erase(spares.begin());
-  place->swap(left.instance);
-  spares.push_back({std::move(place), std::move(left.origin), std::move(left.withheld)});
+  spares.push_back({std::move(left.model), std::move(left.origin), std::move(left.withheld)});
 }
 
 // The inputs of an instance of this type, at the present state of the body.
@@ -259,7 +251,7 @@ ModelOrigin origin_for(const Body &b, const dfm_type &type, const ModelChoice &t
 }
 
 // s, the stable sub-step of the body with it.
-double stable_with(Body &b, BodyModel &made) {
+double stable_with(Body &b, MadeModel &made) {
   StepBound bound;
   exchange(b, made);
   const bool known = b.dynamics->bound(b.world->time, b.integrator.share, [](double *, double *) {}, bound);
@@ -276,23 +268,22 @@ void rehearse(Body &b, ModelChoice &to, double t, uint32_t &integrator, bool at_
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   ModelOrigin origin = origin_for(b, type, to);
   origin.integrator = integrator;
-  auto place = std::make_unique<ModelInstance>();
-  const std::unique_ptr<BodyModel> made =
+  const std::unique_ptr<MadeModel> made =
       make_body_model(w, b, type, std::move(origin), static_cast<int32_t>(integrator));
   check_springs(b, type, *made->dynamics);
   if (b.tears || cut_by_any(b) || (!b.planned_cuts.empty() && b.planned_cuts.back().t > t))
-    check_may_cut(b, made->instance);
+    check_may_cut(b, made->model);
   to.stable = stable_with(b, *made);
-  if (named) warn_of_own_steps(w, b.name, made->instance, static_cast<int32_t>(to.integrator));
-  if (!w.changed) check_effects(w, b, b.model, made->instance);
-  if (at_rest && made->instance.stepper)
+  if (named) warn_of_own_steps(w, b.name, made->model, static_cast<int32_t>(to.integrator));
+  if (!w.changed) check_effects(w, b, b.model, made->model);
+  if (at_rest && made->model.stepper)
     fail(DFM_E_UNSUPPORTED,
          "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
          "another model",
          b.name.c_str(), type.id);
   // one whose forces do not rotate with the body is valid at the present placement only
   const bool lasts = rests_unplaced(type);
-  if (lasts && spares.size() < kSpares) keep_spare(spares, *made, std::move(place));
+  if (lasts && spares.size() < kSpares) keep_spare(spares, *made);
 }
 
 }  // namespace
@@ -304,14 +295,8 @@ bool is_made_so(const Body &b, const ModelChoice &c) {
 
 ModelChoice choose_model(const Body &b, const char *type, const dfm_params &params, int32_t integrator) {
   const dfm_type &found = b.world->context->registry.find(DFM_KIND_MODEL, type);
-  if (params.n && !params.values)
-    fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(),
-         params.n);
-  if (integrator < DFM_INTEGRATOR_AUTO || integrator > DFM_INTEGRATOR_TR_BDF2)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
-         "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
-         b.name.c_str(), integrator);
+  check_given(b, params);
+  check_integrator(b.name, integrator);
   ModelChoice out;
   out.type = found.id;
   if (integrator != DFM_INTEGRATOR_AUTO) out.integrator = static_cast<uint32_t>(integrator);
@@ -325,7 +310,7 @@ ModelChoice choose_model(const Body &b, const char *type, const dfm_params &para
   }
   std::erase_if(own, limit);
   out.params = keep_params(found, {sizeof(dfm_params), static_cast<uint32_t>(own.size()), own.data()});
-  check_params(*b.world, b, found, out.params);
+  values_asked(*b.world, b, found, out.params);
   return out;
 }
 
@@ -338,25 +323,24 @@ void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump};
   ChangeBook book = look_at_changes(b, swap.before);
   const int32_t integrator = static_cast<int32_t>(origin.integrator);
-  auto place = std::make_unique<ModelInstance>();
   b.spares.reserve(kSpares);
-  const std::unique_ptr<BodyModel> made = make_body_model(w, b, type, std::move(origin), integrator);
+  const std::unique_ptr<MadeModel> made = make_body_model(w, b, type, std::move(origin), integrator);
   exchange(b, *made);
   try {
-    judge(w, b, made->instance, book, swap);
+    judge(w, b, made->model, book, swap);
     warn_of_jump(w, b, swap);
     w.changed = true;
     reopen_integrators(w);  // the choices for other bodies may no longer fit
     prepare(w);
   } catch (...) {
     exchange(b, *made);
-    if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));  // the rule may use it again
+    if (!b.rule.empty()) keep_spare(b.spares, *made);  // the rule may use it again
     throw;
   }
   book_change(b, book, swap);
   b.changes = book;
   if (w.step_count == 0) b.first_model = model_hash(b);
-  if (!b.rule.empty()) keep_spare(b.spares, *made, std::move(place));
+  if (!b.rule.empty()) keep_spare(b.spares, *made);
   wake(w, b);
   w.sizes = {};  // another bound, and other errors
 }
@@ -415,6 +399,76 @@ bool try_change(World &w, Body &b, const ModelChoice &to, bool tell) {
   if (tell || !swap.refused) keep_swap(w, swap);
   return !swap.refused;
 }
+
+namespace {
+
+// ---- rules ------------------------------------------------------------------------------------------------
+
+// Selects the model of a body by contact and distance, between steps:
+//
+//   touching   it has a contact
+//   near       a point of its surface lies within a distance of the place of interest
+//   far        else
+//
+// A finer model (higher in this list) is taken at once. It is kept until it has not been needed for a while,
+// and the distance at which near ends is larger than that at which it begins, so that a body that bounces, or
+// stays near the limit, does not change back and forth. Sleeping bodies do not change, because a change would
+// wake them.
+const ModelChoice &choice_of(const SwitchRule &r, SwitchLevel level) {
+  return level == SwitchLevel::touching ? r.touching : level == SwitchLevel::near ? r.near : r.far;
+}
+
+void find_touching(World &w, Array<uint8_t> &touching) {
+  touching.assign(w.bodies.size(), 0);
+  for (uint32_t m = 0; m < w.store.n; ++m)
+    for (const uint64_t id : {w.store.id_a[m], w.store.id_b[m]})
+      if (const uint32_t i = slot_of(w, id); w.store.touching[m] && i != kNone) touching[i] = 1;
+}
+
+bool is_near(const Body &b, const SwitchRule &r) {
+  const bool was = r.level == uint32_t(SwitchLevel::near);
+  const double limit = r.distance * (was ? 1 + r.hysteresis : 1);
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+    if (norm2(surfel_vector(b, b.p.x, s) - r.point) <= limit * limit) return true;
+  }
+  return false;
+}
+
+SwitchLevel called_for(const Body &b, const SwitchRule &r, bool touches) {
+  if (!r.touching.type.empty() && touches) return SwitchLevel::touching;
+  return !r.near.type.empty() && is_near(b, r) ? SwitchLevel::near : SwitchLevel::far;
+}
+
+void follow(World &w, Body &b, SwitchRule &r, bool touches) {
+  const SwitchLevel wanted = called_for(b, r, touches);
+  if (uint32_t(wanted) == r.level) {
+    r.called = w.time;
+    return;
+  }
+  const bool decided = r.level != uint32_t(SwitchLevel::undecided);
+  if (decided && uint32_t(wanted) < r.level && w.time - r.called < r.wait) return;
+  const bool again = r.refused >= 0;
+  if (again && w.time - r.refused < r.wait) return;
+  const ModelChoice &to = choice_of(r, wanted);
+  if (!is_made_so(b, to) && !try_change(w, b, to, !again)) {
+    r.refused = w.time;
+    return;
+  }
+  r.level = uint32_t(wanted);
+  r.called = w.time;
+  r.refused = -1;
+}
+
+void follow_rules(World &w) {
+  if (std::all_of(w.bodies.begin(), w.bodies.end(), [](const auto &b) { return b->rule.empty(); })) return;
+  find_touching(w, w.steps->touching);
+  for (size_t i = 0; i < w.bodies.size(); ++i) {
+    Body &b = *w.bodies[i];
+    if (!b.rule.empty() && !b.slumber.asleep) follow(w, b, b.rule[0], w.steps->touching[i]);
+  }
+}
+
+}  // namespace
 
 void make_switches(World &w, double dt) {
   for (auto &b : w.bodies)

@@ -24,10 +24,8 @@ void check_first_step(World &w, Body &b);
 // Changes the model and keeps the row. Returns false if it was refused because of the energy jump; the row
 // reports that if `tell`.
 bool try_change(World &w, Body &b, const ModelChoice &to, bool tell);
-// Makes the changes that are due in the step of dt seconds that begins now: by time, then by rules
-// (model_rule.cpp).
+// Makes the changes that are due in the step of dt seconds that begins now: by time, then by rules.
 void make_switches(World &w, double dt);
-void follow_rules(World &w);
 void keep_swap(World &w, const Swap &swap);
 
 }  // namespace dfm

@@ -56,10 +56,6 @@ void warn(const World &w, const std::vector<Made> &all) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 CutReport cut_alone(Body &b, const CutShape &shape, uint32_t how, uint32_t most) {
   return how == DFM_CUT_SPLIT ? split_by_blade(b, shape, most) : remove_by_shape(b, shape, most);
 }

@@ -105,19 +105,7 @@ Vec3 normal_of(const Triangles &m, uint32_t t) {
   return normalized(cross(m.corner(t, 1) - a, m.corner(t, 2) - a));
 }
 
-namespace {
-
-double ray_triangles(Obstacle &ob, Vec3 o, Vec3 d, double limit, Vec3 *normal, SearchCount *count) {
-  const Triangles m = search(ob);
-  const TriangleOnRay hit = first_on_ray(m, o, d, limit, count);
-  if (hit.triangle != kNone) *normal = normal_of(m, hit.triangle);
-  return hit.distance;
-}
-
-}  // namespace
-
-double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 direction, double limit, Vec3 *normal,
-                    SearchCount *count) {
+double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *normal) {
   const Quat q = ob.pose.rotation;
   const Vec3 o = rotate_back(q, origin - ob.pose.position), d = rotate_back(q, direction);
   double t = kFar;
@@ -132,30 +120,11 @@ double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 direction, double limit, Vec
       break;
     case Shape::box: t = ray_box(o, d, load3(ob.def.half_size), &n); break;
     case Shape::capsule: t = ray_capsule(o, d, ob.def.radius, ob.def.half_length, &n); break;
-    case Shape::mesh:
-    case Shape::voxels: t = ray_triangles(ob, o, d, limit, &n, count); break;
-    case Shape::none: break;
+    default: break;
   }
   *normal = rotate(q, n);
   return t;
 }
-
-namespace {
-
-Vec3 triangle_normal(const Body &b, uint32_t t) {
-  const uint32_t *const c = &b.surface.tri[size_t(3) * t];
-  const Vec3 a = surfel_vector(b, b.p.x, c[0]);
-  return cross(surfel_vector(b, b.p.x, c[1]) - a, surfel_vector(b, b.p.x, c[2]) - a);
-}
-
-dfm_ray_hit nothing() {
-  dfm_ray_hit hit{};
-  hit.distance = kFar;
-  hit.triangle = kNone;
-  return hit;
-}
-
-}  // namespace
 
 Vec3 surfel_vector(const Body &b, const Array<double> &column, uint32_t s) {
   if (b.surface.identity()) return load3(&column[size_t(b.surface.point[s]) * kStride]);
@@ -167,7 +136,7 @@ Vec3 surfel_vector(const Body &b, const Array<double> &column, uint32_t s) {
 void surface_normals(const Body &b, double *out) {
   std::fill(out, out + size_t(3) * b.surface.nsurfel, 0.0);
   for (uint32_t t = 0; t < b.surface.ntri; ++t) {
-    const Vec3 n = triangle_normal(b, t);
+    const Vec3 n = b.surface.area2(t, [&](uint32_t s) { return surfel_vector(b, b.p.x, s); });
     for (int k = 0; k < 3; ++k) {
       double *const to = out + size_t(3) * b.surface.tri[size_t(3) * t + size_t(k)];
       store3(to, load3(to) + n);
@@ -175,50 +144,6 @@ void surface_normals(const Body &b, double *out) {
   }
   for (uint32_t s = 0; s < b.surface.nsurfel; ++s)
     store3(out + size_t(3) * s, normalized(load3(out + size_t(3) * s)));
-}
-
-dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount *count) {
-  dfm_ray_hit hit = nothing();
-  for (auto &b : w.bodies) {
-    if (b->sensor) continue;
-    const Triangles m = search(*b);
-    const TriangleOnRay on = first_on_ray(m, o, d, std::min(max_distance, hit.distance), count);
-    if (on.triangle == kNone || !(on.distance < hit.distance)) continue;
-    hit.distance = on.distance;
-    hit.body = b->handle;
-    hit.triangle = on.triangle;
-    store3(hit.normal, normal_of(m, on.triangle));
-  }
-  for (auto &ob : w.obstacles) {
-    if (ob->sensor) continue;
-    Vec3 n;
-    const double at = ray_obstacle(*ob, o, d, std::min(max_distance, hit.distance), &n, count);
-    if (!(at <= max_distance && at < hit.distance)) continue;
-    hit.distance = at;
-    hit.body = 0;
-    hit.obstacle = ob->handle;
-    hit.triangle = kNone;
-    store3(hit.normal, n);
-  }
-  if (hit.distance < kFar) store3(hit.point, o + hit.distance * d);
-  return hit;
-}
-
-dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count) {
-  dfm_ray_hit hit = nothing();
-  for (auto &b : w.bodies) {
-    if (b->sensor) continue;
-    const Triangles m = search(*b);
-    const TriangleNearPoint near =
-        closest_to(m, p, DistanceKey::root, std::min(max_distance, hit.distance), count);
-    if (near.triangle == kNone || !(near.key < hit.distance)) continue;
-    hit.distance = near.key;
-    hit.body = b->handle;
-    hit.triangle = near.triangle;
-    store3(hit.point, near.at.point);
-    store3(hit.normal, normal_of(m, near.triangle));
-  }
-  return hit;
 }
 
 TriangleNearPoint closest_on_body(Body &b, Vec3 p) {

@@ -13,16 +13,15 @@ struct Obstacle;
 Triangles search(Body &b);
 Triangles search(Obstacle &ob);
 Vec3 normal_of(const Triangles &triangles, uint32_t triangle);
-// Distance of an obstacle along a ray, or infinity, and the normal there. From inside it is the point where
-// the ray leaves.
-double ray_obstacle(Obstacle &ob, Vec3 origin, Vec3 unit_direction, double limit, Vec3 *normal,
-                    SearchCount *count);
+// Distance of an obstacle without triangles along a ray, or infinity, and the normal there. From inside it is
+// the point where the ray leaves.
+double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 unit_direction, Vec3 *normal);
 
 // N times a column of the phyxels
 Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);
 // Displacements from the rest shape at the body's pose.
 inline Vec3 displacement(const Body &b, uint32_t point) {
-  return load3(&b.p.x[kStride * size_t{point}]) - place(b.origin.frame, load3(&b.p.rest[size_t{3} * point]));
+  return b.p.x_at(point) - place(b.origin.frame, b.p.rest_at(point));
 }
 inline Vec3 surfel_displacement(const Body &b, uint32_t s) {
   if (b.surface.identity()) return displacement(b, b.surface.point[s]);
@@ -30,8 +29,8 @@ inline Vec3 surfel_displacement(const Body &b, uint32_t s) {
 }
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);
-// Several threads may query at once. The first query after positions have changed refits the trees
-// (state/search_tree.h); later ones do not allocate.
+// In find.cpp. Several threads may query at once. The first query after positions have changed refits the
+// trees (state/search_tree.h); later ones do not allocate.
 dfm_ray_hit cast_ray(World &w, Vec3 origin, Vec3 unit_direction, double max_distance,
                      SearchCount *count = nullptr);
 dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count = nullptr);

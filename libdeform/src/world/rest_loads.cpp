@@ -19,8 +19,7 @@ constexpr double kHolds = 10;
 
 Vec3 mean_of(const Body &b, const Spring &s) {
   Vec3 x;
-  for (size_t i = 0; i < s.points.size(); ++i)
-    x += s.weights[i] * load3(&b.p.x[size_t(s.points[i]) * kStride]);
+  for (size_t i = 0; i < s.points.size(); ++i) x += s.weights[i] * b.p.x_at(s.points[i]);
   return x;
 }
 
@@ -56,7 +55,7 @@ void warn_of_own_weight(const World &w, Body &b) {
   if (!(g > 0) || !w.gravity.keys.empty() || !(young > 0)) return;
   double lo = INFINITY, hi = -INFINITY;
   for (uint32_t i = 0; i < b.p.n; ++i) {
-    const double depth = dot(load3(&b.p.x[size_t{kStride} * i]), down) / g;
+    const double depth = dot(b.p.x_at(i), down) / g;
     lo = std::min(lo, depth);
     hi = std::max(hi, depth);
   }

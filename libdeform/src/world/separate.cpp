@@ -42,19 +42,15 @@ struct Opened {
 
 std::vector<Opened> opened_between(const Body &b, const Array<uint32_t> &part) {
   std::vector<Opened> out;
-  const auto cell_of = [&](uint32_t whole) {  // kNone: not of this body
-    const auto at = std::lower_bound(b.cut.cell.begin(), b.cut.cell.end(), whole);
-    return at != b.cut.cell.end() && *at == whole ? uint32_t(at - b.cut.cell.begin()) : kNone;
-  };
   for (const uint64_t face : b.cut.open) {
-    const uint32_t c = cell_of(uint32_t(face >> 32)), d = cell_of(uint32_t(face));
+    const auto [c, d] = present_cells(b, face);
     if (c == kNone || d == kNone || part[c] == part[d]) continue;
     Vec3 way;
     for (size_t i = 0; i < 4; ++i)
       for (size_t j = 0; j < 4; ++j) {
         const uint32_t p = b.tets[4 * size_t{c} + i], q = b.tets[4 * size_t{d} + j];
         if (b.cut.point[p] != b.cut.point[q]) continue;
-        way += load3(&b.p.x[size_t{kStride} * p]) - load3(&b.p.x[size_t{kStride} * q]);
+        way += b.p.x_at(p) - b.p.x_at(q);
       }
     out.push_back({norm2(way), part[c], part[d]});
   }
@@ -143,7 +139,7 @@ void tell_what_goes(const Body &b, const Parts &parts, CutReport &out) {
       const uint32_t p = b.tets[4 * c + k];
       if (std::exchange(seen[p], uint8_t{1})) continue;
       out.mass += b.p.mass[p];
-      out.momentum += b.p.mass[p] * load3(&b.p.v[size_t{kStride} * p]);
+      out.momentum += b.p.mass[p] * b.p.v_at(p);
     }
   }
 }
@@ -229,9 +225,8 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   tell_crumbs(b, rule, parts);
 }
 
-namespace {
-
-void separate_or_wait(Body &b, CutReport &out) {
+void separate_if_asked(Body &b, CutReport &out) {
+  if (!b.separate.on || b.emptied || out.parts < 2) return;
   CutReport report = out;
   if (found_memory([&] { separate(b, b.separate, report); })) {
     out = report;
@@ -245,15 +240,10 @@ void separate_or_wait(Body &b, CutReport &out) {
         b.name.c_str());
 }
 
-}  // namespace
-
-void separate_if_asked(Body &b, CutReport &out) {
-  if (b.separate.on && !b.emptied && out.parts > 1) separate_or_wait(b, out);
-}
-
 void separate_if_asked(Body &b) {
   CutReport report;
-  if (b.separate.on && !b.emptied) separate_or_wait(b, report);
+  report.parts = kNone;  // unknown
+  separate_if_asked(b, report);
 }
 
 void separate_what_waits(World &w) {
@@ -277,19 +267,12 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.sensor = of.sensor;
   b.name = name;
   b.material = of.material;
-  b.category = of.category;
-  b.collides_with = of.collides_with;
   b.user = of.user;
   b.piece_of = of.piece_of ? of.piece_of : of.id;
   b.whole_name = of.piece_of ? of.whole_name : of.name;
-  b.separate = of.separate;
+  static_cast<BodyState &>(b) = of;
   b.separate.waits = false;
-  b.planned_cuts = of.planned_cuts;
   inherit_cuts(of, b);
-  b.switches = of.switches;
-  b.rule = of.rule;
-  b.first_model = of.first_model;
-  b.next_load = of.next_load;
   b.contact_impulse = {};
   b.energy = {};
   b.changes = {};

@@ -5,7 +5,7 @@
 //   load step   gravity and loads at its share; keys and sines go on to its time
 //     rounds    what relaxes has done so, until that changes nothing
 //       steps   until forces are balanced and nothing has moved
-#include "world/settle.h"
+#include "world/equilibrium.h"
 
 #include <algorithm>
 #include <cmath>
@@ -15,7 +15,6 @@
 #include "core/error.h"
 #include "dynamics/at_rest.h"
 #include "dynamics/settling_points.h"
-#include "math/extent.h"
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -81,10 +80,7 @@ class Settling {
   Settling(const Settling &) = delete;
   ~Settling() {
     exchange();
-    w_.def.sleep = def_.sleep;
-    w_.def.contact_tolerance = def_.contact_tolerance;
-    w_.def.max_sweeps = def_.max_sweeps;
-    w_.def.max_passes = def_.max_passes;
+    w_.def = def_;
     w_.prescribed = {};
     w_.changed = true;
     if (!done_) w_.overlaps.aside.swap(aside_);
@@ -141,15 +137,9 @@ class Settling {
             .other = std::move(points),
             .points = own,
             .rest = std::make_unique<AtRest>(w_.memory(), b.p, b.model),
-            .size = size_of(b),
+            .size = extent_of(b.p.x.data(), b.p.n, kStride).longest(),
             .edge = b.surface.median_edge,
             .contact_impulse = {}};
-  }
-
-  static double size_of(const Body &b) {
-    Extent box;
-    for (size_t i = 0; i < b.p.n; ++i) box.add(load3(&b.p.x[kStride * i]));
-    return box.longest();
   }
 
   void exchange() {
@@ -318,7 +308,7 @@ class Settling {
     uint8_t held = 0;
     for (const uint8_t bits : p.held) held = uint8_t(held | bits);
     Vec3 force, center, torque;
-    for (uint32_t i = 0; i < p.n; ++i) center += (p.mass[i] / b.mass) * load3(&p.x[size_t{kStride} * i]);
+    for (uint32_t i = 0; i < p.n; ++i) center += (p.mass[i] / b.mass) * p.x_at(i);
     double inertia = 0, far = 0;
     for (uint32_t i = 0; i < p.n; ++i) {
       double *const f = &p.f[size_t{kStride} * i];
@@ -331,7 +321,7 @@ class Settling {
         f[c] += push;
         if (!(held & (1 << c))) free[int(c)] = f[c];
       }
-      const Vec3 arm = load3(&p.x[size_t{kStride} * i]) - center;
+      const Vec3 arm = p.x_at(i) - center;
       force += free;
       torque += cross(arm, free);
       inertia += p.mass[i] * norm2(arm);
@@ -345,9 +335,7 @@ class Settling {
   double length(double longest) const {
     double h = longest;
     for (const One &one : bodies_) {
-      const Array<uint8_t> &held = one.body->p.held;
-      const bool hangs = std::any_of(held.begin(), held.end(), [](uint8_t bits) { return bits == 7; });
-      if (!hangs && one.pull > 0) h = std::min(h, std::sqrt(one.reach / one.pull));
+      if (!hangs(one) && one.pull > 0) h = std::min(h, std::sqrt(one.reach / one.pull));
     }
     return std::max(h, kShortest);
   }
@@ -374,7 +362,7 @@ class Settling {
     for (const One &one : bodies_) {
       size = std::max(size, one.size);
       each_held_place(*one.body, t, [&](uint32_t point, Vec3 x) {
-        most = std::max(most, norm(x - load3(&one.body->p.x[size_t(point) * kStride])));
+        most = std::max(most, norm(x - one.body->p.x_at(point)));
       });
     }
     for (const auto &o : w_.obstacles) {
@@ -394,13 +382,17 @@ class Settling {
     refuse(*std::max_element(bodies_.begin(), bodies_.end(), worse), steps, h);
   }
 
+  static bool hangs(const One &one) {
+    const Array<uint8_t> &held = one.body->p.held;
+    return std::ranges::find(held, 7) != held.end();
+  }
+
   // A body that is held cannot slide away.
   static const char *advice(const One &one) {
-    const Array<uint8_t> &held = one.body->p.held;
-    const bool hangs = std::any_of(held.begin(), held.end(), [](uint8_t bits) { return bits == 7; });
-    return hangs ? "use more load_steps, or run the world in time with damping (integrator tr_bdf2) until it "
-                   "rests"
-                 : "hold it (fix), raise the friction, or run the world in time";
+    return hangs(one)
+               ? "use more load_steps, or run the world in time with damping (integrator tr_bdf2) until it "
+                 "rests"
+               : "hold it (fix), raise the friction, or run the world in time";
   }
 
   [[noreturn]] void refuse(const One &one, uint32_t steps, double h) const {

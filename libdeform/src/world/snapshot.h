@@ -1,4 +1,4 @@
-// Snapshot (snapshot.cpp), restore (snapshot_restore.cpp) and hash (world_hash.cpp) of a world.
+// Snapshot, restore and hash of a world.
 #pragma once
 #include <cstddef>
 #include <cstdint>
@@ -9,7 +9,7 @@ namespace dfm {
 struct World;
 struct SnapshotField;
 
-uint64_t world_hash(const World &w);
+uint64_t world_hash(const World &w);  // of what the results of later steps depend on
 // map: the location of each field, for tests; may be null.
 void world_snapshot(const World &w, std::vector<unsigned char> &out,
                     std::vector<SnapshotField> *map = nullptr);

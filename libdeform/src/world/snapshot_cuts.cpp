@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numeric>
 
 #include "core/error.h"
@@ -18,13 +19,15 @@ namespace {
   fail(DFM_E_FORMAT, "the snapshot is damaged: body '%s': %s; nothing was restored", b.name.c_str(), what);
 }
 
+template <class List, class Key = std::identity>
+bool rises(const List &list, Key key = {}) {
+  return std::ranges::adjacent_find(list, std::ranges::greater_equal{}, key) == list.end();
+}
+
 bool has_shape(const Body &b, const CutRow &r) {
-  if (!b.cut.whole || b.tets != r.tets || b.cut.point != r.point || b.cut.cell != r.cell ||
-      b.cut.open != r.open || b.surface.patch != r.names.of[3])
-    return false;
-  for (size_t k = 0; k < 3; ++k)
-    if (b.surface.name[k] != r.names.of[k]) return false;
-  return b.surface.named == r.names.named &&
+  return b.cut.whole && b.tets == r.tets && b.cut.point == r.point && b.cut.cell == r.cell &&
+         b.cut.open == r.open && std::equal(b.surface.name, b.surface.name + 3, r.names.of) &&
+         b.surface.patch == r.names.of[3] && b.surface.named == r.names.named &&
          std::equal(b.cut.next_name, b.cut.next_name + kFeatureKinds, r.names.next);
 }
 
@@ -33,11 +36,9 @@ void check(const Body &b, const WholeBody &whole, const CutRow &r) {
   const size_t n = whole.tets.size() / 4;
   if (r.cell.empty() || r.tets.size() != 4 * r.cell.size())
     refuse(b, "cells left: expected corners for each");
-  for (size_t i = 0; i < r.cell.size(); ++i)
-    if (r.cell[i] >= n || (i && r.cell[i] <= r.cell[i - 1]))
-      refuse(b, "cells left: expected numbers of cells, ascending");
-  for (const uint32_t p : r.point)
-    if (p >= whole.npoint) refuse(b, "points left: expected numbers of points");
+  if (!rises(r.cell) || r.cell.back() >= n) refuse(b, "cells left: expected numbers of cells, ascending");
+  if (std::ranges::any_of(r.point, [&](uint32_t p) { return p >= whole.npoint; }))
+    refuse(b, "points left: expected numbers of points");
   std::vector<uint8_t> used(r.point.size());
   for (size_t k = 0; k < r.tets.size(); ++k) {
     if (r.tets[k] >= r.point.size() || r.point[r.tets[k]] != whole.tets[size_t{4} * r.cell[k / 4] + k % 4])
@@ -46,9 +47,9 @@ void check(const Body &b, const WholeBody &whole, const CutRow &r) {
   }
   if (std::find(used.begin(), used.end(), uint8_t{0}) != used.end())
     refuse(b, "points left: expected points that cells have");
-  for (size_t i = 0; i < r.open.size(); ++i)
-    if (r.open[i] >> 32 >= n || (r.open[i] & kNone) >= n || (i && r.open[i] <= r.open[i - 1]))
-      refuse(b, "open faces: expected pairs of cells, ascending");
+  const auto none = [n](uint64_t face) { return face >> 32 >= n || (face & kNone) >= n; };
+  if (!rises(r.open) || std::ranges::any_of(r.open, none))
+    refuse(b, "open faces: expected pairs of cells, ascending");
 }
 
 CutMesh mesh_of(const Memory &m, const CutRow &r) {
@@ -70,19 +71,16 @@ CutMesh mesh_of(const Memory &m, const WholeBody &whole) {
 }
 
 void sort_undone(World &w) noexcept {
-  std::sort(w.undone.begin(), w.undone.end(), [](const auto &l, const auto &r) { return l->id < r->id; });
+  std::ranges::sort(w.undone, {}, [](const auto &b) { return b->id; });
 }
 
 }  // namespace
 
 bool sound(const Array<BladeSide> &sides, size_t ncorner) {
-  for (size_t i = 0; i < sides.size(); ++i) {
-    const BladeSide &s = sides[i];
-    if (s.cell >= ncorner / 4 || (i && s.cell <= sides[i - 1].cell) || s.kind > SideKind::behind ||
-        !(std::isfinite(s.along) && std::isfinite(s.way) && std::isfinite(s.off)))
-      return false;
-  }
-  return true;
+  return rises(sides, &BladeSide::cell) && std::ranges::all_of(sides, [&](const BladeSide &s) {
+           return s.cell < ncorner / 4 && s.kind <= SideKind::behind && std::isfinite(s.along) &&
+                  std::isfinite(s.way) && std::isfinite(s.off);
+         });
 }
 
 bool sound(const std::vector<PlannedCut> &cuts) {
@@ -99,19 +97,14 @@ bool sound(const std::vector<PlannedCut> &cuts) {
 }
 
 bool sound(const Array<CutDue> &dues, uint32_t npoint) {
-  for (size_t i = 0; i < dues.size(); ++i) {
-    const CutDue &d = dues[i];
-    if (d.point >= npoint || (i && d.point <= dues[i - 1].point) || !(d.due >= 0 && d.force >= 0) ||
-        !(std::isfinite(d.due) && std::isfinite(d.force) && std::isfinite(norm2(load3(d.way)))))
-      return false;
-  }
-  return true;
+  return rises(dues, &CutDue::point) && std::ranges::all_of(dues, [&](const CutDue &d) {
+           return d.point < npoint && d.due >= 0 && d.force >= 0 && std::isfinite(d.due) &&
+                  std::isfinite(d.force) && std::isfinite(norm2(load3(d.way)));
+         });
 }
 
 bool sound(const Tool::Cuts &cuts, const Tool &tool) {
-  if (cuts.how > DFM_CUT_SPLIT) return false;
-  for (size_t i = 1; i < cuts.bodies.size(); ++i)
-    if (cuts.bodies[i] <= cuts.bodies[i - 1]) return false;
+  if (cuts.how > DFM_CUT_SPLIT || !rises(cuts.bodies)) return false;
   if (cuts.bodies.empty()) return true;
   try {
     check_tool_cuts(tool, cuts.how);
@@ -123,18 +116,16 @@ bool sound(const Tool::Cuts &cuts, const Tool &tool) {
 
 bool sound(const std::vector<AheadFace> &faces, const Body &b) {
   const size_t n = b.cut.whole ? b.cut.whole->tets.size() / 4 : b.ncell();
-  for (size_t i = 0; i < faces.size(); ++i) {
-    const uint64_t face = faces[i].face;
-    if ((face & kNone) >= n || face >> 32 >= (face & kNone) || (i && face <= faces[i - 1].face)) return false;
-  }
-  return true;
+  return rises(faces, &AheadFace::face) && std::ranges::all_of(faces, [n](const AheadFace &f) {
+           return (f.face & kNone) < n && f.face >> 32 < (f.face & kNone);
+         });
 }
 
 std::vector<Body *> all_bodies(const World &w) {
   std::vector<Body *> out;
   for (const auto *list : {&w.bodies, &w.emptied})
     for (const auto &b : *list) out.push_back(b.get());
-  std::sort(out.begin(), out.end(), [](const Body *l, const Body *r) { return l->id < r->id; });
+  std::ranges::sort(out, {}, &Body::id);
   return out;
 }
 
@@ -152,7 +143,7 @@ std::vector<CutRow> cut_rows(const World &w) {
     r.point = b->cut.point;
     r.cell = b->cut.cell;
     r.open = b->cut.open;
-    for (size_t k = 0; k < 3; ++k) r.names.of[k] = b->surface.name[k];
+    std::copy(b->surface.name, b->surface.name + 3, r.names.of);
     r.names.of[3] = b->surface.patch;
     r.names.named = b->surface.named;
     std::copy(b->cut.next_name, b->cut.next_name + kFeatureKinds, r.names.next);
@@ -187,16 +178,15 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
   };
   for (Body *const b : bodies) {
     if (!b->piece_of) continue;
-    const auto row = std::find_if(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; });
+    const auto row = std::ranges::find(rows, b->id, &CutRow::id);
     const bool there = row != rows.end();
     if (there && row->piece_of == b->piece_of && row->name == b->name) continue;
     move(*b, true);
     if (there && b->id < kMostIds) change_id(*b, kMostIds + b->id);
   }
   for (const CutRow &r : rows) {
-    const auto has_id = [&](const Body *b) { return b->id == r.id; };
     const std::vector<Body *> now = all_bodies(w_);
-    if (!r.piece_of || std::any_of(now.begin(), now.end(), has_id)) continue;
+    if (!r.piece_of || std::ranges::find(now, r.id, &Body::id) != now.end()) continue;
     const auto whole = std::find_if(now.begin(), now.end(),
                                     [&](const Body *b) { return b->id == r.piece_of && !b->piece_of; });
     if (whole == now.end() || r.id <= r.piece_of || r.name.empty() || w_.find_body(r.name) ||
@@ -208,10 +198,8 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
     const auto aside = std::find_if(w_.undone.begin(), w_.undone.end(), [&](const auto &p) {
       return p->id == kMostIds + r.id && p->piece_of == r.piece_of && p->name == r.name;
     });
-    const auto is_free = [&] {
-      return std::none_of(w_.undone.begin(), w_.undone.end(), [&](const auto &p) { return p->id == r.id; });
-    };
-    if (aside != w_.undone.end() && is_free()) change_id(**aside, r.id);
+    const bool taken = std::ranges::any_of(w_.undone, [&](const auto &p) { return p->id == r.id; });
+    if (aside != w_.undone.end() && !taken) change_id(**aside, r.id);
     move(place_for_piece(w_, **whole, r.id, r.name), false);
   }
 }
@@ -241,7 +229,7 @@ SnapshotShapes::SnapshotShapes(World &w, std::vector<CutRow> &rows) : w_(w) {
   try {
     find_pieces(rows);
     for (Body *const b : all_bodies(w)) {
-      const auto row = std::find_if(rows.begin(), rows.end(), [&](const CutRow &r) { return r.id == b->id; });
+      const auto row = std::ranges::find(rows, b->id, &CutRow::id);
       found += row != rows.end();
       put(*b, row == rows.end() ? nullptr : &*row);
     }

@@ -3,9 +3,9 @@
 // host may change between two steps (loads, holds, motions, gravity, filters, friction rules, runtime
 // parameters) is state too.
 //
-// A field is one line in one of the ..._fields() functions: its name, its location and its valid values.
-// Writing (snapshot.cpp), reading and checking (snapshot_restore.cpp) use this line; conditions between
-// fields are in check().
+// A field is a member of BodyState, OnPoints, ObstacleState or WorldState, which a restore exchanges whole,
+// and one line in one of the ..._fields() functions: its name, its location and its valid values.
+// Writing, reading and checking (snapshot.cpp) use this line; conditions between fields are in check() there.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -31,10 +31,10 @@
 
 namespace dfm {
 
-// ---- contents, read in full before the world changes (snapshot_restore.cpp) ----
+// ---- contents, read in full before the world changes (snapshot.cpp) ----
 
 // Members have the names of those in World, Body and Obstacle, so that the lists of fields work for both.
-struct StagedBody {
+struct StagedBody : BodyState, OnPoints {
   struct {
     Array<double> x, v, load;
     Array<uint8_t> held;
@@ -47,35 +47,11 @@ struct StagedBody {
   } model;
   ModelOrigin origin;
   Integrator integrator;
-  std::vector<Switch> switches;
-  std::vector<SwitchRule> rule;
-  uint64_t first_model = 0;
-  std::unique_ptr<BodyModel> made;  // if the body has another model than in the snapshot
-  Vec3 contact_impulse;
-  EnergyBook energy;
-  ChangeBook changes;
-  std::vector<Load> loads;
-  std::vector<Spring> springs;
-  std::vector<HeldMotion> motions;
-  uint32_t next_load = 1, category = 1, collides_with = ~0u;
-  SeparateRule separate;
-  std::vector<PlannedCut> planned_cuts;
-  std::vector<BladeTrack> blades;
+  std::unique_ptr<MadeModel> made;  // if the body has another model than in the snapshot
   CutsAhead ahead;
-  Slumber slumber;
-  Array<double> surfel_impulse, anchor;
+  Array<double> surfel_impulse;
 };
-struct StagedObstacle {
-  Pose pose, target;
-  bool has_target = false;
-  std::vector<dfm_pose_key> keys;
-  dfm_obstacle_def def{};
-  std::string material;
-  struct {
-    std::string material;
-    double friction = kDefaultFriction;
-  } zone;
-};
+struct StagedObstacle : ObstacleState { dfm_obstacle_def def{}; };
 struct StagedRigids {
   Array<dfm_rigid_state> state;
   Array<double> extra, total;
@@ -87,16 +63,10 @@ struct StagedLaw {
   std::vector<double> params;
   double restitution = kNoRestitution;
 };
-struct Staged {
-  double time = 0, offset = 0;
-  uint64_t step_count = 0, next_id = 0;
+struct Staged : WorldState {
+  double offset = 0;
   uint32_t sleepers = 0;
   WorldBound bound;
-  Hold hold;
-  StepSizes sizes;
-  EnergyWatch watch;
-  double struck_until = 0;
-  dfm_world_stats stats{};
   Gravity gravity;
   dfm_world_def def{};
   std::vector<StagedBody> bodies;
@@ -104,21 +74,8 @@ struct Staged {
   std::vector<StagedRigids> rigid_sets;
   std::vector<StagedTool> tools;
   std::vector<StagedLaw> laws;
-  std::vector<FrictionRule> friction;
-  std::vector<FilterRule> filters;
-  std::vector<Attachment> attachments;
-  ContactStore store, tool_store;
   struct { std::vector<PairAside> aside; } overlaps;
-  std::vector<PairWork> work;
-  Report report;
-  RigidReport rigid_report;               // pairs that touch alone
-  std::vector<dfm_contact_event> events;  // none
-  std::vector<Swap> swaps;                // none
-  explicit Staged(const World &w)
-      : store(w.meters.contacts.memory()),
-        tool_store(w.meters.contacts.memory()),
-        report(w.meters.contacts.memory()),
-        rigid_report(w.meters.contacts.memory()) {
+  explicit Staged(const World &w) : WorldState(w.meters.contacts.memory()) {
     const Memory &m = w.memory();
     bodies.resize(w.bodies.size());
     obstacles.resize(w.obstacles.size());
@@ -211,12 +168,8 @@ bool below(const List &list, uint32_t n) {
 }
 
 inline bool in_range(const dfm_type &type, const std::vector<double> &values) {
-  std::vector<dfm_param_value> given;
-  size_t at = 0;
-  for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
-    given.push_back({type.params[i].key, values.data() + at, type.params[i].width});
   try {
-    pack_params(type, given);
+    pack_params(type, param_rows(type, values));
     return true;
   } catch (const Error &) {
     return false;
@@ -578,8 +531,5 @@ void fields(Stream &s, W &w, const World &like) {
   s.array("reported slip", r.slip, 2 * n, must::finite);
   s.array("reported mode", r.mode, n, must::at_most(2));
 }
-
-// Conditions between fields; throws Error if one is not met.
-void check(const SnapshotReader &s, const Staged &t, const World &w);
 
 }  // namespace dfm::snapshot

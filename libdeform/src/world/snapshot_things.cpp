@@ -57,7 +57,7 @@ std::vector<T *> find_things(const std::vector<T *> &things, const std::vector<T
                              const char *what) {
   std::vector<T *> named, unnamed, out;
   for (T *const x : things) (x->name == usual_name(*x, x->id) ? unnamed : named).push_back(x);
-  std::sort(named.begin(), named.end(), [](const T *l, const T *r) { return l->name < r->name; });
+  std::ranges::sort(named, {}, &T::name);
   size_t next = 0, taken = 0;
   for (const ThingRow &r : rows) {
     if (r.name.empty()) {
@@ -70,8 +70,7 @@ std::vector<T *> find_things(const std::vector<T *> &things, const std::vector<T
       out.push_back(unnamed[next++]);
       continue;
     }
-    const auto at = std::lower_bound(named.begin(), named.end(), r.name,
-                                     [](const T *x, const std::string &name) { return x->name < name; });
+    const auto at = std::ranges::lower_bound(named, r.name, {}, &T::name);
     if (at == named.end() || (*at)->name != r.name)
       differs(what, r.name, "is not in this world", "create it before you restore");
     out.push_back(*at);
@@ -97,9 +96,18 @@ void renew_name(Obstacle &o) noexcept {
   if (o.rigid && !o.added) o.rigid->defs[o.rigid_body].name = o.name.c_str();
 }
 
-template <class List, class Id>
-void sort_by_id(List &list, Id id) noexcept {
-  std::sort(list.begin(), list.end(), [&](const auto &l, const auto &r) { return id(*l) < id(*r); });
+bool has_id(const std::vector<ThingRow> &rows, uint64_t id) {
+  return std::ranges::find(rows, id, &ThingRow::id) != rows.end();
+}
+
+uint64_t id_of(const Body &b) { return b.id; }
+uint64_t id_of(const Obstacle &o) { return o.id; }
+uint64_t id_of(const RigidSet &set) { return set.obstacle[0]; }
+uint64_t id_of(const Tool &t) { return id_of(*t.set); }
+
+template <class List>
+void sort_by_id(List &list) noexcept {
+  std::ranges::sort(list, {}, [](const auto &x) { return id_of(*x); });
 }
 
 }  // namespace
@@ -112,62 +120,45 @@ void SnapshotIds::change(uint64_t &id, uint64_t to) {
   id = to;
 }
 
+uint64_t SnapshotIds::now(uint64_t id) const {
+  const auto at = std::ranges::lower_bound(to_, id, {}, &std::pair<uint64_t, uint64_t>::first);
+  return at != to_.end() && at->first == id ? at->second : id;
+}
+
 // A piece keeps its id only if its body does, and if no other thing has it in the snapshot; the restore then
 // removes it.
 void SnapshotIds::set_aside_pieces(const ThingRows &rows) {
-  const auto new_id = [&](uint64_t id) {
-    const auto at = std::lower_bound(to_.begin(), to_.end(), std::pair(id, uint64_t{0}));
-    return at != to_.end() && at->first == id ? at->second : id;
-  };
-  const auto taken = [&](uint64_t id) {
-    const auto is = [&](const ThingRow &r) { return r.id == id; };
-    return std::any_of(rows.bodies.begin(), rows.bodies.end(), is) ||
-           std::any_of(rows.obstacles.begin(), rows.obstacles.end(), is);
-  };
   for (auto *const list : {&w_.bodies, &w_.emptied, &w_.undone})
     for (auto &b : *list) {
       if (!b->piece_of) continue;
-      const uint64_t whole = new_id(b->piece_of);
-      if ((whole != b->piece_of || taken(b->id)) && b->id < kMostIds) change(b->id, kMostIds + b->id);
+      const uint64_t whole = now(b->piece_of);
+      const bool taken = has_id(rows.bodies, b->id) || has_id(rows.obstacles, b->id);
+      if ((whole != b->piece_of || taken) && b->id < kMostIds) change(b->id, kMostIds + b->id);
       change(b->piece_of, whole);
     }
 }
 
 // What else refers to things by their ids, and is not in the snapshot.
 void SnapshotIds::refer(const ThingRows &rows) {
-  const auto renew = [&](uint64_t &id) {
-    const auto at = std::lower_bound(to_.begin(), to_.end(), std::pair(id, uint64_t{0}));
-    if (at != to_.end() && at->first == id) id = at->second;
-  };
-  const auto is_body = [&](uint64_t id) {
-    return std::any_of(rows.bodies.begin(), rows.bodies.end(), [&](const ThingRow &r) { return r.id == id; });
-  };
   for (auto &t : w_.tools) {
     cuts_.push_back(t->cuts.bodies);
-    for (uint64_t &id : cuts_.back()) renew(id);
+    for (uint64_t &id : cuts_.back()) id = now(id);
     std::sort(cuts_.back().begin(), cuts_.back().end());
   }
   sensed_ = w_.sensed;
-  for (Sensed &s : sensed_) {
-    renew(s.sensor);
-    renew(s.thing);
-  }
+  for (Sensed &s : sensed_) s = {now(s.sensor), now(s.thing)};
   std::sort(sensed_.begin(), sensed_.end());
   answers_ = w_.may_touch.answers;
   for (PairAnswer &p : answers_) {
-    renew(p.a);
-    renew(p.b);
-    if (is_body(p.b) && p.b < p.a) std::swap(p.a, p.b);
+    p.a = now(p.a);
+    p.b = now(p.b);
+    if (has_id(rows.bodies, p.b) && p.b < p.a) std::swap(p.a, p.b);
   }
   std::sort(answers_.begin(), answers_.end(), [](const PairAnswer &l, const PairAnswer &r) {
     return std::pair(l.a, l.b) < std::pair(r.a, r.b);
   });
   for (auto &set : w_.rigid_sets)
-    for (uint64_t &id : set->obstacle) {
-      uint64_t to = id;
-      renew(to);
-      change(id, to);
-    }
+    for (uint64_t &id : set->obstacle) change(id, now(id));
 }
 
 SnapshotIds::SnapshotIds(World &w, const ThingRows &rows) : w_(w) {
@@ -179,19 +170,15 @@ SnapshotIds::SnapshotIds(World &w, const ThingRows &rows) : w_(w) {
       if (things[i]->id == of[i].id) continue;
       to_.emplace_back(things[i]->id, of[i].id);
       if (!of[i].name.empty()) continue;
-      Name &n = names_.emplace_back();
-      n.other = usual_name(*things[i], of[i].id);
-      if constexpr (requires { things[i]->piece_of; }) n.body = things[i];
-      else n.obstacle = things[i];
+      names_.push_back({&things[i]->name, usual_name(*things[i], of[i].id)});
     }
   };
   note(bodies, rows.bodies);
   note(obstacles, rows.obstacles);
   if (to_.empty()) return;
   std::sort(to_.begin(), to_.end());
-  for (size_t i = 0; i < rows.bodies.size(); ++i)
-    if (std::any_of(rows.obstacles.begin(), rows.obstacles.end(),
-                    [&](const ThingRow &r) { return r.id == rows.bodies[i].id; }))
+  for (const ThingRow &row : rows.bodies)
+    if (has_id(rows.obstacles, row.id))
       fail(DFM_E_FORMAT,
            "the snapshot is damaged: number of a body: expected that of no obstacle; nothing was restored");
   words_.reserve(2 * (w.bodies.size() + w.emptied.size() + w.undone.size() + w.obstacles.size()) +
@@ -205,27 +192,23 @@ SnapshotIds::SnapshotIds(World &w, const ThingRows &rows) : w_(w) {
 
 // Everything but the ids; a second call undoes the first.
 void SnapshotIds::exchange() noexcept {
-  for (Name &n : names_) {
-    (n.body ? n.body->name : n.obstacle->name).swap(n.other);
-    if (n.obstacle) renew_name(*n.obstacle);
-  }
+  for (Name &n : names_) n.at->swap(n.other);
+  for (auto &o : w_.obstacles) renew_name(*o);
   for (size_t k = 0; k < cuts_.size(); ++k) w_.tools[k]->cuts.bodies.swap(cuts_[k]);
   w_.sensed.swap(sensed_);
   w_.may_touch.answers.swap(answers_);
   w_.steps->self_bodies.swap(self_);  // they are kept by id
-  const auto id = [](const auto &thing) { return thing.id; };
-  for (auto *const list : {&w_.bodies, &w_.emptied, &w_.undone}) sort_by_id(*list, id);
-  sort_by_id(w_.obstacles, id);
-  sort_by_id(w_.rigid_sets, [](const RigidSet &set) { return set.obstacle[0]; });
-  sort_by_id(w_.tools, [](const Tool &t) { return t.set->obstacle[0]; });
+  for (auto *const list : {&w_.bodies, &w_.emptied, &w_.undone}) sort_by_id(*list);
+  sort_by_id(w_.obstacles);
+  sort_by_id(w_.rigid_sets);
+  sort_by_id(w_.tools);
 }
 
 SnapshotIds::~SnapshotIds() {
   if (to_.empty()) return;
   // tools first: what is kept of them is in the order that they had
   for (auto word = words_.rbegin(); word != words_.rend(); ++word) *word->at = word->before;
-  const auto id = [](const Tool &t) { return t.set->obstacle[0]; };
-  sort_by_id(w_.tools, id);
+  sort_by_id(w_.tools);
   exchange();
 }
 

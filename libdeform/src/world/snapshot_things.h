@@ -55,11 +55,8 @@ class SnapshotIds {
 
  private:
   struct Word { uint64_t *at, before; };
-  struct Name {
-    Body *body;
-    Obstacle *obstacle;
-    std::string other;
-  };
+  struct Name { std::string *at, other; };
+  uint64_t now(uint64_t id) const;
   void change(uint64_t &id, uint64_t to);
   void set_aside_pieces(const ThingRows &rows);
   void refer(const ThingRows &rows);

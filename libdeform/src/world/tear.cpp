@@ -19,24 +19,11 @@ namespace {
 
 constexpr uint32_t kMostPoints = 64;  // per body and step; the most stretched points come first
 
-double limit_of(const Material &m) {
-  for (size_t i = 0; i < m.extra_keys.size(); ++i)
-    if (m.extra_keys[i] == kTearKey) return m.extra_values[i][0];
-  return 0;
-}
-
-// Symmetric: xx, yy, zz, xy, yz, zx.
-struct Tensor {
-  double a[6] = {};
-  double at(int i, int j) const { return i == j ? a[i] : a[i + j == 1 ? 3 : i + j == 3 ? 4 : 5]; }
-};
-
-// Largest eigenvalue, by Jacobi's rotations; the vector to it.
-double largest_eigenvalue(const Tensor &t, Vec3 &vector) {
+// Largest eigenvalue of a symmetric matrix (xx, yy, zz, xy, yz, zx), by Jacobi's rotations; the vector to it.
+double largest_eigenvalue(const double (&a)[6], Vec3 &vector) {
   constexpr int kSweeps = 12;
-  double m[3][3], v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) m[i][j] = t.at(i, j);
+  double m[3][3] = {{a[0], a[3], a[5]}, {a[3], a[1], a[4]}, {a[5], a[4], a[2]}};
+  double v[3][3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   for (int sweep = 0; sweep < kSweeps; ++sweep)
     for (int p = 0; p < 2; ++p)
       for (int q = p + 1; q < 3; ++q) {
@@ -70,7 +57,7 @@ double largest_eigenvalue(const Tensor &t, Vec3 &vector) {
 class Tear {
  public:
   explicit Tear(const Body &b) : b_(b), ncell_(b.ncell()), points_(b.p.n) {
-    for (const Material &m : b.makeup.materials) limits_.push_back(limit_of(m));
+    for (const Material &m : b.makeup.materials) limits_.push_back(m.entry(kTearKey, 0));
     for (uint32_t c = 0; c < ncell_; ++c) add(c);
   }
 
@@ -94,25 +81,21 @@ class Tear {
 
  private:
   struct Point {
-    Tensor sum;
+    double sum[6] = {};            // xx, yy, zz, xy, yz, zx
     double volume = 0, limit = 0;  // limit: times volume
     Vec3 way;                      // of the largest stretch
     bool split = false;
   };
 
-  Vec3 x(uint32_t cell, size_t k) const {
-    return load3(&b_.p.x[size_t{kStride} * b_.tets[size_t{4} * cell + k]]);
-  }
-  Vec3 rest(uint32_t cell, size_t k) const {
-    return load3(&b_.p.rest[size_t{3} * b_.tets[size_t{4} * cell + k]]);
-  }
+  Vec3 x(uint32_t cell, size_t k) const { return b_.corner(cell, k); }
+  Vec3 rest(uint32_t cell, size_t k) const { return b_.p.rest_at(b_.tets[size_t{4} * cell + k]); }
   bool shares(uint32_t cell, uint32_t point) const {
     const uint32_t *const c = &b_.tets[size_t{4} * cell];
     return std::find(c, c + 4, point) != c + 4;
   }
   bool side(uint32_t cell, uint32_t point) const {
     const Vec3 middle = 0.25 * ((x(cell, 0) + x(cell, 1)) + (x(cell, 2) + x(cell, 3)));
-    return dot(points_[point].way, middle - load3(&b_.p.x[size_t{kStride} * point])) >= 0;
+    return dot(points_[point].way, middle - b_.p.x_at(point)) >= 0;
   }
 
   void add(uint32_t cell) {
@@ -139,7 +122,7 @@ class Tear {
                            product(0, 1), product(1, 2), product(2, 0)};
     for (size_t k = 0; k < 4; ++k) {
       Point &p = points_[b_.tets[size_t{4} * cell + k]];
-      for (int i = 0; i < 6; ++i) p.sum.a[i] += own[i];
+      for (int i = 0; i < 6; ++i) p.sum[i] += own[i];
       p.volume += volume;
       p.limit += volume * limit;
     }
@@ -151,11 +134,10 @@ class Tear {
       Point &p = points_[i];
       if (!(p.volume > 0)) continue;
       const double most = 1 + p.limit / p.volume;
-      Tensor mean;
-      double beyond2 = 0;
+      double mean[6], beyond2 = 0;
       for (int k = 0; k < 6; ++k) {
-        mean.a[k] = p.sum.a[k] / p.volume;
-        const double part = mean.a[k] - (k < 3);
+        mean[k] = p.sum[k] / p.volume;
+        const double part = mean[k] - (k < 3);
         beyond2 += (k < 3 ? 1 : 2) * part * part;
       }
       // no eigenvalue is further from 1 than the norm of B - 1
@@ -195,7 +177,7 @@ class Tear {
 
 bool may_tear(const Body &b) {
   const std::vector<Material> &list = b.makeup.materials;
-  return std::any_of(list.begin(), list.end(), [](const Material &m) { return limit_of(m) > 0; });
+  return std::any_of(list.begin(), list.end(), [](const Material &m) { return m.entry(kTearKey, 0) > 0; });
 }
 
 void tear_bodies(World &w) {

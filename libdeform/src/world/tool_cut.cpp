@@ -24,18 +24,6 @@ namespace {
 constexpr double kTurn = 0.1;    // rad: a solid that turns by more in a step is placed at several poses
 constexpr int kMostPlaces = 64;  // of a solid in a step
 
-size_t point_of(const Body &b, size_t cell, size_t k) { return size_t{kStride} * b.tets[4 * cell + k]; }
-Extent box_of(const Body &b, size_t cell) {
-  Extent out;
-  for (size_t k = 0; k < 4; ++k) out.add(load3(&b.p.x[point_of(b, cell, k)]));
-  return out;
-}
-Extent box_of(const Body &b) {
-  Extent out;
-  for (uint32_t i = 0; i < b.p.n; ++i) out.add(load3(&b.p.x[size_t{kStride} * i]));
-  return out;
-}
-
 bool has_edge(const Tool &t) { return t.def.shape == DFM_TOOL_BLADE || t.def.shape == DFM_TOOL_SCISSORS; }
 
 // ---- edges ----------------------------------------------------------------------------------------------
@@ -134,7 +122,7 @@ void forget_far(const Body &b, const Edge &edge, const Pose &place, BladeTrack &
   const Vec3 along = normalized(c[2] - c[3]);
   const double unit = b.surface.median_edge;
   std::erase_if(track.dues, [&](const CutDue &d) {
-    const Vec3 r = load3(&b.p.x[size_t{kStride} * d.point]) - c[3];
+    const Vec3 r = b.p.x_at(d.point) - c[3];
     return norm(r - dot(r, along) * along) > kJumped * unit ||
            dot(r, rotate(place.rotation, load3(d.way))) > kBack * unit;
   });
@@ -229,14 +217,14 @@ std::vector<Solid> solids_of(const Tool &t) {
 // n: how many cells have gone.
 void remove(const Tool &t, Body &b, uint32_t &n) {
   const std::vector<Solid> solids = solids_of(t);
-  const Extent whole = box_of(b);
+  const Extent whole = extent_of(b.p.x.data(), b.p.n, kStride);
   if (std::none_of(solids.begin(), solids.end(), [&](const Solid &s) { return s.box.meets(whole); })) return;
   Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
   uint32_t met = 0;
   for (size_t c = 0; c < b.ncell() && (t.cuts.most == 0 || met < t.cuts.most); ++c) {
-    const Extent box = box_of(b, c);
-    Vec3 x[4];
-    for (size_t k = 0; k < 4; ++k) x[k] = load3(&b.p.x[point_of(b, c, k)]);
+    Extent box;
+    const Vec3 x[4] = {b.corner(c, 0), b.corner(c, 1), b.corner(c, 2), b.corner(c, 3)};
+    for (const Vec3 corner : x) box.add(corner);
     const auto meets = [&](const Solid &s) { return s.box.meets(box) && meets_tetrahedron(s.shape, x); };
     if (!std::any_of(solids.begin(), solids.end(), meets)) continue;
     removed[c] = 1;

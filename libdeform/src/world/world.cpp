@@ -12,13 +12,9 @@
 namespace dfm {
 
 World::World(dfm_context *c)
-    : context(c),
-      meters(c->memory),
-      steps(std::make_unique<StepContext>(meters)),
-      store(meters.contacts.memory()),
-      tool_store(meters.contacts.memory()),
-      report(meters.contacts.memory()),
-      rigid_report(meters.contacts.memory()) {
+    : WorldMemory{c, Meters(c->memory)},
+      WorldState(meters.contacts.memory()),
+      steps(std::make_unique<StepContext>(meters)) {
   use_memory(meters.contacts.memory(), step_impulses.pairs);
   stats.size = sizeof stats;
 }
