@@ -32,4 +32,12 @@ struct Extent {
   }
 };
 
+// Of points [n,3].
+template <class Points>
+Extent extent_of(const Points &points) {
+  Extent box;
+  for (size_t i = 0; i < points.size(); i += 3) box.add(load3(&points[i]));
+  return box;
+}
+
 }  // namespace dfm

@@ -30,15 +30,17 @@ Vec3 unit_on_circle(double angle) {
   return {c, angle * s, 0};
 }
 
-Vec3 unit_on_circle(uint64_t i, uint64_t n) {
-  static constexpr double half = 0.5, third = 1.0471975511965977462;  // pi/3
-  static const double root = std::sqrt(3.0) / 2;
+Vec3 turned_by_sixths(Vec3 u, uint64_t sixths) {
+  static const double half = 0.5, root = std::sqrt(3.0) / 2;
   static const double turn[6][2] = {{1, 0},  {half, root},   {-half, root},
                                     {-1, 0}, {-half, -root}, {half, -root}};
+  const double c = turn[sixths][0], s = turn[sixths][1];
+  return {c * u.x - s * u.y, s * u.x + c * u.y, 0};
+}
+
+Vec3 unit_on_circle(uint64_t i, uint64_t n) {
   const uint64_t sextant = 6 * (i % n) / n;
-  const Vec3 u = unit_on_circle(third * (double(6 * (i % n) - sextant * n) / double(n)));
-  return {turn[sextant][0] * u.x - turn[sextant][1] * u.y, turn[sextant][1] * u.x + turn[sextant][0] * u.y,
-          0};
+  return turned_by_sixths(unit_on_circle(kSixth * (double(6 * (i % n) - sextant * n) / double(n))), sextant);
 }
 
 Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t j, uint32_t n) {
@@ -278,9 +280,7 @@ void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings,
 }  // namespace
 
 TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
-  check_size("beam's x size", x);
-  check_size("beam's y size", y);
-  check_size("beam's z size", z);
+  check_beam(x, y, z);
   check_cells(cells);
   const double size[3] = {x, y, z};
   const Grid g = choose_grid(size, cells);
@@ -328,8 +328,7 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
 }
 
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
-  check_size("cylinder's radius", radius);
-  check_size("cylinder's length", length);
+  check_cylinder(radius, length);
   check_cells(cells);
   uint32_t n = 1, m = 1;
   choose_rings(radius, length, cells, &n, &m);
@@ -338,37 +337,30 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
   // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions,
   // difference modulo 3).
   static constexpr int kAxial[7][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}, {1, 0}};
-  const double half = 0.5, root = std::sqrt(3.0) / 2, third = 1.0471975511965977462;  // pi/3
-  const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
   std::vector<Vec3> flat{{}};
   std::vector<int> color{0};
   for (int k = 1; k <= int(n); ++k)
     for (int s = 0; s < 6; ++s)
       for (int t = 0; t < k; ++t) {
-        const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(third * (double(t) / k));
-        flat.push_back({turn[s][0] * u.x - turn[s][1] * u.y, turn[s][1] * u.x + turn[s][0] * u.y, 0});
+        const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(kSixth * (double(t) / k));
+        flat.push_back(turned_by_sixths(u, uint64_t(s)));
         const int q = (k - t) * kAxial[s][0] + t * kAxial[s + 1][0];
         const int r = (k - t) * kAxial[s][1] + t * kAxial[s + 1][1];
         color.push_back(((q - r) % 3 + 3) % 3);
       }
   for (uint32_t layer = 0; layer <= m; ++layer)
     for (const Vec3 &p : flat) add_point(mesh, {p.x, p.y, length * (double(layer) / m)});
-  const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(),
-              [&](uint32_t a, uint32_t b) { return layer % 2 ? color[a] > color[b] : color[a] < color[b]; });
-    const uint32_t low = layer * disc.npoint(), up = low + disc.npoint();
-    add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
-    add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
-    add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
+  const auto prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
+    add_prism(mesh, layer, disc.npoint(), v, [&](uint32_t p) { return color[p]; });
   };
   for (uint32_t layer = 0; layer < m; ++layer)
     for (uint32_t k = 1; k <= n; ++k)
       for (uint32_t s = 0; s < 6; ++s)
         for (uint32_t t = 0; t < k; ++t) {
           const uint32_t outer = s * k + t, inner = s * (k - 1) + t;
-          add_prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
+          prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
           if (t + 1 < k)
-            add_prism(layer,
+            prism(layer,
                       {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
         }
   return finished(std::move(mesh));

@@ -90,9 +90,7 @@ TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangle
 }
 
 TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles) {
-  check_size("beam's x size", x);
-  check_size("beam's y size", y);
-  check_size("beam's z size", z);
+  check_beam(x, y, z);
   check_triangles(triangles);
   const double size[3] = {x, y, z}, squares = std::max(6.0, triangles / 2.0);
   const auto cut = [&](double edge, uint32_t n[3]) {
@@ -133,8 +131,7 @@ TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, ui
 }
 
 TriMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles) {
-  check_size("cylinder's radius", radius);
-  check_size("cylinder's length", length);
+  check_cylinder(radius, length);
   check_triangles(triangles);
   uint32_t n = 1, m = 1;
   double best = HUGE_VAL;

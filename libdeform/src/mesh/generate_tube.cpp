@@ -57,20 +57,12 @@ TetMesh make_tube(const Memory &memory, double inner, double outer, double lengt
       }
   // Colors go 0 1 2 along a ring; a shifted ring begins with 2, so that each triangle has all three.
   const auto color = [&](uint32_t p) { return (p % n + 2 * (p / n % 2)) % 3; };
-  const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(),
-              [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
-    const uint32_t low = layer * slab, up = low + slab;
-    add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
-    add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
-    add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
-  };
   for (uint32_t layer = 0; layer < tube.along; ++layer)
     for (uint32_t k = 0; k < tube.across; ++k)
       for (uint32_t j = 0; j < n; ++j) {
         const uint32_t next = (j + 1) % n, row = k * n, above = row + n;
-        add_prism(layer, {row + j, row + next, above + (k % 2 ? next : j)});
-        add_prism(layer, {above + j, above + next, row + (k % 2 ? j : next)});
+        add_prism(mesh, layer, slab, {row + j, row + next, above + (k % 2 ? next : j)}, color);
+        add_prism(mesh, layer, slab, {above + j, above + next, row + (k % 2 ? j : next)}, color);
       }
   return finished(std::move(mesh));
 }

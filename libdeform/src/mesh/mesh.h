@@ -46,6 +46,9 @@ struct TetMesh {
 inline constexpr uint32_t kNoGroup = UINT32_MAX;
 inline constexpr uint32_t kMaxTets = 1u << 30;  // face numbers are 4*cell+face in 32 bits
 
+// "obj" of "FOLDER/A.OBJ"; empty without one.
+std::string ending_of(const std::string &path);
+
 // ---- reading ----------------------------------------------------------------------------------------------
 // By file name ending; throws Error (IO, FORMAT, UNSUPPORTED) with one sentence. Memory stays within a small
 // multiple of the file's size.

@@ -51,15 +51,6 @@ double triangle_quality(const double *points, const uint32_t *tri) {
 
 namespace {
 
-uint32_t count_pieces(const TriMesh &mesh) {
-  DisjointSets sets(*mesh.memory, mesh.npoint());
-  for (size_t t = 0; t < mesh.tris.size(); t += 3) {
-    sets.join(mesh.tris[t], mesh.tris[t + 1]);
-    sets.join(mesh.tris[t], mesh.tris[t + 2]);
-  }
-  return sets.number();
-}
-
 // Boundary loops: from each end of an open edge around that point, through the triangles between, to the
 // loop's next open edge.
 uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
@@ -117,12 +108,8 @@ TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh) {
   s.edge_min = length.front();
   s.edge_median = length[length.size() / 2];
   s.edge_max = length.back();
-  s.npiece = count_pieces(mesh);
-  for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = points[k];
-  for (size_t i = 0; i < mesh.points.size(); ++i) {
-    s.lo[i % 3] = std::min(s.lo[i % 3], points[i]);
-    s.hi[i % 3] = std::max(s.hi[i % 3], points[i]);
-  }
+  s.npiece = count_pieces(*mesh.memory, s.npoint, mesh.tris, 3);
+  measure(mesh.points, s.lo, s.hi);
   // Volume from cones to the middle of the box: far from the origin nothing cancels.
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
   s.quality_min = 1;

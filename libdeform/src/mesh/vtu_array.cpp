@@ -228,8 +228,8 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
   place.offset = static_cast<uint64_t>(offset);
   if (tag.empty) return place;
   // Numbers come before the first tag inside; information keys may follow.
-  while (place.text.empty()) {
-    place.text = in.rest().substr(0, in.rest().find('<'));
+  for (;;) {
+    if (place.text.empty()) place.text = in.rest().substr(0, in.rest().find('<'));
     if (place.text.find_first_not_of(" \t\r\n") == place.text.npos) place.text = {};
     const auto inner = next_tag(in);
     if (!inner)
@@ -237,10 +237,6 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
                 Cursor::quote(place.name.empty() ? " " : place.name).c_str());
     if (inner->closes && inner->name == "DataArray") return place;
   }
-  for (auto inner = next_tag(in); inner; inner = next_tag(in))
-    if (inner->closes && inner->name == "DataArray") return place;
-  in.refuse("DataArray %s has no end: the file is truncated",
-            Cursor::quote(place.name.empty() ? " " : place.name).c_str());
 }
 
 VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPacking &packing,
