@@ -20,6 +20,10 @@ struct Extent {
     const Vec3 size = hi - lo;
     return std::max({0.0, size.x, size.y, size.z});
   }
+  int longest_axis() const {  // the first of equal ones
+    const Vec3 size = hi - lo;
+    return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  }
   void grow(Vec3 by) {
     lo = lo - by;
     hi = hi + by;

@@ -361,7 +361,7 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
           prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
           if (t + 1 < k)
             prism(layer,
-                      {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
+                  {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
         }
   return finished(std::move(mesh));
 }

@@ -1,5 +1,6 @@
 #include "plugin/params.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -27,14 +28,8 @@ std::vector<std::string> keys_of(const dfm_type &type) {
   return keys;
 }
 
-bool has_row(const dfm_type &type, const char *key) {
-  for (uint32_t i = 0; i < type.nparam; ++i)
-    if (std::strcmp(type.params[i].key, key) == 0) return true;
-  return false;
-}
-
 bool stands_for(const dfm_type &type, const char *given, const char *row) {
-  return std::strcmp(given, "mu") == 0 && !has_row(type, "mu") &&
+  return std::strcmp(given, "mu") == 0 && !find_row(type, "mu") &&
          (std::strcmp(row, "mu_C") == 0 || std::strcmp(row, "mu_S") == 0);
 }
 
@@ -42,7 +37,7 @@ void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
   for (size_t i = 0; i < given.size(); ++i) {
     if (!given[i].key || !given[i].value)
       fail(DFM_E_ARG, "%s: parameter %zu has no %s", type.id, i, given[i].key ? "value" : "key");
-    bool known = has_row(type, given[i].key);
+    bool known = find_row(type, given[i].key);
     for (uint32_t k = 0; k < type.nparam; ++k) known |= stands_for(type, given[i].key, type.params[k].key);
     if (!known) {
       const auto keys = keys_of(type);
@@ -79,6 +74,13 @@ const dfm_param_value *choose(const dfm_type &type, const dfm_param &row,
 }
 
 }  // namespace
+
+const dfm_param *find_row(const dfm_type &type, const char *key) {
+  const dfm_param *const end = type.params + type.nparam;
+  const dfm_param *const row =
+      std::find_if(type.params, end, [&](const dfm_param &r) { return std::strcmp(r.key, key) == 0; });
+  return row == end ? nullptr : row;
+}
 
 uint32_t packed_width(const dfm_type &type) {
   uint32_t n = 0;

@@ -21,6 +21,8 @@ std::vector<double> changed_params(const dfm_type &type, std::span<const dfm_par
                                    const std::vector<double> &present);
 // Packed values by key, in the form that pack_params takes; they point into `packed`.
 std::vector<dfm_param_value> param_rows(const dfm_type &type, const std::vector<double> &packed);
+// Row of a key; null: the type has none.
+const dfm_param *find_row(const dfm_type &type, const char *key);
 uint32_t packed_width(const dfm_type &type);  // doubles of all rows
 
 }  // namespace dfm
