@@ -91,22 +91,14 @@ class Cursor {
   // A word of this file as a number.
   int64_t to_integer(std::string_view text, const char *what) {
     int64_t value = 0;
-    const char *from = text.data(), *to = from + text.size();
-    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
-    const auto result = std::from_chars(from, to, value);
-    if (text.empty() || result.ec != std::errc() || result.ptr != to)
-      refuse_word(text, what, "a whole number");
+    if (parse(text, value) != std::errc()) refuse_word(text, what, "a whole number");
     return value;
   }
   double to_real(std::string_view text, const char *what) {
     double value = 0;
-    const char *from = text.data(), *to = from + text.size();
-    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
-    const auto result = std::from_chars(from, to, value);
-    const bool underflow = result.ec == std::errc::result_out_of_range && below_one(text);
-    if (underflow) value = 0;
-    if (text.empty() || result.ptr != to || (result.ec != std::errc() && !underflow) || !std::isfinite(value))
-      refuse_word(text, what, "a finite number");
+    const std::errc error = parse(text, value);
+    if (error == std::errc::result_out_of_range && below_one(text)) return 0;
+    if (error != std::errc() || !std::isfinite(value)) refuse_word(text, what, "a finite number");
     return value;
   }
   // The next word of this line; empty at its end, which stays unread. A backslash before a line end
@@ -210,6 +202,14 @@ class Cursor {
  private:
   static bool is_space(char c) {
     return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+  }
+  // The whole word as a number, which may begin with a plus.
+  template <class T>
+  static std::errc parse(std::string_view text, T &value) {
+    const char *from = text.data(), *const to = from + text.size();
+    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
+    const auto [end, error] = std::from_chars(from, to, value);
+    return end == to ? error : std::errc::invalid_argument;
   }
   // Whether an out-of-range decimal is too small rather than too large.
   static bool below_one(std::string_view text) {

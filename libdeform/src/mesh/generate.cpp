@@ -108,8 +108,7 @@ Grid choose_grid(const double size[3], uint32_t cells) {
   const double cubes = std::max(1.0, cells / 12.0);
   const double shortest = std::min({size[0], size[1], size[2]});
   double edge = std::cbrt(size[0] * (size[1] * (size[2] / cubes)));
-  Grid best{};
-  double best_score = HUGE_VAL;
+  Best<Grid> best;
   for (int finer = 0; finer == 0 || (finer < 64 && edge > 0.5 * shortest); ++finer, edge *= 0.9)
     for (int up = 0; up < 8; ++up) {
       Grid g{};
@@ -118,15 +117,11 @@ Grid choose_grid(const double size[3], uint32_t cells) {
       const double count = double(g.n[0]) * g.n[1] * g.n[2];
       const double h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
       if (count > kMostCells / 12) continue;
-      const double s =
-          choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
-      if (s < best_score) {
-        best_score = s;
-        best = g;
-      }
+      best.offer(choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes), g);
     }
-  check_choice("beam", best_score < HUGE_VAL ? 12.0 * best.n[0] * best.n[1] * best.n[2] : HUGE_VAL, cells);
-  return best;
+  const uint32_t *const n = best.choice.n;
+  check_choice("beam", best.score < HUGE_VAL ? 12.0 * n[0] * n[1] * n[2] : HUGE_VAL, cells);
+  return best.choice;
 }
 
 // ---- ball -------------------------------------------------------------------------------------------------
@@ -259,22 +254,19 @@ struct Disc {  // triangular lattice in rings
 
 // Tries every number of rings, with the layers that give the number of cells, with those that give near-equal
 // edges, and with the nearest to the first that keep edges within 2:1.
-void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings, uint32_t *layers) {
-  double best = HUGE_VAL;
+std::array<uint32_t, 2> choose_rings(double radius, double length, uint32_t cells) {
+  Best<std::array<uint32_t, 2>> best{{1, 1}};
   for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n) {
     const double asked = cells / (18.0 * n * n), even = length * n / radius;
     for (const double wanted : {asked, even, std::clamp(asked, even / 2, 2 * even)}) {
       if (wanted > kMostCells / (18.0 * n * n)) continue;
       const uint32_t m = rounded(wanted);
-      const double s = choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
-      if (s < best) {
-        best = s;
-        *rings = n;
-        *layers = m;
-      }
+      best.offer(choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells), {n, m});
     }
   }
-  check_choice("cylinder", best < HUGE_VAL ? 18.0 * *rings * *rings * *layers : HUGE_VAL, cells);
+  const auto [n, m] = best.choice;
+  check_choice("cylinder", best.score < HUGE_VAL ? 18.0 * n * n * m : HUGE_VAL, cells);
+  return best.choice;
 }
 
 }  // namespace
@@ -330,8 +322,7 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
   check_cylinder(radius, length);
   check_cells(cells);
-  uint32_t n = 1, m = 1;
-  choose_rings(radius, length, cells, &n, &m);
+  const auto [n, m] = choose_rings(radius, length, cells);
   const Disc disc{n};
   TetMesh mesh(memory);
   // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions,

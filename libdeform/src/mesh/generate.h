@@ -42,6 +42,17 @@ inline double choice_score(double elongation, double count, double asked) {
   const double excess = std::max(1.0, elongation / 2);
   return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
 }
+// The choice of the lowest score, the first of equal ones.
+template <class T>
+struct Best {
+  T choice{};
+  double score = HUGE_VAL;
+  void offer(double its_score, const T &other) {
+    if (!(its_score < score)) return;
+    score = its_score;
+    choice = other;
+  }
+};
 // The number of cells may exceed the requested one only up to a limit.
 inline void check_choice(const char *shape, double count, uint32_t asked) {
   if (count > 100.0 * std::max(asked, 100u))

@@ -140,4 +140,17 @@ void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uin
   keep_points(corners, n, in_group);
 }
 
+void read_corners(Cursor &in, Number type, uint64_t face, int64_t n, uint32_t npoint, Array<uint32_t> &out) {
+  if (n < 3) in.refuse("face %llu has %lld corners; expected 3 or more", ull(face), ll(n));
+  in.count(n, 1, type, "corners of a face");
+  out.clear();
+  for (int64_t k = 0; k < n; ++k) {
+    const int64_t p = in.integer(type, "a face's vertex");
+    if (p < 0 || p >= int64_t(npoint))
+      in.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(p),
+                ll(npoint) - 1);
+    out.push_back(static_cast<uint32_t>(p));
+  }
+}
+
 }  // namespace dfm

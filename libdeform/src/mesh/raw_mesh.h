@@ -57,6 +57,9 @@ struct RawMesh {
 };
 inline constexpr uint32_t kMaxTris = 1u << 30;
 
+// The n corners of a face, from 0.
+void read_corners(Cursor &in, Number type, uint64_t face, int64_t n, uint32_t npoint, Array<uint32_t> &out);
+
 void read_msh(Cursor &in, RawMesh &out);
 void read_vtk(Cursor &in, RawMesh &out);
 void read_vtu(Cursor &in, RawMesh &out);

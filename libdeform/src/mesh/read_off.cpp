@@ -71,16 +71,7 @@ class OffReader {
 
   void read_face(uint64_t face) {
     const int64_t n = number("a face's number of corners");
-    if (n < 3) in_.refuse("face %llu has %lld corners; expected 3 or more", ull(face), ll(n));
-    in_.count(n, 1, Number::i32, "corners of a face");
-    corners_.clear();
-    for (int64_t k = 0; k < n; ++k) {
-      const int64_t p = number("a face's vertex");
-      if (p < 0 || p >= int64_t(out_.npoint()))
-        in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(p),
-                   ll(out_.npoint()) - 1);
-      corners_.push_back(static_cast<uint32_t>(p));
-    }
+    read_corners(in_, Number::i32, face, n, out_.npoint(), corners_);
     out_.add_polygon(in_, corners_.data(), corners_.size(), kNoGroup);
     if (in_.binary)
       in_.skip(4 * in_.count(number("a face's number of colors"), 4, "colors of a face"), "a face's color");

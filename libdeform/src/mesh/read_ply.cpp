@@ -164,7 +164,7 @@ class PlyReader {
     for (uint64_t f = 0; f < n; ++f) {
       int64_t number = 0;
       for (const Property &p : e.properties) {
-        if (&p == list) read_corners(p, f);
+        if (&p == list) read_corners(in_, p.type, f, int64_t(list_length(p)), npoint_, corners_);
         else if (&p == label) number = in_.integer(p.type, "a face's group");
         else pass_over(p);
       }
@@ -172,19 +172,6 @@ class PlyReader {
                                  ? kNoGroup
                                  : out_.group(in_, 2, static_cast<int32_t>(number));
       out_.add_polygon(in_, corners_.data(), corners_.size(), group);
-    }
-  }
-
-  void read_corners(const Property &p, uint64_t face) {
-    const uint64_t k = list_length(p);
-    if (k < 3) in_.refuse("face %llu has %llu corners; expected 3 or more", ull(face), ull(k));
-    corners_.clear();
-    for (uint64_t i = 0; i < k; ++i) {
-      const int64_t v = in_.integer(p.type, "a face's vertex");
-      if (v < 0 || v >= int64_t(npoint_))
-        in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(v),
-                   ll(npoint_) - 1);
-      corners_.push_back(static_cast<uint32_t>(v));
     }
   }
 

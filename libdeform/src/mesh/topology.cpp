@@ -172,7 +172,25 @@ double wave_path(const TetMesh &mesh) {
 
 }  // namespace
 
-void measure(const Array<double> &points, double lo[3], double hi[3]) {
+void MeshMeasures::set_edges(Array<double> &lengths) {
+  std::sort(lengths.begin(), lengths.end());
+  edge_min = lengths.front();
+  edge_median = lengths[lengths.size() / 2];
+  edge_max = lengths.back();
+}
+
+void MeshMeasures::set_qualities(size_t n, const std::function<double(size_t)> &quality) {
+  quality_min = 1;
+  for (size_t i = 0; i < n; ++i) {
+    const double q = quality(i);
+    quality_min = std::min(quality_min, q);
+    quality_mean += q;
+    ++histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
+  }
+  quality_mean /= double(n);
+}
+
+void MeshMeasures::set_box(const Array<double> &points) {
   const Extent box = extent_of(points);
   store3(lo, box.lo);
   store3(hi, box.hi);
@@ -197,26 +215,19 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
     for (size_t i = 0; i < edges.size(); i += 2)
       length.push_back(
           norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
-    std::sort(length.begin(), length.end());
-    s.edge_min = length.front();
-    s.edge_median = length[length.size() / 2];
-    s.edge_max = length.back();
+    s.set_edges(length);
   }
   s.npiece = count_pieces(memory, s.npoint, mesh.tets, 4);
   s.duplicate_points = count_duplicate_points(mesh);
-  s.quality_min = 1;
-  for (uint32_t t = 0; t < s.ntet; ++t) {
-    const uint32_t *tet = &mesh.tets[4 * size_t(t)];
+  s.set_qualities(s.ntet, [&](size_t t) {
+    const uint32_t *tet = &mesh.tets[4 * t];
     const double q = tet_quality(mesh.points.data(), tet);
     s.volume += tet_volume(mesh.points.data(), tet);
-    s.quality_min = std::min(s.quality_min, q);
-    s.quality_mean += q;
     s.flat_cells += q < 0.01;
-    ++s.histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
-  }
-  s.quality_mean /= s.ntet;
+    return q;
+  });
   s.wave_path = wave_path(mesh);
-  measure(mesh.points, s.lo, s.hi);
+  s.set_box(mesh.points);
   return s;
 }
 

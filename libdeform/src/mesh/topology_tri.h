@@ -23,7 +23,5 @@ Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges);
 
 // Pieces of cells of so many corners: joined by points.
 uint32_t count_pieces(const Memory &memory, uint32_t npoint, const Array<uint32_t> &corners, size_t each);
-// The box of points [n,3].
-void measure(const Array<double> &points, double lo[3], double hi[3]);
 
 }  // namespace dfm
