@@ -1,5 +1,5 @@
-// Vectors of DEFORM_WIDTH doubles, which the including file defines, for kernels that are compiled for several
-// widths. Internal linkage only.
+// Vectors of DEFORM_WIDTH doubles, which the including file defines, for kernels that are compiled for
+// several widths. Internal linkage only.
 #pragma once
 #include <stdint.h>
 

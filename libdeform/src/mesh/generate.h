@@ -73,8 +73,8 @@ Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t
 
 void add_point(TetMesh &mesh, Vec3 p);
 void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);  // turned to positive volume
-// The prism over a triangle of a layer, cut in three by the colors of its corners; layers are mirrored in turn,
-// so that the surface diagonals zigzag.
+// The prism over a triangle of a layer, cut in three by the colors of its corners; layers are mirrored in
+// turn, so that the surface diagonals zigzag.
 template <class Color>
 void add_prism(TetMesh &mesh, uint32_t layer, uint32_t slab, std::array<uint32_t, 3> v, const Color &color) {
   std::sort(v.begin(), v.end(),

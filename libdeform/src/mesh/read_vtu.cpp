@@ -114,7 +114,6 @@ class VtuReader {
   }
 
   void find_arrays(Piece &piece) {
-    static const char *const lists[] = {"Verts", "Lines", "Polys", "Strips"};
     std::string_view section;
     while (const auto tag = next_tag(in_)) {
       if (tag->closes) {
@@ -122,13 +121,13 @@ class VtuReader {
         if (tag->name == section) section = {};
       } else if (tag->name == "DataArray" || tag->name == "Array") {
         if (section.empty() || tag->get("type") == "Bit" || (section == "PointData")) continue;
-        keep_array(piece, section, lists, vtu_place(in_, *tag));
+        keep_array(piece, section, vtu_place(in_, *tag));
       } else if (!tag->empty && section.empty()) section = tag->name;
     }
     in_.refuse("a Piece has no end: the file is truncated");
   }
 
-  void keep_array(Piece &piece, std::string_view section, const char *const *lists, VtuPlace &&place) {
+  void keep_array(Piece &piece, std::string_view section, VtuPlace &&place) {
     if (section == "Points") {
       piece.points = std::move(place);
     } else if (section == "CellData") {
@@ -137,10 +136,11 @@ class VtuReader {
       else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type))
         piece.share = std::move(place);
     } else {
-      int list = polydata_ ? -1 : section == "Cells" ? 0 : -1;
-      for (int k = 0; polydata_ && k < 4; ++k)
-        if (section == lists[k]) list = k;
-      if (list < 0) return;
+      static constexpr std::string_view kLists[] = {"Verts", "Lines", "Polys", "Strips"};
+      const size_t list = polydata_            ? size_t(std::find(kLists, kLists + 4, section) - kLists)
+                          : section != "Cells" ? 4
+                                               : 0;
+      if (list == 4) return;
       const std::string name = vtk_lower(place.name);
       CellList &cells = piece.cells[list];
       if (name == "connectivity") cells.connectivity = std::move(place);
