@@ -1,13 +1,12 @@
 #include "broad/broad_phase.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <new>
 #include <utility>
 
 #include "geometry/closest.h"
 #include "geometry/obstacle_shape.h"
+#include "geometry/tree_walk.h"
 
 namespace dfm {
 namespace {
@@ -54,24 +53,6 @@ struct Features {  // corners of a surface as listed
 
 constexpr size_t kLook = 1000;  // surfels that are worth a job
 
-// f(i) for all i < n on the threads of tasks. An exception must not leave a worker.
-template <class F>
-void each(size_t n, size_t grain, Tasks *tasks, F &&f) {
-  if (!tasks || !tasks->parallel() || n <= grain) {
-    for (size_t i = 0; i < n; ++i) f(i);
-    return;
-  }
-  std::atomic<bool> failed{false};
-  tasks->parallel_for(uint32_t(n), uint32_t(grain), [&](uint32_t begin, uint32_t end) {
-    try {
-      for (uint32_t i = begin; i < end; ++i) f(i);
-    } catch (const std::bad_alloc &) {
-      failed = true;
-    }
-  });
-  if (failed) throw std::bad_alloc();
-}
-
 // m, the largest distance of triangles that are listed
 template <class Side>
 double reach_of(const Side &a, const Side &b) {
@@ -109,15 +90,17 @@ void BroadPhase::clear() {
 
 bool BroadPhase::update(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                         const PairFilter &filter, double h, double offset, Tasks *tasks) {
-  match(bodies, obstacles, filter);
-  if (!find_dirty(bodies, obstacles, h, offset, tasks)) return false;
-  renew(bodies, obstacles, filter, h, offset, tasks);
+  const Now now{bodies, obstacles, filter, h, offset, tasks};
+  match(now);
+  if (!find_dirty(now)) return false;
+  renew(now);
   return true;
 }
 
 bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                        const PairFilter &filter, double h, double offset, std::span<const double> speed,
                        Tasks *tasks) {
+  const Now now{bodies, obstacles, filter, h, offset, tasks};
   bool any = false;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body &b = bodies_[i];
@@ -126,25 +109,24 @@ bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const Obstacl
     b.expected = speed[i];
   }
   for (size_t o = 0; o < things_.size(); ++o)
-    if (!holds(things_[o], obstacles[o], h, offset, 1)) things_[o].dirty = any = true;
-  if (any) renew(bodies, obstacles, filter, h, offset, tasks);
+    if (!holds(things_[o], obstacles[o], now, 1)) things_[o].dirty = any = true;
+  if (any) renew(now);
   return any;
 }
 
-void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                       const PairFilter &filter, double h, double offset, Tasks *tasks) {
+void BroadPhase::renew(const Now &now) {
   ++stats_.renewals;
-  each(bodies_.size(), 1, tasks, [&](size_t i) {
-    if (bodies_[i].dirty) renew_body(bodies_[i], h, offset);
+  each_on(now.tasks, bodies_.size(), 1, [&](size_t i) {
+    if (bodies_[i].dirty) renew_body(bodies_[i], now);
   });
   bound_bodies();
   for (size_t o = 0; o < things_.size(); ++o) {
     Thing &t = things_[o];
     // The displacement of a plane is measured over the sphere around the bodies, which has just changed.
-    if (!t.dirty && t.view.shape == Shape::plane) t.dirty = !holds(t, obstacles[o], h, offset);
-    if (t.dirty) renew_thing(t, obstacles[o], h, offset);
+    if (!t.dirty && t.view.shape == Shape::plane) t.dirty = !holds(t, now.obstacles[o], now);
+    if (t.dirty) renew_thing(t, now.obstacles[o], now);
   }
-  find_pairs(bodies, obstacles, filter, tasks);
+  find_pairs(now);
   assemble();
   const auto count = [this](Side &side) {
     stats_.refits += std::exchange(side.refits, 0);
@@ -161,23 +143,22 @@ void BroadPhase::renew(std::span<const BodyView> bodies, std::span<const Obstacl
 }
 
 // Matches bodies_ and things_ to the views; new, removed or changed things lose their lists.
-void BroadPhase::match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                       const PairFilter &filter) {
-  bool same = bodies.size() == bodies_.size() && obstacles.size() == things_.size() &&
-              filter.version == filter_version_;
-  for (size_t i = 0; same && i < bodies.size(); ++i) {
+void BroadPhase::match(const Now &now) {
+  bool same = now.bodies.size() == bodies_.size() && now.obstacles.size() == things_.size() &&
+              now.filter.version == filter_version_;
+  for (size_t i = 0; same && i < now.bodies.size(); ++i) {
     const Body &b = bodies_[i];
-    same = b.id == bodies[i].id && b.surface == bodies[i].surface && b.slot == bodies[i].slot &&
-           b.category == bodies[i].category && b.collides_with == bodies[i].collides_with &&
-           b.x.size() == bodies[i].surface->x.size();
+    same = b.id == now.bodies[i].id && b.surface == now.bodies[i].surface && b.slot == now.bodies[i].slot &&
+           b.category == now.bodies[i].category && b.collides_with == now.bodies[i].collides_with &&
+           b.x.size() == now.bodies[i].surface->x.size();
   }
-  for (size_t o = 0; same && o < obstacles.size(); ++o)
-    same = things_[o].view.id == obstacles[o].id && same_shape(things_[o].view, obstacles[o]);
+  for (size_t o = 0; same && o < now.obstacles.size(); ++o)
+    same = things_[o].view.id == now.obstacles[o].id && same_shape(things_[o].view, now.obstacles[o]);
   if (same) return;
   clear();
-  filter_version_ = filter.version;
-  bodies_.reserve(bodies.size());
-  for (const BodyView &v : bodies) {
+  filter_version_ = now.filter.version;
+  bodies_.reserve(now.bodies.size());
+  for (const BodyView &v : now.bodies) {
     Body &b = bodies_.emplace_back(memory_);
     b.id = v.id;
     b.surface = v.surface;
@@ -186,8 +167,8 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
     b.collides_with = v.collides_with;
     b.x.resize(v.surface->x.size());
   }
-  things_.reserve(obstacles.size());
-  for (const ObstacleView &v : obstacles) {
+  things_.reserve(now.obstacles.size());
+  for (const ObstacleView &v : now.obstacles) {
     Thing &t = things_.emplace_back(memory_);
     t.view = v;
     if (v.shape != Shape::mesh) continue;
@@ -196,49 +177,48 @@ void BroadPhase::match(std::span<const BodyView> bodies, std::span<const Obstacl
   }
 }
 
-void BroadPhase::look(Body &b, bool asleep, double h, double offset) {
+void BroadPhase::look(Body &b, bool asleep, const Now &now) {
   const bool stays = b.asleep && asleep;
   b.asleep = asleep;
   b.expected = 0;
   if (b.dirty || stays) return;
   b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
   b.speed = largest_speed(*b.surface);
-  b.dirty = b.skin > b.skin_most || !(kRounding * (b.moved + reach_share(h, offset, b.speed)) <= b.margin);
+  b.dirty =
+      b.skin > b.skin_most || !(kRounding * (b.moved + reach_share(now.h, now.offset, b.speed)) <= b.margin);
 }
 
-bool BroadPhase::find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                            double h, double offset, Tasks *tasks) {
+bool BroadPhase::find_dirty(const Now &now) {
   bool any = false;
   size_t surfels = 0;
-  for (const BodyView &b : bodies) surfels += b.surface->nsurfel;
+  for (const BodyView &b : now.bodies) surfels += b.surface->nsurfel;
   // body by body, as in the other stages: the thread that has moved a body has it in the cache of its core
-  each(bodies.size(), surfels < kLook ? bodies.size() : 1, tasks,
-       [&](size_t i) { look(bodies_[i], bodies[i].asleep, h, offset); });
+  each_on(now.tasks, bodies_.size(), surfels < kLook ? bodies_.size() : 1,
+          [&](size_t i) { look(bodies_[i], now.bodies[i].asleep, now); });
   for (const Body &b : bodies_) any |= b.dirty;
   for (size_t o = 0; o < things_.size(); ++o) {
     Thing &t = things_[o];
-    t.dirty = t.dirty || t.skin > t.skin_most || !holds(t, obstacles[o], h, offset);
+    t.dirty = t.dirty || t.skin > t.skin_most || !holds(t, now.obstacles[o], now);
     any |= things_[o].dirty;
   }
   return any;
 }
 
 // times: how many times the obstacle's displacement of the sub-step is covered.
-bool BroadPhase::holds(const Thing &thing, const ObstacleView &now, double h, double offset,
-                       double times) const {
+bool BroadPhase::holds(const Thing &thing, const ObstacleView &view, const Now &now, double times) const {
   const ObstacleView &then = thing.view;
   double moved, extent;
-  if (now.shape == Shape::plane) {
+  if (view.shape == Shape::plane) {
     // Only the motion along the normal counts, over the sphere that holds all bodies.
-    const Vec3 n = ObstacleShape(now).axis(2), n0 = ObstacleShape(then).axis(2);
-    moved =
-        norm(n - n0) * radius_ + std::fabs(dot(n, center_ - now.position) - dot(n0, center_ - then.position));
-    extent = norm(center_ - now.position) + radius_;
+    const Vec3 n = ObstacleShape(view).axis(2), n0 = ObstacleShape(then).axis(2);
+    moved = norm(n - n0) * radius_ +
+            std::fabs(dot(n, center_ - view.position) - dot(n0, center_ - then.position));
+    extent = norm(center_ - view.position) + radius_;
   } else {
-    extent = ObstacleShape(now).extent();
-    moved = obstacle_displacement(now, then, extent);
+    extent = ObstacleShape(view).extent();
+    moved = obstacle_displacement(view, then, extent);
   }
-  return kRounding * (moved + offset + times * h * obstacle_speed(now, extent)) <= thing.margin;
+  return kRounding * (moved + now.offset + times * now.h * obstacle_speed(view, extent)) <= thing.margin;
 }
 
 // Updates the copy and tree of a side; returns false if its surface is not finite.
@@ -253,27 +233,27 @@ bool BroadPhase::renew_tree(Side &side) {
   return true;
 }
 
-void BroadPhase::renew_thing(Thing &t, const ObstacleView &now, double h, double offset) {
-  t.view = now;
+void BroadPhase::renew_thing(Thing &t, const ObstacleView &view, const Now &now) {
+  t.view = view;
   if (t.surface) renew_tree(t);
   const double extent =
-      now.shape == Shape::plane ? norm(center_ - now.position) + radius_ : ObstacleShape(now).extent();
-  const double speed = t.speed = obstacle_speed(now, extent), alone = skin_steps_ * h * speed;
-  const double reach = kRounding * reach_share(h, offset, kSpeedGrowth * speed) + offset;
+      view.shape == Shape::plane ? norm(center_ - view.position) + radius_ : ObstacleShape(view).extent();
+  const double speed = t.speed = obstacle_speed(view, extent), alone = skin_steps_ * now.h * speed;
+  const double reach = kRounding * reach_share(now.h, now.offset, kSpeedGrowth * speed) + now.offset;
   t.skin = std::min(alone, t.skin_most);
   t.margin = reach + kRounding * t.skin;
   t.margin_most = reach + kRounding * alone;
 }
 
 // The skin lasts for skin_steps_ of the present motion, a function of the state alone.
-void BroadPhase::renew_body(Body &body, double h, double offset) {
+void BroadPhase::renew_body(Body &body, const Now &now) {
   if (!renew_tree(body)) return;
   const Surface &s = *body.surface;
   const double speed = body.speed = largest_speed(s);
   const double alone =
-      std::clamp(skin_steps_ * h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  const double reach = kRounding * std::max(reach_share(h, offset, kSpeedGrowth * speed),
-                                            2 * offset + kSpeedGrowth * h * body.expected);
+      std::clamp(skin_steps_ * now.h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
+  const double reach = kRounding * std::max(reach_share(now.h, now.offset, kSpeedGrowth * speed),
+                                            2 * now.offset + kSpeedGrowth * now.h * body.expected);
   body.skin = std::min(alone, body.skin_most);
   body.margin = reach + body.skin;
   body.margin_most = reach + alone;
@@ -313,8 +293,7 @@ void BroadPhase::bound_bodies() {
 }
 
 // Pairs without a changed side keep their runs; the others are listed again. Bodies are swept along x.
-void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                            const PairFilter &filter, Tasks *tasks) {
+void BroadPhase::find_pairs(const Now &now) {
   fresh_.clear();
   pairs_.clear();
   next_segments_.clear();
@@ -338,18 +317,19 @@ void BroadPhase::find_pairs(std::span<const BodyView> bodies, std::span<const Ob
     Body &a = bodies_[order_[p]];
     const double high = a.tree.root().hi[0] + a.margin_most + recovery_depth(*a.surface);
     for (size_t q = p + 1; q < order_.size() && low(order_[q]) <= high; ++q)
-      if ((a.dirty || bodies_[order_[q]].dirty) && filter.may_touch(bodies[order_[p]], bodies[order_[q]])) {
+      if ((a.dirty || bodies_[order_[q]].dirty) &&
+          now.filter.may_touch(now.bodies[order_[p]], now.bodies[order_[q]])) {
         limit_skins(a, bodies_[order_[q]]);
         const bool ordered = a.id < bodies_[order_[q]].id;
         pairs_.push_back({order_[ordered ? p : q], order_[ordered ? q : p], false});
       }
     for (uint32_t o = 0; o < things_.size(); ++o)
-      if ((a.dirty || things_[o].dirty) && filter.may_touch(bodies[order_[p]], obstacles[o])) {
+      if ((a.dirty || things_[o].dirty) && now.filter.may_touch(now.bodies[order_[p]], now.obstacles[o])) {
         if (things_[o].usable) limit_skins(a, things_[o]);
         pairs_.push_back({order_[p], o, true});
       }
   }
-  list_pairs(tasks);
+  list_pairs(now.tasks);
 }
 
 void BroadPhase::list_pairs(Tasks *tasks) {
@@ -366,12 +346,13 @@ void BroadPhase::list_pairs(Tasks *tasks) {
   parts_.clear();
   for (uint32_t i = 0; i < pairs_.size(); ++i) cut(i);
   while (found_.size() < parts_.size()) found_.emplace_back(memory_);
-  each(parts_.size(), 1, tasks, [&](size_t i) { list(pairs_[parts_[i].pair], parts_[i].nodes, found_[i]); });
+  each_on(tasks, parts_.size(), 1,
+          [&](size_t i) { list(pairs_[parts_[i].pair], parts_[i].nodes, found_[i]); });
   for (size_t i = 0, end = 0; i < parts_.size(); i = end) {
     while (end < parts_.size() && parts_[end].pair == parts_[i].pair) ++end;
     add_segments(pairs_[parts_[i].pair], {&found_[i], end - i});
   }
-  each(lists_.size(), 1, tasks, [&](size_t i) { put_together(lists_[i]); });
+  each_on(tasks, lists_.size(), 1, [&](size_t i) { put_together(lists_[i]); });
 }
 
 // Surfaces alone are large enough. Most of the work is where they are nearest, so both trees are divided.
@@ -448,7 +429,7 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
   shape.bounds(bounds.lo, bounds.hi);
   near_triangles(
-      a.tree, found.stack, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; },
+      a.tree, [&](const Box &b) { return box_distance2(b, bounds) <= near * near; },
       [&](uint32_t t) {
         const Vec3 x[3] = {fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)};
         const Vec3 center = (1.0 / 3) * (x[0] + x[1] + x[2]);
@@ -500,7 +481,7 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
     }
     return false;
   };
-  near_triangles(a.tree, found.stack, box_near, [&](uint32_t t) {
+  near_triangles(a.tree, box_near, [&](uint32_t t) {
     const uint32_t owns = fa.surface.tri_owns[t];
     for (int k = 0; k < 3; ++k) {
       if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near)

@@ -129,21 +129,25 @@ class BroadPhase {
     size_t begin;
   };
 
-  void match(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-             const PairFilter &filter);
-  bool find_dirty(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles, double h,
-                  double offset, Tasks *tasks);
-  void look(Body &body, bool asleep, double h, double offset);
-  bool holds(const Thing &thing, const ObstacleView &now, double h, double offset, double times = 2) const;
+  // What update() and cover() were called with.
+  struct Now {
+    std::span<const BodyView> bodies;
+    std::span<const ObstacleView> obstacles;
+    const PairFilter &filter;
+    double h, offset;
+    Tasks *tasks;
+  };
+  void match(const Now &now);
+  bool find_dirty(const Now &now);
+  void look(Body &body, bool asleep, const Now &now);
+  bool holds(const Thing &thing, const ObstacleView &view, const Now &now, double times = 2) const;
   bool renew_tree(Side &side);
-  void renew(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-             const PairFilter &filter, double h, double offset, Tasks *tasks);
-  void renew_body(Body &body, double h, double offset);
-  void renew_thing(Thing &thing, const ObstacleView &now, double h, double offset);
+  void renew(const Now &now);
+  void renew_body(Body &body, const Now &now);
+  void renew_thing(Thing &thing, const ObstacleView &view, const Now &now);
   static void limit_skins(Side &a, Side &b);
   void bound_bodies();
-  void find_pairs(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                  const PairFilter &filter, Tasks *tasks);
+  void find_pairs(const Now &now);
   void list_pairs(Tasks *tasks);
   void cut(uint32_t pair);
   void list(const Pair &pair, PairOfTriangles nodes, Found &found) const;

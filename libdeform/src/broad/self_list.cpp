@@ -221,7 +221,7 @@ void SelfList::list_anew(double limit) {
     if (!marked(2, t)) continue;
     const Box &own = tree_.triangle_boxes()[place];
     near_triangles(
-        tree_, stack_, [&](const Box &b) { return box_distance2(own, b) <= limit * limit; },
+        tree_, [&](const Box &b) { return box_distance2(own, b) <= limit * limit; },
         [&](uint32_t other) {
           if (other != t && !(marked(2, other) && other < t)) add(t, other, limit, wanted);
         });

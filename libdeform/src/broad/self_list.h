@@ -17,8 +17,8 @@
 #include "body/self_rest.h"
 #include "broad/rigid_fit.h"
 #include "core/memory.h"
-#include "geometry/box_tree.h"
 #include "geometry/surface.h"
+#include "geometry/tree_walk.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -46,17 +46,9 @@ class SelfList {
   // f(other) for triangles whose boxes may meet that of this one now, and for itself.
   template <class F>
   void near_triangle(uint32_t triangle, F &&f) {
-    Box own{{HUGE_VAL, HUGE_VAL, HUGE_VAL, 0},
-            {-HUGE_VAL, -HUGE_VAL, -HUGE_VAL, 0}};  // where the tree has it
-    for (uint32_t c = 0; c < 3; ++c) {
-      const double *const x = &at_.x()[4 * size_t{surface_.tri[3 * size_t{triangle} + c]}];
-      for (int k = 0; k < 3; ++k) {
-        own.lo[k] = std::min(own.lo[k], x[k]);
-        own.hi[k] = std::max(own.hi[k], x[k]);
-      }
-    }
+    const Box own = triangle_box(&surface_.tri[3 * size_t{triangle}], at_.x().data());  // as the tree has it
     const double margin = kDistanceRounding * 2 * moved_, limit = margin * margin;
-    near_triangles(tree_, stack_, [&](const Box &b) { return box_distance2(own, b) <= limit; }, f);
+    near_triangles(tree_, [&](const Box &b) { return box_distance2(own, b) <= limit; }, f);
   }
   // Ascending by (a, b).
   const Array<SelfPair> &vertex_face() const { return vf_; }

@@ -3,7 +3,7 @@
 // the caller's numbering of vertices, the origin, or the unit of length.
 #include "ccd/toi.h"
 
-#include <cstring>
+#include <bit>
 
 #include "ccd/toi_query.h"
 
@@ -12,19 +12,10 @@ namespace {
 
 using toi::Query;
 
-double power_of_two(int exponent) {
-  const uint64_t bits = uint64_t(exponent + 1023) << 52;
-  double x;
-  std::memcpy(&x, &bits, sizeof x);
-  return x;
-}
+double power_of_two(int exponent) { return std::bit_cast<double>(uint64_t(exponent + 1023) << 52); }
 
 // e with 2^(e-1) <= x < 2^e for normal x > 0; -1022 below.
-int exponent_of(double x) {
-  uint64_t bits;
-  std::memcpy(&bits, &x, sizeof bits);
-  return int(bits >> 52 & 0x7ff) - 1022;
-}
+int exponent_of(double x) { return int(std::bit_cast<uint64_t>(x) >> 52 & 0x7ff) - 1022; }
 
 // Largest coordinate, one chain of comparisons per axis.
 struct Size {

@@ -1,9 +1,7 @@
 #include "ccd/toi_guard.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <new>
 
 #include "ccd/toi_guard_motion.h"
 #include "contact/contact_set.h"
@@ -82,23 +80,28 @@ double floor_share(const GuardScene &scene, const Features &f) {
 constexpr uint32_t kBlock = 192;
 constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
 
-// Two surfaces. Shared: several of them look at blocks of the list at the same time.
+// Shared: several of them look at blocks of the list at the same time.
 template <bool Shared>
-class NearPairs {
+class Near {
  public:
-  NearPairs(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
+  Near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
 
   void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
-    const double now = kRounding * (run.way + run.travel), *const rest = memory_.rest.data();
-    a_ = &scene_.side(list_[run.begin], false);
-    b_ = &scene_.side(list_[run.begin], true);
-    const PairAtRest *const own = a_ == b_ && a_->opened ? a_->pairs[run.kind == kEdgeEdge] : nullptr;
-    for (uint32_t i = begin; i < end; ++i)
-      if (!(now < rest[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
+    const double now = kRounding * (run.way + run.travel);
+    if (scene_.closed_form(list_[run.begin])) look_at_obstacle(run, begin, end, now);
+    else look_at_surfaces(run, begin, end, now);
   }
 
  private:
+  void look_at_surfaces(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+    const double *const rest = memory_.rest.data();
+    a_ = &scene_.side(list_[run.begin], false);
+    b_ = &scene_.side(list_[run.begin], true);
+    const PairAtRest *const own = a_ == b_ && a_->opened ? a_->pairs[run.of.kind == kEdgeEdge] : nullptr;
+    for (uint32_t i = begin; i < end; ++i)
+      if (!(now < rest[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
+  }
   // The height along any direction is a lower bound of the distance, so the value for the start is kept.
   void look(uint32_t i, double way, double now) {
     Features f(*a_, *b_, list_[i]);
@@ -136,38 +139,19 @@ class NearPairs {
     }
   }
 
-  GuardScene &scene_;
-  const Array<Candidate> &list_;
-  GuardMemory &memory_;
-  Array<uint32_t> &near_;
-  double floor_;
-  GuardSide *a_ = nullptr, *b_ = nullptr;  // of the run
-};
-
-// A surface and a closed-form shape or voxels, in the frame of the obstacle.
-template <bool Shared>
-class NearObstacle {
- public:
-  NearObstacle(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
-      : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
-
-  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
+  // A surface and a closed-form shape or voxels, in the frame of the obstacle.
+  void look_at_obstacle(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
     const Candidate &first = list_[run.begin];
     const ObstacleView &view = scene_.obstacles[first.slot_b];
-    const double now = kRounding * (run.way + run.travel);
     const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
     GuardSide &body = scene_.side(first, false);
     for (uint32_t i = begin; i < end; ++i) {
       if (now < memory_.rest[i]) continue;
-      if (view.shape == Shape::voxels) {
-        if (list_[i].kind != 0 || !far(frame, body, i, run.way, now)) near_.push_back(i);
-      } else if (!clear(frame, body, i, run.way)) {
-        near_.push_back(i);
-      }
+      const bool away = view.shape == Shape::voxels ? list_[i].kind == 0 && far(frame, body, i, run.way, now)
+                                                    : clear(frame, body, i, run.way);
+      if (!away) near_.push_back(i);
     }
   }
-
- private:
   // A convex shape lies behind the plane at its point nearest to the feature's middle; a box also behind
   // each of its faces.
   bool clear(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way) {
@@ -223,6 +207,7 @@ class NearObstacle {
   GuardMemory &memory_;
   Array<uint32_t> &near_;
   double floor_;
+  GuardSide *a_ = nullptr, *b_ = nullptr;  // of the run, of two surfaces
 };
 
 }  // namespace
@@ -255,32 +240,22 @@ void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
   rest.resize(n);
   normal.resize(3 * n);
   for (size_t i = 0; i < n;) {
-    const Candidate &c = list[i];
     const size_t end = end_of_run(list, i);
-    runs.push_back({uint32_t(i), uint32_t(end), c.slot_a, c.slot_b, c.obstacle, c.kind, 0, 0});
+    runs.push_back({uint32_t(i), uint32_t(end), list[i], 0, 0});
     i = end;
   }
   // Runs come in one order in all lists, pairs in a run by their features.
   size_t next = 0;
   before.assign(runs.size(), kNone);
   for (size_t r = 0; r < runs.size(); ++r) {
-    const Run &run = runs[r];
-    const auto same = [&](const Run &o) {
-      return o.slot_a == run.slot_a && o.slot_b == run.slot_b && o.obstacle == run.obstacle &&
-             o.kind == run.kind;
-    };
+    const auto same = [&](const Run &o) { return same_run(o.of, runs[r].of); };
     const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
     if (found == old_runs.end()) continue;
     before[r] = static_cast<uint32_t>(found - old_runs.begin());
     next = size_t{before[r]} + 1;
   }
-  const auto carry = [&](uint32_t begin, uint32_t end) {
-    for (uint32_t r = begin; r < end; ++r) carry_over(list, runs[r], before[r]);
-  };
-  const uint32_t all = static_cast<uint32_t>(runs.size());
-  if (tasks && n > 2 * kBlock)
-    tasks->parallel_for(all, kTogether, [&](uint32_t begin, uint32_t end) { carry(begin, end); });
-  else carry(0, all);
+  each_on(n > 2 * kBlock ? tasks : nullptr, runs.size(), kTogether,
+          [&](size_t r) { carry_over(list, runs[r], before[r]); });
 }
 
 void GuardMemory::carry_over(const Array<Candidate> &list, Run &run, uint32_t from) {
@@ -301,39 +276,14 @@ void GuardMemory::carry_over(const Array<Candidate> &list, Run &run, uint32_t fr
 
 namespace {
 
-// Of both kinds of sides.
-template <bool Shared>
-struct Near {
-  GuardScene &scene;
-  const Array<Candidate> &list;
-  NearPairs<Shared> pairs;
-  NearObstacle<Shared> obstacles;
-  Near(GuardScene &s, const Array<Candidate> &all, GuardMemory &memory, Array<uint32_t> &near)
-      : scene(s), list(all), pairs(s, all, memory, near), obstacles(s, all, memory, near) {}
-  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
-    const Candidate &c = list[run.begin];
-    if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) obstacles.look(run, begin, end);
-    else pairs.look(run, begin, end);
-  }
-};
-
 void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory,
                     Array<uint32_t> &near, GuardBlocks &blocks, Tasks &tasks) {
   while (blocks.near.size() < blocks.pieces.size()) blocks.near.emplace_back(near.get_allocator());
-  std::atomic<bool> failed{false};
-  tasks.parallel_for(
-      static_cast<uint32_t>(blocks.pieces.size()), kTogether, [&](uint32_t begin, uint32_t end) {
-        for (uint32_t k = begin; k < end; ++k) {
-          const GuardBlocks::Piece &p = blocks.pieces[k];
-          blocks.near[k].clear();
-          try {
-            Near<true>(scene, list, memory, blocks.near[k]).look(memory.runs[p.run], p.begin, p.end);
-          } catch (const std::bad_alloc &) {
-            failed = true;  // exceptions must not leave a worker
-          }
-        }
-      });
-  if (failed) throw std::bad_alloc();
+  each_on(&tasks, blocks.pieces.size(), kTogether, [&](size_t k) {
+    const GuardBlocks::Piece &p = blocks.pieces[k];
+    blocks.near[k].clear();
+    Near<true>(scene, list, memory, blocks.near[k]).look(memory.runs[p.run], p.begin, p.end);
+  });
   for (size_t k = 0; k < blocks.pieces.size(); ++k)
     near.insert(near.end(), blocks.near[k].begin(), blocks.near[k].end());
 }
@@ -367,7 +317,7 @@ double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<co
   double least = 1;
   for (const uint32_t i : which) {
     const Candidate &c = list[i];
-    if (c.obstacle && scene.obstacles[c.slot_b].shape != Shape::mesh) continue;
+    if (scene.closed_form(c)) continue;
     Features f(scene.side(c, false), scene.side(c, true), c);
     f.find_ends(scene);
     const PairMotion pair(f);

@@ -74,6 +74,10 @@ struct GuardScene {
   GuardSide &side(const Candidate &c, bool second) {
     return sides[!second ? c.slot_a : c.obstacle ? bodies.size() + c.slot_b : c.slot_b];
   }
+  // Is the second side a closed-form shape or voxels?
+  bool closed_form(const Candidate &c) const {
+    return c.obstacle && obstacles[c.slot_b].shape != Shape::mesh;
+  }
   const double *end(GuardSide &s, uint32_t surfel) {
     if (s.stamp[surfel] != round) find_end(s, surfel);
     return &s.end[4 * size_t{surfel}];
@@ -86,8 +90,8 @@ struct GuardScene {
 // the same; pairs that two lists share are carried over.
 struct GuardMemory {
   struct Run {  // of the list: one pair of sides, one kind
-    uint32_t begin, end, slot_a, slot_b;
-    uint8_t obstacle, kind;
+    uint32_t begin, end;
+    Candidate of;  // its first one
     // m, bounds of the motion of the two sides against each other: in all sub-steps since the run is
     // known; in this one
     double way, travel;

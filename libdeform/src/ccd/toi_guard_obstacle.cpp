@@ -178,7 +178,7 @@ double guard_obstacles(GuardScene &scene, const Array<Candidate> &list, std::spa
                        Array<GuardHit> &out) {
   Judge judge(scene, out);
   for (const uint32_t i : which)
-    if (list[i].obstacle && scene.obstacles[list[i].slot_b].shape != Shape::mesh) judge.pair(i, list[i]);
+    if (scene.closed_form(list[i])) judge.pair(i, list[i]);
   return judge.least();
 }
 

@@ -1,8 +1,11 @@
 // Reading of whole files up to a limit, and atomic writing: either the old file or the complete new one
 // remains.
 #pragma once
+#include <algorithm>
+#include <bit>
 #include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <string>
 
 #include "core/memory.h"
@@ -49,8 +52,11 @@ class AtomicFile {
   void write(const void *data, size_t bytes);
   void write(const std::string &text) { write(text.data(), text.size()); }
   template <class T>
-  void put(const T &value) {
-    write(&value, sizeof value);
+  void put(const T &value, std::endian order = std::endian::native) {
+    char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    if (order != std::endian::native) std::reverse(bytes, bytes + sizeof value);
+    write(bytes, sizeof value);
   }
   void commit();
 

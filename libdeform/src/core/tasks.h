@@ -2,8 +2,11 @@
 // block writes to its own elements, or to a partial sum in slot begin/grain; the caller adds these in slot
 // order.
 #pragma once
+#include <atomic>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <new>
 
 namespace dfm {
 
@@ -63,6 +66,26 @@ class Tasks {
   HostFor host_for_;
   void *host_user_;
 };
+
+// f(i) for all i < n, blocks of `grain` on the threads of tasks (null: on this one). Where one has no memory,
+// std::bad_alloc reaches the caller: no exception may leave a worker.
+template <class F>
+void each_on(Tasks *tasks, size_t n, size_t grain, F &&f) {
+  if (!tasks || !tasks->parallel() || n <= grain) {
+    for (size_t i = 0; i < n; ++i) f(i);
+    return;
+  }
+  std::atomic<bool> failed{false};
+  tasks->parallel_for(static_cast<uint32_t>(n), static_cast<uint32_t>(grain),
+                      [&](uint32_t begin, uint32_t end) {
+                        try {
+                          for (uint32_t i = begin; i < end; ++i) f(size_t{i});
+                        } catch (const std::bad_alloc &) {
+                          failed = true;
+                        }
+                      });
+  if (failed) throw std::bad_alloc();
+}
 
 // How many forks lie between the process that asked first and this one; 0 where the system tells none. A
 // child of fork() has the memory of its parent and one thread. Whoever owns threads compares the count with

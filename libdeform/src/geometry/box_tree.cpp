@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "math/extent.h"
+
 namespace dfm {
 namespace {
 
@@ -19,6 +21,8 @@ double half_area(const Box &b) {
   return x * y + y * z + z * x;
 }
 
+}  // namespace
+
 Box triangle_box(const uint32_t *corner, const double *x) {
   const double *a = x + 4 * size_t{corner[0]}, *b = x + 4 * size_t{corner[1]}, *c = x + 4 * size_t{corner[2]};
   Box box;
@@ -29,8 +33,6 @@ Box triangle_box(const uint32_t *corner, const double *x) {
   }
   return box;
 }
-
-}  // namespace
 
 BoxTree::BoxTree(const Memory &memory) { use_memory(memory, node_, box_, tri_box_, tri_, centroid_); }
 
@@ -84,16 +86,9 @@ uint32_t BoxTree::split(uint32_t begin, uint32_t end) {
     node_.push_back({begin, end - begin});
     return self;
   }
-  double lo[3], hi[3];
-  for (int k = 0; k < 3; ++k) lo[k] = hi[k] = centroid_[begin].x[k];
-  for (uint32_t i = begin + 1; i < end; ++i)
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], centroid_[i].x[k]);
-      hi[k] = std::max(hi[k], centroid_[i].x[k]);
-    }
-  int axis = 0;
-  for (int k = 1; k < 3; ++k)
-    if (hi[k] - lo[k] > hi[axis] - lo[axis]) axis = k;
+  Extent box;
+  for (uint32_t i = begin; i < end; ++i) box.add(load3(centroid_[i].x));
+  const int axis = box.longest_axis();
   // Full leaves: the left half takes a multiple of the leaf's size.
   const uint32_t leaves = (end - begin + kLeaf - 1) / kLeaf, middle = begin + (leaves + 1) / 2 * kLeaf;
   std::nth_element(centroid_.begin() + begin, centroid_.begin() + middle, centroid_.begin() + end,

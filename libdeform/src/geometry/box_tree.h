@@ -30,6 +30,8 @@ inline double box_distance2(const Box &a, const Box &b) {
   return sum[0] + sum[1];
 }
 
+Box triangle_box(const uint32_t *corner, const double *x);  // x: [points,4]
+
 struct PairOfTriangles {
   uint32_t a, b;  // nodes of two trees
 };
@@ -153,27 +155,6 @@ void near_self_pairs(const BoxTree &tree, double margin, Array<PairOfTriangles> 
     } else {
       stack.push_back({i, j + 1});
       stack.push_back({i, n.right});
-    }
-  }
-}
-
-// Calls f(triangle) for all triangles whose boxes pass `near(const Box &)`.
-template <class N, class F>
-void near_triangles(const BoxTree &tree, Array<PairOfTriangles> &stack, N &&near, F &&f) {
-  if (tree.empty()) return;
-  stack.clear();
-  stack.push_back({0, 0});
-  while (!stack.empty()) {
-    const uint32_t i = stack.back().a;
-    stack.pop_back();
-    if (!near(tree.boxes()[i])) continue;
-    const BoxTree::Node n = tree.nodes()[i];
-    if (n.count) {
-      for (uint32_t p = n.right; p < n.right + n.count; ++p)
-        if (near(tree.triangle_boxes()[p])) f(tree.triangles()[p]);
-    } else {
-      stack.push_back({i + 1, 0});
-      stack.push_back({n.right, 0});
     }
   }
 }

@@ -16,9 +16,12 @@ inline constexpr double kConvex = 2e-5;
 
 // Sine of the fold at the positions x + ahead v, > 0 where the second face falls away from the first: -c0 .
 // r1 |e| / (|c0| |c1|), with r1 to the second face's far corner and c the faces' normals times twice their
-// areas. f(numerator, square of the denominator over |e|^2); not called for an open edge.
-template <class F>
-bool with_fold(const Surface &surface, uint32_t edge, double ahead, F &&f) {
+// areas. Not of an open edge.
+struct Fold {
+  double value, e2, size2;  // -c0 . r1, |e|^2, (|c0| |c1|)^2
+  bool clear() const { return value * value * e2 > kConvex * kConvex * size2; }
+};
+inline Fold fold_of(const Surface &surface, uint32_t edge, double ahead) {
   const uint32_t *ends = &surface.edge[2 * size_t{edge}], *tris = &surface.edge_tri[2 * size_t{edge}];
   const auto x = [&](uint32_t s) {
     return load3(&surface.x[4 * size_t{s}]) + ahead * load3(&surface.v[4 * size_t{s}]);
@@ -27,13 +30,9 @@ bool with_fold(const Surface &surface, uint32_t edge, double ahead, F &&f) {
     const uint32_t *c = &surface.tri[3 * size_t{t}];
     return c[0] + c[1] + c[2] - ends[0] - ends[1];
   };
-  const Vec3 from = x(ends[0]);
-  const Vec3 e = x(ends[1]) - from;
-  const Vec3 r0 = x(far_corner(tris[0])) - from;
-  const Vec3 r1 = x(far_corner(tris[1])) - from;
-  const Vec3 c0 = cross(e, r0), c1 = cross(r1, e);
-  const double fold = -dot(c0, r1);
-  return f(fold, fold * fold * norm2(e), norm2(c0) * norm2(c1));
+  const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r1 = x(far_corner(tris[1])) - from;
+  const Vec3 c0 = cross(e, x(far_corner(tris[0])) - from), c1 = cross(r1, e);
+  return {-dot(c0, r1), norm2(e), norm2(c0) * norm2(c1)};
 }
 inline bool edge_open(const Surface &surface, uint32_t edge) {
   return surface.edge_tri[2 * size_t{edge}] == kNone || surface.edge_tri[2 * size_t{edge} + 1] == kNone;
@@ -41,16 +40,14 @@ inline bool edge_open(const Surface &surface, uint32_t edge) {
 
 // An open edge counts as fully convex.
 inline bool edge_convex(const Surface &surface, uint32_t edge, double ahead = 0) {
-  return edge_open(surface, edge) ||
-         with_fold(surface, edge, ahead, [](double fold, double sine2, double one) {
-           return fold > 0 && sine2 > kConvex * kConvex * one;
-         });
+  if (edge_open(surface, edge)) return true;
+  const Fold fold = fold_of(surface, edge, ahead);
+  return fold.value > 0 && fold.clear();
 }
 inline bool edge_hollow(const Surface &surface, uint32_t edge, double ahead = 0) {
-  return !edge_open(surface, edge) &&
-         with_fold(surface, edge, ahead, [](double fold, double sine2, double one) {
-           return fold < 0 && sine2 > kConvex * kConvex * one;
-         });
+  if (edge_open(surface, edge)) return false;
+  const Fold fold = fold_of(surface, edge, ahead);
+  return fold.value < 0 && fold.clear();
 }
 
 // Is the unit direction d, which leaves the surface, in the cone of normals of this vertex? p + s e of an

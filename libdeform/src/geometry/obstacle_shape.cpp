@@ -113,28 +113,20 @@ double ObstacleShape::extent() const {
 }
 
 void ObstacleShape::bounds(double lo[3], double hi[3]) const {
-  if (view_.shape == Shape::voxels) {
-    const Vec3 half = 0.5 * (view_.grid->high() - view_.grid->low());
-    const Vec3 center = 0.5 * (view_.grid->high() + view_.grid->low());
-    for (int k = 0; k < 3; ++k) {
-      double c = view_.position[k], r = 0;
-      for (int i = 0; i < 3; ++i) {
-        c += axis_[i][k] * center[i];
-        r += std::fabs(axis_[i][k]) * half[i];
-      }
-      lo[k] = c - r;
-      hi[k] = c + r;
-    }
-    return;
-  }
+  const bool voxels = view_.shape == Shape::voxels, angular = voxels || view_.shape == Shape::box;
+  const Vec3 half = voxels ? 0.5 * (view_.grid->high() - view_.grid->low()) : view_.half_size;
+  const Vec3 center = voxels ? 0.5 * (view_.grid->high() + view_.grid->low()) : Vec3{};
   for (int k = 0; k < 3; ++k) {
-    double r = view_.radius;
-    if (view_.shape == Shape::box) {
-      r = 0;
-      for (int i = 0; i < 3; ++i) r += std::fabs(axis_[i][k]) * view_.half_size[i];
+    double r = angular ? 0 : view_.radius;
+    lo[k] = std::min(end_[0][k], end_[1][k]);
+    hi[k] = std::max(end_[0][k], end_[1][k]);
+    for (int i = 0; angular && i < 3; ++i) {
+      lo[k] += axis_[i][k] * center[i];
+      hi[k] += axis_[i][k] * center[i];
+      r += std::fabs(axis_[i][k]) * half[i];
     }
-    lo[k] = std::min(end_[0][k], end_[1][k]) - r;
-    hi[k] = std::max(end_[0][k], end_[1][k]) + r;
+    lo[k] -= r;
+    hi[k] += r;
   }
 }
 

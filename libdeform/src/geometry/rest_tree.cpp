@@ -1,5 +1,7 @@
 #include "geometry/rest_tree.h"
 
+#include "math/extent.h"
+
 namespace dfm {
 
 RestTree::RestTree(const Memory &memory, const Array<RestBox> &boxes)
@@ -14,22 +16,17 @@ RestTree::RestTree(const Memory &memory, const Array<RestBox> &boxes)
 
 uint32_t RestTree::build(uint32_t begin, uint32_t end) {
   const auto center = [&](uint32_t i, int axis) { return 0.5 * box_[i].lo[axis] + 0.5 * box_[i].hi[axis]; };
-  RestBox box = box_[item_[begin]], centers;
-  for (int k = 0; k < 3; ++k) centers.lo[k] = centers.hi[k] = center(item_[begin], k);
-  for (uint32_t i = begin; i < end; ++i)
-    for (int k = 0; k < 3; ++k) {
-      const RestBox &b = box_[item_[i]];
-      const double c = center(item_[i], k);
-      box.lo[k] = std::min(box.lo[k], b.lo[k]);
-      box.hi[k] = std::max(box.hi[k], b.hi[k]);
-      centers.lo[k] = std::min(centers.lo[k], c);
-      centers.hi[k] = std::max(centers.hi[k], c);
-    }
+  Extent box, centers;
+  for (uint32_t i = begin; i < end; ++i) {
+    const uint32_t own = item_[i];
+    box.add(box_[own].lo);
+    box.add(box_[own].hi);
+    centers.add({center(own, 0), center(own, 1), center(own, 2)});
+  }
   const uint32_t number = static_cast<uint32_t>(node_.size());
-  node_.push_back({box, begin, end, 0});
+  node_.push_back({{box.lo, box.hi}, begin, end, 0});
   if (end - begin <= kLeaf) return number;
-  const Vec3 size = centers.hi - centers.lo;
-  const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+  const int axis = centers.longest_axis();
   const uint32_t mid = begin + (end - begin) / 2;
   std::nth_element(item_.begin() + begin, item_.begin() + mid, item_.begin() + end,
                    [&](uint32_t i, uint32_t j) {

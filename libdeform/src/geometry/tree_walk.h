@@ -113,4 +113,13 @@ bool walk(const BoxTree &tree, N &&near, F &&f) {
   return true;
 }
 
+// f(triangle) for all of them.
+template <class N, class F>
+void near_triangles(const BoxTree &tree, N &&near, F &&f) {
+  walk(tree, near, [&](uint32_t place) {
+    f(tree.triangles()[place]);
+    return true;
+  });
+}
+
 }  // namespace dfm

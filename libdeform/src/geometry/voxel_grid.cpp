@@ -7,6 +7,7 @@
 #include "geometry/rest_tree.h"
 #include "geometry/surface.h"
 #include "geometry/winding.h"
+#include "math/extent.h"
 
 namespace dfm {
 namespace {
@@ -60,15 +61,9 @@ class Distances {
     Array<RestBox> boxes{HookAllocator<RestBox>(memory)};
     boxes.reserve(ntri);
     for (uint32_t t = 0; t < ntri; ++t) {
-      RestBox b{load3(points + 3 * size_t{tris[3 * size_t{t}]}),
-                load3(points + 3 * size_t{tris[3 * size_t{t}]})};
-      for (int i = 1; i < 3; ++i)
-        for (int k = 0; k < 3; ++k) {
-          const double x = points[3 * size_t{tris[3 * size_t{t} + i]} + k];
-          b.lo[k] = std::min(b.lo[k], x);
-          b.hi[k] = std::max(b.hi[k], x);
-        }
-      boxes.push_back(b);
+      Extent b;
+      for (size_t i = 0; i < 3; ++i) b.add(load3(points + 3 * size_t{tris[3 * size_t{t} + i]}));
+      boxes.push_back({b.lo, b.hi});
     }
     return boxes;
   }
@@ -111,13 +106,10 @@ void add_signs(uint32_t nx, uint32_t ny, uint32_t nz, double step, const Distanc
 VoxelGrid::VoxelGrid(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris,
                      uint32_t cells) {
   use_memory(memory, brick_, value_, coarse_);
-  low_ = high_ = load3(points + 3 * size_t{tris[0]});
-  for (size_t i = 0; i < 3 * size_t{ntri}; ++i)
-    for (int k = 0; k < 3; ++k) {
-      const double x = points[3 * size_t{tris[i]} + k];
-      low_[k] = std::min(low_[k], x);
-      high_[k] = std::max(high_[k], x);
-    }
+  Extent box;
+  for (size_t i = 0; i < 3 * size_t{ntri}; ++i) box.add(load3(points + 3 * size_t{tris[i]}));
+  low_ = box.lo;
+  high_ = box.hi;
   const Vec3 size = high_ - low_;
   // Cubes: halved until so many fill the box (no libm root, so that the grid is the same everywhere).
   double small = 0, large = std::max({size.x, size.y, size.z});

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "math/extent.h"
+
 namespace dfm {
 namespace {
 
@@ -87,14 +89,9 @@ uint32_t WindingTree::build(const double *points, const uint32_t *tris, Array<Ve
       for (int k = 0; k < 3; ++k)
         corners_.push_back(load3(points + 3 * size_t(tris[3 * size_t(order[i]) + k])));
   } else {
-    Vec3 lo = centers[order[begin]], hi = lo;
-    for (uint32_t i = begin; i < end; ++i)
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min(lo[k], centers[order[i]][k]);
-        hi[k] = std::max(hi[k], centers[order[i]][k]);
-      }
-    const Vec3 size = hi - lo;
-    const int axis = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    Extent box;
+    for (uint32_t i = begin; i < end; ++i) box.add(centers[order[i]]);
+    const int axis = box.longest_axis();
     const uint32_t middle = begin + (end - begin) / 2;
     std::nth_element(
         order.begin() + begin, order.begin() + middle, order.begin() + end, [&](uint32_t i, uint32_t j) {

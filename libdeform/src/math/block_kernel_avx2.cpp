@@ -1,14 +1,5 @@
 // Four doubles in one register.
-#include <stdint.h>
-
-namespace dfm {
-namespace {
-constexpr uint32_t kWidth = 4;
-}
-}  // namespace dfm
-
+#define DEFORM_WIDTH 4
 #include "block_kernel_lanes.h"
 
-namespace dfm {
-const BlockKernels &block_kernels_avx2() { return kKernels; }
-}  // namespace dfm
+const dfm::BlockKernels &dfm::block_kernels_avx2() { return kKernels; }

@@ -1,4 +1,4 @@
-// The loops of block_kernel.h for vectors of kWidth (2 or 4) doubles, which the including file defines.
+// The loops of block_kernel.h for vectors of kWidth (2 or 4) doubles.
 #pragma once
 #include "block_kernel.h"
 #include "kernel_vector.h"

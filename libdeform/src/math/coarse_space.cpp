@@ -19,10 +19,7 @@ constexpr double kRidge = 1e-9;
 
 // a [w]x and [w]x^T a, where [w]x u = w x u; a row-major
 void times_cross(const double *a, const double *w, double *out) {
-  for (uint32_t r = 0; r < 3; ++r) {
-    const Vec3 row = load3(a + 3 * r);
-    store3(out + 3 * r, cross(row, load3(w)));
-  }
+  for (uint32_t r = 0; r < 3; ++r) store3(out + 3 * r, cross(load3(a + 3 * r), load3(w)));
 }
 
 void transpose(const double *a, double *out) {
@@ -147,15 +144,11 @@ void CoarseSpace::assemble(const BlockPattern &pattern, const double *blk) {
   std::fill(blk_.begin(), blk_.end(), 0.0);
   for (uint32_t b = 0; b < pattern.nb; ++b) {
     uint32_t i = pattern.ij[2 * size_t{b}], j = pattern.ij[2 * size_t{b} + 1];
+    const bool own = i == j, swapped = patch_[i] > patch_[j];
     double a[9];
-    std::copy(blk + 9 * size_t{b}, blk + 9 * size_t{b} + 9, a);
-    const bool own = i == j;
-    if (patch_[i] > patch_[j]) {
-      double t[9];
-      transpose(a, t);
-      std::copy(t, t + 9, a);
-      std::swap(i, j);
-    }
+    if (swapped) transpose(blk + 9 * size_t{b}, a);
+    else std::copy_n(blk + 9 * size_t{b}, 9, a);
+    if (swapped) std::swap(i, j);
     for (uint32_t r = 0; r < 3; ++r)
       for (uint32_t c = 0; c < 3; ++c) a[3 * r + c] *= free_[3 * size_t{i} + r] * free_[3 * size_t{j} + c];
     const double *const left = &arm_[3 * size_t{i}], *const right = &arm_[3 * size_t{j}];

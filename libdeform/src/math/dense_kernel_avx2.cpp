@@ -1,17 +1,5 @@
 // Four doubles in one register.
-#include <stdint.h>
-
-namespace dfm {
-namespace {
-constexpr uint32_t kWidth = 4;
-}
-}  // namespace dfm
-
+#define DEFORM_WIDTH 4
 #include "dense_kernel_lanes.h"
 
-namespace dfm {
-namespace {
-constexpr DenseKernels kKernels = DEFORM_DENSE_KERNELS("avx2");
-}
-const DenseKernels &dense_kernels_avx2() { return kKernels; }
-}  // namespace dfm
+const dfm::DenseKernels &dfm::dense_kernels_avx2() { return kKernels; }

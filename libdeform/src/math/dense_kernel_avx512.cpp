@@ -1,17 +1,5 @@
 // Eight doubles in one register.
-#include <stdint.h>
-
-namespace dfm {
-namespace {
-constexpr uint32_t kWidth = 8;
-}
-}  // namespace dfm
-
+#define DEFORM_WIDTH 8
 #include "dense_kernel_lanes.h"
 
-namespace dfm {
-namespace {
-constexpr DenseKernels kKernels = DEFORM_DENSE_KERNELS("avx512");
-}
-const DenseKernels &dense_kernels_avx512() { return kKernels; }
-}  // namespace dfm
+const dfm::DenseKernels &dfm::dense_kernels_avx512() { return kKernels; }

@@ -1,4 +1,4 @@
-// The loops of dense_kernel.h for vectors of kWidth doubles, which the including file defines.
+// The loops of dense_kernel.h for vectors of kWidth doubles.
 #pragma once
 #include "dense_kernel.h"
 #include "kernel_vector.h"
@@ -274,8 +274,18 @@ void add_three(size_t n, const double *a, const double p[3], double *y) {
   for (; i < n; ++i) y[i] += (a[i] * p[0] + b[i] * p[1]) + c[i] * p[2];
 }
 
+constexpr DenseKernels kKernels = {kWidth == 2   ? "sse2"
+                                   : kWidth == 4 ? "avx2"
+                                                 : "avx512",
+                                   factor,
+                                   pack,
+                                   update,
+                                   forward,
+                                   backward,
+                                   forward_one,
+                                   backward_one,
+                                   gram,
+                                   add_three};
+
 }  // namespace
 }  // namespace dfm
-
-#define DEFORM_DENSE_KERNELS(name) \
-  {name, factor, pack, update, forward, backward, forward_one, backward_one, gram, add_three}

@@ -1,17 +1,5 @@
 // Two doubles in one register.
-#include <stdint.h>
-
-namespace dfm {
-namespace {
-constexpr uint32_t kWidth = 2;
-}
-}  // namespace dfm
-
+#define DEFORM_WIDTH 2
 #include "dense_kernel_lanes.h"
 
-namespace dfm {
-namespace {
-constexpr DenseKernels kKernels = DEFORM_DENSE_KERNELS("sse2");
-}
-const DenseKernels &dense_kernels_sse2() { return kKernels; }
-}  // namespace dfm
+const dfm::DenseKernels &dfm::dense_kernels_sse2() { return kKernels; }

@@ -10,15 +10,17 @@ namespace dfm {
 struct Extent {
   Vec3 lo{HUGE_VAL, HUGE_VAL, HUGE_VAL}, hi{-HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
   void add(Vec3 x) {
-    for (int k = 0; k < 3; ++k) {
-      lo[k] = std::min(lo[k], x[k]);
-      hi[k] = std::max(hi[k], x[k]);
-    }
+    lo = {std::min(lo.x, x.x), std::min(lo.y, x.y), std::min(lo.z, x.z)};
+    hi = {std::max(hi.x, x.x), std::max(hi.y, x.y), std::max(hi.z, x.z)};
   }
   // Along an axis; 0 without points.
   double longest() const {
     const Vec3 size = hi - lo;
     return std::max({0.0, size.x, size.y, size.z});
+  }
+  int longest_axis() const {  // the first of equal ones
+    const Vec3 size = hi - lo;
+    return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
   }
   void grow(Vec3 by) {
     lo = lo - by;
@@ -31,5 +33,13 @@ struct Extent {
     return true;
   }
 };
+
+// Of points [n,3].
+template <class Points>
+Extent extent_of(const Points &points) {
+  Extent box;
+  for (size_t i = 0; i < points.size(); i += 3) box.add(load3(&points[i]));
+  return box;
+}
 
 }  // namespace dfm

@@ -1,6 +1,7 @@
-// Vectors of kWidth doubles, which the including file defines, for kernels that are compiled for several
-// widths. Internal linkage only.
+// Vectors of DEFORM_WIDTH doubles, which the including file defines, for kernels that are compiled for
+// several widths. Internal linkage only.
 #pragma once
+#include <stdint.h>
 
 #define DEFORM_INLINE static inline __attribute__((always_inline))
 // Unrolls loops over lanes and registers: the compiler keeps arrays of vectors in registers only if no loop
@@ -13,6 +14,8 @@
 
 namespace dfm {
 namespace {
+
+constexpr uint32_t kWidth = DEFORM_WIDTH;
 
 typedef double Vector __attribute__((vector_size(8 * kWidth)));
 typedef double Unaligned __attribute__((vector_size(8 * kWidth), aligned(8), may_alias));

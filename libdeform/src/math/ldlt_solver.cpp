@@ -26,7 +26,7 @@ size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
 LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks)
     : kernels_(dense_kernels()), tasks_(tasks), nodes_(memory) {
-  use_memory(memory, entry_begin_, waiting_, row_, column_, fresh_, below_, reach_begin_, reach_);
+  use_memory(memory, entry_begin_, waiting_, row_, column_, fresh_, reach_begin_, reach_);
   use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_);
   use_memory(memory, root_, reached_, product_);
   use_memory(memory, entry_);
@@ -76,7 +76,6 @@ void LdltSolver::find_places(const BlockPattern &pattern) {
   left_.resize(pack);
   right_.resize(pack);
   value_.resize(nodes_.value_begin[ns]);
-  below_.reserve(ns);
   stack_.resize(nodes_.stack);
   for (Array<double> *v : {&pivot_, &inverse_, &root_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
   column_.assign(n_, Supernodes::kNone);
@@ -181,17 +180,6 @@ bool LdltSolver::factor(const double *blk) {
   return ready_ = true;
 }
 
-template <class F>
-void LdltSolver::each(uint32_t count, F &&f) const {
-  if (!tasks_ || count < 2) {
-    for (uint32_t k = 0; k < count; ++k) f(k);
-    return;
-  }
-  tasks_->parallel_for(count, 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t k = begin; k < end; ++k) f(k);
-  });
-}
-
 void LdltSolver::solve_one(const double *b, double *x) {
   const size_t rows = 3 * size_t{n_};
   panels_.resize(std::max(panels_.size(), 2 * rows));
@@ -242,8 +230,8 @@ bool LdltSolver::solve(uint32_t nrhs, const double *b, double *x, double, SolveI
   const uint32_t npanel = (nrhs + kLanes - 1) / kLanes, together = std::min(npanel, slots());
   panels_.resize(std::max(panels_.size(), together * rows * kLanes));
   for (uint32_t first = 0; first < npanel; first += together)
-    each(std::min(together, npanel - first), [&](uint32_t slot) {
-      const size_t column = (size_t{first} + slot) * kLanes;
+    each_on(tasks_, std::min(together, npanel - first), 1, [&](size_t slot) {
+      const size_t column = (first + slot) * kLanes;
       solve_panel(uint32_t(std::min<size_t>(kLanes, nrhs - column)), b + column * rows, x + column * rows,
                   panels_.data() + slot * rows * kLanes);
     });
@@ -342,11 +330,11 @@ void LdltSolver::learn() {
   const uint32_t count = uint32_t(reach_begin_.size() - 1), together = std::min(count - first, slots());
   panels_.resize(std::max(panels_.size(), together * rows * kLanes));
   for (uint32_t p = first; p < count; p += together)
-    each(std::min(together, count - p),
-         [&](uint32_t slot) { forward_reached(p + slot, panels_.data() + slot * rows * kLanes); });
+    each_on(tasks_, std::min(together, count - p), 1,
+            [&](size_t slot) { forward_reached(p + uint32_t(slot), panels_.data() + slot * rows * kLanes); });
   product_.resize(size_t{count} * (count + 1) / 2 * kLanes * kLanes);
-  each(count - first, [&](uint32_t k) {
-    const uint32_t p = first + k;
+  each_on(tasks_, count - first, 1, [&](size_t k) {
+    const auto p = uint32_t(first + k);
     double *const tiles = &product_[size_t{p} * (p + 1) / 2 * kLanes * kLanes];
     for (uint32_t q = 0; q <= p; ++q) gram(p, q, tiles + size_t{q} * kLanes * kLanes);
   });
@@ -369,16 +357,16 @@ bool LdltSolver::restricted(uint32_t nsel, const uint32_t *sel, double, double *
   }
   if (!fresh_.empty()) learn();
   const size_t wide = 3 * size_t{nsel};
-  each(nsel, [&](uint32_t i) {
-    for (uint32_t j = 0; j <= i; ++j)
+  each_on(tasks_, nsel, 1, [&](size_t i) {
+    for (size_t j = 0; j <= i; ++j)
       for (size_t a = 0; a < 3; ++a)
         for (size_t b = 0; b < 3; ++b) {
           size_t p = column_[sel[i]] + a, q = column_[sel[j]] + b;
           if (p < q) std::swap(p, q);
           const size_t r = p / kLanes, c = q / kLanes;
           const double value = product_[((r * (r + 1) / 2 + c) * kLanes + p % kLanes) * kLanes + q % kLanes];
-          w[(3 * size_t{i} + a) * wide + 3 * size_t{j} + b] = value;
-          w[(3 * size_t{j} + b) * wide + 3 * size_t{i} + a] = value;
+          w[(3 * i + a) * wide + 3 * j + b] = value;
+          w[(3 * j + b) * wide + 3 * i + a] = value;
         }
   });
   return true;

@@ -37,8 +37,6 @@ class LdltSolver final : public LinearSolver {
   void find_reach(uint32_t first);
   void forward_reached(uint32_t p, double *panel);
   void gram(uint32_t p, uint32_t q, double *sum) const;
-  template <class F>
-  void each(uint32_t count, F &&f) const;  // calls f(0) ... f(count - 1), on all threads
   uint32_t slots() const { return tasks_ ? 2 * tasks_->threads() : 1; }
 
   const DenseKernels &kernels_;
@@ -62,7 +60,6 @@ class LdltSolver final : public LinearSolver {
   Array<uint32_t> row_;     // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
   Array<uint32_t> column_;  // [n] first column of a point, kNone
   Array<uint32_t> fresh_;   // scratch: points that are not known yet
-  Array<uint32_t> below_;   // scratch: [supernodes] selected points in the subtree
   Array<double> root_;      // 1/sqrt(D)
   Array<uint32_t> reach_begin_, reach_;  // supernodes that a panel reaches
   Array<size_t> reached_begin_;

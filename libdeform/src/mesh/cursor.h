@@ -19,6 +19,17 @@ namespace dfm {
 inline long long ll(int64_t n) { return n; }
 inline unsigned long long ull(uint64_t n) { return n; }
 
+inline constexpr uint32_t kMaxPoints = UINT32_MAX - 1;
+
+// Types of the numbers in arrays; in text all are words.
+enum class Number : uint8_t { f32, f64, i8, u8, i16, u16, i32, u32, i64, u64, text, bit };
+constexpr size_t bytes_of(Number type) {  // 0 for text and bit
+  constexpr uint8_t kBytes[] = {4, 8, 1, 1, 2, 2, 4, 4, 8, 8, 0, 0};
+  return kBytes[size_t(type)];
+}
+constexpr bool is_whole(Number type) { return type >= Number::i8 && type <= Number::u64; }
+constexpr bool is_real(Number type) { return type <= Number::f64; }
+
 class Cursor {
  public:
   Cursor(const std::string &path, const char *begin, size_t bytes)
@@ -80,22 +91,14 @@ class Cursor {
   // A word of this file as a number.
   int64_t to_integer(std::string_view text, const char *what) {
     int64_t value = 0;
-    const char *from = text.data(), *to = from + text.size();
-    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
-    const auto result = std::from_chars(from, to, value);
-    if (text.empty() || result.ec != std::errc() || result.ptr != to)
-      refuse_word(text, what, "a whole number");
+    if (parse(text, value) != std::errc()) refuse_word(text, what, "a whole number");
     return value;
   }
   double to_real(std::string_view text, const char *what) {
     double value = 0;
-    const char *from = text.data(), *to = from + text.size();
-    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
-    const auto result = std::from_chars(from, to, value);
-    const bool underflow = result.ec == std::errc::result_out_of_range && below_one(text);
-    if (underflow) value = 0;
-    if (text.empty() || result.ptr != to || (result.ec != std::errc() && !underflow) || !std::isfinite(value))
-      refuse_word(text, what, "a finite number");
+    const std::errc error = parse(text, value);
+    if (error == std::errc::result_out_of_range && below_one(text)) return 0;
+    if (error != std::errc() || !std::isfinite(value)) refuse_word(text, what, "a finite number");
     return value;
   }
   // The next word of this line; empty at its end, which stays unread. A backslash before a line end
@@ -135,6 +138,25 @@ class Cursor {
     if (claimed > 0 && uint64_t(claimed) <= (left() + 1) / (2 * words_each)) return uint64_t(claimed);
     return count(claimed, 2 * words_each, what);
   }
+  // A promised number of what 32 bits can name.
+  uint32_t small(uint64_t n, const char *what) const {
+    if (n > kMaxPoints) unsupported("%llu %s; up to %u are read", ull(n), what, kMaxPoints);
+    return static_cast<uint32_t>(n);
+  }
+
+  // ---- text or binary ----
+  // The next number of an array; real() is finite.
+  double real(Number type, const char *what);
+  int64_t integer(Number type, const char *what);
+  // As count(), of what takes so many numbers each.
+  uint64_t count(int64_t claimed, size_t numbers_each, Number type, const char *what) const {
+    return binary ? count(claimed, numbers_each * bytes_of(type), what)
+                  : text_count(claimed, numbers_each, what);
+  }
+  // Binary data start right after the line end that closes the text before them.
+  void begin_data(const char *after) {
+    if (binary) end_line(after);
+  }
 
   // ---- binary ----
   template <class T>
@@ -162,7 +184,6 @@ class Cursor {
     if (left() < bytes) refuse("the file ends inside %s", what);
     p_ += bytes;
   }
-  // Binary data start right after the line end that closes the text before them.
   void end_line(const char *after) {
     while (p_ < end_ && (*p_ == ' ' || *p_ == '\t' || *p_ == '\r')) ++p_;
     if (p_ == end_ || *p_ != '\n') refuse("expected a line end after %s", after);
@@ -181,6 +202,14 @@ class Cursor {
  private:
   static bool is_space(char c) {
     return c == ' ' || c == '\n' || c == '\t' || c == '\r' || c == '\v' || c == '\f';
+  }
+  // The whole word as a number, which may begin with a plus.
+  template <class T>
+  static std::errc parse(std::string_view text, T &value) {
+    const char *from = text.data(), *const to = from + text.size();
+    if (text.size() > 1 && *from == '+' && from[1] != '-') ++from;
+    const auto [end, error] = std::from_chars(from, to, value);
+    return end == to ? error : std::errc::invalid_argument;
   }
   // Whether an out-of-range decimal is too small rather than too large.
   static bool below_one(std::string_view text) {

@@ -113,6 +113,11 @@ struct Filling {
   explicit Filling(const Memory &memory) { use_memory(memory, keys, share, loose, tets, sites); }
   Array<Site> keys;  // cells in the order of their keys
   Array<double> share, loose;
+  void add(Site key, double its_share, double its_loose) {
+    keys.push_back(key);
+    share.push_back(its_share);
+    loose.push_back(its_loose);
+  }
   Array<uint32_t> tets;
   Array<Site> sites;  // of the points
   size_t size() const { return keys.size(); }
@@ -153,11 +158,7 @@ Filling arrange(const FillSurface &surface, const FillCover &cover, const FillSh
   std::sort(order.begin(), order.end(),
             [&](uint32_t i, uint32_t j) { return cover.cells[i] < cover.cells[j]; });
   Filling out(memory);
-  for (const uint32_t i : order) {
-    out.keys.push_back(unpack(cover.cells[i]));
-    out.share.push_back(shares.share[i]);
-    out.loose.push_back(shares.loose[i]);
-  }
+  for (const uint32_t i : order) out.add(unpack(cover.cells[i]), shares.share[i], shares.loose[i]);
   return out;
 }
 
@@ -172,8 +173,6 @@ void number_points(const Memory &memory, Filling &f) {
   const Array<uint64_t> all = sites;
   std::sort(sites.begin(), sites.end());
   sites.erase(std::unique(sites.begin(), sites.end()), sites.end());
-  f.tets.clear();
-  f.sites.clear();
   for (const uint64_t s : all)
     f.tets.push_back(uint32_t(std::lower_bound(sites.begin(), sites.end(), s) - sites.begin()));
   for (const uint64_t s : sites) f.sites.push_back(unpack(s));
@@ -186,19 +185,14 @@ uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
   for (size_t i = 0; i < f.tets.size(); ++i) pieces.join(f.tets[i], f.tets[i / 4 * 4]);
   Array<double> material(f.sites.size(), 0.0, HookAllocator<double>(memory));
   for (size_t c = 0; c < f.size(); ++c) material[pieces.root(f.tets[4 * c])] += f.share[c];
-  size_t kept = 0;
+  Filling kept(memory);
   for (size_t c = 0; c < f.size(); ++c)
-    if (material[pieces.root(f.tets[4 * c])] > 0) {
-      f.keys[kept] = f.keys[c];
-      f.share[kept] = f.share[c];
-      f.loose[kept] = f.loose[c];
-      ++kept;
-    }
-  const auto dropped = uint32_t(f.size() - kept);
-  f.keys.resize(kept);
-  f.share.resize(kept);
-  f.loose.resize(kept);
-  if (dropped) number_points(memory, f);
+    if (material[pieces.root(f.tets[4 * c])] > 0) kept.add(f.keys[c], f.share[c], f.loose[c]);
+  const auto dropped = uint32_t(f.size() - kept.size());
+  if (dropped) {
+    number_points(memory, kept);
+    f = std::move(kept);
+  }
   return dropped;
 }
 

@@ -10,6 +10,7 @@
 #include "core/disjoint_sets.h"
 #include "math/extent.h"
 #include "mesh/fill_lattice.h"
+#include "mesh/topology_tri.h"
 
 namespace dfm {
 namespace {
@@ -78,14 +79,9 @@ class PieceTest {
   uint64_t work() const { return work_; }
 
   bool run(const Vec3 corner[3], uint32_t triangle) {
-    Vec3 lo = corner[0], hi = lo;
-    for (int i = 1; i < 3; ++i)
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min(lo[k], corner[i][k]);
-        hi[k] = std::max(hi[k], corner[i][k]);
-      }
-    const Vec3 size = hi - lo;
-    if (std::max({size.x, size.y, size.z}) > kLongestPiece) {  // split at the longest edge
+    Extent box;
+    for (int i = 0; i < 3; ++i) box.add(corner[i]);
+    if (box.longest() > kLongestPiece) {  // split at the longest edge
       int k = 0;
       for (int i = 1; i < 3; ++i)
         if (norm2(corner[(i + 1) % 3] - corner[i]) > norm2(corner[(k + 1) % 3] - corner[k])) k = i;
@@ -95,7 +91,7 @@ class PieceTest {
     }
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b)
-        if (a != b && !run_axes(corner, triangle, lo, hi, a, b)) return false;
+        if (a != b && !run_axes(corner, triangle, box.lo, box.hi, a, b)) return false;
     return true;
   }
 
@@ -157,21 +153,13 @@ void FillSurface::measure_openings() {
     int32_t way;
   };
   Array<Edge> edges{HookAllocator<Edge>(memory)};
-  edges.reserve(tris.size());
-  for (size_t i = 0; i < tris.size(); ++i) {
-    const uint32_t a = tris[i], b = tris[i % 3 == 2 ? i - 2 : i + 1];
-    edges.push_back(a < b ? Edge{a, b, 1} : Edge{b, a, -1});
-  }
-  std::sort(edges.begin(), edges.end(),
-            [](const Edge &e, const Edge &f) { return e.a != f.a ? e.a < f.a : e.b < f.b; });
-  size_t kept = 0;
-  for (size_t i = 0, j; i < edges.size(); i = j) {
+  const Array<TriEdge> all = sorted_edges(memory, uint32_t(tris.size() / 3), tris.data());
+  for (size_t i = 0, j; i < all.size(); i = j) {
+    const auto low = uint32_t(all[i].key >> 32), high = uint32_t(all[i].key);
     int32_t way = 0;
-    for (j = i; j < edges.size() && edges[j].a == edges[i].a && edges[j].b == edges[i].b; ++j)
-      way += edges[j].way;
-    if (way != 0) edges[kept++] = {edges[i].a, edges[i].b, way};
+    for (j = i; j < all.size() && all[j].key == all[i].key; ++j) way += tris[all[j].half] == low ? 1 : -1;
+    if (way != 0) edges.push_back({low, high, way});
   }
-  edges.resize(kept);
   closed = edges.empty();
   if (closed) return;
   DisjointSets loops(memory, uint32_t(points.size() / 3));
@@ -183,18 +171,17 @@ void FillSurface::measure_openings() {
   for (size_t i = 0, j; i < edges.size(); i = j) {
     const uint32_t loop = loops.root(edges[i].a);
     const Vec3 origin = load3(&points[3 * size_t(loop)]);
-    Vec3 patch, lo = origin, hi = origin;
+    Vec3 patch;
+    Extent box;
     for (j = i; j < edges.size() && loops.root(edges[j].a) == loop; ++j) {
       const Vec3 a = load3(&points[3 * size_t(edges[j].a)]), b = load3(&points[3 * size_t(edges[j].b)]);
       patch += (0.5 * edges[j].way) * cross(a - origin, b - origin);
-      for (int k = 0; k < 3; ++k) {
-        lo[k] = std::min({lo[k], a[k], b[k]});
-        hi[k] = std::max({hi[k], a[k], b[k]});
-      }
+      box.add(a);
+      box.add(b);
     }
     ++openings;
     opening_area += norm(patch);
-    opening_width = std::max(opening_width, norm(hi - lo));
+    opening_width = std::max(opening_width, norm(box.hi - box.lo));
   }
 }
 

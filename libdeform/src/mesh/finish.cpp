@@ -247,6 +247,7 @@ std::string coarse_coordinates(const double lo[3], const double hi[3], double ed
 
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   TetMesh mesh(*raw.memory);
+  mesh.warnings = std::move(raw.warnings);
   if (raw.tets.empty() && !raw.tris.empty())
     fail(DFM_E_FORMAT,
          "%s: no tetrahedra in this file, only a surface of %u triangles; fill it, and give it to the body "

@@ -66,8 +66,7 @@ class Orienter {
         flip_(ntri_, 0, HookAllocator<uint8_t>(memory)),
         patch_of_(ntri_, UINT32_MAX, HookAllocator<uint32_t>(memory)),
         order_(HookAllocator<uint32_t>(memory)) {
-    Extent box;
-    for (size_t p = 0; p < points.size(); p += 3) box.add(load3(&points[p]));
+    const Extent box = extent_of(points);
     origin_ = box.lo;
     scale_ = 1 / box.longest();
   }
@@ -201,9 +200,10 @@ class Orienter {
   // them is outside.
   std::vector<Vec3> samples(const Patch &p) const {
     constexpr uint32_t kBetween = 6;
-    uint32_t end[6] = {order_[p.begin], order_[p.begin], order_[p.begin],
-                       order_[p.begin], order_[p.begin], order_[p.begin]};
-    double best[6] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
+    uint32_t end[6];
+    double best[6];
+    std::fill_n(end, 6, order_[p.begin]);
+    std::fill_n(best, 6, HUGE_VAL);
     const auto middle = [&](uint32_t t) {
       const Corners c = corners(t);
       return (1.0 / 3) * (c.a + c.b + c.c);

@@ -427,6 +427,7 @@ void add_warnings(TriMesh &mesh, const Repairs &done) {
 
 TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
   TriMesh mesh(*raw.memory);
+  mesh.warnings = std::move(raw.warnings);
   if (raw.tris.empty() && raw.tets.empty())
     fail(DFM_E_FORMAT,
          "%s: no triangles in this file; a surface needs triangles, or polygons to cut into them",

@@ -30,15 +30,17 @@ Vec3 unit_on_circle(double angle) {
   return {c, angle * s, 0};
 }
 
-Vec3 unit_on_circle(uint64_t i, uint64_t n) {
-  static constexpr double half = 0.5, third = 1.0471975511965977462;  // pi/3
-  static const double root = std::sqrt(3.0) / 2;
+Vec3 turned_by_sixths(Vec3 u, uint64_t sixths) {
+  static const double half = 0.5, root = std::sqrt(3.0) / 2;
   static const double turn[6][2] = {{1, 0},  {half, root},   {-half, root},
                                     {-1, 0}, {-half, -root}, {half, -root}};
+  const double c = turn[sixths][0], s = turn[sixths][1];
+  return {c * u.x - s * u.y, s * u.x + c * u.y, 0};
+}
+
+Vec3 unit_on_circle(uint64_t i, uint64_t n) {
   const uint64_t sextant = 6 * (i % n) / n;
-  const Vec3 u = unit_on_circle(third * (double(6 * (i % n) - sextant * n) / double(n)));
-  return {turn[sextant][0] * u.x - turn[sextant][1] * u.y, turn[sextant][1] * u.x + turn[sextant][0] * u.y,
-          0};
+  return turned_by_sixths(unit_on_circle(kSixth * (double(6 * (i % n) - sextant * n) / double(n))), sextant);
 }
 
 Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t j, uint32_t n) {
@@ -106,8 +108,7 @@ Grid choose_grid(const double size[3], uint32_t cells) {
   const double cubes = std::max(1.0, cells / 12.0);
   const double shortest = std::min({size[0], size[1], size[2]});
   double edge = std::cbrt(size[0] * (size[1] * (size[2] / cubes)));
-  Grid best{};
-  double best_score = HUGE_VAL;
+  Best<Grid> best;
   for (int finer = 0; finer == 0 || (finer < 64 && edge > 0.5 * shortest); ++finer, edge *= 0.9)
     for (int up = 0; up < 8; ++up) {
       Grid g{};
@@ -116,15 +117,11 @@ Grid choose_grid(const double size[3], uint32_t cells) {
       const double count = double(g.n[0]) * g.n[1] * g.n[2];
       const double h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
       if (count > kMostCells / 12) continue;
-      const double s =
-          choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes);
-      if (s < best_score) {
-        best_score = s;
-        best = g;
-      }
+      best.offer(choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes), g);
     }
-  check_choice("beam", best_score < HUGE_VAL ? 12.0 * best.n[0] * best.n[1] * best.n[2] : HUGE_VAL, cells);
-  return best;
+  const uint32_t *const n = best.choice.n;
+  check_choice("beam", best.score < HUGE_VAL ? 12.0 * n[0] * n[1] * n[2] : HUGE_VAL, cells);
+  return best.choice;
 }
 
 // ---- ball -------------------------------------------------------------------------------------------------
@@ -257,30 +254,25 @@ struct Disc {  // triangular lattice in rings
 
 // Tries every number of rings, with the layers that give the number of cells, with those that give near-equal
 // edges, and with the nearest to the first that keep edges within 2:1.
-void choose_rings(double radius, double length, uint32_t cells, uint32_t *rings, uint32_t *layers) {
-  double best = HUGE_VAL;
+std::array<uint32_t, 2> choose_rings(double radius, double length, uint32_t cells) {
+  Best<std::array<uint32_t, 2>> best{{1, 1}};
   for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n) {
     const double asked = cells / (18.0 * n * n), even = length * n / radius;
     for (const double wanted : {asked, even, std::clamp(asked, even / 2, 2 * even)}) {
       if (wanted > kMostCells / (18.0 * n * n)) continue;
       const uint32_t m = rounded(wanted);
-      const double s = choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells);
-      if (s < best) {
-        best = s;
-        *rings = n;
-        *layers = m;
-      }
+      best.offer(choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells), {n, m});
     }
   }
-  check_choice("cylinder", best < HUGE_VAL ? 18.0 * *rings * *rings * *layers : HUGE_VAL, cells);
+  const auto [n, m] = best.choice;
+  check_choice("cylinder", best.score < HUGE_VAL ? 18.0 * n * n * m : HUGE_VAL, cells);
+  return best.choice;
 }
 
 }  // namespace
 
 TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
-  check_size("beam's x size", x);
-  check_size("beam's y size", y);
-  check_size("beam's z size", z);
+  check_beam(x, y, z);
   check_cells(cells);
   const double size[3] = {x, y, z};
   const Grid g = choose_grid(size, cells);
@@ -328,48 +320,39 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
 }
 
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
-  check_size("cylinder's radius", radius);
-  check_size("cylinder's length", length);
+  check_cylinder(radius, length);
   check_cells(cells);
-  uint32_t n = 1, m = 1;
-  choose_rings(radius, length, cells, &n, &m);
+  const auto [n, m] = choose_rings(radius, length, cells);
   const Disc disc{n};
   TetMesh mesh(memory);
   // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions,
   // difference modulo 3).
   static constexpr int kAxial[7][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}, {1, 0}};
-  const double half = 0.5, root = std::sqrt(3.0) / 2, third = 1.0471975511965977462;  // pi/3
-  const double turn[6][2] = {{1, 0}, {half, root}, {-half, root}, {-1, 0}, {-half, -root}, {half, -root}};
   std::vector<Vec3> flat{{}};
   std::vector<int> color{0};
   for (int k = 1; k <= int(n); ++k)
     for (int s = 0; s < 6; ++s)
       for (int t = 0; t < k; ++t) {
-        const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(third * (double(t) / k));
-        flat.push_back({turn[s][0] * u.x - turn[s][1] * u.y, turn[s][1] * u.x + turn[s][0] * u.y, 0});
+        const Vec3 u = (radius * (double(k) / n)) * unit_on_circle(kSixth * (double(t) / k));
+        flat.push_back(turned_by_sixths(u, uint64_t(s)));
         const int q = (k - t) * kAxial[s][0] + t * kAxial[s + 1][0];
         const int r = (k - t) * kAxial[s][1] + t * kAxial[s + 1][1];
         color.push_back(((q - r) % 3 + 3) % 3);
       }
   for (uint32_t layer = 0; layer <= m; ++layer)
     for (const Vec3 &p : flat) add_point(mesh, {p.x, p.y, length * (double(layer) / m)});
-  const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(),
-              [&](uint32_t a, uint32_t b) { return layer % 2 ? color[a] > color[b] : color[a] < color[b]; });
-    const uint32_t low = layer * disc.npoint(), up = low + disc.npoint();
-    add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
-    add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
-    add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
+  const auto prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
+    add_prism(mesh, layer, disc.npoint(), v, [&](uint32_t p) { return color[p]; });
   };
   for (uint32_t layer = 0; layer < m; ++layer)
     for (uint32_t k = 1; k <= n; ++k)
       for (uint32_t s = 0; s < 6; ++s)
         for (uint32_t t = 0; t < k; ++t) {
           const uint32_t outer = s * k + t, inner = s * (k - 1) + t;
-          add_prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
+          prism(layer, {Disc::point(k - 1, inner), Disc::point(k, outer), Disc::point(k, outer + 1)});
           if (t + 1 < k)
-            add_prism(layer,
-                      {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
+            prism(layer,
+                  {Disc::point(k - 1, inner), Disc::point(k, outer + 1), Disc::point(k - 1, inner + 1)});
         }
   return finished(std::move(mesh));
 }

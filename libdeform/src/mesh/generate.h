@@ -11,7 +11,7 @@
 namespace dfm {
 
 inline constexpr uint32_t kMostCells = 100'000'000;
-inline constexpr double kTwoPi = 6.2831853071795864769;
+inline constexpr double kTwoPi = 6.2831853071795864769, kSixth = 1.0471975511965977462;  // of a turn, pi/3
 // rows of the triangular lattice lie sqrt(3)/2 edges apart
 inline constexpr double kRow = 0.86602540378443864676;
 
@@ -21,6 +21,15 @@ inline void check_size(const char *what, double size) {
 }
 inline void check_cells(uint32_t cells) {
   if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
+}
+inline void check_beam(double x, double y, double z) {
+  check_size("beam's x size", x);
+  check_size("beam's y size", y);
+  check_size("beam's z size", z);
+}
+inline void check_cylinder(double radius, double length) {
+  check_size("cylinder's radius", radius);
+  check_size("cylinder's length", length);
 }
 void check_tube(double inner, double outer, double length);
 
@@ -33,6 +42,17 @@ inline double choice_score(double elongation, double count, double asked) {
   const double excess = std::max(1.0, elongation / 2);
   return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
 }
+// The choice of the lowest score, the first of equal ones.
+template <class T>
+struct Best {
+  T choice{};
+  double score = HUGE_VAL;
+  void offer(double its_score, const T &other) {
+    if (!(its_score < score)) return;
+    score = its_score;
+    choice = other;
+  }
+};
 // The number of cells may exceed the requested one only up to a limit.
 inline void check_choice(const char *shape, double count, uint32_t asked) {
   if (count > 100.0 * std::max(asked, 100u))
@@ -44,6 +64,7 @@ inline void check_choice(const char *shape, double count, uint32_t asked) {
 
 // sin and cos on [0, pi/3] by their series: libm's bits depend on the processor.
 Vec3 unit_on_circle(double angle);
+Vec3 turned_by_sixths(Vec3 u, uint64_t sixths);  // in the plane, 0 to 5
 // The point at i/n of a full turn.
 Vec3 unit_on_circle(uint64_t i, uint64_t n);
 // Place j of n on ring k of `rings` from the inner circle to the outer: a triangular lattice, odd rings
@@ -52,6 +73,17 @@ Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t
 
 void add_point(TetMesh &mesh, Vec3 p);
 void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);  // turned to positive volume
+// The prism over a triangle of a layer, cut in three by the colors of its corners; layers are mirrored in
+// turn, so that the surface diagonals zigzag.
+template <class Color>
+void add_prism(TetMesh &mesh, uint32_t layer, uint32_t slab, std::array<uint32_t, 3> v, const Color &color) {
+  std::sort(v.begin(), v.end(),
+            [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
+  const uint32_t low = layer * slab, up = low + slab;
+  add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
+  add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
+  add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
+}
 // without groups, points numbered in their order
 TetMesh finished(TetMesh mesh);
 

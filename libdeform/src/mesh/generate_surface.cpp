@@ -90,27 +90,21 @@ TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangle
 }
 
 TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles) {
-  check_size("beam's x size", x);
-  check_size("beam's y size", y);
-  check_size("beam's z size", z);
+  check_beam(x, y, z);
   check_triangles(triangles);
   const double size[3] = {x, y, z}, squares = std::max(6.0, triangles / 2.0);
-  const auto cut = [&](double edge, uint32_t n[3]) {
-    for (int k = 0; k < 3; ++k) n[k] = rounded(std::min(1e4, size[k] / edge));
+  const auto cut = [&](double edge, std::array<uint32_t, 3> &n) {
+    for (size_t k = 0; k < 3; ++k) n[k] = rounded(std::min(1e4, size[k] / edge));
     return 2.0 * (double(n[0]) * n[1] + double(n[1]) * n[2] + double(n[2]) * n[0]);
   };
-  double edge = std::sqrt(2 * (x * y + y * z + z * x) / squares), best_score = HUGE_VAL;
-  uint32_t best[3] = {1, 1, 1};
+  double edge = std::sqrt(2 * (x * y + y * z + z * x) / squares);
+  Best<std::array<uint32_t, 3>> found{{1, 1, 1}};
   for (int finer = 0; finer < 48; ++finer, edge *= 0.95) {
-    uint32_t n[3];
+    std::array<uint32_t, 3> n;
     const double count = cut(edge, n), h[3] = {x / n[0], y / n[1], z / n[2]};
-    const double s =
-        choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, squares);
-    if (s < best_score) {
-      best_score = s;
-      std::copy_n(n, 3, best);
-    }
+    found.offer(choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, squares), n);
   }
+  const std::array<uint32_t, 3> best = found.choice;
   check_choice("beam's surface",
                4.0 * (double(best[0]) * best[1] + double(best[1]) * best[2] + double(best[2]) * best[0]),
                triangles);
@@ -133,24 +127,18 @@ TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, ui
 }
 
 TriMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles) {
-  check_size("cylinder's radius", radius);
-  check_size("cylinder's length", length);
+  check_cylinder(radius, length);
   check_triangles(triangles);
-  uint32_t n = 1, m = 1;
-  double best = HUGE_VAL;
+  Best<std::array<uint32_t, 2>> best{{1, 1}};
   for (uint32_t rings = 1; rings == 1 || 12.0 * rings * rings <= std::max(4.0 * triangles, 2e5); ++rings) {
     const double h = radius / rings;
     for (const double wanted : {length / h, triangles / (12.0 * rings) - rings}) {
       const uint32_t layers = rounded(std::min(wanted, 1e7));
-      const double s =
-          choice_score(apart(length / layers, h), 12.0 * rings * (double(rings) + layers), triangles);
-      if (s < best) {
-        best = s;
-        n = rings;
-        m = layers;
-      }
+      best.offer(choice_score(apart(length / layers, h), 12.0 * rings * (double(rings) + layers), triangles),
+                 {rings, layers});
     }
   }
+  const uint32_t n = best.choice[0], m = best.choice[1];
   check_choice("cylinder's surface", 12.0 * n * (double(n) + m), triangles);
   Soup soup(memory);
   const auto at = [&](uint32_t ring, uint32_t j) {
@@ -178,21 +166,17 @@ TriMesh make_tube_surface(const Memory &memory, double inner, double outer, doub
   check_tube(inner, outer, length);
   check_triangles(triangles);
   const double wall = outer - inner, round = kTwoPi * (0.5 * (inner + outer)), area = 2 * (length + wall);
-  uint32_t around = 3, across = 1, along = 1;
-  double best = HUGE_VAL, edge = std::sqrt(2 * round * area / triangles);
+  Best<std::array<uint32_t, 3>> best{{3, 1, 1}};
+  double edge = std::sqrt(2 * round * area / triangles);
   for (int finer = 0; finer < 48; ++finer, edge *= 0.95) {
     const uint32_t n = std::max(3u, rounded(std::min(1e7, round / edge)));
     const uint32_t k = rounded(std::min(1e4, wall / edge / kRow)), m = rounded(std::min(1e7, length / edge));
     const double h[3] = {round / n, wall / k / kRow, length / m};
-    const double s = choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}),
-                                  4.0 * n * (double(k) + m), triangles);
-    if (s < best) {
-      best = s;
-      around = n;
-      across = k;
-      along = m;
-    }
+    best.offer(choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}),
+                            4.0 * n * (double(k) + m), triangles),
+               {n, k, m});
   }
+  const uint32_t around = best.choice[0], across = best.choice[1], along = best.choice[2];
   check_choice("tube's surface", 4.0 * around * (double(across) + along), triangles);
   Soup soup(memory);
   add_annuli(soup, inner, outer, length, across, around);

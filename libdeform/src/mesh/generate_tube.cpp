@@ -14,8 +14,11 @@ struct Tube { uint32_t around, across, along; };
 // by both rules.
 Tube choose(double inner, double outer, double length, uint32_t cells) {
   const double wall = outer - inner, round = kTwoPi * (0.5 * (inner + outer));
-  Tube best{3, 1, 1};
-  double best_score = HUGE_VAL, elongation = 0;
+  struct Choice {
+    Tube tube{3, 1, 1};
+    double elongation = 0;
+  };
+  Best<Choice> best;
   for (uint32_t across = 1; across == 1 || 6.0 * across * across <= std::max(4.0 * cells, 2e5); ++across) {
     const double row = wall / across / kRow, fill = std::sqrt(round / cells * (6.0 * across * length));
     for (const double edge : {row, 0.7 * row, 1.4 * row, fill, 0.5 * (row + fill)}) {
@@ -26,19 +29,16 @@ Tube choose(double inner, double outer, double length, uint32_t cells) {
         const uint32_t along = rounded(wanted);
         const double layer = length / along;
         const double longer = std::max({h, row, layer}) / std::min({h, row, layer});
-        const double s = choice_score(longer, 6.0 * across * around * along, cells);
-        if (s < best_score) {
-          best_score = s;
-          best = {around, across, along};
-          elongation = longer;
-        }
+        best.offer(choice_score(longer, 6.0 * across * around * along, cells),
+                   {{around, across, along}, longer});
       }
     }
   }
-  check_choice("tube", best_score < HUGE_VAL ? 6.0 * best.around * best.across * best.along : HUGE_VAL,
+  const auto &[tube, elongation] = best.choice;
+  check_choice("tube", best.score < HUGE_VAL ? 6.0 * tube.around * tube.across * tube.along : HUGE_VAL,
                cells);
   if (elongation > kMostElongated) check_choice("tube", 6 * (round / wall) * (length / wall), 0);
-  return best;
+  return tube;
 }
 
 }  // namespace
@@ -57,20 +57,12 @@ TetMesh make_tube(const Memory &memory, double inner, double outer, double lengt
       }
   // Colors go 0 1 2 along a ring; a shifted ring begins with 2, so that each triangle has all three.
   const auto color = [&](uint32_t p) { return (p % n + 2 * (p / n % 2)) % 3; };
-  const auto add_prism = [&](uint32_t layer, std::array<uint32_t, 3> v) {
-    std::sort(v.begin(), v.end(),
-              [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
-    const uint32_t low = layer * slab, up = low + slab;
-    add_tet(mesh, low + v[0], low + v[1], low + v[2], up + v[2]);
-    add_tet(mesh, low + v[0], low + v[1], up + v[1], up + v[2]);
-    add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
-  };
   for (uint32_t layer = 0; layer < tube.along; ++layer)
     for (uint32_t k = 0; k < tube.across; ++k)
       for (uint32_t j = 0; j < n; ++j) {
         const uint32_t next = (j + 1) % n, row = k * n, above = row + n;
-        add_prism(layer, {row + j, row + next, above + (k % 2 ? next : j)});
-        add_prism(layer, {above + j, above + next, row + (k % 2 ? j : next)});
+        add_prism(mesh, layer, slab, {row + j, row + next, above + (k % 2 ? next : j)}, color);
+        add_prism(mesh, layer, slab, {above + j, above + next, row + (k % 2 ? j : next)}, color);
       }
   return finished(std::move(mesh));
 }

@@ -1,48 +1,9 @@
-// Gmsh files: the head that all versions share, and what 2.2 and 4.1 have in common.
+// Gmsh files: the head that all versions share, sections, and elements.
 #include "mesh/msh.h"
 
 #include <algorithm>
 
 namespace dfm {
-
-MshElement msh_element(int64_t type) {
-  switch (type) {
-    case 15: return {1, 0};
-    case 1: return {2, 1};
-    case 8: return {3, 1};
-    case 26: return {4, 1};
-    case 27: return {5, 1};
-    case 28: return {6, 1};
-    case 2: return {3, 2};
-    case 3: return {4, 2};
-    case 9: return {6, 2};
-    case 10: return {9, 2};
-    case 16: return {8, 2};
-    case 20: return {9, 2};
-    case 21: return {10, 2};
-    case 22: return {12, 2};
-    case 23:
-    case 24: return {15, 2};
-    case 25: return {21, 2};
-    case 4: return {4, 3};
-    case 5: return {8, 3};
-    case 6: return {6, 3};
-    case 7: return {5, 3};
-    case 11: return {10, 3};
-    case 12: return {27, 3};
-    case 13: return {18, 3};
-    case 14: return {14, 3};
-    case 17: return {20, 3};
-    case 18: return {15, 3};
-    case 19: return {13, 3};
-    case 29: return {20, 3};
-    case 30: return {35, 3};
-    case 31: return {56, 3};
-    case 92: return {64, 3};
-    case 93: return {125, 3};
-    default: return {0, 0};
-  }
-}
 
 void NodeNumbers::finish(const Cursor &in) {
   if (tags_.size() >= UINT32_MAX)
@@ -69,46 +30,48 @@ uint32_t NodeNumbers::find(const Cursor &in, int64_t tag) const {
   in.refuse("an element uses node %lld, which the file does not define", ll(tag));
 }
 
-uint32_t ElementSink::begin(const Cursor &in, int64_t type) {
-  element_ = msh_element(type);
-  if (element_.points == 0) in.refuse("element type %lld is not known; 4 is a tetrahedron", ll(type));
-  if (element_.dimension == 3 && type != kMshTet) {
+void MshReader::begin_elements(int64_t type) {
+  // by number; there is none between 31 and 92
+  static constexpr Element kKnown[32] = {
+      {0, 0},  {2, 1},  {3, 2},  {4, 2},  {4, 3}, {8, 3}, {6, 3},  {5, 3},  {3, 1},  {6, 2}, {9, 2},
+      {10, 3}, {27, 3}, {18, 3}, {14, 3}, {1, 0}, {8, 2}, {20, 3}, {15, 3}, {13, 3}, {9, 2}, {10, 2},
+      {12, 2}, {15, 2}, {15, 2}, {21, 2}, {4, 1}, {5, 1}, {6, 1},  {20, 3}, {35, 3}, {56, 3}};
+  element_ = type == 92   ? Element{64, 3}
+             : type == 93 ? Element{125, 3}
+                          : kKnown[type > 0 && type < 32 ? type : 0];
+  if (element_.points == 0) in_.refuse("element type %lld is not known; 4 is a tetrahedron", ll(type));
+  if (element_.dimension == 3 && type != kTet) {
     const bool tet = type == 11 || (type >= 29 && type <= 31);
-    in.unsupported(tet ? "second- or higher-order tetrahedra (element type %lld, %u points); %s"
-                       : "element type %lld (%u points) is a hexahedron, prism or pyramid; only tetrahedra "
-                         "are read: mesh the volume with tetrahedra, or split the cells; then %s",
-                   ll(type), element_.points, kConvertMsh);
+    in_.unsupported(tet ? "second- or higher-order tetrahedra (element type %lld, %u points); %s"
+                        : "element type %lld (%u points) is a hexahedron, prism or pyramid; only tetrahedra "
+                          "are read: mesh the volume with tetrahedra, or split the cells; then %s",
+                    ll(type), element_.points, kConvertMsh);
   }
-  return element_.points;
 }
 
-void ElementSink::add(const Cursor &in, uint32_t group, const int64_t *tags) {
+void MshReader::add_element(uint32_t group) {
   uint32_t corners[4];
-  const bool straight = element_.points <= 4;
-  if (straight && element_.dimension >= 2) {
-    for (uint32_t k = 0; k < element_.points; ++k) corners[k] = nodes_.find(in, tags[k]);
-    if (element_.dimension == 3) out_.add_tet(in, corners, group);
-    else out_.add_polygon(in, corners, element_.points, group);
+  if (element_.points <= 4 && element_.dimension >= 2) {
+    for (uint32_t k = 0; k < element_.points; ++k) corners[k] = nodes_.find(in_, tags_[k]);
+    if (element_.dimension == 3) out_.add_tet(in_, corners, group);
+    else out_.add_polygon(in_, corners, element_.points, group);
     return;
   }
   curved_ += element_.dimension == 2;
   for (uint32_t k = 0; k < element_.points; ++k) {
-    const uint32_t point = nodes_.find(in, tags[k]);
-    if (group != kNoGroup) out_.groups[group].points.push_back(point);
+    const uint32_t point = nodes_.find(in_, tags_[k]);
+    out_.keep_points(&point, 1, group);
   }
 }
 
-void ElementSink::finish(const Cursor &in) const {
-  if (curved_ && out_.tets.empty() && out_.tris.empty())
-    in.unsupported("%llu second- or higher-order triangles or quadrangles and nothing straight; %s",
-                   ull(curved_), kConvertMsh);
-}
-
-int32_t msh_int(const Cursor &in, int64_t value, const char *what) {
-  if (value < INT32_MIN || value > INT32_MAX) in.refuse("%s %lld does not fit 32 bits", what, ll(value));
+int32_t MshReader::in_32_bits(int64_t value, const char *what) const {
+  if (value < INT32_MIN || value > INT32_MAX) in_.refuse("%s %lld does not fit 32 bits", what, ll(value));
   return static_cast<int32_t>(value);
 }
 
+namespace {
+
+// Moves past "$NAME" content that is not used, to after "$EndNAME".
 void skip_section(Cursor &in, std::string_view name) {
   const std::string end = "$End" + std::string(name.substr(1));
   if (!in.find(end))
@@ -116,23 +79,58 @@ void skip_section(Cursor &in, std::string_view name) {
   in.word();
 }
 
-void read_physical_names(Cursor &in, RawMesh &out) {
-  const uint64_t n = in.count(in.integer("the number of physical names"), 6, "physical names");
+}  // namespace
+
+void MshReader::read_physical_names() {
+  const uint64_t n = in_.count(in_.integer("the number of physical names"), 6, "physical names");
   for (uint64_t i = 0; i < n; ++i) {
-    const int64_t dimension = in.integer("a physical group's dimension");
+    const int64_t dimension = in_.integer("a physical group's dimension");
     if (dimension < 0 || dimension > 3)
-      in.refuse("a physical group of dimension %lld; expected 0 to 3", ll(dimension));
-    const int32_t tag = msh_int(in, in.integer("a physical group's number"), "the physical group number");
-    const std::string_view text = in.line();
+      in_.refuse("a physical group of dimension %lld; expected 0 to 3", ll(dimension));
+    const int32_t tag = in_32_bits(in_.integer("a physical group's number"), "the physical group number");
+    const std::string_view text = in_.line();
     const size_t open = text.find('"'), close = text.rfind('"');
     if (open == std::string_view::npos || close == open)
-      in.refuse("expected a physical group's name in double quotes, found %s",
-                Cursor::quote(text.empty() ? " " : text).c_str());
-    const uint32_t group = out.group(in, static_cast<int32_t>(dimension), tag);
+      in_.refuse("expected a physical group's name in double quotes, found %s",
+                 Cursor::quote(text.empty() ? " " : text).c_str());
+    const uint32_t group = out_.group(in_, static_cast<int32_t>(dimension), tag);
     if (group != kNoGroup && close > open + 1)
-      out.groups[group].name.assign(text.substr(open + 1, close - open - 1));
+      out_.groups[group].name.assign(text.substr(open + 1, close - open - 1));
   }
-  in.expect("$EndPhysicalNames", "the physical names");
+  in_.expect("$EndPhysicalNames", "the physical names");
+}
+
+void MshReader::run() {
+  bool nodes = false, elements = false;
+  for (std::string_view section = in_.word(); !section.empty(); section = in_.word()) {
+    const bool parametric = !four_ && section == "$ParametricNodes";
+    if (section == "$PhysicalNames") {
+      read_physical_names();
+    } else if (four_ && section == "$Entities") {
+      if (elements) in_.refuse("$Entities after $Elements; expected them first");
+      read_entities_41();
+    } else if (parametric || section == "$Nodes") {
+      if (nodes)
+        in_.refuse("a second %s; one mesh per file is read", four_ ? "$Nodes section" : "section of nodes");
+      if (four_) read_nodes_41();
+      else read_nodes_22(parametric);
+      nodes_.finish(in_);
+      nodes = true;
+    } else if (section == "$Elements") {
+      if (!nodes) in_.refuse("$Elements before $Nodes; expected the nodes first");
+      if (elements) in_.refuse("a second $Elements section; one mesh per file is read");
+      if (four_) read_elements_41();
+      else read_elements_22();
+      elements = true;
+    } else if (section[0] == '$') skip_section(in_, section);
+    else
+      in_.refuse("expected a section such as $Nodes or $Elements, found %s", Cursor::quote(section).c_str());
+  }
+  if (!nodes || !elements)
+    in_.refuse("no %s section; the file is truncated or holds no mesh", nodes ? "$Elements" : "$Nodes");
+  if (curved_ && out_.tets.empty() && out_.tris.empty())
+    in_.unsupported("%llu second- or higher-order triangles or quadrangles and nothing straight; %s",
+                    ull(curved_), kConvertMsh);
 }
 
 void read_msh(Cursor &in, RawMesh &out) {
@@ -164,8 +162,7 @@ void read_msh(Cursor &in, RawMesh &out) {
     in.swap = one != 1;
   }
   in.expect("$EndMeshFormat", "the format");
-  if (two) read_msh22(in, out);
-  else read_msh41(in, out, size_t(size));
+  MshReader(in, out, four, size == 8).run();
 }
 
 }  // namespace dfm

@@ -1,4 +1,5 @@
-// What MSH 2.2 and 4.1 share: element types, node numbers, and the element sink.
+// Reader of gmsh files: sections and elements are the same in MSH 2.0 to 2.2 (read_msh22.cpp) and 4.1
+// (read_msh41.cpp).
 #pragma once
 #include <cstdint>
 
@@ -8,14 +9,6 @@ namespace dfm {
 
 constexpr const char *kConvertMsh =
     "convert it first: gmsh -3 -save_all -format msh41 -order 1 FILE -o OUT.msh";
-
-// Points and dimension of a gmsh element type; points 0: not known.
-struct MshElement {
-  uint32_t points;
-  int32_t dimension;
-};
-MshElement msh_element(int64_t type);
-constexpr int64_t kMshTet = 4;
 
 // Node numbers of the file to positions. Numbers may have gaps and come in any order.
 class NodeNumbers {
@@ -33,32 +26,62 @@ class NodeNumbers {
   Array<uint32_t> order_;  // position of each ascending number; empty where they ascend in the file already
 };
 
-// Takes elements one by one: keeps tetrahedra, triangles and quadrangles (cut), passes over points and
-// lines (their points join their group), refuses other volume cells, and curved faces where the file has
-// nothing straight.
-class ElementSink {
+class MshReader {
  public:
-  ElementSink(RawMesh &out, const NodeNumbers &nodes) : out_(out), nodes_(nodes) {}
-  // Checks that elements of this type can be taken; returns how many points each has.
-  uint32_t begin(const Cursor &in, int64_t type);
-  void add(const Cursor &in, uint32_t group, const int64_t *tags);
-  void finish(const Cursor &in) const;
+  // four: 4.1; wide: its counts and numbers have 8 bytes, not 4
+  MshReader(Cursor &in, RawMesh &out, bool four, bool wide)
+      : in_(in),
+        out_(out),
+        four_(four),
+        wide_(wide),
+        nodes_(*out.memory),
+        entities_(HookAllocator<Entity>(*out.memory)) {}
+  void run();
 
  private:
+  struct Entity {  // of the geometry
+    int32_t dimension, tag;
+    uint32_t group;
+    bool operator<(const Entity &o) const {
+      return std::pair(dimension, tag) < std::pair(o.dimension, o.tag);
+    }
+  };
+  // A gmsh element type; points 0: not known.
+  struct Element {
+    uint32_t points;
+    int32_t dimension;
+  };
+  static constexpr int64_t kTet = 4;
+
+  void read_physical_names();
+  // Elements come one by one: tetrahedra, triangles and quadrangles (cut) are kept, points and lines passed
+  // over (their points join their group), other volume cells refused, and curved faces where the file has
+  // nothing straight.
+  void begin_elements(int64_t type);  // checks that elements of this type can be taken
+  void add_element(uint32_t group);   // of nodes tags_
+  int32_t in_32_bits(int64_t value, const char *what) const;
+  double real(const char *what) { return in_.real(Number::f64, what); }
+  int32_t number(const char *what) { return in_32_bits(in_.integer(Number::i32, what), what); }
+
+  void read_nodes_22(bool parametric);
+  void read_elements_22();
+
+  int64_t size(const char *what);
+  Number size_type() const { return wide_ ? Number::u64 : Number::u32; }
+  size_t size_bytes() const { return in_.binary ? bytes_of(size_type()) : 2; }
+  void read_entities_41();
+  void read_nodes_41();
+  void read_elements_41();
+  uint32_t group_of(int32_t dimension, int32_t tag) const;
+
+  Cursor &in_;
   RawMesh &out_;
-  const NodeNumbers &nodes_;
-  MshElement element_{0, 0};
-  uint64_t curved_ = 0;  // faces of second and higher order
+  bool four_, wide_;
+  NodeNumbers nodes_;
+  Array<Entity> entities_;
+  Element element_{0, 0};  // of begin_elements()
+  int64_t tags_[125];      // as many as any element has
+  uint64_t curved_ = 0;    // faces of second and higher order
 };
-
-constexpr uint32_t kMaxElementPoints = 125;
-
-void read_msh22(Cursor &in, RawMesh &out);
-void read_msh41(Cursor &in, RawMesh &out, size_t size_bytes);
-
-// Moves past "$NAME" content that is not used, to after "$EndNAME".
-void skip_section(Cursor &in, std::string_view name);
-void read_physical_names(Cursor &in, RawMesh &out);
-int32_t msh_int(const Cursor &in, int64_t value, const char *what);
 
 }  // namespace dfm

@@ -129,8 +129,7 @@ void RawMesh::add_polygon(const Cursor &at, const uint32_t *corners, size_t n, u
   if (small && fan_folds(points, corners, n)) Outline(*memory, points, corners, n).cut(add);
   else
     for (size_t k = 2; k < n; ++k) add(corners[0], corners[k - 1], corners[k]);
-  if (in_group != kNoGroup)
-    groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
+  keep_points(corners, n, in_group);
 }
 
 void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {
@@ -138,13 +137,20 @@ void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uin
     const bool turned = k % 2 != 0;
     add_triangle(at, corners[k - 2], corners[k - !turned], corners[k - turned], in_group);
   }
-  if (in_group != kNoGroup)
-    groups[in_group].points.insert(groups[in_group].points.end(), corners, corners + n);
+  keep_points(corners, n, in_group);
 }
 
-uint32_t point_count(const Cursor &at, uint64_t n, const char *what) {
-  if (n > kMaxPoints) at.unsupported("%llu %s; up to %u are read", ull(n), what, kMaxPoints);
-  return uint32_t(n);
+void read_corners(Cursor &in, Number type, uint64_t face, int64_t n, uint32_t npoint, Array<uint32_t> &out) {
+  if (n < 3) in.refuse("face %llu has %lld corners; expected 3 or more", ull(face), ll(n));
+  in.count(n, 1, type, "corners of a face");
+  out.clear();
+  for (int64_t k = 0; k < n; ++k) {
+    const int64_t p = in.integer(type, "a face's vertex");
+    if (p < 0 || p >= int64_t(npoint))
+      in.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(p),
+                ll(npoint) - 1);
+    out.push_back(static_cast<uint32_t>(p));
+  }
 }
 
 }  // namespace dfm

@@ -40,6 +40,11 @@ struct RawMesh {
   // n >= 3 corners around a face, cut into n-2 triangles: a fan about the first where none of them looks
   // the other way, else ears. A fan always where a corner is not known yet, or there are more than 512.
   void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
+  // Points of an element that is not kept itself; no group: nothing.
+  void keep_points(const uint32_t *points_of, size_t n, uint32_t in_group) {
+    if (in_group == kNoGroup) return;
+    groups[in_group].points.insert(groups[in_group].points.end(), points_of, points_of + n);
+  }
   // Triangles (i, i+1, i+2), every second one turned.
   void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Room for n more: readers that know a valid count call it once, and no array is grown by copying.
@@ -51,9 +56,9 @@ struct RawMesh {
   std::map<std::string, uint32_t, std::less<>> name_index_;
 };
 inline constexpr uint32_t kMaxTris = 1u << 30;
-inline constexpr uint32_t kMaxPoints = UINT32_MAX - 1;
-// A promised number of points that 32 bits can name.
-uint32_t point_count(const Cursor &at, uint64_t n, const char *what = "points");
+
+// The n corners of a face, from 0.
+void read_corners(Cursor &in, Number type, uint64_t face, int64_t n, uint32_t npoint, Array<uint32_t> &out);
 
 void read_msh(Cursor &in, RawMesh &out);
 void read_vtk(Cursor &in, RawMesh &out);

@@ -66,14 +66,6 @@ const Format *format_called(std::string_view name) {
   return nullptr;
 }
 
-std::string ending(const std::string &path) {
-  const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
-  if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
-  std::string text = path.substr(dot + 1);
-  for (char &c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 const Format *format_by_ending(const std::string &end) {
   for (const Format &f : formats())
     for (const char *e : f.endings)
@@ -126,7 +118,7 @@ const Format *format_by_content(std::string_view bytes) {
 }
 
 const Format &choose(const std::string &path, std::string_view bytes, RawMesh &raw) {
-  const std::string end = ending(path);
+  const std::string end = ending_of(path);
   const Format *const named = format_by_ending(end), *const seen = format_by_content(bytes);
   if (bytes.empty())
     fail(DFM_E_FORMAT, "%s: the file is empty; expected a mesh (%s)", path.c_str(), readable().c_str());
@@ -151,21 +143,19 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
   return *found;
 }
 
-// Warnings of the reader come before those of the repair.
-template <class Mesh>
-Mesh finish_with_warnings(Mesh (*finish)(const std::string &, RawMesh &&), const std::string &path,
-                          RawMesh &&raw) {
-  const std::vector<std::string> warnings = raw.warnings;
-  Mesh mesh = finish(path, std::move(raw));
-  mesh.warnings.insert(mesh.warnings.begin(), warnings.begin(), warnings.end());
-  return mesh;
-}
-
 }  // namespace
+
+std::string ending_of(const std::string &path) {
+  const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
+  if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
+  std::string text = path.substr(dot + 1);
+  for (char &c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
 
 std::string mesh_kind(const std::string &path, std::string_view bytes) {
   const Format *const seen = format_by_content(bytes), *const found =
-                                                           seen ? seen : format_by_ending(ending(path));
+                                                           seen ? seen : format_by_ending(ending_of(path));
   return found ? found->name : "";
 }
 
@@ -179,7 +169,7 @@ RawMesh parse_raw(const Memory &memory, const std::string &path, const char *byt
 }
 
 RawMesh read_raw(const Memory &memory, const std::string &path) {
-  const Format *const named = format_by_ending(ending(path));
+  const Format *const named = format_by_ending(ending_of(path));
   if (named && !named->read)  // checked before a large file is read
     fail(DFM_E_UNSUPPORTED, "%s: the library itself reads no %s files; %s", path.c_str(), named->name,
          named->advice);
@@ -188,16 +178,16 @@ RawMesh read_raw(const Memory &memory, const std::string &path) {
 }
 
 TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
-  return finish_with_warnings(finish_mesh, path, parse_raw(memory, path, bytes, size));
+  return finish_mesh(path, parse_raw(memory, path, bytes, size));
 }
 
 TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
   // the file's bytes are free before the repair begins
-  return finish_with_warnings(finish_mesh, path, read_raw(memory, path));
+  return finish_mesh(path, read_raw(memory, path));
 }
 
 TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
-  return finish_with_warnings(finish_surface, path, parse_raw(memory, path, bytes, size));
+  return finish_surface(path, parse_raw(memory, path, bytes, size));
 }
 
 bool has_cells(const std::string &path, const RawMesh &raw) {
@@ -210,13 +200,13 @@ bool has_cells(const std::string &path, const RawMesh &raw) {
 AnyMesh read_any_mesh(const Memory &memory, const std::string &path) {
   RawMesh raw = read_raw(memory, path);
   AnyMesh out;
-  if (has_cells(path, raw)) out.cells = finish_with_warnings(finish_mesh, path, std::move(raw));
-  else out.surface = finish_with_warnings(finish_surface, path, std::move(raw));
+  if (has_cells(path, raw)) out.cells = finish_mesh(path, std::move(raw));
+  else out.surface = finish_surface(path, std::move(raw));
   return out;
 }
 
 TriMesh read_tri_mesh(const Memory &memory, const std::string &path) {
-  return finish_with_warnings(finish_surface, path, read_raw(memory, path));
+  return finish_surface(path, read_raw(memory, path));
 }
 
 }  // namespace dfm

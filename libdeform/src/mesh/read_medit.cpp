@@ -50,7 +50,8 @@ class MeditReader {
   }
 
   void read_points() {
-    const uint32_t n = point_count(in_, in_.text_count(in_.integer("the number of vertices"), 4, "vertices"));
+    const uint32_t n =
+        in_.small(in_.text_count(in_.integer("the number of vertices"), 4, "vertices"), "points");
     out_.points.reserve(3 * size_t(n));
     for (uint32_t i = 0; i < n; ++i) {
       for (int k = 0; k < 3; ++k) out_.points.push_back(in_.real("a vertex's coordinate"));
@@ -71,8 +72,7 @@ class MeditReader {
       const uint32_t group = out_.group(in_, dimension, static_cast<int32_t>(reference));
       if (dimension == 3) out_.add_tet(in_, corner, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);
-      else if (group != kNoGroup)
-        out_.groups[group].points.insert(out_.groups[group].points.end(), corner, corner + corners);
+      else out_.keep_points(corner, corners, group);
     }
   }
 

@@ -3,100 +3,50 @@
 #include "mesh/msh.h"
 
 namespace dfm {
-namespace {
 
-void read_nodes(Cursor &in, RawMesh &out, NodeNumbers &nodes, bool parametric) {
-  const uint64_t n = in.count(in.integer("the number of nodes"), in.binary ? 28 : 8, "nodes");
-  nodes.reserve(n);
-  out.points.reserve(3 * n);
-  if (in.binary) in.end_line("the number of nodes");
+void MshReader::read_nodes_22(bool parametric) {
+  if (parametric && in_.binary) in_.unsupported("binary $ParametricNodes of MSH 2; %s", kConvertMsh);
+  const uint64_t n = in_.count(in_.integer("the number of nodes"), in_.binary ? 28 : 8, "nodes");
+  nodes_.reserve(n);
+  out_.points.reserve(3 * n);
+  in_.begin_data("the number of nodes");
   for (uint64_t i = 0; i < n; ++i) {
-    nodes.add(in.binary ? in.value<int32_t>("a node") : in.integer("a node's number"));
-    for (int k = 0; k < 3; ++k)
-      out.points.push_back(in.binary ? in.binary_real("a node's coordinate")
-                                     : in.real("a node's coordinate"));
-    if (parametric) in.line();  // entity and parameters of the geometry, which a body has no use for
+    nodes_.add(in_.integer(Number::i32, "a node's number"));
+    for (int k = 0; k < 3; ++k) out_.points.push_back(real("a node's coordinate"));
+    if (parametric) in_.line();  // entity and parameters of the geometry, which a body has no use for
   }
-  in.expect(parametric ? "$EndParametricNodes" : "$EndNodes", "the nodes promised");
-  nodes.finish(in);
+  in_.expect(parametric ? "$EndParametricNodes" : "$EndNodes", "the nodes promised");
 }
 
-void read_text_elements(Cursor &in, RawMesh &out, ElementSink &sink) {
-  const uint64_t n = in.count(in.integer("the number of elements"), 6, "elements");
-  int64_t tags[kMaxElementPoints];
-  for (uint64_t i = 0; i < n; ++i) {
-    in.integer("an element's number");
-    const int64_t type = in.integer("an element's type");
-    const uint32_t points = sink.begin(in, type);
-    const int64_t ntag = in.integer("an element's number of tags");
-    if (ntag < 0) in.refuse("an element with %lld tags", ll(ntag));
-    int32_t physical = 0;
-    for (int64_t k = 0; k < ntag; ++k) {
-      const int64_t tag = in.integer("an element's tag");
-      if (k == 0) physical = msh_int(in, tag, "the physical group number");
-    }
-    for (uint32_t k = 0; k < points; ++k) tags[k] = in.integer("an element's node");
-    sink.add(in, out.group(in, msh_element(type).dimension, physical), tags);
-  }
-}
-
-// Binary elements come in runs of one type: type, how many follow, tags of each; then number, tags,
-// nodes of each.
-void read_binary_elements(Cursor &in, RawMesh &out, ElementSink &sink) {
-  const uint64_t n = in.count(in.integer("the number of elements"), 8, "elements");
-  in.end_line("the number of elements");
-  int64_t tags[kMaxElementPoints];
+// Binary elements come in runs of one type: type, how many follow, tags of each; then number, tags, nodes
+// of each. In text each is a run of its own, which begins with its number.
+void MshReader::read_elements_22() {
+  const uint64_t n = in_.count(in_.integer("the number of elements"), in_.binary ? 8 : 6, "elements");
+  in_.begin_data("the number of elements");
+  const auto next = [&](const char *what) { return in_.integer(Number::i32, what); };
   for (uint64_t i = 0; i < n;) {
-    const int32_t type = in.value<int32_t>("an element's type");
-    const int32_t follow = in.value<int32_t>("a run of elements");
-    const int32_t ntag = in.value<int32_t>("a number of tags");
-    const uint32_t points = sink.begin(in, type);
+    if (!in_.binary) next("an element's number");
+    const int64_t type = next("an element's type");
+    begin_elements(type);
+    const int64_t follow = in_.binary ? next("a run of elements") : 1;
+    const int64_t ntag = next("an element's number of tags");
     if (follow <= 0 || uint64_t(follow) > n - i)
-      in.refuse("a run of %d elements where %llu are left", follow, ull(n - i));
-    if (ntag < 0) in.refuse("elements with %d tags", ntag);
-    in.count(follow, 4 * (1 + size_t(ntag) + points), "elements in a run");
-    if (type == kMshTet) out.expect_tets(size_t(follow));
-    for (int32_t e = 0; e < follow; ++e, ++i) {
-      in.value<int32_t>("an element's number");
+      in_.refuse("a run of %lld elements where %llu are left", ll(follow), ull(n - i));
+    if (ntag < 0) in_.refuse("an element with %lld tags", ll(ntag));
+    if (in_.binary) in_.count(follow, 4 * (1 + size_t(ntag) + element_.points), "elements in a run");
+    if (type == kTet) out_.expect_tets(size_t(follow));
+    for (const uint64_t end = i + uint64_t(follow); i < end; ++i) {
+      if (in_.binary) next("an element's number");
       int32_t physical = 0;
-      for (int32_t k = 0; k < ntag; ++k) {
-        const int32_t tag = in.value<int32_t>("an element's tag");
-        if (k == 0) physical = tag;
+      for (int64_t k = 0; k < ntag; ++k) {
+        const int64_t tag = next("an element's tag");
+        if (k == 0) physical = in_32_bits(tag, "the physical group number");
       }
-      for (uint32_t k = 0; k < points; ++k) tags[k] = in.value<int32_t>("an element's node");
-      sink.add(in, out.group(in, msh_element(type).dimension, physical), tags);
+      for (uint32_t k = 0; k < element_.points; ++k) tags_[k] = next("an element's node");
+      add_element(out_.group(in_, element_.dimension, physical));
     }
   }
-}
-
-}  // namespace
-
-void read_msh22(Cursor &in, RawMesh &out) {
-  NodeNumbers nodes(*out.memory);
-  ElementSink sink(out, nodes);
-  bool have_nodes = false, have_elements = false;
-  for (std::string_view section = in.word(); !section.empty(); section = in.word()) {
-    if (section == "$PhysicalNames") {
-      read_physical_names(in, out);
-    } else if (section == "$Nodes" || section == "$ParametricNodes") {
-      const bool parametric = section != "$Nodes";
-      if (have_nodes) in.refuse("a second section of nodes; one mesh per file is read");
-      if (parametric && in.binary) in.unsupported("binary $ParametricNodes of MSH 2; %s", kConvertMsh);
-      read_nodes(in, out, nodes, parametric);
-      have_nodes = true;
-    } else if (section == "$Elements") {
-      if (!have_nodes) in.refuse("$Elements before $Nodes; expected the nodes first");
-      if (have_elements) in.refuse("a second $Elements section; one mesh per file is read");
-      in.binary ? read_binary_elements(in, out, sink) : read_text_elements(in, out, sink);
-      in.expect("$EndElements", "the elements promised");
-      have_elements = true;
-    } else if (section[0] == '$') skip_section(in, section);
-    else
-      in.refuse("expected a section such as $Nodes or $Elements, found %s", Cursor::quote(section).c_str());
-  }
-  if (!have_nodes || !have_elements)
-    in.refuse("no %s section; the file is truncated or holds no mesh", have_nodes ? "$Elements" : "$Nodes");
-  sink.finish(in);
+  in_.expect("$EndElements", "the elements promised");
 }
 
 }  // namespace dfm

@@ -19,12 +19,10 @@ class OffReader {
     const int64_t npoint = number("the number of vertices"), nface = number("the number of faces");
     if (in_.binary) number("the number of edges");
     else in_.line();  // the number of edges, which is not needed and may be missing
-    const uint32_t n = point_count(
-        in_, in_.binary ? in_.count(npoint, 12, "vertices") : in_.text_count(npoint, 3, "vertices"),
-        "vertices");
+    const uint32_t n = in_.small(in_.count(npoint, 3, Number::f32, "vertices"), "vertices");
     out_.points.reserve(3 * size_t(n));
     for (uint32_t i = 0; i < n; ++i) read_point();
-    const uint64_t m = in_.binary ? in_.count(nface, 8, "faces") : in_.text_count(nface, 2, "faces");
+    const uint64_t m = in_.count(nface, 2, Number::i32, "faces");
     for (uint64_t f = 0; f < m; ++f) read_face(f);
   }
 
@@ -63,28 +61,17 @@ class OffReader {
     in_.swap = std::endian::native == std::endian::little;
   }
 
-  int64_t number(const char *what) { return in_.binary ? in_.value<int32_t>(what) : in_.integer(what); }
+  int64_t number(const char *what) { return in_.integer(Number::i32, what); }
 
   void read_point() {
-    for (int k = 0; k < 3; ++k)
-      out_.points.push_back(in_.binary ? in_.binary_real<float>("a vertex's coordinate")
-                                       : in_.real("a vertex's coordinate"));
+    for (int k = 0; k < 3; ++k) out_.points.push_back(in_.real(Number::f32, "a vertex's coordinate"));
     if (in_.binary) in_.skip(4 * extra_, "a vertex's color or normal");
     else in_.line();
   }
 
   void read_face(uint64_t face) {
     const int64_t n = number("a face's number of corners");
-    if (n < 3) in_.refuse("face %llu has %lld corners; expected 3 or more", ull(face), ll(n));
-    in_.binary ? in_.count(n, 4, "corners of a face") : in_.text_count(n, 1, "corners of a face");
-    corners_.clear();
-    for (int64_t k = 0; k < n; ++k) {
-      const int64_t p = number("a face's vertex");
-      if (p < 0 || p >= int64_t(out_.npoint()))
-        in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(p),
-                   ll(out_.npoint()) - 1);
-      corners_.push_back(static_cast<uint32_t>(p));
-    }
+    read_corners(in_, Number::i32, face, n, out_.npoint(), corners_);
     out_.add_polygon(in_, corners_.data(), corners_.size(), kNoGroup);
     if (in_.binary)
       in_.skip(4 * in_.count(number("a face's number of colors"), 4, "colors of a face"), "a face's color");

@@ -8,32 +8,16 @@
 namespace dfm {
 namespace {
 
-enum class PlyNumber : uint8_t { none, i8, u8, i16, u16, i32, u32, f32, f64 };
-
 struct Property {
   std::string_view name;
-  PlyNumber type, count = PlyNumber::none;  // count: of a list
+  Number type = Number::f64;
+  std::optional<Number> count;  // of a list
 };
 struct Element {
   std::string_view name;
   int64_t number = 0;
   std::vector<Property> properties;
 };
-
-size_t bytes_of(PlyNumber type) {
-  switch (type) {
-    case PlyNumber::i8:
-    case PlyNumber::u8: return 1;
-    case PlyNumber::i16:
-    case PlyNumber::u16: return 2;
-    case PlyNumber::i32:
-    case PlyNumber::u32:
-    case PlyNumber::f32: return 4;
-    case PlyNumber::f64: return 8;
-    case PlyNumber::none: break;
-  }
-  return 0;
-}
 
 class PlyReader {
  public:
@@ -46,14 +30,12 @@ class PlyReader {
   }
 
  private:
-  PlyNumber number_type(std::string_view name) const {
-    static const std::pair<std::string_view, PlyNumber> known[] = {
-        {"char", PlyNumber::i8},    {"uchar", PlyNumber::u8},   {"short", PlyNumber::i16},
-        {"ushort", PlyNumber::u16}, {"int", PlyNumber::i32},    {"uint", PlyNumber::u32},
-        {"float", PlyNumber::f32},  {"double", PlyNumber::f64}, {"int8", PlyNumber::i8},
-        {"uint8", PlyNumber::u8},   {"int16", PlyNumber::i16},  {"uint16", PlyNumber::u16},
-        {"int32", PlyNumber::i32},  {"uint32", PlyNumber::u32}, {"float32", PlyNumber::f32},
-        {"float64", PlyNumber::f64}};
+  Number number_type(std::string_view name) const {
+    static const std::pair<std::string_view, Number> known[] = {
+        {"char", Number::i8},   {"uchar", Number::u8},   {"short", Number::i16},   {"ushort", Number::u16},
+        {"int", Number::i32},   {"uint", Number::u32},   {"float", Number::f32},   {"double", Number::f64},
+        {"int8", Number::i8},   {"uint8", Number::u8},   {"int16", Number::i16},   {"uint16", Number::u16},
+        {"int32", Number::i32}, {"uint32", Number::u32}, {"float32", Number::f32}, {"float64", Number::f64}};
     for (const auto &[text, type] : known)
       if (text == name) return type;
     in_.refuse("expected a number type (float, double, int, uchar ...), found %s",
@@ -100,18 +82,17 @@ class PlyReader {
     if (number < 0) in_.refuse("promises %lld elements; a count cannot be negative", ll(number));
     for (const Element &e : elements_)
       if (e.name == name) in_.refuse("element %s is declared twice", Cursor::quote(name).c_str());
-    if (name == "vertex") npoint_ = point_count(in_, static_cast<uint64_t>(number), "vertices");
+    if (name == "vertex") npoint_ = in_.small(static_cast<uint64_t>(number), "vertices");
     elements_.push_back({name, number, {}});
   }
 
   void read_property() {
     if (elements_.empty()) in_.refuse("a property before any element");
     const std::string_view first = in_.line_word();
-    Property p{{}, PlyNumber::none};
+    Property p;
     if (first == "list") {
       p.count = number_type(in_.line_word());
-      if (p.count == PlyNumber::f32 || p.count == PlyNumber::f64)
-        in_.refuse("a list counted by floating-point numbers");
+      if (is_real(*p.count)) in_.refuse("a list counted by floating-point numbers");
       p.type = number_type(in_.line_word());
     } else {
       p.type = number_type(first);
@@ -120,35 +101,12 @@ class PlyReader {
     elements_.back().properties.push_back(p);
   }
 
-  bool is_whole(PlyNumber type) const { return type != PlyNumber::f32 && type != PlyNumber::f64; }
-
-  int64_t whole(PlyNumber type, const char *what) {
-    if (!in_.binary) return in_.integer(what);
-    switch (type) {
-      case PlyNumber::i8: return in_.value<int8_t>(what);
-      case PlyNumber::u8: return in_.value<uint8_t>(what);
-      case PlyNumber::i16: return in_.value<int16_t>(what);
-      case PlyNumber::u16: return in_.value<uint16_t>(what);
-      case PlyNumber::i32: return in_.value<int32_t>(what);
-      case PlyNumber::u32: return in_.value<uint32_t>(what);
-      default: break;
-    }
-    in_.refuse("%s must be a whole number", what);
-  }
-  double real(PlyNumber type, const char *what) {
-    if (!in_.binary) return in_.real(what);
-    if (type == PlyNumber::f32) return in_.binary_real<float>(what);
-    return type == PlyNumber::f64 ? in_.binary_real(what) : static_cast<double>(whole(type, what));
-  }
-
   uint64_t list_length(const Property &p) {
-    const int64_t n = whole(p.count, "the length of a list");
-    return in_.binary ? in_.count(n, bytes_of(p.type), "values in a list")
-                      : in_.text_count(n, 1, "values in a list");
+    return in_.count(in_.integer(*p.count, "the length of a list"), 1, p.type, "values in a list");
   }
 
   void pass_over(const Property &p) {
-    const uint64_t n = p.count == PlyNumber::none ? 1 : list_length(p);
+    const uint64_t n = p.count ? list_length(p) : 1;
     if (in_.binary) return in_.skip(n * bytes_of(p.type), "a property");
     for (uint64_t i = 0; i < n; ++i)
       if (in_.word().empty())
@@ -162,7 +120,7 @@ class PlyReader {
           "triangle strips; save the surface with faces (for instance meshlab, or meshio convert FILE "
           "OUT.obj)");
     size_t least = 0;
-    for (const Property &p : e.properties) least += bytes_of(p.count != PlyNumber::none ? p.count : p.type);
+    for (const Property &p : e.properties) least += bytes_of(p.count.value_or(p.type));
     const std::string name = "elements " + Cursor::quote(e.name);
     const uint64_t n = in_.binary ? in_.count(e.number, least, name.c_str())
                                   : in_.text_count(e.number, e.properties.size(), name.c_str());
@@ -177,8 +135,7 @@ class PlyReader {
     int axis_of[3] = {-1, -1, -1};
     for (size_t k = 0; k < e.properties.size(); ++k)
       for (int c = 0; c < 3; ++c)
-        if (e.properties[k].name == std::string_view("xyz").substr(size_t(c), 1) &&
-            e.properties[k].count == PlyNumber::none)
+        if (e.properties[k].name == std::string_view("xyz").substr(size_t(c), 1) && !e.properties[k].count)
           axis_of[c] = int(k);
     for (int c = 0; c < 3; ++c)
       if (axis_of[c] < 0) in_.refuse("vertices have no property %c", "xyz"[c]);
@@ -188,7 +145,7 @@ class PlyReader {
       for (int k = 0; k < int(e.properties.size()); ++k) {
         const int c = k == axis_of[0] ? 0 : k == axis_of[1] ? 1 : k == axis_of[2] ? 2 : -1;
         if (c < 0) pass_over(e.properties[size_t(k)]);
-        else x[c] = real(e.properties[size_t(k)].type, "a vertex's coordinate");
+        else x[c] = in_.real(e.properties[size_t(k)].type, "a vertex's coordinate");
       }
       out_.points.insert(out_.points.end(), x, x + 3);
     }
@@ -197,9 +154,8 @@ class PlyReader {
   void read_faces(const Element &e, uint64_t n) {
     const Property *list = nullptr, *label = nullptr;
     for (const Property &p : e.properties) {
-      const bool is_list = p.count != PlyNumber::none;
-      if (is_list && (p.name == "vertex_indices" || p.name == "vertex_index")) list = &p;
-      if (!is_list && is_whole(p.type) && !label &&
+      if (p.count && (p.name == "vertex_indices" || p.name == "vertex_index")) list = &p;
+      if (!p.count && is_whole(p.type) && !label &&
           (p.name == "group" || p.name == "material_index" || p.name == "material"))
         label = &p;
     }
@@ -208,27 +164,14 @@ class PlyReader {
     for (uint64_t f = 0; f < n; ++f) {
       int64_t number = 0;
       for (const Property &p : e.properties) {
-        if (&p == list) read_corners(p, f);
-        else if (&p == label) number = whole(p.type, "a face's group");
+        if (&p == list) read_corners(in_, p.type, f, int64_t(list_length(p)), npoint_, corners_);
+        else if (&p == label) number = in_.integer(p.type, "a face's group");
         else pass_over(p);
       }
       const uint32_t group = number < INT32_MIN || number > INT32_MAX
                                  ? kNoGroup
                                  : out_.group(in_, 2, static_cast<int32_t>(number));
       out_.add_polygon(in_, corners_.data(), corners_.size(), group);
-    }
-  }
-
-  void read_corners(const Property &p, uint64_t face) {
-    const uint64_t k = list_length(p);
-    if (k < 3) in_.refuse("face %llu has %llu corners; expected 3 or more", ull(face), ull(k));
-    corners_.clear();
-    for (uint64_t i = 0; i < k; ++i) {
-      const int64_t v = whole(p.type, "a face's vertex");
-      if (v < 0 || v >= int64_t(npoint_))
-        in_.refuse("face %llu refers to vertex %lld; the file has vertices 0 to %lld", ull(face), ll(v),
-                   ll(npoint_) - 1);
-      corners_.push_back(static_cast<uint32_t>(v));
     }
   }
 

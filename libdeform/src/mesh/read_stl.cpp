@@ -44,7 +44,7 @@ class StlReader {
   void corner(double x, double y, double z) { out_.points.insert(out_.points.end(), {x, y, z}); }
 
   void triangle() {
-    const uint32_t last = point_count(in_, out_.points.size() / 3, "corners");
+    const uint32_t last = in_.small(out_.points.size() / 3, "corners");
     const uint32_t corners[3] = {last - 3, last - 2, last - 1};
     out_.add_polygon(in_, corners, 3, group_);
   }

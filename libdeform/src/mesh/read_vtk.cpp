@@ -12,8 +12,6 @@
 namespace dfm {
 namespace {
 
-using Number = VtkNumber;
-
 // VTK writes vtkIdType as int; long is that of the machine that wrote the file, 8 bytes on all
 // that count today.
 Number number_type(const Cursor &in, std::string_view name) {
@@ -131,31 +129,15 @@ class VtkReader {
     in_.swap = std::endian::native == std::endian::little;
   }
 
-  double real(Number type, const char *what) { return vtk_real(in_, type, what); }
-  int64_t integer(Number type, const char *what) { return vtk_integer(in_, type, what); }
-
-  // Bytes that one number takes at least in this file.
-  size_t least(Number type) const { return in_.binary ? vtk_bytes(type) : 2; }
-  uint64_t count(int64_t claimed, size_t numbers_each, Number type, const char *what) const {
-    return in_.binary ? in_.count(claimed, numbers_each * least(type), what)
-                      : in_.text_count(claimed, numbers_each, what);
-  }
-  uint32_t small_count(uint64_t n, const char *what) const {
-    if (n >= UINT32_MAX) in_.unsupported("%llu %s; up to %u are read", ull(n), what, UINT32_MAX - 1);
-    return uint32_t(n);
-  }
-  void begin_data(const char *after) {
-    if (in_.binary) in_.end_line(after);
-  }
   Number real_type(std::string_view name) {
     const Number type = number_type(in_, name);
-    if (vtk_bytes(type) == 0)
+    if (bytes_of(type) == 0)
       in_.refuse("POINTS of type %s; expected float or double", Cursor::quote(name).c_str());
     return type;
   }
   Number integer_type(std::string_view name) {
     const Number type = number_type(in_, name);
-    if (!vtk_whole(type))
+    if (!is_whole(type))
       in_.refuse("cells of type %s; expected a whole-number type such as vtktypeint64",
                  Cursor::quote(name).c_str());
     return type;
@@ -164,15 +146,15 @@ class VtkReader {
   void read_points() {
     const int64_t claimed = in_.integer("the number of points");
     const Number type = real_type(in_.word());
-    begin_data("POINTS");
-    const uint32_t n = small_count(count(claimed, 3, type, "points"), "points");
+    in_.begin_data("POINTS");
+    const uint32_t n = in_.small(in_.count(claimed, 3, type, "points"), "points");
     out_.points.reserve(size_t(n) * 3);
-    for (size_t i = 0; i < size_t(n) * 3; ++i) out_.points.push_back(real(type, "a point's coordinate"));
+    for (size_t i = 0; i < size_t(n) * 3; ++i) out_.points.push_back(in_.real(type, "a point's coordinate"));
   }
 
   uint32_t corner(Number type) {
     const size_t at = in_.offset();
-    const int64_t p = integer(type, "a cell's point number");
+    const int64_t p = in_.integer(type, "a cell's point number");
     if (p < 0 || p >= int64_t(out_.npoint())) {
       if (in_.binary) in_.seek(at);
       in_.refuse("a cell refers to point %lld; the file has points 0 to %lld", ll(p), ll(out_.npoint()) - 1);
@@ -196,18 +178,18 @@ class VtkReader {
     const bool arrays = vtk_lower(in_.word()) == "offsets";
     if (arrays) return read_cell_arrays(first, second);
     in_.seek(at);
-    begin_data("CELLS");
-    const uint64_t size = count(second, 1, Number::i32, "numbers in the cell list");
+    in_.begin_data("CELLS");
+    const uint64_t size = in_.count(second, 1, Number::i32, "numbers in the cell list");
     if (first < 0 || uint64_t(first) > size)
       in_.refuse("CELLS promises %lld cells in a list of %lld numbers", ll(first), ll(second));
-    const uint32_t ncell = small_count(uint64_t(first), "cells");
-    small_count(size, "numbers in the cell list");
-    small_count(cells_.size() + size, "numbers in the cell lists");
+    const uint32_t ncell = in_.small(uint64_t(first), "cells");
+    in_.small(size, "numbers in the cell list");
+    in_.small(cells_.size() + size, "numbers in the cell lists");
     start_.reserve(start_.size() + ncell + 1);
     cells_.reserve(cells_.size() + (size - ncell));
     uint64_t used = 0;
     for (uint32_t c = 0; c < ncell; ++c) {
-      const int64_t k = integer(Number::i32, "a cell's number of points");
+      const int64_t k = in_.integer(Number::i32, "a cell's number of points");
       if (k < 0 || used + 1 + uint64_t(k) > size)
         in_.refuse("cell %u has %lld points; the list of %lld numbers that CELLS promises has no room for it",
                    c, ll(k), ll(second));
@@ -223,29 +205,29 @@ class VtkReader {
 
   void read_cell_arrays(int64_t noffset, int64_t nconnectivity) {
     const Number offset_type = integer_type(in_.word());
-    begin_data("OFFSETS");
-    const uint32_t n = small_count(count(noffset, 1, offset_type, "cell offsets"), "cells");
+    in_.begin_data("OFFSETS");
+    const uint32_t n = in_.small(in_.count(noffset, 1, offset_type, "cell offsets"), "cells");
     const size_t base = cells_.size();
     start_.reserve(start_.size() + n + 1);
     int64_t last = 0;
     for (uint32_t i = 0; i < n; ++i) {
-      const int64_t v = integer(offset_type, "a cell offset");
+      const int64_t v = in_.integer(offset_type, "a cell offset");
       if (v < last || v > nconnectivity || (i == 0 && v != 0))
         in_.refuse("cell offset %lld; offsets start at 0 and rise to the %lld numbers of CONNECTIVITY", ll(v),
                    ll(nconnectivity));
-      start_.push_back(small_count(base + uint64_t(v), "numbers in the cell lists"));
+      start_.push_back(in_.small(base + uint64_t(v), "numbers in the cell lists"));
       last = v;
     }
     if (last != nconnectivity)
       in_.refuse("the last cell offset must equal the %lld numbers of CONNECTIVITY", ll(nconnectivity));
-    if (n == 0) start_.push_back(small_count(base, "numbers in the cell lists"));
+    if (n == 0) start_.push_back(in_.small(base, "numbers in the cell lists"));
     const std::string_view word = in_.word();
     if (vtk_lower(word) != "connectivity")
       in_.refuse("expected CONNECTIVITY after OFFSETS, found %s", Cursor::quote(word).c_str());
     const Number type = integer_type(in_.word());
-    begin_data("CONNECTIVITY");
+    in_.begin_data("CONNECTIVITY");
     const uint32_t m =
-        small_count(count(nconnectivity, 1, type, "numbers in CONNECTIVITY"), "numbers in CONNECTIVITY");
+        in_.small(in_.count(nconnectivity, 1, type, "numbers in CONNECTIVITY"), "numbers in CONNECTIVITY");
     cells_.reserve(base + m);
     for (uint32_t i = 0; i < m; ++i) cells_.push_back(corner(type));
   }
@@ -255,10 +237,10 @@ class VtkReader {
     const size_t ncell = start_.size() - 1;
     if (claimed < 0 || uint64_t(claimed) != ncell)
       in_.refuse("CELL_TYPES promises %lld types, but CELLS has %zu cells", ll(claimed), ncell);
-    begin_data("CELL_TYPES");
-    types_.reserve(count(claimed, 1, Number::i32, "cell types"));
+    in_.begin_data("CELL_TYPES");
+    types_.reserve(in_.count(claimed, 1, Number::i32, "cell types"));
     for (size_t c = 0; c < ncell; ++c) {
-      const int64_t type = integer(Number::i32, "a cell type");
+      const int64_t type = in_.integer(Number::i32, "a cell type");
       if (type < 0 || type > 255)
         in_.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
       types_.push_back(static_cast<uint8_t>(type));
@@ -275,7 +257,6 @@ class VtkReader {
     for (size_t c = 0; shares_.size() == types_.size() && c < types_.size(); ++c)
       if (types_[c] == 10) out_.tet_share.push_back(shares_[c]);
     sink_.finish(in_);
-    sink_.name_groups(group_numbers_, group_names_);
   }
 
   // "name type [components]", "LOOKUP_TABLE name", or "name components tuples type" in a FIELD; then the
@@ -336,21 +317,25 @@ class VtkReader {
 
   void keep_or_skip(bool candidate, std::string_view name, Number type, int64_t n) {
     if (candidate && shares_.empty() && vtk_names_share(name, type)) {
-      begin_data("an array's type");
-      const uint64_t m = count(n, 1, type, "shares");
+      in_.begin_data("an array's type");
+      const uint64_t m = in_.count(n, 1, type, "shares");
       shares_.reserve(m);
-      for (uint64_t i = 0; i < m; ++i) shares_.push_back(real(type, "a cell's share"));
+      for (uint64_t i = 0; i < m; ++i) shares_.push_back(in_.real(type, "a cell's share"));
       return;
     }
-    if (!candidate || !vtk_whole(type) || !labels_.empty() || !vtk_names_groups(name))
+    if (!candidate || !is_whole(type) || !labels_.empty() || !vtk_names_groups(name))
       return skip_values(type, n);
-    begin_data("an array's type");
-    const uint64_t m = count(n, 1, type, "numbers of groups");
-    labels_.reserve(m);
-    for (uint64_t i = 0; i < m; ++i) {
-      const int64_t v = integer(type, "a group's number");
+    read_whole(n, type, "numbers of groups", "a group's number", [&](int64_t v) {
       labels_.push_back(v >= INT32_MIN && v <= int64_t(UINT32_MAX) ? static_cast<int32_t>(v) : 0);
-    }
+    });
+  }
+
+  // The n numbers of an array, whose type has just been read.
+  template <class Keep>
+  void read_whole(int64_t n, Number type, const char *all, const char *one, const Keep &keep) {
+    in_.begin_data("an array's type");
+    const uint64_t m = in_.count(n, 1, type, all);
+    for (uint64_t i = 0; i < m; ++i) keep(in_.integer(type, one));
   }
 
   // "FIELD name n", then n arrays "name components tuples type" and their values. n_cells: where the field is
@@ -374,45 +359,30 @@ class VtkReader {
       const int64_t tuples = in_.integer("an array's number of tuples");
       const Number type = number_type(in_, in_.word());
       if (name == kVtkGroupNumber && width == 2 && type == Number::i32)
-        read_group_numbers(product(2, tuples));
-      else if (name == kVtkGroupName && width == 1 && type == Number::text)
-        skip_strings(tuples, &group_names_);
-      else if (name == kVtkGroupName && width == 1 && type == Number::u8) read_group_names(tuples);
+        read_whole(product(2, tuples), type, "numbers of groups", "a group's number",
+                   [&](int64_t v) { sink_.group_numbers.push_back(v); });
+      else if (name == kVtkGroupName && width == 1 && type == Number::text) read_strings(tuples, true);
+      else if (name == kVtkGroupName && width == 1 && type == Number::u8)
+        read_whole(tuples, type, "characters of names", "a character of a group's name",
+                   [&](int64_t c) { sink_.add_letter(c); });
       else keep_or_skip(n_cells && width == 1 && tuples == *n_cells, name, type, product(width, tuples));
-    }
-  }
-
-  void read_group_numbers(int64_t n) {
-    begin_data("an array's type");
-    const uint64_t m = count(n, 1, Number::i32, "numbers of groups");
-    for (uint64_t i = 0; i < m; ++i) group_numbers_.push_back(integer(Number::i32, "a group's number"));
-  }
-
-  void read_group_names(int64_t n) {
-    begin_data("an array's type");
-    const uint64_t m = count(n, 1, Number::u8, "characters of names");
-    std::string name;
-    for (uint64_t i = 0; i < m; ++i) {
-      const int64_t c = integer(Number::u8, "a character of a group's name");
-      if (c) name += static_cast<char>(c);
-      else group_names_.push_back(std::exchange(name, {}));
     }
   }
 
   void skip_values(Number type, int64_t n) {
     if (type == Number::text) {
-      skip_strings(n, nullptr);
+      read_strings(n, false);
     } else if (in_.binary) {
       in_.end_line("an array's type");
       if (type == Number::bit) in_.skip(size_t((uint64_t(n) + 7) / 8), "a FIELD array");
-      else in_.skip(in_.count(n, vtk_bytes(type), "values") * vtk_bytes(type), "a FIELD array");
+      else in_.skip(in_.count(n, bytes_of(type), "values") * bytes_of(type), "a FIELD array");
     } else {
       for (int64_t i = 0; i < n; ++i)
         if (in_.word().empty()) in_.refuse("the file ends inside a FIELD array of %lld values", ll(n));
     }
   }
 
-  void skip_strings(int64_t n, std::vector<std::string> *keep) {
+  void read_strings(int64_t n, bool names) {
     in_.line();
     for (int64_t i = 0; i < n; ++i) {
       if (in_.left() == 0) in_.refuse("the file ends inside a FIELD of strings");
@@ -424,7 +394,7 @@ class VtkReader {
       } else {
         text = in_.line();
       }
-      if (keep) keep->emplace_back(text);
+      if (names) sink_.add_name(text);
     }
   }
 
@@ -451,8 +421,6 @@ class VtkReader {
   Array<uint8_t> types_;
   Array<int32_t> labels_;  // the file's number of each cell's group, where it has an array of them
   Array<double> shares_;   // of each cell, where it has these
-  std::vector<int64_t> group_numbers_;  // dimension and number of each named group
-  std::vector<std::string> group_names_;
 };
 
 }  // namespace

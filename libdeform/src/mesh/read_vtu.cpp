@@ -42,7 +42,6 @@ class VtuReader {
     if (!closed) in_.refuse("</VTKFile> is missing: the file is truncated");
     if (!piece) in_.refuse("no Piece in this file; expected one with Points and Cells");
     sink_.finish(in_);
-    sink_.name_groups(group_numbers_, group_names_);
   }
 
  private:
@@ -115,7 +114,6 @@ class VtuReader {
   }
 
   void find_arrays(Piece &piece) {
-    static const char *const lists[] = {"Verts", "Lines", "Polys", "Strips"};
     std::string_view section;
     while (const auto tag = next_tag(in_)) {
       if (tag->closes) {
@@ -123,26 +121,26 @@ class VtuReader {
         if (tag->name == section) section = {};
       } else if (tag->name == "DataArray" || tag->name == "Array") {
         if (section.empty() || tag->get("type") == "Bit" || (section == "PointData")) continue;
-        keep_array(piece, section, lists, vtu_place(in_, *tag));
+        keep_array(piece, section, vtu_place(in_, *tag));
       } else if (!tag->empty && section.empty()) section = tag->name;
     }
     in_.refuse("a Piece has no end: the file is truncated");
   }
 
-  void keep_array(Piece &piece, std::string_view section, const char *const *lists, VtuPlace &&place) {
+  void keep_array(Piece &piece, std::string_view section, VtuPlace &&place) {
     if (section == "Points") {
       piece.points = std::move(place);
     } else if (section == "CellData") {
-      if (!piece.group.given && place.components == 1 && vtk_whole(place.type) &&
-          vtk_names_groups(place.name))
+      if (!piece.group.given && place.components == 1 && is_whole(place.type) && vtk_names_groups(place.name))
         piece.group = std::move(place);
       else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type))
         piece.share = std::move(place);
     } else {
-      int list = polydata_ ? -1 : section == "Cells" ? 0 : -1;
-      for (int k = 0; polydata_ && k < 4; ++k)
-        if (section == lists[k]) list = k;
-      if (list < 0) return;
+      static constexpr std::string_view kLists[] = {"Verts", "Lines", "Polys", "Strips"};
+      const size_t list = polydata_            ? size_t(std::find(kLists, kLists + 4, section) - kLists)
+                          : section != "Cells" ? 4
+                                               : 0;
+      if (list == 4) return;
       const std::string name = vtk_lower(place.name);
       CellList &cells = piece.cells[list];
       if (name == "connectivity") cells.connectivity = std::move(place);
@@ -153,7 +151,7 @@ class VtuReader {
 
   VtuNumbers numbers(const VtuPlace &place, uint64_t n, const char *what, bool whole) {
     if (!place.given) in_.refuse("no DataArray of %s: the file is truncated or holds no mesh", what);
-    if (whole && !vtk_whole(place.type)) in_.refuse("the DataArray of %s must be of whole numbers", what);
+    if (whole && !is_whole(place.type)) in_.refuse("the DataArray of %s must be of whole numbers", what);
     VtuNumbers out(*out_.memory, in_, packing_, place);
     out.expect(n, what);
     return out;
@@ -163,12 +161,12 @@ class VtuReader {
     if (piece.npoint == 0) return;
     if (piece.points.given && piece.points.components != 3)
       in_.refuse("points of %u components; expected 3", piece.points.components);
-    const uint32_t n = point_count(in_, piece.npoint);
+    const uint32_t n = in_.small(piece.npoint, "points");
     VtuNumbers a = numbers(piece.points, 3 * uint64_t(n), "points", false);
-    point_count(in_, uint64_t(out_.npoint()) + n);
+    in_.small(uint64_t(out_.npoint()) + n, "points");
     out_.points.reserve(out_.points.size() + 3 * size_t(n));
     for (uint64_t i = 0; i < 3 * uint64_t(n); ++i)
-      out_.points.push_back(vtk_real(a.in, a.type, "a point's coordinate"));
+      out_.points.push_back(a.in.real(a.type, "a point's coordinate"));
   }
 
   void read_cells(const Piece &piece, uint32_t base) {
@@ -195,37 +193,36 @@ class VtuReader {
     if (kind == 0) {
       types.emplace(numbers(list.types, n, "types of cells", true));
       out_.expect_tets(std::min<size_t>(
-          n, connectivity.in.left() / (connectivity.in.binary ? 4 * vtk_bytes(connectivity.type) : 8)));
+          n, connectivity.in.left() / (connectivity.in.binary ? 4 * bytes_of(connectivity.type) : 8)));
     }
     const uint32_t npoint = out_.npoint() - base;
     int64_t end = 0;
     for (uint64_t c = 0; c < n; ++c) {
-      const int64_t next = vtk_integer(offsets.in, offsets.type, "a cell's offset");
+      const int64_t next = offsets.in.integer(offsets.type, "a cell's offset");
       if (next < end)
         offsets.in.refuse("the offset of cell %llu is %lld, after %lld; offsets are ends and rise", ull(c),
                           ll(next), ll(end));
       connectivity.expect(static_cast<uint64_t>(next) - static_cast<uint64_t>(end), "corners of a cell");
       corners_.clear();
       for (; end < next; ++end) {
-        const int64_t p = vtk_integer(connectivity.in, connectivity.type, "a cell's point");
+        const int64_t p = connectivity.in.integer(connectivity.type, "a cell's point");
         if (p < 0 || p >= int64_t(npoint))
           connectivity.in.refuse("cell %llu refers to point %lld; the piece has points 0 to %lld", ull(c),
                                  ll(p), ll(npoint) - 1);
         corners_.push_back(base + static_cast<uint32_t>(p));
       }
       int64_t type = kind;
-      if (types) type = vtk_integer(types->in, types->type, "a cell's type");
+      if (types) type = types->in.integer(types->type, "a cell's type");
       if (type < 0 || type > 255)
         types->in.refuse("cell type %lld; expected 0 to 82 (10 is a tetrahedron)", ll(type));
-      const int64_t label = group ? vtk_integer(group->in, group->type, "a cell's group") : 0;
+      const int64_t label = group ? group->in.integer(group->type, "a cell's group") : 0;
       sink_.add(in_, static_cast<uint8_t>(type), corners_.data(), corners_.size(), label);
-      const double part = share ? vtk_real(share->in, share->type, "a cell's share") : 1;
+      const double part = share ? share->in.real(share->type, "a cell's share") : 1;
       if (share && type == 10) out_.tet_share.push_back(part);
     }
   }
 
-  // Names of groups, as our writer leaves them: pairs of dimension and number, and texts that
-  // end with a zero.
+  // Names of groups.
   void read_field_data() {
     while (const auto tag = next_tag(in_)) {
       if (tag->closes && tag->name == "FieldData") return;
@@ -233,21 +230,14 @@ class VtuReader {
       const std::string_view name = tag->get("Name");
       if (name != kVtkGroupNumber && name != kVtkGroupName) continue;
       const VtuPlace place = vtu_place(in_, *tag);
-      if (place.type != VtkNumber::text && !vtk_whole(place.type)) continue;
+      if (place.type != Number::text && !is_whole(place.type)) continue;
       VtuNumbers a(*out_.memory, in_, packing_, place);
-      std::string text;
       for (;;) {
         if (!a.in.binary) a.in.skip_space();
         if (a.in.left() == 0) break;
-        const int64_t v = vtk_integer(a.in, a.type, "a value of the field data");
-        if (name == kVtkGroupNumber) {
-          group_numbers_.push_back(v);
-        } else if (v) {
-          text += static_cast<char>(v);
-        } else {
-          group_names_.push_back(std::move(text));
-          text.clear();
-        }
+        const int64_t v = a.in.integer(a.type, "a value of the field data");
+        if (name == kVtkGroupNumber) sink_.group_numbers.push_back(v);
+        else sink_.add_letter(v);
       }
     }
     in_.refuse("FieldData has no end: the file is truncated");
@@ -259,8 +249,6 @@ class VtuReader {
   VtuPacking packing_;
   bool polydata_ = false;
   Array<uint32_t> corners_;
-  std::vector<int64_t> group_numbers_;
-  std::vector<std::string> group_names_;
 };
 
 }  // namespace

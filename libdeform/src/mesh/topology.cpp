@@ -2,9 +2,10 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
-#include "math/vec3.h"
+#include "math/extent.h"
 #include "mesh/faces.h"
 #include "mesh/mesh.h"
+#include "mesh/topology_tri.h"
 
 namespace dfm {
 
@@ -97,6 +98,12 @@ Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t
   return edges;
 }
 
+uint32_t count_pieces(const Memory &memory, uint32_t npoint, const Array<uint32_t> &corners, size_t each) {
+  DisjointSets sets(memory, npoint);
+  for (size_t i = 0; i < corners.size(); ++i) sets.join(corners[i / each * each], corners[i]);
+  return sets.number();
+}
+
 double tet_volume(const double *points, const uint32_t *tet) {
   const auto at = [&](int k) { return load3(points + 3 * size_t(tet[k])); };
   return tet_volume(at(0), at(1), at(2), at(3));
@@ -131,29 +138,11 @@ uint32_t count_duplicate_points(const TetMesh &mesh) {
   return n;
 }
 
-// Pieces: points joined by cells.
-uint32_t count_pieces(const TetMesh &mesh) {
-  DisjointSets sets(*mesh.memory, mesh.npoint());
-  uint32_t pieces = mesh.npoint();
-  for (uint32_t t = 0; t < mesh.ntet(); ++t)
-    for (int k = 1; k < 4; ++k) pieces -= sets.join(mesh.tets[4 * size_t(t)], mesh.tets[4 * size_t(t) + k]);
-  return pieces;
-}
-
 uint32_t count_nonmanifold_edges(const Memory &memory, const Array<uint32_t> &triangles) {
-  Array<uint64_t> keys{HookAllocator<uint64_t>(memory)};
-  keys.reserve(triangles.size());
-  for (size_t i = 0; i < triangles.size(); i += 3)
-    for (int k = 0; k < 3; ++k) {
-      const uint32_t a = triangles[i + k], b = triangles[i + (k + 1) % 3];
-      keys.push_back(uint64_t(std::min(a, b)) << 32 | std::max(a, b));
-    }
-  std::sort(keys.begin(), keys.end());
+  const Array<TriEdge> edges = sorted_edges(memory, uint32_t(triangles.size() / 3), triangles.data());
   uint32_t n = 0;
-  for (size_t i = 0, j = 0; i < keys.size(); i = j) {
-    while (j < keys.size() && keys[j] == keys[i]) ++j;
-    n += j - i > 2;
-  }
+  for (size_t i = 2; i < edges.size(); ++i)  // the third triangle at an edge
+    n += edges[i].key == edges[i - 2].key && (i == 2 || edges[i].key != edges[i - 3].key);
   return n;
 }
 
@@ -183,6 +172,30 @@ double wave_path(const TetMesh &mesh) {
 
 }  // namespace
 
+void MeshMeasures::set_edges(Array<double> &lengths) {
+  std::sort(lengths.begin(), lengths.end());
+  edge_min = lengths.front();
+  edge_median = lengths[lengths.size() / 2];
+  edge_max = lengths.back();
+}
+
+void MeshMeasures::set_qualities(size_t n, const std::function<double(size_t)> &quality) {
+  quality_min = 1;
+  for (size_t i = 0; i < n; ++i) {
+    const double q = quality(i);
+    quality_min = std::min(quality_min, q);
+    quality_mean += q;
+    ++histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
+  }
+  quality_mean /= double(n);
+}
+
+void MeshMeasures::set_box(const Array<double> &points) {
+  const Extent box = extent_of(points);
+  store3(lo, box.lo);
+  store3(hi, box.hi);
+}
+
 MeshStatistics mesh_statistics(const TetMesh &mesh) {
   MeshStatistics s;
   const Memory &memory = *mesh.memory;
@@ -202,30 +215,19 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
     for (size_t i = 0; i < edges.size(); i += 2)
       length.push_back(
           norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
-    std::sort(length.begin(), length.end());
-    s.edge_min = length.front();
-    s.edge_median = length[length.size() / 2];
-    s.edge_max = length.back();
+    s.set_edges(length);
   }
-  s.npiece = count_pieces(mesh);
+  s.npiece = count_pieces(memory, s.npoint, mesh.tets, 4);
   s.duplicate_points = count_duplicate_points(mesh);
-  s.quality_min = 1;
-  for (uint32_t t = 0; t < s.ntet; ++t) {
-    const uint32_t *tet = &mesh.tets[4 * size_t(t)];
+  s.set_qualities(s.ntet, [&](size_t t) {
+    const uint32_t *tet = &mesh.tets[4 * t];
     const double q = tet_quality(mesh.points.data(), tet);
     s.volume += tet_volume(mesh.points.data(), tet);
-    s.quality_min = std::min(s.quality_min, q);
-    s.quality_mean += q;
     s.flat_cells += q < 0.01;
-    ++s.histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
-  }
-  s.quality_mean /= s.ntet;
+    return q;
+  });
   s.wave_path = wave_path(mesh);
-  for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = mesh.points[k];
-  for (size_t i = 0; i < mesh.points.size(); ++i) {
-    s.lo[i % 3] = std::min(s.lo[i % 3], mesh.points[i]);
-    s.hi[i % 3] = std::max(s.hi[i % 3], mesh.points[i]);
-  }
+  s.set_box(mesh.points);
   return s;
 }
 

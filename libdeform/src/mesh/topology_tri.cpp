@@ -51,15 +51,6 @@ double triangle_quality(const double *points, const uint32_t *tri) {
 
 namespace {
 
-uint32_t count_pieces(const TriMesh &mesh) {
-  DisjointSets sets(*mesh.memory, mesh.npoint());
-  for (size_t t = 0; t < mesh.tris.size(); t += 3) {
-    sets.join(mesh.tris[t], mesh.tris[t + 1]);
-    sets.join(mesh.tris[t], mesh.tris[t + 2]);
-  }
-  return sets.number();
-}
-
 // Boundary loops: from each end of an open edge around that point, through the triangles between, to the
 // loop's next open edge.
 uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
@@ -113,32 +104,20 @@ TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh) {
     s.closed = s.open_edges + s.nonmanifold_edges + disagreeing == 0;
     s.holes = count_holes(mesh, twin);
   }
-  std::sort(length.begin(), length.end());
-  s.edge_min = length.front();
-  s.edge_median = length[length.size() / 2];
-  s.edge_max = length.back();
-  s.npiece = count_pieces(mesh);
-  for (int k = 0; k < 3; ++k) s.lo[k] = s.hi[k] = points[k];
-  for (size_t i = 0; i < mesh.points.size(); ++i) {
-    s.lo[i % 3] = std::min(s.lo[i % 3], points[i]);
-    s.hi[i % 3] = std::max(s.hi[i % 3], points[i]);
-  }
+  s.set_edges(length);
+  s.npiece = count_pieces(*mesh.memory, s.npoint, mesh.tris, 3);
+  s.set_box(mesh.points);
   // Volume from cones to the middle of the box: far from the origin nothing cancels.
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
-  s.quality_min = 1;
-  for (uint32_t t = 0; t < s.ntri; ++t) {
-    const uint32_t *tri = &mesh.tris[3 * size_t(t)];
+  s.set_qualities(s.ntri, [&](size_t t) {
+    const uint32_t *tri = &mesh.tris[3 * t];
     const Vec3 a = load3(points + 3 * size_t(tri[0]));
     const Vec3 b = load3(points + 3 * size_t(tri[1]));
     const Vec3 c = load3(points + 3 * size_t(tri[2]));
-    const double q = triangle_quality(points, tri);
     s.area += triangle_area(points, tri);
     s.volume += dot(cross(a - middle, b - middle), c - middle) / 6;
-    s.quality_min = std::min(s.quality_min, q);
-    s.quality_mean += q;
-    ++s.histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
-  }
-  s.quality_mean /= s.ntri;
+    return triangle_quality(points, tri);
+  });
   return s;
 }
 

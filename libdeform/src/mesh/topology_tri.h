@@ -21,4 +21,7 @@ Array<TriEdge> sorted_edges(const Memory &memory, uint32_t ntri, const uint32_t 
 // [3 ntri] the half-edge of the other triangle where exactly two meet, else kOpenEdge or kCrowdedEdge.
 Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges);
 
+// Pieces of cells of so many corners: joined by points.
+uint32_t count_pieces(const Memory &memory, uint32_t npoint, const Array<uint32_t> &corners, size_t each);
+
 }  // namespace dfm

@@ -8,15 +8,6 @@
 
 namespace dfm {
 
-enum class VtkNumber : uint8_t { f32, f64, i8, u8, i16, u16, i32, u32, i64, u64, text, bit };
-
-size_t vtk_bytes(VtkNumber type);  // 0 for text and bit
-inline bool vtk_whole(VtkNumber type) {
-  return vtk_bytes(type) && type != VtkNumber::f32 && type != VtkNumber::f64;
-}
-// The next number of a text or binary array; real() is finite.
-double vtk_real(Cursor &in, VtkNumber type, const char *what);
-int64_t vtk_integer(Cursor &in, VtkNumber type, const char *what);
 std::string vtk_lower(std::string_view text);  // its first 64 characters
 
 // Arrays over the cells that are taken for numbers of groups: ours and those of gmsh, meshio, medit and
@@ -26,8 +17,8 @@ inline constexpr const char *kVtkGroup = "group", *kVtkGroupNumber = "group_numb
                             *kVtkGroupName = "group_name";
 // Real numbers over the cells by this name are the shares of a filled surface, as our writer leaves them.
 inline constexpr const char *kVtkShare = "share";
-inline bool vtk_names_share(std::string_view array, VtkNumber type) {
-  return array == kVtkShare && (type == VtkNumber::f32 || type == VtkNumber::f64);
+inline bool vtk_names_share(std::string_view array, Number type) {
+  return array == kVtkShare && is_real(type);
 }
 
 // Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), skips points and lines,
@@ -37,15 +28,20 @@ class VtkCells {
   explicit VtkCells(RawMesh &out) : out_(out) {}
   // Corners are checked to be points of the file. `label`: the file's number of the group, 0 none.
   void add(const Cursor &in, uint8_t type, const uint32_t *corners, size_t n, int64_t label);
-  void finish(const Cursor &in) const;
-  // Names for groups by dimension and number, as our writer leaves them.
-  void name_groups(const std::vector<int64_t> &numbers, const std::vector<std::string> &names);
+  void finish(const Cursor &in);
+
+  // Names for groups, as our writer leaves them: pairs of dimension and number, and names whose letters are
+  // each followed by a zero, or whole.
+  std::vector<int64_t> group_numbers;
+  void add_letter(int64_t letter);
+  void add_name(std::string_view name) { names_.emplace_back(name); }
 
  private:
-  void keep_points(const uint32_t *corners, size_t n, uint32_t group);
   RawMesh &out_;
   size_t cell_ = 0;
   uint64_t curved_ = 0;
+  std::string name_;
+  std::vector<std::string> names_;
 };
 
 }  // namespace dfm

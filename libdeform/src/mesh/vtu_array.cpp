@@ -154,13 +154,13 @@ class Unpacker {
   ByteSource source_;
 };
 
-VtkNumber type_called(const Cursor &in, std::string_view name) {
-  static const std::pair<std::string_view, VtkNumber> known[] = {
-      {"Float32", VtkNumber::f32},   {"Float64", VtkNumber::f64},  {"Int8", VtkNumber::i8},
-      {"UInt8", VtkNumber::u8},      {"Int16", VtkNumber::i16},    {"UInt16", VtkNumber::u16},
-      {"Int32", VtkNumber::i32},     {"UInt32", VtkNumber::u32},   {"Int64", VtkNumber::i64},
-      {"UInt64", VtkNumber::u64},    {"String", VtkNumber::text},  {"Bit", VtkNumber::bit},
-      {"VTKIdType", VtkNumber::i64}, {"vtkIdType", VtkNumber::i64}};
+Number type_called(const Cursor &in, std::string_view name) {
+  static const std::pair<std::string_view, Number> known[] = {
+      {"Float32", Number::f32},   {"Float64", Number::f64},  {"Int8", Number::i8},
+      {"UInt8", Number::u8},      {"Int16", Number::i16},    {"UInt16", Number::u16},
+      {"Int32", Number::i32},     {"UInt32", Number::u32},   {"Int64", Number::i64},
+      {"UInt64", Number::u64},    {"String", Number::text},  {"Bit", Number::bit},
+      {"VTKIdType", Number::i64}, {"vtkIdType", Number::i64}};
   for (const auto &[text, type] : known)
     if (text == name) return type;
   in.refuse("a DataArray of type %s; expected Float64, Float32, Int32, Int64, UInt8 ...",
@@ -228,8 +228,8 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
   place.offset = static_cast<uint64_t>(offset);
   if (tag.empty) return place;
   // Numbers come before the first tag inside; information keys may follow.
-  while (place.text.empty()) {
-    place.text = in.rest().substr(0, in.rest().find('<'));
+  for (;;) {
+    if (place.text.empty()) place.text = in.rest().substr(0, in.rest().find('<'));
     if (place.text.find_first_not_of(" \t\r\n") == place.text.npos) place.text = {};
     const auto inner = next_tag(in);
     if (!inner)
@@ -237,17 +237,13 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
                 Cursor::quote(place.name.empty() ? " " : place.name).c_str());
     if (inner->closes && inner->name == "DataArray") return place;
   }
-  for (auto inner = next_tag(in); inner; inner = next_tag(in))
-    if (inner->closes && inner->name == "DataArray") return place;
-  in.refuse("DataArray %s has no end: the file is truncated",
-            Cursor::quote(place.name.empty() ? " " : place.name).c_str());
 }
 
 VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPacking &packing,
                        const VtuPlace &place)
     : in(file), type(place.type), unpacked_(HookAllocator<char>(memory)) {
-  if (type == VtkNumber::text) type = VtkNumber::i8;
-  if (vtk_bytes(type) == 0) file.unsupported("DataArray '%s' of bits is not read", place.name.c_str());
+  if (type == Number::text) type = Number::i8;
+  if (bytes_of(type) == 0) file.unsupported("DataArray '%s' of bits is not read", place.name.c_str());
   if (place.format == "ascii") {
     const char *const begin = file.rest().data() - file.offset();
     in.seek(place.text.empty() ? file.offset() : size_t(place.text.data() - begin));
@@ -278,9 +274,7 @@ VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPackin
 }
 
 void VtuNumbers::expect(uint64_t n, const char *what) {
-  const int64_t claimed = static_cast<int64_t>(std::min<uint64_t>(n, INT64_MAX));
-  if (in.binary) in.count(claimed, vtk_bytes(type), what);
-  else in.text_count(claimed, 1, what);
+  in.count(static_cast<int64_t>(std::min<uint64_t>(n, INT64_MAX)), 1, type, what);
 }
 
 }  // namespace dfm

@@ -34,7 +34,7 @@ struct VtuPacking {
 // Where one array lies.
 struct VtuPlace {
   bool given = false;
-  VtkNumber type = VtkNumber::f64;
+  Number type = Number::f64;
   uint32_t components = 1;
   std::string name, format;
   std::string_view text;  // between the tags
@@ -48,8 +48,8 @@ class VtuNumbers {
   VtuNumbers(const Memory &memory, const Cursor &file, const VtuPacking &packing, const VtuPlace &place);
   // Refuses where the array has not at least n numbers.
   void expect(uint64_t n, const char *what);
-  Cursor in;  // public for loops over it: vtk_real(a.in, a.type, ..)
-  VtkNumber type;
+  Cursor in;  // public for loops over it: a.in.real(a.type, ..)
+  Number type;
 
  private:
   Array<char> unpacked_;

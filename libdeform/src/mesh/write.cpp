@@ -1,7 +1,4 @@
 // Writes tetrahedral meshes as legacy VTK, VTU and Medit; the file name selects the writer.
-#include <algorithm>
-#include <bit>
-#include <cctype>
 #include <charconv>
 
 #include "core/error.h"
@@ -10,15 +7,6 @@
 
 namespace dfm {
 namespace {
-
-template <class T>
-T big_endian(T value) {
-  if constexpr (std::endian::native == std::endian::little) {
-    auto *bytes = reinterpret_cast<unsigned char *>(&value);
-    std::reverse(bytes, bytes + sizeof value);
-  }
-  return value;
-}
 
 std::string text(uint64_t n) { return std::to_string(n); }
 
@@ -51,8 +39,8 @@ void put_group_names(AtomicFile &out, const TetMesh &mesh) {
             " int\n");
   std::string names;
   for (const MeshGroup &g : mesh.groups) {
-    out.put(big_endian(g.dimension));
-    out.put(big_endian(g.tag));
+    out.put(g.dimension, std::endian::big);
+    out.put(g.tag, std::endian::big);
     names += g.name + '\0';
   }
   out.write(std::string("\n") + kVtkGroupName + " 1 " + text(names.size()) + " unsigned_char\n" + names +
@@ -61,8 +49,8 @@ void put_group_names(AtomicFile &out, const TetMesh &mesh) {
 
 void put_cells(AtomicFile &out, const Array<uint32_t> &cells, uint32_t corners) {
   for (size_t i = 0; i < cells.size(); ++i) {
-    if (i % corners == 0) out.put(big_endian(corners));
-    out.put(big_endian(cells[i]));
+    if (i % corners == 0) out.put(corners, std::endian::big);
+    out.put(cells[i], std::endian::big);
   }
 }
 
@@ -103,12 +91,12 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   const uint64_t ntri = mesh.tri_group.size(), ncell = mesh.ntet() + ntri;
   out.write("# vtk DataFile Version 3.0\ntetrahedra\nBINARY\nDATASET UNSTRUCTURED_GRID\n");
   out.write("POINTS " + text(mesh.npoint()) + " double\n");
-  for (const double x : mesh.points) out.put(big_endian(x));
+  for (const double x : mesh.points) out.put(x, std::endian::big);
   out.write("\nCELLS " + text(ncell) + " " + text(5 * uint64_t(mesh.ntet()) + 4 * ntri) + "\n");
   put_cells(out, mesh.tets, 4);
   put_cells(out, mesh.tris, 3);
   out.write("\nCELL_TYPES " + text(ncell) + "\n");
-  for (uint64_t t = 0; t < ncell; ++t) out.put(big_endian(int32_t(t < mesh.ntet() ? 10 : 5)));
+  for (uint64_t t = 0; t < ncell; ++t) out.put(int32_t(t < mesh.ntet() ? 10 : 5), std::endian::big);
   out.write("\n");
   put_group_names(out, mesh);
   const Array<uint32_t> groups = group_numbers(mesh);
@@ -116,12 +104,12 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   if (!groups.empty() || !share.empty()) out.write("CELL_DATA " + text(ncell) + "\n");
   if (!groups.empty()) {
     out.write(std::string("SCALARS ") + kVtkGroup + " int 1\nLOOKUP_TABLE default\n");
-    for (const uint32_t g : groups) out.put(big_endian(g));
+    for (const uint32_t g : groups) out.put(g, std::endian::big);
     out.write("\n");
   }
   if (!share.empty()) {
     out.write("SCALARS share double 1\nLOOKUP_TABLE default\n");
-    for (const double s : share) out.put(big_endian(s));
+    for (const double s : share) out.put(s, std::endian::big);
     out.write("\n");
   }
   out.commit();
@@ -158,22 +146,18 @@ void write_medit(const TetMesh &mesh, const std::string &path) {
 }
 
 bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
-  const auto ends = [&](const char *ending) {
-    const std::string e(ending);
-    const auto same = [](char a, char b) { return a == std::tolower(static_cast<unsigned char>(b)); };
-    return path.size() > e.size() && std::equal(e.rbegin(), e.rend(), path.rbegin(), same);
-  };
-  if (ends(".msh")) write_msh41(mesh, path);
-  else if (ends(".msh2")) write_msh22(mesh, path);
-  else if (ends(".vtk")) write_vtk(mesh, path);
-  else if (ends(".vtu")) write_vtu(mesh, path);
-  else if (ends(".mesh")) write_medit(mesh, path);
+  const std::string ending = ending_of(path);
+  if (ending == "msh") write_msh41(mesh, path);
+  else if (ending == "msh2") write_msh22(mesh, path);
+  else if (ending == "vtk") write_vtk(mesh, path);
+  else if (ending == "vtu") write_vtu(mesh, path);
+  else if (ending == "mesh") write_medit(mesh, path);
   else
     fail(DFM_E_UNSUPPORTED,
          "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), "
          ".vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)",
          path.c_str());
-  return mesh.share.empty() || ends(".vtk") || ends(".vtu");
+  return mesh.share.empty() || ending == "vtk" || ending == "vtu";
 }
 
 }  // namespace dfm

@@ -1,10 +1,10 @@
 // MSH 2.2 and 4.1, binary. Cells keep their order; groups of points and of triangles are written before them,
 // as elements of their own.
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "math/extent.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
@@ -82,11 +82,7 @@ int32_t entity_of(const TetMesh &mesh, uint32_t group) {  // one entity per grou
 }
 
 void put_entities(AtomicFile &out, const TetMesh &mesh, std::vector<uint32_t> groups) {
-  double box[6] = {HUGE_VAL, HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL, -HUGE_VAL};
-  for (size_t i = 0; i < mesh.points.size(); ++i) {
-    box[i % 3] = std::min(box[i % 3], mesh.points[i]);
-    box[3 + i % 3] = std::max(box[3 + i % 3], mesh.points[i]);
-  }
+  const Extent box = extent_of(mesh.points);
   groups.push_back(kNoGroup);
   const auto dimension = [&](uint32_t g) { return g == kNoGroup ? 3 : mesh.groups[g].dimension; };
   out.write("$Entities\n");
@@ -98,7 +94,7 @@ void put_entities(AtomicFile &out, const TetMesh &mesh, std::vector<uint32_t> gr
     for (const uint32_t g : groups) {
       if (dimension(g) != d) continue;
       out.put(entity_of(mesh, g));
-      out.write(box, d == 0 ? sizeof box / 2 : sizeof box);
+      out.write(&box, d == 0 ? sizeof box / 2 : sizeof box);  // of a point once
       out.put<uint64_t>(g != kNoGroup);
       if (g != kNoGroup) out.put(mesh.groups[g].tag);
       if (d > 0) out.put<uint64_t>(0);

@@ -2,7 +2,6 @@
 // back as it was.
 #include <algorithm>
 #include <bit>
-#include <cctype>
 #include <cfloat>
 #include <cmath>
 
@@ -13,15 +12,6 @@
 
 namespace dfm {
 namespace {
-
-// Bytes of a number in the order the format wants.
-template <class T>
-void put_as(AtomicFile &out, std::endian order, T value) {
-  char bytes[sizeof(T)];
-  std::copy_n(reinterpret_cast<const char *>(&value), sizeof(T), bytes);
-  if (order != std::endian::native) std::reverse(bytes, bytes + sizeof(T));
-  out.write(bytes, sizeof(T));
-}
 
 std::string text(uint64_t n) { return std::to_string(n); }
 
@@ -82,9 +72,9 @@ void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
   std::string head = "binary STL, m";
   head.resize(80, ' ');
   out.write(head);
-  put_as(out, std::endian::little, mesh.ntri());
+  out.put(mesh.ntri(), std::endian::little);
   const auto put_vector = [&](Vec3 v) {
-    for (int k = 0; k < 3; ++k) put_as(out, std::endian::little, float(v[k]));
+    for (int k = 0; k < 3; ++k) out.put(float(v[k]), std::endian::little);
   };
   for (size_t i = 0; i < mesh.tris.size(); i += 3) {
     Vec3 corner[3];
@@ -109,21 +99,18 @@ TetMesh as_cells(const TriMesh &mesh) {
 }  // namespace
 
 void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
-  const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
-  std::string ending =
-      dot == std::string::npos || (slash != std::string::npos && dot < slash) ? "" : path.substr(dot);
-  for (char &c : ending) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (ending == ".vtk") return write_vtk(as_cells(mesh), path);
-  if (ending == ".vtu") return write_vtu(as_cells(mesh), path);
-  static const std::vector<std::string> known{".obj", ".ply", ".stl", ".off", ".vtk", ".vtu"};
-  if (std::find(known.begin(), known.end(), ending) == known.end())
+  const std::string ending = ending_of(path);
+  if (ending == "vtk") return write_vtk(as_cells(mesh), path);
+  if (ending == "vtu") return write_vtu(as_cells(mesh), path);
+  if (ending != "obj" && ending != "ply" && ending != "stl" && ending != "off")
     fail(DFM_E_UNSUPPORTED,
-         "%s: a surface is written as %s, chosen by the ending of the file name, which is '%s' here",
-         path.c_str(), join(known).c_str(), ending.c_str());
+         "%s: a surface is written as .obj, .ply, .stl, .off, .vtk, .vtu, chosen by the ending of the file "
+         "name, which is '%s%s' here",
+         path.c_str(), ending.empty() ? "" : ".", ending.c_str());
   AtomicFile out(path);
-  if (ending == ".obj") put_obj(out, mesh);
-  else if (ending == ".ply") put_ply(out, mesh);
-  else if (ending == ".stl") put_stl(out, mesh, path);
+  if (ending == "obj") put_obj(out, mesh);
+  else if (ending == "ply") put_ply(out, mesh);
+  else if (ending == "stl") put_stl(out, mesh, path);
   else put_off(out, mesh);
   out.commit();
 }

@@ -115,6 +115,10 @@ inline bool rests(const Pair &pair, double reach, ContactPoint &c) {
   return c.distance < reach;
 }
 
+// Gives contacts of surfaces, from `begin` on, their keys: those of one feature of a with one patch of b are
+// counted. The area that each has, a surfel's, is divided among those in which the surfel touches.
+void name_contacts(const Pair &pair, size_t begin, Array<ContactPoint> &out);
+
 // Each works on one run: all candidates of one pair and kind.
 void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out);
 void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out);

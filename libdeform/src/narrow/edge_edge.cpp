@@ -96,25 +96,6 @@ bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h) {
   return edge_convex(surface, edge, 0) || edge_convex(surface, edge, 2 * h);
 }
 
-namespace {
-
-// Keys of the contacts from `begin` on. Those of an edge of `a` with one patch of `b` are counted.
-void set_keys(const Pair &pair, size_t begin, Array<ContactPoint> &out) {
-  const Surface &sa = *pair.a.surface, &sb = *pair.b->surface;
-  const auto patch = [&](const ContactPoint &c) {
-    const uint32_t *t = &sb.edge_tri[2 * size_t{c.feature_b}];
-    return sb.patch[t[0] != kNone ? t[0] : t[1]];
-  };
-  for (size_t i = begin; i < out.size(); ++i) {
-    uint32_t ordinal = 0;
-    for (size_t j = i; j-- > begin && out[j].feature_a == out[i].feature_a;)
-      ordinal += patch(out[j]) == patch(out[i]);
-    out[i].key = contact_key(out[i], sa, pair.a.id, &sb, pair.b->id, patch(out[i]), ordinal);
-  }
-}
-
-}  // namespace
-
 void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const Surface &sa = *pair.a.surface, &sb = *pair.b->surface;
   const size_t begin = out.size();
@@ -191,7 +172,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
                     rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);
     out.push_back(c);
   }
-  set_keys(pair, begin, out);
+  name_contacts(pair, begin, out);
 }
 
 }  // namespace dfm::narrow

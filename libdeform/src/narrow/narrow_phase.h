@@ -10,7 +10,6 @@
 // reached. Edges that bore each other in the last sub-step count on, convex or not. All decisions use this
 // and the geometry of the sub-step alone: more candidates never change the result.
 #pragma once
-#include <atomic>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -43,19 +42,11 @@ class NarrowBlocks {
   template <class Find>
   void run(Tasks &tasks, const Array<Candidate> &list, const Find &find, Array<ContactPoint> &out) {
     while (found_.size() < pieces_.size()) found_.emplace_back(HookAllocator<ContactPoint>(*memory_));
-    std::atomic<bool> failed{false};
-    tasks.parallel_for(static_cast<uint32_t>(pieces_.size()), 1, [&](uint32_t begin, uint32_t end) {
-      for (uint32_t k = begin; k < end; ++k) {
-        found_[k].clear();
-        try {
-          const Piece &p = pieces_[k];
-          find(std::span(&list[p.begin], p.end - p.begin), p.speed, found_[k]);
-        } catch (const std::bad_alloc &) {
-          failed = true;  // exceptions must not leave a worker
-        }
-      }
+    each_on(&tasks, pieces_.size(), 1, [&](size_t k) {
+      found_[k].clear();
+      const Piece &p = pieces_[k];
+      find(std::span(&list[p.begin], p.end - p.begin), p.speed, found_[k]);
     });
-    if (failed) throw std::bad_alloc();
     for (size_t k = 0; k < pieces_.size(); ++k) out.insert(out.end(), found_[k].begin(), found_[k].end());
   }
 

@@ -39,17 +39,9 @@ using namespace narrow;
 // Sine of the fold at the positions x + ahead v: negative where the edge is convex; an open edge is as convex
 // as can be (geometry/convex.h).
 double fold(const Surface &s, uint32_t edge, double ahead) {
-  const uint32_t *const ends = &s.edge[2 * size_t{edge}], *const tris = &s.edge_tri[2 * size_t{edge}];
-  if (tris[0] == kNone || tris[1] == kNone) return -1;
-  const auto x = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]) + ahead * load3(&s.v[4 * size_t{i}]); };
-  const auto far_corner = [&](uint32_t t) {
-    const uint32_t *const c = &s.tri[3 * size_t{t}];
-    return c[0] + c[1] + c[2] - ends[0] - ends[1];
-  };
-  const Vec3 from = x(ends[0]), e = x(ends[1]) - from, r1 = x(far_corner(tris[1])) - from;
-  const Vec3 c0 = cross(e, x(far_corner(tris[0])) - from), c1 = cross(r1, e);
-  const double size2 = norm2(c0) * norm2(c1);
-  return size2 > 0 ? dot(c0, r1) * norm(e) / std::sqrt(size2) : 0;
+  if (edge_open(s, edge)) return -1;
+  const Fold f = fold_of(s, edge, ahead);
+  return f.size2 > 0 ? -f.value * std::sqrt(f.e2) / std::sqrt(f.size2) : 0;
 }
 
 // relative: a triangle beside the feature counts as nearer only beyond this
@@ -212,7 +204,6 @@ struct Self {
   void edge_edge(uint32_t a, uint32_t b, Kin *kept);
   template <bool Opened>
   void find(SelfPairs &pairs, Array<uint8_t> &lent);
-  void name(size_t begin);
   void share_areas(size_t begin, size_t edges, Array<uint8_t> &lent);
 };
 
@@ -444,28 +435,6 @@ void Self::edge_edge(uint32_t a, uint32_t b, Kin *kept) {
   out.push_back(c);
 }
 
-// Keys, and a surfel's area among the faces that it touches.
-void Self::name(size_t begin) {
-  const auto patch = [&](const ContactPoint &c) {
-    const uint32_t *const sides = &s.edge_tri[2 * size_t{c.feature_b}];
-    return s.patch[c.kind == kVertexFace ? c.feature_b : sides[0] != kNone ? sides[0] : sides[1]];
-  };
-  for (size_t i = begin; i < out.size();) {
-    size_t end = i;
-    uint32_t touching = 0;
-    for (; end < out.size() && out[end].type_a == out[i].type_a && out[end].feature_a == out[i].feature_a;
-         ++end)
-      touching += out[end].distance < 2 * offset;
-    for (size_t k = i; k < end; ++k) {
-      uint32_t ordinal = 0;
-      for (size_t j = i; j < k; ++j) ordinal += patch(out[j]) == patch(out[k]);
-      out[k].key = contact_key(out[k], s, body.id, &s, body.id, patch(out[k]), ordinal);
-      if (out[k].distance < 2 * offset) out[k].area /= touching;
-    }
-    i = end;
-  }
-}
-
 // An edge contact takes over the area of the nearest of its ends that has no contact of its own; none
 // is given twice.
 void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
@@ -497,7 +466,7 @@ void Self::find(SelfPairs &pairs, Array<uint8_t> &lent) {
   const size_t edges = out.size();
   for (size_t i = 0; i < ee.size(); ++i)
     edge_edge<Opened>(ee[i].a, ee[i].b, Opened ? &pairs.of_edges[i] : nullptr);
-  name(begin);
+  name_contacts(pair, begin, out);
   share_areas(begin, edges, lent);
 }
 

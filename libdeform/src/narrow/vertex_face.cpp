@@ -178,17 +178,14 @@ Vec3 Group::outward(const Near &n) const {
 // Is p beside an open surface, where there is no inside?
 bool Group::beyond_rim(const Near &n) const {
   const Surface &s = *pair.b->surface;
-  const auto open = [&](uint32_t edge) {
-    return s.edge_tri[2 * size_t{edge}] == kNone || s.edge_tri[2 * size_t{edge} + 1] == kNone;
-  };
   const int f = int(n.feature);
   if (f == 0) return false;
-  if (f < 4) return open(s.tri_edge[3 * size_t{n.tri} + f - 1]);
+  if (f < 4) return edge_open(s, s.tri_edge[3 * size_t{n.tri} + f - 1]);
   const uint32_t corner = corners(n)[f - 4];
   for (uint32_t k = s.fan_begin[corner]; k < s.fan_begin[corner + 1]; ++k)
     for (int i = 0; i < 3; ++i) {
       const uint32_t *c = &s.tri[3 * size_t{s.fan[k]}];
-      if ((c[i] == corner || c[(i + 1) % 3] == corner) && open(s.tri_edge[3 * size_t{s.fan[k]} + i]))
+      if ((c[i] == corner || c[(i + 1) % 3] == corner) && edge_open(s, s.tri_edge[3 * size_t{s.fan[k]} + i]))
         return true;
     }
   return false;
@@ -301,6 +298,7 @@ void Group::emit(Near &n, Vec3 normal, double distance, const double weight[3],
   add_node(c, pair.a.first_node + surfel, 1);
   for (int k = 0; k < 3; ++k) add_node(c, pair.b->first_node + corners(n)[k], -weight[k]);
   place(c, p, p - distance * normal, normal, distance);
+  c.area = 0.5 * facing_area(*pair.a.surface, surfel, -normal);
   if (rests(pair, n.reach, c)) out.push_back(c);
   n.emitted = true;
   n.emitted_normal = normal;
@@ -347,8 +345,27 @@ void Group::resolve(Array<ContactPoint> &out) {
 
 }  // namespace
 
-void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
+void name_contacts(const Pair &pair, size_t begin, Array<ContactPoint> &out) {
   const Surface &b = *pair.b->surface;
+  const auto patch = [&](const ContactPoint &c) {
+    const uint32_t *const sides = &b.edge_tri[2 * size_t{c.feature_b}];
+    return b.patch[c.type_a == 0 ? c.feature_b : sides[0] != kNone ? sides[0] : sides[1]];
+  };
+  for (size_t i = begin, end = begin; i < out.size(); i = end) {
+    uint32_t touching = 0;
+    for (; end < out.size() && out[end].type_a == out[i].type_a && out[end].feature_a == out[i].feature_a;
+         ++end)
+      touching += out[end].distance < 2 * pair.offset;
+    for (size_t k = i; k < end; ++k) {
+      uint32_t ordinal = 0;
+      for (size_t j = i; j < k; ++j) ordinal += patch(out[j]) == patch(out[k]);
+      out[k].key = contact_key(out[k], *pair.a.surface, pair.a.id, &b, pair.b->id, patch(out[k]), ordinal);
+      if (out[k].distance < 2 * pair.offset) out[k].area /= touching;
+    }
+  }
+}
+
+void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
   Group group(pair);
   for (size_t i = 0; i < run.size();) {
     size_t end = i + 1;
@@ -362,16 +379,7 @@ void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
     group.resolve(out);
     std::sort(out.begin() + begin, out.end(),
               [](const ContactPoint &l, const ContactPoint &r) { return l.feature_b < r.feature_b; });
-    uint32_t touching = 0;
-    for (size_t k = begin; k < out.size(); ++k) touching += out[k].distance < 2 * pair.offset;
-    for (size_t k = begin; k < out.size(); ++k) {
-      uint32_t ordinal = 0;
-      for (size_t j = begin; j < k; ++j) ordinal += b.patch[out[j].feature_b] == b.patch[out[k].feature_b];
-      out[k].key =
-          contact_key(out[k], *pair.a.surface, pair.a.id, &b, pair.b->id, b.patch[out[k].feature_b], ordinal);
-      const double area = facing_area(*pair.a.surface, group.surfel, -load3(out[k].normal));
-      out[k].area = 0.5 * area / (out[k].distance < 2 * pair.offset ? touching : 1);
-    }
+    name_contacts(pair, begin, out);
   }
 }
 

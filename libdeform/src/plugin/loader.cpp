@@ -17,10 +17,29 @@
 #include "plugin/boundary.h"
 #include "plugin/registry.h"
 #include "plugin/shared_object.h"
-#include "plugin/static_list.h"
+
+// Plugins linked into the library (option DEFORM_PLUGINS_STATIC): X(name) X(name) ..., written by the build.
+#ifdef DEFORM_STATIC_PLUGIN_LIST
+#define X(name) extern "C" const dfm_plugin *dfm_plugin_entry_##name(const dfm_host *, uint32_t, uint32_t);
+DEFORM_STATIC_PLUGIN_LIST
+#undef X
+#else
+#define DEFORM_STATIC_PLUGIN_LIST
+#endif
 
 namespace dfm {
 namespace {
+
+struct StaticPlugin {
+  const char *name;
+  dfm_plugin_fn entry;
+};
+#define X(name) {#name, dfm_plugin_entry_##name},
+const std::vector<StaticPlugin> &static_plugins() {
+  static const std::vector<StaticPlugin> list{DEFORM_STATIC_PLUGIN_LIST};
+  return list;
+}
+#undef X
 
 thread_local std::string *entry_log = nullptr;
 
@@ -171,14 +190,19 @@ void Loader::enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plu
   std::memcpy(&plugin, given, std::min<size_t>(given->size, sizeof plugin));
 }
 
+const Loader::Module *Loader::loaded_from(uint64_t device, uint64_t inode) const {
+  for (const Module &module : modules_)
+    if (module.image && module.device == device && module.inode == inode) return &module;
+  return nullptr;
+}
+
 bool Loader::load(const std::string &path) {
   const std::string file = real_path(path);
   struct stat st{};
   if (stat(file.c_str(), &st) != 0)
     fail(DFM_E_IO, "cannot read plugin \"%s\": %s", path.c_str(), std::strerror(errno));
   if (!S_ISREG(st.st_mode)) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
-  for (const Module &module : modules_)
-    if (module.image && module.device == st.st_dev && module.inode == st.st_ino) return false;
+  if (loaded_from(st.st_dev, st.st_ino)) return false;
 
   const std::lock_guard one_at_a_time(door);
   Visit visit(host_, path);
@@ -241,10 +265,9 @@ std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
   struct stat st{};
   std::vector<const dfm_type *> out;
   if (stat(path.c_str(), &st) != 0) return out;
-  for (const Module &module : modules_)
-    if (module.image && module.device == st.st_dev && module.inode == st.st_ino)
-      for (const dfm_type *type : registry_.list())
-        if (registry_.file_of(*type) == module.file) out.push_back(type);
+  const Module *const module = loaded_from(st.st_dev, st.st_ino);
+  for (const dfm_type *type : registry_.list())
+    if (module && registry_.file_of(*type) == module->file) out.push_back(type);
   return out;
 }
 

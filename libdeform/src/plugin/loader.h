@@ -41,6 +41,7 @@ class Loader {
     dfm_plugin_fn entry;
     void (*shutdown)(void);
   };
+  const Module *loaded_from(uint64_t device, uint64_t inode) const;  // null: no module
   void keep(Module &&module, const dfm_plugin &plugin);
   void enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin);
   void scan_if_there(const std::string &directory, bool asked_for);

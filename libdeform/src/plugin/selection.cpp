@@ -30,18 +30,6 @@ std::vector<size_t> first_values(const dfm_type &type) {
   return first;
 }
 
-const double *value_of(const dfm_type &type, const std::vector<double> &values, const char *key) {
-  const std::vector<size_t> first = first_values(type);
-  for (uint32_t i = 0; i < type.nparam; ++i)
-    if (std::strcmp(type.params[i].key, key) == 0) return &values[first[i]];
-  return nullptr;
-}
-
-bool has_row(const dfm_type &type, const char *key) {
-  return std::any_of(type.params, type.params + type.nparam,
-                     [&](const dfm_param &row) { return std::strcmp(row.key, key) == 0; });
-}
-
 bool remembers(const dfm_type &type, const dfm_host &host, const std::vector<double> &values) {
   return !law_slots(type, host, values.data()).empty();
 }
@@ -50,12 +38,12 @@ bool remembers(const dfm_type &type, const dfm_host &host, const std::vector<dou
 std::optional<SelectedLaw> plain_law(const Registry &registry, const dfm_type &type,
                                      const std::vector<double> &values) {
   const dfm_type *const plain = registry.try_find(DFM_KIND_FRICTION, kCheapest);
-  const double *const mu = value_of(type, values, "mu_C");
+  const dfm_param *const mu = find_row(type, "mu_C");
   if (!plain || !mu) return std::nullopt;
   const std::vector<size_t> first = first_values(type);
-  std::vector<dfm_param_value> rows{{"mu", mu, 1}};
+  std::vector<dfm_param_value> rows{{"mu", &values[first[size_t(mu - type.params)]], 1}};
   for (uint32_t i = 0; i < type.nparam; ++i)
-    if (has_row(*plain, type.params[i].key) && type.params[i].width == 1)
+    if (find_row(*plain, type.params[i].key) && type.params[i].width == 1)
       rows.push_back({type.params[i].key, &values[first[i]], 1});
   try {
     return SelectedLaw{plain, pack_params(*plain, rows)};

@@ -8,6 +8,7 @@
 
 #include "body/obstacle_mesh.h"
 #include "geometry/closest.h"
+#include "geometry/tree_walk.h"
 #include "geometry/voxel_grid.h"
 
 namespace dfm {
@@ -86,10 +87,7 @@ void probe_inner(OverlapSkin &a, OverlapSkin &b, double least, Crossed &out) {
 }  // namespace
 
 OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
-    : memory_(&memory),
-      surface_(&b.surface),
-      x_(HookAllocator<double>(memory)),
-      stack_(HookAllocator<PairOfTriangles>(memory)) {
+    : memory_(&memory), surface_(&b.surface), x_(HookAllocator<double>(memory)) {
   const Surface &s = b.surface;
   x_.assign(size_t{4} * s.nsurfel, 0.0);
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
@@ -109,10 +107,7 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
 }
 
 OverlapSkin::OverlapSkin(const Memory &memory, const Obstacle &o)
-    : memory_(&memory),
-      surface_(&own_),
-      x_(HookAllocator<double>(memory)),
-      stack_(HookAllocator<PairOfTriangles>(memory)) {
+    : memory_(&memory), surface_(&own_), x_(HookAllocator<double>(memory)) {
   Array<double> box{HookAllocator<double>(memory)};
   const Array<double> *points = &o.points;
   if (o.def.shape == DFM_SHAPE_BOX) {
@@ -188,7 +183,7 @@ bool OverlapSkin::covers(Vec3 p) { return surface_->identity() || std::fabs(turn
 double OverlapSkin::distance(Vec3 p) {
   double best = norm2(p - x(0));
   near_triangles(
-      tree(), stack_,
+      tree(),
       [&](const Box &b) {
         Vec3 away;
         for (int k = 0; k < 3; ++k) away[k] = std::max({b.lo[k] - p[k], p[k] - b.hi[k], 0.0});

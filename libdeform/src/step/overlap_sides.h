@@ -53,7 +53,6 @@ class OverlapSkin {
   std::vector<Vec3> inner_;
   std::unique_ptr<BoxTree> tree_;
   std::unique_ptr<WindingTree> winding_;
-  Array<PairOfTriangles> stack_;
 };
 
 // The result for two sides.
