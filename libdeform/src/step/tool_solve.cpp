@@ -238,7 +238,7 @@ void ToolTouch::solve_island(World &w, StepContext &step, size_t island, double 
   RowsPart part{runs_[island], {}, blocks_[island]};
   for (const RowRun &run : runs_[island]) part.n += run.n;
   const double rest = kRest * tangent_at_rest(w, h_);
-  Tolerance tolerance{normal_at_rest(w, h_), least, tolerance_.data(), tolerance_.data()};
+  Tolerance tolerance{normal_at_rest(w, h_), least, normal_tolerance_.data(), tolerance_.data()};
   batches_.gather(laws_, runs_[island], state_);
   RigidLaws laws(w, step, solved_, part, state_, batches_, tolerance);
   solved_.restore(part);
@@ -246,7 +246,10 @@ void ToolTouch::solve_island(World &w, StepContext &step, size_t island, double 
   // slopes of an earlier sub-step are of no use for the residual of the start
   if (laws.judge(left) && (!batches_.differences() || (laws.slopes() && laws.judge(left)))) {
     tolerance.bond = std::max(least, kDisturbed * left.speed);
-    each_row(part.contacts, [&](uint32_t i) { tolerance_[i] = tolerance.bond; });
+    each_row(part.contacts, [&](uint32_t i) {
+      tolerance_[i] = tolerance.bond;
+      normal_tolerance_[i] = std::min(tolerance.bond, kOff * offset_ / h_);
+    });
     bool found = sweep_island(laws, part, tolerance, left);
     if (!found && !laws.bad && left.speed > rest && !is_used_up(step)) {
       if (island >= newtons_.size()) newtons_.resize(island + 1);
@@ -260,6 +263,7 @@ void ToolTouch::solve_island(World &w, StepContext &step, size_t island, double 
       solved_.restore(part);
       laws.judge(left);
     }
+    if (!found) left_ = std::max(left_, left.normal);
     each_row(part.contacts, [&](uint32_t i) {
       rows_[i].impulse = solved_.impulse[3 * size_t{i}];
       std::copy_n(&solved_.impulse[3 * size_t{i} + 1], 2, rows_[i].along);
@@ -277,6 +281,7 @@ void ToolTouch::solve_rows(World &w, StepContext &step, double tolerance) {
   build_rows();
   find_islands();
   tolerance_.assign(rows_.size(), tolerance);
+  normal_tolerance_.assign(rows_.size(), tolerance);
   for (size_t k = 0; k < runs_.size(); ++k) solve_island(w, step, k, tolerance);
   push_all();
 }

@@ -27,7 +27,6 @@ constexpr double kDent = 5e-4;             // m: edges that are further on the w
 constexpr double kCross = 1e-6;            // sine between edges that have a normal
 constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
 constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
-constexpr double kOff = 0.2;               // of d_c, that places may be off after the passes: else it is, too
 constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
 constexpr double kNear = 0.5;        // of the least thickness: a row with an impulse is no longer than this
 constexpr double kFaster = 0.5;      // of the change by the pass before: else passes end
@@ -535,9 +534,11 @@ void ToolTouch::solve(World &w, StepContext &step) {
       if (pass > 0 && row.impulse > 0) off_ = std::max(off_, h_ * std::fabs(row.lift - lift));
     }
     if (pass > 0) changed = std::max(changed, follow_spin());
+    if (pass > 0) off_ = std::max(off_, h_ * left_);
     for (Moved &m : sides_) m.stale = m.stale || revisions == kMostRevisions;
     if (pass > 0 && (!(changed > done) || !(changed < kFaster * before) || pass == kMostPasses)) return;
     if (pass > 0) before = changed;
+    left_ = 0;
     solve_rows(w, step, std::max(done, kSharper * changed));
   }
 }

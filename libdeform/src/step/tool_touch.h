@@ -274,11 +274,13 @@ class ToolTouch {
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
+  static constexpr double kOff = 0.2;    // of d_c, that places may be off after a sub-step
 
   double h_ = 0, offset_ = 0;
   double planned_ = 0;        // s, the sub-step before it was shortened
   std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
   double off_ = 0;            // m, that places with load or joints may be off after a solve
+  double left_ = 0;           // m/s along normals, that the last solve has left
   double strong_ = 1;         // of the answer without joints, that places give where a motor holds
   double thinnest_ = 0;       // m, of the pairs of free bodies
   std::vector<Pair> pairs_,
@@ -300,7 +302,7 @@ class ToolTouch {
   DisjointSets islands_;                                 // of groups that rows connect
   std::vector<std::vector<RowRun>> runs_;                // [islands]
   std::vector<std::vector<uint32_t>> blocks_;            // [islands]
-  std::vector<double> tolerance_;                        // [rows] m/s
+  std::vector<double> tolerance_, normal_tolerance_;     // [rows] m/s
   std::vector<uint32_t> shared_;                         // rows that are solved with soft bodies
   std::vector<RigidSides> shared_sides_;                 // theirs
   std::vector<uint8_t> shared_groups_, shared_islands_;  // scratch
