@@ -92,8 +92,8 @@ struct ContactRows {
   Array<double> frame;
   Array<double> drive;        // [all,3] obstacle velocity in the frame
   Array<double> rate;         // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
-  Array<double> borne;        // [n] N s, normal impulses at the start of the sub-step
-  Array<double> start_depth;  // [n] m, that counts as distance (ContactStore); empty: none
+  Array<double> borne;        // [soft()] N s, normal impulses at the start of the sub-step
+  Array<double> start_depth;  // [soft()] m, that counts as distance (ContactStore); empty: none
   // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the
   // softness c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l -
   // p, 0), m) is added to u_n + rate. 0, 0, 0 for all others.

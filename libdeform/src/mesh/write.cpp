@@ -146,7 +146,7 @@ void write_medit(const TetMesh &mesh, const std::string &path) {
 }
 
 bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
-  const std::string ending = ending_of(path);
+  const std::string ending = path.rfind('.') == 0 ? "" : ending_of(path);  // a hidden file has none
   if (ending == "msh") write_msh41(mesh, path);
   else if (ending == "msh2") write_msh22(mesh, path);
   else if (ending == "vtk") write_vtk(mesh, path);

@@ -99,7 +99,8 @@ struct StepContext {
   Array<uint8_t> near;               // [bodies] had contacts in the last sub-step
   Array<uint8_t> touching;           // [bodies] touch something, between steps
   std::unique_ptr<ToolTouch> tools;  // with each other
-  // a rigid host has revised its response, and the solve continues from its last impulses
+  // a rigid host, or rows between rigid things, have changed their motion: the solve goes on from its last
+  // impulses
   bool rigid_again = false;
   uint32_t rigid_rounds = 0;  // of solves that rigid things have requested
   AreaShares areas;

@@ -96,7 +96,7 @@ void take_choices(StepContext &step) {
   step.state.scale.clear();
   if (step.chosen.empty()) return;
   bool scaled = false;
-  for (uint32_t i = 0; i < step.state.n; ++i) {
+  for (uint32_t i = 0; i < step.contacts.size(); ++i) {
     step.state.law[i] = step.chosen[i].law;
     scaled = scaled || step.chosen[i].scale != 1;
   }

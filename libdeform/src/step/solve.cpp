@@ -108,6 +108,7 @@ void make_rows(World &w, StepContext &step) {
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, again);
   make_cut_drags(w, step, again);
+  if (step.guard.resolving) step.tools->give_velocities();
   step.tools->find_shared(w, step);
   const std::span<const RigidSides> between_rigids = step.tools->shared_sides();
   uint32_t nstate = 0;

@@ -279,7 +279,7 @@ void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const
 }
 
 // Numbers the bodies on both sides of contacts. A body in two islands gets two numbers. Where rows between
-// rigid things are solved with soft bodies, rigid bodies have numbers as well.
+// rigid things are solved with soft bodies, the rigid bodies of the island have numbers as well.
 void SolveIslands::number_sides(const ContactRows &rows, uint32_t bodies, size_t of_contacts) {
   met_.assign(bodies + (rows.nrigid ? rows.ndof : 0), kNone);
   side_.resize(met_.size());
@@ -292,7 +292,12 @@ void SolveIslands::number_sides(const ContactRows &rows, uint32_t bodies, size_t
     }
     return side_[body];
   };
-  for (uint32_t k = 0; k < count_; ++k)
+  for (uint32_t k = 0; k < count_; ++k) {
+    bool rigids = false;
+    for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
+      const RowRun &own = pairs_[joined_.member[m]].rows;
+      rigids = rigids || (own.first >= rows.soft() && own.first < rows.n);
+    }
     for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
       const Pair &p = pairs_[joined_.member[m]];
       if (joined_.member[m] >= of_contacts) continue;
@@ -300,11 +305,12 @@ void SolveIslands::number_sides(const ContactRows &rows, uint32_t bodies, size_t
       for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
         sides_[2 * size_t{i}] = a;
         sides_[2 * size_t{i} + 1] = b;
-        if (rows.nrigid == 0) continue;
+        if (!rigids) continue;
         if (rows.rigid_a[i] != kNone) sides_[2 * size_t{i}] = number(bodies + rows.rigid_a[i], k);
         if (rows.rigid[i] != kNone) sides_[2 * size_t{i} + 1] = number(bodies + rows.rigid[i], k);
       }
     }
+  }
 }
 
 bool SolveIslands::shares_sides() const {

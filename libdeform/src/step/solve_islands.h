@@ -100,11 +100,11 @@ class SolveIslands {
   Array<Pair> pairs_;      // of sides that touch, or are bonded: contacts, then bonds
   Islands joined_;         // pairs by island
   Array<uint32_t> owner_;  // [dofs] a pair that moves it; of a block its first dof alone
-  // [bodies] the last island it was met in, and its number there
+  // [bodies, then dofs of rigid ones] the last island it was met in, and its number there
   Array<uint32_t> met_, side_;
   Array<uint32_t> sides_, body_of_;  // body_of_: [sides]
   Array<uint8_t> of_cuts_;
-  Array<double> largest_;  // [bodies,2] scratch
+  Array<double> largest_;  // [met_,2] scratch
   Array<uint32_t> order_;
   // by island: runs of contacts, of bonds, and blocks
   Array<RowRun> contact_, bond_;

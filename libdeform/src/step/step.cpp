@@ -396,6 +396,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.guard.start();
   step.ended = step.struck = false;
   step.rigid_rounds = 0;
+  step.rigid_again = false;
   step.budget.rows = w.store.n;
   const uint64_t damping = w.sizes.damping > 0 ? 2 : 0;  // evaluations of the forces
   charge(w, step, (1 + damping) * body_work(w, step) + surface_work(w, step));

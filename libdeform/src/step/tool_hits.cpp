@@ -112,10 +112,7 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
     if (a.round() > 0 && b.round() > 0) find_hits(pair, a, b, at_a, at_b);
   });
   if (hits_.empty()) return false;
-  for (Moved &m : sides_) {
-    std::fill(m.change.begin(), m.change.end(), 0.0);
-    for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
-  }
+  forget_changes();
   for (const Hit &hit : hits_) {
     std::erase_if(rows_, [&](const Row &row) { return row.key == key_of(hit.pair->id, hit.name); });
     add_row(*hit.pair, hit.name, hit.a, hit.b, hit.place, hit.normal, hit.gap, HUGE_VAL);
@@ -126,7 +123,12 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
 void ToolTouch::solve_past_hits(World &w, StepContext &step) {
   for (uint32_t k = 0;; ++k) {
     solve(w, step);
-    if (k == kMostHits || !add_hits(w, step)) return;
+    if (k == kMostHits) return;
+    if (outruns_rows()) {
+      forget_changes();
+      rows_.clear();
+      find(w, step);
+    } else if (!add_hits(w, step)) return;
     take_last(w);
   }
 }

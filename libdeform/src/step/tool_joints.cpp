@@ -161,10 +161,7 @@ double ToolTouch::give_of_motor(const Row &row) const {
 // The host's motors have been decided again: all rows are given their new answers, and velocities those of
 // the impulses so far.
 void ToolTouch::renew_rows() {
-  for (Moved &m : sides_) {
-    std::fill(m.change.begin(), m.change.end(), 0.0);
-    for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
-  }
+  forget_changes();
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     Row &row = rows_[i];
     if (!(jointed(row.a) && sides_[row.a.tool].drives) && !(jointed(row.b) && sides_[row.b.tool].drives))

@@ -1,6 +1,7 @@
 // Friction of tools: the laws of their pairs, and what lasts from one sub-step to the next.
 //
-//   start    impulses of the same keys, times h / h_old, and the state of the law; turned with the normal
+//   start    impulses of the same keys, times h / h_old, or none, and the state of the law; turned with the
+//            normal
 //   solve    by the method for soft bodies (tool_solve.cpp)
 //   end      the state that a law has given at the solution lasts, with the impulses
 //
@@ -9,6 +10,7 @@
 #include <cmath>
 
 #include "core/hash.h"
+#include "dynamics/rigid/rigid_set.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/tool_touch.h"
@@ -59,21 +61,43 @@ void ToolTouch::take_last(const World &w) {
       m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
     }
   }
-  drop_bad_start();
+  drop_bad_starts();
 }
 
-// Impulses of rows that contradict each other may be large while what they do cancels. Where the rows have
-// changed it does not: then none are the better start.
-void ToolTouch::drop_bad_start() {
-  double with = 0, without = 0;
-  for (const Row &row : rows_) {
-    with = std::max(with, norm(speed(row)));
-    without = std::max(without, norm(base_speed(row)) + std::fabs(row.rate));
-  }
-  if (with <= without) return;
-  for (Row &row : rows_) row.impulse = row.along[0] = row.along[1] = 0;
-  std::fill(start_.begin(), start_.end(), 0.0);
-  push_all();
+// Impulses of rows that contradict each other may be large while what they do cancels, and an impact repeats
+// itself in no later sub-step. Where impulses make the places of connected groups faster than none would,
+// none are the start.
+void ToolTouch::drop_bad_starts() {
+  std::vector<uint32_t> &first = first_group_;  // of each side, among all
+  first.assign(1, 0);
+  for (const Moved &m : sides_) first.push_back(first.back() + (m.set ? m.set->ngroup : 0));
+  const auto group_of = [&](const Side &side) {
+    const Moved &m = sides_[side.tool];
+    const uint32_t g = m.set ? m.set->group[side.part] : DFM_RIGID_STILL;
+    return g == DFM_RIGID_STILL ? kNone : first[side.tool] + g;
+  };
+  islands_.start(first.back());
+  for (const Row &row : rows_)
+    if (const uint32_t a = group_of(row.a), b = group_of(row.b); a != kNone && b != kNone)
+      islands_.join(a, b);
+  start_speeds_.assign(islands_.number(), {});
+  const auto speeds_of = [&](const Row &row) {
+    const uint32_t a = group_of(row.a), g = a != kNone ? a : group_of(row.b);
+    return g != kNone ? &start_speeds_[islands_.of[g]] : nullptr;
+  };
+  for (const Row &row : rows_)
+    if (StartSpeeds *const s = speeds_of(row)) {
+      const Vec3 belts = belt(row.a) - belt(row.b);
+      s->with = std::max(s->with, norm(speed(row) + belts));
+      s->without = std::max(s->without, norm(base_speed(row) + belts) + std::fabs(row.rate));
+    }
+  bool any = false;
+  for (Row &row : rows_)
+    if (const StartSpeeds *const s = speeds_of(row); s && s->with > s->without) {
+      row.impulse = row.along[0] = row.along[1] = 0;
+      any = true;
+    }
+  if (any) push_all();
 }
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }

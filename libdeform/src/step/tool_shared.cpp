@@ -104,6 +104,11 @@ void ToolTouch::take_shared(const ContactRows &from) {
   }
   shared_.clear();
   push_all();
+  for (Moved &m : sides_)
+    for (size_t i = 0; i < m.known.size(); ++i) {
+      const uint32_t g = m.set ? m.set->group[i / 6] : DFM_RIGID_STILL;
+      if (g != DFM_RIGID_STILL && m.shared[g]) m.known[i] = m.change[i] + m.turn[i];
+    }
 }
 
 }  // namespace dfm

@@ -107,6 +107,9 @@ ToolTouch::ToolTouch(const Memory &m)
 void ToolTouch::prepare(World &w, SceneFacts &facts) {
   pairs_.clear();
   passing_.clear();
+  rows_.clear();  // of bodies that may be gone
+  shared_.clear();
+  shared_sides_.clear();
   thinnest_ = HUGE_VAL;
   sets_.clear();
   walls_.clear();
@@ -341,11 +344,29 @@ Vec3 ToolTouch::belt(const Side &side) const {
   return m.set ? Vec3{} : m.belt[side.part];
 }
 
-double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const {
-  const double *const v = &sides_[side.tool].free[6 * size_t{side.part}];
+double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) {
+  Moved &m = sides_[side.tool];
+  const double *const v = &m.seen[6 * size_t{side.part}];
   const double arm = shape.endless() ? norm(other.position() - center(side)) + other.reach()
                                      : norm(shape.position() - center(side)) + shape.reach();
+  m.arm[side.part] = std::max(m.arm[side.part], arm);
   return norm(load3(v)) + norm(load3(v + 3)) * arm;
+}
+
+// Whether impulses have made a body so fast that it may meet what no row looks at. Rows are then to be found
+// by its new velocity.
+bool ToolTouch::outruns_rows() {
+  bool any = false;
+  for (Moved &m : sides_)
+    for (size_t i = 0; m.set && i < m.arm.size(); ++i) {
+      double now[6];
+      for (size_t k = 0; k < 6; ++k) now[k] = m.base[6 * i + k] + m.change[6 * i + k];
+      const auto speed_of = [&](const double *v) { return norm(load3(v)) + norm(load3(v + 3)) * m.arm[i]; };
+      if (!(m.arm[i] > 0) || speed_of(now) <= kReach * speed_of(&m.seen[6 * i]) + offset_ / h_) continue;
+      std::copy_n(now, 6, &m.seen[6 * i]);
+      any = true;
+    }
+  return any;
 }
 
 void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal,
@@ -424,7 +445,7 @@ bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool 
 // Adds rows of the corners of each against the other, and of edges that cross. Returns m, the depth of the
 // deepest corner; 0: none is inside.
 double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-  const double reach = 2 * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
+  const double reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const double far = reach + offset_;
   if (!look_at_each_other(a, b, far, pair.jaw)) return 0;
   for (const Side *side : {&at_a, &at_b}) take_response(*side);
@@ -499,12 +520,16 @@ void ToolTouch::find(const World &w, const StepContext &step) {
   });
 }
 
-// Computes the velocities from the impulses of the rows.
-void ToolTouch::push_all() {
+void ToolTouch::forget_changes() {
   for (Moved &m : sides_) {
     std::fill(m.change.begin(), m.change.end(), 0.0);
     for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
   }
+}
+
+// Computes the velocities from the impulses of the rows.
+void ToolTouch::push_all() {
+  forget_changes();
   for (const Row &row : rows_) push(row, row.given());
 }
 
@@ -555,6 +580,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     m.turn.assign(6 * n, 0.0);
     m.given.assign(6 * n, 0.0);
     m.reach.assign(n, 0.0);
+    m.arm.assign(n, 0.0);
     m.touched = m.responds = m.drives = m.stale = false;
     m.jaws.clear();
     m.response.clear();
@@ -569,7 +595,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
         store3(&m.free[6 * i], v.velocity);
         store3(&m.free[6 * i + 3], v.spin);
       }
-      m.base = m.free;
+      m.base = m.seen = m.free;
       continue;
     }
     RigidSet &set = *m.set;
@@ -589,7 +615,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     for (const auto &t : w.tools)
       if (t->set == m.set && t->has_jaws()) list_jaws(m);
     straighten(m);
-    m.base = m.free;
+    m.base = m.seen = m.free;
   }
 }
 
@@ -628,6 +654,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
 
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
+  shared_.clear();
   off_ = 0;
   if (next_.n > 0) keep_next();
   next_report_.contacts.clear();
@@ -651,13 +678,10 @@ bool ToolTouch::begin(World &w, StepContext &step) {
 }
 
 void ToolTouch::give_velocities() {
+  if (rows_.empty()) return;
   for (Moved &m : sides_)
     for (size_t i = 0; m.set && i < m.free.size(); ++i)
       m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
-  remember_known();
-}
-
-void ToolTouch::remember_known() {
   for (Moved &m : sides_) {
     m.known.resize(m.change.size());
     for (size_t i = 0; i < m.known.size(); ++i) m.known[i] = m.change[i] + m.turn[i];
@@ -669,7 +693,7 @@ double ToolTouch::news() const {
   double most = 0;
   for (const Moved &m : sides_)
     for (size_t i = 0; i < m.reach.size(); ++i) {
-      if (!m.set || !(m.reach[i] > 0)) continue;
+      if (!m.set) continue;
       const size_t at = 6 * i;
       const auto differs = [&](size_t k) {
         return norm(load3(&m.change[k]) + load3(&m.turn[k]) - load3(&m.known[k]));
@@ -704,10 +728,7 @@ void ToolTouch::set_base(size_t k) {
 
 bool ToolTouch::answer(World &w, StepContext &step) {
   if (rows_.empty()) return false;
-  if (!shared_.empty()) {
-    take_shared(step.rows);
-    remember_known();
-  }
+  take_shared(step.rows);
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     if (!m.set) continue;

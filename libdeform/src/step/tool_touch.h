@@ -69,11 +69,13 @@ class ToolTouch {
   const double *shared_response(const RigidSet &set, uint32_t group) const;
   // from m/s, rad/s of a body, what these rows have added
   void take_off_shared(const RigidSet &set, uint32_t body, Vec3 &velocity, Vec3 &spin) const;
-  // again: from the impulses that `to` has
+  // again: from the rows' present impulses, else from those of the last sub-step
   void put_shared(ContactRows &to, ContactState &state, bool again);
 
   // Called after the hosts have predicted their velocities again.
   void correct();
+  // Sets' velocities become those of the present impulses, less those of soft bodies; known to these.
+  void give_velocities();
   // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
   // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
   bool answer(World &w, StepContext &step);
@@ -137,6 +139,8 @@ class ToolTouch {
     std::vector<double> known;               // [6n] what soft bodies know of change and turn
     std::vector<uint8_t> shared;             // [groups] its rows are solved with soft bodies
     std::vector<double> reach;               // [n] m, of its rows from its center
+    std::vector<double> seen;                // [6n] m/s, rad/s, by which rows have been found
+    std::vector<double> arm;                 // [n] m, of what may touch, from its center
     bool responds;                           // the response is not zero
     bool touched;                            // a row is its own
     bool drives;                             // it has motors
@@ -189,7 +193,9 @@ class ToolTouch {
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
   static uint64_t key_of(const uint64_t pair[2], Name name);
-  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const;
+  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other);
+  bool outruns_rows();
+  void forget_changes();
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m) const;
   void straighten(Moved &m) const;
@@ -206,7 +212,6 @@ class ToolTouch {
   double follow_spin();
   void solve(World &w, StepContext &step);
   Vec3 base_speed(const Row &row) const;
-  void remember_known();
   double news() const;
   void push_all();
   // tool_solve.cpp
@@ -261,10 +266,9 @@ class ToolTouch {
   bool inside(const ToolShape &a, const ToolShape &b, double deep) const;
   Side side_of(const Obstacle &o, uint32_t wall) const;
   void take_sets(World &w, StepContext &step);
-  void give_velocities();
   // tool_rub.cpp
   void take_last(const World &w);
-  void drop_bad_start();
+  void drop_bad_starts();
   Vec3 slip(const Row &row) const;
   void keep_next();
   // tool_report.cpp
@@ -274,6 +278,7 @@ class ToolTouch {
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
+  static constexpr double kReach = 2;    // rows look so many times as far as a thing goes
   static constexpr double kOff = 0.2;    // of d_c, that places may be off after a sub-step
 
   double h_ = 0, offset_ = 0;
@@ -306,7 +311,11 @@ class ToolTouch {
   std::vector<uint32_t> shared_;                         // rows that are solved with soft bodies
   std::vector<RigidSides> shared_sides_;                 // theirs
   std::vector<uint8_t> shared_groups_, shared_islands_;  // scratch
-  std::vector<std::array<uint64_t, 2>> told_;            // pairs that have met and pass each other
+  std::vector<uint32_t> first_group_;                    // scratch
+  // m/s, the largest of places with and without the impulses of the start
+  struct StartSpeeds { double with = 0, without = 0; };
+  std::vector<StartSpeeds> start_speeds_;      // scratch
+  std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
   LawBatches batches_;
