@@ -69,6 +69,22 @@ TEST(ContactProblems, ToleranceThatNoSolveReaches_LeavesUnsolvedProblems) {
   for (const std::string &name : strict) EXPECT_TRUE(name.ends_with("-unsolved.contact")) << name;
 }
 
+// Rows between rigid bodies are part of a problem whose soft body they rest on.
+TEST(ContactProblems, StackOfRigidBoxesOnABlock_IsWrittenAndSolvedAgain) {
+  const Folder f;
+  f.run({"--set", "/time/duration=0.2", "--set", "/time/step=0.01", "--set",
+         R"(/rigid={"host": "builtin", "bodies": [
+           {"name": "light", "shape": "box", "half_size": [0.03, 0.03, 0.02], "mass": 0.05,
+            "pose": {"position": [0.06, 0.07, 0.2208]}},
+           {"name": "heavy", "shape": "box", "half_size": [0.03, 0.03, 0.02], "mass": 2,
+            "pose": {"position": [0.06, 0.07, 0.2612]}}]})",
+         "--contact-problems", f.path + "/stack", "--contact-problems-every", "5"});
+  EXPECT_GE(f.problems("stack").size(), 3u);
+  const test::CommandResult r = test::deform({"contact", f.path + "/stack", "--json"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(r.out.find("\"solved\": false"), std::string::npos) << r.out;
+}
+
 TEST(ContactProblems, EveryWithoutAFolder_IsRefused) {
   const Folder f;
   const test::CommandResult r = test::deform({"run", f.scene, "--contact-problems-every", "3"});
