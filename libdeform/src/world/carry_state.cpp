@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 #include <utility>
 
 #include "core/error.h"
@@ -206,9 +205,13 @@ uint32_t find_edge(const Surface &s, uint32_t a, uint32_t b) {
   if (a == kNone || b == kNone) return kNone;
   const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
   const auto at = [&](uint32_t e) { return std::pair(s.edge[2 * size_t{e}], s.edge[2 * size_t{e} + 1]); };
-  const auto all = std::views::iota(0u, s.nedge);
-  const auto found = std::ranges::lower_bound(all, key, {}, at);
-  return found != all.end() && at(*found) == key ? *found : kNone;
+  uint32_t low = 0, high = s.nedge;
+  while (low < high) {
+    const uint32_t mid = low + (high - low) / 2;
+    if (at(mid) < key) low = mid + 1;
+    else high = mid;
+  }
+  return low < s.nedge && at(low) == key ? low : kNone;
 }
 
 uint32_t above_all(const Array<uint32_t> &names) {
