@@ -12,6 +12,7 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
+#include "step/budget.h"
 #include "step/context.h"
 #include "step/tool_touch.h"
 
@@ -123,7 +124,7 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
 void ToolTouch::solve_past_hits(World &w, StepContext &step) {
   for (uint32_t k = 0;; ++k) {
     solve(w, step);
-    if (k == kMostHits) return;
+    if (k == kMostHits || is_used_up(step)) return;
     if (outruns_rows()) {
       forget_changes();
       rows_.clear();
