@@ -539,11 +539,12 @@ bool ContactNewton::refactor() {
   const bool dissected = points_ >= kDissected;  // motions of blocks have no place
   if (!factored_ && (dissected || analysed_ != pairs_)) {
     analysed_.clear();
-    if (dissected) factor_.analyse(pattern_, places_.data());
-    else factor_.analyse(pattern_);
-  }
-  if (!factored_ && !dissected) {
-    analysed_.assign(pairs_.begin(), pairs_.end());
+    if (dissected) {
+      factor_.analyse(pattern_, places_.data());
+    } else {
+      factor_.analyse(pattern_);
+      analysed_.assign(pairs_.begin(), pairs_.end());
+    }
   }
   ++factors_;
   return factored_ = factor_.factor(blocks_.data());

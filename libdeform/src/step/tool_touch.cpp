@@ -688,8 +688,8 @@ void ToolTouch::give_velocities() {
   }
 }
 
-// m/s, at most, by which places differ from what soft bodies know.
-double ToolTouch::news() const {
+// m/s, the largest change of a place since the velocities that soft bodies know.
+double ToolTouch::unknown_change() const {
   double most = 0;
   for (const Moved &m : sides_)
     for (size_t i = 0; i < m.reach.size(); ++i) {
@@ -740,7 +740,7 @@ bool ToolTouch::answer(World &w, StepContext &step) {
   for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
   keep_next();
   list_contacts(w);
-  return news() > tangent_at_rest(w, h_);
+  return unknown_change() > tangent_at_rest(w, h_);
 }
 
 }  // namespace dfm

@@ -212,7 +212,7 @@ class ToolTouch {
   double follow_spin();
   void solve(World &w, StepContext &step);
   Vec3 base_speed(const Row &row) const;
-  double news() const;
+  double unknown_change() const;
   void push_all();
   // tool_solve.cpp
   // A group of bodies that answer each other's impulses, with their jaws; or a jaw that moves alone.
