@@ -10,7 +10,6 @@ their times may be compared. A row has: what stopped it, sub-steps, unconverged 
 import argparse
 import json
 import pathlib
-import platform
 import subprocess
 import sys
 import tempfile
@@ -45,6 +44,12 @@ def run(command, path, step, time, changes):
             "cpu_s": round(found["cpu_s"], 3)}
 
 
+def machine():
+    names = [line.split(":", 1)[1].strip() for line in open("/proc/cpuinfo", encoding="utf-8")
+             if line.startswith("model name")]
+    return names[0] if names else "unknown"
+
+
 def number(value):
     return f"{value:.4g}" if isinstance(value, float) else "" if value is None else str(value)
 
@@ -60,7 +65,7 @@ def main():
     commit = subprocess.run(["git", "-C", ROOT, "rev-parse", "--short", "HEAD"], capture_output=True,
                             text=True)
     with open(options.results, "w", encoding="utf-8") as out:
-        out.write(f"# {platform.processor() or platform.machine()}, commit {commit.stdout.strip()}, "
+        out.write(f"# {machine()}, commit {commit.stdout.strip()}, "
                   f"{options.time:g} s of each scene, {len(options.command)} commands\n")
         out.write("scene,step,integrator,command," + ",".join(COLUMNS) + "\n")
         for name in options.scenes:
