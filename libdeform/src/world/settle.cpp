@@ -32,9 +32,6 @@ namespace {
 // s, length of a step. The longer it is, the more the stiffness and the less the mass of a body decides its
 // end.
 constexpr double kLongest = 1, kShortest = 1e-4;
-// The longer a step, the more a body responds to impulses as a whole, and the more sweeps are needed: steps
-// grow below the first number of sweeps and shrink above the second. Limits of a solve on sweeps and passes.
-constexpr uint32_t kEasy = 300, kHard = 900, kMostSweeps = 100, kMostPasses = 100;
 // Tolerances: of Newton's method and contact in a step, relative to the median edge of a body; of the motion
 // in the last step, relative to the size of the body; of forces at a point, relative to the largest load,
 // reaction or contact force (or their rounding); of contacts and friction, relative to the rest distance.
@@ -185,7 +182,6 @@ class Settling {
       const bool taken = step(h);
       const bool whole = taken && w_.stats.substeps == pieces + 1;
       const double off = h * w_.stats.residual / w_.offset;  // of contacts, relative to the rest distance
-      const bool easy = whole && (w_.stats.sweeps < kEasy || off < 0.1 * kGap);
       w_.time = w_.prescribed.at(w_.time);
       const bool there = w_.time >= to.time;
       stand_still();
@@ -200,7 +196,7 @@ class Settling {
       weigh_all(h);
       bool rests = taken && off <= kGap;
       for (One &one : bodies_) {
-        one.reach = easy ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
+        one.reach = whole ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
                          : std::max(0.5 * one.reach, kNear * one.edge);
         one.slid = there && one.touches ? one.slid + one.moved : 0;
         rests = rests && one.moved <= kMoves * one.size && balanced(one);
@@ -209,9 +205,7 @@ class Settling {
         for (One &one : bodies_) slow_overshoot(one, whole);
       if (rests && there) return steps;
       goes_on = goes_on || rests || ++before == kWaits;
-      // sweeps of additional solves by the guard count too; many sweeps that converge are no reason to shrink
-      const bool fair = whole && (w_.stats.sweeps <= kHard || off <= kGap);
-      longest = easy ? std::min(kLongest, 2 * h) : fair ? h : 0.5 * h;
+      longest = whole ? std::min(kLongest, 2 * h) : 0.5 * h;
       if (there) check_progress(steps, h);
     }
   }
@@ -249,8 +243,6 @@ class Settling {
       edge = std::min(edge, one.edge);
     }
     w_.def.contact_tolerance = kContact * edge / h;
-    w_.def.max_sweeps = kMostSweeps;
-    w_.def.max_passes = kMostPasses;
     uint32_t trouble = 0;
     const dfm_status status = step_within_budget(w_, h, &trouble);
     if (trouble & DFM_TROUBLE_INTERRUPTED)
