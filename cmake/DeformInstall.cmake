@@ -55,7 +55,7 @@ install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} 
 foreach(page README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md tests/README.md tests/abi/kept/README.md
     tests/bench/friction/README.md tests/bench/results/rest_compression.csv
     tests/bench/results/scene_models.csv libdeform/include/deform/attach.h
-    libdeform/include/deform/tool.h libdeform/src/world/blade_sweep.h)
+    libdeform/include/deform/tool.h libdeform/src/cut/blade_sweep.h)
   get_filename_component(folder ${page} DIRECTORY)
   install(FILES ${PROJECT_SOURCE_DIR}/${page} DESTINATION ${CMAKE_INSTALL_DOCDIR}/${folder} COMPONENT doc)
 endforeach()

@@ -7,8 +7,8 @@ from tree import CODE, includes, line_of, without_comments
 SRC = "libdeform/src/"
 # A folder may include itself and what stands on a lower level; folders of one level never include each other.
 LEVELS = [["core"], ["math"], ["geometry"], ["mesh", "plugin"], ["body"], ["dynamics", "contact"],
-          ["friction", "broad", "narrow"], ["ccd"], ["plan"], ["state"], ["step"], ["world"],
-          ["scene", "api"]]
+          ["friction", "broad", "narrow"], ["ccd"], ["plan"], ["state"], ["step"], ["world"], ["cut"],
+          ["snapshot"], ["scene", "api"]]
 RANK = {folder: rank for rank, folders in enumerate(LEVELS) for folder in folders}
 # api/ holds one thin file per public header, and scene.h is one of them.
 ALLOWED_BESIDE = {("api", "scene")}
@@ -33,7 +33,7 @@ THIRD_PARTIES = [
 
 STEP_FOLDERS = tuple(SRC + f + "/" for f in (
     "math", "geometry", "body", "dynamics", "contact", "friction", "broad", "narrow", "ccd", "state", "step",
-    "world"))
+    "world", "cut", "snapshot"))
 LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 sinh cosh tanh asinh acosh "
         "atanh sincos pow cbrt "
         "hypot erf erfc tgamma lgamma").split()
@@ -49,7 +49,7 @@ def _resolves(tree, path, name):
 
 def layers(tree):
     """core <- math <- geometry <- {mesh, plugin} <- body <- {dynamics, contact} <- {friction, broad,
-    narrow} <- ccd <- plan <- state <- step <- world <- {scene, api}."""
+    narrow} <- ccd <- plan <- state <- step <- world <- cut <- snapshot <- {scene, api}."""
     for path in tree.select(SRC):
         own = path[len(SRC):].split("/")[0]
         for line, _, name in includes(tree.text(path)):

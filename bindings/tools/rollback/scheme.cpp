@@ -29,7 +29,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/islands.h"
-#include "step/solve_islands.h"
+#include "step/solve/solve_islands.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/step_impulses.h"

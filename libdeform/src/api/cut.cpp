@@ -4,10 +4,11 @@
 #include <cmath>
 
 #include "api/objects.h"
-#include "world/cut_ahead.h"
-#include "world/planned_cut.h"
-#include "world/separate.h"
-#include "world/snapshot_cuts.h"
+#include "cut/cut_ahead.h"
+#include "cut/planned_cut.h"
+#include "cut/separate.h"
+#include "snapshot/snapshot_cuts.h"
+#include "world/may_cut.h"
 
 using namespace dfm;
 

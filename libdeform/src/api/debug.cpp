@@ -4,8 +4,8 @@
 
 #include "api/objects.h"
 #include "mesh/mesh.h"
-#include "step/capture.h"
 #include "step/context.h"
+#include "step/solve/capture.h"
 #include "world/measure.h"
 #include "world/queries.h"
 

@@ -2,7 +2,7 @@
 
 #include "api/objects.h"
 #include "state/obstacle.h"
-#include "step/rigid.h"
+#include "step/rigid/rigid.h"
 #include "step/stages.h"
 
 using namespace dfm;

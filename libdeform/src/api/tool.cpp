@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "api/objects.h"
+#include "cut/tool_cut.h"
 #include "state/tool.h"
 #include "world/tool.h"
-#include "world/tool_cut.h"
 
 using namespace dfm;
 

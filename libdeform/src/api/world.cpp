@@ -4,8 +4,13 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "cut/planned_cut.h"
+#include "cut/separate.h"
+#include "cut/tear.h"
+#include "cut/tool_cut.h"
 #include "deform/deprecated.h"
 #include "plugin/context.h"
+#include "snapshot/snapshot.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "step/context.h"
@@ -15,13 +20,8 @@
 #include "world/equilibrium.h"
 #include "world/explain.h"
 #include "world/model_change.h"
-#include "world/planned_cut.h"
 #include "world/sensors.h"
-#include "world/separate.h"
-#include "world/snapshot.h"
-#include "world/tear.h"
 #include "world/tool.h"
-#include "world/tool_cut.h"
 
 using namespace dfm;
 

@@ -29,8 +29,8 @@ struct ObstacleMesh {
   // Sets the pose at the start of a sub-step and the rates over it. Costs nothing without motion.
   void place(Vec3 position, Quat rotation, Vec3 velocity, Vec3 spin);
 
-  // For what searches the mesh in every sub-step (step/tool_shape.h). A tree in the obstacle's frame holds
-  // for all poses, so a mesh that moves costs no refit.
+  // For what searches the mesh in every sub-step (step/rigid/tool_shape.h). A tree in the obstacle's frame
+  // holds for all poses, so a mesh that moves costs no refit.
   std::unique_ptr<const BoxTree> tree;  // null: triangles_near() gives them all
   void make_tree(const Memory &memory);
   // All triangles whose own boxes in the world overlap this one, and some beside them, ascending. Boxes are

@@ -1,5 +1,5 @@
 // Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were
-// linearized by the last outer pass. The outer loop, over the laws, is step/solve.cpp; the mathematics
+// linearized by the last outer pass. The outer loop, over the laws, is step/solve/solve.cpp; the mathematics
 // is doc/concepts/contact.md.
 #pragma once
 #include "contact/contact_state.h"

@@ -80,7 +80,7 @@ struct Abilities {
   bool springs = false;   // loads may depend on the state: bound() takes their row sums
   bool placed = false;    // single points may be moved
   bool accurate = false;  // accurate_step() is known
-  bool energy = false;    // the energy that its scheme conserves is known (step/energy_watch.h)
+  bool energy = false;    // the energy that its scheme conserves is known (step/watch/energy_watch.h)
   bool damps = false;     // its scheme conserves no energy: it dissipates
   bool parts = false;     // its free motion depends on whether there are contacts: begin(), take_contact()
 };

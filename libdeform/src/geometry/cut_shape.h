@@ -2,7 +2,7 @@
 //
 //   ellipsoid, box   at a pose, swept along a straight way
 //   blade            a quadrilateral: where an edge was, and where it is now
-//   plane            through a whole body: a blade takes its place when it cuts (world/planned_cut.h)
+//   plane            through a whole body: a blade takes its place when it cuts (cut/planned_cut.h)
 #pragma once
 #include <cstdint>
 

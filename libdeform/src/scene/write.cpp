@@ -15,11 +15,11 @@
 #include "scene/keys.h"
 #include "scene/node.h"
 #include "scene/scene.h"
+#include "snapshot/snapshot.h"
+#include "snapshot/snapshot_structure.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "world/create.h"
-#include "world/snapshot.h"
-#include "world/snapshot_structure.h"
 
 namespace dfm::writing {
 

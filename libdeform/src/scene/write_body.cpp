@@ -12,7 +12,7 @@
 #include "scene/table.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
-#include "step/attach.h"
+#include "step/solve/attach.h"
 #include "world/body_model.h"
 
 namespace dfm::writing {

@@ -1,5 +1,5 @@
 // Points of a body's surface that are held at places of something else (deform/attach.h): the lasting state.
-// step/attach.cpp makes bonds from it (contact/bond.h).
+// step/solve/attach.cpp makes bonds from it (contact/bond.h).
 #pragma once
 #include <cstdint>
 #include <vector>

@@ -127,7 +127,7 @@ struct OnPoints {
   Array<double> anchor;            // [n,4] m, positions at the start of its calm; empty if sleep is off
 };
 
-// Points and cells of a body, and what depends on them. A cut exchanges it for another (world/body_shape.h).
+// Points and cells of a body, and what depends on them. A cut exchanges it for another (cut/body_shape.h).
 struct BodyShape : Structure, OnPoints, BodyModel {
   Phyxels p;
   Vec3 corner(size_t cell, size_t k) const { return p.x_at(tets[4 * cell + k]); }

@@ -42,7 +42,7 @@ struct BladeSide {
 };
 
 // Energy that a tool owes for what it has cut, at a point of the body beside the cut. It pays over the way
-// that follows, by a force on the point (step/cut_drag.h).
+// that follows, by a force on the point (step/solve/cut_drag.h).
 struct CutDue {
   double due, force;  // J; N
   double way[3];      // unit length, of the edge through the material; in the frame of the tool's part
@@ -77,7 +77,7 @@ struct CutRecord {
   uint32_t next_name[kFeatureKinds] = {};  // of features of the surface (geometry/surface.h)
 };
 
-// Cuts of a body by tools that are made ahead, beside the steps (world/cut_ahead.h).
+// Cuts of a body by tools that are made ahead, beside the steps (cut/cut_ahead.h).
 // A face that a tool has come through, and that has not opened yet.
 struct AheadFace {
   uint64_t face;  // between cells of the whole body (mesh/cut_mesh.h)

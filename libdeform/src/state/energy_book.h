@@ -1,4 +1,5 @@
-// Lasting state of the energy watch (step/energy_watch.h), and energy that changes of models have added.
+// Lasting state of the energy watch (step/watch/energy_watch.h), and energy that changes of models have
+// added.
 #pragma once
 #include <cstdint>
 

@@ -1,4 +1,4 @@
-// Overlaps that have been found, and what the next search covers; step/overlap.h searches.
+// Overlaps that have been found, and what the next search covers; step/overlap/overlap.h searches.
 #pragma once
 #include <algorithm>
 #include <cstdint>

@@ -1,5 +1,5 @@
 // What rigid things do to each other, for reports: the contacts of the last sub-step, and the pairs that
-// touch (step/tool_report.cpp).
+// touch (step/rigid/tool_report.cpp).
 #pragma once
 #include <compare>
 #include <cstdint>

@@ -26,7 +26,7 @@ struct Tool {
   std::vector<uint64_t> parts;  // handles
   dfm_device device{};          // read NULL: none
   bool mute = false;            // the device has refused a force
-  // The bodies that it cuts (world/tool_cut.h).
+  // The bodies that it cuts (cut/tool_cut.h).
   struct Cuts {
     uint32_t how = 0, most = 0;
     std::vector<uint64_t> bodies;  // ids, ascending

@@ -42,8 +42,8 @@ struct FilterRule {
   bool collide;
 };
 // Of a pair of ids, a body first, or of two rigid things as in RigidReport, J. Two are sums of the watch on
-// energies (step/pair_energy.h), over sub-steps since each was last zero, and never below; that of friction
-// over all, where laws remember.
+// energies (step/watch/pair_energy.h), over sub-steps since each was last zero, and never below; that of
+// friction over all, where laws remember.
 struct PairWork {
   uint64_t a, b;
   double friction;     // work over the run
@@ -120,7 +120,7 @@ struct WorldState {
   std::vector<FilterRule> filters;
   std::vector<Attachment> attachments;  // in order of creation
   ContactStore store;
-  ContactStore tool_store;  // of tools with each other and with rigid bodies (step/tool_touch.h)
+  ContactStore tool_store;  // of tools with each other and with rigid bodies (step/rigid/tool_touch.h)
   Report report;
   RigidReport rigid_report;
   std::vector<PairWork> work;             // sorted by (a, b)

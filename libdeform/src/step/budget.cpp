@@ -15,9 +15,9 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/impact.h"
+#include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
-#include "step/tool_touch.h"
 
 namespace dfm {
 namespace {

@@ -6,17 +6,17 @@
 #include "core/error.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
-#include "step/attach.h"
-#include "step/impact.h"
 #include "step/by_body.h"
-#include "step/change_work.h"
 #include "step/context.h"
-#include "step/cut_drag.h"
-#include "step/energy_watch.h"
 #include "step/first_failure.h"
+#include "step/impact.h"
+#include "step/solve/attach.h"
+#include "step/solve/cut_drag.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
+#include "step/watch/change_work.h"
+#include "step/watch/energy_watch.h"
 
 namespace dfm {
 

@@ -1,9 +1,9 @@
 #include "step/context.h"
 
-#include "step/capture.h"
+#include "step/rigid/tool_touch.h"
 #include "step/self_contact.h"
-#include "step/solve_islands.h"
-#include "step/tool_touch.h"
+#include "step/solve/capture.h"
+#include "step/solve/solve_islands.h"
 
 namespace dfm {
 

@@ -16,11 +16,11 @@
 #include "narrow/narrow_phase.h"
 #include "state/world.h"
 #include "step/budget.h"
-#include "step/energy_watch.h"
 #include "step/guard.h"
 #include "step/islands.h"
-#include "step/pair_energy.h"
 #include "step/stages.h"
+#include "step/watch/energy_watch.h"
+#include "step/watch/pair_energy.h"
 
 namespace dfm {
 

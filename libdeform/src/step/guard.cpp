@@ -28,11 +28,11 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/energy_watch.h"
 #include "step/move_obstacles.h"
 #include "step/self_contact.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
+#include "step/watch/energy_watch.h"
 
 namespace dfm {
 namespace {

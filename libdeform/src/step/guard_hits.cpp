@@ -12,8 +12,8 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/guard.h"
-#include "step/pre_solve.h"
 #include "step/self_contact.h"
+#include "step/solve/pre_solve.h"
 
 namespace dfm {
 namespace {

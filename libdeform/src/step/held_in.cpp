@@ -9,8 +9,8 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/attach.h"
 #include "step/context.h"
+#include "step/solve/attach.h"
 #include "step/stages.h"
 
 namespace dfm {

@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <string>
 
-#include "step/overlap_sides.h"
+#include "step/overlap/overlap_sides.h"
 
 namespace dfm {
 

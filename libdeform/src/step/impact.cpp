@@ -12,7 +12,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/restitution.h"
+#include "step/solve/restitution.h"
 #include "step/stages.h"
 
 namespace dfm {

@@ -6,13 +6,13 @@
 #include "plugin/context.h"
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/bristles.h"
 #include "step/context.h"
-#include "step/pair_energy.h"
+#include "step/rigid/tool_touch.h"
+#include "step/solve/bristles.h"
+#include "step/solve/tolerance.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
-#include "step/tolerance.h"
-#include "step/tool_touch.h"
+#include "step/watch/pair_energy.h"
 
 namespace dfm {
 

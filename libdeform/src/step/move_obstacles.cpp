@@ -4,7 +4,7 @@
 #include "body/obstacle_mesh.h"
 #include "state/obstacle.h"
 #include "step/context.h"
-#include "step/rigid.h"
+#include "step/rigid/rigid.h"
 
 namespace dfm {
 

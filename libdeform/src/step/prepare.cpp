@@ -22,14 +22,14 @@
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
-#include "step/cut_drag.h"
-#include "step/energy_watch.h"
-#include "step/overlap.h"
+#include "step/overlap/overlap.h"
 #include "step/pair_table.h"
-#include "step/rigid.h"
+#include "step/rigid/rigid.h"
+#include "step/rigid/tool_touch.h"
+#include "step/rigid/tools.h"
 #include "step/self_contact.h"
-#include "step/tool_touch.h"
-#include "step/tools.h"
+#include "step/solve/cut_drag.h"
+#include "step/watch/energy_watch.h"
 
 namespace dfm {
 namespace {

@@ -1,8 +1,8 @@
 // Prescribed gravity, loads, springs, and motions of held points.
 #include "state/spring.h"
 #include "state/world.h"
-#include "step/energy_watch.h"
 #include "step/stages.h"
+#include "step/watch/energy_watch.h"
 
 namespace dfm {
 

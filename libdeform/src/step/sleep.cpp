@@ -26,7 +26,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/cut_drag.h"
+#include "step/solve/cut_drag.h"
 #include "step/stages.h"
 
 namespace dfm {

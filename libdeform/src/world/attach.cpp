@@ -6,9 +6,9 @@
 #include "core/error.h"
 #include "core/names.h"
 #include "state/world.h"
-#include "step/attach.h"
-#include "step/energy_watch.h"
+#include "step/solve/attach.h"
 #include "step/stages.h"
+#include "step/watch/energy_watch.h"
 #include "world/queries.h"
 
 namespace dfm {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "step/change_work.h"
+#include "step/watch/change_work.h"
 #include "world/measure.h"
 
 namespace dfm {

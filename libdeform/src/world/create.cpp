@@ -16,19 +16,17 @@
 #include "state/material.h"
 #include "state/obstacle.h"
 #include "state/search_tree.h"
-#include "step/attach.h"
 #include "step/context.h"
+#include "step/rigid/tool_touch.h"
+#include "step/solve/attach.h"
 #include "step/stages.h"
-#include "step/tool_touch.h"
 #include "world/body_effects.h"
 #include "world/body_model.h"
 #include "world/body_surface.h"
 #include "world/body_zones.h"
-#include "world/cut.h"
 #include "world/idle.h"
+#include "world/may_cut.h"
 #include "world/sensors.h"
-#include "world/separate.h"
-#include "world/tear.h"
 #include "world/triangle_list.h"
 
 namespace dfm {
@@ -333,6 +331,20 @@ void forget(World &w, uint64_t handle, const std::string &name) {
   std::erase_if(w.filters, named);
   handle_destroy(handle);
   w.changed = true;
+}
+
+// Called when the body that the host made is destroyed: its pieces become bodies like any other.
+// Those without cells go with it: no list has them, so that the host could not find what a restore refuses.
+void orphan_pieces(World &w, const Body &whole) {
+  for (auto &p : w.bodies) {
+    if (p->piece_of != whole.id) continue;
+    p->piece_of = 0;
+    p->whole_name.clear();
+  }
+  const auto is_piece = [&](const auto &p) { return p->piece_of == whole.id; };
+  for (auto *list : {&w.emptied, &w.undone})
+    for (auto at = list->begin(); (at = std::find_if(list->begin(), list->end(), is_piece)) != list->end();)
+      destroy_body(**at);
 }
 
 }  // namespace

@@ -9,8 +9,8 @@
 #include "dynamics/equilibrium.h"
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/energy_watch.h"
 #include "step/stages.h"
+#include "step/watch/energy_watch.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
 

@@ -10,9 +10,9 @@
 #include "plugin/params.h"
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/pair_energy.h"
 #include "step/pair_table.h"
 #include "step/stages.h"
+#include "step/watch/pair_energy.h"
 
 namespace dfm {
 namespace {

@@ -15,6 +15,12 @@
 
 namespace dfm {
 
+double kinetic_of(const Body &b) {
+  double sum = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i) sum += 0.5 * b.p.mass[i] * norm2(b.p.v_at(i));
+  return sum;
+}
+
 double elastic_energy(Body &b) {
   if (!b.model.can(DFM_CAP_ENERGY)) return NAN;
   double joule = 0;

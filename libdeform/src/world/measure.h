@@ -5,7 +5,8 @@
 namespace dfm {
 
 dfm_body_measure measure(Body &b);
-double elastic_energy(Body &b);  // J; NaN if the model has none
+double kinetic_of(const Body &b);  // J
+double elastic_energy(Body &b);    // J; NaN if the model has none
 // [ntet] J/m3; throws if the model has none
 void energy_density(Body &b, double *out);
 // [ntet,6] Pa; throws if the model has none

@@ -20,11 +20,10 @@
 #include "step/step_bound.h"
 #include "world/body_model.h"
 #include "world/change_energy.h"
-#include "world/cut.h"
 #include "world/idle.h"
+#include "world/may_cut.h"
 #include "world/measure.h"
 #include "world/queries.h"
-#include "world/tool_cut.h"
 
 namespace dfm {
 namespace {

@@ -6,7 +6,7 @@
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
-#include "step/rigid.h"
+#include "step/rigid/rigid.h"
 #include "world/create.h"
 
 namespace dfm {

@@ -20,9 +20,9 @@
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/context.h"
-#include "step/energy_watch.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
+#include "step/watch/energy_watch.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
 
@@ -197,7 +197,7 @@ class Settling {
       bool rests = taken && off <= kGap;
       for (One &one : bodies_) {
         one.reach = whole ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
-                         : std::max(0.5 * one.reach, kNear * one.edge);
+                          : std::max(0.5 * one.reach, kNear * one.edge);
         one.slid = there && one.touches ? one.slid + one.moved : 0;
         rests = rests && one.moved <= kMoves * one.size && balanced(one);
       }

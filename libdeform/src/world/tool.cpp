@@ -10,7 +10,7 @@
 #include "state/bounds.h"
 #include "state/tool.h"
 #include "state/world.h"
-#include "step/rigid.h"
+#include "step/rigid/rigid.h"
 #include "step/stages.h"
 #include "world/attach.h"
 #include "world/find.h"

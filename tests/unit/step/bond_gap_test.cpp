@@ -1,8 +1,8 @@
 // How fast a bond closes what it is open by.
 #include "../world/inside.h"
 #include "state/obstacle.h"
-#include "step/attach.h"
 #include "step/context.h"
+#include "step/solve/attach.h"
 #include "world.h"
 
 // The guard may cut a sub-step to pieces of any length. What a bond is open by closes within the planned

@@ -1,6 +1,6 @@
 // What rigid contact finds of a mesh through its tree has the bits of a search through every triangle, and
 // costs what is near, not what is there.
-#include "step/tool_shape.h"
+#include "step/rigid/tool_shape.h"
 
 #include <algorithm>
 #include <random>

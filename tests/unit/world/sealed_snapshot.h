@@ -4,7 +4,7 @@
 #include <cstring>
 #include <vector>
 
-#include "world/snapshot_stream.h"
+#include "snapshot/snapshot_stream.h"
 
 namespace test {
 

@@ -10,7 +10,7 @@
 #include "inside.h"
 #include "rigid.h"
 #include "sealed_snapshot.h"
-#include "world/snapshot.h"
+#include "snapshot/snapshot.h"
 
 namespace {
 

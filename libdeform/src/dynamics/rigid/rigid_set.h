@@ -1,5 +1,5 @@
 // The rigid bodies of one host. They move in a sub-step by the same calls as a soft body
-// (dynamics/dynamics.h), each for all bodies of the host at once; step/rigid.cpp uses the results.
+// (dynamics/dynamics.h), each for all bodies of the host at once; step/rigid/rigid.cpp uses the results.
 #pragma once
 #include <cstdint>
 #include <span>

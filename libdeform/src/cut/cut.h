@@ -1,0 +1,72 @@
+// Cuts of a body between two steps: cells are removed, faces between cells open (doc/concepts/cutting.md).
+#pragma once
+#include <array>
+#include <new>
+
+#include "core/error.h"
+#include "geometry/cut_shape.h"
+#include "state/body.h"
+
+namespace dfm {
+
+struct BodyShape;
+struct MadeShape;
+
+struct CutReport {
+  uint32_t removed = 0;             // cells
+  uint32_t opened = 0;              // faces
+  uint32_t left = 0;                // cells that the shape meets, but the limit leaves in the body
+  uint32_t copies = 0;              // of points
+  uint32_t parts = 0;               // that the body consists of now
+  uint32_t pieces = 0;              // bodies that have come off it
+  double area = 0;                  // m2 at rest of triangles that are new in the surface
+  double mass = 0;                  // kg, taken away
+  Vec3 momentum;                    // N s, taken away
+  double kinetic = 0, elastic = 0;  // J, taken away; elastic NaN where the model gives none
+  double fracture = 0;              // J, that opening the faces takes
+  Vec3 force;                       // N, on the blade; over the way of the blade it takes that work
+};
+
+// The functions that follow throw Error; then nothing has changed.
+// Removes the first `most` of the cells that the shape meets.
+CutReport remove_by_shape(Body &b, const CutShape &shape, uint32_t most);
+CutReport remove_cells(Body &b, const Array<uint8_t> &removed);
+// Opens the faces between two cells whose middles lie on opposite sides of the blade or plane: the first
+// `most` on its way. Removes no cell.
+CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
+
+// Opens faces between present cells: pairs (mesh/cut_mesh.h), in any order.
+CutReport open_faces(Body &b, const Array<uint64_t> &faces);
+
+// The same in two calls (cut/cut_ahead.h), with faces between cells of the whole body. The first reads only
+// what steps do not change; the body must have the same shape in the second. due: s, time of the second.
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due);
+std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made);
+
+// Present cells on both sides of a face of the whole body; kNone: it was removed.
+std::array<uint32_t, 2> present_cells(const Body &b, uint64_t face);
+uint64_t face_of_whole(const Body &b, uint64_t face);  // between present cells
+
+// Reserves memory for n events beside those of contacts and attachments that a cut ends.
+void reserve_cut_events(World &w, size_t n);
+
+// Runs f; false: there was not enough memory for it.
+template <class F>
+bool found_memory(F &&f) {
+  try {
+    f();
+    return true;
+  } catch (const std::bad_alloc &) {
+    return false;
+  } catch (const Error &e) {
+    if (e.status != DFM_E_NOMEM) throw;
+    return false;
+  }
+}
+
+// Moves a body without cells, or a piece that a restore takes back, out of the list that steps see, or back
+// into it. Allocates nothing after reserve_places().
+void reserve_places(World &w, size_t more);  // for all present bodies and `more` new ones
+void set_place(World &w, Body &b, bool emptied, bool undone) noexcept;
+
+}  // namespace dfm

@@ -1,0 +1,157 @@
+#include "cut/cut_lasting.h"
+
+#include <algorithm>
+
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// Where a feature is now; target kNone: it is gone.
+struct Found { uint32_t target = kNone, feature = kNone; };
+Found find(const std::vector<CutTarget> &targets, size_t kind, uint32_t feature) {
+  for (uint32_t t = 0; t < targets.size(); ++t)
+    if (const uint32_t now = targets[t].map.of[kind][feature]; now != kNone) return {t, now};
+  return {};
+}
+
+// Divides an attachment: each target gets those of its places that are still there. The stiffness of the
+// whole is the sum over its places.
+void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vector<Attachment> &out) {
+  const uint64_t id = targets[0].id;
+  const bool own = a.body == id, anchored = !a.obstacle && a.to == id;
+  if (!own && !anchored) return out.push_back(a);
+  const size_t begin = out.size();
+  for (const CutTarget &t : targets) {
+    Attachment &part = out.emplace_back(a);
+    part.surfels.clear();
+    part.place.clear();
+    part.node.clear();
+    part.weight.clear();
+    part.impulse.clear();
+    (own ? part.body : part.to) = t.id;
+  }
+  for (size_t i = 0; i < a.surfels.size(); ++i) {
+    const Found surfel = own ? find(targets, 0, a.surfels[i]) : Found{0, a.surfels[i]};
+    uint32_t target = surfel.target;
+    uint32_t node[kAnchors];
+    bool there = target != kNone, placed = false;
+    for (size_t k = 0; !a.obstacle && k < kAnchors; ++k) {
+      node[k] = a.node[kAnchors * i + k];
+      if (!anchored) continue;
+      const Found at = find(targets, 0, node[k]);
+      node[k] = at.feature == kNone ? 0 : at.feature;
+      if (a.weight[kAnchors * i + k] == 0) continue;
+      there = there && at.target != kNone && (!placed || at.target == target);
+      target = at.target;
+      placed = true;
+    }
+    if (!there) continue;
+    Attachment &part = out[begin + target];
+    part.surfels.push_back(surfel.feature);
+    for (size_t k = 0; k < 3; ++k) {
+      if (a.obstacle) part.place.push_back(a.place[3 * i + k]);
+      part.impulse.push_back(a.impulse[3 * i + k]);
+    }
+    for (size_t k = 0; !a.obstacle && k < kAnchors; ++k) {
+      part.node.push_back(node[k]);
+      part.weight.push_back(a.weight[kAnchors * i + k]);
+    }
+  }
+  for (size_t t = begin; t < out.size(); ++t) {
+    const double share = double(out[t].surfels.size()) / double(a.surfels.size());
+    out[t].stiffness *= share;
+    out[t].damping *= share;
+    if (targets.size() > 1) out[t].release *= share;
+    if (t > begin) out[t].total = {};
+  }
+  // an attachment without points is reported only if none of its parts has any
+  const auto holds = [](const Attachment &x) { return !x.surfels.empty(); };
+  const auto first = out.begin() + std::ptrdiff_t(begin);
+  const bool any = std::any_of(first, out.end(), holds);
+  if (!any) out.resize(begin + 1);
+  else out.erase(std::remove_if(first, out.end(), [&](auto &x) { return !holds(x); }), out.end());
+}
+
+// Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone.
+template <class Number>
+bool renumber(const std::vector<CutTarget> &targets, Number CutTarget::*number, size_t kind, Number &at,
+              uint32_t &feature) {
+  const Found now = find(targets, kind, feature);
+  if (now.target == kNone) return false;
+  at = targets[now.target].*number;
+  feature = now.feature;
+  return true;
+}
+
+bool renumber(ContactPoint &c, const std::vector<CutTarget> &targets) {
+  const auto slot = &CutTarget::slot;
+  const bool a = c.slot_a == targets[0].slot, b = !c.obstacle && c.slot_b == targets[0].slot;
+  bool there = !a || renumber(targets, slot, c.type_a, c.slot_a, c.feature_a);
+  there &= !b || renumber(targets, slot, c.kind == kEdgeEdge ? 1 : 2, c.slot_b, c.feature_b);
+  if (!there) c.feature_a = c.feature_b = 0;  // of a contact that has ended
+  return there;
+}
+
+bool renumber(Crossing &c, const std::vector<CutTarget> &targets, const World &w) {
+  const auto id = &CutTarget::id;
+  const bool a = c.id_a == targets[0].id, b = c.id_b == targets[0].id;
+  bool there = !a || renumber(targets, id, 1, c.id_a, c.edge_a);
+  there &= !b || renumber(targets, id, 1, c.id_b, c.edge_b);
+  // of two bodies the older one is side a; an obstacle is side b
+  if (c.id_b < c.id_a && slot_of(w, c.id_b) != kNone) {
+    std::swap(c.id_a, c.id_b);
+    std::swap(c.edge_a, c.edge_b);
+  }
+  return there;
+}
+
+}  // namespace
+
+Lasting::Lasting(const World &w, const std::vector<CutTarget> &targets)
+    : crossings(w.store.crossings.get_allocator()),
+      contacts(w.report.contacts.get_allocator()),
+      id_a(w.store.id_a),
+      id_b(w.store.id_b) {
+  for (const Attachment &a : w.attachments) carry(a, targets, attachments);
+  for (Crossing c : w.store.crossings)
+    if (renumber(c, targets, w)) crossings.push_back(c);
+  std::sort(crossings.begin(), crossings.end());
+  contacts = w.report.contacts;
+  ended.assign(w.store.n, 0);
+  for (uint32_t i = 0; i < w.report.n; ++i) {
+    const bool a = contacts[i].slot_a == targets[0].slot;
+    const bool b = !contacts[i].obstacle && contacts[i].slot_b == targets[0].slot;
+    ended[i] = !renumber(contacts[i], targets);
+    for (const CutTarget &t : targets) {
+      if (a && !ended[i] && contacts[i].slot_a == t.slot) id_a[i] = t.id;
+      if (b && !ended[i] && contacts[i].slot_b == t.slot) id_b[i] = t.id;
+    }
+  }
+}
+
+void exchange(World &w, Lasting &other) noexcept {
+  w.attachments.swap(other.attachments);
+  w.store.crossings.swap(other.crossings);
+  w.report.contacts.swap(other.contacts);
+  w.store.id_a.swap(other.id_a);
+  w.store.id_b.swap(other.id_b);
+}
+
+void end_what_went(World &w, const Lasting &lasting) {
+  for (uint32_t i = 0; i < w.report.n; ++i) {
+    if (!lasting.ended[i]) continue;
+    if (w.store.touching[i])
+      add_event(w, DFM_EVENT_END, w.store.id_a[i], w.store.id_b[i], w.store.key[i], w.time);
+    w.store.touching[i] = 0;
+    std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
+  }
+  for (Attachment &a : w.attachments) {
+    if (!a.surfels.empty() || a.released) continue;
+    a.released = true;
+    add_event(w, DFM_EVENT_RELEASE, a.body, a.to, a.number, w.time);
+  }
+  std::erase_if(w.attachments, [](const Attachment &a) { return a.surfels.empty(); });
+}
+
+}  // namespace dfm

@@ -1,0 +1,347 @@
+// The two stages of rigid bodies around the solve: motion without contact, and the end with contact.
+#include "state/bounds.h"
+#include "step/rigid/rigid.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/obstacle_mesh.h"
+#include "core/error.h"
+#include "math/turn.h"
+#include "state/obstacle.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/rigid/tool_touch.h"
+#include "step/stages.h"
+
+namespace dfm {
+namespace {
+
+// said: sentences() before the call of the host. Includes the host's reason if it has given one.
+bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
+                 uint32_t *trouble) {
+  need_memory(fault.status);
+  *trouble |= DFM_TROUBLE_PLUGIN;
+  const std::string why =
+      said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
+  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s",
+                        static_cast<unsigned long long>(w.step_count), set.defs[0].name,
+                        set.host_name.c_str(), fault.what, why.c_str())
+                     .c_str());
+  return false;
+}
+
+// Solves rigid contact. False: a friction law has failed, which ends the step as between soft bodies.
+template <class F>
+bool solved(const World &w, uint32_t *trouble, const F &solve) {
+  try {
+    solve();
+    return true;
+  } catch (const ToolTouch::LawFailed &e) {
+    *trouble |= DFM_TROUBLE_PLUGIN;
+    const std::string at =
+        std::isnan(e.force) ? ""
+                            : format(" at a normal force of %.9g N and a slip of %.9g m/s", e.force, e.slip);
+    set_last_error(
+        format("step %llu: friction law '%s' gave no valid force where rigid things touch%s; take a "
+               "smaller step, reduce speeds and loads or change the law",
+               static_cast<unsigned long long>(w.step_count), e.law->type->id, at.c_str())
+            .c_str());
+    return false;
+  }
+}
+
+}  // namespace
+
+Obstacle &rigid_obstacle(World &w, uint64_t id) {
+  for (auto &o : w.obstacles)
+    if (o->id == id) return *o;
+  fail(DFM_E_FATAL, "a rigid body has lost its shape");
+}
+
+Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
+  return o.added ? load_pose(s) * o.local : load_pose(s);
+}
+
+// Mean velocity of a shape's origin for this motion of its body, as ObstacleView::velocity_at.
+Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
+  if (!o.added) return velocity;
+  const Vec3 arm = rotate(load_quat(start.rotation), o.local.position), turn = load3(start.spin);
+  const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
+  return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
+}
+
+void place_rigids(World &w) {
+  StepContext &step = *w.steps;
+  step.rigid_places.clear();
+  step.rigid_groups.clear();
+  if (w.rigid_sets.empty()) return;
+  step.rigid_places.resize(w.obstacles.size());
+  for (auto &set : w.rigid_sets) {
+    set->first_group = static_cast<uint32_t>(step.rigid_groups.size());
+    step.rigid_groups.resize(step.rigid_groups.size() + set->ngroup);
+    for (uint32_t g : set->group)
+      if (g != DFM_RIGID_STILL) ++step.rigid_groups[set->first_group + g];
+  }
+  for (auto &o : w.obstacles) {
+    if (!o->rigid) continue;
+    const uint32_t g = o->rigid->group[o->rigid_body];
+    if (g != DFM_RIGID_STILL)
+      step.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], {}};
+  }
+}
+
+bool ask_rigids(World &w, uint32_t *trouble) {
+  const uint64_t said = sentences();
+  for (auto &set : w.rigid_sets)
+    if (const HostFault fault = set->free_motion()) return host_failed(w, *set, fault, said, trouble);
+  return true;
+}
+
+bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
+  step.rigid_again = false;
+  for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
+  if (!ask_rigids(w, trouble)) return false;
+  bool goes_on = false;
+  if (!solved(w, trouble, [&] { goes_on = step.tools->begin(w, step); }) || !goes_on) return false;
+  for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
+  for (auto &o : w.obstacles) {
+    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
+    const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
+    ObstacleView &view = step.obstacle_views[o->slot];
+    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), step.h);
+    view.spin = load3(v + 3);
+    view.linear = view.spin - load3(s.spin);
+    if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
+    step.rigid_places[o->slot].center = load3(s.position);
+  }
+  return true;
+}
+
+namespace {
+
+// Sets number their groups one after another.
+RigidSet &set_of_group(World &w, uint32_t group) {
+  const auto after = std::upper_bound(w.rigid_sets.begin(), w.rigid_sets.end(), group,
+                                      [](uint32_t g, const auto &set) { return g < set->first_group; });
+  return **(after - 1);
+}
+
+}  // namespace
+
+void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
+  RigidSet &set = set_of_group(w, block.group);
+  const double *const shared = step.tools->shared_response(set, block.group - set.first_group);
+  step.rows.set_response(block, [&](double *matrix) {
+    if (shared) std::copy_n(shared, 9 * size_t{block.count} * block.count, matrix);
+    else if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
+           set.host_name.c_str(), set.defs[0].name);
+  });
+}
+
+namespace {
+
+// y of the block where its bodies have these velocities, less those that detection has used and what rows
+// between rigid things have added, whose impulses are unknowns here.
+void start_rigids(const StepContext &step, const ContactRows::Block &block, const RigidSet &set,
+                  const Array<double> &velocity, Array<double> &y) {
+  for (uint32_t i = 0; i < set.defs.size(); ++i) {
+    if (set.group[i] == DFM_RIGID_STILL || set.first_group + set.group[i] != block.group) continue;
+    const double *const now = &velocity[6 * size_t{i}], *const then = &set.first[6 * size_t{i}];
+    Vec3 change = load3(now) - load3(then), turn = load3(now + 3) - load3(then + 3);
+    step.tools->take_off_shared(set, i, change, turn);
+    double *const to = &y[4 * size_t{block.first + 2 * set.place[i]}];
+    store3(to, change);
+    store3(to + 4, turn);
+  }
+}
+
+}  // namespace
+
+// A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once
+// more with its new velocities. Detection has been done with the first ones, so the difference enters the
+// rows as the rigid bodies' change of velocity before any impulse.
+void correct_rigids(World &w, StepContext &step) {
+  for (const ContactRows::Block &block : step.rows.blocks)
+    if (block.group != kNone) {
+      const RigidSet &set = set_of_group(w, block.group);
+      start_rigids(step, block, set, set.velocity, step.rows.y);
+    }
+}
+
+void sum_rigid_impulses(World &w, StepContext &step) {
+  for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
+  const ContactRows &rows = step.rows;
+  if (!w.plan.touches() || rows.rigid.empty()) return;
+  for (uint32_t i = 0; i < rows.all(); ++i) {
+    if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
+    const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
+    const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
+    store3(to, load3(to) - p);
+    store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+  }
+}
+
+bool revise_rigids(World &w, StepContext &step) {
+  if (std::none_of(w.rigid_sets.begin(), w.rigid_sets.end(),
+                   [](auto &set) { return set->host.revise != nullptr; }))
+    return false;
+  sum_rigid_impulses(w, step);
+  bool any = false;
+  for (auto &set : w.rigid_sets) {
+    if (!set->host.revise) continue;
+    bool changed = false;
+    step.tools->add_to_impulses(*set);
+    if (!set->revise(changed))
+      fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it",
+           set->host_name.c_str(), set->defs[0].name);
+    if (!changed) continue;
+    any = true;
+    step.tools->add_to_revised(*set);
+    for (const ContactRows::Block &block : step.rows.blocks) {
+      if (block.group == kNone || block.group < set->first_group ||
+          block.group >= set->first_group + set->ngroup)
+        continue;
+      rigid_response(w, step, block);
+      for (Array<double> *y : {&step.rows.y, &step.rows.y_free})
+        start_rigids(step, block, *set, set->revised, *y);
+      step.rows.push_rigid(block);
+    }
+  }
+  return any;
+}
+
+// 1: all have ended their step; 2: a host requests another solve; 0: failed.
+int ask_rigid_ends(World &w, uint32_t *trouble) {
+  const uint64_t said = sentences();
+  bool again = false;
+  for (auto &set : w.rigid_sets)
+    if (const HostFault fault = set->take_impulses()) return host_failed(w, *set, fault, said, trouble);
+  for (auto &set : w.rigid_sets) {
+    bool one = false;
+    if (const HostFault fault = set->end_state(one)) return host_failed(w, *set, fault, said, trouble);
+    again |= one;
+  }
+  return again ? 2 : 1;
+}
+
+Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
+  sum_rigid_impulses(w, step);
+  bool differ = false;
+  if (!solved(w, trouble, [&] { differ = step.tools->answer(w, step); })) return Next::stop;
+  const int end = ask_rigid_ends(w, trouble);
+  if (end == 0) return Next::stop;
+  step.rigid_again = (end == 2 || differ) && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.touches() &&
+                     step.rows.all() > 0;
+  if (step.rigid_again) {
+    ++step.rigid_rounds;
+    ++w.stats.rigid_again;
+    if (!ask_rigids(w, trouble)) return Next::stop;
+    step.tools->correct();
+    return Next::solve;
+  }
+  step.rigid_rounds = 0;
+  if (!step.tools->follows_arcs(w, step) || !step.tools->stays_out(w, step)) return Next::stop;
+  step.tools->turn_jaws();
+  reserve_reports(w, step);
+  // From here on (guard) their true motion is used.
+  for (auto &o : w.obstacles) {
+    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]);
+    const Pose to = shape_pose(*o, o->rigid->next[o->rigid_body]);
+    step.obstacle_views[o->slot].velocity = (1 / step.h) * (to.position - from.position);
+    step.obstacle_views[o->slot].spin =
+        (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation));
+    step.obstacle_views[o->slot].linear = {};
+  }
+  return Next::stage;
+}
+
+void keep_rigids(World &w, StepContext &step) {
+  if (!w.rigid_sets.empty()) step.tools->keep(w);  // else stage_rigid_predict() has not made anything
+  for (auto &set : w.rigid_sets) set->commit(sub_step_of(w, step), step.guard.motion);
+  if (!w.rigid_sets.empty())
+    for (auto &o : w.obstacles)
+      if (o->rigid) o->pose = shape_pose(*o, o->rigid->state[o->rigid_body]);
+}
+
+dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
+  const dfm_rigid_def &d = set.defs[i];
+  const dfm_rigid_state &s = set.state[i];
+  dfm_body_measure m{};
+  m.size = sizeof m;
+  m.mass = d.mass;
+  m.volume = m.rest_volume = solid_volume(d);
+  const Vec3 v = load3(s.velocity), w = load3(s.spin),
+             L = in_axes(load_quat(s.rotation), load3(d.inertia), w);
+  store3(m.com, load3(s.position));
+  store3(m.velocity, v);
+  store3(m.momentum, d.mass * v);
+  store3(m.angular, L);
+  m.kinetic = 0.5 * d.mass * norm2(v) + 0.5 * dot(w, L);
+  const double round =
+      d.shape == DFM_SHAPE_NONE ? 0 : d.radius + (d.shape == DFM_SHAPE_CAPSULE ? d.half_length : 0);
+  const double reach = d.shape == DFM_SHAPE_BOX ? norm(load3(d.half_size)) : round;
+  m.speed_max = norm(v) + norm(w) * reach;
+  for (uint32_t k = 0; k < 3; ++k) m.contact_impulse[k] = set.total[3 * i + k];
+  return m;
+}
+
+void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
+  RigidSet &set = *o.rigid;
+  if (set.group[o.rigid_body] == DFM_RIGID_STILL)
+    fail(DFM_E_ARG, "rigid body '%s' is fixed and cannot be moved", o.name.c_str());
+  if (!finite_values({&given, 1}))
+    fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
+  check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);
+  check_place(*o.world, "rigid body", o.name.c_str(), largest_coordinate(given.position, 1, 3));
+  dfm_rigid_state &s = set.state[o.rigid_body];
+  s = given;
+  store_quat(s.rotation, unit_quat(given.rotation));
+  for (auto &shape : o.world->obstacles)
+    if (shape->rigid == &set && shape->rigid_body == o.rigid_body) shape->pose = shape_pose(*shape, s);
+  ++o.world->placements;
+  values_changed(*o.world);
+}
+
+namespace {
+
+void check_joint(const RigidSet &set, uint32_t joint, dfm_status status) {
+  if (joint >= set.njoint)
+    fail(DFM_E_ARG, "there is no joint %u; the set of rigid body '%s' has %u", joint, set.defs[0].name,
+         set.njoint);
+  if (status != DFM_OK)
+    fail(DFM_E_ARG, "joint %u of the set of rigid body '%s' is neither hinge nor slider", joint,
+         set.defs[0].name);
+}
+
+}  // namespace
+
+void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max) {
+  if (!set.host.set_motor) fail(DFM_E_UNSUPPORTED, "rigid host '%s' has no motors", set.host_name.c_str());
+  if (!std::isfinite(velocity) || !(max >= 0 && std::isfinite(max)))
+    fail(DFM_E_ARG, "motor of joint %u: velocity %g and max %g must be finite, max not negative", joint,
+         velocity, max);
+  check_joint(set, joint, DFM_OK);
+  check_joint(set, joint, set.host.set_motor(set.self, joint, velocity, max, set.extra.data()));
+  set.joints[joint].motor = max > 0;
+  set.joints[joint].velocity = velocity;
+  set.joints[joint].max = max;
+}
+
+void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort) {
+  if (!set.host.joint)
+    fail(DFM_E_UNSUPPORTED, "rigid host '%s' says nothing about its joints", set.host_name.c_str());
+  check_joint(set, joint, DFM_OK);
+  double p, r, e;
+  check_joint(set, joint, set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e));
+  if (position) *position = p;
+  if (rate) *rate = r;
+  if (effort) *effort = e;
+}
+
+}  // namespace dfm

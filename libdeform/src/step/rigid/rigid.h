@@ -1,0 +1,35 @@
+// Rigid bodies in a world: sets of bodies of one host. For detection, filters and reports each body is an
+// obstacle; the solve uses its response from the host, so that contact is two-way. The states belong to the
+// world (snapshot, hash); the host only maps one to the next.
+#pragma once
+#include "contact/rows.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "math/vec3.h"
+#include "state/motion.h"
+
+namespace dfm {
+
+struct StepContext;
+struct World;
+struct Obstacle;
+
+// Throws Error; then the world is unchanged. out: [nbody] handles.
+void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);
+void destroy_rigids(RigidSet &set);  // throws Error if the host owns its bodies
+Obstacle &rigid_obstacle(World &w, uint64_t id);
+void place_rigids(World &w);  // World::prepare(): slots and groups
+void rigid_response(World &w, StepContext &step, const ContactRows::Block &group);
+void sum_rigid_impulses(World &w, StepContext &step);  // of the rows, into every set
+// true: the response of a host has changed with these impulses; rows have the new one, solve again
+bool revise_rigids(World &w, StepContext &step);
+dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
+void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);  // of the body that the shape belongs to
+// pose of a body's shape for this state of the body
+Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);
+Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def);
+// for make_rows(): rows start from the last response of the hosts
+void correct_rigids(World &w, StepContext &step);
+void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);
+void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort);
+
+}  // namespace dfm

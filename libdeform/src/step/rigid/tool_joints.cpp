@@ -1,0 +1,284 @@
+// Contact of bodies that joints connect. Their group answers impulses with a dense matrix that contains the
+// joints and the motors that hold (dynamics/rigid/builtin.cpp), so contact never violates joints.
+//
+//   near     the matrix is computed for groups that something is near, because it costs more than a free body
+//   rank     of a matrix is that of the motions that joints and motors allow; the rest of it is rounding, and
+//            taken out
+//   motors   decided again in each pass, by the impulses of soft bodies and of the rows
+#include <algorithm>
+#include <cmath>
+
+#include "body/obstacle_mesh.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "math/turn.h"
+#include "state/obstacle.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/rigid/tool_touch.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kHeld = 1e-9;     // of the answer without joints: less is rounding, joints allow no motion
+constexpr double kStronger = 0.1;  // of what a place yields where a motor holds that is not at its limit yet
+constexpr double kMostStrong = 1e-6;  // of it: no place gives less
+constexpr double kDriven = 0.01;      // sine: a motor moves a place along a direction
+constexpr double kNever = 1e3;        // m/s, to part by: such a place has no impulse
+constexpr double kRank = 1e-12;       // of the answer without joints: less is rounding
+
+bool gives_way(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
+
+bool is_simple(const ObstacleView &v) {
+  return v.shape == Shape::sphere || v.shape == Shape::capsule || v.shape == Shape::box;
+}
+
+// Whether a joint to the world has its anchor in this obstacle, as both were created: a door in its post. The
+// anchor of a slider may be anywhere.
+bool hangs_on(const World &w, const Obstacle &body, const Obstacle &obstacle) {
+  ObstacleView v = w.steps->obstacle_views[obstacle.slot];
+  if (!is_simple(v)) return false;
+  v.position = load3(obstacle.def.pose.position);
+  v.rotation = unit_quat(obstacle.def.pose.rotation);
+  const ToolShape shape(v, nullptr);
+  return std::any_of(body.rigid->joints.begin(), body.rigid->joints.end(), [&](const dfm_joint_def &j) {
+    ObstaclePoint o;
+    return j.body == body.rigid_body && j.with == DFM_RIGID_WORLD && j.type != DFM_JOINT_SLIDER &&
+           shape.closest(load3(j.anchor), HUGE_VAL, o) && o.distance < w.offset;
+  });
+}
+
+}  // namespace
+
+// Bodies of one set that are no contact partners: those that a joint connects, and those that their joints
+// let overlap as created, such as the ends of a chain of short thick links.
+bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacle &b) {
+  if (a.rigid && !b.rigid) return hangs_on(w, a, b);
+  if (b.rigid && !a.rigid) return hangs_on(w, b, a);
+  if (!a.rigid || a.rigid != b.rigid || a.rigid->of_tool) return false;
+  const RigidSet &set = *a.rigid;
+  const auto names = [&](const dfm_joint_def &j, uint32_t body) { return j.body == body || j.with == body; };
+  const auto is_joined = [&](uint32_t body) {
+    return std::any_of(set.joints.begin(), set.joints.end(), [&](const auto &j) { return names(j, body); });
+  };
+  const uint32_t i = a.rigid_body, k = b.rigid_body;
+  if (std::any_of(set.joints.begin(), set.joints.end(),
+                  [&](const auto &j) { return names(j, i) && names(j, k); }))
+    return true;
+  const bool one_group = set.group[i] == set.group[k] && gives_way(set, i);
+  const bool at_still = gives_way(set, i) ? is_joined(i) && !gives_way(set, k) : is_joined(k);
+  if (!one_group && !at_still) return false;
+  const auto created = [&](const Obstacle &o) {
+    ObstacleView v = w.steps->obstacle_views[o.slot];
+    const Pose body = to_pose(set.defs[o.rigid_body].pose), own = o.added ? body * o.local : body;
+    v.position = own.position;
+    v.rotation = own.rotation;
+    return v;
+  };
+  const ObstacleView va = created(a), vb = created(b);
+  if (!is_simple(va) || !is_simple(vb)) return false;
+  ToolShape shape_a(va, nullptr), shape_b(vb, nullptr);
+  return depth(shape_a, shape_b, true) > 0;
+}
+
+// Which of its groups have joints, and whether motors.
+void ToolTouch::list_joints(Moved &m) {
+  const RigidSet &set = *m.set;
+  m.jointed.assign(set.ngroup, 0);
+  for (const dfm_joint_def &j : set.joints) {
+    m.drives = m.drives || j.motor;
+    for (const uint32_t body : {j.body, j.with})
+      if (body != DFM_RIGID_WORLD && gives_way(set, body)) m.jointed[set.group[body]] = 1;
+  }
+}
+
+void ToolTouch::ask_response(Moved &m, uint32_t g) {
+  RigidSet &set = *m.set;
+  const size_t at = m.first[g] != kNone ? m.first[g] : m.response.size();
+  if (m.first[g] == kNone) m.response.resize(at + m.wide[g] * m.wide[g], 0.0);
+  m.first[g] = kNone;
+  if (!set.respond(g, static_cast<uint32_t>(m.wide[g] / 6), &m.response[at])) return;
+  m.first[g] = at;
+  if (m.jointed[g]) clean_response(m, g);
+}
+
+// Of the group of this side, if it has joints and its response has not been needed yet.
+void ToolTouch::take_response(const Side &side) {
+  Moved &m = sides_[side.tool];
+  if (!m.set) return;
+  const uint32_t g = m.set->group[side.part];
+  if (g != DFM_RIGID_STILL && m.jointed[g] && m.first[g] == kNone) ask_response(m, g);
+}
+
+// 1/kg, how the place would yield without joints; 0: a tool, or it does not.
+double ToolTouch::answer_without_joints(const Side &side, Vec3 along) const {
+  const Moved &m = sides_[side.tool];
+  if (!m.set || m.set->of_tool || !gives_way(*m.set, side.part)) return 0;
+  const dfm_rigid_def &d = m.set->defs[side.part];
+  const Vec3 turn = cross(side.arm, along), inverse{1 / d.inertia[0], 1 / d.inertia[1], 1 / d.inertia[2]};
+  return 1 / d.mass + dot(turn, in_axes(load_quat(m.set->state[side.part].rotation), inverse, turn));
+}
+
+bool ToolTouch::jointed(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  return m.set && gives_way(*m.set, side.part) && m.jointed[m.set->group[side.part]];
+}
+
+// 1/kg, below which an answer along this direction is rounding; 0: no side has joints.
+double ToolTouch::rounding_of(const Row &row, Vec3 along) const {
+  if (!jointed(row.a) && !jointed(row.b)) return 0;
+  return kHeld * (answer_without_joints(row.a, along) + answer_without_joints(row.b, along));
+}
+
+// A place that does not yield because a motor holds has a row nevertheless. It gives at first as a free body
+// would, then less and less (press_harder), until its impulse takes the motor to its limit.
+bool ToolTouch::motor_holds(const Row &row) const {
+  return is_driven(row.a, row.normal) || is_driven(row.b, row.normal);
+}
+
+// Whether a motor of its group moves the place along this direction. If none does, joints hold it as well,
+// such as a door that lies in a post beside its hinge, and no impulse takes a motor to its limit.
+bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
+  if (!jointed(side) || !sides_[side.tool].drives) return false;
+  const RigidSet &set = *sides_[side.tool].set;
+  const Vec3 at = center(side) + side.arm;
+  return std::any_of(set.joints.begin(), set.joints.end(), [&](const dfm_joint_def &j) {
+    const uint32_t body = gives_way(set, j.body) || j.with == DFM_RIGID_WORLD ? j.body : j.with;
+    if (!j.motor || set.group[body] != set.group[side.part]) return false;
+    const dfm_pose &was = set.defs[body].pose;
+    const dfm_rigid_state &s = set.state[body];
+    const Quat turn = load_quat(s.rotation) * conjugate(unit_quat(was.rotation));
+    const Vec3 axis = rotate(turn, normalized(load3(j.axis)));
+    if (j.type == DFM_JOINT_SLIDER) return std::fabs(dot(axis, along)) > kDriven;
+    const Vec3 arm = at - load3(s.position) - rotate(turn, load3(j.anchor) - load3(was.position));
+    return std::fabs(dot(axis, cross(arm, along))) > kDriven * norm(arm);
+  });
+}
+
+double ToolTouch::give_of_motor(const Row &row) const {
+  return strong_ / kHeld * rounding_of(row, row.normal);
+}
+
+// The host's motors have been decided again: all rows are given their new answers, and velocities those of
+// the impulses so far.
+void ToolTouch::renew_rows() {
+  forget_changes();
+  for (uint32_t i = 0; i < rows_.size(); ++i) {
+    Row &row = rows_[i];
+    if (!(jointed(row.a) && sides_[row.a.tool].drives) && !(jointed(row.b) && sides_[row.b.tool].drives))
+      continue;
+    set_answers(row);
+    if (!(row.inverse > 0)) {  // no longer moved by anything: nothing is asked of it
+      row.inverse = kHeld / rounding_of(row, row.normal);
+      row.rate = -kNever;
+      row.impulse = row.opens = 0;
+    }
+    if (!(row.response > 0 && row.impulse > 0)) row.along[0] = row.along[1] = 0;
+  }
+  push_all();
+}
+
+void ToolTouch::ask_again(Moved &m) {
+  for (uint32_t g = 0; g < m.set->ngroup; ++g)
+    if (m.jointed[g] && m.first[g] != kNone) ask_response(m, g);
+}
+
+// Takes velocities and responses by the motors that the present impulses need.
+void ToolTouch::take_host(size_t k) {
+  Moved &m = sides_[k];
+  add_impulses(k);
+  bool changed = false;
+  if (!m.set->host.revise || !m.set->revise(changed) || !(changed || m.stale)) return set_base(k);
+  m.stale = false;
+  m.free.assign(m.set->revised.begin(), m.set->revised.end());
+  ask_again(m);
+  set_base(k);
+  renew_rows();
+}
+
+// Whether a motor has reached its limit by the present impulses, or no longer is there.
+bool ToolTouch::decide_motors() {
+  bool any = false;
+  for (size_t k = 0; k < sides_.size(); ++k) {
+    Moved &m = sides_[k];
+    if (!m.set || !m.drives || !m.touched || !m.set->host.revise) continue;
+    add_impulses(k);
+    bool changed = false;
+    if (!m.set->revise(changed) || !changed) continue;
+    m.free.assign(m.set->revised.begin(), m.set->revised.end());
+    ask_again(m);
+    set_base(k);
+    any = true;
+  }
+  if (any) renew_rows();
+  return any;
+}
+
+// Where motors hold against rows: their places give less.
+bool ToolTouch::press_harder() {
+  if (strong_ < kMostStrong ||
+      std::none_of(
+          rows_.begin(), rows_.end(),
+          [](const Row &row) { return !row.jaw && row.soft > 0 && row.impulse > 0; }))
+    return false;
+  strong_ *= kStronger;
+  renew_rows();
+  return true;
+}
+
+void ToolTouch::add_to_impulses(RigidSet &set) const {
+  if (rows_.empty()) return;
+  for (size_t k = 0; k < sides_.size(); ++k)
+    if (sides_[k].set == &set) add_rows_to(k, set);
+}
+
+void ToolTouch::add_to_revised(RigidSet &set) {
+  if (rows_.empty()) return;
+  for (Moved &m : sides_) {
+    if (m.set != &set || !m.touched) continue;
+    m.free.assign(set.revised.begin(), set.revised.end());
+    ask_again(m);
+    renew_rows();
+    for (size_t i = 0; i < m.free.size(); ++i) set.revised[i] = m.free[i] + m.change[i] + m.turn[i];
+  }
+}
+
+// response = B B^T by Cholesky's method with pivots, without what has a smaller pivot than rounding.
+void ToolTouch::clean_response(Moved &m, uint32_t g) {
+  const size_t wide = m.wide[g];
+  double *const response = &m.response[m.first[g]];
+  std::vector<double> &basis = m.basis;  // [wide,rank] by columns, and two columns more
+  basis.resize(wide * wide + 2 * wide);
+  double *const left = &basis[wide * wide], *const least = left + wide;
+  for (size_t i = 0; i < m.set->defs.size(); ++i) {
+    if (m.set->group[i] != g) continue;
+    const dfm_rigid_def &d = m.set->defs[i];
+    const double turns = 1 / std::min({d.inertia[0], d.inertia[1], d.inertia[2]});
+    for (size_t c = 0; c < 6; ++c) {
+      const size_t r = 6 * size_t{m.set->place[i]} + c;
+      left[r] = response[r * wide + r];
+      least[r] = kRank * (c < 3 ? 1 / d.mass : turns);
+    }
+  }
+  size_t rank = 0;
+  for (; rank < wide; ++rank) {
+    size_t pivot = 0;
+    for (size_t r = 1; r < wide; ++r)
+      if (left[r] * least[pivot] > left[pivot] * least[r]) pivot = r;
+    if (!(left[pivot] > least[pivot])) break;
+    const double scale = 1 / std::sqrt(left[pivot]);
+    double *const column = &basis[rank * wide];
+    for (size_t r = 0; r < wide; ++r) {
+      double sum = response[r * wide + pivot];
+      for (size_t c = 0; c < rank; ++c) sum -= basis[c * wide + r] * basis[c * wide + pivot];
+      column[r] = scale * sum;
+      left[r] -= column[r] * column[r];
+    }
+    left[pivot] = 0;
+  }
+  std::fill_n(response, wide * wide, 0.0);
+  for (size_t c = 0; c < rank; ++c)
+    for (size_t r = 0; r < wide; ++r)
+      for (size_t k = 0; k < wide; ++k) response[r * wide + k] += basis[c * wide + r] * basis[c * wide + k];
+}
+
+}  // namespace dfm

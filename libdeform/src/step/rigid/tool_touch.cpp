@@ -1,0 +1,746 @@
+#include "step/rigid/tool_touch.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "body/obstacle_mesh.h"
+#include "dynamics/rigid/rigid_set.h"
+#include "friction/pair_rules.h"
+#include "geometry/closest.h"
+#include "math/turn.h"
+#include "state/obstacle.h"
+#include "state/tool.h"
+#include "state/world.h"
+#include "step/budget.h"
+#include "step/context.h"
+#include "step/pair_table.h"
+#include "step/solve/tolerance.h"
+
+namespace dfm {
+namespace {
+
+constexpr double kDone = 1e-10;            // of the largest speed that a row is to change
+constexpr double kSharper = 1e-2;          // of the change by a pass: tolerance of its solve
+constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
+constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
+constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
+constexpr double kCross = 1e-6;            // sine between edges that have a normal
+constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
+constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
+constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
+constexpr double kNear = 0.5;        // of the least thickness: a row with an impulse is no longer than this
+constexpr double kFaster = 0.5;      // of the change by the pass before: else passes end
+constexpr uint32_t kMostPasses = 6;  // over what turning adds, until it changes no more
+constexpr uint32_t kMostRevisions = 6;  // of motors, by contact
+
+bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
+bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
+// Part 0 is the frame.
+bool is_jaw(const Obstacle &o) { return of_tool(o) && o.rigid_body > 0; }
+
+// Whether contact moves it, as far as its joints allow.
+bool is_free(const Obstacle &o) { return builtin(o) && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
+// Does not yield, whatever touches it.
+bool is_wall(const Obstacle &o) { return !o.rigid || o.rigid->group[o.rigid_body] == DFM_RIGID_STILL; }
+
+// Whether the rows of this file keep the two apart, filters aside.
+bool kept_apart(const Obstacle &a, const Obstacle &b) {
+  if (a.sensor || b.sensor || (a.rigid && a.rigid == b.rigid && a.rigid_body == b.rigid_body)) return false;
+  if (of_tool(a) && of_tool(b)) return a.rigid != b.rigid;
+  if (of_tool(a) || of_tool(b)) {
+    const Obstacle &other = of_tool(a) ? b : a;
+    return is_free(other) || is_wall(other);
+  }
+  return (is_free(a) && (is_free(b) || is_wall(b))) || (is_free(b) && is_wall(a));
+}
+
+// Planes and voxels have neither corners nor edges, so two of them have no rows.
+bool without_corners(const Obstacle &o) { return o.def.shape == DFM_SHAPE_PLANE || o.grid; }
+
+PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
+
+// The normal of two edges, from q to p, if both edges are left along it. It follows from the two directions
+// alone, so it stays the same for edges that have passed each other.
+bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec3 &n) {
+  n = cross(p.to - p.from, q.to - q.from);
+  const double sine = norm(n), d = norm(apart);
+  if (p.faces == 0 || q.faces == 0 || !(sine > kCross * norm(p.to - p.from) * norm(q.to - q.from))) {
+    if (!(d > 0)) return false;
+    n = (1 / d) * apart;
+    return q.leaves(n) && p.leaves(-n);
+  }
+  n = (1 / sine) * n;
+  if (q.leaves(n) && p.leaves(-n)) return true;
+  n = -n;
+  return q.leaves(n) && p.leaves(-n);
+}
+
+// Of the rotation vectors that end in the same attitude, whole turns apart, the one nearest to `like`: a ball
+// that rolls fast turns more than once in a sub-step.
+Vec3 nearest_turn(Vec3 turn, Vec3 like) {
+  constexpr double kWhole = 2 * 3.14159265358979323846;
+  const double angle = norm(turn), length = norm(like);
+  if (!(length > 0.5 * kWhole)) return turn;
+  const Vec3 axis = angle > 1e-6 ? (1 / angle) * turn : (1 / length) * like;
+  return turn + kWhole * std::round((dot(axis, like) - dot(axis, turn)) / kWhole) * axis;
+}
+
+void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
+
+// Whether a rigid body of another host passes through something, because neither this file nor its host keeps
+// the two apart. A host with a world of its own knows what is in that world.
+bool passes(const Obstacle &a, const Obstacle &b) {
+  if (a.sensor || b.sensor || of_tool(a) || of_tool(b) || a.rigid == b.rigid) return false;
+  const auto held = [](const Obstacle &o) { return !is_wall(o) && !is_free(o) && !o.rigid->elsewhere; };
+  if (!held(a) && !held(b)) return false;
+  return held(a) ? is_wall(b) || is_free(b) || held(b) : is_wall(a) || is_free(a);
+}
+
+}  // namespace
+
+ToolTouch::ToolTouch(const Memory &m)
+    : solved_(m), acceleration_(m), islands_(m), batches_(m), next_(m), next_report_(m) {
+  use_memory(m, start_, tangents_, match_, points_, swept_);
+  state_.use(m);
+}
+
+void ToolTouch::prepare(World &w, SceneFacts &facts) {
+  pairs_.clear();
+  passing_.clear();
+  rows_.clear();  // of bodies that may be gone
+  shared_.clear();
+  shared_sides_.clear();
+  thinnest_ = HUGE_VAL;
+  sets_.clear();
+  walls_.clear();
+  w.pairs.tool_law.clear();
+  if (w.rigid_sets.empty()) return;
+  offset_ = w.offset;
+  const auto wall = [&](uint32_t slot) {
+    const Obstacle &o = *w.obstacles[slot];
+    if (of_tool(o) || is_free(o)) {
+      if (std::find(sets_.begin(), sets_.end(), o.rigid) == sets_.end()) sets_.push_back(o.rigid);
+      return kNone;
+    }
+    const auto at = std::find(walls_.begin(), walls_.end(), slot) - walls_.begin();
+    if (at == std::ssize(walls_)) walls_.push_back(slot);
+    return static_cast<uint32_t>(at);
+  };
+  for (uint32_t i = 0; i < w.obstacles.size(); ++i)
+    for (uint32_t j = i + 1; j < w.obstacles.size(); ++j) {
+      const Obstacle &a = *w.obstacles[i], &b = *w.obstacles[j];
+      const bool cornerless = kept_apart(a, b) && without_corners(a) && without_corners(b);
+      const bool apart = kept_apart(a, b) && !cornerless;
+      if (!apart && !cornerless && !passes(a, b)) continue;
+      bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
+      if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
+        touch = rule->collide;
+      if (!touch || belong_together(w, a, b)) continue;
+      if (!apart) {
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0});
+        for (const Obstacle *const o : {&a, &b})
+          if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
+              std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
+                  facts.rigid_alone.end())
+            facts.rigid_alone.push_back(o->name);
+        continue;
+      }
+      const bool frees = !of_tool(a) && !of_tool(b), jaw = is_jaw(a) || is_jaw(b);
+      facts.rigid_pairs += frees;
+      const uint32_t wall_a = wall(i), wall_b = wall(j);
+      pairs_.push_back({i,
+                        j,
+                        law_of_obstacles(w, a, b),
+                        {a.id, b.id},
+                        frees,
+                        jaw,
+                        b_first(a, b),
+                        {wall_a, wall_b},
+                        frees ? std::min(thickness(a), thickness(b)) : HUGE_VAL});
+      thinnest_ = std::min(thinnest_, pairs_.back().thin);
+    }
+  for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
+  for (const auto *const list : {&pairs_, &passing_})
+    for (const Pair &pair : *list)
+      for (const uint32_t slot : {pair.a, pair.b})
+        if (ObstacleMesh *const mesh = w.obstacles[slot]->mesh.get(); mesh && !mesh->tree)
+          mesh->make_tree(w.meters.obstacles.memory());
+}
+
+Vec3 ToolTouch::speed(const Row &row) const {
+  const auto at = [&](const Side &side) {
+    const double *const v = &sides_[side.tool].base[6 * size_t{side.part}];
+    const double *const d = &sides_[side.tool].change[6 * size_t{side.part}];
+    return load3(v) + load3(d) + cross(load3(v + 3) + load3(d + 3), side.arm);
+  };
+  return at(row.a) - at(row.b);
+}
+
+// Without what the rows have added.
+Vec3 ToolTouch::base_speed(const Row &row) const {
+  const auto at = [&](const Side &side) {
+    const double *const v = &sides_[side.tool].base[6 * size_t{side.part}];
+    return load3(v) + cross(load3(v + 3), side.arm);
+  };
+  return at(row.a) - at(row.b);
+}
+
+bool ToolTouch::Moved::gives(const Obstacle &to) const { return responds || (to.rigid && !jaws.empty()); }
+
+void ToolTouch::push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<double> Moved::*to,
+                     bool turns_jaws) {
+  Moved &m = sides_[side.tool];
+  std::vector<double> &v = m.*to;
+  if (turns_jaws)
+    for (Moved::Jaw &jaw : m.jaws) {
+      if (jaw.part != side.part) continue;
+      const double turns = dot(jaw.lever, impulse) + dot(jaw.axis, moment);
+      jaw.moment += turns;
+      add(jaw.give * turns * jaw.lever, &v[6 * size_t{side.part}]);
+      add(jaw.give * turns * jaw.axis, &v[6 * size_t{side.part} + 3]);
+    }
+  if (!m.responds) return;
+  const uint32_t g = m.set->group[side.part];
+  if (g == DFM_RIGID_STILL || m.first[g] == kNone) return;
+  const size_t wide = m.wide[g], column = 6 * size_t{m.set->place[side.part]};
+  const double p[6] = {impulse.x, impulse.y, impulse.z, moment.x, moment.y, moment.z};
+  const auto move = [&](size_t body) {
+    const double *const row = &m.response[m.first[g] + 6 * size_t{m.set->place[body]} * wide + column];
+    for (size_t r = 0; r < 6; ++r)
+      for (size_t c = 0; c < 6; ++c) v[6 * body + r] += row[r * wide + c] * p[c];
+  };
+  if (wide == 6) return move(side.part);
+  for (size_t i = 0; i < m.set->defs.size(); ++i)
+    if (m.set->group[i] == g) move(i);
+}
+
+void ToolTouch::push(const Row &row, Vec3 p) {
+  push(row.a, p, cross(row.a.arm, p), &Moved::change, true);
+  push(row.b, -p, -cross(row.b.arm, p), &Moved::change, true);
+}
+
+// The relative velocity that this impulse makes. No other impulse may have been applied before.
+Vec3 ToolTouch::answer_to(const Row &row, Vec3 impulse) {
+  push(row, impulse);
+  std::vector<double> &va = sides_[row.a.tool].change, &vb = sides_[row.b.tool].change;
+  const auto moved = [](const Side &s, const std::vector<double> &v) {
+    return load3(&v[6 * size_t{s.part}]) + cross(load3(&v[6 * size_t{s.part} + 3]), s.arm);
+  };
+  const Vec3 out = moved(row.a, va) - moved(row.b, vb);
+  std::fill(va.begin(), va.end(), 0.0);
+  std::fill(vb.begin(), vb.end(), 0.0);
+  for (const Side *side : {&row.a, &row.b})
+    for (Moved::Jaw &jaw : sides_[side->tool].jaws) jaw.moment = 0;
+  return out;
+}
+
+Vec3 ToolTouch::center(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  return m.set ? load3(m.set->state[side.part].position) : m.center[side.part];
+}
+
+// The impulses of a set: those of soft bodies and those of the rows.
+void ToolTouch::add_impulses(size_t k) {
+  if (!sides_[k].set) return;
+  RigidSet &set = *sides_[k].set;
+  std::copy(sides_[k].given.begin(), sides_[k].given.end(), set.impulse.begin());
+  add_rows_to(k, set);
+}
+
+void ToolTouch::add_rows_to(size_t k, RigidSet &set) const {
+  for (const Row &row : rows_)
+    for (const Side *side : {&row.a, &row.b}) {
+      if (side->tool != k) continue;
+      const Vec3 p = side == &row.a ? row.given() : -row.given();
+      double *const to = &set.impulse[6 * size_t{side->part}];
+      add(p, to);
+      add(cross(side->arm, p), to + 3);
+    }
+}
+
+// The mean spin of a free rigid body is not linear in its impulses, because its moments of inertia turn with
+// it; the mean velocities of bodies with joints are not either, because joints hold at the end of the
+// sub-step. The difference between what the host computes from the present impulses and what was assumed here
+// counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
+double ToolTouch::follow_spin() {
+  double most = 0;
+  for (size_t k = 0; k < sides_.size(); ++k) {
+    Moved &m = sides_[k];
+    if (!m.set || m.set->of_tool || !m.touched) continue;
+    add_impulses(k);
+    bool again = false;
+    if (m.set->end_state(again)) continue;  // the host reports this at the end of the sub-step
+    for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
+      if (!(m.reach[i] > 0)) continue;
+      const size_t at = 6 * size_t{i} + 3;
+      if (m.jointed[m.set->group[i]]) {
+        const Vec3 goes = load3(m.set->next[i].position) - load3(m.set->state[i].position);
+        const Vec3 change = (1 / h_) * goes - load3(&m.base[at - 3]) - load3(&m.change[at - 3]);
+        add(change, &m.base[at - 3]);
+        add(change, &m.turn[at - 3]);
+        most = std::max(most, norm(change));
+      }
+      const Quat turned = load_quat(m.set->next[i].rotation) * conjugate(load_quat(m.set->state[i].rotation));
+      const Vec3 taken = load3(&m.base[at]) + load3(&m.change[at]);
+      const Vec3 change = (1 / h_) * nearest_turn(rotation_vector(turned), h_ * taken) - taken;
+      add(change, &m.base[at]);
+      add(change, &m.turn[at]);
+      most = std::max(most, m.reach[i] * norm(change));
+      if (m.jointed[m.set->group[i]]) off_ = std::max(off_, h_ * most);
+    }
+  }
+  return most;
+}
+
+Vec3 ToolTouch::spin(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  const size_t at = 6 * size_t{side.part} + 3;
+  return load3(&m.base[at]) + load3(&m.change[at]);
+}
+
+// (exp(h w) - 1) r / h less its first term. Without it, what a turning tool holds would creep outwards.
+Vec3 ToolTouch::bend(Vec3 spin, Vec3 arm) const {
+  if (h_ * h_ * norm2(spin) > kSmallTurn * kSmallTurn)
+    return (1 / h_) * (rotate(turned(Quat{}, h_ * spin), arm) - arm) - cross(spin, arm);
+  const Vec3 second = cross(spin, cross(spin, arm)), third = cross(spin, second), fourth = cross(spin, third);
+  return (h_ / 2) * second + (h_ * h_ / 6) * third + (h_ * h_ * h_ / 24) * fourth +
+         (h_ * h_ * h_ * h_ / 120) * cross(spin, fourth);
+}
+
+// For the material at the place. On a rounded corner the place moves with the normal, which turns with the
+// other side: a rolling ball has no bend, and a rod that turns with the jaws that hold it has that of a
+// corner.
+Vec3 ToolTouch::bend(const Side &side, const Side &other) const {
+  const Moved &m = sides_[side.tool];
+  if (m.set && m.responds && !m.jaws.empty()) {
+    const Side frame{side.tool, 0, {}, {}};
+    return bend(spin(frame), side.bone + center(side) - center(frame));
+  }
+  const Vec3 own = spin(side), round = side.arm - side.bone;
+  Vec3 out = bend(own, side.bone);
+  if (norm2(round) == 0) return out;
+  const Vec3 first = cross(spin(other), round);
+  return out + cross(own, (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin(other), first));
+}
+
+// Derivative of bend(spin, arm) with respect to the spin, along `by`, to second order.
+Vec3 ToolTouch::bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const {
+  const Vec3 first = cross(spin, by),
+             goes = arm + h_ * (cross(spin, arm) + (0.5 * h_) * cross(spin, cross(spin, arm)));
+  return cross(by + (0.5 * h_) * first + (h_ * h_ / 6) * cross(spin, first), goes) - cross(by, arm);
+}
+
+// Updates what turning adds to the speeds of a row, from the present spins. Returns the change, m/s.
+double ToolTouch::follow_arc(Row &row) const {
+  const Vec3 now = bend(row.a, row.b) + belt(row.a) - bend(row.b, row.a) - belt(row.b);
+  const double changed = norm(now - row.bend);
+  row.bend = now;
+  if (row.frees) row.lift = dot(row.normal, bend(spin(row.a), row.a.bone) - bend(spin(row.b), row.b.bone));
+  return changed;
+}
+
+Vec3 ToolTouch::belt(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  return m.set ? Vec3{} : m.belt[side.part];
+}
+
+double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) {
+  Moved &m = sides_[side.tool];
+  const double *const v = &m.seen[6 * size_t{side.part}];
+  const double arm = shape.endless() ? norm(other.position() - center(side)) + other.reach()
+                                     : norm(shape.position() - center(side)) + shape.reach();
+  m.arm[side.part] = std::max(m.arm[side.part], arm);
+  return norm(load3(v)) + norm(load3(v + 3)) * arm;
+}
+
+// Whether impulses have made a body so fast that it may meet what no row looks at. Rows are then to be found
+// by its new velocity.
+bool ToolTouch::outruns_rows() {
+  bool any = false;
+  for (Moved &m : sides_)
+    for (size_t i = 0; m.set && i < m.arm.size(); ++i) {
+      double now[6];
+      for (size_t k = 0; k < 6; ++k) now[k] = m.base[6 * i + k] + m.change[6 * i + k];
+      const auto speed_of = [&](const double *v) { return norm(load3(v)) + norm(load3(v + 3)) * m.arm[i]; };
+      if (!(m.arm[i] > 0) || speed_of(now) <= kReach * speed_of(&m.seen[6 * i]) + offset_ / h_) continue;
+      std::copy_n(now, 6, &m.seen[6 * i]);
+      any = true;
+    }
+  return any;
+}
+
+void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal,
+                        double gap, double reach) {
+  if (!(gap - offset_ < reach)) return;
+  a.arm = place.at - center(a);
+  b.arm = place.at - center(b);
+  a.bone = pair.jaw ? a.arm : place.bone_a - center(a);
+  b.bone = pair.jaw ? b.arm : place.bone_b - center(b);
+  Row row{};
+  row.a = a;
+  row.b = b;
+  row.frees = pair.frees;
+  row.jaw = pair.jaw;
+  row.b_first = pair.b_first;
+  row.at = place.at;
+  row.gap = gap;
+  row.far = gap > kNear * pair.thin;
+  row.normal = normal;
+  row.law = pair.law;
+  row.pair[0] = pair.id[0];
+  row.pair[1] = pair.id[1];
+  row.key = key_of(pair.id, name);
+  if (pair.jaw) {
+    row.soft = 1 / (h_ * h_ * kFace);
+    row.rate = (offset_ - gap) / h_;
+  } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
+  else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / planned_;
+  row.tangent[0] = any_tangent(normal);
+  row.tangent[1] = cross(normal, row.tangent[0]);
+  set_answers(row);
+  if (!(row.inverse > 0)) return;  // neither yields
+  rows_.push_back(row);
+}
+
+// How the two sides yield along the normal (inverse 0: they do not) and in the tangent plane.
+void ToolTouch::set_answers(Row &row) {
+  const Vec3 pressed = answer_to(row, row.normal);
+  const double w = dot(row.normal, pressed);
+  const bool held = !(w > rounding_of(row, row.normal));
+  row.inverse = row.response = 0;
+  row.pressed = pressed;
+  if (!row.jaw) row.soft = held && motor_holds(row) ? give_of_motor(row) : 0;
+  if (held && !(row.soft > 0)) return;
+  row.inverse = 1 / (w + row.soft);
+  if (held) return;
+  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
+  const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
+  const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
+               both = dot(row.tangent[0], second);
+  row.response = 0.5 * (p + q) + std::sqrt(0.25 * (p - q) * (p - q) + both * both);
+  if (!(row.response > rounding_of(row, row.tangent[0]))) row.response = 0;
+}
+
+// Finds the features of each shape that are this near to the box of the other. Returns false if there are
+// none.
+bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat) {
+  if (a.endless() || b.endless()) {
+    const ToolShape &plane = a.endless() ? a : b;
+    ToolShape &body = a.endless() ? b : a;
+    ObstaclePoint o;
+    if (!plane.closest(body.position(), HUGE_VAL, o) || o.distance - body.reach() > far) return false;
+    body.look_under(o.normal, dot(o.normal, body.position()) - o.distance + far, flat);
+    return true;
+  }
+  if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
+  const Vec3 wide = {far, far, far};
+  const ToolBox of_a = a.bounds(), of_b = b.bounds();
+  const ToolBox near = {of_b.lo - wide, of_b.hi + wide};
+  if (!near.holds(of_a.lo, of_a.hi)) return false;
+  a.look_at(near, flat);
+  b.look_at({of_a.lo - wide, of_a.hi + wide}, flat);
+  return true;
+}
+
+// Adds rows of the corners of each against the other, and of edges that cross. Returns m, the depth of the
+// deepest corner; 0: none is inside.
+double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+  const double reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
+  const double far = reach + offset_;
+  if (!look_at_each_other(a, b, far, pair.jaw)) return 0;
+  for (const Side *side : {&at_a, &at_b}) take_response(*side);
+  double deepest = 0;
+  ObstaclePoint o;
+  // A corner meets an edge or a corner of the other only on its leading side. Other near features are not in
+  // the way, such as the vertices of a floor beside the lower edge of a box that slides over it.
+  bool face = true;
+  for (const ToolShape::Corner &c : a.corners()) {
+    const auto &[corner, number] = c;
+    if (!b.closest(corner, far + a.round(), o, &face) || !(face || a.may_meet(c, -o.normal))) continue;
+    const double gap = o.distance - a.round();
+    deepest = std::max(deepest, -gap);
+    add_row(pair, {kCornerOfA, number, 0}, at_a, at_b,
+            {o.point + 0.5 * gap * o.normal, corner, o.point - b.round() * o.normal}, o.normal, gap, reach);
+  }
+  for (const ToolShape::Corner &c : b.corners()) {
+    const auto &[corner, number] = c;
+    if (!a.closest(corner, far + b.round(), o, &face) || !(face || b.may_meet(c, -o.normal))) continue;
+    const double gap = o.distance - b.round();
+    deepest = std::max(deepest, -gap);
+    add_row(pair, {kCornerOfB, number, 0}, at_a, at_b,
+            {o.point + 0.5 * gap * o.normal, o.point - a.round() * o.normal, corner}, -o.normal, gap, reach);
+  }
+  const double round = a.round() + b.round();
+  for (const ToolShape::Edge &p : a.edges())
+    for (const ToolShape::Edge &q : b.edges()) {
+      if (!segments_within(p.from, p.to, q.from, q.to, far + round)) continue;
+      const SegmentPoints near_by = closest_segments(p.from, p.to, q.from, q.to);
+      if (!(near_by.s > 0 && near_by.s < 1 && near_by.t > 0 && near_by.t < 1)) continue;
+      const Vec3 on_a = p.from + near_by.s * (p.to - p.from), on_b = q.from + near_by.t * (q.to - q.from);
+      Vec3 n;
+      if (!between(p, q, on_a - on_b, n)) continue;
+      const double gap = dot(n, on_a - on_b) - round;
+      if (gap < -kDent) continue;
+      add_row(pair, {kEdges, p.number, q.number}, at_a, at_b,
+              {on_b + (b.round() + 0.5 * gap) * n, on_a, on_b}, n, gap, reach);
+    }
+  return deepest;
+}
+
+ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
+  Side out{};
+  if (wall != kNone) {
+    out.tool = sides_.size() - 1;
+    out.part = wall;
+    return out;
+  }
+  while (sides_[out.tool].set != o.rigid) ++out.tool;
+  out.part = o.rigid_body;
+  return out;
+}
+
+// Calls f(pair, the two shapes, their sides) for all pairs that may touch and of which one yields.
+void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) {
+  for (const Pair &pair : pairs_) {
+    const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
+    const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
+    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
+    const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
+    if (!sides_[at_a.tool].gives(b) && !sides_[at_b.tool].gives(a)) continue;
+    shapes_[0].take(va, a.mesh.get());
+    shapes_[1].take(vb, b.mesh.get());
+    f(pair, shapes_[0], shapes_[1], at_a, at_b);
+  }
+}
+
+void ToolTouch::find(const World &w, const StepContext &step) {
+  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+    const double deep = add_rows(pair, a, b, at_a, at_b);
+    if (!pair.jaw && inside(a, b, deep)) tell_deep(w, pair, deep, false);
+  });
+}
+
+void ToolTouch::forget_changes() {
+  for (Moved &m : sides_) {
+    std::fill(m.change.begin(), m.change.end(), 0.0);
+    for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
+  }
+}
+
+// Computes the velocities from the impulses of the rows.
+void ToolTouch::push_all() {
+  forget_changes();
+  for (const Row &row : rows_) push(row, row.given());
+}
+
+// Passes over what the rows take as given: the terms of turning beyond the first order, spins and motors
+// depend on the solution.
+void ToolTouch::solve(World &w, StepContext &step) {
+  double scale = 0;
+  for (const Row &row : rows_)
+    scale = std::max(
+        scale, std::fabs(row.rate) + std::fabs(dot(row.normal, speed(row))) + row.impulse / row.inverse);
+  const double done = kDone * scale;
+  double before = HUGE_VAL;
+  off_ = 0;
+  uint32_t revisions = 0;
+  for (uint32_t pass = 0;; ++pass) {
+    double changed = 0;
+    charge(w, step, 0);
+    if (pass > 0 && is_used_up(step)) return;  // a pass takes long where joints connect many bodies
+    if (pass > 0 && revisions < kMostRevisions && (decide_motors() || press_harder())) {
+      ++revisions;
+      pass = 0;
+    }
+    off_ = 0;
+    for (Row &row : rows_) {
+      const double lift = row.lift;
+      changed = std::max(changed, follow_arc(row));
+      if (pass > 0 && row.impulse > 0) off_ = std::max(off_, h_ * std::fabs(row.lift - lift));
+    }
+    if (pass > 0) changed = std::max(changed, follow_spin());
+    if (pass > 0) off_ = std::max(off_, h_ * left_);
+    for (Moved &m : sides_) m.stale = m.stale || revisions == kMostRevisions;
+    if (pass > 0 && (!(changed > done) || !(changed < kFaster * before) || pass == kMostPasses)) return;
+    if (pass > 0) before = changed;
+    left_ = 0;
+    solve_rows(w, step, std::max(done, kSharper * changed));
+  }
+}
+
+// Takes velocities and responses of the sets that take part, and the motion of everything else.
+void ToolTouch::take_sets(World &w, StepContext &step) {
+  sides_.resize(sets_.size() + !walls_.empty());
+  for (size_t k = 0; k < sides_.size(); ++k) {
+    Moved &m = sides_[k];
+    m.set = k < sets_.size() ? sets_[k] : nullptr;
+    const size_t n = m.set ? m.set->defs.size() : walls_.size();
+    m.free.assign(6 * n, 0.0);
+    m.change.assign(6 * n, 0.0);
+    m.turn.assign(6 * n, 0.0);
+    m.given.assign(6 * n, 0.0);
+    m.reach.assign(n, 0.0);
+    m.arm.assign(n, 0.0);
+    m.touched = m.responds = m.drives = m.stale = false;
+    m.jaws.clear();
+    m.response.clear();
+    m.jointed.clear();
+    if (!m.set) {
+      m.center.resize(n);
+      m.belt.resize(n);
+      for (size_t i = 0; i < n; ++i) {
+        const ObstacleView &v = step.obstacle_views[walls_[i]];
+        m.center[i] = v.position;
+        m.belt[i] = v.belt;
+        store3(&m.free[6 * i], v.velocity);
+        store3(&m.free[6 * i + 3], v.spin);
+      }
+      m.base = m.seen = m.free;
+      continue;
+    }
+    RigidSet &set = *m.set;
+    std::copy(set.velocity.begin(), set.velocity.end(), m.free.begin());
+    m.first.assign(set.ngroup, kNone);
+    m.wide.assign(set.ngroup, 0);
+    list_joints(m);
+    bool later = false;
+    for (uint32_t i = 0; i < n; ++i) {
+      const uint32_t g = set.group[i];
+      if (g == DFM_RIGID_STILL || m.wide[g] > 0) continue;
+      m.wide[g] = 6 * size_t{step.rigid_groups[set.first_group + g]};
+      if (m.jointed[g]) later = true;  // where something is near
+      else ask_response(m, g);
+    }
+    m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
+    for (const auto &t : w.tools)
+      if (t->set == m.set && t->has_jaws()) list_jaws(m);
+    straighten(m);
+    m.base = m.seen = m.free;
+  }
+}
+
+// A corner moves along an arc. The passes of solve() over it converge by a factor of about h w each; from
+// about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
+// touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
+// w)^2 r / 2: what stays farther away than that does not touch. Where places are off by what the passes have
+// left, the sub-step goes on in its shortest pieces, which then grow again.
+bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
+  double turn = 0, arrives = 1;
+  for (const Row &row : rows_) {
+    if (row.jaw) continue;
+    if (row.far && row.impulse > 0) {
+      const double closes = -h_ * dot(row.normal, base_speed(row)), gap = offset_ - h_ * row.rate;
+      arrives = std::min(arrives, closes > gap ? kAims * gap / closes : 0.5);
+    }
+    double most = 0, leaves = 0;
+    for (const Side *side : {&row.a, &row.b}) {
+      const double r = norm(side->bone), way = h_ * norm(cross(spin(*side), side->bone));
+      if (!(way > kArc * r)) continue;
+      most = std::max(most, way / r);
+      leaves += 0.5 * way * way / r;
+    }
+    const double room = std::max(0.0, -h_ * row.rate);
+    const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
+    if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
+  }
+  if (off_ > kOff * offset_) arrives = std::min(arrives, kLeastPiece * step.guard.planned / step.h);
+  if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
+    return true;
+  step.guard.again = step.guard.fast = true;
+  step.guard.cut = arrives;
+  if (turn > 0) step.guard.cut = std::min(arrives, kAims * kArc / turn);
+  return false;
+}
+
+bool ToolTouch::begin(World &w, StepContext &step) {
+  rows_.clear();
+  shared_.clear();
+  off_ = 0;
+  if (next_.n > 0) keep_next();
+  next_report_.contacts.clear();
+  next_report_.touching.clear();
+  offset_ = w.offset;
+  if (!passing_.empty()) tell_passing(w, step);
+  if (pairs_.empty()) return true;
+  h_ = step.h;
+  planned_ = step.guard.planned;
+  strong_ = 1;
+  take_sets(w, step);
+  tell_driven(w, step);
+  find(w, step);
+  if (rows_.empty() && !add_hits(w, step)) return true;
+  if (!follows_arcs(w, step)) return false;
+  take_last(w);
+  solve_past_hits(w, step);
+  if (!follows_arcs(w, step)) return false;
+  give_velocities();
+  return true;
+}
+
+void ToolTouch::give_velocities() {
+  if (rows_.empty()) return;
+  for (Moved &m : sides_)
+    for (size_t i = 0; m.set && i < m.free.size(); ++i)
+      m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
+  for (Moved &m : sides_) {
+    m.known.resize(m.change.size());
+    for (size_t i = 0; i < m.known.size(); ++i) m.known[i] = m.change[i] + m.turn[i];
+  }
+}
+
+// m/s, the largest change of a place since the velocities that soft bodies know.
+double ToolTouch::unknown_change() const {
+  double most = 0;
+  for (const Moved &m : sides_)
+    for (size_t i = 0; i < m.reach.size(); ++i) {
+      if (!m.set) continue;
+      const size_t at = 6 * i;
+      const auto differs = [&](size_t k) {
+        return norm(load3(&m.change[k]) + load3(&m.turn[k]) - load3(&m.known[k]));
+      };
+      most = std::max(most, differs(at) + m.reach[i] * differs(at + 3));
+    }
+  return most;
+}
+
+void ToolTouch::correct() {
+  if (rows_.empty()) return;
+  for (Moved &m : sides_) {
+    if (!m.set) continue;
+    m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
+    straighten(m);
+    if (!m.drives) continue;
+    ask_again(m);
+    renew_rows();
+  }
+  give_velocities();
+}
+
+// base: what the set does without the rows.
+void ToolTouch::set_base(size_t k) {
+  Moved &m = sides_[k];
+  for (size_t i = 0; i < m.free.size(); ++i) m.base[i] = m.free[i] + m.turn[i];
+  for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
+    const double *const p = &m.given[6 * size_t{i}];
+    push({k, i, {}, {}}, load3(p), load3(p + 3), &Moved::base, false);
+  }
+}
+
+bool ToolTouch::answer(World &w, StepContext &step) {
+  if (rows_.empty()) return false;
+  take_shared(step.rows);
+  for (size_t k = 0; k < sides_.size(); ++k) {
+    Moved &m = sides_[k];
+    if (!m.set) continue;
+    m.given.assign(m.set->impulse.begin(), m.set->impulse.end());
+    if (m.drives && m.touched) take_host(k);
+    else set_base(k);
+  }
+  solve_past_hits(w, step);
+  for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
+  keep_next();
+  list_contacts(w);
+  return unknown_change() > tangent_at_rest(w, h_);
+}
+
+}  // namespace dfm

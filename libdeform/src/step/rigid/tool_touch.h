@@ -1,0 +1,335 @@
+// Contact between two rigid things, at least one of which can yield: tools (deform/tool.h) and bodies of the
+// builtin host, with each other and with whatever does not yield (obstacles, fixed bodies). A coupled tool
+// yields by its spring, a body by its mass and as its joints allow; a tool without a coupling follows its
+// poses exactly and does not yield. Shapes are spheres, capsules, boxes and triangles; obstacles may also be
+// planes and voxels, which only corners touch.
+//
+//   rows     u_n' >= -(gap - d_c) / h at the nearest places of two parts, p >= 0, one of both is zero; the
+//            impulse acts at one point of both, so that both momenta are kept to rounding
+//   energy   p u_n' <= 0 for gap >= d_c / 2: such a contact takes energy or none. A smaller gap opens by at
+//            most a tenth of d_c in a planned sub-step, and no faster in the pieces of one
+//   turning  The rotation of a free body counts to third order, along the normal too: to first order alone a
+//            body that topples would sink by (h w)^2 r / 2 in a sub-step, which contact then opens by a tenth
+//            of d_c. Not so for tools: it would give them p (h w)^2 r / 2 of energy, and their springs hold
+//            them upright
+//   friction the law of the pair, implicitly, at the slip and normal force of the solution (tool_rub.cpp);
+//            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
+//   jaws     follow their angle exactly, so the force on what two of them hold would have no bound. Something
+//            rigid turns a jaw about its hinge by moment over stiffness, at the end of the sub-step (a spring
+//            without mass, backward Euler); soft bodies do not. The face of a jaw yields as well, by a
+//            hundredth of a millimeter per newton; otherwise it would be undefined how rigid things share a
+//            load. Jaws of a tool without a coupling pass through obstacles, as the tool does
+//   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
+//   order    The rows are solved first without soft bodies, whose contacts then use the resulting motion of
+//            tools; those of bodies that soft ones touch are solved with soft contacts (tool_shared.cpp). The
+//            impulses of soft bodies come back into all rows, until neither changes the other
+#pragma once
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "contact/contact_set.h"
+#include "contact/newton.h"
+#include "contact/rows.h"
+#include "contact/store.h"
+#include "core/disjoint_sets.h"
+#include "friction/laws.h"
+#include "math/vec3.h"
+#include "state/rigid_report.h"
+#include "step/rigid/tool_shape.h"
+
+namespace dfm {
+
+struct Obstacle;
+struct RigidSet;
+struct SceneFacts;
+struct StepContext;
+struct World;
+
+class ToolTouch {
+ public:
+  explicit ToolTouch(const Memory &memory);
+  // Called after a change of bodies or rules: finds which pairs may touch, and their laws.
+  void prepare(World &w, SceneFacts &facts);
+  // Thrown by what solves rows: a law failed, returned a value that is not finite, or a limit below zero.
+  struct LawFailed {
+    const LawInstance *law;
+    double force, slip;  // N, m/s, at which the law was evaluated; nan: unknown
+  };
+
+  // Called before the solve: finds and solves the rows of this sub-step, and changes the sets' velocities by
+  // their impulses. Returns false if the sub-step must be repeated, shorter (Guard::again).
+  bool begin(World &w, StepContext &step);
+  // Rows that are solved with the contacts of soft bodies (tool_shared.cpp).
+  void find_shared(const World &w, const StepContext &step);  // once contacts and bonds are known
+  std::span<const RigidSides> shared_sides() const { return shared_sides_; }
+  // [6 bodies,6 bodies] 1/kg, of a group that has such rows; null: it has none
+  const double *shared_response(const RigidSet &set, uint32_t group) const;
+  // from m/s, rad/s of a body, what these rows have added
+  void take_off_shared(const RigidSet &set, uint32_t body, Vec3 &velocity, Vec3 &spin) const;
+  // again: from the rows' present impulses, else from those of the last sub-step
+  void put_shared(ContactRows &to, ContactState &state, bool again);
+
+  // Called after the hosts have predicted their velocities again.
+  void correct();
+  // Sets' velocities become those of the present impulses, less those of soft bodies; known to these.
+  void give_velocities();
+  // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
+  // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
+  bool answer(World &w, StepContext &step);
+  // Called where the motors of a set are decided again because of soft bodies: adds the impulses of the rows
+  // to set.impulse, and their velocities to set.revised if the motors have changed.
+  void add_to_impulses(RigidSet &set) const;
+  void add_to_revised(RigidSet &set);
+  // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
+  bool follows_arcs(const World &w, StepContext &step) const;
+  // Called after the hosts have ended their sub-step: whether no fast free body has passed through something.
+  // False: as for begin().
+  bool stays_out(const World &w, StepContext &step);
+  // Turns the ends of the jaws.
+  void turn_jaws();
+  // Called at the end of an accepted sub-step: moves what lasts to the world.
+  void keep(World &w) noexcept;
+  ContactStore &next() { return next_; }
+  // tool_report.cpp: for events, lists of contacts and sums of pairs
+  static bool b_first(const Obstacle &a, const Obstacle &b);
+  RigidReport &next_report() { return next_report_; }
+  size_t most_events(const World &w) const;  // that keep() adds
+
+ private:
+  struct Side {
+    size_t tool;  // place in sides_
+    uint32_t part;
+    Vec3 arm;   // of the place, from its center
+    Vec3 bone;  // of a round shape: of the corner or axis inside; else, and beside a jaw, arm
+  };
+  struct Row {
+    Side a, b;
+    uint64_t key, pair[2];    // lasting names: of itself, of the two obstacles
+    Vec3 normal, tangent[2];  // from b to a
+    double rate;              // m/s, that u_n must reach
+    double soft;              // 1/kg, of the face of a jaw
+    double opens;             // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
+    double inverse;           // kg
+    double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
+    Vec3 pressed;             // 1/kg, the change of velocity by a unit impulse along the normal
+    uint32_t law;
+    double impulse, along[2];  // N s on a: along the normal and the tangents
+    Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
+    bool frees, jaw;           // none is of a tool; one is a jaw
+    bool far;                  // the gap is large beside the thickness of the two
+    bool b_first;              // reports have b first
+    Vec3 at;                   // m, of the place
+    double gap;                // m
+    double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
+    Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
+  };
+  struct Moved {
+    RigidSet *set;                           // nullptr: things that do not yield
+    std::vector<Vec3> center, belt;          // [n] of these things; m/s
+    std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
+    std::vector<double> basis;               // scratch of clean_response()
+    std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
+    std::vector<uint8_t> jointed;            // [groups]
+    std::vector<double> free, base, change;  // [6n] m/s, rad/s
+    std::vector<double> turn;                // [6n] what impulses change beyond the response
+    std::vector<double> given;               // [6n] N s, N m s of soft bodies
+    std::vector<double> known;               // [6n] what soft bodies know of change and turn
+    std::vector<uint8_t> shared;             // [groups] its rows are solved with soft bodies
+    std::vector<double> reach;               // [n] m, of its rows from its center
+    std::vector<double> seen;                // [6n] m/s, rad/s, by which rows have been found
+    std::vector<double> arm;                 // [n] m, of what may touch, from its center
+    bool responds;                           // the response is not zero
+    bool touched;                            // a row is its own
+    bool drives;                             // it has motors
+    bool stale;                              // the host may have decided about motors since
+    struct Jaw {
+      uint32_t part;
+      Vec3 axis, lever;  // velocity of its center by a turn of one about the axis
+      double give;       // rad/s by a moment's impulse of 1 N m s
+      double moment;     // N m s, of the rows
+    };
+    std::vector<Jaw> jaws;
+    // Whether contact with `to` changes the motion of this side. The jaws of a tool without a coupling yield
+    // to tools and bodies, but not to obstacles: its poses may lead it along a table.
+    bool gives(const Obstacle &to) const;
+  };
+  // Two obstacles that may touch, by their places in World::obstacles.
+  struct Pair {
+    uint32_t a, b, law;
+    uint64_t id[2];
+    bool frees, jaw;   // none is of a tool; one is a jaw
+    bool b_first;      // reports have b first
+    uint32_t wall[2];  // number among walls_; kNone: it is in a set
+    double thin;       // m, least thickness of the two
+  };
+  // Which features of the two meet.
+  enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
+  struct Name {
+    Meeting kind;
+    uint32_t first, second;
+  };
+  // bone_a, bone_b: corners, or points of edges or faces, without the radius around them
+  struct Place { Vec3 at, bone_a, bone_b; };
+  struct Hit {
+    const Pair *pair;
+    Name name;
+    Side a, b;
+    Place place;
+    Vec3 normal;
+    double gap;
+  };
+  Vec3 speed(const Row &row) const;
+  void push(const Row &row, Vec3 impulse);
+  void push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<double> Moved::*to, bool turns_jaws);
+  Vec3 answer_to(const Row &row, Vec3 impulse);
+  void find(const World &w, const StepContext &step);
+  using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
+  void each_pair(const World &w, const StepContext &step, const Visit &f);
+  static bool look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat);
+  double add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
+  void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
+               double reach);
+  static uint64_t key_of(const uint64_t pair[2], Name name);
+  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other);
+  bool outruns_rows();
+  void forget_changes();
+  Vec3 center(const Side &side) const;
+  void list_jaws(Moved &m) const;
+  void straighten(Moved &m) const;
+  Vec3 bend(const Side &side, const Side &other) const;
+  Vec3 bend(Vec3 spin, Vec3 arm) const;
+  Vec3 bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const;
+  double follow_arc(Row &row) const;
+  Vec3 spin(const Side &side) const;
+  Vec3 belt(const Side &side) const;
+  void add_impulses(size_t k);
+  void add_rows_to(size_t k, RigidSet &set) const;
+  void set_base(size_t k);
+  void set_answers(Row &row);
+  double follow_spin();
+  void solve(World &w, StepContext &step);
+  Vec3 base_speed(const Row &row) const;
+  double unknown_change() const;
+  void push_all();
+  // tool_solve.cpp
+  // A group of bodies that answer each other's impulses, with their jaws; or a jaw that moves alone.
+  struct Group {
+    size_t tool;
+    uint32_t group, jaw;  // one of them kNone; jaw: its part
+    bool operator==(const Group &) const = default;
+  };
+  RigidPlace place_of(const Side &side);
+  void fill_response(const Group &of, double *matrix) const;
+  void build_rows();
+  // shared: in the problem of soft bodies
+  const double *start_velocity(const Side &side, bool shared) const;
+  void fill_row(const Row &row, ContactRows &to, uint32_t r, bool shared) const;
+  void set_arcs(const Row &row, ContactRows &to, uint32_t r, bool shared) const;
+  // tool_shared.cpp
+  void take_shared(const ContactRows &from);
+  void find_islands();
+  bool sweep_island(NewtonHost &laws, const RowsPart &part, const Tolerance &tolerance, Residual &left);
+  void solve_island(World &w, StepContext &step, size_t island, double tolerance);
+  void solve_rows(World &w, StepContext &step, double tolerance);
+  // tool_joints.cpp
+  bool belong_together(const World &w, const Obstacle &a, const Obstacle &b);
+  static void list_joints(Moved &m);
+  static void ask_response(Moved &m, uint32_t group);
+  void take_response(const Side &side);
+  double answer_without_joints(const Side &side, Vec3 along) const;
+  bool jointed(const Side &side) const;
+  double rounding_of(const Row &row, Vec3 along) const;
+  bool motor_holds(const Row &row) const;
+  bool is_driven(const Side &side, Vec3 along) const;
+  double give_of_motor(const Row &row) const;
+  void renew_rows();
+  bool press_harder();
+  void ask_again(Moved &m);
+  static void clean_response(Moved &m, uint32_t group);
+  void take_host(size_t k);
+  bool decide_motors();
+  // tool_swept.cpp
+  static double thickness(const Obstacle &o);
+  // tool_hits.cpp
+  Vec3 end_of(const Side &side, Vec3 p) const;
+  void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
+  bool add_hits(const World &w, const StepContext &step);
+  void solve_past_hits(World &w, StepContext &step);
+  double depth(ToolShape &a, ToolShape &b, bool edges) const;
+  void tell_driven(const World &w, const StepContext &step);
+  void tell_deep(const World &w, const Pair &pair, double deep, bool driven);
+  void tell_passing(const World &w, const StepContext &step);
+  bool told(const Pair &pair) const;
+  bool inside(const ToolShape &a, const ToolShape &b, double deep) const;
+  Side side_of(const Obstacle &o, uint32_t wall) const;
+  void take_sets(World &w, StepContext &step);
+  // tool_rub.cpp
+  void take_last(const World &w);
+  void drop_bad_starts();
+  Vec3 slip(const Row &row) const;
+  void keep_next();
+  // tool_report.cpp
+  void list_contact(uint32_t row);
+  void list_contacts(const World &w);
+  void report(World &w) noexcept;
+
+  static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
+  static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
+  static constexpr double kReach = 2;    // rows look so many times as far as a thing goes
+  static constexpr double kOff = 0.2;    // of d_c, that places may be off after a sub-step
+
+  double h_ = 0, offset_ = 0;
+  double planned_ = 0;        // s, the sub-step before it was shortened
+  std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
+  double off_ = 0;            // m, that places with load or joints may be off after a solve
+  double left_ = 0;           // m/s along normals, that the last solve has left
+  double strong_ = 1;         // of the answer without joints, that places give where a motor holds
+  double thinnest_ = 0;       // m, of the pairs of free bodies
+  std::vector<Pair> pairs_,
+      passing_;                   // passing: nothing keeps the two apart, and no filter excludes them
+  std::vector<RigidSet *> sets_;  // that take part
+  std::vector<uint32_t> walls_;   // places in World::obstacles of those in no set of these
+  std::vector<Moved> sides_;      // valid where there are rows; kept for their memory, as shapes_ are
+  ToolShape shapes_[2];
+  std::vector<Row> rows_;
+  std::vector<Hit> hits_;
+  // the rows as a contact problem
+  ContactRows solved_;
+  std::vector<std::unique_ptr<ContactNewton>> newtons_;  // [islands]
+  Acceleration acceleration_;
+  Array<double> swept_;  // [3 rows] impulses of the best sweep
+  std::vector<RigidSides> places_;
+  std::vector<Group> groups_;
+  std::vector<uint32_t> group_size_;                     // [groups] bodies
+  DisjointSets islands_;                                 // of groups that rows connect
+  std::vector<std::vector<RowRun>> runs_;                // [islands]
+  std::vector<std::vector<uint32_t>> blocks_;            // [islands]
+  std::vector<double> tolerance_, normal_tolerance_;     // [rows] m/s
+  std::vector<uint32_t> shared_;                         // rows that are solved with soft bodies
+  std::vector<RigidSides> shared_sides_;                 // theirs
+  std::vector<uint8_t> shared_groups_, shared_islands_;  // scratch
+  std::vector<uint32_t> first_group_;                    // scratch
+  // m/s, the largest of places with and without the impulses of the start
+  struct StartSpeeds { double with = 0, without = 0; };
+  std::vector<StartSpeeds> start_speeds_;      // scratch
+  std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
+  // By row.
+  ContactState state_;
+  LawBatches batches_;
+  std::vector<LawInstance *> laws_;  // of the world
+  Array<ContactPoint> points_;       // key and normal
+  Array<double> start_, tangents_;
+  Array<uint32_t> match_;
+  ContactStore next_;
+  RigidReport next_report_;
+};
+
+// Ends what the thing touches. At the removal of a thing.
+void leave_rigid_contacts(World &w, uint64_t id);
+// The pairs that these contacts are of.
+void find_touching(const World &w, const ContactStore &of, Array<RigidPair> &out);
+
+}  // namespace dfm

@@ -1,0 +1,336 @@
+// contact <-> friction (doc/concepts/contact.md): the rows, the revision of bodies whose response depends on
+// the impulses, and what is kept. The outer loop over the laws around the sweeps is in solve_islands.cpp.
+//
+//   warm start: last impulses of the same keys, times h/h_old, applied before the first sweep
+//   repeat   evaluate all laws once, in batches, at the present slip and normal force
+//            residual of the true laws below tolerance: done
+//            sweep the linearized laws until their own residual is below tolerance
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "body/implicit_system.h"
+#include "contact/solver.h"
+#include "core/error.h"
+#include "plugin/context.h"
+#include "state/obstacle.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/overlap/overlap.h"
+#include "step/pair_table.h"
+#include "step/rigid/rigid.h"
+#include "step/rigid/tool_touch.h"
+#include "step/solve/attach.h"
+#include "step/solve/bristles.h"
+#include "step/solve/cut_drag.h"
+#include "step/solve/pre_solve.h"
+#include "step/solve/restitution.h"
+#include "step/solve/solve_islands.h"
+#include "step/solve/stuck_slip.h"
+#include "step/stages.h"
+#include "step/step_bound.h"
+
+namespace dfm {
+namespace {
+
+// Responses between the touched surfels of bodies whose points respond to each other's impulses.
+void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
+  const Body &b = *w.bodies[block.source];
+  step.block_surfels.resize(block.count);
+  for (uint32_t k = 0; k < block.count; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
+  step.rows.set_answers(block, [&](double *answers) {
+    if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(), answers))
+      fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
+           b.model.type->id, b.name.c_str());
+  });
+}
+
+void fill_responses(World &w, StepContext &step) {
+  for (const ContactRows::Block &block : step.rows.blocks) {
+    if (block.group == kNone) fill_response(w, step, block);
+    else rigid_response(w, step, block);
+  }
+}
+
+// What a solid body answers at its surface, over the response of its mass: 2.5 at a ball.
+constexpr double kWhole = 2.5;
+constexpr uint32_t kMostRevisions = 6;  // of the responses of rigid hosts, within a sub-step
+// A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
+// to this share of the planned one.
+constexpr double kLeastPiece = 1.0 / 256;
+
+// m/s, at which a depth opens that a pair was found with.
+constexpr double kSettles = 8e-4;
+
+// m, what was left of the depth that the pair was found with; `most` if it is found now.
+double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double most) {
+  double left = -1;
+  for (uint32_t i = 0; i < store.n; ++i)
+    if ((store.id_a[i] == a && store.id_b[i] == b) || (store.id_a[i] == b && store.id_b[i] == a))
+      left = std::max(left, store.start_depth[i]);
+  return left < 0 ? most : left;
+}
+
+// Of bodies that are set on each other, or by up to d_c into each other. No motion has made this depth, so
+// it opens by a speed, whatever the sub-step: a share per sub-step would throw what is stiff. Faces of a cut
+// have distances of their own.
+void find_start_depths(World &w, StepContext &step) {
+  const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kSettles);
+  step.rows.start_depth.assign(step.contacts.size(), 0.0);
+  if (w.prescribed.stands()) return;  // an equilibrium has no speed to open by
+  for (uint32_t i = 0; i < step.contacts.size(); ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const Body &a = *w.bodies[c.slot_a], *const b = c.obstacle ? nullptr : w.bodies[c.slot_b].get();
+    const double depth = w.offset - c.distance;
+    const uint32_t m = step.match[i];
+    double left = 0;
+    if (m != kNone) left = w.store.start_depth[m];
+    else if (depth > 0 && !(b && made_id(a) == made_id(*b)))
+      left = left_of_pair(w.store, a.id, b ? b->id : w.obstacles[c.slot_b]->id, 2 * w.offset + opened);
+    step.rows.start_depth[i] = std::max(0.0, std::min(left - opened, depth));
+  }
+}
+
+}  // namespace
+
+bool may_shorten(const StepContext &step) { return step.h > kLeastPiece * step.guard.planned; }
+
+void give_impulses(StepContext &step) {
+  const ContactRows &rows = step.rows;
+  distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.given, step.bonds,
+             rows.impulse.data() + size_t{3} * rows.n);
+}
+
+// Makes rows of the contacts, with the impulses of the last sub-step, which are not applied yet.
+void make_rows(World &w, StepContext &step) {
+  const uint32_t n = static_cast<uint32_t>(step.contacts.size());
+  const bool again = step.rigid_again || step.guard.resolving;
+  if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
+  make_bonds(w, step, again);
+  make_cut_drags(w, step, again);
+  if (step.guard.resolving) step.tools->give_velocities();
+  step.tools->find_shared(w, step);
+  const std::span<const RigidSides> between_rigids = step.tools->shared_sides();
+  uint32_t nstate = 0;
+  for (const LawInstance *law : w.pairs.laws) nstate = std::max(nstate, law->nstate);
+  step.state.resize(n + static_cast<uint32_t>(between_rigids.size()), nstate);
+  for (uint32_t i = 0; i < n; ++i) {
+    const ContactPoint &c = step.contacts[i];
+    step.state.law[i] = pair_law(w, c.slot_a, c.obstacle, c.slot_b);
+    step.state.area[i] = c.area;
+  }
+  if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
+  // The force of laws with memory is proportional to area. A crossing has its part of the area, so it has to
+  // carry its part of the load.
+  if (nstate > 0)
+    for (uint32_t i = 0; i < n; ++i)
+      if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].give = 0;
+  take_choices(step);
+  for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
+    const Body &b = *w.bodies[i];
+    step.sources[i].velocity = b.dynamics->contact_velocity();
+    const double mass = step.systems[i] ? step.systems[i]->mass() : 0;
+    step.sources[i].whole = mass > 0 ? kWhole / mass : 0;
+    const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
+    step.sources[i].place = set_back ? b.p.x.data() : nullptr;
+  }
+  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds,
+                  between_rigids);
+  correct_rigids(w, step);
+  fill_responses(w, step);
+  step.tangents.resize(size_t(3) * n);
+  step.match.resize(n);
+  warm_start(w.store, step.contacts, step.h, step.rows.impulse, step.state, step.tangents.data(),
+             step.match.data(), &w.context->tasks);
+  step.rows.borne.resize(n);
+  for (uint32_t i = 0; i < n; ++i) step.rows.borne[i] = step.rows.impulse[size_t(3) * i];
+  find_start_depths(w, step);
+  share_areas(w, step);
+  fit_bristles(w, step);
+  step.rows.recovery = w.def.recovery_speed;
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
+                   &w.context->tasks);
+  run_belts(step);
+  find_throws(w, step);
+  bounce(step);
+  reset_owed(w, step);
+  std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
+            step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
+  if (step.guard.resolving) guard_impulses(step);
+  if (!step.guard.kept.empty()) guard_rates(step);
+  if (step.rigid_again) std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
+  step.tools->put_shared(step.rows, step.state, again);
+  step.solve_islands->find(w, step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
+}
+
+namespace {
+
+// After the operator has changed.
+void finish_rows(World &w, StepContext &step) {
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
+                   &w.context->tasks);
+  run_belts(step);
+  bounce(step);
+  if (!step.guard.kept.empty()) guard_rates(step);
+  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
+}
+
+// Solves again, from the present impulses, until rigid hosts respond as the solve assumed.
+const SolveIsland *solve_revised(World &w, StepContext &step) {
+  const std::span<SolveIsland> all = step.solve_islands->all();
+  for (SolveIsland &own : all) {
+    own.all_passes = own.all_sweeps = 0;
+    own.open = true;
+  }
+  for (uint32_t hosts = 0;; ++hosts) {
+    const SolveIsland *const bad = solve_islands(w, step);
+    for (SolveIsland &own : all) {
+      if (!own.open) continue;
+      own.all_passes += own.passes;
+      own.all_sweeps += own.sweeps;
+    }
+    // a motor has reached its limit, or no longer does
+    if (bad || hosts == kMostRevisions || step.rows.rigid.empty() || !revise_rigids(w, step)) return bad;
+    finish_rows(w, step);
+    for (SolveIsland &own : all) own.open = own.rigid;
+  }
+}
+
+// Takes the largest residual of all islands, and the passes and sweeps of the island that needed most.
+void add_up(StepContext &step) {
+  step.passes = step.sweeps = 0;
+  step.residual = {};
+  for (const SolveIsland &own : step.solve_islands->all()) {
+    step.passes = std::max(step.passes, own.all_passes);
+    step.sweeps = std::max(step.sweeps, own.all_sweeps);
+    step.residual = larger(step.residual, own.residual);
+  }
+}
+
+// False: the sub-step is to be repeated, with the integrator that contacts need.
+bool contacts_taken(World &w, StepContext &step) {
+  bool all = true;
+  for (const ContactPoint &c : step.contacts) {
+    if (!w.bodies[c.slot_a]->dynamics->take_contact()) all = false;
+    if (!c.obstacle && !w.bodies[c.slot_b]->dynamics->take_contact()) all = false;
+  }
+  for (const Attachment &a : w.attachments) {
+    if (a.released) continue;
+    for (const uint64_t id : {a.body, a.to})
+      if (const uint32_t slot = slot_of(w, id);
+          slot != kNone && !w.bodies[slot]->slumber.asleep && !w.bodies[slot]->dynamics->take_contact())
+        all = false;
+  }
+  for (auto &b : w.bodies)
+    if (!b->slumber.asleep && has_dues(*b) && !b->dynamics->take_contact()) all = false;
+  step.guard.again = step.guard.again || !all;
+  return all;
+}
+
+// False: the sub-step is too long for contact of a body that steps itself. It is repeated as the first of
+// shorter ones, of which the bound, asked for again, then keeps the size.
+bool short_enough(World &w, StepContext &step) {
+  if (!any_bounds_contact(w)) return true;
+  double longest = std::numeric_limits<double>::infinity(), parts = 1;
+  const auto look = [&](uint32_t slot) {
+    if (slot != kNone && !w.bodies[slot]->slumber.asleep)
+      longest = std::min(longest, w.bodies[slot]->dynamics->contact_step());
+  };
+  for (const ContactPoint &c : step.contacts) {
+    look(c.slot_a);
+    if (!c.obstacle) look(c.slot_b);
+  }
+  for (const Attachment &a : w.attachments)
+    for (const uint64_t id : {a.body, a.to})
+      if (!a.released) look(slot_of(w, id));
+  for (uint32_t slot = 0; slot < w.bodies.size(); ++slot)
+    if (has_dues(*w.bodies[slot])) look(slot);
+  while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
+  if (parts == 1) return true;
+  Guard &g = step.guard;
+  bound_is_due(w);
+  if (step.h == g.planned && g.finer == 1) {
+    g.finer = parts;
+    g.refines = true;
+  }
+  g.cut = 1 / parts;
+  g.again = true;
+  return false;
+}
+
+// In a shorter sub-step a body moves less far from where its forces are known.
+bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t *trouble) {
+  if (may_shorten(step)) {
+    step.guard.again = true;
+    step.guard.cut = 0.5;
+    return false;
+  }
+  set_last_error(format("step %llu, body '%s': no state was found in which its forces and contacts agree, "
+                        "not even in a sub-step of %g s; take a smaller step, or lower the stiffness",
+                        static_cast<unsigned long long>(w.step_count),
+                        w.bodies[own.implicit_body]->name.c_str(), step.h)
+                     .c_str());
+  *trouble |= DFM_TROUBLE_NONFINITE;
+  return false;
+}
+
+// False: the sub-step is to be repeated, up to where a body lands that a restitution throws back.
+bool cut_at_landing(World &w, StepContext &step) {
+  if (step.rigid_again || step.guard.resolving) return true;
+  const double share = lands_at(w, step);
+  if (share == 1 || !may_repeat(w, step)) return true;
+  step.guard.again = true;
+  step.guard.cut = share;
+  return false;
+}
+
+}  // namespace
+
+bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
+  ask_pre_solve(w, step);
+  if (!contacts_taken(w, step) || !short_enough(w, step)) return false;
+  step.passes = step.sweeps = 0;
+  step.residual = {};
+  make_rows(w, step);
+  if (!cut_at_landing(w, step)) return false;
+  step.rows.apply_last();
+  if (step.rows.all() == 0) {
+    w.stats.passes = w.stats.sweeps = 0;
+    w.stats.residual = 0;
+    reserve_contacts(w, step);
+    return true;
+  }
+  share_work(w, step);
+  const SolveIsland *const bad = solve_revised(w, step);
+  add_up(step);
+  for (const SolveIsland &own : step.solve_islands->all())
+    if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
+  double poison = 0;
+  for (double l : step.rows.impulse) poison += 0.0 * l;
+  if (bad || poison != 0) {
+    *trouble |= bad ? tell_failed_solve(w, step, bad->bad, bad->batches.failed())
+                    : tell_failed_solve(w, step, nullptr, kNone);
+    return false;
+  }
+  step.bond_impulse.assign(step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n,
+                           step.rows.impulse.end());
+  // laws may have been evaluated at slips that differ from the solution
+  std::swap(step.state.vt, step.state.slip);
+  find_owed(w, step);
+  if (step.residual.due > 1) {
+    *trouble |= DFM_TROUBLE_UNCONVERGED;
+    ++w.stats.unconverged;
+  }
+  w.stats.passes = step.passes;
+  w.stats.sweeps = step.sweeps;
+  w.stats.residual = step.residual.speed;
+  w.stats.passes_max = std::max(w.stats.passes_max, step.passes);
+  w.stats.sweeps_max = std::max(w.stats.sweeps_max, step.sweeps);
+  w.stats.residual_max = std::max(w.stats.residual_max, w.stats.residual);
+  reserve_contacts(w, step);
+  return true;
+}
+
+}  // namespace dfm

@@ -1,0 +1,506 @@
+// The outer loop of one island over the laws, around the inner sweeps (doc/concepts/contact.md).
+#include "step/solve/solve_islands.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "contact/bonds.h"
+#include "plugin/context.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/solve/capture.h"
+#include "step/solve/stuck_slip.h"
+#include "step/solve/tolerance.h"
+
+namespace dfm {
+namespace {
+
+// Laws with memory accumulate errors of the normal force instead of averaging them out. Whenever the force
+// falls, the friction cone cuts off a part of the bristle, which does not come back when the force rises. A
+// point that oscillates under a bristle of share s stretches it by (1 - s) of each way forth and slackens it
+// by (1 + s) of each way back. Both make a held contact creep. Islands with such laws therefore use this
+// share of the normal tolerance while bodies move, and this share of the tangential one at rest
+// (doc/decisions/friction_memory.md).
+constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
+
+// Sweeps come first where points answer their own impulses only. Newton's method takes over where these do
+// not converge: a small problem after the limit of sweeps, one of many contacts, whose matrix is dearer,
+// after a multiple of it.
+constexpr uint32_t kMany = 100, kManySweeps = 4;
+uint32_t most_sweeps(const World &w, const SolveIsland &own) {
+  return w.def.max_sweeps * (own.part.n < kMany ? 1 : kManySweeps);
+}
+
+// Residual::relative is stricter than what is required (Residual::due). Sweeps that only improve the former
+// are polish. A sub-step spends at most this many sweeps on it, because the next sub-step continues from
+// there.
+constexpr uint32_t kPolish = 20;
+bool good(const StepContext &step, SolveIsland &own, const Residual &left, double most) {
+  return left.relative <= most ||
+         (left.due <= most && (own.sweeps >= kPolish || spares(step, own.spent, Thrift::polish)));
+}
+
+// m/s, the residual of the start, at least.
+double start_residual(const StepContext &step, const SolveIsland &own) {
+  const uint32_t *const sides = step.solve_islands->sides();
+  double most = 0;
+  each_row(own.part.contacts, [&](uint32_t i) {
+    for (const size_t k : {2 * size_t{i}, 2 * size_t{i} + 1})
+      if (sides[k] != kNone) most = std::max(most, step.disturbance[2 * size_t{sides[k]} + 1]);
+  });
+  each_row(own.part.bonds, [&](uint32_t i) { most = std::max(most, norm(bond_residual(step.rows, i))); });
+  return most;
+}
+
+// Bonds are solved to a share of their tolerance, so that the residual of the next sweep comes from contacts.
+constexpr double kBondShare = 0.1;
+void sweep_once(const World &w, StepContext &step, SolveIsland &own) {
+  spend(w, step, own.spent, own.part.all());
+  sweep(step.rows, own.part, step.state, step.h);
+  ++own.sweeps;
+  if (!own.part.nbond) return;
+  const uint32_t passes = solve_bonds(step.rows, own.part, kBondShare * own.tolerance.bond, own.scratch);
+  spend(w, step, own.spent, uint64_t{passes} * own.part.nbond);
+}
+
+// Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
+// sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
+// before left more than 0.7 of it; so the residual is computed when it could be small enough at the earliest
+// (doc/decisions/contact_solver.md).
+class Looks {
+ public:
+  bool due(const SolveIsland &own, uint32_t cap) const {
+    return own.sweeps >= std::min({next_, kPolish, cap}) || !own.part.blocks.empty();
+  }
+  void note(uint32_t sweeps, const Residual &left, double most) {
+    const int size = std::ilogb(left.due / most);  // in halves
+    const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
+    const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
+    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMostUnseen));
+    known_ = true;
+    size_ = size;
+    at_ = sweeps;
+  }
+
+ private:
+  static constexpr int kMostUnseen = 4;
+  bool known_ = false;
+  int size_ = 0;
+  uint32_t at_ = 0, next_ = 0;
+};
+
+// Evaluates the laws at the present state, and its residual. False: a law has failed.
+bool ask(const World &w, StepContext &step, SolveIsland &own) {
+  spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
+  const double *const response = step.rows.wt.data();
+  set_trial(step.rows, own.part, step.h, response, step.state);
+  // The sweeps are the next Newton step: from a slip with an error of 1e-2 they reach one of 1e-4.
+  if ((own.bad = own.batches.answer(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
+    return false;
+  if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
+  ++own.passes;
+  return true;
+}
+bool ask_slopes(StepContext &step, SolveIsland &own) {
+  if ((own.bad = own.batches.slopes(step.h, step.state))) return false;
+  if (own.batches.differences()) linearize(step.rows, own.part, step.h, step.state);
+  return true;
+}
+void find_residual(StepContext &step, SolveIsland &own) {
+  own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+}
+
+void begin_newton(const World &w, StepContext &step, SolveIsland &own) {
+  if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
+  own.laws.begin(w, step, own);
+  own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
+}
+
+// m/s, what normals may be off by.
+double normal_tolerance(const World &w, const StepContext &step, const SolveIsland &own) {
+  // static mode: no later sub-step corrects what this solve leaves
+  if (w.prescribed.stands()) return tangent_at_rest(w, step.h);
+  return (own.batches.remembers() ? kRememberedShare : 1) * normal_at_rest(w, step.h);
+}
+
+// Evaluates the laws at the warm start, and finds the disturbance that it leaves at each body.
+void start_island(const World &w, StepContext &step, SolveIsland &own) {
+  if (own.implicit) begin_newton(w, step, own);
+  if (ask(w, step, own) && ask_slopes(step, own))
+    find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
+                     step.disturbance.data());
+}
+
+void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double> &to) {
+  const auto copy = [&](std::span<const RowRun> runs) {
+    for (const RowRun &r : runs)
+      std::copy_n(from.data() + size_t(3) * r.first, size_t(3) * r.n, to.data() + size_t(3) * r.first);
+  };
+  copy(part.contacts);
+  copy(part.bonds);
+}
+
+// Sweeps of one pass over the laws, with the laws as they were last evaluated. False: not finite.
+bool sweep_pass(const World &w, StepContext &step, SolveIsland &own, uint32_t cap) {
+  constexpr double kMost = 0.5;  // of the tolerance
+  own.acceleration.start(step.rows, own.part);
+  for (Looks looks;;) {
+    sweep_once(w, step, own);
+    if (looks.due(own, cap)) {
+      const Residual left = inner_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+      if (!std::isfinite(left.due)) return false;
+      if (good(step, own, left, kMost) || own.sweeps >= cap || spares(step, own.spent, Thrift::sweeps))
+        return true;
+      looks.note(own.sweeps, left, kMost);
+    }
+    own.acceleration.follow(step.rows, own.part);
+  }
+}
+
+// Passes of sweeps until the true residual is good enough. False: Newton's method is to go on.
+bool solve_by_sweeps(const World &w, StepContext &step, SolveIsland &own) {
+  const uint32_t cap = most_sweeps(w, own);
+  copy_impulses(own.part, step.rows.impulse, step.start_impulse);
+  const double start = start_residual(step, own);
+  // block Gauss-Seidel need not converge in a jam with strong friction
+  const auto give_up = [&] {
+    copy_impulses(own.part, step.start_impulse, step.rows.impulse);
+    step.rows.restore(own.part);
+    if (!spares(step, own.spent, Thrift::sweeps)) return false;
+    if (ask(w, step, own)) find_residual(step, own);
+    return true;
+  };
+  for (;;) {
+    // at least one sweep on a warm start is part of the method
+    if (!sweep_pass(w, step, own, cap)) return give_up();
+    if (!ask(w, step, own)) return true;
+    find_residual(step, own);
+    if (good(step, own, own.residual, 1)) return true;
+    const bool ends = spares(step, own.spent, Thrift::sweeps);
+    if (ends || own.sweeps >= cap || own.passes > w.def.max_passes) {
+      if (own.residual.due <= 1) return true;
+      return own.residual.speed <= start ? ends : give_up();
+    }
+    if (!ask_slopes(step, own)) return true;
+  }
+}
+
+// m/s, of the velocities of bodies: that of the contact that needs most.
+double motion_tolerance(const SolveIsland &own) {
+  double least = own.part.nbond ? own.tolerance.bond : std::numeric_limits<double>::infinity();
+  each_row(own.part.contacts, [&](uint32_t i) { least = std::min(least, own.tolerance.tangent[i]); });
+  return least;
+}
+
+void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
+  ContactNewton &newton = *own.newton;
+  const uint32_t steps = newton.steps();
+  own.failed = !newton.solve(motion_tolerance(own), own.tolerance.most_normal);
+  own.sweeps += newton.steps() - steps;
+  own.residual = newton.residual();
+}
+
+void solve_island(const World &w, StepContext &step, SolveIsland &own) {
+  if (own.bad || own.thrown) return;
+  const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
+  const bool stands = w.prescribed.stands(), memory = own.batches.remembers();
+  const ToleranceBounds bounds{least,
+                               own.implicit || stands ? least
+                               : memory               ? kRememberedRest * least
+                                                      : normal,
+                               normal};
+  set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
+                step.disturbance.data(), own.tolerance);
+  ask_slip_back(w, step, own);
+  if (step.capture) own.problem = take_problem(w, step, own);
+  bool newton = own.implicit;
+  if (!newton && !solve_by_sweeps(w, step, own)) {
+    begin_newton(w, step, own);
+    newton = true;
+  }
+  if (newton) solve_by_newton(w, step, own);
+  if (own.bad || own.failed) return;
+  if (newton) own.newton->take();
+}
+
+}  // namespace
+
+bool IslandLaws::answer(const double *response) {
+  own_->bad =
+      own_->batches.answer(step_->h, response, 0.1 * tangent_at_rest(*w_, step_->h), 1e-3, step_->state);
+  return !own_->bad;
+}
+
+bool IslandLaws::slopes() { return !(own_->bad = own_->batches.slopes(step_->h, step_->state)); }
+
+bool IslandLaws::judge(Residual &residual) {
+  if (!ask(*w_, *step_, *own_)) return false;
+  find_residual(*step_, *own_);
+  residual = own_->residual;
+  return true;
+}
+
+bool IslandLaws::goes_on(uint32_t products) {
+  spend(*w_, *step_, own_->spent, uint64_t{products - std::exchange(charged_, products)} * own_->part.all());
+  return !spares(*step_, own_->spent, Thrift::sweeps);
+}
+
+SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
+  use_memory(m, pairs_, owner_, met_, side_, body_of_, largest_, sides_, of_cuts_, order_, contact_, bond_,
+             block_, begin_);
+}
+
+// Joins pairs that move the same unknown.
+void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const> systems) {
+  joined_.start(static_cast<uint32_t>(pairs_.size()));
+  owner_.assign(pairs_.size() > 1 ? rows.ndof + systems.size() : 0, kNone);
+  for (uint32_t k = 0; k < pairs_.size() && !owner_.empty(); ++k) {
+    bool points = false;  // if a pair moves none, its first row is enough
+    const auto move = [&](uint32_t dof) {
+      const uint32_t block = rows.block[dof], s = block == kNone ? rows.source[dof] : kNone;
+      const bool implicit = s != kNone && systems[s];  // an impulse at one of its points moves all
+      points = points || (block == kNone && !implicit);
+      uint32_t &owner = owner_[implicit ? rows.ndof + s : block == kNone ? dof : rows.blocks[block].first];
+      if (owner == kNone) owner = k;
+      else if (owner != k) joined_.join(owner, k);
+    };
+    const RowRun run = pairs_[k].rows;
+    for (uint32_t i = run.first; i < run.first + run.n; ++i) {
+      for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) move(rows.dof[j]);
+      for (const Array<uint32_t> *const rigid : {&rows.rigid, &rows.rigid_a})
+        if (!rigid->empty() && (*rigid)[i] != kNone) move((*rigid)[i]);
+      if (!points) break;
+    }
+  }
+  joined_.finish();
+  count_ = joined_.count;
+}
+
+// Numbers the bodies on both sides of contacts. A body in two islands gets two numbers. Where rows between
+// rigid things are solved with soft bodies, the rigid bodies of the island have numbers as well.
+void SolveIslands::number_sides(const ContactRows &rows, uint32_t bodies, size_t of_contacts) {
+  met_.assign(bodies + (rows.nrigid ? rows.ndof : 0), kNone);
+  side_.resize(met_.size());
+  body_of_.clear();
+  const auto number = [&](uint32_t body, uint32_t island) {
+    if (body == kNone) return kNone;
+    if (std::exchange(met_[body], island) != island) {
+      side_[body] = static_cast<uint32_t>(body_of_.size());
+      body_of_.push_back(body);
+    }
+    return side_[body];
+  };
+  for (uint32_t k = 0; k < count_; ++k) {
+    bool rigids = false;
+    for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
+      const RowRun &own = pairs_[joined_.member[m]].rows;
+      rigids = rigids || (own.first >= rows.soft() && own.first < rows.n);
+    }
+    for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
+      const Pair &p = pairs_[joined_.member[m]];
+      if (joined_.member[m] >= of_contacts) continue;
+      const uint32_t a = number(p.a, k), b = number(p.b, k);
+      for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
+        sides_[2 * size_t{i}] = a;
+        sides_[2 * size_t{i} + 1] = b;
+        if (!rigids) continue;
+        if (rows.rigid_a[i] != kNone) sides_[2 * size_t{i}] = number(bodies + rows.rigid_a[i], k);
+        if (rows.rigid[i] != kNone) sides_[2 * size_t{i} + 1] = number(bodies + rows.rigid[i], k);
+      }
+    }
+  }
+}
+
+bool SolveIslands::shares_sides() const {
+  size_t bodies = 0;
+  for (const uint32_t m : met_) bodies += m != kNone;
+  return bodies < body_of_.size();
+}
+
+void SolveIslands::largest_by_body(Array<double> &values) {
+  largest_.assign(2 * met_.size(), 0.0);
+  const auto each = [&](auto &&f) {
+    for (size_t s = 0; s < body_of_.size(); ++s)
+      for (size_t k = 0; k < 2; ++k) f(values[2 * s + k], largest_[2 * size_t{body_of_[s]} + k]);
+  };
+  each([](double value, double &most) { most = std::max(most, value); });
+  each([](double &value, double most) { value = most; });
+}
+
+void SolveIslands::find_cuts(const World &w, const StepContext &step) {
+  const auto cut = [&](uint32_t slot) {
+    const Surface &s = w.bodies[slot]->surface;
+    return s.slit || s.back > 0;
+  };
+  of_cuts_.clear();
+  if (std::none_of(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return cut(b->slot); })) return;
+  for (const ContactPoint &c : step.contacts)
+    of_cuts_.push_back(!c.obstacle && cut(c.slot_a) && cut(c.slot_b));
+}
+
+// Contacts of the same two bodies are neighbors in the list, so most work is done once for each pair.
+void SolveIslands::find(const World &w, StepContext &step) {
+  const size_t of_contacts = find_pairs(step);
+  join(step.rows, step.systems);
+  sides_.resize(2 * size_t{step.rows.n});
+  number_sides(step.rows, static_cast<uint32_t>(w.bodies.size()), of_contacts);
+  find_cuts(w, step);
+  while (islands_.size() < count_) islands_.emplace_back(memory_);
+  give_rows(of_contacts);
+  sort_blocks(step.rows.blocks);
+  prepare(w, step);
+  std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {
+    const uint32_t a = islands_[l].part.all(), b = islands_[r].part.all();
+    return a != b ? a > b : l < r;
+  });
+}
+
+size_t SolveIslands::find_pairs(const StepContext &step) {
+  pairs_.clear();
+  const auto add = [&](const auto &all, uint32_t first) {
+    for (uint32_t i = 0; i < all.size();) {
+      const auto &c = all[i];
+      const uint32_t begin = i, a = c.slot_a, b = c.slot_b, obstacle = c.obstacle;
+      while (++i < all.size() && all[i].slot_a == a && all[i].slot_b == b && all[i].obstacle == obstacle) {}
+      pairs_.push_back({a, obstacle ? kNone : b, {first + begin, i - begin}});
+    }
+  };
+  add(step.contacts, 0);
+  for (uint32_t i = step.rows.soft(); i < step.rows.n; ++i) pairs_.push_back({kNone, kNone, {i, 1}});
+  const size_t of_contacts = pairs_.size();
+  add(step.bonds, step.rows.n);
+  return of_contacts;
+}
+
+// begin_[k] is then the end of island k's, where that of the next one begins.
+void SolveIslands::split(std::span<const Pair> pairs, Array<RowRun> &out) {
+  const auto of = [&](const Pair &p) { return joined_.of[size_t(&p - pairs_.data())]; };
+  begin_.assign(size_t{count_} + 1, 0);
+  uint32_t last = kNone;
+  for (const Pair &p : pairs)
+    if (const uint32_t k = of(p); k != std::exchange(last, k)) ++begin_[k + 1];
+  for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
+  out.resize(begin_[count_]);
+  last = kNone;
+  for (const Pair &p : pairs) {
+    const uint32_t k = of(p);
+    if (k != std::exchange(last, k)) out[begin_[k]++] = p.rows;
+    else out[begin_[k] - 1].n += p.rows.n;
+  }
+}
+
+void SolveIslands::give_rows(size_t of_contacts) {
+  const auto rows_of = [](std::span<const RowRun> runs) {
+    uint32_t n = 0;
+    for (const RowRun &r : runs) n += r.n;
+    return n;
+  };
+  split({pairs_.data(), of_contacts}, contact_);
+  for (uint32_t k = 0; k < count_; ++k) {
+    RowsPart &part = islands_[k].part;
+    part.contacts = slice(contact_, k);
+    part.n = rows_of(part.contacts);
+  }
+  split({pairs_.data() + of_contacts, pairs_.size() - of_contacts}, bond_);
+  for (uint32_t k = 0; k < count_; ++k) {
+    RowsPart &part = islands_[k].part;
+    part.bonds = slice(bond_, k);
+    part.nbond = rows_of(part.bonds);
+  }
+}
+
+void SolveIslands::sort_blocks(const Array<ContactRows::Block> &blocks) {
+  const auto of_block = [&](const ContactRows::Block &b) {
+    return owner_.empty() ? 0 : joined_.of[owner_[b.first]];
+  };
+  begin_.assign(size_t{count_} + 1, 0);
+  for (const ContactRows::Block &b : blocks) ++begin_[of_block(b) + 1];
+  for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
+  block_.resize(blocks.size());
+  for (uint32_t b = 0; b < blocks.size(); ++b) block_[begin_[of_block(blocks[b])]++] = b;
+}
+
+void SolveIslands::prepare(const World &w, StepContext &step) {
+  const Array<ContactRows::Block> &blocks = step.rows.blocks;
+  order_.resize(count_);
+  for (uint32_t k = 0; k < count_; ++k) {
+    SolveIsland &own = islands_[k];
+    order_[k] = k;
+    own.part.blocks = slice(block_, k);
+    own.rigid = own.implicit = false;
+    for (const uint32_t b : own.part.blocks) own.rigid = own.rigid || blocks[b].group != kNone;
+    const auto moves_implicit = [&](uint32_t i) {
+      for (uint32_t j = step.rows.begin[i]; j < step.rows.begin[i + 1]; ++j) {
+        const uint32_t d = step.rows.dof[j];
+        if (step.rows.block[d] != kNone || !step.systems[step.rows.source[d]]) continue;
+        own.implicit = true;
+        own.implicit_body = step.rows.source[d];
+      }
+    };
+    each_row(own.part.contacts, moves_implicit);
+    each_row(own.part.bonds, moves_implicit);
+    own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
+  }
+}
+
+const SolveIsland *solve_islands(World &w, StepContext &step) {
+  const size_t n = step.rows.n;
+  step.tolerance.normal.resize(n);
+  step.tolerance.tangent.resize(n);
+  step.start_impulse.resize(3 * size_t{step.rows.all()});
+  step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
+  const std::span<SolveIsland> all = step.solve_islands->all();
+  uint64_t rows = 0;
+  for (SolveIsland &own : all) {
+    if (!own.open) continue;
+    rows += own.part.all();
+    own.part.alone = step.rows.is_alone(own.part);
+    own.start();
+    own.failed = false;
+    own.spent = {0, 0, own.part.all(), Thrift::none};
+    own.residual = {};
+    own.bad = nullptr;
+    own.thrown = nullptr;
+    own.tolerance.normal = step.tolerance.normal.data();
+    own.tolerance.tangent = step.tolerance.tangent.data();
+  }
+  for (SolveIsland &own : all) own.spent.all = rows;
+  const std::span<const uint32_t> order = step.solve_islands->by_size();
+  // one job for both, unless islands share a body: then its tolerances follow from all of them
+  const bool shared = step.solve_islands->shares_sides();
+  const auto run = [&](bool starts, bool solves) {
+    w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t k = begin; k < end; ++k) {
+        SolveIsland &own = all[order[k]];
+        if (!own.open) continue;
+        try {
+          if (starts) start_island(w, step, own);
+          if (!solves) continue;
+          solve_island(w, step, own);
+          restore_drive(step, own);
+        } catch (...) {
+          own.thrown = std::current_exception();
+        }
+      }
+    });
+  };
+  run(true, !shared);
+  if (shared) {
+    step.solve_islands->largest_by_body(step.disturbance);
+    run(false, true);
+  }
+  for (const SolveIsland &own : all)
+    if (own.open) charge(w, step, own.spent);
+  if (step.capture) write_problems(w, step);
+  const SolveIsland *bad = nullptr;
+  for (const SolveIsland &own : all) {
+    if (!own.open) continue;
+    if (own.thrown) std::rethrow_exception(own.thrown);
+    if (own.bad && !bad) bad = &own;
+  }
+  return bad;
+}
+
+}  // namespace dfm
