@@ -148,15 +148,8 @@ struct WorldMemory {
   Meters meters;
 };
 
-struct World : WorldMemory, WorldState {
-  uint64_t handle = 0;
-  dfm_world_def def{};
-  Selection selection;            // by the list of effects
-  std::vector<LeftOut> left_out;  // of the world itself
-  ImplicitOptions implicit;       // of bodies whose integrator is implicit
-  Gravity gravity;
-  Prescribed prescribed;
-
+// What a world consists of.
+struct Entities {
   std::vector<std::unique_ptr<Body>> bodies;  // in id order
   // bodies without cells, which take no part in steps, in id order
   std::vector<std::unique_ptr<Body>> emptied;
@@ -169,31 +162,42 @@ struct World : WorldMemory, WorldState {
   std::vector<std::unique_ptr<RigidSet>> rigid_sets;
   std::vector<std::unique_ptr<Tool>> tools;        // in order of creation; the parts of each are a set
   std::vector<std::unique_ptr<LawInstance>> laws;  // the first is the default law, made when first needed
+  uint32_t sensors = 0;                            // how many there are
+  uint32_t tearing = 0;                            // bodies that may tear
+};
+
+// What the host has set for all of them.
+struct Rules {
+  dfm_world_def def{};
+  Selection selection;            // by the list of effects
+  std::vector<LeftOut> left_out;  // of the world itself
+  ImplicitOptions implicit;       // of bodies whose integrator is implicit
+  Gravity gravity;
+  Prescribed prescribed;
   MayTouch may_touch;
   PreSolve pre_solve;
-  uint32_t sensors = 0;        // how many there are
-  uint32_t tearing = 0;        // bodies that may tear
-  std::vector<Sensed> sensed;  // at the end of the last step
-  Overlaps overlaps;
-  // increases when positions or d_c change other than by a step
-  uint64_t placements = 0;
+};
 
-  // Derived from the above by prepare() whenever something changed.
+// Follows from the above and the lasting state: prepare() derives it whenever something changed.
+struct Derived {
   bool changed = true;
   bool revalued = false;  // values_changed(): tables stay valid, the plan is checked
   Plan plan;
   PairTables pairs;
   double offset = 0;  // d_c, m
+};
 
+struct World : WorldMemory, WorldState, Entities, Rules, Derived {
+  uint64_t handle = 0;
+  std::vector<Sensed> sensed;  // at the end of the last step
+  Overlaps overlaps;
+  uint64_t placements = 0;  // increases when positions or d_c change other than by a step
   WorldBound bound;
   IntegratorTimes integrator_times;
-  std::atomic<bool> busy{false};  // a call of the API changes it (api/call.h)
-
+  std::atomic<bool> busy{false};       // a call of the API changes it (api/call.h)
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h
-
   StepImpulses step_impulses;
   uint32_t sleepers = 0;
-
   std::unique_ptr<Aside> aside;  // null: nothing has been made beside the steps
 
   explicit World(dfm_context *c);
