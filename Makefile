@@ -96,6 +96,8 @@ bench: setup-bench build/bench/build.ninja
 bench-contact: setup build/release/build.ninja
 	$(BUILD) release --target deform_command --target deform_contact
 	build/release/bin/deform contact "$(CONTACT_PROBLEMS)"
+	@if [ -f "$(CONTACT_PROBLEMS)/siconos_results.txt" ]; then $(PYTHON) tests/bench/contact_profile.py \
+	  build/release/bin/deform "$(CONTACT_PROBLEMS)" build/contact_profile.png build/contact_profile.csv; fi
 
 bench-peers: setup-peers build/release/build.ninja
 	$(BUILD) release --target deform_command
