@@ -22,12 +22,12 @@
 namespace dfm {
 namespace {
 
-// Shares at which the step begins to go without polish, sweeps and guard pieces: of max_time, and of a budget
-// that is not divided.
-constexpr double kNoPolishAt = 0.25, kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
-// Shares of its sub-step's units at which a contact solve goes without polish, and ends; the rest is left to
-// solves that the guard repeats.
-constexpr double kPolishShare = 0.5, kSolveShare = 0.9;
+// Shares at which contact solves of the step end, and at which it goes without guard pieces: of max_time, and
+// of a budget that is not divided.
+constexpr double kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
+// Share of its sub-step's units at which a contact solve ends; the rest is left to solves that the guard
+// repeats.
+constexpr double kSolveShare = 0.9;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
 constexpr uint64_t kAutomaticFactor = 4000;
 constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
@@ -96,7 +96,7 @@ bool holds(StepContext &step, uint64_t units) {
   const bool is_left =
       b.divided ? b.work + units <= b.limit : !(double(b.work) > kNoPiecesAt * double(b.limit));
   if (is_left && !(used_time(b) > kNoPiecesAt)) return true;
-  step.budget.used = Thrift::pieces;
+  step.budget.cheapened = true;
   return false;
 }
 
@@ -301,7 +301,6 @@ void share_work(const World &w, StepContext &step) {
   Budget &b = step.budget;
   b.rows = step.rows.all();
   if (!b.divided) {
-    b.polish_end = uint64_t(kNoPolishAt * double(b.limit));
     b.solve_end = uint64_t(kFewSweepsAt * double(b.limit));
     return;
   }
@@ -311,7 +310,6 @@ void share_work(const World &w, StepContext &step) {
   const uint64_t fair = fair_work(w, step), follow = std::min(pieces_to_come(step), left_by(own) / fair);
   const double left = double(left_by(own + follow * fair));
   const double share = std::max(left / double(1 + follow), std::min(left, double(kFairSolve * b.rows)));
-  b.polish_end = b.work + uint64_t(kPolishShare * share);
   b.solve_end = b.work + uint64_t(kSolveShare * share);
 }
 
@@ -339,18 +337,15 @@ void spend(const World &w, const StepContext &, Spent &spent, uint64_t units) {
   if (requested(w.handle)) throw StepInterrupted{};
 }
 
-bool spares(const StepContext &step, Spent &spent, Thrift what) {
+bool solve_ends(const StepContext &step, Spent &spent) {
   const Budget &b = step.budget;
-  const bool polish = what == Thrift::polish;
-  if (!(b.work + spent.work * spent.all / spent.own > (polish ? b.polish_end : b.solve_end)) &&
-      !(used_time(b) > (polish ? kNoPolishAt : kFewSweepsAt)))
-    return false;
-  spent.used = std::max(spent.used, what);
-  return true;
+  if (b.work + spent.work * spent.all / spent.own > b.solve_end || used_time(b) > kFewSweepsAt)
+    spent.ended = true;
+  return spent.ended;
 }
 
 void charge(World &w, StepContext &step, const Spent &spent) {
-  step.budget.used = std::max(step.budget.used, spent.used);
+  step.budget.cheapened = step.budget.cheapened || spent.ended;
   charge(w, step, spent.work);
 }
 
@@ -384,8 +379,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   StepContext &step = *w.steps;
   Budget &b = step.budget;
   b.work = b.limit = b.aside = 0;
-  b.kept = b.ended = false;
-  b.used = Thrift::none;
+  b.kept = b.ended = b.cheapened = false;
   b.stats = w.stats;
   b.span = w.def.max_time;
   b.end = b.span > 0 ? now() + b.span : 0;
@@ -407,8 +401,8 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
     ++w.stats.discarded;
   }
   if (b.ended) ++w.stats.shortened;
-  if (b.used != Thrift::none) ++w.stats.cheapened;
-  if (b.ended || b.used != Thrift::none) *trouble |= DFM_TROUBLE_BUDGET;
+  if (b.cheapened) ++w.stats.cheapened;
+  if (b.ended || b.cheapened) *trouble |= DFM_TROUBLE_BUDGET;
   if (w.events.size() > kMostEvents)
     w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
   w.stats.work = b.work;

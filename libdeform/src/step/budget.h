@@ -13,9 +13,6 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// What a step leaves out after it has used a share of its budget. Each entry includes those before it.
-enum class Thrift { none, polish, sweeps, pieces };
-
 struct Budget {
   uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
   // Units that the step takes beside them, from what is free: that of the stable step.
@@ -23,16 +20,15 @@ struct Budget {
   // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
   // is not, because it ends steps that would not end.
   bool divided = false;
-  uint32_t to_come = 0;  // planned sub-steps after the present one
-  uint64_t rows = 0;     // of the present sub-step's contacts; of the last one until they are known
-  // units of the present step at which the present contact solve goes without polish, and ends
-  uint64_t polish_end = 0, solve_end = 0;
+  uint32_t to_come = 0;    // planned sub-steps after the present one
+  uint64_t rows = 0;       // of the present sub-step's contacts; of the last one until they are known
+  uint64_t solve_end = 0;  // units of the present step at which the present contact solve ends
   // s of the steady clock at which the time of the step is used up; 0: no limit
   double end = 0;
-  double span = 0;             // s, from the start of the step to `end`
-  Thrift used = Thrift::none;  // the last entry that this step has used
-  bool ended = false;          // the step ends before its end: the budget is used up
-  bool kept = false;           // `start` holds the state before this step
+  double span = 0;         // s, from the start of the step to `end`
+  bool cheapened = false;  // the step has left something out
+  bool ended = false;      // the step ends before its end: the budget is used up
+  bool kept = false;       // `start` holds the state before this step
   std::vector<unsigned char> start;
   dfm_world_stats stats{};  // before the step
 };
@@ -60,11 +56,12 @@ void charge(World &w, StepContext &step, uint64_t units);
 struct Spent {
   uint64_t work = 0;
   uint64_t all = 1, own = 1;  // rows of all islands, of this one
-  Thrift used = Thrift::none;
+  bool ended = false;         // the solve of the island has ended before it was done
 };
 // Adds units. Throws if a stop was requested, as charge() will.
 void spend(const World &w, const StepContext &step, Spent &spent, uint64_t units);
-bool spares(const StepContext &step, Spent &spent, Thrift what);
+// Whether the solve of the island is to end.
+bool solve_ends(const StepContext &step, Spent &spent);
 void charge(World &w, StepContext &step, const Spent &spent);  // after all islands, by the stepping thread
 // Units of one pass over the bodies that are awake: points and cells; surfels.
 uint64_t body_work(const World &w, const StepContext &step);

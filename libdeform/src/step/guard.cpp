@@ -427,7 +427,7 @@ bool jammed(const World &w, const StepContext &step) {
   if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.due > 1))
     return false;
   // contact may have an answer that the budget has not let it find
-  if (step.budget.divided && step.budget.used >= Thrift::sweeps) return false;
+  if (step.budget.divided && step.budget.cheapened) return false;
   for (size_t o = 0; o < w.obstacles.size(); ++o)
     if (!w.obstacles[o]->rigid && step.obstacle_views[o].moves()) return true;
   return !step.driven.empty();

@@ -37,9 +37,8 @@ uint32_t most_sweeps(const World &w, const SolveIsland &own) {
 // are polish. A sub-step spends at most this many sweeps on it, because the next sub-step continues from
 // there.
 constexpr uint32_t kPolish = 20;
-bool good(const StepContext &step, SolveIsland &own, const Residual &left, double most) {
-  return left.relative <= most ||
-         (left.due <= most && (own.sweeps >= kPolish || spares(step, own.spent, Thrift::polish)));
+bool good(const SolveIsland &own, const Residual &left, double most) {
+  return left.relative <= most || (left.due <= most && own.sweeps >= kPolish);
 }
 
 // m/s, the residual of the start, at least.
@@ -151,8 +150,7 @@ bool sweep_pass(const World &w, StepContext &step, SolveIsland &own, uint32_t ca
     if (looks.due(own, cap)) {
       const Residual left = inner_residual(step.rows, own.part, step.state, step.h, own.tolerance);
       if (!std::isfinite(left.due)) return false;
-      if (good(step, own, left, kMost) || own.sweeps >= cap || spares(step, own.spent, Thrift::sweeps))
-        return true;
+      if (good(own, left, kMost) || own.sweeps >= cap || solve_ends(step, own.spent)) return true;
       looks.note(own.sweeps, left, kMost);
     }
     own.acceleration.follow(step.rows, own.part);
@@ -168,7 +166,7 @@ bool solve_by_sweeps(const World &w, StepContext &step, SolveIsland &own) {
   const auto give_up = [&] {
     copy_impulses(own.part, step.start_impulse, step.rows.impulse);
     step.rows.restore(own.part);
-    if (!spares(step, own.spent, Thrift::sweeps)) return false;
+    if (!solve_ends(step, own.spent)) return false;
     if (ask(w, step, own)) find_residual(step, own);
     return true;
   };
@@ -177,8 +175,8 @@ bool solve_by_sweeps(const World &w, StepContext &step, SolveIsland &own) {
     if (!sweep_pass(w, step, own, cap)) return give_up();
     if (!ask(w, step, own)) return true;
     find_residual(step, own);
-    if (good(step, own, own.residual, 1)) return true;
-    const bool ends = spares(step, own.spent, Thrift::sweeps);
+    if (good(own, own.residual, 1)) return true;
+    const bool ends = solve_ends(step, own.spent);
     if (ends || own.sweeps >= cap || own.passes > w.def.max_passes) {
       if (own.residual.due <= 1) return true;
       return own.residual.speed <= start ? ends : give_up();
@@ -244,7 +242,7 @@ bool IslandLaws::judge(Residual &residual) {
 
 bool IslandLaws::goes_on(uint32_t products) {
   spend(*w_, *step_, own_->spent, uint64_t{products - std::exchange(charged_, products)} * own_->part.all());
-  return !spares(*step_, own_->spent, Thrift::sweeps);
+  return !solve_ends(*step_, own_->spent);
 }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
@@ -459,7 +457,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     own.part.alone = step.rows.is_alone(own.part);
     own.start();
     own.failed = false;
-    own.spent = {0, 0, own.part.all(), Thrift::none};
+    own.spent = {0, 0, own.part.all(), false};
     own.residual = {};
     own.bad = nullptr;
     own.thrown = nullptr;
