@@ -19,7 +19,7 @@ using namespace dfm;
 
 namespace {
 
-class Replay final : public NewtonHost {
+class Replay final : public SolveLaws {
  public:
   Replay(ContactProblem &problem, const dfm_context &context) : p_(problem), part_(problem.rows.whole()) {
     for (const ContactProblem::Law &law : p_.laws) {
@@ -61,7 +61,8 @@ class Replay final : public NewtonHost {
     residual = true_residual(p_.rows, part_, p_.state, p_.h, tolerance_);
     return true;
   }
-  bool goes_on(uint32_t) override { return true; }
+  void spend(uint64_t) override {}
+  bool goes_on() override { return true; }
 
  private:
   ContactProblem &p_;

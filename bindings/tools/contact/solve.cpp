@@ -64,7 +64,7 @@ uint32_t rank_of(Matrix W) {
 
 namespace {
 
-class Solve final : public NewtonHost {
+class Solve final : public SolveLaws {
  public:
   Solve(const LocalProblem &problem, Result &result)
       : problem_(problem), n_(uint32_t(problem.mu.size())), result_(result) {
@@ -141,7 +141,8 @@ class Solve final : public NewtonHost {
     return true;
   }
   bool slopes() override { return true; }
-  bool goes_on(uint32_t) override { return true; }
+  void spend(uint64_t) override {}
+  bool goes_on() override { return true; }
   bool judge(Residual &residual) override {
     std::vector<double> u;
     residual = {};

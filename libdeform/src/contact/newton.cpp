@@ -218,7 +218,8 @@ bool ContactNewton::solve(double tolerance, double normal) {
       best_g_.assign(g_.begin(), g_.end());
       best_l_.assign(l_.begin(), l_.end());
     }
-    if (found_ || steps_ >= limit_ || (spent = !host_->goes_on(products_))) break;
+    host_->spend(uint64_t{products_ - std::exchange(told_, products_)} * part_.all());
+    if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
     lh_.assign(l_.begin(), l_.end());
     double moved = 0;
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));

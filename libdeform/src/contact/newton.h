@@ -49,18 +49,18 @@ struct NewtonSettings {
   double stands = 20;      // of the tolerance, by which normals may miss what velocities no longer follow
 };
 
-// What the solve asks of the laws and of the one who knows the tolerances.
-class NewtonHost {
+// What a solve asks of the laws, and of the one who knows tolerances and budget.
+class SolveLaws {
  public:
-  virtual ~NewtonHost() = default;
+  virtual ~SolveLaws() = default;
   // Evaluates the laws at the state's fn where slip and force lie on the line of ft_stop with these responses
   // [rows], 1/kg (friction/local_solve.cpp); their slopes there. False: a law has failed.
   virtual bool answer(const double *response) = 0;
   virtual bool slopes() = 0;
   // The residual of rows.impulse at rows.y; the state then has the laws there. False: a law has failed.
   virtual bool judge(Residual &residual) = 0;
-  // After a pass that has not found the solution: whether the budget holds another one. products: so far.
-  virtual bool goes_on(uint32_t products) = 0;
+  virtual void spend(uint64_t rows) = 0;  // that were swept, or multiplied
+  virtual bool goes_on() = 0;             // whether the budget holds more
 };
 
 class ContactNewton {
@@ -70,7 +70,7 @@ class ContactNewton {
   // systems: by source; null: not an implicit body. mass: of one. Rows and host stay valid until the solve
   // has ended. rows.impulse is the start of lh.
   void begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
-             ContactState &state, NewtonHost &host, double h);
+             ContactState &state, SolveLaws &host, double h);
   // From the present impulses, so that it goes on where rates or limits of the rows have changed. tolerance:
   // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. False: a law
   // or a model has failed; neither rows nor bodies have a result.
@@ -99,7 +99,7 @@ class ContactNewton {
   ContactRows *rows_ = nullptr;
   RowsPart part_;
   ContactState *state_ = nullptr;
-  NewtonHost *host_ = nullptr;
+  SolveLaws *host_ = nullptr;
   double h_ = 0;
 
   std::vector<Body> bodies_;
@@ -143,6 +143,7 @@ class ContactNewton {
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
   uint32_t limit_ = 0;  // on steps_
+  uint32_t told_ = 0;   // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
   void list_rows();

@@ -19,14 +19,14 @@ ContactNewton::ContactNewton(const Memory &m, const NewtonSettings &settings)
 }
 
 void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
-                          ContactState &state, NewtonHost &host, double h) {
+                          ContactState &state, SolveLaws &host, double h) {
   rows_ = &rows;
   part_ = part;
   state_ = &state;
   host_ = &host;
   h_ = h;
   found_ = factored_ = shaped_ = false;
-  passes_ = steps_ = products_ = factors_ = 0;
+  passes_ = steps_ = products_ = factors_ = told_ = 0;
   number_nodes(systems);
   list_rows();
   set_bias();

@@ -238,4 +238,8 @@ struct ContactRows {
   void finish_bonds(std::span<const Bond> bonds);
 };
 
+// Impulses of a part of the rows, [rows,3] one after the other; set, with the velocities that go with them.
+void take_impulses(const ContactRows &rows, const RowsPart &part, double *to);
+void put_impulses(ContactRows &rows, const RowsPart &part, const double *from);
+
 }  // namespace dfm

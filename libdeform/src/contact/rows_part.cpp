@@ -72,4 +72,19 @@ void ContactRows::restore(const RowsPart &part) {
   each_row(part.bonds, push);
 }
 
+void take_impulses(const ContactRows &rows, const RowsPart &part, double *to) {
+  for (const std::span<const RowRun> runs : {part.contacts, part.bonds})
+    for (const RowRun &r : runs)
+      to = std::copy_n(rows.impulse.data() + size_t{3} * r.first, size_t{3} * r.n, to);
+}
+
+void put_impulses(ContactRows &rows, const RowsPart &part, const double *from) {
+  for (const std::span<const RowRun> runs : {part.contacts, part.bonds})
+    for (const RowRun &r : runs) {
+      std::copy_n(from, size_t{3} * r.n, rows.impulse.data() + size_t{3} * r.first);
+      from += size_t{3} * r.n;
+    }
+  rows.restore(part);
+}
+
 }  // namespace dfm

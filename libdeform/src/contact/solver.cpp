@@ -81,13 +81,6 @@ void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, dou
 
 namespace {
 
-// Impulses of the part's rows, one row after the other.
-void take_impulses(const ContactRows &rows, const RowsPart &part, double *to) {
-  const double *const from = rows.impulse.data();
-  for (const RowRun &r : part.contacts) to = std::copy_n(from + size_t(3) * r.first, size_t(3) * r.n, to);
-  for (const RowRun &r : part.bonds) to = std::copy_n(from + size_t(3) * r.first, size_t(3) * r.n, to);
-}
-
 // Impulses, and the velocities with them, change by these, one row after the other.
 void leap(ContactRows &rows, const RowsPart &part, const double *jumps) {
   const auto change = [&](uint32_t i, Vec3 jump) {

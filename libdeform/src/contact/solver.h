@@ -1,6 +1,6 @@
-// Normal contact and friction of one sub-step: inner sweeps of block Gauss-Seidel on the laws as they were
-// linearized by the last outer pass. The outer loop, over the laws, is step/solve/solve.cpp; the mathematics
-// is doc/concepts/contact.md.
+// Normal contact and friction of one sub-step: sweeps of block Gauss-Seidel on the laws as they were
+// linearized last (contact/sweeps.h has the passes over the laws), and residuals. The mathematics:
+// doc/concepts/contact.md.
 #pragma once
 #include "contact/contact_state.h"
 #include "contact/rows.h"

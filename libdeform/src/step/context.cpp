@@ -24,9 +24,8 @@ StepContext::StepContext(const Meters &meters)
   use_memory(meters.steps.memory(), driven, free_kinetic, looks, block_surfels, near, touching, active, woken,
              stirred, roused.bodies, roused.dwell, roused.total);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
-             best_impulse, start_impulse, tangents, asked_back, owed, match, sharing, aim, stands, ways,
-             renewed, thrown, motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before, goes_on,
-             given.list);
+             best_impulse, tangents, asked_back, owed, match, sharing, aim, stands, ways, renewed, thrown,
+             motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before, goes_on, given.list);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.common, guard.kept, guard.blocks.pieces);

@@ -77,7 +77,7 @@ struct StepContext {
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most
-  Array<double> disturbance, best_impulse, start_impulse;
+  Array<double> disturbance, best_impulse;
   Array<double> tangents;
   // [contacts] m/s, at which sides leave each other at least; empty where no pair has a restitution
   Array<double> thrown;

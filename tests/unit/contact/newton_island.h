@@ -120,7 +120,7 @@ struct BristleLaw {
 };
 
 // Coulomb's law at each contact, or a bristle where its stiffness is given.
-class Laws final : public NewtonHost {
+class Laws final : public SolveLaws {
  public:
   Laws(ContactRows &rows, const RowsPart &part, ContactState &state, double h, double least)
       : tolerance(rows.n, least, least, least), law(rows.n), rows_(rows), part_(part), state_(state), h_(h) {
@@ -142,7 +142,8 @@ class Laws final : public NewtonHost {
     residual = true_residual(rows_, part_, state_, h_, tolerance);
     return true;
   }
-  bool goes_on(uint32_t) override { return true; }
+  void spend(uint64_t) override {}
+  bool goes_on() override { return true; }
   void set(uint32_t i, const BristleLaw &of) {
     law[i] = of;
     state_.form[i] = of.sigma > 0 ? kSmoothLaw : kSetValuedLaw;

@@ -17,13 +17,10 @@ namespace {
 
 constexpr double kRest = 0.01;       // of what contacts may be off by at rest: sweeps need not leave less
 constexpr double kDisturbed = 1e-3;  // of what impulses so far leave: tolerance of a solve
-// Sweeps of a pass over the laws, sweeps between two looks at the residual, passes, and passes in which it
-// halves: else Newton's method goes on.
-constexpr uint32_t kSweeps = 50, kLook = 4, kPasses = 40, kWait = 2;
 constexpr NewtonSettings kNewton{.steps = 30};  // what these do not find, more do not
 
 // What a solve asks of the laws of its rows.
-class RigidLaws final : public NewtonHost {
+class RigidLaws final : public SolveLaws {
  public:
   RigidLaws(World &w, StepContext &step, const ContactRows &rows, const RowsPart &part, ContactState &state,
             LawBatches &batches, const Tolerance &tolerance)
@@ -50,10 +47,8 @@ class RigidLaws final : public NewtonHost {
     residual = true_residual(rows_, part_, state_, step_.h, tolerance_);
     return true;
   }
-  bool goes_on(uint32_t) override {
-    charge(w_, step_, 0);
-    return !is_used_up(step_);
-  }
+  void spend(uint64_t) override { charge(w_, step_, 0); }
+  bool goes_on() override { return !is_used_up(step_); }
 
   const LawInstance *bad = nullptr;
 
@@ -198,65 +193,34 @@ void ToolTouch::find_islands() {
   }
 }
 
-// Accelerated sweeps until the tolerance is met. False: it is not; swept_ has the impulses of the best pass,
-// or those so far, and `left` is their residual.
-bool ToolTouch::sweep_island(NewtonHost &laws, const RowsPart &part, const Tolerance &tolerance,
-                             Residual &left) {
-  swept_.assign(solved_.impulse.begin(), solved_.impulse.end());
-  double before = std::numeric_limits<double>::infinity();
-  for (uint32_t pass = 0; pass < kPasses && laws.slopes(); ++pass) {
-    if (pass > 0 && pass % kWait == 0) {
-      if (!(left.speed < 0.5 * before)) break;
-      before = left.speed;
-    }
-    acceleration_.start(solved_, part);
-    bool finite = true;
-    for (uint32_t k = 1;; ++k) {
-      sweep(solved_, part, state_, h_);
-      if (k % kLook == 0) {
-        const Residual inner = inner_residual(solved_, part, state_, h_, tolerance);
-        finite = std::isfinite(inner.due);
-        if (!finite || inner.relative <= 0.5 || k >= kSweeps) break;
-      }
-      acceleration_.follow(solved_, part);
-    }
-    Residual now;
-    if (!finite || !laws.judge(now)) break;
-    if (now.speed < left.speed) {
-      left = now;
-      swept_.assign(solved_.impulse.begin(), solved_.impulse.end());
-    }
-    // smooth laws are linear in a pass, and the first one begins far from the solution
-    if (now.relative <= 1 && (pass > 0 || !batches_.smooth())) return true;
-    if (!laws.goes_on(0)) break;
-  }
-  return false;
-}
-
 // Sweeps first; where they leave too much, Newton's method goes on from there. The better result counts.
 void ToolTouch::solve_island(World &w, StepContext &step, size_t island, double least) {
   RowsPart part{runs_[island], {}, blocks_[island]};
   for (const RowRun &run : runs_[island]) part.n += run.n;
   const double rest = kRest * tangent_at_rest(w, h_);
-  Tolerance tolerance{normal_at_rest(w, h_), least, normal_tolerance_.data(), tolerance_.data()};
+  const double at_rest = normal_at_rest(w, h_);
+  Tolerance tolerance{at_rest, least, normal_tolerance_.data(), tolerance_.data()};
   batches_.gather(laws_, runs_[island], state_);
   RigidLaws laws(w, step, solved_, part, state_, batches_, tolerance);
   solved_.restore(part);
   Residual left;
   // slopes of an earlier sub-step are of no use for the residual of the start
-  if (laws.judge(left) && (!batches_.differences() || (laws.slopes() && laws.judge(left)))) {
+  if (laws.judge(left) && laws.slopes() && (!batches_.differences() || laws.judge(left))) {
     tolerance.bond = std::max(least, kDisturbed * left.speed);
+    tolerance.most_normal = std::min(tolerance.bond, kOff * offset_ / h_);
     each_row(part.contacts, [&](uint32_t i) {
       tolerance_[i] = tolerance.bond;
-      normal_tolerance_[i] = std::min(tolerance.bond, kOff * offset_ / h_);
+      normal_tolerance_[i] = tolerance.most_normal;
     });
-    bool found = sweep_island(laws, part, tolerance, left);
+    const SweepLimits limits{w.def.max_sweeps, w.def.max_passes, left.speed};
+    bool found = sweeps_.solve(solved_, part, state_, laws, tolerance, limits, h_, left);
+    swept_.assign(solved_.impulse.begin(), solved_.impulse.end());
     if (!found && !laws.bad && left.speed > rest && !is_used_up(step)) {
       if (island >= newtons_.size()) newtons_.resize(island + 1);
       auto &newton = newtons_[island];
       if (!newton) newton = std::make_unique<ContactNewton>(step.contact_memory, kNewton);
       newton->begin(solved_, part, {}, state_, laws, h_);
-      found = newton->solve(tolerance.bond, tolerance.most_normal) && newton->residual().speed < left.speed;
+      found = newton->solve(tolerance.bond, at_rest) && newton->residual().speed < left.speed;
     }
     if (!found) {  // a law that fails on the way need not fail there
       solved_.impulse.assign(swept_.begin(), swept_.end());

@@ -19,7 +19,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kDone = 1e-10;            // of the largest speed that a row is to change
+constexpr double kDone = 1e-11;            // of the largest speed that a row is to change
 constexpr double kSharper = 1e-2;          // of the change by a pass: tolerance of its solve
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
@@ -99,7 +99,7 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 }  // namespace
 
 ToolTouch::ToolTouch(const Memory &m)
-    : solved_(m), acceleration_(m), islands_(m), batches_(m), next_(m), next_report_(m) {
+    : solved_(m), sweeps_(m), islands_(m), batches_(m), next_(m), next_report_(m) {
   use_memory(m, start_, tangents_, match_, points_, swept_);
   state_.use(m);
 }

@@ -32,6 +32,7 @@
 
 #include "contact/contact_set.h"
 #include "contact/newton.h"
+#include "contact/sweeps.h"
 #include "contact/rows.h"
 #include "contact/store.h"
 #include "core/disjoint_sets.h"
@@ -231,7 +232,6 @@ class ToolTouch {
   // tool_shared.cpp
   void take_shared(const ContactRows &from);
   void find_islands();
-  bool sweep_island(NewtonHost &laws, const RowsPart &part, const Tolerance &tolerance, Residual &left);
   void solve_island(World &w, StepContext &step, size_t island, double tolerance);
   void solve_rows(World &w, StepContext &step, double tolerance);
   // tool_joints.cpp
@@ -299,8 +299,8 @@ class ToolTouch {
   // the rows as a contact problem
   ContactRows solved_;
   std::vector<std::unique_ptr<ContactNewton>> newtons_;  // [islands]
-  Acceleration acceleration_;
-  Array<double> swept_;  // [3 rows] impulses of the best sweep
+  Sweeps sweeps_;
+  Array<double> swept_;  // [3 rows] impulses of the sweeps
   std::vector<RigidSides> places_;
   std::vector<Group> groups_;
   std::vector<uint32_t> group_size_;                     // [groups] bodies

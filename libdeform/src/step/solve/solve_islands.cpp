@@ -25,22 +25,6 @@ namespace {
 // (doc/decisions/friction_memory.md).
 constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
 
-// Sweeps come first where points answer their own impulses only. Newton's method takes over where these do
-// not converge: a small problem after the limit of sweeps, one of many contacts, whose matrix is dearer,
-// after a multiple of it.
-constexpr uint32_t kMany = 100, kManySweeps = 4;
-uint32_t most_sweeps(const World &w, const SolveIsland &own) {
-  return w.def.max_sweeps * (own.part.n < kMany ? 1 : kManySweeps);
-}
-
-// Residual::relative is stricter than what is required (Residual::due). Sweeps that only improve the former
-// are polish. A sub-step spends at most this many sweeps on it, because the next sub-step continues from
-// there.
-constexpr uint32_t kPolish = 20;
-bool good(const SolveIsland &own, const Residual &left, double most) {
-  return left.relative <= most || (left.due <= most && own.sweeps >= kPolish);
-}
-
 // m/s, the residual of the start, at least.
 double start_residual(const StepContext &step, const SolveIsland &own) {
   const uint32_t *const sides = step.solve_islands->sides();
@@ -52,43 +36,6 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
   each_row(own.part.bonds, [&](uint32_t i) { most = std::max(most, norm(bond_residual(step.rows, i))); });
   return most;
 }
-
-// Bonds are solved to a share of their tolerance, so that the residual of the next sweep comes from contacts.
-constexpr double kBondShare = 0.1;
-void sweep_once(const World &w, StepContext &step, SolveIsland &own) {
-  spend(w, step, own.spent, own.part.all());
-  sweep(step.rows, own.part, step.state, step.h);
-  ++own.sweeps;
-  if (!own.part.nbond) return;
-  const uint32_t passes = solve_bonds(step.rows, own.part, kBondShare * own.tolerance.bond, own.scratch);
-  spend(w, step, own.spent, uint64_t{passes} * own.part.nbond);
-}
-
-// Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
-// sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
-// before left more than 0.7 of it; so the residual is computed when it could be small enough at the earliest
-// (doc/decisions/contact_solver.md).
-class Looks {
- public:
-  bool due(const SolveIsland &own, uint32_t cap) const {
-    return own.sweeps >= std::min({next_, kPolish, cap}) || !own.part.blocks.empty();
-  }
-  void note(uint32_t sweeps, const Residual &left, double most) {
-    const int size = std::ilogb(left.due / most);  // in halves
-    const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
-    const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
-    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMostUnseen));
-    known_ = true;
-    size_ = size;
-    at_ = sweeps;
-  }
-
- private:
-  static constexpr int kMostUnseen = 4;
-  bool known_ = false;
-  int size_ = 0;
-  uint32_t at_ = 0, next_ = 0;
-};
 
 // Evaluates the laws at the present state, and its residual. False: a law has failed.
 bool ask(const World &w, StepContext &step, SolveIsland &own) {
@@ -102,18 +49,9 @@ bool ask(const World &w, StepContext &step, SolveIsland &own) {
   ++own.passes;
   return true;
 }
-bool ask_slopes(StepContext &step, SolveIsland &own) {
-  if ((own.bad = own.batches.slopes(step.h, step.state))) return false;
-  if (own.batches.differences()) linearize(step.rows, own.part, step.h, step.state);
-  return true;
-}
-void find_residual(StepContext &step, SolveIsland &own) {
-  own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
-}
 
-void begin_newton(const World &w, StepContext &step, SolveIsland &own) {
+void begin_newton(StepContext &step, SolveIsland &own) {
   if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
-  own.laws.begin(w, step, own);
   own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
 }
 
@@ -126,63 +64,11 @@ double normal_tolerance(const World &w, const StepContext &step, const SolveIsla
 
 // Evaluates the laws at the warm start, and finds the disturbance that it leaves at each body.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
-  if (own.implicit) begin_newton(w, step, own);
-  if (ask(w, step, own) && ask_slopes(step, own))
+  own.laws.begin(w, step, own);
+  if (own.implicit) begin_newton(step, own);
+  if (ask(w, step, own) && own.laws.slopes())
     find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
                      step.disturbance.data());
-}
-
-void copy_impulses(const RowsPart &part, const Array<double> &from, Array<double> &to) {
-  const auto copy = [&](std::span<const RowRun> runs) {
-    for (const RowRun &r : runs)
-      std::copy_n(from.data() + size_t(3) * r.first, size_t(3) * r.n, to.data() + size_t(3) * r.first);
-  };
-  copy(part.contacts);
-  copy(part.bonds);
-}
-
-// Sweeps of one pass over the laws, with the laws as they were last evaluated. False: not finite.
-bool sweep_pass(const World &w, StepContext &step, SolveIsland &own, uint32_t cap) {
-  constexpr double kMost = 0.5;  // of the tolerance
-  own.acceleration.start(step.rows, own.part);
-  for (Looks looks;;) {
-    sweep_once(w, step, own);
-    if (looks.due(own, cap)) {
-      const Residual left = inner_residual(step.rows, own.part, step.state, step.h, own.tolerance);
-      if (!std::isfinite(left.due)) return false;
-      if (good(own, left, kMost) || own.sweeps >= cap || solve_ends(step, own.spent)) return true;
-      looks.note(own.sweeps, left, kMost);
-    }
-    own.acceleration.follow(step.rows, own.part);
-  }
-}
-
-// Passes of sweeps until the true residual is good enough. False: Newton's method is to go on.
-bool solve_by_sweeps(const World &w, StepContext &step, SolveIsland &own) {
-  const uint32_t cap = most_sweeps(w, own);
-  copy_impulses(own.part, step.rows.impulse, step.start_impulse);
-  const double start = start_residual(step, own);
-  // block Gauss-Seidel need not converge in a jam with strong friction
-  const auto give_up = [&] {
-    copy_impulses(own.part, step.start_impulse, step.rows.impulse);
-    step.rows.restore(own.part);
-    if (!solve_ends(step, own.spent)) return false;
-    if (ask(w, step, own)) find_residual(step, own);
-    return true;
-  };
-  for (;;) {
-    // at least one sweep on a warm start is part of the method
-    if (!sweep_pass(w, step, own, cap)) return give_up();
-    if (!ask(w, step, own)) return true;
-    find_residual(step, own);
-    if (good(own, own.residual, 1)) return true;
-    const bool ends = solve_ends(step, own.spent);
-    if (ends || own.sweeps >= cap || own.passes > w.def.max_passes) {
-      if (own.residual.due <= 1) return true;
-      return own.residual.speed <= start ? ends : give_up();
-    }
-    if (!ask_slopes(step, own)) return true;
-  }
 }
 
 // m/s, of the velocities of bodies: that of the contact that needs most.
@@ -190,14 +76,6 @@ double motion_tolerance(const SolveIsland &own) {
   double least = own.part.nbond ? own.tolerance.bond : std::numeric_limits<double>::infinity();
   each_row(own.part.contacts, [&](uint32_t i) { least = std::min(least, own.tolerance.tangent[i]); });
   return least;
-}
-
-void solve_by_newton(const World &w, StepContext &step, SolveIsland &own) {
-  ContactNewton &newton = *own.newton;
-  const uint32_t steps = newton.steps();
-  own.failed = !newton.solve(motion_tolerance(own), own.tolerance.most_normal);
-  own.sweeps += newton.steps() - steps;
-  own.residual = newton.residual();
 }
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
@@ -213,14 +91,18 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                 step.disturbance.data(), own.tolerance);
   ask_slip_back(w, step, own);
   if (step.capture) own.problem = take_problem(w, step, own);
-  bool newton = own.implicit;
-  if (!newton && !solve_by_sweeps(w, step, own)) {
-    begin_newton(w, step, own);
-    newton = true;
+  if (!own.implicit) {
+    const SweepLimits limits{w.def.max_sweeps, w.def.max_passes, start_residual(step, own)};
+    const bool done = own.sweeping.solve(step.rows, own.part, step.state, own.laws, own.tolerance, limits,
+                                         step.h, own.residual);
+    own.sweeps = own.sweeping.count();
+    if (done) return;
+    begin_newton(step, own);
   }
-  if (newton) solve_by_newton(w, step, own);
-  if (own.bad || own.failed) return;
-  if (newton) own.newton->take();
+  own.failed = !own.newton->solve(motion_tolerance(own), own.tolerance.most_normal);
+  own.sweeps += own.newton->steps();
+  own.residual = own.newton->residual();
+  if (!own.bad && !own.failed) own.newton->take();
 }
 
 }  // namespace
@@ -231,19 +113,21 @@ bool IslandLaws::answer(const double *response) {
   return !own_->bad;
 }
 
-bool IslandLaws::slopes() { return !(own_->bad = own_->batches.slopes(step_->h, step_->state)); }
-
-bool IslandLaws::judge(Residual &residual) {
-  if (!ask(*w_, *step_, *own_)) return false;
-  find_residual(*step_, *own_);
-  residual = own_->residual;
+bool IslandLaws::slopes() {
+  if ((own_->bad = own_->batches.slopes(step_->h, step_->state))) return false;
+  if (own_->batches.differences()) linearize(step_->rows, own_->part, step_->h, step_->state);
   return true;
 }
 
-bool IslandLaws::goes_on(uint32_t products) {
-  spend(*w_, *step_, own_->spent, uint64_t{products - std::exchange(charged_, products)} * own_->part.all());
-  return !solve_ends(*step_, own_->spent);
+bool IslandLaws::judge(Residual &residual) {
+  if (!ask(*w_, *step_, *own_)) return false;
+  residual = own_->residual = true_residual(step_->rows, own_->part, step_->state, step_->h, own_->tolerance);
+  return true;
 }
+
+void IslandLaws::spend(uint64_t rows) { dfm::spend(*w_, *step_, own_->spent, rows); }
+
+bool IslandLaws::goes_on() { return !solve_ends(*step_, own_->spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
   use_memory(m, pairs_, owner_, met_, side_, body_of_, largest_, sides_, of_cuts_, order_, contact_, bond_,
@@ -447,7 +331,6 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   const size_t n = step.rows.n;
   step.tolerance.normal.resize(n);
   step.tolerance.tangent.resize(n);
-  step.start_impulse.resize(3 * size_t{step.rows.all()});
   step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "contact/newton.h"
+#include "contact/sweeps.h"
 #include "contact/problem.h"
 #include "contact/solver.h"
 #include "friction/laws.h"
@@ -23,25 +24,24 @@ struct World;
 
 struct SolveIsland;
 
-// What Newton's method asks of an island.
-class IslandLaws final : public NewtonHost {
+// What a solve asks of an island.
+class IslandLaws final : public SolveLaws {
  public:
   void begin(const World &w, StepContext &step, SolveIsland &own) {
     w_ = &w;
     step_ = &step;
     own_ = &own;
-    charged_ = 0;
   }
   bool answer(const double *response) override;
   bool slopes() override;
   bool judge(Residual &residual) override;
-  bool goes_on(uint32_t products) override;
+  void spend(uint64_t rows) override;
+  bool goes_on() override;
 
  private:
   const World *w_ = nullptr;
   StepContext *step_ = nullptr;
   SolveIsland *own_ = nullptr;
-  uint32_t charged_ = 0;  // products
 };
 
 struct SolveIsland {
@@ -50,11 +50,10 @@ struct SolveIsland {
   uint32_t implicit_body = 0;  // slot of one of these
   bool rigid = false;          // some body of it is of a rigid host
   LawBatches batches;
-  Acceleration acceleration;
+  Sweeps sweeping;
   std::unique_ptr<ContactNewton> newton;  // null until it is needed
   IslandLaws laws;
   Tolerance tolerance;
-  Array<double> scratch;  // of solve_bonds()
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
@@ -68,7 +67,7 @@ struct SolveIsland {
   bool open = true;  // it is to be solved
   uint32_t all_passes = 0, all_sweeps = 0;
 
-  explicit SolveIsland(const Memory &m) : batches(m), acceleration(m) { use_memory(m, scratch); }
+  explicit SolveIsland(const Memory &m) : batches(m), sweeping(m) {}
   void start() { passes = sweeps = 0; }  // begins with the first pass
 };
 
