@@ -699,14 +699,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
             max_distance: float = np.inf) -> dict[str, Any] | None:
         """The first surface that a ray meets: owner, triangle, distance m, point [3] m, normal [3]; or
         None."""
-        self.free()
-        out = sized(_abi.dfm_ray_hit)
-        check(quick.dfm_world_ray(self.handle, vector(origin, "origin"), vector(direction, "direction"),
-                                  real(max_distance, "max_distance"), ctypes.byref(out)))
-        if not (out.body or out.obstacle):
-            return None
-        return {"owner": self.owner(out.body or out.obstacle), "triangle": out.triangle,
-                "distance": out.distance, "point": np.array(out.point), "normal": np.array(out.normal)}
+        hit = self.query_ray(origin, direction, max_distance)
+        words = ("owner", "triangle", "distance", "point", "normal")
+        return None if hit is None else {key: getattr(hit, key) for key in words}
 
     def snapshot(self) -> bytes:
         """All that a later result depends on; restore() takes it, in another process too."""
