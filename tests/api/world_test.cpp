@@ -27,7 +27,7 @@ TEST(Structs, OfAnOlderCaller_KeepDefaultsForWhatTheyLack) {
   test::Context c;
   dfm_world_def wd;
   std::memset(&wd, 0xff, sizeof wd);  // what lies beyond the caller's struct is garbage
-  wd.size = offsetof(dfm_world_def, method);
+  wd.size = offsetof(dfm_world_def, reserved3);
   wd.flags = 0;
   wd.gravity[0] = wd.gravity[1] = 0;
   wd.gravity[2] = -1;
@@ -383,11 +383,9 @@ TEST(Arguments, OfContextAndWorld_AreChecked) {
   wd.max_sweeps = 0;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
   wd = dfm_world_def_default();
-  for (const int32_t method : {7, -1, int32_t{DFM_METHOD_ROLLBACK}}) {
-    wd.method = method;
-    EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
-  }
-  says({"deform rollback"});
+  wd.reserved3 = 1;
+  EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
+  says({"contact method", "integrator"});
   const char *const effects[] = {"magic", nullptr};
   wd = dfm_world_def_default();
   wd.effects = effects;

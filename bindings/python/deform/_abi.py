@@ -278,7 +278,7 @@ class dfm_sine(_Structure):
 
 
 class dfm_world_def(_Structure):
-    _fields_ = [("size", u32), ("flags", u32), ("gravity", f64 * 3), ("method", i32),
+    _fields_ = [("size", u32), ("flags", u32), ("gravity", f64 * 3), ("reserved3", i32),
                 ("integrator", i32), ("contact_offset", f64), ("contact_tolerance", f64),
                 ("max_sweeps", u32), ("max_passes", u32), ("max_substeps", u32), ("sleep", u32),
                 ("effects", ptr), ("sleep_speed", f64), ("sleep_time", f64), ("self_contact", u32),

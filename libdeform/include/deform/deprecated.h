@@ -5,11 +5,6 @@
 
 #include "deform/body.h"
 #include "deform/query.h"
-/* dfm_world_def.method: the integrator decides. Where that is AUTO, VELOCITY makes it SYMPLECTIC_EULER and
- * IMPLICIT makes it IMPLICIT_EULER. ROLLBACK is refused with DFM_E_UNSUPPORTED: `deform rollback` runs a
- * scene by it (doc/concepts/rollback.md). Since 0.1. */
-enum { DFM_METHOD_AUTO = 0, DFM_METHOD_VELOCITY = 1, DFM_METHOD_IMPLICIT = 2, DFM_METHOD_ROLLBACK = 3 };
-
 /* Queries: dfm_world_query takes their place. Arguments, results and statuses are as they were, except that
  * hits have the sizes of this header. */
 typedef struct dfm_ray_hit {
