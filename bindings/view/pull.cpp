@@ -46,28 +46,36 @@ Patch patch_around(const std::vector<double> &x, const Vec &place) {
   return out;
 }
 
-dfm_ray_hit first_hit(const cli::SceneFile &scene, const Vec &origin, const Vec &direction) {
-  dfm_ray_hit hit = {};
-  hit.size = sizeof hit;
-  const double from[3] = {origin.x, origin.y, origin.z}, along[3] = {direction.x, direction.y, direction.z};
-  cli::need(dfm_world_ray(scene.world(), from, along, std::numeric_limits<double>::infinity(), &hit));
+// Its thing is 0 where there is none.
+dfm_query_hit first_hit(const cli::SceneFile &scene, const Vec &origin, const Vec &direction) {
+  dfm_query_shape from = dfm_query_shape_default();
+  from.shape = DFM_SHAPE_POINT;
+  from.pose.position[0] = origin.x;
+  from.pose.position[1] = origin.y;
+  from.pose.position[2] = origin.z;
+  const double along[3] = {direction.x, direction.y, direction.z};
+  dfm_query_hit hit = {};
+  dfm_query_hits hits = {sizeof hits, sizeof hit, 1, 0, &hit};
+  cli::need(dfm_world_query(scene.world(), &from, along, std::numeric_limits<double>::infinity(), nullptr,
+                            nullptr, &hits));
   return hit;
 }
+bool is_body(const dfm_query_hit &hit) { return dfm_handle_kind(hit.thing) == DFM_HANDLE_BODY; }
 
 }  // namespace
 
 int Pull::tool_at(const Grip &grip, const Vec &origin, const Vec &direction) const {
-  const dfm_ray_hit hit = first_hit(simulation_.scene(), origin, direction);
-  return hit.obstacle ? grip.tool_of(simulation_.scene().name_of(hit.obstacle)) : -1;
+  const dfm_query_hit hit = first_hit(simulation_.scene(), origin, direction);
+  return hit.thing && !is_body(hit) ? grip.tool_of(simulation_.scene().name_of(hit.thing)) : -1;
 }
 
 bool Pull::grab(const Vec &origin, const Vec &direction) {
   const cli::SceneFile &scene = simulation_.scene();
-  const dfm_ray_hit hit = first_hit(scene, origin, direction);
+  const dfm_query_hit hit = first_hit(scene, origin, direction);
   to_ = render::vec(hit.point);
-  if (!hit.body) return hit.obstacle && grab_rigid(scene.name_of(hit.obstacle));
+  if (!is_body(hit)) return hit.thing && grab_rigid(scene.name_of(hit.thing));
   rigid_ = 0;
-  for (body_ = 0; scene.bodies()[body_].handle != hit.body;) ++body_;
+  for (body_ = 0; scene.bodies()[body_].handle != hit.thing;) ++body_;
   const cli::BodyView &body = scene.bodies()[body_];
   for (int k = 0; k < 3; ++k) corners_[k] = body.triangles[3 * size_t(hit.triangle) + size_t(k)];
   std::vector<double> x(3 * size_t(std::max(body.npoint, body.nsurfel)));

@@ -19,7 +19,7 @@ def exported(nm, path):
 
 def declared(include):
     names = set()
-    for path in pathlib.Path(include).rglob("*.h"):
+    for path in set(pathlib.Path(include).rglob("*.h")) - {pathlib.Path(include) / "deform/deprecated.h"}:
         text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.S)
         names |= set(re.findall(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", text, re.M))
         names |= set(re.findall(r"^static inline dfm_status (dfm_world_\w+)\s*\(", text, re.M))

@@ -51,11 +51,8 @@ dfm_status (*const signature_contacts)(dfm_world, uint32_t, dfm_contact *, uint3
 dfm_status (*const signature_snapshot)(dfm_world, void *, size_t *) = dfm_world_snapshot;
 dfm_status (*const signature_set_model)(dfm_body, const char *, const dfm_params *) = dfm_body_set_model;
 dfm_status (*const signature_restore)(dfm_world, const void *, size_t) = dfm_world_restore;
-dfm_status (*const signature_query_cast)(dfm_world, const dfm_query_shape *, const double[3],
-                                         const dfm_query_filter *, dfm_query_hit *) = dfm_world_query_cast;
-dfm_status (*const signature_query_ray_all)(dfm_world, const double[3], const double[3], double,
-                                            const dfm_query_filter *, uint32_t, dfm_query_hit *,
-                                            uint32_t *) = dfm_world_query_ray_all;
+dfm_status (*const signature_query)(dfm_world, const dfm_query_shape *, const double[3], double,
+                                    const dfm_query_filter *, dfm_query_hit_fn, void *) = dfm_world_query;
 dfm_status (*const signature_pre_solve)(dfm_world, dfm_pre_solve_fn, void *) = dfm_world_set_pre_solve;
 dfm_status (*const signature_may_touch)(dfm_world, dfm_may_touch_fn, void *) = dfm_world_set_may_touch;
 dfm_status (*const signature_vertices)(dfm_body, const dfm_vertex_layout *, size_t, void *,

@@ -2,6 +2,7 @@
 #include <cstring>
 
 #include "coupled.h"
+#include "query.h"
 #include "stack.h"
 #include "support.h"
 
@@ -185,13 +186,8 @@ TEST(Coupled, Queries_SpeakOfTheSurfaceGiven) {
   }
   EXPECT_EQ(dfm_surface_points(b, 0, nullptr, &n), DFM_E_UNSUPPORTED);
   EXPECT_NE(std::string(dfm_last_error()).find("several points"), std::string::npos) << dfm_last_error();
-  dfm_ray_hit hit{};
-  hit.size = sizeof hit;
-  const double from[3] = {1.001, 2.002, 10}, down[3] = {0, 0, -1}, near[3] = {1, 2, 2};
-  test::ok(dfm_world_ray(w, from, down, 100, &hit));
-  EXPECT_NEAR(hit.point[2], 3.09, 1e-3);
-  test::ok(dfm_world_closest(w, near, 100, &hit));
-  EXPECT_NEAR(hit.distance, 1 - 0.09, 1e-3);
+  EXPECT_NEAR(test::ray(w, {1.001, 2.002, 10}, {0, 0, -1}, 100).point[2], 3.09, 1e-3);
+  EXPECT_NEAR(test::nearest(w, test::point({1, 2, 2}), nullptr, 100).distance, 1 - 0.09, 1e-3);
 }
 
 TEST(Coupled, Impulse_AtASurfelGivesItsMomentumAndTurnsTheBody) {

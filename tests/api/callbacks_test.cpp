@@ -147,9 +147,9 @@ TEST(MayTouch, CallsIntoTheWorld_AreRefused) {
       [](void *user, uint64_t, uint64_t) {
         Attack &a = *static_cast<Attack *>(user);
         const dfm_query_shape point = dfm_query_shape_default();
-        uint32_t n = 0;
+        dfm_query_hits hits{};
         ++a.asked;
-        a.refused += dfm_world_query_overlap(a.s.world, &point, nullptr, 0, nullptr, &n) == DFM_E_BUSY;
+        a.refused += dfm_world_query(a.s.world, &point, nullptr, 0, nullptr, nullptr, &hits) == DFM_E_BUSY;
         a.refused += dfm_body_destroy(a.s.upper) == DFM_E_BUSY;
         a.refused += dfm_world_ask_again(a.s.world, 0, 0) == DFM_E_BUSY;
         test::says({"busy with another call"});
@@ -385,10 +385,10 @@ TEST(PreSolve, CallsIntoTheWorld_AreRefused) {
       [](void *user, dfm_contact_choice *) {
         Attack &a = *static_cast<Attack *>(user);
         ++a.asked;
-        dfm_query_hit hit{};
-        const double p[3] = {0, 0, 0};
+        dfm_query_hits hits{};
+        const dfm_query_shape point = dfm_query_shape_default();
         a.refused += dfm_world_step(a.s.w, 1e-3, nullptr) == DFM_E_BUSY;
-        a.refused += dfm_world_query_closest(a.s.w, p, 1, nullptr, &hit) == DFM_E_BUSY;
+        a.refused += dfm_world_query(a.s.w, &point, nullptr, 1, nullptr, nullptr, &hits) == DFM_E_BUSY;
         a.refused += dfm_world_set_pre_solve(a.s.w, nullptr, nullptr) == DFM_E_BUSY;
         a.refused += dfm_surface_vertices(a.s.body, nullptr, 0, nullptr, nullptr) == DFM_E_BUSY;
         test::says({"busy with another call"});

@@ -176,10 +176,9 @@ TEST(Run, StiffBodyWithoutAnIntegrator_TakesFewSubSteps) {
 
 TEST(World, StepOfTheDef_IsWhatAutoGoesBy) {
   test::Context context;
-  const auto moves = [&](double step, int32_t method) {
+  const auto moves = [&](double step) {
     dfm_world_def d = dfm_world_def_default();
     d.step = step;
-    d.method = method;
     dfm_world w = 0;
     test::ok(dfm_world_create(context, &d, &w));
     dfm_material_def m = dfm_material_def_default();
@@ -196,9 +195,8 @@ TEST(World, StepOfTheDef_IsWhatAutoGoesBy) {
     test::ok(dfm_world_destroy(w));
     return stable < 1e-4 ? "explicit" : "implicit";
   };
-  EXPECT_STREQ(moves(0.1, DFM_METHOD_AUTO), "implicit");
-  EXPECT_STREQ(moves(0.1, DFM_METHOD_VELOCITY), "explicit");
-  EXPECT_STREQ(moves(0, DFM_METHOD_AUTO), "explicit");
+  EXPECT_STREQ(moves(0.1), "implicit");
+  EXPECT_STREQ(moves(0), "explicit");
   for (const double wrong : {-1.0, double(NAN), HUGE_VAL}) {
     dfm_world_def d = dfm_world_def_default();
     d.step = wrong;

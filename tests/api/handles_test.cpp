@@ -104,47 +104,11 @@ std::vector<Call> world_calls() {
       {"world_set_sleep", [](uint64_t h) { return dfm_world_set_sleep(h, true); }},
       {"world_hold_begin", [](uint64_t h) { return dfm_world_hold_begin(h); }},
       {"world_hold", [](uint64_t h) { return dfm_world_hold(h, numbers, nullptr); }},
-      {"world_ray",
-       [](uint64_t h) {
-         dfm_ray_hit r{};
-         return dfm_world_ray(h, zero3, one3, 1, &r);
-       }},
-      {"world_closest",
-       [](uint64_t h) {
-         dfm_ray_hit r{};
-         return dfm_world_closest(h, zero3, 1, &r);
-       }},
-      {"world_query_ray",
-       [](uint64_t h) {
-         dfm_query_hit r{};
-         return dfm_world_query_ray(h, zero3, one3, 1, nullptr, &r);
-       }},
-      {"world_query_ray_all",
-       [](uint64_t h) { return dfm_world_query_ray_all(h, zero3, one3, 1, nullptr, 0, nullptr, &count); }},
-      {"world_query_ray_all_sized",
-       [](uint64_t h) {
-         return dfm_world_query_ray_all_sized(h, zero3, one3, 1, nullptr, 80, 0, nullptr, &count);
-       }},
-      {"world_query_closest",
-       [](uint64_t h) {
-         dfm_query_hit r{};
-         return dfm_world_query_closest(h, zero3, 1, nullptr, &r);
-       }},
-      {"world_query_overlap",
+      {"world_query",
        [](uint64_t h) {
          const dfm_query_shape s = dfm_query_shape_default();
-         return dfm_world_query_overlap(h, &s, nullptr, 0, nullptr, &count);
-       }},
-      {"world_query_aabb",
-       [](uint64_t h) {
-         const dfm_aabb box{{0, 0, 0}, {1, 1, 1}};
-         return dfm_world_query_aabb(h, &box, nullptr, 0, nullptr, &count);
-       }},
-      {"world_query_cast",
-       [](uint64_t h) {
-         const dfm_query_shape s = dfm_query_shape_default();
-         dfm_query_hit r{};
-         return dfm_world_query_cast(h, &s, one3, nullptr, &r);
+         dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 0, 0, nullptr};
+         return dfm_world_query(h, &s, nullptr, 0, nullptr, nullptr, &hits);
        }},
       {"world_set_may_touch", [](uint64_t h) { return dfm_world_set_may_touch(h, nullptr, nullptr); }},
       {"world_ask_again", [](uint64_t h) { return dfm_world_ask_again(h, 0, 0); }},
@@ -268,11 +232,6 @@ std::vector<Call> body_calls() {
       {"surface_triangles", [](uint64_t h) { return dfm_surface_triangles(h, 0, nullptr, &count); }},
       {"surface_points", [](uint64_t h) { return dfm_surface_points(h, 0, nullptr, &count); }},
       {"surface_vertices", [](uint64_t h) { return dfm_surface_vertices(h, nullptr, 0, nullptr, &count); }},
-      {"body_query_triangles",
-       [](uint64_t h) {
-         const dfm_query_shape s = dfm_query_shape_default();
-         return dfm_body_query_triangles(h, &s, 0, nullptr, &count);
-       }},
       {"body_set_sensor", [](uint64_t h) { return dfm_body_set_sensor(h, false); }},
       {"debug_displacements", [](uint64_t h) { return dfm_debug_displacements(h, 0, nullptr, &count); }},
       {"debug_surface_displacements",
@@ -508,7 +467,7 @@ std::multiset<std::string> declared() {
   std::multiset<std::string> out;
   for (const auto &entry :
        std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/libdeform/include/deform")) {
-    if (entry.path().extension() != ".h") continue;
+    if (entry.path().extension() != ".h" || entry.path().stem() == "deprecated") continue;
     const std::string text = std::regex_replace(test::read_file(entry.path()), comment, "");
     for (std::sregex_iterator at(text.begin(), text.end(), function), end; at != end; ++at)
       out.insert((*at)[1]);

@@ -191,7 +191,26 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   const uint32_t load = s.ball.add_load(points, force);
   s.ball.remove_load(load);
   EXPECT_THROW(s.ball.remove_load(load), deform::Error);
-  EXPECT_TRUE(s.world.ray(Vec3{0, 0, 1}, Vec3{0, 0, -1}, 10).body);
+  deform::QueryShape from;
+  from.shape = DFM_SHAPE_POINT;
+  from.pose.position[0] = 0.003;
+  from.pose.position[1] = 0.002;
+  from.pose.position[2] = 1;
+  const Vec3 down{0, 0, -1};
+  EXPECT_EQ(s.world.query_first(from, down, 10).thing, s.ball.get());
+  from.flags = DFM_QUERY_EACH;
+  const std::vector<dfm_query_hit> all = s.world.query(from, down, 10);
+  ASSERT_EQ(all.size(), 3u) << "the ball twice, and the floor";
+  dfm_query_hit two[2];
+  EXPECT_EQ(s.world.query(from, down, 10, two), 2u);
+  EXPECT_EQ(two[1].distance, all[1].distance);
+  std::vector<uint64_t> things;
+  s.world.query(from, down, 10, nullptr, [&](const dfm_query_hit &h) {
+    things.push_back(h.thing);
+    return things.size() < 3 ? INFINITY : -1;
+  });
+  EXPECT_EQ(things, (std::vector<uint64_t>{s.ball.get(), s.ball.get(), s.floor.get()}));
+  EXPECT_EQ(s.world.query(deform::QueryShape(), {}, 0.01).size(), 2u) << "near the floor's origin";
 
   s.world.add_friction("ball", "floor", "coulomb", deform::Params({{"mu", 0.2}}));
   s.world.set_friction("floor", "ball", deform::Params({{"mu", 0.3}}));
@@ -383,12 +402,15 @@ TEST(Hpp, Calls_AllocateNothing) {
   std::vector<double> x(3 * info.npoint), v(3 * info.npoint), surface(3 * info.nsurfel);
   std::vector<dfm_contact> contacts(4096);
   uint32_t n = 0;
+  deform::QueryShape above;
+  above.shape = DFM_SHAPE_POINT;
+  above.pose.position[2] = 1;
   const uint64_t before = test::heap_calls;
   for (int i = 0; i < 20; ++i) {
     n += s.world.step(1e-3).trouble;
     n += s.ball.state(x, v) + s.ball.surface_positions(surface) + s.world.contacts(contacts);
     n += s.ball.measure().size + s.world.stats().size;
-    n += values::World(s.world.get()).ray(Vec3{0, 0, 1}, Vec3{0, 0, -1}, 10)->triangle;
+    n += values::World(s.world.get()).query_first(above, Vec3{0, 0, -1}, 10)->triangle;
     s.ball.apply_impulse(Vec3{0, 0, 0.1}, Vec3{0, 0, 1e-6});
     const deform::Unique<deform::Body> nothing;
   }

@@ -1,6 +1,7 @@
 // Obstacles of triangles and voxels through the public API: what is refused and how, what comes back, rays,
 // snapshots, threads, the scene's keys.
 #include "obstacle.h"
+#include "query.h"
 
 #include <unistd.h>
 
@@ -120,15 +121,11 @@ TEST(MeshObstacle, Ray_MeetsItWhereItIs) {
     d.pose.rotation[3] = std::sqrt(0.5);  // local x down
     dfm_obstacle o = 0;
     test::ok(dfm_obstacle_create(w, &d, &o));
-    dfm_ray_hit hit{};
-    const double from[3] = {0.01, 0.02, 3}, down[3] = {0, 0, -1}, aside[3] = {0, 1, 0};
-    hit.size = sizeof hit;
-    test::ok(dfm_world_ray(w, from, down, 100, &hit));
-    EXPECT_EQ(hit.obstacle, o);
+    const dfm_query_hit hit = test::ray(w, {0.01, 0.02, 3}, {0, 0, -1}, 100);
+    EXPECT_EQ(hit.thing, o);
     EXPECT_NEAR(hit.distance, 1.7, 1e-12);
     EXPECT_NEAR(hit.normal[2], 1, 1e-12);
-    test::ok(dfm_world_ray(w, from, aside, 100, &hit));
-    EXPECT_TRUE(std::isinf(hit.distance));
+    EXPECT_EQ(test::ray(w, {0.01, 0.02, 3}, {0, 1, 0}, 100).thing, 0u);
   }
 }
 

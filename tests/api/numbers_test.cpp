@@ -4,6 +4,7 @@
 #include <functional>
 #include <limits>
 
+#include "query.h"
 #include "rigid.h"
 
 namespace {
@@ -99,6 +100,11 @@ struct Scene {
     const dfm_status s = dfm_body_add_spring(body, &d, &number);
     if (s == DFM_OK) test::ok(dfm_body_remove_spring(body, number));
     return s;
+  }
+  dfm_status query(std::array<double, 3> at, const double *path, double reach) const {
+    const dfm_query_shape s = test::point(at);
+    dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 0, 0, nullptr};
+    return dfm_world_query(w, &s, path, reach, nullptr, nullptr, &hits);
   }
   dfm_status load(double force, const dfm_scale_key *key, const dfm_sine *sine) {
     const double f[6] = {0, force, 0};
@@ -244,22 +250,18 @@ std::vector<Number> Scene::numbers() {
         return dfm_body_set_params(body, &p);),
       N("mu", return rule(x);),
       N("step", return dfm_world_step(w, x, nullptr);),
-      N("origin", dfm_ray_hit h{}; const double o[3] = {0, x, 0}, d[3] = {0, 0, 1};
-        return dfm_world_ray(w, o, d, 1, &h);),
-      N("direction", dfm_ray_hit h{}; const double o[3] = {0, 0, 0}, d[3] = {0, x, 1};
-        return dfm_world_ray(w, o, d, 1, &h);),
-      N("point", dfm_ray_hit h{}; const double o[3] = {0, x, 0}; return dfm_world_closest(w, o, 1, &h);),
+      N("shape.pose.position", const double d[3] = {0, 0, 1}; return query({0, x, 0}, d, 1);),
+      N("path", const double d[3] = {0, x, 1}; return query({0, 0, 0}, d, 1);),
       N("point", const double o[3] = {0, x, 0}; double f[3], m[3];
         return dfm_world_pair_wrench(w, body, floor, o, f, m);),
       N("beam", const double size[3] = {0.1, x, 0.1}; dfm_tetmesh m = 0;
         const dfm_status s = dfm_tetmesh_make(c, "beam", size, 10, &m);
         if (s == DFM_OK) test::ok(dfm_tetmesh_destroy(m)); return s;),
   };
-  all.push_back({"max_distance",
+  all.push_back({"reach",
                  [this](double x) {
-                   dfm_ray_hit h{};
-                   const double o[3] = {0, 0, 0}, d[3] = {0, 0, 1};
-                   return dfm_world_ray(w, o, d, x, &h);
+                   const double d[3] = {0, 0, 1};
+                   return query({0, 0, 0}, d, x);
                  },
                  true});
   for (int k = 0; k < 4; ++k)

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "obstacle.h"
+#include "query.h"
 #include "stack.h"
 
 namespace {
@@ -18,14 +19,14 @@ double dot(Vec a, Vec b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 struct Hit {
   double distance;
   Vec point, normal;
-  dfm_ray_hit raw;
+  dfm_query_hit raw;
 };
 
-Hit ray(dfm_world w, Vec o, Vec d, double most = 100) {
-  dfm_ray_hit h{};
-  test::ok(dfm_world_ray(w, o.data(), d.data(), most, &h));
+Hit hit_of(const dfm_query_hit &h) {
   return {h.distance, {h.point[0], h.point[1], h.point[2]}, {h.normal[0], h.normal[1], h.normal[2]}, h};
 }
+
+Hit ray(dfm_world w, Vec o, Vec d, double most = 100) { return hit_of(test::ray(w, o, d, most)); }
 
 void expect(const Hit &h, double distance, Vec point, Vec normal, const char *what) {
   EXPECT_NEAR(h.distance, distance, 1e-12) << what;
@@ -34,7 +35,7 @@ void expect(const Hit &h, double distance, Vec point, Vec normal, const char *wh
 }
 
 void expect_nothing(const Hit &h, const char *what) {
-  EXPECT_TRUE(h.raw.body == 0 && h.raw.obstacle == 0 && std::isinf(h.distance)) << what;
+  EXPECT_TRUE(h.raw.thing == 0 && std::isinf(h.distance)) << what;
 }
 
 dfm_obstacle add(dfm_world w, uint32_t shape, Vec at, std::array<double, 4> q = {0, 0, 0, 1}) {
@@ -67,7 +68,7 @@ TEST(Ray, MeetsThePlaneFromBothSides) {
   expect_nothing(ray(w, {0, 0, 5}, {1, 0, 0}), "along it");
   expect_nothing(ray(w, {0, 0, 5}, {0, 0, 1}), "away from it");
   expect_nothing(ray(w, {3, 4, 5}, {0, 0, -1}, 3.99), "beyond max_distance");
-  EXPECT_EQ(ray(w, {3, 4, 5}, {0, 0, -1}).raw.obstacle, o);
+  EXPECT_EQ(ray(w, {3, 4, 5}, {0, 0, -1}).raw.thing, o);
 }
 
 TEST(Ray, MeetsTheSphereFromOutsideAndInside) {
@@ -110,14 +111,13 @@ TEST(Ray, MeetsBodiesByTriangleAndTheNearestThingWins) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   const Hit top = ray(s.world, {0.06, 0.05, 5}, {0, 0, -1});
-  EXPECT_EQ(top.raw.body, s.upper);
-  EXPECT_EQ(top.raw.obstacle, 0u);
+  EXPECT_EQ(top.raw.thing, s.upper);
   expect(top, 5 - 0.2003, {0.06, 0.05, 0.2003}, {0, 0, 1}, "top face");
   dfm_body_info info{};
   test::ok(dfm_body_get_info(s.upper, &info));
   EXPECT_LT(top.raw.triangle, info.ntriangle);
   expect(ray(s.world, {-1, 0.05, 0.05}, {1, 0, 0}), 1, {0, 0.05, 0.05}, {-1, 0, 0}, "side of the lower cube");
-  EXPECT_EQ(ray(s.world, {-1, 0.05, 0.05}, {1, 0, -0.2}).raw.obstacle, s.floor);
+  EXPECT_EQ(ray(s.world, {-1, 0.05, 0.05}, {1, 0, -0.2}).raw.thing, s.floor);
   expect_nothing(ray(s.world, {-1, 0.05, 5}, {1, 0, 0}), "over all");
 }
 
@@ -130,7 +130,7 @@ TEST(Ray, FromInsideOfTriangles_MeetsWhereItLeavesThem) {
   const dfm_body body = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
   const Hit out = ray(w, {1.04, 1.03, 1.02}, {0, 0, 1});
   expect(out, 0.08, {1.04, 1.03, 1.1}, {0, 0, 1}, "a body's face, from behind");
-  EXPECT_EQ(out.raw.body, body);
+  EXPECT_EQ(out.raw.thing, body);
   const test::Triangles box = test::box_surface({0.1, 0.2, 0.3}, 4);
   for (const uint32_t shape : {uint32_t(DFM_SHAPE_MESH), uint32_t(DFM_SHAPE_VOXELS)}) {
     dfm_obstacle_def d = test::mesh_def(shape == DFM_SHAPE_MESH ? "mesh" : "voxels", box, shape, 8000);
@@ -141,8 +141,7 @@ TEST(Ray, FromInsideOfTriangles_MeetsWhereItLeavesThem) {
     const double x = d.pose.position[0];
     const Hit inside = ray(w, {x + 0.03, 0.04, 0.05}, {0, 1, 0});
     expect(inside, 0.26, {x + 0.03, 0.3, 0.05}, {0, 1, 0}, d.name);
-    EXPECT_EQ(inside.raw.obstacle, ob);
-    EXPECT_EQ(inside.raw.body, 0u);
+    EXPECT_EQ(inside.raw.thing, ob);
     expect(ray(w, {x + 0.03, 0.04, 2}, {0, 0, -1}), 1.8, {x + 0.03, 0.04, 0.2}, {0, 0, 1}, "from outside");
     expect_nothing(ray(w, {x + 0.11, 0.04, 2}, {0, 0, -1}, 5), "past it");
   }
@@ -165,14 +164,11 @@ TEST(Ray, OfAnyScale_MeetsTheSamePoint) {
   const Hit near = ray(s.world, {0.06, 0.05, 5}, {0, 0, -1});
   EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1e-100}).distance, near.distance) << "a short direction";
   EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1}, INFINITY).distance, near.distance);
-  EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1}, near.distance).raw.body, s.upper)
+  EXPECT_EQ(ray(s.world, {0.06, 0.05, 5}, {0, 0, -1}, near.distance).raw.thing, s.upper)
       << "up to and with it";
-  EXPECT_EQ(ray(s.world, {0.06, 0.05, 1e6}, {0, 0, -1}, INFINITY).raw.body, s.upper) << "from far away";
+  EXPECT_EQ(ray(s.world, {0.06, 0.05, 1e6}, {0, 0, -1}, INFINITY).raw.thing, s.upper) << "from far away";
   expect_nothing(ray(s.world, {1e6, 0.05, 5}, {1, 0, 1e-320}, INFINITY), "away, almost along an axis");
-  dfm_ray_hit h{};
-  const double far[3] = {0.06, 0.05, 1e6};
-  test::ok(dfm_world_closest(s.world, far, INFINITY, &h));
-  EXPECT_EQ(h.body, s.upper);
+  EXPECT_EQ(test::nearest(s.world, test::point({0.06, 0.05, 1e6}), nullptr, INFINITY).thing, s.upper);
 }
 
 TEST(Closest, PointOfABody_OnFaceEdgeAndCorner) {
@@ -182,16 +178,12 @@ TEST(Closest, PointOfABody_OnFaceEdgeAndCorner) {
   o.name = "cube";
   o.position = {1, 1, 1};
   const dfm_body b = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-  auto closest = [&](Vec p, double most) {
-    dfm_ray_hit h{};
-    test::ok(dfm_world_closest(w, p.data(), most, &h));
-    return Hit{h.distance, {h.point[0], h.point[1], h.point[2]}, {h.normal[0], h.normal[1], h.normal[2]}, h};
-  };
+  auto closest = [&](Vec p, double most) { return hit_of(test::nearest(w, test::point(p), nullptr, most)); };
   expect(closest({1.04, 1.03, 1.5}, 10), 0.4, {1.04, 1.03, 1.1}, {0, 0, 1}, "face");
   EXPECT_NEAR(closest({1.03, 0.97, 1.14}, 10).distance, 0.05, 1e-12) << "edge";
   EXPECT_NEAR(closest({0.98, 0.97, 0.94}, 10).distance, 0.07, 1e-12) << "corner";
   EXPECT_NEAR(closest({1.05, 1.05, 1.03}, 10).distance, 0.03, 1e-12) << "from inside";
-  EXPECT_EQ(closest({1.04, 1.03, 1.5}, 10).raw.body, b);
+  EXPECT_EQ(closest({1.04, 1.03, 1.5}, 10).raw.thing, b);
   expect_nothing(closest({1.04, 1.03, 1.5}, 0.39), "too far");
 }
 

@@ -1,9 +1,10 @@
 // Random shapes, from a point to a thousand meters and from slivers to cubes, in a world of everything:
-// answers of different functions agree with each other.
+// answers of different queries agree with each other, and those of the functions in deform/deprecated.h.
 #include <algorithm>
 #include <random>
 
 #include "obstacle.h"
+#include "query.h"
 #include "rigid.h"
 #include "stack.h"
 
@@ -122,6 +123,16 @@ TEST(QueryRandom, FunctionsAgreeWithEachOther) {
       dfm_query_hit before{};
       ASSERT_EQ(dfm_world_query_cast(w, &s, part, nullptr, &before), DFM_OK);
       ASSERT_EQ(before.thing, 0u);
+    }
+    // a shape that is wider by its gap just touches the nearest thing
+    const dfm_query_hit gap = test::nearest(w, s, nullptr, INFINITY);
+    ASSERT_EQ(gap.distance == 0, n > 0);
+    if (gap.distance > 1e-6) {
+      dfm_query_shape wide = s;
+      wide.radius += 0.999 * gap.distance;
+      ASSERT_TRUE(test::query(w, wide).empty());
+      wide.radius = s.radius + 1.001 * gap.distance;
+      ASSERT_EQ(test::nearest(w, wide, nullptr, 0).distance, 0);
     }
     // a point of the largest overlapping ball
     dfm_query_hit near{}, first{}, all[64];

@@ -5,6 +5,7 @@
 
 #include "heap_calls.h"
 #include "obstacle.h"
+#include "query.h"
 #include "rigid.h"
 #include "stack.h"
 
@@ -12,12 +13,8 @@ namespace {
 
 using Vec = std::array<double, 3>;
 
-dfm_query_shape sphere(Vec at, double r) {
-  dfm_query_shape s = dfm_query_shape_default();
-  s.radius = r;
-  std::copy(at.begin(), at.end(), s.pose.position);
-  return s;
-}
+using test::sphere;
+
 dfm_query_shape box(Vec at, Vec half) {
   dfm_query_shape s = sphere(at, 0);
   s.shape = DFM_SHAPE_BOX;
@@ -48,24 +45,20 @@ dfm_obstacle add(dfm_world w, const char *name, uint32_t shape, Vec at, uint32_t
 }
 
 std::vector<uint64_t> overlaps(dfm_world w, const dfm_query_shape &s, const dfm_query_filter *f = nullptr) {
-  uint64_t things[16];
-  uint32_t n = 0;
-  test::ok(dfm_world_query_overlap(w, &s, f, 16, things, &n));
-  return {things, things + n};
+  std::vector<uint64_t> things;
+  for (const dfm_query_hit &h : test::query(w, s, nullptr, 0, f)) {
+    EXPECT_EQ(h.distance, 0);
+    EXPECT_EQ(h.flags, uint32_t{DFM_QUERY_INSIDE});
+    things.push_back(h.thing);
+  }
+  return things;
 }
 dfm_query_hit cast(dfm_world w, const dfm_query_shape &s, Vec path, const dfm_query_filter *f = nullptr) {
-  dfm_query_hit hit{};
-  hit.size = sizeof hit;
-  test::ok(dfm_world_query_cast(w, &s, path.data(), f, &hit));
-  return hit;
+  return test::nearest(w, s, path.data(), 0, f);
 }
 std::vector<dfm_query_hit> all_hits(dfm_world w, Vec o, Vec d, double most = 100, uint32_t capacity = 64,
                                     const dfm_query_filter *f = nullptr) {
-  std::vector<dfm_query_hit> out(capacity);
-  uint32_t n = 0;
-  test::ok(dfm_world_query_ray_all(w, o.data(), d.data(), most, f, capacity, out.data(), &n));
-  out.resize(std::min(n, capacity));
-  return out;
+  return test::query(w, test::point(o, DFM_QUERY_EACH), d.data(), most, f, capacity);
 }
 
 using Things = std::vector<uint64_t>;
@@ -112,12 +105,8 @@ TEST(QueryOverlap, FindsSurfacesAndWhatIsWithin) {
   EXPECT_EQ(overlaps(y.world, hull), Things{y.mesh});
   hull.pose.position[0] = 4.61;
   EXPECT_EQ(overlaps(y.world, hull), Things{});
-  const dfm_aabb aabb{{0.9, -0.1, 0.9}, {2.1, 0.1, 1.1}};
-  uint64_t things[1] = {77};
-  uint32_t n = 0;
-  test::ok(dfm_world_query_aabb(y.world, &aabb, nullptr, 1, things, &n));
-  EXPECT_EQ(n, 2u) << "ball and crate; there is room for one";
-  EXPECT_EQ(things[0], y.ball);
+  EXPECT_EQ(test::query(y.world, box({1.5, 0, 1}, {0.6, 0.1, 0.1}), nullptr, 0, nullptr, 1)[0].thing, y.ball)
+      << "ball and crate; there is room for one";
 }
 
 TEST(QueryOverlap, TrianglesOfABody_AreThoseOfTheShapesPlace) {
@@ -125,21 +114,27 @@ TEST(QueryOverlap, TrianglesOfABody_AreThoseOfTheShapesPlace) {
   const Yard y(c);
   dfm_body_info info{};
   test::ok(dfm_body_get_info(y.lower, &info));
-  std::vector<uint32_t> list(info.ntriangle);
-  uint32_t n = 0;
-  const dfm_query_shape all = sphere({0.05, 0.05, 0.05}, 1);
-  test::ok(dfm_body_query_triangles(y.lower, &all, info.ntriangle, list.data(), &n));
-  EXPECT_EQ(n, info.ntriangle);
-  EXPECT_TRUE(std::is_sorted(list.begin(), list.end()));
-  const dfm_query_shape side = box({0, 0.05, 0.05}, {0.001, 0.2, 0.2});
-  test::ok(dfm_body_query_triangles(y.lower, &side, info.ntriangle, list.data(), &n));
+  dfm_query_filter lower = dfm_query_filter_default();
+  lower.only = y.lower;
+  lower.what = 0;  // counts no more
+  const auto triangles = [&](dfm_query_shape s) {
+    s.flags = DFM_QUERY_EACH;
+    std::vector<uint32_t> list;
+    for (const dfm_query_hit &h : test::query(y.world, s, nullptr, 0, &lower, 2 * info.ntriangle))
+      if (h.triangle != UINT32_MAX) list.push_back(h.triangle);
+    EXPECT_TRUE(std::is_sorted(list.begin(), list.end()));
+    return list;
+  };
+  EXPECT_EQ(triangles(sphere({0.05, 0.05, 0.05}, 1)).size(), info.ntriangle);
+  const std::vector<uint32_t> list = triangles(box({0, 0.05, 0.05}, {0.001, 0.2, 0.2}));
+  const size_t n = list.size();
   EXPECT_GT(n, 0u);
   EXPECT_LT(n, info.ntriangle);
   std::vector<double> x(3 * info.nsurfel);
   std::vector<uint32_t> tri(3 * info.ntriangle);
   test::ok(dfm_surface_positions(y.lower, info.nsurfel, x.data(), nullptr));
   test::ok(dfm_surface_triangles(y.lower, info.ntriangle, tri.data(), nullptr));
-  for (uint32_t i = 0; i < n; ++i) {
+  for (size_t i = 0; i < n; ++i) {
     double least = 1;
     for (size_t k = 0; k < 3; ++k) least = std::min(least, x[3 * tri[3 * list[i] + k]]);
     EXPECT_LE(least, 0.001);
@@ -293,20 +288,91 @@ TEST(QueryRay, AllHits_AreSortedAndTheNearestAreKept) {
   const std::vector<dfm_query_hit> three = all_hits(y.world, {-1, 0.013, 1.007}, {2, 0, 0}, 100, 3);
   ASSERT_EQ(three.size(), 3u);
   for (size_t i = 0; i < 3; ++i) EXPECT_EQ(three[i].distance, hits[i].distance);
-  uint32_t n = 0;
   const Vec o{-1, 0.013, 1.007}, d{1, 0, 0};
-  test::ok(dfm_world_query_ray_all(y.world, o.data(), d.data(), 100, nullptr, 0, nullptr, &n));
-  EXPECT_EQ(n, 8u);
+  const dfm_query_shape from = test::point(o, DFM_QUERY_EACH);
+  dfm_query_hits count{sizeof count, sizeof(dfm_query_hit), 0, 0, nullptr};
+  test::ok(dfm_world_query(y.world, &from, d.data(), 100, nullptr, nullptr, &count));
+  EXPECT_EQ(count.n, 8u);
   EXPECT_EQ(all_hits(y.world, o, d, 3.05).size(), 3u) << "up to max_distance";
   EXPECT_EQ(all_hits(y.world, {2, 0, 1}, d, 1).size(), 2u) << "from within: out of the crate, into the pill";
   const std::vector<dfm_query_hit> down = all_hits(y.world, {0.061, 0.047, 5}, {0, 0, -1});
   ASSERT_EQ(down.size(), 5u);
   EXPECT_EQ(down[0].thing, y.upper);
   EXPECT_EQ(down[4].thing, y.floor);
-  dfm_query_hit first{};
-  first.size = sizeof first;
-  test::ok(dfm_world_query_ray(y.world, o.data(), d.data(), 100, nullptr, &first));
-  EXPECT_EQ(first.distance, hits[0].distance);
+  EXPECT_EQ(test::ray(y.world, o, d, 100).distance, hits[0].distance);
+}
+
+TEST(Query, TheFunctionThatGetsHits_SaysHowFarToGo) {
+  test::Context c;
+  const Yard y(c);
+  struct Seen {
+    const Yard &y;
+    std::vector<dfm_query_hit> hits;
+    double (*next)(const dfm_query_hit &);
+  } seen{y, {}, nullptr};
+  const dfm_query_shape from = sphere({5, 0.013, 1.007}, 0.01);
+  const double path[3] = {-9, 0, 0};
+  const auto things = [&](double (*next)(const dfm_query_hit &)) {
+    seen.hits.clear();
+    seen.next = next;
+    test::ok(dfm_world_query(
+        y.world, &from, path, 0, nullptr,
+        [](void *user, const dfm_query_hit *hit) {
+          Seen &s = *static_cast<Seen *>(user);
+          s.hits.push_back(*hit);
+          EXPECT_EQ(dfm_obstacle_destroy(s.y.ball), DFM_E_BUSY);
+          EXPECT_EQ(overlaps(s.y.world, sphere({1, 0, 1}, 0)), Things{s.y.ball}) << "it may query";
+          return s.next(*hit);
+        },
+        &seen));
+    Things out;
+    for (const dfm_query_hit &h : seen.hits) out.push_back(h.thing);
+    return out;
+  };
+  EXPECT_EQ(things([](const dfm_query_hit &) { return double{INFINITY}; }),
+            (Things{y.ball, y.crate, y.pill, y.mesh}))
+      << "in order of creation, each once";
+  EXPECT_EQ(things([](const dfm_query_hit &h) { return h.distance; }),
+            (Things{y.ball, y.crate, y.pill, y.mesh}))
+      << "each nearer than the one before";
+  EXPECT_EQ(things([](const dfm_query_hit &) { return -1.0; }), Things{y.ball});
+  EXPECT_EQ(things([](const dfm_query_hit &h) { return h.distance - 1.05; }), (Things{y.ball, y.pill}))
+      << "the next ones are only 1 m nearer";
+}
+
+TEST(QueryClosest, OfAnyShape_IsTheGapToTheNearestThing) {
+  test::Context c;
+  const Yard y(c);
+  const auto gap = [&](const dfm_query_shape &s, double reach = 10) {
+    return test::nearest(y.world, s, nullptr, reach);
+  };
+  dfm_query_hit hit = gap(sphere({1, 0, 1.5}, 0.1));
+  EXPECT_EQ(hit.thing, y.ball);
+  EXPECT_NEAR(hit.distance, 0.2, 1e-12);
+  EXPECT_NEAR(hit.point[2], 1.2, 1e-12);
+  EXPECT_NEAR(hit.normal[2], 1, 1e-12);
+  hit = gap(box({4.3, 0.03, 1.01}, {0.05, 0.02, 0.02}));
+  EXPECT_EQ(hit.thing, y.mesh);
+  EXPECT_NEAR(hit.distance, 0.15, 1e-12);
+  EXPECT_NE(hit.triangle, UINT32_MAX);
+  EXPECT_NEAR(hit.normal[0], 1, 1e-12);
+  EXPECT_EQ(gap(box({4.3, 0.03, 1.01}, {0.05, 0.02, 0.02}), 0.1499).thing, 0u);
+  hit = gap(capsule({9, 9, 0.7}, 0.3, 0.1));
+  EXPECT_EQ(hit.thing, y.floor);
+  EXPECT_NEAR(hit.distance, 0.3, 1e-12);
+  EXPECT_NEAR(hit.point[2], 0, 1e-12);
+  hit = gap(sphere({4, 0, 1}, 0.01));
+  EXPECT_EQ(hit.thing, y.mesh) << "within it";
+  EXPECT_EQ(hit.distance, 0);
+  EXPECT_EQ(hit.flags, uint32_t{DFM_QUERY_INSIDE});
+  dfm_query_shape each = sphere({4.15, 0.03, 1.01}, 0.01);
+  each.flags = DFM_QUERY_EACH;
+  const std::vector<dfm_query_hit> faces = test::query(y.world, each, nullptr, 0.041);
+  ASSERT_FALSE(faces.empty());
+  EXPECT_NEAR(faces[0].distance, 0.04, 1e-12);
+  EXPECT_LT(faces.size(), 6u) << "triangles of the mesh's side alone";
+  each.shape = DFM_SHAPE_POINT;
+  EXPECT_NEAR(test::query(y.world, each, nullptr, 0.051)[0].distance, 0.05, 1e-12);
 }
 
 TEST(QueryRay, RowsOfANewerHeader_HaveZeroBehind) {
@@ -315,9 +381,10 @@ TEST(QueryRay, RowsOfANewerHeader_HaveZeroBehind) {
   const Vec o{-1, 0.013, 1.007}, d{1, 0, 0};
   constexpr uint32_t row = sizeof(dfm_query_hit) + 16;
   std::vector<unsigned char> out(9 * row, 0xa5);
-  uint32_t n = 0;
-  test::ok(dfm_world_query_ray_all_sized(y.world, o.data(), d.data(), 100, nullptr, row, 8,
-                                         reinterpret_cast<dfm_query_hit *>(out.data()), &n));
+  const dfm_query_shape from = test::point(o, DFM_QUERY_EACH);
+  dfm_query_hits hits{sizeof hits, row, 8, 0, reinterpret_cast<dfm_query_hit *>(out.data())};
+  test::ok(dfm_world_query(y.world, &from, d.data(), 100, nullptr, nullptr, &hits));
+  EXPECT_EQ(hits.n, 8u);
   double last = 0;
   for (uint32_t i = 0; i < 8; ++i) {
     dfm_query_hit h;
@@ -327,8 +394,9 @@ TEST(QueryRay, RowsOfANewerHeader_HaveZeroBehind) {
     for (uint32_t k = sizeof h; k < row; ++k) EXPECT_EQ(out[i * row + k], 0);
   }
   for (uint32_t k = 8 * row; k < 9 * row; ++k) EXPECT_EQ(out[k], 0xa5);
-  EXPECT_EQ(dfm_world_query_ray_all_sized(y.world, o.data(), d.data(), 100, nullptr, 72, 0, nullptr, &n),
-            DFM_E_ARG);
+  hits = {sizeof hits, 72, 0, 9, nullptr};
+  EXPECT_EQ(dfm_world_query(y.world, &from, d.data(), 100, nullptr, nullptr, &hits), DFM_E_ARG);
+  EXPECT_EQ(hits.n, 9u) << "untouched";
   test::says({"row_size 72", "sizeof(dfm_query_hit)"});
 }
 
@@ -336,10 +404,7 @@ TEST(QueryClosest, IsTheNearestSurfaceOfAnyKind) {
   test::Context c;
   const Yard y(c);
   const auto closest = [&](Vec p, double most = 10, const dfm_query_filter *f = nullptr) {
-    dfm_query_hit hit{};
-    hit.size = sizeof hit;
-    test::ok(dfm_world_query_closest(y.world, p.data(), most, f, &hit));
-    return hit;
+    return test::nearest(y.world, test::point(p), nullptr, most, f);
   };
   dfm_query_hit hit = closest({1, 0, 1.5});
   EXPECT_EQ(hit.thing, y.ball);
@@ -371,9 +436,9 @@ TEST(Query, AfterAMotion_SeesWhereThingsAreNow) {
   EXPECT_GT(cast(y.world, sphere({0.05, 0.05, 5}, 0.01), {0, 0, -9}).distance, low) << "it has fallen";
   test::ok(dfm_body_destroy(y.upper));
   EXPECT_EQ(overlaps(y.world, sphere({0.05, 0.05, 0.15}, 0.01)), Things{});
-  dfm_query_shape s = sphere({0, 0, 0}, 1);
-  uint32_t n = 0;
-  EXPECT_EQ(dfm_body_query_triangles(y.upper, &s, 0, nullptr, &n), DFM_E_HANDLE);
+  dfm_query_filter gone = dfm_query_filter_default();
+  gone.only = y.upper;
+  EXPECT_EQ(overlaps(y.world, sphere({0, 0, 0}, 1), &gone), Things{});
 }
 
 TEST(Query, OnSeveralThreads_GivesTheBitsOfOneAndTakesNoMemory) {
@@ -386,30 +451,30 @@ TEST(Query, OnSeveralThreads_GivesTheBitsOfOneAndTakesNoMemory) {
       numbers.clear();
       for (int i = 0; i < 60; ++i) {
         const double at = -0.5 + 0.08 * i;
-        dfm_query_hit h{};
-        h.size = sizeof h;
+        dfm_query_hit rows[8];
+        const auto ask_all = [&](const dfm_query_shape &shape, const double *path, double reach) {
+          dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 8, 0, rows};
+          test::ok(dfm_world_query(w, &shape, path, reach, nullptr, nullptr, &hits));
+          numbers.push_back(hits.n);
+          for (uint32_t k = 0; k < hits.n; ++k)
+            for (const double x :
+                 {rows[k].distance, rows[k].point[0], rows[k].normal[1], double(rows[k].triangle)})
+              numbers.push_back(x);
+        };
         dfm_query_shape s = sphere({at, 0.02, 1.5}, 0.05);
         s.shape = i % 3 == 0 ? DFM_SHAPE_BOX : DFM_SHAPE_CAPSULE;
         s.half_length = s.half_size[0] = 0.04;
         const double path[3] = {0.1 * (i % 5), 0.01, -2};
-        test::ok(dfm_world_query_cast(w, &s, path, nullptr, &h));
-        for (const double x : {h.distance, h.point[0], h.normal[1], double(h.triangle)}) numbers.push_back(x);
-        const double p[3] = {at, 0.1, 0.3};
-        test::ok(dfm_world_query_closest(w, p, 10, nullptr, &h));
-        numbers.push_back(h.distance);
-        uint64_t things[8];
-        uint32_t n = 0;
-        test::ok(dfm_world_query_overlap(w, &s, nullptr, 8, things, &n));
-        dfm_query_hit rows[8];
-        numbers.push_back(n);
-        test::ok(dfm_world_query_ray_all(w, p, path, 10, nullptr, 8, rows, &n));
-        numbers.push_back(n);
-        for (uint32_t k = 0; k < std::min(n, 8u); ++k) numbers.push_back(rows[k].distance);
+        ask_all(s, path, 0);
+        ask_all(s, nullptr, 10);
+        ask_all(s, nullptr, 0);
+        ask_all(test::point({at, 0.1, 0.3}), nullptr, 10);
+        ask_all(test::point({at, 0.1, 0.3}, DFM_QUERY_EACH), path, 10);
       }
     }
   };
   Answers one[4];
-  for (Answers &a : one) a.numbers.reserve(4096);
+  for (Answers &a : one) a.numbers.reserve(1 << 14);
   std::vector<std::thread> threads;
   for (int t = 1; t < 4; ++t) threads.emplace_back([&, t] { one[t].ask(y.world); });
   one[0].ask(y.world);
@@ -431,14 +496,17 @@ TEST(Query, AnEmptyWorld_ReturnsNothing) {
 TEST(Query, WhatIsNoShapeRayOrFilter_IsRefusedWithASentence) {
   test::Context c;
   const Yard y(c);
-  const Vec o{0, 0, 0}, d{1, 0, 0};
-  uint32_t n = 77;
-  uint64_t things[4];
+  const double d[3] = {1, 0, 0}, none[3] = {0, 0, 0};
+  dfm_query_hit rows[4];
+  dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 4, 77, rows};
+  const auto ask = [&](const dfm_query_shape *s, const double *path, double reach,
+                       const dfm_query_filter *f = nullptr) {
+    return dfm_world_query(y.world, s, path, reach, f, nullptr, &hits);
+  };
   const auto refused = [&](const dfm_query_shape &s, std::initializer_list<const char *> parts) {
-    EXPECT_EQ(dfm_world_query_overlap(y.world, &s, nullptr, 4, things, &n), DFM_E_ARG);
+    EXPECT_EQ(ask(&s, nullptr, 0), DFM_E_ARG);
     test::says(parts);
-    dfm_query_hit hit{};
-    EXPECT_EQ(dfm_world_query_cast(y.world, &s, d.data(), nullptr, &hit), DFM_E_ARG);
+    EXPECT_EQ(ask(&s, d, 0), DFM_E_ARG);
   };
   refused(sphere({0, 0, 0}, -1), {"radius", "-1"});
   refused(sphere({NAN, 0, 0}, 1), {"position", "nan"});
@@ -446,7 +514,7 @@ TEST(Query, WhatIsNoShapeRayOrFilter_IsRefusedWithASentence) {
   refused(box({0, 0, 0}, {1, NAN, 1}), {"half_size"});
   dfm_query_shape s = sphere({0, 0, 0}, 1);
   s.shape = DFM_SHAPE_PLANE;
-  refused(s, {"shape 0", "DFM_SHAPE_CONVEX"});
+  refused(s, {"shape 0", "DFM_SHAPE_CONVEX", "DFM_SHAPE_POINT"});
   s.shape = DFM_SHAPE_CONVEX;
   refused(s, {"no points"});
   const double bad[3] = {0, INFINITY, 0};
@@ -459,22 +527,28 @@ TEST(Query, WhatIsNoShapeRayOrFilter_IsRefusedWithASentence) {
   refused(s, {"rotation"});
   s.size = 3;
   refused(s, {"size is 3"});
-  EXPECT_EQ(n, 77u) << "untouched";
-  dfm_query_hit hit{};
-  EXPECT_EQ(dfm_world_query_ray(y.world, o.data(), o.data(), 1, nullptr, &hit), DFM_E_ARG);
-  EXPECT_EQ(dfm_world_query_ray(y.world, o.data(), d.data(), 0, nullptr, &hit), DFM_E_ARG);
-  EXPECT_EQ(dfm_world_query_ray(y.world, nullptr, d.data(), 1, nullptr, &hit), DFM_E_ARG);
-  EXPECT_EQ(dfm_world_query_ray(y.world, o.data(), d.data(), 1, nullptr, nullptr), DFM_E_ARG);
-  EXPECT_EQ(dfm_world_query_closest(y.world, o.data(), NAN, nullptr, &hit), DFM_E_ARG);
-  EXPECT_EQ(dfm_world_query_overlap(y.world, nullptr, nullptr, 4, things, &n), DFM_E_ARG);
   s = sphere({0, 0, 0}, 1);
-  EXPECT_EQ(dfm_world_query_overlap(y.world, &s, nullptr, 4, nullptr, &n), DFM_E_ARG);
+  s.flags = 6;
+  refused(s, {"flags is 6"});
+  s.flags = 0;
+  EXPECT_EQ(ask(&s, none, 1), DFM_E_ARG);
+  test::says({"path is zero"});
+  s.shape = DFM_SHAPE_POINT;
+  EXPECT_EQ(ask(&s, none, 0), DFM_E_ARG);
+  EXPECT_EQ(ask(&s, d, -1), DFM_E_ARG);
+  EXPECT_EQ(ask(&s, nullptr, NAN), DFM_E_ARG);
+  test::says({"reach is nan"});
+  EXPECT_EQ(ask(nullptr, d, 1), DFM_E_ARG);
   dfm_query_filter f = dfm_query_filter_default();
   f.what = 99;
-  EXPECT_EQ(dfm_world_query_overlap(y.world, &s, &f, 4, things, &n), DFM_E_ARG);
+  EXPECT_EQ(ask(&s, d, 1, &f), DFM_E_ARG);
   test::says({"what is 99"});
-  const dfm_aabb turned{{0, 0, 0}, {1, -1, 1}};
-  EXPECT_EQ(dfm_world_query_aabb(y.world, &turned, nullptr, 4, things, &n), DFM_E_ARG);
-  test::says({"lo[1]"});
-  EXPECT_EQ(dfm_world_query_overlap(12345, &s, nullptr, 4, things, &n), DFM_E_HANDLE);
+  hits.out = nullptr;
+  EXPECT_EQ(ask(&s, d, 1), DFM_E_ARG);
+  test::says({"out is NULL", "capacity of 4"});
+  hits.size = 8;
+  EXPECT_EQ(ask(&s, d, 1), DFM_E_ARG);
+  EXPECT_EQ(hits.n, 77u) << "untouched";
+  EXPECT_EQ(dfm_world_query(y.world, &s, d, 1, nullptr, nullptr, nullptr), DFM_E_ARG);
+  EXPECT_EQ(dfm_world_query(12345, &s, d, 1, nullptr, nullptr, &hits), DFM_E_HANDLE);
 }

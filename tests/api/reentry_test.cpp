@@ -292,10 +292,11 @@ Calls world_calls(Scene &s, bool step_only) {
                    dfm_law_info info{};
                    return dfm_world_law_info(s.w, 0, &info);
                  }},
-                {"world_query_overlap",
+                {"world_query",
                  [&] {
                    const dfm_query_shape q = dfm_query_shape_default();
-                   return dfm_world_query_overlap(s.w, &q, nullptr, 0, nullptr, &n);
+                   dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 0, 0, nullptr};
+                   return dfm_world_query(s.w, &q, nullptr, 0, nullptr, nullptr, &hits);
                  }},
                 {"surface_vertices", [&] { return dfm_surface_vertices(s.body, nullptr, 0, nullptr, &n); }},
                 {"sensor_things", [&] { return dfm_sensor_things(s.body, 0, nullptr, &n); }},

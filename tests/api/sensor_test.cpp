@@ -2,6 +2,7 @@
 #include <fstream>
 
 #include "obstacle.h"
+#include "query.h"
 #include "rigid.h"
 #include "stack.h"
 #include "support.h"
@@ -188,20 +189,12 @@ TEST(Sensor, RigidBodiesObstaclesAndSoftSensors_AreSeenToo) {
   m.size = sizeof m;
   test::ok(dfm_body_get_measure(solid, &m));
   EXPECT_LT(m.kinetic, 1e-25) << "nothing pushes it";
-  dfm_query_shape s = dfm_query_shape_default();
-  s.pose.position[0] = 0.2;
-  uint32_t n = 9;
-  test::ok(dfm_world_query_overlap(w, &s, nullptr, 0, nullptr, &n));
-  EXPECT_EQ(n, 0u) << "queries pass sensors by";
+  const dfm_query_shape s = test::sphere({0.2, 0, 0}, 0);
+  EXPECT_TRUE(test::query(w, s).empty()) << "queries pass sensors by";
   dfm_query_filter f = dfm_query_filter_default();
   f.what |= DFM_QUERY_SENSORS;
-  uint64_t found = 0;
-  test::ok(dfm_world_query_overlap(w, &s, &f, 1, &found, &n));
-  EXPECT_EQ(found, g);
-  const double o[3] = {0.2, 0.2, 1}, down[3] = {0, 0, -1};
-  dfm_ray_hit hit{};
-  test::ok(dfm_world_ray(w, o, down, 10, &hit));
-  EXPECT_EQ(hit.obstacle, 0u);
+  EXPECT_EQ(test::nearest(w, s, nullptr, 0, &f).thing, g);
+  EXPECT_EQ(test::ray(w, {0.2, 0.2, 1}, {0, 0, -1}, 10).thing, 0u);
 }
 
 TEST(Sensor, AfterARestore_TheSameEventsAreReported) {

@@ -27,7 +27,7 @@ TEST(Structs, OfAnOlderCaller_KeepDefaultsForWhatTheyLack) {
   test::Context c;
   dfm_world_def wd;
   std::memset(&wd, 0xff, sizeof wd);  // what lies beyond the caller's struct is garbage
-  wd.size = offsetof(dfm_world_def, method);
+  wd.size = offsetof(dfm_world_def, reserved3);
   wd.flags = 0;
   wd.gravity[0] = wd.gravity[1] = 0;
   wd.gravity[2] = -1;
@@ -93,15 +93,11 @@ TEST(Structs, FilledForAnOlderCaller_AreNotOverrun) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   steps(s.world, 20);
-  const double up[3] = {0, 0, 1}, origin[3] = {0.05, 0.05, -1};
   never_overrun<dfm_world_stats>("stats", [&](auto *out) { return dfm_world_get_stats(s.world, out); });
   never_overrun<dfm_body_info>("info", [&](auto *out) { return dfm_body_get_info(s.lower, out); });
   never_overrun<dfm_body_measure>("measure", [&](auto *out) { return dfm_body_get_measure(s.lower, out); });
   never_overrun<dfm_obstacle_def>("obstacle def",
                                   [&](auto *out) { return dfm_obstacle_get_def(s.floor, out); });
-  never_overrun<dfm_ray_hit>("ray", [&](auto *out) { return dfm_world_ray(s.world, origin, up, 10, out); });
-  never_overrun<dfm_ray_hit>("closest",
-                             [&](auto *out) { return dfm_world_closest(s.world, origin, 10, out); });
 }
 
 // ---- wrong arguments --------------------------------------------------------------------------------------
@@ -169,22 +165,6 @@ TEST(Arguments, Wrong_AreRefusedInOneSentenceAndChangeNothing) {
        [&] { return dfm_world_filter_pair(s.world, "upper", "flor", false); },
        {"'flor'", "'floor'"}},
       {DFM_E_ARG, [&] { return dfm_world_filter_pair(s.world, nullptr, "floor", false); }, {"NULL"}},
-      {DFM_E_ARG, [&] { return dfm_world_ray(s.world, good3, good3, 0, nullptr); }, {"max_distance"}},
-      {DFM_E_ARG, [&] { return dfm_world_ray(s.world, bad3, good3, 1, nullptr); }, {"origin"}},
-      {DFM_E_ARG,
-       [&] {
-         dfm_ray_hit h{};
-         const double none[3] = {0, 0, 0};
-         return dfm_world_ray(s.world, good3, none, 1, &h);
-       },
-       {"direction"}},
-      {DFM_E_ARG, [&] { return dfm_world_closest(s.world, good3, 1, nullptr); }, {"out"}},
-      {DFM_E_ARG,
-       [&] {
-         dfm_ray_hit h{};
-         return dfm_world_closest(s.world, good3, nan, &h);
-       },
-       {"max_distance"}},
       {DFM_E_ARG, [&] { return dfm_world_get_stats(s.world, nullptr); }, {"NULL"}},
       {DFM_E_ARG, [&] { return dfm_world_hold(s.world, nullptr, nullptr); }, {"'creep'"}},
       {DFM_E_ARG,
@@ -403,11 +383,9 @@ TEST(Arguments, OfContextAndWorld_AreChecked) {
   wd.max_sweeps = 0;
   EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_ARG);
   wd = dfm_world_def_default();
-  for (const int32_t method : {7, -1, int32_t{DFM_METHOD_ROLLBACK}}) {
-    wd.method = method;
-    EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
-  }
-  says({"deform rollback"});
+  wd.reserved3 = 1;
+  EXPECT_EQ(dfm_world_create(good, &wd, &w), DFM_E_UNSUPPORTED);
+  says({"contact method", "integrator"});
   const char *const effects[] = {"magic", nullptr};
   wd = dfm_world_def_default();
   wd.effects = effects;

@@ -16,7 +16,7 @@
 #include "machine.h"
 #include "state/world.h"
 #include "world.h"
-#include "world/queries.h"
+#include "world/find.h"
 
 namespace {
 
@@ -70,6 +70,18 @@ void measure(const Sink &sink, const char *query, const char *what, uint32_t tri
            1e9 * best / kQueries, update_us);
 }
 
+// A ray, or (to zero) the closest point.
+void ask(dfm::World &w, Vec3 from, Vec3 to, dfm::SearchCount *count) {
+  dfm_query_hit hit;
+  dfm_query_hits hits{sizeof hits, sizeof hit, 1, 0, &hit};
+  dfm::ThingQuery q;
+  q.shape.position = from;
+  q.point = true;
+  q.way = {dfm::norm2(to) > 0, to};
+  q.count = count;
+  dfm::find(w, dfm::ThingFilter(nullptr), q, dfm::keep_nearest, &hits);
+}
+
 void body(const Sink &sink, const char *what, uint32_t cells, const dfm_surface_def *skin) {
   test::Context c;
   const dfm_world world = test::make_world(c);
@@ -79,20 +91,16 @@ void body(const Sink &sink, const char *what, uint32_t cells, const dfm_surface_
   const dfm_body b = test::make_body(c, world, "ball", {1, 0, 0}, cells, o);
   dfm_body_info info{};
   test::ok(dfm_body_get_info(b, &info));
-  dfm::cast_ray(w, {2, 0, 0}, {-1, 0, 0}, dfm::kFar);
+  ask(w, {2, 0, 0}, {-1, 0, 0}, nullptr);
   double update = HUGE_VAL;
   for (int round = 0; round < kRounds; ++round) {
     ++w.bodies[0]->x_version;
     const auto begin = std::chrono::steady_clock::now();
-    dfm::cast_ray(w, {2, 0, 0}, {-1, 0, 0}, dfm::kFar);
+    ask(w, {2, 0, 0}, {-1, 0, 0}, nullptr);
     update = std::min(update, 1e6 * seconds_since(begin));
   }
-  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) {
-    dfm::cast_ray(w, from, to, dfm::kFar, count);
-  };
-  const auto point = [&](Vec3 from, Vec3, dfm::SearchCount *count) {
-    dfm::closest_surface(w, from, dfm::kFar, count);
-  };
+  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) { ask(w, from, to, count); };
+  const auto point = [&](Vec3 from, Vec3, dfm::SearchCount *count) { ask(w, from, {}, count); };
   measure(sink, "ray", what, info.ntriangle, update, ray);
   measure(sink, "closest", what, info.ntriangle, update, point);
 }
@@ -110,9 +118,7 @@ void obstacle(const Sink &sink, int level) {
   d.triangles = ball.tri.data();
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(world, &d, &o));
-  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) {
-    dfm::cast_ray(w, from, to, dfm::kFar, count);
-  };
+  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) { ask(w, from, to, count); };
   measure(sink, "ray", "obstacle", ball.ntri(), 0, ray);
 }
 

@@ -6,6 +6,7 @@
 #include <thread>
 
 #include "core/handle.h"
+#include "query.h"
 #include "scenes.h"
 #include "step/context.h"
 
@@ -145,8 +146,6 @@ TEST_P(Determinism, QueriesAndSnapshots_ChangeNothing) {
     scenes::advance(w, 1);
     double dt = 0;
     size_t bytes = 0;
-    dfm_ray_hit hit{};
-    const double origin[3] = {0, 0, 1}, down[3] = {0, 0, -1};
     switch (i % 7) {
       case 0: test::ok(dfm_world_stable_step(w, &dt, nullptr, nullptr)); break;
       case 1: test::ok(dfm_world_explain(w, nullptr, &bytes)); break;
@@ -155,7 +154,7 @@ TEST_P(Determinism, QueriesAndSnapshots_ChangeNothing) {
         test::measure(bodies[0]);
         test::stats(w);
         break;
-      case 4: test::ok(dfm_world_ray(w, origin, down, 10, &hit)); break;
+      case 4: test::ray(w, {0, 0, 1}, {0, 0, -1}, 10); break;
       case 5: test::ok(dfm_world_events(w, 0, nullptr, &n)); break;
       default: test::ok(dfm_world_contacts(w, 0, nullptr, &n)); test::ok(dfm_world_pairs(w, 0, nullptr, &n));
     }

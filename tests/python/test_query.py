@@ -67,11 +67,16 @@ class Queries(Scenery):
             self.world.query_ray(*down, filter="bodies")
 
     def test_closest_overlap_and_cast(self):
+        shape = deform.Shape
+        hits = self.world.query(shape.point((0.01, 0.02, 2)), (0, 0, -2))
+        self.assertEqual([hit.owner for hit in hits], [self.high, self.low, self.floor])
+        self.assertEqual(hits[2].distance, 2)
+        self.assertEqual(self.world.query(shape.sphere(0.1, (1, 0, 0.6)), reach=5)[0].owner, self.stone)
+        self.assertEqual(self.world.query(shape.sphere(0.1, (1, 0, 0.6)), reach=5, most=0), [])
         near = self.world.query_closest((1, 0, 0.6))
         self.assertEqual(near.owner, self.stone)
         self.assertAlmostEqual(near.distance, 0.05)
         self.assertIsNone(self.world.query_closest((1, 0, 2), max_distance=0.5))
-        shape = deform.Shape
         for asking, found in ((shape.sphere(0.1, (0, 0, 0.2)), [self.low]),
                               (shape.box((0.01, 0.01, 0.3), (0, 0, 0.45)), [self.low, self.high]),
                               (shape.capsule(0.02, 0.3, (1, 0, 0.5)), [self.stone]),

@@ -98,6 +98,8 @@ DFM_RIGID_AGAIN, DFM_RIGID_MOST_AGAIN = 2, 4
 DFM_TOI_BISECTION, DFM_TOI_REGULA_FALSI, DFM_TOI_BRENT, DFM_TOI_CONSERVATIVE = 0, 1, 2, 3
 DFM_DRAW_CONTACTS, DFM_DRAW_FORCES, DFM_DRAW_BOXES = 1, 2, 4
 DFM_SHAPE_CONVEX = 7
+DFM_SHAPE_POINT = 8
+DFM_QUERY_EACH = 1
 DFM_QUERY_BODIES, DFM_QUERY_OBSTACLES, DFM_QUERY_RIGIDS, DFM_QUERY_SENSORS = 1, 2, 4, 8
 DFM_QUERY_INSIDE = 1
 DFM_CHOICE_TOUCHED = 1
@@ -276,7 +278,7 @@ class dfm_sine(_Structure):
 
 
 class dfm_world_def(_Structure):
-    _fields_ = [("size", u32), ("flags", u32), ("gravity", f64 * 3), ("method", i32),
+    _fields_ = [("size", u32), ("flags", u32), ("gravity", f64 * 3), ("reserved3", i32),
                 ("integrator", i32), ("contact_offset", f64), ("contact_tolerance", f64),
                 ("max_sweeps", u32), ("max_passes", u32), ("max_substeps", u32), ("sleep", u32),
                 ("effects", ptr), ("sleep_speed", f64), ("sleep_time", f64), ("self_contact", u32),
@@ -415,11 +417,6 @@ class dfm_vertex_layout(_Structure):
                 ("cookie", u64)]
 
 
-class dfm_ray_hit(_Structure):
-    _fields_ = [("size", u32), ("triangle", u32), ("body", u64), ("obstacle", u64), ("distance", f64),
-                ("point", f64 * 3), ("normal", f64 * 3)]
-
-
 class dfm_tetmesh_info(_Structure):
     _fields_ = [("size", u32), ("npoint", u32), ("ntet", u32), ("ntriangle", u32), ("nedge", u32),
                 ("npiece", u32), ("turned", u32), ("dropped_points", u32), ("dropped_cells", u32),
@@ -535,18 +532,22 @@ class dfm_toi_options(_Structure):
 
 class dfm_query_shape(_Structure):
     _fields_ = [("size", u32), ("shape", u32), ("pose", dfm_pose), ("half_size", f64 * 3),
-                ("radius", f64), ("half_length", f64), ("npoint", u32), ("reserved", u32),
-                ("points", ptr), ("cookie", u64)]
+                ("radius", f64), ("half_length", f64), ("npoint", u32), ("flags", u32), ("points", ptr),
+                ("cookie", u64)]
 
 
 class dfm_query_filter(_Structure):
     _fields_ = [("size", u32), ("what", u32), ("category", u32), ("collides_with", u32), ("accept", ptr),
-                ("user", ptr), ("cookie", u64)]
+                ("user", ptr), ("cookie", u64), ("only", u64)]
 
 
 class dfm_query_hit(_Structure):
     _fields_ = [("size", u32), ("flags", u32), ("thing", u64), ("triangle", u32), ("reserved", u32),
                 ("distance", f64), ("point", f64 * 3), ("normal", f64 * 3)]
+
+
+class dfm_query_hits(_Structure):
+    _fields_ = [("size", u32), ("row_size", u32), ("capacity", u32), ("n", u32), ("out", ptr)]
 
 
 class dfm_contact_choice(_Structure):

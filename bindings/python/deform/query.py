@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _abi
 from ._context import choice
-from ._library import ArgumentError, check, default, lib, quick, sized
+from ._library import ArgumentError, check, default, lib, quick
 from ._values import pose_of, real, vector, whole
 from .body import EVERYTHING, Body, Obstacle
 from .mesh import points_of
@@ -27,7 +27,7 @@ _NoteFn = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p)
 
 
 class Shape:
-    """A convex shape that a query asks with. Made by Shape.sphere, .box, .capsule and .hull.
+    """A convex shape that a query asks with. Made by Shape.point, .sphere, .box, .capsule and .hull.
 
     position: [3] m; rotation: [4], a quaternion x, y, z, w. Sizes may be zero: a sphere of radius 0 is a
     point.
@@ -38,6 +38,11 @@ class Shape:
         self.struct.shape = kind
         self.struct.pose = pose_of(position, rotation)
         self._points: np.ndarray | None = None
+
+    @classmethod
+    def point(cls, position: Any = (0, 0, 0)) -> Shape:
+        """To which surfaces alone count, and not what encloses it: a ray, or the closest point."""
+        return cls(_abi.DFM_SHAPE_POINT, position, (0, 0, 0, 1))
 
     @classmethod
     def sphere(cls, radius: float = 0, position: Any = (0, 0, 0)) -> Shape:
@@ -262,78 +267,70 @@ class Queries:
 
     # ---- queries ---------------------------------------------------------------------------------------
 
-    def _hit(self, out: Any) -> Hit | None:
-        if not out.thing:
-            return None
+    def _hit(self, out: Any) -> Hit:
         triangle = None if out.triangle == 0xFFFFFFFF else int(out.triangle)
         return Hit(self.owner(out.thing), triangle, out.distance, np.array(out.point), np.array(out.normal),
                    bool(out.flags & _abi.DFM_QUERY_INSIDE))
+
+    def query(self, shape: Shape, path: Any = None, reach: float = 0, filter: Filter | None = None, *,
+              each: bool = False, most: int | None = None) -> list[Hit]:
+        """What a shape meets, nearest first (dfm_world_query): on a path [3] m, which it follows without
+        turning up to reach m, 0: its length; without a path what is within reach m, 0: what it overlaps.
+        A Shape.point meets surfaces alone: on a path it is a ray. each: all triangles of a thing, and where
+        a ray leaves it, in place of its nearest hit. most: so many hits at most."""
+        self.free()
+        asked, capacity = _Asked(self, filter), 16 if most is None else most
+        if not isinstance(shape, Shape):
+            raise TypeError(f"a query asks with a deform.Shape, not {shape!r}")
+        struct = _abi.dfm_query_shape.from_buffer_copy(shape.struct)
+        struct.flags = _abi.DFM_QUERY_EACH if each else 0
+        at, along = ctypes.byref(struct), None if path is None else vector(path, "path")
+        while True:
+            out = (_abi.dfm_query_hit * capacity)()
+            hits = _abi.dfm_query_hits(ctypes.sizeof(_abi.dfm_query_hits), ctypes.sizeof(_abi.dfm_query_hit),
+                                       capacity, 0, ctypes.addressof(out))
+            asked.done(quick.dfm_world_query(self.handle, at, along, real(reach, "reach"), asked.at, None,
+                                             ctypes.byref(hits)))
+            if most is not None or hits.n < capacity:
+                return [self._hit(hit) for hit in out[:hits.n]]
+            capacity *= 4
+
+    def _first(self, *arguments: Any) -> Hit | None:
+        return next(iter(self.query(*arguments, most=1)), None)
 
     def query_ray(self, origin: Any, direction: Any, max_distance: float = np.inf,
                   filter: Filter | None = None) -> Hit | None:
         """The first surface that a ray meets. origin: [3] m; direction: [3], of any length; max_distance: m.
         None: nothing is met."""
-        asked, out = self._ask(filter), sized(_abi.dfm_query_hit)
-        asked.done(quick.dfm_world_query_ray(self.handle, vector(origin, "origin"),
-                                             vector(direction, "direction"),
-                                             real(max_distance, "max_distance"), asked.at,
-                                             ctypes.byref(out)))
-        return self._hit(out)
+        return self._first(Shape.point(vector(origin, "origin")), vector(direction, "direction"),
+                           _reach(max_distance), filter)
 
     def query_ray_all(self, origin: Any, direction: Any, max_distance: float = np.inf,
                       filter: Filter | None = None) -> list[Hit]:
         """All surfaces that a ray enters or leaves, nearest first. A ray through an edge meets the triangles
         on both sides."""
-        asked, n, capacity = self._ask(filter), ctypes.c_uint32(), 16
-        while True:
-            out = (_abi.dfm_query_hit * capacity)()
-            asked.done(quick.dfm_world_query_ray_all_sized(
-                self.handle, vector(origin, "origin"), vector(direction, "direction"),
-                real(max_distance, "max_distance"), asked.at,
-                ctypes.sizeof(_abi.dfm_query_hit), capacity, ctypes.byref(out), ctypes.byref(n)))
-            if n.value <= capacity:
-                return [hit for hit in map(self._hit, out[:n.value]) if hit is not None]
-            capacity = n.value
+        return self.query(Shape.point(vector(origin, "origin")), vector(direction, "direction"),
+                          _reach(max_distance), filter, each=True)
 
     def query_closest(self, point: Any, max_distance: float = np.inf,
                       filter: Filter | None = None) -> Hit | None:
         """The closest point of all surfaces within max_distance m of a point [3] m, or None."""
-        asked, out = self._ask(filter), sized(_abi.dfm_query_hit)
-        asked.done(quick.dfm_world_query_closest(self.handle, vector(point, "point"),
-                                                 real(max_distance, "max_distance"), asked.at,
-                                                 ctypes.byref(out)))
-        return self._hit(out)
+        return self._first(Shape.point(vector(point, "point")), None, _reach(max_distance), filter)
 
     def query_overlap(self, shape: Shape, filter: Filter | None = None) -> list[Body | Obstacle]:
         """Things that a shape touches or holds, or that hold it: bodies, then obstacles and rigid bodies,
         each in order of creation."""
-        return self._overlap(quick.dfm_world_query_overlap, _shape(shape), filter)
+        return [hit.owner for hit in self.query(shape, None, 0, filter)]
 
     def query_aabb(self, low: Any, high: Any, filter: Filter | None = None) -> list[Body | Obstacle]:
         """The same of the axis-parallel box from low [3] m to high [3] m."""
-        box = _abi.dfm_aabb(vector(low, "low"), vector(high, "high"))
-        return self._overlap(quick.dfm_world_query_aabb, ctypes.byref(box), filter)
-
-    def _overlap(self, function: Any, at: Any, filter: Filter | None) -> list[Body | Obstacle]:
-        asked, n, capacity = self._ask(filter), ctypes.c_uint32(), 64
-        while True:
-            out = (ctypes.c_uint64 * capacity)()
-            asked.done(function(self.handle, at, asked.at, capacity, ctypes.byref(out), ctypes.byref(n)))
-            if n.value <= capacity:
-                return [self.owner(handle) for handle in out[:n.value]]
-            capacity = n.value
+        low, high = np.array(vector(low, "low")), np.array(vector(high, "high"))
+        return self.query_overlap(Shape.box((high - low) / 2, (low + high) / 2), filter)
 
     def query_cast(self, shape: Shape, path: Any, filter: Filter | None = None) -> Hit | None:
         """The first thing that a shape meets while it moves along a straight path [3] m without turning;
         None: the path is free. A shape that overlaps a thing at the start hits it at distance 0, `inside`."""
-        asked, out = self._ask(filter), sized(_abi.dfm_query_hit)
-        asked.done(quick.dfm_world_query_cast(self.handle, _shape(shape), vector(path, "path"), asked.at,
-                                              ctypes.byref(out)))
-        return self._hit(out)
-
-    def _ask(self, given: Filter | None) -> _Asked:
-        self.free()
-        return _Asked(self, given)
+        return self._first(shape, vector(path, "path"), 0, filter)
 
     # ---- functions that decide about contacts ----------------------------------------------------------
 
@@ -444,19 +441,14 @@ def write_scene(function: Any, handle: int, path: str | os.PathLike[str], durati
     return sentences
 
 
-def _shape(shape: Shape) -> Any:
-    if not isinstance(shape, Shape):
-        raise TypeError(f"a query asks with a deform.Shape, not {shape!r}")
-    return ctypes.byref(shape.struct)
+def _reach(max_distance: float) -> float:
+    """0 is no distance here, and not the length of the path."""
+    return real(max_distance, "max_distance") or -1
 
 
 def query_triangles(body: Body, shape: Shape) -> np.ndarray:
     """Body.query_triangles."""
-    n, capacity = ctypes.c_uint32(), 64
-    while True:
-        out = np.empty(capacity, dtype=np.uint32)
-        check(quick.dfm_body_query_triangles(body.handle, _shape(shape), capacity, out.ctypes.data,
-                                             ctypes.byref(n)))
-        if n.value <= capacity:
-            return out[:n.value].copy()
-        capacity = n.value
+    alone = Filter()
+    alone.struct.only = body.handle
+    hits = body.world.query(shape, None, 0, alone, each=True)
+    return np.array([hit.triangle for hit in hits if hit.triangle is not None], dtype=np.uint32)

@@ -28,7 +28,6 @@ from .report import Reports
 from .tool import Tools
 
 _LOG = logging.getLogger("deform")
-METHODS = {"auto": 0, "velocity": 1, "implicit": 2}  # for one version: the integrator decides
 INTEGRATORS = {"auto": 0, "symplectic_euler": 1, "implicit_euler": 2, "tr_bdf2": 3}
 SELF_CONTACT = {"off": 0, "on": 1, "auto": 2}
 COUPLINGS = {"barycentric": 0, "mls": 1}
@@ -121,7 +120,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                 "World.write_scene a file")
 
     def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
-                 method: str = "auto", step: float = 0, sleep: bool = False, self_contact: str = "off",
+                 step: float = 0, sleep: bool = False, self_contact: str = "off",
                  effects: Iterable[str] | None = None, contact_offset: float = 0, max_substeps: int = 10000,
                  max_sweeps: int = 50, max_time: float = 0, untangle: bool = False, solver: str | None = None,
                  energy_watch: float = 0.01, recovery_speed: float = 0, obstacle_speed: float = 0,
@@ -132,7 +131,6 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition = default(_abi.dfm_world_def)
         definition.gravity = vector(gravity, "gravity")
         definition.integrator = word("integrator", integrator, INTEGRATORS)
-        definition.method = word("method", method, METHODS)
         definition.step, definition.sleep = real(step, "step"), int(sleep)
         definition.self_contact = word("self_contact", self_contact, SELF_CONTACT)
         words = None if effects is None else strings(effects)
@@ -699,14 +697,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
             max_distance: float = np.inf) -> dict[str, Any] | None:
         """The first surface that a ray meets: owner, triangle, distance m, point [3] m, normal [3]; or
         None."""
-        self.free()
-        out = sized(_abi.dfm_ray_hit)
-        check(quick.dfm_world_ray(self.handle, vector(origin, "origin"), vector(direction, "direction"),
-                                  real(max_distance, "max_distance"), ctypes.byref(out)))
-        if not (out.body or out.obstacle):
-            return None
-        return {"owner": self.owner(out.body or out.obstacle), "triangle": out.triangle,
-                "distance": out.distance, "point": np.array(out.point), "normal": np.array(out.normal)}
+        hit = self.query_ray(origin, direction, max_distance)
+        words = ("owner", "triangle", "distance", "point", "normal")
+        return None if hit is None else {key: getattr(hit, key) for key in words}
 
     def snapshot(self) -> bytes:
         """All that a later result depends on; restore() takes it, in another process too."""

@@ -2,9 +2,13 @@
 // Included by deform.hpp.
 #ifndef DEFORM_QUERIES_HPP
 #define DEFORM_QUERIES_HPP
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include "deform/deform.h"
@@ -27,69 +31,39 @@ namespace basic {
 template <class E, class Self>
 class WorldQueries {
  public:
-  auto ray(In3 origin, In3 direction, double max_distance) const {
-    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
-      h.size = sizeof h;
-      return dfm_world_ray(world(), origin.data(), direction.data(), max_distance, &h);
-    });
+  // found(const dfm_query_hit &) returns how far to go on, as a dfm_query_hit_fn.
+  template <class F>
+    requires std::invocable<F &, const dfm_query_hit &>
+  auto query(const dfm_query_shape &shape, std::optional<In3> path, double reach,
+             const dfm_query_filter *filter, F &&found) const {
+    const auto hit = [](void *user, const dfm_query_hit *h) -> double {
+      return (*static_cast<std::remove_reference_t<F> *>(user))(*h);
+    };
+    return E::done(dfm_world_query(world(), &shape, path ? path->data() : nullptr, reach, filter, hit,
+                                   std::addressof(found)));
   }
-  auto closest(In3 point, double max_distance) const {
-    return produce<E, dfm_ray_hit>([&](dfm_ray_hit &h) {
-      h.size = sizeof h;
-      return dfm_world_closest(world(), point.data(), max_distance, &h);
-    });
+  // The nearest hits, nearest first: into the caller's memory, returning their number; or all as a vector.
+  auto query(const dfm_query_shape &shape, std::optional<In3> path, double reach,
+             std::span<dfm_query_hit> out, const dfm_query_filter *filter = nullptr) const {
+    return produce<E, uint32_t>([&](uint32_t &n) { return hits(shape, path, reach, filter, out, n); });
   }
-  // filter nullptr: all but sensors.
-  auto query_ray(In3 origin, In3 direction, double max_distance,
-                 const dfm_query_filter *filter = nullptr) const {
-    return hit([&](dfm_query_hit &h) {
-      return dfm_world_query_ray(world(), origin.data(), direction.data(), max_distance, filter, &h);
-    });
-  }
-  auto query_closest(In3 point, double max_distance, const dfm_query_filter *filter = nullptr) const {
-    return hit([&](dfm_query_hit &h) {
-      return dfm_world_query_closest(world(), point.data(), max_distance, filter, &h);
-    });
-  }
-  auto query_cast(const dfm_query_shape &shape, In3 path, const dfm_query_filter *filter = nullptr) const {
-    return hit(
-        [&](dfm_query_hit &h) { return dfm_world_query_cast(world(), &shape, path.data(), filter, &h); });
-  }
-  // Into the caller's memory, the nearest ones, returning how many there are in all; or as a vector.
-  auto query_ray_all(In3 origin, In3 direction, double max_distance, std::span<dfm_query_hit> out,
-                     const dfm_query_filter *filter = nullptr) const {
-    return produce<E, uint32_t>([&](uint32_t &n) {
-      return dfm_world_query_ray_all(world(), origin.data(), direction.data(), max_distance, filter,
-                                     rows(out.size(), 1), out.data(), &n);
-    });
-  }
-  auto query_ray_all(In3 origin, In3 direction, double max_distance,
-                     const dfm_query_filter *filter = nullptr) const {
+  auto query(const dfm_query_shape &shape, std::optional<In3> path = {}, double reach = 0,
+             const dfm_query_filter *filter = nullptr) const {
     return produce<E, std::vector<dfm_query_hit>>([&](std::vector<dfm_query_hit> &out) {
-      return whole(out, [&](uint32_t capacity, dfm_query_hit *to, uint32_t *n) {
-        return dfm_world_query_ray_all(world(), origin.data(), direction.data(), max_distance, filter,
-                                       capacity, to, n);
-      });
+      uint32_t n = 0;
+      const dfm_status s = hits(shape, path, reach, filter, {}, n);
+      if (s < 0 || n == 0) return s;
+      out.resize(n);
+      return hits(shape, path, reach, filter, out, n);
     });
   }
-  auto query_overlap(const dfm_query_shape &shape, std::span<uint64_t> out,
-                     const dfm_query_filter *filter = nullptr) const {
-    return produce<E, uint32_t>([&](uint32_t &n) {
-      return dfm_world_query_overlap(world(), &shape, filter, rows(out.size(), 1), out.data(), &n);
-    });
-  }
-  auto query_overlap(const dfm_query_shape &shape, const dfm_query_filter *filter = nullptr) const {
-    return produce<E, std::vector<uint64_t>>([&](std::vector<uint64_t> &out) {
-      return whole(out, [&](uint32_t capacity, uint64_t *to, uint32_t *n) {
-        return dfm_world_query_overlap(world(), &shape, filter, capacity, to, n);
-      });
-    });
-  }
-  auto query_aabb(const dfm_aabb &box, const dfm_query_filter *filter = nullptr) const {
-    return produce<E, std::vector<uint64_t>>([&](std::vector<uint64_t> &out) {
-      return whole(out, [&](uint32_t capacity, uint64_t *to, uint32_t *n) {
-        return dfm_world_query_aabb(world(), &box, filter, capacity, to, n);
-      });
+  // The nearest hit; its thing is 0 where there is none.
+  auto query_first(const dfm_query_shape &shape, std::optional<In3> path = {}, double reach = 0,
+                   const dfm_query_filter *filter = nullptr) const {
+    return produce<E, dfm_query_hit>([&](dfm_query_hit &out) {
+      uint32_t n = 0;
+      out = {};
+      return hits(shape, path, reach, filter, {&out, 1}, n);
     });
   }
 
@@ -104,21 +78,13 @@ class WorldQueries {
 
  private:
   dfm_world world() const noexcept { return static_cast<const Self *>(this)->get(); }
-  template <class F>
-  static auto hit(F &&f) {
-    return produce<E, dfm_query_hit>([&](dfm_query_hit &h) {
-      h.size = sizeof h;
-      return f(h);
-    });
-  }
-  // Asked for the number first.
-  template <class T, class F>
-  static dfm_status whole(std::vector<T> &out, F &&f) {
-    uint32_t n = 0;
-    const dfm_status s = f(0, nullptr, &n);
-    if (s < 0 || n == 0) return s;
-    out.resize(n);
-    return f(n, out.data(), &n);
+  dfm_status hits(const dfm_query_shape &shape, std::optional<In3> path, double reach,
+                  const dfm_query_filter *filter, std::span<dfm_query_hit> out, uint32_t &n) const noexcept {
+    dfm_query_hits to{sizeof to, sizeof(dfm_query_hit), rows(out.size(), 1), 0, out.data()};
+    const dfm_status s =
+        dfm_world_query(world(), &shape, path ? path->data() : nullptr, reach, filter, nullptr, &to);
+    n = to.n;
+    return s;
   }
 };
 
@@ -152,12 +118,6 @@ class BodyQueries : public SensorQueries<E, Self> {
   auto surface_vertices(const dfm_vertex_layout &layout, std::span<std::byte> out) const {
     return produce<E, uint32_t>(
         [&](uint32_t &n) { return dfm_surface_vertices(body(), &layout, out.size(), out.data(), &n); });
-  }
-  // Into the caller's memory, the lowest numbers, returning how many there are in all.
-  auto query_triangles(const dfm_query_shape &shape, std::span<uint32_t> out) const {
-    return produce<E, uint32_t>([&](uint32_t &n) {
-      return dfm_body_query_triangles(body(), &shape, rows(out.size(), 1), out.data(), &n);
-    });
   }
 
  private:

@@ -1,10 +1,11 @@
-/* deform/query.h -- queries on the present positions: what overlaps a shape, what a moving shape hits first,
- * all hits of a ray, the closest point; each with a filter. doc/concepts/queries.md.
+/* deform/query.h -- one query of the present positions: what a shape, a ray or a point meets on a path,
+ * within a distance or where it is. doc/concepts/queries.md.
  *
  * Queries use the surfaces themselves, without the rest distance of contacts: triangles of bodies, meshes and
  * voxels, closed formulas for the other shapes. Results do not depend on the number of threads or on earlier
- * queries. Any number of threads may query while no step runs. The first query of a body after its points
- * have moved updates its tree (dfm_world_ray); later ones allocate nothing. */
+ * queries. Any number of threads may query while no step runs. Triangles are searched through trees of boxes
+ * (about 150 bytes a triangle), which are built when they are first needed. The first query of a body after
+ * its points have moved updates its tree; later ones allocate nothing. */
 #ifndef DEFORM_QUERY_H
 #define DEFORM_QUERY_H
 #include "deform/base.h"
@@ -15,20 +16,26 @@
 extern "C" {
 #endif
 
-/** The convex hull of points, for dfm_query_shape. Since 0.1. */
+/** For dfm_query_shape: the convex hull of points. Since 0.1. */
 #define DFM_SHAPE_CONVEX 7u
+/** For dfm_query_shape: a point to which only surfaces count, seen from both sides, and not what encloses it.
+ * On a path it is a ray. Since 0.1. */
+#define DFM_SHAPE_POINT 8u
 
+/** dfm_query_shape.flags. EACH: all hits of a thing, in place of its nearest: one for each triangle, and of
+ * other shapes where a ray enters and where it leaves. */
+enum { DFM_QUERY_EACH = 1 };
 /** A convex shape for a query. The radius of a box or a hull rounds it: the shape extends by the radius
  * beyond the box or the points. Sizes may be zero: a sphere of radius 0 is a point. */
 typedef struct dfm_query_shape {
-  uint32_t size, shape; /* DFM_SHAPE_SPHERE, BOX, CAPSULE or CONVEX */
-  dfm_pose pose;        /* world */
-  double half_size[3];  /* box, m */
-  double radius;        /* m; sphere, capsule; box and hull: 0 if not rounded */
-  double half_length;   /* capsule: half of the axis between the centers of its caps, along local z, m */
-  uint32_t npoint, reserved;
-  const double *points; /* CONVEX: [npoint,3] m, in the shape's frame; borrowed during the call */
-  uint64_t cookie;      /* set by the default function */
+  uint32_t size, shape;   /* DFM_SHAPE_SPHERE, BOX, CAPSULE, CONVEX or POINT */
+  dfm_pose pose;          /* world */
+  double half_size[3];    /* box, m */
+  double radius;          /* m; sphere, capsule; box and hull: 0 if not rounded */
+  double half_length;     /* capsule: half of the axis between the centers of its caps, along local z, m */
+  uint32_t npoint, flags; /* sum of DFM_QUERY_EACH */
+  const double *points;   /* CONVEX: [npoint,3] m, in the shape's frame; borrowed during the call */
+  uint64_t cookie;        /* set by the default function */
 } dfm_query_shape;
 /** dfm_query_shape_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_query_shape_default_sized(uint32_t size, dfm_query_shape *out);
@@ -53,6 +60,7 @@ typedef struct dfm_query_filter {
   bool (*accept)(void *user, uint64_t thing);
   void *user;      /* first argument of accept */
   uint64_t cookie; /* set by the default function */
+  uint64_t only;   /* the one thing to ask, whatever its kind and masks; 0: all that pass */
 } dfm_query_filter;
 /** dfm_query_filter_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_query_filter_default_sized(uint32_t size, dfm_query_filter *out);
@@ -64,84 +72,53 @@ static inline dfm_query_filter dfm_query_filter_default(void) {
   return out;
 }
 
-/** dfm_query_hit.flags. INSIDE: for a cast, the shape overlaps the thing at the start. */
+/** dfm_query_hit.flags. INSIDE: the shape overlaps the thing where it is, or at the start of its path. */
 enum { DFM_QUERY_INSIDE = 1 };
 typedef struct dfm_query_hit {
   uint32_t size, flags;
-  uint64_t thing;              /* dfm_body, dfm_obstacle or dfm_rigid; 0: no hit */
-  uint32_t triangle, reserved; /* of the surface; UINT32_MAX for shapes in closed form */
-  double distance;             /* m, along the ray or the path, or to the closest point; INFINITY: no hit */
+  uint64_t thing;              /* dfm_body, dfm_obstacle or dfm_rigid */
+  uint32_t triangle, reserved; /* of the surface, as in dfm_surface_triangles; UINT32_MAX: none */
+  double distance;             /* m, along the path, or between shape and thing */
   double point[3];             /* m, world; on the thing */
-  double normal[3];            /* unit; outward from the surface; for a cast, from the thing to the shape */
+  double normal[3];            /* unit; POINT: outward from the surface; else from the thing to the shape */
 } dfm_query_hit;
+/** Gets one hit; valid during the call. It may query, but may not change the world (DFM_E_BUSY).
+ * @return how far the query is to go on, m: INFINITY as far as before, hit->distance for hits no farther
+ * than this one, -1 to end it */
+typedef double (*dfm_query_hit_fn)(void *user, const dfm_query_hit *hit);
 
-/** First surface that a ray hits. As dfm_world_ray, with a filter.
+/** The nearest hits, nearest first; at equal distance bodies, then obstacles and rigid bodies, each in order
+ * of creation, then the lower triangle. */
+typedef struct dfm_query_hits {
+  uint32_t size, row_size; /* sizeof(dfm_query_hits), sizeof(dfm_query_hit) */
+  uint32_t capacity, n;    /* of out; out, how many there are, `capacity` at most. Capacity 0: n counts all */
+  dfm_query_hit *out;
+} dfm_query_hits;
+
+/** What a shape meets.
+ * - On a path, which it follows without rotation: what it hits, and at which distance along the path. There
+ *   it is at most 1e-9 of the largest length involved (path, shape, thing) away from touching, and it has not
+ *   passed through anything before. What it overlaps at the start it hits at distance 0, with the flag
+ *   INSIDE, its own position as point and a normal opposite to the path. A path of length 0 finds overlaps
+ *   only.
+ * - Without a path: what is within `reach`; with reach 0 what it overlaps. A thing that it overlaps has
+ *   distance 0, the flag INSIDE, the shape's position as point and no normal, and a triangle only with EACH.
+ * It overlaps a thing if it touches its surface or lies inside: in the space that a closed surface encloses,
+ * or in the half-space below a plane. An open surface encloses nothing; of a surface that faces inward (a
+ * room) only the triangles count. Of a POINT on a path, a ray, the hits are those of the surfaces; from
+ * inside, where it leaves a thing; through an edge, the lower triangle or with EACH both.
+ * @param path    [3] m, of any length if reach is given; NULL: none
+ * @param reach   m, largest distance, INFINITY for any; 0: the whole path; without a path, overlaps
  * @param filter  NULL: all but sensors
- * @param hit     out; thing 0: no hit
+ * @param hit     called on this thread, for things in their order (as of dfm_query_hits), each with its
+ *                nearest hit (with EACH: in no order), the lowest triangle of several. NULL: user is a
+ *                dfm_query_hits, which gets the nearest ones
+ * @param user    first argument of hit
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM no memory for a tree; DFM_E_HANDLE; DFM_E_BUSY. Threads: Any thread.
  * Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_query_ray(dfm_world world, const double origin[3], const double direction[3],
-                                       double max_distance, const dfm_query_filter *filter,
-                                       dfm_query_hit *hit);
-/** dfm_world_query_ray_all with rows of any size that is at least the first one. @param row_size bytes from
- * one row of out to the next (base.h). Since 0.1.
- * Threads: Any thread. Not during step. */
-DFM_API dfm_status dfm_world_query_ray_all_sized(dfm_world world, const double origin[3],
-                                                 const double direction[3], double max_distance,
-                                                 const dfm_query_filter *filter, uint32_t row_size,
-                                                 uint32_t capacity, dfm_query_hit *out, uint32_t *n);
-/** All surfaces that a ray hits, where it enters things and where it leaves them, nearest first; at equal
- * distance bodies before obstacles, each in order of creation, then the lower triangle. A ray through an edge
- * hits the triangles on both sides.
- * @param capacity  of out in hits; if there are more hits, out gets the nearest ones
- * @param n         out, number of all hits; out has min(n, capacity) of them. May be NULL
- * @return as dfm_world_query_ray. Threads: Any thread. Not during step. Since 0.1. */
-static inline dfm_status dfm_world_query_ray_all(dfm_world world, const double origin[3],
-                                                 const double direction[3], double max_distance,
-                                                 const dfm_query_filter *filter, uint32_t capacity,
-                                                 dfm_query_hit *out, uint32_t *n) {
-  return dfm_world_query_ray_all_sized(world, origin, direction, max_distance, filter,
-                                       (uint32_t)sizeof(dfm_query_hit), capacity, out, n);
-}
-
-/** Closest point of all surfaces within max_distance of a point, which may lie inside of things.
- * @param hit  out; normal: of the surface there, outward
- * @return as dfm_world_query_ray. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_query_closest(dfm_world world, const double point[3], double max_distance,
-                                           const dfm_query_filter *filter, dfm_query_hit *hit);
-
-/** Things that a shape overlaps: it touches their surface, or lies inside them. Inside is the space that a
- * closed surface encloses, and the half-space below a plane; an open surface encloses nothing. Of a surface
- * that faces inward (a room) only the triangles count.
- * @param capacity  of things; if there are more, it gets the first ones
- * @param things    out, handles: bodies, then obstacles and rigid bodies, each in order of creation
- * @param n         out, number of all; may be NULL
- * @return as dfm_world_query_ray. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_query_overlap(dfm_world world, const dfm_query_shape *shape,
-                                           const dfm_query_filter *filter, uint32_t capacity,
-                                           uint64_t *things, uint32_t *n);
-/** The same for an axis-aligned box. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box, const dfm_query_filter *filter,
-                                        uint32_t capacity, uint64_t *things, uint32_t *n);
-/** Surface triangles of a body that a shape touches or contains, ascending.
- * @param capacity   of triangles; if there are more, it gets the lowest numbers
- * @param triangles  out, numbers as in dfm_surface_triangles
- * @param n          out, number of all; may be NULL
- * @return as dfm_world_query_ray. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape, uint32_t capacity,
-                                            uint32_t *triangles, uint32_t *n);
-
-/** First thing that a shape hits while it moves along a straight path without rotation. hit->distance is the
- * length along the path. There the shape is at most 1e-9 of the largest length involved (path, shape, thing)
- * away from touching, and it has not passed through anything before. A shape that overlaps a thing at the
- * start hits it at distance 0, with flag DFM_QUERY_INSIDE, the shape's position as point and a normal
- * opposite to the path; use a filter to leave such things out. At equal distance the first thing, then the
- * lower triangle.
- * @param path  m; its length is the largest distance. A path of length 0 finds overlaps only
- * @param hit   out; thing 0: the path is free
- * @return as dfm_world_query_ray. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_query_cast(dfm_world world, const dfm_query_shape *shape, const double path[3],
-                                        const dfm_query_filter *filter, dfm_query_hit *hit);
+DFM_API dfm_status dfm_world_query(dfm_world world, const dfm_query_shape *shape, const double path[3],
+                                   double reach, const dfm_query_filter *filter, dfm_query_hit_fn hit,
+                                   void *user);
 #ifdef __cplusplus
 }
 #endif

@@ -8,7 +8,7 @@
 extern "C" {
 #endif
 /** Makes a body a sensor, or (false) an ordinary body again. A sensor has no contacts except with itself. At
- * the end of each step the library determines which things overlap the sensor (as dfm_world_query_overlap
+ * the end of each step the library determines which things overlap the sensor (as dfm_world_query
  * defines it), among those that its masks and rules would let it touch, other sensors excepted.
  * dfm_world_events reports changes since the last step as DFM_EVENT_SENSOR_BEGIN and DFM_EVENT_SENSOR_END
  * (a: the sensor, b: the other thing, key 0, t: the end of the step). An overlap that ends because one of the

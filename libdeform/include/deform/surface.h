@@ -62,7 +62,7 @@ static inline dfm_vertex_layout dfm_vertex_layout_default(void) {
 /** Writes one vertex per surfel for drawing; each value is the nearest float to that of the functions above.
  * The triangles of dfm_surface_triangles are the index buffer. Memory is only written, in ascending order
  * except for `stick`, so it may be a mapped vertex buffer. If the surface is the boundary of the cells, the
- * call allocates nothing; otherwise the first call builds the tree that dfm_world_ray uses.
+ * call allocates nothing; otherwise the first call builds the tree of queries.
  * @param layout  NULL: dfm_vertex_layout_default()
  * @param bytes   size of out; 0 with out NULL only counts
  * @param out     aligned to 4
@@ -72,32 +72,6 @@ static inline dfm_vertex_layout dfm_vertex_layout_default(void) {
  * step. Since 0.1. */
 DFM_API dfm_status dfm_surface_vertices(dfm_body body, const dfm_vertex_layout *layout, size_t bytes,
                                         void *out, uint32_t *n);
-
-typedef struct dfm_ray_hit {
-  uint32_t size, triangle;
-  dfm_body body;
-  dfm_obstacle obstacle;
-  double distance, point[3], normal[3];
-} dfm_ray_hit;
-/** First surface that a ray hits; at equal distance a body before an obstacle, then the lower number. The
- * search uses a tree of boxes for each body and each obstacle that is a mesh or voxels: about 100 boxes for
- * 100,000 triangles. A tree is built when it is first needed (about 150 bytes a triangle). The tree of a body
- * is updated by the first query after its points have moved, which takes about as long as reading its
- * surface. Later queries allocate nothing. Several threads may call it at once.
- * @param origin        m
- * @param direction     need not be unit; distance is in meters
- * @param max_distance  m, above 0; INFINITY for any
- * @param hit           out; hit->body and hit->obstacle are both 0: no hit. For a ray that starts inside a
- *                      shape: where it leaves the shape
- * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM no memory for a tree; DFM_E_HANDLE. Threads: Any thread. Not during
- * step. Since 0.1. */
-DFM_API dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
-                                 double max_distance, dfm_ray_hit *hit);
-/** Closest point on the surface of any body within max_distance, with the trees of dfm_world_ray. Same
- * result struct.
- * @return as dfm_world_ray. Threads: Any thread. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance,
-                                     dfm_ray_hit *hit);
 #ifdef __cplusplus
 }
 #endif

@@ -30,7 +30,7 @@ enum { DFM_SELF_OFF = 0, DFM_SELF_ON = 1, DFM_SELF_AUTO = 2 }; /* dfm_world_def.
 typedef struct dfm_world_def {
   uint32_t size, flags;
   double gravity[3];  /* m/s2 */
-  int32_t method;     /* 0; other values: deform/deprecated.h */
+  int32_t reserved3;  /* 0, else DFM_E_UNSUPPORTED */
   int32_t integrator; /* DFM_INTEGRATOR_* */
   /* m, rest distance d_c; 0: chosen from the meshes of the world (1e-3 of the median surface edge) */
   double contact_offset;
@@ -79,7 +79,7 @@ typedef struct dfm_world_def {
   uint32_t reserved2;
   /* s, intended length of steps, from which integrator AUTO is chosen: a body whose explicit sub-steps would
    * cost four times as much as implicit ones becomes implicit (doc/concepts/implicit.md); 0: unknown, AUTO is
-   * SYMPLECTIC_EULER or the one of the method */
+   * SYMPLECTIC_EULER */
   double step;
   uint64_t cookie; /* set by the default function */
 } dfm_world_def;

@@ -27,7 +27,6 @@
 #define dfm_query_shape_default query_shape_inline
 #define dfm_query_filter_default query_filter_inline
 #define dfm_vertex_layout_default vertex_layout_inline
-#define dfm_world_query_ray_all query_ray_all_inline
 #include "api/first_size.h"
 #undef dfm_world_contacts
 #undef dfm_world_pairs
@@ -53,7 +52,6 @@
 #undef dfm_query_shape_default
 #undef dfm_query_filter_default
 #undef dfm_vertex_layout_default
-#undef dfm_world_query_ray_all
 
 // bytes: size of a row in 0.1.
 #define DFM_LIST_SYMBOL(name, row, bytes)                                                         \
@@ -94,10 +92,3 @@ DFM_DEFAULT_SYMBOL(dfm_switch_rule)
 DFM_DEFAULT_SYMBOL(dfm_query_shape)
 DFM_DEFAULT_SYMBOL(dfm_query_filter)
 DFM_DEFAULT_SYMBOL(dfm_vertex_layout)
-
-extern "C" DFM_API dfm_status dfm_world_query_ray_all(dfm_world world, const double origin[3],
-                                                      const double direction[3], double max_distance,
-                                                      const dfm_query_filter *filter, uint32_t capacity,
-                                                      dfm_query_hit *out, uint32_t *n) {
-  return dfm_world_query_ray_all_sized(world, origin, direction, max_distance, filter, 80, capacity, out, n);
-}

@@ -3,9 +3,7 @@
 #include <cmath>
 
 #include "api/objects.h"
-#include "geometry/convex_search.h"
 #include "world/find.h"
-#include "world/queries.h"
 
 using namespace dfm;
 
@@ -50,9 +48,7 @@ double size_of(double value, const char *name) {
   return value;
 }
 
-Convex taken_shape(const dfm_query_shape *given) {
-  need(given, "shape");
-  const dfm_query_shape def = take_def(given, dfm_query_shape_default());
+Convex taken_shape(const dfm_query_shape &def) {
   Convex c;
   c.position = finite(def.pose.position, "shape.pose.position");
   if (!all_finite(def.pose.rotation, 4)) fail(DFM_E_ARG, "the shape's rotation is not finite");
@@ -61,6 +57,7 @@ Convex taken_shape(const dfm_query_shape *given) {
   c.radius = size_of(def.radius, "radius");
   switch (def.shape) {
     case DFM_SHAPE_SPHERE: break;
+    case DFM_SHAPE_POINT: c.radius = 0; break;
     case DFM_SHAPE_CAPSULE:
       c.npoint = 2;
       c.own[5] = size_of(def.half_length, "half_length");
@@ -80,125 +77,59 @@ Convex taken_shape(const dfm_query_shape *given) {
       break;
     default:
       fail(DFM_E_ARG,
-           "a query cannot use shape %u; expected DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE or "
-           "DFM_SHAPE_CONVEX",
+           "a query cannot use shape %u; expected DFM_SHAPE_SPHERE, DFM_SHAPE_BOX, DFM_SHAPE_CAPSULE, "
+           "DFM_SHAPE_CONVEX or DFM_SHAPE_POINT",
            def.shape);
   }
   return c;
 }
 
-struct Ray {
-  Vec3 origin, unit;
-  double limit;
-};
-Ray taken_ray(const double *origin, const double *direction, double max_distance) {
-  Ray r{finite(origin, "origin"), normalized(finite(direction, "direction")), max_distance};
-  if (!(norm2(r.unit) > 0.5))
-    fail(DFM_E_ARG, "the direction of the ray is zero, or its length is too large for a double");
-  if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be above 0", max_distance);
-  return r;
+ThingQuery taken_query(const dfm_query_shape *shape, const double *path, double reach) {
+  need(shape, "shape");
+  const dfm_query_shape def = take_def(shape, dfm_query_shape_default());
+  if (def.flags & ~uint32_t{DFM_QUERY_EACH})
+    fail(DFM_E_ARG, "shape.flags is %u; expected 0 or DFM_QUERY_EACH", def.flags);
+  if (!(reach >= 0)) fail(DFM_E_ARG, "reach is %g m; it must not be negative", reach);
+  ThingQuery q;
+  q.shape = taken_shape(def);
+  q.point = def.shape == DFM_SHAPE_POINT;
+  q.each = def.flags & DFM_QUERY_EACH;
+  q.limit = reach;
+  if (!path) return q;
+  const Vec3 way = finite(path, "path");
+  q.way = {true, normalized(way)};
+  const double length = norm(way);
+  if (!std::isfinite(length)) fail(DFM_E_ARG, "the length of the path is too large for a double");
+  if (reach == 0) q.limit = length;
+  if ((q.point || reach > 0) && !(norm2(q.way.unit) > 0.5))
+    fail(DFM_E_ARG, "the path is zero; the direction of a ray, or of a path with a reach, must not be");
+  return q;
 }
 
-void need_room(const void *out, uint32_t capacity) {
-  if (capacity > 0 && !out) fail(DFM_E_ARG, "the out argument is NULL, with a capacity of %u", capacity);
-}
-
-void list_overlaps(World &w, const Given &given, const Convex &shape, uint32_t capacity, uint64_t *things,
-                   uint32_t *n) {
-  need_room(things, capacity);
-  uint32_t count = 0;
-  each_thing(w, given.filter(), [&](const Thing &thing) {
-    if (!overlaps(shape, thing)) return true;
-    if (count < capacity) things[count] = thing.handle();
-    ++count;
-    return true;
-  });
-  if (n) *n = count;
+dfm_query_hits taken_hits(const void *user) {
+  need(user, "user");
+  const auto &hits = *static_cast<const dfm_query_hits *>(user);
+  if (hits.size < sizeof hits)
+    fail(DFM_E_ARG, "the size of the dfm_query_hits is %u; set it to its sizeof", hits.size);
+  if (hits.row_size < sizeof(dfm_query_hit) || hits.row_size % 8 != 0)
+    fail(DFM_E_ARG,
+         "row_size %u is not the size of a dfm_query_hit: expected a multiple of 8, at least %zu; set it to "
+         "sizeof(dfm_query_hit)",
+         hits.row_size, sizeof(dfm_query_hit));
+  if (hits.capacity > 0 && !hits.out) fail(DFM_E_ARG, "out is NULL, with a capacity of %u", hits.capacity);
+  return {hits.size, hits.row_size, hits.capacity, 0, hits.out};
 }
 
 }  // namespace
 
-dfm_status dfm_world_query_ray(dfm_world world, const double origin[3], const double direction[3],
-                               double max_distance, const dfm_query_filter *filter, dfm_query_hit *hit) {
+dfm_status dfm_world_query(dfm_world world, const dfm_query_shape *shape, const double path[3], double reach,
+                           const dfm_query_filter *filter, dfm_query_hit_fn hit, void *user) {
   return as_status(to_read<world_of>, world, [&](World &w) {
-    const Ray ray = taken_ray(origin, direction, max_distance);
+    const ThingQuery query = taken_query(shape, path, reach);
     const Given given(filter);
-    give(hit, find_first_on_ray(w, given.filter(), ray.origin, ray.unit, ray.limit));
-  });
-}
-
-dfm_status dfm_world_query_ray_all_sized(dfm_world world, const double origin[3], const double direction[3],
-                                         double max_distance, const dfm_query_filter *filter,
-                                         uint32_t row_size, uint32_t capacity, dfm_query_hit *out,
-                                         uint32_t *n) {
-  return as_status([&] {
-    if (row_size < sizeof(dfm_query_hit) || row_size % 8 != 0)
-      fail(DFM_E_ARG,
-           "row_size %u is not the size of a dfm_query_hit: expected a multiple of 8, at least %zu; pass "
-           "sizeof(dfm_query_hit)",
-           row_size, sizeof(dfm_query_hit));
-    World &w = settled(world_of(world));
-    const Ray ray = taken_ray(origin, direction, max_distance);
-    const Given given(filter);
-    need_room(out, capacity);
-    HitRows rows(out, row_size, capacity);
-    find_all_on_ray(w, given.filter(), ray.origin, ray.unit, ray.limit, rows);
-    if (n) *n = rows.count();
-  });
-}
-
-dfm_status dfm_world_query_closest(dfm_world world, const double point[3], double max_distance,
-                                   const dfm_query_filter *filter, dfm_query_hit *hit) {
-  return as_status(to_read<world_of>, world, [&](World &w) {
-    const Vec3 p = finite(point, "point");
-    if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be above 0", max_distance);
-    const Given given(filter);
-    give(hit, find_closest(w, given.filter(), p, max_distance));
-  });
-}
-
-dfm_status dfm_world_query_overlap(dfm_world world, const dfm_query_shape *shape,
-                                   const dfm_query_filter *filter, uint32_t capacity, uint64_t *things,
-                                   uint32_t *n) {
-  return as_status(to_read<world_of>, world, [&](World &w) {
-    const Convex asked = taken_shape(shape);
-    list_overlaps(w, Given(filter), asked, capacity, things, n);
-  });
-}
-
-dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box, const dfm_query_filter *filter,
-                                uint32_t capacity, uint64_t *things, uint32_t *n) {
-  return as_status(to_read<world_of>, world, [&](World &w) {
-    need(box, "box");
-    const Vec3 lo = finite(box->lo, "box.lo"), hi = finite(box->hi, "box.hi");
-    Convex asked;
-    asked.box = true;
-    asked.position = 0.5 * (lo + hi);
-    asked.half = 0.5 * (hi - lo);
-    for (int k = 0; k < 3; ++k)
-      if (!(asked.half[k] >= 0))
-        fail(DFM_E_ARG, "box: lo[%d] is %g m, above hi[%d], %g m", k, lo[k], k, hi[k]);
-    list_overlaps(w, Given(filter), asked, capacity, things, n);
-  });
-}
-
-dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape, uint32_t capacity,
-                                    uint32_t *triangles, uint32_t *n) {
-  return as_status(to_read<shown_body_of>, body, [&](Body &b) {
-    const Convex asked = taken_shape(shape);
-    need_room(triangles, capacity);
-    const uint32_t count = triangles_touched(search(b), asked, capacity, triangles);
-    if (n) *n = count;
-  });
-}
-
-dfm_status dfm_world_query_cast(dfm_world world, const dfm_query_shape *shape, const double path[3],
-                                const dfm_query_filter *filter, dfm_query_hit *hit) {
-  return as_status(to_read<world_of>, world, [&](World &w) {
-    const Convex asked = taken_shape(shape);
-    const Vec3 way = finite(path, "path");
-    if (!std::isfinite(norm(way))) fail(DFM_E_ARG, "the length of the path is too large for a double");
-    const Given given(filter);
-    give(hit, find_first_on_path(w, given.filter(), asked, way));
+    if (hit) return find(w, given.filter(), query, hit, user);
+    dfm_query_hits kept = taken_hits(user);
+    find(w, given.filter(), query, keep_nearest, &kept);
+    static_cast<dfm_query_hits *>(user)->n = kept.n;
   });
 }

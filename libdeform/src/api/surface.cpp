@@ -1,7 +1,5 @@
 #include "deform/surface.h"
 
-#include <cmath>
-
 #include "api/objects.h"
 #include "world/queries.h"
 
@@ -51,27 +49,5 @@ dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point,
            b.name.c_str());
     if (room(b.surface.nsurfel, capacity, point, n))
       std::copy(b.surface.point.begin(), b.surface.point.begin() + b.surface.nsurfel, point);
-  });
-}
-
-dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
-                         double max_distance, dfm_ray_hit *hit) {
-  return as_status(world_of, world, [&](World &w) {
-    need(origin, "origin");
-    need(direction, "direction");
-    const Vec3 d = normalized(load3(direction));
-    if (!(norm2(d) > 0.5) || !(norm2(load3(origin)) < INFINITY) || !(max_distance > 0))
-      fail(DFM_E_ARG,
-           "a ray needs a finite origin, a direction that is not zero and a positive max_distance");
-    give(hit, cast_ray(w, load3(origin), d, max_distance));
-  });
-}
-
-dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance, dfm_ray_hit *hit) {
-  return as_status(world_of, world, [&](World &w) {
-    need(point, "point");
-    if (!all_finite(point, 3)) fail(DFM_E_ARG, "the point is not finite");
-    if (!(max_distance > 0)) fail(DFM_E_ARG, "max_distance is %g m; it must be positive", max_distance);
-    give(hit, closest_surface(w, load3(point), max_distance));
   });
 }

@@ -66,21 +66,11 @@ double shortest_step(const World &w, double dt) {
   return kShortestStep * reach;
 }
 
-// For one version (deform/deprecated.h): an integrator that is given says more.
-void take_method(dfm_world_def &d) {
-  if (d.method == DFM_METHOD_ROLLBACK)
-    fail(DFM_E_UNSUPPORTED,
-         "the contact method rollback is a program of its own now: run the scene by `deform rollback`");
-  if (d.method < DFM_METHOD_AUTO || d.method > DFM_METHOD_ROLLBACK)
-    fail(DFM_E_UNSUPPORTED, "method is %d; leave it 0, and choose an integrator", d.method);
-  if (d.integrator == DFM_INTEGRATOR_AUTO && d.method != DFM_METHOD_AUTO)
-    d.integrator =
-        d.method == DFM_METHOD_IMPLICIT ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
-  d.method = DFM_METHOD_AUTO;
-}
-
 void choose_integrator(World &w) {
   const dfm_world_def &d = w.def;
+  if (d.reserved3 != 0)
+    fail(DFM_E_UNSUPPORTED, "reserved3, once the contact method, is %d; leave it 0, and choose an integrator",
+         d.reserved3);
   if (d.integrator < DFM_INTEGRATOR_AUTO || d.integrator > DFM_INTEGRATOR_TR_BDF2)
     fail(DFM_E_UNSUPPORTED,
          "integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER, "
@@ -187,7 +177,6 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
              "sleep_speed (m/s) and sleep_time (s) must be positive and finite; the defaults are 0.01 and "
              "0.5, found %g",
              value);
-    take_method(w->def);
     choose_integrator(*w);
     select_effects(*w);
     prepare(*w);

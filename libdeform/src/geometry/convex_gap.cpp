@@ -187,9 +187,11 @@ ConvexGap convex_gap(const Convex &a, const Convex &b, Vec3 shift) {
   return gap;
 }
 
-bool convex_touch(const Convex &a, const Convex &b) {
+ConvexHit convex_near(const Convex &a, const Convex &b, double limit) {
   const ConvexGap gap = convex_gap(a, b);
-  return !gap.apart || gap.distance <= a.radius + b.radius;
+  const double distance = gap.distance - (a.radius + b.radius);
+  if (!gap.apart || distance <= 0) return {true, true, 0, {}, a.position};
+  return {distance <= limit, false, distance, gap.normal, gap.on_b + b.radius * gap.normal};
 }
 
 ConvexHit convex_cast(const Convex &a, const Convex &b, Vec3 unit, double limit) {

@@ -41,8 +41,6 @@ struct ConvexGap {
 };
 // a is displaced by `shift`.
 ConvexGap convex_gap(const Convex &a, const Convex &b, Vec3 shift = {});
-// Whether the shapes overlap; touching counts, up to rounding.
-bool convex_touch(const Convex &a, const Convex &b);
 
 // The distance of two convex shapes is a convex function of the displacement of one of them, so Newton's
 // method from the start never goes too far: each step goes as far as the separating plane allows
@@ -55,5 +53,8 @@ struct ConvexHit {
 };
 // unit: the direction in which a moves, up to `limit`.
 ConvexHit convex_cast(const Convex &a, const Convex &b, Vec3 unit, double limit);
+// The same of shapes at rest that are up to `limit` apart: `way` is their distance. Inside: they overlap;
+// touching counts, up to rounding.
+ConvexHit convex_near(const Convex &a, const Convex &b, double limit);
 
 }  // namespace dfm

@@ -3,72 +3,50 @@
 namespace dfm {
 namespace {
 
-Convex triangle_of(const Triangles &m, uint32_t t) {
-  return convex_triangle(m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
-}
-
-// Wider than the shape by more than rounding.
-struct Bounds {
+Box widened(const Triangles &m, const Convex &shape) {
   Vec3 lo, hi;
-  Bounds(const Triangles &m, const Convex &shape) {
-    shape.bounds(lo, hi);
-    const double slack = kRaySlack * length_scale(m.tree, shape.position);
-    for (int k = 0; k < 3; ++k) {
-      lo[k] -= slack;
-      hi[k] += slack;
-    }
+  shape.bounds(lo, hi);
+  const double slack = kRaySlack * length_scale(m.tree, shape.position);
+  Box out{};
+  for (int k = 0; k < 3; ++k) {
+    out.lo[k] = lo[k] - slack;
+    out.hi[k] = hi[k] + slack;
   }
-  bool meets(const Box &b) const {
-    for (int k = 0; k < 3; ++k)
-      if (!(b.lo[k] <= hi[k] && lo[k] <= b.hi[k])) return false;
-    return true;
-  }
-};
+  return out;
+}
 
 }  // namespace
 
-TriangleOnPath first_on_path(const Triangles &m, const Convex &shape, Vec3 unit, double limit) {
-  TriangleOnPath best;
+ShapeSearch::ShapeSearch(const Triangles &m, const Convex &shape, const ShapeWay &way)
+    : m_(m),
+      shape_(shape),
+      way_(way),
+      box_(widened(m, shape)),
+      swept_(0.5 * (load3(box_.lo) + load3(box_.hi)), way.unit, 0.5 * (load3(box_.hi) - load3(box_.lo))) {}
+
+ConvexHit ShapeSearch::meet(uint32_t t, double limit) const {
+  return convex_meet(shape_, convex_triangle(m_.corner(t, 0), m_.corner(t, 1), m_.corner(t, 2)), way_, limit);
+}
+
+TriangleMet first_met(const Triangles &m, const Convex &shape, const ShapeWay &way, double limit) {
+  TriangleMet best;
   if (m.tree.empty()) return best;
-  const Bounds bounds(m, shape);
-  const RayBoxes boxes(0.5 * (bounds.lo + bounds.hi), unit, 0.5 * (bounds.hi - bounds.lo));
+  const ShapeSearch search(m, shape, way);
   double most = limit;
   uint64_t nodes = 0;
-  const auto bound = [&](const Box &b) { return boxes.first(b); };
+  const auto bound = [&](const Box &b) { return search.first(b); };
   const auto leaf = [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       if (!(bound(m.tree.triangle_boxes()[i]) <= most)) continue;
       const uint32_t t = m.tree.triangles()[i];
-      const ConvexHit hit = convex_cast(shape, triangle_of(m, t), unit, most);
+      const ConvexHit hit = search.meet(t, most);
       if (!hit.hit || !(hit.way < most || (hit.way == most && t < best.triangle))) continue;
-      most = hit.way;
       best = {hit, t};
+      most = hit.inside && !way.moves ? -1 : hit.way;  // -1: nothing is nearer
     }
   };
   nearest_first(m.tree, most, nodes, bound, leaf);
   return best;
-}
-
-bool touches_any(const Triangles &m, const Convex &shape) {
-  if (m.tree.empty()) return false;
-  const Bounds bounds(m, shape);
-  return !walk(
-      m.tree, [&](const Box &b) { return bounds.meets(b); },
-      [&](uint32_t place) { return !convex_touch(shape, triangle_of(m, m.tree.triangles()[place])); });
-}
-
-uint32_t triangles_touched(const Triangles &m, const Convex &shape, uint32_t capacity, uint32_t *out) {
-  if (m.tree.empty()) return 0;
-  const Bounds bounds(m, shape);
-  Least<uint32_t> least(out, capacity);
-  walk(
-      m.tree, [&](const Box &b) { return bounds.meets(b); },
-      [&](uint32_t place) {
-        const uint32_t t = m.tree.triangles()[place];
-        if (convex_touch(shape, triangle_of(m, t))) least.offer(t);
-        return true;
-      });
-  return least.finish();
 }
 
 int winding_by_ray(const Triangles &m, Vec3 p) {

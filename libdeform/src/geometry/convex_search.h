@@ -2,7 +2,7 @@
 // triangle in it can change the result, so results are those of a test of every triangle; of equal triangles
 // the lowest number.
 #pragma once
-#include <algorithm>
+#include <cmath>
 
 #include "geometry/convex_gap.h"
 #include "geometry/tree_walk.h"
@@ -10,47 +10,57 @@
 
 namespace dfm {
 
-struct TriangleOnPath {
+// How a shape meets others: on its way along `unit`, or by distance where it is.
+struct ShapeWay {
+  bool moves = false;
+  Vec3 unit;
+};
+inline ConvexHit convex_meet(const Convex &a, const Convex &b, const ShapeWay &way, double limit) {
+  return way.moves ? convex_cast(a, b, way.unit, limit) : convex_near(a, b, limit);
+}
+
+// A shape and the triangles of a tree.
+class ShapeSearch {
+ public:
+  // The tree may not be empty.
+  ShapeSearch(const Triangles &triangles, const Convex &shape, const ShapeWay &way);
+  // At or below the way to anything in the box.
+  double first(const Box &b) const {
+    return way_.moves ? swept_.first(b) : std::sqrt(box_distance2(box_, b));
+  }
+  ConvexHit meet(uint32_t triangle, double limit) const;
+
+ private:
+  const Triangles &m_;
+  const Convex &shape_;
+  const ShapeWay way_;
+  const Box box_;  // wider than the shape by more than rounding
+  const RayBoxes swept_;
+};
+
+struct TriangleMet {
   ConvexHit hit;
   uint32_t triangle = kNone;
 };
-// The first triangle that the shape touches, up to and including the distance `limit`.
-TriangleOnPath first_on_path(const Triangles &triangles, const Convex &shape, Vec3 unit, double limit);
+// The first triangle that the shape meets, up to and including `limit`; of a shape at rest that overlaps the
+// surface, any.
+TriangleMet first_met(const Triangles &triangles, const Convex &shape, const ShapeWay &way, double limit);
 
-bool touches_any(const Triangles &triangles, const Convex &shape);
+// Calls f(hit, triangle) for all that it meets, in no order.
+template <class F>
+void each_met(const Triangles &m, const Convex &shape, const ShapeWay &way, double limit, F &&f) {
+  if (m.tree.empty()) return;
+  const ShapeSearch search(m, shape, way);
+  near_triangles(
+      m.tree, [&](const Box &b) { return search.first(b) <= limit; },
+      [&](uint32_t t) {
+        if (const ConvexHit hit = search.meet(t, limit); hit.hit) f(hit, t);
+      });
+}
 
 // How often a closed surface winds around p: 1 inside, where its triangles look outward. By a ray, so exact
 // to rounding; p on the surface may count either way.
 int winding_by_ray(const Triangles &triangles, Vec3 p);
-
-// Keeps the smallest of the offered items in the caller's memory; finish() sorts them.
-template <class T>
-class Least {
- public:
-  Least(T *out, uint32_t capacity) : out_(out), capacity_(capacity) {}
-  void offer(const T &value) {
-    if (count_ < capacity_) {
-      out_[count_++] = value;
-      return;
-    }
-    if (count_++ == capacity_) std::make_heap(out_, out_ + capacity_);
-    if (capacity_ == 0 || !(value < out_[0])) return;
-    std::pop_heap(out_, out_ + capacity_);
-    out_[capacity_ - 1] = value;
-    std::push_heap(out_, out_ + capacity_);
-  }
-  uint32_t finish() {  // returns the number of offered items
-    std::sort(out_, out_ + std::min(count_, capacity_));
-    return count_;
-  }
-
- private:
-  T *out_;
-  uint32_t capacity_, count_ = 0;
-};
-
-// The lowest numbers of the triangles that the shape touches or contains, and their total count.
-uint32_t triangles_touched(const Triangles &triangles, const Convex &shape, uint32_t capacity, uint32_t *out);
 
 // Calls f(distance, triangle) for all triangles on a ray up to and including `limit`, in no order. As
 // first_on_ray.

@@ -78,9 +78,9 @@ double lift_onto(dfm_context *context, const dfm_obstacle_def &on, const std::ve
   double way[3];
   store3(way, path);
   dfm_query_hit hit = {};
-  hit.size = sizeof hit;
-  need(dfm_world_query_cast(scratch.world, &hull, way, nullptr, &hit));
-  if (!hit.thing)
+  dfm_query_hits hits = {sizeof hits, sizeof hit, 1, 0, &hit};
+  need(dfm_world_query(scratch.world, &hull, way, 0, nullptr, nullptr, &hits));
+  if (hits.n == 0)
     fail(DFM_E_ARG, "the body is not above or below '%s'; move it there by its \"pose\"", on.name);
   return raised - hit.distance;
 }

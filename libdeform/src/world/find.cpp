@@ -13,23 +13,18 @@
 namespace dfm {
 namespace {
 
-dfm_query_hit nothing() {
-  dfm_query_hit hit{};
-  hit.size = sizeof hit;
-  hit.triangle = kNone;
-  hit.distance = kFar;
-  return hit;
-}
-
 // Where a ray, a point or a shape on its way meets a thing.
 struct Met {
   double distance = kFar;
   uint32_t triangle = kNone;
   Vec3 point, normal;
+  bool inside = false;
 };
 
 dfm_query_hit hit_of(const Thing &thing, const Met &met) {
-  dfm_query_hit hit = nothing();
+  dfm_query_hit hit{};
+  hit.size = sizeof hit;
+  hit.flags = met.inside ? DFM_QUERY_INSIDE : 0;
   hit.thing = thing.handle();
   hit.triangle = met.triangle;
   hit.distance = met.distance;
@@ -42,6 +37,29 @@ Shape shape_of(const Obstacle &o) { return Shape(o.def.shape); }
 bool of_triangles(const Obstacle &o) { return shape_of(o) == Shape::mesh || shape_of(o) == Shape::voxels; }
 
 Vec3 plane_normal(const Obstacle &o) { return rotate(o.pose.rotation, {0, 0, 1}); }
+bool is_convex(const Obstacle &o) {
+  return shape_of(o) == Shape::sphere || shape_of(o) == Shape::box || shape_of(o) == Shape::capsule;
+}
+
+Convex convex_of(const Obstacle &o) {
+  Convex c;
+  c.position = o.pose.position;
+  c.rotation = o.pose.rotation;
+  c.turned = true;
+  if (shape_of(o) == Shape::box) {
+    c.box = true;
+    c.half = load3(o.def.half_size);
+    return c;
+  }
+  c.radius = o.def.radius;
+  if (shape_of(o) == Shape::capsule) {
+    c.npoint = 2;
+    c.own[2] = -o.def.half_length;
+    c.own[5] = o.def.half_length;
+  }
+  return c;
+}
+
 // m, depth of the deepest point of a shape, and that point
 double above_plane(const Convex &shape, const Obstacle &o, Vec3 *lowest = nullptr) {
   const Vec3 n = plane_normal(o), p = shape.support(-n);
@@ -99,7 +117,7 @@ bool surfaces_overlap(const Thing &a, const Thing &b) {
     for (int k = 0; near && k < 3; ++k)
       near = std::max({x[0][k], x[1][k], x[2][k]}) >= root.lo[k] &&
              std::min({x[0][k], x[1][k], x[2][k]}) <= root.hi[k];
-    if (near && touches_any(of_b, convex_triangle(x[0], x[1], x[2]))) return true;
+    if (near && first_met(of_b, convex_triangle(x[0], x[1], x[2]), {}, 0).hit.hit) return true;
   }
   return encloses(b, of_b, moved(of_a.corner(0, 0))) ||
          encloses(a, of_a, seen_by(a, back(b, of_b.corner(0, 0))));
@@ -127,6 +145,99 @@ bool plane_overlaps(const Obstacle &plane, const Thing &thing) {
                                 });
 }
 
+// f(met) for what it meets up to the limit, and perhaps beyond.
+template <class F>
+void meet_ray(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+  const Vec3 o = q.shape.position, d = q.way.unit;
+  if (has_triangles(thing)) {
+    const Triangles m = triangles_of(thing);
+    const Vec3 from = seen_by(thing, o), along = turned_by(thing, d);
+    const auto on = [&](double at, uint32_t t) {
+      f(Met{at, t, o + at * d, turned_back(thing, normal_of(m, t))});
+    };
+    if (q.each) return all_on_ray(m, from, along, limit, on);
+    const TriangleOnRay first = first_on_ray(m, from, along, limit, q.count);
+    if (first.triangle != kNone) on(first.distance, first.triangle);
+    return;
+  }
+  const Obstacle &obstacle = *thing.obstacle;
+  Vec3 n;
+  const double first = ray_obstacle(obstacle, o, d, &n);
+  if (!(first < kFar)) return;
+  f(Met{first, kNone, o + first * d, n});
+  // The exit point is the entry point of the reversed line.
+  if (!q.each || !is_convex(obstacle) || !(dot(n, d) < 0)) return;
+  const double beyond = first + 2 * convex_of(obstacle).reach() + 1;
+  const double last = beyond - ray_obstacle(obstacle, o + beyond * d, -d, &n);
+  if (last >= first) f(Met{last, kNone, o + last * d, n});
+}
+
+template <class F>
+void meet_point(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+  const Vec3 p = q.shape.position;
+  if (has_triangles(thing)) {
+    const Triangles m = triangles_of(thing);
+    const TriangleNearPoint near = closest_to(m, seen_by(thing, p), DistanceKey::root, limit, q.count);
+    if (near.triangle != kNone)
+      f(Met{near.key, near.triangle, back(thing, near.at.point),
+            turned_back(thing, normal_of(m, near.triangle))});
+  } else if (shape_of(*thing.obstacle) != Shape::none) {
+    const ObstaclePoint near = thing.obstacle->standing().closest(p);
+    f(Met{std::fabs(near.distance), kNone, near.point, near.normal});
+  }
+}
+
+template <class F>
+void meet_shape(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+  const Vec3 unit = q.way.unit;
+  const Met start{0, kNone, q.shape.position, q.way.moves ? -unit : Vec3{}, true};
+  if (has_triangles(thing)) {
+    const Triangles m = triangles_of(thing);
+    const Convex seen = seen_by(thing, q.shape);
+    const ShapeWay way{q.way.moves, turned_by(thing, unit)};
+    const auto on = [&](const ConvexHit &hit, uint32_t t) {
+      f(Met{hit.way, t, back(thing, hit.point), turned_back(thing, hit.normal), hit.inside});
+    };
+    // a shape inside a closed surface may hit it from inside later
+    if (q.each) {
+      each_met(m, seen, way, limit, on);
+      if (!q.point && encloses(thing, m, seen.any())) f(start);
+      return;
+    }
+    const TriangleMet first = first_met(m, seen, way, limit);
+    if (!(first.hit.hit && first.hit.way == 0) && encloses(thing, m, seen.any())) f(start);
+    else if (first.hit.hit) on(first.hit, way.moves || !first.hit.inside ? first.triangle : kNone);
+    return;
+  }
+  const Obstacle &obstacle = *thing.obstacle;
+  if (shape_of(obstacle) == Shape::plane) {
+    Vec3 lowest;
+    const Vec3 n = plane_normal(obstacle);
+    const double above = above_plane(q.shape, obstacle, &lowest), closing = -dot(unit, n);
+    const double way = !q.way.moves ? above : closing > 0 ? above / closing : kFar;
+    if (above <= 0) f(start);
+    else f(Met{way, kNone, lowest + (q.way.moves ? way * unit : -above * n), n});
+  } else if (is_convex(obstacle)) {
+    const ConvexHit hit = convex_meet(q.shape, convex_of(obstacle), q.way, limit);
+    if (hit.hit) f(Met{hit.way, kNone, hit.point, hit.normal, hit.inside});
+  }
+}
+
+template <class F>
+void meet(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+  if (q.point && q.way.moves) meet_ray(thing, q, limit, f);
+  else if (q.point && !q.each) meet_point(thing, q, limit, f);
+  else meet_shape(thing, q, limit, f);
+}
+
+bool overlaps(const Convex &shape, const Thing &thing) {
+  ThingQuery q;
+  q.shape = shape;
+  bool any = false;
+  meet_shape(thing, q, 0, [&](const Met &met) { any = any || met.distance <= 0; });
+  return any;
+}
+
 }  // namespace
 
 bool ThingFilter::passes(const Thing &thing) const {
@@ -134,43 +245,11 @@ bool ThingFilter::passes(const Thing &thing) const {
   const uint32_t kind = thing.body              ? DFM_QUERY_BODIES
                         : thing.obstacle->rigid ? DFM_QUERY_RIGIDS
                                                 : DFM_QUERY_OBSTACLES;
+  if (given_->only) return given_->only == thing.handle();
   if (!(given_->what & kind) || (thing.sensor() && !(given_->what & DFM_QUERY_SENSORS))) return false;
   if (!(given_->category & thing.collides_with()) || !(thing.category() & given_->collides_with))
     return false;
   return !given_->accept || given_->accept(given_->user, thing.handle());
-}
-
-bool is_convex(const Obstacle &o) {
-  return shape_of(o) == Shape::sphere || shape_of(o) == Shape::box || shape_of(o) == Shape::capsule;
-}
-
-Convex convex_of(const Obstacle &o) {
-  Convex c;
-  c.position = o.pose.position;
-  c.rotation = o.pose.rotation;
-  c.turned = true;
-  if (shape_of(o) == Shape::box) {
-    c.box = true;
-    c.half = load3(o.def.half_size);
-    return c;
-  }
-  c.radius = o.def.radius;
-  if (shape_of(o) == Shape::capsule) {
-    c.npoint = 2;
-    c.own[2] = -o.def.half_length;
-    c.own[5] = o.def.half_length;
-  }
-  return c;
-}
-
-bool overlaps(const Convex &shape, const Thing &thing) {
-  if (has_triangles(thing)) {
-    const Triangles m = triangles_of(thing);
-    const Convex seen = seen_by(thing, shape);
-    return touches_any(m, seen) || encloses(thing, m, seen.any());
-  }
-  if (shape_of(*thing.obstacle) == Shape::plane) return above_plane(shape, *thing.obstacle) <= 0;
-  return is_convex(*thing.obstacle) && convex_touch(shape, convex_of(*thing.obstacle));
 }
 
 bool overlap(const Thing &a, const Thing &b) {
@@ -193,166 +272,46 @@ double distance_from(Obstacle &o, Vec3 p, double limit) {
   return closest_to(search(o), local, DistanceKey::root, limit).key;
 }
 
-namespace {
-
-Met first_of(const Thing &thing, Vec3 o, Vec3 d, double limit, SearchCount *count = nullptr) {
-  if (has_triangles(thing)) {
-    const Triangles m = triangles_of(thing);
-    const TriangleOnRay on = first_on_ray(m, seen_by(thing, o), turned_by(thing, d), limit, count);
-    if (on.triangle == kNone) return {};
-    return {on.distance, on.triangle, o + on.distance * d, turned_back(thing, normal_of(m, on.triangle))};
-  }
-  Vec3 n;
-  const double at = ray_obstacle(*thing.obstacle, o, d, &n);
-  return at <= limit && at < kFar ? Met{at, kNone, o + at * d, n} : Met{};
-}
-
-Met closest_of(const Thing &thing, Vec3 p, double limit, SearchCount *count = nullptr) {
-  if (has_triangles(thing)) {
-    const Triangles m = triangles_of(thing);
-    const TriangleNearPoint near = closest_to(m, seen_by(thing, p), DistanceKey::root, limit, count);
-    if (near.triangle == kNone) return {};
-    return {near.key, near.triangle, back(thing, near.at.point),
-            turned_back(thing, normal_of(m, near.triangle))};
-  }
-  if (shape_of(*thing.obstacle) == Shape::none) return {};
-  const ObstaclePoint near = thing.obstacle->standing().closest(p);
-  const double distance = std::fabs(near.distance);
-  return distance <= limit ? Met{distance, kNone, near.point, near.normal} : Met{};
-}
-
-// meet(thing, limit): where it meets a thing within the limit.
-struct Nearest {
-  Thing thing;
-  Met met;
-  template <class Meet>
-  Nearest(World &w, const ThingFilter &filter, double limit, const Meet &meet) {
-    each_thing(w, filter, [&](const Thing &other) {
-      const Met found = meet(other, std::min(limit, met.distance));
-      if (!(found.distance < met.distance)) return true;
-      thing = other;
-      met = found;
-      return true;
+void find(World &w, const ThingFilter &filter, const ThingQuery &query, dfm_query_hit_fn hit, void *user) {
+  double limit = query.limit;
+  each_thing(w, filter, [&](const Thing &thing) {
+    meet(thing, query, limit, [&](const Met &met) {
+      if (!(met.distance <= limit) || !(met.distance < kFar)) return;
+      const dfm_query_hit found = hit_of(thing, met);
+      limit = std::min(limit, hit(user, &found));
     });
-  }
-  dfm_query_hit hit() const { return met.distance < kFar ? hit_of(thing, met) : nothing(); }
-  dfm_ray_hit ray_hit() const {  // of a body's triangles alone
-    dfm_ray_hit hit{};
-    hit.triangle = thing.body ? met.triangle : kNone;
-    hit.distance = met.distance;
-    if (thing.body) hit.body = thing.handle();
-    else if (thing.obstacle) hit.obstacle = thing.handle();
-    store3(hit.point, met.point);
-    store3(hit.normal, met.normal);
-    return hit;
-  }
-};
-
-}  // namespace
-
-dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 o, Vec3 d, double limit) {
-  const auto meet = [&](const Thing &thing, double most) { return first_of(thing, o, d, most); };
-  return Nearest(w, filter, limit, meet).hit();
-}
-
-dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit) {
-  const auto meet = [&](const Thing &thing, double most) { return closest_of(thing, p, most); };
-  return Nearest(w, filter, limit, meet).hit();
-}
-
-dfm_ray_hit cast_ray(World &w, Vec3 o, Vec3 d, double max_distance, SearchCount *count) {
-  const auto meet = [&](const Thing &thing, double most) { return first_of(thing, o, d, most, count); };
-  return Nearest(w, ThingFilter(nullptr), max_distance, meet).ray_hit();
-}
-
-dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count) {
-  const auto meet = [&](const Thing &thing, double most) {
-    return thing.body ? closest_of(thing, p, most, count) : Met{};
-  };
-  return Nearest(w, ThingFilter(nullptr), max_distance, meet).ray_hit();
-}
-
-dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Convex &shape, Vec3 path) {
-  dfm_query_hit hit = nothing();
-  const double length = norm(path);
-  const Vec3 unit = normalized(path);
-  const auto take = [&](const Thing &thing, const Met &met, bool inside) {
-    if (!(met.distance < hit.distance)) return;
-    hit = hit_of(thing, met);
-    if (inside) hit.flags = DFM_QUERY_INSIDE;
-  };
-  const Met start{0, kNone, shape.position, -unit};
-  each_thing(w, filter, [&](const Thing &thing) {
-    const double most = std::min(length, hit.distance);
-    if (has_triangles(thing)) {
-      const Triangles m = triangles_of(thing);
-      const Convex seen = seen_by(thing, shape);
-      const auto [found, triangle] = first_on_path(m, seen, turned_by(thing, unit), most);
-      if (found.hit)
-        take(thing, {found.way, triangle, back(thing, found.point), turned_back(thing, found.normal)},
-             found.inside);
-      // a shape inside a closed surface may hit it from inside later
-      if (hit.distance > 0 && encloses(thing, m, seen.any())) take(thing, start, true);
-      return hit.distance > 0;
-    }
-    const Obstacle &o = *thing.obstacle;
-    if (shape_of(o) == Shape::plane) {
-      Vec3 lowest;
-      const double above = above_plane(shape, o, &lowest), closing = -dot(unit, plane_normal(o));
-      const double way = closing > 0 ? above / closing : kFar;
-      if (above <= 0) take(thing, start, true);
-      else if (way <= most) take(thing, {way, kNone, lowest + way * unit, plane_normal(o)}, false);
-    } else if (is_convex(o)) {
-      const ConvexHit found = convex_cast(shape, convex_of(o), unit, most);
-      if (found.hit) take(thing, {found.way, kNone, found.point, found.normal}, found.inside);
-    }
-    return hit.distance > 0;
+    return limit >= 0;
   });
-  return hit;
 }
 
-bool HitRows::before(const dfm_query_hit &hit, uint32_t row) const {
-  dfm_query_hit other;
-  std::memcpy(&other, at_ + size_t{step_} * row, sizeof other);
-  if (hit.distance != other.distance) return hit.distance < other.distance;
-  // of equal hits the first one offered, except for triangles of one thing
-  return hit.thing == other.thing && hit.triangle < other.triangle;
-}
-
-void HitRows::offer(const dfm_query_hit &hit) {
-  const uint32_t held = std::min(count_++, capacity_);
-  if (held == capacity_ && (capacity_ == 0 || !before(hit, held - 1))) return;
-  uint32_t at = held == capacity_ ? held - 1 : held;
-  const uint32_t end = at;
-  while (at > 0 && before(hit, at - 1)) --at;
-  unsigned char *const row = at_ + size_t{step_} * at;
-  std::memmove(row + step_, row, size_t{step_} * (end - at));
-  std::memcpy(row, &hit, sizeof hit);
-  std::memset(row + sizeof hit, 0, step_ - sizeof hit);
-}
-
-void find_all_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit, double limit,
-                     HitRows &rows) {
-  each_thing(w, filter, [&](const Thing &thing) {
-    if (has_triangles(thing)) {
-      const Triangles m = triangles_of(thing);
-      all_on_ray(m, seen_by(thing, origin), turned_by(thing, unit), limit, [&](double at, uint32_t t) {
-        rows.offer(hit_of(thing, {at, t, origin + at * unit, turned_back(thing, normal_of(m, t))}));
-      });
-      return true;
-    }
-    const Obstacle &o = *thing.obstacle;
-    Vec3 n;
-    const double first = ray_obstacle(o, origin, unit, &n);
-    if (!(first < kFar)) return true;
-    if (first <= limit) rows.offer(hit_of(thing, {first, kNone, origin + first * unit, n}));
-    // The exit point is the entry point of the reversed line.
-    if (!is_convex(o) || !(dot(n, unit) < 0)) return true;
-    const double beyond = first + 2 * convex_of(o).reach() + 1;
-    const double last = beyond - ray_obstacle(o, origin + beyond * unit, -unit, &n);
-    if (last >= first && last <= limit) rows.offer(hit_of(thing, {last, kNone, origin + last * unit, n}));
-    return true;
-  });
+double keep_nearest(void *user, const dfm_query_hit *hit) {
+  dfm_query_hits &hits = *static_cast<dfm_query_hits *>(user);
+  if (hits.capacity == 0) {
+    ++hits.n;
+    return kFar;
+  }
+  const size_t step = hits.row_size;
+  const auto row = [&](uint32_t i) { return reinterpret_cast<unsigned char *>(hits.out) + step * i; };
+  const auto held = [&](uint32_t i) {
+    dfm_query_hit other;
+    std::memcpy(&other, row(i), sizeof other);
+    return other;
+  };
+  const auto before = [&](const dfm_query_hit &other) {
+    if (hit->distance != other.distance) return hit->distance < other.distance;
+    // of equal hits the first one offered, except for triangles of one thing
+    return hit->thing == other.thing && hit->triangle < other.triangle;
+  };
+  const bool full = hits.n == hits.capacity;
+  if (!full || before(held(hits.n - 1))) {
+    const uint32_t end = full ? hits.n - 1 : hits.n++;
+    uint32_t at = end;
+    while (at > 0 && before(held(at - 1))) --at;
+    std::memmove(row(at + 1), row(at), step * (end - at));
+    std::memcpy(row(at), hit, sizeof *hit);
+    std::memset(row(at) + sizeof *hit, 0, step - sizeof *hit);
+  }
+  return hits.n == hits.capacity ? held(hits.n - 1).distance : kFar;
 }
 
 }  // namespace dfm

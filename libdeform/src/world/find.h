@@ -1,9 +1,8 @@
-// Overlaps, casts and all-hits queries of a shape, a ray or a point among bodies, obstacles and rigid bodies:
-// the functions of deform/query.h, for checked arguments.
+// What a shape, a ray or a point meets among bodies, obstacles and rigid bodies: dfm_world_query, for checked
+// arguments.
 #pragma once
 #include "deform/query.h"
-#include "geometry/convex_gap.h"
-#include "geometry/triangle_search.h"
+#include "geometry/convex_search.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 
@@ -39,35 +38,25 @@ void each_thing(World &w, const ThingFilter &filter, F &&f) {
     if (const Thing thing{nullptr, o.get()}; filter.passes(thing) && !f(thing)) return;
 }
 
-// A sphere, capsule or box as a convex shape.
-Convex convex_of(const Obstacle &o);
-bool is_convex(const Obstacle &o);
-
-// Whether it touches the surface of the thing, or is inside it.
-bool overlaps(const Convex &shape, const Thing &thing);
 // Whether two things overlap. Two planes do not.
 bool overlap(const Thing &a, const Thing &b);
 
-dfm_query_hit find_first_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit, double limit);
-dfm_query_hit find_closest(World &w, const ThingFilter &filter, Vec3 p, double limit);
 // m, signed distance of a point from the surface of an obstacle, negative inside a sphere, box or capsule;
 // `limit` if it is farther.
 double distance_from(Obstacle &o, Vec3 p, double limit);
-dfm_query_hit find_first_on_path(World &w, const ThingFilter &filter, const Convex &shape, Vec3 path);
-// Writes all hits into the caller's rows: nearest first, then by thing, then by triangle.
-class HitRows {
- public:
-  HitRows(dfm_query_hit *out, uint32_t row_size, uint32_t capacity)
-      : at_(reinterpret_cast<unsigned char *>(out)), step_(row_size), capacity_(capacity) {}
-  void offer(const dfm_query_hit &hit);  // things in their order
-  uint32_t count() const { return count_; }
 
- private:
-  bool before(const dfm_query_hit &hit, uint32_t row) const;
-  unsigned char *at_;
-  uint32_t step_, capacity_, count_ = 0;
+struct ThingQuery {
+  Convex shape;
+  bool point = false;  // of no size, and what encloses it does not count: a ray, or the closest point
+  bool each = false;   // all hits of a thing, in place of its nearest
+  ShapeWay way;
+  double limit = kFar;  // m, along the way or from the shape
+  SearchCount *count = nullptr;
 };
-void find_all_on_ray(World &w, const ThingFilter &filter, Vec3 origin, Vec3 unit, double limit,
-                     HitRows &rows);
+// Calls hit() as dfm_world_query does. Several threads may query at once. The first query after positions
+// have changed refits the trees (state/search_tree.h); later ones do not allocate.
+void find(World &w, const ThingFilter &filter, const ThingQuery &query, dfm_query_hit_fn hit, void *user);
+// A hit() whose user is a dfm_query_hits.
+double keep_nearest(void *user, const dfm_query_hit *hit);
 
 }  // namespace dfm

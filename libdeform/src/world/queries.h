@@ -29,11 +29,6 @@ inline Vec3 surfel_displacement(const Body &b, uint32_t s) {
 }
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);
-// In find.cpp. Several threads may query at once. The first query after positions have changed refits the
-// trees (state/search_tree.h); later ones do not allocate.
-dfm_ray_hit cast_ray(World &w, Vec3 origin, Vec3 unit_direction, double max_distance,
-                     SearchCount *count = nullptr);
-dfm_ray_hit closest_surface(World &w, Vec3 p, double max_distance, SearchCount *count = nullptr);
 TriangleNearPoint closest_on_body(Body &b, Vec3 p);  // by squared distance
 
 }  // namespace dfm

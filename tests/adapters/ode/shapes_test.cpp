@@ -4,6 +4,7 @@
 #include <functional>
 
 #include "ode.h"
+#include "query.h"
 
 namespace {
 
@@ -212,10 +213,7 @@ TEST(OdeShapes, Heightfield_CarriesWhereOdeSaysItIs) {
     dGeomRaySet(ray, p[0], p[1], p[2], 0, 0, -1);
     dContactGeom c[8];
     const int n = dCollide(ray, g, 8, c, sizeof c[0]);
-    const double down[3] = {0, 0, -1};
-    dfm_ray_hit hit{};
-    hit.size = sizeof hit;
-    ok(dfm_world_ray(ode.soft, p.data(), down, 2, &hit));
+    const dfm_query_hit hit = test::ray(ode.soft, p, {0, 0, -1}, 2);
     if (n == 0) continue;  // ODE finds no ray on a heightfield's border
     EXPECT_NEAR(hit.point[2], c[0].pos[2], 2e-3) << p[0] << " " << p[1];
   }

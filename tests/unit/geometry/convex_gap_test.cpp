@@ -217,7 +217,7 @@ TEST(ConvexSearch, ThroughATree_GivesTheBitsOfEveryTriangle) {
                            : i % 3 == 1 ? box(r.in_box(2), r.turn(), {0.1, 0.2, 0.05})
                                         : capsule(r.in_box(2), r.turn(), 0.2, 0.05);
       const Vec3 d = dfm::normalized(r.in_box(1));
-      dfm::TriangleOnPath want;
+      dfm::TriangleMet want, least;
       double most = 3;
       std::vector<uint32_t> touched;
       for (uint32_t t = 0; t < n; ++t) {
@@ -226,24 +226,29 @@ TEST(ConvexSearch, ThroughATree_GivesTheBitsOfEveryTriangle) {
           most = hit.way;
           want = {hit, t};
         }
-        if (dfm::convex_touch(shape, triangle(t))) touched.push_back(t);
+        const dfm::ConvexHit near = dfm::convex_near(shape, triangle(t), 0.7);
+        if (near.hit && (!least.hit.hit || near.way < least.hit.way)) least = {near, t};
+        if (near.hit && near.inside) touched.push_back(t);
       }
-      const dfm::TriangleOnPath got = dfm::first_on_path(m, shape, d, 3);
+      const dfm::TriangleMet got = dfm::first_met(m, shape, {true, d}, 3);
       ASSERT_EQ(got.triangle, want.triangle) << round << ", " << i;
       if (want.triangle != dfm::kNone) {
         ASSERT_EQ(got.hit.way, want.hit.way);
         ASSERT_EQ(got.hit.point.x, want.hit.point.x);
         ASSERT_EQ(got.hit.normal.z, want.hit.normal.z);
       }
-      std::vector<uint32_t> list(n);
-      ASSERT_EQ(dfm::triangles_touched(m, shape, n, list.data()), touched.size());
-      list.resize(touched.size());
+      std::vector<uint32_t> list;
+      dfm::each_met(m, shape, {}, 0, [&](const dfm::ConvexHit &, uint32_t t) { list.push_back(t); });
+      std::sort(list.begin(), list.end());
       ASSERT_EQ(list, touched);
-      ASSERT_EQ(dfm::touches_any(m, shape), !touched.empty());
-      if (touched.size() > 2) {
-        uint32_t two[2];
-        ASSERT_EQ(dfm::triangles_touched(m, shape, 2, two), touched.size());
-        ASSERT_TRUE(two[0] == touched[0] && two[1] == touched[1]) << "the lowest";
+      ASSERT_EQ(dfm::first_met(m, shape, {}, 0).hit.hit, !touched.empty());
+      const dfm::TriangleMet near = dfm::first_met(m, shape, {}, 0.7);
+      ASSERT_EQ(near.hit.hit, least.hit.hit) << round << ", " << i;
+      if (least.hit.hit) {
+        ASSERT_EQ(near.hit.way, least.hit.way);
+      }
+      if (least.hit.hit && !least.hit.inside) {
+        ASSERT_EQ(near.triangle, least.triangle);
       }
     }
   }

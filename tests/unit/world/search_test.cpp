@@ -11,6 +11,7 @@
 #include "stack.h"
 #include "state/obstacle.h"
 #include "state/world.h"
+#include "world/find.h"
 #include "world/queries.h"
 
 namespace {
@@ -99,8 +100,8 @@ void expect_same(const dfm::Triangles &m, Vec3 p, dfm::DistanceKey key, double l
 dfm::World &inside(dfm_world w) { return *static_cast<dfm::World *>(dfm::handle_find(dfm::Kind::world, w)); }
 
 // Bodies and mesh obstacles of a world without trees.
-dfm_ray_hit every_triangle(dfm::World &w, Vec3 o, Vec3 d) {
-  dfm_ray_hit hit{};
+dfm_query_hit every_triangle(dfm::World &w, Vec3 o, Vec3 d) {
+  dfm_query_hit hit{};
   hit.distance = kFar;
   hit.triangle = kNone;
   for (auto &b : w.bodies)
@@ -110,30 +111,29 @@ dfm_ray_hit every_triangle(dfm::World &w, Vec3 o, Vec3 d) {
       const double at = dfm::ray_triangle(o, d, x[0], x[1], x[2]);
       if (!(at < hit.distance)) continue;
       hit.distance = at;
-      hit.body = b->handle;
+      hit.thing = b->handle;
       hit.triangle = t;
     }
   for (auto &ob : w.obstacles) {
     const dfm::Quat q = ob->pose.rotation;
     const Vec3 at_o = dfm::rotate_back(q, o - ob->pose.position), at_d = dfm::rotate_back(q, d);
-    const auto met = [&](double at) {
+    const auto met = [&](double at, uint32_t t) {
       if (!(at < hit.distance)) return;
       hit.distance = at;
-      hit.body = 0;
-      hit.obstacle = ob->handle;
-      hit.triangle = kNone;
+      hit.thing = ob->handle;
+      hit.triangle = t;
     };
-    if (ob->def.shape == DFM_SHAPE_PLANE && -at_o.z / at_d.z >= 0) met(-at_o.z / at_d.z);
+    if (ob->def.shape == DFM_SHAPE_PLANE && -at_o.z / at_d.z >= 0) met(-at_o.z / at_d.z, kNone);
     for (size_t i = 0; i < ob->triangles.size(); i += 3) {
       const auto x = [&](size_t k) { return dfm::load3(&ob->points[size_t{3} * ob->triangles[i + k]]); };
-      met(dfm::ray_triangle(at_o, at_d, x(0), x(1), x(2)));
+      met(dfm::ray_triangle(at_o, at_d, x(0), x(1), x(2)), uint32_t(i / 3));
     }
   }
   return hit;
 }
 
-dfm_ray_hit every_triangle(dfm::World &w, Vec3 p) {
-  dfm_ray_hit hit{};
+dfm_query_hit every_triangle(dfm::World &w, Vec3 p) {
+  dfm_query_hit hit{};
   hit.distance = kFar;
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
@@ -142,9 +142,25 @@ dfm_ray_hit every_triangle(dfm::World &w, Vec3 p) {
       const double d = std::sqrt(dfm::closest_on_triangle(p, x[0], x[1], x[2]).distance2);
       if (!(d < hit.distance)) continue;
       hit.distance = d;
-      hit.body = b->handle;
+      hit.thing = b->handle;
       hit.triangle = t;
     }
+  return hit;
+}
+
+// The nearest hit of a ray along d, or (d zero) of a body's surface from o.
+dfm_query_hit nearest(dfm::World &w, Vec3 o, Vec3 d) {
+  dfm_query_hit hit{};
+  hit.distance = kFar;
+  hit.triangle = kNone;
+  dfm_query_hits hits{sizeof hits, sizeof hit, 1, 0, &hit};
+  dfm_query_filter bodies = dfm_query_filter_default();
+  bodies.what = DFM_QUERY_BODIES;
+  dfm::ThingQuery q;
+  q.shape.position = o;
+  q.point = true;
+  q.way = {dfm::norm2(d) > 0, d};
+  dfm::find(w, dfm::ThingFilter(q.way.moves ? nullptr : &bodies), q, dfm::keep_nearest, &hits);
   return hit;
 }
 
@@ -155,14 +171,13 @@ void expect_now(dfm_world world, const char *when) {
   for (int i = 0; i < 40; ++i) {
     const Vec3 o = Vec3{0.05, 0.05, 0.1} + 0.3 * at.any();
     const Vec3 d = dfm::normalized(Vec3{0.05, 0.05, 0.1} - o + 0.05 * at.any());
-    const dfm_ray_hit want = every_triangle(w, o, d), got = dfm::cast_ray(w, o, d, kFar);
+    const dfm_query_hit want = every_triangle(w, o, d), got = nearest(w, o, d);
     ASSERT_EQ(got.distance, want.distance) << when << ", ray " << i;
-    ASSERT_EQ(got.body, want.body) << when;
-    ASSERT_EQ(got.obstacle, want.obstacle) << when;
+    ASSERT_EQ(got.thing, want.thing) << when;
     ASSERT_EQ(got.triangle, want.triangle) << when;
-    const dfm_ray_hit point = every_triangle(w, o), near = dfm::closest_surface(w, o, kFar);
+    const dfm_query_hit point = every_triangle(w, o), near = nearest(w, o, {});
     ASSERT_EQ(near.distance, point.distance) << when << ", point " << i;
-    ASSERT_EQ(near.body, point.body) << when;
+    ASSERT_EQ(near.thing, point.thing) << when;
     ASSERT_EQ(near.triangle, point.triangle) << when;
   }
 }
@@ -344,11 +359,8 @@ TEST(Queries, OnSeveralThreads_GiveTheSameResults) {
         for (++ready; ready < 4;) {}
         for (int i = 0; i < 50; ++i) {
           const Vec3 o = 0.4 * at.any(), d = at.any();
-          dfm_ray_hit hit{};
-          test::ok(dfm_world_ray(s.world, &o.x, &d.x, 10, &hit));
-          own.push_back(hit.distance);
-          test::ok(dfm_world_closest(s.world, &o.x, 10, &hit));
-          own.push_back(hit.distance);
+          own.push_back(nearest(inside(s.world), o, dfm::normalized(d)).distance);
+          own.push_back(nearest(inside(s.world), o, {}).distance);
         }
       });
     for (std::thread &t : threads) t.join();
