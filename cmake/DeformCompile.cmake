@@ -90,9 +90,9 @@ function(deform_precompile target)
 endfunction()
 
 # DEFORM_UNITY compiles files of a folder together, for a third of the work: what costs is headers and
-# templates, the same ones in each file. Builds that are not edited use it: those of the sanitizers and the
-# static one by clang. cmake/unity_groups.py keeps apart what collides, anew when a file changes. The release
-# build compiles each file by itself, so that a missing #include is an error there.
+# templates, the same ones in each file. All presets but dev and clang use it, release for all but the tests.
+# cmake/unity_groups.py keeps apart what collides, anew when a file changes. CI's release build and dev
+# compile each file by itself, so that a missing #include is an error there.
 if(DEFORM_UNITY)
   include(DeformPython)
 endif()
