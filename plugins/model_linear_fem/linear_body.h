@@ -3,7 +3,7 @@
 #include <deform/plugin.h>
 
 #include "../model_common/buffer.h"
-#include "../model_common/entry.h"
+#include "../model_common/by_kind.h"
 #include "../model_common/material.h"
 #include "../model_common/tetrahedron.h"
 
@@ -18,6 +18,8 @@ extern const dfm_param kParams[kParamCount];
 constexpr const char *kId = "org.deform.linear_fem";
 
 struct Body {
+  using Row = Param;
+  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, false};
   const dfm_host *host = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0;
   double params[kParamCount] = {};

@@ -150,6 +150,7 @@ class TetMesh : public Handle<dfm_tetmesh, struct TetMeshKind> {
       if (s < 0) return s;
       def.npoint = i.npoint;
       def.ntet = i.ntet;
+      if (const dfm_status cells = dfm_tetmesh_cells(raw_, &def.cell, &def.cells); cells < 0) return cells;
       return dfm_tetmesh_share(raw_, &def.cell_share);
     }));
   }

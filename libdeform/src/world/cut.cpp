@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "mesh/cells.h"
 #include "mesh/cut_mesh.h"
 #include "plugin/on_behalf.h"
 #include "state/material.h"
@@ -189,6 +190,10 @@ double kinetic_of(const Body &b) {
 
 void check_may_cut(const Body &b, const ModelInstance &model) {
   const char *const name = b.name.c_str();
+  if (!b.cells.empty())
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s' can be neither cut nor torn: its cells are %s; give it a mesh of first-order tetrahedra",
+         name, cell_kind(b.cell_type).name);
   if (!b.surface.identity())
     fail(DFM_E_UNSUPPORTED,
          "body '%s' can be neither cut nor torn: it has its own surface; create it with the boundary of its "
