@@ -13,9 +13,10 @@
 // q^2 <= g sum (|G_a| / w_a) u_a^2, g = sum |G_a| w_a. K P u = K (u - w x U), U the displacement: with
 // e^2 = alpha^2 (sum D_a U_a^2) g max(|G_a| / (w_a D_a)) the square in K of the bracket is at most
 // (1 + e)^2 sum D_a u_a^2. What the turning of P adds is
-//   -2 h.(w x u) + h.(w x (w x d)) - tau.dw,   |A dw| <= |dA| |w| + q |w|,
-// with |h_a| <= eta |G_a|, M = sum h_a (x) d_a, |tau| <= sqrt 2 |M|, |dA| <= sqrt 2 (1 + sqrt 2 alpha |S|) q:
-// at most (2 alpha eta + alpha^2 |M| + sqrt 2 |M| alpha^2 (1 + sqrt 2 + 2 alpha |S|)) q^2.
+//   -2 h.(w x u) + h.(w x (w x d)) - tau.dw,   |A dw| <= |dA| |w| + q |w|.
+// With M = sum h_a (x) d_a, |tau| <= sqrt 2 |M|, |dA| <= sqrt 2 (1 + sqrt 2 alpha |S|) q the last two are at most
+// (alpha^2 |M| + sqrt 2 |M| alpha^2 (1 + sqrt 2 + 2 alpha |S|)) q^2. The first is at most 2 alpha q p, p = sum
+// |h_a| |u_a|, p^2 <= H sum (|h_a| / w_a) u_a^2, H = sum |h_a| w_a, so at most alpha (q^2 H/g + p^2 g/H).
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -109,11 +110,11 @@ class CellBody {
   void bound(const dfm_kin &k, double *ksum, double *csum) const {
     for (uint32_t c = 0; c < ncell_; ++c) {
       const Cell &cell = cell_[c];
-      double more = 0, grown = 1;
+      double more[kMostNodes] = {}, grown = 1;
       if (of_.turns) growth(k, c, grown, more);
       for (uint32_t a = 0; a < nodes_; ++a) {
         const uint32_t i = corner(c, a);
-        ksum[i] += grown * cell.row[a] + more * cell.share[a];
+        ksum[i] += grown * cell.row[a] + more[a];
         csum[i] += at(kDampingStiffness, c) * grown * cell.row[a];
       }
     }
@@ -186,7 +187,7 @@ class CellBody {
     double mean[kMostNodes][3] = {};  // 1/m, G
     double row[kMostNodes] = {};      // N/m, D_a of this cell
     double share[kMostNodes] = {};    // |G_a| g / w_a
-    double excess = 0;                // g max(|G_a| / (w_a D_a))
+    double g = 0, excess = 0;         // sum |G_a| w_a, g max(|G_a| / (w_a D_a))
   };
   // One at the positions of a call.
   struct Moved {
@@ -293,6 +294,7 @@ class CellBody {
         length[a] = std::sqrt((g[0] * g[0] + g[1] * g[1]) + g[2] * g[2]);
         sum += length[a] * weight_[corner(c, a)];
       }
+      cell.g = sum;
       cell.excess = 0;
       for (uint32_t a = 0; a < nodes_; ++a) {
         const double w = weight_[corner(c, a)];
@@ -445,27 +447,29 @@ class CellBody {
     for (uint32_t j = 0; j < 3; ++j) f[size_t(k.stride) * i + j] += sum[j];
   }
 
-  // grown: factor of the rows at rest; more: of the shares.
-  void growth(const dfm_kin &k, uint32_t c, double &grown, double &more) const {
+  // grown: factor of the rows at rest; more: what comes on top by node.
+  void growth(const dfm_kin &k, uint32_t c, double &grown, double (&more)[kMostNodes]) const {
     Moved m;
-    double h[kMostNodes][3], moment[9] = {}, rows = 0, eta = 0, second = 0;
+    double h[kMostNodes][3], pull[kMostNodes], moment[9] = {}, rows = 0, all = 0, second = 0;
     move(k, c, m);
     apply(c, m.u, h);
     const Cell &cell = cell_[c];
     const auto square = [](const double *x) { return (x[0] * x[0] + x[1] * x[1]) + x[2] * x[2]; };
     for (uint32_t a = 0; a < nodes_; ++a) {
       rows += cell.row[a] * square(m.u[a]);
-      const double g2 = square(cell.mean[a]), h2 = square(h[a]);
-      if (g2 > 0) eta = std::max(eta, h2 / g2);
+      pull[a] = std::sqrt(square(h[a]));
+      all += pull[a] * weight_[corner(c, a)];
       for (uint32_t n = 0; n < 9; ++n) moment[n] += h[a][n / 3] * m.d[a][n % 3];
     }
     for (const double x : moment) second += x * x;
-    eta = std::sqrt(eta);
     second = std::sqrt(second);
     const double alpha = norm_of(m.inverse), stretch = norm_of(m.s), root = std::sqrt(2.0);
     const double e = alpha * std::sqrt(rows * cell.excess);
     grown = (1 + e) * (1 + e);
-    more = 2 * alpha * eta + alpha * alpha * second * (1 + root * (1 + root + 2 * alpha * stretch));
+    const double twist =
+        alpha * all / cell.g + alpha * alpha * second * (1 + root * (1 + root + 2 * alpha * stretch));
+    for (uint32_t a = 0; a < nodes_; ++a)
+      more[a] = twist * cell.share[a] + alpha * cell.g * pull[a] / weight_[corner(c, a)];
   }
 
   // blk -= by R P^T K P R^T. With Z_a = sum K_ab [u_b]x, Y = sum [u_a]x^T Z_a, C_a = A^-1 [G_a]x:

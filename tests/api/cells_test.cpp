@@ -175,7 +175,7 @@ TEST(CellWorlds, Scene_MakesThemAndAWrittenSceneHasThem) {
   dfm_world world = 0, again = 0;
   DFM_OK_OR_DIE(dfm_scene_load(context, path.c_str(), &world));
   test::run(world, 0.02, 0.01);
-  const std::string copy = folder + "/copy/scene.json";
+  const std::string copy = folder + "/copy.json";
   DFM_OK_OR_DIE(dfm_world_write_scene(world, copy.c_str(), nullptr, nullptr));
   DFM_OK_OR_DIE(dfm_scene_load(context, copy.c_str(), &again));
   for (const char *name : {"second", "bricks"}) {
@@ -189,7 +189,7 @@ TEST(CellWorlds, Scene_MakesThemAndAWrittenSceneHasThem) {
   std::string wrong = kScene;
   wrong.replace(wrong.find("\"beam\""), 6, "\"bricks\"");
   test::write_file(path, wrong);
-  EXPECT_EQ(dfm_scene_load(context, path.c_str(), &world), DFM_E_FORMAT);
+  EXPECT_EQ(dfm_scene_load(context, path.c_str(), &world), DFM_E_ARG);
   test::says({"/bodies/0/mesh/order", "bricks are of first order"});
 }
 

@@ -288,7 +288,7 @@ TEST(MeshRead, VtkStructure_IsChecked) {
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 2\n10\n10\n", DFM_E_FORMAT,
                  {"2 types", "1 cells"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n10\n", DFM_E_FORMAT,
-                 {"tetrahedron", "3 points"});
+                 {"tetrahedra", "3 points"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
                  {"no tetrahedra", "TetMesh.fill", "deform mesh fill ", "/v.vtk", " --out ", "/v.vtu"});
   expect_refusal("a v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,

@@ -171,7 +171,7 @@ TEST(ReadVtu, Structure_IsChecked) {
   expect_refusal(file(piece(4, kFour, 2, "0 1 2 3 0 1 2 3", "4 3", "10 10")), DFM_E_FORMAT,
                  {"offset of cell 1 is 3"});
   expect_refusal(file(piece(4, kFour, 2, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"2 offsets"});
-  expect_refusal(file(piece(4, kFour, 1, "0 1 2", "3", "10")), DFM_E_FORMAT, {"tetrahedron", "3 points"});
+  expect_refusal(file(piece(4, kFour, 1, "0 1 2", "3", "10")), DFM_E_FORMAT, {"tetrahedra", "3 points"});
   expect_refusal(file(piece(4, "0 0 0", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"12 points"});
   expect_refusal(file(piece(4, "0 0 0 1 0 0 0 nan 0 0 0 1", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT,
                  {"a.vtu:3:", "'nan'"});
