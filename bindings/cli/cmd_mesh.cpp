@@ -159,7 +159,8 @@ int make(const Globals &globals, const Shape &shape) {
   {
     const Patience patience(told(globals), "making " + shape.out);
     const dfm_status made =
-        surface ? dfm_trimesh_make(s.context, shape.kind == "bricks" ? "beam" : shape.kind.c_str(), size.data(), shape.cells, &s.surface)
+        surface ? dfm_trimesh_make(s.context, shape.kind == "bricks" ? "beam" : shape.kind.c_str(),
+                                   size.data(), shape.cells, &s.surface)
                 : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
     if (made < 0) return fail(dfm_last_error());
     if (!surface && shape.order == 2 && dfm_tetmesh_second_order(s.cells, &s.cells) < 0)
@@ -178,8 +179,8 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
   command.needs_subcommand();
   for (const Kind &kind :
        {Kind{"cylinder", "axis z, base at the origin"}, Kind{"beam", "edges from the origin"},
-        Kind{"bricks", "a beam of hexahedra"},
-        Kind{"ball", "about the origin"}, Kind{"tube", "a cylinder with a hole; axis z, base at the origin"},
+        Kind{"bricks", "a beam of hexahedra"}, Kind{"ball", "about the origin"},
+        Kind{"tube", "a cylinder with a hole; axis z, base at the origin"},
         Kind{"torus", "a surface; about the origin, axis z"}}) {
     const std::string name = kind.name;
     Command sub = command.command(name, kind.about);
@@ -194,7 +195,8 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
     sub.option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")
         .with_default()
         .type_name("N");
-    if (name == "beam" || name == "bricks") sub.option("--size", shape->edges, "edges x y z, m").values(3).with_default();
+    if (name == "beam" || name == "bricks")
+      sub.option("--size", shape->edges, "edges x y z, m").values(3).with_default();
     else
       sub.option("--radius", shape->radius,
                  name == "tube"    ? "outer, m"

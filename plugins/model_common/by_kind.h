@@ -22,9 +22,13 @@ struct ByKind {
   }
   // The body that the instance has.
   template <class Use>
-  auto with(const Use &use) { return by_cells ? use(cells) : use(tet); }
+  auto with(const Use &use) {
+    return by_cells ? use(cells) : use(tet);
+  }
   template <class Use>
-  auto with(const Use &use) const { return by_cells ? use(cells) : use(tet); }
+  auto with(const Use &use) const {
+    return by_cells ? use(cells) : use(tet);
+  }
 
   void apply_params(const double *values) {
     with([&](auto &b) { b.apply_params(values); });

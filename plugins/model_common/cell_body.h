@@ -2,9 +2,9 @@
 // at rest, in a frame R that turns with the cell, or stands still: with d_a = R^T x_a and X_a the rest
 // positions
 //   u_a = d_a - X_a,   E = u.K u / 2,   h = K u,   f = -dE/dx = -R P^T h,   P = du/d(R^T dx).
-// R is the polar factor of the mean gradient F = sum x_a (x) G_a, S = R^T F. A change d of the d_a turns it by
-//   w = A^-1 sum G_a x d_a,  A = tr S I - S;   P d = d_a - w x d_a,   (P^T h)_a = h_a - (A^-1 tau) x G_a,
-// tau = sum d_a x h_a = sum u_a x h_a, since K resists no rotation of X So the forces are the gradient of an
+// R is the polar factor of the mean gradient F = sum x_a (x) G_a, S = R^T F. A change e of d turns it by
+//   w = A^-1 sum G_a x e_a,  A = tr S I - S;   (P e)_a = e_a - w x d_a,   (P^T h)_a = h_a - (A^-1 tau) x G_a,
+// tau = sum d_a x h_a = sum u_a x h_a, since K resists no rotation of X. So the forces are the gradient of an
 // energy that no rotation changes, and have no moment. The tangent is R P^T K P R^T, positive semidefinite;
 // what the turning of P adds is left out. The damper is damping_stiffness R P^T K P R^T v.
 //
@@ -14,9 +14,10 @@
 // e^2 = alpha^2 (sum D_a U_a^2) g max(|G_a| / (w_a D_a)) the square in K of the bracket is at most
 // (1 + e)^2 sum D_a u_a^2. What the turning of P adds is
 //   -2 h.(w x u) + h.(w x (w x d)) - tau.dw,   |A dw| <= |dA| |w| + q |w|.
-// With M = sum h_a (x) d_a, |tau| <= sqrt 2 |M|, |dA| <= sqrt 2 (1 + sqrt 2 alpha |S|) q the last two are at most
-// (alpha^2 |M| + sqrt 2 |M| alpha^2 (1 + sqrt 2 + 2 alpha |S|)) q^2. The first is at most 2 alpha q p, p = sum
-// |h_a| |u_a|, p^2 <= H sum (|h_a| / w_a) u_a^2, H = sum |h_a| w_a, so at most alpha (q^2 H/g + p^2 g/H).
+// With M = sum h_a (x) d_a, |tau| <= sqrt 2 |M|, |dA| <= sqrt 2 (1 + sqrt 2 alpha |S|) q the last two are at
+// most (alpha^2 |M| + sqrt 2 |M| alpha^2 (1 + sqrt 2 + 2 alpha |S|)) q^2. The first is at most 2 alpha q p,
+// p = sum |h_a| |u_a|, p^2 <= H sum (|h_a| / w_a) u_a^2, H = sum |h_a| w_a, so at most
+// alpha (q^2 H/g + p^2 g/H).
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -97,14 +98,20 @@ class CellBody {
 
   void add_forces(const dfm_kin &k, double *f) {
     Call call{this, &k, f};
-    run(ncell_, [](void *user, uint32_t begin, uint32_t end) {
-      const Call &of = *static_cast<const Call *>(user);
-      for (uint32_t c = begin; c < end; ++c) of.body->force_of(*of.k, c);
-    }, call);
-    run(npoint_, [](void *user, uint32_t begin, uint32_t end) {
-      const Call &of = *static_cast<const Call *>(user);
-      for (uint32_t i = begin; i < end; ++i) of.body->sum_point(*of.k, i, of.f);
-    }, call);
+    run(
+        ncell_,
+        [](void *user, uint32_t begin, uint32_t end) {
+          const Call &of = *static_cast<const Call *>(user);
+          for (uint32_t c = begin; c < end; ++c) of.body->force_of(*of.k, c);
+        },
+        call);
+    run(
+        npoint_,
+        [](void *user, uint32_t begin, uint32_t end) {
+          const Call &of = *static_cast<const Call *>(user);
+          for (uint32_t i = begin; i < end; ++i) of.body->sum_point(*of.k, i, of.f);
+        },
+        call);
   }
 
   void bound(const dfm_kin &k, double *ksum, double *csum) const {
@@ -141,8 +148,8 @@ class CellBody {
       double local[9], half[9] = {};
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
-          local[3 * i + j] = l.mu * (m.s[3 * i + j] + m.s[3 * j + i]) +
-                             (i == j ? l.lambda * trace - 2 * l.mu : 0);
+          local[3 * i + j] =
+              l.mu * (m.s[3 * i + j] + m.s[3 * j + i]) + (i == j ? l.lambda * trace - 2 * l.mu : 0);
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
           for (int n = 0; n < 3; ++n) half[3 * i + j] += m.r[3 * i + n] * local[3 * n + j];
@@ -203,7 +210,8 @@ class CellBody {
   static bool refuse(const dfm_host *h, const Of &of, const char *key) {
     char text[200];
     std::snprintf(text, sizeof text,
-                  "parameter %s is for first-order tetrahedra alone; leave it out, or give a mesh of those", key);
+                  "parameter %s is for first-order tetrahedra alone; leave it out, or give a mesh of those",
+                  key);
     complain(h, of.id, text);
     return false;
   }
@@ -218,7 +226,8 @@ class CellBody {
 
   template <class Piece>
   void run(uint32_t n, Piece piece, Call &call) const {
-    if (ncell_ >= kParallelCells && host->parallel_for) host->parallel_for(host->ctx, n, kGrain, piece, &call);
+    if (ncell_ >= kParallelCells && host->parallel_for)
+      host->parallel_for(host->ctx, n, kGrain, piece, &call);
     else piece(&call, 0, n);
   }
 
@@ -504,8 +513,8 @@ class CellBody {
             for (uint32_t n = 0; n < 3; ++n) {
               double yc = 0;
               for (uint32_t o = 0; o < 3; ++o) yc += y[3 * n + o] * turn[b][3 * o + j];
-              sum[3 * i + j] += z[a][3 * i + n] * turn[b][3 * n + j] +
-                                turn[a][3 * n + i] * (z[b][3 * j + n] + yc);
+              sum[3 * i + j] +=
+                  z[a][3 * i + n] * turn[b][3 * n + j] + turn[a][3 * n + i] * (z[b][3 * j + n] + yc);
             }
         for (uint32_t i = 0; i < 3; ++i)
           for (uint32_t j = 0; j < 3; ++j)
@@ -515,8 +524,7 @@ class CellBody {
             for (uint32_t n = 0; n < 3; ++n) full[3 * i + j] += half[3 * i + n] * m.r[3 * j + n];
         const uint32_t i = corner(c, a), j = corner(c, b);
         const size_t slot = a == b ? i : npoint_ + slot_[(nblock() - nodes_) * c + place(a, b) - (a + 1)];
-        for (uint32_t n = 0; n < 9; ++n)
-          blk[9 * slot + n] -= by * full[i > j ? 3 * (n % 3) + n / 3 : n];
+        for (uint32_t n = 0; n < 9; ++n) blk[9 * slot + n] -= by * full[i > j ? 3 * (n % 3) + n / 3 : n];
       }
   }
 
@@ -554,15 +562,15 @@ class CellBody {
   Of of_{};
   uint32_t kind_ = 0, nodes_ = 0, npoint_ = 0, ncell_ = 0;
   double params_[kParamCount] = {};
-  Buffer<double> field_[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
-  Buffer<double> rest_, mass_;         // [npoint,3] m, [npoint] kg
-  Buffer<uint32_t> cells_;             // [ncell,nodes]
-  Buffer<Cell> cell_;                  // [ncell]
-  Buffer<double> block_, norm_;        // [ncell,nblock,9] N/m, [ncell,nblock] their norms
-  Buffer<double> force_;               // [ncell,nodes,3] N
-  Buffer<uint32_t> begin_, place_;     // [npoint + 1], [ncell * nodes]
-  Buffer<double> drag_;                // [npoint] kg/s
-  Buffer<double> weight_, next_;       // [npoint]
+  Buffer<double> field_[kParamCount];     // [ncell] values by cell in place of a parameter's; empty without
+  Buffer<double> rest_, mass_;            // [npoint,3] m, [npoint] kg
+  Buffer<uint32_t> cells_;                // [ncell,nodes]
+  Buffer<Cell> cell_;                     // [ncell]
+  Buffer<double> block_, norm_;           // [ncell,nblock,9] N/m, [ncell,nblock] their norms
+  Buffer<double> force_;                  // [ncell,nodes,3] N
+  Buffer<uint32_t> begin_, place_;        // [npoint + 1], [ncell * nodes]
+  Buffer<double> drag_;                   // [npoint] kg/s
+  Buffer<double> weight_, next_;          // [npoint]
   mutable Buffer<uint32_t> pair_, slot_;  // [npair,2], [ncell, pairs of its nodes]
   mutable uint32_t npair_ = 0;
 };

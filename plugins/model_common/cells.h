@@ -1,4 +1,5 @@
-// Cells with more nodes than a tetrahedron's corners: their shape functions, and the stiffness of one at rest.
+// Cells with more nodes than a tetrahedron's corners: their shape functions, and the stiffness of one at
+// rest.
 // Orders of nodes are VTK's: the edges of a tetrahedron 01 12 02 03 13 23; a hexahedron around the bottom,
 // then around the top.
 //
@@ -43,7 +44,7 @@ inline double norm_of(const double *m) {
 // One cell at rest.
 struct RestCell {
   double volume = 0;
-  double mean[kMostNodes][3] = {};                         // 1/m, mean gradients of the shape functions
+  double mean[kMostNodes][3] = {};                        // 1/m, mean gradients of the shape functions
   double stiffness[3 * kMostNodes][3 * kMostNodes] = {};  // N/m, of the first 3 nodes_of(kind) rows
 };
 
@@ -54,12 +55,12 @@ constexpr int kMost = kMostNodes + kInner;
 
 // At one of the eight points of a rule.
 struct Point {
-  double at[3];            // reference coordinates
-  double weight;           // m^3 once the Jacobian is known
+  double at[3];                 // reference coordinates
+  double weight;                // m^3 once the Jacobian is known
   double local[kMostNodes][3];  // derivatives of the shape functions
-  double inverse[9];       // of the Jacobian
+  double inverse[9];            // of the Jacobian
   double jacobian;
-  double g[kMost][3];      // gradients, 1/m
+  double g[kMost][3];  // gradients, 1/m
 };
 
 constexpr int kTetEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};

@@ -120,7 +120,8 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CAPS)) return &kOwnCaps;
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
-  if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const AnyBody *>(self)->tet.plastic() ? &kSlots : &kNoSlots;
+  if (!strcmp(id, DFM_EXT_SLOTS))
+    return static_cast<const AnyBody *>(self)->tet.plastic() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;

@@ -44,13 +44,13 @@ const char *const kEffects[] = {"damping", nullptr};
 
 const dfm_model kModel =
     model::table<AnyBody>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
-                       create, set_params, nullptr, extension);
+                          create, set_params, nullptr, extension);
 
-const dfm_type kType = dfm::plugin::type(
-    DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",
-    "finite elements of linear elasticity (Zienkiewicz, Taylor, Zhu 2013, The Finite "
-    "Element Method: Its Basis and Fundamentals, ch. 2)",
-    kParams, kEffects, &kModel);
+const dfm_type kType =
+    dfm::plugin::type(DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",
+                      "finite elements of linear elasticity (Zienkiewicz, Taylor, Zhu 2013, The Finite "
+                      "Element Method: Its Basis and Fundamentals, ch. 2)",
+                      kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace linear

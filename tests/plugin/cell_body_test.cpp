@@ -43,8 +43,9 @@ struct Body : ModelInstance {
       Vec at = rest;
       for (size_t r = 0; r < 3; ++r)
         for (size_t c = 0; c < 3; ++c) at[r] += a[r][c] * rest[c];
-      set(x, i, std::cos(angle) * at + std::sin(angle) * cross(axis, at) +
-                    (1 - std::cos(angle)) * dot(axis, at) * axis);
+      set(x, i,
+          std::cos(angle) * at + std::sin(angle) * cross(axis, at) +
+              (1 - std::cos(angle)) * dot(axis, at) * axis);
     }
   }
 };
@@ -96,10 +97,12 @@ TEST_P(CellBody, UniformStrain_LeavesInnerPointsInBalance) {
     EXPECT_GE(n, 8u);
     if (GetParam().turns()) continue;
     const std::vector<double> stress = stress_of_cells(b);
-    const double lambda = kYoung * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu = kYoung / 2 / (1 + poisson);
+    const double lambda = kYoung * poisson / ((1 + poisson) * (1 - 2 * poisson)),
+                 mu = kYoung / 2 / (1 + poisson);
     for (size_t k = 0; k < stress.size(); ++k) {
       const int r = kStressRow[k % 6], c = kStressColumn[k % 6];
-      EXPECT_NEAR(stress[k], mu * (kA[r][c] + kA[c][r]) + (r == c ? lambda * 0.012 : 0), 1e-9 * lambda + 1e-8);
+      EXPECT_NEAR(stress[k], mu * (kA[r][c] + kA[c][r]) + (r == c ? lambda * 0.012 : 0),
+                  1e-9 * lambda + 1e-8);
     }
   }
 }
@@ -178,7 +181,7 @@ double field_error(uint32_t kind, uint32_t n) {
     return Vec{e * sy * sz, 0.6 * e * cy * sz, 0.8 * e * sy * cz};
   };
   const double h = 1.0 / n;
-  const Mesh m = kind == DFM_CELL_HEX8   ? brick_bar(n, n, n, {h, h, h})
+  const Mesh m = kind == DFM_CELL_HEX8  ? brick_bar(n, n, n, {h, h, h})
                  : kind == DFM_CELL_TET ? kuhn_bar(n, n, n, h)
                                         : second_order(kuhn_bar(n, n, n, h));
   Host host;

@@ -20,8 +20,7 @@ inline Mesh second_order(const Mesh &m, double noise = 0) {
     const uint32_t *q = &m.cells[4 * size_t(c)];
     for (int a = 0; a < 4; ++a) out.cells.push_back(q[a]);
     for (const auto &e : kEdgesOfTet) {
-      const auto [at, fresh] =
-          middle.insert({std::minmax(q[e[0]], q[e[1]]), uint32_t(out.rest.size() / 3)});
+      const auto [at, fresh] = middle.insert({std::minmax(q[e[0]], q[e[1]]), uint32_t(out.rest.size() / 3)});
       if (fresh) {
         const Vec x = m.at(q[e[0]]), y = m.at(q[e[1]]);
         const double length = norm(y - x);

@@ -6,8 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Reads the tetrahedra, of first or second order, or the hexahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary;
- * doc/reference/mesh_files.md). The format is recognized by the first bytes, else by the file name ending.
+/** Reads tetrahedra, also of second order, or hexahedra: MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU, Medit
+ * (ASCII and binary; doc/reference/mesh_files.md). The first bytes, else the ending, tell the format.
  * Memory is bounded by the size of the file.
  * Inverted cells are reversed, unused points and duplicate cells removed, each with a count in a warning of
  * the log and in dfm_tetmesh_info. A cell without volume is refused: it has no rest shape.
@@ -18,8 +18,8 @@ DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_
 /** Generators, SI units, with about `cells` tetrahedra: the nearest number that the shape's lattice allows,
  * more if cells would otherwise be longer than twice their width.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y,
- * z} edges from the origin; "bricks": the same of hexahedra; "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius,
- * outer radius, length}, as the cylinder.
+ * z} edges from the origin; "bricks": the same of hexahedra; "ball": size = {radius, 0, 0}, about the origin;
+ * "tube": size = {inner radius, outer radius, length}, as the cylinder.
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3],
                                     uint32_t cells, dfm_tetmesh *out);

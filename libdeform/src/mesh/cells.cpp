@@ -58,8 +58,7 @@ Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<
 
 void mass_shares(const CellKind &kind, const double *points, const uint32_t *cell, double *out) {
   if (kind.nodes != 8) {
-    for (uint32_t k = 0; k < kind.nodes; ++k)
-      out[k] = kind.nodes == 4 ? 0.25 : k < 4 ? 1.0 / 36 : 4.0 / 27;
+    for (uint32_t k = 0; k < kind.nodes; ++k) out[k] = kind.nodes == 4 ? 0.25 : k < 4 ? 1.0 / 36 : 4.0 / 27;
     return;
   }
   constexpr double kGauss = 0.57735026918962576451;

@@ -24,7 +24,7 @@ Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<
 
 // Shares of a cell's mass by node, all positive, their sum 1. Of a hexahedron the row sums of its mass
 // matrix. Those of a second-order tetrahedron are negative at the corners, so its diagonal is scaled instead
-// (Hinton, Rock, Zienkiewicz 1976, A note on mass lumping and related processes in the finite element method).
+// (Hinton, Rock, Zienkiewicz 1976, A note on mass lumping and related processes).
 void mass_shares(const CellKind &kind, const double *points, const uint32_t *cell, double *out);
 
 // The same shape by second-order tetrahedra whose edges are straight.

@@ -193,8 +193,7 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const MeshStatistics s = mesh_statistics(mesh);
   if (mesh.turned)
     warn(format("%u of %u cells had negative volume and %s turned", mesh.turned,
-                s.ntet / cell_kind(mesh.cell).tets,
-                was_were(mesh.turned)));
+                s.ntet / cell_kind(mesh.cell).tets, was_were(mesh.turned)));
   if (mesh.overlapping)
     warn(
         format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh "

@@ -104,8 +104,8 @@ struct Grid {
   }
 };
 
-// Tries cubes of the size that gives the number of cells, `each` of them a cube, and smaller ones, each edge's number
-// rounded down and up.
+// Tries cubes of the size that gives the number of cells, `each` of them a cube, and smaller ones, the number of
+// each edge rounded down and up.
 Grid choose_grid(const double size[3], uint32_t cells, double each) {
   const double cubes = std::max(1.0, cells / each);
   const double shortest = std::min({size[0], size[1], size[2]});
@@ -333,7 +333,9 @@ TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t
     for (uint32_t j = 0; j <= g.n[1]; ++j)
       for (uint32_t k = 0; k <= g.n[2]; ++k)
         add_point(mesh, {x * i / g.n[0], y * j / g.n[1], z * k / g.n[2]});
-  const auto at = [&](uint32_t i, uint32_t j, uint32_t k) { return (i * (g.n[1] + 1) + j) * (g.n[2] + 1) + k; };
+  const auto at = [&](uint32_t i, uint32_t j, uint32_t k) {
+    return (i * (g.n[1] + 1) + j) * (g.n[2] + 1) + k;
+  };
   for (uint32_t i = 0; i < g.n[0]; ++i)
     for (uint32_t j = 0; j < g.n[1]; ++j)
       for (uint32_t k = 0; k < g.n[2]; ++k)

@@ -24,7 +24,7 @@ struct TetMesh {
     use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share);
   }
   const Memory *memory;
-  Array<double> points;       // [npoint,3], m
+  Array<double> points;  // [npoint,3], m
   // DFM_CELL_* of plugin.h; of another kind than tetrahedra, nodes by cell: `tets` are then the tetrahedra of
   // each, as many as mesh/cells.h says, and [ntet] arrays go by these
   uint32_t cell = 8;
@@ -67,7 +67,7 @@ TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char
 // ---- generators (SI units, near-isotropic cells, about `cells` of them) -----------------------------------
 // axis z, base at the origin
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);
-TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);  // from the origin
+TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);    // from the origin
 TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells);  // as the beam
 // about the origin
 TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);

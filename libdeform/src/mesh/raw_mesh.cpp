@@ -114,8 +114,8 @@ void RawMesh::expect_tets(size_t n) {
 void RawMesh::add_cell(const Cursor &at, uint32_t kind, const uint32_t *nodes, uint32_t in_group) {
   const CellKind &of = cell_kind(kind);
   if (cell && cell != kind)
-    at.unsupported("%s beside %s; a body has cells of one kind: write one of them alone",
-                   of.name, cell_kind(cell).name);
+    at.unsupported("%s beside %s; a body has cells of one kind: write one of them alone", of.name,
+                   cell_kind(cell).name);
   cell = kind;
   if (tet_group.size() + of.tets >= kMaxTets) at.unsupported("more than %u tetrahedra", kMaxTets - 1);
   if (of.tets > 1) cells.insert(cells.end(), nodes, nodes + of.nodes);

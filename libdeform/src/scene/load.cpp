@@ -76,8 +76,8 @@ bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
 // Stored under a name that no file can have.
 std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
-  const std::string name =
-      format("/dev/null/%s %a %a %a %u %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells, m.order);
+  const std::string name = format("/dev/null/%s %a %a %a %u %u", m.kind.c_str(), m.size[0], m.size[1],
+                                  m.size[2], m.cells, m.order);
   dfm_tetmesh &mesh = cells_[name];
   if (mesh) return name;
   def_.require(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
@@ -88,11 +88,10 @@ std::string MeshFiles::make(const Body &b) {
   }
   const dfm_tetmesh_info info = info_of(mesh, b.pointer + "/mesh");
   if (info.ncell > 2 * uint64_t{m.cells} && info.ncell > m.cells + kCheapCells)
-    context_->logf(
-        DFM_LOG_WARNING,
-        "body '%s': its %s has %u cells, not about %u: cells are about as long as thick, and no "
-        "fewer of them fit into its thickness; make it thicker for fewer",
-        b.name.c_str(), m.kind.c_str(), info.ncell, m.cells);
+    context_->logf(DFM_LOG_WARNING,
+                   "body '%s': its %s has %u cells, not about %u: cells are about as long as thick, and no "
+                   "fewer of them fit into its thickness; make it thicker for fewer",
+                   b.name.c_str(), m.kind.c_str(), info.ncell, m.cells);
   return name;
 }
 

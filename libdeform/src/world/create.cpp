@@ -111,8 +111,10 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
     b.cells = Array<uint32_t>(def.cells, def.cells + size_t(def.ntet / kind.tets) * kind.nodes,
                               HookAllocator<uint32_t>(m));
     if (def.ntet % kind.tets || tets_of(m, kind, b.cells) != b.tets)
-      fail(DFM_E_ARG, "body '%s': its tetrahedra are not those of its %s; give both as dfm_tetmesh_data and "
-           "dfm_tetmesh_cells do", b.name.c_str(), kind.name);
+      fail(DFM_E_ARG,
+           "body '%s': its tetrahedra are not those of its %s; give both as dfm_tetmesh_data and "
+           "dfm_tetmesh_cells do",
+           b.name.c_str(), kind.name);
     if (def.cell_share)
       fail(DFM_E_UNSUPPORTED, "body '%s': %s are wholly material; give no cell_share", b.name.c_str(),
            kind.name);

@@ -144,13 +144,15 @@ TEST(CellFiles, ReflectedCells_AreTurned) {
 }
 
 TEST(CellFiles, WhatIsNoBody_IsRefused) {
-  expect_refusal(kMsh22 + kTen + "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 4 2 0 1 1 2 3 4\n$EndElements\n",
-                 DFM_E_UNSUPPORTED, {"tetrahedra beside second-order tetrahedra", "one kind"});
+  expect_refusal(
+      kMsh22 + kTen + "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 4 2 0 1 1 2 3 4\n$EndElements\n",
+      DFM_E_UNSUPPORTED, {"tetrahedra beside second-order tetrahedra", "one kind"});
   expect_refusal(kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 2 3 4 6 5 7 8 9 10\n$EndElements\n",
                  DFM_E_FORMAT, {"cell 0", "distorted", "order its points"});
-  expect_refusal(kMsh22 + kTen +
-                     "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n",
-                 DFM_E_FORMAT, {"on one another"});
+  expect_refusal(
+      kMsh22 + kTen +
+          "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n",
+      DFM_E_FORMAT, {"on one another"});
   TetMesh filled = make_beam(kMemory, 1, 1, 1, 50);
   filled.share.assign(filled.ntet(), 0.5);
   EXPECT_THROW(second_order(filled), Error);

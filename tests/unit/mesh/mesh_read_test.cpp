@@ -345,9 +345,11 @@ TEST(MeshRead, MshStructure_IsChecked) {
                  {"double quotes"});
   const std::string hexes = "$Elements\n1 1 1 1\n3 1 6 1\n1 1 2 3 4 1 2\n$EndElements\n";
   expect_refusal("m.msh", kMsh41 + nodes + hexes, DFM_E_UNSUPPORTED, {"prism", "hexahedra of 8 points"});
-  expect_refusal("m.msh",
-                 kMsh41 + nodes + "$Elements\n1 1 1 1\n3 1 29 1\n1 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4\n$EndElements\n",
-                 DFM_E_UNSUPPORTED, {"above second order", "-order 1"});
+  expect_refusal(
+      "m.msh",
+      kMsh41 + nodes +
+          "$Elements\n1 1 1 1\n3 1 29 1\n1 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4\n$EndElements\n",
+      DFM_E_UNSUPPORTED, {"above second order", "-order 1"});
 }
 
 TEST(MeshRead, OtherFiles_AreRefusedByEnding) {
