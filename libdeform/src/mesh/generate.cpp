@@ -104,8 +104,8 @@ struct Grid {
   }
 };
 
-// Tries cubes of the size that gives the number of cells, `each` of them a cube, and smaller ones, the number of
-// each edge rounded down and up.
+// Tries cubes of the size that gives the number of cells, `each` of them a cube, and smaller ones, the number
+// of each edge rounded down and up.
 Grid choose_grid(const double size[3], uint32_t cells, double each) {
   const double cubes = std::max(1.0, cells / each);
   const double shortest = std::min({size[0], size[1], size[2]});
