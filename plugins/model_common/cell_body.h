@@ -30,6 +30,7 @@
 #include "entry.h"
 #include "params.h"
 #include "rotation.h"
+#include "small_range.h"
 
 namespace model {
 
@@ -128,13 +129,24 @@ class CellBody {
     for (uint32_t i = 0; i < npoint_; ++i) csum[i] += drag_[i];
   }
 
-  double energy(const dfm_kin &k) const {
+  double energy(const dfm_kin &k) {
     double sum = 0;
-    for (uint32_t c = 0; c < ncell_; ++c) sum += energy_of(k, c);
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      Moved m;
+      sum += energy_of(k, c, m);
+      if (of_.turns) continue;
+      double h[3][3];
+      for (int i = 0; i < 9; ++i) h[i / 3][i % 3] = m.s[i] - (i % 4 == 0);
+      range_.look(c, h);
+    }
+    range_.tell(host, of_.id);
     return sum;
   }
   void cell_energy(const dfm_kin &k, double *density) const {
-    for (uint32_t c = 0; c < ncell_; ++c) density[c] = energy_of(k, c) / cell_[c].volume;
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      Moved m;
+      density[c] = energy_of(k, c, m) / cell_[c].volume;
+    }
   }
 
   // Of the mean strain in the frame, turned into the axes of the world.
@@ -392,8 +404,7 @@ class CellBody {
         }
   }
 
-  double energy_of(const dfm_kin &k, uint32_t c) const {
-    Moved m;
+  double energy_of(const dfm_kin &k, uint32_t c, Moved &m) const {
     double h[kMostNodes][3], sum = 0;
     move(k, c, m);
     apply(c, m.u, h);
@@ -562,15 +573,16 @@ class CellBody {
   Of of_{};
   uint32_t kind_ = 0, nodes_ = 0, npoint_ = 0, ncell_ = 0;
   double params_[kParamCount] = {};
-  Buffer<double> field_[kParamCount];     // [ncell] values by cell in place of a parameter's; empty without
-  Buffer<double> rest_, mass_;            // [npoint,3] m, [npoint] kg
-  Buffer<uint32_t> cells_;                // [ncell,nodes]
-  Buffer<Cell> cell_;                     // [ncell]
-  Buffer<double> block_, norm_;           // [ncell,nblock,9] N/m, [ncell,nblock] their norms
-  Buffer<double> force_;                  // [ncell,nodes,3] N
-  Buffer<uint32_t> begin_, place_;        // [npoint + 1], [ncell * nodes]
-  Buffer<double> drag_;                   // [npoint] kg/s
-  Buffer<double> weight_, next_;          // [npoint]
+  Buffer<double> field_[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
+  Buffer<double> rest_, mass_;         // [npoint,3] m, [npoint] kg
+  Buffer<uint32_t> cells_;             // [ncell,nodes]
+  Buffer<Cell> cell_;                  // [ncell]
+  Buffer<double> block_, norm_;        // [ncell,nblock,9] N/m, [ncell,nblock] their norms
+  Buffer<double> force_;               // [ncell,nodes,3] N
+  Buffer<uint32_t> begin_, place_;     // [npoint + 1], [ncell * nodes]
+  Buffer<double> drag_;                // [npoint] kg/s
+  Buffer<double> weight_, next_;       // [npoint]
+  SmallRange range_;
   mutable Buffer<uint32_t> pair_, slot_;  // [npair,2], [ncell, pairs of its nodes]
   mutable uint32_t npair_ = 0;
 };

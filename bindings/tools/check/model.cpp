@@ -99,7 +99,8 @@ void Solid::find_edges() {
   std::set<std::pair<uint32_t, uint32_t>> all;
   for (uint32_t c = 0; c < ncell(); ++c)
     for (uint32_t k = 0; k < nodes(); ++k)
-      for (uint32_t l = 0; l < k; ++l) all.insert(std::minmax(cells[nodes() * c + k], cells[nodes() * c + l]));
+      for (uint32_t l = 0; l < k; ++l)
+        all.insert(std::minmax(cells[nodes() * c + k], cells[nodes() * c + l]));
   edges.clear();
   for (const auto &[i, j] : all) edges.insert(edges.end(), {i, j});
 }
@@ -212,7 +213,11 @@ std::vector<Variant> variants(const Subject &subject) {
 }
 
 Body::Body(const Subject &s, const Solid &of, const Variant &variant, uint32_t width, Refusal refusal)
-    : subject(s), solid(with_cells(of, variant.cell)), params(variant.params), ops(model_of(s)), stride(width) {
+    : subject(s),
+      solid(with_cells(of, variant.cell)),
+      params(variant.params),
+      ops(model_of(s)),
+      stride(width) {
   dfm_mesh m{};
   const char *const no_key = nullptr;
   const double *const no_field = nullptr;
