@@ -1,6 +1,6 @@
-// The range of small displacements, and warnings where a body leaves it. Energies are computed occasionally and
-// not in each step, so rotations and strains are checked there. Of a turn by theta about an axis n the forces
-// are zero with u = tan(theta) n x X, so the antisymmetric part of the gradient is its tangent.
+// The range of small displacements, and warnings where a body leaves it. Energies are computed occasionally
+// and not in each step, so rotations and strains are checked there. Of a turn by theta about an axis n the
+// forces are zero with u = tan(theta) n x X, so the antisymmetric part of the gradient is its tangent.
 #pragma once
 #include <algorithm>
 #include <cmath>
@@ -36,8 +36,8 @@ class SmallRange {
     char text[320];
     std::snprintf(text, sizeof text,
                   "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: "
-                  "beyond %.0f degrees or %.0f %% this model treats rotation as strain, so the body swells and "
-                  "its forces are wrong; corotational_fem has no such limit.",
+                  "beyond %.0f degrees or %.0f %% this model treats rotation as strain, so the body swells "
+                  "and its forces are wrong; corotational_fem has no such limit.",
                   who, most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn),
                   100 * kLargestStrain);
     host->log(host->ctx, 2, 0, text);
