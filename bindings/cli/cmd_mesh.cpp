@@ -128,7 +128,7 @@ int convert(const Globals &globals, const std::string &in, const std::string &ou
 
 struct Shape {
   std::string kind, out;
-  uint32_t cells = 1000;
+  uint32_t cells = 1000, order = 1;
   double radius = 0.2, inner = 0.15, ring = 0.5, length = 1;
   std::vector<double> edges{1, 0.1, 0.1};
   bool surface = false;
@@ -159,9 +159,12 @@ int make(const Globals &globals, const Shape &shape) {
   {
     const Patience patience(told(globals), "making " + shape.out);
     const dfm_status made =
-        surface ? dfm_trimesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.surface)
+        surface ? dfm_trimesh_make(s.context, shape.kind == "bricks" ? "beam" : shape.kind.c_str(),
+                                   size.data(), shape.cells, &s.surface)
                 : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
     if (made < 0) return fail(dfm_last_error());
+    if (!surface && shape.order == 2 && dfm_tetmesh_second_order(s.cells, &s.cells) < 0)
+      return fail(dfm_last_error());
     if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str())
                  : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
       return fail(dfm_last_error());
@@ -176,7 +179,8 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
   command.needs_subcommand();
   for (const Kind &kind :
        {Kind{"cylinder", "axis z, base at the origin"}, Kind{"beam", "edges from the origin"},
-        Kind{"ball", "about the origin"}, Kind{"tube", "a cylinder with a hole; axis z, base at the origin"},
+        Kind{"bricks", "a beam of hexahedra"}, Kind{"ball", "about the origin"},
+        Kind{"tube", "a cylinder with a hole; axis z, base at the origin"},
         Kind{"torus", "a surface; about the origin, axis z"}}) {
     const std::string name = kind.name;
     Command sub = command.command(name, kind.about);
@@ -191,7 +195,8 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
     sub.option("--cells", shape->cells, "about how many tetrahedra, or triangles of a surface")
         .with_default()
         .type_name("N");
-    if (name == "beam") sub.option("--size", shape->edges, "edges x y z, m").values(3).with_default();
+    if (name == "beam" || name == "bricks")
+      sub.option("--size", shape->edges, "edges x y z, m").values(3).with_default();
     else
       sub.option("--radius", shape->radius,
                  name == "tube"    ? "outer, m"
@@ -201,6 +206,8 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
     if (name == "tube") sub.option("--inner", shape->inner, "inner radius, m").with_default();
     if (name == "torus") sub.option("--ring", shape->ring, "radius of the ring, m").with_default();
     if (name == "cylinder" || name == "tube") sub.option("--length", shape->length, "m").with_default();
+    if (name != "bricks" && name != "torus")
+      sub.option("--order", shape->order, "2: second-order tetrahedra").with_default().type_name("1|2");
     sub.flag("--surface", shape->surface, "the surface alone, also as .vtk or .vtu");
     sub.calls([=, &globals] { *exit_code = make(globals, *shape); });
   }

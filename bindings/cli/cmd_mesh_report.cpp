@@ -3,6 +3,7 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
+#include <deform/plugin.h>
 
 #include "cmd_mesh.h"
 #include "crossing.h"
@@ -196,6 +197,13 @@ bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
   r.measures = {{"volume", i.volume}};
   const auto count = [&](const char *name, uint32_t n) { r.lines.emplace_back(name, std::to_string(n)); };
   count("points", i.npoint);
+  const char *const kind = i.cell == DFM_CELL_HEX8    ? "hexahedra"
+                           : i.cell == DFM_CELL_TET10 ? "second-order tetrahedra"
+                                                      : nullptr;
+  if (kind) {
+    r.counts.push_back({i.cell == DFM_CELL_HEX8 ? "hexahedra" : "second_order_tets", i.ncell});
+    r.lines.emplace_back("cells", std::to_string(i.ncell) + " " + kind);
+  }
   count("tetrahedra", i.ntet);
   count("surface triangles", i.ntriangle);
   count("edges", i.nedge);
@@ -226,7 +234,8 @@ bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
     const std::vector<uint32_t> boundary = boundary_of(tets, i.ntet);
     report_crossings(r, points, i.npoint, boundary.data(), uint32_t(boundary.size() / 3));
   }
-  r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntet) + " tetrahedra, " +
+  r.summary = std::to_string(i.npoint) + " points, " +
+              (kind ? std::to_string(i.ncell) + " " + kind : std::to_string(i.ntet) + " tetrahedra") + ", " +
               std::to_string(i.ntriangle) + " surface triangles, least mean ratio " +
               text("%.3g", i.quality_min);
   return true;

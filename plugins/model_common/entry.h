@@ -38,12 +38,23 @@ constexpr dfm_effect_rows rows_of(const dfm_effect_row (&rows)[N]) {
   return {sizeof(dfm_effect_rows), sizeof(dfm_effect_row), N, 0, rows};
 }
 
-// Why a model on tetrahedra with edges cannot use the mesh; NULL if it can.
-inline const char *wrong_with(const dfm_mesh &m) {
-  if (m.cell != DFM_CELL_TET) return "the cells must be tetrahedra";
+// The kinds of cells that a body takes: its kCells, else tetrahedra.
+template <class Body>
+constexpr uint32_t cells_of() {
+  if constexpr (requires { Body::kCells; }) return Body::kCells;
+  else return DFM_CELL_TET;
+}
+constexpr uint32_t nodes_of(uint32_t kind) {
+  return kind == DFM_CELL_TET10 ? 10 : kind == DFM_CELL_HEX8 ? 8 : 4;
+}
+
+// Why a model on these kinds of cells, with edges, cannot use the mesh; NULL if it can.
+inline const char *wrong_with(const dfm_mesh &m, uint32_t kinds) {
+  if (!(m.cell & kinds))
+    return kinds == DFM_CELL_TET ? "the cells must be tetrahedra" : "the cells are of an unknown kind";
   if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass)
     return "the mesh has no cells, points or edges";
-  for (size_t n = 0; n < 4 * size_t(m.ncell); ++n)
+  for (size_t n = 0; n < nodes_of(m.cell) * size_t(m.ncell); ++n)
     if (m.cells[n] >= m.npoint) return "a cell names a point that the mesh lacks";
   for (size_t n = 0; n < 2 * size_t(m.nedge); ++n)
     if (m.edges[n] >= m.npoint) return "an edge names a point that the mesh lacks";
@@ -55,7 +66,7 @@ inline const char *wrong_with(const dfm_mesh &m) {
 template <class Body>
 dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **self) {
   *self = nullptr;
-  if (const char *wrong = wrong_with(*m)) {
+  if (const char *wrong = wrong_with(*m, cells_of<Body>())) {
     complain(h, who, wrong);
     return DFM_E_ARG;
   }
@@ -143,7 +154,8 @@ struct Ops {
     return with_state(self, k, [&](Body &body) { body.cell_stress(*k, stress); });
   }
   static const char *const *active_effects(const void *self) {
-    return static_cast<const Body *>(self)->active_effects;
+    if constexpr (requires(const Body &b) { b.active(); }) return static_cast<const Body *>(self)->active();
+    else return static_cast<const Body *>(self)->active_effects;
   }
   static const char *idle(const void *self, uint32_t row) {
     using Row = typename Body::Row;
@@ -173,7 +185,7 @@ constexpr dfm_model table(uint32_t caps, decltype(dfm_model::create) create,
   using Of = Ops<Body>;
   return {sizeof(dfm_model),
           caps,
-          DFM_CELL_TET,
+          cells_of<Body>(),
           0,
           nullptr,
           create,

@@ -3,14 +3,14 @@
 // the equations used here.
 #include <string.h>
 
-#include "../model_common/entry.h"
 #include "corot_body.h"
 #include "deform/plugin_draft.h"
 
 namespace corot {
 
 namespace {
-using Ops = model::Ops<Body>;
+using AnyBody = model::ByKind<Body>;
+using Ops = model::Ops<AnyBody>;
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL, kUnlessGiven = DFM_PARAM_AUTO;
 const char *const kEnergies[] = {"corotational", "neo_hookean", "stvk", nullptr};
 const char *const kTangents[] = {"usual", "exact", nullptr};
@@ -70,12 +70,14 @@ bool check_params(const dfm_host *h, const double *values) {
 
 dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
   *self = nullptr;
-  return check_params(h, m->params) ? model::create<Body>(h, m, kId, self) : DFM_E_ARG;
+  return check_params(h, m->params) ? model::create<AnyBody>(h, m, kId, self) : DFM_E_ARG;
 }
 
 dfm_status set_params(void *self, const double *params) {
-  Body *body = static_cast<Body *>(self);
-  if (!check_params(body->host, params)) return DFM_E_ARG;
+  AnyBody *any = static_cast<AnyBody *>(self);
+  Body *body = &any->tet;
+  if (!check_params(any->host, params)) return DFM_E_ARG;
+  if (any->by_cells) return model::change(*any, params);
   if (params[kLocking] != body->params[kLocking]) {
     complain(body->host, "parameter locking cannot change during a run; create the body again");
     return DFM_E_ARG;
@@ -89,7 +91,7 @@ dfm_status set_params(void *self, const double *params) {
 }
 
 dfm_status state_init(const void *self, double *state) {
-  const Body &body = *static_cast<const Body *>(self);
+  const Body &body = static_cast<const AnyBody *>(self)->tet;
   if (body.plastic()) std::fill(state, state + size_t(kPlasticState) * body.ncell, 0.0);
   return DFM_OK;
 }
@@ -102,7 +104,7 @@ constexpr uint32_t kCaps = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING 
 
 // The energy is not stationary in a frame by Gram-Schmidt, so forces are no gradient and have a moment.
 uint32_t caps_of(const void *self) {
-  const bool gradient = uint32_t(static_cast<const Body *>(self)->params[kRotation]) != kQr;
+  const bool gradient = uint32_t(static_cast<const AnyBody *>(self)->tet.params[kRotation]) != kQr;
   return gradient ? kCaps : kCaps & ~uint32_t(DFM_CAP_ENERGY | DFM_CAP_ROTATION_INVARIANT);
 }
 
@@ -118,7 +120,8 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CAPS)) return &kOwnCaps;
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
-  if (!strcmp(id, DFM_EXT_SLOTS)) return static_cast<const Body *>(self)->plastic() ? &kSlots : &kNoSlots;
+  if (!strcmp(id, DFM_EXT_SLOTS))
+    return static_cast<const AnyBody *>(self)->tet.plastic() ? &kSlots : &kNoSlots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
@@ -129,7 +132,7 @@ const void *extension(const void *self, const char *id) {
 const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
                                 "anisotropy", "deform.plasticity", nullptr};
 
-const dfm_model kModel = model::table<Body>(kCaps, create, set_params, state_init, extension);
+const dfm_model kModel = model::table<AnyBody>(kCaps, create, set_params, state_init, extension);
 
 const dfm_type kType =
     dfm::plugin::type(DFM_KIND_MODEL, kId, "corotational finite elements", "0.1.0", "MIT",

@@ -7,6 +7,7 @@
 #include <cstdint>
 
 #include "../model_common/blocks.h"
+#include "../model_common/by_kind.h"
 #include "../model_common/material.h"
 #include "../model_common/tetrahedron.h"
 #include "corot_kernel.h"
@@ -47,6 +48,7 @@ void complain(const dfm_host *h, const char *what);
 
 struct Body : model::Blocks<Block> {
   using Row = Param;
+  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, true};
   // From this size on blocks go through the host's parallel_for; below it waking a worker costs more than it
   // saves. Summing the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 3000, kParallelMergeCells = 100000;

@@ -42,20 +42,6 @@ constexpr int kWeightSteps = 20;
 constexpr double kLeastWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
 constexpr int kPair[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
 
-// Largest singular value, or a little more: the largest eigenvalue of the symmetric m^T m is at most mean +
-// sqrt(2/3) |deviator|, equal where the other two are.
-double norm_of(const double *m) {
-  double a[6];
-  constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
-  for (int n = 0; n < 6; ++n) {
-    const double *x = m + kRow[n], *y = m + kCol[n];
-    a[n] = (x[0] * y[0] + x[3] * y[3]) + x[6] * y[6];
-  }
-  const double mean = ((a[0] + a[1]) + a[2]) / 3, x = a[0] - mean, y = a[1] - mean, z = a[2] - mean;
-  const double deviator2 = ((x * x + y * y) + z * z) + 2 * ((a[3] * a[3] + a[4] * a[4]) + a[5] * a[5]);
-  return __builtin_sqrt(mean + __builtin_sqrt(deviator2 * (2.0 / 3)));
-}
-
 void twist_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
   Body &body = *call.body;
@@ -90,7 +76,7 @@ void Body::find_rows(Room &room) {
       for (int b = a; b < 4; ++b) {
         double one[9];
         model::stiffness_block(shape, d, a, b, one);
-        blocks[10 * size_t(c) + kPair[a][b]] = norm_of(one);
+        blocks[10 * size_t(c) + kPair[a][b]] = model::norm_of(one);
       }
   }
   const auto row = [&](uint32_t c, int a) {

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "../model_common/edges.h"
 #include "../model_common/params.h"
@@ -20,18 +19,6 @@ namespace {
 
 // From this size on rows go through the host's parallel_for, in pieces of this many points.
 constexpr uint32_t kParallelCells = 10000, kGrain = 512;
-// Range of small displacements: tangent of the rotation, largest strain.
-constexpr double kLargestTurn = 0.27, kLargestStrain = 0.3;
-// Of warnings about it. From 15 degrees so much farther is 47.
-constexpr uint32_t kMostWarnings = 2;
-constexpr double kMuchFarther = 4;
-
-// The angle of a tangent to half a degree, for a sentence.
-double degrees_of(double tangent) {
-  if (tangent > 1) return 90 - degrees_of(1 / tangent);
-  return 57.3 * tangent / (1 + 0.28 * tangent * tangent);
-}
-
 double dot(const double *u, const double *w) { return (u[0] * w[0] + u[1] * w[1]) + u[2] * w[2]; }
 
 // out -= K d, of a block or (second end of an edge) its transpose.
@@ -238,46 +225,19 @@ double Body::density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) cons
 double Body::energy(const dfm_kin &k) {
   double sum = 0;
   Tetrahedron t;
-  Farthest most;
   for (uint32_t c = 0; c < ncell; ++c) {
     if (!cell(c, t)) continue;
     sum += t.volume * density_of(c, k, t);
-    look_at(c, k, t, most);
+    look_at(c, k, t);
   }
-  tell(most);
+  range.tell(host, kId);
   return sum;
 }
 
-// Energies are computed occasionally and not in each step, so rotations and strains are checked there. Of a
-// turn by theta about an axis n the forces are zero with u = tan(theta) n x X, so the antisymmetric part of
-// the gradient is its tangent.
-void Body::look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest &most) const {
-  double h[3][3] = {}, turn = 0, strain = 0;
+void Body::look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t) {
+  double h[3][3] = {};
   gradient_of(c, k, t, h);
-  for (size_t r = 0; r < 3; ++r) {
-    const size_t s = (r + 1) % 3;
-    const double half = 0.5 * (h[s][r] - h[r][s]);
-    turn += half * half;
-    strain = std::max({strain, std::fabs(h[r][r]), std::fabs(0.5 * (h[s][r] + h[r][s]))});
-  }
-  const double beyond = std::max(std::sqrt(turn) / kLargestTurn, strain / kLargestStrain);
-  if (beyond > most.beyond) most = {beyond, std::sqrt(turn), strain, c};
-}
-
-// Warns when a cell leaves the range, and once more when it is much farther out.
-void Body::tell(const Farthest &most) {
-  if (!(most.beyond > 1) || warnings == kMostWarnings) return;
-  if (warnings > 0 && !(most.beyond > kMuchFarther * told)) return;
-  told = most.beyond;
-  ++warnings;
-  char text[320];
-  std::snprintf(text, sizeof text,
-                "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: "
-                "beyond %.0f degrees or %.0f %% this model treats rotation as strain, so the body swells and "
-                "its forces are wrong; corotational_fem has no such limit.",
-                kId, most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn),
-                100 * kLargestStrain);
-  host->log(host->ctx, 2, 0, text);
+  range.look(c, h);
 }
 
 void Body::cell_energy(const dfm_kin &k, double *density) const {

@@ -3,7 +3,7 @@
 #include <deform/plugin.h>
 
 #include "../model_common/buffer.h"
-#include "../model_common/entry.h"
+#include "../model_common/by_kind.h"
 #include "../model_common/material.h"
 #include "../model_common/tetrahedron.h"
 
@@ -18,6 +18,8 @@ extern const dfm_param kParams[kParamCount];
 constexpr const char *kId = "org.deform.linear_fem";
 
 struct Body {
+  using Row = Param;
+  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, false};
   const dfm_host *host = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0;
   double params[kParamCount] = {};
@@ -54,14 +56,8 @@ struct Body {
   Buffer<double> drag, volume;  // [npoint] kg/s; m3, four times its own
   Buffer<double> ksum, csum;    // [npoint] of the bound
   bool damping_on = false, drag_on = false;
-  double told = 0;  // excess over the range at the last warning
-  uint32_t warnings = 0;
+  model::SmallRange range;
 
-  // The cell that is farthest from small displacements: of the limits, tangent of its turn, strain.
-  struct Farthest {
-    double beyond = 0, turn = 0, strain = 0;
-    uint32_t cell = 0;
-  };
   double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
   void take_mesh(const dfm_mesh &m);
   void take_fields(const dfm_mesh &m);
@@ -71,8 +67,7 @@ struct Body {
   void displacement(const dfm_kin &k, uint32_t point, double *u) const;
   void gradient_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double (&h)[3][3]) const;
   void strain_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t, double *e) const;
-  void look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t, Farthest &most) const;
-  void tell(const Farthest &most);
+  void look_at(uint32_t c, const dfm_kin &k, const Tetrahedron &t);
   double density_of(uint32_t c, const dfm_kin &k, const Tetrahedron &t) const;
 };
 

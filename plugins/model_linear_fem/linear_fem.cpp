@@ -8,7 +8,8 @@
 namespace linear {
 
 namespace {
-using Ops = model::Ops<Body>;
+using AnyBody = model::ByKind<Body>;
+using Ops = model::Ops<AnyBody>;
 constexpr uint32_t kEach = DFM_PARAM_RUNTIME | DFM_PARAM_PER_CELL;
 }
 const dfm_param kParams[kParamCount] = {
@@ -21,11 +22,11 @@ const dfm_param kParams[kParamCount] = {
 namespace {
 
 dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
-  return model::create<Body>(h, m, kId, self);
+  return model::create<AnyBody>(h, m, kId, self);
 }
 
 dfm_status set_params(void *self, const double *params) {
-  return model::change_in_range<Body>(self, kId, kParams, params);
+  return model::change_in_range<AnyBody>(self, kId, kParams, params);
 }
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
@@ -42,14 +43,14 @@ const void *extension(const void *, const char *id) {
 const char *const kEffects[] = {"damping", nullptr};
 
 const dfm_model kModel =
-    model::table<Body>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
-                       create, set_params, nullptr, extension);
+    model::table<AnyBody>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
+                          create, set_params, nullptr, extension);
 
-const dfm_type kType = dfm::plugin::type(
-    DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",
-    "first-order tetrahedra of linear elasticity (Zienkiewicz, Taylor, Zhu 2013, The Finite "
-    "Element Method: Its Basis and Fundamentals, ch. 2)",
-    kParams, kEffects, &kModel);
+const dfm_type kType =
+    dfm::plugin::type(DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",
+                      "finite elements of linear elasticity (Zienkiewicz, Taylor, Zhu 2013, The Finite "
+                      "Element Method: Its Basis and Fundamentals, ch. 2)",
+                      kParams, kEffects, &kModel);
 
 }  // namespace
 }  // namespace linear

@@ -64,7 +64,9 @@ TEST(DefSizes, DefaultsOfAnOlderOrANewerHeader_FillItsStructAndNothingBehind) {
         if constexpr (requires { defaults.cookie; } && !std::is_same_v<T, dfm_attach_def> &&
                       !std::is_same_v<T, dfm_scene_write_def> && !std::is_same_v<T, dfm_tool_def>)
           grown = sizeof defaults.cookie;
-        if constexpr (requires { defaults.mass_scaling; }) grown += sizeof defaults.mass_scaling;
+        if constexpr (requires { defaults.mass_scaling; })
+          grown += sizeof defaults.mass_scaling + sizeof defaults.cells + sizeof defaults.cell +
+                   sizeof defaults.reserved2;
         if constexpr (requires { defaults.only; }) grown += sizeof defaults.only;
         EXPECT_EQ(first + grown, known)
             << "it has grown: this number stays, and the line above takes the new size";

@@ -361,6 +361,12 @@ std::vector<Call> tetmesh_calls() {
       {"tetmesh_group_points",
        [](uint64_t h) { return dfm_tetmesh_group_points(h, 0, nullptr, nullptr, nullptr); }},
       {"tetmesh_triangles", [](uint64_t h) { return dfm_tetmesh_triangles(h, nullptr, nullptr, nullptr); }},
+      {"tetmesh_cells", [](uint64_t h) { return dfm_tetmesh_cells(h, nullptr, nullptr); }},
+      {"tetmesh_second_order",
+       [](uint64_t h) {
+         dfm_tetmesh out;
+         return dfm_tetmesh_second_order(h, &out);
+       }},
       {"tetmesh_file_cells",
        [](uint64_t h) {
          const uint32_t *p;

@@ -401,7 +401,7 @@ TEST(MeshApi, WrongArguments_LeaveTheOutputAlone) {
   dfm_tetmesh mesh = 77;
   const double size[3] = {1, 1, 1};
   EXPECT_EQ(dfm_tetmesh_make(c.context, "cone", size, 10, &mesh), DFM_E_ARG);
-  EXPECT_TRUE(has(dfm_last_error(), "cylinder, beam, ball or tube"));
+  EXPECT_TRUE(has(dfm_last_error(), "cylinder, beam, bricks, ball or tube"));
   EXPECT_EQ(dfm_tetmesh_make(c.context, "ball", size, 0, &mesh), DFM_E_ARG);
   EXPECT_EQ(dfm_tetmesh_make(nullptr, "ball", size, 10, &mesh), DFM_E_ARG);
   EXPECT_EQ(dfm_tetmesh_make(c.context, "ball", nullptr, 10, &mesh), DFM_E_ARG);

@@ -236,8 +236,7 @@ TEST(SceneStart, ThinSheetOfManyMoreCellsThanAskedFor_IsWarnedOf) {
     return r.err;
   };
   const std::string thin = log("[0.4, 0.4, 0.01]", "100");
-  EXPECT_NE(thin.find("body 'sheet': its beam has 4800 tetrahedra, not about 100"), std::string::npos)
-      << thin;
+  EXPECT_NE(thin.find("body 'sheet': its beam has 4800 cells, not about 100"), std::string::npos) << thin;
   EXPECT_EQ(log("[0.4, 0.4, 0.01]", "4000").find("not about"), std::string::npos);
   EXPECT_EQ(log("[0.4, 0.4, 0.04]", "100").find("not about"), std::string::npos) << "300 are as good as 100";
 }

@@ -88,10 +88,12 @@ inline const dfm_type &type_of(const char *module, uint32_t n = 0) {
 }
 
 struct Mesh {
+  uint32_t kind = DFM_CELL_TET;
   std::vector<double> rest, mass;
   std::vector<uint32_t> cells, edges;
+  uint32_t nodes() const { return kind == DFM_CELL_TET10 ? 10 : kind == DFM_CELL_HEX8 ? 8 : 4; }
   uint32_t npoint() const { return uint32_t(rest.size() / 3); }
-  uint32_t ncell() const { return uint32_t(cells.size() / 4); }
+  uint32_t ncell() const { return uint32_t(cells.size() / nodes()); }
   Vec at(uint32_t i) const { return {rest[3 * i], rest[3 * i + 1], rest[3 * i + 2]}; }
   double volume(uint32_t c) const {
     const uint32_t *q = &cells[4 * c];
@@ -119,7 +121,7 @@ inline dfm_mesh described(const Mesh &m) {
   d.size = sizeof d;
   d.npoint = m.npoint();
   d.ncell = m.ncell();
-  d.cell = DFM_CELL_TET;
+  d.cell = m.kind;
   d.rest = m.rest.data();
   d.cells = m.cells.data();
   d.mass = m.mass.data();

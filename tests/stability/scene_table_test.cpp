@@ -22,6 +22,7 @@ constexpr Row kRows[] = {
     {"attached", 0, 0},
     {"ball_incline", 3, 0.3},
     {"basin", 8, 0.8},
+    {"bending_cells", 0, 0},
     {"cheese", 20, 0.6},
     {"changing_models", 12, 0.2},
     {"fill_drop", 30, 0.4},

@@ -67,6 +67,7 @@ inline void lend(dfm_tetmesh mesh, dfm_body_def &d) {
   d.npoint = info.npoint;
   d.ntet = info.ntet;
   ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
+  ok(dfm_tetmesh_cells(mesh, &d.cell, &d.cells));
 }
 
 inline dfm_material make_material(dfm_world w, const BodyOptions &o) {

@@ -37,7 +37,7 @@ DFM_CAP_DAMPING = 4
 DFM_CAP_ROTATION_INVARIANT = 16
 DFM_CAP_PLAUSIBLE = 32
 DFM_CAP_CONSTANT_STIFFNESS = 64
-DFM_CELL_TET = 8
+DFM_CELL_TET, DFM_CELL_HEX8, DFM_CELL_TET10 = 8, 16, 32
 DFM_SOLVER_DIRECT = 1
 DFM_VERSION_MAJOR = 0
 DFM_VERSION_MINOR = 1
@@ -346,7 +346,8 @@ class dfm_body_def(_Structure):
                 ("spin", f64 * 3), ("fixed", ptr), ("category", u32), ("collides_with", u32),
                 ("user", ptr), ("surface", ptr), ("nfield", u32), ("fields", ptr),
                 ("cell_materials", ptr), ("cell_share", ptr), ("groups", ptr), ("integrator", i32),
-                ("reserved", u32), ("cookie", u64), ("mass_scaling", f64)]
+                ("reserved", u32), ("cookie", u64), ("mass_scaling", f64), ("cells", ptr), ("cell", u32),
+                ("reserved2", u32)]
 
 
 class dfm_body_info(_Structure):
@@ -424,7 +425,7 @@ class dfm_tetmesh_info(_Structure):
                 ("overlapping_faces", u32), ("ngroup", u32), ("volume", f64), ("edge_min", f64),
                 ("edge_median", f64), ("edge_max", f64), ("quality_min", f64), ("quality_mean", f64),
                 ("quality_histogram", u32 * 10), ("lo", f64 * 3), ("hi", f64 * 3), ("warnings", text),
-                ("wave_path", f64)]
+                ("wave_path", f64), ("cell", u32), ("ncell", u32)]
 
 
 class dfm_trimesh_info(_Structure):

@@ -104,6 +104,8 @@ FUNCTIONS = {
     "dfm_tetmesh_destroy": (i32, [u64]),
     "dfm_tetmesh_get_info": (i32, [u64, ptr]),
     "dfm_tetmesh_data": (i32, [u64, ptr, ptr, ptr]),
+    "dfm_tetmesh_cells": (i32, [u64, ptr, ptr]),
+    "dfm_tetmesh_second_order": (i32, [u64, ptr]),
     "dfm_tetmesh_groups": (i32, [u64, ptr, ptr]),
     "dfm_tetmesh_triangles": (i32, [u64, ptr, ptr, ptr]),
     "dfm_tetmesh_group_points": (i32, [u64, u32, ptr, ptr, ptr]),

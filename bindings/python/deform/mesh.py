@@ -155,6 +155,11 @@ class TetMesh(_Mesh):
         return cls._made("beam", size, cells)
 
     @classmethod
+    def bricks(cls, size: Sequence[float], cells: int = 1000) -> TetMesh:
+        """The same of hexahedra, for the models corotational_fem and linear_fem."""
+        return cls._made("bricks", size, cells)
+
+    @classmethod
     def cylinder(cls, radius: float, length: float, cells: int = 1000) -> TetMesh:
         """A cylinder along z from 0 to `length`, m."""
         return cls._made("cylinder", [radius, length], cells)
@@ -172,6 +177,12 @@ class TetMesh(_Mesh):
         out = ctypes.c_uint64()
         check(lib.dfm_tetmesh_fill(surface.handle, whole(cells, "cells", 1), ctypes.byref(out)))
         return cls(out.value, surface._context)
+
+    def second_order(self) -> TetMesh:
+        """The same shape with points in the middles of the edges, for the same models as bricks()."""
+        out = ctypes.c_uint64()
+        check(lib.dfm_tetmesh_second_order(self.handle, ctypes.byref(out)))
+        return TetMesh(out.value, self._context)
 
     def write(self, path: Any) -> None:
         """Writes *.msh, *.msh2, *.vtk, *.vtu or *.mesh; only VTK and VTU keep the shares of a filled mesh."""

@@ -305,6 +305,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
             if points is not None or tets is not None:
                 raise ArgumentError("add_body takes a mesh, or points and tets, not both", "DFM_E_ARG")
             points, tets = mesh.points, mesh.tets
+            kind, nodes = ctypes.c_uint32(), ctypes.c_void_p()
+            check(lib.dfm_tetmesh_cells(mesh.handle, ctypes.byref(kind), ctypes.byref(nodes)))
+            definition.cell, definition.cells = kind.value, nodes.value
             share, groups = mesh.share, mesh.surface_groups()
             if share is not None:
                 definition.cell_share = share.ctypes.data

@@ -1,6 +1,7 @@
 #include "check/model.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
@@ -71,9 +72,23 @@ bool below(const std::vector<double> &m, size_t width, double shift) {
 
 std::string with(const Variant &variant) { return "with " + variant.name; }
 
-double Solid::volume(uint32_t cell) const {
+double Solid::volume(uint32_t c) const {
+  const uint32_t *const q = &cells[nodes() * size_t(c)];
+  if (cell != DFM_CELL_HEX8) return volume_of(q);
+  // a bilinear face halves what is between its two pairs of triangles
+  constexpr uint32_t kFace[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                                    {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+  double sum = 0;
+  for (const auto &f : kFace)
+    for (const auto &[i, j, k] : {std::array{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {1, 2, 3}}) {
+      const uint32_t tet[4] = {q[0], q[f[i]], q[f[j]], q[f[k]]};
+      sum += volume_of(tet) / 2;
+    }
+  return sum;
+}
+
+double Solid::volume_of(const uint32_t *q) const {
   double e[3][3], n[3];
-  const uint32_t *const q = &cells[4 * size_t(cell)];
   for (size_t k = 0; k < 3; ++k)
     for (size_t a = 0; a < 3; ++a) e[k][a] = rest[3 * size_t(q[k + 1]) + a] - rest[3 * size_t(q[0]) + a];
   cross(e[1], e[2], n);
@@ -83,8 +98,9 @@ double Solid::volume(uint32_t cell) const {
 void Solid::find_edges() {
   std::set<std::pair<uint32_t, uint32_t>> all;
   for (uint32_t c = 0; c < ncell(); ++c)
-    for (uint32_t k = 0; k < 4; ++k)
-      for (uint32_t l = 0; l < k; ++l) all.insert(std::minmax(cells[4 * c + k], cells[4 * c + l]));
+    for (uint32_t k = 0; k < nodes(); ++k)
+      for (uint32_t l = 0; l < k; ++l)
+        all.insert(std::minmax(cells[nodes() * c + k], cells[nodes() * c + l]));
   edges.clear();
   for (const auto &[i, j] : all) edges.insert(edges.end(), {i, j});
 }
@@ -123,6 +139,41 @@ Solid block(uint32_t nx, uint32_t ny, uint32_t nz, Held held) {
   return out;
 }
 
+Solid with_cells(const Solid &of, uint32_t cell) {
+  if (of.cell == cell) return of;
+  Solid out = of;
+  out.cell = cell;
+  out.cells.clear();
+  if (cell == DFM_CELL_HEX8) {
+    for (uint32_t c = 0; c < of.ncell(); c += 6) {  // the first three go along x y, y z and z x
+      const uint32_t *const q = &of.cells[4 * size_t(c)];
+      for (const uint32_t k : {0, 1, 2, 5, 9, 10, 3, 6}) out.cells.push_back(q[k]);
+    }
+    out.find_edges();
+    return out;
+  }
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> middle;
+  out.mass.assign(of.npoint(), 0.0);
+  for (uint32_t c = 0; c < of.ncell(); ++c) {
+    const uint32_t *const q = &of.cells[4 * size_t(c)];
+    out.cells.insert(out.cells.end(), q, q + 4);
+    for (const auto &[k, l] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}) {
+      const auto [at, fresh] = middle.insert({std::minmax(q[k], q[l]), out.npoint()});
+      if (fresh) {
+        for (size_t a = 0; a < 3; ++a)
+          out.rest.push_back((of.rest[3 * size_t(q[k]) + a] + of.rest[3 * size_t(q[l]) + a]) / 2);
+        out.mass.push_back(0);
+        out.fixed.push_back(of.fixed[q[k]] & of.fixed[q[l]]);
+      }
+      out.cells.push_back(at->second);
+    }
+    for (size_t k = 0; k < 10; ++k)
+      out.mass[out.cells[10 * size_t(c) + k]] += kDensity * of.volume(c) * (k < 4 ? 1.0 / 36 : 4.0 / 27);
+  }
+  out.find_edges();
+  return out;
+}
+
 Solid small_block(Held held) { return block(3, 3, 2, held); }
 
 const dfm_model &model_of(const Subject &subject) {
@@ -146,6 +197,11 @@ std::vector<Variant> variants(const Subject &subject) {
     for (uint32_t k = 0; (row.flags & DFM_PARAM_ENUM) && row.names && row.names[k]; ++k)
       if (k != row.def) add(row.names[k], k);
   }
+  for (const auto &[name, cell] : {std::pair<const char *, uint32_t>{"hexahedra", DFM_CELL_HEX8},
+                                   {"second-order tetrahedra", DFM_CELL_TET10}})
+    for (size_t k = 0, n = wanted.size(); (model_of(subject).cells & cell) && k < std::min<size_t>(n, 2); ++k)
+      if (k == 0 || wanted[k].name.starts_with("damping_stiffness"))
+        wanted.push_back({wanted[k].name + " and " + name, wanted[k].params, cell});
   std::vector<Variant> out;
   const Solid solid = block(1, 1, 1);
   for (Variant &v : wanted) {
@@ -157,14 +213,18 @@ std::vector<Variant> variants(const Subject &subject) {
 }
 
 Body::Body(const Subject &s, const Solid &of, const Variant &variant, uint32_t width, Refusal refusal)
-    : subject(s), solid(of), params(variant.params), ops(model_of(s)), stride(width) {
+    : subject(s),
+      solid(with_cells(of, variant.cell)),
+      params(variant.params),
+      ops(model_of(s)),
+      stride(width) {
   dfm_mesh m{};
   const char *const no_key = nullptr;
   const double *const no_field = nullptr;
   m.size = sizeof m;
   m.npoint = solid.npoint();
   m.ncell = solid.ncell();
-  m.cell = DFM_CELL_TET;
+  m.cell = solid.cell;
   m.rest = solid.rest.data();
   m.cells = solid.cells.data();
   m.mass = solid.mass.data();
@@ -185,7 +245,7 @@ Body::Body(const Subject &s, const Solid &of, const Variant &variant, uint32_t w
   if (why_.rfind("; ", 0) == 0) why_.erase(0, 2);
   if (!self && refusal == Refusal::is_broken)
     broken(
-        "create refuses a block of %u tetrahedra with %s (%s); accept every mesh of cells that "
+        "create refuses a block of %u cells with %s (%s); accept every mesh of cells that "
         "dfm_model.cells names, or refuse the parameters for all",
         solid.ncell(), variant.name.c_str(), why_.empty() ? "without a reason" : why_.c_str());
   if (!self) return;

@@ -28,25 +28,34 @@ using Numbers = std::vector<double, Aligned64<double>>;
 // points, and as many blends of three.
 constexpr double kCube = 0.1;  // m
 struct Solid {
+  uint32_t cell = DFM_CELL_TET;  // with the nodes of plugin.h
   std::vector<double> rest, mass, weight;
   std::vector<uint32_t> cells, edges, row, col;
   std::vector<uint8_t> fixed;
   uint32_t npoint() const { return static_cast<uint32_t>(mass.size()); }
-  uint32_t ncell() const { return static_cast<uint32_t>(cells.size() / 4); }
+  uint32_t nodes() const { return cell == DFM_CELL_TET10 ? 10 : cell == DFM_CELL_HEX8 ? 8 : 4; }
+  uint32_t ncell() const { return static_cast<uint32_t>(cells.size() / nodes()); }
   uint32_t nedge() const { return static_cast<uint32_t>(edges.size() / 2); }
   uint32_t nsurfel() const { return static_cast<uint32_t>(row.size() - 1); }
-  double volume(uint32_t cell) const;
+  double volume(uint32_t c) const;
   void find_edges();
+
+ private:
+  double volume_of(const uint32_t *tet) const;
 };
 enum class Held { nothing, one_side };
 Solid block(uint32_t x, uint32_t y, uint32_t z, Held held = Held::nothing);
+// The same block of other cells: cubes, or tetrahedra with points in the middles of their edges.
+Solid with_cells(const Solid &tetrahedra, uint32_t cell);
 Solid small_block(Held held = Held::nothing);  // 48 points: arrays of 64-byte lines at every stride
 
 // Parameters with which rules are checked: the defaults, the defaults with damping, each word of each
-// enumeration. What create refuses is left out.
+// enumeration, and the first two with the other kinds of cells that the model takes. What create refuses is
+// left out.
 struct Variant {
   std::string name;  // "the defaults", "energy = stvk"
   std::vector<double> params;
+  uint32_t cell = DFM_CELL_TET;
 };
 std::vector<Variant> variants(const Subject &subject);
 

@@ -244,7 +244,8 @@ void law_sound(const dfm_type &type, const dfm_friction &law) {
 
 // Numbers that must agree, and functions that some parameters and claims require.
 void model_sound(const dfm_type &type, const dfm_model &model) {
-  constexpr uint32_t kCells = DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX;
+  constexpr uint32_t kCells =
+      DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX8 | DFM_CELL_TET10;
   if (model.cells & ~kCells)
     broken("cells has bits that this ABI does not know (%#x); use DFM_CELL_*", model.cells & ~kCells);
   for (uint32_t i = 0; i < type.nparam && !model.set_params; ++i)

@@ -72,6 +72,11 @@ typedef struct dfm_body_def {
    * slivers and light points. Mass, center and moments of inertia at rest stay exact; dfm_body_info has what
    * was moved and what it changes (doc/concepts/step.md). Such a body cannot be cut. 0: none. */
   double mass_scaling;
+  /* Cells that are not first-order tetrahedra, as dfm_tetmesh_cells gives them: kind, DFM_CELL_* of plugin.h,
+   * and nodes, copied. tets and ntet are then those of the same mesh, and all [ntet] arrays go by these: of a
+   * cell the values of its first tetrahedron count. NULL: the cells are the tetrahedra. */
+  const uint32_t *cells;
+  uint32_t cell, reserved2;
 } dfm_body_def;
 
 /** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */

@@ -143,6 +143,11 @@ class TetMesh : public Handle<dfm_tetmesh, struct TetMeshKind> {
   auto file_cells() const { return per_cell<uint32_t>(dfm_tetmesh_file_cells); }  // empty: as in the file
   auto share() const { return per_cell<double>(dfm_tetmesh_share); }              // empty: not filled
   auto write(Text path) const { return E::done(dfm_tetmesh_write(raw_, path.c_str)); }
+  // The same shape with points in the middles of the edges.
+  auto second_order() const {
+    return produce<E, Unique<TetMesh<E>>>(
+        [&](auto &mesh) { return dfm_tetmesh_second_order(raw_, mesh.put()); });
+  }
   // Points, cells and share into a def that borrows them.
   auto give_to(dfm_body_def &def) const {
     return E::done(counted([&](const dfm_tetmesh_info &i) {
@@ -150,6 +155,7 @@ class TetMesh : public Handle<dfm_tetmesh, struct TetMeshKind> {
       if (s < 0) return s;
       def.npoint = i.npoint;
       def.ntet = i.ntet;
+      if (const dfm_status cells = dfm_tetmesh_cells(raw_, &def.cell, &def.cells); cells < 0) return cells;
       return dfm_tetmesh_share(raw_, &def.cell_share);
     }));
   }

@@ -6,8 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Reads the tetrahedra of MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU and Medit files (ASCII and binary;
- * doc/reference/mesh_files.md). The format is recognized by the first bytes, else by the file name ending.
+/** Reads tetrahedra, also of second order, or hexahedra: MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU, Medit
+ * (ASCII and binary; doc/reference/mesh_files.md). The first bytes, else the ending, tell the format.
  * Memory is bounded by the size of the file.
  * Inverted cells are reversed, unused points and duplicate cells removed, each with a count in a warning of
  * the log and in dfm_tetmesh_info. A cell without volume is refused: it has no rest shape.
@@ -18,8 +18,8 @@ DFM_API dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_
 /** Generators, SI units, with about `cells` tetrahedra: the nearest number that the shape's lattice allows,
  * more if cells would otherwise be longer than twice their width.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x, y,
- * z} edges from the origin; "ball": size = {radius, 0, 0}, about the origin; "tube": size = {inner radius,
- * outer radius, length}, as the cylinder.
+ * z} edges from the origin; "bricks": the same of hexahedra; "ball": size = {radius, 0, 0}, about the origin;
+ * "tube": size = {inner radius, outer radius, length}, as the cylinder.
  * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3],
                                     uint32_t cells, dfm_tetmesh *out);
@@ -43,6 +43,9 @@ typedef struct dfm_tetmesh_info {
    * by row sums: the least 2 sqrt(m/k) of the points, m a quarter of the cells' volumes, k = sum of
    * V |g_i| |g_j| over cells and their corners, g the gradients of the shape functions */
   double wave_path;
+  /* DFM_CELL_* of plugin.h, and how many of these; each is several of the ntet tetrahedra if they are not
+   * tetrahedra of first order */
+  uint32_t cell, ncell;
 } dfm_tetmesh_info;
 /** Counts, sizes and repairs, out->size bytes at most. @return DFM_OK; DFM_E_ARG;
  * DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
@@ -51,6 +54,14 @@ DFM_API dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out)
  * in the file, from 0. Each out may be NULL. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
                                     const uint32_t **file_point);
+/** Cells of a kind that a model may take, dfm_body_def.cells: [ncell,k] points in the order of plugin.h. The
+ * arrays by tetrahedron have each cell as 8 (second-order tetrahedra) or 6 of them (hexahedra) in turn; NULL
+ * where the cells are the tetrahedra. Borrowed. Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_tetmesh_cells(dfm_tetmesh mesh, uint32_t *kind, const uint32_t **cells);
+/** The same shape with second-order tetrahedra: points in the middles of the edges, groups kept. @return
+ * DFM_OK; DFM_E_UNSUPPORTED other cells, or those of a filled surface; DFM_E_NOMEM; DFM_E_HANDLE. Threads:
+ * Any thread. Since 0.1. */
+DFM_API dfm_status dfm_tetmesh_second_order(dfm_tetmesh mesh, dfm_tetmesh *out);
 /** Physical groups, [ngroup], of all dimensions: name of group k (its number if it has no name);
  * for each cell, its group (UINT32_MAX: none). Each out may be NULL; valid while the mesh lives. Threads: Any
  * thread. Since 0.1. */

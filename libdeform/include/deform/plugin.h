@@ -172,7 +172,9 @@ enum {
   DFM_CAP_PLAUSIBLE = 32,         /* not derived from a continuum */
   DFM_CAP_CONSTANT_STIFFNESS = 64 /* stiffness depends on the parameters alone: one factorization serves */
 };
-enum { DFM_CELL_TET = 8 };
+/* [ncell,k] points: 4 corners; those and then the middles of the edges 01 12 02 03 13 23, k = 10; 8 corners,
+ * around the bottom, then around the top */
+enum { DFM_CELL_TET = 8, DFM_CELL_HEX8 = 16, DFM_CELL_TET10 = 32 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
   uint32_t size, npoint, ncell, cell; /* cell: one DFM_CELL_* */
   /* [npoint,3] m, before the body's pose; after it for a model without DFM_CAP_ROTATION_INVARIANT */

@@ -8,8 +8,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/* ---- models: cells other than tetrahedra ------------------------------------------------------------- */
-enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4, DFM_CELL_HEX = 16 };
+/* ---- models: cells without volume -------------------------------------------------------------------- */
+enum { DFM_CELL_POINT = 1, DFM_CELL_EDGE = 2, DFM_CELL_TRI = 4 };
 /* ---- models: cells that go, points that are split ------------------------------------------------------ */
 /* Extension "dfm.topology/1" of a model: an instance depends on the cells of the body one by one, so an
  * instance that create() makes from a part of the cells can continue from the state of this one. A host cuts

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "api/mesh_objects.h"
+#include "mesh/cells.h"
 #include "mesh/raw_mesh.h"
 
 using namespace dfm;
@@ -13,12 +14,13 @@ namespace {
 // "About" so many cells are asked for; who gets others by more than a quarter is told.
 void tell_count(TetMesh &mesh, const char *kind, uint32_t asked) {
   constexpr double kAbout = 1.25;
-  const double made = double(mesh.tets.size() / 4);
+  const CellKind &of = cell_kind(mesh.cell);
+  const double made = double(mesh.ntet() / of.tets);
   if (std::max(made, double(asked)) > kAbout * std::min(made, double(asked)))
     mesh.warnings.push_back(
-        format("%.0f tetrahedra are made where %u were asked for: the lattice of a %s has no number of "
+        format("%.0f %s are made where %u were asked for: the lattice of a %s has no number of "
                "well-shaped cells nearer to that",
-               made, asked, kind));
+               made, of.name, asked, kind));
 }
 }  // namespace
 
@@ -71,9 +73,10 @@ dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double
     };
     if (name == "cylinder") keep(make_cylinder(memory, size[0], size[1], cells));
     else if (name == "beam") keep(make_beam(memory, size[0], size[1], size[2], cells));
+    else if (name == "bricks") keep(make_bricks(memory, size[0], size[1], size[2], cells));
     else if (name == "ball") keep(make_ball(memory, size[0], cells));
     else if (name == "tube") keep(make_tube(memory, size[0], size[1], size[2], cells));
-    else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, ball or tube", kind);
+    else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, bricks, ball or tube", kind);
   });
 }
 
@@ -94,6 +97,8 @@ dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
     info.duplicate_points = s.duplicate_points;
     info.overlapping_faces = m.overlapping;
     info.wave_path = s.wave_path;
+    info.cell = m.cell;
+    info.ncell = s.ntet / cell_kind(m.cell).tets;
     give(out, info);
   });
 }
@@ -105,6 +110,22 @@ dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint3
     if (points) *points = m.points.data();
     if (tets) *tets = m.tets.data();
     if (file_point) *file_point = m.file_point.data();
+  });
+}
+
+dfm_status dfm_tetmesh_cells(dfm_tetmesh mesh, uint32_t *kind, const uint32_t **cells) {
+  return as_status([&] {
+    const TetMesh &m = Object::of(mesh).mesh;
+    if (kind) *kind = m.cell;
+    if (cells) *cells = m.cells.empty() ? nullptr : m.cells.data();
+  });
+}
+
+dfm_status dfm_tetmesh_second_order(dfm_tetmesh mesh, dfm_tetmesh *out) {
+  return as_status([&] {
+    need(out, "out");
+    const Object &object = Object::of(mesh);
+    *out = Object::keep(object.context, second_order(object.mesh));
   });
 }
 

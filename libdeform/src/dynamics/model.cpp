@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/tables.h"
 
@@ -39,9 +40,11 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   host = &h;
   ops = static_cast<const dfm_model *>(t.ops);
   params = std::move(values);
-  if (!(ops->cells & DFM_CELL_TET))
-    fail(DFM_E_UNSUPPORTED, "model '%s' does not accept tetrahedra; choose another model for this mesh",
-         t.id);
+  if (!(ops->cells & mesh.cell))
+    fail(DFM_E_UNSUPPORTED,
+         "model '%s' does not accept %s; take corotational_fem or linear_fem, or a mesh of first-order "
+         "tetrahedra",
+         t.id, cell_kind(mesh.cell).name);
   {
     const Overheard why;
     const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });

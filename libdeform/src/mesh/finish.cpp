@@ -10,6 +10,7 @@
 
 #include "core/names.h"
 #include "math/vec3.h"
+#include "mesh/cells.h"
 #include "mesh/faces.h"
 #include "mesh/finish.h"
 
@@ -64,6 +65,39 @@ void turn_negative(RawMesh &raw, TetMesh &mesh) {
     }
 }
 
+// The same for cells of another kind, whose tetrahedra have one orientation each.
+void turn_cells(const std::string &path, RawMesh &raw, TetMesh &mesh) {
+  const CellKind &kind = cell_kind(raw.cell);
+  for (size_t c = 0; c < raw.cells.size() / kind.nodes; ++c) {
+    uint32_t *const cell = &raw.cells[kind.nodes * c];
+    uint32_t n = 0, flat = 0;
+    const auto count = [&] {
+      n = flat = 0;
+      for (size_t t = kind.tets * c; t < kind.tets * (c + 1); ++t) {
+        const CellShape s = cell_shape(raw.points.data(), &raw.tets[4 * t]);
+        n += s.volume6 < 0;
+        flat += is_flat(s);
+      }
+    };
+    count();
+    if (2 * n > kind.tets) {  // reflected
+      const auto swap = [&](std::initializer_list<std::pair<int, int>> pairs) {
+        for (const auto &[i, j] : pairs) std::swap(cell[i], cell[j]);
+      };
+      if (kind.nodes == 8) swap({{0, 4}, {1, 5}, {2, 6}, {3, 7}});
+      else swap({{2, 3}, {5, 8}, {6, 7}});
+      tets_of(kind, cell, &raw.tets[4 * kind.tets * c]);
+      ++mesh.turned;
+      count();
+    }
+    if (n + flat)
+      fail(DFM_E_FORMAT,
+           "%s: cell %zu (counted from 0) of %s is so distorted that a part of it is flat or inverted; "
+           "straighten its edges in the mesher, or order its points as the format says",
+           path.c_str(), c, kind.name);
+  }
+}
+
 // Triangles without a group add nothing to the boundary of the cells.
 void keep_grouped_triangles(const RawMesh &raw, TetMesh &mesh, const Array<uint32_t> &number) {
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
@@ -96,6 +130,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
   raw.points.resize(3 * size_t(kept));
   raw.points.shrink_to_fit();
   for (uint32_t &p : raw.tets) p = number[p];
+  for (uint32_t &p : raw.cells) p = number[p];
   keep_grouped_triangles(raw, mesh, number);
 
   for (size_t i = 0; i < raw.tet_group.size(); ++i)
@@ -157,8 +192,8 @@ void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const MeshStatistics s = mesh_statistics(mesh);
   if (mesh.turned)
-    warn(format("%u of %u cells had negative volume and %s turned", mesh.turned, s.ntet,
-                was_were(mesh.turned)));
+    warn(format("%u of %u cells had negative volume and %s turned", mesh.turned,
+                s.ntet / cell_kind(mesh.cell).tets, was_were(mesh.turned)));
   if (mesh.overlapping)
     warn(
         format("the mesh is tangled: across %u face%s both cells lie on the same side, so they overlap; mesh "
@@ -259,13 +294,22 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
     fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface",
          path.c_str());
   check_points(path, raw.points);
-  refuse_flat(path, raw);
-  turn_negative(raw, mesh);
+  if (raw.cells.empty()) {
+    refuse_flat(path, raw);
+    turn_negative(raw, mesh);
+  } else {
+    turn_cells(path, raw, mesh);
+  }
   mesh.dropped_cells = drop_duplicate_cells(raw, &mesh.file_cell);
+  if (mesh.dropped_cells && !raw.cells.empty())
+    fail(DFM_E_FORMAT, "%s: cells lie on one another; write each of the %s once", path.c_str(),
+         cell_kind(raw.cell).name);
   take_shares(raw, mesh);
   renumber(raw, mesh);
   sort_groups(raw, mesh);
   mesh.points = std::move(raw.points);
+  mesh.cell = raw.cell;
+  mesh.cells = std::move(raw.cells);
   mesh.tets = std::move(raw.tets);
   mesh.tet_group = std::move(raw.tet_group);
   mesh.groups = std::move(raw.groups);

@@ -14,6 +14,8 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "deform/plugin.h"
+#include "mesh/cells.h"
 #include "math/vec3.h"
 #include "mesh/generate.h"
 #include "mesh/mesh.h"
@@ -102,10 +104,10 @@ struct Grid {
   }
 };
 
-// Tries cubes of the size that gives the number of cells, and smaller ones, each edge's number
-// rounded down and up.
-Grid choose_grid(const double size[3], uint32_t cells) {
-  const double cubes = std::max(1.0, cells / 12.0);
+// Tries cubes of the size that gives the number of cells, `each` of them a cube, and smaller ones, the number
+// of each edge rounded down and up.
+Grid choose_grid(const double size[3], uint32_t cells, double each) {
+  const double cubes = std::max(1.0, cells / each);
   const double shortest = std::min({size[0], size[1], size[2]});
   double edge = std::cbrt(size[0] * (size[1] * (size[2] / cubes)));
   Best<Grid> best;
@@ -116,11 +118,11 @@ Grid choose_grid(const double size[3], uint32_t cells) {
         g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
       const double count = double(g.n[0]) * g.n[1] * g.n[2];
       const double h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
-      if (count > kMostCells / 12) continue;
+      if (count > kMostCells / each) continue;
       best.offer(choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes), g);
     }
   const uint32_t *const n = best.choice.n;
-  check_choice("beam", best.score < HUGE_VAL ? 12.0 * n[0] * n[1] * n[2] : HUGE_VAL, cells);
+  check_choice("beam", best.score < HUGE_VAL ? each * n[0] * n[1] * n[2] : HUGE_VAL, cells);
   return best.choice;
 }
 
@@ -275,7 +277,7 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
   check_beam(x, y, z);
   check_cells(cells);
   const double size[3] = {x, y, z};
-  const Grid g = choose_grid(size, cells);
+  const Grid g = choose_grid(size, cells, 12);
   TetMesh mesh(memory);
   const auto at = [&](double i, double j, double k) {
     add_point(mesh, {x * (i / g.n[0]), y * (j / g.n[1]), z * (k / g.n[2])});
@@ -316,6 +318,31 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
           if (c[axis] == 0) add_face(c, axis, 0);
           add_face(c, axis, 1);
         }
+  return finished(std::move(mesh));
+}
+
+TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells) {
+  check_beam(x, y, z);
+  check_cells(cells);
+  const double size[3] = {x, y, z};
+  const Grid g = choose_grid(size, cells, 1);
+  const CellKind &kind = cell_kind(DFM_CELL_HEX8);
+  TetMesh mesh(memory);
+  mesh.cell = kind.kind;
+  for (uint32_t i = 0; i <= g.n[0]; ++i)
+    for (uint32_t j = 0; j <= g.n[1]; ++j)
+      for (uint32_t k = 0; k <= g.n[2]; ++k)
+        add_point(mesh, {x * i / g.n[0], y * j / g.n[1], z * k / g.n[2]});
+  const auto at = [&](uint32_t i, uint32_t j, uint32_t k) {
+    return (i * (g.n[1] + 1) + j) * (g.n[2] + 1) + k;
+  };
+  for (uint32_t i = 0; i < g.n[0]; ++i)
+    for (uint32_t j = 0; j < g.n[1]; ++j)
+      for (uint32_t k = 0; k < g.n[2]; ++k)
+        for (const uint32_t up : {k, k + 1})
+          for (const uint32_t p : {at(i, j, up), at(i + 1, j, up), at(i + 1, j + 1, up), at(i, j + 1, up)})
+            mesh.cells.push_back(p);
+  mesh.tets = tets_of(memory, kind, mesh.cells);
   return finished(std::move(mesh));
 }
 

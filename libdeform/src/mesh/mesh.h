@@ -21,10 +21,14 @@ struct MeshGroup {
 
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard()) : memory(&m) {
-    use_memory(m, points, tets, tet_group, tris, tri_group, file_point, file_cell, share);
+    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share);
   }
   const Memory *memory;
-  Array<double> points;       // [npoint,3], m
+  Array<double> points;  // [npoint,3], m
+  // DFM_CELL_* of plugin.h; of another kind than tetrahedra, nodes by cell: `tets` are then the tetrahedra of
+  // each, as many as mesh/cells.h says, and [ntet] arrays go by these
+  uint32_t cell = 8;
+  Array<uint32_t> cells;
   Array<uint32_t> tets;       // [ntet,4], every volume positive
   Array<uint32_t> tet_group;  // [ntet] index into groups, kNoGroup without
   // [n,3] the file's triangles that belong to a group, so that it survives writing; in the
@@ -43,6 +47,9 @@ struct TetMesh {
   std::vector<std::string> warnings;  // one sentence each
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
   uint32_t ntet() const { return static_cast<uint32_t>(tets.size() / 4); }
+  // The cells as they are written: nodes, and the group of each.
+  const Array<uint32_t> &nodes() const { return cells.empty() ? tets : cells; }
+  Array<uint32_t> cell_groups() const;
 };
 inline constexpr uint32_t kNoGroup = UINT32_MAX;
 inline constexpr uint32_t kMaxTets = 1u << 30;  // face numbers are 4*cell+face in 32 bits
@@ -60,7 +67,8 @@ TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char
 // ---- generators (SI units, near-isotropic cells, about `cells` of them) -----------------------------------
 // axis z, base at the origin
 TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);
-TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);  // from the origin
+TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);    // from the origin
+TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells);  // as the beam
 // about the origin
 TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);
 // as the cylinder, with a hole
@@ -127,7 +135,7 @@ struct VtuArray {
   const uint32_t *integer;  // [n,width] where real is null
 };
 struct VtuGrid {
-  uint32_t npoint = 0, ncell = 0, corners = 4;  // 4 tetrahedra, 3 triangles
+  uint32_t npoint = 0, ncell = 0, corners = 4;  // 3 triangles, else as in mesh/cells.h
   const double *points = nullptr;               // [npoint,3]
   const uint32_t *cells = nullptr;              // [ncell,corners]
   uint32_t nface = 0;                           // triangles behind the cells; cell data are [ncell+nface]

@@ -3,6 +3,9 @@
 
 #include <algorithm>
 
+#include "deform/plugin.h"
+#include "mesh/cells.h"
+
 namespace dfm {
 
 void NodeNumbers::finish(const Cursor &in) {
@@ -40,20 +43,23 @@ void MshReader::begin_elements(int64_t type) {
              : type == 93 ? Element{125, 3}
                           : kKnown[type > 0 && type < 32 ? type : 0];
   if (element_.points == 0) in_.refuse("element type %lld is not known; 4 is a tetrahedron", ll(type));
-  if (element_.dimension == 3 && type != kTet) {
-    const bool tet = type == 11 || (type >= 29 && type <= 31);
-    in_.unsupported(tet ? "second- or higher-order tetrahedra (element type %lld, %u points); %s"
-                        : "element type %lld (%u points) is a hexahedron, prism or pyramid; only tetrahedra "
-                          "are read: mesh the volume with tetrahedra, or split the cells; then %s",
+  cell_ = type == kTet ? DFM_CELL_TET : type == 11 ? DFM_CELL_TET10 : type == 5 ? DFM_CELL_HEX8 : 0;
+  if (element_.dimension == 3 && !cell_) {
+    const bool tet = type >= 29 && type <= 31;
+    in_.unsupported(tet ? "tetrahedra above second order (element type %lld, %u points); %s"
+                        : "element type %lld (%u points) is a prism, a pyramid or a hexahedron above first "
+                          "order; tetrahedra of first and second order and hexahedra of 8 points are read: "
+                          "mesh the volume with these; then %s",
                     ll(type), element_.points, kConvertMsh);
   }
 }
 
 void MshReader::add_element(uint32_t group) {
-  uint32_t corners[4];
-  if (element_.points <= 4 && element_.dimension >= 2) {
-    for (uint32_t k = 0; k < element_.points; ++k) corners[k] = nodes_.find(in_, tags_[k]);
-    if (element_.dimension == 3) out_.add_tet(in_, corners, group);
+  uint32_t corners[10];
+  if (element_.dimension == 3 || (element_.points <= 4 && element_.dimension == 2)) {
+    for (uint32_t k = 0; k < element_.points; ++k)
+      corners[cell_ == DFM_CELL_TET10 ? kMshTet10[k] : k] = nodes_.find(in_, tags_[k]);
+    if (element_.dimension == 3) out_.add_cell(in_, cell_, corners, group);
     else out_.add_polygon(in_, corners, element_.points, group);
     return;
   }

@@ -54,9 +54,9 @@ class MshReader {
   static constexpr int64_t kTet = 4;
 
   void read_physical_names();
-  // Elements come one by one: tetrahedra, triangles and quadrangles (cut) are kept, points and lines passed
-  // over (their points join their group), other volume cells refused, and curved faces where the file has
-  // nothing straight.
+  // Elements come one by one: cells of mesh/cells.h, triangles and quadrangles (cut) are kept, points and
+  // lines passed over (their points join their group), other volume cells refused, and curved faces where the
+  // file has nothing straight.
   void begin_elements(int64_t type);  // checks that elements of this type can be taken
   void add_element(uint32_t group);   // of nodes tags_
   int32_t in_32_bits(int64_t value, const char *what) const;
@@ -80,6 +80,7 @@ class MshReader {
   NodeNumbers nodes_;
   Array<Entity> entities_;
   Element element_{0, 0};  // of begin_elements()
+  uint32_t cell_ = 0;      // its kind of volume cell, 0 for none
   int64_t tags_[125];      // as many as any element has
   uint64_t curved_ = 0;    // faces of second and higher order
 };

@@ -5,6 +5,7 @@
 #include <span>
 
 #include "math/vec3.h"
+#include "mesh/cells.h"
 
 namespace dfm {
 namespace {
@@ -102,18 +103,25 @@ uint32_t RawMesh::named_group(const Cursor &at, int32_t dimension, std::string_v
 
 void RawMesh::expect_tets(size_t n) {
   if (n >= kMaxTets) return;  // add_tet says so
-  const size_t cells = ntet() + n;
-  if (tets.capacity() >= 4 * cells) return;
+  const size_t all = ntet() + n;
+  if (tets.capacity() >= 4 * all) return;
   // many small blocks still cost linear time
-  const size_t room = tets.empty() ? cells : std::max(cells, 2 * size_t(ntet()));
+  const size_t room = tets.empty() ? all : std::max(all, 2 * size_t(ntet()));
   tets.reserve(4 * room);
   tet_group.reserve(room);
 }
 
-void RawMesh::add_tet(const Cursor &at, const uint32_t corners[4], uint32_t in_group) {
-  if (tet_group.size() == kMaxTets - 1) at.unsupported("more than %u tetrahedra", kMaxTets - 1);
-  tets.insert(tets.end(), corners, corners + 4);
-  tet_group.push_back(in_group);
+void RawMesh::add_cell(const Cursor &at, uint32_t kind, const uint32_t *nodes, uint32_t in_group) {
+  const CellKind &of = cell_kind(kind);
+  if (cell && cell != kind)
+    at.unsupported("%s beside %s; a body has cells of one kind: write one of them alone", of.name,
+                   cell_kind(cell).name);
+  cell = kind;
+  if (tet_group.size() + of.tets >= kMaxTets) at.unsupported("more than %u tetrahedra", kMaxTets - 1);
+  if (of.tets > 1) cells.insert(cells.end(), nodes, nodes + of.nodes);
+  tets.resize(tets.size() + 4 * of.tets);
+  tets_of(of, nodes, &tets[tets.size() - 4 * of.tets]);
+  tet_group.insert(tet_group.end(), of.tets, in_group);
 }
 
 void RawMesh::add_triangle(const Cursor &at, uint32_t a, uint32_t b, uint32_t c, uint32_t in_group) {

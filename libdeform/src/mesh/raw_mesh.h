@@ -14,10 +14,12 @@ namespace dfm {
 
 struct RawMesh {
   explicit RawMesh(const Memory &m) : memory(&m) {
-    use_memory(m, points, tets, tet_group, tet_share, tris, tri_group);
+    use_memory(m, points, cells, tets, tet_group, tet_share, tris, tri_group);
   }
   const Memory *memory;
   Array<double> points;
+  uint32_t cell = 0;          // as in TetMesh; 0 before the first one
+  Array<uint32_t> cells;      // of another kind than tetrahedra
   Array<uint32_t> tets;       // 0-based positions of points in the file
   Array<uint32_t> tet_group;  // index into groups
   // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
@@ -36,7 +38,7 @@ struct RawMesh {
   // The same where a file knows groups by name alone; they are numbered as they come. No name is "no group".
   uint32_t named_group(const Cursor &at, int32_t dimension, std::string_view name);
 
-  void add_tet(const Cursor &at, const uint32_t corners[4], uint32_t in_group);
+  void add_cell(const Cursor &at, uint32_t kind, const uint32_t *nodes, uint32_t in_group);
   // n >= 3 corners around a face, cut into n-2 triangles: a fan about the first where none of them looks
   // the other way, else ears. A fan always where a corner is not known yet, or there are more than 512.
   void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);

@@ -1,6 +1,7 @@
 // Medit files (.mesh, ASCII): keywords, each with a count and rows of numbers from 1, the last of a row its
 // reference. References other than 0 are groups of the tetrahedra, triangles (and quadrilaterals, cut) and
 // edges. Keywords that a body does not need are skipped.
+#include "deform/plugin.h"
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -70,7 +71,7 @@ class MeditReader {
       if (reference < INT32_MIN || reference > INT32_MAX)
         in_.refuse("reference %lld does not fit 32 bits", ll(reference));
       const uint32_t group = out_.group(in_, dimension, static_cast<int32_t>(reference));
-      if (dimension == 3) out_.add_tet(in_, corner, group);
+      if (dimension == 3) out_.add_cell(in_, DFM_CELL_TET, corner, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);
       else out_.keep_points(corner, corners, group);
     }

@@ -4,6 +4,9 @@
 #include <cctype>
 #include <utility>
 
+#include "deform/plugin.h"
+#include "mesh/cells.h"
+
 namespace dfm {
 
 std::string vtk_lower(std::string_view text) {
@@ -29,9 +32,12 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
                ? out_.group(in, dimension, static_cast<int32_t>(label))
                : kNoGroup;
   };
-  if (type == 10) {
-    if (n != 4) in.refuse("cell %zu is a tetrahedron (type 10) with %zu points; expected 4", cell, n);
-    return out_.add_tet(in, corners, group(3));
+  for (const uint32_t kind : {DFM_CELL_TET, DFM_CELL_TET10, DFM_CELL_HEX8}) {
+    const CellKind &of = cell_kind(kind);
+    if (of.vtk != type) continue;
+    if (n != of.nodes)
+      in.refuse("cell %zu is of type %d, %s, with %zu points; expected %u", cell, type, of.name, n, of.nodes);
+    return out_.add_cell(in, kind, corners, group(3));
   }
   if (is_one_of({5, 6, 7, 8, 9})) {  // triangle, strip, polygon, pixel, quadrangle
     const size_t expected = type == 5 ? 3 : type >= 8 ? 4 : 0;
@@ -46,15 +52,16 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
   }
   if (is_one_of({1, 2, 3, 4})) return out_.keep_points(corners, n, group(type > 2));  // points, lines
   curved_ += is_one_of({22, 23, 28, 30, 34, 36, 69, 70, 76, 77});
-  if (is_one_of({24, 71, 78, 79, 80}))
+  if (is_one_of({71, 78, 79, 80}))
     in.unsupported(
-        "cell %zu is a second- or higher-order tetrahedron (type %d); write first-order cells (for "
-        "instance gmsh -order 1)",
+        "cell %zu is a tetrahedron above second order (type %d); write cells of first or second order (for "
+        "instance gmsh -order 2)",
         cell, type);
-  if (is_one_of({11, 12, 13, 14, 15, 16, 25, 26, 27, 29, 31, 32, 33, 37, 41, 42, 72, 73, 74}))
+  if (is_one_of({11, 13, 14, 15, 16, 25, 26, 27, 29, 31, 32, 33, 37, 41, 42, 72, 73, 74}))
     in.unsupported(
-        "cell %zu is a volume cell of type %d (hexahedron, wedge, pyramid or polyhedron); only tetrahedra "
-        "(type 10) are read: mesh the shape with tetrahedra",
+        "cell %zu is a volume cell of type %d (voxel, wedge, pyramid, polyhedron, or a hexahedron above "
+        "first "
+        "order); tetrahedra (types 10 and 24) and hexahedra (12) are read: mesh the shape with these",
         cell, type);
 }
 

@@ -3,6 +3,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "mesh/cells.h"
 #include "mesh/vtk.h"
 
 namespace dfm {
@@ -15,8 +16,9 @@ std::string text(uint64_t n) { return std::to_string(n); }
 Array<uint32_t> group_numbers(const TetMesh &mesh) {
   Array<uint32_t> out(HookAllocator<uint32_t>(*mesh.memory));
   if (mesh.groups.empty()) return out;
-  out.reserve(mesh.tet_group.size() + mesh.tri_group.size());
-  for (const Array<uint32_t> *groups : {&mesh.tet_group, &mesh.tri_group})
+  const Array<uint32_t> cells = mesh.cell_groups();
+  out.reserve(cells.size() + mesh.tri_group.size());
+  for (const Array<uint32_t> *groups : {&cells, &mesh.tri_group})
     for (const uint32_t g : *groups)
       out.push_back(g == kNoGroup ? 0 : static_cast<uint32_t>(mesh.groups[g].tag));
   return out;
@@ -88,15 +90,16 @@ class TextRows {
 
 void write_vtk(const TetMesh &mesh, const std::string &path) {
   AtomicFile out(path);
-  const uint64_t ntri = mesh.tri_group.size(), ncell = mesh.ntet() + ntri;
+  const CellKind &kind = cell_kind(mesh.cell);
+  const uint64_t ntri = mesh.tri_group.size(), nvolume = mesh.ntet() / kind.tets, ncell = nvolume + ntri;
   out.write("# vtk DataFile Version 3.0\ntetrahedra\nBINARY\nDATASET UNSTRUCTURED_GRID\n");
   out.write("POINTS " + text(mesh.npoint()) + " double\n");
   for (const double x : mesh.points) out.put(x, std::endian::big);
-  out.write("\nCELLS " + text(ncell) + " " + text(5 * uint64_t(mesh.ntet()) + 4 * ntri) + "\n");
-  put_cells(out, mesh.tets, 4);
+  out.write("\nCELLS " + text(ncell) + " " + text((kind.nodes + 1) * nvolume + 4 * ntri) + "\n");
+  put_cells(out, mesh.nodes(), kind.nodes);
   put_cells(out, mesh.tris, 3);
   out.write("\nCELL_TYPES " + text(ncell) + "\n");
-  for (uint64_t t = 0; t < ncell; ++t) out.put(int32_t(t < mesh.ntet() ? 10 : 5), std::endian::big);
+  for (uint64_t t = 0; t < ncell; ++t) out.put(int32_t(t < nvolume ? kind.vtk : 5), std::endian::big);
   out.write("\n");
   put_group_names(out, mesh);
   const Array<uint32_t> groups = group_numbers(mesh);
@@ -121,8 +124,9 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
   VtuGrid grid;
   grid.npoint = mesh.npoint();
   grid.points = mesh.points.data();
-  grid.ncell = mesh.ntet();
-  grid.cells = mesh.tets.data();
+  grid.corners = cell_kind(mesh.cell).nodes;
+  grid.ncell = mesh.ntet() / cell_kind(mesh.cell).tets;
+  grid.cells = mesh.nodes().data();
   grid.nface = static_cast<uint32_t>(mesh.tri_group.size());
   grid.faces = mesh.tris.data();
   grid.groups = &mesh.groups;
@@ -132,6 +136,9 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
 }
 
 void write_medit(const TetMesh &mesh, const std::string &path) {
+  if (!mesh.cells.empty())
+    fail(DFM_E_UNSUPPORTED, "%s: %s are not written to Medit files; write .msh, .vtk or .vtu", path.c_str(),
+         cell_kind(mesh.cell).name);
   AtomicFile out(path);
   out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + text(mesh.npoint()) + "\n");
   TextRows rows(out);

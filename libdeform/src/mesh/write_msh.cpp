@@ -5,7 +5,8 @@
 #include "core/error.h"
 #include "core/file.h"
 #include "math/extent.h"
-#include "mesh/mesh.h"
+#include "deform/plugin.h"
+#include "mesh/cells.h"
 
 namespace dfm {
 namespace {
@@ -18,12 +19,16 @@ void put_head(AtomicFile &out, const char *version) {
   out.write("\n$EndMeshFormat\n");
 }
 
-// Consecutive elements of one group: one block of MSH 4.1. Type 15 is a point, 2 a triangle, 4 a tetrahedron.
+// Consecutive elements of one group: one block of MSH 4.1. Type 15 is a point, 2 a triangle.
 struct Run {
   int32_t dimension, type;
   uint32_t group, corners;
   const uint32_t *points;
   uint64_t n;
+  // Of element t, in the file's order.
+  uint32_t point(uint64_t t, uint32_t k) const {
+    return points[corners * t + (type == cell_kind(DFM_CELL_TET10).msh ? kMshTet10[k] : k)];
+  }
 };
 
 void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t corners,
@@ -38,7 +43,7 @@ void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t 
 
 // Everything that is written, lowest dimension first. Of lines only the points are known, so their
 // groups are left out.
-std::vector<Run> runs_of(const TetMesh &mesh) {
+std::vector<Run> runs_of(const TetMesh &mesh, const Array<uint32_t> &cell_groups) {
   std::vector<Run> runs;
   for (uint32_t g = 0; g < mesh.groups.size(); ++g) {
     const Array<uint32_t> &points = mesh.groups[g].points;
@@ -46,7 +51,8 @@ std::vector<Run> runs_of(const TetMesh &mesh) {
       runs.push_back({0, 15, g, 1, points.data(), points.size()});
   }
   add_runs(runs, 2, 2, 3, mesh.tris, mesh.tri_group);
-  add_runs(runs, 3, 4, 4, mesh.tets, mesh.tet_group);
+  const CellKind &kind = cell_kind(mesh.cell);
+  add_runs(runs, 3, kind.msh, kind.nodes, mesh.nodes(), cell_groups);
   return runs;
 }
 
@@ -106,7 +112,8 @@ void put_entities(AtomicFile &out, const TetMesh &mesh, std::vector<uint32_t> gr
 
 void write_msh41(const TetMesh &mesh, const std::string &path) {
   AtomicFile out(path);
-  const std::vector<Run> runs = runs_of(mesh);
+  const Array<uint32_t> cell_groups = mesh.cell_groups();
+  const std::vector<Run> runs = runs_of(mesh, cell_groups);
   const std::vector<uint32_t> groups = written_groups(mesh, runs);
   put_head(out, "4.1");
   put_names(out, mesh, groups);
@@ -130,7 +137,7 @@ void write_msh41(const TetMesh &mesh, const std::string &path) {
     out.put(r.n);
     for (uint64_t t = 0; t < r.n; ++t) {
       out.put(++number);
-      for (uint32_t k = 0; k < r.corners; ++k) out.put<uint64_t>(uint64_t(r.points[r.corners * t + k]) + 1);
+      for (uint32_t k = 0; k < r.corners; ++k) out.put<uint64_t>(uint64_t(r.point(t, k)) + 1);
     }
   }
   out.write("\n$EndElements\n");
@@ -142,7 +149,8 @@ void write_msh22(const TetMesh &mesh, const std::string &path) {
     fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(),
          INT32_MAX, mesh.npoint());
   AtomicFile out(path);
-  const std::vector<Run> runs = runs_of(mesh);
+  const Array<uint32_t> cell_groups = mesh.cell_groups();
+  const std::vector<Run> runs = runs_of(mesh, cell_groups);
   put_head(out, "2.2");
   put_names(out, mesh, written_groups(mesh, runs));
   out.write("$Nodes\n" + text(mesh.npoint()) + "\n");
@@ -160,7 +168,7 @@ void write_msh22(const TetMesh &mesh, const std::string &path) {
       out.put(++number);
       out.put(r.group == kNoGroup ? 0 : mesh.groups[r.group].tag);
       out.put(entity_of(mesh, r.group));
-      for (uint32_t k = 0; k < r.corners; ++k) out.put(static_cast<int32_t>(r.points[r.corners * t + k] + 1));
+      for (uint32_t k = 0; k < r.corners; ++k) out.put(static_cast<int32_t>(r.point(t, k) + 1));
     }
   }
   out.write("\n$EndElements\n");

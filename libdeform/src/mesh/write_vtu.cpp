@@ -105,7 +105,8 @@ void write_vtu(const std::string &path, const VtuGrid &grid) {
   for (uint64_t c = 1; c <= ncell; ++c)
     put_number(c <= grid.ncell ? c * grid.corners : cell_corners + 3 * (c - grid.ncell));
   out.put<uint64_t>(ncell);
-  for (uint32_t c = 0; c < ncell; ++c) out.put<uint8_t>(grid.corners == 4 && c < grid.ncell ? 10 : 5);
+  const uint8_t cell = grid.corners == 3 ? 5 : grid.corners == 4 ? 10 : grid.corners == 8 ? 12 : 24;
+  for (uint32_t c = 0; c < ncell; ++c) out.put<uint8_t>(c < grid.ncell ? cell : 5);
   out.write("\n  </AppendedData>\n</VTKFile>\n");
   out.commit();
 }

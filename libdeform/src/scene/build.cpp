@@ -291,6 +291,8 @@ class Builder {
     d.ntet = mesh.ntet;
     d.points = mesh.points.data();
     d.tets = mesh.tets;
+    d.cell = mesh.cell;
+    d.cells = mesh.nodes;
     d.material = material(b.material);
     d.model = b.model.c_str();
     d.model_params = b.params.view();

@@ -86,7 +86,7 @@ struct OwnSurface {
 struct MadeMesh {
   std::string kind;  // empty: the mesh is a file
   double size[3] = {};
-  uint32_t cells = 0;
+  uint32_t cells = 0, order = 1;
 };
 
 // A model; type empty: none is named.

@@ -76,18 +76,22 @@ bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
 // Stored under a name that no file can have.
 std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
-  const std::string name =
-      format("/dev/null/%s %a %a %a %u", m.kind.c_str(), m.size[0], m.size[1], m.size[2], m.cells);
+  const std::string name = format("/dev/null/%s %a %a %a %u %u", m.kind.c_str(), m.size[0], m.size[1],
+                                  m.size[2], m.cells, m.order);
   dfm_tetmesh &mesh = cells_[name];
   if (mesh) return name;
   def_.require(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
+  if (m.order == 2) {
+    const dfm_tetmesh first = mesh;
+    def_.require(dfm_tetmesh_second_order(first, &mesh), b.pointer + "/mesh");
+    def_.require(dfm_tetmesh_destroy(first), b.pointer + "/mesh");
+  }
   const dfm_tetmesh_info info = info_of(mesh, b.pointer + "/mesh");
-  if (info.ntet > 2 * uint64_t{m.cells} && info.ntet > m.cells + kCheapCells)
-    context_->logf(
-        DFM_LOG_WARNING,
-        "body '%s': its %s has %u tetrahedra, not about %u: cells are about as long as thick, and no "
-        "fewer of them fit into its thickness; make it thicker for fewer",
-        b.name.c_str(), m.kind.c_str(), info.ntet, m.cells);
+  if (info.ncell > 2 * uint64_t{m.cells} && info.ncell > m.cells + kCheapCells)
+    context_->logf(DFM_LOG_WARNING,
+                   "body '%s': its %s has %u cells, not about %u: cells are about as long as thick, and no "
+                   "fewer of them fit into its thickness; make it thicker for fewer",
+                   b.name.c_str(), m.kind.c_str(), info.ncell, m.cells);
   return name;
 }
 
@@ -147,6 +151,7 @@ void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const
   const dfm_tetmesh_info info = info_of(mesh, pointer);
   const double *points = nullptr;
   def_.require(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), pointer);
+  def_.require(dfm_tetmesh_cells(mesh, &out.cell, &out.nodes), pointer);
   def_.require(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), pointer);
   def_.require(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
   def_.require(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);

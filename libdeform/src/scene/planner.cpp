@@ -203,10 +203,13 @@ class Reader {
     }
   }
 
-  std::vector<std::string> candidates(const Measured &measured) const {
+  // Models that take cells of this kind.
+  std::vector<std::string> candidates(const Measured &measured, uint32_t cell) const {
     std::vector<std::string> out;
-    for (const MeasuredModel &m : measured.models)
-      if (types_.find(DFM_KIND_MODEL, m.id)) out.push_back(m.id);
+    for (const MeasuredModel &m : measured.models) {
+      const dfm_type *const type = types_.find(DFM_KIND_MODEL, m.id);
+      if (type && static_cast<const dfm_model *>(type->ops)->cells & cell) out.push_back(m.id);
+    }
     return out;
   }
 
@@ -253,7 +256,7 @@ class Reader {
     if (!b.model_open) r.model = short_id(b.model);
     const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    r.models = candidates(measured);
+    r.models = candidates(measured, mesh.cell);
     return r;
   }
 

@@ -194,7 +194,8 @@ MadeMesh read_made(const Node &node) {
   MadeMesh made;
   node.object("made_mesh");
   made.kind = node.at("make").word("make");
-  const bool round = made.kind != "beam", tube = made.kind == "tube", along = tube || made.kind == "cylinder";
+  const bool bricks = made.kind == "bricks", round = made.kind != "beam" && !bricks,
+             tube = made.kind == "tube", along = tube || made.kind == "cylinder";
   const std::pair<const char *, bool> wanted[] = {
       {"radius", round}, {"inner", tube}, {"length", along}, {"size", !round}};
   for (const auto &[key, mine] : wanted)
@@ -209,6 +210,9 @@ MadeMesh read_made(const Node &node) {
     read_sizes(node.at("size"), "edges", made.size);
   }
   made.cells = read_count(node.member("cells", 1000), 1, 1e8);
+  made.order = read_count(node.member("order", 1), 1, 2);
+  if (bricks && made.order == 2)
+    node.at("order").fail("bricks are of first order; leave it out, or make a beam");
   return made;
 }
 

@@ -21,6 +21,8 @@ struct Skin {
 struct BodyMesh {
   std::vector<double> points;  // [n,3] rest, scaled
   const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr, *file_cell = nullptr;
+  const uint32_t *nodes = nullptr;  // of cells that are not first-order tetrahedra, of the kind `cell`
+  uint32_t cell = 0;
   const double *share = nullptr;
   dfm_tetmesh handle = 0;  // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;

@@ -41,6 +41,8 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
   TetMesh mesh;
   mesh.points.assign(b.p.rest.begin(), b.p.rest.end());
   mesh.tets.assign(b.tets.begin(), b.tets.end());
+  mesh.cell = b.cell_type;
+  mesh.cells.assign(b.cells.begin(), b.cells.end());
   mesh.share.assign(b.share.begin(), b.share.end());
   const uint32_t ntet = mesh.ntet();
   mesh.tet_group.assign(ntet, kNoGroup);

@@ -108,6 +108,9 @@ struct BodyModel {
 // Cells of a body, and what follows from them and from the points at rest alone.
 struct Structure {
   Array<uint32_t> tets, edges;
+  // DFM_CELL_*; nodes of cells that are not first-order tetrahedra, of which `tets` has several each in turn
+  uint32_t cell_type = 8;
+  Array<uint32_t> cells;
   Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
   Surface surface;
   SurfaceZones zones;

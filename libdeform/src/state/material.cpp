@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/handle.h"
 #include "core/names.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
 #include "state/world.h"
@@ -51,12 +52,31 @@ void check_share(const dfm_body_def &def, const std::string &body) {
            body.c_str(), t, def.cell_share[t]);
 }
 
+namespace {
+
+// The masses of cells with more nodes, of which lump_mass() knows the tetrahedra.
+void share_mass(Body &b, const double *density, double all) {
+  const CellKind &kind = cell_kind(b.cell_type);
+  std::fill(b.p.mass.begin(), b.p.mass.end(), 0.0);
+  for (size_t c = 0; c < b.ncell() / kind.tets; ++c) {
+    const uint32_t *const cell = &b.cells[kind.nodes * c];
+    double mass = 0, share[10];
+    for (size_t t = kind.tets * c; t < kind.tets * (c + 1); ++t)
+      mass += (density ? density[t] : all) * tet_volume(b.p.rest.data(), &b.tets[4 * t]);
+    mass_shares(kind, b.p.rest.data(), cell, share);
+    for (uint32_t k = 0; k < kind.nodes; ++k) b.p.mass[cell[k]] += share[k] * mass;
+  }
+}
+
+}  // namespace
+
 void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells) {
   std::vector<double> density;
   for (uint32_t k : cells.of) density.push_back(cells.list[k]->def.density);
   const LumpedMass lumped =
       lump_mass(b.p.n, b.p.rest.data(), def.ntet, b.tets.data(), cells.list[0]->def.density,
                 density.empty() ? nullptr : density.data(), def.cell_share, b.p.mass.data());
+  if (!b.cells.empty()) share_mass(b, density.empty() ? nullptr : density.data(), cells.list[0]->def.density);
   b.rest_volume = lumped.volume;
   b.mass = lumped.mass;
 }

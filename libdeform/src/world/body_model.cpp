@@ -8,6 +8,7 @@
 
 #include "core/error.h"
 #include "core/hash.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
@@ -192,19 +193,26 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   const MeshCoupling coupling(m, b.surface);
   std::vector<const char *> field_keys;
   std::vector<const double *> fields;
+  const uint32_t each = cell_kind(b.cell_type).tets;
+  std::vector<std::vector<double>> by_cell;  // of the first tetrahedron of each cell
   for (const CellField &f : out.fields) {
     field_keys.push_back(f.key.c_str());
     fields.push_back(f.values.data());
+    if (each == 1) continue;
+    std::vector<double> &first = by_cell.emplace_back();
+    for (size_t t = 0; t < b.ncell(); t += each)
+      first.insert(first.end(), &f.values[f.width * t], &f.values[f.width * t] + f.width);
+    fields.back() = first.data();
   }
   field_keys.push_back(nullptr);
   dfm_mesh mesh{};
   mesh.size = sizeof mesh;
   mesh.npoint = b.p.n;
-  mesh.ncell = b.ncell();
-  mesh.cell = DFM_CELL_TET;
+  mesh.ncell = b.ncell() / each;
+  mesh.cell = b.cell_type;
   const std::vector<double> placed = rest_for(type, b, out.origin.frame);
   mesh.rest = placed.empty() ? b.p.rest.data() : placed.data();
-  mesh.cells = b.tets.data();
+  mesh.cells = each == 1 ? b.tets.data() : b.cells.data();
   mesh.mass = b.p.mass.data();
   mesh.params = values.data();
   mesh.field_keys = field_keys.data();

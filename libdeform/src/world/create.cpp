@@ -10,7 +10,7 @@
 #include "core/handle.h"
 #include "friction/pair_rules.h"
 #include "geometry/voxel_grid.h"
-#include "mesh/mesh.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "state/bounds.h"
 #include "state/material.h"
@@ -103,6 +103,20 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
   if (def.fixed)
     for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
   b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
+  if (def.cells) {
+    const CellKind &kind = cell_kind(def.cell);
+    b.cell_type = kind.kind;
+    b.cells = Array<uint32_t>(def.cells, def.cells + size_t(def.ntet / kind.tets) * kind.nodes,
+                              HookAllocator<uint32_t>(m));
+    if (def.ntet % kind.tets || tets_of(m, kind, b.cells) != b.tets)
+      fail(DFM_E_ARG,
+           "body '%s': its tetrahedra are not those of its %s; give both as dfm_tetmesh_data and "
+           "dfm_tetmesh_cells do",
+           b.name.c_str(), kind.name);
+    if (def.cell_share)
+      fail(DFM_E_UNSUPPORTED, "body '%s': %s are wholly material; give no cell_share", b.name.c_str(),
+           kind.name);
+  }
   if (def.cell_share)
     b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
 }

@@ -4,6 +4,7 @@
 #include <cstddef>
 
 #include "core/error.h"
+#include "mesh/cells.h"
 #include "plugin/tables.h"
 #include "state/material.h"
 #include "state/tool.h"
@@ -23,6 +24,10 @@ std::optional<dfm_topology> topology_of(const ModelInstance &model) {
 
 void check_may_cut(const Body &b, const ModelInstance &model) {
   const char *const name = b.name.c_str();
+  if (!b.cells.empty())
+    fail(DFM_E_UNSUPPORTED,
+         "body '%s' can be neither cut nor torn: its cells are %s; give it a mesh of first-order tetrahedra",
+         name, cell_kind(b.cell_type).name);
   if (!b.surface.identity())
     fail(DFM_E_UNSUPPORTED,
          "body '%s' can be neither cut nor torn: it has its own surface; create it with the boundary of its "

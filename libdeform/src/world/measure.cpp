@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "mesh/cells.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
 #include "plugin/registry.h"
@@ -69,7 +70,8 @@ namespace {
 
 // Values of a model by cell at the present positions. give: the function of an extension that has one.
 template <class Table, class Give>
-void ask_by_cell(Body &b, const char *id, const char *name, const char *what, const Give &give, double *out) {
+void ask_by_cell(Body &b, const char *id, const char *name, const char *what, size_t width, const Give &give,
+                 double *out) {
   const char *const type = b.model.type->id;
   const auto table =
       copy_table<Table>(b.model.extension(id), 2 * sizeof(uint32_t) + sizeof(void *), type, name);
@@ -79,6 +81,10 @@ void ask_by_cell(Body &b, const char *id, const char *name, const char *what, co
   const char *const entry = name + std::strlen("dfm_");
   if (b.model.call(entry, [&] { return give(*table)(b.model.self, &k, out); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not give its %s per cell", type, what);
+  // each tetrahedron of a cell has the cell's; the last one first, so that none is overwritten before
+  const size_t each = cell_kind(b.cell_type).tets;
+  for (size_t t = b.ncell(); each > 1 && t-- > 0;)
+    std::copy_n(out + width * (t / each), width, out + width * t);
 }
 
 }  // namespace
@@ -87,12 +93,12 @@ bool offers(const Body &b, const char *extension) { return b.model.extension(ext
 
 void energy_density(Body &b, double *out) {
   const auto give = [](const dfm_cell_energy &table) { return table.cell_energy; };
-  ask_by_cell<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy", "energy", give, out);
+  ask_by_cell<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy", "energy", 1, give, out);
 }
 
 void cell_stress(Body &b, double *out) {
   const auto give = [](const dfm_cell_stress &table) { return table.cell_stress; };
-  ask_by_cell<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress", "stress", give, out);
+  ask_by_cell<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress", "stress", 6, give, out);
 }
 
 namespace {

@@ -288,7 +288,7 @@ TEST(MeshRead, VtkStructure_IsChecked) {
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 2\n10\n10\n", DFM_E_FORMAT,
                  {"2 types", "1 cells"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n10\n", DFM_E_FORMAT,
-                 {"tetrahedron", "3 points"});
+                 {"tetrahedra", "3 points"});
   expect_refusal("v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
                  {"no tetrahedra", "TetMesh.fill", "deform mesh fill ", "/v.vtk", " --out ", "/v.vtu"});
   expect_refusal("a v.vtk", kVtk + kFour + "CELLS 1 4\n3 0 1 2\nCELL_TYPES 1\n5\n", DFM_E_FORMAT,
@@ -301,8 +301,10 @@ TEST(MeshRead, VtkStructure_IsChecked) {
   const std::string eight =
       "POINTS 8 double\n0 0 0 1 0 0 0 1 0 1 1 0 0 0 1 1 0 1 0 1 1 1 1 1\nCELLS 1 9\n8 0 1 2 3 4 5 6 "
       "7\nCELL_TYPES 1\n";
-  expect_refusal("v.vtk", kVtk + eight + "12\n", DFM_E_UNSUPPORTED, {"hexahedron", "tetrahedra"});
-  expect_refusal("v.vtk", kVtk + eight + "24\n", DFM_E_UNSUPPORTED, {"second", "-order 1"});
+  expect_refusal("v.vtk", kVtk + eight + "13\n", DFM_E_UNSUPPORTED, {"wedge", "tetrahedra"});
+  expect_refusal("v.vtk", kVtk + eight + "12\n", DFM_E_FORMAT, {"cell 0", "distorted", "order its points"});
+  expect_refusal("v.vtk", kVtk + eight + "24\n", DFM_E_FORMAT, {"8 points", "expected 10"});
+  expect_refusal("v.vtk", kVtk + eight + "71\n", DFM_E_UNSUPPORTED, {"above second order", "-order 2"});
 }
 
 TEST(MeshRead, MshStructure_IsChecked) {
@@ -341,11 +343,13 @@ TEST(MeshRead, MshStructure_IsChecked) {
                  {"m.msh:8", "$EndNodes", "$Elements"});
   expect_refusal("m.msh", kMsh22 + "$PhysicalNames\n1\n3 1 body\n$EndPhysicalNames\n", DFM_E_FORMAT,
                  {"double quotes"});
-  const std::string hexes = "$Elements\n1 1 1 1\n3 1 5 1\n1 1 2 3 4 1 2 3 4\n$EndElements\n";
-  expect_refusal("m.msh", kMsh41 + nodes + hexes, DFM_E_UNSUPPORTED, {"hexahedron", "tetrahedra"});
-  expect_refusal("m.msh",
-                 kMsh41 + nodes + "$Elements\n1 1 1 1\n3 1 11 1\n1 1 2 3 4 1 2 3 4 1 2\n$EndElements\n",
-                 DFM_E_UNSUPPORTED, {"order", "-order 1"});
+  const std::string hexes = "$Elements\n1 1 1 1\n3 1 6 1\n1 1 2 3 4 1 2\n$EndElements\n";
+  expect_refusal("m.msh", kMsh41 + nodes + hexes, DFM_E_UNSUPPORTED, {"prism", "hexahedra of 8 points"});
+  expect_refusal(
+      "m.msh",
+      kMsh41 + nodes +
+          "$Elements\n1 1 1 1\n3 1 29 1\n1 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4\n$EndElements\n",
+      DFM_E_UNSUPPORTED, {"above second order", "-order 1"});
 }
 
 TEST(MeshRead, OtherFiles_AreRefusedByEnding) {

@@ -171,14 +171,14 @@ TEST(ReadVtu, Structure_IsChecked) {
   expect_refusal(file(piece(4, kFour, 2, "0 1 2 3 0 1 2 3", "4 3", "10 10")), DFM_E_FORMAT,
                  {"offset of cell 1 is 3"});
   expect_refusal(file(piece(4, kFour, 2, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"2 offsets"});
-  expect_refusal(file(piece(4, kFour, 1, "0 1 2", "3", "10")), DFM_E_FORMAT, {"tetrahedron", "3 points"});
+  expect_refusal(file(piece(4, kFour, 1, "0 1 2", "3", "10")), DFM_E_FORMAT, {"tetrahedra", "3 points"});
   expect_refusal(file(piece(4, "0 0 0", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT, {"12 points"});
   expect_refusal(file(piece(4, "0 0 0 1 0 0 0 nan 0 0 0 1", 1, "0 1 2 3", "4", "10")), DFM_E_FORMAT,
                  {"a.vtu:3:", "'nan'"});
-  expect_refusal(file(piece(8, kFour + " " + kFour, 1, "0 1 2 3 4 5 6 7", "8", "12")), DFM_E_UNSUPPORTED,
-                 {"hexahedron", "mesh the shape"});
-  expect_refusal(file(piece(4, kFour, 1, "0 1 2 3 0 1 2 3 0 1", "10", "24")), DFM_E_UNSUPPORTED,
-                 {"higher-order", "-order 1"});
+  expect_refusal(file(piece(8, kFour + " " + kFour, 1, "0 1 2 3 4 5 6 7", "8", "11")), DFM_E_UNSUPPORTED,
+                 {"voxel", "mesh the shape"});
+  expect_refusal(file(piece(4, kFour, 1, "0 1 2 3 0 1 2 3 0 1", "10", "71")), DFM_E_UNSUPPORTED,
+                 {"above second order", "-order 2"});
   expect_refusal(file(points_alone("NumberOfComponents=\"2\" format=\"ascii\"", "0 0")), DFM_E_FORMAT,
                  {"2 components"});
   expect_refusal(file(points_alone("NumberOfComponents=\"3\" format=\"appended\" offset=\"0\"", "")),

@@ -1,0 +1,590 @@
+// A body of cells with more nodes than a tetrahedron's corners (cells.h). The stiffness K of a cell is that
+// at rest, in a frame R that turns with the cell, or stands still: with d_a = R^T x_a and X_a the rest
+// positions
+//   u_a = d_a - X_a,   E = u.K u / 2,   h = K u,   f = -dE/dx = -R P^T h,   P = du/d(R^T dx).
+// R is the polar factor of the mean gradient F = sum x_a (x) G_a, S = R^T F. A change e of d turns it by
+//   w = A^-1 sum G_a x e_a,  A = tr S I - S;   (P e)_a = e_a - w x d_a,   (P^T h)_a = h_a - (A^-1 tau) x G_a,
+// tau = sum d_a x h_a = sum u_a x h_a, since K resists no rotation of X. So the forces are the gradient of an
+// energy that no rotation changes, and have no moment. The tangent is R P^T K P R^T, positive semidefinite;
+// what the turning of P adds is left out. The damper is damping_stiffness R P^T K P R^T v.
+//
+// The step bound. With N_ab >= |K_ab| and any weights w > 0, D_a = sum_b N_ab w_b / w_a dominates K (corot's
+// corot_bound.cpp). Let q = sum |G_a| |u_a| of a change u, alpha >= |A^-1|, hence |w| <= alpha q and
+// q^2 <= g sum (|G_a| / w_a) u_a^2, g = sum |G_a| w_a. K P u = K (u - w x U), U the displacement: with
+// e^2 = alpha^2 (sum D_a U_a^2) g max(|G_a| / (w_a D_a)) the square in K of the bracket is at most
+// (1 + e)^2 sum D_a u_a^2. What the turning of P adds is
+//   -2 h.(w x u) + h.(w x (w x d)) - tau.dw,   |A dw| <= |dA| |w| + q |w|.
+// With M = sum h_a (x) d_a, |tau| <= sqrt 2 |M|, |dA| <= sqrt 2 (1 + sqrt 2 alpha |S|) q the last two are at
+// most (alpha^2 |M| + sqrt 2 |M| alpha^2 (1 + sqrt 2 + 2 alpha |S|)) q^2. The first is at most 2 alpha q p,
+// p = sum |h_a| |u_a|, p^2 <= H sum (|h_a| / w_a) u_a^2, H = sum |h_a| w_a, so at most
+// alpha (q^2 H/g + p^2 g/H).
+#pragma once
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <utility>
+
+#include "buffer.h"
+#include "cells.h"
+#include "entry.h"
+#include "params.h"
+#include "rotation.h"
+#include "small_range.h"
+
+namespace model {
+
+class CellBody {
+ public:
+  // Rows that each model with these cells begins its parameters with.
+  enum Param : uint32_t { kYoung, kPoisson, kDampingStiffness, kDampingMass, kParamCount };
+  struct Of {
+    const char *id;
+    const dfm_param *rows;
+    uint32_t nrow;
+    bool turns;  // the frames of the cells
+  };
+
+  // Whether all rows but the first have their defaults; else the reason has been logged.
+  static bool takes(const dfm_host *h, const Of &of, const double *values) {
+    for (uint32_t r = 0; r < of.nrow; values += of.rows[r++].width)
+      for (uint32_t w = 0; r >= kParamCount && w < of.rows[r].width; ++w)
+        if (values[w] != of.rows[r].def) return refuse(h, of, of.rows[r].key);
+    return true;
+  }
+
+  void create(const dfm_host *h, const dfm_mesh &m, const Of &of) {
+    host = h;
+    of_ = of;
+    kind_ = m.cell;
+    nodes_ = nodes_of(kind_);
+    npoint_ = m.npoint;
+    ncell_ = m.ncell;
+    if (!takes(h, of, m.params)) throw Refused{};
+    for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
+      for (uint32_t r = kParamCount; r < of.nrow; ++r)
+        if (!std::strcmp(m.field_keys[k], of.rows[r].key) && !refuse(h, of, of.rows[r].key)) throw Refused{};
+    take_fields(h, of.id, of.rows, kParamCount, m, field_, [](uint32_t, double) { return true; });
+    rest_.create_copy(h, m.rest, 3 * size_t(npoint_));
+    mass_.create_copy(h, m.mass, npoint_);
+    cells_.create_copy(h, m.cells, size_t(nodes_) * ncell_);
+    cell_.create(h, ncell_);
+    block_.create(h, 9 * nblock() * ncell_);
+    force_.create(h, 3 * size_t(nodes_) * ncell_);
+    drag_.create(h, npoint_);
+    weight_.create(h, npoint_);
+    next_.create(h, npoint_);
+    norm_.create(h, nblock() * ncell_);
+    find_places();
+    apply_params(m.params);
+  }
+
+  // Throws before anything changes.
+  void apply_params(const double *values) {
+    if (!takes(host, of_, values)) throw Refused{};
+    std::copy(values, values + kParamCount, params_);
+    std::fill(drag_.data(), drag_.data() + npoint_, 0.0);
+    std::fill(weight_.data(), weight_.data() + npoint_, 0.0);
+    for (uint32_t c = 0; c < ncell_; ++c) make_cell(c);
+    bool damped = false;
+    for (uint32_t c = 0; c < ncell_; ++c) damped |= at(kDampingStiffness, c) > 0 || at(kDampingMass, c) > 0;
+    const char **effect = active_effects;
+    if (of_.turns) *effect++ = "volume";
+    if (damped) *effect++ = "damping";
+    if (of_.turns) *effect++ = "large_rotation";
+    *effect = nullptr;
+    for (uint32_t i = 0; i < npoint_; ++i) drag_[i] = weight_[i] > 0 ? mass_[i] * (drag_[i] / weight_[i]) : 0;
+    find_rows();
+  }
+
+  void add_forces(const dfm_kin &k, double *f) {
+    Call call{this, &k, f};
+    run(
+        ncell_,
+        [](void *user, uint32_t begin, uint32_t end) {
+          const Call &of = *static_cast<const Call *>(user);
+          for (uint32_t c = begin; c < end; ++c) of.body->force_of(*of.k, c);
+        },
+        call);
+    run(
+        npoint_,
+        [](void *user, uint32_t begin, uint32_t end) {
+          const Call &of = *static_cast<const Call *>(user);
+          for (uint32_t i = begin; i < end; ++i) of.body->sum_point(*of.k, i, of.f);
+        },
+        call);
+  }
+
+  void bound(const dfm_kin &k, double *ksum, double *csum) const {
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      const Cell &cell = cell_[c];
+      double more[kMostNodes] = {}, grown = 1;
+      if (of_.turns) growth(k, c, grown, more);
+      for (uint32_t a = 0; a < nodes_; ++a) {
+        const uint32_t i = corner(c, a);
+        ksum[i] += grown * cell.row[a] + more[a];
+        csum[i] += at(kDampingStiffness, c) * grown * cell.row[a];
+      }
+    }
+    for (uint32_t i = 0; i < npoint_; ++i) csum[i] += drag_[i];
+  }
+
+  double energy(const dfm_kin &k) {
+    double sum = 0;
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      Moved m;
+      sum += energy_of(k, c, m);
+      if (of_.turns) continue;
+      double h[3][3];
+      for (int i = 0; i < 9; ++i) h[i / 3][i % 3] = m.s[i] - (i % 4 == 0);
+      range_.look(c, h);
+    }
+    range_.tell(host, of_.id);
+    return sum;
+  }
+  void cell_energy(const dfm_kin &k, double *density) const {
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      Moved m;
+      density[c] = energy_of(k, c, m) / cell_[c].volume;
+    }
+  }
+
+  // Of the mean strain in the frame, turned into the axes of the world.
+  void cell_stress(const dfm_kin &k, double *stress) const {
+    constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      Moved m;
+      move(k, c, m);
+      const Lame l = lame_of(at(kYoung, c), at(kPoisson, c));
+      const double trace = ((m.s[0] + m.s[4]) + m.s[8]) - 3;
+      double local[9], half[9] = {};
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          local[3 * i + j] =
+              l.mu * (m.s[3 * i + j] + m.s[3 * j + i]) + (i == j ? l.lambda * trace - 2 * l.mu : 0);
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j)
+          for (int n = 0; n < 3; ++n) half[3 * i + j] += m.r[3 * i + n] * local[3 * n + j];
+      for (int n = 0; n < 6; ++n) {
+        double sum = 0;
+        for (int o = 0; o < 3; ++o) sum += half[3 * kRow[n] + o] * m.r[3 * kCol[n] + o];
+        stress[6 * size_t(c) + size_t(n)] = sum;
+      }
+    }
+  }
+
+  uint32_t pairs() const {
+    ready_pairs();
+    return npoint_ + npair_;
+  }
+  void pattern(uint32_t *ij) const {
+    for (uint32_t i = 0; i < npoint_; ++i) ij[2 * size_t(i)] = ij[2 * size_t(i) + 1] = i;
+    ready_pairs();
+    std::copy(pair_.data(), pair_.data() + 2 * size_t(npair_), ij + 2 * size_t(npoint_));
+  }
+  void add_stiffness(const dfm_kin &k, double a, double b, double *blk) const {
+    ready_pairs();
+    for (uint32_t c = 0; c < ncell_; ++c)
+      if (const double by = a + b * at(kDampingStiffness, c); by != 0) add_tangent(k, c, by, blk);
+    for (uint32_t i = 0; i < npoint_; ++i)
+      for (size_t n = 0; n < 9; n += 4) blk[9 * size_t(i) + n] -= b * drag_[i];
+  }
+
+  const dfm_host *host = nullptr;
+  const char *active_effects[4] = {};  // of the present parameters, NULL-terminated
+
+ private:
+  static constexpr uint32_t kParallelCells = 500, kGrain = 64;
+  static constexpr int kWeightSteps = 20;
+  static constexpr double kLeastWeight = 1e-3;
+  // Least sum of two stretches that turns a frame: in cells pressed flatter the forces are no gradient.
+  static constexpr double kLeastStretch = 0.1;
+
+  struct Cell {
+    double volume = 0;
+    double rest[kMostNodes][3] = {};  // m, from the mean of the nodes
+    double mean[kMostNodes][3] = {};  // 1/m, G
+    double row[kMostNodes] = {};      // N/m, D_a of this cell
+    double share[kMostNodes] = {};    // |G_a| g / w_a
+    double g = 0, excess = 0;         // sum |G_a| w_a, g max(|G_a| / (w_a D_a))
+  };
+  // One at the positions of a call.
+  struct Moved {
+    double r[9], s[9], inverse[9];  // R, S, A^-1
+    double d[kMostNodes][3], u[kMostNodes][3];
+  };
+  struct Call {
+    CellBody *body;
+    const dfm_kin *k;
+    double *f;
+  };
+
+  static bool refuse(const dfm_host *h, const Of &of, const char *key) {
+    char text[200];
+    std::snprintf(text, sizeof text,
+                  "parameter %s is for first-order tetrahedra alone; leave it out, or give a mesh of those",
+                  key);
+    complain(h, of.id, text);
+    return false;
+  }
+  double at(Param which, uint32_t c) const {
+    return field_[which].empty() ? params_[which] : field_[which][c];
+  }
+  size_t nblock() const { return size_t(nodes_) * (nodes_ + 1) / 2; }
+  uint32_t corner(uint32_t c, uint32_t a) const { return cells_[size_t(nodes_) * c + a]; }
+  // Block (a, b), a <= b, in the order (0, 0), (0, 1) ...
+  size_t place(uint32_t a, uint32_t b) const { return size_t(a) * nodes_ - a * (a + 1) / 2 + b; }
+  const double *blocks(uint32_t c) const { return block_.data() + 9 * nblock() * c; }
+
+  template <class Piece>
+  void run(uint32_t n, Piece piece, Call &call) const {
+    if (ncell_ >= kParallelCells && host->parallel_for)
+      host->parallel_for(host->ctx, n, kGrain, piece, &call);
+    else piece(&call, 0, n);
+  }
+
+  // Places of each point in the list of nodes of all cells, ascending.
+  void find_places() {
+    const size_t n = size_t(nodes_) * ncell_;
+    begin_.create(host, size_t(npoint_) + 1);
+    place_.create(host, n);
+    for (size_t k = 0; k < n; ++k) ++begin_[cells_[k] + 1];
+    for (uint32_t i = 0; i < npoint_; ++i) begin_[i + 1] += begin_[i];
+    Buffer<uint32_t> next;
+    next.create_copy(host, begin_.data(), npoint_);
+    for (size_t k = 0; k < n; ++k) place_[next[cells_[k]]++] = uint32_t(k);
+  }
+
+  void make_cell(uint32_t c) {
+    double x[3 * kMostNodes], middle[3] = {};
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t n = 0; n < 3; ++n) {
+        x[3 * a + n] = rest_[3 * size_t(corner(c, a)) + n];
+        middle[n] += x[3 * a + n] / nodes_;
+      }
+    RestCell made;
+    if (!make_rest_cell(kind_, x, lame_of(at(kYoung, c), at(kPoisson, c)), made))
+      throw "a cell is inverted or flat at rest; mesh the shape again with less curved cells";
+    Cell &out = cell_[c];
+    out.volume = made.volume;
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t n = 0; n < 3; ++n) {
+        out.rest[a][n] = x[3 * a + n] - middle[n];
+        out.mean[a][n] = made.mean[a][n];
+      }
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t b = a; b < nodes_; ++b) {
+        double *const k = block_.data() + 9 * (nblock() * c + place(a, b));
+        for (uint32_t n = 0; n < 9; ++n) k[n] = made.stiffness[3 * a + n / 3][3 * b + n % 3];
+        norm_[nblock() * c + place(a, b)] = norm_of(k);
+      }
+    for (uint32_t a = 0; a < nodes_; ++a) {
+      drag_[corner(c, a)] += made.volume * at(kDampingMass, c);
+      weight_[corner(c, a)] += made.volume;
+    }
+  }
+
+  double row_of(uint32_t c, uint32_t a) const {
+    const double *const norm = norm_.data() + nblock() * c;
+    double sum = 0;
+    for (uint32_t b = 0; b < nodes_; ++b)
+      sum += norm[a < b ? place(a, b) : place(b, a)] * weight_[corner(c, b)];
+    return sum;
+  }
+
+  // Weights by a few steps toward the Perron vector of the row sums over the masses, then the rows.
+  void find_rows() {
+    std::fill(weight_.data(), weight_.data() + npoint_, 1.0);
+    for (int step = 0; step < kWeightSteps; ++step) {
+      std::fill(next_.data(), next_.data() + npoint_, 0.0);
+      for (uint32_t c = 0; c < ncell_; ++c)
+        for (uint32_t a = 0; a < nodes_; ++a) next_[corner(c, a)] += row_of(c, a);
+      double most = 0;
+      for (uint32_t i = 0; i < npoint_; ++i) {
+        next_[i] = mass_[i] > 0 ? next_[i] / mass_[i] : 0;
+        most = std::max(most, next_[i]);
+      }
+      for (uint32_t i = 0; i < npoint_; ++i)
+        weight_[i] = most > 0 ? std::max(next_[i] / most, kLeastWeight) : 1;
+    }
+    for (uint32_t c = 0; c < ncell_; ++c) {
+      Cell &cell = cell_[c];
+      double length[kMostNodes], sum = 0;
+      for (uint32_t a = 0; a < nodes_; ++a) {
+        const double *g = cell.mean[a];
+        length[a] = std::sqrt((g[0] * g[0] + g[1] * g[1]) + g[2] * g[2]);
+        sum += length[a] * weight_[corner(c, a)];
+      }
+      cell.g = sum;
+      cell.excess = 0;
+      for (uint32_t a = 0; a < nodes_; ++a) {
+        const double w = weight_[corner(c, a)];
+        cell.row[a] = row_of(c, a) / w;
+        cell.share[a] = length[a] * sum / w;
+        cell.excess = std::max(cell.excess, cell.share[a] / cell.row[a]);
+      }
+    }
+  }
+
+  // Frame and displacements of a cell.
+  void move(const dfm_kin &k, uint32_t c, Moved &m) const {
+    const Cell &cell = cell_[c];
+    double middle[3] = {}, from[kMostNodes][3], f[9] = {};
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t n = 0; n < 3; ++n) {
+        from[a][n] = k.x[size_t(k.stride) * corner(c, a) + n];
+        middle[n] += from[a][n];
+      }
+    for (double &x : middle) x /= nodes_;
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t i = 0; i < 3; ++i) {
+        from[a][i] -= middle[i];
+        for (uint32_t j = 0; j < 3; ++j) f[3 * i + j] += from[a][i] * cell.mean[a][j];
+      }
+    if (of_.turns) rotation::polar_of(f, m.r);
+    else rotation::identity(m.r);
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t i = 0; i < 3; ++i) {
+        m.d[a][i] = (m.r[i] * from[a][0] + m.r[3 + i] * from[a][1]) + m.r[6 + i] * from[a][2];
+        m.u[a][i] = m.d[a][i] - cell.rest[a][i];
+      }
+    for (uint32_t i = 0; i < 3; ++i)
+      for (uint32_t j = 0; j < 3; ++j)
+        m.s[3 * i + j] = (m.r[i] * f[j] + m.r[3 + i] * f[3 + j]) + m.r[6 + i] * f[6 + j];
+    if (of_.turns) invert_turn(m);
+  }
+
+  // A^-1, no eigenvalue of A less than kLeastStretch.
+  static void invert_turn(Moved &m) {
+    double a[3][3], v[3][3], far = 0;
+    const double trace = (m.s[0] + m.s[4]) + m.s[8];
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        a[i][j] = (i == j ? trace : 0) - 0.5 * (m.s[3 * i + j] + m.s[3 * j + i]);
+        const double off = a[i][j] - (i == j ? 2 : 0);
+        far += off * off;
+      }
+    if (far < 1) {  // no eigenvalue is less than 1
+      for (int r = 0; r < 3; ++r)
+        for (int c = 0; c < 3; ++c) {
+          const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+          m.inverse[3 * c + r] = a[r1][c1] * a[r2][c2] - a[r1][c2] * a[r2][c1];
+        }
+      const double det = (a[0][0] * m.inverse[0] + a[0][1] * m.inverse[3]) + a[0][2] * m.inverse[6];
+      for (double &x : m.inverse) x /= det;
+      return;
+    }
+    jacobi(a, v);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        double sum = 0;
+        for (int n = 0; n < 3; ++n) sum += v[i][n] * v[j][n] / std::max(a[n][n], kLeastStretch);
+        m.inverse[3 * i + j] = sum;
+      }
+  }
+
+  static void cross(const double *a, const double *b, double *out) {
+    out[0] = a[1] * b[2] - a[2] * b[1];
+    out[1] = a[2] * b[0] - a[0] * b[2];
+    out[2] = a[0] * b[1] - a[1] * b[0];
+  }
+  static void times(const double *m, const double *x, double *out) {
+    for (int i = 0; i < 3; ++i) out[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2];
+  }
+
+  // out = K u
+  void apply(uint32_t c, const double (*u)[3], double (*out)[3]) const {
+    std::fill(&out[0][0], &out[0][0] + 3 * nodes_, 0.0);
+    const double *k = blocks(c);
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t b = a; b < nodes_; ++b, k += 9)
+        for (uint32_t i = 0; i < 3; ++i) {
+          out[a][i] += (k[3 * i] * u[b][0] + k[3 * i + 1] * u[b][1]) + k[3 * i + 2] * u[b][2];
+          if (b > a) out[b][i] += (k[i] * u[a][0] + k[3 + i] * u[a][1]) + k[6 + i] * u[a][2];
+        }
+  }
+
+  double energy_of(const dfm_kin &k, uint32_t c, Moved &m) const {
+    double h[kMostNodes][3], sum = 0;
+    move(k, c, m);
+    apply(c, m.u, h);
+    for (uint32_t a = 0; a < nodes_; ++a)
+      sum += (m.u[a][0] * h[a][0] + m.u[a][1] * h[a][1]) + m.u[a][2] * h[a][2];
+    return 0.5 * sum;
+  }
+
+  // The rate of u: R^T v less the turning of the frame.
+  void rate(const dfm_kin &k, uint32_t c, const Moved &m, double (*out)[3]) const {
+    double middle[3] = {}, axial[3] = {}, w[3], part[3];
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t n = 0; n < 3; ++n) middle[n] += k.v[size_t(k.stride) * corner(c, a) + n] / nodes_;
+    for (uint32_t a = 0; a < nodes_; ++a) {
+      const double *const v = k.v + size_t(k.stride) * corner(c, a);
+      const double from[3] = {v[0] - middle[0], v[1] - middle[1], v[2] - middle[2]};
+      for (uint32_t i = 0; i < 3; ++i)
+        out[a][i] = (m.r[i] * from[0] + m.r[3 + i] * from[1]) + m.r[6 + i] * from[2];
+      cross(cell_[c].mean[a], out[a], part);
+      for (int n = 0; n < 3; ++n) axial[n] += part[n];
+    }
+    if (!of_.turns) return;
+    times(m.inverse, axial, w);
+    for (uint32_t a = 0; a < nodes_; ++a) {
+      cross(w, m.d[a], part);
+      for (int n = 0; n < 3; ++n) out[a][n] -= part[n];
+    }
+  }
+
+  void force_of(const dfm_kin &k, uint32_t c) {
+    Moved m;
+    double h[kMostNodes][3], tau[3] = {}, turn[3] = {}, part[3];
+    move(k, c, m);
+    double pull[kMostNodes][3];
+    std::copy_n(&m.u[0][0], 3 * nodes_, &pull[0][0]);
+    if (const double damp = at(kDampingStiffness, c); damp > 0) {
+      rate(k, c, m, h);
+      for (uint32_t a = 0; a < nodes_; ++a)
+        for (int n = 0; n < 3; ++n) pull[a][n] += damp * h[a][n];
+    }
+    apply(c, pull, h);
+    for (uint32_t a = 0; of_.turns && a < nodes_; ++a) {
+      cross(m.u[a], h[a], part);
+      for (int n = 0; n < 3; ++n) tau[n] += part[n];
+    }
+    if (of_.turns) times(m.inverse, tau, turn);
+    double *out = force_.data() + 3 * size_t(nodes_) * c;
+    for (uint32_t a = 0; a < nodes_; ++a, out += 3) {
+      cross(turn, cell_[c].mean[a], part);
+      for (int n = 0; n < 3; ++n) part[n] -= h[a][n];
+      times(m.r, part, out);
+    }
+  }
+
+  void sum_point(const dfm_kin &k, uint32_t i, double *f) const {
+    const double *const v = k.v + size_t(k.stride) * i;
+    double sum[3] = {-drag_[i] * v[0], -drag_[i] * v[1], -drag_[i] * v[2]};
+    for (uint32_t n = begin_[i]; n < begin_[i + 1]; ++n)
+      for (uint32_t j = 0; j < 3; ++j) sum[j] += force_[3 * size_t(place_[n]) + j];
+    for (uint32_t j = 0; j < 3; ++j) f[size_t(k.stride) * i + j] += sum[j];
+  }
+
+  // grown: factor of the rows at rest; more: what comes on top by node.
+  void growth(const dfm_kin &k, uint32_t c, double &grown, double (&more)[kMostNodes]) const {
+    Moved m;
+    double h[kMostNodes][3], pull[kMostNodes], moment[9] = {}, rows = 0, all = 0, second = 0;
+    move(k, c, m);
+    apply(c, m.u, h);
+    const Cell &cell = cell_[c];
+    const auto square = [](const double *x) { return (x[0] * x[0] + x[1] * x[1]) + x[2] * x[2]; };
+    for (uint32_t a = 0; a < nodes_; ++a) {
+      rows += cell.row[a] * square(m.u[a]);
+      pull[a] = std::sqrt(square(h[a]));
+      all += pull[a] * weight_[corner(c, a)];
+      for (uint32_t n = 0; n < 9; ++n) moment[n] += h[a][n / 3] * m.d[a][n % 3];
+    }
+    for (const double x : moment) second += x * x;
+    second = std::sqrt(second);
+    const double alpha = norm_of(m.inverse), stretch = norm_of(m.s), root = std::sqrt(2.0);
+    const double e = alpha * std::sqrt(rows * cell.excess);
+    grown = (1 + e) * (1 + e);
+    const double twist =
+        alpha * all / cell.g + alpha * alpha * second * (1 + root * (1 + root + 2 * alpha * stretch));
+    for (uint32_t a = 0; a < nodes_; ++a)
+      more[a] = twist * cell.share[a] + alpha * cell.g * pull[a] / weight_[corner(c, a)];
+  }
+
+  // blk -= by R P^T K P R^T. With Z_a = sum K_ab [u_b]x, Y = sum [u_a]x^T Z_a, C_a = A^-1 [G_a]x:
+  // P^T K P = K + Z C + (Z C)^T + C^T Y C.
+  void add_tangent(const dfm_kin &k, uint32_t c, double by, double *blk) const {
+    Moved m;
+    move(k, c, m);
+    double z[kMostNodes][9] = {}, turn[kMostNodes][9] = {}, y[9] = {};
+    for (uint32_t n = 0; of_.turns && n < 3; ++n) {
+      // columns: of [u]x it is u x e_n, of A^-1 [G]x it is A^-1 (G x e_n)
+      double unit[3] = {}, column[kMostNodes][3], product[kMostNodes][3], part[3];
+      unit[n] = 1;
+      for (uint32_t a = 0; a < nodes_; ++a) cross(m.u[a], unit, column[a]);
+      apply(c, column, product);
+      for (uint32_t a = 0; a < nodes_; ++a) {
+        for (uint32_t i = 0; i < 3; ++i) z[a][3 * i + n] = product[a][i];
+        cross(product[a], m.u[a], part);  // [u]x^T p = p x u
+        for (uint32_t i = 0; i < 3; ++i) y[3 * i + n] += part[i];
+        double g[3], t[3];
+        cross(cell_[c].mean[a], unit, g);
+        times(m.inverse, g, t);
+        for (uint32_t i = 0; i < 3; ++i) turn[a][3 * i + n] = t[i];
+      }
+    }
+    const double *own = blocks(c);
+    for (uint32_t a = 0; a < nodes_; ++a)
+      for (uint32_t b = a; b < nodes_; ++b, own += 9) {
+        double sum[9], half[9] = {}, full[9] = {};
+        std::copy(own, own + 9, sum);
+        for (uint32_t i = 0; of_.turns && i < 3; ++i)
+          for (uint32_t j = 0; j < 3; ++j)
+            for (uint32_t n = 0; n < 3; ++n) {
+              double yc = 0;
+              for (uint32_t o = 0; o < 3; ++o) yc += y[3 * n + o] * turn[b][3 * o + j];
+              sum[3 * i + j] +=
+                  z[a][3 * i + n] * turn[b][3 * n + j] + turn[a][3 * n + i] * (z[b][3 * j + n] + yc);
+            }
+        for (uint32_t i = 0; i < 3; ++i)
+          for (uint32_t j = 0; j < 3; ++j)
+            for (uint32_t n = 0; n < 3; ++n) half[3 * i + j] += m.r[3 * i + n] * sum[3 * n + j];
+        for (uint32_t i = 0; i < 3; ++i)
+          for (uint32_t j = 0; j < 3; ++j)
+            for (uint32_t n = 0; n < 3; ++n) full[3 * i + j] += half[3 * i + n] * m.r[3 * j + n];
+        const uint32_t i = corner(c, a), j = corner(c, b);
+        const size_t slot = a == b ? i : npoint_ + slot_[(nblock() - nodes_) * c + place(a, b) - (a + 1)];
+        for (uint32_t n = 0; n < 9; ++n) blk[9 * slot + n] -= by * full[i > j ? 3 * (n % 3) + n / 3 : n];
+      }
+  }
+
+  // Pairs i < j of points of a cell, ascending; made when an implicit step first asks.
+  void ready_pairs() const {
+    if (!pair_.empty()) return;
+    const size_t each = nblock() - nodes_;
+    Buffer<uint64_t> key;
+    key.create(host, each * ncell_);
+    slot_.create(host, each * ncell_);
+    size_t n = 0;
+    const auto each_pair = [&](auto &&use) {
+      for (uint32_t c = 0; c < ncell_; ++c)
+        for (uint32_t a = 0; a < nodes_; ++a)
+          for (uint32_t b = a + 1; b < nodes_; ++b) {
+            const auto [i, j] = std::minmax({corner(c, a), corner(c, b)});
+            use(uint64_t(i) << 32 | j);
+          }
+    };
+    each_pair([&](uint64_t of) { key[n++] = of; });
+    std::sort(key.data(), key.data() + n);
+    const size_t kept = size_t(std::unique(key.data(), key.data() + n) - key.data());
+    size_t at = 0;
+    each_pair([&](uint64_t of) {
+      slot_[at++] = uint32_t(std::lower_bound(key.data(), key.data() + kept, of) - key.data());
+    });
+    npair_ = uint32_t(kept);
+    pair_.create(host, 2 * kept);
+    for (size_t p = 0; p < kept; ++p) {
+      pair_[2 * p] = uint32_t(key[p] >> 32);
+      pair_[2 * p + 1] = uint32_t(key[p]);
+    }
+  }
+
+  Of of_{};
+  uint32_t kind_ = 0, nodes_ = 0, npoint_ = 0, ncell_ = 0;
+  double params_[kParamCount] = {};
+  Buffer<double> field_[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
+  Buffer<double> rest_, mass_;         // [npoint,3] m, [npoint] kg
+  Buffer<uint32_t> cells_;             // [ncell,nodes]
+  Buffer<Cell> cell_;                  // [ncell]
+  Buffer<double> block_, norm_;        // [ncell,nblock,9] N/m, [ncell,nblock] their norms
+  Buffer<double> force_;               // [ncell,nodes,3] N
+  Buffer<uint32_t> begin_, place_;     // [npoint + 1], [ncell * nodes]
+  Buffer<double> drag_;                // [npoint] kg/s
+  Buffer<double> weight_, next_;       // [npoint]
+  SmallRange range_;
+  mutable Buffer<uint32_t> pair_, slot_;  // [npair,2], [ncell, pairs of its nodes]
+  mutable uint32_t npair_ = 0;
+};
+
+}  // namespace model

@@ -1,0 +1,213 @@
+// Cells with more nodes than a tetrahedron's corners: their shape functions, and the stiffness of one at
+// rest.
+// Orders of nodes are VTK's: the edges of a tetrahedron 01 12 02 03 13 23; a hexahedron around the bottom,
+// then around the top.
+//
+// TET10: quadratic shape functions; the 8-point rule of degree 3 integrates the stiffness of a straight cell
+// exactly and passes the patch test on curved ones.
+// HEX8: trilinear shape functions, 2 x 2 x 2 points, with two remedies against locking:
+// - bending: three displacements that are quadratic in one coordinate each, whose gradients are taken at the
+//   center and scaled by the Jacobian, so that constant stresses do no work on them (Taylor, Beresford,
+//   Wilson 1976, A non-conforming element for stress analysis). They belong to the cell alone and are
+//   eliminated from its stiffness.
+// - poisson near 1/2: the volume change is its projection on 1, xi, eta, zeta (B-bar, Hughes 1980,
+//   Generalization of selective integration procedures); the linear parts are those of bending, which the
+//   quadratic displacements relieve, so that one constraint is left per cell.
+#pragma once
+#include <deform/plugin.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "entry.h"
+#include "material.h"
+
+namespace model {
+
+constexpr uint32_t kMostNodes = 10;
+
+// Largest singular value, or a little more: the largest eigenvalue of the symmetric m^T m is at most mean +
+// sqrt(2/3) |deviator|, equal where the other two are.
+inline double norm_of(const double *m) {
+  double a[6];
+  constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
+  for (int n = 0; n < 6; ++n) {
+    const double *x = m + kRow[n], *y = m + kCol[n];
+    a[n] = (x[0] * y[0] + x[3] * y[3]) + x[6] * y[6];
+  }
+  const double mean = ((a[0] + a[1]) + a[2]) / 3, x = a[0] - mean, y = a[1] - mean, z = a[2] - mean;
+  const double deviator2 = ((x * x + y * y) + z * z) + 2 * ((a[3] * a[3] + a[4] * a[4]) + a[5] * a[5]);
+  return std::sqrt(mean + std::sqrt(deviator2 * (2.0 / 3)));
+}
+
+// One cell at rest.
+struct RestCell {
+  double volume = 0;
+  double mean[kMostNodes][3] = {};                        // 1/m, mean gradients of the shape functions
+  double stiffness[3 * kMostNodes][3 * kMostNodes] = {};  // N/m, of the first 3 nodes_of(kind) rows
+};
+
+namespace cells {
+
+constexpr int kInner = 3;  // quadratic displacements of a hexahedron
+constexpr int kMost = kMostNodes + kInner;
+
+// At one of the eight points of a rule.
+struct Point {
+  double at[3];                 // reference coordinates
+  double weight;                // m^3 once the Jacobian is known
+  double local[kMostNodes][3];  // derivatives of the shape functions
+  double inverse[9];            // of the Jacobian
+  double jacobian;
+  double g[kMost][3];  // gradients, 1/m
+};
+
+constexpr int kTetEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+
+inline void tet10(int n, Point &p) {
+  double b[4];  // barycentric: a corner, or the center of the face opposite to it
+  for (int k = 0; k < 4; ++k) b[k] = n < 4 ? k == n : k == n - 4 ? 0 : 1.0 / 3;
+  p.weight = (n < 4 ? 1.0 : 9.0) / 40 / 6;
+  const double d[4][3] = {{-1, -1, -1}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+  for (int c = 0; c < 3; ++c) {
+    p.at[c] = b[c + 1];
+    for (int k = 0; k < 4; ++k) p.local[k][c] = (4 * b[k] - 1) * d[k][c];
+    for (int e = 0; e < 6; ++e) {
+      const int i = kTetEdges[e][0], j = kTetEdges[e][1];
+      p.local[4 + e][c] = 4 * (b[i] * d[j][c] + b[j] * d[i][c]);
+    }
+  }
+}
+
+inline void hex8(int n, Point &p) {
+  constexpr double kGauss = 0.57735026918962576451;
+  constexpr int kSign[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
+                               {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
+  p.weight = 1;
+  for (int c = 0; c < 3; ++c) p.at[c] = n < 8 ? kGauss * kSign[n][c] : 0;  // 8: the center
+  for (int k = 0; k < 8; ++k)
+    for (int c = 0; c < 3; ++c) {
+      const int i = (c + 1) % 3, j = (c + 2) % 3;
+      p.local[k][c] = 0.125 * kSign[k][c] * (1 + kSign[k][i] * p.at[i]) * (1 + kSign[k][j] * p.at[j]);
+    }
+}
+
+// The Jacobian dx_i/dxi_j, its determinant and inverse; false if it is not positive.
+inline bool jacobian_of(uint32_t nodes, const double *x, Point &p) {
+  double j[9] = {};
+  for (uint32_t a = 0; a < nodes; ++a)
+    for (int r = 0; r < 3; ++r)
+      for (int c = 0; c < 3; ++c) j[3 * r + c] += x[3 * a + uint32_t(r)] * p.local[a][c];
+  for (int r = 0; r < 3; ++r)
+    for (int c = 0; c < 3; ++c) {
+      const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
+      p.inverse[3 * c + r] = j[3 * r1 + c1] * j[3 * r2 + c2] - j[3 * r1 + c2] * j[3 * r2 + c1];
+    }
+  p.jacobian = (j[0] * p.inverse[0] + j[1] * p.inverse[3]) + j[2] * p.inverse[6];
+  if (!(p.jacobian > 0)) return false;
+  for (double &v : p.inverse) v /= p.jacobian;
+  return true;
+}
+
+// Gradient of a function with these derivatives, times by.
+inline void gradient(const double *inverse, const double *local, double by, double *g) {
+  for (int c = 0; c < 3; ++c)
+    g[c] = by * ((local[0] * inverse[c] + local[1] * inverse[3 + c]) + local[2] * inverse[6 + c]);
+}
+
+// Projects what the rows hold at the points on 1, xi, eta, zeta, weighted by volume.
+inline void project(const Point *q, int rows, double (*theta)[kMost][3]) {
+  double basis[8][4];
+  const auto inner = [&](int i, int j) {
+    double sum = 0;
+    for (int n = 0; n < 8; ++n) sum += q[n].weight * basis[n][i] * basis[n][j];
+    return sum;
+  };
+  for (int n = 0; n < 8; ++n) {  // made orthonormal one after another
+    basis[n][0] = 1;
+    for (int k = 0; k < 3; ++k) basis[n][k + 1] = q[n].at[k];
+  }
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < i; ++j) {
+      const double along = inner(i, j);
+      for (int n = 0; n < 8; ++n) basis[n][i] -= along * basis[n][j];
+    }
+    const double length = std::sqrt(inner(i, i));
+    for (int n = 0; n < 8; ++n) basis[n][i] /= length;
+  }
+  for (int a = 0; a < rows; ++a)
+    for (int c = 0; c < 3; ++c) {
+      double part[4] = {};
+      for (int n = 0; n < 8; ++n)
+        for (int i = 0; i < 4; ++i) part[i] += q[n].weight * basis[n][i] * theta[n][a][c];
+      for (int n = 0; n < 8; ++n) {
+        theta[n][a][c] = 0;
+        for (int i = 0; i < 4; ++i) theta[n][a][c] += basis[n][i] * part[i];
+      }
+    }
+}
+
+// Eliminates the rows of k from n on, the last one first: each pivot is positive.
+template <int kSize>
+inline void eliminate(double (&k)[kSize][kSize], int n, int all) {
+  for (int p = all - 1; p >= n; --p)
+    for (int i = 0; i < p; ++i) {
+      const double share = k[i][p] / k[p][p];
+      for (int j = 0; j < p; ++j) k[i][j] -= share * k[p][j];
+    }
+}
+
+}  // namespace cells
+
+// x [nodes,3] m. False if the Jacobian is not positive at a point: the cell is inverted or flat there.
+inline bool make_rest_cell(uint32_t kind, const double *x, const Lame &m, RestCell &out) {
+  using namespace cells;
+  const bool hex = kind == DFM_CELL_HEX8;
+  const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes;
+  const auto look = [&](int n, Point &p) {
+    hex ? hex8(n, p) : tet10(n, p);
+    return jacobian_of(uint32_t(nodes), x, p);
+  };
+  Point q[8], center{};
+  if (hex && !look(8, center)) return false;
+  out = RestCell();
+  for (int n = 0; n < 8; ++n) {
+    if (!look(n, q[n])) return false;
+    q[n].weight *= q[n].jacobian;
+    for (int a = 0; a < nodes; ++a) gradient(q[n].inverse, q[n].local[a], 1, q[n].g[a]);
+    for (int k = 0; hex && k < kInner; ++k) {
+      double local[3] = {};
+      local[k] = q[n].at[k];
+      gradient(center.inverse, local, center.jacobian / q[n].jacobian, q[n].g[nodes + k]);
+    }
+    out.volume += q[n].weight;
+    for (int a = 0; a < nodes; ++a)
+      for (int c = 0; c < 3; ++c) out.mean[a][c] += q[n].weight * q[n].g[a][c];
+  }
+  for (int a = 0; a < nodes; ++a)
+    for (double &g : out.mean[a]) g /= out.volume;
+  double theta[8][kMost][3];
+  for (int n = 0; n < 8; ++n) std::copy_n(&q[n].g[0][0], 3 * kMost, &theta[n][0][0]);
+  if (hex) project(q, rows, theta);
+  // 2 mu deviator : deviator + bulk theta^2
+  const double bulk = m.lambda + 2 * m.mu / 3;
+  double k[3 * kMost][3 * kMost] = {};
+  for (int n = 0; n < 8; ++n)
+    for (int a = 0; a < rows; ++a)
+      for (int b = 0; b < rows; ++b) {
+        const double *ga = q[n].g[a], *gb = q[n].g[b], *ta = theta[n][a], *tb = theta[n][b];
+        const double both = (ga[0] * gb[0] + ga[1] * gb[1]) + ga[2] * gb[2];
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j) {
+            const double shear = (i == j ? both : 0) + ga[j] * gb[i] - (2.0 / 3) * (ga[i] * gb[j]);
+            k[3 * a + i][3 * b + j] += q[n].weight * (m.mu * shear + bulk * (ta[i] * tb[j]));
+          }
+      }
+  eliminate(k, 3 * nodes, 3 * rows);
+  for (int i = 0; i < 3 * nodes; ++i)
+    for (int j = 0; j < 3 * nodes; ++j) out.stiffness[i][j] = 0.5 * (k[i][j] + k[j][i]);
+  return true;
+}
+
+}  // namespace model

@@ -1,0 +1,86 @@
+// Bars of second-order tetrahedra and of hexahedra against the converged value of the reference set
+// (reference/elasticity, bar_tip), and near poisson 1/2.
+#include <deform/plugin.h>
+
+#include <cstring>
+
+#include "statics.h"
+
+namespace {
+
+constexpr double kSide = 0.1, kForce = 0.01;
+
+// A bar of 1 x 0.1 x 0.1 m of `across` cells in each direction across, of the cells that the file has.
+std::string bar_file(dfm_context *context, const char *kind, uint32_t across, bool second) {
+  const double size[3] = {1, kSide, kSide};
+  const uint32_t cubes = 10 * across * across * across;
+  dfm_tetmesh mesh = 0;
+  test::ok(dfm_tetmesh_make(context, kind, size, std::strcmp(kind, "bricks") ? 12 * cubes : cubes, &mesh));
+  if (second) test::ok(dfm_tetmesh_second_order(mesh, &mesh));
+  const std::string path = test::scratch("cells_bar") + "/bar.vtu";
+  test::ok(dfm_tetmesh_write(mesh, path.c_str()));
+  return path;
+}
+
+// Tip deflection under a uniform traction at the end over `exact`, by the work of its consistent loads.
+double tip(const char *model, const char *kind, uint32_t across, bool second, double poisson, double exact) {
+  test::Context context;
+  const std::string path = bar_file(context, kind, across, second);
+  test::Statics s(path, model, 1e5, poisson);
+  dfm_tetmesh mesh = 0;
+  test::ok(dfm_tetmesh_read(context, path.c_str(), &mesh));
+  dfm_tetmesh_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_tetmesh_get_info(mesh, &info));
+  uint32_t cell = 0;
+  const uint32_t *nodes = nullptr, *tets = nullptr;
+  const double *x = nullptr;
+  test::ok(dfm_tetmesh_cells(mesh, &cell, &nodes));
+  test::ok(dfm_tetmesh_data(mesh, &x, &tets, nullptr));
+  const uint32_t k = cell == DFM_CELL_HEX8 ? 8 : cell == DFM_CELL_TET10 ? 10 : 4;
+  if (!nodes) nodes = tets;
+  std::vector<double> weight(info.npoint);
+  double all = 0;
+  for (uint32_t c = 0; c < info.ncell; ++c) {
+    const auto at_end = [&](uint32_t a) { return x[3 * nodes[k * c + a]] > 1 - 1e-9; };
+    uint32_t on = 0;
+    for (uint32_t a = 0; a < k; ++a) on += at_end(a);
+    if (on != (k == 8 ? 4 : k == 10 ? 6 : 3)) continue;
+    for (uint32_t a = k == 10 ? 4 : 0; a < k; ++a) weight[nodes[k * c + a]] += at_end(a);
+  }
+  for (double w : weight) all += w;
+  for (uint32_t i = 0; i < info.npoint; ++i) {
+    const double force[3] = {0, 0, -kForce * weight[i] / all};
+    if (x[3 * i] < 1e-9) s.hold(i, 7);
+    if (weight[i] > 0) s.load(i, force);
+  }
+  s.solve();
+  const std::vector<double> u = s.displacement();
+  double work = 0;
+  for (uint32_t i = 0; i < info.npoint; ++i) work += u[3 * i + 2] * weight[i] / all;
+  return -work / exact;
+}
+
+constexpr double kExact = 0.004003982437917666;
+
+TEST(Cells, BarOfOneCellAcross_BendsAsTheReferenceSet) {
+  for (const char *model : {"linear_fem", "corotational_fem"}) {
+    EXPECT_NEAR(tip(model, "beam", 1, true, 0.3, kExact), 1, 0.02) << model;
+    EXPECT_NEAR(tip(model, "bricks", 1, false, 0.3, kExact), 1, 0.02) << model;
+  }
+  EXPECT_LT(tip("linear_fem", "beam", 1, false, 0.3, kExact), 0.5);
+}
+
+TEST(Cells, BarOfMoreCellsAcross_IsNearer) {
+  EXPECT_NEAR(tip("linear_fem", "beam", 2, true, 0.3, kExact), 1, 0.005);
+  EXPECT_NEAR(tip("linear_fem", "bricks", 4, false, 0.3, kExact), 1, 0.005);
+}
+
+// Against the finest mesh of hexahedra; first-order tetrahedra give 0.06.
+TEST(Cells, BarNearlyIncompressible_DoesNotLock) {
+  const double exact = kExact * tip("linear_fem", "bricks", 4, false, 0.499, kExact);
+  EXPECT_NEAR(tip("linear_fem", "bricks", 1, false, 0.499, exact), 1, 0.02);
+  EXPECT_NEAR(tip("linear_fem", "beam", 2, true, 0.499, exact), 1, 0.03);
+}
+
+}  // namespace

@@ -1,0 +1,196 @@
+// Bodies of second-order tetrahedra and of hexahedra in worlds and scenes: they fall on a floor, swing, are
+// saved and written; what does not take them says so.
+#include <deform/plugin.h>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+struct Kind {
+  const char *make;
+  bool second;
+  std::array<double, 3> size;
+  uint32_t cells;
+};
+constexpr Kind kBall = {"ball", true, {0.1, 0, 0}, 160}, kBricks = {"bricks", false, {0.2, 0.2, 0.2}, 27};
+
+dfm_tetmesh made(dfm_context *context, const Kind &kind) {
+  dfm_tetmesh mesh = 0;
+  test::ok(dfm_tetmesh_make(context, kind.make, kind.size.data(), kind.cells, &mesh));
+  if (kind.second) test::ok(dfm_tetmesh_second_order(mesh, &mesh));
+  return mesh;
+}
+
+dfm_body_def def_of(dfm_tetmesh mesh, const char *model) {
+  dfm_body_def d = dfm_body_def_default();
+  test::lend(mesh, d);
+  d.model = model;
+  return d;
+}
+
+struct Drop {
+  test::Context context;
+  dfm_world world;
+  dfm_body body = 0;
+  explicit Drop(const Kind &kind, int32_t integrator, double young = 2e5, double height = 0.3) {
+    world = test::make_world(context, {0, 0, -9.81}, integrator);
+    test::add_plane(world, "floor");
+    test::set_friction(world, 0.5);
+    dfm_tetmesh mesh = made(context, kind);
+    dfm_body_def d = def_of(mesh, "corotational_fem");
+    test::BodyOptions o;
+    o.young = young;
+    d.material = test::make_material(world, o);
+    d.pose.position[2] = height;
+    d.spin[0] = 3;
+    d.spin[1] = 1;
+    test::ok(dfm_body_create(world, &d, &body));
+    test::ok(dfm_tetmesh_destroy(mesh));
+  }
+  ~Drop() { dfm_world_destroy(world); }
+};
+
+TEST(CellWorlds, BodiesDroppedOnAFloor_BounceWithoutNewEnergyAndDoNotCross) {
+  for (const Kind &kind : {kBall, kBricks})
+    for (int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
+      Drop d(kind, integrator);
+      const double before = test::total_energy(d.body), h = 2e-3;
+      uint32_t seen = 0, touched = 0;
+      double most = 0;
+      for (int n = 0; n < 300; ++n) {
+        uint32_t trouble = 0;
+        ASSERT_EQ(dfm_world_step(d.world, h, &trouble), DFM_OK) << dfm_last_error();
+        seen |= trouble;
+        touched += !test::contacts(d.world).empty();
+        most = std::max(most, test::total_energy(d.body));
+        ASSERT_EQ(test::measure(d.body).inverted, 0u);
+      }
+      EXPECT_EQ(seen & ~uint32_t(DFM_TROUBLE_SUBSTEPS), 0u) << kind.make << " " << integrator;
+      EXPECT_GT(touched, 10u);
+      EXPECT_LT(most, before * 1.01);
+      uint32_t n = 0;
+      std::vector<double> x(3 * 2000);
+      test::ok(dfm_body_get_state(d.body, 2000, x.data(), nullptr, &n));
+      for (uint32_t i = 0; i < n; ++i) EXPECT_GT(x[3 * i + 2], -1e-4);
+    }
+}
+
+TEST(CellWorlds, MassAndVolume_AreThoseOfTheShape) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  for (const Kind &kind : {kBall, kBricks}) {
+    dfm_tetmesh mesh = made(context, kind);
+    dfm_tetmesh_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    EXPECT_EQ(info.ncell, kind.cells);
+    EXPECT_EQ(info.cell, uint32_t(kind.second ? DFM_CELL_TET10 : DFM_CELL_HEX8));
+    const dfm_body_def d = def_of(mesh, "corotational_fem");
+    dfm_body body = 0;
+    test::ok(dfm_body_create(world, &d, &body));
+    const dfm_body_measure m = test::measure(body);
+    EXPECT_NEAR(m.mass, 1000 * info.volume, 1e-9);
+    EXPECT_NEAR(m.rest_volume, info.volume, 1e-12);
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(m.com[k], (info.lo[k] + info.hi[k]) / 2, 1e-12);
+  }
+  dfm_world_destroy(world);
+}
+
+TEST(CellWorlds, Snapshot_ContinuesWithTheSameBits) {
+  Drop d(kBall, DFM_INTEGRATOR_SYMPLECTIC_EULER), other(kBall, DFM_INTEGRATOR_SYMPLECTIC_EULER);
+  test::run(d.world, 0.3, 2e-3);
+  const std::string kept = test::snapshot(d.world);
+  test::ok(dfm_world_restore(other.world, kept.data(), kept.size()));
+  test::run(d.world, 0.1, 2e-3);
+  test::run(other.world, 0.1, 2e-3);
+  EXPECT_TRUE(test::snapshot(d.world) == test::snapshot(other.world));
+}
+
+// Each tetrahedron of a cell has the cell's.
+TEST(CellWorlds, StressAndEnergy_AreThatOfTheCell) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  dfm_tetmesh mesh = made(context, kBricks);
+  dfm_body_def d = def_of(mesh, "corotational_fem");
+  dfm_body body = 0;
+  test::ok(dfm_body_create(world, &d, &body));
+  std::vector<double> x(d.points, d.points + 3 * d.npoint);
+  for (size_t i = 0; i < x.size(); i += 3) x[i] *= 1 + 0.1 * x[i];
+  test::ok(dfm_body_set_state(body, d.npoint, x.data(), nullptr));
+  std::vector<double> stress(6 * size_t(d.ntet));
+  test::ok(dfm_body_stress(body, d.ntet, stress.data()));
+  for (uint32_t t = 0; t < d.ntet; ++t)
+    for (uint32_t k = 0; k < 6; ++k) EXPECT_EQ(stress[6 * t + k], stress[6 * (t / 6 * 6) + k]);
+  EXPECT_NE(stress[0], stress[6 * size_t(d.ntet - 1)]);
+  dfm_world_destroy(world);
+}
+
+TEST(CellWorlds, WhatTakesNoSuchCells_SaysSo) {
+  Drop d(kBricks, DFM_INTEGRATOR_IMPLICIT_EULER);
+  dfm_cut_def cut = dfm_cut_def_default();
+  cut.half_size[0] = cut.half_size[1] = cut.half_size[2] = 1;
+  EXPECT_EQ(dfm_body_cut(d.body, &cut, nullptr), DFM_E_UNSUPPORTED);
+  test::says({"neither cut nor torn", "hexahedra", "first-order tetrahedra"});
+  EXPECT_EQ(dfm_body_set_model(d.body, "msm", nullptr), DFM_E_UNSUPPORTED);
+  test::says({"msm", "does not accept hexahedra", "corotational_fem"});
+  dfm_tetmesh mesh = made(d.context, kBall);
+  dfm_body body = 0;
+  for (const char *model : {"msm", "shape_matching", "modal", "condensed", "meshless"}) {
+    const dfm_body_def def = def_of(mesh, model);
+    EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_UNSUPPORTED) << model;
+    test::says({model, "does not accept second-order tetrahedra"});
+  }
+  dfm_body_def def = def_of(mesh, "corotational_fem");
+  def.ntet -= 8;
+  std::vector<uint32_t> tets(def.tets, def.tets + 4 * def.ntet);
+  def.tets = tets.data();
+  tets[0] = def.tets[5];
+  EXPECT_NE(dfm_body_create(d.world, &def, &body), DFM_OK);
+  def = def_of(mesh, "corotational_fem");
+  def.cell = 3;
+  EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_ARG);
+  test::says({"3 is no kind of cell"});
+  const double one = 1;
+  const dfm_param_value value{"yield", &one, 1};
+  def = def_of(mesh, "corotational_fem");
+  def.model_params = {sizeof(dfm_params), 1, &value};
+  EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_ARG);
+  test::says({"yield", "first-order tetrahedra alone"});
+}
+
+constexpr const char *kScene = R"({"format": "deform-scene", "version": 1,
+  "time": {"duration": 0.02, "step": 0.01},
+  "bodies": [
+    {"name": "second", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 48, "order": 2},
+     "model": {"type": "corotational_fem"}, "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]]}]},
+    {"name": "bricks", "mesh": {"make": "bricks", "size": [0.4, 0.1, 0.1], "cells": 4},
+     "model": {"type": "linear_fem"}, "pose": {"position": [0, 1, 0]},
+     "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]]}]}]})";
+
+TEST(CellWorlds, Scene_MakesThemAndAWrittenSceneHasThem) {
+  test::Context context;
+  const std::string folder = test::scratch("cell_scene"), path = folder + "/scene.json";
+  test::write_file(path, kScene);
+  dfm_world world = 0, again = 0;
+  DFM_OK_OR_DIE(dfm_scene_load(context, path.c_str(), &world));
+  test::run(world, 0.02, 0.01);
+  const std::string copy = folder + "/copy.json";
+  DFM_OK_OR_DIE(dfm_world_write_scene(world, copy.c_str(), nullptr, nullptr));
+  DFM_OK_OR_DIE(dfm_scene_load(context, copy.c_str(), &again));
+  for (const char *name : {"second", "bricks"}) {
+    dfm_body a = 0, b = 0;
+    test::ok(dfm_world_find_body(world, name, &a));
+    test::ok(dfm_world_find_body(again, name, &b));
+    const dfm_body_measure m = test::measure(a), n = test::measure(b);
+    EXPECT_GT(m.elastic, 0);
+    EXPECT_NEAR(n.elastic / m.elastic, 1, 1e-9) << name;
+  }
+  std::string wrong = kScene;
+  wrong.replace(wrong.find("\"beam\""), 6, "\"bricks\"");
+  test::write_file(path, wrong);
+  EXPECT_EQ(dfm_scene_load(context, path.c_str(), &world), DFM_E_ARG);
+  test::says({"/bodies/0/mesh/order", "bricks are of first order"});
+}
+
+}  // namespace

@@ -1,0 +1,67 @@
+// Meshes of second-order tetrahedra and of hexahedra for the host of model_host.h.
+#pragma once
+#include "model_host.h"
+
+namespace model_test {
+
+// VTK's order of the edges.
+constexpr int kEdgesOfTet[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+
+// The middles of the edges as points; `noise` bends the edges by that share of their length.
+inline Mesh second_order(const Mesh &m, double noise = 0) {
+  Mesh out;
+  out.kind = DFM_CELL_TET10;
+  out.rest = m.rest;
+  std::map<std::pair<uint32_t, uint32_t>, uint32_t> middle;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> u(-noise, noise);
+  out.mass.assign(m.npoint(), 0);
+  for (uint32_t c = 0; c < m.ncell(); ++c) {
+    const uint32_t *q = &m.cells[4 * size_t(c)];
+    for (int a = 0; a < 4; ++a) out.cells.push_back(q[a]);
+    for (const auto &e : kEdgesOfTet) {
+      const auto [at, fresh] = middle.insert({std::minmax(q[e[0]], q[e[1]]), uint32_t(out.rest.size() / 3)});
+      if (fresh) {
+        const Vec x = m.at(q[e[0]]), y = m.at(q[e[1]]);
+        const double length = norm(y - x);
+        for (size_t k = 0; k < 3; ++k) out.rest.push_back((x[k] + y[k]) / 2 + length * u(random));
+        out.mass.push_back(0);
+      }
+      out.cells.push_back(at->second);
+    }
+    for (uint32_t a = 0; a < 10; ++a)
+      out.mass[out.cells[10 * size_t(c) + a]] += 1000 * m.volume(c) * (a < 4 ? 1.0 / 36 : 4.0 / 27);
+  }
+  out.edges = m.edges;  // a mesh has some
+  return out;
+}
+
+// nx x ny x nz boxes of sides h; `noise` moves inner points by that share of the shortest side.
+inline Mesh brick_bar(uint32_t nx, uint32_t ny, uint32_t nz, Vec h, double noise = 0) {
+  Mesh m;
+  m.kind = DFM_CELL_HEX8;
+  const auto id = [&](uint32_t i, uint32_t j, uint32_t k) { return (i * (ny + 1) + j) * (nz + 1) + k; };
+  std::mt19937 random(7);
+  const double most = noise * *std::min_element(h.begin(), h.end());
+  std::uniform_real_distribution<double> u(-most, most);
+  for (uint32_t i = 0; i <= nx; ++i)
+    for (uint32_t j = 0; j <= ny; ++j)
+      for (uint32_t k = 0; k <= nz; ++k) {
+        const bool inner = i > 0 && j > 0 && k > 0 && i < nx && j < ny && k < nz;
+        const double at[3] = {h[0] * i, h[1] * j, h[2] * k};
+        for (double x : at) m.rest.push_back(x + (inner ? u(random) : 0));
+      }
+  m.mass.assign(m.npoint(), 0);
+  for (uint32_t i = 0; i < nx; ++i)
+    for (uint32_t j = 0; j < ny; ++j)
+      for (uint32_t k = 0; k < nz; ++k)
+        for (uint32_t n = 0; n < 8; ++n) {
+          const uint32_t p = id(i + ((n % 4) == 1 || (n % 4) == 2), j + (n % 4 > 1), k + n / 4);
+          m.cells.push_back(p);
+          m.mass[p] += 1000 * h[0] * h[1] * h[2] / 8;
+        }
+  m.edges = {0, 1};
+  return m;
+}
+
+}  // namespace model_test

@@ -1,0 +1,163 @@
+// Second-order tetrahedra and hexahedra as meshes: their tetrahedra, masses, files, and what is refused.
+#include "mesh/cells.h"
+
+#include <map>
+#include <numeric>
+#include <set>
+
+#include "deform/plugin.h"
+#include "math/vec3.h"
+#include "mesh_support.h"
+
+namespace {
+
+using namespace dfm;
+
+void expect_refusal(const std::string &text, dfm_status status, const std::vector<std::string> &words) {
+  const auto error = test::refusal_of_text("a.msh", text);
+  ASSERT_TRUE(error) << "it was read";
+  EXPECT_EQ(error->status, status) << error->sentence;
+  for (const std::string &word : words)
+    EXPECT_NE(error->sentence.find(word), std::string::npos) << "no '" << word << "' in: " << error->sentence;
+}
+
+const Memory &kMemory = Memory::standard();
+
+TetMesh made(uint32_t kind) {
+  if (kind == DFM_CELL_HEX8) return make_bricks(kMemory, 0.3, 0.2, 0.2, 12);
+  return second_order(make_beam(kMemory, 0.3, 0.2, 0.2, 100));
+}
+
+class Cells : public testing::TestWithParam<uint32_t> {};
+INSTANTIATE_TEST_SUITE_P(Kinds, Cells, testing::Values(DFM_CELL_TET10, DFM_CELL_HEX8), [](const auto &of) {
+  return of.param == DFM_CELL_HEX8 ? std::string("Hex8") : std::string("Tet10");
+});
+
+// All are positive, fill the box, and have no other boundary than the box, whatever the numbers of points.
+TEST_P(Cells, Tetrahedra_FillTheShapeAndMeet) {
+  TetMesh mesh = made(GetParam());
+  const CellKind &kind = cell_kind(mesh.cell);
+  for (int shuffle = 0; shuffle < 3; ++shuffle) {
+    ASSERT_EQ(mesh.ntet(), kind.tets * (mesh.cells.size() / kind.nodes));
+    double volume = 0;
+    for (uint32_t t = 0; t < mesh.ntet(); ++t) {
+      const double one = tet_volume(mesh.points.data(), &mesh.tets[4 * size_t{t}]);
+      EXPECT_GT(one, 0);
+      volume += one;
+    }
+    EXPECT_NEAR(volume, 0.012, 1e-15);
+    double area = 0;
+    const Array<uint32_t> faces = boundary_triangles(mesh.tets);
+    for (size_t f = 0; f < faces.size(); f += 3) {
+      const auto x = [&](size_t k) { return load3(&mesh.points[3 * size_t{faces[f + k]}]); };
+      area += norm(cross(x(1) - x(0), x(2) - x(0))) / 2;
+    }
+    EXPECT_NEAR(area, 2 * (0.06 + 0.06 + 0.04), 1e-14);
+    // other numbers of the points
+    const uint32_t n = mesh.npoint();
+    TetMesh other = mesh;
+    const auto number = [&](uint32_t p) { return uint32_t((uint64_t{p} * 101 + uint32_t(shuffle) + 3) % n); };
+    ASSERT_EQ(std::gcd(n, 101u), 1u);
+    for (uint32_t p = 0; p < n; ++p)
+      std::copy_n(&mesh.points[3 * size_t{p}], 3, &other.points[3 * size_t{number(p)}]);
+    for (uint32_t &p : other.cells) p = number(p);
+    other.tets = tets_of(kMemory, kind, other.cells);
+    mesh = other;
+  }
+}
+
+TEST_P(Cells, MassShares_ArePositiveAndHaveTheCenterOfTheCell) {
+  const TetMesh mesh = made(GetParam());
+  const CellKind &kind = cell_kind(mesh.cell);
+  TetMesh moved = mesh;
+  for (size_t k = 0; k < moved.points.size(); k += 3) moved.points[k] *= 1 + moved.points[k + 1];  // a taper
+  const bool straight = kind.nodes == 10;
+  const TetMesh &of = straight ? mesh : moved;
+  for (size_t c = 0; c < of.cells.size() / kind.nodes; ++c) {
+    double share[10], sum = 0, volume = 0;
+    Vec3 center, mean;
+    mass_shares(kind, of.points.data(), &of.cells[kind.nodes * c], share);
+    for (uint32_t k = 0; k < kind.nodes; ++k) {
+      EXPECT_GT(share[k], 0);
+      sum += share[k];
+      mean += share[k] * load3(&of.points[3 * size_t{of.cells[kind.nodes * c + k]}]);
+    }
+    for (size_t t = kind.tets * c; t < kind.tets * (c + 1); ++t) {
+      const double v = tet_volume(of.points.data(), &of.tets[4 * t]);
+      volume += v;
+      for (size_t k = 0; k < 4; ++k) center += (v / 4) * load3(&of.points[3 * size_t{of.tets[4 * t + k]}]);
+    }
+    EXPECT_NEAR(sum, 1, 1e-14);
+    EXPECT_LT(norm(mean - (1 / volume) * center), 1e-12);
+  }
+}
+
+TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
+  TetMesh mesh = made(GetParam());
+  const CellKind &kind = cell_kind(mesh.cell);
+  mesh.groups.push_back({"left", 3, 4, Array<uint32_t>()});
+  for (uint32_t t = 0; t < mesh.ntet() / 2 / kind.tets * kind.tets; ++t) mesh.tet_group[t] = 0;
+  for (const char *ending : {"msh", "msh2", "vtk", "vtu"}) {
+    const std::string path = test::scratch("cells") + "/a." + ending;
+    ASSERT_TRUE(write_tet_mesh(mesh, path));
+    const TetMesh back = read_tet_mesh(kMemory, path);
+    EXPECT_EQ(back.cell, mesh.cell) << ending;
+    EXPECT_EQ(back.cells, mesh.cells) << ending;
+    EXPECT_EQ(back.tets, mesh.tets) << ending;
+    EXPECT_EQ(back.points, mesh.points) << ending;
+    EXPECT_EQ(back.tet_group, mesh.tet_group) << ending;
+    EXPECT_TRUE(back.warnings.empty()) << ending << ": " << back.warnings[0];
+  }
+  try {
+    write_tet_mesh(mesh, test::scratch("cells") + "/a.mesh");
+    ADD_FAILURE() << "Medit";
+  } catch (const Error &e) {
+    EXPECT_EQ(e.status, DFM_E_UNSUPPORTED);
+    EXPECT_NE(std::string(e.what()).find("write .msh, .vtk or .vtu"), std::string::npos);
+  }
+}
+
+const std::string kMsh22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+// Points of gmsh's second-order tetrahedron: corners, then the edges 01 12 02 03 23 13.
+const std::string kTen =
+    "$Nodes\n10\n1 0 0 0\n2 2 0 0\n3 0 2 0\n4 0 0 2\n5 1 0 0\n6 1 1 0\n7 0 1 0\n8 0 0 1\n9 0 1 1\n10 1 0 "
+    "1\n$EndNodes\n";
+
+TetMesh parsed(const std::string &name, const std::string &text) {
+  return parse_tet_mesh(kMemory, name, text.data(), text.size());
+}
+
+TEST(CellFiles, GmshsOrderOfEdges_IsTurnedIntoVtks) {
+  const TetMesh mesh =
+      parsed("a.msh", kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n");
+  ASSERT_EQ(mesh.cell, uint32_t(DFM_CELL_TET10));
+  EXPECT_EQ(mesh.cells, (Array<uint32_t>{0, 1, 2, 3, 4, 5, 6, 7, 9, 8}));
+  EXPECT_EQ(mesh.turned, 0u);
+  EXPECT_NEAR(mesh_statistics(mesh).volume, 8.0 / 6, 1e-14);
+}
+
+TEST(CellFiles, ReflectedCells_AreTurned) {
+  const TetMesh mesh =
+      parsed("a.msh", kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 3 2 4 7 6 5 8 10 9\n$EndElements\n");
+  EXPECT_EQ(mesh.turned, 1u);
+  EXPECT_NEAR(mesh_statistics(mesh).volume, 8.0 / 6, 1e-14);
+}
+
+TEST(CellFiles, WhatIsNoBody_IsRefused) {
+  expect_refusal(
+      kMsh22 + kTen + "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 4 2 0 1 1 2 3 4\n$EndElements\n",
+      DFM_E_UNSUPPORTED, {"tetrahedra beside second-order tetrahedra", "one kind"});
+  expect_refusal(kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 2 3 4 6 5 7 8 9 10\n$EndElements\n",
+                 DFM_E_FORMAT, {"cell 0", "distorted", "order its points"});
+  expect_refusal(
+      kMsh22 + kTen +
+          "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n",
+      DFM_E_FORMAT, {"on one another"});
+  TetMesh filled = make_beam(kMemory, 1, 1, 1, 50);
+  filled.share.assign(filled.ntet(), 0.5);
+  EXPECT_THROW(second_order(filled), Error);
+  EXPECT_THROW(second_order(made(DFM_CELL_HEX8)), Error);
+  EXPECT_THROW(cell_kind(7), Error);
+}
+
+}  // namespace
