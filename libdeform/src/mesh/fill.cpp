@@ -153,7 +153,8 @@ Filling arrange(const FillSurface &surface, const FillCover &cover, const FillSh
   const Memory &memory = surface.memory;
   Array<uint32_t> order{HookAllocator<uint32_t>(memory)};
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
-    if (cover.kind[i] != CellKind::outside && !(shares.share[i] == 0 && cover.kind[i] == CellKind::mixed))
+    if (cover.kind[i] != LatticeCell::outside &&
+        !(shares.share[i] == 0 && cover.kind[i] == LatticeCell::mixed))
       order.push_back(i);
   std::sort(order.begin(), order.end(),
             [&](uint32_t i, uint32_t j) { return cover.cells[i] < cover.cells[j]; });

@@ -213,27 +213,27 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
   const uint32_t crossed = out.kept = out.cells.size();
   out.complete = !out.hopeless && crossed <= limit && touched.size() <= most_touched;
   if (!out.complete) return out;
-  out.kind.assign(crossed, CellKind::crossed);
+  out.kind.assign(crossed, LatticeCell::crossed);
   const auto look = [&](uint64_t key, bool surely_inside) {
     bool is_new = false;
     out.cells.add(key, &is_new);
     if (!is_new) return;
-    CellKind kind = CellKind::inside;
+    LatticeCell kind = LatticeCell::inside;
     if (!surely_inside) {
       const double w = surface.winding.at(lattice.to_box(0.5 * place_of(unpack(key))));
-      kind = w > 0.5 ? CellKind::inside : CellKind::outside;
-      if (!surface.closed && std::fabs(w - 0.5) < kSettled) kind = CellKind::mixed;
+      kind = w > 0.5 ? LatticeCell::inside : LatticeCell::outside;
+      if (!surface.closed && std::fabs(w - 0.5) < kSettled) kind = LatticeCell::mixed;
     }
     out.kind.push_back(kind);
-    out.kept += kind != CellKind::outside;
+    out.kept += kind != LatticeCell::outside;
   };
   for (uint32_t i = 0; i < touched.size(); ++i) look(touched[i], false);
   const uint32_t near = out.cells.size();
   for (uint32_t i = 0; i < out.cells.size() && out.kept <= limit; ++i)
     // no surface separates neighbors that no triangle touches
-    for (uint32_t face = 0; face < 4 && out.kind[i] != CellKind::outside; ++face)
+    for (uint32_t face = 0; face < 4 && out.kind[i] != LatticeCell::outside; ++face)
       look(pack(neighbor(unpack(out.cells[i]), face)),
-           i >= near && surface.closed && out.kind[i] == CellKind::inside);
+           i >= near && surface.closed && out.kind[i] == LatticeCell::inside);
   out.complete = out.kept <= limit;
   return out;
 }

@@ -56,7 +56,7 @@ class KeySet {
 };
 
 // mixed: no triangle, yet the winding number passes 1/2 (a hole)
-enum class CellKind : uint8_t { outside, inside, crossed, mixed };
+enum class LatticeCell : uint8_t { outside, inside, crossed, mixed };
 
 // Surface in a frame of its own: about the middle of its box, in lengths of the box.
 struct FillSurface {
@@ -89,10 +89,10 @@ struct Lattice {
 // Cells that the surface needs: those that a triangle enters, and those inside. A triangle in a face between
 // two cells enters neither.
 struct FillCover {
-  explicit FillCover(const Memory &memory) : cells(memory), kind(HookAllocator<CellKind>(memory)) {}
+  explicit FillCover(const Memory &memory) : cells(memory), kind(HookAllocator<LatticeCell>(memory)) {}
   KeySet cells;
   // by number; outside for cells that were only tested
-  Array<CellKind> kind;
+  Array<LatticeCell> kind;
   uint32_t kept = 0;
   // false: stopped, because of more than `limit` cells or too much work
   bool complete = true;

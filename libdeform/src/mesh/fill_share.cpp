@@ -147,7 +147,7 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
   const uint64_t work = 8 * crossing_work(surface, cover.cells.size());
   const uint64_t left = each_crossing(surface, lattice, nullptr, work, [&](uint64_t key, uint32_t tri, bool) {
     const Pair pair{cover.cells.find(key), tri};
-    if (cover.kind[pair.cell] == CellKind::crossed && (pairs.empty() || !(pairs.back() == pair)))
+    if (cover.kind[pair.cell] == LatticeCell::crossed && (pairs.empty() || !(pairs.back() == pair)))
       pairs.push_back(pair);
     return pairs.size() <= most;
   });
@@ -158,8 +158,8 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
          surface.tris.size() / 3, cover.cells.size(), static_cast<unsigned long long>(most));
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(), [](CellKind k) {
-    return k == CellKind::crossed || k == CellKind::mixed;
+  const auto sampled = uint32_t(std::count_if(cover.kind.begin(), cover.kind.end(), [](LatticeCell k) {
+    return k == LatticeCell::crossed || k == LatticeCell::mixed;
   }));
   const uint32_t n = cover.cells.size();
   FillShares out{Array<double>(n, 0.0, HookAllocator<double>(memory)),
@@ -172,8 +172,8 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
   for (uint32_t i = 0; i < n; ++i) {
     tris.clear();
     for (; at < pairs.size() && pairs[at].cell == i; ++at) tris.push_back(pairs[at].tri);
-    if (cover.kind[i] == CellKind::inside) out.share[i] = 1;
-    else if (cover.kind[i] != CellKind::outside)
+    if (cover.kind[i] == LatticeCell::inside) out.share[i] = 1;
+    else if (cover.kind[i] != LatticeCell::outside)
       sampler.run(unpack(cover.cells[i]), tris.data(), uint32_t(tris.size()), &out.share[i], &out.loose[i]);
   }
   return out;
