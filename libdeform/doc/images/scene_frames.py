@@ -48,6 +48,7 @@ PICTURES = {
     "cheese.png": [("0.3, 0.5, 0.7 s", [("cheese", (), t) for t in (0.3, 0.5, 0.7)]),
                    ("1.2, 1.4, 1.6 s", [("cheese", (), t) for t in (1.2, 1.4, 1.6)])],
     "fill_drop.png": [("0, 0.4, 1.8 s", [("fill_drop", (), t) for t in (0, 0.4, 1.8)])],
+    "bending_cells.png": [(None, [("bending_cells", (), 1.5)])],
     "pressed_ring.png": [(None, [("pressed_ring", FINE_RING, 0.5)])],
     "rigid.png": [("rigid_on_ball", [("rigid_on_ball", (), t) for t in (0, 1, 2)]),
                   ("rigid_on_bed", [("rigid_on_bed", (), t) for t in (0, 0.5, 2)]),
