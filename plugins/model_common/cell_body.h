@@ -198,7 +198,7 @@ class CellBody {
   static constexpr uint32_t kParallelCells = 500, kGrain = 64;
   static constexpr int kWeightSteps = 20;
   static constexpr double kLeastWeight = 1e-3;
-  // Least sum of two stretches that turns a frame: in cells pressed flatter the forces are no gradient.
+  // Least sum of two stretches that turns a frame: nearer to a reflection the forces are no gradient.
   static constexpr double kLeastStretch = 0.1;
 
   struct Cell {

@@ -22,7 +22,7 @@ inline bool vtk_names_share(std::string_view array, Number type) {
 }
 
 // Takes cells one by one: keeps those of a body, and straight faces and six-point triangles (cut into
-// triangles), skips points and lines, refuses other volume cells, because a body must not lose parts silently.
+// triangles), skips points and lines, refuses other volume cells: a body must not lose parts silently.
 class VtkCells {
  public:
   explicit VtkCells(RawMesh &out) : out_(out) {}
