@@ -150,6 +150,8 @@ int make(const Globals &globals, const Shape &shape) {
   if (surface && writes == Writes::cells)
     return fail(shape.out + ": ." + mesh_ending(shape.out) +
                 " is written with tetrahedra; write a surface as .obj, .ply, .stl, .off, .vtk or .vtu");
+  if (surface && shape.order == 2)
+    return fail(shape.out + ": --order 2 is of cells, and this is a surface; leave it out");
   if (!s.context) return fail(dfm_last_error());
   if (!surface && shape.kind == "torus")
     return fail(shape.out +
@@ -207,7 +209,10 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
     if (name == "torus") sub.option("--ring", shape->ring, "radius of the ring, m").with_default();
     if (name == "cylinder" || name == "tube") sub.option("--length", shape->length, "m").with_default();
     if (name != "bricks" && name != "torus")
-      sub.option("--order", shape->order, "2: second-order tetrahedra").with_default().type_name("1|2");
+      sub.option("--order", shape->order, "2: second-order tetrahedra")
+          .with_default()
+          .one_of({"1", "2"})
+          .type_name("1|2");
     sub.flag("--surface", shape->surface, "the surface alone, also as .vtk or .vtu");
     sub.calls([=, &globals] { *exit_code = make(globals, *shape); });
   }

@@ -230,7 +230,7 @@ bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
   const double *points = nullptr;
   const uint32_t *tets = nullptr;
   if (crossings && dfm_tetmesh_data(mesh, &points, &tets, nullptr) >= 0) {
-    report_steps(r, points, i.npoint, tets, i.ntet);
+    if (!kind) report_steps(r, points, i.npoint, tets, i.ntet);  // the others have the bound of their model
     const std::vector<uint32_t> boundary = boundary_of(tets, i.ntet);
     report_crossings(r, points, i.npoint, boundary.data(), uint32_t(boundary.size() / 3));
   }

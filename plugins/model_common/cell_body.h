@@ -5,8 +5,9 @@
 // R is the polar factor of the mean gradient F = sum x_a (x) G_a, S = R^T F. A change e of d turns it by
 //   w = A^-1 sum G_a x e_a,  A = tr S I - S;   (P e)_a = e_a - w x d_a,   (P^T h)_a = h_a - (A^-1 tau) x G_a,
 // tau = sum d_a x h_a = sum u_a x h_a, since K resists no rotation of X. So the forces are the gradient of an
-// energy that no rotation changes, and have no moment. The tangent is R P^T K P R^T, positive semidefinite;
-// what the turning of P adds is left out. The damper is damping_stiffness R P^T K P R^T v.
+// energy that no rotation changes, and have no moment, except where kLeastStretch acts: there A^-1 is not the
+// inverse of A. The tangent is R P^T K P R^T, positive semidefinite; what the turning of P adds is left out.
+// The damper is damping_stiffness R P^T K P R^T v.
 //
 // The step bound. With N_ab >= |K_ab| and any weights w > 0, D_a = sum_b N_ab w_b / w_a dominates K (corot's
 // corot_bound.cpp). Let q = sum |G_a| |u_a| of a change u, alpha >= |A^-1|, hence |w| <= alpha q and
@@ -197,7 +198,7 @@ class CellBody {
   static constexpr uint32_t kParallelCells = 500, kGrain = 64;
   static constexpr int kWeightSteps = 20;
   static constexpr double kLeastWeight = 1e-3;
-  // Least sum of two stretches that turns a frame: in cells pressed flatter the forces are no gradient.
+  // Least sum of two stretches that turns a frame: nearer to a reflection the forces are no gradient.
   static constexpr double kLeastStretch = 0.1;
 
   struct Cell {

@@ -97,6 +97,30 @@ TEST(CellWorlds, MassAndVolume_AreThoseOfTheShape) {
   dfm_world_destroy(world);
 }
 
+TEST(CellWorlds, MaterialsThatDifferWithinACell_AreThatOfItsFirstTetrahedron) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  test::BodyOptions light, heavy;
+  light.density = 500;
+  heavy.density = 2000;
+  heavy.name = "heavy";
+  const dfm_material a = test::make_material(world, light), b = test::make_material(world, heavy);
+  for (const Kind &kind : {kBall, kBricks}) {
+    dfm_tetmesh mesh = made(context, kind);
+    dfm_body_def d = def_of(mesh, "corotational_fem");
+    const uint32_t each = kind.second ? 8 : 6;
+    std::vector<dfm_material> mixed(d.ntet, b);
+    for (uint32_t t = 0; t < d.ntet; t += each) mixed[t] = a;
+    d.cell_materials = mixed.data();
+    dfm_body body = 0;
+    test::ok(dfm_body_create(world, &d, &body));
+    const dfm_body_measure m = test::measure(body);
+    EXPECT_NEAR(m.mass, 500 * m.rest_volume, 1e-9);
+    test::ok(dfm_tetmesh_destroy(mesh));
+  }
+  dfm_world_destroy(world);
+}
+
 TEST(CellWorlds, Snapshot_ContinuesWithTheSameBits) {
   Drop d(kBall, DFM_INTEGRATOR_SYMPLECTIC_EULER), other(kBall, DFM_INTEGRATOR_SYMPLECTIC_EULER);
   test::run(d.world, 0.3, 2e-3);
@@ -151,6 +175,13 @@ TEST(CellWorlds, WhatTakesNoSuchCells_SaysSo) {
   def.cell = 3;
   EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_ARG);
   test::says({"3 is no kind of cell"});
+  for (const bool first_order : {false, true}) {
+    def = def_of(mesh, "corotational_fem");
+    if (first_order) def.cell = DFM_CELL_TET;
+    else def.cells = nullptr;
+    EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_ARG);
+    test::says({"tetrahedra need no cells", "dfm_tetmesh_cells"});
+  }
   const double one = 1;
   const dfm_param_value value{"yield", &one, 1};
   def = def_of(mesh, "corotational_fem");

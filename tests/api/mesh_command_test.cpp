@@ -143,6 +143,19 @@ TEST(MeshCommand, MakeOfAnotherNumberOfCells_SaysSo) {
   EXPECT_EQ(said("500"), "");
 }
 
+TEST(MeshCommand, MakeOfSecondOrder_IsOfCells) {
+  const std::string obj = folder() + "/second.obj", vtu = folder() + "/second.vtu";
+  const auto made = [](const std::string &out, const char *order) {
+    return test::deform({"mesh", "make", "beam", "--cells", "50", "--out", out, "--order", order});
+  };
+  EXPECT_TRUE(has(made(obj, "2").err, "--order 2 is of cells, and this is a surface"));
+  EXPECT_EQ(made(vtu, "3").exit_code, 2);
+  EXPECT_EQ(made(vtu, "2").exit_code, 0);
+  const auto info = test::deform({"mesh", "info", vtu});
+  EXPECT_TRUE(has(info.out, "second-order tetrahedra"));
+  EXPECT_FALSE(has(info.out, "explicit sub-step"));
+}
+
 TEST(MeshCommand, Convert_ThereAndBackKeepsTheBytes) {
   const std::string a = folder() + "/a.msh", b = folder() + "/b.vtk", c = folder() + "/c.msh";
   ASSERT_EQ(test::deform({"mesh", "make", "ball", "--out", a, "--cells", "300", "--quiet"}).exit_code, 0);

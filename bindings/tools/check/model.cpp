@@ -95,12 +95,38 @@ double Solid::volume_of(const uint32_t *q) const {
   return (e[0][0] * n[0] + e[0][1] * n[1] + e[0][2] * n[2]) / 6;
 }
 
+// Those of the tetrahedra that a body divides the cell into (mesh/cells.h).
 void Solid::find_edges() {
+  constexpr uint32_t kTets[][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
+                                   {6, 8, 7, 4}, {6, 8, 9, 7}, {6, 8, 5, 9}, {6, 8, 4, 5}};
+  constexpr uint32_t kQuads[][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
+                                    {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
   std::set<std::pair<uint32_t, uint32_t>> all;
-  for (uint32_t c = 0; c < ncell(); ++c)
-    for (uint32_t k = 0; k < nodes(); ++k)
-      for (uint32_t l = 0; l < k; ++l)
-        all.insert(std::minmax(cells[nodes() * c + k], cells[nodes() * c + l]));
+  for (uint32_t c = 0; c < ncell(); ++c) {
+    const uint32_t *const q = &cells[size_t{nodes()} * c];
+    const auto add = [&](uint32_t a, uint32_t b) {
+      if (a != b) all.insert(std::minmax(a, b));
+    };
+    const auto add_all = [&](const uint32_t *of) {
+      for (const auto &[k, l] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}})
+        add(q[of[k]], q[of[l]]);
+    };
+    constexpr uint32_t kWhole[] = {0, 1, 2, 3};
+    if (nodes() == 4) add_all(kWhole);
+    if (nodes() == 10)
+      for (const auto &tet : kTets) add_all(tet);
+    if (nodes() != 8) continue;
+    const uint32_t least = *std::min_element(q, q + 8);
+    for (uint32_t k = 0; k < 8; ++k) add(least, q[k]);
+    for (const auto &quad : kQuads) {
+      uint32_t first = 0;
+      for (uint32_t k = 0; k < 4; ++k) {
+        add(q[quad[k]], q[quad[(k + 1) % 4]]);
+        if (q[quad[k]] < q[quad[first]]) first = k;
+      }
+      add(q[quad[first]], q[quad[(first + 2) % 4]]);
+    }
+  }
   edges.clear();
   for (const auto &[i, j] : all) edges.insert(edges.end(), {i, j});
 }

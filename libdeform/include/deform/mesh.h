@@ -51,7 +51,8 @@ typedef struct dfm_tetmesh_info {
  * DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out);
 /** Borrowed arrays, valid while the mesh lives: points [npoint,3], tets [ntet,4], file_point [npoint] index
- * in the file, from 0. Each out may be NULL. Threads: Any thread. Since 0.1. */
+ * in the file, from 0. Each out may be NULL. A body of such tets where dfm_tetmesh_info.cell is another kind
+ * needs dfm_tetmesh_cells too. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
                                     const uint32_t **file_point);
 /** Cells of a kind that a model may take, dfm_body_def.cells: [ncell,k] points in the order of plugin.h. The

@@ -187,7 +187,9 @@ typedef struct dfm_mesh {             /* rest configuration; borrowed during cre
   /* [nfield] each [ncell, width of the row of that key], in the row's range */
   const double *const *fields;
   uint32_t nedge, nsurfel;
-  const uint32_t *edges;     /* [nedge,2] i < j, lexicographic: the order of DFM_PER_EDGE state */
+  /* [nedge,2] i < j, lexicographic: the order of DFM_PER_EDGE state. Of other cells than DFM_CELL_TET
+   * those of the tetrahedra of each (dfm_tetmesh_cells) */
+  const uint32_t *edges;
   const uint32_t *row, *col; /* coupling N in CSR: surfel s has points col[row[s] .. row[s+1]) */
   const double *weight;      /* [row[nsurfel]]; x_s = sum weight * x_point */
   const uint8_t *fixed;      /* [npoint] held components, bits 1 x, 2 y, 4 z; the host moves them */

@@ -11,6 +11,7 @@
 namespace dfm {
 namespace {
 
+constexpr uint32_t kNoPoint = UINT32_MAX;
 constexpr CellKind kKinds[] = {{DFM_CELL_TET, 4, 1, "tetrahedra", 4, 10},
                                {DFM_CELL_TET10, 10, 8, "second-order tetrahedra", 11, 24},
                                {DFM_CELL_HEX8, 8, 6, "hexahedra", 5, 12}};
@@ -111,13 +112,16 @@ TetMesh second_order(const TetMesh &mesh) {
   out.points = mesh.points;
   out.groups = mesh.groups;
   out.file_point = mesh.file_point;
+  for (const uint32_t t : mesh.file_cell) out.file_cell.insert(out.file_cell.end(), kind.tets, t);
+  out.warnings = mesh.warnings;
+  uint32_t last = *std::max_element(out.file_point.begin(), out.file_point.end());
   const Array<uint32_t> edges = unique_edges(mesh.tets);
   for (size_t e = 0; e < edges.size(); e += 2) {
     const auto at = [&](size_t k) { return load3(&mesh.points[3 * size_t{edges[k]}]); };
     double x[3];
     store3(x, 0.5 * (at(e) + at(e + 1)));
     out.points.insert(out.points.end(), x, x + 3);
-    out.file_point.push_back(uint32_t(out.file_point.size()));
+    out.file_point.push_back(++last);
   }
   const auto middle = [&](uint32_t a, uint32_t b) {
     const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
@@ -127,7 +131,8 @@ TetMesh second_order(const TetMesh &mesh) {
       if (std::pair(edges[2 * at], edges[2 * at + 1]) < key) lo = at + 1;
       else hi = at;
     }
-    return uint32_t(mesh.npoint() + lo);
+    const bool found = lo < edges.size() / 2 && std::pair(edges[2 * lo], edges[2 * lo + 1]) == key;
+    return found ? uint32_t(mesh.npoint() + lo) : kNoPoint;
   };
   for (size_t t = 0; t < mesh.tets.size(); t += 4) {
     const uint32_t *q = &mesh.tets[t];
@@ -140,8 +145,10 @@ TetMesh second_order(const TetMesh &mesh) {
   for (size_t t = 0; t < mesh.tri_group.size(); ++t) {
     const uint32_t *q = &mesh.tris[3 * t];
     const uint32_t a = middle(q[0], q[1]), b = middle(q[1], q[2]), c = middle(q[2], q[0]);
-    out.tris.insert(out.tris.end(), {q[0], a, c, a, q[1], b, c, b, q[2], a, b, c});
-    out.tri_group.insert(out.tri_group.end(), 4, mesh.tri_group[t]);
+    const bool face = a != kNoPoint && b != kNoPoint && c != kNoPoint;  // a file may name other triangles
+    if (face) out.tris.insert(out.tris.end(), {q[0], a, c, a, q[1], b, c, b, q[2], a, b, c});
+    else out.tris.insert(out.tris.end(), q, q + 3);
+    out.tri_group.insert(out.tri_group.end(), face ? 4 : 1, mesh.tri_group[t]);
   }
   for (MeshGroup &g : out.groups) {
     if (g.dimension < 2) continue;

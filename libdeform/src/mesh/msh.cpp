@@ -56,10 +56,12 @@ void MshReader::begin_elements(int64_t type) {
 
 void MshReader::add_element(uint32_t group) {
   uint32_t corners[10];
-  if (element_.dimension == 3 || (element_.points <= 4 && element_.dimension == 2)) {
+  const bool second = element_.points == 6 && element_.dimension == 2;
+  if (element_.dimension == 3 || second || (element_.points <= 4 && element_.dimension == 2)) {
     for (uint32_t k = 0; k < element_.points; ++k)
       corners[cell_ == DFM_CELL_TET10 ? kMshTet10[k] : k] = nodes_.find(in_, tags_[k]);
     if (element_.dimension == 3) out_.add_cell(in_, cell_, corners, group);
+    else if (second) out_.add_second_triangle(in_, corners, group);
     else out_.add_polygon(in_, corners, element_.points, group);
     return;
   }

@@ -1,6 +1,7 @@
 #include "mesh/raw_mesh.h"
 
 #include <algorithm>
+#include <array>
 #include <numeric>
 #include <span>
 
@@ -133,11 +134,22 @@ void RawMesh::add_triangle(const Cursor &at, uint32_t a, uint32_t b, uint32_t c,
 void RawMesh::add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {
   const auto add = [&](uint32_t a, uint32_t b, uint32_t c) { add_triangle(at, a, b, c, in_group); };
   const auto known = [&](uint32_t corner) { return corner < npoint(); };
+  uint32_t quad[4];
+  if (n == 4) {  // as tets_of() cuts the faces of hexahedra
+    std::rotate_copy(corners, std::min_element(corners, corners + 4), corners + 4, quad);
+    corners = quad;
+  }
   const bool small = n > 3 && n <= kMostEars && std::all_of(corners, corners + n, known);
   if (small && fan_folds(points, corners, n)) Outline(*memory, points, corners, n).cut(add);
   else
     for (size_t k = 2; k < n; ++k) add(corners[0], corners[k - 1], corners[k]);
   keep_points(corners, n, in_group);
+}
+
+void RawMesh::add_second_triangle(const Cursor &at, const uint32_t *nodes, uint32_t in_group) {
+  for (const auto &[a, b, c] : {std::array{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
+    add_triangle(at, nodes[a], nodes[b], nodes[c], in_group);
+  keep_points(nodes, 6, in_group);
 }
 
 void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {

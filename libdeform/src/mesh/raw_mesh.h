@@ -39,14 +39,17 @@ struct RawMesh {
   uint32_t named_group(const Cursor &at, int32_t dimension, std::string_view name);
 
   void add_cell(const Cursor &at, uint32_t kind, const uint32_t *nodes, uint32_t in_group);
-  // n >= 3 corners around a face, cut into n-2 triangles: a fan about the first where none of them looks
-  // the other way, else ears. A fan always where a corner is not known yet, or there are more than 512.
+  // n >= 3 corners around a face, cut into n-2 triangles: a fan about the first (of four: about the least)
+  // where none of them looks the other way, else ears. A fan always where a corner is not known yet, or there
+  // are more than 512.
   void add_polygon(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Points of an element that is not kept itself; no group: nothing.
   void keep_points(const uint32_t *points_of, size_t n, uint32_t in_group) {
     if (in_group == kNoGroup) return;
     groups[in_group].points.insert(groups[in_group].points.end(), points_of, points_of + n);
   }
+  // Corners, then the middles of the edges 01 12 20: four triangles, as those of a second-order tetrahedron.
+  void add_second_triangle(const Cursor &at, const uint32_t *nodes, uint32_t in_group);
   // Triangles (i, i+1, i+2), every second one turned.
   void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Room for n more: readers that know a valid count call it once, and no array is grown by copying.

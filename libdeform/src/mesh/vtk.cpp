@@ -39,11 +39,12 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
       in.refuse("cell %zu is of type %d, %s, with %zu points; expected %u", cell, type, of.name, n, of.nodes);
     return out_.add_cell(in, kind, corners, group(3));
   }
-  if (is_one_of({5, 6, 7, 8, 9})) {  // triangle, strip, polygon, pixel, quadrangle
-    const size_t expected = type == 5 ? 3 : type >= 8 ? 4 : 0;
+  if (is_one_of({5, 6, 7, 8, 9, 22})) {  // triangle, strip, polygon, pixel, quadrangle, second-order triangle
+    const size_t expected = type == 5 ? 3 : type == 22 ? 6 : type >= 8 ? 4 : 0;
     if (expected ? n != expected : n < 3)
       in.refuse("cell %zu (type %d) has %zu points; expected %zu%s", cell, type, n, expected ? expected : 3,
                 expected ? "" : " or more");
+    if (type == 22) return out_.add_second_triangle(in, corners, group(2));
     if (type == 6) return out_.add_strip(in, corners, n, group(2));
     if (type != 8) return out_.add_polygon(in, corners, n, group(2));
     // a pixel's corners go row by row
@@ -51,7 +52,7 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
     return out_.add_polygon(in, around, 4, group(2));
   }
   if (is_one_of({1, 2, 3, 4})) return out_.keep_points(corners, n, group(type > 2));  // points, lines
-  curved_ += is_one_of({22, 23, 28, 30, 34, 36, 69, 70, 76, 77});
+  curved_ += is_one_of({23, 28, 30, 34, 36, 69, 70, 76, 77});
   if (is_one_of({71, 78, 79, 80}))
     in.unsupported(
         "cell %zu is a tetrahedron above second order (type %d); write cells of first or second order (for "

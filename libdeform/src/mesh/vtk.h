@@ -21,8 +21,8 @@ inline bool vtk_names_share(std::string_view array, Number type) {
   return array == kVtkShare && is_real(type);
 }
 
-// Takes cells one by one: keeps tetrahedra and straight faces (cut into triangles), skips points and lines,
-// refuses other volume cells, because a body must not lose parts silently.
+// Takes cells one by one: keeps those of a body, and straight faces and six-point triangles (cut into
+// triangles), skips points and lines, refuses other volume cells: a body must not lose parts silently.
 class VtkCells {
  public:
   explicit VtkCells(RawMesh &out) : out_(out) {}

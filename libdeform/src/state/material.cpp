@@ -33,8 +33,10 @@ CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std:
   }
   std::map<dfm_material, uint32_t> known;
   out.of.resize(def.ntet);
+  const uint32_t each = def.cells ? cell_kind(def.cell).tets : 1;
   for (uint32_t t = 0; t < def.ntet; ++t) {
-    const dfm_material handle = def.cell_materials[t] ? def.cell_materials[t] : def.material;
+    const dfm_material of_cell = def.cell_materials[t / each * each];
+    const dfm_material handle = of_cell ? of_cell : def.material;
     const auto [at, fresh] = known.try_emplace(handle, uint32_t(out.list.size()));
     if (fresh) out.list.push_back(&find(handle));
     out.of[t] = at->second;

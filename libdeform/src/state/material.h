@@ -33,7 +33,7 @@ struct Material {
 // The materials of a body's cells. One entry in `list`: the same everywhere, and `of` is empty.
 struct CellMaterials {
   std::vector<const Material *> list;  // by first cell
-  std::vector<uint32_t> of;            // [ntet] index into list
+  std::vector<uint32_t> of;            // [ntet] index into list; the same for all of a cell
 };
 
 // Throws Error(HANDLE) if the handle is no material, or one of another world. `plain` is used for handle 0.

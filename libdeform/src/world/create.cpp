@@ -43,6 +43,12 @@ void check_mesh(const dfm_body_def &def, const std::string &name) {
   if (def.npoint < 4 || def.ntet < 1 || !def.points || !def.tets)
     fail(DFM_E_ARG, "body '%s' has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron",
          name.c_str(), def.npoint, def.ntet);
+  const bool others = def.cell != 0 && def.cell != DFM_CELL_TET;
+  if (others != (def.cells != nullptr))
+    fail(DFM_E_ARG,
+         "body '%s': cell is %u and cells is %s; tetrahedra need no cells, and other kinds need both, as "
+         "dfm_tetmesh_cells gives them",
+         name.c_str(), def.cell, def.cells ? "set" : "NULL");
   for (uint32_t i = 0; i < def.npoint; ++i)
     if (!all_finite(def.points + size_t(3) * i, 3))
       fail(DFM_E_ARG, "body '%s': point %u is not finite", name.c_str(), i);

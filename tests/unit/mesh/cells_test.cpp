@@ -143,6 +143,76 @@ TEST(CellFiles, ReflectedCells_AreTurned) {
   EXPECT_NEAR(mesh_statistics(mesh).volume, 8.0 / 6, 1e-14);
 }
 
+// Whether each triangle of the mesh is one of the boundary.
+bool on_boundary(const TetMesh &mesh) {
+  std::set<std::set<uint32_t>> faces;
+  const auto add = [](std::set<std::set<uint32_t>> &to, const Array<uint32_t> &of) {
+    for (size_t f = 0; f < of.size(); f += 3) to.insert({of[f], of[f + 1], of[f + 2]});
+  };
+  add(faces, boundary_triangles(mesh.tets));
+  const size_t n = faces.size();
+  add(faces, mesh.tris);
+  return faces.size() == n;
+}
+
+TEST(CellFiles, GroupsOfQuadrangles_AreTrianglesOfTheBoundary) {
+  const int top[4] = {5, 6, 7, 8};
+  for (int first = 0; first < 4; ++first) {
+    std::string msh = kMsh22 +
+                      "$Nodes\n8\n1 0 0 0\n2 1 0 0\n3 1 1 0\n4 0 1 0\n5 0 0 1\n6 1 0 1\n7 1 1 1\n8 0 1 1\n"
+                      "$EndNodes\n$Elements\n2\n1 3 2 7 1",
+                vtk =
+                    "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n"
+                    "0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1\nCELLS 2 14\n8 0 1 2 3 4 5 6 7\n4";
+    for (int k = 0; k < 4; ++k) {
+      msh += " " + std::to_string(top[(first + k) % 4]);
+      vtk += " " + std::to_string(top[(first + k) % 4] - 1);
+    }
+    msh += "\n2 5 2 0 1 1 2 3 4 5 6 7 8\n$EndElements\n";
+    vtk += "\nCELL_TYPES 2\n12 9\nCELL_DATA 2\nSCALARS group int 1\nLOOKUP_TABLE default\n3 7\n";
+    for (const TetMesh &mesh : {parsed("a.msh", msh), parsed("a.vtk", vtk)}) {
+      EXPECT_EQ(mesh.tri_group.size(), 2u);
+      EXPECT_TRUE(on_boundary(mesh)) << first;
+    }
+  }
+}
+
+TEST(CellFiles, GroupsOfSecondOrderTriangles_AreTrianglesOfTheBoundary) {
+  const TetMesh msh =
+      parsed("a.msh", kMsh22 + kTen +
+                          "$Elements\n2\n1 9 2 7 1 1 3 2 7 6 5\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n"
+                          "$EndElements\n");
+  const TetMesh vtk =
+      parsed("a.vtk",
+             "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 10 double\n"
+             "0 0 0 1 0 0 0 1 0 0 0 1 .5 0 0 .5 .5 0 0 .5 0 0 0 .5 .5 0 .5 0 .5 .5\nCELLS 2 18\n"
+             "10 0 1 2 3 4 5 6 7 8 9\n6 0 2 1 6 5 4\nCELL_TYPES 2\n24 22\nCELL_DATA 2\nSCALARS group int 1\n"
+             "LOOKUP_TABLE default\n3 7\n");
+  for (const TetMesh &mesh : {msh, vtk}) {
+    EXPECT_EQ(mesh.tri_group.size(), 4u);
+    EXPECT_TRUE(on_boundary(mesh));
+    for (const MeshGroup &g : mesh.groups)
+      if (g.dimension == 2) {
+        EXPECT_EQ(g.points, (Array<uint32_t>{0, 1, 2, 4, 5, 6}));
+      }
+  }
+}
+
+// The triangle 1 4 5 is no face of a cell; point 3 of the file is in no cell.
+TEST(SecondOrder, TrianglesThatAreNoFaces_StayWhole) {
+  const TetMesh mesh = second_order(parsed(
+      "a.msh", kMsh22 +
+                   "$Nodes\n6\n1 0 0 0\n2 1 0 0\n3 9 9 9\n4 0 1 0\n5 0.3 0.3 1\n6 0.3 0.3 -1\n$EndNodes\n"
+                   "$Elements\n4\n1 4 2 0 1 1 2 4 5\n2 4 2 0 1 1 4 2 6\n3 2 2 7 1 1 5 6\n4 2 2 7 1 1 2 5\n"
+                   "$EndElements\n"));
+  ASSERT_EQ(mesh.tri_group.size(), 5u);
+  EXPECT_EQ((Array<uint32_t>{mesh.tris.begin(), mesh.tris.begin() + 3}), (Array<uint32_t>{0, 3, 4}));
+  std::set<uint32_t> numbers(mesh.file_point.begin(), mesh.file_point.end());
+  EXPECT_EQ(numbers.size(), mesh.npoint());
+  EXPECT_EQ(numbers.count(2), 0u);
+  EXPECT_EQ(mesh.warnings.size(), 1u);
+}
+
 TEST(CellFiles, WhatIsNoBody_IsRefused) {
   expect_refusal(
       kMsh22 + kTen + "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 4 2 0 1 1 2 3 4\n$EndElements\n",
