@@ -163,7 +163,7 @@ TEST(Fill, ShareOfACellCutByAPlane_WithinItsStatedError) {
     dfm::Site site[4];
     dfm::corners_of(dfm::unpack(cover.cells[i]), site);
     double z[4], lo = 1e9, hi = -1e9;
-    bool middle = cover.kind[i] == dfm::CellKind::crossed;
+    bool middle = cover.kind[i] == dfm::LatticeCell::crossed;
     for (int k = 0; k < 4; ++k) {
       z[k] = site[k].z;
       lo = std::min(lo, z[k]);
@@ -209,7 +209,7 @@ TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
   const dfm::FillShares shares = dfm::sample_shares(s, cover, lattice);
   double sum = 0;
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
-    if (cover.kind[i] != dfm::CellKind::outside) sum += shares.share[i];
+    if (cover.kind[i] != dfm::LatticeCell::outside) sum += shares.share[i];
   // 4^3 cubes of 12 cells; walls cut the cells across them in half
   EXPECT_NEAR(sum, 64 * 12, 1.5);
   // 4 cells around each of the 144 inner faces, and around each of the 96 in the walls
