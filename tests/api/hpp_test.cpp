@@ -39,6 +39,8 @@ struct Scene {
   }
 };
 
+double no_farther(const dfm_query_hit &hit) { return hit.distance; }
+
 // Handles of different things are of different types: neither converts, assigns or compares, but a rigid body
 // is an obstacle.
 template <class A, class B>
@@ -210,6 +212,25 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
     return things.size() < 3 ? INFINITY : -1;
   });
   EXPECT_EQ(things, (std::vector<uint64_t>{s.ball.get(), s.ball.get(), s.floor.get()}));
+  const auto nowhere = [](const dfm_query_hit &) { return -1.0; };
+  s.world.query(from, down, 10, nullptr, nowhere);
+  s.world.query(from, down, 10, nullptr, no_farther);
+  EXPECT_THROW(s.world.query(from, down, 10, nullptr, [](const dfm_query_hit &) -> double { throw 7; }), int);
+  int asked = 0;
+  deform::QueryFilter filter;
+  filter.user = &asked;
+  filter.accept = [](void *user, uint64_t) { return ++*static_cast<int *>(user) > 0; };
+  const std::vector<dfm_query_hit> again = s.world.query(from, down, 10, &filter);
+  EXPECT_EQ(asked, 2);
+  ASSERT_EQ(again.size(), all.size());
+  for (size_t i = 0; i < all.size(); ++i) {
+    EXPECT_EQ(again[i].distance, all[i].distance);
+    EXPECT_EQ(again[i].reserved, 0u);
+  }
+  const dfm_query_hit none = s.world.query_first(from, Vec3{0, 0, 1}, 10);
+  EXPECT_EQ(none.thing, 0u);
+  EXPECT_TRUE(std::isinf(none.distance));
+  EXPECT_EQ(none.triangle, UINT32_MAX);
   EXPECT_EQ(s.world.query(deform::QueryShape(), {}, 0.01).size(), 2u) << "near the floor's origin";
 
   s.world.add_friction("ball", "floor", "coulomb", deform::Params({{"mu", 0.2}}));

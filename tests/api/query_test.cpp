@@ -371,8 +371,96 @@ TEST(QueryClosest, OfAnyShape_IsTheGapToTheNearestThing) {
   ASSERT_FALSE(faces.empty());
   EXPECT_NEAR(faces[0].distance, 0.04, 1e-12);
   EXPECT_LT(faces.size(), 6u) << "triangles of the mesh's side alone";
-  each.shape = DFM_SHAPE_POINT;
-  EXPECT_NEAR(test::query(y.world, each, nullptr, 0.051)[0].distance, 0.05, 1e-12);
+}
+
+TEST(QueryClosest, OfAPoint_EachCountsSurfacesAloneAlsoFromInside) {
+  test::Context c;
+  const Yard y(c);
+  const auto expect = [&](Vec from, uint64_t thing, double distance, Vec at, Vec normal) {
+    const double reach = distance + 1e-9;
+    const std::vector<dfm_query_hit> hits =
+        test::query(y.world, test::point(from, DFM_QUERY_EACH), nullptr, reach);
+    ASSERT_FALSE(hits.empty());
+    const dfm_query_hit one = test::nearest(y.world, test::point(from), nullptr, reach);
+    EXPECT_EQ(std::memcmp(&hits[0], &one, sizeof one), 0) << "the nearest one is first";
+    for (const dfm_query_hit &h : hits) {
+      EXPECT_EQ(h.thing, thing);
+      EXPECT_EQ(h.flags, 0u);
+      EXPECT_EQ(h.triangle != UINT32_MAX, thing == y.mesh || thing == y.upper);
+      EXPECT_NEAR(h.distance, distance, 1e-12);
+      for (size_t k = 0; k < 3; ++k) {
+        EXPECT_NEAR(h.point[k], at[k], 1e-12);
+        EXPECT_NEAR(h.normal[k], normal[k], 1e-12);
+      }
+    }
+  };
+  expect({4.15, 0, 1}, y.mesh, 0.05, {4.1, 0, 1}, {1, 0, 0});
+  expect({4.06, 0, 1}, y.mesh, 0.04, {4.1, 0, 1}, {1, 0, 0});
+  expect({4.1, 0, 1}, y.mesh, 0, {4.1, 0, 1}, {1, 0, 0});
+  expect({0.05, 0.05, 0.21}, y.upper, 0.21 - 0.2003, {0.05, 0.05, 0.2003}, {0, 0, 1});
+  expect({1, 0, 1.15}, y.ball, 0.05, {1, 0, 1.2}, {0, 0, 1});
+  expect({2.07, 0, 1}, y.crate, 0.03, {2.1, 0, 1}, {1, 0, 0});
+  expect({9, 9, -0.3}, y.floor, 0.3, {9, 9, 0}, {0, 0, 1});
+  EXPECT_TRUE(test::query(y.world, test::point({4, 0, 1}, DFM_QUERY_EACH), nullptr, 0.0999).empty());
+}
+
+TEST(Query, Count_IsOfAllHitsAndAsksTheFilterOnce) {
+  test::Context c;
+  const Yard y(c);
+  const Vec o{-1, 0.013, 1.007}, d{1, 0, 0};
+  const std::vector<dfm_query_hit> all = all_hits(y.world, o, d);
+  ASSERT_EQ(all.size(), 8u);
+  const dfm_query_shape from = test::point(o, DFM_QUERY_EACH | DFM_QUERY_COUNT);
+  dfm_query_filter f = dfm_query_filter_default();
+  int asked = 0;
+  f.user = &asked;
+  f.accept = [](void *user, uint64_t) { return ++*static_cast<int *>(user) > 0; };
+  for (uint32_t capacity = 0; capacity <= 9; ++capacity) {
+    dfm_query_hit rows[9];
+    dfm_query_hits hits{sizeof hits, sizeof rows[0], capacity, 0, rows};
+    asked = 0;
+    test::ok(dfm_world_query(y.world, &from, d.data(), 100, &f, nullptr, &hits));
+    EXPECT_EQ(hits.n, 8u);
+    EXPECT_EQ(asked, 7);
+    const uint32_t kept = std::min(capacity, 8u);
+    for (uint32_t i = 0; i < kept; ++i) EXPECT_EQ(std::memcmp(&rows[i], &all[i], sizeof rows[i]), 0);
+    uint32_t n = 0;
+    asked = 0;
+    test::ok(dfm_world_query_ray_all(y.world, o.data(), d.data(), 100, &f, capacity, rows, &n));
+    EXPECT_EQ(n, 8u);
+    EXPECT_EQ(asked, 7);
+    for (uint32_t i = 0; i < kept; ++i) EXPECT_EQ(std::memcmp(&rows[i], &all[i], sizeof rows[i]), 0);
+  }
+}
+
+TEST(QueryFilter, OnlyWhatIsNoThingOfTheWorld_IsRefused) {
+  test::Context c;
+  const Yard y(c), other(c);
+  dfm_query_filter f = dfm_query_filter_default();
+  f.accept = [](void *, uint64_t) { return false; };
+  const dfm_query_shape all = sphere({0, 0, 0}, 20);
+  for (const uint64_t thing : {y.lower, y.floor, y.mesh}) {
+    f.only = thing;
+    EXPECT_EQ(overlaps(y.world, all, &f), Things{thing}) << "accept is not asked";
+  }
+  dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 0, 7, nullptr};
+  const auto ask = [&](uint64_t only) {
+    f.only = only;
+    return dfm_world_query(y.world, &all, nullptr, 0, &f, nullptr, &hits);
+  };
+  for (const uint64_t thing : {other.lower, other.floor, y.world, uint64_t{12345}})
+    EXPECT_EQ(ask(thing), DFM_E_HANDLE);
+  test::ok(dfm_obstacle_destroy(y.pill));
+  EXPECT_EQ(ask(y.pill), DFM_E_HANDLE);
+  uint32_t n = 7;
+  dfm_cut_def d = dfm_cut_def_default();
+  for (double &half : d.half_size) half = 1;
+  test::ok(dfm_body_cut(y.lower, &d, nullptr));
+  EXPECT_EQ(ask(y.lower), DFM_E_STATE);
+  test::says({"lower", "no cells left"});
+  EXPECT_EQ(dfm_body_query_triangles(y.lower, &all, 0, nullptr, &n), DFM_E_STATE);
+  EXPECT_EQ(n, 7u);
+  EXPECT_EQ(hits.n, 7u);
 }
 
 TEST(QueryRay, RowsOfANewerHeader_HaveZeroBehind) {
@@ -438,7 +526,9 @@ TEST(Query, AfterAMotion_SeesWhereThingsAreNow) {
   EXPECT_EQ(overlaps(y.world, sphere({0.05, 0.05, 0.15}, 0.01)), Things{});
   dfm_query_filter gone = dfm_query_filter_default();
   gone.only = y.upper;
-  EXPECT_EQ(overlaps(y.world, sphere({0, 0, 0}, 1), &gone), Things{});
+  dfm_query_hits none{sizeof none, sizeof(dfm_query_hit), 0, 0, nullptr};
+  const dfm_query_shape all = sphere({0, 0, 0}, 1);
+  EXPECT_EQ(dfm_world_query(y.world, &all, nullptr, 0, &gone, nullptr, &none), DFM_E_HANDLE);
 }
 
 TEST(Query, OnSeveralThreads_GivesTheBitsOfOneAndTakesNoMemory) {
@@ -549,6 +639,13 @@ TEST(Query, WhatIsNoShapeRayOrFilter_IsRefusedWithASentence) {
   hits.size = 8;
   EXPECT_EQ(ask(&s, d, 1), DFM_E_ARG);
   EXPECT_EQ(hits.n, 77u) << "untouched";
+  struct Newer {
+    dfm_query_hits known;
+    uint64_t more;
+  } newer{{sizeof newer, sizeof rows[0], 4, 0, rows}, 0};
+  test::ok(dfm_world_query(y.world, &s, d, 1, nullptr, nullptr, &newer));
+  newer.more = 1;
+  EXPECT_EQ(dfm_world_query(y.world, &s, d, 1, nullptr, nullptr, &newer), DFM_E_UNSUPPORTED);
   EXPECT_EQ(dfm_world_query(y.world, &s, d, 1, nullptr, nullptr, nullptr), DFM_E_ARG);
   EXPECT_EQ(dfm_world_query(12345, &s, d, 1, nullptr, nullptr, &hits), DFM_E_HANDLE);
 }

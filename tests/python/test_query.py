@@ -48,6 +48,10 @@ class Queries(Scenery):
             for i in range(60):
                 world.add_obstacle("sphere", radius=0.1, position=(0, i + 1, 0))
             self.assertEqual(len(world.query_overlap(deform.Shape.sphere(100))), 80)
+            asked = []
+            some = deform.Filter(accept=lambda thing: bool(asked.append(thing)) or len(asked) > 20)
+            self.assertEqual(len(world.query_overlap(deform.Shape.sphere(100), some)), 60)
+            self.assertEqual(len(asked), 80)  # each once
 
     def test_filters_choose_kinds_masks_and_things(self):
         down = (0.01, 0.02, 2), (0, 0, -1)

@@ -231,12 +231,15 @@ class _Asked:
         accept: Callable[[Any], bool] | None = given.accept
         if accept is not None:
             function: Callable[[Any], bool] = accept
+            answers: dict[int, bool] = {}  # a query for more hits asks no thing again
 
             def ask(_user: int, handle: int) -> bool:
                 if self.raised is not None:
                     return False
                 try:
-                    return bool(function(world.owner(handle)))
+                    if handle not in answers:
+                        answers[handle] = bool(function(world.owner(handle)))
+                    return answers[handle]
                 except BaseException as error_:  # nothing may pass through the library's frames
                     self.raised = error_
                     return False
@@ -283,7 +286,8 @@ class Queries:
         if not isinstance(shape, Shape):
             raise TypeError(f"a query asks with a deform.Shape, not {shape!r}")
         struct = _abi.dfm_query_shape.from_buffer_copy(shape.struct)
-        struct.flags = _abi.DFM_QUERY_EACH if each else 0
+        struct.flags = ((_abi.DFM_QUERY_EACH if each else 0) |
+                        (_abi.DFM_QUERY_COUNT if most is None else 0))
         at, along = ctypes.byref(struct), None if path is None else vector(path, "path")
         while True:
             out = (_abi.dfm_query_hit * capacity)()
@@ -291,9 +295,9 @@ class Queries:
                                        capacity, 0, ctypes.addressof(out))
             asked.done(quick.dfm_world_query(self.handle, at, along, real(reach, "reach"), asked.at, None,
                                              ctypes.byref(hits)))
-            if most is not None or hits.n < capacity:
+            if hits.n <= capacity or most is not None:
                 return [self._hit(hit) for hit in out[:hits.n]]
-            capacity *= 4
+            capacity = hits.n
 
     def _first(self, *arguments: Any) -> Hit | None:
         return next(iter(self.query(*arguments, most=1)), None)

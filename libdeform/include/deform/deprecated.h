@@ -6,7 +6,7 @@
 #include "deform/body.h"
 #include "deform/query.h"
 /* Queries: dfm_world_query takes their place. Arguments, results and statuses are as they were, except that
- * hits have the sizes of this header. */
+ * hits have the sizes of this header and that a call during a step is DFM_E_BUSY. */
 typedef struct dfm_ray_hit {
   uint32_t size, triangle;
   dfm_body body;
@@ -72,7 +72,7 @@ static inline dfm_status dfm_world_ray(dfm_world world, const double origin[3], 
 }
 static inline double dfm_query_nearest_body(void *user, const dfm_query_hit *hit) {
   dfm_query_hit *const nearest = (dfm_query_hit *)user;
-  if (dfm_handle_kind(hit->thing) != DFM_HANDLE_BODY) return INFINITY;
+  if (dfm_handle_kind(hit->thing) != DFM_HANDLE_BODY) return -1; /* bodies come first */
   if (hit->distance < nearest->distance) *nearest = *hit;
   return nearest->distance;
 }
@@ -92,13 +92,9 @@ static inline dfm_status dfm_world_query_ray_all_sized(dfm_world world, const do
   dfm_query_shape point = dfm_query_point(origin);
   dfm_query_hits hits = {(uint32_t)sizeof hits, row_size, capacity, 0, out};
   const double reach = max_distance > 0 ? max_distance : -1;
-  point.flags = DFM_QUERY_EACH;
-  dfm_status status =
+  point.flags = DFM_QUERY_EACH | DFM_QUERY_COUNT;
+  const dfm_status status =
       dfm_world_query(world, &point, direction ? direction : none, reach, filter, NULL, &hits);
-  if (status >= 0 && capacity > 0 && n) {
-    hits.capacity = 0;
-    status = dfm_world_query(world, &point, direction, reach, filter, NULL, &hits);
-  }
   if (status >= 0 && n) *n = hits.n;
   return status;
 }
@@ -144,11 +140,18 @@ static inline dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *b
 static inline double dfm_query_list_triangle(void *user, const dfm_query_hit *hit) {
   dfm_query_numbers *const list = (dfm_query_numbers *)user;
   if (hit->triangle == UINT32_MAX) return INFINITY;
-  uint32_t at = list->n < list->capacity ? list->n : list->capacity;
+  const uint32_t kept = list->n < list->capacity ? list->n : list->capacity;
   ++list->n;
-  for (; at > 0 && list->triangles[at - 1] > hit->triangle; --at)
-    if (at < list->capacity) list->triangles[at] = list->triangles[at - 1];
-  if (at < list->capacity) list->triangles[at] = hit->triangle;
+  uint32_t at = 0, above = kept;
+  while (at < above) {
+    const uint32_t middle = at + (above - at) / 2;
+    if (list->triangles[middle] < hit->triangle) at = middle + 1;
+    else above = middle;
+  }
+  if (at == list->capacity) return INFINITY;
+  for (uint32_t i = kept < list->capacity ? kept : kept - 1; i > at; --i)
+    list->triangles[i] = list->triangles[i - 1];
+  list->triangles[at] = hit->triangle;
   return INFINITY;
 }
 static inline dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape,

@@ -2,12 +2,14 @@
 // Included by deform.hpp.
 #ifndef DEFORM_QUERIES_HPP
 #define DEFORM_QUERIES_HPP
+#include <algorithm>
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -36,11 +38,7 @@ class WorldQueries {
     requires std::invocable<F &, const dfm_query_hit &>
   auto query(const dfm_query_shape &shape, std::optional<In3> path, double reach,
              const dfm_query_filter *filter, F &&found) const {
-    const auto hit = [](void *user, const dfm_query_hit *h) -> double {
-      return (*static_cast<std::remove_reference_t<F> *>(user))(*h);
-    };
-    return E::done(dfm_world_query(world(), &shape, path ? path->data() : nullptr, reach, filter, hit,
-                                   std::addressof(found)));
+    return E::done(each_hit(shape, path, reach, filter, found));
   }
   // The nearest hits, nearest first: into the caller's memory, returning their number; or all as a vector.
   auto query(const dfm_query_shape &shape, std::optional<In3> path, double reach,
@@ -50,19 +48,30 @@ class WorldQueries {
   auto query(const dfm_query_shape &shape, std::optional<In3> path = {}, double reach = 0,
              const dfm_query_filter *filter = nullptr) const {
     return produce<E, std::vector<dfm_query_hit>>([&](std::vector<dfm_query_hit> &out) {
-      uint32_t n = 0;
-      const dfm_status s = hits(shape, path, reach, filter, {}, n);
-      if (s < 0 || n == 0) return s;
-      out.resize(n);
-      return hits(shape, path, reach, filter, out, n);
+      // one query, so the filter's function is asked once; `reserved` numbers the things until all are sorted
+      const dfm_status s = each_hit(shape, path, reach, filter, [&](const dfm_query_hit &h) {
+        const bool same = !out.empty() && out.back().thing == h.thing;
+        const uint32_t number = out.empty() ? 0 : out.back().reserved + !same;
+        out.push_back(h);
+        out.back().reserved = number;
+        return HUGE_VAL;
+      });
+      std::sort(out.begin(), out.end(), [](const dfm_query_hit &a, const dfm_query_hit &b) {
+        return std::tie(a.distance, a.reserved, a.triangle) < std::tie(b.distance, b.reserved, b.triangle);
+      });
+      for (dfm_query_hit &h : out) h.reserved = 0;
+      return s;
     });
   }
-  // The nearest hit; its thing is 0 where there is none.
+  // The nearest hit; where there is none its thing is 0 and its distance infinite.
   auto query_first(const dfm_query_shape &shape, std::optional<In3> path = {}, double reach = 0,
                    const dfm_query_filter *filter = nullptr) const {
     return produce<E, dfm_query_hit>([&](dfm_query_hit &out) {
       uint32_t n = 0;
       out = {};
+      out.size = sizeof out;
+      out.triangle = UINT32_MAX;
+      out.distance = HUGE_VAL;
       return hits(shape, path, reach, filter, {&out, 1}, n);
     });
   }
@@ -78,6 +87,27 @@ class WorldQueries {
 
  private:
   dfm_world world() const noexcept { return static_cast<const Self *>(this)->get(); }
+  template <class F>
+  dfm_status each_hit(const dfm_query_shape &shape, std::optional<In3> path, double reach,
+                      const dfm_query_filter *filter, F &&found) const {
+    double next = -1;
+    const auto ask = [&](const dfm_query_hit &h) { next = found(h); };
+    struct To {
+      typename E::template Call<decltype(ask)> call;
+      double &next;
+    } to{{ask}, next};
+    const dfm_status s = dfm_world_query(
+        world(), &shape, path ? path->data() : nullptr, reach, filter,
+        [](void *user, const dfm_query_hit *h) -> double {
+          To &t = *static_cast<To *>(user);
+          t.next = -1;  // what it is after a throw
+          t.call(*h);
+          return t.next;
+        },
+        &to);
+    to.call.rethrow();
+    return s;
+  }
   dfm_status hits(const dfm_query_shape &shape, std::optional<In3> path, double reach,
                   const dfm_query_filter *filter, std::span<dfm_query_hit> out, uint32_t &n) const noexcept {
     dfm_query_hits to{sizeof to, sizeof(dfm_query_hit), rows(out.size(), 1), 0, out.data()};

@@ -22,9 +22,10 @@ extern "C" {
  * On a path it is a ray. Since 0.1. */
 #define DFM_SHAPE_POINT 8u
 
-/** dfm_query_shape.flags. EACH: all hits of a thing, in place of its nearest: one for each triangle, and of
- * other shapes where a ray enters and where it leaves. */
-enum { DFM_QUERY_EACH = 1 };
+/** dfm_query_shape.flags. EACH: all hits of a thing, in place of its nearest: one for each triangle, and one
+ * without a triangle if the shape lies inside a closed surface; of other shapes where a ray enters and where
+ * it leaves. COUNT: n of a dfm_query_hits counts all hits, also those for which out has no room. */
+enum { DFM_QUERY_EACH = 1, DFM_QUERY_COUNT = 2 };
 /** A convex shape for a query. The radius of a box or a hull rounds it: the shape extends by the radius
  * beyond the box or the points. Sizes may be zero: a sphere of radius 0 is a point. */
 typedef struct dfm_query_shape {
@@ -33,7 +34,7 @@ typedef struct dfm_query_shape {
   double half_size[3];    /* box, m */
   double radius;          /* m; sphere, capsule; box and hull: 0 if not rounded */
   double half_length;     /* capsule: half of the axis between the centers of its caps, along local z, m */
-  uint32_t npoint, flags; /* sum of DFM_QUERY_EACH */
+  uint32_t npoint, flags; /* flags: sum of DFM_QUERY_EACH and COUNT */
   const double *points;   /* CONVEX: [npoint,3] m, in the shape's frame; borrowed during the call */
   uint64_t cookie;        /* set by the default function */
 } dfm_query_shape;
@@ -60,7 +61,9 @@ typedef struct dfm_query_filter {
   bool (*accept)(void *user, uint64_t thing);
   void *user;      /* first argument of accept */
   uint64_t cookie; /* set by the default function */
-  uint64_t only;   /* the one thing to ask, whatever its kind and masks; 0: all that pass */
+  /* the one thing to ask, whatever its kind and masks, without accept; 0: all that pass. Not of this world:
+   * DFM_E_HANDLE; a body without cells: DFM_E_STATE */
+  uint64_t only;
 } dfm_query_filter;
 /** dfm_query_filter_default into a struct of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_query_filter_default_sized(uint32_t size, dfm_query_filter *out);
@@ -72,7 +75,8 @@ static inline dfm_query_filter dfm_query_filter_default(void) {
   return out;
 }
 
-/** dfm_query_hit.flags. INSIDE: the shape overlaps the thing where it is, or at the start of its path. */
+/** dfm_query_hit.flags. INSIDE: the shape overlaps the thing where it is, or at the start of its path; never
+ * of a POINT. */
 enum { DFM_QUERY_INSIDE = 1 };
 typedef struct dfm_query_hit {
   uint32_t size, flags;
@@ -91,7 +95,7 @@ typedef double (*dfm_query_hit_fn)(void *user, const dfm_query_hit *hit);
  * of creation, then the lower triangle. */
 typedef struct dfm_query_hits {
   uint32_t size, row_size; /* sizeof(dfm_query_hits), sizeof(dfm_query_hit) */
-  uint32_t capacity, n;    /* of out; out, how many there are, `capacity` at most. Capacity 0: n counts all */
+  uint32_t capacity, n;    /* of out; out, how many it has got; with COUNT or capacity 0 how many there are */
   dfm_query_hit *out;
 } dfm_query_hits;
 
@@ -106,7 +110,8 @@ typedef struct dfm_query_hits {
  * It overlaps a thing if it touches its surface or lies inside: in the space that a closed surface encloses,
  * or in the half-space below a plane. An open surface encloses nothing; of a surface that faces inward (a
  * room) only the triangles count. Of a POINT on a path, a ray, the hits are those of the surfaces; from
- * inside, where it leaves a thing; through an edge, the lower triangle or with EACH both.
+ * inside, where it leaves a thing; through an edge, the lower triangle or with EACH both. Without a path they
+ * are the closest points of surfaces, also where the point lies inside.
  * @param path    [3] m, of any length if reach is given; NULL: none
  * @param reach   m, largest distance, INFINITY for any; 0: the whole path; without a path, overlaps
  * @param filter  NULL: all but sensors
@@ -114,8 +119,8 @@ typedef struct dfm_query_hits {
  *                nearest hit (with EACH: in no order), the lowest triangle of several. NULL: user is a
  *                dfm_query_hits, which gets the nearest ones
  * @param user    first argument of hit
- * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM no memory for a tree; DFM_E_HANDLE; DFM_E_BUSY. Threads: Any thread.
- * Not during step. Since 0.1. */
+ * @return DFM_OK; DFM_E_ARG; DFM_E_NOMEM no memory for a tree; DFM_E_HANDLE; DFM_E_STATE filter.only has no
+ * cells; DFM_E_BUSY. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_query(dfm_world world, const dfm_query_shape *shape, const double path[3],
                                    double reach, const dfm_query_filter *filter, dfm_query_hit_fn hit,
                                    void *user);

@@ -84,11 +84,9 @@ Convex taken_shape(const dfm_query_shape &def) {
   return c;
 }
 
-ThingQuery taken_query(const dfm_query_shape *shape, const double *path, double reach) {
-  need(shape, "shape");
-  const dfm_query_shape def = take_def(shape, dfm_query_shape_default());
-  if (def.flags & ~uint32_t{DFM_QUERY_EACH})
-    fail(DFM_E_ARG, "shape.flags is %u; expected 0 or DFM_QUERY_EACH", def.flags);
+ThingQuery taken_query(const dfm_query_shape &def, const double *path, double reach) {
+  if (def.flags & ~uint32_t{DFM_QUERY_EACH | DFM_QUERY_COUNT})
+    fail(DFM_E_ARG, "shape.flags is %u; expected a sum of DFM_QUERY_EACH and DFM_QUERY_COUNT", def.flags);
   if (!(reach >= 0)) fail(DFM_E_ARG, "reach is %g m; it must not be negative", reach);
   ThingQuery q;
   q.shape = taken_shape(def);
@@ -108,16 +106,24 @@ ThingQuery taken_query(const dfm_query_shape *shape, const double *path, double 
 
 dfm_query_hits taken_hits(const void *user) {
   need(user, "user");
-  const auto &hits = *static_cast<const dfm_query_hits *>(user);
-  if (hits.size < sizeof hits)
-    fail(DFM_E_ARG, "the size of the dfm_query_hits is %u; set it to its sizeof", hits.size);
-  if (hits.row_size < sizeof(dfm_query_hit) || hits.row_size % 8 != 0)
+  const auto *const given = static_cast<const dfm_query_hits *>(user);
+  if (given->size < kFirstSize<dfm_query_hits>)
+    fail(DFM_E_ARG, "the size of the dfm_query_hits is %u; set it to its sizeof", given->size);
+  dfm_query_hits hits = take_def(given, dfm_query_hits{});
+  hits.n = 0;
+  if (hits.row_size < kFirstSize<dfm_query_hit> || hits.row_size % 8 != 0)
     fail(DFM_E_ARG,
          "row_size %u is not the size of a dfm_query_hit: expected a multiple of 8, at least %zu; set it to "
          "sizeof(dfm_query_hit)",
-         hits.row_size, sizeof(dfm_query_hit));
+         hits.row_size, size_t{kFirstSize<dfm_query_hit>});
   if (hits.capacity > 0 && !hits.out) fail(DFM_E_ARG, "out is NULL, with a capacity of %u", hits.capacity);
-  return {hits.size, hits.row_size, hits.capacity, 0, hits.out};
+  return hits;
+}
+
+// The one thing of a filter.
+void need_thing(const World &w, uint64_t thing) {
+  if (dfm_handle_kind(thing) == DFM_HANDLE_BODY) shown_body_of(thing);
+  id_of(w, thing, "filter.only");
 }
 
 }  // namespace
@@ -125,11 +131,15 @@ dfm_query_hits taken_hits(const void *user) {
 dfm_status dfm_world_query(dfm_world world, const dfm_query_shape *shape, const double path[3], double reach,
                            const dfm_query_filter *filter, dfm_query_hit_fn hit, void *user) {
   return as_status(to_read<world_of>, world, [&](World &w) {
-    const ThingQuery query = taken_query(shape, path, reach);
+    need(shape, "shape");
+    const dfm_query_shape def = take_def(shape, dfm_query_shape_default());
+    const ThingQuery query = taken_query(def, path, reach);
     const Given given(filter);
+    if (given.taken.only) need_thing(w, given.taken.only);
     if (hit) return find(w, given.filter(), query, hit, user);
     dfm_query_hits kept = taken_hits(user);
-    find(w, given.filter(), query, keep_nearest, &kept);
+    const bool count = kept.capacity == 0 || def.flags & DFM_QUERY_COUNT;
+    find(w, given.filter(), query, count ? keep_and_count : keep_nearest, &kept);
     static_cast<dfm_query_hits *>(user)->n = kept.n;
   });
 }

@@ -32,20 +32,21 @@ TriangleMet first_met(const Triangles &m, const Convex &shape, const ShapeWay &w
   TriangleMet best;
   if (m.tree.empty()) return best;
   const ShapeSearch search(m, shape, way);
-  double most = limit;
+  double most = limit, key = search.key(limit);
   uint64_t nodes = 0;
   const auto bound = [&](const Box &b) { return search.first(b); };
   const auto leaf = [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
-      if (!(bound(m.tree.triangle_boxes()[i]) <= most)) continue;
+      if (!(bound(m.tree.triangle_boxes()[i]) <= key)) continue;
       const uint32_t t = m.tree.triangles()[i];
       const ConvexHit hit = search.meet(t, most);
       if (!hit.hit || !(hit.way < most || (hit.way == most && t < best.triangle))) continue;
       best = {hit, t};
       most = hit.inside && !way.moves ? -1 : hit.way;  // -1: nothing is nearer
+      key = search.key(most);
     }
   };
-  nearest_first(m.tree, most, nodes, bound, leaf);
+  nearest_first(m.tree, key, nodes, bound, leaf);
   return best;
 }
 

@@ -24,10 +24,10 @@ class ShapeSearch {
  public:
   // The tree may not be empty.
   ShapeSearch(const Triangles &triangles, const Convex &shape, const ShapeWay &way);
-  // At or below the way to anything in the box.
-  double first(const Box &b) const {
-    return way_.moves ? swept_.first(b) : std::sqrt(box_distance2(box_, b));
-  }
+  // At or below the key of the way to anything in the box.
+  double first(const Box &b) const { return way_.moves ? swept_.first(b) : box_distance2(box_, b); }
+  // The way itself, of a shape at rest its square: no box needs a square root.
+  double key(double way) const { return way_.moves || way < 0 ? way : way * way; }
   ConvexHit meet(uint32_t triangle, double limit) const;
 
  private:
@@ -46,13 +46,13 @@ struct TriangleMet {
 // surface, any.
 TriangleMet first_met(const Triangles &triangles, const Convex &shape, const ShapeWay &way, double limit);
 
-// Calls f(hit, triangle) for all that it meets, in no order.
+// Calls f(hit, triangle) for all that it meets, in no order. f may lower `limit`; -1 ends it.
 template <class F>
-void each_met(const Triangles &m, const Convex &shape, const ShapeWay &way, double limit, F &&f) {
+void each_met(const Triangles &m, const Convex &shape, const ShapeWay &way, const double &limit, F &&f) {
   if (m.tree.empty()) return;
   const ShapeSearch search(m, shape, way);
   near_triangles(
-      m.tree, [&](const Box &b) { return search.first(b) <= limit; },
+      m.tree, [&](const Box &b) { return search.first(b) <= search.key(limit); },
       [&](uint32_t t) {
         if (const ConvexHit hit = search.meet(t, limit); hit.hit) f(hit, t);
       });
@@ -63,9 +63,9 @@ void each_met(const Triangles &m, const Convex &shape, const ShapeWay &way, doub
 int winding_by_ray(const Triangles &triangles, Vec3 p);
 
 // Calls f(distance, triangle) for all triangles on a ray up to and including `limit`, in no order. As
-// first_on_ray.
+// first_on_ray. f may lower `limit`; -1 ends it.
 template <class F>
-void all_on_ray(const Triangles &m, Vec3 o, Vec3 unit, double limit, F &&f) {
+void all_on_ray(const Triangles &m, Vec3 o, Vec3 unit, const double &limit, F &&f) {
   if (m.tree.empty()) return;
   const double slack = kRaySlack * length_scale(m.tree, o);
   const RayBoxes boxes(o, unit, {slack, slack, slack});

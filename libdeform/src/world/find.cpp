@@ -147,7 +147,7 @@ bool plane_overlaps(const Obstacle &plane, const Thing &thing) {
 
 // f(met) for what it meets up to the limit, and perhaps beyond.
 template <class F>
-void meet_ray(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+void meet_ray(const Thing &thing, const ThingQuery &q, const double &limit, F &&f) {
   const Vec3 o = q.shape.position, d = q.way.unit;
   if (has_triangles(thing)) {
     const Triangles m = triangles_of(thing);
@@ -173,14 +173,27 @@ void meet_ray(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
 }
 
 template <class F>
-void meet_point(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+void meet_point(const Thing &thing, const ThingQuery &q, const double &limit, F &&f) {
   const Vec3 p = q.shape.position;
   if (has_triangles(thing)) {
     const Triangles m = triangles_of(thing);
-    const TriangleNearPoint near = closest_to(m, seen_by(thing, p), DistanceKey::root, limit, q.count);
-    if (near.triangle != kNone)
-      f(Met{near.key, near.triangle, back(thing, near.at.point),
-            turned_back(thing, normal_of(m, near.triangle))});
+    const Vec3 seen = seen_by(thing, p);
+    const auto on = [&](double distance, uint32_t t, const TrianglePoint &at) {
+      f(Met{distance, t, back(thing, at.point), turned_back(thing, normal_of(m, t))});
+    };
+    if (q.each) {
+      if (m.tree.empty()) return;
+      const ShapeSearch search(m, seen_by(thing, q.shape), {});
+      return near_triangles(
+          m.tree, [&](const Box &b) { return search.first(b) <= search.key(limit); },
+          [&](uint32_t t) {
+            const TrianglePoint at =
+                closest_on_triangle(seen, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+            on(std::sqrt(at.distance2), t, at);
+          });
+    }
+    const TriangleNearPoint near = closest_to(m, seen, DistanceKey::root, limit, q.count);
+    if (near.triangle != kNone) on(near.key, near.triangle, near.at);
   } else if (shape_of(*thing.obstacle) != Shape::none) {
     const ObstaclePoint near = thing.obstacle->standing().closest(p);
     f(Met{std::fabs(near.distance), kNone, near.point, near.normal});
@@ -188,7 +201,7 @@ void meet_point(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
 }
 
 template <class F>
-void meet_shape(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
+void meet_shape(const Thing &thing, const ThingQuery &q, const double &limit, F &&f) {
   const Vec3 unit = q.way.unit;
   const Met start{0, kNone, q.shape.position, q.way.moves ? -unit : Vec3{}, true};
   if (has_triangles(thing)) {
@@ -201,7 +214,7 @@ void meet_shape(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
     // a shape inside a closed surface may hit it from inside later
     if (q.each) {
       each_met(m, seen, way, limit, on);
-      if (!q.point && encloses(thing, m, seen.any())) f(start);
+      if (limit >= 0 && encloses(thing, m, seen.any())) f(start);
       return;
     }
     const TriangleMet first = first_met(m, seen, way, limit);
@@ -224,11 +237,52 @@ void meet_shape(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
 }
 
 template <class F>
-void meet(const Thing &thing, const ThingQuery &q, double limit, F &&f) {
-  if (q.point && q.way.moves) meet_ray(thing, q, limit, f);
-  else if (q.point && !q.each) meet_point(thing, q, limit, f);
-  else meet_shape(thing, q, limit, f);
+void meet(const Thing &thing, const ThingQuery &q, const double &limit, F &&f) {
+  if (!q.point) meet_shape(thing, q, limit, f);
+  else if (q.way.moves) meet_ray(thing, q, limit, f);
+  else meet_point(thing, q, limit, f);
 }
+
+// The rows of a dfm_query_hits.
+class KeptHits {
+ public:
+  explicit KeptHits(dfm_query_hits &hits)
+      : hits_(hits), known_(std::min<size_t>(hits.row_size, sizeof(dfm_query_hit))) {}
+  dfm_query_hit at(uint32_t i) const {
+    dfm_query_hit hit{};
+    std::memcpy(&hit, row(i), known_);
+    return hit;
+  }
+  // Puts a hit at its place among the first `kept`; the last one falls out of a full list.
+  void add(uint32_t kept, dfm_query_hit hit) {
+    // of equal hits the first one offered, except for triangles of one thing
+    const auto before = [&](const dfm_query_hit &other) {
+      if (hit.distance != other.distance) return hit.distance < other.distance;
+      return hit.thing == other.thing && hit.triangle < other.triangle;
+    };
+    const bool full = kept == hits_.capacity;
+    if (full && (kept == 0 || !before(at(kept - 1)))) return;
+    const uint32_t end = full ? kept - 1 : kept;
+    uint32_t place = 0;
+    for (uint32_t above = end; place < above;) {
+      const uint32_t middle = place + (above - place) / 2;
+      if (before(at(middle))) above = middle;
+      else place = middle + 1;
+    }
+    const size_t step = hits_.row_size;
+    std::memmove(row(place + 1), row(place), step * (end - place));
+    hit.size = static_cast<uint32_t>(known_);
+    std::memcpy(row(place), &hit, known_);
+    std::memset(row(place) + known_, 0, step - known_);
+  }
+
+ private:
+  unsigned char *row(uint32_t i) const {
+    return reinterpret_cast<unsigned char *>(hits_.out) + size_t{hits_.row_size} * i;
+  }
+  dfm_query_hits &hits_;
+  const size_t known_;
+};
 
 bool overlaps(const Convex &shape, const Thing &thing) {
   ThingQuery q;
@@ -286,32 +340,17 @@ void find(World &w, const ThingFilter &filter, const ThingQuery &query, dfm_quer
 
 double keep_nearest(void *user, const dfm_query_hit *hit) {
   dfm_query_hits &hits = *static_cast<dfm_query_hits *>(user);
-  if (hits.capacity == 0) {
-    ++hits.n;
-    return kFar;
-  }
-  const size_t step = hits.row_size;
-  const auto row = [&](uint32_t i) { return reinterpret_cast<unsigned char *>(hits.out) + step * i; };
-  const auto held = [&](uint32_t i) {
-    dfm_query_hit other;
-    std::memcpy(&other, row(i), sizeof other);
-    return other;
-  };
-  const auto before = [&](const dfm_query_hit &other) {
-    if (hit->distance != other.distance) return hit->distance < other.distance;
-    // of equal hits the first one offered, except for triangles of one thing
-    return hit->thing == other.thing && hit->triangle < other.triangle;
-  };
-  const bool full = hits.n == hits.capacity;
-  if (!full || before(held(hits.n - 1))) {
-    const uint32_t end = full ? hits.n - 1 : hits.n++;
-    uint32_t at = end;
-    while (at > 0 && before(held(at - 1))) --at;
-    std::memmove(row(at + 1), row(at), step * (end - at));
-    std::memcpy(row(at), hit, sizeof *hit);
-    std::memset(row(at) + sizeof *hit, 0, step - sizeof *hit);
-  }
-  return hits.n == hits.capacity ? held(hits.n - 1).distance : kFar;
+  KeptHits kept(hits);
+  kept.add(hits.n, *hit);
+  if (hits.n < hits.capacity) ++hits.n;
+  return hits.n == hits.capacity ? kept.at(hits.n - 1).distance : kFar;
+}
+
+double keep_and_count(void *user, const dfm_query_hit *hit) {
+  dfm_query_hits &hits = *static_cast<dfm_query_hits *>(user);
+  KeptHits(hits).add(std::min(hits.n, hits.capacity), *hit);
+  ++hits.n;
+  return kFar;
 }
 
 }  // namespace dfm

@@ -56,7 +56,9 @@ struct ThingQuery {
 // Calls hit() as dfm_world_query does. Several threads may query at once. The first query after positions
 // have changed refits the trees (state/search_tree.h); later ones do not allocate.
 void find(World &w, const ThingFilter &filter, const ThingQuery &query, dfm_query_hit_fn hit, void *user);
-// A hit() whose user is a dfm_query_hits.
+// A hit() whose user is a dfm_query_hits of some capacity; one that counts all hits, also those that the list
+// has no room for.
 double keep_nearest(void *user, const dfm_query_hit *hit);
+double keep_and_count(void *user, const dfm_query_hit *hit);
 
 }  // namespace dfm
