@@ -60,8 +60,8 @@ TEST(TearScene, PartsOfALiver_AreNotReportedAsOverlapping) {
 
 namespace {
 
-// A ball of glass that strikes a floor and falls into many parts; what the command says.
-test::CommandResult shattered(const std::string &name, const std::string &duration,
+// A ball of glass that strikes a floor at this speed (m/s) and falls into many parts; what the command says.
+test::CommandResult shattered(const std::string &name, const std::string &duration, const std::string &speed,
                               const std::string &separate) {
   const std::string folder = test::scratch(name + " " + std::to_string(getpid()));
   test::write_file(folder + "/scene.json", R"({"format": "deform-scene", "version": 1,
@@ -71,7 +71,8 @@ test::CommandResult shattered(const std::string &name, const std::string &durati
     "bodies": [{"name": "ball", "mesh": {"make": "ball", "radius": 0.1, "cells": 500}, "material": "glass",
       "model": {"type": "corotational_fem"}, )" +
                                                separate + R"(
-      "pose": {"position": [0, 0, 0.12]}, "velocity": [0, 0, -3]}],
+      "pose": {"position": [0, 0, 0.12]}, "velocity": [0, 0, -)" +
+                                               speed + R"(]}],
     "obstacles": [{"name": "floor", "shape": "plane"}], "output": {"every": 0.002}})");
   const test::CommandResult r = test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
@@ -85,7 +86,7 @@ constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells
 // Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
 TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
   const test::CommandResult r =
-      shattered("pieces of a ball", "0.03", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
+      shattered("pieces of a ball", "0.03", "3", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
   const std::string &log = r.err;
   const std::string said = "parts of body 'ball' came off with their faces in each other, by up to ";
   size_t times = 0;
@@ -101,9 +102,11 @@ TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
   EXPECT_NE(r.out.find("\"least_cells\" above 1 with \"crumbs\": \"remove\""), std::string::npos) << r.out;
 }
 
+// At 3 m/s three of seven starts end with an error: loads of faces that interlock cancel each other, and grow
+// (doc/decisions/contact_solver.md).
 // unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, TornBodyThatCrossesItself_IsAdvisedToSeparate) {
-  const std::string log = shattered("torn ball", "0.06", "").err;
+  const std::string log = shattered("torn ball", "0.06", "2", "").err;
   EXPECT_NE(log.find("a surface crosses itself"), std::string::npos) << log;
   EXPECT_NE(log.find("set \"separate\" of body 'ball'"), std::string::npos) << log;
 }
