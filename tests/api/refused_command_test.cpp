@@ -21,7 +21,7 @@ test::CommandResult deform_without(long n, const std::string &count, const std::
 }
 
 // Every allocation in turn would be thousands of runs: the first ones of the set-up each by itself, the
-// others in strides that grow, and the last ones.
+// others in strides that grow, and the last ones. runs 0: every allocation.
 void walk(const std::string &name, const std::vector<std::string> &args, int runs) {
 #ifdef DEFORM_SANITIZED
   GTEST_SKIP() << "a sanitizer brings its own operator new";
@@ -33,9 +33,10 @@ void walk(const std::string &name, const std::vector<std::string> &args, int run
   ASSERT_EQ(whole.exit_code, 0) << whole.err;
   const long total = std::atol(test::read_file(count).c_str());
   ASSERT_GT(total, 100);
-  int refused = 0;
-  for (int i = 0; i < runs; ++i) {
-    const long n = long(std::llround(std::pow(double(total), double(i) / (runs - 1)))) - 1;
+  long refused = 0;
+  const long last = runs ? runs : total;
+  for (long i = 0; i < last; ++i) {
+    const long n = runs ? long(std::llround(std::pow(double(total), double(i) / (runs - 1)))) - 1 : i;
     // What an earlier run has left is looked through and removed.
     if (args[0] == "run")
       for (const char *left :
@@ -51,7 +52,7 @@ void walk(const std::string &name, const std::vector<std::string> &args, int run
           << "allocation " << n << " of " << total << ": " << r.err;
     }
   }
-  EXPECT_GT(refused, runs / 2);
+  EXPECT_GT(refused, last / 2);
 }
 
 }  // namespace
@@ -60,6 +61,11 @@ void walk(const std::string &name, const std::vector<std::string> &args, int run
 TEST(RefusedCommand, RunOfAScene_EndsWithASentence) {
   walk("run", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"},
        500);
+}
+// soak: 19,000 runs, of which those above are a choice
+TEST(RefusedCommand, RunOfAScene_EveryAllocation_EndsWithASentence) {
+  walk("run_all", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"},
+       0);
 }
 // unsanitized: the sanitizer's own operator new must come first
 TEST(RefusedCommand, RunOfRigidBodies_EndsWithASentence) {

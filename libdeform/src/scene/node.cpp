@@ -98,6 +98,10 @@ Node Node::member(const std::string &key, json otherwise) const {
   return member(key);
 }
 
+Node Node::member(const std::string &key, double x, double y, double z) const {
+  return has(key.c_str()) ? member(key) : member(key, json::array({x, y, z}));
+}
+
 Node Node::at(const std::string &key) const {
   if (!has(key.c_str())) fail("the key \"%s\" is missing here", key.c_str());
   return member(key);

@@ -40,6 +40,9 @@ class Node {
   Node at(const std::string &key) const;                      // an error if absent: the key is required
   Node member(const std::string &key) const;                  // must exist
   Node member(const std::string &key, json otherwise) const;  // the latter where it is absent
+  // [x, y, z] where it is absent, and made only there: a filled json array allocates in its destructor, which
+  // ends the process where memory is short.
+  Node member(const std::string &key, double x, double y, double z) const;
   Node part(const std::string &kind) const;  // the object under the key of its kind's name, made if absent
   std::vector<Node> items() const;           // an error if this is no array
   std::vector<Node> items(const char *key) const;  // empty where the key is absent
@@ -57,7 +60,7 @@ class Node {
   }
   void vector(double out[3]) const;
   void vector(const char *key, double out[3], double x, double y, double z) const {
-    member(key, json::array({x, y, z})).vector(out);
+    member(key, x, y, z).vector(out);
   }
   // A name for a file or a table: no separators, no control characters.
   std::string name() const;

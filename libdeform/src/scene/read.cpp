@@ -247,7 +247,7 @@ dfm_sine read_sine(const Node &sine, bool scalar) {
 namespace {
 
 void read_gravity(const Node &scene, Definition &def) {
-  const Node gravity = scene.member("gravity", json::array({0.0, 0.0, -9.81}));
+  const Node gravity = scene.member("gravity", 0.0, 0.0, -9.81);
   if (gravity.value().is_array()) return gravity.vector(def.world.gravity);
   if (!gravity.value().is_object())
     gravity.fail("expected [x, y, z] in m/s2 or an object with keyframes, found %s",

@@ -394,7 +394,7 @@ Quat read_plane(const Node &node, dfm_obstacle_def &def) {
   if (node.has("pose") && node.has("point"))
     node.member("point").fail("a plane is placed by \"point\" or by \"pose\", not by both");
   if (!node.has("pose")) node.vector("point", def.pose.position, 0, 0, 0);
-  read_direction(node.member("normal", json::array({0.0, 0.0, 1.0})), "the normal of a plane", normal);
+  read_direction(node.member("normal", 0.0, 0.0, 1.0), "the normal of a plane", normal);
   const Quat turn = rotation_to(normal);
   store_quat(def.pose.rotation, load_quat(def.pose.rotation) * turn);
   return turn;
