@@ -15,7 +15,8 @@ std::string beside(const std::string &name);  // the path of a program in the fo
 [[noreturn]] void become(const std::string &subcommand, const std::string &name,
                          const std::vector<std::string> &words, const std::string &missing);
 
-// A subcommand whose command line its program reads, by the same rules (bindings/tools, bindings/view).
+// A subcommand whose command line its program reads, by the same rules (bindings/tools, bindings/view,
+// bindings/serve).
 struct Program {
   const char *name, *file, *about;
   const char *missing = "`make demo` leaves it out, `make tools` builds it";
@@ -49,6 +50,9 @@ inline constexpr Program kPhantom = {
 inline constexpr Program kRollback = {
     "rollback", "deform-rollback",
     "runs a scene by the collision solution of Zerbato (2010), for comparison"};
+inline constexpr Program kServe = {
+    "serve", "deform-serve", "a scene in a browser on this machine: orbit, pull, cut, sliders, plots",
+    "with Debian's libwebsockets-dev installed, `make tools` builds it"};
 inline constexpr Program kView = {
     "view", "deform-view", "a window on a scene, with mouse, sliders and plots",
     "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it"};

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <iterator>
 
 #include "messages.h"
 
@@ -146,6 +147,22 @@ void ByHand::before_step(double h) {
   strike(drag_.thing, arm, impulse);
 }
 
+void ByHand::cut(const JsonValue &line) const {
+  const std::vector<double> blade = line.numbers("blade");
+  dfm_cut_def def = dfm_cut_def_default();
+  if (blade.size() != std::size(def.blade)) throw Failure(kBadInput, "a blade has twelve numbers");
+  def.shape = DFM_CUT_BLADE;
+  def.how = DFM_CUT_SPLIT;
+  std::copy(blade.begin(), blade.end(), def.blade);
+  std::string why;
+  bool any = false;
+  for (const BodyView &b : scene_.bodies()) {
+    if (dfm_body_cut(b.handle, &def, nullptr) == DFM_OK) any = true;
+    else if (why.empty()) why = dfm_last_error();
+  }
+  if (!any) throw Failure(kBadInput, why.empty() ? "there is no body to cut" : why);
+}
+
 void ByHand::act(const JsonValue &line) {
   const std::string what = line.get("do");
   const double value = line.scalar("value");
@@ -169,6 +186,8 @@ void ByHand::act(const JsonValue &line) {
     tools_.lead(line);
   } else if (what == "let") {
     tools_.let(line);
+  } else if (what == "cut") {
+    cut(line);
   } else if (what == "gravity") {
     need(dfm_world_set_gravity(scene_.world(), vector(line, "to").data()));
   } else if (what == "friction") {

@@ -9,6 +9,9 @@
 //                                     the same of a rigid body; place: m, in the axes of its pose
 //   {"do": "move", "to": [x,y,z]}     the end of that spring
 //   {"do": "release"}                 the spring goes
+//   {"do": "cut", "blade": [12 numbers]}
+//                                     opens faces of all bodies that can be cut and that a blade meets on its
+//                                     way, as DFM_CUT_BLADE with DFM_CUT_SPLIT; m
 //   {"do": "gravity", "to": [x,y,z]}
 //   {"do": "friction", "between": [A,B], "key": "mu", "value": v}
 //   {"do": "param", "body": B, "key": "young", "value": v}
@@ -61,6 +64,7 @@ class ByHand {
 
   void pull(const JsonValue &line);
   void drag(const JsonValue &line);
+  void cut(const JsonValue &line) const;
   void at(double place[3], double velocity[3]) const;  // of what is dragged, now
   const BodyView &body(const JsonValue &line) const;
 

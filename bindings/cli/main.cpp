@@ -16,6 +16,7 @@ int main(int argc, char **argv) {
     cli::add_program(top, globals, cli::kFriction);
     cli::add_program(top, globals, cli::kCost);
     cli::add_program(top, globals, cli::kRollback);
+    cli::add_program(top, globals, cli::kServe);
     cli::add_program(top, globals, cli::kView);
     cli::add_contact(top, globals, exit_code);
     cli::add_montage(top, globals, exit_code);

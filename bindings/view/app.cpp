@@ -84,7 +84,7 @@ Stage::Stage(const Options &options, const cli::Globals &globals, const cli::Rec
       pull(simulation),
       grip(simulation, size),
       plots(simulation, grip),
-      sliders(make_sliders(simulation)) {}
+      sliders(live::make_sliders(simulation)) {}
 
 App::App(const Options &options, const cli::Globals &globals)
     : options_(options),
@@ -273,7 +273,7 @@ void App::set_slider(const std::string &name, double value) {
     return;
   }
   std::string names = replay_ ? "speed, pull, time" : "speed, pull";
-  for (Slider &s : stage_->sliders) {
+  for (live::Slider &s : stage_->sliders) {
     if (s.name == name) {
       s.apply(value);
       s.value = value;
@@ -365,7 +365,7 @@ void App::restart() {
   if (replay_) show_state(0);
   else stage_->simulation.restart();
   stage_->grip.forget();
-  for (Slider &s : stage_->sliders) s.value = s.first;
+  for (live::Slider &s : stage_->sliders) s.value = s.first;
   stage_->plots.clear();
   stage_->plots.sample();
   wanted_ = stage_->simulation.time();
@@ -430,7 +430,7 @@ void App::shot(const std::string &name) {
     for (const cli::RigidView &rigid : stage_->scene.rigids())
       bodies.add(rigid.name, cli::json_vector(cli::rigid_measure(rigid).com));
     for (size_t i = 0; i < stage_->grip.count(); ++i) {
-      const Felt felt = stage_->grip.felt(i);
+      const live::Felt felt = stage_->grip.felt(i);
       cli::JsonObject tool;
       tools.add(stage_->grip.name(i), tool.add("at", text_of(felt.at))
                                           .add("force", text_of(felt.force))

@@ -10,12 +10,12 @@
 #include "camera.h"
 #include "cli.h"
 #include "drawing.h"
-#include "grip.h"
+#include "live/grip.h"
 #include "options.h"
 #include "plots.h"
-#include "pull.h"
+#include "live/pull.h"
 #include "script.h"
-#include "sliders.h"
+#include "live/sliders.h"
 #include "space_mouse.h"
 #include "window.h"
 
@@ -27,15 +27,15 @@ inline constexpr double kTurn = 3.5;  // radians for a way across the picture's 
 struct Stage {
   Stage(const Options &options, const cli::Globals &globals, const cli::Recording *replay);
   cli::SceneFile scene;
-  Simulation simulation;
+  live::Simulation simulation;
   cli::Drawing drawing;
   render::Bounds extent, bodies;  // at the start
   double size;                    // m, of that
-  Pull pull;
-  Grip grip;
+  live::Pull pull;
+  live::Grip grip;
   Arrows arrows;
   Plots plots;
-  std::vector<Slider> sliders;
+  std::vector<live::Slider> sliders;
 };
 
 class App {
@@ -72,7 +72,7 @@ class App {
   void panels();
   void controls();
   void files();
-  void slide(Slider &slider);
+  void slide(live::Slider &slider);
   void sliders();
   void plots();
   void numbers();

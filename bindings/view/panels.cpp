@@ -110,7 +110,7 @@ void App::files() {
   if (ImGui::Button(stage_->simulation.recording() ? "end recording" : "record")) key("v");
 }
 
-void App::slide(Slider &s) {
+void App::slide(live::Slider &s) {
   float x = float(s.value);
   if (slider(s.label.c_str(), &x, float(s.low), float(s.high), s.format,
              s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0))
@@ -125,7 +125,7 @@ void App::sliders() {
   float stiffness = float(stage_->pull.stiffness);
   if (slider("pull", &stiffness, 0.1f, 1000, "%.3g x", ImGuiSliderFlags_Logarithmic))
     stage_->pull.stiffness = stiffness;
-  for (Slider &s : stage_->sliders) slide(s);
+  for (live::Slider &s : stage_->sliders) slide(s);
 }
 
 namespace {
@@ -198,9 +198,9 @@ void App::numbers() {
     }
   }
   if (stage_->pull.holds()) ImGui::Text("pulled with %.3g N", stage_->pull.force());
-  const Grip &grip = stage_->grip;
+  const live::Grip &grip = stage_->grip;
   if (grip.holds() && !replay_) {
-    const Felt felt = grip.felt(size_t(grip.taken()));
+    const live::Felt felt = grip.felt(size_t(grip.taken()));
     const auto text = [](const char *what, render::Vec v, const char *unit) {
       if (render::norm(v) < 0.1) v = v * 1e3;
       else ++unit;  // without its m for milli

@@ -12,7 +12,7 @@ constexpr size_t kMost = 600;  // samples
 
 }  // namespace
 
-Plots::Plots(const Simulation &simulation, const Grip &grip) : simulation_(simulation), grip_(grip) {
+Plots::Plots(const live::Simulation &simulation, const live::Grip &grip) : simulation_(simulation), grip_(grip) {
   plots_.push_back({"energy", "J", {{"kinetic", {}}, {"elastic", {}}}, false, -1});
   const cli::SceneFile &scene = simulation.scene();
   for (uint32_t i = 0; i < scene.settings().nprobe; ++i) {
@@ -57,7 +57,7 @@ void Plots::sample() {
     for (size_t k = 0; k < 3; ++k) row.push_back(at[k] - starts_[3 * i + k]);
   }
   for (size_t i = 0; i < grip_.count(); ++i) {
-    const Felt felt = grip_.felt(i);
+    const live::Felt felt = grip_.felt(i);
     row.insert(row.end(), {felt.force.x, felt.force.y, felt.force.z});
     row.insert(row.end(), {felt.torque.x, felt.torque.y, felt.torque.z});
   }

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "grip.h"
-#include "simulation.h"
+#include "live/grip.h"
+#include "live/simulation.h"
 
 namespace view {
 
@@ -23,15 +23,15 @@ struct Plot {
 
 class Plots {
  public:
-  Plots(const Simulation &simulation, const Grip &grip);
+  Plots(const live::Simulation &simulation, const live::Grip &grip);
   void sample();  // where simulated time has gone on
   void clear();
   const std::vector<Plot> &plots() const { return plots_; }
   const std::vector<double> &times() const { return times_; }
 
  private:
-  const Simulation &simulation_;
-  const Grip &grip_;
+  const live::Simulation &simulation_;
+  const live::Grip &grip_;
   std::vector<Plot> plots_;
   std::vector<double> times_, starts_;  // s; [nprobe,3] m
 };

@@ -32,7 +32,7 @@ bool App::tool_key(const std::string &name) {
   const bool other = std::any_of(std::begin(kOthers), std::end(kOthers), [&](auto *k) { return name == k; });
   if (found == std::end(kWays) && !other) return false;
   if (replay_) return true;
-  Grip &grip = stage_->grip;
+  live::Grip &grip = stage_->grip;
   if (name == "b") {
     ask_for_probe();
   } else if (name == "tab") {
@@ -59,7 +59,7 @@ bool App::tool_key(const std::string &name) {
 
 // Left: in the plane through where it shall go that faces the camera. Right: turns it.
 void App::lead(double dx, double dy) {
-  Grip &grip = stage_->grip;
+  live::Grip &grip = stage_->grip;
   if (!grip.holds()) return;
   const render::View v = render::view_of(orbit_.camera());
   if (held_ == kRight) {
@@ -75,7 +75,7 @@ void App::lead(double dx, double dy) {
 
 // Each move is an act like those of mouse and keys, so that it is recorded.
 void App::lead_by_space_mouse(double now) {
-  Grip &grip = stage_->grip;
+  live::Grip &grip = stage_->grip;
   if (!space_mouse_ || !grip.holds() || replay_) return;
   space_mouse_->lead(grip.pose(), grip.opening(), render::view_of(orbit_.camera()), 0.5 * stage_->size);
   const dfm_device device = space_mouse_->device();
@@ -103,7 +103,7 @@ void App::add_probe() {
   attempt([&] {
     Options more = options_;
     more.from.clear();
-    more.set.push_back("/tools=" + tools_with_probe(stage_->scene, stage_->bodies));
+    more.set.push_back("/tools=" + live::tools_with_probe(stage_->scene, stage_->bodies));
     auto fresh = std::make_unique<Stage>(more, globals_, nullptr);
     fresh->drawing.set_color(stage_->drawing.color());
     stage_ = std::move(fresh);
@@ -119,10 +119,10 @@ void App::add_probe() {
 }
 
 void App::add_tool_arrows(const render::Camera &camera, render::Scene &picture) {
-  const Grip &grip = stage_->grip;
+  const live::Grip &grip = stage_->grip;
   for (std::vector<double> &xyz : felt_) xyz.clear();
   for (size_t i = 0; i < grip.count(); ++i) {
-    const Felt felt = grip.felt(i);
+    const live::Felt felt = grip.felt(i);
     const Vec vectors[2] = {felt.force, felt.torque};
     for (int k = 0; k < 2; ++k) {
       const double length = render::norm(vectors[k]);

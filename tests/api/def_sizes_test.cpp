@@ -29,6 +29,7 @@ void each_default(F f) {
   f(dfm_query_shape_default(), dfm_query_shape_default_sized, 120, "dfm_query_shape_default");
   f(dfm_query_filter_default(), dfm_query_filter_default_sized, 32, "dfm_query_filter_default");
   f(dfm_scene_write_def_default(), dfm_scene_write_def_default_sized, 48, "dfm_scene_write_def_default");
+  f(dfm_stream_def_default(), dfm_stream_def_default_sized, 40, "dfm_stream_def_default");
   f(dfm_vertex_layout_default(), dfm_vertex_layout_default_sized, 56, "dfm_vertex_layout_default");
 }
 

@@ -21,6 +21,7 @@
 #include "deform/rigid.h"
 #include "deform/scene.h"
 #include "deform/sensor.h"
+#include "deform/stream.h"
 #include "deform/surface.h"
 #include "deform/toi.h"
 #include "deform/tool.h"

@@ -52,6 +52,7 @@ DFM_ENDED_WITH(dfm_query_hit, normal)
 DFM_ENDED_WITH(dfm_query_hits, out)
 DFM_ENDED_WITH(dfm_scene_settings, has_camera)
 DFM_ENDED_WITH(dfm_scene_write_def, cookie)
+DFM_ENDED_WITH(dfm_stream_def, cookie)
 DFM_ENDED_WITH(dfm_tool_def, cookie)
 DFM_ENDED_WITH(dfm_tool_state, port_work)
 #undef DFM_ENDED_WITH

@@ -14,6 +14,7 @@
 #define dfm_cut_def_default cut_def_inline
 #define dfm_separate_def_default separate_def_inline
 #define dfm_scene_write_def_default scene_write_def_inline
+#define dfm_stream_def_default stream_def_inline
 #define dfm_context_def_default context_def_inline
 #define dfm_world_def_default world_def_inline
 #define dfm_equilibrium_def_default equilibrium_def_inline
@@ -39,6 +40,7 @@
 #undef dfm_cut_def_default
 #undef dfm_separate_def_default
 #undef dfm_scene_write_def_default
+#undef dfm_stream_def_default
 #undef dfm_context_def_default
 #undef dfm_world_def_default
 #undef dfm_equilibrium_def_default
@@ -79,6 +81,7 @@ DFM_DEFAULT_SYMBOL(dfm_attach_def)
 DFM_DEFAULT_SYMBOL(dfm_cut_def)
 DFM_DEFAULT_SYMBOL(dfm_separate_def)
 DFM_DEFAULT_SYMBOL(dfm_scene_write_def)
+DFM_DEFAULT_SYMBOL(dfm_stream_def)
 DFM_DEFAULT_SYMBOL(dfm_context_def)
 DFM_DEFAULT_SYMBOL(dfm_world_def)
 DFM_DEFAULT_SYMBOL(dfm_equilibrium_def)

@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdarg>
 #include <cstdio>
+#include <cstring>
 #include <functional>
 #include <memory>
 
@@ -189,6 +190,17 @@ inline bool room(size_t size, uint32_t capacity, const void *out, uint32_t *n) {
     fail(DFM_E_ARG, "capacity %u is too small for %u entries; call with capacity 0 to learn the number",
          capacity, count);
   return true;
+}
+
+// A text or buffer whose size the caller queries first.
+inline void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
+  need(bytes, "bytes");
+  const size_t room = *bytes;
+  *bytes = size;
+  if (!to) return;
+  if (room < size)
+    fail(DFM_E_ARG, "the buffer has %zu bytes, %zu are needed; call with NULL to learn the size", room, size);
+  std::memcpy(to, data, size);
 }
 
 // of(x) for each x of a list, by that convention.

@@ -46,17 +46,6 @@ void check_max_time(double seconds) {
     fail(DFM_E_ARG, "max_time is %g s; give the wall time that a step may take, or 0 for no limit", seconds);
 }
 
-// A text or buffer whose size the caller queries first.
-void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
-  need(bytes, "bytes");
-  const size_t room = *bytes;
-  *bytes = size;
-  if (!to) return;
-  if (room < size)
-    fail(DFM_E_ARG, "the buffer has %zu bytes, %zu are needed; call with NULL to learn the size", room, size);
-  std::memcpy(to, data, size);
-}
-
 // Positions are checked only up to a kilometer away, where it could matter.
 double shortest_step(const World &w, double dt) {
   double reach = 1;

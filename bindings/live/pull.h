@@ -5,10 +5,10 @@
 #include <string>
 
 #include "render/geometry.h"
-#include "grip.h"
-#include "simulation.h"
+#include "live/grip.h"
+#include "live/simulation.h"
 
-namespace view {
+namespace live {
 
 class Pull {
  public:
@@ -39,4 +39,4 @@ class Pull {
   render::Vec to_, offset_;  // offset: from the picked place to the mean of the points that the spring holds
 };
 
-}  // namespace view
+}  // namespace live

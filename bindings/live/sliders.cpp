@@ -1,4 +1,4 @@
-#include "sliders.h"
+#include "live/sliders.h"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include "messages.h"
 #include "render/geometry.h"
 
-namespace view {
+namespace live {
 namespace {
 
 void add_gravity(Simulation &simulation, std::vector<Slider> &out) {
@@ -127,4 +127,4 @@ std::vector<Slider> make_sliders(Simulation &simulation) {
   return out;
 }
 
-}  // namespace view
+}  // namespace live

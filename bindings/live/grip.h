@@ -4,9 +4,9 @@
 #include <vector>
 
 #include "render/geometry.h"
-#include "simulation.h"
+#include "live/simulation.h"
 
-namespace view {
+namespace live {
 
 // On a tool in the last step, world axes, the torque about its origin; N, N m.
 struct Felt { render::Vec at, force, torque; };
@@ -57,4 +57,4 @@ class Grip {
 // cli::Failure where there is no body to touch.
 std::string tools_with_probe(const cli::SceneFile &scene, const render::Bounds &bodies);
 
-}  // namespace view
+}  // namespace live

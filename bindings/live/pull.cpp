@@ -1,4 +1,4 @@
-#include "pull.h"
+#include "live/pull.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 
 #include "messages.h"
 
-namespace view {
+namespace live {
 
 using render::Vec;
 
@@ -188,4 +188,4 @@ double Pull::force() const {
   return render::norm(render::vec(f));
 }
 
-}  // namespace view
+}  // namespace live

@@ -1,4 +1,4 @@
-#include "simulation.h"
+#include "live/simulation.h"
 
 #include <chrono>
 
@@ -6,7 +6,7 @@
 #include "state_file.h"
 #include "step_size.h"
 
-namespace view {
+namespace live {
 
 Simulation::Simulation(const cli::SceneFile &scene, double start)
     : scene_(scene), world_(scene.world()), hand_(scene), start_(start) {
@@ -111,4 +111,4 @@ void Simulation::was_set() {
   trouble_.clear();
 }
 
-}  // namespace view
+}  // namespace live

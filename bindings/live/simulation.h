@@ -6,7 +6,7 @@
 
 #include "recording.h"
 
-namespace view {
+namespace live {
 
 class Simulation {
  public:
@@ -51,4 +51,4 @@ class Simulation {
   double step_ms_ = 0;
 };
 
-}  // namespace view
+}  // namespace live

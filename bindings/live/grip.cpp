@@ -1,4 +1,4 @@
-#include "grip.h"
+#include "live/grip.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include "messages.h"
 #include "run.h"
 
-namespace view {
+namespace live {
 
 using render::Vec;
 
@@ -152,4 +152,4 @@ std::string tools_with_probe(const cli::SceneFile &scene, const render::Bounds &
   return cli::json_array(all);
 }
 
-}  // namespace view
+}  // namespace live

@@ -4,9 +4,9 @@
 #include <string>
 #include <vector>
 
-#include "simulation.h"
+#include "live/simulation.h"
 
-namespace view {
+namespace live {
 
 struct Slider {
   std::string name;   // as scripts say it: "mu:upper:floor"
@@ -21,4 +21,4 @@ struct Slider {
 // body whose model takes another one while it runs.
 std::vector<Slider> make_sliders(Simulation &simulation);
 
-}  // namespace view
+}  // namespace live

@@ -1,0 +1,75 @@
+// Serves a page and a stream of messages to browsers on this machine, on a thread of its own. The simulation
+// shows what is new and takes what viewers have sent; it never waits for the network.
+#pragma once
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+struct lws_context;
+struct lws;
+
+namespace serve {
+
+using Bytes = std::vector<unsigned char>;
+
+// A text that the viewer in control has sent.
+struct Request {
+  uint32_t viewer;
+  std::string text;
+};
+
+class Server {
+ public:
+  // Listens on 127.0.0.1; port 0: a free one. Throws cli::Failure.
+  Server(uint16_t port, std::string token);
+  ~Server();
+  Server(const Server &) = delete;
+  uint16_t port() const { return port_; }
+  // whole: for viewers that come later; changed: for those that have all before it, empty: these take the
+  // whole as well.
+  void show_scene(Bytes whole, Bytes changed);
+  void show_frame(Bytes frame);  // a viewer that is slow gets the newest one alone
+  void show_state(std::string json);
+  std::vector<Request> take();
+  uint32_t viewers() const;
+  uint32_t in_control() const;  // number of that viewer; 0: there is none
+
+ private:
+  struct Viewer;
+  struct Call;  // what libwebsockets calls
+  using Message = std::shared_ptr<Bytes>;  // begins with LWS_PRE bytes for the transport
+  struct Change {
+    uint64_t number;
+    Message message;
+  };
+
+  static Message message_of(const void *data, size_t bytes);
+  void wake();
+  void serve();
+  bool allowed(lws *wsi) const;
+  void joins(Viewer &viewer, lws *wsi);
+  void leaves(Viewer &viewer);
+  bool hears(Viewer &viewer, const char *text, size_t n, bool ends);  // false: the viewer is to go
+  bool writes(Viewer &viewer, lws *wsi);
+  Message next_for(Viewer &viewer, bool &text);
+
+  std::string token_;
+  uint16_t port_ = 0;
+  lws_context *context_ = nullptr;
+  std::thread thread_;
+
+  mutable std::mutex mutex_;  // of all below
+  bool stops_ = false;
+  Message scene_, frame_, state_;
+  std::deque<Change> changes_;
+  uint64_t scene_number_ = 0, frame_number_ = 0, state_number_ = 0;
+  std::deque<Request> requests_;
+  std::vector<uint32_t> present_;  // viewers in the order in which they came
+  uint32_t control_ = 0, last_viewer_ = 0;
+};
+
+}  // namespace serve
