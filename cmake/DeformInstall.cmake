@@ -25,11 +25,13 @@ endif()
 if(deform_tools)
   install(TARGETS ${deform_tools} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT command OPTIONAL)
 endif()
-if(TARGET deform_view)
-  set_target_properties(deform_view PROPERTIES INSTALL_RPATH "${deform_cli_rpath}"
-    BUILD_WITH_INSTALL_RPATH ON)
-  install(TARGETS deform_view RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT viewer OPTIONAL)
-endif()
+foreach(viewer view serve)
+  if(TARGET deform_${viewer})
+    set_target_properties(deform_${viewer} PROPERTIES INSTALL_RPATH "${deform_cli_rpath}"
+      BUILD_WITH_INSTALL_RPATH ON)
+    install(TARGETS deform_${viewer} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT ${viewer} OPTIONAL)
+  endif()
+endforeach()
 install(TARGETS deform deform_headers EXPORT deformTargets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)

@@ -6,6 +6,7 @@
 #   libdeform-doc       the pages
 #   deform              the command
 #   deform-view         the window of `deform view`; where it was built
+#   deform-serve        the server of `deform serve`; the same
 #   libdeform-ode       adapter for ODE: library, header, CMake package, .pc
 #   libdeform-bullet    adapter for Bullet, for both of its precisions
 #   python3-deform      the Python package, on the library of libdeform0
@@ -71,9 +72,12 @@ if(TARGET deform_bullet OR TARGET deform_bullet64)
   set(CPACK_DEBIAN_COMMAND_PACKAGE_RECOMMENDS libdeform-bullet)
 endif()
 deform_package(command deform "soft bodies with true friction: the command" "${command_needs}" command)
+if(TARGET deform_serve)
+  deform_package(serve deform-serve "soft bodies with true friction: a scene in a browser" "deform ${same}" serve)
+endif()
 if(TARGET deform_view)
-  deform_package(viewer deform-view "soft bodies with true friction: the window of deform view"
-    "deform ${same}, libglfw3 | libglfw3-wayland" viewer)
+  deform_package(view deform-view "soft bodies with true friction: the window of deform view"
+    "deform ${same}, libglfw3 | libglfw3-wayland" view)
 endif()
 if(CMAKE_INSTALL_LIBDIR STREQUAL "lib")  # where `native` finds the library
   deform_package(python python3-deform "soft bodies with true friction: the Python package"

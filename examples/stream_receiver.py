@@ -1,10 +1,13 @@
 #!/usr/bin/env python3
-"""Receives what `deform serve` streams, with Python's standard library alone: the scene once, then where every
-point of every surface is. It prints a line for each frame, and can write the surfaces as OBJ files. The format
-is described in libdeform/doc/reference/stream.md.
+"""Receives what `deform serve` and `deform run --stream` send, with Python's standard library alone: the
+scene, and then where every point of every surface is. It prints a line for each frame, and can write the
+surfaces as OBJ files. The format: libdeform/doc/reference/stream.md.
 
-    deform serve SCENE             prints a URL
+    deform serve SCENE             prints the URL
     python3 stream_receiver.py URL [--frames N] [--obj FOLDER] [--send '{"do":"run","on":false}']
+or
+    python3 stream_receiver.py rtp://127.0.0.1:5004 [--frames N] [--obj FOLDER]
+    deform run SCENE --stream rtp://127.0.0.1:5004
 """
 import argparse
 import base64
@@ -13,6 +16,7 @@ import os
 import socket
 import struct
 import sys
+import time
 import urllib.parse
 
 
@@ -91,10 +95,73 @@ class Connection:
         self.socket.close()
 
 
-class Body:
-    def __init__(self, name, shape, base, triangles):
-        self.name, self.shape, self.base, self.triangles = name, shape, base, triangles
-        self.x = list(base)
+class RtpConnection:
+    """Datagrams of RTP (RFC 3550) at an address of this machine; their sender gets a report each second."""
+
+    def __init__(self, url, timeout=10):
+        at = urllib.parse.urlsplit(url)
+        family = socket.AF_INET6 if ":" in at.hostname else socket.AF_INET
+        self.socket = socket.socket(family, socket.SOCK_DGRAM)
+        self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
+        self.socket.bind((at.hostname, at.port))
+        self.socket.settimeout(timeout)
+        self.source, self.frame_ends, self.first, self.highest, self.received = None, False, 0, 0, 0
+        self.reported, self.before = time.monotonic(), (0, 0)
+
+    def receive(self):
+        """The payload of the next packet; frame_ends: whether it is the last one of a frame."""
+        while True:
+            data, sender = self.socket.recvfrom(1 << 16)
+            if len(data) < 12 or data[0] >> 6 != 2:
+                continue
+            if 200 <= data[1] <= 204:  # RTCP
+                if b"\x81\xcb" in data[28:30]:
+                    raise ConnectionError("the sender has ended")
+                continue
+            sequence, _, source = struct.unpack_from(">HII", data, 2)
+            if source != self.source:  # another sender, or the same one anew
+                self.source, self.first, self.highest = source, sequence, sequence
+                self.received, self.before = 0, (0, 0)
+            ahead = (sequence - self.highest) & 0xffff
+            if ahead < 0x8000:
+                self.highest += ahead  # counts on past 16 bits
+            self.received += 1
+            self.frame_ends = data[1] >> 7 == 1
+            if time.monotonic() - self.reported > 1:
+                self.report(sender)
+            return data[12:]
+
+    def lost(self):
+        return max(0, self.highest - self.first + 1 - self.received)
+
+    def report(self, sender):
+        expected = self.highest - self.first + 1 - self.before[0]
+        share = max(0, expected - (self.received - self.before[1])) / max(1, expected)
+        self.before, self.reported = (self.before[0] + expected, self.received), time.monotonic()
+        self.socket.sendto(struct.pack(">BBHII", 0x81, 201, 7, 0, self.source)
+                           + struct.pack(">IIIII", int(255 * share) << 24 | min(self.lost(), 0xffffff),
+                                         self.highest & 0xffffffff, 0, 0, 0), sender)
+
+    def close(self):
+        self.socket.close()
+
+
+class Surface:
+    """Of a body or an obstacle; `missing`: values of its base and its triangles that have not come yet."""
+
+    def __init__(self, name, shape, n, m):
+        self.name, self.shape = name, shape
+        self.base, self.triangles = [None] * (3 * n), [None] * (3 * m)
+        self.moved = [0.0] * (3 * n)
+        self.missing = 3 * n + 3 * m
+
+    def put(self, values, first, new):
+        self.missing -= sum(v is None for v in values[3 * first:3 * first + len(new)])
+        values[3 * first:3 * first + len(new)] = new
+
+    @property
+    def x(self):
+        return [b + u for b, u in zip(self.base, self.moved)]
 
 
 class Scene:
@@ -102,7 +169,7 @@ class Scene:
 
     def __init__(self):
         self.bodies, self.things, self.contacts, self.present = {}, {}, [], {}
-        self.time, self.frame = 0.0, -1
+        self.time, self.frame = 0.0, 0
 
     def read(self, message):
         """Packets of one message, one behind the other. Returns whether one of them was of a frame."""
@@ -112,14 +179,17 @@ class Scene:
                                                                                                 message, at)
             if mark != b"DFMS" or version != 1 or size < 32 or at + size > len(message):
                 raise ValueError("this is no packet of dfm.stream 1")
-            if kind == 0 and whole:
+            if kind == 0 and whole and count == 1:
                 self.bodies, self.things = {}, {}
-            if kind == 1:
+            # a packet of a frame that is over has come late: what is there is newer
+            late = kind == 1 and (self.frame - frame) & 0xffffffff in range(1, 1 << 31)
+            if kind == 1 and not late:
                 any_frame = True
                 if frame != self.frame:
                     self.contacts, self.present = [], {}
                 self.frame, self.time = frame, time
-            self.read_chunks(message[at:at + size])
+            if not late:
+                self.read_chunks(message[at:at + size])
             at += size
         return any_frame
 
@@ -134,24 +204,34 @@ class Scene:
             at += 8 + size
 
     @staticmethod
-    def text(data, at, n):
-        return data[at:at + n].decode(), at + (n + 3) // 4 * 4
+    def text(data, at):
+        n, = struct.unpack_from("<I", data, at)
+        return data[at + 4:at + 4 + n].decode("utf-8", "replace")
 
     def read_body(self, data):
-        number, shape, n, m, letters = struct.unpack_from("<5I", data)
-        name, at = self.text(data, 20, letters)
-        base = struct.unpack_from(f"<{3 * n}f", data, at)
-        self.bodies[number] = Body(name, shape, base, struct.unpack_from(f"<{3 * m}I", data, at + 12 * n))
+        number, shape, n, m = struct.unpack_from("<4I", data)
+        if number not in self.bodies or self.bodies[number].shape != shape:  # else it is told again
+            self.bodies[number] = Surface(self.text(data, 16), shape, n, m)
 
     def read_obst(self, data):
-        number, shape, sensor = struct.unpack_from("<3I", data)
-        size = struct.unpack_from("<5f", data, 12)
-        n, m, letters = struct.unpack_from("<3I", data, 32)
-        name, at = self.text(data, 44, letters)
-        self.things[number] = {
-            "name": name, "shape": shape, "sensor": bool(sensor), "radius": size[0], "half_length": size[1],
-            "half_size": size[2:], "points": struct.unpack_from(f"<{3 * n}f", data, at),
-            "triangles": struct.unpack_from(f"<{3 * m}I", data, at + 12 * n), "pose": (0, 0, 0, 0, 0, 0, 1)}
+        number, shape, n, m, sensor = struct.unpack_from("<5I", data)
+        if number in self.things:
+            return
+        thing = self.things[number] = Surface(self.text(data, 40), shape, n, m)
+        thing.sensor, thing.pose = bool(sensor), (0, 0, 0, 0, 0, 0, 1)
+        thing.radius, thing.half_length, *thing.half_size = struct.unpack_from("<5f", data, 20)
+
+    def ranges(self, data, kind, of):
+        number, shape, first, n = struct.unpack_from("<4I", data)
+        surface = self.bodies.get(number) or self.things.get(number)
+        if surface and surface.shape == shape:
+            surface.put(of(surface), first, struct.unpack_from(f"<{3 * n}{kind}", data, 16))
+
+    def read_base(self, data):
+        self.ranges(data, "f", lambda surface: surface.base)
+
+    def read_tris(self, data):
+        self.ranges(data, "I", lambda surface: surface.triangles)
 
     def read_list(self, data):
         self.present.update(struct.iter_unpack("<II", data))
@@ -159,7 +239,7 @@ class Scene:
     def read_pose(self, data):
         for number, *pose in struct.iter_unpack("<I7f", data):
             if number in self.things:
-                self.things[number]["pose"] = tuple(pose)
+                self.things[number].pose = tuple(pose)
 
     def read_surf(self, data):
         number, shape, first, n, floats = struct.unpack_from("<5I", data)
@@ -170,9 +250,9 @@ class Scene:
             moved = struct.unpack_from(f"<{3 * n}f", data, 20)
         else:
             low, step = struct.unpack_from("<3f", data, 20), struct.unpack_from("<3f", data, 32)
-            moved = [low[i % 3] + step[i % 3] * q for i, q in enumerate(struct.unpack_from(f"<{3 * n}H", data, 48))]
-        base = body.base[3 * first:3 * (first + n)]
-        body.x[3 * first:3 * (first + n)] = [b + u for b, u in zip(base, moved)]
+            steps = struct.unpack_from(f"<{3 * n}H", data, 48)
+            moved = [low[i % 3] + step[i % 3] * q for i, q in enumerate(steps)]
+        body.moved[3 * first:3 * (first + n)] = moved
 
     def read_cont(self, data):
         self.contacts += [(row[:3], row[3:6], row[6]) for row in struct.iter_unpack("<6fI", data)]
@@ -181,14 +261,15 @@ class Scene:
         with open(path, "w", encoding="utf-8") as out:
             before = 1
             for number, body in self.bodies.items():
-                if number not in self.present:
+                if number not in self.present or body.missing:
                     continue
                 out.write(f"o {body.name}\n")
-                for i in range(0, len(body.x), 3):
-                    out.write("v %.7g %.7g %.7g\n" % tuple(body.x[i:i + 3]))
+                x = body.x
+                for i in range(0, len(x), 3):
+                    out.write("v %.7g %.7g %.7g\n" % tuple(x[i:i + 3]))
                 for i in range(0, len(body.triangles), 3):
                     out.write("f %d %d %d\n" % tuple(before + k for k in body.triangles[i:i + 3]))
-                before += len(body.x) // 3
+                before += len(x) // 3
 
 
 def main():
@@ -200,17 +281,19 @@ def main():
     given = arguments.parse_args()
     if given.obj:
         os.makedirs(given.obj, exist_ok=True)
-    connection, scene, seen = Connection(given.url), Scene(), 0
+    rtp = given.url.startswith("rtp://")
+    connection, scene, seen = (RtpConnection if rtp else Connection)(given.url, 60), Scene(), 0
     for request in given.send:
         connection.send(json.loads(request))
     while not given.frames or seen < given.frames:
         message = connection.receive()
-        if isinstance(message, str) or not scene.read(message):
+        if isinstance(message, str) or not scene.read(message) or (rtp and not connection.frame_ends):
             continue
         seen += 1
-        points = sum(len(b.x) // 3 for b in scene.bodies.values())
+        points = sum(len(b.base) // 3 for b in scene.bodies.values())
         print(f"frame {scene.frame}, {scene.time:.4f} s: {len(scene.present)} bodies, {points} points, "
-              f"{len(scene.contacts)} contacts, {len(message)} bytes", flush=True)
+              f"{len(scene.contacts)} contacts" + (f", {connection.lost()} packets lost" if rtp else ""),
+              flush=True)
         if given.obj:
             scene.write_obj(os.path.join(given.obj, f"{scene.frame:06d}.obj"))
     connection.close()

@@ -50,9 +50,9 @@ inline constexpr Program kPhantom = {
 inline constexpr Program kRollback = {
     "rollback", "deform-rollback",
     "runs a scene by the collision solution of Zerbato (2010), for comparison"};
-inline constexpr Program kServe = {
-    "serve", "deform-serve", "a scene in a browser on this machine: orbit, pull, cut, sliders, plots",
-    "with Debian's libwebsockets-dev installed, `make tools` builds it"};
+inline constexpr Program kServe = {"serve", "deform-serve",
+                                   "a scene in a browser on this machine: orbit, pull, cut, sliders, plots",
+                                   "with Debian's libwebsockets-dev installed, `make tools` builds it"};
 inline constexpr Program kView = {
     "view", "deform-view", "a window on a scene, with mouse, sliders and plots",
     "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it"};

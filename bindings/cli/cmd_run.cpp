@@ -28,6 +28,7 @@
 #include "planned.h"
 #include "progress.h"
 #include "recording.h"
+#include "rtp.h"
 #include "run_plots.h"
 #include "sensors.h"
 #include "tools.h"
@@ -121,6 +122,10 @@ class Runner {
         comparison_(comparison) {
     if (options.record) recorder_.emplace(scene, options);
     if (options.plot) plots_ = RunPlots::create(scene);
+    if (!options.stream.empty()) {
+      refuse_static(scene, "--stream");
+      stream_.emplace(scene, options.stream);
+    }
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
@@ -138,6 +143,10 @@ class Runner {
     outputs(true);
     mark_ = {wall_seconds(), cpu_seconds()};
     while (!interrupted && !result_.stopped && advance()) outputs(false);
+    if (stream_) {
+      stream_->end();
+      result_.stream = stream_->report();
+    }
     came_back();
     count_time();
     if (frames_) finish_frames();
@@ -408,6 +417,7 @@ class Runner {
     sensors_.add_step();
     tools_.add_step(passed);
     result_.simulated = dfm_world_time(world_);
+    if (stream_) stream_->after_step();
     return true;
   }
 
@@ -508,6 +518,7 @@ class Runner {
   std::unique_ptr<Frames> frames_;
   std::optional<Recorder> recorder_;
   std::unique_ptr<RunPlots> plots_;
+  std::optional<RtpSender> stream_;
   Comparison *comparison_;
   size_t saved_ = 0;                         // of options_.saves, which are in order of time
   static constexpr double kSlowStep = 0.02;  // s; after a longer step the progress is shown at once
@@ -603,6 +614,9 @@ void add_run(Command app, Globals &globals, int *exit_code) {
       .type_name("DIR");
   sub.option("--contact-problems-every", options->every, "beside them every N-th contact problem")
       .type_name("N");
+  sub.option("--stream", options->stream,
+             "send the run, no faster than the clock, as RTP packets (doc/reference/stream.md)")
+      .type_name("rtp://ADDRESS:PORT");
   sub.flag("--record", options->record, "keep every recorded state, for `deform replay`");
   sub.calls([=, &globals] {
     if (options->every > 0 && options->problems.empty())

@@ -485,6 +485,11 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
               static_cast<unsigned long long>(run.steps), run.simulated - run.begun, run.wall,
               double(run.steps) / run.wall, (run.simulated - run.begun) / run.wall);
+  if (run.stream.frames)
+    std::printf("streamed: %llu frames, %llu packets, %.3g MB, %.2g ms a frame; %.0f %% reported as lost\n",
+                static_cast<unsigned long long>(run.stream.frames),
+                static_cast<unsigned long long>(run.stream.packets), 1e-6 * double(run.stream.bytes),
+                1e3 * run.stream.seconds / double(run.stream.frames), 100 * run.stream.lost);
   if (run.pictures)
     std::printf("pictures: %llu, drawn in a further %.3g s, %.2g s each, by %s\n",
                 static_cast<unsigned long long>(run.pictures), run.drawing,

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "crossing.h"
+#include "rtp.h"
 #include "scene_file.h"
 
 namespace cli {
@@ -30,6 +31,7 @@ struct RunOptions {
   bool record = false;     // every recorded state, as a state file
   std::string problems;    // folder for contact problems; empty: none are written
   uint32_t every = 0;      // of them that is written, beside the unsolved ones; 0: none
+  std::string stream;      // "rtp://ADDRESS:PORT"; empty: nowhere
   std::string save_scene;  // where the world of the end is written as a scene; empty: nowhere
   // in place of dfm_world_step(), where another program steps; empty: none does
   std::function<dfm_status(dfm_world, double, uint32_t *)> step;
@@ -62,6 +64,7 @@ struct RunResult {
   // checks
   double start = 0, begun = 0, simulated = 0, wall = 0, cpu = 0;
   StepTimes times;
+  RtpSender::Report stream;  // of --stream
   uint64_t pictures = 0;
   double drawing = 0;    // s, wall time of the pictures
   std::string drawn_by;  // the renderer, as OpenGL names it

@@ -48,15 +48,16 @@ struct Server::Call {
       case LWS_CALLBACK_HTTP: {
         const std::string path = static_cast<const char *>(in);
         const Server &server = of(wsi);
-        const unsigned status = path != "/"             ? HTTP_STATUS_NOT_FOUND
+        const unsigned status = path != "/"            ? HTTP_STATUS_NOT_FOUND
                                 : !server.allowed(wsi) ? HTTP_STATUS_FORBIDDEN
                                                        : HTTP_STATUS_OK;
         if (status != HTTP_STATUS_OK) {
-          if (lws_return_http_status(wsi, status, "deform serve: open the URL that it has printed")) return -1;
+          if (lws_return_http_status(wsi, status, "deform serve: open the URL that it has printed"))
+            return -1;
           return lws_http_transaction_completed(wsi) ? -1 : 0;
         }
-        unsigned char head[LWS_PRE + 1024], *const start = head + LWS_PRE, *p = start,
-                                           *const end = head + sizeof head;
+        unsigned char head[LWS_PRE + 1024], *const start = head + LWS_PRE,
+                                                   *p = start, *const end = head + sizeof head;
         const auto add = [&](const char *name, const char *value) {
           return lws_add_http_header_by_name(wsi, reinterpret_cast<const unsigned char *>(name),
                                              reinterpret_cast<const unsigned char *>(value),
@@ -94,6 +95,7 @@ struct Server::Call {
       case LWS_CALLBACK_ESTABLISHED: of(wsi).joins(*viewer, wsi); return 0;
       case LWS_CALLBACK_CLOSED: of(wsi).leaves(*viewer); return 0;
       case LWS_CALLBACK_RECEIVE: {
+        if (lws_frame_is_binary(wsi)) return -1;  // of text the library checks that it is UTF-8
         const bool ends = lws_is_final_fragment(wsi) && lws_remaining_packet_payload(wsi) == 0;
         return of(wsi).hears(*viewer, static_cast<const char *>(in), n, ends) ? 0 : -1;
       }
@@ -107,10 +109,10 @@ struct Server::Call {
 };
 
 Server::Server(uint16_t port, std::string token) : token_(std::move(token)) {
-  static const lws_protocols protocols[] = {{"http", &Call::page, sizeof(Http), 0, 0, nullptr, 0},
-                                            {"dfm.stream.1", &Call::stream, sizeof(Viewer), kLongestText, 0,
-                                             nullptr, 0},
-                                            {nullptr, nullptr, 0, 0, 0, nullptr, 0}};
+  static const lws_protocols protocols[] = {
+      {"http", &Call::page, sizeof(Http), 0, 0, nullptr, 0},
+      {"dfm.stream.1", &Call::stream, sizeof(Viewer), kLongestText, 0, nullptr, 0},
+      {nullptr, nullptr, 0, 0, 0, nullptr, 0}};
   // a viewer that answers no ping is gone
   static const lws_retry_bo_t patience = {nullptr, 0, 0, 20, 40, 0};
   lws_set_log_level(0, nullptr);
@@ -251,8 +253,10 @@ bool Server::hears(Viewer &viewer, const char *text, size_t n, bool ends) {
   if (!ends) return true;
   const std::string whole(viewer.text, viewer.length);
   viewer.length = 0;
+  std::string bare = whole;
+  std::erase_if(bare, [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; });
   const std::lock_guard lock(mutex_);
-  if (viewer.number && whole == R"({"do":"take"})") control_ = viewer.number;
+  if (viewer.number && bare == R"({"do":"take"})") control_ = viewer.number;
   else if (viewer.number && viewer.number == control_ && requests_.size() < kMostRequests)
     requests_.push_back({viewer.number, whole});
   return true;

@@ -40,7 +40,7 @@ class Server {
 
  private:
   struct Viewer;
-  struct Call;  // what libwebsockets calls
+  struct Call;                             // what libwebsockets calls
   using Message = std::shared_ptr<Bytes>;  // begins with LWS_PRE bytes for the transport
   struct Change {
     uint64_t number;

@@ -44,6 +44,13 @@ std::string text_of(const render::Vec &v) {
   return cli::json_vector(x);
 }
 
+// What a viewer has sent, as it may stand in a sentence: an escaped half of a letter is none.
+std::string plain(std::string text) {
+  for (char &c : text)
+    if (c < ' ' || c > '~') c = '?';
+  return text;
+}
+
 // Four corners.
 std::string blade_of(const cli::JsonValue &line) {
   const std::vector<double> x = line.numbers("blade");
@@ -117,9 +124,10 @@ void Session::ask(const std::string &what, const cli::JsonValue &line) {
     pull_.release();
   } else if (what == "slider") {
     const std::string name = line.get("name");
-    const auto slider = std::find_if(sliders_.begin(), sliders_.end(),
-                                     [&](const live::Slider &s) { return s.name == name; });
-    if (slider == sliders_.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
+    const auto slider =
+        std::find_if(sliders_.begin(), sliders_.end(), [&](const live::Slider &s) { return s.name == name; });
+    if (slider == sliders_.end())
+      throw cli::Failure(cli::kBadInput, "there is no slider \"" + plain(name) + "\"");
     const double value = line.scalar("value");
     if (!(value >= slider->low && value <= slider->high))
       throw cli::Failure(cli::kBadInput, "slider \"" + name + "\": the value is outside of its range");
@@ -143,7 +151,7 @@ void Session::ask(const std::string &what, const cli::JsonValue &line) {
     for (live::Slider &s : sliders_) s.value = s.first;
     wanted_ = 0;
   } else {
-    throw cli::Failure(cli::kBadInput, "\"" + what + "\" is nothing that a viewer can ask for");
+    throw cli::Failure(cli::kBadInput, "\"" + plain(what) + "\" is nothing that a viewer can ask for");
   }
 }
 
@@ -172,43 +180,32 @@ Bytes Session::packets(uint32_t kind, dfm_body body) {
   def.flags = kind == DFM_STREAM_FRAME ? uint32_t{DFM_STREAM_CONTACTS} : 0;
   def.frame = frame_;
   def.body = body;
-  size_t bytes = buffer_.size();
-  // without a buffer it only counts
-  if (dfm_world_stream(scene_.world(), &def, buffer_.data(), &bytes) != DFM_OK || bytes > buffer_.size()) {
-    buffer_.resize(bytes + bytes / 4);  // the size that it needs; some more for the next ones
-    bytes = buffer_.size();
-    cli::need(dfm_world_stream(scene_.world(), &def, buffer_.data(), &bytes));
-  }
-  return Bytes(buffer_.begin(), buffer_.begin() + std::ptrdiff_t(bytes));
+  cli::write_packets(scene_.world(), def, buffer_);
+  return buffer_;
 }
 
-// Bodies whose triangles have changed, alone; viewers that come later get everything.
-void Session::show_scene() {
+// Bodies whose triangles are others than viewers have, alone; viewers that come later get everything.
+void Session::show_scene(std::vector<std::pair<uint32_t, uint32_t>> shapes) {
+  if (shapes == shown_ && !scene_due_) return;
   Bytes changed;
-  bool any = scene_due_;
-  std::map<dfm_body, std::vector<uint32_t>> now;
-  for (size_t i = 0; i < scene_.bodies().size(); ++i) {
-    scene_.renew(i);
-    const cli::BodyView &body = scene_.bodies()[i];
-    const auto before = shown_.find(body.handle);
-    if (before == shown_.end() || before->second != body.triangles) {
-      any = true;
+  for (const auto &shape : shapes) {
+    if (std::find(shown_.begin(), shown_.end(), shape) != shown_.end()) continue;
+    for (const cli::BodyView &body : scene_.bodies()) {
+      if (static_cast<uint32_t>(body.handle) != shape.first) continue;
       const Bytes one = packets(DFM_STREAM_SCENE, body.handle);
       changed.insert(changed.end(), one.begin(), one.end());
     }
-    now[body.handle] = body.triangles;
   }
-  any |= now.size() != shown_.size();
-  shown_ = std::move(now);
-  if (!any) return;
+  shown_ = std::move(shapes);
   server_.show_scene(packets(DFM_STREAM_SCENE), scene_due_ ? Bytes() : std::move(changed));
   scene_due_ = false;
 }
 
 void Session::show() {
-  show_scene();
+  Bytes frame = packets(DFM_STREAM_FRAME);
+  show_scene(cli::shapes_in(frame));
   server_.show_state(state());
-  server_.show_frame(packets(DFM_STREAM_FRAME));
+  server_.show_frame(std::move(frame));
   ++frame_;
 }
 
@@ -216,7 +213,9 @@ std::string Session::state() const {
   std::vector<std::string> sliders, probes;
   for (const live::Slider &s : sliders_) {
     cli::JsonObject one;
-    one.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label)).add("value", cli::number(s.value));
+    one.add("name", cli::quoted(s.name))
+        .add("label", cli::quoted(s.label))
+        .add("value", cli::number(s.value));
     one.add("low", cli::number(s.low)).add("high", cli::number(s.high));
     sliders.push_back(one.add("logarithmic", yes(s.logarithmic)).text());
   }
@@ -224,8 +223,7 @@ std::string Session::state() const {
     const char *name = nullptr;
     double at[3];
     cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
-    probes.push_back(
-        cli::JsonObject().add("name", cli::quoted(name)).add("at", cli::json_vector(at)).text());
+    probes.push_back(cli::JsonObject().add("name", cli::quoted(name)).add("at", cli::json_vector(at)).text());
   }
   double up[3];
   upright_.at(dfm_world_time(scene_.world()), up);

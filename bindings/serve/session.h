@@ -1,10 +1,11 @@
 // A scene that runs for viewers elsewhere: takes what they ask for, steps, and shows the result.
 #pragma once
 #include <chrono>
-#include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "cli/rtp.h"
 #include "cli/upright.h"
 #include "live/pull.h"
 #include "live/sliders.h"
@@ -15,10 +16,10 @@ namespace serve {
 struct Options {
   std::string scene, token;
   std::vector<std::string> set;
-  uint16_t port = 0;     // 0: a free one
-  double rate = 30;      // pictures a second
-  bool paused = false;   // begins so
-  double seconds = 0;    // of the clock, after which it ends; 0: never
+  uint16_t port = 0;    // 0: a free one
+  double rate = 30;     // pictures a second
+  bool paused = false;  // begins so
+  double seconds = 0;   // of the clock, after which it ends; 0: never
 };
 
 class Session {
@@ -33,7 +34,7 @@ class Session {
   void ask(const std::string &what, const cli::JsonValue &line);
   void advance(double seconds);
   void show();
-  void show_scene();
+  void show_scene(std::vector<std::pair<uint32_t, uint32_t>> shapes);
   std::string state() const;
   Bytes packets(uint32_t kind, dfm_body body = 0);
 
@@ -44,7 +45,7 @@ class Session {
   std::vector<live::Slider> sliders_;
   cli::Upright upright_;
   Server server_;
-  std::map<dfm_body, std::vector<uint32_t>> shown_;  // triangles that viewers have
+  std::vector<std::pair<uint32_t, uint32_t>> shown_;  // bodies that viewers have (cli/rtp.h)
   Bytes buffer_;
   bool running_, scene_due_ = true;
   double wanted_ = 0, real_ = 0;  // s; simulated seconds per second, smoothed

@@ -12,7 +12,8 @@ constexpr size_t kMost = 600;  // samples
 
 }  // namespace
 
-Plots::Plots(const live::Simulation &simulation, const live::Grip &grip) : simulation_(simulation), grip_(grip) {
+Plots::Plots(const live::Simulation &simulation, const live::Grip &grip)
+    : simulation_(simulation), grip_(grip) {
   plots_.push_back({"energy", "J", {{"kinetic", {}}, {"elastic", {}}}, false, -1});
   const cli::SceneFile &scene = simulation.scene();
   for (uint32_t i = 0; i < scene.settings().nprobe; ++i) {

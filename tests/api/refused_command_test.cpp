@@ -64,8 +64,8 @@ TEST(RefusedCommand, RunOfAScene_EndsWithASentence) {
 }
 // soak: 19,000 runs, of which those above are a choice
 TEST(RefusedCommand, RunOfAScene_EveryAllocation_EndsWithASentence) {
-  walk("run_all", {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"},
-       0);
+  walk("run_all",
+       {"run", DEFORM_SOURCE_DIR "/examples/scenes/slope_block.json", "--time", "0.002", "--quiet"}, 0);
 }
 // unsanitized: the sanitizer's own operator new must come first
 TEST(RefusedCommand, RunOfRigidBodies_EndsWithASentence) {

@@ -62,7 +62,8 @@ class Browser:
             if self.value(expression):
                 return
             time.sleep(0.05)
-        raise AssertionError(f"{what}: not within {seconds} s ({expression}); {self.value('JSON.stringify(state)')}")
+        state = self.value("JSON.stringify(state)")
+        raise AssertionError(f"{what}: not within {seconds} s ({expression}); {state}")
 
     def mouse(self, kind, x, y, button="left"):
         self.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, button=button, clickCount=1,
@@ -94,24 +95,28 @@ class Browser:
         shutil.rmtree(self.folder, ignore_errors=True)
 
 
-# Where a point of a body is in the page, in pixels.
-PLACE = """((i) => { const b = [...world.bodies.values()][0], a = axes(), p = sub(point(b.x, i), a.eye);
-  const d = -dot(p, a.back) * camera.tan, h = canvas.clientHeight, w = canvas.clientWidth;
-  return [w / 2 + h / 2 * dot(p, a.right) / d, h / 2 - h / 2 * dot(p, a.top) / d]; })"""
+# Where the first body is in the page: left, top, right, bottom, in pixels.
+BOX = """(() => { const b = [...world.bodies.values()][0], a = axes(), h = canvas.clientHeight / 2;
+  const q = [1e9, 1e9, -1e9, -1e9];
+  for (let i = 0; i < b.x.length / 3; i++) {
+    const p = sub(point(b.x, i), a.eye), d = -dot(p, a.back) * camera.tan;
+    const x = canvas.clientWidth / 2 + h * dot(p, a.right) / d, y = h - h * dot(p, a.top) / d;
+    q[0] = Math.min(q[0], x); q[1] = Math.min(q[1], y); q[2] = Math.max(q[2], x); q[3] = Math.max(q[3], y);
+  }
+  return q; })()"""
 
 
 def walk(browser, out):
     picture = lambda name: browser.picture(os.path.join(out, name))
-    browser.wait("typeof world !== 'undefined' && world.bodies.size > 0 && world.frame > 3", "the scene is there")
+    browser.wait("typeof world !== 'undefined' && world.bodies.size > 0 && world.frame > 3", "the scene")
     browser.wait("state.control === me", "this page is in control")
     picture("begin.png")
     browser.click("run")
     browser.wait("state.running === true", "Run runs")
     browser.wait("state.time > 0.05", "time goes on")
     # the middle of what is seen of the body: it is pulled aside, and follows
-    middle = browser.value("(() => { const at = %s, b = [...world.bodies.values()][0], n = b.x.length / 3;"
-                           "let s = [0, 0]; for (let i = 0; i < n; i++) { const q = at(i); s = [s[0] + q[0] / n,"
-                           "s[1] + q[1] / n]; } return s; })()" % PLACE)
+    box = browser.value(BOX)
+    middle = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
     before = browser.value("[...world.bodies.values()][0].x.reduce((a, c) => a + c, 0)")
     browser.drag(middle, (middle[0] + 120, middle[1] - 60), 0.5)
     browser.wait("state.pull && state.pull.force > 0", "the body is pulled")
@@ -137,10 +142,7 @@ def walk(browser, out):
     # a stroke across the body cuts it
     browser.click("cut")
     triangles = browser.value("[...world.bodies.values()][0].triangles.length")
-    middle = browser.value(PLACE + "(0)")
-    box = browser.value("(() => { const at = %s, b = [...world.bodies.values()][0], n = b.x.length / 3; let q = [1e9,"
-                        "1e9, -1e9, -1e9]; for (let i = 0; i < n; i++) { const p = at(i); q = [Math.min(q[0], p[0]),"
-                        "Math.min(q[1], p[1]), Math.max(q[2], p[0]), Math.max(q[3], p[1])]; } return q; })()" % PLACE)
+    box = browser.value(BOX)
     x = (box[0] + box[2]) / 2
     browser.drag((x, box[1] - 30), (x + 4, (box[1] + box[3]) / 2))
     browser.mouse("mouseReleased", x + 4, (box[1] + box[3]) / 2)
@@ -159,7 +161,8 @@ def main():
     serve, scene, out = sys.argv[1:4]
     chromium = sys.argv[4] if len(sys.argv) > 4 else "chromium-headless-shell"
     os.makedirs(out, exist_ok=True)
-    with subprocess.Popen([serve, "serve", scene, "--paused", "--seconds", "120"], stdout=subprocess.PIPE, text=True) as served:
+    with subprocess.Popen([serve, "serve", scene, "--paused", "--seconds", "120"], stdout=subprocess.PIPE,
+                          text=True) as served:
         try:
             browser = Browser(chromium, served.stdout.readline().strip(), (1000, 700))
             try:

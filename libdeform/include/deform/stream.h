@@ -16,8 +16,7 @@ typedef struct dfm_stream_def {
   uint32_t size, flags; /* flags: DFM_STREAM_* */
   uint32_t kind;        /* DFM_STREAM_SCENE or FRAME */
   uint32_t frame;       /* number that the packets carry */
-  /* bytes that no packet of a FRAME exceeds, at least 256; 0: one packet. Each packet can be read without the
-   * others. A SCENE is always one */
+  /* bytes that no packet exceeds, at least 256; 0: one packet. Each packet can be read without the others */
   uint32_t packet;
   uint32_t reserved;
   dfm_body body;   /* of a SCENE: only this body; 0: everything */

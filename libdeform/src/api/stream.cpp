@@ -24,7 +24,8 @@ void dfm_stream_def_default_sized(uint32_t size, dfm_stream_def *out) {
 
 namespace {
 
-constexpr uint32_t kHeader = 32, kChunk = 8, kSurfaceHead = 48;  // bytes
+constexpr uint32_t kHeader = 32, kChunk = 8, kSurfaceHead = 48, kRangeHead = 16;  // bytes
+constexpr uint32_t kLongestName = 100, kThing = 48 + kLongestName;                // bytes of a head, at most
 constexpr uint32_t kLeastPacket = 256;
 constexpr float kSteps = 65535;  // of a range in 16 bits
 
@@ -77,7 +78,6 @@ class Packets {
     bytes_.insert(bytes_.end(), text.begin(), text.end());
     bytes_.resize((bytes_.size() + 3) / 4 * 4);
   }
-  // The triangles of three numbers each.
   void add(std::span<const uint32_t> numbers) {
     const auto *const p = reinterpret_cast<const unsigned char *>(numbers.data());
     bytes_.insert(bytes_.end(), p, p + numbers.size_bytes());
@@ -108,7 +108,7 @@ class Packets {
     add(uint8_t{1});
     add(static_cast<uint8_t>(def_.kind));
     add(static_cast<uint16_t>(def_.kind == DFM_STREAM_SCENE && !def_.body));  // nothing else is in the scene
-    add(uint32_t{0});  // packets of the frame
+    add(uint32_t{0});                                                         // packets of the frame
     add(fragment);
     add(uint32_t{0});  // bytes
     add(def_.frame);
@@ -124,33 +124,56 @@ class Packets {
   size_t chunk_ = 0;
 };
 
+// Three values for each of n points or triangles, over as many chunks as it takes; write(i) adds those of one.
+template <class Write>
+void ranges(const char *tag, uint32_t id, uint32_t shape, uint32_t n, Packets &out, Write write) {
+  constexpr size_t each = 12;
+  for (uint32_t first = 0; first < n;) {
+    if (out.left() < kRangeHead + each) out.next();
+    const size_t fit = (std::min<size_t>(out.left(), 1u << 30) - kRangeHead) / each;
+    const auto last = static_cast<uint32_t>(std::min<size_t>(n, first + fit));
+    out.chunk(tag);
+    for (const uint32_t x : {id, shape, first, last - first}) out.add(x);
+    for (uint32_t i = first; i < last; ++i) write(i);
+    out.end_chunk();
+    first = last;
+  }
+}
+
+void triangles(uint32_t id, uint32_t shape, std::span<const uint32_t> tri, Packets &out) {
+  ranges("TRIS", id, shape, static_cast<uint32_t>(tri.size() / 3), out,
+         [&](uint32_t i) { out.add(tri.subspan(3 * size_t{i}, 3)); });
+}
+
+// Names in a scene are as long as its author likes; a packet has the beginning.
+std::string name_in(const std::string &name) { return name.substr(0, kLongestName); }
+
 void add_body(const Body &b, Packets &out) {
   const Surface &s = b.surface;
+  const uint32_t id = number_of(b.handle), shape = shape_of(b);
+  if (out.left() < kThing) out.next();
   out.chunk("BODY");
-  out.add(number_of(b.handle));
-  out.add(shape_of(b));
-  out.add(s.nsurfel);
-  out.add(s.ntri);
-  out.add(b.name);
-  for (uint32_t i = 0; i < s.nsurfel; ++i) out.add(surfel_vector(b, b.p.x, i) - surfel_displacement(b, i));
-  out.add(std::span(s.tri.data(), 3 * size_t{s.ntri}));
+  for (const uint32_t x : {id, shape, s.nsurfel, s.ntri}) out.add(x);
+  out.add(name_in(b.name));
   out.end_chunk();
+  ranges("BASE", id, shape, s.nsurfel, out,
+         [&](uint32_t i) { out.add(surfel_vector(b, b.p.x, i) - surfel_displacement(b, i)); });
+  triangles(id, shape, {s.tri.data(), 3 * size_t{s.ntri}}, out);
 }
 
 void add_obstacle(const Obstacle &o, Packets &out) {
+  const uint32_t id = number_of(o.handle), n = static_cast<uint32_t>(o.points.size() / 3);
+  if (out.left() < kThing) out.next();
   out.chunk("OBST");
-  out.add(number_of(o.handle));
-  out.add(o.def.shape);
+  for (const uint32_t x : {id, o.def.shape, n, static_cast<uint32_t>(o.triangles.size() / 3)}) out.add(x);
   out.add(uint32_t{o.sensor});
   out.add(static_cast<float>(o.def.radius));
   out.add(static_cast<float>(o.def.half_length));
   out.add(load3(o.def.half_size));
-  out.add(static_cast<uint32_t>(o.points.size() / 3));
-  out.add(static_cast<uint32_t>(o.triangles.size() / 3));
-  out.add(o.name);
-  for (size_t i = 0; i < o.points.size(); i += 3) out.add(load3(&o.points[i]));
-  out.add(std::span(o.triangles.data(), o.triangles.size()));
+  out.add(name_in(o.name));
   out.end_chunk();
+  ranges("BASE", id, o.def.shape, n, out, [&](uint32_t i) { out.add(load3(&o.points[3 * size_t{i}])); });
+  triangles(id, o.def.shape, {o.triangles.data(), o.triangles.size()}, out);
 }
 
 // Displacements of surfels `first` to `last`, in the range that they have.
@@ -204,14 +227,17 @@ void add_surface(const Body &b, uint32_t shape, const dfm_stream_def &d, std::ve
 }
 
 void add_contacts(const World &w, Packets &out) {
-  struct Row { Vec3 point, force; uint32_t sticks; };
+  struct Row {
+    Vec3 point, force;
+    uint32_t sticks;
+  };
   std::vector<Row> rows;
   for (uint32_t i = 0; i < w.report.n; ++i) {
     const double *const f = &w.report.frame[9 * size_t{i}], *const l = &w.report.impulse[3 * size_t{i}];
     if (!(l[0] > 0)) continue;
     const Vec3 impulse = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
-    rows.push_back({load3(w.report.contacts[i].point), (1 / w.report.h) * impulse,
-                    uint32_t{w.report.mode[i] == 1}});
+    rows.push_back(
+        {load3(w.report.contacts[i].point), (1 / w.report.h) * impulse, uint32_t{w.report.mode[i] == 1}});
   }
   for (const RigidContact &c : w.rigid_report.contacts)
     rows.push_back({c.point, (1 / w.rigid_report.h) * c.force(), c.sticks});
@@ -271,9 +297,8 @@ void check(const World &w, const dfm_stream_def &d) {
 dfm_status dfm_world_stream(dfm_world world, const dfm_stream_def *def, void *buffer, size_t *bytes) {
   return as_status([&] {
     const World &w = whole(settled(world_of(world)));
-    dfm_stream_def d = take_def(def, dfm_stream_def_default());
+    const dfm_stream_def d = take_def(def, dfm_stream_def_default());
     check(w, d);
-    if (d.kind == DFM_STREAM_SCENE) d.packet = 0;
     Packets packets(w, d);
     if (d.kind == DFM_STREAM_SCENE) add_scene(w, d, packets);
     else add_frame(w, d, packets);
