@@ -48,6 +48,7 @@ uint64_t (*const signature_world_hash)(dfm_world) = dfm_world_hash;
 dfm_status (*const signature_find_body)(dfm_world, const char *, dfm_body *) = dfm_world_find_body;
 dfm_status (*const signature_positions)(dfm_body, uint32_t, double *, uint32_t *) = dfm_surface_positions;
 dfm_status (*const signature_contacts)(dfm_world, uint32_t, dfm_contact *, uint32_t *) = dfm_world_contacts;
+dfm_status (*const signature_stream)(dfm_world, const dfm_stream_def *, void *, size_t *) = dfm_world_stream;
 dfm_status (*const signature_snapshot)(dfm_world, void *, size_t *) = dfm_world_snapshot;
 dfm_status (*const signature_set_model)(dfm_body, const char *, const dfm_params *) = dfm_body_set_model;
 dfm_status (*const signature_restore)(dfm_world, const void *, size_t) = dfm_world_restore;

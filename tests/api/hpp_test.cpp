@@ -1,5 +1,6 @@
 // deform.hpp: what ends what, errors in both ways, spans and their lengths, callables through the C API, no
 // allocation of its own.
+#include <cstring>
 #include <cmath>
 
 #include <deform/deform.hpp>
@@ -240,6 +241,18 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   s.world.filter_pair("ball", "floor", false);
   s.world.remove_filter("floor", "ball");
   EXPECT_THROW(s.world.remove_filter("floor", "ball"), deform::Error);
+}
+
+TEST(Hpp, Stream_GivesPackets) {
+  const Scene s;
+  deform::StreamDef def;
+  def.kind = DFM_STREAM_SCENE;
+  const auto scene = s.world.stream(def), frame = s.world.stream();
+  EXPECT_EQ(std::memcmp(scene.data(), "DFMS", 4), 0);
+  EXPECT_EQ(std::memcmp(frame.data(), "DFMS", 4), 0);
+  EXPECT_EQ(frame[5], std::byte{DFM_STREAM_FRAME});
+  def.kind = 9;
+  EXPECT_THROW((void)s.world.stream(def), deform::Error);
 }
 
 TEST(Hpp, Snapshot_RestoresTheSameBits) {

@@ -38,6 +38,9 @@ struct RigidDef : dfm_rigid_def {
 struct SceneWriteDef : dfm_scene_write_def {
   SceneWriteDef() noexcept : dfm_scene_write_def(dfm_scene_write_def_default()) {}
 };
+struct StreamDef : dfm_stream_def {
+  StreamDef() noexcept : dfm_stream_def(dfm_stream_def_default()) {}
+};
 struct BodyDef : dfm_body_def {
   BodyDef() noexcept : dfm_body_def(dfm_body_def_default()) {}
   // Borrowed until the body is made: points [n,3], tets [n,4].
