@@ -73,7 +73,8 @@ if(TARGET deform_bullet OR TARGET deform_bullet64)
 endif()
 deform_package(command deform "soft bodies with true friction: the command" "${command_needs}" command)
 if(TARGET deform_serve)
-  deform_package(serve deform-serve "soft bodies with true friction: a scene in a browser" "deform ${same}" serve)
+  deform_package(serve deform-serve "soft bodies with true friction: a scene in a browser" "deform ${same}"
+    serve)
 endif()
 if(TARGET deform_view)
   deform_package(view deform-view "soft bodies with true friction: the window of deform view"

@@ -1,7 +1,7 @@
-// A run as packets of RTP (RFC 3550) to one address: what dfm_world_stream writes, each packet the payload of
-// one datagram. The scene goes round again and again, about once a second, so that who comes late, or has lost
-// a part, is whole after the next round; where a cut changes triangles, a round begins at once.
-// doc/reference/stream.md has the format. A header of 12 bytes and two reports need no library.
+// A run as packets of RTP (RFC 3550) to one address: what dfm_world_stream writes, each packet the payload
+// of one datagram. The scene is sent again about once a second, so that who comes late, or has lost a part,
+// is whole after the next round; where a cut changes triangles, a round begins at once. The format:
+// doc/reference/stream.md.
 #pragma once
 #include <array>
 #include <chrono>

@@ -1,4 +1,4 @@
-/* deform/stream.h -- a scene as packets of bytes, for viewers elsewhere. The format: doc/reference/stream.md. */
+/* deform/stream.h -- a scene as packets of bytes, for viewers elsewhere (format: doc/reference/stream.md). */
 #ifndef DEFORM_STREAM_H
 #define DEFORM_STREAM_H
 #include "deform/base.h"
@@ -6,7 +6,7 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** dfm_stream_def.kind. SCENE: names, triangles and shapes, which a viewer needs once, and again for each body
+/** dfm_stream_def.kind. SCENE: names, triangles and shapes, which a viewer needs once, and again of a body
  * whose triangles have changed. FRAME: where everything is now. */
 enum { DFM_STREAM_SCENE = 0, DFM_STREAM_FRAME = 1 };
 /** dfm_stream_def.flags, of a FRAME. FLOAT32: displacements of surfels as floats, not in 16 bits. CONTACTS:

@@ -124,7 +124,7 @@ class Packets {
   size_t chunk_ = 0;
 };
 
-// Three values for each of n points or triangles, over as many chunks as it takes; write(i) adds those of one.
+// Three values for each of n points or triangles, over as many chunks as it takes; write(i) adds three.
 template <class Write>
 void ranges(const char *tag, uint32_t id, uint32_t shape, uint32_t n, Packets &out, Write write) {
   constexpr size_t each = 12;
