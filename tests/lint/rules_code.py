@@ -24,6 +24,7 @@ THIRD_PARTIES = [
     ("PNG", r"png\.h", r"\bpng_\w+\s*\(", "bindings/render/"),
     ("GLFW", r"GLFW/", r"\bglfw[A-Z]\w*\s*\(", "bindings/view/"),
     ("Dear ImGui", r"(backends/)?imgui", r"\bImGui::", "bindings/view/"),
+    ("libwebsockets", r"libwebsockets\.h", r"\blws_\w+\s*\(", "bindings/serve/"),
     ("CLI11", r"CLI/", r"\bCLI::", "bindings/cli/"),
     ("spdlog", r"spdlog/", r"\bspdlog::", "bindings/cli/"),
     ("HDF5", r"hdf5\.h", r"\bH5[A-Z]\w+\s*\(", "bindings/tools/"),

@@ -15,10 +15,11 @@ BELOW = {
                       "broad", "narrow", "ccd", "plan", "state", "step", "world", "cut", "snapshot", "scene",
                       "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
-    "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "tools", "view", "live", "serve"},
+    "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "tools", "live",
+                 "view", "serve"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
-              "plugin", "gpu", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python", "serve",
-              "contact_problems"},
+              "plugin", "gpu", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python",
+              "serve", "contact_problems"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
 MAX_LINES = 800
