@@ -199,6 +199,27 @@ TEST(Stream, CutBody_HasAnotherShape) {
   EXPECT_EQ(later.present.at(uint32_t(s.lower)), other);
 }
 
+// A linear model counts its displacements from where the body is when it gets it.
+TEST(Stream, BodyThatCountsFromAnotherPlace_HasAnotherShape) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(s.upper, 0, nullptr, nullptr, &n));
+  std::vector<double> x(3 * size_t{n}), still(x.size(), 0.0);
+  test::ok(dfm_body_get_state(s.upper, n, x.data(), nullptr, &n));
+  for (size_t i = 0; i < x.size(); i += 3) x[i] += 0.5;
+  test::ok(dfm_body_set_state(s.upper, n, x.data(), still.data()));
+  Viewer v;
+  v.read(stream(s.world, DFM_STREAM_SCENE));
+  v.read(stream(s.world, DFM_STREAM_FRAME));
+  const uint32_t before = v.present.at(uint32_t(s.upper));
+  test::ok(dfm_body_set_model(s.upper, "linear_fem", nullptr));
+  v.read(stream(s.world, DFM_STREAM_SCENE));
+  v.read(stream(s.world, DFM_STREAM_FRAME));
+  EXPECT_NE(v.present.at(uint32_t(s.upper)), before);
+  v.compare(s.upper);
+}
+
 TEST(Stream, BadCalls_AreRefusedWithASentence) {
   test::Context c;
   const test::Stack s = test::make_stack(c);

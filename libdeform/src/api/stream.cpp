@@ -32,10 +32,12 @@ constexpr float kSteps = 65535;  // of a range in 16 bits
 // The low half of a handle is the place in its table, and the rest says which thing of that place it is.
 uint32_t number_of(uint64_t handle) { return static_cast<uint32_t>(handle); }
 
-// Changes with the triangles of a body, so that displacements are never put on others.
+// Changes with the triangles of a body and with the shape that displacements count from, so that these are
+// never put on another one.
 uint32_t shape_of(const Body &b) {
   Hash hash;
   hash.add(b.handle);
+  hash.add(b.origin.frame);
   for (const uint32_t corner : std::span(b.surface.tri.data(), 3 * size_t{b.surface.ntri}))
     hash.value = (hash.value ^ corner) * 1099511628211ull;  // by numbers: a quarter of the time by bytes
   return static_cast<uint32_t>(hash.value ^ hash.value >> 32);
