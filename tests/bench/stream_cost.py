@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """stream_cost.py BIN: what it costs to show a run: physics alone, pictures drawn here, packets of RTP, a
-browser's stream to one viewer and to eight. Processor time, so that it holds on a busy machine. Tables 7.3 and
-7.4 of Zerbato (2010) compare physics, local and remote drawing in the same way."""
+browser's stream to one viewer and to eight. Processor time, so that it holds on a busy machine. Tables 7.3
+and 7.4 of Zerbato (2010) compare physics, local and remote drawing in the same way."""
 import os
 import resource
 import socket
