@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""served.py BIN: served.png, the page of `deform serve` with the shipped liver, by Chromium without a window."""
+"""served.py BIN: served.png, the page of `deform serve` with the shipped liver, by headless Chromium."""
 import os
 import subprocess
 import sys
