@@ -95,6 +95,15 @@ class Connection:
         self.socket.close()
 
 
+def says_goodbye(data):
+    """Whether one of the packets of RTCP in a datagram ends the stream (RFC 3550, 6.6)."""
+    while len(data) >= 4:
+        if data[1] == 203:
+            return True
+        data = data[4 + 4 * int.from_bytes(data[2:4], "big"):]
+    return False
+
+
 class RtpConnection:
     """Datagrams of RTP (RFC 3550) at an address of this machine; their sender gets a report each second."""
 
@@ -105,21 +114,24 @@ class RtpConnection:
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
         self.socket.bind((at.hostname, at.port))
         self.socket.settimeout(timeout)
-        self.source, self.frame_ends, self.first, self.highest, self.received = None, False, 0, 0, 0
+        self.source, self.anew, self.frame_ends = None, False, False
+        self.first, self.highest, self.received = 0, 0, 0
         self.reported, self.before = time.monotonic(), (0, 0)
 
     def receive(self):
-        """The payload of the next packet; frame_ends: whether it is the last one of a frame."""
+        """The payload of the next packet. frame_ends: whether it is the last one of a frame; anew: whether its
+        sender is another one than before, of another run."""
         while True:
             data, sender = self.socket.recvfrom(1 << 16)
             if len(data) < 12 or data[0] >> 6 != 2:
                 continue
             if 200 <= data[1] <= 204:  # RTCP
-                if b"\x81\xcb" in data[28:30]:
+                if says_goodbye(data):
                     raise ConnectionError("the sender has ended")
                 continue
             sequence, _, source = struct.unpack_from(">HII", data, 2)
-            if source != self.source:  # another sender, or the same one anew
+            self.anew = source != self.source
+            if self.anew:
                 self.source, self.first, self.highest = source, sequence, sequence
                 self.received, self.before = 0, (0, 0)
             ahead = (sequence - self.highest) & 0xffff
@@ -146,11 +158,16 @@ class RtpConnection:
         self.socket.close()
 
 
+def older(frame, other):
+    """Numbers of frames begin again at 2^32."""
+    return 0 < (other - frame) & 0xffffffff < 1 << 31
+
+
 class Surface:
     """Of a body or an obstacle; `missing`: values of its base and its triangles that have not come yet."""
 
-    def __init__(self, name, shape, n, m):
-        self.name, self.shape = name, shape
+    def __init__(self, name, shape, n, m, frame=0):
+        self.name, self.shape, self.frame = name, shape, frame
         self.base, self.triangles = [None] * (3 * n), [None] * (3 * m)
         self.moved = [0.0] * (3 * n)
         self.missing = 3 * n + 3 * m
@@ -169,7 +186,7 @@ class Scene:
 
     def __init__(self):
         self.bodies, self.things, self.contacts, self.present = {}, {}, [], {}
-        self.time, self.frame = 0.0, 0
+        self.time, self.frame, self.told = 0.0, 0, 0
 
     def read(self, message):
         """Packets of one message, one behind the other. Returns whether one of them was of a frame."""
@@ -182,7 +199,8 @@ class Scene:
             if kind == 0 and whole and count == 1:
                 self.bodies, self.things = {}, {}
             # a packet of a frame that is over has come late: what is there is newer
-            late = kind == 1 and (self.frame - frame) & 0xffffffff in range(1, 1 << 31)
+            late = kind == 1 and older(frame, self.frame)
+            self.told = frame
             if kind == 1 and not late:
                 any_frame = True
                 if frame != self.frame:
@@ -210,8 +228,9 @@ class Scene:
 
     def read_body(self, data):
         number, shape, n, m = struct.unpack_from("<4I", data)
-        if number not in self.bodies or self.bodies[number].shape != shape:  # else it is told again
-            self.bodies[number] = Surface(self.text(data, 16), shape, n, m)
+        body = self.bodies.get(number)
+        if body is None or (body.shape != shape and not older(self.told, body.frame)):  # else it is told again
+            self.bodies[number] = Surface(self.text(data, 16), shape, n, m, self.told)
 
     def read_obst(self, data):
         number, shape, n, m, sensor = struct.unpack_from("<5I", data)
@@ -287,6 +306,8 @@ def main():
         connection.send(json.loads(request))
     while not given.frames or seen < given.frames:
         message = connection.receive()
+        if rtp and connection.anew:
+            scene = Scene()
         if isinstance(message, str) or not scene.read(message) or (rtp and not connection.frame_ends):
             continue
         seen += 1

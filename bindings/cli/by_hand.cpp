@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdlib>
 #include <iterator>
+#include <utility>
 
 #include "messages.h"
 
@@ -110,13 +111,14 @@ void ByHand::at(double place[3], double velocity[3]) const {
     return;
   }
   uint32_t n = 0;
+  std::fill_n(place, 3, 0.0);
+  std::fill_n(velocity, 3, 0.0);
   for (const BodyView &b : scene_.bodies()) {
     if (b.handle != drag_.thing) continue;
     std::vector<double> x(3 * size_t(b.nsurfel)), v(x.size());
     need(dfm_surface_positions(b.handle, b.nsurfel, x.data(), &n));
     need(dfm_surface_velocities(b.handle, b.nsurfel, v.data(), &n));
     for (size_t k = 0; k < 3; ++k) {
-      place[k] = velocity[k] = 0;
       for (size_t c = 0; c < 3; ++c) {
         place[k] += drag_.weights[c] * x[3 * size_t(drag_.corners[c]) + k];
         velocity[k] += drag_.weights[c] * v[3 * size_t(drag_.corners[c]) + k];
@@ -180,8 +182,8 @@ void ByHand::act(const JsonValue &line) {
   } else if (what == "move" && body_) {
     need(dfm_body_set_spring_target(body_, spring_, vector(line, "to").data()));
   } else if (what == "release" && body_) {
-    need(dfm_body_remove_spring(body_, spring_));
-    body_ = 0;
+    // over in any case: a cut may have taken its points
+    need(dfm_body_remove_spring(std::exchange(body_, 0), spring_));
   } else if (what == "tool") {
     tools_.lead(line);
   } else if (what == "let") {

@@ -1,11 +1,9 @@
 // deform run SCENE.json: simulates and writes what interfaces promise.
 #include <unistd.h>
 
-#include <csignal>
 #include <ctime>
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cerrno>
 #include <cmath>
@@ -20,6 +18,7 @@
 #include "attachments.h"
 #include "frames.h"
 #include "impulses.h"
+#include "interrupt.h"
 #include "json_text.h"
 #include "leaving.h"
 #include "messages.h"
@@ -37,25 +36,6 @@
 
 namespace cli {
 namespace {
-
-volatile std::sig_atomic_t interrupted = 0;
-std::atomic<dfm_world> stepping{0};  // the world whose step a signal stops
-static_assert(std::atomic<dfm_world>::is_always_lock_free);
-
-void on_signal(int) {
-  interrupted = 1;
-  expect_return();
-  if (const dfm_world world = stepping) dfm_world_interrupt(world);
-}
-
-// The first signal ends the run in order; a second one ends the process as usual.
-void catch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = on_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
 
 std::string seconds(double t) {
   char text[32];
@@ -122,10 +102,6 @@ class Runner {
         comparison_(comparison) {
     if (options.record) recorder_.emplace(scene, options);
     if (options.plot) plots_ = RunPlots::create(scene);
-    if (!options.stream.empty()) {
-      refuse_static(scene, "--stream");
-      stream_.emplace(scene, options.stream);
-    }
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
@@ -138,11 +114,15 @@ class Runner {
     }
     if (!options_.from.empty()) go_on_from(options_.from);
     result_.begun = result_.simulated = dfm_world_time(world_);
+    if (!options_.stream.empty()) {
+      refuse_static(scene_, "--stream");
+      stream_.emplace(scene_, options_.stream);
+    }
     count_overlaps();
     add_unwatched(scene_, result_);
     outputs(true);
     mark_ = {wall_seconds(), cpu_seconds()};
-    while (!interrupted && !result_.stopped && advance()) outputs(false);
+    while (!interrupted() && !result_.stopped && advance()) outputs(false);
     if (stream_) {
       stream_->end();
       result_.stream = stream_->report();
@@ -150,7 +130,7 @@ class Runner {
     came_back();
     count_time();
     if (frames_) finish_frames();
-    if (interrupted) {
+    if (interrupted()) {
       result_.interrupted = true;
       result_.stop_reason = "interrupted by a signal";
     }
@@ -370,11 +350,11 @@ class Runner {
     info.size = sizeof info;
     const double begin = wall_seconds();
     stepping = world_;
-    const dfm_status status = interrupted ? DFM_DISCARD : dfm_world_equilibrium(world_, &def, &info);
+    const dfm_status status = interrupted() ? DFM_DISCARD : dfm_world_equilibrium(world_, &def, &info);
     stepping = 0;
     result_.times.add(wall_seconds() - begin);
     take_swaps();
-    if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the search
+    if (interrupted() && status == DFM_DISCARD) return false;  // the world is as before the search
     if (status != DFM_OK) {
       stop();
       return false;
@@ -397,14 +377,14 @@ class Runner {
     const double begin = wall_seconds();
     uint32_t trouble = 0;
     stepping = world_;
-    const dfm_status status = interrupted     ? DFM_DISCARD
+    const dfm_status status = interrupted()   ? DFM_DISCARD
                               : options_.step ? options_.step(world_, step, &trouble)
                                               : dfm_world_step(world_, step, &trouble);
     stepping = 0;
     last_step_ = wall_seconds() - begin;
     result_.times.add(last_step_);
     take_swaps();
-    if (interrupted && status == DFM_DISCARD) return false;  // the world is as before the step
+    if (interrupted() && status == DFM_DISCARD) return false;  // the world is as before the step
     if (status != DFM_OK) {
       stop();
       return false;

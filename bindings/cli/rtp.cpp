@@ -1,10 +1,13 @@
 #include "rtp.h"
 
 #include <netdb.h>
+#include <poll.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <random>
 #include <thread>
@@ -18,7 +21,8 @@ constexpr uint32_t kRtpHeader = 12, kPayload = 1188;  // bytes: a datagram of 1,
 constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96, kSenderReport = 200, kReceiverReport = 201,
                   kDescription = 202, kGoodbye = 203;
 constexpr double kFrameRate = 30, kSlowest = 5;   // frames a second
-constexpr double kRound = 1, kReports = 5;        // s
+constexpr int kRound = 1000, kPatience = 5;       // ms
+constexpr int kReports = 5;                       // s
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
 constexpr double kTicks = 90000;                  // of the timestamp, in a second
 constexpr double kFrom1900 = 2208988800.0;        // s, to 1970
@@ -32,72 +36,41 @@ void put32(unsigned char *to, uint32_t x) {
   put16(to + 2, x & 0xffff);
 }
 
-uint32_t word_at(const std::vector<unsigned char> &bytes, size_t at) {
-  uint32_t x;
-  std::memcpy(&x, &bytes[at], sizeof x);
-  return x;
-}
-
-// f(begin, size) for each packet.
-template <class F>
-void each_packet(const std::vector<unsigned char> &packets, F f) {
-  for (size_t at = 0; at < packets.size();) {
-    const size_t size = word_at(packets, at + 16);
-    f(at, size);
-    at += size;
-  }
-}
-
+// Connected to the first address of the host to which this machine has a way.
 int open_socket(const std::string &url) {
   const auto refuse = [&](const std::string &why) -> int {
     throw Failure(kBadInput, "--stream " + url + ": " + why);
   };
   const std::string scheme = "rtp://";
   const size_t colon = url.rfind(':');
-  if (url.compare(0, scheme.size(), scheme) != 0 || colon == std::string::npos || colon < scheme.size())
+  if (url.compare(0, scheme.size(), scheme) != 0 || colon < scheme.size())
     return refuse("expected rtp://ADDRESS:PORT");
   std::string host = url.substr(scheme.size(), colon - scheme.size());
   if (host.size() > 1 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
+  const std::string port = url.substr(colon + 1);
+  unsigned number = 0;
+  const auto [end, bad] = std::from_chars(port.data(), port.data() + port.size(), number);
+  if (bad != std::errc() || end != port.data() + port.size() || number == 0 || number > 65535)
+    return refuse("expected a port from 1 to 65535 behind the last colon");
   addrinfo wanted = {}, *found = nullptr;
   wanted.ai_socktype = SOCK_DGRAM;
   wanted.ai_flags = AI_NUMERICSERV;
-  const int error = getaddrinfo(host.c_str(), url.c_str() + colon + 1, &wanted, &found);
+  const int error = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found);
   if (error) return refuse(gai_strerror(error));
-  const int out = socket(found->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-  const bool joined = out >= 0 && connect(out, found->ai_addr, found->ai_addrlen) == 0;
+  std::string why = "no address";
+  int out = -1;
+  for (const addrinfo *at = found; at && out < 0; at = at->ai_next) {
+    out = socket(at->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+    if (out >= 0 && connect(out, at->ai_addr, at->ai_addrlen) == 0) break;
+    why = std::strerror(errno);
+    if (out >= 0) close(out);
+    out = -1;
+  }
   freeaddrinfo(found);
-  if (joined) return out;
-  const std::string why = std::strerror(errno);
-  if (out >= 0) close(out);
-  return refuse(why);
+  return out >= 0 ? out : refuse(why);
 }
 
 }  // namespace
-
-std::vector<std::pair<uint32_t, uint32_t>> shapes_in(const std::vector<unsigned char> &packets) {
-  std::vector<std::pair<uint32_t, uint32_t>> out;
-  each_packet(packets, [&](size_t begin, size_t size) {
-    for (size_t at = begin + 32; at < begin + size;) {
-      const uint32_t bytes = word_at(packets, at + 4);
-      if (std::memcmp(&packets[at], "LIST", 4) == 0)
-        for (size_t i = at + 8; i < at + 8 + bytes; i += 8)
-          out.emplace_back(word_at(packets, i), word_at(packets, i + 4));
-      at += 8 + bytes;
-    }
-  });
-  return out;
-}
-
-void write_packets(dfm_world world, const dfm_stream_def &def, std::vector<unsigned char> &out) {
-  out.resize(std::max<size_t>(out.capacity(), 64));
-  size_t bytes = out.size();
-  if (dfm_world_stream(world, &def, out.data(), &bytes) != DFM_OK) {
-    out.resize(bytes + bytes / 4);  // what it needs; some more for the next ones
-    bytes = out.size();
-    need(dfm_world_stream(world, &def, out.data(), &bytes));
-  }
-  out.resize(bytes);
-}
 
 RtpSender::RtpSender(const SceneFile &scene, const std::string &url)
     : scene_(scene),
@@ -108,27 +81,43 @@ RtpSender::RtpSender(const SceneFile &scene, const std::string &url)
   sequence_ = static_cast<uint16_t>(system());
   source_ = system();
   first_stamp_ = system();
-  began_ = next_frame_ = next_report_ = next_round_ = Clock::now();
+  began_ = last_frame_ = next_frame_ = next_report_ = next_round_ = Clock::now();
 }
 
 RtpSender::~RtpSender() { close(socket_); }
 
-void RtpSender::send(const unsigned char *payload, size_t n, bool marker) {
+uint32_t RtpSender::stamp() const {
+  const double passed = std::chrono::duration<double>(Clock::now() - began_).count();
+  return first_stamp_ + static_cast<uint32_t>(static_cast<uint64_t>(passed * kTicks));
+}
+
+// What the network does not take within a few milliseconds is lost, like what it loses later.
+void RtpSender::send(const unsigned char *payload, size_t n, bool marker, uint32_t stamp) {
   datagram_.resize(kRtpHeader + n);
   unsigned char *const to = datagram_.data();
-  const double passed = std::chrono::duration<double>(Clock::now() - began_).count();
   to[0] = kRtpVersion;
   to[1] = static_cast<unsigned char>(kPayloadType | (marker ? 0x80 : 0));
   put16(to + 2, sequence_++);
-  put32(to + 4, first_stamp_ + static_cast<uint32_t>(static_cast<uint64_t>(passed * kTicks)));
+  put32(to + 4, stamp);
   put32(to + 8, source_);
   std::memcpy(to + kRtpHeader, payload, n);
-  // what the network does not take now is lost, like what it loses later
-  if (::send(socket_, to, datagram_.size(), 0) >= 0) {
-    ++report_.packets;
-    report_.bytes += datagram_.size();
+  ssize_t sent = ::send(socket_, to, datagram_.size(), 0);
+  if (sent < 0 && (errno == EAGAIN || errno == ENOBUFS)) {
+    pollfd room = {socket_, POLLOUT, 0};
+    poll(&room, 1, kPatience);
+    sent = ::send(socket_, to, datagram_.size(), 0);
   }
+  if (sent < 0) return;
+  ++report_.packets;
+  report_.bytes += datagram_.size();
   octets_ += n;
+}
+
+void RtpSender::send_all(const Packets &packets, bool frame) {
+  const uint32_t now = stamp();
+  each_packet(packets, [&](size_t at, size_t size) {
+    send(&packets[at], size, frame && at + size == packets.size(), now);
+  });
 }
 
 void RtpSender::send_frame() {
@@ -137,35 +126,53 @@ void RtpSender::send_frame() {
   def.frame = number_++;
   def.packet = kPayload;
   write_packets(scene_.world(), def, frame_);
-  auto shapes = shapes_in(frame_);
-  if (shapes != shapes_) {
-    shapes_ = std::move(shapes);
-    next_round_ = Clock::now();
-    sent_ = round_.size();
-  }
-  each_packet(frame_, [&](size_t at, size_t size) { send(&frame_[at], size, at + size == frame_.size()); });
+  const Shapes shapes = shapes_in(frame_);
+  if (shapes != shapes_) send_changed(shapes);
+  send_all(frame_, true);
   ++report_.frames;
 }
 
-// Of the round that is on its way, or of the next one where that is due.
-void RtpSender::send_scene(size_t packets) {
+// Bodies whose triangles are others than before, at once; the round has the rest.
+void RtpSender::send_changed(const Shapes &shapes) {
+  for (const auto &shape : shapes) {
+    if (std::find(shapes_.begin(), shapes_.end(), shape) != shapes_.end()) continue;
+    for (const BodyView &body : scene_.bodies()) {
+      if (static_cast<uint32_t>(body.handle) != shape.first) continue;
+      dfm_stream_def def = dfm_stream_def_default();
+      def.kind = DFM_STREAM_SCENE;
+      def.packet = kPayload;
+      def.frame = number_;
+      def.body = body.handle;
+      write_packets(scene_.world(), def, changed_);
+      send_all(changed_, false);
+    }
+  }
+  shapes_ = shapes;
+}
+
+// What these seconds have of a round, which takes half of its time.
+void RtpSender::send_round(double seconds) {
+  const Clock::time_point now = Clock::now();
   if (sent_ == round_.size()) {
-    if (Clock::now() < next_round_) return;
-    next_round_ += std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kRound));
+    if (now < next_round_) return;
+    next_round_ = std::max(now, next_round_ + std::chrono::milliseconds(kRound));
     dfm_stream_def def = dfm_stream_def_default();
     def.kind = DFM_STREAM_SCENE;
     def.packet = kPayload;
+    def.frame = number_;
     write_packets(scene_.world(), def, round_);
     sent_ = 0;
   }
-  for (; packets > 0 && sent_ < round_.size(); --packets) {
+  const double share = std::min(1.0, 2e3 * seconds / kRound);
+  const size_t upto = sent_ + static_cast<size_t>(share * static_cast<double>(round_.size()));
+  while (sent_ < round_.size() && sent_ <= upto) {
     const size_t size = word_at(round_, sent_ + 16);
-    send(&round_[sent_], size, false);
+    send(&round_[sent_], size, false, stamp());
     sent_ += size;
   }
 }
 
-void RtpSender::send_report(bool bye) {
+void RtpSender::send_report(bool ends) {
   unsigned char out[64] = {};
   const double now =
                    std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),
@@ -177,25 +184,23 @@ void RtpSender::send_report(bool bye) {
   put32(out + 8, static_cast<uint32_t>(static_cast<uint64_t>(from)));
   put32(out + 12,
         static_cast<uint32_t>((from - static_cast<double>(static_cast<uint64_t>(from))) * 4294967295.0));
-  put32(out + 16, first_stamp_ + static_cast<uint32_t>(static_cast<uint64_t>(passed * kTicks)));
+  put32(out + 16, stamp());
   put32(out + 20, static_cast<uint32_t>(report_.packets));
   put32(out + 24, static_cast<uint32_t>(octets_));
-  unsigned char *const next = out + 28;
-  next[0] = kRtpVersion | 1;
-  if (bye) {
-    next[1] = kGoodbye;
-    put16(next + 2, 1);
-    put32(next + 4, source_);
-    ::send(socket_, out, 36, 0);
-    return;
-  }
-  next[1] = kDescription;  // one item: a canonical name of six letters
-  put16(next + 2, 4);
-  put32(next + 4, source_);
-  next[8] = 1;
-  next[9] = 6;
-  std::memcpy(next + 10, "deform", 6);
-  ::send(socket_, out, 28 + 20, 0);
+  unsigned char *const name = out + 28;  // one item: a canonical name of six letters
+  name[0] = kRtpVersion | 1;
+  name[1] = kDescription;
+  put16(name + 2, 4);
+  put32(name + 4, source_);
+  name[8] = 1;
+  name[9] = 6;
+  std::memcpy(name + 10, "deform", 6);
+  unsigned char *const goodbye = name + 20;
+  goodbye[0] = kRtpVersion | 1;
+  goodbye[1] = kGoodbye;
+  put16(goodbye + 2, 1);
+  put32(goodbye + 4, source_);
+  ::send(socket_, out, ends ? 56 : 48, 0);
 }
 
 // Reports of the receiver.
@@ -218,20 +223,20 @@ void RtpSender::after_step() {
                 std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval_));
   hear();
   send_frame();
-  // a round takes half of its time
-  send_scene(1 + static_cast<size_t>(2 * interval_ / kRound * double(round_.size()) / kPayload));
+  send_round(std::chrono::duration<double>(now - last_frame_).count());
+  last_frame_ = now;
   if (now >= next_report_) {
     send_report(false);
-    next_report_ = now + std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(kReports));
+    next_report_ = now + std::chrono::seconds(kReports);
   }
   report_.seconds += std::chrono::duration<double>(Clock::now() - now).count();
 }
 
 void RtpSender::end() {
   for (int i = 0; i < 2; ++i) {
+    send_round(kRound);  // what is left of the present one, and another one
     next_round_ = Clock::now();
-    send_scene(SIZE_MAX);  // what is left of the present round
-    send_scene(SIZE_MAX);
+    send_round(kRound);
     send_frame();
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }

@@ -3,21 +3,15 @@
 // is whole after the next round; where a cut changes triangles, a round begins at once. The format:
 // doc/reference/stream.md.
 #pragma once
-#include <array>
 #include <chrono>
 #include <cstdint>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "packets.h"
 #include "scene_file.h"
 
 namespace cli {
-
-// [bodies] number and shape of those in packets of a frame: what tells whether triangles have changed.
-std::vector<std::pair<uint32_t, uint32_t>> shapes_in(const std::vector<unsigned char> &packets);
-// dfm_world_stream into a buffer that grows.
-void write_packets(dfm_world world, const dfm_stream_def &def, std::vector<unsigned char> &out);
 
 class RtpSender {
  public:
@@ -39,9 +33,12 @@ class RtpSender {
  private:
   using Clock = std::chrono::steady_clock;
   void send_frame();
-  void send_scene(size_t packets);
-  void send(const unsigned char *payload, size_t n, bool marker);
-  void send_report(bool bye);
+  void send_changed(const Shapes &shapes);
+  void send_round(double seconds);
+  void send(const unsigned char *payload, size_t n, bool marker, uint32_t stamp);
+  void send_all(const Packets &packets, bool frame);
+  void send_report(bool ends);
+  uint32_t stamp() const;
   void hear();
 
   const SceneFile &scene_;
@@ -50,11 +47,12 @@ class RtpSender {
   uint32_t source_, first_stamp_;
   uint64_t octets_ = 0;
   double begin_;  // s, of the world
-  Clock::time_point began_, next_frame_, next_report_, next_round_;
+  Clock::time_point began_, last_frame_, next_frame_, next_report_, next_round_;
   double interval_;  // s, between frames: longer where packets get lost
-  std::vector<unsigned char> frame_, round_, datagram_;
+  Packets frame_, changed_, round_;
+  std::vector<unsigned char> datagram_;
   size_t sent_ = 0;  // bytes of the round
-  std::vector<std::pair<uint32_t, uint32_t>> shapes_;
+  Shapes shapes_;
   uint32_t number_ = 0;
   Report report_;
 };

@@ -11,12 +11,12 @@ namespace live {
 
 using render::Vec;
 
-namespace {
-
 std::string text_of(const Vec &v) {
   const double x[3] = {v.x, v.y, v.z};
   return cli::json_vector(x);
 }
+
+namespace {
 
 Vec at(const std::vector<double> &xyz, size_t i) { return render::vec(&xyz[3 * i]); }
 
@@ -60,6 +60,15 @@ dfm_query_hit first_hit(const cli::SceneFile &scene, const Vec &origin, const Ve
                             nullptr, &hits));
   return hit;
 }
+// As it is now: cuts and tears change points and triangles, and bring and take bodies. nullptr: it is gone.
+const cli::BodyView *view_of(const cli::SceneFile &scene, dfm_body body) {
+  scene.renew_list();
+  const auto &all = scene.bodies();
+  const auto at = std::ranges::find(all, body, &cli::BodyView::handle);
+  if (at == all.end()) return nullptr;
+  scene.renew(static_cast<size_t>(at - all.begin()));
+  return &*at;
+}
 bool is_body(const dfm_query_hit &hit) { return dfm_handle_kind(hit.thing) == DFM_HANDLE_BODY; }
 
 }  // namespace
@@ -75,8 +84,10 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
   to_ = render::vec(hit.point);
   if (!is_body(hit)) return hit.thing && grab_rigid(scene.name_of(hit.thing));
   rigid_ = 0;
-  for (body_ = 0; scene.bodies()[body_].handle != hit.thing;) ++body_;
-  const cli::BodyView &body = scene.bodies()[body_];
+  const cli::BodyView *const view = view_of(scene, hit.thing);
+  if (!view) return false;
+  const cli::BodyView &body = *view;
+  body_ = hit.thing;
   for (int k = 0; k < 3; ++k) corners_[k] = body.triangles[3 * size_t(hit.triangle) + size_t(k)];
   std::vector<double> x(3 * size_t(std::max(body.npoint, body.nsurfel)));
   uint32_t n = 0;
@@ -173,10 +184,11 @@ Vec Pull::place() const {
     cli::rotate(state.rotation, arm_, arm);
     return render::vec(state.position) + render::vec(arm);
   }
-  const cli::BodyView &body = simulation_.scene().bodies()[body_];
-  std::vector<double> x(3 * size_t(body.nsurfel));
+  const cli::BodyView *const body = view_of(simulation_.scene(), body_);
+  if (!body || std::ranges::max(corners_) >= body->nsurfel) return to_;  // a cut has taken the place
+  std::vector<double> x(3 * size_t(body->nsurfel));
   uint32_t n = 0;
-  cli::need(dfm_surface_positions(body.handle, body.nsurfel, x.data(), &n));
+  cli::need(dfm_surface_positions(body->handle, body->nsurfel, x.data(), &n));
   Vec out;
   for (int k = 0; k < 3; ++k) out = out + at(x, corners_[k]) * weights_[k];
   return out;

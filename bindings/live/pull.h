@@ -10,6 +10,8 @@
 
 namespace live {
 
+std::string text_of(const render::Vec &v);  // as JSON
+
 class Pull {
  public:
   explicit Pull(Simulation &simulation) : simulation_(simulation) {}
@@ -31,7 +33,7 @@ class Pull {
   bool drag(cli::JsonObject &line, double mass);
 
   Simulation &simulation_;
-  size_t body_ = 0;
+  dfm_body body_ = 0;
   dfm_rigid rigid_ = 0;  // 0: it is a body that is held
   double arm_[3] = {0, 0, 0};
   uint32_t corners_[3] = {0, 0, 0};  // surfels of the picked triangle

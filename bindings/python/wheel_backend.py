@@ -151,7 +151,7 @@ def native_files(prefix):
             if path.is_file() and LIBRARIES.fullmatch(inside):
                 yield f"lib/{inside}", path
     for path in sorted((prefix / "bin").glob("deform*")):
-        if path.name != "deform-view":  # which needs a window's libraries
+        if path.name not in ("deform-view", "deform-serve"):  # which need libraries of a window, a network
             yield f"bin/{path.name}", path
     for folder in ("share/deform", "include/deform"):
         for path in sorted((prefix / folder).rglob("*")):

@@ -40,7 +40,8 @@ void add_serve(cli::Command app, cli::Globals &globals, int *) {
   sub.option("--seconds", options->seconds, "of the clock, after which it ends (never)").positive();
   sub.calls([=, &globals] {
     if (*port > 65535) throw cli::Failure(cli::kBadInput, "--port: expected 0 to 65535");
-    if (options->rate > 240) throw cli::Failure(cli::kBadInput, "--rate: expected at most 240");
+    if (!(options->rate >= 1 && options->rate <= 240))
+      throw cli::Failure(cli::kBadInput, "--rate: expected 1 to 240");
     if (options->token.find_first_not_of("0123456789abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ") !=
             std::string::npos ||
         options->token.size() > 64)

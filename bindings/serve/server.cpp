@@ -24,8 +24,10 @@ bool same(const std::string &a, const char *b, size_t n) {
   return differ == 0;
 }
 
+// Empty where it is absent, and "?" where it is longer than any that is allowed.
 std::string header(lws *wsi, lws_token_indexes which) {
   char text[256];
+  if (lws_hdr_total_length(wsi, which) >= static_cast<int>(sizeof text)) return "?";
   return lws_hdr_copy(wsi, text, sizeof text, which) > 0 ? text : "";
 }
 
@@ -45,6 +47,7 @@ struct Server::Call {
 
   static int page(lws *wsi, lws_callback_reasons reason, void *user, void *in, size_t) {
     switch (reason) {
+      case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: return -1;  // a WebSocket names the other protocol
       case LWS_CALLBACK_HTTP: {
         const std::string path = static_cast<const char *>(in);
         const Server &server = of(wsi);
@@ -124,7 +127,8 @@ Server::Server(uint16_t port, std::string token) : token_(std::move(token)) {
   info.user = this;
   info.gid = static_cast<gid_t>(-1);
   info.uid = static_cast<uid_t>(-1);
-  info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND | LWS_SERVER_OPTION_DISABLE_IPV6;
+  info.options = LWS_SERVER_OPTION_FAIL_UPON_UNABLE_TO_BIND | LWS_SERVER_OPTION_DISABLE_IPV6 |
+                 LWS_SERVER_OPTION_VALIDATE_UTF8;
   context_ = lws_create_context(&info);
   lws_vhost *const host = context_ ? lws_get_vhost_by_name(context_, "default") : nullptr;
   const int found = host ? lws_get_vhost_listen_port(host) : -1;
@@ -153,7 +157,10 @@ void Server::serve() {
       const std::lock_guard lock(mutex_);
       if (stops_) return;
     }
-    if (lws_service(context_, 0) < 0) return;
+    if (lws_service(context_, 0) < 0) {
+      const std::lock_guard lock(mutex_);
+      stops_ = true;
+    }
   }
 }
 
@@ -210,6 +217,11 @@ std::vector<Request> Server::take() {
 uint32_t Server::viewers() const {
   const std::lock_guard lock(mutex_);
   return static_cast<uint32_t>(present_.size());
+}
+
+bool Server::works() const {
+  const std::lock_guard lock(mutex_);
+  return !stops_;
 }
 
 uint32_t Server::in_control() const {

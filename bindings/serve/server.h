@@ -35,6 +35,7 @@ class Server {
   void show_frame(Bytes frame);  // a viewer that is slow gets the newest one alone
   void show_state(std::string json);
   std::vector<Request> take();
+  bool works() const;  // false: the network has failed
   uint32_t viewers() const;
   uint32_t in_control() const;  // number of that viewer; 0: there is none
 

@@ -1,67 +1,56 @@
 #include "session.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <thread>
 
+#include "cli/interrupt.h"
 #include "cli/leaving.h"
 #include "cli/messages.h"
+#include "cli/state_file.h"
 
 namespace serve {
 namespace {
 
 constexpr double kBudget = 0.9;  // of the time of a picture, for steps; what is left is for viewers
 
-volatile std::sig_atomic_t ended = 0;
-std::atomic<dfm_world> stepping{0};
+constexpr double kFar = 1e6;  // m, of a viewer's coordinates
 
-void on_signal(int) {
-  ended = 1;
-  cli::expect_return();
-  if (const dfm_world world = stepping) dfm_world_interrupt(world);
-}
-
-void catch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = on_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
-
-render::Vec vector(const cli::JsonValue &line, const char *key) {
+std::string list_of(const cli::JsonValue &line, const char *key, size_t n) {
   const std::vector<double> x = line.numbers(key);
-  if (x.size() != 3 || !std::all_of(x.begin(), x.end(), [](double v) { return std::isfinite(v); }))
-    throw cli::Failure(cli::kBadInput, std::string("expected three finite numbers under \"") + key + "\"");
-  return render::vec(x.data());
-}
-
-std::string text_of(const render::Vec &v) {
-  const double x[3] = {v.x, v.y, v.z};
-  return cli::json_vector(x);
-}
-
-// What a viewer has sent, as it may stand in a sentence: an escaped half of a letter is none.
-std::string plain(std::string text) {
-  for (char &c : text)
-    if (c < ' ' || c > '~') c = '?';
-  return text;
-}
-
-// Four corners.
-std::string blade_of(const cli::JsonValue &line) {
-  const std::vector<double> x = line.numbers("blade");
-  if (x.size() != 12 || !std::all_of(x.begin(), x.end(), [](double v) { return std::isfinite(v); }))
-    throw cli::Failure(cli::kBadInput, "expected twelve finite numbers under \"blade\"");
+  if (x.size() != n || !std::all_of(x.begin(), x.end(), [](double v) { return std::fabs(v) <= kFar; }))
+    throw cli::Failure(cli::kBadInput,
+                       std::string("expected ") + std::to_string(n) + " numbers under \"" + key + "\"");
   std::vector<std::string> out;
   for (const double v : x) out.push_back(cli::number(v));
   return cli::json_array(out);
 }
 
+render::Vec vector(const cli::JsonValue &line, const char *key) {
+  list_of(line, key, 3);
+  return render::vec(line.numbers(key).data());
+}
+
 const char *yes(bool x) { return x ? "true" : "false"; }
+
+// What browsers take as text: names in files, and sentences that cut one, need not be UTF-8.
+std::string as_utf8(std::string text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto byte = [&](size_t k) {
+      return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0;
+    };
+    const unsigned lead = byte(0);
+    const size_t n = lead < 0x80 ? 1 : lead >= 0xc2 && lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+    bool good = lead < 0x80 || (lead >= 0xc2 && lead <= 0xf4);
+    for (size_t k = 1; k < n; ++k) good = good && byte(k) >> 6 == 2;
+    if (n == 3) good = good && (lead > 0xe0 || byte(1) >= 0xa0) && (lead != 0xed || byte(1) < 0xa0);
+    if (n == 4) good = good && (lead > 0xf0 || byte(1) >= 0x90) && (lead < 0xf4 || byte(1) < 0x90);
+    if (!good) text[i] = '?';
+    i += good ? n : 1;
+  }
+  return text;
+}
 
 }  // namespace
 
@@ -73,29 +62,53 @@ Session::Session(const Options &options, const cli::Globals &globals)
       sliders_(live::make_sliders(simulation_)),
       upright_(scene_),
       server_(options.port, options.token),
-      running_(!options.paused) {}
+      running_(!options.paused) {
+  cli::refuse_static(scene_, "serve");
+}
 
 void Session::run() {
-  catch_signals();
-  stepping = scene_.world();
+  cli::catch_signals();
+  cli::stepping = scene_.world();
   std::printf("http://127.0.0.1:%u/?token=%s\n", unsigned{server_.port()}, options_.token.c_str());
   std::fflush(stdout);
   const std::chrono::duration<double> picture(1 / options_.rate);
   const Clock::time_point began = Clock::now();
-  Clock::time_point next = began;
-  while (!ended) {
+  for (Clock::time_point next = began; !cli::interrupted() && server_.works();) {
     for (const Request &request : server_.take()) act(request);
-    if (pull_.holds() && server_.in_control() != holder_) pull_.release();
-    if (running_) advance(picture.count());
-    scene_.renew_list();
-    if (server_.viewers() > 0) show();
+    attempt([&] {
+      if (pull_.holds() && server_.in_control() != holder_) pull_.release();
+      if (running_) advance(picture.count());
+    });
+    attempt([&] {
+      scene_.renew_list();
+      if (server_.viewers() > 0) show();
+    });
     next += std::chrono::duration_cast<Clock::duration>(picture);
     next = std::max(next, Clock::now());
     std::this_thread::sleep_until(next);
     if (options_.seconds > 0 && std::chrono::duration<double>(next - began).count() > options_.seconds) break;
   }
-  stepping = 0;
-  if (ended) cli::came_back();
+  cli::stepping = 0;
+  if (cli::interrupted()) cli::came_back();
+  if (!server_.works()) throw cli::Failure(cli::kStopped, "serve: the network has failed; start it again");
+}
+
+// What fails tells viewers why, and ends a pull; they can go on, or reset.
+void Session::attempt(const std::function<void()> &what) {
+  try {
+    what();
+  } catch (const cli::Failure &e) {
+    message_ = e.what();
+    running_ = false;
+    let_go();
+  }
+}
+
+void Session::let_go() {
+  try {
+    pull_.release();
+  } catch (const cli::Failure &) {  // a cut has taken what was held
+  }
 }
 
 void Session::act(const Request &request) {
@@ -104,17 +117,17 @@ void Session::act(const Request &request) {
   try {
     if (!cli::parse_json(request.text, line) || line.kind != cli::JsonValue::object)
       throw cli::Failure(cli::kBadInput, "a request is an object of JSON");
-    holder_ = request.viewer;
-    ask(line.get("do"), line);
+    ask(line.get("do"), line, request.viewer);
   } catch (const cli::Failure &e) {
     message_ = e.what();
   }
 }
 
 // What a viewer may ask for, with names as in doc/reference/stream.md.
-void Session::ask(const std::string &what, const cli::JsonValue &line) {
+void Session::ask(const std::string &what, const cli::JsonValue &line, uint32_t viewer) {
   if (what == "grab") {
-    pull_.release();
+    let_go();
+    holder_ = viewer;
     const render::Vec along = vector(line, "along");
     if (!(render::norm(along) > 0)) throw cli::Failure(cli::kBadInput, "\"along\" is zero");
     pull_.grab(vector(line, "from"), along);
@@ -126,17 +139,16 @@ void Session::ask(const std::string &what, const cli::JsonValue &line) {
     const std::string name = line.get("name");
     const auto slider =
         std::find_if(sliders_.begin(), sliders_.end(), [&](const live::Slider &s) { return s.name == name; });
-    if (slider == sliders_.end())
-      throw cli::Failure(cli::kBadInput, "there is no slider \"" + plain(name) + "\"");
+    if (slider == sliders_.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
     const double value = line.scalar("value");
     if (!(value >= slider->low && value <= slider->high))
       throw cli::Failure(cli::kBadInput, "slider \"" + name + "\": the value is outside of its range");
     slider->apply(value);
     slider->value = value;
   } else if (what == "cut") {
-    pull_.release();
+    let_go();
     cli::JsonObject cut;
-    simulation_.act(cut.add("do", "\"cut\"").add("blade", blade_of(line)));
+    simulation_.act(cut.add("do", "\"cut\"").add("blade", list_of(line, "blade", 12)));
   } else if (what == "run") {
     running_ = line.get("on") == "true";
     if (running_ && simulation_.at_end()) simulation_.go_on();
@@ -146,12 +158,12 @@ void Session::ask(const std::string &what, const cli::JsonValue &line) {
     if (simulation_.at_end()) simulation_.go_on();
     if (!simulation_.step()) message_ = simulation_.trouble();
   } else if (what == "reset") {
-    pull_.release();
+    let_go();
     simulation_.restart();
     for (live::Slider &s : sliders_) s.value = s.first;
     wanted_ = 0;
   } else {
-    throw cli::Failure(cli::kBadInput, "\"" + plain(what) + "\" is nothing that a viewer can ask for");
+    throw cli::Failure(cli::kBadInput, "\"" + what + "\" is nothing that a viewer can ask for");
   }
 }
 
@@ -160,7 +172,7 @@ void Session::advance(double seconds) {
   const double before = simulation_.time();
   const Clock::time_point began = Clock::now();
   wanted_ += seconds;
-  while (simulation_.time() < wanted_ - 1e-9 && !ended) {
+  while (simulation_.time() < wanted_ - 1e-9 && !cli::interrupted()) {
     if (!simulation_.step()) {
       running_ = false;
       message_ = simulation_.trouble().empty() ? "The scene has ended; run goes on." : simulation_.trouble();
@@ -185,7 +197,7 @@ Bytes Session::packets(uint32_t kind, dfm_body body) {
 }
 
 // Bodies whose triangles are others than viewers have, alone; viewers that come later get everything.
-void Session::show_scene(std::vector<std::pair<uint32_t, uint32_t>> shapes) {
+void Session::show_scene(cli::Shapes shapes) {
   if (shapes == shown_ && !scene_due_) return;
   Bytes changed;
   for (const auto &shape : shapes) {
@@ -245,10 +257,10 @@ std::string Session::state() const {
     out.add("eye", cli::json_vector(settings.eye)).add("look_at", cli::json_vector(settings.look_at));
   if (pull_.holds()) {
     cli::JsonObject pull;
-    pull.add("place", text_of(pull_.place())).add("to", text_of(pull_.to()));
+    pull.add("place", live::text_of(pull_.place())).add("to", live::text_of(pull_.to()));
     out.add("pull", pull.add("force", cli::number(pull_.force())).text());
   }
-  return out.text();
+  return as_utf8(out.text());
 }
 
 }  // namespace serve

@@ -1,11 +1,11 @@
 // A scene that runs for viewers elsewhere: takes what they ask for, steps, and shows the result.
 #pragma once
 #include <chrono>
+#include <functional>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "cli/rtp.h"
+#include "cli/packets.h"
 #include "cli/upright.h"
 #include "live/pull.h"
 #include "live/sliders.h"
@@ -31,10 +31,12 @@ class Session {
  private:
   using Clock = std::chrono::steady_clock;
   void act(const Request &request);
-  void ask(const std::string &what, const cli::JsonValue &line);
+  void ask(const std::string &what, const cli::JsonValue &line, uint32_t viewer);
+  void attempt(const std::function<void()> &what);
+  void let_go();
   void advance(double seconds);
   void show();
-  void show_scene(std::vector<std::pair<uint32_t, uint32_t>> shapes);
+  void show_scene(cli::Shapes shapes);
   std::string state() const;
   Bytes packets(uint32_t kind, dfm_body body = 0);
 
@@ -45,7 +47,7 @@ class Session {
   std::vector<live::Slider> sliders_;
   cli::Upright upright_;
   Server server_;
-  std::vector<std::pair<uint32_t, uint32_t>> shown_;  // bodies that viewers have (cli/rtp.h)
+  cli::Shapes shown_;  // bodies that viewers have
   Bytes buffer_;
   bool running_, scene_due_ = true;
   double wanted_ = 0, real_ = 0;  // s; simulated seconds per second, smoothed

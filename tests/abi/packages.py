@@ -14,7 +14,8 @@ from installed_tree import PROGRAMS, clean_environment, run, without_spaces
 NEEDS = {"libdeform0": ["libc6", "libstdc++6"], "libdeform-dev": ["libdeform0 (="],
          "libdeform-doc": [],
          "deform": ["libdeform0 (="],
-         "deform-view": ["deform (=", "libglfw3"], "libdeform-ode": ["libdeform0 (=", "libode8"],
+         "deform-view": ["deform (=", "libglfw3"], "deform-serve": ["deform (=", "libwebsockets"],
+         "libdeform-ode": ["libdeform0 (=", "libode8"],
          "libdeform-bullet": ["libdeform0 (=", "libbullet"],
          "python3-deform": ["libdeform0 (=", "deform (=", "python3-numpy"],
          "libdeform-cholmod": ["libdeform0 (=", "libcholmod"]}

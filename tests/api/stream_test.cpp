@@ -138,7 +138,7 @@ TEST(Stream, SaysWhatTheLibraryHas_InPacketsOfAnySize) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
   test::run(s.world, 30e-3, 1e-3);
-  for (const uint32_t packet : {0u, 256u, 300u, 1188u, 65536u})
+  for (const uint32_t packet : {0u, 256u, 258u, 259u, 301u, 1188u, 65536u})
     for (const uint32_t flags : {0u, uint32_t{DFM_STREAM_FLOAT32}, uint32_t{DFM_STREAM_CONTACTS}}) {
       SCOPED_TRACE(testing::Message() << "packets of " << packet << ", flags " << flags);
       Viewer v;

@@ -41,12 +41,20 @@ def http(url, target, host=None):
         return s.recv(4096).split(b"\r\n", 1)[0].decode()
 
 
+def blade(dice):
+    """From above through anything, somewhere."""
+    x, y, far = dice.uniform(-0.1, 0.3), dice.uniform(-0.1, 0.3), dice.uniform(-1, 1)
+    return [x, y, -1, x, y, 1, x + far, y + 0.3, 1, x + far, y + 0.3, -1]
+
+
 def malformed(dice):
     """Text of a viewer that means no good, or nothing."""
     request = dice.choice([
-        {"do": "grab", "from": [0, 0, 1], "along": [0, 0, -1]}, {"do": "pull", "to": [0, 0, 0]},
+        {"do": "grab", "from": [dice.uniform(-0.1, 0.3), dice.uniform(-0.1, 0.3), 1], "along": [0, 0, -1]},
+        {"do": "pull", "to": [0, 0, 0]},
         {"do": "release"},
         {"do": "slider", "name": "mu:*:*", "value": 0.3}, {"do": "cut", "blade": [0.0] * 12},
+        {"do": "cut", "blade": blade(dice)}, {"do": "reset"},
         {"do": "run", "on": True},
         {"do": "step"}, {"do": "nothing"}, {"do": "pull", "to": [1e308, -1e308, 1e999]}, [], {}, 7, None])
     text = bytearray(json.dumps(request).encode())
@@ -74,6 +82,8 @@ def main():
         assert refused(url.replace("token=", "token=0")), "another token"
         assert refused(f"http://127.0.0.1:{port}/"), "no token"
         assert refused(url, origin="http://example.org"), "a page of another origin"
+        assert refused(url, origin="http://" + "x" * 300 + ".example.org"), "a long name of it"
+        assert refused(f"http://127.0.0.1:{port}/", protocol=None), "no protocol and no token"
         assert not refused(url, origin=f"http://127.0.0.1:{port}"), "the page itself"
         target = url[url.index("/", 8):]
         assert " 200 " in http(url, target) and " 403 " in http(url, "/?token=x")

@@ -9,7 +9,7 @@ import subprocess
 import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "examples"))
-from stream_receiver import Scene  # noqa: E402
+from stream_receiver import Scene, says_goodbye  # noqa: E402
 
 LOST, DOUBLED, LATE = 0.05, 0.02, 0.05
 
@@ -44,7 +44,7 @@ def main():
     while True:
         data, _ = incoming.recvfrom(1 << 16)
         if 200 <= data[1] <= 204:
-            if b"\x81\xcb" in data[28:30]:  # goodbye
+            if says_goodbye(data):
                 break
             continue
         number = int.from_bytes(data[2:4], "big")

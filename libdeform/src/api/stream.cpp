@@ -43,17 +43,16 @@ uint32_t shape_of(const Body &b) {
   return static_cast<uint32_t>(hash.value ^ hash.value >> 32);
 }
 
-bool seen(const Body &b) { return !b.undone && !b.emptied; }
-
 // Packets of chunks. Where a chunk does not fit into the packet any more, another one begins.
 class Packets {
  public:
-  Packets(const World &w, const dfm_stream_def &d) : def_(d), time_(w.time) { begin(); }
-  // Bytes that a chunk may still have in this packet, payload alone; the packet that is next has room().
-  size_t left() const {
-    return !def_.packet ? SIZE_MAX : def_.packet - std::min<size_t>(def_.packet, size() + kChunk);
+  // Chunks end at multiples of 4.
+  Packets(const World &w, const dfm_stream_def &d) : def_(d), most_(d.packet / 4 * 4), time_(w.time) {
+    begin();
   }
-  size_t room() const { return !def_.packet ? SIZE_MAX : def_.packet - kHeader - kChunk; }
+  // Bytes that a chunk may still have in this packet, payload alone; the packet that is next has room().
+  size_t left() const { return !most_ ? SIZE_MAX : most_ - std::min<size_t>(most_, size() + kChunk); }
+  size_t room() const { return !most_ ? SIZE_MAX : most_ - kHeader - kChunk; }
   void next() {
     end();
     begin();
@@ -102,7 +101,7 @@ class Packets {
 
  private:
   size_t size() const { return bytes_.size() - starts_.back(); }
-  bool fits(size_t more) const { return !def_.packet || size() + more <= def_.packet; }
+  bool fits(size_t more) const { return !most_ || size() + more <= most_; }
   void begin() {
     const auto fragment = static_cast<uint32_t>(starts_.size());
     starts_.push_back(bytes_.size());
@@ -116,10 +115,14 @@ class Packets {
     add(def_.frame);
     add(time_);
   }
-  void end() { put(starts_.back() + 16, static_cast<uint32_t>(size())); }
+  void end() {
+    if (size() > UINT32_MAX) fail(DFM_E_ARG, "stream: a packet has 4 GiB; set dfm_stream_def.packet");
+    put(starts_.back() + 16, static_cast<uint32_t>(size()));
+  }
   void put(size_t at, uint32_t value) { std::memcpy(&bytes_[at], &value, sizeof value); }
 
   const dfm_stream_def &def_;
+  size_t most_;  // bytes of a packet; 0: any
   double time_;
   std::vector<unsigned char> bytes_;
   std::vector<size_t> starts_;
@@ -252,8 +255,7 @@ void add_contacts(const World &w, Packets &out) {
 
 void add_frame(const World &w, const dfm_stream_def &d, Packets &out) {
   std::vector<const Body *> bodies;
-  for (const auto &b : w.bodies)
-    if (seen(*b)) bodies.push_back(b.get());
+  for (const auto &b : w.bodies) bodies.push_back(b.get());
   std::vector<uint32_t> shapes;
   for (const Body *b : bodies) shapes.push_back(shape_of(*b));
   out.rows("LIST", bodies.size(), 8, [&](size_t i) {
@@ -275,7 +277,7 @@ void add_frame(const World &w, const dfm_stream_def &d, Packets &out) {
 
 void add_scene(const World &w, const dfm_stream_def &d, Packets &out) {
   for (const auto &b : w.bodies)
-    if (seen(*b) && (!d.body || b->handle == d.body)) add_body(*b, out);
+    if (!d.body || b->handle == d.body) add_body(*b, out);
   if (d.body) return;
   for (const auto &o : w.obstacles) add_obstacle(*o, out);
 }
@@ -289,8 +291,8 @@ void check(const World &w, const dfm_stream_def &d) {
   if (d.packet != 0 && d.packet < kLeastPacket)
     fail(DFM_E_ARG, "stream: packets of %u bytes; expected at least %u, or 0 for one packet", d.packet,
          kLeastPacket);
-  if (d.body && std::none_of(w.bodies.begin(), w.bodies.end(),
-                             [&](const auto &b) { return b->handle == d.body && seen(*b); }))
+  if (d.body &&
+      std::none_of(w.bodies.begin(), w.bodies.end(), [&](const auto &b) { return b->handle == d.body; }))
     fail(DFM_E_ARG, "stream: 'body' is no body of this world that has cells");
 }
 
