@@ -119,8 +119,8 @@ class RtpConnection:
         self.reported, self.before = time.monotonic(), (0, 0)
 
     def receive(self):
-        """The payload of the next packet. frame_ends: whether it is the last one of a frame; anew: whether its
-        sender is another one than before, of another run."""
+        """The payload of the next packet. frame_ends: whether it is the last one of a frame; anew: whether
+        its sender is another one than before, of another run."""
         while True:
             data, sender = self.socket.recvfrom(1 << 16)
             if len(data) < 12 or data[0] >> 6 != 2:
@@ -229,7 +229,8 @@ class Scene:
     def read_body(self, data):
         number, shape, n, m = struct.unpack_from("<4I", data)
         body = self.bodies.get(number)
-        if body is None or (body.shape != shape and not older(self.told, body.frame)):  # else it is told again
+        # else it is told again, or it comes late
+        if body is None or (body.shape != shape and not older(self.told, body.frame)):
             self.bodies[number] = Surface(self.text(data, 16), shape, n, m, self.told)
 
     def read_obst(self, data):

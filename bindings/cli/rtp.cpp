@@ -176,7 +176,7 @@ void RtpSender::send_report(bool ends) {
   unsigned char out[64] = {};
   const double now =
                    std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count(),
-               passed = std::chrono::duration<double>(Clock::now() - began_).count(), from = now + kFrom1900;
+               from = now + kFrom1900;
   out[0] = kRtpVersion;
   out[1] = kSenderReport;
   put16(out + 2, 6);
