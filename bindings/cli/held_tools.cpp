@@ -85,9 +85,7 @@ void HeldTools::let(const JsonValue &line) {
 
 // False: it is led no more.
 bool HeldTools::walk(Held &held, double now, double h) {
-  dfm_tool_state state = {};
-  state.size = sizeof state;
-  need(dfm_tool_get_state(held.tool, &state));
+  const dfm_tool_state state = got<dfm_tool_state>(dfm_tool_get_state, held.tool);
   dfm_pose from = state.device, start = {}, to = held.to;
   double opening = state.opening, first = 0, last = held.opening;
   double way[3], turn[3];

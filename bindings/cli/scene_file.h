@@ -70,7 +70,6 @@ class SceneFile {
   std::vector<RigidView> rigids_;
   mutable std::map<uint64_t, std::string> names_;
   mutable std::map<uint64_t, uint32_t> numbers_;
-  mutable std::vector<dfm_body> handles_;
 };
 
 }  // namespace cli
