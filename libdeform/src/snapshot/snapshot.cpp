@@ -249,7 +249,7 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
 void put_parameters(const Body &b, ModelInstance &model, const Dynamics &moves,
                     const std::vector<double> &values) {
   if (values == model.params) return;
-  if (model.put_params(values, moves.claims()) != DFM_OK)
+  if (model.put_params(values, moves.abilities().claims) != DFM_OK)
     fail(DFM_E_FORMAT,
          "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it "
          "runs; nothing was restored",

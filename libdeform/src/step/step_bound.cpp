@@ -32,7 +32,7 @@ uint32_t inverted_cells(const Body &b) {
 
 void look_at_shape(Body &b) {
   // points that are updated late are unknown until they are requested
-  b.bound.inverted = b.dynamics->late() ? 0 : inverted_cells(b);
+  b.bound.inverted = b.dynamics->abilities().late ? 0 : inverted_cells(b);
   b.bound.strain_rate = b.slumber.asleep ? 0 : b.dynamics->strain_rate();
 }
 
