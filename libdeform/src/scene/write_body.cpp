@@ -339,14 +339,9 @@ void write_springs(SceneWriter &to, const Body &b, Written &out) {
 void write_attachments(SceneWriter &to, const Body &b, Written &out) {
   for (const Attachment &a : to.w.attachments) {
     if (a.body != b.id || a.released) continue;
-    const Body *const other = [&]() -> const Body * {
-      for (const auto &x : to.w.bodies)
-        if (!a.obstacle && x->id == a.to) return x.get();
-      return nullptr;
-    }();
-    std::string name = other ? other->name : "";
-    for (const auto &o : to.w.obstacles)
-      if (a.obstacle && o->id == a.to) name = o->name;
+    const Body *const other = to.w.body(a.to);
+    const Obstacle *const thing = to.w.obstacle(a.to);
+    const std::string name = other ? other->name : thing ? thing->name : "";
     Written entry;
     entry["to"] = name;
     std::vector<uint32_t> points;

@@ -100,9 +100,7 @@ Written write_tool(SceneWriter &to, const Tool &t) {
   write_opening(t, v, out);
   write_coupling(t, out);
   write_cuts(to, t, out);
-  const auto touched = std::find_if(to.w.obstacles.begin(), to.w.obstacles.end(),
-                                    [&](const auto &o) { return o->id == t.set->obstacle[0]; });
-  to.put_material(out, **touched);
+  to.put_material(out, *to.w.obstacle(t.set->obstacle[0]));
   tell(to, t, v);
   return out;
 }
