@@ -12,11 +12,6 @@
 namespace fs = std::filesystem;
 
 namespace cli {
-namespace {
-
-double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
-}  // namespace
 
 static std::string csv_number(double x) {
   return std::isfinite(x) ? number(x) : std::isnan(x) ? "nan" : x > 0 ? "inf" : "-inf";

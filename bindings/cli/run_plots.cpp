@@ -30,8 +30,6 @@ struct Plot {
   std::vector<Curve> curves;
 };
 
-double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 // Of a linear axis: its ends, and steps of 1, 2 or 5 times a power of ten.
 struct Axis {
   double low, high, from, to, step;  // from, to: pixels
