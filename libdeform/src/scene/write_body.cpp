@@ -353,12 +353,8 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     if (a.flags & DFM_ATTACH_TOUCH) entry["touch"] = true;
     out["attach"].push_back(std::move(entry));
     double away = 0;
-    for (size_t i = 0; i < a.surfels.size(); ++i) {
-      Vec3 x;
-      b.surface.each_phyxel(
-          a.surfels[i], [&](uint32_t p, double weight) { x += weight * load3(&b.p.x[kStride * size_t{p}]); });
-      away = std::max(away, norm(x - attached_place(to.w, a, i)));
-    }
+    for (size_t i = 0; i < a.surfels.size(); ++i)
+      away = std::max(away, norm(b.surface.sum(a.surfels[i], b.p.x.data()) - attached_place(to.w, a, i)));
     if (away > 1e-6 * b.surface.median_edge)
       to.note("body '%s': its attachment to '%s' is stretched by %g m now; in the scene it is at rest there",
               b.name.c_str(), name.c_str(), away);

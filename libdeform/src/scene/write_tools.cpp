@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "scene/keys.h"
+#include "scene/rotation.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
@@ -10,7 +11,7 @@
 namespace dfm::writing {
 namespace {
 
-constexpr double kRadian = 0.017453292519943295;  // of a degree
+using scene::kRadian;
 
 // In degrees, so that the reader gets the same radians where any number gives them.
 double degrees_of(double radians) {

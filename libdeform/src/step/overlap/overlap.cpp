@@ -78,17 +78,12 @@ std::vector<Overlap> find_overlaps(World &w) {
   return out;
 }
 
-double length_of(const Array<double> &points, size_t stride) {
-  Extent box;
-  for (size_t i = 0; i + 2 < points.size(); i += stride) box.add(load3(&points[i]));
-  return norm(box.hi - box.lo);
-}
-
 // A body of centimeters in a mesh of a hundred times its size that it overlaps: one of the two files is in
 // millimeters.
 std::string hint_of_units(const Body &b, const Obstacle *o) {
   if (!o || o->points.empty()) return {};
-  const double own = length_of(b.p.x, kStride), its = length_of(o->points, 3);
+  const double own = extent_of(b.p.x.data(), b.p.n, kStride).diagonal();
+  const double its = extent_of(o->points).diagonal();
   if (!(its > kOtherUnits * own)) return {};
   return format(
       "; '%s' is %.3g m across and '%s' %.3g m: if a mesh is in millimeters, multiply its points by "
