@@ -18,7 +18,6 @@
 
 #include "body/implicit_system.h"
 #include "dynamics/dynamics.h"
-#include "dynamics/relative_work.h"
 #include "dynamics/rest_factor.h"
 #include "dynamics/stiffness.h"
 #include "math/anderson.h"

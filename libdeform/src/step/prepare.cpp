@@ -13,7 +13,6 @@
 #include "body/implicit_system.h"
 #include "body/obstacle_mesh.h"
 #include "core/error.h"
-#include "dynamics/relative_work.h"
 #include "friction/pair_rules.h"
 #include "geometry/voxel_grid.h"
 #include "plan/integrators.h"
