@@ -5,26 +5,14 @@
 #include "messages.h"
 
 namespace cli {
-namespace {
-
-void numbers_of(const BodyView &body, std::vector<uint32_t> &numbers) {
-  uint32_t n = 0;
-  need(dfm_body_attachments(body.handle, 0, nullptr, &n));
-  numbers.resize(n);
-  if (n) need(dfm_body_attachments(body.handle, n, numbers.data(), &n));
-}
-
-}  // namespace
 
 Attachments::Attachments(const SceneFile &scene, const std::string &folder)
     : scene_(scene),
       static_(scene.value("/time/mode") == "\"static\""),
       last_time_(dfm_world_time(scene.world())) {
   bool any = false;
-  for (const BodyView &body : scene.bodies()) {
-    numbers_of(body, numbers_);
-    any = any || !numbers_.empty();
-  }
+  for (const BodyView &body : scene.bodies())
+    any = any || !listed<uint32_t>(dfm_body_attachments, body.handle).empty();
   if (any)
     table_ = std::make_unique<Csv>(folder + "/attachments.csv",
                                    "t,body,attachment,to,x,y,z,force_x,force_y,force_z,moment_x,moment_y,"
@@ -34,18 +22,14 @@ Attachments::Attachments(const SceneFile &scene, const std::string &folder)
 void Attachments::record() {
   if (!table_) return;
   const double t = dfm_world_time(scene_.world());
-  for (const BodyView &body : scene_.bodies()) {
-    numbers_of(body, numbers_);
-    for (const uint32_t number : numbers_) write(t, body, number);
-  }
+  for (const BodyView &body : scene_.bodies())
+    for (const uint32_t number : listed<uint32_t>(dfm_body_attachments, body.handle)) write(t, body, number);
   table_->flush();
   last_time_ = t;
 }
 
 void Attachments::write(double t, const BodyView &body, uint32_t number) {
-  dfm_attachment a{};
-  a.size = sizeof a;
-  need(dfm_body_get_attachment(body.handle, number, &a));
+  const dfm_attachment a = got<dfm_attachment>(dfm_body_get_attachment, body.handle, number);
   std::array<double, 3> &last = last_impulse_[{body.handle, number}];
   double force[3] = {0, 0, 0};
   for (size_t k = 0; k < 3; ++k) {

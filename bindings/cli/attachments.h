@@ -25,7 +25,6 @@ class Attachments {
   const SceneFile &scene_;
   const bool static_;
   std::unique_ptr<Csv> table_;
-  std::vector<uint32_t> numbers_;
   double last_time_;
   std::map<std::pair<uint64_t, uint32_t>, std::array<double, 3>> last_impulse_;  // N s at the last record
 };

@@ -22,9 +22,7 @@ void cross(const double a[3], const double b[3], double out[3]) {
 
 // What an impulse at an arm from the center of mass changes of a rigid body's velocities.
 void strike(dfm_rigid rigid, const double arm[3], const double impulse[3]) {
-  dfm_rigid_def def = {};
-  def.size = sizeof def;
-  need(dfm_rigid_get_def(rigid, &def));
+  const dfm_rigid_def def = got<dfm_rigid_def>(dfm_rigid_get_def, rigid);
   dfm_rigid_state state = {};
   need(dfm_rigid_get_state(rigid, &state));
   const double *const q = state.rotation, back[4] = {-q[0], -q[1], -q[2], q[3]};

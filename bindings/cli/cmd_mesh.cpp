@@ -9,6 +9,7 @@
 
 #include "arguments.h"
 #include "become.h"
+#include "messages.h"
 #include "progress.h"
 
 namespace cli {
@@ -71,16 +72,12 @@ std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
   std::vector<std::string> lost;
   const std::string ending = mesh_ending(out);
   if (s.cells) {
-    dfm_tetmesh_info i = {};
-    i.size = sizeof i;
-    dfm_tetmesh_get_info(s.cells, &i);
+    const dfm_tetmesh_info i = got<dfm_tetmesh_info>(dfm_tetmesh_get_info, s.cells);
     if (i.ngroup && ending == "mesh") lost.push_back("names of groups (Medit stores only their numbers)");
     if (const std::string shares = lost_shares(s.cells, out); !shares.empty()) lost.push_back(shares);
     return lost;
   }
-  dfm_trimesh_info i = {};
-  i.size = sizeof i;
-  dfm_trimesh_get_info(s.surface, &i);
+  const dfm_trimesh_info i = got<dfm_trimesh_info>(dfm_trimesh_get_info, s.surface);
   if (ending == "stl") lost.push_back("digits beyond the first 7 (STL stores single precision)");
   if (i.ngroup && ending == "ply") lost.push_back("names of groups (PLY stores only their numbers)");
   if (i.ngroup && (ending == "stl" || ending == "off"))
@@ -102,9 +99,7 @@ int convert_file(MeshSession &s, const std::string &in, const std::string &out,
                 " is a surface; fill it: deform mesh fill " + shown_word(in) + " --out " + filling_file(out) +
                 ", or convert it to .obj, .ply, .stl, .off, .vtk or .vtu");
   if (s.cells && written_by(out) == Writes::surface) {
-    dfm_tetmesh_info i = {};
-    i.size = sizeof i;
-    dfm_tetmesh_get_info(s.cells, &i);
+    const dfm_tetmesh_info i = got<dfm_tetmesh_info>(dfm_tetmesh_get_info, s.cells);
     lost.push_back(std::to_string(i.ntet) + (i.ntet == 1 ? " tetrahedron" : " tetrahedra") + ", of which ." +
                    mesh_ending(out) + " holds the boundary alone");
     s.cells = 0;

@@ -348,18 +348,7 @@ class Runner {
     def.time = result_.start + duration_ * def.load_to - result_.simulated;
     dfm_equilibrium_info info = {};
     info.size = sizeof info;
-    const double begin = wall_seconds();
-    stepping = world_;
-    const dfm_status status = interrupted() ? DFM_DISCARD : dfm_world_equilibrium(world_, &def, &info);
-    stepping = 0;
-    result_.times.add(wall_seconds() - begin);
-    take_swaps();
-    if (interrupted() && status == DFM_DISCARD) return false;  // the world is as before the search
-    if (status != DFM_OK) {
-      stop();
-      return false;
-    }
-    ++result_.steps;
+    if (!taken([&] { return dfm_world_equilibrium(world_, &def, &info); })) return false;
     result_.load_steps += info.load_steps;
     result_.iterations += info.iterations;
     result_.residual = info.residual;
@@ -368,28 +357,32 @@ class Runner {
     return true;
   }
 
+  // A call that moves the world. False: the run ends here, and the world is as before the call.
+  template <class Call>
+  bool taken(const Call &call) {
+    const double begin = wall_seconds();
+    stepping = world_;
+    const dfm_status status = interrupted() ? DFM_DISCARD : call();
+    stepping = 0;
+    last_step_ = wall_seconds() - begin;
+    result_.times.add(last_step_);
+    for (const dfm_swap &s : listed<dfm_swap>(dfm_world_swaps, world_)) result_.swaps.push_back(s);
+    if (status == DFM_OK) ++result_.steps;
+    else if (!interrupted() || status != DFM_DISCARD) stop();
+    return status == DFM_OK;
+  }
+
   // One step toward the end; false when there.
   bool advance() {
     if (static_) return advance_load();
     double step = next_step(scene_, result_.start, result_.simulated);
     if (comparison_) step = comparison_->prepare(scene_, step);
     if (step <= 0) return false;
-    const double begin = wall_seconds();
     uint32_t trouble = 0;
-    stepping = world_;
-    const dfm_status status = interrupted()   ? DFM_DISCARD
-                              : options_.step ? options_.step(world_, step, &trouble)
-                                              : dfm_world_step(world_, step, &trouble);
-    stepping = 0;
-    last_step_ = wall_seconds() - begin;
-    result_.times.add(last_step_);
-    take_swaps();
-    if (interrupted() && status == DFM_DISCARD) return false;  // the world is as before the step
-    if (status != DFM_OK) {
-      stop();
-      return false;
-    }
-    ++result_.steps;
+    const bool done = taken([&] {
+      return options_.step ? options_.step(world_, step, &trouble) : dfm_world_step(world_, step, &trouble);
+    });
+    if (!done) return false;
     trouble_ |= trouble;
     scene_.renew_list();
     const double passed = dfm_world_time(world_) - result_.simulated;
@@ -399,15 +392,6 @@ class Runner {
     result_.simulated = dfm_world_time(world_);
     if (stream_) stream_->after_step();
     return true;
-  }
-
-  void take_swaps() {
-    uint32_t n = 0;
-    need(dfm_world_swaps(world_, 0, nullptr, &n));
-    if (n == 0) return;
-    const size_t before = result_.swaps.size();
-    result_.swaps.resize(before + n);
-    need(dfm_world_swaps(world_, n, result_.swaps.data() + before, &n));
   }
 
   void stop() {
@@ -465,9 +449,8 @@ class Runner {
   }
 
   void count_overlaps() {
-    need(dfm_world_overlaps(world_, 0, nullptr, &result_.overlaps));
-    std::vector<dfm_overlap> found(result_.overlaps);
-    if (!found.empty()) need(dfm_world_overlaps(world_, result_.overlaps, found.data(), nullptr));
+    const std::vector<dfm_overlap> found = listed<dfm_overlap>(dfm_world_overlaps, world_);
+    result_.overlaps = uint32_t(found.size());
     for (const dfm_overlap &o : found) result_.untangled += (o.flags & DFM_OVERLAP_SEPARATED) != 0;
   }
 

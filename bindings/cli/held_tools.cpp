@@ -31,8 +31,6 @@ void turn_between(const double from[4], const double to[4], double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = s > 0 ? sign * angle * q[k] / s : 0;
 }
 
-double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 // Of a way, in a step of h at that speed at most.
 double share_of(double way, double speed, double h) { return way > speed * h ? speed * h / way : 1; }
 
@@ -85,9 +83,7 @@ void HeldTools::let(const JsonValue &line) {
 
 // False: it is led no more.
 bool HeldTools::walk(Held &held, double now, double h) {
-  dfm_tool_state state = {};
-  state.size = sizeof state;
-  need(dfm_tool_get_state(held.tool, &state));
+  const dfm_tool_state state = got<dfm_tool_state>(dfm_tool_get_state, held.tool);
   dfm_pose from = state.device, start = {}, to = held.to;
   double opening = state.opening, first = 0, last = held.opening;
   double way[3], turn[3];
@@ -97,8 +93,8 @@ bool HeldTools::walk(Held &held, double now, double h) {
     need(dfm_tool_keys_at(held.tool, now + h, &to, &last));
     for (int k = 0; k < 3; ++k) way[k] = from.position[k] - start.position[k];
     turn_between(start.rotation, from.rotation, turn);
-    const double left = 1 - share_of(length(way), held.speed, h);
-    const double left_turn = 1 - share_of(length(turn), kTurning, h);
+    const double left = 1 - share_of(norm(way), held.speed, h);
+    const double left_turn = 1 - share_of(norm(turn), kTurning, h);
     const double left_open = 1 - share_of(std::abs(opening - first), kOpening, h);
     if (left <= 0 && left_turn <= 0 && left_open <= 0) {
       need(dfm_tool_follow_keys(held.tool));
@@ -114,8 +110,8 @@ bool HeldTools::walk(Held &held, double now, double h) {
     const double lag = 1 - std::exp(-h / kLag);
     for (int k = 0; k < 3; ++k) way[k] = to.position[k] - from.position[k];
     turn_between(from.rotation, to.rotation, turn);
-    const double share = std::min(lag, share_of(length(way), held.speed, h));
-    const double turning = std::min(lag, share_of(length(turn), kTurning, h));
+    const double share = std::min(lag, share_of(norm(way), held.speed, h));
+    const double turning = std::min(lag, share_of(norm(turn), kTurning, h));
     for (int k = 0; k < 3; ++k) {
       to.position[k] = from.position[k] + share * way[k];
       turn[k] *= turning;

@@ -44,13 +44,8 @@ double LargestInWindow::value() const {
 double peak_window(const SceneFile &scene) { return std::max(kWindow, longest_step(scene)); }
 
 void Impulses::add_step(double step) {
-  uint32_t n = 0;
-  need(dfm_world_pair_impulses(scene_.world(), 0, nullptr, &n));
-  if (n == 0) return;
-  step_.resize(n);
-  need(dfm_world_pair_impulses(scene_.world(), n, step_.data(), &n));
   const double begin = dfm_world_time(scene_.world()) - step;
-  for (const dfm_pair_impulse &p : step_) {
+  for (const dfm_pair_impulse &p : listed<dfm_pair_impulse>(dfm_world_pair_impulses, scene_.world())) {
     Sum &sum = sums_.try_emplace({p.a, p.b}, Sum{0, LargestInWindow(window_)}).first->second;
     sum.normal += p.normal_impulse;
     constexpr size_t parts = std::size(dfm_pair_impulse{}.part);

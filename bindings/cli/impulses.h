@@ -44,7 +44,6 @@ class Impulses {
   const SceneFile &scene_;
   double window_;
   std::map<std::pair<uint64_t, uint64_t>, Sum> sums_;
-  std::vector<dfm_pair_impulse> step_;
 };
 
 // s: 5 ms, or the longest step that the scene allows, if that is longer.

@@ -20,6 +20,23 @@ inline void need(dfm_status status) {
   if (status < 0) throw Failure(kBadInput, dfm_last_error());
 }
 
+// What a function of the library writes into a struct of its caller, and the rows of a list.
+template <class T, class Get, class... Of>
+T got(Get get, Of... of) {
+  T out{};
+  out.size = sizeof out;
+  need(get(of..., &out));
+  return out;
+}
+template <class T, class List, class... Of>
+std::vector<T> listed(List list, Of... of) {
+  uint32_t n = 0;
+  need(list(of..., 0, nullptr, &n));
+  std::vector<T> out(n);
+  if (n > 0) need(list(of..., n, out.data(), &n));
+  return out;
+}
+
 void warn(const std::string &sentence);          // to stderr, and kept for the summary
 void keep_warning(const std::string &sentence);  // for the summary only
 const std::vector<std::string> &warnings();

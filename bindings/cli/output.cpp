@@ -12,11 +12,6 @@
 namespace fs = std::filesystem;
 
 namespace cli {
-namespace {
-
-double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
-}  // namespace
 
 static std::string csv_number(double x) {
   return std::isfinite(x) ? number(x) : std::isnan(x) ? "nan" : x > 0 ? "inf" : "-inf";
@@ -121,13 +116,7 @@ void Outputs::write_bodies(double t) {
 }
 
 void Outputs::write_contacts(double t) {
-  uint32_t n = 0;
-  need(dfm_world_pairs(scene_.world(), 0, nullptr, &n));
-  pairs_.resize(n);
-  for (dfm_pair_report &p : pairs_) p.size = sizeof p;
-  if (n > 0) need(dfm_world_pairs(scene_.world(), n, pairs_.data(), &n));
-  for (uint32_t i = 0; i < n; ++i) {
-    const dfm_pair_report &p = pairs_[i];
+  for (const dfm_pair_report &p : listed<dfm_pair_report>(dfm_world_pairs, scene_.world())) {
     contacts_->cell(t).cell(scene_.name_of(p.a)).cell(scene_.name_of(p.b));
     contacts_->cell(std::to_string(p.count)).cell(std::to_string(p.sticking));
     contacts_->cell(p.normal)
@@ -191,9 +180,7 @@ FileNodes Outputs::file_nodes(size_t b) const {
   const uint32_t *file_point = nullptr;
   if (surface) {
     out.surface = scene_.value(key + "/surface/mesh").empty() && scene_.value(key + "/surface/from").empty();
-    dfm_trimesh_info info = {};
-    info.size = sizeof info;
-    need(dfm_trimesh_get_info(surface, &info));
+    const dfm_trimesh_info info = got<dfm_trimesh_info>(dfm_trimesh_get_info, surface);
     out.number.resize(out.surface ? info.npoint : body.npoint);
     for (uint32_t i = 0; i < out.number.size(); ++i) out.number[i] = i;
     need(dfm_trimesh_data(surface, nullptr, nullptr, &file_point));
@@ -212,14 +199,10 @@ FileNodes Outputs::file_nodes(size_t b) const {
 std::vector<double> Outputs::node_displacements(const FileNodes &nodes) {
   std::vector<double> out(3 * nodes.number.size(), std::numeric_limits<double>::quiet_NaN());
   uint32_t n = 0;
-  std::vector<dfm_body> bodies{nodes.body};
-  need(dfm_body_pieces(nodes.body, 0, nullptr, &n));
-  bodies.resize(1 + n);
-  if (n > 0) need(dfm_body_pieces(nodes.body, n, bodies.data() + 1, &n));
+  std::vector<dfm_body> bodies = listed<dfm_body>(dfm_body_pieces, nodes.body);
+  bodies.insert(bodies.begin(), nodes.body);
   for (const dfm_body body : bodies) {
-    dfm_body_info info = {};
-    info.size = sizeof info;
-    need(dfm_body_get_info(body, &info));
+    const dfm_body_info info = got<dfm_body_info>(dfm_body_get_info, body);
     if (info.ntet == 0) continue;
     const uint32_t points = nodes.surface ? info.nsurfel : info.npoint;
     std::vector<double> u(3 * size_t(points));

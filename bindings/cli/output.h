@@ -65,7 +65,6 @@ class Outputs {
   double last_time_ = 0;
   std::map<uint64_t, std::array<double, 3>> last_impulse_;  // N s at the last record, by handle
   std::vector<FileNodes> nodes_;                            // of each body, where the scene asks for them
-  std::vector<dfm_pair_report> pairs_;
 };
 
 }  // namespace cli

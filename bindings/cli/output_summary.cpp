@@ -37,23 +37,17 @@ double StepTimes::quantile(double q) const {
 }
 
 dfm_world_stats world_stats(const SceneFile &scene) {
-  dfm_world_stats stats = {};
-  stats.size = sizeof stats;
-  need(dfm_world_get_stats(scene.world(), &stats));
+  const dfm_world_stats stats = got<dfm_world_stats>(dfm_world_get_stats, scene.world());
   return stats;
 }
 
 dfm_body_measure body_measure(const BodyView &body) {
-  dfm_body_measure m = {};
-  m.size = sizeof m;
-  need(dfm_body_get_measure(body.handle, &m));
+  const dfm_body_measure m = got<dfm_body_measure>(dfm_body_get_measure, body.handle);
   return m;
 }
 
 dfm_body_measure rigid_measure(const RigidView &rigid) {
-  dfm_body_measure m = {};
-  m.size = sizeof m;
-  need(dfm_rigid_get_measure(rigid.handle, &m));
+  const dfm_body_measure m = got<dfm_body_measure>(dfm_rigid_get_measure, rigid.handle);
   return m;
 }
 
@@ -79,17 +73,10 @@ Checker::Checker(const SceneFile &scene) : scene_(scene), positions_(scene.bodie
 // Pairs of surfaces that are attached and do not touch: their common border coincides.
 std::vector<std::array<uint32_t, 2>> Checker::joined() const {
   std::vector<std::array<uint32_t, 2>> out;
-  std::vector<uint32_t> numbers;
   for (uint32_t b = 0; b < positions_.size(); ++b) {
     const dfm_body body = scene_.bodies()[b].handle;
-    uint32_t n = 0;
-    need(dfm_body_attachments(body, 0, nullptr, &n));
-    numbers.resize(n);
-    if (n > 0) need(dfm_body_attachments(body, n, numbers.data(), &n));
-    for (const uint32_t number : numbers) {
-      dfm_attachment a = {};
-      a.size = sizeof a;
-      need(dfm_body_get_attachment(body, number, &a));
+    for (const uint32_t number : listed<uint32_t>(dfm_body_attachments, body)) {
+      const dfm_attachment a = got<dfm_attachment>(dfm_body_get_attachment, body, number);
       if (a.flags & DFM_ATTACH_TOUCH) continue;
       for (uint32_t other = 0; other < positions_.size(); ++other)
         if (scene_.bodies()[other].handle == a.to) out.push_back({std::min(b, other), std::max(b, other)});
@@ -187,11 +174,7 @@ void Checker::keep(const crossing::Found &found) {
 namespace {
 
 std::vector<dfm_stage_time> profile(const SceneFile &scene) {
-  uint32_t n = 0;
-  need(dfm_world_profile(scene.world(), 0, nullptr, &n));
-  std::vector<dfm_stage_time> stages(n);
-  if (n > 0) need(dfm_world_profile(scene.world(), n, stages.data(), &n));
-  return stages;
+  return listed<dfm_stage_time>(dfm_world_profile, scene.world());
 }
 
 std::string stages_json(const SceneFile &scene, uint64_t steps) {

@@ -30,8 +30,6 @@ struct Plot {
   std::vector<Curve> curves;
 };
 
-double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
-
 // Of a linear axis: its ends, and steps of 1, 2 or 5 times a power of ten.
 struct Axis {
   double low, high, from, to, step;  // from, to: pixels
@@ -122,13 +120,8 @@ class Drawn : public RunPlots {
     for (const RigidView &rigid : scene_.rigids()) add(rigid.name, rigid_measure(rigid));
     set(kEnergy, "kinetic", kinetic);
     set(kEnergy, "elastic", elastic);
-    uint32_t n = 0;
-    need(dfm_world_pairs(scene_.world(), 0, nullptr, &n));
-    std::vector<dfm_pair_report> pairs(n);
-    for (dfm_pair_report &p : pairs) p.size = sizeof p;
-    if (n > 0) need(dfm_world_pairs(scene_.world(), n, pairs.data(), &n));
     for (Curve &c : plots_[kForce].curves) c.y.resize(times_.size(), 0);  // apart: none
-    for (const dfm_pair_report &p : pairs)
+    for (const dfm_pair_report &p : listed<dfm_pair_report>(dfm_world_pairs, scene_.world()))
       set(kForce, scene_.name_of(p.a) + ", " + scene_.name_of(p.b), p.normal, 0);
     for (uint32_t i = 0; i < probes(); ++i) {
       double at[3];

@@ -73,44 +73,31 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
     need(dfm_scene_open(context_.get(), path.c_str(), &options, &scene_));
   }
   need(dfm_scene_world(scene_, &world_));
-  settings_.size = sizeof settings_;
-  need(dfm_scene_get_settings(scene_, &settings_));
+  settings_ = got<dfm_scene_settings>(dfm_scene_get_settings, scene_);
 
   renew_list();
-  uint32_t n = 0;
-  need(dfm_world_obstacles(world_, 0, nullptr, &n));
-  std::vector<dfm_obstacle> obstacles(n);
-  need(dfm_world_obstacles(world_, n, obstacles.data(), &n));
-  for (const dfm_obstacle handle : obstacles) {
+  for (const dfm_obstacle handle : listed<dfm_obstacle>(dfm_world_obstacles, world_)) {
     ObstacleView obstacle;
     obstacle.handle = handle;
-    obstacle.def.size = sizeof obstacle.def;
-    need(dfm_obstacle_get_def(handle, &obstacle.def));
+    obstacle.def = got<dfm_obstacle_def>(dfm_obstacle_get_def, handle);
     obstacle.name = names_[handle] = obstacle.def.name ? obstacle.def.name : "";
     obstacles_.push_back(obstacle);
   }
-  need(dfm_world_rigids(world_, 0, nullptr, &n));
-  std::vector<dfm_rigid> rigids(n);
-  if (n > 0) need(dfm_world_rigids(world_, n, rigids.data(), &n));
-  for (const dfm_rigid handle : rigids) rigids_.push_back({handle, names_[handle]});
+  for (const dfm_rigid handle : listed<dfm_rigid>(dfm_world_rigids, world_))
+    rigids_.push_back({handle, names_[handle]});
 }
 
 void SceneFile::renew_list() const {
-  uint32_t n = 0;
-  need(dfm_world_bodies(world_, 0, nullptr, &n));
-  handles_.resize(n);
-  if (n > 0) need(dfm_world_bodies(world_, n, handles_.data(), &n));
-  if (std::ranges::equal(handles_, bodies_, {}, {}, &BodyView::handle)) return;
+  const std::vector<dfm_body> handles = listed<dfm_body>(dfm_world_bodies, world_);
+  if (std::ranges::equal(handles, bodies_, {}, {}, &BodyView::handle)) return;
   const bool pieces = !names_.empty();  // a scene has all other bodies from the start
   std::vector<BodyView> before = std::exchange(bodies_, {});
-  for (const dfm_body handle : handles_) {
+  for (const dfm_body handle : handles) {
     if (const auto old = std::ranges::find(before, handle, &BodyView::handle); old != before.end()) {
       bodies_.push_back(std::move(*old));
       continue;
     }
-    dfm_body_info info = {};
-    info.size = sizeof info;
-    need(dfm_body_get_info(handle, &info));
+    const dfm_body_info info = got<dfm_body_info>(dfm_body_get_info, handle);
     BodyView body;
     body.handle = handle;
     body.name = info.name;
@@ -126,13 +113,9 @@ void SceneFile::renew_list() const {
 }
 
 void SceneFile::find_wholes() const {
-  std::vector<dfm_body> pieces;
   for (const BodyView &body : bodies_) {
     if (!body.cut || body.whole != body.handle) continue;
-    uint32_t n = 0;
-    need(dfm_body_pieces(body.handle, 0, nullptr, &n));
-    pieces.resize(n);
-    if (n > 0) need(dfm_body_pieces(body.handle, n, pieces.data(), &n));
+    const std::vector<dfm_body> pieces = listed<dfm_body>(dfm_body_pieces, body.handle);
     for (BodyView &piece : bodies_)
       if (std::ranges::find(pieces, piece.handle) != pieces.end()) piece.whole = body.handle;
   }
@@ -140,9 +123,7 @@ void SceneFile::find_wholes() const {
 
 void SceneFile::renew(size_t at) const {
   BodyView &body = bodies_[at];
-  dfm_body_info info = {};
-  info.size = sizeof info;
-  need(dfm_body_get_info(body.handle, &info));
+  const dfm_body_info info = got<dfm_body_info>(dfm_body_get_info, body.handle);
   if (info.npoint != body.npoint || info.ntet != body.ntet) read_shape(info, body);
 }
 

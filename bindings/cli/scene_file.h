@@ -1,5 +1,6 @@
 // A scene as the command sees it: opened, with the names and sizes of what is in it. On the public API only.
 #pragma once
+#include <cmath>
 #include <map>
 #include <memory>
 #include <string>
@@ -33,6 +34,7 @@ struct RigidView {
 };
 // By a quaternion x, y, z, w; all zero reads as identity.
 void rotate(const double q[4], const double v[3], double out[3]);
+inline double norm(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 // Points of an obstacle of triangles where it is now, [n,3].
 void place_points(const ObstacleView &obstacle, std::vector<double> &out);
 
@@ -70,7 +72,6 @@ class SceneFile {
   std::vector<RigidView> rigids_;
   mutable std::map<uint64_t, std::string> names_;
   mutable std::map<uint64_t, uint32_t> numbers_;
-  mutable std::vector<dfm_body> handles_;
 };
 
 }  // namespace cli

@@ -12,22 +12,14 @@ Sensors::Sensors(const SceneFile &scene, const std::string &folder) : scene_(sce
     if (sensor) seen_.push_back({thing});
   };
   for (const BodyView &b : scene.bodies()) look(b.handle);
-  uint32_t n = 0;  // rigid bodies are among them
-  need(dfm_world_obstacles(scene.world(), 0, nullptr, &n));
-  std::vector<dfm_obstacle> obstacles(n);
-  if (n) need(dfm_world_obstacles(scene.world(), n, obstacles.data(), &n));
-  for (const dfm_obstacle o : obstacles) look(o);
+  for (const dfm_obstacle o : listed<dfm_obstacle>(dfm_world_obstacles, scene.world()))
+    look(o);  // rigid bodies are among them
   if (!seen_.empty()) table_ = std::make_unique<Csv>(folder + "/sensors.csv", "t,sensor,thing,event");
 }
 
 void Sensors::add_step() {
   if (seen_.empty()) return;
-  uint32_t n = 0;
-  need(dfm_world_events(scene_.world(), 0, nullptr, &n));
-  if (n == 0) return;
-  events_.resize(n);
-  need(dfm_world_events(scene_.world(), n, events_.data(), &n));
-  for (const dfm_contact_event &e : events_) {
+  for (const dfm_contact_event &e : listed<dfm_contact_event>(dfm_world_events, scene_.world())) {
     const bool begins = e.kind == DFM_EVENT_SENSOR_BEGIN;
     if (!begins && e.kind != DFM_EVENT_SENSOR_END) continue;
     for (Seen &s : seen_)
@@ -42,12 +34,9 @@ std::string Sensors::json() const {
   if (seen_.empty()) return {};
   JsonObject out;
   for (const Seen &s : seen_) {
-    uint32_t n = 0;
-    need(dfm_sensor_things(s.sensor, 0, nullptr, &n));
-    std::vector<uint64_t> things(n);
-    if (n) need(dfm_sensor_things(s.sensor, n, things.data(), &n));
     std::vector<std::string> inside;
-    for (const uint64_t thing : things) inside.push_back(quoted(scene_.name_of(thing)));
+    for (const uint64_t thing : listed<uint64_t>(dfm_sensor_things, s.sensor))
+      inside.push_back(quoted(scene_.name_of(thing)));
     JsonObject row;
     row.add("begins", std::to_string(s.begins))
         .add("ends", std::to_string(s.ends))

@@ -25,7 +25,6 @@ class Sensors {
   const SceneFile &scene_;
   std::vector<Seen> seen_;
   std::unique_ptr<Csv> table_;
-  std::vector<dfm_contact_event> events_;
 };
 
 }  // namespace cli

@@ -7,16 +7,12 @@
 namespace cli {
 
 Tools::Tools(const SceneFile &scene, const std::string &folder) : scene_(scene) {
-  uint32_t n = 0;
-  need(dfm_world_tools(scene.world(), 0, nullptr, &n));
-  std::vector<dfm_tool> list(n);
-  if (n) need(dfm_world_tools(scene.world(), n, list.data(), &n));
-  for (const dfm_tool tool : list) {
+  for (const dfm_tool tool : listed<dfm_tool>(dfm_world_tools, scene.world())) {
     dfm_tool_def def = dfm_tool_def_default();
     need(dfm_tool_get_def(tool, &def));
     tools_.push_back({tool, def.name});
   }
-  if (n)
+  if (!tools_.empty())
     table_ = std::make_unique<Csv>(folder + "/tools.csv",
                                    "t,tool,x,y,z,qx,qy,qz,qw,opening_deg,fx,fy,fz,tx,ty,tz,"
                                    "hand_fx,hand_fy,hand_fz,hand_tx,hand_ty,hand_tz,work");
@@ -37,9 +33,7 @@ void Tools::record() {
   constexpr double kDegree = 57.295779513082321;
   const double now = dfm_world_time(scene_.world());
   for (Felt &f : tools_) {
-    dfm_tool_state s{};
-    s.size = sizeof s;
-    need(dfm_tool_get_state(f.tool, &s));
+    const dfm_tool_state s = got<dfm_tool_state>(dfm_tool_get_state, f.tool);
     for (double &x : f.impulse) x = span_ > 0 ? x / span_ : 0;
     table_->cell(now).cell(f.name).cells(s.pose.position, 3).cells(s.pose.rotation, 4);
     table_->cell(kDegree * s.opening).cells(f.impulse, 12).cell(s.work).end_row();

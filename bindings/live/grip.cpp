@@ -13,11 +13,7 @@ using render::Vec;
 
 Grip::Grip(Simulation &simulation, double size) : simulation_(simulation), speed_(2 * size) {
   const dfm_world world = simulation.scene().world();
-  uint32_t n = 0;
-  cli::need(dfm_world_tools(world, 0, nullptr, &n));
-  std::vector<dfm_tool> list(n);
-  if (n > 0) cli::need(dfm_world_tools(world, n, list.data(), &n));
-  for (const dfm_tool tool : list) {
+  for (const dfm_tool tool : cli::listed<dfm_tool>(dfm_world_tools, world)) {
     dfm_tool_def def = dfm_tool_def_default();
     cli::need(dfm_tool_get_def(tool, &def));
     tools_.push_back({tool, def.name, def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS});
@@ -25,9 +21,7 @@ Grip::Grip(Simulation &simulation, double size) : simulation_(simulation), speed
 }
 
 Felt Grip::felt(size_t tool) const {
-  dfm_tool_state state = {};
-  state.size = sizeof state;
-  cli::need(dfm_tool_get_state(tools_[tool].tool, &state));
+  const dfm_tool_state state = cli::got<dfm_tool_state>(dfm_tool_get_state, tools_[tool].tool);
   double force[3], torque[3], out[3];
   cli::need(dfm_tool_force(tools_[tool].tool, force, torque));
   Felt felt;
@@ -49,9 +43,7 @@ int Grip::tool_of(const std::string &part) const {
 void Grip::take(int tool) {
   taken_ = tool;
   if (tool < 0) return;
-  dfm_tool_state state = {};
-  state.size = sizeof state;
-  cli::need(dfm_tool_get_state(tools_[size_t(tool)].tool, &state));
+  const dfm_tool_state state = cli::got<dfm_tool_state>(dfm_tool_get_state, tools_[size_t(tool)].tool);
   put(state.device, state.opening);
 }
 

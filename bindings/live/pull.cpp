@@ -102,9 +102,7 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
   cli::need(dfm_body_get_state(body.handle, body.npoint, x.data(), nullptr, &n));
   const Patch patch = patch_around(x, to_);
   offset_ = patch.middle - to_;
-  dfm_body_info info = {};
-  info.size = sizeof info;
-  cli::need(dfm_body_get_info(body.handle, &info));
+  const dfm_body_info info = cli::got<dfm_body_info>(dfm_body_get_info, body.handle);
   const double rate = 2 * std::numbers::pi * 4, k = stiffness * info.mass * rate * rate;
   cli::JsonObject line;
   line.add("do", "\"pull\"")
@@ -136,9 +134,7 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
 
 bool Pull::grab_rigid(const std::string &name) {
   for (const cli::RigidView &r : simulation_.scene().rigids()) {
-    dfm_rigid_def def = {};
-    def.size = sizeof def;
-    cli::need(dfm_rigid_get_def(r.handle, &def));
+    const dfm_rigid_def def = cli::got<dfm_rigid_def>(dfm_rigid_get_def, r.handle);
     if (r.name != name || def.fixed) continue;
     dfm_rigid_state state = {};
     cli::need(dfm_rigid_get_state(r.handle, &state));

@@ -9,6 +9,11 @@ namespace {
 
 bool same(const dMass &a, const dMass &b) { return a.mass == b.mass && std::equal(a.I, a.I + 12, b.I); }
 
+dfm_status not_in_space(dGeomID geom) {
+  return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
+                static_cast<void *>(geom));
+}
+
 }  // namespace
 
 Adapter::Adapter(dfm_world world, const dfm_ode_def &def)
@@ -251,9 +256,7 @@ dfm_status Adapter::step(double dt) {
 dfm_status Adapter::obstacle(dGeomID geom, dfm_obstacle *out) {
   TRY(sync());
   const auto known = by_geom_.find(geom);
-  if (known == by_geom_.end())
-    return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
-                  static_cast<void *>(geom));
+  if (known == by_geom_.end()) return not_in_space(geom);
   if (!known->second->obstacle)
     return failed(
         DFM_E_ARG,
@@ -273,8 +276,13 @@ dfm_status Adapter::rigid(dBodyID body, dfm_rigid *out) {
   return DFM_OK;
 }
 
-bool Adapter::in_space(dGeomID geom) const {
-  return by_geom_.count(geom) || std::find(seen_.begin(), seen_.end(), geom) != seen_.end();
+// Of a geom that was added since the last step, too.
+dfm_status Adapter::must_have(dGeomID geom) {
+  seen_.clear();
+  engine_.spaces.clear();
+  walk(space_);
+  return by_geom_.count(geom) || std::ranges::find(seen_, geom) != seen_.end() ? dfm_status{DFM_OK}
+                                                                               : not_in_space(geom);
 }
 
 dfm_status Adapter::rebind(dGeomID geom) {
@@ -287,12 +295,7 @@ dfm_status Adapter::rebind(dGeomID geom) {
 }
 
 dfm_status Adapter::set_geom(dGeomID geom, const dfm_ode_geom &props) {
-  seen_.clear();
-  engine_.spaces.clear();
-  walk(space_);
-  if (!in_space(geom))
-    return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
-                  static_cast<void *>(geom));
+  TRY(must_have(geom));
   TRY(rebind(geom));
   Props &p = props_[geom];
   p.ignore = props.ignore;
@@ -302,12 +305,7 @@ dfm_status Adapter::set_geom(dGeomID geom, const dfm_ode_geom &props) {
 }
 
 dfm_status Adapter::set_arrays(dGeomID geom, int geom_class, Triangles arrays) {
-  seen_.clear();
-  engine_.spaces.clear();
-  walk(space_);
-  if (!in_space(geom))
-    return failed(DFM_E_ARG, "geom %p is not in the adapter's space; dSpaceAdd puts it there",
-                  static_cast<void *>(geom));
+  TRY(must_have(geom));
   if (signature_of(geom).inner_class != geom_class)
     return failed(DFM_E_ARG, "geom %p is no %s; only of those ODE keeps the arrays to itself",
                   static_cast<void *>(geom), class_name(geom_class));

@@ -74,7 +74,7 @@ class Adapter {
   double sync_seconds_ = 0;
 
   void walk(dSpaceID space);
-  bool in_space(dGeomID geom) const;
+  dfm_status must_have(dGeomID geom);
   dfm_status look();
   dfm_status check(const std::vector<Signature> &signatures) const;
   dfm_status drop();

@@ -32,10 +32,7 @@ void add_arrow(std::vector<double> &xyz, const Vec &foot, const Vec &tip, const 
 
 void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera &camera,
                   render::Scene &out) {
-  uint32_t n = 0;
-  cli::need(dfm_world_contacts(scene.world(), 0, nullptr, &n));
-  contacts_.resize(n);
-  if (n > 0) cli::need(dfm_world_contacts(scene.world(), n, contacts_.data(), &n));
+  const std::vector<dfm_contact> contacts = cli::listed<dfm_contact>(dfm_world_contacts, scene.world());
   // On the body that was made first, whichever side the contact is reported for.
   const auto force = [](const dfm_contact &c) {
     const Vec normal = render::vec(c.normal), first = render::vec(c.tangent);
@@ -43,11 +40,11 @@ void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera
     return on_a * (c.body_b && c.body_b < c.body_a ? -1.0 : 1.0);
   };
   double top = 0;
-  for (const dfm_contact &c : contacts_) top = std::max(top, render::norm(force(c)));
+  for (const dfm_contact &c : contacts) top = std::max(top, render::norm(force(c)));
   // Follows a rise at once and a fall slowly, so that neighboring pictures can be compared.
   scale_ = std::max(top, 0.98 * scale_);
   for (std::vector<double> &xyz : xyz_) xyz.clear();
-  for (const dfm_contact &c : contacts_) {
+  for (const dfm_contact &c : contacts) {
     const Vec f = force(c);
     const double length = scale_ > 0 ? kLength * size * render::norm(f) / scale_ : 0;
     if (!(length > 0)) continue;

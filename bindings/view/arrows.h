@@ -22,7 +22,6 @@ class Arrows {
   double longest() const { return scale_; }  // N, of an arrow of full length
 
  private:
-  std::vector<dfm_contact> contacts_;
   std::vector<double> xyz_[2];
   double scale_ = 0;
 };

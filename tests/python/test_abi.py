@@ -1,10 +1,9 @@
-"""The ctypes description of the C interface agrees with the headers, and with a C compiler."""
+"""The ctypes description of the C interface agrees with a C compiler."""
 import ctypes
 import inspect
 import os
 import pathlib
 import subprocess
-import sys
 import tempfile
 import unittest
 
@@ -12,7 +11,6 @@ from deform import _abi
 
 SOURCE = pathlib.Path(os.environ["DEFORM_SOURCE"])
 INCLUDE = SOURCE / "libdeform" / "include"
-PACKAGE = SOURCE / "bindings" / "python"
 
 
 def structs():
@@ -21,11 +19,6 @@ def structs():
 
 
 class Abi(unittest.TestCase):
-    def test_headers_unchanged(self):
-        done = subprocess.run([sys.executable, "-B", PACKAGE / "make_abi.py", INCLUDE,
-                               PACKAGE / "deform" / "_abi.py", "--check"], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
-
     def test_structs_laid_out_as_in_c(self):
         lines = []
         for kind in structs():

@@ -11,7 +11,6 @@ import pathlib
 from typing import Any
 
 from . import _abi
-from ._abi_functions import FUNCTIONS
 
 ROOT = pathlib.Path(__file__).resolve().parent
 NATIVE = ROOT / "native"  # what the wheel carries: lib/, bin/, share/
@@ -102,7 +101,7 @@ def _path() -> pathlib.Path:
 
 
 def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
-    for name, (result, arguments) in FUNCTIONS.items():
+    for name, (result, arguments) in _abi.FUNCTIONS.items():
         function = getattr(library, name)
         function.restype = result
         function.argtypes = arguments

@@ -79,14 +79,15 @@ class _Mesh(OfThisProcess):
     _instead = "give its arrays (points and cells), or the path of its file"
     _info_kind: Any
     _get_info: Any
-    _cell_width: int
+    _data: Any
+    _destroy: Any
 
-    def __init__(self, handle: int, destroy: Any, context: Context):
+    def __init__(self, handle: Any = None, context: Any = None):
         if not isinstance(context, Context):
             kind = type(self).__name__
             raise ArgumentError(f"a {kind} is made by {kind}.from_arrays(points, cells), read(path) or "
                                 "another of its functions, not by calling the class", "DFM_E_ARG")
-        self._keeper = _Keeper(handle, destroy, context)
+        self._keeper = _Keeper(handle, self._destroy, context)
         self._context = context
 
     def __copy__(self) -> Any:
@@ -98,6 +99,18 @@ class _Mesh(OfThisProcess):
     @property
     def handle(self) -> int:
         return self._keeper.handle
+
+    @classmethod
+    def _of(cls, function: Any, *arguments: Any, context: Context | None = None) -> Any:
+        """The mesh that a function of the library makes."""
+        context, out = context or default_context(), ctypes.c_uint64()
+        check(function(*arguments, ctypes.byref(out)))
+        return cls(out.value, context)
+
+    def _arrays(self) -> tuple[int | None, int | None]:
+        points, corners = ctypes.c_void_p(), ctypes.c_void_p()
+        check(self._data(self.handle, ctypes.byref(points), ctypes.byref(corners), None))
+        return points.value, corners.value
 
     @property
     def info(self) -> Any:
@@ -125,23 +138,18 @@ class TetMesh(_Mesh):
 
     _info_kind = _abi.dfm_tetmesh_info
     _get_info = staticmethod(quick.dfm_tetmesh_get_info)
-
-    def __init__(self, handle: Any = None, context: Any = None):
-        super().__init__(handle, lib.dfm_tetmesh_destroy, context)
+    _data = staticmethod(quick.dfm_tetmesh_data)
+    _destroy = staticmethod(lib.dfm_tetmesh_destroy)
 
     @classmethod
     def _made(cls, kind: str, size: Sequence[float], cells: int) -> TetMesh:
-        context, out = default_context(), ctypes.c_uint64()
-        check(lib.dfm_tetmesh_make(context.address, kind.encode(), _size(size), whole(cells, "cells", 1),
-                                  ctypes.byref(out)))
-        return cls(out.value, context)
+        return cls._of(lib.dfm_tetmesh_make, default_context().address, kind.encode(), _size(size),
+                       whole(cells, "cells", 1))
 
     @classmethod
     def read(cls, path: Any) -> TetMesh:
         """Reads MSH, VTK, VTU or Medit; what was repaired is in `warnings`."""
-        context, out = default_context(), ctypes.c_uint64()
-        check(lib.dfm_tetmesh_read(context.address, encoded(path), ctypes.byref(out)))
-        return cls(out.value, context)
+        return cls._of(lib.dfm_tetmesh_read, default_context().address, encoded(path))
 
     @classmethod
     def ball(cls, radius: float, cells: int = 1000) -> TetMesh:
@@ -174,24 +182,16 @@ class TetMesh(_Mesh):
         """Tetrahedra inside of a closed surface, given as a TriMesh or the path of its file. They reach out
         of the surface: give it to add_body too (surface=), which otherwise takes their jagged border."""
         surface = surface_of(surface, "surface")
-        out = ctypes.c_uint64()
-        check(lib.dfm_tetmesh_fill(surface.handle, whole(cells, "cells", 1), ctypes.byref(out)))
-        return cls(out.value, surface._context)
+        return cls._of(lib.dfm_tetmesh_fill, surface.handle, whole(cells, "cells", 1),
+                       context=surface._context)
 
     def second_order(self) -> TetMesh:
         """The same shape with points in the middles of the edges, for the same models as bricks()."""
-        out = ctypes.c_uint64()
-        check(lib.dfm_tetmesh_second_order(self.handle, ctypes.byref(out)))
-        return TetMesh(out.value, self._context)
+        return TetMesh._of(lib.dfm_tetmesh_second_order, self.handle, context=self._context)
 
     def write(self, path: Any) -> None:
         """Writes *.msh, *.msh2, *.vtk, *.vtu or *.mesh; only VTK and VTU keep the shares of a filled mesh."""
         check(lib.dfm_tetmesh_write(self.handle, encoded(path)))
-
-    def _arrays(self) -> tuple[int | None, int | None]:
-        points, tets = ctypes.c_void_p(), ctypes.c_void_p()
-        check(quick.dfm_tetmesh_data(self.handle, ctypes.byref(points), ctypes.byref(tets), None))
-        return points.value, tets.value
 
     @property
     def points(self) -> np.ndarray:
@@ -309,43 +309,31 @@ class TriMesh(_Mesh):
 
     _info_kind = _abi.dfm_trimesh_info
     _get_info = staticmethod(quick.dfm_trimesh_get_info)
-
-    def __init__(self, handle: Any = None, context: Any = None):
-        super().__init__(handle, lib.dfm_trimesh_destroy, context)
+    _data = staticmethod(quick.dfm_trimesh_data)
+    _destroy = staticmethod(lib.dfm_trimesh_destroy)
 
     @classmethod
     def read(cls, path: Any) -> TriMesh:
         """Reads OBJ, PLY, STL, OFF, MSH, VTK, VTU or Medit; what was repaired is in `warnings`."""
-        context, out = default_context(), ctypes.c_uint64()
-        check(lib.dfm_trimesh_read(context.address, encoded(path), ctypes.byref(out)))
-        return cls(out.value, context)
+        return cls._of(lib.dfm_trimesh_read, default_context().address, encoded(path))
 
     @classmethod
     def from_arrays(cls, points: Any, triangles: Any) -> TriMesh:
         """points [n,3] m, triangles [m,3] counter-clockwise seen from outside; repaired as a file is."""
-        context, out = default_context(), ctypes.c_uint64()
         p, t = points_of(points), cells_of(triangles, 3, "triangles")
-        check(lib.dfm_trimesh_create(context.address, len(p), p.ctypes.data, len(t), t.ctypes.data,
-                                     ctypes.byref(out)))
-        return cls(out.value, context)
+        return cls._of(lib.dfm_trimesh_create, default_context().address, len(p), p.ctypes.data, len(t),
+                       t.ctypes.data)
 
     @classmethod
     def make(cls, kind: str, size: Sequence[float], triangles: int = 1000) -> TriMesh:
         """A closed surface: "ball" [radius], "cylinder" [radius, length], "beam" [x, y, z], "tube" [inner,
         outer, length] or "torus" [ring radius, tube radius]; m."""
-        context, out = default_context(), ctypes.c_uint64()
-        check(lib.dfm_trimesh_make(context.address, kind.encode(), _size(size),
-                                  whole(triangles, "triangles", 1), ctypes.byref(out)))
-        return cls(out.value, context)
+        return cls._of(lib.dfm_trimesh_make, default_context().address, kind.encode(), _size(size),
+                       whole(triangles, "triangles", 1))
 
     def write(self, path: Any) -> None:
         """Writes *.obj, *.ply, *.stl, *.off, *.vtk or *.vtu."""
         check(lib.dfm_trimesh_write(self.handle, encoded(path)))
-
-    def _arrays(self) -> tuple[int | None, int | None]:
-        points, triangles = ctypes.c_void_p(), ctypes.c_void_p()
-        check(quick.dfm_trimesh_data(self.handle, ctypes.byref(points), ctypes.byref(triangles), None))
-        return points.value, triangles.value
 
     @property
     def points(self) -> np.ndarray:

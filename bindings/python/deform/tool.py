@@ -221,11 +221,7 @@ class Tools:
             points, triangles = mesh.points, numbers_of(mesh.triangles).reshape(-1, 3)
             definition.npoint, definition.ntriangle = len(points), len(triangles)
             definition.points, definition.triangles = points.ctypes.data, triangles.ctypes.data
-        out = ctypes.c_uint64()
-        with self.alone():
-            status = lib.dfm_tool_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
-        check(status)
-        return self._tool(out.value)
+        return self._tool(self._created(lib.dfm_tool_create, definition))
 
     def _tool(self: Any, handle: int) -> Tool:
         out = sized(_abi.dfm_tool_def)
@@ -239,7 +235,4 @@ class Tools:
 
     def find_tool(self: Any, name: str) -> Tool:
         """The tool of that name; ArgumentError names the nearest one."""
-        out = ctypes.c_uint64()
-        self.free()
-        check(quick.dfm_world_find_tool(self.handle, text(name, "name"), ctypes.byref(out)))
-        return self._tool(out.value)
+        return self._tool(self._found(quick.dfm_world_find_tool, name))

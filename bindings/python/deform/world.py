@@ -219,6 +219,14 @@ class World(Queries, Reports, Tools, OfThisProcess):
         finally:
             self._busy = 0
 
+    def _created(self, function: Any, definition: Any) -> int:
+        """The handle of what a function of the library makes in this world."""
+        out = ctypes.c_uint64()
+        with self.alone():
+            status = function(self.handle, ctypes.byref(definition), ctypes.byref(out))
+        check(status)
+        return out.value
+
     def accept(self, status: int) -> int:
         """Raises what a status means, a discarded call included; what a Python law has raised is its
         cause."""
@@ -356,11 +364,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.mass_scaling = mass_scaling
         definition.category = whole(category, "category")
         definition.collides_with = whole(collides_with, "collides_with")
-        out = ctypes.c_uint64()
-        with self.alone():
-            status = lib.dfm_body_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
-        check(status)
-        return self._know(self._body(out.value))
+        return self._know(self._body(self._created(lib.dfm_body_create, definition)))
 
     def add_obstacle(self, shape: str = "plane", *, name: str | None = None,
                      position: Sequence[float] = (0, 0, 0), rotation: Sequence[float] | None = None,
@@ -393,11 +397,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
             p, t = _scaled(mesh.points, scale), mesh.triangles
             definition.npoint, definition.ntriangle = len(p), len(t)
             definition.points, definition.triangles, definition.cells = p.ctypes.data, t.ctypes.data, cells
-        out = ctypes.c_uint64()
-        with self.alone():
-            status = lib.dfm_obstacle_create(self.handle, ctypes.byref(definition), ctypes.byref(out))
-        check(status)
-        return self._know(self._obstacle(out.value))
+        return self._know(self._obstacle(self._created(lib.dfm_obstacle_create, definition)))
 
     def add_rigid(self, shape: str = "sphere", **options: Any) -> Rigid:
         """A rigid body that soft bodies push; options: those of RigidDef."""
@@ -454,26 +454,23 @@ class World(Queries, Reports, Tools, OfThisProcess):
         """In order of creation, rigid bodies among them."""
         return [self._obstacle(h) for h in self._handles(quick.dfm_world_obstacles)]
 
-    def find_body(self, name: str) -> Body:
-        """The body of that name; ArgumentError names the nearest one."""
+    def _found(self, function: Any, name: str) -> int:
         out = ctypes.c_uint64()
         self.free()
-        check(quick.dfm_world_find_body(self.handle, text(name, "name"), ctypes.byref(out)))
-        return self._body(out.value)
+        check(function(self.handle, text(name, "name"), ctypes.byref(out)))
+        return out.value
+
+    def find_body(self, name: str) -> Body:
+        """The body of that name; ArgumentError names the nearest one."""
+        return self._body(self._found(quick.dfm_world_find_body, name))
 
     def find_obstacle(self, name: str) -> Obstacle:
         """The obstacle or rigid body of that name; ArgumentError names the nearest one."""
-        out = ctypes.c_uint64()
-        self.free()
-        check(quick.dfm_world_find_obstacle(self.handle, text(name, "name"), ctypes.byref(out)))
-        return self._obstacle(out.value)
+        return self._obstacle(self._found(quick.dfm_world_find_obstacle, name))
 
     def find_rigid(self, name: str) -> Rigid:
         """The rigid body of that name; ArgumentError names the nearest one."""
-        out = ctypes.c_uint64()
-        self.free()
-        check(quick.dfm_world_find_rigid(self.handle, text(name, "name"), ctypes.byref(out)))
-        return Rigid(self, out.value, name)
+        return Rigid(self, self._found(quick.dfm_world_find_rigid, name), name)
 
     def owner(self, handle: int) -> Body | Obstacle:
         """The object of a handle in a report (contacts["body_a"], pairs["b"])."""

@@ -1,7 +1,6 @@
 #include <cstdio>
 
 #include "chart.h"
-#include "page.h"
 
 namespace cli::cost {
 namespace {

@@ -1,4 +1,4 @@
-#include "meshes.h"
+#include "study.h"
 
 #include <filesystem>
 #include <memory>

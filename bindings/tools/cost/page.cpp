@@ -1,4 +1,4 @@
-#include "page.h"
+#include "study.h"
 
 #include <algorithm>
 #include <cmath>

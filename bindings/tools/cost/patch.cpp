@@ -1,4 +1,4 @@
-#include "patch.h"
+#include "study.h"
 
 #include <algorithm>
 #include <filesystem>

@@ -80,4 +80,22 @@ struct Study {
 Study make_study(const Subject &subject, const Surfaces &surfaces, const std::string &mesh_left_out,
                  const StudyOptions &options, Runs &runs);
 
+// meshes.cpp: surfaces from which bodies are filled with another number of cells.
+// Why the cells of this scene's bodies cannot vary; "" where they can.
+std::string why_cells_stay(const Subject &subject);
+// Writes the boundary of each body whose cells come from a file to folder/BODY.obj. Absolute paths, by body;
+// "" for a body that is made or filled already.
+Surfaces write_surfaces(const Subject &subject, const std::string &folder);
+
+// patch.cpp: the choice as a JSON merge patch (RFC 7396), and as a scene.
+// It contains whole lists, because a merge patch cannot change a part of one. Null: nothing is chosen.
+JsonValue scene_patch(const Subject &subject, const Study &study);
+// Writes the scene with the pick's changes to `path`. Files keep their places: names are made relative to
+// the new scene's folder, and surfaces that the study has written are copied beside it.
+void write_applied(const Subject &subject, const Study &study, const std::string &path);
+
+// page.cpp: cost.html, the study on one page in one file, pictures included; needs no network and no script.
+std::string page_html(const Subject &subject, const Study &study);
+std::string escaped(const std::string &text);  // for HTML and SVG
+
 }  // namespace cli::cost

@@ -1,10 +1,10 @@
 #include "deform/body.h"
 
 #include <cmath>
+#include <span>
 
 #include "api/objects.h"
 #include "state/bounds.h"
-#include "state/held.h"
 #include "state/spring.h"
 #include "step/stages.h"
 #include "step/watch/energy_watch.h"
@@ -31,6 +31,26 @@ void check_points(const Body &b, uint32_t n, const uint32_t *points) {
   if (n) need(points, "points");
   for (uint32_t i = 0; i < n; ++i)
     if (points[i] >= b.p.n) refuse(b, ": point %u does not exist; it has %u points", points[i], b.p.n);
+}
+
+// Removes the points from the motions that carry them, at most one each; a motion without points is removed.
+// All or nothing.
+void drop_motions(Body &b, std::span<const uint32_t> points) {
+  if (b.motions.empty()) return;
+  std::vector<uint8_t> dropped(b.p.n);
+  for (const uint32_t p : points) dropped[p] = 1;
+  for (HeldMotion &m : b.motions) {
+    size_t kept = 0;
+    for (size_t i = 0; i < m.points.size(); ++i) {
+      if (dropped[m.points[i]]) continue;
+      m.points[kept] = m.points[i];
+      for (size_t k = 0; k < 3; ++k) m.start[3 * kept + k] = m.start[3 * i + k];
+      ++kept;
+    }
+    m.points.resize(kept);
+    m.start.resize(3 * kept);
+  }
+  std::erase_if(b.motions, [](const HeldMotion &m) { return m.points.empty(); });
 }
 
 // Held components keep the velocity of the hold: zero unless a motion moves them.

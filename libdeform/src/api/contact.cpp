@@ -110,18 +110,13 @@ dfm_contact report(const World &w, uint32_t i) {
   return out;
 }
 
-uint32_t slot_of_obstacle(const World &w, uint64_t id) {
-  const auto at = std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });
-  return static_cast<uint32_t>(at - w.obstacles.begin());
-}
-
 dfm_contact report(const World &w, const RigidContact &c) {
   const double h = w.rigid_report.h;
   dfm_contact out{};
   if (c.sticks) out.flags |= DFM_CONTACT_STICKING;
   if (c.began) out.flags |= DFM_CONTACT_BEGAN;
-  out.feature_a = slot_of_obstacle(w, c.a);
-  out.feature_b = slot_of_obstacle(w, c.b);
+  out.feature_a = obstacle_slot_of(w, c.a);
+  out.feature_b = obstacle_slot_of(w, c.b);
   const Obstacle &a = *w.obstacles[out.feature_a], &b = *w.obstacles[out.feature_b];
   out.body_a = a.handle;
   out.body_b = b.rigid ? b.handle : 0;
@@ -162,7 +157,7 @@ dfm_pair_report &row_of(const World &w, std::vector<PairRow> &pairs, uint64_t a,
 
 // The center of mass at the time of the contact points: at the start of the sub-step.
 Vec3 center_of(const World &w, uint64_t id, double h) {
-  const Obstacle &o = *w.obstacles[slot_of_obstacle(w, id)];
+  const Obstacle &o = *w.obstacles[obstacle_slot_of(w, id)];
   if (!o.rigid) return o.pose.position;
   const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
   return load3(s.position) - h * load3(s.velocity);

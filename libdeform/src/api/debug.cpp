@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "api/objects.h"
+#include "math/extent.h"
 #include "mesh/mesh.h"
 #include "step/context.h"
 #include "step/solve/capture.h"
@@ -64,8 +65,8 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
     std::vector<double> x(size_t(3) * n), v(size_t(3) * n), u(size_t(3) * n), force(size_t(3) * n);
     const double h = b.impulse_time();
     for (uint32_t s = 0; s < n; ++s) {
-      store3(&x[size_t(3) * s], surfel_vector(b, b.p.x, s));
-      store3(&v[size_t(3) * s], surfel_vector(b, b.p.v, s));
+      store3(&x[size_t(3) * s], b.surface.sum(s, b.p.x.data()));
+      store3(&v[size_t(3) * s], b.surface.sum(s, b.p.v.data()));
       store3(&u[size_t(3) * s], surfel_displacement(b, s));
       if (h > 0) store3(&force[size_t(3) * s], (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]));
     }
@@ -116,21 +117,15 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
     }
     if (!(what & DFM_DRAW_BOXES)) return;
     for (auto &b : w.bodies) {
-      Vec3 lo = surfel_vector(*b, b->p.x, 0), hi = lo;
-      for (uint32_t s = 1; s < b->surface.nsurfel; ++s) {
-        const Vec3 x = surfel_vector(*b, b->p.x, s);
-        for (int k = 0; k < 3; ++k) {
-          lo[k] = std::min(lo[k], x[k]);
-          hi[k] = std::max(hi[k], x[k]);
-        }
-      }
+      Extent box;
+      for (uint32_t s = 0; s < b->surface.nsurfel; ++s) box.add(b->surface.sum(s, b->p.x.data()));
       for (int corner = 0; corner < 8; ++corner)
         for (int axis = 0; axis < 3; ++axis) {
           if (corner & (1 << axis)) continue;
           Vec3 p, q;
-          for (int k = 0; k < 3; ++k) p[k] = corner & (1 << k) ? hi[k] : lo[k];
+          for (int k = 0; k < 3; ++k) p[k] = corner & (1 << k) ? box.hi[k] : box.lo[k];
           q = p;
-          q[axis] = hi[axis];
+          q[axis] = box.hi[axis];
           draw(p, q, 0x808080);
         }
     }

@@ -85,22 +85,7 @@ dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
 }
 
 dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
-  return as_status(Object::of, mesh, [&](const Object &object) {
-    const TetMesh &m = object.mesh;
-    const MeshStatistics &s = object.statistics;
-    dfm_tetmesh_info info{};
-    put_shared(info, object);
-    info.ntet = s.ntet;
-    info.ntriangle = s.ntriangle;
-    info.dropped_cells = m.dropped_cells;
-    info.flat_cells = s.flat_cells;
-    info.duplicate_points = s.duplicate_points;
-    info.overlapping_faces = m.overlapping;
-    info.wave_path = s.wave_path;
-    info.cell = m.cell;
-    info.ncell = s.ntet / cell_kind(m.cell).tets;
-    give(out, info);
-  });
+  return as_status(Object::of, mesh, [&](const Object &object) { give(out, object.info); });
 }
 
 dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,

@@ -7,13 +7,15 @@ using namespace dfm;
 
 dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) { return surfel_vector(b, b.p.x, s); });
+    give_vectors(b.surface.nsurfel, capacity, xyz, n,
+                 [&](uint32_t s) { return b.surface.sum(s, b.p.x.data()); });
   });
 }
 
 dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) { return surfel_vector(b, b.p.v, s); });
+    give_vectors(b.surface.nsurfel, capacity, xyz, n,
+                 [&](uint32_t s) { return b.surface.sum(s, b.p.v.data()); });
   });
 }
 

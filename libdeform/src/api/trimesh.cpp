@@ -64,20 +64,7 @@ dfm_status dfm_trimesh_destroy(dfm_trimesh mesh) {
 }
 
 dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
-  return as_status(Object::of, mesh, [&](const Object &object) {
-    const TriMesh &m = object.mesh;
-    const TriMeshStatistics &s = object.statistics;
-    dfm_trimesh_info info{};
-    put_shared(info, object);
-    info.ntriangle = s.ntri;
-    info.merged_points = m.merged_points;
-    info.dropped_triangles = m.dropped_tris;
-    info.open_edges = s.open_edges;
-    info.holes = s.holes;
-    info.closed = s.closed;
-    info.area = s.area;
-    give(out, info);
-  });
+  return as_status(Object::of, mesh, [&](const Object &object) { give(out, object.info); });
 }
 
 dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles,

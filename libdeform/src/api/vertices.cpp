@@ -87,7 +87,7 @@ void put_vertices(Body &b, const dfm_vertex_layout &l, unsigned char *out) {
   // N x_p may involve many points; then it is computed once for all triangles around a surfel
   const double *const formed = s.identity() ? nullptr : search(b).x;
   const auto x = [&](uint32_t i) {
-    return formed ? load3(formed + 4 * size_t{i}) : surfel_vector(b, b.p.x, i);
+    return formed ? load3(formed + 4 * size_t{i}) : b.surface.sum(i, b.p.x.data());
   };
   const Vec3 origin = load3(l.origin);
   const float none = 0;
@@ -102,7 +102,7 @@ void put_vertices(Body &b, const dfm_vertex_layout &l, unsigned char *out) {
       }
       put(out, l.normal, normalized(sum));
     }
-    if (l.velocity != DFM_VERTEX_NONE) put(out, l.velocity, surfel_vector(b, b.p.v, i));
+    if (l.velocity != DFM_VERTEX_NONE) put(out, l.velocity, b.surface.sum(i, b.p.v.data()));
     if (l.displacement != DFM_VERTEX_NONE) put(out, l.displacement, surfel_displacement(b, i));
     if (l.stick != DFM_VERTEX_NONE) std::memcpy(out + l.stick, &none, sizeof none);
   }

@@ -76,7 +76,7 @@ void keep_integrator(Body &b, const Integrator &was) {
 void keep_params(Body &b, const BodyShape &before) {
   const std::vector<double> values = before.model.params;
   if (values == b.model.params) return;
-  if (const dfm_status s = b.model.put_params(values, b.dynamics->claims()); s != DFM_OK)
+  if (const dfm_status s = b.model.put_params(values, b.dynamics->abilities().claims); s != DFM_OK)
     fail(s, "body '%s': model '%s' does not take its present parameters for the cells that are left",
          b.name.c_str(), b.model.type->id);
   b.model.params = values;

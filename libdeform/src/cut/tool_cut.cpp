@@ -299,9 +299,9 @@ void cut_by_tools(World &w, double dt) {
     for (auto &b : w.bodies)
       if (t.cuts_body(*b)) ids.push_back(b->id);
     for (const uint64_t id : ids) {
-      const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), [&](auto &b) { return b->id == id; });
-      if (at == w.bodies.end()) continue;
-      Body &b = **at;
+      Body *const found = w.body(id);
+      if (!found) continue;
+      Body &b = *found;
       reserve_cut_events(w, 1);
       uint32_t n = 0;
       const auto tell = [&] {

@@ -31,9 +31,7 @@ dfm_kin Dynamics::kin(double time, double h, bool trial) const {
 void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &change) const {
   double fastest = 0, most = 0;
   for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
-    Vec3 u;
-    surface_.each_phyxel(s,
-                         [&](uint32_t p, double weight) { u += weight * load3(mean + size_t(p) * kStride); });
+    const Vec3 u = surface_.sum(s, mean);
     fastest = std::max(fastest, norm2(u));
     most = std::max(most, norm2(u - load3(&surface_.v[size_t(s) * kStride])));
   }

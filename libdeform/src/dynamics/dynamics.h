@@ -26,6 +26,10 @@
 
 namespace dfm {
 
+// Work of an implicit sub-step relative to an explicit one of the same body; the second value is for a
+// constant matrix. Source: doc/decisions/implicit_time.md.
+inline constexpr unsigned kImplicitWork = 50, kConstantWork = 20;
+
 class ImplicitSystem;
 struct RestRows;
 class Tasks;
@@ -83,6 +87,10 @@ struct Abilities {
   bool energy = false;    // the energy that its scheme conserves is known (step/watch/energy_watch.h)
   bool damps = false;     // its scheme conserves no energy: it dissipates
   bool parts = false;     // its free motion depends on whether there are contacts: begin(), take_contact()
+  bool late = false;      // steps leave out points: see_points()
+  // DFM_CAP_* that the model must keep with any parameters, because these dynamics need them.
+  uint32_t claims = 0;
+  uint32_t work = 1;  // of a sub-step relative to an explicit one: a rough number for the budget of a step
 };
 
 class Dynamics {
@@ -92,10 +100,6 @@ class Dynamics {
   virtual ~Dynamics() = default;
 
   virtual Abilities abilities() const = 0;
-  // DFM_CAP_* that the model must keep with any parameters, because these dynamics need them.
-  virtual uint32_t claims() const { return 0; }
-  // work of a sub-step relative to an explicit one: a rough number for the budget of a step
-  virtual uint32_t relative_work() const { return 1; }
 
   // spectrum: share is wanted, too. The lag is points().dampers.lag from the next bound() on.
   // placed: of the rest positions that the model was made with.
@@ -151,9 +155,10 @@ class Dynamics {
   // For a body whose scheme damps: writes the forces at the end into points().f, including loads of the
   // sub-step. Returns false if the model fails. After end_state().
   virtual bool end_forces(const SubStep &) { return false; }
-  // points().f is that of the last add_forces(), whether it was kept or not: but for rounding, and for held
-  // components. After end_state(), before commit(). Returns false if the model fails.
-  virtual bool see_forces(const SubStep &) { return true; }
+  // Before commit() takes only a part of the displacement: computes the points of the end that steps leave
+  // out, and points().f is that of the last add_forces(), whether it was kept or not, but for rounding and
+  // for held components. Returns false if the model fails.
+  virtual bool see_end(const SubStep &) { return true; }
   // J, stored in dampers that see the velocity with a lag
   virtual double damper_energy(double /*time*/) { return 0; }
   // fraction: share of the displacement that is taken; velocities are those of the end.
@@ -165,12 +170,8 @@ class Dynamics {
   // Computes the points that steps may leave out because no surfel depends on them. Call before reading
   // points. Between steps, any thread.
   virtual void see_points() {}
-  // The same for the result of end_state(), if only a part of the displacement is taken.
-  virtual void see_ends() {}
   // Call after points have been written; all of them must have been computed before.
   virtual void points_changed() {}
-  // Whether steps leave out points.
-  virtual bool late() const { return false; }
   // Returns false if the sums are not known without see_points(). Also valid between free_motion() and
   // end_state().
   virtual bool sums(BodySums &) const { return false; }

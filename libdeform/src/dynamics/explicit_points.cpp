@@ -306,7 +306,7 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
 
 // A motion of parts has left its forces in what it has changed of the velocities: the model need not compute
 // them again. Held components have none.
-bool ExplicitPoints::see_forces(const SubStep &now) {
+bool ExplicitPoints::see_end(const SubStep &now) {
   if (!moved_) return true;
   if (!ways_known_) return find_forces(now);  // other code has changed the free motion
   for (uint32_t i = 0; i < p_.n; ++i)

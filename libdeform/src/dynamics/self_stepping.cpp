@@ -142,8 +142,8 @@ void SelfStepping::commit(const SubStep &, double fraction) {
 }
 
 // A partial displacement is no state of the model: it then continues from the positions of all points.
-void SelfStepping::see_ends() {
-  if (!model_.late) return;
+bool SelfStepping::see_end(const SubStep &) {
+  if (!model_.late) return true;
   see_points();
   dfm_kin k = kin(0, 0);
   k.x = p_.x_end.data();
@@ -152,6 +152,7 @@ void SelfStepping::see_ends() {
   model_.call("points",
               [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
   model_.call("look", [&] { return model_.late->look(model_.self, model_.state_out.data()); });
+  return true;
 }
 
 void SelfStepping::see_points() {

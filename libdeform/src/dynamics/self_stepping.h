@@ -14,7 +14,7 @@ class SelfStepping : public Dynamics {
  public:
   SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model);
 
-  Abilities abilities() const override { return {}; }
+  Abilities abilities() const override { return {.late = model_.late.has_value()}; }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double contact_step() override;
   bool free_motion(const SubStep &now, double &kinetic) override;
@@ -24,9 +24,8 @@ class SelfStepping : public Dynamics {
   void bound_ends(double &speed, double &change) const override;
   void commit(const SubStep &now, double fraction) override;
   void see_points() override;
-  void see_ends() override;
+  bool see_end(const SubStep &now) override;
   void points_changed() override;
-  bool late() const override { return model_.late.has_value(); }
   bool sums(BodySums &out) const override;
 
  private:

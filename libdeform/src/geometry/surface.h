@@ -67,6 +67,14 @@ struct Surface {
     for (uint32_t j = row[s]; j < row[s + 1]; ++j) f(col[j], weight[j]);
   }
 
+  // At surfel s, of a column [nphyxel,4].
+  Vec3 sum(uint32_t s, const double *column) const {
+    if (identity()) return load3(column + size_t{4} * point[s]);
+    Vec3 out;
+    each_phyxel(s, [&](uint32_t p, double w) { out += w * load3(column + size_t{4} * p); });
+    return out;
+  }
+
   // Twice the area of a triangle whose surfels are at these places, along its normal.
   template <class At>
   Vec3 area2(size_t t, At &&at) const {

@@ -18,6 +18,7 @@ struct Extent {
     const Vec3 size = hi - lo;
     return std::max({0.0, size.x, size.y, size.z});
   }
+  double diagonal() const { return norm(hi - lo); }
   int longest_axis() const {  // the first of equal ones
     const Vec3 size = hi - lo;
     return size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;

@@ -190,7 +190,7 @@ uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
 
 void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
-  const MeshStatistics s = mesh_statistics(mesh);
+  const dfm_tetmesh_info s = mesh_statistics(mesh);
   if (mesh.turned)
     warn(format("%u of %u cells had negative volume and %s turned", mesh.turned,
                 s.ntet / cell_kind(mesh.cell).tets, was_were(mesh.turned)));

@@ -398,7 +398,7 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
 
 void add_warnings(TriMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
-  const TriMeshStatistics s = tri_mesh_statistics(mesh);
+  const dfm_trimesh_info s = mesh_statistics(mesh);
   add_count(mesh.warnings, done.same, "point", "", "merged with another at exactly the same place");
   add_count(mesh.warnings, done.rim, "point", " on open edges",
             "merged with another that differs by rounding only");
@@ -409,7 +409,7 @@ void add_warnings(TriMesh &mesh, const Repairs &done) {
             "dropped, so the pieces are one");
   add_count(mesh.warnings, mesh.dropped_points, "point", " that no triangle uses", "dropped");
   if (mesh.turned)
-    warn(format("%u of %u triangles faced the wrong way and %s turned", mesh.turned, s.ntri,
+    warn(format("%u of %u triangles faced the wrong way and %s turned", mesh.turned, s.ntriangle,
                 was_were(mesh.turned)));
   if (done.twisted)
     warn(format("%u piece%s no two sides (like a Moebius strip) and %s left as in the file", done.twisted,

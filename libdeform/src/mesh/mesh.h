@@ -2,11 +2,11 @@
 // nothing here runs in a step.
 #pragma once
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "core/memory.h"
+#include "deform/mesh.h"
 
 namespace dfm {
 
@@ -97,23 +97,8 @@ double tet_volume(const double *points, const uint32_t *tet);
 // an inverted one.
 double tet_quality(const double *points, const uint32_t *tet);
 
-struct MeshMeasures {
-  double edge_min = 0, edge_median = 0, edge_max = 0, quality_min = 0, quality_mean = 0;
-  uint32_t histogram[10] = {};  // of the quality, bins of 0.1
-  double lo[3] = {}, hi[3] = {};
-  void set_edges(Array<double> &lengths);
-  void set_qualities(size_t n, const std::function<double(size_t)> &quality);
-  void set_box(const Array<double> &points);
-};
-
-struct MeshStatistics : MeshMeasures {
-  uint32_t npoint = 0, ntet = 0, ntriangle = 0, nedge = 0, npiece = 0;
-  uint32_t duplicate_points = 0;   // points that lie exactly on an earlier one
-  uint32_t nonmanifold_edges = 0;  // boundary edges with more than two triangles
-  uint32_t flat_cells = 0;         // mean ratio below 0.01
-  double volume = 0, wave_path = 0;
-};
-MeshStatistics mesh_statistics(const TetMesh &mesh);
+// All but the text of the warnings.
+dfm_tetmesh_info mesh_statistics(const TetMesh &mesh);
 
 // ---- writing ----------------------------------------------------------------------------------------------
 // All write to a temporary file next to the target and rename it, so no partial file remains. Throw

@@ -2,7 +2,7 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
-#include "math/extent.h"
+#include "mesh/cells.h"
 #include "mesh/faces.h"
 #include "mesh/mesh.h"
 #include "mesh/topology_tri.h"
@@ -172,35 +172,18 @@ double wave_path(const TetMesh &mesh) {
 
 }  // namespace
 
-void MeshMeasures::set_edges(Array<double> &lengths) {
-  std::sort(lengths.begin(), lengths.end());
-  edge_min = lengths.front();
-  edge_median = lengths[lengths.size() / 2];
-  edge_max = lengths.back();
-}
-
-void MeshMeasures::set_qualities(size_t n, const std::function<double(size_t)> &quality) {
-  quality_min = 1;
-  for (size_t i = 0; i < n; ++i) {
-    const double q = quality(i);
-    quality_min = std::min(quality_min, q);
-    quality_mean += q;
-    ++histogram[std::clamp(static_cast<int>(q * 10), 0, 9)];
-  }
-  quality_mean /= double(n);
-}
-
-void MeshMeasures::set_box(const Array<double> &points) {
-  const Extent box = extent_of(points);
-  store3(lo, box.lo);
-  store3(hi, box.hi);
-}
-
-MeshStatistics mesh_statistics(const TetMesh &mesh) {
-  MeshStatistics s;
+dfm_tetmesh_info mesh_statistics(const TetMesh &mesh) {
+  dfm_tetmesh_info s{};
   const Memory &memory = *mesh.memory;
   s.npoint = mesh.npoint();
   s.ntet = mesh.ntet();
+  s.cell = mesh.cell;
+  s.ncell = s.ntet / cell_kind(mesh.cell).tets;
+  s.ngroup = static_cast<uint32_t>(mesh.groups.size());
+  s.turned = mesh.turned;
+  s.dropped_points = mesh.dropped_points;
+  s.dropped_cells = mesh.dropped_cells;
+  s.overlapping_faces = mesh.overlapping;
   if (s.ntet == 0) return s;
   {
     const Array<uint32_t> triangles = boundary_triangles(mesh.tets);
@@ -215,11 +198,11 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
     for (size_t i = 0; i < edges.size(); i += 2)
       length.push_back(
           norm(load3(&mesh.points[3 * size_t(edges[i])]) - load3(&mesh.points[3 * size_t(edges[i + 1])])));
-    s.set_edges(length);
+    put_edges(length, s);
   }
   s.npiece = count_pieces(memory, s.npoint, mesh.tets, 4);
   s.duplicate_points = count_duplicate_points(mesh);
-  s.set_qualities(s.ntet, [&](size_t t) {
+  put_qualities(s.ntet, s, [&](size_t t) {
     const uint32_t *tet = &mesh.tets[4 * t];
     const double q = tet_quality(mesh.points.data(), tet);
     s.volume += tet_volume(mesh.points.data(), tet);
@@ -227,7 +210,7 @@ MeshStatistics mesh_statistics(const TetMesh &mesh) {
     return q;
   });
   s.wave_path = wave_path(mesh);
-  s.set_box(mesh.points);
+  put_box(mesh.points, s);
   return s;
 }
 

@@ -80,15 +80,20 @@ uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
 
 }  // namespace
 
-TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh) {
-  TriMeshStatistics s;
+dfm_trimesh_info mesh_statistics(const TriMesh &mesh) {
+  dfm_trimesh_info s{};
   s.npoint = mesh.npoint();
-  s.ntri = mesh.ntri();
-  if (s.ntri == 0) return s;
+  s.ntriangle = mesh.ntri();
+  s.ngroup = static_cast<uint32_t>(mesh.groups.size());
+  s.turned = mesh.turned;
+  s.merged_points = mesh.merged_points;
+  s.dropped_points = mesh.dropped_points;
+  s.dropped_triangles = mesh.dropped_tris;
+  if (s.ntriangle == 0) return s;
   const double *points = mesh.points.data();
   Array<double> length{HookAllocator<double>(*mesh.memory)};
   {
-    const Array<TriEdge> edges = sorted_edges(*mesh.memory, s.ntri, mesh.tris.data());
+    const Array<TriEdge> edges = sorted_edges(*mesh.memory, s.ntriangle, mesh.tris.data());
     const Array<uint32_t> twin = edge_twins(*mesh.memory, edges);
     uint32_t disagreeing = 0;
     for (size_t i = 0; i < edges.size(); ++i) {
@@ -104,12 +109,12 @@ TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh) {
     s.closed = s.open_edges + s.nonmanifold_edges + disagreeing == 0;
     s.holes = count_holes(mesh, twin);
   }
-  s.set_edges(length);
+  put_edges(length, s);
   s.npiece = count_pieces(*mesh.memory, s.npoint, mesh.tris, 3);
-  s.set_box(mesh.points);
+  put_box(mesh.points, s);
   // Volume from cones to the middle of the box: far from the origin nothing cancels.
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
-  s.set_qualities(s.ntri, [&](size_t t) {
+  put_qualities(s.ntriangle, s, [&](size_t t) {
     const uint32_t *tri = &mesh.tris[3 * t];
     const Vec3 a = load3(points + 3 * size_t(tri[0]));
     const Vec3 b = load3(points + 3 * size_t(tri[1]));

@@ -45,14 +45,7 @@ double triangle_area(const double *points, const uint32_t *tri);
 // 4 sqrt(3) area / sum l^2: 1 for an equilateral triangle, 0 for a flat one.
 double triangle_quality(const double *points, const uint32_t *tri);
 
-struct TriMeshStatistics : MeshMeasures {
-  uint32_t npoint = 0, ntri = 0, nedge = 0, npiece = 0;  // pieces: joined by points
-  uint32_t open_edges = 0, holes = 0;                    // edges of one triangle; loops of them
-  uint32_t nonmanifold_edges = 0;                        // edges of more than two triangles
-  bool closed = false;                                   // every edge has two triangles that agree
-  double area = 0, volume = 0;
-};
-TriMeshStatistics tri_mesh_statistics(const TriMesh &mesh);
+dfm_trimesh_info mesh_statistics(const TriMesh &mesh);
 
 // Cells of a body-centered cubic lattice that cover the inside of the surface, about `cells` of them, with
 // `share` filled in. The surface need not be clean: inside is where the generalized winding number exceeds

@@ -20,8 +20,14 @@ enum class StageRole {
   guards,          // nothing crosses at the end of the sub-step
 };
 
+// Motions and loads that are given over time.
+struct Varying {
+  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false;
+  bool operator==(const Varying &) const = default;
+};
+
 // Input of the plan.
-struct SceneFacts {
+struct SceneFacts : Varying {
   unsigned bodies = 0, self_stepping = 0, obstacles = 0;
   unsigned coupled = 0, coupled_surfels = 0;    // bodies with a surface of their own, and its surfels
   unsigned body_pairs = 0, obstacle_pairs = 0;  // pairs that may touch, filters applied
@@ -30,8 +36,11 @@ struct SceneFacts {
   std::string rigid_hosts;                  // names
   unsigned rigid_pairs = 0;  // of rigid bodies of the builtin host, with each other and with obstacles
   std::vector<std::string> rigid_alone;  // rigid bodies that pass through obstacles
-  bool gravity_keys = false, loads_vary = false, held_move = false, obstacles_move = false, unguarded = false;
-  struct Provider { std::string effect, plugin; };
+  bool unguarded = false;
+  struct Provider {
+    std::string effect, plugin;
+    bool operator==(const Provider &) const = default;
+  };
   // by models and laws of the scene, with their present parameters
   std::vector<Provider> offered;
   // by models and laws of the scene, with suitable parameters
@@ -43,6 +52,7 @@ struct SceneFacts {
   unsigned self_bodies = 0;              // bodies that may touch themselves, filters applied
   bool self_cut = false;                 // one of them because it has been cut
   std::vector<std::string> asked;        // where listed
+  bool operator==(const SceneFacts &) const = default;
 };
 
 // Whether a stage runs, and why; if it does not: why not, or empty if that is obvious.

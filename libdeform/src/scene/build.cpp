@@ -16,7 +16,7 @@
 #include "scene/jitter.h"
 #include "scene/load.h"
 #include "scene/place.h"
-#include "scene/start.h"
+#include "scene/rotation.h"
 #include "scene/table.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -87,7 +87,7 @@ double size_of_free(const dfm::Body &b) {
     if (b.p.held[i]) return 0;
     box.add(load3(&b.p.x[size_t{kStride} * i]));
   }
-  return norm(box.hi - box.lo);
+  return box.diagonal();
 }
 
 // Explicit time cuts a step into stable sub-steps; implicit time takes it whole. A body that falls through
@@ -106,6 +106,37 @@ void tell_long_step(dfm_context *context, const World &world, double step) {
                   b->name.c_str(), size, fall, step, std::sqrt(2 * kShort * size / g));
     return;  // one sentence for the scene
   }
+}
+
+// World positions of the points of a body that begins scrambled, flattened or inside out, [npoint,3]: a
+// change of the rest positions about the center of their box, then the pose.
+std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, const dfm_pose &pose) {
+  std::vector<double> x(mesh.points);
+  Jitter random(start.seed);
+  const Quat turn = load_quat(pose.rotation);
+  for (size_t i = 0; i < x.size(); i += 3) {
+    for (size_t k = 0; k < 3; ++k) {
+      const double center = (mesh.lo[k] + mesh.hi[k]) / 2, half = (mesh.hi[k] - mesh.lo[k]) / 2;
+      switch (start.kind) {
+        case StartKind::scramble: x[i + k] = center + half * random.symmetric(); break;
+        // the plane keeps x and y, the line x alone
+        case StartKind::plane:
+          if (k > 1) x[i + k] = center;
+          break;
+        case StartKind::line:
+          if (k > 0) x[i + k] = center;
+          break;
+        case StartKind::point: x[i + k] = center; break;
+        case StartKind::invert: x[i + k] = 2 * center - x[i + k]; break;
+        case StartKind::rest:
+        case StartKind::state: break;
+      }
+    }
+    double turned[3];
+    rotate(turn, &x[i], turned);
+    for (size_t k = 0; k < 3; ++k) x[i + k] = turned[k] + pose.position[k];
+  }
+  return x;
 }
 
 constexpr double kFrame = 1.0 / 60;  // s, assumed step if the scene names none

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/vec3.h"
+#include "math/extent.h"
 #include "scene/select.h"
 
 namespace dfm::scene {
@@ -54,15 +54,9 @@ double from_cell(const double *const corner[4], const double *point, double weig
 }  // namespace
 
 Locator::Locator(const BodyMesh &mesh) : mesh_(mesh) {
-  double hi[3];
-  for (int k = 0; k < 3; ++k) {
-    lo_[k] = INFINITY;
-    hi[k] = -INFINITY;
-    for (uint32_t i = 0; i < mesh.npoint; ++i) {
-      lo_[k] = std::min(lo_[k], mesh.points[3 * i + k]);
-      hi[k] = std::max(hi[k], mesh.points[3 * i + k]);
-    }
-  }
+  const Extent box = extent_of(mesh.points);
+  const Vec3 hi = box.hi;
+  store3(lo_, box.lo);
   // About one cubic bin per cell; a bin is never thinner than the thinnest extent of the body requires.
   const double extent = std::max({hi[0] - lo_[0], hi[1] - lo_[1], hi[2] - lo_[2]});
   double volume = 1;

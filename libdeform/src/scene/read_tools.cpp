@@ -1,13 +1,13 @@
 // "tools": what hands and devices move.
 #include "scene/keys.h"
 #include "scene/read.h"
+#include "scene/rotation.h"
 
 namespace dfm::scene {
 namespace {
 
-constexpr double kRadian = 0.017453292519943295;  // of a degree
-constexpr Range kOpening{0, 170, false, false};   // degrees
-constexpr Range kLate{0, 0.1, false, false};      // s
+constexpr Range kOpening{0, 170, false, false};  // degrees
+constexpr Range kLate{0, 0.1, false, false};     // s
 
 bool has_jaws(uint32_t shape) { return shape == DFM_TOOL_GRASPER || shape == DFM_TOOL_SCISSORS; }
 

@@ -4,6 +4,8 @@
 
 namespace dfm::scene {
 
+inline constexpr double kRadian = 0.017453292519943295;  // of a degree
+
 // axis need not be unit, but not zero. Multiples of 90 degrees come out to the last bit, and the same on
 // every machine: libm's sine is not used, since its last bit depends on the processor and the start state
 // decides the state hash.

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "scene/rotation.h"
 #include "scene/table.h"
 
 namespace dfm::scene {
@@ -231,8 +232,8 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
 namespace {
 
 constexpr char kPose[] = "t,x,y,z,qx,qy,qz,qw", kOpening[] = "t,x,y,z,qx,qy,qz,qw,opening_deg";
-constexpr uint64_t kMostRows = 4000000;                          // more than an hour at 1 kHz
-constexpr double kRadian = 0.017453292519943295, kWidest = 170;  // degrees
+constexpr uint64_t kMostRows = 4000000;  // more than an hour at 1 kHz
+constexpr double kWidest = 170;          // degrees
 
 }  // namespace
 

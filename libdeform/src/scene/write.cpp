@@ -315,11 +315,9 @@ Written write_filters(SceneWriter &to) {
       add(r.between[0], r.between[1], r.collide);
   }
   const auto name = [&](uint64_t id) -> std::string {
-    for (const auto &b : w.bodies)
-      if (b->id == id) return b->name;
-    for (const auto &o : w.obstacles)
-      if (o->id == id && !o->added) return o->name;
-    return "";
+    if (const Body *const b = w.body(id)) return b->name;
+    const Obstacle *const o = w.obstacle(id);
+    return o && !o->added ? o->name : "";
   };
   for (const PairAnswer &p : w.may_touch.answers)
     if (const std::string a = name(p.a), b = name(p.b); !p.touch && !a.empty() && !b.empty())

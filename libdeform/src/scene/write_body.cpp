@@ -339,14 +339,9 @@ void write_springs(SceneWriter &to, const Body &b, Written &out) {
 void write_attachments(SceneWriter &to, const Body &b, Written &out) {
   for (const Attachment &a : to.w.attachments) {
     if (a.body != b.id || a.released) continue;
-    const Body *const other = [&]() -> const Body * {
-      for (const auto &x : to.w.bodies)
-        if (!a.obstacle && x->id == a.to) return x.get();
-      return nullptr;
-    }();
-    std::string name = other ? other->name : "";
-    for (const auto &o : to.w.obstacles)
-      if (a.obstacle && o->id == a.to) name = o->name;
+    const Body *const other = to.w.body(a.to);
+    const Obstacle *const thing = to.w.obstacle(a.to);
+    const std::string name = other ? other->name : thing ? thing->name : "";
     Written entry;
     entry["to"] = name;
     std::vector<uint32_t> points;
@@ -358,12 +353,8 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     if (a.flags & DFM_ATTACH_TOUCH) entry["touch"] = true;
     out["attach"].push_back(std::move(entry));
     double away = 0;
-    for (size_t i = 0; i < a.surfels.size(); ++i) {
-      Vec3 x;
-      b.surface.each_phyxel(
-          a.surfels[i], [&](uint32_t p, double weight) { x += weight * load3(&b.p.x[kStride * size_t{p}]); });
-      away = std::max(away, norm(x - attached_place(to.w, a, i)));
-    }
+    for (size_t i = 0; i < a.surfels.size(); ++i)
+      away = std::max(away, norm(b.surface.sum(a.surfels[i], b.p.x.data()) - attached_place(to.w, a, i)));
     if (away > 1e-6 * b.surface.median_edge)
       to.note("body '%s': its attachment to '%s' is stretched by %g m now; in the scene it is at rest there",
               b.name.c_str(), name.c_str(), away);

@@ -55,10 +55,6 @@ Written write_obstacle(SceneWriter &to, const Obstacle &o) {
 
 namespace {
 
-const Obstacle &obstacle_of(const World &w, uint64_t id) {
-  return **std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](const auto &o) { return o->id == id; });
-}
-
 // The one added shape of a body without a shape of its own that a scene could say instead; null: none.
 const Obstacle *only_shape(const World &w, const RigidSet &set, uint32_t body) {
   const Obstacle *found = nullptr;
@@ -104,7 +100,7 @@ Written joint_of(const RigidSet &set, const dfm_joint_def &j) {
 
 Written rigid_body_of(SceneWriter &to, const RigidSet &set, uint32_t i) {
   const dfm_rigid_def &d = set.defs[i];
-  const Obstacle &o = obstacle_of(to.w, set.obstacle[i]);
+  const Obstacle &o = *to.w.obstacle(set.obstacle[i]);
   to.check_name("rigid body", o.name);
   const Obstacle *const other = d.shape == DFM_SHAPE_NONE ? only_shape(to.w, set, i) : nullptr;
   if (d.shape == DFM_SHAPE_NONE && !other) {

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "scene/keys.h"
+#include "scene/rotation.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
 #include "state/tool.h"
@@ -10,7 +11,7 @@
 namespace dfm::writing {
 namespace {
 
-constexpr double kRadian = 0.017453292519943295;  // of a degree
+using scene::kRadian;
 
 // In degrees, so that the reader gets the same radians where any number gives them.
 double degrees_of(double radians) {
@@ -100,9 +101,7 @@ Written write_tool(SceneWriter &to, const Tool &t) {
   write_opening(t, v, out);
   write_coupling(t, out);
   write_cuts(to, t, out);
-  const auto touched = std::find_if(to.w.obstacles.begin(), to.w.obstacles.end(),
-                                    [&](const auto &o) { return o->id == t.set->obstacle[0]; });
-  to.put_material(out, **touched);
+  to.put_material(out, *to.w.obstacle(t.set->obstacle[0]));
   tell(to, t, v);
   return out;
 }

@@ -127,15 +127,9 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
 // Bodies of the world that is restored into; both lists are in id order.
 struct Things {
   const World &w;
-  const Body *body(uint64_t id) const { return find(w.bodies, id); }
-  const Obstacle *obstacle(uint64_t id) const { return find(w.obstacles, id); }
+  const Body *body(uint64_t id) const { return w.body(id); }
+  const Obstacle *obstacle(uint64_t id) const { return w.obstacle(id); }
   bool known(uint64_t id) const { return body(id) || obstacle(id); }
-  template <class List>
-  static auto find(const List &list, uint64_t id) -> decltype(list[0].get()) {
-    const auto at = std::lower_bound(list.begin(), list.end(), id,
-                                     [](const auto &x, uint64_t value) { return x->id < value; });
-    return at != list.end() && (*at)->id == id ? at->get() : nullptr;
-  }
   // Whether an edge may have this number. Edge numbers of primitives are only compared and index nothing.
   bool edge(uint64_t id, uint32_t number) const {
     if (const Body *const b = body(id)) return number < b->surface.nedge;
@@ -249,7 +243,7 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
 void put_parameters(const Body &b, ModelInstance &model, const Dynamics &moves,
                     const std::vector<double> &values) {
   if (values == model.params) return;
-  if (model.put_params(values, moves.claims()) != DFM_OK)
+  if (model.put_params(values, moves.abilities().claims) != DFM_OK)
     fail(DFM_E_FORMAT,
          "the snapshot has other parameters for model '%s' of body '%s', which cannot take them while it "
          "runs; nothing was restored",

@@ -86,7 +86,7 @@ struct SpareModel {
   }
 };
 
-// The pressure of what touches a body, a running mean (step/squeezed.h).
+// The pressure of what touches a body, a running mean (step/step_bound.cpp).
 struct Squeezed {
   double pressure = 0, at = 0;  // Pa; s, of the last look
   double since = 0;             // s, of the last look at which it was small

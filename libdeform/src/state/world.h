@@ -207,6 +207,9 @@ struct World : WorldMemory, WorldState, Entities, Rules, Derived {
   // world.cpp
   Body *find_body(const std::string &name);
   Obstacle *find_obstacle(const std::string &name);
+  // By id; nullptr: there is none, or no more.
+  Body *body(uint64_t id) const;
+  Obstacle *obstacle(uint64_t id) const;
   uint64_t handle_of(uint64_t id) const;  // body or obstacle; 0 if gone
 };
 

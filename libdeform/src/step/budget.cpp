@@ -253,7 +253,7 @@ uint64_t body_work(const World &w, const StepContext &step) {
   uint64_t sum = 1;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    sum += b.dynamics->relative_work() * (b.p.n + b.tets.size() / 4);
+    sum += b.dynamics->abilities().work * (b.p.n + b.tets.size() / 4);
   }
   return sum;
 }

@@ -79,9 +79,8 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     for (const uint32_t i : step.active) {
       Body &b = *w.bodies[i];
       const OnBehalf speaks(b.name);
-      b.dynamics->see_ends();
       // for the work over the part of the motion that the guard has left out
-      if (b.dynamics->see_forces(now)) continue;
+      if (b.dynamics->see_end(now)) continue;
       *trouble |= tell_no_forces(w, b);
       return false;
     }

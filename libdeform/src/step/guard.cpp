@@ -25,6 +25,7 @@
 #include "geometry/pierce.h"
 #include "math/turn.h"
 #include "plugin/context.h"
+#include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -41,10 +42,9 @@ constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
 constexpr double kLeastCut = 0.25;
 // Strain: above the first a sub-step is repeated finer, until it is below the second.
 constexpr double kHardImpact = 0.08, kSoftImpact = 0.05;
-constexpr double kFinest = 4;         // sub-steps that an impact makes of one
-constexpr double kLight = 299792458;  // m/s
-constexpr double kNoWay = 0.02;       // of the motion of a sub-step: less counts as none
-constexpr double kSlow = 0.01;        // of d_g: what moves by less needs no closer look at how it does
+constexpr double kFinest = 4;    // sub-steps that an impact makes of one
+constexpr double kNoWay = 0.02;  // of the motion of a sub-step: less counts as none
+constexpr double kSlow = 0.01;   // of d_g: what moves by less needs no closer look at how it does
 // Of an implicit body in contact: edges that it moves a point beyond where its velocity leads, and the share
 // of its energy that the sub-step adds; above both a sub-step is repeated finer.
 constexpr double kTurns = 0.5, kGains = 0.01;
@@ -123,23 +123,13 @@ bool meets(const World &w, const StepContext &step, uint32_t slot) {
   return false;
 }
 
-// m, of the diagonal of its bounding box
-double extent(const Surface &s) {
-  Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high = -1.0 * low;
-  for (uint32_t i = 0; i < s.nsurfel; ++i)
-    for (int c = 0; c < 3; ++c) {
-      low[c] = std::min(low[c], s.x[size_t{4} * i + size_t(c)]);
-      high[c] = std::max(high[c], s.x[size_t{4} * i + size_t(c)]);
-    }
-  return norm(high - low);
-}
-
 // A body that steps itself turns its frame without contact; what contact changes is added along straight
 // lines. A spin w that contact stops leaves 1 - cos(h w) of the size as strain; way over size is about h w.
 double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
   if (!b.model.stepper || !b.model.can(DFM_CAP_ENERGY)) return 0;
   const double way = step.h * step.guard.change[slot];
-  return way > kStraight * b.surface.median_edge ? way / extent(b.surface) : 0;
+  if (!(way > kStraight * b.surface.median_edge)) return 0;
+  return way / extent_of(b.surface.x.data(), b.surface.nsurfel, kStride).diagonal();
 }
 
 // The equation of backward Euler may have further solutions in which the body, or a part of it, is turned
@@ -284,11 +274,7 @@ void set_sides(World &w, StepContext &step) {
 // distance between these ends and those of their straight ways.
 double set_back_ends(GuardScene &scene, GuardSide &side, Surface &s) {
   double most = 0;
-  const auto straight = [&](uint32_t i) {
-    Vec3 way;
-    s.each_phyxel(i, [&](uint32_t p, double weight) { way += weight * load3(&side.mean[4 * size_t{p}]); });
-    return scene.fraction * scene.h * way;
-  };
+  const auto straight = [&](uint32_t i) { return scene.fraction * scene.h * s.sum(i, side.mean); };
   for (const uint32_t t : s.laid)
     for (size_t k = 0; k < 3; ++k) {
       const uint32_t i = s.tri[3 * size_t{t} + k];

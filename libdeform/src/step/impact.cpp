@@ -32,17 +32,6 @@ constexpr double kSame = 1e-6;  // relative: a step of the announced length
 
 bool is_implicit(const Body &b) { return b.integrator.chosen == Chosen::implicit && !b.slumber.asleep; }
 
-// m, of its bounding box
-double extent(const Body &b) {
-  Vec3 low{HUGE_VAL, HUGE_VAL, HUGE_VAL}, high = -1.0 * low;
-  for (uint32_t i = 0; i < b.p.n; ++i)
-    for (int k = 0; k < 3; ++k) {
-      low[k] = std::min(low[k], b.p.x[size_t{kStride} * i + size_t(k)]);
-      high[k] = std::max(high[k], b.p.x[size_t{kStride} * i + size_t(k)]);
-    }
-  return norm(high - low);
-}
-
 bool touched(const Body &b) {
   return std::ranges::any_of(b.surfel_impulse, [](double p) { return p != 0; });
 }
@@ -147,7 +136,8 @@ void begin_impact(World &w) {
   double lasts = 0;
   for (const auto &b : w.bodies)
     if (is_implicit(*b))
-      lasts = std::max(lasts, kEdges * extent(*b) / b->surface.median_edge * b->integrator.step);
+      lasts = std::max(lasts, kEdges * extent_of(b->p.x.data(), b->p.n, kStride).diagonal() /
+                                  b->surface.median_edge * b->integrator.step);
   turn(w, Chosen::implicit, Chosen::struck);
   w.struck_until = w.time + lasts;
   w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.struck_until);

@@ -64,12 +64,9 @@ Zones zones_of(const World &w, const ContactPoint &c) {
 
 // Index among bodies and obstacles, or kNone.
 uint32_t thing_of(const World &w, uint64_t id) {
-  const auto is = [id](const auto &thing) { return thing->id == id; };
-  if (const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), is); b != w.bodies.end())
-    return static_cast<uint32_t>(b - w.bodies.begin());
-  const auto o = std::find_if(w.obstacles.begin(), w.obstacles.end(), is);
-  return o == w.obstacles.end() ? kNone
-                                : static_cast<uint32_t>(w.bodies.size() + size_t(o - w.obstacles.begin()));
+  if (const uint32_t b = slot_of(w, id); b != kNone) return b;
+  const uint32_t o = obstacle_slot_of(w, id);
+  return o == kNone ? kNone : static_cast<uint32_t>(w.bodies.size()) + o;
 }
 
 uint32_t law_of_zones(World &w, uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b) {

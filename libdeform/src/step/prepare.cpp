@@ -7,14 +7,12 @@
 #include <algorithm>
 #include <bit>
 #include <map>
-#include <tuple>
 #include <utility>
 #include <vector>
 
 #include "body/implicit_system.h"
 #include "body/obstacle_mesh.h"
 #include "core/error.h"
-#include "dynamics/relative_work.h"
 #include "friction/pair_rules.h"
 #include "geometry/voxel_grid.h"
 #include "plan/integrators.h"
@@ -127,17 +125,8 @@ void offer(const dfm_type &type, std::vector<SceneFacts::Provider> &to) {
   for (const std::string &e : effects(type)) to.push_back({e, type.id});
 }
 
-// Prescribed motions and loads, for the plan.
-struct Prescribed {
-  bool gravity_keys = false;
-  bool loads_vary = false;
-  bool held_move = false;
-  bool obstacles_move = false;
-  bool operator==(const Prescribed &) const = default;
-};
-
-Prescribed prescribed(const World &w) {
-  Prescribed p;
+Varying varying(const World &w) {
+  Varying p;
   p.gravity_keys = !w.gravity.keys.empty();
   for (auto &b : w.bodies) {
     p.loads_vary |= b->loads_vary();
@@ -147,22 +136,13 @@ Prescribed prescribed(const World &w) {
   return p;
 }
 
-void put(const Prescribed &p, SceneFacts &facts) {
-  facts.gravity_keys = p.gravity_keys;
-  facts.loads_vary = p.loads_vary;
-  facts.held_move = p.held_move;
-  facts.obstacles_move = p.obstacles_move;
-}
-
 // Updates only the plan, if changed values call for another stage.
 void look_at_plan(World &w, StepContext &step) {
-  const SceneFacts &old = step.facts;
-  const Prescribed now = prescribed(w);
-  if (now != Prescribed{old.gravity_keys, old.loads_vary, old.held_move, old.obstacles_move}) {
-    SceneFacts facts = old;
-    put(now, facts);
+  SceneFacts facts = step.facts;
+  static_cast<Varying &>(facts) = varying(w);
+  if (facts != step.facts) {
     w.plan = make_plan(facts);
-    put(now, step.facts);
+    step.facts = std::move(facts);
     ++step.made.plans;
   }
   w.revalued = false;
@@ -469,26 +449,6 @@ void choose_integrators(World &w) {
   }
 }
 
-// All that a plan is made of.
-bool same(const SceneFacts &a, const SceneFacts &b) {
-  const auto numbers = [](const SceneFacts &f) {
-    return std::tie(f.bodies, f.self_stepping, f.obstacles, f.coupled, f.coupled_surfels, f.body_pairs,
-                    f.obstacle_pairs, f.rigid_bodies, f.rigid_joints, f.attachments, f.paid_cuts,
-                    f.rigid_hosts, f.rigid_pairs, f.rigid_alone);
-  };
-  const auto flags = [](const SceneFacts &f) {
-    return std::tie(f.gravity_keys, f.loads_vary, f.held_move, f.obstacles_move, f.unguarded,
-                    f.effects_listed, f.sleep, f.self, f.self_auto, f.self_bodies, f.self_cut, f.asked);
-  };
-  const auto provided = [](const std::vector<SceneFacts::Provider> &l,
-                           const std::vector<SceneFacts::Provider> &r) {
-    return std::ranges::equal(l, r,
-                              [](auto &x, auto &y) { return x.effect == y.effect && x.plugin == y.plugin; });
-  };
-  return numbers(a) == numbers(b) && flags(a) == flags(b) && provided(a.offered, b.offered) &&
-         provided(a.idle, b.idle) && provided(a.available, b.available);
-}
-
 // planned: the facts of the present plan.
 void choose_plan(World &w, StepContext &step, SceneFacts &facts, const SceneFacts &planned) {
   for (const dfm_type *t : w.context->registry.list()) offer(*t, facts.available);
@@ -505,7 +465,7 @@ void choose_plan(World &w, StepContext &step, SceneFacts &facts, const SceneFact
   }
   if (!facts.unguarded && (touch || (facts.bodies && facts.effects_listed)))
     facts.offered.push_back({kGuard, "contact"});
-  if (same(facts, planned)) return;
+  if (facts == planned) return;
   w.plan = make_plan(facts);
   ++step.made.plans;
 }
@@ -567,7 +527,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   facts.sleep = w.def.sleep != 0;
   facts.attachments = static_cast<unsigned>(w.attachments.size());
   facts.paid_cuts = paid_cuts(w);
-  put(prescribed(w), facts);
+  static_cast<Varying &>(facts) = varying(w);
   step.exchange.clear();
   view_bodies(w, step, facts);
   view_obstacles_anew(w, step);

@@ -283,15 +283,6 @@ void count_self(World &w, StepContext &step) {
   w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
 }
 
-// Velocity of a surfel over the sub-step after the solve.
-Vec3 velocity_after(const Body &b, uint32_t surfel) {
-  const double *const mean = b.dynamics->end().mean;
-  Vec3 sum;
-  b.surface.each_phyxel(
-      surfel, [&](uint32_t p, double weight) { sum += weight * load3(&mean[size_t(p) * kStride]); });
-  return sum;
-}
-
 }  // namespace
 
 void follow_list(SelfBody &s, double offset) {
@@ -327,8 +318,9 @@ bool cover_self(World &w, StepContext &step) {
     if (step.body_views[b.slot].asleep) continue;
     const double change = step.guard.change[b.slot];
     // An impact may fold a surface within the sub-step that was far from itself before the solve.
-    if (!s->on &&
-        s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) { return velocity_after(b, surfel); }))
+    if (!s->on && s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) {
+          return b.surface.sum(surfel, b.dynamics->end().mean);
+        }))
       switch_to(*s, true);
     if (s->on && s->list.cover(step.h, w.offset, change)) follow_list(*s, w.offset);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);

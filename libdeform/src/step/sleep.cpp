@@ -71,17 +71,13 @@ bool asleep(const World &w, uint64_t id) {
 }  // namespace
 
 // Ids increase with the slots; only prepare() renumbers slots.
-uint32_t slot_of(const World &w, uint64_t id) {
-  const auto at = std::lower_bound(w.bodies.begin(), w.bodies.end(), id,
-                                   [](const auto &b, uint64_t value) { return b->id < value; });
-  return at != w.bodies.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.bodies.begin()) : kNone;
+template <class List>
+static uint32_t place_of(const List &list, uint64_t id) {
+  const auto at = std::ranges::lower_bound(list, id, {}, [](const auto &x) { return x->id; });
+  return at != list.end() && (*at)->id == id ? static_cast<uint32_t>(at - list.begin()) : kNone;
 }
-
-uint32_t obstacle_slot_of(const World &w, uint64_t id) {
-  const auto at = std::lower_bound(w.obstacles.begin(), w.obstacles.end(), id,
-                                   [](const auto &o, uint64_t value) { return o->id < value; });
-  return at != w.obstacles.end() && (*at)->id == id ? static_cast<uint32_t>(at - w.obstacles.begin()) : kNone;
-}
+uint32_t slot_of(const World &w, uint64_t id) { return place_of(w.bodies, id); }
+uint32_t obstacle_slot_of(const World &w, uint64_t id) { return place_of(w.obstacles, id); }
 
 // Finds the active bodies of a sub-step, and the bodies that receive contact impulses.
 void gather_active(World &w) {
@@ -349,9 +345,7 @@ void hold_sleepers(World &w) {
 // Called before a body or an obstacle is removed from the world: bodies that touched it wake, and higher
 // slots in the contacts of sleeping bodies move down by one.
 void close_slot(World &w, uint64_t id, bool obstacle) {
-  const auto thing =
-      std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->id == id; });
-  const uint32_t slot = obstacle ? static_cast<uint32_t>(thing - w.obstacles.begin()) : slot_of(w, id);
+  const uint32_t slot = obstacle ? obstacle_slot_of(w, id) : slot_of(w, id);
   if (obstacle) wake_touching(w, id);
   else wake(w, *w.bodies[slot]);
   if (w.sleepers == 0) w.report.n = 0;

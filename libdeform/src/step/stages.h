@@ -64,22 +64,6 @@ void reopen_integrators(World &w);
 void set_gravity_now(World &w);  // from its keys, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 
-// The rows of the table in step.cpp that pass to a stage the parts of world and context that it reads and
-// writes; doc/concepts/architecture.md lists these parts.
-namespace row {
-Next motion(World &w, StepContext &step, uint32_t *trouble);
-Next model(World &w, StepContext &step, uint32_t *trouble);
-Next predict(World &w, StepContext &step, uint32_t *trouble);
-Next rigid_predict(World &w, StepContext &step, uint32_t *trouble);
-Next gather(World &w, StepContext &step, uint32_t *trouble);
-Next broad(World &w, StepContext &step, uint32_t *trouble);
-Next self(World &w, StepContext &step, uint32_t *trouble);
-Next solve(World &w, StepContext &step, uint32_t *trouble);
-Next distribute(World &w, StepContext &step, uint32_t *trouble);
-Next commit(World &w, StepContext &step, uint32_t *trouble);
-Next sleep(World &w, StepContext &step, uint32_t *trouble);
-}  // namespace row
-
 using Active = std::span<const uint32_t>;  // slots of the bodies that stages work on, ascending
 // A held velocity component set by this sub-step.
 struct Driven { double *velocity, before; };

@@ -35,6 +35,55 @@
 namespace dfm {
 namespace {
 
+// The rows of the table that pass to a stage the parts of world and context that it reads and writes;
+// doc/concepts/architecture.md lists these parts.
+namespace row {
+
+Next motion(World &w, StepContext &step, uint32_t *) {
+  stage_motion(w, step.h, step.rest, step.driven);
+  return Next::stage;
+}
+Next model(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage_model(w, step.active, sub_step_of(w, step), trouble));
+}
+Next predict(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
+               watch_energy(w, step, trouble));
+}
+Next rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage_rigid_predict(w, step, trouble));
+}
+Next gather(World &w, StepContext &step, uint32_t *) {
+  stage_gather(w, step.active);
+  return Next::stage;
+}
+Next broad(World &w, StepContext &step, uint32_t *) {
+  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, w.context->tasks,
+              step.broad);
+  return Next::stage;
+}
+Next self(World &w, StepContext &step, uint32_t *) {
+  stage_self(w, step);
+  return Next::stage;
+}
+Next solve(World &w, StepContext &step, uint32_t *trouble) {
+  const bool solved = stage_solve(w, step, trouble);
+  step.guard.resolving = false;
+  return go_on(solved);
+}
+Next distribute(World &, StepContext &step, uint32_t *) {
+  step.ended = false;
+  give_impulses(step);
+  return Next::stage;
+}
+Next commit(World &w, StepContext &step, uint32_t *trouble) { return go_on(stage_commit(w, step, trouble)); }
+Next sleep(World &w, StepContext &step, uint32_t *) {
+  stage_sleep(w, step);
+  return Next::stage;
+}
+
+}  // namespace row
+
 constexpr Stage kTable[] = {
     {"motion", row::motion, cost::prescribed, when::motion},
     {"model", row::model, cost::cells, when::model},
@@ -93,53 +142,6 @@ Plan make_plan(const SceneFacts &facts) {
   }
   return plan;
 }
-
-namespace row {
-
-Next motion(World &w, StepContext &step, uint32_t *) {
-  stage_motion(w, step.h, step.rest, step.driven);
-  return Next::stage;
-}
-Next model(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage_model(w, step.active, sub_step_of(w, step), trouble));
-}
-Next predict(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
-               watch_energy(w, step, trouble));
-}
-Next rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage_rigid_predict(w, step, trouble));
-}
-Next gather(World &w, StepContext &step, uint32_t *) {
-  stage_gather(w, step.active);
-  return Next::stage;
-}
-Next broad(World &w, StepContext &step, uint32_t *) {
-  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, w.context->tasks,
-              step.broad);
-  return Next::stage;
-}
-Next self(World &w, StepContext &step, uint32_t *) {
-  stage_self(w, step);
-  return Next::stage;
-}
-Next solve(World &w, StepContext &step, uint32_t *trouble) {
-  const bool solved = stage_solve(w, step, trouble);
-  step.guard.resolving = false;
-  return go_on(solved);
-}
-Next distribute(World &, StepContext &step, uint32_t *) {
-  step.ended = false;
-  give_impulses(step);
-  return Next::stage;
-}
-Next commit(World &w, StepContext &step, uint32_t *trouble) { return go_on(stage_commit(w, step, trouble)); }
-Next sleep(World &w, StepContext &step, uint32_t *) {
-  stage_sleep(w, step);
-  return Next::stage;
-}
-
-}  // namespace row
 
 namespace {
 

@@ -57,7 +57,7 @@ std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
            did_you_mean(def.group, groups, '\'').c_str());
   }
   for (uint32_t i = 0; def.box && i < s.nsurfel; ++i) {
-    const Vec3 x = surfel_vector(b, b.p.x, i);
+    const Vec3 x = b.surface.sum(i, b.p.x.data());
     bool in = true;
     for (int k = 0; k < 3; ++k) in = in && x[k] >= def.box[k] && x[k] <= def.box[3 + k];
     if (in) out[i] = 1;
@@ -74,7 +74,7 @@ struct Place {
 };
 Place place_on(const Body &b, const TriangleNearPoint &near, Vec3 x) {
   const Surface &s = b.surface;
-  const auto at = [&](uint32_t i) { return surfel_vector(b, b.p.x, i); };
+  const auto at = [&](uint32_t i) { return b.surface.sum(i, b.p.x.data()); };
   Place p{};
   for (uint32_t k = 0; k < 3; ++k) {
     p.node[k] = s.tri[3 * size_t{near.triangle} + k];
@@ -105,7 +105,7 @@ Place place_on(const Body &b, const TriangleNearPoint &near, Vec3 x) {
 
 void place_on_body(const Body &b, const dfm_attach_def &def, Body &other, Attachment &a) {
   for (uint32_t i = 0, n = 0; i < a.surfels.size(); ++i) {
-    const Vec3 x = surfel_vector(b, b.p.x, a.surfels[i]);
+    const Vec3 x = b.surface.sum(a.surfels[i], b.p.x.data());
     const TriangleNearPoint near = closest_on_body(other, x);
     if (def.max_distance > 0 && near.key > def.max_distance * def.max_distance) continue;
     const Place p = place_on(other, near, x);
@@ -121,7 +121,7 @@ void place_on_obstacle(const Body &b, const Obstacle &o, Attachment &a) {
   a.place.resize(3 * a.surfels.size());
   for (size_t i = 0; i < a.surfels.size(); ++i)
     store3(&a.place[3 * i],
-           rotate_back(frame.rotation, surfel_vector(b, b.p.x, a.surfels[i]) - frame.position));
+           rotate_back(frame.rotation, b.surface.sum(a.surfels[i], b.p.x.data()) - frame.position));
 }
 
 void check_values(const Body &b, const dfm_attach_def &def) {
@@ -205,7 +205,7 @@ dfm_attachment attachment_report(const Body &b, uint32_t number) {
   for (const Attachment &a : w.attachments) {
     if (a.body != b.id || a.number != number || a.released) continue;
     for (size_t i = 0; i < a.surfels.size(); ++i) {
-      x.push_back(surfel_vector(b, b.p.x, a.surfels[i]));
+      x.push_back(b.surface.sum(a.surfels[i], b.p.x.data()));
       f.push_back(a.h > 0 ? (1 / a.h) * load3(&a.impulse[3 * i]) : Vec3{});
       out.stretch = std::max(out.stretch, norm(x.back() - attached_place(w, a, i)));
     }

@@ -124,11 +124,11 @@ class EffectsAtWork {
 // In the model and its values.
 void give_params(Body &b, const std::vector<double> &values) {
   const char *const type = b.model.type->id;
-  const dfm_status status = b.model.put_params(values, b.dynamics->claims());
+  const dfm_status status = b.model.put_params(values, b.dynamics->abilities().claims);
   if (status == DFM_E_NOMEM)
     fail(DFM_E_NOMEM, "body '%s': model '%s' ran out of memory with these parameters; nothing was changed",
          b.name.c_str(), type);
-  if (status == DFM_E_UNSUPPORTED && b.dynamics->claims())
+  if (status == DFM_E_UNSUPPORTED && b.dynamics->abilities().claims)
     fail(DFM_E_UNSUPPORTED,
          "body '%s': model '%s' does not accept these parameters during a run, or its stiffness matrix would "
          "change in kind; set the model again with them (dfm_body_set_model)",

@@ -428,7 +428,7 @@ bool is_near(const Body &b, const SwitchRule &r) {
   const bool was = r.level == uint32_t(SwitchLevel::near);
   const double limit = r.distance * (was ? 1 + r.hysteresis : 1);
   for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
-    if (norm2(surfel_vector(b, b.p.x, s) - r.point) <= limit * limit) return true;
+    if (norm2(b.surface.sum(s, b.p.x.data()) - r.point) <= limit * limit) return true;
   }
   return false;
 }

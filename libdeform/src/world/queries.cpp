@@ -84,7 +84,7 @@ double ray_capsule(Vec3 o, Vec3 d, double r, double half, Vec3 *normal) {
 Triangles search(Body &b) {
   return b.search->at(b.x_version, b.surface.tri, b.surface.nsurfel, [&](double *x) {
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
-      store3(x + 4 * size_t{s}, surfel_vector(b, b.p.x, s));
+      store3(x + 4 * size_t{s}, b.surface.sum(s, b.p.x.data()));
       x[4 * size_t{s} + 3] = 0;
     }
   });
@@ -126,17 +126,10 @@ double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 direction, Vec3 *norma
   return t;
 }
 
-Vec3 surfel_vector(const Body &b, const Array<double> &column, uint32_t s) {
-  if (b.surface.identity()) return load3(&column[size_t(b.surface.point[s]) * kStride]);
-  Vec3 sum;
-  b.surface.each_phyxel(s, [&](uint32_t i, double w) { sum += w * load3(&column[size_t(i) * kStride]); });
-  return sum;
-}
-
 void surface_normals(const Body &b, double *out) {
   std::fill(out, out + size_t(3) * b.surface.nsurfel, 0.0);
   for (uint32_t t = 0; t < b.surface.ntri; ++t) {
-    const Vec3 n = b.surface.area2(t, [&](uint32_t s) { return surfel_vector(b, b.p.x, s); });
+    const Vec3 n = b.surface.area2(t, [&](uint32_t s) { return b.surface.sum(s, b.p.x.data()); });
     for (int k = 0; k < 3; ++k) {
       double *const to = out + size_t(3) * b.surface.tri[size_t(3) * t + size_t(k)];
       store3(to, load3(to) + n);

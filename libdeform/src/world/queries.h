@@ -17,15 +17,13 @@ Vec3 normal_of(const Triangles &triangles, uint32_t triangle);
 // the point where the ray leaves.
 double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 unit_direction, Vec3 *normal);
 
-// N times a column of the phyxels
-Vec3 surfel_vector(const Body &b, const Array<double> &phyxel_column, uint32_t surfel);
 // Displacements from the rest shape at the body's pose.
 inline Vec3 displacement(const Body &b, uint32_t point) {
   return b.p.x_at(point) - place(b.origin.frame, b.p.rest_at(point));
 }
 inline Vec3 surfel_displacement(const Body &b, uint32_t s) {
   if (b.surface.identity()) return displacement(b, b.surface.point[s]);
-  return surfel_vector(b, b.p.x, s) - place(b.origin.frame, load3(&b.surface.rest[size_t{3} * s]));
+  return b.surface.sum(s, b.p.x.data()) - place(b.origin.frame, load3(&b.surface.rest[size_t{3} * s]));
 }
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);

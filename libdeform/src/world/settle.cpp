@@ -1,5 +1,5 @@
 // Each step is a step of the world from rest, with the usual contact, friction and guard. Two things differ:
-// the dynamics of bodies (dynamics/settling_points.h), and prescribed motions and loads are constant at their
+// the dynamics of bodies (SettlingPoints), and prescribed motions and loads are constant at their
 // values at the end of the load step (World::prescribed).
 //
 //   load step   gravity and loads at its share; keys and sines go on to its time
@@ -11,10 +11,10 @@
 #include <cmath>
 #include <memory>
 #include <vector>
+#include <utility>
 
 #include "core/error.h"
 #include "dynamics/at_rest.h"
-#include "dynamics/settling_points.h"
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -25,9 +25,137 @@
 #include "step/watch/energy_watch.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
+#include "dynamics/implicit_points.h"
 
 namespace dfm {
 namespace {
+
+// Points on their way to an equilibrium with contact, in steps of backward Euler from rest:
+//
+//   f(x) + loads + M g + contact = (M / h^2 + S) (x - x0)
+//
+// (S: of compliant loads, and of what slows touched points, N/m)
+// which is the condition of equilibrium once x stops changing. M / h^2 decides the length of a step, not
+// where steps end; it bounds the motion of bodies that nothing holds (the proximal point method, Rockafellar
+// 1976). A step starts with the contact forces of the step before. Without them bodies would fall freely by
+// h^2 g before contacts are found, which is meters in a step of a second.
+
+class SettlingPoints : public ImplicitPoints {
+ public:
+  // softness: [npoint] N/m, S. error: m, tolerance of Newton's method for points at rest.
+  SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                 const ImplicitOptions &options, const std::vector<double> &softness, double error);
+
+  // The contact forces to start with: impulses at the surfels [nsurfel,3] over h seconds; h 0: none.
+  void start_from(const double *surfel_impulse, double h);
+  // In the next steps, points that contacts push, or have pushed since the last call with 0, resist their
+  // motion in a step by this multiple of their own stiffness, as softness does. It shortens steps there, and
+  // does not change where they end.
+  void slow_touched(double times);
+  const double *contact_force() const { return last_.data(); }  // [npoint,3] N, of the last step
+  double stiffest() const { return stiffest_; }                 // N/m, of a point, in the last step
+
+  Abilities abilities() const override {
+    Abilities a = ImplicitPoints::abilities();
+    a.damps = false;  // its steps are not steps in time
+    return a;
+  }
+  bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
+  bool free_motion(const SubStep &now, double &kinetic) override;
+  // with the last contact forces: used to find contacts
+  const double *point_velocity() const override { return guess_.data(); }
+  const double *start() const override { return guess_.data(); }
+  bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
+  double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
+  void commit(const SubStep &now, double fraction) override;
+
+ private:
+  double error_allowed_, stiffest_ = 0;
+  double slowed_ = 0;  // multiple of their own stiffness by which touched points resist
+  // [npoint] N/m: stiffness of loads; the model's own at a touched point, else 0
+  Array<double> springs_of_loads_, own_;
+  Array<double> last_, next_;  // [npoint,3] N, contact forces of the last step and at the end of this one
+  Array<double> guess_;        // [npoint,4] m/s
+  Array<double> load_;         // [npoint,4] N, loads alone
+  // [npoint,3] N s, m/s: the last contact forces, and their effect on velocities
+  Array<double> impulse_, taken_;
+};
+
+SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                               const ImplicitOptions &options, const std::vector<double> &softness,
+                               double error)
+    : ImplicitPoints(memory, points, surface, model, options), error_allowed_(error) {
+  use_memory(memory, softness_, last_, next_, guess_, load_, impulse_, taken_, springs_of_loads_, own_);
+  for (Array<double> *a : {&last_, &next_, &impulse_, &taken_}) a->assign(size_t{3} * points.n, 0.0);
+  guess_.assign(size_t{kStride} * points.n, 0.0);
+  softness_.assign(softness.begin(), softness.end());
+  springs_of_loads_ = softness_;
+  own_.assign(points.n, 0.0);
+}
+
+void SettlingPoints::start_from(const double *surfel_impulse, double h) {
+  std::fill(last_.begin(), last_.end(), 0.0);
+  if (h > 0) spread_impulses(surfel_impulse, 1 / h, last_);
+}
+
+void SettlingPoints::slow_touched(double times) {
+  if (times == 0 && slowed_ == 0) return;
+  if (times == 0) std::fill(own_.begin(), own_.end(), 0.0);
+  else
+    for (uint32_t i = 0; i < p_.n; ++i) {
+      const double *const push = &last_[size_t{3} * i];
+      if (own_[i] == 0 && (push[0] != 0 || push[1] != 0 || push[2] != 0)) own_[i] = own_stiffness(i);
+    }
+  slowed_ = times;
+  bool changed = false;
+  for (uint32_t i = 0; i < p_.n; ++i) {
+    const double before = std::exchange(softness_[i], springs_of_loads_[i] + times * own_[i]);
+    changed = changed || softness_[i] != before;
+  }
+  if (changed) softness_changed();
+}
+
+// The scheme is stable at any step, also with loads that depend on positions.
+bool SettlingPoints::bound(double, double, const AddRowSums &, StepBound &out) {
+  out = {};
+  return true;
+}
+
+// One linear correction only: with contact forces that do not rotate with the body, a standing body may have
+// no equilibrium near, and Newton's method would search for it forever.
+bool SettlingPoints::free_motion(const SubStep &now, double &) {
+  load_ = p_.load;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      p_.load[size_t{kStride} * i + c] += last_[size_t{3} * i + c];
+      impulse_[size_t{3} * i + c] = now.h * last_[size_t{3} * i + c];
+    }
+  options_.rest = error_allowed_ / now.h;
+  const bool found = take_first_way(now);
+  p_.load.swap(load_);
+  guess_ = p_.v_free;
+  if (!found || !solve(impulse_, taken_)) return false;
+  stiffest_ = largest_diagonal() / (now.h * now.h);
+  double poison = 0;
+  for (uint32_t i = 0; i < p_.n; ++i)
+    for (uint32_t c = 0; c < 3; ++c) {
+      const size_t at = size_t{kStride} * i + c;
+      p_.v_free[at] -= taken_[size_t{3} * i + c];
+      poison += 0.0 * p_.v_free[at];
+    }
+  return poison == 0;
+}
+
+bool SettlingPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
+  std::fill(next_.begin(), next_.end(), 0.0);
+  if (touched) spread_impulses(surfel_impulse, 1 / now.h, next_);
+  return ImplicitPoints::end_state(now, surfel_impulse, touched);
+}
+
+void SettlingPoints::commit(const SubStep &now, double fraction) {
+  last_.swap(next_);
+  ImplicitPoints::commit(now, fraction);
+}
 
 // s, length of a step. The longer it is, the more the stiffness and the less the mass of a body decides its
 // end.

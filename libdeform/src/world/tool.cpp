@@ -363,7 +363,7 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint3
   const double limit = reach > 0 ? reach : 2 * w.offset;
   std::vector<std::vector<uint32_t>> held(t.parts.size());
   for (uint32_t i = 0; i < b.surface.nsurfel; ++i) {
-    const Vec3 x = surfel_vector(b, b.p.x, i);
+    const Vec3 x = b.surface.sum(i, b.p.x.data());
     double nearest = HUGE_VAL;
     uint32_t part = kNone;
     for (auto &o : w.obstacles) {

@@ -2,6 +2,8 @@
 #include "state/world.h"
 #include "step/context.h"
 
+#include <algorithm>
+
 #include "core/aside.h"
 #include "plugin/context.h"
 #include "state/material.h"
@@ -21,6 +23,18 @@ World::World(dfm_context *c)
 
 World::~World() = default;
 
+namespace {
+// Lists are in the order of ids.
+template <class List>
+auto *of_id(const List &list, uint64_t id) {
+  const auto at = std::ranges::lower_bound(list, id, {}, [](const auto &x) { return x->id; });
+  return at != list.end() && (*at)->id == id ? at->get() : nullptr;
+}
+}  // namespace
+
+Body *World::body(uint64_t id) const { return of_id(bodies, id); }
+Obstacle *World::obstacle(uint64_t id) const { return of_id(obstacles, id); }
+
 Body *World::find_body(const std::string &name) {
   for (auto *list : {&bodies, &emptied})
     for (auto &b : *list)
@@ -38,9 +52,8 @@ uint64_t World::handle_of(uint64_t id) const {
   for (auto *list : {&bodies, &emptied, &undone})
     for (auto &b : *list)
       if (b->id == id) return b->handle;
-  for (auto &o : obstacles)
-    if (o->id == id) return o->handle;
-  return 0;
+  const Obstacle *const o = obstacle(id);
+  return o ? o->handle : 0;
 }
 
 }  // namespace dfm

@@ -70,7 +70,7 @@ TEST(ExplicitPoints, PartsAndWhole_LeadToTheSameBits) {
   EXPECT_EQ(whole.body->p.x_end, parts.body->p.x_end);
   EXPECT_NEAR(whole.kinetic, parts.kinetic, 1e-12 * whole.kinetic);
   EXPECT_NE(whole.body->p.f, parts.body->p.f);
-  EXPECT_TRUE(whole.body->dynamics->see_forces(whole.now) && parts.body->dynamics->see_forces(parts.now));
+  EXPECT_TRUE(whole.body->dynamics->see_end(whole.now) && parts.body->dynamics->see_end(parts.now));
   const dfm::Phyxels &p = parts.body->p;
   double most = 0;
   for (const double f : whole.body->p.f) most = std::max(most, std::fabs(f));
@@ -84,14 +84,14 @@ TEST(ExplicitPoints, PartsAndWhole_LeadToTheSameBits) {
 TEST(ExplicitPoints, ForcesOfAMotionByParts_AreSeenWithoutTheModel) {
   const Falling f;
   dfm::Body &b = *f.body;
-  EXPECT_TRUE(b.dynamics->see_forces(f.now));
+  EXPECT_TRUE(b.dynamics->see_end(f.now));
   const std::vector<double> before(b.p.f.begin(), b.p.f.end());
   const dfm_model *const ops = b.model.ops;
   dfm_model fails = *ops;
   fails.add_forces = [](void *, const dfm_kin *, double *) { return dfm_status(DFM_E_FATAL); };
   b.model.ops = &fails;
   f.end(f.impulses(1, 2));
-  EXPECT_TRUE(b.dynamics->see_forces(f.now));
+  EXPECT_TRUE(b.dynamics->see_end(f.now));
   b.model.ops = ops;
   EXPECT_TRUE(std::equal(before.begin(), before.end(), b.p.f.begin()));
 }

@@ -92,7 +92,7 @@ TEST(FinishSurface, ValidBox_IsUnchanged) {
   const TriMesh m = finished(s);
   EXPECT_EQ(all_warnings(m), "");
   for (uint32_t i = 0; i < 36; ++i) EXPECT_EQ(m.tris[i], s.tris[i / 3][i % 3]);
-  const TriMeshStatistics st = tri_mesh_statistics(m);
+  const dfm_trimesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(st.nedge, 18u);
   EXPECT_EQ(st.npiece, 1u);
@@ -108,7 +108,7 @@ TEST(FinishSurface, LooseCorners_AreMergedToTheFirst) {
   EXPECT_EQ(m.npoint(), 8u);
   EXPECT_EQ(m.merged_points, 28u);
   EXPECT_EQ(m.dropped_points, 0u);
-  EXPECT_TRUE(tri_mesh_statistics(m).closed);
+  EXPECT_TRUE(mesh_statistics(m).closed);
   for (uint32_t p = 0; p < 8; ++p) {
     const Vec3 here = load3(&m.points[3 * size_t(p)]);
     for (uint32_t q = 0; q < s.points.size(); ++q)
@@ -139,7 +139,7 @@ TEST(FinishSurface, OneRoundingApart_IsMerged) {
       }
       const TriMesh m = finished(s, scale);
       EXPECT_EQ(m.npoint(), 8u) << scale << ' ' << apart;
-      EXPECT_TRUE(tri_mesh_statistics(m).closed) << scale << ' ' << apart;
+      EXPECT_TRUE(mesh_statistics(m).closed) << scale << ' ' << apart;
       EXPECT_EQ(m.merged_points, 28u);
     }
   Soup s = loose(box({}, {1, 1, 1}));
@@ -173,7 +173,7 @@ TEST(FinishSurface, FartherApart_IsNotMerged) {
 TEST(FinishSurface, TurnedAtRandom_FacesOutward) {
   for (const uint32_t every : {1u, 2u, 3u, 4u}) {
     const TriMesh m = finished(turned(box({}, {1, 1, 1}), every));
-    const TriMeshStatistics st = tri_mesh_statistics(m);
+    const dfm_trimesh_info st = mesh_statistics(m);
     EXPECT_TRUE(st.closed) << every;
     EXPECT_NEAR(st.volume, 1, 1e-15) << every;
     EXPECT_EQ(m.turned, (11 + every) / every);
@@ -184,14 +184,14 @@ TEST(FinishSurface, AnySizeAndPlace_SameRepairs) {
   const Soup s = loose(turned(joined(box({}, {3, 3, 3}), box({1, 1, 1}, {2, 2, 2})), 3));
   for (const double scale : {1e-150, 1e-9, 1.0, 1e5, 1e90}) {
     const TriMesh m = finished(s, scale);
-    const TriMeshStatistics st = tri_mesh_statistics(m);
+    const dfm_trimesh_info st = mesh_statistics(m);
     EXPECT_EQ(m.npoint(), 16u) << scale;
     EXPECT_EQ(m.ntri(), 24u) << scale;
     EXPECT_TRUE(st.closed) << scale;
     EXPECT_NEAR(st.volume / scale / scale / scale, scale < 1e-100 ? 0 : 26, 1e-12) << scale;
     EXPECT_NEAR(st.quality_min, std::sqrt(3.0) / 2, 1e-12) << scale;
   }
-  const TriMeshStatistics far = tri_mesh_statistics(finished(s, 0.125, {1e7, -1e7, 1e7}));
+  const dfm_trimesh_info far = mesh_statistics(finished(s, 0.125, {1e7, -1e7, 1e7}));
   EXPECT_TRUE(far.closed);
   EXPECT_NEAR(far.volume, 26 * 0.125 * 0.125 * 0.125, 1e-12);
 }
@@ -202,14 +202,14 @@ TEST(FinishSurface, Nested_AlternatesOutwardAndIntoTheHole) {
                   joined(box({2, 2, 2}, {4, 4, 4}), box({5, 5, 5}, {7, 7, 7})));
   for (const Soup &given : {s, turned(s), turned(s, 5)}) {
     const TriMesh m = finished(given);
-    EXPECT_NEAR(tri_mesh_statistics(m).volume, 729 - 343 + 8 + 8, 1e-11);
-    EXPECT_EQ(tri_mesh_statistics(m).npiece, 4u);
+    EXPECT_NEAR(mesh_statistics(m).volume, 729 - 343 + 8 + 8, 1e-11);
+    EXPECT_EQ(mesh_statistics(m).npiece, 4u);
   }
 }
 
 TEST(FinishSurface, Crossing_IsNotNested) {
   const TriMesh m = finished(turned(joined(box({0, 0, 0}, {4, 4, 4}), box({1, 1, 1}, {3, 3, 5})), 2));
-  EXPECT_NEAR(tri_mesh_statistics(m).volume, 64 + 16, 1e-12);
+  EXPECT_NEAR(mesh_statistics(m).volume, 64 + 16, 1e-12);
 }
 
 // Both boxes within the other's bounding box would be wrong by one point or by boxes alone: the small one
@@ -217,13 +217,13 @@ TEST(FinishSurface, Crossing_IsNotNested) {
 TEST(FinishSurface, BesideInTheBoundingBox_IsNotNested) {
   Soup l = kTetrahedron;
   const TriMesh m = finished(turned(joined(l, box({0.7, 0.7, 0.7}, {0.9, 0.9, 0.9})), 3));
-  EXPECT_NEAR(tri_mesh_statistics(m).volume, 1.0 / 6 + 0.008, 1e-14);
+  EXPECT_NEAR(mesh_statistics(m).volume, 1.0 / 6 + 0.008, 1e-14);
 }
 
 TEST(FinishSurface, NestedPieceThatTouchesTheOuter_StillFacesIntoTheHole) {
   // shares the plane x = 0
   const TriMesh m = finished(joined(box({0, 0, 0}, {3, 3, 3}), box({0, 1, 1}, {2, 2, 2})));
-  EXPECT_NEAR(tri_mesh_statistics(m).volume, 27 - 2, 1e-12);
+  EXPECT_NEAR(mesh_statistics(m).volume, 27 - 2, 1e-12);
 }
 
 TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
@@ -232,7 +232,7 @@ TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
   s.tris.erase(s.tris.begin() + 3);
   s.tris.erase(s.tris.begin());
   const TriMesh m = finished(turned(s));
-  const TriMeshStatistics st = tri_mesh_statistics(m);
+  const dfm_trimesh_info st = mesh_statistics(m);
   EXPECT_FALSE(st.closed);
   EXPECT_EQ(st.open_edges, 10u);
   EXPECT_EQ(st.holes, 3u);
@@ -244,7 +244,7 @@ TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
 
 TEST(FinishSurface, RimsThatTouchInAPoint_AreTwo) {
   const Soup bow{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}};
-  const TriMeshStatistics st = tri_mesh_statistics(finished(bow));
+  const dfm_trimesh_info st = mesh_statistics(finished(bow));
   EXPECT_EQ(st.holes, 2u);
   EXPECT_EQ(st.open_edges, 6u);
   EXPECT_EQ(st.npiece, 1u);
@@ -285,7 +285,7 @@ TEST(FinishSurface, MoebiusStrip_IsReportedAndLeft) {
   const TriMesh m = finished(s);
   EXPECT_EQ(m.turned, 0u);
   EXPECT_NE(all_warnings(m).find("1 piece has no two sides"), std::string::npos) << all_warnings(m);
-  EXPECT_EQ(tri_mesh_statistics(m).holes, 1u);
+  EXPECT_EQ(mesh_statistics(m).holes, 1u);
 }
 
 TEST(FinishSurface, WithoutArea_IsDropped) {
@@ -298,7 +298,7 @@ TEST(FinishSurface, WithoutArea_IsDropped) {
   const TriMesh m = finished(s);
   EXPECT_EQ(m.dropped_tris, 3u);
   EXPECT_EQ(m.dropped_points, 2u);
-  EXPECT_TRUE(tri_mesh_statistics(m).closed);
+  EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_EQ(all_warnings(m),
             "3 triangles without area were dropped\n2 points that no triangle uses were dropped\n");
 }
@@ -309,7 +309,7 @@ TEST(FinishSurface, FlatAlongANeighborsSide_LeavesNoSlit) {
   s.points.push_back({0.5, 0, 0});  // on the edge 0-1
   s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 1, 3}, {0, 3, 2}, {1, 2, 3}, {0, 1, 4}};
   const TriMesh m = finished(s);
-  const TriMeshStatistics st = tri_mesh_statistics(m);
+  const dfm_trimesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(m.ntri(), 6u);
   EXPECT_NEAR(st.volume, 1.0 / 6, 1e-16);
@@ -325,9 +325,9 @@ TEST(FinishSurface, FlatBesideFlat_IsTakenUpInTurn) {
   s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 5, 3}, {5, 6, 3}, {6, 1, 3},
             {0, 3, 2}, {1, 2, 3}, {0, 1, 5}, {0, 5, 4}, {5, 1, 6}};
   const TriMesh m = finished(s);
-  EXPECT_TRUE(tri_mesh_statistics(m).closed);
+  EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_EQ(m.ntri(), 10u);
-  EXPECT_NEAR(tri_mesh_statistics(m).volume, 1.0 / 6, 1e-16);
+  EXPECT_NEAR(mesh_statistics(m).volume, 1.0 / 6, 1e-16);
 }
 
 TEST(FinishSurface, ListedTwice_IsDropped) {
@@ -338,14 +338,14 @@ TEST(FinishSurface, ListedTwice_IsDropped) {
   const TriMesh m = finished(s);
   EXPECT_EQ(m.ntri(), 12u);
   EXPECT_EQ(m.dropped_tris, 3u);
-  EXPECT_TRUE(tri_mesh_statistics(m).closed);
+  EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_EQ(all_warnings(m), "3 duplicate triangles were dropped\n");
 }
 
 // Two closed boxes face to face: keeping one side of the wall would leave edges of three triangles.
 TEST(FinishSurface, TwoBoxesFaceToFace_BecomeOne) {
   const TriMesh m = finished(joined(box({0, 0, 0}, {1, 1, 1}), box({1, 0, 0}, {2, 1, 1})));
-  const TriMeshStatistics st = tri_mesh_statistics(m);
+  const dfm_trimesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(m.ntri(), 20u);
   EXPECT_EQ(st.npiece, 1u);
@@ -359,13 +359,13 @@ TEST(FinishSurface, SheetWithBothSides_KeepsOne) {
   Soup s{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}, {0, 2, 1}, {0, 3, 2}}};
   const TriMesh m = finished(s);
   EXPECT_EQ(m.ntri(), 2u);
-  EXPECT_EQ(tri_mesh_statistics(m).area, 1);
+  EXPECT_EQ(mesh_statistics(m).area, 1);
 }
 
 TEST(FinishSurface, BoxesThatShareAnEdge_AreTurnedEachAndCounted) {
   Soup a = box({0, 0, 0}, {1, 1, 1}), b = box({1, 1, 0}, {2, 2, 1});
   const TriMesh m = finished(turned(joined(a, b), 3));
-  const TriMeshStatistics st = tri_mesh_statistics(m);
+  const dfm_trimesh_info st = mesh_statistics(m);
   EXPECT_EQ(st.nonmanifold_edges, 1u);
   EXPECT_FALSE(st.closed);
   EXPECT_NEAR(st.volume, 2, 1e-14);
@@ -377,7 +377,7 @@ TEST(FinishSurface, FinOnABox_IsCountedAndTheBoxFacesOutward) {
   s.points.push_back({0.5, -1, -1});
   s.tris.push_back({0, 1, 8});
   const TriMesh m = finished(s);
-  const TriMeshStatistics st = tri_mesh_statistics(m);
+  const dfm_trimesh_info st = mesh_statistics(m);
   EXPECT_EQ(st.nonmanifold_edges, 1u);
   EXPECT_EQ(st.open_edges, 2u);
   double volume = 0;
@@ -404,8 +404,8 @@ TEST(FinishSurface, Tetrahedra_GiveTheirBoundaryWithTheGroupsOfTheSkin) {
   raw.tris.assign({skin[5], skin[4], skin[3]});
   raw.tri_group.assign({1});
   const TriMesh m = finish_surface("ball", std::move(raw));
-  EXPECT_TRUE(tri_mesh_statistics(m).closed);
-  EXPECT_NEAR(tri_mesh_statistics(m).volume, mesh_statistics(ball).volume, 1e-14);
+  EXPECT_TRUE(mesh_statistics(m).closed);
+  EXPECT_NEAR(mesh_statistics(m).volume, mesh_statistics(ball).volume, 1e-14);
   EXPECT_EQ(m.ntri(), skin.size() / 3);
   EXPECT_EQ(m.dropped_points, 1u);
   ASSERT_EQ(m.groups.size(), 1u);
@@ -427,7 +427,7 @@ TEST(FinishSurface, CellsApartAtOnePlace_AreJoined) {
   EXPECT_EQ(m.ntri(), boundary_triangles(beam.tets).size() / 3);
   EXPECT_EQ(m.merged_points, beam.tets.size() - beam.npoint());
   EXPECT_EQ(m.dropped_points, 0u);
-  EXPECT_NEAR(tri_mesh_statistics(m).volume, 1, 1e-14);
+  EXPECT_NEAR(mesh_statistics(m).volume, 1, 1e-14);
 }
 
 TEST(FinishSurface, Groups_FollowTheirTriangles) {

@@ -17,10 +17,10 @@ constexpr double kPi = 3.14159265358979323846;
 const Memory &standard() { return Memory::standard(); }
 
 void expect_sound(const TriMesh &m, uint32_t asked, int euler, double least_quality) {
-  const TriMeshStatistics s = tri_mesh_statistics(m);
+  const dfm_trimesh_info s = mesh_statistics(m);
   EXPECT_TRUE(s.closed) << asked;
   EXPECT_EQ(s.npiece, 1u);
-  EXPECT_EQ(int64_t(s.npoint) - s.nedge + s.ntri, euler) << asked;
+  EXPECT_EQ(int64_t(s.npoint) - s.nedge + s.ntriangle, euler) << asked;
   EXPECT_GT(s.volume, 0);
   EXPECT_GT(s.quality_min, asked < 500 ? 0.05 : least_quality) << asked;
   EXPECT_TRUE(m.warnings.empty());
@@ -28,8 +28,8 @@ void expect_sound(const TriMesh &m, uint32_t asked, int euler, double least_qual
   EXPECT_EQ(m.tri_group.size(), m.ntri());
   for (uint32_t p = 0; p < m.npoint(); ++p) ASSERT_EQ(m.file_point[p], p);
   if (asked < 500) return;
-  EXPECT_LT(std::max(s.ntri / double(asked), asked / double(s.ntri)), 1.35)
-      << asked << " asked, " << s.ntri << " made";
+  EXPECT_LT(std::max(s.ntriangle / double(asked), asked / double(s.ntriangle)), 1.35)
+      << asked << " asked, " << s.ntriangle << " made";
 }
 
 std::string refused(const std::function<void()> &f) {
@@ -51,7 +51,7 @@ TEST(GenerateSurface, Balls_AreInscribedInTheirSphere) {
     expect_sound(m, n, 2, 0.75);
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(m.points[p], m.points[p + 1], m.points[p + 2]), 0.5, 1e-15);
-    const double volume = tri_mesh_statistics(m).volume;
+    const double volume = mesh_statistics(m).volume;
     EXPECT_GT(volume, last);
     EXPECT_LT(volume, 4 * kPi / 3 / 8);
     last = volume;
@@ -64,7 +64,7 @@ TEST(GenerateSurface, Beams_FillTheirBox) {
     for (const auto &size : {std::array{1.0, 1.0, 1.0}, {1.0, 0.1, 0.2}, {1e-9, 2e-9, 3e-9}}) {
       const TriMesh m = make_beam_surface(standard(), size[0], size[1], size[2], n);
       expect_sound(m, n, 2, 0.5);
-      EXPECT_NEAR(tri_mesh_statistics(m).volume / (size[0] * size[1] * size[2]), 1, 1e-13);
+      EXPECT_NEAR(mesh_statistics(m).volume / (size[0] * size[1] * size[2]), 1, 1e-13);
     }
 }
 
@@ -76,7 +76,7 @@ TEST(GenerateSurface, Cylinders_HaveTheVolumeOfTheirPolygon) {
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
-      EXPECT_NEAR(tri_mesh_statistics(m).volume, length * 0.02 * around * std::sin(2 * kPi / around),
+      EXPECT_NEAR(mesh_statistics(m).volume, length * 0.02 * around * std::sin(2 * kPi / around),
                   1e-14 * around);
     }
 }
@@ -89,7 +89,7 @@ TEST(GenerateSurface, Tubes_HaveTheVolumeOfTheirRing) {
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
-      EXPECT_NEAR(tri_mesh_statistics(m).volume,
+      EXPECT_NEAR(mesh_statistics(m).volume,
                   0.3 * (0.04 - inner * inner) * around * std::sin(2 * kPi / around), 1e-14 * around);
     }
 }
@@ -101,7 +101,7 @@ TEST(GenerateSurface, Tori_ApproachTheirVolume) {
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(std::hypot(m.points[p], m.points[p + 1]) - 0.06, m.points[p + 2]), 0.02, 1e-15);
   }
-  EXPECT_NEAR(tri_mesh_statistics(make_torus_surface(standard(), 0.06, 0.02, 50000)).volume /
+  EXPECT_NEAR(mesh_statistics(make_torus_surface(standard(), 0.06, 0.02, 50000)).volume /
                   (2 * kPi * kPi * 0.06 * 0.0004),
               1, 2e-3);
 }
@@ -110,7 +110,7 @@ TEST(GenerateTube, Cells_AreValidAndFillTheRing) {
   for (const uint32_t n : {1u, 500u, 3000u, 20000u})
     for (const double inner : {0.05, 0.1, 0.18}) {
       const TetMesh m = make_tube(standard(), inner, 0.2, 0.7, n);
-      const MeshStatistics s = mesh_statistics(m);
+      const dfm_tetmesh_info s = mesh_statistics(m);
       EXPECT_GT(s.quality_min, n == 1 ? 0.1 : inner == 0.05 ? 0.25 : 0.45) << n << " " << inner;
       EXPECT_EQ(s.npiece, 1u);
       EXPECT_EQ(s.nonmanifold_edges + s.duplicate_points, 0u);

@@ -33,7 +33,7 @@ bool read_capped(const std::string &name, const std::string &bytes) {
       for (const uint32_t p : *corners) EXPECT_LT(p, raw.npoint()) << name;
     if (raw.tets.empty()) {
       const TriMesh mesh = finish_surface(name, std::move(raw));
-      tri_mesh_statistics(mesh);
+      mesh_statistics(mesh);
     } else {
       const TetMesh mesh = finish_mesh(name, std::move(raw));
       mesh_statistics(mesh);

@@ -63,7 +63,7 @@ TEST(MeshTopology, Quality_IsOneForRegularZeroForFlatAndBlindToSize) {
 }
 
 TEST(MeshTopology, Statistics_OfTwoCells) {
-  const MeshStatistics s = mesh_statistics(two_tets());
+  const dfm_tetmesh_info s = mesh_statistics(two_tets());
   EXPECT_EQ(s.ntriangle, 6u);
   EXPECT_EQ(s.nedge, 9u);
   EXPECT_EQ(s.npiece, 1u);
@@ -71,7 +71,7 @@ TEST(MeshTopology, Statistics_OfTwoCells) {
   EXPECT_DOUBLE_EQ(s.volume, 0.5);
   EXPECT_DOUBLE_EQ(s.edge_min, 1);
   EXPECT_DOUBLE_EQ(s.edge_max, std::sqrt(2.0));
-  EXPECT_EQ(s.histogram[7] + s.histogram[8] + s.histogram[9], 2u);
+  EXPECT_EQ(s.quality_histogram[7] + s.quality_histogram[8] + s.quality_histogram[9], 2u);
   EXPECT_EQ(s.hi[2], 1);
 }
 

@@ -93,7 +93,7 @@ class PackedMeshes : public testing::Test {
   size_t cap_of(const std::string &path) const { return 16384 + 64 * std::filesystem::file_size(path); }
 
   void expect_tets(const Row &row, const TetMesh &mesh) {
-    const MeshStatistics s = mesh_statistics(mesh);
+    const dfm_tetmesh_info s = mesh_statistics(mesh);
     EXPECT_GT(s.quality_min, 0);
     if (!mesh.cells.empty()) {  // gmsh's; the table counts corners
       EXPECT_EQ(mesh.turned, 0u);
@@ -122,9 +122,9 @@ class PackedMeshes : public testing::Test {
     EXPECT_GT(mesh.ntri(), 0u);
     for (const uint32_t p : mesh.tris) ASSERT_LT(p, mesh.npoint());
     if (row.volume > 0) {  // formats/: points joined, volume known
-      const TriMeshStatistics s = tri_mesh_statistics(mesh);
+      const dfm_trimesh_info s = mesh_statistics(mesh);
       EXPECT_EQ(s.npoint, row.points);
-      EXPECT_EQ(s.ntri, row.tris);
+      EXPECT_EQ(s.ntriangle, row.tris);
       EXPECT_NEAR(s.volume / row.volume, 1, 1e-5);  // some are written with 7 digits
       EXPECT_TRUE(s.closed);
     } else if (row.tris) {  // as they stand in the file, STL corners apart
@@ -218,7 +218,7 @@ TEST_F(PackedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
               {"cyl_fine.msh", 2579, 15092, 2386, 18863}};
   for (const auto &row : rows) {
     SCOPED_TRACE(row.file);
-    const MeshStatistics s =
+    const dfm_tetmesh_info s =
         mesh_statistics(read_tet_mesh(Memory::standard(), folder + "thesis/" + row.file));
     EXPECT_EQ(s.npoint, row.points);
     EXPECT_EQ(s.ntet, row.tets);
@@ -231,10 +231,10 @@ TEST_F(PackedMeshes, DefectiveSurfaces_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
     return read_tri_mesh(Memory::standard(), folder + "nasty/" + file);
   };
-  EXPECT_GT(tri_mesh_statistics(read("open_surface.obj")).open_edges, 0u);
+  EXPECT_GT(mesh_statistics(read("open_surface.obj")).open_edges, 0u);
   EXPECT_GT(read("mixed_winding.obj").turned, 0u);
-  EXPECT_TRUE(tri_mesh_statistics(read("mixed_winding.obj")).closed);
-  EXPECT_EQ(tri_mesh_statistics(read("nonmanifold_edge.ply")).nonmanifold_edges, 1u);
+  EXPECT_TRUE(mesh_statistics(read("mixed_winding.obj")).closed);
+  EXPECT_EQ(mesh_statistics(read("nonmanifold_edge.ply")).nonmanifold_edges, 1u);
   EXPECT_GT(read("degenerate_triangles.off").dropped_tris, 0u);
-  EXPECT_EQ(tri_mesh_statistics(read("self_intersecting.stl")).npiece, 2u);
+  EXPECT_EQ(mesh_statistics(read("self_intersecting.stl")).npiece, 2u);
 }

@@ -72,7 +72,7 @@ TEST(WriteSurface, Stl_KeepsSinglePrecision) {
   const TriMesh m = ball_in_groups(), back = there_and_back(m, ".stl");
   ASSERT_EQ(back.ntri(), m.ntri());
   EXPECT_EQ(back.npoint(), m.npoint());
-  EXPECT_TRUE(tri_mesh_statistics(back).closed);
+  EXPECT_TRUE(mesh_statistics(back).closed);
   EXPECT_EQ(back.turned, 0u);
   for (size_t i = 0; i < m.tris.size(); ++i)
     for (int k = 0; k < 3; ++k)

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "dynamics/relative_work.h"
+#include "dynamics/dynamics.h"
 
 namespace {
 

@@ -107,7 +107,7 @@ dfm_query_hit every_triangle(dfm::World &w, Vec3 o, Vec3 d) {
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       Vec3 x[3];
-      for (size_t k = 0; k < 3; ++k) x[k] = dfm::surfel_vector(*b, b->p.x, b->surface.tri[3 * size_t{t} + k]);
+      for (size_t k = 0; k < 3; ++k) x[k] = b->surface.sum(b->surface.tri[3 * size_t{t} + k], b->p.x.data());
       const double at = dfm::ray_triangle(o, d, x[0], x[1], x[2]);
       if (!(at < hit.distance)) continue;
       hit.distance = at;
@@ -138,7 +138,7 @@ dfm_query_hit every_triangle(dfm::World &w, Vec3 p) {
   for (auto &b : w.bodies)
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       Vec3 x[3];
-      for (size_t k = 0; k < 3; ++k) x[k] = dfm::surfel_vector(*b, b->p.x, b->surface.tri[3 * size_t{t} + k]);
+      for (size_t k = 0; k < 3; ++k) x[k] = b->surface.sum(b->surface.tri[3 * size_t{t} + k], b->p.x.data());
       const double d = std::sqrt(dfm::closest_on_triangle(p, x[0], x[1], x[2]).distance2);
       if (!(d < hit.distance)) continue;
       hit.distance = d;

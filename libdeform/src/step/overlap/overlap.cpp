@@ -78,28 +78,12 @@ std::vector<Overlap> find_overlaps(World &w) {
   return out;
 }
 
-const Body *body_of_id(const World &w, uint64_t id) {
-  for (auto &b : w.bodies)
-    if (b->id == id) return b.get();
-  return nullptr;
-}
-const Obstacle *obstacle_of_id(const World &w, uint64_t id) {
-  for (auto &o : w.obstacles)
-    if (o->id == id) return o.get();
-  return nullptr;
-}
-
-double length_of(const Array<double> &points, size_t stride) {
-  Extent box;
-  for (size_t i = 0; i + 2 < points.size(); i += stride) box.add(load3(&points[i]));
-  return norm(box.hi - box.lo);
-}
-
 // A body of centimeters in a mesh of a hundred times its size that it overlaps: one of the two files is in
 // millimeters.
 std::string hint_of_units(const Body &b, const Obstacle *o) {
   if (!o || o->points.empty()) return {};
-  const double own = length_of(b.p.x, kStride), its = length_of(o->points, 3);
+  const double own = extent_of(b.p.x.data(), b.p.n, kStride).diagonal();
+  const double its = extent_of(o->points).diagonal();
   if (!(its > kOtherUnits * own)) return {};
   return format(
       "; '%s' is %.3g m across and '%s' %.3g m: if a mesh is in millimeters, multiply its points by "
@@ -111,13 +95,13 @@ std::string hint_of_units(const Body &b, const Obstacle *o) {
 const std::string &made_name(const Body &b) { return b.piece_of ? b.whole_name : b.name; }
 
 std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
-  const Body &a = *body_of_id(w, o.a);
-  const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
+  const Body &a = *w.body(o.a);
+  const Obstacle *const thing = o.obstacle ? w.obstacle(o.b) : nullptr;
   if (const HeldIn held = held_in(w, sides, {a.slot, thing ? thing->slot : 0, o.obstacle}, w.offset); held.by)
     return tell_held_in(w, held, thing->slot);
   const std::string what =
       o.aside ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
-  const Body *const b = thing ? nullptr : body_of_id(w, o.b);
+  const Body *const b = thing ? nullptr : w.body(o.b);
   const bool came = a.piece_of || (b && b->piece_of);
   const std::string &first = made_name(a), &second = thing ? thing->name : made_name(*b);
   const std::string where = !came ? "move one of them"
@@ -129,12 +113,12 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
 }
 
 void warn(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
-  const Obstacle *const thing = o.obstacle ? obstacle_of_id(w, o.b) : nullptr;
-  const std::string &name = thing ? thing->name : body_of_id(w, o.b)->name;
+  const Obstacle *const thing = o.obstacle ? w.obstacle(o.b) : nullptr;
+  const std::string &name = thing ? thing->name : w.body(o.b)->name;
   w.context->logf(
       DFM_LOG_WARNING,
       "body '%s' and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
-      body_of_id(w, o.a)->name.c_str(),
+      w.body(o.a)->name.c_str(),
       !thing                  ? "body"
       : !thing->rigid         ? "obstacle"
       : thing->rigid->of_tool ? "tool"
@@ -162,7 +146,7 @@ void warn_of_parts(World &w, const std::vector<Overlap> &found) {
     if (at == told.end()) at = told.insert(at, {whole, 0.0});
     if (!(deepest->depth > kTellAgain * at->second)) continue;
     at->second = deepest->depth;
-    const Body &a = *body_of_id(w, deepest->a), &b = *body_of_id(w, deepest->b);
+    const Body &a = *w.body(deepest->a), &b = *w.body(deepest->b);
     w.context->logf(
         DFM_LOG_WARNING,
         "parts of body '%s' came off with their faces in each other, by up to %.3g m ('%s' and '%s'; %zu "
@@ -224,7 +208,7 @@ void settle_overlaps(World &w) {
 
 void keep_overlaps_aside(World &w) {
   const auto gone = [&](const auto &p) {
-    return !body_of_id(w, p.a) || (p.obstacle ? !obstacle_of_id(w, p.b) : !body_of_id(w, p.b));
+    return !w.body(p.a) || (p.obstacle ? !w.obstacle(p.b) : !w.body(p.b));
   };
   std::erase_if(w.overlaps.aside, gone);
   std::erase_if(w.overlaps.found, gone);
@@ -235,8 +219,8 @@ void release_overlaps(World &w) {
   if (w.overlaps.aside.empty() || w.step_count % kReleaseEvery != 0) return;
   OverlapSides sides(w);
   std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
-    const uint32_t j = p.obstacle ? obstacle_of_id(w, p.b)->slot : body_of_id(w, p.b)->slot;
-    if (sides.look({body_of_id(w, p.a)->slot, j, p.obstacle != 0}, w.offset, true).through) return false;
+    const uint32_t j = p.obstacle ? w.obstacle(p.b)->slot : w.body(p.b)->slot;
+    if (sides.look({w.body(p.a)->slot, j, p.obstacle != 0}, w.offset, true).through) return false;
     w.pairs.filter.set(p.a, p.b, p.obstacle, true);
     return true;
   });

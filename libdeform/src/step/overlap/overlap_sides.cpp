@@ -91,9 +91,7 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
   const Surface &s = b.surface;
   x_.assign(size_t{4} * s.nsurfel, 0.0);
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
-    Vec3 x;
-    s.each_phyxel(i, [&](uint32_t p, double weight) { x += weight * load3(&b.p.x[size_t(p) * kStride]); });
-    store3(&x_[size_t{4} * i], x);
+    store3(&x_[size_t{4} * i], s.sum(i, b.p.x.data()));
   }
   closed_ = std::find(s.edge_tri.begin(), s.edge_tri.end(), kNone) == s.edge_tri.end();
   const size_t cells = b.ncell();
@@ -131,12 +129,9 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Obstacle &o)
 }
 
 void OverlapSkin::finish() {
-  lo_ = hi_ = x(0);
-  for (uint32_t s = 1; s < nsurfel(); ++s)
-    for (int k = 0; k < 3; ++k) {
-      lo_[k] = std::min(lo_[k], x(s)[k]);
-      hi_[k] = std::max(hi_[k], x(s)[k]);
-    }
+  const Extent box = extent_of(x_.data(), nsurfel(), kStride);
+  lo_ = box.lo;
+  hi_ = box.hi;
   origin_ = 0.5 * (lo_ + hi_);
   const double size = norm(hi_ - lo_);
   scale_ = size > 0 ? 1 / size : 1;

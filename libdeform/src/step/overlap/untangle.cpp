@@ -63,11 +63,7 @@ class Untangler {
 
  private:
   OverlapPair pair_of(const Overlap &f) const {
-    const auto at = [](const auto &list, uint64_t id) {
-      return static_cast<uint32_t>(
-          std::find_if(list.begin(), list.end(), [&](auto &x) { return x->id == id; }) - list.begin());
-    };
-    return {at(w_.bodies, f.a), f.obstacle ? at(w_.obstacles, f.b) : at(w_.bodies, f.b), f.obstacle};
+    return {slot_of(w_, f.a), f.obstacle ? obstacle_slot_of(w_, f.b) : slot_of(w_, f.b), f.obstacle};
   }
   bool moves(const OverlapPair &p) const { return movable_[p.a] || (!p.obstacle && movable_[p.b]); }
   bool moved(const OverlapPair &p) const {

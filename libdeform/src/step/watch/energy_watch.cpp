@@ -142,7 +142,7 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   elastic += b.dynamics->damper_energy(w.time);
   // the call came between its prediction and its commit, which may share memory with the result
   double again = 0;
-  if (steps_itself(b) && (!hides(b) || b.dynamics->late()) &&
+  if (steps_itself(b) && (!hides(b) || b.dynamics->abilities().late) &&
       !b.dynamics->free_motion(sub_step_of(w, step), again))
     return false;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);

@@ -124,15 +124,9 @@ Scale scale_of(const World &w, const PairWork &p) {
 
 const std::string &name_of(const World &w, uint64_t id) {
   static const std::string gone = "?";
-  for (const auto &b : w.bodies)
-    if (b->id == id) return b->name;
-  for (const auto &o : w.obstacles)
-    if (o->id == id) return o->name;
-  return gone;
-}
-
-bool is_body(const World &w, uint64_t id) {
-  return std::any_of(w.bodies.begin(), w.bodies.end(), [&](const auto &b) { return b->id == id; });
+  if (const Body *const b = w.body(id)) return b->name;
+  const Obstacle *const o = w.obstacle(id);
+  return o ? o->name : gone;
 }
 
 // The law of the contact of the pair with the largest load.
@@ -240,7 +234,7 @@ std::string tell_pair_gain(World &w) {
   const bool rubs = worst->rubbed > limit;
   const std::string sides =
       worst->a == worst->b ? format("body '%s' on itself", name_of(w, worst->a).c_str())
-      : is_body(w, worst->b)
+      : w.body(worst->b)
           ? format("bodies '%s' and '%s'", name_of(w, worst->a).c_str(), name_of(w, worst->b).c_str())
           : format("body '%s' on obstacle '%s'", name_of(w, worst->a).c_str(), name_of(w, worst->b).c_str());
   const std::string grown =
@@ -252,7 +246,7 @@ std::string tell_pair_gain(World &w) {
         "step %llu, %s: friction law '%s' has put in %s; its force must point against the slip: "
         "change the law or its parameters (energy_watch sets the limit, 0 switches the watch off)",
         static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), grown.c_str());
-  const uint32_t a = slot_of(w, worst->a), o = is_body(w, worst->b) ? kNone : obstacle_slot_of(w, worst->b);
+  const uint32_t a = slot_of(w, worst->a), o = w.body(worst->b) ? kNone : obstacle_slot_of(w, worst->b);
   const std::string held = a != kNone && o != kNone ? tell_held_at(w, a, o) : std::string();
   return format("step %llu, %s: their contact (law '%s'%s) has put in %s; %s",
                 static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(),
