@@ -43,7 +43,8 @@ const void *extension(const void *, const char *id) {
 const char *const kEffects[] = {"damping", nullptr};
 
 const dfm_model kModel =
-    model::table<AnyBody>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
+    model::table<AnyBody>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS |
+                              DFM_CAP_INSIDE,
                           create, set_params, nullptr, extension);
 
 const dfm_type kType =

@@ -37,6 +37,7 @@ DFM_CAP_DAMPING = 4
 DFM_CAP_ROTATION_INVARIANT = 16
 DFM_CAP_PLAUSIBLE = 32
 DFM_CAP_CONSTANT_STIFFNESS = 64
+DFM_CAP_INSIDE = 128
 DFM_CELL_TET, DFM_CELL_HEX8, DFM_CELL_TET10 = 8, 16, 32
 DFM_SOLVER_DIRECT = 1
 DFM_VERSION_MAJOR = 0
@@ -164,7 +165,7 @@ class dfm_mesh(_Structure):
     _fields_ = [("size", u32), ("npoint", u32), ("ncell", u32), ("cell", u32), ("rest", ptr),
                 ("cells", ptr), ("mass", ptr), ("params", ptr), ("field_keys", ptr), ("fields", ptr),
                 ("nedge", u32), ("nsurfel", u32), ("edges", ptr), ("row", ptr), ("col", ptr),
-                ("weight", ptr), ("fixed", ptr)]
+                ("weight", ptr), ("fixed", ptr), ("inside", ptr)]
 
 
 class dfm_kin(_Structure):
@@ -347,7 +348,7 @@ class dfm_body_def(_Structure):
                 ("user", ptr), ("surface", ptr), ("nfield", u32), ("fields", ptr),
                 ("cell_materials", ptr), ("cell_share", ptr), ("groups", ptr), ("integrator", i32),
                 ("reserved", u32), ("cookie", u64), ("mass_scaling", f64), ("cells", ptr), ("cell", u32),
-                ("reserved2", u32)]
+                ("reserved2", u32), ("cell_inside", ptr)]
 
 
 class dfm_body_info(_Structure):

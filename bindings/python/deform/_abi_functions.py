@@ -123,6 +123,8 @@ FUNCTIONS = {
     "dfm_trimesh_write": (i32, [u64, text]),
     "dfm_tetmesh_fill": (i32, [u64, u32, ptr]),
     "dfm_tetmesh_share": (i32, [u64, ptr]),
+    "dfm_tetmesh_lattice": (i32, [u64, u32, f64, ptr]),
+    "dfm_tetmesh_inside": (i32, [u64, ptr]),
     "dfm_scene_load": (i32, [ptr, text, ptr]),
     "dfm_scene_open": (i32, [ptr, text, ptr, ptr]),
     "dfm_scene_close": (i32, [u64]),

@@ -178,6 +178,16 @@ class TetMesh(_Mesh):
         check(lib.dfm_tetmesh_fill(surface.handle, whole(cells, "cells", 1), ctypes.byref(out)))
         return cls(out.value, surface._context)
 
+    @classmethod
+    def lattice(cls, surface: TriMesh | Any, cells: int = 0, size: float = 0) -> TetMesh:
+        """A coarse regular grid of hexahedra under a closed surface, given as a TriMesh or the path of its
+        file: about `cells` of them, or of edges of about `size`, m. Give the surface to add_body too
+        (surface=), and one of the models that bricks() is for."""
+        surface = surface_of(surface, "surface")
+        out = ctypes.c_uint64()
+        check(lib.dfm_tetmesh_lattice(surface.handle, whole(cells, "cells", 0), float(size), ctypes.byref(out)))
+        return cls(out.value, surface._context)
+
     def second_order(self) -> TetMesh:
         """The same shape with points in the middles of the edges, for the same models as bricks()."""
         out = ctypes.c_uint64()

@@ -308,6 +308,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
             kind, nodes = ctypes.c_uint32(), ctypes.c_void_p()
             check(lib.dfm_tetmesh_cells(mesh.handle, ctypes.byref(kind), ctypes.byref(nodes)))
             definition.cell, definition.cells = kind.value, nodes.value
+            inside = ctypes.c_void_p()
+            check(lib.dfm_tetmesh_inside(mesh.handle, ctypes.byref(inside)))
+            definition.cell_inside = inside.value
             share, groups = mesh.share, mesh.surface_groups()
             if share is not None:
                 definition.cell_share = share.ctypes.data

@@ -1,5 +1,6 @@
-// A surfel moves with the tetrahedron that contains it: its barycentric coordinates at rest are its weights.
-// They reproduce linear fields, also outside the cell, where they extrapolate.
+// A surfel moves with the cell that contains it: its weights are its barycentric coordinates at rest in a
+// tetrahedron, the shape functions at its place in a hexahedron. They reproduce linear fields, also outside
+// the cell, where they extrapolate.
 #include "body/coupling.h"
 
 #include <algorithm>
@@ -7,9 +8,11 @@
 #include <optional>
 
 #include "core/error.h"
+#include "deform/plugin.h"
 #include "geometry/closest.h"
 #include "geometry/rest_tree.h"
 #include "math/extent.h"
+#include "mesh/cells.h"
 
 namespace dfm {
 namespace {
@@ -78,6 +81,29 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   w[3] = g;
 }
 
+// Shape functions of the hexahedron c at x, by Newton's method from its center: one step in a box. False
+// where it does not get there, far outside a distorted cell.
+bool hexahedron_weights(Vec3 x, const Vec3 c[8], double w[8]) {
+  constexpr int kSteps = 20;
+  constexpr uint32_t kAll[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  double points[24];
+  for (size_t k = 0; k < 8; ++k) store3(points + 3 * k, c[k]);
+  const double near2 = 1e-28 * norm2(c[6] - c[0]);
+  Vec3 at;
+  for (int step = 0; step < kSteps; ++step) {
+    hexahedron_shapes(at, w);
+    Vec3 left = x;
+    for (int k = 0; k < 8; ++k) left -= w[k] * c[k];
+    if (norm2(left) <= near2) return true;
+    Vec3 along[3];
+    hexahedron_jacobian(points, kAll, at, along);
+    const Vec3 n0 = cross(along[1], along[2]), n1 = cross(along[2], along[0]), n2 = cross(along[0], along[1]);
+    const double inverse = 1 / dot(along[0], n0);
+    at += inverse * Vec3{dot(left, n0), dot(left, n1), dot(left, n2)};
+  }
+  return false;
+}
+
 class RestCells {
  public:
   RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
@@ -125,7 +151,18 @@ uint32_t RestCells::find(Vec3 x, double &away) const {
 
 double RestCells::row(Vec3 x, Array<RowEntry> &out) const {
   double away;
-  const uint32_t *const corner = in_.tet + size_t{4} * find(x, away);
+  const uint32_t cell = find(x, away);
+  if (in_.hexahedron) {
+    const uint32_t *const node = in_.hexahedron + size_t{8} * (cell / cell_kind(DFM_CELL_HEX8).tets);
+    Vec3 of[8];
+    double weight[8];
+    for (int k = 0; k < 8; ++k) of[k] = rest_.point[node[k]];
+    if (hexahedron_weights(x, of, weight)) {
+      for (int k = 0; k < 8; ++k) out.push_back({node[k], weight[k]});
+      return away;
+    }
+  }
+  const uint32_t *const corner = in_.tet + size_t{4} * cell;
   Vec3 c[4];
   double w[4];
   for (int k = 0; k < 4; ++k) c[k] = rest_.point[corner[k]];

@@ -22,6 +22,7 @@ struct CouplingInput {
   const double *point = nullptr;   // [npoint,3]
   const uint32_t *tet = nullptr;   // [ntet,4]
   const double *surfel = nullptr;  // [nsurfel,3]
+  const uint32_t *hexahedron = nullptr;  // [ntet/6,8] where the tetrahedra are those of hexahedra
   double support = 3;              // mean distances to the ten nearest phyxels
 };
 

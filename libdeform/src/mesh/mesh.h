@@ -21,7 +21,8 @@ struct MeshGroup {
 
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard()) : memory(&m) {
-    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share);
+    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share,
+               inside);
   }
   const Memory *memory;
   Array<double> points;  // [npoint,3], m
@@ -40,6 +41,7 @@ struct TetMesh {
   Array<uint32_t> file_cell;
   // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
   Array<double> share;
+  Array<double> inside;           // [ncell,27] of a lattice, as dfm_tetmesh_inside gives it; else empty
   std::vector<MeshGroup> groups;  // by dimension, then tag
   // Repairs and observations of the reader.
   uint32_t turned = 0, dropped_points = 0, dropped_cells = 0;

@@ -132,6 +132,11 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
   grid.groups = &mesh.groups;
   if (!groups.empty()) grid.cell_data.push_back({kVtkGroup, 1, nullptr, groups.data()});
   if (!share.empty()) grid.cell_data.push_back({"share", 1, share.data(), nullptr});
+  Array<double> inside = mesh.inside;
+  if (!inside.empty()) {
+    inside.resize(inside.size() + size_t{kInside} * grid.nface);
+    grid.cell_data.push_back({kVtkInside, kInside, inside.data(), nullptr});
+  }
   write_vtu(path, grid);
 }
 

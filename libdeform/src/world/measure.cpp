@@ -31,6 +31,20 @@ double elastic_energy(Body &b) {
   return b.model.call("energy", ask) == DFM_OK ? joule : NAN;
 }
 
+namespace {
+
+// Of the material of a lattice as it is now.
+double volume_inside(const Body &b) {
+  std::vector<double> x;
+  for (uint32_t i = 0; i < b.p.n; ++i) x.insert(x.end(), &b.p.x[kStride * i], &b.p.x[kStride * i] + 3);
+  double sum = 0;
+  for (size_t c = 0; c < b.cells.size() / 8; ++c)
+    each_inside(x.data(), &b.cells[8 * c], &b.inside[kInside * c], [&](double volume, Vec3) { sum += volume; });
+  return sum;
+}
+
+}  // namespace
+
 dfm_body_measure measure(Body &b) {
   dfm_body_measure m{};
   m.mass = b.mass;
@@ -54,6 +68,7 @@ dfm_body_measure measure(Body &b) {
     m.volume += b.share.empty() ? v : b.share[t / 4] * v;
     m.inverted += v < 0;
   }
+  if (!b.inside.empty()) m.volume = volume_inside(b);
   store3(m.com, com);
   store3(m.velocity, velocity);
   store3(m.momentum, momentum);
