@@ -579,6 +579,7 @@ class CellBody {
   double params_[kParamCount] = {};
   Buffer<double> field_[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
   Buffer<double> rest_, mass_;         // [npoint,3] m, [npoint] kg
+  Buffer<double> inside_;              // [ncell,27] of a lattice, as dfm_mesh has it; else empty
   Buffer<uint32_t> cells_;             // [ncell,nodes]
   Buffer<Cell> cell_;                  // [ncell]
   Buffer<double> block_, norm_;        // [ncell,nblock,9] N/m, [ncell,nblock] their norms
