@@ -16,7 +16,9 @@
 // Of a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights are
 // given (dfm_mesh.inside): all of them are of functions that these weights are exact for, in a box. The
 // quadratic displacements lose their mean gradient over the material, again for constant stresses, and those
-// that say nothing new on material that is thin in their direction stay zero.
+// that say nothing new on material that is thin in their direction stay zero. A share kTie of the stiffness is
+// that of the whole cell, scaled by what is material: it changes nothing for uniform strains, and holds nodes
+// far from the material, whose mass is of that order too.
 #pragma once
 #include <deform/plugin.h>
 
@@ -57,6 +59,7 @@ namespace cells {
 constexpr int kInner = 3;  // quadratic displacements of a hexahedron
 constexpr int kMost = kMostNodes + kInner;
 constexpr int kWhole = 8, kInside = 27;  // points of the rules
+constexpr double kTie = 0.02;
 constexpr double kThin = 1e-9;           // of the square of a function: it depends on those before it
 
 // At one of the points of a rule.
@@ -235,6 +238,12 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
   eliminate(k, 3 * nodes, 3 * rows);
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j) out.stiffness[i][j] = 0.5 * (k[i][j] + k[j][i]);
+  if (!inside) return true;
+  RestCell whole;
+  if (!make_rest_cell(kind, x, nullptr, m, whole)) return false;
+  for (int i = 0; i < 3 * nodes; ++i)
+    for (int j = 0; j < 3 * nodes; ++j)
+      out.stiffness[i][j] += kTie * (out.volume / whole.volume * whole.stiffness[i][j] - out.stiffness[i][j]);
   return true;
 }
 

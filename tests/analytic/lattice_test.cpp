@@ -101,12 +101,6 @@ struct Body {
     test::ok(dfm_body_create(world, &d, &body));
   }
   ~Body() { dfm_world_destroy(world); }
-  uint32_t cells() const {
-    dfm_tetmesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
-    return info.ncell;
-  }
   // x = R (X + A X)
   void place(const Matrix &a, const Matrix &turn) {
     dfm_body_info info{};
@@ -140,7 +134,9 @@ TEST(Lattice, MassCenterAndInertia_AreThoseOfTheSurface) {
       EXPECT_NEAR(m.rest_volume, solid.mass / 1000, 1e-12 * m.rest_volume);
       EXPECT_NEAR(m.volume, m.rest_volume, 1e-12 * m.volume);
       for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(m.com[k], solid.center[k], 1e-12) << cells;
-      std::printf("%u: %u cells, inertia %.12f\n", cells, b.cells(), m.angular[2] / solid.inertia);
+      // a point keeps a tenth of its mass at least, which is in the way of the moments of coarse ones
+      const double much = cells == 8 ? 1 : cells == 60 ? 0.15 : cells == 500 ? 0.006 : 1e-9;
+      EXPECT_NEAR(m.angular[2] / solid.inertia, 1, much) << cells;
     }
   }
 }
@@ -257,14 +253,15 @@ double bent(const char *model, double size, const Matrix &turn) {
   const std::vector<double> u = s.displacement();
   double work = 0;
   for (size_t i = 0; i < u.size(); ++i) work += force[i] * u[i];
-  std::printf("%s size %g: %u cells, %g\n", model, size, info.ncell, work / (kMoment * kMoment / 1e5 / inertia));
   return work / (kMoment * kMoment / 1e5 / inertia);
 }
 
 }  // namespace
 
+// First-order tetrahedra along the bar: 0.352, 0.746, 0.934 (cells_test.cpp has them).
 TEST(Lattice, BarAskewToTheGrid_BendsAsBeamTheoryHasIt) {
-  for (const double size : {0.1, 0.05, 0.025}) bent("linear_fem", size, turned(0, 0, 0));
-  for (const double size : {0.2, 0.1, 0.05, 0.025}) bent("linear_fem", size, kAskew);
-  bent("corotational_fem", 0.1, kAskew);
+  EXPECT_NEAR(bent("linear_fem", 0.1, turned(0, 0, 0)), 1, 0.002);
+  const struct { double size, much; } steps[] = {{0.1, 0.05}, {0.05, 0.06}, {0.025, 0.02}};
+  for (const auto &[size, much] : steps) EXPECT_NEAR(bent("linear_fem", size, kAskew), 1, much) << size;
+  EXPECT_NEAR(bent("corotational_fem", 0.1, kAskew), 1, 0.05);
 }

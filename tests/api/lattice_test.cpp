@@ -88,10 +88,6 @@ TEST(Lattice, PebbleOnAFloor_RestsWithItsWeightAndDoesNotCreep) {
       EXPECT_LT(after.com[2], kFlat * kRadius);
       EXPECT_GT(after.com[2], 0.9 * kFlat * kRadius);
       EXPECT_EQ(after.inverted, 0u);
-      std::printf("%d %u: %g %g, %g %g\n", integrator, cells,
-                  (after.contact_impulse[2] - before.contact_impulse[2]) / weight - 1,
-                  (after.com[0] - before.com[0]) / kRadius, (after.com[2] - before.com[2]) / kRadius,
-                  after.com[2] / kRadius);
     }
 }
 

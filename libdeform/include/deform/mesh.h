@@ -168,8 +168,8 @@ DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tet
  * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share);
 /** A coarse regular grid of hexahedra over the box of a closed surface, for a body that wears this surface
- * (dfm_body_def.surface, cell_inside). Cells of which less than a quarter of what a neighbor has lies inside
- * are left out: their material belongs to that neighbor, which reaches beyond its borders.
+ * (dfm_body_def.surface, cell_inside). Cells with less than 0.15 of the material of a neighbor are left
+ * out: what they have belongs to that neighbor, which reaches beyond its borders.
  * @param cells  wanted number, the nearest that the grid gives; 0: by size
  * @param size   m, edge of the cells, about: each side of the box is divided into equal parts; 0: by cells
  * @return DFM_OK; DFM_E_ARG not one of both, size above the longest side of the box, more than 1e6 cells in

@@ -76,7 +76,7 @@ void mass_shares(const CellKind &kind, const double *points, const uint32_t *cel
     double shape[8];
     Vec3 along[3];
     hexahedron_shapes(place, shape);
-    hexahedron_jacobian(points, cell, place, along);
+    hexahedron_jacobian(points, 3, cell, place, along);
     const double weight = dot(along[0], cross(along[1], along[2]));
     all += weight;
     for (uint32_t k = 0; k < 8; ++k) out[k] += weight * shape[k];
@@ -95,10 +95,10 @@ void hexahedron_shapes(Vec3 at, double out[8]) {
              (high_side(k, 2) ? 1 + at.z : 1 - at.z);
 }
 
-void hexahedron_jacobian(const double *points, const uint32_t *cell, Vec3 at, Vec3 along[3]) {
+void hexahedron_jacobian(const double *points, size_t stride, const uint32_t *cell, Vec3 at, Vec3 along[3]) {
   Vec3 out[3];
   for (uint32_t k = 0; k < 8; ++k) {
-    const Vec3 x = load3(points + 3 * size_t{cell[k]});
+    const Vec3 x = load3(points + stride * cell[k]);
     const double sx = high_side(k, 0) ? 1 : -1, sy = high_side(k, 1) ? 1 : -1, sz = high_side(k, 2) ? 1 : -1;
     const double px = 1 + sx * at.x, py = 1 + sy * at.y, pz = 1 + sz * at.z;
     out[0] += (0.125 * sx * py * pz) * x;
@@ -108,15 +108,26 @@ void hexahedron_jacobian(const double *points, const uint32_t *cell, Vec3 at, Ve
   std::copy_n(out, 3, along);
 }
 
-void each_inside(const double *points, const uint32_t *cell, const double *inside,
+bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside) {
+  Vec3 sum, along[3];
+  double all = 0;
+  for (uint32_t q = 0; q < kInsidePoints; ++q) {
+    sum += inside[q] * inside_place(q);
+    all += inside[q];
+  }
+  hexahedron_jacobian(points, stride, cell, (1 / all) * sum, along);
+  return dot(along[0], cross(along[1], along[2])) < 0;
+}
+
+void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,
                  const std::function<void(double volume, Vec3 place)> &use) {
-  for (uint32_t q = 0; q < kInside; ++q) {
+  for (uint32_t q = 0; q < kInsidePoints; ++q) {
     const Vec3 at = inside_place(q);
     double shape[8];
     hexahedron_shapes(at, shape);
     Vec3 place, along[3];
-    for (uint32_t k = 0; k < 8; ++k) place += shape[k] * load3(points + 3 * size_t{cell[k]});
-    hexahedron_jacobian(points, cell, at, along);
+    for (uint32_t k = 0; k < 8; ++k) place += shape[k] * load3(points + stride * cell[k]);
+    hexahedron_jacobian(points, stride, cell, at, along);
     use(8 * inside[q] * dot(along[0], cross(along[1], along[2])), place);
   }
 }

@@ -31,14 +31,16 @@ Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<
 void mass_shares(const CellKind &kind, const double *points, const uint32_t *cell, double *out);
 
 // Points by which each hexahedron's material is given (dfm_tetmesh_inside), and their place in its coordinates.
-inline constexpr uint32_t kInside = 27;
+inline constexpr uint32_t kInsidePoints = 27;
 Vec3 inside_place(uint32_t point);
 // Shape functions there.
 void hexahedron_shapes(Vec3 at, double out[8]);
-// Derivatives of the place by the three coordinates there.
-void hexahedron_jacobian(const double *points, const uint32_t *cell, Vec3 at, Vec3 along[3]);
+// Derivatives of the place by the three coordinates there; points [n,stride].
+void hexahedron_jacobian(const double *points, size_t stride, const uint32_t *cell, Vec3 at, Vec3 along[3]);
+// Whether the material of a cell is turned inside out, in its middle.
+bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside);
 // Calls use(volume, place) for each: the sum of volume f(place) is the integral over the material.
-void each_inside(const double *points, const uint32_t *cell, const double *inside,
+void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,
                  const std::function<void(double volume, Vec3 place)> &use);
 
 // The same shape by second-order tetrahedra whose edges are straight.

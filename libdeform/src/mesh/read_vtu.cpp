@@ -136,7 +136,7 @@ class VtuReader {
         piece.group = std::move(place);
       else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type))
         piece.share = std::move(place);
-      else if (place.components == kInside && place.name == kVtkInside && !is_whole(place.type))
+      else if (place.components == kInsidePoints && place.name == kVtkInside && !is_whole(place.type))
         piece.inside = std::move(place);
     } else {
       static constexpr std::string_view kLists[] = {"Verts", "Lines", "Polys", "Strips"};
@@ -184,7 +184,7 @@ class VtuReader {
     if (piece.group.given) group.emplace(numbers(piece.group, total, "groups of cells", true));
     if (piece.share.given && !polydata_) share.emplace(numbers(piece.share, total, "shares of cells", false));
     if (piece.inside.given && !polydata_)
-      inside.emplace(numbers(piece.inside, kInside * total, "weights of cells", false));
+      inside.emplace(numbers(piece.inside, kInsidePoints * total, "weights of cells", false));
     for (int k = 0; k < 4; ++k)
       if (piece.ncell[k])
         read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group, share, inside);
@@ -225,7 +225,7 @@ class VtuReader {
       sink_.add(in_, static_cast<uint8_t>(type), corners_.data(), corners_.size(), label);
       const double part = share ? share->in.real(share->type, "a cell's share") : 1;
       if (share && type == 10) out_.tet_share.push_back(part);
-      for (uint32_t q = 0; inside && q < kInside; ++q) {
+      for (uint32_t q = 0; inside && q < kInsidePoints; ++q) {
         const double weight = inside->in.real(inside->type, "a cell's weight");
         if (type == 12) out_.inside.push_back(weight);
       }

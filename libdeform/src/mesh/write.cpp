@@ -134,8 +134,8 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
   if (!share.empty()) grid.cell_data.push_back({"share", 1, share.data(), nullptr});
   Array<double> inside = mesh.inside;
   if (!inside.empty()) {
-    inside.resize(inside.size() + size_t{kInside} * grid.nface);
-    grid.cell_data.push_back({kVtkInside, kInside, inside.data(), nullptr});
+    inside.resize(inside.size() + size_t{kInsidePoints} * grid.nface);
+    grid.cell_data.push_back({kVtkInside, kInsidePoints, inside.data(), nullptr});
   }
   write_vtu(path, grid);
 }

@@ -45,8 +45,8 @@ double longest_of_skin(const BodyMesh &mesh) {
 
 double BodyMesh::share_of(uint32_t tet) const {
   if (!inside) return share ? share[tet] : 1;
-  const double *const weights = inside + size_t{kInside} * (tet / cell_kind(cell).tets);
-  return std::accumulate(weights, weights + kInside, 0.0);
+  const double *const weights = inside + size_t{kInsidePoints} * (tet / cell_kind(cell).tets);
+  return std::accumulate(weights, weights + kInsidePoints, 0.0);
 }
 
 MeshFiles::~MeshFiles() {

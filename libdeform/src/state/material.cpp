@@ -72,28 +72,30 @@ void share_mass(Body &b, const double *density, double all) {
 }
 
 // Least part of its mass that a point keeps when moments are set right.
-constexpr double kLeastMass = 0.25;
+constexpr double kLeastMass = 0.1;
 
 // Of a lattice. Equal shares of a cell's material to its nodes leave no point without mass, but keep neither
 // center nor moments of inertia. So all masses change by factors that are a quadratic polynomial of the place,
 // by which these are those of the material; where a factor would be less than kLeastMass, the moments come as
 // near as it allows.
 void lump_inside(Body &b, const double *density, double all) {
+  const size_t tets = cell_kind(b.cell_type).tets, ncell = b.ncell() / tets;
   std::vector<Vec3> place;
   for (uint32_t i = 0; i < b.p.n; ++i) place.push_back(b.p.rest_at(i));
   std::vector<double> mass(b.p.n), factor(b.p.n, 1.0);
-  const uint32_t tets = cell_kind(b.cell_type).tets;
-  const auto each = [&](auto &&use) {  // use(mass, place, cell)
-    for (size_t c = 0; c < b.ncell() / tets; ++c)
-      each_inside(b.p.rest.data(), &b.cells[8 * c], &b.inside[kInside * c], [&](double volume, Vec3 x) {
-        use(volume * (density ? density[tets * c] : all), x, c);
-      });
+  const auto each = [&](const auto &use) {  // use(volume, density, place, cell)
+    for (size_t c = 0; c < ncell; ++c)
+      each_inside(b.p.rest.data(), 3, &b.cells[8 * c], &b.inside[kInsidePoints * c],
+                  [&](double volume, Vec3 x) { use(volume, density ? density[tets * c] : all, x, c); });
   };
-  each([&](double m, Vec3, size_t c) {
-    for (size_t k = 8 * c; k < 8 * (c + 1); ++k) mass[b.cells[k]] += m / 8;
+  b.mass = b.rest_volume = 0;
+  each([&](double volume, double rho, Vec3, size_t c) {
+    b.rest_volume += volume;
+    for (size_t k = 8 * c; k < 8 * (c + 1); ++k) mass[b.cells[k]] += rho * volume / 8;
   });
-  const OrthonormalQuadratics terms(
-      place, mass, [&](auto &&use) { each([&](double m, Vec3 x, size_t) { use(m, x); }); });
+  const OrthonormalQuadratics terms(place, mass, [&](const auto &use) {
+    each([&](double volume, double rho, Vec3 x, size_t) { use(rho * volume, x); });
+  });
   for (const auto &[from, to] : {std::pair<size_t, size_t>{1, 4}, {4, kQuadratics}}) {
     std::vector<double> change(b.p.n);
     for (size_t k = from; k < to; ++k)
@@ -103,10 +105,6 @@ void lump_inside(Body &b, const double *density, double all) {
       if (factor[i] + change[i] < kLeastMass) by = std::min(by, (factor[i] - kLeastMass) / -change[i]);
     for (uint32_t i = 0; i < b.p.n; ++i) factor[i] += by * change[i];
   }
-  b.mass = b.rest_volume = 0;
-  for (size_t c = 0; c < b.ncell() / tets; ++c)
-    each_inside(b.p.rest.data(), &b.cells[8 * c], &b.inside[kInside * c],
-                [&](double volume, Vec3) { b.rest_volume += volume; });
   for (uint32_t i = 0; i < b.p.n; ++i) b.mass += b.p.mass[i] = factor[i] * mass[i];
 }
 

@@ -13,6 +13,7 @@
 #include "step/first_failure.h"
 #include "step/squeezed.h"
 #include "step/stages.h"
+#include "world/measure.h"
 
 namespace dfm {
 namespace {
@@ -25,10 +26,6 @@ namespace {
 constexpr uint32_t kBoundEvery = 16;
 constexpr double kLeastStrain = kBoundStrain / 8;
 constexpr uint32_t kMostEstimated = 4;  // sub-steps at an estimated bound
-
-uint32_t inverted_cells(const Body &b) {
-  return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
-}
 
 void look_at_shape(Body &b) {
   // points that are updated late are unknown until they are requested

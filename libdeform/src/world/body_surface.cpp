@@ -76,7 +76,8 @@ void couple(Body &b, const dfm_surface_def &def) {
          "body '%s': its surface lies up to %g m from its cells, which are %g m across; both must be in the "
          "same frame and unit (m)",
          name, c.farthest, size);
-  if (c.farthest > kTellOutside * size)
+  // the cells of a lattice need not cover its surface
+  if (b.inside.empty() && c.farthest > kTellOutside * size)
     b.world->context->logf(DFM_LOG_WARNING,
                            "body '%s': %u of %u surfels hang on the nearest cell from outside, the farthest "
                            "%g m away; cells that cover the surface follow it better",

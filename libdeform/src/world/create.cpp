@@ -104,14 +104,14 @@ void take_inside(Body &b, const dfm_body_def &def) {
   if (b.cell_type != DFM_CELL_HEX8)
     fail(DFM_E_UNSUPPORTED, "body '%s': cell_inside is for hexahedra; its cells are %s", b.name.c_str(),
          cell_kind(b.cell_type).name);
-  const size_t n = b.cells.size() / 8 * kInside;
+  const size_t n = b.cells.size() / 8 * kInsidePoints;
   b.inside = Array<double>(def.cell_inside, def.cell_inside + n, b.cells.get_allocator());
-  for (size_t c = 0; c < n; c += kInside) {
+  for (size_t c = 0; c < n; c += kInsidePoints) {
     double material = 0;
-    for (size_t q = 0; q < kInside; ++q) material += b.inside[c + q];
+    for (size_t q = 0; q < kInsidePoints; ++q) material += b.inside[c + q];
     if (!(material > 0 && material < HUGE_VAL))
       fail(DFM_E_ARG, "body '%s': the weights of cell %zu in cell_inside sum to %g; expected more than 0",
-           b.name.c_str(), c / kInside, material);
+           b.name.c_str(), c / kInsidePoints, material);
   }
 }
 

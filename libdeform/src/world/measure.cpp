@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "dynamics/symplectic_euler.h"
 #include "mesh/cells.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
@@ -31,19 +32,13 @@ double elastic_energy(Body &b) {
   return b.model.call("energy", ask) == DFM_OK ? joule : NAN;
 }
 
-namespace {
-
-// Of the material of a lattice as it is now.
-double volume_inside(const Body &b) {
-  std::vector<double> x;
-  for (uint32_t i = 0; i < b.p.n; ++i) x.insert(x.end(), &b.p.x[kStride * i], &b.p.x[kStride * i] + 3);
-  double sum = 0;
-  for (size_t c = 0; c < b.cells.size() / 8; ++c)
-    each_inside(x.data(), &b.cells[8 * c], &b.inside[kInside * c], [&](double volume, Vec3) { sum += volume; });
-  return sum;
+uint32_t inverted_cells(const Body &b) {
+  if (b.inside.empty()) return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
+  uint32_t n = 0;
+  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
+    n += inverted_inside(b.p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c]);
+  return n * cell_kind(b.cell_type).tets;
 }
-
-}  // namespace
 
 dfm_body_measure measure(Body &b) {
   dfm_body_measure m{};
@@ -63,12 +58,12 @@ dfm_body_measure measure(Body &b) {
   const Vec3 velocity = (1 / b.mass) * momentum;
   Vec3 angular;
   for (uint32_t i = 0; i < p.n; ++i) angular += p.mass[i] * cross(p.x_at(i) - com, p.v_at(i) - velocity);
-  for (size_t t = 0; t < b.tets.size(); t += 4) {
-    const double v = tet_volume(p.x.data(), kStride, &b.tets[t]);
-    m.volume += b.share.empty() ? v : b.share[t / 4] * v;
-    m.inverted += v < 0;
-  }
-  if (!b.inside.empty()) m.volume = volume_inside(b);
+  m.inverted = inverted_cells(b);
+  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
+    each_inside(p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c],
+                [&](double volume, Vec3) { m.volume += volume; });
+  for (size_t t = 0; b.inside.empty() && t < b.tets.size(); t += 4)
+    m.volume += (b.share.empty() ? 1 : b.share[t / 4]) * tet_volume(p.x.data(), kStride, &b.tets[t]);
   store3(m.com, com);
   store3(m.velocity, velocity);
   store3(m.momentum, momentum);
