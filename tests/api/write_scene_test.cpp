@@ -114,7 +114,7 @@ TEST_P(ShippedScene, WrittenAndLoaded_IsTheSameWorld) {
 INSTANTIATE_TEST_SUITE_P(Each, ShippedScene,
                          testing::Values("attached", "ball_incline", "bending_cells", "changing_models",
                                          "cheese", "fill_drop", "fill_drop_organs", "grasp",
-                                         "gravity_anisotropy", "gravity_beams", "guard_shot", "liver",
+                                         "gravity_anisotropy", "gravity_beams", "guard_shot", "lattice_drop", "liver",
                                          "orange", "pinched_tube", "pressed_ring", "probe_block",
                                          "rabbits_slope", "reduced_models", "rigid_on_ball", "rigid_on_bed",
                                          "rigid_pinch", "rollback_compare", "slope_block", "ten_bodies",
