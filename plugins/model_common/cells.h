@@ -13,12 +13,12 @@
 // - poisson near 1/2: the volume change is its projection on 1, xi, eta, zeta (B-bar, Hughes 1980,
 //   Generalization of selective integration procedures); the linear parts are those of bending, which the
 //   quadratic displacements relieve, so that one constraint is left per cell.
-// Of a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights are
-// given (dfm_mesh.inside): all of them are of functions that these weights are exact for, in a box. The
-// quadratic displacements lose their mean gradient over the material, again for constant stresses, and those
-// that say nothing new on material that is thin in their direction stay zero. A share kTie of the stiffness is
-// that of the whole cell, scaled by what is material: it changes nothing for uniform strains, and holds nodes
-// far from the material, whose mass is of that order too.
+// Of a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights
+// are given (dfm_mesh.inside): in a box they are exact for all functions that occur. The quadratic
+// displacements lose their mean gradient over the material, again for constant stresses, and those that say
+// nothing new on material that is thin in their direction stay zero. A share kTie of the stiffness is that of
+// the whole cell, scaled by what is material: it changes nothing for uniform strains, and holds nodes far
+// from the material, whose mass is of that order too.
 #pragma once
 #include <deform/plugin.h>
 
@@ -60,7 +60,7 @@ constexpr int kInner = 3;  // quadratic displacements of a hexahedron
 constexpr int kMost = kMostNodes + kInner;
 constexpr int kWhole = 8, kInside = 27;  // points of the rules
 constexpr double kTie = 0.02;
-constexpr double kThin = 1e-9;           // of the square of a function: it depends on those before it
+constexpr double kThin = 1e-9;  // of the square of a function: it depends on those before it
 
 // At one of the points of a rule.
 struct Point {
@@ -185,7 +185,8 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
                            RestCell &out) {
   using namespace cells;
   const bool hex = kind == DFM_CELL_HEX8;
-  const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes, points = inside ? kInside : kWhole;
+  const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes,
+            points = inside ? kInside : kWhole;
   const auto look = [&](int n, Point &p) {
     hex ? hex8_place(n, inside, p) : tet10(n, p);
     if (hex) hex8(p);

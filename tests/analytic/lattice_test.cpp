@@ -47,7 +47,8 @@ struct Skin {
     triangles.assign(t, t + 3 * size_t(info.ntriangle));
     for (uint32_t i = 0; i < info.npoint; ++i)
       for (const double v : apply(turn, {x[3 * i], x[3 * i + 1], x[3 * i + 2]})) points.push_back(v);
-    test::ok(dfm_trimesh_create(context, info.npoint, points.data(), info.ntriangle, triangles.data(), &mesh));
+    test::ok(
+        dfm_trimesh_create(context, info.npoint, points.data(), info.ntriangle, triangles.data(), &mesh));
   }
 };
 
@@ -88,9 +89,13 @@ struct Body {
     test::ok(dfm_tetmesh_lattice(skin.mesh, cells, size, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
-    const dfm_surface_def surface = {sizeof(dfm_surface_def), DFM_COUPLING_BARYCENTRIC,
-                                     uint32_t(skin.points.size() / 3), uint32_t(skin.triangles.size() / 3),
-                                     skin.points.data(), skin.triangles.data(), 0};
+    const dfm_surface_def surface = {sizeof(dfm_surface_def),
+                                     DFM_COUPLING_BARYCENTRIC,
+                                     uint32_t(skin.points.size() / 3),
+                                     uint32_t(skin.triangles.size() / 3),
+                                     skin.points.data(),
+                                     skin.triangles.data(),
+                                     0};
     d.surface = &surface;
     test::BodyOptions o;
     o.young = 1e5;
@@ -153,8 +158,7 @@ TEST(Lattice, EnergyOfUniformStrain_IsThatOfTheVolume) {
           trace += kStrain[i][i];
           for (size_t j = 0; j < 3; ++j) square += kStrain[i][j] * kStrain[i][j];
         }
-        const double exact =
-            solid_of(*skin).mass / 1000 * (mu * square + 0.5 * lambda * trace * trace);
+        const double exact = solid_of(*skin).mass / 1000 * (mu * square + 0.5 * lambda * trace * trace);
         for (const char *model : {"linear_fem", "corotational_fem"}) {
           Body b(context, *skin, 0, size, model, poisson);
           b.place(kStrain, turned(0, 0, 0));
@@ -229,7 +233,8 @@ double bent(const char *model, double size, const Matrix &turn) {
       for (int j = 0; j < kParts; ++j) {
         const double y = kSide * (i + 0.5) / kParts, z = kSide * (j + 0.5) / kParts;
         const Vec at = apply(turn, {end, y, z});
-        const Vec along = apply(turn, {(end > 0 ? 1 : -1) * kMoment * (z - kSide / 2) / inertia * area, 0, 0});
+        const Vec along =
+            apply(turn, {(end > 0 ? 1 : -1) * kMoment * (z - kSide / 2) / inertia * area, 0, 0});
         uint32_t cell = 0;
         double weight[8];
         shapes(x, cells, info.ncell, at, &cell, weight);
@@ -240,7 +245,9 @@ double bent(const char *model, double size, const Matrix &turn) {
   const auto farthest = [&](Vec way) {
     uint32_t best = 0;
     for (uint32_t i = 0; i < s.npoint; ++i) {
-      const auto height = [&](uint32_t n) { return way[0] * x[3 * n] + way[1] * x[3 * n + 1] + way[2] * x[3 * n + 2]; };
+      const auto height = [&](size_t n) {
+        return way[0] * x[3 * n] + way[1] * x[3 * n + 1] + way[2] * x[3 * n + 2];
+      };
       if (height(i) > height(best)) best = i;
     }
     return best;

@@ -218,7 +218,8 @@ TEST(Lattice, WhatCannotBeOne_SaysSo) {
   test::ok(dfm_trimesh_write(whole, (folder + "/ball.stl").c_str()));
   const auto told = [&](const std::string &keys, std::initializer_list<const char *> parts) {
     test::write_file(path, R"({"format": "deform-scene", "version": 1,
-      "time": {"duration": 0.02, "step": 0.01}, "bodies": [{"name": "ball", "model": {"type": "linear_fem"}, )" +
+      "time": {"duration": 0.02, "step": 0.01},
+      "bodies": [{"name": "ball", "model": {"type": "linear_fem"}, )" +
                                keys + "}]}");
     dfm_world w = 0;
     EXPECT_NE(dfm_scene_load(context, path.c_str(), &w), DFM_OK);

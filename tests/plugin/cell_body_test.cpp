@@ -15,8 +15,10 @@ struct Case {
   bool turns() const { return std::strcmp(module, "model_corotational_fem") == 0; }
 };
 std::string name_of(const testing::TestParamInfo<Case> &info) {
-  return std::string(info.param.turns() ? "Corotational" : "Linear") +
-         (info.param.cut ? "Cut" : info.param.kind == DFM_CELL_TET10 ? "Tet10" : "Hex8");
+  return std::string(info.param.turns() ? "Corotational" : "Linear") + (info.param.cut ? "Cut"
+                                                                        : info.param.kind == DFM_CELL_TET10
+                                                                            ? "Tet10"
+                                                                            : "Hex8");
 }
 const dfm_type &type_by(const char *module) {
   static std::map<std::string, const dfm_type *> known;

@@ -66,7 +66,8 @@ inline Mesh brick_bar(uint32_t nx, uint32_t ny, uint32_t nz, Vec h, double noise
 
 // Weights of the three Gauss points for integrals over [-1,end] in place of [-1,1], in its length.
 inline std::array<double, 3> part_rule(double end) {
-  const double g = std::sqrt(0.6), m0 = (end + 1) / 2, m1 = (end * end - 1) / 4, m2 = (end * end * end + 1) / 6;
+  const double g = std::sqrt(0.6), m0 = (end + 1) / 2, m1 = (end * end - 1) / 4,
+               m2 = (end * end * end + 1) / 6;
   return {m2 / 1.2 - m1 / (2 * g), m0 - m2 / 0.6, m2 / 1.2 + m1 / (2 * g)};
 }
 

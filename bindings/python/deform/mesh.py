@@ -185,7 +185,8 @@ class TetMesh(_Mesh):
         (surface=), and one of the models that bricks() is for."""
         surface = surface_of(surface, "surface")
         out = ctypes.c_uint64()
-        check(lib.dfm_tetmesh_lattice(surface.handle, whole(cells, "cells", 0), float(size), ctypes.byref(out)))
+        check(lib.dfm_tetmesh_lattice(surface.handle, whole(cells, "cells", 0), float(size),
+                                      ctypes.byref(out)))
         return cls(out.value, surface._context)
 
     def second_order(self) -> TetMesh:

@@ -84,8 +84,8 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   w[3] = g;
 }
 
-// Place of x in the coordinates of the hexahedron c and its shape functions there, by Newton's method from its
-// center: one step in a box. False where it does not get there, far outside a distorted cell.
+// Place of x in the coordinates of the hexahedron c and its shape functions there, by Newton's method from
+// its center: one step in a box. False where it does not get there, far outside a distorted cell.
 bool hexahedron_weights(Vec3 x, const Vec3 c[8], Vec3 &at, double w[8]) {
   constexpr int kSteps = 20;
   constexpr uint32_t kAll[8] = {0, 1, 2, 3, 4, 5, 6, 7};

@@ -85,8 +85,8 @@ class Mover {
  private:
   const Phyxels &p_;
   const RestRows &rows_;
-  std::vector<Quadratics> terms_;   // at the points; orthonormal with the masses as weights
-  std::vector<double> added_;  // [n] kg
+  std::vector<Quadratics> terms_;  // at the points; orthonormal with the masses as weights
+  std::vector<double> added_;      // [n] kg
   Quadratics paid_{};
   double total_ = 0;
 

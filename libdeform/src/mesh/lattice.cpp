@@ -199,8 +199,7 @@ Moments moved(const Moments &in, const int (&cells)[3]) {
 // Weights of the Gauss points, by the polynomials that are 1 at one of three points and 0 at the others.
 Moments weights_of(const Moments &in) {
   constexpr double g2 = 0.6, g = 0.77459666924148337704;
-  constexpr double kOne[3][3] = {
-      {0, -0.5 / g, 0.5 / g2}, {1, 0, -1 / g2}, {0, 0.5 / g, 0.5 / g2}};
+  constexpr double kOne[3][3] = {{0, -0.5 / g, 0.5 / g2}, {1, 0, -1 / g2}, {0, 0.5 / g, 0.5 / g2}};
   double by[3][3][3];
   for (auto &axis : by) std::copy_n(&kOne[0][0], 9, &axis[0][0]);
   Moments out = along_axes(by, in);
@@ -323,8 +322,10 @@ void refuse_unfit(const TriMesh &surface, const Extent &box, uint32_t cells, dou
          "close it, or let \"fill\" fill it, which closes small holes",
          s.open_edges, s.nonmanifold_edges);
   if (!(s.volume > 0))
-    fail(DFM_E_FORMAT, "the surface encloses %g m3; it should enclose a volume, its triangles "
-         "counter-clockwise from outside", s.volume);
+    fail(DFM_E_FORMAT,
+         "the surface encloses %g m3; it should enclose a volume, its triangles "
+         "counter-clockwise from outside",
+         s.volume);
   if (size > box.longest())
     fail(DFM_E_ARG, "cells of %g m are larger than the surface, whose box is %g x %g x %g m", size,
          box.hi[0] - box.lo[0], box.hi[1] - box.lo[1], box.hi[2] - box.lo[2]);

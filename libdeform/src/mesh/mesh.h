@@ -21,8 +21,7 @@ struct MeshGroup {
 
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard()) : memory(&m) {
-    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share,
-               inside);
+    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share, inside);
   }
   const Memory *memory;
   Array<double> points;  // [npoint,3], m

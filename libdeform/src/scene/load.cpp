@@ -36,8 +36,8 @@ double longest_of_skin(const BodyMesh &mesh) {
   double longest = 0;
   for (const size_t k : {1, 3, 4})
     for (size_t c = 0; c < 3; ++c)
-      longest = std::max(longest, mesh.points[3 * size_t{mesh.nodes[k]} + c] -
-                                      mesh.points[3 * size_t{mesh.nodes[0]} + c]);
+      longest = std::max(
+          longest, mesh.points[3 * size_t{mesh.nodes[k]} + c] - mesh.points[3 * size_t{mesh.nodes[0]} + c]);
   return longest;
 }
 
@@ -238,10 +238,7 @@ BodyMesh MeshFiles::load(const Body &b) {
   BodyMesh out;
   out.filled = !has_cells(path, pointer);
   check_keys(b, out.filled);
-  take_cells(!out.filled    ? cells(path, pointer)
-             : b.lattice() ? lattice(path, b)
-                           : filling(path, b),
-             b, out);
+  take_cells(!out.filled ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
   out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);
   if (!b.surface.mesh.empty()) {
     const std::string where = b.surface.pointer + "/mesh";

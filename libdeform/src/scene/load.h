@@ -53,7 +53,7 @@ class MeshFiles {
   std::map<std::pair<std::string, uint32_t>, dfm_tetmesh> fillings_;  // by file and number of cells
   // by file, number and size of cells
   std::map<std::tuple<std::string, uint32_t, double>, dfm_tetmesh> lattices_;
-  std::deque<Triangles> split_;                                       // by body, lent to its BodyMesh
+  std::deque<Triangles> split_;  // by body, lent to its BodyMesh
 };
 
 }  // namespace dfm::scene

@@ -12,7 +12,7 @@ namespace {
 
 constexpr char kPrefix[] = "anisotropy_";
 constexpr char kAxis[] = "anisotropy_axis";
-constexpr double kMostCells = 1e8;  // dfm_tetmesh_fill and dfm_body_create say the same of these two
+constexpr double kMostCells = 1e8;    // dfm_tetmesh_fill and dfm_body_create say the same of these two
 constexpr double kMostLattice = 1e6;  // dfm_tetmesh_lattice says the same
 constexpr double kWidestSupport = 10;
 

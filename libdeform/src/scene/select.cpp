@@ -90,7 +90,8 @@ std::vector<uint32_t> skin_triangles(const Selection &where, const BodyMesh &mes
   return out;
 }
 
-// Marks the corners of the cells that hold the skin's marked points, or of the face or edge on which one lies.
+// Marks the corners of the cells that hold the skin's marked points, or of the face or edge on which one
+// lies.
 void mark_cells(const std::vector<uint8_t> &surfel, const BodyMesh &mesh, std::vector<uint8_t> &point) {
   for (uint32_t s = 0; s < mesh.skin.npoint; ++s) {
     if (!surfel[s]) continue;

@@ -6,6 +6,7 @@
 
 #include "core/error.h"
 #include "dynamics/symplectic_euler.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/spring.h"
@@ -13,9 +14,17 @@
 #include "step/first_failure.h"
 #include "step/squeezed.h"
 #include "step/stages.h"
-#include "world/measure.h"
 
 namespace dfm {
+
+uint32_t inverted_cells(const Body &b) {
+  if (b.inside.empty()) return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
+  uint32_t n = 0;
+  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
+    n += inverted_inside(b.p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c]);
+  return n * cell_kind(b.cell_type).tets;
+}
+
 namespace {
 
 // The bound depends on the state (volume terms stiffen as cells grow, tilted springs as they stretch). 0.9 of

@@ -135,8 +135,8 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
            "dfm_tetmesh_cells do",
            b.name.c_str(), kind.name);
     if (def.cell_share)
-      fail(DFM_E_UNSUPPORTED, "body '%s': cell_share is for tetrahedra; %s take cell_inside, if any", b.name.c_str(),
-           kind.name);
+      fail(DFM_E_UNSUPPORTED, "body '%s': cell_share is for tetrahedra; %s take cell_inside, if any",
+           b.name.c_str(), kind.name);
   }
   if (def.cell_inside) take_inside(b, def);
   if (def.cell_share)

@@ -5,7 +5,6 @@
 #include <cstring>
 
 #include "core/error.h"
-#include "dynamics/symplectic_euler.h"
 #include "mesh/cells.h"
 #include "plugin/on_behalf.h"
 #include "plugin/params.h"
@@ -13,6 +12,7 @@
 #include "plugin/tables.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "world/body_model.h"
 
 namespace dfm {
@@ -30,14 +30,6 @@ double elastic_energy(Body &b) {
   const OnBehalf speaks(b.name);
   const auto ask = [&] { return b.model.ops->energy(b.model.self, &k, &joule); };
   return b.model.call("energy", ask) == DFM_OK ? joule : NAN;
-}
-
-uint32_t inverted_cells(const Body &b) {
-  if (b.inside.empty()) return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
-  uint32_t n = 0;
-  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
-    n += inverted_inside(b.p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c]);
-  return n * cell_kind(b.cell_type).tets;
 }
 
 dfm_body_measure measure(Body &b) {

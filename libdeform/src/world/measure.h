@@ -5,7 +5,6 @@
 namespace dfm {
 
 dfm_body_measure measure(Body &b);
-uint32_t inverted_cells(const Body &b);  // tetrahedra; of a lattice by the middle of its cells' material
 double kinetic_of(const Body &b);  // J
 double elastic_energy(Body &b);    // J; NaN if the model has none
 // [ntet] J/m3; throws if the model has none
