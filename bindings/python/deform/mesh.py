@@ -216,14 +216,23 @@ class TetMesh(_Mesh):
 
     @property
     def volume(self) -> float:
-        """m3; of a mesh that was filled, of its material. Its cells reach out of the surface; their volume is
-        info.volume."""
-        share = self.share
+        """m3; of a mesh that was filled, and of a lattice, of its material. Its cells reach out of the surface;
+        their volume is info.volume."""
+        share, inside = self.share, self.inside
+        if inside is not None:
+            share = np.repeat(inside.sum(axis=1), len(self.tets) // len(inside))
         if share is None:
             return float(self.info.volume)
         corners = self.points[self.tets]
         a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
         return float(share @ np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
+
+    @property
+    def inside(self) -> np.ndarray | None:
+        """[ncell,27] material of the cells of a lattice, as dfm_tetmesh_inside gives it; else None."""
+        out = ctypes.c_void_p()
+        check(quick.dfm_tetmesh_inside(self.handle, ctypes.byref(out)))
+        return _borrowed(self._keeper, out.value, (self.info.ncell, 27), ctypes.c_double) if out.value else None
 
     @property
     def share(self) -> np.ndarray | None:
