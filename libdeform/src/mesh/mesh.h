@@ -124,8 +124,8 @@ void write_msh22(const TetMesh &mesh, const std::string &path);  // binary
 void write_vtk(const TetMesh &mesh, const std::string &path);    // legacy 3.0, binary
 void write_medit(const TetMesh &mesh, const std::string &path);  // text; groups by number alone
 void write_vtu(const TetMesh &mesh, const std::string &path);    // with groups and share as cell data
-// By ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh. False: the mesh has shares, which the format does
-// not hold.
+// By ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh. False: cells are in part material, and the format
+// does not hold how much.
 bool write_tet_mesh(const TetMesh &mesh, const std::string &path);
 
 // VTU (XML, appended raw data), as ParaView reads it.

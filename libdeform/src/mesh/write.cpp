@@ -169,7 +169,7 @@ bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
          "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), "
          ".vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)",
          path.c_str());
-  return mesh.share.empty() || ending == "vtk" || ending == "vtu";
+  return ending == "vtu" || (mesh.inside.empty() && (mesh.share.empty() || ending == "vtk"));
 }
 
 }  // namespace dfm

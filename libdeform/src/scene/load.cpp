@@ -167,9 +167,10 @@ void MeshFiles::check_keys(const Body &b, bool filled) const {
                   "the mesh is a surface, and the cells that fill it belong to no group");
     return;
   }
-  if (b.fill || b.lattice())
-    def_.refuse(b.pointer + (b.fill ? "/fill" : "/lattice"),
-                "the mesh holds cells already; \"fill\" and \"lattice\" are for a closed surface");
+  if (b.fill)
+    def_.refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
+  if (b.lattice())
+    def_.refuse(b.pointer + "/lattice", "the mesh holds cells already; \"lattice\" is for a closed surface");
   if (b.surface.coupled && b.surface.mesh.empty())
     def_.refuse(b.surface.pointer + "/coupling",
                 "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
