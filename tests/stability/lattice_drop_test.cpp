@@ -29,4 +29,6 @@ TEST(LatticeDrop, Bodies_LandAndKeepTheirVolumeWithoutCrossing) {
 }
 
 // soak: long, and a jittered run of what another test runs
-TEST(LatticeDrop, JitteredRuns_DoNotCross) { test::expect_jittered("lattice_drop", 1, 10, kLanding, 8, stand); }
+TEST(LatticeDrop, JitteredRuns_DoNotCross) {
+  test::expect_jittered("lattice_drop", 1, 10, kLanding, 8, stand);
+}

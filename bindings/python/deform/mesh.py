@@ -216,8 +216,8 @@ class TetMesh(_Mesh):
 
     @property
     def volume(self) -> float:
-        """m3; of a mesh that was filled, and of a lattice, of its material. Its cells reach out of the surface;
-        their volume is info.volume."""
+        """m3; of a mesh that was filled, and of a lattice, of its material. Its cells reach out of the
+        surface; their volume is info.volume."""
         share, inside = self.share, self.inside
         if inside is not None:
             share = np.repeat(inside.sum(axis=1), len(self.tets) // len(inside))
@@ -232,7 +232,8 @@ class TetMesh(_Mesh):
         """[ncell,27] material of the cells of a lattice, as dfm_tetmesh_inside gives it; else None."""
         out = ctypes.c_void_p()
         check(quick.dfm_tetmesh_inside(self.handle, ctypes.byref(out)))
-        return _borrowed(self._keeper, out.value, (self.info.ncell, 27), ctypes.c_double) if out.value else None
+        shape = (self.info.ncell, 27)
+        return _borrowed(self._keeper, out.value, shape, ctypes.c_double) if out.value else None
 
     @property
     def share(self) -> np.ndarray | None:
