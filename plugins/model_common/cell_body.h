@@ -69,6 +69,8 @@ class CellBody {
     rest_.create_copy(h, m.rest, 3 * size_t(npoint_));
     mass_.create_copy(h, m.mass, npoint_);
     cells_.create_copy(h, m.cells, size_t(nodes_) * ncell_);
+    const bool part = m.size >= offsetof(dfm_mesh, inside) + sizeof m.inside && m.inside;
+    if (part) inside_.create_copy(h, m.inside, size_t{cells::kInside} * ncell_);
     cell_.create(h, ncell_);
     block_.create(h, 9 * nblock() * ncell_);
     force_.create(h, 3 * size_t(nodes_) * ncell_);
@@ -264,7 +266,8 @@ class CellBody {
         middle[n] += x[3 * a + n] / nodes_;
       }
     RestCell made;
-    if (!make_rest_cell(kind_, x, lame_of(at(kYoung, c), at(kPoisson, c)), made))
+    const double *const inside = inside_.empty() ? nullptr : &inside_[size_t{cells::kInside} * c];
+    if (!make_rest_cell(kind_, x, inside, lame_of(at(kYoung, c), at(kPoisson, c)), made))
       throw "a cell is inverted or flat at rest; mesh the shape again with less curved cells";
     Cell &out = cell_[c];
     out.volume = made.volume;
@@ -576,6 +579,7 @@ class CellBody {
   double params_[kParamCount] = {};
   Buffer<double> field_[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
   Buffer<double> rest_, mass_;         // [npoint,3] m, [npoint] kg
+  Buffer<double> inside_;              // [ncell,27] of a lattice, as dfm_mesh has it; else empty
   Buffer<uint32_t> cells_;             // [ncell,nodes]
   Buffer<Cell> cell_;                  // [ncell]
   Buffer<double> block_, norm_;        // [ncell,nblock,9] N/m, [ncell,nblock] their norms

@@ -13,6 +13,12 @@
 // - poisson near 1/2: the volume change is its projection on 1, xi, eta, zeta (B-bar, Hughes 1980,
 //   Generalization of selective integration procedures); the linear parts are those of bending, which the
 //   quadratic displacements relieve, so that one constraint is left per cell.
+// Of a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights
+// are given (dfm_mesh.inside): in a box they are exact for all functions that occur. The quadratic
+// displacements lose their mean gradient over the material, again for constant stresses, and those that say
+// nothing new on material that is thin in their direction stay zero. A share kTie of the stiffness is that of
+// the whole cell, scaled by what is material: it changes nothing for uniform strains, and holds nodes far
+// from the material, whose mass is of that order too.
 #pragma once
 #include <deform/plugin.h>
 
@@ -52,8 +58,11 @@ namespace cells {
 
 constexpr int kInner = 3;  // quadratic displacements of a hexahedron
 constexpr int kMost = kMostNodes + kInner;
+constexpr int kWhole = 8, kInside = 27;  // points of the rules
+constexpr double kTie = 0.02;
+constexpr double kThin = 1e-9;  // of the square of a function: it depends on those before it
 
-// At one of the eight points of a rule.
+// At one of the points of a rule.
 struct Point {
   double at[3];                 // reference coordinates
   double weight;                // m^3 once the Jacobian is known
@@ -80,17 +89,22 @@ inline void tet10(int n, Point &p) {
   }
 }
 
-inline void hex8(int n, Point &p) {
-  constexpr double kGauss = 0.57735026918962576451;
+inline void hex8(Point &p) {
   constexpr int kSign[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
                                {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
-  p.weight = 1;
-  for (int c = 0; c < 3; ++c) p.at[c] = n < 8 ? kGauss * kSign[n][c] : 0;  // 8: the center
   for (int k = 0; k < 8; ++k)
     for (int c = 0; c < 3; ++c) {
       const int i = (c + 1) % 3, j = (c + 2) % 3;
       p.local[k][c] = 0.125 * kSign[k][c] * (1 + kSign[k][i] * p.at[i]) * (1 + kSign[k][j] * p.at[j]);
     }
+}
+
+inline void hex8_place(int n, const double *inside, Point &p) {
+  constexpr double kGauss = 0.57735026918962576451, kThree = 0.77459666924148337704;
+  constexpr int kHigh[8] = {0, 1, 3, 2, 4, 5, 7, 6};  // bits by axis
+  for (int c = 0, step = 1; c < 3; ++c, step *= 3)
+    p.at[c] = inside ? kThree * (n / step % 3 - 1) : kHigh[n] >> c & 1 ? kGauss : -kGauss;
+  p.weight = inside ? 8 * inside[n] : 1;
 }
 
 // The Jacobian dx_i/dxi_j, its determinant and inverse; false if it is not positive.
@@ -116,43 +130,48 @@ inline void gradient(const double *inverse, const double *local, double by, doub
     g[c] = by * ((local[0] * inverse[c] + local[1] * inverse[3 + c]) + local[2] * inverse[6 + c]);
 }
 
-// Projects what the rows hold at the points on 1, xi, eta, zeta, weighted by volume.
-inline void project(const Point *q, int rows, double (*theta)[kMost][3]) {
-  double basis[8][4];
+// Projects what the rows hold at the points on 1, xi, eta, zeta, weighted by volume. Returns which of these
+// say something new, as bits.
+inline int project(const Point *q, int points, int rows, double (*theta)[kMost][3]) {
+  double basis[kInside][4];
+  int kept = 0;
   const auto inner = [&](int i, int j) {
     double sum = 0;
-    for (int n = 0; n < 8; ++n) sum += q[n].weight * basis[n][i] * basis[n][j];
+    for (int n = 0; n < points; ++n) sum += q[n].weight * basis[n][i] * basis[n][j];
     return sum;
   };
-  for (int n = 0; n < 8; ++n) {  // made orthonormal one after another
+  for (int n = 0; n < points; ++n) {  // made orthonormal one after another
     basis[n][0] = 1;
     for (int k = 0; k < 3; ++k) basis[n][k + 1] = q[n].at[k];
   }
   for (int i = 0; i < 4; ++i) {
+    const double before = inner(i, i);
     for (int j = 0; j < i; ++j) {
       const double along = inner(i, j);
-      for (int n = 0; n < 8; ++n) basis[n][i] -= along * basis[n][j];
+      for (int n = 0; n < points; ++n) basis[n][i] -= along * basis[n][j];
     }
-    const double length = std::sqrt(inner(i, i));
-    for (int n = 0; n < 8; ++n) basis[n][i] /= length;
+    const double square = inner(i, i), length = square > kThin * std::fabs(before) ? std::sqrt(square) : 0;
+    kept |= (length > 0) << i;
+    for (int n = 0; n < points; ++n) basis[n][i] = length > 0 ? basis[n][i] / length : 0;
   }
   for (int a = 0; a < rows; ++a)
     for (int c = 0; c < 3; ++c) {
       double part[4] = {};
-      for (int n = 0; n < 8; ++n)
+      for (int n = 0; n < points; ++n)
         for (int i = 0; i < 4; ++i) part[i] += q[n].weight * basis[n][i] * theta[n][a][c];
-      for (int n = 0; n < 8; ++n) {
+      for (int n = 0; n < points; ++n) {
         theta[n][a][c] = 0;
         for (int i = 0; i < 4; ++i) theta[n][a][c] += basis[n][i] * part[i];
       }
     }
+  return kept;
 }
 
-// Eliminates the rows of k from n on, the last one first: each pivot is positive.
+// Eliminates the rows of k from n on, the last one first: each pivot is positive, or its row is zero.
 template <int kSize>
 inline void eliminate(double (&k)[kSize][kSize], int n, int all) {
   for (int p = all - 1; p >= n; --p)
-    for (int i = 0; i < p; ++i) {
+    for (int i = 0; i < p && k[p][p] > 0; ++i) {
       const double share = k[i][p] / k[p][p];
       for (int j = 0; j < p; ++j) k[i][j] -= share * k[p][j];
     }
@@ -160,19 +179,25 @@ inline void eliminate(double (&k)[kSize][kSize], int n, int all) {
 
 }  // namespace cells
 
-// x [nodes,3] m. False if the Jacobian is not positive at a point: the cell is inverted or flat there.
-inline bool make_rest_cell(uint32_t kind, const double *x, const Lame &m, RestCell &out) {
+// x [nodes,3] m; inside [27] or null. False if the Jacobian is not positive at a point: the cell is inverted
+// or flat there.
+inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside, const Lame &m,
+                           RestCell &out) {
   using namespace cells;
   const bool hex = kind == DFM_CELL_HEX8;
-  const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes;
+  const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes,
+            points = inside ? kInside : kWhole;
   const auto look = [&](int n, Point &p) {
-    hex ? hex8(n, p) : tet10(n, p);
+    hex ? hex8_place(n, inside, p) : tet10(n, p);
+    if (hex) hex8(p);
     return jacobian_of(uint32_t(nodes), x, p);
   };
-  Point q[8], center{};
-  if (hex && !look(8, center)) return false;
+  Point q[kInside], center{};
+  if (hex) hex8(center);
+  if (hex && !jacobian_of(uint32_t(nodes), x, center)) return false;
   out = RestCell();
-  for (int n = 0; n < 8; ++n) {
+  double spurious[kInner][3] = {};  // m^2, integrals of the quadratic displacements' gradients
+  for (int n = 0; n < points; ++n) {
     if (!look(n, q[n])) return false;
     q[n].weight *= q[n].jacobian;
     for (int a = 0; a < nodes; ++a) gradient(q[n].inverse, q[n].local[a], 1, q[n].g[a]);
@@ -180,6 +205,7 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const Lame &m, RestCe
       double local[3] = {};
       local[k] = q[n].at[k];
       gradient(center.inverse, local, center.jacobian / q[n].jacobian, q[n].g[nodes + k]);
+      for (int c = 0; c < 3; ++c) spurious[k][c] += q[n].weight * q[n].g[nodes + k][c];
     }
     out.volume += q[n].weight;
     for (int a = 0; a < nodes; ++a)
@@ -187,13 +213,19 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const Lame &m, RestCe
   }
   for (int a = 0; a < nodes; ++a)
     for (double &g : out.mean[a]) g /= out.volume;
-  double theta[8][kMost][3];
-  for (int n = 0; n < 8; ++n) std::copy_n(&q[n].g[0][0], 3 * kMost, &theta[n][0][0]);
-  if (hex) project(q, rows, theta);
+  for (int n = 0; inside && n < points; ++n)
+    for (int k = 0; k < kInner; ++k)
+      for (int c = 0; c < 3; ++c) q[n].g[nodes + k][c] -= spurious[k][c] / out.volume;
+  double theta[kInside][kMost][3];
+  for (int n = 0; n < points; ++n) std::copy_n(&q[n].g[0][0], 3 * kMost, &theta[n][0][0]);
+  const int kept = hex ? project(q, points, rows, theta) : 0;
+  for (int n = 0; n < points; ++n)
+    for (int k = 0; hex && k < kInner; ++k)
+      for (int c = 0; c < 3 && !(kept >> (k + 1) & 1); ++c) q[n].g[nodes + k][c] = theta[n][nodes + k][c] = 0;
   // 2 mu deviator : deviator + bulk theta^2
   const double bulk = m.lambda + 2 * m.mu / 3;
   double k[3 * kMost][3 * kMost] = {};
-  for (int n = 0; n < 8; ++n)
+  for (int n = 0; n < points; ++n)
     for (int a = 0; a < rows; ++a)
       for (int b = 0; b < rows; ++b) {
         const double *ga = q[n].g[a], *gb = q[n].g[b], *ta = theta[n][a], *tb = theta[n][b];
@@ -207,6 +239,12 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const Lame &m, RestCe
   eliminate(k, 3 * nodes, 3 * rows);
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j) out.stiffness[i][j] = 0.5 * (k[i][j] + k[j][i]);
+  if (!inside) return true;
+  RestCell whole;
+  if (!make_rest_cell(kind, x, nullptr, m, whole)) return false;
+  for (int i = 0; i < 3 * nodes; ++i)
+    for (int j = 0; j < 3 * nodes; ++j)
+      out.stiffness[i][j] += kTie * (out.volume / whole.volume * whole.stiffness[i][j] - out.stiffness[i][j]);
   return true;
 }
 

@@ -100,7 +100,8 @@ const dfm_slot kPlasticSlot = {DFM_PER_CELL, kPlasticState, DFM_SLOT_SCALAR, 0};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
                 kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot, 0, 0};
 
-constexpr uint32_t kCaps = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT;
+constexpr uint32_t kCaps =
+    DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_INSIDE;
 
 // The energy is not stationary in a frame by Gram-Schmidt, so forces are no gradient and have a moment.
 uint32_t caps_of(const void *self) {

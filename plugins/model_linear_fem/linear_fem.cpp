@@ -42,9 +42,9 @@ const void *extension(const void *, const char *id) {
 
 const char *const kEffects[] = {"damping", nullptr};
 
-const dfm_model kModel =
-    model::table<AnyBody>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS,
-                          create, set_params, nullptr, extension);
+const dfm_model kModel = model::table<AnyBody>(
+    DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS | DFM_CAP_INSIDE,
+    create, set_params, nullptr, extension);
 
 const dfm_type kType =
     dfm::plugin::type(DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",

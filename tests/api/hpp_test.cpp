@@ -302,6 +302,11 @@ TEST(Hpp, Meshes_LendTheirArrays) {
   def.set_mesh(filled);
   EXPECT_EQ(def.cell_share, filled.share().data());
   EXPECT_EQ(def.npoint, filled.info().npoint);
+  const auto lattice = surface.lattice(30);
+  deform::BodyDef of_lattice;
+  of_lattice.set_mesh(lattice);
+  EXPECT_NE(of_lattice.cell_inside, nullptr);
+  EXPECT_EQ(of_lattice.cell_share, nullptr);
   const auto again = context.make_surface(shape.points, shape.triangles);
   EXPECT_EQ(again.info().ntriangle, surface.info().ntriangle);
   EXPECT_THROW((void)context.make_tets("bal", {0.1}, 100), deform::Error);

@@ -64,4 +64,23 @@ inline Mesh brick_bar(uint32_t nx, uint32_t ny, uint32_t nz, Vec h, double noise
   return m;
 }
 
+// Weights of the three Gauss points for integrals over [-1,end] in place of [-1,1], in its length.
+inline std::array<double, 3> part_rule(double end) {
+  const double g = std::sqrt(0.6), m0 = (end + 1) / 2, m1 = (end * end - 1) / 4,
+               m2 = (end * end * end + 1) / 6;
+  return {m2 / 1.2 - m1 / (2 * g), m0 - m2 / 0.6, m2 / 1.2 + m1 / (2 * g)};
+}
+
+// Every cell is a box of material, from a corner of the cell to somewhere inside it or beyond its borders.
+inline Mesh cut_bars() {
+  Mesh m = brick_bar(3, 3, 3, {0.1, 0.12, 0.09});
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> u(-0.5, 1.6);
+  for (uint32_t c = 0; c < m.ncell(); ++c) {
+    const std::array<double, 3> x = part_rule(u(random)), y = part_rule(u(random)), z = part_rule(u(random));
+    for (uint32_t q = 0; q < 27; ++q) m.inside.push_back(x[q % 3] * y[q / 3 % 3] * z[q / 9]);
+  }
+  return m;
+}
+
 }  // namespace model_test

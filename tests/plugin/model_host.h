@@ -89,7 +89,7 @@ inline const dfm_type &type_of(const char *module, uint32_t n = 0) {
 
 struct Mesh {
   uint32_t kind = DFM_CELL_TET;
-  std::vector<double> rest, mass;
+  std::vector<double> rest, mass, inside;  // inside: of hexahedra in part material
   std::vector<uint32_t> cells, edges;
   uint32_t nodes() const { return kind == DFM_CELL_TET10 ? 10 : kind == DFM_CELL_HEX8 ? 8 : 4; }
   uint32_t npoint() const { return uint32_t(rest.size() / 3); }
@@ -127,6 +127,7 @@ inline dfm_mesh described(const Mesh &m) {
   d.mass = m.mass.data();
   d.nedge = uint32_t(m.edges.size() / 2);
   d.edges = m.edges.data();
+  if (!m.inside.empty()) d.inside = m.inside.data();
   return d;
 }
 

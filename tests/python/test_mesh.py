@@ -61,6 +61,19 @@ class Meshes(unittest.TestCase):
             np.testing.assert_allclose(body.positions, surface.points, atol=1e-9)
             self.assertAlmostEqual(body.measure.mass / (1000 * surface.volume), 1, delta=0.02)
 
+    def test_lattice_under_a_surface(self):
+        surface = deform.TriMesh.make("torus", [0.2, 0.06], triangles=1500)
+        for mesh in (deform.TetMesh.lattice(surface, cells=60), deform.TetMesh.lattice(surface, size=0.08)):
+            self.assertEqual(mesh.inside.shape, (mesh.info.ncell, 27))
+            self.assertAlmostEqual(mesh.volume / surface.volume, 1, delta=1e-12)
+            with deform.World(gravity=(0, 0, 0)) as world:
+                body = world.add_body(mesh, surface=surface, model="corotational_fem")
+                np.testing.assert_allclose(body.positions, surface.points, atol=1e-9)
+                self.assertAlmostEqual(body.measure.mass / (1000 * surface.volume), 1, delta=1e-12)
+        self.assertIsNone(deform.TetMesh.fill(surface, cells=100).inside)
+        with self.assertRaisesRegex(deform.ArgumentError, "either a number of cells"):
+            deform.TetMesh.lattice(surface)
+
     def test_surface_where_cells_are_needed_names_fill(self):
         with tempfile.TemporaryDirectory(suffix=" with space") as folder, deform.World() as world:
             file = str(pathlib.Path(folder) / "ball.stl")

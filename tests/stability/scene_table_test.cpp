@@ -31,6 +31,7 @@ constexpr Row kRows[] = {
     {"gravity_beams", 0, 0},
     {"grasp", 6, 0.75},
     {"guard_shot", 20, 0.02},
+    {"lattice_drop", 8, 0.3},
     {"liver", 20, 0.75},
     {"orange", 20, 0.5},
     {"pinched_tube", 8, 0.45},

@@ -68,6 +68,7 @@ inline void lend(dfm_tetmesh mesh, dfm_body_def &d) {
   d.ntet = info.ntet;
   ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
   ok(dfm_tetmesh_cells(mesh, &d.cell, &d.cells));
+  ok(dfm_tetmesh_inside(mesh, &d.cell_inside));
 }
 
 inline dfm_material make_material(dfm_world w, const BodyOptions &o) {

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 _HERE = pathlib.Path(__file__).resolve().parent
 # those that the wheel carries, or the tree's
 INCLUDES = (_HERE / "native" / "include", _HERE.parents[2] / "libdeform" / "include")
-_HEADERS = ("plugin base id math world body contact attach surface stream mesh scene obstacle law material model "
-            "rigid toi debug query callback sensor cut tool").split()
+_HEADERS = ("plugin base id math world body contact attach surface stream mesh scene obstacle law material "
+            "model rigid toi debug query callback sensor cut tool").split()
 
 _types: dict[str, Any] = {
     "double": ctypes.c_double, "float": ctypes.c_float, "uint64_t": ctypes.c_uint64,

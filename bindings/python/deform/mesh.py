@@ -185,6 +185,17 @@ class TetMesh(_Mesh):
         return cls._of(lib.dfm_tetmesh_fill, surface.handle, whole(cells, "cells", 1),
                        context=surface._context)
 
+    @classmethod
+    def lattice(cls, surface: TriMesh | Any, cells: int = 0, size: float = 0) -> TetMesh:
+        """A coarse regular grid of hexahedra under a closed surface, given as a TriMesh or the path of its
+        file: about `cells` of them, or of edges of about `size`, m. Give the surface to add_body too
+        (surface=), and one of the models that bricks() is for."""
+        surface = surface_of(surface, "surface")
+        out = ctypes.c_uint64()
+        check(lib.dfm_tetmesh_lattice(surface.handle, whole(cells, "cells", 0), float(size),
+                                      ctypes.byref(out)))
+        return cls(out.value, surface._context)
+
     def second_order(self) -> TetMesh:
         """The same shape with points in the middles of the edges, for the same models as bricks()."""
         return TetMesh._of(lib.dfm_tetmesh_second_order, self.handle, context=self._context)
@@ -205,14 +216,24 @@ class TetMesh(_Mesh):
 
     @property
     def volume(self) -> float:
-        """m3; of a mesh that was filled, of its material. Its cells reach out of the surface; their volume is
-        info.volume."""
-        share = self.share
+        """m3; of a mesh that was filled, and of a lattice, of its material. Its cells reach out of the
+        surface; their volume is info.volume."""
+        share, inside = self.share, self.inside
+        if inside is not None:
+            share = np.repeat(inside.sum(axis=1), len(self.tets) // len(inside))
         if share is None:
             return float(self.info.volume)
         corners = self.points[self.tets]
         a, b, c = (corners[:, k] - corners[:, 0] for k in (1, 2, 3))
         return float(share @ np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
+
+    @property
+    def inside(self) -> np.ndarray | None:
+        """[ncell,27] material of the cells of a lattice, as dfm_tetmesh_inside gives it; else None."""
+        out = ctypes.c_void_p()
+        check(quick.dfm_tetmesh_inside(self.handle, ctypes.byref(out)))
+        shape = (self.info.ncell, 27)
+        return _borrowed(self._keeper, out.value, shape, ctypes.c_double) if out.value else None
 
     @property
     def share(self) -> np.ndarray | None:

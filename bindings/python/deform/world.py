@@ -316,12 +316,14 @@ class World(Queries, Reports, Tools, OfThisProcess):
             kind, nodes = ctypes.c_uint32(), ctypes.c_void_p()
             check(lib.dfm_tetmesh_cells(mesh.handle, ctypes.byref(kind), ctypes.byref(nodes)))
             definition.cell, definition.cells = kind.value, nodes.value
-            share, groups = mesh.share, mesh.surface_groups()
+            inside, share, groups = mesh.inside, mesh.share, mesh.surface_groups()
+            if inside is not None:
+                definition.cell_inside = inside.ctypes.data
             if share is not None:
                 definition.cell_share = share.ctypes.data
             if groups is not None:
                 definition.groups = ctypes.addressof(groups)
-            keep += [share, groups]
+            keep += [inside, share, groups]
         elif points is None or tets is None:
             raise ArgumentError("add_body needs a mesh, or points and tets", "DFM_E_ARG")
         x, cells = _scaled(points_of(points), scale), cells_of(tets, 4, "tets")

@@ -77,6 +77,9 @@ typedef struct dfm_body_def {
    * cell the values of its first tetrahedron count. NULL: the cells are the tetrahedra. */
   const uint32_t *cells;
   uint32_t cell, reserved2;
+  /* Hexahedra that are only in part material, or whose material reaches beyond them, as dfm_tetmesh_inside
+   * gives them: [ncell,27], copied. NULL: whole cells. */
+  const double *cell_inside;
 } dfm_body_def;
 
 /** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */

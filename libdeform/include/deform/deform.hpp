@@ -156,6 +156,7 @@ class TetMesh : public Handle<dfm_tetmesh, struct TetMeshKind> {
       def.npoint = i.npoint;
       def.ntet = i.ntet;
       if (const dfm_status cells = dfm_tetmesh_cells(raw_, &def.cell, &def.cells); cells < 0) return cells;
+      if (const dfm_status part = dfm_tetmesh_inside(raw_, &def.cell_inside); part < 0) return part;
       return dfm_tetmesh_share(raw_, &def.cell_share);
     }));
   }
@@ -221,6 +222,11 @@ class TriMesh : public Handle<dfm_trimesh, struct TriMeshKind> {
   auto fill(uint32_t cells) const {
     return produce<E, Unique<TetMesh<E>>>(
         [&](auto &mesh) { return dfm_tetmesh_fill(raw_, cells, mesh.put()); });
+  }
+  // A coarse grid of hexahedra, by their number (size 0) or edge (cells 0).
+  auto lattice(uint32_t cells, double size = 0) const {
+    return produce<E, Unique<TetMesh<E>>>(
+        [&](auto &mesh) { return dfm_tetmesh_lattice(raw_, cells, size, mesh.put()); });
   }
 };
 

@@ -167,6 +167,21 @@ DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tet
  * files store it. Borrowed.
  * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share);
+/** A coarse regular grid of hexahedra over the box of a closed surface, for a body that wears this surface
+ * (dfm_body_def.surface, cell_inside). Cells with less than 0.15 of the material of a neighbor are left
+ * out: what they have belongs to that neighbor, which reaches beyond its borders.
+ * @param cells  wanted number, the nearest that the grid gives; 0: by size
+ * @param size   m, edge of the cells, about: each side of the box is divided into equal parts; 0: by cells
+ * @return DFM_OK; DFM_E_ARG not one of both, size above the longest side of the box, more than 1e6 cells in
+ * the box; DFM_E_FORMAT the surface is open, or crosses itself; DFM_E_NOMEM; DFM_E_HANDLE
+ * Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_tetmesh_lattice(dfm_trimesh surface, uint32_t cells, double size, dfm_tetmesh *out);
+/** Material of the cells of a lattice, [ncell,27]: weights w of the 3 x 3 x 3 Gauss points xi of each cell,
+ * the first coordinate running fastest, so that the mean over a whole cell of f, counted where there is
+ * material, is sum w f(xi), for every f at most quadratic in each of the cell's coordinates. Their sum is the
+ * fraction that is material; some may be negative. NULL for other meshes; VTU files store it. Borrowed.
+ * @return DFM_OK; DFM_E_HANDLE. Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_tetmesh_inside(dfm_tetmesh mesh, const double **inside);
 
 #ifdef __cplusplus
 }

@@ -169,8 +169,9 @@ enum {
   DFM_CAP_STIFFNESS = 2, /* has pattern and stiffness: implicit steps are possible */
   DFM_CAP_DAMPING = 4,
   DFM_CAP_ROTATION_INVARIANT = 16,
-  DFM_CAP_PLAUSIBLE = 32,         /* not derived from a continuum */
-  DFM_CAP_CONSTANT_STIFFNESS = 64 /* stiffness depends on the parameters alone: one factorization serves */
+  DFM_CAP_PLAUSIBLE = 32,          /* not derived from a continuum */
+  DFM_CAP_CONSTANT_STIFFNESS = 64, /* stiffness depends on the parameters alone: one factorization serves */
+  DFM_CAP_INSIDE = 128             /* accepts dfm_mesh.inside */
 };
 /* [ncell,k] points: 4 corners; those and then the middles of the edges 01 12 02 03 13 23, k = 10; 8 corners,
  * around the bottom, then around the top */
@@ -193,6 +194,9 @@ typedef struct dfm_mesh {             /* rest configuration; borrowed during cre
   const uint32_t *row, *col; /* coupling N in CSR: surfel s has points col[row[s] .. row[s+1]) */
   const double *weight;      /* [row[nsurfel]]; x_s = sum weight * x_point */
   const uint8_t *fixed;      /* [npoint] held components, bits 1 x, 2 y, 4 z; the host moves them */
+  /* [ncell,27] material of hexahedra as dfm_tetmesh_inside describes it, only for a model with
+   * DFM_CAP_INSIDE; NULL: whole cells */
+  const double *inside;
 } dfm_mesh;
 typedef struct dfm_kin { /* one evaluation point */
   uint32_t size, stride;

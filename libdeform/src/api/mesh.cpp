@@ -160,7 +160,7 @@ dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
       object.context.logf(
           DFM_LOG_WARNING,
           "%s does not keep how much of each cell is material: a body of this file counts every cell "
-          "whole in mass and stiffness; write .vtu or .vtk, which keep it",
-          path);
+          "whole in mass and stiffness; write %s",
+          path, object.mesh.inside.empty() ? ".vtu or .vtk, which keep it" : ".vtu, which keeps it");
   });
 }

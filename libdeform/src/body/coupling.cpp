@@ -1,5 +1,9 @@
-// A surfel moves with the tetrahedron that contains it: its barycentric coordinates at rest are its weights.
-// They reproduce linear fields, also outside the cell, where they extrapolate.
+// A surfel moves with the cell that contains it: its weights are its barycentric coordinates at rest in a
+// tetrahedron, the shape functions at its place in a hexahedron. They reproduce linear fields, also outside
+// the cell, where they extrapolate: the nearest tetrahedron, or all hexahedra within the length of a cell, so
+// that the surface has no steps where the nearest one changes. Their parts are ((2 - d) / d)^2, d being the
+// distance from the cell in its own coordinates, along which it is two long (R. Franke, G. Nielson, Smooth
+// interpolation of large sets of scattered data, Int. J. Numer. Meth. Engng 15, 1980).
 #include "body/coupling.h"
 
 #include <algorithm>
@@ -7,9 +11,11 @@
 #include <optional>
 
 #include "core/error.h"
+#include "deform/plugin.h"
 #include "geometry/closest.h"
 #include "geometry/rest_tree.h"
 #include "math/extent.h"
+#include "mesh/cells.h"
 
 namespace dfm {
 namespace {
@@ -78,6 +84,40 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
   w[3] = g;
 }
 
+// Place of x in the coordinates of the hexahedron c and its shape functions there, by Newton's method from
+// its center: one step in a box. False where it does not get there, far outside a distorted cell.
+bool hexahedron_weights(Vec3 x, const Vec3 c[8], Vec3 &at, double w[8]) {
+  constexpr int kSteps = 20;
+  constexpr uint32_t kAll[8] = {0, 1, 2, 3, 4, 5, 6, 7};
+  double points[24];
+  for (size_t k = 0; k < 8; ++k) store3(points + 3 * k, c[k]);
+  const double near2 = 1e-28 * norm2(c[6] - c[0]);
+  at = {};
+  for (int step = 0; step < kSteps; ++step) {
+    hexahedron_shapes(at, w);
+    Vec3 left = x;
+    for (int k = 0; k < 8; ++k) left -= w[k] * c[k];
+    if (norm2(left) <= near2) return true;
+    Vec3 along[3];
+    hexahedron_jacobian(points, 3, kAll, at, along);
+    const Vec3 n0 = cross(along[1], along[2]), n1 = cross(along[2], along[0]), n2 = cross(along[0], along[1]);
+    const double inverse = 1 / dot(along[0], n0);
+    at += inverse * Vec3{dot(left, n0), dot(left, n1), dot(left, n2)};
+  }
+  return false;
+}
+
+// Sorts a row by columns and adds up the entries of each, in the order in which they came.
+void add_up(Array<RowEntry> &row) {
+  std::ranges::stable_sort(row, {}, &RowEntry::col);
+  size_t n = 0;
+  for (const RowEntry &e : row)
+    if (n && row[n - 1].col == e.col) row[n - 1].weight += e.weight;
+    else row[n++] = e;
+  row.resize(n);
+  std::erase_if(row, [](const RowEntry &e) { return e.weight == 0; });
+}
+
 class RestCells {
  public:
   RestCells(const Memory &memory, const CouplingInput &in, const LocalRest &rest)
@@ -88,6 +128,9 @@ class RestCells {
   double row(Vec3 x, Array<RowEntry> &out) const;
 
  private:
+  // The same from hexahedra; false where the nearest one does not reach.
+  bool hexahedra(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const;
+
   const CouplingInput &in_;
   const LocalRest &rest_;
   Array<RestBox> box_;
@@ -123,9 +166,50 @@ uint32_t RestCells::find(Vec3 x, double &away) const {
   return cell;
 }
 
+bool RestCells::hexahedra(Vec3 x, uint32_t nearest, double away, Array<RowEntry> &out) const {
+  const uint32_t tets = cell_kind(DFM_CELL_HEX8).tets;
+  Vec3 of[8], at;
+  double w[8], all = 0;
+  const auto corners = [&](uint32_t hexahedron) {
+    for (size_t k = 0; k < 8; ++k) of[k] = rest_.point[in_.hexahedron[8 * size_t{hexahedron} + k]];
+  };
+  const auto add = [&](uint32_t hexahedron, double part) {
+    for (size_t k = 0; k < 8; ++k) out.push_back({in_.hexahedron[8 * size_t{hexahedron} + k], part * w[k]});
+    all += part;
+  };
+  corners(nearest / tets);
+  if (!hexahedron_weights(x, of, at, w)) return false;
+  if (away == 0) {
+    add(nearest / tets, 1);
+    return true;
+  }
+  const double far2 = norm2(of[6] - of[0]);
+  std::vector<uint32_t> found;
+  tree_.near(x, far2, [&](uint32_t t) { found.push_back(t / tets); });
+  std::ranges::sort(found);
+  found.erase(std::ranges::unique(found).begin(), found.end());
+  for (const uint32_t hexahedron : found) {
+    corners(hexahedron);
+    if (!hexahedron_weights(x, of, at, w)) continue;
+    const auto beyond = [](double xi) { return std::max(std::fabs(xi) - 1, 0.0); };
+    const double d = norm(Vec3{beyond(at.x), beyond(at.y), beyond(at.z)});
+    if (d < 2) add(hexahedron, (2 - d) * (2 - d) / std::max(d * d, kInside * kInside));
+  }
+  if (!(all > 0)) {
+    corners(nearest / tets);
+    hexahedron_weights(x, of, at, w);
+    add(nearest / tets, 1);
+  }
+  for (RowEntry &e : out) e.weight /= all;
+  add_up(out);
+  return true;
+}
+
 double RestCells::row(Vec3 x, Array<RowEntry> &out) const {
   double away;
-  const uint32_t *const corner = in_.tet + size_t{4} * find(x, away);
+  const uint32_t cell = find(x, away);
+  if (in_.hexahedron && hexahedra(x, cell, away, out)) return away;
+  const uint32_t *const corner = in_.tet + size_t{4} * cell;
   Vec3 c[4];
   double w[4];
   for (int k = 0; k < 4; ++k) c[k] = rest_.point[corner[k]];
@@ -355,17 +439,6 @@ class Neighborhoods {
   Array<Known> known_;
   Array<uint32_t> neighbor_, list_;
 };
-
-// Sorts a row by columns and adds up the entries of each, in the order in which they came.
-void add_up(Array<RowEntry> &row) {
-  std::ranges::stable_sort(row, {}, &RowEntry::col);
-  size_t n = 0;
-  for (const RowEntry &e : row)
-    if (n && row[n - 1].col == e.col) row[n - 1].weight += e.weight;
-    else row[n++] = e;
-  row.resize(n);
-  std::erase_if(row, [](const RowEntry &e) { return e.weight == 0; });
-}
 
 // Rounding in A^-1 of a flat neighborhood grows with its condition number: linear fields are restored in the
 // row by the smallest change relative to |w_j|: w_j += |w_j| p_j . M^-1 (p_s - sum w p), p = (1, X - X_s), M

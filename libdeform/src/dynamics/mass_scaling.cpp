@@ -16,17 +16,15 @@
 #include <limits>
 #include <utility>
 
+#include "math/quadratics.h"
+
 namespace dfm {
 namespace {
 
-constexpr size_t kTerms = 10;      // of a quadratic polynomial in space
 constexpr int kTurns = 6;          // of what points get and what they pay
 constexpr double kMostPaid = 0.5;  // of its own mass, by a point
 constexpr double kWorth = 1.25;    // longer sub-steps: they have four sizes to the octave
-constexpr double kFlat = 1e-10;    // of a polynomial's square: it depends on those before it
 constexpr int kHalvings = 40;      // of the interval in which the sub-step lies
-
-using Terms = std::array<double, kTerms>;
 
 double step_of(double k, double c, double m) {
   const double bottom = c + std::sqrt(c * c + 4 * m * k);
@@ -35,9 +33,8 @@ double step_of(double k, double c, double m) {
 
 class Mover {
  public:
-  Mover(const Phyxels &p, const RestRows &rows) : p_(p), rows_(rows), terms_(p.n), added_(p.n) {
+  Mover(const Phyxels &p, const RestRows &rows) : p_(p), rows_(rows), terms_(terms_of(p)), added_(p.n) {
     for (uint32_t i = 0; i < p.n; ++i) total_ += p.mass[i];
-    make_terms();
   }
 
   double total() const { return total_; }
@@ -48,14 +45,14 @@ class Mover {
     double moved = 0;
     paid_ = {};
     for (int turn = 0; turn < kTurns; ++turn) {
-      Terms paid{};
+      Quadratics paid{};
       moved = 0;
       for (uint32_t i = 0; i < p_.n; ++i) {
         const double share = share_paid(i),
                      needed = 0.25 * h * (h * rows_.stiffness[i] + 2 * rows_.damping[i]);
         added_[i] = std::max(0.0, needed - p_.mass[i] * (1 - std::max(0.0, share)));
         moved += added_[i];
-        for (size_t k = 0; added_[i] > 0 && k < kTerms; ++k) paid[k] += added_[i] * terms_[i][k];
+        for (size_t k = 0; added_[i] > 0 && k < kQuadratics; ++k) paid[k] += added_[i] * terms_[i][k];
       }
       paid_ = paid;
     }
@@ -69,18 +66,18 @@ class Mover {
   // At least the largest share of u.m u that u.(m' - m) u has for a quadratic u, and at most 1.16 of it: the
   // eighth root of the Frobenius norm of the eighth power of the matrix between these.
   double energy_change() const {
-    std::array<Terms, kTerms> change{};
+    std::array<Quadratics, kQuadratics> change{};
     for (uint32_t i = 0; i < p_.n; ++i)
-      for (size_t k = 0; k < kTerms; ++k)
-        for (size_t l = 0; l < kTerms; ++l) change[k][l] += changed(i) * terms_[i][k] * terms_[i][l];
+      for (size_t k = 0; k < kQuadratics; ++k)
+        for (size_t l = 0; l < kQuadratics; ++l) change[k][l] += changed(i) * terms_[i][k] * terms_[i][l];
     for (int power = 1; power < 8; power *= 2) {
-      const std::array<Terms, kTerms> a = std::exchange(change, {});
-      for (size_t k = 0; k < kTerms; ++k)
-        for (size_t l = 0; l < kTerms; ++l)
-          for (size_t j = 0; j < kTerms; ++j) change[k][l] += a[k][j] * a[j][l];
+      const std::array<Quadratics, kQuadratics> a = std::exchange(change, {});
+      for (size_t k = 0; k < kQuadratics; ++k)
+        for (size_t l = 0; l < kQuadratics; ++l)
+          for (size_t j = 0; j < kQuadratics; ++j) change[k][l] += a[k][j] * a[j][l];
     }
     double square = 0;
-    for (const Terms &row : change)
+    for (const Quadratics &row : change)
       for (const double x : row) square += x * x;
     return std::sqrt(std::sqrt(std::sqrt(std::sqrt(square))));
   }
@@ -88,43 +85,20 @@ class Mover {
  private:
   const Phyxels &p_;
   const RestRows &rows_;
-  std::vector<Terms> terms_;   // at the points; orthonormal with the masses as weights
-  std::vector<double> added_;  // [n] kg
-  Terms paid_{};
+  std::vector<Quadratics> terms_;  // at the points; orthonormal with the masses as weights
+  std::vector<double> added_;      // [n] kg
+  Quadratics paid_{};
   double total_ = 0;
 
+  static std::vector<Quadratics> terms_of(const Phyxels &p) {
+    std::vector<Vec3> place;
+    for (uint32_t i = 0; i < p.n; ++i) place.push_back(load3(&p.rest[size_t{3} * i]));
+    const std::vector<double> mass(p.mass.begin(), p.mass.end());
+    return OrthonormalQuadratics(place, mass, [](auto &&) {}).at;
+  }
   double share_paid(uint32_t i) const {
     double sum = 0;
-    for (size_t k = 0; k < kTerms; ++k) sum += paid_[k] * terms_[i][k];
-    return sum;
-  }
-
-  void make_terms() {
-    Vec3 center;
-    double square = 0;
-    for (uint32_t i = 0; i < p_.n; ++i) center += (p_.mass[i] / total_) * load3(&p_.rest[size_t{3} * i]);
-    for (uint32_t i = 0; i < p_.n; ++i)
-      square += p_.mass[i] / total_ * norm2(load3(&p_.rest[size_t{3} * i]) - center);
-    for (uint32_t i = 0; i < p_.n; ++i) {
-      const Vec3 x = (1 / std::sqrt(square)) * (load3(&p_.rest[size_t{3} * i]) - center);
-      terms_[i] = {1, x.x, x.y, x.z, x.x * x.x, x.y * x.y, x.z * x.z, x.x * x.y, x.y * x.z, x.z * x.x};
-    }
-    for (size_t k = 0; k < kTerms; ++k) {
-      const double before = product(k, k);
-      for (int again = 0; again < 2; ++again)  // the second time for what rounding has left
-        for (size_t l = 0; l < k; ++l) {
-          const double part = product(k, l);
-          for (Terms &t : terms_) t[k] -= part * t[l];
-        }
-      const double left = product(k, k);
-      const double scale = left > kFlat * before ? 1 / std::sqrt(left) : 0;
-      for (Terms &t : terms_) t[k] *= scale;
-    }
-  }
-
-  double product(size_t k, size_t l) const {
-    double sum = 0;
-    for (uint32_t i = 0; i < p_.n; ++i) sum += p_.mass[i] * terms_[i][k] * terms_[i][l];
+    for (size_t k = 0; k < kQuadratics; ++k) sum += paid_[k] * terms_[i][k];
     return sum;
   }
 };

@@ -45,6 +45,10 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
          "model '%s' does not accept %s; take corotational_fem or linear_fem, or a mesh of first-order "
          "tetrahedra",
          t.id, cell_kind(mesh.cell).name);
+  if (mesh.inside && !(ops->caps & DFM_CAP_INSIDE))
+    fail(DFM_E_UNSUPPORTED,
+         "model '%s' takes whole hexahedra, not the cells of a lattice; take corotational_fem or linear_fem",
+         t.id);
   {
     const Overheard why;
     const dfm_status s = call("create", [&] { return ops->create(host, &mesh, &self); });

@@ -21,6 +21,11 @@ constexpr uint32_t kTets[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 
 constexpr uint32_t kQuads[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
                                    {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};  // outward
 
+// Whether a node of a hexahedron lies on the high side of an axis.
+bool high_side(uint32_t node, int axis) {
+  return axis == 2 ? node >= 4 : axis == 1 ? node % 4 >= 2 : node % 4 == 1 || node % 4 == 2;
+}
+
 }  // namespace
 
 const CellKind &cell_kind(uint32_t kind) {
@@ -63,32 +68,68 @@ void mass_shares(const CellKind &kind, const double *points, const uint32_t *cel
     return;
   }
   constexpr double kGauss = 0.57735026918962576451;
-  const auto side = [](uint32_t k, int axis) {  // node k lies on the high side of the axis
-    return axis == 2 ? k >= 4 : axis == 1 ? k % 4 >= 2 : k % 4 == 1 || k % 4 == 2;
-  };
   std::fill_n(out, 8, 0.0);
   double all = 0;
   for (uint32_t q = 0; q < 8; ++q) {
+    const auto at = [&](int axis) { return high_side(q, axis) ? kGauss : -kGauss; };
+    const Vec3 place{at(0), at(1), at(2)};
     double shape[8];
     Vec3 along[3];
-    for (uint32_t k = 0; k < 8; ++k) {
-      double part[3], slope[3];
-      for (int a = 0; a < 3; ++a) {
-        const double at = side(q, a) ? kGauss : -kGauss;
-        part[a] = 0.5 * (side(k, a) ? 1 + at : 1 - at);
-        slope[a] = side(k, a) ? 0.5 : -0.5;
-      }
-      shape[k] = part[0] * part[1] * part[2];
-      const Vec3 x = load3(points + 3 * size_t(cell[k]));
-      along[0] += slope[0] * part[1] * part[2] * x;
-      along[1] += part[0] * slope[1] * part[2] * x;
-      along[2] += part[0] * part[1] * slope[2] * x;
-    }
+    hexahedron_shapes(place, shape);
+    hexahedron_jacobian(points, 3, cell, place, along);
     const double weight = dot(along[0], cross(along[1], along[2]));
     all += weight;
     for (uint32_t k = 0; k < 8; ++k) out[k] += weight * shape[k];
   }
   for (uint32_t k = 0; k < 8; ++k) out[k] /= all;
+}
+
+Vec3 inside_place(uint32_t point) {
+  constexpr double kAt[3] = {-0.77459666924148337704, 0, 0.77459666924148337704};
+  return {kAt[point % 3], kAt[point / 3 % 3], kAt[point / 9]};
+}
+
+void hexahedron_shapes(Vec3 at, double out[8]) {
+  for (uint32_t k = 0; k < 8; ++k)
+    out[k] = 0.125 * (high_side(k, 0) ? 1 + at.x : 1 - at.x) * (high_side(k, 1) ? 1 + at.y : 1 - at.y) *
+             (high_side(k, 2) ? 1 + at.z : 1 - at.z);
+}
+
+void hexahedron_jacobian(const double *points, size_t stride, const uint32_t *cell, Vec3 at, Vec3 along[3]) {
+  Vec3 out[3];
+  for (uint32_t k = 0; k < 8; ++k) {
+    const Vec3 x = load3(points + stride * cell[k]);
+    const double sx = high_side(k, 0) ? 1 : -1, sy = high_side(k, 1) ? 1 : -1, sz = high_side(k, 2) ? 1 : -1;
+    const double px = 1 + sx * at.x, py = 1 + sy * at.y, pz = 1 + sz * at.z;
+    out[0] += (0.125 * sx * py * pz) * x;
+    out[1] += (0.125 * sy * pz * px) * x;
+    out[2] += (0.125 * sz * px * py) * x;
+  }
+  std::copy_n(out, 3, along);
+}
+
+bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside) {
+  Vec3 sum, along[3];
+  double all = 0;
+  for (uint32_t q = 0; q < kInsidePoints; ++q) {
+    sum += inside[q] * inside_place(q);
+    all += inside[q];
+  }
+  hexahedron_jacobian(points, stride, cell, (1 / all) * sum, along);
+  return dot(along[0], cross(along[1], along[2])) < 0;
+}
+
+void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,
+                 const std::function<void(double volume, Vec3 place)> &use) {
+  for (uint32_t q = 0; q < kInsidePoints; ++q) {
+    const Vec3 at = inside_place(q);
+    double shape[8];
+    hexahedron_shapes(at, shape);
+    Vec3 place, along[3];
+    for (uint32_t k = 0; k < 8; ++k) place += shape[k] * load3(points + stride * cell[k]);
+    hexahedron_jacobian(points, stride, cell, at, along);
+    use(8 * inside[q] * dot(along[0], cross(along[1], along[2])), place);
+  }
 }
 
 Array<uint32_t> TetMesh::cell_groups() const {

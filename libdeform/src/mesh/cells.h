@@ -2,6 +2,9 @@
 // them: every such cell is also a few tetrahedra with the same points, and everything else (surface, volume,
 // contact, guard, coupling, quality, pictures) works on these.
 #pragma once
+#include <functional>
+
+#include "math/vec3.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
@@ -26,6 +29,20 @@ Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<
 // matrix. Those of a second-order tetrahedron are negative at the corners, so its diagonal is scaled instead
 // (Hinton, Rock, Zienkiewicz 1976, A note on mass lumping and related processes).
 void mass_shares(const CellKind &kind, const double *points, const uint32_t *cell, double *out);
+
+// Points by which each hexahedron's material is given (dfm_tetmesh_inside), and their place in its
+// coordinates.
+inline constexpr uint32_t kInsidePoints = 27;
+Vec3 inside_place(uint32_t point);
+// Shape functions there.
+void hexahedron_shapes(Vec3 at, double out[8]);
+// Derivatives of the place by the three coordinates there; points [n,stride].
+void hexahedron_jacobian(const double *points, size_t stride, const uint32_t *cell, Vec3 at, Vec3 along[3]);
+// Whether the material of a cell is turned inside out, in its middle.
+bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside);
+// Calls use(volume, place) for each: the sum of volume f(place) is the integral over the material.
+void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,
+                 const std::function<void(double volume, Vec3 place)> &use);
 
 // The same shape by second-order tetrahedra whose edges are straight.
 TetMesh second_order(const TetMesh &mesh);

@@ -174,6 +174,8 @@ void take_shares(RawMesh &raw, TetMesh &mesh) {
       raw.tet_share.size() == raw.ntet() &&
       std::all_of(raw.tet_share.begin(), raw.tet_share.end(), [](double s) { return s > 0 && s <= 1; });
   if (sound) mesh.share = std::move(raw.tet_share);
+  if (raw.cell == DFM_CELL_HEX8 && raw.inside.size() == raw.cells.size() / 8 * kInsidePoints)
+    mesh.inside = std::move(raw.inside);
 }
 
 uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {

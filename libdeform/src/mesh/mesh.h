@@ -21,7 +21,7 @@ struct MeshGroup {
 
 struct TetMesh {
   explicit TetMesh(const Memory &m = Memory::standard()) : memory(&m) {
-    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share);
+    use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share, inside);
   }
   const Memory *memory;
   Array<double> points;  // [npoint,3], m
@@ -40,6 +40,7 @@ struct TetMesh {
   Array<uint32_t> file_cell;
   // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
   Array<double> share;
+  Array<double> inside;           // [ncell,27] of a lattice, as dfm_tetmesh_inside gives it; else empty
   std::vector<MeshGroup> groups;  // by dimension, then tag
   // Repairs and observations of the reader.
   uint32_t turned = 0, dropped_points = 0, dropped_cells = 0;
@@ -108,8 +109,8 @@ void write_msh22(const TetMesh &mesh, const std::string &path);  // binary
 void write_vtk(const TetMesh &mesh, const std::string &path);    // legacy 3.0, binary
 void write_medit(const TetMesh &mesh, const std::string &path);  // text; groups by number alone
 void write_vtu(const TetMesh &mesh, const std::string &path);    // with groups and share as cell data
-// By ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh. False: the mesh has shares, which the format does
-// not hold.
+// By ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh. False: cells are in part material, and the format
+// does not hold how much.
 bool write_tet_mesh(const TetMesh &mesh, const std::string &path);
 
 // VTU (XML, appended raw data), as ParaView reads it.

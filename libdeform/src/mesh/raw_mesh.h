@@ -14,7 +14,7 @@ namespace dfm {
 
 struct RawMesh {
   explicit RawMesh(const Memory &m) : memory(&m) {
-    use_memory(m, points, cells, tets, tet_group, tet_share, tris, tri_group);
+    use_memory(m, points, cells, tets, tet_group, tet_share, inside, tris, tri_group);
   }
   const Memory *memory;
   Array<double> points;
@@ -24,6 +24,7 @@ struct RawMesh {
   Array<uint32_t> tet_group;  // index into groups
   // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
   Array<double> tet_share;
+  Array<double> inside;           // [ncell,27] of hexahedra, likewise
   Array<uint32_t> tris;           // polygons are cut into triangles by the readers
   Array<uint32_t> tri_group;      // index into groups, kNoGroup without
   bool own_corners = false;       // the format gives each triangle points of its own

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "mesh/cells.h"
 #include "mesh/vtu_array.h"
 
 namespace dfm {
@@ -16,7 +17,7 @@ struct Piece {
   // UnstructuredGrid: the first alone; PolyData: vertices, lines, polygons, strips
   uint64_t ncell[4] = {};
   CellList cells[4];
-  VtuPlace points, group, share;
+  VtuPlace points, group, share, inside;
 };
 
 class VtuReader {
@@ -135,6 +136,8 @@ class VtuReader {
         piece.group = std::move(place);
       else if (!piece.share.given && place.components == 1 && vtk_names_share(place.name, place.type))
         piece.share = std::move(place);
+      else if (place.components == kInsidePoints && place.name == kVtkInside && !is_whole(place.type))
+        piece.inside = std::move(place);
     } else {
       static constexpr std::string_view kLists[] = {"Verts", "Lines", "Polys", "Strips"};
       const size_t list = polydata_            ? size_t(std::find(kLists, kLists + 4, section) - kLists)
@@ -177,16 +180,19 @@ class VtuReader {
       total += n;
     }
     if (total == 0) return;
-    std::optional<VtuNumbers> group, share;
+    std::optional<VtuNumbers> group, share, inside;
     if (piece.group.given) group.emplace(numbers(piece.group, total, "groups of cells", true));
     if (piece.share.given && !polydata_) share.emplace(numbers(piece.share, total, "shares of cells", false));
+    if (piece.inside.given && !polydata_)
+      inside.emplace(numbers(piece.inside, kInsidePoints * total, "weights of cells", false));
     for (int k = 0; k < 4; ++k)
       if (piece.ncell[k])
-        read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group, share);
+        read_list(piece.cells[k], piece.ncell[k], base, polydata_ ? kinds[k] : 0, group, share, inside);
   }
 
   void read_list(const CellList &list, uint64_t n, uint32_t base, uint8_t kind,
-                 std::optional<VtuNumbers> &group, std::optional<VtuNumbers> &share) {
+                 std::optional<VtuNumbers> &group, std::optional<VtuNumbers> &share,
+                 std::optional<VtuNumbers> &inside) {
     VtuNumbers offsets = numbers(list.offsets, n, "offsets of cells", true);
     VtuNumbers connectivity = numbers(list.connectivity, 0, "connectivity", true);
     std::optional<VtuNumbers> types;
@@ -219,6 +225,10 @@ class VtuReader {
       sink_.add(in_, static_cast<uint8_t>(type), corners_.data(), corners_.size(), label);
       const double part = share ? share->in.real(share->type, "a cell's share") : 1;
       if (share && type == 10) out_.tet_share.push_back(part);
+      for (uint32_t q = 0; inside && q < kInsidePoints; ++q) {
+        const double weight = inside->in.real(inside->type, "a cell's weight");
+        if (type == 12) out_.inside.push_back(weight);
+      }
     }
   }
 

@@ -17,6 +17,7 @@ inline constexpr const char *kVtkGroup = "group", *kVtkGroupNumber = "group_numb
                             *kVtkGroupName = "group_name";
 // Real numbers over the cells by this name are the shares of a filled surface, as our writer leaves them.
 inline constexpr const char *kVtkShare = "share";
+inline constexpr const char *kVtkInside = "inside";  // of a lattice, mesh/cells.h
 inline bool vtk_names_share(std::string_view array, Number type) {
   return array == kVtkShare && is_real(type);
 }

@@ -132,6 +132,11 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
   grid.groups = &mesh.groups;
   if (!groups.empty()) grid.cell_data.push_back({kVtkGroup, 1, nullptr, groups.data()});
   if (!share.empty()) grid.cell_data.push_back({"share", 1, share.data(), nullptr});
+  Array<double> inside = mesh.inside;
+  if (!inside.empty()) {
+    inside.resize(inside.size() + size_t{kInsidePoints} * grid.nface);
+    grid.cell_data.push_back({kVtkInside, kInsidePoints, inside.data(), nullptr});
+  }
   write_vtu(path, grid);
 }
 
@@ -164,7 +169,7 @@ bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
          "%s: tetrahedra are not written to this file name ending; expected .msh (MSH 4.1), .msh2 (MSH 2.2), "
          ".vtk (legacy VTK), .vtu (VTU) or .mesh (Medit)",
          path.c_str());
-  return mesh.share.empty() || ending == "vtk" || ending == "vtu";
+  return ending == "vtu" || (mesh.inside.empty() && (mesh.share.empty() || ending == "vtk"));
 }
 
 }  // namespace dfm

@@ -286,11 +286,11 @@ class Builder {
   // Weights of forces that are divided by mass: density times share.
   std::vector<double> cell_weights(const BodyMesh &mesh, const std::vector<dfm_material> &materials) const {
     std::vector<double> out;
-    if (!mesh.share && materials.empty()) return out;
+    if (!mesh.share && !mesh.inside && materials.empty()) return out;
     std::map<dfm_material, double> density = {{0, dfm_material_def_default().density}};
     for (const Material &m : def_.materials) density[materials_.at(m.name)] = m.def.density;
     for (uint32_t t = 0; t < mesh.ntet; ++t)
-      out.push_back((mesh.share ? mesh.share[t] : 1) * (materials.empty() ? 1 : density.at(materials[t])));
+      out.push_back(mesh.share_of(t) * (materials.empty() ? 1 : density.at(materials[t])));
     return out;
   }
 
@@ -332,6 +332,7 @@ class Builder {
     d.fields = fields.data();
     if (!materials.empty()) d.cell_materials = materials.data();
     d.cell_share = mesh.share;
+    d.cell_inside = mesh.inside;
     const Skin &skin = mesh.skin;
     const dfm_surface_def surface = {sizeof(dfm_surface_def), b.surface.coupling, skin.npoint,
                                      skin.ntriangle,          skin.points.data(), skin.triangles,

@@ -134,6 +134,10 @@ struct Body : Thing {
   OwnSurface surface;
   Start start;
   uint32_t fill = 0;  // cells; 0: not said
+  // of a lattice: one of these; m
+  uint32_t lattice_cells = 0;
+  double lattice_size = 0;
+  bool lattice() const { return lattice_cells > 0 || lattice_size > 0; }
   std::vector<GroupMaterial> by_group;
   std::vector<FieldFile> fields;
   Params params;

@@ -24,8 +24,8 @@ constexpr Row kObjects[] = {
     {"material", "name density young poisson damping friction tear fracture_energy"},
     {"damping", "mass stiffness"},
     {"body",
-     "name mesh material model integrator pose velocity spin fix forces surface nodal_bc fill springs "
-     "anisotropy materials_by_group fields start switch attach sensor id separate cut_delay place "
+     "name mesh material model integrator pose velocity spin fix forces surface nodal_bc fill lattice "
+     "springs anisotropy materials_by_group fields start switch attach sensor id separate cut_delay place "
      "-pressure mass_scaling"},
     {"place", "on"},
     {"separate", "least_cells crumbs"},
@@ -47,6 +47,7 @@ constexpr Row kObjects[] = {
     {"surface", "from mesh coupling support"},
     {"made_mesh", "make radius inner length size cells order"},
     {"fill", "cells"},
+    {"lattice", "cells size"},
     {"start", "scramble flatten invert state"},
     {"anisotropy", "axis field params"},
     {"obstacle",

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <numeric>
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 
 namespace dfm::scene {
@@ -28,11 +30,29 @@ double longest_edge(const BodyMesh &mesh) {
   return longest;
 }
 
+// m, of the skin's edges. Each cell of a lattice has points of the skin.
+double longest_of_skin(const BodyMesh &mesh) {
+  if (!mesh.inside) return kLongestEdge * longest_edge(mesh);
+  double longest = 0;
+  for (const size_t k : {1, 3, 4})
+    for (size_t c = 0; c < 3; ++c)
+      longest = std::max(
+          longest, mesh.points[3 * size_t{mesh.nodes[k]} + c] - mesh.points[3 * size_t{mesh.nodes[0]} + c]);
+  return longest;
+}
+
 }  // namespace
+
+double BodyMesh::share_of(uint32_t tet) const {
+  if (!inside) return share ? share[tet] : 1;
+  const double *const weights = inside + size_t{kInsidePoints} * (tet / cell_kind(cell).tets);
+  return std::accumulate(weights, weights + kInsidePoints, 0.0);
+}
 
 MeshFiles::~MeshFiles() {
   for (auto &[path, mesh] : cells_) dfm_tetmesh_destroy(mesh);
   for (auto &[key, mesh] : fillings_) dfm_tetmesh_destroy(mesh);
+  for (auto &[key, mesh] : lattices_) dfm_tetmesh_destroy(mesh);
   for (auto &[path, mesh] : surfaces_) dfm_trimesh_destroy(mesh);
 }
 
@@ -121,6 +141,15 @@ dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
   return mesh;
 }
 
+dfm_tetmesh MeshFiles::lattice(const std::string &path, const Body &b) {
+  dfm_tetmesh &mesh = lattices_[{path, b.lattice_cells, b.lattice_size / b.scale}];
+  if (!mesh)
+    def_.require(dfm_tetmesh_lattice(surface(path, b.pointer + "/mesh"), b.lattice_cells,
+                                     b.lattice_size / b.scale, &mesh),
+                 b.pointer + "/lattice");
+  return mesh;
+}
+
 // Keys that go with one kind of mesh file only.
 void MeshFiles::check_keys(const Body &b, bool filled) const {
   if (filled) {
@@ -140,6 +169,8 @@ void MeshFiles::check_keys(const Body &b, bool filled) const {
   }
   if (b.fill)
     def_.refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
+  if (b.lattice())
+    def_.refuse(b.pointer + "/lattice", "the mesh holds cells already; \"lattice\" is for a closed surface");
   if (b.surface.coupled && b.surface.mesh.empty())
     def_.refuse(b.surface.pointer + "/coupling",
                 "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
@@ -156,6 +187,7 @@ void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const
   def_.require(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
   def_.require(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
   def_.require(dfm_tetmesh_share(mesh, &out.share), pointer);
+  def_.require(dfm_tetmesh_inside(mesh, &out.inside), pointer);
   out.handle = mesh;
   out.npoint = info.npoint;
   out.ntet = info.ntet;
@@ -192,7 +224,7 @@ void MeshFiles::split_skin(BodyMesh &out) {
   s.points = skin.points;
   s.triangles.assign(skin.triangles, skin.triangles + 3 * size_t{skin.ntriangle});
   if (skin.triangle_group) s.group.assign(skin.triangle_group, skin.triangle_group + skin.ntriangle);
-  split_long_edges(kLongestEdge * longest_edge(out), s);
+  split_long_edges(longest_of_skin(out), s);
   if (s.points.size() == skin.points.size()) return;
   skin.points = s.points;
   Triangles &kept = split_.emplace_back(std::move(s));
@@ -207,7 +239,7 @@ BodyMesh MeshFiles::load(const Body &b) {
   BodyMesh out;
   out.filled = !has_cells(path, pointer);
   check_keys(b, out.filled);
-  take_cells(out.filled ? filling(path, b) : cells(path, pointer), b, out);
+  take_cells(!out.filled ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
   out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);
   if (!b.surface.mesh.empty()) {
     const std::string where = b.surface.pointer + "/mesh";
@@ -236,7 +268,7 @@ void MeshFiles::tell_of_unit(const Body &b, const BodyMesh &mesh) const {
 void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
   const dfm_tetmesh_info cells = info_of(mesh.handle, b.surface.pointer);
   double filled = 0;  // cells of the lattice are alike
-  for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share[t];
+  for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share_of(t);
   context_->logf(
       DFM_LOG_WARNING,
       "body '%s' is drawn and touches with the %u triangles around its %u cells, in steps of about "

@@ -4,6 +4,7 @@
 #include <map>
 #include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 
 #include "scene/select.h"
@@ -36,6 +37,7 @@ class MeshFiles {
   dfm_tetmesh cells(const std::string &path, const std::string &pointer);
   dfm_trimesh surface(const std::string &path, const std::string &pointer);
   dfm_tetmesh filling(const std::string &path, const Body &body);
+  dfm_tetmesh lattice(const std::string &path, const Body &body);
   void check_keys(const Body &body, bool filled) const;
   void take_cells(dfm_tetmesh mesh, const Body &body, BodyMesh &out) const;
   void split_skin(BodyMesh &out);
@@ -49,7 +51,9 @@ class MeshFiles {
   std::map<std::string, dfm_tetmesh> cells_;
   std::map<std::string, dfm_trimesh> surfaces_;
   std::map<std::pair<std::string, uint32_t>, dfm_tetmesh> fillings_;  // by file and number of cells
-  std::deque<Triangles> split_;                                       // by body, lent to its BodyMesh
+  // by file, number and size of cells
+  std::map<std::tuple<std::string, uint32_t, double>, dfm_tetmesh> lattices_;
+  std::deque<Triangles> split_;  // by body, lent to its BodyMesh
 };
 
 }  // namespace dfm::scene

@@ -12,7 +12,8 @@ namespace {
 
 constexpr char kPrefix[] = "anisotropy_";
 constexpr char kAxis[] = "anisotropy_axis";
-constexpr double kMostCells = 1e8;  // dfm_tetmesh_fill and dfm_body_create say the same of these two
+constexpr double kMostCells = 1e8;    // dfm_tetmesh_fill and dfm_body_create say the same of these two
+constexpr double kMostLattice = 1e6;  // dfm_tetmesh_lattice says the same
 constexpr double kWidestSupport = 10;
 
 void read_fields(const Node &node, const dfm_type *model, Body &b) {
@@ -105,6 +106,14 @@ void read_anisotropy(const Node &node, const dfm_type *model, const Types &types
   if (node.has("params")) read_anisotropy_params(node.member("params"), model, b);
 }
 
+void read_lattice(const Node &node, Body &b) {
+  node.object("lattice");
+  if (node.has("cells") == node.has("size"))
+    node.fail("expected either \"cells\", about how many, or \"size\", their edge in m");
+  if (node.has("cells")) b.lattice_cells = read_count(node.at("cells"), 1, kMostLattice);
+  else b.lattice_size = node.at("size").number(kPositive);
+}
+
 void read_surface(const Node &node, OwnSurface &out) {
   node.object("surface");
   out.pointer = node.pointer();
@@ -136,6 +145,9 @@ void read_carriers(const Node &body, const dfm_type *model, ReadContext &context
     if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
     b.fill = uint32_t(n);
   }
+  if (body.has("lattice")) read_lattice(body.member("lattice"), b);
+  if (b.lattice() && b.fill)
+    body.member("lattice").fail("the body is filled with tetrahedra by \"fill\" too; keep one");
   if (body.has("materials_by_group")) read_materials_by_group(body.member("materials_by_group"), context, b);
   if (body.has("fields")) read_fields(body.member("fields"), model, b);
   if (body.has("anisotropy")) read_anisotropy(body.member("anisotropy"), model, context.types, b);

@@ -90,14 +90,16 @@ std::vector<uint32_t> skin_triangles(const Selection &where, const BodyMesh &mes
   return out;
 }
 
-// Marks the corners of the cells that hold the skin's marked points.
+// Marks the corners of the cells that hold the skin's marked points, or of the face or edge on which one
+// lies.
 void mark_cells(const std::vector<uint8_t> &surfel, const BodyMesh &mesh, std::vector<uint8_t> &point) {
   for (uint32_t s = 0; s < mesh.skin.npoint; ++s) {
     if (!surfel[s]) continue;
     uint32_t corners[4];
     double weights[4];
     locate(mesh, &mesh.skin.points[3 * size_t(s)], corners, weights);
-    for (uint32_t c : corners) point[c] = 1;
+    for (int k = 0; k < 4; ++k)
+      if (std::fabs(weights[k]) > kSlack) point[corners[k]] = 1;
   }
 }
 

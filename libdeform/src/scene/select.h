@@ -23,7 +23,7 @@ struct BodyMesh {
   const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr, *file_cell = nullptr;
   const uint32_t *nodes = nullptr;  // of cells that are not first-order tetrahedra, of the kind `cell`
   uint32_t cell = 0;
-  const double *share = nullptr;
+  const double *share = nullptr, *inside = nullptr;
   dfm_tetmesh handle = 0;  // lends the arrays and the points of its groups
   const char *const *group_names = nullptr;
   // [nface,3], [nface] the file's triangles that belong to a group
@@ -36,6 +36,8 @@ struct BodyMesh {
   std::vector<double> cell_weight;
   double lo[3] = {}, hi[3] = {}, size = 0;         // of the scaled points; size: diagonal
   mutable std::shared_ptr<const Locator> locator;  // made at first use
+
+  double share_of(uint32_t tet) const;  // of its volume, that is material
 };
 
 // The point of each node of the mesh file; UINT32_MAX: none.

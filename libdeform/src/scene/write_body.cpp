@@ -44,6 +44,7 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
   mesh.cell = b.cell_type;
   mesh.cells.assign(b.cells.begin(), b.cells.end());
   mesh.share.assign(b.share.begin(), b.share.end());
+  mesh.inside.assign(b.inside.begin(), b.inside.end());
   const uint32_t ntet = mesh.ntet();
   mesh.tet_group.assign(ntet, kNoGroup);
   std::vector<std::string> keys;

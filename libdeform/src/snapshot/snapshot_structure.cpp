@@ -65,6 +65,7 @@ uint64_t make_of(const Body &b) {
   const Array<double> &rest = whole ? whole->rest : b.p.rest, &mass = whole ? whole->mass : b.p.mass;
   h.add(tets.data(), tets.size() * sizeof(uint32_t));
   h.add(b.cells.data(), b.cells.size() * sizeof(uint32_t));
+  h.add(b.inside.data(), b.inside.size() * sizeof(double));
   h.add(rest.data(), rest.size() * sizeof(double));
   h.add(mass.data(), mass.size() * sizeof(double));
   makeup(h, whole ? whole->makeup : b.makeup);

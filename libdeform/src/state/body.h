@@ -117,7 +117,8 @@ struct Structure {
   CutRecord cut;
   // a new number after each cut: what is derived from points, cells or surface is out of date
   uint64_t shape = 0;
-  Array<double> share;  // [ntet] how much of each cell is material; empty: all
+  Array<double> share;   // [ntet] how much of each cell is material; empty: all
+  Array<double> inside;  // [ncell,27] the same of hexahedra, as dfm_tetmesh_inside gives it; empty: all
   Makeup makeup;
 };
 

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "core/handle.h"
 #include "core/names.h"
+#include "math/quadratics.h"
 #include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
@@ -70,6 +71,43 @@ void share_mass(Body &b, const double *density, double all) {
   }
 }
 
+// Least part of its mass that a point keeps when moments are set right.
+constexpr double kLeastMass = 0.1;
+
+// Of a lattice. Equal shares of a cell's material to its nodes leave no point without mass, but keep neither
+// center nor moments of inertia. So all masses change by factors that are a quadratic polynomial of the
+// place, by which these are those of the material; where a factor would be less than kLeastMass, the moments
+// come as near as it allows.
+void lump_inside(Body &b, const double *density, double all) {
+  const size_t tets = cell_kind(b.cell_type).tets, ncell = b.ncell() / tets;
+  std::vector<Vec3> place;
+  for (uint32_t i = 0; i < b.p.n; ++i) place.push_back(b.p.rest_at(i));
+  std::vector<double> mass(b.p.n), factor(b.p.n, 1.0);
+  const auto each = [&](const auto &use) {  // use(volume, density, place, cell)
+    for (size_t c = 0; c < ncell; ++c)
+      each_inside(b.p.rest.data(), 3, &b.cells[8 * c], &b.inside[kInsidePoints * c],
+                  [&](double volume, Vec3 x) { use(volume, density ? density[tets * c] : all, x, c); });
+  };
+  b.mass = b.rest_volume = 0;
+  each([&](double volume, double rho, Vec3, size_t c) {
+    b.rest_volume += volume;
+    for (size_t k = 8 * c; k < 8 * (c + 1); ++k) mass[b.cells[k]] += rho * volume / 8;
+  });
+  const OrthonormalQuadratics terms(place, mass, [&](const auto &use) {
+    each([&](double volume, double rho, Vec3 x, size_t) { use(rho * volume, x); });
+  });
+  for (const auto &[from, to] : {std::pair<size_t, size_t>{1, 4}, {4, kQuadratics}}) {
+    std::vector<double> change(b.p.n);
+    for (size_t k = from; k < to; ++k)
+      for (uint32_t i = 0; i < b.p.n; ++i) change[i] += terms.sums[k] * terms.at[i][k];
+    double by = 1;
+    for (uint32_t i = 0; i < b.p.n; ++i)
+      if (factor[i] + change[i] < kLeastMass) by = std::min(by, (factor[i] - kLeastMass) / -change[i]);
+    for (uint32_t i = 0; i < b.p.n; ++i) factor[i] += by * change[i];
+  }
+  for (uint32_t i = 0; i < b.p.n; ++i) b.mass += b.p.mass[i] = factor[i] * mass[i];
+}
+
 }  // namespace
 
 void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells) {
@@ -81,6 +119,8 @@ void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells) {
   if (!b.cells.empty()) share_mass(b, density.empty() ? nullptr : density.data(), cells.list[0]->def.density);
   b.rest_volume = lumped.volume;
   b.mass = lumped.mass;
+  if (!b.inside.empty())
+    lump_inside(b, density.empty() ? nullptr : density.data(), cells.list[0]->def.density);
 }
 
 namespace {

@@ -7,6 +7,7 @@
 
 #include "core/error.h"
 #include "dynamics/symplectic_euler.h"
+#include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/spring.h"
@@ -16,6 +17,15 @@
 #include "math/elementary.h"
 
 namespace dfm {
+
+uint32_t inverted_cells(const Body &b) {
+  if (b.inside.empty()) return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
+  uint32_t n = 0;
+  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
+    n += inverted_inside(b.p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c]);
+  return n * cell_kind(b.cell_type).tets;
+}
+
 namespace {
 
 // Of Young's modulus: where a body loses half of its height (world/rest_loads.cpp).
@@ -78,10 +88,6 @@ void tell_squeezed(World &w) {
 constexpr uint32_t kBoundEvery = 16;
 constexpr double kLeastStrain = kBoundStrain / 8;
 constexpr uint32_t kMostEstimated = 4;  // sub-steps at an estimated bound
-
-uint32_t inverted_cells(const Body &b) {
-  return points_kernels().inverted(b.ncell(), b.tets.data(), b.p.x.data());
-}
 
 void look_at_shape(Body &b) {
   // points that are updated late are unknown until they are requested

@@ -7,6 +7,9 @@ namespace dfm {
 struct Body;
 struct World;
 
+// Tetrahedra that are inside out; of a lattice those of cells whose material is, in its middle.
+uint32_t inverted_cells(const Body &b);
+
 inline constexpr double kBoundShare = 0.9;  // of the bound, that is used
 
 // Strain of an edge, from a bound to the next one, that the rest of the bound pays for.

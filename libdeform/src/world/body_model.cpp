@@ -220,6 +220,7 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.nedge = static_cast<uint32_t>(b.edges.size() / 2);
   mesh.edges = b.edges.data();
   mesh.fixed = out.origin.held.data();
+  mesh.inside = b.inside.empty() ? nullptr : b.inside.data();
   coupling.tell(mesh);
   if (!take_spare(b, type, values, out)) out.model.create(type, w.context->host, mesh, m, std::move(values));
   if (asks_single(type, out.origin.params)) out.model.use_single();

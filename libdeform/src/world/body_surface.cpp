@@ -63,6 +63,7 @@ void couple(Body &b, const dfm_surface_def &def) {
   in.point = b.p.rest.data();
   in.tet = b.tets.data();
   in.surfel = def.points;
+  if (b.cell_type == DFM_CELL_HEX8) in.hexahedron = b.cells.data();
   if (def.support > 0) in.support = def.support;
   Coupling c = def.coupling == DFM_COUPLING_MLS      ? couple_mls(m, in)
                : def.coupling == DFM_COUPLING_THESIS ? couple_thesis(m, in)
@@ -75,7 +76,8 @@ void couple(Body &b, const dfm_surface_def &def) {
          "body '%s': its surface lies up to %g m from its cells, which are %g m across; both must be in the "
          "same frame and unit (m)",
          name, c.farthest, size);
-  if (c.farthest > kTellOutside * size)
+  // the cells of a lattice need not cover its surface
+  if (b.inside.empty() && c.farthest > kTellOutside * size)
     b.world->context->logf(DFM_LOG_WARNING,
                            "body '%s': %u of %u surfels hang on the nearest cell from outside, the farthest "
                            "%g m away; cells that cover the surface follow it better",
@@ -109,7 +111,7 @@ void make_body_surface(Body &b, const dfm_surface_def *def) {
     check_surface(*def, b.name.c_str());
     make_surface(m, def->npoint, def->points, def->triangles, def->ntriangle, b.surface);
     check_outward(b.surface, b.name.c_str());
-    if (!b.share.empty()) tell_of_long_edges(b);
+    if (!b.share.empty() || !b.inside.empty()) tell_of_long_edges(b);
     couple(b, *def);
   } else {
     const Array<uint32_t> boundary = boundary_triangles(m, b.ncell(), b.tets.data());

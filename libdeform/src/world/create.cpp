@@ -100,6 +100,21 @@ void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials
   }
 }
 
+void take_inside(Body &b, const dfm_body_def &def) {
+  if (b.cell_type != DFM_CELL_HEX8)
+    fail(DFM_E_UNSUPPORTED, "body '%s': cell_inside is for hexahedra; its cells are %s", b.name.c_str(),
+         cell_kind(b.cell_type).name);
+  const size_t n = b.cells.size() / 8 * kInsidePoints;
+  b.inside = Array<double>(def.cell_inside, def.cell_inside + n, b.cells.get_allocator());
+  for (size_t c = 0; c < n; c += kInsidePoints) {
+    double material = 0;
+    for (size_t q = 0; q < kInsidePoints; ++q) material += b.inside[c + q];
+    if (!(material > 0 && material < HUGE_VAL))
+      fail(DFM_E_ARG, "body '%s': the weights of cell %zu in cell_inside sum to %g; expected more than 0",
+           b.name.c_str(), c / kInsidePoints, material);
+  }
+}
+
 // Points at rest, without mass and place, and cells.
 void take_points(World &w, Body &b, const dfm_body_def &def) {
   const Memory &m = w.memory();
@@ -120,9 +135,10 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
            "dfm_tetmesh_cells do",
            b.name.c_str(), kind.name);
     if (def.cell_share)
-      fail(DFM_E_UNSUPPORTED, "body '%s': %s are wholly material; give no cell_share", b.name.c_str(),
-           kind.name);
+      fail(DFM_E_UNSUPPORTED, "body '%s': cell_share is for tetrahedra; %s take cell_inside, if any",
+           b.name.c_str(), kind.name);
   }
+  if (def.cell_inside) take_inside(b, def);
   if (def.cell_share)
     b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
 }

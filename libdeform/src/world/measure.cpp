@@ -12,6 +12,7 @@
 #include "plugin/tables.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "step/step_bound.h"
 #include "world/body_model.h"
 
 namespace dfm {
@@ -49,11 +50,12 @@ dfm_body_measure measure(Body &b) {
   const Vec3 velocity = (1 / b.mass) * momentum;
   Vec3 angular;
   for (uint32_t i = 0; i < p.n; ++i) angular += p.mass[i] * cross(p.x_at(i) - com, p.v_at(i) - velocity);
-  for (size_t t = 0; t < b.tets.size(); t += 4) {
-    const double v = tet_volume(p.x.data(), kStride, &b.tets[t]);
-    m.volume += b.share.empty() ? v : b.share[t / 4] * v;
-    m.inverted += v < 0;
-  }
+  m.inverted = inverted_cells(b);
+  for (size_t c = 0; c < b.inside.size() / kInsidePoints; ++c)
+    each_inside(p.x.data(), kStride, &b.cells[8 * c], &b.inside[kInsidePoints * c],
+                [&](double volume, Vec3) { m.volume += volume; });
+  for (size_t t = 0; b.inside.empty() && t < b.tets.size(); t += 4)
+    m.volume += (b.share.empty() ? 1 : b.share[t / 4]) * tet_volume(p.x.data(), kStride, &b.tets[t]);
   store3(m.com, com);
   store3(m.velocity, velocity);
   store3(m.momentum, momentum);

@@ -116,7 +116,7 @@ TEST(ShareOnSkin, ForceAndTorque_AreThoseOfTheTraction) {
 TEST(SelectOnFilled, Box_TakesTheSurfaceInIt) {
   Cells c(dfm::make_beam(dfm::Memory::standard(), 1, 1, 1, 100));
   Skin &skin = c.body.skin;
-  skin.points = {0.3, 0.3, 0.31};
+  skin.points = {0.3, 0.305, 0.315};
   skin.npoint = 1;
   dfm::scene::Selection where;
   for (int k = 0; k < 3; ++k) {
@@ -132,4 +132,6 @@ TEST(SelectOnFilled, Box_TakesTheSurfaceInIt) {
   locate(c.body, skin.points.data(), corners, weights);
   std::sort(corners, corners + 4);
   for (int k = 0; k < 4; ++k) EXPECT_EQ(points[size_t(k)], corners[k]);
+  skin.points = {0.3, 0.3, 0.31};  // on a face
+  EXPECT_EQ(select(where, c.body, "s.json").size(), 3u);
 }

@@ -1,0 +1,235 @@
+// Lattices in worlds and scenes: they rest on a floor by their fine surface, are saved and written; what they
+// cannot be made of says so.
+#include <cmath>
+
+#include "support.h"
+#include "world.h"
+
+namespace {
+
+constexpr double kRadius = 0.1, kFlat = 0.6;
+
+dfm_trimesh ball(dfm_context *context, double triangles = 1000) {
+  const double size[3] = {kRadius, 0, 0};
+  dfm_trimesh out = 0;
+  test::ok(dfm_trimesh_make(context, "ball", size, uint32_t(triangles), &out));
+  return out;
+}
+
+// The ball, flatter: it does not roll.
+dfm_trimesh pebble(dfm_context *context) {
+  const dfm_trimesh round = ball(context);
+  dfm_trimesh_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_trimesh_get_info(round, &info));
+  const double *x = nullptr;
+  const uint32_t *triangles = nullptr;
+  test::ok(dfm_trimesh_data(round, &x, &triangles, nullptr));
+  std::vector<double> points(x, x + 3 * info.npoint);
+  for (size_t i = 2; i < points.size(); i += 3) points[i] *= kFlat;
+  dfm_trimesh out = 0;
+  test::ok(dfm_trimesh_create(context, info.npoint, points.data(), info.ntriangle, triangles, &out));
+  return out;
+}
+
+struct Worn {
+  dfm_surface_def def{};
+  explicit Worn(dfm_trimesh skin) {
+    dfm_trimesh_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_trimesh_get_info(skin, &info));
+    def.size = sizeof def;
+    def.npoint = info.npoint;
+    def.ntriangle = info.ntriangle;
+    test::ok(dfm_trimesh_data(skin, &def.points, &def.triangles, nullptr));
+  }
+};
+
+struct Resting {
+  test::Context context;
+  dfm_world world;
+  dfm_body body = 0;
+  explicit Resting(int32_t integrator, uint32_t cells) {
+    world = test::make_world(context, {0, 0, -9.81}, integrator);
+    test::add_plane(world, "floor");
+    test::set_friction(world, 0.5);
+    const dfm_trimesh skin = pebble(context);
+    const Worn worn(skin);
+    dfm_tetmesh mesh = 0;
+    test::ok(dfm_tetmesh_lattice(skin, cells, 0, &mesh));
+    dfm_body_def d = dfm_body_def_default();
+    test::lend(mesh, d);
+    d.model = "corotational_fem";
+    d.surface = &worn.def;
+    test::BodyOptions o;
+    o.young = 1e5;
+    o.damping_mass = 10;
+    o.damping_stiffness = 1e-3;
+    d.material = test::make_material(world, o);
+    d.pose.position[2] = kFlat * kRadius + 0.002;
+    test::ok(dfm_body_create(world, &d, &body));
+  }
+  ~Resting() { dfm_world_destroy(world); }
+};
+
+}  // namespace
+
+TEST(Lattice, PebbleOnAFloor_RestsWithItsWeightAndDoesNotCreep) {
+  for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER})
+    for (const uint32_t cells : {8u, 64u}) {
+      Resting r(integrator, cells);
+      test::run(r.world, 1.5, 2e-3);
+      const dfm_body_measure before = test::measure(r.body);
+      test::run(r.world, 1.0, 2e-3);
+      const dfm_body_measure after = test::measure(r.body);
+      const double weight = 9.81 * after.mass;
+      EXPECT_NEAR(after.contact_impulse[2] - before.contact_impulse[2], weight, 1e-4 * weight) << cells;
+      for (int k = 0; k < 3; ++k) EXPECT_NEAR(after.com[k], before.com[k], 1e-5 * kRadius) << cells;
+      EXPECT_LT(after.com[2], kFlat * kRadius);
+      EXPECT_GT(after.com[2], 0.9 * kFlat * kRadius);
+      EXPECT_EQ(after.inverted, 0u);
+    }
+}
+
+TEST(Lattice, Snapshot_ContinuesWithTheSameBits) {
+  for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
+    Resting r(integrator, 27), other(integrator, 27), coarse(integrator, 8);
+    test::run(r.world, 0.1, 2e-3);
+    const std::string kept = test::snapshot(r.world);
+    test::ok(dfm_world_restore(other.world, kept.data(), kept.size()));
+    EXPECT_NE(dfm_world_restore(coarse.world, kept.data(), kept.size()), DFM_OK);
+    test::run(r.world, 0.1, 2e-3);
+    test::run(other.world, 0.1, 2e-3);
+    EXPECT_TRUE(test::snapshot(r.world) == test::snapshot(other.world));
+  }
+}
+
+// By a linear field every surfel is exact, and by a product of coordinates too, whichever tetrahedra a
+// hexahedron is divided into.
+TEST(Lattice, SurfaceFollowsTrilinearFields) {
+  Resting r(DFM_INTEGRATOR_IMPLICIT_EULER, 1);
+  const auto field = [](double *x) {
+    const double a = x[0], b = x[1], c = x[2];
+    x[0] += 0.2 * b * c + 30 * a * b * c;
+    x[1] += 0.3 * c * a;
+    x[2] += 0.1 * a - a * b;
+  };
+  uint32_t n = 0;
+  std::vector<double> x(24), seen(3 * 2000);
+  test::ok(dfm_body_get_state(r.body, 8, x.data(), nullptr, &n));
+  for (double *p = x.data(); p < x.data() + 24; p += 3) {
+    p[2] -= kFlat * kRadius + 0.002;
+    field(p);
+  }
+  test::ok(dfm_body_set_state(r.body, n, x.data(), nullptr));
+  const dfm_trimesh skin = pebble(r.context);
+  const Worn worn(skin);
+  std::vector<double> want(worn.def.points, worn.def.points + 3 * worn.def.npoint);
+  for (size_t i = 0; i < want.size(); i += 3) field(&want[i]);
+  test::ok(dfm_surface_positions(r.body, 2000, seen.data(), &n));
+  ASSERT_EQ(3 * n, want.size());
+  for (size_t i = 0; i < want.size(); ++i) EXPECT_NEAR(seen[i], want[i], 1e-15);
+}
+
+constexpr const char *kScene = R"({"format": "deform-scene", "version": 1,
+  "time": {"duration": 0.02, "step": 0.01}, "gravity": [0, 0, -9.81],
+  "bodies": [
+    {"name": "ball", "mesh": "ball.stl", "lattice": {"cells": 30}, "model": {"type": "corotational_fem"},
+     "fix": [{"box": [[-1, -1, -1], [1, 1, -0.09]]}]},
+    {"name": "fine", "mesh": "ball.stl", "lattice": {"size": 0.05}, "model": {"type": "linear_fem"},
+     "pose": {"position": [0, 1, 0], "scale": 0.5}}]})";
+
+TEST(Lattice, Scene_MakesItAndAWrittenSceneHasIt) {
+  test::Context context;
+  const std::string folder = test::scratch("lattice_scene"), path = folder + "/scene.json";
+  test::ok(dfm_trimesh_write(ball(context), (folder + "/ball.stl").c_str()));
+  test::write_file(path, kScene);
+  dfm_world world = 0, again = 0;
+  DFM_OK_OR_DIE(dfm_scene_load(context, path.c_str(), &world));
+  test::run(world, 0.02, 0.01);
+  const std::string copy = folder + "/copy.json";
+  DFM_OK_OR_DIE(dfm_world_write_scene(world, copy.c_str(), nullptr, nullptr));
+  DFM_OK_OR_DIE(dfm_scene_load(context, copy.c_str(), &again));
+  for (const char *name : {"ball", "fine"}) {
+    dfm_body a = 0, b = 0;
+    test::ok(dfm_world_find_body(world, name, &a));
+    test::ok(dfm_world_find_body(again, name, &b));
+    const dfm_body_measure m = test::measure(a), n = test::measure(b);
+    EXPECT_GT(m.elastic, 0);
+    EXPECT_NEAR(n.elastic / m.elastic, 1, 1e-9) << name;
+    EXPECT_NEAR(n.mass, m.mass, 1e-14);
+    const double whole = 4000 * M_PI / 3 * std::pow(kRadius, 3) * (std::string(name) == "fine" ? 0.125 : 1);
+    EXPECT_NEAR(m.mass, whole, 0.02 * whole);
+    dfm_body_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_body_get_info(a, &info));
+    if (std::string(name) == "fine") {
+      EXPECT_EQ(info.ntet, 6u * 8);  // 2 x 2 x 2 cells, of which none is nearly empty
+    }
+  }
+}
+
+TEST(Lattice, WhatCannotBeOne_SaysSo) {
+  test::Context context;
+  const dfm_trimesh whole = ball(context);
+  dfm_tetmesh mesh = 0;
+  EXPECT_EQ(dfm_tetmesh_lattice(whole, 0, 0, &mesh), DFM_E_ARG);
+  test::says({"either a number of cells", "or their size"});
+  EXPECT_EQ(dfm_tetmesh_lattice(whole, 5, 0.1, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_tetmesh_lattice(whole, 2000000, 0, &mesh), DFM_E_ARG);
+  test::says({"1 to 1000000"});
+  EXPECT_EQ(dfm_tetmesh_lattice(whole, 0, 1e-4, &mesh), DFM_E_ARG);
+  test::says({"cells of 0.0001 m", "at most 1000000"});
+  EXPECT_EQ(dfm_tetmesh_lattice(whole, 0, 0.3, &mesh), DFM_E_ARG);
+  test::says({"cells of 0.3 m are larger than the surface"});
+  const Worn worn(whole);
+  dfm_trimesh open = 0;
+  test::ok(dfm_trimesh_create(context, worn.def.npoint, worn.def.points, worn.def.ntriangle - 1,
+                              worn.def.triangles, &open));
+  EXPECT_EQ(dfm_tetmesh_lattice(open, 8, 0, &mesh), DFM_E_FORMAT);
+  test::says({"the surface is open", "3 edges", "fill"});
+  std::vector<double> points(worn.def.points, worn.def.points + 3 * worn.def.npoint);
+  std::vector<uint32_t> triangles(worn.def.triangles, worn.def.triangles + 3 * worn.def.ntriangle);
+  for (size_t i = 0; i < size_t{3} * worn.def.npoint; ++i) points.push_back(points[i] + (i % 3 ? 0 : 0.03));
+  for (size_t i = 0; i < size_t{3} * worn.def.ntriangle; ++i)
+    triangles.push_back(triangles[i] + worn.def.npoint);
+  dfm_trimesh crossing = 0;
+  test::ok(dfm_trimesh_create(context, 2 * worn.def.npoint, points.data(), 2 * worn.def.ntriangle,
+                              triangles.data(), &crossing));
+  EXPECT_EQ(dfm_tetmesh_lattice(crossing, 100, 0, &mesh), DFM_E_FORMAT);
+  test::says({"crosses itself", "fill"});
+
+  test::ok(dfm_tetmesh_lattice(whole, 8, 0, &mesh));
+  const dfm_world world = test::make_world(context);
+  dfm_body_def d = dfm_body_def_default();
+  test::lend(mesh, d);
+  d.model = "msm";
+  dfm_body body = 0;
+  EXPECT_EQ(dfm_body_create(world, &d, &body), DFM_E_UNSUPPORTED);
+  test::says({"msm", "hexahedra"});
+  d.model = "corotational_fem";
+  const std::vector<double> none(27 * 8);
+  d.cell_inside = none.data();
+  EXPECT_EQ(dfm_body_create(world, &d, &body), DFM_E_ARG);
+  test::says({"weights of cell 0", "more than 0"});
+  dfm_world_destroy(world);
+
+  const std::string folder = test::scratch("lattice_errors"), path = folder + "/scene.json";
+  test::ok(dfm_trimesh_write(whole, (folder + "/ball.stl").c_str()));
+  const auto told = [&](const std::string &keys, std::initializer_list<const char *> parts) {
+    test::write_file(path, R"({"format": "deform-scene", "version": 1,
+      "time": {"duration": 0.02, "step": 0.01},
+      "bodies": [{"name": "ball", "model": {"type": "linear_fem"}, )" +
+                               keys + "}]}");
+    dfm_world w = 0;
+    EXPECT_NE(dfm_scene_load(context, path.c_str(), &w), DFM_OK);
+    test::says(parts);
+  };
+  told(R"("mesh": "ball.stl", "lattice": {})", {"/bodies/0/lattice", "either \"cells\"", "\"size\""});
+  told(R"("mesh": "ball.stl", "lattice": {"cells": 8, "size": 0.1})", {"/bodies/0/lattice", "either"});
+  told(R"("mesh": "ball.stl", "lattice": {"cells": 8}, "fill": {"cells": 80})",
+       {"/bodies/0/lattice", "\"fill\" too"});
+  told(R"("mesh": "ball.stl", "lattice": {"size": 1})", {"/bodies/0/lattice", "larger than the surface"});
+  told(R"("mesh": {"make": "ball", "radius": 0.1}, "lattice": {"cells": 8})",
+       {"/bodies/0/lattice", "for a closed surface"});
+}
