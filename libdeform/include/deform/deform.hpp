@@ -566,23 +566,12 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
     });
   }
   auto snapshot() const {
-    return produce<E, std::vector<std::byte>>([&](std::vector<std::byte> &out) {
-      size_t bytes = 0;
-      const dfm_status s = dfm_world_snapshot(raw_, nullptr, &bytes);
-      if (s < 0) return s;
-      out.resize(bytes);
-      return dfm_world_snapshot(raw_, out.data(), &bytes);
-    });
+    return collect_bytes<E>([&](void *out, size_t *bytes) { return dfm_world_snapshot(raw_, out, bytes); });
   }
   // Packets for viewers elsewhere, one behind the other.
   auto stream(const dfm_stream_def &def = StreamDef()) const {
-    return produce<E, std::vector<std::byte>>([&](std::vector<std::byte> &out) {
-      size_t bytes = 0;
-      const dfm_status s = dfm_world_stream(raw_, &def, nullptr, &bytes);
-      if (s < 0) return s;
-      out.resize(bytes);
-      return dfm_world_stream(raw_, &def, out.data(), &bytes);
-    });
+    return collect_bytes<E>(
+        [&](void *out, size_t *bytes) { return dfm_world_stream(raw_, &def, out, bytes); });
   }
   auto restore(std::span<const std::byte> from) const {
     return E::done(dfm_world_restore(raw_, from.data(), from.size()));

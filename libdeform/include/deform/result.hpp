@@ -319,6 +319,16 @@ inline auto collect_text(F &&f) {
     return s;
   });
 }
+template <class E, class F>
+inline auto collect_bytes(F &&f) {
+  return produce<E, std::vector<std::byte>>([&](std::vector<std::byte> &out) {
+    size_t bytes = 0;
+    const dfm_status s = f(nullptr, &bytes);
+    if (s < 0) return s;
+    out.resize(bytes);
+    return f(out.data(), &bytes);
+  });
+}
 
 // A handle's value. Raw is what the C functions take; Kind keeps handles of different things apart, which in
 // C have one type.
