@@ -130,7 +130,8 @@ std::vector<std::string> capabilities(const dfm_type &type) {
                {DFM_CAP_ROTATION_INVARIANT, "rotation_invariant"},
                {DFM_CAP_PLAUSIBLE, "plausible"},
                {DFM_CAP_STIFFNESS, "stiffness"},
-               {DFM_CAP_CONSTANT_STIFFNESS, "constant_stiffness"}};
+               {DFM_CAP_CONSTANT_STIFFNESS, "constant_stiffness"},
+               {DFM_CAP_INSIDE, "inside"}};
   for (const auto &cap : names)
     if (caps & cap.bit) out.push_back(cap.name);
   return out;

@@ -120,6 +120,7 @@ static const Row rows[] = {
     M(dfm_mesh, col),
     M(dfm_mesh, weight),
     M(dfm_mesh, fixed),
+    M(dfm_mesh, inside),
     S(dfm_kin),
     M(dfm_kin, size),
     M(dfm_kin, stride),

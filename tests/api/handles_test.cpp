@@ -372,6 +372,11 @@ std::vector<Call> tetmesh_calls() {
          const uint32_t *p;
          return dfm_tetmesh_file_cells(h, &p);
        }},
+      {"tetmesh_inside",
+       [](uint64_t h) {
+         const double *p;
+         return dfm_tetmesh_inside(h, &p);
+       }},
       {"tetmesh_share",
        [](uint64_t h) {
          const double *p;
@@ -393,6 +398,7 @@ std::vector<Call> trimesh_calls() {
       {"trimesh_groups", [](uint64_t h) { return dfm_trimesh_groups(h, nullptr, nullptr); }},
       {"trimesh_write", [](uint64_t h) { return dfm_trimesh_write(h, "/nonexistent/x.obj"); }},
       {"tetmesh_fill", [](uint64_t h) { return dfm_tetmesh_fill(h, 100, &made); }},
+      {"tetmesh_lattice", [](uint64_t h) { return dfm_tetmesh_lattice(h, 10, 0, &made); }},
   };
 }
 

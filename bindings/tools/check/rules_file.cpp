@@ -256,7 +256,8 @@ void model_sound(const dfm_type &type, const dfm_model &model) {
           type.params[i].key ? type.params[i].key : "");
 
   constexpr uint32_t kKnown = DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING |
-                              DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS;
+                              DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE | DFM_CAP_CONSTANT_STIFFNESS |
+                              DFM_CAP_INSIDE;
   if (model.caps & ~kKnown)
     broken("caps has bits that this ABI does not know (%#x); use DFM_CAP_*", model.caps & ~kKnown);
   if ((model.caps & DFM_CAP_CONSTANT_STIFFNESS) && !(model.caps & DFM_CAP_STIFFNESS))

@@ -5,6 +5,7 @@
   fem                corotational finite elements, the rest left open
   fem 1 ms           the same at the common step
   fem tr_bdf2 4 ms   implicit, second order, at MuJoCo's and Bullet's own longest step
+  lattice 4 ms       the same with about five hexahedra under the surface of the mesh
 """
 import csv
 import json
@@ -19,13 +20,14 @@ import entry_deform  # of the friction benchmark
 
 FEM = {"model": {"type": "corotational_fem"}}
 SETTINGS = {"defaults": {}, "defaults 1 ms": {"step": 1e-3}, "fem": FEM, "fem 1 ms": {**FEM, "step": 1e-3},
-            "fem tr_bdf2 4 ms": {**FEM, "step": 4e-3, "integrator": "tr_bdf2"}}
+            "fem tr_bdf2 4 ms": {**FEM, "step": 4e-3, "integrator": "tr_bdf2"},
+            "lattice 4 ms": {**FEM, "step": 4e-3, "integrator": "tr_bdf2", "lattice": {"cells": 5}}}
 TICK = 4e-3  # s: the processor's time is counted in ticks; what is shorter counts as one
 GAP = 2e-5  # m, start distance: settles without an impact
 
 
 class Entry:
-    name, settings, SEARCH = "deform", SETTINGS, entry_deform.SEARCH
+    name, settings, SEARCH, lattice = "deform", SETTINGS, entry_deform.SEARCH, None
 
     def __init__(self, command, work):
         self.command, self.work, self.meshes = command, work, {}
@@ -41,11 +43,14 @@ class Entry:
             path = os.path.join(self.work, "mesh_%d.msh" % len(self.meshes))
             mesh_file.make(self.command, body, path)
             self.meshes[key] = path
-        return self.meshes[key]
+            surface = path.replace(".msh", ".obj")
+            subprocess.run([self.command, "mesh", "convert", path, surface, "--quiet"], check=True)
+        return self.meshes[key].replace(".msh", ".obj") if self.lattice else self.meshes[key]
 
     def run(self, case, configuration):
         scene = getattr(self, "scene_" + case["name"])(case)
         given = self.settings[configuration]
+        self.lattice = given.get("lattice")
         if "step" in given:
             scene["time"]["step"] = given["step"]
         if "integrator" in given:
@@ -58,7 +63,8 @@ class Entry:
                                                         "params": {"mu": case["mu"]}}]
         for body in scene["bodies"]:
             body.update(mesh=self.mesh(case["body"]), material="gel", **({"model": given["model"]} if "model"
-                                                                         in given else {}))
+                                                                         in given else {}),
+                        **({"lattice": self.lattice} if self.lattice else {}))
         path, folder = os.path.join(self.work, "scene.json"), os.path.join(self.work, "run")
         with open(path, "w") as f:
             json.dump(scene, f)
@@ -158,6 +164,9 @@ class Entry:
         return {"shortening": total, **self.creep(case, folder, "block%d" % (case["count"] - 1), "x")}
 
     def points(self, body):
+        if self.lattice:
+            with open(self.mesh(body)) as f:
+                return [[float(x) for x in line.split()[1:4]] for line in f if line.startswith("v ")], None
         path = os.path.join(self.work, "points.msh2")
         mesh_file.make(self.command, body, path)
         return mesh_file.read(path)
