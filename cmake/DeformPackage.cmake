@@ -82,7 +82,8 @@ if(TARGET deform_view)
 endif()
 if(CMAKE_INSTALL_LIBDIR STREQUAL "lib")  # where `native` finds the library
   deform_package(python python3-deform "soft bodies with true friction: the Python package"
-    "libdeform0 ${same}, deform ${same}, python3 (>= 3.10), python3-numpy" python python_package)
+    "libdeform0 ${same}, libdeform-dev ${same}, deform ${same}, python3 (>= 3.10), python3-numpy"
+    python python_package)
 endif()
 if(TARGET solver_cholmod)
   deform_package(cholmod libdeform-cholmod "linear solver CHOLMOD for deform (GPL)"

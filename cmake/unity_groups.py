@@ -45,7 +45,8 @@ class File:
             found = [at for folder in [path.parent, *folders] if (at := folder / name).exists()]
             self.includes += [found[0].resolve()] if found else []
         self.internal = set(re.findall(r"^\s*#\s*define (\w+)", text, re.M))
-        self.renames = bool(re.search(r"^#\s*define.*^#include", text, re.M | re.S))
+        # other names in a header, or symbols by their names: inline functions of that name may be emitted
+        self.renames = bool(re.search(r"^#\s*define.*^#include|\basm\(", text, re.M | re.S))
         self.opens = bool(re.search(r"^using namespace", text, re.M))
         self.allocates = bool(re.search(r"^\w.*\boperator (new|delete)\b", text, re.M))
         self.names = set()

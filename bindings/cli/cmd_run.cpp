@@ -357,7 +357,7 @@ class Runner {
     return true;
   }
 
-  // A call that moves the world. False: the run ends here, and the world is as before the call.
+  // A call that moves the world. False: the run ends here; interrupted, the world is as before the call.
   template <class Call>
   bool taken(const Call &call) {
     const double begin = wall_seconds();

@@ -17,7 +17,7 @@ NEEDS = {"libdeform0": ["libc6", "libstdc++6"], "libdeform-dev": ["libdeform0 (=
          "deform-view": ["deform (=", "libglfw3"], "deform-serve": ["deform (=", "libwebsockets"],
          "libdeform-ode": ["libdeform0 (=", "libode8"],
          "libdeform-bullet": ["libdeform0 (=", "libbullet"],
-         "python3-deform": ["libdeform0 (=", "deform (=", "python3-numpy"],
+         "python3-deform": ["libdeform0 (=", "libdeform-dev (=", "deform (=", "python3-numpy"],
          "libdeform-cholmod": ["libdeform0 (=", "libcholmod"]}
 ALWAYS = ["libdeform0", "libdeform-dev", "libdeform-doc", "deform", "python3-deform"]
 

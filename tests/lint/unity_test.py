@@ -52,6 +52,7 @@ class Groups(unittest.TestCase):
         other = OWN % "int b() { return 1; }"
         self.assertFalse(self.together('#define x y\n#include "seen.h"\n#undef x\n', other))
         self.assertFalse(self.together("void *operator new(size_t n) {\n  return 0;\n}\n", other))
+        self.assertFalse(self.together('int f(void) asm("g");\n', other))
         self.assertFalse(self.together('#include "seen.h"\n', other,
                                        header="void *operator new(size_t n) {\n  return 0;\n}\n"))
 

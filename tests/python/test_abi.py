@@ -3,6 +3,7 @@ import ctypes
 import inspect
 import os
 import pathlib
+import re
 import subprocess
 import tempfile
 import unittest
@@ -19,6 +20,13 @@ def structs():
 
 
 class Abi(unittest.TestCase):
+    def test_every_function_of_the_headers_is_there(self):
+        said = set()
+        for header in sorted((INCLUDE / "deform").glob("*.h")):
+            said |= set(re.findall(r"^DFM_API [^;{]*?\b(dfm_\w+)\(", header.read_text(), re.M))
+        self.assertGreater(len(said), 200)
+        self.assertEqual(said - set(_abi.FUNCTIONS), set())
+
     def test_structs_laid_out_as_in_c(self):
         lines = []
         for kind in structs():

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _HERE = pathlib.Path(__file__).resolve().parent
 # those that the wheel carries, or the tree's
-INCLUDES = (_HERE / "native" / "include", _HERE.parents[2] / "libdeform" / "include")
+INCLUDES = (_HERE / "native" / "include", *(up / "libdeform" / "include" for up in _HERE.parents[2:3]))
 _HEADERS = ("plugin base id math world body contact attach surface stream mesh scene obstacle law material "
             "model rigid toi debug query callback sensor cut tool").split()
 
@@ -46,7 +46,8 @@ def _type(declared: str) -> Any:
     if "(*" in declared:
         return ctypes.c_void_p
     match = re.match(r"(?:const )?(\w+)((?: ?\*| ?const\b)*) ?\w*((?:\[\w*\])*)$", declared.strip())
-    assert match, declared
+    if not match:
+        raise ValueError(f"this declaration is of no form that is known: {declared}")
     base, stars, sizes = match.groups()
     depth = stars.count("*") + sizes.count("[")
     if base == "char" and depth == 1 and declared.strip().startswith("const"):
@@ -106,6 +107,14 @@ def _read(source: str) -> None:
                 else [_type(argument) for argument in re.split(r",(?![^()]*\))", arguments)])
 
 
+_folder = next((path / "deform" for path in INCLUDES if (path / "deform" / "plugin.h").is_file()), None)
+if _folder is None:
+    raise ImportError("deform: the C headers, which say what the library has, are in none of "
+                      f"{', '.join(map(str, INCLUDES))}; install the package, or libdeform-dev")
 for _header in _HEADERS:
-    _read((next(path for path in INCLUDES if path.is_dir()) / "deform" / f"{_header}.h").read_text())
+    try:
+        _read((_folder / f"{_header}.h").read_text())
+    except Exception as _error:
+        raise ImportError(f"deform: {_folder / _header}.h cannot be read ({_error}); install the headers of "
+                          "the package's own version") from _error
 globals().update({name: kind for name, kind in _types.items() if name.startswith("dfm_")}, **_constants)

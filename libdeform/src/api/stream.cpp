@@ -161,8 +161,7 @@ void add_body(const Body &b, Packets &out) {
   for (const uint32_t x : {id, shape, s.nsurfel, s.ntri}) out.add(x);
   out.add(name_in(b.name));
   out.end_chunk();
-  ranges("BASE", id, shape, s.nsurfel, out,
-         [&](uint32_t i) { out.add(surfel_vector(b, b.p.x, i) - surfel_displacement(b, i)); });
+  ranges("BASE", id, shape, s.nsurfel, out, [&](uint32_t i) { out.add(surfel_at_rest(b, i)); });
   triangles(id, shape, {s.tri.data(), 3 * size_t{s.ntri}}, out);
 }
 

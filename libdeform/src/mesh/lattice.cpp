@@ -315,7 +315,7 @@ void refuse_unfit(const TriMesh &surface, const Extent &box, uint32_t cells, dou
     fail(DFM_E_ARG,
          "a lattice has either a number of cells, 1 to %u, or their size in m, above 0; found %u and %g",
          kMostCells, cells, size);
-  const TriMeshStatistics s = tri_mesh_statistics(surface);
+  const dfm_trimesh_info s = mesh_statistics(surface);
   if (!s.closed)
     fail(DFM_E_FORMAT,
          "the surface is open: %u edges have one triangle, %u more than two; a lattice needs a closed one: "
@@ -338,8 +338,8 @@ TetMesh make_lattice(const TriMesh &surface, uint32_t cells, double size) {
   Extent box;
   for (const uint32_t p : surface.tris) box.add(load3(&surface.points[3 * size_t{p}]));
   refuse_unfit(surface, box, cells, size);
-  const Lattice l = cells ? seek(surface, box, tri_mesh_statistics(surface).volume, cells)
-                          : lay(surface, grid_of(box, size));
+  const Lattice l =
+      cells ? seek(surface, box, mesh_statistics(surface).volume, cells) : lay(surface, grid_of(box, size));
   constexpr uint32_t kCorner[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                       {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
   const Grid &g = l.grid;

@@ -138,9 +138,10 @@ Varying varying(const World &w) {
 
 // Updates only the plan, if changed values call for another stage.
 void look_at_plan(World &w, StepContext &step) {
-  SceneFacts facts = step.facts;
-  static_cast<Varying &>(facts) = varying(w);
-  if (facts != step.facts) {
+  const Varying now = varying(w);
+  if (now != static_cast<const Varying &>(step.facts)) {
+    SceneFacts facts = step.facts;
+    static_cast<Varying &>(facts) = now;
     w.plan = make_plan(facts);
     step.facts = std::move(facts);
     ++step.made.plans;

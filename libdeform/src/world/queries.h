@@ -21,9 +21,13 @@ double ray_obstacle(const Obstacle &ob, Vec3 origin, Vec3 unit_direction, Vec3 *
 inline Vec3 displacement(const Body &b, uint32_t point) {
   return b.p.x_at(point) - place(b.origin.frame, b.p.rest_at(point));
 }
+inline Vec3 surfel_at_rest(const Body &b, uint32_t s) {
+  return place(b.origin.frame, b.surface.identity() ? b.p.rest_at(b.surface.point[s])
+                                                    : load3(&b.surface.rest[size_t{3} * s]));
+}
 inline Vec3 surfel_displacement(const Body &b, uint32_t s) {
   if (b.surface.identity()) return displacement(b, b.surface.point[s]);
-  return b.surface.sum(s, b.p.x.data()) - place(b.origin.frame, load3(&b.surface.rest[size_t{3} * s]));
+  return b.surface.sum(s, b.p.x.data()) - surfel_at_rest(b, s);
 }
 // [nsurfel,3], area-weighted
 void surface_normals(const Body &b, double *out);
