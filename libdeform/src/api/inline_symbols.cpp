@@ -2,7 +2,7 @@
 // defaults), exported as symbols for callers that look functions up by name without a C compiler. Their
 // structs remain those of 0.1.
 //
-// The inline functions of these names must not be called here: where a compiler emits one, both have the name.
+// The inline functions of these names must not be called here: where a compiler emits one, both have a name.
 #include "api/first_size.h"
 
 #define DFM_TEXT(x) #x
