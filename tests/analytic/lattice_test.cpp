@@ -2,6 +2,7 @@
 // that lies askew to its grid bends as beam theory has it.
 #include <deform/plugin.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "statics.h"
@@ -271,4 +272,47 @@ TEST(Lattice, BarAskewToTheGrid_BendsAsBeamTheoryHasIt) {
   const struct { double size, much; } steps[] = {{0.1, 0.05}, {0.05, 0.06}, {0.025, 0.02}};
   for (const auto &[size, much] : steps) EXPECT_NEAR(bent("linear_fem", size, kAskew), 1, much) << size;
   EXPECT_NEAR(bent("corotational_fem", 0.1, kAskew), 1, 0.05);
+}
+
+// Cells that share no more than an edge turn about it without a force.
+TEST(Lattice, BarThinnerThanACellAndAskew_HasNoHinges) {
+  test::Context context;
+  for (const Matrix &turn : {turned(0, 0, std::tan(M_PI / 8)), turned(0, std::tan(M_PI / 8), 0), kAskew})
+    for (const double size : {0.25, 0.2, 0.15, 0.1, 0.05}) {
+      const Skin bar(context, "beam", {1, kSide, kSide}, 12, turn);
+      dfm_tetmesh mesh = 0;
+      test::ok(dfm_tetmesh_lattice(bar.mesh, 0, size, &mesh));
+      dfm_tetmesh_info info{};
+      info.size = sizeof info;
+      test::ok(dfm_tetmesh_get_info(mesh, &info));
+      uint32_t kind = 0;
+      const uint32_t *cells = nullptr;
+      test::ok(dfm_tetmesh_cells(mesh, &kind, &cells));
+      std::vector<uint32_t> piece(info.ncell);
+      for (uint32_t c = 0; c < info.ncell; ++c) piece[c] = c;
+      for (uint32_t a = 0; a < info.ncell; ++a)
+        for (uint32_t b = 0; b < a; ++b) {
+          int shared = 0;
+          for (int i = 0; i < 8; ++i)
+            shared += std::count(cells + 8 * b, cells + 8 * b + 8, cells[8 * a + uint32_t(i)]) > 0;
+          if (shared != 4) continue;
+          const uint32_t from = piece[a], to = piece[b];
+          std::replace(piece.begin(), piece.end(), from, to);
+        }
+      EXPECT_EQ(std::count(piece.begin(), piece.end(), piece[0]), std::ptrdiff_t(info.ncell))
+          << size << ", " << info.ncell << " cells";
+    }
+}
+
+TEST(Lattice, ThinAndAskew_GetsTheNearestNumberOfCells) {
+  test::Context context;
+  const Skin rod(context, "beam", {1, 1e-3, 1e-3}, 12, kAskew);
+  for (const uint32_t cells : {20u, 1000u}) {
+    dfm_tetmesh mesh = 0;
+    test::ok(dfm_tetmesh_lattice(rod.mesh, cells, 0, &mesh));
+    dfm_tetmesh_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    EXPECT_GT(info.ncell, 10u) << cells;
+  }
 }

@@ -169,6 +169,53 @@ TEST(Lattice, Scene_MakesItAndAWrittenSceneHasIt) {
   }
 }
 
+// "fix" holds what it selects: the surface there follows corners of hexahedra, all of which are held.
+TEST(Lattice, HeldSurface_Stays) {
+  test::Context context;
+  const std::string folder = test::scratch("lattice_held"), path = folder + "/scene.json";
+  const double size[3] = {1, 0.3, 0.3};
+  dfm_trimesh straight = 0, askew = 0;
+  test::ok(dfm_trimesh_make(context, "beam", size, 400, &straight));
+  const Worn worn(straight);
+  std::vector<double> points(worn.def.points, worn.def.points + 3 * size_t{worn.def.npoint});
+  const double c = std::cos(0.3), s = std::sin(0.3);
+  for (size_t i = 0; i < points.size(); i += 3) {
+    const double x = points[i], y = points[i + 1];
+    points[i] = c * x - s * y;
+    points[i + 1] = s * x + c * y;
+  }
+  test::ok(dfm_trimesh_create(context, worn.def.npoint, points.data(), worn.def.ntriangle, worn.def.triangles,
+                              &askew));
+  test::ok(dfm_trimesh_write(askew, (folder + "/bar.stl").c_str()));
+  for (const int cells : {3, 12, 40}) {
+    test::write_file(path,
+                     R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.2, "step": 0.01},
+      "gravity": [0, 0, -9.81], "bodies": [{"name": "bar", "mesh": "bar.stl", "lattice": {"cells": )" +
+                         std::to_string(cells) + R"(}, "model": {"type": "corotational_fem"},
+      "material": "soft", "fix": [{"box": [[-1, -1, -1], [0.15, 1, 1]]}]}],
+      "materials": {"soft": {"young": 5e4}}})");
+    dfm_world world = 0;
+    DFM_OK_OR_DIE(dfm_scene_load(context, path.c_str(), &world));
+    dfm_body body = 0;
+    test::ok(dfm_world_find_body(world, "bar", &body));
+    uint32_t n = 0;
+    test::ok(dfm_surface_positions(body, 0, nullptr, &n));
+    std::vector<double> before(3 * size_t{n}), after(before.size());
+    test::ok(dfm_surface_positions(body, n, before.data(), &n));
+    test::run(world, 0.2, 0.01);
+    test::ok(dfm_surface_positions(body, n, after.data(), &n));
+    double most = 0, free = 0;
+    for (size_t i = 0; i < before.size(); i += 3) {
+      const double moved =
+          std::hypot(after[i] - before[i], after[i + 1] - before[i + 1], after[i + 2] - before[i + 2]);
+      (before[i] <= 0.15 ? most : free) = std::max(before[i] <= 0.15 ? most : free, moved);
+    }
+    EXPECT_LT(most, 1e-12) << cells;
+    EXPECT_GT(free, 1e-3) << cells;
+    dfm_world_destroy(world);
+  }
+}
+
 TEST(Lattice, WhatCannotBeOne_SaysSo) {
   test::Context context;
   const dfm_trimesh whole = ball(context);

@@ -35,6 +35,8 @@ std::string why_cells_stay(const Subject &subject) {
     const std::string body = "/bodies/" + std::to_string(i);
     const JsonValue *const mesh = subject.find(body + "/mesh");
     if (!mesh) return "body '" + subject.bodies[i].name + "' has no mesh of its own";
+    if (subject.find(body + "/lattice"))
+      return "body '" + subject.bodies[i].name + "' is a lattice, whose cells this study does not vary yet";
     if (mesh->kind == JsonValue::object) continue;
     const std::string part = named_part(subject, body);
     if (!part.empty() && !subject.find(body + "/fill"))

@@ -82,7 +82,7 @@ constexpr std::chrono::microseconds kWithinStep{2000}, kBetweenSteps{200}, kCrow
 // Between the jobs of a step workers spin so that they do not fall asleep. Each worker waits at a cache line
 // of its own, so jobs that do not call it do not disturb it.
 struct Tasks::Pool {
-  static constexpr uint64_t kOpen = uint64_t{1} << 31, kInsidePoints = kOpen - 1;
+  static constexpr uint64_t kOpen = uint64_t{1} << 31, kInside = kOpen - 1;
   static constexpr int kNumber = 32;  // bits below a job's number
 
   // held by the thread that owns the job: worlds of one context may step on several threads
@@ -165,7 +165,7 @@ struct Tasks::Pool {
       if (!enter(seen)) continue;
       wake_next(own);
       drain(own);
-      if (((gate.fetch_sub(1) - 1) & (kOpen | kInsidePoints)) != 0 || !waiting.load()) continue;
+      if (((gate.fetch_sub(1) - 1) & (kOpen | kInside)) != 0 || !waiting.load()) continue;
       const std::lock_guard lock(mutex);
       done.notify_one();
     }
@@ -193,8 +193,8 @@ struct Tasks::Pool {
   }
 
   void close() {
-    const auto empty = [&] { return (gate.load() & kInsidePoints) == 0; };
-    if ((gate.fetch_and(~kOpen) & kInsidePoints) == 0) return;
+    const auto empty = [&] { return (gate.load() & kInside) == 0; };
+    if ((gate.fetch_and(~kOpen) & kInside) == 0) return;
     if (spin(empty, [&] { return crowded ? kCrowded : kWithinStep; })) return;
     std::unique_lock lock(mutex);
     waiting = true;

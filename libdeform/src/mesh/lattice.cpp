@@ -11,10 +11,14 @@
 // whose shape functions go on beyond its borders (S. Badia, F. Verdugo, A. F. Martin, The aggregated unfitted
 // finite element method for elliptic problems, Comput. Methods Appl. Mech. Engng 336, 2018). A larger part
 // makes bars askew to the grid too soft, a smaller one too stiff: one to four cells across, in eight
-// directions, they bend by 0.90 to 1.36 of the exact angle with 0.25, 0.83 to 1.05 with 0.15, 0.74 to 1.03
+// directions, they bend by 0.90 to 1.34 of the exact angle with 0.25, 0.82 to 1.05 with 0.15, 0.73 to 1.02
 // with 0.1 (tests/analytic/lattice_test.cpp has one of them).
+//
+// Hinges. Cells that share no more than an edge or a corner turn about it without a force. Where those that
+// are left out would leave such a place, they are kept.
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "core/error.h"
 #include "deform/plugin.h"
@@ -209,14 +213,19 @@ Moments weights_of(const Moments &in) {
 
 // ---- the grid ---------------------------------------------------------------------------------------------
 
+double cells_in(const Extent &box, double size) {
+  double all = 1;
+  for (int k = 0; k < 3; ++k) all *= std::max(1.0, std::round((box.hi[k] - box.lo[k]) / size));
+  return all;
+}
+
 Grid grid_of(const Extent &box, double size) {
   Grid g{};
-  double all = 1;
+  const double all = cells_in(box, size);
   for (int k = 0; k < 3; ++k) {
     g.lo[k] = box.lo[k];
     g.hi[k] = box.hi[k];
     const double n = std::max(1.0, std::round((g.hi[k] - g.lo[k]) / size));
-    all *= n;
     g.n[k] = uint32_t(std::min(n, 1.0 * kMostCells));
     g.edge[k] = (g.hi[k] - g.lo[k]) / n;
   }
@@ -254,6 +263,78 @@ size_t fullest(const Lattice &l, size_t cell, bool faces) {
   return best;
 }
 
+// Kept cells that faces join, each with the lowest number of its cells.
+class Joined {
+ public:
+  explicit Joined(const Lattice &l) : l_(l), up_(l.grid.size()) {
+    for (size_t c = 0; c < up_.size(); ++c) up_[c] = uint32_t(c);
+    for (size_t c = 0; c < up_.size(); ++c)
+      if (kept(c)) join_faces(c);
+  }
+  bool kept(size_t c) const { return l_.root[c] == c; }
+  uint32_t of(size_t c) {
+    while (up_[c] != c) c = up_[c] = up_[up_[c]];
+    return uint32_t(c);
+  }
+  void join_faces(size_t c) {
+    uint32_t at[3];
+    l_.grid.place(c, at);
+    for (int face = 0; face < 6; ++face) {
+      uint32_t to[3] = {at[0], at[1], at[2]};
+      to[face / 2] += face % 2 ? 1 : UINT32_MAX;
+      if (to[face / 2] >= l_.grid.n[face / 2]) continue;
+      const size_t other = l_.grid.number(to[0], to[1], to[2]);
+      if (kept(other)) up_[std::max(of(c), of(other))] = std::min(of(c), of(other));
+    }
+  }
+  // Whether kept cells meet at a corner of this one and are of more than one piece.
+  bool at_hinge(size_t c) {
+    uint32_t at[3];
+    l_.grid.place(c, at);
+    for (uint32_t corner = 0; corner < 8; ++corner) {
+      uint32_t piece = UINT32_MAX;
+      for (uint32_t n = 0; n < 8; ++n) {
+        uint32_t to[3];
+        bool within = true;
+        for (uint32_t k = 0; k < 3; ++k) {
+          to[k] = at[k] + (corner >> k & 1) - (n >> k & 1);
+          within = within && to[k] < l_.grid.n[k];
+        }
+        const size_t other = within ? l_.grid.number(to[0], to[1], to[2]) : c;
+        if (other == c || !kept(other)) continue;
+        if (piece != UINT32_MAX && of(other) != piece) return true;
+        piece = of(other);
+      }
+    }
+    return false;
+  }
+
+ private:
+  const Lattice &l_;
+  std::vector<uint32_t> up_;
+};
+
+// Keeps cells that were to be left out, those with most material first, until none is left at a hinge.
+void keep_hinges(Lattice &l) {
+  Joined pieces(l);
+  for (bool more = true; more;) {
+    std::vector<uint32_t> found;
+    for (size_t c = 0; c < l.grid.size(); ++c)
+      if (l.root[c] != UINT32_MAX && !pieces.kept(c) && pieces.at_hinge(c)) found.push_back(uint32_t(c));
+    std::ranges::sort(found, [&](uint32_t a, uint32_t b) {
+      return l.part(a) != l.part(b) ? l.part(a) > l.part(b) : a < b;
+    });
+    more = false;
+    for (const uint32_t c : found) {
+      if (!pieces.at_hinge(c)) continue;
+      l.root[c] = c;
+      ++l.kept;
+      pieces.join_faces(c);
+      more = true;
+    }
+  }
+}
+
 void give_away(Lattice &l) {
   for (size_t c = 0; c < l.grid.size(); ++c) {
     if (!(l.part(c) > kNothing)) continue;
@@ -264,6 +345,7 @@ void give_away(Lattice &l) {
     }
     l.kept += l.root[c] == c;
   }
+  keep_hinges(l);
   // each step leads to a fuller cell
   for (size_t c = 0; c < l.grid.size(); ++c)
     while (l.root[c] != UINT32_MAX && l.root[l.root[c]] != l.root[c]) l.root[c] = l.root[l.root[c]];
@@ -299,8 +381,14 @@ Lattice lay(const TriMesh &surface, const Grid &grid) {
 Lattice seek(const TriMesh &surface, const Extent &box, double volume, uint32_t cells) {
   Lattice best;
   double size = std::cbrt(volume / cells), apart = HUGE_VAL;
+  uint32_t before[3] = {};
   for (int tries = 0; tries < kTries && apart > 0; ++tries) {
-    Lattice now = lay(surface, grid_of(box, std::min(size, box.longest())));
+    // of a thin shape that lies askew most of the box is empty
+    while (cells_in(box, size) > kMostCells) size *= 1.1;
+    const Grid grid = grid_of(box, std::min(size, box.longest()));
+    if (std::equal(grid.n, grid.n + 3, before)) break;
+    std::copy_n(grid.n, 3, before);
+    Lattice now = lay(surface, grid);
     const double ratio = double(now.kept) / cells, off = std::fabs(std::log(ratio));
     size *= std::cbrt(ratio);
     if (!(off < apart)) continue;

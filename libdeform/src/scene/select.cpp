@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "body/coupling.h"
 #include "core/error.h"
 #include "core/names.h"
 #include "math/vec3.h"
@@ -48,6 +49,7 @@ namespace {
 // of the body's diagonal: points that lie on a face of the box by the author's reckoning may miss
 // it by rounding
 constexpr double kSlack = 1e-9;
+constexpr double kNoWeight = 1e-9;  // of a point beside the face on which another one lies
 
 bool in_box(const Selection &where, const BodyMesh &mesh, const double *p) {
   const double slack = kSlack * mesh.size;
@@ -90,16 +92,34 @@ std::vector<uint32_t> skin_triangles(const Selection &where, const BodyMesh &mes
   return out;
 }
 
-// Marks the corners of the cells that hold the skin's marked points, or of the face or edge on which one
-// lies.
+// f(point, weight) for those that a point of the skin follows, as in the body's coupling.
+template <class F>
+void each_point_of(const BodyMesh &mesh, uint32_t s, F f) {
+  if (mesh.nodes && mesh.cell == DFM_CELL_HEX8) {
+    if (!mesh.rows) {
+      const CouplingInput in{mesh.npoint,        mesh.ntet, mesh.skin.npoint,
+                             mesh.points.data(), mesh.tets, mesh.skin.points.data(),
+                             mesh.nodes};
+      mesh.rows = std::make_shared<const Coupling>(couple_barycentric(Memory::standard(), in));
+    }
+    for (uint32_t k = mesh.rows->row[s]; k < mesh.rows->row[s + 1]; ++k)
+      f(mesh.rows->col[k], mesh.rows->weight[k]);
+    return;
+  }
+  uint32_t corners[4];
+  double weights[4];
+  locate(mesh, &mesh.skin.points[3 * size_t(s)], corners, weights);
+  for (int k = 0; k < 4; ++k) f(corners[k], weights[k]);
+}
+
+// Marks the points that the skin's marked ones follow: the corners of their cells, or of the face or edge on
+// which one lies.
 void mark_cells(const std::vector<uint8_t> &surfel, const BodyMesh &mesh, std::vector<uint8_t> &point) {
   for (uint32_t s = 0; s < mesh.skin.npoint; ++s) {
     if (!surfel[s]) continue;
-    uint32_t corners[4];
-    double weights[4];
-    locate(mesh, &mesh.skin.points[3 * size_t(s)], corners, weights);
-    for (int k = 0; k < 4; ++k)
-      if (std::fabs(weights[k]) > kSlack) point[corners[k]] = 1;
+    each_point_of(mesh, s, [&](uint32_t p, double weight) {
+      if (std::fabs(weight) > kNoWeight) point[p] = 1;
+    });
   }
 }
 
@@ -252,13 +272,10 @@ Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mes
   }
   for (uint32_t s = 0; s < skin.npoint; ++s) {
     if (!(surfel[s] > 0)) continue;
-    uint32_t corners[4];
-    double weights[4];
-    locate(mesh, &skin.points[3 * size_t(s)], corners, weights);
-    for (int k = 0; k < 4; ++k) {
-      point[corners[k]] += weights[k] * surfel[s];
-      touched[corners[k]] = 1;
-    }
+    each_point_of(mesh, s, [&](uint32_t p, double weight) {
+      point[p] += weight * surfel[s];
+      touched[p] = 1;
+    });
   }
   Shared out;
   for (uint32_t i : marked(touched)) {

@@ -7,6 +7,10 @@
 #include "scene/defs.h"
 #include "scene/locate.h"
 
+namespace dfm {
+struct Coupling;
+}
+
 namespace dfm::scene {
 
 // A surface that was given as such: that of a filled body, or one of its own over cells.
@@ -35,7 +39,8 @@ struct BodyMesh {
   // [ntet] mass per volume of each cell relative to the others; empty: the same
   std::vector<double> cell_weight;
   double lo[3] = {}, hi[3] = {}, size = 0;         // of the scaled points; size: diagonal
-  mutable std::shared_ptr<const Locator> locator;  // made at first use
+  mutable std::shared_ptr<const Locator> locator;  // made at first use, as the next one
+  mutable std::shared_ptr<const Coupling> rows;    // of the skin, on hexahedra
 
   double share_of(uint32_t tet) const;  // of its volume, that is material
 };
