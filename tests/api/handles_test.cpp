@@ -38,6 +38,7 @@ std::vector<Call> world_calls() {
       {"world_step", [](uint64_t h) { return dfm_world_step(h, 1e-3, nullptr); }},
       {"world_stable_step", [](uint64_t h) { return dfm_world_stable_step(h, numbers, nullptr, nullptr); }},
       {"world_snapshot", [](uint64_t h) { return dfm_world_snapshot(h, nullptr, &bytes); }},
+      {"world_stream", [](uint64_t h) { return dfm_world_stream(h, nullptr, nullptr, &bytes); }},
       {"world_restore", [](uint64_t h) { return dfm_world_restore(h, numbers, sizeof numbers); }},
       {"world_find_body", [](uint64_t h) { return dfm_world_find_body(h, "lower", &made); }},
       {"world_bodies", [](uint64_t h) { return dfm_world_bodies(h, 0, nullptr, &count); }},
