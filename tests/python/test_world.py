@@ -36,6 +36,23 @@ class Building(unittest.TestCase):
             self.assertAlmostEqual(world.time, 1.0)
             self.assertEqual(world.stats.steps, 120)
 
+    def test_stream_has_the_surface(self):
+        sys.path.insert(0, str(pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples"))
+        from stream_receiver import Scene  # what others would receive
+        with deform.World(integrator="implicit_euler") as world:
+            world.add_obstacle("plane", name="floor")
+            body = ball(world, name="ball")
+            world.run(0.05, dt=0.01)
+            seen = Scene()
+            seen.read(world.stream(scene=True))
+            self.assertTrue(seen.read(world.stream(contacts=True, frame=3, packet=1200)))
+            received, = seen.bodies.values()
+            self.assertEqual((received.name, seen.frame), ("ball", 3))
+            self.assertLess(np.abs(np.reshape(received.x, (-1, 3)) - body.positions).max(), 1e-7)
+            self.assertTrue(seen.contacts)
+            with self.assertRaisesRegex(deform.ArgumentError, "at least 256"):
+                world.stream(packet=10)
+
     def test_mass_scaling_is_told(self):
         with deform.World() as world:
             self.assertEqual(ball(world, mass_scaling=0.02).mass_scaled, (0, 0))  # no point is light

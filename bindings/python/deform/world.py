@@ -712,6 +712,22 @@ class World(Queries, Reports, Tools, OfThisProcess):
         check(quick.dfm_world_snapshot(self.handle, buffer, ctypes.byref(size)))
         return buffer.raw[:size.value]
 
+    def stream(self, scene: bool = False, contacts: bool = False, frame: int = 0, packet: int = 0) -> bytes:
+        """The present state as packets for viewers elsewhere, one behind the other (dfm_world_stream).
+
+        scene: names, triangles and shapes in place of a frame. contacts: with those of the last sub-step.
+        frame: number that the packets carry. packet: bytes that none exceeds, 0 for one packet."""
+        self.free()
+        given = default(_abi.dfm_stream_def)
+        given.kind = _abi.DFM_STREAM_SCENE if scene else _abi.DFM_STREAM_FRAME
+        given.flags = _abi.DFM_STREAM_CONTACTS if contacts and not scene else 0
+        given.frame, given.packet = whole(frame, "frame"), whole(packet, "packet")
+        size = ctypes.c_size_t(0)
+        check(quick.dfm_world_stream(self.handle, ctypes.byref(given), None, ctypes.byref(size)))
+        buffer = ctypes.create_string_buffer(size.value)
+        check(quick.dfm_world_stream(self.handle, ctypes.byref(given), buffer, ctypes.byref(size)))
+        return buffer.raw[:size.value]
+
     def restore(self, snapshot: Any) -> None:
         """Back to a snapshot (bytes, or any buffer of bytes) of this world, or of one with the same contents:
         the next steps give the same bits. Contents are found by their names, or by their order where they

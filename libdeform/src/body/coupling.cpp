@@ -187,7 +187,7 @@ bool RestCells::hexahedra(Vec3 x, uint32_t nearest, double away, Array<RowEntry>
   std::vector<uint32_t> found;
   tree_.near(x, far2, [&](uint32_t t) { found.push_back(t / tets); });
   std::ranges::sort(found);
-  found.erase(std::ranges::unique(found).begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
   for (const uint32_t hexahedron : found) {
     corners(hexahedron);
     if (!hexahedron_weights(x, of, at, w)) continue;

@@ -273,9 +273,10 @@ void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
       DFM_LOG_WARNING,
       "body '%s' is drawn and touches with the %u triangles around its %u cells, in steps of about "
       "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
-      "\"boundary\", as a body that is cut needs it; more cells (\"fill\") make smaller steps",
-      b.name.c_str(), cells.ntriangle, cells.ntet, b.scale * cells.edge_median,
-      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.mesh.c_str());
+      "\"boundary\"%s make smaller steps",
+      b.name.c_str(), cells.ntriangle, mesh.inside ? cells.ncell : cells.ntet, b.scale * cells.edge_median,
+      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.mesh.c_str(),
+      mesh.inside ? "; more cells (\"lattice\")" : ", as a body that is cut needs it; more cells (\"fill\")");
 }
 
 void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
