@@ -4,6 +4,7 @@
 
 #include "support.h"
 #include "world.h"
+#include "written.h"
 
 namespace {
 
@@ -202,21 +203,9 @@ constexpr const char *kScene = R"({"format": "deform-scene", "version": 1,
 TEST(CellWorlds, Scene_MakesThemAndAWrittenSceneHasThem) {
   test::Context context;
   const std::string folder = test::scratch("cell_scene"), path = folder + "/scene.json";
-  test::write_file(path, kScene);
-  dfm_world world = 0, again = 0;
-  DFM_OK_OR_DIE(dfm_scene_load(context, path.c_str(), &world));
-  test::run(world, 0.02, 0.01);
-  const std::string copy = folder + "/copy.json";
-  DFM_OK_OR_DIE(dfm_world_write_scene(world, copy.c_str(), nullptr, nullptr));
-  DFM_OK_OR_DIE(dfm_scene_load(context, copy.c_str(), &again));
-  for (const char *name : {"second", "bricks"}) {
-    dfm_body a = 0, b = 0;
-    test::ok(dfm_world_find_body(world, name, &a));
-    test::ok(dfm_world_find_body(again, name, &b));
-    const dfm_body_measure m = test::measure(a), n = test::measure(b);
-    EXPECT_GT(m.elastic, 0);
-    EXPECT_NEAR(n.elastic / m.elastic, 1, 1e-9) << name;
-  }
+  const test::Written both(context, folder, kScene);
+  for (const char *name : {"second", "bricks"}) both.same(name);
+  dfm_world world = 0;
   std::string wrong = kScene;
   wrong.replace(wrong.find("\"beam\""), 6, "\"bricks\"");
   test::write_file(path, wrong);
