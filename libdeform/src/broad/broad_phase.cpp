@@ -17,7 +17,7 @@ constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faste
 // Beside a surface that is this many times finer, its edges count: its own skin is used up so soon that the
 // pair is listed again in nearly every sub-step, each time with all that lies in the skin of the coarse one.
 constexpr double kMuchFiner = 4;
-constexpr double kWide = 2;  // times the margin that a list would have now: it is made again
+constexpr double kWide = 2;  // times the margin that was needed since: the list is made again
 // factor by which speeds may increase before the margin of the reach is used up
 constexpr double kSpeedGrowth = 1.25;
 
@@ -105,6 +105,7 @@ bool BroadPhase::cover(std::span<const BodyView> bodies, std::span<const Obstacl
   bool any = false;
   for (size_t i = 0; i < bodies_.size(); ++i) {
     Body &b = bodies_[i];
+    b.needed = std::max(b.needed, kRounding * (2 * offset + kSpeedGrowth * h * speed[i]));
     if (!b.usable || kRounding * (b.moved + offset + h * speed[i]) <= b.margin) continue;
     b.dirty = any = true;
     b.expected = speed[i];
@@ -178,6 +179,15 @@ void BroadPhase::match(const Now &now) {
   }
 }
 
+// A list for a faster motion holds more than the present one needs, for ever where a body comes to rest.
+// needed: m, the margin that a list would have now.
+bool BroadPhase::too_wide(Side &side, double needed) const {
+  side.needed = std::max(side.needed, needed);
+  if (++side.age <= skin_steps_) return false;
+  side.age = 0;
+  return kWide * std::exchange(side.needed, 0) < side.margin;
+}
+
 void BroadPhase::look(Body &b, bool asleep, const Now &now) {
   const bool stays = b.asleep && asleep;
   b.asleep = asleep;
@@ -185,10 +195,7 @@ void BroadPhase::look(Body &b, bool asleep, const Now &now) {
   if (b.dirty || stays) return;
   b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
   b.speed = largest_speed(*b.surface);
-  // a list for a faster motion holds more than the present one needs, for ever if the body comes to rest
-  const bool wide = ++b.age > skin_steps_ &&
-                    kWide * (reach(b, now) + std::min(skin(b, now), b.skin_most)) < b.margin;
-  b.dirty = wide || b.skin > b.skin_most ||
+  b.dirty = too_wide(b, reach(b, now) + std::min(skin(b, now), b.skin_most)) || b.skin > b.skin_most ||
             !(kRounding * (b.moved + reach_share(now.h, now.offset, b.speed)) <= b.margin);
 }
 
@@ -202,7 +209,9 @@ bool BroadPhase::find_dirty(const Now &now) {
   for (const Body &b : bodies_) any |= b.dirty;
   for (size_t o = 0; o < things_.size(); ++o) {
     Thing &t = things_[o];
-    t.dirty = t.dirty || t.skin > t.skin_most || !holds(t, now.obstacles[o], now);
+    double alone;
+    const double needed = reach(t, now.obstacles[o], now, alone) + std::min(alone, t.skin_most);
+    t.dirty = too_wide(t, needed) || t.dirty || t.skin > t.skin_most || !holds(t, now.obstacles[o], now);
     any |= things_[o].dirty;
   }
   return any;
@@ -237,16 +246,26 @@ bool BroadPhase::renew_tree(Side &side) {
   return true;
 }
 
+// m, of the margin of a list made now; skin: m, out, that it would have alone beside it.
+double BroadPhase::reach(const Thing &t, const ObstacleView &view, const Now &now, double &skin) const {
+  const double extent =
+      view.shape == Shape::plane ? norm(center_ - view.position) + radius_ : ObstacleShape(view).extent();
+  const double speed = obstacle_speed(view, extent);
+  skin = skin_steps_ * now.h * speed;
+  return kRounding * reach_share(now.h, now.offset, kSpeedGrowth * speed) + now.offset;
+}
+
 void BroadPhase::renew_thing(Thing &t, const ObstacleView &view, const Now &now) {
   t.view = view;
   if (t.surface) renew_tree(t);
-  const double extent =
-      view.shape == Shape::plane ? norm(center_ - view.position) + radius_ : ObstacleShape(view).extent();
-  const double speed = t.speed = obstacle_speed(view, extent), alone = skin_steps_ * now.h * speed;
-  const double reach = kRounding * reach_share(now.h, now.offset, kSpeedGrowth * speed) + now.offset;
+  double alone;
+  const double needed = reach(t, view, now, alone);
+  t.speed = alone / (skin_steps_ * now.h);
   t.skin = std::min(alone, t.skin_most);
-  t.margin = reach + kRounding * t.skin;
-  t.margin_most = reach + kRounding * alone;
+  t.margin = needed + kRounding * t.skin;
+  t.margin_most = needed + kRounding * alone;
+  t.age = 0;
+  t.needed = 0;
 }
 
 // m, of the margin of a list made now: what contacts need, and beside it the skin, which lasts for
@@ -269,6 +288,7 @@ void BroadPhase::renew_body(Body &body, const Now &now) {
   body.margin_most = needed + alone;
   body.moved = 0;
   body.age = 0;
+  body.needed = 0;
 }
 
 // Two surfaces whose lists may meet with the skins that they would have alone: a skin that has become thin

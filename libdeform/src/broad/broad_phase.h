@@ -86,7 +86,9 @@ class BroadPhase {
     double skin = 0, skin_most = HUGE_VAL, margin_most = 0;
     bool dirty = true, usable = false;  // usable: all positions finite
     bool asleep = false;                // at the last update; unchanged positions if it still sleeps
-    uint32_t age = 0;                   // updates since the lists were made
+    // updates since the margin was last compared with what they needed; the most of that, m
+    uint32_t age = 0;
+    double needed = 0;
     uint32_t refits = 0, rebuilds = 0;  // of the tree, not in stats_ yet
     BoxTree tree;
     Array<double> x;  // [nsurfel,4] when the lists were made
@@ -144,6 +146,8 @@ class BroadPhase {
   bool holds(const Thing &thing, const ObstacleView &view, const Now &now, double times = 2) const;
   double reach(const Body &body, const Now &now) const;
   double skin(const Body &body, const Now &now) const;
+  double reach(const Thing &thing, const ObstacleView &view, const Now &now, double &skin) const;
+  bool too_wide(Side &side, double needed) const;
   bool renew_tree(Side &side);
   void renew(const Now &now);
   void renew_body(Body &body, const Now &now);

@@ -98,7 +98,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   const double before = size(), left = error();
-  failed = !find_way(false, std::clamp(set_.share * tolerance / left, 1e-8, set_.inexact));
+  failed = !find_way(false, std::clamp(set_.share * tolerance / left, 1e-8, 1e-2));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
   ++steps_;
@@ -122,7 +122,7 @@ bool ContactNewton::frozen_steps() {
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
-    if (!find_way(true, set_.inexact)) return false;
+    if (!find_way(true, 1e-2)) return false;
     const double first = slope();
     base_.assign(v_.begin(), v_.end());
     ++steps_;
@@ -195,7 +195,7 @@ bool ContactNewton::solve(double tolerance, double normal) {
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
   bool spent = false;
-  uint32_t stood = 0;
+  uint32_t slow = 0, stood = 0;
   Array<double> &before = kept_;
   for (passes_ = 0; passes_ < set_.passes;) {
     ++passes_;
@@ -205,6 +205,7 @@ bool ContactNewton::solve(double tolerance, double normal) {
     if (!newton(goal, round)) return false;
     if (round && steps_ < limit_ && passes_ < set_.passes) {
       scale_penalties(set_.softens);
+      slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
     }
@@ -236,8 +237,11 @@ bool ContactNewton::solve(double tolerance, double normal) {
       scale_penalties(set_.grows);
     }
     aim = stands ? off : now;
-    if (now > 0.5 * left) scale_penalties(set_.grows);
+    slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
+    if (slow < 3) continue;
+    slow = 0;
+    scale_penalties(set_.grows);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);

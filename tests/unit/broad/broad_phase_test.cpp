@@ -361,11 +361,14 @@ TEST(BroadPhase, RestingScene_KeepsItsLists) {
   EXPECT_EQ(broad.stats().rebuilds, 2u);
 }
 
-// Lists for a fast motion hold all triangles of both, which is too much for bodies at rest.
-TEST(BroadPhase, BodiesThatComeToRest_AreListedAgainOnce) {
+// Lists for a fast motion hold all triangles of both, which is too much for things at rest.
+TEST(BroadPhase, ThingsThatComeToRest_AreListedAgainOnce) {
   Scene scene;
   scene.add(box_mesh({1, 1, 1}, 4, 4, 4), {200, 0, 0});
   scene.add(moved(box_mesh({1, 1, 1}, 4, 4, 4), {}, {0, 0, 1.001}), {200, 0, 0});
+  ObstacleView &ball = scene.add(Shape::sphere, {0, 0, -1.101});
+  ball.radius = 0.6;
+  ball.velocity = {200, 0, 0};
   BroadPhase broad(Memory::standard()), fresh(Memory::standard());
   const auto update = [&](BroadPhase &lists) {
     lists.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
@@ -373,6 +376,7 @@ TEST(BroadPhase, BodiesThatComeToRest_AreListedAgainOnce) {
   update(broad);
   const size_t before = broad.candidates().size();
   for (auto &s : scene.surfaces) std::fill(s->v.begin(), s->v.end(), 0.0);
+  ball.velocity = {};
   for (int step = 0; step < 1000; ++step) update(broad);
   update(fresh);
   EXPECT_EQ(broad.candidates().size(), fresh.candidates().size());
