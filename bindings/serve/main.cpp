@@ -32,6 +32,8 @@ void add_serve(cli::Command app, cli::Globals &globals, int *) {
   sub.option("SCENE", options->scene, "scene file (JSON)").required();
   sub.option("--port", *port, "of 127.0.0.1 (a free one)").type_name("N");
   sub.option("--token", options->token, "what the URL has to say (a new one each time)").type_name("TEXT");
+  sub.option("--stream", options->stream, "to there too, for `deform view` with the token")
+      .type_name("rtp://ADDRESS:PORT");
   sub.option("--rate", options->rate, "pictures a second").with_default().positive();
   sub.option("--set", options->set, "change a value of the scene")
       .type_name("/json/pointer=value")

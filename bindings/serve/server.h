@@ -35,6 +35,10 @@ class Server {
   void show_frame(Bytes frame);  // a viewer that is slow gets the newest one alone
   void show_state(std::string json);
   std::vector<Request> take();
+  // A viewer by another transport, which has its place among those of control. 0: there are too many.
+  uint32_t join();
+  void leave(uint32_t viewer);
+  void hear(uint32_t viewer, const std::string &text);
   bool works() const;  // false: the network has failed
   uint32_t viewers() const;
   uint32_t in_control() const;  // number of that viewer; 0: there is none
@@ -53,7 +57,6 @@ class Server {
   void serve();
   bool allowed(lws *wsi) const;
   void joins(Viewer &viewer, lws *wsi);
-  void leaves(Viewer &viewer);
   bool hears(Viewer &viewer, const char *text, size_t n, bool ends);  // false: the viewer is to go
   bool writes(Viewer &viewer, lws *wsi);
   Message next_for(Viewer &viewer, bool &text);

@@ -52,6 +52,13 @@ std::string as_utf8(std::string text) {
   return text;
 }
 
+std::string text_of(const live::Slider &s) {
+  cli::JsonObject out;
+  out.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label));
+  out.add("value", cli::number(s.value)).add("low", cli::number(s.low)).add("high", cli::number(s.high));
+  return out.add("logarithmic", yes(s.logarithmic)).text();
+}
+
 }  // namespace
 
 Session::Session(const Options &options, const cli::Globals &globals)
@@ -64,16 +71,19 @@ Session::Session(const Options &options, const cli::Globals &globals)
       server_(options.port, options.token),
       running_(!options.paused) {
   cli::refuse_static(scene_, "serve");
+  if (!options.stream.empty()) stream_.emplace(scene_, options.stream, options.token);
 }
 
 void Session::run() {
   cli::catch_signals();
   cli::stepping = scene_.world();
   std::printf("http://127.0.0.1:%u/?token=%s\n", unsigned{server_.port()}, options_.token.c_str());
+  if (stream_) std::printf("deform view %s?token=%s\n", options_.stream.c_str(), options_.token.c_str());
   std::fflush(stdout);
   const std::chrono::duration<double> picture(1 / options_.rate);
   const Clock::time_point began = Clock::now();
   for (Clock::time_point next = began; !cli::interrupted() && server_.works();) {
+    hear_stream();
     for (const Request &request : server_.take()) act(request);
     attempt([&] {
       if (pull_.holds() && server_.in_control() != holder_) pull_.release();
@@ -82,6 +92,7 @@ void Session::run() {
     attempt([&] {
       scene_.renew_list();
       if (server_.viewers() > 0) show();
+      show_stream();
     });
     next += std::chrono::duration_cast<Clock::duration>(picture);
     next = std::max(next, Clock::now());
@@ -89,6 +100,7 @@ void Session::run() {
     if (options_.seconds > 0 && std::chrono::duration<double>(next - began).count() > options_.seconds) break;
   }
   cli::stepping = 0;
+  if (stream_) attempt([&] { stream_->end(); });
   if (cli::interrupted()) cli::came_back();
   if (!server_.works()) throw cli::Failure(cli::kStopped, "serve: the network has failed; start it again");
 }
@@ -216,27 +228,48 @@ void Session::show_scene(cli::Shapes shapes) {
 void Session::show() {
   Bytes frame = packets(DFM_STREAM_FRAME);
   show_scene(cli::shapes_in(frame));
-  server_.show_state(state());
+  server_.show_state(whole_state());
   server_.show_frame(std::move(frame));
   ++frame_;
 }
 
-std::string Session::state() const {
-  std::vector<std::string> sliders, probes;
-  for (const live::Slider &s : sliders_) {
-    cli::JsonObject one;
-    one.add("name", cli::quoted(s.name))
-        .add("label", cli::quoted(s.label))
-        .add("value", cli::number(s.value));
-    one.add("low", cli::number(s.low)).add("high", cli::number(s.high));
-    sliders.push_back(one.add("logarithmic", yes(s.logarithmic)).text());
+// Who steers by RTP is a viewer like any other.
+void Session::hear_stream() {
+  if (!stream_) return;
+  const std::vector<std::string> requests = stream_->take();
+  if (stream_->steered() != (at_stream_ != 0)) {
+    if (at_stream_) server_.leave(at_stream_);
+    at_stream_ = at_stream_ ? 0 : server_.join();
   }
+  for (const std::string &text : requests) server_.hear(at_stream_, text);
+}
+
+// A datagram has room for one slider.
+void Session::show_stream() {
+  if (!stream_) return;
+  stream_->show();
+  if (!at_stream_) return;
+  cli::JsonObject out = state();
+  out.add("you", std::to_string(at_stream_));
+  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[told_++ % sliders_.size()])}));
+  stream_->tell(as_utf8(out.text()));
+}
+
+std::string Session::whole_state() const {
+  std::vector<std::string> sliders, probes;
+  for (const live::Slider &s : sliders_) sliders.push_back(text_of(s));
   for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) {
     const char *name = nullptr;
     double at[3];
     cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
     probes.push_back(cli::JsonObject().add("name", cli::quoted(name)).add("at", cli::json_vector(at)).text());
   }
+  cli::JsonObject out = state();
+  out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
+  return as_utf8(out.text());
+}
+
+cli::JsonObject Session::state() const {
   double up[3];
   upright_.at(dfm_world_time(scene_.world()), up);
   cli::JsonObject out;
@@ -249,9 +282,7 @@ std::string Session::state() const {
       .add("real", cli::number(real_))
       .add("control", std::to_string(server_.in_control()))
       .add("viewers", std::to_string(server_.viewers()))
-      .add("up", cli::json_vector(up))
-      .add("sliders", cli::json_array(sliders))
-      .add("probes", cli::json_array(probes));
+      .add("up", cli::json_vector(up));
   const dfm_scene_settings &settings = scene_.settings();
   if (settings.has_camera)
     out.add("eye", cli::json_vector(settings.eye)).add("look_at", cli::json_vector(settings.look_at));
@@ -260,7 +291,7 @@ std::string Session::state() const {
     pull.add("place", live::text_of(pull_.place())).add("to", live::text_of(pull_.to()));
     out.add("pull", pull.add("force", cli::number(pull_.force())).text());
   }
-  return as_utf8(out.text());
+  return out;
 }
 
 }  // namespace serve

@@ -2,10 +2,12 @@
 #pragma once
 #include <chrono>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "cli/packets.h"
+#include "cli/rtp.h"
 #include "cli/upright.h"
 #include "live/pull.h"
 #include "live/sliders.h"
@@ -14,7 +16,7 @@
 namespace serve {
 
 struct Options {
-  std::string scene, token;
+  std::string scene, token, stream;  // stream: "rtp://ADDRESS:PORT"; empty: by WebSocket alone
   std::vector<std::string> set;
   uint16_t port = 0;    // 0: a free one
   double rate = 30;     // pictures a second
@@ -37,7 +39,10 @@ class Session {
   void advance(double seconds);
   void show();
   void show_scene(cli::Shapes shapes);
-  std::string state() const;
+  void hear_stream();
+  void show_stream();
+  cli::JsonObject state() const;  // without sliders and probes
+  std::string whole_state() const;
   Bytes packets(uint32_t kind, dfm_body body = 0);
 
   const Options &options_;
@@ -47,7 +52,10 @@ class Session {
   std::vector<live::Slider> sliders_;
   cli::Upright upright_;
   Server server_;
-  cli::Shapes shown_;  // bodies that viewers have
+  std::optional<cli::RtpSender> stream_;
+  uint32_t at_stream_ = 0;  // number of the viewer there; 0: none steers
+  size_t told_ = 0;         // the slider of which it is told next
+  cli::Shapes shown_;       // bodies that viewers have
   Bytes buffer_;
   bool running_, scene_due_ = true;
   double wanted_ = 0, real_ = 0;  // s; simulated seconds per second, smoothed
