@@ -1,29 +1,16 @@
 // deform-serve, which `deform serve` starts: a scene in a browser on this machine.
 #include <cmath>
-#include <cstdio>
 #include <memory>
-#include <random>
 
 #include "cli/arguments.h"
 #include "cli/become.h"
 #include "cli/cli.h"
 #include "cli/messages.h"
 #include "session.h"
+#include "token.h"
 
 namespace serve {
 namespace {
-
-// 128 bits from the system.
-std::string new_token() {
-  std::random_device system;
-  std::string out;
-  for (int i = 0; i < 4; ++i) {
-    char text[16];
-    std::snprintf(text, sizeof text, "%08x", unsigned{system()});
-    out += text;
-  }
-  return out;
-}
 
 void add_serve(cli::Command app, cli::Globals &globals, int *) {
   const auto options = std::make_shared<Options>();
