@@ -4,7 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <deque>
+#include <map>
 #include <random>
+#include <utility>
 
 #include "stack.h"
 
@@ -12,12 +17,12 @@ namespace {
 
 using Packet = std::vector<unsigned char>;
 
-std::vector<Packet> stream(dfm_world w, uint32_t kind, uint32_t frame, uint32_t flags = 0,
-                           dfm_body body = 0) {
+std::vector<Packet> stream(dfm_world w, uint32_t kind, uint32_t frame, uint32_t flags = 0, dfm_body body = 0,
+                           uint32_t packet = 300) {
   dfm_stream_def d = dfm_stream_def_default();
   d.kind = kind;
   d.flags = flags;
-  d.packet = 300;
+  d.packet = packet;
   d.frame = frame;
   d.body = body;
   size_t n = 0;
@@ -37,15 +42,37 @@ bool read(live::Received &r, const std::vector<Packet> &packets) {
   return std::ranges::all_of(packets, [&](const Packet &p) { return r.read(p.data(), p.size()); });
 }
 
+std::vector<double> positions(dfm_body b) {
+  uint32_t n = 0;
+  test::ok(dfm_surface_positions(b, 0, nullptr, &n));
+  std::vector<double> x(3 * size_t{n});
+  test::ok(dfm_surface_positions(b, n, x.data(), &n));
+  return x;
+}
+
+// Of a body, as LIST tells it; 0: none does.
+uint32_t shape_in(const std::vector<Packet> &frame, uint32_t body) {
+  for (const Packet &p : frame)
+    for (size_t at = 32, size = 0; at < p.size(); at += 8 + size) {
+      const auto word = [&](size_t i) {
+        uint32_t x = 0;
+        std::memcpy(&x, &p[i], sizeof x);
+        return x;
+      };
+      size = word(at + 4);
+      for (size_t i = at + 8; std::memcmp(&p[at], "LIST", 4) == 0 && i < at + 8 + size; i += 8)
+        if (word(i) == body) return word(i + 4);
+    }
+  return 0;
+}
+
 void compare(const live::Received &r, dfm_body b, double within) {
   SCOPED_TRACE(testing::Message() << "body " << uint32_t(b));
   ASSERT_TRUE(r.present(uint32_t(b)));
   const live::Received::Mesh *const m = r.bodies().at(uint32_t(b)).drawn();
   ASSERT_TRUE(m);
-  uint32_t n = 0, nt = 0;
-  test::ok(dfm_surface_positions(b, 0, nullptr, &n));
-  std::vector<double> x(3 * size_t{n});
-  test::ok(dfm_surface_positions(b, n, x.data(), &n));
+  const std::vector<double> x = positions(b);
+  uint32_t nt = 0;
   test::ok(dfm_surface_triangles(b, 0, nullptr, &nt));
   std::vector<uint32_t> tri(3 * size_t{nt});
   test::ok(dfm_surface_triangles(b, nt, tri.data(), &nt));
@@ -134,6 +161,104 @@ TEST(Received, CutBody_IsDrawnAsItWasUntilTheNewOneIsComplete) {
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 2)));
   compare(r, s.upper, kWithin);
   compare(r, s.lower, kWithin);
+}
+
+// soak: the frames of ten minutes at 30 Hz, sent as `deform run --stream` does: each second everything again,
+// at once what a cut changes. 5 % are lost, 2 % come twice, 5 % come with the next frame. A point is nowhere
+// where it never was, and in a frame that came as a whole all are where they are now.
+TEST(Received, TenMinutesOfLoss_LeaveNoMoreThanOlderPoints) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  size_t n = 0;
+  test::ok(dfm_world_snapshot(s.world, nullptr, &n));
+  std::vector<char> first(n);
+  test::ok(dfm_world_snapshot(s.world, first.data(), &n));
+  std::mt19937 dice(3);
+  const auto chance = [&](double share) { return std::uniform_real_distribution<>(0, 1)(dice) < share; };
+  live::Received r;
+  std::map<uint32_t, uint32_t> shapes;
+  std::map<uint32_t, std::deque<std::vector<double>>> places;  // of the last frames with these triangles
+  std::map<uint32_t, double> ranges;                           // m, of displacements since then
+  std::vector<Packet> late;
+  size_t cuts = 0, packets = 0, lost = 0, points = 0, newest = 0, oldest = 0, waits = 0;
+  for (uint32_t frame = 0; frame < 600 * 30; ++frame) {
+    test::run(s.world, 2e-3, 2e-3);
+    if (frame % 60 == 30) {
+      dfm_cut_def cut = dfm_cut_def_default();
+      cut.shape = DFM_CUT_PLANE;
+      cut.how = DFM_CUT_SPLIT;
+      const dfm_body body = frame % 120 == 30 ? s.upper : s.lower;
+      dfm_body_measure m = {};
+      m.size = sizeof m;
+      test::ok(dfm_body_get_measure(body, &m));
+      std::copy_n(m.com, 3, cut.blade);
+      for (int k = 3; k < 6; ++k) cut.blade[k] = std::uniform_real_distribution<>(-1, 1)(dice);
+      test::ok(dfm_body_cut(body, &cut, nullptr));
+      ++cuts;
+    }
+    if (frame % 300 == 299) test::ok(dfm_world_restore(s.world, first.data(), first.size()));
+    std::vector<Packet> sent = stream(s.world, DFM_STREAM_FRAME, frame, 0, 0, 1188);
+    std::vector<Packet> way = std::exchange(late, {});
+    const auto add = [&](const std::vector<Packet> &more) {
+      sent.insert(sent.begin(), more.begin(), more.end());
+    };
+    for (const dfm_body body : test::listed(dfm_world_bodies, s.world)) {
+      const uint32_t shape = shape_in(sent, uint32_t(body));
+      if (shapes[uint32_t(body)] == shape) continue;
+      shapes[uint32_t(body)] = shape;
+      places[uint32_t(body)].clear();
+      ranges[uint32_t(body)] = 0;
+      add(stream(s.world, DFM_STREAM_SCENE, frame, 0, body, 1188));
+    }
+    if (frame % 30 == 0) add(stream(s.world, DFM_STREAM_SCENE, frame, 0, 0, 1188));
+    bool whole = true;
+    for (const Packet &p : sent) {
+      ++packets;
+      const bool gone = chance(0.05);
+      lost += gone;
+      whole = whole && !gone;
+      if (gone) continue;
+      for (int k = chance(0.02) ? 2 : 1; k > 0; --k) (chance(0.05) ? late : way).push_back(p);
+    }
+    whole = whole && late.empty();
+    std::ranges::shuffle(way, dice);
+    EXPECT_TRUE(read(r, way));
+    check(r);
+    for (const dfm_body body : test::listed(dfm_world_bodies, s.world)) {
+      const uint32_t number = uint32_t(body);
+      std::deque<std::vector<double>> &ages = places[number];
+      ages.push_front(positions(body));
+      if (ages.size() > 20) ages.pop_back();
+      const auto found = r.bodies().find(number);
+      const live::Received::Mesh *const m = found == r.bodies().end() ? nullptr : &found->second;
+      if (!m || m->missing || m->shape != shapes[number]) {  // it is told again each second
+        ++waits;
+        continue;
+      }
+      ASSERT_EQ(m->x.size(), ages.front().size());
+      const auto [low, high] = std::ranges::minmax(m->moved);
+      ranges[number] = std::max(ranges[number], high - low);
+      const double within = 3e-7 + ranges[number] / 131070;
+      for (size_t i = 0; i < m->x.size(); i += 3) {
+        size_t age = 0;
+        const auto differs = [&](size_t k) { return std::fabs(m->x[i + k] - ages[age][i + k]) > within; };
+        while (age < ages.size() && (differs(0) || differs(1) || differs(2))) ++age;
+        ASSERT_LT(age, ages.size()) << "frame " << frame << ": a place that the point never had";
+        if (whole) {
+          ASSERT_EQ(age, 0u) << "frame " << frame;
+        }
+        ++points;
+        newest += age == 0;
+        oldest = std::max(oldest, age);
+      }
+    }
+  }
+  std::printf(
+      "%zu packets, %zu lost; %zu cuts; %.1f %% of points are the newest, the oldest is of %zu frames "
+      "before; bodies waited for triangles in %zu of 36,000 cases\n",
+      packets, lost, cuts, 100.0 * double(newest) / double(points), oldest, waits);
+  EXPECT_GT(cuts, 250u);
+  EXPECT_GT(double(newest), 0.85 * double(points));
 }
 
 // A million: what a network or an enemy can send.

@@ -150,8 +150,8 @@ class Server:
         """A slider on the page: it calls apply(value), between two steps."""
         value, low, high = real(value, "value"), real(low, "low"), real(high, "high")
         if not low <= value <= high or low == high or (logarithmic and low <= 0):
-            raise ArgumentError(f"slider '{label}' from {low:g} to {high:g} at {value:g}: expected a range that "
-                                "has the value, and is positive where it is logarithmic", "DFM_E_ARG")
+            raise ArgumentError(f"slider '{label}' from {low:g} to {high:g} at {value:g}: expected a range "
+                                "that has the value, and is positive where it is logarithmic", "DFM_E_ARG")
         self._sliders.append(({"name": label, "label": label, "value": value, "low": low, "high": high,
                                "logarithmic": bool(logarithmic)}, apply))
 
