@@ -90,7 +90,8 @@ class Browser:
 
     def close(self):
         self.socket.close()
-        os.killpg(self.process.pid, signal.SIGKILL)  # Debian's command is a script, whose child is the browser
+        # Debian's command is a script, whose child is the browser
+        os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
         self.process.stderr.close()
         shutil.rmtree(self.folder, ignore_errors=True)
