@@ -1,17 +1,32 @@
 // deform-serve, which `deform serve` starts: a scene in a browser on this machine.
-#include <cmath>
+#include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <memory>
 #include <random>
+#include <thread>
 
 #include "cli/arguments.h"
 #include "cli/become.h"
 #include "cli/cli.h"
+#include "cli/interrupt.h"
+#include "cli/leaving.h"
 #include "cli/messages.h"
-#include "session.h"
+#include "cli/state_file.h"
+#include "live/session.h"
+#include "server.h"
 
 namespace serve {
 namespace {
+
+struct Options {
+  std::string scene, token;
+  std::vector<std::string> set;
+  uint16_t port = 0;    // 0: a free one
+  double rate = 30;     // pictures a second
+  bool paused = false;  // begins so
+  double seconds = 0;   // of the clock, after which it ends; 0: never
+};
 
 // 128 bits from the system.
 std::string new_token() {
@@ -23,6 +38,29 @@ std::string new_token() {
     out += text;
   }
   return out;
+}
+
+// Until a signal ends it.
+void run(const Options &options, const cli::Globals &globals) {
+  using Clock = std::chrono::steady_clock;
+  Server server(options.port, options.token);
+  live::Session session(globals, options.scene, options.set, server, !options.paused);
+  cli::catch_signals();
+  cli::stepping = session.scene().world();
+  std::printf("http://127.0.0.1:%u/?token=%s\n", unsigned{server.port()}, options.token.c_str());
+  std::fflush(stdout);
+  const std::chrono::duration<double> picture(1 / options.rate);
+  const Clock::time_point began = Clock::now();
+  for (Clock::time_point next = began; !cli::interrupted() && server.works();) {
+    session.picture(picture.count());
+    next += std::chrono::duration_cast<Clock::duration>(picture);
+    next = std::max(next, Clock::now());
+    std::this_thread::sleep_until(next);
+    if (options.seconds > 0 && std::chrono::duration<double>(next - began).count() > options.seconds) break;
+  }
+  cli::stepping = 0;
+  if (cli::interrupted()) cli::came_back();
+  if (!server.works()) throw cli::Failure(cli::kStopped, "serve: the network has failed; start it again");
 }
 
 void add_serve(cli::Command app, cli::Globals &globals, int *) {
@@ -48,7 +86,7 @@ void add_serve(cli::Command app, cli::Globals &globals, int *) {
       throw cli::Failure(cli::kBadInput, "--token: expected at most 64 letters and digits");
     options->port = static_cast<uint16_t>(*port);
     if (options->token.empty()) options->token = new_token();
-    Session(*options, globals).run();
+    run(*options, globals);
   });
 }
 
