@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""wasm_beside.py DEFORM DEFORM.js [--time T] [SCENE ...]: the shipped scenes by the command and by its build for
-WebAssembly under node, each on one thread: steps per second of both, and whether the state has the same hash at
-the end. Exit code 1 where one differs."""
+"""wasm_beside.py DEFORM DEFORM.js [SCENE ...] [--time T]: the shipped scenes by the command and by its build
+for WebAssembly under node, each on one thread: steps per second of both, and whether the state has the same
+hash at the end. Exit code 1 where one differs."""
 import argparse
 import json
 import pathlib
@@ -12,8 +12,8 @@ SCENES = pathlib.Path(__file__).resolve().parents[2] / "examples/scenes"
 
 
 def run(command, scene, time):
-    done = subprocess.run([*command, "run", scene, "--json", "--quiet", "--threads", "1", "--time", str(time)],
-                          capture_output=True, text=True)
+    options = ["--json", "--quiet", "--threads", "1", "--time", str(time)]
+    done = subprocess.run([*command, "run", scene, *options], capture_output=True, text=True)
     if done.returncode:
         raise SystemExit(f"{' '.join(command)}: {done.stderr}")
     return json.loads(done.stdout)
