@@ -100,7 +100,8 @@ void RtpReceiver::answer(const unsigned char *in, size_t n) {
 void RtpReceiver::told(const cli::JsonValue &state) {
   for (const cli::JsonValue &s : state.list("sliders")) {
     const std::string name = s.get("name");
-    auto at = std::ranges::find(sliders_, name, &Slider::name);
+    auto at =
+        std::find_if(sliders_.begin(), sliders_.end(), [&](const Slider &have) { return have.name == name; });
     if (at == sliders_.end()) {
       if (sliders_.size() >= kMostAsked) return;
       at = sliders_.insert(at, Slider{name, s.get("label"), 0, 1, 0, s.get("logarithmic") == "true"});
