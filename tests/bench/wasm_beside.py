@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""wasm_beside.py DEFORM DEFORM.js [SCENE ...] [--time T] [--runs N]: the shipped scenes by the command and by its build
-for WebAssembly under node, each on one thread: steps per second of both, and whether the state has the same
-hash at the end. Exit code 1 where one differs."""
+"""wasm_beside.py DEFORM DEFORM.js [SCENE ...] [--time T] [--runs N]: the shipped scenes by the command and by
+its build for WebAssembly under node, each on one thread: steps per second of both, and whether the state has
+the same hash at the end. Exit code 1 where one differs."""
 import argparse
 import json
 import pathlib
