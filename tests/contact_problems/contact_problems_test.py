@@ -81,8 +81,8 @@ class ContactProblems(unittest.TestCase):
 
 
 # Mean and most of a kind.
-MOST = {"explicit": {"passes": (3.4, 15), "steps": (5.46, 30), "products": (19.7, 205)},
-        "implicit": {"passes": (4.94, 36), "steps": (10.8, 194), "products": (66.5, 1562)}}
+MOST = {"explicit": {"passes": (3.2, 9), "steps": (5.46, 40), "products": (17.9, 232)},
+        "implicit": {"passes": (4.0, 20), "steps": (10.3, 178), "products": (59.7, 1441)}}
 
 if __name__ == "__main__":
     unittest.main()

@@ -17,6 +17,7 @@ constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faste
 // Beside a surface that is this many times finer, its edges count: its own skin is used up so soon that the
 // pair is listed again in nearly every sub-step, each time with all that lies in the skin of the coarse one.
 constexpr double kMuchFiner = 4;
+constexpr double kWide = 2;  // times the margin that a list would have now: it is made again
 // factor by which speeds may increase before the margin of the reach is used up
 constexpr double kSpeedGrowth = 1.25;
 
@@ -184,8 +185,11 @@ void BroadPhase::look(Body &b, bool asleep, const Now &now) {
   if (b.dirty || stays) return;
   b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
   b.speed = largest_speed(*b.surface);
-  b.dirty =
-      b.skin > b.skin_most || !(kRounding * (b.moved + reach_share(now.h, now.offset, b.speed)) <= b.margin);
+  // a list for a faster motion holds more than the present one needs, for ever if the body comes to rest
+  const bool wide = ++b.age > skin_steps_ &&
+                    kWide * (reach(b, now) + std::min(skin(b, now), b.skin_most)) < b.margin;
+  b.dirty = wide || b.skin > b.skin_most ||
+            !(kRounding * (b.moved + reach_share(now.h, now.offset, b.speed)) <= b.margin);
 }
 
 bool BroadPhase::find_dirty(const Now &now) {
@@ -245,19 +249,26 @@ void BroadPhase::renew_thing(Thing &t, const ObstacleView &view, const Now &now)
   t.margin_most = reach + kRounding * alone;
 }
 
-// The skin lasts for skin_steps_ of the present motion, a function of the state alone.
+// m, of the margin of a list made now: what contacts need, and beside it the skin, which lasts for
+// skin_steps_ of the present motion.
+double BroadPhase::reach(const Body &body, const Now &now) const {
+  return kRounding * std::max(reach_share(now.h, now.offset, kSpeedGrowth * body.speed),
+                              2 * now.offset + kSpeedGrowth * now.h * body.expected);
+}
+double BroadPhase::skin(const Body &body, const Now &now) const {
+  const double edge = body.surface->median_edge;
+  return std::clamp(skin_steps_ * now.h * body.speed, kSkinLeast * edge, kSkinMost * edge);
+}
+
 void BroadPhase::renew_body(Body &body, const Now &now) {
   if (!renew_tree(body)) return;
-  const Surface &s = *body.surface;
-  const double speed = body.speed = largest_speed(s);
-  const double alone =
-      std::clamp(skin_steps_ * now.h * speed, kSkinLeast * s.median_edge, kSkinMost * s.median_edge);
-  const double reach = kRounding * std::max(reach_share(now.h, now.offset, kSpeedGrowth * speed),
-                                            2 * now.offset + kSpeedGrowth * now.h * body.expected);
+  body.speed = largest_speed(*body.surface);
+  const double needed = reach(body, now), alone = skin(body, now);
   body.skin = std::min(alone, body.skin_most);
-  body.margin = reach + body.skin;
-  body.margin_most = reach + alone;
+  body.margin = needed + body.skin;
+  body.margin_most = needed + alone;
   body.moved = 0;
+  body.age = 0;
 }
 
 // Two surfaces whose lists may meet with the skins that they would have alone: a skin that has become thin

@@ -86,6 +86,7 @@ class BroadPhase {
     double skin = 0, skin_most = HUGE_VAL, margin_most = 0;
     bool dirty = true, usable = false;  // usable: all positions finite
     bool asleep = false;                // at the last update; unchanged positions if it still sleeps
+    uint32_t age = 0;                   // updates since the lists were made
     uint32_t refits = 0, rebuilds = 0;  // of the tree, not in stats_ yet
     BoxTree tree;
     Array<double> x;  // [nsurfel,4] when the lists were made
@@ -141,6 +142,8 @@ class BroadPhase {
   bool find_dirty(const Now &now);
   void look(Body &body, bool asleep, const Now &now);
   bool holds(const Thing &thing, const ObstacleView &view, const Now &now, double times = 2) const;
+  double reach(const Body &body, const Now &now) const;
+  double skin(const Body &body, const Now &now) const;
   bool renew_tree(Side &side);
   void renew(const Now &now);
   void renew_body(Body &body, const Now &now);

@@ -49,7 +49,7 @@ void ContactNewton::move(double share) {
 // out = (A + J' G J) in
 void ContactNewton::multiply(const double *in, double *out, bool symmetric) const {
   std::fill_n(out, size_t{3} * nodes_, 0.0);
-  for (uint32_t b = 0; b < pattern_.nb; ++b) {
+  for (const uint32_t b : at_) {
     const uint32_t i = pattern_.ij[2 * size_t{b}], j = pattern_.ij[2 * size_t{b} + 1];
     const double *const a = &matrix_[9 * size_t{b}], *const x = in + 3 * size_t{j};
     double *const y = out + 3 * size_t{i};
@@ -59,8 +59,12 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
     double *const to = out + 3 * size_t{j};
     for (size_t c = 0; c < 3; ++c) to[c] += a[c] * z[0] + a[3 + c] * z[1] + a[6 + c] * z[2];
   }
+  for (uint32_t k = single_; k < nodes_; ++k)
+    for (size_t c = 0; c < 3; ++c)
+      out[3 * size_t{k} + c] = matrix_[9 * size_t{own_[k]} + 4 * c] * in[3 * size_t{k} + c];
   for (uint32_t k = 0; k < row_.size(); ++k) {
     const double *G = &slope_[9 * size_t{k}];
+    if (std::all_of(G, G + 9, [](double g) { return g == 0; })) continue;  // most rows are open
     double s[9];
     if (symmetric) {
       symmetric_part(G, s);
@@ -94,7 +98,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   const double before = size(), left = error();
-  failed = !find_way(false, std::clamp(set_.share * tolerance / left, 1e-8, 1e-2));
+  failed = !find_way(false, std::clamp(set_.share * tolerance / left, 1e-8, set_.inexact));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
   ++steps_;
@@ -118,7 +122,7 @@ bool ContactNewton::frozen_steps() {
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
-    if (!find_way(true, 1e-2)) return false;
+    if (!find_way(true, set_.inexact)) return false;
     const double first = slope();
     base_.assign(v_.begin(), v_.end());
     ++steps_;
@@ -191,7 +195,7 @@ bool ContactNewton::solve(double tolerance, double normal) {
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
   bool spent = false;
-  uint32_t slow = 0, stood = 0;
+  uint32_t stood = 0;
   Array<double> &before = kept_;
   for (passes_ = 0; passes_ < set_.passes;) {
     ++passes_;
@@ -201,7 +205,6 @@ bool ContactNewton::solve(double tolerance, double normal) {
     if (!newton(goal, round)) return false;
     if (round && steps_ < limit_ && passes_ < set_.passes) {
       scale_penalties(set_.softens);
-      slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
     }
@@ -233,11 +236,8 @@ bool ContactNewton::solve(double tolerance, double normal) {
       scale_penalties(set_.grows);
     }
     aim = stands ? off : now;
-    slow = now > 0.5 * left ? slow + 1 : 0;
+    if (now > 0.5 * left) scale_penalties(set_.grows);
     left = now;
-    if (slow < 3) continue;
-    slow = 0;
-    scale_penalties(set_.grows);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);

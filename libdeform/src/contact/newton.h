@@ -32,7 +32,7 @@ namespace dfm {
 // Nominal values hold for all scenes that were tried; the comment says what a change trades.
 struct NewtonSettings {
   double penalty = 10;     // rho w: larger, fewer passes with more Newton steps each
-  double grows = 3;        // of rho after three passes in a row that leave more than half
+  double grows = 3;        // of rho after a pass that leaves more than half
   double softens = 0.1;    // of rho, where Newton steps of a pass go round
   uint32_t rounds = 4;     // frozen phases of a pass after which they do
   uint32_t firm = 6;       // times that rho grows before rows count as contradicting each other
@@ -41,6 +41,7 @@ struct NewtonSettings {
   uint32_t kept = 12;      // products for which a kept factor is worth more than a new one
   uint32_t products = 40;  // the limit on products of one Newton step
   double share = 0.1;      // of the tolerance of a pass that Newton steps leave; of g that a frozen one does
+  double inexact = 0.1;    // of g, that GMRES leaves at most
   double coarse = 1e-2;    // m/s, that the Newton steps of a pass leave at most
   double falls = 0.2;      // of |g|, that a full step has to take away
   double flat = 0.3;       // of the slope, that a line search may leave
@@ -103,7 +104,8 @@ class ContactNewton {
   double h_ = 0;
 
   std::vector<Body> bodies_;
-  uint32_t nodes_ = 0, points_ = 0;  // of all; those before the motions of blocks
+  // of all; the first that is a single point, and the first that is a motion of blocks
+  uint32_t nodes_ = 0, single_ = 0, points_ = 0;
   Array<uint32_t> node_of_dof_;      // kNone: a block
   Array<uint32_t> dof_of_node_;      // of single points; kNone
   ContactRows::Motions motions_;

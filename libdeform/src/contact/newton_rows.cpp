@@ -79,6 +79,7 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
     for (uint32_t k = 0; k < b.count; ++k)
       inverse_.insert(inverse_.end(), diagonal + kStride * k, diagonal + kStride * k + 3);
   }
+  single_ = nodes_;
   dof_of_node_.assign(nodes_, kNone);
   heavy_.assign(size_t{kStride} * nodes_, 0.0);
   each_dof([&](uint32_t d) {
@@ -261,7 +262,7 @@ bool ContactNewton::evaluate(bool frozen) {
   const size_t stride = s.stride;
   for (const Body &b : bodies_)
     if (!b.system->residual(&v_[size_t{kStride} * b.first], &g_[size_t{3} * b.first])) return false;
-  for (uint32_t k = bodies_.empty() ? 0 : bodies_.back().first + bodies_.back().count; k < points_; ++k)
+  for (uint32_t k = single_; k < points_; ++k)
     for (size_t c = 0; c < 3; ++c)
       g_[3 * size_t{k} + c] =
           heavy_[size_t{kStride} * k + c] *
@@ -488,13 +489,12 @@ bool ContactNewton::set_matrix() {
   std::fill(matrix_.begin(), matrix_.end(), 0.0);
   for (const Body &b : bodies_)
     if (!b.system->matrix(&at_[b.pattern], matrix_.data())) return false;
-  const uint32_t single = bodies_.empty() ? 0 : bodies_.back().first + bodies_.back().count;
-  for (uint32_t k = single; k < nodes_; ++k)
+  for (uint32_t k = single_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c) {
       const double heavy = heavy_[size_t{kStride} * k + c];
       matrix_[9 * size_t{own_[k]} + 4 * c] = k < points_ && heavy > 0 ? heavy : 1;
     }
-  for (uint32_t k = 0; k < single; ++k)
+  for (uint32_t k = 0; k < single_; ++k)
     for (size_t c = 0; c < 3; ++c) {
       double &inverse = inverse_[3 * size_t{k} + c];
       if (inverse > 0) inverse = 1 / matrix_[9 * size_t{own_[k]} + 4 * c];

@@ -57,7 +57,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
 
   BlockPattern pattern() const override { return stiffness_.pattern(); }
   double mass() const override { return moving_; }
-  const double *start() const override { return p_.v.data(); }
+  const double *start() const override { return (solved_ ? p_.v_end : p_.v).data(); }
   const double *places() const override { return p_.x.data(); }
   const double *diagonal_inverse() const override { return alone_.data(); }
   bool residual(const double *v, double *r) override;

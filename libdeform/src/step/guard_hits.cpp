@@ -233,8 +233,9 @@ void guard_ask_hits(World &w, StepContext &step) {
   });
 }
 
-// Adds hits to the contacts of the sub-step, in order; if there is a contact already, it gets the geometry of
-// the hit.
+// Adds hits to the contacts of the sub-step, in order. A contact of the start gets the geometry of the hit of
+// its features; hits of earlier rounds stay beside it: a face that may not pass an obstacle at one place
+// turns there, and hits it at another, and one row for both would be led to and fro between the two.
 void guard_add_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   choose_hits(step);
@@ -266,14 +267,14 @@ void guard_add_hits(World &w, StepContext &step) {
     const double rate = (along - target) / step.h;
     const auto same = std::find_if(step.contacts.begin(), step.contacts.end(),
                                    [&](const ContactPoint &o) { return same_features(o, c); });
-    if (same != step.contacts.end()) {
+    const auto present = same != step.contacts.end() ? kept(same->key) : g.kept.end();
+    if (present != g.kept.end() && !present->hit) {
       c.key = same->key;
       c.area = same->area;
       c.lender = same->lender;
       *same = c;
-      const auto k = kept(c.key);
-      k->rate = rate;
-      k->hit = true;
+      present->rate = rate;
+      present->hit = true;
     } else {
       c.key = free_key(w, step, c);
       step.contacts.push_back(c);

@@ -361,6 +361,25 @@ TEST(BroadPhase, RestingScene_KeepsItsLists) {
   EXPECT_EQ(broad.stats().rebuilds, 2u);
 }
 
+// Lists for a fast motion hold all triangles of both, which is too much for bodies at rest.
+TEST(BroadPhase, BodiesThatComeToRest_AreListedAgainOnce) {
+  Scene scene;
+  scene.add(box_mesh({1, 1, 1}, 4, 4, 4), {200, 0, 0});
+  scene.add(moved(box_mesh({1, 1, 1}, 4, 4, 4), {}, {0, 0, 1.001}), {200, 0, 0});
+  BroadPhase broad(Memory::standard()), fresh(Memory::standard());
+  const auto update = [&](BroadPhase &lists) {
+    lists.update(scene.bodies, scene.obstacles, scene.filter, scene.h, scene.offset);
+  };
+  update(broad);
+  const size_t before = broad.candidates().size();
+  for (auto &s : scene.surfaces) std::fill(s->v.begin(), s->v.end(), 0.0);
+  for (int step = 0; step < 1000; ++step) update(broad);
+  update(fresh);
+  EXPECT_EQ(broad.candidates().size(), fresh.candidates().size());
+  EXPECT_GT(before, 4 * broad.candidates().size());
+  EXPECT_EQ(broad.stats().renewals, 2u);
+}
+
 // A slender bar turns on a slab and bends as it goes: boxes that fitted it along an axis grow until the tree
 // is made anew. Contacts are those of lists made from nothing all the way.
 TEST(BroadPhase, TurningBar_GetsNewTreesAndTheSameContacts) {
