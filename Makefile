@@ -16,8 +16,8 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view tools bench-contact bench-peers deb docs wheel
-.PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers
+.PHONY: view tools bench-contact bench-peers deb docs wheel wasm
+.PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers setup-wasm
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -36,6 +36,7 @@ help:
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
+	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
 	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
@@ -51,12 +52,15 @@ setup-peers:
 	$(SETUP) doors peers
 setup-docs:
 	$(SETUP) docs
+setup-wasm:
+	$(SETUP) doors wasm
 setup-fuzz:
 	$(SETUP) doors clang
 
 # Configured once; ninja calls CMake again by itself where a CMake file changed.
 build/bench/build.ninja: | setup-bench
 build/fuzz/build.ninja: | setup-fuzz
+build/wasm/build.ninja: | setup-wasm
 build/%/build.ninja: | setup
 	cmake --preset $*
 
@@ -104,7 +108,7 @@ bench-peers: setup-peers build/release/build.ninja
 	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers $(PEERS) $(JOBS)
 
 # Rows that are in the table already are not run again.
-soak: setup-bench build/bench/build.ninja build/release/build.ninja
+soak: setup-bench wasm build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --test-dir build/release -j $(JOBS) --output-on-failure -L 'soak|stability'
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
@@ -127,6 +131,10 @@ wheel: setup build/release/build.ninja
 	$(BUILD) release --target deform_tools deform_python_native
 	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; print( \
 	  b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': '$(CURDIR)/build/release'}))"
+
+wasm: setup-wasm build/wasm/build.ninja
+	$(BUILD) wasm --target deform_page
+	@ls -l build/wasm/page
 
 # Debian packages of the release build.
 deb: setup build/release/build.ninja

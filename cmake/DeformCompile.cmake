@@ -6,7 +6,9 @@ set(CMAKE_CXX_STANDARD_REQUIRED ON)
 set(CMAKE_CXX_EXTENSIONS OFF)
 set(CMAKE_C_STANDARD 99)
 set(CMAKE_C_EXTENSIONS OFF)
-set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+if(NOT EMSCRIPTEN)   # one program of everything, which lies nowhere else
+  set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+endif()
 set(CMAKE_C_VISIBILITY_PRESET hidden)
 set(CMAKE_CXX_VISIBILITY_PRESET hidden)
 set(CMAKE_VISIBILITY_INLINES_HIDDEN ON)
@@ -55,9 +57,14 @@ if(DEFORM_SANITIZE)
 endif()
 
 # Files named *_kernel_avx2.cpp and *_kernel_avx512.cpp are compiled for those instruction sets and chosen at
-# run time. AVX-512 cannot be had without FMA (clang turns it off with -mno-fma); -ffp-contract=off keeps it
-# unused, and a test looks into the objects. UndefinedBehaviorSanitizer checks their sources as they are
-# compiled for the narrowest vectors.
+# run time; on other processors than x86-64 deform_own_sources takes them out of a list. AVX-512 cannot be had
+# without FMA (clang turns it off with -mno-fma); -ffp-contract=off keeps it unused, and a test looks into the
+# objects. UndefinedBehaviorSanitizer checks their sources as they are compiled for the narrowest vectors.
+macro(deform_own_sources list)
+  if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+    list(FILTER ${list} EXCLUDE REGEX "_kernel_avx[0-9]+\\.cpp$")
+  endif()
+endmacro()
 function(deform_kernel_flags)
   set(once "")
   if(DEFORM_SANITIZE MATCHES "undefined")

@@ -164,13 +164,13 @@ def older(frame, other):
 
 
 class Surface:
-    """Of a body or an obstacle; `missing`: values of its base and its triangles that have not come yet."""
+    """Of a body or an obstacle; `missing`: values that have not come yet."""
 
     def __init__(self, name, shape, n, m, frame=0):
         self.name, self.shape, self.frame = name, shape, frame
         self.base, self.triangles = [None] * (3 * n), [None] * (3 * m)
-        self.moved = [0.0] * (3 * n)
-        self.missing = 3 * n + 3 * m
+        self.moved = [None] * (3 * n)
+        self.missing = 6 * n + 3 * m
 
     def put(self, values, first, new):
         self.missing -= sum(v is None for v in values[3 * first:3 * first + len(new)])
@@ -238,6 +238,7 @@ class Scene:
         if number in self.things:
             return
         thing = self.things[number] = Surface(self.text(data, 40), shape, n, m)
+        thing.put(thing.moved, 0, [0.0] * (3 * n))
         thing.sensor, thing.pose = bool(sensor), (0, 0, 0, 0, 0, 0, 1)
         thing.radius, thing.half_length, *thing.half_size = struct.unpack_from("<5f", data, 20)
 
@@ -272,7 +273,7 @@ class Scene:
             low, step = struct.unpack_from("<3f", data, 20), struct.unpack_from("<3f", data, 32)
             steps = struct.unpack_from(f"<{3 * n}H", data, 48)
             moved = [low[i % 3] + step[i % 3] * q for i, q in enumerate(steps)]
-        body.moved[3 * first:3 * (first + n)] = moved
+        body.put(body.moved, first, moved)
 
     def read_cont(self, data):
         self.contacts += [(row[:3], row[3:6], row[6]) for row in struct.iter_unpack("<6fI", data)]

@@ -153,56 +153,61 @@ void Drawing::add_surface(size_t i, render::Scene &out) {
   out.surfaces.push_back(s);
 }
 
-void Drawing::add_obstacles(render::Scene &out) {
-  for (size_t at = 0; at < placed_.size(); ++at) {
-    const ObstacleView &o = scene_.obstacles()[at];
-    if (o.def.ntriangle) {
-      add_triangles(o, placed_[at], out);
-      continue;
+void add_solid(const Solid &o, bool slab, render::Scene &out) {
+  const double up[3] = {0, 0, 1};
+  double axis[3];
+  rotate(o.pose.rotation, up, axis);
+  const double *p = o.pose.position;
+  if (o.shape == DFM_SHAPE_PLANE) {
+    out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}, slab});
+  } else if (o.shape == DFM_SHAPE_SPHERE) {
+    out.spheres.push_back({{p[0], p[1], p[2]}, o.radius, {}});
+  } else if (o.shape == DFM_SHAPE_BOX) {
+    render::Box box = {};
+    for (int i = 0; i < 3; ++i) {
+      box.pose.position[i] = p[i];
+      box.half[i] = o.half_size[i];
     }
-    dfm_pose pose = {};
-    need(dfm_obstacle_get_pose(o.handle, &pose));
-    const double up[3] = {0, 0, 1};
-    double axis[3];
-    rotate(pose.rotation, up, axis);
-    const double *p = pose.position;
-    if (o.def.shape == DFM_SHAPE_PLANE) {
-      out.planes.push_back({{p[0], p[1], p[2]}, {axis[0], axis[1], axis[2]}, {}, upright_.tilts()});
-    } else if (o.def.shape == DFM_SHAPE_SPHERE) {
-      out.spheres.push_back({{p[0], p[1], p[2]}, o.def.radius, {}});
-    } else if (o.def.shape == DFM_SHAPE_BOX) {
-      render::Box box = {};
-      for (int i = 0; i < 3; ++i) {
-        box.pose.position[i] = p[i];
-        box.half[i] = o.def.half_size[i];
-      }
-      for (int i = 0; i < 4; ++i) box.pose.rotation[i] = pose.rotation[i];
-      box.look = {};
-      out.boxes.push_back(box);
-    } else if (o.def.shape == DFM_SHAPE_CAPSULE) {
-      render::Capsule capsule = {};
-      for (int i = 0; i < 3; ++i) {
-        capsule.a[i] = p[i] - o.def.half_length * axis[i];
-        capsule.b[i] = p[i] + o.def.half_length * axis[i];
-      }
-      capsule.radius = o.def.radius;
-      capsule.look = {};
-      out.capsules.push_back(capsule);
+    for (int i = 0; i < 4; ++i) box.pose.rotation[i] = o.pose.rotation[i];
+    box.look = {};
+    out.boxes.push_back(box);
+  } else if (o.shape == DFM_SHAPE_CAPSULE) {
+    render::Capsule capsule = {};
+    for (int i = 0; i < 3; ++i) {
+      capsule.a[i] = p[i] - o.half_length * axis[i];
+      capsule.b[i] = p[i] + o.half_length * axis[i];
     }
+    capsule.radius = o.radius;
+    capsule.look = {};
+    out.capsules.push_back(capsule);
   }
 }
 
-void Drawing::add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const {
-  place_points(o, placed);
+void add_gray(const std::vector<double> &xyz, const uint32_t *triangles, uint32_t n, render::Scene &out) {
   render::Surface s;
-  s.xyz = placed.data();
-  s.n = o.def.npoint;
-  s.tri = o.def.triangles;
-  s.ntri = o.def.ntriangle;
+  s.xyz = xyz.data();
+  s.n = uint32_t(xyz.size() / 3);
+  s.tri = triangles;
+  s.ntri = n;
   s.rgb[0] = 0.72f;
   s.rgb[1] = 0.73f;
   s.rgb[2] = 0.75f;  // no body's color
   out.surfaces.push_back(s);
+}
+
+void Drawing::add_obstacles(render::Scene &out) {
+  for (size_t at = 0; at < placed_.size(); ++at) {
+    const ObstacleView &o = scene_.obstacles()[at];
+    if (o.def.ntriangle) {
+      place_points(o, placed_[at]);
+      add_gray(placed_[at], o.def.triangles, o.def.ntriangle, out);
+      continue;
+    }
+    Solid solid = {o.def.shape, {}, {}, o.def.radius, o.def.half_length};
+    std::copy_n(o.def.half_size, 3, solid.half_size);
+    need(dfm_obstacle_get_pose(o.handle, &solid.pose));
+    add_solid(solid, upright_.tilts(), out);
+  }
 }
 
 void Drawing::fill(render::Scene &out) {

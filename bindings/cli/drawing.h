@@ -11,6 +11,16 @@
 
 namespace cli {
 
+// An obstacle that has no triangles. slab: of a plane, render.h.
+struct Solid {
+  uint32_t shape;  // DFM_SHAPE_*
+  dfm_pose pose;
+  double half_size[3], radius, half_length;
+};
+void add_solid(const Solid &solid, bool slab, render::Scene &out);
+// A surface in the color of obstacles; it reads xyz and triangles where they are.
+void add_gray(const std::vector<double> &xyz, const uint32_t *triangles, uint32_t n, render::Scene &out);
+
 class Drawing {
  public:
   Drawing(const SceneFile &scene, const std::string &color);
@@ -50,7 +60,6 @@ class Drawing {
   void add_surface(size_t body, render::Scene &out);
   void add_bodies(render::Scene &out);
   void add_obstacles(render::Scene &out);
-  void add_triangles(const ObstacleView &o, std::vector<double> &placed, render::Scene &out) const;
 
   const SceneFile &scene_;
   Upright upright_;

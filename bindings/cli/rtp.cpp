@@ -11,70 +11,89 @@
 #include <cstring>
 #include <random>
 #include <thread>
+#include <utility>
 
 #include "messages.h"
 
 namespace cli {
 namespace {
 
-constexpr uint32_t kRtpHeader = 12, kPayload = 1188;  // bytes: a datagram of 1,200 passes every network
-constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96, kSenderReport = 200, kReceiverReport = 201,
-                  kDescription = 202, kGoodbye = 203;
+constexpr uint32_t kPayload = 1188;  // bytes: a datagram of 1,200 passes every network
+constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96;
 constexpr double kFrameRate = 30, kSlowest = 5;   // frames a second
 constexpr int kRound = 1000, kPatience = 5;       // ms
 constexpr int kReports = 5;                       // s
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
+constexpr size_t kMostRequests = 256;             // that wait; what comes beyond comes again
 constexpr double kTicks = 90000;                  // of the timestamp, in a second
 constexpr double kFrom1900 = 2208988800.0;        // s, to 1970
+constexpr auto kListens = std::chrono::seconds(5);  // who steers is gone after that
 
-void put16(unsigned char *to, uint32_t x) {
-  to[0] = static_cast<unsigned char>(x >> 8);
-  to[1] = static_cast<unsigned char>(x);
-}
-void put32(unsigned char *to, uint32_t x) {
-  put16(to, x >> 16);
-  put16(to + 2, x & 0xffff);
-}
+}  // namespace
 
-// Connected to the first address of the host to which this machine has a way.
-int open_socket(const std::string &url) {
-  const auto refuse = [&](const std::string &why) -> int {
-    throw Failure(kBadInput, "--stream " + url + ": " + why);
+RtpUrl rtp_url(const std::string &url, const std::string &what) {
+  const auto refuse = [&](const std::string &why) {
+    throw Failure(kBadInput, what + " " + url + ": " + why);
   };
-  const std::string scheme = "rtp://";
-  const size_t colon = url.rfind(':');
-  if (url.compare(0, scheme.size(), scheme) != 0 || colon < scheme.size())
-    return refuse("expected rtp://ADDRESS:PORT");
-  std::string host = url.substr(scheme.size(), colon - scheme.size());
-  if (host.size() > 1 && host.front() == '[' && host.back() == ']') host = host.substr(1, host.size() - 2);
-  const std::string port = url.substr(colon + 1);
+  const std::string scheme = "rtp://", query = "?token=";
+  RtpUrl out;
+  std::string rest = url;
+  if (const size_t at = url.find(query); at != std::string::npos) {
+    out.token = url.substr(at + query.size());
+    rest = url.substr(0, at);
+    if (rest.ends_with('/')) rest.pop_back();
+    if (out.token.size() > kToken) refuse("the token has more than 64 letters");
+  }
+  const size_t colon = rest.rfind(':');
+  if (!rest.starts_with(scheme) || colon < scheme.size()) refuse("expected rtp://ADDRESS:PORT");
+  out.host = rest.substr(scheme.size(), colon - scheme.size());
+  if (out.host.size() > 1 && out.host.front() == '[' && out.host.back() == ']')
+    out.host = out.host.substr(1, out.host.size() - 2);
+  out.port = rest.substr(colon + 1);
   unsigned number = 0;
-  const auto [end, bad] = std::from_chars(port.data(), port.data() + port.size(), number);
-  if (bad != std::errc() || end != port.data() + port.size() || number == 0 || number > 65535)
-    return refuse("expected a port from 1 to 65535 behind the last colon");
+  const char *const last = out.port.data() + out.port.size();
+  const auto [end, bad] = std::from_chars(out.port.data(), last, number);
+  if (bad != std::errc() || end != last || number == 0 || number > 65535)
+    refuse("expected a port from 1 to 65535 behind the last colon");
+  return out;
+}
+
+int rtp_socket(const RtpUrl &url, const std::string &what,
+               const std::function<int(int, const sockaddr *, socklen_t)> &open) {
   addrinfo wanted = {}, *found = nullptr;
   wanted.ai_socktype = SOCK_DGRAM;
   wanted.ai_flags = AI_NUMERICSERV;
-  const int error = getaddrinfo(host.c_str(), port.c_str(), &wanted, &found);
-  if (error) return refuse(gai_strerror(error));
-  std::string why = "no address";
+  const int error = getaddrinfo(url.host.c_str(), url.port.c_str(), &wanted, &found);
+  std::string why = error ? gai_strerror(error) : "no address";
   int out = -1;
-  for (const addrinfo *at = found; at && out < 0; at = at->ai_next) {
+  for (const addrinfo *at = error ? nullptr : found; at && out < 0; at = at->ai_next) {
     out = socket(at->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (out >= 0 && connect(out, at->ai_addr, at->ai_addrlen) == 0) break;
+    if (out >= 0 && open(out, at->ai_addr, at->ai_addrlen) == 0) break;
     why = std::strerror(errno);
     if (out >= 0) close(out);
     out = -1;
   }
-  freeaddrinfo(found);
-  return out >= 0 ? out : refuse(why);
+  if (!error) freeaddrinfo(found);
+  if (out < 0) throw Failure(kBadInput, what + " rtp://" + url.host + ":" + url.port + ": " + why);
+  return out;
 }
 
-}  // namespace
+std::vector<unsigned char> control_packet(uint32_t source, size_t head, const std::string &text) {
+  std::vector<unsigned char> out((head + text.size() + 3) / 4 * 4, ' ');
+  std::fill_n(out.begin(), head, static_cast<unsigned char>(0));
+  std::copy(text.begin(), text.end(), out.begin() + static_cast<std::ptrdiff_t>(head));
+  out[0] = kRtpVersion;
+  out[1] = kApp;
+  put16(&out[2], static_cast<uint32_t>(out.size() / 4 - 1));
+  put32(&out[4], source);
+  std::memcpy(&out[8], kControl, 4);
+  return out;
+}
 
-RtpSender::RtpSender(const SceneFile &scene, const std::string &url)
+RtpSender::RtpSender(const SceneFile &scene, const std::string &url, std::string token)
     : scene_(scene),
-      socket_(open_socket(url)),
+      token_(std::move(token)),
+      socket_(rtp_socket(rtp_url(url, "--stream"), "--stream", connect)),
       begin_(dfm_world_time(scene.world())),
       interval_(1 / kFrameRate) {
   std::random_device system;
@@ -203,20 +222,56 @@ void RtpSender::send_report(bool ends) {
   ::send(socket_, out, ends ? 56 : 48, 0);
 }
 
-// Reports of the receiver.
+// Reports of the receiver, and what it asks for. The socket has only what comes from the address to which
+// it sends.
 void RtpSender::hear() {
-  unsigned char in[512];
-  for (ssize_t n; (n = recv(socket_, in, sizeof in, 0)) > 0;) {
-    if (n < 32 || in[0] >> 6 != 2 || (in[0] & 31) == 0 || in[1] != kReceiverReport) continue;
-    report_.lost = in[12] / 256.0;
-    if (report_.lost > kTooMuch) interval_ = std::min(1.4 * interval_, 1 / kSlowest);
-    else if (report_.lost < kLittle) interval_ = std::max(0.9 * interval_, 1 / kFrameRate);
-  }
+  unsigned char in[2048];
+  for (ssize_t n; (n = recv(socket_, in, sizeof in, 0)) > 0;)
+    each_report(in, static_cast<size_t>(n), [&](const unsigned char *report, size_t size) {
+      if (report[1] == kApp) return hear_request(report, size);
+      if (size < 32 || (report[0] & 31) == 0 || report[1] != kReceiverReport) return;
+      report_.lost = report[12] / 256.0;
+      if (report_.lost > kTooMuch) interval_ = std::min(1.4 * interval_, 1 / kSlowest);
+      else if (report_.lost < kLittle) interval_ = std::max(0.9 * interval_, 1 / kFrameRate);
+    });
+}
+
+// In order and once each: what is lost comes again, with all that follows it.
+void RtpSender::hear_request(const unsigned char *in, size_t n) {
+  if (token_.empty() || n < kRequestHead || std::memcmp(in + 8, kControl, 4) != 0) return;
+  unsigned char differ = 0;  // in a time that does not tell where
+  for (size_t i = 0; i < kToken; ++i)
+    differ |= static_cast<unsigned char>(in[12 + i] ^ (i < token_.size() ? token_[i] : 0));
+  if (differ) return;
+  heard_ = Clock::now();
+  if (steerer_ != get32(in + 4)) taken_ = 0;
+  steerer_ = get32(in + 4);
+  if (get32(in + 12 + kToken) != taken_ + 1 || requests_.size() >= kMostRequests) return;
+  ++taken_;
+  requests_.emplace_back(in + kRequestHead, in + n);
+}
+
+bool RtpSender::steered() const { return steerer_ && Clock::now() < heard_ + kListens; }
+
+std::vector<std::string> RtpSender::take() {
+  hear();
+  return std::exchange(requests_, {});
+}
+
+void RtpSender::tell(const std::string &text) {
+  std::vector<unsigned char> out = control_packet(source_, kAnswerHead, text);
+  put32(&out[12], steerer_);
+  put32(&out[16], taken_);
+  ::send(socket_, out.data(), out.size(), 0);
 }
 
 void RtpSender::after_step() {
   const std::chrono::duration<double> simulated(dfm_world_time(scene_.world()) - begin_);
   std::this_thread::sleep_until(began_ + std::chrono::duration_cast<Clock::duration>(simulated));
+  show();
+}
+
+void RtpSender::show() {
   const Clock::time_point now = Clock::now();
   if (now < next_frame_) return;
   next_frame_ = std::max(next_frame_, now - std::chrono::milliseconds(1)) +

@@ -27,7 +27,7 @@ import tempfile
 import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python(_law)?\.so|deform/plugins-\d+/.*|"
+LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python(_law|_serve)?\.so|deform/plugins-\d+/.*|"
                        r"libpng\d+\.so\.\d+")
 PACKAGE = ROOT / "bindings" / "python" / "deform"
 
@@ -79,6 +79,7 @@ def _tag(files=()):
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     machine = platform.removeprefix("linux_")
     programs = {inside: path for inside, path in files if inside.startswith(("bin/", "lib/"))}
+    programs.pop("lib/libdeform_python_serve.so", None)  # opened where the system has libwebsockets alone
     own, first = {pathlib.PurePath(inside).name for inside in programs}, 28
     for path in programs.values():
         asked = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True,

@@ -69,7 +69,8 @@ struct Server::Call {
         if (lws_add_http_common_headers(wsi, HTTP_STATUS_OK, "text/html; charset=utf-8", sizeof kPage - 1, &p,
                                         end) ||
             add("cache-control:", "no-store") || add("referrer-policy:", "no-referrer") ||
-            add("x-frame-options:", "DENY") || lws_finalize_write_http_header(wsi, start, &p, end))
+            add("content-security-policy:", "frame-ancestors http://127.0.0.1:* http://localhost:*") ||
+            lws_finalize_write_http_header(wsi, start, &p, end))
           return -1;
         static_cast<Http *>(user)->sent = 0;
         lws_callback_on_writable(wsi);
@@ -96,7 +97,7 @@ struct Server::Call {
     switch (reason) {
       case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: return of(wsi).allowed(wsi) ? 0 : -1;
       case LWS_CALLBACK_ESTABLISHED: of(wsi).joins(*viewer, wsi); return 0;
-      case LWS_CALLBACK_CLOSED: of(wsi).leaves(*viewer); return 0;
+      case LWS_CALLBACK_CLOSED: of(wsi).leave(viewer->number); return 0;
       case LWS_CALLBACK_RECEIVE: {
         if (lws_frame_is_binary(wsi)) return -1;  // of text the library checks that it is UTF-8
         const bool ends = lws_is_final_fragment(wsi) && lws_remaining_packet_payload(wsi) == 0;
@@ -241,21 +242,32 @@ bool Server::allowed(lws *wsi) const {
   return given && same(token_, given, std::strlen(given));
 }
 
-void Server::joins(Viewer &viewer, lws *wsi) {
-  {
-    const std::lock_guard lock(mutex_);
-    if (present_.size() >= kMostViewers) return;  // its number stays 0, and it gets nothing
-    viewer.number = ++last_viewer_;
-    present_.push_back(viewer.number);
-    if (!control_) control_ = viewer.number;
-  }
-  lws_callback_on_writable(wsi);
+uint32_t Server::join() {
+  const std::lock_guard lock(mutex_);
+  if (present_.size() >= kMostViewers) return 0;
+  present_.push_back(++last_viewer_);
+  if (!control_) control_ = last_viewer_;
+  return last_viewer_;
 }
 
-void Server::leaves(Viewer &viewer) {
+void Server::joins(Viewer &viewer, lws *wsi) {
+  viewer.number = join();  // where it stays 0, it gets nothing
+  if (viewer.number) lws_callback_on_writable(wsi);
+}
+
+void Server::leave(uint32_t viewer) {
   const std::lock_guard lock(mutex_);
-  std::erase(present_, viewer.number);
-  if (control_ == viewer.number) control_ = present_.empty() ? 0 : present_.front();
+  std::erase(present_, viewer);
+  if (control_ == viewer) control_ = present_.empty() ? 0 : present_.front();
+}
+
+void Server::hear(uint32_t viewer, const std::string &text) {
+  std::string bare = text;
+  std::erase_if(bare, [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; });
+  const std::lock_guard lock(mutex_);
+  if (viewer && bare == R"({"do":"take"})") control_ = viewer;
+  else if (viewer && viewer == control_ && requests_.size() < kMostRequests)
+    requests_.push_back({viewer, text});
 }
 
 bool Server::hears(Viewer &viewer, const char *text, size_t n, bool ends) {
@@ -263,14 +275,8 @@ bool Server::hears(Viewer &viewer, const char *text, size_t n, bool ends) {
   if (n) std::memcpy(viewer.text + viewer.length, text, n);
   viewer.length += n;
   if (!ends) return true;
-  const std::string whole(viewer.text, viewer.length);
+  hear(viewer.number, {viewer.text, viewer.length});
   viewer.length = 0;
-  std::string bare = whole;
-  std::erase_if(bare, [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; });
-  const std::lock_guard lock(mutex_);
-  if (viewer.number && bare == R"({"do":"take"})") control_ = viewer.number;
-  else if (viewer.number && viewer.number == control_ && requests_.size() < kMostRequests)
-    requests_.push_back({viewer.number, whole});
   return true;
 }
 

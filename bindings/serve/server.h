@@ -9,35 +9,34 @@
 #include <thread>
 #include <vector>
 
+#include "live/viewers.h"
+
 struct lws_context;
 struct lws;
 
 namespace serve {
 
-using Bytes = std::vector<unsigned char>;
+using live::Bytes;
+using live::Request;
 
-// A text that the viewer in control has sent.
-struct Request {
-  uint32_t viewer;
-  std::string text;
-};
-
-class Server {
+class Server final : public live::Viewers {
  public:
   // Listens on 127.0.0.1; port 0: a free one. Throws cli::Failure.
   Server(uint16_t port, std::string token);
-  ~Server();
+  ~Server() override;
   Server(const Server &) = delete;
   uint16_t port() const { return port_; }
-  // whole: for viewers that come later; changed: for those that have all before it, empty: these take the
-  // whole as well.
-  void show_scene(Bytes whole, Bytes changed);
-  void show_frame(Bytes frame);  // a viewer that is slow gets the newest one alone
-  void show_state(std::string json);
-  std::vector<Request> take();
+  void show_scene(Bytes whole, Bytes changed) override;
+  void show_frame(Bytes frame) override;
+  void show_state(std::string json) override;
+  std::vector<Request> take() override;
+  uint32_t viewers() const override;
+  uint32_t in_control() const override;
+  // A viewer by another transport, which has its place among those of control. 0: there are too many.
+  uint32_t join();
+  void leave(uint32_t viewer);
+  void hear(uint32_t viewer, const std::string &text);
   bool works() const;  // false: the network has failed
-  uint32_t viewers() const;
-  uint32_t in_control() const;  // number of that viewer; 0: there is none
 
  private:
   struct Viewer;
@@ -53,7 +52,6 @@ class Server {
   void serve();
   bool allowed(lws *wsi) const;
   void joins(Viewer &viewer, lws *wsi);
-  void leaves(Viewer &viewer);
   bool hears(Viewer &viewer, const char *text, size_t n, bool ends);  // false: the viewer is to go
   bool writes(Viewer &viewer, lws *wsi);
   Message next_for(Viewer &viewer, bool &text);

@@ -66,11 +66,6 @@ std::string text_of(const render::Vec &v) {
   return cli::json_vector(x);
 }
 
-bool on_processor(const std::string &device) {
-  return device.find("llvmpipe") != std::string::npos || device.find("softpipe") != std::string::npos ||
-         device.find("swrast") != std::string::npos;
-}
-
 }  // namespace
 
 Stage::Stage(const Options &options, const cli::Globals &globals, const cli::Recording *replay)
@@ -96,7 +91,7 @@ App::App(const Options &options, const cli::Globals &globals)
   options_.out = folder_of(options, path);
   window_ = Window::open(options.width, options.height,
                          "deform view " + std::filesystem::path(path).filename().string(), !script_);
-  window_->size(width_, height_);
+  canvas_.open(*window_, options.detail);
   if (!script_ || std::getenv("DEFORM_VIEW_SPNAV")) space_mouse_ = SpaceMouse::open(no_space_mouse_);
   first_look();
   stage_->plots.sample();
@@ -156,7 +151,7 @@ void App::first_look() {
   render::Scene picture;
   stage_->drawing.fill(picture);
   orbit_.set_up(render::vec(picture.up));
-  orbit_.set(first_camera(stage_->scene, picture, height_ > 0 ? aspect() : 1));
+  orbit_.set(first_camera(stage_->scene, picture, canvas_.height() > 0 ? aspect() : 1));
 }
 
 void App::handle(const Input &in) {
@@ -230,8 +225,8 @@ void App::mouse(const Input &in) {
   }
   if (in.kind != Input::move || held_ < 0) return;
   if (leads_) return attempt([&] { lead(dx, dy); });
-  if (held_ == kMiddle) orbit_.shift(-dx / height_, dy / height_);
-  else orbit_.turn(-kTurn * dx / height_, kTurn * dy / height_);
+  if (held_ == kMiddle) orbit_.shift(-dx / canvas_.height(), dy / canvas_.height());
+  else orbit_.turn(-kTurn * dx / canvas_.height(), kTurn * dy / canvas_.height());
 }
 
 void App::press(int button) {
@@ -373,24 +368,9 @@ void App::restart() {
 }
 
 bool App::draw() {
-  uint32_t width = 0, height = 0;
-  window_->size(width, height);
-  if (width == 0 || height == 0) {
+  if (!canvas_.fit()) {
     window_->end_panels();
     return false;
-  }
-  if (!renderer_ || width != width_ || height != height_) {
-    width_ = width;
-    height_ = height;
-    std::string why;
-    renderer_.reset();
-    const auto make = [&](render::Detail detail) {
-      renderer_ = render::WindowRenderer::create(window_->symbol_of(), detail, width, height, &why);
-      if (!renderer_) throw cli::Failure(cli::kBadInput, "view: " + why);
-    };
-    make(options_.detail == "full" ? render::Detail::full : render::Detail::fast);
-    device_ = renderer_->device();
-    if (options_.detail.empty() && !on_processor(device_)) make(render::Detail::full);
   }
   render::Scene picture;
   stage_->drawing.fill(picture);
@@ -398,7 +378,8 @@ bool App::draw() {
   orbit_.set_up(render::vec(picture.up));
   picture.camera = orbit_.camera();
   const double size = stage_->size;
-  if (show_arrows_ && !replay_) stage_->arrows.fill(stage_->scene, size, *picture.camera, picture);
+  if (show_arrows_ && !replay_)
+    stage_->arrows.fill(touches_of(stage_->scene), size, *picture.camera, picture);
   if (show_arrows_ && !replay_) add_tool_arrows(*picture.camera, picture);
   double held[6];
   if (stage_->pull.holds()) {
@@ -409,19 +390,13 @@ bool App::draw() {
     picture.spheres.push_back({{from.x, from.y, from.z}, 0.006 * size, {{0.1f, 0.1f, 0.1f}, 1}});
     picture.spheres.push_back({{to.x, to.y, to.z}, 0.006 * size, {{0.1f, 0.1f, 0.1f}, 1}});
   }
-  std::string why;
-  if (!renderer_->show(picture, &why)) throw cli::Failure(cli::kBadInput, "view: " + why);
+  canvas_.show(picture);
   window_->end_panels();
   return true;
 }
 
 void App::shot(const std::string &name) {
-  cli::make_folder(options_.out);
-  const std::string path = name[0] == '/' ? name : options_.out + "/" + name;
-  render::Image image;
-  renderer_->read_window(image);
-  std::string why;
-  if (!render::write_png(path, image, &why)) throw cli::Failure(cli::kBadInput, why);
+  const std::string path = canvas_.write(options_.out, name);
   const std::string hash = cli::hash_text(dfm_world_hash(stage_->scene.world()));
   if (globals_.json) {
     cli::JsonObject bodies, tools, row;

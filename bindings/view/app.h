@@ -8,6 +8,7 @@
 
 #include "arrows.h"
 #include "camera.h"
+#include "canvas.h"
 #include "cli.h"
 #include "drawing.h"
 #include "live/grip.h"
@@ -78,10 +79,9 @@ class App {
   void numbers();
   void help();
   void shot(const std::string &name);
-  double aspect() const { return double(width_) / height_; }
-  // The mouse, from -1 (left, bottom) to 1.
-  double across() const { return 2 * mouse_[0] / width_ - 1; }
-  double above() const { return 1 - 2 * mouse_[1] / height_; }
+  double aspect() const { return canvas_.aspect(); }
+  double across() const { return canvas_.across(mouse_[0]); }
+  double above() const { return canvas_.above(mouse_[1]); }
 
   Options options_;
   cli::Globals globals_;
@@ -91,10 +91,8 @@ class App {
   std::unique_ptr<Window> window_;
   std::unique_ptr<SpaceMouse> space_mouse_;
   std::string no_space_mouse_;  // why there is none
-  std::unique_ptr<render::WindowRenderer> renderer_;
-  std::string device_;  // what GL calls itself
+  Canvas canvas_;
   Orbit orbit_;
-  uint32_t width_ = 0, height_ = 0;  // pixels
   bool running_ = false, quit_ = false, help_ = false, show_arrows_ = true, show_plots_ = true,
        show_panels_ = true;
   double speed_ = 1;                // simulated seconds per second

@@ -30,27 +30,29 @@ void add_arrow(std::vector<double> &xyz, const Vec &foot, const Vec &tip, const 
   add(xyz, tip, tip - along * head - side * (0.5 * head));
 }
 
-void Arrows::fill(const cli::SceneFile &scene, double size, const render::Camera &camera,
-                  render::Scene &out) {
-  const std::vector<dfm_contact> contacts = cli::listed<dfm_contact>(dfm_world_contacts, scene.world());
-  // On the body that was made first, whichever side the contact is reported for.
-  const auto force = [](const dfm_contact &c) {
+std::vector<Touch> touches_of(const cli::SceneFile &scene) {
+  std::vector<Touch> out;
+  for (const dfm_contact &c : cli::listed<dfm_contact>(dfm_world_contacts, scene.world())) {
     const Vec normal = render::vec(c.normal), first = render::vec(c.tangent);
     const Vec on_a = normal * c.fn + first * c.ft[0] + cross(normal, first) * c.ft[1];
-    return on_a * (c.body_b && c.body_b < c.body_a ? -1.0 : 1.0);
-  };
+    // on the body that was made first, whichever side the contact is reported for
+    out.push_back({render::vec(c.point), on_a * (c.body_b && c.body_b < c.body_a ? -1.0 : 1.0),
+                   (c.flags & DFM_CONTACT_STICKING) != 0});
+  }
+  return out;
+}
+
+void Arrows::fill(const std::vector<Touch> &touches, double size, const render::Camera &camera,
+                  render::Scene &out) {
   double top = 0;
-  for (const dfm_contact &c : contacts) top = std::max(top, render::norm(force(c)));
+  for (const Touch &t : touches) top = std::max(top, render::norm(t.force));
   // Follows a rise at once and a fall slowly, so that neighboring pictures can be compared.
   scale_ = std::max(top, 0.98 * scale_);
   for (std::vector<double> &xyz : xyz_) xyz.clear();
-  for (const dfm_contact &c : contacts) {
-    const Vec f = force(c);
-    const double length = scale_ > 0 ? kLength * size * render::norm(f) / scale_ : 0;
+  for (const Touch &t : touches) {
+    const double length = scale_ > 0 ? kLength * size * render::norm(t.force) / scale_ : 0;
     if (!(length > 0)) continue;
-    const Vec foot = render::vec(c.point);
-    add_arrow(xyz_[c.flags & DFM_CONTACT_STICKING ? 0 : 1], foot, foot + render::unit(f) * length, camera,
-              size);
+    add_arrow(xyz_[t.sticks ? 0 : 1], t.point, t.point + render::unit(t.force) * length, camera, size);
   }
   for (int i = 0; i < 2; ++i) {
     render::Lines lines;

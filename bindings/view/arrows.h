@@ -14,11 +14,17 @@ inline constexpr float kSticks[3] = {0.10f, 0.55f, 0.30f}, kSlides[3] = {0.95f, 
 void add_arrow(std::vector<double> &xyz, const render::Vec &foot, const render::Vec &tip,
                const render::Camera &camera, double size);
 
+struct Touch {
+  render::Vec point, force;  // m, N
+  bool sticks;
+};
+// Of the last sub-step: of two bodies the force on the one that was made first.
+std::vector<Touch> touches_of(const cli::SceneFile &scene);
+
 class Arrows {
  public:
-  // Adds those of the last sub-step: of two bodies the force on the one that was made first. size: m, of what
-  // is shown; what they point to lives here until the next call.
-  void fill(const cli::SceneFile &scene, double size, const render::Camera &camera, render::Scene &out);
+  // size: m, of what is shown; what they point to lives here until the next call.
+  void fill(const std::vector<Touch> &touches, double size, const render::Camera &camera, render::Scene &out);
   double longest() const { return scale_; }  // N, of an arrow of full length
 
  private:

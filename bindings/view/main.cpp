@@ -7,6 +7,7 @@
 #include "become.h"
 #include "cli.h"
 #include "messages.h"
+#include "remote.h"
 
 namespace view {
 namespace {
@@ -23,7 +24,8 @@ void add_view(cli::Command app, cli::Globals &globals, int *) {
   const auto options = std::make_shared<Options>();
   const auto size = std::make_shared<std::string>();
   cli::Command sub = app.command(cli::kView.name, cli::kView.about);
-  sub.option("SCENE", options->scene, "scene file (JSON); not needed with --replay");
+  sub.option("SCENE", options->scene,
+             "scene file (JSON), or rtp://ADDRESS:PORT of a stream; not with --replay");
   sub.option("--replay", options->replay, "show the states that `deform run --record` kept").type_name("DIR");
   sub.option("--script", options->script, "no hands: lines `t key|drag|slider|shot ARGS`").type_name("FILE");
   sub.option("--from", options->from, "begin with a state that `deform run --save` or the viewer wrote")
@@ -42,6 +44,7 @@ void add_view(cli::Command app, cli::Globals &globals, int *) {
       throw cli::Failure(cli::kBadInput,
                          "view: SCENE is required, or --replay DIR (see: deform view --help)");
     if (!size->empty()) read_size(*size, *options);
+    if (options->scene.starts_with("rtp://")) return Remote(*options, globals).run();
     App(*options, globals).run();
   });
 }

@@ -7,45 +7,15 @@
 #include <numbers>
 
 #include "app.h"
+#include "panels.h"
 #include "run.h"
 
 namespace view {
 namespace {
 
-constexpr float kWide = 310, kGap = 12, kPlot = 270, kHigh = 64, kLine = 16;
+constexpr float kPlot = 270, kHigh = 64, kLine = 16;
 constexpr float kSlider = 96, kValue = 112, kLabel = 184;  // where a row's parts end or begin, from the left
 constexpr float kKeys = 104;                               // of the help
-
-// Of a size that is meant for letters of 14 pixels.
-float scaled(float size) { return size * ImGui::GetFontSize() / 14; }
-constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
-                                    ImGuiWindowFlags_NoCollapse | ImGuiWindowFlags_NoTitleBar |
-                                    ImGuiWindowFlags_AlwaysAutoResize;
-
-void pale() {
-  ImGui::StyleColorsLight();
-  ImGuiStyle &style = ImGui::GetStyle();
-  style.WindowRounding = 4;
-  style.FrameRounding = 3;
-  style.WindowBorderSize = 0;
-  style.Colors[ImGuiCol_WindowBg] = {1, 1, 1, 0.78f};
-}
-
-// The number stands beside the handle, which would cover it.
-bool slider(const char *label, float *x, float low, float high, const char *format,
-            ImGuiSliderFlags flags = 0) {
-  char value[32];
-  std::snprintf(value, sizeof value, format, double(*x));
-  ImGui::PushID(label);
-  ImGui::SetNextItemWidth(scaled(kSlider));
-  const bool moved = ImGui::SliderFloat("", x, low, high, "", flags);
-  ImGui::PopID();
-  ImGui::SameLine(scaled(kValue));
-  ImGui::TextUnformatted(value);
-  ImGui::SameLine(scaled(kLabel));
-  ImGui::TextWrapped("%s", label);
-  return moved;
-}
 
 void color_bar(const cli::Drawing::Legend &legend) {
   constexpr int kParts = 64;
@@ -68,12 +38,46 @@ void color_bar(const cli::Drawing::Legend &legend) {
 
 }  // namespace
 
-void App::panels() {
-  if (!show_panels_) return;
+float scaled(float size) { return size * ImGui::GetFontSize() / 14; }
+void pale() {
+  ImGui::StyleColorsLight();
+  ImGuiStyle &style = ImGui::GetStyle();
+  style.WindowRounding = 4;
+  style.FrameRounding = 3;
+  style.WindowBorderSize = 0;
+  style.Colors[ImGuiCol_WindowBg] = {1, 1, 1, 0.78f};
+}
+
+bool slider(const char *label, float *x, float low, float high, const char *format, ImGuiSliderFlags flags) {
+  char value[32];
+  std::snprintf(value, sizeof value, format, double(*x));
+  ImGui::PushID(label);
+  ImGui::SetNextItemWidth(scaled(kSlider));
+  const bool moved = ImGui::SliderFloat("", x, low, high, "", flags);
+  ImGui::PopID();
+  ImGui::SameLine(scaled(kValue));
+  ImGui::TextUnformatted(value);
+  ImGui::SameLine(scaled(kLabel));
+  ImGui::TextWrapped("%s", label);
+  return moved;
+}
+
+void begin_panel() {
   pale();
   ImGui::SetNextWindowPos({scaled(kGap), scaled(kGap)}, ImGuiCond_Always);
   ImGui::SetNextWindowSize({scaled(kWide), 0}, ImGuiCond_Always);
   ImGui::Begin("deform", nullptr, kFixed);
+}
+
+void wrapped(const std::string &text) {
+  ImGui::PushTextWrapPos(scaled(kWide) - 12);
+  ImGui::TextUnformatted(text.c_str());
+  ImGui::PopTextWrapPos();
+}
+
+void App::panels() {
+  if (!show_panels_) return;
+  begin_panel();
   controls();
   if (!replay_) files();
   numbers();
@@ -175,7 +179,7 @@ void draw_plot(const Plot &plot, const std::vector<double> &times) {
 
 void App::plots() {
   if (stage_->plots.times().size() < 2) return;
-  ImGui::SetNextWindowPos({float(width_) - scaled(kGap), scaled(kGap)}, ImGuiCond_Always, {1, 0});
+  ImGui::SetNextWindowPos({float(canvas_.width()) - scaled(kGap), scaled(kGap)}, ImGuiCond_Always, {1, 0});
   ImGui::SetNextWindowSize({scaled(kPlot), 0}, ImGuiCond_Always);
   ImGui::Begin("plots", nullptr, kFixed);
   for (const Plot &p : stage_->plots.plots())
@@ -221,11 +225,7 @@ void App::numbers() {
     ImGui::Text("%.3f ms a step, %.2f x real time", stage_->simulation.step_ms(), running_ ? real_ : 0);
     ImGui::Text("%.0f frames a second", frame_ms_ > 0 ? 1e3 / frame_ms_ : 0);
   }
-  if (!message_.empty()) {
-    ImGui::PushTextWrapPos(scaled(kWide) - 12);
-    ImGui::TextUnformatted(message_.c_str());
-    ImGui::PopTextWrapPos();
-  }
+  if (!message_.empty()) wrapped(message_);
   if (!help_) return;
   ImGui::Separator();
   help();

@@ -63,13 +63,14 @@ void App::lead(double dx, double dy) {
   if (!grip.holds()) return;
   const render::View v = render::view_of(orbit_.camera());
   if (held_ == kRight) {
-    grip.turn(v.up, kTurn * dx / height_);
-    grip.turn(v.right, kTurn * dy / height_);
+    grip.turn(v.up, kTurn * dx / canvas_.height());
+    grip.turn(v.right, kTurn * dy / canvas_.height());
     return;
   }
   const double x = across(), y = above();
   const Vec now = orbit_.at_depth(x, y, aspect(), grip.to());
-  const Vec then = orbit_.at_depth(x - 2 * dx / width_, y + 2 * dy / height_, aspect(), grip.to());
+  const Vec then =
+      orbit_.at_depth(x - 2 * dx / canvas_.width(), y + 2 * dy / canvas_.height(), aspect(), grip.to());
   grip.move_to(grip.to() + now - then);
 }
 

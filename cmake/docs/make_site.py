@@ -8,6 +8,7 @@ import argparse
 import json
 import logging
 import pathlib
+import shutil
 import sys
 import urllib.parse
 from html.parser import HTMLParser
@@ -55,6 +56,16 @@ def broken(site):
                 yield f"{path.relative_to(site)}: {to} has no such heading"
 
 
+def add_live(made, site):
+    """The page of `make wasm` where it has been made, and the link to it."""
+    if not (made / "index.html").is_file():
+        return
+    shutil.copytree(made, site / "live", dirs_exist_ok=True)
+    page = site / "libdeform/doc/howto/webassembly.html"
+    name = "<code>live/index.html</code>"
+    page.write_text(page.read_text().replace(name, f'<a href="../../../live/index.html">{name}</a>'))
+
+
 def main():
     root = pathlib.Path(__file__).resolve().parents[2]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -85,6 +96,7 @@ def main():
         entry["answers"] = answers.get(entry["location"], "")
     (options.out / "search/index.js").write_text("var pages = " + json.dumps(index["docs"]) + ";\n")
     (options.out / "code.css").write_text(HtmlFormatter(style="friendly").get_style_defs(".code"))
+    add_live(options.root / "build/wasm/page", options.out)
     wrong = sorted(broken(options.out))
     count = len(list(options.out.rglob("*.html")))
     print("\n".join(wrong) or f"{options.out}/index.html: {count} pages, every link leads somewhere")

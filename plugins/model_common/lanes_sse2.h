@@ -1,6 +1,12 @@
-// Four doubles as two SSE2 registers, the baseline of x86-64. Internal linkage only.
+// Four doubles as two SSE2 registers, the baseline of x86-64; SIMDe makes them of what other processors have.
+// Internal linkage only.
 #pragma once
+#if defined(__x86_64__)
 #include <emmintrin.h>
+#else
+#define SIMDE_ENABLE_NATIVE_ALIASES
+#include <simde/x86/sse2.h>
+#endif
 #include <stdint.h>
 
 #define DEFORM_INLINE static inline __attribute__((always_inline))

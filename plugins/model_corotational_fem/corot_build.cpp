@@ -10,7 +10,10 @@ namespace {
 
 const Kernels *choose_kernels(const dfm_host *host) {
   const model::Width width = model::choose_width(host, "corotational_fem");
-  return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
+  if constexpr (model::kHasWider) {
+    if (width != model::kSse2) return width == model::kAvx512 ? kernels_avx512() : kernels_avx2();
+  }
+  return kernels_sse2();
 }
 
 }  // namespace

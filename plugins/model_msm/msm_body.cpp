@@ -55,7 +55,10 @@ void merge_pass(void *user, uint32_t begin, uint32_t end) {
 
 const Kernels *choose_kernels(const dfm_host *host) {
   const model::Width width = model::choose_width(host, "msm");
-  return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
+  if constexpr (model::kHasWider) {
+    if (width != model::kSse2) return width == model::kAvx512 ? kernels_avx512() : kernels_avx2();
+  }
+  return kernels_sse2();
 }
 
 // Branches: exact for a stretch that grows evenly over a step, dp/dt = de/dt - p/tau, hence p+ = E p + kept

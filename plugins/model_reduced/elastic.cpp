@@ -71,7 +71,10 @@ void add_rows(const double *x, double extent, uint8_t bits, uint32_t point,
 
 const Kernels *choose_kernels(const dfm_host *host, const char *id) {
   const model::Width width = model::choose_width(host, id);
-  return width == model::kAvx512 ? kernels_avx512() : width == model::kAvx2 ? kernels_avx2() : kernels_sse2();
+  if constexpr (model::kHasWider) {
+    if (width != model::kSse2) return width == model::kAvx512 ? kernels_avx512() : kernels_avx2();
+  }
+  return kernels_sse2();
 }
 
 }  // namespace

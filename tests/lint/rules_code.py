@@ -40,8 +40,8 @@ LIBM = ("exp exp2 expm1 log2 log10 log1p log sin cos tan asin acos atan atan2 si
         "hypot erf erfc tgamma lgamma").split()
 # elementary.h is header-only and needs nothing of the library: exp and pow with the same bits for everybody.
 PLUGIN_HEADERS = ("deform/plugin.h", "deform/plugin.hpp", "deform/plugin_draft.h", "deform/elementary.h")
-KERNEL_HEADERS = {"emmintrin.h", "immintrin.h", "stdint.h", "stddef.h", "cstdint", "cstddef",
-                  "deform/plugin.h", "math/kernel_vector.h"}
+KERNEL_HEADERS = {"emmintrin.h", "simde/x86/sse2.h", "immintrin.h", "stdint.h", "stddef.h", "cstdint",
+                  "cstddef", "deform/plugin.h", "math/kernel_vector.h"}
 
 
 def _resolves(tree, path, name):

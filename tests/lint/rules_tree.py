@@ -16,7 +16,7 @@ BELOW = {
                       "api"},
     "libdeform/doc": {"README.md", "concepts", "reference", "models", "laws", "howto", "decisions", "images"},
     "bindings": {"CMakeLists.txt", "cli", "render", "rigid_host", "ode", "bullet", "python", "tools", "live",
-                 "view", "serve"},
+                 "view", "serve", "web"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
               "plugin", "gpu", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python",
               "serve", "contact_problems"},

@@ -135,10 +135,11 @@ def main():
             pass
         flood.close()
         second.send({"do": "take"})
-        second.send({"do": "reset"})
+        second.send({"do": "run", "on": False})
+        second.send({"do": "reset"})  # after all that the other one has asked for
+        state_of(second, lambda s: s["time"] == 0 and s["control"] == number)
         second.send({"do": "run", "on": True})
-        now = state_of(second, lambda s: s["running"] and s["control"] == number)["time"]
-        state_of(second, lambda s: s["time"] > now)
+        state_of(second, lambda s: s["time"] > 0)
         with open(f"/proc/{served.pid}/status", encoding="ascii") as status:
             kb = next(int(line.split()[1]) for line in status if line.startswith("VmRSS"))
         print(f"{count} malformed messages; {kb / 1024:.0f} MB of memory")

@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -26,7 +27,7 @@ class Browser:
             [program, "--headless", "--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader",
              "--enable-unsafe-swiftshader", "--remote-debugging-port=0", "--remote-allow-origins=*",
              f"--user-data-dir={self.folder}", f"--window-size={size[0]},{size[1]}", "about:blank"],
-            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True)
         port = None
         for line in self.process.stderr:
             found = re.search(r"DevTools listening on ws://127\.0\.0\.1:(\d+)/", line)
@@ -89,7 +90,8 @@ class Browser:
 
     def close(self):
         self.socket.close()
-        self.process.kill()
+        # Debian's command is a script, whose child is the browser
+        os.killpg(self.process.pid, signal.SIGKILL)
         self.process.wait()
         self.process.stderr.close()
         shutil.rmtree(self.folder, ignore_errors=True)

@@ -16,6 +16,7 @@ from ._library import (ArgumentError, BusyError, Discarded, Diverged, Error, Fil
 from .body import Body, Obstacle, Rigid, rotation
 from .cut import CutInfo
 from ._command import command, cost, explain
+from ._serve import Server, serve
 from .rig import friction, plot_friction
 from .law import Law, PythonLaw
 from .mesh import TetMesh, TriMesh
@@ -31,7 +32,7 @@ __version__: str = _quick.dfm_version(None, None, None).decode()
 __all__ = ["ArgumentError", "Body", "BusyError", "ContactChoice", "Context", "CutInfo",
            "Discarded", "Diverged", "Error", "FileError", "Filter", "FormatError", "HandleError",
            "Hit", "JointDef", "Law", "Material", "Obstacle", "OutOfMemory", "Parameter",
-           "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run", "Scene", "Shape",
-           "StateError", "TetMesh", "Tool", "TriMesh", "Trouble", "UnsupportedError", "World",
+           "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run", "Scene", "Server",
+           "Shape", "StateError", "TetMesh", "Tool", "TriMesh", "Trouble", "UnsupportedError", "World",
            "command", "cost", "default_context", "explain", "friction", "include_dir",
-           "plot_friction", "rotation", "run", "template_dir"]
+           "plot_friction", "rotation", "run", "serve", "template_dir"]

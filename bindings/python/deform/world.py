@@ -114,7 +114,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
     """
 
     __slots__ = ("__weakref__", "_asked", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
-                 "_lists", "_owner", "context", "handle", "shown", "user")
+                 "_lists", "_owner", "_streamed", "context", "handle", "shown", "user")
     _finalize: Any
     _instead = ("World.snapshot() gives bytes, which restore() of a world with the same contents takes, and "
                 "World.write_scene a file")
@@ -157,6 +157,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         self.user: Any = None
         self.shown = Shown()
         self._busy = 0  # the thread that is inside a call
+        self._streamed = 64  # bytes, more than a stream has had
         self._asked = False  # to stop, by a signal
         self._bits = ctypes.c_uint32(0)
         self._bits_at = ctypes.byref(self._bits)
@@ -722,10 +723,13 @@ class World(Queries, Reports, Tools, OfThisProcess):
         given.kind = _abi.DFM_STREAM_SCENE if scene else _abi.DFM_STREAM_FRAME
         given.flags = _abi.DFM_STREAM_CONTACTS if contacts and not scene else 0
         given.frame, given.packet = whole(frame, "frame"), whole(packet, "packet")
-        size = ctypes.c_size_t(0)
-        check(quick.dfm_world_stream(self.handle, ctypes.byref(given), None, ctypes.byref(size)))
-        buffer = ctypes.create_string_buffer(size.value)
-        check(quick.dfm_world_stream(self.handle, ctypes.byref(given), buffer, ctypes.byref(size)))
+        size = ctypes.c_size_t(self._streamed)
+        buffer = ctypes.create_string_buffer(self._streamed)
+        status = quick.dfm_world_stream(self.handle, ctypes.byref(given), buffer, ctypes.byref(size))
+        if size.value > self._streamed:  # more than the last time, and a half for the next ones
+            self._streamed = size.value + size.value // 2
+            return self.stream(scene, contacts, frame, packet)
+        check(status)
         return buffer.raw[:size.value]
 
     def restore(self, snapshot: Any) -> None:

@@ -7,10 +7,18 @@
 #include "math/width.h"
 
 namespace dfm {
+namespace {
 
-ContactRows::ContactRows(const Memory &m)
-    : kernels_(dense_kernels()),
-      loops_(doubles_at_once() >= 4 ? contact_kernels_avx2() : contact_kernels_sse2()) {
+const ContactKernels &contact_kernels() {
+  if constexpr (kHasWider) {
+    if (doubles_at_once() >= 4) return contact_kernels_avx2();
+  }
+  return contact_kernels_sse2();
+}
+
+}  // namespace
+
+ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()), loops_(contact_kernels()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
              given_, frame, drive, rate, borne, start_depth, yields, wn, wt, cross, impulse, bond,
              dof_of_point_, dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_,

@@ -15,7 +15,10 @@ Point *points(Array<double> &a) { return reinterpret_cast<Point *>(a.data()); }
 }  // namespace
 
 const PointsKernels &points_kernels() {
-  return doubles_at_once() >= 4 ? points_kernels_avx2() : points_kernels_sse2();
+  if constexpr (kHasWider) {
+    if (doubles_at_once() >= 4) return points_kernels_avx2();
+  }
+  return points_kernels_sse2();
 }
 
 double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h) {

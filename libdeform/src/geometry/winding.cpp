@@ -85,6 +85,8 @@ uint32_t WindingTree::build(const double *points, const uint32_t *tris, Array<Ve
   boxes_[number].begin = begin;
   boxes_[number].end = end;
   if (end - begin <= kLeaf) {
+    // nth_element leaves them in an order of the standard library's own, and they are summed
+    std::sort(order.begin() + begin, order.begin() + end);
     for (uint32_t i = begin; i < end; ++i)
       for (int k = 0; k < 3; ++k)
         corners_.push_back(load3(points + 3 * size_t(tris[3 * size_t(order[i]) + k])));

@@ -7,8 +7,9 @@ namespace dfm {
 
 struct Vec3 {
   double x = 0, y = 0, z = 0;
-  double &operator[](int i) { return (&x)[i]; }
-  double operator[](int i) const { return (&x)[i]; }
+  // no pointer to x reaches y and z: clang takes that as a promise
+  double &operator[](int i) { return i == 0 ? x : i == 1 ? y : z; }
+  double operator[](int i) const { return i == 0 ? x : i == 1 ? y : z; }
 };
 
 inline bool all_finite(const double *x, size_t n) {

@@ -6,6 +6,7 @@
 namespace dfm {
 
 int doubles_at_once() {
+#if defined(__x86_64__)
   const bool avx2 = __builtin_cpu_supports("avx2");
   const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                       __builtin_cpu_supports("avx512dq");
@@ -13,16 +14,25 @@ int doubles_at_once() {
   if (asked && std::strcmp(asked, "sse2") == 0) return 2;
   if (asked && std::strcmp(asked, "avx2") == 0 && avx2) return 4;
   return avx512 ? 8 : avx2 ? 4 : 2;
+#else
+  return 2;
+#endif
 }
 
 const DenseKernels &dense_kernels() {
-  const int width = doubles_at_once();
-  return width == 8 ? dense_kernels_avx512() : width == 4 ? dense_kernels_avx2() : dense_kernels_sse2();
+  if constexpr (kHasWider) {
+    const int width = doubles_at_once();
+    if (width > 2) return width == 8 ? dense_kernels_avx512() : dense_kernels_avx2();
+  }
+  return dense_kernels_sse2();
 }
 
 // A row of a block has three doubles: vectors of eight would be half empty.
 const BlockKernels &block_kernels() {
-  return doubles_at_once() >= 4 ? block_kernels_avx2() : block_kernels_sse2();
+  if constexpr (kHasWider) {
+    if (doubles_at_once() >= 4) return block_kernels_avx2();
+  }
+  return block_kernels_sse2();
 }
 
 }  // namespace dfm

@@ -1,11 +1,30 @@
 #include "mesh/vtu_array.h"
 
+#ifdef DEFORM_HAVE_ZLIB
 #include <zlib.h>
+#endif
 
 #include <algorithm>
+#include <span>
 
 namespace dfm {
 namespace {
+
+// Unpacks into exactly `to.size()` bytes.
+void unpack_block(const Cursor &in, std::string_view packed, std::span<char> to, uint64_t block) {
+#ifdef DEFORM_HAVE_ZLIB
+  uLongf bytes = static_cast<uLongf>(to.size());
+  const int code =
+      uncompress(reinterpret_cast<Bytef *>(to.data()), &bytes, reinterpret_cast<const Bytef *>(packed.data()),
+                 static_cast<uLong>(packed.size()));
+  if (code == Z_MEM_ERROR) throw std::bad_alloc();
+  if (code != Z_OK || bytes != to.size())
+    in.refuse("compressed block %llu is damaged (zlib says %d)", ull(block), code);
+#else
+  in.refuse("is compressed (block %llu is), and this library was built without zlib: write it uncompressed",
+            ull(block));
+#endif
+}
 
 // Limit on the unpacked bytes of an array relative to the bytes of the file: an array of types compresses a
 // thousandfold, but coordinates and cells of a valid file vary. Second: the largest expansion of one byte by
@@ -137,14 +156,8 @@ class Unpacker {
       block.resize(size_t(packed[b]));
       if (!source_.read(block.data(), block.size()))
         in_.refuse("the file ends, or is not base64, inside compressed block %llu", ull(b));
-      uLongf bytes = static_cast<uLongf>(b + 1 < nblock || last == 0 ? size : last);
-      const uLongf wanted = bytes;
-      const int code =
-          uncompress(reinterpret_cast<Bytef *>(out.data() + size * b), &bytes,
-                     reinterpret_cast<const Bytef *>(block.data()), static_cast<uLong>(block.size()));
-      if (code == Z_MEM_ERROR) throw std::bad_alloc();
-      if (code != Z_OK || bytes != wanted)
-        in_.refuse("compressed block %llu is damaged (zlib says %d)", ull(b), code);
+      const uint64_t bytes = b + 1 < nblock || last == 0 ? size : last;
+      unpack_block(in_, {block.data(), block.size()}, {out.data() + size * b, size_t(bytes)}, b);
     }
     return {out.data(), out.size()};
   }

@@ -296,7 +296,7 @@ void Loader::add_bundled() {
 }
 
 void Loader::discover() {
-  const char *path = secure_getenv("DEFORM_PLUGIN_PATH");
+  const char *path = trusted_environment("DEFORM_PLUGIN_PATH");
   if (!path && std::getenv("DEFORM_PLUGIN_PATH"))
     registry_.pass_over("DEFORM_PLUGIN_PATH", "ignored: the process runs with elevated privilege");
   for (const char *begin = path; begin && *begin;) {

@@ -4,6 +4,8 @@
 
 #ifdef DEFORM_PLUGINS_STATIC
 
+#include <cstdlib>
+
 namespace dfm {
 
 SharedObject::SharedObject(const std::string &, const std::string &name) {
@@ -14,6 +16,7 @@ SharedObject::SharedObject(const std::string &, const std::string &name) {
 }
 void SharedObject::close(void *) noexcept {}
 std::string default_plugin_directory() { return {}; }
+const char *trusted_environment(const char *name) { return std::getenv(name); }
 
 }  // namespace dfm
 
@@ -24,6 +27,7 @@ std::string default_plugin_directory() { return {}; }
 #include <link.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <vector>
@@ -127,6 +131,8 @@ SharedObject::SharedObject(const std::string &file, const std::string &name) {
 void SharedObject::close(void *image) noexcept {
   if (image) dlclose(image);
 }
+
+const char *trusted_environment(const char *name) { return secure_getenv(name); }
 
 std::string default_plugin_directory() {
   Dl_info info{};

@@ -30,4 +30,8 @@ class SharedObject {
 // empty if the plugins are linked into the library.
 std::string default_plugin_directory();
 
+// The value of an environment variable; null where it is unset, or where the process could open files in the
+// name of another user than the one who has set it.
+const char *trusted_environment(const char *name);
+
 }  // namespace dfm

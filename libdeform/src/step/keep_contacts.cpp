@@ -159,7 +159,7 @@ void order_keys(const World &w, StepContext &step) {
   auto end = order.begin();
   for (const uint32_t m : w.store.by_key)
     if (now[m] != kNone) *end++ = now[m];
-  const bool few = order.end() - end <= kFew;
+  const bool few = size_t(order.end() - end) <= kFew;
   for (uint32_t i = 0; i < to.n; ++i) {
     if (step.match[i] != kNone && now[step.match[i]] == i) continue;
     const auto at = few ? std::upper_bound(order.begin(), end, i, before) : end;

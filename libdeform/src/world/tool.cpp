@@ -376,7 +376,8 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint3
     }
     if (part != kNone) held[part].push_back(i);
   }
-  const auto holding = std::count_if(held.begin(), held.end(), [](auto &list) { return !list.empty(); });
+  const auto holding =
+      size_t(std::count_if(held.begin(), held.end(), [](auto &list) { return !list.empty(); }));
   if (holding > capacity)
     fail(DFM_E_ARG, "tool '%s' would hold '%s' with %d parts, and there is room for %u attachments",
          t.name.c_str(), b.name.c_str(), int(holding), capacity);

@@ -149,7 +149,9 @@ TEST_P(LatePoints, OfABodyThatIsMovedOrLoaded_AreThoseOfAStepThatMovesAll) {
     whole.touch();
     test::run(whole.world, 1e-3, 1e-3);
   }
-  EXPECT_LT(apart(late, whole), 1e-6) << "hundredths of the rest distance, which solves leave";
+  // Rounding decides about a round of the guard here and there, and places then differ by what solves leave:
+  // hundredths of the rest distance, 2e-5 m, over a way of 4e-3 m. Points that are not moved are off by all.
+  EXPECT_LT(apart(late, whole), 2e-4);
 }
 
 TEST_P(LatePoints, AfterAnImpulseOfTheHost_MoveAccordingly) {

@@ -1,16 +1,14 @@
-#include "session.h"
+#include "live/session.h"
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <thread>
 
 #include "cli/interrupt.h"
-#include "cli/leaving.h"
 #include "cli/messages.h"
 #include "cli/state_file.h"
 
-namespace serve {
+namespace live {
 namespace {
 
 constexpr double kBudget = 0.9;  // of the time of a picture, for steps; what is left is for viewers
@@ -52,45 +50,37 @@ std::string as_utf8(std::string text) {
   return text;
 }
 
+std::string text_of(const Slider &s) {
+  cli::JsonObject out;
+  out.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label));
+  out.add("value", cli::number(s.value)).add("low", cli::number(s.low)).add("high", cli::number(s.high));
+  return out.add("logarithmic", yes(s.logarithmic)).text();
+}
+
 }  // namespace
 
-Session::Session(const Options &options, const cli::Globals &globals)
-    : options_(options),
-      scene_(globals, options.scene, options.set, 0),
+Session::Session(const cli::Globals &globals, const std::string &scene, const std::vector<std::string> &set,
+                 Viewers &viewers, bool runs)
+    : scene_(globals, scene, set, 0),
       simulation_(scene_, dfm_world_time(scene_.world())),
       pull_(simulation_),
-      sliders_(live::make_sliders(simulation_)),
+      sliders_(make_sliders(simulation_)),
       upright_(scene_),
-      server_(options.port, options.token),
-      running_(!options.paused) {
+      viewers_(viewers),
+      running_(runs) {
   cli::refuse_static(scene_, "serve");
 }
 
-void Session::run() {
-  cli::catch_signals();
-  cli::stepping = scene_.world();
-  std::printf("http://127.0.0.1:%u/?token=%s\n", unsigned{server_.port()}, options_.token.c_str());
-  std::fflush(stdout);
-  const std::chrono::duration<double> picture(1 / options_.rate);
-  const Clock::time_point began = Clock::now();
-  for (Clock::time_point next = began; !cli::interrupted() && server_.works();) {
-    for (const Request &request : server_.take()) act(request);
-    attempt([&] {
-      if (pull_.holds() && server_.in_control() != holder_) pull_.release();
-      if (running_) advance(picture.count());
-    });
-    attempt([&] {
-      scene_.renew_list();
-      if (server_.viewers() > 0) show();
-    });
-    next += std::chrono::duration_cast<Clock::duration>(picture);
-    next = std::max(next, Clock::now());
-    std::this_thread::sleep_until(next);
-    if (options_.seconds > 0 && std::chrono::duration<double>(next - began).count() > options_.seconds) break;
-  }
-  cli::stepping = 0;
-  if (cli::interrupted()) cli::came_back();
-  if (!server_.works()) throw cli::Failure(cli::kStopped, "serve: the network has failed; start it again");
+void Session::picture(double seconds) {
+  for (const Request &request : viewers_.take()) act(request);
+  attempt([&] {
+    if (pull_.holds() && viewers_.in_control() != holder_) pull_.release();
+    if (running_) advance(seconds);
+  });
+  attempt([&] {
+    scene_.renew_list();
+    if (viewers_.viewers() > 0) show();
+  });
 }
 
 // What fails tells viewers why, and ends a pull; they can go on, or reset.
@@ -138,7 +128,7 @@ void Session::ask(const std::string &what, const cli::JsonValue &line, uint32_t 
   } else if (what == "slider") {
     const std::string name = line.get("name");
     const auto slider =
-        std::find_if(sliders_.begin(), sliders_.end(), [&](const live::Slider &s) { return s.name == name; });
+        std::find_if(sliders_.begin(), sliders_.end(), [&](const Slider &s) { return s.name == name; });
     if (slider == sliders_.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
     const double value = line.scalar("value");
     if (!(value >= slider->low && value <= slider->high))
@@ -160,7 +150,7 @@ void Session::ask(const std::string &what, const cli::JsonValue &line, uint32_t 
   } else if (what == "reset") {
     let_go();
     simulation_.restart();
-    for (live::Slider &s : sliders_) s.value = s.first;
+    for (Slider &s : sliders_) s.value = s.first;
     wanted_ = 0;
   } else {
     throw cli::Failure(cli::kBadInput, "\"" + what + "\" is nothing that a viewer can ask for");
@@ -209,34 +199,40 @@ void Session::show_scene(cli::Shapes shapes) {
     }
   }
   shown_ = std::move(shapes);
-  server_.show_scene(packets(DFM_STREAM_SCENE), scene_due_ ? Bytes() : std::move(changed));
+  viewers_.show_scene(packets(DFM_STREAM_SCENE), scene_due_ ? Bytes() : std::move(changed));
   scene_due_ = false;
 }
 
 void Session::show() {
   Bytes frame = packets(DFM_STREAM_FRAME);
   show_scene(cli::shapes_in(frame));
-  server_.show_state(state());
-  server_.show_frame(std::move(frame));
+  viewers_.show_state(whole_state());
+  viewers_.show_frame(std::move(frame));
   ++frame_;
 }
 
-std::string Session::state() const {
+std::string Session::brief_state(uint32_t viewer, size_t slider) const {
+  cli::JsonObject out = state();
+  out.add("you", std::to_string(viewer));
+  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[slider % sliders_.size()])}));
+  return as_utf8(out.text());
+}
+
+std::string Session::whole_state() const {
   std::vector<std::string> sliders, probes;
-  for (const live::Slider &s : sliders_) {
-    cli::JsonObject one;
-    one.add("name", cli::quoted(s.name))
-        .add("label", cli::quoted(s.label))
-        .add("value", cli::number(s.value));
-    one.add("low", cli::number(s.low)).add("high", cli::number(s.high));
-    sliders.push_back(one.add("logarithmic", yes(s.logarithmic)).text());
-  }
+  for (const Slider &s : sliders_) sliders.push_back(text_of(s));
   for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) {
     const char *name = nullptr;
     double at[3];
     cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
     probes.push_back(cli::JsonObject().add("name", cli::quoted(name)).add("at", cli::json_vector(at)).text());
   }
+  cli::JsonObject out = state();
+  out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
+  return as_utf8(out.text());
+}
+
+cli::JsonObject Session::state() const {
   double up[3];
   upright_.at(dfm_world_time(scene_.world()), up);
   cli::JsonObject out;
@@ -247,20 +243,18 @@ std::string Session::state() const {
       .add("message", cli::quoted(message_))
       .add("step_ms", cli::number(simulation_.step_ms()))
       .add("real", cli::number(real_))
-      .add("control", std::to_string(server_.in_control()))
-      .add("viewers", std::to_string(server_.viewers()))
-      .add("up", cli::json_vector(up))
-      .add("sliders", cli::json_array(sliders))
-      .add("probes", cli::json_array(probes));
+      .add("control", std::to_string(viewers_.in_control()))
+      .add("viewers", std::to_string(viewers_.viewers()))
+      .add("up", cli::json_vector(up));
   const dfm_scene_settings &settings = scene_.settings();
   if (settings.has_camera)
     out.add("eye", cli::json_vector(settings.eye)).add("look_at", cli::json_vector(settings.look_at));
   if (pull_.holds()) {
     cli::JsonObject pull;
-    pull.add("place", live::text_of(pull_.place())).add("to", live::text_of(pull_.to()));
+    pull.add("place", text_of(pull_.place())).add("to", text_of(pull_.to()));
     out.add("pull", pull.add("force", cli::number(pull_.force())).text());
   }
-  return as_utf8(out.text());
+  return out;
 }
 
-}  // namespace serve
+}  // namespace live

@@ -9,24 +9,20 @@
 #include "cli/upright.h"
 #include "live/pull.h"
 #include "live/sliders.h"
-#include "server.h"
+#include "live/viewers.h"
 
-namespace serve {
-
-struct Options {
-  std::string scene, token;
-  std::vector<std::string> set;
-  uint16_t port = 0;    // 0: a free one
-  double rate = 30;     // pictures a second
-  bool paused = false;  // begins so
-  double seconds = 0;   // of the clock, after which it ends; 0: never
-};
+namespace live {
 
 class Session {
  public:
-  Session(const Options &options, const cli::Globals &globals);
-  // Until a signal ends it.
-  void run();
+  // set: as `deform run --set` takes them.
+  Session(const cli::Globals &globals, const std::string &scene, const std::vector<std::string> &set,
+          Viewers &viewers, bool runs);
+  // Does what viewers have asked for, takes steps for as long as a picture lasts, s, and shows the result.
+  void picture(double seconds);
+  const cli::SceneFile &scene() const { return scene_; }
+  // The state as it goes to a viewer of that number, with one slider (which begin again), without probes.
+  std::string brief_state(uint32_t viewer, size_t slider) const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -37,16 +33,16 @@ class Session {
   void advance(double seconds);
   void show();
   void show_scene(cli::Shapes shapes);
-  std::string state() const;
+  cli::JsonObject state() const;  // without sliders and probes
+  std::string whole_state() const;
   Bytes packets(uint32_t kind, dfm_body body = 0);
 
-  const Options &options_;
   cli::SceneFile scene_;
-  live::Simulation simulation_;
-  live::Pull pull_;
-  std::vector<live::Slider> sliders_;
+  Simulation simulation_;
+  Pull pull_;
+  std::vector<Slider> sliders_;
   cli::Upright upright_;
-  Server server_;
+  Viewers &viewers_;
   cli::Shapes shown_;  // bodies that viewers have
   Bytes buffer_;
   bool running_, scene_due_ = true;
@@ -55,4 +51,4 @@ class Session {
   std::string message_;
 };
 
-}  // namespace serve
+}  // namespace live

@@ -1,0 +1,271 @@
+#include "live/received.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <limits>
+
+static_assert(std::endian::native == std::endian::little);
+
+namespace live {
+namespace {
+
+constexpr size_t kHeader = 32, kChunk = 8;     // bytes
+constexpr size_t kMost = size_t{1} << 22;      // points and triangles of all surfaces together
+constexpr size_t kEach = 64;                   // of them, that a surface counts for beside its own
+constexpr size_t kMostRows = size_t{1} << 16;  // of contacts, and of bodies that are there
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+
+// Numbers of frames begin again at 2^32.
+bool older(uint32_t frame, uint32_t other) {
+  const uint32_t behind = other - frame;
+  return behind > 0 && behind < 1u << 31;
+}
+
+size_t weight(const Received::Mesh &m) {
+  return kEach + m.base.size() / 3 + m.triangles.size() / 3 + (m.before ? weight(*m.before) : 0);
+}
+
+}  // namespace
+
+class Received::Chunk {
+ public:
+  Chunk(const unsigned char *bytes, size_t n) : bytes_(bytes), n_(n) {}
+  size_t size() const { return n_; }
+  bool has(size_t at, size_t bytes) const { return at <= n_ && bytes <= n_ - at; }
+  template <class T = uint32_t>
+  T get(size_t at) const {
+    T x;
+    std::memcpy(&x, bytes_ + at, sizeof x);
+    return x;
+  }
+  // Whether n finite floats stand there.
+  bool finite(size_t at, size_t n) const {
+    if (!has(at, 4 * n)) return false;
+    for (size_t i = 0; i < n; ++i)
+      if (!std::isfinite(get<float>(at + 4 * i))) return false;
+    return true;
+  }
+  std::string text(size_t at) const {
+    if (!has(at, 4) || !has(at + 4, get(at))) return {};
+    return {reinterpret_cast<const char *>(bytes_ + at + 4), get(at)};
+  }
+
+ private:
+  const unsigned char *bytes_;
+  size_t n_;
+};
+
+bool Received::read(const unsigned char *bytes, size_t n) {
+  while (n > 0) {
+    if (n < kHeader || std::memcmp(bytes, "DFMS\x01", 5) != 0) return false;
+    const size_t size = Chunk(bytes, n).get(16);
+    if (size < kHeader || size > n) return false;
+    packet(bytes, size);
+    bytes += size;
+    n -= size;
+  }
+  return true;
+}
+
+void Received::packet(const unsigned char *bytes, size_t n) {
+  const Chunk head(bytes, n);
+  const bool frame = bytes[5] == 1, everything = bytes[5] == 0 && bytes[6] == 1 && head.get(8) == 1;
+  told_ = head.get(20);
+  if (frame) {
+    if (begun_ && older(told_, frame_)) return;  // what is there is newer
+    if (!begun_ || told_ != frame_) contacts_.clear();
+    begun_ = true;
+    frame_ = told_;
+    time_ = head.get<double>(24);
+  }
+  for (auto &[number, m] : bodies_) m.told = !everything;
+  for (auto &[number, m] : things_) m.told = !everything;
+  for (size_t at = kHeader; head.has(at, kChunk);) {
+    const size_t size = head.get(at + 4);
+    if (!head.has(at + kChunk, size)) break;
+    chunk(bytes + at, Chunk(bytes + at + kChunk, size));
+    at += kChunk + size;
+  }
+  const auto left_out = [&](const auto &entry) {
+    if (!entry.second.told) drop(entry.second);
+    return !entry.second.told;
+  };
+  std::erase_if(bodies_, left_out);
+  std::erase_if(things_, left_out);
+}
+
+void Received::chunk(const unsigned char *tag, const Chunk &c) {
+  static const struct {
+    char tag[5];
+    void (Received::*read)(const Chunk &);
+  } kKinds[] = {{"BODY", &Received::body},      {"OBST", &Received::thing},   {"BASE", &Received::base},
+                {"TRIS", &Received::triangles}, {"LIST", &Received::list},    {"POSE", &Received::poses},
+                {"SURF", &Received::surface},   {"CONT", &Received::contacts}};
+  for (const auto &kind : kKinds)
+    if (std::memcmp(tag, kind.tag, 4) == 0) return (this->*kind.read)(c);
+}
+
+void Received::drop(const Mesh &m) { held_ -= weight(m); }
+
+// False: it would take too much memory.
+bool Received::make(Mesh &m, const Chunk &c, size_t name) {
+  const size_t n = c.get(8), triangles = c.get(12);
+  if (n > kMost || triangles > kMost || held_ + kEach + n + triangles > kMost) return false;
+  m.name = c.text(name);
+  m.shape = c.get(4);
+  m.frame = told_;
+  m.told = true;
+  m.base.assign(3 * n, std::numeric_limits<float>::quiet_NaN());
+  m.moved.assign(3 * n, kNone);
+  m.x.assign(3 * n, kNone);
+  m.triangles.assign(3 * triangles, UINT32_MAX);
+  m.missing = 6 * n + 3 * triangles;
+  held_ += weight(m);
+  return true;
+}
+
+void Received::body(const Chunk &c) {
+  if (!c.has(0, 20)) return;
+  const auto found = bodies_.find(c.get(0));
+  if (found != bodies_.end()) {
+    Mesh &m = found->second;
+    m.told = true;
+    if (m.shape == c.get(4) || older(told_, m.frame)) return;
+  }
+  Mesh fresh;
+  if (!make(fresh, c, 16)) return;
+  if (found == bodies_.end()) {
+    bodies_.emplace(c.get(0), std::move(fresh));
+    return;
+  }
+  Mesh &old = found->second;
+  drop(old);
+  if (old.missing == 0) fresh.before = std::make_unique<Mesh>(std::move(old));
+  else fresh.before = std::move(old.before);
+  if (fresh.before) held_ += weight(*fresh.before);
+  old = std::move(fresh);
+}
+
+void Received::thing(const Chunk &c) {
+  if (!c.has(0, 44)) return;
+  if (const auto found = things_.find(c.get(0)); found != things_.end()) {
+    found->second.told = true;
+    return;
+  }
+  Thing t;
+  if (!c.finite(20, 5) || !make(t, c, 40)) return;
+  t.missing -= t.moved.size();
+  std::fill(t.moved.begin(), t.moved.end(), 0.0);  // things do not change their shape
+  t.sensor = c.get(16) & 1;
+  t.radius = c.get<float>(20);
+  t.half_length = c.get<float>(24);
+  for (size_t k = 0; k < 3; ++k) t.half_size[k] = c.get<float>(28 + 4 * k);
+  things_.emplace(c.get(0), std::move(t));
+}
+
+Received::Mesh *Received::mesh(uint32_t number, uint32_t shape) {
+  if (const auto at = bodies_.find(number); at != bodies_.end() && at->second.shape == shape)
+    return &at->second;
+  if (const auto at = things_.find(number); at != things_.end() && at->second.shape == shape)
+    return &at->second;
+  return nullptr;
+}
+
+void Received::base(const Chunk &c) {
+  if (!c.has(0, 16)) return;
+  Mesh *const m = mesh(c.get(0), c.get(4));
+  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
+  if (!m || first > m->base.size() || n > m->base.size() - first || !c.finite(16, n)) return;
+  for (size_t i = 0; i < n; ++i) {
+    float &to = m->base[first + i];
+    m->missing -= std::isnan(to);
+    to = c.get<float>(16 + 4 * i);
+    m->x[first + i] = double{to} + m->moved[first + i];
+  }
+  if (m->missing == 0) settle(*m);
+}
+
+void Received::triangles(const Chunk &c) {
+  if (!c.has(0, 16)) return;
+  Mesh *const m = mesh(c.get(0), c.get(4));
+  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
+  if (!m || first > m->triangles.size() || n > m->triangles.size() - first || !c.has(16, 4 * n)) return;
+  for (size_t i = 0; i < n; ++i)
+    if (c.get(16 + 4 * i) >= m->base.size() / 3) return;
+  for (size_t i = 0; i < n; ++i) {
+    uint32_t &to = m->triangles[first + i];
+    m->missing -= to == UINT32_MAX;
+    to = c.get(16 + 4 * i);
+  }
+  if (m->missing == 0) settle(*m);
+}
+
+// Complete: what was drawn before is not needed any more.
+void Received::settle(Mesh &m) {
+  if (!m.before) return;
+  drop(*m.before);
+  m.before.reset();
+}
+
+void Received::list(const Chunk &c) {
+  if (listed_ != frame_) {
+    std::erase_if(bodies_, [&](const auto &entry) {  // gone in the frame before
+      const bool gone = !present_.contains(entry.first) && older(entry.second.frame, listed_);
+      if (gone) drop(entry.second);
+      return gone;
+    });
+    present_.clear();
+    listed_ = frame_;
+  }
+  for (size_t at = 0; c.has(at, 8) && present_.size() < kMostRows; at += 8)
+    present_[c.get(at)] = c.get(at + 4);
+}
+
+void Received::poses(const Chunk &c) {
+  for (size_t at = 0; c.has(at, 32); at += 32) {
+    const auto found = things_.find(c.get(at));
+    if (found == things_.end() || !c.finite(at + 4, 7)) continue;
+    for (size_t k = 0; k < 3; ++k) found->second.position[k] = double{c.get<float>(at + 4 + 4 * k)};
+    for (size_t k = 0; k < 4; ++k) found->second.rotation[k] = double{c.get<float>(at + 16 + 4 * k)};
+  }
+}
+
+void Received::surface(const Chunk &c) {
+  if (!c.has(0, 20)) return;
+  const auto found = bodies_.find(c.get(0));
+  if (found == bodies_.end() || found->second.shape != c.get(4)) return;
+  Mesh &m = found->second;
+  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
+  const bool floats = c.get(16) & 1;
+  if (first > m.moved.size() || n > m.moved.size() - first) return;
+  if (floats ? !c.finite(20, n) : !c.finite(20, 6) || !c.has(48, 2 * n)) return;
+  for (size_t i = 0; i < n; ++i) {
+    double &to = m.moved[first + i];
+    m.missing -= std::isnan(to);
+    if (floats) {
+      to = double{c.get<float>(20 + 4 * i)};
+    } else {
+      const size_t k = 4 * (i % 3);
+      to = double{c.get<float>(20 + k)} + double{c.get<float>(32 + k)} * c.get<uint16_t>(48 + 2 * i);
+    }
+    m.x[first + i] = double{m.base[first + i]} + to;
+  }
+  if (m.missing == 0) settle(m);
+}
+
+void Received::contacts(const Chunk &c) {
+  for (size_t at = 0; c.has(at, 28) && contacts_.size() < kMostRows; at += 28) {
+    if (!c.finite(at, 6)) continue;
+    Contact row;
+    for (size_t k = 0; k < 3; ++k) {
+      row.point[k] = c.get<float>(at + 4 * k);
+      row.force[k] = c.get<float>(at + 12 + 4 * k);
+    }
+    row.sticks = c.get(at + 24);
+    contacts_.push_back(row);
+  }
+}
+
+}  // namespace live

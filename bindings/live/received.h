@@ -1,0 +1,74 @@
+// What packets of a stream have told: the format of doc/reference/stream.md, read. Bytes of any origin may
+// come: what is not of the format is passed over, and memory is bounded.
+#pragma once
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace live {
+
+class Received {
+ public:
+  // A surface; of a thing in the axes of its pose.
+  struct Mesh {
+    std::string name;
+    uint32_t shape = 0, frame = 0;  // frame: when it was told
+    std::vector<float> base;        // [n,3] m
+    std::vector<double> moved, x;   // [n,3] m; x: where the points are
+    std::vector<uint32_t> triangles;
+    size_t missing = 0;            // values that have not come yet
+    std::unique_ptr<Mesh> before;  // with the triangles of before, until the new ones are complete
+    bool told = false;             // in the packet that is being read
+    // nullptr: there is nothing whole to draw.
+    const Mesh *drawn() const { return missing == 0 ? this : before.get(); }
+  };
+  struct Thing : Mesh {
+    bool sensor = false;
+    float radius = 0, half_length = 0, half_size[3] = {0, 0, 0};
+    double position[3] = {0, 0, 0}, rotation[4] = {0, 0, 0, 1};
+  };
+  struct Contact {
+    float point[3], force[3];
+    uint32_t sticks;
+  };
+
+  // Packets, one behind the other. False: there is something else among them; what stands before it is taken.
+  bool read(const unsigned char *bytes, size_t n);
+  const std::map<uint32_t, Mesh> &bodies() const { return bodies_; }
+  const std::map<uint32_t, Thing> &things() const { return things_; }
+  const std::vector<Contact> &contacts() const { return contacts_; }
+  bool present(uint32_t body) const { return present_.contains(body); }
+  double time() const { return time_; }      // s, of the newest frame
+  uint32_t frame() const { return frame_; }  // its number
+
+ private:
+  class Chunk;
+  void packet(const unsigned char *bytes, size_t n);
+  void chunk(const unsigned char *tag, const Chunk &c);
+  void body(const Chunk &c);
+  void thing(const Chunk &c);
+  void base(const Chunk &c);
+  void triangles(const Chunk &c);
+  void list(const Chunk &c);
+  void poses(const Chunk &c);
+  void surface(const Chunk &c);
+  void contacts(const Chunk &c);
+  bool make(Mesh &m, const Chunk &c, size_t name);
+  Mesh *mesh(uint32_t number, uint32_t shape);
+  void drop(const Mesh &m);
+  void settle(Mesh &m);
+
+  std::map<uint32_t, Mesh> bodies_;
+  std::map<uint32_t, Thing> things_;
+  std::map<uint32_t, uint32_t> present_;
+  std::vector<Contact> contacts_;
+  double time_ = 0;
+  uint32_t frame_ = 0, told_ = 0, listed_ = 0;  // told_: of the packet that is read; listed_: of present_
+  bool begun_ = false;
+  size_t held_ = 0;  // of the bound of memory
+};
+
+}  // namespace live

@@ -1,0 +1,69 @@
+// The other end of `--stream rtp://`: takes packets at an address of this machine, reports to their sender
+// what gets lost, and asks it for what doc/reference/stream.md lists.
+#pragma once
+#include <chrono>
+#include <deque>
+#include <string>
+#include <vector>
+
+#include "cli/json_text.h"
+#include "cli/rtp.h"
+#include "live/received.h"
+
+namespace live {
+
+class RtpReceiver {
+ public:
+  // url: "rtp://ADDRESS:PORT[?token=TEXT]", what the sender sends to. Throws cli::Failure.
+  explicit RtpReceiver(const std::string &url);
+  ~RtpReceiver();
+  RtpReceiver(const RtpReceiver &) = delete;
+  // Takes what has come, and sends what is due; call it often.
+  void hear();
+  const Received &scene() const { return scene_; }
+  uint64_t frames() const { return frames_; }  // that have come to their end
+  uint64_t packets() const { return received_; }
+  uint64_t lost() const { return highest_ + 1 > first_ + received_ ? highest_ + 1 - first_ - received_ : 0; }
+  bool ended() const { return ended_; }  // the sender has said so
+  bool may_ask() const { return !url_.token.empty(); }
+  // replaced: by the next such one while it waits, as places to which something is pulled are.
+  void ask(const cli::JsonObject &request, bool replaced = false);
+  // What the sender tells who has the token; null before.
+  const cli::JsonValue &state() const { return state_; }
+  struct Slider {
+    std::string name, label;
+    double low = 0, high = 1, value = 0;
+    bool logarithmic = false;
+  };
+  std::vector<Slider> &sliders() { return sliders_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  struct Request {
+    uint32_t number;
+    std::string text;
+    bool replaced;
+  };
+  void datagram(const unsigned char *in, size_t n);
+  void answer(const unsigned char *in, size_t n);
+  void told(const cli::JsonValue &state);
+  void report();
+  void send_requests();
+  std::vector<unsigned char> request(uint32_t number, const std::string &text) const;
+
+  const cli::RtpUrl url_;
+  int socket_;
+  uint32_t own_, source_ = 0;  // numbers of this end and of the sender
+  bool begun_ = false, ended_ = false;
+  sockaddr_storage sender_ = {};
+  socklen_t sender_size_ = 0;
+  uint64_t first_ = 0, highest_ = 0, received_ = 0, expected_before_ = 0, received_before_ = 0, frames_ = 0;
+  Clock::time_point heard_, reported_, asked_;
+  Received scene_;
+  std::deque<Request> requests_;    // that the sender has not taken yet
+  uint32_t number_ = 0, sent_ = 0;  // of the last one, and of the last one that was sent
+  cli::JsonValue state_;
+  std::vector<Slider> sliders_;
+};
+
+}  // namespace live

@@ -1,0 +1,301 @@
+#include "remote.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "drawing.h"
+#include "live/pull.h"
+#include "messages.h"
+#include "panels.h"
+
+namespace view {
+
+using render::Vec;
+
+namespace {
+
+constexpr double kTurn = 3.5;  // radians for a way across the picture's height
+
+// Distance along a ray to triangles; infinite: it meets none.
+double distance(const live::Received::Mesh &m, const Ray &ray) {
+  double best = std::numeric_limits<double>::infinity();
+  const auto at = [&](uint32_t i) { return render::vec(&m.x[3 * size_t{i}]); };
+  for (size_t k = 0; k + 2 < m.triangles.size(); k += 3) {
+    const Vec p = at(m.triangles[k]), u = at(m.triangles[k + 1]) - p, v = at(m.triangles[k + 2]) - p;
+    const Vec h = cross(ray.direction, v), s = ray.origin - p, q = cross(s, u);
+    const double d = dot(u, h), a = dot(s, h) / d, b = dot(ray.direction, q) / d, far = dot(v, q) / d;
+    if (a >= 0 && b >= 0 && a + b <= 1 && far > 0 && far < best) best = far;
+  }
+  return best;
+}
+
+}  // namespace
+
+Remote::Remote(const Options &options, const cli::Globals &globals)
+    : options_(options), globals_(globals), receiver_(options.scene) {
+  if (!options.script.empty()) script_.emplace(options.script);
+  window_ =
+      Window::open(options.width, options.height, "deform view " + options.scene.substr(0, 40), !script_);
+  canvas_.open(*window_, options.detail);
+  last_ = window_->now();
+}
+
+void Remote::run() {
+  window_->begin_panels({}, 0.02);  // sizes of panels are known from the second time on
+  panels();
+  window_->end_panels();
+  while (!window_->closed() && !quit_) frame();
+}
+
+void Remote::frame() {
+  std::vector<Input> inputs = window_->poll(0.004);
+  receiver_.hear();
+  std::vector<ScriptLine> due;
+  const double now = window_->now();
+  if (size_ == 0) first_look();
+  if (size_ == 0) began_ = now;
+  else if (script_) script_->frame(now - began_, inputs, due);
+  window_->begin_panels(inputs, now - last_);
+  last_ = now;
+  for (const Input &in : inputs) handle(in);
+  for (const ScriptLine &line : due)
+    if (line.kind == ScriptLine::slider) set_slider(line.name, line.value);
+  pull_to_mouse();
+  panels();
+  draw();
+  for (const ScriptLine &line : due)
+    if (line.kind == ScriptLine::shot) shot(line.name);
+  window_->show();
+  if (script_ && (script_->done() || (size_ == 0 && receiver_.ended()))) quit_ = true;
+}
+
+// All of it, as for off-screen pictures; the scene's own camera where the sender tells it.
+void Remote::first_look() {
+  if (receiver_.frames() == 0) return;
+  render::Scene picture;
+  fill(picture);
+  const render::Bounds all = render::bounds(picture);
+  if (all.empty() || !canvas_.fit()) return;
+  size_ = render::norm(render::vec(all.hi) - render::vec(all.lo));
+  orbit_.set_up(render::vec(picture.up));
+  orbit_.set(render::auto_camera(picture, canvas_.aspect()));
+}
+
+void Remote::ask(const char *what, const std::function<void(cli::JsonObject &)> &more, bool replaced) {
+  cli::JsonObject request;
+  request.add("do", cli::quoted(what));
+  if (more) more(request);
+  receiver_.ask(request, replaced);
+}
+
+bool Remote::steers() const {
+  const cli::JsonValue &state = receiver_.state();
+  return state.kind == cli::JsonValue::object && state.get("control") == state.get("you");
+}
+
+void Remote::handle(const Input &in) {
+  if (in.kind == Input::key) key(in.name);
+  else mouse(in);
+}
+
+void Remote::key(const std::string &name) {
+  if (name == "space") {
+    ask("run", [&](cli::JsonObject &r) { r.add("on", running() ? "false" : "true"); });
+  } else if (name == "s" || name == ".") {
+    ask("step");
+  } else if (name == "r") {
+    ask("reset");
+  } else if (name == "c") {
+    ask("take");
+  } else if (name == "home") {
+    size_ = 0;
+    set_ = false;
+  } else if (name == "a") {
+    show_arrows_ = !show_arrows_;
+  } else if (name == "t") {
+    show_panels_ = !show_panels_;
+  } else if (name == "q" || name == "escape") {
+    quit_ = true;
+  } else if (script_) {
+    throw cli::Failure(cli::kBadInput, script_->path() + ": there is no key \"" + name + "\" of a stream");
+  }
+}
+
+void Remote::mouse(const Input &in) {
+  if (in.kind == Input::wheel) {
+    if (!window_->panels_want_mouse()) orbit_.zoom(std::pow(0.88, in.turns));
+    return;
+  }
+  const double dx = (in.x - mouse_[0]) / canvas_.height(), dy = (in.y - mouse_[1]) / canvas_.height();
+  mouse_[0] = in.x;
+  mouse_[1] = in.y;
+  if (in.kind == Input::press && held_ < 0 && !window_->panels_want_mouse()) press(in.button);
+  if (in.kind == Input::release && in.button == kLeft && pulled_) {
+    pulled_.reset();
+    ask("release");
+  }
+  if (in.kind == Input::release && in.button == held_) held_ = -1;
+  if (in.kind != Input::move || held_ < 0) return;
+  if (held_ == kMiddle) orbit_.shift(-dx, dy);
+  else orbit_.turn(-kTurn * dx, kTurn * dy);
+}
+
+void Remote::press(int button) {
+  const Ray ray = orbit_.ray(canvas_.across(mouse_[0]), canvas_.above(mouse_[1]), canvas_.aspect());
+  double far = std::numeric_limits<double>::infinity();
+  for (const auto &[number, body] : receiver_.scene().bodies())
+    if (const auto *const m = body.drawn(); m && receiver_.scene().present(number))
+      far = std::min(far, distance(*m, ray));
+  if (button != kLeft || !std::isfinite(far) || !steers()) {
+    held_ = button;
+    return;
+  }
+  pulled_ = ray.origin + ray.direction * far;
+  ask("grab", [&](cli::JsonObject &r) {
+    r.add("from", live::text_of(ray.origin)).add("along", live::text_of(ray.direction));
+  });
+}
+
+// In the plane through the picked place that faces the camera.
+void Remote::pull_to_mouse() {
+  if (!pulled_) return;
+  const Vec to =
+      orbit_.at_depth(canvas_.across(mouse_[0]), canvas_.above(mouse_[1]), canvas_.aspect(), *pulled_);
+  if (render::norm(to - *pulled_) == 0) return;
+  pulled_ = to;
+  ask("pull", [&](cli::JsonObject &r) { r.add("to", live::text_of(to)); }, true);
+}
+
+void Remote::set_slider(const std::string &name, double value) {
+  ask("slider",
+      [&](cli::JsonObject &r) { r.add("name", cli::quoted(name)).add("value", cli::number(value)); });
+}
+
+void Remote::panels() {
+  if (!show_panels_) return;
+  begin_panel();
+  const live::Received &scene = receiver_.scene();
+  const cli::JsonValue &state = receiver_.state();
+  if (steers()) {
+    if (ImGui::Button(running() ? "pause" : "run", {scaled(60), 0})) key("space");
+    ImGui::SameLine();
+    if (ImGui::Button("step")) key("s");
+    ImGui::SameLine();
+    if (ImGui::Button("restart")) key("r");
+  } else if (state.kind == cli::JsonValue::object) {
+    if (ImGui::Button("take control")) key("c");
+  }
+  ImGui::Text("t = %.4f s, frame %u", scene.time(), scene.frame());
+  ImGui::Text("%llu packets, %llu lost", static_cast<unsigned long long>(receiver_.packets()),
+              static_cast<unsigned long long>(receiver_.lost()));
+  if (receiver_.ended()) ImGui::TextUnformatted("The sender has ended.");
+  else if (receiver_.packets() == 0) ImGui::TextUnformatted("Nothing has come yet.");
+  if (const std::string message = state.get("message"); !message.empty()) wrapped(message);
+  for (live::RtpReceiver::Slider &s : receiver_.sliders()) {
+    float x = float(s.value);
+    if (slider(s.label.c_str(), &x, float(s.low), float(s.high), "%.3g",
+               s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0)) {
+      s.value = std::clamp(double(x), s.low, s.high);
+      set_slider(s.name, s.value);
+    }
+  }
+  ImGui::End();
+}
+
+void Remote::fill(render::Scene &out) {
+  const live::Received &scene = receiver_.scene();
+  if (const std::vector<double> up = receiver_.state().numbers("up"); up.size() == 3)
+    std::copy_n(up.begin(), 3, out.up);
+  uint32_t color = 0;
+  for (const auto &[number, body] : scene.bodies()) {
+    const render::Color own = render::palette(color++);
+    const auto *const m = body.drawn();
+    if (!m || !scene.present(number) || m->triangles.empty()) continue;
+    render::Surface s;
+    s.xyz = m->x.data();
+    s.n = uint32_t(m->x.size() / 3);
+    s.tri = m->triangles.data();
+    s.ntri = uint32_t(m->triangles.size() / 3);
+    s.rgb[0] = own.r;
+    s.rgb[1] = own.g;
+    s.rgb[2] = own.b;
+    out.surfaces.push_back(s);
+  }
+  for (const auto &[number, t] : scene.things()) {
+    if (t.sensor || t.missing) continue;
+    if (t.triangles.empty()) {
+      cli::Solid solid = {t.shape, {}, {}, double{t.radius}, double{t.half_length}};
+      std::copy_n(t.half_size, 3, solid.half_size);
+      std::copy_n(t.position, 3, solid.pose.position);
+      std::copy_n(t.rotation, 4, solid.pose.rotation);
+      cli::add_solid(solid, false, out);
+      continue;
+    }
+    std::vector<double> &xyz = placed_[number];
+    xyz.resize(t.base.size());
+    for (size_t i = 0; i < xyz.size(); i += 3) {
+      const double p[3] = {double{t.base[i]}, double{t.base[i + 1]}, double{t.base[i + 2]}};
+      cli::rotate(t.rotation, p, &xyz[i]);
+      for (size_t k = 0; k < 3; ++k) xyz[i + k] += t.position[k];
+    }
+    cli::add_gray(xyz, t.triangles.data(), uint32_t(t.triangles.size() / 3), out);
+  }
+}
+
+void Remote::draw() {
+  if (!canvas_.fit()) return window_->end_panels();
+  render::Scene picture;
+  fill(picture);
+  orbit_.set_up(render::vec(picture.up));
+  const cli::JsonValue &state = receiver_.state();
+  if (const std::vector<double> eye = state.numbers("eye"), at = state.numbers("look_at");
+      size_ > 0 && !set_ && eye.size() == 3 && at.size() == 3) {
+    set_ = true;
+    render::Camera own = orbit_.camera();
+    std::copy_n(eye.begin(), 3, own.eye);
+    std::copy_n(at.begin(), 3, own.look_at);
+    orbit_.set(own);
+  }
+  picture.camera = orbit_.camera();
+  std::vector<Touch> touches;
+  for (const live::Received::Contact &c : receiver_.scene().contacts())
+    touches.push_back(
+        {{c.point[0], c.point[1], c.point[2]}, {c.force[0], c.force[1], c.force[2]}, c.sticks == 1});
+  if (show_arrows_) arrows_.fill(touches, size_, *picture.camera, picture);
+  std::vector<double> held;
+  if (const cli::JsonValue *const pull = state.find("pull")) {
+    held = pull->numbers("place");
+    const std::vector<double> to = pull->numbers("to");
+    held.insert(held.end(), to.begin(), to.end());
+    if (held.size() == 6) picture.lines.push_back({held.data(), 1, {0.1f, 0.1f, 0.1f}, 2, true});
+  }
+  canvas_.show(picture);
+  window_->end_panels();
+}
+
+void Remote::shot(const std::string &name) {
+  const std::string path = canvas_.write(options_.out.empty() ? "out/stream_view" : options_.out, name);
+  if (!globals_.json) {
+    if (!globals_.quiet) std::printf("%s: t = %g s\n", path.c_str(), receiver_.scene().time());
+  } else {
+    cli::JsonObject row, middles;
+    for (const auto &[number, body] : receiver_.scene().bodies()) {
+      const auto *const m = body.drawn();
+      if (!m || !receiver_.scene().present(number)) continue;
+      double sum[3] = {0, 0, 0};
+      for (size_t i = 0; i < m->x.size(); ++i) sum[i % 3] += m->x[i] / double(m->x.size() / 3);
+      middles.add(m->name, cli::json_vector(sum));
+    }
+    row.add("shot", cli::quoted(path))
+        .add("t", cli::number(receiver_.scene().time()))
+        .add("frame", std::to_string(receiver_.scene().frame()))
+        .add("lost", std::to_string(receiver_.lost()))
+        .add("middle", middles.text());
+    std::printf("%s\n", row.text().c_str());
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace view
