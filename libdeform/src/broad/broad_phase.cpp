@@ -186,8 +186,8 @@ void BroadPhase::look(Body &b, bool asleep, const Now &now) {
   b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
   b.speed = largest_speed(*b.surface);
   // a list for a faster motion holds more than the present one needs, for ever if the body comes to rest
-  const bool wide = ++b.age > skin_steps_ &&
-                    kWide * (reach(b, now) + std::min(skin(b, now), b.skin_most)) < b.margin;
+  const bool wide =
+      ++b.age > skin_steps_ && kWide * (reach(b, now) + std::min(skin(b, now), b.skin_most)) < b.margin;
   b.dirty = wide || b.skin > b.skin_most ||
             !(kRounding * (b.moved + reach_share(now.h, now.offset, b.speed)) <= b.margin);
 }
