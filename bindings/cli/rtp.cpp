@@ -32,6 +32,14 @@ constexpr double kTicks = 90000;                  // of the timestamp, in a seco
 constexpr double kFrom1900 = 2208988800.0;        // s, to 1970
 constexpr auto kListens = std::chrono::seconds(5);  // who steers is gone after that
 
+// Of --stream, whose token is no part of it.
+RtpUrl sink(const std::string &url) {
+  RtpUrl out = rtp_url(url, "--stream");
+  if (!out.token.empty())
+    throw Failure(kBadInput, "--stream " + url + ": no token belongs here; `deform serve` has --token");
+  return out;
+}
+
 }  // namespace
 
 RtpUrl rtp_url(const std::string &url, const std::string &what) {
@@ -96,7 +104,7 @@ std::vector<unsigned char> control_packet(uint32_t source, size_t head, const st
 RtpSender::RtpSender(const SceneFile &scene, const std::string &url, std::string token)
     : scene_(scene),
       token_(std::move(token)),
-      socket_(rtp_socket(rtp_url(url, "--stream"), "--stream", connect)),
+      socket_(rtp_socket(sink(url), "--stream", connect)),
       begin_(dfm_world_time(scene.world())),
       interval_(1 / kFrameRate) {
   std::random_device system;

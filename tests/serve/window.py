@@ -35,6 +35,18 @@ class Network(threading.Thread):
         self.window, self.sender = ("127.0.0.1", window), None
         self.dice, self.dropped, self.forged = random.Random(1), [0, 0], None
         self.ends = False
+        self.bad = 0  # answers that a window must not take
+
+    def spoil(self, data):
+        """Sends answers as no good sender does, before a good one."""
+        state = json.loads(data[20:])
+        good = {"name": "x", "label": "x", "value": 1, "low": 0.5, "high": 2, "logarithmic": False}
+        for change in ({"label": ""}, {"name": ""}, {"low": 3}, {"high": 1e39}, {"low": -1e999}, {"value": 7},
+                       {"low": 0, "logarithmic": True}, {"label": "a\0b"}, {"label": "x" * 1000},
+                       {"low": {}}, {"high": None}):
+            wrong = {**state, "sliders": [{**good, **change}], "up": [0, 0, 0], "eye": [1e999] * 3}
+            self.far.sendto(answer(data[:20], wrong), self.window)
+            self.bad += 1
 
     def run(self):
         while not self.ends:
@@ -45,13 +57,24 @@ class Network(threading.Thread):
                     self.sender = source
                 elif data[1] == 204 and len(data) > 80:  # one that asks for something
                     self.forged = data
-                if self.dice.random() < LOST and not 200 <= data[1] <= 203:
+                # of each side one at least
+                asked = out or (data[1] == 204 and len(data) > 80)
+                if not 200 <= data[1] <= 203 and asked and (
+                        not self.dropped[not out] or self.dice.random() < LOST):
                     self.dropped[not out] += 1
                     continue
                 if out:
+                    if data[1] == 204:
+                        self.spoil(data)
                     self.far.sendto(data, self.window)
                 elif self.sender:
                     self.near.sendto(data, self.sender)
+
+
+def answer(head, state):
+    text = json.dumps(state).encode()
+    text += b" " * (-len(text) % 4)
+    return head[:2] + ((len(head) + len(text)) // 4 - 1).to_bytes(2, "big") + head[4:] + text
 
 
 def pixels(path):
