@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "messages.h"
+#include "secret.h"
 
 namespace cli {
 namespace {
@@ -25,9 +26,19 @@ constexpr int kRound = 1000, kPatience = 5;       // ms
 constexpr int kReports = 5;                       // s
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
 constexpr size_t kMostRequests = 256;             // that wait; what comes beyond comes again
+constexpr size_t kMostSteerers = 4096;            // that a run knows
+constexpr int kMostHeard = 256;                   // datagrams at a time
 constexpr double kTicks = 90000;                  // of the timestamp, in a second
 constexpr double kFrom1900 = 2208988800.0;        // s, to 1970
 constexpr auto kListens = std::chrono::seconds(5);  // who steers is gone after that
+
+// Of --stream, whose token is no part of it.
+RtpUrl sink(const std::string &url) {
+  RtpUrl out = rtp_url(url, "--stream");
+  if (!out.token.empty())
+    throw Failure(kBadInput, "--stream " + url + ": no token belongs here; `deform serve` has --token");
+  return out;
+}
 
 }  // namespace
 
@@ -93,7 +104,7 @@ std::vector<unsigned char> control_packet(uint32_t source, size_t head, const st
 RtpSender::RtpSender(const SceneFile &scene, const std::string &url, std::string token)
     : scene_(scene),
       token_(std::move(token)),
-      socket_(rtp_socket(rtp_url(url, "--stream"), "--stream", connect)),
+      socket_(rtp_socket(sink(url), "--stream", connect)),
       begin_(dfm_world_time(scene.world())),
       interval_(1 / kFrameRate) {
   std::random_device system;
@@ -226,7 +237,8 @@ void RtpSender::send_report(bool ends) {
 // it sends.
 void RtpSender::hear() {
   unsigned char in[2048];
-  for (ssize_t n; (n = recv(socket_, in, sizeof in, 0)) > 0;)
+  ssize_t n = 0;
+  for (int i = 0; i < kMostHeard && (n = recv(socket_, in, sizeof in, 0)) > 0; ++i)
     each_report(in, static_cast<size_t>(n), [&](const unsigned char *report, size_t size) {
       if (report[1] == kApp) return hear_request(report, size);
       if (size < 32 || (report[0] & 31) == 0 || report[1] != kReceiverReport) return;
@@ -239,15 +251,16 @@ void RtpSender::hear() {
 // In order and once each: what is lost comes again, with all that follows it.
 void RtpSender::hear_request(const unsigned char *in, size_t n) {
   if (token_.empty() || n < kRequestHead || std::memcmp(in + 8, kControl, 4) != 0) return;
-  unsigned char differ = 0;  // in a time that does not tell where
-  for (size_t i = 0; i < kToken; ++i)
-    differ |= static_cast<unsigned char>(in[12 + i] ^ (i < token_.size() ? token_[i] : 0));
-  if (differ) return;
+  std::string padded = token_;
+  padded.resize(kToken);
+  const uint32_t source = get32(in + 4);
+  if (!same_secret(padded, in + 12, kToken)) return;
+  if (!taken_.contains(source) && taken_.size() >= kMostSteerers) return;
   heard_ = Clock::now();
-  if (steerer_ != get32(in + 4)) taken_ = 0;
-  steerer_ = get32(in + 4);
-  if (get32(in + 12 + kToken) != taken_ + 1 || requests_.size() >= kMostRequests) return;
-  ++taken_;
+  steerer_ = source;
+  uint32_t &taken = taken_[source];
+  if (get32(in + 12 + kToken) != taken + 1 || requests_.size() >= kMostRequests) return;
+  ++taken;
   requests_.emplace_back(in + kRequestHead, in + n);
 }
 
@@ -261,7 +274,7 @@ std::vector<std::string> RtpSender::take() {
 void RtpSender::tell(const std::string &text) {
   std::vector<unsigned char> out = control_packet(source_, kAnswerHead, text);
   put32(&out[12], steerer_);
-  put32(&out[16], taken_);
+  put32(&out[16], taken_[steerer_]);
   ::send(socket_, out.data(), out.size(), 0);
 }
 

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -105,8 +106,9 @@ class RtpSender {
   size_t sent_ = 0;  // bytes of the round
   Shapes shapes_;
   uint32_t number_ = 0;
-  uint32_t steerer_ = 0, taken_ = 0;  // source of who steers, the number of the last request
-  Clock::time_point heard_;           // from it
+  uint32_t steerer_ = 0;                // source of who steers
+  std::map<uint32_t, uint32_t> taken_;  // of each source, the number of the last request
+  Clock::time_point heard_;             // from who steers
   std::vector<std::string> requests_;
   Report report_;
 };

@@ -80,14 +80,17 @@ void Received::packet(const unsigned char *bytes, size_t n) {
     frame_ = told_;
     time_ = head.get<double>(24);
   }
-  for (auto &[number, m] : bodies_) m.told = !everything;
-  for (auto &[number, m] : things_) m.told = !everything;
+  if (everything) {
+    for (auto &[number, m] : bodies_) m.told = false;
+    for (auto &[number, m] : things_) m.told = false;
+  }
   for (size_t at = kHeader; head.has(at, kChunk);) {
     const size_t size = head.get(at + 4);
     if (!head.has(at + kChunk, size)) break;
     chunk(bytes + at, Chunk(bytes + at + kChunk, size));
     at += kChunk + size;
   }
+  if (!everything) return;
   const auto left_out = [&](const auto &entry) {
     if (!entry.second.told) drop(entry.second);
     return !entry.second.told;

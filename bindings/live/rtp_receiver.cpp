@@ -3,7 +3,7 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
+#include <cfloat>
 #include <cstring>
 #include <random>
 
@@ -14,9 +14,20 @@ namespace {
 
 constexpr auto kReports = std::chrono::seconds(1), kSilence = std::chrono::seconds(2);
 constexpr auto kAgain = std::chrono::milliseconds(50);  // requests are sent again
-constexpr size_t kMostAsked = 64;                       // requests that wait
+constexpr size_t kMostAsked = 256, kAtOnce = 32;        // requests that wait; of them, that are sent
+constexpr size_t kMostSliders = 64, kLongest = 256;     // sliders; bytes of their texts
+constexpr int kMostHeard = 1024;                        // datagrams at a time
 constexpr int kBuffer = 1 << 21;                        // bytes, of the system for the socket
 constexpr uint8_t kVersion = 2 << 6;
+
+bool shows(const RtpReceiver::Slider &s) {
+  const auto good = [](const std::string &text) {
+    return !text.empty() && text.size() <= kLongest && text.find('\0') == std::string::npos;
+  };
+  const double most = FLT_MAX / 4;  // what a panel takes
+  return good(s.name) && good(s.label) && s.low >= -most && s.high <= most && float(s.low) < float(s.high) &&
+         (!s.logarithmic || float(s.low) > 0) && s.value >= s.low && s.value <= s.high;
+}
 
 bool same(const sockaddr_storage &a, socklen_t na, const sockaddr_storage &b, socklen_t nb) {
   return na == nb && std::memcmp(&a, &b, na) == 0;
@@ -27,16 +38,14 @@ bool same(const sockaddr_storage &a, socklen_t na, const sockaddr_storage &b, so
 RtpReceiver::RtpReceiver(const std::string &url)
     : url_(cli::rtp_url(url, "view")), socket_(cli::rtp_socket(url_, "view", bind)) {
   setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof kBuffer);
-  std::random_device system;
-  own_ = system();
   heard_ = reported_ = asked_ = Clock::now();
 }
 
 RtpReceiver::~RtpReceiver() { close(socket_); }
 
 void RtpReceiver::hear() {
-  unsigned char in[2048];
-  for (;;) {
+  unsigned char in[1 << 16];
+  for (int i = 0; i < kMostHeard; ++i) {
     sockaddr_storage from = {};
     socklen_t size = sizeof from;
     const ssize_t n = recvfrom(socket_, in, sizeof in, 0, reinterpret_cast<sockaddr *>(&from), &size);
@@ -46,12 +55,11 @@ void RtpReceiver::hear() {
     if (begun_ && !its && !ended_ && Clock::now() < heard_ + kSilence) continue;
     if (n < int{cli::kRtpHeader} || in[0] >> 6 != 2) continue;
     const bool rtp = in[1] < cli::kSenderReport || in[1] > cli::kApp;
-    if (!its && !rtp) continue;
+    if (rtp ? !datagram(in, size_t(n)) : !its) continue;
     sender_ = from;
     sender_size_ = size;
     heard_ = Clock::now();
-    if (rtp) datagram(in, size_t(n));
-    else
+    if (!rtp)
       cli::each_report(in, size_t(n), [&](const unsigned char *p, size_t bytes) {
         if (p[1] == cli::kGoodbye) ended_ = true;
         if (p[1] == cli::kApp) answer(p, bytes);
@@ -63,10 +71,13 @@ void RtpReceiver::hear() {
   if (!requests_.empty() && now >= asked_ + kAgain) send_requests();
 }
 
-void RtpReceiver::datagram(const unsigned char *in, size_t n) {
+// False: it is none of a run. Whose first one is none is not the sender, and does not get the token.
+bool RtpReceiver::datagram(const unsigned char *in, size_t n) {
   const uint32_t sequence = cli::get16(in + 2), source = cli::get32(in + 8);
   if (!begun_ || source != source_) {  // another run
+    if (n == cli::kRtpHeader || !Received().read(in + cli::kRtpHeader, n - cli::kRtpHeader)) return false;
     begun_ = true;
+    own_ = std::random_device()();  // numbers of requests begin again
     source_ = source;
     first_ = highest_ = sequence;
     received_ = expected_before_ = received_before_ = 0;
@@ -74,6 +85,8 @@ void RtpReceiver::datagram(const unsigned char *in, size_t n) {
     state_ = {};
     sliders_.clear();
     requests_.clear();
+    taken_ = 0;
+    sent_ = 0;
     reported_ = Clock::now() - kReports;
   }
   ended_ = false;
@@ -82,13 +95,17 @@ void RtpReceiver::datagram(const unsigned char *in, size_t n) {
   ++received_;
   frames_ += in[1] >> 7;
   scene_.read(in + cli::kRtpHeader, n - cli::kRtpHeader);
+  return true;
 }
 
 void RtpReceiver::answer(const unsigned char *in, size_t n) {
-  if (n < cli::kAnswerHead || std::memcmp(in + 8, cli::kControl, 4) != 0) return;
+  if (!may_ask() || n < cli::kAnswerHead || std::memcmp(in + 8, cli::kControl, 4) != 0) return;
   if (cli::get32(in + 12) != own_) return;
-  const uint32_t taken = cli::get32(in + 16);
-  while (!requests_.empty() && int32_t(taken - requests_.front().number) >= 0) requests_.pop_front();
+  if (const uint32_t more = cli::get32(in + 16) - taken_; more <= sent_) {
+    requests_.erase(requests_.begin(), requests_.begin() + more);
+    taken_ += more;
+    sent_ -= more;
+  }
   cli::JsonValue state;
   if (cli::parse_json({in + cli::kAnswerHead, in + n}, state) && state.kind == cli::JsonValue::object) {
     told(state);
@@ -96,31 +113,40 @@ void RtpReceiver::answer(const unsigned char *in, size_t n) {
   }
 }
 
-// One slider in each answer.
+// One slider in each answer; anyone may have sent it.
 void RtpReceiver::told(const cli::JsonValue &state) {
   for (const cli::JsonValue &s : state.list("sliders")) {
-    const std::string name = s.get("name");
-    auto at =
-        std::find_if(sliders_.begin(), sliders_.end(), [&](const Slider &have) { return have.name == name; });
+    Slider fresh = {s.get("name"),    s.get("label"),    s.scalar("low"),
+                    s.scalar("high"), s.scalar("value"), s.get("logarithmic") == "true"};
+    if (!shows(fresh)) continue;
+    const auto at = std::find_if(sliders_.begin(), sliders_.end(),
+                                 [&](const Slider &have) { return have.name == fresh.name; });
     if (at == sliders_.end()) {
-      if (sliders_.size() >= kMostAsked) return;
-      at = sliders_.insert(at, Slider{name, s.get("label"), 0, 1, 0, s.get("logarithmic") == "true"});
+      if (sliders_.size() < kMostSliders) sliders_.push_back(std::move(fresh));
+      continue;
     }
-    at->low = s.scalar("low");
-    at->high = s.scalar("high");
-    if (requests_.empty()) at->value = s.scalar("value");  // else it may be from before what was asked for
+    if (!requests_.empty())  // it may be from before what was asked for
+      fresh.value = std::clamp(at->value, fresh.low, fresh.high);
+    *at = std::move(fresh);
   }
 }
 
-// What may have been taken keeps its text: only what no datagram has carried yet is replaced.
-void RtpReceiver::ask(const cli::JsonObject &request, bool replaced) {
-  if (replaced && !requests_.empty() && requests_.back().replaced && requests_.back().number > sent_) {
-    requests_.back().text = request.text();
-    return;
+// What may have been taken keeps its text, and what replaces nothing keeps its place among all others.
+void RtpReceiver::ask(const cli::JsonObject &request, const std::string &replaces) {
+  if (!may_ask()) return;
+  for (size_t i = requests_.size(); i > sent_ && !replaces.empty() && !requests_[i - 1].replaces.empty(); --i)
+    if (requests_[i - 1].replaces == replaces) {
+      requests_[i - 1].text = request.text();
+      return;
+    }
+  if (requests_.size() >= kMostAsked) {
+    const auto waits = std::find_if(requests_.begin() + std::ptrdiff_t(sent_), requests_.end(),
+                                    [](const Request &r) { return !r.replaces.empty(); });
+    if (waits == requests_.end()) return;
+    requests_.erase(waits);
   }
-  if (!may_ask() || requests_.size() >= kMostAsked) return;
-  requests_.push_back({++number_, request.text(), replaced});
-  if (!replaced || requests_.size() == 1) send_requests();
+  requests_.push_back({request.text(), replaces});
+  if (replaces.empty() || requests_.size() == 1) send_requests();
 }
 
 std::vector<unsigned char> RtpReceiver::request(uint32_t number, const std::string &text) const {
@@ -133,9 +159,9 @@ std::vector<unsigned char> RtpReceiver::request(uint32_t number, const std::stri
 void RtpReceiver::send_requests() {
   asked_ = Clock::now();
   if (!begun_) return;
-  sent_ = number_;
-  for (const Request &r : requests_) {
-    const std::vector<unsigned char> out = request(r.number, r.text);
+  sent_ = std::max(sent_, std::min(requests_.size(), kAtOnce));
+  for (size_t i = 0; i < sent_; ++i) {
+    const std::vector<unsigned char> out = request(taken_ + 1 + uint32_t(i), requests_[i].text);
     sendto(socket_, out.data(), out.size(), 0, reinterpret_cast<const sockaddr *>(&sender_), sender_size_);
   }
 }

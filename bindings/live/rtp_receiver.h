@@ -26,8 +26,9 @@ class RtpReceiver {
   uint64_t lost() const { return highest_ + 1 > first_ + received_ ? highest_ + 1 - first_ - received_ : 0; }
   bool ended() const { return ended_; }  // the sender has said so
   bool may_ask() const { return !url_.token.empty(); }
-  // replaced: by the next such one while it waits, as places to which something is pulled are.
-  void ask(const cli::JsonObject &request, bool replaced = false);
+  // replaces: what this one takes the place of while that waits unsent, "pull" or a slider's name; empty:
+  // nothing.
+  void ask(const cli::JsonObject &request, const std::string &replaces = "");
   // What the sender tells who has the token; null before.
   const cli::JsonValue &state() const { return state_; }
   struct Slider {
@@ -39,12 +40,8 @@ class RtpReceiver {
 
  private:
   using Clock = std::chrono::steady_clock;
-  struct Request {
-    uint32_t number;
-    std::string text;
-    bool replaced;
-  };
-  void datagram(const unsigned char *in, size_t n);
+  struct Request { std::string text, replaces; };
+  bool datagram(const unsigned char *in, size_t n);
   void answer(const unsigned char *in, size_t n);
   void told(const cli::JsonValue &state);
   void report();
@@ -53,15 +50,16 @@ class RtpReceiver {
 
   const cli::RtpUrl url_;
   int socket_;
-  uint32_t own_, source_ = 0;  // numbers of this end and of the sender
+  uint32_t own_ = 0, source_ = 0;  // numbers of this end and of the sender
   bool begun_ = false, ended_ = false;
   sockaddr_storage sender_ = {};
   socklen_t sender_size_ = 0;
   uint64_t first_ = 0, highest_ = 0, received_ = 0, expected_before_ = 0, received_before_ = 0, frames_ = 0;
   Clock::time_point heard_, reported_, asked_;
   Received scene_;
-  std::deque<Request> requests_;    // that the sender has not taken yet
-  uint32_t number_ = 0, sent_ = 0;  // of the last one, and of the last one that was sent
+  uint32_t taken_ = 0;            // number of the last one that the sender has taken
+  std::deque<Request> requests_;  // those with the next numbers
+  size_t sent_ = 0;               // so many of them, from the first on, were sent and keep their text
   cli::JsonValue state_;
   std::vector<Slider> sliders_;
 };

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kBudget = 0.9;  // of the time of a picture, for steps; what is left is for viewers
 
+constexpr size_t kBrief = 256;  // bytes of each text that goes in one datagram
+
 constexpr double kFar = 1e6;  // m, of a viewer's coordinates
 
 std::string list_of(const cli::JsonValue &line, const char *key, size_t n) {
@@ -212,7 +214,7 @@ void Session::show() {
 }
 
 std::string Session::brief_state(uint32_t viewer, size_t slider) const {
-  cli::JsonObject out = state();
+  cli::JsonObject out = state(kBrief);
   out.add("you", std::to_string(viewer));
   if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[slider % sliders_.size()])}));
   return as_utf8(out.text());
@@ -232,15 +234,15 @@ std::string Session::whole_state() const {
   return as_utf8(out.text());
 }
 
-cli::JsonObject Session::state() const {
+cli::JsonObject Session::state(size_t most) const {
   double up[3];
   upright_.at(dfm_world_time(scene_.world()), up);
   cli::JsonObject out;
-  out.add("scene", cli::quoted(scene_.path()))
+  out.add("scene", cli::quoted(scene_.path().substr(0, most)))
       .add("time", cli::number(simulation_.time()))
       .add("frame", std::to_string(frame_))
       .add("running", yes(running_))
-      .add("message", cli::quoted(message_))
+      .add("message", cli::quoted(message_.substr(0, most)))
       .add("step_ms", cli::number(simulation_.step_ms()))
       .add("real", cli::number(real_))
       .add("control", std::to_string(viewers_.in_control()))

@@ -33,7 +33,8 @@ class Session {
   void advance(double seconds);
   void show();
   void show_scene(cli::Shapes shapes);
-  cli::JsonObject state() const;  // without sliders and probes
+  // Without sliders and probes. most: bytes of each text.
+  cli::JsonObject state(size_t most = std::string::npos) const;
   std::string whole_state() const;
   Bytes packets(uint32_t kind, dfm_body body = 0);
 

@@ -20,6 +20,14 @@ struct Served {
 
 serve::Bytes bytes_of(const unsigned char *bytes, size_t n) { return {bytes, bytes + n}; }
 
+// No exception goes on into C.
+template <class F>
+void attempt(F f) {
+  try {
+    f();
+  } catch (const std::exception &) {}
+}
+
 }  // namespace
 
 /** Listens on 127.0.0.1.
@@ -41,16 +49,18 @@ SERVE_API void *deform_serve_open(uint16_t *port, char *token, char *why, size_t
 SERVE_API void deform_serve_close(void *served) { delete static_cast<Served *>(served); }
 
 /** What viewers get: a scene as a whole for those that come later, and what of it has changed (nchanged 0:
- * everything) for those that are there; a frame; the state as JSON. */
+ * everything) for those that are there; a frame; the state as JSON. Where memory is short: nothing. */
 SERVE_API void deform_serve_scene(void *served, const unsigned char *whole, size_t n,
                                   const unsigned char *changed, size_t nchanged) {
-  static_cast<Served *>(served)->server->show_scene(bytes_of(whole, n), bytes_of(changed, nchanged));
+  attempt([&] {
+    static_cast<Served *>(served)->server->show_scene(bytes_of(whole, n), bytes_of(changed, nchanged));
+  });
 }
 SERVE_API void deform_serve_frame(void *served, const unsigned char *frame, size_t n) {
-  static_cast<Served *>(served)->server->show_frame(bytes_of(frame, n));
+  attempt([&] { static_cast<Served *>(served)->server->show_frame(bytes_of(frame, n)); });
 }
 SERVE_API void deform_serve_state(void *served, const char *json) {
-  static_cast<Served *>(served)->server->show_state(json);
+  attempt([&] { static_cast<Served *>(served)->server->show_state(json); });
 }
 
 /** The next request of who is in control.
@@ -61,7 +71,9 @@ SERVE_API int deform_serve_next(void *served, uint32_t *viewer, char *text) {
   Served &s = *static_cast<Served *>(served);
   if (!s.server->works()) return -1;
   if (s.requests.empty())
-    for (serve::Request &request : s.server->take()) s.requests.push_back(std::move(request));
+    attempt([&] {
+      for (serve::Request &request : s.server->take()) s.requests.push_back(std::move(request));
+    });
   if (s.requests.empty()) return 0;
   *viewer = s.requests.front().viewer;
   std::snprintf(text, 1025, "%s", s.requests.front().text.c_str());

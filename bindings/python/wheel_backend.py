@@ -29,6 +29,7 @@ import zipfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 LIBRARIES = re.compile(r"libdeform(_\w+)?\.so\.\d+|libdeform_python(_law|_serve)?\.so|deform/plugins-\d+/.*|"
                        r"libpng\d+\.so\.\d+")
+SERVER = "lib/libdeform_python_serve.so"
 PACKAGE = ROOT / "bindings" / "python" / "deform"
 
 
@@ -79,7 +80,7 @@ def _tag(files=()):
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     machine = platform.removeprefix("linux_")
     programs = {inside: path for inside, path in files if inside.startswith(("bin/", "lib/"))}
-    programs.pop("lib/libdeform_python_serve.so", None)  # opened where the system has libwebsockets alone
+    programs.pop(SERVER, None)
     own, first = {pathlib.PurePath(inside).name for inside in programs}, 28
     for path in programs.values():
         asked = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True,
@@ -206,6 +207,8 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         _installed(prefix, settings)
         files = list(native_files(prefix))
         tag = _tag(files)
+        if "manylinux" in tag:  # a system of that name need not have libwebsockets; deform.serve() says so
+            files = [file for file in files if file[0] != SERVER]
         wheel = _Wheel(pathlib.Path(wheel_directory) / f"{name}-{tag}.whl")
         for path in sorted(PACKAGE.rglob("*")):
             if path.is_file() and path.suffix in (".py", ".js", ".html", ".typed"):

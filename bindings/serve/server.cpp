@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "cli/messages.h"
+#include "cli/secret.h"
 #include "page.h"
 
 namespace serve {
@@ -16,13 +17,6 @@ constexpr size_t kMostRequests = 256;  // that wait for the simulation; what com
 constexpr size_t kMostViewers = 32, kMostChanges = 64;
 
 struct Http { size_t sent; };  // of the page
-
-bool same(const std::string &a, const char *b, size_t n) {
-  if (n != a.size()) return false;
-  unsigned char differ = 0;  // in a time that does not tell where
-  for (size_t i = 0; i < n; ++i) differ |= static_cast<unsigned char>(a[i] ^ b[i]);
-  return differ == 0;
-}
 
 // Empty where it is absent, and "?" where it is longer than any that is allowed.
 std::string header(lws *wsi, lws_token_indexes which) {
@@ -239,7 +233,7 @@ bool Server::allowed(lws *wsi) const {
   if (!origin.empty() && origin != "http://" + host) return false;
   char text[128];
   const char *const given = lws_get_urlarg_by_name(wsi, "token=", text, sizeof text);
-  return given && same(token_, given, std::strlen(given));
+  return given && cli::same_secret(token_, given, std::strlen(given));
 }
 
 uint32_t Server::join() {

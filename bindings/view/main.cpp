@@ -44,7 +44,10 @@ void add_view(cli::Command app, cli::Globals &globals, int *) {
       throw cli::Failure(cli::kBadInput,
                          "view: SCENE is required, or --replay DIR (see: deform view --help)");
     if (!size->empty()) read_size(*size, *options);
-    if (options->scene.starts_with("rtp://")) return Remote(*options, globals).run();
+    const bool stream = options->scene.starts_with("rtp://");
+    if (stream && !(options->replay.empty() && options->from.empty() && options->set.empty()))
+      throw cli::Failure(cli::kBadInput, "view: a stream takes no --replay, --from or --set");
+    if (stream) return Remote(*options, globals).run();
     App(*options, globals).run();
   });
 }

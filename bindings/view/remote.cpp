@@ -31,13 +31,20 @@ double distance(const live::Received::Mesh &m, const Ray &ray) {
   return best;
 }
 
+// Three numbers of a state; none where they are no place.
+std::vector<double> place_in(const cli::JsonValue &state, const char *key) {
+  std::vector<double> x = state.numbers(key);
+  const bool good = x.size() == 3 && std::ranges::all_of(x, [](double v) { return std::fabs(v) < 1e9; });
+  return good ? x : std::vector<double>();
+}
+
 }  // namespace
 
 Remote::Remote(const Options &options, const cli::Globals &globals)
     : options_(options), globals_(globals), receiver_(options.scene) {
   if (!options.script.empty()) script_.emplace(options.script);
-  window_ =
-      Window::open(options.width, options.height, "deform view " + options.scene.substr(0, 40), !script_);
+  const std::string place = options.scene.substr(0, options.scene.find('?'));  // who looks on learns no token
+  window_ = Window::open(options.width, options.height, "deform view " + place.substr(0, 40), !script_);
   canvas_.open(*window_, options.detail);
   last_ = window_->now();
 }
@@ -83,11 +90,12 @@ void Remote::first_look() {
   orbit_.set(render::auto_camera(picture, canvas_.aspect()));
 }
 
-void Remote::ask(const char *what, const std::function<void(cli::JsonObject &)> &more, bool replaced) {
+void Remote::ask(const char *what, const std::function<void(cli::JsonObject &)> &more,
+                 const std::string &replaces) {
   cli::JsonObject request;
   request.add("do", cli::quoted(what));
   if (more) more(request);
-  receiver_.ask(request, replaced);
+  receiver_.ask(request, replaces);
 }
 
 bool Remote::steers() const {
@@ -165,12 +173,14 @@ void Remote::pull_to_mouse() {
       orbit_.at_depth(canvas_.across(mouse_[0]), canvas_.above(mouse_[1]), canvas_.aspect(), *pulled_);
   if (render::norm(to - *pulled_) == 0) return;
   pulled_ = to;
-  ask("pull", [&](cli::JsonObject &r) { r.add("to", live::text_of(to)); }, true);
+  ask("pull", [&](cli::JsonObject &r) { r.add("to", live::text_of(to)); }, "pull");
 }
 
 void Remote::set_slider(const std::string &name, double value) {
-  ask("slider",
-      [&](cli::JsonObject &r) { r.add("name", cli::quoted(name)).add("value", cli::number(value)); });
+  ask(
+      "slider",
+      [&](cli::JsonObject &r) { r.add("name", cli::quoted(name)).add("value", cli::number(value)); },
+      "slider " + name);
 }
 
 void Remote::panels() {
@@ -194,19 +204,22 @@ void Remote::panels() {
   else if (receiver_.packets() == 0) ImGui::TextUnformatted("Nothing has come yet.");
   if (const std::string message = state.get("message"); !message.empty()) wrapped(message);
   for (live::RtpReceiver::Slider &s : receiver_.sliders()) {
+    ImGui::PushID(s.name.c_str());  // labels may be alike
     float x = float(s.value);
     if (slider(s.label.c_str(), &x, float(s.low), float(s.high), "%.3g",
                s.logarithmic ? ImGuiSliderFlags_Logarithmic : 0)) {
       s.value = std::clamp(double(x), s.low, s.high);
       set_slider(s.name, s.value);
     }
+    ImGui::PopID();
   }
   ImGui::End();
 }
 
 void Remote::fill(render::Scene &out) {
   const live::Received &scene = receiver_.scene();
-  if (const std::vector<double> up = receiver_.state().numbers("up"); up.size() == 3)
+  if (const std::vector<double> up = place_in(receiver_.state(), "up");
+      !up.empty() && render::norm(render::vec(up.data())) > 0)
     std::copy_n(up.begin(), 3, out.up);
   uint32_t color = 0;
   for (const auto &[number, body] : scene.bodies()) {
@@ -250,8 +263,8 @@ void Remote::draw() {
   fill(picture);
   orbit_.set_up(render::vec(picture.up));
   const cli::JsonValue &state = receiver_.state();
-  if (const std::vector<double> eye = state.numbers("eye"), at = state.numbers("look_at");
-      size_ > 0 && !set_ && eye.size() == 3 && at.size() == 3) {
+  if (const std::vector<double> eye = place_in(state, "eye"), at = place_in(state, "look_at");
+      size_ > 0 && !set_ && !eye.empty() && !at.empty() && eye != at) {
     set_ = true;
     render::Camera own = orbit_.camera();
     std::copy_n(eye.begin(), 3, own.eye);
@@ -266,8 +279,8 @@ void Remote::draw() {
   if (show_arrows_) arrows_.fill(touches, size_, *picture.camera, picture);
   std::vector<double> held;
   if (const cli::JsonValue *const pull = state.find("pull")) {
-    held = pull->numbers("place");
-    const std::vector<double> to = pull->numbers("to");
+    held = place_in(*pull, "place");
+    const std::vector<double> to = place_in(*pull, "to");
     held.insert(held.end(), to.begin(), to.end());
     if (held.size() == 6) picture.lines.push_back({held.data(), 1, {0.1f, 0.1f, 0.1f}, 2, true});
   }

@@ -35,7 +35,8 @@ class Remote {
   void press(int button);
   void pull_to_mouse();
   void set_slider(const std::string &name, double value);
-  void ask(const char *what, const std::function<void(cli::JsonObject &)> &more = {}, bool replaced = false);
+  void ask(const char *what, const std::function<void(cli::JsonObject &)> &more = {},
+           const std::string &replaces = "");
   bool steers() const;  // the sender takes what this window asks for
   bool running() const { return receiver_.state().get("running") == "true"; }
   void first_look();

@@ -258,6 +258,7 @@ TEST(Received, TenMinutesOfLoss_LeaveNoMoreThanOlderPoints) {
       "before; bodies waited for triangles in %zu of 36,000 cases\n",
       packets, lost, cuts, 100.0 * double(newest) / double(points), oldest, waits);
   EXPECT_GT(cuts, 250u);
+  EXPECT_LE(oldest, 4u);
   EXPECT_GT(double(newest), 0.85 * double(points));
 }
 

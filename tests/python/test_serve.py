@@ -64,6 +64,9 @@ class Serve(unittest.TestCase):
         self.addCleanup(self.server.close)
         self.viewer = Viewer(self.server.url)
         self.addCleanup(self.viewer.close)
+        end = time.monotonic() + 20
+        while not self.server.viewers and time.monotonic() < end:
+            time.sleep(1e-3)
 
     def go(self, until, most=20):
         """Steps until that holds."""
@@ -74,10 +77,16 @@ class Serve(unittest.TestCase):
             self.server.update()
 
     def later(self, *requests):
-        """Sends them one after the other from another thread, while this one waits in update()."""
+        """Sends them from another thread, while this one waits in update(): each after a state that comes
+        after that of the one before and is of a pause."""
         def send():
+            known = 0
             for request in requests:
-                time.sleep(0.1)
+                end = time.monotonic() + 20
+                while time.monotonic() < end and (len(self.viewer.states) <= known + 3
+                                                  or self.viewer.state["running"]):
+                    time.sleep(1e-3)
+                known = len(self.viewer.states)
                 self.viewer.connection.send(request)
         thread = threading.Thread(target=send)
         thread.start()
@@ -126,6 +135,12 @@ class Serve(unittest.TestCase):
         at = self.world.time
         self.viewer.connection.send({"do": "reset"})
         self.go(lambda: self.world.time < at)
+        self.go(lambda: given == [1.5, 9.81] and self.viewer.state["sliders"][0]["value"] == 9.81)
+        for value, low, high in ((1, 0, np.inf), (np.nan, 0, 1)):
+            with self.assertRaisesRegex(deform.ArgumentError, "finite"):
+                self.server.add_slider("E", value, low, high, given.append)
+        with self.assertRaisesRegex(deform.ArgumentError, "already"):
+            self.server.add_slider("gravity", 1, 0, 2, given.append)
         with self.assertRaises(deform.ArgumentError):
             self.server.add_slider("E", 0, 0, 1, given.append, logarithmic=True)
 
@@ -144,6 +159,39 @@ class Serve(unittest.TestCase):
         self.server.update()
         self.assertTrue(self.server.running)
         self.assertAlmostEqual(self.world.time, at + 4e-3)
+
+    def test_two_steps_at_once_are_two(self):
+        self.server.running = False
+        before = self.server.viewers
+        self.viewer.connection.send({"do": "step"})
+        self.viewer.connection.send({"do": "step"})
+        self.server.update()
+        self.server.update()
+        self.assertEqual((before, self.server.running), (1, False))
+        self.later({"do": "run", "on": True})
+        self.server.update()
+        self.assertTrue(self.server.running)
+
+    def test_who_pauses_and_leaves_holds_nothing(self):
+        self.server.running = False
+        self.viewer.close()
+        self.server.update()
+        self.assertTrue(self.server.running)
+
+    def test_forked_process_has_no_server(self):
+        child = os.fork()
+        if not child:
+            closed = self.server.closed
+            self.server.close()
+            os._exit(0 if closed else 1)
+        self.assertEqual(os.waitpid(child, 0)[1], 0)
+        self.assertFalse(self.server.closed)
+        self.go(lambda: self.viewer.frames > 1)
+
+    def test_what_is_no_number_is_null(self):
+        self.server._took = float("nan")
+        self.go(lambda: self.viewer.states)
+        self.assertIsNone(self.viewer.state["step_ms"])
 
     def test_cut_opens_what_can_be_cut(self):
         before = len(self.body.triangles)

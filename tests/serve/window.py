@@ -13,9 +13,10 @@ import threading
 import zlib
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "examples"))
+from abuse import state_of  # noqa: E402
 from stream_receiver import Connection  # noqa: E402
 
-LOST = 0.05
+LOST, SKIPPED = 0.05, 77
 
 
 def bound(port=0):
@@ -35,6 +36,18 @@ class Network(threading.Thread):
         self.window, self.sender = ("127.0.0.1", window), None
         self.dice, self.dropped, self.forged = random.Random(1), [0, 0], None
         self.ends = False
+        self.bad = 0  # answers that a window must not take
+
+    def spoil(self, data):
+        """Sends answers as no good sender does, before a good one."""
+        state = json.loads(data[20:])
+        good = {"name": "x", "label": "x", "value": 1, "low": 0.5, "high": 2, "logarithmic": False}
+        for change in ({"label": ""}, {"name": ""}, {"low": 3}, {"high": 1e39}, {"low": -1e999}, {"value": 7},
+                       {"low": 0, "logarithmic": True}, {"label": "a\0b"}, {"label": "x" * 1000},
+                       {"low": {}}, {"high": None}):
+            wrong = {**state, "sliders": [{**good, **change}], "up": [0, 0, 0], "eye": [1e999] * 3}
+            self.far.sendto(packet(data[:20], wrong), self.window)
+            self.bad += 1
 
     def run(self):
         while not self.ends:
@@ -45,13 +58,24 @@ class Network(threading.Thread):
                     self.sender = source
                 elif data[1] == 204 and len(data) > 80:  # one that asks for something
                     self.forged = data
-                if self.dice.random() < LOST and not 200 <= data[1] <= 203:
+                # of each side one at least
+                asked = out or (data[1] == 204 and len(data) > 80)
+                if not 200 <= data[1] <= 203 and asked and (
+                        not self.dropped[not out] or self.dice.random() < LOST):
                     self.dropped[not out] += 1
                     continue
                 if out:
+                    if data[1] == 204:
+                        self.spoil(data)
                     self.far.sendto(data, self.window)
                 elif self.sender:
                     self.near.sendto(data, self.sender)
+
+
+def packet(head, text):
+    text = json.dumps(text).encode()
+    text += b" " * (-len(text) % 4)
+    return head[:2] + ((len(head) + len(text)) // 4 - 1).to_bytes(2, "big") + head[4:] + text
 
 
 def pixels(path):
@@ -98,14 +122,32 @@ def watch(view, url, script, out, display):
     return {os.path.basename(row["shot"]): row for row in rows}
 
 
+def restart(run, served, page, window, out, display):
+    """A window steers a run, and the next one that is sent to the same place."""
+    script, seen = "1 key c\n1.5 key space\n8 key c\n8.5 key space\n11 shot again.png\n", {}
+    look = threading.Thread(target=lambda: seen.update(watch(*window, script, out, display)))
+    look.start()
+    viewer = Connection(page)
+    state_of(viewer, lambda state: state["running"])
+    viewer.close()
+    served.terminate()
+    served.wait()
+    with subprocess.Popen(run, stdout=subprocess.PIPE, text=True) as again:
+        try:
+            look.join()
+        finally:
+            again.terminate()
+    assert seen["again.png"]["t"] > 0.1, "the window runs the next scene too"
+
+
 def check(serve, view, scene, out, display):
     at_window = bound()
     port = at_window.getsockname()[1]
     at_window.close()
     network = Network(port)
     network.start()
-    run = [serve, "serve", scene, "--paused", "--seconds", "150", "--stream"]
-    run.append(f"rtp://127.0.0.1:{network.port}")
+    run = [serve, "serve", scene, "--paused", "--seconds", "150", "--stream",
+           f"rtp://127.0.0.1:{network.port}"]
     with subprocess.Popen(run, stdout=subprocess.PIPE, text=True) as served:
         page, told = (served.stdout.readline().strip() for _ in range(2))
         token = told.split("?token=")[1]
@@ -134,7 +176,7 @@ def check(serve, view, scene, out, display):
             assert across[1][0] > 1000 and across[1][1] > across[0][1] + 10, f"a picture shows it: {across}"
             # what was heard once is not heard again
             request = network.forged
-            viewer, states = Connection(page), []
+            viewer = Connection(page)
             network.near.sendto(request, network.sender)
             bound().sendto(request, network.sender)
             for _ in range(2000):  # nor what is malformed, but for its number, which is old
@@ -144,12 +186,22 @@ def check(serve, view, scene, out, display):
                     if not 76 <= place < 80:
                         data[place] = dice.randrange(256)
                 network.near.sendto(data[:dice.randrange(len(data) + 1)], network.sender)
-            while len(states) < 10:
-                message = viewer.receive()
-                if isinstance(message, str) and "time" in message:
-                    states.append(json.loads(message))
+            # nor the next one from elsewhere, or with another token; else it is
+            last = int.from_bytes(request[76:80], "big")
+            state = {"do": "slider", "name": "gravity", "value": 7}
+            head, then = (request[:76] + (last + i).to_bytes(4, "big") for i in (1, 2))
+            bound().sendto(packet(head, {"do": "take"}), network.sender)
+            for place in range(12, 76):
+                wrong = head[:place] + bytes([head[place] ^ 1]) + head[place + 1:]
+                network.near.sendto(packet(wrong, {"do": "take"}), network.sender)
+            states = [state_of(viewer) for _ in range(20)]
             assert states[-1]["sliders"][0]["value"] == 3.5 and not states[-1]["running"]
-            assert all(network.dropped), network.dropped
+            network.near.sendto(packet(head, {"do": "take"}), network.sender)
+            network.near.sendto(packet(then, state), network.sender)
+            state_of(viewer, lambda state: state["sliders"][0]["value"] == 7)
+            viewer.close()
+            assert all(network.dropped) and network.bad, network.dropped
+            restart(run + ["--token", token], served, page, (view, url + "?token=" + token), out, display)
             print(f"pulled from {x[0]:.3f} to {x[1]:.3f} m; lost on the way: {network.dropped}")
         finally:
             served.terminate()
@@ -165,7 +217,7 @@ def main():
                                    "-nolisten", "tcp"], pass_fds=[there], stderr=subprocess.DEVNULL)
     except FileNotFoundError:
         print("skipped: no Xvfb on this machine: install Debian's xvfb")
-        return
+        sys.exit(SKIPPED)
     try:
         os.close(there)
         with os.fdopen(here) as number:

@@ -4,8 +4,10 @@ from __future__ import annotations
 import ctypes
 import json
 import math
+import os
 import sys
 import time
+import weakref
 from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
@@ -20,7 +22,9 @@ if TYPE_CHECKING:
 _MODULE = "libdeform_python_serve.so"
 _FAR = 1e6       # m, of a viewer's coordinates
 _RATE = 2 * math.pi * 4  # 1/s, at which a body swings on the spring that pulls it
+_MOST = 256       # requests in one exchange
 _native: Any = None
+_servers: weakref.WeakSet[Any] = weakref.WeakSet()
 
 
 def _module() -> Any:
@@ -41,6 +45,24 @@ def _module() -> Any:
             function.restype, function.argtypes = result, arguments
         _native = module
     return _native
+
+
+def _forget() -> None:
+    """In a forked process: the network's threads are the parent's, and so are its connections."""
+    for server in list(_servers):
+        server._served = server._pull = None
+
+
+os.register_at_fork(after_in_child=_forget)
+
+
+def _finite(x: Any) -> Any:
+    """The same, with None for numbers that JSON cannot hold."""
+    if isinstance(x, float):
+        return x if math.isfinite(x) else None
+    if isinstance(x, dict):
+        return {key: _finite(value) for key, value in x.items()}
+    return [_finite(value) for value in x] if isinstance(x, list) else x
 
 
 def _numbers(request: dict[str, Any], key: str, n: int) -> np.ndarray:
@@ -100,9 +122,11 @@ class Server:
         if not self._served:
             raise StateError(why.value.decode(), "DFM_E_STATE")
         self.url = f"http://127.0.0.1:{own.value}/?token={given.value.decode()}"
+        _servers.add(self)
         self.running = True
+        self._steps = 0  # that viewers have asked for and that are still to come
         self._first = first
-        self._sliders: list[tuple[dict[str, Any], Callable[[float], Any]]] = []
+        self._sliders: list[tuple[dict[str, Any], float, Callable[[float], Any]]] = []
         self._pull: _Pull | None = None
         self._holder = self._frame = 0
         self._shapes: bytes | None = None  # LIST of the last frame that was shown
@@ -149,11 +173,15 @@ class Server:
                    apply: Callable[[float], Any], logarithmic: bool = False) -> None:
         """A slider on the page: it calls apply(value), between two steps."""
         value, low, high = real(value, "value"), real(low, "low"), real(high, "high")
+        if any(slider["name"] == label for slider, *_ in self._sliders):
+            raise ArgumentError(f"there is a slider '{label}' already", "DFM_E_ARG")
+        if not all(map(math.isfinite, (value, low, high))):
+            raise ArgumentError(f"slider '{label}': expected finite numbers", "DFM_E_ARG")
         if not low <= value <= high or low == high or (logarithmic and low <= 0):
             raise ArgumentError(f"slider '{label}' from {low:g} to {high:g} at {value:g}: expected a range "
                                 "that has the value, and is positive where it is logarithmic", "DFM_E_ARG")
         self._sliders.append(({"name": label, "label": label, "value": value, "low": low, "high": high,
-                               "logarithmic": bool(logarithmic)}, apply))
+                               "logarithmic": bool(logarithmic)}, value, apply))
 
     def update(self) -> None:
         """To be called after each step: does what viewers have asked for, and shows the world where a picture
@@ -170,19 +198,29 @@ class Server:
 
     def _update(self, now: float) -> None:
         if self.real_time:
-            ahead = (self.world.time - self._began[1]) - (now - self._began[0])
-            if ahead > 0:
-                time.sleep(ahead)
+            while self.running and (ahead := self._ahead(now)) > 0:
+                time.sleep(min(ahead, 1 / self.rate))
                 now = time.monotonic()
-            elif ahead < -0.1:  # it does not catch up
+                if now >= self._next:  # viewers do not wait for a long step
+                    self._exchange()
+            if self._ahead(now) < -0.1:  # it does not catch up
                 self._began = (now, self.world.time)
         if self.running and now < self._next:
             return
-        steps = self._exchange()
-        while not self.running and not steps:
+        if not self._steps:
+            self._exchange()
+        while not self.running and not self._steps:
+            if not self.viewers:  # nobody is there who could let it go on
+                self.running = True
+                break
             time.sleep(1 / self.rate)
-            steps = self._exchange()
+            self._exchange()
             self._began = (time.monotonic(), self.world.time)
+        self._steps = max(self._steps - 1, 0)
+
+    def _ahead(self, now: float) -> float:
+        """s, of the world before the clock."""
+        return float(self.world.time - self._began[1]) - (now - self._began[0])
 
     def run(self, duration: float = math.inf, dt: float | None = None) -> None:
         """Steps the world for `duration` s, by dt or the stable step, no faster than the clock, and shows
@@ -200,13 +238,14 @@ class Server:
                 raise
         finally:
             self.real_time = kept
+        self._show()
 
     # ---- what viewers ask for --------------------------------------------------------------------------
 
-    def _exchange(self) -> bool:
-        """Requests in, a picture out. Whether one step was asked for."""
-        viewer, text, stepped = ctypes.c_uint32(), ctypes.create_string_buffer(1025), False
-        while True:
+    def _exchange(self) -> None:
+        """Requests in, a picture out."""
+        viewer, text = ctypes.c_uint32(), ctypes.create_string_buffer(1025)
+        for _ in range(_MOST):
             came = self._native.deform_serve_next(self._served, ctypes.byref(viewer), text)
             if came < 0:
                 raise Error("serve: the network has failed; serve the world again")
@@ -218,7 +257,7 @@ class Server:
             except (ValueError, RecursionError):
                 request = None
             try:
-                stepped = self._ask(request, viewer.value) or stepped
+                self._ask(request, viewer.value)
             except Error as refused:
                 self._message = str(refused)
         if self._pull and self._native.deform_serve_control(self._served) != self._holder:
@@ -226,9 +265,8 @@ class Server:
         self._next = time.monotonic() + 1 / self.rate
         if self.viewers:
             self._show()
-        return stepped
 
-    def _ask(self, request: Any, viewer: int) -> bool:
+    def _ask(self, request: Any, viewer: int) -> None:
         """The requests of doc/reference/stream.md."""
         if not isinstance(request, dict):
             raise ArgumentError("a request is an object of JSON", "DFM_E_ARG")
@@ -245,17 +283,20 @@ class Server:
         elif what == "cut":
             self._cut(_numbers(request, "blade", 12).reshape(4, 3))
         elif what == "run":
-            self.running = request.get("on") is True
+            self.running, self._steps = request.get("on") is True, 0
         elif what == "step":
             self.running = False
-            return True
+            self._steps += 1
         elif what == "reset":
             self._release()
             self.world.restore(self._first)
             self._began = (time.monotonic(), self.world.time)
+            for slider, value, apply in self._sliders:
+                if slider["value"] != value:
+                    apply(value)
+                    slider["value"] = value
         else:
             raise ArgumentError(f'"{what}" is nothing that a viewer can ask for', "DFM_E_ARG")
-        return False
 
     def _grab(self, origin: np.ndarray, along: np.ndarray, viewer: int) -> None:
         self._release()
@@ -274,7 +315,7 @@ class Server:
                 pass
 
     def _slide(self, name: Any, value: Any) -> None:
-        for slider, apply in self._sliders:
+        for slider, _, apply in self._sliders:
             if slider["name"] != name:
                 continue
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not (
@@ -307,7 +348,8 @@ class Server:
             self._shapes = shapes
             scene = self.world.stream(scene=True, frame=self._frame)
             self._native.deform_serve_scene(self._served, scene, len(scene), b"", 0)
-        self._native.deform_serve_state(self._served, json.dumps(self._state()).encode())
+        state = json.dumps(_finite(self._state()), allow_nan=False).encode()
+        self._native.deform_serve_state(self._served, state)
         self._native.deform_serve_frame(self._served, frame, len(frame))
         self._frame += 1
 
@@ -319,7 +361,7 @@ class Server:
                "message": self._message, "step_ms": self._took, "real": speed, "viewers": self.viewers,
                "control": int(self._native.deform_serve_control(self._served)),
                "up": self.world.shown.upright.at(at).tolist(), "probes": [],
-               "sliders": [slider for slider, _ in self._sliders]}
+               "sliders": [slider for slider, *_ in self._sliders]}
         if self._pull:
             try:
                 out["pull"] = self._pull.told()

@@ -105,8 +105,8 @@ class ContactNewton {
   std::vector<Body> bodies_;
   // of all; the first that is a single point, and the first that is a motion of blocks
   uint32_t nodes_ = 0, single_ = 0, points_ = 0;
-  Array<uint32_t> node_of_dof_;      // kNone: a block
-  Array<uint32_t> dof_of_node_;      // of single points; kNone
+  Array<uint32_t> node_of_dof_;  // kNone: a block
+  Array<uint32_t> dof_of_node_;  // of single points; kNone
   ContactRows::Motions motions_;
   Array<Row> row_;
   Array<uint32_t> index_;  // rows of the part, for motions()
