@@ -195,14 +195,7 @@ void BroadPhase::look(Body &b, bool asleep, const Now &now) {
   if (b.dirty || stays) return;
   b.moved = largest_norm(b.surface->nsurfel, b.surface->x.data(), b.x.data());
   b.speed = largest_speed(*b.surface);
-<<<<<<< HEAD
   b.dirty = too_wide(b, reach(b, now) + std::min(skin(b, now), b.skin_most)) || b.skin > b.skin_most ||
-=======
-  // a list for a faster motion holds more than the present one needs, for ever if the body comes to rest
-  const bool wide =
-      ++b.age > skin_steps_ && kWide * (reach(b, now) + std::min(skin(b, now), b.skin_most)) < b.margin;
-  b.dirty = wide || b.skin > b.skin_most ||
->>>>>>> fix
             !(kRounding * (b.moved + reach_share(now.h, now.offset, b.speed)) <= b.margin);
 }
 
