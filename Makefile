@@ -108,7 +108,9 @@ bench-peers: setup-peers build/release/build.ninja
 	@$(PYTHON) -B tests/bench/peers/bench_peers.py build/release/bin/deform build/peers $(PEERS) $(JOBS)
 
 # Rows that are in the table already are not run again.
-soak: setup-bench wasm build/bench/build.ninja build/release/build.ninja
+soak: setup-bench build/bench/build.ninja build/release/build.ninja
+	@if command -v em++ >/dev/null; then $(MAKE) --no-print-directory wasm; \
+	  else echo "deform: no emscripten, so WebAssembly is not tested (make setup-wasm installs it)"; fi
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --test-dir build/release -j $(JOBS) --output-on-failure -L 'soak|stability'
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'

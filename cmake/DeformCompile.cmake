@@ -60,8 +60,11 @@ endif()
 # run time; on other processors than x86-64 deform_own_sources takes them out of a list. AVX-512 cannot be had
 # without FMA (clang turns it off with -mno-fma); -ffp-contract=off keeps it unused, and a test looks into the
 # objects. UndefinedBehaviorSanitizer checks their sources as they are compiled for the narrowest vectors.
+# The compiler says what it compiles for, as to the code that calls them: -m32 changes no name of a processor.
+include(CheckCXXSourceCompiles)
+check_cxx_source_compiles("#ifndef __x86_64__\n#error\n#endif\nint main() { return 0; }" DEFORM_X86_64)
 macro(deform_own_sources list)
-  if(NOT CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64|amd64)$")
+  if(NOT DEFORM_X86_64)
     list(FILTER ${list} EXCLUDE REGEX "_kernel_avx[0-9]+\\.cpp$")
   endif()
 endmacro()

@@ -97,7 +97,10 @@ install(FILES ${PROJECT_BINARY_DIR}/cmake/deformConfig.cmake
 # An archive is all there is to link then, so `pkg-config --libs` names what it needs even without --static.
 set(deform_pc_needs "")
 if(NOT DEFORM_SHARED)
-  set(deform_pc_needs " -lz -lstdc++ -lm -pthread")
+  set(deform_pc_needs " -lstdc++ -lm -pthread")
+  if(DEFORM_ZLIB)
+    string(PREPEND deform_pc_needs " -lz")
+  endif()
   if(NOT DEFORM_PLUGINS_STATIC)
     string(APPEND deform_pc_needs " -ldl")
   endif()

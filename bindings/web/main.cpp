@@ -6,6 +6,7 @@
 #include <memory>
 #include <utility>
 
+#include "cli/cli.h"
 #include "cli/json_text.h"
 #include "cli/messages.h"
 #include "deform/plugin.h"
@@ -31,11 +32,11 @@ class Page final : public live::Viewers {
   uint32_t viewers() const override { return 1; }
   uint32_t in_control() const override { return 1; }
 
-  // What a scene may choose from goes along, as JSON.
+  // What a scene may choose from goes along, as JSON; a scene that was refused shows nothing.
   void join(const std::string &models, const std::string &laws) const {
     cli::JsonObject out;
     give_text(out.add("you", "1").add("models", models).add("laws", laws).text().c_str());
-    give_bytes(whole_.data(), whole_.size());
+    if (!whole_.empty()) give_bytes(whole_.data(), whole_.size());
   }
   void ask(const char *text) { requests_.push_back({1, text}); }
 
@@ -47,7 +48,13 @@ class Page final : public live::Viewers {
 Page page;
 std::unique_ptr<live::Session> session;
 
-std::string ids_of(uint32_t kind) {
+cli::Globals globals() {
+  cli::Globals out;
+  out.quiet = true;  // progress would be shown by a thread
+  return out;
+}
+
+std::string ids_of(dfm_context *context, uint32_t kind) {
   struct List {
     uint32_t kind;
     std::vector<std::string> ids;
@@ -57,7 +64,7 @@ std::string ids_of(uint32_t kind) {
     const std::string id = type->id;
     if (type->kind == all.kind) all.ids.push_back(cli::quoted(id.substr(id.rfind('.') + 1)));
   };
-  cli::need(dfm_plugin_visit(session->scene().context(), look, &list));
+  cli::need(dfm_plugin_visit(context, look, &list));
   return cli::json_array(list.ids);
 }
 
@@ -69,10 +76,8 @@ extern "C" {
 // Begins to run a scene of the module's own files. False: the page has been told why not.
 EMSCRIPTEN_KEEPALIVE bool deform_open(const char *path) {
   try {
-    cli::Globals globals;
-    globals.quiet = true;  // progress would be shown by a thread
     web::session =
-        std::make_unique<live::Session>(globals, path, std::vector<std::string>{}, web::page, true);
+        std::make_unique<live::Session>(web::globals(), path, std::vector<std::string>{}, web::page, true);
     return true;
   } catch (const std::exception &e) {
     give_text(cli::JsonObject().add("refused", cli::quoted(e.what())).text().c_str());
@@ -81,10 +86,14 @@ EMSCRIPTEN_KEEPALIVE bool deform_open(const char *path) {
 }
 // A viewer that has nothing yet gets the whole scene.
 EMSCRIPTEN_KEEPALIVE void deform_join() {
-  web::page.join(web::ids_of(DFM_KIND_MODEL), web::ids_of(DFM_KIND_FRICTION));
+  const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(
+      cli::make_context(web::globals()), dfm_context_destroy);
+  web::page.join(web::ids_of(context.get(), DFM_KIND_MODEL), web::ids_of(context.get(), DFM_KIND_FRICTION));
 }
 // What the viewer asks for, with the next picture.
 EMSCRIPTEN_KEEPALIVE void deform_ask(const char *text) { web::page.ask(text); }
 // s: how long the picture lasts.
-EMSCRIPTEN_KEEPALIVE void deform_picture(double seconds) { web::session->picture(seconds); }
+EMSCRIPTEN_KEEPALIVE void deform_picture(double seconds) {
+  if (web::session) web::session->picture(seconds);
+}
 }

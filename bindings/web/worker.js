@@ -2,10 +2,11 @@
 // with its viewers. The first message brings the module, the files and the scene; the others are requests.
 "use strict";
 const kPicture = 1 / 30;  // s
+const refuse = error => postMessage(JSON.stringify({ refused: String(error) }));
 async function begin({ module, files, scene }) {
   const deform = await makeDeform({
     instantiateWasm(imports, done) {
-      WebAssembly.instantiate(module, imports).then(done);
+      WebAssembly.instantiate(module, imports).then(done).catch(refuse);
       return {};
     },
     give: message => postMessage(message, typeof message === "string" ? [] : [message]),
@@ -16,8 +17,9 @@ async function begin({ module, files, scene }) {
   }
   const call = (name, ...given) => deform.ccall(name, "number", given.map(x => typeof x), given);
   onmessage = ({ data }) => data === "join" ? call("deform_join") : call("deform_ask", data);
-  if (!call("deform_open", scene)) return;
+  const runs = call("deform_open", scene);
   call("deform_join");
+  if (!runs) return;
   let next = performance.now();
   const picture = () => {
     call("deform_picture", kPicture);
@@ -26,4 +28,4 @@ async function begin({ module, files, scene }) {
   };
   picture();
 }
-onmessage = ({ data }) => begin(data).catch(e => postMessage(JSON.stringify({ refused: String(e) })));
+onmessage = ({ data }) => begin(data).catch(refuse);

@@ -3,6 +3,7 @@
 #pragma once
 #ifdef __cplusplus
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cstdint>
 #include <cstdio>
@@ -35,10 +36,6 @@ unique_ptr<T> make_unique_for_overwrite(size_t n) {
 #if _LIBCPP_VERSION < 15000
 namespace ranges {
 
-template <class Projection>
-auto projected_less(Projection p) {
-  return [p](const auto &a, const auto &b) { return std::invoke(p, a) < std::invoke(p, b); };
-}
 template <class Less, class Projection>
 auto projected_less(Less less, Projection p) {
   return [less, p](const auto &a, const auto &b) {
@@ -104,7 +101,7 @@ auto max(R &&r) {
 }  // namespace ranges
 #endif
 
-#if _LIBCPP_VERSION < 20000
+#if _LIBCPP_VERSION < 200000
 // By strtod, which rounds as from_chars has to; it takes white space, "+" and hexadecimal digits too.
 inline from_chars_result from_chars(const char *first, const char *last, double &value) {
   size_t n = 0;
@@ -120,6 +117,9 @@ inline from_chars_result from_chars(const char *first, const char *last, double 
   value = x;
   return {behind, errc()};
 }
+#endif
+
+#if _LIBCPP_VERSION < 14000
 // The fewest digits that are read as the same number, as 1500 or 1.5e+03: what is shorter.
 inline to_chars_result to_chars(char *first, char *last, double value) {
   char far[40], near[400];

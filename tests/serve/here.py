@@ -9,7 +9,7 @@ import sys
 
 from browser import BOX, Browser
 
-RUNS = "world.bodies.size > 0 && world.frame > 3 && state.time > 0.02"
+RUNS = "typeof world !== 'undefined' && world.bodies.size > 0 && world.frame > 3 && state.time > 0.02"
 
 
 def choose(browser, name, value):

@@ -1,10 +1,20 @@
 #include "plugin/shared_object.h"
 
+#include <cstdlib>
+
 #include "core/error.h"
 
-#ifdef DEFORM_PLUGINS_STATIC
+namespace dfm {
 
-#include <cstdlib>
+#ifdef __EMSCRIPTEN__  // one user
+const char *trusted_environment(const char *name) { return std::getenv(name); }
+#else
+const char *trusted_environment(const char *name) { return secure_getenv(name); }
+#endif
+
+}  // namespace dfm
+
+#ifdef DEFORM_PLUGINS_STATIC
 
 namespace dfm {
 
@@ -16,7 +26,6 @@ SharedObject::SharedObject(const std::string &, const std::string &name) {
 }
 void SharedObject::close(void *) noexcept {}
 std::string default_plugin_directory() { return {}; }
-const char *trusted_environment(const char *name) { return std::getenv(name); }
 
 }  // namespace dfm
 
@@ -27,7 +36,6 @@ const char *trusted_environment(const char *name) { return std::getenv(name); }
 #include <link.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <vector>
@@ -131,8 +139,6 @@ SharedObject::SharedObject(const std::string &file, const std::string &name) {
 void SharedObject::close(void *image) noexcept {
   if (image) dlclose(image);
 }
-
-const char *trusted_environment(const char *name) { return secure_getenv(name); }
 
 std::string default_plugin_directory() {
   Dl_info info{};
