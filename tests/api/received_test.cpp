@@ -141,15 +141,7 @@ TEST(Received, CutBody_IsDrawnAsItWasUntilTheNewOneIsComplete) {
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, 0)));
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 0)));
   const size_t before = r.bodies().at(uint32_t(s.upper)).drawn()->triangles.size();
-  dfm_cut_def cut = dfm_cut_def_default();
-  cut.shape = DFM_CUT_PLANE;
-  cut.how = DFM_CUT_SPLIT;
-  dfm_body_measure m = {};
-  m.size = sizeof m;
-  test::ok(dfm_body_get_measure(s.upper, &m));
-  std::copy_n(m.com, 3, cut.blade);
-  cut.blade[3] = 1;
-  test::ok(dfm_body_cut(s.upper, &cut, nullptr));
+  test::split_upper(s);
   std::vector<Packet> scene = stream(s.world, DFM_STREAM_SCENE, 1, 0, s.upper);
   const Packet last = scene.back();
   scene.pop_back();

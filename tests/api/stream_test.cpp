@@ -179,15 +179,7 @@ TEST(Stream, CutBody_HasAnotherShape) {
   v.read(stream(s.world, DFM_STREAM_SCENE));
   v.read(stream(s.world, DFM_STREAM_FRAME));
   const uint32_t before = v.present.at(uint32_t(s.upper)), other = v.present.at(uint32_t(s.lower));
-  dfm_cut_def cut = dfm_cut_def_default();
-  cut.shape = DFM_CUT_PLANE;
-  cut.how = DFM_CUT_SPLIT;
-  dfm_body_measure m = {};
-  m.size = sizeof m;
-  test::ok(dfm_body_get_measure(s.upper, &m));
-  std::copy_n(m.com, 3, cut.blade);
-  cut.blade[3] = 1;
-  test::ok(dfm_body_cut(s.upper, &cut, nullptr));
+  test::split_upper(s);
   Viewer later;
   later.read(stream(s.world, DFM_STREAM_SCENE, 0, 0, s.upper));
   EXPECT_EQ(later.meshes.size(), 1u) << "that body alone";

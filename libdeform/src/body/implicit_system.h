@@ -14,8 +14,7 @@ class ImplicitSystem {
   virtual BlockPattern pattern() const = 0;  // of A
   virtual double mass() const = 0;           // kg, of the points that move
   // [n,4] m/s: where the solve starts, the last solution where the sub-step has one (of an equilibrium: the
-  // guess); components that are held
-  // have their velocity at the end.
+  // guess). Components that are held have their velocity at the end.
   virtual const double *start() const = 0;
   virtual const double *places() const = 0;  // [n,4] m, at the start of the sub-step
   // [n,4] 1/kg, estimate of the inverse of A's diagonal; zero where a component is held

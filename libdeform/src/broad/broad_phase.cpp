@@ -209,9 +209,11 @@ bool BroadPhase::find_dirty(const Now &now) {
   for (const Body &b : bodies_) any |= b.dirty;
   for (size_t o = 0; o < things_.size(); ++o) {
     Thing &t = things_[o];
-    double alone;
-    const double needed = reach(t, now.obstacles[o], now, alone) + std::min(alone, t.skin_most);
-    t.dirty = too_wide(t, needed) || t.dirty || t.skin > t.skin_most || !holds(t, now.obstacles[o], now);
+    double speed;
+    const double needed = reach(now.obstacles[o], now, speed);
+    const double alone = skin_steps_ * now.h * speed;
+    t.dirty = too_wide(t, needed + std::min(alone, t.skin_most)) || t.dirty || t.skin > t.skin_most ||
+              !holds(t, now.obstacles[o], now);
     any |= things_[o].dirty;
   }
   return any;
@@ -246,21 +248,18 @@ bool BroadPhase::renew_tree(Side &side) {
   return true;
 }
 
-// m, of the margin of a list made now; skin: m, out, that it would have alone beside it.
-double BroadPhase::reach(const Thing &t, const ObstacleView &view, const Now &now, double &skin) const {
+// m, what contacts need of the margin of a list made now. speed: m/s, out, of the fastest of its points.
+double BroadPhase::reach(const ObstacleView &view, const Now &now, double &speed) const {
   const double extent =
       view.shape == Shape::plane ? norm(center_ - view.position) + radius_ : ObstacleShape(view).extent();
-  const double speed = obstacle_speed(view, extent);
-  skin = skin_steps_ * now.h * speed;
+  speed = obstacle_speed(view, extent);
   return kRounding * reach_share(now.h, now.offset, kSpeedGrowth * speed) + now.offset;
 }
 
 void BroadPhase::renew_thing(Thing &t, const ObstacleView &view, const Now &now) {
   t.view = view;
   if (t.surface) renew_tree(t);
-  double alone;
-  const double needed = reach(t, view, now, alone);
-  t.speed = alone / (skin_steps_ * now.h);
+  const double needed = reach(view, now, t.speed), alone = skin_steps_ * now.h * t.speed;
   t.skin = std::min(alone, t.skin_most);
   t.margin = needed + kRounding * t.skin;
   t.margin_most = needed + kRounding * alone;

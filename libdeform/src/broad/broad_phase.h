@@ -146,7 +146,7 @@ class BroadPhase {
   bool holds(const Thing &thing, const ObstacleView &view, const Now &now, double times = 2) const;
   double reach(const Body &body, const Now &now) const;
   double skin(const Body &body, const Now &now) const;
-  double reach(const Thing &thing, const ObstacleView &view, const Now &now, double &skin) const;
+  double reach(const ObstacleView &view, const Now &now, double &speed) const;
   bool too_wide(Side &side, double needed) const;
   bool renew_tree(Side &side);
   void renew(const Now &now);
