@@ -19,7 +19,7 @@ enum ContactKind : uint8_t { kVertexFace = 0, kEdgeEdge = 1, kPrimitive = 2 };
 
 // One contact's geometry, as narrow/ emits it. Plain.
 struct ContactPoint {
-  // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step
+  // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step, but for `more`
   uint64_t key;
   uint32_t slot_a, slot_b;  // body slots in the world; slot_b = obstacle slot if obstacle
   // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
@@ -28,6 +28,8 @@ struct ContactPoint {
   uint8_t type_a;  // what feature_a is: 0 surfel, 1 edge, 2 triangle
   // area: for an edge or triangle contact, the node that lent it, plus 1; else 0
   uint32_t lender;
+  // 0; else a further row of the contact with this key, which stands before it (step/guard_hits.cpp)
+  uint32_t more;
   uint32_t node[4];
   double weight[4];
   double point[3];   // m, midway between the closest points

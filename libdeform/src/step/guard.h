@@ -41,11 +41,12 @@ struct Guard {
   std::vector<Crossed> crossed;
   struct Kept {
     uint64_t key;
+    uint32_t more;
     Vec3 impulse;
     double rate;
     bool hit;
   };
-  // sorted by key: results of the previous solve, and rates of contacts made from hits
+  // sorted by key, more: results of the previous solve, and rates of contacts made from hits
   Array<Kept> kept;
   bool resolving = false;  // the next solve starts from `kept`
   uint32_t solves = 0;     // of this sub-step, with hits

@@ -211,6 +211,17 @@ void choose_hits(StepContext &step) {
   if (hits.size() > kMostHits) hits.resize(kMostHits);
 }
 
+bool precedes(const Guard::Kept &l, const Guard::Kept &r) {
+  return l.key != r.key ? l.key < r.key : l.more < r.more;
+}
+
+// kept: in order
+const Guard::Kept *find_kept(const Array<Guard::Kept> &kept, const ContactPoint &c) {
+  const auto k =
+      std::lower_bound(kept.begin(), kept.end(), Guard::Kept{c.key, c.more, {}, 0, false}, precedes);
+  return k == kept.end() || k->key != c.key || k->more != c.more ? nullptr : &*k;
+}
+
 // Of two bodies.
 double rests_at(const World &w, const StepContext &step, const ContactPoint &c) {
   const BodyView &a = step.body_views[c.slot_a], &b = step.body_views[c.slot_b];
@@ -233,23 +244,26 @@ void guard_ask_hits(World &w, StepContext &step) {
   });
 }
 
-// Adds hits to the contacts of the sub-step, in order; if there is a contact already, it gets the geometry of
-// the hit.
+// Adds hits to the contacts of the sub-step, in order. A contact that its pair has already gets the geometry of
+// the hit, unless an earlier hit made it and it bears load. Then it stays, and the hit adds a row: a face that
+// turns about one place comes near at another, and a single row would follow it to and fro. Rows of a contact
+// begin with the same state of friction, and are one contact again after the sub-step (keep_contacts.cpp).
 void guard_add_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   choose_hits(step);
-  const auto kept = [&](uint64_t key) {
-    return std::find_if(g.kept.begin(), g.kept.end(), [&](const Guard::Kept &k) { return k.key == key; });
+  const auto kept = [&](const ContactPoint &c) {
+    return std::find_if(g.kept.begin(), g.kept.end(),
+                        [&](const Guard::Kept &k) { return k.key == c.key && k.more == c.more; });
   };
   Array<Guard::Kept> before;
   before.swap(g.kept);
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
+    const ContactPoint &c = step.contacts[i];
     const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
-    g.kept.push_back({step.contacts[i].key, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6),
-                      step.rows.rate[i], false});
+    const Guard::Kept *const k = find_kept(before, c);
+    g.kept.push_back({c.key, c.more, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6),
+                      step.rows.rate[i], k && k->hit});
   }
-  for (const Guard::Kept &k : before)
-    if (k.hit) kept(k.key)->hit = true;
   for (const GuardHit &hit : g.hits) {
     ContactPoint c;
     double along;
@@ -260,31 +274,39 @@ void guard_add_hits(World &w, StepContext &step) {
     const double apart = of_one_body(pair) ? guarded_apart(w, step, pair)
                          : pair.obstacle   ? w.offset
                                            : rests_at(w, step, c);
-    const double target =
-        hit.start < apart ? hit.start + std::max(0.0, 0.8 * apart - hit.start) * (step.h / g.planned) : apart;
+    const double opens = std::max(0.0, 0.8 * apart - hit.start) * (step.h / g.planned);
+    const double target = std::min(apart, std::min(hit.start, along) + opens);
     c.distance += w.offset - apart;
     const double rate = (along - target) / step.h;
-    const auto same = std::find_if(step.contacts.begin(), step.contacts.end(),
-                                   [&](const ContactPoint &o) { return same_features(o, c); });
-    if (same != step.contacts.end()) {
-      c.key = same->key;
-      c.area = same->area;
-      c.lender = same->lender;
-      *same = c;
-      const auto k = kept(c.key);
-      k->rate = rate;
-      k->hit = true;
-    } else {
-      c.key = free_key(w, step, c);
-      step.contacts.push_back(c);
-      g.kept.push_back({c.key, {}, rate, true});
+    const auto of_pair = [&](const ContactPoint &o) { return same_features(o, c); };
+    const auto idle = [&](const ContactPoint &o) { return of_pair(o) && !kept(o)->hit; };
+    if (const auto row = std::find_if(step.contacts.begin(), step.contacts.end(), idle);
+        row != step.contacts.end()) {
+      c.key = row->key;
+      c.more = row->more;
+      c.area = row->area;
+      c.lender = row->lender;
+      *row = c;
+      kept(c)->rate = rate;
+      kept(c)->hit = true;
+      continue;
     }
+    const auto first = std::find_if(step.contacts.begin(), step.contacts.end(), of_pair);
+    if (first == step.contacts.end()) {
+      c.key = free_key(w, step, c);
+    } else {
+      c.key = first->key;
+      while (kept(c) != g.kept.end()) ++c.more;
+    }
+    step.contacts.push_back(c);
+    g.kept.push_back({c.key, c.more, {}, rate, true});
   }
-  std::sort(g.kept.begin(), g.kept.end(), [](const auto &l, const auto &r) { return l.key < r.key; });
+  std::sort(g.kept.begin(), g.kept.end(), precedes);
   const auto id_b = [&](const ContactPoint &c) {
     return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
   };
   std::sort(step.contacts.begin(), step.contacts.end(), [&](const ContactPoint &l, const ContactPoint &r) {
+    if ((l.more > 0) != (r.more > 0)) return r.more > 0;
     if (of_one_body(l) != of_one_body(r)) return of_one_body(r);
     if (l.slot_a != r.slot_a) return w.bodies[l.slot_a]->id < w.bodies[r.slot_a]->id;
     if (l.obstacle != r.obstacle) return l.obstacle < r.obstacle;
@@ -292,21 +314,14 @@ void guard_add_hits(World &w, StepContext &step) {
     if (l.kind != r.kind) return l.kind < r.kind;
     if (l.type_a != r.type_a) return l.type_a < r.type_a;
     if (l.feature_a != r.feature_a) return l.feature_a < r.feature_a;
-    return l.feature_b != r.feature_b ? l.feature_b < r.feature_b : l.key < r.key;
+    if (l.feature_b != r.feature_b) return l.feature_b < r.feature_b;
+    return l.key != r.key ? l.key < r.key : l.more < r.more;
   });
 }
 
-namespace {
-const Guard::Kept *find_kept(const Guard &g, uint64_t key) {
-  const auto k = std::lower_bound(g.kept.begin(), g.kept.end(), key,
-                                  [](const auto &e, uint64_t v) { return e.key < v; });
-  return k == g.kept.end() || k->key != key ? nullptr : &*k;
-}
-}  // namespace
-
 void guard_impulses(StepContext &step) {
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
-    const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key);
+    const Guard::Kept *const k = find_kept(step.guard.kept, step.contacts[i]);
     if (!k) continue;
     const double *const f = &step.rows.frame[size_t(i) * 9];
     double *const l = &step.rows.impulse[size_t(i) * 3];
@@ -318,7 +333,7 @@ void guard_impulses(StepContext &step) {
 
 void guard_rates(StepContext &step) {
   for (uint32_t i = 0; i < step.rows.soft(); ++i)
-    if (const Guard::Kept *const k = find_kept(step.guard, step.contacts[i].key); k && k->hit)
+    if (const Guard::Kept *const k = find_kept(step.guard.kept, step.contacts[i]); k && k->hit)
       step.rows.rate[i] = k->rate;
 }
 

@@ -147,6 +147,45 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   w.report.mode[i] = step.state.mode[i];
 }
 
+void book_friction(World &w, const StepContext &step) {
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
+    const ContactPoint &c = step.contacts[i];
+    const double *const l = &step.rows.impulse[size_t(i) * 3];
+    if (l[1] == 0 && l[2] == 0) continue;
+    const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+    work_of(w, {w.bodies[c.slot_a]->id, b, c.obstacle != 0}).friction +=
+        l[1] * step.state.vt[i] + l[2] * step.state.vt[step.state.stride + i];
+  }
+}
+
+// Of row `from` to row `to`: what friction has made of them.
+void take_state(ContactState &s, uint32_t to, uint32_t from) {
+  s.mode[to] = s.mode[from];
+  for (size_t k = 0; k < 2; ++k) s.vt[k * s.stride + to] = s.vt[k * s.stride + from];
+  for (size_t k = 0; k < s.nstate; ++k) s.bristle_out[k * s.stride + to] = s.bristle_out[k * s.stride + from];
+}
+
+// Further rows of a contact are the last ones. The first row gets what they bear and their areas, and the
+// state of friction of the one that bears most. Returns the number of contacts.
+uint32_t join_rows(StepContext &step) {
+  const auto own = [](const ContactPoint &c) { return c.more == 0; };
+  const auto end = std::find_if_not(step.contacts.begin(), step.contacts.end(), own);
+  for (auto first = end; first != step.contacts.end(); ++first) {
+    const uint32_t from = uint32_t(first - step.contacts.begin());
+    const auto is_same = [&](const ContactPoint &c) { return c.key == first->key; };
+    const uint32_t to = uint32_t(std::find_if(step.contacts.begin(), end, is_same) - step.contacts.begin());
+    const double *const f = &step.rows.frame[size_t{9} * from], *const t = &step.rows.frame[size_t{9} * to];
+    double *const l = &step.rows.impulse[size_t{3} * from], *const sum = &step.rows.impulse[size_t{3} * to];
+    if (l[0] > sum[0]) take_state(step.state, to, from);
+    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    for (size_t k = 0; k < 3; ++k) sum[k] += dot(load3(t + 3 * k), p);
+    std::fill_n(l, 3, 0.0);
+    step.state.area[to] += step.state.area[from];
+    if (!step.aim.empty()) step.aim[to] += step.aim[from];
+  }
+  return uint32_t(end - step.contacts.begin());
+}
+
 // The contacts in the order of their keys: those that go on, in the order of the store, merged with new ones.
 void order_keys(const World &w, StepContext &step) {
   constexpr uint32_t kFew = 16;
@@ -173,7 +212,8 @@ void order_keys(const World &w, StepContext &step) {
 }  // namespace
 
 void keep_contacts(World &w, StepContext &step) {
-  const uint32_t n = step.rows.soft(), S = step.state.nstate;
+  book_friction(w, step);
+  const uint32_t n = join_rows(step), S = step.state.nstate;
   ContactStore &to = step.next_store;
   if (w.sleepers) std::swap(w.report, step.last_report);
   to.n = n;
@@ -185,7 +225,7 @@ void keep_contacts(World &w, StepContext &step) {
       },
       to);
   if (step.owed.empty()) std::fill(to.owed.begin(), to.owed.end(), 0.0);
-  else std::copy(step.owed.begin(), step.owed.end(), to.owed.begin());
+  else std::copy_n(step.owed.begin(), size_t(3) * n, to.owed.begin());
   w.report.n = n;
   w.report.h = step.h;
   w.report.contacts.resize(n);
@@ -203,9 +243,6 @@ void keep_contacts(World &w, StepContext &step) {
     const double *const l = &step.rows.impulse[size_t(i) * 3];
     touching += to.touching[i];
     sticking += l[0] > 0 && step.state.mode[i] == 1;
-    if (l[1] != 0 || l[2] != 0)
-      work_of(w, {a, b, step.contacts[i].obstacle != 0}).friction +=
-          l[1] * w.report.slip[2 * i] + l[2] * w.report.slip[2 * i + 1];
   }
   follow_load(w, step);
   turn_frames(w, step);

@@ -180,7 +180,7 @@ void follow_load(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   const ContactState &s = step.state;
   const uint32_t n = static_cast<uint32_t>(step.aim.size());
-  to.due.resize(n);
+  to.due.resize(n == 0 ? 0 : to.n);
   if (n == 0) return;
   for (uint32_t i = 0; i < n; ++i) {
     step.ways[i] = {0, 0};
@@ -204,11 +204,11 @@ void follow_load(World &w, StepContext &step) {
                        step.renewed.data());
   // At rest renewal is rounding only, and the target areas are not needed.
   if (std::all_of(step.renewed.begin(), step.renewed.end(), [](double r) { return r <= kRests; })) {
-    std::copy_n(s.area.begin(), n, to.due.begin());
+    std::copy_n(s.area.begin(), to.n, to.due.begin());
     return;
   }
   step.exchange.pass(step.contacts, step.sources, step.rows.impulse.data(), step.aim.data());
-  for (uint32_t i = 0; i < n; ++i) to.due[i] = s.area[i] + step.renewed[i] * (step.aim[i] - s.area[i]);
+  for (uint32_t i = 0; i < to.n; ++i) to.due[i] = s.area[i] + step.renewed[i] * (step.aim[i] - s.area[i]);
 }
 
 void fit_bristles(World &w, StepContext &step) {
@@ -226,7 +226,7 @@ void fit_bristles(World &w, StepContext &step) {
 void turn_frames(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   ObstacleTurn obstacle(w, step);
-  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
+  for (uint32_t i = 0; i < to.n; ++i) {
     const LawInstance &law = *w.pairs.laws[step.state.law[i]];
     if (!law.turns || !to.touching[i]) continue;
     const ContactPoint &c = step.contacts[i];

@@ -1,5 +1,6 @@
 #include "step/solve/pre_solve.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -79,9 +80,13 @@ void ask_pre_solve(World &w, StepContext &step) {
   if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, law);
   size_t kept = 0;
   for (size_t i = 0; i < step.contacts.size(); ++i) {
+    const ContactPoint &c = step.contacts[i];
     StepContext::Chosen chosen;
-    if (!ask(w, step, step.contacts[i], law[i], chosen)) continue;
-    step.contacts[kept++] = step.contacts[i];
+    if (c.more > 0 && std::none_of(step.contacts.begin(), step.contacts.begin() + std::ptrdiff_t(kept),
+                                   [&](const ContactPoint &o) { return o.key == c.key; }))
+      continue;
+    if (!ask(w, step, c, law[i], chosen)) continue;
+    step.contacts[kept++] = c;
     step.chosen.push_back(chosen);
   }
   step.contacts.resize(kept);
