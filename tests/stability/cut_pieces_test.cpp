@@ -194,8 +194,8 @@ TEST(CutPieces, JellyCutInTwo_NothingPassesThrough) {
 
 // A bar of dough is pulled until it tears at both ends. Splinters that hang in the teeth of an end were parts
 // of the middle, whose contact with that end was off as a whole: 164 pairs. In 13 of 80 starts that differ by
-// nanometers, a corner beside a held point is drawn up to 8 d_c behind a face in one state; faces as contact has
-// them, set back, do not cross there.
+// nanometers, a corner beside a held point is drawn up to 8 d_c behind a face in one state; faces as contact
+// has them, set back, do not cross there.
 TEST(CutPieces, SplintersOfATornBar_StayWithTheEndTheyHangOn) {
   const std::string scene =
       pulled_bar(R"({"duration": 0.9, "step": 0.0005})",

@@ -95,3 +95,29 @@ TEST(Guard, RigidAndSoft_KeepMomentum) {
     for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(after[k], before[k], 1e-12 * scale);
   }
 }
+
+// A contact that the guard has given several rows is one: its key comes once, and the impulses of all its
+// rows are in the report.
+TEST(Guard, RowsOfHits_AreReportedAsOneContact) {
+  uint64_t solves = 0;
+  for (unsigned seed = 1; seed <= 6; ++seed) {
+    Shot s(true, seed);
+    seed % 2 ? closed_mesh(s) : terrain(s);
+    for (int step = 0; step < 4; ++step) {
+      double scale = 0;
+      const Vec start = s.momentum(&scale);
+      test::ok(dfm_world_step(s.world, 5e-4, nullptr));
+      const Vec end = s.momentum();
+      Vec given{};
+      for (const dfm_pair_impulse &p : test::listed(dfm_world_pair_impulses, s.world))
+        for (size_t k = 0; k < 3; ++k) given[k] += p.impulse[k];
+      for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(given[k], end[k] - start[k], 1e-9 * scale) << seed;
+      std::vector<uint64_t> keys;
+      for (const dfm_contact &c : test::contacts(s.world)) keys.push_back(c.key);
+      std::sort(keys.begin(), keys.end());
+      EXPECT_EQ(std::adjacent_find(keys.begin(), keys.end()), keys.end()) << seed;
+    }
+    solves += test::stats(s.world).guard_solves;
+  }
+  EXPECT_GT(solves, 10u);
+}

@@ -24,12 +24,14 @@ struct ContactPoint {
   uint32_t slot_a, slot_b;  // body slots in the world; slot_b = obstacle slot if obstacle
   // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
   uint32_t feature_a, feature_b;
-  uint8_t kind, obstacle, nnode;
+  uint8_t kind;
+  uint8_t obstacle : 1;
+  // 0; else a further row of the contact with this key, which stands before it (step/guard_hits.cpp)
+  uint8_t more : 7;
+  uint8_t nnode;
   uint8_t type_a;  // what feature_a is: 0 surfel, 1 edge, 2 triangle
   // area: for an edge or triangle contact, the node that lent it, plus 1; else 0
   uint32_t lender;
-  // 0; else a further row of the contact with this key, which stands before it (step/guard_hits.cpp)
-  uint32_t more;
   uint32_t node[4];
   double weight[4];
   double point[3];   // m, midway between the closest points

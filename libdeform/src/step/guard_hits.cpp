@@ -245,9 +245,9 @@ void guard_ask_hits(World &w, StepContext &step) {
 }
 
 // Adds hits to the contacts of the sub-step, in order. A contact that its pair has already gets the geometry of
-// the hit, unless an earlier hit made it and it bears load. Then it stays, and the hit adds a row: a face that
-// turns about one place comes near at another, and a single row would follow it to and fro. Rows of a contact
-// begin with the same state of friction, and are one contact again after the sub-step (keep_contacts.cpp).
+// the hit, once; a further hit adds a row to it: a face that turns about one place comes near at another, and a
+// single row would be led to and fro. Rows of a contact begin with the same state of friction, and are one
+// contact again after the sub-step (keep_contacts.cpp).
 void guard_add_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   choose_hits(step);
@@ -278,24 +278,20 @@ void guard_add_hits(World &w, StepContext &step) {
     const double target = std::min(apart, std::min(hit.start, along) + opens);
     c.distance += w.offset - apart;
     const double rate = (along - target) / step.h;
-    const auto of_pair = [&](const ContactPoint &o) { return same_features(o, c); };
-    const auto idle = [&](const ContactPoint &o) { return of_pair(o) && !kept(o)->hit; };
-    if (const auto row = std::find_if(step.contacts.begin(), step.contacts.end(), idle);
-        row != step.contacts.end()) {
-      c.key = row->key;
-      c.more = row->more;
-      c.area = row->area;
-      c.lender = row->lender;
-      *row = c;
-      kept(c)->rate = rate;
-      kept(c)->hit = true;
-      continue;
-    }
-    const auto first = std::find_if(step.contacts.begin(), step.contacts.end(), of_pair);
-    if (first == step.contacts.end()) {
+    const auto same = std::find_if(step.contacts.begin(), step.contacts.end(),
+                                   [&](const ContactPoint &o) { return same_features(o, c); });
+    if (same == step.contacts.end()) {
       c.key = free_key(w, step, c);
     } else {
-      c.key = first->key;
+      c.key = same->key;
+      if (const auto first = kept(*same); !first->hit) {
+        c.area = same->area;
+        c.lender = same->lender;
+        *same = c;
+        first->rate = rate;
+        first->hit = true;
+        continue;
+      }
       while (kept(c) != g.kept.end()) ++c.more;
     }
     step.contacts.push_back(c);

@@ -69,10 +69,10 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
   return {l[0] * u.x + along, kOpens * l[0] * std::max(0.0, -rows.rate[i]), smooth ? step.h * asked : 0};
 }
 
-// Bodies wedged in each other may bear any load that balances itself, and a solve may err in it: what contacts
-// of one pair seem to make, those of others take back in the same sub-step through the points that they share.
-// So the contacts of an island have made no more than their sum, of which each pair that has made something
-// gets its share.
+// Bodies wedged in each other may bear any load that balances itself, and a solve may err in it: what
+// contacts of one pair seem to make, those of others take back in the same sub-step through the points that
+// they share. So the contacts of an island have made no more than their sum, of which each pair that has made
+// something gets its share.
 void share_in_islands(StepContext &step) {
   Array<PairMade> &pairs = step.pairs_made;
   for (const SolveIsland &island : step.solve_islands->all()) {
