@@ -79,7 +79,9 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
       match[i] = kNone;
       return;
     }
-    for (int k = 0; k < 3; ++k) l[k] = scale * old.impulse[size_t(m) * 3 + size_t(k)];
+    // the first row of a contact bears its load
+    for (int k = 0; k < 3 && contacts[i].more == 0; ++k)
+      l[k] = scale * old.impulse[size_t(m) * 3 + size_t(k)];
     state.dwell[i] = old.dwell[m];
     // The columns have the width of the law with the largest state; the values of a law come first.
     if (old.law[m] == state.law[i])
