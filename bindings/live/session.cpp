@@ -178,36 +178,17 @@ void Session::advance(double seconds) {
   real_ += 0.1 * ((simulation_.time() - before) / seconds - real_);
 }
 
-Bytes Session::packets(uint32_t kind, dfm_body body) {
-  dfm_stream_def def = dfm_stream_def_default();
-  def.kind = kind;
-  def.flags = kind == DFM_STREAM_FRAME ? uint32_t{DFM_STREAM_CONTACTS} : 0;
-  def.frame = frame_;
-  def.body = body;
-  cli::write_packets(scene_.world(), def, buffer_);
-  return buffer_;
-}
-
-// Bodies whose triangles are others than viewers have, alone; viewers that come later get everything.
-void Session::show_scene(cli::Shapes shapes) {
-  if (shapes == shown_ && !scene_due_) return;
-  Bytes changed;
-  for (const auto &shape : shapes) {
-    if (std::find(shown_.begin(), shown_.end(), shape) != shown_.end()) continue;
-    for (const cli::BodyView &body : scene_.bodies()) {
-      if (static_cast<uint32_t>(body.handle) != shape.first) continue;
-      const Bytes one = packets(DFM_STREAM_SCENE, body.handle);
-      changed.insert(changed.end(), one.begin(), one.end());
-    }
-  }
-  shown_ = std::move(shapes);
-  viewers_.show_scene(packets(DFM_STREAM_SCENE), scene_due_ ? Bytes() : std::move(changed));
-  scene_due_ = false;
-}
-
+// What viewers have not yet, alone; viewers that come later get everything.
 void Session::show() {
-  Bytes frame = packets(DFM_STREAM_FRAME);
-  show_scene(cli::shapes_in(frame));
+  Bytes frame, scene;
+  cli::write_packet(scene_.world(), DFM_STREAM_FRAME, frame_, frame);
+  if (cli::Shapes shapes = cli::shapes_in(frame); shapes != shown_ || frame_ == 0) {
+    cli::write_packet(scene_.world(), DFM_STREAM_SCENE, frame_, scene);
+    Bytes news;
+    if (!shown_.empty()) news = cli::news_packets(scene_.world(), frame_, shown_, shapes);
+    viewers_.show_scene(std::move(scene), std::move(news));
+    shown_ = std::move(shapes);
+  }
   viewers_.show_state(whole_state());
   viewers_.show_frame(std::move(frame));
   ++frame_;

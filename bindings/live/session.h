@@ -32,11 +32,9 @@ class Session {
   void let_go();
   void advance(double seconds);
   void show();
-  void show_scene(cli::Shapes shapes);
   // Without sliders and probes. most: bytes of each text.
   cli::JsonObject state(size_t most = std::string::npos) const;
   std::string whole_state() const;
-  Bytes packets(uint32_t kind, dfm_body body = 0);
 
   cli::SceneFile scene_;
   Simulation simulation_;
@@ -44,9 +42,8 @@ class Session {
   std::vector<Slider> sliders_;
   cli::Upright upright_;
   Viewers &viewers_;
-  cli::Shapes shown_;  // bodies that viewers have
-  Bytes buffer_;
-  bool running_, scene_due_ = true;
+  cli::Shapes shown_;  // what viewers have
+  bool running_;
   double wanted_ = 0, real_ = 0;  // s; simulated seconds per second, smoothed
   uint32_t frame_ = 0, holder_ = 0;
   std::string message_;

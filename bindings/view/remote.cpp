@@ -237,9 +237,9 @@ void Remote::fill(render::Scene &out) {
     out.surfaces.push_back(s);
   }
   for (const auto &[number, t] : scene.things()) {
-    if (t.sensor || t.missing) continue;
+    if (t.sensor || t.missing || !scene.present(number)) continue;
     if (t.triangles.empty()) {
-      cli::Solid solid = {t.shape, {}, {}, double{t.radius}, double{t.half_length}};
+      cli::Solid solid = {t.kind, {}, {}, double{t.radius}, double{t.half_length}};
       std::copy_n(t.half_size, 3, solid.half_size);
       std::copy_n(t.position, 3, solid.pose.position);
       std::copy_n(t.rotation, 4, solid.pose.rotation);
