@@ -194,22 +194,28 @@ void Session::show() {
   ++frame_;
 }
 
-std::string Session::brief_state(uint32_t viewer, size_t slider) const {
+std::string Session::probe(uint32_t i, size_t most) const {
+  const char *name = nullptr;
+  double at[3];
+  cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
+  cli::JsonObject out;
+  out.add("name", cli::quoted(std::string(name).substr(0, most)));
+  return out.add("at", cli::json_vector(at)).text();
+}
+
+std::string Session::brief_state(uint32_t viewer, size_t turn) const {
   cli::JsonObject out = state(kBrief);
   out.add("you", std::to_string(viewer));
-  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[slider % sliders_.size()])}));
+  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[turn % sliders_.size()])}));
+  if (const uint32_t n = scene_.settings().nprobe)
+    out.add("probes", cli::json_array({probe(uint32_t(turn % n), kBrief)}));
   return as_utf8(out.text());
 }
 
 std::string Session::whole_state() const {
   std::vector<std::string> sliders, probes;
   for (const Slider &s : sliders_) sliders.push_back(text_of(s));
-  for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) {
-    const char *name = nullptr;
-    double at[3];
-    cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
-    probes.push_back(cli::JsonObject().add("name", cli::quoted(name)).add("at", cli::json_vector(at)).text());
-  }
+  for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) probes.push_back(probe(i));
   cli::JsonObject out = state();
   out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
   return as_utf8(out.text());

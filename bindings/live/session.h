@@ -21,8 +21,8 @@ class Session {
   // Does what viewers have asked for, takes steps for as long as a picture lasts, s, and shows the result.
   void picture(double seconds);
   const cli::SceneFile &scene() const { return scene_; }
-  // The state as it goes to a viewer of that number, with one slider (which begin again), without probes.
-  std::string brief_state(uint32_t viewer, size_t slider) const;
+  // The state as it goes to a viewer of that number, with one slider and one probe, which go by turns.
+  std::string brief_state(uint32_t viewer, size_t turn) const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -35,6 +35,7 @@ class Session {
   // Without sliders and probes. most: bytes of each text.
   cli::JsonObject state(size_t most = std::string::npos) const;
   std::string whole_state() const;
+  std::string probe(uint32_t i, size_t most = std::string::npos) const;
 
   cli::SceneFile scene_;
   Simulation simulation_;
