@@ -234,12 +234,13 @@ class Scene:
             self.bodies[number] = Surface(self.text(data, 16), shape, n, m, self.told)
 
     def read_obst(self, data):
-        number, shape, n, m, sensor = struct.unpack_from("<5I", data)
-        if number in self.things:
+        number, shape, n, m, kind = struct.unpack_from("<5I", data)
+        thing = self.things.get(number)
+        if thing and (thing.shape == shape or older(self.told, thing.frame)):
             return
-        thing = self.things[number] = Surface(self.text(data, 40), shape, n, m)
+        thing = self.things[number] = Surface(self.text(data, 40), shape, n, m, self.told)
         thing.put(thing.moved, 0, [0.0] * (3 * n))
-        thing.sensor, thing.pose = bool(sensor), (0, 0, 0, 0, 0, 0, 1)
+        thing.kind, thing.sensor, thing.pose = kind & 0xffff, kind >> 16 == 1, (0, 0, 0, 0, 0, 0, 1)
         thing.radius, thing.half_length, *thing.half_size = struct.unpack_from("<5f", data, 20)
 
     def ranges(self, data, kind, of):
@@ -314,7 +315,8 @@ def main():
             continue
         seen += 1
         points = sum(len(b.base) // 3 for b in scene.bodies.values())
-        print(f"frame {scene.frame}, {scene.time:.4f} s: {len(scene.present)} bodies, {points} points, "
+        bodies = len(scene.bodies.keys() & scene.present.keys())
+        print(f"frame {scene.frame}, {scene.time:.4f} s: {bodies} bodies, {points} points, "
               f"{len(scene.contacts)} contacts" + (f", {connection.lost()} packets lost" if rtp else ""),
               flush=True)
         if given.obj:

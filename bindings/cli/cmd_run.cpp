@@ -116,7 +116,7 @@ class Runner {
     result_.begun = result_.simulated = dfm_world_time(world_);
     if (!options_.stream.empty()) {
       refuse_static(scene_, "--stream");
-      stream_.emplace(scene_, options_.stream);
+      stream_.emplace(world_, options_.stream);
     }
     count_overlaps();
     add_unwatched(scene_, result_);

@@ -11,11 +11,17 @@ namespace cli {
 
 using Packets = std::vector<unsigned char>;  // one behind the other
 
-// Number and shape of each body in packets of a frame: another shape means other triangles.
+// Number and shape of each thing in packets of a frame: another shape means other triangles.
 using Shapes = std::vector<std::pair<uint32_t, uint32_t>>;
 Shapes shapes_in(const Packets &frame);
 
 void write_packets(dfm_world world, const dfm_stream_def &def, Packets &out);
+// The present state as one packet; of a frame its surfaces as floats, and contacts.
+void write_packet(dfm_world world, uint32_t kind, uint32_t frame, Packets &out);
+// Those of a scene for all that `now` has and `before` has not.
+Packets news_packets(dfm_world world, uint32_t frame, const Shapes &before, const Shapes &now);
+// What the two above write, for a network: packets of at most that many bytes (0: one), surfaces in 16 bits.
+void pack(const Packets &packets, uint32_t most, Packets &out);
 
 inline uint32_t word_at(const Packets &packets, size_t at) {
   uint32_t x;

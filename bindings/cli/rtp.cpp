@@ -21,9 +21,10 @@ namespace {
 
 constexpr uint32_t kPayload = 1188;  // bytes: a datagram of 1,200 passes every network
 constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96;
-constexpr double kFrameRate = 30, kSlowest = 5;   // frames a second
-constexpr int kRound = 1000, kPatience = 5;       // ms
-constexpr int kReports = 5;                       // s
+constexpr double kFrameRate = 30, kSlowest = 5;  // frames a second
+constexpr std::chrono::seconds kRound(1), kReports(5);
+constexpr std::chrono::milliseconds kTick(5);     // within which what comes is heard
+constexpr int kPatience = 5;                      // ms
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
 constexpr size_t kMostRequests = 256;             // that wait; what comes beyond comes again
 constexpr size_t kMostSteerers = 4096;            // that a run knows
@@ -101,20 +102,33 @@ std::vector<unsigned char> control_packet(uint32_t source, size_t head, const st
   return out;
 }
 
-RtpSender::RtpSender(const SceneFile &scene, const std::string &url, std::string token)
-    : scene_(scene),
+RtpSender::RtpSender(dfm_world world, const std::string &url, std::string token)
+    : world_(world),
       token_(std::move(token)),
       socket_(rtp_socket(sink(url), "--stream", connect)),
-      begin_(dfm_world_time(scene.world())),
+      begin_(dfm_world_time(world)),
       interval_(1 / kFrameRate) {
   std::random_device system;
   sequence_ = static_cast<uint16_t>(system());
   source_ = system();
   first_stamp_ = system();
-  began_ = last_frame_ = next_frame_ = next_report_ = next_round_ = Clock::now();
+  thread_ = std::thread([this] { work(); });
 }
 
-RtpSender::~RtpSender() { close(socket_); }
+RtpSender::~RtpSender() {
+  stop(true);
+  close(socket_);
+}
+
+void RtpSender::stop(bool at_once) {
+  if (!thread_.joinable()) return;
+  {
+    const std::lock_guard lock(mutex_);
+    inbox_.until = at_once ? Inbox::stops : Inbox::ends;
+  }
+  filled_.notify_one();
+  thread_.join();
+}
 
 uint32_t RtpSender::stamp() const {
   const double passed = std::chrono::duration<double>(Clock::now() - began_).count();
@@ -122,13 +136,13 @@ uint32_t RtpSender::stamp() const {
 }
 
 // What the network does not take within a few milliseconds is lost, like what it loses later.
-void RtpSender::send(const unsigned char *payload, size_t n, bool marker, uint32_t stamp) {
+void RtpSender::send(const unsigned char *payload, size_t n, bool marker) {
   datagram_.resize(kRtpHeader + n);
   unsigned char *const to = datagram_.data();
   to[0] = kRtpVersion;
   to[1] = static_cast<unsigned char>(kPayloadType | (marker ? 0x80 : 0));
   put16(to + 2, sequence_++);
-  put32(to + 4, stamp);
+  put32(to + 4, stamp_);
   put32(to + 8, source_);
   std::memcpy(to + kRtpHeader, payload, n);
   ssize_t sent = ::send(socket_, to, datagram_.size(), 0);
@@ -138,66 +152,27 @@ void RtpSender::send(const unsigned char *payload, size_t n, bool marker, uint32
     sent = ::send(socket_, to, datagram_.size(), 0);
   }
   if (sent < 0) return;
+  octets_ += n;
+  const std::lock_guard lock(mutex_);
   ++report_.packets;
   report_.bytes += datagram_.size();
-  octets_ += n;
 }
 
 void RtpSender::send_all(const Packets &packets, bool frame) {
-  const uint32_t now = stamp();
+  stamp_ = stamp();
   each_packet(packets, [&](size_t at, size_t size) {
-    send(&packets[at], size, frame && at + size == packets.size(), now);
+    send(&packets[at], size, frame && at + size == packets.size());
   });
-}
-
-void RtpSender::send_frame() {
-  dfm_stream_def def = dfm_stream_def_default();
-  def.flags = DFM_STREAM_CONTACTS;
-  def.frame = number_++;
-  def.packet = kPayload;
-  write_packets(scene_.world(), def, frame_);
-  const Shapes shapes = shapes_in(frame_);
-  if (shapes != shapes_) send_changed(shapes);
-  send_all(frame_, true);
-  ++report_.frames;
-}
-
-// Bodies whose triangles are others than before, at once; the round has the rest.
-void RtpSender::send_changed(const Shapes &shapes) {
-  for (const auto &shape : shapes) {
-    if (std::find(shapes_.begin(), shapes_.end(), shape) != shapes_.end()) continue;
-    for (const BodyView &body : scene_.bodies()) {
-      if (static_cast<uint32_t>(body.handle) != shape.first) continue;
-      dfm_stream_def def = dfm_stream_def_default();
-      def.kind = DFM_STREAM_SCENE;
-      def.packet = kPayload;
-      def.frame = number_;
-      def.body = body.handle;
-      write_packets(scene_.world(), def, changed_);
-      send_all(changed_, false);
-    }
-  }
-  shapes_ = shapes;
 }
 
 // What these seconds have of a round, which takes half of its time.
 void RtpSender::send_round(double seconds) {
-  const Clock::time_point now = Clock::now();
-  if (sent_ == round_.size()) {
-    if (now < next_round_) return;
-    next_round_ = std::max(now, next_round_ + std::chrono::milliseconds(kRound));
-    dfm_stream_def def = dfm_stream_def_default();
-    def.kind = DFM_STREAM_SCENE;
-    def.packet = kPayload;
-    def.frame = number_;
-    write_packets(scene_.world(), def, round_);
-    sent_ = 0;
-  }
-  const double share = std::min(1.0, 2e3 * seconds / kRound);
+  stamp_ = stamp();
+  const double share = std::min(1.0, 2 * seconds / std::chrono::duration<double>(kRound).count());
   const size_t upto = sent_ + static_cast<size_t>(share * static_cast<double>(round_.size()));
   while (sent_ < round_.size() && sent_ <= upto) {
     const size_t size = word_at(round_, sent_ + 16);
-    send(&round_[sent_], size, false, stamp());
+    send(&round_[sent_], size, false);
     sent_ += size;
   }
 }
@@ -215,7 +190,7 @@ void RtpSender::send_report(bool ends) {
   put32(out + 12,
         static_cast<uint32_t>((from - static_cast<double>(static_cast<uint64_t>(from))) * 4294967295.0));
   put32(out + 16, stamp());
-  put32(out + 20, static_cast<uint32_t>(report_.packets));
+  put32(out + 20, static_cast<uint32_t>(report().packets));
   put32(out + 24, static_cast<uint32_t>(octets_));
   unsigned char *const name = out + 28;  // one item: a canonical name of six letters
   name[0] = kRtpVersion | 1;
@@ -242,6 +217,7 @@ void RtpSender::hear() {
     each_report(in, static_cast<size_t>(n), [&](const unsigned char *report, size_t size) {
       if (report[1] == kApp) return hear_request(report, size);
       if (size < 32 || (report[0] & 31) == 0 || report[1] != kReceiverReport) return;
+      const std::lock_guard lock(mutex_);
       report_.lost = report[12] / 256.0;
       if (report_.lost > kTooMuch) interval_ = std::min(1.4 * interval_, 1 / kSlowest);
       else if (report_.lost < kLittle) interval_ = std::max(0.9 * interval_, 1 / kFrameRate);
@@ -255,6 +231,7 @@ void RtpSender::hear_request(const unsigned char *in, size_t n) {
   padded.resize(kToken);
   const uint32_t source = get32(in + 4);
   if (!same_secret(padded, in + 12, kToken)) return;
+  const std::lock_guard lock(mutex_);
   if (!taken_.contains(source) && taken_.size() >= kMostSteerers) return;
   heard_ = Clock::now();
   steerer_ = source;
@@ -264,22 +241,38 @@ void RtpSender::hear_request(const unsigned char *in, size_t n) {
   requests_.emplace_back(in + kRequestHead, in + n);
 }
 
-bool RtpSender::steered() const { return steerer_ && Clock::now() < heard_ + kListens; }
+bool RtpSender::steered() const {
+  const std::lock_guard lock(mutex_);
+  return steerer_ && Clock::now() < heard_ + kListens;
+}
 
 std::vector<std::string> RtpSender::take() {
-  hear();
+  const std::lock_guard lock(mutex_);
   return std::exchange(requests_, {});
 }
 
 void RtpSender::tell(const std::string &text) {
+  const std::lock_guard lock(mutex_);
+  inbox_.text = text;
+}
+
+RtpSender::Report RtpSender::report() const {
+  const std::lock_guard lock(mutex_);
+  return report_;
+}
+
+void RtpSender::send_answer(const std::string &text) {
   std::vector<unsigned char> out = control_packet(source_, kAnswerHead, text);
-  put32(&out[12], steerer_);
-  put32(&out[16], taken_[steerer_]);
+  {
+    const std::lock_guard lock(mutex_);
+    put32(&out[12], steerer_);
+    put32(&out[16], taken_[steerer_]);
+  }
   ::send(socket_, out.data(), out.size(), 0);
 }
 
 void RtpSender::after_step() {
-  const std::chrono::duration<double> simulated(dfm_world_time(scene_.world()) - begin_);
+  const std::chrono::duration<double> simulated(dfm_world_time(world_) - begin_);
   std::this_thread::sleep_until(began_ + std::chrono::duration_cast<Clock::duration>(simulated));
   show();
 }
@@ -287,25 +280,94 @@ void RtpSender::after_step() {
 void RtpSender::show() {
   const Clock::time_point now = Clock::now();
   if (now < next_frame_) return;
+  hand_over();
+  const std::lock_guard lock(mutex_);
   next_frame_ = std::max(next_frame_, now - std::chrono::milliseconds(1)) +
                 std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval_));
-  hear();
-  send_frame();
-  send_round(std::chrono::duration<double>(now - last_frame_).count());
-  last_frame_ = now;
-  if (now >= next_report_) {
-    send_report(false);
-    next_report_ = now + std::chrono::seconds(kReports);
-  }
   report_.seconds += std::chrono::duration<double>(Clock::now() - now).count();
 }
 
+// A copy of the state, and of the scene where something in it is new. News that still wait are lost; the
+// next round has them.
+void RtpSender::hand_over() {
+  write_packet(world_, DFM_STREAM_FRAME, number_, snapshot_);
+  Packets news, scene;
+  if (Shapes shapes = shapes_in(snapshot_); shapes != shapes_ || number_ == 0) {
+    news = news_packets(world_, number_, shapes_, shapes);
+    write_packet(world_, DFM_STREAM_SCENE, number_, scene);
+    shapes_ = std::move(shapes);
+  }
+  ++number_;
+  {
+    const std::lock_guard lock(mutex_);
+    std::swap(inbox_.frame, snapshot_);
+    if (!scene.empty()) {
+      inbox_.news = std::move(news);
+      inbox_.scene = std::move(scene);
+    }
+  }
+  filled_.notify_one();
+}
+
 void RtpSender::end() {
+  hand_over();
+  stop(false);
+}
+
+void RtpSender::work() {
+  Inbox in;
+  Clock::time_point last = began_, next_report = began_, next_round = began_;
+  while (in.until == Inbox::goes) {
+    {
+      std::unique_lock lock(mutex_);
+      filled_.wait_until(lock, Clock::now() + kTick,
+                         [&] { return !inbox_.frame.empty() || inbox_.until != Inbox::goes; });
+      std::swap(in, inbox_);
+      inbox_.frame.clear();  // keeps its memory
+    }
+    if (in.until == Inbox::stops) return;
+    hear();
+    const Clock::time_point now = Clock::now();
+    try {
+      if (!in.scene.empty()) {
+        pack(in.news, kPayload, news_);
+        send_all(news_, false);
+        pack(in.scene, kPayload, round_);
+        sent_ = 0;
+        next_round = now + kRound;
+      }
+      if (!in.frame.empty()) {
+        pack(in.frame, kPayload, frame_);
+        send_all(frame_, true);
+        const std::lock_guard lock(mutex_);
+        ++report_.frames;
+      }
+    } catch (const std::exception &) {  // no memory: lost, like what the network loses
+    }
+    if (!in.text.empty()) send_answer(in.text);
+    if (now >= next_round) {
+      sent_ = 0;
+      next_round = now + kRound;
+    }
+    send_round(std::chrono::duration<double>(now - last).count());
+    last = now;
+    if (now >= next_report) {
+      send_report(false);
+      next_report = now + kReports;
+    }
+    in.news.clear();
+    in.scene.clear();
+    in.text.clear();
+  }
+  send_end();
+}
+
+void RtpSender::send_end() {
   for (int i = 0; i < 2; ++i) {
-    send_round(kRound);  // what is left of the present one, and another one
-    next_round_ = Clock::now();
-    send_round(kRound);
-    send_frame();
+    send_round(1);  // what is left of the present one, and another one
+    sent_ = 0;
+    send_round(1);
+    send_all(frame_, true);
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   send_report(true);

@@ -1,19 +1,21 @@
 // A run as packets of RTP (RFC 3550) to one address: what dfm_world_stream writes, each packet the payload
 // of one datagram. The scene is sent again about once a second, so that who comes late, or has lost a part,
-// is whole after the next round; where a cut changes triangles, a round begins at once. The format:
-// doc/reference/stream.md.
+// is whole after the next round; where something is new, it is sent and a round begins at once. The thread
+// that steps takes a copy of the state; another one packs and sends it. The format: doc/reference/stream.md.
 #pragma once
 #include <sys/socket.h>
 
 #include <chrono>
+#include <condition_variable>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <mutex>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "packets.h"
-#include "scene_file.h"
 
 namespace cli {
 
@@ -62,55 +64,76 @@ class RtpSender {
  public:
   // url: "rtp://ADDRESS:PORT". token: of who may steer, from that address alone; empty: nobody. Throws
   // Failure.
-  RtpSender(const SceneFile &scene, const std::string &url, std::string token = "");
+  RtpSender(dfm_world world, const std::string &url, std::string token = "");
   ~RtpSender();
   RtpSender(const RtpSender &) = delete;
   // After a step: waits where the run is ahead of the clock, and sends where a picture is due.
   void after_step();
-  void show();                         // sends where a picture is due
+  void show();                         // what is sent next, where a picture is due
   bool steered() const;                // who has the token listens
   std::vector<std::string> take();     // what it has asked for since the last call, in order
   void tell(const std::string &text);  // to it
-  void end();                          // the last state, twice, and that nothing follows
+  void end();  // the last state, twice, and that nothing follows; waits until it is sent
 
   struct Report {
     uint64_t frames = 0, packets = 0, bytes = 0;
-    double seconds = 0;  // of the run's own time, for encoding and sending
+    double seconds = 0;  // that the run itself has spent
     double lost = 0;     // share, as the receiver has said last
   };
-  const Report &report() const { return report_; }
+  Report report() const;
 
  private:
   using Clock = std::chrono::steady_clock;
-  void send_frame();
-  void send_changed(const Shapes &shapes);
-  void send_round(double seconds);
-  void send(const unsigned char *payload, size_t n, bool marker, uint32_t stamp);
+  // What the thread of the network gets; what it has not taken in time, the next one replaces.
+  struct Inbox {
+    Packets frame, news, scene;  // empty: none
+    std::string text;
+    enum { goes, ends, stops } until = goes;
+  };
+  void hand_over();
+  void stop(bool at_once);
+  void work();
   void send_all(const Packets &packets, bool frame);
+  void send_round(double seconds);
+  void send(const unsigned char *payload, size_t n, bool marker);
   void send_report(bool ends);
+  void send_answer(const std::string &text);
+  void send_end();
   uint32_t stamp() const;
   void hear();
   void hear_request(const unsigned char *in, size_t n);
 
-  const SceneFile &scene_;
+  const dfm_world world_;
   const std::string token_;
-  int socket_ = -1;
-  uint16_t sequence_;
-  uint32_t source_, first_stamp_;
-  uint64_t octets_ = 0;
-  double begin_;  // s, of the world
-  Clock::time_point began_, last_frame_, next_frame_, next_report_, next_round_;
-  double interval_;  // s, between frames: longer where packets get lost
-  Packets frame_, changed_, round_;
-  std::vector<unsigned char> datagram_;
-  size_t sent_ = 0;  // bytes of the round
+  const int socket_;
+  const double begin_;  // s, of the world
+  const Clock::time_point began_ = Clock::now();
+
+  // Of the thread that steps.
+  Clock::time_point next_frame_ = began_;
+  Packets snapshot_;
   Shapes shapes_;
   uint32_t number_ = 0;
+
+  mutable std::mutex mutex_;  // of these
+  std::condition_variable filled_;
+  Inbox inbox_;
+  double interval_;                     // s, between frames: longer where packets get lost
   uint32_t steerer_ = 0;                // source of who steers
   std::map<uint32_t, uint32_t> taken_;  // of each source, the number of the last request
   Clock::time_point heard_;             // from who steers
   std::vector<std::string> requests_;
   Report report_;
+
+  // Of the thread of the network.
+  uint16_t sequence_;
+  uint32_t source_, first_stamp_;
+  uint32_t stamp_ = 0;  // of what is sent now
+  uint64_t octets_ = 0;
+  Packets frame_, news_, round_;
+  std::vector<unsigned char> datagram_;
+  size_t sent_ = 0;  // bytes of the round
+  std::thread thread_;
 };
 
 }  // namespace cli

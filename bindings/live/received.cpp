@@ -24,7 +24,7 @@ bool older(uint32_t frame, uint32_t other) {
 }
 
 size_t weight(const Received::Mesh &m) {
-  return kEach + m.base.size() / 3 + m.triangles.size() / 3 + (m.before ? weight(*m.before) : 0);
+  return kEach + m.points + m.faces + (m.before ? weight(*m.before) : 0);
 }
 
 }  // namespace
@@ -33,6 +33,7 @@ class Received::Chunk {
  public:
   Chunk(const unsigned char *bytes, size_t n) : bytes_(bytes), n_(n) {}
   size_t size() const { return n_; }
+  const unsigned char *bytes() const { return bytes_; }
   bool has(size_t at, size_t bytes) const { return at <= n_ && bytes <= n_ - at; }
   template <class T = uint32_t>
   T get(size_t at) const {
@@ -84,12 +85,7 @@ void Received::packet(const unsigned char *bytes, size_t n) {
     for (auto &[number, m] : bodies_) m.told = false;
     for (auto &[number, m] : things_) m.told = false;
   }
-  for (size_t at = kHeader; head.has(at, kChunk);) {
-    const size_t size = head.get(at + 4);
-    if (!head.has(at + kChunk, size)) break;
-    chunk(bytes + at, Chunk(bytes + at + kChunk, size));
-    at += kChunk + size;
-  }
+  chunks(bytes + kHeader, n - kHeader);
   if (!everything) return;
   const auto left_out = [&](const auto &entry) {
     if (!entry.second.told) drop(entry.second);
@@ -97,6 +93,16 @@ void Received::packet(const unsigned char *bytes, size_t n) {
   };
   std::erase_if(bodies_, left_out);
   std::erase_if(things_, left_out);
+}
+
+void Received::chunks(const unsigned char *bytes, size_t n) {
+  const Chunk all(bytes, n);
+  for (size_t at = 0; all.has(at, kChunk);) {
+    const size_t size = all.get(at + 4);
+    if (!all.has(at + kChunk, size)) break;
+    chunk(bytes + at, Chunk(bytes + at + kChunk, size));
+    at += kChunk + size;
+  }
 }
 
 void Received::chunk(const unsigned char *tag, const Chunk &c) {
@@ -120,13 +126,31 @@ bool Received::make(Mesh &m, const Chunk &c, size_t name) {
   m.shape = c.get(4);
   m.frame = told_;
   m.told = true;
-  m.base.assign(3 * n, std::numeric_limits<float>::quiet_NaN());
-  m.moved.assign(3 * n, kNone);
-  m.x.assign(3 * n, kNone);
-  m.triangles.assign(3 * triangles, UINT32_MAX);
+  m.points = n;
+  m.faces = triangles;
   m.missing = 6 * n + 3 * triangles;
+  m.filled = m.missing == 0;
   held_ += weight(m);
   return true;
+}
+
+// False: the chunk is kept until as much has come as the lists of the mesh need at least.
+bool Received::fills(Mesh &m, const char *tag, const Chunk &c) {
+  if (m.filled) return true;
+  const auto size = uint32_t(c.size());
+  m.waiting.insert(m.waiting.end(), tag, tag + 4);
+  m.waiting.insert(m.waiting.end(), reinterpret_cast<const unsigned char *>(&size),
+                   reinterpret_cast<const unsigned char *>(&size) + sizeof size);
+  m.waiting.insert(m.waiting.end(), c.bytes(), c.bytes() + size);
+  if (m.waiting.size() < 12 * (m.points + m.faces)) return false;
+  const std::vector<unsigned char> all = std::move(m.waiting);
+  m.filled = true;
+  m.base.assign(3 * m.points, std::numeric_limits<float>::quiet_NaN());
+  m.moved.assign(3 * m.points, m.rigid ? 0 : kNone);
+  m.x.assign(3 * m.points, kNone);
+  m.triangles.assign(3 * m.faces, UINT32_MAX);
+  chunks(all.data(), all.size());
+  return false;
 }
 
 void Received::body(const Chunk &c) {
@@ -155,20 +179,26 @@ void Received::thing(const Chunk &c) {
   if (!c.has(0, 44)) return;
   if (const auto found = things_.find(c.get(0)); found != things_.end()) {
     found->second.told = true;
-    return;
+    if (found->second.shape == c.get(4) || older(told_, found->second.frame)) return;
+    drop(found->second);  // another thing has its number
+    things_.erase(found);
   }
   Thing t;
   if (!c.finite(20, 5) || !make(t, c, 40)) return;
-  t.missing -= t.moved.size();
-  std::fill(t.moved.begin(), t.moved.end(), 0.0);  // things do not change their shape
-  t.sensor = c.get(16) & 1;
+  t.rigid = true;
+  t.missing -= 3 * t.points;
+  t.filled = t.missing == 0;
+  t.kind = c.get(16) & 0xffff;
+  t.sensor = c.get(16) >> 16 & 1;
   t.radius = c.get<float>(20);
   t.half_length = c.get<float>(24);
   for (size_t k = 0; k < 3; ++k) t.half_size[k] = c.get<float>(28 + 4 * k);
   things_.emplace(c.get(0), std::move(t));
 }
 
-Received::Mesh *Received::mesh(uint32_t number, uint32_t shape) {
+Received::Mesh *Received::mesh(const Chunk &c) {
+  if (!c.has(0, 16)) return nullptr;
+  const uint32_t number = c.get(0), shape = c.get(4);
   if (const auto at = bodies_.find(number); at != bodies_.end() && at->second.shape == shape)
     return &at->second;
   if (const auto at = things_.find(number); at != things_.end() && at->second.shape == shape)
@@ -177,10 +207,10 @@ Received::Mesh *Received::mesh(uint32_t number, uint32_t shape) {
 }
 
 void Received::base(const Chunk &c) {
-  if (!c.has(0, 16)) return;
-  Mesh *const m = mesh(c.get(0), c.get(4));
-  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
-  if (!m || first > m->base.size() || n > m->base.size() - first || !c.finite(16, n)) return;
+  Mesh *const m = mesh(c);
+  if (!m) return;
+  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)}, all = 3 * m->points;
+  if (first > all || n > all - first || !c.finite(16, n) || !fills(*m, "BASE", c)) return;
   for (size_t i = 0; i < n; ++i) {
     float &to = m->base[first + i];
     m->missing -= std::isnan(to);
@@ -191,12 +221,13 @@ void Received::base(const Chunk &c) {
 }
 
 void Received::triangles(const Chunk &c) {
-  if (!c.has(0, 16)) return;
-  Mesh *const m = mesh(c.get(0), c.get(4));
-  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
-  if (!m || first > m->triangles.size() || n > m->triangles.size() - first || !c.has(16, 4 * n)) return;
+  Mesh *const m = mesh(c);
+  if (!m) return;
+  const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)}, all = 3 * m->faces;
+  if (first > all || n > all - first || !c.has(16, 4 * n)) return;
   for (size_t i = 0; i < n; ++i)
-    if (c.get(16 + 4 * i) >= m->base.size() / 3) return;
+    if (c.get(16 + 4 * i) >= m->points) return;
+  if (!fills(*m, "TRIS", c)) return;
   for (size_t i = 0; i < n; ++i) {
     uint32_t &to = m->triangles[first + i];
     m->missing -= to == UINT32_MAX;
@@ -214,11 +245,13 @@ void Received::settle(Mesh &m) {
 
 void Received::list(const Chunk &c) {
   if (listed_ != frame_) {
-    std::erase_if(bodies_, [&](const auto &entry) {  // gone in the frame before
-      const bool gone = !present_.contains(entry.first) && older(entry.second.frame, listed_);
-      if (gone) drop(entry.second);
-      return gone;
-    });
+    const auto gone = [&](const auto &entry) {  // in the frame before
+      const bool out = !present_.contains(entry.first) && older(entry.second.frame, listed_);
+      if (out) drop(entry.second);
+      return out;
+    };
+    std::erase_if(bodies_, gone);
+    std::erase_if(things_, gone);
     present_.clear();
     listed_ = frame_;
   }
@@ -241,9 +274,11 @@ void Received::surface(const Chunk &c) {
   if (found == bodies_.end() || found->second.shape != c.get(4)) return;
   Mesh &m = found->second;
   const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
+  const size_t all = 3 * m.points;
   const bool floats = c.get(16) & 1;
-  if (first > m.moved.size() || n > m.moved.size() - first) return;
+  if (first > all || n > all - first) return;
   if (floats ? !c.finite(20, n) : !c.finite(20, 6) || !c.has(48, 2 * n)) return;
+  if (!fills(m, "SURF", c)) return;
   for (size_t i = 0; i < n; ++i) {
     double &to = m.moved[first + i];
     m.missing -= std::isnan(to);

@@ -16,8 +16,13 @@ class Received {
   struct Mesh {
     std::string name;
     uint32_t shape = 0, frame = 0;  // frame: when it was told
-    std::vector<float> base;        // [n,3] m
-    std::vector<double> moved, x;   // [n,3] m; x: where the points are
+    size_t points = 0, faces = 0;   // that it has when it is complete
+    // Its chunks until as much has come as it needs: memory is bounded by that, whatever was announced.
+    std::vector<unsigned char> waiting;
+    bool filled = false;           // they are in the lists below
+    bool rigid = false;            // has no displacements
+    std::vector<float> base;       // [n,3] m
+    std::vector<double> moved, x;  // [n,3] m; x: where the points are
     std::vector<uint32_t> triangles;
     size_t missing = 0;            // values that have not come yet
     std::unique_ptr<Mesh> before;  // with the triangles of before, until the new ones are complete
@@ -26,6 +31,7 @@ class Received {
     const Mesh *drawn() const { return missing == 0 ? this : before.get(); }
   };
   struct Thing : Mesh {
+    uint32_t kind = 0;  // DFM_SHAPE_*
     bool sensor = false;
     float radius = 0, half_length = 0, half_size[3] = {0, 0, 0};
     double position[3] = {0, 0, 0}, rotation[4] = {0, 0, 0, 1};
@@ -40,13 +46,14 @@ class Received {
   const std::map<uint32_t, Mesh> &bodies() const { return bodies_; }
   const std::map<uint32_t, Thing> &things() const { return things_; }
   const std::vector<Contact> &contacts() const { return contacts_; }
-  bool present(uint32_t body) const { return present_.contains(body); }
+  bool present(uint32_t number) const { return present_.contains(number); }
   double time() const { return time_; }      // s, of the newest frame
   uint32_t frame() const { return frame_; }  // its number
 
  private:
   class Chunk;
   void packet(const unsigned char *bytes, size_t n);
+  void chunks(const unsigned char *bytes, size_t n);
   void chunk(const unsigned char *tag, const Chunk &c);
   void body(const Chunk &c);
   void thing(const Chunk &c);
@@ -57,7 +64,8 @@ class Received {
   void surface(const Chunk &c);
   void contacts(const Chunk &c);
   bool make(Mesh &m, const Chunk &c, size_t name);
-  Mesh *mesh(uint32_t number, uint32_t shape);
+  Mesh *mesh(const Chunk &c);
+  bool fills(Mesh &m, const char *tag, const Chunk &c);
   void drop(const Mesh &m);
   void settle(Mesh &m);
 

@@ -178,57 +178,44 @@ void Session::advance(double seconds) {
   real_ += 0.1 * ((simulation_.time() - before) / seconds - real_);
 }
 
-Bytes Session::packets(uint32_t kind, dfm_body body) {
-  dfm_stream_def def = dfm_stream_def_default();
-  def.kind = kind;
-  def.flags = kind == DFM_STREAM_FRAME ? uint32_t{DFM_STREAM_CONTACTS} : 0;
-  def.frame = frame_;
-  def.body = body;
-  cli::write_packets(scene_.world(), def, buffer_);
-  return buffer_;
-}
-
-// Bodies whose triangles are others than viewers have, alone; viewers that come later get everything.
-void Session::show_scene(cli::Shapes shapes) {
-  if (shapes == shown_ && !scene_due_) return;
-  Bytes changed;
-  for (const auto &shape : shapes) {
-    if (std::find(shown_.begin(), shown_.end(), shape) != shown_.end()) continue;
-    for (const cli::BodyView &body : scene_.bodies()) {
-      if (static_cast<uint32_t>(body.handle) != shape.first) continue;
-      const Bytes one = packets(DFM_STREAM_SCENE, body.handle);
-      changed.insert(changed.end(), one.begin(), one.end());
-    }
-  }
-  shown_ = std::move(shapes);
-  viewers_.show_scene(packets(DFM_STREAM_SCENE), scene_due_ ? Bytes() : std::move(changed));
-  scene_due_ = false;
-}
-
+// What viewers have not yet, alone; viewers that come later get everything.
 void Session::show() {
-  Bytes frame = packets(DFM_STREAM_FRAME);
-  show_scene(cli::shapes_in(frame));
+  Bytes frame, scene;
+  cli::write_packet(scene_.world(), DFM_STREAM_FRAME, frame_, frame);
+  if (cli::Shapes shapes = cli::shapes_in(frame); shapes != shown_ || frame_ == 0) {
+    cli::write_packet(scene_.world(), DFM_STREAM_SCENE, frame_, scene);
+    Bytes news;
+    if (!shown_.empty()) news = cli::news_packets(scene_.world(), frame_, shown_, shapes);
+    viewers_.show_scene(std::move(scene), std::move(news));
+    shown_ = std::move(shapes);
+  }
   viewers_.show_state(whole_state());
   viewers_.show_frame(std::move(frame));
   ++frame_;
 }
 
-std::string Session::brief_state(uint32_t viewer, size_t slider) const {
+std::string Session::probe(uint32_t i, size_t most) const {
+  const char *name = nullptr;
+  double at[3];
+  cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
+  cli::JsonObject out;
+  out.add("name", cli::quoted(std::string(name).substr(0, most)));
+  return out.add("at", cli::json_vector(at)).text();
+}
+
+std::string Session::brief_state(uint32_t viewer, size_t turn) const {
   cli::JsonObject out = state(kBrief);
   out.add("you", std::to_string(viewer));
-  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[slider % sliders_.size()])}));
+  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[turn % sliders_.size()])}));
+  if (const uint32_t n = scene_.settings().nprobe)
+    out.add("probes", cli::json_array({probe(uint32_t(turn % n), kBrief)}));
   return as_utf8(out.text());
 }
 
 std::string Session::whole_state() const {
   std::vector<std::string> sliders, probes;
   for (const Slider &s : sliders_) sliders.push_back(text_of(s));
-  for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) {
-    const char *name = nullptr;
-    double at[3];
-    cli::need(dfm_scene_probe(scene_.scene(), i, &name, at, nullptr));
-    probes.push_back(cli::JsonObject().add("name", cli::quoted(name)).add("at", cli::json_vector(at)).text());
-  }
+  for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) probes.push_back(probe(i));
   cli::JsonObject out = state();
   out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
   return as_utf8(out.text());

@@ -21,8 +21,8 @@ class Session {
   // Does what viewers have asked for, takes steps for as long as a picture lasts, s, and shows the result.
   void picture(double seconds);
   const cli::SceneFile &scene() const { return scene_; }
-  // The state as it goes to a viewer of that number, with one slider (which begin again), without probes.
-  std::string brief_state(uint32_t viewer, size_t slider) const;
+  // The state as it goes to a viewer of that number, with one slider and one probe, which go by turns.
+  std::string brief_state(uint32_t viewer, size_t turn) const;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -32,11 +32,10 @@ class Session {
   void let_go();
   void advance(double seconds);
   void show();
-  void show_scene(cli::Shapes shapes);
   // Without sliders and probes. most: bytes of each text.
   cli::JsonObject state(size_t most = std::string::npos) const;
   std::string whole_state() const;
-  Bytes packets(uint32_t kind, dfm_body body = 0);
+  std::string probe(uint32_t i, size_t most = std::string::npos) const;
 
   cli::SceneFile scene_;
   Simulation simulation_;
@@ -44,9 +43,8 @@ class Session {
   std::vector<Slider> sliders_;
   cli::Upright upright_;
   Viewers &viewers_;
-  cli::Shapes shown_;  // bodies that viewers have
-  Bytes buffer_;
-  bool running_, scene_due_ = true;
+  cli::Shapes shown_;  // what viewers have
+  bool running_;
   double wanted_ = 0, real_ = 0;  // s; simulated seconds per second, smoothed
   uint32_t frame_ = 0, holder_ = 0;
   std::string message_;

@@ -31,14 +31,16 @@ void attempt(F f) {
 }  // namespace
 
 /** Listens on 127.0.0.1.
+ * @param pack  dfm_stream_pack
  * @param port  in: 0 for a free one; out: the port
  * @param token [65] in: "" for a new one; out: what the URL has to say
  * @param why   out, [capacity] one sentence where that fails. @return NULL then. */
-SERVE_API void *deform_serve_open(uint16_t *port, char *token, char *why, size_t capacity) {
+SERVE_API void *deform_serve_open(serve::Server::Pack pack, uint16_t *port, char *token, char *why,
+                                  size_t capacity) {
   try {
     auto served = std::make_unique<Served>();
     if (!*token) std::strcpy(token, serve::new_token().c_str());
-    served->server = std::make_unique<serve::Server>(*port, token);
+    served->server = std::make_unique<serve::Server>(*port, token, pack);
     *port = served->server->port();
     return served.release();
   } catch (const std::exception &e) {

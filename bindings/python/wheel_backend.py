@@ -213,6 +213,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         for path in sorted(PACKAGE.rglob("*")):
             if path.is_file() and path.suffix in (".py", ".js", ".html", ".typed"):
                 wheel.add(f"deform/{path.relative_to(PACKAGE).as_posix()}", path.read_bytes())
+        wheel.add("deform/page.html", (ROOT / "bindings" / "serve" / "page.html").read_bytes())
         for inside, path in files:
             mode = 0o755 if inside.startswith(("bin/", "lib/")) else 0o644
             wheel.add(f"deform/native/{inside}", path.read_bytes(), mode)

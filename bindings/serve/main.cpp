@@ -34,7 +34,7 @@ struct Options {
 class Stream {
  public:
   Stream(const Options &options, live::Session &session, Server &server)
-      : session_(session), server_(server), sender_(session.scene(), options.stream, options.token) {}
+      : session_(session), server_(server), sender_(session.scene().world(), options.stream, options.token) {}
   void hear() {
     const std::vector<std::string> requests = sender_.take();
     if (sender_.steered() != (viewer_ != 0)) {
@@ -63,7 +63,7 @@ class Stream {
 // Until a signal ends it.
 void run(const Options &options, const cli::Globals &globals) {
   using Clock = std::chrono::steady_clock;
-  Server server(options.port, options.token);
+  Server server(options.port, options.token, dfm_stream_pack);
   live::Session session(globals, options.scene, options.set, server, !options.paused);
   cli::catch_signals();
   cli::stepping = session.scene().world();

@@ -99,6 +99,7 @@ struct Server::Call {
       }
       case LWS_CALLBACK_SERVER_WRITEABLE: return of(wsi).writes(*viewer, wsi) ? 0 : -1;
       case LWS_CALLBACK_EVENT_WAIT_CANCELLED:
+        of(wsi).pack_frame();
         lws_callback_on_writable_all_protocol(lws_get_context(wsi), lws_get_protocol(wsi));
         return 0;
       default: return 0;
@@ -106,7 +107,7 @@ struct Server::Call {
   }
 };
 
-Server::Server(uint16_t port, std::string token) : token_(std::move(token)) {
+Server::Server(uint16_t port, std::string token, Pack pack) : token_(std::move(token)), pack_(pack) {
   static const lws_protocols protocols[] = {
       {"http", &Call::page, sizeof(Http), 0, 0, nullptr, 0},
       {"dfm.stream.1", &Call::stream, sizeof(Viewer), kLongestText, 0, nullptr, 0},
@@ -183,13 +184,27 @@ void Server::show_scene(Bytes whole, Bytes changed) {
 }
 
 void Server::show_frame(Bytes frame) {
-  Message message = message_of(frame.data(), frame.size());
   {
     const std::lock_guard lock(mutex_);
-    frame_ = std::move(message);
-    ++frame_number_;
+    fresh_ = std::move(frame);
   }
   wake();
+}
+
+// On the thread of the network; the newest frame alone.
+void Server::pack_frame() {
+  Bytes fresh;
+  {
+    const std::lock_guard lock(mutex_);
+    fresh.swap(fresh_);
+  }
+  size_t n = 0;
+  if (fresh.empty() || pack_(fresh.data(), fresh.size(), nullptr, nullptr, &n) != DFM_OK) return;
+  auto message = std::make_shared<Bytes>(LWS_PRE + n);
+  if (pack_(fresh.data(), fresh.size(), nullptr, message->data() + LWS_PRE, &n) != DFM_OK) return;
+  const std::lock_guard lock(mutex_);
+  frame_ = std::move(message);
+  ++frame_number_;
 }
 
 void Server::show_state(std::string json) {

@@ -1,5 +1,6 @@
-// Serves a page and a stream of messages to browsers on this machine, on a thread of its own. The simulation
-// shows what is new and takes what viewers have sent; it never waits for the network.
+// Serves a page and a stream of messages to browsers on this machine, on a thread of its own, which packs
+// frames too. The simulation shows what is new and takes what viewers have sent; it never waits for the
+// network.
 #pragma once
 #include <cstdint>
 #include <deque>
@@ -9,6 +10,7 @@
 #include <thread>
 #include <vector>
 
+#include "deform/stream.h"
 #include "live/viewers.h"
 
 struct lws_context;
@@ -21,8 +23,10 @@ using live::Request;
 
 class Server final : public live::Viewers {
  public:
+  // dfm_stream_pack; the Python package has no other way to it.
+  using Pack = decltype(&dfm_stream_pack);
   // Listens on 127.0.0.1; port 0: a free one. Throws cli::Failure.
-  Server(uint16_t port, std::string token);
+  Server(uint16_t port, std::string token, Pack pack);
   ~Server() override;
   Server(const Server &) = delete;
   uint16_t port() const { return port_; }
@@ -49,6 +53,7 @@ class Server final : public live::Viewers {
 
   static Message message_of(const void *data, size_t bytes);
   void wake();
+  void pack_frame();
   void serve();
   bool allowed(lws *wsi) const;
   void joins(Viewer &viewer, lws *wsi);
@@ -57,12 +62,14 @@ class Server final : public live::Viewers {
   Message next_for(Viewer &viewer, bool &text);
 
   std::string token_;
+  const Pack pack_;
   uint16_t port_ = 0;
   lws_context *context_ = nullptr;
   std::thread thread_;
 
   mutable std::mutex mutex_;  // of all below
   bool stops_ = false;
+  Bytes fresh_;  // the newest frame, which is not packed yet
   Message scene_, frame_, state_;
   std::deque<Change> changes_;
   uint64_t scene_number_ = 0, frame_number_ = 0, state_number_ = 0;

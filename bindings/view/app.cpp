@@ -89,9 +89,7 @@ App::App(const Options &options, const cli::Globals &globals)
   if (!options.script.empty()) script_.emplace(options.script);
   const std::string &path = stage_->scene.path();
   options_.out = folder_of(options, path);
-  window_ = Window::open(options.width, options.height,
-                         "deform view " + std::filesystem::path(path).filename().string(), !script_);
-  canvas_.open(*window_, options.detail);
+  open(options, "deform view " + std::filesystem::path(path).filename().string(), !script_);
   if (!script_ || std::getenv("DEFORM_VIEW_SPNAV")) space_mouse_ = SpaceMouse::open(no_space_mouse_);
   first_look();
   stage_->plots.sample();
@@ -107,13 +105,6 @@ void App::attempt(const std::function<void()> &what) {
     message_ = failure.what();
     if (script_) throw;  // no user reads the window
   }
-}
-
-void App::run() {
-  window_->begin_panels({}, kFrame);  // sizes of panels are known from the second time on
-  panels();
-  window_->end_panels();
-  while (!window_->closed() && !quit_) frame();
 }
 
 void App::frame() {
@@ -154,11 +145,6 @@ void App::first_look() {
   orbit_.set(first_camera(stage_->scene, picture, canvas_.height() > 0 ? aspect() : 1));
 }
 
-void App::handle(const Input &in) {
-  if (in.kind == Input::key) return key(in.name);
-  mouse(in);
-}
-
 void App::key(const std::string &name) {
   message_.clear();
   if (name != "b") asked_ = false;
@@ -184,12 +170,6 @@ void App::key(const std::string &name) {
     static const std::vector<std::string> kColors{"body", "contact", "speed", "displacement", "stress"};
     const auto at = std::find(kColors.begin(), kColors.end(), stage_->drawing.color());
     stage_->drawing.set_color(at == kColors.end() || at + 1 == kColors.end() ? kColors.front() : at[1]);
-  } else if (name == "a") {
-    show_arrows_ = !show_arrows_;
-  } else if (name == "p") {
-    show_plots_ = !show_plots_;
-  } else if (name == "t") {
-    show_panels_ = !show_panels_;
   } else if (name == "f5" && !replay_) {
     save();
   } else if (name == "f9" && !replay_) {
@@ -198,52 +178,45 @@ void App::key(const std::string &name) {
     record();
   } else if (name == "h") {
     help_ = !help_;
-  } else if (name == "q" || name == "escape") {
-    quit_ = true;
-  } else if (!tool_key(name) && script_) {
+  } else if (!shared_key(name) && !tool_key(name) && script_) {
     throw cli::Failure(cli::kBadInput,
                        script_->path() + ": there is no key \"" + name + "\"; the key h shows them all");
   }
 }
 
-void App::mouse(const Input &in) {
-  if (in.kind == Input::wheel) {
-    if (leads_) lead_deeper(in.turns);
-    else if (!window_->panels_want_mouse()) orbit_.zoom(std::pow(0.88, in.turns));
-    return;
-  }
-  const double dx = in.x - mouse_[0], dy = in.y - mouse_[1];
-  mouse_[0] = in.x;
-  mouse_[1] = in.y;
-  if (in.kind == Input::press && held_ < 0 && !window_->panels_want_mouse())
-    attempt([&] { press(in.button); });
-  if (in.kind == Input::release && in.button == kLeft && stage_->pull.holds())
-    attempt([&] { stage_->pull.release(); });
-  if (in.kind == Input::release && in.button == held_) {
-    held_ = -1;
-    leads_ = false;
-  }
-  if (in.kind != Input::move || held_ < 0) return;
-  if (leads_) return attempt([&] { lead(dx, dy); });
-  if (held_ == kMiddle) orbit_.shift(-dx / canvas_.height(), dy / canvas_.height());
-  else orbit_.turn(-kTurn * dx / canvas_.height(), kTurn * dy / canvas_.height());
-}
-
 void App::press(int button) {
-  const Ray ray = orbit_.ray(across(), above(), aspect());
-  if (button != kMiddle && !replay_) {
-    const int tool = stage_->pull.tool_at(stage_->grip, ray.origin, ray.direction);
+  const Ray at = ray();
+  attempt([&] {
+    const int tool =
+        button != kMiddle && !replay_ ? stage_->pull.tool_at(stage_->grip, at.origin, at.direction) : -1;
     if (tool >= 0) {
       if (tool != stage_->grip.taken()) stage_->grip.take(tool);
       leads_ = true;
-      held_ = button;
+    } else if (button == kLeft && !replay_ && stage_->pull.grab(at.origin, at.direction)) {
       return;
     }
-  }
-  if (button == kLeft && !replay_) {
-    if (stage_->pull.grab(ray.origin, ray.direction)) return;
-  }
-  held_ = button;
+    held_ = button;
+  });
+}
+
+void App::release(int button) {
+  if (button == kLeft && stage_->pull.holds()) attempt([&] { stage_->pull.release(); });
+  if (button == held_) leads_ = false;
+}
+
+bool App::leads(double dx, double dy) {
+  if (leads_) attempt([&] { lead(dx, dy); });
+  return leads_;
+}
+
+void App::cut(const double blade[12]) {
+  if (replay_) return;
+  std::vector<std::string> corners;
+  for (int i = 0; i < 12; ++i) corners.push_back(cli::number(blade[i]));
+  attempt([&] {
+    cli::JsonObject line;
+    stage_->simulation.act(line.add("do", "\"cut\"").add("blade", cli::json_array(corners)));
+  });
 }
 
 // In the plane through the picked place that faces the camera.
@@ -390,6 +363,7 @@ bool App::draw() {
     picture.spheres.push_back({{from.x, from.y, from.z}, 0.006 * size, {{0.1f, 0.1f, 0.1f}, 1}});
     picture.spheres.push_back({{to.x, to.y, to.z}, 0.006 * size, {{0.1f, 0.1f, 0.1f}, 1}});
   }
+  add_stroke(picture);
   canvas_.show(picture);
   window_->end_panels();
   return true;

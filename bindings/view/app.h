@@ -7,22 +7,17 @@
 #include <vector>
 
 #include "arrows.h"
-#include "camera.h"
-#include "canvas.h"
 #include "cli.h"
 #include "drawing.h"
+#include "hands.h"
 #include "live/grip.h"
-#include "options.h"
 #include "plots.h"
 #include "live/pull.h"
 #include "script.h"
 #include "live/sliders.h"
 #include "space_mouse.h"
-#include "window.h"
 
 namespace view {
-
-inline constexpr double kTurn = 3.5;  // radians for a way across the picture's height
 
 // What belongs to the scene as it was read.
 struct Stage {
@@ -39,23 +34,22 @@ struct Stage {
   std::vector<live::Slider> sliders;
 };
 
-class App {
+class App final : public Hands {
  public:
   App(const Options &options, const cli::Globals &globals);
-  // Until the window is closed, or the script is at its end.
-  void run();
 
  private:
-  void frame();
-  void handle(const Input &input);
-  void key(const std::string &name);
-  void mouse(const Input &input);
-  void press(int button);
+  void frame() override;
+  void key(const std::string &name) override;
+  void press(int button) override;
+  void release(int button) override;
+  void cut(const double blade[12]) override;
+  bool leads(double dx, double dy) override;
+  bool leads_deeper(double turns) override;
   bool tool_key(const std::string &name);  // false: no key of tools
   void ask_for_probe();
   void lead(double dx, double dy);  // the tool in hand by the mouse
   void lead_by_space_mouse(double now);
-  void lead_deeper(double turns);  // of the wheel, away from the user
   void add_probe();
   void add_tool_arrows(const render::Camera &camera, render::Scene &picture);
   void pull_to_mouse();
@@ -70,7 +64,7 @@ class App {
   void attempt(const std::function<void()> &what);
   bool draw();  // false: the window has no size
   void first_look();
-  void panels();
+  void panels() override;
   void controls();
   void files();
   void slide(live::Slider &slider);
@@ -79,30 +73,21 @@ class App {
   void numbers();
   void help();
   void shot(const std::string &name);
-  double aspect() const { return canvas_.aspect(); }
-  double across() const { return canvas_.across(mouse_[0]); }
-  double above() const { return canvas_.above(mouse_[1]); }
 
   Options options_;
   cli::Globals globals_;
   std::optional<Script> script_;
   std::optional<cli::Recording> replay_;
   std::unique_ptr<Stage> stage_;
-  std::unique_ptr<Window> window_;
   std::unique_ptr<SpaceMouse> space_mouse_;
   std::string no_space_mouse_;  // why there is none
-  Canvas canvas_;
-  Orbit orbit_;
-  bool running_ = false, quit_ = false, help_ = false, show_arrows_ = true, show_plots_ = true,
-       show_panels_ = true;
+  bool running_ = false, help_ = false;
   double speed_ = 1;                // simulated seconds per second
   double wanted_ = 0;               // s of the scene, by the clock of the window
   double last_ = 0;                 // s, when the last frame began
   double frame_ms_ = 0, real_ = 0;  // smoothed; simulated seconds per second
   uint64_t frames_ = 0;
-  double mouse_[2] = {0, 0};
-  int held_ = -1;                 // the button that turns or shifts the camera, or leads a tool; -1: none
-  bool leads_ = false;            // it leads the tool in hand
+  bool leads_ = false;            // the button that is held leads the tool in hand
   std::vector<double> felt_[2];   // arrows of forces and torques on tools
   double lead_[6] = {};           // from the tool in hand to where it shall go
   double strongest_[2] = {0, 0};  // N, N m, of an arrow of full length

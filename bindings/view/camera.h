@@ -15,6 +15,7 @@ class Orbit {
   void shift(double right, double up);  // in heights of the picture
   void zoom(double factor);             // of the distance
   render::Camera camera() const;
+  double distance() const { return distance_; }  // m, from the eye to what it looks at
   // From the eye through a point of the picture: x, y from -1 (left, bottom) to 1.
   Ray ray(double x, double y, double aspect) const;
   // Where the plane through `depth_of` that faces the camera is met by that ray.

@@ -16,6 +16,7 @@ namespace {
 constexpr float kPlot = 270, kHigh = 64, kLine = 16;
 constexpr float kSlider = 96, kValue = 112, kLabel = 184;  // where a row's parts end or begin, from the left
 constexpr float kKeys = 104;                               // of the help
+const ImU32 kCurves[] = {IM_COL32(45, 105, 180, 255), IM_COL32(205, 80, 55, 255), IM_COL32(60, 140, 85, 255)};
 
 void color_bar(const cli::Drawing::Legend &legend) {
   constexpr int kParts = 64;
@@ -75,6 +76,53 @@ void wrapped(const std::string &text) {
   ImGui::PopTextWrapPos();
 }
 
+void begin_plots(float width) {
+  ImGui::SetNextWindowPos({width - scaled(kGap), scaled(kGap)}, ImGuiCond_Always, {1, 0});
+  ImGui::SetNextWindowSize({scaled(kPlot), 0}, ImGuiCond_Always);
+  ImGui::Begin("plots", nullptr, kFixed);
+}
+
+// Curves over simulated time in the rectangle below the cursor, with the ends of both axes.
+void draw_plot(const Plot &plot) {
+  const std::vector<double> &times = plot.times;
+  if (times.size() < 2) return;
+  ImGui::TextUnformatted((plot.title + ", " + plot.unit).c_str());
+  for (size_t c = 0; c < plot.curves.size() && !plot.curves[c].name.empty(); ++c) {
+    ImGui::SameLine();
+    ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(kCurves[c % 3]), "%s", plot.curves[c].name.c_str());
+  }
+  float low = 0, high = 0;
+  for (const Curve &c : plot.curves)
+    for (const float y : c.values) {
+      low = std::min(low, y);
+      high = std::max(high, y);
+    }
+  if (!(high > low)) high = low + 1e-12f;
+  const ImVec2 at = ImGui::GetCursorScreenPos(), size = {scaled(kPlot) - 16, scaled(kHigh)};
+  ImDrawList *const list = ImGui::GetWindowDrawList();
+  const ImU32 ink = IM_COL32(90, 95, 105, 255);
+  list->AddRectFilled(at, {at.x + size.x, at.y + size.y}, IM_COL32(255, 255, 255, 160));
+  const auto down = [&](float y) { return at.y + size.y * (1 - (y - low) / (high - low)); };
+  list->AddLine({at.x, down(0)}, {at.x + size.x, down(0)}, IM_COL32(170, 175, 185, 255));
+  const double first = times.front(), length = std::max(times.back() - first, 1e-12);
+  for (size_t c = 0; c < plot.curves.size(); ++c) {
+    std::vector<ImVec2> way;
+    for (size_t i = 0; i < times.size(); ++i)
+      way.push_back({at.x + size.x * float((times[i] - first) / length), down(plot.curves[c].values[i])});
+    list->AddPolyline(way.data(), int(way.size()), kCurves[c % 3], 0, 1.5f);
+  }
+  char text[32];
+  const auto write = [&](float x, float y, double value, const char *unit) {
+    std::snprintf(text, sizeof text, "%.3g%s", value, unit);
+    list->AddText({x, y}, ink, text);
+  };
+  write(at.x + 2, at.y, high, "");
+  write(at.x + 2, at.y + size.y - scaled(kLine), low, "");
+  std::snprintf(text, sizeof text, "%.2f s", times.back());
+  list->AddText({at.x + size.x - ImGui::CalcTextSize(text).x - 2, at.y + size.y - scaled(kLine)}, ink, text);
+  ImGui::Dummy({size.x, size.y + 4});
+}
+
 void App::panels() {
   if (!show_panels_) return;
   begin_panel();
@@ -132,59 +180,12 @@ void App::sliders() {
   for (live::Slider &s : stage_->sliders) slide(s);
 }
 
-namespace {
-
-const ImU32 kCurves[] = {IM_COL32(45, 105, 180, 255), IM_COL32(205, 80, 55, 255), IM_COL32(60, 140, 85, 255)};
-
-// Curves over simulated time in the rectangle below the cursor, with the ends of both axes.
-void draw_plot(const Plot &plot, const std::vector<double> &times) {
-  ImGui::TextUnformatted((plot.title + ", " + plot.unit).c_str());
-  for (size_t c = 0; c < plot.curves.size() && !plot.curves[c].name.empty(); ++c) {
-    ImGui::SameLine();
-    ImGui::TextColored(ImGui::ColorConvertU32ToFloat4(kCurves[c % 3]), "%s", plot.curves[c].name.c_str());
-  }
-  float low = 0, high = 0;
-  for (const Curve &c : plot.curves)
-    for (const float y : c.values) {
-      low = std::min(low, y);
-      high = std::max(high, y);
-    }
-  if (!(high > low)) high = low + 1e-12f;
-  const ImVec2 at = ImGui::GetCursorScreenPos(), size = {scaled(kPlot) - 16, scaled(kHigh)};
-  ImDrawList *const list = ImGui::GetWindowDrawList();
-  const ImU32 ink = IM_COL32(90, 95, 105, 255);
-  list->AddRectFilled(at, {at.x + size.x, at.y + size.y}, IM_COL32(255, 255, 255, 160));
-  const auto down = [&](float y) { return at.y + size.y * (1 - (y - low) / (high - low)); };
-  list->AddLine({at.x, down(0)}, {at.x + size.x, down(0)}, IM_COL32(170, 175, 185, 255));
-  const double first = times.front(), length = std::max(times.back() - first, 1e-12);
-  for (size_t c = 0; c < plot.curves.size(); ++c) {
-    std::vector<ImVec2> way;
-    for (size_t i = 0; i < times.size(); ++i)
-      way.push_back({at.x + size.x * float((times[i] - first) / length), down(plot.curves[c].values[i])});
-    list->AddPolyline(way.data(), int(way.size()), kCurves[c % 3], 0, 1.5f);
-  }
-  char text[32];
-  const auto write = [&](float x, float y, double value, const char *unit) {
-    std::snprintf(text, sizeof text, "%.3g%s", value, unit);
-    list->AddText({x, y}, ink, text);
-  };
-  write(at.x + 2, at.y, high, "");
-  write(at.x + 2, at.y + size.y - scaled(kLine), low, "");
-  std::snprintf(text, sizeof text, "%.2f s", times.back());
-  list->AddText({at.x + size.x - ImGui::CalcTextSize(text).x - 2, at.y + size.y - scaled(kLine)}, ink, text);
-  ImGui::Dummy({size.x, size.y + 4});
-}
-
-}  // namespace
-
 void App::plots() {
-  if (stage_->plots.times().size() < 2) return;
-  ImGui::SetNextWindowPos({float(canvas_.width()) - scaled(kGap), scaled(kGap)}, ImGuiCond_Always, {1, 0});
-  ImGui::SetNextWindowSize({scaled(kPlot), 0}, ImGuiCond_Always);
-  ImGui::Begin("plots", nullptr, kFixed);
+  if (stage_->plots.plots()[0].times.size() < 2) return;
+  begin_plots(float(canvas_.width()));
   for (const Plot &p : stage_->plots.plots())
     if (!(p.measured && (script_ || replay_)) && (p.tool < 0 || p.tool == std::max(stage_->grip.taken(), 0)))
-      draw_plot(p, stage_->plots.times());
+      draw_plot(p);
   ImGui::End();
 }
 
@@ -244,6 +245,7 @@ void App::help() {
       {"a", "arrows of contact forces"},
       {"p", "plots"},
       {"t", "no panels, for a picture"},
+      {"x", "strokes of the left mouse button cut"},
       {"f5, f9", "save, load"},
       {"v", "begins or ends a recording"},
       {"tab", "takes the next tool in hand; so does the mouse"},

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "plots.h"
+
 namespace view {
 
 inline constexpr float kWide = 310, kGap = 12;  // pixels, for letters of 14
@@ -14,6 +16,8 @@ inline constexpr ImGuiWindowFlags kFixed = ImGuiWindowFlags_NoMove | ImGuiWindow
 float scaled(float size);
 void begin_panel();  // in the upper left corner; ImGui::End() ends it
 void wrapped(const std::string &text);
+void begin_plots(float width);  // in the upper right corner of a window so wide
+void draw_plot(const Plot &plot);
 // The number stands beside the handle, which would cover it. True: it was moved.
 bool slider(const char *label, float *x, float low, float high, const char *format,
             ImGuiSliderFlags flags = 0);

@@ -12,6 +12,21 @@ constexpr size_t kMost = 600;  // samples
 
 }  // namespace
 
+void Plot::add(double time, const double *values) {
+  if (!times.empty() && time <= times.back()) return;
+  const auto push = [](auto &list, auto x) {
+    if (list.size() == kMost) list.erase(list.begin());
+    list.push_back(x);
+  };
+  push(times, time);
+  for (size_t i = 0; i < curves.size(); ++i) push(curves[i].values, float(values[i]));
+}
+
+void Plot::clear() {
+  times.clear();
+  for (Curve &c : curves) c.values.clear();
+}
+
 Plots::Plots(const live::Simulation &simulation, const live::Grip &grip)
     : simulation_(simulation), grip_(grip) {
   plots_.push_back({"energy", "J", {{"kinetic", {}}, {"elastic", {}}}, false, -1});
@@ -36,14 +51,12 @@ Plots::Plots(const live::Simulation &simulation, const live::Grip &grip)
 }
 
 void Plots::clear() {
-  times_.clear();
-  for (Plot &p : plots_)
-    for (Curve &c : p.curves) c.values.clear();
+  for (Plot &p : plots_) p.clear();
 }
 
 void Plots::sample() {
   const double t = simulation_.time();
-  if (!times_.empty() && t <= times_.back()) return;
+  if (!plots_[0].times.empty() && t <= plots_[0].times.back()) return;
   const cli::SceneFile &scene = simulation_.scene();
   double kinetic = 0, elastic = 0;
   for (const cli::BodyView &body : scene.bodies()) {
@@ -63,15 +76,11 @@ void Plots::sample() {
     row.insert(row.end(), {felt.torque.x, felt.torque.y, felt.torque.z});
   }
   row.push_back(simulation_.step_ms());
-  const bool full = times_.size() == kMost;
-  if (full) times_.erase(times_.begin());
-  times_.push_back(t);
-  size_t next = 0;
-  for (Plot &p : plots_)
-    for (Curve &c : p.curves) {
-      if (full) c.values.erase(c.values.begin());
-      c.values.push_back(float(row[next++]));
-    }
+  const double *next = row.data();
+  for (Plot &p : plots_) {
+    p.add(t, next);
+    next += p.curves.size();
+  }
 }
 
 }  // namespace view

@@ -17,8 +17,12 @@ struct Curve {
 struct Plot {
   std::string title, unit;
   std::vector<Curve> curves;
-  bool measured = false;  // differs from run to run
-  int tool = -1;          // number of the tool that it is about
+  bool measured = false;        // differs from run to run
+  int tool = -1;                // number of the tool that it is about
+  std::vector<double> times{};  // s
+  // One for each curve; where a new time begins, and the oldest ones are dropped.
+  void add(double time, const double *values);
+  void clear();
 };
 
 class Plots {
@@ -27,13 +31,12 @@ class Plots {
   void sample();  // where simulated time has gone on
   void clear();
   const std::vector<Plot> &plots() const { return plots_; }
-  const std::vector<double> &times() const { return times_; }
 
  private:
   const live::Simulation &simulation_;
   const live::Grip &grip_;
   std::vector<Plot> plots_;
-  std::vector<double> times_, starts_;  // s; [nprobe,3] m
+  std::vector<double> starts_;  // [nprobe,3] m
 };
 
 }  // namespace view

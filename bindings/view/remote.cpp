@@ -16,7 +16,7 @@ using render::Vec;
 
 namespace {
 
-constexpr double kTurn = 3.5;  // radians for a way across the picture's height
+constexpr size_t kMostPlots = 32;  // probes
 
 // Distance along a ray to triangles; infinite: it meets none.
 double distance(const live::Received::Mesh &m, const Ray &ray) {
@@ -44,16 +44,8 @@ Remote::Remote(const Options &options, const cli::Globals &globals)
     : options_(options), globals_(globals), receiver_(options.scene) {
   if (!options.script.empty()) script_.emplace(options.script);
   const std::string place = options.scene.substr(0, options.scene.find('?'));  // who looks on learns no token
-  window_ = Window::open(options.width, options.height, "deform view " + place.substr(0, 40), !script_);
-  canvas_.open(*window_, options.detail);
+  open(options, "deform view " + place.substr(0, 40), !script_);
   last_ = window_->now();
-}
-
-void Remote::run() {
-  window_->begin_panels({}, 0.02);  // sizes of panels are known from the second time on
-  panels();
-  window_->end_panels();
-  while (!window_->closed() && !quit_) frame();
 }
 
 void Remote::frame() {
@@ -70,6 +62,7 @@ void Remote::frame() {
   for (const ScriptLine &line : due)
     if (line.kind == ScriptLine::slider) set_slider(line.name, line.value);
   pull_to_mouse();
+  sample();
   panels();
   draw();
   for (const ScriptLine &line : due)
@@ -103,11 +96,6 @@ bool Remote::steers() const {
   return state.kind == cli::JsonValue::object && state.get("control") == state.get("you");
 }
 
-void Remote::handle(const Input &in) {
-  if (in.kind == Input::key) key(in.name);
-  else mouse(in);
-}
-
 void Remote::key(const std::string &name) {
   if (name == "space") {
     ask("run", [&](cli::JsonObject &r) { r.add("on", running() ? "false" : "true"); });
@@ -120,57 +108,43 @@ void Remote::key(const std::string &name) {
   } else if (name == "home") {
     size_ = 0;
     set_ = false;
-  } else if (name == "a") {
-    show_arrows_ = !show_arrows_;
-  } else if (name == "t") {
-    show_panels_ = !show_panels_;
-  } else if (name == "q" || name == "escape") {
-    quit_ = true;
-  } else if (script_) {
+  } else if (!shared_key(name) && script_) {
     throw cli::Failure(cli::kBadInput, script_->path() + ": there is no key \"" + name + "\" of a stream");
   }
 }
 
-void Remote::mouse(const Input &in) {
-  if (in.kind == Input::wheel) {
-    if (!window_->panels_want_mouse()) orbit_.zoom(std::pow(0.88, in.turns));
-    return;
-  }
-  const double dx = (in.x - mouse_[0]) / canvas_.height(), dy = (in.y - mouse_[1]) / canvas_.height();
-  mouse_[0] = in.x;
-  mouse_[1] = in.y;
-  if (in.kind == Input::press && held_ < 0 && !window_->panels_want_mouse()) press(in.button);
-  if (in.kind == Input::release && in.button == kLeft && pulled_) {
-    pulled_.reset();
-    ask("release");
-  }
-  if (in.kind == Input::release && in.button == held_) held_ = -1;
-  if (in.kind != Input::move || held_ < 0) return;
-  if (held_ == kMiddle) orbit_.shift(-dx, dy);
-  else orbit_.turn(-kTurn * dx, kTurn * dy);
+void Remote::release(int button) {
+  if (button != kLeft || !pulled_) return;
+  pulled_.reset();
+  ask("release");
+}
+
+void Remote::cut(const double blade[12]) {
+  std::vector<std::string> corners;
+  for (int i = 0; i < 12; ++i) corners.push_back(cli::number(blade[i]));
+  ask("cut", [&](cli::JsonObject &r) { r.add("blade", cli::json_array(corners)); });
 }
 
 void Remote::press(int button) {
-  const Ray ray = orbit_.ray(canvas_.across(mouse_[0]), canvas_.above(mouse_[1]), canvas_.aspect());
+  const Ray at = ray();
   double far = std::numeric_limits<double>::infinity();
   for (const auto &[number, body] : receiver_.scene().bodies())
     if (const auto *const m = body.drawn(); m && receiver_.scene().present(number))
-      far = std::min(far, distance(*m, ray));
+      far = std::min(far, distance(*m, at));
   if (button != kLeft || !std::isfinite(far) || !steers()) {
     held_ = button;
     return;
   }
-  pulled_ = ray.origin + ray.direction * far;
+  pulled_ = at.origin + at.direction * far;
   ask("grab", [&](cli::JsonObject &r) {
-    r.add("from", live::text_of(ray.origin)).add("along", live::text_of(ray.direction));
+    r.add("from", live::text_of(at.origin)).add("along", live::text_of(at.direction));
   });
 }
 
 // In the plane through the picked place that faces the camera.
 void Remote::pull_to_mouse() {
   if (!pulled_) return;
-  const Vec to =
-      orbit_.at_depth(canvas_.across(mouse_[0]), canvas_.above(mouse_[1]), canvas_.aspect(), *pulled_);
+  const Vec to = orbit_.at_depth(across(), above(), aspect(), *pulled_);
   if (render::norm(to - *pulled_) == 0) return;
   pulled_ = to;
   ask("pull", [&](cli::JsonObject &r) { r.add("to", live::text_of(to)); }, "pull");
@@ -181,6 +155,27 @@ void Remote::set_slider(const std::string &name, double value) {
       "slider",
       [&](cli::JsonObject &r) { r.add("name", cli::quoted(name)).add("value", cli::number(value)); },
       "slider " + name);
+}
+
+// What the state tells of probes, one in each answer, and of the pull.
+void Remote::sample() {
+  const cli::JsonValue &state = receiver_.state();
+  const double time = state.scalar("time");
+  const auto add = [&](const std::string &title, const Plot &fresh, const std::vector<double> &values) {
+    const bool good = std::ranges::all_of(values, [](double v) { return std::fabs(v) < 1e9; });
+    const auto at = plots_.find(title);
+    if (!good || values.size() != fresh.curves.size() || (at == plots_.end() && plots_.size() >= kMostPlots))
+      return;
+    Plot &plot = at == plots_.end() ? plots_.emplace(title, fresh).first->second : at->second;
+    if (!plot.times.empty() && time < plot.times.back()) plot.clear();  // it was reset
+    plot.add(time, values.data());
+  };
+  for (const cli::JsonValue &probe : state.list("probes")) {
+    const std::string title = "probe " + probe.get("name").substr(0, 40);
+    add(title, {title, "m", {{"x", {}}, {"y", {}}, {"z", {}}}}, probe.numbers("at"));
+  }
+  if (const cli::JsonValue *const pull = state.find("pull"))
+    add("pull", {"pull", "N", {{"", {}}}}, {pull->scalar("force")});
 }
 
 void Remote::panels() {
@@ -194,6 +189,8 @@ void Remote::panels() {
     if (ImGui::Button("step")) key("s");
     ImGui::SameLine();
     if (ImGui::Button("restart")) key("r");
+    ImGui::SameLine();
+    if (ImGui::Button(cutting_ ? "end cuts" : "cut")) key("x");
   } else if (state.kind == cli::JsonValue::object) {
     if (ImGui::Button("take control")) key("c");
   }
@@ -213,6 +210,10 @@ void Remote::panels() {
     }
     ImGui::PopID();
   }
+  ImGui::End();
+  if (!show_plots_ || plots_.empty()) return;
+  begin_plots(float(canvas_.width()));
+  for (const auto &[title, plot] : plots_) draw_plot(plot);
   ImGui::End();
 }
 
@@ -237,9 +238,9 @@ void Remote::fill(render::Scene &out) {
     out.surfaces.push_back(s);
   }
   for (const auto &[number, t] : scene.things()) {
-    if (t.sensor || t.missing) continue;
+    if (t.sensor || t.missing || !scene.present(number)) continue;
     if (t.triangles.empty()) {
-      cli::Solid solid = {t.shape, {}, {}, double{t.radius}, double{t.half_length}};
+      cli::Solid solid = {t.kind, {}, {}, double{t.radius}, double{t.half_length}};
       std::copy_n(t.half_size, 3, solid.half_size);
       std::copy_n(t.position, 3, solid.pose.position);
       std::copy_n(t.rotation, 4, solid.pose.rotation);
@@ -284,6 +285,7 @@ void Remote::draw() {
     held.insert(held.end(), to.begin(), to.end());
     if (held.size() == 6) picture.lines.push_back({held.data(), 1, {0.1f, 0.1f, 0.1f}, 2, true});
   }
+  add_stroke(picture);
   canvas_.show(picture);
   window_->end_panels();
 }
@@ -293,19 +295,24 @@ void Remote::shot(const std::string &name) {
   if (!globals_.json) {
     if (!globals_.quiet) std::printf("%s: t = %g s\n", path.c_str(), receiver_.scene().time());
   } else {
-    cli::JsonObject row, middles;
+    cli::JsonObject row, middles, plotted;
+    size_t triangles = 0;
+    for (const auto &[title, plot] : plots_) plotted.add(title, std::to_string(plot.times.size()));
     for (const auto &[number, body] : receiver_.scene().bodies()) {
       const auto *const m = body.drawn();
       if (!m || !receiver_.scene().present(number)) continue;
       double sum[3] = {0, 0, 0};
       for (size_t i = 0; i < m->x.size(); ++i) sum[i % 3] += m->x[i] / double(m->x.size() / 3);
       middles.add(m->name, cli::json_vector(sum));
+      triangles += m->triangles.size() / 3;
     }
     row.add("shot", cli::quoted(path))
         .add("t", cli::number(receiver_.scene().time()))
         .add("frame", std::to_string(receiver_.scene().frame()))
         .add("lost", std::to_string(receiver_.lost()))
-        .add("middle", middles.text());
+        .add("middle", middles.text())
+        .add("triangles", std::to_string(triangles))
+        .add("plotted", plotted.text());
     std::printf("%s\n", row.text().c_str());
   }
   std::fflush(stdout);

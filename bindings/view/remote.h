@@ -3,36 +3,31 @@
 #pragma once
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "arrows.h"
-#include "camera.h"
-#include "canvas.h"
 #include "cli.h"
+#include "hands.h"
 #include "live/rtp_receiver.h"
-#include "options.h"
+#include "plots.h"
 #include "script.h"
-#include "window.h"
 
 namespace view {
 
-class Remote {
+class Remote final : public Hands {
  public:
-  // options.scene: "rtp://ADDRESS:PORT[?token=TEXT]".
+  // options.scene: "rtp://ADDRESS:PORT[?token=TEXT]". A script has the clock's time, and begins with the
+  // first frame that comes.
   Remote(const Options &options, const cli::Globals &globals);
-  // Until the window is closed, or the script is at its end. A script has the clock's time, and begins with
-  // the first frame that comes.
-  void run();
 
  private:
-  void frame();
-  void handle(const Input &input);
-  void key(const std::string &name);
-  void mouse(const Input &input);
-  void press(int button);
+  void frame() override;
+  void key(const std::string &name) override;
+  void press(int button) override;
+  void release(int button) override;
+  void cut(const double blade[12]) override;
   void pull_to_mouse();
   void set_slider(const std::string &name, double value);
   void ask(const char *what, const std::function<void(cli::JsonObject &)> &more = {},
@@ -40,7 +35,8 @@ class Remote {
   bool steers() const;  // the sender takes what this window asks for
   bool running() const { return receiver_.state().get("running") == "true"; }
   void first_look();
-  void panels();
+  void panels() override;
+  void sample();
   void fill(render::Scene &picture);
   void draw();
   void shot(const std::string &name);
@@ -49,18 +45,13 @@ class Remote {
   const cli::Globals &globals_;
   std::optional<Script> script_;
   live::RtpReceiver receiver_;
-  std::unique_ptr<Window> window_;
-  Canvas canvas_;
-  Orbit orbit_;
   Arrows arrows_;
   std::map<uint32_t, std::vector<double>> placed_;  // points of things that have triangles
   double size_ = 0;                                 // m, of what is shown; 0: nothing has come yet
   bool set_ = false;                                // the camera is as the sender's scene says
   double began_ = 0, last_ = 0;                     // s
-  double mouse_[2] = {0, 0};
-  int held_ = -1;                      // the button that turns or shifts the camera; -1: none
-  std::optional<render::Vec> pulled_;  // m, the place that the mouse holds
-  bool quit_ = false, show_arrows_ = true, show_panels_ = true;
+  std::optional<render::Vec> pulled_;               // m, the place that the mouse holds
+  std::map<std::string, Plot> plots_;               // by what they show
 };
 
 }  // namespace view

@@ -85,10 +85,13 @@ void App::lead_by_space_mouse(double now) {
   if (device.read(device.user, now, &sample) == DFM_OK) grip.put(sample.pose, sample.opening);
 }
 
-void App::lead_deeper(double turns) {
-  if (!stage_->grip.holds()) return;
-  const Vec back = render::view_of(orbit_.camera()).back;
-  attempt([&] { stage_->grip.move_to(stage_->grip.to() - back * (2 * kMove * stage_->size * turns)); });
+// Away from the user.
+bool App::leads_deeper(double turns) {
+  if (leads_ && stage_->grip.holds()) {
+    const Vec back = render::view_of(orbit_.camera()).back;
+    attempt([&] { stage_->grip.move_to(stage_->grip.to() - back * (2 * kMove * stage_->size * turns)); });
+  }
+  return leads_;
 }
 
 // What was simulated is lost by it.

@@ -26,7 +26,7 @@ def scenes_of(examples):
 
 def main():
     module, examples, out = map(pathlib.Path, sys.argv[1:4])
-    scenes = dict(scenes_of(examples))
+    scenes = dict(scenes_of(examples), friction_rig=["friction/rig.json"])
     names = sorted({name for files in scenes.values() for name in files})
     data = [(examples / name).read_bytes() for name in names]
     worker = pathlib.Path(__file__).with_name("worker.js").read_text()

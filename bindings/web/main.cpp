@@ -1,15 +1,19 @@
 // A scene in a page without a server: the session of `deform serve` in a worker of the browser, with one
-// viewer. worker.js calls the functions below and takes the messages.
+// viewer; or the rig of `deform friction`. worker.js calls the functions below and takes the messages.
 #include <emscripten.h>
 
+#include <algorithm>
+#include <cmath>
 #include <exception>
 #include <memory>
+#include <string_view>
 #include <utility>
 
 #include "cli/cli.h"
 #include "cli/json_text.h"
 #include "cli/messages.h"
 #include "deform/plugin.h"
+#include "friction/rig.h"
 #include "live/session.h"
 
 EM_JS(void, give_bytes, (const unsigned char *bytes, size_t n),
@@ -54,6 +58,86 @@ cli::Globals globals() {
   return out;
 }
 
+// A case that the page has written: its viewer moves the law's parameters and the numbers of the drive, and
+// gets all rows again.
+class Rig {
+ public:
+  explicit Rig(const char *path) : case_(cli::read_case(path)) {}
+  void picture() {
+    for (const live::Request &request : page.take()) act(request.text);
+    if (std::exchange(due_, false)) run();
+  }
+
+ private:
+  void act(const std::string &text) {
+    cli::JsonValue line;
+    if (!cli::parse_json(text, line) || line.get("do") != "slider") return;
+    const std::string name = line.get("name");
+    const double value = line.scalar("value");
+    if (const auto at = case_.input.find(name); at != case_.input.end()) {
+      at->second = value;
+    } else {
+      std::erase_if(case_.params, [&](const cli::CaseParam &p) { return p.key == name; });
+      case_.params.push_back({name, {value}, ""});
+    }
+    due_ = true;
+  }
+
+  // A decade to both sides, as far as the law goes; what is zero, up to one.
+  static std::string slider(const std::string &name, const std::string &label, double value,
+                            double low = -INFINITY, double high = INFINITY) {
+    const bool decade = value > 0;
+    low = std::max(low, decade ? value / 10 : 0.0);
+    high = std::min(high, decade ? 10 * value : 1.0);
+    cli::JsonObject out;
+    out.add("name", cli::quoted(name)).add("label", cli::quoted(label)).add("value", cli::number(value));
+    out.add("low", cli::number(low)).add("high", cli::number(high));
+    return out.add("logarithmic", decade && low > 0 ? "true" : "false").text();
+  }
+
+  std::string sliders(const cli::RigLaw &law) const {
+    std::vector<std::string> out;
+    for (const auto &[name, value] : case_.input)
+      if (value != 0) out.push_back(slider(name, name + " of the motion", value));
+    const char *const rows = reinterpret_cast<const char *>(law.type().params);
+    for (uint32_t i = 0; i < law.type().nparam; ++i) {
+      const auto *const row = reinterpret_cast<const dfm_param *>(rows + size_t(i) * law.type().param_size);
+      if (row->width > 1 || row->flags & (DFM_PARAM_ENUM | DFM_PARAM_INTEGER | DFM_PARAM_LIST)) continue;
+      const std::string unit = row->unit == std::string_view("1") ? "" : std::string(", ") + row->unit;
+      out.push_back(slider(row->key, row->key + unit, law.param(row->key, 0), row->min, row->max));
+    }
+    return cli::json_array(out);
+  }
+
+  void run() const {
+    try {
+      cli::RigLaw law(globals(), case_, "");
+      cli::Progress silent(false);
+      const cli::RigResult result = cli::run_rig(case_, law, kStep, silent);
+      std::vector<std::string> columns, rows;
+      for (const std::string &name : result.columns) columns.push_back(cli::quoted(name));
+      for (const std::vector<double> &row : result.rows) {
+        std::vector<std::string> cells;
+        for (const double x : row) cells.push_back(cli::number(x));
+        rows.push_back(cli::json_array(cells));
+      }
+      cli::JsonObject out;
+      out.add("law", cli::quoted(law.type().id)).add("message", cli::quoted(result.stopped));
+      out.add("normal", cli::number(law.normal_force())).add("steps", std::to_string(result.steps));
+      out.add("sliders", sliders(law)).add("columns", cli::json_array(columns));
+      give_text(out.add("rows", cli::json_array(rows)).text().c_str());
+    } catch (const std::exception &e) {
+      give_text(cli::JsonObject().add("refused", cli::quoted(e.what())).text().c_str());
+    }
+  }
+
+  static constexpr double kStep = 1e-4;  // s
+  cli::FrictionCase case_;
+  bool due_ = true;
+};
+
+std::unique_ptr<Rig> rig;
+
 std::string ids_of(dfm_context *context, uint32_t kind) {
   struct List {
     uint32_t kind;
@@ -73,9 +157,14 @@ std::string ids_of(dfm_context *context, uint32_t kind) {
 
 extern "C" {
 
-// Begins to run a scene of the module's own files. False: the page has been told why not.
+// Begins to run a scene of the module's own files, or a case of the rig. False: the page has been told why
+// not.
 EMSCRIPTEN_KEEPALIVE bool deform_open(const char *path) {
   try {
+    if (std::string_view(path).starts_with("/friction/")) {
+      web::rig = std::make_unique<web::Rig>(path);
+      return true;
+    }
     web::session =
         std::make_unique<live::Session>(web::globals(), path, std::vector<std::string>{}, web::page, true);
     return true;
@@ -95,5 +184,6 @@ EMSCRIPTEN_KEEPALIVE void deform_ask(const char *text) { web::page.ask(text); }
 // s: how long the picture lasts.
 EMSCRIPTEN_KEEPALIVE void deform_picture(double seconds) {
   if (web::session) web::session->picture(seconds);
+  if (web::rig) web::rig->picture();
 }
 }

@@ -441,13 +441,25 @@ TEST_F(Viewer, RecordedSession_IsReplayedToTheSameBitsAndShown) {
   EXPECT_GT(different(picture("last.png"), picture("turned.png")), 1000u);
 }
 
+TEST_F(Viewer, Stroke_CutsTheBlockAndIsReplayed) {
+  const std::string stroke = "0.04 drag 160 10 160 230 0.06\n0.18 shot end.png\n0.19 key v\n";
+  const test::CommandResult whole = view("0 key space\n0 key v\n" + stroke);
+  const test::CommandResult cut = view("0 key space\n0 key v\n0 key x\n" + stroke);
+  ASSERT_EQ(cut.exit_code, 0) << cut.err;
+  EXPECT_NE(told(cut, "end.png", "state_hash"), told(whole, "end.png", "state_hash"));
+  EXPECT_NE(test::read_file(folder_ + "/recording/acts.jsonl").find("\"cut\""), std::string::npos);
+  const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
+  EXPECT_EQ(again.exit_code, 0) << again.err;
+  EXPECT_NE(again.out.find("the same bits in all "), std::string::npos) << again.out;
+}
+
 TEST_F(Viewer, ImpossibleInput_IsReportedInOneSentence) {
   const struct {
     const char *script, *sentence;
   } cases[] = {
       {"0 jump\n", "script.txt:2: expected key, drag, slider or shot, found \"jump\""},
       {"\n0 key\n", "script.txt:3: expected the name of a key, found the end of the line"},
-      {"0 key x\n", "there is no key \"x\""},
+      {"0 key z\n", "there is no key \"z\""},
       {"0 slider nothing 1\n", "there is no slider \"nothing\""},
   };
   for (const auto &c : cases) {

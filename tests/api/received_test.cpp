@@ -155,6 +155,68 @@ TEST(Received, CutBody_IsDrawnAsItWasUntilTheNewOneIsComplete) {
   compare(r, s.lower, kWithin);
 }
 
+// The second sphere gets the number of the first one.
+TEST(Received, ThingsThatAreAddedAndRemoved_AreSeenSo) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  live::Received r;
+  EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, 0)));
+  EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 0)));
+  uint32_t frame = 0, number = 0;
+  for (const double radius : {0.1, 0.2}) {
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.shape = DFM_SHAPE_SPHERE;
+    d.radius = radius;
+    d.pose.position[0] = 3;
+    dfm_obstacle sphere = 0;
+    test::ok(dfm_obstacle_create(s.world, &d, &sphere));
+    EXPECT_TRUE(number == 0 || number == uint32_t(sphere));
+    number = uint32_t(sphere);
+    const std::vector<Packet> now = stream(s.world, DFM_STREAM_FRAME, ++frame);
+    EXPECT_EQ(shape_in(now, number), uint32_t(sphere >> 32)) << "frames tell of it";
+    EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, frame, 0, sphere)));
+    EXPECT_TRUE(read(r, now));
+    EXPECT_TRUE(r.present(number));
+    EXPECT_EQ(r.things().at(number).kind, uint32_t{DFM_SHAPE_SPHERE});
+    EXPECT_EQ(r.things().at(number).radius, float(radius));
+    EXPECT_EQ(r.things().at(number).position[0], 3);
+    EXPECT_EQ(r.things().at(uint32_t(s.floor)).name, "floor");
+    test::ok(dfm_obstacle_destroy(sphere));
+    EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, ++frame)));
+    EXPECT_FALSE(r.present(number));
+  }
+  EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, ++frame)));
+  EXPECT_EQ(r.things().size(), 1u);
+  compare(r, s.upper, kWithin);
+}
+
+// A few bytes say that the largest surface of all comes.
+TEST(Received, WhatIsAnnounced_TakesNoMemoryBeforeItComes) {
+  const auto packet = [](const char *tag, std::vector<uint32_t> words) {
+    const auto n = uint32_t(4 * words.size()), size = 40 + n, one = 1u;
+    Packet p(size);
+    std::memcpy(&p[0], "DFMS\x01", 5);
+    std::memcpy(&p[8], &one, 4);
+    std::memcpy(&p[16], &size, 4);
+    std::memcpy(&p[32], tag, 4);
+    std::memcpy(&p[36], &n, 4);
+    std::memcpy(&p[40], words.data(), n);
+    return p;
+  };
+  const uint32_t most = (1u << 21) - 64;
+  live::Received r;
+  EXPECT_TRUE(read(r, {packet("BODY", {7, 1, most, most, 0})}));
+  const live::Received::Mesh &m = r.bodies().at(7);
+  EXPECT_EQ(m.points, most);
+  for (uint32_t i = 1; i <= 100; ++i)
+    EXPECT_TRUE(read(
+        r, {packet("BASE", {7, 1, most - i, 1, 0, 0, 0}), packet("SURF", {7, 1, most - i, 1, 1, 0, 0, 0}),
+            packet("TRIS", {7, 1, most - i, 1, 0, 1, 2})}));
+  EXPECT_EQ(m.base.capacity() + m.moved.capacity() + m.x.capacity() + m.triangles.capacity(), 0u);
+  EXPECT_LE(m.waiting.capacity(), 4u * 100 * 3 * 48);
+  EXPECT_FALSE(m.drawn());
+}
+
 // soak: the frames of ten minutes at 30 Hz, sent as `deform run --stream` does: each second everything again,
 // at once what a cut changes. 5 % are lost, 2 % come twice, 5 % come with the next frame. A point is nowhere
 // where it never was, and in a frame that came as a whole all are where they are now.

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <random>
 
 #include "cut_scenes.h"
 #include "stack.h"
@@ -212,6 +213,39 @@ TEST(Stream, BodyThatCountsFromAnotherPlace_HasAnotherShape) {
   v.compare(s.upper);
 }
 
+TEST(Stream, PackedLater_IsTheSame) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  test::run(s.world, 5e-3, 1e-3);
+  const Bytes all[] = {stream(s.world, DFM_STREAM_SCENE),
+                       stream(s.world, DFM_STREAM_FRAME, DFM_STREAM_FLOAT32 | DFM_STREAM_CONTACTS)};
+  for (const uint32_t packet : {0u, 256u, 1188u})
+    for (const uint32_t flags : {0u, uint32_t{DFM_STREAM_FLOAT32}})
+      for (const Bytes &one : all) {
+        dfm_stream_def d = dfm_stream_def_default();
+        d.packet = packet;
+        d.flags = flags;
+        size_t n = 0;
+        test::ok(dfm_stream_pack(one.data(), one.size(), &d, nullptr, &n));
+        Bytes out(n);
+        test::ok(dfm_stream_pack(one.data(), one.size(), &d, out.data(), &n));
+        EXPECT_EQ(out, &one == all ? stream(s.world, DFM_STREAM_SCENE, flags, packet)
+                                   : stream(s.world, DFM_STREAM_FRAME, flags | DFM_STREAM_CONTACTS, packet));
+      }
+  // what it did not write: refused, or packed, and no more
+  std::mt19937 dice(1);
+  size_t refused = 0;
+  for (int i = 0; i < 20000; ++i) {
+    Bytes bad = all[dice() % 2];
+    const size_t at = dice() % (bad.size() / 4) * 4;
+    for (size_t k = 0; k < 4; ++k) bad[at % 400 / 4 * 4 + k] = static_cast<unsigned char>(dice() >> 7);
+    if (dice() % 4 == 0) bad.resize(dice() % bad.size());
+    size_t n = 0;
+    refused += dfm_stream_pack(bad.data(), bad.size(), nullptr, nullptr, &n) == DFM_E_ARG;
+  }
+  EXPECT_GT(refused, 5000u);
+}
+
 TEST(Stream, BadCalls_AreRefusedWithASentence) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
@@ -228,7 +262,7 @@ TEST(Stream, BadCalls_AreRefusedWithASentence) {
   refused("flags are 8");
   d.packet = 255;
   refused("at least 256");
-  d.body = s.floor;
+  d.body = test::make_stack(c).floor;
   refused("'body'");
   test::ok(dfm_world_stream(s.world, nullptr, nullptr, &n));
   Bytes small(n - 1);

@@ -200,7 +200,27 @@ class Serve(unittest.TestCase):
         self.viewer.connection.send({"do": "cut", "blade": [x, -1, -1, x, -1, 1, x, 1, 1, x, 1, -1]})
         self.go(lambda: len(self.body.triangles) > before or len(self.world.bodies) > 1)
         self.go(lambda: all(b.missing == 0 for b in self.viewer.scene.bodies.values())
-                and len(self.viewer.scene.present) == len(self.world.bodies))
+                and len(self.viewer.scene.present) == len(self.world.bodies) + 1)
+
+    def things(self, viewer):
+        scene = viewer.scene
+        return {thing.name for number, thing in scene.things.items() if number in scene.present}
+
+    def test_what_is_added_later_is_seen(self):
+        self.go(lambda: self.things(self.viewer) == {"floor"})
+        ball = self.world.add_obstacle("sphere", name="ball", radius=0.05, position=(1, 0, 0.05))
+        self.go(lambda: self.things(self.viewer) == {"floor", "ball"})
+        ball.remove()
+        self.go(lambda: self.things(self.viewer) == {"floor"})
+        self.world.add_rigid("box", name="box", half_size=(0.1, 0.1, 0.1), position=(1, 0, 0.1), mass=1)
+        mesh = deform.TetMesh.beam((0.1, 0.1, 0.1), cells=60)
+        self.world.add_body(mesh, name="second", position=(-1, 0, 0.001))
+        late = Viewer(self.server.url)
+        self.addCleanup(late.close)
+        for viewer in (self.viewer, late):
+            self.go(lambda viewer=viewer: self.things(viewer) == {"floor", "box"}
+                    and [b.name for b in viewer.scene.bodies.values() if not b.missing]
+                    == ["block", "second"])
 
     def test_what_is_malformed_is_told(self):
         dice = random.Random(1)

@@ -165,7 +165,9 @@ def check(serve, view, scene, out, display):
             seen = watch(view, url + "?token=" + token,
                          "0.5 shot start.png\n1 key c\n1.5 key space\n2.5 shot rest.png\n"
                          "2.5 drag 160 120 220 120 0.4 1.5\n4.2 shot held.png\n"
-                         "5 slider gravity 3.5\n5.3 key space\n6.5 shot end.png\n7 shot after.png\n",
+                         "5 slider gravity 3.5\n5.3 key space\n6.5 shot end.png\n7 shot after.png\n"
+                         # a stroke from above to below, after it the mouse pulls again
+                         "7.1 key x\n7.2 drag 160 20 160 220 0.3\n7.8 key x\n7.9 key t\n9 shot cut.png\n",
                          out, display)
             assert seen["start.png"]["t"] == 0, "another token runs nothing"
             assert seen["rest.png"]["t"] > 0.1
@@ -174,6 +176,8 @@ def check(serve, view, scene, out, display):
             assert x[1] > x[0] + 0.02, f"the mouse has pulled the block from {x[0]} to {x[1]}"
             across = [red(pixels(os.path.join(out, f"{shot}.png"))) for shot in ("rest", "held")]
             assert across[1][0] > 1000 and across[1][1] > across[0][1] + 10, f"a picture shows it: {across}"
+            assert seen["cut.png"]["triangles"] > seen["after.png"]["triangles"], "the stroke has cut"
+            assert seen["end.png"]["plotted"]["probe top"] > 10 < seen["end.png"]["plotted"]["pull"]
             # what was heard once is not heard again
             request = network.forged
             viewer = Connection(page)

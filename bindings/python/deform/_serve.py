@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
 
-from ._library import PATH, ArgumentError, Error, StateError, UnsupportedError
+from ._library import PATH, ArgumentError, Error, StateError, UnsupportedError, quick
 from ._values import real, whole
 from .body import Body
 
@@ -38,7 +38,7 @@ def _module() -> Any:
                                    "Debian's libwebsockets-dev is installed", "DFM_E_UNSUPPORTED") from None
         p, u, n, t = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_size_t, ctypes.c_char_p
         for name, result, arguments in (
-                ("open", p, [p, t, t, n]), ("close", None, [p]), ("scene", None, [p, t, n, t, n]),
+                ("open", p, [p, p, t, t, n]), ("close", None, [p]), ("scene", None, [p, t, n, t, n]),
                 ("frame", None, [p, t, n]), ("state", None, [p, t]), ("next", ctypes.c_int, [p, p, t]),
                 ("viewers", u, [p]), ("control", u, [p])):
             function = getattr(module, f"deform_serve_{name}")
@@ -118,7 +118,8 @@ class Server:
         why = ctypes.create_string_buffer(512)
         self._native = _module()
         first = world.snapshot()
-        self._served = self._native.deform_serve_open(ctypes.byref(own), given, why, len(why))
+        self._served = self._native.deform_serve_open(
+            ctypes.cast(quick.dfm_stream_pack, ctypes.c_void_p), ctypes.byref(own), given, why, len(why))
         if not self._served:
             raise StateError(why.value.decode(), "DFM_E_STATE")
         self.url = f"http://127.0.0.1:{own.value}/?token={given.value.decode()}"
@@ -337,9 +338,9 @@ class Server:
     # ---- what viewers see ------------------------------------------------------------------------------
 
     def _show(self) -> None:
-        frame = self.world.stream(contacts=True, frame=self._frame)
+        frame = self.world.stream(contacts=True, frame=self._frame, floats=True)
         at, shapes = 32, b""
-        while at < len(frame):  # LIST tells bodies whose triangles are others than before
+        while at < len(frame):  # LIST tells what is new or has other triangles
             size = int.from_bytes(frame[at + 4:at + 8], "little")
             if frame[at:at + 4] == b"LIST":
                 shapes += frame[at + 8:at + 8 + size]

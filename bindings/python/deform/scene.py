@@ -229,13 +229,8 @@ class Run:
 
     def html(self, height: int = 480) -> str:
         """The run as one piece of HTML with WebGL in it: no server, no other file, nothing from the
-        network. It shows one surface per body: a run in which a body is cut has picture() instead."""
+        network."""
         from .webgl import html
-        for frame in self.frames:
-            for name, triangles in frame.triangles.items():
-                if triangles is not self.triangles[name]:
-                    raise ArgumentError(f"html() shows one surface per body, and '{name}' has been cut at "
-                                        f"{frame.t:.6g} s; draw single frames with picture(i)", "DFM_E_ARG")
         return html(self, height)
 
     def _repr_html_(self) -> str:

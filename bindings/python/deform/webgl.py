@@ -1,123 +1,109 @@
-"""A run as one HTML document: its surfaces in all frames, and a small viewer (viewer.js) that turns and
-plays them."""
+"""A run as one HTML document: the page of `deform serve` with a recording of its surfaces inside."""
 from __future__ import annotations
 
 import base64
 import html as markup
 import json
-import math
-import pathlib
-from typing import TYPE_CHECKING, Any
+import struct
+from typing import TYPE_CHECKING, Any, Iterable
 
 import numpy as np
 
-from .picture import COLORS, Solid, color_map, palette, turned
+from ._library import ROOT
+from .picture import COLORS, color_map, turned
 
 if TYPE_CHECKING:
     from .scene import Run
 
-_GRAY = (0.72, 0.73, 0.75)
-_LEVELS = 65535  # positions travel as 16 bits of the box around everything
-_AROUND = 24     # points on a circle
+_LEVELS = 65535  # of a range in 16 bits
 _COLORS = 17     # of a map, in equal distances
+_PLACES = (ROOT / "page.html", ROOT.parents[1] / "serve" / "page.html")  # of a wheel, of a clone
 
 
-def _encoded(array: np.ndarray) -> str:
-    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode()
+def _chunk(tag: bytes, *parts: Any) -> bytes:
+    data = b"".join(part if isinstance(part, bytes) else part.tobytes() for part in parts)
+    data += b"\0" * (-len(data) % 4)
+    return tag + struct.pack("<I", len(data)) + data
 
 
-def _grid(rows: int, columns: int) -> np.ndarray:
-    """Triangles of a sheet of points [rows,columns]."""
-    i, j = np.meshgrid(np.arange(rows - 1), np.arange(columns - 1), indexing="ij")
-    a = (i * columns + j).ravel()
-    return np.concatenate([np.stack([a, a + columns + 1, a + 1], 1),
-                           np.stack([a, a + columns, a + columns + 1], 1)])
+def _packet(scene: bool, whole: bool, frame: int, t: float, chunks: Iterable[bytes]) -> bytes:
+    data = b"".join(chunks)
+    return struct.pack("<4sBBHIIIId", b"DFMS", 1, not scene, whole, 1, 0, 32 + len(data), frame, t) + data
 
 
-def _capsule(radius: float, half: float) -> tuple[np.ndarray, np.ndarray]:
-    """A sphere whose halves are moved apart along z; half 0: a sphere."""
-    polar = np.concatenate([np.linspace(0, math.pi / 2, 9), np.linspace(math.pi / 2, math.pi, 9)])
-    shift = np.repeat([half, -half], 9)
-    turn = np.linspace(0, 2 * math.pi, _AROUND + 1)
-    x = radius * np.sin(polar)[:, None] * np.cos(turn)
-    y = radius * np.sin(polar)[:, None] * np.sin(turn)
-    z = np.broadcast_to((radius * np.cos(polar) + shift)[:, None], x.shape)
-    return np.stack([x, y, z], 2).reshape(-1, 3), _grid(len(polar), _AROUND + 1)
+def _named(name: str) -> bytes:
+    text = name.encode()[:100]
+    return struct.pack("<I", len(text)) + text
 
 
-def mesh_of(solid: Solid, reach: float) -> tuple[np.ndarray, np.ndarray]:
-    """Points [n,3] m where it is, and triangles [m,3]; a plane as a square of that reach, m."""
-    if solid.points is not None and solid.triangles is not None:
-        return solid.points, solid.triangles
-    if solid.kind == 0:
-        side = np.linspace(-reach, reach, 2)
-        local = np.array([(x, y, 0.0) for x in side for y in side])
-        triangles = np.array([[0, 2, 3], [0, 3, 1]])
-    elif solid.kind == 2:
-        corners = [(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)]
-        local = np.array(corners) * np.array(solid.size)
-        triangles = np.array([[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
-                              [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]])
-    else:
-        local, triangles = _capsule(solid.size[0], solid.size[1] if solid.kind == 3 else 0.0)
-    return turned(solid.pose[3:], local) + solid.pose[:3], triangles
+def _surface(number: int, shape: int, points: np.ndarray, triangles: np.ndarray) -> list[bytes]:
+    return [_chunk(b"BASE", struct.pack("<4I", number, shape, 0, len(points)), points.astype("<f4")),
+            _chunk(b"TRIS", struct.pack("<4I", number, shape, 0, len(triangles)), triangles.astype("<u4"))]
 
 
-def _to_z(up: np.ndarray) -> np.ndarray:
-    """The rotation [3,3] that takes a unit vector to z, the viewer's up, by the shortest way."""
-    x, y, z = up
-    if z < -1 + 1e-12:
-        return np.diag([1.0, -1.0, -1.0])
-    across = np.array([[0, 0, -x], [0, 0, -y], [x, y, 0]])
-    return np.eye(3) + across + across @ across / (1 + z)
-
-
-def _surfaces(run: Run) -> list[tuple[list[np.ndarray], np.ndarray, tuple[float, float, float], Any]]:
-    """(points of each frame, triangles, color, values of each frame or None)"""
-    out: list[Any] = []
-    turns = [_to_z(run.upright.at(frame.t)).T if run.upright else np.eye(3) for frame in run.frames]
-    for i, (name, triangles) in enumerate(run.triangles.items()):
-        values = [frame.values[name] for frame in run.frames]
-        points = [frame.positions[name] @ turn for frame, turn in zip(run.frames, turns)]
-        out.append((points, triangles, palette(i), None if values[0] is None else values))
-    shown = np.concatenate([points.reshape(-1, 3) for surface in out for points in surface[0]]
-                           or [np.zeros((1, 3))])
-    reach = 1.5 * float(np.linalg.norm(np.ptp(shown, axis=0))) or 1.0
-    for k in range(len(run.frames[0].obstacles)):
-        meshes = [mesh_of(frame.obstacles[k], reach) for frame in run.frames]
-        points = [mesh[0] @ turn for mesh, turn in zip(meshes, turns)]
-        still = all(np.array_equal(points[0], p) for p in points)
-        out.append((points[:1] if still else points, meshes[0][1], _GRAY, None))
+def _things(run: Run, number: int) -> list[bytes]:
+    """Obstacles and rigid bodies, which have the same shape in all frames."""
+    out = []
+    for k, solid in enumerate(run.frames[0].obstacles):
+        points, triangles = np.empty((0, 3)), np.empty((0, 3))
+        if solid.points is not None and solid.triangles is not None:
+            back = solid.pose[3:] * (-1, -1, -1, 1)
+            points, triangles = turned(back, solid.points - solid.pose[:3]), solid.triangles
+        radius, half = (solid.size[0], solid.size[1]) if solid.kind in (1, 3) else (0, 0)
+        box = solid.size if solid.kind == 2 else (0, 0, 0)
+        numbers = number + k, 1, len(points), len(triangles), solid.kind
+        out.append(_chunk(b"OBST", struct.pack("<5I5f", *numbers, radius, half, *box), _named("")))
+        out += _surface(number + k, 1, points, triangles)
     return out
 
 
-def data_of(run: Run) -> dict[str, Any]:
-    """What the viewer is given."""
-    surfaces = _surfaces(run)
-    everything = np.concatenate([points for surface in surfaces for points in surface[0]])
-    low = everything.min(axis=0)
-    span = float((everything.max(axis=0) - low).max()) or 1.0
-    bodies = surfaces[:len(run.triangles)]
-    moving = np.concatenate([points for surface in bodies for points in surface[0]] or [everything])
-    low_value, high_value = run.value_range()
-    listed = []
-    for frames, triangles, color, values in surfaces:
-        points = np.rint((np.stack(frames) - low) / span * _LEVELS).astype("<u2")
-        item = {"n": points.shape[1], "frames": points.shape[0], "points": _encoded(points),
-                "triangles": _encoded(triangles.astype("<u4")), "color": list(color)}
-        if values is not None:
-            # 0: the body's own color
-            stacked = np.stack(values)
-            reach = high_value - low_value
-            share = (stacked - low_value) / reach if reach > 0 else 0 * stacked
-            levels = np.rint(1 + 254 * np.clip(share, 0, 1)).astype("u1")
-            item["values"] = _encoded(np.where(stacked == 0, 0, levels).astype("u1")
-                                      if run.color == "contact" else levels)
-        listed.append(item)
-    middle = (moving.min(axis=0) + moving.max(axis=0)) / 2
-    return {"times": [round(frame.t, 6) for frame in run.frames], "low": low.tolist(), "span": span,
-            "middle": middle.tolist(), "size": float(np.linalg.norm(np.ptp(moving, axis=0))) or 1.0,
-            "map": color_map(run.color, _COLORS).ravel().tolist(), "surfaces": listed}
+def _moved(number: int, shape: int, moved: np.ndarray) -> bytes:
+    low = moved.min(axis=0)
+    step = ((moved.max(axis=0) - low) / _LEVELS).astype("<f4")
+    rows = np.rint((moved - low) / np.where(step > 0, step, 1)).clip(0, _LEVELS)
+    return _chunk(b"SURF", struct.pack("<5I", number, shape, 0, len(moved), 0), low.astype("<f4"), step,
+                  struct.pack("<I", 0), rows.astype("<u2"))
+
+
+def _values(run: Run, values: np.ndarray) -> np.ndarray:
+    """Levels from 1; 0: the body's own color."""
+    low, high = run.value_range()
+    share = (values - low) / (high - low) if high > low else 0 * values
+    levels = np.rint(1 + 254 * np.clip(share, 0, 1)).astype("u1")
+    return np.where(values == 0, 0, levels).astype("u1") if run.color == "contact" else levels
+
+
+def packets_of(run: Run) -> bytes:
+    """The run in the format of doc/reference/stream.md. A body whose triangles change is told again."""
+    out, first = [], len(run.triangles) + 1
+    known: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # triangles, places that displacements count from
+    shapes: dict[str, int] = {}
+    for i, frame in enumerate(run.frames):
+        scene = _things(run, first) if i == 0 else []
+        listed, surfaces = [], []
+        for number, (name, triangles) in enumerate(frame.triangles.items(), 1):
+            points, values = frame.positions[name], frame.values[name]
+            if len(points) == 0:
+                continue
+            if name not in known or known[name][0] is not triangles:
+                known[name] = triangles, points.astype(np.float64)
+                scene.append(_chunk(b"BODY", struct.pack("<4I", number, i, len(points), len(triangles)),
+                                    _named(name)))
+                scene += _surface(number, i, points, triangles)
+                shapes[name] = i
+            listed.append((number, shapes[name]))
+            surfaces.append(_moved(number, shapes[name], points - known[name][1]))
+            if values is not None:
+                surfaces.append(_chunk(b"VALU", struct.pack("<4I", *listed[-1], 0, len(points)),
+                                       _values(run, values)))
+        listed += [(first + k, 1) for k in range(len(frame.obstacles))]
+        poses = b"".join(struct.pack("<I7f", first + k, *solid.pose)
+                         for k, solid in enumerate(frame.obstacles))
+        if scene:
+            out.append(_packet(True, i == 0, i, frame.t, scene))
+        out.append(_packet(False, False, i, frame.t, [
+            _chunk(b"LIST", np.array(listed, "<u4")), _chunk(b"POSE", poses), *surfaces]))
+    return b"".join(out)
 
 
 def _legend(run: Run) -> str:
@@ -126,23 +112,21 @@ def _legend(run: Run) -> str:
         return ""
     (title, unit), (low, high) = COLORS[run.color], run.value_range()
     colors = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in 255 * color_map(run.color, _COLORS))
-    bar = ("<i style=\"display:inline-block;width:80px;height:10px;"
-           f"background:linear-gradient(to right,{colors})\"></i>")
-    return f"<span id=\"legend\">{title}, {unit}: {low:.3g} {bar} {high:.3g}</span>"
+    bar = f"<i style=\"background:linear-gradient(to right,{colors})\"></i>"
+    return f"{title}, {unit}: {low:.3g} {bar} {high:.3g}"
 
 
 def document(run: Run) -> str:
-    """The whole document; its file may be opened by any browser."""
-    viewer = pathlib.Path(__file__).with_name("viewer.js").read_text()
-    data = json.dumps(data_of(run), separators=(",", ":"))
-    return ("<!DOCTYPE html><html><head><meta charset=\"utf-8\"><title>deform</title><style>"
-            "html,body{margin:0;height:100%;font:13px sans-serif;background:#f4f5f7}"
-            "canvas{width:100%;height:calc(100% - 34px);display:block;touch-action:none}"
-            "#bar{height:34px;display:flex;align-items:center;gap:8px;padding:0 8px}"
-            "#at{flex:1}</style></head>"
-            "<body><canvas id=\"view\"></canvas><div id=\"bar\"><button id=\"play\">play</button>"
-            "<input id=\"at\" type=\"range\" min=\"0\" value=\"0\"><span id=\"time\"></span>"
-            f"{_legend(run)}</div><script>const RUN={data};\n{viewer}</script></body></html>")
+    """The whole document; its file may be opened by any browser, and loads nothing."""
+    page = next(path for path in _PLACES if path.exists()).read_text(encoding="utf-8")
+    ups = [(run.upright.at(frame.t) if run.upright else np.array([0, 0, 1])).tolist() for frame in run.frames]
+    film = json.dumps({"packets": base64.b64encode(packets_of(run)).decode(), "ups": ups,
+                       "map": color_map(run.color, _COLORS).ravel().tolist(), "legend": _legend(run)},
+                      separators=(",", ":")).replace("</", "<\\/")
+    alone = ("<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; "
+             "script-src 'unsafe-inline'; style-src 'unsafe-inline'\">")
+    head = '<meta charset="utf-8">\n'
+    return page.replace(head, f"{head}{alone}\n<script>const film={film};</script>\n", 1)
 
 
 def html(run: Run, height: int = 480) -> str:

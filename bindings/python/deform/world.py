@@ -713,22 +713,24 @@ class World(Queries, Reports, Tools, OfThisProcess):
         check(quick.dfm_world_snapshot(self.handle, buffer, ctypes.byref(size)))
         return buffer.raw[:size.value]
 
-    def stream(self, scene: bool = False, contacts: bool = False, frame: int = 0, packet: int = 0) -> bytes:
+    def stream(self, scene: bool = False, contacts: bool = False, frame: int = 0, packet: int = 0,
+               floats: bool = False) -> bytes:
         """The present state as packets for viewers elsewhere, one behind the other (dfm_world_stream).
 
         scene: names, triangles and shapes in place of a frame. contacts: with those of the last sub-step.
-        frame: number that the packets carry. packet: bytes that none exceeds, 0 for one packet."""
+        frame: number that the packets carry. packet: bytes that none exceeds, 0 for one packet. floats:
+        displacements as floats, not in 16 bits."""
         self.free()
         given = default(_abi.dfm_stream_def)
         given.kind = _abi.DFM_STREAM_SCENE if scene else _abi.DFM_STREAM_FRAME
-        given.flags = _abi.DFM_STREAM_CONTACTS if contacts and not scene else 0
+        given.flags = 0 if scene else contacts * _abi.DFM_STREAM_CONTACTS | floats * _abi.DFM_STREAM_FLOAT32
         given.frame, given.packet = whole(frame, "frame"), whole(packet, "packet")
         size = ctypes.c_size_t(self._streamed)
         buffer = ctypes.create_string_buffer(self._streamed)
         status = quick.dfm_world_stream(self.handle, ctypes.byref(given), buffer, ctypes.byref(size))
         if size.value > self._streamed:  # more than the last time, and a half for the next ones
             self._streamed = size.value + size.value // 2
-            return self.stream(scene, contacts, frame, packet)
+            return self.stream(scene, contacts, frame, packet, floats)
         check(status)
         return buffer.raw[:size.value]
 

@@ -573,6 +573,11 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
     return collect_bytes<E>(
         [&](void *out, size_t *bytes) { return dfm_world_stream(raw_, &def, out, bytes); });
   }
+  static auto pack_stream(std::span<const std::byte> packet, const dfm_stream_def &def = StreamDef()) {
+    return collect_bytes<E>([&](void *out, size_t *bytes) {
+      return dfm_stream_pack(packet.data(), packet.size(), &def, out, bytes);
+    });
+  }
   auto restore(std::span<const std::byte> from) const {
     return E::done(dfm_world_restore(raw_, from.data(), from.size()));
   }

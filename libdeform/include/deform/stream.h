@@ -6,8 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** dfm_stream_def.kind. SCENE: names, triangles and shapes, which a viewer needs once, and again of a body
- * whose triangles have changed. FRAME: where everything is now. */
+/** dfm_stream_def.kind. SCENE: names, triangles and shapes, which a viewer needs once, and of what is new or
+ * has other triangles. FRAME: where everything is now. */
 enum { DFM_STREAM_SCENE = 0, DFM_STREAM_FRAME = 1 };
 /** dfm_stream_def.flags, of a FRAME. FLOAT32: displacements of surfels as floats, not in 16 bits. CONTACTS:
  * with the contacts of the last sub-step that carry load. */
@@ -19,7 +19,7 @@ typedef struct dfm_stream_def {
   /* bytes that no packet exceeds, at least 256; 0: one packet. Each packet can be read without the others */
   uint32_t packet;
   uint32_t reserved;
-  dfm_body body;   /* of a SCENE: only this body; 0: everything */
+  dfm_body body;   /* of a SCENE: only this body, obstacle or rigid body; 0: everything */
   uint64_t cookie; /* set by the default function */
 } dfm_stream_def;
 /** dfm_stream_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
@@ -40,6 +40,12 @@ static inline dfm_stream_def dfm_stream_def_default(void) {
  * @return DFM_OK; DFM_E_ARG kind, packet, a body of another world, or too small a buffer (*bytes is set);
  * DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_world_stream(dfm_world world, const dfm_stream_def *def, void *buffer, size_t *bytes);
+/** The same from a packet that dfm_world_stream has written with FLOAT32 and packet 0: the thread that steps
+ * takes that one, and another one does the rest.
+ * @param def  NULL: the default; its packet and FLOAT32 count
+ * @return DFM_OK; DFM_E_ARG another packet, or as above. Threads: Any thread. Since 0.1. */
+DFM_API dfm_status dfm_stream_pack(const void *packet, size_t size, const dfm_stream_def *def, void *buffer,
+                                   size_t *bytes);
 #ifdef __cplusplus
 }
 #endif

@@ -1,0 +1,112 @@
+// What `--stream` sends (bindings/cli/rtp.h) while another thread steps the world.
+#include "rtp.h"
+
+#include <arpa/inet.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <map>
+#include <thread>
+
+#include "live/received.h"
+#include "stack.h"
+
+namespace {
+
+std::vector<double> positions(dfm_body b) {
+  uint32_t n = 0;
+  test::ok(dfm_surface_positions(b, 0, nullptr, &n));
+  std::vector<double> x(3 * size_t{n});
+  test::ok(dfm_surface_positions(b, n, x.data(), &n));
+  return x;
+}
+
+// Who has looked on from the start, and who comes later.
+struct Viewers {
+  int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
+  std::string url;
+  live::Received early, late;
+  std::map<double, std::vector<double>> seen;  // of each frame that is whole, where the body is
+  size_t gaps = 0;
+
+  Viewers() {
+    sockaddr_in at = {};
+    at.sin_family = AF_INET;
+    at.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+    EXPECT_EQ(bind(socket, reinterpret_cast<const sockaddr *>(&at), sizeof at), 0);
+    socklen_t size = sizeof at;
+    getsockname(socket, reinterpret_cast<sockaddr *>(&at), &size);
+    const int buffer = 1 << 22;
+    setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);
+    url = "rtp://127.0.0.1:" + std::to_string(ntohs(at.sin_port));
+  }
+  ~Viewers() { close(socket); }
+
+  // Until the sender says that nothing follows.
+  void receive(uint32_t body) {
+    std::vector<unsigned char> in(1 << 16);
+    int sequence = -1;
+    for (bool ends = false; !ends;) {
+      const ssize_t n = recv(socket, in.data(), in.size(), 0);
+      if (n <= 0) return;
+      if (in[1] >= cli::kSenderReport && in[1] <= cli::kApp) {
+        cli::each_report(in.data(), size_t(n),
+                         [&](const unsigned char *p, size_t) { ends |= p[1] == cli::kGoodbye; });
+        continue;
+      }
+      const int number = int(cli::get16(&in[2]));
+      gaps += sequence >= 0 && number != ((sequence + 1) & 0xffff);
+      sequence = number;
+      EXPECT_TRUE(early.read(&in[12], size_t(n) - 12));
+      if (early.frame() > 20) late.read(&in[12], size_t(n) - 12);
+      const auto found = early.bodies().find(body);
+      if (in[1] >> 7 && found != early.bodies().end() && found->second.drawn())
+        seen[early.time()] = found->second.x;
+    }
+  }
+};
+
+TEST(Rtp, SentOnAnotherThread_FramesAreWhatTheStepsHaveLeft) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c, 0.02);
+  Viewers viewers;
+  std::thread network([&] { viewers.receive(uint32_t(s.upper)); });
+  std::map<double, std::vector<double>> steps;
+  dfm_obstacle added = 0;
+  {
+    cli::RtpSender sender(s.world, viewers.url);
+    for (uint64_t frames = 0; frames < 45; frames = sender.report().frames) {
+      test::run(s.world, 1e-3, 1e-3);
+      steps[dfm_world_time(s.world)] = positions(s.upper);
+      sender.after_step();
+      if ((frames != 10 || added) && frames != 30) continue;
+      if (added) test::ok(dfm_obstacle_destroy(added));
+      dfm_obstacle_def d = dfm_obstacle_def_default();
+      d.shape = frames == 30 ? DFM_SHAPE_BOX : DFM_SHAPE_SPHERE;
+      d.radius = 0.1;
+      d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.1;
+      d.pose.position[0] = 3;
+      test::ok(dfm_obstacle_create(s.world, &d, &added));
+    }
+    sender.end();
+  }
+  network.join();
+  EXPECT_EQ(viewers.gaps, 0u);
+  EXPECT_GT(viewers.seen.size(), 30u);
+  for (const auto &[time, x] : viewers.seen) {
+    const std::vector<double> &at = steps.at(time);
+    ASSERT_EQ(x.size(), at.size());
+    for (size_t i = 0; i < x.size(); ++i) ASSERT_NEAR(x[i], at[i], 3e-7 + 0.05 / 131070) << time << " s";
+  }
+  // the last obstacle has come, and the one before is gone, for both
+  for (const live::Received *r : {&viewers.early, &viewers.late}) {
+    ASSERT_TRUE(r->bodies().contains(uint32_t(s.upper)));
+    EXPECT_TRUE(r->bodies().at(uint32_t(s.upper)).drawn());
+    ASSERT_TRUE(r->things().contains(uint32_t(added)));
+    EXPECT_EQ(r->things().at(uint32_t(added)).kind, uint32_t{DFM_SHAPE_BOX});
+    for (const auto &[number, thing] : r->things())
+      EXPECT_EQ(r->present(number), number == uint32_t(added) || number == uint32_t(s.floor));
+  }
+}
+
+}  // namespace
