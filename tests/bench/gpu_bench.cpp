@@ -15,8 +15,8 @@
 #include <vector>
 
 #include "machine.h"
-#include "model_msm_gpu/gpu_body.h"
-#include "model_msm_gpu/vulkan_stepper.h"
+#include "model_gpu/gpu_body.h"
+#include "model_gpu/vulkan_stepper.h"
 
 namespace {
 

@@ -9,7 +9,7 @@ namespace {
 using namespace stepper_test;
 
 enum Device { automatic, hardware, software, reference };
-const dfm_type &gpu() { return type_of("model_msm_gpu"); }
+const dfm_type &gpu() { return type_of("model_gpu"); }
 
 // A body on the device and on the processor. Without a driver the test is skipped; where Mesa's software
 // driver is installed, it fails.

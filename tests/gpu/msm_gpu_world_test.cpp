@@ -213,7 +213,7 @@ TEST(MsmGpuCommand, Hardware_IsNoSoftwareDriver) {
 TEST(MsmGpuCommand, PluginCheck_FindsNothingOfOurs) {
   if (device() == kReference) GTEST_SKIP() << "no driver: the defaults of the model are refused";
   const test::CommandResult r =
-      test::deform({"plugin", "check", std::string(DEFORM_PLUGIN_DIR) + "/model_msm_gpu.so"});
+      test::deform({"plugin", "check", std::string(DEFORM_PLUGIN_DIR) + "/model_gpu.so"});
   std::istringstream lines(r.out);
   int passed = 0;
   for (std::string line, id, result; std::getline(lines, line);) {
