@@ -24,7 +24,7 @@ Devices *devices = nullptr;
 
 const dfm_param kParams[kParamCount] = {
     {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
-    {"damping_stiffness", "damping over stiffness", "s", 0, 1e3, 0, kRun, 1, nullptr},
+    {"damping_stiffness", "damping over stiffness", "s", 0, 10, 0, kRun, 1, nullptr},
     {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun, 1, nullptr},
     {"device",
      "auto: a graphics card, else a software driver; hardware: a card or none; software: that driver; "
