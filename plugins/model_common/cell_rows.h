@@ -21,8 +21,8 @@ inline void block_norms(const Tetrahedron &shape, const double (*d)[6], double *
 }
 
 // norms [ncell,10]; heights [ncell,4]: |g_a|. Fills weight [npoint]; next [npoint] is room. Then take(c, a,
-// row, turn) gets what corner a of cell c adds to the row of its point, and per stiffness against a turning of
-// the material in its frame, |g_a| (sum_b |g_b| w_b) / w_a.
+// row, turn) gets what corner a of cell c adds to the row of its point, and per stiffness against a turning
+// of the material in its frame, |g_a| (sum_b |g_b| w_b) / w_a.
 template <class Take>
 void cell_rows(uint32_t ncell, uint32_t npoint, const uint32_t *cells, const double *mass,
                const double *norms, const double *heights, double *weight, double *next, const Take &take) {

@@ -1,5 +1,5 @@
-// Weights w > 0 of points for which the rows (sum_b N_ab w_b) / (m_a w_a) are even: of all weights those allow
-// the longest step. Some steps of the power method toward the Perron vector of the row sums.
+// Weights w > 0 of points for which the rows (sum_b N_ab w_b) / (m_a w_a) are even: of all weights those
+// allow the longest step. Some steps of the power method toward the Perron vector of the row sums.
 #pragma once
 #include <algorithm>
 #include <cstdint>

@@ -4,8 +4,8 @@
 
 #define precise
 #define UNROLLED
-#define IN(name, n) const double(&name)[n]
-#define OUT(name, n) double(&name)[n]
+#define IN(name, n) const double (&name)[n]
+#define OUT(name, n) double (&name)[n]
 #define PLACE(i) call.of<const dvec4>(kPlace)[i]
 #define SPEED(i) call.of<const dvec4>(kSpeed)[i]
 #define LOAD(i) call.of<const dvec4>(kLoad)[i]

@@ -29,8 +29,7 @@ struct CellMotion {
   static void raise(uint32_t &to, float value) {
     const std::atomic_ref<uint32_t> all(to);
     const uint32_t bits = std::bit_cast<uint32_t>(value);
-    for (uint32_t seen = all; seen < bits && !all.compare_exchange_weak(seen, bits);) {
-    }
+    for (uint32_t seen = all; seen < bits && !all.compare_exchange_weak(seen, bits);) {}
   }
 #include "cell_motion.glsl"
 };

@@ -1,6 +1,6 @@
-// org.deform.msm_gpu and org.deform.corotational_fem_gpu: the springs and dampers of org.deform.msm, the cells
-// of org.deform.corotational_fem, moved in explicit sub-steps on a compute device (Zerbato 2010, (2.25), (2.26),
-// 2.1.2 and 7.1); the bodies step themselves.
+// org.deform.msm_gpu and org.deform.corotational_fem_gpu: the springs and dampers of org.deform.msm, the
+// cells of org.deform.corotational_fem, moved in explicit sub-steps on a compute device (Zerbato 2010,
+// (2.25), (2.26), 2.1.2 and 7.1); the bodies step themselves.
 #include <cstring>
 
 #include "cells.h"
@@ -71,7 +71,7 @@ struct Tables {
   static dfm_status set_params(void *self, const double *params) {
     One &of = body(self);
     return model::in_range(of.host, Of::kId, kParams, Of::kParams, params) ? model::change(of, params)
-                                                                          : DFM_E_ARG;
+                                                                           : DFM_E_ARG;
   }
   static dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
     return body(self).predict(*k, f, u);
@@ -98,8 +98,8 @@ struct Tables {
     *n = One::kFactCount;
     return static_cast<const One *>(self)->facts();
   }
-  static constexpr dfm_stepper kStepper = {sizeof(dfm_stepper), 0,      predict, respond, diagonal,
-                                           commit,              nullptr, respond_many};
+  static constexpr dfm_stepper kStepper = {
+      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
   static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
 
   static const void *extension(const void *, const char *id) {
@@ -130,7 +130,8 @@ struct Tables {
   }
   static constexpr dfm_type type(const char *name, const char *source, const char *const *effects,
                                  const dfm_model *of) {
-    dfm_type t = dfm::plugin::type(DFM_KIND_MODEL, Of::kId, name, "0.1.0", "MIT", source, kParams, effects, of);
+    dfm_type t =
+        dfm::plugin::type(DFM_KIND_MODEL, Of::kId, name, "0.1.0", "MIT", source, kParams, effects, of);
     t.nparam = Of::kParams;
     return t;
   }

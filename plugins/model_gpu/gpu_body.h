@@ -1,5 +1,6 @@
 // A body that a compute device moves. The host keeps places and velocities: the device's are a copy of them,
-// which is renewed where they are not those that the last step left. Equations, limits, cost: doc/models/gpu.md.
+// which is renewed where they are not those that the last step left. Equations, limits, cost:
+// doc/models/msm_gpu.md.
 #pragma once
 #include <memory>
 

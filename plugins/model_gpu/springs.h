@@ -1,4 +1,4 @@
-// Springs of a mesh: what org.deform.msm_gpu moves points by. Equations: doc/models/gpu.md.
+// Springs of a mesh: what org.deform.msm_gpu moves points by. Equations: doc/models/msm_gpu.md.
 #pragma once
 #include "parts.h"
 

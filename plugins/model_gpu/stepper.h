@@ -1,5 +1,5 @@
-// What moves the points of a body: kernels over arrays, run by a device (vulkan_stepper.h) or, as reference, by
-// the processor. Both run the same .glsl files.
+// What moves the points of a body: kernels over arrays, run by a device (vulkan_stepper.h) or, as reference,
+// by the processor. Both run the same .glsl files.
 #pragma once
 #include <algorithm>
 #include <bit>
@@ -78,7 +78,7 @@ class Stepper {
   // n sub-steps of h; moved, loaded: place and speed, or load, are not those that the last run left. NULL, or
   // why it failed.
   virtual const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) = 0;
-  // 0, or the largest h^2 D/m + 2 h E/m of a point above 4 in the last run: its step was longer than the bound.
+  // 0, or the largest h^2 D/m + 2 h E/m of a point above 4 in the last run, whose steps were too long.
   float worst() const { return std::bit_cast<float>(*worst_); }
 
  protected:

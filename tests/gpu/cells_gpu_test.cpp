@@ -10,12 +10,12 @@ Mesh bar() { return kuhn_bar(4, 3, 3, 0.02, 0.2); }
 // Linear maps, some of which turn cells over or leave two stretches that nearly cancel.
 const std::vector<std::array<Vec, 3>> &shapes() {
   static const std::vector<std::array<Vec, 3>> all = {
-      {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},           {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
-      {{{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},         {{{3, 0.4, 0}, {0, 0.5, 0}, {0, 0.2, 0.5}}},
-      {{{2, 0, 0}, {0, 2, 0}, {0.3, 0, 1.5}}},       {{{0.2, 0, 0}, {0, 0.2, 0.1}, {0, 0, 0.2}}},
-      {{{1, 0, 0}, {0, 1, 0}, {0, 0, 0}}},           {{{1, 0, 0}, {0, 1.1, 0}, {0.1, 0, -0.6}}},
-      {{{1.3, 0, 0.1}, {0, 1, 0}, {0, 0, -0.97}}},   {{{-1.2, 0, 0}, {0, -1, 0}, {0, 0.1, -0.8}}},
-      {{{4, 0, 0}, {0, 1e-3, 0}, {0, 0, 2e-3}}},     {{{1e-5, 0, 0}, {0, 1e-5, 0}, {0, 0, 1e-5}}},
+      {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}},         {{{0, -1, 0}, {1, 0, 0}, {0, 0, 1}}},
+      {{{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}},       {{{3, 0.4, 0}, {0, 0.5, 0}, {0, 0.2, 0.5}}},
+      {{{2, 0, 0}, {0, 2, 0}, {0.3, 0, 1.5}}},     {{{0.2, 0, 0}, {0, 0.2, 0.1}, {0, 0, 0.2}}},
+      {{{1, 0, 0}, {0, 1, 0}, {0, 0, 0}}},         {{{1, 0, 0}, {0, 1.1, 0}, {0.1, 0, -0.6}}},
+      {{{1.3, 0, 0.1}, {0, 1, 0}, {0, 0, -0.97}}}, {{{-1.2, 0, 0}, {0, -1, 0}, {0, 0.1, -0.8}}},
+      {{{4, 0, 0}, {0, 1e-3, 0}, {0, 0, 2e-3}}},   {{{1e-5, 0, 0}, {0, 1e-5, 0}, {0, 0, 1e-5}}},
   };
   return all;
 }
@@ -51,8 +51,8 @@ TEST(CorotationalFemGpu, InEveryShape_MovesAsTheProcessorsModel) {
     for (uint32_t i = 0; i < plain.size(); ++i) {
       const Vec now = plain.get(plain.v, i);
       most = std::max(most, norm(now - plain.get(before.data(), i)));
-      off = std::max({off, norm(now - b.device->get(b.device->v, i)),
-                      norm(now - b.processor->get(b.processor->v, i))});
+      off = std::max(
+          {off, norm(now - b.device->get(b.device->v, i)), norm(now - b.processor->get(b.processor->v, i))});
     }
     EXPECT_GT(most, 1e-5) << shape[0][0] << " " << shape[2][2];
     EXPECT_LE(off, 1e-6 * most) << shape[0][0] << " " << shape[2][2];

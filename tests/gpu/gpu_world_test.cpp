@@ -1,5 +1,5 @@
-// Bodies of the models msm_gpu and corotational_fem_gpu in a world: contact and friction of the library, sub-steps, snapshots, the
-// command.
+// Bodies of the models msm_gpu and corotational_fem_gpu in a world: contact and friction of the library,
+// sub-steps, snapshots, the command.
 #include <filesystem>
 
 #include "support.h"

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""The SPIR-V in the source tree is what glslangValidator makes of the shaders, and no sum in it may be contracted
-with a product.
+"""The SPIR-V in the source tree is what glslangValidator makes of the shaders, and no sum in it may be
+contracted with a product.
 
 spirv.py GLSLANG FOLDER [--write]    --write replaces the words in the tree
 """
