@@ -4,6 +4,7 @@
 #include <cstring>
 
 #include "cells.h"
+#include "deform/plugin_draft.h"
 #include "gpu_body.h"
 #include "springs.h"
 #include "vulkan_stepper.h"
@@ -57,6 +58,8 @@ namespace {
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
+// nothing but the shape is state, so what is left of a cut body is a new one
+const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 
 // The tables of the model on bodies Of.
 template <class Of>
@@ -107,6 +110,7 @@ struct Tables {
     if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
     if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
     if (!strcmp(id, DFM_EXT_FACTS)) return &kFacts;
+    if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
     return nullptr;
   }
   static constexpr dfm_model model(uint32_t caps) {

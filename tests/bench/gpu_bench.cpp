@@ -6,7 +6,7 @@
 //   body      steps of a body of tetrahedra through the model's own functions, arrays of the host included
 // The bytes of a sub-step count each array once: what other points' places and velocities cost beyond that is
 // up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs
-// or cells (2e4 on a software driver), --only cells leaves out the springs.
+// or cells (2e4 on a software driver), --only cells, --only springs leave out the other ones.
 // --csv FILE --commit ID appends the figures.
 #include <chrono>
 #include <cstdlib>
@@ -302,11 +302,11 @@ int main(int argc, char **argv) {
                  "device,what,springs_or_cells,points,damping,substeps,us_per_substep,per_s,gb_per_s,"
                  "copy_gb_per_s,off_m");
   double most = 0;
-  bool springs = true;
+  bool springs = true, cells = true;
   Choice choice = kAuto;
   for (int n = 1; n + 1 < argc; n += 2) {
     if (!std::strcmp(argv[n], "--most")) most = std::atof(argv[n + 1]);
-    if (!std::strcmp(argv[n], "--only") && !std::strcmp(argv[n + 1], "cells")) springs = false;
+    if (!std::strcmp(argv[n], "--only")) (std::strcmp(argv[n + 1], "cells") ? cells : springs) = false;
     if (!std::strcmp(argv[n], "--device") && !std::strcmp(argv[n + 1], "software")) choice = kSoftware;
   }
   try {
@@ -319,13 +319,13 @@ int main(int argc, char **argv) {
     for (const uint32_t side : {12u, 26u, 55u}) {
       if (6.0 * side * side * side > most) continue;
       Block block(side);
-      {
-        Cells cells;
-        cells.create(&host, block.mesh);
-        cells.fill(block.params);
-        passes("cells", cells, block.x, 1000, vulkan, copy, out);
+      if (cells) {
+        Cells parts;
+        parts.create(&host, block.mesh);
+        parts.fill(block.params);
+        passes("cells", parts, block.x, 1000, vulkan, copy, out);
+        body<Cells>("body of cells", block, choice, vulkan->name, copy, out);
       }
-      body<Cells>("body of cells", block, choice, vulkan->name, copy, out);
       if (springs) body<Springs>("body", block, choice, vulkan->name, copy, out);
     }
   } catch (const std::string &why) {

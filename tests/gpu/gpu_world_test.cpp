@@ -2,6 +2,7 @@
 // sub-steps, snapshots, the command.
 #include <filesystem>
 
+#include "cut_scenes.h"
 #include "support.h"
 #include "under_ball.h"
 #include "world.h"
@@ -149,6 +150,30 @@ TEST_P(GpuWorld, SavedInContact_ContinuesWithTheSameBits) {
   test::ok(dfm_world_restore(b->world, saved.data(), saved.size()));
   test::run(b->world, 0.1, 2e-3);
   EXPECT_EQ(dfm_world_hash(a->world), dfm_world_hash(b->world));
+}
+
+// The cells under a sphere go, and with them their springs: the rest moves as what is left of the processor's
+// body would, and as the same cut of another one does.
+TEST_P(GpuWorld, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
+  uint64_t hash[2];
+  double height[3];
+  for (int n = 0; n < 3; ++n) {
+    const char *model = n < 2 ? GetParam() : on_the_processor(GetParam());
+    World w(model, device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-3);
+    test::run(w.world, 0.1, 2e-3);
+    const dfm_body_measure before = w.now();
+    const dfm_cut_def sphere = test::cutting::sphere({0.05, 0.05, 0.1}, 0.03);
+    dfm_cut_info done = test::cutting::ask();
+    test::ok(dfm_body_cut(w.body, &sphere, &done));
+    EXPECT_GT(done.cells, 5u);
+    EXPECT_NEAR(w.now().mass + done.mass, before.mass, 1e-12);
+    test::run(w.world, 1.0, 2e-3);
+    EXPECT_NEAR(normal_force(w.world), w.now().mass * 9.81, 1e-3 * before.mass * 9.81);
+    height[n] = w.now().com[2];
+    if (n < 2) hash[n] = dfm_world_hash(w.world);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+  EXPECT_NEAR(height[0], height[2], 1e-5);
 }
 
 // Two bodies, one on the other, submit from two threads at once.
