@@ -4,8 +4,8 @@
 // norm of the block (a, b) of K_e, which no rotation changes, and any positive weights w
 //   D_a = sum over cells of (sum_b N_ab w_b) / w_a
 // is such a diagonal: |u_a N_ab u_b| <= N_ab/2 (w_b/w_a u_a^2 + w_a/w_b u_b^2). The weights are chosen once
-// so that the rows are even, by a few steps toward the Perron vector of the row-sum operator: 0.84 of the
-// true step on a fine mesh, where the least h_min / c_p of a cell gives 0.06.
+// so that the rows are even: 0.84 of the true step on a fine mesh, where the least h_min / c_p of a cell
+// gives 0.06.
 //
 // The turning of R. The energy is mu |F - R|^2 + lambda/2 (t - 3)^2 with t = tr S, and R = dt/dF. Hence
 //   d2W = 2 mu |dF|^2 + lambda (R:dF)^2 + (lambda (t - 3) - 2 mu) dF:dR,
@@ -33,14 +33,11 @@
 // The energies of the gradient have rows of their own, of the second derivative at the shape. In W'' each
 // dyad X:dF with X of largest stretch x is at most x sum |u_a| |g_a|, |dF| too, and d2J is at most twice
 // the longest stretch, at least minus once that.
+#include "../model_common/cell_rows.h"
 #include "corot_body.h"
 
 namespace corot {
 namespace {
-
-constexpr int kWeightSteps = 20;
-constexpr double kLeastWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
-constexpr int kPair[4][4] = {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}};
 
 void twist_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
@@ -64,7 +61,6 @@ void Body::cell_elasticity(size_t place, double (*d)[6]) const {
 }
 
 void Body::find_rows(Room &room) {
-  Buffer<double> &next = room.next, &blocks = room.blocks;
   for (uint32_t c = 0; c < ncell; ++c) {
     const size_t place = place_of[c];
     model::Tetrahedron shape{1, {}};  // the constants hold the volume
@@ -72,45 +68,17 @@ void Body::find_rows(Room &room) {
     for (int a = 0; a < 3; ++a) shape.g[0][a] = -((shape.g[1][a] + shape.g[2][a]) + shape.g[3][a]);
     double d[6][6];
     cell_elasticity(place, d);
-    for (int a = 0; a < 4; ++a)
-      for (int b = a; b < 4; ++b) {
-        double one[9];
-        model::stiffness_block(shape, d, a, b, one);
-        blocks[10 * size_t(c) + kPair[a][b]] = model::norm_of(one);
-      }
-  }
-  const auto row = [&](uint32_t c, int a) {
-    const uint32_t *q = cells.data() + 4 * size_t(c);
-    double sum = 0;
-    for (int b = 0; b < 4; ++b) sum += blocks[10 * size_t(c) + kPair[a][b]] * weight[q[b]];
-    return sum;
-  };
-  std::fill(weight.data(), weight.data() + npoint, 1.0);
-  for (int step = 0; step < kWeightSteps; ++step) {
-    std::fill(next.data(), next.data() + npoint, 0.0);
-    for (uint32_t c = 0; c < ncell; ++c)
-      for (int a = 0; a < 4; ++a) next[cells[4 * size_t(c) + a]] += row(c, a);
-    double most = 0;
-    for (uint32_t i = 0; i < npoint; ++i) {
-      next[i] = mass[i] > 0 ? next[i] / mass[i] : 0;
-      most = std::max(most, next[i]);
-    }
-    for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kLeastWeight) : 1;
+    model::block_norms(shape, d, room.blocks.data() + 10 * size_t(c));
   }
   std::fill(rest_rows.data(), rest_rows.data() + npoint, 0.0);
   std::fill(damp_rows.data(), damp_rows.data() + npoint, 0.0);
-  for (uint32_t c = 0; c < ncell; ++c) {
-    const uint32_t *q = cells.data() + 4 * size_t(c);
-    const double *h = height_inverse.data() + 4 * size_t(c);
-    double sum = 0;
-    for (int b = 0; b < 4; ++b) sum += h[b] * weight[q[b]];
-    for (int a = 0; a < 4; ++a) {
-      const double own = row(c, a) / weight[q[a]];
-      rest_rows[q[a]] += own;
-      damp_rows[q[a]] += at(kDampingStiffness, c) * own;
-      twist_share[4 * size_t(c) + a] = h[a] * sum / weight[q[a]];
-    }
-  }
+  model::cell_rows(ncell, npoint, cells.data(), mass.data(), room.blocks.data(), height_inverse.data(),
+                   weight.data(), room.next.data(), [&](uint32_t c, int a, double row, double turn) {
+                     const size_t corner = 4 * size_t(c) + size_t(a);
+                     rest_rows[cells[corner]] += row;
+                     damp_rows[cells[corner]] += at(kDampingStiffness, c) * row;
+                     twist_share[corner] = turn;
+                   });
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {

@@ -17,7 +17,7 @@ SCENE, STEPS = "examples/scenes/slope_block.json", 200
 DYNAMIC_LINKER = {"dlopen", "dlsym", "dlclose", "dlerror", "dladdr"}
 # plugins/CMakeLists.txt keeps these out of the library: one links a library under the GPL, one opens the
 # Vulkan loader at run time.
-FILES_ONLY = {"solver_cholmod", "model_msm_gpu"}
+FILES_ONLY = {"solver_cholmod", "model_gpu"}
 
 
 def asked_for(*paths):

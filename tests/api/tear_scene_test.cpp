@@ -104,8 +104,8 @@ TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
   EXPECT_NE(r.out.find("\"least_cells\" above 1 with \"crumbs\": \"remove\""), std::string::npos) << r.out;
 }
 
-// It crosses itself only where a budget ends solves: loads of faces that interlock cancel each other, and grow
-// (doc/decisions/contact_solver.md).
+// It crosses itself only where a budget ends solves: loads of faces that interlock cancel each other, and
+// grow (doc/decisions/contact_solver.md).
 // unsanitized: too slow there; shorter tests run the same code
 TEST(TearScene, TornBodyThatCrossesItself_IsAdvisedToSeparate) {
   const std::string log = shattered("torn ball", "0.06", "3", "", {"--set", "/time/max_work=1000000"}).err;

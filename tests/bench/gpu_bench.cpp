@@ -1,11 +1,12 @@
-// Springs times sub-steps per second of the model msm_gpu, beside what the same kernel does on points without
-// springs, which is to copy their places and velocities:
+// Springs and cells times sub-steps per second of the models of model_gpu, beside what the kernel of the
+// springs does on points without springs, which is to copy their places and velocities:
 //   lattice   points of a cube, each with springs to its 26 neighbors: many sub-steps in one submission; one
 //             and its end back; one with points and loads on the way there, too, as in contact
+//   cells     tetrahedra of a cube, the same
 //   body      steps of a body of tetrahedra through the model's own functions, arrays of the host included
 // The bytes of a sub-step count each array once: what other points' places and velocities cost beyond that is
 // up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs
-// (2e4 on a software driver).
+// or cells (2e4 on a software driver), --only cells, --only springs leave out the other ones.
 // --csv FILE --commit ID appends the figures.
 #include <chrono>
 #include <cstdlib>
@@ -15,12 +16,14 @@
 #include <vector>
 
 #include "machine.h"
-#include "model_msm_gpu/gpu_body.h"
-#include "model_msm_gpu/vulkan_stepper.h"
+#include "model_gpu/cells.h"
+#include "model_gpu/gpu_body.h"
+#include "model_gpu/springs.h"
+#include "model_gpu/vulkan_stepper.h"
 
 namespace {
 
-using namespace msm_gpu;
+using namespace gpu;
 
 dfm_host services() {
   dfm_host h{};
@@ -91,40 +94,60 @@ struct Lattice {
             stiffness.push_back(100);
           }
     springs.lay_out(&host, npoint(), uint32_t(nspring()), edges.data());
-    springs.fill(stiffness.data(), square.data());
-  }
-
-  void start(Stepper &s) const {
-    std::mt19937 random(2);
-    std::uniform_real_distribution<double> u(-1, 1);
-    for (uint32_t i = 0; i < npoint(); ++i) {
-      const auto near = [&](int a) { return x[3 * size_t(i) + size_t(a)] + 2e-4 * u(random); };
-      s.place[i] = {near(0), near(1), near(2), 1000};
-      s.speed[i] = {0.1 * u(random), 0.1 * u(random), 0.1 * u(random), 0};
-      s.load[i] = {0, 0, -9.81, 0.1};
-    }
+    springs.put(stiffness.data(), square.data());
   }
 };
 
-constexpr double kOfSpring = sizeof(uvec4), kOfPoint = sizeof(uvec2) + 5 * sizeof(dvec4);  // bytes
+// A cube of side^3 cubes of six tetrahedra; surfels are the points of its boundary.
+struct Block {
+  std::vector<double> x, mass, weights;
+  std::vector<uint32_t> cells, edges, rows, points;
+  double params[kParamCount] = {1e5, 1e-4, 0, 0, 0.3};
+  dfm_mesh mesh{};
+  uint32_t npoint() const { return uint32_t(x.size() / 3); }
+  explicit Block(uint32_t side);
+};
 
-double gigabytes(size_t both_ends, size_t points) {
-  return 1e-9 * (kOfSpring * double(both_ends) + kOfPoint * double(points));
+void start(const std::vector<double> &x, double inverse_mass, Stepper &s) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> u(-1, 1);
+  for (uint32_t i = 0; i < x.size() / 3; ++i) {
+    const auto near = [&](int a) { return x[3 * size_t(i) + size_t(a)] + 2e-4 * u(random); };
+    s.place[i] = {near(0), near(1), near(2), inverse_mass};
+    s.speed[i] = {0.1 * u(random), 0.1 * u(random), 0.1 * u(random), 0};
+    s.load[i] = {0, 0, -9.81, 0.1};
+  }
 }
 
-constexpr double kStep = 1e-4;  // s, stable on the lattice
+constexpr double kOfSpring = sizeof(uvec4), kOfPoint = sizeof(uvec2) + 5 * sizeof(dvec4);  // bytes
+// A cell's corners, shape, and forces there and back; its points are read once more.
+constexpr double kOfCell = 3 * sizeof(uvec4) + (3 + 2 * 4) * sizeof(dvec4);
+constexpr double kMoreOfPoint = sizeof(double) + sizeof(dvec4);
+
+double gigabytes(const Springs &of, float) {
+  return 1e-9 * (2 * kOfSpring * of.count() + kOfPoint * of.npoint);
+}
+double gigabytes(const Cells &of, float damping) {
+  const double speeds = damping > 0 ? sizeof(dvec4) : 0;
+  return 1e-9 * (kOfCell * of.count() + (kOfPoint + kMoreOfPoint + speeds) * of.npoint);
+}
+
+constexpr double kStep = 1e-4;  // s, stable on the lattice and in the cells
 
 // m, how far a point of the device is from that of the reference after some sub-steps, at most.
-double difference(const Lattice &l, VulkanStepper &device, float damping) {
-  Reference processor(&host, l.npoint());
-  processor.take(l.springs);
-  const uint32_t n = l.nspring() > 1000000 ? 4 : 100;
+template <class Of>
+double difference(const Of &parts, const std::vector<double> &x, double inverse_mass, VulkanStepper &device,
+                  float damping) {
+  Reference processor(&host, parts.npoint);
+  processor.take(parts.work());
+  const uint32_t n = parts.count() > 500000 ? 4 : 100;
   double most = 0;
   for (Stepper *s : {static_cast<Stepper *>(&device), static_cast<Stepper *>(&processor)}) {
-    l.start(*s);
+    start(x, inverse_mass, *s);
     if (const char *why = s->run(n, kStep, damping, true, true)) std::printf("%s\n", why);
+    if (s->worst() > 0) std::printf("%g > 4: too long a step\n", double(s->worst()));
   }
-  for (uint32_t i = 0; i < l.npoint(); ++i) {
+  for (uint32_t i = 0; i < parts.npoint; ++i) {
     const dvec4 &a = device.place[i], &b = processor.place[i];
     const double off = std::max({std::fabs(a.x - b.x), std::fabs(a.y - b.y), std::fabs(a.z - b.z)});
     most = off >= most ? off : off == off ? most : HUGE_VAL;
@@ -138,7 +161,7 @@ double bandwidth(const std::shared_ptr<Vulkan> &vulkan, uint32_t points) {
   Springs none;
   none.lay_out(&host, points, 0, nullptr);
   VulkanStepper s(vulkan, points);
-  s.take(none);
+  s.take(none.work());
   for (uint32_t i = 0; i < points; ++i) {
     s.place[i] = {0.1 * i, 0.2, 0.3, 1};
     s.speed[i] = {1, 2, 3 + 0.1 * i, 0};
@@ -148,46 +171,49 @@ double bandwidth(const std::shared_ptr<Vulkan> &vulkan, uint32_t points) {
   // the difference of two lengths leaves out the copy back
   const double few = time_of([&] { s.run(100, kStep, 0, false, false); });
   const double many = time_of([&] { s.run(300, kStep, 0, false, false); });
-  return gigabytes(0, points) * 200 / (many - few);
+  return gigabytes(none, 0) * 200 / (many - few);
 }
 
-void lattice(uint32_t side, const std::shared_ptr<Vulkan> &vulkan, double copy, bench::Csv &out) {
-  const Lattice l(side);
-  VulkanStepper s(vulkan, l.npoint());
-  s.take(l.springs);
+template <class Of>
+void passes(const char *kind, const Of &parts, const std::vector<double> &x, double inverse_mass,
+            const std::shared_ptr<Vulkan> &vulkan, double copy, bench::Csv &out) {
+  VulkanStepper s(vulkan, parts.npoint);
+  s.take(parts.work());
   for (const float damping : {0.0f, 1e-4f}) {
-    const double off = difference(l, s, damping);
+    const double off = difference(parts, x, inverse_mass, s, damping);
     const auto row = [&](const char *what, uint32_t n, bool moved, bool loaded) {
-      l.start(s);
+      start(x, inverse_mass, s);
       s.run(1, kStep, damping, true, true);
       const double step = time_of([&] { s.run(n, kStep, damping, moved, loaded); }) / n;
-      const double rate = double(l.nspring()) / step, speed = gigabytes(2 * l.nspring(), l.npoint()) / step;
+      const double rate = parts.count() / step, speed = gigabytes(parts, damping) / step;
       std::printf(
-          "%-20s %8zu springs %7u points %s %9.3f us a sub-step, %8.3g springs/s, %6.1f GB/s, "
-          "%3.0f %% of a copy, %.2g m off\n",
-          what, l.nspring(), l.npoint(), damping > 0 ? "damped" : "      ", 1e6 * step, rate, speed,
+          "%s: %-15s %8u %7u points %s %9.3f us a sub-step, %8.3g/s, %6.1f GB/s, %3.0f %% of a copy, %.2g m "
+          "off\n",
+          kind, what, parts.count(), parts.npoint, damping > 0 ? "damped" : "      ", 1e6 * step, rate, speed,
           100 * speed / copy, off);
       if (out.csv)
-        std::fprintf(out.csv, "%s,%s,lattice: %s,%zu,%u,%g,%u,%.4f,%.4g,%.1f,%.1f,%.3g\n", out.head.c_str(),
-                     bench::quoted(vulkan->name).c_str(), what, l.nspring(), l.npoint(), double(damping), n,
-                     1e6 * step, rate, speed, copy, off);
+        std::fprintf(out.csv, "%s,%s,%s: %s,%u,%u,%g,%u,%.4f,%.4g,%.1f,%.1f,%.3g\n", out.head.c_str(),
+                     bench::quoted(vulkan->name).c_str(), kind, what, parts.count(), parts.npoint,
+                     double(damping), n, 1e6 * step, rate, speed, copy, off);
     };
-    row("many sub-steps", l.nspring() > 1000000 ? 100 : 1000, false, false);
+    row("many sub-steps", parts.count() > 500000 ? 100 : 1000, false, false);
     row("back", 1, false, false);
     row("there and back", 1, true, true);
   }
 }
 
-// A cube of side^3 cubes of six tetrahedra.
-void body(uint32_t side, Choice choice, const std::string &name, double copy, bench::Csv &out) {
-  std::vector<double> x, mass;
-  std::vector<uint32_t> cells;
+void lattice(uint32_t side, const std::shared_ptr<Vulkan> &vulkan, double copy, bench::Csv &out) {
+  const Lattice l(side);
+  passes("lattice", l.springs, l.x, 1000, vulkan, copy, out);
+}
+
+Block::Block(uint32_t side) {
   const auto id = [&](uint32_t i, uint32_t j, uint32_t k) { return (i * (side + 1) + j) * (side + 1) + k; };
   for (uint32_t i = 0; i <= side; ++i)
     for (uint32_t j = 0; j <= side; ++j)
       for (uint32_t k = 0; k <= side; ++k)
         for (const uint32_t a : {i, j, k}) x.push_back(0.01 * a);
-  const uint32_t n = uint32_t(x.size() / 3);
+  const uint32_t n = npoint();
   mass.assign(n, 0);
   std::vector<uint64_t> pairs;
   for (uint32_t i = 0; i < side; ++i)
@@ -209,7 +235,6 @@ void body(uint32_t side, Choice choice, const std::string &name, double copy, be
       }
   std::sort(pairs.begin(), pairs.end());
   pairs.erase(std::unique(pairs.begin(), pairs.end()), pairs.end());
-  std::vector<uint32_t> edges, rows, points;
   for (const uint64_t p : pairs) edges.insert(edges.end(), {uint32_t(p >> 32), uint32_t(p)});
   for (uint32_t i = 0; i < n; ++i) {  // surfels: the points of the boundary
     bool outside = false;
@@ -217,31 +242,36 @@ void body(uint32_t side, Choice choice, const std::string &name, double copy, be
     if (outside) points.push_back(i);
   }
   for (uint32_t s = 0; s <= points.size(); ++s) rows.push_back(s);
-  const std::vector<double> weights(points.size(), 1.0);
-  const double params[kParamCount] = {1e5, 1e-4, 0, double(choice)};
-  dfm_mesh m{};
-  m.size = sizeof m;
-  m.npoint = n;
-  m.ncell = uint32_t(cells.size() / 4);
-  m.cell = DFM_CELL_TET;
-  m.rest = x.data();
-  m.cells = cells.data();
-  m.mass = mass.data();
-  m.params = params;
-  m.nedge = uint32_t(pairs.size());
-  m.edges = edges.data();
-  m.nsurfel = uint32_t(points.size());
-  m.row = rows.data();
-  m.col = points.data();
-  m.weight = weights.data();
-  Body b;
-  const double made = seconds([&] { b.create(&host, m); });
-  std::vector<double> at(4 * size_t(n)), v(at), f(at), x_end(at), v_end(at), u(3 * points.size()), p(u);
+  weights.assign(points.size(), 1.0);
+  mesh.size = sizeof mesh;
+  mesh.npoint = n;
+  mesh.ncell = uint32_t(cells.size() / 4);
+  mesh.cell = DFM_CELL_TET;
+  mesh.rest = x.data();
+  mesh.cells = cells.data();
+  mesh.mass = mass.data();
+  mesh.params = params;
+  mesh.nedge = uint32_t(pairs.size());
+  mesh.edges = edges.data();
+  mesh.nsurfel = uint32_t(points.size());
+  mesh.row = rows.data();
+  mesh.col = points.data();
+  mesh.weight = weights.data();
+}
+
+template <class Of>
+void body(const char *kind, Block &block, Choice choice, const std::string &name, double copy,
+          bench::Csv &out) {
+  block.params[kDevice] = choice;
+  const uint32_t n = block.npoint();
+  Body<Of> b;
+  const double made = seconds([&] { b.create(&host, block.mesh); });
+  std::vector<double> at(4 * size_t(n)), v(at), f(at), x_end(at), v_end(at), u(3 * block.points.size()), p(u);
   for (uint32_t i = 0; i < n; ++i) {
-    std::copy_n(&x[3 * size_t(i)], 3, &at[4 * size_t(i)]);
-    f[4 * size_t(i) + 2] = -9.81 * mass[i];
+    std::copy_n(&block.x[3 * size_t(i)], 3, &at[4 * size_t(i)]);
+    f[4 * size_t(i) + 2] = -9.81 * block.mass[i];
   }
-  const double longest = b.facts()[0].value;
+  const double longest = b.facts()[0].value, count = b.facts()[1].value;
   for (const uint32_t steps : {1u, 10u, 100u}) {
     dfm_kin k{};
     k.size = sizeof k;
@@ -255,15 +285,13 @@ void body(uint32_t side, Choice choice, const std::string &name, double copy, be
       at.swap(x_end);
       v.swap(v_end);
     });
-    const double rate = double(pairs.size()) * steps / step;
-    std::printf(
-        "body %4u sub-steps    %8zu springs %7u points %9.1f us a step, %.3g sub-steps/s, created "
-        "in %.2g s\n",
-        steps, pairs.size(), n, 1e6 * step, steps / step, made);
+    const double rate = count * steps / step;
+    std::printf("%s: %4u sub-steps %8.0f %7u points %9.1f us a step, %.3g sub-steps/s, created in %.2g s\n",
+                kind, steps, count, n, 1e6 * step, steps / step, made);
     if (out.csv)
-      std::fprintf(out.csv, "%s,%s,body,%zu,%u,%g,%u,%.4f,%.4g,%.1f,%.1f,\n", out.head.c_str(),
-                   bench::quoted(name).c_str(), pairs.size(), n, params[kDampingStiffness], steps,
-                   1e6 * step / steps, rate, gigabytes(2 * pairs.size(), n) * steps / step, copy);
+      std::fprintf(out.csv, "%s,%s,%s,%.0f,%u,%g,%u,%.4f,%.4g,,%.1f,\n", out.head.c_str(),
+                   bench::quoted(name).c_str(), kind, count, n, block.params[kDampingStiffness], steps,
+                   1e6 * step / steps, rate, copy);
   }
 }
 
@@ -271,12 +299,14 @@ void body(uint32_t side, Choice choice, const std::string &name, double copy, be
 
 int main(int argc, char **argv) {
   bench::Csv out(argc, argv,
-                 "device,what,springs,points,damping,substeps,us_per_substep,springs_per_s,gb_per_s,"
+                 "device,what,springs_or_cells,points,damping,substeps,us_per_substep,per_s,gb_per_s,"
                  "copy_gb_per_s,off_m");
   double most = 0;
+  bool springs = true, cells = true;
   Choice choice = kAuto;
   for (int n = 1; n + 1 < argc; n += 2) {
     if (!std::strcmp(argv[n], "--most")) most = std::atof(argv[n + 1]);
+    if (!std::strcmp(argv[n], "--only")) (std::strcmp(argv[n + 1], "cells") ? cells : springs) = false;
     if (!std::strcmp(argv[n], "--device") && !std::strcmp(argv[n + 1], "software")) choice = kSoftware;
   }
   try {
@@ -285,9 +315,19 @@ int main(int argc, char **argv) {
     const double copy = bandwidth(vulkan, most > 1e6 ? 8000000 : 100000);
     std::printf("%s: points without springs move %.1f GB/s, read and written\n", vulkan->name.c_str(), copy);
     for (const uint32_t side : {10u, 21u, 23u, 43u, 92u})
-      if (13.0 * side * side * side < most) lattice(side, vulkan, copy, out);
-    for (const uint32_t side : {11u, 26u, 52u})
-      if (7.0 * side * side * side < most) body(side, choice, vulkan->name, copy, out);
+      if (springs && 13.0 * side * side * side < most) lattice(side, vulkan, copy, out);
+    for (const uint32_t side : {12u, 26u, 55u}) {
+      if (6.0 * side * side * side > most) continue;
+      Block block(side);
+      if (cells) {
+        Cells parts;
+        parts.create(&host, block.mesh);
+        parts.fill(block.params);
+        passes("cells", parts, block.x, 1000, vulkan, copy, out);
+        body<Cells>("body of cells", block, choice, vulkan->name, copy, out);
+      }
+      if (springs) body<Springs>("body", block, choice, vulkan->name, copy, out);
+    }
   } catch (const std::string &why) {
     std::printf("no figures: %s\n", why.c_str());
   }

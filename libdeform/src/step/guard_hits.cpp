@@ -244,10 +244,10 @@ void guard_ask_hits(World &w, StepContext &step) {
   });
 }
 
-// Adds hits to the contacts of the sub-step, in order. A contact that its pair has already gets the geometry of
-// the hit, once; a further hit adds a row to it: a face that turns about one place comes near at another, and a
-// single row would be led to and fro. Rows of a contact begin with the same state of friction, and are one
-// contact again after the sub-step (keep_contacts.cpp).
+// Adds hits to the contacts of the sub-step, in order. A contact that its pair has already gets the geometry
+// of the hit, once; a further hit adds a row to it: a face that turns about one place comes near at another,
+// and a single row would be led to and fro. Rows of a contact begin with the same state of friction, and are
+// one contact again after the sub-step (keep_contacts.cpp).
 void guard_add_hits(World &w, StepContext &step) {
   Guard &g = step.guard;
   choose_hits(step);

@@ -1,16 +1,16 @@
 // Moves the points of a body on a device. The arrays of Stepper are memory that the device copies from and
 // to; a run is one submission: copies of what has changed, the sub-steps, the copy back.
 #pragma once
-#include "springs.h"
+#include "stepper.h"
 #include "vulkan.h"
 
-namespace msm_gpu {
+namespace gpu {
 
 class VulkanStepper : public Stepper {
  public:
   VulkanStepper(std::shared_ptr<Vulkan> vulkan, uint32_t npoint);  // throws std::string
   ~VulkanStepper() override;
-  void take(const Springs &springs) override;
+  void take(const Work &work) override;
   const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) override;
 
  private:
@@ -32,7 +32,8 @@ class VulkanStepper : public Stepper {
 
   std::shared_ptr<Vulkan> vulkan_;
   uint32_t npoint_, now_ = 0;  // which of place_ and speed_ is the present
-  Array place_[2], speed_[2], load_, row_, spring_, shared_;
+  Work work_{};
+  Array place_[2], speed_[2], load_, own_[kWorst - kOwn], exceeded_, shared_;
   VkDescriptorPool sets_ = VK_NULL_HANDLE;
   VkDescriptorSet set_[2] = {};
   VkCommandPool pool_ = VK_NULL_HANDLE;
@@ -53,4 +54,4 @@ class VulkanStepper : public Stepper {
   void upload(const Array &to, const void *from, size_t size);
 };
 
-}  // namespace msm_gpu
+}  // namespace gpu

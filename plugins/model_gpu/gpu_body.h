@@ -1,28 +1,27 @@
-// A mass-spring body that a compute device moves. The host keeps places and velocities: the device's are a
-// copy of them, which is renewed where they are not those that the last step left. Equations, limits, cost:
+// A body that a compute device moves. The host keeps places and velocities: the device's are a copy of them,
+// which is renewed where they are not those that the last step left. Equations, limits, cost:
 // doc/models/msm_gpu.md.
 #pragma once
 #include <memory>
 
 #include "../model_common/entry.h"
-#include "springs.h"
+#include "parts.h"
 
-namespace msm_gpu {
+namespace gpu {
 
-enum Param : uint32_t { kYoung, kDampingStiffness, kDampingMass, kDevice, kParamCount };
 enum Choice : uint32_t { kAuto, kHardware, kSoftware, kReference };
-extern const dfm_param kParams[kParamCount];
-constexpr const char *kId = "org.deform.msm_gpu";
 
 // The device that this choice means, opened once for the process; throws model::Refused after the reason was
-// logged. Not for kReference.
-std::unique_ptr<Stepper> open_stepper(const dfm_host *host, Choice choice, uint32_t npoint);
+// logged in the name of `who`. Not for kReference.
+std::unique_ptr<Stepper> open_stepper(const dfm_host *host, const char *who, Choice choice, uint32_t npoint);
 
+// Of: Springs or Cells.
+template <class Of>
 class Body {
  public:
   using Row = Param;
   const dfm_host *host = nullptr;
-  const char *active_effects[3] = {};  // NULL-terminated
+  const char *active_effects[4] = {};  // NULL-terminated
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
@@ -32,42 +31,37 @@ class Body {
   void respond(uint32_t n, const uint32_t *surfel, const double *p, double *du);
   void diagonal(uint32_t n, const uint32_t *surfel, double *w) const;
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
-  void bound(const dfm_kin &k, double *ksum, double *csum) const;
+  void bound(const dfm_kin &k, double *ksum, double *csum) { parts_.bound(k, ksum, csum); }
   double energy(const dfm_kin &k);
   static constexpr uint32_t kFactCount = 2;
   const dfm_fact *facts() const { return facts_; }
 
  private:
-  double params_[kParamCount] = {};
-  uint32_t npoint_ = 0, nedge_ = 0, nsurfel_ = 0;
-  Buffer<uint32_t> edges_;
-  Buffer<double> share_;      // [nedge] m2 stiffness over Young's modulus, or N/m where that came by cell
-  Buffer<double> stiffness_;  // [nedge] N/m
-  Buffer<double> rest_square_;
-  Buffer<double> inverse_mass_, row_;  // [npoint] 1/kg; N/m, of the step bound
+  Of parts_;
+  double params_[Of::kParams] = {};
+  uint32_t npoint_ = 0, nsurfel_ = 0;
+  Buffer<double> inverse_mass_;  // [npoint] 1/kg
   Buffer<uint8_t> held_;
   Buffer<uint32_t> surfel_row_, surfel_point_;  // coupling
   Buffer<double> surfel_weight_;
   Buffer<double> impulse_;       // [npoint,3] N s, zero between calls
   Buffer<double> block_energy_;  // J
-  Springs springs_;
   std::unique_ptr<Stepper> stepper_;
-  bool by_cell_ = false;
-  double longest_ = 0;  // s, stable in every shape
+  double longest_ = 0;  // s
   double h_ = 0;        // s, of the step that was predicted
   dfm_fact facts_[kFactCount] = {};
 
-  void take_springs(const dfm_mesh &m);
   void take_surface(const dfm_mesh &m);
-  void find_rows();
+  void find_longest();
   bool take_points(const dfm_kin &k);
   bool take_loads(const double *f, uint32_t stride);
   template <class F>
-  void each_point(const F &f) const;                                       // f(point), on the host's workers
-  double energy_of(const dfm_kin &k, uint32_t begin, uint32_t end) const;  // of springs
+  void each_point(const F &f) const {
+    Parts::each(host, npoint_, f);
+  }
   double free_inverse_mass(uint32_t point, int axis) const {
     return held_[point] >> axis & 1 ? 0 : inverse_mass_[point];
   }
 };
 
-}  // namespace msm_gpu
+}  // namespace gpu

@@ -4,10 +4,10 @@
 #include <cstring>
 #include <utility>
 
-namespace msm_gpu {
+namespace gpu {
 namespace {
 
-constexpr uint32_t kGroup = 64;  // points, as in spring_step.comp
+constexpr uint32_t kGroup = 64;  // as in points.glsl
 constexpr VkPipelineStageFlags kCopy = VK_PIPELINE_STAGE_TRANSFER_BIT,
                                kCompute = VK_PIPELINE_STAGE_COMPUTE_SHADER_BIT,
                                kProcessor = VK_PIPELINE_STAGE_HOST_BIT;
@@ -45,10 +45,9 @@ VulkanStepper::~VulkanStepper() { close(); }
 
 void VulkanStepper::open() {
   const Vulkan &vk = *vulkan_;
-  if ((npoint_ + kGroup - 1) / kGroup > vk.limits.maxComputeWorkGroupCount[0])
-    throw "the body has more points than the device " + vk.name + " takes in one call; take a coarser mesh";
   for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_}) make(*array, bytes(), false);
-  make(row_, sizeof(uvec2) * npoint_, false);
+  make(exceeded_, sizeof(uint32_t), true);
+  worst_ = static_cast<uint32_t *>(exceeded_.mapped);
   make(shared_, 3 * bytes(), true);
   place = static_cast<dvec4 *>(shared_.mapped);
   speed = place + npoint_;
@@ -93,8 +92,9 @@ void VulkanStepper::close() {
   vk.DestroyFence(vk.device, done_, nullptr);
   vk.DestroyCommandPool(vk.device, pool_, nullptr);
   vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
-  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &row_, &spring_, &shared_})
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &exceeded_, &shared_})
     drop(*array);
+  for (Array &array : own_) drop(array);
 }
 
 void VulkanStepper::make(Array &array, size_t size, bool mapped) {
@@ -129,22 +129,22 @@ void VulkanStepper::drop(Array &array) {
 void VulkanStepper::describe() {
   const Vulkan &vk = *vulkan_;
   for (uint32_t s = 0; s < 2; ++s) {
-    const VkBuffer buffers[kBindings] = {place_[s].buffer,    speed_[s].buffer, load_.buffer,
-                                         row_.buffer,         spring_.buffer,   place_[1 - s].buffer,
-                                         speed_[1 - s].buffer};
-    VkDescriptorBufferInfo whole[kBindings];
-    VkWriteDescriptorSet writes[kBindings];
+    VkBuffer buffers[kBindings] = {place_[s].buffer, speed_[s].buffer, load_.buffer, place_[1 - s].buffer,
+                                   speed_[1 - s].buffer};
+    for (uint32_t n = 0; n < kWorst - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
+    buffers[kWorst] = exceeded_.buffer;
     for (uint32_t b = 0; b < kBindings; ++b) {
-      whole[b] = {buffers[b], 0, VK_WHOLE_SIZE};
-      writes[b] = {};
-      writes[b].sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
-      writes[b].dstSet = set_[s];
-      writes[b].dstBinding = b;
-      writes[b].descriptorCount = 1;
-      writes[b].descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
-      writes[b].pBufferInfo = &whole[b];
+      if (!buffers[b]) continue;
+      const VkDescriptorBufferInfo whole{buffers[b], 0, VK_WHOLE_SIZE};
+      VkWriteDescriptorSet write{};
+      write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
+      write.dstSet = set_[s];
+      write.dstBinding = b;
+      write.descriptorCount = 1;
+      write.descriptorType = VK_DESCRIPTOR_TYPE_STORAGE_BUFFER;
+      write.pBufferInfo = &whole;
+      vk.UpdateDescriptorSets(vk.device, 1, &write, 0, nullptr);
     }
-    vk.UpdateDescriptorSets(vk.device, kBindings, writes, 0, nullptr);
   }
 }
 
@@ -179,7 +179,7 @@ void VulkanStepper::upload(const Array &to, const void *from, size_t size) {
     const VkBufferCopy all{0, 0, size};
     vulkan_->CmdCopyBuffer(once_, staging.buffer, to.buffer, 1, &all);
     vulkan_->EndCommandBuffer(once_);
-    must(finish(once_), "a copy of the springs");
+    must(finish(once_), "a copy of the body");
   } catch (...) {
     drop(staging);
     throw;
@@ -187,13 +187,18 @@ void VulkanStepper::upload(const Array &to, const void *from, size_t size) {
   drop(staging);
 }
 
-void VulkanStepper::take(const Springs &springs) {
-  if (!spring_.buffer) {
-    make(spring_, sizeof(uvec4) * std::max<size_t>(springs.nspring, 1), false);
-    describe();
-  }
-  upload(row_, springs.row.data(), sizeof(uvec2) * npoint_);
-  if (springs.nspring) upload(spring_, springs.spring.data(), sizeof(uvec4) * springs.nspring);
+void VulkanStepper::take(const Work &work) {
+  const bool first = !work_.npass;
+  for (uint32_t p = 0; first && p < work.npass; ++p)
+    if ((work.pass[p].count + kGroup - 1) / kGroup > vulkan_->limits.maxComputeWorkGroupCount[0])
+      throw "the body has more points or cells than the device " + vulkan_->name +
+          " takes in one call; take a coarser mesh";
+  for (uint32_t n = 0; first && n < kWorst - kOwn; ++n)
+    if (work.array[n].bytes) make(own_[n], work.array[n].bytes, false);
+  if (first) describe();
+  work_ = work;
+  for (uint32_t n = 0; n < kWorst - kOwn; ++n)
+    if (work.array[n].data) upload(own_[n], work.array[n].data, work.array[n].bytes);
 }
 
 void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
@@ -210,27 +215,31 @@ void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
   }
   if (batch.loaded) copy(shared_, 2 * bytes(), load_, 0);
   if (batch.moved || batch.loaded) order(commands, kCopy, kCompute);
-  vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline);
-  const Constants constants{batch.h, npoint_, batch.damping};
-  vk.CmdPushConstants(commands, vk.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof constants, &constants);
   for (uint32_t k = 0; k < batch.n; ++k) {
-    if (k > 0) order(commands, kCompute, kCompute);
     vk.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.layout, 0, 1,
                              &set_[(batch.from + k) % 2], 0, nullptr);
-    vk.CmdDispatch(commands, (npoint_ + kGroup - 1) / kGroup, 1, 1);
+    for (uint32_t p = 0; p < work_.npass; ++p) {
+      const Work::Pass &pass = work_.pass[p];
+      if (k + p > 0) order(commands, kCompute, kCompute);
+      vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline[pass.kernel]);
+      const Constants now{batch.h, pass.count, batch.damping};
+      vk.CmdPushConstants(commands, vk.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof now, &now);
+      vk.CmdDispatch(commands, (pass.count + kGroup - 1) / kGroup, 1, 1);
+    }
   }
   if (batch.seen) {
     const uint32_t end = (batch.from + batch.n) % 2;
     order(commands, kCompute, kCopy);
     copy(place_[end], 0, shared_, 0);
     copy(speed_[end], 0, shared_, bytes());
-    order(commands, kCopy, kProcessor);
+    order(commands, kCompute | kCopy, kProcessor);
   }
   vk.EndCommandBuffer(commands);
 }
 
 // What was recorded is used again where it is the same, as it is from step to step.
 const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, bool loaded) {
+  *worst_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMostSteps);
     const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, damping};
@@ -247,4 +256,4 @@ const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, 
   return nullptr;
 }
 
-}  // namespace msm_gpu
+}  // namespace gpu

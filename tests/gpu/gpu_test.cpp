@@ -1,104 +1,21 @@
-// The model msm_gpu by its plugin's tables: the device against the same kernel on the processor, and both
-// against the model msm.
-#include <filesystem>
-
-#include "../plugin/stepper_host.h"
+// Both models of the plugin model_gpu: the device against the same kernels on the processor, and both against
+// the processor's models.
+#include "gpu_host.h"
 
 namespace {
 
-using namespace stepper_test;
+using namespace gpu_test;
 
-enum Device { automatic, hardware, software, reference };
-const dfm_type &gpu() { return type_of("model_msm_gpu"); }
-
-// A body on the device and on the processor. Without a driver the test is skipped; where Mesa's software
-// driver is installed, it fails.
-struct Bodies {
-  Host host;
-  Mesh mesh;
-  std::unique_ptr<Stepper> device, processor;
-  Bodies(const Mesh &m, Params p = {}, const std::vector<uint8_t> &fixed = {}, Device which = automatic)
-      : mesh(m) {
-    p["device"] = which;
-    device = std::make_unique<Stepper>(host, gpu(), mesh, p, fixed);
-    p["device"] = reference;
-    processor = std::make_unique<Stepper>(host, gpu(), mesh, p, fixed);
-    EXPECT_EQ(processor->status, DFM_OK) << host.logged;
-  }
-  bool both() const { return device->status == DFM_OK; }
-};
-
-bool mesa_is_installed() {
-  for (const char *folder : {"/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"}) {
-    std::error_code none;
-    for (const auto &file : std::filesystem::directory_iterator(folder, none))
-      if (file.path().filename().string().starts_with("lvp_icd")) return true;
-  }
-  return false;
-}
-#define NEEDS_DRIVER(bodies)                                                          \
-  if (!(bodies).both() && !mesa_is_installed()) GTEST_SKIP() << (bodies).host.logged; \
-  ASSERT_TRUE((bodies).both()) << (bodies).host.logged
-
-void expect_same_bits(const Stepper &a, const Stepper &b, const std::string &when) {
-  const size_t bytes = 4 * size_t(a.size()) * sizeof(double);
-  EXPECT_EQ(std::memcmp(a.x, b.x, bytes), 0) << when;
-  EXPECT_EQ(std::memcmp(a.v, b.v, bytes), 0) << when;
-}
-
-Vec axis_sum(const Stepper &b, const double *a) {
-  Vec sum{};
-  for (uint32_t i = 0; i < b.size(); ++i) sum = sum + b.mesh.mass[i] * b.get(a, i);
-  return sum;
-}
-
-std::vector<double> msm_row(double young, double damping, double drag) {
-  return row_of(type_of("model_msm"), {{"young", young},
-                                       {"damping_stiffness", damping},
-                                       {"damping_mass", drag},
-                                       {"volume", 0},
-                                       {"collapse", 0}});
-}
-
-// The model msm in the same explicit sub-steps.
-struct Plain : ModelInstance {
-  Vec gravity{};
-  std::vector<uint8_t> held;
-  Plain(Host &h, const Mesh &m, double young, double damping, double drag, std::vector<uint8_t> fixed = {})
-      : ModelInstance(h, type_of("model_msm"), m, msm_row_padded(young, damping, drag), 4, {}, fixed),
-        held(std::move(fixed)) {
-    held.resize(m.npoint());
-  }
-  static std::vector<double> msm_row_padded(double young, double damping, double drag) {
-    std::vector<double> row = msm_row(young, damping, drag);
-    row.resize(row.size() + 2, 1.0);  // the axis, which is three wide
-    return row;
-  }
-  void sub_step(double h) {
-    forces();
-    for (uint32_t i = 0; i < size(); ++i) {
-      if (!held[i]) set(v, i, get(v, i) + h * ((1 / mesh.mass[i]) * get(f, i) + gravity));
-      set(x, i, get(x, i) + h * get(v, i));
-    }
-  }
-};
-
-double fact(const Stepper &b, const std::string &key) {
-  uint32_t n = 0;
-  const auto *facts = static_cast<const dfm_facts *>(b.ops->extension(b.self, DFM_EXT_FACTS));
-  const dfm_fact *row = facts->list(b.self, &n);
-  for (uint32_t k = 0; k < n; ++k)
-    if (row[k].key == key) return row[k].value;
-  ADD_FAILURE() << key;
-  return 0;
-}
+class Gpu : public testing::TestWithParam<uint32_t> {};
+INSTANTIATE_TEST_SUITE_P(Models, Gpu, testing::Values(uint32_t(kSprings), uint32_t(kCells)),
+                         [](const auto &one) { return one.param == kCells ? "cells" : "springs"; });
 
 // Neither a number of points that fills groups, nor one that does not.
-TEST(MsmGpu, OnTheSoftwareDriver_HasTheBitsOfTheReference) {
+TEST_P(Gpu, OnTheSoftwareDriver_HasTheBitsOfTheReference) {
   for (const double damping : {0.0, 2e-4})
     for (const bool held : {false, true}) {
       const Mesh m = kuhn_bar(6, 3, 3, 0.02, 0.2);
-      Bodies b(m, {{"young", 3e5}, {"damping_stiffness", damping}, {"damping_mass", 0.7}},
+      Bodies b(GetParam(), m, {{"young", 3e5}, {"damping_stiffness", damping}, {"damping_mass", 0.7}},
                held ? clamp_of(m) : std::vector<uint8_t>{}, software);
       NEEDS_DRIVER(b);
       for (Stepper *each : {b.device.get(), b.processor.get()}) {
@@ -119,16 +36,16 @@ TEST(MsmGpu, OnTheSoftwareDriver_HasTheBitsOfTheReference) {
 }
 
 // A card may round the square root and the quotient of a spring otherwise, by 2.5 units in the 24th bit each.
-TEST(MsmGpu, OnAnyDevice_ASubStepIsThatOfTheReference) {
+TEST_P(Gpu, OnAnyDevice_ASubStepIsThatOfTheReference) {
   const Mesh m = kuhn_bar(6, 3, 3, 0.02, 0.2);
-  Bodies b(m, {{"damping_stiffness", 2e-4}});
+  Bodies b(GetParam(), m, {{"damping_stiffness", 2e-4}});
   NEEDS_DRIVER(b);
   const double h = b.device->dt = b.processor->dt = 0.9 * fact(*b.device, "longest_step");
   for (Stepper *each : {b.device.get(), b.processor.get()}) {
     each->shake(2e-3, 0.3);
     each->step();
   }
-  Plain before(b.host, m, 1e5, 0, 0);
+  Plain before(b.host, GetParam(), m, {});
   before.shake(2e-3, 0.3);
   double most = 0, off = 0;
   for (uint32_t i = 0; i < m.npoint(); ++i) {
@@ -140,9 +57,9 @@ TEST(MsmGpu, OnAnyDevice_ASubStepIsThatOfTheReference) {
   EXPECT_LE(off, 1e-6 * most);
 }
 
-TEST(MsmGpu, SameStepsAgain_HaveTheSameBits) {
+TEST_P(Gpu, SameStepsAgain_HaveTheSameBits) {
   const Mesh m = kuhn_bar(5, 4, 3, 0.02, 0.2);
-  Bodies b(m), again(m);
+  Bodies b(GetParam(), m), again(GetParam(), m);
   NEEDS_DRIVER(b);
   for (Stepper *each : {b.device.get(), again.device.get()}) {
     each->shake(2e-3, 0.3);
@@ -153,9 +70,9 @@ TEST(MsmGpu, SameStepsAgain_HaveTheSameBits) {
 }
 
 // More sub-steps than one submission holds, too.
-TEST(MsmGpu, LongStep_IsThatOfItsSubSteps) {
+TEST_P(Gpu, LongStep_IsThatOfItsSubSteps) {
   const Mesh m = kuhn_bar(3, 3, 3, 0.02, 0.2);
-  Bodies b(m), parts(m);
+  Bodies b(GetParam(), m), parts(GetParam(), m);
   NEEDS_DRIVER(b);
   double longest = 1;
   while (longest > fact(*b.device, "longest_step")) longest /= 2;
@@ -177,14 +94,15 @@ TEST(MsmGpu, LongStep_IsThatOfItsSubSteps) {
 }
 
 // Forces of a spring are those of msm up to some units in the 24th bit of each.
-TEST(MsmGpu, SubStep_IsThatOfMsmInSinglePrecision) {
+TEST_P(Gpu, SubStep_IsThatOfTheProcessorsModel) {
   const Mesh m = read_msh(test::mesh_dir() + "/bars/bar_u3.msh");
   const double young = 2e5, damping = 1e-4, drag = 0.5;
   Host host;
   Stepper b(
-      host, gpu(), m,
+      host, gpu(GetParam()), m,
       {{"young", young}, {"damping_stiffness", damping}, {"damping_mass", drag}, {"device", reference}});
-  Plain plain(host, m, young, damping, drag);
+  Plain plain(host, GetParam(), m,
+              {{"young", young}, {"damping_stiffness", damping}, {"damping_mass", drag}});
   ASSERT_EQ(b.status, DFM_OK) << host.logged;
   ASSERT_EQ(plain.status, DFM_OK) << host.logged;
   b.dt = 0.9 * fact(b, "longest_step");
@@ -202,29 +120,12 @@ TEST(MsmGpu, SubStep_IsThatOfMsmInSinglePrecision) {
   EXPECT_LE(off, 1e-6 * most);
 }
 
-// s, of the first period of the middle's motion along x, by the zeros between samples.
-template <class Move, class Place>
-double period(const Move &move, const Place &place, double h) {
-  double last = place(), first = 0, found = 0;
-  int zeros = 0;
-  for (int n = 1; zeros < 9 && n < 200000; ++n) {
-    move();
-    const double now = place();
-    if (last < 0 && now >= 0) {
-      found = h * (n - now / (now - last));
-      if (zeros++ == 0) first = found;
-    }
-    last = now;
-  }
-  return (found - first) / 8;
-}
-
-TEST(MsmGpu, StretchedBar_HasThePeriodOfMsm) {
+TEST_P(Gpu, StretchedBar_HasThePeriodOfTheProcessorsModel) {
   const Mesh m = kuhn_bar(12, 2, 2, 0.02);
   const double young = 1e6;
-  Bodies b(m, {{"young", young}}, clamp_of(m));
+  Bodies b(GetParam(), m, {{"young", young}}, clamp_of(m));
   NEEDS_DRIVER(b);
-  Plain plain(b.host, m, young, 0, 0, clamp_of(m));
+  Plain plain(b.host, GetParam(), m, {{"young", young}}, clamp_of(m));
   const double h = 0.9 * fact(*b.device, "longest_step");
   const auto stretch = [&](auto &body) {
     for (uint32_t i = 0; i < m.npoint(); ++i)
@@ -236,19 +137,19 @@ TEST(MsmGpu, StretchedBar_HasThePeriodOfMsm) {
   b.device->dt = h;
   const double device =
       period([&] { b.device->step(); }, [&] { return b.device->get(b.device->x, tip)[0] - m.at(tip)[0]; }, h);
-  const double msm =
+  const double processor =
       period([&] { plain.sub_step(h); }, [&] { return plain.get(plain.x, tip)[0] - m.at(tip)[0]; }, h);
   // of a slender rod: 4 l / sqrt(E / rho)
-  EXPECT_NEAR(msm, 4 * 0.24 / std::sqrt(young / 1000), 0.05 * msm);
-  EXPECT_NEAR(device, msm, 1e-6 * msm);
+  EXPECT_NEAR(processor, 4 * 0.24 / std::sqrt(young / 1000), 0.05 * processor);
+  EXPECT_NEAR(device, processor, 1e-6 * processor);
 }
 
-TEST(MsmGpu, HangingBar_SagsAsMsm) {
+TEST_P(Gpu, HangingBar_SagsAsTheProcessorsModel) {
   const Mesh m = kuhn_bar(8, 2, 2, 0.02);
   const double young = 5e4, drag = 60;
-  Bodies b(m, {{"young", young}, {"damping_mass", drag}}, clamp_of(m));
+  Bodies b(GetParam(), m, {{"young", young}, {"damping_mass", drag}}, clamp_of(m));
   NEEDS_DRIVER(b);
-  Plain plain(b.host, m, young, 0, drag, clamp_of(m));
+  Plain plain(b.host, GetParam(), m, {{"young", young}, {"damping_mass", drag}}, clamp_of(m));
   plain.gravity = {9.81, 0, -1};
   b.device->pull(plain.gravity);
   b.device->dt = 0.05;
@@ -256,16 +157,16 @@ TEST(MsmGpu, HangingBar_SagsAsMsm) {
   const double h = 0.9 * fact(*b.device, "longest_step");
   for (int n = 0; n * h < 6; ++n) plain.sub_step(h);
   const uint32_t tip = m.npoint() - 1;
-  const Vec device = b.device->get(b.device->x, tip) - m.at(tip), msm = plain.get(plain.x, tip) - m.at(tip);
-  EXPECT_GT(norm(msm), 1e-3);
-  EXPECT_LE(norm(device - msm), 1e-6 * norm(msm));
+  const Vec device = b.device->get(b.device->x, tip) - m.at(tip), sag = plain.get(plain.x, tip) - m.at(tip);
+  EXPECT_GT(norm(sag), 1e-3);
+  EXPECT_LE(norm(device - sag), 1e-6 * norm(sag));
   EXPECT_LT(norm(b.device->get(b.device->v, tip)), 1e-8);
 }
 
 // A force has the same bits at both ends of its spring and lies along it.
-TEST(MsmGpu, FreeBody_KeepsItsMomenta) {
+TEST_P(Gpu, FreeBody_KeepsItsMomenta) {
   const Mesh m = kuhn_bar(5, 3, 3, 0.02, 0.2);
-  Bodies b(m, {{"damping_stiffness", 1e-4}});
+  Bodies b(GetParam(), m, {{"damping_stiffness", 1e-4}});
   NEEDS_DRIVER(b);
   Stepper &body = *b.device;
   body.shake(2e-3, 0.5);
@@ -279,9 +180,9 @@ TEST(MsmGpu, FreeBody_KeepsItsMomenta) {
 }
 
 // A thousand steps of a body without damping; the scheme's own swing is h omega / 2 at most.
-TEST(MsmGpu, UndampedBody_KeepsItsEnergy) {
+TEST_P(Gpu, UndampedBody_KeepsItsEnergy) {
   const Mesh m = kuhn_bar(5, 3, 3, 0.02, 0.2);
-  Bodies b(m);
+  Bodies b(GetParam(), m);
   Stepper &body = *b.processor;
   body.shake(5e-4, 0);
   const auto total = [&] { return body.kinetic() + body.energy(); };
@@ -337,11 +238,11 @@ double largest_eigenvalue(Plain &b, double shift) {
 // Rows count every shape: torn out to three times its length, sheared, crushed.
 TEST(MsmGpu, LongestStep_IsStableInEveryShape) {
   const Mesh m = kuhn_bar(4, 3, 3, 0.02, 0.2);
-  Bodies b(m);
+  Bodies b(kSprings, m);
   const double h = fact(*b.processor, "longest_step"), most = 4 / (h * h);
   double highest = 0;
   for (const Vec size : {Vec{1, 1, 1}, Vec{3, 3, 3}, Vec{3, 0.3, 1}, Vec{0.5, 0.5, 0.5}, Vec{1, 1, 0}}) {
-    Plain plain(b.host, m, 1e5, 0, 0);
+    Plain plain(b.host, kSprings, m, {});
     for (uint32_t i = 0; i < m.npoint(); ++i) {
       const Vec x = m.at(i);
       plain.set(plain.x, i, {size[0] * x[0] + 0.5 * x[1], size[1] * x[1], size[2] * x[2]});
@@ -354,12 +255,12 @@ TEST(MsmGpu, LongestStep_IsStableInEveryShape) {
   EXPECT_GT(highest, 0.4 * most);  // and no step that is much too short
 }
 
-TEST(MsmGpu, ParametersInRange_MayChangeAndOthersAreRefused) {
+TEST_P(Gpu, ParametersInRange_MayChangeAndOthersAreRefused) {
   const Mesh m = kuhn_bar(2, 2, 2, 0.02);
-  Bodies b(m, {{"young", 1e5}}), stiff(m, {{"young", 4e5}});
+  Bodies b(GetParam(), m, {{"young", 1e5}}), stiff(GetParam(), m, {{"young", 4e5}});
   NEEDS_DRIVER(b);
   const double longest = fact(*b.device, "longest_step");
-  std::vector<double> row = row_of(gpu(), {{"young", 4e5}});
+  std::vector<double> row = row_of(gpu(GetParam()), {{"young", 4e5}});
   ASSERT_EQ(b.device->ops->set_params(b.device->self, row.data()), DFM_OK);
   EXPECT_NEAR(fact(*b.device, "longest_step"), longest / 2, 1e-12 * longest);
   for (Stepper *each : {b.device.get(), stiff.device.get()}) {
@@ -369,25 +270,28 @@ TEST(MsmGpu, ParametersInRange_MayChangeAndOthersAreRefused) {
   expect_same_bits(*b.device, *stiff.device, "after a change");
   row[1] = -1;
   EXPECT_EQ(b.device->ops->set_params(b.device->self, row.data()), DFM_E_ARG);
-  Mesh tiny = kuhn_bar(2, 2, 2, 1e-7);
-  Stepper none(b.host, gpu(), tiny, {{"device", reference}});
-  EXPECT_EQ(none.status, DFM_E_ARG);
-  EXPECT_NE(b.host.logged.find("edges of 1e-6 m to 1e4 m are expected"), std::string::npos) << b.host.logged;
 }
 
-TEST(MsmGpu, FailingAllocator_LeavesNothingBehind) {
+TEST(MsmGpu, EdgesBeyondTheRangeOfAFloat_AreRefused) {
+  Host host;
+  Stepper none(host, gpu(kSprings), kuhn_bar(2, 2, 2, 1e-7), {{"device", reference}});
+  EXPECT_EQ(none.status, DFM_E_ARG);
+  EXPECT_NE(host.logged.find("edges of 1e-6 m to 1e4 m are expected"), std::string::npos) << host.logged;
+}
+
+TEST_P(Gpu, FailingAllocator_LeavesNothingBehind) {
   const Mesh m = kuhn_bar(2, 2, 2, 0.02);
   size_t calls = 0;
   {
     Host counting;
-    Stepper body(counting, gpu(), m, {{"device", reference}});
+    Stepper body(counting, gpu(GetParam()), m, {{"device", reference}});
     calls = counting.calls;
   }
   for (size_t n = 0; n < calls; ++n) {
     Host host;
     host.fail_at = n;
     {
-      Stepper body(host, gpu(), m, {{"device", reference}});
+      Stepper body(host, gpu(GetParam()), m, {{"device", reference}});
       EXPECT_EQ(body.status, DFM_E_NOMEM) << n;
       body.self = nullptr;
     }

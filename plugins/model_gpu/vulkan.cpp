@@ -5,12 +5,24 @@
 #include <cstddef>
 #include <vector>
 
-namespace msm_gpu {
+namespace gpu {
 namespace {
 
-constexpr uint32_t kCode[] = {
-#include "spring_step_spirv.inc"
+constexpr uint32_t kSpringStep[] = {
+#include "spring_step.inc"
 };
+constexpr uint32_t kForces[] = {
+#include "cell_forces.inc"
+};
+constexpr uint32_t kMotion[] = {
+#include "cell_motion.inc"
+};
+struct Code {
+  size_t bytes;
+  const uint32_t *words;
+};
+constexpr Code kCode[kKernels] = {
+    {sizeof kSpringStep, kSpringStep}, {sizeof kForces, kForces}, {sizeof kMotion, kMotion}};
 
 void must(VkResult result, const char *what) {
   if (result == VK_SUCCESS) return;
@@ -36,7 +48,8 @@ Vulkan::Vulkan(Wanted wanted) {
   try {
     open_instance();
     open_device(choose(wanted));
-    make_pipeline();
+    make_layout();
+    for (uint32_t k = 0; k < kKernels; ++k) make_pipeline(Kernel(k));
   } catch (...) {
     close();
     throw;
@@ -65,9 +78,9 @@ void Vulkan::open_instance() {
     throw std::string(
         "libvulkan.so.1 finds no Vulkan driver on this machine; install that of the graphics card "
         "(without a card mesa-vulkan-drivers), or set device to reference");
-#define MSM_GPU_GET(name) name = reinterpret_cast<PFN_vk##name>(get(instance_, "vk" #name));
-  MSM_GPU_OF_INSTANCE(MSM_GPU_GET)
-#undef MSM_GPU_GET
+#define DEFORM_GPU_GET(name) name = reinterpret_cast<PFN_vk##name>(get(instance_, "vk" #name));
+  DEFORM_GPU_OF_INSTANCE(DEFORM_GPU_GET)
+#undef DEFORM_GPU_GET
 }
 
 // Of equals the first that the driver lists.
@@ -123,13 +136,14 @@ void Vulkan::open_device(VkPhysicalDevice chosen) {
   info.pQueueCreateInfos = &queue;
   info.pEnabledFeatures = &features;
   must(CreateDevice(chosen, &info, nullptr, &device), "vkCreateDevice");
-#define MSM_GPU_GET(name) name = reinterpret_cast<PFN_vk##name>(GetDeviceProcAddr(device, "vk" #name));
-  MSM_GPU_OF_DEVICE(MSM_GPU_GET)
-#undef MSM_GPU_GET
+#define DEFORM_GPU_GET(name) name = reinterpret_cast<PFN_vk##name>(GetDeviceProcAddr(device, "vk" #name));
+  DEFORM_GPU_OF_DEVICE(DEFORM_GPU_GET)
+#undef DEFORM_GPU_GET
   GetDeviceQueue(device, family, 0, &queue_);
 }
 
-void Vulkan::make_pipeline() {
+// All kernels share it; none uses all of the bindings.
+void Vulkan::make_layout() {
   VkDescriptorSetLayoutBinding bindings[kBindings] = {};
   for (uint32_t b = 0; b < kBindings; ++b) {
     bindings[b].binding = b;
@@ -150,10 +164,13 @@ void Vulkan::make_pipeline() {
   whole.pushConstantRangeCount = 1;
   whole.pPushConstantRanges = &range;
   must(CreatePipelineLayout(device, &whole, nullptr, &layout), "vkCreatePipelineLayout");
+}
+
+void Vulkan::make_pipeline(Kernel kernel) {
   VkShaderModuleCreateInfo code{};
   code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
-  code.codeSize = sizeof kCode;
-  code.pCode = kCode;
+  code.codeSize = kCode[kernel].bytes;
+  code.pCode = kCode[kernel].words;
   VkShaderModule module = VK_NULL_HANDLE;
   must(CreateShaderModule(device, &code, nullptr, &module), "vkCreateShaderModule");
   VkComputePipelineCreateInfo info{};
@@ -163,7 +180,7 @@ void Vulkan::make_pipeline() {
   info.stage.module = module;
   info.stage.pName = "main";
   info.layout = layout;
-  const VkResult made = CreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline);
+  const VkResult made = CreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline[kernel]);
   DestroyShaderModule(device, module, nullptr);
   must(made, "vkCreateComputePipelines");
 }
@@ -171,7 +188,7 @@ void Vulkan::make_pipeline() {
 void Vulkan::close() {
   if (device) {
     DeviceWaitIdle(device);
-    DestroyPipeline(device, pipeline, nullptr);
+    for (const VkPipeline each : pipeline) DestroyPipeline(device, each, nullptr);
     DestroyPipelineLayout(device, layout, nullptr);
     DestroyDescriptorSetLayout(device, set_layout, nullptr);
     DestroyDevice(device, nullptr);
@@ -199,4 +216,4 @@ VkResult Vulkan::submit(VkCommandBuffer commands, VkFence done) {
   return QueueSubmit(queue_, 1, &info, done);
 }
 
-}  // namespace msm_gpu
+}  // namespace gpu

@@ -1,13 +1,13 @@
-// One sub-step of symplectic Euler for one point, as GLSL and as C++: spring_step.comp and springs.cpp define
-// PLACE to DAMPING below. A point adds up the forces of its own springs, always in the same order, and writes
-// itself alone, so neither the scheduling nor the device decides the sum. Force and motion of a spring:
+// One sub-step of one point, as GLSL and as C++: spring_step.comp and springs.cpp define PLACE to DAMPING
+// below. A point adds up the forces of its own springs, always in the same order, and writes itself alone, so
+// neither the scheduling nor the device decides the sum. Force of a spring:
 //
 //   f = (k (L - L0) / L + c v.d / L^2) d,   L - L0 = (L^2 - L0^2) / (L + L0)
-//   v' = v + h (f / m + load - drag v),     x' = x + h v'
 //
 // Places, velocities and their sums are binary64: lengths squared are subtracted before they are rounded, so
 // the body at rest is free of forces wherever it is, and a spring pulls along its own line, which keeps the
 // angular momentum. The factor before d is binary32; a spring computes the same one at both ends.
+#include "motion.glsl"
 void move_point(uint i) {
   const dvec4 x = PLACE(i);     // m; 1/kg
   const dvec4 v = SPEED(i);     // m/s; held components, bits 1 x, 2 y, 4 z
@@ -45,16 +45,5 @@ void move_point(uint i) {
       }
     }
   }
-  const uint held = uint(v.w);
-  precise double vx = v.x + STEP * ((fx * x.w + load.x) - load.w * v.x);
-  precise double vy = v.y + STEP * ((fy * x.w + load.y) - load.w * v.y);
-  precise double vz = v.z + STEP * ((fz * x.w + load.z) - load.w * v.z);
-  vx = (held & 1u) != 0u ? v.x : vx;
-  vy = (held & 2u) != 0u ? v.y : vy;
-  vz = (held & 4u) != 0u ? v.z : vz;
-  precise double nx = x.x + STEP * vx;
-  precise double ny = x.y + STEP * vy;
-  precise double nz = x.z + STEP * vz;
-  NEXT_PLACE(i, dvec4(nx, ny, nz, x.w));
-  NEXT_SPEED(i, dvec4(vx, vy, vz, v.w));
+  end_step(i, x, v, load, fx, fy, fz);
 }

@@ -9,14 +9,15 @@
 #include <string>
 
 #include "../model_common/entry.h"
+#include "stepper.h"
 
 // The functions that are used, by what hands them out.
 // clang-format off
-#define MSM_GPU_OF_INSTANCE(X) \
+#define DEFORM_GPU_OF_INSTANCE(X) \
   X(DestroyInstance) X(EnumeratePhysicalDevices) X(GetPhysicalDeviceProperties) X(GetPhysicalDeviceFeatures) \
   X(GetPhysicalDeviceQueueFamilyProperties) X(GetPhysicalDeviceMemoryProperties) X(CreateDevice) \
   X(GetDeviceProcAddr)
-#define MSM_GPU_OF_DEVICE(X) \
+#define DEFORM_GPU_OF_DEVICE(X) \
   X(DestroyDevice) X(GetDeviceQueue) X(DeviceWaitIdle) X(QueueSubmit) X(CreateBuffer) X(DestroyBuffer) \
   X(GetBufferMemoryRequirements) X(BindBufferMemory) X(AllocateMemory) X(FreeMemory) X(MapMemory) \
   X(CreateShaderModule) X(DestroyShaderModule) X(CreateDescriptorSetLayout) X(DestroyDescriptorSetLayout) \
@@ -27,20 +28,12 @@
   X(CmdPipelineBarrier) X(CmdCopyBuffer) X(CreateFence) X(DestroyFence) X(ResetFences) X(WaitForFences)
 // clang-format on
 
-namespace msm_gpu {
+namespace gpu {
 
 // Which device: the best one, one that is no software driver, a software driver.
 enum class Wanted : uint32_t { automatic, hardware, software };
 
-// What the kernel is called with; the layout is that of spring_step.comp.
-struct Constants {
-  double step;
-  uint32_t npoint;
-  float damping;
-};
-constexpr uint32_t kBindings = 7;
-
-// A device with the kernel's pipeline; several bodies share it.
+// A device with the pipelines of the kernels; several bodies share it.
 class Vulkan {
  public:
   explicit Vulkan(Wanted wanted);  // throws std::string: a sentence without its full stop
@@ -54,11 +47,11 @@ class Vulkan {
   uint32_t family = 0;
   VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
   VkPipelineLayout layout = VK_NULL_HANDLE;
-  VkPipeline pipeline = VK_NULL_HANDLE;
-#define MSM_GPU_DECLARE(name) PFN_vk##name name = nullptr;
-  MSM_GPU_OF_INSTANCE(MSM_GPU_DECLARE)
-  MSM_GPU_OF_DEVICE(MSM_GPU_DECLARE)
-#undef MSM_GPU_DECLARE
+  VkPipeline pipeline[kKernels] = {};
+#define DEFORM_GPU_DECLARE(name) PFN_vk##name name = nullptr;
+  DEFORM_GPU_OF_INSTANCE(DEFORM_GPU_DECLARE)
+  DEFORM_GPU_OF_DEVICE(DEFORM_GPU_DECLARE)
+#undef DEFORM_GPU_DECLARE
 
   // Memory that the device reads fastest, or that the processor reads and writes (mapped); throws.
   uint32_t memory_type(uint32_t allowed, bool mapped) const;
@@ -73,8 +66,9 @@ class Vulkan {
   void open_instance();
   VkPhysicalDevice choose(Wanted wanted);
   void open_device(VkPhysicalDevice chosen);
-  void make_pipeline();
+  void make_layout();
+  void make_pipeline(Kernel kernel);
   void close();
 };
 
-}  // namespace msm_gpu
+}  // namespace gpu

@@ -1,7 +1,8 @@
-// Bodies of the model msm_gpu in a world: contact and friction of the library, sub-steps, snapshots, the
-// command.
+// Bodies of the models msm_gpu and corotational_fem_gpu in a world: contact and friction of the library,
+// sub-steps, snapshots, the command.
 #include <filesystem>
 
+#include "cut_scenes.h"
 #include "support.h"
 #include "under_ball.h"
 #include "world.h"
@@ -31,7 +32,7 @@ struct World {
     const dfm_param_value gpu[] = {{"device", &device, 1}},
                           msm[] = {{"volume", &zero, 1}, {"collapse", &zero, 1}};
     if (std::string(model) == "msm") d.model_params = {sizeof(dfm_params), 2, msm};
-    else d.model_params = {sizeof(dfm_params), 1, gpu};
+    else if (std::string(model).ends_with("_gpu")) d.model_params = {sizeof(dfm_params), 1, gpu};
     d.pose.position[2] = z;
     test::ok(dfm_body_create(world, &d, &body));
     test::ok(dfm_tetmesh_destroy(mesh));
@@ -72,31 +73,39 @@ double normal_force(dfm_world world) {
   return n ? pair.normal : 0;
 }
 
-TEST(MsmGpuWorld, BlockDropped_ComesToRestAsWithMsm) {
-  World gpu("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 0.03);
-  World msm("msm", 0, "coulomb", 0.5, {0, 0, -9.81}, 0.03);
-  for (const World *w : {&gpu, &msm}) test::run(w->world, 1.5, 2e-3);
+class GpuWorld : public testing::TestWithParam<const char *> {};
+INSTANTIATE_TEST_SUITE_P(Models, GpuWorld, testing::Values("msm_gpu", "corotational_fem_gpu"),
+                         [](const auto &one) { return std::string(one.param); });
+
+const char *on_the_processor(const std::string &model) {
+  return model == "msm_gpu" ? "msm" : "corotational_fem";
+}
+
+TEST_P(GpuWorld, BlockDropped_ComesToRestAsOnTheProcessor) {
+  World gpu(GetParam(), device(), "coulomb", 0.5, {0, 0, -9.81}, 0.03);
+  World processor(on_the_processor(GetParam()), 0, "coulomb", 0.5, {0, 0, -9.81}, 0.03);
+  for (const World *w : {&gpu, &processor}) test::run(w->world, 1.5, 2e-3);
   const dfm_body_measure m = gpu.now();
   EXPECT_LT(m.speed_max, 1e-6);
   EXPECT_NEAR(normal_force(gpu.world), m.mass * 9.81, 1e-3 * m.mass * 9.81);
-  EXPECT_NEAR(m.com[2], msm.now().com[2], 1e-5);
+  EXPECT_NEAR(m.com[2], processor.now().com[2], 1e-5);
   EXPECT_LT(m.com[2], 0.04995);  // it sags
 }
 
 // The rest does not depend on the step that the host takes, though a longer one is divided for contact.
-TEST(MsmGpuWorld, SagOnAFloor_IsTheSameAtAnyStep) {
+TEST_P(GpuWorld, SagOnAFloor_IsTheSameAtAnyStep) {
   double height[2];
   int n = 0;
   for (const double h : {5e-4, 1.0 / 60}) {
-    World w("msm_gpu", device(), "none", 0, {0, 0, -9.81}, 1e-3);
+    World w(GetParam(), device(), "none", 0, {0, 0, -9.81}, 1e-3);
     test::run(w.world, 1.5, h);
     height[n++] = w.now().com[2];
   }
   EXPECT_NEAR(height[0], height[1], 1e-7);
 }
 
-TEST(MsmGpuWorld, InFlight_TakesOneSubStepAndOnTheFloorThoseOfItsBound) {
-  World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 0.2);
+TEST_P(GpuWorld, InFlight_TakesOneSubStepAndOnTheFloorThoseOfItsBound) {
+  World w(GetParam(), device(), "coulomb", 0.5, {0, 0, -9.81}, 0.2);
   test::run(w.world, 0.1, 0.01);
   EXPECT_EQ(test::stats(w.world).substeps_max, 1u);
   test::run(w.world, 3, 0.01);
@@ -105,9 +114,9 @@ TEST(MsmGpuWorld, InFlight_TakesOneSubStepAndOnTheFloorThoseOfItsBound) {
   EXPECT_GE(s.last_substeps * s.stable_step, 0.01 * (1 - 1e-9));
 }
 
-TEST(MsmGpuWorld, OnASlope_HoldsWithAnyLawAndCreepsLessThanItsBound) {
+TEST_P(GpuWorld, OnASlope_HoldsWithAnyLawAndCreepsLessThanItsBound) {
   for (const char *law : {"coulomb", "karnopp", "dahl", "lugre", "elastoplastic", "gms"}) {
-    World w("msm_gpu", device(), law, 0.6, {9.81 * std::sin(0.3), 0, -9.81 * std::cos(0.3)}, 1e-4);
+    World w(GetParam(), device(), law, 0.6, {9.81 * std::sin(0.3), 0, -9.81 * std::cos(0.3)}, 1e-4);
     test::run(w.world, 1.0, 2e-3);
     const dfm_body_measure before = w.now();
     test::run(w.world, 1.0, 2e-3);
@@ -117,9 +126,9 @@ TEST(MsmGpuWorld, OnASlope_HoldsWithAnyLawAndCreepsLessThanItsBound) {
   }
 }
 
-TEST(MsmGpuWorld, OnASlope_SlidesWithCoulombsAcceleration) {
+TEST_P(GpuWorld, OnASlope_SlidesWithCoulombsAcceleration) {
   const double theta = 0.5, mu = 0.3;
-  World w("msm_gpu", device(), "coulomb", mu, {9.81 * std::sin(theta), 0, -9.81 * std::cos(theta)}, 1e-4,
+  World w(GetParam(), device(), "coulomb", mu, {9.81 * std::sin(theta), 0, -9.81 * std::cos(theta)}, 1e-4,
           1e6);
   test::run(w.world, 0.2, 1e-3);
   const double before = w.now().velocity[0];
@@ -127,9 +136,9 @@ TEST(MsmGpuWorld, OnASlope_SlidesWithCoulombsAcceleration) {
   EXPECT_NEAR((w.now().velocity[0] - before) / 0.4, 9.81 * (std::sin(theta) - mu * std::cos(theta)), 0.01);
 }
 
-TEST(MsmGpuWorld, SavedInContact_ContinuesWithTheSameBits) {
+TEST_P(GpuWorld, SavedInContact_ContinuesWithTheSameBits) {
   const auto make = [] {
-    return std::make_unique<World>("msm_gpu", device(), "lugre", 0.5, std::array<double, 3>{1, 0, -9.81},
+    return std::make_unique<World>(GetParam(), device(), "lugre", 0.5, std::array<double, 3>{1, 0, -9.81},
                                    0.01);
   };
   const auto a = make(), b = make();
@@ -143,15 +152,39 @@ TEST(MsmGpuWorld, SavedInContact_ContinuesWithTheSameBits) {
   EXPECT_EQ(dfm_world_hash(a->world), dfm_world_hash(b->world));
 }
 
+// The cells under a sphere go, and with them their springs: the rest moves as what is left of the processor's
+// body would, and as the same cut of another one does.
+TEST_P(GpuWorld, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
+  uint64_t hash[2];
+  double height[3];
+  for (int n = 0; n < 3; ++n) {
+    const char *model = n < 2 ? GetParam() : on_the_processor(GetParam());
+    World w(model, device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-3);
+    test::run(w.world, 0.1, 2e-3);
+    const dfm_body_measure before = w.now();
+    const dfm_cut_def sphere = test::cutting::sphere({0.05, 0.05, 0.1}, 0.03);
+    dfm_cut_info done = test::cutting::ask();
+    test::ok(dfm_body_cut(w.body, &sphere, &done));
+    EXPECT_GT(done.cells, 5u);
+    EXPECT_NEAR(w.now().mass + done.mass, before.mass, 1e-12);
+    test::run(w.world, 1.0, 2e-3);
+    EXPECT_NEAR(normal_force(w.world), w.now().mass * 9.81, 1e-3 * before.mass * 9.81);
+    height[n] = w.now().com[2];
+    if (n < 2) hash[n] = dfm_world_hash(w.world);
+  }
+  EXPECT_EQ(hash[0], hash[1]);
+  EXPECT_NEAR(height[0], height[2], 1e-5);
+}
+
 // Two bodies, one on the other, submit from two threads at once.
-TEST(MsmGpuWorld, OnTwoWorkers_HasTheSameBits) {
+TEST_P(GpuWorld, OnTwoWorkers_HasTheSameBits) {
   if (device() == kReference) GTEST_SKIP() << "no driver";
   uint64_t hash[2];
   for (const uint32_t threads : {1u, 2u}) {
-    World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-3, 2e5, threads);
+    World w(GetParam(), device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-3, 2e5, threads);
     test::BodyOptions o;
     o.name = "upper";
-    o.model = "msm_gpu";
+    o.model = GetParam();
     o.position = {0.02, 0.01, 0.103};
     test::make_body(w.context, w.world, "beam", {0.1, 0.1, 0.1}, 100, o);
     test::run(w.world, 0.1, 2e-3);
@@ -162,16 +195,16 @@ TEST(MsmGpuWorld, OnTwoWorkers_HasTheSameBits) {
 }
 
 // A card may round a square root and a quotient otherwise.
-TEST(MsmGpuWorld, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
+TEST_P(GpuWorld, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
   if (!is_there(kSoftware)) GTEST_SKIP() << "no such driver";
-  World a("msm_gpu", kSoftware, "lugre", 0.5, {1, 0, -9.81}, 0.01);
-  World b("msm_gpu", kReference, "lugre", 0.5, {1, 0, -9.81}, 0.01);
+  World a(GetParam(), kSoftware, "lugre", 0.5, {1, 0, -9.81}, 0.01);
+  World b(GetParam(), kReference, "lugre", 0.5, {1, 0, -9.81}, 0.01);
   for (const World *w : {&a, &b}) test::run(w->world, 0.3, 2e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }
 
-TEST(MsmGpuWorld, UnderASoftBall_CarriesBothWeights) {
-  World w("msm_gpu", device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1e6);
+TEST_P(GpuWorld, UnderASoftBall_CarriesBothWeights) {
+  World w(GetParam(), device(), "coulomb", 0.5, {0, 0, -9.81}, 1e-4, 1e6);
   test::expect_block_carries_ball(w.context, w.world, w.body, 2.5);
 }
 
@@ -182,7 +215,7 @@ const char *const kScene =
    "material": "soft", "model": {"type": "msm_gpu"DEVICE}}]})";
 
 test::CommandResult run_scene(const std::string &device, bool driver) {
-  const std::string folder = test::scratch("msm_gpu"), file = folder + "/scene.json";
+  const std::string folder = test::scratch("gpu"), file = folder + "/scene.json";
   std::string scene = kScene;
   const size_t at = scene.find("DEVICE");
   scene.replace(at, 6, device.empty() ? "" : ", \"params\": {\"device\": \"" + device + "\"}");
@@ -193,7 +226,7 @@ test::CommandResult run_scene(const std::string &device, bool driver) {
   return test::run(argv);
 }
 
-TEST(MsmGpuCommand, WithoutADriver_SaysWhatToInstallAndTheReferenceStillRuns) {
+TEST(GpuCommand, WithoutADriver_SaysWhatToInstallAndTheReferenceStillRuns) {
   const test::CommandResult none = run_scene("", false), processor = run_scene("reference", false);
   EXPECT_NE(none.exit_code, 0);
   EXPECT_NE(none.err.find("set device to reference"), std::string::npos) << none.err;
@@ -202,7 +235,7 @@ TEST(MsmGpuCommand, WithoutADriver_SaysWhatToInstallAndTheReferenceStillRuns) {
 }
 
 // A machine that must have a card fails without one.
-TEST(MsmGpuCommand, Hardware_IsNoSoftwareDriver) {
+TEST(GpuCommand, Hardware_IsNoSoftwareDriver) {
   const test::CommandResult r = run_scene("hardware", true);
   if (r.exit_code != 0) {
     EXPECT_NE(r.err.find("no graphics card"), std::string::npos) << r.err;
@@ -210,10 +243,10 @@ TEST(MsmGpuCommand, Hardware_IsNoSoftwareDriver) {
 }
 
 // V09 counts 144 bytes that Mesa 22.3.6 leaves at each vkEnumeratePhysicalDevices of a new instance.
-TEST(MsmGpuCommand, PluginCheck_FindsNothingOfOurs) {
+TEST(GpuCommand, PluginCheck_FindsNothingOfOurs) {
   if (device() == kReference) GTEST_SKIP() << "no driver: the defaults of the model are refused";
   const test::CommandResult r =
-      test::deform({"plugin", "check", std::string(DEFORM_PLUGIN_DIR) + "/model_msm_gpu.so"});
+      test::deform({"plugin", "check", std::string(DEFORM_PLUGIN_DIR) + "/model_gpu.so"});
   std::istringstream lines(r.out);
   int passed = 0;
   for (std::string line, id, result; std::getline(lines, line);) {
@@ -224,7 +257,7 @@ TEST(MsmGpuCommand, PluginCheck_FindsNothingOfOurs) {
       EXPECT_EQ(id, "V09") << r.out;
     }
   }
-  EXPECT_GE(passed, 19) << r.out;
+  EXPECT_GE(passed, 39) << r.out;
 }
 
 }  // namespace

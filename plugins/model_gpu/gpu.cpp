@@ -1,0 +1,177 @@
+// org.deform.msm_gpu and org.deform.corotational_fem_gpu: the springs and dampers of org.deform.msm, the
+// cells of org.deform.corotational_fem, moved in explicit sub-steps on a compute device (Zerbato 2010,
+// (2.25), (2.26), 2.1.2 and 7.1); the bodies step themselves.
+#include <cstring>
+
+#include "cells.h"
+#include "deform/plugin_draft.h"
+#include "gpu_body.h"
+#include "springs.h"
+#include "vulkan_stepper.h"
+
+namespace gpu {
+
+namespace {
+constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL;
+const char *const kDevices[] = {"auto", "hardware", "software", "reference", nullptr};
+
+// One device for each choice, open until the last host has gone, since opening takes longer than the set-up
+// of a body. No static variable here has a destructor: it would leave memory when the file is unloaded.
+struct Devices { std::shared_ptr<Vulkan> open[3]; };
+std::mutex one;
+uint32_t hosts = 0;
+Devices *devices = nullptr;
+}  // namespace
+
+const dfm_param kParams[kParamCount] = {
+    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
+    {"damping_stiffness", "damping over stiffness", "s", 0, 10, 0, kRun, 1, nullptr},
+    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun, 1, nullptr},
+    {"device",
+     "auto: a graphics card, else a software driver; hardware: a card or none; software: that driver; "
+     "reference: the processor",
+     "1", 0, 3, kAuto, DFM_PARAM_ENUM, 1, kDevices},
+    {"poisson", "Poisson ratio", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
+};
+
+std::unique_ptr<Stepper> open_stepper(const dfm_host *host, const char *who, Choice choice, uint32_t npoint) {
+  try {
+    std::shared_ptr<Vulkan> vulkan;
+    {
+      const std::lock_guard<std::mutex> alone(one);
+      if (!devices) devices = new Devices;
+      std::shared_ptr<Vulkan> &open = devices->open[choice];
+      if (!open) {
+        open = std::make_shared<Vulkan>(Wanted(choice));
+        host->log(host->ctx, 1, 0, (std::string(who) + ": its bodies are on " + open->name + ".").c_str());
+      }
+      vulkan = open;
+    }
+    return std::make_unique<VulkanStepper>(std::move(vulkan), npoint);
+  } catch (const std::string &why) {
+    model::complain(host, who, why.c_str());
+    throw model::Refused{};
+  }
+}
+
+namespace {
+
+const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
+const dfm_effect_rows kEffectRows = model::rows_of(kOff);
+// nothing but the shape is state, so what is left of a cut body is a new one
+const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
+
+// The tables of the model on bodies Of.
+template <class Of>
+struct Tables {
+  using One = Body<Of>;
+  using Ops = model::Ops<One>;
+  static One &body(void *self) { return *static_cast<One *>(self); }
+
+  static dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
+    return model::create<One>(h, m, Of::kId, self);
+  }
+  static dfm_status set_params(void *self, const double *params) {
+    One &of = body(self);
+    return model::in_range(of.host, Of::kId, kParams, Of::kParams, params) ? model::change(of, params)
+                                                                           : DFM_E_ARG;
+  }
+  static dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
+    return body(self).predict(*k, f, u);
+  }
+  static dfm_status respond_many(void *self, const dfm_kin *, uint32_t n, const uint32_t *surfel,
+                                 uint32_t nrhs, const double *p, double *du) {
+    for (uint32_t r = 0; r < nrhs; ++r)
+      body(self).respond(n, surfel, p + size_t(3) * n * r, du + size_t(3) * n * r);
+    return DFM_OK;
+  }
+  static dfm_status respond(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
+                            double *du) {
+    return respond_many(self, k, n, surfel, 1, p, du);
+  }
+  static dfm_status diagonal(void *self, const dfm_kin *, uint32_t n, const uint32_t *surfel, double *w) {
+    body(self).diagonal(n, surfel, w);
+    return DFM_OK;
+  }
+  static dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
+    body(self).commit(*k, p, x, v);
+    return DFM_OK;
+  }
+  static const dfm_fact *facts(const void *self, uint32_t *n) {
+    *n = One::kFactCount;
+    return static_cast<const One *>(self)->facts();
+  }
+  static constexpr dfm_stepper kStepper = {
+      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
+  static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
+
+  static const void *extension(const void *, const char *id) {
+    if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+    if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
+    if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
+    if (!strcmp(id, DFM_EXT_FACTS)) return &kFacts;
+    if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
+    return nullptr;
+  }
+  static constexpr dfm_model model(uint32_t caps) {
+    return {sizeof(dfm_model),
+            caps | DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+            DFM_CELL_TET,
+            0,
+            nullptr,
+            create,
+            model::destroy<One>,
+            set_params,
+            nullptr,
+            nullptr,
+            Ops::bound,
+            Ops::energy,
+            nullptr,
+            nullptr,
+            extension,
+            0,
+            0};
+  }
+  static constexpr dfm_type type(const char *name, const char *source, const char *const *effects,
+                                 const dfm_model *of) {
+    dfm_type t =
+        dfm::plugin::type(DFM_KIND_MODEL, Of::kId, name, "0.1.0", "MIT", source, kParams, effects, of);
+    t.nparam = Of::kParams;
+    return t;
+  }
+};
+
+const dfm_model kSpringModel = Tables<Springs>::model(DFM_CAP_PLAUSIBLE);
+const dfm_model kCellModel = Tables<Cells>::model(0);
+const char *const kSpringEffects[] = {"large_rotation", "damping", nullptr};
+const char *const kCellEffects[] = {"volume", "large_rotation", "damping", nullptr};
+const dfm_type kSpringType = Tables<Springs>::type(
+    "mass-spring on a compute device",
+    "Zerbato 2010, (2.25), (2.26) and 7.1; Van Gelder 1998, Approximate simulation of elastic membranes by "
+    "triangulated spring meshes",
+    kSpringEffects, &kSpringModel);
+const dfm_type kCellType = Tables<Cells>::type(
+    "corotational finite elements on a compute device",
+    "Zerbato 2010, (2.1)-(2.13) corrected, and 7.1; Mueller and Gross 2004, Interactive virtual materials",
+    kCellEffects, &kCellModel);
+
+void shut_down() {
+  const std::lock_guard<std::mutex> alone(one);
+  if (--hosts > 0) return;
+  delete devices;
+  devices = nullptr;
+}
+
+}  // namespace
+}  // namespace gpu
+
+extern "C" DFM_EXPORT const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi,
+                                                         uint32_t host_abi_min) {
+  using namespace gpu;
+  static const dfm_type *const types[] = {&kSpringType, &kCellType};
+  static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, types, shut_down};
+  const dfm_plugin *const made = dfm::plugin::publish(host, host_abi, host_abi_min, &plugin);
+  const std::lock_guard<std::mutex> alone(one);
+  hosts += made != nullptr;
+  return made;
+}

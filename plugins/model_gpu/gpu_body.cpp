@@ -1,0 +1,242 @@
+#include "gpu_body.h"
+
+#include <atomic>
+#include <cmath>
+#include <string>
+
+#include "cells.h"
+#include "springs.h"
+
+namespace gpu {
+namespace {
+
+constexpr double kMostSteps = 1e6;
+// Of the sub-step that would have been short enough, when a step is taken again.
+constexpr double kShorter = 0.9;
+
+}  // namespace
+
+template <class Of>
+void Body<Of>::create(const dfm_host *h, const dfm_mesh &m) {
+  host = h;
+  if (!model::in_range(h, Of::kId, kParams, Of::kParams, m.params)) throw model::Refused{};
+  npoint_ = m.npoint;
+  inverse_mass_.create(h, npoint_);
+  held_.create(h, npoint_);
+  for (uint32_t i = 0; i < npoint_; ++i) {
+    inverse_mass_[i] = 1 / m.mass[i];
+    if (m.fixed) held_[i] = m.fixed[i];
+  }
+  parts_.create(h, m);
+  block_energy_.create(h, parts_.count() / kGrain + 1);
+  take_surface(m);
+  const Choice choice = Choice(uint32_t(m.params[kDevice]));
+  if (choice == kReference) stepper_ = std::make_unique<Reference>(h, npoint_);
+  else stepper_ = open_stepper(h, Of::kId, choice, npoint_);
+  for (uint32_t i = 0; i < npoint_; ++i) {
+    // neither is what a host gives, so the first step takes all of them
+    stepper_->place[i] = {NAN, 0, 0, inverse_mass_[i]};
+    stepper_->load[i].w = NAN;
+    stepper_->speed[i].w = held_[i];
+  }
+  apply_params(m.params);
+}
+
+template <class Of>
+void Body<Of>::take_surface(const dfm_mesh &m) {
+  nsurfel_ = m.nsurfel;
+  const uint32_t entries = nsurfel_ ? m.row[nsurfel_] : 0;
+  surfel_row_.create_copy(host, m.row, nsurfel_ ? size_t(nsurfel_) + 1 : 0);
+  surfel_point_.create_copy(host, m.col, entries);
+  surfel_weight_.create_copy(host, m.weight, entries);
+  impulse_.create(host, 3 * size_t(npoint_));
+}
+
+template <class Of>
+void Body<Of>::apply_params(const double *values) {
+  std::copy(values, values + Of::kParams, params_);
+  parts_.fill(params_);
+  try {
+    stepper_->take(parts_.work());
+  } catch (const std::string &why) {
+    model::complain(host, Of::kId, why.c_str());
+    throw model::Refused{};
+  }
+  find_longest();
+  const char **effect = active_effects;
+  if (Of::kParams > kPoisson) *effect++ = "volume";
+  *effect++ = "large_rotation";
+  if (params_[kDampingStiffness] > 0 || params_[kDampingMass] > 0) *effect++ = "damping";
+  *effect = nullptr;
+  facts_[0] = {"longest_step", Of::kLongest, "s", longest_};
+  facts_[1] = Of::kCount;
+  facts_[1].value = double(parts_.count());
+}
+
+template <class Of>
+void Body<Of>::find_longest() {
+  longest_ = HUGE_VAL;
+  for (uint32_t i = 0; i < npoint_; ++i) {
+    const double m = parts_.mass[i], k = parts_.row[i];
+    const double c = params_[kDampingStiffness] * k + params_[kDampingMass] * m;
+    const double most = c + std::sqrt(c * c + 4 * m * k);
+    if (most > 0) longest_ = std::min(longest_, 4 * m / most);
+  }
+}
+
+template <class Of>
+bool Body<Of>::take_points(const dfm_kin &k) {
+  std::atomic<bool> moved = false;
+  each_point([&](size_t i) {
+    bool differ = false;
+    const auto put = [&](double &to, double from) {
+      differ |= std::bit_cast<uint64_t>(to) != std::bit_cast<uint64_t>(from);
+      to = from;
+    };
+    const double *const x = k.x + i * k.stride, *const v = k.v + i * k.stride;
+    dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
+    put(place.x, x[0]);
+    put(place.y, x[1]);
+    put(place.z, x[2]);
+    put(speed.x, v[0]);
+    put(speed.y, v[1]);
+    put(speed.z, v[2]);
+    if (differ) moved.store(true, std::memory_order_relaxed);
+  });
+  return moved;
+}
+
+template <class Of>
+bool Body<Of>::take_loads(const double *f, uint32_t stride) {
+  std::atomic<bool> changed = false;
+  each_point([&](size_t i) {
+    const double *const of = f + i * stride, per = inverse_mass_[i];
+    const dvec4 now{of[0] * per, of[1] * per, of[2] * per, params_[kDampingMass]};
+    dvec4 &load = stepper_->load[i];
+    if (now.x == load.x && now.y == load.y && now.z == load.z && now.w == load.w) return;
+    load = now;
+    changed.store(true, std::memory_order_relaxed);
+  });
+  return changed;
+}
+
+template <class Of>
+dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
+  double steps = std::max(1.0, std::ceil(k.dt / longest_ - 1e-9));
+  h_ = k.dt;
+  bool moved = take_points(k);
+  const bool loaded = take_loads(f, k.stride);
+  for (;;) {
+    if (!(steps <= kMostSteps)) {
+      char text[160];
+      std::snprintf(text, sizeof text,
+                    "a step of %g s needs %.3g sub-steps of %.3g s; soften or coarsen the body, lower its "
+                    "damping, or take a shorter step",
+                    k.dt, steps, k.dt / steps);
+      model::complain(host, Of::kId, text);
+      return DFM_DISCARD;
+    }
+    const uint32_t n = uint32_t(steps);
+    if (const char *why = stepper_->run(n, k.dt / n, float(params_[kDampingStiffness]), moved, loaded)) {
+      model::complain(host, Of::kId, why);
+      return DFM_E_FATAL;
+    }
+    const double worst = double(stepper_->worst());
+    if (!(worst > 0)) break;
+    // without dampers it falls as h^2
+    steps = std::ceil(steps * std::sqrt(worst / 4) / kShorter);
+    moved = take_points(k);
+  }
+  for (uint32_t s = 0; s < nsurfel_; ++s) {
+    double way[3] = {};
+    for (uint32_t e = surfel_row_[s]; e < surfel_row_[s + 1]; ++e) {
+      const uint32_t i = surfel_point_[e];
+      const dvec4 &end = stepper_->place[i];
+      const double *const x = k.x + size_t(i) * k.stride, weight = surfel_weight_[e];
+      way[0] += weight * (end.x - x[0]);
+      way[1] += weight * (end.y - x[1]);
+      way[2] += weight * (end.z - x[2]);
+    }
+    for (size_t a = 0; a < 3; ++a) u_s[3 * size_t(s) + a] = way[a] / k.dt;
+  }
+  return DFM_OK;
+}
+
+// An impulse changes the velocity of its points, and moves them by that over the step: the scheme of one
+// sub-step.
+template <class Of>
+void Body<Of>::respond(uint32_t n, const uint32_t *surfel, const double *p, double *du) {
+  for (uint32_t k = 0; k < n; ++k)
+    for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
+      for (size_t a = 0; a < 3; ++a)
+        impulse_[3 * size_t(surfel_point_[e]) + a] += surfel_weight_[e] * p[3 * size_t(k) + a];
+  for (uint32_t k = 0; k < n; ++k)
+    for (int a = 0; a < 3; ++a) {
+      double sum = 0;
+      for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e) {
+        const uint32_t i = surfel_point_[e];
+        sum += surfel_weight_[e] * (free_inverse_mass(i, a) * impulse_[3 * size_t(i) + size_t(a)]);
+      }
+      du[3 * size_t(k) + size_t(a)] = sum;
+    }
+  for (uint32_t k = 0; k < n; ++k)
+    for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
+      std::fill_n(&impulse_[3 * size_t(surfel_point_[e])], 3, 0.0);
+}
+
+template <class Of>
+void Body<Of>::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
+  std::fill_n(w, 9 * size_t(n), 0.0);
+  for (uint32_t k = 0; k < n; ++k)
+    for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
+      for (int a = 0; a < 3; ++a)
+        w[9 * size_t(k) + 4 * size_t(a)] +=
+            surfel_weight_[e] * (free_inverse_mass(surfel_point_[e], a) * surfel_weight_[e]);
+}
+
+template <class Of>
+void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
+  each_point([&](size_t i) {
+    const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
+    const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};
+    for (size_t a = 0; a < k.stride; ++a) {
+      x[i * k.stride + a] = a < 3 ? end[a] : 0;
+      v[i * k.stride + a] = a < 3 ? fast[a] : 0;
+    }
+  });
+  for (size_t s = 0; s < nsurfel_; ++s) {
+    const double *const p = p_s + 3 * s;
+    if (p[0] == 0 && p[1] == 0 && p[2] == 0) continue;
+    for (uint32_t e = surfel_row_[s]; e < surfel_row_[s + 1]; ++e)
+      for (size_t a = 0; a < 3; ++a) {
+        const size_t at = size_t(surfel_point_[e]) * k.stride + a;
+        const double change = free_inverse_mass(surfel_point_[e], int(a)) * (surfel_weight_[e] * p[a]);
+        x[at] += h_ * change;
+        v[at] += change;
+      }
+  }
+}
+
+// Sums of blocks of springs or cells, in the order of the blocks.
+template <class Of>
+double Body<Of>::energy(const dfm_kin &k) {
+  struct Shape {
+    Body *body;
+    const dfm_kin *k;
+  } shape{this, &k};
+  const auto blocks = [](void *user, uint32_t begin, uint32_t end) {
+    const Shape &of = *static_cast<const Shape *>(user);
+    for (uint32_t at = begin; at < end; at += kGrain)
+      of.body->block_energy_[at / kGrain] = of.body->parts_.energy(*of.k, at, std::min(at + kGrain, end));
+  };
+  const uint32_t count = parts_.count();
+  host->parallel_for(host->ctx, count, kGrain, blocks, &shape);
+  double sum = 0;
+  for (uint32_t at = 0; at < count; at += kGrain) sum += block_energy_[at / kGrain];
+  return sum;
+}
+
+template class Body<Springs>;
+template class Body<Cells>;
+
+}  // namespace gpu

@@ -1,0 +1,38 @@
+// What bodies of springs and of cells have alike for their points.
+#pragma once
+#include <algorithm>
+
+#include "../model_common/params.h"
+#include "stepper.h"
+
+namespace gpu {
+
+// Rows of the parameter tables; springs have no last one.
+enum Param : uint32_t { kYoung, kDampingStiffness, kDampingMass, kDevice, kPoisson, kParamCount };
+extern const dfm_param kParams[kParamCount];
+
+constexpr uint32_t kGrain = 4096;  // springs, cells, points: waking a worker costs more than fewer save
+
+struct Parts {
+  const dfm_host *host = nullptr;
+  uint32_t npoint = 0;
+  Buffer<double> mass;  // [npoint] kg
+  Buffer<double> row;   // [npoint] N/m, of the step bound
+  void take_points(const dfm_host *h, uint32_t n) {
+    host = h;
+    npoint = n;
+    mass.create(h, n);
+    row.create(h, n);
+  }
+  // f(n) for each of `all`, on the host's workers.
+  template <class F>
+  static void each(const dfm_host *host, uint32_t all, const F &f) {
+    const auto some = [](void *user, uint32_t begin, uint32_t end) {
+      const F &one = *static_cast<const F *>(user);
+      for (size_t i = begin; i < end; ++i) one(i);
+    };
+    host->parallel_for(host->ctx, all, kGrain, some, const_cast<F *>(&f));
+  }
+};
+
+}  // namespace gpu

@@ -1,0 +1,20 @@
+// What the shaders share: the arrays of the points, and what they are called with.
+layout(local_size_x = 64) in;
+layout(std430, binding = 0) readonly buffer Places { dvec4 place[]; };
+layout(std430, binding = 1) readonly buffer Speeds { dvec4 speed[]; };
+layout(std430, binding = 2) readonly buffer Loads { dvec4 loads[]; };
+layout(std430, binding = 3) writeonly buffer NextPlaces { dvec4 next_place[]; };
+layout(std430, binding = 4) writeonly buffer NextSpeeds { dvec4 next_speed[]; };
+layout(push_constant) uniform Now {
+  double step;     // s
+  uint count;      // of invocations
+  float damping;   // s
+};
+#define PLACE(i) place[i]
+#define SPEED(i) speed[i]
+#define LOAD(i) loads[i]
+#define NEXT_PLACE(i, value) next_place[i] = value
+#define NEXT_SPEED(i, value) next_speed[i] = value
+#define STEP step
+#define UNROLLED [[unroll]]
+#define DAMPING damping

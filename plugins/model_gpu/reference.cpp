@@ -1,0 +1,79 @@
+#include "stepper.h"
+
+#include <algorithm>
+
+namespace gpu {
+namespace {
+
+constexpr uint32_t kGrain = 1024;
+
+struct Task {
+  const Work::Pass *pass;
+  Call call;
+};
+
+void do_some(void *user, uint32_t begin, uint32_t end) {
+  const Task &task = *static_cast<const Task *>(user);
+  task.pass->some(task.call, begin, end);
+}
+
+}  // namespace
+
+size_t lay_out(Buffer<uvec2> &row, uint32_t npoint) {
+  size_t all = 0;
+  for (uint32_t side = 0; side < npoint; side += kSide) {
+    const uint32_t end = std::min(npoint, side + kSide);
+    uint32_t most = 0;
+    for (uint32_t i = side; i < end; ++i) {
+      row[i].x = uint32_t(all) + (i - side);
+      most = std::max(most, row[i].y);
+    }
+    all += size_t(kSide) * most;
+  }
+  all += size_t(3) * kSide;
+  if (all > ~0u) throw "the body has more springs or cells than a number of 32 bits counts";
+  return all;
+}
+
+Reference::Reference(const dfm_host *host, uint32_t npoint) : host_(host) {
+  for (Buffer<dvec4> &array : array_) array.create(host, npoint);
+  exceeded_.create(host, 1);
+  place = array_[0].data();
+  speed = array_[1].data();
+  load = array_[2].data();
+  next_place_ = array_[3].data();
+  next_speed_ = array_[4].data();
+  worst_ = exceeded_.data();
+}
+
+void Reference::take(const Work &work) {
+  work_ = work;
+  for (uint32_t n = 0; n < kWorst - kOwn; ++n) {
+    const Work::Array &of = work.array[n];
+    if (of.bytes && !of.data && own_[n].empty()) own_[n].create(host_, of.bytes);
+  }
+}
+
+const char *Reference::run(uint32_t n, double h, float damping, bool, bool) {
+  *worst_ = 0;
+  Task task{};
+  for (uint32_t a = 0; a < kWorst - kOwn; ++a)
+    task.call.array[kOwn + a] = own_[a].empty() ? const_cast<void *>(work_.array[a].data) : own_[a].data();
+  task.call.array[kLoad] = load;
+  task.call.array[kWorst] = worst_;
+  for (uint32_t k = 0; k < n; ++k) {
+    dvec4 *const now[4] = {place, speed, next_place_, next_speed_};
+    constexpr Binding to[4] = {kPlace, kSpeed, kNextPlace, kNextSpeed};
+    for (int a = 0; a < 4; ++a) task.call.array[to[a]] = now[a];
+    for (uint32_t p = 0; p < work_.npass; ++p) {
+      task.pass = &work_.pass[p];
+      task.call.now = {h, task.pass->count, damping};
+      host_->parallel_for(host_->ctx, task.pass->count, kGrain, do_some, &task);
+    }
+    std::swap(place, next_place_);
+    std::swap(speed, next_speed_);
+  }
+  return nullptr;
+}
+
+}  // namespace gpu

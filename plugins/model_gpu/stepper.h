@@ -1,0 +1,117 @@
+// What moves the points of a body: kernels over arrays, run by a device (vulkan_stepper.h) or, as reference,
+// by the processor. Both run the same .glsl files.
+#pragma once
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "../model_common/buffer.h"
+
+namespace gpu {
+
+using model::Buffer;
+
+// The types of GLSL, with its layout in memory.
+struct dvec4 {
+  double x, y, z, w;
+  dvec4() = default;
+  dvec4(double a, double b, double c, double d) : x(a), y(b), z(c), w(d) {}
+};
+struct dvec2 {
+  double x, y;
+  dvec2(double a, double b) : x(a), y(b) {}
+};
+struct uvec2 {
+  uint32_t x, y;
+  uvec2() = default;
+  uvec2(uint32_t a, uint32_t b) : x(a), y(b) {}
+};
+struct uvec4 { uint32_t x, y, z, w; };
+
+// Bindings of the arrays, as in the .comp files. From kOwn to kWorst they are those of the kernels.
+enum Binding : uint32_t { kPlace, kSpeed, kLoad, kNextPlace, kNextSpeed, kOwn, kWorst = 10, kBindings };
+
+// What a kernel is called with; the layout is that of the .comp files.
+struct Constants {
+  double step;     // s
+  uint32_t count;  // of invocations
+  float damping;   // s
+};
+
+struct Call {
+  void *array[kBindings];
+  Constants now;
+  template <class T>
+  T *of(uint32_t binding) const {
+    return static_cast<T *>(array[binding]);
+  }
+};
+
+enum Kernel : uint32_t { kSprings, kCellForces, kCellMotion, kKernels };
+
+// A sub-step: passes one after the other, each over `count` items that may run in any order.
+struct Work {
+  struct Pass {
+    Kernel kernel;
+    uint32_t count;
+    void (*some)(const Call &, uint32_t begin, uint32_t end);  // the same on the processor
+  };
+  struct Array {
+    size_t bytes;      // 0: the binding is not used
+    const void *data;  // NULL: the kernels alone write it
+  };
+  Pass pass[2];
+  uint32_t npass;
+  Array array[kWorst - kOwn];
+};
+
+// Arrays [npoint] that a body writes before run() and reads after it: place (m; 1/kg), speed (m/s; held
+// components, bits 1 x, 2 y, 4 z), load (m/s2; drag, 1/s).
+class Stepper {
+ public:
+  dvec4 *place = nullptr, *speed = nullptr, *load = nullptr;
+  Stepper() = default;
+  Stepper(const Stepper &) = delete;
+  virtual ~Stepper() = default;
+  // Throws; before the first run, and where the data have changed. The data must stay where they are.
+  virtual void take(const Work &work) = 0;
+  // n sub-steps of h; moved, loaded: place and speed, or load, are not those that the last run left. NULL, or
+  // why it failed.
+  virtual const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) = 0;
+  // 0, or the largest h^2 D/m + 2 h E/m of a point above 4 in the last run, whose steps were too long.
+  float worst() const { return std::bit_cast<float>(*worst_); }
+
+ protected:
+  uint32_t *worst_ = nullptr;
+};
+
+class Reference : public Stepper {
+ public:
+  Reference(const dfm_host *host, uint32_t npoint);
+  void take(const Work &work) override;
+  const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) override;
+
+ private:
+  const dfm_host *host_;
+  Work work_{};
+  Buffer<dvec4> array_[5];
+  Buffer<uint32_t> exceeded_;
+  Buffer<uint8_t> own_[kWorst - kOwn];
+  dvec4 *next_place_, *next_speed_;
+};
+
+constexpr uint32_t kSide = 32;  // points that read side by side, cells that are read so; in the kernels, too
+
+// Where a point's entries are, `row.y` in number: the first in row.x, the next 32 further. Returns the room
+// for all; the kernels read on to a multiple of four.
+size_t lay_out(Buffer<uvec2> &row, uint32_t npoint);
+
+// What the kernels use beside operators.
+using std::abs;
+using std::max;
+using std::sqrt;
+using uint = uint32_t;
+inline float uintBitsToFloat(uint bits) { return std::bit_cast<float>(bits); }
+inline double packDouble2x32(uvec2 bits) { return std::bit_cast<double>(uint64_t{bits.y} << 32 | bits.x); }
+
+}  // namespace gpu
