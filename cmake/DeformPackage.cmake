@@ -19,8 +19,8 @@ set(deform_python_dir lib/python3/dist-packages/deform)
 file(CREATE_LINK ../../../.. ${PROJECT_BINARY_DIR}/cmake/native SYMBOLIC)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/bindings/python/deform DESTINATION lib/python3/dist-packages
   COMPONENT python_package EXCLUDE_FROM_ALL PATTERN __pycache__ EXCLUDE)
-install(FILES ${PROJECT_BINARY_DIR}/cmake/native DESTINATION ${deform_python_dir} COMPONENT python_package
-  EXCLUDE_FROM_ALL)
+install(FILES ${PROJECT_BINARY_DIR}/cmake/native ${PROJECT_SOURCE_DIR}/bindings/serve/page.html
+  DESTINATION ${deform_python_dir} COMPONENT python_package EXCLUDE_FROM_ALL)
 
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME deform)

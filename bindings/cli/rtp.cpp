@@ -326,15 +326,15 @@ void RtpSender::work() {
       inbox_.frame.clear();  // keeps its memory
     }
     if (in.until == Inbox::stops) return;
-    hear();
     const Clock::time_point now = Clock::now();
     try {
+      hear();
       if (!in.scene.empty()) {
         pack(in.news, kPayload, news_);
         send_all(news_, false);
-        pack(in.scene, kPayload, round_);
-        sent_ = 0;
-        next_round = now + kRound;
+        Packets packed;
+        pack(in.scene, kPayload, packed);
+        next_scene_.swap(packed);
       }
       if (!in.frame.empty()) {
         pack(in.frame, kPayload, frame_);
@@ -342,19 +342,22 @@ void RtpSender::work() {
         const std::lock_guard lock(mutex_);
         ++report_.frames;
       }
+      if (!in.text.empty()) send_answer(in.text);
+      // A scene that changes in every frame waits for the end of a round: who comes late gets all of one.
+      const bool over = sent_ >= round_.size();
+      if (over && (now >= next_round || !next_scene_.empty())) {
+        if (!next_scene_.empty()) round_ = std::exchange(next_scene_, {});
+        sent_ = 0;
+        next_round = now + kRound;
+      }
+      send_round(std::chrono::duration<double>(now - last).count());
+      if (now >= next_report) {
+        send_report(false);
+        next_report = now + kReports;
+      }
     } catch (const std::exception &) {  // no memory: lost, like what the network loses
     }
-    if (!in.text.empty()) send_answer(in.text);
-    if (now >= next_round) {
-      sent_ = 0;
-      next_round = now + kRound;
-    }
-    send_round(std::chrono::duration<double>(now - last).count());
     last = now;
-    if (now >= next_report) {
-      send_report(false);
-      next_report = now + kReports;
-    }
     in.news.clear();
     in.scene.clear();
     in.text.clear();
@@ -365,6 +368,7 @@ void RtpSender::work() {
 void RtpSender::send_end() {
   for (int i = 0; i < 2; ++i) {
     send_round(1);  // what is left of the present one, and another one
+    if (!next_scene_.empty()) round_ = std::exchange(next_scene_, {});
     sent_ = 0;
     send_round(1);
     send_all(frame_, true);

@@ -130,7 +130,7 @@ class RtpSender {
   uint32_t source_, first_stamp_;
   uint32_t stamp_ = 0;  // of what is sent now
   uint64_t octets_ = 0;
-  Packets frame_, news_, round_;
+  Packets frame_, news_, round_, next_scene_;
   std::vector<unsigned char> datagram_;
   size_t sent_ = 0;  // bytes of the round
   std::thread thread_;

@@ -277,7 +277,8 @@ void add_quantized(Bytes rows, Packets &out) {
   out.add(uint32_t{0});
   for (size_t i = 0; i < n; ++i) {
     const double way = (double{at(i)} - double{low[i % 3]}) * per[i % 3];
-    out.add(static_cast<uint16_t>(std::min(way + 0.5, double{kSteps})));
+    // what is not finite, of a packet that is not ours, has no place in the range
+    out.add(static_cast<uint16_t>(way >= 0 ? std::min(way + 0.5, double{kSteps}) : 0));
   }
 }
 

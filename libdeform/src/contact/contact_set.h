@@ -19,7 +19,7 @@ enum ContactKind : uint8_t { kVertexFace = 0, kEdgeEdge = 1, kPrimitive = 2 };
 
 // One contact's geometry, as narrow/ emits it. Plain.
 struct ContactPoint {
-  // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step, but for `more`
+  // persistent: (kind, a's feature, b's body or obstacle, b's patch); unique within a sub-step where more = 0
   uint64_t key;
   uint32_t slot_a, slot_b;  // body slots in the world; slot_b = obstacle slot if obstacle
   // surfel, edge or triangle number within its body; primitive: obstacle feature (face, edge, corner)
