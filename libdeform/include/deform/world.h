@@ -58,7 +58,7 @@ typedef struct dfm_world_def {
   /* s, wall-clock limit for one step, 0: none. A step that reaches the limit depends on the machine and its
    * load */
   double max_time;
-  /* units of work for one step (doc/concepts/budget.md), the same on every machine; 0: automatic, 4000 times
+  /* units of work for one step (doc/concepts/budget.md), the same on every machine; 0: automatic, 16000 times
    * the cost of a step without contact; UINT64_MAX: no limit */
   uint64_t max_work;
   /* 0.01: a step stops if a body has gained more energy than loads, motions and contact have put into it, by

@@ -12,8 +12,10 @@ uint32_t other_of(const ContactPoint &c, int node) {
   return c.weight[node] < 0 ? c.slot_a : c.slot_b | (c.obstacle ? 0x80000000u : 0u);
 }
 // Contacts that take area from corners: a crossing between bodies, and other contacts without an area from
-// detection.
-bool takes(const ContactPoint &c) { return !(c.area > 0) || (c.type_a != 0 && !c.obstacle); }
+// detection. The area of a contact is that of its first row.
+bool takes(const ContactPoint &c) {
+  return c.more == 0 && (!(c.area > 0) || (c.type_a != 0 && !c.obstacle));
+}
 bool corner_on_face(const ContactPoint &c) { return c.type_a == 0 && !c.obstacle; }
 
 }  // namespace
@@ -28,7 +30,7 @@ void AreaShares::list_owners(std::span<const ContactPoint> contacts, const doubl
   for (uint32_t i = 0; i < contacts.size(); ++i) {
     const ContactPoint &c = contacts[i];
     const bool loaded = impulse[3 * size_t{i}] > 0;
-    if (takes(c) || (loaded || c.distance < touch) == idle) continue;
+    if (c.more > 0 || takes(c) || (loaded || c.distance < touch) == idle) continue;
     owners_.push_back({c.type_a == 0 ? c.node[0] : c.lender - 1, other_of(c, 0), i, loaded});
   }
   std::sort(owners_.begin(), owners_.end(), [](const Owner &l, const Owner &r) {

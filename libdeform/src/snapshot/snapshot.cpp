@@ -201,7 +201,7 @@ bool good_report(const Staged &t, const World &w) {
     const size_t counts[] = {4, 3, 3, 1, 1, 3, 1};
     for (int k = 0; k < 7; ++k)
       if (!must::all_finite(values[k], counts[k])) return false;
-    if (c.key != t.store.key[i] || c.kind > kPrimitive || c.obstacle > 1 || c.nnode > 4 || c.type_a > 2)
+    if (c.key != t.store.key[i] || c.kind > kPrimitive || c.more != 0 || c.nnode > 4 || c.type_a > 2)
       return false;
     if (!t.store.touching[i] && c.slot_a == kNone) continue;  // of a removed body
     if (c.slot_a >= w.bodies.size()) return false;

@@ -158,30 +158,20 @@ void book_friction(World &w, const StepContext &step) {
   }
 }
 
-// Of row `from` to row `to`: what friction has made of them.
-void take_state(ContactState &s, uint32_t to, uint32_t from) {
-  s.mode[to] = s.mode[from];
-  for (size_t k = 0; k < 2; ++k) s.vt[k * s.stride + to] = s.vt[k * s.stride + from];
-  for (size_t k = 0; k < s.nstate; ++k) s.bristle_out[k * s.stride + to] = s.bristle_out[k * s.stride + from];
-}
-
-// Further rows of a contact are the last ones. The first row gets what they bear and their areas, and the
-// state of friction of the one that bears most. Returns the number of contacts.
+// Further rows of a contact are the last ones. The first row, which has the area and the state of friction,
+// gets what they bear. Returns the number of contacts.
 uint32_t join_rows(StepContext &step) {
   const auto own = [](const ContactPoint &c) { return c.more == 0; };
   const auto end = std::find_if_not(step.contacts.begin(), step.contacts.end(), own);
-  for (auto first = end; first != step.contacts.end(); ++first) {
-    const uint32_t from = uint32_t(first - step.contacts.begin());
-    const auto is_same = [&](const ContactPoint &c) { return c.key == first->key; };
-    const uint32_t to = uint32_t(std::find_if(step.contacts.begin(), end, is_same) - step.contacts.begin());
-    const double *const f = &step.rows.frame[size_t{9} * from], *const t = &step.rows.frame[size_t{9} * to];
-    double *const l = &step.rows.impulse[size_t{3} * from], *const sum = &step.rows.impulse[size_t{3} * to];
-    if (l[0] > sum[0]) take_state(step.state, to, from);
+  for (auto row = end; row != step.contacts.end(); ++row) {
+    const auto is_same = [&](const ContactPoint &c) { return c.key == row->key; };
+    const size_t from = size_t(row - step.contacts.begin()),
+                 to = size_t(std::find_if(step.contacts.begin(), end, is_same) - step.contacts.begin());
+    const double *const f = &step.rows.frame[9 * from], *const t = &step.rows.frame[9 * to];
+    double *const l = &step.rows.impulse[3 * from], *const sum = &step.rows.impulse[3 * to];
     const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
     for (size_t k = 0; k < 3; ++k) sum[k] += dot(load3(t + 3 * k), p);
     std::fill_n(l, 3, 0.0);
-    step.state.area[to] += step.state.area[from];
-    if (!step.aim.empty()) step.aim[to] += step.aim[from];
   }
   return uint32_t(end - step.contacts.begin());
 }

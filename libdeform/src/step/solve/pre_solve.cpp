@@ -1,6 +1,5 @@
 #include "step/solve/pre_solve.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "core/error.h"
@@ -82,10 +81,14 @@ void ask_pre_solve(World &w, StepContext &step) {
   for (size_t i = 0; i < step.contacts.size(); ++i) {
     const ContactPoint &c = step.contacts[i];
     StepContext::Chosen chosen;
-    if (c.more > 0 && std::none_of(step.contacts.begin(), step.contacts.begin() + std::ptrdiff_t(kept),
-                                   [&](const ContactPoint &o) { return o.key == c.key; }))
+    if (c.more > 0) {  // the answer belongs to the contact
+      size_t first = 0;
+      while (first < kept && step.contacts[first].key != c.key) ++first;
+      if (first == kept) continue;
+      chosen = step.chosen[first];
+    } else if (!ask(w, step, c, law[i], chosen)) {
       continue;
-    if (!ask(w, step, c, law[i], chosen)) continue;
+    }
     step.contacts[kept++] = c;
     step.chosen.push_back(chosen);
   }

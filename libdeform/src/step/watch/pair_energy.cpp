@@ -83,14 +83,14 @@ void share_in_islands(StepContext &step) {
         for (; at != pairs.end() && at->contact < run.first + run.n; ++at) f(*at);
       }
     };
-    double all = 0, gained = 0;
+    double all = 0, gained = 0, lost = 0;
     each([&](const PairMade &p) {
       all += p.made;
-      gained += std::max(0.0, p.made);
+      (p.made > 0 ? gained : lost) += p.made;
     });
-    if (!(gained > 0)) continue;
-    const double share = std::max(0.0, all) / gained;
-    each([&](PairMade &p) { p.made = std::min(p.made, share * std::max(0.0, p.made)); });
+    const bool gains = all > 0;
+    const double sum = gains ? gained : lost;
+    each([&](PairMade &p) { p.made = sum != 0 && (p.made > 0) == gains ? p.made * (all / sum) : 0; });
   }
 }
 
