@@ -124,8 +124,6 @@ template <class Of>
 dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
   double steps = std::max(1.0, std::ceil(k.dt / longest_ - 1e-9));
   h_ = k.dt;
-  bool moved = take_points(k);
-  const bool loaded = take_loads(f, k.stride);
   for (;;) {
     if (!(steps <= kMostSteps)) {
       char text[160];
@@ -136,16 +134,18 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
       model::complain(host, Of::kId, text);
       return DFM_DISCARD;
     }
+    const bool moved = take_points(k) || unlike_, loaded = take_loads(f, k.stride) || unlike_;
+    unlike_ = true;
     const uint32_t n = uint32_t(steps);
     if (const char *why = stepper_->run(n, k.dt / n, float(params_[kDampingStiffness]), moved, loaded)) {
       model::complain(host, Of::kId, why);
       return DFM_E_FATAL;
     }
+    unlike_ = false;
     const double worst = double(stepper_->worst());
     if (!(worst > 0)) break;
     // without dampers it falls as h^2
     steps = std::ceil(steps * std::sqrt(worst / 4) / kShorter);
-    moved = take_points(k);
   }
   for (uint32_t s = 0; s < nsurfel_; ++s) {
     double way[3] = {};

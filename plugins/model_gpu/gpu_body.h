@@ -47,6 +47,7 @@ class Body {
   Buffer<double> impulse_;       // [npoint,3] N s, zero between calls
   Buffer<double> block_energy_;  // J
   std::unique_ptr<Stepper> stepper_;
+  bool unlike_ = true;  // the device's arrays may differ from those of stepper_
   double longest_ = 0;  // s
   double h_ = 0;        // s, of the step that was predicted
   dfm_fact facts_[kFactCount] = {};

@@ -88,7 +88,6 @@ void VulkanStepper::open() {
 
 void VulkanStepper::close() {
   const Vulkan &vk = *vulkan_;
-  vk.DeviceWaitIdle(vk.device);
   vk.DestroyFence(vk.device, done_, nullptr);
   vk.DestroyCommandPool(vk.device, pool_, nullptr);
   vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
