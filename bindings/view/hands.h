@@ -34,9 +34,9 @@ class Hands {
   virtual void frame() = 0;
   virtual void panels() = 0;
   virtual void key(const std::string &name) = 0;
-  virtual void press(int button) = 0;              // on the picture; held_ is it where it leads the camera
+  virtual void press(int button) = 0;  // on the picture; held_ is it where it leads the camera
   virtual void release(int button) = 0;
-  virtual void cut(const double blade[12]) = 0;    // m, corners
+  virtual void cut(const double blade[12]) = 0;  // m, corners
   // Pixels, turns; false: the camera takes them.
   virtual bool leads(double, double) { return false; }
   virtual bool leads_deeper(double) { return false; }

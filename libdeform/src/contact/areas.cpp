@@ -13,9 +13,7 @@ uint32_t other_of(const ContactPoint &c, int node) {
 }
 // Contacts that take area from corners: a crossing between bodies, and other contacts without an area from
 // detection. The area of a contact is that of its first row.
-bool takes(const ContactPoint &c) {
-  return c.more == 0 && (!(c.area > 0) || (c.type_a != 0 && !c.obstacle));
-}
+bool takes(const ContactPoint &c) { return c.more == 0 && (!(c.area > 0) || (c.type_a != 0 && !c.obstacle)); }
 bool corner_on_face(const ContactPoint &c) { return c.type_a == 0 && !c.obstacle; }
 
 }  // namespace
