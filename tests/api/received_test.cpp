@@ -11,6 +11,7 @@
 #include <random>
 #include <utility>
 
+#include "coupled.h"
 #include "stack.h"
 
 namespace {
@@ -42,14 +43,6 @@ bool read(live::Received &r, const std::vector<Packet> &packets) {
   return std::ranges::all_of(packets, [&](const Packet &p) { return r.read(p.data(), p.size()); });
 }
 
-std::vector<double> positions(dfm_body b) {
-  uint32_t n = 0;
-  test::ok(dfm_surface_positions(b, 0, nullptr, &n));
-  std::vector<double> x(3 * size_t{n});
-  test::ok(dfm_surface_positions(b, n, x.data(), &n));
-  return x;
-}
-
 // Of a body, as LIST tells it; 0: none does.
 uint32_t shape_in(const std::vector<Packet> &frame, uint32_t body) {
   for (const Packet &p : frame)
@@ -71,7 +64,7 @@ void compare(const live::Received &r, dfm_body b, double within) {
   ASSERT_TRUE(r.present(uint32_t(b)));
   const live::Received::Mesh *const m = r.bodies().at(uint32_t(b)).drawn();
   ASSERT_TRUE(m);
-  const std::vector<double> x = positions(b);
+  const std::vector<double> x = test::surface_positions(b);
   uint32_t nt = 0;
   test::ok(dfm_surface_triangles(b, 0, nullptr, &nt));
   std::vector<uint32_t> tri(3 * size_t{nt});
@@ -281,7 +274,7 @@ TEST(Received, TenMinutesOfLoss_LeaveNoMoreThanOlderPoints) {
     for (const dfm_body body : test::listed(dfm_world_bodies, s.world)) {
       const uint32_t number = uint32_t(body);
       std::deque<std::vector<double>> &ages = places[number];
-      ages.push_front(positions(body));
+      ages.push_front(test::surface_positions(body));
       if (ages.size() > 20) ages.pop_back();
       const auto found = r.bodies().find(number);
       const live::Received::Mesh *const m = found == r.bodies().end() ? nullptr : &found->second;

@@ -2,24 +2,18 @@
 #include "rtp.h"
 
 #include <arpa/inet.h>
+#include <sys/time.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <map>
 #include <thread>
 
+#include "coupled.h"
 #include "live/received.h"
 #include "stack.h"
 
 namespace {
-
-std::vector<double> positions(dfm_body b) {
-  uint32_t n = 0;
-  test::ok(dfm_surface_positions(b, 0, nullptr, &n));
-  std::vector<double> x(3 * size_t{n});
-  test::ok(dfm_surface_positions(b, n, x.data(), &n));
-  return x;
-}
 
 // Who has looked on from the start, and who comes later.
 struct Viewers {
@@ -38,6 +32,8 @@ struct Viewers {
     getsockname(socket, reinterpret_cast<sockaddr *>(&at), &size);
     const int buffer = 1 << 22;
     setsockopt(socket, SOL_SOCKET, SO_RCVBUF, &buffer, sizeof buffer);
+    const timeval patience = {20, 0};  // where the sender's goodbye is lost
+    setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
     url = "rtp://127.0.0.1:" + std::to_string(ntohs(at.sin_port));
   }
   ~Viewers() { close(socket); }
@@ -77,7 +73,7 @@ TEST(Rtp, SentOnAnotherThread_FramesAreWhatTheStepsHaveLeft) {
     cli::RtpSender sender(s.world, viewers.url);
     for (uint64_t frames = 0; frames < 45; frames = sender.report().frames) {
       test::run(s.world, 1e-3, 1e-3);
-      steps[dfm_world_time(s.world)] = positions(s.upper);
+      steps[dfm_world_time(s.world)] = test::surface_positions(s.upper);
       sender.after_step();
       if ((frames != 10 || added) && frames != 30) continue;
       if (added) test::ok(dfm_obstacle_destroy(added));
