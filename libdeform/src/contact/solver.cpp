@@ -276,8 +276,6 @@ void each_side(const uint32_t *sides, uint32_t i, T *disturbance, F &&f) {
 void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                       const uint32_t *sides, double *disturbance) {
   const LawView law = answer.view();
-  each_row(part.contacts,
-           [&](uint32_t i) { each_side(sides, i, disturbance, [](double *d) { d[0] = d[1] = 0; }); });
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);

@@ -62,13 +62,11 @@ double normal_tolerance(const World &w, const StepContext &step, const SolveIsla
   return (own.batches.remembers() ? kRememberedShare : 1) * normal_at_rest(w, step.h);
 }
 
-// Evaluates the laws at the warm start, and finds the disturbance that it leaves at each body.
+// Evaluates the laws at the warm start.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
   own.laws.begin(w, step, own);
   if (own.implicit) begin_newton(step, own);
-  if (ask(w, step, own) && own.laws.slopes())
-    find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
-                     step.disturbance.data());
+  if (ask(w, step, own)) own.laws.slopes();
 }
 
 // m/s, of the velocities of bodies: that of the contact that needs most.
@@ -130,7 +128,7 @@ void IslandLaws::spend(uint64_t rows) { dfm::spend(*w_, *step_, own_->spent, row
 bool IslandLaws::goes_on() { return !solve_ends(*step_, own_->spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
-  use_memory(m, pairs_, owner_, met_, side_, body_of_, largest_, sides_, of_cuts_, order_, contact_, bond_,
+  use_memory(m, pairs_, owner_, sides_, of_cuts_, order_, contact_, bond_,
              block_, begin_);
 }
 
@@ -160,55 +158,19 @@ void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const
   count_ = joined_.count;
 }
 
-// Numbers the bodies on both sides of contacts. A body in two islands gets two numbers. Where rows between
-// rigid things are solved with soft bodies, the rigid bodies of the island have numbers as well.
-void SolveIslands::number_sides(const ContactRows &rows, uint32_t bodies, size_t of_contacts) {
-  met_.assign(bodies + (rows.nrigid ? rows.ndof : 0), kNone);
-  side_.resize(met_.size());
-  body_of_.clear();
-  const auto number = [&](uint32_t body, uint32_t island) {
-    if (body == kNone) return kNone;
-    if (std::exchange(met_[body], island) != island) {
-      side_[body] = static_cast<uint32_t>(body_of_.size());
-      body_of_.push_back(body);
-    }
-    return side_[body];
-  };
-  for (uint32_t k = 0; k < count_; ++k) {
-    bool rigids = false;
-    for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
-      const RowRun &own = pairs_[joined_.member[m]].rows;
-      rigids = rigids || (own.first >= rows.soft() && own.first < rows.n);
-    }
-    for (uint32_t m = joined_.begin[k]; m < joined_.begin[k + 1]; ++m) {
-      const Pair &p = pairs_[joined_.member[m]];
-      if (joined_.member[m] >= of_contacts) continue;
-      const uint32_t a = number(p.a, k), b = number(p.b, k);
-      for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
-        sides_[2 * size_t{i}] = a;
-        sides_[2 * size_t{i} + 1] = b;
-        if (!rigids) continue;
-        if (rows.rigid_a[i] != kNone) sides_[2 * size_t{i}] = number(bodies + rows.rigid_a[i], k);
-        if (rows.rigid[i] != kNone) sides_[2 * size_t{i} + 1] = number(bodies + rows.rigid[i], k);
-      }
-    }
+void SolveIslands::set_sides(const StepContext &step, uint32_t bodies) {
+  const ContactRows &rows = step.rows;
+  sides_.assign(2 * size_t{rows.n}, kNone);
+  for (uint32_t i = 0; i < rows.soft(); ++i) {
+    sides_[2 * size_t{i}] = step.contacts[i].slot_a;
+    if (!step.contacts[i].obstacle) sides_[2 * size_t{i} + 1] = step.contacts[i].slot_b;
   }
-}
-
-bool SolveIslands::shares_sides() const {
-  size_t bodies = 0;
-  for (const uint32_t m : met_) bodies += m != kNone;
-  return bodies < body_of_.size();
-}
-
-void SolveIslands::largest_by_body(Array<double> &values) {
-  largest_.assign(2 * met_.size(), 0.0);
-  const auto each = [&](auto &&f) {
-    for (size_t s = 0; s < body_of_.size(); ++s)
-      for (size_t k = 0; k < 2; ++k) f(values[2 * s + k], largest_[2 * size_t{body_of_[s]} + k]);
+  const auto set_rigid = [&](const Array<uint32_t> &dof, size_t side) {
+    for (uint32_t i = 0; i < rows.n && !dof.empty(); ++i)
+      if (dof[i] != kNone) sides_[2 * size_t{i} + side] = bodies + dof[i];
   };
-  each([](double value, double &most) { most = std::max(most, value); });
-  each([](double &value, double most) { value = most; });
+  set_rigid(rows.rigid_a, 0);
+  set_rigid(rows.rigid, 1);
 }
 
 void SolveIslands::find_cuts(const World &w, const StepContext &step) {
@@ -226,8 +188,7 @@ void SolveIslands::find_cuts(const World &w, const StepContext &step) {
 void SolveIslands::find(const World &w, StepContext &step) {
   const size_t of_contacts = find_pairs(step);
   join(step.rows, step.systems);
-  sides_.resize(2 * size_t{step.rows.n});
-  number_sides(step.rows, static_cast<uint32_t>(w.bodies.size()), of_contacts);
+  set_sides(step, static_cast<uint32_t>(w.bodies.size()));
   find_cuts(w, step);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
   give_rows(of_contacts);
@@ -331,7 +292,6 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   const size_t n = step.rows.n;
   step.tolerance.normal.resize(n);
   step.tolerance.tangent.resize(n);
-  step.disturbance.resize(2 * size_t{step.solve_islands->side_count()});
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;
   for (SolveIsland &own : all) {
@@ -349,29 +309,29 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   }
   for (SolveIsland &own : all) own.spent.all = rows;
   const std::span<const uint32_t> order = step.solve_islands->by_size();
-  // one job for both, unless islands share a body: then its tolerances follow from all of them
-  const bool shared = step.solve_islands->shares_sides();
-  const auto run = [&](bool starts, bool solves) {
+  const auto run = [&](auto &&job) {
     w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
       for (uint32_t k = begin; k < end; ++k) {
         SolveIsland &own = all[order[k]];
         if (!own.open) continue;
         try {
-          if (starts) start_island(w, step, own);
-          if (!solves) continue;
-          solve_island(w, step, own);
-          restore_drive(step, own);
+          job(own);
         } catch (...) {
           own.thrown = std::current_exception();
         }
       }
     });
   };
-  run(true, !shared);
-  if (shared) {
-    step.solve_islands->largest_by_body(step.disturbance);
-    run(false, true);
-  }
+  run([&](SolveIsland &own) { start_island(w, step, own); });
+  // tolerances of a body follow from all of its islands
+  for (SolveIsland &own : all)
+    if (own.open && !own.bad && !own.thrown)
+      find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
+                       step.disturbance.data());
+  run([&](SolveIsland &own) {
+    solve_island(w, step, own);
+    restore_drive(step, own);
+  });
   for (const SolveIsland &own : all)
     if (own.open) charge(w, step, own.spent);
   if (step.capture) write_problems(w, step);

@@ -82,13 +82,11 @@ class SolveIslands {
   // Indices of islands, those with the most rows first: otherwise a thread might begin a large island when
   // the others are done.
   std::span<const uint32_t> by_size() const { return {order_.data(), count_}; }
-  // [contacts,2] numbers of the two bodies among those of all islands; kNone: an obstacle
+  // [contacts,2] the two bodies: slot, or of a rigid body with unknowns the number of all slots plus its first
+  // dof; kNone: an obstacle
   const uint32_t *sides() const { return sides_.data(); }
   // [contacts] whether both sides are faces of a cut, set back; null: none are
   const uint8_t *of_cuts() const { return of_cuts_.empty() ? nullptr : of_cuts_.data(); }
-  uint32_t side_count() const { return static_cast<uint32_t>(body_of_.size()); }
-  bool shares_sides() const;                    // whether some body is in several islands
-  void largest_by_body(Array<double> &values);  // [sides,2] each becomes the largest of its body
 
  private:
   struct Pair {
@@ -99,11 +97,8 @@ class SolveIslands {
   Array<Pair> pairs_;      // of sides that touch, or are bonded: contacts, then bonds
   Islands joined_;         // pairs by island
   Array<uint32_t> owner_;  // [dofs] a pair that moves it; of a block its first dof alone
-  // [bodies, then dofs of rigid ones] the last island it was met in, and its number there
-  Array<uint32_t> met_, side_;
-  Array<uint32_t> sides_, body_of_;  // body_of_: [sides]
+  Array<uint32_t> sides_;
   Array<uint8_t> of_cuts_;
-  Array<double> largest_;  // [met_,2] scratch
   Array<uint32_t> order_;
   // by island: runs of contacts, of bonds, and blocks
   Array<RowRun> contact_, bond_;
@@ -111,7 +106,7 @@ class SolveIslands {
   std::vector<SolveIsland> islands_;  // those of this sub-step come first, and stay for later ones
   uint32_t count_ = 0;
   void join(const ContactRows &rows, std::span<ImplicitSystem *const> systems);
-  void number_sides(const ContactRows &rows, uint32_t bodies, size_t of_contacts);
+  void set_sides(const StepContext &step, uint32_t bodies);
   void find_cuts(const World &w, const StepContext &step);
   size_t find_pairs(const StepContext &step);  // returns how many are of contacts
   // Rows of these pairs by island.
