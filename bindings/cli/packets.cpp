@@ -12,7 +12,7 @@ Shapes shapes_in(const Packets &frame) {
     for (size_t at = begin + 32; at < begin + size;) {
       const uint32_t bytes = word_at(frame, at + 4);
       if (std::memcmp(&frame[at], "LIST", 4) == 0)
-        for (size_t i = at + 8; i < at + 8 + bytes; i += 8)
+        for (size_t i = at + 12; i < at + 8 + bytes; i += 8)
           out.emplace_back(word_at(frame, i), word_at(frame, i + 4));
       at += 8 + bytes;
     }

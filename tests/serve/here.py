@@ -10,7 +10,7 @@ import sys
 
 from browser import BOX, Browser
 
-RUNS = "typeof world !== 'undefined' && world.bodies.size > 0 && world.frame > 3 && state.time > 0.02"
+RUNS = "typeof world !== 'undefined' && bodies().length > 0 && world.frame > 3 && state.time > 0.02"
 
 
 def choose(browser, name, value):
@@ -84,7 +84,7 @@ def recorded(browser, tape):
     browser.value(f"""(() => {{ const bytes = Uint8Array.from(atob({json.dumps(tape)}), c => c.charCodeAt(0));
       const given = new DataTransfer(); given.items.add(new File([bytes], "run.dfms"));
       $("file").files = given.files; $("file").onchange(); }})()""")
-    browser.wait("player && world.bodies.size > 0 && !state.time", "it plays without a module")
+    browser.wait("player && bodies().length > 0 && !state.time", "it plays without a module")
 
 
 def main():
