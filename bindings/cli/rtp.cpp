@@ -22,7 +22,7 @@ namespace {
 constexpr uint32_t kPayload = 1188;  // bytes: a datagram of 1,200 passes every network
 constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96;
 constexpr double kFrameRate = 30, kSlowest = 5;  // frames a second
-constexpr std::chrono::seconds kRound(1), kReports(5);
+constexpr std::chrono::seconds kRound(1), kReports(5), kEnding(1);
 constexpr std::chrono::milliseconds kTick(5);     // within which what comes is heard
 constexpr int kPatience = 5;                      // ms
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
@@ -122,6 +122,7 @@ RtpSender::~RtpSender() {
 
 void RtpSender::stop(bool at_once) {
   if (!thread_.joinable()) return;
+  until_ = Clock::now() + (at_once ? Clock::duration(0) : kEnding);
   {
     const std::lock_guard lock(mutex_);
     inbox_.until = at_once ? Inbox::stops : Inbox::ends;
@@ -137,6 +138,7 @@ uint32_t RtpSender::stamp() const {
 
 // What the network does not take within a few milliseconds is lost, like what it loses later.
 void RtpSender::send(const unsigned char *payload, size_t n, bool marker) {
+  if (Clock::now() > until_.load()) return;
   datagram_.resize(kRtpHeader + n);
   unsigned char *const to = datagram_.data();
   to[0] = kRtpVersion;

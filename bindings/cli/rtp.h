@@ -5,6 +5,7 @@
 #pragma once
 #include <sys/socket.h>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -73,7 +74,8 @@ class RtpSender {
   bool steered() const;                // who has the token listens
   std::vector<std::string> take();     // what it has asked for since the last call, in order
   void tell(const std::string &text);  // to it
-  void end();  // the last state, twice, and that nothing follows; waits until it is sent
+  void
+  end();  // the last state, twice, and that nothing follows; waits until it is sent, for a second at most
 
   struct Report {
     uint64_t frames = 0, packets = 0, bytes = 0;
@@ -132,7 +134,8 @@ class RtpSender {
   uint64_t octets_ = 0;
   Packets frame_, news_, round_, next_scene_;
   std::vector<unsigned char> datagram_;
-  size_t sent_ = 0;  // bytes of the round
+  size_t sent_ = 0;                                                  // bytes of the round
+  std::atomic<Clock::time_point> until_ = Clock::time_point::max();  // it sends no packets after that
   std::thread thread_;
 };
 

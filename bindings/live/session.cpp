@@ -52,13 +52,6 @@ std::string as_utf8(std::string text) {
   return text;
 }
 
-std::string text_of(const Slider &s) {
-  cli::JsonObject out;
-  out.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label));
-  out.add("value", cli::number(s.value)).add("low", cli::number(s.low)).add("high", cli::number(s.high));
-  return out.add("logarithmic", yes(s.logarithmic)).text();
-}
-
 }  // namespace
 
 Session::Session(const cli::Globals &globals, const std::string &scene, const std::vector<std::string> &set,
@@ -128,15 +121,7 @@ void Session::ask(const std::string &what, const cli::JsonValue &line, uint32_t 
   } else if (what == "release") {
     pull_.release();
   } else if (what == "slider") {
-    const std::string name = line.get("name");
-    const auto slider =
-        std::find_if(sliders_.begin(), sliders_.end(), [&](const Slider &s) { return s.name == name; });
-    if (slider == sliders_.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
-    const double value = line.scalar("value");
-    if (!(value >= slider->low && value <= slider->high))
-      throw cli::Failure(cli::kBadInput, "slider \"" + name + "\": the value is outside of its range");
-    slider->apply(value);
-    slider->value = value;
+    set_slider(sliders_, line);
   } else if (what == "cut") {
     let_go();
     cli::JsonObject cut;
@@ -206,7 +191,7 @@ std::string Session::probe(uint32_t i, size_t most) const {
 std::string Session::brief_state(uint32_t viewer, size_t turn) const {
   cli::JsonObject out = state(kBrief);
   out.add("you", std::to_string(viewer));
-  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[turn % sliders_.size()])}));
+  if (!sliders_.empty()) out.add("sliders", cli::json_array({slider_text(sliders_[turn % sliders_.size()])}));
   if (const uint32_t n = scene_.settings().nprobe)
     out.add("probes", cli::json_array({probe(uint32_t(turn % n), kBrief)}));
   return as_utf8(out.text());
@@ -214,7 +199,7 @@ std::string Session::brief_state(uint32_t viewer, size_t turn) const {
 
 std::string Session::whole_state() const {
   std::vector<std::string> sliders, probes;
-  for (const Slider &s : sliders_) sliders.push_back(text_of(s));
+  for (const Slider &s : sliders_) sliders.push_back(slider_text(s));
   for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) probes.push_back(probe(i));
   cli::JsonObject out = state();
   out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));

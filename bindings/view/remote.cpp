@@ -161,13 +161,16 @@ void Remote::set_slider(const std::string &name, double value) {
 void Remote::sample() {
   const cli::JsonValue &state = receiver_.state();
   const double time = state.scalar("time");
+  if (run_ != receiver_.runs() || time < plotted_) plots_.clear();  // of another run, or it was reset
+  run_ = receiver_.runs();
+  plotted_ = std::fabs(time) < 1e9 ? time : 0;
   const auto add = [&](const std::string &title, const Plot &fresh, const std::vector<double> &values) {
-    const bool good = std::ranges::all_of(values, [](double v) { return std::fabs(v) < 1e9; });
+    const bool good =
+        time == plotted_ && std::ranges::all_of(values, [](double v) { return std::fabs(v) < 1e9; });
     const auto at = plots_.find(title);
     if (!good || values.size() != fresh.curves.size() || (at == plots_.end() && plots_.size() >= kMostPlots))
       return;
     Plot &plot = at == plots_.end() ? plots_.emplace(title, fresh).first->second : at->second;
-    if (!plot.times.empty() && time < plot.times.back()) plot.clear();  // it was reset
     plot.add(time, values.data());
   };
   for (const cli::JsonValue &probe : state.list("probes")) {

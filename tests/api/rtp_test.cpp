@@ -2,9 +2,13 @@
 #include "rtp.h"
 
 #include <arpa/inet.h>
+#include <sys/syscall.h>
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <thread>
@@ -12,6 +16,19 @@
 #include "coupled.h"
 #include "live/received.h"
 #include "stack.h"
+
+namespace {
+
+std::atomic<bool> congested = false;  // the network takes nothing
+
+}  // namespace
+
+extern "C" ssize_t send(int socket, const void *bytes, size_t n, int flags) {
+  if (!congested) return syscall(SYS_sendto, socket, bytes, n, flags, nullptr, 0);
+  usleep(200000);
+  errno = EAGAIN;
+  return -1;
+}
 
 namespace {
 
@@ -103,6 +120,20 @@ TEST(Rtp, SentOnAnotherThread_FramesAreWhatTheStepsHaveLeft) {
     for (const auto &[number, thing] : r->meshes())
       EXPECT_TRUE(!thing.rigid || number == uint32_t(added) || number == uint32_t(s.floor));
   }
+}
+
+TEST(Rtp, NetworkThatTakesNothing_DoesNotHoldTheEnd) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c, 0.02);
+  Viewers viewers;
+  cli::RtpSender sender(s.world, viewers.url);
+  test::run(s.world, 1e-3, 1e-3);
+  sender.after_step();
+  congested = true;
+  const auto before = std::chrono::steady_clock::now();
+  sender.end();
+  congested = false;
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(3));
 }
 
 }  // namespace

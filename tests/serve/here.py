@@ -68,6 +68,8 @@ def rig(browser, out):
     level, before = browser.value("state.sliders.find(s => s.name === 'mu_C').value"), browser.value(force)
     assert abs(level * 9.8 - 1.47) < 1e-9 and 1.47 < before < 1.97, (level, before)
     browser.picture(os.path.join(out, "here_rig.png"))
+    browser.value("send({do: 'slider', name: 'mu_C', value: 1e9})")
+    browser.wait("$('message').textContent.includes('outside of its range')", "a value of no slider", 60)
     for name in ("mu_S", "mu_C"):
         move(browser, name, 1)
     browser.wait(f"{force} > 8", "more friction, more force", 60)
