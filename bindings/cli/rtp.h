@@ -81,6 +81,8 @@ class RtpSender {
     uint64_t frames = 0, packets = 0, bytes = 0;
     double seconds = 0;  // that the run itself has spent
     double lost = 0;     // share, as the receiver has said last
+    double lasted = 0;   // s, from the start to the last frame
+    std::map<uint32_t, uint64_t> bodies;  // bytes of their displacements, by number
   };
   Report report() const;
 
@@ -96,6 +98,7 @@ class RtpSender {
   void stop(bool at_once);
   void work();
   void send_all(const Packets &packets, bool frame);
+  void count_frame();
   void send_round(double seconds);
   void send(const unsigned char *payload, size_t n, bool marker);
   void send_report(bool ends);
@@ -113,9 +116,7 @@ class RtpSender {
 
   // Of the thread that steps.
   Clock::time_point next_frame_ = began_;
-  Packets snapshot_;
-  Shapes shapes_;
-  uint32_t number_ = 0;
+  Teller teller_;
 
   mutable std::mutex mutex_;  // of these
   std::condition_variable filled_;

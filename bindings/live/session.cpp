@@ -165,18 +165,10 @@ void Session::advance(double seconds) {
 
 // What viewers have not yet, alone; viewers that come later get everything.
 void Session::show() {
-  Bytes frame, scene;
-  cli::write_packet(scene_.world(), DFM_STREAM_FRAME, frame_, frame);
-  if (cli::Shapes shapes = cli::shapes_in(frame); shapes != shown_ || frame_ == 0) {
-    cli::write_packet(scene_.world(), DFM_STREAM_SCENE, frame_, scene);
-    Bytes news;
-    if (!shown_.empty()) news = cli::news_packets(scene_.world(), frame_, shown_, shapes);
-    viewers_.show_scene(std::move(scene), std::move(news));
-    shown_ = std::move(shapes);
-  }
+  teller_.look(scene_.world());
+  if (!teller_.scene.empty()) viewers_.show_scene(std::move(teller_.scene), std::move(teller_.changed));
   viewers_.show_state(whole_state());
-  viewers_.show_frame(std::move(frame));
-  ++frame_;
+  viewers_.show_frame(teller_.frame);
 }
 
 std::string Session::probe(uint32_t i, size_t most) const {
@@ -212,7 +204,7 @@ cli::JsonObject Session::state(size_t most) const {
   cli::JsonObject out;
   out.add("scene", cli::quoted(scene_.path().substr(0, most)))
       .add("time", cli::number(simulation_.time()))
-      .add("frame", std::to_string(frame_))
+      .add("frame", std::to_string(teller_.number()))
       .add("running", yes(running_))
       .add("message", cli::quoted(message_.substr(0, most)))
       .add("step_ms", cli::number(simulation_.step_ms()))

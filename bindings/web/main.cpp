@@ -31,7 +31,7 @@ class Page final : public live::Viewers {
     give_bytes(news.data(), news.size());
     whole_ = std::move(whole);
   }
-  void show_frame(live::Bytes frame) override { give_bytes(frame.data(), frame.size()); }
+  void show_frame(live::Bytes &frame) override { give_bytes(frame.data(), frame.size()); }
   void show_state(std::string json) override { give_text(json.c_str()); }
   std::vector<live::Request> take() override { return std::exchange(requests_, {}); }
   uint32_t viewers() const override { return 1; }
