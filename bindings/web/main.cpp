@@ -101,8 +101,10 @@ class Rig {
   }
 
   void add_sliders(const cli::RigLaw &law) {
-    for (auto &[name, value] : case_.input)
-      if (value != 0) add_slider(name, name + " of the motion", value, [&value](double x) { value = x; });
+    for (auto &entry : case_.input)
+      if (entry.second != 0)
+        add_slider(entry.first, entry.first + " of the motion", entry.second,
+                   [&entry](double x) { entry.second = x; });
     const char *const rows = reinterpret_cast<const char *>(law.type().params);
     for (uint32_t i = 0; i < law.type().nparam; ++i) {
       const auto *const row = reinterpret_cast<const dfm_param *>(rows + size_t(i) * law.type().param_size);
