@@ -268,7 +268,8 @@ std::string energy_json(const SceneFile &scene, const RunResult &run, const dfm_
 }
 
 // kbit/s that the frames have brought of each body that is there at the end.
-std::vector<std::pair<std::string, double>> stream_rates(const SceneFile &scene, const RtpSender::Report &sent) {
+std::vector<std::pair<std::string, double>> stream_rates(const SceneFile &scene,
+                                                         const RtpSender::Report &sent) {
   std::vector<std::pair<std::string, double>> out;
   for (const BodyView &body : scene.bodies())
     if (const auto at = sent.bodies.find(uint32_t(body.handle)); at != sent.bodies.end())
@@ -459,7 +460,8 @@ void print_stream(const SceneFile &scene, const RtpSender::Report &sent) {
               static_cast<unsigned long long>(sent.frames), static_cast<unsigned long long>(sent.packets),
               1e-6 * double(sent.bytes), 1e3 * sent.seconds / double(sent.frames), 100 * sent.lost);
   auto rates = stream_rates(scene, sent);
-  std::stable_sort(rates.begin(), rates.end(), [](const auto &a, const auto &b) { return a.second > b.second; });
+  std::stable_sort(rates.begin(), rates.end(),
+                   [](const auto &a, const auto &b) { return a.second > b.second; });
   for (size_t i = 0; i < rates.size() && i < kMost; ++i)
     std::printf("streamed of %s: %.4g kbit/s\n", rates[i].first.c_str(), rates[i].second);
 }

@@ -16,8 +16,8 @@ using Shapes = std::vector<std::pair<uint32_t, uint32_t>>;  // of things: number
 
 void write_packets(dfm_world world, const dfm_stream_def &def, Packets &out);
 
-// What viewers get of a world. look() fills it, in the memory of the last time: a frame in one packet, surfaces
-// as floats, with contacts; and where something is new, the scene, and of it what has changed.
+// What viewers get of a world. look() fills it, in the memory of the last time: a frame in one packet,
+// surfaces as floats, with contacts; and where something is new, the scene, and of it what has changed.
 class Teller {
  public:
   Packets frame, scene, changed;

@@ -79,9 +79,9 @@ class RtpSender {
 
   struct Report {
     uint64_t frames = 0, packets = 0, bytes = 0;
-    double seconds = 0;  // that the run itself has spent
-    double lost = 0;     // share, as the receiver has said last
-    double lasted = 0;   // s, from the start to the last frame
+    double seconds = 0;                   // that the run itself has spent
+    double lost = 0;                      // share, as the receiver has said last
+    double lasted = 0;                    // s, from the start to the last frame
     std::map<uint32_t, uint64_t> bodies;  // bytes of their displacements, by number
   };
   Report report() const;

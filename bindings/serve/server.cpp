@@ -108,7 +108,8 @@ struct Server::Call {
   }
 };
 
-Server::Server(uint16_t port, std::string token, Pack pack) : token_(std::move(token)), pack_(pack), frame_(message_of(nullptr, 0)) {
+Server::Server(uint16_t port, std::string token, Pack pack)
+    : token_(std::move(token)), pack_(pack), frame_(message_of(nullptr, 0)) {
   static const lws_protocols protocols[] = {
       {"http", &Call::page, sizeof(Http), 0, 0, nullptr, 0},
       {"dfm.stream.1", &Call::stream, sizeof(Viewer), kLongestText, 0, nullptr, 0},

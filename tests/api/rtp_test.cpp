@@ -136,4 +136,44 @@ TEST(Rtp, NetworkThatTakesNothing_DoesNotHoldTheEnd) {
   EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(3));
 }
 
+TEST(Rtp, RateFollowsWhatTheReceiverHasLost) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c, 0.05);
+  Viewers viewers;
+  cli::RtpSender sender(s.world, viewers.url);
+  sockaddr_storage from = {};
+  socklen_t size = sizeof from;
+  unsigned char in[2048];
+  ASSERT_GT(recvfrom(viewers.socket, in, sizeof in, 0, reinterpret_cast<sockaddr *>(&from), &size), 0);
+  const auto frames = [&](double seconds) {
+    const uint64_t before = sender.report().frames;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    while (std::chrono::steady_clock::now() < end) {
+      sender.show();
+      usleep(1000);
+    }
+    return sender.report().frames - before;
+  };
+  const auto lost = [&](unsigned char share) {  // of 256
+    for (int i = 0; i < 40; ++i) {
+      unsigned char out[32] = {};
+      out[0] = 0x81;
+      out[1] = cli::kReceiverReport;
+      out[3] = 7;
+      out[12] = share;
+      EXPECT_EQ(sendto(viewers.socket, out, sizeof out, 0, reinterpret_cast<const sockaddr *>(&from), size),
+                ssize_t{sizeof out});
+    }
+    frames(0.3);
+  };
+  EXPECT_GT(frames(1), 20u);
+  lost(128);
+  EXPECT_NEAR(sender.report().lost, 0.5, 1e-12);
+  EXPECT_LE(frames(1), 7u);
+  lost(12);  // between the two bounds: as it was
+  EXPECT_LE(frames(1), 7u);
+  lost(0);
+  EXPECT_GT(frames(1), 20u);
+}
+
 }  // namespace

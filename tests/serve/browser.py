@@ -15,7 +15,7 @@ import time
 import urllib.request
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "examples"))
-from stream_receiver import Connection  # noqa: E402
+from stream_receiver import Connection, Scene  # noqa: E402
 
 
 class Browser:
@@ -160,6 +160,22 @@ def walk(browser, out):
     browser.wait("state.time < 0.2", "Reset goes back")
     browser.wait(f"bodies()[0].triangles.length === {triangles}", "the cut is undone")
     assert browser.value("state.message") == "", browser.value("state.message")
+    # the run is recorded from the whole scene on, and downloaded
+    path = os.path.join(out, "run.dfms")
+    if os.path.exists(path):
+        os.remove(path)
+    browser.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=os.path.abspath(out))
+    browser.click("record")
+    browser.wait("tape && tape.length > 5", "it records")
+    browser.click("record")
+    end = time.time() + 20
+    while not os.path.exists(path) and time.time() < end:
+        time.sleep(0.05)
+    scene = Scene()
+    with open(path, "rb") as file:
+        scene.read(file.read())
+    assert [body.missing for body in scene.bodies.values()] == [0] and scene.present
+    assert len(scene.bodies.popitem()[1].triangles) == triangles
 
 
 def main():

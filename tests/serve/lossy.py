@@ -8,6 +8,7 @@ import random
 import socket
 import subprocess
 import sys
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "examples"))
 from stream_receiver import Scene, says_goodbye  # noqa: E402
@@ -51,6 +52,7 @@ def main():
                             f"rtp://127.0.0.1:{port}"])
     clean, lossy, waiting, shapes = Scene(), Scene(), [], {}
     brought, ended = {}, set()  # bytes of each body; frames
+    late, joined, whole = Scene(), None, None  # who joins in the middle, when, and when it has all
     count = dropped = 0
     sequence, gone = None, set()
     while True:
@@ -66,6 +68,12 @@ def main():
         payload = data[12:]
         assert len(data) <= 1200
         clean.read(payload)
+        if joined or clean.time > 0.5 * float(seconds):
+            joined = joined or time.monotonic()
+            late.read(payload)
+            if not whole and late.present and all(
+                    number in late.surfaces and not late.surfaces[number].missing for number in late.present):
+                whole = time.monotonic()
         if payload[5] == 1 and (frame := payload[20:24]) not in ended:  # the last one is sent three times
             measure(payload, brought)
             if data[1] & 128:
@@ -91,6 +99,7 @@ def main():
     with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
         sent = json.load(file)["stream"]
     assert sent["frames"] == len(ended) and sent["packets"] == count
+    assert whole - joined < 1.2, f"who joins late is whole after {whole - joined:.2f} s"
     rates = {clean.bodies[number].name: n for number, n in brought.items() if number in clean.present}
     for name, n in rates.items():  # all of the same time
         assert abs(sent["kbit_per_s"][name] / n - sum(sent["kbit_per_s"].values()) / sum(rates.values())) \
@@ -98,7 +107,8 @@ def main():
     assert 0.5 * float(seconds) < 8e-3 * n / sent["kbit_per_s"][name] < 30
     assert dropped > 0
     cuts = sum(len(v) for v in shapes.values()) - len({number for number, _ in shapes})
-    print(f"{count} packets, {dropped} lost; triangles of {len(shapes)} bodies, changed by cuts: {cuts}")
+    print(f"{count} packets, {dropped} lost; who joins late is whole after {whole - joined:.2f} s")
+    print(f"triangles of {len(shapes)} bodies, changed by cuts: {cuts}")
     assert set(clean.bodies) == set(lossy.bodies) and clean.present == lossy.present
     worst = 0.0
     for number, body in clean.bodies.items():
