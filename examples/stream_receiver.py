@@ -222,7 +222,7 @@ class Scene:
             for surface in self.surfaces.values() if everything else ():
                 surface.told = False
             # a packet of a frame that is over has come late: what is there is newer
-            late = kind == 1 and older(frame, self.frame)
+            late = kind == 1 and (older(frame, self.frame) or not math.isfinite(time))
             self.told = frame
             if kind == 1 and not late:
                 any_frame = True

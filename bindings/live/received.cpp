@@ -76,11 +76,12 @@ void Received::packet(const unsigned char *bytes, size_t n) {
   const bool frame = bytes[5] == 1, everything = bytes[5] == 0 && bytes[6] == 1 && head.get(8) == 1;
   told_ = head.get(20);
   if (frame) {
-    if (begun_ && older(told_, frame_)) return;  // what is there is newer
+    const double time = head.get<double>(24);
+    if ((begun_ && older(told_, frame_)) || !std::isfinite(time)) return;  // what is there is newer
     if (!begun_ || told_ != frame_) contacts_.clear();
     begun_ = true;
     frame_ = told_;
-    time_ = head.get<double>(24);
+    time_ = time;
   }
   if (everything)
     for (auto &[number, m] : meshes_) m.told = false;

@@ -267,6 +267,18 @@ TEST(Received, ListOfWhichAPartIsLost_HidesNothing) {
   EXPECT_EQ(r.meshes().size(), 0u) << "of nothing, too, there is a list";
 }
 
+TEST(Received, FrameWithoutATime_IsPassedOver) {
+  live::Received r;
+  EXPECT_TRUE(read(r, body(7, 1, 0)));
+  EXPECT_TRUE(read(r, {packet("LIST", {1, 7, 1}, 0)}));
+  Packet bad = packet("LIST", {0}, 1);
+  const double never = std::nan("");
+  std::memcpy(&bad[24], &never, sizeof never);
+  EXPECT_TRUE(read(r, {bad}));
+  EXPECT_EQ(r.time(), 0);
+  EXPECT_TRUE(r.present(7));
+}
+
 // A late scene does not take what is newer; an obstacle is nowhere before it has a place.
 TEST(Received, OlderScene_ForgetsNothingNewer) {
   live::Received r;

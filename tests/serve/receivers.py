@@ -6,6 +6,7 @@ import base64
 import json
 import os
 import pathlib
+import random
 import struct
 import sys
 import tracemalloc
@@ -20,12 +21,12 @@ def chunk(tag, *words):
     return tag.encode() + struct.pack(f"<I{len(words)}I", 4 * len(words), *words)
 
 
-def packet(frame, *chunks, whole=0, odd=0):
+def packet(frame, *chunks, whole=0, odd=0, time=0.0):
     """Of a frame where the first chunk is one of a frame. odd: bytes that its first length is off."""
     data = bytearray(b"".join(chunks))
     data[4:8] = struct.pack("<I", int.from_bytes(data[4:8], "little") + odd)
     kind = data[:4] in (b"LIST", b"POSE", b"SURF")
-    return struct.pack("<4sBBHIIIId", b"DFMS", 1, kind, whole, 1, 0, 32 + len(data), frame, 0.0) + data
+    return struct.pack("<4sBBHIIIId", b"DFMS", 1, kind, whole, 1, 0, 32 + len(data), frame, time) + data
 
 
 def body(number, shape):
@@ -84,6 +85,9 @@ CASES = {  # what it is about: packets, and the numbers of bodies and of things 
     "a corner that is no point": (
         [packet(0, chunk("BODY", 7, 1, 3, 1, 0), chunk("BASE", 7, 1, 0, 3, *[0] * 9),
                 chunk("TRIS", 7, 1, 0, 1, 0, 1, 3)), packet(0, listed(1, 7), still(7, 1))], [], []),
+    "a time that is no number": (
+        [packet(0, *body(7, 1)), packet(0, listed(1, 7), still(7, 1)),
+         packet(1, listed(0), time=float("nan"))], [7], []),
     "a place that is no number": (
         [packet(0, *body(7, 1)), packet(0, listed(1, 7), still(7, 1)),
          packet(1, chunk("SURF", 7, 1, 0, 1, 1, 0x7fc00000, 0, 0))], [7], []),
@@ -120,6 +124,17 @@ def in_page(browser, packets):
     }})()"""))
 
 
+def malformed(dice, n):
+    """Packets of all cases, each with some wrong words."""
+    good = [one for packets, *_ in CASES.values() for one in packets]
+    for _ in range(n):
+        one = bytearray(dice.choice(good))
+        for _ in range(dice.randrange(1, 4)):
+            at = 4 * dice.randrange(5, len(one) // 4)
+            one[at:at + 4] = struct.pack("<I", dice.choice([0, 1, 3, 7, 0x7fc00000, 0xffffffff, LARGEST]))
+        yield bytes(one)
+
+
 def main():
     browser = None
     if len(sys.argv) > 2:
@@ -133,6 +148,15 @@ def main():
             if browser:
                 seen = in_page(browser, packets)
                 assert seen == expected, (what, seen)
+        bad = []
+        for one in malformed(random.Random(1), 5000):
+            bad.append(one)
+            if sum(map(len, bad)) < 20000:
+                continue
+            plain(bad)
+            if browser:
+                in_page(browser, bad)
+            bad = []
     finally:
         if browser:
             browser.close()
