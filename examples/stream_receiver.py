@@ -12,6 +12,7 @@ or
 import argparse
 import base64
 import json
+import math
 import os
 import socket
 import struct
@@ -163,14 +164,26 @@ def older(frame, other):
     return 0 < (other - frame) & 0xffffffff < 1 << 31
 
 
-class Surface:
-    """Of a body or an obstacle; `missing`: values that have not come yet."""
+MOST, EACH, MOST_ROWS, LONGEST_NAME = 1 << 22, 64, 1 << 16, 100
 
-    def __init__(self, name, shape, n, m, frame=0):
-        self.name, self.shape, self.frame = name, shape, frame
-        self.base, self.triangles = [None] * (3 * n), [None] * (3 * m)
-        self.moved = [None] * (3 * n)
-        self.missing = 6 * n + 3 * m
+
+class Surface:
+    """Of a body, or of an obstacle (rigid); `missing`: values that have not come yet. Its chunks wait until
+    as much has come as it needs: what is announced takes no memory."""
+
+    def __init__(self, rigid, name, shape, n, m, frame):
+        self.rigid, self.name, self.shape, self.points, self.faces = rigid, name, shape, n, m
+        self.frame, self.told, self.pose, self.waiting, self.waits = frame, True, None, [], 0
+        self.base, self.moved, self.triangles = [], [], []
+        self.missing = 3 * m + (3 * n + 1 if rigid else 6 * n)
+
+    @property
+    def weight(self):
+        return EACH + self.points + self.faces
+
+    def fill(self):
+        self.base, self.triangles = [None] * (3 * self.points), [None] * (3 * self.faces)
+        self.moved = [0.0 if self.rigid else None] * (3 * self.points)
 
     def put(self, values, first, new):
         self.missing -= sum(v is None for v in values[3 * first:3 * first + len(new)])
@@ -185,8 +198,17 @@ class Scene:
     """What has been received: bodies and things by their numbers, contacts, time."""
 
     def __init__(self):
-        self.bodies, self.things, self.contacts, self.present = {}, {}, [], {}
+        self.surfaces, self.held, self.contacts = {}, 0, []
+        self.present, self.listing, self.listed = {}, {}, -1
         self.time, self.frame, self.told = 0.0, 0, 0
+
+    @property
+    def bodies(self):
+        return {number: s for number, s in self.surfaces.items() if not s.rigid}
+
+    @property
+    def things(self):
+        return {number: s for number, s in self.surfaces.items() if s.rigid}
 
     def read(self, message):
         """Packets of one message, one behind the other. Returns whether one of them was of a frame."""
@@ -196,18 +218,21 @@ class Scene:
                                                                                                 message, at)
             if mark != b"DFMS" or version != 1 or size < 32 or at + size > len(message):
                 raise ValueError("this is no packet of dfm.stream 1")
-            if kind == 0 and whole and count == 1:
-                self.bodies, self.things = {}, {}
+            everything = kind == 0 and whole == 1 and count == 1
+            for surface in self.surfaces.values() if everything else ():
+                surface.told = False
             # a packet of a frame that is over has come late: what is there is newer
-            late = kind == 1 and older(frame, self.frame)
+            late = kind == 1 and (older(frame, self.frame) or not math.isfinite(time))
             self.told = frame
             if kind == 1 and not late:
                 any_frame = True
                 if frame != self.frame:
-                    self.contacts, self.present = [], {}
+                    self.contacts = []
                 self.frame, self.time = frame, time
             if not late:
                 self.read_chunks(message[at:at + size])
+            if everything:
+                self.forget(lambda _, s: not s.told and not older(self.told, s.frame))
             at += size
         return any_frame
 
@@ -215,69 +240,111 @@ class Scene:
         at = 32
         while at + 8 <= len(packet):
             tag, size = struct.unpack_from("<4sI", packet, at)
-            data = packet[at + 8:at + 8 + size]
+            if size % 4 or at + 8 + size > len(packet):
+                break
             read = getattr(self, "read_" + tag.decode("ascii", "replace").lower(), None)
-            if read:  # what a later version adds is skipped
-                read(data)
+            try:
+                if read:  # what a later version adds is skipped
+                    read(packet[at + 8:at + 8 + size])
+            except struct.error:  # a chunk that is shorter than it says
+                pass
             at += 8 + size
 
-    @staticmethod
-    def text(data, at):
-        n, = struct.unpack_from("<I", data, at)
-        return data[at + 4:at + 4 + n].decode("utf-8", "replace")
+    def forget(self, gone):
+        for number, surface in list(self.surfaces.items()):
+            if gone(number, surface):
+                self.held -= self.surfaces.pop(number).weight
+
+    def tell(self, data, name, rigid):
+        """One thing has a number, and the newest that was told has it. Returns it where it is a new one."""
+        number, shape, n, m = struct.unpack_from("<4I", data)
+        have = self.surfaces.get(number)
+        if have:
+            have.told = True
+            if (have.shape, have.rigid) == (shape, rigid) or older(self.told, have.frame):
+                return None
+        letters, = struct.unpack_from("<I", data, name)
+        text = data[name + 4:name + 4 + min(letters, LONGEST_NAME)].decode("utf-8", "replace")
+        fresh = Surface(rigid, text, shape, n, m, self.told)
+        if self.held + fresh.weight > MOST:
+            return None
+        self.held += fresh.weight - (have.weight if have else 0)
+        self.surfaces[number] = fresh
+        return fresh
 
     def read_body(self, data):
-        number, shape, n, m = struct.unpack_from("<4I", data)
-        body = self.bodies.get(number)
-        # else it is told again, or it comes late
-        if body is None or (body.shape != shape and not older(self.told, body.frame)):
-            self.bodies[number] = Surface(self.text(data, 16), shape, n, m, self.told)
+        self.tell(data, 16, False)
 
     def read_obst(self, data):
-        number, shape, n, m, kind = struct.unpack_from("<5I", data)
-        thing = self.things.get(number)
-        if thing and (thing.shape == shape or older(self.told, thing.frame)):
-            return
-        thing = self.things[number] = Surface(self.text(data, 40), shape, n, m, self.told)
-        thing.put(thing.moved, 0, [0.0] * (3 * n))
-        thing.kind, thing.sensor, thing.pose = kind & 0xffff, kind >> 16 == 1, (0, 0, 0, 0, 0, 0, 1)
-        thing.radius, thing.half_length, *thing.half_size = struct.unpack_from("<5f", data, 20)
+        kind, size = struct.unpack_from("<I", data, 16)[0], struct.unpack_from("<5f", data, 20)
+        thing = self.tell(data, 40, True) if all(map(math.isfinite, size)) else None
+        if thing:
+            thing.kind, thing.sensor = kind & 0xffff, kind >> 16 == 1
+            thing.radius, thing.half_length, *thing.half_size = size
 
-    def ranges(self, data, kind, of):
+    def ranges(self, tag, data, values):
+        """Puts the values of a range where they belong, or keeps the chunk."""
         number, shape, first, n = struct.unpack_from("<4I", data)
-        surface = self.bodies.get(number) or self.things.get(number)
-        if surface and surface.shape == shape:
-            surface.put(of(surface), first, struct.unpack_from(f"<{3 * n}{kind}", data, 16))
+        s = self.surfaces.get(number)
+        if not s or s.shape != shape or (tag == "surf" and s.rigid):
+            return
+        if first + n > (s.faces if tag == "tris" else s.points) or not all(map(math.isfinite, values)):
+            return
+        if tag == "tris" and any(i >= s.points for i in values):
+            return
+        if s.waiting is None:
+            s.put({"base": s.base, "tris": s.triangles, "surf": s.moved}[tag], first, values)
+            return
+        s.waiting.append((tag, data, values))
+        s.waits += 8 + len(data)
+        if s.waits >= 12 * (s.points + s.faces):
+            waiting, s.waiting = s.waiting, None
+            s.fill()
+            for kept in waiting:
+                self.ranges(*kept)
 
     def read_base(self, data):
-        self.ranges(data, "f", lambda surface: surface.base)
+        self.ranges("base", data, struct.unpack_from(f"<{3 * self.rows(data)}f", data, 16))
 
     def read_tris(self, data):
-        self.ranges(data, "I", lambda surface: surface.triangles)
+        self.ranges("tris", data, struct.unpack_from(f"<{3 * self.rows(data)}I", data, 16))
+
+    @staticmethod
+    def rows(data):
+        return struct.unpack_from("<I", data, 12)[0]
 
     def read_list(self, data):
-        self.present.update(struct.iter_unpack("<II", data))
+        """What a list that is whole leaves out is gone, unless it was told later."""
+        n, = struct.unpack_from("<I", data)
+        if n > MOST_ROWS:
+            return
+        if self.listed != self.frame:
+            self.listing, self.listed = {}, self.frame
+        self.listing.update(struct.iter_unpack("<II", data[4:]))
+        if len(self.listing) >= n:
+            self.present = self.listing
+            self.forget(lambda number, s: number not in self.present and older(s.frame, self.frame))
 
     def read_pose(self, data):
         for number, *pose in struct.iter_unpack("<I7f", data):
-            if number in self.things:
-                self.things[number].pose = tuple(pose)
+            thing = self.surfaces.get(number)
+            if thing and thing.rigid and all(map(math.isfinite, pose)):
+                thing.missing -= thing.pose is None
+                thing.pose = tuple(pose)
 
     def read_surf(self, data):
-        number, shape, first, n, floats = struct.unpack_from("<5I", data)
-        body = self.bodies.get(number)
-        if body is None or body.shape != shape:  # its triangles are on their way
-            return
-        if floats:
+        n, floats = struct.unpack_from("<2I", data, 12)
+        if floats & 1:
             moved = struct.unpack_from(f"<{3 * n}f", data, 20)
         else:
             low, step = struct.unpack_from("<3f", data, 20), struct.unpack_from("<3f", data, 32)
             steps = struct.unpack_from(f"<{3 * n}H", data, 48)
             moved = [low[i % 3] + step[i % 3] * q for i, q in enumerate(steps)]
-        body.put(body.moved, first, moved)
+        self.ranges("surf", data, moved)
 
     def read_cont(self, data):
-        self.contacts += [(row[:3], row[3:6], row[6]) for row in struct.iter_unpack("<6fI", data)]
+        rows = [row for row in struct.iter_unpack("<6fI", data) if all(map(math.isfinite, row))]
+        self.contacts += [(row[:3], row[3:6], row[6]) for row in rows[:MOST_ROWS - len(self.contacts)]]
 
     def write_obj(self, path):
         with open(path, "w", encoding="utf-8") as out:
@@ -314,7 +381,7 @@ def main():
         if isinstance(message, str) or not scene.read(message) or (rtp and not connection.frame_ends):
             continue
         seen += 1
-        points = sum(len(b.base) // 3 for b in scene.bodies.values())
+        points = sum(b.points for b in scene.bodies.values())
         bodies = len(scene.bodies.keys() & scene.present.keys())
         print(f"frame {scene.frame}, {scene.time:.4f} s: {bodies} bodies, {points} points, "
               f"{len(scene.contacts)} contacts" + (f", {connection.lost()} packets lost" if rtp else ""),

@@ -267,6 +267,24 @@ std::string energy_json(const SceneFile &scene, const RunResult &run, const dfm_
   return out.add("unwatched", unwatched.text()).text();
 }
 
+// kbit/s that the frames have brought of each body that is there at the end.
+std::vector<std::pair<std::string, double>> stream_rates(const SceneFile &scene,
+                                                         const RtpSender::Report &sent) {
+  std::vector<std::pair<std::string, double>> out;
+  for (const BodyView &body : scene.bodies())
+    if (const auto at = sent.bodies.find(uint32_t(body.handle)); at != sent.bodies.end())
+      out.emplace_back(body.name, 8e-3 * double(at->second) / sent.lasted);
+  return out;
+}
+
+std::string stream_json(const SceneFile &scene, const RtpSender::Report &sent) {
+  JsonObject rates, out;
+  for (const auto &[body, rate] : stream_rates(scene, sent)) rates.add(body, number(rate));
+  out.add("frames", std::to_string(sent.frames)).add("packets", std::to_string(sent.packets));
+  out.add("bytes", std::to_string(sent.bytes)).add("lost", number(sent.lost));
+  return out.add("kbit_per_s", rates.text()).text();
+}
+
 struct AutoShare { double steps = 0, implicit = 0, changes = 0; };
 // Where the library may change integrators; steps 0: nowhere.
 AutoShare auto_share(const JsonValue &plan) {
@@ -366,6 +384,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
       .add("swaps", swaps_json(scene, run))
       .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))));
   if (!run.sensors.empty()) out.add("sensors", run.sensors);
+  if (run.stream.frames) out.add("stream", stream_json(scene, run.stream));
   if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
   return indented(out.text());
@@ -435,6 +454,18 @@ void print_undamped(const SceneFile &scene) {
       "in a material, for example, lets them come to rest\n");
 }
 
+void print_stream(const SceneFile &scene, const RtpSender::Report &sent) {
+  constexpr size_t kMost = 5;
+  std::printf("streamed: %llu frames, %llu packets, %.3g MB, %.2g ms a frame; %.0f %% reported as lost\n",
+              static_cast<unsigned long long>(sent.frames), static_cast<unsigned long long>(sent.packets),
+              1e-6 * double(sent.bytes), 1e3 * sent.seconds / double(sent.frames), 100 * sent.lost);
+  auto rates = stream_rates(scene, sent);
+  std::stable_sort(rates.begin(), rates.end(),
+                   [](const auto &a, const auto &b) { return a.second > b.second; });
+  for (size_t i = 0; i < rates.size() && i < kMost; ++i)
+    std::printf("streamed of %s: %.4g kbit/s\n", rates[i].first.c_str(), rates[i].second);
+}
+
 void print_swaps(const SceneFile &scene, const RunResult &run) {
   constexpr size_t kMost = 20;
   for (size_t i = 0; i < run.swaps.size() && i < kMost; ++i) {
@@ -468,11 +499,7 @@ void print_table(const SceneFile &scene, const RunResult &run, const Checks &che
   std::printf("%llu steps, %g s simulated in %.3g s: %.4g steps/s, %.3g x real time\n",
               static_cast<unsigned long long>(run.steps), run.simulated - run.begun, run.wall,
               double(run.steps) / run.wall, (run.simulated - run.begun) / run.wall);
-  if (run.stream.frames)
-    std::printf("streamed: %llu frames, %llu packets, %.3g MB, %.2g ms a frame; %.0f %% reported as lost\n",
-                static_cast<unsigned long long>(run.stream.frames),
-                static_cast<unsigned long long>(run.stream.packets), 1e-6 * double(run.stream.bytes),
-                1e3 * run.stream.seconds / double(run.stream.frames), 100 * run.stream.lost);
+  if (run.stream.frames) print_stream(scene, run.stream);
   if (run.pictures)
     std::printf("pictures: %llu, drawn in a further %.3g s, %.2g s each, by %s\n",
                 static_cast<unsigned long long>(run.pictures), run.drawing,

@@ -22,7 +22,7 @@ namespace {
 constexpr uint32_t kPayload = 1188;  // bytes: a datagram of 1,200 passes every network
 constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96;
 constexpr double kFrameRate = 30, kSlowest = 5;  // frames a second
-constexpr std::chrono::seconds kRound(1), kReports(5);
+constexpr std::chrono::seconds kRound(1), kReports(5), kEnding(1);
 constexpr std::chrono::milliseconds kTick(5);     // within which what comes is heard
 constexpr int kPatience = 5;                      // ms
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
@@ -122,6 +122,7 @@ RtpSender::~RtpSender() {
 
 void RtpSender::stop(bool at_once) {
   if (!thread_.joinable()) return;
+  until_ = Clock::now() + (at_once ? Clock::duration(0) : kEnding);
   {
     const std::lock_guard lock(mutex_);
     inbox_.until = at_once ? Inbox::stops : Inbox::ends;
@@ -137,6 +138,7 @@ uint32_t RtpSender::stamp() const {
 
 // What the network does not take within a few milliseconds is lost, like what it loses later.
 void RtpSender::send(const unsigned char *payload, size_t n, bool marker) {
+  if (Clock::now() > until_.load()) return;
   datagram_.resize(kRtpHeader + n);
   unsigned char *const to = datagram_.data();
   to[0] = kRtpVersion;
@@ -290,23 +292,25 @@ void RtpSender::show() {
 // A copy of the state, and of the scene where something in it is new. News that still wait are lost; the
 // next round has them.
 void RtpSender::hand_over() {
-  write_packet(world_, DFM_STREAM_FRAME, number_, snapshot_);
-  Packets news, scene;
-  if (Shapes shapes = shapes_in(snapshot_); shapes != shapes_ || number_ == 0) {
-    news = news_packets(world_, number_, shapes_, shapes);
-    write_packet(world_, DFM_STREAM_SCENE, number_, scene);
-    shapes_ = std::move(shapes);
-  }
-  ++number_;
+  teller_.look(world_);
   {
     const std::lock_guard lock(mutex_);
-    std::swap(inbox_.frame, snapshot_);
-    if (!scene.empty()) {
-      inbox_.news = std::move(news);
-      inbox_.scene = std::move(scene);
+    std::swap(inbox_.frame, teller_.frame);
+    if (!teller_.scene.empty()) {
+      inbox_.news = std::move(teller_.changed);
+      inbox_.scene = std::move(teller_.scene);
     }
   }
   filled_.notify_one();
+}
+
+void RtpSender::count_frame() {
+  const std::lock_guard lock(mutex_);
+  ++report_.frames;
+  report_.lasted = std::chrono::duration<double>(Clock::now() - began_).count();
+  each_chunk(frame_, [&](size_t at, size_t size) {
+    if (std::memcmp(&frame_[at], "SURF", 4) == 0) report_.bodies[word_at(frame_, at + 8)] += size;
+  });
 }
 
 void RtpSender::end() {
@@ -339,8 +343,7 @@ void RtpSender::work() {
       if (!in.frame.empty()) {
         pack(in.frame, kPayload, frame_);
         send_all(frame_, true);
-        const std::lock_guard lock(mutex_);
-        ++report_.frames;
+        count_frame();
       }
       if (!in.text.empty()) send_answer(in.text);
       // A scene that changes in every frame waits for the end of a round: who comes late gets all of one.

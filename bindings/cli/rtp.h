@@ -5,6 +5,7 @@
 #pragma once
 #include <sys/socket.h>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
@@ -73,12 +74,15 @@ class RtpSender {
   bool steered() const;                // who has the token listens
   std::vector<std::string> take();     // what it has asked for since the last call, in order
   void tell(const std::string &text);  // to it
-  void end();  // the last state, twice, and that nothing follows; waits until it is sent
+  void
+  end();  // the last state, twice, and that nothing follows; waits until it is sent, for a second at most
 
   struct Report {
     uint64_t frames = 0, packets = 0, bytes = 0;
-    double seconds = 0;  // that the run itself has spent
-    double lost = 0;     // share, as the receiver has said last
+    double seconds = 0;                   // that the run itself has spent
+    double lost = 0;                      // share, as the receiver has said last
+    double lasted = 0;                    // s, from the start to the last frame
+    std::map<uint32_t, uint64_t> bodies;  // bytes of their displacements, by number
   };
   Report report() const;
 
@@ -94,6 +98,7 @@ class RtpSender {
   void stop(bool at_once);
   void work();
   void send_all(const Packets &packets, bool frame);
+  void count_frame();
   void send_round(double seconds);
   void send(const unsigned char *payload, size_t n, bool marker);
   void send_report(bool ends);
@@ -111,9 +116,7 @@ class RtpSender {
 
   // Of the thread that steps.
   Clock::time_point next_frame_ = began_;
-  Packets snapshot_;
-  Shapes shapes_;
-  uint32_t number_ = 0;
+  Teller teller_;
 
   mutable std::mutex mutex_;  // of these
   std::condition_variable filled_;
@@ -132,7 +135,8 @@ class RtpSender {
   uint64_t octets_ = 0;
   Packets frame_, news_, round_, next_scene_;
   std::vector<unsigned char> datagram_;
-  size_t sent_ = 0;  // bytes of the round
+  size_t sent_ = 0;                                                  // bytes of the round
+  std::atomic<Clock::time_point> until_ = Clock::time_point::max();  // it sends no packets after that
   std::thread thread_;
 };
 

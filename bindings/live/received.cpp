@@ -14,7 +14,8 @@ namespace {
 constexpr size_t kHeader = 32, kChunk = 8;     // bytes
 constexpr size_t kMost = size_t{1} << 22;      // points and triangles of all surfaces together
 constexpr size_t kEach = 64;                   // of them, that a surface counts for beside its own
-constexpr size_t kMostRows = size_t{1} << 16;  // of contacts, and of bodies that are there
+constexpr size_t kMostRows = size_t{1} << 16;  // of contacts, and of what is there
+constexpr size_t kLongestName = 100;           // bytes
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // Numbers of frames begin again at 2^32.
@@ -48,9 +49,9 @@ class Received::Chunk {
       if (!std::isfinite(get<float>(at + 4 * i))) return false;
     return true;
   }
-  std::string text(size_t at) const {
+  std::string name(size_t at) const {
     if (!has(at, 4) || !has(at + 4, get(at))) return {};
-    return {reinterpret_cast<const char *>(bytes_ + at + 4), get(at)};
+    return {reinterpret_cast<const char *>(bytes_ + at + 4), std::min<size_t>(get(at), kLongestName)};
   }
 
  private:
@@ -75,31 +76,33 @@ void Received::packet(const unsigned char *bytes, size_t n) {
   const bool frame = bytes[5] == 1, everything = bytes[5] == 0 && bytes[6] == 1 && head.get(8) == 1;
   told_ = head.get(20);
   if (frame) {
-    if (begun_ && older(told_, frame_)) return;  // what is there is newer
+    const double time = head.get<double>(24);
+    if ((begun_ && older(told_, frame_)) || !std::isfinite(time)) return;  // what is there is newer
     if (!begun_ || told_ != frame_) contacts_.clear();
     begun_ = true;
     frame_ = told_;
-    time_ = head.get<double>(24);
+    time_ = time;
   }
-  if (everything) {
-    for (auto &[number, m] : bodies_) m.told = false;
-    for (auto &[number, m] : things_) m.told = false;
-  }
+  if (everything)
+    for (auto &[number, m] : meshes_) m.told = false;
   chunks(bytes + kHeader, n - kHeader);
-  if (!everything) return;
-  const auto left_out = [&](const auto &entry) {
-    if (!entry.second.told) drop(entry.second);
-    return !entry.second.told;
-  };
-  std::erase_if(bodies_, left_out);
-  std::erase_if(things_, left_out);
+  if (everything) forget([&](uint32_t, const Mesh &m) { return !m.told && !older(told_, m.frame); });
+}
+
+template <class F>
+void Received::forget(F gone) {
+  std::erase_if(meshes_, [&](const auto &entry) {
+    const bool out = gone(entry.first, entry.second);
+    if (out) held_ -= weight(entry.second);
+    return out;
+  });
 }
 
 void Received::chunks(const unsigned char *bytes, size_t n) {
   const Chunk all(bytes, n);
   for (size_t at = 0; all.has(at, kChunk);) {
     const size_t size = all.get(at + 4);
-    if (!all.has(at + kChunk, size)) break;
+    if (size % 4 != 0 || !all.has(at + kChunk, size)) break;
     chunk(bytes + at, Chunk(bytes + at + kChunk, size));
     at += kChunk + size;
   }
@@ -114,24 +117,6 @@ void Received::chunk(const unsigned char *tag, const Chunk &c) {
                 {"SURF", &Received::surface},   {"CONT", &Received::contacts}};
   for (const auto &kind : kKinds)
     if (std::memcmp(tag, kind.tag, 4) == 0) return (this->*kind.read)(c);
-}
-
-void Received::drop(const Mesh &m) { held_ -= weight(m); }
-
-// False: it would take too much memory.
-bool Received::make(Mesh &m, const Chunk &c, size_t name) {
-  const size_t n = c.get(8), triangles = c.get(12);
-  if (n > kMost || triangles > kMost || held_ + kEach + n + triangles > kMost) return false;
-  m.name = c.text(name);
-  m.shape = c.get(4);
-  m.frame = told_;
-  m.told = true;
-  m.points = n;
-  m.faces = triangles;
-  m.missing = 6 * n + 3 * triangles;
-  m.filled = m.missing == 0;
-  held_ += weight(m);
-  return true;
 }
 
 // False: the chunk is kept until as much has come as the lists of the mesh need at least.
@@ -154,56 +139,52 @@ bool Received::fills(Mesh &m, const char *tag, const Chunk &c) {
 }
 
 void Received::body(const Chunk &c) {
-  if (!c.has(0, 20)) return;
-  const auto found = bodies_.find(c.get(0));
-  if (found != bodies_.end()) {
-    Mesh &m = found->second;
-    m.told = true;
-    if (m.shape == c.get(4) || older(told_, m.frame)) return;
-  }
-  Mesh fresh;
-  if (!make(fresh, c, 16)) return;
-  if (found == bodies_.end()) {
-    bodies_.emplace(c.get(0), std::move(fresh));
-    return;
-  }
-  Mesh &old = found->second;
-  drop(old);
-  if (old.missing == 0) fresh.before = std::make_unique<Mesh>(std::move(old));
-  else fresh.before = std::move(old.before);
-  if (fresh.before) held_ += weight(*fresh.before);
-  old = std::move(fresh);
+  if (c.has(0, 20)) tell(c, Mesh(), 16);
 }
 
 void Received::thing(const Chunk &c) {
-  if (!c.has(0, 44)) return;
-  if (const auto found = things_.find(c.get(0)); found != things_.end()) {
-    found->second.told = true;
-    if (found->second.shape == c.get(4) || older(told_, found->second.frame)) return;
-    drop(found->second);  // another thing has its number
-    things_.erase(found);
-  }
-  Thing t;
-  if (!c.finite(20, 5) || !make(t, c, 40)) return;
+  if (!c.has(0, 44) || !c.finite(20, 5)) return;
+  Mesh t;
   t.rigid = true;
-  t.missing -= 3 * t.points;
-  t.filled = t.missing == 0;
   t.kind = c.get(16) & 0xffff;
   t.sensor = c.get(16) >> 16 & 1;
   t.radius = c.get<float>(20);
   t.half_length = c.get<float>(24);
   for (size_t k = 0; k < 3; ++k) t.half_size[k] = c.get<float>(28 + 4 * k);
-  things_.emplace(c.get(0), std::move(t));
+  tell(c, std::move(t), 40);
+}
+
+// One thing has a number, and the newest that was told has it. name: where it stands.
+void Received::tell(const Chunk &c, Mesh fresh, size_t name) {
+  const auto found = meshes_.find(c.get(0));
+  if (found != meshes_.end()) {
+    Mesh &m = found->second;
+    m.told = true;
+    if ((m.shape == c.get(4) && m.rigid == fresh.rigid) || older(told_, m.frame)) return;
+  }
+  fresh.points = c.get(8);
+  fresh.faces = c.get(12);
+  if (held_ + weight(fresh) > kMost) return;
+  fresh.name = c.name(name);
+  fresh.shape = c.get(4);
+  fresh.frame = told_;
+  fresh.told = true;
+  fresh.filled = fresh.points + fresh.faces == 0;
+  fresh.missing = 3 * fresh.faces + (fresh.rigid ? 3 * fresh.points + 1 : 6 * fresh.points);
+  if (found != meshes_.end()) {
+    Mesh &old = found->second;
+    held_ -= weight(old);
+    if (!fresh.rigid && !old.rigid && fresh.missing > 0)
+      fresh.before = old.missing == 0 ? std::make_unique<Mesh>(std::move(old)) : std::move(old.before);
+  }
+  held_ += weight(fresh);
+  meshes_.insert_or_assign(c.get(0), std::move(fresh));
 }
 
 Received::Mesh *Received::mesh(const Chunk &c) {
   if (!c.has(0, 16)) return nullptr;
-  const uint32_t number = c.get(0), shape = c.get(4);
-  if (const auto at = bodies_.find(number); at != bodies_.end() && at->second.shape == shape)
-    return &at->second;
-  if (const auto at = things_.find(number); at != things_.end() && at->second.shape == shape)
-    return &at->second;
-  return nullptr;
+  const auto found = meshes_.find(c.get(0));
+  return found == meshes_.end() || found->second.shape != c.get(4) ? nullptr : &found->second;
 }
 
 void Received::base(const Chunk &c) {
@@ -239,40 +220,39 @@ void Received::triangles(const Chunk &c) {
 // Complete: what was drawn before is not needed any more.
 void Received::settle(Mesh &m) {
   if (!m.before) return;
-  drop(*m.before);
+  held_ -= weight(*m.before);
   m.before.reset();
 }
 
+// What a list that is whole leaves out is gone, unless it was told later.
 void Received::list(const Chunk &c) {
-  if (listed_ != frame_) {
-    const auto gone = [&](const auto &entry) {  // in the frame before
-      const bool out = !present_.contains(entry.first) && older(entry.second.frame, listed_);
-      if (out) drop(entry.second);
-      return out;
-    };
-    std::erase_if(bodies_, gone);
-    std::erase_if(things_, gone);
-    present_.clear();
-    listed_ = frame_;
-  }
-  for (size_t at = 0; c.has(at, 8) && present_.size() < kMostRows; at += 8)
-    present_[c.get(at)] = c.get(at + 4);
+  if (!c.has(0, 4) || c.get(0) > kMostRows) return;
+  const size_t all = c.get(0);
+  if (listed_ != frame_) listing_.clear();
+  listed_ = frame_;
+  for (size_t at = 4; c.has(at, 8) && listing_.size() < all; at += 8) listing_[c.get(at)] = c.get(at + 4);
+  if (listing_.size() < all) return;
+  present_.swap(listing_);
+  listing_.clear();
+  forget([&](uint32_t number, const Mesh &m) { return !present(number) && older(m.frame, frame_); });
 }
 
 void Received::poses(const Chunk &c) {
   for (size_t at = 0; c.has(at, 32); at += 32) {
-    const auto found = things_.find(c.get(at));
-    if (found == things_.end() || !c.finite(at + 4, 7)) continue;
-    for (size_t k = 0; k < 3; ++k) found->second.position[k] = double{c.get<float>(at + 4 + 4 * k)};
-    for (size_t k = 0; k < 4; ++k) found->second.rotation[k] = double{c.get<float>(at + 16 + 4 * k)};
+    const auto found = meshes_.find(c.get(at));
+    if (found == meshes_.end() || !found->second.rigid || !c.finite(at + 4, 7)) continue;
+    Mesh &t = found->second;
+    for (size_t k = 0; k < 3; ++k) t.position[k] = double{c.get<float>(at + 4 + 4 * k)};
+    for (size_t k = 0; k < 4; ++k) t.rotation[k] = double{c.get<float>(at + 16 + 4 * k)};
+    t.missing -= !t.placed;
+    t.placed = true;
   }
 }
 
 void Received::surface(const Chunk &c) {
-  if (!c.has(0, 20)) return;
-  const auto found = bodies_.find(c.get(0));
-  if (found == bodies_.end() || found->second.shape != c.get(4)) return;
-  Mesh &m = found->second;
+  Mesh *const found = c.has(0, 20) ? mesh(c) : nullptr;
+  if (!found || found->rigid) return;
+  Mesh &m = *found;
   const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
   const size_t all = 3 * m.points;
   const bool floats = c.get(16) & 1;

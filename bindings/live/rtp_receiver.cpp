@@ -83,6 +83,8 @@ bool RtpReceiver::datagram(const unsigned char *in, size_t n) {
     received_ = expected_before_ = received_before_ = 0;
     scene_ = {};
     state_ = {};
+    told_ = 0;
+    ++runs_;
     sliders_.clear();
     requests_.clear();
     taken_ = 0;
@@ -107,10 +109,13 @@ void RtpReceiver::answer(const unsigned char *in, size_t n) {
     sent_ -= more;
   }
   cli::JsonValue state;
-  if (cli::parse_json({in + cli::kAnswerHead, in + n}, state) && state.kind == cli::JsonValue::object) {
-    told(state);
-    state_ = std::move(state);
-  }
+  if (!cli::parse_json({in + cli::kAnswerHead, in + n}, state) || state.kind != cli::JsonValue::object)
+    return;
+  const double frame = state.scalar("frame");
+  if (!(frame >= told_ && frame <= UINT32_MAX)) return;  // it has come late
+  told_ = frame;
+  told(state);
+  state_ = std::move(state);
 }
 
 // One slider in each answer; anyone may have sent it.

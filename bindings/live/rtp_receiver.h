@@ -21,6 +21,7 @@ class RtpReceiver {
   // Takes what has come, and sends what is due; call it often.
   void hear();
   const Received &scene() const { return scene_; }
+  uint64_t runs() const { return runs_; }      // of which something has come, this one included
   uint64_t frames() const { return frames_; }  // that have come to their end
   uint64_t packets() const { return received_; }
   uint64_t lost() const { return highest_ + 1 > first_ + received_ ? highest_ + 1 - first_ - received_ : 0; }
@@ -55,12 +56,14 @@ class RtpReceiver {
   sockaddr_storage sender_ = {};
   socklen_t sender_size_ = 0;
   uint64_t first_ = 0, highest_ = 0, received_ = 0, expected_before_ = 0, received_before_ = 0, frames_ = 0;
+  uint64_t runs_ = 0;
   Clock::time_point heard_, reported_, asked_;
   Received scene_;
   uint32_t taken_ = 0;            // number of the last one that the sender has taken
   std::deque<Request> requests_;  // those with the next numbers
   size_t sent_ = 0;               // so many of them, from the first on, were sent and keep their text
   cli::JsonValue state_;
+  double told_ = 0;  // frame of the state
   std::vector<Slider> sliders_;
 };
 

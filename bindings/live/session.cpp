@@ -52,13 +52,6 @@ std::string as_utf8(std::string text) {
   return text;
 }
 
-std::string text_of(const Slider &s) {
-  cli::JsonObject out;
-  out.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label));
-  out.add("value", cli::number(s.value)).add("low", cli::number(s.low)).add("high", cli::number(s.high));
-  return out.add("logarithmic", yes(s.logarithmic)).text();
-}
-
 }  // namespace
 
 Session::Session(const cli::Globals &globals, const std::string &scene, const std::vector<std::string> &set,
@@ -128,15 +121,7 @@ void Session::ask(const std::string &what, const cli::JsonValue &line, uint32_t 
   } else if (what == "release") {
     pull_.release();
   } else if (what == "slider") {
-    const std::string name = line.get("name");
-    const auto slider =
-        std::find_if(sliders_.begin(), sliders_.end(), [&](const Slider &s) { return s.name == name; });
-    if (slider == sliders_.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
-    const double value = line.scalar("value");
-    if (!(value >= slider->low && value <= slider->high))
-      throw cli::Failure(cli::kBadInput, "slider \"" + name + "\": the value is outside of its range");
-    slider->apply(value);
-    slider->value = value;
+    set_slider(sliders_, line);
   } else if (what == "cut") {
     let_go();
     cli::JsonObject cut;
@@ -180,18 +165,10 @@ void Session::advance(double seconds) {
 
 // What viewers have not yet, alone; viewers that come later get everything.
 void Session::show() {
-  Bytes frame, scene;
-  cli::write_packet(scene_.world(), DFM_STREAM_FRAME, frame_, frame);
-  if (cli::Shapes shapes = cli::shapes_in(frame); shapes != shown_ || frame_ == 0) {
-    cli::write_packet(scene_.world(), DFM_STREAM_SCENE, frame_, scene);
-    Bytes news;
-    if (!shown_.empty()) news = cli::news_packets(scene_.world(), frame_, shown_, shapes);
-    viewers_.show_scene(std::move(scene), std::move(news));
-    shown_ = std::move(shapes);
-  }
+  teller_.look(scene_.world());
+  if (!teller_.scene.empty()) viewers_.show_scene(std::move(teller_.scene), std::move(teller_.changed));
   viewers_.show_state(whole_state());
-  viewers_.show_frame(std::move(frame));
-  ++frame_;
+  viewers_.show_frame(teller_.frame);
 }
 
 std::string Session::probe(uint32_t i, size_t most) const {
@@ -206,7 +183,7 @@ std::string Session::probe(uint32_t i, size_t most) const {
 std::string Session::brief_state(uint32_t viewer, size_t turn) const {
   cli::JsonObject out = state(kBrief);
   out.add("you", std::to_string(viewer));
-  if (!sliders_.empty()) out.add("sliders", cli::json_array({text_of(sliders_[turn % sliders_.size()])}));
+  if (!sliders_.empty()) out.add("sliders", cli::json_array({slider_text(sliders_[turn % sliders_.size()])}));
   if (const uint32_t n = scene_.settings().nprobe)
     out.add("probes", cli::json_array({probe(uint32_t(turn % n), kBrief)}));
   return as_utf8(out.text());
@@ -214,7 +191,7 @@ std::string Session::brief_state(uint32_t viewer, size_t turn) const {
 
 std::string Session::whole_state() const {
   std::vector<std::string> sliders, probes;
-  for (const Slider &s : sliders_) sliders.push_back(text_of(s));
+  for (const Slider &s : sliders_) sliders.push_back(slider_text(s));
   for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) probes.push_back(probe(i));
   cli::JsonObject out = state();
   out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
@@ -227,7 +204,7 @@ cli::JsonObject Session::state(size_t most) const {
   cli::JsonObject out;
   out.add("scene", cli::quoted(scene_.path().substr(0, most)))
       .add("time", cli::number(simulation_.time()))
-      .add("frame", std::to_string(frame_))
+      .add("frame", std::to_string(teller_.number()))
       .add("running", yes(running_))
       .add("message", cli::quoted(message_.substr(0, most)))
       .add("step_ms", cli::number(simulation_.step_ms()))

@@ -43,10 +43,10 @@ class Session {
   std::vector<Slider> sliders_;
   cli::Upright upright_;
   Viewers &viewers_;
-  cli::Shapes shown_;  // what viewers have
+  cli::Teller teller_;
   bool running_;
   double wanted_ = 0, real_ = 0;  // s; simulated seconds per second, smoothed
-  uint32_t frame_ = 0, holder_ = 0;
+  uint32_t holder_ = 0;
   std::string message_;
 };
 

@@ -127,4 +127,23 @@ std::vector<Slider> make_sliders(Simulation &simulation) {
   return out;
 }
 
+void set_slider(std::vector<Slider> &sliders, const cli::JsonValue &request) {
+  const std::string name = request.get("name");
+  const auto slider =
+      std::find_if(sliders.begin(), sliders.end(), [&](const Slider &s) { return s.name == name; });
+  if (slider == sliders.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
+  const double value = request.scalar("value");
+  if (!(value >= slider->low && value <= slider->high))
+    throw cli::Failure(cli::kBadInput, "slider \"" + name + "\": the value is outside of its range");
+  slider->apply(value);
+  slider->value = value;
+}
+
+std::string slider_text(const Slider &s) {
+  cli::JsonObject out;
+  out.add("name", cli::quoted(s.name)).add("label", cli::quoted(s.label));
+  out.add("value", cli::number(s.value)).add("low", cli::number(s.low)).add("high", cli::number(s.high));
+  return out.add("logarithmic", s.logarithmic ? "true" : "false").text();
+}
+
 }  // namespace live

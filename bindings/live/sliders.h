@@ -20,5 +20,9 @@ struct Slider {
 // "gravity"; "mu:A:B" of each rule of friction (mu_C and mu_S apart where they differ); "young:BODY" of each
 // body whose model takes another one while it runs.
 std::vector<Slider> make_sliders(Simulation &simulation);
+// Does what a viewer asks for, as doc/reference/stream.md has it. Throws cli::Failure where there is none of
+// that name, or its range lacks the value.
+void set_slider(std::vector<Slider> &sliders, const cli::JsonValue &request);
+std::string slider_text(const Slider &slider);
 
 }  // namespace live

@@ -21,8 +21,9 @@ class Viewers {
   // whole: for viewers that come later; changed: for those that have all before it, empty: these take the
   // whole as well.
   virtual void show_scene(Bytes whole, Bytes changed) = 0;
-  // One packet as write_packet has it; a viewer that is slow gets the newest one alone.
-  virtual void show_frame(Bytes frame) = 0;
+  // One packet as cli::Teller has it, whose memory is exchanged for that of an older one; a slow viewer gets
+  // the newest one alone.
+  virtual void show_frame(Bytes &frame) = 0;
   virtual void show_state(std::string json) = 0;
   virtual std::vector<Request> take() = 0;
   virtual uint32_t viewers() const = 0;

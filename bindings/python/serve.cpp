@@ -16,6 +16,7 @@ namespace {
 struct Served {
   std::unique_ptr<serve::Server> server;
   std::deque<serve::Request> requests;
+  serve::Bytes frame;
 };
 
 serve::Bytes bytes_of(const unsigned char *bytes, size_t n) { return {bytes, bytes + n}; }
@@ -59,7 +60,11 @@ SERVE_API void deform_serve_scene(void *served, const unsigned char *whole, size
   });
 }
 SERVE_API void deform_serve_frame(void *served, const unsigned char *frame, size_t n) {
-  attempt([&] { static_cast<Served *>(served)->server->show_frame(bytes_of(frame, n)); });
+  Served &s = *static_cast<Served *>(served);
+  attempt([&] {
+    s.frame.assign(frame, frame + n);
+    s.server->show_frame(s.frame);
+  });
 }
 SERVE_API void deform_serve_state(void *served, const char *json) {
   attempt([&] { static_cast<Served *>(served)->server->show_state(json); });

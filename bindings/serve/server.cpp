@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "cli/messages.h"
+#include "cli/packets.h"
 #include "cli/secret.h"
 #include "page.h"
 
@@ -107,7 +108,8 @@ struct Server::Call {
   }
 };
 
-Server::Server(uint16_t port, std::string token, Pack pack) : token_(std::move(token)), pack_(pack) {
+Server::Server(uint16_t port, std::string token, Pack pack)
+    : token_(std::move(token)), pack_(pack), frame_(message_of(nullptr, 0)) {
   static const lws_protocols protocols[] = {
       {"http", &Call::page, sizeof(Http), 0, 0, nullptr, 0},
       {"dfm.stream.1", &Call::stream, sizeof(Viewer), kLongestText, 0, nullptr, 0},
@@ -183,28 +185,27 @@ void Server::show_scene(Bytes whole, Bytes changed) {
   wake();
 }
 
-void Server::show_frame(Bytes frame) {
+void Server::show_frame(Bytes &frame) {
   {
     const std::lock_guard lock(mutex_);
-    fresh_ = std::move(frame);
+    fresh_.swap(frame);
   }
   wake();
 }
 
-// On the thread of the network; the newest frame alone.
+// On the thread of the network, which alone reads what it packs; the newest frame alone.
 void Server::pack_frame() {
-  Bytes fresh;
   {
     const std::lock_guard lock(mutex_);
-    fresh.swap(fresh_);
+    packed_.swap(fresh_);
+    fresh_.clear();
   }
-  size_t n = 0;
-  if (fresh.empty() || pack_(fresh.data(), fresh.size(), nullptr, nullptr, &n) != DFM_OK) return;
-  auto message = std::make_shared<Bytes>(LWS_PRE + n);
-  if (pack_(fresh.data(), fresh.size(), nullptr, message->data() + LWS_PRE, &n) != DFM_OK) return;
-  const std::lock_guard lock(mutex_);
-  frame_ = std::move(message);
-  ++frame_number_;
+  if (packed_.empty()) return;
+  const auto pack = [&](void *to, size_t *n) {
+    return pack_(packed_.data(), packed_.size(), nullptr, to, n);
+  };
+  if (cli::fill(*frame_, LWS_PRE, pack) == DFM_OK) ++frame_number_;
+  packed_.clear();
 }
 
 void Server::show_state(std::string json) {
@@ -308,7 +309,7 @@ Server::Message Server::next_for(Viewer &viewer, bool &text) {
     text = true;
     return state_;
   }
-  if (frame_ && viewer.frame != frame_number_) {
+  if (frame_->size() > LWS_PRE && viewer.frame != frame_number_) {
     viewer.frame = frame_number_;
     return frame_;
   }

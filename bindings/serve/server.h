@@ -31,7 +31,7 @@ class Server final : public live::Viewers {
   Server(const Server &) = delete;
   uint16_t port() const { return port_; }
   void show_scene(Bytes whole, Bytes changed) override;
-  void show_frame(Bytes frame) override;
+  void show_frame(Bytes &frame) override;
   void show_state(std::string json) override;
   std::vector<Request> take() override;
   uint32_t viewers() const override;
@@ -66,6 +66,7 @@ class Server final : public live::Viewers {
   uint16_t port_ = 0;
   lws_context *context_ = nullptr;
   std::thread thread_;
+  Bytes packed_;  // of the thread of the network: the frame that is packed
 
   mutable std::mutex mutex_;  // of all below
   bool stops_ = false;

@@ -50,7 +50,7 @@ void Hands::mouse(const Input &in) {
   mouse_[0] = in.x;
   mouse_[1] = in.y;
   if (in.kind == Input::press && held_ < 0 && !window_->panels_want_mouse()) {
-    if (cutting_ && in.button == kLeft) stroke_ = ray();
+    if (cutting_ && in.button == kLeft && steers()) stroke_ = ray();
     else press(in.button);
   }
   if (in.kind == Input::release) {

@@ -37,6 +37,7 @@ class Hands {
   virtual void press(int button) = 0;  // on the picture; held_ is it where it leads the camera
   virtual void release(int button) = 0;
   virtual void cut(const double blade[12]) = 0;  // m, corners
+  virtual bool steers() const { return true; }   // false: what it asks for is not taken
   // Pixels, turns; false: the camera takes them.
   virtual bool leads(double, double) { return false; }
   virtual bool leads_deeper(double) { return false; }

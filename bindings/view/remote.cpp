@@ -128,8 +128,8 @@ void Remote::cut(const double blade[12]) {
 void Remote::press(int button) {
   const Ray at = ray();
   double far = std::numeric_limits<double>::infinity();
-  for (const auto &[number, body] : receiver_.scene().bodies())
-    if (const auto *const m = body.drawn(); m && receiver_.scene().present(number))
+  for (const auto &[number, body] : receiver_.scene().meshes())
+    if (const auto *const m = body.drawn(); m && !m->rigid && receiver_.scene().present(number))
       far = std::min(far, distance(*m, at));
   if (button != kLeft || !std::isfinite(far) || !steers()) {
     held_ = button;
@@ -161,13 +161,16 @@ void Remote::set_slider(const std::string &name, double value) {
 void Remote::sample() {
   const cli::JsonValue &state = receiver_.state();
   const double time = state.scalar("time");
+  if (run_ != receiver_.runs() || time < plotted_) plots_.clear();  // of another run, or it was reset
+  run_ = receiver_.runs();
+  plotted_ = std::fabs(time) < 1e9 ? time : 0;
   const auto add = [&](const std::string &title, const Plot &fresh, const std::vector<double> &values) {
-    const bool good = std::ranges::all_of(values, [](double v) { return std::fabs(v) < 1e9; });
+    const bool good =
+        time == plotted_ && std::ranges::all_of(values, [](double v) { return std::fabs(v) < 1e9; });
     const auto at = plots_.find(title);
     if (!good || values.size() != fresh.curves.size() || (at == plots_.end() && plots_.size() >= kMostPlots))
       return;
     Plot &plot = at == plots_.end() ? plots_.emplace(title, fresh).first->second : at->second;
-    if (!plot.times.empty() && time < plot.times.back()) plot.clear();  // it was reset
     plot.add(time, values.data());
   };
   for (const cli::JsonValue &probe : state.list("probes")) {
@@ -223,7 +226,8 @@ void Remote::fill(render::Scene &out) {
       !up.empty() && render::norm(render::vec(up.data())) > 0)
     std::copy_n(up.begin(), 3, out.up);
   uint32_t color = 0;
-  for (const auto &[number, body] : scene.bodies()) {
+  for (const auto &[number, body] : scene.meshes()) {
+    if (body.rigid) continue;
     const render::Color own = render::palette(color++);
     const auto *const m = body.drawn();
     if (!m || !scene.present(number) || m->triangles.empty()) continue;
@@ -237,8 +241,8 @@ void Remote::fill(render::Scene &out) {
     s.rgb[2] = own.b;
     out.surfaces.push_back(s);
   }
-  for (const auto &[number, t] : scene.things()) {
-    if (t.sensor || t.missing || !scene.present(number)) continue;
+  for (const auto &[number, t] : scene.meshes()) {
+    if (!t.rigid || t.sensor || t.missing || !scene.present(number)) continue;
     if (t.triangles.empty()) {
       cli::Solid solid = {t.kind, {}, {}, double{t.radius}, double{t.half_length}};
       std::copy_n(t.half_size, 3, solid.half_size);
@@ -298,9 +302,9 @@ void Remote::shot(const std::string &name) {
     cli::JsonObject row, middles, plotted;
     size_t triangles = 0;
     for (const auto &[title, plot] : plots_) plotted.add(title, std::to_string(plot.times.size()));
-    for (const auto &[number, body] : receiver_.scene().bodies()) {
+    for (const auto &[number, body] : receiver_.scene().meshes()) {
       const auto *const m = body.drawn();
-      if (!m || !receiver_.scene().present(number)) continue;
+      if (!m || m->rigid || !receiver_.scene().present(number)) continue;
       double sum[3] = {0, 0, 0};
       for (size_t i = 0; i < m->x.size(); ++i) sum[i % 3] += m->x[i] / double(m->x.size() / 3);
       middles.add(m->name, cli::json_vector(sum));

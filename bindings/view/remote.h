@@ -32,7 +32,7 @@ class Remote final : public Hands {
   void set_slider(const std::string &name, double value);
   void ask(const char *what, const std::function<void(cli::JsonObject &)> &more = {},
            const std::string &replaces = "");
-  bool steers() const;  // the sender takes what this window asks for
+  bool steers() const override;
   bool running() const { return receiver_.state().get("running") == "true"; }
   void first_look();
   void panels() override;
@@ -52,6 +52,8 @@ class Remote final : public Hands {
   double began_ = 0, last_ = 0;                     // s
   std::optional<render::Vec> pulled_;               // m, the place that the mouse holds
   std::map<std::string, Plot> plots_;               // by what they show
+  double plotted_ = 0;                              // s, of the state that they have got last
+  uint64_t run_ = 0;                                // of which they are
 };
 
 }  // namespace view

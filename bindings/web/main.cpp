@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <functional>
 #include <memory>
 #include <string_view>
 #include <utility>
@@ -30,7 +31,7 @@ class Page final : public live::Viewers {
     give_bytes(news.data(), news.size());
     whole_ = std::move(whole);
   }
-  void show_frame(live::Bytes frame) override { give_bytes(frame.data(), frame.size()); }
+  void show_frame(live::Bytes &frame) override { give_bytes(frame.data(), frame.size()); }
   void show_state(std::string json) override { give_text(json.c_str()); }
   std::vector<live::Request> take() override { return std::exchange(requests_, {}); }
   uint32_t viewers() const override { return 1; }
@@ -72,49 +73,59 @@ class Rig {
   void act(const std::string &text) {
     cli::JsonValue line;
     if (!cli::parse_json(text, line) || line.get("do") != "slider") return;
-    const std::string name = line.get("name");
-    const double value = line.scalar("value");
-    if (const auto at = case_.input.find(name); at != case_.input.end()) {
-      at->second = value;
-    } else {
-      std::erase_if(case_.params, [&](const cli::CaseParam &p) { return p.key == name; });
-      case_.params.push_back({name, {value}, ""});
+    try {
+      live::set_slider(sliders_, line);
+      due_ = true;
+    } catch (const cli::Failure &e) {
+      refuse(e);
     }
-    due_ = true;
+  }
+
+  static void refuse(const std::exception &e) {
+    give_text(cli::JsonObject().add("refused", cli::quoted(e.what())).text().c_str());
   }
 
   // A decade to both sides, as far as the law goes; what is zero, up to one.
-  static std::string slider(const std::string &name, const std::string &label, double value,
-                            double low = -INFINITY, double high = INFINITY) {
+  void add_slider(const std::string &name, const std::string &label, double value,
+                  std::function<void(double)> apply, double low = -INFINITY, double high = INFINITY) {
     const bool decade = value > 0;
-    low = std::max(low, decade ? value / 10 : 0.0);
-    high = std::min(high, decade ? 10 * value : 1.0);
-    cli::JsonObject out;
-    out.add("name", cli::quoted(name)).add("label", cli::quoted(label)).add("value", cli::number(value));
-    out.add("low", cli::number(low)).add("high", cli::number(high));
-    return out.add("logarithmic", decade && low > 0 ? "true" : "false").text();
+    live::Slider s;
+    s.name = name;
+    s.label = label;
+    s.value = value;
+    s.low = std::max(low, decade ? value / 10 : 0.0);
+    s.high = std::min(high, decade ? 10 * value : 1.0);
+    s.logarithmic = decade && s.low > 0;
+    s.apply = std::move(apply);
+    sliders_.push_back(std::move(s));
   }
 
-  std::string sliders(const cli::RigLaw &law) const {
-    std::vector<std::string> out;
-    for (const auto &[name, value] : case_.input)
-      if (value != 0) out.push_back(slider(name, name + " of the motion", value));
+  void add_sliders(const cli::RigLaw &law) {
+    for (auto &entry : case_.input)
+      if (entry.second != 0)
+        add_slider(entry.first, entry.first + " of the motion", entry.second,
+                   [&entry](double x) { entry.second = x; });
     const char *const rows = reinterpret_cast<const char *>(law.type().params);
     for (uint32_t i = 0; i < law.type().nparam; ++i) {
       const auto *const row = reinterpret_cast<const dfm_param *>(rows + size_t(i) * law.type().param_size);
       if (row->width > 1 || row->flags & (DFM_PARAM_ENUM | DFM_PARAM_INTEGER | DFM_PARAM_LIST)) continue;
       const std::string unit = row->unit == std::string_view("1") ? "" : std::string(", ") + row->unit;
-      out.push_back(slider(row->key, row->key + unit, law.param(row->key, 0), row->min, row->max));
+      const auto apply = [this, key = std::string(row->key)](double x) {
+        std::erase_if(case_.params, [&](const cli::CaseParam &p) { return p.key == key; });
+        case_.params.push_back({key, {x}, ""});
+      };
+      add_slider(row->key, row->key + unit, law.param(row->key, 0), apply, row->min, row->max);
     }
-    return cli::json_array(out);
   }
 
-  void run() const {
+  void run() {
     try {
       cli::RigLaw law(globals(), case_, "");
+      if (sliders_.empty()) add_sliders(law);
       cli::Progress silent(false);
       const cli::RigResult result = cli::run_rig(case_, law, kStep, silent);
-      std::vector<std::string> columns, rows;
+      std::vector<std::string> columns, rows, sliders;
+      for (const live::Slider &s : sliders_) sliders.push_back(live::slider_text(s));
       for (const std::string &name : result.columns) columns.push_back(cli::quoted(name));
       for (const std::vector<double> &row : result.rows) {
         std::vector<std::string> cells;
@@ -124,15 +135,16 @@ class Rig {
       cli::JsonObject out;
       out.add("law", cli::quoted(law.type().id)).add("message", cli::quoted(result.stopped));
       out.add("normal", cli::number(law.normal_force())).add("steps", std::to_string(result.steps));
-      out.add("sliders", sliders(law)).add("columns", cli::json_array(columns));
+      out.add("sliders", cli::json_array(sliders)).add("columns", cli::json_array(columns));
       give_text(out.add("rows", cli::json_array(rows)).text().c_str());
     } catch (const std::exception &e) {
-      give_text(cli::JsonObject().add("refused", cli::quoted(e.what())).text().c_str());
+      refuse(e);
     }
   }
 
   static constexpr double kStep = 1e-4;  // s
   cli::FrictionCase case_;
+  std::vector<live::Slider> sliders_;  // with the ranges that the page has
   bool due_ = true;
 };
 

@@ -73,8 +73,10 @@ def main():
         run(prefix / "bin" / "deform", *words, "--help", env=clean)
     said = run(python, "-c", "import deform\nwith deform.World() as w:\n  w.add_obstacle('plane')\n"
                "  b = w.add_body(deform.TetMesh.ball(0.1, cells=100), position=(0, 0, 0.15))\n"
-               "  w.run(0.01, dt=1e-3)\n  print(deform.__file__, b.measure.com[2])",
+               "  w.run(0.01, dt=1e-3)\n  print(deform.__file__, b.measure.com[2], w.film().html()[:7])",
                env={**clean, "PYTHONPATH": str(prefix / "lib/python3/dist-packages")})
+    if "<iframe" not in said:
+        sys.exit("the package shows no film")
     if str(root) not in said:
         sys.exit("another deform was imported than the package's")
 

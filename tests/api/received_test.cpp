@@ -53,7 +53,7 @@ uint32_t shape_in(const std::vector<Packet> &frame, uint32_t body) {
         return x;
       };
       size = word(at + 4);
-      for (size_t i = at + 8; std::memcmp(&p[at], "LIST", 4) == 0 && i < at + 8 + size; i += 8)
+      for (size_t i = at + 12; std::memcmp(&p[at], "LIST", 4) == 0 && i < at + 8 + size; i += 8)
         if (word(i) == body) return word(i + 4);
     }
   return 0;
@@ -62,7 +62,7 @@ uint32_t shape_in(const std::vector<Packet> &frame, uint32_t body) {
 void compare(const live::Received &r, dfm_body b, double within) {
   SCOPED_TRACE(testing::Message() << "body " << uint32_t(b));
   ASSERT_TRUE(r.present(uint32_t(b)));
-  const live::Received::Mesh *const m = r.bodies().at(uint32_t(b)).drawn();
+  const live::Received::Mesh *const m = r.meshes().at(uint32_t(b)).drawn();
   ASSERT_TRUE(m);
   const std::vector<double> x = test::surface_positions(b);
   uint32_t nt = 0;
@@ -76,7 +76,7 @@ void compare(const live::Received &r, dfm_body b, double within) {
 
 // Whatever has come: what is drawn is whole.
 void check(const live::Received &r) {
-  for (const auto &[number, body] : r.bodies()) {
+  for (const auto &[number, body] : r.meshes()) {
     const live::Received::Mesh *const m = body.drawn();
     if (!m) continue;
     ASSERT_TRUE(std::ranges::all_of(m->x, [](double x) { return std::isfinite(x); }));
@@ -105,7 +105,7 @@ TEST(Received, PacketsInAnyOrderAndTwice_AreWhatTheLibraryHas) {
     }
     compare(r, s.upper, kWithin);
     compare(r, s.lower, kWithin);
-    EXPECT_EQ(r.things().at(uint32_t(s.floor)).name, "floor");
+    EXPECT_EQ(r.meshes().at(uint32_t(s.floor)).name, "floor");
     EXPECT_EQ(r.contacts().empty(), !(flags & DFM_STREAM_CONTACTS));
     EXPECT_EQ(r.frame(), 7u);
     test::run(s.world, 5e-3, 1e-3);
@@ -133,15 +133,15 @@ TEST(Received, CutBody_IsDrawnAsItWasUntilTheNewOneIsComplete) {
   live::Received r;
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, 0)));
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 0)));
-  const size_t before = r.bodies().at(uint32_t(s.upper)).drawn()->triangles.size();
+  const size_t before = r.meshes().at(uint32_t(s.upper)).drawn()->triangles.size();
   test::split_upper(s);
   std::vector<Packet> scene = stream(s.world, DFM_STREAM_SCENE, 1, 0, s.upper);
   const Packet last = scene.back();
   scene.pop_back();
   EXPECT_TRUE(read(r, scene));
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 1)));
-  ASSERT_TRUE(r.bodies().at(uint32_t(s.upper)).drawn());
-  EXPECT_EQ(r.bodies().at(uint32_t(s.upper)).drawn()->triangles.size(), before);
+  ASSERT_TRUE(r.meshes().at(uint32_t(s.upper)).drawn());
+  EXPECT_EQ(r.meshes().at(uint32_t(s.upper)).drawn()->triangles.size(), before);
   EXPECT_TRUE(r.read(last.data(), last.size()));
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 2)));
   compare(r, s.upper, kWithin);
@@ -170,36 +170,160 @@ TEST(Received, ThingsThatAreAddedAndRemoved_AreSeenSo) {
     EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, frame, 0, sphere)));
     EXPECT_TRUE(read(r, now));
     EXPECT_TRUE(r.present(number));
-    EXPECT_EQ(r.things().at(number).kind, uint32_t{DFM_SHAPE_SPHERE});
-    EXPECT_EQ(r.things().at(number).radius, float(radius));
-    EXPECT_EQ(r.things().at(number).position[0], 3);
-    EXPECT_EQ(r.things().at(uint32_t(s.floor)).name, "floor");
+    EXPECT_EQ(r.meshes().at(number).kind, uint32_t{DFM_SHAPE_SPHERE});
+    EXPECT_EQ(r.meshes().at(number).radius, float(radius));
+    EXPECT_EQ(r.meshes().at(number).position[0], 3);
+    EXPECT_EQ(r.meshes().at(uint32_t(s.floor)).name, "floor");
     test::ok(dfm_obstacle_destroy(sphere));
     EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, ++frame)));
     EXPECT_FALSE(r.present(number));
   }
   EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, ++frame)));
-  EXPECT_EQ(r.things().size(), 1u);
+  EXPECT_EQ(r.meshes().size(), 3u);
   compare(r, s.upper, kWithin);
+}
+
+using Words = std::vector<uint32_t>;
+
+// With one chunk.
+Packet packet(const char *tag, const Words &words, uint32_t frame = 0) {
+  const auto n = uint32_t(4 * words.size()), size = 40 + n, one = 1u;
+  Packet p(size);
+  std::memcpy(&p[0], "DFMS\x01", 5);
+  p[5] = std::strcmp(tag, "LIST") == 0 || std::strcmp(tag, "POSE") == 0 || std::strcmp(tag, "SURF") == 0;
+  std::memcpy(&p[8], &one, 4);
+  std::memcpy(&p[16], &size, 4);
+  std::memcpy(&p[20], &frame, 4);
+  std::memcpy(&p[32], tag, 4);
+  std::memcpy(&p[36], &n, 4);
+  std::memcpy(&p[40], words.data(), n);
+  return p;
+}
+
+// A triangle, and a sphere.
+std::vector<Packet> body(uint32_t number, uint32_t shape, uint32_t frame) {
+  return {packet("BODY", {number, shape, 3, 1, 0}, frame),
+          packet("TRIS", {number, shape, 0, 1, 0, 1, 2}, frame),
+          packet("BASE", {number, shape, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0}, frame),
+          packet("SURF", {number, shape, 0, 3, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}, frame)};
+}
+std::vector<Packet> sphere(uint32_t number, uint32_t shape, uint32_t frame) {
+  return {packet("OBST", {number, shape, 0, 0, 1, 0x3f800000, 0, 0, 0, 0, 0}, frame),
+          packet("POSE", {number, 0, 0, 0, 0, 0, 0, 0x3f800000}, frame)};
+}
+
+TEST(Received, NumberThatAnotherThingGets_IsThatOneAlone) {
+  live::Received r;
+  for (uint32_t frame = 0; frame < 6; ++frame) {
+    const bool rigid = frame % 2 == 1;
+    EXPECT_TRUE(read(r, rigid ? sphere(7, 1, frame) : body(7, 1, frame)));
+    EXPECT_TRUE(read(r, {packet("LIST", {1, 7, 1}, frame)}));
+    ASSERT_EQ(r.meshes().size(), 1u);
+    EXPECT_EQ(r.meshes().at(7).rigid, rigid);
+    EXPECT_EQ(r.meshes().at(7).drawn(), &r.meshes().at(7));
+    EXPECT_TRUE(r.present(7));
+  }
+  EXPECT_TRUE(read(r, body(7, 1, 2)));  // late
+  EXPECT_TRUE(r.meshes().at(7).rigid);
+}
+
+TEST(Received, ListOfWhichAPartIsLost_HidesNothing) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  std::vector<uint32_t> numbers;
+  for (int i = 0; i < 300; ++i) {
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.shape = DFM_SHAPE_SPHERE;
+    d.radius = 0.01;
+    d.pose.position[0] = 3 + i;
+    dfm_obstacle sphere = 0;
+    test::ok(dfm_obstacle_create(s.world, &d, &sphere));
+    numbers.push_back(uint32_t(sphere));
+  }
+  live::Received r;
+  const auto there = [&] { return std::ranges::count_if(numbers, [&](uint32_t n) { return r.present(n); }); };
+  EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, 0)));
+  EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 0, 0, 0, 1188)));
+  EXPECT_EQ(there(), 300);
+  std::vector<Packet> frame = stream(s.world, DFM_STREAM_FRAME, 1, 0, 0, 1188);
+  const Packet second = frame[1];
+  EXPECT_EQ(std::memcmp(&second[32], "LIST", 4), 0);
+  frame.erase(frame.begin() + 1);
+  EXPECT_TRUE(read(r, frame));
+  EXPECT_EQ(there(), 300);
+  // what is taken away is gone where the list has come as a whole, in any order
+  for (const dfm_obstacle o : test::listed(dfm_world_obstacles, s.world))
+    if (std::ranges::count(std::vector(numbers.begin(), numbers.begin() + 100), uint32_t(o)))
+      test::ok(dfm_obstacle_destroy(o));
+  frame = stream(s.world, DFM_STREAM_FRAME, 2, 0, 0, 1188);
+  EXPECT_TRUE(read(r, {frame[1], frame[1]}));
+  EXPECT_EQ(there(), 300);
+  EXPECT_TRUE(read(r, {frame[0]}));
+  EXPECT_EQ(there(), 200);
+  EXPECT_EQ(r.meshes().size(), 203u);
+  for (const dfm_obstacle o : test::listed(dfm_world_obstacles, s.world)) test::ok(dfm_obstacle_destroy(o));
+  for (const dfm_body b : test::listed(dfm_world_bodies, s.world)) test::ok(dfm_body_destroy(b));
+  EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, 3, 0, 0, 1188)));
+  EXPECT_EQ(r.meshes().size(), 0u) << "of nothing, too, there is a list";
+}
+
+TEST(Received, FrameWithoutATime_IsPassedOver) {
+  live::Received r;
+  EXPECT_TRUE(read(r, body(7, 1, 0)));
+  EXPECT_TRUE(read(r, {packet("LIST", {1, 7, 1}, 0)}));
+  Packet bad = packet("LIST", {0}, 1);
+  const double never = std::nan("");
+  std::memcpy(&bad[24], &never, sizeof never);
+  EXPECT_TRUE(read(r, {bad}));
+  EXPECT_EQ(r.time(), 0);
+  EXPECT_TRUE(r.present(7));
+}
+
+// A late scene does not take what is newer; an obstacle is nowhere before it has a place.
+TEST(Received, OlderScene_ForgetsNothingNewer) {
+  live::Received r;
+  Packet all = packet("BODY", {1, 1, 0, 0, 0}, 5);
+  all[6] = 1;
+  EXPECT_TRUE(read(r, {all}));
+  EXPECT_TRUE(read(r, {packet("OBST", {2, 1, 0, 0, 1, 0x3f800000, 0, 0, 0, 0, 0}, 6)}));
+  EXPECT_FALSE(r.meshes().at(2).drawn());
+  EXPECT_TRUE(read(r, {packet("POSE", {2, 0, 0, 0, 0, 0, 0, 0x3f800000}, 6), all}));
+  ASSERT_TRUE(r.meshes().contains(2));
+  EXPECT_TRUE(r.meshes().at(2).drawn());
+}
+
+TEST(Received, ChunkThatIsNotOfFourBytes_EndsItsPacket) {
+  live::Received r;
+  Packet p = packet("BODY", {1, 1, 0, 0, 0});
+  const uint32_t odd = 19;
+  std::memcpy(&p[36], &odd, 4);
+  const Packet more = packet("BODY", {2, 1, 0, 0, 0});
+  p.insert(p.end() - 1, more.begin() + 32, more.end());
+  const auto size = uint32_t(p.size());
+  std::memcpy(&p[16], &size, 4);
+  EXPECT_TRUE(read(r, {p}));
+  EXPECT_TRUE(r.meshes().empty());
+}
+
+// Bodies of nothing, and long names.
+TEST(Received, WhatIsToldAgainAndAgain_TakesNoMoreMemory) {
+  live::Received r;
+  Words named = {1, 0, 0, 0, 10000};
+  named.resize(5 + 2500, 0x61616161);
+  EXPECT_TRUE(read(r, {packet("BODY", named)}));
+  EXPECT_EQ(r.meshes().at(1).name.size(), 100u);
+  for (uint32_t shape = 1; shape < 200000; ++shape) {
+    EXPECT_TRUE(read(r, {packet("BODY", {1, shape, 0, 0, 0})}));
+    ASSERT_FALSE(r.meshes().at(1).before);
+  }
 }
 
 // A few bytes say that the largest surface of all comes.
 TEST(Received, WhatIsAnnounced_TakesNoMemoryBeforeItComes) {
-  const auto packet = [](const char *tag, std::vector<uint32_t> words) {
-    const auto n = uint32_t(4 * words.size()), size = 40 + n, one = 1u;
-    Packet p(size);
-    std::memcpy(&p[0], "DFMS\x01", 5);
-    std::memcpy(&p[8], &one, 4);
-    std::memcpy(&p[16], &size, 4);
-    std::memcpy(&p[32], tag, 4);
-    std::memcpy(&p[36], &n, 4);
-    std::memcpy(&p[40], words.data(), n);
-    return p;
-  };
   const uint32_t most = (1u << 21) - 64;
   live::Received r;
   EXPECT_TRUE(read(r, {packet("BODY", {7, 1, most, most, 0})}));
-  const live::Received::Mesh &m = r.bodies().at(7);
+  const live::Received::Mesh &m = r.meshes().at(7);
   EXPECT_EQ(m.points, most);
   for (uint32_t i = 1; i <= 100; ++i)
     EXPECT_TRUE(read(
@@ -276,8 +400,8 @@ TEST(Received, TenMinutesOfLoss_LeaveNoMoreThanOlderPoints) {
       std::deque<std::vector<double>> &ages = places[number];
       ages.push_front(test::surface_positions(body));
       if (ages.size() > 20) ages.pop_back();
-      const auto found = r.bodies().find(number);
-      const live::Received::Mesh *const m = found == r.bodies().end() ? nullptr : &found->second;
+      const auto found = r.meshes().find(number);
+      const live::Received::Mesh *const m = found == r.meshes().end() ? nullptr : &found->second;
       if (!m || m->missing || m->shape != shapes[number]) {  // it is told again each second
         ++waits;
         continue;
@@ -318,8 +442,13 @@ TEST(Received, MalformedPackets_HarmNothing) {
   for (const Packet &p : stream(s.world, DFM_STREAM_FRAME, 0, DFM_STREAM_CONTACTS)) good.push_back(p);
   std::mt19937 dice(2);
   const auto below = [&](size_t n) { return size_t{dice()} % n; };
-  auto r = std::make_unique<live::Received>();
+  std::unique_ptr<live::Received> r;
   for (int i = 0; i < 1000000; ++i) {
+    if (i % 100 == 0) {  // or all is older than the frame of a wrong number
+      if (r) check(*r);
+      r = std::make_unique<live::Received>();
+      EXPECT_TRUE(read(*r, good));
+    }
     Packet p = good[below(good.size())];
     for (size_t k = below(4); k > 0; --k) {
       const size_t at = below(p.size());
@@ -329,10 +458,8 @@ TEST(Received, MalformedPackets_HarmNothing) {
     }
     if (below(8) == 0) p.resize(below(p.size()));
     r->read(p.data(), p.size());
-    if (i % 10000 == 0) check(*r);
   }
-  // a new viewer is as if nothing had been, and so is this one as soon as frames are newer
-  r = std::make_unique<live::Received>();
+  r = std::make_unique<live::Received>();  // as if nothing had been
   EXPECT_TRUE(read(*r, good));
   compare(*r, s.upper, kWithin);
 }

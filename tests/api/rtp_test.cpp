@@ -2,9 +2,13 @@
 #include "rtp.h"
 
 #include <arpa/inet.h>
+#include <sys/syscall.h>
 #include <sys/time.h>
 #include <unistd.h>
 
+#include <atomic>
+#include <cerrno>
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <thread>
@@ -12,6 +16,19 @@
 #include "coupled.h"
 #include "live/received.h"
 #include "stack.h"
+
+namespace {
+
+std::atomic<bool> congested = false;  // the network takes nothing
+
+}  // namespace
+
+extern "C" ssize_t send(int socket, const void *bytes, size_t n, int flags) {
+  if (!congested) return syscall(SYS_sendto, socket, bytes, n, flags, nullptr, 0);
+  usleep(200000);
+  errno = EAGAIN;
+  return -1;
+}
 
 namespace {
 
@@ -55,8 +72,8 @@ struct Viewers {
       sequence = number;
       EXPECT_TRUE(early.read(&in[12], size_t(n) - 12));
       if (early.frame() > 20) late.read(&in[12], size_t(n) - 12);
-      const auto found = early.bodies().find(body);
-      if (in[1] >> 7 && found != early.bodies().end() && found->second.drawn())
+      const auto found = early.meshes().find(body);
+      if (in[1] >> 7 && found != early.meshes().end() && found->second.drawn())
         seen[early.time()] = found->second.x;
     }
   }
@@ -96,13 +113,68 @@ TEST(Rtp, SentOnAnotherThread_FramesAreWhatTheStepsHaveLeft) {
   }
   // the last obstacle has come, and the one before is gone, for both
   for (const live::Received *r : {&viewers.early, &viewers.late}) {
-    ASSERT_TRUE(r->bodies().contains(uint32_t(s.upper)));
-    EXPECT_TRUE(r->bodies().at(uint32_t(s.upper)).drawn());
-    ASSERT_TRUE(r->things().contains(uint32_t(added)));
-    EXPECT_EQ(r->things().at(uint32_t(added)).kind, uint32_t{DFM_SHAPE_BOX});
-    for (const auto &[number, thing] : r->things())
-      EXPECT_EQ(r->present(number), number == uint32_t(added) || number == uint32_t(s.floor));
+    ASSERT_TRUE(r->meshes().contains(uint32_t(s.upper)));
+    EXPECT_TRUE(r->meshes().at(uint32_t(s.upper)).drawn());
+    ASSERT_TRUE(r->meshes().contains(uint32_t(added)));
+    EXPECT_EQ(r->meshes().at(uint32_t(added)).kind, uint32_t{DFM_SHAPE_BOX});
+    for (const auto &[number, thing] : r->meshes())
+      EXPECT_TRUE(!thing.rigid || number == uint32_t(added) || number == uint32_t(s.floor));
   }
+}
+
+TEST(Rtp, NetworkThatTakesNothing_DoesNotHoldTheEnd) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c, 0.02);
+  Viewers viewers;
+  cli::RtpSender sender(s.world, viewers.url);
+  test::run(s.world, 1e-3, 1e-3);
+  sender.after_step();
+  congested = true;
+  const auto before = std::chrono::steady_clock::now();
+  sender.end();
+  congested = false;
+  EXPECT_LT(std::chrono::steady_clock::now() - before, std::chrono::seconds(3));
+}
+
+// unsanitized: against the clock
+TEST(Rtp, RateFollowsWhatTheReceiverHasLost) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c, 0.05);
+  Viewers viewers;
+  cli::RtpSender sender(s.world, viewers.url);
+  sockaddr_storage from = {};
+  socklen_t size = sizeof from;
+  unsigned char in[2048];
+  ASSERT_GT(recvfrom(viewers.socket, in, sizeof in, 0, reinterpret_cast<sockaddr *>(&from), &size), 0);
+  const auto frames = [&](double seconds) {
+    const uint64_t before = sender.report().frames;
+    const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(seconds);
+    while (std::chrono::steady_clock::now() < end) {
+      sender.show();
+      usleep(1000);
+    }
+    return sender.report().frames - before;
+  };
+  const auto lost = [&](unsigned char share) {  // of 256
+    for (int i = 0; i < 40; ++i) {
+      unsigned char out[32] = {};
+      out[0] = 0x81;
+      out[1] = cli::kReceiverReport;
+      out[3] = 7;
+      out[12] = share;
+      EXPECT_EQ(sendto(viewers.socket, out, sizeof out, 0, reinterpret_cast<const sockaddr *>(&from), size),
+                ssize_t{sizeof out});
+    }
+    frames(0.3);
+  };
+  EXPECT_GT(frames(1), 10u);
+  lost(128);
+  EXPECT_NEAR(sender.report().lost, 0.5, 1e-12);
+  EXPECT_LE(frames(1), 7u);
+  lost(12);  // between the two bounds: as it was
+  EXPECT_LE(frames(1), 7u);
+  lost(0);
+  EXPECT_GT(frames(1), 10u);
 }
 
 }  // namespace

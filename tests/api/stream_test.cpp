@@ -46,7 +46,7 @@ struct Viewer {
   std::map<uint32_t, uint32_t> present;
   std::map<uint32_t, std::vector<float>> poses;
   std::vector<std::vector<float>> contacts;
-  size_t packets = 0, longest = 0;
+  size_t packets = 0, longest = 0, listed = 0;
 
   void read(const Bytes &b) {
     size_t n = 0;
@@ -91,7 +91,8 @@ struct Viewer {
       }
       m.missing -= 3 * size_t{u(3)};
     } else if (tag == "LIST") {
-      for (size_t i = 0; i < c.size() / 8; ++i) present[u(2 * i)] = u(2 * i + 1);
+      listed = u(0);
+      for (size_t i = 0; i < c.size() / 8; ++i) present[u(2 * i + 1)] = u(2 * i + 2);
     } else if (tag == "POSE") {
       for (size_t i = 0; i < c.size() / 32; ++i)
         for (size_t k = 1; k < 8; ++k) poses[u(8 * i)].push_back(f(8 * i + k));
@@ -147,6 +148,7 @@ TEST(Stream, SaysWhatTheLibraryHas_InPacketsOfAnySize) {
       v.read(stream(s.world, DFM_STREAM_FRAME, flags, packet));
       if (packet) EXPECT_LE(v.longest, packet);
       else EXPECT_EQ(v.packets, 1u);
+      EXPECT_EQ(v.listed, v.present.size());
       v.compare(s.lower);
       v.compare(s.upper);
       EXPECT_EQ(v.meshes.at(uint32_t(s.floor)).name, "floor");

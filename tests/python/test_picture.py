@@ -186,6 +186,23 @@ class View(unittest.TestCase):
         ball = np.reshape(scene.things[2].base, (-1, 3))
         np.testing.assert_allclose(np.linalg.norm(ball, axis=1), 0.1, rtol=1e-3)
 
+    def test_obstacles_that_come_and_go_are_seen_so(self):
+        with deform.World() as world:
+            world.add_body(deform.TetMesh.ball(0.1, 300), name="ball")
+            floor = world.add_obstacle("plane", name="floor")
+            film = world.film()
+            world.add_obstacle("sphere", radius=0.1, position=(1, 0, 0))
+            world.add_rigid("box", half_size=(0.1, 0.1, 0.1), position=(2, 0, 0.1), mass=1)
+            film.add()
+            floor.remove()
+            world.add_obstacle("sphere", radius=0.2, position=(3, 0, 0))
+            film.add()
+            there = [[(t.kind, round(t.radius, 6), t.pose[0]) for n, t in scene.things.items()
+                      if n in scene.present and not t.missing] for scene in self.seen(film)]
+        self.assertEqual(there[0], [(0, 0, 0)])
+        self.assertEqual(there[1], [(0, 0, 0), (1, 0.1, 1), (2, 0, 2)])
+        self.assertEqual(there[2], [(1, 0.1, 1), (2, 0, 2), (1, 0.2, 3)])
+
     def test_slope_by_gravity_is_turned_upright(self):
         with deform.World(gravity=(3, 0, -4)) as world:
             world.add_obstacle("plane")

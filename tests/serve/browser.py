@@ -15,7 +15,7 @@ import time
 import urllib.request
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "examples"))
-from stream_receiver import Connection  # noqa: E402
+from stream_receiver import Connection, Scene  # noqa: E402
 
 
 class Browser:
@@ -98,7 +98,7 @@ class Browser:
 
 
 # Where the first body is in the page: left, top, right, bottom, in pixels.
-BOX = """(() => { const b = [...world.bodies.values()][0], a = axes(), h = canvas.clientHeight / 2;
+BOX = """(() => { const b = bodies()[0], a = axes(), h = canvas.clientHeight / 2;
   const q = [1e9, 1e9, -1e9, -1e9];
   for (let i = 0; i < b.x.length / 3; i++) {
     const p = sub(point(b.x, i), a.eye), d = -dot(p, a.back) * camera.tan;
@@ -110,7 +110,7 @@ BOX = """(() => { const b = [...world.bodies.values()][0], a = axes(), h = canva
 
 def walk(browser, out):
     picture = lambda name: browser.picture(os.path.join(out, name))
-    browser.wait("typeof world !== 'undefined' && world.bodies.size > 0 && world.frame > 3", "the scene")
+    browser.wait("typeof world !== 'undefined' && bodies().length > 0 && world.frame > 3", "the scene")
     browser.wait("state.control === me", "this page is in control")
     picture("begin.png")
     browser.click("run")
@@ -119,13 +119,13 @@ def walk(browser, out):
     # the middle of what is seen of the body: it is pulled aside, and follows
     box = browser.value(BOX)
     middle = ((box[0] + box[2]) / 2, (box[1] + box[3]) / 2)
-    before = browser.value("[...world.bodies.values()][0].x.reduce((a, c) => a + c, 0)")
+    before = browser.value("bodies()[0].x.reduce((a, c) => a + c, 0)")
     browser.drag(middle, (middle[0] + 120, middle[1] - 60), 0.5)
     browser.wait("state.pull && state.pull.force > 0", "the body is pulled")
     picture("pulled.png")
     browser.mouse("mouseReleased", middle[0] + 120, middle[1] - 60)
     browser.wait("!state.pull", "the body is let go")
-    after = browser.value("[...world.bodies.values()][0].x.reduce((a, c) => a + c, 0)")
+    after = browser.value("bodies()[0].x.reduce((a, c) => a + c, 0)")
     assert before != after
     # a slider, by the keyboard as a user would: one step up
     name = browser.value("state.sliders[0].name")
@@ -143,12 +143,12 @@ def walk(browser, out):
     picture("arrows.png")
     # a stroke across the body cuts it
     browser.click("cut")
-    triangles = browser.value("[...world.bodies.values()][0].triangles.length")
+    triangles = browser.value("bodies()[0].triangles.length")
     box = browser.value(BOX)
     x = (box[0] + box[2]) / 2
     browser.drag((x, box[1] - 30), (x + 4, (box[1] + box[3]) / 2))
     browser.mouse("mouseReleased", x + 4, (box[1] + box[3]) / 2)
-    browser.wait(f"[...world.bodies.values()][0].triangles.length > {triangles}", "the stroke has cut")
+    browser.wait(f"bodies()[0].triangles.length > {triangles}", "the stroke has cut")
     browser.click("cut")
     browser.click("run")
     browser.wait(f"state.time > {at} + 0.3", "it runs on")
@@ -158,8 +158,24 @@ def walk(browser, out):
     picture("cut.png")
     browser.click("reset")
     browser.wait("state.time < 0.2", "Reset goes back")
-    browser.wait(f"[...world.bodies.values()][0].triangles.length === {triangles}", "the cut is undone")
+    browser.wait(f"bodies()[0].triangles.length === {triangles}", "the cut is undone")
     assert browser.value("state.message") == "", browser.value("state.message")
+    # the run is recorded from the whole scene on, and downloaded
+    path = os.path.join(out, "run.dfms")
+    if os.path.exists(path):
+        os.remove(path)
+    browser.call("Browser.setDownloadBehavior", behavior="allow", downloadPath=os.path.abspath(out))
+    browser.click("record")
+    browser.wait("tape && tape.length > 5", "it records")
+    browser.click("record")
+    end = time.time() + 20
+    while not os.path.exists(path) and time.time() < end:
+        time.sleep(0.05)
+    scene = Scene()
+    with open(path, "rb") as file:
+        scene.read(file.read())
+    assert [body.missing for body in scene.bodies.values()] == [0] and scene.present
+    assert len(scene.bodies.popitem()[1].triangles) == triangles
 
 
 def main():

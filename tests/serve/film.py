@@ -23,15 +23,16 @@ def main():
         for i in range(30):
             if i == 15:
                 body.cut("plane", point=(0, 0, 0), normal=(1, 0, 0))
+                world.add_obstacle("sphere", radius=0.05, position=(-0.3, 0, 0.05))
             world.run(0.01, dt=1e-3)
             film.add()
     page = out / "film.html"
     page.write_text(webgl.document(film), encoding="utf-8")
     browser = Browser(chromium, page.resolve().as_uri(), (700, 500))
     try:
-        faces = "world.bodies.get(1).triangles.length"
+        faces = "world.meshes.get(1).triangles.length"
         browser.wait("typeof world !== 'undefined' && world.frame === 0", "a frame")
-        assert browser.value("world.things.size") == 2
+        assert browser.value("things().length") == 2
         before = browser.value(faces)
         browser.click("play")
         browser.wait("world.frame === 30", "it plays to its end")
@@ -41,7 +42,8 @@ def main():
             browser.value(f"(s => {{ s.value = {frame}; s.oninput(); }})($('at'))")
             browser.wait(f"world.frame === {frame}", "the slider moves")
             assert (browser.value(faces) > before) == more
-            assert browser.value("world.bodies.get(1).x.every(Number.isFinite)")
+            assert browser.value("things().length") == 2 + more
+            assert browser.value("world.meshes.get(1).x.every(Number.isFinite)")
             browser.picture(str(out / f"film_{frame}.png"))
         assert "speed, m/s" in browser.value("$('legend').textContent")
     finally:

@@ -10,7 +10,7 @@ import sys
 
 from browser import BOX, Browser
 
-RUNS = "typeof world !== 'undefined' && world.bodies.size > 0 && world.frame > 3 && state.time > 0.02"
+RUNS = "typeof world !== 'undefined' && bodies().length > 0 && world.frame > 3 && state.time > 0.02"
 
 
 def choose(browser, name, value):
@@ -68,6 +68,8 @@ def rig(browser, out):
     level, before = browser.value("state.sliders.find(s => s.name === 'mu_C').value"), browser.value(force)
     assert abs(level * 9.8 - 1.47) < 1e-9 and 1.47 < before < 1.97, (level, before)
     browser.picture(os.path.join(out, "here_rig.png"))
+    browser.value("send({do: 'slider', name: 'mu_C', value: 1e9})")
+    browser.wait("$('message').textContent.includes('outside of its range')", "a value of no slider", 60)
     for name in ("mu_S", "mu_C"):
         move(browser, name, 1)
     browser.wait(f"{force} > 8", "more friction, more force", 60)
@@ -84,7 +86,7 @@ def recorded(browser, tape):
     browser.value(f"""(() => {{ const bytes = Uint8Array.from(atob({json.dumps(tape)}), c => c.charCodeAt(0));
       const given = new DataTransfer(); given.items.add(new File([bytes], "run.dfms"));
       $("file").files = given.files; $("file").onchange(); }})()""")
-    browser.wait("player && world.bodies.size > 0 && !state.time", "it plays without a module")
+    browser.wait("player && bodies().length > 0 && !state.time", "it plays without a module")
 
 
 def main():

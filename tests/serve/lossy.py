@@ -2,11 +2,13 @@
 """lossy.py DEFORM SCENE SECONDS OUT: a run that is streamed over a network that loses, doubles and reorders
 packets, beside a receiver of the same packets without loss. Whatever is lost, no triangle is broken, and at
 the end, cuts included, both have the same."""
+import json
 import os
 import random
 import socket
 import subprocess
 import sys
+import time
 
 sys.path.insert(0, os.path.join(os.path.dirname(__file__), "..", "..", "examples"))
 from stream_receiver import Scene, says_goodbye  # noqa: E402
@@ -18,6 +20,17 @@ def free_port():
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         return probe.getsockname()[1]
+
+
+def measure(packet, brought):
+    """Bytes of displacements in a packet, added for each body."""
+    at = 32
+    while at < len(packet):
+        n = 8 + int.from_bytes(packet[at + 4:at + 8], "little")
+        if packet[at:at + 4] == b"SURF":
+            number = int.from_bytes(packet[at + 8:at + 12], "little")
+            brought[number] = brought.get(number, 0) + n
+        at += n
 
 
 def check(scene, places):
@@ -38,6 +51,8 @@ def main():
     run = subprocess.Popen([deform, "run", scene_file, "--time", seconds, "--out", out, "--quiet", "--stream",
                             f"rtp://127.0.0.1:{port}"])
     clean, lossy, waiting, shapes = Scene(), Scene(), [], {}
+    brought, ended = {}, set()  # bytes of each body; frames
+    late, joined, whole = Scene(), None, None  # who joins in the middle, when, and when it has all
     count = dropped = 0
     sequence, gone = None, set()
     while True:
@@ -53,6 +68,16 @@ def main():
         payload = data[12:]
         assert len(data) <= 1200
         clean.read(payload)
+        if joined or clean.time > 0.5 * float(seconds):
+            joined = joined or time.monotonic()
+            late.read(payload)
+            if not whole and late.present and all(
+                    number in late.surfaces and not late.surfaces[number].missing for number in late.present):
+                whole = time.monotonic()
+        if payload[5] == 1 and (frame := payload[20:24]) not in ended:  # the last one is sent three times
+            measure(payload, brought)
+            if data[1] & 128:
+                ended.add(frame)
         # not the same part of two frames in a row: the end of a run is sent more than once for that
         part = (payload[5], int.from_bytes(payload[12:16], "little"))
         if part not in gone and dice.random() < LOST:
@@ -71,9 +96,19 @@ def main():
     for packet in waiting:
         lossy.read(packet)
     assert run.wait() == 0
+    with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
+        sent = json.load(file)["stream"]
+    assert sent["frames"] == len(ended) and sent["packets"] == count
+    assert whole - joined < 1.5, f"who joins late is whole after {whole - joined:.2f} s"
+    rates = {clean.bodies[number].name: n for number, n in brought.items() if number in clean.present}
+    for name, n in rates.items():  # all of the same time
+        assert abs(sent["kbit_per_s"][name] / n - sum(sent["kbit_per_s"].values()) / sum(rates.values())) \
+            < 1e-6 * sent["kbit_per_s"][name] / n, sent
+    assert 0.5 * float(seconds) < 8e-3 * n / sent["kbit_per_s"][name] < 30
     assert dropped > 0
     cuts = sum(len(v) for v in shapes.values()) - len({number for number, _ in shapes})
-    print(f"{count} packets, {dropped} lost; triangles of {len(shapes)} bodies, changed by cuts: {cuts}")
+    print(f"{count} packets, {dropped} lost; who joins late is whole after {whole - joined:.2f} s")
+    print(f"triangles of {len(shapes)} bodies, changed by cuts: {cuts}")
     assert set(clean.bodies) == set(lossy.bodies) and clean.present == lossy.present
     worst = 0.0
     for number, body in clean.bodies.items():

@@ -155,9 +155,13 @@ def check(serve, view, scene, out, display):
         url = f"rtp://127.0.0.1:{port}"
         try:
             # without the token: it sees all, and asks for nothing
-            seen = watch(view, url, "0.5 shot a.png\n0.6 key space\n1.6 shot b.png\n", out, display)
+            # and its strokes turn the camera, they cut nothing
+            seen = watch(view, url, "0.5 shot a.png\n0.6 key space\n1.6 shot b.png\n1.7 key x\n"
+                         "1.8 drag 20 20 120 40 0.3\n2.4 shot c.png\n", out, display)
             assert seen["a.png"]["t"] == seen["b.png"]["t"] == 0, "who lacks the token does not run the scene"
-            area, middle = red(pixels(os.path.join(out, "a.png")))
+            a, b, c = (pixels(os.path.join(out, f"{shot}.png")) for shot in "abc")
+            assert a == b != c, "the stroke of who does not steer"
+            area, middle = red(a)
             assert area > 1000, f"the block covers {area} pixels"
             watch(view, url + "?token=" + "0" * len(token),
                   "1.5 key space\n2.5 key space\n2.6 shot a.png\n", out, display)
@@ -165,19 +169,22 @@ def check(serve, view, scene, out, display):
             seen = watch(view, url + "?token=" + token,
                          "0.5 shot start.png\n1 key c\n1.5 key space\n2.5 shot rest.png\n"
                          "2.5 drag 160 120 220 120 0.4 1.5\n4.2 shot held.png\n"
+                         # a reset ends the plots
+                         "4.6 key r\n4.9 shot reset.png\n"
                          "5 slider gravity 3.5\n5.3 key space\n6.5 shot end.png\n7 shot after.png\n"
                          # a stroke from above to below, after it the mouse pulls again
                          "7.1 key x\n7.2 drag 160 20 160 220 0.3\n7.8 key x\n7.9 key t\n9 shot cut.png\n",
                          out, display)
             assert seen["start.png"]["t"] == 0, "another token runs nothing"
             assert seen["rest.png"]["t"] > 0.1
-            assert seen["end.png"]["t"] == seen["after.png"]["t"] > seen["held.png"]["t"]
+            assert seen["end.png"]["t"] == seen["after.png"]["t"] > seen["reset.png"]["t"]
             x = [seen[shot]["middle"]["block"][0] for shot in ("rest.png", "held.png")]
             assert x[1] > x[0] + 0.02, f"the mouse has pulled the block from {x[0]} to {x[1]}"
             across = [red(pixels(os.path.join(out, f"{shot}.png"))) for shot in ("rest", "held")]
             assert across[1][0] > 1000 and across[1][1] > across[0][1] + 10, f"a picture shows it: {across}"
             assert seen["cut.png"]["triangles"] > seen["after.png"]["triangles"], "the stroke has cut"
-            assert seen["end.png"]["plotted"]["probe top"] > 10 < seen["end.png"]["plotted"]["pull"]
+            assert seen["held.png"]["plotted"]["probe top"] > 10 < seen["held.png"]["plotted"]["pull"]
+            assert "pull" not in seen["reset.png"]["plotted"], "a plot of what was before the reset"
             # what was heard once is not heard again
             request = network.forged
             viewer = Connection(page)

@@ -140,8 +140,8 @@ class Solid:
     """A shape of an obstacle where it is: kind as DFM_SHAPE_*, pose [7], axis [3], size [3]; or triangles."""
 
     def __init__(self, kind: int, pose: np.ndarray, axis: np.ndarray, size: Sequence[float],
-                 points: np.ndarray | None = None, triangles: np.ndarray | None = None):
-        self.kind, self.pose, self.axis, self.size = kind, pose, axis, list(size)
+                 points: np.ndarray | None = None, triangles: np.ndarray | None = None, handle: int = 0):
+        self.kind, self.pose, self.axis, self.size, self.handle = kind, pose, axis, list(size), handle
         self.points, self.triangles = points, triangles
 
 
@@ -171,7 +171,7 @@ def solids(world: World) -> list[Solid]:
             points = np.ascontiguousarray(turned(rotation, rest) + position)
             memory = (ctypes.c_uint32 * (3 * definition.ntriangle)).from_address(definition.triangles)
             triangles = np.frombuffer(memory, dtype=np.uint32).reshape(-1, 3).copy()
-        out.append(Solid(definition.shape, pose, axis, size, points, triangles))
+        out.append(Solid(definition.shape, pose, axis, size, points, triangles, obstacle.handle))
     return out
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Iterable
 import numpy as np
 
 from ._library import ROOT
-from .picture import COLORS, color_map, turned
+from .picture import COLORS, Solid, color_map, turned
 
 if TYPE_CHECKING:
     from .scene import Run
@@ -41,20 +41,17 @@ def _surface(number: int, shape: int, points: np.ndarray, triangles: np.ndarray)
             _chunk(b"TRIS", struct.pack("<4I", number, shape, 0, len(triangles)), triangles.astype("<u4"))]
 
 
-def _things(run: Run, number: int) -> list[bytes]:
-    """Obstacles and rigid bodies, which have the same shape in all frames."""
-    out = []
-    for k, solid in enumerate(run.frames[0].obstacles):
-        points, triangles = np.empty((0, 3)), np.empty((0, 3))
-        if solid.points is not None and solid.triangles is not None:
-            back = solid.pose[3:] * (-1, -1, -1, 1)
-            points, triangles = turned(back, solid.points - solid.pose[:3]), solid.triangles
-        radius, half = (solid.size[0], solid.size[1]) if solid.kind in (1, 3) else (0, 0)
-        box = solid.size if solid.kind == 2 else (0, 0, 0)
-        numbers = number + k, 1, len(points), len(triangles), solid.kind
-        out.append(_chunk(b"OBST", struct.pack("<5I5f", *numbers, radius, half, *box), _named("")))
-        out += _surface(number + k, 1, points, triangles)
-    return out
+def _thing(number: int, solid: Solid) -> list[bytes]:
+    """An obstacle or rigid body, which has the same shape in all frames."""
+    points, triangles = np.empty((0, 3)), np.empty((0, 3))
+    if solid.points is not None and solid.triangles is not None:
+        back = solid.pose[3:] * (-1, -1, -1, 1)
+        points, triangles = turned(back, solid.points - solid.pose[:3]), solid.triangles
+    radius, half = (solid.size[0], solid.size[1]) if solid.kind in (1, 3) else (0, 0)
+    box = solid.size if solid.kind == 2 else (0, 0, 0)
+    numbers = number, 1, len(points), len(triangles), solid.kind
+    return [_chunk(b"OBST", struct.pack("<5I5f", *numbers, radius, half, *box), _named("")),
+            *_surface(number, 1, points, triangles)]
 
 
 def _moved(number: int, shape: int, moved: np.ndarray) -> bytes:
@@ -74,13 +71,14 @@ def _values(run: Run, values: np.ndarray) -> np.ndarray:
 
 
 def packets_of(run: Run) -> bytes:
-    """The run in the format of doc/reference/stream.md. A body whose triangles change is told again."""
-    out, first = [], len(run.triangles) + 1
+    """The run in the format of doc/reference/stream.md. A body whose triangles change is told again, what is
+    added later when it is there."""
+    out = []
+    numbers: dict[int, int] = {}  # of obstacles, behind those of bodies, by their handles
     known: dict[str, tuple[np.ndarray, np.ndarray]] = {}  # triangles, places that displacements count from
     shapes: dict[str, int] = {}
     for i, frame in enumerate(run.frames):
-        scene = _things(run, first) if i == 0 else []
-        listed, surfaces = [], []
+        scene, listed, surfaces, poses = [], [], [], []
         for number, (name, triangles) in enumerate(frame.triangles.items(), 1):
             points, values = frame.positions[name], frame.values[name]
             if len(points) == 0:
@@ -96,13 +94,17 @@ def packets_of(run: Run) -> bytes:
             if values is not None:
                 surfaces.append(_chunk(b"VALU", struct.pack("<4I", *listed[-1], 0, len(points)),
                                        _values(run, values)))
-        listed += [(first + k, 1) for k in range(len(frame.obstacles))]
-        poses = b"".join(struct.pack("<I7f", first + k, *solid.pose)
-                         for k, solid in enumerate(frame.obstacles))
+        for solid in frame.obstacles:
+            if solid.handle not in numbers:
+                numbers[solid.handle] = len(run.triangles) + len(numbers) + 1
+                scene += _thing(numbers[solid.handle], solid)
+            listed.append((numbers[solid.handle], 1))
+            poses.append(struct.pack("<I7f", listed[-1][0], *solid.pose))
         if scene:
             out.append(_packet(True, i == 0, i, frame.t, scene))
         out.append(_packet(False, False, i, frame.t, [
-            _chunk(b"LIST", np.array(listed, "<u4")), _chunk(b"POSE", poses), *surfaces]))
+            _chunk(b"LIST", np.array([len(listed), *np.ravel(listed)], "<u4")),
+            _chunk(b"POSE", *poses), *surfaces]))
     return b"".join(out)
 
 

@@ -43,7 +43,7 @@ DFM_API dfm_status dfm_world_stream(dfm_world world, const dfm_stream_def *def, 
 /** The same from a packet that dfm_world_stream has written with FLOAT32 and packet 0: the thread that steps
  * takes that one, and another one does the rest.
  * @param def  NULL: the default; its packet and FLOAT32 count
- * @return DFM_OK; DFM_E_ARG another packet, or as above. Threads: Any thread. Since 0.1. */
+ * @return DFM_OK; DFM_E_ARG no such packet, a bad def, too small a buffer. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_stream_pack(const void *packet, size_t size, const dfm_stream_def *def, void *buffer,
                                    size_t *bytes);
 #ifdef __cplusplus

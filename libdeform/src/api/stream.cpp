@@ -222,6 +222,7 @@ void add_frame(const World &w, const dfm_stream_def &d, Packets &out) {
   std::vector<uint32_t> shapes;
   for (const auto &b : w.bodies) shapes.push_back(shape_of(*b));
   out.chunk("LIST");
+  out.add(static_cast<uint32_t>(w.bodies.size() + w.obstacles.size()));
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     out.add(number_of(w.bodies[i]->handle));
     out.add(shapes[i]);
@@ -287,12 +288,12 @@ void add_parts(Bytes chunk, const dfm_stream_def &d, Packets &out) {
   static const struct {
     char tag[5];
     uint32_t head, row;  // bytes
-  } kLists[] = {{"LIST", 0, 8},           {"POSE", 0, 32},          {"CONT", 0, 28},
+  } kLists[] = {{"LIST", 4, 8},           {"POSE", 0, 32},          {"CONT", 0, 28},
                 {"BASE", kRangeHead, 12}, {"TRIS", kRangeHead, 12}, {"SURF", kSurfaceHead, 12}};
   const auto list = std::find_if(std::begin(kLists), std::end(kLists),
                                  [&](const auto &l) { return std::memcmp(l.tag, &chunk[0], 4) == 0; });
   const Bytes content = chunk.subspan(kChunk);
-  if (list == std::end(kLists)) {  // names and sizes
+  if (list == std::end(kLists) || content.size() == list->head) {  // names and sizes, lists of nothing
     if (out.left() < content.size()) out.next();
     if (out.left() < content.size()) fail(DFM_E_ARG, "stream: a chunk of the packet fits into no packet");
     out.add(chunk);
@@ -310,8 +311,8 @@ void add_parts(Bytes chunk, const dfm_stream_def &d, Packets &out) {
     if (out.left() < std::min<size_t>(head + row * (n - i), out.room() / 2)) out.next();
     const size_t m = std::min(n - i, (std::min<size_t>(out.left(), 1u << 30) - head) / row);
     out.chunk(&chunk[0]);
-    if (list->head) {
-      out.add(content.first(8));
+    out.add(content.first(std::min(list->head, 8u)));
+    if (list->head >= kRangeHead) {
       out.add(word(content, 8) + static_cast<uint32_t>(i));
       out.add(static_cast<uint32_t>(m));
     }
