@@ -93,7 +93,8 @@ void Received::packet(const unsigned char *bytes, size_t n) {
   const size_t before = contacts_.size();
   chunks(bytes + kHeader, n - kHeader);
   if (contacts_.size() > before) parts_.insert(part_);
-  if (everything) forget([&](uint32_t, const Mesh &m) { return !m.in_packet && !older(packet_frame_, m.frame); });
+  if (everything)
+    forget([&](uint32_t, const Mesh &m) { return !m.in_packet && !older(packet_frame_, m.frame); });
 }
 
 template <class F>

@@ -73,7 +73,7 @@ class Received {
   std::vector<Contact> contacts_;
   double time_ = 0;
   uint32_t frame_ = 0, packet_frame_ = 0, listed_ = 0;  // of the packet that is read; of listing_
-  uint32_t part_ = 0;         // number of the packet that is read
+  uint32_t part_ = 0;                                   // number of the packet that is read
   std::set<uint32_t> parts_;  // packets of the frame of which the contacts have come
   bool begun_ = false;
   size_t held_ = 0;  // of the bound of memory

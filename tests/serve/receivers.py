@@ -112,8 +112,8 @@ CASES = {  # what it is about: packets, the numbers of bodies and of things to d
     "a list with half a row": (
         [packet(0, sphere(7, 1)), packet(0, chunk("LIST", 1, 7, 1, 8), posed(7))], [], [7]),
     "poses and contacts with half a row": (
-        [packet(0, sphere(7, 1)), packet(0, listed(1, 7), chunk("POSE", 7, *[0] * 6, ONE, 7), touching(2, ONE))],
-        [], [7], [], 2),
+        [packet(0, sphere(7, 1)),
+         packet(0, listed(1, 7), chunk("POSE", 7, *[0] * 6, ONE, 7), touching(2, ONE))], [], [7], [], 2),
     "contacts that come twice": (
         [packet(0, listed(0), touching(2), touching(1), part=3), packet(0, touching(4), part=2)] * 3,
         [], [], [], 7),
@@ -154,8 +154,9 @@ def in_page(browser, packets):
       if (all.some(m => m.base && m.base.length > 1e5)) return '"what is announced takes memory"';
       if (all.some(m => m.name.length > 100)) return '"a name without end"';
       if (world.present && world.present.size > 300) return '"a list is longer than it says"';
-      const sensors = things().filter(t => t.sensor);
-      return JSON.stringify([...[bodies(), things(), sensors].map(list => list.map(m => m.id).sort((a, b) => a - b)),
+      if (all.some(m => m.rigid && m.x.length)) return '"things of a kind have a shape together"';
+      const ids = list => list.map(m => m.id).sort((a, b) => a - b);
+      return JSON.stringify([ids(bodies()), ids(things()), ids(things().filter(t => t.sensor)),
         world.contacts.length]);
     }})()"""))
 
