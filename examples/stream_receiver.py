@@ -5,8 +5,7 @@ surfaces as OBJ files. The format: libdeform/doc/reference/stream.md.
 
     deform serve SCENE             prints the URL
     python3 stream_receiver.py URL [--frames N] [--obj FOLDER] [--send '{"do":"run","on":false}']
-or
-    python3 stream_receiver.py rtp://127.0.0.1:5004 [--frames N] [--obj FOLDER]
+    python3 stream_receiver.py rtp://127.0.0.1:5004 [--frames N] [--obj FOLDER], and then
     deform run SCENE --stream rtp://127.0.0.1:5004
 """
 import argparse
@@ -28,15 +27,12 @@ class Connection:
         at = urllib.parse.urlsplit(url)
         self.rest = b""
         self.socket = socket.create_connection((at.hostname, at.port), timeout)
-        key = base64.b64encode(os.urandom(16)).decode()
         path = (at.path or "/") + ("?" + at.query if at.query else "")
         lines = [f"GET {path} HTTP/1.1", f"Host: {at.hostname}:{at.port}",
-                 "Upgrade: websocket", "Connection: Upgrade", f"Sec-WebSocket-Key: {key}",
-                 "Sec-WebSocket-Version: 13"]
-        if protocol:
-            lines.append(f"Sec-WebSocket-Protocol: {protocol}")
-        if origin:
-            lines.append(f"Origin: {origin}")
+                 "Upgrade: websocket", "Connection: Upgrade", "Sec-WebSocket-Version: 13",
+                 f"Sec-WebSocket-Key: {base64.b64encode(os.urandom(16)).decode()}"]
+        more = (("Sec-WebSocket-Protocol", protocol), ("Origin", origin))
+        lines += [f"{name}: {value}" for name, value in more if value]
         self.socket.sendall(("\r\n".join(lines) + "\r\n\r\n").encode())
         while b"\r\n\r\n" not in self.rest:
             self.more()
@@ -60,10 +56,8 @@ class Connection:
     def frame(self):
         first, second = self.take(2)
         n = second & 127
-        if n == 126:
-            n, = struct.unpack(">H", self.take(2))
-        elif n == 127:
-            n, = struct.unpack(">Q", self.take(8))
+        if n > 125:
+            n = int.from_bytes(self.take(2 if n == 126 else 8), "big")
         return first & 128, first & 15, self.take(n)
 
     def receive(self):
@@ -75,11 +69,9 @@ class Connection:
                 raise ConnectionError("the server has closed the connection")
             if code == 9:
                 self.send_frame(10, part)
+            if code in (9, 10):
                 continue
-            if code == 10:
-                continue
-            kind = kind or code
-            data += part
+            kind, data = kind or code, data + part
             if last:
                 return data.decode() if kind == 1 else data
 
@@ -115,21 +107,25 @@ class RtpConnection:
         self.socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 21)
         self.socket.bind((at.hostname, at.port))
         self.socket.settimeout(timeout)
-        self.source, self.anew, self.frame_ends = None, False, False
+        self.sender, self.source, self.anew, self.frame_ends = None, None, False, False
         self.first, self.highest, self.received = 0, 0, 0
-        self.reported, self.before = time.monotonic(), (0, 0)
+        self.heard, self.reported, self.before = 0.0, time.monotonic(), (0, 0)
 
     def receive(self):
         """The payload of the next packet. frame_ends: whether it is the last one of a frame; anew: whether
-        its sender is another one than before, of another run."""
+        it is of another run. One sender at a time: another one counts when this one is silent."""
         while True:
             data, sender = self.socket.recvfrom(1 << 16)
-            if len(data) < 12 or data[0] >> 6 != 2:
+            its, now = sender == self.sender, time.monotonic()
+            if len(data) < 12 or data[0] >> 6 != 2 or (self.sender and not its and now < self.heard + 2):
                 continue
             if 200 <= data[1] <= 204:  # RTCP
-                if says_goodbye(data):
+                if its and says_goodbye(data):
                     raise ConnectionError("the sender has ended")
                 continue
+            if data[12:17] != b"DFMS\x01" or data[28:32] != struct.pack("<I", len(data) - 12):
+                continue
+            self.sender, self.heard = sender, now
             sequence, _, source = struct.unpack_from(">HII", data, 2)
             self.anew = source != self.source
             if self.anew:
@@ -140,7 +136,7 @@ class RtpConnection:
                 self.highest += ahead  # counts on past 16 bits
             self.received += 1
             self.frame_ends = data[1] >> 7 == 1
-            if time.monotonic() - self.reported > 1:
+            if now - self.reported > 1:
                 self.report(sender)
             return data[12:]
 
@@ -159,9 +155,18 @@ class RtpConnection:
         self.socket.close()
 
 
+def word(data, at):
+    return struct.unpack_from("<I", data, at)[0]
+
+
 def older(frame, other):
     """Numbers of frames begin again at 2^32."""
     return 0 < (other - frame) & 0xffffffff < 1 << 31
+
+
+def rows(form, data):
+    """Those that are whole."""
+    return struct.iter_unpack(form, data[:len(data) - len(data) % struct.calcsize(form)])
 
 
 MOST, EACH, MOST_ROWS, LONGEST_NAME = 1 << 22, 64, 1 << 16, 100
@@ -173,7 +178,7 @@ class Surface:
 
     def __init__(self, rigid, name, shape, n, m, frame):
         self.rigid, self.name, self.shape, self.points, self.faces = rigid, name, shape, n, m
-        self.frame, self.told, self.pose, self.waiting, self.waits = frame, True, None, [], 0
+        self.frame, self.in_packet, self.pose, self.waiting = frame, True, None, bytearray()
         self.base, self.moved, self.triangles = [], [], []
         self.missing = 3 * m + (3 * n + 1 if rigid else 6 * n)
 
@@ -200,7 +205,8 @@ class Scene:
     def __init__(self):
         self.surfaces, self.held, self.contacts = {}, 0, []
         self.present, self.listing, self.listed = {}, {}, -1
-        self.time, self.frame, self.told = 0.0, 0, 0
+        self.time, self.frame, self.packet_frame, self.begun = 0.0, 0, 0, False
+        self.part, self.parts = 0, set()  # packets of the frame of which the contacts have come
 
     @property
     def bodies(self):
@@ -214,30 +220,33 @@ class Scene:
         """Packets of one message, one behind the other. Returns whether one of them was of a frame."""
         at, any_frame = 0, False
         while at + 32 <= len(message):
-            mark, version, kind, whole, count, fragment, size, frame, time = struct.unpack_from("<4sBBHIIIId",
-                                                                                                message, at)
+            (mark, version, kind, whole, count, self.part, size, frame,
+             time) = struct.unpack_from("<4sBBHIIIId", message, at)
             if mark != b"DFMS" or version != 1 or size < 32 or at + size > len(message):
                 raise ValueError("this is no packet of dfm.stream 1")
             everything = kind == 0 and whole == 1 and count == 1
             for surface in self.surfaces.values() if everything else ():
-                surface.told = False
+                surface.in_packet = False
             # a packet of a frame that is over has come late: what is there is newer
-            late = kind == 1 and (older(frame, self.frame) or not math.isfinite(time))
-            self.told = frame
+            late = kind == 1 and (self.begun and older(frame, self.frame) or not math.isfinite(time))
+            self.packet_frame = frame
             if kind == 1 and not late:
-                any_frame = True
                 if frame != self.frame:
-                    self.contacts = []
+                    self.contacts, self.parts = [], set()
+                any_frame = self.begun = True
                 self.frame, self.time = frame, time
             if not late:
-                self.read_chunks(message[at:at + size])
+                contacts = len(self.contacts)
+                self.read_chunks(message[at + 32:at + size])
+                if len(self.contacts) > contacts:
+                    self.parts.add(self.part)
             if everything:
-                self.forget(lambda _, s: not s.told and not older(self.told, s.frame))
+                self.forget(lambda _, s: not s.in_packet and not older(self.packet_frame, s.frame))
             at += size
         return any_frame
 
     def read_chunks(self, packet):
-        at = 32
+        at = 0
         while at + 8 <= len(packet):
             tag, size = struct.unpack_from("<4sI", packet, at)
             if size % 4 or at + 8 + size > len(packet):
@@ -260,15 +269,15 @@ class Scene:
         number, shape, n, m = struct.unpack_from("<4I", data)
         have = self.surfaces.get(number)
         if have:
-            have.told = True
-            if (have.shape, have.rigid) == (shape, rigid) or older(self.told, have.frame):
+            have.in_packet = True
+            if (have.shape, have.rigid) == (shape, rigid) or older(self.packet_frame, have.frame):
                 return None
-        letters, = struct.unpack_from("<I", data, name)
-        text = data[name + 4:name + 4 + min(letters, LONGEST_NAME)].decode("utf-8", "replace")
-        fresh = Surface(rigid, text, shape, n, m, self.told)
-        if self.held + fresh.weight > MOST:
+        text = data[name + 4:name + 4 + min(word(data, name), LONGEST_NAME)].decode("utf-8", "replace")
+        fresh = Surface(rigid, text, shape, n, m, self.packet_frame)
+        held = self.held - (have.weight if have else 0) + fresh.weight
+        if held > MOST:
             return None
-        self.held += fresh.weight - (have.weight if have else 0)
+        self.held = held
         self.surfaces[number] = fresh
         return fresh
 
@@ -276,57 +285,49 @@ class Scene:
         self.tell(data, 16, False)
 
     def read_obst(self, data):
-        kind, size = struct.unpack_from("<I", data, 16)[0], struct.unpack_from("<5f", data, 20)
+        kind, size = word(data, 16), struct.unpack_from("<5f", data, 20)
         thing = self.tell(data, 40, True) if all(map(math.isfinite, size)) else None
         if thing:
-            thing.kind, thing.sensor = kind & 0xffff, kind >> 16 == 1
+            thing.kind, thing.sensor = kind & 0xffff, kind >> 16 & 1 == 1
             thing.radius, thing.half_length, *thing.half_size = size
 
     def ranges(self, tag, data, values):
         """Puts the values of a range where they belong, or keeps the chunk."""
         number, shape, first, n = struct.unpack_from("<4I", data)
         s = self.surfaces.get(number)
-        if not s or s.shape != shape or (tag == "surf" and s.rigid):
+        if n == 0 or not s or s.shape != shape or (tag == b"SURF" and s.rigid):
             return
-        if first + n > (s.faces if tag == "tris" else s.points) or not all(map(math.isfinite, values)):
-            return
-        if tag == "tris" and any(i >= s.points for i in values):
+        good = math.isfinite if tag != b"TRIS" else lambda corner: corner < s.points
+        if first + n > (s.faces if tag == b"TRIS" else s.points) or not all(map(good, values)):
             return
         if s.waiting is None:
-            s.put({"base": s.base, "tris": s.triangles, "surf": s.moved}[tag], first, values)
-            return
-        s.waiting.append((tag, data, values))
-        s.waits += 8 + len(data)
-        if s.waits >= 12 * (s.points + s.faces):
-            waiting, s.waiting = s.waiting, None
+            return s.put({b"BASE": s.base, b"TRIS": s.triangles, b"SURF": s.moved}[tag], first, values)
+        s.waiting += tag + struct.pack("<I", len(data)) + data
+        if len(s.waiting) >= 12 * (s.points + s.faces):
+            waiting, s.waiting = bytes(s.waiting), None
             s.fill()
-            for kept in waiting:
-                self.ranges(*kept)
+            self.read_chunks(waiting)
 
     def read_base(self, data):
-        self.ranges("base", data, struct.unpack_from(f"<{3 * self.rows(data)}f", data, 16))
+        self.ranges(b"BASE", data, struct.unpack_from(f"<{3 * word(data, 12)}f", data, 16))
 
     def read_tris(self, data):
-        self.ranges("tris", data, struct.unpack_from(f"<{3 * self.rows(data)}I", data, 16))
-
-    @staticmethod
-    def rows(data):
-        return struct.unpack_from("<I", data, 12)[0]
+        self.ranges(b"TRIS", data, struct.unpack_from(f"<{3 * word(data, 12)}I", data, 16))
 
     def read_list(self, data):
         """What a list that is whole leaves out is gone, unless it was told later."""
-        n, = struct.unpack_from("<I", data)
-        if n > MOST_ROWS:
-            return
+        n = word(data, 0)
         if self.listed != self.frame:
             self.listing, self.listed = {}, self.frame
-        self.listing.update(struct.iter_unpack("<II", data[4:]))
+        for number, shape in rows("<II", data[4:]):
+            if len(self.listing) < min(n, MOST_ROWS):
+                self.listing[number] = shape
         if len(self.listing) >= n:
-            self.present = self.listing
+            self.present, self.listing = self.listing, {}
             self.forget(lambda number, s: number not in self.present and older(s.frame, self.frame))
 
     def read_pose(self, data):
-        for number, *pose in struct.iter_unpack("<I7f", data):
+        for number, *pose in rows("<I7f", data):
             thing = self.surfaces.get(number)
             if thing and thing.rigid and all(map(math.isfinite, pose)):
                 thing.missing -= thing.pose is None
@@ -340,15 +341,15 @@ class Scene:
             low, step = struct.unpack_from("<3f", data, 20), struct.unpack_from("<3f", data, 32)
             steps = struct.unpack_from(f"<{3 * n}H", data, 48)
             moved = [low[i % 3] + step[i % 3] * q for i, q in enumerate(steps)]
-        self.ranges("surf", data, moved)
+        self.ranges(b"SURF", data, moved)
 
     def read_cont(self, data):
-        rows = [row for row in struct.iter_unpack("<6fI", data) if all(map(math.isfinite, row))]
-        self.contacts += [(row[:3], row[3:6], row[6]) for row in rows[:MOST_ROWS - len(self.contacts)]]
+        for row in rows("<6fI", data) if self.part not in self.parts else ():
+            if all(map(math.isfinite, row)) and len(self.contacts) < MOST_ROWS:
+                self.contacts.append((row[:3], row[3:6], row[6]))
 
     def write_obj(self, path):
         with open(path, "w", encoding="utf-8") as out:
-            before = 1
             for number, body in self.bodies.items():
                 if number not in self.present or body.missing:
                     continue
@@ -357,8 +358,7 @@ class Scene:
                 for i in range(0, len(x), 3):
                     out.write("v %.7g %.7g %.7g\n" % tuple(x[i:i + 3]))
                 for i in range(0, len(body.triangles), 3):
-                    out.write("f %d %d %d\n" % tuple(before + k for k in body.triangles[i:i + 3]))
-                before += len(x) // 3
+                    out.write("f %d %d %d\n" % tuple(k - body.points for k in body.triangles[i:i + 3]))
 
 
 def main():

@@ -1,6 +1,7 @@
 #include "packets.h"
 
-#include <algorithm>
+#include <set>
+#include <unordered_map>
 
 #include "messages.h"
 
@@ -20,20 +21,18 @@ void list_shapes(const Packets &frame, Shapes &out) {
 
 // Those of a scene for all that `now` has and `before` has not.
 Packets news_packets(dfm_world world, uint32_t frame, const Shapes &before, const Shapes &now) {
-  std::vector<uint64_t> things = listed<uint64_t>(dfm_world_bodies, world);
-  const std::vector<uint64_t> others = listed<uint64_t>(dfm_world_obstacles, world);
-  things.insert(things.end(), others.begin(), others.end());
+  std::unordered_map<uint32_t, uint64_t> things;  // handles by number
+  for (const uint64_t body : listed<uint64_t>(dfm_world_bodies, world)) things[uint32_t(body)] = body;
+  for (const uint64_t other : listed<uint64_t>(dfm_world_obstacles, world)) things[uint32_t(other)] = other;
+  const std::set known(before.begin(), before.end());
   Packets out, one;
   for (const auto &shape : now) {
-    if (std::find(before.begin(), before.end(), shape) != before.end()) continue;
-    const auto thing = std::find_if(things.begin(), things.end(), [&](uint64_t handle) {
-      return static_cast<uint32_t>(handle) == shape.first;
-    });
-    if (thing == things.end()) continue;
+    const auto thing = things.find(shape.first);
+    if (thing == things.end() || known.contains(shape)) continue;
     dfm_stream_def def = dfm_stream_def_default();
     def.kind = DFM_STREAM_SCENE;
     def.frame = frame;
-    def.body = *thing;
+    def.body = thing->second;
     write_packets(world, def, one);
     out.insert(out.end(), one.begin(), one.end());
   }
@@ -55,16 +54,17 @@ void write_packets(dfm_world world, const dfm_stream_def &def, Packets &out) {
 }
 
 void Teller::look(dfm_world world) {
+  number_ += looked_;
   write_packet(world, DFM_STREAM_FRAME, number_, frame);
   list_shapes(frame, now_);
   scene.clear();
   changed.clear();
-  if (now_ != shapes_ || number_ == 0) {
-    changed = news_packets(world, number_, shapes_, now_);
+  if (!looked_ || now_ != shapes_) {
+    if (looked_) changed = news_packets(world, number_, shapes_, now_);
     write_packet(world, DFM_STREAM_SCENE, number_, scene);
     shapes_.swap(now_);
   }
-  ++number_;
+  looked_ = true;
 }
 
 void pack(const Packets &packets, uint32_t most, Packets &out) {

@@ -17,15 +17,17 @@ using Shapes = std::vector<std::pair<uint32_t, uint32_t>>;  // of things: number
 void write_packets(dfm_world world, const dfm_stream_def &def, Packets &out);
 
 // What viewers get of a world. look() fills it, in the memory of the last time: a frame in one packet,
-// surfaces as floats, with contacts; and where something is new, the scene, and of it what has changed.
+// surfaces as floats, with contacts; and where something is new, the scene, and of it what has changed (the
+// first time nothing: all of it is new).
 class Teller {
  public:
   Packets frame, scene, changed;
   void look(dfm_world world);
-  uint32_t number() const { return number_; }  // of the next frame
+  uint32_t number() const { return number_; }  // of `frame`
 
  private:
   uint32_t number_ = 0;
+  bool looked_ = false;
   Shapes shapes_, now_;  // of the scene that was told last
 };
 

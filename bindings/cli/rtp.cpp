@@ -22,7 +22,8 @@ namespace {
 constexpr uint32_t kPayload = 1188;  // bytes: a datagram of 1,200 passes every network
 constexpr uint8_t kRtpVersion = 2 << 6, kPayloadType = 96;
 constexpr double kFrameRate = 30, kSlowest = 5;  // frames a second
-constexpr std::chrono::seconds kRound(1), kReports(5), kEnding(1);
+constexpr std::chrono::seconds kReports(5), kEnding(1);
+constexpr std::chrono::milliseconds kRound(600);  // and half of one: who joins late is whole within a second
 constexpr std::chrono::milliseconds kTick(5);     // within which what comes is heard
 constexpr int kPatience = 5;                      // ms
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
@@ -335,9 +336,9 @@ void RtpSender::work() {
       hear();
       if (!in.scene.empty()) {
         pack(in.news, kPayload, news_);
-        send_all(news_, false);
         Packets packed;
         pack(in.scene, kPayload, packed);
+        send_all(round_.empty() ? packed : news_, false);  // the first time all is new
         next_scene_.swap(packed);
       }
       if (!in.frame.empty()) {

@@ -49,9 +49,10 @@ class Received::Chunk {
       if (!std::isfinite(get<float>(at + 4 * i))) return false;
     return true;
   }
+  // Its length stands at `at`.
   std::string name(size_t at) const {
-    if (!has(at, 4) || !has(at + 4, get(at))) return {};
-    return {reinterpret_cast<const char *>(bytes_ + at + 4), std::min<size_t>(get(at), kLongestName)};
+    const size_t n = std::min({size_t{get(at)}, kLongestName, n_ - at - 4});
+    return {reinterpret_cast<const char *>(bytes_ + at + 4), n};
   }
 
  private:
@@ -74,19 +75,26 @@ bool Received::read(const unsigned char *bytes, size_t n) {
 void Received::packet(const unsigned char *bytes, size_t n) {
   const Chunk head(bytes, n);
   const bool frame = bytes[5] == 1, everything = bytes[5] == 0 && bytes[6] == 1 && head.get(8) == 1;
-  told_ = head.get(20);
+  packet_frame_ = head.get(20);
   if (frame) {
     const double time = head.get<double>(24);
-    if ((begun_ && older(told_, frame_)) || !std::isfinite(time)) return;  // what is there is newer
-    if (!begun_ || told_ != frame_) contacts_.clear();
+    if ((begun_ && older(packet_frame_, frame_)) || !std::isfinite(time)) return;  // what is there is newer
+    if (packet_frame_ != frame_) {
+      contacts_.clear();
+      parts_.clear();
+    }
     begun_ = true;
-    frame_ = told_;
+    frame_ = packet_frame_;
     time_ = time;
   }
   if (everything)
-    for (auto &[number, m] : meshes_) m.told = false;
+    for (auto &[number, m] : meshes_) m.in_packet = false;
+  part_ = head.get(12);
+  const size_t before = contacts_.size();
   chunks(bytes + kHeader, n - kHeader);
-  if (everything) forget([&](uint32_t, const Mesh &m) { return !m.told && !older(told_, m.frame); });
+  if (contacts_.size() > before) parts_.insert(part_);
+  if (everything)
+    forget([&](uint32_t, const Mesh &m) { return !m.in_packet && !older(packet_frame_, m.frame); });
 }
 
 template <class F>
@@ -159,25 +167,27 @@ void Received::tell(const Chunk &c, Mesh fresh, size_t name) {
   const auto found = meshes_.find(c.get(0));
   if (found != meshes_.end()) {
     Mesh &m = found->second;
-    m.told = true;
-    if ((m.shape == c.get(4) && m.rigid == fresh.rigid) || older(told_, m.frame)) return;
+    m.in_packet = true;
+    if ((m.shape == c.get(4) && m.rigid == fresh.rigid) || older(packet_frame_, m.frame)) return;
   }
   fresh.points = c.get(8);
   fresh.faces = c.get(12);
-  if (held_ + weight(fresh) > kMost) return;
+  const size_t others = held_ - (found == meshes_.end() ? 0 : weight(found->second));
+  if (others + weight(fresh) > kMost) return;
   fresh.name = c.name(name);
   fresh.shape = c.get(4);
-  fresh.frame = told_;
-  fresh.told = true;
+  fresh.frame = packet_frame_;
+  fresh.in_packet = true;
   fresh.filled = fresh.points + fresh.faces == 0;
   fresh.missing = 3 * fresh.faces + (fresh.rigid ? 3 * fresh.points + 1 : 6 * fresh.points);
   if (found != meshes_.end()) {
     Mesh &old = found->second;
-    held_ -= weight(old);
+    std::unique_ptr<Mesh> before;
     if (!fresh.rigid && !old.rigid && fresh.missing > 0)
-      fresh.before = old.missing == 0 ? std::make_unique<Mesh>(std::move(old)) : std::move(old.before);
+      before = old.missing == 0 ? std::make_unique<Mesh>(std::move(old)) : std::move(old.before);
+    if (before && others + weight(fresh) + weight(*before) <= kMost) fresh.before = std::move(before);
   }
-  held_ += weight(fresh);
+  held_ = others + weight(fresh);
   meshes_.insert_or_assign(c.get(0), std::move(fresh));
 }
 
@@ -191,7 +201,7 @@ void Received::base(const Chunk &c) {
   Mesh *const m = mesh(c);
   if (!m) return;
   const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)}, all = 3 * m->points;
-  if (first > all || n > all - first || !c.finite(16, n) || !fills(*m, "BASE", c)) return;
+  if (n == 0 || first > all || n > all - first || !c.finite(16, n) || !fills(*m, "BASE", c)) return;
   for (size_t i = 0; i < n; ++i) {
     float &to = m->base[first + i];
     m->missing -= std::isnan(to);
@@ -205,7 +215,7 @@ void Received::triangles(const Chunk &c) {
   Mesh *const m = mesh(c);
   if (!m) return;
   const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)}, all = 3 * m->faces;
-  if (first > all || n > all - first || !c.has(16, 4 * n)) return;
+  if (n == 0 || first > all || n > all - first || !c.has(16, 4 * n)) return;
   for (size_t i = 0; i < n; ++i)
     if (c.get(16 + 4 * i) >= m->points) return;
   if (!fills(*m, "TRIS", c)) return;
@@ -256,7 +266,7 @@ void Received::surface(const Chunk &c) {
   const size_t first = 3 * size_t{c.get(8)}, n = 3 * size_t{c.get(12)};
   const size_t all = 3 * m.points;
   const bool floats = c.get(16) & 1;
-  if (first > all || n > all - first) return;
+  if (n == 0 || first > all || n > all - first) return;
   if (floats ? !c.finite(20, n) : !c.finite(20, 6) || !c.has(48, 2 * n)) return;
   if (!fills(m, "SURF", c)) return;
   for (size_t i = 0; i < n; ++i) {
@@ -273,7 +283,9 @@ void Received::surface(const Chunk &c) {
   if (m.missing == 0) settle(m);
 }
 
+// A packet that comes again brings none.
 void Received::contacts(const Chunk &c) {
+  if (parts_.contains(part_)) return;
   for (size_t at = 0; c.has(at, 28) && contacts_.size() < kMostRows; at += 28) {
     if (!c.finite(at, 6)) continue;
     Contact row;

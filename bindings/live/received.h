@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -25,7 +26,7 @@ class Received {
     std::vector<uint32_t> triangles;
     size_t missing = 0;            // values that have not come yet
     std::unique_ptr<Mesh> before;  // with the triangles of before, until the new ones are complete
-    bool told = false;             // in the packet that is being read
+    bool in_packet = false;        // told of in the packet that is being read
     bool rigid = false;            // all below is of such a one
     uint32_t kind = 0;             // DFM_SHAPE_*
     bool sensor = false, placed = false;
@@ -71,7 +72,9 @@ class Received {
   std::map<uint32_t, uint32_t> present_, listing_;  // listing_: a list of which a part may not have come yet
   std::vector<Contact> contacts_;
   double time_ = 0;
-  uint32_t frame_ = 0, told_ = 0, listed_ = 0;  // told_: of the packet that is read; listed_: of listing_
+  uint32_t frame_ = 0, packet_frame_ = 0, listed_ = 0;  // of the packet that is read; of listing_
+  uint32_t part_ = 0;                                   // number of the packet that is read
+  std::set<uint32_t> parts_;  // packets of the frame of which the contacts have come
   bool begun_ = false;
   size_t held_ = 0;  // of the bound of memory
 };

@@ -83,7 +83,7 @@ bool RtpReceiver::datagram(const unsigned char *in, size_t n) {
     received_ = expected_before_ = received_before_ = 0;
     scene_ = {};
     state_ = {};
-    told_ = 0;
+    state_frame_ = 0;
     ++runs_;
     sliders_.clear();
     requests_.clear();
@@ -112,8 +112,8 @@ void RtpReceiver::answer(const unsigned char *in, size_t n) {
   if (!cli::parse_json({in + cli::kAnswerHead, in + n}, state) || state.kind != cli::JsonValue::object)
     return;
   const double frame = state.scalar("frame");
-  if (!(frame >= told_ && frame <= UINT32_MAX)) return;  // it has come late
-  told_ = frame;
+  if (!(frame >= state_frame_ && frame <= UINT32_MAX)) return;  // it has come late
+  state_frame_ = frame;
   told(state);
   state_ = std::move(state);
 }

@@ -63,7 +63,7 @@ class RtpReceiver {
   std::deque<Request> requests_;  // those with the next numbers
   size_t sent_ = 0;               // so many of them, from the first on, were sent and keep their text
   cli::JsonValue state_;
-  double told_ = 0;  // frame of the state
+  double state_frame_ = 0;  // frame of the state
   std::vector<Slider> sliders_;
 };
 

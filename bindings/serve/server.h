@@ -66,14 +66,17 @@ class Server final : public live::Viewers {
   uint16_t port_ = 0;
   lws_context *context_ = nullptr;
   std::thread thread_;
-  Bytes packed_;  // of the thread of the network: the frame that is packed
+  // Of the thread of the network: the frame that is packed, and as it goes out.
+  Bytes packed_;
+  Message frame_;
+  uint64_t frame_number_ = 0;
 
   mutable std::mutex mutex_;  // of all below
   bool stops_ = false;
   Bytes fresh_;  // the newest frame, which is not packed yet
-  Message scene_, frame_, state_;
+  Message scene_, state_;
   std::deque<Change> changes_;
-  uint64_t scene_number_ = 0, frame_number_ = 0, state_number_ = 0;
+  uint64_t scene_number_ = 0, state_number_ = 0;
   std::deque<Request> requests_;
   std::vector<uint32_t> present_;  // viewers in the order in which they came
   uint32_t control_ = 0, last_viewer_ = 0;

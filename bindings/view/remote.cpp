@@ -241,6 +241,7 @@ void Remote::fill(render::Scene &out) {
     s.rgb[2] = own.b;
     out.surfaces.push_back(s);
   }
+  size_t drawn = 0;
   for (const auto &[number, t] : scene.meshes()) {
     if (!t.rigid || t.sensor || t.missing || !scene.present(number)) continue;
     if (t.triangles.empty()) {
@@ -251,7 +252,8 @@ void Remote::fill(render::Scene &out) {
       cli::add_solid(solid, false, out);
       continue;
     }
-    std::vector<double> &xyz = placed_[number];
+    if (drawn == placed_.size()) placed_.emplace_back();
+    std::vector<double> &xyz = placed_[drawn++];
     xyz.resize(t.base.size());
     for (size_t i = 0; i < xyz.size(); i += 3) {
       const double p[3] = {double{t.base[i]}, double{t.base[i + 1]}, double{t.base[i + 2]}};
@@ -260,6 +262,7 @@ void Remote::fill(render::Scene &out) {
     }
     cli::add_gray(xyz, t.triangles.data(), uint32_t(t.triangles.size() / 3), out);
   }
+  placed_.resize(drawn);
 }
 
 void Remote::draw() {

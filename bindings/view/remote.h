@@ -46,14 +46,14 @@ class Remote final : public Hands {
   std::optional<Script> script_;
   live::RtpReceiver receiver_;
   Arrows arrows_;
-  std::map<uint32_t, std::vector<double>> placed_;  // points of things that have triangles
-  double size_ = 0;                                 // m, of what is shown; 0: nothing has come yet
-  bool set_ = false;                                // the camera is as the sender's scene says
-  double began_ = 0, last_ = 0;                     // s
-  std::optional<render::Vec> pulled_;               // m, the place that the mouse holds
-  std::map<std::string, Plot> plots_;               // by what they show
-  double plotted_ = 0;                              // s, of the state that they have got last
-  uint64_t run_ = 0;                                // of which they are
+  std::vector<std::vector<double>> placed_;  // points of things that have triangles, in the order of drawing
+  double size_ = 0;                          // m, of what is shown; 0: nothing has come yet
+  bool set_ = false;                         // the camera is as the sender's scene says
+  double began_ = 0, last_ = 0;              // s
+  std::optional<render::Vec> pulled_;        // m, the place that the mouse holds
+  std::map<std::string, Plot> plots_;        // by what they show
+  double plotted_ = 0;                       // s, of the state that they have got last
+  uint64_t run_ = 0;                         // of which they are
 };
 
 }  // namespace view

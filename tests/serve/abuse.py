@@ -34,6 +34,19 @@ def state_of(viewer, until=lambda state: True, seconds=30):
     raise AssertionError("no such state came")
 
 
+def states_of_frames(viewer, n):
+    """Of n frames, how many have a state of their number before them."""
+    last, count, frames = None, 0, 0
+    while frames < n:
+        message = viewer.receive()
+        if isinstance(message, str):
+            last = json.loads(message).get("frame")
+        elif message[5] == 1:
+            count += last == int.from_bytes(message[20:24], "little")
+            frames += 1
+    return count
+
+
 def http(url, target, host=None):
     at = urllib.parse.urlsplit(url)
     with socket.create_connection((at.hostname, at.port), 10) as s:
@@ -94,6 +107,7 @@ def main():
         number = json.loads(second.receive())["you"]
         state = state_of(second)
         assert state["viewers"] == 2 and state["control"] != number
+        assert states_of_frames(second, 40) > 20  # one that is late may get a newer one
         slider = state["sliders"][0]
         to_low = {"do": "slider", "name": slider["name"], "value": slider["low"]}
         second.send(to_low)

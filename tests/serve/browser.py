@@ -160,6 +160,12 @@ def walk(browser, out):
     browser.wait("state.time < 0.2", "Reset goes back")
     browser.wait(f"bodies()[0].triangles.length === {triangles}", "the cut is undone")
     assert browser.value("state.message") == "", browser.value("state.message")
+    # a wrong file leaves the connection as it is, with a sentence
+    browser.value("""(data => { data.items.add(new File(["no recording"], "notes.txt"));
+      $("file").files = data.files; $("file").onchange(); })(new DataTransfer())""")
+    browser.wait("trouble.startsWith('notes.txt is no recording')", "a file that is none")
+    frame = browser.value("world.frame")
+    browser.wait(f"world.frame > {frame} + 3 && $('message').textContent === trouble", "the connection stays")
     # the run is recorded from the whole scene on, and downloaded
     path = os.path.join(out, "run.dfms")
     if os.path.exists(path):

@@ -99,7 +99,9 @@ def main():
     with open(os.path.join(out, "summary.json"), encoding="utf-8") as file:
         sent = json.load(file)["stream"]
     assert sent["frames"] == len(ended) and sent["packets"] == count
-    assert whole - joined < 1.5, f"who joins late is whole after {whole - joined:.2f} s"
+    assert whole, "who joins late is never whole"
+    # 0.9 s and a frame by design; the rest is what this machine adds when others work on it
+    assert whole - joined < 1.2, f"who joins late is whole after {whole - joined:.2f} s"
     rates = {clean.bodies[number].name: n for number, n in brought.items() if number in clean.present}
     for name, n in rates.items():  # all of the same time
         assert abs(sent["kbit_per_s"][name] / n - sum(sent["kbit_per_s"].values()) / sum(rates.values())) \
