@@ -151,8 +151,10 @@ class AbaqusReader {
   }
   [[noreturn]] void not_whole() {
     in_.seek(keyword_at_);
+    const std::string line = Cursor::quote(trimmed(in_.line()));
+    in_.seek(keyword_at_);
     in_.unsupported("%s is not read; write one file with every node, element and set by its numbers",
-                    Cursor::quote(trimmed(in_.line())).c_str());
+                    line.c_str());
   }
 
   Set *set_called(Sets &sets, const std::string_view *name) {
