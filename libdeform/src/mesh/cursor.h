@@ -38,7 +38,8 @@ class Cursor {
   bool binary = false;  // names places by byte instead of line
   bool swap = false;    // binary values have the other byte order
   char comment = 0;     // a word that starts with it begins a comment up to the end of the line
-  char separator = ' ';  // of line_word(), beside blanks
+  // of line_word(), beside blanks
+  char separator = ' ';
 
   const std::string &path() const { return path_; }
   size_t left() const { return size_t(end_ - p_); }

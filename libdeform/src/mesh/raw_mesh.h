@@ -24,11 +24,11 @@ struct RawMesh {
   Array<uint32_t> tet_group;  // index into groups
   // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
   Array<double> tet_share;
-  Array<double> inside;           // [ncell,27] of hexahedra, likewise
-  Array<uint32_t> tris;           // polygons are cut into triangles by the readers
-  Array<uint32_t> tri_group;      // index into groups, kNoGroup without
-  bool own_corners = false;       // the format gives each triangle points of its own
-  std::vector<MeshGroup> groups;  // points: not those of their cells by tet_group; with repeats
+  Array<double> inside;               // [ncell,27] of hexahedra, likewise
+  Array<uint32_t> tris;               // polygons are cut into triangles by the readers
+  Array<uint32_t> tri_group;          // index into groups, kNoGroup without
+  bool own_corners = false;           // the format gives each triangle points of its own
+  std::vector<MeshGroup> groups;      // points: without those of tet_group, in file order, with repeats
   std::vector<std::string> warnings;  // one sentence each, printed before those of repair
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
   uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }

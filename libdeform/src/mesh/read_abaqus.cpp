@@ -14,11 +14,14 @@ namespace dfm {
 namespace {
 
 // Types of elements by what stands before the number of nodes.
-struct Family { const char *prefix; uint8_t dimension; };
-constexpr Family kFamilies[] = {{"c3d", 3}, {"ac3d", 3}, {"dc3d", 3}, {"ec3d", 3},  {"f3d", 3},
-                                {"sc", 3},  {"css", 3},  {"coh3d", 3}, {"s", 2},    {"ds", 2},
-                                {"stri", 2}, {"cps", 2}, {"cpe", 2},  {"cax", 2},   {"m3d", 2},
-                                {"r3d", 2}, {"sfm3d", 2}, {"b", 1},   {"t2d", 1},   {"t3d", 1}};
+struct Family {
+  const char *prefix;
+  uint8_t dimension;
+};
+constexpr Family kFamilies[] = {{"c3d", 3},  {"ac3d", 3},  {"dc3d", 3},  {"ec3d", 3}, {"f3d", 3},
+                                {"sc", 3},   {"css", 3},   {"coh3d", 3}, {"s", 2},    {"ds", 2},
+                                {"stri", 2}, {"cps", 2},   {"cpe", 2},   {"cax", 2},  {"m3d", 2},
+                                {"r3d", 2},  {"sfm3d", 2}, {"b", 1},     {"t2d", 1},  {"t3d", 1}};
 
 std::string_view trimmed(std::string_view text) {
   constexpr const char *kBlank = " \t\r";
@@ -55,20 +58,26 @@ class AbaqusReader {
       else if (is("*elset")) read_set(element_sets_, elements_, "elset");
       else if (is("*solid section") && parameter("elset")) {
         const auto set = element_sets_.index.find(key(*parameter("elset")));
-        if (set != element_sets_.index.end()) sections_.push_back(set->second);
+        if (set != element_sets_.index.end()) element_sets_.all[set->second].section = true;
       }
     }
     make_groups();
     if (!passed_over_.empty())
-      out_.warnings.push_back("elements of these types have no cells or triangles of a body and were left out: " +
-                              join(passed_over_));
+      out_.warnings.push_back(
+          "elements of these types have no cells or triangles of a body and were left out: " +
+          join(passed_over_));
     if (lost_)
       out_.warnings.push_back(format("%zu entries of sets name no node and no element that was read", lost_));
   }
 
  private:
   struct Place { uint32_t first, n; };  // n: triangles from the first; 0: the cell
-  struct Set { std::string_view name; Array<uint32_t> members; };
+  struct Set {
+    std::string_view name;
+    Array<uint32_t> members;
+    bool section = false;
+    uint32_t groups[2] = {kNoGroup, kNoGroup};  // of its triangles, of its cells
+  };
   struct Sets {
     std::vector<Set> all;
     std::map<std::string, uint32_t> index;  // by name in lower case
@@ -132,7 +141,8 @@ class AbaqusReader {
 
   // Refuses what would lose a part of the mesh.
   void check() {
-    for (const char *word : {"*include", "*system", "*ngen", "*nfill", "*ncopy", "*nmap", "*elgen", "*elcopy"})
+    for (const char *word :
+         {"*include", "*system", "*ngen", "*nfill", "*ncopy", "*nmap", "*elgen", "*elcopy"})
       if (is(word)) not_whole();
     const std::string_view *system = parameter("system");
     if ((is("*node") && system && !Cursor::is_word(*system, "r")) ||
@@ -147,7 +157,8 @@ class AbaqusReader {
                       parts_ > 1 ? "part" : "instance");
     }
     if (is("*instance") && data())
-      out_.warnings.push_back("the place of the instance in its assembly is left out; the mesh is where its part is");
+      out_.warnings.push_back(
+          "the place of the instance in its assembly is left out; the mesh is where its part is");
   }
   [[noreturn]] void not_whole() {
     in_.seek(keyword_at_);
@@ -196,7 +207,8 @@ class AbaqusReader {
     if (dimension == 3 && !kind) {
       in_.seek(keyword_at_);
       in_.unsupported(
-          "elements of type %s; tetrahedra of 4 and 10 nodes (C3D4, C3D10) and hexahedra of 8 (C3D8) are read: "
+          "elements of type %s; tetrahedra of 4 and 10 nodes (C3D4, C3D10) and hexahedra of 8 (C3D8) are "
+          "read: "
           "mesh the volume with one of these",
           Cursor::quote(*type).c_str());
     }
@@ -277,21 +289,24 @@ class AbaqusReader {
       if (!set.members.empty())
         out_.keep_points(set.members.data(), set.members.size(), out_.named_group(in_, 0, set.name));
     const CellKind &kind = cell_kind(out_.cell ? out_.cell : uint32_t{DFM_CELL_TET});
-    const auto group = [&](const Set &set, Place place) {
-      return out_.named_group(in_, place.n ? 2 : 3, set.name);
+    const auto group = [&](Set &set, Place place) {
+      uint32_t &g = set.groups[place.n == 0];
+      if (g == kNoGroup) g = out_.named_group(in_, place.n ? 2 : 3, set.name);
+      return g;
     };
-    const auto take = [&](const Set &set) {
+    const auto take = [&](Set &set) {
       for (const uint32_t e : set.members) {
         const Place at = places_[e];
         if (at.n) std::fill_n(&out_.tri_group[at.first], at.n, group(set, at));
         else std::fill_n(&out_.tet_group[kind.tets * size_t{at.first}], kind.tets, group(set, at));
       }
     };
-    for (const Set &set : element_sets_.all) take(set);
-    for (const uint32_t section : sections_) take(element_sets_.all[section]);
+    for (Set &set : element_sets_.all) take(set);
+    for (Set &set : element_sets_.all)
+      if (set.section) take(set);
     const Array<uint32_t> &nodes = out_.cells.empty() ? out_.tets : out_.cells;
     Array<uint32_t> last(out_.npoint(), kNoGroup, HookAllocator<uint32_t>(*out_.memory));
-    for (const Set &set : element_sets_.all)
+    for (Set &set : element_sets_.all)
       for (const uint32_t e : set.members) {
         const Place at = places_[e];
         const uint32_t g = group(set, at);
@@ -320,7 +335,6 @@ class AbaqusReader {
   Numbers nodes_, elements_;
   Array<Place> places_;  // of each element
   Sets node_sets_, element_sets_;
-  std::vector<uint32_t> sections_;  // sets of cells
   size_t named_ = 0, lost_ = 0;
   std::vector<std::string> passed_over_;
 };

@@ -92,7 +92,7 @@ class MeditReader {
     return static_cast<uint32_t>(p - 1);
   }
 
-  // Cells of other kinds and orders, and orders of nodes other than the usual one, must not be lost in silence.
+  // Cells of other kinds and orders, and other orders of nodes, must not be lost in silence.
   static bool is_lost(std::string_view word) {
     for (const char *kind : {"Prisms", "Pyramids", "Tetrahedra", "Hexahedra", "Triangles"})
       if (word.substr(0, std::string_view(kind).size()) == kind) return true;

@@ -22,11 +22,14 @@ class TetgenReader {
     const auto read = [&](const char *part, void (TetgenReader::*rows)(Cursor &)) {
       if (ending == part) return (this->*rows)(in_);
       const std::string path = beside(part);
-      const Array<char> bytes = read_whole_file(*out_.memory, path, kMaxMeshBytes, "the file that belongs to it");
+      const Array<char> bytes =
+          read_whole_file(*out_.memory, path, kMaxMeshBytes, "the file that belongs to it");
       Cursor in(path, bytes.data(), bytes.size());
       (this->*rows)(in);
     };
-    const auto has = [&](const char *part) { return ending == part || std::filesystem::exists(beside(part)); };
+    const auto has = [&](const char *part) {
+      return ending == part || std::filesystem::exists(beside(part));
+    };
     markers_ = !has("face");
     read("node", &TetgenReader::read_points);
     if (has("ele")) read("ele", &TetgenReader::read_cells);
@@ -87,7 +90,8 @@ class TetgenReader {
       uint32_t face[6];
       in.integer("a triangle's number");
       for (size_t k = 0; k < corners; ++k) face[k] = node(in, in.line_word());
-      const uint32_t in_group = out_.group(in, 2, marked ? group(in, in.line_word(), "a triangle's marker") : 0);
+      const uint32_t in_group =
+          out_.group(in, 2, marked ? group(in, in.line_word(), "a triangle's marker") : 0);
       if (corners == 6) out_.add_second_triangle(in, face, in_group);
       else out_.add_polygon(in, face, 3, in_group);
     }
@@ -98,7 +102,9 @@ class TetgenReader {
     if (is != 0 && is != 1) in.refuse("%lld markers or regions; expected 0 or 1", ll(is));
     return is;
   }
-  uint32_t node(Cursor &in, std::string_view word) { return nodes_.find(in, in.to_integer(word, "a point's number")); }
+  uint32_t node(Cursor &in, std::string_view word) {
+    return nodes_.find(in, in.to_integer(word, "a point's number"));
+  }
   // Regions are real numbers to TetGen.
   static int32_t group(Cursor &in, std::string_view word, const char *what) {
     const double number = in.to_real(word, what);

@@ -1,8 +1,7 @@
-// Abaqus, TetGen and Medit files of every kind of cell against the same mesh as MSH; sets, sections, parts; what
-// is refused, and damage.
+// Abaqus, TetGen and Medit files of every kind of cell against the same mesh as MSH; sets, sections, parts;
+// what is refused, and damage.
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <functional>
 
 #include "deform/plugin.h"
@@ -60,12 +59,15 @@ std::string abaqus(const TetMesh &mesh, const std::string &type) {
   std::string members;
   for (size_t c = 0; c < n / 2; ++c) members += element(c) + (c % 8 == 7 ? ",\n" : ",");
   return "*HEADING\n*NODE\n" + rows(mesh.npoint(), [&](size_t p) { return tag(p) + point(mesh, p, ", "); }) +
-         "*ELEMENT, TYPE=" + type + ", ELSET=whole\n" + rows(n, [&](size_t c) {
-           std::string out = element(c);
-           for (size_t k = 0; k < kind.nodes; ++k)
-             out += (k == 3 ? ",\n " : ", ") + tag(mesh.nodes()[kind.nodes * c + k]);
-           return out;
-         }) + "*ELSET, ELSET=left\n" + members + "\n";
+         "*ELEMENT, TYPE=" + type + ", ELSET=whole\n" +
+         rows(n,
+              [&](size_t c) {
+                std::string out = element(c);
+                for (size_t k = 0; k < kind.nodes; ++k)
+                  out += (k == 3 ? ",\n " : ", ") + tag(mesh.nodes()[kind.nodes * c + k]);
+                return out;
+              }) +
+         "*ELSET, ELSET=left\n" + members + "\n";
 }
 
 // place: of each of TetGen's nodes among ours
@@ -73,18 +75,17 @@ void write_tetgen(const TetMesh &mesh, const std::string &stem, size_t first) {
   constexpr uint32_t kPlace[10] = {0, 1, 2, 3, 9, 7, 4, 5, 8, 6};
   const CellKind &kind = cell_kind(mesh.cell);
   const size_t n = mesh.nodes().size() / kind.nodes;
-  test::write_file(stem + ".node", std::to_string(mesh.npoint()) + " 3 0 0\n" +
-                                       rows(mesh.npoint(), [&](size_t p) {
-                                         return std::to_string(p + first) + point(mesh, p, " ");
-                                       }));
-  test::write_file(stem + ".ele", std::to_string(n) + " " + std::to_string(kind.nodes) + " 1\n" +
-                                      rows(n, [&](size_t c) {
-                                        std::string out = std::to_string(c + first);
-                                        for (size_t k = 0; k < kind.nodes; ++k)
-                                          out += " " + std::to_string(
-                                                           mesh.nodes()[kind.nodes * c + kPlace[k]] + first);
-                                        return out + (c < n / 2 ? " 4" : " 0");
-                                      }));
+  test::write_file(stem + ".node",
+                   std::to_string(mesh.npoint()) + " 3 0 0\n" + rows(mesh.npoint(), [&](size_t p) {
+                     return std::to_string(p + first) + point(mesh, p, " ");
+                   }));
+  test::write_file(stem + ".ele",
+                   std::to_string(n) + " " + std::to_string(kind.nodes) + " 1\n" + rows(n, [&](size_t c) {
+                     std::string out = std::to_string(c + first);
+                     for (size_t k = 0; k < kind.nodes; ++k)
+                       out += " " + std::to_string(mesh.nodes()[kind.nodes * c + kPlace[k]] + first);
+                     return out + (c < n / 2 ? " 4" : " 0");
+                   }));
 }
 
 void expect_same(const TetMesh &a, const TetMesh &b) {
@@ -156,7 +157,8 @@ TEST_P(MeshesOfEngineers, EveryFormat_GivesTheMeshThatMshGives) {
 // Nodes of C3D10 as Abaqus numbers them: the middles of 12 23 13 14 24 34.
 TEST(Abaqus, MiddlesOfEdges_LieOnThem) {
   const TetMesh mesh = parsed(
-      "*NODE\n1, 0, 0, 0\n2, 2, 0, 0\n3, 0, 2, 0\n4, 0, 0, 2\n5, 1, 0, 0\n6, 1, 1, 0\n7, 0, 1, 0\n8, 0, 0, 1\n"
+      "*NODE\n1, 0, 0, 0\n2, 2, 0, 0\n3, 0, 2, 0\n4, 0, 0, 2\n5, 1, 0, 0\n6, 1, 1, 0\n7, 0, 1, 0\n8, 0, 0, "
+      "1\n"
       "9, 1, 0, 1\n10, 0, 1, 1\n*ELEMENT, TYPE=C3D10M\n1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10\n");
   ASSERT_EQ(mesh.cells.size(), 10u);
   EXPECT_EQ(mesh.turned, 0u);
@@ -164,9 +166,9 @@ TEST(Abaqus, MiddlesOfEdges_LieOnThem) {
   const uint32_t edges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
   for (size_t e = 0; e < 6; ++e)
     for (size_t k = 0; k < 3; ++k)
-      EXPECT_EQ(mesh.points[3 * mesh.cells[4 + e] + k], (mesh.points[3 * mesh.cells[edges[e][0]] + k] +
-                                                          mesh.points[3 * mesh.cells[edges[e][1]] + k]) /
-                                                             2);
+      EXPECT_EQ(
+          mesh.points[3 * mesh.cells[4 + e] + k],
+          (mesh.points[3 * mesh.cells[edges[e][0]] + k] + mesh.points[3 * mesh.cells[edges[e][1]] + k]) / 2);
 }
 
 TEST(Abaqus, Sets_AreGroupsHoweverTheyAreWritten) {
@@ -174,8 +176,11 @@ TEST(Abaqus, Sets_AreGroupsHoweverTheyAreWritten) {
       "*node, nset=ALL\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n5, 1, 1, 1\n"
       "*Element, Type=C3D4\n 1, 1, 2, 3, 4\n 2, 2, 5, 3, 4\n*ELEMENT, TYPE=S3, ELSET=Face\n 3, 1, 3, 2\n"
       "*NSET, NSET=odd, GENERATE\n1, 5, 2\n*NSET, nset=Two\n1,\n2\n*NSET, NSET=both\nODD, two\n"
-      "*NSET, NSET=both\n4\n*ELSET, ELSET=odd\n1, 3\n*ELSET, ELSET=\"with blank\", GENERATE\n2, 1000000000000\n");
-  const auto points = [&](const char *name, int32_t dimension) { return group_of(mesh, name, dimension).points; };
+      "*NSET, NSET=both\n4\n*ELSET, ELSET=odd\n1, 3\n*ELSET, ELSET=\"with blank\", GENERATE\n2, "
+      "1000000000000\n");
+  const auto points = [&](const char *name, int32_t dimension) {
+    return group_of(mesh, name, dimension).points;
+  };
   EXPECT_EQ(points("ALL", 0), (Array<uint32_t>{0, 1, 2, 3, 4}));
   EXPECT_EQ(points("odd", 0), (Array<uint32_t>{0, 2, 4}));
   EXPECT_EQ(points("Two", 0), (Array<uint32_t>{0, 1}));
@@ -190,7 +195,8 @@ TEST(Abaqus, Sets_AreGroupsHoweverTheyAreWritten) {
 }
 
 TEST(Abaqus, SectionsDivideTheCells_WhateverOtherSetsSay) {
-  const std::string two = kFour + "5, 1, 1, 1\n*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n2, 2, 5, 3, 4\n"
+  const std::string two = kFour +
+                          "5, 1, 1, 1\n*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n2, 2, 5, 3, 4\n"
                           "*ELSET, ELSET=one\n1\n*ELSET, ELSET=loaded\n1, 2\n";
   const auto groups = [](const TetMesh &m) {
     return std::vector{m.groups.at(m.tet_group.at(0)).name, m.groups.at(m.tet_group.at(1)).name};
@@ -206,7 +212,8 @@ TEST(Abaqus, SectionsDivideTheCells_WhateverOtherSetsSay) {
 TEST(Abaqus, AssemblyOfOnePart_IsRead) {
   const std::string part = "*Heading\n*Part, name=P\n" + kTet + "*End Part\n*Assembly, name=A\n";
   const std::string rest =
-      "*End Instance\n*Node\n1, 9., 9., 9.\n*Nset, nset=reference\n 1,\n*Nset, nset=Fixed, instance=P-1\n 1, 2\n"
+      "*End Instance\n*Node\n1, 9., 9., 9.\n*Nset, nset=reference\n 1,\n*Nset, nset=Fixed, instance=P-1\n 1, "
+      "2\n"
       "*End Assembly\n";
   const TetMesh mesh = parsed(part + "*Instance, name=P-1, part=P\n" + rest);
   EXPECT_EQ(mesh.npoint(), 4u);
@@ -223,8 +230,9 @@ TEST(Abaqus, AssemblyOfOnePart_IsRead) {
 }
 
 TEST(Abaqus, ElementsThatAreNoCells_AreLeftOutAndToldOf) {
-  const TetMesh mesh = parsed(kTet + "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"
-                                     "*ELSET, ELSET=mixed\n7, 20, 21\n");
+  const TetMesh mesh = parsed(kTet +
+                              "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"
+                              "*ELSET, ELSET=mixed\n7, 20, 21\n");
   ASSERT_EQ(mesh.warnings.size(), 2u);
   EXPECT_NE(mesh.warnings[0].find("'SPRINGA'"), std::string::npos);
   EXPECT_NE(mesh.warnings[1].find("2 entries"), std::string::npos);
@@ -244,7 +252,8 @@ TEST(Abaqus, WhatWouldLosePartOfTheMesh_IsRefused) {
   refuse(kTet + "*ELEMENT, TYPE=C3D8\n8, 1, 2, 3, 4, 1, 2, 3, 4\n", DFM_E_UNSUPPORTED, {"one kind"});
   refuse(kFour + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 9\n", DFM_E_FORMAT, {"a.inp:7:", "node 9"});
   refuse(kFour + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3\n", DFM_E_FORMAT, {"an element's node"});
-  refuse(kFour + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3\n*NSET, NSET=a\n", DFM_E_FORMAT, {"a.inp:8:", "element's node"});
+  refuse(kFour + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3\n*NSET, NSET=a\n", DFM_E_FORMAT,
+         {"a.inp:8:", "element's node"});
   refuse(kFour + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4, 5\n", DFM_E_FORMAT, {"a.inp:7:", "more than the 4"});
   refuse(kFour + "*ELEMENT\n1, 1, 2, 3, 4\n", DFM_E_FORMAT, {"a.inp:6:", "TYPE=C3D4"});
   refuse(kTet + "7, 1, 2, 3, 4\n", DFM_E_FORMAT, {"element number 7 is given twice"});
@@ -313,7 +322,8 @@ TEST(Tetgen, Damage_IsRefusedInOneSentence) {
   const auto whole = [&] {
     for (const std::string &part : parts) test::write_file(stem + part, test::read_file(cube + part));
   };
-  const auto refuse = [&](const std::string &part, const std::string &text, const std::vector<std::string> &words) {
+  const auto refuse = [&](const std::string &part, const std::string &text,
+                          const std::vector<std::string> &words) {
     whole();
     test::write_file(stem + part, text);
     test::CountedMemory memory;
@@ -326,8 +336,7 @@ TEST(Tetgen, Damage_IsRefusedInOneSentence) {
   };
   for (const std::string &part : parts) {
     const std::string bytes = test::read_file(cube + part);
-    for (size_t k = 0; k < 24; ++k)
-      refuse(part, bytes.substr(0, k * (bytes.size() - 8) / 24), {"a" + part});
+    for (size_t k = 0; k < 24; ++k) refuse(part, bytes.substr(0, k * (bytes.size() - 8) / 24), {"a" + part});
   }
   refuse(".node", "4000000000 3 0 0\n0 0 0 0\n", {"a.node:1:", "4000000000 points"});
   refuse(".node", "9 3 10000000000 0\n", {"attributes"});

@@ -59,15 +59,16 @@ TEST(ReadDispatch, ForeignContent_IsNamedWhateverTheEnding) {
 
 TEST(ReadDispatch, ForeignEndings_AreRefusedWithTheWayToConvert) {
   const std::pair<const char *, const char *> rows[] = {
-      {"bdf", "meshio convert"}, {"poly", ".ele"},    {"edge", ".ele"},      {"gltf", "assimp"},        {"glb", "assimp"},     {"fbx", "assimp"},    {"3ds", "assimp"},
-      {"dae", "assimp"},         {"gz", "gunzip"},      {"meshb", "gmsh -3"}, {"step", "gmsh -3"},
-      {"med", "meshio"}};
+      {"bdf", "meshio convert"}, {"poly", ".ele"},     {"edge", ".ele"},    {"gltf", "assimp"},
+      {"glb", "assimp"},         {"fbx", "assimp"},    {"3ds", "assimp"},   {"dae", "assimp"},
+      {"gz", "gunzip"},          {"meshb", "gmsh -3"}, {"step", "gmsh -3"}, {"med", "meshio"}};
   for (const auto &[end, word] : rows) expect_unsupported(std::string("a.") + end, "x", {word});
 }
 
 TEST(ReadDispatch, UnknownEnding_NamesTheNearestAndAllThatAreRead) {
-  expect_unsupported("a.stll", "x",
-                     {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off, .inp, .ele"});
+  expect_unsupported(
+      "a.stll", "x",
+      {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off, .inp, .ele"});
   expect_unsupported("a.d/mesh", "x", {"unknown mesh file ending ''"});
 }
 
