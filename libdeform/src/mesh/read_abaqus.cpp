@@ -4,6 +4,7 @@
 // may overlap, and a cell has one group: that of its section, else of the last set that names it.
 #include <cctype>
 #include <map>
+#include <set>
 
 #include "deform/plugin.h"
 #include "mesh/cells.h"
@@ -65,7 +66,7 @@ class AbaqusReader {
     if (!passed_over_.empty())
       out_.warnings.push_back(
           "elements of these types have no cells or triangles of a body and were left out: " +
-          join(passed_over_));
+          join({passed_over_.begin(), passed_over_.end()}));
     if (lost_)
       out_.warnings.push_back(format("%zu entries of sets name no node and no element that was read", lost_));
   }
@@ -214,7 +215,7 @@ class AbaqusReader {
     }
     if (dimension == 1) return;  // lines
     if (!kind && n != 3 && n != 4 && n != 6) {
-      passed_over_.push_back(Cursor::quote(*type));
+      passed_over_.insert(Cursor::quote(*type));
       return;
     }
     Set *const set = set_called(element_sets_, parameter("elset"));
@@ -336,7 +337,7 @@ class AbaqusReader {
   Array<Place> places_;  // of each element
   Sets node_sets_, element_sets_;
   size_t named_ = 0, lost_ = 0;
-  std::vector<std::string> passed_over_;
+  std::set<std::string> passed_over_;
 };
 
 }  // namespace

@@ -231,7 +231,8 @@ TEST(Abaqus, AssemblyOfOnePart_IsRead) {
 
 TEST(Abaqus, ElementsThatAreNoCells_AreLeftOutAndToldOf) {
   const TetMesh mesh = parsed(kTet +
-                              "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"
+                              "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=SPRINGA\n22, 1, "
+                              "2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"
                               "*ELSET, ELSET=mixed\n7, 20, 21\n");
   ASSERT_EQ(mesh.warnings.size(), 2u);
   EXPECT_NE(mesh.warnings[0].find("'SPRINGA'"), std::string::npos);
