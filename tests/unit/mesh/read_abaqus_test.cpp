@@ -13,15 +13,17 @@ using namespace dfm;
 
 namespace {
 
-const Memory &kMemory = Memory::standard();
+const Memory &kStandard = Memory::standard();
 const std::string kFour = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n";
 const std::string kTet = kFour + "*ELEMENT, TYPE=C3D4, ELSET=all\n7, 1, 2, 3, 4\n";
 
-TetMesh parsed(const std::string &text) { return parse_tet_mesh(kMemory, "a.inp", text.data(), text.size()); }
+TetMesh parsed(const std::string &text) {
+  return parse_tet_mesh(kStandard, "a.inp", text.data(), text.size());
+}
 
 TetMesh made(uint32_t kind) {
-  if (kind == DFM_CELL_HEX8) return make_bricks(kMemory, 0.3, 0.2, 0.2, 12);
-  const TetMesh beam = make_beam(kMemory, 0.3, 0.2, 0.2, 100);
+  if (kind == DFM_CELL_HEX8) return make_bricks(kStandard, 0.3, 0.2, 0.2, 12);
+  const TetMesh beam = make_beam(kStandard, 0.3, 0.2, 0.2, 100);
   return kind == DFM_CELL_TET10 ? second_order(beam) : beam;
 }
 
@@ -134,7 +136,7 @@ TEST_P(MeshesOfEngineers, EveryFormat_GivesTheMeshThatMshGives) {
   const std::string folder = test::scratch("engineers");
   const TetMesh mesh = grouped(GetParam());
   write_tet_mesh(mesh, folder + "/a.msh");
-  const TetMesh msh = read_tet_mesh(kMemory, folder + "/a.msh");
+  const TetMesh msh = read_tet_mesh(kStandard, folder + "/a.msh");
   for (const char *more : {"", "H", "R", "MH"}) {
     const TetMesh back = parsed(abaqus(mesh, "C3D" + std::to_string(cell_kind(mesh.cell).nodes) + more));
     expect_same(back, msh);
@@ -142,12 +144,12 @@ TEST_P(MeshesOfEngineers, EveryFormat_GivesTheMeshThatMshGives) {
     EXPECT_EQ(group_of(back, "whole", 3).points.size(), back.npoint());
   }
   write_tet_mesh(mesh, folder + "/a.mesh");
-  expect_same(read_tet_mesh(kMemory, folder + "/a.mesh"), msh);
+  expect_same(read_tet_mesh(kStandard, folder + "/a.mesh"), msh);
   for (const size_t first : {0, 1, 5}) {
     if (mesh.cell == DFM_CELL_HEX8) continue;
     write_tetgen(mesh, folder + "/t", first);
     for (const char *ending : {".ele", ".node"}) {
-      const TetMesh back = read_tet_mesh(kMemory, folder + "/t" + ending);
+      const TetMesh back = read_tet_mesh(kStandard, folder + "/t" + ending);
       expect_same(back, msh);
       EXPECT_EQ(group_of(back, "4", 3).points, group_of(msh, "left", 3).points);
     }
@@ -280,7 +282,7 @@ TEST(Abaqus, WhatWouldLosePartOfTheMesh_IsRefused) {
 TEST(Tetgen, MarkersAndRegions_AreGroups) {
   const std::string cube = std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_tetgen";
   for (const char *ending : {".ele", ".node", ".face"}) {
-    const TetMesh m = read_tet_mesh(kMemory, cube + ending);
+    const TetMesh m = read_tet_mesh(kStandard, cube + ending);
     ASSERT_EQ(m.groups.size(), 3u);  // markers of points are those of their triangles
     EXPECT_EQ(group_of(m, "7", 2).points.size(), 8u);
     EXPECT_EQ(m.tri_group.size(), 12u);
@@ -290,14 +292,14 @@ TEST(Tetgen, MarkersAndRegions_AreGroups) {
   const std::string stem = test::scratch("tetgen") + "/a";
   test::write_file(stem + ".node", test::read_file(cube + ".node"));
   test::write_file(stem + ".ele", test::read_file(cube + ".ele"));
-  EXPECT_EQ(group_of(read_tet_mesh(kMemory, stem + ".ele"), "3", 0).points.size(), 8u);
+  EXPECT_EQ(group_of(read_tet_mesh(kStandard, stem + ".ele"), "3", 0).points.size(), 8u);
 }
 
 // Corners and then the middles of 12 23 13, as tetgen -o2 writes them.
 TEST(Tetgen, SecondOrderTriangles_AreTheBoundary) {
   const std::string stem = test::scratch("tetgen2") + "/a";
   write_tetgen(second_order(parsed(kTet)), stem, 0);
-  const TetMesh plain = read_tet_mesh(kMemory, stem + ".ele");
+  const TetMesh plain = read_tet_mesh(kStandard, stem + ".ele");
   const auto at = [&](uint32_t a, uint32_t b) {
     for (uint32_t p = 4; p < 10; ++p) {
       bool is = true;
@@ -308,10 +310,10 @@ TEST(Tetgen, SecondOrderTriangles_AreTheBoundary) {
     return std::string("?");
   };
   test::write_file(stem + ".face", "1 1\n0 0 2 1 " + at(0, 2) + " " + at(2, 1) + " " + at(0, 1) + " 5\n");
-  const TetMesh mesh = read_tet_mesh(kMemory, stem + ".face");
+  const TetMesh mesh = read_tet_mesh(kStandard, stem + ".face");
   EXPECT_EQ(mesh.tri_group.size(), 4u);
   EXPECT_EQ(group_of(mesh, "5", 2).points.size(), 6u);
-  const TriMesh skin = read_tri_mesh(kMemory, stem + ".ele");
+  const TriMesh skin = read_tri_mesh(kStandard, stem + ".ele");
   ASSERT_EQ(skin.groups.size(), 1u);  // each of the four is a triangle of the boundary
   EXPECT_EQ(std::count(skin.tri_group.begin(), skin.tri_group.end(), 0u), 4);
 }
