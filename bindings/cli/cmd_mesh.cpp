@@ -38,7 +38,8 @@ std::string filling_file(const std::string &out) {
   return shown_word(std::filesystem::path(out).replace_extension(".vtu").string());
 }
 
-constexpr const char *kIn = "mesh of any format that is read: .msh .vtk .vtu .mesh .obj .ply .stl .off";
+constexpr const char *kIn =
+    "mesh of any format that is read: .msh .vtk .vtu .mesh .inp .ele .obj .ply .stl .off";
 
 bool open(MeshSession &s, const std::string &file, bool as_surface) {
   if (!s.context) return false;

@@ -46,12 +46,12 @@ TEST(MeshKind, NothingToMakeABodyOf_IsAnError) {
   Context c;
   const std::string folder = test::scratch("mesh_kind");
   test::write_file(folder + "/points.obj", "v 0 0 0\n");
-  test::write_file(folder + "/a.inp", "*NODE\n");
+  test::write_file(folder + "/a.bdf", "GRID\n");
   uint32_t kind = 77;
   EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/points.obj").c_str(), &kind), DFM_E_FORMAT);
   EXPECT_NE(std::string(dfm_last_error()).find("no tetrahedra and no triangles"), std::string::npos)
       << dfm_last_error();
-  EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/a.inp").c_str(), &kind), DFM_E_UNSUPPORTED);
+  EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/a.bdf").c_str(), &kind), DFM_E_UNSUPPORTED);
   EXPECT_EQ(dfm_mesh_file_kind(c.context, (folder + "/none.msh").c_str(), &kind), DFM_E_IO);
   EXPECT_EQ(dfm_mesh_file_kind(nullptr, "a.msh", &kind), DFM_E_ARG);
   EXPECT_EQ(dfm_mesh_file_kind(c.context, nullptr, &kind), DFM_E_ARG);

@@ -193,5 +193,28 @@ class Readers(unittest.TestCase):
             self.assertEqual(len(by_meshio(path)[0]), len(by_vtk(path)[0]))
 
 
+class OfMeshio(unittest.TestCase):
+    """Volume meshes that meshio writes, read by the command."""
+
+    def test_formats_of_engineers(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for make, order, kind, files in (("beam", 1, "tetra", "a.inp a.node a.mesh"),
+                                             ("beam", 2, "tetra10", "a.inp"),
+                                             ("bricks", 1, "hexahedron", "a.inp a.mesh")):
+                source = pathlib.Path(folder) / "a.vtu"
+                more = ["--order", order] if make == "beam" else []
+                deform("mesh", "make", make, "--cells", 100, *more, "--out", source)
+                read = meshio.read(source)
+                plain = meshio.Mesh(read.points, [(kind, read.cells_dict[kind])])
+                for file in files.split():
+                    with self.subTest(kind=kind, file=file):
+                        path = pathlib.Path(folder) / file
+                        plain.write(path)
+                        ours, theirs = mesh(path), mesh(source)
+                        for name in ("points", "tets", "surface_triangles", "edges"):
+                            self.assertEqual(ours[name], theirs[name])
+                        self.assertAlmostEqual(ours["volume"] / theirs["volume"], 1, delta=1e-12)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -148,7 +148,7 @@ class TetMesh(_Mesh):
 
     @classmethod
     def read(cls, path: Any) -> TetMesh:
-        """Reads MSH, VTK, VTU or Medit; what was repaired is in `warnings`."""
+        """Reads MSH, VTK, VTU, Medit, Abaqus or TetGen; what was repaired is in `warnings`."""
         return cls._of(lib.dfm_tetmesh_read, default_context().address, encoded(path))
 
     @classmethod
@@ -335,7 +335,7 @@ class TriMesh(_Mesh):
 
     @classmethod
     def read(cls, path: Any) -> TriMesh:
-        """Reads OBJ, PLY, STL, OFF, MSH, VTK, VTU or Medit; what was repaired is in `warnings`."""
+        """Reads OBJ, PLY, STL, OFF and what TetMesh.read does; what was repaired is in `warnings`."""
         return cls._of(lib.dfm_trimesh_read, default_context().address, encoded(path))
 
     @classmethod

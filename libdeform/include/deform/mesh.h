@@ -6,8 +6,8 @@
 #ifdef __cplusplus
 extern "C" {
 #endif
-/** Reads tetrahedra, also of second order, or hexahedra: MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU, Medit
- * (ASCII and binary; doc/reference/mesh_files.md). The first bytes, else the ending, tell the format.
+/** Reads tetrahedra, also of second order, or hexahedra: MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU,
+ * Medit, Abaqus, TetGen (doc/reference/mesh_files.md). The first bytes, else the ending, tell the format.
  * Memory is bounded by the size of the file.
  * Inverted cells are reversed, unused points and duplicate cells removed, each with a count in a warning of
  * the log and in dfm_tetmesh_info. A cell without volume is refused: it has no rest shape.
@@ -102,7 +102,7 @@ DFM_API dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, ui
 DFM_API dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells,
                                  dfm_trimesh *surface);
 
-/** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of MSH, VTK, VTU and Medit files (the
+/** Reads a triangle surface: OBJ, PLY, STL, OFF, and the triangles of files of dfm_tetmesh_read (the
  * boundary if such a file has tetrahedra). Polygons are divided into triangles. Coincident points are merged,
  * triangles without area and duplicates removed, and triangles oriented so that neighbors agree and closed
  * pieces face outward. Holes are counted, not closed. Each repair adds one sentence to warnings.

@@ -38,6 +38,8 @@ class Cursor {
   bool binary = false;  // names places by byte instead of line
   bool swap = false;    // binary values have the other byte order
   char comment = 0;     // a word that starts with it begins a comment up to the end of the line
+  // of line_word(), beside blanks
+  char separator = ' ';
 
   const std::string &path() const { return path_; }
   size_t left() const { return size_t(end_ - p_); }
@@ -105,13 +107,13 @@ class Cursor {
   // continues the line.
   std::string_view line_word() {
     for (; p_ < end_ && *p_ != '\n'; ++p_) {
-      if (is_space(*p_)) continue;
+      if (is_space(*p_) || *p_ == separator) continue;
       if (continues()) {
         while (*p_ != '\n') ++p_;
         continue;
       }
       const char *from = p_;
-      while (p_ < end_ && !is_space(*p_) && !continues()) ++p_;
+      while (p_ < end_ && !is_space(*p_) && *p_ != separator && !continues()) ++p_;
       return {from, size_t(p_ - from)};
     }
     return {};
@@ -228,7 +230,8 @@ class Cursor {
   }
   [[noreturn]] void refuse_word(std::string_view text, const char *what, const char *kind) {
     if (!text.empty()) p_ = text.data();
-    refuse("expected %s (%s), found %s", what, kind, quote(text).c_str());
+    refuse("expected %s (%s), found %s", what, kind,
+           text.empty() && left() ? "the end of the line" : quote(text).c_str());
   }
   [[noreturn]] void refuse_as(dfm_status status, const char *sentence, va_list args) const;
   std::string path_;

@@ -133,18 +133,16 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
   for (uint32_t &p : raw.cells) p = number[p];
   keep_grouped_triangles(raw, mesh, number);
 
+  for (MeshGroup &group : raw.groups) {
+    for (uint32_t &p : group.points) p = number[p];
+    group.points.erase(std::remove(group.points.begin(), group.points.end(), kNoGroup), group.points.end());
+  }
   for (size_t i = 0; i < raw.tet_group.size(); ++i)
     if (raw.tet_group[i] != kNoGroup) {
       Array<uint32_t> &points = raw.groups[raw.tet_group[i]].points;
       points.insert(points.end(), &raw.tets[4 * i], &raw.tets[4 * i] + 4);
     }
-  for (MeshGroup &group : raw.groups) {
-    if (group.dimension < 3) {
-      for (uint32_t &p : group.points) p = number[p];
-      group.points.erase(std::remove(group.points.begin(), group.points.end(), kNoGroup), group.points.end());
-    }
-    sort_once(group.points);
-  }
+  for (MeshGroup &group : raw.groups) sort_once(group.points);
 }
 
 // Groups by dimension and number, whatever order the file has them in.

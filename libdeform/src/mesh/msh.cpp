@@ -8,31 +8,6 @@
 
 namespace dfm {
 
-void NodeNumbers::finish(const Cursor &in) {
-  if (tags_.size() >= UINT32_MAX)
-    in.unsupported("%zu nodes; up to %u are read", tags_.size(), UINT32_MAX - 1);
-  if (!std::is_sorted(tags_.begin(), tags_.end())) {
-    order_.resize(tags_.size());
-    for (uint32_t i = 0; i < order_.size(); ++i) order_[i] = i;
-    std::sort(order_.begin(), order_.end(),
-              [&](uint32_t a, uint32_t b) { return tags_[a] != tags_[b] ? tags_[a] < tags_[b] : a < b; });
-    std::sort(tags_.begin(), tags_.end());
-  }
-  const auto twice = std::adjacent_find(tags_.begin(), tags_.end());
-  if (twice != tags_.end()) in.refuse("node number %lld is given twice", ll(*twice));
-}
-
-uint32_t NodeNumbers::find(const Cursor &in, int64_t tag) const {
-  size_t at;
-  if (!tags_.empty() && tag >= tags_.front() && tag <= tags_.back()) {
-    at = size_t(uint64_t(tag) - uint64_t(tags_.front()));  // where numbers have no gaps, this is the place
-    if (at >= tags_.size() || tags_[at] != tag)
-      at = size_t(std::lower_bound(tags_.begin(), tags_.end(), tag) - tags_.begin());
-    if (tags_[at] == tag) return order_.empty() ? uint32_t(at) : order_[at];
-  }
-  in.refuse("an element uses node %lld, which the file does not define", ll(tag));
-}
-
 void MshReader::begin_elements(int64_t type) {
   // by number; there is none between 31 and 92
   static constexpr Element kKnown[32] = {

@@ -3,28 +3,13 @@
 #pragma once
 #include <cstdint>
 
+#include "mesh/numbers.h"
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
 
 constexpr const char *kConvertMsh =
     "convert it first: gmsh -3 -save_all -format msh41 -order 1 FILE -o OUT.msh";
-
-// Node numbers of the file to positions. Numbers may have gaps and come in any order.
-class NodeNumbers {
- public:
-  explicit NodeNumbers(const Memory &m)
-      : tags_(HookAllocator<int64_t>(m)), order_(HookAllocator<uint32_t>(m)) {}
-  void reserve(size_t n) { tags_.reserve(n); }
-  void add(int64_t tag) { tags_.push_back(tag); }
-  size_t size() const { return tags_.size(); }
-  void finish(const Cursor &in);                       // refuses a number given twice
-  uint32_t find(const Cursor &in, int64_t tag) const;  // refuses an unknown number
-
- private:
-  Array<int64_t> tags_;    // by position, then ascending after finish()
-  Array<uint32_t> order_;  // position of each ascending number; empty where they ascend in the file already
-};
 
 class MshReader {
  public:
@@ -34,7 +19,7 @@ class MshReader {
         out_(out),
         four_(four),
         wide_(wide),
-        nodes_(*out.memory),
+        nodes_(*out.memory, "node"),
         entities_(HookAllocator<Entity>(*out.memory)) {}
   void run();
 
@@ -77,7 +62,7 @@ class MshReader {
   Cursor &in_;
   RawMesh &out_;
   bool four_, wide_;
-  NodeNumbers nodes_;
+  Numbers nodes_;
   Array<Entity> entities_;
   Element element_{0, 0};  // of begin_elements()
   uint32_t cell_ = 0;      // its kind of volume cell, 0 for none

@@ -94,11 +94,12 @@ uint32_t RawMesh::group(const Cursor &at, int32_t dimension, int32_t tag) {
 
 uint32_t RawMesh::named_group(const Cursor &at, int32_t dimension, std::string_view name) {
   if (name.empty()) return kNoGroup;
-  const auto known = name_index_.find(name);
+  std::pair key(dimension, std::string(name));
+  const auto known = name_index_.find(key);
   if (known != name_index_.end()) return known->second;
   const uint32_t made = group(at, dimension, static_cast<int32_t>(groups.size()) + 1);
   groups[made].name = name;
-  name_index_.emplace(name, made);
+  name_index_.emplace(std::move(key), made);
   return made;
 }
 

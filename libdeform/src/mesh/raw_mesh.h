@@ -24,11 +24,11 @@ struct RawMesh {
   Array<uint32_t> tet_group;  // index into groups
   // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
   Array<double> tet_share;
-  Array<double> inside;           // [ncell,27] of hexahedra, likewise
-  Array<uint32_t> tris;           // polygons are cut into triangles by the readers
-  Array<uint32_t> tri_group;      // index into groups, kNoGroup without
-  bool own_corners = false;       // the format gives each triangle points of its own
-  std::vector<MeshGroup> groups;  // points: of elements below dimension 3 only, in file order, with repeats
+  Array<double> inside;               // [ncell,27] of hexahedra, likewise
+  Array<uint32_t> tris;               // polygons are cut into triangles by the readers
+  Array<uint32_t> tri_group;          // index into groups, kNoGroup without
+  bool own_corners = false;           // the format gives each triangle points of its own
+  std::vector<MeshGroup> groups;      // points: without those of tet_group, in file order, with repeats
   std::vector<std::string> warnings;  // one sentence each, printed before those of repair
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
   uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }
@@ -59,7 +59,7 @@ struct RawMesh {
  private:
   void add_triangle(const Cursor &at, uint32_t a, uint32_t b, uint32_t c, uint32_t in_group);
   std::map<std::pair<int32_t, int32_t>, uint32_t> group_index_;
-  std::map<std::string, uint32_t, std::less<>> name_index_;
+  std::map<std::pair<int32_t, std::string>, uint32_t> name_index_;
 };
 inline constexpr uint32_t kMaxTris = 1u << 30;
 
@@ -70,6 +70,8 @@ void read_msh(Cursor &in, RawMesh &out);
 void read_vtk(Cursor &in, RawMesh &out);
 void read_vtu(Cursor &in, RawMesh &out);
 void read_medit(Cursor &in, RawMesh &out);
+void read_abaqus(Cursor &in, RawMesh &out);
+void read_tetgen(Cursor &in, RawMesh &out);
 void read_obj(Cursor &in, RawMesh &out);
 void read_ply(Cursor &in, RawMesh &out);
 void read_stl(Cursor &in, RawMesh &out);

@@ -1,7 +1,8 @@
 // Medit files (.mesh, ASCII): keywords, each with a count and rows of numbers from 1, the last of a row its
-// reference. References other than 0 are groups of the tetrahedra, triangles (and quadrilaterals, cut) and
-// edges. Keywords that a body does not need are skipped.
+// reference. References other than 0 are groups of the cells, triangles (and quadrilaterals, cut) and edges.
+// Keywords that a body does not need are skipped.
 #include "deform/plugin.h"
+#include "mesh/cells.h"
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -23,14 +24,16 @@ class MeditReader {
         if (points) in_.refuse("a second Vertices section; one mesh per file is read");
         read_points();
         points = true;
-      } else if (word == "Tetrahedra") read_cells(points, "tetrahedra", 4, 3);
+      } else if (word == "Tetrahedra") read_volume(points, DFM_CELL_TET);
+      else if (word == "TetrahedraP2") read_volume(points, DFM_CELL_TET10);
+      else if (word == "Hexahedra" || word == "Hexaedra") read_volume(points, DFM_CELL_HEX8);
       else if (word == "Triangles") read_cells(points, "triangles", 3, 2);
+      else if (word == "TrianglesP2") read_cells(points, "second-order triangles", 6, 2);
       else if (word == "Quadrilaterals") read_cells(points, "quadrilaterals", 4, 2);
       else if (word == "Edges") read_cells(points, "edges", 2, 1);
-      else if (word == "Hexahedra" || word == "Hexaedra" || word == "Prisms" || word == "Pyramids")
-        refuse_if_any(word);
+      else if (is_lost(word)) refuse_if_any(word);
       else if (word == "End") ended = true;
-      else if (is_letter(word.front())) pass_over(word);
+      else if (is_letter(word.front())) pass_over();
       else
         in_.refuse("expected a keyword such as Vertices, Tetrahedra or End, found %s",
                    Cursor::quote(word).c_str());
@@ -60,18 +63,23 @@ class MeditReader {
     }
   }
 
-  void read_cells(bool points, const char *what, uint32_t corners, int32_t dimension) {
+  void read_volume(bool points, uint32_t kind) {
+    read_cells(points, cell_kind(kind).name, cell_kind(kind).nodes, 3, kind);
+  }
+
+  void read_cells(bool points, const char *what, uint32_t corners, int32_t dimension, uint32_t kind = 0) {
     if (!points) in_.refuse("%s before Vertices; expected Vertices first", what);
     const uint64_t n = in_.text_count(in_.integer("a number of elements"), corners + 1, what);
-    if (dimension == 3) out_.expect_tets(n);
-    uint32_t corner[4];
+    if (kind == DFM_CELL_TET) out_.expect_tets(n);
+    uint32_t corner[10];
     for (uint64_t i = 0; i < n; ++i) {
       for (uint32_t k = 0; k < corners; ++k) corner[k] = point();
       const int64_t reference = in_.integer("an element's reference");
       if (reference < INT32_MIN || reference > INT32_MAX)
         in_.refuse("reference %lld does not fit 32 bits", ll(reference));
       const uint32_t group = out_.group(in_, dimension, static_cast<int32_t>(reference));
-      if (dimension == 3) out_.add_cell(in_, DFM_CELL_TET, corner, group);
+      if (dimension == 3) out_.add_cell(in_, kind, corner, group);
+      else if (corners == 6) out_.add_second_triangle(in_, corner, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);
       else out_.keep_points(corner, corners, group);
     }
@@ -84,19 +92,21 @@ class MeditReader {
     return static_cast<uint32_t>(p - 1);
   }
 
+  // Cells of other kinds and orders, and other orders of nodes, must not be lost in silence.
+  static bool is_lost(std::string_view word) {
+    for (const char *kind : {"Prisms", "Pyramids", "Tetrahedra", "Hexahedra", "Triangles"})
+      if (word.substr(0, std::string_view(kind).size()) == kind) return true;
+    return false;
+  }
   void refuse_if_any(std::string_view what) {
     if (in_.integer("a number of elements") == 0) return;
     in_.unsupported(
-        "%.*s; only tetrahedra and triangles are read: mesh the volume with tetrahedra, or split the cells",
+        "%.*s; tetrahedra of 4 and 10 points and hexahedra of 8 are read: mesh the volume with one of these",
         int(what.size()), what.data());
   }
 
-  // To the next keyword; cells of higher order must not be lost in silence.
-  void pass_over(std::string_view word) {
-    const bool curved = word == "TetrahedraP2" || word == "TrianglesP2";
-    if (curved && in_.integer("a number of elements") != 0)
-      in_.unsupported("second-order %s; write first-order cells (for instance gmsh -order 1)",
-                      word == "TrianglesP2" ? "triangles" : "tetrahedra");
+  // To the next keyword.
+  void pass_over() {
     for (;;) {
       in_.skip_space();
       if (in_.left() == 0 || is_letter(in_.rest().front())) return;

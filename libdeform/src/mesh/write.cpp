@@ -141,10 +141,8 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
 }
 
 void write_medit(const TetMesh &mesh, const std::string &path) {
-  if (!mesh.cells.empty())
-    fail(DFM_E_UNSUPPORTED, "%s: %s are not written to Medit files; write .msh, .vtk or .vtu", path.c_str(),
-         cell_kind(mesh.cell).name);
   AtomicFile out(path);
+  const CellKind &kind = cell_kind(mesh.cell);
   out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + text(mesh.npoint()) + "\n");
   TextRows rows(out);
   for (size_t i = 0; i < mesh.points.size(); i += 3) {
@@ -152,7 +150,10 @@ void write_medit(const TetMesh &mesh, const std::string &path) {
     rows.put(0, '\n');
   }
   rows.elements("Triangles", 3, mesh.tris, mesh.tri_group, mesh);
-  rows.elements("Tetrahedra", 4, mesh.tets, mesh.tet_group, mesh);
+  rows.elements(kind.nodes == 4    ? "Tetrahedra"
+                : kind.nodes == 10 ? "TetrahedraP2"
+                                   : "Hexahedra",
+                kind.nodes, mesh.nodes(), mesh.cell_groups(), mesh);
   out.write("End\n");
   out.commit();
 }

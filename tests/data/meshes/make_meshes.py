@@ -244,6 +244,27 @@ def medit():
           "\nEnd\n")
 
 
+def commas(rows):
+    return "".join(", ".join(str(v) for v in row) + "\n" for row in rows)
+
+
+def abaqus():
+    elements = [(i + 1, *tags(t)) for i, t in enumerate(TETS)]
+    write("cube_abaqus.inp", "** a comment\n*Heading\ncube\n*NODE, NSET=all\n",
+          commas((t, *p) for t, p in zip(TAGS, POINTS)),
+          "*Element, type=S3,\n elset=skin\n", commas((i + 101, *tags(t)) for i, t in enumerate(SKIN)),
+          "*ELEMENT, TYPE=C3D4H, ELSET=low\n", commas(elements[:3]), "** comment\n",
+          "*ELEMENT, TYPE=C3D4\n", commas(elements[3:]), '*ELSET, ELSET="high end", GENERATE\n4, 6\n',
+          "*STEP\n*STATIC\n0.1, 1.\n*END STEP\n")
+
+
+def tetgen():
+    write("cube_tetgen.node", "# a comment\n9 3 1 1\n", words((t, *p, 0.5, 3) for t, p in zip(TAGS, POINTS)))
+    write("cube_tetgen.ele", "6 4 1\n", words((i, *tags(t), g) for i, (t, g) in enumerate(zip(TETS, GROUPS))),
+          "# end\n")
+    write("cube_tetgen.face", "12 1\n", words((i, *tags(t), 7, i, -1) for i, t in enumerate(SKIN)))
+
+
 def surfaces():
     here = "../surfaces/cube_"
     back = [[f"{p - 9}/1" for p in q] for q in SQUARES]
@@ -314,4 +335,6 @@ msh41_binary("<", 4, "cube_msh41_bin_size4.msh")
 vtk()
 vtu()
 medit()
+abaqus()
+tetgen()
 surfaces()

@@ -66,10 +66,10 @@ TEST(MeshBounds, CutAtAnyByte_IsRefusedOrWhole) {
     const std::string bytes = test::read_file(file);
     ASSERT_TRUE(read_capped(name_of(file), bytes)) << file;
     // What follows the cells is not needed: node data and periodic sections in MSH must still be complete,
-    // VTK attributes not. OBJ has no count and no end, a file of several solids is whole after each, POLYDATA
-    // after each section: the surface is open there.
+    // VTK attributes not. OBJ and Abaqus have no count and no end, a file of several solids is whole after
+    // each, POLYDATA after each section: the surface is open there.
     bool has_end = true;
-    for (const char *without : {".obj", "stl_ascii", "polydata"})
+    for (const char *without : {".obj", ".inp", "stl_ascii", "polydata"})
       has_end = has_end && file.find(without) == std::string::npos;
     for (size_t n = 0; n < bytes.size(); ++n) {
       const bool accepted = read_capped(name_of(file), bytes.substr(0, n));

@@ -44,7 +44,8 @@ inline std::vector<std::string> files_of(const std::string &folder, const std::v
   return out;
 }
 inline std::vector<std::string> own_meshes() {
-  return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes", {".msh", ".vtk", ".vtu", ".mesh"});
+  return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes",
+                  {".msh", ".vtk", ".vtu", ".mesh", ".inp"});
 }
 inline std::vector<std::string> own_surfaces() {
   return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces",

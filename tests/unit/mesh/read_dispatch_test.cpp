@@ -53,29 +53,28 @@ TEST(ReadDispatch, ForeignContent_IsNamedWhateverTheEnding) {
   expect_unsupported("a.obj", "glTF\2", {"glTF", "deform mesh convert"});
   expect_unsupported("a.obj", "Kaydara FBX Binary  ", {"FBX", "deform mesh convert"});
   expect_unsupported("a.vtu", "<?xml version=\"1.0\"?>\n<COLLADA>", {"COLLADA", "deform mesh convert"});
-  expect_unsupported("a.mesh", "*HEADING\n*NODE\n1, 0, 0, 0\n", {"Abaqus", "meshio convert"});
   expect_unsupported("a.mesh", "\x89HDF\r\n", {"HDF5", "meshio convert"});
   expect_unsupported("a.obj", "\xff\xfev", {"UTF-16", "plain text"});
 }
 
 TEST(ReadDispatch, ForeignEndings_AreRefusedWithTheWayToConvert) {
   const std::pair<const char *, const char *> rows[] = {
-      {"inp", "meshio convert"}, {"node", "tetgen -g"}, {"ele", "tetgen -g"}, {"face", "meshio convert"},
-      {"gltf", "assimp"},        {"glb", "assimp"},     {"fbx", "assimp"},    {"3ds", "assimp"},
-      {"dae", "assimp"},         {"gz", "gunzip"},      {"meshb", "gmsh -3"}, {"step", "gmsh -3"},
-      {"med", "meshio"}};
+      {"bdf", "meshio convert"}, {"poly", ".ele"},     {"edge", ".ele"},    {"gltf", "assimp"},
+      {"glb", "assimp"},         {"fbx", "assimp"},    {"3ds", "assimp"},   {"dae", "assimp"},
+      {"gz", "gunzip"},          {"meshb", "gmsh -3"}, {"step", "gmsh -3"}, {"med", "meshio"}};
   for (const auto &[end, word] : rows) expect_unsupported(std::string("a.") + end, "x", {word});
 }
 
 TEST(ReadDispatch, UnknownEnding_NamesTheNearestAndAllThatAreRead) {
-  expect_unsupported("a.stll", "x",
-                     {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off"});
+  expect_unsupported(
+      "a.stll", "x",
+      {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off, .inp, .ele"});
   expect_unsupported("a.d/mesh", "x", {"unknown mesh file ending ''"});
 }
 
 TEST(ReadDispatch, ForeignEnding_IsRefusedBeforeTheFileIsRead) {
   try {
-    read_raw(Memory::standard(), "/nowhere/a.inp");
+    read_raw(Memory::standard(), "/nowhere/a.bdf");
     ADD_FAILURE();
   } catch (const Error &e) {
     EXPECT_EQ(e.status, DFM_E_UNSUPPORTED);
