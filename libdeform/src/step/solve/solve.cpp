@@ -161,11 +161,6 @@ void make_rows(World &w, StepContext &step) {
   if (step.rigid_again) std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
   step.tools->put_shared(step.rows, step.state, again);
   step.solve_islands->find(w, step);
-  // Tolerances follow from what the sub-step changes, not from what its last solve has left. Unknowns of rigid
-  // bodies may have another number in each solve.
-  const size_t soft = 2 * w.bodies.size();
-  step.disturbance.resize(again ? std::min(soft, step.disturbance.size()) : 0);
-  step.disturbance.resize(soft + (step.rows.rigid.empty() ? 0 : 2 * size_t{step.rows.ndof}), 0.0);
   // an equilibrium has no velocity that an opening could leave
   if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
 }

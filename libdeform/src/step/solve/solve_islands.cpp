@@ -292,6 +292,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   const size_t n = step.rows.n;
   step.tolerance.normal.resize(n);
   step.tolerance.tangent.resize(n);
+  step.disturbance.assign(2 * (w.bodies.size() + (step.rows.rigid.empty() ? 0 : step.rows.ndof)), 0.0);
   const std::span<SolveIsland> all = step.solve_islands->all();
   uint64_t rows = 0;
   for (SolveIsland &own : all) {
