@@ -14,7 +14,8 @@ from ._library import ArgumentError, Diverged, Error, command_path
 def main() -> None:
     """Becomes the command: `deform run SCENE`, `deform cost SCENE`, ... (the console script)."""
     path = str(command_path())
-    os.execv(path, [path, *sys.argv[1:]])
+    # `deform sweep` and `deform fit` come back to this interpreter
+    os.execve(path, [path, *sys.argv[1:]], {"DEFORM_PYTHON": sys.executable, **os.environ})
 
 
 def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> str:
