@@ -3,7 +3,7 @@
 // forked from this one: what is global in a run is new each time, and a run that crashes ends nothing else.
 //
 // Standard input: a line for each run, {"scene": FILE, "out": FOLDER, "set": ["/pointer=value", ..]}.
-// Standard output: a line for each run, {"code": exit code, "signal": that ended it, or 0, "said": its error}.
+// Standard output: a line for each run, {"code": exit code, "signal": what ended it, or 0, "said": error}.
 #include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>

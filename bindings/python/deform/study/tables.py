@@ -30,9 +30,9 @@ def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units:
     try:
         import pyarrow as arrow
         import pyarrow.parquet
-    except ImportError:
-        raise UnsupportedError("Parquet needs pyarrow for this Python (pip install pyarrow); the rows are in "
-                               "sweep.csv", "DFM_E_UNSUPPORTED") from None
+    except ImportError as missing:
+        raise UnsupportedError(f"Parquet needs pyarrow for this Python, pip install pyarrow ({missing}); the "
+                               f"rows are in sweep.csv", "DFM_E_UNSUPPORTED") from None
     arrays, fields = [], []
     for name in columns:
         array = arrow.array([row.get(name) for row in rows])
