@@ -27,6 +27,8 @@ class Fit(Table):
     notes. values: {name: value}; intervals: {name: (low, high)}, which hold all at once with the stated
     confidence; curves: measured and fitted; scatter: of the residuals over sigma; evaluations: runs."""
 
+    digits = 5
+
     def __init__(self, study: Study, rows: Sequence[dict[str, Any]], notes: Sequence[str], curves: Any,
                  spread: Spread, evaluations: int, folder: pathlib.Path):
         super().__init__(rows, ["parameter", "value", "low", "high", "unit", "start"], notes)

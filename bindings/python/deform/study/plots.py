@@ -72,6 +72,14 @@ def response_curves(data: Columns) -> Any:
     return drawn
 
 
+def _edges(middles: np.ndarray, log: bool) -> np.ndarray:
+    """Of cells around values, halfway on the scale of the axis."""
+    at = np.log(middles) if log else middles
+    inner = (at[1:] + at[:-1]) / 2
+    out = np.concatenate([[2 * at[0] - inner[0]], inner, [2 * at[-1] - inner[-1]]])
+    return np.exp(out) if log else out
+
+
 def maps(data: Columns) -> Any:
     """Each quantity over the first two parameters, by color."""
     first, second = data.parameters[:2]
@@ -83,10 +91,10 @@ def maps(data: Columns) -> Any:
     across, up = np.unique(x), np.unique(y)
     for axis, quantity in zip(axes.flat, data.quantities):
         z = data.of(quantity)
-        if len(across) * len(up) == len(z):
+        if len(across) * len(up) == len(z) and min(len(across), len(up)) > 1:
             grid = np.full((len(up), len(across)), np.nan)
             grid[np.searchsorted(up, y), np.searchsorted(across, x)] = z
-            colors = axis.pcolormesh(across, up, grid, shading="nearest", cmap="viridis")
+            colors = axis.pcolormesh(_edges(across, first.log), _edges(up, second.log), grid, cmap="viridis")
         else:
             colors = axis.scatter(x, y, c=z, s=18, cmap="viridis")
         drawn.colorbar(colors, ax=axis).set_label(data.label(quantity), fontsize=9)
@@ -150,8 +158,8 @@ def fit_figure(curves: Sequence[Mapping[str, Any]]) -> Any:
     axes = drawn.subplots(high, wide, squeeze=False)
     for axis, curve in zip(axes.flat, curves):
         x = curve["x"]
-        axis.errorbar(x, curve["measured"], curve["sigma"], fmt="o", color=GRAY, markersize=3, linewidth=0.7,
-                      label="measured")
+        axis.errorbar(x, curve["measured"], curve["sigma"], fmt="o", color=GRAY, markersize=2, linewidth=0.5,
+                      zorder=1, label="measured")
         axis.plot(x, curve["start"], "--", color=ORANGE, linewidth=1.2, label="start")
         axis.plot(x, curve["fitted"], "-", color=BLUE, linewidth=1.6, label="fit")
         axis.set_xlabel(curve["labels"][0], fontsize=9)

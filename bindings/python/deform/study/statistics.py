@@ -44,12 +44,13 @@ class Spread:
     def sentences(self, names: Sequence[str]) -> list[str]:
         """On identifiability: a sentence for each direction that the data leave open, and for each pair that
         is nearly one."""
-        out, told = [], set()
+        out: list[str] = []
+        told: set[int] = set()
         for k in self.open:
             direction = self.directions[k]
             part = [i for i in np.argsort(-np.abs(direction)) if abs(direction[i]) >= PART]
             of = [names[i] for i in sorted(part)]
-            told.update((i, j) for i in part for j in part)
+            told.update(part)
             if len(of) == 1:
                 out.append(f"{of[0]} cannot be found from these data: over its whole range the residuals "
                            f"change by less than the noise")
@@ -60,7 +61,7 @@ class Spread:
                        f"shares of their ranges: {along}) changes the residuals by less than the noise")
         for i in range(len(names)):
             for j in range(i + 1, len(names)):
-                if (i, j) not in told and abs(self.correlation[i, j]) > ALIKE:
+                if not told & {i, j} and abs(self.correlation[i, j]) > ALIKE:
                     out.append(f"{names[i]} and {names[j]} are hard to tell apart by these data: the "
                                f"correlation of their errors is {self.correlation[i, j]:.4f}")
         return out
