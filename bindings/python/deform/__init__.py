@@ -24,7 +24,8 @@ from .picture import Picture
 from .query import ContactChoice, Filter, Hit, Shape
 from .rigid_set import JointDef, Material, RigidDef
 from .scene import Run, Scene, run
-from .study import Fit, Sweep, fit, sweep
+from .study.fit import Fit, fit
+from .study.sweep import Sweep, sweep
 from .tool import Tool
 from .world import Trouble, World
 

@@ -19,7 +19,7 @@ import threading
 import time
 from typing import Any, Mapping
 
-from .._library import command_path
+from .._library import FileError, command_path
 
 ATTEMPTS = 3  # of a run whose worker dies: what kills so many is the run
 
@@ -216,8 +216,12 @@ class Engine:
 
     def _ask(self, request: Mapping[str, Any], limit: float) -> Any:
         if self.worker is None:
-            self.worker = subprocess.Popen([str(command_path()), "worker"], stdin=subprocess.PIPE,
-                                           stdout=subprocess.PIPE, text=True)
+            program = str(command_path())
+            try:
+                self.worker = subprocess.Popen([program, "worker"], stdin=subprocess.PIPE,
+                                               stdout=subprocess.PIPE, text=True)
+            except OSError as error:
+                raise FileError(f"{program}: cannot be started: {error.strerror}", "DFM_E_IO") from None
         to, answers = self.worker.stdin, self.worker.stdout
         assert to is not None and answers is not None
         try:
