@@ -5,9 +5,9 @@
 
 A case is equally exact where every quantity lies in its band. The table has for each case and engine the
 configuration that gets there for the least processor time per simulated second, and those that do not get
-there at any; in bold the least time and all within a factor of two of it. The picture has every configuration:
-its error in half bands over its cost. With --page the table takes the place of what stands between the page's
-marks.
+there at any; in bold the least time and all within a factor of two of it. The picture has every
+configuration: its error in half bands over its cost. With --page the table takes the place of what stands
+between the page's marks.
 """
 import argparse
 import csv
