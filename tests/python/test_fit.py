@@ -54,7 +54,7 @@ class InAFolder(unittest.TestCase):
 class Recovery(InAFolder):
     def test_without_noise_the_values_come_back(self):
         for method in "least_squares", "differential_evolution":
-            found = deform.fit(self.study(self.measured(), optimizer={"method": method, "evaluations": 600}),
+            found = deform.fit(self.study(self.measured(), optimizer={"method": method, "evaluations": 300}),
                                workers=2)
             for name, true in TRUTH.items():
                 self.assertAlmostEqual(found.values[name] / true, 1, delta=5e-3, msg=method)

@@ -160,17 +160,17 @@ def _cost(problem: Problem, many: Sequence[Any]) -> list[float]:
     return [float(r @ r) for r in problem.residuals(many)]
 
 
-def _differential_evolution(problem: Problem, start: np.ndarray, _step: float, most: int,
+def _differential_evolution(problem: Problem, start: np.ndarray, step: float, most: int,
                             seed: int) -> np.ndarray:
     from scipy.optimize import differential_evolution
     per_round = 15 * len(start)
     found = differential_evolution(lambda u: u, [(0.0, 1.0)] * len(start), x0=start, seed=seed, polish=False,
                                    updating="deferred", workers=lambda _, many: _cost(problem, list(many)),
                                    maxiter=max(1, (most or 40 * per_round) // per_round - 1), tol=1e-3)
-    return np.array(found.x)
+    return _least_squares(problem, np.array(found.x), step, 0, seed)  # it only makes them smaller
 
 
-def _cma(problem: Problem, start: np.ndarray, _step: float, most: int, seed: int) -> np.ndarray:
+def _cma(problem: Problem, start: np.ndarray, step: float, most: int, seed: int) -> np.ndarray:
     try:
         import cma
     except ImportError:
@@ -181,7 +181,7 @@ def _cma(problem: Problem, start: np.ndarray, _step: float, most: int, seed: int
     while not search.stop():
         many = search.ask()
         search.tell(many, _cost(problem, many))
-    return np.array(search.result.xbest)
+    return _least_squares(problem, np.array(search.result.xbest), step, 0, seed)
 
 
 OPTIMIZERS: dict[str, Callable[[Problem, np.ndarray, float, int, int], np.ndarray]] = {
