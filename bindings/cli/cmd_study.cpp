@@ -28,6 +28,8 @@ constexpr const char *kStart =
     "                   f'({error}); install it for that interpreter (pip install .; Debian: '\n"
     "                   f'python3-deform, python3-numpy), or name another one in DEFORM_PYTHON',\n"
     "                   file=sys.stderr) or 2)\n"
+    "except KeyboardInterrupt:\n"
+    "    sys.exit(130)\n"
     "sys.exit(main())\n";
 
 void set_if_unset(const char *name, const std::string &value) { setenv(name, value.c_str(), 0); }

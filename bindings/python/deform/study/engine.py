@@ -218,8 +218,9 @@ class Engine:
         if self.worker is None:
             program = str(command_path())
             try:
+                # in a session of its own: Ctrl-C is for the sweep, which ends its workers
                 self.worker = subprocess.Popen([program, "worker"], stdin=subprocess.PIPE,
-                                               stdout=subprocess.PIPE, text=True)
+                                               stdout=subprocess.PIPE, text=True, start_new_session=True)
             except OSError as error:
                 raise FileError(f"{program}: cannot be started: {error.strerror}", "DFM_E_IO") from None
         to, answers = self.worker.stdin, self.worker.stdout
