@@ -210,6 +210,7 @@ class Kills(InAFolder):
         lines = [json.loads(line) for line in file.read_text().splitlines()]
         self.assertEqual(len({line["key"] for line in lines}), 120)
         self.assertEqual(len(lines), 120)
+        self.assertEqual(list(pathlib.Path("/dev/shm").glob(f"deform-study-{first.pid}-*")), [])
 
     def test_what_kills_every_worker_is_a_failed_run(self):
         study = sweep_study(self.scene, set={"/time/duration": 3000}, design={"method": "sobol", "runs": 1})

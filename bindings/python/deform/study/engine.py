@@ -21,6 +21,7 @@ from typing import Any, Mapping
 
 from .._library import FileError, command_path
 
+FOLDER = "deform-study-"  # and the process whose it is
 ATTEMPTS = 3  # of a run whose worker dies: what kills so many is the run
 
 
@@ -129,7 +130,9 @@ class Engine:
     def __init__(self) -> None:
         self.worker: subprocess.Popen[str] | None = None
         self.closed = False
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="deform-study-", dir=_memory()))
+        memory = _memory()
+        _clear(pathlib.Path(memory or tempfile.gettempdir()))
+        self.folder = pathlib.Path(tempfile.mkdtemp(prefix=f"{FOLDER}{os.getpid()}-", dir=memory))
 
     def close(self) -> None:
         """Ends the run that another thread has begun, too."""
@@ -250,6 +253,14 @@ def _last(said: str) -> str:
 def _memory() -> str | None:
     """A folder in memory, where there is one: tables of a run are read once."""
     return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+
+
+def _clear(there: pathlib.Path) -> None:
+    """Removes the folders of processes that were killed."""
+    for folder in there.glob(FOLDER + "*"):
+        owner = folder.name.removeprefix(FOLDER).partition("-")[0]
+        if owner.isdigit() and not os.path.exists(f"/proc/{owner}"):
+            shutil.rmtree(folder, ignore_errors=True)
 
 
 _of_thread = threading.local()
