@@ -53,9 +53,7 @@ void name_package() {
 
 [[noreturn]] void become_python(const std::string &subcommand, const std::vector<std::string> &words) {
   name_package();
-  const char *const named = std::getenv("DEFORM_PYTHON");
-  std::vector<std::string> interpreters = {named ? named : DEFORM_PYTHON};
-  if (!named) interpreters.push_back("python3");
+  const std::vector<std::string> interpreters = pythons();
   for (const std::string &python : interpreters) {
     std::vector<const char *> argv{python.c_str(), "-B", "-c", kStart};
     for (const std::string &word : words) argv.push_back(word.c_str());
