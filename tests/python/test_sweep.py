@@ -18,10 +18,20 @@ import unittest.mock
 
 import deform
 from deform.study.design import points
+from deform.study.engine import Engine, Failed, Results
+from deform.study.executors import Dask
 from deform.study.spec import read_study
+from deform.study.sweep import task_of
 from study_files import BOX, MU, SPEED, sweep_study, write_box
 
 COMMAND = os.environ["DEFORM_COMMAND"]
+
+
+def alive(pid):
+    try:
+        return bool(pathlib.Path(f"/proc/{pid}/cmdline").read_bytes())
+    except OSError:
+        return False
 
 
 def workers_of(pid):
@@ -42,7 +52,13 @@ class InAFolder(unittest.TestCase):
     def setUp(self):
         self.folder = pathlib.Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder)
-        self.scene, self.out = write_box(self.folder), self.folder / "out"
+        self.scene, self.out, self.tmp = write_box(self.folder), self.folder / "out", self.folder / "tmp"
+        self.tmp.mkdir()
+        for patch in (unittest.mock.patch.dict(os.environ, TMPDIR=str(self.tmp)),
+                      unittest.mock.patch.object(tempfile, "tempdir", str(self.tmp))):
+            patch.start()
+            self.addCleanup(patch.stop)
+        self.addCleanup(lambda: self.assertEqual(list(self.tmp.glob("*deform-study-*")), []))
 
     def command(self, *arguments, code=0, **environment):
         done = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True,
@@ -86,6 +102,34 @@ class Designs(InAFolder):
             self.assertEqual(cells, list(range(64)), method)  # one in each of 64 layers
         self.assertEqual(len(self.points("sobol", runs=50)), 50)
 
+    def test_whole_numbers_have_equal_shares(self):
+        whole = {"at": MU, "from": 1, "to": 4, "whole": True}
+        rows = points(read_study(sweep_study(self.scene, parameters={"n": whole},
+                                             design={"method": "sobol", "runs": 64})))
+        self.assertEqual([[p["n"] for p in rows].count(n) for n in range(6)], [0, 16, 16, 16, 16, 0])
+        rows = points(read_study(sweep_study(self.scene, design={"method": "grid"},
+                                             parameters={"n": {**whole, "count": 9}})))
+        self.assertEqual([p["n"] for p in rows], [1, 2, 3, 4])
+
+    def test_results_depend_on_the_files_that_a_study_names(self):
+        def keys():
+            study = read_study(sweep_study(self.scene, set={"/a": "fixed.txt"}, parameters={
+                "m": {"at": "/mesh", "values": ["one.txt", "two.txt"]}}))
+            return [study.key(study.digest(), {"m": name}) for name in study.parameters[0].values]
+
+        self.scene.write_text(json.dumps({"about": "x" * 600, "mesh": "of_scene.txt"}))
+        for name in "of_scene.txt", "fixed.txt", "one.txt", "two.txt":
+            (self.folder / name).write_text(name)
+        first = keys()
+        (self.folder / "two.txt").write_text("changed")
+        second = keys()
+        self.assertEqual([a == b for a, b in zip(first, second)], [True, False])
+        for name in "of_scene.txt", "fixed.txt":
+            (self.folder / name).write_text("changed")
+            third = keys()
+            self.assertEqual(len({*second, *third}), 4)
+            second = third
+
     def test_wrong_studies_say_where(self):
         for changes, sentence in (
                 ({"parameters": {"mu": {"at": MU, "form": 1, "to": 2}}},
@@ -95,6 +139,12 @@ class Designs(InAFolder):
                 ({"parameters": {"mu": {"at": MU, "from": 0, "to": 1, "scale": "log"}}}, "begins above 0"),
                 ({"quantities": {"x": {"table": "probs", "column": "x"}}}, "expected one of .*probes"),
                 ({"quantities": {"mu": {"summary": "/steps"}}}, "is a parameter already"),
+                ({"quantities": {"said": {"summary": "/steps"}}}, '"said" is a column of every sweep'),
+                ({"parameters": {"a": {"at": MU, "values": [1]}, "b": {"at": MU, "values": [1]}}},
+                 "/parameters/b: .*/mu is set by a already"),
+                ({"parameters": {"n": {"at": MU, "from": 0.5, "to": 2, "whole": True}}}, '"whole" range'),
+                ({"set": {"/a=1": 2}}, "/set: expected an object"),
+                ({"limit_s": -1}, "/limit_s: expected a number above 0"),
                 ({"scene": "none.json"}, "none.json: cannot be opened"),
                 ({"design": {"method": "sobl"}}, "expected one of .*sobol"),
                 ({"design": {"method": "random"}}, 'needs "runs"')):
@@ -149,6 +199,26 @@ class Runs(InAFolder):
         said = deform.sweep(study, out=self.out)[0]["said"]
         self.assertIn("longer than limit_s (0.5 s)", said)
 
+    def test_sentences_name_no_files_that_are_gone(self):
+        engine = Engine()
+        self.addCleanup(engine.close)
+        said = f"deform: a.json: stopped at step 3: no; the last good state is in {engine.folder}/run/states"
+        with unittest.mock.patch.object(engine, "_ask", return_value={"code": 3, "signal": 0, "said": said}):
+            outcome = engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
+        self.assertEqual(outcome["said"], "a.json: stopped at step 3: no")
+
+    def test_what_plugins_print_is_no_answer(self):
+        engine = Engine()
+        self.addCleanup(engine.close)
+        engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
+        for stream in 0, 1:
+            self.assertEqual(os.readlink(f"/proc/{engine.process.pid}/fd/{stream}"), "/dev/null")
+
+    def test_columns_hold_finite_numbers(self):
+        (self.folder / "rows.csv").write_text("x\n1\nnan\n")
+        with self.assertRaisesRegex(Failed, 'column "x" of rows.csv holds "nan", no number'):
+            Results(self.folder, {}).column({"table": "rows", "where": {}}, "x")
+
     def test_rig(self):
         case = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "friction" / "braked_mass.json"
         study = {"rig": str(case), "design": {"method": "grid"},
@@ -163,54 +233,79 @@ class Kills(InAFolder):
     def test_killed_workers_lose_nothing(self):
         """200 runs; a worker or its run is killed after every 20th result."""
         study = sweep_study(self.scene, design={"method": "sobol", "runs": 200})
-        choose, killed, ended = random.Random(1), [], threading.Event()
+        choose, killed = random.Random(1), []
 
-        def kill():
-            file, seen = self.out / "runs.jsonl", 0
-            while not ended.wait(0.002):
-                if not file.exists() or file.read_bytes().count(b"\n") < seen + 20:
-                    continue
-                seen += 20
-                there = workers_of(os.getpid())
-                if there:
-                    killed.append(choose.choice(there))
-                    try:
-                        os.kill(killed[-1], signal.SIGKILL)
-                    except ProcessLookupError:  # it was a run, and has ended
-                        killed.pop()
-                        seen -= 20
+        def add(progress, failed):
+            progress.done += 1
+            while progress.done % 20 == 0:
+                killed.append(choose.choice(workers_of(os.getpid()) or [0]))
+                try:
+                    if killed[-1]:
+                        os.kill(killed[-1], choose.choice((signal.SIGKILL, signal.SIGTERM)))
+                    break
+                except ProcessLookupError:  # it was a run, and has ended
+                    killed.pop()
 
-        killer = threading.Thread(target=kill)
-        killer.start()
-        try:
+        with unittest.mock.patch("deform.study.progress.Progress.add", add):
             rows = deform.sweep(study, out=self.out, workers=2)
-        finally:
-            ended.set()
-            killer.join()
-        self.assertGreaterEqual(len(killed), 8)
+        self.assertGreaterEqual(len([pid for pid in killed if pid]), 8)
         self.assertEqual(rows.failed, [])
         self.assertEqual(len(rows.done), 200)
         self.assertEqual(len({row["slid"] for row in rows}), 200)
 
-    def test_a_killed_sweep_goes_on(self):
-        study = self.study(design={"method": "sobol", "runs": 120})
-        first = subprocess.Popen([COMMAND, "sweep", study, "--out", self.out, "--quiet"], cwd=self.folder)
-        file = self.out / "runs.jsonl"
-        while not file.exists() or file.read_bytes().count(b"\n") < 20:
-            self.assertIsNone(first.poll())
+    def started(self, study, **changes):
+        """A sweep that has processes, and these."""
+        sweep = subprocess.Popen([COMMAND, "sweep", study, "--out", self.out, "--quiet", "--workers", "2"],
+                                 cwd=self.folder)
+        self.addCleanup(sweep.wait)
+        self.addCleanup(sweep.kill)
+        return sweep
+
+    def wait_until(self, what):
+        end = time.monotonic() + 20
+        while not what():
+            self.assertLess(time.monotonic(), end)
             time.sleep(0.005)
+
+    def test_a_killed_sweep_goes_on(self):
+        study = self.study(design={"method": "sobol", "runs": 40}, set={"/time/duration": 0.8})
+        first, file = self.started(study), self.out / "runs.jsonl"
+        self.wait_until(lambda: file.exists() and file.read_bytes().count(b"\n") >= 5)
         first.kill()
         first.wait()
         with open(file, "ab") as torn:
             torn.write(b'{"key": "half a li')
         kept = file.read_bytes().count(b"\n")
         said = self.command("sweep", study, "--out", self.out)
-        self.assertIn("120 runs: 120 done", said.stdout)
-        self.assertIn(f" of {120 - kept} runs, 0 failed, 0 s left", said.stderr)
+        self.assertIn("40 runs: 40 done", said.stdout)
+        self.assertIn(f" of {40 - kept} runs, 0 failed, 0 s left", said.stderr)
         lines = [json.loads(line) for line in file.read_text().splitlines()]
-        self.assertEqual(len({line["key"] for line in lines}), 120)
-        self.assertEqual(len(lines), 120)
-        self.assertEqual(list(pathlib.Path("/dev/shm").glob(f"deform-study-{first.pid}-*")), [])
+        self.assertEqual(len({line["key"] for line in lines}), 40)
+        self.assertEqual(len(lines), 40)
+
+    def test_nothing_outlives_a_sweep(self):
+        study = self.study(set={"/time/duration": 3000})
+        for how in signal.SIGKILL, signal.SIGTERM, signal.SIGINT:
+            sweep = self.started(study)
+            self.wait_until(lambda: len(workers_of(sweep.pid)) == 4)
+            there = workers_of(sweep.pid)
+            sweep.send_signal(how)
+            self.assertEqual(sweep.wait(20), -9 if how == signal.SIGKILL else 128 + how)
+            self.wait_until(lambda: not any(map(alive, there)))
+        self.assertEqual(list(self.tmp.glob("*deform-study-*")), [])  # of the first, by the second
+
+    def test_nothing_outlives_an_error(self):
+        study = sweep_study(self.scene, design={"method": "sobol", "runs": 128})
+        before, errors = set(threading.enumerate()), []  # which keep the frames that they have left
+        with unittest.mock.patch("deform.study.progress.Progress.add", side_effect=OSError):
+            for _ in range(3):
+                try:
+                    deform.sweep(study, out=self.out, workers=2)
+                except OSError as error:
+                    errors.append(error)
+        self.assertEqual(len(errors), 3)
+        self.assertEqual(workers_of(os.getpid()), [])
+        self.assertEqual(set(threading.enumerate()) - before, set())
 
     def test_what_kills_every_worker_is_a_failed_run(self):
         study = sweep_study(self.scene, set={"/time/duration": 3000}, design={"method": "sobol", "runs": 1})
@@ -236,20 +331,24 @@ class Kills(InAFolder):
 
 class Overhead(InAFolder):
     def test_processor_time_of_a_run_beside_its_steps(self):
-        """Of the sweep and its workers together, the scene's reading and its tables included; the best of
-        three, because a busy machine lends its caches to others."""
+        """Of the sweep and its workers together, the scene's reading and its tables included: 5 ms, or seven
+        starts of /bin/true, which takes 0.75 ms where a run takes 3.6 and more where the machine is busy."""
         def spent():
             return sum(sum(resource.getrusage(who)[:2])
                        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 
-        costs = []
+        costs, starts = [], []
         for seed in range(3):
-            study = sweep_study(self.scene, design={"method": "random", "runs": 150, "seed": seed},
+            study = sweep_study(self.scene, design={"method": "random", "runs": 100, "seed": seed},
                                 quantities={"cpu": {"summary": "/cpu_s", "unit": "s"}})
+            begun = spent()
+            for _ in range(50):
+                subprocess.run(["/bin/true"], check=True)
             before = spent()
             rows = deform.sweep(study, out=self.out, workers=2)
+            starts.append((before - begun) / 50)
             costs.append((spent() - before - sum(row["cpu"] for row in rows)) / len(rows))
-        self.assertLess(min(costs), 0.005, costs)
+        self.assertLess(min(costs), max(0.005, 7 * min(starts)), (costs, starts))
 
 
 class Outputs(InAFolder):
@@ -281,19 +380,21 @@ class Outputs(InAFolder):
         self.assertEqual(table.num_rows, 4)
 
     def test_parts_of_an_array_are_gathered(self):
-        study = self.study(design={"method": "sobol", "runs": 10})
-        self.command("sweep", study, "--out", self.out, "--export", "slurm")
+        mu = [0.3 + 0.01 * i for i in range(10)]
+        mu[3] = -1
+        study = self.study(design={"method": "grid"}, parameters={"mu": {"at": MU, "values": mu}})
+        self.command("sweep", study.name, "--out", self.out.name, "--export", "slurm")
         array = self.out / "array.sh"
         self.assertIn("#SBATCH --array=0-9", array.read_text())
         self.command("sweep", study, "--out", self.out, "--export", "snakemake")
         compile((self.out / "Snakefile").read_text().split("rule")[0], "Snakefile", "exec")
         for i in range(0, 10, 3):
             done = subprocess.run(["sh", array], env={**os.environ, "SLURM_ARRAY_TASK_ID": str(i)},
-                                  cwd=self.folder, capture_output=True, text=True)
+                                  cwd="/", capture_output=True, text=True)
             self.assertEqual(done.returncode, 0, done.stderr)
-        said = self.command("sweep", study, "--out", self.out)
+        said = self.command("sweep", study, "--out", self.out, code=1)
         self.assertIn(" of 6 runs, 0 failed", said.stderr)
-        self.assertIn("10 done", said.stdout)
+        self.assertIn("9 done, 1 failed", said.stdout)
 
     def test_dask(self):
         study = self.study(design={"method": "sobol", "runs": 8})
@@ -306,8 +407,12 @@ class Outputs(InAFolder):
         with unittest.mock.patch("deform.study.executors.CONNECT", 1.0):
             with self.assertRaisesRegex(deform.ArgumentError, "no Dask scheduler answers at tcp://127"):
                 deform.sweep(study, out=self.folder / "other", executor="dask", address="tcp://127.0.0.1:1")
+        with Dask(1) as pool, self.assertRaisesRegex(deform.Error, "Dask cannot make runs: KeyError"):
+            list(pool.map([{}]))
 
     def test_command_says_what_is_missing(self):
+        self.assertEqual(self.command("sweep", self.study(), "--out", self.scene / "out", code=2).stderr,
+                         f"deform: {self.scene / 'out'}: Not a directory\n")
         self.assertRegex(self.command("sweep", self.folder / "none.json", code=2).stderr,
                          "^deform: .*none.json: cannot be opened")
         self.assertRegex(self.command("sweep", code=2).stderr, "STUDY.json .*--help")

@@ -3,6 +3,7 @@ from __future__ import annotations
 
 import argparse
 import re
+import signal
 import sys
 from typing import Any, NoReturn
 
@@ -64,7 +65,7 @@ def _sweep(given: Any) -> int:
         if rows.failed and not given.retry:
             print("--retry makes failed runs again")
         print("written: " + ", ".join(map(str, written)))
-    return 1 if rows.failed else 0
+    return 1 if only is None and rows.failed else 0  # of a block, a failed run is a result
 
 
 def _fit(given: Any) -> int:
@@ -79,11 +80,15 @@ def _fit(given: Any) -> int:
 
 def main() -> int:
     given = _parser().parse_args()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))  # ends its processes, too
     try:
         return _sweep(given) if given.command == "sweep" else _fit(given)
     except Error as error:
         print(f"deform: {error}", file=sys.stderr)
         return 3 if error.status == "DFM_E_FATAL" else 2
+    except OSError as error:
+        print(f"deform: {error.filename}: {error.strerror}", file=sys.stderr)
+        return 2
     except KeyboardInterrupt:
         print("deform: interrupted; what is done is kept, and the next call goes on", file=sys.stderr)
         return 130

@@ -13,7 +13,8 @@ from .spec import Parameter, Study
 def _along(parameter: Parameter) -> list[Any]:
     if parameter.values:
         return parameter.values
-    return [parameter.place(i / (parameter.count - 1)) for i in range(parameter.count)]
+    # whole numbers may be fewer than "count"
+    return list(dict.fromkeys(parameter.place(i / (parameter.count - 1)) for i in range(parameter.count)))
 
 
 def points(study: Study) -> list[dict[str, Any]]:

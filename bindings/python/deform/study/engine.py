@@ -5,7 +5,7 @@ and keeps the library and its plugins loaded; a rig is a program of its own.
 """
 from __future__ import annotations
 
-import csv
+import fcntl
 import json
 import math
 import os
@@ -17,12 +17,15 @@ import subprocess
 import tempfile
 import threading
 import time
-from typing import Any, Mapping
+from typing import Any, Mapping, Sequence
 
 from .._library import FileError, command_path
+from .tables import finite, read_csv
 
-FOLDER = "deform-study-"  # and the process whose it is
+FOLDER = "deform-study-"
+ROOM = 2 ** 30  # bytes, free in memory for tables and states of runs; else they are written to disk
 ATTEMPTS = 3  # of a run whose worker dies: what kills so many is the run
+INTERRUPTED = 130  # exit code of a run that SIGTERM has ended before its time (bindings/cli/messages.h)
 
 
 class Died(Exception):
@@ -65,8 +68,7 @@ class Results:
             path = self.folder / f"{name}.csv"
             if not path.exists():
                 raise Failed(f"the run wrote no {name}.csv")
-            with open(path, newline="") as file:
-                self.tables[name] = list(csv.DictReader(file))
+            self.tables[name] = read_csv(path)
         return self.tables[name]
 
     def column(self, read: Mapping[str, Any], name: str) -> list[float]:
@@ -80,9 +82,9 @@ class Results:
             raise Failed(f'no row of {read["table"]}.csv is as {json.dumps(read["where"])}; it holds '
                          f"{json.dumps(held)}")
         try:
-            return [float(row[name]) for row in kept]
-        except ValueError:
-            raise Failed(f'column "{name}" of {read["table"]}.csv holds texts') from None
+            return finite(kept, name)
+        except ValueError as error:
+            raise Failed(f'column "{name}" of {read["table"]}.csv holds {error}, no number') from None
 
     def read(self, what: Mapping[str, Any]) -> Any:
         """A number; of a curve its two columns."""
@@ -128,29 +130,52 @@ class Engine:
     """Runs what it is given, one after the other; one for each thread that wants to run something."""
 
     def __init__(self) -> None:
-        self.worker: subprocess.Popen[str] | None = None
-        self.closed = False
-        memory = _memory()
-        _clear(pathlib.Path(memory or tempfile.gettempdir()))
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix=f"{FOLDER}{os.getpid()}-", dir=memory))
+        self.process: subprocess.Popen[str] | None = None  # the worker, which stays, or the rig that runs
+        self.ended = False
+        self.lock = threading.Lock()  # of both
+        self.folder, self.mark = _own_folder(_memory())
+
+    def end(self) -> None:
+        """From any thread: ends what runs, and nothing new begins. The thread whose run it is sees that as
+        the death of its process."""
+        with self.lock:
+            self.ended = True
+            if self.process is not None:
+                self.process.kill()
 
     def close(self) -> None:
-        """Ends the run that another thread has begun, too."""
-        self.closed = True
+        """When no thread runs anything here."""
+        self.end()
         self._stop()
         shutil.rmtree(self.folder, ignore_errors=True)
+        os.close(self.mark)
+
+    def _start(self, words: Sequence[str], **pipes: Any) -> subprocess.Popen[str]:
+        with self.lock:
+            if self.ended:
+                raise Died("the sweep has ended")
+            try:
+                # in a session of its own: Ctrl-C is for the sweep, which ends its processes
+                self.process = subprocess.Popen([str(command_path()), *words], stdout=subprocess.PIPE,
+                                                text=True, start_new_session=True, **pipes)
+            except OSError as error:
+                raise FileError(f"{command_path()}: cannot be started: {error.strerror}",
+                                "DFM_E_IO") from None
+            return self.process
 
     def _stop(self) -> None:
-        if self.worker is None:
-            return
-        self.worker.kill()
-        self.worker.wait()
-        for pipe in (self.worker.stdin, self.worker.stdout):
+        with self.lock:
+            process, self.process = self.process, None
+            if process is None:
+                return
+            process.kill()
+        process.wait()
+        for pipe in (process.stdin, process.stdout, process.stderr):
             try:
-                pipe.close()  # type: ignore[union-attr]
-            except OSError:
+                if pipe is not None:
+                    pipe.close()
+            except OSError:  # what was not sent cannot be
                 pass
-        self.worker = None
 
     def run(self, task: Mapping[str, Any]) -> dict[str, Any]:
         """{"state": "done", "read": [..]} or {"state": "failed", "said": sentence}; both with "seconds".
@@ -169,7 +194,7 @@ class Engine:
                 except Died as error:
                     self._stop()
                     died += 1
-                    if self.closed:
+                    if self.ended:
                         raise Failed("the sweep has ended") from None
                     if died == ATTEMPTS:
                         raise Failed(f"{error}, {ATTEMPTS} times in {ATTEMPTS}") from None
@@ -194,39 +219,36 @@ class Engine:
             except (KeyError, IndexError, ValueError, TypeError):
                 raise Failed(f"{file}: there is nothing at {pointer} to set") from None
         (folder / "case.json").write_text(json.dumps(case))
+        rig = self._start(["friction", str(folder / "case.json"), "--json",
+                           "--csv", str(folder / "rows.csv")],
+                          stdin=subprocess.DEVNULL, stderr=subprocess.PIPE)
         try:
-            done = subprocess.run([str(command_path()), "friction", str(folder / "case.json"), "--json",
-                                   "--csv", str(folder / "rows.csv")], capture_output=True, text=True,
-                                  timeout=limit or None)
+            summary, said = rig.communicate(timeout=limit or None)
         except subprocess.TimeoutExpired:
             raise Failed(_over(limit)) from None
-        if done.returncode < 0:
-            raise Died(f"the rig was ended by signal {-done.returncode}")
-        if done.returncode:
-            raise Failed(_last(done.stderr).replace(str(folder / "case.json"), file))
-        return Results(folder, json.loads(done.stdout))
+        finally:
+            self._stop()
+        if rig.returncode < 0 or rig.returncode == INTERRUPTED:
+            raise Died(f"the rig was ended by {_signal(-rig.returncode)}")
+        if rig.returncode:
+            raise Failed(_last(said).replace(str(folder / "case.json"), file))
+        return Results(folder, json.loads(summary))
 
     def _scene(self, folder: pathlib.Path, file: str, values: Mapping[str, Any], limit: float) -> Results:
         request = {"scene": file, "out": str(folder),
                    "set": [f"{pointer}={json.dumps(value)}" for pointer, value in values.items()]}
         answer = self._ask(request, limit)
-        if answer["signal"]:
-            raise Died(f"the run was ended by signal {answer['signal']} "
-                       f"({signal.strsignal(answer['signal']) or 'unknown'})")
+        if answer["signal"] or answer["code"] == INTERRUPTED:
+            raise Died(f"the run was ended by {_signal(answer['signal'])}")
         if answer["code"]:
-            raise Failed(_last(answer["said"]) or f"the run ended with exit code {answer['code']}")
+            # its files do not stay
+            clauses = [part for part in _last(answer["said"]).split("; ") if str(folder) not in part]
+            raise Failed("; ".join(clauses) or f"the run ended with exit code {answer['code']}")
         return Results(folder, json.loads((folder / "summary.json").read_text()))
 
     def _ask(self, request: Mapping[str, Any], limit: float) -> Any:
-        if self.worker is None:
-            program = str(command_path())
-            try:
-                # in a session of its own: Ctrl-C is for the sweep, which ends its workers
-                self.worker = subprocess.Popen([program, "worker"], stdin=subprocess.PIPE,
-                                               stdout=subprocess.PIPE, text=True, start_new_session=True)
-            except OSError as error:
-                raise FileError(f"{program}: cannot be started: {error.strerror}", "DFM_E_IO") from None
-        to, answers = self.worker.stdin, self.worker.stdout
+        worker = self.process or self._start(["worker"], stdin=subprocess.PIPE)
+        to, answers = worker.stdin, worker.stdout
         assert to is not None and answers is not None
         try:
             to.write(json.dumps(request) + "\n")
@@ -250,17 +272,39 @@ def _last(said: str) -> str:
     return said.strip().rsplit("\n", 1)[-1].removeprefix("deform: ")
 
 
-def _memory() -> str | None:
-    """A folder in memory, where there is one: tables of a run are read once."""
-    return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
+def _signal(number: int) -> str:
+    return f"signal {number} ({signal.strsignal(number)})" if number > 0 else "a signal to end"
 
 
-def _clear(there: pathlib.Path) -> None:
-    """Removes the folders of processes that were killed."""
-    for folder in there.glob(FOLDER + "*"):
-        owner = folder.name.removeprefix(FOLDER).partition("-")[0]
-        if owner.isdigit() and not os.path.exists(f"/proc/{owner}"):
-            shutil.rmtree(folder, ignore_errors=True)
+def _memory() -> str:
+    """A folder in memory, where there is one with room: tables of a run are read once. TMPDIR names
+    another."""
+    there = "/dev/shm"
+    if not os.environ.get("TMPDIR") and os.access(there, os.W_OK):
+        room = os.statvfs(there)
+        if room.f_bavail * room.f_frsize > ROOM:
+            return there
+    return tempfile.gettempdir()
+
+
+def _own_folder(there: str) -> tuple[pathlib.Path, int]:
+    """A new folder and its lock, which ends with this process. Removes the folders that nobody locks: their
+    processes were killed."""
+    for old in pathlib.Path(there).glob(FOLDER + "*"):
+        try:
+            mark = os.open(old, os.O_RDONLY)
+        except OSError:
+            continue
+        try:
+            fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            shutil.rmtree(old, ignore_errors=True)
+        except OSError:
+            pass
+        os.close(mark)
+    new = pathlib.Path(tempfile.mkdtemp(prefix="." + FOLDER, dir=there))
+    mark = os.open(new, os.O_RDONLY)
+    fcntl.flock(mark, fcntl.LOCK_EX)
+    return new.rename(new.with_name(new.name[1:])), mark  # seen by others from here on, locked
 
 
 _of_thread = threading.local()

@@ -4,9 +4,10 @@ from __future__ import annotations
 import os
 import queue
 import threading
+from contextlib import ExitStack, suppress
 from typing import Any, Iterator, Mapping, Sequence
 
-from .._library import ArgumentError, UnsupportedError
+from .._library import ArgumentError, Error, UnsupportedError
 from .engine import Engine, run_here
 
 Tasks = Sequence[Mapping[str, Any]]
@@ -32,7 +33,7 @@ class Local:
             engine.close()
 
     def map(self, tasks: Tasks) -> Outcomes:
-        """(index, outcome) of each task, in the order in which they end."""
+        """(index, outcome) of each task, in the order in which they end. To be closed by who stops early."""
         waiting: queue.SimpleQueue[int | None] = queue.SimpleQueue()
         ended: queue.SimpleQueue[tuple[int, Any]] = queue.SimpleQueue()
         for i in range(len(tasks)):
@@ -57,16 +58,18 @@ class Local:
                 if isinstance(outcome, BaseException):
                     raise outcome
                 yield i, outcome
+        except BaseException:  # the caller has stopped, or a run raised: what runs is ended
+            for engine in self.engines:
+                engine.end()
+            raise
         finally:
-            while not waiting.empty():  # the caller has stopped: nothing new begins
-                try:
+            with suppress(queue.Empty):
+                while True:
                     waiting.get_nowait()
-                except queue.Empty:
-                    break
             for _ in threads:
                 waiting.put(None)
-        for thread in threads:
-            thread.join()
+            for thread in threads:
+                thread.join()
 
 
 class Dask:
@@ -83,31 +86,34 @@ class Dask:
         self.distributed, self.workers, self.address = distributed, workers, address
 
     def __enter__(self) -> Dask:
-        self.cluster = None
-        if not self.address:
-            self.cluster = self.distributed.LocalCluster(
+        with ExitStack() as stack:
+            cluster = self.address or stack.enter_context(self.distributed.LocalCluster(
                 n_workers=self.workers or len(os.sched_getaffinity(0)), threads_per_worker=1,
-                dashboard_address=None)
-        try:
-            self.client = self.distributed.Client(self.cluster or self.address, timeout=CONNECT)
-        except (OSError, ValueError) as error:
-            raise ArgumentError(f"no Dask scheduler answers at {self.address}: {error}",
-                                "DFM_E_ARG") from None
+                dashboard_address=None))
+            try:
+                self.client = stack.enter_context(self.distributed.Client(cluster, timeout=CONNECT))
+            except (OSError, ValueError) as error:
+                raise ArgumentError(f"no Dask scheduler answers at {self.address}: {error}",
+                                    "DFM_E_ARG") from None
+            self.open = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self.client.close()
-        if self.cluster is not None:
-            self.cluster.close()
+        self.open.close()
 
     def map(self, tasks: Tasks) -> Outcomes:
         futures = self.client.map(run_here, list(tasks), pure=False)
         index = {future.key: i for i, future in enumerate(futures)}
         for future in self.distributed.as_completed(futures):
             error = future.exception()
-            yield index[future.key], (
-                {"state": "failed", "said": f"Dask gave it up: {error}", "seconds": 0.0} if error
-                else future.result())
+            if isinstance(error, self.distributed.KilledWorker):  # as often as Dask allows: it is the run
+                yield index[future.key], {"state": "failed", "said": f"Dask gave it up: {error}",
+                                          "seconds": 0.0}
+            elif error:
+                raise Error(f"a worker of Dask cannot make runs: {type(error).__name__}: {error}; it needs "
+                            f"this version of deform and the study's files at the same paths")
+            else:
+                yield index[future.key], future.result()
 
 
 EXECUTORS = ("local", "dask")

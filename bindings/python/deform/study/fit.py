@@ -4,14 +4,15 @@ from __future__ import annotations
 import json
 import math
 import pathlib
-from contextlib import ExitStack
-from typing import Any, Callable, Sequence
+from contextlib import ExitStack, closing
+from typing import Any, Callable, Mapping, Sequence
 
 import numpy as np
 
 from .._command import Table
 from .._library import ArgumentError, Error, UnsupportedError
 from . import plots
+from .engine import Failed
 from .executors import Dask, Local, executor as named_executor
 from .page import page, table
 from .spec import Residual, Study, read_study
@@ -19,13 +20,14 @@ from .statistics import Spread
 from .sweep import out_folder
 from .tables import titled
 
-ROUGH = 0.2  # relative difference of two Jacobians from which the residuals are no smooth function
+ROUGH = 0.2  # relative change of a derivative with its step from which the residuals are no smooth function
+LEFT = 0.1   # of an interval's half width: what a search that has converged may leave of the way
 
 
 class Fit(Table):
     """What fit() found: a row for each parameter (parameter, value, low, high, unit, start), and sentences in
     notes. values: {name: value}; intervals: {name: (low, high)}, which hold all at once with the stated
-    confidence; curves: measured and fitted; scatter: of the residuals over sigma; evaluations: runs."""
+    confidence; curves: measured and fitted; scatter: of the residuals over sigma; evaluations: points."""
 
     digits = 5
 
@@ -72,30 +74,47 @@ def _finite(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+class Spent(Exception):
+    """A search has used its evaluations."""
+
+
 class Problem:
-    """Residuals of points in shares of the ranges; each is found once."""
+    """Residuals of points in shares of the ranges; each is found once. evaluations: points whose runs were
+    made; most: of them, 0: as many as asked for."""
 
     def __init__(self, study: Study, pool: Local | Dask, tell: Callable[[str], None]):
         self.study, self.pool, self.tell = study, pool, tell
-        self.known: dict[tuple[float, ...], list[np.ndarray]] = {}
-        self.evaluations = 0
-        self.best = math.inf
+        self.known: dict[tuple[float, ...], list[np.ndarray] | Failed] = {}
+        self.evaluations = self.most = 0
+        self.best, self.best_at = math.inf, np.array([])
 
     def point(self, shares: Sequence[float]) -> dict[str, Any]:
         return {p.name: p.place(float(s)) for p, s in zip(self.study.parameters, shares)}
 
-    def curves(self, many: Sequence[Sequence[float]]) -> list[list[np.ndarray]]:
+    def find(self, many: Sequence[Sequence[float]]) -> list[list[np.ndarray] | Failed]:
         """What the runs of each point give, in the form of the measurements."""
         keys = [tuple(float(s) for s in shares) for shares in many]
         new = list(dict.fromkeys(key for key in keys if key not in self.known))
-        for which, outcome in self.pool.map([self._task(key) for key in new]):
-            self.evaluations += 1
-            if outcome["state"] == "failed":
-                point = ", ".join(f"{name} = {value:.6g}" for name, value in self.point(new[which]).items())
-                raise Error(f"the run at {point} failed: {outcome['said']}; narrow the ranges to where the "
-                            f"scene runs")
-            self.known[new[which]] = self._in_measured_form(outcome["read"])
+        if self.most and self.evaluations + len(new) > self.most:
+            raise Spent
+        with closing(self.pool.map([self._task(key) for key in new])) as ended:
+            for which, outcome in ended:
+                self.evaluations += 1
+                try:
+                    if outcome["state"] == "failed":
+                        raise Failed(outcome["said"])
+                    self.known[new[which]] = self._in_measured_form(outcome["read"])
+                except Failed as failed:
+                    self.known[new[which]] = failed
         return [self.known[key] for key in keys]
+
+    def curves(self, shares: Sequence[float]) -> list[np.ndarray]:
+        found = self.find([shares])[0]
+        if isinstance(found, Failed):
+            point = ", ".join(f"{name} = {value:.6g}" for name, value in self.point(shares).items())
+            raise Error(f"the run at {point} failed: {found}; a fit needs it: give ranges, and a start, in "
+                        f"which the scene runs")
+        return found
 
     def _task(self, shares: Sequence[float]) -> dict[str, Any]:
         values = self.study.values(self.point(shares))
@@ -110,27 +129,38 @@ class Problem:
         return [_at_measured(r, next(columns[r.run])) for r in self.study.residuals]
 
     def residuals(self, many: Sequence[Sequence[float]]) -> list[np.ndarray]:
-        of = self.study.residuals
-        out = [np.concatenate([(c - r.measured) / r.sigma for r, c in zip(of, curves)])
-               for curves in self.curves(many)]
-        for values in out:
+        """Infinite where a run failed: no search goes there."""
+        n = sum(len(r.measured) for r in self.study.residuals)
+        out = [np.full(n, math.inf) if isinstance(found, Failed) else np.concatenate(self.of_curves(found))
+               for found in self.find(many)]
+        for shares, values in zip(many, out):
             cost = float(values @ values)
             if cost < self.best:
-                self.best = cost
-                self.tell(f"{self.evaluations} runs: residuals are {math.sqrt(cost / len(values)):.4g} sigma")
+                self.best, self.best_at = cost, np.array(shares, dtype=float)
+                self.tell(f"{self.evaluations} points: residuals are {math.sqrt(cost / n):.4g} sigma")
         return out
 
+    def of_curves(self, curves: Sequence[np.ndarray]) -> list[np.ndarray]:
+        return [(c - r.measured) / r.sigma for r, c in zip(self.study.residuals, curves)]
+
     def jacobian(self, shares: np.ndarray, step: float) -> np.ndarray:
-        """By central differences, one-sided where a bound is nearer than the step."""
+        """By central differences, one-sided where a bound is nearer than the step or a run fails."""
         ends = []
         for i in range(len(shares)):
             for sign in (-1, 1):
                 end = np.array(shares, dtype=float)
                 end[i] = min(max(end[i] + sign * step, 0.0), 1.0)
                 ends.append(end)
-        values = self.residuals(ends)
-        return np.array([(values[2 * i + 1] - values[2 * i]) / (ends[2 * i + 1][i] - ends[2 * i][i])
-                         for i in range(len(shares))]).T
+        values = self.residuals([shares, *ends])
+        here = values.pop(0)
+        columns = []
+        for i in range(len(shares)):
+            (low, a), (high, b) = ((end, value) if np.isfinite(value).all() else (shares, here)
+                                   for end, value in zip(ends[2 * i:2 * i + 2], values[2 * i:2 * i + 2]))
+            if low[i] == high[i]:
+                self.curves(ends[2 * i])  # raises
+            columns.append((b - a) / (high[i] - low[i]))
+        return np.array(columns).T
 
 
 def _at_measured(residual: Residual, read: Any) -> np.ndarray:
@@ -138,21 +168,21 @@ def _at_measured(residual: Residual, read: Any) -> np.ndarray:
         return np.array([read])
     x, y = map(np.array, read)
     if not np.all(np.diff(x) > 0):
-        raise Error(f'residual "{residual.name}": the column "{residual.read["against"]}" of the run does '
-                    f'not increase from row to row, so nothing can be read off between rows; use "against": '
-                    f'"t"')
+        raise Failed(f'residual "{residual.name}": the column "{residual.read["against"]}" of the run does '
+                     f'not increase from row to row, so nothing can be read off between rows; use "against": '
+                     f'"t"')
     slack = 1e-9 * (x[-1] - x[0])
     if residual.against[0] < x[0] - slack or residual.against[-1] > x[-1] + slack:
-        raise Error(f'residual "{residual.name}": measured from {residual.against[0]:g} to '
-                    f'{residual.against[-1]:g}, and the run gives {x[0]:g} to {x[-1]:g}; make the run '
-                    f"longer or leave out what it does not reach")
+        raise Failed(f'residual "{residual.name}": measured from {residual.against[0]:g} to '
+                     f'{residual.against[-1]:g}, and the run gives {x[0]:g} to {x[-1]:g}; make the run '
+                     f"longer or leave out what it does not reach")
     return np.interp(residual.against, x, y)
 
 
-def _least_squares(problem: Problem, start: np.ndarray, step: float, most: int, _seed: int) -> np.ndarray:
+def _least_squares(problem: Problem, start: np.ndarray, step: float, _seed: int) -> np.ndarray:
     from scipy.optimize import least_squares
     found = least_squares(lambda u: problem.residuals([u])[0], start, jac=lambda u: problem.jacobian(u, step),
-                          bounds=(0.0, 1.0), xtol=1e-6, ftol=1e-9, gtol=1e-12, max_nfev=most or 50)
+                          bounds=(0.0, 1.0), xtol=1e-6, ftol=1e-9, gtol=1e-12)
     return np.array(found.x)
 
 
@@ -160,32 +190,44 @@ def _cost(problem: Problem, many: Sequence[Any]) -> list[float]:
     return [float(r @ r) for r in problem.residuals(many)]
 
 
-def _differential_evolution(problem: Problem, start: np.ndarray, step: float, most: int,
-                            seed: int) -> np.ndarray:
+def _differential_evolution(problem: Problem, start: np.ndarray, _step: float, seed: int) -> np.ndarray:
     from scipy.optimize import differential_evolution
-    per_round = 15 * len(start)
     found = differential_evolution(lambda u: u, [(0.0, 1.0)] * len(start), x0=start, seed=seed, polish=False,
                                    updating="deferred", workers=lambda _, many: _cost(problem, list(many)),
-                                   maxiter=max(1, (most or 40 * per_round) // per_round - 1), tol=1e-3)
-    return _least_squares(problem, np.array(found.x), step, 0, seed)  # it only makes them smaller
+                                   tol=1e-3)
+    return np.array(found.x)
 
 
-def _cma(problem: Problem, start: np.ndarray, step: float, most: int, seed: int) -> np.ndarray:
+def _cma(problem: Problem, start: np.ndarray, _step: float, seed: int) -> np.ndarray:
     try:
         import cma
     except ImportError:
         raise UnsupportedError('the optimizer cma needs the package cma for this Python (pip install cma); '
                                '"differential_evolution" does without', "DFM_E_UNSUPPORTED") from None
     search = cma.CMAEvolutionStrategy(start, 0.25, {"bounds": [0, 1], "seed": seed + 1, "verbose": -9,
-                                                    "maxfevals": most or 400 * len(start), "tolx": 1e-4})
+                                                    "tolx": 1e-4})
     while not search.stop():
         many = search.ask()
         search.tell(many, _cost(problem, many))
-    return _least_squares(problem, np.array(search.result.xbest), step, 0, seed)
+    return np.array(search.result.xbest)
 
 
-OPTIMIZERS: dict[str, Callable[[Problem, np.ndarray, float, int, int], np.ndarray]] = {
-    "least_squares": _least_squares, "differential_evolution": _differential_evolution, "cma": _cma}
+# And how many points for each parameter, unless the study says it.
+OPTIMIZERS: dict[str, tuple[Callable[[Problem, np.ndarray, float, int], np.ndarray], int]] = {
+    "least_squares": (_least_squares, 100), "differential_evolution": (_differential_evolution, 600),
+    "cma": (_cma, 400)}
+
+
+def _search(problem: Problem, start: np.ndarray, method: str, optimizer: Mapping[str, Any],
+            most: int) -> np.ndarray:
+    search, of_each = OPTIMIZERS[method]
+    problem.most = problem.evaluations + (most or of_each * len(start))
+    try:
+        return search(problem, start, optimizer["step"], optimizer["seed"])
+    except Spent:
+        return problem.best_at
+    finally:
+        problem.most = 0
 
 
 def _check(study: Study) -> None:
@@ -215,18 +257,20 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
     sentence whenever the residuals have become smaller."""
     read = study if isinstance(study, Study) else read_study(study)
     _check(read)
-    names, step = [p.name for p in read.parameters], read.optimizer["step"]
+    names = [p.name for p in read.parameters]
+    method, step = read.optimizer["method"], read.optimizer["step"]
     start = np.array([p.share(p.start) for p in read.parameters])
     with ExitStack() as stack:
         pool = stack.enter_context(named_executor(executor, workers, address))
         problem = Problem(read, pool, tell or (lambda _: None))
-        best = OPTIMIZERS[read.optimizer["method"]](problem, start, step, read.optimizer["evaluations"],
-                                                    read.optimizer["seed"])
+        at_start = problem.curves(start)
+        best = _search(problem, start, method, read.optimizer, read.optimizer["evaluations"])
+        if method != "least_squares":  # which only makes the residuals smaller
+            best = _search(problem, best, "least_squares", read.optimizer, 0)
         jacobian, coarse = problem.jacobian(best, step), problem.jacobian(best, 2 * step)
-        residuals = problem.residuals([best])[0]
-        at_start, at_best = problem.curves([start, best])
-    spread = Spread(jacobian, residuals, read.confidence)
-    rows, notes = [], [_summary(spread, len(residuals), problem.evaluations)]
+        at_best = problem.curves(best)
+    spread = Spread(jacobian, problem.of_curves(at_best), read.confidence)
+    rows, notes = [], [_summary(spread, len(jacobian), problem.evaluations)]
     for i, p in enumerate(read.parameters):
         low, high = (p.place(min(max(best[i] + sign * spread.half[i], 0.0), 1.0)) for sign in (-1, 1))
         rows.append({"parameter": p.name, "value": p.place(best[i]), "low": low, "high": high, "unit": p.unit,
@@ -234,22 +278,35 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
         if min(best[i], 1 - best[i]) < 1e-6:
             notes.append(f"{p.name} lies at the end of its range, {p.place(best[i]):.6g}: widen the range, "
                          f"or the interval means nothing")
-    notes += spread.sentences(names)
-    if spread.scatter > 2:
-        notes.append(f"the residuals are {spread.scatter:.3g} times as large as sigma says: this input does "
-                     f"not give the measured curve, or sigma is too small")
-    rough = float(np.linalg.norm(jacobian - coarse) / max(np.linalg.norm(jacobian), 1e-300))
-    if rough > ROUGH:
-        notes.append(f"the derivatives change by {100 * rough:.0f} % between a step of {step:g} and "
-                     f'{2 * step:g} of the ranges, so the intervals are rough: set another "step" of the '
-                     f'optimizer, or search by "differential_evolution" or "cma"')
+    left = spread.left(best)
+    if left.max() > LEFT:
+        notes.append(f"the search has not converged: {names[left.argmax()]} is {left.max():.2g} half widths "
+                     f'of its interval from where it goes on to, so the values are no fit yet: raise '
+                     f'"evaluations" of the optimizer, or give another "start" or "method"')
+    else:
+        notes += spread.sentences(names)
+        if spread.scatter > 2:
+            notes.append(f"the residuals are {spread.scatter:.3g} times as large as sigma says: this input "
+                         f"does not give the measured curve, or sigma is too small")
+        for r, r1 in zip(read.residuals, spread.correlated):
+            if r1:
+                notes.append(f"neighbors in {r.name} have residuals with a correlation of {r1:.2f}, by noise "
+                             f"that lasts or an input that does not give this curve: its {len(r.measured)} "
+                             f"numbers count as {len(r.measured) * (1 - r1) / (1 + r1):.3g}")
+    for i, name in enumerate(names):
+        rough = float(np.linalg.norm((jacobian - coarse)[:, i])
+                      / max(np.linalg.norm(jacobian[:, i]), 1e-300))
+        if rough > ROUGH and i not in spread.untold:
+            notes.append(f"derivatives by {name} change by {100 * rough:.0f} % between a step of {step:g} "
+                         f'and {2 * step:g} of its range, so intervals are rough: set another "step" of the '
+                         f'optimizer, or search by "differential_evolution" or "cma"')
     return Fit(read, rows, notes, _curves(read, at_start, at_best), spread, problem.evaluations,
                out_folder(read, out))
 
 
 def _summary(spread: Spread, n: int, evaluations: int) -> str:
     return (f"{n} residuals of {spread.scatter:.3g} sigma after {evaluations} points; intervals by t "
-            f"quantiles of {spread.free} degrees of freedom, for all parameters at once")
+            f"quantiles of {spread.free:.3g} degrees of freedom, for all parameters at once")
 
 
 def _curves(study: Study, start: list[np.ndarray], best: list[np.ndarray]) -> list[dict[str, Any]]:

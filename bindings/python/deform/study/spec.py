@@ -1,20 +1,22 @@
 """STUDY.json, read and checked: what varies, what is run, what is kept of a run."""
 from __future__ import annotations
 
-import csv
 import difflib
 import hashlib
 import json
 import math
+import os.path
 import pathlib
 from dataclasses import dataclass, field
 from typing import Any, Iterable, Mapping
 
 import numpy as np
 
-from .._library import FileError, FormatError
+from .._library import FileError, FormatError, quick
+from .tables import finite, read_csv
 
 TABLES = {"bodies", "contacts", "probes", "attachments", "sensors", "tools", "rows"}
+OF_ROWS = ("state", "said", "seconds")  # what a sweep's rows say beside parameters and quantities
 TAKES = ("last", "first", "min", "max", "mean", "change", "period", "peak_to_peak")
 
 
@@ -82,11 +84,15 @@ class Place:
         return at.value
 
 
+def is_pointer(value: Any) -> bool:
+    return isinstance(value, str) and value.startswith("/") and "=" not in value
+
+
 def pointers(place: Place, key: str) -> list[str]:
     value = place.value[key]
     found = value if isinstance(value, list) else [value]
     for pointer in found:
-        if not isinstance(pointer, str) or not pointer.startswith("/") or "=" in pointer:
+        if not is_pointer(pointer):
             raise place.of(key).fail(f"expected a JSON pointer into the scene, as /gravity/2, or a list of "
                                      f"them, found {json.dumps(value)}")
     return found
@@ -111,10 +117,10 @@ class Parameter:
         """The value at a share 0 .. 1 of the range, or of the list."""
         if self.values:
             return self.values[min(int(share * len(self.values)), len(self.values) - 1)]
-        value = (self.low * (self.high / self.low) ** share if self.log else
-                 self.low + (self.high - self.low) * share)
-        value = min(max(value, self.low), self.high)
-        return round(value) if self.whole else float(value)
+        top = self.high + self.whole  # each whole number has as much of the range as the others
+        value = self.low * (top / self.low) ** share if self.log else self.low + (top - self.low) * share
+        value = float(min(max(value, self.low), self.high))
+        return math.floor(value) if self.whole else value
 
     def share(self, value: float) -> float:
         if self.log:
@@ -141,7 +147,11 @@ def read_parameter(name: str, at: Place) -> Parameter:
         raise at.fail(f'"from" ({low:g}) must be below "to" ({high:g})')
     if log and low <= 0:
         raise at.fail(f'a range with "scale": "log" begins above 0, and "from" is {low:g}')
-    whole = at.has("whole") and at.of("whole").value is True
+    whole = at.value.get("whole", False)
+    if not isinstance(whole, bool):
+        raise at.of("whole").fail(f"expected true or false, found {json.dumps(whole)}")
+    if whole and (low % 1 or high % 1):
+        raise at.fail(f'a "whole" range goes from a whole number to one, and this from {low:g} to {high:g}')
     out = Parameter(name, to, unit, [], low, high, log, whole, at.whole("count", 5, 2))
     start = at.number("start", out.place(0.5))
     if not low <= start <= high:
@@ -210,34 +220,39 @@ class Study:
         return {at: point[p.name] for p in self.parameters for at in p.at}
 
     def digest(self) -> str:
-        """What results depend on beside a point's values: files, fixed values, what is read of a run."""
-        text = json.dumps([self.kind, [(input_digest(file), fixed) for file, fixed in self.runs],
-                           self.quantities], sort_keys=True)
+        """What results depend on beside a point's values: library, files, fixed values, what is read of a
+        run."""
+        inputs = [(_of_file(file), _of_named(json.loads(pathlib.Path(file).read_text()), file), fixed,
+                   _of_named(fixed, file)) for file, fixed in self.runs]
+        text = json.dumps([quick.dfm_version(None, None, None).decode(), self.kind, inputs, self.quantities],
+                          sort_keys=True)
         return hashlib.sha256(text.encode()).hexdigest()
 
+    def key(self, digest: str, point: Mapping[str, Any]) -> str:
+        """Of a point of the study with this digest: the same as long as its results would be."""
+        values = self.values(point)
+        named = [_of_named(values, file) for file, _ in self.runs]
+        return hashlib.sha256(json.dumps([digest, values, named], sort_keys=True).encode()).hexdigest()[:24]
 
-def input_digest(file: str) -> str:
-    """Of an input file and the files beside it that it names."""
-    path = pathlib.Path(file)
-    digest = hashlib.sha256(path.read_bytes())
 
-    def walk(value: Any) -> None:
-        if isinstance(value, str) and value and len(value) < 1000:
-            named = path.parent / value
-            if named.is_file():
-                digest.update(named.read_bytes())
-        for item in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-            walk(item)
+def _of_file(path: str) -> str:
+    return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
 
-    walk(json.loads(path.read_text()))
-    return digest.hexdigest()
+
+def _of_named(value: Any, file: str) -> list[str]:
+    """Of the files that texts in a value name, counted from the folder of the input file."""
+    if isinstance(value, str):
+        path = os.path.join(os.path.dirname(file), value)
+        return [_of_file(path)] if value and os.path.isfile(path) else []
+    items = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
+    return [digest for item in items for digest in _of_named(item, file)]
 
 
 def _input(at: Place, folder: pathlib.Path) -> tuple[str, str]:
     if at.has("scene") == at.has("rig"):
         raise at.fail('a study runs a "scene" or a "rig" (a case of `deform friction`): name one file')
     kind = "scene" if at.has("scene") else "rig"
-    path = folder / at.text(kind)
+    path = (folder / at.text(kind)).absolute()  # a worker may run in another folder
     try:
         json.loads(path.read_text())
     except OSError as error:
@@ -251,15 +266,14 @@ def _fixed(at: Place) -> dict[str, Any]:
     if not at.has("set"):
         return {}
     value = at.of("set").value
-    if not isinstance(value, Mapping) or not all(key.startswith("/") for key in value):
+    if not isinstance(value, Mapping) or not all(map(is_pointer, value)):
         raise at.of("set").fail('expected an object as {"/time/duration": 0.5}')
     return dict(value)
 
 
 def read_columns(path: pathlib.Path, names: list[str], at: Place) -> list[np.ndarray]:
     try:
-        with open(path, newline="") as file:
-            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+        rows = read_csv(path)
     except OSError as error:
         raise at.fail(f"{path}: cannot be opened: {error.strerror}") from None
     out = []
@@ -268,12 +282,9 @@ def read_columns(path: pathlib.Path, names: list[str], at: Place) -> list[np.nda
             has = ", ".join(rows[0]) if rows else "no rows"
             raise at.fail(f'{path} has no column "{name}"; it has {has}')
         try:
-            column = np.array([float(row[name]) for row in rows])
-        except (TypeError, ValueError):
-            column = np.array([math.nan])
-        if not np.all(np.isfinite(column)):
-            raise at.fail(f'{path}: column "{name}" holds something else than finite numbers')
-        out.append(column)
+            out.append(np.array(finite(rows, name)))
+        except ValueError as error:
+            raise at.fail(f'{path}: column "{name}" holds {error}, no finite number') from None
     return out
 
 
@@ -324,12 +335,20 @@ def read_study(source: Any) -> Study:
     if not parameters:
         raise of.fail("a study varies one parameter or more")
     quantities, units = {}, {p.name: p.unit for p in parameters}
+    of_pointer: dict[str, str] = {}
+    for p in parameters:
+        for pointer in p.at:
+            if of_pointer.setdefault(pointer, p.name) != p.name:
+                raise of.of(p.name).fail(f"{pointer} is set by {of_pointer[pointer]} already")
     if at.has("quantities"):
         listed = at.of("quantities").keys(value["quantities"])
         for name in listed.value:
             if name in units:
                 raise listed.fail(f'"{name}" is a parameter already; a quantity needs a name of its own')
             quantities[name], units[name] = read_quantity(listed.of(name))
+    for name in OF_ROWS:
+        if name in units:
+            raise at.fail(f'"{name}" is a column of every sweep: give it another name')
     runs = [(main, fixed)]
     residuals = []
     for i, one in enumerate(at.list("residuals") if at.has("residuals") else []):
@@ -355,7 +374,7 @@ def read_study(source: Any) -> Study:
                  residuals,
                  {"method": optimizer.text("method", "least_squares",
                                            ("least_squares", "differential_evolution", "cma")),
-                  "step": optimizer.number("step", 0.01, 0),
+                  "step": optimizer.number("step", 0.01, 1e-12),
                   "evaluations": optimizer.whole("evaluations", 0, 0),
                   "seed": optimizer.whole("seed", 0, 0)},
-                 confidence, at.number("limit_s", 0.0))
+                 confidence, at.number("limit_s", 0.0, 0))

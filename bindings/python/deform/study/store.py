@@ -3,20 +3,15 @@ is done stays, and the next call goes on."""
 from __future__ import annotations
 
 import fcntl
-import hashlib
 import json
 import os
 import pathlib
 import time
-from typing import Any, Mapping
+from typing import Any
 
-from .._library import StateError
+from .._library import FileError, StateError
 
 SYNC_EVERY = 1.0  # s: what a loss of power may cost; the end of a process costs nothing
-
-
-def key_of(digest: str, values: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps([digest, values], sort_keys=True).encode()).hexdigest()[:24]
 
 
 class Store:
@@ -28,10 +23,14 @@ class Store:
         self.file = open(path, "ab")
         try:
             fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
+        except BlockingIOError:
             self.file.close()
             raise StateError(f"{path}: another sweep writes here; wait for its end, or give another folder "
                              f"(--out)", "DFM_E_STATE") from None
+        except OSError as error:
+            self.file.close()
+            raise FileError(f"{path}: cannot be locked: {error.strerror}; give a folder of another file "
+                            f"system (--out)", "DFM_E_IO") from None
         self.rows: dict[str, dict[str, Any]] = {}
         for other in [folder / "runs.jsonl", *sorted((folder / "runs").glob("*.jsonl"))]:
             if other != path and other.exists():

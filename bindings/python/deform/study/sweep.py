@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import pathlib
-from contextlib import ExitStack
+from contextlib import ExitStack, closing
 from typing import Any, Sequence
 
 from .._command import Table
@@ -13,7 +13,7 @@ from .executors import executor as named_executor
 from .page import page, table
 from .progress import Progress
 from .spec import Study, read_study
-from .store import Store, key_of
+from .store import Store
 
 
 class Sweep(Table):
@@ -91,7 +91,7 @@ def sweep(study: Any, *, out: Any = None, executor: str = "local", workers: int 
         raise ArgumentError(f'{read.file}: /: a sweep needs "quantities", what is read of each run',
                             "DFM_E_ARG")
     folder, all_points, digest = out_folder(read, out), points(read), read.digest()
-    keys = [key_of(digest, read.values(point)) for point in all_points]
+    keys = [read.key(digest, point) for point in all_points]
     first, last = only if only is not None else (0, len(keys) - 1)
     if not 0 <= first <= last < len(keys):
         raise ArgumentError(f"runs {first} to {last} are not among the {len(keys)} of this study, which are "
@@ -108,7 +108,8 @@ def sweep(study: Any, *, out: Any = None, executor: str = "local", workers: int 
         shown = Progress(len(todo), progress)
         if todo:
             pool = stack.enter_context(named_executor(executor, workers, address))
-            for which, outcome in pool.map([task_of(read, all_points[i]) for i in todo]):
+            ended = stack.enter_context(closing(pool.map([task_of(read, all_points[i]) for i in todo])))
+            for which, outcome in ended:
                 i = todo[which]
                 store.add({"key": keys[i], "point": all_points[i], **outcome})
                 shown.add(outcome["state"] == "failed")

@@ -1,7 +1,9 @@
-"""Rows of a sweep as CSV and Parquet, with units: in the header, and in the metadata of the columns."""
+"""Tables: of runs and measurements, read from CSV; rows of a sweep as CSV and Parquet, with units in the
+header and in the metadata of the columns."""
 from __future__ import annotations
 
 import csv
+import json
 import math
 import os
 import pathlib
@@ -10,6 +12,24 @@ from typing import Any, Mapping, Sequence
 from .._library import UnsupportedError
 
 Rows = Sequence[Mapping[str, Any]]
+
+
+def read_csv(path: pathlib.Path) -> list[dict[str, str]]:
+    with open(path, newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def finite(rows: Sequence[Mapping[str, str]], name: str) -> list[float]:
+    """A column; raises ValueError with the first text that is no finite number."""
+    out = []
+    for row in rows:
+        try:
+            out.append(float(row[name]))
+        except (TypeError, ValueError):
+            out.append(math.nan)
+        if not math.isfinite(out[-1]):
+            raise ValueError(json.dumps(row[name]))
+    return out
 
 
 def titled(name: str, units: Mapping[str, str]) -> str:
