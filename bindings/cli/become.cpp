@@ -3,6 +3,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 
@@ -19,6 +20,11 @@ std::string beside(const std::string &name) {
   if (error)
     throw Failure(kBadInput, "/proc/self/exe cannot be read: the command does not know where it lies");
   return self.parent_path() / name;
+}
+
+std::vector<std::string> pythons() {
+  if (const char *const named = std::getenv("DEFORM_PYTHON")) return {named};
+  return {DEFORM_PYTHON, "python3"};
 }
 
 void become(const std::string &subcommand, const std::string &name, const std::vector<std::string> &words,

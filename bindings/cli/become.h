@@ -10,6 +10,10 @@ struct Globals;
 
 std::string beside(const std::string &name);  // the path of a program in the folder of this one
 
+// Python interpreters, the first choice first: the one that DEFORM_PYTHON in the environment names, and no
+// other; else the one that the build found, and python3 in PATH.
+std::vector<std::string> pythons();
+
 // Becomes the program `name`, with these words behind its own, or throws; missing: what to do where it is not
 // there.
 [[noreturn]] void become(const std::string &subcommand, const std::string &name,

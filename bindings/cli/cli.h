@@ -28,6 +28,8 @@ int fail(const std::string &sentence);
 
 // A context with the command's options; prints the sentence and exits the process with 2 where that fails.
 dfm_context *make_context(const Globals &globals);
+// The next make_context() returns this one, which its caller then owns.
+void offer_context(dfm_context *context);
 
 // Each adds its subcommand; the callback stores its exit code in *exit_code.
 void add_run(Command app, Globals &globals, int *exit_code);
@@ -35,6 +37,8 @@ void add_replay(Command app, Globals &globals, int *exit_code);
 void add_mesh(Command app, Globals &globals, int *exit_code);
 void add_plugin(Command app, Globals &globals, int *exit_code);
 void add_contact(Command app, Globals &globals, int *exit_code);
+void add_study(Command app, const Globals &globals, const char *name, const char *about);
+void add_worker(Command app, Globals &globals, int *exit_code);   // for deform.sweep; not listed in --help
 void add_montage(Command app, Globals &globals, int *exit_code);  // for `make demo`; not listed in --help
 
 // Reads the command line by the subcommands that `add` adds and calls the one that is meant; all of main().

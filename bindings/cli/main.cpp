@@ -16,6 +16,11 @@ int main(int argc, char **argv) {
     cli::add_program(top, globals, cli::kFriction);
     cli::add_program(top, globals, cli::kCost);
     cli::add_program(top, globals, cli::kRollback);
+#ifndef __EMSCRIPTEN__
+    cli::add_study(top, globals, "sweep", "runs a scene over ranges of its values: tables, plots, a page");
+    cli::add_study(top, globals, "fit", "finds values of a scene from measured curves, with intervals");
+    cli::add_worker(top, globals, exit_code);
+#endif
     cli::add_program(top, globals, cli::kServe);
     cli::add_program(top, globals, cli::kView);
     cli::add_contact(top, globals, exit_code);

@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <utility>
 
 #include "cli.h"
 #ifdef DEFORM_HAVE_BULLET
@@ -46,6 +47,8 @@ size_t edit_distance(const std::string &a, const std::string &b) {
   return row[b.size()];
 }
 
+dfm_context *offered = nullptr;
+
 }  // namespace
 
 Globals &session_globals() { return globals; }
@@ -82,7 +85,10 @@ const char *kind_name(uint32_t kind) {
 
 void warn(const std::string &sentence) { on_log(nullptr, DFM_LOG_WARNING, sentence.c_str()); }
 
+void offer_context(dfm_context *context) { offered = context; }
+
 dfm_context *make_context(const Globals &g) {
+  if (dfm_context *const ready = std::exchange(offered, nullptr)) return ready;
   dfm_context_def def = dfm_context_def_default();
   def.threads = g.threads;
   def.log = on_log;

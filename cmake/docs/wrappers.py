@@ -185,11 +185,11 @@ def python_pages(package, reference):
             modules.setdefault(node.module, []).extend(names)
     out, rows = {}, []
     for module, names in modules.items():
-        tree = ast.parse((root / f"{module}.py").read_text())
+        tree = ast.parse((root / f"{module.replace('.', '/')}.py").read_text())
         found = {node.name: node for node in tree.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
-        title = module.strip("_")
-        title = {"library": "errors and paths"}.get(title, title)
-        path = f"python_{module.strip('_')}.md"
+        module = module.rpartition(".")[2].strip("_")
+        title = {"library": "errors and paths"}.get(module, module)
+        path = f"python_{module}.md"
         page = [f"# deform: {title}", _text(ast.get_docstring(tree), reference)]
         for name in sorted(names, key=lambda n: found[n].lineno):
             node = found[name]

@@ -68,6 +68,9 @@ class Wheel(unittest.TestCase):
             version = subprocess.run([folder / "venv" / "bin" / "deform", "--version"], capture_output=True,
                                      text=True, env=clean(), check=True).stdout
             self.assertIn(re.search(r"-([\d.]+)-py3", wheel.name).group(1), version)
+            study = subprocess.run([folder / "venv" / "bin" / "deform", "sweep", "none.json"], text=True,
+                                   capture_output=True, env=clean(), cwd=folder / "other")
+            self.assertEqual(study.stderr, "deform: none.json: cannot be opened: No such file or directory\n")
             with zipfile.ZipFile(wheel) as zipped:
                 files = zipped.namelist()
             for needed in ("deform/py.typed", "deform/native/bin/deform-cost",

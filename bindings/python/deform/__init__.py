@@ -24,15 +24,18 @@ from .picture import Picture
 from .query import ContactChoice, Filter, Hit, Shape
 from .rigid_set import JointDef, Material, RigidDef
 from .scene import Run, Scene, run
+from .study.fit import Fit, fit
+from .study.sweep import Sweep, sweep
 from .tool import Tool
 from .world import Trouble, World
 
 __version__: str = _quick.dfm_version(None, None, None).decode()
 
 __all__ = ["ArgumentError", "Body", "BusyError", "ContactChoice", "Context", "CutInfo",
-           "Discarded", "Diverged", "Error", "FileError", "Filter", "FormatError", "HandleError",
-           "Hit", "JointDef", "Law", "Material", "Obstacle", "OutOfMemory", "Parameter",
-           "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run", "Scene", "Server",
-           "Shape", "StateError", "TetMesh", "Tool", "TriMesh", "Trouble", "UnsupportedError", "World",
-           "command", "cost", "default_context", "explain", "friction", "include_dir",
-           "plot_friction", "rotation", "run", "serve", "template_dir"]
+           "Discarded", "Diverged", "Error", "FileError", "Filter", "Fit", "FormatError",
+           "HandleError", "Hit", "JointDef", "Law", "Material", "Obstacle", "OutOfMemory",
+           "Parameter", "Picture", "PluginType", "PythonLaw", "Rigid", "RigidDef", "Run", "Scene",
+           "Server", "Shape", "StateError", "Sweep", "TetMesh", "Tool", "TriMesh", "Trouble",
+           "UnsupportedError", "World", "command", "cost", "default_context", "explain", "fit",
+           "friction", "include_dir", "plot_friction", "rotation", "run", "serve", "sweep",
+           "template_dir"]

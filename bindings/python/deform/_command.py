@@ -14,7 +14,8 @@ from ._library import ArgumentError, Diverged, Error, command_path
 def main() -> None:
     """Becomes the command: `deform run SCENE`, `deform cost SCENE`, ... (the console script)."""
     path = str(command_path())
-    os.execv(path, [path, *sys.argv[1:]])
+    # `deform sweep` and `deform fit` come back to this interpreter
+    os.execve(path, [path, *sys.argv[1:]], {"DEFORM_PYTHON": sys.executable, **os.environ})
 
 
 def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> str:
@@ -27,14 +28,16 @@ def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> st
     raise {2: ArgumentError, 3: Diverged}.get(done.returncode, Error)(said.removeprefix("deform: "))
 
 
-def _shown(value: Any) -> str:
+def _shown(value: Any, digits: int) -> str:
     if isinstance(value, float):
-        return f"{value:.3g}"
+        return f"{value:.{digits}g}"
     return "" if value is None else str(value)
 
 
 class Table(list):
     """Rows as dicts; prints as a table below its notes, and a notebook shows it as one."""
+
+    digits = 3
 
     def __init__(self, rows: Sequence[dict[str, Any]], columns: Sequence[str], notes: Sequence[str] = ()):
         super().__init__(rows)
@@ -46,7 +49,7 @@ class Table(list):
         return [row.get(name) for row in self]
 
     def __str__(self) -> str:
-        cells = [self.columns] + [[_shown(row.get(c)) for c in self.columns] for row in self]
+        cells = [self.columns] + [[_shown(row.get(c), self.digits) for c in self.columns] for row in self]
         widths = [max(len(line[i]) for line in cells) for i in range(len(self.columns))]
         return "\n".join([*self.notes] + ["  ".join(c.ljust(w) for c, w in zip(line, widths)).rstrip()
                                           for line in cells])
@@ -54,7 +57,8 @@ class Table(list):
     def _repr_html_(self) -> str:
         from html import escape
         head = "".join(f"<th>{escape(c)}</th>" for c in self.columns)
-        cells = [[f"<td>{escape(_shown(row.get(c)))}</td>" for c in self.columns] for row in self]
+        cells = [[f"<td>{escape(_shown(row.get(c), self.digits))}</td>" for c in self.columns]
+                 for row in self]
         rows = "".join(f"<tr>{''.join(line)}</tr>" for line in cells)
         notes = "".join(f"<p>{escape(note)}</p>" for note in self.notes)
         return f"{notes}<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"

@@ -7,10 +7,10 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <vector>
 
+#include "become.h"
 #include "plot_script.h"
 #include "messages.h"
 
@@ -19,8 +19,8 @@ namespace {
 
 enum class Drawn { yes, no, cannot };  // cannot: no such interpreter, or it has no matplotlib
 
-// isolated: PYTHONHOME and PYTHONPATH may be settings for another interpreter. said: out, what the script
-// prints: why the picture cannot be written.
+// isolated, of the build's own interpreter: PYTHONHOME and PYTHONPATH may be settings for another one. said:
+// out, what the script prints: why the picture cannot be written.
 Drawn draw_with(const std::string &python, bool isolated, const std::vector<std::string> &arguments,
                 std::string &said) {
   std::vector<std::string> words = {python};
@@ -60,10 +60,11 @@ Drawn draw_with(const std::string &python, bool isolated, const std::vector<std:
 bool plot_friction(const std::string &csv, const std::string &picture, const std::string &kind,
                    const std::string &title) {
   const std::vector<std::string> arguments = {csv, picture, kind, title};
-  const char *const named = std::getenv("DEFORM_PYTHON");
   std::string said;
-  Drawn drawn = draw_with(named ? named : DEFORM_PYTHON, !named, arguments, said);
-  if (drawn == Drawn::cannot && !named) drawn = draw_with("python3", false, arguments, said);
+  Drawn drawn = Drawn::cannot;
+  const std::vector<std::string> interpreters = pythons();
+  for (size_t i = 0; i < interpreters.size() && drawn == Drawn::cannot; i++)
+    drawn = draw_with(interpreters[i], i + 1 < interpreters.size(), arguments, said);
   if (drawn == Drawn::yes) return true;
   std::remove((picture + ".part").c_str());
   if (drawn == Drawn::cannot) return false;

@@ -4,8 +4,7 @@
 
 namespace cli {
 
-// Runs the first of these that has matplotlib: the interpreter that DEFORM_PYTHON in the environment names
-// (then no other is tried); the one that the build found; python3 in PATH. False where none has it; throws
+// Runs the first of pythons() (bindings/cli/become.h) that has matplotlib. False where none has it; throws
 // Failure where the picture could not be made for another reason.
 bool plot_friction(const std::string &csv, const std::string &picture, const std::string &kind,
                    const std::string &title);

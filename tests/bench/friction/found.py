@@ -4,6 +4,13 @@ import json
 import os
 
 FOUND = "found by search"  # the configuration's name in the rows
+
+
+def shown(configuration):
+    """In tables, most cells of which it stands in."""
+    return "searched" if configuration == FOUND else configuration
+
+
 # run.py and run_scenes.py may name another
 TABLE = os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "results", "peers_search.csv")
 

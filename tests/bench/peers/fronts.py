@@ -15,7 +15,7 @@ import math
 import os
 
 import speed
-from found import FOUND
+from found import FOUND, shown
 
 BEGIN, END = "<!-- scenes -->\n", "<!-- end of scenes -->\n"
 COLORS = {**speed.COLORS, "jolt": "#8a63b8"}
@@ -60,12 +60,6 @@ def name_of(case, quantities):
     return "%s: %s" % (case, ", ".join(plain.get(q, q) for q in quantities))
 
 
-def bold_least(cells, level):
-    """Cells (value or None, text): the least in bold, and what is within a factor `level` of it."""
-    least = min((v for v, _ in cells if v is not None), default=None)
-    return ["**%s**" % t if v is not None and v <= level * least else t for v, t in cells]
-
-
 def heads(rows):
     """Engines, what they cannot run, the rest of a table's head."""
     engines = list(dict.fromkeys(r["engine"] for r in rows))
@@ -78,17 +72,19 @@ def least_time(rows):
     text = "Least processor time (s per simulated s) within an error:\n\n| question | error at most " + head
     for case, quantities, unit, levels in QUESTIONS:
         found = runs(rows, case, quantities)
+        answers = {}
         for level in levels:
             cells = []
             for engine in engines:
                 good = [r for r in found if r[0] == engine and r[4] <= level]
                 if good:
                     r = min(good, key=lambda x: x[3])
-                    cells.append((r[3], "%.3g (%s, %d)" % (r[3], r[1], r[2])))
+                    cells.append((r[3], "%.3g (%s, %d)" % (r[3], shown(r[1]), r[2])))
                 else:
                     cells.append((None, "cannot" if (engine, case) in cannot else "never"))
-            text += "| %s | %g %s | %s |\n" % (name_of(case, quantities), level, unit,
-                                              " | ".join(bold_least(cells, speed.LEVEL)))
+            answers.setdefault(" | ".join(speed.bold_least(cells, speed.LEVEL)), []).append("%g" % level)
+        for answer, of in answers.items():  # levels with the same answer share a row
+            text += "| %s | %s %s | %s |\n" % (name_of(case, quantities), ", ".join(of), unit, answer)
     return text
 
 

@@ -4,9 +4,10 @@
   speed.py FILE.csv [--page PAGE] [--picture PNG]
 
 A case is equally exact where every quantity lies in its band. The table has for each case and engine the
-configuration that gets there for the least processor time per simulated second, those that do not get there
-at any, and which engines are fastest, within a factor of two. The picture has every configuration: its error
-in half bands over its cost. With --page the table takes the place of what stands between the page's marks.
+configuration that gets there for the least processor time per simulated second, and those that do not get
+there at any; in bold the least time and all within a factor of two of it. The picture has every
+configuration: its error in half bands over its cost. With --page the table takes the place of what stands
+between the page's marks.
 """
 import argparse
 import csv
@@ -16,6 +17,7 @@ import sys
 
 sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), os.pardir, "friction"))
 import table
+from found import shown
 
 LEVEL = 2  # ratio of two times that is not significant
 COLORS = {"deform": "#2f6db3", "mujoco": "#c8553d", "bullet": "#3b8f5c"}
@@ -39,28 +41,29 @@ def runs(rows):
     return out
 
 
+def bold_least(cells, level):
+    """Cells (value or None, text): the least in bold, and what is within a factor `level` of it."""
+    least = min((v for v, _ in cells if v is not None), default=None)
+    return ["**%s**" % t if v is not None and v <= level * least else t for v, t in cells]
+
+
 def speed_table(rows):
     cases = runs(rows)
     engines = list(dict.fromkeys(who[0] for by in cases.values() for who in by))
-    lines = ["| case | " + " | ".join(engines) + " | fastest |", "|" + "---|" * (2 + len(engines))]
+    lines = ["| case | " + " | ".join(engines) + " |", "|" + "---|" * (1 + len(engines))]
     for (case, parameters), by in cases.items():
-        best = {}
+        cells = []
         for engine in engines:
             passed = [(cost, name) for (e, name), (error, cost) in by.items() if e == engine and error <= 1]
-            best[engine] = min(passed) if passed else None
-        told = []
-        for engine in engines:
-            if best[engine]:
-                told.append("%.3g s (%s)" % best[engine])
-            elif any(e == engine for e, _ in by):
-                told.append("not at any setting run")
+            if passed:
+                cost, name = min(passed)
+                cells.append((cost, "%.3g (%s)" % (cost, shown(name))))
             else:
-                told.append("not run")
-        passed = [(found[0], engine) for engine, found in best.items() if found]
-        near = [engine for cost, engine in passed if cost <= LEVEL * min(passed)[0]]
-        fastest = ", ".join(near) or "none"
-        lines.append("| %s %s | %s | %s |" % (case, parameters, " | ".join(told), fastest))
+                run = any(e == engine for e, _ in by)
+                cells.append((None, "not at any setting run" if run else "not run"))
+        lines.append("| %s %s | %s |" % (case, parameters, " | ".join(bold_least(cells, LEVEL))))
     return "\n".join(lines) + "\n"
+
 
 
 def picture(rows, path):

@@ -1,0 +1,70 @@
+"""Tables: of runs and measurements, read from CSV; rows of a sweep as CSV and Parquet, with units in the
+header and in the metadata of the columns."""
+from __future__ import annotations
+
+import csv
+import json
+import math
+import os
+import pathlib
+from typing import Any, Mapping, Sequence
+
+from .._library import UnsupportedError
+
+Rows = Sequence[Mapping[str, Any]]
+
+
+def read_csv(path: pathlib.Path) -> list[dict[str, str]]:
+    with open(path, newline="") as file:
+        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+
+
+def finite(rows: Sequence[Mapping[str, str]], name: str) -> list[float]:
+    """A column; raises ValueError with the first text that is no finite number."""
+    out = []
+    for row in rows:
+        try:
+            out.append(float(row[name]))
+        except (TypeError, ValueError):
+            out.append(math.nan)
+        if not math.isfinite(out[-1]):
+            raise ValueError(json.dumps(row[name]))
+    return out
+
+
+def titled(name: str, units: Mapping[str, str]) -> str:
+    return f"{name} [{units[name]}]" if units.get(name) else name
+
+
+def write_csv(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
+    part = path.with_name(path.name + ".part")
+    with open(part, "w", newline="") as file:
+        out = csv.writer(file)
+        out.writerow([titled(name, units) for name in columns])
+        for row in rows:
+            out.writerow(["" if row.get(name) is None else row[name] for name in columns])
+    os.replace(part, path)
+
+
+def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
+    try:
+        import pyarrow as arrow
+        import pyarrow.parquet
+    except ImportError as missing:
+        raise UnsupportedError(f"Parquet needs pyarrow for this Python, pip install pyarrow ({missing}); the "
+                               f"rows are in sweep.csv", "DFM_E_UNSUPPORTED") from None
+    arrays, fields = [], []
+    for name in columns:
+        array = arrow.array([row.get(name) for row in rows])
+        arrays.append(array)
+        metadata = {"unit": units[name]} if units.get(name) else None
+        fields.append(arrow.field(name, array.type, metadata=metadata))
+    part = path.with_name(path.name + ".part")
+    arrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), part)
+    os.replace(part, path)
+
+
+def shown(value: Any) -> str:
+    if isinstance(value, float):
+        return "" if math.isnan(value) else f"{value:.5g}"
+    return "" if value is None else str(value)

@@ -1,0 +1,429 @@
+"""Sweeps: designs, results that stay whatever ends a run, a worker or the sweep, tables, plots, exports."""
+import csv
+import importlib.util
+import json
+import os
+import pathlib
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+import unittest
+import unittest.mock
+
+import deform
+from deform.study.design import points
+from deform.study.engine import Engine, Failed, Results
+from deform.study.executors import Dask
+from deform.study.spec import read_study
+from deform.study.sweep import task_of
+from study_files import BOX, MU, SPEED, sweep_study, write_box
+
+COMMAND = os.environ["DEFORM_COMMAND"]
+
+
+def alive(pid):
+    try:
+        return bool(pathlib.Path(f"/proc/{pid}/cmdline").read_bytes())
+    except OSError:
+        return False
+
+
+def workers_of(pid):
+    """Processes of `deform worker` below a process, and the runs that they have forked."""
+    found = []
+    for entry in pathlib.Path("/proc").iterdir():
+        try:
+            if entry.name.isdigit() and (entry / "cmdline").read_bytes().endswith(b"\0worker\0"):
+                parent = int((entry / "stat").read_text().rsplit(")", 1)[1].split()[1])
+                found.append((int(entry.name), parent))
+        except OSError:
+            continue
+    own = {child for child, parent in found if parent == pid}
+    return sorted(own | {child for child, parent in found if parent in own})
+
+
+class InAFolder(unittest.TestCase):
+    def setUp(self):
+        self.folder = pathlib.Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.scene, self.out, self.tmp = write_box(self.folder), self.folder / "out", self.folder / "tmp"
+        self.tmp.mkdir()
+        for patch in (unittest.mock.patch.dict(os.environ, TMPDIR=str(self.tmp)),
+                      unittest.mock.patch.object(tempfile, "tempdir", str(self.tmp))):
+            patch.start()
+            self.addCleanup(patch.stop)
+        self.addCleanup(lambda: self.assertEqual(list(self.tmp.glob("*deform-study-*")), []))
+
+    def command(self, *arguments, code=0, **environment):
+        done = subprocess.run([COMMAND, *map(str, arguments)], capture_output=True, text=True,
+                              cwd=self.folder, env={**os.environ, **environment})
+        self.assertEqual(done.returncode, code, done.stderr + done.stdout)
+        return done
+
+    def study(self, **changes):
+        path = self.folder / "study.json"
+        path.write_text(json.dumps(sweep_study(self.scene, **changes)))
+        return path
+
+
+class Designs(InAFolder):
+    def points(self, method, **changes):
+        return points(read_study(sweep_study(self.scene, design={"method": method, **changes})))
+
+    def test_grid_and_list(self):
+        study = sweep_study(self.scene, design={"method": "grid"}, parameters={
+            "mu": {"at": MU, "values": [0.1, 0.2]}, "v": {"at": SPEED, "from": 1, "to": 100, "scale": "log",
+                                                            "count": 3}})
+        grid = points(read_study(study))
+        self.assertEqual([p["mu"] for p in grid], [0.1] * 3 + [0.2] * 3)
+        for found, wanted in zip((p["v"] for p in grid), (1, 10, 100)):
+            self.assertAlmostEqual(found, wanted, 12)
+        study["design"]["method"] = "list"
+        with self.assertRaisesRegex(deform.FormatError, "equally many: mu 2, v 3"):
+            points(read_study(study))
+        study["parameters"]["v"]["count"] = 2
+        self.assertEqual([p["mu"] for p in points(read_study(study))], [0.1, 0.2])
+
+    def test_samples_fill_their_ranges_and_repeat(self):
+        for method in "random", "latin_hypercube", "sobol":
+            rows = self.points(method, runs=64, seed=5)
+            self.assertEqual(rows, self.points(method, runs=64, seed=5))
+            self.assertNotEqual(rows, self.points(method, runs=64, seed=6))
+            self.assertTrue(all(0.2 <= p["mu"] <= 0.9 and 0.1 <= p["v"] <= 0.5 for p in rows))
+            if method == "random":
+                continue
+            cells = sorted(int((p["mu"] - 0.2) / 0.7 * 64) for p in rows)
+            self.assertEqual(cells, list(range(64)), method)  # one in each of 64 layers
+        self.assertEqual(len(self.points("sobol", runs=50)), 50)
+
+    def test_whole_numbers_have_equal_shares(self):
+        whole = {"at": MU, "from": 1, "to": 4, "whole": True}
+        rows = points(read_study(sweep_study(self.scene, parameters={"n": whole},
+                                             design={"method": "sobol", "runs": 64})))
+        self.assertEqual([[p["n"] for p in rows].count(n) for n in range(6)], [0, 16, 16, 16, 16, 0])
+        rows = points(read_study(sweep_study(self.scene, design={"method": "grid"},
+                                             parameters={"n": {**whole, "count": 9}})))
+        self.assertEqual([p["n"] for p in rows], [1, 2, 3, 4])
+
+    def test_results_depend_on_the_files_that_a_study_names(self):
+        def keys():
+            study = read_study(sweep_study(self.scene, set={"/a": "fixed.txt"}, parameters={
+                "m": {"at": "/mesh", "values": ["one.txt", "two.txt"]}}))
+            return [study.key(study.digest(), {"m": name}) for name in study.parameters[0].values]
+
+        self.scene.write_text(json.dumps({"about": "x" * 600, "mesh": "of_scene.txt"}))
+        for name in "of_scene.txt", "fixed.txt", "one.txt", "two.txt":
+            (self.folder / name).write_text(name)
+        first = keys()
+        (self.folder / "two.txt").write_text("changed")
+        second = keys()
+        self.assertEqual([a == b for a, b in zip(first, second)], [True, False])
+        for name in "of_scene.txt", "fixed.txt":
+            (self.folder / name).write_text("changed")
+            third = keys()
+            self.assertEqual(len({*second, *third}), 4)
+            second = third
+
+    def test_wrong_studies_say_where(self):
+        for changes, sentence in (
+                ({"parameters": {"mu": {"at": MU, "form": 1, "to": 2}}},
+                 '/parameters/mu: unknown key "form"'),
+                ({"parameters": {"mu": {"at": MU, "from": 2, "to": 1}}}, r'"from" \(2\) must be below'),
+                ({"parameters": {"mu": {"at": "mu", "values": [1]}}}, "expected a JSON pointer"),
+                ({"parameters": {"mu": {"at": MU, "from": 0, "to": 1, "scale": "log"}}}, "begins above 0"),
+                ({"quantities": {"x": {"table": "probs", "column": "x"}}}, "expected one of .*probes"),
+                ({"quantities": {"mu": {"summary": "/steps"}}}, "is a parameter already"),
+                ({"quantities": {"said": {"summary": "/steps"}}}, '"said" is a column of every sweep'),
+                ({"parameters": {"a": {"at": MU, "values": [1]}, "b": {"at": MU, "values": [1]}}},
+                 "/parameters/b: .*/mu is set by a already"),
+                ({"parameters": {"n": {"at": MU, "from": 0.5, "to": 2, "whole": True}}}, '"whole" range'),
+                ({"set": {"/a=1": 2}}, "/set: expected an object"),
+                ({"limit_s": -1}, "/limit_s: expected a number above 0"),
+                ({"scene": "none.json"}, "none.json: cannot be opened"),
+                ({"design": {"method": "sobl"}}, "expected one of .*sobol"),
+                ({"design": {"method": "random"}}, 'needs "runs"')):
+            with self.assertRaisesRegex(deform.FormatError, sentence):
+                points(read_study({**sweep_study(self.scene), **changes}))
+
+
+class Runs(InAFolder):
+    def test_box_slides_as_far_as_its_energy_takes_it(self):
+        rows = deform.sweep(sweep_study(self.scene), out=self.out, workers=2)
+        self.assertEqual(len(rows.done), 16)
+        for row in rows:
+            h, way = 0.002, row["v"] ** 2 / (2 * row["mu"] * 9.81)
+            if row["v"] < 0.15 * row["mu"] * 9.81:  # comes to rest before the end
+                self.assertAlmostEqual(row["slid"], way, delta=row["v"] * h)
+            self.assertEqual(row["steps"], 100)
+        self.assertIn("16 done, 0 failed", str(rows))
+
+    def test_results_are_those_of_deform_run(self):
+        row = deform.sweep(sweep_study(self.scene, design={"method": "sobol", "runs": 1}), out=self.out)[0]
+        deform.command("run", self.scene, "--set", f"{MU}={row['mu']!r}", "--set", f"{SPEED}={row['v']!r}",
+                       "--out", self.folder / "run", "--quiet")
+        with open(self.folder / "run" / "bodies.csv", newline="") as file:
+            path = [float(line["com_x"]) for line in csv.DictReader(file) if line["body"] == "box"]
+        self.assertEqual(row["slid"], path[-1] - path[0])
+
+    def test_failed_runs_keep_their_sentence_until_retried(self):
+        study = sweep_study(self.scene, design={"method": "grid"}, parameters={
+            "mu": {"at": MU, "values": [-0.1, 0.5]}})
+        rows = deform.sweep(study, out=self.out, workers=1)
+        self.assertEqual([row["state"] for row in rows], ["failed", "done"])
+        self.assertIn("mu", rows[0]["said"])
+        before = (self.out / "runs.jsonl").read_bytes()
+        deform.sweep(study, out=self.out)
+        self.assertEqual((self.out / "runs.jsonl").read_bytes(), before)
+        deform.sweep(study, out=self.out, retry=True)
+        self.assertEqual((self.out / "runs.jsonl").read_bytes().count(b"\n"), 3)
+        study["quantities"] = {"far": {"table": "probes", "column": "x", "where": {"probe": "tip"}}}
+        self.assertIn("no row of probes.csv", deform.sweep(study, out=self.out)[1]["said"])
+
+    def test_results_of_another_scene_are_not_taken(self):
+        study = sweep_study(self.scene, design={"method": "sobol", "runs": 2})
+        deform.sweep(study, out=self.out)
+        self.scene.write_text(json.dumps({**BOX, "gravity": [0, 0, -1.6]}))
+        moon = deform.sweep(study, out=self.out)
+        self.assertEqual(len((self.out / "runs.jsonl").read_text().splitlines()), 4)
+        self.assertEqual(len(moon.done), 2)
+
+    def test_a_run_that_takes_too_long_is_ended(self):
+        study = sweep_study(self.scene, set={"/time/duration": 3000}, limit_s=0.5,
+                            design={"method": "sobol", "runs": 1})
+        said = deform.sweep(study, out=self.out)[0]["said"]
+        self.assertIn("longer than limit_s (0.5 s)", said)
+
+    def test_sentences_name_no_files_that_are_gone(self):
+        engine = Engine()
+        self.addCleanup(engine.close)
+        said = f"deform: a.json: stopped at step 3: no; the last good state is in {engine.folder}/run/states"
+        with unittest.mock.patch.object(engine, "_ask", return_value={"code": 3, "signal": 0, "said": said}):
+            outcome = engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
+        self.assertEqual(outcome["said"], "a.json: stopped at step 3: no")
+
+    def test_what_plugins_print_is_no_answer(self):
+        engine = Engine()
+        self.addCleanup(engine.close)
+        engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
+        for stream in 0, 1:
+            self.assertEqual(os.readlink(f"/proc/{engine.process.pid}/fd/{stream}"), "/dev/null")
+
+    def test_columns_hold_finite_numbers(self):
+        (self.folder / "rows.csv").write_text("x\n1\nnan\n")
+        with self.assertRaisesRegex(Failed, 'column "x" of rows.csv holds "nan", no number'):
+            Results(self.folder, {}).column({"table": "rows", "where": {}}, "x")
+
+    def test_rig(self):
+        case = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "friction" / "braked_mass.json"
+        study = {"rig": str(case), "design": {"method": "grid"},
+                 "parameters": {"mu": {"at": "/params/mu", "values": [0.25, 0.5]}},
+                 "quantities": {"stop": {"table": "rows", "column": "x", "unit": "m"}}}
+        stops = [row["stop"] for row in deform.sweep(study, out=self.out)]
+        self.assertAlmostEqual(stops[0], 1 / (2 * 0.25 * 10), delta=1e-3)
+        self.assertAlmostEqual(stops[1], 1 / (2 * 0.5 * 10), delta=1e-3)
+
+
+class Kills(InAFolder):
+    def test_killed_workers_lose_nothing(self):
+        """200 runs; a worker or its run is killed after every 20th result."""
+        study = sweep_study(self.scene, design={"method": "sobol", "runs": 200})
+        choose, killed = random.Random(1), []
+
+        def add(progress, failed):
+            progress.done += 1
+            while progress.done % 20 == 0:
+                killed.append(choose.choice(workers_of(os.getpid()) or [0]))
+                try:
+                    if killed[-1]:
+                        os.kill(killed[-1], choose.choice((signal.SIGKILL, signal.SIGTERM)))
+                    break
+                except ProcessLookupError:  # it was a run, and has ended
+                    killed.pop()
+
+        with unittest.mock.patch("deform.study.progress.Progress.add", add):
+            rows = deform.sweep(study, out=self.out, workers=2)
+        self.assertGreaterEqual(len([pid for pid in killed if pid]), 8)
+        self.assertEqual(rows.failed, [])
+        self.assertEqual(len(rows.done), 200)
+        self.assertEqual(len({row["slid"] for row in rows}), 200)
+
+    def started(self, study, **changes):
+        """A sweep that has processes, and these."""
+        sweep = subprocess.Popen([COMMAND, "sweep", study, "--out", self.out, "--quiet", "--workers", "2"],
+                                 cwd=self.folder)
+        self.addCleanup(sweep.wait)
+        self.addCleanup(sweep.kill)
+        return sweep
+
+    def wait_until(self, what):
+        end = time.monotonic() + 20
+        while not what():
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.005)
+
+    def test_a_killed_sweep_goes_on(self):
+        study = self.study(design={"method": "sobol", "runs": 40}, set={"/time/duration": 0.8})
+        first, file = self.started(study), self.out / "runs.jsonl"
+        self.wait_until(lambda: file.exists() and file.read_bytes().count(b"\n") >= 5)
+        first.kill()
+        first.wait()
+        with open(file, "ab") as torn:
+            torn.write(b'{"key": "half a li')
+        kept = file.read_bytes().count(b"\n")
+        said = self.command("sweep", study, "--out", self.out)
+        self.assertIn("40 runs: 40 done", said.stdout)
+        self.assertIn(f" of {40 - kept} runs, 0 failed, 0 s left", said.stderr)
+        lines = [json.loads(line) for line in file.read_text().splitlines()]
+        self.assertEqual(len({line["key"] for line in lines}), 40)
+        self.assertEqual(len(lines), 40)
+
+    def test_nothing_outlives_a_sweep(self):
+        study = self.study(set={"/time/duration": 3000})
+        for how in signal.SIGKILL, signal.SIGTERM, signal.SIGINT:
+            sweep = self.started(study)
+            self.wait_until(lambda: len(workers_of(sweep.pid)) == 4)
+            there = workers_of(sweep.pid)
+            sweep.send_signal(how)
+            self.assertEqual(sweep.wait(20), -9 if how == signal.SIGKILL else 128 + how)
+            self.wait_until(lambda: not any(map(alive, there)))
+        self.assertEqual(list(self.tmp.glob("*deform-study-*")), [])  # of the first, by the second
+
+    def test_nothing_outlives_an_error(self):
+        study = sweep_study(self.scene, design={"method": "sobol", "runs": 128})
+        before, errors = set(threading.enumerate()), []  # which keep the frames that they have left
+        with unittest.mock.patch("deform.study.progress.Progress.add", side_effect=OSError):
+            for _ in range(3):
+                try:
+                    deform.sweep(study, out=self.out, workers=2)
+                except OSError as error:
+                    errors.append(error)
+        self.assertEqual(len(errors), 3)
+        self.assertEqual(workers_of(os.getpid()), [])
+        self.assertEqual(set(threading.enumerate()) - before, set())
+
+    def test_what_kills_every_worker_is_a_failed_run(self):
+        study = sweep_study(self.scene, set={"/time/duration": 3000}, design={"method": "sobol", "runs": 1})
+        ended = threading.Event()
+
+        def kill():
+            while not ended.wait(0.01):
+                for pid in workers_of(os.getpid()):
+                    try:
+                        os.kill(pid, signal.SIGKILL)
+                    except ProcessLookupError:
+                        pass
+
+        killer = threading.Thread(target=kill)
+        killer.start()
+        try:
+            said = deform.sweep(study, out=self.out, workers=1)[0]["said"]
+        finally:
+            ended.set()
+            killer.join()
+        self.assertIn("3 times in 3", said)
+
+
+class Overhead(InAFolder):
+    def test_processor_time_of_a_run_beside_its_steps(self):
+        """Of the sweep and its workers together, the scene's reading and its tables included: 5 ms, or seven
+        starts of /bin/true, which takes 0.75 ms where a run takes 3.6 and more where the machine is busy."""
+        def spent():
+            return sum(sum(resource.getrusage(who)[:2])
+                       for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+
+        costs, starts = [], []
+        for seed in range(3):
+            study = sweep_study(self.scene, design={"method": "random", "runs": 100, "seed": seed},
+                                quantities={"cpu": {"summary": "/cpu_s", "unit": "s"}})
+            begun = spent()
+            for _ in range(50):
+                subprocess.run(["/bin/true"], check=True)
+            before = spent()
+            rows = deform.sweep(study, out=self.out, workers=2)
+            starts.append((before - begun) / 50)
+            costs.append((spent() - before - sum(row["cpu"] for row in rows)) / len(rows))
+        self.assertLess(min(costs), max(0.005, 7 * min(starts)), (costs, starts))
+
+
+class Outputs(InAFolder):
+    def test_command_writes_tables_and_page(self):
+        said = self.command("sweep", self.study(), "--out", self.out, "--workers", "2")
+        self.assertIn("16 runs: 16 done, 0 failed", said.stdout)
+        with open(self.out / "sweep.csv", newline="") as file:
+            rows = list(csv.reader(file))
+        self.assertEqual(rows[0][:4], ["mu [1]", "v [m/s]", "slid [m]", "steps"])
+        self.assertEqual(len(rows), 17)
+        page = (self.out / "sweep.html").read_text()
+        self.assertEqual(page.count("data:image/png;base64,"), 3)
+        self.assertNotIn("http", page)
+        for name in "curves", "map", "parallel":
+            self.assertEqual((self.out / f"{name}.png").read_bytes()[1:4], b"PNG")
+
+    def test_parquet_holds_units(self):
+        study = self.study(design={"method": "sobol", "runs": 4})
+        try:
+            import pyarrow.parquet
+        except ImportError:  # Debian 12 has no package of it
+            said = self.command("sweep", study, "--out", self.out, "--parquet", code=2)
+            self.assertRegex(said.stderr, "deform: Parquet needs pyarrow for .*sweep.csv\n$")
+            self.assertTrue((self.out / "sweep.csv").exists())
+            return
+        self.command("sweep", study, "--out", self.out, "--parquet")
+        table = pyarrow.parquet.read_table(self.out / "sweep.parquet")
+        self.assertEqual(table.schema.field("v").metadata, {b"unit": b"m/s"})
+        self.assertEqual(table.num_rows, 4)
+
+    def test_parts_of_an_array_are_gathered(self):
+        mu = [0.3 + 0.01 * i for i in range(10)]
+        mu[3] = -1
+        study = self.study(design={"method": "grid"}, parameters={"mu": {"at": MU, "values": mu}})
+        self.command("sweep", study.name, "--out", self.out.name, "--export", "slurm")
+        array = self.out / "array.sh"
+        self.assertIn("#SBATCH --array=0-9", array.read_text())
+        self.command("sweep", study, "--out", self.out, "--export", "snakemake")
+        compile((self.out / "Snakefile").read_text().split("rule")[0], "Snakefile", "exec")
+        for i in range(0, 10, 3):
+            done = subprocess.run(["sh", array], env={**os.environ, "SLURM_ARRAY_TASK_ID": str(i)},
+                                  cwd="/", capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stderr)
+        said = self.command("sweep", study, "--out", self.out, code=1)
+        self.assertIn(" of 6 runs, 0 failed", said.stderr)
+        self.assertIn("9 done, 1 failed", said.stdout)
+
+    def test_dask(self):
+        study = self.study(design={"method": "sobol", "runs": 8})
+        if importlib.util.find_spec("distributed") is None:
+            said = self.command("sweep", study, "--executor", "dask", code=2)
+            self.assertIn("the executor dask needs dask.distributed", said.stderr)
+            return
+        said = self.command("sweep", study, "--out", self.out, "--executor", "dask", "--workers", "2")
+        self.assertIn("8 runs: 8 done, 0 failed", said.stdout)
+        with unittest.mock.patch("deform.study.executors.CONNECT", 1.0):
+            with self.assertRaisesRegex(deform.ArgumentError, "no Dask scheduler answers at tcp://127"):
+                deform.sweep(study, out=self.folder / "other", executor="dask", address="tcp://127.0.0.1:1")
+        with Dask(1) as pool, self.assertRaisesRegex(deform.Error, "Dask cannot make runs: KeyError"):
+            list(pool.map([{}]))
+
+    def test_command_says_what_is_missing(self):
+        self.assertEqual(self.command("sweep", self.study(), "--out", self.scene / "out", code=2).stderr,
+                         f"deform: {self.scene / 'out'}: Not a directory\n")
+        self.assertRegex(self.command("sweep", self.folder / "none.json", code=2).stderr,
+                         "^deform: .*none.json: cannot be opened")
+        self.assertRegex(self.command("sweep", code=2).stderr, "STUDY.json .*--help")
+        said = self.command("sweep", "x", code=2, DEFORM_PYTHON="/no/python").stderr
+        self.assertIn("the Python interpreter /no/python cannot be started", said)
+        bare = self.folder / "python"
+        bare.write_text(f'#!/bin/sh\nshift\nexec {sys.executable} -I -S "$@"\n')
+        bare.chmod(0o755)
+        said = self.command("sweep", "x", code=2, DEFORM_PYTHON=str(bare)).stderr
+        self.assertRegex(said, "^deform: sweep: .*cannot import the Python package deform .*DEFORM_PYTHON\n$")
+
+
+if __name__ == "__main__":
+    unittest.main()
