@@ -65,9 +65,9 @@ Residual true_residual(const ContactRows &rows, const RowsPart &part, const Cont
 // of parts together
 Residual larger(const Residual &a, const Residual &b);
 
-// d of the bodies of a part: the largest r_t that the start leaves at any contact of the body, and the largest
-// of all r_n and r_t, no less than disturbance has already. sides: [contacts,2] numbers of bodies, kNone: an
-// obstacle; disturbance: [bodies,2].
+// d of the bodies of a part: the largest r_t that the warm start leaves at any contact of the body, and the
+// largest of all r_n and r_t; no less than disturbance has already. sides: [contacts,2] numbers of bodies,
+// kNone: an obstacle; disturbance: [bodies,2].
 void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                       const uint32_t *sides, double *disturbance);
 // tangent[i] = max(bounds.tangent, 1e-2 d), d the larger one of the two bodies. A contact at rest is warm

@@ -128,8 +128,7 @@ void IslandLaws::spend(uint64_t rows) { dfm::spend(*w_, *step_, own_->spent, row
 bool IslandLaws::goes_on() { return !solve_ends(*step_, own_->spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
-  use_memory(m, pairs_, owner_, sides_, of_cuts_, order_, contact_, bond_,
-             block_, begin_);
+  use_memory(m, pairs_, owner_, sides_, of_cuts_, order_, contact_, bond_, block_, begin_);
 }
 
 // Joins pairs that move the same unknown.
