@@ -128,7 +128,7 @@ void IslandLaws::spend(uint64_t rows) { dfm::spend(*w_, *step_, own_->spent, row
 bool IslandLaws::goes_on() { return !solve_ends(*step_, own_->spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
-  use_memory(m, pairs_, owner_, sides_, of_cuts_, order_, contact_, bond_, block_, begin_);
+  use_memory(m, pairs_, owner_, sides_, between_rigids_, of_cuts_, order_, contact_, bond_, block_, begin_);
 }
 
 // Joins pairs that move the same unknown.
@@ -157,19 +157,24 @@ void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const
   count_ = joined_.count;
 }
 
-void SolveIslands::set_sides(const StepContext &step, uint32_t bodies) {
+// Rigid bodies count as bodies where rows between rigid things are solved with soft ones, else as obstacles.
+void SolveIslands::set_sides(const StepContext &step, uint32_t bodies, size_t of_contacts) {
   const ContactRows &rows = step.rows;
   sides_.assign(2 * size_t{rows.n}, kNone);
-  for (uint32_t i = 0; i < rows.soft(); ++i) {
-    sides_[2 * size_t{i}] = step.contacts[i].slot_a;
-    if (!step.contacts[i].obstacle) sides_[2 * size_t{i} + 1] = step.contacts[i].slot_b;
+  between_rigids_.assign(count_, 0);
+  for (size_t k = 0; k < of_contacts; ++k)
+    if (pairs_[k].rows.first >= rows.soft()) between_rigids_[joined_.of[k]] = 1;
+  for (size_t k = 0; k < of_contacts; ++k) {
+    const Pair &p = pairs_[k];
+    for (uint32_t i = p.rows.first; i < p.rows.first + p.rows.n; ++i) {
+      uint32_t *const side = &sides_[2 * size_t{i}];
+      side[0] = p.a;
+      side[1] = p.b;
+      if (!between_rigids_[joined_.of[k]]) continue;
+      if (rows.rigid_a[i] != kNone) side[0] = bodies + rows.rigid_a[i];
+      if (rows.rigid[i] != kNone) side[1] = bodies + rows.rigid[i];
+    }
   }
-  const auto set_rigid = [&](const Array<uint32_t> &dof, size_t side) {
-    for (uint32_t i = 0; i < rows.n && !dof.empty(); ++i)
-      if (dof[i] != kNone) sides_[2 * size_t{i} + side] = bodies + dof[i];
-  };
-  set_rigid(rows.rigid_a, 0);
-  set_rigid(rows.rigid, 1);
 }
 
 void SolveIslands::find_cuts(const World &w, const StepContext &step) {
@@ -187,7 +192,7 @@ void SolveIslands::find_cuts(const World &w, const StepContext &step) {
 void SolveIslands::find(const World &w, StepContext &step) {
   const size_t of_contacts = find_pairs(step);
   join(step.rows, step.systems);
-  set_sides(step, static_cast<uint32_t>(w.bodies.size()));
+  set_sides(step, static_cast<uint32_t>(w.bodies.size()), of_contacts);
   find_cuts(w, step);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
   give_rows(of_contacts);

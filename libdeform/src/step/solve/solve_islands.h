@@ -82,8 +82,7 @@ class SolveIslands {
   // Indices of islands, those with the most rows first: otherwise a thread might begin a large island when
   // the others are done.
   std::span<const uint32_t> by_size() const { return {order_.data(), count_}; }
-  // [contacts,2] the two bodies: the slot; of a rigid body with unknowns its first dof behind all slots;
-  // kNone: an obstacle
+  // [contacts,2] the two bodies: the slot, or the first dof of a rigid body behind all slots; kNone: an obstacle
   const uint32_t *sides() const { return sides_.data(); }
   // [contacts] whether both sides are faces of a cut, set back; null: none are
   const uint8_t *of_cuts() const { return of_cuts_.empty() ? nullptr : of_cuts_.data(); }
@@ -98,6 +97,7 @@ class SolveIslands {
   Islands joined_;         // pairs by island
   Array<uint32_t> owner_;  // [dofs] a pair that moves it; of a block its first dof alone
   Array<uint32_t> sides_;
+  Array<uint8_t> between_rigids_;  // [islands]
   Array<uint8_t> of_cuts_;
   Array<uint32_t> order_;
   // by island: runs of contacts, of bonds, and blocks
@@ -106,7 +106,7 @@ class SolveIslands {
   std::vector<SolveIsland> islands_;  // those of this sub-step come first, and stay for later ones
   uint32_t count_ = 0;
   void join(const ContactRows &rows, std::span<ImplicitSystem *const> systems);
-  void set_sides(const StepContext &step, uint32_t bodies);
+  void set_sides(const StepContext &step, uint32_t bodies, size_t of_contacts);
   void find_cuts(const World &w, const StepContext &step);
   size_t find_pairs(const StepContext &step);  // returns how many are of contacts
   // Rows of these pairs by island.
