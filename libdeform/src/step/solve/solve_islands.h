@@ -82,7 +82,8 @@ class SolveIslands {
   // Indices of islands, those with the most rows first: otherwise a thread might begin a large island when
   // the others are done.
   std::span<const uint32_t> by_size() const { return {order_.data(), count_}; }
-  // [contacts,2] the two bodies: the slot, or the first dof of a rigid body behind all slots; kNone: an obstacle
+  // [contacts,2] the two bodies: the slot, or behind all slots the first dof of a rigid body; kNone: an
+  // obstacle
   const uint32_t *sides() const { return sides_.data(); }
   // [contacts] whether both sides are faces of a cut, set back; null: none are
   const uint8_t *of_cuts() const { return of_cuts_.empty() ? nullptr : of_cuts_.data(); }
