@@ -170,10 +170,10 @@ def check(serve, view, scene, out, display):
                          "0.5 shot start.png\n1 key c\n1.5 key space\n2.5 shot rest.png\n"
                          "2.5 drag 160 120 220 120 0.4 1.5\n4.2 shot held.png\n"
                          # a reset ends the plots
-                         "4.6 key r\n4.9 shot reset.png\n"
-                         "5 slider gravity 3.5\n5.3 key space\n6.5 shot end.png\n7 shot after.png\n"
+                         "4.6 key r\n6 shot reset.png\n"
+                         "6.1 slider gravity 3.5\n6.4 key space\n7.6 shot end.png\n8.1 shot after.png\n"
                          # a stroke from above to below, after it the mouse pulls again
-                         "7.1 key x\n7.2 drag 160 20 160 220 0.3\n7.8 key x\n7.9 key t\n9 shot cut.png\n",
+                         "8.2 key x\n8.3 drag 160 20 160 220 0.3\n8.9 key x\n9 key t\n10.1 shot cut.png\n",
                          out, display)
             assert seen["start.png"]["t"] == 0, "another token runs nothing"
             assert seen["rest.png"]["t"] > 0.1

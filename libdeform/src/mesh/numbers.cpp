@@ -19,21 +19,35 @@ void Numbers::finish(const Cursor &in) {
 }
 
 uint32_t Numbers::find(const Cursor &in, int64_t tag) const {
-  size_t at;
-  if (!tags_.empty() && tag >= tags_.front() && tag <= tags_.back()) {
-    at = size_t(uint64_t(tag) - uint64_t(tags_.front()));  // where numbers have no gaps, this is the place
-    if (at >= tags_.size() || tags_[at] != tag)
-      at = size_t(std::lower_bound(tags_.begin(), tags_.end(), tag) - tags_.begin());
-    if (tags_[at] == tag) return order_.empty() ? uint32_t(at) : order_[at];
-  }
-  in.refuse("%s %lld is used, which the file does not define", of_, ll(tag));
+  const size_t at = place(tag);
+  if (at == tags_.size()) in.refuse("%s %lld is used, which the file does not define", of_, ll(tag));
+  return position(at);
 }
 
-void Numbers::find_range(int64_t first, int64_t last, int64_t step, Array<uint32_t> &out) const {
-  const auto from = std::lower_bound(tags_.begin(), tags_.end(), first);
-  for (auto tag = from; tag != tags_.end() && *tag <= last; ++tag)
-    if ((uint64_t(*tag) - uint64_t(first)) % uint64_t(step) == 0)
-      out.push_back(order_.empty() ? uint32_t(tag - tags_.begin()) : order_[size_t(tag - tags_.begin())]);
+size_t Numbers::place(int64_t tag) const {
+  if (tags_.empty() || tag < tags_.front() || tag > tags_.back()) return tags_.size();
+  // where numbers have no gaps, this is the place
+  size_t at = size_t(uint64_t(tag) - uint64_t(tags_.front()));
+  if (at >= tags_.size() || tags_[at] != tag)
+    at = size_t(std::lower_bound(tags_.begin(), tags_.end(), tag) - tags_.begin());
+  return tags_[at] == tag ? at : tags_.size();
+}
+
+uint64_t Numbers::find_range(int64_t first, int64_t last, int64_t step, Array<uint32_t> &out) const {
+  if (last < first) return 0;
+  const size_t from = size_t(std::lower_bound(tags_.begin(), tags_.end(), first) - tags_.begin()),
+               to = size_t(std::upper_bound(tags_.begin(), tags_.end(), last) - tags_.begin());
+  const uint64_t steps = (uint64_t(last) - uint64_t(first)) / uint64_t(step);
+  if (steps >= to - from) {
+    for (size_t at = from; at < to; ++at)
+      if ((uint64_t(tags_[at]) - uint64_t(first)) % uint64_t(step) == 0) out.push_back(position(at));
+    return to - from;
+  }
+  for (uint64_t k = 0; k <= steps; ++k) {
+    const size_t at = place(int64_t(uint64_t(first) + k * uint64_t(step)));
+    if (at < tags_.size()) out.push_back(position(at));
+  }
+  return steps + 1;
 }
 
 }  // namespace dfm

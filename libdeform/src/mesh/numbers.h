@@ -16,10 +16,13 @@ class Numbers {
   size_t size() const { return tags_.size(); }
   void finish(const Cursor &in);                       // refuses a number given twice
   uint32_t find(const Cursor &in, int64_t tag) const;  // refuses an unknown number
-  // Appends the positions of those of first, first + step, ... last that there are.
-  void find_range(int64_t first, int64_t last, int64_t step, Array<uint32_t> &out) const;
+  // Appends the positions of those of first, first + step, ... last that there are; returns how many numbers
+  // were looked at for it: of the range or of the file, whichever are fewer.
+  uint64_t find_range(int64_t first, int64_t last, int64_t step, Array<uint32_t> &out) const;
 
  private:
+  size_t place(int64_t tag) const;  // in tags_; its size where there is none
+  uint32_t position(size_t place) const { return order_.empty() ? uint32_t(place) : order_[place]; }
   const char *of_;
   Array<int64_t> tags_;    // by position, then ascending after finish()
   Array<uint32_t> order_;  // position of each ascending number; empty where they ascend in the file already

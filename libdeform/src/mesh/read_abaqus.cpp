@@ -255,7 +255,6 @@ class AbaqusReader {
     const bool generate = parameter("generate");
     for (; data(); in_.line()) {
       for (std::string_view word = in_.line_word(); !word.empty(); word = in_.line_word()) {
-        const size_t before = members.size();
         const auto other = sets.index.find(key(word));
         if (generate) {
           const int64_t first = in_.to_integer(word, "the first of a range"),
@@ -263,29 +262,29 @@ class AbaqusReader {
           word = in_.line_word();
           const int64_t step = word.empty() ? 1 : in_.to_integer(word, "the step of a range");
           if (step < 1) in_.refuse("a range with the step %lld; expected 1 or more", ll(step));
-          numbers.find_range(first, last, step, members);
-          count(members.size() - before);
+          count(numbers.find_range(first, last, step, members));
         } else if (other != sets.index.end()) {
           const Array<uint32_t> copy = sets.all[other->second].members;
           members.insert(members.end(), copy.begin(), copy.end());
           count(copy.size());
         } else {
           const int64_t number = in_.to_integer(word, "a number or a set that stands before");
+          const size_t before = members.size();
           numbers.find_range(number, number, 1, members);
           lost_ += members.size() == before;
         }
       }
     }
-    sort_once(members);
   }
   // A few bytes may name all nodes again and again.
-  void count(size_t members) {
+  void count(uint64_t members) {
     if ((named_ += members) > bytes_)
-      in_.unsupported("its sets have more than %zu members, one for each byte of the file; write fewer sets",
+      in_.unsupported("its sets name more than %zu members, one for each byte of the file; write fewer sets",
                       bytes_);
   }
 
   void make_groups() {
+    for (Set &set : element_sets_.all) sort_once(set.members);
     for (const Set &set : node_sets_.all)
       if (!set.members.empty())
         out_.keep_points(set.members.data(), set.members.size(), out_.named_group(in_, 0, set.name));

@@ -1,6 +1,8 @@
 // TetGen: points in NAME.node, tetrahedra of 4 or 10 points in NAME.ele, triangles in NAME.face, each with a
 // head of counts and rows that begin with a number. Whichever is named, those beside it are read too. Groups
 // are the regions of the tetrahedra and the markers of the triangles, without triangles of the points.
+#include <algorithm>
+#include <array>
 #include <filesystem>
 
 #include "core/file.h"
@@ -80,21 +82,52 @@ class TetgenReader {
     }
   }
 
-  // Behind the marker of a triangle may stand the tetrahedra that it belongs to.
+  // Three corners, and perhaps the middles of the edges, whose order is not the same in all files: those of
+  // the tetrahedra are taken. Behind the marker may stand the two tetrahedra that the triangle belongs to.
   void read_faces(Cursor &in) {
     in.comment = '#';
     const int64_t n = in.integer("the number of triangles"), marked = flag(in);
-    const size_t corners = corners_ == 10 ? 6 : 3;
-    const uint64_t nface = in.text_count(n, 1 + corners + size_t(marked), "triangles");
+    Cursor first_row = in;
+    first_row.skip_space();
+    int64_t words = 0;
+    for (std::string_view w; !(w = first_row.line_word()).empty() && w.front() != in.comment;) ++words;
+    const size_t nodes = words - 1 - marked < 6 ? 3 : 6;
+    const uint64_t nface = in.text_count(n, 1 + nodes + size_t(marked), "triangles");
+    const Array<Middle> middles = middles_of_edges();
     for (uint64_t f = 0; f < nface; ++f, in.line()) {
       uint32_t face[6];
       in.integer("a triangle's number");
-      for (size_t k = 0; k < corners; ++k) face[k] = node(in, in.line_word());
+      for (size_t k = 0; k < 3; ++k) face[k] = node(in, in.line_word());
+      for (size_t k = 3; k < nodes; ++k) node(in, in.line_word());
       const uint32_t in_group =
           out_.group(in, 2, marked ? group(in, in.line_word(), "a triangle's marker") : 0);
-      if (corners == 6) out_.add_second_triangle(in, face, in_group);
+      size_t found = 0;  // a file may name other triangles than those of its tetrahedra
+      for (size_t k = 0; k < 3; ++k) {
+        const Middle edge = middle(face[k], face[(k + 1) % 3], 0);
+        const auto at = std::lower_bound(middles.begin(), middles.end(), edge);
+        if (at == middles.end() || (*at)[0] != edge[0] || (*at)[1] != edge[1]) continue;
+        face[3 + k] = (*at)[2];
+        ++found;
+      }
+      if (found == 3) out_.add_second_triangle(in, face, in_group);
       else out_.add_polygon(in, face, 3, in_group);
     }
+  }
+
+  using Middle = std::array<uint32_t, 3>;  // the ends of an edge, ascending, and its middle
+  static Middle middle(uint32_t a, uint32_t b, uint32_t of) { return {std::min(a, b), std::max(a, b), of}; }
+  Array<Middle> middles_of_edges() const {
+    Array<Middle> out{HookAllocator<Middle>(*out_.memory)};
+    if (corners_ != 10) return out;
+    out.reserve(out_.cells.size() / 10 * 6);
+    constexpr uint32_t kEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+    for (size_t c = 0; c < out_.cells.size(); c += 10) {
+      const uint32_t *const cell = &out_.cells[c];
+      for (uint32_t e = 0; e < 6; ++e)
+        out.push_back(middle(cell[kEdges[e][0]], cell[kEdges[e][1]], cell[4 + e]));
+    }
+    std::sort(out.begin(), out.end());
+    return out;
   }
 
   static int64_t flag(Cursor &in) {

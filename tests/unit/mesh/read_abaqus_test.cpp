@@ -6,6 +6,7 @@
 
 #include "deform/plugin.h"
 #include "mesh/cells.h"
+#include "mesh/numbers.h"
 #include "mesh/tri_mesh.h"
 #include "mesh_support.h"
 
@@ -279,6 +280,33 @@ TEST(Abaqus, WhatWouldLosePartOfTheMesh_IsRefused) {
   refuse(sets, DFM_E_UNSUPPORTED, {"one for each byte"});
 }
 
+// 1 MB of ranges that name two nodes of 15,000 each, and of blocks of one set: time grows as the file does.
+TEST(Abaqus, RangesOfFarSteps_CostWhatTheyName) {
+  Numbers numbers(kStandard, "node");
+  for (int64_t k = 1; k <= 30000; k += 2) numbers.add(k);
+  const std::string none = "a.inp";
+  numbers.finish(Cursor(none, none.data(), 0));
+  Array<uint32_t> found;
+  EXPECT_EQ(numbers.find_range(1, 29999, 29998, found), 2u);
+  EXPECT_EQ(found, (Array<uint32_t>{0, 14999}));
+  found.clear();
+  EXPECT_EQ(numbers.find_range(INT64_MIN, INT64_MAX, 1, found), 15000u);
+  EXPECT_EQ(found.size(), 15000u);
+  found.clear();
+  EXPECT_EQ(numbers.find_range(2, 30000, 4, found), 7500u);
+  EXPECT_EQ(numbers.find_range(5, 4, 1, found), 0u);
+  EXPECT_TRUE(found.empty());
+  std::string text = kTet + "*NODE\n" +
+                     rows(15000, [](size_t p) { return std::to_string(p + 5) + ",1,1,1"; }) +
+                     "*NSET,NSET=a,GENERATE\n" + rows(30000, [](size_t) { return "1,15004,15003"; });
+  for (int k = 0; k < 15000; ++k) text += "*NSET,NSET=a\n" + std::to_string(k + 1) + "\n";
+  EXPECT_EQ(group_of(parsed(text), "a", 0).points.size(), 4u);  // nodes of no element are left out
+  // ranges that name none of the nodes that are there are looked through all the same
+  text = kTet + "*NODE\n" + rows(999, [](size_t p) { return std::to_string(2 * p + 6) + ",1,1,1"; }) +
+         "*NSET,NSET=a,GENERATE\n" + rows(99, [](size_t) { return "5,2001,2"; });
+  expect_refusal("a.inp", text, DFM_E_UNSUPPORTED, {"one for each byte"});
+}
+
 TEST(Tetgen, MarkersAndRegions_AreGroups) {
   const std::string cube = std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_tetgen";
   for (const char *ending : {".ele", ".node", ".face"}) {
@@ -295,8 +323,9 @@ TEST(Tetgen, MarkersAndRegions_AreGroups) {
   EXPECT_EQ(group_of(read_tet_mesh(kStandard, stem + ".ele"), "3", 0).points.size(), 8u);
 }
 
-// Corners and then the middles of 12 23 13, as tetgen -o2 writes them.
-TEST(Tetgen, SecondOrderTriangles_AreTheBoundary) {
+// After the corners tetgen -po2 writes the middles of 12 23 31, tetgen -po2f those of 23 31 12, tetgen -o2 of
+// points alone none; then the marker, if any, and with -nn two tetrahedra.
+TEST(Tetgen, SecondOrderTriangles_AreTheBoundaryHoweverTheirMiddlesAreOrdered) {
   const std::string stem = test::scratch("tetgen2") + "/a";
   write_tetgen(second_order(parsed(kTet)), stem, 0);
   const TetMesh plain = read_tet_mesh(kStandard, stem + ".ele");
@@ -305,17 +334,24 @@ TEST(Tetgen, SecondOrderTriangles_AreTheBoundary) {
       bool is = true;
       for (size_t k = 0; k < 3; ++k)
         is = is && plain.points[3 * p + k] == (plain.points[3 * a + k] + plain.points[3 * b + k]) / 2;
-      if (is) return std::to_string(p);
+      if (is) return " " + std::to_string(p);
     }
     return std::string("?");
   };
-  test::write_file(stem + ".face", "1 1\n0 0 2 1 " + at(0, 2) + " " + at(2, 1) + " " + at(0, 1) + " 5\n");
-  const TetMesh mesh = read_tet_mesh(kStandard, stem + ".face");
-  EXPECT_EQ(mesh.tri_group.size(), 4u);
-  EXPECT_EQ(group_of(mesh, "5", 2).points.size(), 6u);
-  const TriMesh skin = read_tri_mesh(kStandard, stem + ".ele");
-  ASSERT_EQ(skin.groups.size(), 1u);  // each of the four is a triangle of the boundary
-  EXPECT_EQ(std::count(skin.tri_group.begin(), skin.tri_group.end(), 0u), 4);
+  for (const std::string &middles :
+       {at(0, 2) + at(2, 1) + at(0, 1), at(2, 1) + at(0, 1) + at(0, 2), std::string()}) {
+    for (const char *marker : {" 5", " 5 0 -1"}) {
+      test::write_file(stem + ".face", "1 1\n  0 0 2 1" + middles + marker + "\n# made by tetgen\n");
+      const TetMesh mesh = read_tet_mesh(kStandard, stem + ".face");
+      EXPECT_EQ(mesh.tri_group.size(), 4u);
+      EXPECT_EQ(group_of(mesh, "5", 2).points.size(), 6u);
+      const TriMesh skin = read_tri_mesh(kStandard, stem + ".ele");
+      ASSERT_EQ(skin.groups.size(), 1u);  // each of the four is a triangle of the boundary
+      EXPECT_EQ(std::count(skin.tri_group.begin(), skin.tri_group.end(), 0u), 4);
+    }
+    test::write_file(stem + ".face", "1 0\n  0 0 2 1" + middles + "\n");
+    expect_same(read_tet_mesh(kStandard, stem + ".ele"), plain);
+  }
 }
 
 TEST(Tetgen, Damage_IsRefusedInOneSentence) {
