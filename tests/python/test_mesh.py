@@ -113,7 +113,7 @@ class Meshes(unittest.TestCase):
         with self.assertRaisesRegex(deform.ArgumentError, "no cells of kind 'tetra'; it has triangle"):
             deform.TetMesh.from_meshio(surface.to_meshio())
         with tempfile.TemporaryDirectory() as folder:
-            file = str(pathlib.Path(folder) / "ball.bdf")  # which meshio reads, and the library does not
+            file = str(pathlib.Path(folder) / "ball.su2")  # which meshio reads, and the library does not
             meshio.write(file, there)
             self.assertAlmostEqual(deform.TetMesh.from_meshio(file).volume, mesh.volume)
         with deform.World() as world:
