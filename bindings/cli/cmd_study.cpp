@@ -21,6 +21,7 @@ namespace {
 constexpr const char *kStart =
     "import sys\n"
     "if sys.path[0] == '': del sys.path[0]\n"
+    "sys.path += filter(None, [sys.argv.pop(1)])\n"
     "try:\n"
     "    from deform.study.__main__ import main\n"
     "except ImportError as error:\n"
@@ -34,28 +35,26 @@ constexpr const char *kStart =
 
 void set_if_unset(const char *name, const std::string &value) { setenv(name, value.c_str(), 0); }
 
-// The package that belongs to this command: in a wheel around it, in a build folder beside it. Elsewhere (a
-// Debian package, `make install`) the interpreter knows where it is.
-void name_package() {
+// The package that belongs to this command: in a build folder beside it, in a wheel around it. Elsewhere (a
+// Debian package, `make install`) the interpreter knows where it is. Returns the folder that kStart appends
+// to the interpreter's: a wheel's has other packages, too, which must not hide the standard library.
+std::string name_package() {
   namespace fs = std::filesystem;
   set_if_unset("DEFORM_COMMAND", beside("deform"));
-  std::string folder;
-  if (fs::exists(beside("../../study/__main__.py"))) folder = beside("../../..");
   if (fs::exists(beside("../python/deform/study/__main__.py"))) {
-    folder = beside("../python");
     set_if_unset("DEFORM_LIBRARY", beside("../lib/libdeform.so.0"));
+    const std::string folder = beside("../python");
+    const char *const before = std::getenv("PYTHONPATH");
+    setenv("PYTHONPATH", (before && *before ? folder + ":" + before : folder).c_str(), 1);
   }
-  if (folder.empty()) return;
-  const char *const before = std::getenv("PYTHONPATH");
-  const std::string path = before && *before ? folder + ":" + before : folder;
-  setenv("PYTHONPATH", path.c_str(), 1);
+  return fs::exists(beside("../../study/__main__.py")) ? beside("../../..") : "";
 }
 
 [[noreturn]] void become_python(const std::string &subcommand, const std::vector<std::string> &words) {
-  name_package();
+  const std::string appended = name_package();
   const std::vector<std::string> interpreters = pythons();
   for (const std::string &python : interpreters) {
-    std::vector<const char *> argv{python.c_str(), "-B", "-c", kStart};
+    std::vector<const char *> argv{python.c_str(), "-B", "-c", kStart, appended.c_str()};
     for (const std::string &word : words) argv.push_back(word.c_str());
     argv.push_back(nullptr);
     execvp(python.c_str(), const_cast<char **>(argv.data()));

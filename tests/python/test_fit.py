@@ -121,11 +121,27 @@ class Said(InAFolder):
         self.assertAlmostEqual(found.values["young"] / found.values["density"], 770, delta=8)
 
     def test_a_search_that_was_stopped_claims_nothing(self):
-        found = deform.fit(self.study(self.measured(), optimizer={"evaluations": 7}), workers=2)
-        said = "\n".join(found.notes)
-        self.assertRegex(said, r"the search has not converged: (mu|v) is .* raise \"evaluations\"")
-        self.assertNotRegex(said, "as large as sigma|told apart|cannot be found")
-        self.assertLessEqual(found.evaluations, 1 + 7 + 8)  # the start, the search, two Jacobians
+        study = self.study(self.measured())
+        for start in 0.7, 0.95:
+            study["parameters"]["mu"]["start"] = start
+            for most in 1, 3, 7:
+                found = deform.fit({**study, "optimizer": {"evaluations": most}}, workers=2)
+                self.assertEqual(len(found.notes), 2, found.notes)
+                self.assertRegex(found.notes[1],
+                                 r"the search has not converged: (mu|v) is .* raise \"evaluations\"")
+                self.assertLessEqual(found.evaluations, 1 + most + 8)  # the start, the search, two Jacobians
+
+    def test_a_search_that_was_stopped_where_it_ends_has_converged(self):
+        study = self.study(self.measured(SIGMA))
+        for name, value in deform.fit(study, workers=2).values.items():
+            study["parameters"][name]["start"] = value
+        found = deform.fit({**study, "optimizer": {"evaluations": 1}}, workers=2)
+        self.assertNotIn("converged", str(found))
+
+    def test_a_global_search_that_stopped_at_once_goes_on_from_the_start(self):
+        found = deform.fit(self.study(self.measured(), optimizer={"method": "differential_evolution",
+                                                                  "evaluations": 1}), workers=2)
+        self.assertAlmostEqual(found.values["mu"] / TRUTH["mu"], 1, delta=5e-3)
 
     def test_rough_derivatives_name_their_parameter(self):
         """Of a speed on a logarithmic scale, by steps of a third and two thirds of it."""

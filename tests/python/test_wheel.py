@@ -71,6 +71,13 @@ class Wheel(unittest.TestCase):
             study = subprocess.run([folder / "venv" / "bin" / "deform", "sweep", "none.json"], text=True,
                                    capture_output=True, env=clean(), cwd=folder / "other")
             self.assertEqual(study.stderr, "deform: none.json: cannot be opened: No such file or directory\n")
+            # by an interpreter without the package, whose folder must not hide the standard library
+            packages, = (folder / "venv" / "lib").glob("python*/site-packages")
+            (packages / "argparse.py").write_text("raise SystemExit('not the standard library')")
+            other = subprocess.run([packages / "deform" / "native" / "bin" / "deform", "sweep", "none.json"],
+                                   text=True, capture_output=True, cwd=folder / "other",
+                                   env={**clean(), "DEFORM_PYTHON": sys.executable})
+            self.assertEqual(other.stderr, study.stderr)
             with zipfile.ZipFile(wheel) as zipped:
                 files = zipped.namelist()
             for needed in ("deform/py.typed", "deform/native/bin/deform-cost",

@@ -219,13 +219,14 @@ OPTIMIZERS: dict[str, tuple[Callable[[Problem, np.ndarray, float, int], np.ndarr
 
 
 def _search(problem: Problem, start: np.ndarray, method: str, optimizer: Mapping[str, Any],
-            most: int) -> np.ndarray:
+            most: int) -> tuple[np.ndarray, bool]:
+    """The best point, and whether the search ended by itself."""
     search, of_each = OPTIMIZERS[method]
     problem.most = problem.evaluations + (most or of_each * len(start))
     try:
-        return search(problem, start, optimizer["step"], optimizer["seed"])
+        return search(problem, start, optimizer["step"], optimizer["seed"]), True
     except Spent:
-        return problem.best_at
+        return problem.best_at, False
     finally:
         problem.most = 0
 
@@ -257,51 +258,64 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
     sentence whenever the residuals have become smaller."""
     read = study if isinstance(study, Study) else read_study(study)
     _check(read)
-    names = [p.name for p in read.parameters]
     method, step = read.optimizer["method"], read.optimizer["step"]
     start = np.array([p.share(p.start) for p in read.parameters])
     with ExitStack() as stack:
         pool = stack.enter_context(named_executor(executor, workers, address))
         problem = Problem(read, pool, tell or (lambda _: None))
         at_start = problem.curves(start)
-        best = _search(problem, start, method, read.optimizer, read.optimizer["evaluations"])
+        problem.residuals([start])  # the best, until a search finds a better one
+        best, ended = _search(problem, start, method, read.optimizer, read.optimizer["evaluations"])
         if method != "least_squares":  # which only makes the residuals smaller
-            best = _search(problem, best, "least_squares", read.optimizer, 0)
+            best, ended = _search(problem, best, "least_squares", read.optimizer, 0)
         jacobian, coarse = problem.jacobian(best, step), problem.jacobian(best, 2 * step)
         at_best = problem.curves(best)
     spread = Spread(jacobian, problem.of_curves(at_best), read.confidence)
-    rows, notes = [], [_summary(spread, len(jacobian), problem.evaluations)]
+    rows = []
     for i, p in enumerate(read.parameters):
         low, high = (p.place(min(max(best[i] + sign * spread.half[i], 0.0), 1.0)) for sign in (-1, 1))
         rows.append({"parameter": p.name, "value": p.place(best[i]), "low": low, "high": high, "unit": p.unit,
                      "start": p.start})
-        if min(best[i], 1 - best[i]) < 1e-6:
-            notes.append(f"{p.name} lies at the end of its range, {p.place(best[i]):.6g}: widen the range, "
-                         f"or the interval means nothing")
-    left = spread.left(best)
+    notes = [_summary(spread, len(jacobian), problem.evaluations), *_notes(read, spread, best, ended, coarse)]
+    return Fit(read, rows, notes, _curves(read, at_start, at_best), spread, problem.evaluations,
+               out_folder(read, out))
+
+
+def _notes(study: Study, spread: Spread, best: np.ndarray, ended: bool, coarse: np.ndarray) -> list[str]:
+    """What there is to say beside the values. ended: the search did by itself; coarse: the Jacobian of steps
+    twice as long."""
+    # The residuals of a search that was stopped are no noise: only the stated size tells how near it came.
+    left = spread.left(best, spread.noise if ended else spread.stated)
+    names, notes = [p.name for p in study.parameters], []
     if left.max() > LEFT:
         notes.append(f"the search has not converged: {names[left.argmax()]} is {left.max():.2g} half widths "
-                     f'of its interval from where it goes on to, so the values are no fit yet: raise '
-                     f'"evaluations" of the optimizer, or give another "start" or "method"')
+                     f"of {'its interval' if ended else 'an interval by sigma'} from where it goes on to, so "
+                     f'the values are no fit yet: raise "evaluations" of the optimizer, or give another '
+                     f'"start" or "method"')
+        if not ended:
+            return notes
     else:
         notes += spread.sentences(names)
         if spread.scatter > 2:
             notes.append(f"the residuals are {spread.scatter:.3g} times as large as sigma says: this input "
                          f"does not give the measured curve, or sigma is too small")
-        for r, r1 in zip(read.residuals, spread.correlated):
+        for r, r1 in zip(study.residuals, spread.correlated):
             if r1:
                 notes.append(f"neighbors in {r.name} have residuals with a correlation of {r1:.2f}, by noise "
                              f"that lasts or an input that does not give this curve: its {len(r.measured)} "
                              f"numbers count as {len(r.measured) * (1 - r1) / (1 + r1):.3g}")
-    for i, name in enumerate(names):
-        rough = float(np.linalg.norm((jacobian - coarse)[:, i])
-                      / max(np.linalg.norm(jacobian[:, i]), 1e-300))
+    step = study.optimizer["step"]
+    for i, p in enumerate(study.parameters):
+        if min(best[i], 1 - best[i]) < 1e-6:
+            notes.append(f"{p.name} lies at the end of its range, {p.place(best[i]):.6g}: widen the range, "
+                         f"or the interval means nothing")
+        rough = float(np.linalg.norm((spread.jacobian - coarse)[:, i])
+                      / max(np.linalg.norm(spread.jacobian[:, i]), 1e-300))
         if rough > ROUGH and i not in spread.untold:
-            notes.append(f"derivatives by {name} change by {100 * rough:.0f} % between a step of {step:g} "
+            notes.append(f"derivatives by {p.name} change by {100 * rough:.0f} % between a step of {step:g} "
                          f'and {2 * step:g} of its range, so intervals are rough: set another "step" of the '
                          f'optimizer, or search by "differential_evolution" or "cma"')
-    return Fit(read, rows, notes, _curves(read, at_start, at_best), spread, problem.evaluations,
-               out_folder(read, out))
+    return notes
 
 
 def _summary(spread: Spread, n: int, evaluations: int) -> str:

@@ -2,13 +2,14 @@
 from __future__ import annotations
 
 import difflib
+import functools
 import hashlib
 import json
 import math
 import os.path
 import pathlib
 from dataclasses import dataclass, field
-from typing import Any, Iterable, Mapping
+from typing import Any, Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from .tables import finite, read_csv
 
 TABLES = {"bodies", "contacts", "probes", "attachments", "sensors", "tools", "rows"}
 OF_ROWS = ("state", "said", "seconds")  # what a sweep's rows say beside parameters and quantities
+TETGEN = (".ele", ".node", ".face")  # whichever a scene names, those beside it are read too
 TAKES = ("last", "first", "min", "max", "mean", "change", "period", "peak_to_peak")
 
 
@@ -219,33 +221,38 @@ class Study:
         """{pointer: value} of a point {parameter: value}."""
         return {at: point[p.name] for p in self.parameters for at in p.at}
 
-    def digest(self) -> str:
-        """What results depend on beside a point's values: library, files, fixed values, what is read of a
-        run."""
-        inputs = [(_of_file(file), _of_named(json.loads(pathlib.Path(file).read_text()), file), fixed,
-                   _of_named(fixed, file)) for file, fixed in self.runs]
-        text = json.dumps([quick.dfm_version(None, None, None).decode(), self.kind, inputs, self.quantities],
-                          sort_keys=True)
-        return hashlib.sha256(text.encode()).hexdigest()
+    def keys(self, points: Iterable[Mapping[str, Any]]) -> list[str]:
+        """Of each point: the same as long as its results would be, which depend on its values and on library,
+        files, fixed values and what is read of a run."""
+        of_file = functools.lru_cache(maxsize=None)(_of_file)  # the points of a study name the same few
+        inputs = [(of_file(file), _of_named(json.loads(pathlib.Path(file).read_text()), file, of_file), fixed,
+                   _of_named(fixed, file, of_file)) for file, fixed in self.runs]
+        digest = _of_json([quick.dfm_version(None, None, None).decode(), self.kind, inputs, self.quantities])
+        keys = []
+        for values in map(self.values, points):
+            named = [_of_named(values, file, of_file) for file, _ in self.runs]
+            keys.append(_of_json([digest, values, named])[:24])
+        return keys
 
-    def key(self, digest: str, point: Mapping[str, Any]) -> str:
-        """Of a point of the study with this digest: the same as long as its results would be."""
-        values = self.values(point)
-        named = [_of_named(values, file) for file, _ in self.runs]
-        return hashlib.sha256(json.dumps([digest, values, named], sort_keys=True).encode()).hexdigest()[:24]
+
+def _of_json(value: Any) -> str:
+    return hashlib.sha256(json.dumps(value, sort_keys=True).encode()).hexdigest()
 
 
 def _of_file(path: str) -> str:
     return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
 
 
-def _of_named(value: Any, file: str) -> list[str]:
-    """Of the files that texts in a value name, counted from the folder of the input file."""
+def _of_named(value: Any, file: str, of_file: Callable[[str], str]) -> list[str]:
+    """Of the files that texts in a value name, counted from the folder of the input file, and of those that
+    are read with them."""
     if isinstance(value, str):
         path = os.path.join(os.path.dirname(file), value)
-        return [_of_file(path)] if value and os.path.isfile(path) else []
+        name, ending = os.path.splitext(path)
+        paths = [path] + [name + other for other in TETGEN if ending.lower() in TETGEN]
+        return [of_file(one) for one in dict.fromkeys(paths) if value and os.path.isfile(one)]
     items = value.values() if isinstance(value, Mapping) else value if isinstance(value, list) else ()
-    return [digest for item in items for digest in _of_named(item, file)]
+    return [digest for item in items for digest in _of_named(item, file, of_file)]
 
 
 def _input(at: Place, folder: pathlib.Path) -> tuple[str, str]:

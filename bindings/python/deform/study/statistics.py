@@ -44,8 +44,8 @@ class Spread:
             root = np.sqrt(np.diag(covariance))
             self.correlation = covariance / np.outer(root, root)
         # What cannot be told is judged with noise of at least the stated size: a fit without noise has none.
+        self.unit, self.stated = unit, independent
         self.noise = max(1.0, self.scatter) * independent
-        self.wide = self.noise * unit
         self.open = [k for k in range(p) if self.noise * inverse[k] > WIDE]
 
     def part(self, k: int) -> list[int]:
@@ -58,14 +58,14 @@ class Spread:
         """The parameters of the directions that the data leave open."""
         return {i for k in self.open for i in self.part(k)}
 
-    def left(self, at: np.ndarray) -> np.ndarray:
+    def left(self, at: np.ndarray, noise: float) -> np.ndarray:
         """How far a search that ended at these shares of the ranges is from its end, in half widths of
-        intervals (by noise of at least the stated size): by a step of Gauss and Newton along what the data
-        tell, to the ends of the ranges at most."""
+        intervals by this noise: by a step of Gauss and Newton along what the data tell with noise of the
+        stated size, to the ends of the ranges at most."""
         step, inside = np.zeros(len(at)), np.ones(len(at), dtype=bool)
         while inside.any():
             u, s, rows = np.linalg.svd(self.jacobian[:, inside], full_matrices=False)
-            told = self.noise < WIDE * s
+            told = self.stated < WIDE * s
             residuals = self.residuals + self.jacobian[:, ~inside] @ step[~inside]
             step[inside] = -rows[told].T @ ((u.T @ residuals)[told] / s[told])
             to = np.clip(at + step, 0, 1) - at
@@ -74,7 +74,7 @@ class Spread:
                 break
             step[beyond] = to[beyond]
             inside &= ~beyond
-        return np.abs(step) / self.wide
+        return np.abs(step) / (noise * self.unit)
 
     def sentences(self, names: Sequence[str]) -> list[str]:
         """On identifiability: a sentence for each direction that the data leave open, and for each pair that

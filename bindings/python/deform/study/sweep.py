@@ -90,8 +90,8 @@ def sweep(study: Any, *, out: Any = None, executor: str = "local", workers: int 
     if not read.quantities:
         raise ArgumentError(f'{read.file}: /: a sweep needs "quantities", what is read of each run',
                             "DFM_E_ARG")
-    folder, all_points, digest = out_folder(read, out), points(read), read.digest()
-    keys = [read.key(digest, point) for point in all_points]
+    folder, all_points = out_folder(read, out), points(read)
+    keys = read.keys(all_points)
     first, last = only if only is not None else (0, len(keys) - 1)
     if not 0 <= first <= last < len(keys):
         raise ArgumentError(f"runs {first} to {last} are not among the {len(keys)} of this study, which are "
