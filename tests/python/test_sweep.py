@@ -5,7 +5,6 @@ import json
 import os
 import pathlib
 import random
-import resource
 import shutil
 import signal
 import subprocess
@@ -344,28 +343,6 @@ class Kills(InAFolder):
             ended.set()
             killer.join()
         self.assertIn("3 times in 3", said)
-
-
-class Overhead(InAFolder):
-    def test_processor_time_of_a_run_beside_its_steps(self):
-        """Of the sweep and its workers together, the scene's reading and its tables included: 5 ms, or seven
-        starts of /bin/true, which takes 0.75 ms where a run takes 3.6 and more where the machine is busy."""
-        def spent():
-            return sum(sum(resource.getrusage(who)[:2])
-                       for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
-
-        costs, starts = [], []
-        for seed in range(3):
-            study = sweep_study(self.scene, design={"method": "random", "runs": 100, "seed": seed},
-                                quantities={"cpu": {"summary": "/cpu_s", "unit": "s"}})
-            begun = spent()
-            for _ in range(50):
-                subprocess.run(["/bin/true"], check=True)
-            before = spent()
-            rows = deform.sweep(study, out=self.out, workers=2)
-            starts.append((before - begun) / 50)
-            costs.append((spent() - before - sum(row["cpu"] for row in rows)) / len(rows))
-        self.assertLess(min(costs), max(0.005, 7 * min(starts)), (costs, starts))
 
 
 class Outputs(InAFolder):
