@@ -67,7 +67,7 @@ struct Streams { FILE *requests, *answers; };
 // /dev/null.
 Streams take_streams() {
   const int in = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3), out = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
-  const int null = open("/dev/null", O_RDWR | O_CLOEXEC);
+  const int null = ::open("/dev/null", O_RDWR | O_CLOEXEC);
   if (in < 0 || out < 0 || null < 0) give_up("no streams");
   dup2(null, STDIN_FILENO);
   dup2(null, STDOUT_FILENO);
