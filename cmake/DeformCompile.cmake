@@ -63,23 +63,34 @@ endif()
 # The compiler says what it compiles for, as to the code that calls them: -m32 changes no name of a processor.
 include(CheckCXXSourceCompiles)
 check_cxx_source_compiles("#ifndef __x86_64__\n#error\n#endif\nint main() { return 0; }" DEFORM_X86_64)
+# What is the system's lies in files named *_posix.cpp and *_windows.cpp.
 macro(deform_own_sources list)
+  if(WIN32)
+    list(FILTER ${list} EXCLUDE REGEX "_posix\\.cpp$")
+  else()
+    list(FILTER ${list} EXCLUDE REGEX "_windows\\.cpp$")
+  endif()
   if(NOT DEFORM_X86_64)
     list(FILTER ${list} EXCLUDE REGEX "_kernel_avx[0-9]+\\.cpp$")
   endif()
 endmacro()
 function(deform_kernel_flags)
+  # A stack of Windows is aligned to 16 bytes, which gcc does not correct for wider vectors (its bug 54412).
+  set(wide "")
+  if(WIN32)
+    set(wide ";-Wa,-muse-unaligned-vector-move")
+  endif()
   set(once "")
   if(DEFORM_SANITIZE MATCHES "undefined")
     set(once ";-fno-sanitize=undefined")
   endif()
   foreach(file IN LISTS ARGN)
     if(file MATCHES "_kernel_avx2\\.cpp$")
-      set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-mavx2;-mno-fma${once}"
+      set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS "-mavx2;-mno-fma${wide}${once}"
         SKIP_PRECOMPILE_HEADERS ON)
     elseif(file MATCHES "_kernel_avx512\\.cpp$")
       set_source_files_properties(${file} PROPERTIES COMPILE_OPTIONS
-        "-mavx512f;-mavx512vl;-mavx512dq;-mprefer-vector-width=512${once}" SKIP_PRECOMPILE_HEADERS ON)
+        "-mavx512f;-mavx512vl;-mavx512dq;-mprefer-vector-width=512${wide}${once}" SKIP_PRECOMPILE_HEADERS ON)
     endif()
   endforeach()
 endfunction()
@@ -116,13 +127,14 @@ function(deform_unity target)
   set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_MODE GROUP)
 endfunction()
 
-# Sets UNITY_GROUP of those of the sources (of FOLDER) that have no flags of their own.
+# Sets UNITY_GROUP of those of the sources (of FOLDER) that have no flags of their own. <windows.h> defines
+# words of other files.
 function(deform_unity_groups folder)
   set(together "")
   foreach(file IN LISTS ARGN)
     get_filename_component(file ${file} ABSOLUTE BASE_DIR ${folder})
     get_source_file_property(own ${file} COMPILE_OPTIONS)
-    if(file MATCHES "\\.cpp$" AND NOT file MATCHES "_kernel" AND NOT own)
+    if(file MATCHES "\\.cpp$" AND NOT file MATCHES "_kernel|_windows" AND NOT own)
       list(APPEND together ${file})
     endif()
   endforeach()

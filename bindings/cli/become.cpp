@@ -1,7 +1,5 @@
 #include "become.h"
 
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
@@ -10,16 +8,15 @@
 #include "arguments.h"
 #include "cli.h"
 #include "messages.h"
+#include "system.h"
 
 namespace fs = std::filesystem;
 
 namespace cli {
 std::string beside(const std::string &name) {
-  std::error_code error;
-  const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  if (error)
-    throw Failure(kBadInput, "/proc/self/exe cannot be read: the command does not know where it lies");
-  return self.parent_path() / name;
+  const std::string self = os::own_file();
+  if (self.empty()) throw Failure(kBadInput, "the system does not tell the command where it lies");
+  return name_of(path_of(self).parent_path() / path_of(name));
 }
 
 std::vector<std::string> pythons() {
@@ -30,12 +27,10 @@ std::vector<std::string> pythons() {
 void become(const std::string &subcommand, const std::string &name, const std::vector<std::string> &words,
             const std::string &missing) {
   const std::string program = beside(name);
-  if (access(program.c_str(), X_OK) != 0)
+  std::error_code unknown;
+  if (!fs::exists(path_of(program), unknown))
     throw Failure(kBadInput, subcommand + ": there is no " + program + "; " + missing);
-  std::vector<const char *> argv{program.c_str()};
-  for (const std::string &word : words) argv.push_back(word.c_str());
-  argv.push_back(nullptr);
-  execv(program.c_str(), const_cast<char **>(argv.data()));
+  os::become(program, words);
   throw Failure(kBadInput, subcommand + ": " + program + " cannot be started: " + std::strerror(errno));
 }
 

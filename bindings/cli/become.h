@@ -19,11 +19,21 @@ std::vector<std::string> pythons();
 [[noreturn]] void become(const std::string &subcommand, const std::string &name,
                          const std::vector<std::string> &words, const std::string &missing);
 
+#ifdef _WIN32
+inline constexpr const char *kMadeByTools = "the build for Windows has none; see doc/howto/packages.md";
+inline constexpr const char *kNoServer = kMadeByTools, *kNoWindow = kMadeByTools;
+#else
+inline constexpr const char *kMadeByTools = "`make demo` leaves it out, `make tools` builds it";
+inline constexpr const char *kNoServer = "with Debian's libwebsockets-dev installed, `make tools` builds it";
+inline constexpr const char *kNoWindow =
+    "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it";
+#endif
+
 // A subcommand whose command line its program reads, by the same rules (bindings/tools, bindings/view,
 // bindings/serve).
 struct Program {
   const char *name, *file, *about;
-  const char *missing = "`make demo` leaves it out, `make tools` builds it";
+  const char *missing = kMadeByTools;
 };
 void add_program(Command parent, const Globals &globals, const Program &program);
 
@@ -56,9 +66,10 @@ inline constexpr Program kRollback = {
     "runs a scene by the collision solution of Zerbato (2010), for comparison"};
 inline constexpr Program kServe = {"serve", "deform-serve",
                                    "a scene in a browser on this machine: orbit, pull, cut, sliders, plots",
-                                   "with Debian's libwebsockets-dev installed, `make tools` builds it"};
-inline constexpr Program kView = {
-    "view", "deform-view", "a window on a scene, with mouse, sliders and plots",
-    "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it"};
+                                   kNoServer};
+inline constexpr Program kView = {"view", "deform-view", "a window on a scene, with mouse, sliders and plots",
+                                  kNoWindow};
+inline constexpr const char *kSweepAbout = "runs a scene over ranges of its values: tables, plots, a page";
+inline constexpr const char *kFitAbout = "finds values of a scene from measured curves, with intervals";
 
 }  // namespace cli

@@ -11,6 +11,7 @@
 #include "become.h"
 #include "messages.h"
 #include "progress.h"
+#include "system.h"
 
 namespace cli {
 
@@ -35,7 +36,7 @@ namespace {
 
 // The name under which a remedy saves a filling: VTU keeps the shares of the cells.
 std::string filling_file(const std::string &out) {
-  return shown_word(std::filesystem::path(out).replace_extension(".vtu").string());
+  return shown_word(name_of(path_of(out).replace_extension(".vtu")));
 }
 
 constexpr const char *kIn =

@@ -10,6 +10,7 @@
 #include "cmd_mesh.h"
 #include "json_text.h"
 #include "progress.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -94,7 +95,7 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   if (f.imported) return;
   // The file alone would be drawn, and would touch, with the jagged border of its cells.
   const auto whole = [](const std::string &path) {
-    return shown(quoted(std::filesystem::absolute(path).lexically_normal()));
+    return shown(quoted(name_of(std::filesystem::absolute(path_of(path)).lexically_normal())));
   };
   std::printf("  body of a scene   \"mesh\": %s, \"surface\": {\"mesh\": %s}%s\n", whole(file).c_str(),
               whole(in).c_str(),

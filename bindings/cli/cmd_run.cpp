@@ -1,6 +1,4 @@
 // deform run SCENE.json: simulates and writes what interfaces promise.
-#include <unistd.h>
-
 #include <ctime>
 
 #include <algorithm>
@@ -308,8 +306,7 @@ class Runner {
     if (options_.record) refuse_static(scene_, "--record");
     if (!options_.save_scene.empty()) check_scene_path(scene_, options_.save_scene);
     for (const RunOptions::Save &save : options_.saves) {
-      const std::filesystem::path folder = std::filesystem::path(save.path).parent_path();
-      if (access(folder.empty() ? "." : folder.c_str(), W_OK) != 0)
+      if (!may_write_beside(save.path))
         throw Failure(kBadInput,
                       "--save " + save.path + ": cannot be written there: " + std::strerror(errno));
       if (save.at > duration_ * (1 + 1e-9))

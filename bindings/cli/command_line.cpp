@@ -129,6 +129,7 @@ int run(int argc, char **argv, cli::AddCommands *add) {
   app.set_version_flag("--version", dfm_version(nullptr, nullptr, nullptr));
   const cli::Command top(&app);
   app.require_subcommand(1);
+  app.allow_windows_style_options(false);  // what begins with "/" is a file on every system
   cli::globals.words.assign(argv + std::min(argc, 1), argv + argc);
   add(top, cli::globals, &exit_code);
   cli::add_common(&app);

@@ -5,21 +5,20 @@
 #include <fstream>
 
 #include "messages.h"
+#include "system.h"
 
 namespace cli {
 namespace fs = std::filesystem;
 
 std::string costs_file() {
-  const char *const config = std::getenv("XDG_CONFIG_HOME"), *const home = std::getenv("HOME");
-  if (config && *config) return std::string(config) + "/deform/costs.json";
-  if (home && *home) return std::string(home) + "/.config/deform/costs.json";
-  return "";
+  const std::string folder = os::settings_folder();
+  return folder.empty() ? "" : folder + "/deform/costs.json";
 }
 
 void offer_costs() {
   const std::string path = costs_file();
   std::error_code ignored;
-  if (!path.empty() && fs::is_regular_file(path, ignored)) setenv("DEFORM_COSTS", path.c_str(), 0);
+  if (!path.empty() && fs::is_regular_file(path_of(path), ignored)) os::set_if_unset("DEFORM_COSTS", path);
 }
 
 std::string machine_name() {

@@ -1,12 +1,10 @@
 #include "file.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
 
 #include "messages.h"
+#include "system.h"
 
 namespace cli {
 
@@ -27,10 +25,13 @@ void cannot_write(const std::string &path) {
   throw Failure(kBadInput, path + ": cannot be written: " + std::strerror(errno));
 }
 
+bool may_write_beside(const std::string &path) {
+  const std::string folder = name_of(path_of(path).parent_path());
+  return os::may_write(folder.empty() ? "." : folder);
+}
+
 File new_file(const std::string &path) {
-  if (unlink(path.c_str()) != 0 && errno != ENOENT) cannot_write(path);
-  const int fd = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-  FILE *file = fd < 0 ? nullptr : fdopen(fd, "w+b");
+  FILE *const file = os::create_anew(path);
   if (!file) cannot_write(path);
   return File(file, std::fclose);
 }

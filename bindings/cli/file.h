@@ -18,6 +18,7 @@ using File = std::unique_ptr<FILE, int (*)(FILE *)>;
 // A new file to write to as results come, and to read from. A former file is removed and not written into, so
 // that a link's target stays what it is.
 File new_file(const std::string &path);
+bool may_write_beside(const std::string &path);           // into its folder; false: errno says why
 [[noreturn]] void cannot_write(const std::string &path);  // for the reason in errno
 
 }  // namespace cli

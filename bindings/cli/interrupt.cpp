@@ -3,6 +3,7 @@
 #include <csignal>
 
 #include "leaving.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -17,13 +18,7 @@ void on_signal(int) {
 
 }  // namespace
 
-void catch_signals() {
-  struct sigaction action = {};
-  action.sa_handler = on_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
+void catch_signals() { os::on_end_signals(on_signal); }
 
 bool interrupted() { return came != 0; }
 

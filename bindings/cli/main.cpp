@@ -16,9 +16,12 @@ int main(int argc, char **argv) {
     cli::add_program(top, globals, cli::kFriction);
     cli::add_program(top, globals, cli::kCost);
     cli::add_program(top, globals, cli::kRollback);
-#ifndef __EMSCRIPTEN__
-    cli::add_study(top, globals, "sweep", "runs a scene over ranges of its values: tables, plots, a page");
-    cli::add_study(top, globals, "fit", "finds values of a scene from measured curves, with intervals");
+#ifdef _WIN32
+    cli::add_program(top, globals, {"sweep", "deform-sweep", cli::kSweepAbout});
+    cli::add_program(top, globals, {"fit", "deform-fit", cli::kFitAbout});
+#elif !defined(__EMSCRIPTEN__)
+    cli::add_study(top, globals, "sweep", cli::kSweepAbout);
+    cli::add_study(top, globals, "fit", cli::kFitAbout);
     cli::add_worker(top, globals, exit_code);
 #endif
     cli::add_program(top, globals, cli::kServe);

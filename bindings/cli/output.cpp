@@ -8,6 +8,7 @@
 
 #include "json_text.h"
 #include "messages.h"
+#include "system.h"
 
 namespace fs = std::filesystem;
 
@@ -170,7 +171,7 @@ FileNodes Outputs::file_nodes(size_t b) const {
     for (uint32_t i = 0; i < body.npoint; ++i) own.number.push_back(i);
     return own;
   }
-  const std::string path = (fs::path(scene_.path()).parent_path() / mesh.text).string();
+  const std::string path = name_of(path_of(scene_.path()).parent_path() / path_of(mesh.text));
   FileNodes out;
   out.body = body.handle;
   out.name = body.name;

@@ -7,6 +7,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "state_file.h"
+#include "system.h"
 
 namespace fs = std::filesystem;
 
@@ -23,7 +24,7 @@ std::string run_file(const SceneFile &scene, const RunOptions &options, bool by_
   JsonObject out;
   out.add("format", quoted(kFormat))
       .add("version", by_hand ? kByHand : kVersion)
-      .add("scene", quoted(fs::absolute(scene.path()).string()))
+      .add("scene", quoted(name_of(fs::absolute(path_of(scene.path())))))
       .add("set", json_array(set))
       .add("jitter", std::to_string(options.jitter));
   return indented(out.text());
@@ -62,7 +63,7 @@ void Recorder::add() {
 
 Recording read_recording(const std::string &run) {
   const std::string folder = run + "/recording", file = folder + "/run.json", index = folder + "/states.csv";
-  if (!fs::exists(file))
+  if (!fs::exists(path_of(file)))
     throw Failure(kBadInput, run +
                                  ": no recording in this folder; make one with `deform run SCENE --record "
                                  "--out " +

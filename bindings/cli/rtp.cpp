@@ -1,12 +1,6 @@
 #include "rtp.h"
 
-#include <netdb.h>
-#include <poll.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cstring>
 #include <random>
@@ -15,6 +9,7 @@
 
 #include "messages.h"
 #include "secret.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -71,22 +66,9 @@ RtpUrl rtp_url(const std::string &url, const std::string &what) {
   return out;
 }
 
-int rtp_socket(const RtpUrl &url, const std::string &what,
-               const std::function<int(int, const sockaddr *, socklen_t)> &open) {
-  addrinfo wanted = {}, *found = nullptr;
-  wanted.ai_socktype = SOCK_DGRAM;
-  wanted.ai_flags = AI_NUMERICSERV;
-  const int error = getaddrinfo(url.host.c_str(), url.port.c_str(), &wanted, &found);
-  std::string why = error ? gai_strerror(error) : "no address";
-  int out = -1;
-  for (const addrinfo *at = error ? nullptr : found; at && out < 0; at = at->ai_next) {
-    out = socket(at->ai_family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
-    if (out >= 0 && open(out, at->ai_addr, at->ai_addrlen) == 0) break;
-    why = std::strerror(errno);
-    if (out >= 0) close(out);
-    out = -1;
-  }
-  if (!error) freeaddrinfo(found);
+int rtp_socket(const RtpUrl &url, const std::string &what, bool connected) {
+  std::string why;
+  const int out = os::datagram_socket(url.host, url.port, connected, why);
   if (out < 0) throw Failure(kBadInput, what + " rtp://" + url.host + ":" + url.port + ": " + why);
   return out;
 }
@@ -106,7 +88,7 @@ std::vector<unsigned char> control_packet(uint32_t source, size_t head, const st
 RtpSender::RtpSender(dfm_world world, const std::string &url, std::string token)
     : world_(world),
       token_(std::move(token)),
-      socket_(rtp_socket(sink(url), "--stream", connect)),
+      socket_(rtp_socket(sink(url), "--stream", true)),
       begin_(dfm_world_time(world)),
       interval_(1 / kFrameRate) {
   std::random_device system;
@@ -118,7 +100,7 @@ RtpSender::RtpSender(dfm_world world, const std::string &url, std::string token)
 
 RtpSender::~RtpSender() {
   stop(true);
-  close(socket_);
+  os::close_socket(socket_);
 }
 
 void RtpSender::stop(bool at_once) {
@@ -148,13 +130,7 @@ void RtpSender::send(const unsigned char *payload, size_t n, bool marker) {
   put32(to + 4, stamp_);
   put32(to + 8, source_);
   std::memcpy(to + kRtpHeader, payload, n);
-  ssize_t sent = ::send(socket_, to, datagram_.size(), 0);
-  if (sent < 0 && (errno == EAGAIN || errno == ENOBUFS)) {
-    pollfd room = {socket_, POLLOUT, 0};
-    poll(&room, 1, kPatience);
-    sent = ::send(socket_, to, datagram_.size(), 0);
-  }
-  if (sent < 0) return;
+  if (!os::send(socket_, to, datagram_.size(), kPatience)) return;
   octets_ += n;
   const std::lock_guard lock(mutex_);
   ++report_.packets;
@@ -208,15 +184,15 @@ void RtpSender::send_report(bool ends) {
   goodbye[1] = kGoodbye;
   put16(goodbye + 2, 1);
   put32(goodbye + 4, source_);
-  ::send(socket_, out, ends ? 56 : 48, 0);
+  os::send(socket_, out, ends ? 56 : 48, 0);
 }
 
 // Reports of the receiver, and what it asks for. The socket has only what comes from the address to which
 // it sends.
 void RtpSender::hear() {
   unsigned char in[2048];
-  ssize_t n = 0;
-  for (int i = 0; i < kMostHeard && (n = recv(socket_, in, sizeof in, 0)) > 0; ++i)
+  std::ptrdiff_t n = 0;
+  for (int i = 0; i < kMostHeard && (n = os::receive(socket_, in, sizeof in)) > 0; ++i)
     each_report(in, static_cast<size_t>(n), [&](const unsigned char *report, size_t size) {
       if (report[1] == kApp) return hear_request(report, size);
       if (size < 32 || (report[0] & 31) == 0 || report[1] != kReceiverReport) return;
@@ -271,7 +247,7 @@ void RtpSender::send_answer(const std::string &text) {
     put32(&out[12], steerer_);
     put32(&out[16], taken_[steerer_]);
   }
-  ::send(socket_, out.data(), out.size(), 0);
+  os::send(socket_, out.data(), out.size(), 0);
 }
 
 void RtpSender::after_step() {

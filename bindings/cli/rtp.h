@@ -3,13 +3,10 @@
 // is whole after the next round; where something is new, it is sent and a round begins at once. The thread
 // that steps takes a copy of the state; another one packs and sends it. The format: doc/reference/stream.md.
 #pragma once
-#include <sys/socket.h>
-
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <mutex>
 #include <string>
@@ -57,9 +54,7 @@ void each_report(const unsigned char *bytes, size_t n, F f) {
 // "rtp://ADDRESS:PORT[?token=TEXT]"; throws Failure, whose sentence begins with `what`.
 struct RtpUrl { std::string host, port, token; };
 RtpUrl rtp_url(const std::string &url, const std::string &what);
-// A socket at the first of the host's addresses at which open(socket, address, length) gives 0.
-int rtp_socket(const RtpUrl &url, const std::string &what,
-               const std::function<int(int, const sockaddr *, socklen_t)> &open);
+int rtp_socket(const RtpUrl &url, const std::string &what, bool connected);  // to it, else bound to it
 
 class RtpSender {
  public:

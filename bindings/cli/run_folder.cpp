@@ -1,9 +1,6 @@
 #include "run_folder.h"
 
 #include <dirent.h>
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
@@ -13,6 +10,7 @@
 #include <vector>
 
 #include "messages.h"
+#include "system.h"
 
 namespace fs = std::filesystem;
 
@@ -26,12 +24,12 @@ void remove_matching(const std::string &folder, const char *pattern) {
   std::vector<fs::path> found;
   const std::unique_ptr<DIR, int (*)(DIR *)> open(opendir(folder.c_str()), &closedir);
   for (const dirent *entry; open && (entry = readdir(open.get()));)
-    if (std::regex_match(entry->d_name, names)) found.push_back(fs::path(folder) / entry->d_name);
+    if (std::regex_match(entry->d_name, names)) found.push_back(path_of(folder) / path_of(entry->d_name));
   for (const fs::path &path : found) {
     std::error_code refused;
     if (!fs::remove(path, refused) && refused)
       throw Failure(kBadInput,
-                    path.string() + ": left by an earlier run, and cannot be removed: " + refused.message());
+                    name_of(path) + ": left by an earlier run, and cannot be removed: " + refused.message());
   }
 }
 
@@ -40,7 +38,7 @@ void remove_matching(const std::string &folder, const char *pattern) {
 void refuse_linked_folders(const std::string &folder) {
   for (const char *name : {"/states", "/nodes", "/frames", "/recording"}) {
     std::error_code error;
-    if (fs::is_symlink(folder + name, error))
+    if (fs::is_symlink(path_of(folder + name), error))
       throw Failure(kBadInput,
                     folder + name +
                         ": a symbolic link, and a run deletes and writes files in this folder; remove the "
@@ -67,34 +65,33 @@ void remove_earlier(const std::string &folder) {
 
 void make_folder(const std::string &path) {
   std::error_code error;
-  fs::create_directories(path, error);
-  if (error || !fs::is_directory(path))
+  fs::create_directories(path_of(path), error);
+  if (error || !fs::is_directory(path_of(path)))
     throw Failure(kBadInput, path + ": the folder cannot be made: " +
                                  (error ? error.message() : "a file of that name is there"));
 }
 
 RunFolder::RunFolder(const std::string &path) {
   make_folder(path);
-  descriptor_ = open(path.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor_ < 0)
+  const os::Hold hold = os::hold_folder(path, held_);
+  if (hold == os::Hold::impossible)
     throw Failure(kBadInput, path + ": the folder cannot be opened: " + std::strerror(errno));
+  if (hold == os::Hold::held_by_another)
+    throw Failure(kBadInput, path +
+                                 ": another run is writing into this folder; wait for its end, or give "
+                                 "another one with --out");
   try {
-    if (flock(descriptor_, LOCK_EX | LOCK_NB) != 0) {
-      if (errno == EWOULDBLOCK)
-        throw Failure(kBadInput, path +
-                                     ": another run is writing into this folder; wait for its end, or give "
-                                     "another one with --out");
+    if (hold == os::Hold::unlocked)
       warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) +
            "); let no other run write into it meanwhile");
-    }
     refuse_linked_folders(path);
     remove_earlier(path);
   } catch (...) {
-    close(descriptor_);
+    os::let_go(held_);
     throw;
   }
 }
 
-RunFolder::~RunFolder() { close(descriptor_); }
+RunFolder::~RunFolder() { os::let_go(held_); }
 
 }  // namespace cli

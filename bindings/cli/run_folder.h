@@ -1,6 +1,7 @@
 // The folder that a run writes into: made, held by one run at a time, and free of what an earlier
 // run left there.
 #pragma once
+#include <cstdint>
 #include <string>
 
 namespace cli {
@@ -17,7 +18,7 @@ class RunFolder {
   RunFolder &operator=(const RunFolder &) = delete;
 
  private:
-  int descriptor_;
+  std::intptr_t held_;
 };
 
 }  // namespace cli

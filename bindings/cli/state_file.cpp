@@ -2,8 +2,6 @@
 // dfm_world_write_scene leaves them, are read too.
 #include "state_file.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
@@ -14,6 +12,7 @@
 #include "file.h"
 #include "json_text.h"
 #include "messages.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -134,17 +133,16 @@ void refuse_static(const SceneFile &scene, const std::string &option) {
 }
 
 void check_scene_path(const SceneFile &scene, const std::string &path) {
-  const std::filesystem::path file(path);
+  const std::filesystem::path file = path_of(path);
   const auto refuse = [&](const std::string &why) {
     throw Failure(kBadInput, "--save-scene " + path + ": " + why);
   };
   if (file.extension() != ".json" || file.stem().empty())
     refuse("the name of a scene file must end in .json");
   std::error_code error;
-  if (std::filesystem::equivalent(file, scene.path(), error))
+  if (std::filesystem::equivalent(file, path_of(scene.path()), error))
     refuse("this is the scene that is being run, which would be overwritten; give another name");
-  if (access(file.has_parent_path() ? file.parent_path().c_str() : ".", W_OK) != 0)
-    refuse(std::string("cannot be written there: ") + std::strerror(errno));
+  if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
 }
 
 void write_as_scene(const SceneFile &scene, const std::string &path) {

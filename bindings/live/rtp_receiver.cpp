@@ -36,7 +36,7 @@ bool same(const sockaddr_storage &a, socklen_t na, const sockaddr_storage &b, so
 }  // namespace
 
 RtpReceiver::RtpReceiver(const std::string &url)
-    : url_(cli::rtp_url(url, "view")), socket_(cli::rtp_socket(url_, "view", bind)) {
+    : url_(cli::rtp_url(url, "view")), socket_(cli::rtp_socket(url_, "view", false)) {
   setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof kBuffer);
   heard_ = reported_ = asked_ = Clock::now();
 }

@@ -1,6 +1,8 @@
 // The other end of `--stream rtp://`: takes packets at an address of this machine, reports to their sender
 // what gets lost, and asks it for what doc/reference/stream.md lists.
 #pragma once
+#include <sys/socket.h>
+
 #include <chrono>
 #include <deque>
 #include <string>

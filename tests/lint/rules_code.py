@@ -189,6 +189,25 @@ def kernels(tree):
                        "namespace")
 
 
-RULES = {"layers": layers, "public_only": public_only, "plugin_includes": plugin_includes,
+def systems(tree):
+    """The library and the command are built for Windows too: what POSIX alone has lies in *_posix.cpp."""
+    alone = re.compile(r"(dlfcn|elf|link|netdb|poll|spawn|arpa/\w+|"
+                       r"sys/(file|mman|prctl|resource|socket|syscall|un|wait))\.h$")
+    left_out = re.compile(r"_(posix|windows)\.cpp$|bindings/cli/(bullet_host|cmd_study|cmd_worker)\.cpp$")
+    for path in tree.select(SRC, "bindings/cli/"):
+        content = tree.text(path)
+        if left_out.search(path) or "__has_include(<link.h>)" in content:
+            continue
+        for line, _, name in includes(content):
+            if alone.match(name):
+                yield (path, line, f"includes {name}, which Windows has not: give system.h a function, and "
+                                   f"system_posix.cpp and system_windows.cpp its two bodies")
+        for match in re.finditer(r"filesystem::path\(|\bfs::path\(|\.string\(\)", without_comments(content)):
+            if not path.endswith(("core/path.h", "bindings/cli/system.h")):
+                yield (path, line_of(content, match.start()),
+                       "names are UTF-8 on every system: path_of(name), name_of(path)")
+
+
+RULES = {"layers": layers, "public_only": public_only, "systems": systems, "plugin_includes": plugin_includes,
          "third_parties": third_parties,
          "numbers": numbers, "libm": libm, "kernels": kernels}

@@ -19,7 +19,7 @@ BELOW = {
                  "view", "serve", "web"},
     "tests": {"CMakeLists.txt", "README.md", "support", "data", "unit", "analytic", "stability", "api",
               "plugin", "gpu", "determinism", "adapters", "fuzz", "lint", "bench", "abi", "render", "python",
-              "serve", "contact_problems"},
+              "serve", "ports", "contact_problems"},
 }
 PLUGIN_FOLDER = re.compile(r"plugins/(CMakeLists\.txt|(model|friction|solver|template)_[a-z0-9_]+)$")
 MAX_LINES = 800

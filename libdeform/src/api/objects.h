@@ -122,8 +122,7 @@ inline dfm_context &exclusive(dfm_context &context) {
 }
 
 // Error(DFM_E_ARG) with the body's name before the sentence.
-[[noreturn]] inline void refuse(const Body &b, const char *sentence, ...)
-    __attribute__((format(printf, 2, 3)));
+[[noreturn]] inline void refuse(const Body &b, const char *sentence, ...) DEFORM_PRINTF(2, 3);
 inline void refuse(const Body &b, const char *sentence, ...) {
   char text[1024];
   va_list rest;

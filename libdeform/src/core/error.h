@@ -8,6 +8,13 @@
 
 #include "deform/plugin.h"
 
+// Of a function with a format as of printf; that of mingw-w64 has a name of its own.
+#ifdef __MINGW_PRINTF_FORMAT
+#define DEFORM_PRINTF(text, first) __attribute__((format(__MINGW_PRINTF_FORMAT, text, first)))
+#else
+#define DEFORM_PRINTF(text, first) __attribute__((format(printf, text, first)))
+#endif
+
 namespace dfm {
 
 struct Error : std::exception {
@@ -18,8 +25,8 @@ struct Error : std::exception {
 };
 
 // printf-style; the message is one sentence: what was wrong, where, and what to do.
-[[noreturn]] void fail(dfm_status status, const char *format, ...) __attribute__((format(printf, 2, 3)));
-std::string format(const char *format, ...) __attribute__((format(printf, 1, 2)));
+[[noreturn]] void fail(dfm_status status, const char *format, ...) DEFORM_PRINTF(2, 3);
+std::string format(const char *format, ...) DEFORM_PRINTF(1, 2);
 
 // Makes a text safe for any terminal: control characters (file names may contain them) become \uXXXX, bytes
 // that are not valid UTF-8 become "?".

@@ -1,7 +1,5 @@
 #include "core/file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -10,35 +8,24 @@
 #include <cstring>
 
 #include "core/error.h"
+#include "core/system.h"
 
 namespace dfm {
-namespace {
-
-const char *kind_of(mode_t mode) {
-  if (S_ISBLK(mode) || S_ISCHR(mode)) return "a device";
-  return S_ISDIR(mode)    ? "a directory"
-         : S_ISFIFO(mode) ? "a pipe"
-         : S_ISSOCK(mode) ? "a socket"
-                          : "not a regular file";
-}
-
-}  // namespace
 
 InputFile::InputFile(const std::string &path, const char *expected) : path_(path) {
-  // Without O_NONBLOCK, opening a pipe without a writer would block forever. Standard input may block.
+  // Standard input may block.
   const bool standard = path == "/dev/stdin";
-  descriptor_ = standard ? fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 0)
-                         : open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  descriptor_ = standard ? os::duplicate(STDIN_FILENO) : os::open_input(path);
   if (descriptor_ < 0)
     fail(DFM_E_IO, "%s: cannot be opened: %s; expected %s", path.c_str(), std::strerror(errno), expected);
-  struct stat status;
-  const bool known = fstat(descriptor_, &status) == 0, regular = known && S_ISREG(status.st_mode);
-  if (regular || (known && standard && (S_ISFIFO(status.st_mode) || S_ISSOCK(status.st_mode)))) {
-    bytes_ = regular ? uint64_t(status.st_size) : 0;
+  os::FileStatus status;
+  const bool known = os::status_of(descriptor_, status), regular = known && !status.kind;
+  if (regular || (known && standard && status.readable)) {
+    bytes_ = regular ? status.bytes : 0;
     return;
   }
   const std::string reason =
-      known ? format("is %s", kind_of(status.st_mode)) : format("cannot be read: %s", std::strerror(errno));
+      known ? format("is %s", status.kind) : format("cannot be read: %s", std::strerror(errno));
   close(descriptor_);
   fail(DFM_E_IO, "%s: %s; give the name of %s", path.c_str(), reason.c_str(), expected);
 }
@@ -48,7 +35,8 @@ InputFile::~InputFile() { close(descriptor_); }
 size_t InputFile::read(char *to, size_t n) {
   size_t done = 0;
   while (done < n) {
-    const ssize_t got = ::read(descriptor_, to + done, n - done);
+    // of more than 2 GiB at a time no system reads all
+    const auto got = ::read(descriptor_, to + done, std::min<size_t>(n - done, size_t{1} << 30));
     if (got < 0 && errno == EINTR) continue;
     if (got < 0) fail(DFM_E_IO, "%s: cannot be read: %s", path_.c_str(), std::strerror(errno));
     if (got == 0) break;
@@ -82,45 +70,29 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path, uint6
   }
 }
 
-// Opens an unnamed file in the folder of `path`, which disappears if the process is killed; -1 if the file
-// system does not support that.
-int AtomicFile::open_beside() {
-  const size_t slash = path_.rfind('/');
-  const std::string folder = slash == std::string::npos ? "." : path_.substr(0, slash + 1);
-#ifdef O_TMPFILE
-  if (access("/proc/self/fd", X_OK) == 0) {
-    const int fd = open(folder.c_str(), O_TMPFILE | O_WRONLY | O_CLOEXEC, 0666);
-    if (fd >= 0) {
-      kind_ = Kind::unnamed;
-      return fd;
-    }
-  }
-#endif
-  return open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
-}
-
 AtomicFile::AtomicFile(const std::string &path) : path_(path) {
   static std::atomic<unsigned> counter{0};
-  temporary_ = path + format(".part%ld-%u", static_cast<long>(getpid()), counter.fetch_add(1));
-  struct stat status;
+  temporary_ = path + format(".part%ld-%u", os::process_number(), counter.fetch_add(1));
+  const size_t slash = path.rfind('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  os::FileStatus status;
   int fd = -1;
-  if (stat(path.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+  if (os::status_of(path, status) && status.kind) {
     kind_ = Kind::device;
-    if (S_ISDIR(status.st_mode) || S_ISBLK(status.st_mode))
-      fail(DFM_E_IO, "%s: is %s; give the name of a file to write", path.c_str(), kind_of(status.st_mode));
-    // a pipe without a reader is an error; the call does not wait
-    fd = open(path.c_str(), O_WRONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-    if (fd >= 0) fcntl(fd, F_SETFL, fcntl(fd, F_GETFL) & ~O_NONBLOCK);
+    if (!status.writable)
+      fail(DFM_E_IO, "%s: is %s; give the name of a file to write", path.c_str(), status.kind);
+    fd = os::open_stream(path);
   } else {
-    fd = open_beside();
+    fd = os::create_unnamed(folder);
+    if (fd >= 0) kind_ = Kind::unnamed;
+    else fd = os::create(temporary_);
   }
   file_ = fd < 0 ? nullptr : fdopen(fd, "wb");
   if (!file_) {
     const int code = errno;
     if (fd >= 0) close(fd);
-    if (fd >= 0 && kind_ == Kind::named) unlink(temporary_.c_str());
+    if (fd >= 0 && kind_ == Kind::named) os::remove_file(temporary_);
     errno = code;
-    const size_t slash = path.rfind('/');
     if (code == ENOENT && slash != std::string::npos)
       fail(DFM_E_IO, "%s: cannot be written: %s; make the folder '%s' first", path.c_str(),
            std::strerror(code), path.substr(0, slash).c_str());
@@ -131,7 +103,7 @@ AtomicFile::AtomicFile(const std::string &path) : path_(path) {
 AtomicFile::~AtomicFile() {
   if (!file_) return;
   std::fclose(file_);
-  if (kind_ == Kind::named) unlink(temporary_.c_str());
+  if (kind_ == Kind::named) os::remove_file(temporary_);
 }
 
 void AtomicFile::fail_io(const char *what) {
@@ -146,18 +118,17 @@ void AtomicFile::commit() {
   if (std::fflush(file_) != 0) fail_io("cannot be written");
   bool placed = true;
   if (kind_ == Kind::unnamed) {
-    const std::string own = format("/proc/self/fd/%d", fileno(file_));
-    unlink(temporary_.c_str());
-    placed = linkat(AT_FDCWD, own.c_str(), AT_FDCWD, temporary_.c_str(), AT_SYMLINK_FOLLOW) == 0;
+    os::remove_file(temporary_);
+    placed = os::give_name(fileno(file_), temporary_);
     if (!placed) fail_io("cannot be written");
     kind_ = Kind::named;
   }
   const int closed = std::fclose(file_);
   file_ = nullptr;
-  if (kind_ != Kind::device) placed = closed == 0 && std::rename(temporary_.c_str(), path_.c_str()) == 0;
+  if (kind_ != Kind::device) placed = closed == 0 && os::rename_over(temporary_, path_);
   if (closed == 0 && placed) return;
   const int code = errno;
-  if (kind_ == Kind::named) unlink(temporary_.c_str());
+  if (kind_ == Kind::named) os::remove_file(temporary_);
   errno = code;
   fail_io("cannot be written");
 }

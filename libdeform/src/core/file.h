@@ -62,7 +62,6 @@ class AtomicFile {
 
  private:
   [[noreturn]] void fail_io(const char *what);
-  int open_beside();
   enum class Kind { device, named, unnamed };
   std::string path_, temporary_;
   Kind kind_ = Kind::named;

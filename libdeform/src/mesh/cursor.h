@@ -54,9 +54,9 @@ class Cursor {
   std::string_view rest() const { return {p_, left()}; }
 
   // Throws "FILE:12: " or "FILE, byte 345: " followed by the sentence; DFM_E_FORMAT.
-  [[noreturn]] void refuse(const char *sentence, ...) const __attribute__((format(printf, 2, 3)));
+  [[noreturn]] void refuse(const char *sentence, ...) const DEFORM_PRINTF(2, 3);
   // The same for valid content that is not supported; DFM_E_UNSUPPORTED.
-  [[noreturn]] void unsupported(const char *sentence, ...) const __attribute__((format(printf, 2, 3)));
+  [[noreturn]] void unsupported(const char *sentence, ...) const DEFORM_PRINTF(2, 3);
 
   // ---- text ----
   void skip_space() {

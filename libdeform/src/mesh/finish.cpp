@@ -6,9 +6,9 @@
 #include <array>
 #include <cfloat>
 #include <cmath>
-#include <filesystem>
 
 #include "core/names.h"
+#include "core/path.h"
 #include "math/vec3.h"
 #include "mesh/cells.h"
 #include "mesh/faces.h"
@@ -289,7 +289,7 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
          "as its surface: TetMesh.fill and surface= of add_body in Python, dfm_tetmesh_fill and "
          "dfm_body_def.surface in C, or deform mesh fill %s --out %s",
          path.c_str(), raw.ntri(), shell_word(path).c_str(),
-         shell_word(std::filesystem::path(path).replace_extension(".vtu").string()).c_str());
+         shell_word(name_of(path_of(path).replace_extension(".vtu"))).c_str());
   if (raw.tets.empty())
     fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface",
          path.c_str());

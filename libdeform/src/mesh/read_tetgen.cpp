@@ -3,9 +3,9 @@
 // are the regions of the tetrahedra and the markers of the triangles, without triangles of the points.
 #include <algorithm>
 #include <array>
-#include <filesystem>
 
 #include "core/file.h"
+#include "core/path.h"
 #include "deform/plugin.h"
 #include "mesh/numbers.h"
 #include "mesh/raw_mesh.h"
@@ -30,7 +30,7 @@ class TetgenReader {
       (this->*rows)(in);
     };
     const auto has = [&](const char *part) {
-      return ending == part || std::filesystem::exists(beside(part));
+      return ending == part || std::filesystem::exists(path_of(beside(part)));
     };
     markers_ = !has("face");
     read("node", &TetgenReader::read_points);

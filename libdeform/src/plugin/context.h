@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/error.h"
 #include "core/memory.h"
 #include "core/tasks.h"
 #include "deform/base.h"
@@ -22,7 +23,7 @@ struct dfm_context {
 
   // Logs to the host's hook; without one, warnings and errors go to stderr.
   void log(int32_t level, const char *utf8) const noexcept;
-  void logf(int32_t level, const char *format, ...) const noexcept __attribute__((format(printf, 3, 4)));
+  void logf(int32_t level, const char *format, ...) const noexcept DEFORM_PRINTF(3, 4);
   void trace_begin(const char *zone) const {
     if (hooks.trace_begin) hooks.trace_begin(hooks.user, zone);
   }

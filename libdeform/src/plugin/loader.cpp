@@ -1,8 +1,5 @@
 #include "plugin/loader.h"
 
-#include <dirent.h>
-#include <sys/stat.h>
-
 #include <algorithm>
 #include <cerrno>
 #include <clocale>
@@ -11,8 +8,11 @@
 #include <cstring>
 #include <memory>
 #include <mutex>
+#include <sstream>
 
 #include "core/error.h"
+#include "core/path.h"
+#include "core/system.h"
 #include "deform/base.h"
 #include "plugin/boundary.h"
 #include "plugin/registry.h"
@@ -50,41 +50,29 @@ std::recursive_mutex door;
 
 std::string real_path(const std::string &path) {
   // dlopen searches the system's libraries for a name without a slash
-  char *resolved = realpath(path.c_str(), nullptr);
-  if (!resolved) fail(DFM_E_IO, "cannot open plugin \"%s\": %s", path.c_str(), std::strerror(errno));
-  const std::unique_ptr<char, decltype(&std::free)> freed(resolved, &std::free);
-  return resolved;
+  std::error_code error;
+  const std::filesystem::path resolved = std::filesystem::canonical(path_of(path), error);
+  if (error) fail(DFM_E_IO, "cannot open plugin \"%s\": %s", path.c_str(), error.message().c_str());
+  return name_of(resolved);
 }
 
 bool is_directory(const std::string &path) {
-  struct stat st{};
-  return stat(path.c_str(), &st) == 0 && S_ISDIR(st.st_mode);
+  std::error_code error;
+  return std::filesystem::is_directory(path_of(path), error);
 }
 
 bool is_link(const std::string &path) {
-  struct stat st{};
-  return lstat(path.c_str(), &st) == 0 && S_ISLNK(st.st_mode);
+  std::error_code error;
+  return std::filesystem::is_symlink(path_of(path), error);
 }
 
-// Uses readdir, because the iterators of the standard library allocate inside noexcept functions, which ends
-// the process if memory runs out.
 std::vector<std::string> entries(const std::string &directory) {
-  const std::unique_ptr<DIR, int (*)(DIR *)> open(opendir(directory.c_str()), &closedir);
-  if (!open)
+  std::vector<std::string> names;
+  if (!os::list_folder(directory, names))
     fail(errno == ENOMEM ? DFM_E_NOMEM : DFM_E_IO, "cannot read plugin directory \"%s\": %s",
          directory.c_str(), std::strerror(errno));
-  std::vector<std::string> names;
-  errno = 0;
-  for (const dirent *entry; (entry = readdir(open.get()));)
-    if (const std::string name = entry->d_name; name != "." && name != "..") names.push_back(name);
-  if (errno)
-    fail(DFM_E_IO, "cannot read plugin directory \"%s\": %s", directory.c_str(), std::strerror(errno));
   std::sort(names.begin(), names.end());  // the same order on every file system
   return names;
-}
-
-bool ends_in_so(const std::string &name) {
-  return name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0;
 }
 
 // Lives while initializers and the entry function of a plugin run. Restores the floating-point environment
@@ -198,11 +186,11 @@ const Loader::Module *Loader::loaded_from(uint64_t device, uint64_t inode) const
 
 bool Loader::load(const std::string &path) {
   const std::string file = real_path(path);
-  struct stat st{};
-  if (stat(file.c_str(), &st) != 0)
+  os::FileStatus status;
+  if (!os::status_of(file, status))
     fail(DFM_E_IO, "cannot read plugin \"%s\": %s", path.c_str(), std::strerror(errno));
-  if (!S_ISREG(st.st_mode)) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
-  if (loaded_from(st.st_dev, st.st_ino)) return false;
+  if (status.kind) fail(DFM_E_UNSUPPORTED, "%s is not a file", path.c_str());
+  if (loaded_from(status.device, status.number)) return false;
 
   const std::lock_guard one_at_a_time(door);
   Visit visit(host_, path);
@@ -211,7 +199,7 @@ bool Loader::load(const std::string &path) {
   dfm_plugin plugin;
   enter(entry, path, plugin);
   visit.end();
-  keep({nullptr, st.st_dev, st.st_ino, path, entry, plugin.shutdown}, plugin);
+  keep({nullptr, status.device, status.number, path, entry, plugin.shutdown}, plugin);
   modules_.back().image = library.release();
   return true;
 }
@@ -235,8 +223,8 @@ uint32_t Loader::scan(const std::string &directory) {
     const std::string path = directory + (directory.back() == '/' ? "" : "/") + name;
     if (is_directory(path)) {
       registry_.pass_over(path, "a directory: plugins lie directly in the plugin directory");
-    } else if (!ends_in_so(name)) {
-      registry_.pass_over(path, "its name does not end in .so");
+    } else if (!name.ends_with(os::kPluginEnding)) {
+      registry_.pass_over(path, std::string("its name does not end in ") + os::kPluginEnding);
     } else {
       try {
         if (load(path)) ++loaded;
@@ -262,10 +250,10 @@ void Loader::add_static(dfm_plugin_fn entry, const std::string &name) {
 }
 
 std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
-  struct stat st{};
+  os::FileStatus status;
   std::vector<const dfm_type *> out;
-  if (stat(path.c_str(), &st) != 0) return out;
-  const Module *const module = loaded_from(st.st_dev, st.st_ino);
+  if (!os::status_of(path, status)) return out;
+  const Module *const module = loaded_from(status.device, status.number);
   for (const dfm_type *type : registry_.list())
     if (module && registry_.file_of(*type) == module->file) out.push_back(type);
   return out;
@@ -296,14 +284,12 @@ void Loader::add_bundled() {
 }
 
 void Loader::discover() {
-  const char *path = trusted_environment("DEFORM_PLUGIN_PATH");
-  if (!path && std::getenv("DEFORM_PLUGIN_PATH"))
-    registry_.pass_over("DEFORM_PLUGIN_PATH", "ignored: the process runs with elevated privilege");
-  for (const char *begin = path; begin && *begin;) {
-    const char *end = std::strchr(begin, ':');
-    scan_if_there(end ? std::string(begin, end) : std::string(begin), true);
-    begin = end ? end + 1 : nullptr;
-  }
+  const char *const variable = "DEFORM_PLUGIN_PATH";
+  const std::optional<std::string> path = os::trusted_environment(variable);
+  if (!path && os::environment(variable))
+    registry_.pass_over(variable, "ignored: the process runs with elevated privilege");
+  std::istringstream folders(path.value_or(""));
+  for (std::string folder; std::getline(folders, folder, os::kBetweenPaths);) scan_if_there(folder, true);
   scan_if_there(default_plugin_directory(), false);
 }
 

@@ -30,8 +30,14 @@ class SharedObject {
 // empty if the plugins are linked into the library.
 std::string default_plugin_directory();
 
-// The value of an environment variable; null where it is unset, or where the process could open files in the
-// name of another user than the one who has set it.
-const char *trusted_environment(const char *name);
+// Of the system: shared_object_posix.cpp, shared_object_windows.cpp. The file of this library, or of the
+// program that it is linked into; empty: unknown.
+std::string file_of_library();
+
+// Throws DFM_E_IO or DFM_E_UNSUPPORTED with the reason unless the file is a complete shared object for this
+// machine that defines dfm_plugin_entry (not checked if the file has no section headers). It is checked
+// before the dynamic linker maps it: a truncated library would end the process by SIGBUS, and a library
+// without the entry point would run its constructors for nothing. In elf_file.cpp.
+void check_plugin_file(const std::string &path);
 
 }  // namespace dfm

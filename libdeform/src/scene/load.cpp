@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
 #include <numeric>
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "core/path.h"
 #include "mesh/cells.h"
 #include "plugin/context.h"
 
@@ -71,10 +71,9 @@ dfm_trimesh_info MeshFiles::surface_info(dfm_trimesh mesh, const std::string &po
 }
 
 std::string MeshFiles::path_of(const std::string &path) const {
-  const std::filesystem::path p(path);
-  return p.is_absolute() || def_.folder.empty()
-             ? path
-             : (std::filesystem::path(def_.folder) / p).lexically_normal().string();
+  const std::filesystem::path p = dfm::path_of(path);
+  return p.is_absolute() || def_.folder.empty() ? path
+                                                : name_of((dfm::path_of(def_.folder) / p).lexically_normal());
 }
 
 bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {

@@ -30,7 +30,7 @@ class Node {
   const std::string &file() const { return *file_; }
   json &value() const { return *value_; }
 
-  [[noreturn]] void fail(const char *format, ...) const __attribute__((format(printf, 2, 3)));
+  [[noreturn]] void fail(const char *format, ...) const DEFORM_PRINTF(2, 3);
   [[noreturn]] void not_yet() const;  // "not available yet: POINTER"
 
   // Checks that this is an object whose keys are those of `kind`; unknown ones and those not

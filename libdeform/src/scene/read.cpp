@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 
 #include "core/names.h"
+#include "core/path.h"
 #include "scene/keys.h"
 #include "state/step_sizes.h"
 
@@ -566,7 +566,7 @@ Definition read_scene(json &tree, const std::string &file, const Types &types) {
   if (version.number() != 1) version.fail("this reader knows version 1, found %g", version.number());
   Definition def;
   def.file = file;
-  def.folder = std::filesystem::path(file).parent_path().string();
+  def.folder = name_of(path_of(file).parent_path());
   ReadContext context{types, {}, {}, {}};
   read_gravity(scene, def);
   read_time(scene, def);

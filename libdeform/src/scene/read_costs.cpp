@@ -1,6 +1,5 @@
 // The measured costs that the planner reads: JSON as `deform calibrate` writes it (doc/reference/outputs.md).
-#include <cstdlib>
-
+#include "core/system.h"
 #include "scene/planner.h"
 #include "shipped_costs.h"
 
@@ -44,9 +43,9 @@ MeasuredModel read_model(const Node &node) {
 }  // namespace
 
 Measured read_costs() {
-  const char *const named = std::getenv("DEFORM_COSTS");
-  const std::string file = named && *named ? named : "(costs that the library ships)";
-  json tree = named && *named ? parse_file(file) : parse_text(kShippedCosts, file);
+  const std::optional<std::string> named = os::environment("DEFORM_COSTS");
+  const std::string file = named && !named->empty() ? *named : "(costs that the library ships)";
+  json tree = named && !named->empty() ? parse_file(file) : parse_text(kShippedCosts, file);
   const Node root(&tree, "", &file);
   if (root.at("format").text() != "deform-costs")
     root.at("format").fail("expected \"deform-costs\", a file of deform calibrate");

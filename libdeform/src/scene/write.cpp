@@ -3,11 +3,11 @@
 #include <algorithm>
 #include <cstdarg>
 #include <cstring>
-#include <filesystem>
 
 #include "core/error.h"
 #include "core/file.h"
 #include "core/handle.h"
+#include "core/path.h"
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
 #include "mesh/tri_mesh.h"
@@ -109,19 +109,17 @@ void SceneWriter::note(const char *text, ...) {
 
 namespace {
 
-std::string folder_name(const std::string &path) {
-  return std::filesystem::path(path).stem().string() + "_files";
-}
+std::string folder_name(const std::string &path) { return name_of(path_of(path).stem()) + "_files"; }
 
 // Where a file of the folder beside the scene lies; makes the folder.
 std::string beside(const std::string &path, const std::string &name) {
-  const std::filesystem::path where = std::filesystem::path(path).parent_path() / folder_name(path);
+  const std::filesystem::path where = path_of(path).parent_path() / path_of(folder_name(path));
   std::error_code error;
   std::filesystem::create_directory(where, error);
   if (!std::filesystem::is_directory(where, error))
     fail(DFM_E_IO, "%s: the folder %s for its meshes cannot be created beside it; give another path",
-         path.c_str(), where.c_str());
-  return (where / name).string();
+         path.c_str(), name_of(where).c_str());
+  return name_of(where / path_of(name));
 }
 
 }  // namespace
@@ -425,9 +423,8 @@ void tell_what_is_left_out(SceneWriter &to) {
         Used &u = *static_cast<Used *>(user);
         const std::string path = file ? file : "";
         if (path.empty() || !u.ids.count(type->id)) return;
-        if (path.rfind("static:", 0) == 0
-                ? path.rfind("static:host", 0) != 0
-                : std::filesystem::path(path).parent_path() == std::filesystem::path(u.shipped))
+        if (path.rfind("static:", 0) == 0 ? path.rfind("static:host", 0) != 0
+                                          : path_of(path).parent_path() == path_of(u.shipped))
           return;
         if (u.told.insert(type->id).second)
           u.to->remark(
@@ -507,7 +504,7 @@ void write_snapshot(SceneWriter &to, const std::string &name) {
 }  // namespace
 
 void write_scene(World &w, const std::string &path, const WriteOptions &options, uint32_t &notes) {
-  const std::filesystem::path whole(path);
+  const std::filesystem::path whole = path_of(path);
   if (whole.extension() != ".json" || whole.stem().empty())
     fail(DFM_E_ARG, "%s: the name of a scene file must end in .json", path.c_str());
   SceneWriter to{w, path, options, notes};

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "state/world.h"
 
 namespace dfm::writing {
@@ -49,7 +50,7 @@ struct SceneWriter {
   std::map<std::string, std::pair<std::string, Written>> material_keys{};  // name and entries by key
   std::set<std::string> model_keys{};                                      // parameters of any loaded model
 
-  void note(const char *text, ...) __attribute__((format(printf, 2, 3)));
+  void note(const char *text, ...) DEFORM_PRINTF(2, 3);
   // A remark for the user who runs the scene: refuses nothing, and is not counted.
   void remark(const std::string &sentence) const {
     if (options.note) options.note(sentence);

@@ -25,7 +25,7 @@ void came_back() {}
 #include "deform/deform.h"
 #include "messages.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if !defined(__linux__) || defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
 #define DEFORM_OWN_EXIT 0
 #elif defined(__has_feature)
 #if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer)
@@ -79,7 +79,11 @@ void end(Sentence &s) {
 }
 
 [[noreturn]] void end_now(int code) {
+#if DEFORM_OWN_EXIT
   for (;;) syscall(SYS_exit_group, code);
+#else
+  _exit(code);
+#endif
 }
 
 // Of exit, quick_exit and _exit, whatever code they were given.
