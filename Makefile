@@ -4,6 +4,7 @@ PREFIX ?= /usr/local
 SCENE ?= examples/scenes/two_cylinders.json
 # How many compilers or tests run at a time; a compiler needs half a gigabyte of memory.
 JOBS ?= $(shell nproc)
+EXAMPLES = $(patsubst examples/%.c,example_%,$(wildcard examples/*.c))
 # A folder of contact problems in Siconos' text format or FCLIB's HDF5
 CONTACT_PROBLEMS ?=
 # What bench-peers runs: all or quick
@@ -16,8 +17,8 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view tools bench-contact bench-peers deb docs wheel wasm
-.PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers setup-wasm
+.PHONY: view tools bench-contact bench-peers deb docs wheel wasm ports
+.PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers setup-wasm setup-ports
 
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
@@ -37,6 +38,7 @@ help:
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
 	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
+	@echo "make ports            the command for Linux on arm64 and for Windows, tested by qemu and Wine"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
 	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
@@ -54,6 +56,8 @@ setup-docs:
 	$(SETUP) docs
 setup-wasm:
 	$(SETUP) doors wasm
+setup-ports:
+	$(SETUP) doors ports
 setup-fuzz:
 	$(SETUP) doors clang
 
@@ -61,6 +65,7 @@ setup-fuzz:
 build/bench/build.ninja: | setup-bench
 build/fuzz/build.ninja: | setup-fuzz
 build/wasm/build.ninja: | setup-wasm
+build/arm64/build.ninja build/windows/build.ninja: | setup-ports
 build/%/build.ninja: | setup
 	cmake --preset $*
 
@@ -111,6 +116,9 @@ bench-peers: setup-peers build/release/build.ninja
 soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	@if command -v em++ >/dev/null; then $(MAKE) --no-print-directory wasm; \
 	  else echo "deform: no emscripten, so WebAssembly is not tested (make setup-wasm installs it)"; fi
+	@if command -v aarch64-linux-gnu-g++ && command -v x86_64-w64-mingw32-g++-posix && command -v wine; then \
+	  $(MAKE) --no-print-directory ports; \
+	  else echo "deform: no cross compilers, so arm64 and Windows are not tested (make setup-ports)"; fi
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --test-dir build/release -j $(JOBS) --output-on-failure -L 'soak|stability'
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
@@ -137,6 +145,12 @@ wheel: setup build/release/build.ninja
 wasm: setup-wasm build/wasm/build.ninja
 	$(BUILD) wasm --target deform_page
 	@ls -l build/wasm/page
+
+ports: setup-ports build/arm64/build.ninja build/windows/build.ninja build/release/build.ninja
+	$(BUILD) arm64
+	$(BUILD) windows
+	$(BUILD) release --target deform_command $(EXAMPLES)
+	@ctest --test-dir build/release --output-on-failure -R '^ports\.'
 
 # Debian packages of the release build.
 deb: setup build/release/build.ninja

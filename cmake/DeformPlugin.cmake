@@ -2,6 +2,16 @@
 # of the library. deform_add_static_plugin(NAME SOURCE...) builds the same sources as an archive to link into
 # a program; the entry is then called dfm_plugin_entry_NAME, and the program hands it to
 # dfm_plugin_register_static.
+
+# Templates of the standard library are visible in ELF whatever the compiler is told: the map hides them. On
+# other systems only what is marked is exported.
+function(deform_exports target map)
+  if(NOT WIN32 AND NOT APPLE)
+    target_link_options(${target} PRIVATE -Wl,--version-script=${map})
+    set_target_properties(${target} PROPERTIES LINK_DEPENDS ${map})
+  endif()
+endfunction()
+
 function(deform_plugin_rules name)
   if(COMMAND deform_kernel_flags)
     deform_kernel_flags(${ARGN})
@@ -27,7 +37,5 @@ function(deform_add_plugin name)
   add_library(${name} MODULE ${ARGN})
   deform_plugin_rules(${name} ${ARGN})
   set_target_properties(${name} PROPERTIES PREFIX "")
-  set(map ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/deform_plugin.map)
-  target_link_options(${name} PRIVATE -Wl,--version-script=${map})
-  set_target_properties(${name} PROPERTIES LINK_DEPENDS ${map})
+  deform_exports(${name} ${CMAKE_CURRENT_FUNCTION_LIST_DIR}/deform_plugin.map)
 endfunction()

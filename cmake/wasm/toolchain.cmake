@@ -13,5 +13,6 @@ if(EXISTS /usr/share/nodejs/acorn)
   set(CMAKE_C_LINKER_LAUNCHER ${CMAKE_COMMAND} -E env NODE_PATH=/usr/share/nodejs)
   set(CMAKE_CXX_LINKER_LAUNCHER ${CMAKE_C_LINKER_LAUNCHER})
 endif()
+set(DEFORM_OTHER_SYSTEM ON)
 # Of every program.
 set(DEFORM_WASM_LINK -sALLOW_MEMORY_GROWTH=1 -sTOTAL_STACK=4MB)
