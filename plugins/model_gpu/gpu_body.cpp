@@ -11,8 +11,7 @@ namespace gpu {
 namespace {
 
 constexpr double kMostSteps = 1e6;
-// Of the sub-step that would have been short enough, when a step is taken again.
-constexpr double kShorter = 0.9;
+constexpr double kRounding = 1e-6;  // rates of the kernels are binary32
 
 }  // namespace
 
@@ -68,7 +67,7 @@ void Body<Of>::apply_params(const double *values) {
   *effect++ = "large_rotation";
   if (params_[kDampingStiffness] > 0 || params_[kDampingMass] > 0) *effect++ = "damping";
   *effect = nullptr;
-  facts_[0] = {"longest_step", Of::kLongest, "s", longest_};
+  facts_[0] = {"longest_step", Of::kLongest, "s", Of::kShare * longest_};
   facts_[1] = Of::kCount;
   facts_[1].value = double(parts_.count());
 }
@@ -77,6 +76,7 @@ template <class Of>
 void Body<Of>::find_longest() {
   longest_ = HUGE_VAL;
   for (uint32_t i = 0; i < npoint_; ++i) {
+    if (held_[i] == 7) continue;
     const double m = parts_.mass[i], k = parts_.row[i];
     const double c = params_[kDampingStiffness] * k + params_[kDampingMass] * m;
     const double most = c + std::sqrt(c * c + 4 * m * k);
@@ -122,9 +122,13 @@ bool Body<Of>::take_loads(const double *f, uint32_t stride) {
 
 template <class Of>
 dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
-  double steps = std::max(1.0, std::ceil(k.dt / longest_ - 1e-9));
+  double stable = longest_;
+  if (Of::kState.nslot && k.state[0] > 0) stable = std::min(stable, k.state[0]);
   h_ = k.dt;
   for (;;) {
+    // a step that is stable as a whole, as those in contact are, is not divided
+    const double all = k.dt / stable - kRounding,
+                 steps = all <= 1 ? 1 : std::ceil(k.dt / (Of::kShare * stable) - kRounding);
     if (!(steps <= kMostSteps)) {
       char text[160];
       std::snprintf(text, sizeof text,
@@ -142,10 +146,10 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
       return DFM_E_FATAL;
     }
     unlike_ = false;
-    const double worst = double(stepper_->worst());
-    if (!(worst > 0)) break;
-    // without dampers it falls as h^2
-    steps = std::ceil(steps * std::sqrt(worst / 4) / kShorter);
+    const double highest = double(stepper_->highest());
+    shape_ = highest > 0 ? 1 / highest : 0;
+    if (!(highest * (k.dt / n) > 1 + kRounding)) break;
+    stable = shape_;
   }
   for (uint32_t s = 0; s < nsurfel_; ++s) {
     double way[3] = {};
@@ -196,6 +200,7 @@ void Body<Of>::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
 
 template <class Of>
 void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
+  if (Of::kState.nslot) k.state_out[0] = shape_;
   each_point([&](size_t i) {
     const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
     const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};

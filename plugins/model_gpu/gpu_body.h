@@ -25,7 +25,11 @@ class Body {
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
-  bool lacks_state(const dfm_kin &) const { return false; }
+  bool lacks_state(const dfm_kin &k) const {
+    if (!Of::kState.nslot || k.state) return false;
+    model::complain(host, Of::kId, "the host gives no state");
+    return true;
+  }
 
   dfm_status predict(const dfm_kin &k, const double *f, double *u_s);
   void respond(uint32_t n, const uint32_t *surfel, const double *p, double *du);
@@ -48,8 +52,9 @@ class Body {
   Buffer<double> block_energy_;  // J
   std::unique_ptr<Stepper> stepper_;
   bool unlike_ = true;  // the device's arrays may differ from those of stepper_
-  double longest_ = 0;  // s
+  double longest_ = 0;  // s, stable near rest
   double h_ = 0;        // s, of the step that was predicted
+  double shape_ = 0;    // s, stable at its worst shape; 0 where no kernel finds it
   dfm_fact facts_[kFactCount] = {};
 
   void take_surface(const dfm_mesh &m);

@@ -17,7 +17,7 @@ struct Parts {
   const dfm_host *host = nullptr;
   uint32_t npoint = 0;
   Buffer<double> mass;  // [npoint] kg
-  Buffer<double> row;   // [npoint] N/m, of the step bound
+  Buffer<double> row;   // [npoint] N/m, of the step bound; of cells at rest
   void take_points(const dfm_host *h, uint32_t n) {
     host = h;
     npoint = n;

@@ -9,6 +9,8 @@ class Springs : public Parts {
   static constexpr const char *kId = "org.deform.msm_gpu";
   static constexpr uint32_t kParams = kPoisson;  // those before it
   static constexpr const char *kLongest = "sub-step that is stable in every shape";
+  static constexpr double kShare = 1;  // of a sub-step that is stable
+  static constexpr dfm_slots kState = {sizeof(dfm_slots), 0, nullptr, 0, 0};
   static constexpr dfm_fact kCount = {"springs", "springs, each read from both ends in a sub-step", "1", 0};
 
   void create(const dfm_host *h, const dfm_mesh &m);

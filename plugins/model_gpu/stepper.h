@@ -28,8 +28,8 @@ struct uvec2 {
 };
 struct uvec4 { uint32_t x, y, z, w; };
 
-// Bindings of the arrays, as in the .comp files. From kOwn to kWorst they are those of the kernels.
-enum Binding : uint32_t { kPlace, kSpeed, kLoad, kNextPlace, kNextSpeed, kOwn, kWorst = 10, kBindings };
+// Bindings of the arrays, as in the .comp files. From kOwn to kHighest they are those of the kernels.
+enum Binding : uint32_t { kPlace, kSpeed, kLoad, kNextPlace, kNextSpeed, kOwn, kHighest = 10, kBindings };
 
 // What a kernel is called with; the layout is that of the .comp files.
 struct Constants {
@@ -62,7 +62,7 @@ struct Work {
   };
   Pass pass[2];
   uint32_t npass;
-  Array array[kWorst - kOwn];
+  Array array[kHighest - kOwn];
 };
 
 // Arrays [npoint] that a body writes before run() and reads after it: place (m; 1/kg), speed (m/s; held
@@ -78,11 +78,11 @@ class Stepper {
   // n sub-steps of h; moved, loaded: place and speed, or load, are not those that the last run left. NULL, or
   // why it failed.
   virtual const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) = 0;
-  // 0, or the largest h^2 D/m + 2 h E/m of a point above 4 in the last run, whose steps were too long.
-  float worst() const { return std::bit_cast<float>(*worst_); }
+  // 1/s, the highest rate of the step bound at the shapes of the last run; 0 where no kernel finds it.
+  float highest() const { return std::bit_cast<float>(*highest_); }
 
  protected:
-  uint32_t *worst_ = nullptr;
+  uint32_t *highest_ = nullptr;
 };
 
 class Reference : public Stepper {
@@ -95,8 +95,8 @@ class Reference : public Stepper {
   const dfm_host *host_;
   Work work_{};
   Buffer<dvec4> array_[5];
-  Buffer<uint32_t> exceeded_;
-  Buffer<uint8_t> own_[kWorst - kOwn];
+  Buffer<uint32_t> rate_;
+  Buffer<uint8_t> own_[kHighest - kOwn];
   dvec4 *next_place_, *next_speed_;
 };
 
@@ -112,6 +112,11 @@ using std::max;
 using std::sqrt;
 using uint = uint32_t;
 inline float uintBitsToFloat(uint bits) { return std::bit_cast<float>(bits); }
+inline uint floatBitsToUint(float value) { return std::bit_cast<uint>(value); }
+inline uvec2 unpackDouble2x32(double value) {
+  const uint64_t bits = std::bit_cast<uint64_t>(value);
+  return {uint32_t(bits), uint32_t(bits >> 32)};
+}
 inline double packDouble2x32(uvec2 bits) { return std::bit_cast<double>(uint64_t{bits.y} << 32 | bits.x); }
 
 }  // namespace gpu

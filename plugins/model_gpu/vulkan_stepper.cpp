@@ -46,8 +46,8 @@ VulkanStepper::~VulkanStepper() { close(); }
 void VulkanStepper::open() {
   const Vulkan &vk = *vulkan_;
   for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_}) make(*array, bytes(), false);
-  make(exceeded_, sizeof(uint32_t), true);
-  worst_ = static_cast<uint32_t *>(exceeded_.mapped);
+  make(rate_, sizeof(uint32_t), true);
+  highest_ = static_cast<uint32_t *>(rate_.mapped);
   make(shared_, 3 * bytes(), true);
   place = static_cast<dvec4 *>(shared_.mapped);
   speed = place + npoint_;
@@ -91,7 +91,7 @@ void VulkanStepper::close() {
   vk.DestroyFence(vk.device, done_, nullptr);
   vk.DestroyCommandPool(vk.device, pool_, nullptr);
   vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
-  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &exceeded_, &shared_})
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &rate_, &shared_})
     drop(*array);
   for (Array &array : own_) drop(array);
 }
@@ -130,8 +130,8 @@ void VulkanStepper::describe() {
   for (uint32_t s = 0; s < 2; ++s) {
     VkBuffer buffers[kBindings] = {place_[s].buffer, speed_[s].buffer, load_.buffer, place_[1 - s].buffer,
                                    speed_[1 - s].buffer};
-    for (uint32_t n = 0; n < kWorst - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
-    buffers[kWorst] = exceeded_.buffer;
+    for (uint32_t n = 0; n < kHighest - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
+    buffers[kHighest] = rate_.buffer;
     for (uint32_t b = 0; b < kBindings; ++b) {
       if (!buffers[b]) continue;
       const VkDescriptorBufferInfo whole{buffers[b], 0, VK_WHOLE_SIZE};
@@ -192,11 +192,11 @@ void VulkanStepper::take(const Work &work) {
     if ((work.pass[p].count + kGroup - 1) / kGroup > vulkan_->limits.maxComputeWorkGroupCount[0])
       throw "the body has more points or cells than the device " + vulkan_->name +
           " takes in one call; take a coarser mesh";
-  for (uint32_t n = 0; first && n < kWorst - kOwn; ++n)
+  for (uint32_t n = 0; first && n < kHighest - kOwn; ++n)
     if (work.array[n].bytes) make(own_[n], work.array[n].bytes, false);
   if (first) describe();
   work_ = work;
-  for (uint32_t n = 0; n < kWorst - kOwn; ++n)
+  for (uint32_t n = 0; n < kHighest - kOwn; ++n)
     if (work.array[n].data) upload(own_[n], work.array[n].data, work.array[n].bytes);
 }
 
@@ -238,7 +238,7 @@ void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
 
 // What was recorded is used again where it is the same, as it is from step to step.
 const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, bool loaded) {
-  *worst_ = 0;
+  *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMostSteps);
     const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, damping};

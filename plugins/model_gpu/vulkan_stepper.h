@@ -33,7 +33,7 @@ class VulkanStepper : public Stepper {
   std::shared_ptr<Vulkan> vulkan_;
   uint32_t npoint_, now_ = 0;  // which of place_ and speed_ is the present
   Work work_{};
-  Array place_[2], speed_[2], load_, own_[kWorst - kOwn], exceeded_, shared_;
+  Array place_[2], speed_[2], load_, own_[kHighest - kOwn], rate_, shared_;
   VkDescriptorPool sets_ = VK_NULL_HANDLE;
   VkDescriptorSet set_[2] = {};
   VkCommandPool pool_ = VK_NULL_HANDLE;

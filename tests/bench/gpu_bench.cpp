@@ -145,7 +145,7 @@ double difference(const Of &parts, const std::vector<double> &x, double inverse_
   for (Stepper *s : {static_cast<Stepper *>(&device), static_cast<Stepper *>(&processor)}) {
     start(x, inverse_mass, *s);
     if (const char *why = s->run(n, kStep, damping, true, true)) std::printf("%s\n", why);
-    if (s->worst() > 0) std::printf("%g > 4: too long a step\n", double(s->worst()));
+    if (s->highest() * kStep > 1) std::printf("%g 1/s: too long a step\n", double(s->highest()));
   }
   for (uint32_t i = 0; i < parts.npoint; ++i) {
     const dvec4 &a = device.place[i], &b = processor.place[i];

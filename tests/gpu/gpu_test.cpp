@@ -120,6 +120,32 @@ TEST_P(Gpu, SubStep_IsThatOfTheProcessorsModel) {
   EXPECT_LE(off, 1e-6 * most);
 }
 
+// In contact the library takes 0.9 of the bound, and an impulse moves its points as the scheme of one
+// sub-step does. Dampers rule the bound here, and the lightest points are held.
+TEST_P(Gpu, StepOfTheBound_IsOneSubStep) {
+  const Mesh m = kuhn_bar(4, 3, 3, 0.02, 0.2);
+  for (const double damping : {0.0, 1e-4, 1e-2}) {
+    const Params p = {{"young", 3e5}, {"damping_stiffness", damping}};
+    Bodies b(GetParam(), m, p, clamp_of(m));
+    NEEDS_DRIVER(b);
+    Plain plain(b.host, GetParam(), m, p, clamp_of(m));
+    const double h = 0.9 * stable_step(*b.device, clamp_of(m));
+    plain.shake(1e-5, 0.01);
+    plain.sub_step(h);
+    for (Stepper *each : {b.device.get(), b.processor.get()}) {
+      each->dt = h;
+      each->shake(1e-5, 0.01);
+      each->step();
+      double most = 0, off = 0;
+      for (uint32_t i = 0; i < m.npoint(); ++i) {
+        most = std::max(most, norm(plain.get(plain.v, i)));
+        off = std::max(off, norm(plain.get(plain.v, i) - each->get(each->v, i)));
+      }
+      EXPECT_LE(off, 1e-6 * most) << damping;
+    }
+  }
+}
+
 TEST_P(Gpu, StretchedBar_HasThePeriodOfTheProcessorsModel) {
   const Mesh m = kuhn_bar(12, 2, 2, 0.02);
   const double young = 1e6;
