@@ -147,10 +147,10 @@ void VulkanStepper::describe() {
   }
 }
 
-void VulkanStepper::begin(VkCommandBuffer commands) const {
+VkResult VulkanStepper::begin(VkCommandBuffer commands) const {
   VkCommandBufferBeginInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  vulkan_->BeginCommandBuffer(commands, &info);
+  return vulkan_->BeginCommandBuffer(commands, &info);
 }
 
 void VulkanStepper::order(VkCommandBuffer commands, VkPipelineStageFlags before,
@@ -174,10 +174,10 @@ void VulkanStepper::upload(const Array &to, const void *from, size_t size) {
   try {
     make(staging, size, true);
     std::memcpy(staging.mapped, from, size);
-    begin(once_);
+    must(begin(once_), "vkBeginCommandBuffer");
     const VkBufferCopy all{0, 0, size};
     vulkan_->CmdCopyBuffer(once_, staging.buffer, to.buffer, 1, &all);
-    vulkan_->EndCommandBuffer(once_);
+    must(vulkan_->EndCommandBuffer(once_), "vkEndCommandBuffer");
     must(finish(once_), "a copy of the body");
   } catch (...) {
     drop(staging);
@@ -200,13 +200,13 @@ void VulkanStepper::take(const Work &work) {
     if (work.array[n].data) upload(own_[n], work.array[n].data, work.array[n].bytes);
 }
 
-void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
+VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
   const Vulkan &vk = *vulkan_;
   const auto copy = [&](const Array &from, size_t at, const Array &to, size_t to_at) {
     const VkBufferCopy part{at, to_at, bytes()};
     vk.CmdCopyBuffer(commands, from.buffer, to.buffer, 1, &part);
   };
-  begin(commands);
+  if (const VkResult begun = begin(commands); begun != VK_SUCCESS) return begun;
   order(commands, kCompute | kCopy | kProcessor, kCompute | kCopy);
   if (batch.moved) {
     copy(shared_, 0, place_[batch.from], 0);
@@ -233,7 +233,7 @@ void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
     copy(speed_[end], 0, shared_, bytes());
     order(commands, kCompute | kCopy, kProcessor);
   }
-  vk.EndCommandBuffer(commands);
+  return vk.EndCommandBuffer(commands);
 }
 
 // What was recorded is used again where it is the same, as it is from step to step.
@@ -243,11 +243,14 @@ const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, 
     const uint32_t some = std::min(n - taken, kMostSteps);
     const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, damping};
     const uint32_t slot = batch.from + 2 * batch.moved + 4 * batch.loaded + 8 * batch.seen;
+    VkResult result = VK_SUCCESS;
     if (!(recorded_[slot] == batch)) {
-      record(commands_[slot], batch);
-      recorded_[slot] = batch;
+      recorded_[slot] = {};
+      result = record(commands_[slot], batch);
+      if (result == VK_SUCCESS) recorded_[slot] = batch;
     }
-    if (finish(commands_[slot]) != VK_SUCCESS)
+    if (result == VK_SUCCESS) result = finish(commands_[slot]);
+    if (result != VK_SUCCESS)
       return "the device was lost, or its driver failed; restart the program, or set device to reference";
     taken += some;
     now_ = (now_ + some) % 2;

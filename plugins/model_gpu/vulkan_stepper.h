@@ -47,10 +47,10 @@ class VulkanStepper : public Stepper {
   void open();
   void close();
   void describe();
-  void begin(VkCommandBuffer commands) const;
+  VkResult begin(VkCommandBuffer commands) const;
   void order(VkCommandBuffer commands, VkPipelineStageFlags before, VkPipelineStageFlags after) const;
   VkResult finish(VkCommandBuffer commands);
-  void record(VkCommandBuffer commands, const Batch &batch) const;
+  VkResult record(VkCommandBuffer commands, const Batch &batch) const;
   void upload(const Array &to, const void *from, size_t size);
 };
 
