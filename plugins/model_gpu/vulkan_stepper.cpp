@@ -26,7 +26,7 @@ VkAccessFlags reads_of(VkPipelineStageFlags stages) {
 void must(VkResult result, const char *what) {
   if (result == VK_SUCCESS) return;
   throw std::string(what) + " failed on the device (VkResult " + std::to_string(int(result)) +
-      "); take a smaller body, or set device to reference";
+      "); take a smaller body, or take the model without _gpu";
 }
 
 }  // namespace
@@ -251,7 +251,7 @@ const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, 
     }
     if (result == VK_SUCCESS) result = finish(commands_[slot]);
     if (result != VK_SUCCESS)
-      return "the device was lost, or its driver failed; restart the program, or set device to reference";
+      return "the device was lost, or its driver failed; restart the program, or take the model without _gpu";
     taken += some;
     now_ = (now_ + some) % 2;
   }

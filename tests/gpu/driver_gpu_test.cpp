@@ -52,7 +52,7 @@ void expect_told(Broken broken) {
   const auto works = std::exchange((*one.vulkan).*Call, broken);
   const char *const why = one.run();
   ASSERT_NE(why, nullptr);
-  EXPECT_NE(std::string(why).find("set device to reference"), std::string::npos) << why;
+  EXPECT_NE(std::string(why).find("take the model without _gpu"), std::string::npos) << why;
   (*one.vulkan).*Call = works;
   EXPECT_EQ(one.run(), nullptr);
   EXPECT_EQ(one.stepper->place[0].x, 1);

@@ -128,6 +128,11 @@ struct PlannedWay {
 };
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);
 
+// s of processor time per second, on a card by the clock, of a body that a model moves in the scheme that the
+// body names, else explicitly, in steps of a scene; infinite where it was not measured.
+double predicted_cost(const Measured &measured, const std::string &model, const BodyRegime &body,
+                      double step);
+
 // Milliseconds of a frame.
 double ms_per_step(const Way &way);
 
