@@ -58,14 +58,15 @@ void force_of_cell(uint i) {
   all[2] = s[5];
   all[6] = s[5];
   const dvec2 growth = growth_of(f, e, g2.y, g2.z);
-  const precise float stiffer = float(growth.x);
-  const precise float damped = DAMPING * float(growth.y);
+  const precise float damper = DAMPING * float(growth.y);
+  const precise float stiffer = float(growth.x) + PER_LAG * damper;
+  const precise float damped = PER_LAG > 0.0f ? 0.0f : damper;
   if (DAMPING > 0.0f) {
     const double damping = double(DAMPING);
-    x0 = SPEED(q.x);
-    x1 = SPEED(q.y);
-    x2 = SPEED(q.z);
-    x3 = SPEED(q.w);
+    x0 = SEEN(q.x);
+    x1 = SEEN(q.y);
+    x2 = SEEN(q.z);
+    x3 = SEEN(q.w);
     d[0] = x1.x - x0.x;
     d[1] = x1.y - x0.y;
     d[2] = x1.z - x0.z;

@@ -1,5 +1,6 @@
 // Second pass: each point adds up the forces of its corners, always in the same order, and moves. The highest
-// rate of all is that of the step bound at this shape: 1 / h with h^2 D/m + 2 h E/m = 4.
+// rate of all is that of the step bound at this shape: 1 / h with h^2 D/m + 2 h E/m = 4; dampers
+// with a lag count in D, over the lag.
 #include "motion.glsl"
 void move_corners(uint i) {
   const dvec4 x = PLACE(i);
@@ -27,8 +28,9 @@ void move_corners(uint i) {
     }
   }
   precise double rest = REST_ROW(i);   // 1/s2, D/m
-  precise double stiff = rest + x.w * double(stiffer);
-  precise double damper = (double(DAMPING) * rest + load.w) + x.w * double(damped);
+  precise double of_dampers = double(DAMPING) * rest;
+  precise double stiff = (rest + double(PER_LAG) * of_dampers) + x.w * double(stiffer);
+  precise double damper = ((PER_LAG > 0.0f ? double(0.0f) : of_dampers) + load.w) + x.w * double(damped);
   precise double rate = 0.25 * (damper + sqrt(damper * damper + 4.0 * stiff));
   if (uint(v.w) != 7u) RAISE(float(rate));   // a held point does not move
   end_step(i, x, v, load, fx, fy, fz);

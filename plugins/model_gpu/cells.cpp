@@ -80,8 +80,8 @@ void Cells::create(const dfm_host *h, const dfm_mesh &m) {
 }
 
 void Cells::fill(const double *params) {
-  damping_ = params[kDampingStiffness];
-  drag_ = params[kDampingMass];
+  damping = params[kDampingStiffness];
+  drag = params[kDampingMass];
   for (uint32_t c = 0; c < ncell_; ++c) {
     Rest &of = rest_[c];
     const model::Lame lame = model::lame_of(this->of(kYoung, params, c), this->of(kPoisson, params, c));
@@ -149,12 +149,12 @@ void Cells::bound(const dfm_kin &k, double *ksum, double *csum) {
     double f[9], r[9], e[6];
     strain(k, c, f, r, e);
     const dvec2 more = CellForces{none}.growth_of(f, e, rest_[c].mu2, rest_[c].lambda);
-    twist_[c] = more.x;
-    damper_[c] = damping_ * more.y;
+    twist_[c] = more.x + (lag > 0 ? damping * more.y / lag : 0);
+    damper_[c] = lag > 0 ? 0 : damping * more.y;
   });
   for (uint32_t i = 0; i < npoint; ++i) {
-    ksum[i] += row[i];
-    csum[i] += damping_ * row[i] + drag_ * mass[i];
+    ksum[i] += stiff(i);
+    csum[i] += damper(i);
   }
   for (size_t n = 0; n < 4 * size_t(ncell_); ++n) {
     ksum[cells_[n]] += twist_[n / 4] * double(twist_share_[n]);

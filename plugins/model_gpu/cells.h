@@ -13,9 +13,6 @@ class Cells : public Parts {
   static constexpr const char *kLongest =
       "sub-step that is stable near rest; where cells are drawn far, shorter";
   static constexpr double kShare = 0.9;  // of a sub-step that is stable: shapes change on the way
-  // s, the longest stable sub-step at the worst shape of the last step; 0 before the first
-  static constexpr dfm_slot kStable = {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0};
-  static constexpr dfm_slots kState = {sizeof(dfm_slots), 1, &kStable, 0, 0};
   static constexpr dfm_fact kCount = {"cells", "tetrahedra, each read once in a sub-step", "1", 0};
 
   void create(const dfm_host *h, const dfm_mesh &m);
@@ -41,7 +38,6 @@ class Cells : public Parts {
   Buffer<float> twist_share_;   // [ncell,4] row of a corner per stiffness against turning
   Buffer<double> row_by_mass_;  // [npoint] 1/s2
   Buffer<double> twist_, damper_;  // [ncell] of bound()
-  double damping_ = 0, drag_ = 0;
 
   double of(Param which, const double *params, uint32_t c) const {
     return field_[which].empty() ? params[which] : field_[which][c];

@@ -12,6 +12,10 @@ namespace {
 
 constexpr double kMostSteps = 1e6;
 constexpr double kRounding = 1e-6;  // rates of the kernels are binary32
+constexpr double kStrain = 1e-5;    // whose energy is that of a small one
+// Dampers with a lag are at most so stiff, relative to what is beside them; a mode at the own frequency
+// loses so much of its damping, and is so much faster, at most.
+constexpr double kStiffening = 3, kError = 0.02;
 
 }  // namespace
 
@@ -27,6 +31,7 @@ void Body<Of>::create(const dfm_host *h, const dfm_mesh &m) {
     if (m.fixed) held_[i] = m.fixed[i];
   }
   parts_.create(h, m);
+  rest_.create_copy(h, m.rest, 3 * size_t(npoint_));
   block_energy_.create(h, parts_.count() / kGrain + 1);
   take_surface(m);
   const Choice choice = Choice(uint32_t(m.params[kDevice]));
@@ -61,7 +66,7 @@ void Body<Of>::apply_params(const double *values) {
     model::complain(host, Of::kId, why.c_str());
     throw model::Refused{};
   }
-  find_longest();
+  find_lag();
   const char **effect = active_effects;
   if (Of::kParams > kPoisson) *effect++ = "volume";
   *effect++ = "large_rotation";
@@ -73,20 +78,68 @@ void Body<Of>::apply_params(const double *values) {
 }
 
 template <class Of>
-void Body<Of>::find_longest() {
-  longest_ = HUGE_VAL;
+double Body<Of>::longest() const {
+  double least = HUGE_VAL;
   for (uint32_t i = 0; i < npoint_; ++i) {
     if (held_[i] == 7) continue;
-    const double m = parts_.mass[i], k = parts_.row[i];
-    const double c = params_[kDampingStiffness] * k + params_[kDampingMass] * m;
+    const double m = parts_.mass[i], k = parts_.stiff(i), c = parts_.damper(i);
     const double most = c + std::sqrt(c * c + 4 * m * k);
-    if (most > 0) longest_ = std::min(longest_, 4 * m / most);
+    if (most > 0) least = std::min(least, 4 * m / most);
   }
+  return least;
+}
+
+// 1/s: the slowest motion in which the body strains the same everywhere, by Rayleigh's quotient.
+template <class Of>
+double Body<Of>::own_frequency() {
+  Buffer<double> x;
+  x.create(host, 3 * size_t(npoint_));
+  double middle[3] = {}, mass = 0, slowest = HUGE_VAL;
+  for (size_t i = 0; i < npoint_; ++i) {
+    mass += parts_.mass[i];
+    for (size_t a = 0; a < 3; ++a) middle[a] += parts_.mass[i] * rest_[3 * i + a];
+  }
+  for (double &of : middle) of /= mass;
+  dfm_kin k{};
+  k.size = sizeof k;
+  k.stride = 3;
+  k.x = x.data();
+  for (size_t row = 0; row < 3; ++row)
+    for (size_t col = 0; col <= row; ++col) {
+      double moved = 0;
+      for (size_t i = 0; i < npoint_; ++i) {
+        double u[3] = {};
+        u[row] += kStrain * (rest_[3 * i + col] - middle[col]);
+        if (col != row) u[col] += kStrain * (rest_[3 * i + row] - middle[row]);
+        for (size_t a = 0; a < 3; ++a) x[3 * i + a] = rest_[3 * i + a] + u[a];
+        moved += parts_.mass[i] * ((u[0] * u[0] + u[1] * u[1]) + u[2] * u[2]);
+      }
+      const double work = 2 * energy(k);
+      if (work > 0 && moved > 0) slowest = std::min(slowest, work / moved);
+    }
+  return std::sqrt(slowest);
+}
+
+// As the library finds that of a body that it moves itself (doc/concepts/step.md, dampers).
+template <class Of>
+void Body<Of>::find_lag() {
+  parts_.lag = 0;
+  longest_ = longest();
+  const double ratio = params_[kDampingStiffness];
+  if (ratio > 0) {
+    const double w = own_frequency();
+    parts_.lag = std::min({ratio / kStiffening, std::sqrt(kError) / w, 2 * kError / (ratio * w * w)});
+    const double with = longest();
+    if (with > longest_) longest_ = with;
+    else parts_.lag = 0;
+  }
+  dampers_ = {float(ratio), parts_.lag > 0 ? float(1 / parts_.lag) : 0};
 }
 
 template <class Of>
 bool Body<Of>::take_points(const dfm_kin &k) {
   std::atomic<bool> moved = false;
+  const bool damped = dampers_.damping > 0, begun = k.state[3 * size_t(npoint_)] > 0;
   each_point([&](size_t i) {
     bool differ = false;
     const auto put = [&](double &to, double from) {
@@ -101,6 +154,12 @@ bool Body<Of>::take_points(const dfm_kin &k) {
     put(speed.x, v[0]);
     put(speed.y, v[1]);
     put(speed.z, v[2]);
+    if (damped) {
+      const double *const u = begun ? k.state + 3 * i : v;
+      put(stepper_->seen[i].x, u[0]);
+      put(stepper_->seen[i].y, u[1]);
+      put(stepper_->seen[i].z, u[2]);
+    }
     if (differ) moved.store(true, std::memory_order_relaxed);
   });
   return moved;
@@ -123,7 +182,7 @@ bool Body<Of>::take_loads(const double *f, uint32_t stride) {
 template <class Of>
 dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
   double stable = longest_;
-  if (Of::kState.nslot && k.state[0] > 0) stable = std::min(stable, k.state[0]);
+  if (const double last = k.state[3 * size_t(npoint_)]; last > 0) stable = std::min(stable, last);
   h_ = k.dt;
   for (;;) {
     // a step that is stable as a whole, as those in contact are, is not divided
@@ -141,14 +200,15 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
     const bool moved = take_points(k) || unlike_, loaded = take_loads(f, k.stride) || unlike_;
     unlike_ = true;
     const uint32_t n = uint32_t(steps);
-    if (const char *why = stepper_->run(n, k.dt / n, float(params_[kDampingStiffness]), moved, loaded)) {
+    part_ = k.dt / n;
+    if (const char *why = stepper_->run(n, part_, dampers_, moved, loaded)) {
       model::complain(host, Of::kId, why);
       return DFM_E_FATAL;
     }
     unlike_ = false;
     const double highest = double(stepper_->highest());
-    shape_ = highest > 0 ? 1 / highest : 0;
-    if (!(highest * (k.dt / n) > 1 + kRounding)) break;
+    shape_ = highest > 0 ? 1 / highest : longest_;
+    if (!(highest * part_ > 1 + kRounding)) break;
     stable = shape_;
   }
   for (uint32_t s = 0; s < nsurfel_; ++s) {
@@ -200,15 +260,22 @@ void Body<Of>::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
 
 template <class Of>
 void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
-  if (Of::kState.nslot) k.state_out[0] = shape_;
+  const bool damped = dampers_.damping > 0;
+  k.state_out[3 * size_t(npoint_)] = shape_;
   each_point([&](size_t i) {
-    const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
+    const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i],
+                &seen = damped ? stepper_->seen[i] : speed;
     const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};
+    double *const u = k.state_out + 3 * i;
+    u[0] = seen.x;
+    u[1] = seen.y;
+    u[2] = seen.z;
     for (size_t a = 0; a < k.stride; ++a) {
       x[i * k.stride + a] = a < 3 ? end[a] : 0;
       v[i * k.stride + a] = a < 3 ? fast[a] : 0;
     }
   });
+  const double sees = 1 - dampers_.kept(part_);  // of a change
   for (size_t s = 0; s < nsurfel_; ++s) {
     const double *const p = p_s + 3 * s;
     if (p[0] == 0 && p[1] == 0 && p[2] == 0) continue;
@@ -218,6 +285,7 @@ void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v)
         const double change = free_inverse_mass(surfel_point_[e], int(a)) * (surfel_weight_[e] * p[a]);
         x[at] += h_ * change;
         v[at] += change;
+        k.state_out[3 * size_t(surfel_point_[e]) + a] += sees * change;
       }
   }
 }

@@ -43,6 +43,8 @@ Reference::Reference(const dfm_host *host, uint32_t npoint) : host_(host) {
   load = array_[2].data();
   next_place_ = array_[3].data();
   next_speed_ = array_[4].data();
+  seen = array_[5].data();
+  next_seen_ = array_[6].data();
   highest_ = rate_.data();
 }
 
@@ -54,7 +56,7 @@ void Reference::take(const Work &work) {
   }
 }
 
-const char *Reference::run(uint32_t n, double h, float damping, bool, bool) {
+const char *Reference::run(uint32_t n, double h, const Dampers &dampers, bool, bool) {
   *highest_ = 0;
   Task task{};
   for (uint32_t a = 0; a < kHighest - kOwn; ++a)
@@ -62,16 +64,17 @@ const char *Reference::run(uint32_t n, double h, float damping, bool, bool) {
   task.call.array[kLoad] = load;
   task.call.array[kHighest] = highest_;
   for (uint32_t k = 0; k < n; ++k) {
-    dvec4 *const now[4] = {place, speed, next_place_, next_speed_};
-    constexpr Binding to[4] = {kPlace, kSpeed, kNextPlace, kNextSpeed};
-    for (int a = 0; a < 4; ++a) task.call.array[to[a]] = now[a];
+    dvec4 *const now[6] = {place, speed, seen, next_place_, next_speed_, next_seen_};
+    constexpr Binding to[6] = {kPlace, kSpeed, kSeen, kNextPlace, kNextSpeed, kNextSeen};
+    for (int a = 0; a < 6; ++a) task.call.array[to[a]] = now[a];
     for (uint32_t p = 0; p < work_.npass; ++p) {
       task.pass = &work_.pass[p];
-      task.call.now = {h, task.pass->count, damping};
+      task.call.now = dampers.constants(h, task.pass->count);
       host_->parallel_for(host_->ctx, task.pass->count, kGrain, do_some, &task);
     }
     std::swap(place, next_place_);
     std::swap(speed, next_speed_);
+    if (dampers.damping > 0) std::swap(seen, next_seen_);
   }
   return nullptr;
 }

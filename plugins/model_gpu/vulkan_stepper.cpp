@@ -45,14 +45,16 @@ VulkanStepper::~VulkanStepper() { close(); }
 
 void VulkanStepper::open() {
   const Vulkan &vk = *vulkan_;
-  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_}) make(*array, bytes(), false);
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &seen_[0], &seen_[1], &load_})
+    make(*array, bytes(), false);
   make(rate_, sizeof(uint32_t), true);
   highest_ = static_cast<uint32_t *>(rate_.mapped);
-  make(shared_, 3 * bytes(), true);
+  make(shared_, 4 * bytes(), true);
   place = static_cast<dvec4 *>(shared_.mapped);
   speed = place + npoint_;
-  load = speed + npoint_;
-  std::memset(static_cast<void *>(place), 0, 3 * bytes());
+  seen = speed + npoint_;
+  load = seen + npoint_;
+  std::memset(static_cast<void *>(place), 0, 4 * bytes());
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * kBindings};
   VkDescriptorPoolCreateInfo sets{};
   sets.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
@@ -91,7 +93,8 @@ void VulkanStepper::close() {
   vk.DestroyFence(vk.device, done_, nullptr);
   vk.DestroyCommandPool(vk.device, pool_, nullptr);
   vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
-  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &rate_, &shared_})
+  for (Array *array :
+       {&place_[0], &place_[1], &speed_[0], &speed_[1], &seen_[0], &seen_[1], &load_, &rate_, &shared_})
     drop(*array);
   for (Array &array : own_) drop(array);
 }
@@ -132,6 +135,8 @@ void VulkanStepper::describe() {
                                    speed_[1 - s].buffer};
     for (uint32_t n = 0; n < kHighest - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
     buffers[kHighest] = rate_.buffer;
+    buffers[kSeen] = seen_[s].buffer;
+    buffers[kNextSeen] = seen_[1 - s].buffer;
     for (uint32_t b = 0; b < kBindings; ++b) {
       if (!buffers[b]) continue;
       const VkDescriptorBufferInfo whole{buffers[b], 0, VK_WHOLE_SIZE};
@@ -208,11 +213,13 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
   };
   if (const VkResult begun = begin(commands); begun != VK_SUCCESS) return begun;
   order(commands, kCompute | kCopy | kProcessor, kCompute | kCopy);
+  const bool damped = batch.dampers.damping > 0;
   if (batch.moved) {
     copy(shared_, 0, place_[batch.from], 0);
     copy(shared_, bytes(), speed_[batch.from], 0);
+    if (damped) copy(shared_, 2 * bytes(), seen_[batch.from], 0);
   }
-  if (batch.loaded) copy(shared_, 2 * bytes(), load_, 0);
+  if (batch.loaded) copy(shared_, 3 * bytes(), load_, 0);
   if (batch.moved || batch.loaded) order(commands, kCopy, kCompute);
   for (uint32_t k = 0; k < batch.n; ++k) {
     vk.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.layout, 0, 1,
@@ -221,7 +228,7 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
       const Work::Pass &pass = work_.pass[p];
       if (k + p > 0) order(commands, kCompute, kCompute);
       vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline[pass.kernel]);
-      const Constants now{batch.h, pass.count, batch.damping};
+      const Constants now = batch.dampers.constants(batch.h, pass.count);
       vk.CmdPushConstants(commands, vk.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof now, &now);
       vk.CmdDispatch(commands, (pass.count + kGroup - 1) / kGroup, 1, 1);
     }
@@ -231,17 +238,18 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
     order(commands, kCompute, kCopy);
     copy(place_[end], 0, shared_, 0);
     copy(speed_[end], 0, shared_, bytes());
+    if (damped) copy(seen_[end], 0, shared_, 2 * bytes());
     order(commands, kCompute | kCopy, kProcessor);
   }
   return vk.EndCommandBuffer(commands);
 }
 
 // What was recorded is used again where it is the same, as it is from step to step.
-const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, bool loaded) {
+const char *VulkanStepper::run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) {
   *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMostSteps);
-    const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, damping};
+    const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, dampers};
     const uint32_t slot = batch.from + 2 * batch.moved + 4 * batch.loaded + 8 * batch.seen;
     VkResult result = VK_SUCCESS;
     if (!(recorded_[slot] == batch)) {

@@ -42,7 +42,7 @@ struct Moving {
     stepper->place[0] = {0, 0, 0, 1};
     stepper->speed[0] = {1, 0, 0, 0};
   }
-  const char *run() { return stepper->run(2, 0.5, 0, true, true); }
+  const char *run() { return stepper->run(2, 0.5, {}, true, true); }
 };
 
 template <auto Call, class Broken>
