@@ -142,8 +142,15 @@ void Cells::strain(const dfm_kin &k, size_t c, double (&f)[9], double (&r)[9], d
   of.strain_of(r, f, e);
 }
 
-// What each shape adds to the rows at rest, as the kernel counts it.
+// What each shape adds to the rows at rest, as the kernel counts it. After a step the kernel has found the
+// sub-step that no point asks to be shorter; as dampers, points ask for that and leave room to what else acts on
+// them. The worst point at rest is named.
 void Cells::bound(const dfm_kin &k, double *ksum, double *csum) {
+  constexpr double kOthers = 1 - 1e-6;
+  if (const double last = k.state[3 * size_t(npoint)]; last > 0) {
+    for (uint32_t i = 0; i < npoint; ++i) csum[i] += (i == worst ? 1 : kOthers) * (2 * mass[i] / last);
+    return;
+  }
   each(host, ncell_, [&](size_t c) {
     const Call none{};
     double f[9], r[9], e[6];

@@ -78,13 +78,15 @@ void Body<Of>::apply_params(const double *values) {
 }
 
 template <class Of>
-double Body<Of>::longest() const {
+double Body<Of>::longest() {
   double least = HUGE_VAL;
   for (uint32_t i = 0; i < npoint_; ++i) {
     if (held_[i] == 7) continue;
     const double m = parts_.mass[i], k = parts_.stiff(i), c = parts_.damper(i);
     const double most = c + std::sqrt(c * c + 4 * m * k);
-    if (most > 0) least = std::min(least, 4 * m / most);
+    if (!(4 * m < most * least)) continue;
+    least = 4 * m / most;
+    parts_.worst = i;
   }
   return least;
 }
@@ -129,9 +131,8 @@ void Body<Of>::find_lag() {
   if (ratio > 0) {
     const double w = own_frequency();
     parts_.lag = std::min({ratio / kStiffening, std::sqrt(kError) / w, 2 * kError / (ratio * w * w)});
-    const double with = longest();
-    if (with > longest_) longest_ = with;
-    else parts_.lag = 0;
+    if (!(longest() > longest_)) parts_.lag = 0;
+    longest_ = longest();
   }
   dampers_ = {float(ratio), parts_.lag > 0 ? float(1 / parts_.lag) : 0};
 }

@@ -68,7 +68,7 @@ class Body {
   void take_surface(const dfm_mesh &m);
   double own_frequency();
   void find_lag();
-  double longest() const;
+  double longest();
   bool take_points(const dfm_kin &k);
   bool take_loads(const double *f, uint32_t stride);
   template <class F>
