@@ -63,10 +63,10 @@ void force_of_cell(uint i) {
   const precise float damped = PER_LAG > 0.0f ? 0.0f : damper;
   if (DAMPING > 0.0f) {
     const double damping = double(DAMPING);
-    x0 = SEEN(q.x);
-    x1 = SEEN(q.y);
-    x2 = SEEN(q.z);
-    x3 = SEEN(q.w);
+    x0 = OF_DAMPERS(q.x);
+    x1 = OF_DAMPERS(q.y);
+    x2 = OF_DAMPERS(q.z);
+    x3 = OF_DAMPERS(q.w);
     d[0] = x1.x - x0.x;
     d[1] = x1.y - x0.y;
     d[2] = x1.z - x0.z;

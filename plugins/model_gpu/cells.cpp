@@ -143,8 +143,8 @@ void Cells::strain(const dfm_kin &k, size_t c, double (&f)[9], double (&r)[9], d
 }
 
 // What each shape adds to the rows at rest, as the kernel counts it. After a step the kernel has found the
-// sub-step that no point asks to be shorter; as dampers, points ask for that and leave room to what else acts on
-// them. The worst point at rest is named.
+// sub-step that no point asks to be shorter; as dampers, points ask for that and leave room to what else acts
+// on them. The worst point at rest is named.
 void Cells::bound(const dfm_kin &k, double *ksum, double *csum) {
   constexpr double kOthers = 1 - 1e-6;
   if (const double last = k.state[3 * size_t(npoint)]; last > 0) {

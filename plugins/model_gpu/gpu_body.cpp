@@ -140,7 +140,7 @@ void Body<Of>::find_lag() {
 template <class Of>
 bool Body<Of>::take_points(const dfm_kin &k) {
   std::atomic<bool> moved = false;
-  const bool damped = dampers_.damping > 0, begun = k.state[3 * size_t(npoint_)] > 0;
+  const bool lagged = dampers_.per_lag > 0, begun = k.state[3 * size_t(npoint_)] > 0;
   each_point([&](size_t i) {
     bool differ = false;
     const auto put = [&](double &to, double from) {
@@ -155,7 +155,7 @@ bool Body<Of>::take_points(const dfm_kin &k) {
     put(speed.x, v[0]);
     put(speed.y, v[1]);
     put(speed.z, v[2]);
-    if (damped) {
+    if (lagged) {
       const double *const u = begun ? k.state + 3 * i : v;
       put(stepper_->seen[i].x, u[0]);
       put(stepper_->seen[i].y, u[1]);
@@ -261,11 +261,11 @@ void Body<Of>::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
 
 template <class Of>
 void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
-  const bool damped = dampers_.damping > 0;
+  const bool lagged = dampers_.per_lag > 0;
   k.state_out[3 * size_t(npoint_)] = shape_;
   each_point([&](size_t i) {
     const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i],
-                &seen = damped ? stepper_->seen[i] : speed;
+                &seen = lagged ? stepper_->seen[i] : speed;
     const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};
     double *const u = k.state_out + 3 * i;
     u[0] = seen.x;

@@ -21,6 +21,7 @@ layout(push_constant) uniform Now {
 #define NEXT_SPEED(i, value) next_speed[i] = value
 #define SEEN(i) seen[i]
 #define NEXT_SEEN(i, value) next_seen[i] = value
+#define OF_DAMPERS(i) (per_lag > 0.0f ? seen[i] : speed[i])
 #define STEP step
 #define KEPT kept
 #define PER_LAG per_lag

@@ -74,7 +74,7 @@ const char *Reference::run(uint32_t n, double h, const Dampers &dampers, bool, b
     }
     std::swap(place, next_place_);
     std::swap(speed, next_speed_);
-    if (dampers.damping > 0) std::swap(seen, next_seen_);
+    if (dampers.per_lag > 0) std::swap(seen, next_seen_);
   }
   return nullptr;
 }

@@ -12,7 +12,7 @@ void move_point(uint i) {
   const dvec4 x = PLACE(i);     // m; 1/kg
   const dvec4 v = SPEED(i);     // m/s; held components, bits 1 x, 2 y, 4 z
   const dvec4 load = LOAD(i);   // m/s2; drag 1/s
-  const dvec4 u = DAMPING > 0.0f ? SEEN(i) : v;
+  const dvec4 u = DAMPING > 0.0f ? OF_DAMPERS(i) : v;
   const uvec2 row = ROW(i);     // of its springs: the first, how many; 32 points side by side
   precise double fx = double(0.0f);
   precise double fy = fx;
@@ -25,7 +25,7 @@ void move_point(uint i) {
     dvec4 w[4];
     UNROLLED for (uint k = 0u; k < 4u; ++k) spring[k] = SPRING(row.x + 32u * (n + k));
     UNROLLED for (uint k = 0u; k < 4u; ++k) y[k] = PLACE(spring[k].x);
-    UNROLLED for (uint k = 0u; k < 4u; ++k) w[k] = DAMPING > 0.0f ? SEEN(spring[k].x) : v;
+    UNROLLED for (uint k = 0u; k < 4u; ++k) w[k] = DAMPING > 0.0f ? OF_DAMPERS(spring[k].x) : v;
     UNROLLED for (uint k = 0u; k < 4u; ++k) {
       precise double dx = y[k].x - x.x;
       precise double dy = y[k].y - x.y;

@@ -213,11 +213,11 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
   };
   if (const VkResult begun = begin(commands); begun != VK_SUCCESS) return begun;
   order(commands, kCompute | kCopy | kProcessor, kCompute | kCopy);
-  const bool damped = batch.dampers.damping > 0;
+  const bool lagged = batch.dampers.per_lag > 0;
   if (batch.moved) {
     copy(shared_, 0, place_[batch.from], 0);
     copy(shared_, bytes(), speed_[batch.from], 0);
-    if (damped) copy(shared_, 2 * bytes(), seen_[batch.from], 0);
+    if (lagged) copy(shared_, 2 * bytes(), seen_[batch.from], 0);
   }
   if (batch.loaded) copy(shared_, 3 * bytes(), load_, 0);
   if (batch.moved || batch.loaded) order(commands, kCopy, kCompute);
@@ -238,7 +238,7 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
     order(commands, kCompute, kCopy);
     copy(place_[end], 0, shared_, 0);
     copy(speed_[end], 0, shared_, bytes());
-    if (damped) copy(seen_[end], 0, shared_, 2 * bytes());
+    if (lagged) copy(seen_[end], 0, shared_, 2 * bytes());
     order(commands, kCompute | kCopy, kProcessor);
   }
   return vk.EndCommandBuffer(commands);
