@@ -34,7 +34,8 @@ inline constexpr size_t kMeets = 4;
 const char *meets_name(Meets meets);  // as a file of costs names it
 
 struct MeasuredModel {
-  std::string id;  // short name
+  std::string id;       // short name
+  std::string machine;  // on which it was measured; empty: that of all
   bool steps_itself = false;
   // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 0.02 and by
   // 0.8 of its length, a bar that turns, a block that lies on a plane, a held block that a small sphere

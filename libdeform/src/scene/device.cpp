@@ -95,12 +95,18 @@ class Chooser {
       return format("no costs of %s are known; deform calibrate measures them where there is a card",
                     std::isfinite(here) ? short_id(card).c_str() : short_id(own).c_str());
     const std::string times = format(
-        "%u points that touch %s: %.2g ms per step of %.3g s on a card, %.2g ms "
-        "on the processor, by the costs of %s",
-        b.points, touches(b), there, step, here, measured_.machine.c_str());
+        "%u points that touch %s: %.2g ms per step of %.3g s on a card (costs of %s), %.2g ms on the "
+        "processor (%s)",
+        b.points, touches(b), there, step, machine(card).c_str(), here, machine(own).c_str());
     if (!(there < here)) return times;
     faster_ = times;
     return "";
+  }
+
+  std::string machine(const dfm_type &model) const {
+    for (const MeasuredModel &m : measured_.models)
+      if (m.id == short_id(model) && !m.machine.empty()) return m.machine;
+    return measured_.machine;
   }
 
   static const char *touches(const BodyRegime &b) {
