@@ -67,6 +67,15 @@ void print_unwatched(const JsonValue &plan) {
       std::printf("  %-20s  not seen by the energy watch: %s\n", body.get("name").c_str(), why.c_str());
 }
 
+// What moves bodies whose scene says "device".
+void print_devices(const std::string &json) {
+  JsonValue devices;
+  if (json.empty() || !parse_json(json, devices)) return;
+  for (const JsonValue &d : devices.items)
+    std::printf("  %-20s  runs on: %s, by %s: %s\n", d.get("name").c_str(), d.get("device").c_str(),
+                d.get("model").c_str(), d.get("why").c_str());
+}
+
 // Models that bodies are to have later.
 void print_changes(const JsonValue &plan) {
   for (const JsonValue &body : plan.list("bodies")) {
@@ -204,10 +213,11 @@ int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
     throw Failure(kBadInput, "the library's plan is not JSON: " + text.substr(0, 200));
   std::vector<EffectCost> costs;
   if (options.costs) costs = measure(globals, scene, options.set, plan);
-  const std::string planned = planned_json(scene);
+  const std::string planned = planned_json(scene), devices = scene.value("/devices");
   if (globals.json) {
     const std::string more = (options.costs ? ",\"costs\":" + costs_json(costs) : "") +
-                             (planned.empty() ? "" : ",\"planner\":" + planned) + "}";
+                             (planned.empty() ? "" : ",\"planner\":" + planned) +
+                             (devices.empty() ? "" : ",\"devices\":" + devices) + "}";
     std::printf("%s%s\n", text.substr(0, text.rfind('}')).c_str(), more.c_str());
     return kDone;
   }
@@ -217,6 +227,7 @@ int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
   print_list(plan, "stages", "stages of a step, in order", {"why", "cost"});
   print_list(plan, "absent", "left out", {"why"});
   print_list(plan, "bodies", "bodies", {"model", "kind", "surface", "cells", "points", "surfels"});
+  print_devices(devices);
   if (scene.value("/time/mode") != "\"static\"") {
     print_integrators(plan);
     print_light(plan);

@@ -1,7 +1,12 @@
 // First pass of a sub-step: each cell writes the forces of its corners where their points will read them, and
-// with them what the cell adds to the rows of the step bound, h^2 D + 2 h E. Corner 0 gets what the others
-// leave, so their sum is zero.
+// with them what the cell adds to the rows of the step bound, of stiffness and of dampers, as two binary32.
+// Corner 0 gets what the others leave, so their sum is zero.
 #include "cell.glsl"
+double rows_of(uint share, float stiffer, float damped) {
+  const precise float k = uintBitsToFloat(share) * stiffer;
+  const precise float c = uintBitsToFloat(share) * damped;
+  return packDouble2x32(uvec2(floatBitsToUint(k), floatBitsToUint(c)));
+}
 void force_of_cell(uint i) {
   const uint at = i & 31u;   // 32 cells side by side
   const uint first = i - at;
@@ -53,13 +58,15 @@ void force_of_cell(uint i) {
   all[2] = s[5];
   all[6] = s[5];
   const dvec2 growth = growth_of(f, e, g2.y, g2.z);
-  precise double grows = (STEP * STEP) * growth.x;
+  const precise float damper = DAMPING * float(growth.y);
+  const precise float stiffer = float(growth.x) + PER_LAG * damper;
+  const precise float damped = PER_LAG > 0.0f ? 0.0f : damper;
   if (DAMPING > 0.0f) {
     const double damping = double(DAMPING);
-    x0 = SPEED(q.x);
-    x1 = SPEED(q.y);
-    x2 = SPEED(q.z);
-    x3 = SPEED(q.w);
+    x0 = OF_DAMPERS(q.x);
+    x1 = OF_DAMPERS(q.y);
+    x2 = OF_DAMPERS(q.z);
+    x3 = OF_DAMPERS(q.w);
     d[0] = x1.x - x0.x;
     d[1] = x1.y - x0.y;
     d[2] = x1.z - x0.z;
@@ -72,13 +79,12 @@ void force_of_cell(uint i) {
     precise double rate[9];
     gradient_of(d, g, rate);
     add_dampers(r, rate, e, damping * g2.y, damping * g2.z, all);
-    grows = grows + (2.0 * STEP) * (damping * growth.y);
   }
-  dvec4 share = dvec4(0.0, 0.0, 0.0, 0.0);
-  if (grows > 0.0) {
-    const uvec4 bits = CORNER(3u * first + 64u + at);
-    share = dvec4(double(uintBitsToFloat(bits.x)), double(uintBitsToFloat(bits.y)),
-                  double(uintBitsToFloat(bits.z)), double(uintBitsToFloat(bits.w)));
+  dvec4 grows = dvec4(0.0, 0.0, 0.0, 0.0);
+  if (stiffer > 0.0f || damped > 0.0f) {
+    const uvec4 share = CORNER(3u * first + 64u + at);
+    grows = dvec4(rows_of(share.x, stiffer, damped), rows_of(share.y, stiffer, damped),
+                  rows_of(share.z, stiffer, damped), rows_of(share.w, stiffer, damped));
   }
   precise double p[9];
   UNROLLED for (uint k = 0u; k < 9u; k += 3u)
@@ -91,8 +97,8 @@ void force_of_cell(uint i) {
   precise double fx = 0.0 - ((of[0] + of[3]) + of[6]);
   precise double fy = 0.0 - ((of[1] + of[4]) + of[7]);
   precise double fz = 0.0 - ((of[2] + of[5]) + of[8]);
-  FORCE(to.x, dvec4(fx, fy, fz, share.x * grows));
-  FORCE(to.y, dvec4(of[0], of[1], of[2], share.y * grows));
-  FORCE(to.z, dvec4(of[3], of[4], of[5], share.z * grows));
-  FORCE(to.w, dvec4(of[6], of[7], of[8], share.w * grows));
+  FORCE(to.x, dvec4(fx, fy, fz, grows.x));
+  FORCE(to.y, dvec4(of[0], of[1], of[2], grows.y));
+  FORCE(to.z, dvec4(of[3], of[4], of[5], grows.z));
+  FORCE(to.w, dvec4(of[6], of[7], of[8], grows.w));
 }

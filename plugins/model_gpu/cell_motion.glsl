@@ -1,5 +1,6 @@
-// Second pass: each point adds up the forces of its corners, always in the same order, and moves. Where the
-// step is longer than the bound at this shape, it says so: h^2 D/m + 2 h E/m above 4.
+// Second pass: each point adds up the forces of its corners, always in the same order, and moves. The highest
+// rate of all is that of the step bound at this shape: 1 / h with h^2 D/m + 2 h E/m = 4; dampers
+// with a lag count in D, over the lag.
 #include "motion.glsl"
 void move_corners(uint i) {
   const dvec4 x = PLACE(i);
@@ -9,7 +10,8 @@ void move_corners(uint i) {
   precise double fx = 0.0;
   precise double fy = 0.0;
   precise double fz = 0.0;
-  precise double grows = 0.0;
+  precise float stiffer = 0.0f;
+  precise float damped = 0.0f;
   // four at a time; behind a point's last corner lie others', which are read and not used
   for (uint n = 0u; n < row.y; n += 4u) {
     dvec4 f[4];
@@ -19,13 +21,17 @@ void move_corners(uint i) {
         fx += f[k].x;
         fy += f[k].y;
         fz += f[k].z;
-        grows += f[k].w;
+        const uvec2 more = unpackDouble2x32(f[k].w);
+        stiffer += uintBitsToFloat(more.x);
+        damped += uintBitsToFloat(more.y);
       }
     }
   }
   precise double rest = REST_ROW(i);   // 1/s2, D/m
-  precise double most =
-      STEP * (STEP * rest + 2.0 * (double(DAMPING) * rest + load.w)) + x.w * grows;
-  if (most > 4.0) EXCEEDS(float(most));
+  precise double of_dampers = double(DAMPING) * rest;
+  precise double stiff = (rest + double(PER_LAG) * of_dampers) + x.w * double(stiffer);
+  precise double damper = ((PER_LAG > 0.0f ? double(0.0f) : of_dampers) + load.w) + x.w * double(damped);
+  precise double rate = 0.25 * (damper + sqrt(damper * damper + 4.0 * stiff));
+  if (uint(v.w) != 7u) RAISE(float(rate));   // a held point does not move
   end_step(i, x, v, load, fx, fy, fz);
 }

@@ -9,9 +9,6 @@
 namespace gpu {
 namespace {
 
-// Rows at rest over those of longest_step: what a shape may add to them before a step must be taken again.
-constexpr double kAllowed = 1 / 0.81;
-
 // The kernels: their functions are members here.
 struct CellForces {
   const Call &call;
@@ -25,7 +22,7 @@ struct CellMotion {
 #define ROW(i) call.of<const uvec2>(kOwn)[i]
 #define CORNER_FORCE(i) call.of<const dvec4>(kOwn + 3)[i]
 #define REST_ROW(i) call.of<const double>(kOwn + 4)[i]
-#define EXCEEDS(value) raise(*call.of<uint32_t>(kWorst), value)
+#define RAISE(rate) raise(*call.of<uint32_t>(kHighest), rate)
   static void raise(uint32_t &to, float value) {
     const std::atomic_ref<uint32_t> all(to);
     const uint32_t bits = std::bit_cast<uint32_t>(value);
@@ -60,7 +57,7 @@ void Cells::create(const dfm_host *h, const dfm_mesh &m) {
   shapes_.create(h, entries_);
   twist_share_.create(h, 4 * size_t(ncell_));
   places_.create(h, npoint);
-  for (Buffer<double> *each : {&rest_row_, &row_by_mass_}) each->create(h, npoint);
+  row_by_mass_.create(h, npoint);
   for (Buffer<double> *each : {&twist_, &damper_}) each->create(h, ncell_);
   for (size_t n = 0; n < 4 * size_t(ncell_); ++n) ++places_[cells_[n]].y;
   room_ = gpu::lay_out(places_, npoint);
@@ -83,8 +80,8 @@ void Cells::create(const dfm_host *h, const dfm_mesh &m) {
 }
 
 void Cells::fill(const double *params) {
-  damping_ = params[kDampingStiffness];
-  drag_ = params[kDampingMass];
+  damping = params[kDampingStiffness];
+  drag = params[kDampingMass];
   for (uint32_t c = 0; c < ncell_; ++c) {
     Rest &of = rest_[c];
     const model::Lame lame = model::lame_of(this->of(kYoung, params, c), this->of(kPoisson, params, c));
@@ -115,17 +112,14 @@ void Cells::find_rows() {
       heights[4 * c + a] = std::sqrt((g[0] * g[0] + g[1] * g[1]) + g[2] * g[2]);
     }
   }
-  std::fill(rest_row_.data(), rest_row_.data() + npoint, 0.0);
+  std::fill(row.data(), row.data() + npoint, 0.0);
   model::cell_rows(ncell_, npoint, cells_.data(), mass.data(), norms.data(), heights.data(), weight.data(),
                    next.data(), [&](uint32_t c, int a, double own, double turn) {
                      const size_t corner = 4 * size_t(c) + size_t(a);
-                     rest_row_[cells_[corner]] += own;
+                     row[cells_[corner]] += own;
                      twist_share_[corner] = float(turn);
                    });
-  for (uint32_t i = 0; i < npoint; ++i) {
-    row_by_mass_[i] = rest_row_[i] / mass[i];
-    row[i] = kAllowed * rest_row_[i];
-  }
+  for (uint32_t i = 0; i < npoint; ++i) row_by_mass_[i] = row[i] / mass[i];
   for (size_t c = 0; c < ncell_; ++c) {
     const float *s = twist_share_.data() + 4 * c;
     corners_[place_of(c, 2)] = {std::bit_cast<uint>(s[0]), std::bit_cast<uint>(s[1]),
@@ -148,19 +142,26 @@ void Cells::strain(const dfm_kin &k, size_t c, double (&f)[9], double (&r)[9], d
   of.strain_of(r, f, e);
 }
 
-// What each shape adds to the rows at rest, as the kernel counts it.
+// What each shape adds to the rows at rest, as the kernel counts it. After a step the kernel has found the
+// sub-step that no point asks to be shorter; as dampers, points ask for that and leave room to what else acts
+// on them. The worst point at rest is named.
 void Cells::bound(const dfm_kin &k, double *ksum, double *csum) {
+  constexpr double kOthers = 1 - 1e-6;
+  if (const double last = k.state[3 * size_t(npoint)]; last > 0) {
+    for (uint32_t i = 0; i < npoint; ++i) csum[i] += (i == worst ? 1 : kOthers) * (2 * mass[i] / last);
+    return;
+  }
   each(host, ncell_, [&](size_t c) {
     const Call none{};
     double f[9], r[9], e[6];
     strain(k, c, f, r, e);
     const dvec2 more = CellForces{none}.growth_of(f, e, rest_[c].mu2, rest_[c].lambda);
-    twist_[c] = more.x;
-    damper_[c] = damping_ * more.y;
+    twist_[c] = more.x + (lag > 0 ? damping * more.y / lag : 0);
+    damper_[c] = lag > 0 ? 0 : damping * more.y;
   });
   for (uint32_t i = 0; i < npoint; ++i) {
-    ksum[i] += rest_row_[i];
-    csum[i] += damping_ * rest_row_[i] + drag_ * mass[i];
+    ksum[i] += stiff(i);
+    csum[i] += damper(i);
   }
   for (size_t n = 0; n < 4 * size_t(ncell_); ++n) {
     ksum[cells_[n]] += twist_[n / 4] * double(twist_share_[n]);

@@ -12,6 +12,7 @@ class Cells : public Parts {
   static constexpr uint32_t kParams = kParamCount;
   static constexpr const char *kLongest =
       "sub-step that is stable near rest; where cells are drawn far, shorter";
+  static constexpr double kShare = 0.9;  // of a sub-step that is stable: shapes change on the way
   static constexpr dfm_fact kCount = {"cells", "tetrahedra, each read once in a sub-step", "1", 0};
 
   void create(const dfm_host *h, const dfm_mesh &m);
@@ -35,10 +36,8 @@ class Cells : public Parts {
   Buffer<uvec4> corners_;       // points, places of their forces, twist_share as float; 32 cells side by side
   Buffer<dvec4> shapes_;        // gradients of corners 1 to 3, mu2, lambda
   Buffer<float> twist_share_;   // [ncell,4] row of a corner per stiffness against turning
-  Buffer<double> rest_row_;     // [npoint] N/m
   Buffer<double> row_by_mass_;  // [npoint] 1/s2
   Buffer<double> twist_, damper_;  // [ncell] of bound()
-  double damping_ = 0, drag_ = 0;
 
   double of(Param which, const double *params, uint32_t c) const {
     return field_[which].empty() ? params[which] : field_[which][c];

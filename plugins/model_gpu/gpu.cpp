@@ -58,7 +58,7 @@ namespace {
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
-// nothing but the shape is state, so what is left of a cut body is a new one
+// state follows by slot
 const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 
 // The tables of the model on bodies Of.
@@ -117,8 +117,8 @@ struct Tables {
     return {sizeof(dfm_model),
             caps | DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
             DFM_CELL_TET,
-            0,
-            nullptr,
+            One::kSlotCount,
+            One::kSlots,
             create,
             model::destroy<One>,
             set_params,

@@ -11,8 +11,11 @@ namespace gpu {
 namespace {
 
 constexpr double kMostSteps = 1e6;
-// Of the sub-step that would have been short enough, when a step is taken again.
-constexpr double kShorter = 0.9;
+constexpr double kRounding = 1e-6;  // rates of the kernels are binary32
+constexpr double kStrain = 1e-5;    // whose energy is that of a small one
+// Dampers with a lag are at most so stiff, relative to what is beside them; a mode at the own frequency
+// loses so much of its damping, and is so much faster, at most.
+constexpr double kStiffening = 3, kError = 0.02;
 
 }  // namespace
 
@@ -28,6 +31,7 @@ void Body<Of>::create(const dfm_host *h, const dfm_mesh &m) {
     if (m.fixed) held_[i] = m.fixed[i];
   }
   parts_.create(h, m);
+  rest_.create_copy(h, m.rest, 3 * size_t(npoint_));
   block_energy_.create(h, parts_.count() / kGrain + 1);
   take_surface(m);
   const Choice choice = Choice(uint32_t(m.params[kDevice]));
@@ -62,31 +66,81 @@ void Body<Of>::apply_params(const double *values) {
     model::complain(host, Of::kId, why.c_str());
     throw model::Refused{};
   }
-  find_longest();
+  find_lag();
   const char **effect = active_effects;
   if (Of::kParams > kPoisson) *effect++ = "volume";
   *effect++ = "large_rotation";
   if (params_[kDampingStiffness] > 0 || params_[kDampingMass] > 0) *effect++ = "damping";
   *effect = nullptr;
-  facts_[0] = {"longest_step", Of::kLongest, "s", longest_};
+  facts_[0] = {"longest_step", Of::kLongest, "s", Of::kShare * longest_};
   facts_[1] = Of::kCount;
   facts_[1].value = double(parts_.count());
 }
 
 template <class Of>
-void Body<Of>::find_longest() {
-  longest_ = HUGE_VAL;
+double Body<Of>::longest() {
+  double least = HUGE_VAL;
   for (uint32_t i = 0; i < npoint_; ++i) {
-    const double m = parts_.mass[i], k = parts_.row[i];
-    const double c = params_[kDampingStiffness] * k + params_[kDampingMass] * m;
+    if (held_[i] == 7) continue;
+    const double m = parts_.mass[i], k = parts_.stiff(i), c = parts_.damper(i);
     const double most = c + std::sqrt(c * c + 4 * m * k);
-    if (most > 0) longest_ = std::min(longest_, 4 * m / most);
+    if (!(4 * m < most * least)) continue;
+    least = 4 * m / most;
+    parts_.worst = i;
   }
+  return least;
+}
+
+// 1/s: the slowest motion in which the body strains the same everywhere, by Rayleigh's quotient.
+template <class Of>
+double Body<Of>::own_frequency() {
+  Buffer<double> x;
+  x.create(host, 3 * size_t(npoint_));
+  double middle[3] = {}, mass = 0, slowest = HUGE_VAL;
+  for (size_t i = 0; i < npoint_; ++i) {
+    mass += parts_.mass[i];
+    for (size_t a = 0; a < 3; ++a) middle[a] += parts_.mass[i] * rest_[3 * i + a];
+  }
+  for (double &of : middle) of /= mass;
+  dfm_kin k{};
+  k.size = sizeof k;
+  k.stride = 3;
+  k.x = x.data();
+  for (size_t row = 0; row < 3; ++row)
+    for (size_t col = 0; col <= row; ++col) {
+      double moved = 0;
+      for (size_t i = 0; i < npoint_; ++i) {
+        double u[3] = {};
+        u[row] += kStrain * (rest_[3 * i + col] - middle[col]);
+        if (col != row) u[col] += kStrain * (rest_[3 * i + row] - middle[row]);
+        for (size_t a = 0; a < 3; ++a) x[3 * i + a] = rest_[3 * i + a] + u[a];
+        moved += parts_.mass[i] * ((u[0] * u[0] + u[1] * u[1]) + u[2] * u[2]);
+      }
+      const double work = 2 * energy(k);
+      if (work > 0 && moved > 0) slowest = std::min(slowest, work / moved);
+    }
+  return std::sqrt(slowest);
+}
+
+// As the library finds that of a body that it moves itself (doc/concepts/step.md, dampers).
+template <class Of>
+void Body<Of>::find_lag() {
+  parts_.lag = 0;
+  longest_ = longest();
+  const double ratio = params_[kDampingStiffness];
+  if (ratio > 0) {
+    const double w = own_frequency();
+    parts_.lag = std::min({ratio / kStiffening, std::sqrt(kError) / w, 2 * kError / (ratio * w * w)});
+    if (!(longest() > longest_)) parts_.lag = 0;
+    longest_ = longest();
+  }
+  dampers_ = {float(ratio), parts_.lag > 0 ? float(1 / parts_.lag) : 0};
 }
 
 template <class Of>
 bool Body<Of>::take_points(const dfm_kin &k) {
   std::atomic<bool> moved = false;
+  const bool lagged = dampers_.per_lag > 0, begun = k.state[3 * size_t(npoint_)] > 0;
   each_point([&](size_t i) {
     bool differ = false;
     const auto put = [&](double &to, double from) {
@@ -101,6 +155,12 @@ bool Body<Of>::take_points(const dfm_kin &k) {
     put(speed.x, v[0]);
     put(speed.y, v[1]);
     put(speed.z, v[2]);
+    if (lagged) {
+      const double *const u = begun ? k.state + 3 * i : v;
+      put(stepper_->seen[i].x, u[0]);
+      put(stepper_->seen[i].y, u[1]);
+      put(stepper_->seen[i].z, u[2]);
+    }
     if (differ) moved.store(true, std::memory_order_relaxed);
   });
   return moved;
@@ -122,9 +182,13 @@ bool Body<Of>::take_loads(const double *f, uint32_t stride) {
 
 template <class Of>
 dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
-  double steps = std::max(1.0, std::ceil(k.dt / longest_ - 1e-9));
+  double stable = longest_;
+  if (const double last = k.state[3 * size_t(npoint_)]; last > 0) stable = std::min(stable, last);
   h_ = k.dt;
   for (;;) {
+    // a step that is stable as a whole, as those in contact are, is not divided
+    const double all = k.dt / stable - kRounding,
+                 steps = all <= 1 ? 1 : std::ceil(k.dt / (Of::kShare * stable) - kRounding);
     if (!(steps <= kMostSteps)) {
       char text[160];
       std::snprintf(text, sizeof text,
@@ -137,15 +201,16 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
     const bool moved = take_points(k) || unlike_, loaded = take_loads(f, k.stride) || unlike_;
     unlike_ = true;
     const uint32_t n = uint32_t(steps);
-    if (const char *why = stepper_->run(n, k.dt / n, float(params_[kDampingStiffness]), moved, loaded)) {
+    part_ = k.dt / n;
+    if (const char *why = stepper_->run(n, part_, dampers_, moved, loaded)) {
       model::complain(host, Of::kId, why);
       return DFM_E_FATAL;
     }
     unlike_ = false;
-    const double worst = double(stepper_->worst());
-    if (!(worst > 0)) break;
-    // without dampers it falls as h^2
-    steps = std::ceil(steps * std::sqrt(worst / 4) / kShorter);
+    const double highest = double(stepper_->highest());
+    shape_ = highest > 0 ? 1 / highest : longest_;
+    if (!(highest * part_ > 1 + kRounding)) break;
+    stable = shape_;
   }
   for (uint32_t s = 0; s < nsurfel_; ++s) {
     double way[3] = {};
@@ -196,14 +261,22 @@ void Body<Of>::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
 
 template <class Of>
 void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
+  const bool lagged = dampers_.per_lag > 0;
+  k.state_out[3 * size_t(npoint_)] = shape_;
   each_point([&](size_t i) {
-    const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
+    const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i],
+                &seen = lagged ? stepper_->seen[i] : speed;
     const double end[3] = {place.x, place.y, place.z}, fast[3] = {speed.x, speed.y, speed.z};
+    double *const u = k.state_out + 3 * i;
+    u[0] = seen.x;
+    u[1] = seen.y;
+    u[2] = seen.z;
     for (size_t a = 0; a < k.stride; ++a) {
       x[i * k.stride + a] = a < 3 ? end[a] : 0;
       v[i * k.stride + a] = a < 3 ? fast[a] : 0;
     }
   });
+  const double sees = 1 - dampers_.kept(part_);  // of a change
   for (size_t s = 0; s < nsurfel_; ++s) {
     const double *const p = p_s + 3 * s;
     if (p[0] == 0 && p[1] == 0 && p[2] == 0) continue;
@@ -213,6 +286,7 @@ void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v)
         const double change = free_inverse_mass(surfel_point_[e], int(a)) * (surfel_weight_[e] * p[a]);
         x[at] += h_ * change;
         v[at] += change;
+        k.state_out[3 * size_t(surfel_point_[e]) + a] += sees * change;
       }
   }
 }

@@ -22,10 +22,19 @@ class Body {
   using Row = Param;
   const dfm_host *host = nullptr;
   const char *active_effects[4] = {};  // NULL-terminated
+  // m/s, the velocity that dampers see; s, the longest sub-step that is stable at the worst shape of the last
+  // step, 0 before the first
+  static constexpr dfm_slot kSlots[] = {{DFM_PER_POINT, 3, DFM_SLOT_VECTOR, 0},
+                                        {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
+  static constexpr uint32_t kSlotCount = 2;
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
-  bool lacks_state(const dfm_kin &) const { return false; }
+  bool lacks_state(const dfm_kin &k) const {
+    if (k.state) return false;
+    model::complain(host, Of::kId, "the host gives no state");
+    return true;
+  }
 
   dfm_status predict(const dfm_kin &k, const double *f, double *u_s);
   void respond(uint32_t n, const uint32_t *surfel, const double *p, double *du);
@@ -47,13 +56,19 @@ class Body {
   Buffer<double> impulse_;       // [npoint,3] N s, zero between calls
   Buffer<double> block_energy_;  // J
   std::unique_ptr<Stepper> stepper_;
-  bool unlike_ = true;  // the device's arrays may differ from those of stepper_
-  double longest_ = 0;  // s
+  bool unlike_ = true;   // the device's arrays may differ from those of stepper_
+  Buffer<double> rest_;  // [npoint,3] m
+  Dampers dampers_;
+  double longest_ = 0;  // s, stable near rest
   double h_ = 0;        // s, of the step that was predicted
+  double part_ = 0;     // s, of its sub-steps
+  double shape_ = 0;    // s, stable at its worst shape
   dfm_fact facts_[kFactCount] = {};
 
   void take_surface(const dfm_mesh &m);
-  void find_longest();
+  double own_frequency();
+  void find_lag();
+  double longest();
   bool take_points(const dfm_kin &k);
   bool take_loads(const double *f, uint32_t stride);
   template <class F>

@@ -1,5 +1,6 @@
 // The end of a sub-step of symplectic Euler for a point on which f acts, as GLSL and as C++:
-//   v' = v + h (f / m + load - drag v),     x' = x + h v'
+//   v' = v + h (f / m + load - drag v),     x' = x + h v',     u' = v' - kept (v' - u)
+// u is the velocity that dampers with a lag see (doc/concepts/step.md, dampers).
 void end_step(uint i, dvec4 x, dvec4 v, dvec4 load, double fx, double fy, double fz) {
   const uint held = uint(v.w);
   precise double vx = v.x + STEP * ((fx * x.w + load.x) - load.w * v.x);
@@ -13,4 +14,11 @@ void end_step(uint i, dvec4 x, dvec4 v, dvec4 load, double fx, double fy, double
   precise double nz = x.z + STEP * vz;
   NEXT_PLACE(i, dvec4(nx, ny, nz, x.w));
   NEXT_SPEED(i, dvec4(vx, vy, vz, v.w));
+  if (PER_LAG > 0.0f) {
+    const dvec4 u = SEEN(i);
+    precise double ux = vx - KEPT * (vx - u.x);
+    precise double uy = vy - KEPT * (vy - u.y);
+    precise double uz = vz - KEPT * (vz - u.z);
+    NEXT_SEEN(i, dvec4(ux, uy, uz, u.w));
+  }
 }

@@ -16,8 +16,14 @@ constexpr uint32_t kGrain = 4096;  // springs, cells, points: waking a worker co
 struct Parts {
   const dfm_host *host = nullptr;
   uint32_t npoint = 0;
-  Buffer<double> mass;  // [npoint] kg
-  Buffer<double> row;   // [npoint] N/m, of the step bound
+  Buffer<double> mass;           // [npoint] kg
+  Buffer<double> row;            // [npoint] N/m, of the step bound; of cells at rest
+  double damping = 0, drag = 0;  // s, 1/s
+  double lag = 0;                // s, with which dampers see velocities; 0: none
+  uint32_t worst = 0;            // the point that asks for the shortest sub-step at rest
+  // What the rows of the bound count for a point: of stiffness and of dampers.
+  double stiff(uint32_t i) const { return row[i] * (lag > 0 ? 1 + damping / lag : 1); }
+  double damper(uint32_t i) const { return (lag > 0 ? 0 : damping * row[i]) + drag * mass[i]; }
   void take_points(const dfm_host *h, uint32_t n) {
     host = h;
     npoint = n;

@@ -37,41 +37,44 @@ size_t lay_out(Buffer<uvec2> &row, uint32_t npoint) {
 
 Reference::Reference(const dfm_host *host, uint32_t npoint) : host_(host) {
   for (Buffer<dvec4> &array : array_) array.create(host, npoint);
-  exceeded_.create(host, 1);
+  rate_.create(host, 1);
   place = array_[0].data();
   speed = array_[1].data();
   load = array_[2].data();
   next_place_ = array_[3].data();
   next_speed_ = array_[4].data();
-  worst_ = exceeded_.data();
+  seen = array_[5].data();
+  next_seen_ = array_[6].data();
+  highest_ = rate_.data();
 }
 
 void Reference::take(const Work &work) {
   work_ = work;
-  for (uint32_t n = 0; n < kWorst - kOwn; ++n) {
+  for (uint32_t n = 0; n < kHighest - kOwn; ++n) {
     const Work::Array &of = work.array[n];
     if (of.bytes && !of.data && own_[n].empty()) own_[n].create(host_, of.bytes);
   }
 }
 
-const char *Reference::run(uint32_t n, double h, float damping, bool, bool) {
-  *worst_ = 0;
+const char *Reference::run(uint32_t n, double h, const Dampers &dampers, bool, bool) {
+  *highest_ = 0;
   Task task{};
-  for (uint32_t a = 0; a < kWorst - kOwn; ++a)
+  for (uint32_t a = 0; a < kHighest - kOwn; ++a)
     task.call.array[kOwn + a] = own_[a].empty() ? const_cast<void *>(work_.array[a].data) : own_[a].data();
   task.call.array[kLoad] = load;
-  task.call.array[kWorst] = worst_;
+  task.call.array[kHighest] = highest_;
   for (uint32_t k = 0; k < n; ++k) {
-    dvec4 *const now[4] = {place, speed, next_place_, next_speed_};
-    constexpr Binding to[4] = {kPlace, kSpeed, kNextPlace, kNextSpeed};
-    for (int a = 0; a < 4; ++a) task.call.array[to[a]] = now[a];
+    dvec4 *const now[6] = {place, speed, seen, next_place_, next_speed_, next_seen_};
+    constexpr Binding to[6] = {kPlace, kSpeed, kSeen, kNextPlace, kNextSpeed, kNextSeen};
+    for (int a = 0; a < 6; ++a) task.call.array[to[a]] = now[a];
     for (uint32_t p = 0; p < work_.npass; ++p) {
       task.pass = &work_.pass[p];
-      task.call.now = {h, task.pass->count, damping};
+      task.call.now = dampers.constants(h, task.pass->count);
       host_->parallel_for(host_->ctx, task.pass->count, kGrain, do_some, &task);
     }
     std::swap(place, next_place_);
     std::swap(speed, next_speed_);
+    if (dampers.per_lag > 0) std::swap(seen, next_seen_);
   }
   return nullptr;
 }

@@ -112,8 +112,8 @@ void Springs::put(const double *stiffness, const double *rest_square) {
 void Springs::fill(const double *params) {
   for (uint32_t e = 0; e < nspring_; ++e) stiffness_[e] = by_cell_ ? share_[e] : params[kYoung] * share_[e];
   put(stiffness_.data(), rest_square_.data());
-  damping_ = params[kDampingStiffness];
-  drag_ = params[kDampingMass];
+  damping = params[kDampingStiffness];
+  drag = params[kDampingMass];
   find_rows();
 }
 
@@ -139,8 +139,8 @@ void Springs::find_rows() {
 
 void Springs::bound(const dfm_kin &, double *ksum, double *csum) {
   for (uint32_t i = 0; i < npoint; ++i) {
-    ksum[i] += row[i];
-    csum[i] += damping_ * row[i] + drag_ * mass[i];
+    ksum[i] += stiff(i);
+    csum[i] += damper(i);
   }
 }
 

@@ -9,6 +9,7 @@ class Springs : public Parts {
   static constexpr const char *kId = "org.deform.msm_gpu";
   static constexpr uint32_t kParams = kPoisson;  // those before it
   static constexpr const char *kLongest = "sub-step that is stable in every shape";
+  static constexpr double kShare = 1;  // of a sub-step that is stable
   static constexpr dfm_fact kCount = {"springs", "springs, each read from both ends in a sub-step", "1", 0};
 
   void create(const dfm_host *h, const dfm_mesh &m);
@@ -33,7 +34,6 @@ class Springs : public Parts {
   Buffer<double> stiffness_;  // [nspring] N/m
   Buffer<double> rest_square_;
   bool by_cell_ = false;
-  double damping_ = 0, drag_ = 0;
 
   void find_rows();
 };

@@ -28,14 +28,35 @@ struct uvec2 {
 };
 struct uvec4 { uint32_t x, y, z, w; };
 
-// Bindings of the arrays, as in the .comp files. From kOwn to kWorst they are those of the kernels.
-enum Binding : uint32_t { kPlace, kSpeed, kLoad, kNextPlace, kNextSpeed, kOwn, kWorst = 10, kBindings };
+// Bindings of the arrays, as in the .comp files. From kOwn to kHighest they are those of the kernels.
+enum Binding : uint32_t {
+  kPlace,
+  kSpeed,
+  kLoad,
+  kNextPlace,
+  kNextSpeed,
+  kOwn,
+  kHighest = 10,
+  kSeen,
+  kNextSeen,
+  kBindings
+};
 
 // What a kernel is called with; the layout is that of the .comp files.
 struct Constants {
   double step;     // s
+  double kept;     // in a sub-step, of the difference of what dampers see from the velocity
   uint32_t count;  // of invocations
   float damping;   // s
+  float per_lag;   // 1/s
+};
+
+// Damping over stiffness, s; one over the lag with which dampers see velocities, 1/s, 0 without one.
+struct Dampers {
+  float damping = 0, per_lag = 0;
+  bool operator==(const Dampers &) const = default;
+  double kept(double h) const { return per_lag > 0 ? (2 - h * per_lag) / (2 + h * per_lag) : 0; }
+  Constants constants(double h, uint32_t count) const { return {h, kept(h), count, damping, per_lag}; }
 };
 
 struct Call {
@@ -62,42 +83,42 @@ struct Work {
   };
   Pass pass[2];
   uint32_t npass;
-  Array array[kWorst - kOwn];
+  Array array[kHighest - kOwn];
 };
 
 // Arrays [npoint] that a body writes before run() and reads after it: place (m; 1/kg), speed (m/s; held
-// components, bits 1 x, 2 y, 4 z), load (m/s2; drag, 1/s).
+// components, bits 1 x, 2 y, 4 z), seen by dampers (m/s), load (m/s2; drag, 1/s).
 class Stepper {
  public:
-  dvec4 *place = nullptr, *speed = nullptr, *load = nullptr;
+  dvec4 *place = nullptr, *speed = nullptr, *seen = nullptr, *load = nullptr;
   Stepper() = default;
   Stepper(const Stepper &) = delete;
   virtual ~Stepper() = default;
   // Throws; before the first run, and where the data have changed. The data must stay where they are.
   virtual void take(const Work &work) = 0;
-  // n sub-steps of h; moved, loaded: place and speed, or load, are not those that the last run left. NULL, or
-  // why it failed.
-  virtual const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) = 0;
-  // 0, or the largest h^2 D/m + 2 h E/m of a point above 4 in the last run, whose steps were too long.
-  float worst() const { return std::bit_cast<float>(*worst_); }
+  // n sub-steps of h; moved, loaded: place, speed and seen, or load, are not those that the last run left.
+  // NULL, or why it failed.
+  virtual const char *run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) = 0;
+  // 1/s, the highest rate of the step bound at the shapes of the last run; 0 where no kernel finds it.
+  float highest() const { return std::bit_cast<float>(*highest_); }
 
  protected:
-  uint32_t *worst_ = nullptr;
+  uint32_t *highest_ = nullptr;
 };
 
 class Reference : public Stepper {
  public:
   Reference(const dfm_host *host, uint32_t npoint);
   void take(const Work &work) override;
-  const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) override;
+  const char *run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) override;
 
  private:
   const dfm_host *host_;
   Work work_{};
-  Buffer<dvec4> array_[5];
-  Buffer<uint32_t> exceeded_;
-  Buffer<uint8_t> own_[kWorst - kOwn];
-  dvec4 *next_place_, *next_speed_;
+  Buffer<dvec4> array_[7];
+  Buffer<uint32_t> rate_;
+  Buffer<uint8_t> own_[kHighest - kOwn];
+  dvec4 *next_place_, *next_speed_, *next_seen_;
 };
 
 constexpr uint32_t kSide = 32;  // points that read side by side, cells that are read so; in the kernels, too
@@ -112,6 +133,11 @@ using std::max;
 using std::sqrt;
 using uint = uint32_t;
 inline float uintBitsToFloat(uint bits) { return std::bit_cast<float>(bits); }
+inline uint floatBitsToUint(float value) { return std::bit_cast<uint>(value); }
+inline uvec2 unpackDouble2x32(double value) {
+  const uint64_t bits = std::bit_cast<uint64_t>(value);
+  return {uint32_t(bits), uint32_t(bits >> 32)};
+}
 inline double packDouble2x32(uvec2 bits) { return std::bit_cast<double>(uint64_t{bits.y} << 32 | bits.x); }
 
 }  // namespace gpu

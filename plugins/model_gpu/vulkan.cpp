@@ -64,7 +64,7 @@ void Vulkan::open_instance() {
   if (!library)
     throw std::string(
         "the Vulkan loader libvulkan.so.1 is not installed; install libvulkan1 and the driver of the "
-        "graphics card (without a card mesa-vulkan-drivers), or set device to reference");
+        "graphics card (without a card mesa-vulkan-drivers), or take the model without _gpu");
   const auto get = reinterpret_cast<PFN_vkGetInstanceProcAddr>(dlsym(library, "vkGetInstanceProcAddr"));
   const auto create =
       get ? reinterpret_cast<PFN_vkCreateInstance>(get(nullptr, "vkCreateInstance")) : nullptr;
@@ -77,7 +77,7 @@ void Vulkan::open_instance() {
   if (!create || create(&info, nullptr, &instance_) != VK_SUCCESS)
     throw std::string(
         "libvulkan.so.1 finds no Vulkan driver on this machine; install that of the graphics card "
-        "(without a card mesa-vulkan-drivers), or set device to reference");
+        "(without a card mesa-vulkan-drivers), or take the model without _gpu");
 #define DEFORM_GPU_GET(name) name = reinterpret_cast<PFN_vk##name>(get(instance_, "vk" #name));
   DEFORM_GPU_OF_INSTANCE(DEFORM_GPU_GET)
 #undef DEFORM_GPU_GET
@@ -111,7 +111,7 @@ VkPhysicalDevice Vulkan::choose(Wanted wanted) {
   if (best) return best;
   throw std::string("no ") + (wanted == Wanted::hardware ? "graphics card" : "device") +
       " that computes in binary64 with Vulkan 1.1; found: " + (seen.empty() ? "none" : seen.substr(0, 90)) +
-      "; install a driver, or set device to auto or reference";
+      "; install a driver, or take the model without _gpu";
 }
 
 void Vulkan::open_device(VkPhysicalDevice chosen) {

@@ -26,7 +26,7 @@ VkAccessFlags reads_of(VkPipelineStageFlags stages) {
 void must(VkResult result, const char *what) {
   if (result == VK_SUCCESS) return;
   throw std::string(what) + " failed on the device (VkResult " + std::to_string(int(result)) +
-      "); take a smaller body, or set device to reference";
+      "); take a smaller body, or take the model without _gpu";
 }
 
 }  // namespace
@@ -45,14 +45,16 @@ VulkanStepper::~VulkanStepper() { close(); }
 
 void VulkanStepper::open() {
   const Vulkan &vk = *vulkan_;
-  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_}) make(*array, bytes(), false);
-  make(exceeded_, sizeof(uint32_t), true);
-  worst_ = static_cast<uint32_t *>(exceeded_.mapped);
-  make(shared_, 3 * bytes(), true);
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &seen_[0], &seen_[1], &load_})
+    make(*array, bytes(), false);
+  make(rate_, sizeof(uint32_t), true);
+  highest_ = static_cast<uint32_t *>(rate_.mapped);
+  make(shared_, 4 * bytes(), true);
   place = static_cast<dvec4 *>(shared_.mapped);
   speed = place + npoint_;
-  load = speed + npoint_;
-  std::memset(static_cast<void *>(place), 0, 3 * bytes());
+  seen = speed + npoint_;
+  load = seen + npoint_;
+  std::memset(static_cast<void *>(place), 0, 4 * bytes());
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * kBindings};
   VkDescriptorPoolCreateInfo sets{};
   sets.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
@@ -91,7 +93,8 @@ void VulkanStepper::close() {
   vk.DestroyFence(vk.device, done_, nullptr);
   vk.DestroyCommandPool(vk.device, pool_, nullptr);
   vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
-  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &load_, &exceeded_, &shared_})
+  for (Array *array :
+       {&place_[0], &place_[1], &speed_[0], &speed_[1], &seen_[0], &seen_[1], &load_, &rate_, &shared_})
     drop(*array);
   for (Array &array : own_) drop(array);
 }
@@ -130,8 +133,10 @@ void VulkanStepper::describe() {
   for (uint32_t s = 0; s < 2; ++s) {
     VkBuffer buffers[kBindings] = {place_[s].buffer, speed_[s].buffer, load_.buffer, place_[1 - s].buffer,
                                    speed_[1 - s].buffer};
-    for (uint32_t n = 0; n < kWorst - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
-    buffers[kWorst] = exceeded_.buffer;
+    for (uint32_t n = 0; n < kHighest - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
+    buffers[kHighest] = rate_.buffer;
+    buffers[kSeen] = seen_[s].buffer;
+    buffers[kNextSeen] = seen_[1 - s].buffer;
     for (uint32_t b = 0; b < kBindings; ++b) {
       if (!buffers[b]) continue;
       const VkDescriptorBufferInfo whole{buffers[b], 0, VK_WHOLE_SIZE};
@@ -147,10 +152,10 @@ void VulkanStepper::describe() {
   }
 }
 
-void VulkanStepper::begin(VkCommandBuffer commands) const {
+VkResult VulkanStepper::begin(VkCommandBuffer commands) const {
   VkCommandBufferBeginInfo info{};
   info.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO;
-  vulkan_->BeginCommandBuffer(commands, &info);
+  return vulkan_->BeginCommandBuffer(commands, &info);
 }
 
 void VulkanStepper::order(VkCommandBuffer commands, VkPipelineStageFlags before,
@@ -174,10 +179,10 @@ void VulkanStepper::upload(const Array &to, const void *from, size_t size) {
   try {
     make(staging, size, true);
     std::memcpy(staging.mapped, from, size);
-    begin(once_);
+    must(begin(once_), "vkBeginCommandBuffer");
     const VkBufferCopy all{0, 0, size};
     vulkan_->CmdCopyBuffer(once_, staging.buffer, to.buffer, 1, &all);
-    vulkan_->EndCommandBuffer(once_);
+    must(vulkan_->EndCommandBuffer(once_), "vkEndCommandBuffer");
     must(finish(once_), "a copy of the body");
   } catch (...) {
     drop(staging);
@@ -192,27 +197,29 @@ void VulkanStepper::take(const Work &work) {
     if ((work.pass[p].count + kGroup - 1) / kGroup > vulkan_->limits.maxComputeWorkGroupCount[0])
       throw "the body has more points or cells than the device " + vulkan_->name +
           " takes in one call; take a coarser mesh";
-  for (uint32_t n = 0; first && n < kWorst - kOwn; ++n)
+  for (uint32_t n = 0; first && n < kHighest - kOwn; ++n)
     if (work.array[n].bytes) make(own_[n], work.array[n].bytes, false);
   if (first) describe();
   work_ = work;
-  for (uint32_t n = 0; n < kWorst - kOwn; ++n)
+  for (uint32_t n = 0; n < kHighest - kOwn; ++n)
     if (work.array[n].data) upload(own_[n], work.array[n].data, work.array[n].bytes);
 }
 
-void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
+VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
   const Vulkan &vk = *vulkan_;
   const auto copy = [&](const Array &from, size_t at, const Array &to, size_t to_at) {
     const VkBufferCopy part{at, to_at, bytes()};
     vk.CmdCopyBuffer(commands, from.buffer, to.buffer, 1, &part);
   };
-  begin(commands);
+  if (const VkResult begun = begin(commands); begun != VK_SUCCESS) return begun;
   order(commands, kCompute | kCopy | kProcessor, kCompute | kCopy);
+  const bool lagged = batch.dampers.per_lag > 0;
   if (batch.moved) {
     copy(shared_, 0, place_[batch.from], 0);
     copy(shared_, bytes(), speed_[batch.from], 0);
+    if (lagged) copy(shared_, 2 * bytes(), seen_[batch.from], 0);
   }
-  if (batch.loaded) copy(shared_, 2 * bytes(), load_, 0);
+  if (batch.loaded) copy(shared_, 3 * bytes(), load_, 0);
   if (batch.moved || batch.loaded) order(commands, kCopy, kCompute);
   for (uint32_t k = 0; k < batch.n; ++k) {
     vk.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.layout, 0, 1,
@@ -221,7 +228,7 @@ void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
       const Work::Pass &pass = work_.pass[p];
       if (k + p > 0) order(commands, kCompute, kCompute);
       vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline[pass.kernel]);
-      const Constants now{batch.h, pass.count, batch.damping};
+      const Constants now = batch.dampers.constants(batch.h, pass.count);
       vk.CmdPushConstants(commands, vk.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof now, &now);
       vk.CmdDispatch(commands, (pass.count + kGroup - 1) / kGroup, 1, 1);
     }
@@ -231,24 +238,28 @@ void VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) const {
     order(commands, kCompute, kCopy);
     copy(place_[end], 0, shared_, 0);
     copy(speed_[end], 0, shared_, bytes());
+    if (lagged) copy(seen_[end], 0, shared_, 2 * bytes());
     order(commands, kCompute | kCopy, kProcessor);
   }
-  vk.EndCommandBuffer(commands);
+  return vk.EndCommandBuffer(commands);
 }
 
 // What was recorded is used again where it is the same, as it is from step to step.
-const char *VulkanStepper::run(uint32_t n, double h, float damping, bool moved, bool loaded) {
-  *worst_ = 0;
+const char *VulkanStepper::run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) {
+  *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMostSteps);
-    const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, damping};
+    const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, dampers};
     const uint32_t slot = batch.from + 2 * batch.moved + 4 * batch.loaded + 8 * batch.seen;
+    VkResult result = VK_SUCCESS;
     if (!(recorded_[slot] == batch)) {
-      record(commands_[slot], batch);
-      recorded_[slot] = batch;
+      recorded_[slot] = {};
+      result = record(commands_[slot], batch);
+      if (result == VK_SUCCESS) recorded_[slot] = batch;
     }
-    if (finish(commands_[slot]) != VK_SUCCESS)
-      return "the device was lost, or its driver failed; restart the program, or set device to reference";
+    if (result == VK_SUCCESS) result = finish(commands_[slot]);
+    if (result != VK_SUCCESS)
+      return "the device was lost, or its driver failed; restart the program, or take the model without _gpu";
     taken += some;
     now_ = (now_ + some) % 2;
   }

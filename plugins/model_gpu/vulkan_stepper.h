@@ -11,7 +11,7 @@ class VulkanStepper : public Stepper {
   VulkanStepper(std::shared_ptr<Vulkan> vulkan, uint32_t npoint);  // throws std::string
   ~VulkanStepper() override;
   void take(const Work &work) override;
-  const char *run(uint32_t n, double h, float damping, bool moved, bool loaded) override;
+  const char *run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) override;
 
  private:
   struct Array {
@@ -24,16 +24,16 @@ class VulkanStepper : public Stepper {
     uint32_t n = 0, from = 0;
     bool moved = false, loaded = false, seen = false;
     double h = 0;
-    float damping = 0;
+    Dampers dampers;
     bool operator==(const Batch &) const = default;
   };
   static constexpr uint32_t kBatches = 16;
   static constexpr uint32_t kMostSteps = 1024;  // of a batch: a driver ends what computes for seconds
 
   std::shared_ptr<Vulkan> vulkan_;
-  uint32_t npoint_, now_ = 0;  // which of place_ and speed_ is the present
+  uint32_t npoint_, now_ = 0;  // which of place_, speed_ and seen_ is the present
   Work work_{};
-  Array place_[2], speed_[2], load_, own_[kWorst - kOwn], exceeded_, shared_;
+  Array place_[2], speed_[2], seen_[2], load_, own_[kHighest - kOwn], rate_, shared_;
   VkDescriptorPool sets_ = VK_NULL_HANDLE;
   VkDescriptorSet set_[2] = {};
   VkCommandPool pool_ = VK_NULL_HANDLE;
@@ -47,10 +47,10 @@ class VulkanStepper : public Stepper {
   void open();
   void close();
   void describe();
-  void begin(VkCommandBuffer commands) const;
+  VkResult begin(VkCommandBuffer commands) const;
   void order(VkCommandBuffer commands, VkPipelineStageFlags before, VkPipelineStageFlags after) const;
   VkResult finish(VkCommandBuffer commands);
-  void record(VkCommandBuffer commands, const Batch &batch) const;
+  VkResult record(VkCommandBuffer commands, const Batch &batch) const;
   void upload(const Array &to, const void *from, size_t size);
 };
 

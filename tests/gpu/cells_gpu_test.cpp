@@ -129,6 +129,51 @@ TEST(CorotationalFemGpu, HeldFarDrawn_StaysStable) {
   EXPECT_LT(most, 1.3 * first);
 }
 
+// The step bound of the shape, as the kernel finds it and as the rows of bound() give it.
+TEST(CorotationalFemGpu, State_IsTheStepOfTheRowsInEveryShape) {
+  for (const auto &shape : shapes()) {
+    const Mesh m = bar();
+    Bodies b(kCells, m, {{"poisson", 0.45}, {"damping_stiffness", 1e-4}, {"damping_mass", 0.5}}, clamp_of(m));
+    NEEDS_DRIVER(b);
+    for (Stepper *each : {b.device.get(), b.processor.get()}) {
+      take_shape(*each, shape);
+      const double stable = stable_step(*each, clamp_of(m));
+      each->dt = 1e-4 * stable;
+      each->step();
+      EXPECT_NEAR(each->state.back(), stable, 1e-5 * stable) << shape[0][0] << " " << shape[2][2];
+      EXPECT_NEAR(stable_step(*each, clamp_of(m)), each->state.back(), 1e-9 * stable);
+    }
+  }
+}
+
+// The first step finds that the shape asks for shorter sub-steps, and those after it begin with them.
+TEST(CorotationalFemGpu, StaysFarDrawn_TakesNoOtherStepTwice) {
+  const Mesh m = bar();
+  std::vector<uint8_t> ends(m.npoint(), 0);
+  for (uint32_t i = 0; i < m.npoint(); ++i) ends[i] = m.at(i)[0] < 1e-9 || m.at(i)[0] > 0.08 - 1e-9 ? 7 : 0;
+  Bodies b(kCells, m, {{"poisson", 0.45}, {"damping_stiffness", 1e-4}}, ends);
+  Stepper &body = *b.processor;
+  take_shape(body, {{{2.5, 0, 0}, {0, 0.75, 0}, {0, 0, 0.75}}});
+  body.dt = 40 * fact(body, "longest_step");
+  static uint32_t passes = 0;
+  b.host.table.parallel_for = [](void *, uint32_t n, uint32_t, void (*fn)(void *, uint32_t, uint32_t),
+                                 void *user) {
+    ++passes;
+    fn(user, 0, n);
+  };
+  int again = 0;
+  for (int n = 0; n < 50; ++n) {
+    const double stable =
+        std::min(body.state.back() > 0 ? body.state.back() : HUGE_VAL, fact(body, "longest_step") / 0.9);
+    const uint32_t once = 2 * uint32_t(std::ceil(body.dt / (0.9 * stable) - 1e-6)) + 3;
+    passes = 0;
+    body.step();
+    again += passes > once;
+    EXPECT_GE(passes, once);
+  }
+  EXPECT_EQ(again, 1);
+}
+
 // The device says when a step was too long as the processor does.
 TEST(CorotationalFemGpu, DrawnFarOnTheSoftwareDriver_HasTheBitsOfTheReference) {
   Bodies b(kCells, bar(), {{"poisson", 0.45}, {"damping_stiffness", 1e-5}}, {}, software);

@@ -91,6 +91,20 @@ inline double fact(const Stepper &b, const std::string &key) {
   return 0;
 }
 
+// s, by the rows of the model's bound, held points left out.
+inline double stable_step(Stepper &b, const std::vector<uint8_t> &fixed) {
+  std::vector<double> stiff(b.size(), 0.0), damper(b.size(), 0.0);
+  double cell = HUGE_VAL;
+  const dfm_kin k = b.kin();
+  EXPECT_EQ(b.ops->bound(b.self, &k, stiff.data(), damper.data(), &cell), DFM_OK);
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    if (fixed[i] == 7) continue;
+    const double mass = b.mesh.mass[i], c = damper[i];
+    cell = std::min(cell, 4 * mass / (c + std::sqrt(c * c + 4 * mass * stiff[i])));
+  }
+  return cell;
+}
+
 // s, of the first period of the middle's motion along x, by the zeros between samples.
 template <class Move, class Place>
 double period(const Move &move, const Place &place, double h) {

@@ -120,6 +120,32 @@ TEST_P(Gpu, SubStep_IsThatOfTheProcessorsModel) {
   EXPECT_LE(off, 1e-6 * most);
 }
 
+// In contact the library takes 0.9 of the bound, and an impulse moves its points as the scheme of one
+// sub-step does. Dampers rule the bound here, and the lightest points are held.
+TEST_P(Gpu, StepOfTheBound_IsOneSubStep) {
+  const Mesh m = kuhn_bar(4, 3, 3, 0.02, 0.2);
+  for (const double damping : {0.0, 1e-4, 1e-2}) {
+    const Params p = {{"young", 3e5}, {"damping_stiffness", damping}};
+    Bodies b(GetParam(), m, p, clamp_of(m));
+    NEEDS_DRIVER(b);
+    Plain plain(b.host, GetParam(), m, p, clamp_of(m));
+    const double h = 0.9 * stable_step(*b.device, clamp_of(m));
+    plain.shake(1e-5, 0.01);
+    plain.sub_step(h);
+    for (Stepper *each : {b.device.get(), b.processor.get()}) {
+      each->dt = h;
+      each->shake(1e-5, 0.01);
+      each->step();
+      double most = 0, off = 0;
+      for (uint32_t i = 0; i < m.npoint(); ++i) {
+        most = std::max(most, norm(plain.get(plain.v, i)));
+        off = std::max(off, norm(plain.get(plain.v, i) - each->get(each->v, i)));
+      }
+      EXPECT_LE(off, 1e-6 * most) << damping;
+    }
+  }
+}
+
 TEST_P(Gpu, StretchedBar_HasThePeriodOfTheProcessorsModel) {
   const Mesh m = kuhn_bar(12, 2, 2, 0.02);
   const double young = 1e6;
@@ -142,6 +168,46 @@ TEST_P(Gpu, StretchedBar_HasThePeriodOfTheProcessorsModel) {
   // of a slender rod: 4 l / sqrt(E / rho)
   EXPECT_NEAR(processor, 4 * 0.24 / std::sqrt(young / 1000), 0.05 * processor);
   EXPECT_NEAR(device, processor, 1e-6 * processor);
+}
+
+// The lag of the dampers allows sub-steps that dampers which see the velocity do not, and takes 2 % of the
+// first mode's damping at most.
+TEST_P(Gpu, StiffDampers_SlowTheFirstModeAsInShortSteps) {
+  const Mesh m = kuhn_bar(12, 2, 2, 0.02);
+  const double w = 1.5707963267948966 / 0.24 * std::sqrt(1e6 / 1000);  // rad/s
+  const Params p = {{"young", 1e6}, {"damping_stiffness", 2 * 0.1 / w}};
+  Bodies b(GetParam(), m, p, clamp_of(m));
+  NEEDS_DRIVER(b);
+  Plain plain(b.host, GetParam(), m, p, clamp_of(m));
+  const auto stretch = [&](auto &body) {
+    for (uint32_t i = 0; i < m.npoint(); ++i)
+      body.set(body.x, i, m.at(i) + Vec{1e-3 * std::sin(1.5707963267948966 * m.at(i)[0] / 0.24), 0, 0});
+  };
+  const uint32_t tip = m.npoint() - 1;
+  const double h = 0.9 * fact(*b.device, "longest_step");
+  constexpr int kParts = 40;
+  std::vector<double> rows(m.npoint(), 0.0), damping(rows);
+  double cell = HUGE_VAL, seeing = HUGE_VAL;  // s, the longest sub-step of dampers without a lag
+  const dfm_kin k = plain.kin();
+  ASSERT_EQ(plain.ops->bound(plain.self, &k, rows.data(), damping.data(), &cell), DFM_OK);
+  for (uint32_t i = 0; i < m.npoint(); ++i) seeing = std::min(seeing, 2 * m.mass[i] / damping[i]);
+  EXPECT_GT(h, 1.5 * seeing);
+  ASSERT_LT(h / kParts, 0.9 * seeing);
+  stretch(*b.device);
+  stretch(plain);
+  b.device->dt = h;
+  double off = 0, most = 0, last = 0;
+  for (int n = 0; n * h < 4 * 6.283185307179586 / w; ++n) {
+    b.device->step();
+    for (int part = 0; part < kParts; ++part) plain.sub_step(h / kParts);
+    const double there = b.device->get(b.device->x, tip)[0] - m.at(tip)[0],
+                 here = plain.get(plain.x, tip)[0] - m.at(tip)[0];
+    off = std::max(off, std::fabs(there - here));
+    most = std::max(most, std::fabs(here));
+    last = here;
+  }
+  EXPECT_LT(std::fabs(last), 0.15 * most);  // it has lost most of its motion
+  EXPECT_LT(off, 0.03 * most);
 }
 
 TEST_P(Gpu, HangingBar_SagsAsTheProcessorsModel) {

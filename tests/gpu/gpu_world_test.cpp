@@ -43,7 +43,7 @@ struct World {
   dfm_body_measure now() const { return test::measure(body); }
 };
 
-constexpr double kSoftware = 2, kReference = 3;  // of the parameter "device"
+constexpr double kHardware = 1, kSoftware = 2, kReference = 3;  // of the parameter "device"
 
 bool is_there(double which) {
   test::Context context(1);
@@ -229,7 +229,7 @@ test::CommandResult run_scene(const std::string &device, bool driver) {
 TEST(GpuCommand, WithoutADriver_SaysWhatToInstallAndTheReferenceStillRuns) {
   const test::CommandResult none = run_scene("", false), processor = run_scene("reference", false);
   EXPECT_NE(none.exit_code, 0);
-  EXPECT_NE(none.err.find("set device to reference"), std::string::npos) << none.err;
+  EXPECT_NE(none.err.find("take the model without _gpu"), std::string::npos) << none.err;
   EXPECT_NE(none.err.find("mesa-vulkan-drivers"), std::string::npos) << none.err;
   EXPECT_EQ(processor.exit_code, 0) << processor.err;
 }
@@ -239,6 +239,105 @@ TEST(GpuCommand, Hardware_IsNoSoftwareDriver) {
   const test::CommandResult r = run_scene("hardware", true);
   if (r.exit_code != 0) {
     EXPECT_NE(r.err.find("no graphics card"), std::string::npos) << r.err;
+  }
+}
+
+// "device" of a body, and the members of its model.
+test::CommandResult explain_on(const std::string &device, const std::string &model, bool driver,
+                               const std::string &costs = "", const std::string &wish = "") {
+  const std::string folder = test::scratch("device"), file = folder + "/scene.json";
+  test::write_file(file,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+ )" + wish + R"("materials": {"soft": {"density": 1000, "young": 1e5, "damping": {"stiffness": 1e-4}}},
+ "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 50},
+   "material": "soft", "device": ")" +
+                       device + R"(", "model": {)" + model + "}}]}");
+  std::vector<std::string> argv = {"/usr/bin/env", "DEFORM_COSTS=" + costs};
+  if (!driver) argv.insert(argv.end(), {"VK_ICD_FILENAMES=/nowhere.json", "VK_DRIVER_FILES=/nowhere.json"});
+  argv.insert(argv.end(), {DEFORM_COMMAND, "explain", file});
+  return test::run(argv);
+}
+
+bool says(const test::CommandResult &r, const std::string &words) {
+  return (r.exit_code == 0 ? r.out : r.err).find(words) != std::string::npos;
+}
+
+TEST(GpuScene, Device_ChoosesTheModelOfThatName) {
+  for (const auto &[device, model, found] :
+       {std::array{"cpu", R"("type": "corotational_fem_gpu")", "model: org.deform.corotational_fem  "},
+        std::array{"cpu", R"("type": "msm")", "model: org.deform.msm  "},
+        std::array{"auto", R"("type": "condensed")", "no loaded model computes what condensed does"}}) {
+    const test::CommandResult r = explain_on(device, model, true);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    EXPECT_TRUE(says(r, found)) << r.out;
+  }
+  const test::CommandResult none = explain_on("gpu", R"("type": "condensed")", true);
+  EXPECT_NE(none.exit_code, 0);
+  EXPECT_TRUE(says(none, "that exists for corotational_fem, msm")) << none.err;
+  if (device() == kReference) GTEST_SKIP() << "no driver";
+  const test::CommandResult springs =
+      explain_on("gpu", R"("type": "msm", "params": {"volume": 0, "collapse": 0})", true);
+  EXPECT_TRUE(says(springs, "runs on: gpu, by msm_gpu: the scene asks for it")) << springs.out << springs.err;
+  EXPECT_TRUE(says(explain_on("gpu", R"("type": "corotational_fem")", true), "by corotational_fem_gpu"));
+}
+
+TEST(GpuScene, DeviceBesideAnAccuracy_IsThatOfTheModelThatThePlannerTakes) {
+  const test::CommandResult r =
+      explain_on("auto", R"("type": "auto")", true, "", R"("accuracy": {"target": 0.9},)");
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_TRUE(says(r, "runs on: cpu, by ")) << r.out;
+  EXPECT_TRUE(says(r, "chosen:   ")) << r.out;
+}
+
+// The card has fewer effects than the processor, and no scene loses one without a word.
+TEST(GpuScene, WhatTheCardLacks_IsTold) {
+  if (device() == kReference) GTEST_SKIP() << "no driver";
+  const test::CommandResult volume = explain_on("gpu", R"("type": "msm")", true);
+  EXPECT_NE(volume.exit_code, 0);
+  EXPECT_TRUE(says(volume, "/bodies/0/device: msm_gpu has no volume")) << volume.err;
+  const test::CommandResult other =
+      explain_on("gpu", R"("type": "corotational_fem", "params": {"energy": "stvk"})", true);
+  EXPECT_NE(other.exit_code, 0);
+  EXPECT_TRUE(says(other, "corotational_fem_gpu has no \"energy\" here")) << other.err;
+}
+
+TEST(GpuScene, WithoutADriver_GpuIsRefusedInOneSentence) {
+  const test::CommandResult r = explain_on("gpu", R"("type": "corotational_fem")", false);
+  EXPECT_NE(r.exit_code, 0);
+  EXPECT_TRUE(says(r, "mesa-vulkan-drivers")) << r.err;
+  EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+}
+
+// By costs in which it is faster, or slower.
+TEST(GpuScene, Auto_TakesTheCardWhereItIsFasterAndThere) {
+  const auto model = [](const char *name, const char *itself, const char *ns) {
+    std::string costs;
+    for (const char *meets : {"free", "touching", "pressed", "stacked"})
+      costs += std::string(costs.empty() ? "" : ", ") + "\"" + meets +
+               R"(": [{"points": 10, "ns_per_point": )" + ns + "}]";
+    return std::string(R"({"model": ")") + name + R"(", "steps_itself": )" + itself +
+           R"(, "wave_steps": 1, "errors": {"bends_little": 0, "bends_far": 0, "turns": 0, "lies": 0,)"
+           R"( "dents": 0, "dent_force": 0}, "costs": {"symplectic_euler": {)" +
+           costs + "}}}";
+  };
+  for (const bool faster : {true, false}) {
+    const std::string file = test::scratch("costs") + "/costs.json";
+    test::write_file(
+        file, R"({"format": "deform-costs", "version": 4, "machine": "that of the test", "models": [)" +
+                  model("corotational_fem", "false", "100") + ", " +
+                  model("corotational_fem_gpu", "true", faster ? "1" : "1e9") + "]}");
+    const test::CommandResult here = explain_on("auto", R"("type": "corotational_fem")", true, file),
+                              none = explain_on("auto", R"("type": "corotational_fem")", false, file);
+    EXPECT_EQ(here.exit_code, 0) << here.err;
+    EXPECT_EQ(none.exit_code, 0) << none.err;
+    EXPECT_EQ(none.err, "");
+    EXPECT_TRUE(says(none, "runs on: cpu, by corotational_fem: ")) << none.out;
+    EXPECT_TRUE(says(none, faster ? "mesa-vulkan-drivers" : "(costs of that of the test)")) << none.out;
+    // no card is what computes on the processor
+    const bool card = is_there(kHardware);
+    EXPECT_TRUE(says(here, faster && card ? "runs on: gpu" : "runs on: cpu")) << here.out;
+    if (!faster) continue;
+    EXPECT_TRUE(says(here, card ? "(costs of" : "no graphics card")) << here.out;
   }
 }
 

@@ -107,6 +107,10 @@ double explicit_step(const MeasuredModel &m, const BodyRegime &b) {
   return kOffered * h0 * h0 / (std::hypot(h0, beta) + beta);
 }
 
+double cpu_per_s(const MeasuredModel &m, Scheme own, double h, const BodyRegime &b) {
+  return 1e-9 * ns_per_point(costs_of(m, own, b), b.points, h) * b.points / h;
+}
+
 struct Try {
   const BodyRegime *body;
   Estimate e;
@@ -128,7 +132,7 @@ BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, co
   w.model_error = model_error(m, *t.body, t.e, wish);
   w.time_error = at_most(wish.weight * time_error(own, m.steps_itself, h, *t.body, t.e), 1);
   w.mesh_error = at_most(wish.weight * mesh_error(*t.body), 1);
-  w.cpu_s_per_s = 1e-9 * ns_per_point(costs_of(m, own, *t.body), t.body->points, h) * t.body->points / h;
+  w.cpu_s_per_s = cpu_per_s(m, own, h, *t.body);
   return w;
 }
 
@@ -434,6 +438,19 @@ Estimate estimate(const BodyRegime &b, double duration) {
   e.sag = std::max(deflection, impact) * b.length;
   e.lasts = rate > 0 ? std::min(duration, 3 / rate) : duration;
   return e;
+}
+
+double predicted_cost(const Measured &measured, const std::string &model, const BodyRegime &body,
+                      double step) {
+  for (const MeasuredModel &m : measured.models) {
+    if (m.id != model) continue;
+    const Scheme scheme =
+        m.steps_itself || body.scheme < 0 ? Scheme::explicit_euler : static_cast<Scheme>(body.scheme);
+    if (costs_of(m, scheme, body).empty()) break;
+    const bool divided = scheme == Scheme::explicit_euler && !m.steps_itself;
+    return cpu_per_s(m, scheme, divided ? std::min(step, explicit_step(m, body)) : step, body);
+  }
+  return HUGE_VAL;
 }
 
 double ms_per_step(const Way &way) { return 1e3 * way.cpu_s_per_s * way.frame; }

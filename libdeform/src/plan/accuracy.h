@@ -34,7 +34,8 @@ inline constexpr size_t kMeets = 4;
 const char *meets_name(Meets meets);  // as a file of costs names it
 
 struct MeasuredModel {
-  std::string id;  // short name
+  std::string id;       // short name
+  std::string machine;  // on which it was measured; empty: that of all
   bool steps_itself = false;
   // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 0.02 and by
   // 0.8 of its length, a bar that turns, a block that lies on a plane, a held block that a small sphere
@@ -127,6 +128,11 @@ struct PlannedWay {
   std::string missed;                // if it does not meet: what is predicted and what would meet
 };
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);
+
+// s of processor time per second, on a card by the clock, of a body that a model moves in the scheme that the
+// body names, else explicitly, in steps of a scene; infinite where it was not measured.
+double predicted_cost(const Measured &measured, const std::string &model, const BodyRegime &body,
+                      double step);
 
 // Milliseconds of a frame.
 double ms_per_step(const Way &way);

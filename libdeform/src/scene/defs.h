@@ -130,6 +130,8 @@ struct Body : Thing {
   dfm_body_def def = dfm_body_def_default();
   std::string mesh, model, nodal_bc;
   bool model_open = false;  // the planner chooses; `model` holds a placeholder
+  // of `model`, which the processor moves, or the model that a card moves; device.h chooses and clears it
+  std::optional<std::string> device;
   MadeMesh made;
   OwnSurface surface;
   Start start;
@@ -261,6 +263,9 @@ class Types {
   std::vector<std::string> names(uint32_t kind) const;                 // short names
   std::vector<std::string> model_keys() const;                         // parameters of any model
   std::vector<const dfm_type *> models() const;
+  // The model NAME_gpu beside the model NAME, which a graphics card moves, and the reverse; nullptr: none.
+  const dfm_type *on_card(const dfm_type &model) const;
+  const dfm_type *off_card(const dfm_type &model) const;
   // A file that was not loaded and why: the one that speaks of this type, else the first; "": all were.
   std::string passed_over(const std::string &name) const;
 

@@ -26,7 +26,7 @@ constexpr Row kObjects[] = {
     {"body",
      "name mesh material model integrator pose velocity spin fix forces surface nodal_bc fill lattice "
      "springs anisotropy materials_by_group fields start switch attach sensor id separate cut_delay place "
-     "-pressure mass_scaling"},
+     "-pressure mass_scaling device"},
     {"place", "on"},
     {"separate", "least_cells crumbs"},
     {"model", "type params precision"},
@@ -98,6 +98,7 @@ constexpr Row kWords[] = {
     {"from", "boundary"},
     {"flatten", "plane line point"},
     {"precision", "double single"},
+    {"device", "cpu gpu auto"},
     {"coupling", "barycentric mls thesis"},
     {"by", "auto area mass"},
     {"color", "body contact speed displacement stress"},

@@ -203,12 +203,13 @@ class Reader {
     }
   }
 
-  // Models that take cells of this kind.
+  // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
   std::vector<std::string> candidates(const Measured &measured, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.find(DFM_KIND_MODEL, m.id);
-      if (type && static_cast<const dfm_model *>(type->ops)->cells & cell) out.push_back(m.id);
+      if (!type || types_.off_card(*type)) continue;
+      if (static_cast<const dfm_model *>(type->ops)->cells & cell) out.push_back(m.id);
     }
     return out;
   }
@@ -291,12 +292,17 @@ json way_json(const Way &way, const Definition &def) {
 
 }  // namespace
 
+std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Types &types,
+                                const Measured &measured) {
+  return Reader(context, def, types).run(measured);
+}
+
 json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree) {
   Wish wish = def.wanted;
   wish.duration = def.duration;
   wish.step = def.step;
   const Measured measured = read_costs();
-  const std::vector<BodyRegime> bodies = Reader(context, def, types).run(measured);
+  const std::vector<BodyRegime> bodies = regimes(context, def, types, measured);
   PlannedWay plan = plan_accuracy(bodies, measured, wish);
   const char *const key = wish.target > 0 ? "accuracy" : "budget";
   if (!plan.found)

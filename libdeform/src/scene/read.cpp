@@ -70,6 +70,20 @@ std::vector<const dfm_type *> Types::models() const {
   return out;
 }
 
+namespace {
+constexpr std::string_view kOnCard = "_gpu";
+}
+
+const dfm_type *Types::on_card(const dfm_type &model) const {
+  return find(DFM_KIND_MODEL, std::string(model.id).append(kOnCard));
+}
+
+const dfm_type *Types::off_card(const dfm_type &model) const {
+  const std::string_view id = model.id;
+  if (!id.ends_with(kOnCard)) return nullptr;
+  return find(DFM_KIND_MODEL, std::string(id.substr(0, id.size() - kOnCard.size())));
+}
+
 std::vector<std::string> Types::model_keys() const {
   std::vector<std::string> out;
   for (const dfm_type *t : types_)

@@ -21,6 +21,7 @@ std::vector<CostAt> read_sizes(const Node &sizes) {
 MeasuredModel read_model(const Node &node) {
   MeasuredModel m;
   m.id = node.at("model").text();
+  if (node.has("machine")) m.machine = node.member("machine").text();
   m.steps_itself = node.at("steps_itself").boolean();
   m.wave_steps = node.at("wave_steps").number(kNotNegative);
   const Node errors = node.at("errors");

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "scene/build.h"
+#include "scene/device.h"
 #include "scene/node.h"
 #include "scene/planner.h"
 #include "scene/read.h"
@@ -38,12 +39,19 @@ Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_opti
   }
   const Types types(context);
   definition_ = read_scene(tree_->root, path, types);
+  // The scene then says what was chosen, and is read as if its file had said so.
+  json chosen, devices;
   if (definition_.wanted.any()) {
-    // The scene then says what was chosen, and is read as if its file had said so.
-    json chosen = plan_scene(context, definition_, types, tree_->root);
+    chosen = plan_scene(context, definition_, types, tree_->root);
     definition_ = read_scene(tree_->root, path, types);
-    tree_->root[definition_.wanted.target > 0 ? "accuracy" : "budget"]["chosen"] = std::move(chosen);
   }
+  if (std::ranges::any_of(definition_.bodies, [](const Body &b) { return b.device.has_value(); })) {
+    devices = choose_devices(context, definition_, types, tree_->root);
+    definition_ = read_scene(tree_->root, path, types);
+  }
+  if (!chosen.is_null())
+    tree_->root[definition_.wanted.target > 0 ? "accuracy" : "budget"]["chosen"] = std::move(chosen);
+  if (!devices.is_null()) tree_->root["devices"] = std::move(devices);
   Built built = build(context, definition_, options ? options->jitter_seed : 0);
   world_ = built.world;
   probes_ = std::move(built.probes);

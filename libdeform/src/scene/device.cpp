@@ -1,0 +1,208 @@
+#include "scene/device.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/error.h"
+#include "core/handle.h"
+#include "scene/build.h"
+#include "scene/planner.h"
+#include "state/world.h"
+#include "world/body_effects.h"
+
+namespace dfm::scene {
+namespace {
+
+constexpr double kFrame = 1.0 / 60;  // s, where the scene names no step
+
+std::string short_id(const dfm_type &type) {
+  const std::string id = type.id;
+  return id.substr(id.rfind('.') + 1);
+}
+
+// Effects that work in a small body of this material.
+std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,
+                                    const std::string &model, Params params) {
+  Definition small;
+  small.file = def.file;
+  small.materials = def.materials;
+  small.duration = kFrame;
+  Body &b = small.bodies.emplace_back();
+  b.pointer = body.pointer;
+  b.name = body.name;
+  b.material = body.material;
+  b.model = model;
+  b.params = std::move(params);
+  b.made = {"beam", {0.1, 0.1, 0.1}, 6, 1};
+  const Built built = build(context, small, 0);
+  std::vector<std::string> out;
+  for (const BodyEffect &e : body_effects(*resolve<World>(Kind::world, built.world).find_body(body.name)))
+    if (e.works) out.push_back(e.name);
+  dfm_world_destroy(built.world);
+  return out;
+}
+
+class Chooser {
+ public:
+  Chooser(dfm_context *context, const Definition &def, const Types &types, json &tree)
+      : context_(context), def_(def), types_(types), tree_(tree) {}
+
+  json run() {
+    json out = json::array();
+    for (size_t i = 0; i < def_.bodies.size(); ++i) {
+      const Body &b = def_.bodies[i];
+      if (!b.device) continue;
+      const dfm_type &own = *types_.find(DFM_KIND_MODEL, b.model);
+      const dfm_type *const card = types_.on_card(own);
+      const bool asked = *b.device == "gpu";
+      std::string why = card ? "" : no_model(own);
+      if (card && !asked) why = slower_on(own, *card, i);
+      if (why.empty()) why = asked ? differs(b, own, *card, true) : unless_refused(b, own, *card);
+      if (asked && !why.empty()) def_.refuse(b.pointer + "/device", why, DFM_E_UNSUPPORTED);
+      const bool on_card = why.empty();
+      if (on_card) why = asked ? "the scene asks for it" : faster_;
+      if (on_card) move(b, own, *card);
+      tree_[json::json_pointer(b.pointer + "/device")] = on_card ? "gpu" : "cpu";
+      out.push_back({{"name", b.name},
+                     {"device", on_card ? "gpu" : "cpu"},
+                     {"model", short_id(on_card ? *card : own)},
+                     {"why", why}});
+    }
+    return out;
+  }
+
+ private:
+  std::string no_model(const dfm_type &own) const {
+    std::vector<std::string> able;
+    for (const dfm_type *t : types_.models())
+      if (types_.on_card(*t)) able.push_back(short_id(*t));
+    return format("no loaded model computes what %s does on a graphics card%s%s; take \"device\": \"cpu\"",
+                  short_id(own).c_str(), able.empty() ? "" : "; that exists for ", join(able).c_str());
+  }
+
+  // Why the processor is taken by the costs; empty: it is not, and faster_ says why.
+  std::string slower_on(const dfm_type &own, const dfm_type &card, size_t body) {
+    if (def_.equilibrium) return "the processor finds equilibria";
+    if (regimes_.empty()) {
+      measured_ = read_costs();
+      regimes_ = regimes(context_, def_, types_, measured_);
+    }
+    const BodyRegime &b = regimes_[body];
+    const double step = def_.step > 0 ? def_.step : kFrame;
+    const double here = 1e3 * step * predicted_cost(measured_, short_id(own), b, step),
+                 there = 1e3 * step * predicted_cost(measured_, short_id(card), b, step);
+    if (!std::isfinite(here) || !std::isfinite(there))
+      return format("no costs of %s are known; deform calibrate measures them where there is a card",
+                    std::isfinite(here) ? short_id(card).c_str() : short_id(own).c_str());
+    const std::string times = format(
+        "%u points that touch %s: %.2g ms per step of %.3g s on a card (costs of %s), %.2g ms on the "
+        "processor (%s)",
+        b.points, touches(b), there, step, machine(card).c_str(), here, machine(own).c_str());
+    if (!(there < here)) return times;
+    faster_ = times;
+    return "";
+  }
+
+  std::string machine(const dfm_type &model) const {
+    for (const MeasuredModel &m : measured_.models)
+      if (m.id == short_id(model) && !m.machine.empty()) return m.machine;
+    return measured_.machine;
+  }
+
+  static const char *touches(const BodyRegime &b) {
+    constexpr const char *kWhat[kMeets] = {"nothing", "the ground", "a probe", "another body"};
+    return kWhat[static_cast<size_t>(what_it_meets(b))];
+  }
+
+  const Material *material(const Body &b) const {
+    for (const Material &m : def_.materials)
+      if (m.name == b.material) return &m;
+    return nullptr;
+  }
+
+  // A parameter that the card's model lacks and that is not 0, which leaves out what it is for.
+  static std::string lacking(const Params &params, const dfm_type &own, const dfm_type &card) {
+    for (size_t k = 0; k < params.keys.size(); ++k)
+      if (find_row(&own, params.keys[k]) && !find_row(&card, params.keys[k]) &&
+          std::ranges::any_of(params.values[k], [](double v) { return v != 0; }))
+        return params.keys[k];
+    return "";
+  }
+
+  // Why the card would not move the body as the processor does; empty: it would. A driver that computes on
+  // the processor counts where the card is asked for. Throws Error where the model refuses the body.
+  std::string differs(const Body &b, const dfm_type &own, const dfm_type &card, bool any_driver) const {
+    const std::string name = short_id(card);
+    std::string key = lacking(b.params, own, card);
+    if (const Material *m = material(b); key.empty() && m) key = lacking(m->extra, own, card);
+    for (const FieldFile &f : b.fields)
+      if (const dfm_param *row = find_row(&card, f.key); !row || !(row->flags & DFM_PARAM_PER_CELL))
+        key = f.key;
+    if (!key.empty())
+      return format("%s has no \"%s\" here; leave it out, or take \"device\": \"cpu\"", name.c_str(),
+                    key.c_str());
+    Params left = left_for(b.params, card);
+    if (!any_driver) ask_for_hardware(card, left);
+    const std::vector<std::string> here = effects_of(context_, def_, b, own.id, b.params),
+                                   there = effects_of(context_, def_, b, card.id, std::move(left));
+    for (const std::string &effect : here)
+      if (std::ranges::find(there, effect) == there.end())
+        return format(
+            "%s has no %s; switch it off in %s (deform explain says by what), take \"device\": "
+            "\"cpu\", or name the model %s",
+            name.c_str(), effect.c_str(), short_id(own).c_str(), name.c_str());
+    return "";
+  }
+
+  // The same, and why the model refuses the body, for which the processor is taken.
+  std::string unless_refused(const Body &b, const dfm_type &own, const dfm_type &card) const {
+    try {
+      return differs(b, own, card, false);
+    } catch (const Error &e) {
+      const std::string why = e.what(), where = def_.file + ": " + b.pointer + ": ";
+      return why.starts_with(where) ? why.substr(where.size()) : why;
+    }
+  }
+
+  static void ask_for_hardware(const dfm_type &card, Params &params) {
+    const dfm_param *const row = find_row(&card, "device");
+    for (int k = 0; row && row->names && row->names[k]; ++k) {
+      if (std::string_view(row->names[k]) != "hardware") continue;
+      params.keys.push_back(row->key);
+      params.values.push_back({double(k)});
+    }
+  }
+
+  static Params left_for(const Params &params, const dfm_type &card) {
+    Params out;
+    for (size_t k = 0; k < params.keys.size(); ++k)
+      if (find_row(&card, params.keys[k])) {
+        out.keys.push_back(params.keys[k]);
+        out.values.push_back(params.values[k]);
+      }
+    return out;
+  }
+
+  void move(const Body &b, const dfm_type &own, const dfm_type &card) {
+    json &model = tree_[json::json_pointer(b.pointer + "/model")];
+    model["type"] = card.id;
+    for (const std::string &key : b.params.keys)
+      if (find_row(&own, key) && !find_row(&card, key)) model["params"].erase(key);
+  }
+
+  dfm_context *context_;
+  const Definition &def_;
+  const Types &types_;
+  json &tree_;
+  Measured measured_;
+  std::vector<BodyRegime> regimes_;
+  std::string faster_;
+};
+
+}  // namespace
+
+json choose_devices(dfm_context *context, const Definition &def, const Types &types, json &tree) {
+  return Chooser(context, def, types, tree).run();
+}
+
+}  // namespace dfm::scene
