@@ -14,7 +14,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
   if (!model::in_range(h, id_, kParams, kParamCount, m.params)) throw model::Refused{};
   if (condensed_) check_size(m.nsurfel, m.npoint);
-  elastic_.create(h, id_, m);
+  elastic_.create(h, id_, m, by_surface_);
   modes_.create(h, id_, m, elastic_, m.params);
   take_surface(m);
   take_near(m);
@@ -154,9 +154,7 @@ void Body::whole_displacement(const dfm_kin &k, Frame &f) {
 double Body::energy(const dfm_kin &k) {
   Frame f;
   whole_displacement(k, f);
-  double sum = 0;
-  for (uint32_t c = 0; c < elastic_.ncell; ++c) sum += elastic_.volume(c) * elastic_.density(c, u_.data());
-  return sum;
+  return elastic_.energy(u_.data());
 }
 
 void Body::cell_energy(const dfm_kin &k, double *density) {
