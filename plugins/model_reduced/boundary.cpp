@@ -48,9 +48,7 @@ struct Integrals {
 struct Kelvin {
   double mu, nu, k;
   Kelvin(double young, double poisson)
-      : mu(young / (2 * (1 + poisson))),
-        nu(poisson),
-        k((1 + poisson) / (8 * kPi * young * (1 - poisson))) {}
+      : mu(young / (2 * (1 + poisson))), nu(poisson), k((1 + poisson) / (8 * kPi * young * (1 - poisson))) {}
   void u(const Integrals &i, double *out) const {
     for (int a = 0; a < 9; ++a) out[a] = k * (i.dyad[a] + (a % 4 ? 0 : (3 - 4 * nu) * i.inverse));
   }
@@ -128,9 +126,8 @@ struct Boundary::Triangle {
       for (double &k : s) k /= side;
       cross_add(s, n, 1, m);
       const double from = dot(to[a], s), until = from + side, t = dot(to[a], m);
-      const double f = from + until > 0
-                           ? dfm_log((length[b] + until) / (length[a] + from))
-                           : dfm_log((length[a] - from) / (length[b] - until));
+      const double f = from + until > 0 ? dfm_log((length[b] + until) / (length[a] + from))
+                                        : dfm_log((length[a] - from) / (length[b] - until));
       inverse += t * f;
       const double along = length[b] - length[a];
       for (int i = 0; i < 3; ++i) {
@@ -196,7 +193,8 @@ struct Boundary::Triangle {
       for (int a = 0; a < 3; ++a) {
         double x[3];
         for (int k = 0; k < 3; ++k)
-          x[k] = part[a][k] + ring[2 * r] * ((part[(a + 1) % 3][k] - part[a][k]) + (part[(a + 2) % 3][k] - part[a][k]));
+          x[k] = part[a][k] +
+                 ring[2 * r] * ((part[(a + 1) % 3][k] - part[a][k]) + (part[(a + 2) % 3][k] - part[a][k]));
         add(x, ring[2 * r + 1]);
       }
   }
@@ -204,9 +202,7 @@ struct Boundary::Triangle {
 
 void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   host_ = host;
-  struct Face {
-    uint32_t sorted[3], corner[3];
-  };
+  struct Face { uint32_t sorted[3], corner[3]; };
   std::vector<Face> faces;
   constexpr int kFaces[4][3] = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   for (size_t c = 0; c < m.ncell; ++c)
@@ -222,8 +218,8 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   std::stable_sort(faces.begin(), faces.end(), less);
   std::vector<uint32_t> place(m.npoint, UINT32_MAX);
   for (size_t n = 0; n < faces.size(); ++n) {
-    const bool twice = (n > 0 && !less(faces[n - 1], faces[n])) ||
-                       (n + 1 < faces.size() && !less(faces[n], faces[n + 1]));
+    const bool twice =
+        (n > 0 && !less(faces[n - 1], faces[n])) || (n + 1 < faces.size() && !less(faces[n], faces[n + 1]));
     if (twice) continue;
     for (const uint32_t i : faces[n].corner) {
       triangles_.push_back(i);
@@ -232,10 +228,11 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   }
   if (ntriangle() > kMostTriangles) {
     char text[200];
-    std::snprintf(text, sizeof text,
-                  "%zu triangles; boundary elements of more than %zu are refused, because their dense matrices "
-                  "take minutes; take a coarser surface, or the model condensed",
-                  ntriangle(), kMostTriangles);
+    std::snprintf(
+        text, sizeof text,
+        "%zu triangles; boundary elements of more than %zu are refused, because their dense matrices "
+        "take minutes; take a coarser surface, or the model condensed",
+        ntriangle(), kMostTriangles);
     model::complain(host, id, text);
     throw model::Refused{};
   }
@@ -295,7 +292,8 @@ void Boundary::add_pairs(const std::vector<Triangle> &t, double young, double po
             for (size_t r = 0; r < 3; ++r) row_of(at, y.corner[a], r, r) += y.area / 6;
         }
       }
-      const double inverse = 0.5 * (pair[0].inverse + pair[1].inverse), over = kelvin.mu / (4 * kPi) * inverse;
+      const double inverse = 0.5 * (pair[0].inverse + pair[1].inverse),
+                   over = kelvin.mu / (4 * kPi) * inverse;
       double g[9];
       for (int a = 0; a < 9; ++a) g[a] = (a % 4 ? 0 : 2 * over) - 4 * kelvin.mu * kelvin.mu * mean[a];
       for (int b = 0; b < 3; ++b)
@@ -375,10 +373,11 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
   lead_inner(kernels, t, rest, young, poisson, traction);
   make_rigid_exact(rest, block);
   char text[200];
-  std::snprintf(text, sizeof text,
-                "%s: %zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
-                "forces under rigid motions are %.2g of the stiffness.",
-                id, many, asymmetry_, rigid_error_);
+  std::snprintf(
+      text, sizeof text,
+      "%s: %zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
+      "forces under rigid motions are %.2g of the stiffness.",
+      id, many, asymmetry_, rigid_error_);
   host_->log(host_->ctx, 1, 0, text);
 }
 
@@ -407,8 +406,7 @@ void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t
           for (size_t r = 0; r < 3; ++r) {
             const size_t row = 3 * i + r;
             if (row < first || row >= first + many) continue;
-            for (size_t s = 0; s < 3; ++s)
-              follow_[row * columns + 3 * t[q].corner[a] + s] -= k[3 * r + s];
+            for (size_t s = 0; s < 3; ++s) follow_[row * columns + 3 * t[q].corner[a] + s] -= k[3 * r + s];
           }
         }
       }

@@ -275,11 +275,11 @@ void Elastic::factorize() {
 void Elastic::take_surface(const dfm_mesh &m, const char *id) {
   for (const uint32_t key : {kYoung, kPoisson})
     if (!field_[key].empty()) {
-      char text[160];
+      char text[200];
       std::snprintf(
           text, sizeof text,
-          "%s differs by cell, and boundary elements have one material; give one value, or take the "
-          "model condensed",
+          "%s differs by cell, and boundary elements have one material; give one value (for a surface "
+          "\"fill\": {\"cells\": 0}), or take the model condensed",
           kParams[key].key);
       model::complain(host_, id, text);
       throw model::Refused{};
