@@ -160,7 +160,14 @@ double Body::energy(const dfm_kin &k) {
 void Body::cell_energy(const dfm_kin &k, double *density) {
   Frame f;
   whole_displacement(k, f);
-  for (uint32_t c = 0; c < elastic_.ncell; ++c) density[c] = elastic_.density(c, u_.data());
+  double sum = 0;
+  for (uint32_t c = 0; c < elastic_.ncell; ++c) {
+    density[c] = elastic_.density(c, u_.data());
+    sum += elastic_.volume(c) * density[c];
+  }
+  // the surface has the energy; cells share it as their strains have it
+  const double scale = by_surface_ && sum > 0 ? elastic_.energy(u_.data()) / sum : 1;
+  for (uint32_t c = 0; by_surface_ && c < elastic_.ncell; ++c) density[c] *= scale;
 }
 
 void Body::cell_stress(const dfm_kin &k, double *stress) {

@@ -7,7 +7,8 @@
 //
 //   U = k ((3 - 4 nu) 1/r + r r^T/r^3),   k = (1 + nu) / (8 pi E (1 - nu))
 //   K u = int d/dn(1/(4 pi r)) u + int (2 mu U - 1/(4 pi r)) [c_a]x u_a
-//   v.D u = mu/(4 pi) int int 1/r (2 c_b.c_a v.u - (c_b.v)(c_a.u)) - v.[c_b]x int int (mu/(2 pi r) - 4 mu^2 U) [c_a]x u
+//   v.D u = mu/(4 pi) int int 1/r (2 c_b.c_a v.u - (c_b.v)(c_a.u))
+//           - v.[c_b]x int int (mu/(2 pi r) - 4 mu^2 U) [c_a]x u
 //
 // so that every integral is of 1/r, r r^T/r^3 or the solid angle: none is stronger than weakly singular. The
 // inner one is in closed form (Wilton et al. 1984), the outer by Gauss points, on parts of the triangle that
@@ -29,6 +30,16 @@ namespace {
 constexpr double kPi = 0x1.921fb54442d18p+1;
 constexpr size_t kMostTriangles = 2500;
 constexpr int kDeepest = 3;
+
+// Of (x, y) against the axis x, in -pi .. pi: the angle is halved three times, then a series.
+double angle_of(double y, double x) {
+  if (x < 0) return (y < 0 ? -kPi : kPi) - angle_of(y, -x);
+  double t = y / (x + std::sqrt(x * x + y * y));
+  for (int n = 0; n < 2; ++n) t /= 1 + std::sqrt(1 + t * t);
+  double sum = 0;
+  for (int n = 23; n > 0; n -= 2) sum = 1.0 / n - t * t * sum;
+  return 8 * t * sum;
+}
 
 double dot(const double *a, const double *b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
 
@@ -115,7 +126,7 @@ struct Boundary::Triangle {
       const double volume = dot(to[0], cross);
       const double below = length[0] * length[1] * length[2] + dot(to[0], to[1]) * length[2] +
                            dot(to[1], to[2]) * length[0] + dot(to[2], to[0]) * length[1];
-      solid = -2 * std::atan2(volume, below);
+      solid = -2 * angle_of(volume, below);
     }
     double line[3] = {}, plane[9] = {}, inverse = 0;
     for (int a = 0; a < 3; ++a) {
@@ -385,8 +396,9 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
 void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t, const double *rest,
                           double young, double poisson, const std::vector<double> &traction) {
   const Kelvin kelvin(young, poisson);
-  const size_t rows = 3 * t.size(), columns = 3 * point.size(), own = 3 * inner.size();
-  follow_.create(host_, own * columns);
+  const size_t rows = 3 * t.size(), columns = 3 * point.size(), own = 3 * inner.size(), row_size = padded();
+  follow_.create(host_, own * row_size);
+  packed_.create(host_, kLanes * row_size);
   std::vector<double> loads(rows * kLanes);
   for (size_t first = 0; first < own; first += kLanes) {
     const size_t many = std::min(kLanes, own - first);
@@ -406,7 +418,7 @@ void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t
           for (size_t r = 0; r < 3; ++r) {
             const size_t row = 3 * i + r;
             if (row < first || row >= first + many) continue;
-            for (size_t s = 0; s < 3; ++s) follow_[row * columns + 3 * t[q].corner[a] + s] -= k[3 * r + s];
+            for (size_t s = 0; s < 3; ++s) follow_[row * row_size + 3 * t[q].corner[a] + s] -= k[3 * r + s];
           }
         }
       }
@@ -415,7 +427,7 @@ void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t
       kernels.gram(rows, loads.data(), traction.data() + l * rows * kLanes, sum);
       for (size_t a = 0; a < many; ++a)
         for (size_t b = 0; b < kLanes && kLanes * l + b < columns; ++b)
-          follow_[(first + a) * columns + kLanes * l + b] += sum[kLanes * a + b];
+          follow_[(first + a) * row_size + kLanes * l + b] += sum[kLanes * a + b];
     }
   }
 }
@@ -483,7 +495,7 @@ void Boundary::make_rigid_exact(const double *rest, double *block) {
                 force[k][3 * i + r] * rigid[k][3 * j + s] + rigid[k][3 * i + r] * force[k][3 * j + s];
     }
   for (size_t row = 0; row < 3 * inner.size(); ++row) {
-    double *const follows = follow_.data() + row * size;
+    double *const follows = follow_.data() + row * padded();
     for (const std::vector<double> &r : rigid) {
       double missing = r[size + row];
       for (size_t j = 0; j < size; ++j) missing -= follows[j] * r[j];
@@ -494,27 +506,45 @@ void Boundary::make_rigid_exact(const double *rest, double *block) {
 
 template <size_t kWide>
 void Boundary::gather(double *f) const {
-  const size_t n = point.size();
+  const size_t size = 3 * point.size(), row_size = padded();
+  double *const own = packed_.data();
+  std::fill(own, own + kWide * size, 0.0);
+  bool any = false;
   for (size_t row = 0; row < 3 * inner.size(); ++row) {
     double *const from = f + kWide * (3 * size_t(inner[row / 3]) + row % 3);
-    const double *const follows = follow_.data() + 3 * n * row;
-    for (size_t j = 0; j < 3 * n; ++j)
-      for (size_t w = 0; w < kWide; ++w)
-        f[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] += follows[j] * from[w];
+    if (std::all_of(from, from + kWide, [](double a) { return a == 0; })) continue;
+    any = true;
+    const double *const follows = follow_.data() + row_size * row;
+    for (size_t j = 0; j < size; ++j)
+      for (size_t w = 0; w < kWide; ++w) own[kWide * j + w] += follows[j] * from[w];
     std::fill(from, from + kWide, 0.0);
   }
+  for (size_t j = 0; any && j < size; ++j)
+    for (size_t w = 0; w < kWide; ++w)
+      f[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] += own[kWide * j + w];
 }
 
+// Of one vector eight sums side by side.
 template <size_t kWide>
 void Boundary::spread(double *u) const {
-  const size_t n = point.size();
+  const size_t size = 3 * point.size(), row_size = padded();
+  double *const own = packed_.data();
+  for (size_t j = 0; j < row_size; ++j)
+    for (size_t w = 0; w < kWide; ++w)
+      own[kWide * j + w] = j < size ? u[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] : 0;
   for (size_t row = 0; row < 3 * inner.size(); ++row) {
-    const double *const follows = follow_.data() + 3 * n * row;
-    double sum[kWide] = {};
-    for (size_t j = 0; j < 3 * n; ++j)
-      for (size_t w = 0; w < kWide; ++w)
-        sum[w] += follows[j] * u[kWide * (3 * size_t(point[j / 3]) + j % 3) + w];
-    std::copy(sum, sum + kWide, u + kWide * (3 * size_t(inner[row / 3]) + row % 3));
+    const double *const follows = follow_.data() + row_size * row;
+    double *const to = u + kWide * (3 * size_t(inner[row / 3]) + row % 3);
+    double sum[kLanes] = {};
+    if constexpr (kWide == 1) {
+      for (size_t j = 0; j < row_size; j += kLanes)
+        for (size_t w = 0; w < kLanes; ++w) sum[w] += follows[j + w] * own[j + w];
+      *to = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
+    } else {
+      for (size_t j = 0; j < size; ++j)
+        for (size_t w = 0; w < kLanes; ++w) sum[w] += follows[j] * own[kLanes * j + w];
+      std::copy(sum, sum + kLanes, to);
+    }
   }
 }
 

@@ -42,7 +42,9 @@ class Boundary {
   double rigid_error_ = 0, asymmetry_ = 0;
   size_t ntriangle() const { return triangles_.size() / 3; }
   std::vector<uint32_t> triangles_;  // [.,3] counter-clockwise from outside, places in `point`
-  Buffer<double> follow_;            // [3 inner, 3 surface]
+  Buffer<double> follow_;            // [3 inner, padded 3 surface]
+  mutable Buffer<double> packed_;    // [padded 3 surface, kLanes]
+  size_t padded() const { return (3 * point.size() + kLanes - 1) / kLanes * kLanes; }
   void add_pairs(const std::vector<Triangle> &t, double young, double poisson, std::vector<double> &single,
                  std::vector<double> &both, double *block);
   size_t pair(size_t i, size_t j) const { return i * (2 * point.size() - i - 1) / 2 + (j - i - 1); }

@@ -1,8 +1,8 @@
 // Linear elasticity of a mesh in its frame: stiffness, held components, and displacements under forces. For a
 // body without held points the compliance applies to the force minus the inertia forces of the rigid
 // acceleration, and its displacements neither move the center of mass nor rotate the body (they are
-// orthogonal, by mass, to the rigid motions). The stiffness is that of the cells, or of the surface alone, which
-// inner points then follow (boundary.h).
+// orthogonal, by mass, to the rigid motions). The stiffness is that of the cells, or of the surface alone,
+// which inner points then follow (boundary.h).
 #pragma once
 #include <deform/plugin.h>
 

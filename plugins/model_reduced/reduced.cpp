@@ -1,4 +1,4 @@
-// org.deform.modal, org.deform.condensed and org.deform.boundary: linear elasticity by few modes in a floating
+// org.deform.modal, org.deform.condensed, org.deform.boundary: linear elasticity by few modes in a floating
 // frame, and what they leave out at rest; the bodies step themselves (doc/models/modal.md, condensed.md,
 // boundary.md).
 #include <cstring>

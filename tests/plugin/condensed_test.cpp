@@ -1,5 +1,5 @@
-// The type org.deform.condensed: its surface at rest is that of the full solution. org.deform.boundary has the
-// same steps (boundary_elements_test.cpp).
+// The type org.deform.condensed: its surface at rest is that of the full solution. org.deform.boundary has
+// the same steps (boundary_elements_test.cpp).
 #include "stepper_host.h"
 
 namespace {

@@ -1,4 +1,5 @@
-// The models modal, condensed and boundary in a world: dropped, sliding, holding, saved; with every law of friction.
+// The models modal, condensed and boundary in a world: dropped, sliding, holding, saved; with every law of
+// friction.
 #include "under_ball.h"
 
 namespace {
