@@ -47,9 +47,10 @@ bool measure(dfm_trimesh surface, dfm_tetmesh mesh, Filled &out) {
       dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0)
     return false;
   for (uint32_t t = 0; t < out.cells.ntet; ++t) {
-    out.volume += share[t] * cell_volume(points, tets + 4 * size_t(t));
-    out.mean_share += share[t] / out.cells.ntet;
-    out.least_share = share[t] < out.least_share ? share[t] : out.least_share;
+    const double part = share ? share[t] : 1;
+    out.volume += part * cell_volume(points, tets + 4 * size_t(t));
+    out.mean_share += part / out.cells.ntet;
+    out.least_share = part < out.least_share ? part : out.least_share;
   }
   out.warnings = lines_of(out.surface.warnings);
   for (const std::string &w : lines_of(out.cells.warnings)) out.warnings.push_back(w);
@@ -81,7 +82,7 @@ void print_json(const std::string &in, const std::string &file, uint32_t wanted,
   std::fputs(indented(out.text()).c_str(), stdout);
 }
 
-void print_table(const std::string &in, const std::string &file, const Filled &f) {
+void print_table(const std::string &in, const std::string &file, uint32_t wanted, const Filled &f) {
   std::printf("%s: %u triangles, filled into %s\n", shown(in).c_str(), f.surface.ntriangle,
               shown(file).c_str());
   std::printf("  cells             %u\n  points            %u\n  pieces            %u\n", f.cells.ntet,
@@ -92,7 +93,7 @@ void print_table(const std::string &in, const std::string &file, const Filled &f
   std::printf("  seconds           %.2f\n", f.seconds);
   for (const std::string &w : f.warnings) std::printf("  warning: %s\n", shown(w).c_str());
   if (f.surface.warnings[0] == 0 && f.cells.warnings[0] == 0) std::printf("  the surface is clean\n");
-  if (f.imported) return;
+  if (f.imported || wanted == 0) return;
   // The file alone would be drawn, and would touch, with the jagged border of its cells.
   const auto whole = [](const std::string &path) {
     return shown(quoted(name_of(std::filesystem::absolute(path_of(path)).lexically_normal())));
@@ -124,7 +125,7 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   if (const std::string lost = lost_shares(s.cells, out); !lost.empty())
     filled.warnings.push_back("not kept: " + lost);
   if (globals.json) print_json(in, out, cells, filled);
-  else if (!globals.quiet) print_table(in, out, filled);
+  else if (!globals.quiet) print_table(in, out, cells, filled);
   return kDone;
 }
 
@@ -146,7 +147,11 @@ void add_mesh_fill(Command mesh, Globals &globals, int *exit_code) {
   command.option("--out", options->out, "file to write: .msh (MSH 4.1), .msh2 (MSH 2.2), .mesh, .vtk or .vtu")
       .required()
       .type_name("FILE");
-  command.option("--cells", options->cells, "about how many tetrahedra").with_default().type_name("N");
+  command
+      .option("--cells", options->cells,
+              "about how many tetrahedra; 0: from one inner point to the triangles")
+      .with_default()
+      .type_name("N");
   command.calls(
       [=, &globals] { *exit_code = fill(globals, options->surface, options->out, options->cells); });
 }

@@ -14,7 +14,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
   if (!model::in_range(h, id_, kParams, kParamCount, m.params)) throw model::Refused{};
   if (condensed_) check_size(m.nsurfel, m.npoint);
-  elastic_.create(h, id_, m);
+  elastic_.create(h, id_, m, by_surface_);
   modes_.create(h, id_, m, elastic_, m.params);
   take_surface(m);
   take_near(m);
@@ -154,15 +154,20 @@ void Body::whole_displacement(const dfm_kin &k, Frame &f) {
 double Body::energy(const dfm_kin &k) {
   Frame f;
   whole_displacement(k, f);
-  double sum = 0;
-  for (uint32_t c = 0; c < elastic_.ncell; ++c) sum += elastic_.volume(c) * elastic_.density(c, u_.data());
-  return sum;
+  return elastic_.energy(u_.data());
 }
 
 void Body::cell_energy(const dfm_kin &k, double *density) {
   Frame f;
   whole_displacement(k, f);
-  for (uint32_t c = 0; c < elastic_.ncell; ++c) density[c] = elastic_.density(c, u_.data());
+  double sum = 0;
+  for (uint32_t c = 0; c < elastic_.ncell; ++c) {
+    density[c] = elastic_.density(c, u_.data());
+    sum += elastic_.volume(c) * density[c];
+  }
+  // the surface has the energy; cells share it as their strains have it
+  const double scale = by_surface_ && sum > 0 ? elastic_.energy(u_.data()) / sum : 1;
+  for (uint32_t c = 0; by_surface_ && c < elastic_.ncell; ++c) density[c] *= scale;
 }
 
 void Body::cell_stress(const dfm_kin &k, double *stress) {

@@ -20,7 +20,8 @@ constexpr double kLargestGradient = 0.1;
 constexpr double kForgotten = 1;  // s in the range of small displacements
 // What determines the body's position: the points; the points, for a host that sees them later; the state.
 enum class Lead { points, points_for_now, state };
-constexpr const char *kModalId = "org.deform.modal", *kCondensedId = "org.deform.condensed";
+constexpr const char *kModalId = "org.deform.modal", *kCondensedId = "org.deform.condensed",
+                     *kBoundaryId = "org.deform.boundary";
 
 struct Frame {
   double c[3] = {};                           // m, of its origin
@@ -29,7 +30,8 @@ struct Frame {
 
 class Body {
  public:
-  Body(const char *id, bool condensed) : id_(id), condensed_(condensed) {}
+  Body(const char *id, bool condensed, bool by_surface = false)
+      : id_(id), condensed_(condensed), by_surface_(by_surface) {}
   using Row = Param;
   const dfm_host *host = nullptr;
   const char *active_effects[3] = {};  // NULL-terminated
@@ -60,7 +62,7 @@ class Body {
 
  private:
   const char *id_;
-  const bool condensed_;
+  const bool condensed_, by_surface_;
   double params_[kParamCount] = {};
   char note_[128] = {};
   dfm_fact facts_[kFactCount] = {};
@@ -223,6 +225,10 @@ struct Modal : Body {
 };
 struct Condensed : Body {
   Condensed() : Body(kCondensedId, true) {}
+};
+// Condensed, with the stiffness of boundary elements (boundary.h).
+struct Surface : Body {
+  Surface() : Body(kBoundaryId, true, true) {}
 };
 
 }  // namespace reduced

@@ -237,23 +237,25 @@ void Elastic::find_pins() {
   for (const uint32_t i : {first, second, third})
     add_rows(rest.data() + 3 * size_t(i), extent, 7, i, rows, which);
   if (independent_rows(std::move(rows), chosen) < 6) throw "the mesh has no volume";
-  for (const uint32_t r : chosen) pins_.push_back(which[r]);
+  for (const uint32_t r : chosen) given_.push_back(which[r]);
 }
 
 void Elastic::check_holding() const {
   std::vector<std::array<double, 6>> rows;
   std::vector<uint32_t> which, chosen;
-  for (const uint32_t i : holders) add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
+  for (const uint32_t i : holders)
+    if (!std::binary_search(surface_.inner.begin(), surface_.inner.end(), i))
+      add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
   if (independent_rows(std::move(rows), chosen) < 6)
     throw "what is held leaves the body a rigid motion; hold three points that are not in a line, hold "
           "nothing, or use corotational_fem";
 }
 
-// Held and pinned displacements have a row and a column of their own.
+// Given displacements have a row and a column of their own, and so have those of points that follow.
 void Elastic::factorize() {
   std::vector<uint8_t> out(3 * size_t(npoint));
-  for (size_t j = 0; j < out.size(); ++j) out[j] = held[j / 3] >> (j % 3) & 1;
-  for (const uint32_t pin : pins_) out[pin] = 1;
+  for (const uint32_t j : given_) out[j] = 1;
+  for (const uint32_t i : surface_.inner) std::fill_n(&out[3 * size_t(i)], 3, uint8_t(1));
   double mean = 0;
   for (size_t i = 0; i < npoint; ++i) mean += (block_[9 * i] + block_[9 * i + 4]) + block_[9 * i + 8];
   mean /= double(3 * size_t(npoint));
@@ -269,22 +271,45 @@ void Elastic::factorize() {
   factor_.create(host_, npoint, ij, blk, rest.data());
 }
 
-void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m) {
+// One material; the blocks are those of all pairs of the surface's points.
+void Elastic::take_surface(const dfm_mesh &m, const char *id) {
+  for (const uint32_t key : {kYoung, kPoisson})
+    if (!field_[key].empty()) {
+      char text[200];
+      std::snprintf(
+          text, sizeof text,
+          "%s differs by cell, and boundary elements have one material; give one value (for a surface "
+          "\"fill\": {\"cells\": 0}), or take the model condensed",
+          kParams[key].key);
+      model::complain(host_, id, text);
+      throw model::Refused{};
+    }
+  surface_.find(host_, id, m);
+  edges_.create_copy(host_, surface_.edges.data(), surface_.edges.size());
+  nedge_ = uint32_t(surface_.edges.size() / 2);
+}
+
+void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bool by_surface) {
   host_ = host;
   kernels = choose_kernels(host, id);
+  by_surface_ = by_surface;
   take(m, id);
   place_origin(m);
   nedge_ = m.nedge;
+  if (by_surface) take_surface(m, id);
   block_.create(host, 9 * (size_t(npoint) + nedge_));
-  assemble();
+  if (by_surface) surface_.assemble(id, *kernels, rest.data(), young_, poisson_, block_.data());
+  else assemble();
   if (floating) {
     find_rigid();
     find_pins();
   } else {
     check_holding();
+    for (uint32_t j = 0; j < 3 * npoint; ++j)
+      if (is_held(j)) given_.push_back(j);
   }
   factorize();
-  if (floating) block_.drop();
+  if (floating && !by_surface) block_.drop();
 }
 
 void Elastic::compliance(const double *f, double *u) const { respond<1>(f, u); }
@@ -293,12 +318,26 @@ void Elastic::compliance_of_eight(const double *f, double *u) const { respond<kL
 
 // Held bodies alone: of a floating one the inertia forces act at all points.
 void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) const {
-  factor_.inverse_at(*kernels, n, points, w);
   const size_t rows = 3 * size_t(n);
-  const auto is_held = [&](size_t j) { return held[points[j / 3]] >> (j % 3) & 1; };
+  if (by_surface_) {
+    std::vector<double> eight(kLanes * 3 * size_t(npoint));
+    for (size_t first = 0; first < rows; first += kLanes) {
+      const size_t many = std::min(kLanes, rows - first);
+      std::fill(eight.begin(), eight.end(), 0.0);
+      for (size_t l = 0; l < many; ++l)
+        eight[kLanes * (3 * size_t(points[(first + l) / 3]) + (first + l) % 3) + l] = 1;
+      compliance_of_eight(eight.data(), eight.data());
+      for (size_t l = 0; l < many; ++l)
+        for (size_t j = 0; j < rows; ++j)
+          w[(first + l) * rows + j] = eight[kLanes * (3 * size_t(points[j / 3]) + j % 3) + l];
+    }
+    return;
+  }
+  factor_.inverse_at(*kernels, n, points, w);
+  const auto fixed = [&](size_t j) { return is_held(3 * size_t(points[j / 3]) + j % 3); };
   for (size_t i = 0; i < rows; ++i)
     for (size_t j = 0; j < rows; ++j)
-      if (is_held(i) || is_held(j)) w[i * rows + j] = 0;
+      if (fixed(i) || fixed(j)) w[i * rows + j] = 0;
 }
 
 // Floating: to the force less the inertia forces of the rigid acceleration that it calls for, and without a
@@ -306,25 +345,27 @@ void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) 
 template <size_t kWide>
 void Elastic::respond(const double *f, double *u) const {
   const size_t size = 3 * size_t(npoint);
+  const auto clear_given = [&] {
+    for (const uint32_t j : given_) std::fill_n(u + kWide * j, kWide, 0.0);
+  };
   const auto solve = [&] {
+    if (by_surface_) surface_.gather<kWide>(u);
+    clear_given();
     if constexpr (kWide == 1) factor_.solve(u, u);
     else factor_.solve_eight(*kernels, u, u);
+    if (!by_surface_) return;
+    surface_.spread<kWide>(u);
+    clear_given();
   };
-  if (!floating) {
-    for (size_t j = 0; j < size; ++j)
-      for (size_t w = 0; w < kWide; ++w) u[kWide * j + w] = held[j / 3] >> (j % 3) & 1 ? 0 : f[kWide * j + w];
-    return solve();
-  }
+  std::copy(f, f + kWide * size, u);
+  if (!floating) return solve();
   double along[6][kWide] = {};
   for (size_t k = 0; k < 6; ++k)
     for (size_t j = 0; j < size; ++j)
       for (size_t w = 0; w < kWide; ++w) along[k][w] += rigid[k * size + j] * f[kWide * j + w];
-  std::copy(f, f + kWide * size, u);
   for (size_t k = 0; k < 6; ++k)
     for (size_t j = 0; j < size; ++j)
       for (size_t w = 0; w < kWide; ++w) u[kWide * j + w] -= mass[j / 3] * along[k][w] * rigid[k * size + j];
-  for (const uint32_t pin : pins_)
-    for (size_t w = 0; w < kWide; ++w) u[kWide * pin + w] = 0;
   solve();
   for (size_t k = 0; k < 6; ++k)
     for (size_t w = 0; w < kWide; ++w) along[k][w] = 0;
@@ -336,14 +377,12 @@ void Elastic::respond(const double *f, double *u) const {
       for (size_t w = 0; w < kWide; ++w) u[kWide * j + w] -= along[k][w] * rigid[k * size + j];
 }
 
-void Elastic::follow(double *u) const {
-  double *const f = work_.data();
-  const size_t size = 3 * size_t(npoint);
-  std::fill(f, f + size, 0.0);
+// out += scale K u
+void Elastic::multiply(const double *u, double scale, double *out) const {
   const auto take = [&](size_t i, size_t j, const double *k, bool transposed) {
     const size_t row = transposed ? 1 : 3, column = transposed ? 3 : 1;
     for (size_t r = 0; r < 3; ++r)
-      for (size_t s = 0; s < 3; ++s) f[3 * i + r] -= k[row * r + column * s] * u[3 * j + s];
+      for (size_t s = 0; s < 3; ++s) out[3 * i + r] += scale * k[row * r + column * s] * u[3 * j + s];
   };
   for (size_t i = 0; i < npoint; ++i) take(i, i, block_.data() + 9 * i, false);
   for (size_t e = 0; e < nedge_; ++e) {
@@ -351,11 +390,20 @@ void Elastic::follow(double *u) const {
     take(i, j, block_.data() + 9 * (npoint + e), false);
     take(j, i, block_.data() + 9 * (npoint + e), true);
   }
-  for (size_t j = 0; j < size; ++j)
-    if (held[j / 3] >> (j % 3) & 1) f[j] = 0;
+}
+
+void Elastic::follow(double *u) const {
+  double *const f = work_.data();
+  const size_t size = 3 * size_t(npoint);
+  std::fill(f, f + size, 0.0);
+  multiply(u, -1, f);
+  for (const uint32_t j : given_) f[j] = 0;
   factor_.solve(f, f);
-  for (size_t j = 0; j < size; ++j)
-    if (!(held[j / 3] >> (j % 3) & 1)) u[j] = f[j];
+  for (const uint32_t j : given_) f[j] = u[j];
+  std::copy(f, f + size, u);
+  if (!by_surface_) return;
+  surface_.spread<1>(u);
+  for (const uint32_t j : given_) u[j] = f[j];
 }
 
 // h = sum u_a g_a^T
@@ -394,6 +442,27 @@ void Elastic::stress(uint32_t c, const double *u, double *out) const {
   for (size_t r = 0; r < 3; ++r)
     for (size_t s = 0; s < 3; ++s)
       out[3 * r + s] = m.mu * (h[3 * r + s] + h[3 * s + r]) + (r == s ? pressure : 0);
+}
+
+double Elastic::energy(const double *u) const {
+  double sum = 0;
+  if (by_surface_) {
+    double *const f = work_.data();
+    std::fill(f, f + 3 * size_t(npoint), 0.0);
+    multiply(u, 1, f);
+    for (size_t j = 0; j < 3 * size_t(npoint); ++j) sum += 0.5 * f[j] * u[j];
+  } else {
+    for (uint32_t c = 0; c < ncell; ++c) sum += volume(c) * density(c, u);
+  }
+  return sum;
+}
+
+size_t Elastic::nmoving() const {
+  size_t moving = 0;
+  for (size_t j = 0; j < 3 * size_t(npoint); ++j) moving += !is_held(j);
+  for (const uint32_t i : surface_.inner)
+    for (size_t a = 0; a < 3; ++a) moving -= !is_held(3 * size_t(i) + a);
+  return floating ? moving - 6 : moving;
 }
 
 double Elastic::density(uint32_t c, const double *u) const {

@@ -1,7 +1,8 @@
 // Linear elasticity of a mesh in its frame: stiffness, held components, and displacements under forces. For a
 // body without held points the compliance applies to the force minus the inertia forces of the rigid
 // acceleration, and its displacements neither move the center of mass nor rotate the body (they are
-// orthogonal, by mass, to the rigid motions).
+// orthogonal, by mass, to the rigid motions). The stiffness is that of the cells, or of the surface alone,
+// which inner points then follow (boundary.h).
 #pragma once
 #include <deform/plugin.h>
 
@@ -10,6 +11,7 @@
 
 #include "../model_common/material.h"
 #include "../model_common/tetrahedron.h"
+#include "boundary.h"
 #include "params.h"
 #include "sparse.h"
 
@@ -21,7 +23,7 @@ constexpr uint32_t kMostPoints = 10000;
 class Elastic {
  public:
   // Throws model::Refused after the reason was logged, or a sentence.
-  void create(const dfm_host *host, const char *id, const dfm_mesh &m);
+  void create(const dfm_host *host, const char *id, const dfm_mesh &m, bool by_surface);
 
   const Kernels *kernels = nullptr;  // of this processor
   uint32_t npoint = 0, ncell = 0;
@@ -47,6 +49,8 @@ class Elastic {
   double density(uint32_t c, const double *u) const;            // J/m3
   void stress(uint32_t c, const double *u, double *out) const;  // 3 x 3
   double volume(uint32_t c) const;
+  double energy(const double *u) const;  // J
+  size_t nmoving() const;                // components that have a displacement of their own
 
  private:
   const dfm_host *host_ = nullptr;
@@ -54,11 +58,16 @@ class Elastic {
   Buffer<double> field_[kParamCount];
   Buffer<uint32_t> cells_, edges_;
   uint32_t nedge_ = 0;
-  Buffer<double> block_;        // [npoint + nedge, 9]; dropped where nothing is held
-  std::vector<uint32_t> pins_;  // floating: six displacements that keep the body in place
+  Buffer<double> block_;  // [npoint + nedge, 9]; dropped where nothing is held and cells have the energy
+  bool by_surface_ = false;
+  Boundary surface_;
+  std::vector<uint32_t> given_;  // components: those held; floating: six that keep the body in place
   Factor factor_;
   mutable Buffer<double> work_;  // [3 npoint]
 
+  bool is_held(size_t component) const { return held[component / 3] >> (component % 3) & 1; }
+  void multiply(const double *u, double scale, double *out) const;
+  void take_surface(const dfm_mesh &m, const char *id);
   bool cell(uint32_t c, model::Tetrahedron &out) const;
   model::Lame lame(uint32_t c) const;
   void gradient(uint32_t c, const model::Tetrahedron &t, const double *u, double *h) const;

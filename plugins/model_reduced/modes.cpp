@@ -90,9 +90,7 @@ void Modes::create(const dfm_host *host, const char *id, const dfm_mesh &m, cons
   const double frequency = params[kFrequency], wanted_share = params[kShare];
   if ((params[kModes] > 0) + (frequency > 0) + (wanted_share > 0) > 1)
     throw "modes, frequency and share each say how many modes there are; give one of them";
-  size_t moving = 0;
-  for (size_t j = 0; j < 3 * size_t(body.npoint); ++j) moving += !(body.held[j / 3] >> (j % 3) & 1);
-  available = uint32_t(body.floating ? moving - 6 : moving);
+  available = uint32_t(body.nmoving());
   Search search(body);
   search.load_surface(m);
   const size_t most = std::min<size_t>(available, kMostModes);

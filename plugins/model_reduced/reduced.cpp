@@ -1,5 +1,6 @@
-// org.deform.modal and org.deform.condensed: linear elasticity by few modes in a floating frame, and what
-// they leave out at rest; the bodies step themselves (doc/models/modal.md, doc/models/condensed.md).
+// org.deform.modal, org.deform.condensed, org.deform.boundary: linear elasticity by few modes in a floating
+// frame, and what they leave out at rest; the bodies step themselves (doc/models/modal.md, condensed.md,
+// boundary.md).
 #include <cstring>
 
 #include "../model_common/entry.h"
@@ -139,7 +140,13 @@ const dfm_type kCondensed = dfm::plugin::type(
     "residual flexibility (MacNeal 1971, Computers & Structures 1)",
     kParams, kEffects, &Entry<Condensed>::kModel);
 
+const dfm_type kBoundary = dfm::plugin::type(
+    DFM_KIND_MODEL, kBoundaryId, "linear elasticity by boundary elements", "0.1.0", "MIT",
+    "symmetric Galerkin boundary elements (Sirtori 1979, Meccanica 14; Han 1994, Computing 52) in place of "
+    "condensed cells",
+    kParams, kEffects, &Entry<Surface>::kModel);
+
 }  // namespace
 }  // namespace reduced
 
-DFM_PLUGIN(&reduced::kModal, &reduced::kCondensed)
+DFM_PLUGIN(&reduced::kModal, &reduced::kCondensed, &reduced::kBoundary)

@@ -91,7 +91,7 @@ TEST(TetmeshFill, MeshThatWasNotFilled_HasNoShare) {
 
 TEST(TetmeshFill, WrongArguments_AreRefusedWithASentence) {
   Filled f("ball", {0.1, 0, 0}, 500);
-  EXPECT_EQ(dfm_tetmesh_fill(f.surface, 0, &f.mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_tetmesh_fill(f.surface, UINT32_MAX, &f.mesh), DFM_E_ARG);
   EXPECT_EQ(dfm_tetmesh_fill(f.surface, 100, nullptr), DFM_E_ARG);
   EXPECT_EQ(dfm_tetmesh_fill(0, 100, &f.mesh), DFM_E_HANDLE);
   EXPECT_EQ(dfm_tetmesh_share(0, nullptr), DFM_E_ARG);

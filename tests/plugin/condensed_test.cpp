@@ -1,4 +1,5 @@
-// The type org.deform.condensed: its surface at rest is that of the full solution.
+// The type org.deform.condensed: its surface at rest is that of the full solution. org.deform.boundary has
+// the same steps (boundary_elements_test.cpp).
 #include "stepper_host.h"
 
 namespace {
@@ -98,9 +99,11 @@ TEST(Condensed, FreeBodyPulledAtTwoCorners_HasTheShapeOfAllModes) {
 
 TEST(Condensed, Commit_IsPredictAndRespond) {
   const Mesh m = kuhn_bar(4, 2, 2, 0.05);
-  for (const bool held : {false, true}) {
+  for (const uint32_t which : {0u, 1u, 2u, 3u}) {
+    const bool held = which % 2;
     Host host;
-    Stepper b(host, condensed(), m, {{"modes", 12}, {"damping_stiffness", 1e-3}, {"damping_mass", 2}},
+    Stepper b(host, type_of("model_reduced", 1 + which / 2), m,
+              {{"modes", 12}, {"damping_stiffness", 1e-3}, {"damping_mass", 2}},
               held ? clamp_of(m) : std::vector<uint8_t>{});
     for (uint32_t i = 0; i < b.size(); ++i)
       if (!held) b.set(b.v, i, cross({1, 2, -1}, m.at(i)));
@@ -110,10 +113,16 @@ TEST(Condensed, Commit_IsPredictAndRespond) {
   }
 }
 
-TEST(Condensed, FreeSpinningBody_KeepsItsMomentaUnderUnevenForces) {
+class Reduced : public testing::TestWithParam<uint32_t> {
+ protected:
+  const dfm_type &type() const { return type_of("model_reduced", GetParam()); }
+};
+INSTANTIATE_TEST_SUITE_P(CondensedAndBoundary, Reduced, testing::Values(1, 2));
+
+TEST_P(Reduced, FreeSpinningBody_KeepsItsMomentaUnderUnevenForces) {
   const Mesh m = kuhn_bar(4, 2, 1, 0.05);
   Host host;
-  Stepper b(host, condensed(), m, {{"young", 1e6}});
+  Stepper b(host, type(), m, {{"young", 1e6}});
   for (uint32_t i = 0; i < b.size(); ++i) b.set(b.v, i, cross({4, 7, -9}, m.at(i)));
   b.step();
   const Vec p = b.momentum();
@@ -132,7 +141,7 @@ TEST(Condensed, FreeSpinningBody_KeepsItsMomentaUnderUnevenForces) {
 // A body that was deformed by another model goes on from there, with few modes too.
 TEST(Condensed, BodyDeformedElsewhere_IsNotMovedAtOnce) {
   const Mesh m = kuhn_bar(4, 2, 2, 0.05);
-  for (const uint32_t type : {0u, 1u}) {
+  for (const uint32_t type : {0u, 1u, 2u}) {
     Host host;
     Stepper b(host, type_of("model_reduced", type), m, {{"modes", 3}});
     std::mt19937 random(5);
@@ -148,7 +157,7 @@ TEST(Condensed, BodyDeformedElsewhere_IsNotMovedAtOnce) {
 
 TEST(Condensed, AnyInstructionSet_GivesTheSameBits) {
   const Mesh m = kuhn_bar(5, 3, 3, 0.05);
-  for (const uint32_t type : {0u, 1u}) {
+  for (const uint32_t type : {0u, 1u, 2u}) {
     std::vector<std::vector<double>> end;
     for (const char *simd : {"sse2", "avx2", "avx512"}) {
       setenv("DEFORM_SIMD", simd, 1);

@@ -1,4 +1,5 @@
-// The models modal and condensed in a world: dropped, sliding, holding, saved; with every law of friction.
+// The models modal, condensed and boundary in a world: dropped, sliding, holding, saved; with every law of
+// friction.
 #include "under_ball.h"
 
 namespace {
@@ -265,7 +266,7 @@ TEST_P(ReducedWorld, PartlyHeldAndTurnedByItsPose_IsRefusedWithTheReason) {
   dfm_world_destroy(world);
 }
 
-INSTANTIATE_TEST_SUITE_P(Of, ReducedWorld, testing::Values("modal", "condensed"),
+INSTANTIATE_TEST_SUITE_P(Of, ReducedWorld, testing::Values("modal", "condensed", "boundary"),
                          [](const auto &of) { return std::string(of.param); });
 
 // All of the weight is carried by the surface: at rest a condensed body has the shape of the full solution.

@@ -180,9 +180,10 @@ class TetMesh(_Mesh):
     @classmethod
     def fill(cls, surface: TriMesh | Any, cells: int = 5000) -> TetMesh:
         """Tetrahedra inside of a closed surface, given as a TriMesh or the path of its file. They reach out
-        of the surface: give it to add_body too (surface=), which otherwise takes their jagged border."""
+        of the surface: give it to add_body too (surface=), which otherwise takes their jagged border. 0: from
+        one inner point to the triangles, which are their border; for the model boundary."""
         surface = surface_of(surface, "surface")
-        return cls._of(lib.dfm_tetmesh_fill, surface.handle, whole(cells, "cells", 1),
+        return cls._of(lib.dfm_tetmesh_fill, surface.handle, whole(cells, "cells", 0),
                        context=surface._context)
 
     @classmethod

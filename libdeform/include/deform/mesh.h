@@ -157,10 +157,12 @@ DFM_API dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path);
  * inside is where the winding number exceeds one half.
  * @param surface  closed except for small holes; else DFM_E_FORMAT, and the error gives the size of the
  * opening
- * @param cells    wanted number of tetrahedra; the result has a number near it
+ * @param cells    wanted number of tetrahedra; the result has a number near it. 0: no lattice, cells from one
+ * inner point to the triangles, which stay their border, as the model `boundary` takes it; DFM_E_UNSUPPORTED
+ * if no point inside sees all triangles
  * @param out      cells that cover the inside; the surface lies within them. dfm_tetmesh_share gives the
  *                 fraction of each that is material
- * @return DFM_OK; DFM_E_ARG cells below 1 or above 1e8; DFM_E_FORMAT; DFM_E_NOMEM; DFM_E_HANDLE
+ * @return DFM_OK; DFM_E_ARG cells above 1e8; DFM_E_FORMAT; DFM_E_NOMEM; DFM_E_HANDLE
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out);
 /** Fraction of each cell that is material, [ntet], in (0,1]; NULL for a mesh that was not filled. VTK and VTU

@@ -7,7 +7,7 @@ dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *ou
   return as_status([&] {
     need(out, "out");
     const TriMeshObject &object = TriMeshObject::of(surface);
-    TetMesh mesh = dfm::fill_surface(object.mesh, cells);
+    TetMesh mesh = cells ? dfm::fill_surface(object.mesh, cells) : dfm::fan_surface(object.mesh);
     for (const std::string &w : mesh.warnings)
       object.context.logf(DFM_LOG_WARNING, "filling a surface: %s", w.c_str());
     *out = TetMeshObject::keep(object.context, std::move(mesh));

@@ -51,6 +51,10 @@ dfm_trimesh_info mesh_statistics(const TriMesh &mesh);
 // `share` filled in. The surface need not be clean: inside is where the generalized winding number exceeds
 // one half. Throws Error(FORMAT) where nothing is inside.
 TetMesh fill_surface(const TriMesh &surface, uint32_t cells);
+// Cells from one inner point to the triangles, in two layers, for a closed surface of which it sees all
+// triangles: no lattice, the surface is the border of the cells. Throws Error(UNSUPPORTED) without such a
+// point.
+TetMesh fan_surface(const TriMesh &surface);
 // Hexahedra of a regular grid over the box of a closed surface: about `cells` of them, or of edges of about
 // `size`; the other is 0.
 TetMesh make_lattice(const TriMesh &surface, uint32_t cells, double size);

@@ -135,7 +135,7 @@ struct Body : Thing {
   MadeMesh made;
   OwnSurface surface;
   Start start;
-  uint32_t fill = 0;  // cells; 0: not said
+  std::optional<uint32_t> fill;  // cells; 0: none of a lattice
   // of a lattice: one of these; m
   uint32_t lattice_cells = 0;
   double lattice_size = 0;

@@ -127,7 +127,7 @@ dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &point
 }
 
 dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
-  const uint32_t wanted = b.fill ? b.fill : kFillCells;
+  const uint32_t wanted = b.fill.value_or(kFillCells);
   dfm_tetmesh &mesh = fillings_[{path, wanted}];
   if (!mesh)
     def_.require(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
@@ -150,9 +150,9 @@ dfm_tetmesh MeshFiles::lattice(const std::string &path, const Body &b) {
 }
 
 // Keys that go with one kind of mesh file only.
-void MeshFiles::check_keys(const Body &b, bool filled) const {
-  if (filled) {
-    if (!b.nodal_bc.empty())
+void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
+  if (!has_cells) {
+    if (filled && !b.nodal_bc.empty())
       def_.refuse(b.pointer + "/nodal_bc",
                   "the mesh is a surface, and its nodes are not points of the filled body; use \"fix\" and "
                   "\"forces\"");
@@ -236,9 +236,10 @@ void MeshFiles::split_skin(BodyMesh &out) {
 BodyMesh MeshFiles::load(const Body &b) {
   const std::string path = b.made.kind.empty() ? path_of(b.mesh) : make(b), pointer = b.pointer + "/mesh";
   BodyMesh out;
-  out.filled = !has_cells(path, pointer);
-  check_keys(b, out.filled);
-  take_cells(!out.filled ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
+  const bool whole = has_cells(path, pointer);
+  out.filled = !whole && b.fill != 0u;
+  check_keys(b, whole, out.filled);
+  take_cells(whole ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
   out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);
   if (!b.surface.mesh.empty()) {
     const std::string where = b.surface.pointer + "/mesh";
@@ -248,7 +249,7 @@ BodyMesh MeshFiles::load(const Body &b) {
     if (!out.wears_skin) tell_of_steps(b, out);
     split_skin(out);
   }
-  if (out.filled && !b.has_scale) tell_of_unit(b, out);
+  if (!whole && !b.has_scale) tell_of_unit(b, out);
   return out;
 }
 

@@ -141,7 +141,7 @@ void read_carriers(const Node &body, const dfm_type *model, ReadContext &context
   if (body.has("surface")) read_surface(body.member("surface"), b.surface);
   if (body.has("fill")) {
     const Node cells = body.member("fill").object("fill").at("cells");
-    const double n = cells.number(Range{1, kMostCells, false, false});
+    const double n = cells.number(Range{0, kMostCells, false, false});
     if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
     b.fill = uint32_t(n);
   }

@@ -1,0 +1,244 @@
+// The type org.deform.boundary: elasticity from the surface alone, against closed forms. Its steps are those
+// of org.deform.condensed and tested with it (condensed_test.cpp, reduced_world_test.cpp).
+#include "deform/mesh.h"
+#include "stepper_host.h"
+#include "world.h"
+
+namespace {
+
+using namespace stepper_test;
+
+const dfm_type &boundary() { return type_of("model_reduced", 2); }
+
+struct Triangle {
+  uint32_t corner[3];
+  Vec normal;  // times the area
+};
+
+// Border of the cells.
+std::vector<Triangle> border_of(const Mesh &m) {
+  std::map<std::array<uint32_t, 3>, std::vector<Triangle>> faces;
+  for (uint32_t c = 0; c < m.ncell(); ++c)
+    for (const auto &f :
+         {std::array{0, 2, 1}, std::array{0, 1, 3}, std::array{0, 3, 2}, std::array{1, 2, 3}}) {
+      Triangle t{};
+      std::array<uint32_t, 3> key{};
+      for (size_t a = 0; a < 3; ++a) key[a] = t.corner[a] = m.cells[4 * c + uint32_t(f[a])];
+      t.normal = 0.5 * cross(m.at(key[1]) - m.at(key[0]), m.at(key[2]) - m.at(key[0]));
+      std::sort(key.begin(), key.end());
+      faces[key].push_back(t);
+    }
+  std::vector<Triangle> out;
+  for (const auto &[key, same] : faces)
+    if (same.size() == 1) out.push_back(same[0]);
+  return out;
+}
+
+// A closed surface without cells of a lattice.
+Mesh fan_of(const char *kind, const double (&size)[3], uint32_t triangles) {
+  test::Context context(1);
+  dfm_trimesh surface = 0;
+  dfm_tetmesh cells = 0;
+  test::ok(dfm_trimesh_make(context, kind, size, triangles, &surface));
+  test::ok(dfm_tetmesh_fill(surface, 0, &cells));
+  dfm_tetmesh_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_tetmesh_get_info(cells, &info));
+  const double *points = nullptr;
+  const uint32_t *tets = nullptr;
+  test::ok(dfm_tetmesh_data(cells, &points, &tets, nullptr));
+  Mesh m;
+  m.rest.assign(points, points + 3 * size_t(info.npoint));
+  m.cells.assign(tets, tets + 4 * size_t(info.ntet));
+  m.finish();
+  test::ok(dfm_tetmesh_destroy(cells));
+  test::ok(dfm_trimesh_destroy(surface));
+  return m;
+}
+
+// One step long enough for the modes, by backward Euler: forces that keep their directions turn a free body
+// back and forth, and a second one would see it turned by what rounding leaves of their moment.
+void settle_free(Stepper &b) {
+  b.dt = 10;
+  b.state[0] = 1;
+  b.step();
+}
+
+void settle_held(Stepper &b) {
+  b.dt = 1e5;
+  for (int n = 0; n < 3; ++n) b.step();
+}
+
+// traction(normal, middle) in Pa on each triangle.
+template <class Traction>
+void load(Stepper &b, const Mesh &m, const Traction &traction) {
+  for (const Triangle &t : border_of(m)) {
+    const double area = norm(t.normal);
+    const Vec middle = (1.0 / 3) * (m.at(t.corner[0]) + m.at(t.corner[1]) + m.at(t.corner[2]));
+    const Vec part = (area / 3) * traction((1 / area) * t.normal, middle);
+    for (const uint32_t i : t.corner) b.set(b.f, i, b.get(b.f, i) + part);
+  }
+}
+
+// The largest error of the changes of distances between points by a strain along the axes, over the largest.
+double distance_from(Stepper &b, const Mesh &m, const Vec &strain) {
+  double worst = 0, most = 0;
+  for (uint32_t i = 0; i < b.size(); ++i)
+    for (uint32_t j = 0; j < i; ++j) {
+      const Vec d = m.at(i) - m.at(j);
+      Vec end = d;
+      for (size_t a = 0; a < 3; ++a) end[a] *= 1 + strain[a];
+      const double exact = norm(end) - norm(d), found = norm(b.get(b.x, i) - b.get(b.x, j)) - norm(d);
+      worst = std::max(worst, std::abs(found - exact));
+      most = std::max(most, std::abs(exact));
+    }
+  return worst / most;
+}
+
+// Uniform stress on a block: its edges and corners are where wrong integrals show. Inner points follow.
+TEST(Boundary, BlockInUniformTension_HasTheExactDisplacements) {
+  const Mesh m = kuhn_bar(3, 2, 2, 0.05, 0.2);
+  for (const double poisson : {-0.3, 0.0, 0.3, 0.49}) {
+    Host host;
+    Stepper b(host, boundary(), m, {{"young", 1e5}, {"poisson", poisson}, {"modes", 5}});
+    ASSERT_EQ(b.status, DFM_OK) << host.logged;
+    load(b, m, [](Vec n, Vec) { return Vec{100 * n[0], 0, 0}; });
+    settle_free(b);
+    EXPECT_LT(distance_from(b, m, {1e-3, -1e-3 * poisson, -1e-3 * poisson}), 2e-4) << poisson;
+  }
+}
+
+TEST(Boundary, LShapedBodyUnderPressure_ShrinksByTheExactStrain) {
+  Mesh m = kuhn_bar(3, 3, 1, 0.05);
+  std::vector<uint32_t> kept;
+  for (uint32_t c = 0; c < m.ncell(); ++c) {
+    Vec middle{};
+    for (int a = 0; a < 4; ++a) middle = middle + 0.25 * m.at(m.cells[4 * c + uint32_t(a)]);
+    if (middle[0] < 0.05 || middle[1] < 0.05) kept.insert(kept.end(), &m.cells[4 * c], &m.cells[4 * c] + 4);
+  }
+  std::map<uint32_t, uint32_t> number;
+  Mesh l;
+  for (uint32_t &i : kept) {
+    if (number.emplace(i, uint32_t(number.size())).second)
+      l.rest.insert(l.rest.end(), &m.rest[3 * i], &m.rest[3 * i] + 3);
+    i = number[i];
+  }
+  l.cells = kept;
+  l.finish();
+  Host host;
+  Stepper b(host, boundary(), l, {{"young", 1e5}, {"modes", 5}});
+  ASSERT_EQ(b.status, DFM_OK) << host.logged;
+  load(b, l, [](Vec n, Vec) { return -100.0 * n; });
+  settle_free(b);
+  EXPECT_LT(distance_from(b, l, {-4e-4, -4e-4, -4e-4}), 2e-4);
+}
+
+// u = -p (1 - 2 nu) / E r
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Boundary, SphereOfAThousandTrianglesUnderPressure_IsWithinAPercent) {
+  const Mesh m = fan_of("ball", {0.1, 0, 0}, 1000);
+  EXPECT_NEAR(double(border_of(m).size()), 1000, 150);
+  Host host;
+  Stepper b(host, boundary(), m, {{"young", 1e5}, {"poisson", 0.3}, {"modes", 5}});
+  ASSERT_EQ(b.status, DFM_OK) << host.logged;
+  load(b, m, [](Vec n, Vec) { return -1000.0 * n; });
+  settle_free(b);
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    if (norm(m.at(i)) < 0.099) continue;
+    EXPECT_NEAR(0.1 - norm(b.get(b.x, i)), 0.4 * 1000 / 1e5 * 0.1, 0.01 * 0.4 * 1000 / 1e5 * 0.1) << i;
+  }
+}
+
+// Lame's thick tube with free ends, whose stress grows twofold towards the hole as around Kirsch's:
+// u = p a^2 / (E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2 / r).
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Boundary, TubeUnderInnerPressure_WidensAsLameHasIt) {
+  test::Context context(1);
+  dfm_tetmesh made = 0;
+  const double size[] = {0.05, 0.1, 0.05};
+  test::ok(dfm_tetmesh_make(context, "tube", size, 1500, &made));
+  dfm_tetmesh_info info{};
+  info.size = sizeof info;
+  test::ok(dfm_tetmesh_get_info(made, &info));
+  const double *points = nullptr;
+  const uint32_t *tets = nullptr;
+  test::ok(dfm_tetmesh_data(made, &points, &tets, nullptr));
+  Mesh m;
+  m.rest.assign(points, points + 3 * size_t(info.npoint));
+  m.cells.assign(tets, tets + 4 * size_t(info.ntet));
+  m.finish();
+  test::ok(dfm_tetmesh_destroy(made));
+  Host host;
+  Stepper b(host, boundary(), m, {{"young", 1e5}, {"poisson", 0.3}, {"modes", 5}});
+  ASSERT_EQ(b.status, DFM_OK) << host.logged;
+  load(b, m, [](Vec n, Vec x) {
+    const bool inside = std::hypot(x[0], x[1]) < 0.06 && std::abs(n[2]) < 0.5;
+    return inside ? -1000.0 * n : Vec{};
+  });
+  settle_free(b);
+  double sum[2] = {}, exact[2] = {};
+  for (uint32_t i = 0; i < b.size(); ++i) {
+    const Vec X = m.at(i), u = b.get(b.x, i) - X;
+    const double r = std::hypot(X[0], X[1]);
+    const bool hole = r < 0.0501;
+    if (!hole && r < 0.0999) continue;
+    sum[hole] += (u[0] * X[0] + u[1] * X[1]) / r;
+    exact[hole] += 1000 * 0.0025 / (1e5 * 0.0075) * (0.7 * r + 1.3 * 0.01 / r);
+  }
+  for (int at = 0; at < 2; ++at) EXPECT_NEAR(sum[at] / exact[at], 1, 0.01) << at;
+}
+
+// Held by single components at three points, the body follows any small rigid motion of them: no force.
+TEST(Boundary, RigidMotionOfWhatIsHeld_IsFollowedWithoutForce) {
+  const Mesh m = kuhn_bar(3, 2, 2, 0.05, 0.2);
+  std::vector<uint8_t> fixed(m.npoint());
+  fixed[0] = 7;
+  fixed[m.npoint() - 1] = 6;
+  fixed[2] = 2;
+  Host host;
+  Stepper b(host, boundary(), m, {{"modes", 5}}, fixed);
+  ASSERT_EQ(b.status, DFM_OK) << host.logged;
+  const Vec turn{1e-3, -2e-3, 3e-3}, shift{1e-3, 2e-3, -1e-3};
+  const auto motion = [&](uint32_t i) { return shift + cross(turn, m.at(i)); };
+  for (uint32_t i = 0; i < b.size(); ++i)
+    for (size_t a = 0; a < 3; ++a)
+      if (fixed[i] >> a & 1) b.x[4 * i + a] += motion(i)[a];
+  settle_held(b);
+  for (uint32_t i = 0; i < b.size(); ++i)
+    EXPECT_LT(norm(b.get(b.x, i) - m.at(i) - motion(i)), 1e-10 * 4e-3) << i;
+  const dfm_kin k = b.now();
+  double energy = 0;
+  ASSERT_EQ(b.ops->energy(b.self, &k, &energy), DFM_OK);
+  EXPECT_LT(std::abs(energy), 1e-10 * 0.05);  // 0.05 J: of strains as large as these displacements
+  const size_t at = host.logged.find("the symmetry of the integrals is off by ");
+  ASSERT_NE(at, std::string::npos) << host.logged;
+  EXPECT_LT(std::strtod(host.logged.c_str() + at + 40, nullptr), 1e-4) << host.logged;
+}
+
+// A cantilever of 10 to 1 under a force at its end: w = F L^3 / (3 E I) (1 + shear), on few triangles.
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Boundary, Cantilever_BendsAsTimoshenkoHasIt) {
+  const Mesh m = kuhn_bar(30, 3, 3, 1.0 / 30);
+  Host host;
+  Stepper b(host, boundary(), m, {{"young", 1e7}, {"poisson", 0.3}, {"modes", 5}}, clamp_of(m));
+  ASSERT_EQ(b.status, DFM_OK) << host.logged;
+  load(b, m, [](Vec n, Vec x) { return x[0] > 0.999 && n[0] > 0.5 ? Vec{0, 0, -100} : Vec{}; });
+  settle_held(b);
+  const double inertia = 1e-4 / 12, area = 0.01, shear = 1e7 / 2.6;
+  const double exact = 1.0 / (3 * 1e7 * inertia) + 1.0 / (5.0 / 6 * shear * area);
+  const uint32_t end = m.npoint() - 1;
+  EXPECT_NEAR((m.at(end)[2] - b.get(b.x, end)[2]) / exact, 1, 0.03);
+}
+
+TEST(Boundary, WhatItCannotTake_IsRefusedInASentence) {
+  const Mesh m = kuhn_bar(16, 16, 16, 0.01);
+  Host host;
+  const Stepper b(host, boundary(), m);
+  EXPECT_EQ(b.status, DFM_E_ARG);
+  EXPECT_NE(host.logged.find("3072 triangles; boundary elements of more than 2500 are refused"),
+            std::string::npos)
+      << host.logged;
+  EXPECT_EQ(host.live, 0u);
+}
+
+}  // namespace
