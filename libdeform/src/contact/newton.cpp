@@ -186,9 +186,10 @@ void ContactNewton::scale_penalties(double by) {
   for (double &response : response_) response /= by;
 }
 
-bool ContactNewton::solve(double tolerance, double normal) {
+bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   found_ = false;
-  limit_ = steps_ + set_.steps;
+  most_ = steps;
+  limit_ = steps_ + most_;
   set_penalties(set_.penalty);
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
@@ -272,7 +273,7 @@ bool ContactNewton::gains(double normal) const {
 // motion in proportion to it: bodies give way a little, and no contact does work that its law does not allow.
 bool ContactNewton::penalties_alone() {
   std::fill(lh_.begin(), lh_.end(), 0.0);
-  limit_ = steps_ + set_.steps;
+  limit_ = steps_ + most_;
   for (bool round = true; round && steps_ < limit_; scale_penalties(set_.softens))
     if (!newton(set_.coarse, round)) return false;
   put_rows();

@@ -37,7 +37,6 @@ struct NewtonSettings {
   uint32_t rounds = 4;     // frozen phases of a pass after which they do
   uint32_t firm = 6;       // times that rho grows before rows count as contradicting each other
   uint32_t passes = 100;   // the limit on outer passes
-  uint32_t steps = 600;    // the limit on Newton steps: what a solve may cost
   uint32_t kept = 12;      // products for which a kept factor is worth more than a new one
   uint32_t products = 40;  // the limit on products of one Newton step
   double share = 0.1;      // of the tolerance of a pass that Newton steps leave; of g that a frozen one does
@@ -72,9 +71,10 @@ class ContactNewton {
   void begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
              ContactState &state, SolveLaws &host, double h);
   // From the present impulses, so that it goes on where rates or limits of the rows have changed. tolerance:
-  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. False: a law
-  // or a model has failed; neither rows nor bodies have a result.
-  bool solve(double tolerance, double normal);
+  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. steps: the
+  // limit on Newton steps, what the solve may cost. False: a law or a model has failed; neither rows nor
+  // bodies have a result.
+  bool solve(double tolerance, double normal, uint32_t steps = 600);
   // The bodies' velocities become those of the solution.
   void take();
 
@@ -143,8 +143,8 @@ class ContactNewton {
   bool found_ = false;
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
-  uint32_t limit_ = 0;  // on steps_
-  uint32_t told_ = 0;   // of products_, to the host
+  uint32_t most_ = 0, limit_ = 0;  // steps of this solve; on steps_
+  uint32_t told_ = 0;              // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
   void list_rows();

@@ -531,14 +531,16 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
   }
 }
 
-void ContactRows::push_rigid(const Block &b) {
+void ContactRows::restart_rigids() {
+  for (const Block &b : blocks)
+    if (b.group != kNone)
+      std::copy_n(&y[size_t(4) * b.first], size_t(4) * b.count, &y_free[size_t(4) * b.first]);
   for (uint32_t i = 0; i < all(); ++i) {
     const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
+    const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
     each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
-      if (d < b.first || d >= b.first + b.count) return;
-      const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
-      response_apply(b, d, sign * p);
-      response_apply(b, d + 1, sign * dfm::cross(r, p));
+      response_apply(blocks[block[d]], d, sign * p);
+      response_apply(blocks[block[d]], d + 1, sign * dfm::cross(r, p));
     });
   }
 }

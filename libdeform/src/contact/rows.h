@@ -186,8 +186,8 @@ struct ContactRows {
     Array<size_t> first_column, column_count, first_value;
   };
   void motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, Motions &out) const;
-  // changes y of a rigid group by all impulses that act on it: its response has been renewed
-  void push_rigid(const Block &group);
+  // Rigid bodies begin again: y has their velocities without impulses, or their responses have changed.
+  void restart_rigids();
 
  private:
   friend struct ContactProblem;  // keeps them in a file

@@ -35,6 +35,7 @@ struct SceneFacts : Varying {
   unsigned attachments = 0, paid_cuts = 0;  // paid: a tool and a body that takes energy to be cut
   std::string rigid_hosts;                  // names
   unsigned rigid_pairs = 0;  // of rigid bodies of the builtin host, with each other and with obstacles
+  bool rigid_rows = false;   // rigid things may touch each other, tools included
   std::vector<std::string> rigid_alone;  // rigid bodies that pass through obstacles
   bool unguarded = false;
   struct Provider {
@@ -90,7 +91,7 @@ struct Plan {
   std::vector<AbsentStage> absent;
   std::vector<PlannedEffect> effects;
   bool has(StageRole role) const;
-  bool touches() const;  // has stages of contact
+  bool touches() const;  // has stages of contact with bodies
 };
 
 inline constexpr char kSelfAuto[] = "contact.self auto";

@@ -94,7 +94,10 @@ StageChoice self(const SceneFacts &f) {
                              : "no body");
 }
 
-StageChoice solve(const SceneFacts &f) { return of_contact(f); }
+StageChoice solve(const SceneFacts &f) {
+  if (!acts(f) && f.rigid_rows) return runs("rigid bodies and tools may touch each other or obstacles");
+  return of_contact(f);
+}
 
 StageChoice rigid_commit(const SceneFacts &f) {
   return f.rigid_bodies ? runs("ends of " + rigids(f)) : left_out();

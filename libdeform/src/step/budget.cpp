@@ -30,7 +30,7 @@ constexpr double kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
 constexpr double kSolveShare = 0.9;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
 constexpr uint64_t kAutomaticFactor = 16000;
-constexpr uint64_t kRigidWork = 10;  // of a rigid body, in the automatic limit
+constexpr uint64_t kRigidWork = 1000;  // of a rigid body, in the automatic limit
 
 struct StepInterrupted {};
 

@@ -368,8 +368,6 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   facts.effects_listed = w.selection.listed();
   facts.asked = w.selection.names();
   choose_self_bodies(w, step, facts, used);
-  w.pairs.laws.clear();
-  for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
 }
 
 // Assumes the number of sub-steps that the step has without the other bodies; nothing else is known.
@@ -535,6 +533,8 @@ void prepare(World &w, const RestoredChoice *restored) {
   view_rigids(w, facts);
   make_pair_tables(w, step, facts);
   step.tools->prepare(w, facts);
+  w.pairs.laws.clear();
+  for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
   choose_plan(w, step, facts, planned);
   unplanned.facts = nullptr;
   if (!restored && !w.plan.touches()) end_contacts(w);

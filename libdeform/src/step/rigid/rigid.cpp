@@ -31,26 +31,6 @@ bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, ui
   return false;
 }
 
-// Solves rigid contact. False: a friction law has failed, which ends the step as between soft bodies.
-template <class F>
-bool solved(const World &w, uint32_t *trouble, const F &solve) {
-  try {
-    solve();
-    return true;
-  } catch (const ToolTouch::LawFailed &e) {
-    *trouble |= DFM_TROUBLE_PLUGIN;
-    const std::string at =
-        std::isnan(e.force) ? ""
-                            : format(" at a normal force of %.9g N and a slip of %.9g m/s", e.force, e.slip);
-    set_last_error(
-        format("step %llu: friction law '%s' gave no valid force where rigid things touch%s; take a "
-               "smaller step, reduce speeds and loads or change the law",
-               static_cast<unsigned long long>(w.step_count), e.law->type->id, at.c_str())
-            .c_str());
-    return false;
-  }
-}
-
 }  // namespace
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
@@ -102,8 +82,7 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
   if (!ask_rigids(w, trouble)) return false;
-  bool goes_on = false;
-  if (!solved(w, trouble, [&] { goes_on = step.tools->begin(w, step); }) || !goes_on) return false;
+  if (!step.tools->begin(w, step)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
     if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
@@ -131,50 +110,37 @@ RigidSet &set_of_group(World &w, uint32_t group) {
 }  // namespace
 
 void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
-  RigidSet &set = set_of_group(w, block.group);
-  const double *const shared = step.tools->shared_response(set, block.group - set.first_group);
   step.rows.set_response(block, [&](double *matrix) {
-    if (shared) std::copy_n(shared, 9 * size_t{block.count} * block.count, matrix);
-    else if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
+    if (step.tools->fill_response(block.group, matrix)) return;
+    RigidSet &set = set_of_group(w, block.group);
+    if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
            set.host_name.c_str(), set.defs[0].name);
   });
 }
 
-namespace {
-
-// y of the block where its bodies have these velocities, less those that detection has used and what rows
-// between rigid things have added, whose impulses are unknowns here.
-void start_rigids(const StepContext &step, const ContactRows::Block &block, const RigidSet &set,
-                  const Array<double> &velocity, Array<double> &y) {
-  for (uint32_t i = 0; i < set.defs.size(); ++i) {
-    if (set.group[i] == DFM_RIGID_STILL || set.first_group + set.group[i] != block.group) continue;
-    const double *const now = &velocity[6 * size_t{i}], *const then = &set.first[6 * size_t{i}];
-    Vec3 change = load3(now) - load3(then), turn = load3(now + 3) - load3(then + 3);
-    step.tools->take_off_shared(set, i, change, turn);
-    double *const to = &y[4 * size_t{block.first + 2 * set.place[i]}];
-    store3(to, change);
-    store3(to + 4, turn);
+// The velocities of rigid bodies without contact, less those that detection has used: a host that says
+// DFM_RIGID_AGAIN or decides otherwise about its motors knows better now how its bodies move, and turning
+// adds what is linear in no impulse.
+void start_rigids(World &w, StepContext &step) {
+  for (const ContactRows::Block &block : step.rows.blocks) {
+    if (block.group == kNone) continue;
+    step.tools->each_body(w, block.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
+      double now[6];
+      const size_t at = 6 * size_t{body};
+      if (!step.tools->free_velocity(set, body, now)) std::copy_n(&set.velocity[at], 6, now);
+      double *const to = &step.rows.y[4 * size_t{block.first + 2 * place}];
+      store3(to, load3(now) - load3(&set.first[at]));
+      store3(to + 4, load3(now + 3) - load3(&set.first[at + 3]));
+    });
   }
-}
-
-}  // namespace
-
-// A host that says DFM_RIGID_AGAIN knows better now how its bodies move: the same contacts are solved once
-// more with its new velocities. Detection has been done with the first ones, so the difference enters the
-// rows as the rigid bodies' change of velocity before any impulse.
-void correct_rigids(World &w, StepContext &step) {
-  for (const ContactRows::Block &block : step.rows.blocks)
-    if (block.group != kNone) {
-      const RigidSet &set = set_of_group(w, block.group);
-      start_rigids(step, block, set, set.velocity, step.rows.y);
-    }
 }
 
 void sum_rigid_impulses(World &w, StepContext &step) {
   for (auto &set : w.rigid_sets) std::fill(set->impulse.begin(), set->impulse.end(), 0.0);
   const ContactRows &rows = step.rows;
-  if (!w.plan.touches() || rows.rigid.empty()) return;
+  if (!w.plan.has(StageRole::solves) || rows.rigid.empty()) return;
+  step.tools->add_impulses();
   for (uint32_t i = 0; i < rows.all(); ++i) {
     if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
     const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
@@ -186,33 +152,33 @@ void sum_rigid_impulses(World &w, StepContext &step) {
   }
 }
 
-bool revise_rigids(World &w, StepContext &step) {
-  if (std::none_of(w.rigid_sets.begin(), w.rigid_sets.end(),
-                   [](auto &set) { return set->host.revise != nullptr; }))
-    return false;
+bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool &renewed) {
+  step.tools->take(w, step, left);
   sum_rigid_impulses(w, step);
-  bool any = false;
+  renewed = false;
   for (auto &set : w.rigid_sets) {
-    if (!set->host.revise) continue;
+    if (!revises || !set->host.revise) continue;
     bool changed = false;
-    step.tools->add_to_impulses(*set);
     if (!set->revise(changed))
       fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it",
            set->host_name.c_str(), set->defs[0].name);
     if (!changed) continue;
-    any = true;
-    step.tools->add_to_revised(*set);
-    for (const ContactRows::Block &block : step.rows.blocks) {
-      if (block.group == kNone || block.group < set->first_group ||
-          block.group >= set->first_group + set->ngroup)
-        continue;
-      rigid_response(w, step, block);
-      for (Array<double> *y : {&step.rows.y, &step.rows.y_free})
-        start_rigids(step, block, *set, set->revised, *y);
-      step.rows.push_rigid(block);
-    }
+    set->velocity.assign(set->revised.begin(), set->revised.end());
+    step.tools->renew(*set);
+    renewed = true;
   }
-  return any;
+  renewed = renewed || (revises && step.tools->press_harder());
+  if (!renewed && !step.tools->follow(w, step)) return false;
+  if (renewed)
+    for (const ContactRows::Block &block : step.rows.blocks)
+      if (block.group != kNone) rigid_response(w, step, block);
+  return true;
+}
+
+void restart_rigids(World &w, StepContext &step) {
+  step.tools->put(step.rows, step.state);
+  start_rigids(w, step);
+  step.rows.restart_rigids();
 }
 
 // 1: all have ended their step; 2: a host requests another solve; 0: failed.
@@ -231,11 +197,14 @@ int ask_rigid_ends(World &w, uint32_t *trouble) {
 
 Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   sum_rigid_impulses(w, step);
-  bool differ = false;
-  if (!solved(w, trouble, [&] { differ = step.tools->answer(w, step); })) return Next::stop;
+  if (step.tools->finds_more(w, step)) {
+    step.rigid_again = true;
+    return Next::solve;
+  }
+  step.tools->list(w, step);
   const int end = ask_rigid_ends(w, trouble);
   if (end == 0) return Next::stop;
-  step.rigid_again = (end == 2 || differ) && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.touches() &&
+  step.rigid_again = end == 2 && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
                      step.rows.all() > 0;
   if (step.rigid_again) {
     ++step.rigid_rounds;

@@ -20,15 +20,18 @@ Obstacle &rigid_obstacle(World &w, uint64_t id);
 void place_rigids(World &w);  // World::prepare(): slots and groups
 void rigid_response(World &w, StepContext &step, const ContactRows::Block &group);
 void sum_rigid_impulses(World &w, StepContext &step);  // of the rows, into every set
-// true: the response of a host has changed with these impulses; rows have the new one, solve again
-bool revise_rigids(World &w, StepContext &step);
+// After a solve that has left `left` m/s along normals: whether it must go on, because turning or motors go
+// otherwise than it assumed. revises: hosts may decide again about motors; renewed: out, one has, so that
+// responses have changed.
+bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool &renewed);
+void restart_rigids(World &w, StepContext &step);  // then, once the rows are finished again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);  // of the body that the shape belongs to
 // pose of a body's shape for this state of the body
 Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);
 Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def);
-// for make_rows(): rows start from the last response of the hosts
-void correct_rigids(World &w, StepContext &step);
+// for make_rows(): rows start from the last velocities of the hosts
+void start_rigids(World &w, StepContext &step);
 void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max);
 void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort);
 

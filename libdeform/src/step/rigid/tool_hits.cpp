@@ -65,8 +65,7 @@ bool ToolTouch::inside(const ToolShape &a, const ToolShape &b, double deep) cons
 Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
   const Moved &m = sides_[side.tool];
   const size_t at = 6 * size_t{side.part};
-  const Vec3 from = center(side), way = load3(&m.base[at]) + load3(&m.change[at]),
-             spin = load3(&m.base[at + 3]) + load3(&m.change[at + 3]);
+  const Vec3 from = center(side), way = load3(&m.now[at]), spin = load3(&m.now[at + 3]);
   return from + h_ * way + rotate(turned(Quat{}, h_ * spin), p - from);
 }
 
@@ -113,7 +112,6 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
     if (a.round() > 0 && b.round() > 0) find_hits(pair, a, b, at_a, at_b);
   });
   if (hits_.empty()) return false;
-  forget_changes();
   for (const Hit &hit : hits_) {
     std::erase_if(rows_, [&](const Row &row) { return row.key == key_of(hit.pair->id, hit.name); });
     add_row(*hit.pair, hit.name, hit.a, hit.b, hit.place, hit.normal, hit.gap, HUGE_VAL);
@@ -121,17 +119,15 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
   return true;
 }
 
-void ToolTouch::solve_past_hits(World &w, StepContext &step) {
-  for (uint32_t k = 0;; ++k) {
-    solve(w, step);
-    if (k == kMostHits || is_used_up(step)) return;
-    if (outruns_rows()) {
-      forget_changes();
-      rows_.clear();
-      find(w, step);
-    } else if (!add_hits(w, step)) return;
-    take_last(w);
-  }
+bool ToolTouch::finds_more(World &w, StepContext &step) {
+  if (rows_.empty() || hits_found_ == kMostHits || is_used_up(step)) return false;
+  if (outruns_rows()) {
+    rows_.clear();
+    find(w, step);
+  } else if (!add_hits(w, step)) return false;
+  take_last(w);
+  ++hits_found_;
+  return true;
 }
 
 // m, how deep one reaches into the other now, by its corners and, if `edges`, along its edges; 0: not at all.

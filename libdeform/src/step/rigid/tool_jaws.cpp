@@ -15,13 +15,14 @@ void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 }  // namespace
 
 // The hinge is the origin of part 0, about its y.
-void ToolTouch::list_jaws(Moved &m) const {
+void ToolTouch::list_jaws(Moved &m, uint32_t &groups) const {
   const dfm_rigid_state &frame = m.set->state[0];
   const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
   for (uint32_t i = 1; i < m.set->defs.size(); ++i) {
     const Vec3 arm = load3(m.set->state[i].position) - load3(frame.position);
     const double length = 2 * m.set->defs[i].half_size[2];
-    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length), 0});
+    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length),
+                      responds({size_t(&m - sides_.data()), i, {}, {}}) ? kNone : groups++});
   }
 }
 
@@ -47,14 +48,15 @@ void ToolTouch::straighten(Moved &m) const {
 }
 
 void ToolTouch::turn_jaws() {
-  if (rows_.empty()) return;
   for (Moved &m : sides_)
     for (const Moved::Jaw &jaw : m.jaws) {
-      if (jaw.moment == 0) continue;
+      const double *const p = &m.set->impulse[6 * size_t{jaw.part}];
+      const double moment = dot(jaw.lever, load3(p)) + dot(jaw.axis, load3(p + 3));
+      if (moment == 0) continue;
       const dfm_rigid_state &frame = m.set->next[0];
       dfm_rigid_state &s = m.set->next[jaw.part];
       const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
-      const double rate = jaw.give * jaw.moment;
+      const double rate = jaw.give * moment;
       const Quat by = turned(Quat{}, h_ * rate * axis);
       const Vec3 arm = load3(s.position) - load3(frame.position), now = rotate(by, arm);
       store3(s.position, load3(frame.position) + now);

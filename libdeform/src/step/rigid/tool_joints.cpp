@@ -158,10 +158,10 @@ double ToolTouch::give_of_motor(const Row &row) const {
   return strong_ / kHeld * rounding_of(row, row.normal);
 }
 
-// The host's motors have been decided again: all rows are given their new answers, and velocities those of
-// the impulses so far.
+// The host's motors have been decided again: all rows are given their new answers.
 void ToolTouch::renew_rows() {
-  forget_changes();
+  passes_ = 0;
+  changed_ = HUGE_VAL;
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     Row &row = rows_[i];
     if (!(jointed(row.a) && sides_[row.a.tool].drives) && !(jointed(row.b) && sides_[row.b.tool].drives))
@@ -174,7 +174,6 @@ void ToolTouch::renew_rows() {
     }
     if (!(row.response > 0 && row.impulse > 0)) row.along[0] = row.along[1] = 0;
   }
-  push_all();
 }
 
 void ToolTouch::ask_again(Moved &m) {
@@ -182,35 +181,12 @@ void ToolTouch::ask_again(Moved &m) {
     if (m.jointed[g] && m.first[g] != kNone) ask_response(m, g);
 }
 
-// Takes velocities and responses by the motors that the present impulses need.
-void ToolTouch::take_host(size_t k) {
-  Moved &m = sides_[k];
-  add_impulses(k);
-  bool changed = false;
-  if (!m.set->host.revise || !m.set->revise(changed) || !(changed || m.stale)) return set_base(k);
-  m.stale = false;
-  m.free.assign(m.set->revised.begin(), m.set->revised.end());
-  ask_again(m);
-  set_base(k);
+void ToolTouch::renew(const RigidSet &set) {
+  Moved *const m = known(set);
+  if (!m) return;
+  m->free.assign(set.velocity.begin(), set.velocity.end());
+  ask_again(*m);
   renew_rows();
-}
-
-// Whether a motor has reached its limit by the present impulses, or no longer is there.
-bool ToolTouch::decide_motors() {
-  bool any = false;
-  for (size_t k = 0; k < sides_.size(); ++k) {
-    Moved &m = sides_[k];
-    if (!m.set || !m.drives || !m.touched || !m.set->host.revise) continue;
-    add_impulses(k);
-    bool changed = false;
-    if (!m.set->revise(changed) || !changed) continue;
-    m.free.assign(m.set->revised.begin(), m.set->revised.end());
-    ask_again(m);
-    set_base(k);
-    any = true;
-  }
-  if (any) renew_rows();
-  return any;
 }
 
 // Where motors hold against rows: their places give less.
@@ -223,23 +199,6 @@ bool ToolTouch::press_harder() {
   strong_ *= kStronger;
   renew_rows();
   return true;
-}
-
-void ToolTouch::add_to_impulses(RigidSet &set) const {
-  if (rows_.empty()) return;
-  for (size_t k = 0; k < sides_.size(); ++k)
-    if (sides_[k].set == &set) add_rows_to(k, set);
-}
-
-void ToolTouch::add_to_revised(RigidSet &set) {
-  if (rows_.empty()) return;
-  for (Moved &m : sides_) {
-    if (m.set != &set || !m.touched) continue;
-    m.free.assign(set.revised.begin(), set.revised.end());
-    ask_again(m);
-    renew_rows();
-    for (size_t i = 0; i < m.free.size(); ++i) set.revised[i] = m.free[i] + m.change[i] + m.turn[i];
-  }
 }
 
 // response = B B^T by Cholesky's method with pivots, without what has a smaller pivot than rounding.

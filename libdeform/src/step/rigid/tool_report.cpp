@@ -4,6 +4,7 @@
 // places would tell a host nothing about what touches what.
 #include <algorithm>
 
+#include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -27,9 +28,19 @@ bool gives_way(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_bod
 // Whether the first of the two is side b of reports.
 bool ToolTouch::b_first(const Obstacle &a, const Obstacle &b) { return gives_way(b) && !gives_way(a); }
 
+std::string ToolTouch::row_names(const World &w, uint32_t row) const {
+  const auto name = [&](uint64_t id) {
+    const auto at =
+        std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](const auto &o) { return o->id == id; });
+    return at == w.obstacles.end() ? std::string() : (*at)->name;
+  };
+  const Row &r = rows_[row];
+  return format("'%s' and '%s'", name(r.pair[0]).c_str(), name(r.pair[1]).c_str());
+}
+
 // Seen from the other side the normal and the first tangent are the opposite ones, and the second tangent,
 // their product, stays: forces, slips and deflections change their sign along it alone.
-void ToolTouch::list_contact(uint32_t i) {
+void ToolTouch::list_contact(const World &w, uint32_t i, const ContactState &state, uint32_t first) {
   const Row &row = rows_[i];
   const double side = row.b_first ? -1 : 1;
   const Vec3 v = slip(row);
@@ -47,15 +58,20 @@ void ToolTouch::list_contact(uint32_t i) {
   c.slip[1] = side * dot(row.tangent[1], v);
   c.gap = row.gap - offset_;
   c.law = row.law;
-  c.sticks = row.response > 0 && state_.mode[i] == 1;
+  c.sticks = row.response > 0 && state.mode[first + i] == 1;
   c.began = match_[i] == kNone;
-  for (size_t s = 0; s < std::min<size_t>(2, laws_[row.law]->nstate); ++s)
-    c.bristle[s] = (s == 1 ? side : 1) * state_.bristle_out[s * state_.stride + i];
+  for (size_t s = 0; s < std::min<size_t>(2, w.pairs.laws[row.law]->nstate); ++s)
+    c.bristle[s] = (s == 1 ? side : 1) * state.bristle_out[s * state.stride + first + i];
   next_report_.contacts.push_back(c);
 }
 
+void ToolTouch::list(const World &w, const StepContext &step) {
+  keep_next(step.state, step.rows.soft());
+  list_contacts(w, step.state, step.rows.soft());
+}
+
 // Memory for it is needed before the sub-step is final.
-void ToolTouch::list_contacts(const World &w) {
+void ToolTouch::list_contacts(const World &w, const ContactState &state, uint32_t first) {
   RigidReport &to = next_report_;
   const Array<RigidPair> &before = w.rigid_report.touching;
   to.h = h_;
@@ -66,7 +82,7 @@ void ToolTouch::list_contacts(const World &w) {
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     const Row &row = rows_[i];
     const RigidPair pair{row.pair[row.b_first], row.pair[!row.b_first]};
-    if (row.impulse > 0) list_contact(i);
+    if (row.impulse > 0) list_contact(w, i, state, first);
     else if (!(row.gap - offset_ < kApart * offset_) ||
              !std::binary_search(before.begin(), before.end(), pair))
       continue;

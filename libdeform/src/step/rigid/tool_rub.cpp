@@ -2,7 +2,7 @@
 //
 //   start    impulses of the same keys, times h / h_old, or none, and the state of the law; turned with the
 //            normal
-//   solve    by the method for soft bodies (tool_solve.cpp)
+//   solve    with the contacts of soft bodies (tool_rows.cpp)
 //   end      the state that a law has given at the solution lasts, with the impulses
 //
 // A place where two rigid things meet has no area. Laws that use the area get one square centimeter.
@@ -33,10 +33,8 @@ uint64_t ToolTouch::key_of(const uint64_t pair[2], Name name) {
 // Sets the frames of the rows and their initial impulses, and adds these to the velocities.
 void ToolTouch::take_last(const World &w) {
   const uint32_t n = static_cast<uint32_t>(rows_.size());
-  laws_.resize(w.laws.size());
-  std::transform(w.laws.begin(), w.laws.end(), laws_.begin(), [](auto &law) { return law.get(); });
   uint32_t nstate = 0;
-  for (const Row &row : rows_) nstate = std::max(nstate, laws_[row.law]->nstate);
+  for (const Row &row : rows_) nstate = std::max(nstate, w.pairs.laws[row.law]->nstate);
   state_.resize(n, nstate);
   points_.assign(n, {});
   tangents_.resize(3 * size_t{n});
@@ -54,14 +52,28 @@ void ToolTouch::take_last(const World &w) {
     row.tangent[1] = cross(row.normal, row.tangent[0]);
     row.impulse = start_[3 * size_t{i}];
     std::copy_n(&start_[3 * size_t{i} + 1], 2, row.along);
-    push(row, row.given());
     for (const Side *side : {&row.a, &row.b}) {
       Moved &m = sides_[side->tool];
       m.touched = true;
       m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
     }
   }
+  add_rows_to_velocities();
   drop_bad_starts();
+  passes_ = 0;
+  changed_ = HUGE_VAL;
+  for (Row &row : rows_) follow_arc(row);
+}
+
+void ToolTouch::add_rows_to_velocities() {
+  for (Moved &m : sides_)
+    for (size_t k = 0; k < m.now.size(); ++k) m.now[k] = m.free[k] + m.turn[k];
+  for (const Row &row : rows_)
+    for (const Side *side : {&row.a, &row.b}) {
+      Moved &m = sides_[side->tool];
+      for (uint32_t body = 0; m.set && body < m.set->defs.size(); ++body)
+        add_answer(*side, side == &row.a ? row.given() : -row.given(), body, &m.now[6 * size_t{body}]);
+    }
 }
 
 // Impulses of rows that contradict each other may be large while what they do cancels, and an impact repeats
@@ -89,7 +101,7 @@ void ToolTouch::drop_bad_starts() {
     if (StartSpeeds *const s = speeds_of(row)) {
       const Vec3 belts = belt(row.a) - belt(row.b);
       s->with = std::max(s->with, norm(speed(row) + belts));
-      s->without = std::max(s->without, norm(base_speed(row) + belts) + std::fabs(row.rate));
+      s->without = std::max(s->without, norm(free_speed(row) + belts) + std::fabs(row.rate));
     }
   bool any = false;
   for (Row &row : rows_)
@@ -97,13 +109,13 @@ void ToolTouch::drop_bad_starts() {
       row.impulse = row.along[0] = row.along[1] = 0;
       any = true;
     }
-  if (any) push_all();
+  if (any) add_rows_to_velocities();
 }
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }
 
 // Memory for it is needed before the sub-step is final.
-void ToolTouch::keep_next() {
+void ToolTouch::keep_next(const ContactState &state, uint32_t first) {
   ContactStore &to = next_;
   uint32_t n = 0;
   for (const Row &row : rows_) n += row.impulse > 0;
@@ -126,7 +138,7 @@ void ToolTouch::keep_next() {
     store3(&to.tangent[3 * size_t{n}], row.tangent[0]);
     store3(&to.impulse[3 * size_t{n}], {row.impulse, row.along[0], row.along[1]});
     for (uint32_t s = 0; s < to.nstate; ++s)
-      to.bristle[size_t{to.nstate} * n + s] = state_.bristle_out[size_t{s} * state_.stride + i];
+      to.bristle[size_t{to.nstate} * n + s] = state.bristle_out[size_t{s} * state.stride + first + i];
     to.law[n] = row.law;
     to.dwell[n] = state_.dwell[i] + h_;
     to.area[n] = kArea;

@@ -19,8 +19,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kDone = 1e-11;            // of the largest speed that a row is to change
-constexpr double kSharper = 1e-2;          // of the change by a pass: tolerance of its solve
+constexpr double kDone = 1e-2;             // of what slips may be off by at rest: less changes nothing
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
@@ -31,7 +30,6 @@ constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
 constexpr double kNear = 0.5;        // of the least thickness: a row with an impulse is no longer than this
 constexpr double kFaster = 0.5;      // of the change by the pass before: else passes end
 constexpr uint32_t kMostPasses = 6;  // over what turning adds, until it changes no more
-constexpr uint32_t kMostRevisions = 6;  // of motors, by contact
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
 bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
@@ -98,9 +96,8 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m)
-    : solved_(m), sweeps_(m), islands_(m), batches_(m), next_(m), next_report_(m) {
-  use_memory(m, start_, tangents_, match_, points_, swept_);
+ToolTouch::ToolTouch(const Memory &m) : islands_(m), next_(m), next_report_(m) {
+  use_memory(m, start_, tangents_, match_, points_);
   state_.use(m);
 }
 
@@ -108,14 +105,15 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   pairs_.clear();
   passing_.clear();
   rows_.clear();  // of bodies that may be gone
-  shared_.clear();
-  shared_sides_.clear();
+  sides_.clear();
   thinnest_ = HUGE_VAL;
   sets_.clear();
   walls_.clear();
   w.pairs.tool_law.clear();
   if (w.rigid_sets.empty()) return;
   offset_ = w.offset;
+  for (const auto &t : w.tools)
+    if (t->motion.coupled() && t->has_jaws()) sets_.push_back(t->set);
   const auto wall = [&](uint32_t slot) {
     const Obstacle &o = *w.obstacles[slot];
     if (of_tool(o) || is_free(o)) {
@@ -159,6 +157,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
                         frees ? std::min(thickness(a), thickness(b)) : HUGE_VAL});
       thinnest_ = std::min(thinnest_, pairs_.back().thin);
     }
+  facts.rigid_rows = !pairs_.empty();
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
   for (const auto *const list : {&pairs_, &passing_})
     for (const Pair &pair : *list)
@@ -169,17 +168,15 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
 
 Vec3 ToolTouch::speed(const Row &row) const {
   const auto at = [&](const Side &side) {
-    const double *const v = &sides_[side.tool].base[6 * size_t{side.part}];
-    const double *const d = &sides_[side.tool].change[6 * size_t{side.part}];
-    return load3(v) + load3(d) + cross(load3(v + 3) + load3(d + 3), side.arm);
+    const double *const v = &sides_[side.tool].now[6 * size_t{side.part}];
+    return load3(v) + cross(load3(v + 3), side.arm);
   };
   return at(row.a) - at(row.b);
 }
 
-// Without what the rows have added.
-Vec3 ToolTouch::base_speed(const Row &row) const {
+Vec3 ToolTouch::free_speed(const Row &row) const {
   const auto at = [&](const Side &side) {
-    const double *const v = &sides_[side.tool].base[6 * size_t{side.part}];
+    const double *const v = &sides_[side.tool].free[6 * size_t{side.part}];
     return load3(v) + cross(load3(v + 3), side.arm);
   };
   return at(row.a) - at(row.b);
@@ -187,51 +184,35 @@ Vec3 ToolTouch::base_speed(const Row &row) const {
 
 bool ToolTouch::Moved::gives(const Obstacle &to) const { return responds || (to.rigid && !jaws.empty()); }
 
-void ToolTouch::push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<double> Moved::*to,
-                     bool turns_jaws) {
-  Moved &m = sides_[side.tool];
-  std::vector<double> &v = m.*to;
-  if (turns_jaws)
-    for (Moved::Jaw &jaw : m.jaws) {
-      if (jaw.part != side.part) continue;
-      const double turns = dot(jaw.lever, impulse) + dot(jaw.axis, moment);
-      jaw.moment += turns;
-      add(jaw.give * turns * jaw.lever, &v[6 * size_t{side.part}]);
-      add(jaw.give * turns * jaw.axis, &v[6 * size_t{side.part} + 3]);
-    }
-  if (!m.responds) return;
-  const uint32_t g = m.set->group[side.part];
-  if (g == DFM_RIGID_STILL || m.first[g] == kNone) return;
-  const size_t wide = m.wide[g], column = 6 * size_t{m.set->place[side.part]};
-  const double p[6] = {impulse.x, impulse.y, impulse.z, moment.x, moment.y, moment.z};
-  const auto move = [&](size_t body) {
-    const double *const row = &m.response[m.first[g] + 6 * size_t{m.set->place[body]} * wide + column];
+// Adds to v, m/s and rad/s [6] of a body, what an impulse on a side of the same set changes.
+void ToolTouch::add_answer(const Side &by, Vec3 impulse, uint32_t body, double *v) const {
+  const Moved &m = sides_[by.tool];
+  const Vec3 moment = cross(by.arm, impulse);
+  if (responds(by) && m.set->group[body] == m.set->group[by.part]) {
+    const double p[6] = {impulse.x, impulse.y, impulse.z, moment.x, moment.y, moment.z};
+    const size_t g = m.set->group[body], wide = m.wide[g];
+    const double *const to_body =
+        &m.response[m.first[g] + 6 * (m.set->place[body] * wide + m.set->place[by.part])];
     for (size_t r = 0; r < 6; ++r)
-      for (size_t c = 0; c < 6; ++c) v[6 * body + r] += row[r * wide + c] * p[c];
-  };
-  if (wide == 6) return move(side.part);
-  for (size_t i = 0; i < m.set->defs.size(); ++i)
-    if (m.set->group[i] == g) move(i);
+      for (size_t c = 0; c < 6; ++c) v[r] += to_body[r * wide + c] * p[c];
+  }
+  for (const Moved::Jaw &jaw : m.jaws) {
+    if (jaw.part != by.part || body != by.part) continue;
+    const double rate = jaw.give * (dot(jaw.lever, impulse) + dot(jaw.axis, moment));
+    add(rate * jaw.lever, v);
+    add(rate * jaw.axis, v + 3);
+  }
 }
 
-void ToolTouch::push(const Row &row, Vec3 p) {
-  push(row.a, p, cross(row.a.arm, p), &Moved::change, true);
-  push(row.b, -p, -cross(row.b.arm, p), &Moved::change, true);
-}
-
-// The relative velocity that this impulse makes. No other impulse may have been applied before.
-Vec3 ToolTouch::answer_to(const Row &row, Vec3 impulse) {
-  push(row, impulse);
-  std::vector<double> &va = sides_[row.a.tool].change, &vb = sides_[row.b.tool].change;
-  const auto moved = [](const Side &s, const std::vector<double> &v) {
-    return load3(&v[6 * size_t{s.part}]) + cross(load3(&v[6 * size_t{s.part} + 3]), s.arm);
+// The relative velocity that an impulse on a, and its opposite on b, makes.
+Vec3 ToolTouch::answer_to(const Row &row, Vec3 impulse) const {
+  const auto at = [&](const Side &side) {
+    double v[6] = {};
+    for (const Side *by : {&row.a, &row.b})
+      if (by->tool == side.tool) add_answer(*by, by == &row.a ? impulse : -impulse, side.part, v);
+    return load3(v) + cross(load3(v + 3), side.arm);
   };
-  const Vec3 out = moved(row.a, va) - moved(row.b, vb);
-  std::fill(va.begin(), va.end(), 0.0);
-  std::fill(vb.begin(), vb.end(), 0.0);
-  for (const Side *side : {&row.a, &row.b})
-    for (Moved::Jaw &jaw : sides_[side->tool].jaws) jaw.moment = 0;
-  return out;
+  return at(row.a) - at(row.b);
 }
 
 Vec3 ToolTouch::center(const Side &side) const {
@@ -239,20 +220,13 @@ Vec3 ToolTouch::center(const Side &side) const {
   return m.set ? load3(m.set->state[side.part].position) : m.center[side.part];
 }
 
-// The impulses of a set: those of soft bodies and those of the rows.
-void ToolTouch::add_impulses(size_t k) {
-  if (!sides_[k].set) return;
-  RigidSet &set = *sides_[k].set;
-  std::copy(sides_[k].given.begin(), sides_[k].given.end(), set.impulse.begin());
-  add_rows_to(k, set);
-}
-
-void ToolTouch::add_rows_to(size_t k, RigidSet &set) const {
+void ToolTouch::add_impulses() const {
   for (const Row &row : rows_)
     for (const Side *side : {&row.a, &row.b}) {
-      if (side->tool != k) continue;
+      RigidSet *const set = sides_[side->tool].set;
+      if (!set) continue;
       const Vec3 p = side == &row.a ? row.given() : -row.given();
-      double *const to = &set.impulse[6 * size_t{side->part}];
+      double *const to = &set->impulse[6 * size_t{side->part}];
       add(p, to);
       add(cross(side->arm, p), to + 3);
     }
@@ -264,10 +238,8 @@ void ToolTouch::add_rows_to(size_t k, RigidSet &set) const {
 // counts in the next pass; otherwise a thin body would oscillate. Returns the largest change, m/s.
 double ToolTouch::follow_spin() {
   double most = 0;
-  for (size_t k = 0; k < sides_.size(); ++k) {
-    Moved &m = sides_[k];
+  for (Moved &m : sides_) {
     if (!m.set || m.set->of_tool || !m.touched) continue;
-    add_impulses(k);
     bool again = false;
     if (m.set->end_state(again)) continue;  // the host reports this at the end of the sub-step
     for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
@@ -275,15 +247,15 @@ double ToolTouch::follow_spin() {
       const size_t at = 6 * size_t{i} + 3;
       if (m.jointed[m.set->group[i]]) {
         const Vec3 goes = load3(m.set->next[i].position) - load3(m.set->state[i].position);
-        const Vec3 change = (1 / h_) * goes - load3(&m.base[at - 3]) - load3(&m.change[at - 3]);
-        add(change, &m.base[at - 3]);
+        const Vec3 change = (1 / h_) * goes - load3(&m.now[at - 3]);
+        add(change, &m.now[at - 3]);
         add(change, &m.turn[at - 3]);
         most = std::max(most, norm(change));
       }
       const Quat turned = load_quat(m.set->next[i].rotation) * conjugate(load_quat(m.set->state[i].rotation));
-      const Vec3 taken = load3(&m.base[at]) + load3(&m.change[at]);
+      const Vec3 taken = load3(&m.now[at]);
       const Vec3 change = (1 / h_) * nearest_turn(rotation_vector(turned), h_ * taken) - taken;
-      add(change, &m.base[at]);
+      add(change, &m.now[at]);
       add(change, &m.turn[at]);
       most = std::max(most, m.reach[i] * norm(change));
       if (m.jointed[m.set->group[i]]) off_ = std::max(off_, h_ * most);
@@ -293,9 +265,7 @@ double ToolTouch::follow_spin() {
 }
 
 Vec3 ToolTouch::spin(const Side &side) const {
-  const Moved &m = sides_[side.tool];
-  const size_t at = 6 * size_t{side.part} + 3;
-  return load3(&m.base[at]) + load3(&m.change[at]);
+  return load3(&sides_[side.tool].now[6 * size_t{side.part} + 3]);
 }
 
 // (exp(h w) - 1) r / h less its first term. Without it, what a turning tool holds would creep outwards.
@@ -359,8 +329,7 @@ bool ToolTouch::outruns_rows() {
   bool any = false;
   for (Moved &m : sides_)
     for (size_t i = 0; m.set && i < m.arm.size(); ++i) {
-      double now[6];
-      for (size_t k = 0; k < 6; ++k) now[k] = m.base[6 * i + k] + m.change[6 * i + k];
+      const double *const now = &m.now[6 * i];
       const auto speed_of = [&](const double *v) { return norm(load3(v)) + norm(load3(v + 3)) * m.arm[i]; };
       if (!(m.arm[i] > 0) || speed_of(now) <= kReach * speed_of(&m.seen[6 * i]) + offset_ / h_) continue;
       std::copy_n(now, 6, &m.seen[6 * i]);
@@ -520,68 +489,39 @@ void ToolTouch::find(const World &w, const StepContext &step) {
   });
 }
 
-void ToolTouch::forget_changes() {
-  for (Moved &m : sides_) {
-    std::fill(m.change.begin(), m.change.end(), 0.0);
-    for (Moved::Jaw &jaw : m.jaws) jaw.moment = 0;
+// The terms of turning beyond the first order and spins depend on the solution.
+bool ToolTouch::follow(World &w, StepContext &step) {
+  if (rows_.empty()) return false;
+  double changed = 0;
+  off_ = h_ * left_;
+  for (Row &row : rows_) {
+    const double lift = row.lift;
+    changed = std::max(changed, follow_arc(row));
+    if (row.impulse > 0) off_ = std::max(off_, h_ * std::fabs(row.lift - lift));
   }
-}
-
-// Computes the velocities from the impulses of the rows.
-void ToolTouch::push_all() {
-  forget_changes();
-  for (const Row &row : rows_) push(row, row.given());
-}
-
-// Passes over what the rows take as given: the terms of turning beyond the first order, spins and motors
-// depend on the solution.
-void ToolTouch::solve(World &w, StepContext &step) {
-  double scale = 0;
-  for (const Row &row : rows_)
-    scale = std::max(
-        scale, std::fabs(row.rate) + std::fabs(dot(row.normal, speed(row))) + row.impulse / row.inverse);
-  const double done = kDone * scale;
-  double before = HUGE_VAL;
-  off_ = 0;
-  uint32_t revisions = 0;
-  for (uint32_t pass = 0;; ++pass) {
-    double changed = 0;
-    charge(w, step, 0);
-    if (pass > 0 && is_used_up(step)) return;  // a pass takes long where joints connect many bodies
-    if (pass > 0 && revisions < kMostRevisions && (decide_motors() || press_harder())) {
-      ++revisions;
-      pass = 0;
-    }
-    off_ = 0;
-    for (Row &row : rows_) {
-      const double lift = row.lift;
-      changed = std::max(changed, follow_arc(row));
-      if (pass > 0 && row.impulse > 0) off_ = std::max(off_, h_ * std::fabs(row.lift - lift));
-    }
-    if (pass > 0) changed = std::max(changed, follow_spin());
-    if (pass > 0) off_ = std::max(off_, h_ * left_);
-    for (Moved &m : sides_) m.stale = m.stale || revisions == kMostRevisions;
-    if (pass > 0 && (!(changed > done) || !(changed < kFaster * before) || pass == kMostPasses)) return;
-    if (pass > 0) before = changed;
-    left_ = 0;
-    solve_rows(w, step, std::max(done, kSharper * changed));
-  }
+  changed = std::max(changed, follow_spin());
+  charge(w, step, 0);
+  if (!(changed > kDone * tangent_at_rest(w, h_)) || !(changed < kFaster * changed_) ||
+      passes_ == kMostPasses || is_used_up(step))
+    return false;
+  changed_ = changed;
+  ++passes_;
+  return true;
 }
 
 // Takes velocities and responses of the sets that take part, and the motion of everything else.
 void ToolTouch::take_sets(World &w, StepContext &step) {
   sides_.resize(sets_.size() + !walls_.empty());
+  auto groups = static_cast<uint32_t>(step.rigid_groups.size());
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     m.set = k < sets_.size() ? sets_[k] : nullptr;
     const size_t n = m.set ? m.set->defs.size() : walls_.size();
     m.free.assign(6 * n, 0.0);
-    m.change.assign(6 * n, 0.0);
     m.turn.assign(6 * n, 0.0);
-    m.given.assign(6 * n, 0.0);
     m.reach.assign(n, 0.0);
     m.arm.assign(n, 0.0);
-    m.touched = m.responds = m.drives = m.stale = false;
+    m.touched = m.responds = m.drives = false;
     m.jaws.clear();
     m.response.clear();
     m.jointed.clear();
@@ -595,7 +535,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
         store3(&m.free[6 * i], v.velocity);
         store3(&m.free[6 * i + 3], v.spin);
       }
-      m.base = m.seen = m.free;
+      m.now = m.seen = m.free;
       continue;
     }
     RigidSet &set = *m.set;
@@ -613,9 +553,9 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     }
     m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
-      if (t->set == m.set && t->has_jaws()) list_jaws(m);
+      if (t->set == m.set && t->has_jaws()) list_jaws(m, groups);
     straighten(m);
-    m.base = m.seen = m.free;
+    m.now = m.seen = m.free;
   }
 }
 
@@ -629,7 +569,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   for (const Row &row : rows_) {
     if (row.jaw) continue;
     if (row.far && row.impulse > 0) {
-      const double closes = -h_ * dot(row.normal, base_speed(row)), gap = offset_ - h_ * row.rate;
+      const double closes = -h_ * dot(row.normal, free_speed(row)), gap = offset_ - h_ * row.rate;
       arrives = std::min(arrives, closes > gap ? kAims * gap / closes : 0.5);
     }
     double most = 0, leaves = 0;
@@ -654,93 +594,35 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
 
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
-  shared_.clear();
-  off_ = 0;
-  if (next_.n > 0) keep_next();
+  off_ = left_ = 0;
   next_report_.contacts.clear();
   next_report_.touching.clear();
   offset_ = w.offset;
   if (!passing_.empty()) tell_passing(w, step);
-  if (pairs_.empty()) return true;
+  if (sets_.empty()) return true;
   h_ = step.h;
   planned_ = step.guard.planned;
   strong_ = 1;
+  hits_found_ = 0;
   take_sets(w, step);
   tell_driven(w, step);
   find(w, step);
   if (rows_.empty() && !add_hits(w, step)) return true;
   if (!follows_arcs(w, step)) return false;
   take_last(w);
-  solve_past_hits(w, step);
-  if (!follows_arcs(w, step)) return false;
-  give_velocities();
+  for (const Moved &m : sides_)
+    if (m.set) m.set->velocity.assign(m.now.begin(), m.now.end());
   return true;
 }
 
-void ToolTouch::give_velocities() {
-  if (rows_.empty()) return;
-  for (Moved &m : sides_)
-    for (size_t i = 0; m.set && i < m.free.size(); ++i)
-      m.set->velocity[i] = m.free[i] + m.change[i] + m.turn[i];
-  for (Moved &m : sides_) {
-    m.known.resize(m.change.size());
-    for (size_t i = 0; i < m.known.size(); ++i) m.known[i] = m.change[i] + m.turn[i];
-  }
-}
-
-// m/s, the largest change of a place since the velocities that soft bodies know.
-double ToolTouch::unknown_change() const {
-  double most = 0;
-  for (const Moved &m : sides_)
-    for (size_t i = 0; i < m.reach.size(); ++i) {
-      if (!m.set) continue;
-      const size_t at = 6 * i;
-      const auto differs = [&](size_t k) {
-        return norm(load3(&m.change[k]) + load3(&m.turn[k]) - load3(&m.known[k]));
-      };
-      most = std::max(most, differs(at) + m.reach[i] * differs(at + 3));
-    }
-  return most;
-}
-
 void ToolTouch::correct() {
-  if (rows_.empty()) return;
   for (Moved &m : sides_) {
     if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
     straighten(m);
-    if (!m.drives) continue;
-    ask_again(m);
-    renew_rows();
+    if (m.drives) ask_again(m);
   }
-  give_velocities();
-}
-
-// base: what the set does without the rows.
-void ToolTouch::set_base(size_t k) {
-  Moved &m = sides_[k];
-  for (size_t i = 0; i < m.free.size(); ++i) m.base[i] = m.free[i] + m.turn[i];
-  for (uint32_t i = 0; i < m.set->defs.size(); ++i) {
-    const double *const p = &m.given[6 * size_t{i}];
-    push({k, i, {}, {}}, load3(p), load3(p + 3), &Moved::base, false);
-  }
-}
-
-bool ToolTouch::answer(World &w, StepContext &step) {
-  if (rows_.empty()) return false;
-  take_shared(step.rows);
-  for (size_t k = 0; k < sides_.size(); ++k) {
-    Moved &m = sides_[k];
-    if (!m.set) continue;
-    m.given.assign(m.set->impulse.begin(), m.set->impulse.end());
-    if (m.drives && m.touched) take_host(k);
-    else set_base(k);
-  }
-  solve_past_hits(w, step);
-  for (size_t k = 0; k < sides_.size(); ++k) add_impulses(k);
-  keep_next();
-  list_contacts(w);
-  return unknown_change() > tangent_at_rest(w, h_);
+  renew_rows();
 }
 
 }  // namespace dfm

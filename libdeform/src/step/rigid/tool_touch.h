@@ -16,23 +16,22 @@
 //            impulses and the state of the law last from sub-step to sub-step (World::tool_store)
 //   jaws     follow their angle exactly, so the force on what two of them hold would have no bound. Something
 //            rigid turns a jaw about its hinge by moment over stiffness, at the end of the sub-step (a spring
-//            without mass, backward Euler); soft bodies do not. The face of a jaw yields as well, by a
-//            hundredth of a millimeter per newton; otherwise it would be undefined how rigid things share a
-//            load. Jaws of a tool without a coupling pass through obstacles, as the tool does
+//            without mass, backward Euler); soft bodies do so where the tool is coupled. The face of a jaw
+//            yields as well, by a hundredth of a millimeter per newton; otherwise it would be undefined how
+//            rigid things share a load. Jaws of a tool without a coupling pass through obstacles, as the tool
+//            does
 //   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
-//   order    The rows are solved first without soft bodies, whose contacts then use the resulting motion of
-//            tools; those of bodies that soft ones touch are solved with soft contacts (tool_shared.cpp). The
-//            impulses of soft bodies come back into all rows, until neither changes the other
+//   order    The rows are part of the one contact problem of a sub-step (step/solve/solve.cpp). What turning
+//            adds, motors and hits depend on its solution: follow() updates them, and the solve goes on
 #pragma once
 #include <array>
 #include <cstdint>
 #include <functional>
-#include <memory>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "contact/contact_set.h"
-#include "contact/newton.h"
-#include "contact/sweeps.h"
 #include "contact/rows.h"
 #include "contact/store.h"
 #include "core/disjoint_sets.h"
@@ -54,36 +53,35 @@ class ToolTouch {
   explicit ToolTouch(const Memory &memory);
   // Called after a change of bodies or rules: finds which pairs may touch, and their laws.
   void prepare(World &w, SceneFacts &facts);
-  // Thrown by what solves rows: a law failed, returned a value that is not finite, or a limit below zero.
-  struct LawFailed {
-    const LawInstance *law;
-    double force, slip;  // N, m/s, at which the law was evaluated; nan: unknown
-  };
 
-  // Called before the solve: finds and solves the rows of this sub-step, and changes the sets' velocities by
-  // their impulses. Returns false if the sub-step must be repeated, shorter (Guard::again).
+  // Called before detection: finds the rows of this sub-step, and adds to the sets' velocities what their
+  // impulses of the last one do. Returns false if the sub-step must be repeated, shorter (Guard::again).
   bool begin(World &w, StepContext &step);
-  // Rows that are solved with the contacts of soft bodies (tool_shared.cpp).
-  void find_shared(const World &w, const StepContext &step);  // once contacts and bonds are known
-  std::span<const RigidSides> shared_sides() const { return shared_sides_; }
-  // [6 bodies,6 bodies] 1/kg, of a group that has such rows; null: it has none
-  const double *shared_response(const RigidSet &set, uint32_t group) const;
-  // from m/s, rad/s of a body, what these rows have added
-  void take_off_shared(const RigidSet &set, uint32_t body, Vec3 &velocity, Vec3 &spin) const;
-  // again: from the rows' present impulses, else from those of the last sub-step
-  void put_shared(ContactRows &to, ContactState &state, bool again);
-
+  // The rows as part of a contact problem: sides of each row, sizes of the groups of bodies that answer each
+  // other, by world-wide number. Jaws that move alone have numbers behind those of the hosts' groups.
+  std::span<const RigidSides> sides(const StepContext &step);
+  std::span<const uint32_t> group_sizes() const { return group_size_; }
+  // [6 bodies,6 bodies] 1/kg, of a world-wide group; false: it is unknown here
+  bool fill_response(uint32_t group, double *matrix) const;
+  // f(set, body, its place in the group) for the bodies of a group
+  using VisitBody = std::function<void(const RigidSet &, uint32_t body, uint32_t place)>;
+  void each_body(const World &w, uint32_t group, const VisitBody &f) const;
+  // m/s, rad/s [6] of a body without contact, with what turning adds; null: nothing of its set is known here
+  bool free_velocity(const RigidSet &set, uint32_t body, double *out) const;
+  void put(ContactRows &to, ContactState &state) const;
   // Called after the hosts have predicted their velocities again.
   void correct();
-  // Sets' velocities become those of the present impulses, less those of soft bodies; known to these.
-  void give_velocities();
-  // Called when the sets hold the impulses of soft bodies: solves the rows again and adds their impulses.
-  // Returns whether these differ from those in the velocities, so that soft bodies must be solved again.
-  bool answer(World &w, StepContext &step);
-  // Called where the motors of a set are decided again because of soft bodies: adds the impulses of the rows
-  // to set.impulse, and their velocities to set.revised if the motors have changed.
-  void add_to_impulses(RigidSet &set) const;
-  void add_to_revised(RigidSet &set);
+  // Takes impulses and velocities of a solve. left: m/s along normals, that it has left.
+  void take(const World &w, const StepContext &step, double left);
+  void add_impulses() const;        // of the rows, to those of the sets
+  void renew(const RigidSet &set);  // whose host has decided again about its motors (RigidSet::revised)
+  bool press_harder();              // where motors hold; false: as hard as they can
+  // Updates what turning adds, from the present solution. Returns whether the solve must go on.
+  bool follow(World &w, StepContext &step);
+  // Looks for what meets by the present solution without a row. Returns whether there are new rows.
+  bool finds_more(World &w, StepContext &step);
+  // Called once the rows are final: what the world is to keep of them.
+  void list(const World &w, const StepContext &step);
   // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
   bool follows_arcs(const World &w, StepContext &step) const;
   // Called after the hosts have ended their sub-step: whether no fast free body has passed through something.
@@ -94,6 +92,7 @@ class ToolTouch {
   // Called at the end of an accepted sub-step: moves what lasts to the world.
   void keep(World &w) noexcept;
   ContactStore &next() { return next_; }
+  std::string row_names(const World &w, uint32_t row) const;  // of the two things, for messages
   // tool_report.cpp: for events, lists of contacts and sums of pairs
   static bool b_first(const Obstacle &a, const Obstacle &b);
   RigidReport &next_report() { return next_report_; }
@@ -128,29 +127,25 @@ class ToolTouch {
     Vec3 given() const { return impulse * normal + along[0] * tangent[0] + along[1] * tangent[1]; }
   };
   struct Moved {
-    RigidSet *set;                           // nullptr: things that do not yield
-    std::vector<Vec3> center, belt;          // [n] of these things; m/s
-    std::vector<double> response;            // [6 bodies,6 bodies] 1/kg, of one group after another
-    std::vector<double> basis;               // scratch of clean_response()
-    std::vector<size_t> first, wide;         // [groups] where it begins (kNone: none), 6 bodies
-    std::vector<uint8_t> jointed;            // [groups]
-    std::vector<double> free, base, change;  // [6n] m/s, rad/s
-    std::vector<double> turn;                // [6n] what impulses change beyond the response
-    std::vector<double> given;               // [6n] N s, N m s of soft bodies
-    std::vector<double> known;               // [6n] what soft bodies know of change and turn
-    std::vector<uint8_t> shared;             // [groups] its rows are solved with soft bodies
-    std::vector<double> reach;               // [n] m, of its rows from its center
-    std::vector<double> seen;                // [6n] m/s, rad/s, by which rows have been found
-    std::vector<double> arm;                 // [n] m, of what may touch, from its center
-    bool responds;                           // the response is not zero
-    bool touched;                            // a row is its own
-    bool drives;                             // it has motors
-    bool stale;                              // the host may have decided about motors since
+    RigidSet *set;                    // nullptr: things that do not yield
+    std::vector<Vec3> center, belt;   // [n] of these things; m/s
+    std::vector<double> response;     // [6 bodies,6 bodies] 1/kg, of one group after another
+    std::vector<double> basis;        // scratch of clean_response()
+    std::vector<size_t> first, wide;  // [groups] where it begins (kNone: none), 6 bodies
+    std::vector<uint8_t> jointed;     // [groups]
+    std::vector<double> free, now;    // [6n] m/s, rad/s: without contact, at the present impulses
+    std::vector<double> turn;         // [6n] what impulses change beyond the response
+    std::vector<double> reach;        // [n] m, of its rows from its center
+    std::vector<double> seen;         // [6n] m/s, rad/s, by which rows have been found
+    std::vector<double> arm;          // [n] m, of what may touch, from its center
+    bool responds;                    // the response is not zero
+    bool touched;                     // a row is its own
+    bool drives;                      // it has motors
     struct Jaw {
       uint32_t part;
       Vec3 axis, lever;  // velocity of its center by a turn of one about the axis
       double give;       // rad/s by a moment's impulse of 1 N m s
-      double moment;     // N m s, of the rows
+      uint32_t alone;    // world-wide number of its group where it moves alone, else kNone
     };
     std::vector<Jaw> jaws;
     // Whether contact with `to` changes the motion of this side. The jaws of a tool without a coupling yield
@@ -183,9 +178,9 @@ class ToolTouch {
     double gap;
   };
   Vec3 speed(const Row &row) const;
-  void push(const Row &row, Vec3 impulse);
-  void push(const Side &side, Vec3 impulse, Vec3 moment, std::vector<double> Moved::*to, bool turns_jaws);
-  Vec3 answer_to(const Row &row, Vec3 impulse);
+  Vec3 free_speed(const Row &row) const;
+  void add_answer(const Side &by, Vec3 impulse, uint32_t body, double *v) const;
+  Vec3 answer_to(const Row &row, Vec3 impulse) const;
   void find(const World &w, const StepContext &step);
   using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f);
@@ -196,9 +191,8 @@ class ToolTouch {
   static uint64_t key_of(const uint64_t pair[2], Name name);
   double fastest(const ToolShape &shape, const Side &side, const ToolShape &other);
   bool outruns_rows();
-  void forget_changes();
   Vec3 center(const Side &side) const;
-  void list_jaws(Moved &m) const;
+  void list_jaws(Moved &m, uint32_t &groups) const;
   void straighten(Moved &m) const;
   Vec3 bend(const Side &side, const Side &other) const;
   Vec3 bend(Vec3 spin, Vec3 arm) const;
@@ -206,34 +200,17 @@ class ToolTouch {
   double follow_arc(Row &row) const;
   Vec3 spin(const Side &side) const;
   Vec3 belt(const Side &side) const;
-  void add_impulses(size_t k);
-  void add_rows_to(size_t k, RigidSet &set) const;
-  void set_base(size_t k);
   void set_answers(Row &row);
   double follow_spin();
-  void solve(World &w, StepContext &step);
-  Vec3 base_speed(const Row &row) const;
-  double unknown_change() const;
-  void push_all();
-  // tool_solve.cpp
-  // A group of bodies that answer each other's impulses, with their jaws; or a jaw that moves alone.
-  struct Group {
-    size_t tool;
-    uint32_t group, jaw;  // one of them kNone; jaw: its part
-    bool operator==(const Group &) const = default;
-  };
-  RigidPlace place_of(const Side &side);
-  void fill_response(const Group &of, double *matrix) const;
-  void build_rows();
-  // shared: in the problem of soft bodies
-  const double *start_velocity(const Side &side, bool shared) const;
-  void fill_row(const Row &row, ContactRows &to, uint32_t r, bool shared) const;
-  void set_arcs(const Row &row, ContactRows &to, uint32_t r, bool shared) const;
-  // tool_shared.cpp
-  void take_shared(const ContactRows &from);
-  void find_islands();
-  void solve_island(World &w, StepContext &step, size_t island, double tolerance);
-  void solve_rows(World &w, StepContext &step, double tolerance);
+  const Moved *known(const RigidSet &set) const;
+  Moved *known(const RigidSet &set) { return const_cast<Moved *>(std::as_const(*this).known(set)); }
+  const double *first_of(const Side &side) const;
+  // tool_rows.cpp
+  bool responds(const Side &side) const;
+  static void add_jaw(const Moved::Jaw &jaw, double *matrix, size_t wide);
+  RigidPlace place_of(const Side &side) const;
+  void fill_row(const Row &row, ContactRows &to, uint32_t r) const;
+  void set_arcs(const Row &row, ContactRows &to, uint32_t r) const;
   // tool_joints.cpp
   bool belong_together(const World &w, const Obstacle &a, const Obstacle &b);
   static void list_joints(Moved &m);
@@ -246,18 +223,14 @@ class ToolTouch {
   bool is_driven(const Side &side, Vec3 along) const;
   double give_of_motor(const Row &row) const;
   void renew_rows();
-  bool press_harder();
   void ask_again(Moved &m);
   static void clean_response(Moved &m, uint32_t group);
-  void take_host(size_t k);
-  bool decide_motors();
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
   // tool_hits.cpp
   Vec3 end_of(const Side &side, Vec3 p) const;
   void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   bool add_hits(const World &w, const StepContext &step);
-  void solve_past_hits(World &w, StepContext &step);
   double depth(ToolShape &a, ToolShape &b, bool edges) const;
   void tell_driven(const World &w, const StepContext &step);
   void tell_deep(const World &w, const Pair &pair, double deep, bool driven);
@@ -268,12 +241,13 @@ class ToolTouch {
   void take_sets(World &w, StepContext &step);
   // tool_rub.cpp
   void take_last(const World &w);
+  void add_rows_to_velocities();
   void drop_bad_starts();
   Vec3 slip(const Row &row) const;
-  void keep_next();
+  void keep_next(const ContactState &state, uint32_t first);
   // tool_report.cpp
-  void list_contact(uint32_t row);
-  void list_contacts(const World &w);
+  void list_contact(const World &w, uint32_t row, const ContactState &state, uint32_t first);
+  void list_contacts(const World &w, const ContactState &state, uint32_t first);
   void report(World &w) noexcept;
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
@@ -296,31 +270,19 @@ class ToolTouch {
   ToolShape shapes_[2];
   std::vector<Row> rows_;
   std::vector<Hit> hits_;
-  // the rows as a contact problem
-  ContactRows solved_;
-  std::vector<std::unique_ptr<ContactNewton>> newtons_;  // [islands]
-  Sweeps sweeps_;
-  Array<double> swept_;  // [3 rows] impulses of the sweeps
   std::vector<RigidSides> places_;
-  std::vector<Group> groups_;
-  std::vector<uint32_t> group_size_;                     // [groups] bodies
-  DisjointSets islands_;                                 // of groups that rows connect
-  std::vector<std::vector<RowRun>> runs_;                // [islands]
-  std::vector<std::vector<uint32_t>> blocks_;            // [islands]
-  std::vector<double> tolerance_, normal_tolerance_;     // [rows] m/s
-  std::vector<uint32_t> shared_;                         // rows that are solved with soft bodies
-  std::vector<RigidSides> shared_sides_;                 // theirs
-  std::vector<uint8_t> shared_groups_, shared_islands_;  // scratch
-  std::vector<uint32_t> first_group_;                    // scratch
+  std::vector<uint32_t> group_size_;      // bodies by world-wide group; behind them one for each jaw alone
+  uint32_t passes_ = 0, hits_found_ = 0;  // since motors were decided; of this sub-step
+  double changed_ = 0;                    // m/s, by the pass before
+  DisjointSets islands_;                  // of groups that rows connect
+  std::vector<uint32_t> first_group_;     // scratch
   // m/s, the largest of places with and without the impulses of the start
   struct StartSpeeds { double with = 0, without = 0; };
   std::vector<StartSpeeds> start_speeds_;      // scratch
   std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
-  LawBatches batches_;
-  std::vector<LawInstance *> laws_;  // of the world
-  Array<ContactPoint> points_;       // key and normal
+  Array<ContactPoint> points_;  // key and normal
   Array<double> start_, tangents_;
   Array<uint32_t> match_;
   ContactStore next_;

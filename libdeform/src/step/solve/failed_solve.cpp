@@ -9,6 +9,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/held_in.h"
+#include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -30,13 +31,14 @@ const Body &fastest(const World &w) {
 
 // The first contact with a value that is not finite after the solve, or kNone.
 uint32_t spoilt(const StepContext &step) {
-  for (uint32_t i = 0; i < step.rows.soft(); ++i)
+  for (uint32_t i = 0; i < step.rows.n; ++i)
     for (size_t k = 0; k < 3; ++k)
       if (!std::isfinite(step.rows.impulse[3 * size_t{i} + k])) return i;
   return kNone;
 }
 
 std::string sides(const World &w, const StepContext &step, uint32_t i) {
+  if (i >= step.rows.soft() && i < step.rows.n) return step.tools->row_names(w, i - step.rows.soft());
   if (i >= step.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
   const ContactPoint &c = step.contacts[i];
   if (c.obstacle)

@@ -54,7 +54,7 @@ void fill_responses(World &w, StepContext &step) {
 
 // What a solid body answers at its surface, over the response of its mass: 2.5 at a ball.
 constexpr double kWhole = 2.5;
-constexpr uint32_t kMostRevisions = 6;  // of the responses of rigid hosts, within a sub-step
+constexpr uint32_t kMostRevisions = 12;  // of the responses of rigid hosts, within a sub-step
 // A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
 // to this share of the planned one.
 constexpr double kLeastPiece = 1.0 / 256;
@@ -108,9 +108,7 @@ void make_rows(World &w, StepContext &step) {
   if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, again);
   make_cut_drags(w, step, again);
-  if (step.guard.resolving) step.tools->give_velocities();
-  step.tools->find_shared(w, step);
-  const std::span<const RigidSides> between_rigids = step.tools->shared_sides();
+  const std::span<const RigidSides> between_rigids = step.tools->sides(step);
   uint32_t nstate = 0;
   for (const LawInstance *law : w.pairs.laws) nstate = std::max(nstate, law->nstate);
   step.state.resize(n + static_cast<uint32_t>(between_rigids.size()), nstate);
@@ -134,9 +132,9 @@ void make_rows(World &w, StepContext &step) {
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
     step.sources[i].place = set_back ? b.p.x.data() : nullptr;
   }
-  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.rigid_groups}, step.bonds,
+  step.rows.build(step.contacts, step.sources, {step.rigid_places, step.tools->group_sizes()}, step.bonds,
                   between_rigids);
-  correct_rigids(w, step);
+  start_rigids(w, step);
   fill_responses(w, step);
   step.tangents.resize(size_t(3) * n);
   step.match.resize(n);
@@ -159,7 +157,7 @@ void make_rows(World &w, StepContext &step) {
   if (step.guard.resolving) guard_impulses(step);
   if (!step.guard.kept.empty()) guard_rates(step);
   if (step.rigid_again) std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
-  step.tools->put_shared(step.rows, step.state, again);
+  step.tools->put(step.rows, step.state);
   step.solve_islands->find(w, step);
   // an equilibrium has no velocity that an opening could leave
   if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
@@ -177,23 +175,28 @@ void finish_rows(World &w, StepContext &step) {
   if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
 }
 
-// Solves again, from the present impulses, until rigid hosts respond as the solve assumed.
+// Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed.
 const SolveIsland *solve_revised(World &w, StepContext &step) {
   const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) {
     own.all_passes = own.all_sweeps = 0;
     own.open = true;
   }
-  for (uint32_t hosts = 0;; ++hosts) {
+  for (uint32_t revisions = 0;;) {
     const SolveIsland *const bad = solve_islands(w, step);
+    double left = 0;
     for (SolveIsland &own : all) {
+      if (own.between_rigids && own.residual.due > 1) left = std::max(left, own.residual.normal);
       if (!own.open) continue;
       own.all_passes += own.passes;
       own.all_sweeps += own.sweeps;
     }
-    // a motor has reached its limit, or no longer does
-    if (bad || hosts == kMostRevisions || step.rows.rigid.empty() || !revise_rigids(w, step)) return bad;
-    finish_rows(w, step);
+    bool renewed = false;
+    if (bad || step.rows.rigid.empty() || !follow_rigids(w, step, left, revisions < kMostRevisions, renewed))
+      return bad;
+    revisions += renewed;
+    if (renewed) finish_rows(w, step);
+    restart_rigids(w, step);
     for (SolveIsland &own : all) own.open = own.rigid;
   }
 }

@@ -37,6 +37,47 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
   return most;
 }
 
+// Where all is rigid, nothing is elastic: no later sub-step makes good what a solve leaves, and loads that
+// share a place wander where gaps differ by it. Sweeps go on to the rounding of what contact changes. What
+// they leave below a share of the tolerance at rest is good enough; above it Newton's method gets this many
+// steps (what these do not find, more do not), and the better result counts.
+constexpr double kRigidRounding = 1e-11, kRigidRest = 1e-2;
+constexpr uint32_t kRigidSteps = 30;
+
+void tighten(const ContactRows &rows, SolveIsland &own) {
+  double scale = 0;
+  each_row(own.part.contacts, [&](uint32_t i) {
+    scale = std::max(scale, std::fabs(rows.rate[i]) + norm(rows.velocity(i, rows.y_free.data())));
+  });
+  own.tolerance.most_normal = kRigidRounding * scale;
+  each_row(own.part.contacts,
+           [&](uint32_t i) { own.tolerance.normal[i] = own.tolerance.tangent[i] = kRigidRounding * scale; });
+}
+
+void begin_newton(StepContext &step, SolveIsland &own) {
+  if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
+  own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
+}
+
+// least: m/s, of tangents at rest. normal: of normals.
+void solve_rigid(StepContext &step, SolveIsland &own, double least, double normal) {
+  if (own.bad || own.residual.speed <= kRigidRest * least) {
+    own.residual.due = std::min(own.residual.due, 1.0);
+    return;
+  }
+  const double swept = own.residual.speed;
+  own.swept.resize(3 * size_t{own.part.all()});
+  take_impulses(step.rows, own.part, own.swept.data());
+  begin_newton(step, own);
+  const bool found = own.newton->solve(0.1 * kRigidRest * least, normal, kRigidSteps);
+  own.sweeps += own.newton->steps();
+  own.residual = own.newton->residual();
+  if (found && !own.bad && own.residual.speed <= swept) return;
+  own.bad = nullptr;  // a law that fails on the way need not fail there
+  put_impulses(step.rows, own.part, own.swept.data());
+  own.laws.judge(own.residual);
+}
+
 // Evaluates the laws at the present state, and its residual. False: a law has failed.
 bool ask(const World &w, StepContext &step, SolveIsland &own) {
   spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
@@ -48,11 +89,6 @@ bool ask(const World &w, StepContext &step, SolveIsland &own) {
   if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
   ++own.passes;
   return true;
-}
-
-void begin_newton(StepContext &step, SolveIsland &own) {
-  if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
-  own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
 }
 
 // m/s, what normals may be off by.
@@ -87,6 +123,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                                normal};
   set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
                 step.disturbance.data(), own.tolerance);
+  if (own.all_rigid) tighten(step.rows, own);
   ask_slip_back(w, step, own);
   if (step.capture) own.problem = take_problem(w, step, own);
   if (!own.implicit) {
@@ -95,9 +132,10 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                                          step.h, own.residual);
     own.sweeps = own.sweeping.count();
     if (done) return;
+    if (own.all_rigid) return solve_rigid(step, own, least, normal);
     begin_newton(step, own);
   }
-  own.failed = !own.newton->solve(motion_tolerance(own), own.tolerance.most_normal);
+  own.failed = !own.newton->solve(motion_tolerance(own), normal);
   own.sweeps += own.newton->steps();
   own.residual = own.newton->residual();
   if (!own.bad && !own.failed) own.newton->take();
@@ -277,6 +315,8 @@ void SolveIslands::prepare(const World &w, StepContext &step) {
     order_[k] = k;
     own.part.blocks = slice(block_, k);
     own.rigid = own.implicit = false;
+    own.between_rigids = between_rigids_[k];
+    own.all_rigid = own.part.nbond == 0 && own.part.contacts.front().first >= step.rows.soft();
     for (const uint32_t b : own.part.blocks) own.rigid = own.rigid || blocks[b].group != kNone;
     const auto moves_implicit = [&](uint32_t i) {
       for (uint32_t j = step.rows.begin[i]; j < step.rows.begin[i + 1]; ++j) {

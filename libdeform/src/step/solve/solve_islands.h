@@ -46,9 +46,11 @@ class IslandLaws final : public SolveLaws {
 
 struct SolveIsland {
   RowsPart part;
-  bool implicit = false;       // some body of it moves implicitly
-  uint32_t implicit_body = 0;  // slot of one of these
-  bool rigid = false;          // some body of it is of a rigid host
+  bool implicit = false;        // some body of it moves implicitly
+  uint32_t implicit_body = 0;   // slot of one of these
+  bool rigid = false;           // some body of it is of a rigid host
+  bool between_rigids = false;  // some row of it is between rigid things
+  bool all_rigid = false;       // all of them
   LawBatches batches;
   Sweeps sweeping;
   std::unique_ptr<ContactNewton> newton;  // null until it is needed
@@ -57,8 +59,9 @@ struct SolveIsland {
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
-  bool failed = false;  // no velocities were found: a model cannot tell its forces
-  bool owes = false;    // contacts of it owe slip (stuck_slip.h)
+  bool failed = false;        // no velocities were found: a model cannot tell its forces
+  bool owes = false;          // contacts of it owe slip (stuck_slip.h)
+  std::vector<double> swept;  // [rows,3] N s, scratch
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
   std::exception_ptr thrown;

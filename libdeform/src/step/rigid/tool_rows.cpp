@@ -1,0 +1,183 @@
+// The rows between rigid things as part of the contact problem of a sub-step: blocks of it are tools with
+// their jaws and groups of bodies, known by their responses.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "dynamics/rigid/rigid_set.h"
+#include "state/world.h"
+#include "step/context.h"
+#include "step/rigid/tool_touch.h"
+
+namespace dfm {
+
+const ToolTouch::Moved *ToolTouch::known(const RigidSet &set) const {
+  const auto at = std::find_if(sides_.begin(), sides_.end(), [&](const Moved &m) { return m.set == &set; });
+  return at == sides_.end() ? nullptr : &*at;
+}
+
+// Whether impulses on this side move its group.
+bool ToolTouch::responds(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  if (!m.set || !m.responds) return false;
+  const uint32_t g = m.set->group[side.part];
+  return g != DFM_RIGID_STILL && m.first[g] != kNone;
+}
+
+// A jaw of a tool that does not answer impulses moves alone.
+RigidPlace ToolTouch::place_of(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  if (responds(side))
+    return {m.set->first_group + m.set->group[side.part], m.set->place[side.part], center(side)};
+  for (const Moved::Jaw &jaw : m.jaws)
+    if (jaw.part == side.part) return {jaw.alone, 0, center(side)};
+  return {kNone, 0, center(side)};
+}
+
+std::span<const RigidSides> ToolTouch::sides(const StepContext &step) {
+  places_.clear();
+  group_size_.assign(step.rigid_groups.begin(), step.rigid_groups.end());
+  for (const Moved &m : sides_)
+    for (const Moved::Jaw &jaw : m.jaws)
+      if (jaw.alone != kNone) group_size_.push_back(1);
+  for (const Row &row : rows_)
+    places_.push_back(
+        {place_of(row.a), place_of(row.b), center(row.a) + row.a.arm, row.normal, row.tangent[0]});
+  return places_;
+}
+
+// What a jaw gives, at the first of its body's entries.
+void ToolTouch::add_jaw(const Moved::Jaw &jaw, double *matrix, size_t wide) {
+  double way[6];
+  store3(way, jaw.lever);
+  store3(way + 3, jaw.axis);
+  for (size_t r = 0; r < 6; ++r)
+    for (size_t c = 0; c < 6; ++c) matrix[r * wide + c] += jaw.give * way[r] * way[c];
+}
+
+bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
+  for (const Moved &m : sides_) {
+    if (!m.set) continue;
+    const uint32_t g = group - m.set->first_group;
+    const bool own = group >= m.set->first_group && g < m.set->ngroup;
+    if (own && m.first[g] == kNone) return false;
+    const size_t wide = own ? m.wide[g] : 6;
+    if (own) std::copy_n(&m.response[m.first[g]], wide * wide, matrix);
+    for (const Moved::Jaw &jaw : m.jaws) {
+      if (own && m.set->group[jaw.part] == g)
+        add_jaw(jaw, matrix + 6 * size_t{m.set->place[jaw.part]} * (wide + 1), wide);
+      if (jaw.alone != group) continue;
+      std::fill_n(matrix, 36, 0.0);
+      add_jaw(jaw, matrix, 6);
+      return true;
+    }
+    if (own) return true;
+  }
+  return false;
+}
+
+void ToolTouch::each_body(const World &w, uint32_t group, const VisitBody &f) const {
+  for (const Moved &m : sides_)
+    for (const Moved::Jaw &jaw : m.jaws)
+      if (jaw.alone == group) return f(*m.set, jaw.part, 0);
+  for (const auto &set : w.rigid_sets)
+    for (uint32_t i = 0; i < set->defs.size(); ++i)
+      if (set->group[i] != DFM_RIGID_STILL && set->first_group + set->group[i] == group)
+        f(*set, i, set->place[i]);
+}
+
+bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, double *out) const {
+  const Moved *const m = known(set);
+  for (size_t k = 0; m && k < 6; ++k) out[k] = m->free[6 * size_t{body} + k] + m->turn[6 * size_t{body} + k];
+  return m != nullptr;
+}
+
+// [6] of the side's body where the unknowns of the problem are zero: what detection has used.
+const double *ToolTouch::first_of(const Side &side) const {
+  const Moved &m = sides_[side.tool];
+  const size_t at = 6 * size_t{side.part};
+  return m.set ? &m.set->first[at] : &m.free[at];
+}
+
+// What turning adds follows the spins of the solution, to first order about the present ones, where these are
+// no larger than contact allows (follows_arcs). On rounded corners the place of contact stays behind the
+// turn, so slips do not follow it.
+void ToolTouch::set_arcs(const Row &row, ContactRows &to, uint32_t r) const {
+  if (h_ * std::max(norm(spin(row.a)), norm(spin(row.b))) > kArc) return;
+  const Vec3 axes[3] = {row.normal, row.tangent[0], row.tangent[1]};
+  const bool round = norm2(row.a.arm - row.a.bone) > 0 || norm2(row.b.arm - row.b.bone) > 0;
+  double *const drive = &to.drive[3 * size_t{r}];
+  const auto set = [&](const Side &side, double sign, Array<double> &arcs) {
+    double *const arc = &arcs[9 * size_t{r}];
+    const Vec3 now = spin(side) - load3(first_of(side) + 3);  // of the unknowns
+    const Vec3 unit[3] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    const double change[3] = {now.x, now.y, now.z};
+    for (size_t d = 0; d < 3; ++d) {
+      const Vec3 slope = bend_slope(spin(side), side.bone, unit[d]);
+      for (size_t c = 0; c < (round ? 1 : 3); ++c) {
+        arc[3 * c + d] = dot(axes[c], slope);
+        drive[c] += sign * arc[3 * c + d] * change[d];
+      }
+    }
+  };
+  set(row.a, 1, to.arc_a);
+  set(row.b, -1, to.arc);
+}
+
+void ToolTouch::fill_row(const Row &row, ContactRows &to, uint32_t r) const {
+  const auto at = [&](const Side &side) {
+    const double *const v = first_of(side);
+    return load3(v) + cross(load3(v + 3), side.arm);
+  };
+  const Vec3 without = at(row.a) - at(row.b);
+  store3(&to.drive[3 * size_t{r}],
+         {-(dot(row.normal, without) + row.lift), -dot(row.tangent[0], without + row.bend),
+          -dot(row.tangent[1], without + row.bend)});
+  if (row.frees) set_arcs(row, to, r);
+  store3(&to.impulse[3 * size_t{r}], {row.impulse, row.along[0], row.along[1]});
+  to.rate[r] = -row.rate;
+  to.wn[r] = 1 / row.inverse;
+  to.wt[r] = row.response;
+  for (size_t k = 0; k < 2; ++k) to.cross[2 * size_t{r} + k] = dot(row.tangent[k], row.pressed);
+  const bool opens = row.opens > 0;
+  store3(&to.yields[3 * size_t{r}],
+         {opens ? row.opens : row.soft, opens ? row.rate : std::numeric_limits<double>::max(), 0});
+}
+
+void ToolTouch::put(ContactRows &to, ContactState &state) const {
+  if (rows_.empty()) return;
+  if (std::any_of(rows_.begin(), rows_.end(), [](const Row &row) { return row.frees; }))
+    for (Array<double> *arc : {&to.arc, &to.arc_a}) arc->assign(9 * size_t{to.all()}, 0.0);
+  for (uint32_t i = 0; i < rows_.size(); ++i) {
+    const uint32_t r = to.soft() + i;
+    fill_row(rows_[i], to, r);
+    state.law[r] = state_.law[i];
+    state.area[r] = state_.area[i];
+    state.dwell[r] = state_.dwell[i];
+    for (size_t s = 0; s < state.nstate; ++s)
+      state.bristle[s * state.stride + r] = s < state_.nstate ? state_.bristle[s * state_.stride + i] : 0;
+  }
+}
+
+void ToolTouch::take(const World &w, const StepContext &step, double left) {
+  left_ = left;
+  for (uint32_t i = 0; i < rows_.size(); ++i) {
+    const double *const l = &step.rows.impulse[3 * size_t{step.rows.soft() + i}];
+    rows_[i].impulse = l[0];
+    std::copy_n(l + 1, 2, rows_[i].along);
+  }
+  for (Moved &m : sides_)
+    for (size_t i = 0; i < m.now.size(); ++i) m.now[i] = m.free[i] + m.turn[i];
+  for (const ContactRows::Block &b : step.rows.blocks) {
+    if (b.group == kNone) continue;
+    each_body(w, b.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
+      Moved *const m = known(set);
+      if (!m) return;
+      for (size_t k = 0; k < 6; ++k)
+        m->now[6 * size_t{body} + k] =
+            set.first[6 * size_t{body} + k] + step.rows.y[4 * size_t{b.first + 2 * place + k / 3} + k % 3];
+    });
+  }
+}
+
+}  // namespace dfm
