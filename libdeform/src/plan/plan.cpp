@@ -65,6 +65,5 @@ std::string self_asked_by(const SceneFacts &f) {
 bool Plan::has(StageRole role) const {
   return std::any_of(stages.begin(), stages.end(), [&](const PlannedStage &s) { return s.role == role; });
 }
-bool Plan::touches() const { return has(StageRole::gives_impulses); }
 
 }  // namespace dfm

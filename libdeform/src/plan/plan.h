@@ -76,6 +76,7 @@ StageChoice distribute(const SceneFacts &facts);
 StageChoice guard(const SceneFacts &facts);
 StageChoice commit(const SceneFacts &facts);
 StageChoice sleep(const SceneFacts &facts);
+bool acts(const SceneFacts &facts);  // whether contact, attachments or blades act on bodies
 }  // namespace when
 
 struct PlannedStage {
@@ -90,8 +91,9 @@ struct Plan {
   std::vector<PlannedStage> stages;  // in the order of a sub-step
   std::vector<AbsentStage> absent;
   std::vector<PlannedEffect> effects;
+  bool on_bodies = false;  // its contact solve acts on bodies, not on rigid things alone
   bool has(StageRole role) const;
-  bool touches() const;  // has stages of contact with bodies
+  bool touches() const { return on_bodies && has(StageRole::solves); }
 };
 
 inline constexpr char kSelfAuto[] = "contact.self auto";

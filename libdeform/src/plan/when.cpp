@@ -27,9 +27,8 @@ std::string rigids(const SceneFacts &f) {
 }
 
 // Loads that act on bodies through their surfaces.
-bool acts(const SceneFacts &f) { return touches(f) || f.attachments || f.paid_cuts; }
 StageChoice of_contact(const SceneFacts &f) {
-  if (!acts(f)) return left_out(nobody(f));
+  if (!when::acts(f)) return left_out(nobody(f));
   std::vector<std::string> what;
   if (touches(f)) what.push_back(who(f));
   if (f.attachments) what.push_back(count(f.attachments, "attachment holds", "attachments hold"));
@@ -42,6 +41,8 @@ StageChoice of_pairs(const SceneFacts &f) {
 }
 
 }  // namespace
+
+bool acts(const SceneFacts &f) { return touches(f) || f.attachments || f.paid_cuts; }
 
 StageChoice motion(const SceneFacts &f) {
   std::vector<std::string> what;

@@ -135,6 +135,7 @@ std::span<const Stage> stage_table() { return kTable; }
 Plan make_plan(const SceneFacts &facts) {
   Plan plan;
   plan_effects(facts, plan);
+  plan.on_bodies = when::acts(facts);
   for (size_t row = 0; row < std::size(kTable); ++row) {
     StageChoice choice = kTable[row].when(facts);
     if (choice.runs) plan.stages.push_back({row, kTable[row].role, std::move(choice.why)});
