@@ -217,7 +217,7 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
     }
     unlike_ = false;
     const double highest = double(stepper_->highest());
-    shape_ = highest > 0 ? 1 / highest : parts_.longest;
+    shape_ = highest > 0 ? std::min(1 / highest, parts_.longest) : parts_.longest;
     if (!(highest * part_ > 1 + kRounding)) break;
     stable = shape_;
   }

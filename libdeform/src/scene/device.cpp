@@ -21,8 +21,8 @@ std::string short_id(const dfm_type &type) {
   return id.substr(id.rfind('.') + 1);
 }
 
-// Effects that work in this body with another model, or its own, in a world without other things. What is said
-// of the body is said when the scene is built.
+// Effects that work in this body with this model, in a world without other things. Warnings come when the
+// scene is built.
 std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,
                                     const std::string &model, Params params) {
   Definition alone;
@@ -146,7 +146,7 @@ class Chooser {
   }
 
   // Why the card would not move the body as the processor does; empty: it would. A driver that computes on
-  // the processor counts where the card is asked for. Throws Error where the processor's model refuses the body.
+  // the processor counts where the card is asked for. Throws Error where the model of the processor refuses.
   std::string differs(const Body &b, const dfm_type &own, const dfm_type &card, bool any_driver) const {
     const std::string name = short_id(card);
     std::string key = lacking(b.params, own, card);
