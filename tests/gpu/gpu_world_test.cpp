@@ -376,6 +376,31 @@ TEST(GpuScene, WhatTheCardLacks_IsTold) {
   }
 }
 
+// A state of a machine where "auto" chose otherwise.
+TEST(GpuScene, StateOfAnotherDevice_IsToldSo) {
+  const std::string folder = test::scratch("state"), file = folder + "/scene.json", state = folder + "/s.dfm";
+  test::write_file(file,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+ "bodies": [{"name": "cube", )" +
+                       kCube + R"("device": "auto", "model": {"type": "condensed"}}]})");
+  const auto run = [&](const std::vector<std::string> &more) {
+    std::vector<std::string> argv = {"run", file, "--out", folder + "/out"};
+    argv.insert(argv.end(), more.begin(), more.end());
+    return test::deform(argv);
+  };
+  const test::CommandResult saved = run({"--save", "0.005", state});
+  ASSERT_EQ(saved.exit_code, 0) << saved.err;
+  EXPECT_EQ(run({"--from", state}).exit_code, 0);
+  std::string text = test::read_file(state);
+  const size_t at = text.find("is on cpu");
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, 9, "is on gpu");
+  test::write_file(state, text);
+  const test::CommandResult r = run({"--from", state});
+  EXPECT_NE(r.exit_code, 0);
+  EXPECT_TRUE(says(r, "written where 'cube' is on gpu, and here 'cube' is on cpu")) << r.err;
+}
+
 TEST(GpuScene, WithoutADriver_GpuIsRefusedInOneSentence) {
   const test::CommandResult r = explain_on("gpu", R"("type": "corotational_fem")", false);
   EXPECT_NE(r.exit_code, 0);
