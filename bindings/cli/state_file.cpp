@@ -69,12 +69,24 @@ std::vector<std::string> needs_of(const SceneFile &scene) {
   return out;
 }
 
+// What moves bodies whose scene says "device": "'cube' is on gpu".
+std::string devices_of(const SceneFile &scene) {
+  JsonValue devices;
+  const std::string json = scene.value("/devices");
+  if (json.empty() || !parse_json(json, devices)) return "";
+  std::string out;
+  for (const JsonValue &d : devices.items)
+    out += (out.empty() ? "'" : ", '") + d.get("name") + "' is on " + d.get("device");
+  return out;
+}
+
 std::string head_of(const SceneFile &scene, size_t bytes) {
   JsonObject head;
   head.add("format", quoted(kFormat))
       .add("version", kVersion)
       .add("library", quoted(dfm_version(nullptr, nullptr, nullptr)))
       .add("scene", quoted(hash_text(scene_hash(scene))))
+      .add("devices", quoted(devices_of(scene)))
       .add("t", number(dfm_world_time(scene.world())))
       .add("state_hash", quoted(hash_text(dfm_world_hash(scene.world()))))
       .add("plugins", json_array(needs_of(scene)))
@@ -119,6 +131,7 @@ uint64_t scene_hash(const SceneFile &scene) {
     std::erase_if(from.members, [&](const JsonMember &m) { return m.name == name; });
   };
   leave_out(text, "output");
+  leave_out(text, "devices");  // why they were chosen; the bodies have the models
   for (JsonMember &m : text.members)
     if (m.name == "time") leave_out(m.value, "duration");
   return hash_of(json_text(text));
@@ -180,6 +193,10 @@ void read_state(const SceneFile &scene, const std::string &path) {
   if (head.get("version") != kVersion)
     refuse(path, "state format " + head.get("version") + ", and this command reads " + kVersion +
                      "; run the scene again");
+  const std::string then = head.get("devices"), now = devices_of(scene);
+  if (!then.empty() && !now.empty() && then != now)
+    refuse(path, "written where " + then + ", and here " + now +
+                     "; give bodies that \"device\" of then, which \"auto\" chooses by the machine");
   if (head.get("scene") != hash_text(scene_hash(scene)))
     refuse(
         path,

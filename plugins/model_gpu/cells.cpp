@@ -148,7 +148,8 @@ void Cells::strain(const dfm_kin &k, size_t c, double (&f)[9], double (&r)[9], d
 void Cells::bound(const dfm_kin &k, double *ksum, double *csum) {
   constexpr double kOthers = 1 - 1e-6;
   if (const double last = k.state[3 * size_t(npoint)]; last > 0) {
-    for (uint32_t i = 0; i < npoint; ++i) csum[i] += (i == worst ? 1 : kOthers) * (2 * mass[i] / last);
+    const double stable = std::min(last, longest);  // parameters may have changed since
+    for (uint32_t i = 0; i < npoint; ++i) csum[i] += (i == worst ? 1 : kOthers) * (2 * mass[i] / stable);
     return;
   }
   each(host, ncell_, [&](size_t c) {

@@ -77,7 +77,9 @@ struct Tables {
                                                                            : DFM_E_ARG;
   }
   static dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
-    return body(self).predict(*k, f, u);
+    dfm_status status = DFM_OK;
+    const dfm_status lacks = Ops::with_state(self, k, [&](One &of) { status = of.predict(*k, f, u); });
+    return lacks == DFM_OK ? status : lacks;
   }
   static dfm_status respond_many(void *self, const dfm_kin *, uint32_t n, const uint32_t *surfel,
                                  uint32_t nrhs, const double *p, double *du) {
@@ -94,8 +96,7 @@ struct Tables {
     return DFM_OK;
   }
   static dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
-    body(self).commit(*k, p, x, v);
-    return DFM_OK;
+    return Ops::with_state(self, k, [&](One &of) { of.commit(*k, p, x, v); });
   }
   static const dfm_fact *facts(const void *self, uint32_t *n) {
     *n = One::kFactCount;

@@ -58,23 +58,32 @@ void Body<Of>::take_surface(const dfm_mesh &m) {
 
 template <class Of>
 void Body<Of>::apply_params(const double *values) {
-  std::copy(values, values + Of::kParams, params_);
-  parts_.fill(params_);
-  try {
+  const auto take = [&] {
+    parts_.fill(params_);
     stepper_->take(parts_.work());
+    find_lag();
+  };
+  unlike_ = true;
+  try {
+    try {
+      model::try_params(params_, values, take);
+    } catch (...) {
+      if (facts_[0].key) take();  // a body that is there keeps its old values
+      throw;
+    }
   } catch (const std::string &why) {
     model::complain(host, Of::kId, why.c_str());
     throw model::Refused{};
   }
-  find_lag();
   const char **effect = active_effects;
   if (Of::kParams > kPoisson) *effect++ = "volume";
   *effect++ = "large_rotation";
   if (params_[kDampingStiffness] > 0 || params_[kDampingMass] > 0) *effect++ = "damping";
   *effect = nullptr;
-  facts_[0] = {"longest_step", Of::kLongest, "s", Of::kShare * longest_};
+  facts_[0] = {"longest_step", Of::kLongest, "s", Of::kShare * parts_.longest};
   facts_[1] = Of::kCount;
   facts_[1].value = double(parts_.count());
+  facts_[2] = {"on_processor", stepper_->device(), "1", stepper_->on_processor() ? 1.0 : 0.0};
 }
 
 template <class Of>
@@ -126,13 +135,13 @@ double Body<Of>::own_frequency() {
 template <class Of>
 void Body<Of>::find_lag() {
   parts_.lag = 0;
-  longest_ = longest();
+  parts_.longest = longest();
   const double ratio = params_[kDampingStiffness];
   if (ratio > 0) {
     const double w = own_frequency();
     parts_.lag = std::min({ratio / kStiffening, std::sqrt(kError) / w, 2 * kError / (ratio * w * w)});
-    if (!(longest() > longest_)) parts_.lag = 0;
-    longest_ = longest();
+    if (!(longest() > parts_.longest)) parts_.lag = 0;
+    parts_.longest = longest();
   }
   dampers_ = {float(ratio), parts_.lag > 0 ? float(1 / parts_.lag) : 0};
 }
@@ -182,7 +191,7 @@ bool Body<Of>::take_loads(const double *f, uint32_t stride) {
 
 template <class Of>
 dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
-  double stable = longest_;
+  double stable = parts_.longest;
   if (const double last = k.state[3 * size_t(npoint_)]; last > 0) stable = std::min(stable, last);
   h_ = k.dt;
   for (;;) {
@@ -208,7 +217,7 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
     }
     unlike_ = false;
     const double highest = double(stepper_->highest());
-    shape_ = highest > 0 ? 1 / highest : longest_;
+    shape_ = highest > 0 ? std::min(1 / highest, parts_.longest) : parts_.longest;
     if (!(highest * part_ > 1 + kRounding)) break;
     stable = shape_;
   }

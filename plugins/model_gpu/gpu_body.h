@@ -42,7 +42,7 @@ class Body {
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
   void bound(const dfm_kin &k, double *ksum, double *csum) { parts_.bound(k, ksum, csum); }
   double energy(const dfm_kin &k);
-  static constexpr uint32_t kFactCount = 2;
+  static constexpr uint32_t kFactCount = 3;
   const dfm_fact *facts() const { return facts_; }
 
  private:
@@ -59,10 +59,9 @@ class Body {
   bool unlike_ = true;   // the device's arrays may differ from those of stepper_
   Buffer<double> rest_;  // [npoint,3] m
   Dampers dampers_;
-  double longest_ = 0;  // s, stable near rest
-  double h_ = 0;        // s, of the step that was predicted
-  double part_ = 0;     // s, of its sub-steps
-  double shape_ = 0;    // s, stable at its worst shape
+  double h_ = 0;      // s, of the step that was predicted
+  double part_ = 0;   // s, of its sub-steps
+  double shape_ = 0;  // s, stable at its worst shape
   dfm_fact facts_[kFactCount] = {};
 
   void take_surface(const dfm_mesh &m);

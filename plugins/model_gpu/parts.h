@@ -20,6 +20,7 @@ struct Parts {
   Buffer<double> row;            // [npoint] N/m, of the step bound; of cells at rest
   double damping = 0, drag = 0;  // s, 1/s
   double lag = 0;                // s, with which dampers see velocities; 0: none
+  double longest = 0;            // s, the longest sub-step that is stable near rest
   uint32_t worst = 0;            // the point that asks for the shortest sub-step at rest
   // What the rows of the bound count for a point: of stiffness and of dampers.
   double stiff(uint32_t i) const { return row[i] * (lag > 0 ? 1 + damping / lag : 1); }

@@ -99,6 +99,8 @@ class Stepper {
   // n sub-steps of h; moved, loaded: place, speed and seen, or load, are not those that the last run left.
   // NULL, or why it failed.
   virtual const char *run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) = 0;
+  virtual const char *device() const = 0;  // its name
+  virtual bool on_processor() const = 0;
   // 1/s, the highest rate of the step bound at the shapes of the last run; 0 where no kernel finds it.
   float highest() const { return std::bit_cast<float>(*highest_); }
 
@@ -111,6 +113,8 @@ class Reference : public Stepper {
   Reference(const dfm_host *host, uint32_t npoint);
   void take(const Work &work) override;
   const char *run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) override;
+  const char *device() const override { return "no driver"; }
+  bool on_processor() const override { return true; }
 
  private:
   const dfm_host *host_;

@@ -12,6 +12,8 @@ class VulkanStepper : public Stepper {
   ~VulkanStepper() override;
   void take(const Work &work) override;
   const char *run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) override;
+  const char *device() const override { return vulkan_->name.c_str(); }
+  bool on_processor() const override { return vulkan_->software; }
 
  private:
   struct Array {

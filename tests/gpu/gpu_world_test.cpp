@@ -242,16 +242,39 @@ TEST(GpuCommand, Hardware_IsNoSoftwareDriver) {
   }
 }
 
-// "device" of a body, and the members of its model.
+const std::string kCube = R"("mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 50}, )";
+
+// "device" of a body, the members of its model, and those of the body.
 test::CommandResult explain_on(const std::string &device, const std::string &model, bool driver,
-                               const std::string &costs = "", const std::string &wish = "") {
+                               const std::string &costs = "", const std::string &wish = "",
+                               const std::string &body = "") {
   const std::string folder = test::scratch("device"), file = folder + "/scene.json";
   test::write_file(file,
                    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
- )" + wish + R"("materials": {"soft": {"density": 1000, "young": 1e5, "damping": {"stiffness": 1e-4}}},
- "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 50},
-   "material": "soft", "device": ")" +
+ )" + wish + R"("materials": {"soft": {"density": 1000, "young": 1e5, "damping": {"stiffness": 1e-4}},
+   "clay": {"young": 1e5, "yield": 0.1}},
+ "bodies": [{"name": "cube", "material": "soft", )" +
+                       (body.find("\"mesh\"") == std::string::npos ? kCube + body : body) + R"("device": ")" +
                        device + R"(", "model": {)" + model + "}}]}");
+  test::write_file(folder + "/tet.msh", R"($MeshFormat
+2.2 0 8
+$EndMeshFormat
+$PhysicalNames
+1
+3 1 "core"
+$EndPhysicalNames
+$Nodes
+4
+1 0 0 0
+2 0.1 0 0
+3 0 0.1 0
+4 0 0 0.1
+$EndNodes
+$Elements
+1
+1 4 2 1 1 1 2 3 4
+$EndElements
+)");
   std::vector<std::string> argv = {"/usr/bin/env", "DEFORM_COSTS=" + costs};
   if (!driver) argv.insert(argv.end(), {"VK_ICD_FILENAMES=/nowhere.json", "VK_DRIVER_FILES=/nowhere.json"});
   argv.insert(argv.end(), {DEFORM_COMMAND, "explain", file});
@@ -262,14 +285,39 @@ bool says(const test::CommandResult &r, const std::string &words) {
   return (r.exit_code == 0 ? r.out : r.err).find(words) != std::string::npos;
 }
 
+// A file of costs in which the card moves cells faster, or slower.
+std::string costs_of_cells(bool faster) {
+  const auto model = [](const char *name, const char *itself, const char *ns) {
+    std::string costs;
+    for (const char *meets : {"free", "touching", "pressed", "stacked"})
+      costs += std::string(costs.empty() ? "" : ", ") + "\"" + meets +
+               R"(": [{"points": 10, "ns_per_point": )" + ns + "}]";
+    return std::string(R"({"model": ")") + name + R"(", "steps_itself": )" + itself +
+           R"(, "wave_steps": 1, "errors": {"bends_little": 0, "bends_far": 0, "turns": 0, "lies": 0,)"
+           R"( "dents": 0, "dent_force": 0}, "costs": {"symplectic_euler": {)" +
+           costs + "}}}";
+  };
+  const std::string file = test::scratch("costs") + "/costs.json";
+  test::write_file(file,
+                   R"({"format": "deform-costs", "version": 4, "machine": "that of the test", "models": [)" +
+                       model("corotational_fem", "false", "100") + ", " +
+                       model("corotational_fem_gpu", "true", faster ? "1" : "1e9") + "]}");
+  return file;
+}
+
 TEST(GpuScene, Device_ChoosesTheModelOfThatName) {
   for (const auto &[device, model, found] :
-       {std::array{"cpu", R"("type": "corotational_fem_gpu")", "model: org.deform.corotational_fem  "},
-        std::array{"cpu", R"("type": "msm")", "model: org.deform.msm  "},
+       {std::array{"cpu", R"("type": "msm")", "model: org.deform.msm  "},
         std::array{"auto", R"("type": "condensed")", "no loaded model computes what condensed does"}}) {
     const test::CommandResult r = explain_on(device, model, true);
     EXPECT_EQ(r.exit_code, 0) << r.err;
     EXPECT_TRUE(says(r, found)) << r.out;
+  }
+  for (const char *device : {"cpu", "auto"}) {
+    const test::CommandResult other = explain_on(device, R"("type": "msm_gpu")", true);
+    EXPECT_NE(other.exit_code, 0);
+    EXPECT_TRUE(says(other, "/bodies/0/device: org.deform.msm_gpu is the model of a graphics card"))
+        << other.err;
   }
   const test::CommandResult none = explain_on("gpu", R"("type": "condensed")", true);
   EXPECT_NE(none.exit_code, 0);
@@ -278,6 +326,7 @@ TEST(GpuScene, Device_ChoosesTheModelOfThatName) {
   const test::CommandResult springs =
       explain_on("gpu", R"("type": "msm", "params": {"volume": 0, "collapse": 0})", true);
   EXPECT_TRUE(says(springs, "runs on: gpu, by msm_gpu: the scene asks for it")) << springs.out << springs.err;
+  EXPECT_TRUE(says(springs, "on_processor: ")) << springs.out;
   EXPECT_TRUE(says(explain_on("gpu", R"("type": "corotational_fem")", true), "by corotational_fem_gpu"));
 }
 
@@ -287,6 +336,11 @@ TEST(GpuScene, DeviceBesideAnAccuracy_IsThatOfTheModelThatThePlannerTakes) {
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_TRUE(says(r, "runs on: cpu, by ")) << r.out;
   EXPECT_TRUE(says(r, "chosen:   ")) << r.out;
+  if (device() == kReference) GTEST_SKIP() << "no driver";
+  const test::CommandResult card =
+      explain_on("gpu", R"("type": "auto")", true, "", R"("accuracy": {"target": 0.9},)");
+  EXPECT_EQ(card.exit_code, 0) << card.err;
+  EXPECT_TRUE(says(card, "runs on: gpu, by corotational_fem_gpu")) << card.out;
 }
 
 // The card has fewer effects than the processor, and no scene loses one without a word.
@@ -299,33 +353,65 @@ TEST(GpuScene, WhatTheCardLacks_IsTold) {
       explain_on("gpu", R"("type": "corotational_fem", "params": {"energy": "stvk"})", true);
   EXPECT_NE(other.exit_code, 0);
   EXPECT_TRUE(says(other, "corotational_fem_gpu has no \"energy\" here")) << other.err;
+  for (const auto &[body, model, words] :
+       {std::array{R"("mesh": "tet.msh", "materials_by_group": {"core": "clay"}, )", "",
+                   "has no \"yield\" here"},
+        std::array{R"("mesh": {"make": "beam", "size": [1, 1, 1], "cells": 50, "order": 2}, )", "",
+                   "second-order"},
+        std::array{R"("mesh": {"make": "bricks", "size": [1, 1, 1], "cells": 50}, )", "", "hex"},
+        std::array{R"("mass_scaling": 0.1, )", "", "mass_scaling"},
+        std::array{"", R"("type": "msm", "precision": "single", "params": {"volume": 0, "collapse": 0})",
+                   "only in double precision"},
+        std::array{R"("integrator": "implicit_euler", )", "", "is moved by symplectic_euler alone"}}) {
+    const std::string of = *model ? model : R"("type": "corotational_fem")";
+    const test::CommandResult r = explain_on("gpu", of, true, "", "", body);
+    EXPECT_NE(r.exit_code, 0) << words;
+    EXPECT_TRUE(says(r, "/bodies/0/device: ") && says(r, words) && says(r, "take \"device\": \"cpu\""))
+        << r.err;
+    EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
+    const test::CommandResult either = explain_on("auto", of, true, costs_of_cells(true), "", body);
+    EXPECT_EQ(either.exit_code, 0) << either.err;
+    EXPECT_EQ(either.err, "");
+    EXPECT_TRUE(says(either, "runs on: cpu, by ")) << either.out;
+  }
+}
+
+// A state of a machine where "auto" chose otherwise.
+TEST(GpuScene, StateOfAnotherDevice_IsToldSo) {
+  const std::string folder = test::scratch("state"), file = folder + "/scene.json", state = folder + "/s.dfm";
+  test::write_file(file,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+ "bodies": [{"name": "cube", )" +
+                       kCube + R"("device": "auto", "model": {"type": "condensed"}}]})");
+  const auto run = [&](const std::vector<std::string> &more) {
+    std::vector<std::string> argv = {"run", file, "--out", folder + "/out"};
+    argv.insert(argv.end(), more.begin(), more.end());
+    return test::deform(argv);
+  };
+  const test::CommandResult saved = run({"--save", "0.005", state});
+  ASSERT_EQ(saved.exit_code, 0) << saved.err;
+  EXPECT_EQ(run({"--from", state}).exit_code, 0);
+  std::string text = test::read_file(state);
+  const size_t at = text.find("is on cpu");
+  ASSERT_NE(at, std::string::npos);
+  text.replace(at, 9, "is on gpu");
+  test::write_file(state, text);
+  const test::CommandResult r = run({"--from", state});
+  EXPECT_NE(r.exit_code, 0);
+  EXPECT_TRUE(says(r, "written where 'cube' is on gpu, and here 'cube' is on cpu")) << r.err;
 }
 
 TEST(GpuScene, WithoutADriver_GpuIsRefusedInOneSentence) {
   const test::CommandResult r = explain_on("gpu", R"("type": "corotational_fem")", false);
   EXPECT_NE(r.exit_code, 0);
-  EXPECT_TRUE(says(r, "mesa-vulkan-drivers")) << r.err;
+  EXPECT_TRUE(says(r, "/bodies/0/device: ") && says(r, "mesa-vulkan-drivers")) << r.err;
+  EXPECT_TRUE(says(r, "take \"device\": \"cpu\"")) << r.err;
   EXPECT_EQ(std::count(r.err.begin(), r.err.end(), '\n'), 1) << r.err;
 }
 
-// By costs in which it is faster, or slower.
 TEST(GpuScene, Auto_TakesTheCardWhereItIsFasterAndThere) {
-  const auto model = [](const char *name, const char *itself, const char *ns) {
-    std::string costs;
-    for (const char *meets : {"free", "touching", "pressed", "stacked"})
-      costs += std::string(costs.empty() ? "" : ", ") + "\"" + meets +
-               R"(": [{"points": 10, "ns_per_point": )" + ns + "}]";
-    return std::string(R"({"model": ")") + name + R"(", "steps_itself": )" + itself +
-           R"(, "wave_steps": 1, "errors": {"bends_little": 0, "bends_far": 0, "turns": 0, "lies": 0,)"
-           R"( "dents": 0, "dent_force": 0}, "costs": {"symplectic_euler": {)" +
-           costs + "}}}";
-  };
   for (const bool faster : {true, false}) {
-    const std::string file = test::scratch("costs") + "/costs.json";
-    test::write_file(
-        file, R"({"format": "deform-costs", "version": 4, "machine": "that of the test", "models": [)" +
-                  model("corotational_fem", "false", "100") + ", " +
-                  model("corotational_fem_gpu", "true", faster ? "1" : "1e9") + "]}");
+    const std::string file = costs_of_cells(faster);
     const test::CommandResult here = explain_on("auto", R"("type": "corotational_fem")", true, file),
                               none = explain_on("auto", R"("type": "corotational_fem")", false, file);
     EXPECT_EQ(here.exit_code, 0) << here.err;

@@ -37,9 +37,30 @@ double clock_time() {
   return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
 }
 
-// By "device" of a scene; not of a driver that computes on the processor.
-bool on_card(const std::string &model) { return model.ends_with("_gpu"); }
-constexpr double kHardware = 1;  // of their parameter "device"
+// "hardware" among the words of a model's parameter "device", which is no driver that computes on the
+// processor; -1: the model has none.
+double hardware_of(dfm_context *context, const std::string &model) {
+  struct Asked {
+    const std::string *id;
+    double found;
+  } asked = {&model, -1};
+  need(dfm_plugin_visit(
+      context,
+      [](void *user, const dfm_type *type, const char *) {
+        Asked &of = *static_cast<Asked *>(user);
+        if (type->kind != DFM_KIND_MODEL || *of.id != type->id) return;
+        for (uint32_t i = 0; i < type->nparam; ++i) {
+          const auto *const row = reinterpret_cast<const dfm_param *>(
+              reinterpret_cast<const char *>(type->params) + size_t(i) * type->param_size);
+          if (std::string_view(row->key) != "device" || !row->names) continue;
+          for (int k = 0; row->names[k]; ++k)
+            if (std::string_view(row->names[k]) == "hardware") of.found = k;
+        }
+      },
+      &asked));
+  return asked.found;
+}
+bool on_card(dfm_context *context, const std::string &model) { return hardware_of(context, model) >= 0; }
 
 // What the bar touches, as the planner calls it; stacked: a second bar lies across it.
 enum class Touch { free, touching, pressed, stacked };
@@ -165,8 +186,9 @@ class Bar {
     b.points = points;
     b.fixed = fixed.data();
     b.model = s.model.c_str();
-    const dfm_param_value card = {"device", &kHardware, 1};
-    if (on_card(s.model)) b.model_params = {sizeof(dfm_params), 1, &card};
+    const double hardware = hardware_of(context_, s.model);
+    const dfm_param_value card = {"device", &hardware, 1};
+    if (hardware >= 0) b.model_params = {sizeof(dfm_params), 1, &card};
     b.spin[1] = s.spin;
     need(dfm_body_create(world_, &b, &body_));
     if (s.touch == Touch::stacked) {
@@ -401,7 +423,7 @@ class Calibration {
       std::vector<std::string> rows;
       for (const uint32_t cells : {400u, 2000u, 8000u, 64000u}) {
         if (touch == Touch::stacked && cells > kMostStacked) continue;
-        if (cells > kMostHere && !on_card(id)) continue;
+        if (cells > kMostHere && !on_card(context_, id)) continue;
         Setting s;
         s.model = id;
         s.integrator = integrator;
@@ -412,7 +434,7 @@ class Calibration {
         const auto measured = [&](double h) {  // 0: the stable step
           const Bar bar(context_, s);
           if (h == 0) h = bar.stable_step();
-          const Clock now = on_card(id) ? clock_time : processor_time;
+          const Clock now = on_card(context_, id) ? clock_time : processor_time;
           return std::pair(bar.points(), number(pressed ? cost_pressed(bar, h, now) : cost(bar, h, now)));
         };
         const bool explicit_time = integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER && !itself;

@@ -10,6 +10,7 @@
 #include "deform/plugin_draft.h"
 #include "math/ldlt_solver.h"
 #include "plugin/on_behalf.h"
+#include "plugin/quiet.h"
 
 namespace dfm {
 namespace {
@@ -181,6 +182,7 @@ dfm_context::~dfm_context() {
 }
 
 void dfm_context::log(int32_t level, const char *utf8) const noexcept {
+  if (dfm::Quiet::drops(level)) return;
   if (hooks.log) {
     try {
       hooks.log(hooks.user, level, utf8);
@@ -220,6 +222,7 @@ void dfm_context::remove_live(uint64_t handle) noexcept {
 namespace dfm {
 
 thread_local Overheard *Overheard::now_ = nullptr;
+thread_local bool Quiet::now_ = false;
 thread_local const std::string *OnBehalf::now_ = nullptr;
 
 bool Overheard::take(const char *text) noexcept {

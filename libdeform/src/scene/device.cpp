@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "plugin/quiet.h"
 #include "scene/build.h"
 #include "scene/planner.h"
 #include "state/world.h"
@@ -20,26 +21,37 @@ std::string short_id(const dfm_type &type) {
   return id.substr(id.rfind('.') + 1);
 }
 
-// Effects that work in a small body of this material.
+// Effects that work in this body with this model, in a world without other things. Warnings come when the
+// scene is built.
 std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,
                                     const std::string &model, Params params) {
-  Definition small;
-  small.file = def.file;
-  small.materials = def.materials;
-  small.duration = kFrame;
-  Body &b = small.bodies.emplace_back();
-  b.pointer = body.pointer;
-  b.name = body.name;
-  b.material = body.material;
+  Definition alone;
+  alone.file = def.file;
+  alone.folder = def.folder;
+  alone.world = def.world;
+  alone.solver = def.solver;
+  alone.materials = def.materials;
+  alone.duration = def.duration;
+  alone.step = def.step;
+  alone.equilibrium = def.equilibrium;
+  Body &b = alone.bodies.emplace_back(body);
   b.model = model;
   b.params = std::move(params);
-  b.made = {"beam", {0.1, 0.1, 0.1}, 6, 1};
-  const Built built = build(context, small, 0);
+  b.on.clear();
+  b.attach.clear();
+  const Quiet quiet;
+  const Built built = build(context, alone, 0);
   std::vector<std::string> out;
   for (const BodyEffect &e : body_effects(*resolve<World>(Kind::world, built.world).find_body(body.name)))
     if (e.works) out.push_back(e.name);
   dfm_world_destroy(built.world);
   return out;
+}
+
+std::string lost(const std::vector<std::string> &here, const std::vector<std::string> &there) {
+  for (const std::string &effect : here)
+    if (std::ranges::find(there, effect) == there.end()) return effect;
+  return "";
 }
 
 class Chooser {
@@ -57,7 +69,7 @@ class Chooser {
       const bool asked = *b.device == "gpu";
       std::string why = card ? "" : no_model(own);
       if (card && !asked) why = slower_on(own, *card, i);
-      if (why.empty()) why = asked ? differs(b, own, *card, true) : unless_refused(b, own, *card);
+      if (why.empty()) why = differs(b, own, *card, asked);
       if (asked && !why.empty()) def_.refuse(b.pointer + "/device", why, DFM_E_UNSUPPORTED);
       const bool on_card = why.empty();
       if (on_card) why = asked ? "the scene asks for it" : faster_;
@@ -114,10 +126,14 @@ class Chooser {
     return kWhat[static_cast<size_t>(what_it_meets(b))];
   }
 
-  const Material *material(const Body &b) const {
+  // The parameters that its materials give to a model.
+  std::vector<const Params *> of_materials(const Body &b) const {
+    std::vector<const Params *> out;
     for (const Material &m : def_.materials)
-      if (m.name == b.material) return &m;
-    return nullptr;
+      if (m.name == b.material ||
+          std::ranges::any_of(b.by_group, [&](const GroupMaterial &g) { return g.material == m.name; }))
+        out.push_back(&m.extra);
+    return out;
   }
 
   // A parameter that the card's model lacks and that is not 0, which leaves out what it is for.
@@ -130,38 +146,39 @@ class Chooser {
   }
 
   // Why the card would not move the body as the processor does; empty: it would. A driver that computes on
-  // the processor counts where the card is asked for. Throws Error where the model refuses the body.
+  // the processor counts where the card is asked for. Throws Error where the model of the processor refuses.
   std::string differs(const Body &b, const dfm_type &own, const dfm_type &card, bool any_driver) const {
     const std::string name = short_id(card);
     std::string key = lacking(b.params, own, card);
-    if (const Material *m = material(b); key.empty() && m) key = lacking(m->extra, own, card);
+    for (const Params *given : of_materials(b))
+      if (key.empty()) key = lacking(*given, own, card);
     for (const FieldFile &f : b.fields)
       if (const dfm_param *row = find_row(&card, f.key); !row || !(row->flags & DFM_PARAM_PER_CELL))
         key = f.key;
     if (!key.empty())
       return format("%s has no \"%s\" here; leave it out, or take \"device\": \"cpu\"", name.c_str(),
                     key.c_str());
-    Params left = left_for(b.params, card);
+    if (moved_by(b) > DFM_INTEGRATOR_SYMPLECTIC_EULER)
+      return format(
+          "%s is moved by symplectic_euler alone; leave \"integrator\" out, or take \"device\": \"cpu\"",
+          name.c_str());
+    Params left = left_for(b.params, own, card);
     if (!any_driver) ask_for_hardware(card, left);
-    const std::vector<std::string> here = effects_of(context_, def_, b, own.id, b.params),
-                                   there = effects_of(context_, def_, b, card.id, std::move(left));
-    for (const std::string &effect : here)
-      if (std::ranges::find(there, effect) == there.end())
-        return format(
-            "%s has no %s; switch it off in %s (deform explain says by what), take \"device\": "
-            "\"cpu\", or name the model %s",
-            name.c_str(), effect.c_str(), short_id(own).c_str(), name.c_str());
-    return "";
-  }
-
-  // The same, and why the model refuses the body, for which the processor is taken.
-  std::string unless_refused(const Body &b, const dfm_type &own, const dfm_type &card) const {
+    const std::vector<std::string> here = effects_of(context_, def_, b, own.id, b.params);
+    std::vector<std::string> there;
     try {
-      return differs(b, own, card, false);
+      there = effects_of(context_, def_, b, card.id, std::move(left));
     } catch (const Error &e) {
-      const std::string why = e.what(), where = def_.file + ": " + b.pointer + ": ";
-      return why.starts_with(where) ? why.substr(where.size()) : why;
+      const std::string why = e.what(), where = def_.file + ": ";
+      return (why.starts_with(where) ? why.substr(where.size()) : why) + "; or take \"device\": \"cpu\"";
     }
+    const std::string effect = lost(here, there);
+    if (!effect.empty())
+      return format(
+          "%s has no %s; switch it off in %s (deform explain says by what), take \"device\": "
+          "\"cpu\", or name the model %s",
+          name.c_str(), effect.c_str(), short_id(own).c_str(), name.c_str());
+    return "";
   }
 
   static void ask_for_hardware(const dfm_type &card, Params &params) {
@@ -173,10 +190,15 @@ class Chooser {
     }
   }
 
-  static Params left_for(const Params &params, const dfm_type &card) {
+  int32_t moved_by(const Body &b) const {
+    return b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
+  }
+
+  // All but what the processor's model has for itself.
+  static Params left_for(const Params &params, const dfm_type &own, const dfm_type &card) {
     Params out;
     for (size_t k = 0; k < params.keys.size(); ++k)
-      if (find_row(&card, params.keys[k])) {
+      if (find_row(&card, params.keys[k]) || !find_row(&own, params.keys[k])) {
         out.keys.push_back(params.keys[k]);
         out.values.push_back(params.values[k]);
       }
@@ -184,6 +206,7 @@ class Chooser {
   }
 
   void move(const Body &b, const dfm_type &own, const dfm_type &card) {
+    tree_[json::json_pointer(b.pointer)].erase("integrator");  // it says what the card does anyway
     json &model = tree_[json::json_pointer(b.pointer + "/model")];
     model["type"] = card.id;
     for (const std::string &key : b.params.keys)
@@ -200,6 +223,18 @@ class Chooser {
 };
 
 }  // namespace
+
+bool whole_on_card(dfm_context *context, const Definition &def, const Types &types, const Body &body,
+                   const dfm_type &own) {
+  const dfm_type *const card = types.on_card(own);
+  if (!card) return false;
+  const std::vector<std::string> here = effects_of(context, def, body, own.id, {});
+  try {
+    return lost(here, effects_of(context, def, body, card->id, {})).empty();
+  } catch (const Error &) {
+    return true;
+  }
+}
 
 json choose_devices(dfm_context *context, const Definition &def, const Types &types, json &tree) {
   return Chooser(context, def, types, tree).run();

@@ -5,6 +5,7 @@
 
 #include "math/extent.h"
 #include "math/turn.h"
+#include "scene/device.h"
 #include "scene/load.h"
 
 namespace dfm::scene {
@@ -98,7 +99,7 @@ std::string short_id(const std::string &id) {
 class Reader {
  public:
   Reader(dfm_context *context, const Definition &def, const Types &types)
-      : def_(def), types_(types), files_(context, def) {
+      : context_(context), def_(def), types_(types), files_(context, def) {
     g_ = length(def.world.gravity);
     for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? def.world.gravity[k] / g_ : 0;
   }
@@ -204,12 +205,15 @@ class Reader {
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
-  std::vector<std::string> candidates(const Measured &measured, uint32_t cell) const {
+  // "gpu" asks for one that a card computes, too, with its defaults.
+  std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.find(DFM_KIND_MODEL, m.id);
-      if (!type || types_.off_card(*type)) continue;
-      if (static_cast<const dfm_model *>(type->ops)->cells & cell) out.push_back(m.id);
+      if (!type || types_.off_card(*type) || !(static_cast<const dfm_model *>(type->ops)->cells & cell))
+        continue;
+      if (b.device == "gpu" && !whole_on_card(context_, def_, types_, b, *type)) continue;
+      out.push_back(m.id);
     }
     return out;
   }
@@ -257,10 +261,12 @@ class Reader {
     if (!b.model_open) r.model = short_id(b.model);
     const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    r.models = candidates(measured, mesh.cell);
+    if (b.device == "gpu" && named == DFM_INTEGRATOR_AUTO) r.scheme = 0;
+    r.models = b.model_open ? candidates(measured, b, mesh.cell) : std::vector<std::string>{};
     return r;
   }
 
+  dfm_context *context_;
   const Definition &def_;
   const Types &types_;
   MeshFiles files_;
@@ -319,7 +325,10 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   bool implicit = false;
   for (size_t i = 0; i < bodies.size(); ++i) {
     const BodyWay &way = plan.way.bodies[i];
-    if (def.bodies[i].model_open) write(def.bodies[i].pointer + "/model/type", way.model);
+    const Body &b = def.bodies[i];
+    if (b.device == "gpu" && b.def.integrator == DFM_INTEGRATOR_AUTO)
+      write(b.pointer + "/integrator", scheme_name(way.scheme));
+    if (b.model_open) write(b.pointer + "/model/type", way.model);
     if (way.scheme != Scheme::explicit_euler && def.world.integrator == DFM_INTEGRATOR_AUTO && !implicit) {
       write("/time/integrator", scheme_name(way.scheme));
       implicit = true;

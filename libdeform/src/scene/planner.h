@@ -11,12 +11,12 @@ namespace dfm::scene {
 // ships. Throws Error (which file, where, what was expected).
 Measured read_costs();
 
-// Chooses what the scene leaves open (model of a body, integrator, step, contact tolerance), writes it into
-// the tree and returns the value of /accuracy/chosen or /budget/chosen. Keys that the scene names are kept.
 // What the planner derives of each body.
 std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Types &types,
                                 const Measured &measured);
 
+// Chooses what the scene leaves open (model of a body, integrator, step, contact tolerance), writes it into
+// the tree and returns the value of /accuracy/chosen or /budget/chosen. Keys that the scene names are kept.
 json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree);
 
 }  // namespace dfm::scene

@@ -315,14 +315,16 @@ void check_open(const Node &body, const Node &model) {
     if (body.has(key)) body.member(key).fail("%s", sentence);
 }
 
-// The model whose parameters the body has. A model of a card that is asked for by its own name is left alone.
-const dfm_type *read_device(const Node &body, const dfm_type *named, const Types &types, Body &b) {
-  if (!body.has("device")) return named;
-  const std::string device = body.member("device").word("device");
+// The model of a card has its own defaults: it is no other name for that of the processor.
+void read_device(const Node &body, const dfm_type *named, const Types &types, Body &b) {
+  if (!body.has("device")) return;
+  const Node node = body.member("device");
+  const std::string device = node.word("device");
   const dfm_type *const other = types.off_card(*named);
-  if (device == "gpu" && other) return named;
-  if (device != "cpu") b.device = device;
-  return other ? other : named;
+  if (device != "gpu" && other)
+    node.fail("%s is the model of a graphics card; name %s in /model/type, or take \"device\": \"gpu\"",
+              named->id, other->id);
+  if (device != "cpu" && !other) b.device = device;
 }
 
 }  // namespace
@@ -338,8 +340,8 @@ Body read_body(const Node &node, ReadContext &context) {
   if (context.planned) b.model_open = !model.has("type") || model.value()["type"] == "auto";
   if (b.model_open) check_open(node, model);
   if (!model.has("type") || b.model_open) model.value()["type"] = "msm";
-  const dfm_type *type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
-  type = read_device(node, type, context.types, b);
+  const dfm_type *const type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
+  read_device(node, type, context.types, b);
   b.model = type->id;
   b.def.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
