@@ -21,8 +21,7 @@ std::vector<std::string> pythons();
 
 #ifdef _WIN32
 inline constexpr const char *kMadeByTools = "the build for Windows has none; see doc/howto/packages.md";
-inline constexpr const char *kNoServer = kMadeByTools, *kNoWindow = kMadeByTools,
-                            *kNoContact = kMadeByTools;
+inline constexpr const char *kNoServer = kMadeByTools, *kNoWindow = kMadeByTools, *kNoContact = kMadeByTools;
 #else
 inline constexpr const char *kMadeByTools = "`make demo` leaves it out, `make tools` builds it";
 inline constexpr const char *kNoServer = "with Debian's libwebsockets-dev installed, `make tools` builds it";

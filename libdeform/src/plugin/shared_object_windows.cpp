@@ -33,8 +33,7 @@ SharedObject::SharedObject(const std::string &file, const std::string &name) {
   const bool has_entry = GetProcAddress(seen, kEntry) != nullptr;
   FreeLibrary(seen);
   if (!has_entry) fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it has no symbol %s", name.c_str(), kEntry);
-  const HMODULE image =
-      map(file, name, LOAD_LIBRARY_SEARCH_DLL_LOAD_DIR | LOAD_LIBRARY_SEARCH_DEFAULT_DIRS);
+  const HMODULE image = map(file, name, LOAD_LIBRARY_SEARCH_DLL_LOAD_DIR | LOAD_LIBRARY_SEARCH_DEFAULT_DIRS);
   image_ = image;
   entry_ = reinterpret_cast<dfm_plugin_fn>(reinterpret_cast<void *>(GetProcAddress(image, kEntry)));
 }
