@@ -26,7 +26,7 @@ std::vector<std::string> pythons() {
 
 void become(const std::string &subcommand, const std::string &name, const std::vector<std::string> &words,
             const std::string &missing) {
-  const std::string program = beside(name);
+  const std::string program = beside(name + os::kProgramEnding);
   std::error_code unknown;
   if (!fs::exists(path_of(program), unknown))
     throw Failure(kBadInput, subcommand + ": there is no " + program + "; " + missing);

@@ -21,12 +21,14 @@ std::vector<std::string> pythons();
 
 #ifdef _WIN32
 inline constexpr const char *kMadeByTools = "the build for Windows has none; see doc/howto/packages.md";
-inline constexpr const char *kNoServer = kMadeByTools, *kNoWindow = kMadeByTools;
+inline constexpr const char *kNoServer = kMadeByTools, *kNoWindow = kMadeByTools, *kNoContact = kMadeByTools;
 #else
 inline constexpr const char *kMadeByTools = "`make demo` leaves it out, `make tools` builds it";
 inline constexpr const char *kNoServer = "with Debian's libwebsockets-dev installed, `make tools` builds it";
 inline constexpr const char *kNoWindow =
     "with Debian's libglfw3-dev and libimgui-dev installed, `make view` builds it";
+inline constexpr const char *kNoContact =
+    "it is not installed: with Debian's libhdf5-dev, the library's build makes it";
 #endif
 
 // A subcommand whose command line its program reads, by the same rules (bindings/tools, bindings/view,

@@ -23,8 +23,7 @@ void add_contact(Command app, Globals &globals, int *) {
     if (!options->folder.empty()) words.insert(words.end(), {"--export", options->folder});
     words.push_back("--");
     words.insert(words.end(), options->paths.begin(), options->paths.end());
-    become("contact", "deform-contact", words,
-           "it is not installed: with Debian's libhdf5-dev, the library's build makes it");
+    become("contact", "deform-contact", words, kNoContact);
   });
 }
 

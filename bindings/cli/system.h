@@ -21,6 +21,12 @@ inline std::string name_of(const std::filesystem::path &path) {
 
 namespace os {
 
+#ifdef _WIN32
+inline constexpr char kProgramEnding[] = ".exe";
+#else
+inline constexpr char kProgramEnding[] = "";
+#endif
+
 std::string own_file();                                         // of the program that runs; empty: unknown
 std::string settings_folder();                                  // of this user's programs; empty: none
 void set_if_unset(const char *name, const std::string &value);  // in the environment

@@ -13,6 +13,23 @@
 #include <cstring>
 
 namespace cli::os {
+namespace {
+
+// In one call where the system has it: between two, a child process could get the socket.
+int open_datagram_socket(int family) {
+#ifdef SOCK_CLOEXEC
+  return socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+#else
+  const int out = socket(family, SOCK_DGRAM, 0);
+  if (out >= 0) {
+    fcntl(out, F_SETFD, FD_CLOEXEC);
+    fcntl(out, F_SETFL, O_NONBLOCK);
+  }
+  return out;
+#endif
+}
+
+}  // namespace
 
 std::string own_file() {
   std::error_code error;
@@ -70,11 +87,9 @@ int datagram_socket(const std::string &host, const std::string &port, bool conne
   why = error ? gai_strerror(error) : "no address";
   int out = -1;
   for (const addrinfo *at = error ? nullptr : found; at && out < 0; at = at->ai_next) {
-    out = socket(at->ai_family, SOCK_DGRAM, 0);
+    out = open_datagram_socket(at->ai_family);
     const auto place = connected ? connect : bind;
-    if (out >= 0 && fcntl(out, F_SETFD, FD_CLOEXEC) == 0 && fcntl(out, F_SETFL, O_NONBLOCK) == 0 &&
-        place(out, at->ai_addr, at->ai_addrlen) == 0)
-      break;
+    if (out >= 0 && place(out, at->ai_addr, at->ai_addrlen) == 0) break;
     why = std::strerror(errno);
     if (out >= 0) close(out);
     out = -1;

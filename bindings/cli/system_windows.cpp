@@ -91,10 +91,15 @@ Hold hold_folder(const std::string &folder, std::intptr_t &token) {
   std::error_code error;
   std::wstring name = std::filesystem::canonical(path_of(folder), error).generic_wstring();
   for (wchar_t &c : name) c = c == L'/' ? L'|' : wchar_t(std::towlower(c));
-  const HANDLE mutex = CreateMutexW(nullptr, FALSE, (L"Local\\deform-run-" + name).c_str());
+  const HANDLE mutex = error ? nullptr : CreateMutexW(nullptr, FALSE, (L"Local\\deform-run-" + name).c_str());
+  const DWORD result = GetLastError();
+  if (!mutex) {
+    if (!error) error.assign(int(result), std::system_category());
+    errno = error.default_error_condition().value();
+    return Hold::impossible;
+  }
   token = reinterpret_cast<std::intptr_t>(mutex);
-  if (!mutex) return Hold::impossible;
-  if (GetLastError() != ERROR_ALREADY_EXISTS) return Hold::held;
+  if (result != ERROR_ALREADY_EXISTS) return Hold::held;
   let_go(token);
   return Hold::held_by_another;
 }

@@ -190,7 +190,9 @@ def kernels(tree):
 
 
 def systems(tree):
-    """The library and the command are built for Windows too: what POSIX alone has lies in *_posix.cpp."""
+    """In the library and the command, headers that Windows lacks are included in *_posix.cpp alone, and no
+    name is converted by fs::path(name) or path.string(). Not found: implicit conversions, and functions that
+    headers of both systems declare differently."""
     alone = re.compile(r"(dlfcn|elf|link|netdb|poll|spawn|arpa/\w+|"
                        r"sys/(file|mman|prctl|resource|socket|syscall|un|wait))\.h$")
     left_out = re.compile(r"_(posix|windows)\.cpp$|bindings/cli/(bullet_host|cmd_study|cmd_worker)\.cpp$")

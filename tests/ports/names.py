@@ -34,8 +34,11 @@ def main():
     deform("run", "Kopie é.json", "--quiet", "--time", "0.02")
     assert "Kugel ñ.vtu" in deform("mesh", "info", "Kugel ñ.vtu")
     assert "fehlt ü.vtu: cannot be opened: No such file" in deform("mesh", "info", "fehlt ü.vtu", code=2)
-    for absent in ("sweep", "fit", "cost", "friction", "serve", "view"):
-        assert "the build for Windows has none" in deform(absent, "x", code=2), absent
+    for program in ("ccd", "rollback"):
+        assert f"deform {program} --help" in deform(program, code=2), program
+    for absent in ("sweep", "fit", "cost", "calibrate", "friction", "serve", "view", "contact",
+                   "explain --costs", "plugin check", "mesh from-labels", "mesh phantom"):
+        assert "the build for Windows has none" in deform(*absent.split(), "x", code=2), absent
     return 0
 
 

@@ -32,7 +32,11 @@ bool status_of(int descriptor, FileStatus &to) {
   to.bytes = uint64_t(status.st_size);
   to.device = to.number = 0;
   BY_HANDLE_FILE_INFORMATION known;
-  if (regular && GetFileInformationByHandle(reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)), &known)) {
+  if (regular) {
+    if (!GetFileInformationByHandle(reinterpret_cast<HANDLE>(_get_osfhandle(descriptor)), &known)) {
+      errno = EIO;
+      return false;
+    }
     to.device = known.dwVolumeSerialNumber;
     to.number = uint64_t(known.nFileIndexHigh) << 32 | known.nFileIndexLow;
   }

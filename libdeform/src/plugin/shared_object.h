@@ -11,8 +11,8 @@ namespace dfm {
 
 class SharedObject {
  public:
-  // Checks the file before any code in it runs. Throws DFM_E_UNSUPPORTED or DFM_E_IO; `name` is its name in
-  // messages.
+  // Checks the file, of an absolute path, before any code in it runs. Throws DFM_E_UNSUPPORTED or DFM_E_IO;
+  // `name` is its name in messages.
   SharedObject(const std::string &file, const std::string &name);
   ~SharedObject() { close(image_); }
   SharedObject(const SharedObject &) = delete;

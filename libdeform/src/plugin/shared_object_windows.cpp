@@ -13,12 +13,16 @@ namespace {
 
 constexpr char kEntry[] = "dfm_plugin_entry";
 
-// A library that is mapped to be looked into runs no code.
+// A library that is mapped to be looked into runs no code. What cannot be loaded opens no window.
 HMODULE map(const std::string &file, const std::string &name, DWORD how) {
+  DWORD before = 0;
+  SetThreadErrorMode(SEM_FAILCRITICALERRORS | SEM_NOOPENFILEERRORBOX, &before);
   const HMODULE image = LoadLibraryExW(path_of(file).make_preferred().c_str(), nullptr, how);
-  if (!image)
-    fail(DFM_E_UNSUPPORTED, "%s cannot be loaded: %s", name.c_str(),
-         std::system_category().message(int(GetLastError())).c_str());
+  const DWORD error = GetLastError();
+  SetThreadErrorMode(before, nullptr);
+  if (!image)  // not every error has a text
+    fail(DFM_E_UNSUPPORTED, "%s cannot be loaded: %s (error %lu)", name.c_str(),
+         std::system_category().message(int(error)).c_str(), error);
   return image;
 }
 
@@ -29,7 +33,7 @@ SharedObject::SharedObject(const std::string &file, const std::string &name) {
   const bool has_entry = GetProcAddress(seen, kEntry) != nullptr;
   FreeLibrary(seen);
   if (!has_entry) fail(DFM_E_UNSUPPORTED, "%s is not a plugin: it has no symbol %s", name.c_str(), kEntry);
-  const HMODULE image = map(file, name, LOAD_WITH_ALTERED_SEARCH_PATH);
+  const HMODULE image = map(file, name, LOAD_LIBRARY_SEARCH_DLL_LOAD_DIR | LOAD_LIBRARY_SEARCH_DEFAULT_DIRS);
   image_ = image;
   entry_ = reinterpret_cast<dfm_plugin_fn>(reinterpret_cast<void *>(GetProcAddress(image, kEntry)));
 }
