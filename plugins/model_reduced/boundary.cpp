@@ -28,7 +28,7 @@ namespace reduced {
 namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
-constexpr size_t kMostTriangles = 2500;
+constexpr size_t kMostTriangles = 1600;
 constexpr int kDeepest = 3;
 
 // Of (x, y) against the axis x, in -pi .. pi: the angle is halved three times, then a series.
@@ -242,7 +242,7 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
     std::snprintf(
         text, sizeof text,
         "%zu triangles; boundary elements of more than %zu are refused, because their dense matrices "
-        "take minutes; take a coarser surface, or the model condensed",
+        "take more than a minute; take a coarser surface, or the model condensed",
         ntriangle(), kMostTriangles);
     model::complain(host, id, text);
     throw model::Refused{};

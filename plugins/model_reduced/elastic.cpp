@@ -284,7 +284,6 @@ void Elastic::take_surface(const dfm_mesh &m, const char *id) {
       model::complain(host_, id, text);
       throw model::Refused{};
     }
-  surface_.find(host_, id, m);
   edges_.create_copy(host_, surface_.edges.data(), surface_.edges.size());
   nedge_ = uint32_t(surface_.edges.size() / 2);
 }
@@ -293,6 +292,7 @@ void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bo
   host_ = host;
   kernels = choose_kernels(host, id);
   by_surface_ = by_surface;
+  if (by_surface) surface_.find(host, id, m);  // its limit is the lower one
   take(m, id);
   place_origin(m);
   nedge_ = m.nedge;

@@ -235,7 +235,7 @@ TEST(Boundary, WhatItCannotTake_IsRefusedInASentence) {
   Host host;
   const Stepper b(host, boundary(), m);
   EXPECT_EQ(b.status, DFM_E_ARG);
-  EXPECT_NE(host.logged.find("3072 triangles; boundary elements of more than 2500 are refused"),
+  EXPECT_NE(host.logged.find("3072 triangles; boundary elements of more than 1600 are refused"),
             std::string::npos)
       << host.logged;
   EXPECT_EQ(host.live, 0u);
