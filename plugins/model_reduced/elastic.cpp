@@ -243,12 +243,19 @@ void Elastic::find_pins() {
 void Elastic::check_holding() const {
   std::vector<std::array<double, 6>> rows;
   std::vector<uint32_t> which, chosen;
+  bool inside = false;
   for (const uint32_t i : holders)
-    if (!std::binary_search(surface_.inner.begin(), surface_.inner.end(), i))
-      add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
-  if (independent_rows(std::move(rows), chosen) < 6)
+    if (std::binary_search(surface_.inner.begin(), surface_.inner.end(), i)) inside = true;
+    else add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
+  const bool enough = independent_rows(std::move(rows), chosen) == 6;
+  constexpr const char *kInside =
+      "points inside are held, but boundary elements are held by their surface alone; hold points of the "
+      "surface";
+  if (!enough && inside) throw kInside;
+  if (!enough)
     throw "what is held leaves the body a rigid motion; hold three points that are not in a line, hold "
           "nothing, or use corotational_fem";
+  if (inside) host_->log(host_->ctx, 2, 0, kInside);
 }
 
 // Given displacements have a row and a column of their own, and so have those of points that follow.
