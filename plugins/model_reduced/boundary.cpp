@@ -257,7 +257,8 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   for (size_t c = 0; c < 4 * m.ncell; ++c) leader[lead(m.cells[c])] = lead(m.cells[c / 4 * 4]);
   for (size_t c = 0; c < 4 * m.ncell; ++c)
     if (lead(m.cells[c]) != lead(m.cells[0])) {
-      model::complain(host, id, "the cells are separate pieces; boundary elements take one: make a body of each");
+      model::complain(host, id,
+                      "the cells are separate pieces; boundary elements take one: make a body of each");
       throw model::Refused{};
     }
   for (uint32_t i = 0; i < m.npoint; ++i) {
@@ -407,7 +408,8 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
 
 // u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u.
 void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vector<Triangle> &t,
-                          const double *rest, double young, double poisson, const std::vector<double> &traction) {
+                          const double *rest, double young, double poisson,
+                          const std::vector<double> &traction) {
   const Kelvin kelvin(young, poisson);
   const size_t rows = 3 * t.size(), columns = 3 * point.size(), own = 3 * inner.size(), row_size = padded();
   follow_.create(host_, own * row_size);
@@ -439,10 +441,11 @@ void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vec
       }
       if (std::fabs(solid + 4 * kPi) < 1) continue;  // NaN on an edge
       char text[200];
-      std::snprintf(text, sizeof text,
-                    "point %u is a corner of cells, but not inside their border: flat cells are there; remove "
-                    "them, or take the model condensed",
-                    inner[i]);
+      std::snprintf(
+          text, sizeof text,
+          "point %u is a corner of cells, but not inside their border: flat cells are there; remove "
+          "them, or take the model condensed",
+          inner[i]);
       model::complain(host_, id, text);
       throw model::Refused{};
     }

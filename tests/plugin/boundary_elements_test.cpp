@@ -310,8 +310,7 @@ TEST(Boundary, YoungByCell_IsRefusedInASentence) {
 TEST(Boundary, HoldingOfPointsInside_IsRefusedInASentence) {
   const Mesh m = kuhn_bar(4, 4, 4, 0.05);
   std::vector<uint8_t> fixed(m.npoint());
-  for (uint32_t i = 0; i < m.npoint(); ++i)
-    fixed[i] = norm(m.at(i) - Vec{0.1, 0.1, 0.1}) < 0.09 ? 7 : 0;
+  for (uint32_t i = 0; i < m.npoint(); ++i) fixed[i] = norm(m.at(i) - Vec{0.1, 0.1, 0.1}) < 0.09 ? 7 : 0;
   EXPECT_NE(why_refused(m, fixed).find("hold points of the surface"), std::string::npos);
   std::vector<uint8_t> more = clamp_of(m);
   more[62] = 7;

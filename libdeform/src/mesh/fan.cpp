@@ -47,18 +47,21 @@ bool find_eye(const std::vector<Plane> &planes, double least, Vec3 &eye) {
 TetMesh fan_surface(const TriMesh &surface) {
   const dfm_trimesh_info info = mesh_statistics(surface);
   if (!info.closed)
-    fail(DFM_E_FORMAT,
-         "the surface is not closed, or its triangles disagree about the outside: %u edges have one triangle, "
-         "%u more than two; without cells of a lattice (\"cells\": 0) it must be closed: close it, or ask for "
-         "cells",
-         info.open_edges, info.nonmanifold_edges);
+    fail(
+        DFM_E_FORMAT,
+        "the surface is not closed, or its triangles disagree about the outside: %u edges have one triangle, "
+        "%u more than two; without cells of a lattice (\"cells\": 0) it must be closed: close it, or ask for "
+        "cells",
+        info.open_edges, info.nonmanifold_edges);
   if (!(info.volume > 0))
     fail(DFM_E_FORMAT,
-         "the surface encloses %g m3; it should enclose a volume, its triangles counter-clockwise from outside",
+         "the surface encloses %g m3; it should enclose a volume, its triangles counter-clockwise from "
+         "outside",
          info.volume);
   if (info.npiece != 1)
     fail(DFM_E_UNSUPPORTED,
-         "the surface has %u separate pieces; without cells of a lattice (\"cells\": 0) it must be one: make a "
+         "the surface has %u separate pieces; without cells of a lattice (\"cells\": 0) it must be one: make "
+         "a "
          "body of each, or ask for cells",
          info.npiece);
   const auto at = [&](uint32_t i) { return load3(&surface.points[3 * size_t(i)]); };
@@ -74,11 +77,12 @@ TetMesh fan_surface(const TriMesh &surface) {
   }
   eye = eye + origin;
   if (!find_eye(planes, 1e-3 * info.edge_median, eye))
-    fail(DFM_E_UNSUPPORTED,
-         "no point was found that sees all %u triangles of the surface from inside, and its cells would reach "
-         "from one point to all of them; give a mesh with tetrahedra whose border is this surface, or ask for "
-         "cells of a lattice",
-         surface.ntri());
+    fail(
+        DFM_E_UNSUPPORTED,
+        "no point was found that sees all %u triangles of the surface from inside, and its cells would reach "
+        "from one point to all of them; give a mesh with tetrahedra whose border is this surface, or ask for "
+        "cells of a lattice",
+        surface.ntri());
 
   TetMesh out(*surface.memory);
   const uint32_t n = surface.npoint(), middle = 2 * n;
