@@ -241,8 +241,8 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
     char text[200];
     std::snprintf(
         text, sizeof text,
-        "%zu triangles; boundary elements of more than %zu are refused, because their dense matrices "
-        "take more than a minute; take a coarser surface, or the model condensed",
+        "%zu triangles; boundary elements of more than %zu are refused, because time grows "
+        "with their cube; take a coarser surface, or the model condensed",
         ntriangle(), kMostTriangles);
     model::complain(host, id, text);
     throw model::Refused{};
