@@ -239,11 +239,10 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   }
   if (ntriangle() > kMostTriangles) {
     char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "%zu triangles; boundary elements of more than %zu are refused, because time grows "
-        "with their cube; take a coarser surface, or the model condensed",
-        ntriangle(), kMostTriangles);
+    std::snprintf(text, sizeof text,
+                  "%zu triangles; boundary elements of more than %zu are refused, because time grows "
+                  "with their cube; take a coarser surface, or the model condensed",
+                  ntriangle(), kMostTriangles);
     model::complain(host, id, text);
     throw model::Refused{};
   }
