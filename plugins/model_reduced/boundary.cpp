@@ -28,7 +28,7 @@ namespace reduced {
 namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
-constexpr size_t kMostTriangles = 2500;
+constexpr size_t kMostTriangles = 1600;
 constexpr int kDeepest = 3;
 
 // Of (x, y) against the axis x, in -pi .. pi: the angle is halved three times, then a series.
@@ -239,14 +239,27 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   }
   if (ntriangle() > kMostTriangles) {
     char text[200];
-    std::snprintf(
-        text, sizeof text,
-        "%zu triangles; boundary elements of more than %zu are refused, because their dense matrices "
-        "take minutes; take a coarser surface, or the model condensed",
-        ntriangle(), kMostTriangles);
+    std::snprintf(text, sizeof text,
+                  "%zu triangles; boundary elements of more than %zu are refused, because time grows "
+                  "with their cube; take a coarser surface, or the model condensed",
+                  ntriangle(), kMostTriangles);
     model::complain(host, id, text);
     throw model::Refused{};
   }
+  // The first point of each piece leads its others.
+  std::vector<uint32_t> leader(m.npoint);
+  for (uint32_t i = 0; i < m.npoint; ++i) leader[i] = i;
+  const auto lead = [&](uint32_t i) {
+    while (leader[i] != i) i = leader[i] = leader[leader[i]];
+    return i;
+  };
+  for (size_t c = 0; c < 4 * m.ncell; ++c) leader[lead(m.cells[c])] = lead(m.cells[c / 4 * 4]);
+  for (size_t c = 0; c < 4 * m.ncell; ++c)
+    if (lead(m.cells[c]) != lead(m.cells[0])) {
+      model::complain(host, id,
+                      "the cells are separate pieces; boundary elements take one: make a body of each");
+      throw model::Refused{};
+    }
   for (uint32_t i = 0; i < m.npoint; ++i) {
     if (place[i] == 0) {
       place[i] = uint32_t(point.size());
@@ -381,7 +394,7 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
             to[3 * (column % 3) + row % 3] += sum[kLanes * a + b];
         }
     }
-  lead_inner(kernels, t, rest, young, poisson, traction);
+  lead_inner(id, kernels, t, rest, young, poisson, traction);
   make_rigid_exact(rest, block);
   char text[200];
   std::snprintf(
@@ -389,12 +402,13 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
       "%s: %zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
       "forces under rigid motions are %.2g of the stiffness.",
       id, many, asymmetry_, rigid_error_);
-  host_->log(host_->ctx, 1, 0, text);
+  host_->log(host_->ctx, asymmetry_ > 1e-3 ? 2 : 1, 0, text);
 }
 
 // u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u.
-void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t, const double *rest,
-                          double young, double poisson, const std::vector<double> &traction) {
+void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vector<Triangle> &t,
+                          const double *rest, double young, double poisson,
+                          const std::vector<double> &traction) {
   const Kelvin kelvin(young, poisson);
   const size_t rows = 3 * t.size(), columns = 3 * point.size(), own = 3 * inner.size(), row_size = padded();
   follow_.create(host_, own * row_size);
@@ -402,12 +416,14 @@ void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t
   std::vector<double> loads(rows * kLanes);
   for (size_t first = 0; first < own; first += kLanes) {
     const size_t many = std::min(kLanes, own - first);
-    for (size_t i = first / 3; 3 * i < first + many; ++i)
+    for (size_t i = first / 3; 3 * i < first + many; ++i) {
+      double solid = 0;
       for (size_t q = 0; q < t.size(); ++q) {
         Integrals at;
         t[q].inner(rest + 3 * size_t(inner[i]), false, at);
         double u[9], k[9];
         kelvin.u(at, u);
+        solid += at.normal[0] + at.normal[1] + at.normal[2];
         for (size_t r = 0; r < 3; ++r) {
           const size_t row = 3 * i + r;
           if (row < first || row >= first + many) continue;
@@ -422,6 +438,16 @@ void Boundary::lead_inner(const Kernels &kernels, const std::vector<Triangle> &t
           }
         }
       }
+      if (std::fabs(solid + 4 * kPi) < 1) continue;  // NaN on an edge
+      char text[200];
+      std::snprintf(
+          text, sizeof text,
+          "point %u is a corner of cells, but not inside their border: flat cells are there; remove "
+          "them, or take the model condensed",
+          inner[i]);
+      model::complain(host_, id, text);
+      throw model::Refused{};
+    }
     for (size_t l = 0; kLanes * l < columns; ++l) {
       double sum[kLanes * kLanes] = {};
       kernels.gram(rows, loads.data(), traction.data() + l * rows * kLanes, sum);

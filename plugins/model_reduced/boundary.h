@@ -20,7 +20,7 @@ class Boundary {
   std::vector<uint32_t> inner;  // all others, rising: they follow the surface
   std::vector<uint32_t> edges;  // [.,2] all pairs of points of the surface, i < j, lexicographic
 
-  // The triangles around the cells. Throws model::Refused where they are too many.
+  // The triangles around the cells. Throws model::Refused where they are too many, or around separate pieces.
   void find(const dfm_host *host, const char *id, const dfm_mesh &m);
   // block [npoint + pairs, 9]: the stiffness. rest [npoint,3].
   void assemble(const char *id, const Kernels &kernels, const double *rest, double young, double poisson,
@@ -49,8 +49,8 @@ class Boundary {
                  std::vector<double> &both, double *block);
   size_t pair(size_t i, size_t j) const { return i * (2 * point.size() - i - 1) / 2 + (j - i - 1); }
   double *block_at(double *block, size_t i, size_t j) const;
-  void lead_inner(const Kernels &kernels, const std::vector<Triangle> &t, const double *rest, double young,
-                  double poisson, const std::vector<double> &traction);
+  void lead_inner(const char *id, const Kernels &kernels, const std::vector<Triangle> &t, const double *rest,
+                  double young, double poisson, const std::vector<double> &traction);
   void make_rigid_exact(const double *rest, double *block);
 };
 

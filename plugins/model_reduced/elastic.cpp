@@ -243,12 +243,19 @@ void Elastic::find_pins() {
 void Elastic::check_holding() const {
   std::vector<std::array<double, 6>> rows;
   std::vector<uint32_t> which, chosen;
+  bool inside = false;
   for (const uint32_t i : holders)
-    if (!std::binary_search(surface_.inner.begin(), surface_.inner.end(), i))
-      add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
-  if (independent_rows(std::move(rows), chosen) < 6)
+    if (std::binary_search(surface_.inner.begin(), surface_.inner.end(), i)) inside = true;
+    else add_rows(rest.data() + 3 * size_t(i), extent, held[i], i, rows, which);
+  const bool enough = independent_rows(std::move(rows), chosen) == 6;
+  constexpr const char *kInside =
+      "points inside are held, but boundary elements are held by their surface alone; hold points of the "
+      "surface";
+  if (!enough && inside) throw kInside;
+  if (!enough)
     throw "what is held leaves the body a rigid motion; hold three points that are not in a line, hold "
           "nothing, or use corotational_fem";
+  if (inside) host_->log(host_->ctx, 2, 0, kInside);
 }
 
 // Given displacements have a row and a column of their own, and so have those of points that follow.
@@ -284,7 +291,6 @@ void Elastic::take_surface(const dfm_mesh &m, const char *id) {
       model::complain(host_, id, text);
       throw model::Refused{};
     }
-  surface_.find(host_, id, m);
   edges_.create_copy(host_, surface_.edges.data(), surface_.edges.size());
   nedge_ = uint32_t(surface_.edges.size() / 2);
 }
@@ -293,6 +299,7 @@ void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bo
   host_ = host;
   kernels = choose_kernels(host, id);
   by_surface_ = by_surface;
+  if (by_surface) surface_.find(host, id, m);  // its limit is the lower one
   take(m, id);
   place_origin(m);
   nedge_ = m.nedge;

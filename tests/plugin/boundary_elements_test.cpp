@@ -185,7 +185,7 @@ TEST(Boundary, TubeUnderInnerPressure_WidensAsLameHasIt) {
     sum[hole] += (u[0] * X[0] + u[1] * X[1]) / r;
     exact[hole] += 1000 * 0.0025 / (1e5 * 0.0075) * (0.7 * r + 1.3 * 0.01 / r);
   }
-  for (int at = 0; at < 2; ++at) EXPECT_NEAR(sum[at] / exact[at], 1, 0.01) << at;
+  for (int at = 0; at < 2; ++at) EXPECT_NEAR(sum[at] / exact[at], 1, 0.005) << at;
 }
 
 // Held by single components at three points, the body follows any small rigid motion of them: no force.
@@ -227,7 +227,110 @@ TEST(Boundary, Cantilever_BendsAsTimoshenkoHasIt) {
   const double inertia = 1e-4 / 12, area = 0.01, shear = 1e7 / 2.6;
   const double exact = 1.0 / (3 * 1e7 * inertia) + 1.0 / (5.0 / 6 * shear * area);
   const uint32_t end = m.npoint() - 1;
-  EXPECT_NEAR((m.at(end)[2] - b.get(b.x, end)[2]) / exact, 1, 0.03);
+  EXPECT_NEAR((m.at(end)[2] - b.get(b.x, end)[2]) / exact, 1, 0.025);
+}
+
+TEST(Boundary, FilledSurface_HasItsVolumeAndCenter) {
+  const Mesh m = fan_of("cylinder", {0.1, 0.3, 0}, 400);
+  double enclosed = 0;
+  Vec center{}, sum{};
+  for (const Triangle &t : border_of(m)) {
+    Vec corners{};
+    for (const uint32_t i : t.corner) corners = corners + m.at(i);
+    const double part = dot(m.at(t.corner[0]), t.normal) / 3;
+    enclosed += part;
+    center = center + (part / 4) * corners;
+  }
+  double mass = 0, volume = 0;
+  for (uint32_t i = 0; i < m.npoint(); ++i) {
+    mass += m.mass[i];
+    sum = sum + m.mass[i] * m.at(i);
+  }
+  for (uint32_t c = 0; c < m.ncell(); ++c) {
+    const Vec o = m.at(m.cells[4 * c]);
+    const auto side = [&](uint32_t a) { return m.at(m.cells[4 * c + a]) - o; };
+    volume += dot(side(1), cross(side(2), side(3))) / 6;
+  }
+  EXPECT_NEAR(volume, enclosed, 1e-12 * enclosed);
+  EXPECT_LT(norm((1 / mass) * sum - (1 / enclosed) * center), 1e-3 * 0.1);
+}
+
+std::string why_not_filled(const std::vector<double> &points, const std::vector<uint32_t> &triangles) {
+  test::Context context(1);
+  dfm_trimesh surface = 0;
+  dfm_tetmesh cells = 0;
+  test::ok(dfm_trimesh_create(context, uint32_t(points.size() / 3), points.data(),
+                              uint32_t(triangles.size() / 3), triangles.data(), &surface));
+  const dfm_status status = dfm_tetmesh_fill(surface, 0, &cells);
+  const std::string why = status == DFM_OK ? "filled" : dfm_last_error();
+  test::ok(dfm_trimesh_destroy(surface));
+  return why;
+}
+
+TEST(Boundary, SurfacesThatOnePointDoesNotFill_AreRefusedInASentence) {
+  const std::vector<double> points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const std::vector<uint32_t> closed = {0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
+  EXPECT_EQ(why_not_filled(points, closed), "filled");
+  const std::string open = why_not_filled(points, {closed.begin(), closed.end() - 3});
+  EXPECT_NE(open.find("not closed, or its triangles disagree about the outside: 3 edges"), std::string::npos)
+      << open;
+  std::vector<double> twice = points;
+  std::vector<uint32_t> two = closed;
+  for (const double x : points) twice.push_back(x + 5);
+  for (const uint32_t i : closed) two.push_back(i + 4);
+  const std::string apart = why_not_filled(twice, two);
+  EXPECT_NE(apart.find("2 separate pieces"), std::string::npos) << apart;
+  test::Context context(1);
+  dfm_trimesh torus = 0;
+  dfm_tetmesh cells = 0;
+  const double size[3] = {0.1, 0.03, 0};
+  test::ok(dfm_trimesh_make(context, "torus", size, 500, &torus));
+  EXPECT_EQ(dfm_tetmesh_fill(torus, 0, &cells), DFM_E_UNSUPPORTED);
+  EXPECT_NE(std::string(dfm_last_error()).find("no point was found that sees all"), std::string::npos)
+      << dfm_last_error();
+  test::ok(dfm_trimesh_destroy(torus));
+}
+
+// What the log has where a body is refused.
+std::string why_refused(const Mesh &m, const std::vector<uint8_t> &fixed = {}, const Fields &by_cell = {}) {
+  Host host;
+  const ModelInstance b(host, boundary(), m, row_of(boundary(), {{"modes", 5}}), 4, by_cell, fixed);
+  EXPECT_EQ(b.status, DFM_E_ARG);
+  EXPECT_EQ(host.live, 0u);
+  return host.logged;
+}
+
+TEST(Boundary, YoungByCell_IsRefusedInASentence) {
+  const Mesh m = kuhn_bar(2, 2, 2, 0.05);
+  std::vector<double> young(m.ncell(), 1e5);
+  young[3] = 2e5;
+  EXPECT_NE(why_refused(m, {}, {{"young", young}}).find("young differs by cell"), std::string::npos);
+}
+
+TEST(Boundary, HoldingOfPointsInside_IsRefusedInASentence) {
+  const Mesh m = kuhn_bar(4, 4, 4, 0.05);
+  std::vector<uint8_t> fixed(m.npoint());
+  for (uint32_t i = 0; i < m.npoint(); ++i) fixed[i] = norm(m.at(i) - Vec{0.1, 0.1, 0.1}) < 0.09 ? 7 : 0;
+  EXPECT_NE(why_refused(m, fixed).find("hold points of the surface"), std::string::npos);
+  std::vector<uint8_t> more = clamp_of(m);
+  more[62] = 7;
+  Host host;
+  const Stepper b(host, boundary(), m, {{"modes", 5}}, more);
+  EXPECT_EQ(b.status, DFM_OK);
+  EXPECT_NE(host.logged.find("hold points of the surface"), std::string::npos) << host.logged;
+}
+
+TEST(Boundary, FlatCellsAtTheBorderAndSeparatePieces_AreRefusedInASentence) {
+  Mesh flat;
+  flat.rest = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0.5, 0, 0};  // the last in the middle of an edge
+  flat.cells = {0, 4, 2, 3, 4, 1, 2, 3, 0, 2, 4, 1, 0, 4, 3, 1};
+  flat.finish();
+  EXPECT_NE(why_refused(flat).find("point 4 is a corner of cells"), std::string::npos) << why_refused(flat);
+  Mesh two = irregular_tet();
+  for (int n = 0; n < 12; ++n) two.rest.push_back(two.rest[size_t(n)] + 5);
+  for (uint32_t i = 4; i < 8; ++i) two.cells.push_back(i);
+  two.finish();
+  EXPECT_NE(why_refused(two).find("separate pieces"), std::string::npos);
 }
 
 TEST(Boundary, WhatItCannotTake_IsRefusedInASentence) {
@@ -235,7 +338,7 @@ TEST(Boundary, WhatItCannotTake_IsRefusedInASentence) {
   Host host;
   const Stepper b(host, boundary(), m);
   EXPECT_EQ(b.status, DFM_E_ARG);
-  EXPECT_NE(host.logged.find("3072 triangles; boundary elements of more than 2500 are refused"),
+  EXPECT_NE(host.logged.find("3072 triangles; boundary elements of more than 1600 are refused"),
             std::string::npos)
       << host.logged;
   EXPECT_EQ(host.live, 0u);

@@ -82,3 +82,14 @@ TEST(FillBounds, MoreCellsThanMemoryHolds_AreRefusedBeforeTheWorkBegins) {
   EXPECT_THROW(need_memory(uint64_t(1) << 60, "a test"), Error);
   EXPECT_NO_THROW(need_memory(1 << 20, "a test"));
 }
+
+TEST(FillBounds, SurfaceTurnedInsideOut_IsNotFilledFromOnePoint) {
+  const TriMesh inside_out = tetrahedron({0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1});
+  try {
+    fan_surface(inside_out);
+    FAIL() << "filled";
+  } catch (const Error &e) {
+    EXPECT_EQ(e.status, DFM_E_FORMAT);
+    EXPECT_NE(e.sentence.find("it should enclose a volume"), std::string::npos) << e.sentence;
+  }
+}
