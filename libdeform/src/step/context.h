@@ -25,6 +25,7 @@
 namespace dfm {
 
 class ImplicitSystem;
+struct RigidSet;
 struct SelfBody;
 class SolveIslands;
 class ToolTouch;
@@ -51,6 +52,12 @@ struct StepContext {
   std::vector<ObstacleView> obstacle_views;
   std::vector<RigidPlace> rigid_places;  // by obstacle slot; empty without rigid bodies
   std::vector<uint32_t> rigid_groups;    // bodies per group, all sets
+  struct RigidMember {
+    RigidSet *set;
+    uint32_t body;
+  };
+  std::vector<RigidMember> rigid_members;  // of one group after another
+  std::vector<size_t> rigid_first;         // [groups + 1] into them
   std::vector<DofSource> sources;
   std::vector<ImplicitSystem *> systems;               // by body slot; null: not implicit
   std::vector<std::unique_ptr<SelfBody>> self_bodies;  // in id order; those that may touch themselves

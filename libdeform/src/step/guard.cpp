@@ -476,7 +476,6 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   }
   if (step.guard.solves < kSolves && may_solve_again(w, step, step.guard.hits.size())) {
     guard_add_hits(w, step);
-    if (step.residual.due > 1) --w.stats.unconverged;  // counted once, by the last solve
     for (const uint32_t i : step.active) w.bodies[i]->dynamics->free_again(sub_step_of(w, step));
     step.guard.resolving = true;
     ++step.guard.solves;

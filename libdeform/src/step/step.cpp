@@ -331,7 +331,6 @@ void refine(World &w, StepContext &step) {
 // Repeats until bodies and contacts are consistent, and h is short enough for the guard.
 bool piece(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t before = *trouble;
-  const uint64_t unconverged = w.stats.unconverged;
   struct Undo {
     World &w;
     StepContext &step;
@@ -344,7 +343,6 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   while (!sub_step(w, step, trouble)) {
     if (!step.guard.again && !step.struck) return false;
     *trouble = before;
-    w.stats.unconverged = unconverged;
     if (step.struck) return false;
     fast |= step.guard.fast;
     if (step.guard.refines) refine(w, step);
@@ -400,6 +398,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   step.ended = step.struck = false;
   step.rigid_rounds = 0;
   step.rigid_again = false;
+  step.residual = {};
   step.budget.rows = w.store.n;
   const uint64_t damping = w.sizes.damping > 0 ? 2 : 0;  // evaluations of the forces
   charge(w, step, (1 + damping) * body_work(w, step) + surface_work(w, step));
@@ -411,6 +410,10 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
     if (next == Next::stage) ++at;
   }
   keep_rigids(w, step);
+  if (step.residual.due > 1) {
+    *trouble |= DFM_TROUBLE_UNCONVERGED;
+    ++w.stats.unconverged;
+  }
   return undo.kept = true;
 }
 

@@ -63,6 +63,13 @@ void place_rigids(World &w) {
     for (uint32_t g : set->group)
       if (g != DFM_RIGID_STILL) ++step.rigid_groups[set->first_group + g];
   }
+  step.rigid_first.assign(1, 0);
+  for (const uint32_t n : step.rigid_groups) step.rigid_first.push_back(step.rigid_first.back() + n);
+  step.rigid_members.resize(step.rigid_first.back());
+  for (auto &set : w.rigid_sets)
+    for (uint32_t i = 0; i < set->defs.size(); ++i)
+      if (const uint32_t g = set->group[i]; g != DFM_RIGID_STILL)
+        step.rigid_members[step.rigid_first[set->first_group + g] + set->place[i]] = {set.get(), i};
   for (auto &o : w.obstacles) {
     if (!o->rigid) continue;
     const uint32_t g = o->rigid->group[o->rigid_body];
@@ -125,10 +132,11 @@ void rigid_response(World &w, StepContext &step, const ContactRows::Block &block
 void start_rigids(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group == kNone) continue;
-    step.tools->each_body(w, block.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
+    const bool alone = block.group >= step.rigid_groups.size();
+    step.tools->each_body(step, block.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
       double now[6];
       const size_t at = 6 * size_t{body};
-      if (!step.tools->free_velocity(set, body, now)) std::copy_n(&set.velocity[at], 6, now);
+      if (!step.tools->free_velocity(set, body, alone, now)) std::copy_n(&set.velocity[at], 6, now);
       double *const to = &step.rows.y[4 * size_t{block.first + 2 * place}];
       store3(to, load3(now) - load3(&set.first[at]));
       store3(to + 4, load3(now + 3) - load3(&set.first[at + 3]));
@@ -153,7 +161,7 @@ void sum_rigid_impulses(World &w, StepContext &step) {
 }
 
 bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool &renewed) {
-  step.tools->take(w, step, left);
+  step.tools->take(step, left);
   sum_rigid_impulses(w, step);
   renewed = false;
   for (auto &set : w.rigid_sets) {

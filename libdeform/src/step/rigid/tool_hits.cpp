@@ -125,7 +125,7 @@ bool ToolTouch::finds_more(World &w, StepContext &step) {
     rows_.clear();
     find(w, step);
   } else if (!add_hits(w, step)) return false;
-  take_last(w);
+  take_last(w, step);
   ++hits_found_;
   return true;
 }

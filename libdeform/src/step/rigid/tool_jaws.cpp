@@ -47,11 +47,26 @@ void ToolTouch::straighten(Moved &m) const {
   }
 }
 
+// N m s about its hinge: of all that touches it, or, of a jaw alone, of what is rigid.
+double ToolTouch::moment_of(size_t tool, const Moved::Jaw &jaw) const {
+  const auto about = [&](Vec3 p, Vec3 m) { return dot(jaw.lever, p) + dot(jaw.axis, m); };
+  const double *const all = &sides_[tool].set->impulse[6 * size_t{jaw.part}];
+  if (jaw.alone == kNone) return about(load3(all), load3(all + 3));
+  double sum = 0;
+  for (const Row &row : rows_)
+    for (const Side *side : {&row.a, &row.b}) {
+      if (side->tool != tool || side->part != jaw.part) continue;
+      const Vec3 p = side == &row.a ? row.given() : -row.given();
+      sum += about(p, cross(side->arm, p));
+    }
+  return sum;
+}
+
 void ToolTouch::turn_jaws() {
-  for (Moved &m : sides_)
-    for (const Moved::Jaw &jaw : m.jaws) {
-      const double *const p = &m.set->impulse[6 * size_t{jaw.part}];
-      const double moment = dot(jaw.lever, load3(p)) + dot(jaw.axis, load3(p + 3));
+  for (size_t tool = 0; tool < sides_.size(); ++tool)
+    for (const Moved::Jaw &jaw : sides_[tool].jaws) {
+      const Moved &m = sides_[tool];
+      const double moment = moment_of(tool, jaw);
       if (moment == 0) continue;
       const dfm_rigid_state &frame = m.set->next[0];
       dfm_rigid_state &s = m.set->next[jaw.part];

@@ -35,6 +35,8 @@ RigidPlace ToolTouch::place_of(const Side &side) const {
 }
 
 std::span<const RigidSides> ToolTouch::sides(const StepContext &step) {
+  passes_ = 0;
+  changed_ = HUGE_VAL;
   places_.clear();
   group_size_.assign(step.rigid_groups.begin(), step.rigid_groups.end());
   for (const Moved &m : sides_)
@@ -64,7 +66,7 @@ bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
     const size_t wide = own ? m.wide[g] : 6;
     if (own) std::copy_n(&m.response[m.first[g]], wide * wide, matrix);
     for (const Moved::Jaw &jaw : m.jaws) {
-      if (own && m.set->group[jaw.part] == g)
+      if (own && jaw.alone == kNone && m.set->group[jaw.part] == g)
         add_jaw(jaw, matrix + 6 * size_t{m.set->place[jaw.part]} * (wide + 1), wide);
       if (jaw.alone != group) continue;
       std::fill_n(matrix, 36, 0.0);
@@ -76,20 +78,24 @@ bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
   return false;
 }
 
-void ToolTouch::each_body(const World &w, uint32_t group, const VisitBody &f) const {
+void ToolTouch::each_body(const StepContext &step, uint32_t group, const VisitBody &f) const {
+  if (group < step.rigid_groups.size()) {
+    for (size_t k = step.rigid_first[group]; k < step.rigid_first[group + 1]; ++k) {
+      const auto &[set, body] = step.rigid_members[k];
+      f(*set, body, set->place[body]);
+    }
+    return;
+  }
   for (const Moved &m : sides_)
     for (const Moved::Jaw &jaw : m.jaws)
-      if (jaw.alone == group) return f(*m.set, jaw.part, 0);
-  for (const auto &set : w.rigid_sets)
-    for (uint32_t i = 0; i < set->defs.size(); ++i)
-      if (set->group[i] != DFM_RIGID_STILL && set->first_group + set->group[i] == group)
-        f(*set, i, set->place[i]);
+      if (jaw.alone == group) f(*m.set, jaw.part, 0);
 }
 
-bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, double *out) const {
+bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const {
   const Moved *const m = known(set);
-  for (size_t k = 0; m && k < 6; ++k) out[k] = m->free[6 * size_t{body} + k] + m->turn[6 * size_t{body} + k];
-  return m != nullptr;
+  if (!m || !(m->responds || alone)) return false;
+  for (size_t k = 0; k < 6; ++k) out[k] = m->free[6 * size_t{body} + k] + m->turn[6 * size_t{body} + k];
+  return true;
 }
 
 // [6] of the side's body where the unknowns of the problem are zero: what detection has used.
@@ -159,7 +165,7 @@ void ToolTouch::put(ContactRows &to, ContactState &state) const {
   }
 }
 
-void ToolTouch::take(const World &w, const StepContext &step, double left) {
+void ToolTouch::take(const StepContext &step, double left) {
   left_ = left;
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     const double *const l = &step.rows.impulse[3 * size_t{step.rows.soft() + i}];
@@ -170,7 +176,7 @@ void ToolTouch::take(const World &w, const StepContext &step, double left) {
     for (size_t i = 0; i < m.now.size(); ++i) m.now[i] = m.free[i] + m.turn[i];
   for (const ContactRows::Block &b : step.rows.blocks) {
     if (b.group == kNone) continue;
-    each_body(w, b.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
+    each_body(step, b.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
       Moved *const m = known(set);
       if (!m) return;
       for (size_t k = 0; k < 6; ++k)

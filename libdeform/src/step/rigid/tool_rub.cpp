@@ -31,7 +31,7 @@ uint64_t ToolTouch::key_of(const uint64_t pair[2], Name name) {
 }
 
 // Sets the frames of the rows and their initial impulses, and adds these to the velocities.
-void ToolTouch::take_last(const World &w) {
+void ToolTouch::take_last(const World &w, const StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(rows_.size());
   uint32_t nstate = 0;
   for (const Row &row : rows_) nstate = std::max(nstate, w.pairs.laws[row.law]->nstate);
@@ -58,28 +58,30 @@ void ToolTouch::take_last(const World &w) {
       m.reach[side->part] = std::max(m.reach[side->part], norm(side->arm));
     }
   }
-  add_rows_to_velocities();
-  drop_bad_starts();
-  passes_ = 0;
-  changed_ = HUGE_VAL;
+  add_rows_to_velocities(step);
+  drop_bad_starts(step);
   for (Row &row : rows_) follow_arc(row);
 }
 
-void ToolTouch::add_rows_to_velocities() {
+// `now` is that without soft bodies.
+void ToolTouch::add_rows_to_velocities(const StepContext &step) {
   for (Moved &m : sides_)
     for (size_t k = 0; k < m.now.size(); ++k) m.now[k] = m.free[k] + m.turn[k];
   for (const Row &row : rows_)
     for (const Side *side : {&row.a, &row.b}) {
       Moved &m = sides_[side->tool];
-      for (uint32_t body = 0; m.set && body < m.set->defs.size(); ++body)
-        add_answer(*side, side == &row.a ? row.given() : -row.given(), body, &m.now[6 * size_t{body}]);
+      const Vec3 p = side == &row.a ? row.given() : -row.given();
+      if (const RigidPlace place = place_of(*side); place.group != kNone)
+        each_body(step, place.group, [&](const RigidSet &, uint32_t body, uint32_t) {
+          add_answer(*side, p, body, &m.now[6 * size_t{body}]);
+        });
     }
 }
 
 // Impulses of rows that contradict each other may be large while what they do cancels, and an impact repeats
 // itself in no later sub-step. Where impulses make the places of connected groups faster than none would,
 // none are the start.
-void ToolTouch::drop_bad_starts() {
+void ToolTouch::drop_bad_starts(const StepContext &step) {
   std::vector<uint32_t> &first = first_group_;  // of each side, among all
   first.assign(1, 0);
   for (const Moved &m : sides_) first.push_back(first.back() + (m.set ? m.set->ngroup : 0));
@@ -109,7 +111,7 @@ void ToolTouch::drop_bad_starts() {
       row.impulse = row.along[0] = row.along[1] = 0;
       any = true;
     }
-  if (any) add_rows_to_velocities();
+  if (any) add_rows_to_velocities(step);
 }
 
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }

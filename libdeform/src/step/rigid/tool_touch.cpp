@@ -554,7 +554,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
       if (t->set == m.set && t->has_jaws()) list_jaws(m, groups);
-    straighten(m);
+    if (m.responds) straighten(m);
     m.now = m.seen = m.free;
   }
 }
@@ -609,7 +609,9 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   find(w, step);
   if (rows_.empty() && !add_hits(w, step)) return true;
   if (!follows_arcs(w, step)) return false;
-  take_last(w);
+  for (Moved &m : sides_)
+    if (!m.responds) straighten(m);  // jaws that move alone turn by what is rigid only
+  take_last(w, step);
   for (const Moved &m : sides_)
     if (m.set) m.set->velocity.assign(m.now.begin(), m.now.end());
   return true;
@@ -619,7 +621,7 @@ void ToolTouch::correct() {
   for (Moved &m : sides_) {
     if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
-    straighten(m);
+    if (m.responds || !rows_.empty()) straighten(m);
     if (m.drives) ask_again(m);
   }
   renew_rows();

@@ -65,14 +65,15 @@ class ToolTouch {
   bool fill_response(uint32_t group, double *matrix) const;
   // f(set, body, its place in the group) for the bodies of a group
   using VisitBody = std::function<void(const RigidSet &, uint32_t body, uint32_t place)>;
-  void each_body(const World &w, uint32_t group, const VisitBody &f) const;
-  // m/s, rad/s [6] of a body without contact, with what turning adds; null: nothing of its set is known here
-  bool free_velocity(const RigidSet &set, uint32_t body, double *out) const;
+  void each_body(const StepContext &step, uint32_t group, const VisitBody &f) const;
+  // m/s, rad/s [6] of a body without contact, with what turning adds. alone: of a jaw that moves alone. False:
+  // it follows its poses, with what rigid things do to its jaws, or nothing of its set is known here.
+  bool free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const;
   void put(ContactRows &to, ContactState &state) const;
   // Called after the hosts have predicted their velocities again.
   void correct();
   // Takes impulses and velocities of a solve. left: m/s along normals, that it has left.
-  void take(const World &w, const StepContext &step, double left);
+  void take(const StepContext &step, double left);
   void add_impulses() const;        // of the rows, to those of the sets
   void renew(const RigidSet &set);  // whose host has decided again about its motors (RigidSet::revised)
   bool press_harder();              // where motors hold; false: as hard as they can
@@ -194,6 +195,7 @@ class ToolTouch {
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m, uint32_t &groups) const;
   void straighten(Moved &m) const;
+  double moment_of(size_t tool, const Moved::Jaw &jaw) const;
   Vec3 bend(const Side &side, const Side &other) const;
   Vec3 bend(Vec3 spin, Vec3 arm) const;
   Vec3 bend_slope(Vec3 spin, Vec3 arm, Vec3 by) const;
@@ -240,9 +242,9 @@ class ToolTouch {
   Side side_of(const Obstacle &o, uint32_t wall) const;
   void take_sets(World &w, StepContext &step);
   // tool_rub.cpp
-  void take_last(const World &w);
-  void add_rows_to_velocities();
-  void drop_bad_starts();
+  void take_last(const World &w, const StepContext &step);
+  void add_rows_to_velocities(const StepContext &step);
+  void drop_bad_starts(const StepContext &step);
   Vec3 slip(const Row &row) const;
   void keep_next(const ContactState &state, uint32_t first);
   // tool_report.cpp
@@ -266,7 +268,7 @@ class ToolTouch {
       passing_;                   // passing: nothing keeps the two apart, and no filter excludes them
   std::vector<RigidSet *> sets_;  // that take part
   std::vector<uint32_t> walls_;   // places in World::obstacles of those in no set of these
-  std::vector<Moved> sides_;      // valid where there are rows; kept for their memory, as shapes_ are
+  std::vector<Moved> sides_;      // of this sub-step; kept for their memory, as shapes_ are
   ToolShape shapes_[2];
   std::vector<Row> rows_;
   std::vector<Hit> hits_;

@@ -39,6 +39,7 @@ uint32_t spoilt(const StepContext &step) {
 
 std::string sides(const World &w, const StepContext &step, uint32_t i) {
   if (i >= step.rows.soft() && i < step.rows.n) return step.tools->row_names(w, i - step.rows.soft());
+  if (i >= step.contacts.size() && w.bodies.empty()) return "rigid things that touch";
   if (i >= step.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
   const ContactPoint &c = step.contacts[i];
   if (c.obstacle)

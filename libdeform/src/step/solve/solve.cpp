@@ -186,7 +186,7 @@ const SolveIsland *solve_revised(World &w, StepContext &step) {
     const SolveIsland *const bad = solve_islands(w, step);
     double left = 0;
     for (SolveIsland &own : all) {
-      if (own.between_rigids && own.residual.due > 1) left = std::max(left, own.residual.normal);
+      if (own.between_rigids) left = std::max(left, own.residual.normal);
       if (!own.open) continue;
       own.all_passes += own.passes;
       own.all_sweeps += own.sweeps;
@@ -322,10 +322,6 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   // laws may have been evaluated at slips that differ from the solution
   std::swap(step.state.vt, step.state.slip);
   find_owed(w, step);
-  if (step.residual.due > 1) {
-    *trouble |= DFM_TROUBLE_UNCONVERGED;
-    ++w.stats.unconverged;
-  }
   w.stats.passes = step.passes;
   w.stats.sweeps = step.sweeps;
   w.stats.residual = step.residual.speed;

@@ -59,13 +59,10 @@ void begin_newton(StepContext &step, SolveIsland &own) {
   own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
 }
 
-// least: m/s, of tangents at rest. normal: of normals.
+// After sweeps. least: m/s, of tangents at rest. normal: of normals.
 void solve_rigid(StepContext &step, SolveIsland &own, double least, double normal) {
-  if (own.bad || own.residual.speed <= kRigidRest * least) {
-    own.residual.due = std::min(own.residual.due, 1.0);
-    return;
-  }
   const double swept = own.residual.speed;
+  if (own.bad || swept <= kRigidRest * least) return;
   own.swept.resize(3 * size_t{own.part.all()});
   take_impulses(step.rows, own.part, own.swept.data());
   begin_newton(step, own);
@@ -121,8 +118,11 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                                : memory               ? kRememberedRest * least
                                                       : normal,
                                normal};
-  set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
-                step.disturbance.data(), own.tolerance);
+  const auto allow = [&] {
+    set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
+                  step.disturbance.data(), own.tolerance);
+  };
+  allow();
   if (own.all_rigid) tighten(step.rows, own);
   ask_slip_back(w, step, own);
   if (step.capture) own.problem = take_problem(w, step, own);
@@ -132,7 +132,12 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                                          step.h, own.residual);
     own.sweeps = own.sweeping.count();
     if (done) return;
-    if (own.all_rigid) return solve_rigid(step, own, least, normal);
+    if (own.all_rigid) {
+      solve_rigid(step, own, least, normal);
+      allow();
+      if (!own.bad) own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+      return;
+    }
     begin_newton(step, own);
   }
   own.failed = !own.newton->solve(motion_tolerance(own), normal);
@@ -195,7 +200,7 @@ void SolveIslands::join(const ContactRows &rows, std::span<ImplicitSystem *const
   count_ = joined_.count;
 }
 
-// Rigid bodies count as bodies where rows between rigid things are solved with soft ones, else as obstacles.
+// Rigid bodies count as bodies in islands with rows between rigid things, else as obstacles.
 void SolveIslands::set_sides(const StepContext &step, uint32_t bodies, size_t of_contacts) {
   const ContactRows &rows = step.rows;
   sides_.assign(2 * size_t{rows.n}, kNone);
