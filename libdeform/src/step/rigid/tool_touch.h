@@ -66,8 +66,8 @@ class ToolTouch {
   // f(set, body, its place in the group) for the bodies of a group
   using VisitBody = std::function<void(const RigidSet &, uint32_t body, uint32_t place)>;
   void each_body(const StepContext &step, uint32_t group, const VisitBody &f) const;
-  // m/s, rad/s [6] of a body without contact, with what turning adds. alone: of a jaw that moves alone. False:
-  // it follows its poses, with what rigid things do to its jaws, or nothing of its set is known here.
+  // m/s, rad/s [6] of a body without contact, with what turning adds. alone: of a jaw that moves alone.
+  // False: it follows its poses, with what rigid things do to its jaws, or nothing of its set is known here.
   bool free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const;
   void put(ContactRows &to, ContactState &state) const;
   // Called after the hosts have predicted their velocities again.
