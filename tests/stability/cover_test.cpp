@@ -39,8 +39,7 @@ TEST(CoverRefused, BeyondTheProduct_NamesTheModelAndTheAlternative) {
     test::says(parts);
   };
   for (const std::string &model : levels()[kModel]) {
-    const bool steps_itself =
-        model == "modal" || model == "condensed" || model == "boundary" || model == "shape_matching";
+    const bool steps_itself = model == "modal" || model == "condensed" || model == "shape_matching";
     test::Context context;
     const dfm_world w = test::make_world(context);
     test::BodyOptions o;
