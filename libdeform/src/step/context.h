@@ -31,6 +31,11 @@ class SolveIslands;
 class ToolTouch;
 struct Capture;
 
+struct RigidMember {
+  RigidSet *set;
+  uint32_t body;
+};
+
 struct StageTime {
   double seconds = 0;
   uint64_t calls = 0;
@@ -50,12 +55,8 @@ struct StepContext {
   struct { uint64_t tables = 0, plans = 0; } made;
   std::vector<BodyView> body_views;
   std::vector<ObstacleView> obstacle_views;
-  std::vector<RigidPlace> rigid_places;  // by obstacle slot; empty without rigid bodies
-  std::vector<uint32_t> rigid_groups;    // bodies per group, all sets
-  struct RigidMember {
-    RigidSet *set;
-    uint32_t body;
-  };
+  std::vector<RigidPlace> rigid_places;    // by obstacle slot; empty without rigid bodies
+  std::vector<uint32_t> rigid_groups;      // bodies per group, all sets
   std::vector<RigidMember> rigid_members;  // of one group after another
   std::vector<size_t> rigid_first;         // [groups + 1] into them
   std::vector<DofSource> sources;

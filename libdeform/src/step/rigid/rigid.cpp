@@ -133,14 +133,15 @@ void start_rigids(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group == kNone) continue;
     const bool alone = block.group >= step.rigid_groups.size();
-    step.tools->each_body(step, block.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
-      double now[6];
+    double *to = &step.rows.y[4 * size_t{block.first}];
+    for (const auto &[set, body] : step.tools->members(step, block.group)) {
       const size_t at = 6 * size_t{body};
-      if (!step.tools->free_velocity(set, body, alone, now)) std::copy_n(&set.velocity[at], 6, now);
-      double *const to = &step.rows.y[4 * size_t{block.first + 2 * place}];
-      store3(to, load3(now) - load3(&set.first[at]));
-      store3(to + 4, load3(now + 3) - load3(&set.first[at + 3]));
-    });
+      double now[6];
+      if (!step.tools->free_velocity(*set, body, alone, now)) std::copy_n(&set->velocity[at], 6, now);
+      store3(to, load3(now) - load3(&set->first[at]));
+      store3(to + 4, load3(now + 3) - load3(&set->first[at + 3]));
+      to += 8;
+    }
   }
 }
 

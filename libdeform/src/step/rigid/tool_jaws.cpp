@@ -3,6 +3,7 @@
 
 #include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
+#include "step/context.h"
 #include "step/rigid/tool_touch.h"
 
 namespace dfm {
@@ -15,14 +16,18 @@ void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 }  // namespace
 
 // The hinge is the origin of part 0, about its y.
-void ToolTouch::list_jaws(Moved &m, uint32_t &groups) const {
+void ToolTouch::list_jaws(Moved &m, uint32_t groups) {
   const dfm_rigid_state &frame = m.set->state[0];
   const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
   for (uint32_t i = 1; i < m.set->defs.size(); ++i) {
     const Vec3 arm = load3(m.set->state[i].position) - load3(frame.position);
     const double length = 2 * m.set->defs[i].half_size[2];
-    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length),
-                      responds({size_t(&m - sides_.data()), i, {}, {}}) ? kNone : groups++});
+    uint32_t alone = kNone;
+    if (!responds({size_t(&m - sides_.data()), i, {}, {}})) {
+      alone = groups + static_cast<uint32_t>(alone_.size());
+      alone_.push_back({m.set, i});
+    }
+    m.jaws.push_back({i, axis, cross(axis, arm), 1 / (h_ * h_ * kJaw * length * length), alone});
   }
 }
 

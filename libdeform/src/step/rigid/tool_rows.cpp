@@ -39,9 +39,7 @@ std::span<const RigidSides> ToolTouch::sides(const StepContext &step) {
   changed_ = HUGE_VAL;
   places_.clear();
   group_size_.assign(step.rigid_groups.begin(), step.rigid_groups.end());
-  for (const Moved &m : sides_)
-    for (const Moved::Jaw &jaw : m.jaws)
-      if (jaw.alone != kNone) group_size_.push_back(1);
+  group_size_.insert(group_size_.end(), alone_.size(), 1);
   for (const Row &row : rows_)
     places_.push_back(
         {place_of(row.a), place_of(row.b), center(row.a) + row.a.arm, row.normal, row.tangent[0]});
@@ -78,17 +76,10 @@ bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
   return false;
 }
 
-void ToolTouch::each_body(const StepContext &step, uint32_t group, const VisitBody &f) const {
-  if (group < step.rigid_groups.size()) {
-    for (size_t k = step.rigid_first[group]; k < step.rigid_first[group + 1]; ++k) {
-      const auto &[set, body] = step.rigid_members[k];
-      f(*set, body, set->place[body]);
-    }
-    return;
-  }
-  for (const Moved &m : sides_)
-    for (const Moved::Jaw &jaw : m.jaws)
-      if (jaw.alone == group) f(*m.set, jaw.part, 0);
+std::span<const RigidMember> ToolTouch::members(const StepContext &step, uint32_t group) const {
+  const size_t groups = step.rigid_groups.size();
+  if (group >= groups) return {&alone_[group - groups], 1};
+  return {step.rigid_members.data() + step.rigid_first[group], step.rigid_groups[group]};
 }
 
 bool ToolTouch::free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const {
@@ -176,13 +167,13 @@ void ToolTouch::take(const StepContext &step, double left) {
     for (size_t i = 0; i < m.now.size(); ++i) m.now[i] = m.free[i] + m.turn[i];
   for (const ContactRows::Block &b : step.rows.blocks) {
     if (b.group == kNone) continue;
-    each_body(step, b.group, [&](const RigidSet &set, uint32_t body, uint32_t place) {
-      Moved *const m = known(set);
-      if (!m) return;
-      for (size_t k = 0; k < 6; ++k)
-        m->now[6 * size_t{body} + k] =
-            set.first[6 * size_t{body} + k] + step.rows.y[4 * size_t{b.first + 2 * place + k / 3} + k % 3];
-    });
+    uint32_t place = 0;
+    for (const auto &[set, body] : members(step, b.group)) {
+      Moved *const m = known(*set);
+      const double *const y = &step.rows.y[4 * size_t{b.first + 2 * place++}];
+      for (size_t k = 0; m && k < 6; ++k)
+        m->now[6 * size_t{body} + k] = set->first[6 * size_t{body} + k] + y[k < 3 ? k : k + 1];
+    }
   }
 }
 

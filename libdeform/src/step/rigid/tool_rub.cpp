@@ -72,9 +72,8 @@ void ToolTouch::add_rows_to_velocities(const StepContext &step) {
       Moved &m = sides_[side->tool];
       const Vec3 p = side == &row.a ? row.given() : -row.given();
       if (const RigidPlace place = place_of(*side); place.group != kNone)
-        each_body(step, place.group, [&](const RigidSet &, uint32_t body, uint32_t) {
-          add_answer(*side, p, body, &m.now[6 * size_t{body}]);
-        });
+        for (const RigidMember &member : members(step, place.group))
+          add_answer(*side, p, member.body, &m.now[6 * size_t{member.body}]);
     }
 }
 

@@ -512,7 +512,7 @@ bool ToolTouch::follow(World &w, StepContext &step) {
 // Takes velocities and responses of the sets that take part, and the motion of everything else.
 void ToolTouch::take_sets(World &w, StepContext &step) {
   sides_.resize(sets_.size() + !walls_.empty());
-  auto groups = static_cast<uint32_t>(step.rigid_groups.size());
+  alone_.clear();
   for (size_t k = 0; k < sides_.size(); ++k) {
     Moved &m = sides_[k];
     m.set = k < sets_.size() ? sets_[k] : nullptr;
@@ -553,7 +553,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     }
     m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
-      if (t->set == m.set && t->has_jaws()) list_jaws(m, groups);
+      if (t->set == m.set && t->has_jaws()) list_jaws(m, static_cast<uint32_t>(step.rigid_groups.size()));
     if (m.responds) straighten(m);
     m.now = m.seen = m.free;
   }

@@ -28,6 +28,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -43,6 +44,7 @@
 namespace dfm {
 
 struct Obstacle;
+struct RigidMember;
 struct RigidSet;
 struct SceneFacts;
 struct StepContext;
@@ -63,9 +65,8 @@ class ToolTouch {
   std::span<const uint32_t> group_sizes() const { return group_size_; }
   // [6 bodies,6 bodies] 1/kg, of a world-wide group; false: it is unknown here
   bool fill_response(uint32_t group, double *matrix) const;
-  // f(set, body, its place in the group) for the bodies of a group
-  using VisitBody = std::function<void(const RigidSet &, uint32_t body, uint32_t place)>;
-  void each_body(const StepContext &step, uint32_t group, const VisitBody &f) const;
+  // The bodies of a group, by their places in it.
+  std::span<const RigidMember> members(const StepContext &step, uint32_t group) const;
   // m/s, rad/s [6] of a body without contact, with what turning adds. alone: of a jaw that moves alone.
   // False: it follows its poses, with what rigid things do to its jaws, or nothing of its set is known here.
   bool free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const;
@@ -193,7 +194,7 @@ class ToolTouch {
   double fastest(const ToolShape &shape, const Side &side, const ToolShape &other);
   bool outruns_rows();
   Vec3 center(const Side &side) const;
-  void list_jaws(Moved &m, uint32_t &groups) const;
+  void list_jaws(Moved &m, uint32_t groups);
   void straighten(Moved &m) const;
   double moment_of(size_t tool, const Moved::Jaw &jaw) const;
   Vec3 bend(const Side &side, const Side &other) const;
@@ -272,6 +273,7 @@ class ToolTouch {
   ToolShape shapes_[2];
   std::vector<Row> rows_;
   std::vector<Hit> hits_;
+  std::vector<RigidMember> alone_;  // jaws that move alone, by group behind those of the hosts
   std::vector<RigidSides> places_;
   std::vector<uint32_t> group_size_;      // bodies by world-wide group; behind them one for each jaw alone
   uint32_t passes_ = 0, hits_found_ = 0;  // since motors were decided; of this sub-step
