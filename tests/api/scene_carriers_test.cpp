@@ -457,9 +457,9 @@ TEST(SceneFill, Outputs_AreOfTheFilesSurface) {
 
 TEST(SceneFill, Mistakes_AreReported) {
   expect_refused("/bodies/0/fill={\"cells\": 5}", {"/bodies/0/fill", "holds tetrahedra already"});
-  expect_refused({kBox, "/bodies/0/fill={\"cells\": 0}"}, {"/bodies/0/fill/cells", "from 1"});
+  expect_refused({kBox, "/bodies/0/fill={\"cells\": -1}"}, {"/bodies/0/fill/cells", "from 0"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 100000001}"},
-                 {"/bodies/0/fill/cells", "from 1 to 100000000, found 100000001"});
+                 {"/bodies/0/fill/cells", "from 0 to 100000000, found 100000001"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": null}"}, {"/bodies/0/fill/cells", "found null"});
   expect_refused({kBox, "/bodies/0/fill={\"cells\": 10.5}"}, {"/bodies/0/fill/cells", "whole number"});
   expect_refused({kBox, "/bodies/0/fill={\"cell\": 10}"}, {"/bodies/0/fill/cell", "did you mean \"cells\"?"});
