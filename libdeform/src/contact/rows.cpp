@@ -458,7 +458,6 @@ double ContactRows::load_without_opening(uint32_t i) const {
 }
 
 void ContactRows::turn_frames() {
-  if (ndof > 0 && std::find(block.begin(), block.end(), kNone) == block.end()) return;  // no part is alone
   constexpr size_t kMore = 4;  // doubles that a whole vector at the last contact may see
   frame.resize(size_t(all()) * 9 + kMore);
   drive.resize(size_t(all()) * 3 + kMore);
