@@ -31,9 +31,8 @@ set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${deform_plugin_h
 
 add_library(deform_flags INTERFACE)
 target_compile_options(deform_flags INTERFACE -ffp-contract=off -Wall -Wextra -Wno-unused-parameter)
-if(NOT DEFORM_UNITY)   # there a local name may be another file's own
-  target_compile_options(deform_flags INTERFACE -Wshadow)
-endif()
+# Where files are compiled together, a local name may be another file's own.
+target_compile_options(deform_flags INTERFACE $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow>)
 if(DEFORM_WERROR)
   target_compile_options(deform_flags INTERFACE -Werror)
 elseif(NOT PROJECT_IS_TOP_LEVEL)
@@ -112,13 +111,13 @@ endfunction()
 
 # DEFORM_UNITY compiles files of a folder together, for a third of the work: what costs is headers and
 # templates, the same ones in each file. All presets but dev and clang use it, release for all but the tests.
-# cmake/unity_groups.py keeps apart what collides, anew when a file changes. CI's release build and dev
-# compile each file by itself, so that a missing #include is an error there.
+# cmake/unity_groups.py keeps apart what collides, anew when a file changes. CI's release build compiles each
+# file but the tests by itself, and dev all, so that a missing #include is an error there.
 if(DEFORM_UNITY)
   include(DeformPython)
 endif()
 function(deform_unity target)
-  if(NOT DEFORM_UNITY)
+  if(NOT DEFORM_UNITY OR DEFORM_UNITY STREQUAL "TESTS")
     return()
   endif()
   get_target_property(sources ${target} SOURCES)

@@ -74,34 +74,6 @@ void list_crossings(World &w, StepContext &step) {
 
 namespace {
 
-// Whether all bodies of the contact keep the velocity of the solve. Bodies that step themselves may damp it
-// within a sub-step; of implicit ones, what an impulse adds is no velocity.
-bool keeps_velocity(const StepContext &step, uint32_t i) {
-  const ContactRows &rows = step.rows;
-  for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
-    const uint32_t d = rows.dof[j], block = rows.block[d];
-    if (block == kNone ? step.systems[rows.source[d]] != nullptr : rows.blocks[block].group == kNone)
-      return false;
-  }
-  return true;
-}
-
-// The impulse that the next sub-step starts from. A solve leaves a velocity within its tolerance. The solve
-// that stops this velocity adds an impulse for it to that of the force, once. If the next sub-step started
-// from the sum, it would give the same velocity with the opposite sign, and so on: a body at rest would
-// oscillate at the tolerance for ever. So a contact that sticks at rest takes over half of a change, and the
-// extra impulse decays (doc/decisions/contact_solver.md).
-Vec3 next_start(const World &w, const StepContext &step, uint32_t i) {
-  Vec3 l = load3(&step.rows.impulse[size_t(3) * i]);
-  l.x = step.rows.load_without_opening(i);
-  const uint32_t m = step.match[i];
-  if (step.tolerance.tangent.empty() || m == kNone) return l;
-  if (step.tolerance.tangent[i] > tangent_at_rest(w, step.h) || !(l.x > 0) || step.state.mode[i] != 1)
-    return l;
-  const Vec3 before = (step.h / w.store.h) * load3(&w.store.impulse[size_t(3) * m]);
-  return before.x > 0 && keeps_velocity(step, i) ? 0.5 * (before + l) : l;
-}
-
 // Stores contact i for the next sub-step and for the report.
 void keep_contact(World &w, StepContext &step, uint32_t i) {
   const uint32_t S = step.state.nstate;
@@ -121,7 +93,7 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   to.law[i] = step.state.law[i];
   store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
   store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
-  store3(&to.impulse[size_t(3) * i], next_start(w, step, i));
+  store3(&to.impulse[size_t(3) * i], {step.rows.load_without_opening(i), l[1], l[2]});
   // the law of this contact has `own` values of state; the other columns belong to laws with more
   const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
   for (uint32_t s = 0; s < S; ++s)

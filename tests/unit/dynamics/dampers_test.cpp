@@ -76,6 +76,7 @@ double period(const Peaks &p) { return p[2].first - p[0].first; }
 
 constexpr const char *kModels[] = {"msm", "corotational_fem", "linear_fem", "meshless"};
 
+// unsanitized: 36 s there; the tests below have the same accesses
 // Damping and period of the first stretch within 2 %, in sub-steps that are at least four times as long: with
 // a lag those that stiffness allows; without, as short as damping asks for.
 TEST(Dampers, WithALag_TheFirstModeIsDampedAsByRayleigh) {

@@ -10,15 +10,10 @@
 //
 // Where more contacts carry load than points can move, not every set of velocities can be asked for. The
 // slips of all contacts since the same instant can be taken back: the points go where they were. But contacts
-// begin and end, and what those that stay owe then belongs to no motion of the points. So a(e) / T is smaller
-// than r, the tolerance of the sub-step: the state without slip, which solves the contacts without e, is good
-// enough in any case, and contradictions change impulses by no more than the tolerance does. With E, the
-// motion common to all contacts of two sides, a way and a turn in the plane of the contacts,
-//
-//     a(e) / T = kShare E / T, at most r / 2,   and   kShare (e - E) / T, at most r / 5.
-//
-// Bodies can follow E whatever the number of contacts, and nothing elastic opposes it. What begins to stick
-// owes E (doc/decisions/contact_solver.md).
+// begin and end, and what those that stay owe then belongs to no motion of the points. So a(e) / T is kShare
+// e / T and at most r / 2, r the tolerance of the sub-step: the state without slip, which solves the contacts
+// without e, is good enough in any case, and contradictions change impulses by no more than the tolerance
+// does.
 #include "step/solve/stuck_slip.h"
 
 #include <algorithm>
@@ -35,7 +30,7 @@ namespace {
 
 // All at once would be a velocity as large as the error, which the next solve stops again.
 constexpr double kShare = 0.4;
-constexpr double kMostCommon = 0.5, kMostOwn = 0.2;  // of the tolerance
+constexpr double kMost = 0.5;  // of the tolerance
 
 bool is_projection(const LawInstance &law) { return law.ops->flags & DFM_FRIC_SET_VALUED; }
 
@@ -46,62 +41,10 @@ bool holds_places(const World &w) {
                      [](const LawInstance *law) { return is_projection(*law); });
 }
 
-// f(first, end): rows of the same two sides, which are neighbors.
-template <class F>
-void each_pair(const StepContext &step, const RowsPart &part, F &&f) {
-  for (const RowRun &run : part.contacts)
-    for (uint32_t i = run.first, end = std::min(run.first + run.n, step.rows.soft()); i < end;) {
-      const uint32_t first = i;
-      const ContactPoint &c = step.contacts[first];
-      const auto belongs = [&](const ContactPoint &o) {
-        return o.slot_a == c.slot_a && o.slot_b == c.slot_b && o.obstacle == c.obstacle;
-      };
-      while (++i < end && belongs(step.contacts[i])) {}
-      f(first, i);
-    }
-}
-
 // In integers: most contacts of a sliding body owe nothing, and each is asked several times.
 bool any(const double *e) {
   const auto bits = [e](int k) { return std::bit_cast<uint64_t>(e[k]); };
   return (bits(0) | bits(1) | bits(2)) << 1 != 0;
-}
-
-// The motion in the plane of the contacts that comes nearest to what they owe.
-struct Common {
-  uint32_t n = 0;  // contacts that owe
-  Vec3 center, axis, way;
-  double turn = 0;
-  Vec3 at(Vec3 x) const { return way + turn * cross(axis, x - center); }
-};
-
-// owed: [contacts,3]
-Common common_motion(const StepContext &step, const double *owed, uint32_t first, uint32_t end) {
-  uint32_t n = 0;
-  Vec3 center, axis, way;
-  const auto each = [&](auto &&f) {
-    for (uint32_t i = first; i < end; ++i)
-      if (const double *const e = owed + 3 * size_t{i}; any(e)) f(i, load3(step.contacts[i].point), load3(e));
-  };
-  each([&](uint32_t i, Vec3 x, Vec3 e) {
-    ++n;
-    center += x;
-    axis += load3(&step.rows.frame[size_t{9} * i]);
-    way += e;
-  });
-  if (n == 0) return {};
-  const double size = norm(axis);
-  center = (1.0 / n) * center;
-  way = (1.0 / n) * way;
-  if (!(size > 0)) return {n, center, axis, way, 0};
-  axis = (1 / size) * axis;
-  double along = 0, all = 0;
-  each([&](uint32_t, Vec3 x, Vec3 e) {
-    const Vec3 r = cross(axis, x - center);
-    along += dot(r, e);
-    all += dot(r, r);
-  });
-  return {n, center, axis, way, all > 0 ? along / all : 0};
 }
 
 Vec3 at_most(double most, Vec3 v) {
@@ -134,28 +77,13 @@ void ask_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   own.owes = owes;
   if (!owes) return;
   const double rate = kShare / step.guard.planned;
-  each_pair(step, own.part, [&](uint32_t first, uint32_t end) {
-    const Common common = common_motion(step, owed, first, end);
-    if (common.n == 0) {
-      std::fill(asked + 2 * size_t{first}, asked + 2 * size_t{end}, 0.0);
-      return;
-    }
-    for (uint32_t i = first; i < end; ++i) {
-      double *const e = owed + 3 * size_t{i};
-      const double r = own.tolerance.tangent[i];
-      const Vec3 with = common.at(load3(step.contacts[i].point));
-      if (!any(e)) {
-        store3(e, with);
-        asked[2 * size_t{i}] = asked[2 * size_t{i} + 1] = 0;
-        continue;
-      }
-      const Vec3 back =
-          at_most(kMostCommon * r, rate * with) + at_most(kMostOwn * r, rate * (load3(e) - with));
-      for (size_t k = 0; k < 2; ++k) {
-        const double along = dot(load3(&step.rows.frame[size_t{9} * i + 3 + 3 * k]), back);
-        asked[2 * size_t{i} + k] = along;
-        step.rows.drive[3 * size_t{i} + 1 + k] -= along;
-      }
+  each_row(own.part.contacts, [&](uint32_t i) {
+    if (i >= step.rows.soft()) return;
+    const Vec3 back = at_most(kMost * own.tolerance.tangent[i], rate * load3(owed + 3 * size_t{i}));
+    for (size_t k = 0; k < 2; ++k) {
+      const double along = dot(load3(&step.rows.frame[size_t{9} * i + 3 + 3 * k]), back);
+      asked[2 * size_t{i} + k] = along;
+      step.rows.drive[3 * size_t{i} + 1 + k] -= along;
     }
   });
 }
