@@ -72,7 +72,8 @@ build/%/build.ninja: | setup
 # With a display the window is built too, for `deform view`.
 demo: setup build/release/build.ninja
 	$(BUILD) release --target deform_command $(if $(DISPLAY)$(WAYLAND_DISPLAY),deform_viewer)
-	@$(PYTHON) cmake/demo.py build/release/bin/deform out/demo
+	@$(PYTHON) -B bindings/python/deform/demo.py build/release/bin/deform \
+	  examples/scenes/two_cylinders.json out/demo
 
 view: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer

@@ -48,6 +48,12 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/libdeform/include/deform DESTINATION ${C
 install(FILES ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
   ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform
   COMPONENT command)
+# For `python -m deform demo`.
+install(FILES ${PROJECT_SOURCE_DIR}/examples/scenes/two_cylinders.json
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/deform/scenes COMPONENT command)
+install(FILES ${PROJECT_SOURCE_DIR}/examples/data/cylinder_thick.msh
+  ${PROJECT_SOURCE_DIR}/examples/data/cylinder_slim.msh
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/deform/data COMPONENT command)
 # Plugins to copy and edit, as source.
 file(GLOB deform_templates ${PROJECT_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform COMPONENT dev)

@@ -34,7 +34,7 @@ PACKAGE = ROOT / "bindings" / "python" / "deform"
 
 
 def _project():
-    """The table [project] of pyproject.toml, as far as the metadata of a wheel goes (Python 3.10 has no
+    """The table [project] of pyproject.toml, as far as the metadata of a wheel goes (Python 3.9 has no
     reader)."""
     text = (ROOT / "pyproject.toml").read_text()
     project = dict(re.findall(r'^([\w-]+) = "([^"]*)"$', text.split("[project]")[1].split("\n[")[0], re.M))
@@ -104,10 +104,9 @@ def _run(*command):
 def configure(build, settings):
     """What the wheel is built from, where nothing is built already."""
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
-    _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_TESTS=OFF",
-         "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_VIEW=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_BULLET=OFF",
-         "-DDEFORM_ASSIMP=OFF",
-         "-DCMAKE_INSTALL_LIBDIR=lib",
+    without = [f"-DDEFORM_{part}=OFF" for part in ("TESTS", "EXAMPLES", "VIEW", "ODE", "BULLET", "ASSIMP")]
+    _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_UNITY=ON",
+         *without, "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON", "-DCMAKE_INSTALL_LIBDIR=lib",
          *shlex.split(settings.get("cmake", "")))
 
 
