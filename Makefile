@@ -36,7 +36,7 @@ help:
 	@echo "make asan, make tsan  the suite under the sanitizers; tsan: what runs on several threads"
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
-	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
+	@echo "make wheel            the Python package for CPython 3.9 up, manylinux: build/dist/"
 	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
 	@echo "make ports            the command for Linux on arm64 and for Windows, tested by qemu and Wine"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
@@ -140,10 +140,9 @@ install: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools
 	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
 
-wheel: setup build/release/build.ninja
-	$(BUILD) release --target deform_tools deform_python_native
-	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; print( \
-	  b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': '$(CURDIR)/build/release'}))"
+wheel: setup
+	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; \
+	  print(b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': 'no'}))"
 
 wasm: setup-wasm build/wasm/build.ninja
 	$(BUILD) wasm --target deform_page

@@ -4,7 +4,7 @@ from a registry, so that `pip install .` works wherever the library builds.
 
 The wheel is for any Python 3 (py3-none-PLATFORM): nothing in it is compiled against an interpreter. Its
 platform is manylinux_2_N where all that it needs from the system is what every Linux of that name has
-(PEP 600): a wheel built without ODE and Bullet, as prebuilt=no builds it. libpng travels in it.
+(PEP 600): a wheel built without ODE, Bullet and HDF5, as prebuilt=no builds it. libpng travels in it.
 
 Settings (pip: --config-settings NAME=VALUE):
   prebuilt  a build folder of this tree whose target deform_tools is built; nothing is compiled then.
@@ -75,6 +75,15 @@ def _oldest(version):
     return None
 
 
+def asked_of_system(path):
+    """(libraries that not every system has, versions of symbols that it asks the others for)"""
+    said = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True, check=True).stdout
+    of = re.findall(r"^  required from (\S+):\n((?:    0x.*\n)+)", said, re.M)
+    return (set(re.findall(r"^ *NEEDED +(\S+)$", said, re.M)) - EVERYWHERE,
+            {line.split()[-1] for library, lines in of if library in EVERYWHERE
+             for line in lines.splitlines()})
+
+
 def _tag(files=()):
     """The wheel's tag by what its files ask the system for."""
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
@@ -83,13 +92,9 @@ def _tag(files=()):
     programs.pop(SERVER, None)
     own, first = {pathlib.PurePath(inside).name for inside in programs}, 28
     for path in programs.values():
-        asked = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True,
-                               check=True).stdout
-        needed = set(re.findall(r"^ *NEEDED +(\S+)$", asked, re.M)) - own - EVERYWHERE
-        of = re.findall(r"^  required from (\S+):\n((?:    0x.*\n)+)", asked, re.M)
-        versions = {_oldest(line.split()[-1]) for library, lines in of if library in EVERYWHERE
-                    for line in lines.splitlines()}
-        if needed or None in versions:
+        needed, symbols = asked_of_system(path)
+        versions = {_oldest(version) for version in symbols}
+        if needed - own or None in versions:
             return f"py3-none-{platform}"
         first = max({first, *versions})
     return f"py3-none-manylinux_2_{first}_{machine}" if programs and machine != platform else (

@@ -1,5 +1,5 @@
 // Waits until ready() holds, in which the lock is held. std::condition_variable::wait() would ask for the
-// newest symbol of gcc 12's library, which systems of 2021 lack (tests/abi/oldest_system.py).
+// newest symbol of gcc 12's library, which systems of 2021 lack (tests/python/test_wheel.py).
 #pragma once
 #include <chrono>
 #include <condition_variable>
