@@ -17,7 +17,7 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
 .PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view tools bench-contact bench-peers deb docs wheel wasm ports ports-built
+.PHONY: view tools bench-contact bench-peers deb docs wheel wasm ports ports-built abi-report
 .PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers setup-wasm setup-ports
 
 help:
@@ -40,6 +40,7 @@ help:
 	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
 	@echo "make ports            the command for Linux on arm64 and for Windows, tested by qemu and Wine"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
+	@echo "make abi-report       build/abi/report.txt: what changed in the public headers, for release notes"
 	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
 	@echo "JOBS=N                with any of them: compilers or tests at a time (default: one per processor)"
@@ -164,6 +165,14 @@ deb: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools deform_python_native
 	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
 	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
+
+# For release notes: what changed in the public headers, additions too, since a revision (SINCE=v0.1.0).
+SINCE ?= $(shell git describe --tags --abbrev=0 2>/dev/null || \
+  git log --diff-filter=A --format=%h -- tests/abi/baseline/public.txt | tail -n 1)
+abi-report: setup
+	@mkdir -p build/abi && git show $(SINCE):tests/abi/baseline/public.txt >build/abi/since.txt
+	@$(PYTHON) -B tests/abi/baseline.py cc libdeform/include/deform build/abi/since.txt build/abi --report \
+	  >build/abi/report.txt && echo "build/abi/report.txt: $$(wc -l <build/abi/report.txt) lines since $(SINCE)"
 
 docs: setup-docs
 	@$(PYTHON) -B cmake/docs/make_site.py

@@ -57,12 +57,12 @@ def answers(program, folder, files):
     return "\n".join(out) + "\n"
 
 
-def printed(programs, deform):
+def printed(programs, deform, scratch):
     """What programs print that have the structs and sizes of then."""
     library = pathlib.Path(deform).resolve().parent.parent / "lib"
     env = {**{k: v for k, v in os.environ.items() if not k.startswith("DEFORM_")},
            "LD_LIBRARY_PATH": str(library)}
-    return "".join(f"== {path.name}\n{run(path, env=env)}" for path in programs)
+    return "".join(f"== {path.name}\n{run(path, env=env, cwd=scratch)}" for path in programs)
 
 
 def scenes(deform, folder, scratch):
@@ -104,7 +104,7 @@ def main():
     for path in files:
         print(run(deform, "plugin", "check", path, "--quiet", "--limit", "100"))
     found = {"answers.csv": answers(program, folder, files), "scenes.csv": scenes(deform, folder, scratch),
-             "programs.txt": printed(programs, deform)}
+             "programs.txt": printed(programs, deform, scratch)}
     if sys.argv[-1] == "--write":
         for name, text in found.items():
             (folder / name).write_text(text)

@@ -159,7 +159,8 @@ class Wheel(unittest.TestCase):
             build = pathlib.Path(name) / "build"
             wheel_backend.configure(build, {"cmake": "-DDEFORM_RENDER=OFF"})
             cache = (build / "CMakeCache.txt").read_text()
-            for entry in ("DEFORM_RENDER:BOOL=OFF", "CMAKE_DISABLE_FIND_PACKAGE_HDF5:PATH=ON", "DEFORM_TESTS:BOOL=OFF", "DEFORM_ODE:STRING=OFF",
+            for entry in ("DEFORM_RENDER:BOOL=OFF", "CMAKE_DISABLE_FIND_PACKAGE_HDF5:PATH=ON",
+                          "DEFORM_TESTS:BOOL=OFF", "DEFORM_ODE:STRING=OFF",
                           "DEFORM_BULLET:STRING=OFF", "CMAKE_INSTALL_LIBDIR:PATH=lib"):
                 self.assertIn(entry, cache.replace(":UNINITIALIZED=", ":PATH="))
             targets = subprocess.run(["cmake", "--build", build, "--target", "help"], check=True,
