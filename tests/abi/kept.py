@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Plugins that were built once, when ABI 1 was frozen, and programs of the C API, built when it was promised,
-against today's library (tests/abi/kept/README.md). A program must print what it did. Each plugin must keep the rules of the validator, answer its host (kept.cpp) to the bit what it answered then, also
-where the host's structs have grown since, and do in a scene what it did.
+against today's library (tests/abi/kept/README.md). A program must print what it did. Each plugin must keep
+the rules of the validator, answer its host (kept.cpp) to the bit what it answered then, also where the
+host's structs have grown since, and do in a scene what it did.
 
 kept.py KEPT_PROGRAM DEFORM FOLDER SCRATCH           compares
 kept.py KEPT_PROGRAM DEFORM FOLDER SCRATCH --write   writes answers.csv, scenes.csv and programs.txt again

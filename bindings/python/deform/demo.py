@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""`make demo`, `python -m deform demo [OUT_DIR]`: the two cylinders with friction and without, as a table, one
+"""`make demo`, `python -m deform demo [OUT_DIR]`: two cylinders with friction and without, as a table, one
 picture with two rows, and summary.json.
 
 demo.py DEFORM_COMMAND SCENE OUT_DIR
