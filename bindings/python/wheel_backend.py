@@ -126,7 +126,7 @@ def release_build():
 
 
 def _installed(prefix, settings):
-    """What the tree installs, beneath prefix."""
+    """What the tree installs, beneath prefix; from which build folder."""
     if not shutil.which("cmake"):
         raise SystemExit("deform: there is no cmake; building the library needs CMake 3.22, Ninja or make, a "
                          "C++20 compiler and some headers: `cmake/setup.sh doors` installs them on Debian")
@@ -146,6 +146,7 @@ def _installed(prefix, settings):
              "--parallel", os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or len(os.sched_getaffinity(0)))
     _run("cmake", "--install", build, "--strip", "--prefix", prefix)
     _run("cmake", "--install", build, "--strip", "--prefix", prefix, "--component", "python")
+    return build
 
 
 def native_files(prefix):
@@ -202,13 +203,25 @@ class _Wheel:
         self.zip.close()
 
 
+def _contents(build, version, files):
+    """{name in .dist-info: text}: what is inside of the programs, and its licenses; none where the system has
+    no dpkg."""
+    if not build or not shutil.which("dpkg-query") or not (build / "build.ninja").exists():
+        return {}
+    with tempfile.TemporaryDirectory() as out:
+        _run("python3", "-B", ROOT / "cmake" / "packaging" / "sbom.py", build, out, version,
+             *(path for inside, path in files if inside.startswith(("bin/", "lib/"))))
+        return {f"{place}/{name}": (pathlib.Path(out) / name).read_text()
+                for place, name in (("sboms", "deform.spdx.json"), ("licenses", "third_party.txt"))}
+
+
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     settings = dict(config_settings or {})
     project = _project()
     name = f"{project['name']}-{project['version']}"
     with tempfile.TemporaryDirectory() as folder:
         prefix = pathlib.Path(folder) / "prefix"
-        _installed(prefix, settings)
+        build = _installed(prefix, settings)
         files = list(native_files(prefix))
         tag = _tag(files)
         if "manylinux" in tag:  # a system of that name need not have libwebsockets; deform.serve() says so
@@ -221,8 +234,9 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         for inside, path in files:
             mode = 0o755 if inside.startswith(("bin/", "lib/")) else 0o644
             wheel.add(f"deform/native/{inside}", path.read_bytes(), mode)
+        contents = _contents(build, project["version"], files)
     info = f"{name}.dist-info"
-    for file, text in _information(project, tag).items():
+    for file, text in {**_information(project, tag), **contents}.items():
         wheel.add(f"{info}/{file}", text.encode())
     wheel.close(info)
     return f"{name}-{tag}.whl"

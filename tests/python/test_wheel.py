@@ -1,5 +1,6 @@
 """The wheel from this build, installed into a fresh environment, used in another folder: ten lines, plugins,
 command, picture. No registry is asked: NumPy is the system's."""
+import json
 import os
 import pathlib
 import re
@@ -80,6 +81,9 @@ class Wheel(unittest.TestCase):
             self.assertEqual(other.stderr, study.stderr)
             with zipfile.ZipFile(wheel) as zipped:
                 files = zipped.namelist()
+                inside, = (json.loads(zipped.read(name)) for name in files if name.endswith(".spdx.json"))
+            self.assertIn(("CONTAINS", "SPDXRef-libpng16-16"), {
+                (row["relationshipType"], row["relatedSpdxElement"]) for row in inside["relationships"]})
             for needed in ("deform/py.typed", "deform/native/bin/deform-cost",
                            "deform/native/lib/libdeform.so.0", "deform/native/include/deform/plugin.h",
                            "deform/demo.py", "deform/native/share/deform/data/cylinder_slim.msh"):
