@@ -16,8 +16,8 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
-.PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view tools bench-contact bench-peers deb docs wheel wasm ports ports-built abi-report
+.PHONY: help demo test bench soak soak-fuzz lint format tidy asan tsan fuzz install clean
+.PHONY: view tools bench-contact bench-peers packages deb docs wheel wasm ports ports-built abi-report
 .PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers setup-wasm setup-ports
 
 help:
@@ -40,6 +40,7 @@ help:
 	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
 	@echo "make ports            the command for Linux on arm64 and for Windows, tested by qemu and Wine"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
+	@echo "make packages         source archive, wheel; the same bytes from two folders: build/dist/"
 	@echo "make abi-report       build/abi/report.txt: what changed in the public headers, for release notes"
 	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
@@ -126,6 +127,9 @@ soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --test-dir build/release -j $(JOBS) --output-on-failure -L 'soak|stability'
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
+	@if command -v clang++ >/dev/null; then $(MAKE) --no-print-directory soak-fuzz; \
+	  else echo "deform: no clang, so the readers are not fuzzed (make setup-fuzz)"; fi
+	$(MAKE) --no-print-directory packages
 	$(BUILD) bench --target hold_soak suite_soak cover_soak cut_soak
 	nice -n 19 build/bench/bin/cover_soak tests/bench/results/cover_soak.csv
 	nice -n 19 build/bench/bin/cut_soak tests/bench/results/cut_soak.csv
@@ -136,6 +140,10 @@ soak: setup-bench build/bench/build.ninja build/release/build.ninja
 
 fuzz: setup-fuzz build/fuzz/build.ninja
 	$(BUILD) fuzz --target run_fuzz
+
+# 1e7 inputs in all
+soak-fuzz: setup-fuzz build/fuzz/build.ninja
+	$(BUILD) fuzz --target soak_fuzz
 
 install: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools
@@ -160,10 +168,15 @@ ports-built: setup-ports build/arm64/build.ninja build/windows/build.ninja
 	$(BUILD) arm64
 	$(BUILD) windows
 
+# What a release ships, from the source archive; compiles twice, in two folders, and compares.
+packages: setup
+	@$(PYTHON) -B tests/abi/reproducible.py . build/dist build/packages
+
 # Debian packages of the release build.
 deb: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools deform_python_native
-	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
+	@SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct 2>/dev/null || echo 315532800) \
+	  cpack --config build/release/CPackConfig.cmake -B build/release/packages
 	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
 
 # For release notes: what changed in the public headers, additions too, since a revision (SINCE=v0.1.0).

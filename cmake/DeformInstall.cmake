@@ -73,7 +73,8 @@ if(DEFORM_DPKG AND Python3_EXECUTABLE)
   endforeach()
   list(JOIN files "\" \"" files)
   install(CODE "execute_process(COMMAND \"${Python3_EXECUTABLE}\" -B
-      \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\" \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
+      \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\"
+      \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
       ${PROJECT_VERSION} \"${files}\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT library)
 endif()
 # The pages, in the places that they have in the source tree, so that links between them hold; and what they

@@ -13,6 +13,7 @@ Settings (pip: --config-settings NAME=VALUE):
   cmake     further arguments for configuring, in one text
 """
 import base64
+import gzip
 import hashlib
 import io
 import os
@@ -249,12 +250,14 @@ def build_sdist(sdist_directory, config_settings=None):
     git = ["git", "-C", str(ROOT), "ls-files", "-z"]
     listed = subprocess.run(git, check=True, capture_output=True).stdout
     target = pathlib.Path(sdist_directory) / f"{name}.tar.gz"
-    with tarfile.open(target, "w:gz", format=tarfile.PAX_FORMAT) as tar:
+    with gzip.GzipFile(target, "wb", mtime=0) as file, tarfile.open(fileobj=file, mode="w") as tar:
+
+        def add(path, data, mode):  # the same bytes whenever, wherever and by whomever it is made
+            info = tarfile.TarInfo(f"{name}/{path}")
+            info.size, info.mode, info.mtime = len(data), mode, 315532800
+            tar.addfile(info, io.BytesIO(data))
         for path in filter(None, listed.decode().split("\0")):
             if (ROOT / path).is_file():
-                tar.add(ROOT / path, f"{name}/{path}")
-        data = _metadata(project).encode()
-        info = tarfile.TarInfo(f"{name}/PKG-INFO")
-        info.size = len(data)
-        tar.addfile(info, io.BytesIO(data))
+                add(path, (ROOT / path).read_bytes(), 0o755 if os.access(ROOT / path, os.X_OK) else 0o644)
+        add("PKG-INFO", _metadata(project).encode(), 0o644)
     return target.name

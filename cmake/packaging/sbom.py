@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
-"""What is inside of programs and libraries of a build, and what they ask the system for: by the headers that each was compiled from (ninja), the libraries that it is linked with (objdump), and the Debian
-packages that these belong to (dpkg). Writes deform.spdx.json (SPDX 2.3) and third_party.txt, the licenses.
+"""What is inside of programs and libraries of a build, and what they ask the system for: by the headers that
+each was compiled from (ninja), the libraries that it is linked with (objdump), and the Debian packages
+that these belong to (dpkg). Writes deform.spdx.json (SPDX 2.3) and third_party.txt, the licenses.
 
 sbom.py BUILD OUT VERSION FILE...    FILE: built here, or of the system and shipped with it
 """
@@ -52,8 +53,8 @@ def owners(paths):
              (line.rsplit(": ", 1) for line in out.splitlines()) if path in asked}
     if not found:
         return {}
-    versions = dict(line.split("\t") for line in said(
-        "dpkg-query", "-W", "-f", "${binary:Package}\t${Version}\n", *sorted(set(found.values()))).splitlines())
+    rows = said("dpkg-query", "-W", "-f", "${binary:Package}\t${Version}\n", *sorted(set(found.values())))
+    versions = dict(line.split("\t") for line in rows.splitlines())
     versions = {name.partition(":")[0]: version for name, version in versions.items()}
     return {path: (name.partition(":")[0], versions[name.partition(":")[0]]) for path, name in found.items()}
 
