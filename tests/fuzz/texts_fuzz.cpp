@@ -28,7 +28,8 @@ dfm::scene::BodyMesh block() {  // as a scene's reader has it
   const double *points = nullptr;
   dfm::scene::BodyMesh out;
   if (dfm_tetmesh_get_info(mesh, &info) != DFM_OK ||
-      dfm_tetmesh_data(mesh, &points, &out.tets, nullptr) != DFM_OK)
+      dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point) != DFM_OK ||
+      dfm_tetmesh_file_cells(mesh, &out.file_cell) != DFM_OK)
     std::abort();
   out.points.assign(points, points + 3 * size_t{info.npoint});
   out.npoint = info.npoint;
@@ -51,8 +52,7 @@ void tetgen(Bytes text) {
     if (first.empty()) first = part;
     text = end == Bytes::npos ? Bytes{} : text.substr(end + 3);
   }
-  dfm::Memory hooks;
-  dfm::RawMesh raw(hooks);
+  dfm::RawMesh raw(dfm::Memory::standard());
   const std::string path = folder + "/a.node";
   dfm::Cursor in(path, first.data(), first.size());
   dfm::read_tetgen(in, raw);
