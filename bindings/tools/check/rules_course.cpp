@@ -144,7 +144,7 @@ std::string opposes_slip(const Subject &subject) {
       b.commit();
       for (uint32_t i = 0; i < kPairs; ++i) {
         const double off = plane_length(b.out_ft[i] - b.out_ft[i + kPairs],
-                                      b.out_ft[b.stride + i] + b.out_ft[b.stride + i + kPairs]);
+                                        b.out_ft[b.stride + i] + b.out_ft[b.stride + i + kPairs]);
         const double error = off == 0 ? 0 : off / (b.ft(i) + s.level);
         worst = std::max(worst, error);
         if (!(error <= 1e-12))

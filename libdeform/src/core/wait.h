@@ -9,8 +9,7 @@ namespace dfm {
 
 template <class Ready>
 void wait(std::condition_variable &changed, std::unique_lock<std::mutex> &lock, const Ready &ready) {
-  while (!changed.wait_for(lock, std::chrono::hours(1), ready)) {
-  }
+  while (!changed.wait_for(lock, std::chrono::hours(1), ready)) {}
 }
 
 }  // namespace dfm
