@@ -22,6 +22,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 import sysconfig
 import tarfile
 import tempfile
@@ -213,7 +214,7 @@ def _contents(build, version, files):
     if not build or not shutil.which("dpkg-query") or not (build / "build.ninja").exists():
         return {}
     with tempfile.TemporaryDirectory() as out:
-        _run("python3", "-B", ROOT / "cmake" / "packaging" / "sbom.py", build, out, version,
+        _run(sys.executable, "-B", ROOT / "cmake" / "packaging" / "sbom.py", build, out, version,
              *(path for inside, path in files if inside.startswith(("bin/", "lib/"))))
         return {f"{place}/{name}": (pathlib.Path(out) / name).read_text()
                 for place, name in (("sboms", "deform.spdx.json"), ("licenses", "third_party.txt"))}

@@ -14,7 +14,8 @@ import subprocess
 import sys
 import time
 
-# Licenses of what is compiled in or shipped, by the name of the Debian package; another one is an error.
+# Licenses of what is compiled in or shipped, by the name of the Debian package; of another one none is said,
+# which tests/abi/packages.py refuses.
 LICENSES = {"libbullet": "Zlib", "libc6": "LGPL-2.1-or-later", "libcli11": "BSD-3-Clause",
             "libegl": "MIT-Khronos-old AND Apache-2.0", "libeigen3": "MPL-2.0", "libgl-dev": "MIT",
             "libglfw3": "Zlib", "libhdf5": "BSD-3-Clause", "libimgui": "MIT", "libode": "BSD-3-Clause",
@@ -33,10 +34,7 @@ def said(*argv, **more):
 
 
 def license_of(package):
-    for name, text in LICENSES.items():
-        if package.startswith(name):
-            return text
-    sys.exit(f"sbom: which license has {package}? Add it to LICENSES of {__file__}")
+    return next((text for name, text in LICENSES.items() if package.startswith(name)), "NOASSERTION")
 
 
 def owners(paths):
@@ -50,7 +48,8 @@ def owners(paths):
         return {}
     out = subprocess.run(["dpkg-query", "-S", *sorted(asked)], capture_output=True, text=True).stdout
     found = {asked[path]: names.split(",")[0].strip() for names, path in
-             (line.rsplit(": ", 1) for line in out.splitlines()) if path in asked}
+             (line.rsplit(": ", 1) for line in out.splitlines())
+             if path in asked and not names.startswith("diversion ")}
     if not found:
         return {}
     rows = said("dpkg-query", "-W", "-f", "${binary:Package}\t${Version}\n", *sorted(set(found.values())))
@@ -62,7 +61,7 @@ def owners(paths):
 def headers_of(build):
     """{object: headers of the system}, as the compiler has told ninja."""
     out, own = {}, None
-    for line in said("ninja", "-C", build, "-t", "deps").splitlines():
+    for line in said("ninja", "-n", "-C", build, "-t", "deps").splitlines():
         if line.startswith("    "):
             if line.startswith("    /usr/"):
                 own.add(os.path.normpath(line.strip()))
@@ -84,8 +83,8 @@ def main():
     built = {path.name: path.resolve() for folder in ("bin", "lib", "lib/deform/*") for path in
              build.glob(f"{folder}/*") if path.name in shipped and path.is_file()}
     parts = [path.relative_to(build) for path in built.values()]
-    inside = set().union(*(headers.get(part, set()) for part in
-                           said("ninja", "-C", build, "-t", "inputs", *parts).splitlines()))
+    objects = re.findall(r" -o (\S+\.o) ", said("ninja", "-n", "-C", build, "-t", "commands", *parts))
+    inside = set().union(*(headers.get(part, set()) for part in objects))
     linked, copied = set(), shipped - built.keys()
     for path in found:
         needed = re.findall(r"^ *NEEDED +(\S+)$", said("objdump", "-p", path), re.M)
@@ -97,7 +96,8 @@ def main():
                          pathlib.Path("/").glob(f"{folder[1:]}/{name}")}).values())
 
     if not inside:
-        sys.exit(f"sbom: {build} does not know what it was compiled from")
+        print(f"sbom: dpkg has none of the headers that {build} was compiled from: nothing is written")
+        return
     packages, relations = {}, set()
     for kind, who in (("STATIC_LINK", inside), ("DYNAMIC_LINK", linked), ("CONTAINS", copied)):
         for name, of in who:
