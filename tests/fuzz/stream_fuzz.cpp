@@ -4,7 +4,6 @@
 // Input: a byte that chooses. Even: the rest is a datagram. Odd: the rest is a list of {u16 place, u8 value}
 // that are put into a scene and a frame that the library has written.
 #include <cmath>
-#include <cstring>
 #include <vector>
 
 #include "cli/rtp.h"

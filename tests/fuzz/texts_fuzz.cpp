@@ -1,8 +1,6 @@
 // Any bytes as one of the text files that are no scene and no mesh of one file: an error with a sentence, or
 // what was read. The first byte chooses the reader.
-#include <cmath>
 #include <cstdlib>
-#include <cstring>
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -40,20 +38,22 @@ dfm::scene::BodyMesh block() {  // as a scene's reader has it
 
 // Three files one behind the other, divided by lines of "%%".
 void tetgen(Bytes text) {
-  static const std::string folder = "/tmp/deform_fuzz_" + std::to_string(getpid());
-  std::filesystem::create_directories(folder);
-  std::string first;
+  static const struct Folder {
+    const std::string name = "/tmp/deform_fuzz_" + std::to_string(getpid());
+    Folder() { std::filesystem::create_directories(name); }
+    ~Folder() { std::filesystem::remove_all(name); }
+  } folder;
+  const std::string first(text.substr(0, text.find("%%\n")));
   for (const char *const ending : {"/a.node", "/a.ele", "/a.face"}) {
     const size_t end = text.find("%%\n");
     const Bytes part = text.substr(0, end);
-    std::FILE *const file = std::fopen((folder + ending).c_str(), "wb");
+    std::FILE *const file = std::fopen((folder.name + ending).c_str(), "wb");
     if (!file || std::fwrite(part.data(), 1, part.size(), file) != part.size() || std::fclose(file))
       std::abort();
-    if (first.empty()) first = part;
     text = end == Bytes::npos ? Bytes{} : text.substr(end + 3);
   }
   dfm::RawMesh raw(dfm::Memory::standard());
-  const std::string path = folder + "/a.node";
+  const std::string path = folder.name + "/a.node";
   dfm::Cursor in(path, first.data(), first.size());
   dfm::read_tetgen(in, raw);
   if (!raw.tets.empty()) dfm::finish_mesh("fuzz", std::move(raw));
