@@ -58,12 +58,9 @@ install(FILES ${PROJECT_SOURCE_DIR}/examples/data/cylinder_thick.msh
 file(GLOB deform_templates ${PROJECT_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform COMPONENT dev)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
-# What is inside of the programs and libraries, and its licenses: where ninja and dpkg can tell.
-if(PROJECT_IS_TOP_LEVEL AND DEFORM_SHARED AND CMAKE_GENERATOR STREQUAL "Ninja")
-  find_program(DEFORM_DPKG dpkg-query)
-  find_package(Python3 COMPONENTS Interpreter)
-endif()
-if(DEFORM_DPKG AND Python3_EXECUTABLE)
+# What is inside of the programs and libraries, and its licenses: where Python, ninja and dpkg can tell.
+if(PROJECT_IS_TOP_LEVEL AND DEFORM_SHARED AND NOT CMAKE_CROSSCOMPILING)
+  include(DeformPython)
   set(files "")
   foreach(target deform deform_cli deform_view deform_serve deform_ode deform_bullet deform_bullet64
       deform_python deform_python_serve libdeform_python_law solver_cholmod ${deform_tools} ${deform_plugins})
@@ -72,10 +69,10 @@ if(DEFORM_DPKG AND Python3_EXECUTABLE)
     endif()
   endforeach()
   list(JOIN files "\" \"" files)
-  install(CODE "execute_process(COMMAND \"${Python3_EXECUTABLE}\" -B
+  install(CODE "execute_process(COMMAND \"${DEFORM_PYTHON}\" -B
       \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\"
       \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
-      ${PROJECT_VERSION} \"${files}\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT library)
+      ${PROJECT_VERSION} \"${files}\")" COMPONENT library)
 endif()
 # The pages, in the places that they have in the source tree, so that links between them hold; and what they
 # link to outside of their folder, which abi.installed_tree checks.

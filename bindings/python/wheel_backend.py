@@ -209,15 +209,13 @@ class _Wheel:
 
 
 def _contents(build, version, files):
-    """{name in .dist-info: text}: what is inside of the programs, and its licenses; none where the system has
-    no dpkg."""
-    if not build or not shutil.which("dpkg-query") or not (build / "build.ninja").exists():
-        return {}
+    """{name in .dist-info: text}: what is inside of the programs, and its licenses, if sbom.py can tell."""
     with tempfile.TemporaryDirectory() as out:
         _run(sys.executable, "-B", ROOT / "cmake" / "packaging" / "sbom.py", build, out, version,
              *(path for inside, path in files if inside.startswith(("bin/", "lib/"))))
         return {f"{place}/{name}": (pathlib.Path(out) / name).read_text()
-                for place, name in (("sboms", "deform.spdx.json"), ("licenses", "third_party.txt"))}
+                for place, name in (("sboms", "deform.spdx.json"), ("licenses", "third_party.txt"))
+                if (pathlib.Path(out) / name).exists()}
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):

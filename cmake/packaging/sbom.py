@@ -10,6 +10,7 @@ import json
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import time
@@ -78,6 +79,8 @@ def resolved(path):
 
 def main():
     build, out, version = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]), sys.argv[3]
+    if not all(map(shutil.which, ("ninja", "objdump", "dpkg-query"))) or not (build / "build.ninja").exists():
+        return print("sbom: takes a build by ninja, objdump and dpkg; nothing is written")
     found = [path for path in map(pathlib.Path, sys.argv[4:]) if path.exists()]
     headers, shipped = headers_of(build), {path.name for path in found}
     built = {path.name: path.resolve() for folder in ("bin", "lib", "lib/deform/*") for path in
@@ -96,8 +99,7 @@ def main():
                          pathlib.Path("/").glob(f"{folder[1:]}/{name}")}).values())
 
     if not inside:
-        print(f"sbom: dpkg has none of the headers that {build} was compiled from: nothing is written")
-        return
+        return print(f"sbom: dpkg has none of the headers of {build}; nothing is written")
     packages, relations = {}, set()
     for kind, who in (("STATIC_LINK", inside), ("DYNAMIC_LINK", linked), ("CONTAINS", copied)):
         for name, of in who:
