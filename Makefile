@@ -16,8 +16,8 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 
 # The doors share build folders: `make -j demo test` runs one after the other. JOBS is for the compilers.
 .NOTPARALLEL:
-.PHONY: help demo test bench soak lint format tidy asan tsan fuzz install clean
-.PHONY: view tools bench-contact bench-peers deb docs wheel wasm ports ports-built
+.PHONY: help demo test bench soak soak-fuzz lint format tidy asan tsan fuzz install clean
+.PHONY: view tools bench-contact bench-peers packages deb docs wheel wasm ports ports-built abi-report
 .PHONY: setup setup-test setup-bench setup-fuzz setup-docs setup-peers setup-wasm setup-ports
 
 help:
@@ -36,10 +36,12 @@ help:
 	@echo "make asan, make tsan  the suite under the sanitizers; tsan: what runs on several threads"
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
-	@echo "make wheel            the Python package for any Python 3 on this system: build/dist/"
+	@echo "make wheel            the Python package for CPython 3.9 up, manylinux: build/dist/"
 	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
 	@echo "make ports            the command for Linux on arm64 and for Windows, tested by qemu and Wine"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
+	@echo "make packages         source archive, wheel; the same bytes from two folders: build/dist/"
+	@echo "make abi-report       build/abi/report.txt: what changed in the public headers, for release notes"
 	@echo "make docs             the pages, the API and search as a site: build/site/index.html"
 	@echo "make clean            removes build/ and out/"
 	@echo "JOBS=N                with any of them: compilers or tests at a time (default: one per processor)"
@@ -72,7 +74,8 @@ build/%/build.ninja: | setup
 # With a display the window is built too, for `deform view`.
 demo: setup build/release/build.ninja
 	$(BUILD) release --target deform_command $(if $(DISPLAY)$(WAYLAND_DISPLAY),deform_viewer)
-	@$(PYTHON) cmake/demo.py build/release/bin/deform out/demo
+	@$(PYTHON) -B bindings/python/deform/demo.py build/release/bin/deform \
+	  examples/scenes/two_cylinders.json out/demo
 
 view: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer
@@ -124,6 +127,9 @@ soak: setup-bench build/bench/build.ninja build/release/build.ninja
 	$(BUILD) release
 	DEFORM_SOAK=1 nice -n 19 ctest --test-dir build/release -j $(JOBS) --output-on-failure -L 'soak|stability'
 	DEFORM_SOAK=1 nice -n 19 ctest --preset release -R '^python\.cut_scenes$$'
+	@if command -v clang++ >/dev/null; then $(MAKE) --no-print-directory soak-fuzz; \
+	  else echo "deform: no clang, so the readers are not fuzzed (make setup-fuzz)"; fi
+	$(MAKE) --no-print-directory packages
 	$(BUILD) bench --target hold_soak suite_soak cover_soak cut_soak
 	nice -n 19 build/bench/bin/cover_soak tests/bench/results/cover_soak.csv
 	nice -n 19 build/bench/bin/cut_soak tests/bench/results/cut_soak.csv
@@ -135,14 +141,17 @@ soak: setup-bench build/bench/build.ninja build/release/build.ninja
 fuzz: setup-fuzz build/fuzz/build.ninja
 	$(BUILD) fuzz --target run_fuzz
 
+# 1e7 inputs in all
+soak-fuzz: setup-fuzz build/fuzz/build.ninja
+	$(BUILD) fuzz --target soak_fuzz
+
 install: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools
 	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
 
-wheel: setup build/release/build.ninja
-	$(BUILD) release --target deform_tools deform_python_native
-	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; print( \
-	  b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': '$(CURDIR)/build/release'}))"
+wheel: setup
+	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; \
+	  print(b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': 'no'}))"
 
 wasm: setup-wasm build/wasm/build.ninja
 	$(BUILD) wasm --target deform_page
@@ -159,11 +168,24 @@ ports-built: setup-ports build/arm64/build.ninja build/windows/build.ninja
 	$(BUILD) arm64
 	$(BUILD) windows
 
+# What a release ships, from the source archive; compiles twice, in two folders, and compares.
+packages: setup
+	@$(PYTHON) -B tests/abi/reproducible.py . build/dist build/packages
+
 # Debian packages of the release build.
 deb: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools deform_python_native
-	@cpack --config build/release/CPackConfig.cmake -B build/release/packages
+	@SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct 2>/dev/null || echo 315532800) \
+	  cpack --config build/release/CPackConfig.cmake -B build/release/packages
 	@rm -rf build/release/packages/_CPack_Packages && ls build/release/packages/*.deb
+
+# For release notes: what changed in the public headers, additions too, since a revision (SINCE=v0.1.0).
+SINCE ?= $(shell git describe --tags --abbrev=0 2>/dev/null || \
+  git log --diff-filter=A --format=%h -- tests/abi/baseline/public.txt | tail -n 1)
+abi-report: setup
+	@mkdir -p build/abi && git show $(SINCE):tests/abi/baseline/public.txt >build/abi/since.txt
+	@$(PYTHON) -B tests/abi/baseline.py cc libdeform/include/deform build/abi/since.txt build/abi --report \
+	  >build/abi/report.txt && echo "build/abi/report.txt: $$(wc -l <build/abi/report.txt) lines since $(SINCE)"
 
 docs: setup-docs
 	@$(PYTHON) -B cmake/docs/make_site.py

@@ -22,6 +22,11 @@ set(CMAKE_C_FLAGS_RELEASE "-O2 -g1")
 set(CMAKE_CXX_FLAGS_SANITIZE "-O1 -g1")
 set(CMAKE_C_FLAGS_SANITIZE "-O1 -g1")
 
+# The linker's hash of debug information, which names folders, is all in which two builds would differ.
+if(PROJECT_IS_TOP_LEVEL AND CMAKE_SYSTEM_NAME STREQUAL "Linux")
+  add_link_options(-Wl,--build-id=none)
+endif()
+
 # Plugins of one ABI lie in a folder of their own; the header says which ABI that is.
 set(deform_plugin_header ${CMAKE_CURRENT_LIST_DIR}/../libdeform/include/deform/plugin.h)
 file(STRINGS ${deform_plugin_header} deform_abi REGEX "^#define DFM_ABI ")

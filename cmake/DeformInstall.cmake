@@ -48,10 +48,32 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/libdeform/include/deform DESTINATION ${C
 install(FILES ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json
   ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-cost.schema.json DESTINATION ${CMAKE_INSTALL_DATADIR}/deform
   COMPONENT command)
+# For `python -m deform demo`.
+install(FILES ${PROJECT_SOURCE_DIR}/examples/scenes/two_cylinders.json
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/deform/scenes COMPONENT command)
+install(FILES ${PROJECT_SOURCE_DIR}/examples/data/cylinder_thick.msh
+  ${PROJECT_SOURCE_DIR}/examples/data/cylinder_slim.msh
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/deform/data COMPONENT command)
 # Plugins to copy and edit, as source.
 file(GLOB deform_templates ${PROJECT_SOURCE_DIR}/plugins/template_*)
 install(DIRECTORY ${deform_templates} DESTINATION ${CMAKE_INSTALL_DATADIR}/deform COMPONENT dev)
 install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT library)
+# What is inside of the programs and libraries, and its licenses: where Python, ninja and dpkg can tell.
+if(PROJECT_IS_TOP_LEVEL AND DEFORM_SHARED AND NOT CMAKE_CROSSCOMPILING)
+  include(DeformPython)
+  set(files "")
+  foreach(target deform deform_cli deform_view deform_serve deform_ode deform_bullet deform_bullet64
+      deform_python deform_python_serve libdeform_python_law solver_cholmod ${deform_tools} ${deform_plugins})
+    if(TARGET ${target})
+      list(APPEND files $<TARGET_FILE:${target}>)
+    endif()
+  endforeach()
+  list(JOIN files "\" \"" files)
+  install(CODE "execute_process(COMMAND \"${DEFORM_PYTHON}\" -B
+      \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\"
+      \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
+      ${PROJECT_VERSION} \"${files}\")" COMPONENT library)
+endif()
 # The pages, in the places that they have in the source tree, so that links between them hold; and what they
 # link to outside of their folder, which abi.installed_tree checks.
 foreach(page README.md CHANGELOG.md CONTRIBUTING.md SECURITY.md tests/README.md tests/abi/kept/README.md

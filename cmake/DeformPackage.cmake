@@ -82,7 +82,7 @@ if(TARGET deform_view)
 endif()
 if(CMAKE_INSTALL_LIBDIR STREQUAL "lib")  # where `native` finds the library
   deform_package(python python3-deform "soft bodies with true friction: the Python package"
-    "libdeform0 ${same}, libdeform-dev ${same}, deform ${same}, python3 (>= 3.10), python3-numpy"
+    "libdeform0 ${same}, libdeform-dev ${same}, deform ${same}, python3 (>= 3.9), python3-numpy"
     python python_package)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "python3-matplotlib, python3-scipy")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS python3-distributed)

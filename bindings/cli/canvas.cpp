@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "messages.h"
+#include "plane.h"
 
 namespace cli {
 namespace {
@@ -42,7 +43,7 @@ void PixelCanvas::paint(double x0, double y0, double x1, double y1, Ink ink, Ins
 }
 
 void PixelCanvas::line(double x0, double y0, double x1, double y1, double width, Ink ink, bool dashed) {
-  const double length = std::hypot(x1 - x0, y1 - y0), dash = 6, gap = 5;
+  const double length = plane_length(x1 - x0, y1 - y0), dash = 6, gap = 5;
   if (!dashed) return stroke(x0, y0, x1, y1, width, ink);
   for (double s = 0; s < length; s += dash + gap) {
     const double a = s / length, b = std::min(s + dash, length) / length;
@@ -52,7 +53,7 @@ void PixelCanvas::line(double x0, double y0, double x1, double y1, double width,
 
 void PixelCanvas::disc(double x, double y, double radius, Ink ink, const std::string &) {
   paint(x - radius, y - radius, x + radius, y + radius, ink,
-        [&](double px, double py) { return radius - std::hypot(px - x, py - y); });
+        [&](double px, double py) { return radius - plane_length(px - x, py - y); });
 }
 
 void PixelCanvas::box(double x, double y, double width, double height, Ink ink) {
@@ -70,7 +71,7 @@ void PixelCanvas::stroke(double x0, double y0, double x1, double y1, double widt
   paint(std::min(x0, x1) - r, std::min(y0, y1) - r, std::max(x0, x1) + r, std::max(y0, y1) + r, ink,
         [&](double px, double py) {
           const double s = std::clamp(((px - x0) * dx + (py - y0) * dy) / l2, 0.0, 1.0);
-          return r - std::hypot(px - x0 - s * dx, py - y0 - s * dy);
+          return r - plane_length(px - x0 - s * dx, py - y0 - s * dy);
         });
 }
 

@@ -4,7 +4,7 @@ from a registry, so that `pip install .` works wherever the library builds.
 
 The wheel is for any Python 3 (py3-none-PLATFORM): nothing in it is compiled against an interpreter. Its
 platform is manylinux_2_N where all that it needs from the system is what every Linux of that name has
-(PEP 600): a wheel built without ODE and Bullet, as prebuilt=no builds it. libpng travels in it.
+(PEP 600): a wheel built without ODE, Bullet and HDF5, as prebuilt=no builds it. libpng travels in it.
 
 Settings (pip: --config-settings NAME=VALUE):
   prebuilt  a build folder of this tree whose target deform_tools is built; nothing is compiled then.
@@ -13,6 +13,7 @@ Settings (pip: --config-settings NAME=VALUE):
   cmake     further arguments for configuring, in one text
 """
 import base64
+import gzip
 import hashlib
 import io
 import os
@@ -21,6 +22,7 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
 import sysconfig
 import tarfile
 import tempfile
@@ -34,7 +36,7 @@ PACKAGE = ROOT / "bindings" / "python" / "deform"
 
 
 def _project():
-    """The table [project] of pyproject.toml, as far as the metadata of a wheel goes (Python 3.10 has no
+    """The table [project] of pyproject.toml, as far as the metadata of a wheel goes (Python 3.9 has no
     reader)."""
     text = (ROOT / "pyproject.toml").read_text()
     project = dict(re.findall(r'^([\w-]+) = "([^"]*)"$', text.split("[project]")[1].split("\n[")[0], re.M))
@@ -75,6 +77,15 @@ def _oldest(version):
     return None
 
 
+def asked_of_system(path):
+    """(libraries that not every system has, versions of symbols that it asks the others for)"""
+    said = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True, check=True).stdout
+    of = re.findall(r"^  required from (\S+):\n((?:    0x.*\n)+)", said, re.M)
+    return (set(re.findall(r"^ *NEEDED +(\S+)$", said, re.M)) - EVERYWHERE,
+            {line.split()[-1] for library, lines in of if library in EVERYWHERE
+             for line in lines.splitlines()})
+
+
 def _tag(files=()):
     """The wheel's tag by what its files ask the system for."""
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
@@ -83,13 +94,9 @@ def _tag(files=()):
     programs.pop(SERVER, None)
     own, first = {pathlib.PurePath(inside).name for inside in programs}, 28
     for path in programs.values():
-        asked = subprocess.run(["objdump", "-p", str(path)], capture_output=True, text=True,
-                               check=True).stdout
-        needed = set(re.findall(r"^ *NEEDED +(\S+)$", asked, re.M)) - own - EVERYWHERE
-        of = re.findall(r"^  required from (\S+):\n((?:    0x.*\n)+)", asked, re.M)
-        versions = {_oldest(line.split()[-1]) for library, lines in of if library in EVERYWHERE
-                    for line in lines.splitlines()}
-        if needed or None in versions:
+        needed, symbols = asked_of_system(path)
+        versions = {_oldest(version) for version in symbols}
+        if needed - own or None in versions:
             return f"py3-none-{platform}"
         first = max({first, *versions})
     return f"py3-none-manylinux_2_{first}_{machine}" if programs and machine != platform else (
@@ -104,10 +111,9 @@ def _run(*command):
 def configure(build, settings):
     """What the wheel is built from, where nothing is built already."""
     generator = ["-G", "Ninja"] if shutil.which("ninja") else []
-    _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_TESTS=OFF",
-         "-DDEFORM_EXAMPLES=OFF", "-DDEFORM_VIEW=OFF", "-DDEFORM_ODE=OFF", "-DDEFORM_BULLET=OFF",
-         "-DDEFORM_ASSIMP=OFF",
-         "-DCMAKE_INSTALL_LIBDIR=lib",
+    without = [f"-DDEFORM_{part}=OFF" for part in ("TESTS", "EXAMPLES", "VIEW", "ODE", "BULLET", "ASSIMP")]
+    _run("cmake", "-S", ROOT, "-B", build, *generator, "-DCMAKE_BUILD_TYPE=Release", "-DDEFORM_UNITY=ON",
+         *without, "-DCMAKE_DISABLE_FIND_PACKAGE_HDF5=ON", "-DCMAKE_INSTALL_LIBDIR=lib",
          *shlex.split(settings.get("cmake", "")))
 
 
@@ -122,7 +128,7 @@ def release_build():
 
 
 def _installed(prefix, settings):
-    """What the tree installs, beneath prefix."""
+    """What the tree installs, beneath prefix; from which build folder."""
     if not shutil.which("cmake"):
         raise SystemExit("deform: there is no cmake; building the library needs CMake 3.22, Ninja or make, a "
                          "C++20 compiler and some headers: `cmake/setup.sh doors` installs them on Debian")
@@ -142,6 +148,7 @@ def _installed(prefix, settings):
              "--parallel", os.environ.get("CMAKE_BUILD_PARALLEL_LEVEL") or len(os.sched_getaffinity(0)))
     _run("cmake", "--install", build, "--strip", "--prefix", prefix)
     _run("cmake", "--install", build, "--strip", "--prefix", prefix, "--component", "python")
+    return build
 
 
 def native_files(prefix):
@@ -184,18 +191,31 @@ class _Wheel:
         self.zip = zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED)
         self.record = []
 
-    def add(self, name, data, mode=0o644):
+    def _write(self, name, data, mode=0o644):
         info = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))  # the same bytes whenever it is built
         info.external_attr = (0o100000 | mode) << 16
         info.compress_type = zipfile.ZIP_DEFLATED
         self.zip.writestr(info, data)
+
+    def add(self, name, data, mode=0o644):
+        self._write(name, data, mode)
         digest = base64.urlsafe_b64encode(hashlib.sha256(data).digest()).rstrip(b"=").decode()
         self.record.append(f"{name},sha256={digest},{len(data)}")
 
     def close(self, info):
         self.record.append(f"{info}/RECORD,,")
-        self.zip.writestr(f"{info}/RECORD", "\n".join(self.record) + "\n")
+        self._write(f"{info}/RECORD", "\n".join(self.record) + "\n")
         self.zip.close()
+
+
+def _contents(build, version, files):
+    """{name in .dist-info: text}: what is inside of the programs, and its licenses, if sbom.py can tell."""
+    with tempfile.TemporaryDirectory() as out:
+        _run(sys.executable, "-B", ROOT / "cmake" / "packaging" / "sbom.py", build, out, version,
+             *(path for inside, path in files if inside.startswith(("bin/", "lib/"))))
+        return {f"{place}/{name}": (pathlib.Path(out) / name).read_text()
+                for place, name in (("sboms", "deform.spdx.json"), ("licenses", "third_party.txt"))
+                if (pathlib.Path(out) / name).exists()}
 
 
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
@@ -204,7 +224,7 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     name = f"{project['name']}-{project['version']}"
     with tempfile.TemporaryDirectory() as folder:
         prefix = pathlib.Path(folder) / "prefix"
-        _installed(prefix, settings)
+        build = _installed(prefix, settings)
         files = list(native_files(prefix))
         tag = _tag(files)
         if "manylinux" in tag:  # a system of that name need not have libwebsockets; deform.serve() says so
@@ -217,8 +237,9 @@ def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
         for inside, path in files:
             mode = 0o755 if inside.startswith(("bin/", "lib/")) else 0o644
             wheel.add(f"deform/native/{inside}", path.read_bytes(), mode)
+        contents = _contents(build, project["version"], files)
     info = f"{name}.dist-info"
-    for file, text in _information(project, tag).items():
+    for file, text in {**_information(project, tag), **contents}.items():
         wheel.add(f"{info}/{file}", text.encode())
     wheel.close(info)
     return f"{name}-{tag}.whl"
@@ -231,12 +252,14 @@ def build_sdist(sdist_directory, config_settings=None):
     git = ["git", "-C", str(ROOT), "ls-files", "-z"]
     listed = subprocess.run(git, check=True, capture_output=True).stdout
     target = pathlib.Path(sdist_directory) / f"{name}.tar.gz"
-    with tarfile.open(target, "w:gz", format=tarfile.PAX_FORMAT) as tar:
+    with gzip.GzipFile(target, "wb", mtime=0) as file, tarfile.open(fileobj=file, mode="w") as tar:
+
+        def add(path, data, mode):  # the same bytes whenever, wherever and by whomever it is made
+            info = tarfile.TarInfo(f"{name}/{path}")
+            info.size, info.mode, info.mtime = len(data), mode, 315532800
+            tar.addfile(info, io.BytesIO(data))
         for path in filter(None, listed.decode().split("\0")):
             if (ROOT / path).is_file():
-                tar.add(ROOT / path, f"{name}/{path}")
-        data = _metadata(project).encode()
-        info = tarfile.TarInfo(f"{name}/PKG-INFO")
-        info.size = len(data)
-        tar.addfile(info, io.BytesIO(data))
+                add(path, (ROOT / path).read_bytes(), 0o755 if os.access(ROOT / path, os.X_OK) else 0o644)
+        add("PKG-INFO", _metadata(project).encode(), 0o644)
     return target.name

@@ -161,9 +161,9 @@ double advance(char c) {
 
 double distance(Point p, Point a, Point b) {
   const double dx = b.x - a.x, dy = b.y - a.y, length = dx * dx + dy * dy;
-  if (length == 0) return std::hypot(p.x - a.x, p.y - a.y) - kDot;
+  if (length == 0) return std::hypot(p.x - a.x, p.y - a.y, 0.0) - kDot;
   const double t = std::clamp(((p.x - a.x) * dx + (p.y - a.y) * dy) / length, 0.0, 1.0);
-  return std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy);
+  return std::hypot(p.x - a.x - t * dx, p.y - a.y - t * dy, 0.0);
 }
 
 void blend(Image &picture, long x, long y, Color c, double cover) {

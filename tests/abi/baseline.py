@@ -7,6 +7,7 @@ asked by exports.py.
 
 baseline.py CC INCLUDE_DIR STORED SCRATCH          compares; exit 77 where only abidiff's part was passed over
 baseline.py CC INCLUDE_DIR STORED SCRATCH --self   spoils the stored headers in ways that must be found
+baseline.py CC INCLUDE_DIR STORED SCRATCH --report   tells what changed, for release notes
 baseline.py CC INCLUDE_DIR STORED --write          writes STORED again
 """
 import pathlib
@@ -144,6 +145,9 @@ def main():
         pathlib.Path(stored).write_text(now)
         return 0
     before, folder = pathlib.Path(stored).read_text(), pathlib.Path(sys.argv[4])
+    if sys.argv[-1] == "--report":
+        print("\n".join(differences(compiler, before, now, folder)[0]) or "nothing changed")
+        return 0
     if sys.argv[-1] == "--self":
         for number, (what, pattern, by) in enumerate(SPOILT):
             after, n = re.subn(pattern, by, before, count=1, flags=re.M)

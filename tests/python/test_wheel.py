@@ -1,5 +1,6 @@
 """The wheel from this build, installed into a fresh environment, used in another folder: ten lines, plugins,
 command, picture. No registry is asked: NumPy is the system's."""
+import json
 import os
 import pathlib
 import re
@@ -68,6 +69,12 @@ class Wheel(unittest.TestCase):
             version = subprocess.run([folder / "venv" / "bin" / "deform", "--version"], capture_output=True,
                                      text=True, env=clean(), check=True).stdout
             self.assertIn(re.search(r"-([\d.]+)-py3", wheel.name).group(1), version)
+            # python -m deform, and what its demo runs; `make demo` does the rest
+            plan = ("import runpy, sys; from deform._library import demo_scene; sys.argv[1:] = "
+                    "['explain', str(demo_scene())]; runpy.run_module('deform', run_name='__main__')")
+            said = subprocess.run([python, "-c", plan], cwd=folder / "other", capture_output=True, text=True,
+                                  env=clean())
+            self.assertIn("org.deform.coulomb", said.stdout, said.stderr)
             study = subprocess.run([folder / "venv" / "bin" / "deform", "sweep", "none.json"], text=True,
                                    capture_output=True, env=clean(), cwd=folder / "other")
             self.assertEqual(study.stderr, "deform: none.json: cannot be opened: No such file or directory\n")
@@ -80,8 +87,12 @@ class Wheel(unittest.TestCase):
             self.assertEqual(other.stderr, study.stderr)
             with zipfile.ZipFile(wheel) as zipped:
                 files = zipped.namelist()
+                inside, = (json.loads(zipped.read(name)) for name in files if name.endswith(".spdx.json"))
+            self.assertIn(("CONTAINS", "SPDXRef-libpng16-16"), {
+                (row["relationshipType"], row["relatedSpdxElement"]) for row in inside["relationships"]})
             for needed in ("deform/py.typed", "deform/native/bin/deform-cost",
-                           "deform/native/lib/libdeform.so.0", "deform/native/include/deform/plugin.h"):
+                           "deform/native/lib/libdeform.so.0", "deform/native/include/deform/plugin.h",
+                           "deform/demo.py", "deform/native/share/deform/data/cylinder_slim.msh"):
                 self.assertIn(needed, files)
 
     def test_tag_names_the_oldest_system_that_has_what_is_asked_for(self):
@@ -106,6 +117,23 @@ class Wheel(unittest.TestCase):
             both = [("lib/libb.so", made), (f"lib/{other.name}", other)]
             self.assertIn("manylinux", wheel_backend._tag(both))
             self.assertRegex(wheel_backend._tag(both[:1]), r"^py3-none-linux_\w+$")
+
+    def test_no_symbol_is_newer_than_the_oldest_system(self):
+        """manylinux_2_34: RHEL 9 and what is younger. A newer glibc than Debian 12's gives newer symbols to
+        every program."""
+        if float(os.confstr("CS_GNU_LIBC_VERSION").split()[1]) > 2.36:
+            self.skipTest("a glibc newer than Debian 12's")
+        sys.path.insert(0, str(SOURCE / "bindings" / "python"))
+        self.addCleanup(sys.path.pop, 0)
+        import wheel_backend
+        build = pathlib.Path(os.environ["DEFORM_BUILD"])
+        files = [path for place in ("lib/*.so*", "lib/deform/plugins-*/*.so", "bin/deform*")
+                 for path in build.glob(place) if path.is_file() and not path.is_symlink()]
+        self.assertGreater(len(files), 25)
+        for path in files:
+            for version in wheel_backend.asked_of_system(path)[1]:
+                self.assertLessEqual(wheel_backend._oldest(version) or 99, 34,
+                                     f"{path} needs {version}: objdump -T {path} | grep {version}")
 
     def test_a_release_build_of_this_tree_is_packed(self):
         sys.path.insert(0, str(SOURCE / "bindings" / "python"))
@@ -141,7 +169,8 @@ class Wheel(unittest.TestCase):
             build = pathlib.Path(name) / "build"
             wheel_backend.configure(build, {"cmake": "-DDEFORM_RENDER=OFF"})
             cache = (build / "CMakeCache.txt").read_text()
-            for entry in ("DEFORM_RENDER:BOOL=OFF", "DEFORM_TESTS:BOOL=OFF", "DEFORM_ODE:STRING=OFF",
+            for entry in ("DEFORM_RENDER:BOOL=OFF", "CMAKE_DISABLE_FIND_PACKAGE_HDF5:PATH=ON",
+                          "DEFORM_TESTS:BOOL=OFF", "DEFORM_ODE:STRING=OFF",
                           "DEFORM_BULLET:STRING=OFF", "CMAKE_INSTALL_LIBDIR:PATH=lib"):
                 self.assertIn(entry, cache.replace(":UNINITIALIZED=", ":PATH="))
             targets = subprocess.run(["cmake", "--build", build, "--target", "help"], check=True,

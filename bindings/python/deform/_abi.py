@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 _HERE = pathlib.Path(__file__).resolve().parent
 # those that the wheel carries, or the tree's
-INCLUDES = (_HERE / "native" / "include", *(up / "libdeform" / "include" for up in _HERE.parents[2:3]))
+INCLUDES = (_HERE / "native" / "include", *(up / "libdeform" / "include" for up in list(_HERE.parents)[2:3]))
 _HEADERS = ("plugin base id math world body contact attach surface stream mesh scene obstacle law material "
             "model rigid toi debug query callback sensor cut tool").split()
 

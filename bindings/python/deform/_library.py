@@ -137,6 +137,11 @@ def include_dir() -> pathlib.Path:
     return _shipped("include", "libdeform/include")
 
 
+def demo_scene() -> pathlib.Path:
+    """The scene of `python -m deform demo`."""
+    return _shipped("share/deform/scenes", "examples/scenes") / "two_cylinders.json"
+
+
 def template_dir(kind: str = "friction") -> pathlib.Path:
     """A plugin in C to copy and edit: "friction" or "model"."""
     return _shipped(f"share/deform/template_{kind}", f"plugins/template_{kind}")

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "check/environment.h"
+#include "plane.h"
 #include "slots.h"
 
 namespace cli::check {
@@ -150,7 +151,7 @@ void Lanes::must(double dt) {
 
 std::string Lanes::inputs(uint32_t i) const {
   std::string said;
-  if (law.needs(DFM_NEED_VT)) said += text(" at a slip of %.3g m/s", std::hypot(vt[i], vt[stride + i]));
+  if (law.needs(DFM_NEED_VT)) said += text(" at a slip of %.3g m/s", plane_length(vt[i], vt[stride + i]));
   if (law.needs(DFM_NEED_FN))
     said += text("%s a normal force of %.3g N", said.empty() ? " at" : " and", fn[i]);
   return said;
@@ -193,7 +194,7 @@ void Lanes::spoil_padding() {
   columns(state, law.nstate);
 }
 
-double Lanes::ft(uint32_t i) const { return std::hypot(out_ft[i], out_ft[stride + i]); }
+double Lanes::ft(uint32_t i) const { return plane_length(out_ft[i], out_ft[stride + i]); }
 
 void Lanes::take(uint32_t i, const Lanes &from, uint32_t k) {
   const auto columns = [&](double *to, const double *at, uint32_t width) {

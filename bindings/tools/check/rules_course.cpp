@@ -6,6 +6,7 @@
 #include "check/groups.h"
 #include "check/law.h"
 #include "check/runner.h"
+#include "plane.h"
 
 namespace cli::check {
 namespace {
@@ -142,8 +143,8 @@ std::string opposes_slip(const Subject &subject) {
       b.must(h);
       b.commit();
       for (uint32_t i = 0; i < kPairs; ++i) {
-        const double off = std::hypot(b.out_ft[i] - b.out_ft[i + kPairs],
-                                      b.out_ft[b.stride + i] + b.out_ft[b.stride + i + kPairs]);
+        const double off = plane_length(b.out_ft[i] - b.out_ft[i + kPairs],
+                                        b.out_ft[b.stride + i] + b.out_ft[b.stride + i + kPairs]);
         const double error = off == 0 ? 0 : off / (b.ft(i) + s.level);
         worst = std::max(worst, error);
         if (!(error <= 1e-12))

@@ -5,6 +5,7 @@
 #include "check/groups.h"
 #include "check/law.h"
 #include "check/runner.h"
+#include "plane.h"
 
 namespace cli::check {
 namespace {
@@ -79,7 +80,7 @@ std::string turns_with_frame(const Subject &subject) {
         const double turn = kTurn * i / 360;
         const double ex = x * std::cos(turn) - y * std::sin(turn);
         const double ey = x * std::sin(turn) + y * std::cos(turn);
-        const double off = std::hypot(b.out_ft[i] - ex, b.out_ft[b.stride + i] - ey);
+        const double off = plane_length(b.out_ft[i] - ex, b.out_ft[b.stride + i] - ey);
         const double error = off == 0 ? 0 : off / (b.ft(0) + s.level);
         worst = std::max(worst, error);
         if (!(error <= 1e-12))
@@ -141,7 +142,7 @@ void loops_dissipate(const Law &law, const Scales &s) {
           const double vx = law.needs(DFM_NEED_VT) ? b.vt[i] : 0;
           const double vy = law.needs(DFM_NEED_VT) ? b.vt[b.stride + i] : 0;
           work[i] -= h * (b.out_ft[i] * vx + b.out_ft[b.stride + i] * vy);
-          moved[i] += h * b.ft(i) * std::hypot(vx, vy);
+          moved[i] += h * b.ft(i) * plane_length(vx, vy);
         }
       }
     for (uint32_t i = 0; i < n; ++i)
@@ -185,7 +186,7 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
       const bool sticks = law.needs(DFM_NEED_FT_STOP) && b.mode[i] == 1;
       const double vx = sticks ? 0 : b.vt[i], vy = sticks ? 0 : b.vt[b.stride + i];
       const double taken = -h * (b.out_ft[i] * vx + b.out_ft[b.stride + i] * vy);
-      const double path = h * b.ft(i) * std::hypot(vx, vy);
+      const double path = h * b.ft(i) * plane_length(vx, vy);
       work[i] += taken;
       moved[i] += path;
       if (!(work[i] >= -1e-9 * moved[i]))
@@ -304,7 +305,7 @@ std::string derivatives_agree(const Subject &subject) {
     for (int c = 0; c < 3; ++c) {
       if (!(c < 2 ? law.needs(DFM_NEED_VT) : law.needs(DFM_NEED_FN))) continue;
       const auto speed = [&](uint32_t i) {
-        return law.needs(DFM_NEED_VT) ? std::hypot(b.vt[i], b.vt[b.stride + i]) : 0;
+        return law.needs(DFM_NEED_VT) ? plane_length(b.vt[i], b.vt[b.stride + i]) : 0;
       };
       Difference d(law, b, h);
       if (c < 2)

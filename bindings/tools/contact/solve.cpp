@@ -4,6 +4,7 @@
 #include <ctime>
 
 #include "contact/newton.h"
+#include "plane.h"
 #include "solve.h"
 
 namespace contact {
@@ -14,8 +15,8 @@ namespace {
 
 // Of one contact: u with the term of its friction, r, mu.
 double natural_map(Vec3 u, Vec3 r, double mu) {
-  const Vec3 z = r - (u + Vec3{mu * std::hypot(u.y, u.z), 0, 0});
-  const double size = std::hypot(z.y, z.z);
+  const Vec3 z = r - (u + Vec3{mu * cli::plane_length(u.y, u.z), 0, 0});
+  const double size = cli::plane_length(z.y, z.z);
   Vec3 p = z;
   if (size > mu * z.x) {
     const double normal = (z.x + mu * size) / (1 + mu * mu);
@@ -130,7 +131,7 @@ class Solve final : public SolveLaws {
     ContactState &s = state_;
     for (uint32_t i = 0; i < n_; ++i) {
       const uint32_t second = s.stride + i;
-      const double mu = problem_.mu[i], size = std::hypot(s.ft_stop[i], s.ft_stop[second]);
+      const double mu = problem_.mu[i], size = cli::plane_length(s.ft_stop[i], s.ft_stop[second]);
       s.limit[i] = mu * s.fn[i];
       s.mode[i] = size > s.limit[i] ? 2 : 1;
       for (const uint32_t at : {i, second}) {
@@ -186,9 +187,9 @@ class Solve final : public SolveLaws {
     const Vec3 r = load3(&rows_.impulse[3 * size_t{i}]);
     const double w = rows_.wt[i], normal = std::fabs(std::min(rows_.wn[i] * r.x, u.x));
     if (!(w > 0)) return normal;
-    const double a = r.y - u.y / w, b = r.z - u.z / w, size = std::hypot(a, b),
+    const double a = r.y - u.y / w, b = r.z - u.z / w, size = cli::plane_length(a, b),
                  limit = problem_.mu[i] * std::max(0.0, r.x), share = size > limit ? limit / size : 1;
-    return std::max(normal, w * std::hypot(r.y - share * a, r.z - share * b));
+    return std::max(normal, w * cli::plane_length(r.y - share * a, r.z - share * b));
   }
 };
 

@@ -14,6 +14,7 @@
 #include <limits>
 
 #include "messages.h"
+#include "plane.h"
 
 namespace cli::cost {
 namespace {
@@ -591,7 +592,7 @@ class Student {
     out_.pick = first([&](double e) { return e + bound <= target; });
     out_.proven = out_.pick >= 0;
     if (out_.pick < 0) out_.pick = first([&](double e) { return e + own <= target; });
-    if (out_.pick < 0) out_.pick = first([&](double e) { return std::hypot(e, own) <= target; });
+    if (out_.pick < 0) out_.pick = first([&](double e) { return plane_length(e, own) <= target; });
     OnThisMesh &here = out_.own_mesh;
     here.pick = -1;
     for (const size_t i : here.front)

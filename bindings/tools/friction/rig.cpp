@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "messages.h"
+#include "plane.h"
 
 namespace cli {
 namespace {
@@ -278,8 +279,8 @@ class Rig {
     const double end = case_.times.back();
     refuse_too_many(end / step_);
     const bool turns = case_.drive == Drive::circle || case_.drive == Drive::turn;
-    const auto force_now = [&] { return (turns ? std::hypot(fx_, fy_) : fx_) + 0.0; };
-    const auto speed_now = [&] { return std::hypot(v_.vx, v_.vy); };
+    const auto force_now = [&] { return (turns ? plane_length(fx_, fy_) : fx_) + 0.0; };
+    const auto speed_now = [&] { return plane_length(v_.vx, v_.vy); };
     double highest = force_now(), lowest = highest, fastest = speed_now();
     for (const double row : case_.times) {
       std::vector<double> stops = {row};

@@ -1,9 +1,7 @@
 #include "core/aside.h"
 
 #include <algorithm>
-#include <condition_variable>
 #include <deque>
-#include <mutex>
 #include <thread>
 #include <utility>
 #if defined(__linux__)
@@ -14,6 +12,7 @@
 
 #include "core/float_env.h"
 #include "core/tasks.h"
+#include "core/wait.h"
 
 namespace dfm {
 namespace {
@@ -78,7 +77,7 @@ struct Aside::Room {
       std::shared_ptr<Job> job;  // may be the last that holds it: it goes without the lock
       {
         std::unique_lock lock(mutex);
-        begin.wait(lock, [&] { return stop || !jobs.empty(); });
+        wait(begin, lock, [&] { return stop || !jobs.empty(); });
         if (stop) return;
         job = std::move(jobs.front());
         jobs.pop_front();

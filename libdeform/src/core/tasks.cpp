@@ -7,12 +7,11 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
-#include <mutex>
 #include <thread>
 #include <vector>
 
 #include "core/float_env.h"
+#include "core/wait.h"
 
 namespace dfm {
 namespace {
@@ -157,7 +156,7 @@ struct Tasks::Pool {
       if (!spin(ready, most)) {
         std::unique_lock lock(mutex);
         here.asleep = true;
-        here.start.wait(lock, ready);
+        wait(here.start, lock, ready);
         here.asleep = false;
       }
       if (stop.load()) return;
@@ -198,7 +197,7 @@ struct Tasks::Pool {
     if (spin(empty, [&] { return crowded ? kCrowded : kWithinStep; })) return;
     std::unique_lock lock(mutex);
     waiting = true;
-    done.wait(lock, empty);
+    wait(done, lock, empty);
     waiting = false;
   }
 };

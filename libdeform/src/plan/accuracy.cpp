@@ -104,7 +104,7 @@ double explicit_step(const MeasuredModel &m, const BodyRegime &b) {
   const double nu = std::min(std::max(b.poisson, 0.0), 0.49);
   const double pressure = std::sqrt(b.young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / b.density);
   const double h0 = m.wave_steps * b.cell_size / pressure, beta = b.damping_stiffness;
-  return kOffered * h0 * h0 / (std::hypot(h0, beta) + beta);
+  return kOffered * h0 * h0 / (std::sqrt(h0 * h0 + beta * beta) + beta);
 }
 
 double cpu_per_s(const MeasuredModel &m, Scheme own, double h, const BodyRegime &b) {

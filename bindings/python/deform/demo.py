@@ -1,18 +1,20 @@
 #!/usr/bin/env python3
-"""make demo: the two cylinders with friction and without, as a table, one picture with two rows, and
-out/demo/summary.json.
+"""`make demo`, `python -m deform demo [OUT_DIR]`: two cylinders with friction and without, as a table, one
+picture with two rows, and summary.json.
 
-demo.py DEFORM_COMMAND OUT_DIR
+demo.py DEFORM_COMMAND SCENE OUT_DIR
 """
+from __future__ import annotations
+
 import csv
 import json
 import math
 import pathlib
 import subprocess
 import sys
+from typing import Any
 
-SCENE = "examples/scenes/two_cylinders.json"
-RUNS = {
+RUNS: dict[str, list[str]] = {
     "with friction": [],
     "without friction": ["--set", '/contact/friction=[{"between": ["*", "*"], "law": "none"}]'],
 }
@@ -21,18 +23,19 @@ FRAMES_PER_SECOND = 2
 TIMES = (0, 0.5, 1, 1.5, 5)
 
 
-def run(*argv):
+def run(*argv: Any) -> None:
     done = subprocess.run([str(a) for a in argv])
     if done.returncode:
         sys.exit(f"demo: {' '.join(map(str, argv))} ended with exit code {done.returncode}; its sentence "
                  f"stands above")
 
 
-def simulate(command, out, label, options):
+def simulate(command: Any, scene: Any, out: pathlib.Path, label: str,
+             options: list[str]) -> dict[str, Any]:
     """Runs the scene and returns what the table and the picture need."""
     folder = out / label.replace(" ", "_")
     print(f"--- {label}", flush=True)
-    run(command, "run", SCENE, "--out", folder, "--frames", FRAMES_PER_SECOND, *options)
+    run(command, "run", scene, "--out", folder, "--frames", FRAMES_PER_SECOND, *options)
     summary = json.loads((folder / "summary.json").read_text())
     with open(folder / "bodies.csv", newline="") as file:
         rows = [r for r in csv.DictReader(file) if r["body"] == "upper"]
@@ -51,8 +54,8 @@ def simulate(command, out, label, options):
     }
 
 
-def table(runs):
-    def place(point):
+def table(runs: dict[str, dict[str, Any]]) -> None:
+    def place(point: Any) -> str:
         return "({:.3f} {:.3f} {:.3f})".format(*point)
 
     rows = [("upper cylinder starts at (m)", lambda r: place(r["upper"]["start"])),
@@ -69,18 +72,17 @@ def table(runs):
         print(f"{name:34}" + "".join(f"{cell(r):>24}" for r in runs.values()))
 
 
-def main():
-    command, out = sys.argv[1], pathlib.Path(sys.argv[2])
+def demo(command: Any, scene: Any, out: pathlib.Path) -> None:
     out.mkdir(parents=True, exist_ok=True)
-    runs = {label: simulate(command, out, label, options) for label, options in RUNS.items()}
+    runs = {label: simulate(command, scene, out, label, options) for label, options in RUNS.items()}
     picture = out / "two_cylinders.png"
     run(command, "montage", *(part for label, r in runs.items() for part in ("--row", label, *r["pictures"])),
         "--out", picture)
-    (out / "summary.json").write_text(json.dumps({"scene": SCENE, "picture": str(picture), "runs": runs},
+    (out / "summary.json").write_text(json.dumps({"scene": str(scene), "picture": str(picture), "runs": runs},
                                                  indent=2) + "\n")
     table(runs)
     print(f"\npicture {picture}, figures {out}/summary.json")
 
 
 if __name__ == "__main__":
-    main()
+    demo(sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3]))

@@ -1,0 +1,12 @@
+"""python -m deform demo [OUT_DIR]: the picture of the front page; other words are those of the command."""
+import pathlib
+import sys
+
+from ._command import main
+from ._library import command_path, demo_scene
+
+if sys.argv[1:2] == ["demo"]:
+    from .demo import demo
+    demo(command_path(), demo_scene(), pathlib.Path((sys.argv[2:3] or ["deform_demo"])[0]))
+else:
+    main()
