@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "geometry/bulge.h"
 #include "geometry/closest.h"
 #include "geometry/obstacle_shape.h"
 #include "geometry/tree_walk.h"
@@ -51,6 +52,18 @@ struct Features {  // corners of a surface as listed
   Vec3 corner(uint32_t t, int k) const { return point(surface.tri[3 * size_t{t} + k]); }
   Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
 };
+
+// m, the farthest that a patch as listed lies off its triangle
+double largest_bulge(const Features &f) {
+  double most = 0;
+  for (uint32_t t = 0; t < f.surface.bulge_from.size(); ++t) {
+    if (f.surface.bulge_from[t] == kNone) continue;
+    const Patch patch(f.surface, t);
+    for (int k = 0; k < 3; ++k)
+      most = std::max(most, norm2(patch.off(k, [&](uint32_t s) { return f.point(s); })));
+  }
+  return 4.0 / 3 * std::sqrt(most);
+}
 
 constexpr size_t kLook = 1000;  // surfels that are worth a job
 
@@ -475,12 +488,15 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
 }
 
 // Edges and triangles are listed only where surfels alone would let the obstacle through: edges at a round
-// shape or at the edges of a box, triangles at a round shape or at the corners of a box.
+// shape or at the edges of a box, triangles at a round shape or at the corners of a box; all near the obstacle
+// where they bulge.
 bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
   const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};
   const Shape kind = shape.view().shape;
-  const double near = kRounding * (a.margin + thing.margin + recovery_depth(*a.surface));
+  const bool bulges = !a.surface->bulge.empty();
+  const double near = kRounding * (a.surface->bulge_sum * a.margin + thing.margin + recovery_depth(*a.surface)) +
+                      (bulges ? largest_bulge(fa) : 0);
   const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
   const double limit = near + round, limit2 = limit * limit;
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
@@ -511,16 +527,23 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
     }
     return false;
   };
+  const auto all_near = [&](uint32_t t) {
+    const Vec3 center = (1.0 / 3) * (fa.corner(t, 0) + fa.corner(t, 1) + fa.corner(t, 2));
+    double size2 = 0;
+    for (int k = 0; k < 3; ++k) size2 = std::max(size2, norm2(fa.corner(t, k) - center));
+    return shape.closest(center).distance <= near + std::sqrt(size2);
+  };
   near_triangles(a.tree, box_near, [&](uint32_t t) {
+    const bool all = bulges && all_near(t);
     const uint32_t owns = fa.surface.tri_owns[t];
     for (int k = 0; k < 3; ++k) {
       if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near)
         found.vf.push_back(fa.surface.tri[3 * size_t{t} + k]);
-      if (kind != Shape::plane && owns >> (3 + k) & 1 &&
-          edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))
+      if (owns >> (3 + k) & 1 &&
+          (all || (kind != Shape::plane && edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))))
         found.ee.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
     }
-    if (kind != Shape::plane && triangle_near(t)) found.fv.push_back(t);
+    if (all || (kind != Shape::plane && triangle_near(t))) found.fv.push_back(t);
   });
   for (Array<uint64_t> *list : {&found.vf, &found.ee, &found.fv})
     for (uint64_t &f : *list) f <<= 32;
@@ -532,7 +555,7 @@ void BroadPhase::add_segments(const Pair &pair, std::span<const Found> parts) {
   const auto [a, b, obstacle] = pair;
   const Shape shape = obstacle ? things_[b].view.shape : Shape::none;
   add_segment(a, b, obstacle, 0, parts, &Found::vf);
-  if (shape == Shape::plane) return;
+  if (shape == Shape::plane && bodies_[a].surface->bulge.empty()) return;
   if (shape != Shape::voxels) add_segment(a, b, obstacle, 1, parts, &Found::ee);
   if (obstacle) add_segment(a, b, true, 2, parts, &Found::fv);
   else add_segment(b, a, false, 0, parts, &Found::fv);

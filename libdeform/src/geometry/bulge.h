@@ -1,0 +1,68 @@
+// Surfaces that mean to be smooth: over each triangle a quadratic patch through its corners,
+//
+//     p(u) = sum_k u_k x_k + 4 (u_0 u_1 D_0 + u_1 u_2 D_1 + u_2 u_0 D_2),
+//
+// D_k how far the middle of edge k lies off the straight edge. At rest a patch has the curve that its corners'
+// normals ask for (the middle of a cubic edge of Vlachos et al., Curved PN triangles, 2001); there D_k is
+// written in the corners and a fourth surfel off the triangle's plane, and so it goes with the body:
+//
+//     D_k = c_k0 (x_1 - x_0) + c_k1 (x_2 - x_0) + c_k2 (x_o - x_0).
+//
+// A point of a patch is a sum of surfels whose weights depend on u alone. It moves as the body does where that
+// moves as a rigid one, its gap changes by its weights times the surfels' velocities, and impulses on it keep
+// angular momentum. Where a load has pressed the surfels flat, so is the patch.
+#pragma once
+#include "geometry/surface.h"
+#include "math/vec3.h"
+
+namespace dfm {
+
+// Makes the patches of a surface at rest. Faces whose normals differ by less than `degrees` at a corner are of
+// one smooth surface there. Patches that would be hollow stay flat.
+void make_bulges(Surface &surface, double degrees);
+
+struct Patch {
+  uint32_t node[4];  // the triangle's corners and the fourth surfel
+  const double *c;   // [3,3]
+
+  Patch(const Surface &s, uint32_t t)
+      : node{s.tri[3 * size_t{t}], s.tri[3 * size_t{t} + 1], s.tri[3 * size_t{t} + 2], s.bulge_from[t]},
+        c(&s.bulge[9 * size_t{t}]) {}
+  void weights(const double u[3], double w[4]) const {
+    for (int k = 0; k < 3; ++k) w[k] = u[k];
+    w[3] = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double f = 4 * u[k] * u[(k + 1) % 3];
+      w[0] -= f * (c[3 * k] + c[3 * k + 1] + c[3 * k + 2]);
+      for (int i = 0; i < 3; ++i) w[i + 1] += f * c[3 * k + i];
+    }
+  }
+  // D_k; at(surfel): its place
+  template <class At>
+  Vec3 off(int k, At &&at) const {
+    const Vec3 x = at(node[0]);
+    return c[3 * k] * (at(node[1]) - x) + c[3 * k + 1] * (at(node[2]) - x) + c[3 * k + 2] * (at(node[3]) - x);
+  }
+};
+
+// The heights over a plane of a patch: of its corners, and 4 times those of D_k at the middles.
+struct PatchHeights {
+  double corner[3], off[3];
+
+  template <class At>
+  PatchHeights(const Patch &patch, Vec3 normal, At &&at) {
+    for (int k = 0; k < 3; ++k) corner[k] = dot(normal, at(patch.node[k]));
+    for (int k = 0; k < 3; ++k) off[k] = dot(normal, patch.off(k, at));
+  }
+  double at(const double u[3]) const {
+    double sum = 0;
+    for (int k = 0; k < 3; ++k) sum += u[k] * corner[k] + 4 * u[k] * u[(k + 1) % 3] * off[k];
+    return sum;
+  }
+  // The lowest point between the ends of edge k; false: it is an end.
+  bool lowest_of_edge(int k, double u[3]) const;
+  // The lowest point inside; false: it lies on an edge.
+  bool lowest_inside(double u[3]) const;
+};
+
+}  // namespace dfm
