@@ -170,6 +170,7 @@ struct Made {
     d.name = name;
     d.material = material;
     d.mass_scaling = 0.01;
+    d.smooth = 30;
     test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
     d.npoint = info.npoint;
     d.ntet = info.ntet;
@@ -191,6 +192,7 @@ TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   EXPECT_EQ(all(write(made.world, path, DFM_SCENE_SNAPSHOT)), "");
   EXPECT_NE(test::read_file(path).find("\"max_sweeps\":77"), std::string::npos) << test::read_file(path);
   EXPECT_NE(test::read_file(path).find("\"mass_scaling\": 0.01"), std::string::npos);
+  EXPECT_NE(test::read_file(path).find("\"smooth\": 30"), std::string::npos);
   const dfm_world back = load(made.context, path);
   ASSERT_TRUE(back);
   const std::vector<unsigned char> bytes = read(folder_of("program") + "/program_files/snapshot.state");

@@ -301,8 +301,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         or the path of its file. fields: model parameters that differ by cell, [m] or [m,width] by key. scale:
         of the points of mesh and surface, 0.001 where they are in millimeters. on: an obstacle, onto which
         the body is moved from its position along gravity. mass_scaling: share of its mass, at most 0.1, that
-        may be moved to the points that bound explicit sub-steps. smooth: degrees; where normals of neighboring
-        faces differ by less, the body touches closed-form obstacles as a curved surface.
+        may be moved to the points that bound explicit sub-steps. smooth: degrees; across edges with smaller
+        angles the body touches planes, spheres, boxes and capsules as a curved surface.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)

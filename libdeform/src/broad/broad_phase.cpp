@@ -488,15 +488,16 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
 }
 
 // Edges and triangles are listed only where surfels alone would let the obstacle through: edges at a round
-// shape or at the edges of a box, triangles at a round shape or at the corners of a box; all near the obstacle
-// where they bulge.
+// shape or at the edges of a box, triangles at a round shape or at the corners of a box; of surfaces that
+// bulge, all near the obstacle.
 bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
   const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};
   const Shape kind = shape.view().shape;
   const bool bulges = !a.surface->bulge.empty();
-  const double near = kRounding * (a.surface->bulge_sum * a.margin + thing.margin + recovery_depth(*a.surface)) +
-                      (bulges ? largest_bulge(fa) : 0);
+  const double near =
+      kRounding * (a.surface->bulge_sum * a.margin + thing.margin + recovery_depth(*a.surface)) +
+      (bulges ? largest_bulge(fa) : 0);
   const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
   const double limit = near + round, limit2 = limit * limit;
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};

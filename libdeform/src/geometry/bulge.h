@@ -2,23 +2,23 @@
 //
 //     p(u) = sum_k u_k x_k + 4 (u_0 u_1 D_0 + u_1 u_2 D_1 + u_2 u_0 D_2),
 //
-// D_k how far the middle of edge k lies off the straight edge. At rest a patch has the curve that its corners'
-// normals ask for (the middle of a cubic edge of Vlachos et al., Curved PN triangles, 2001); there D_k is
-// written in the corners and a fourth surfel off the triangle's plane, and so it goes with the body:
+// D_k how far the middle of edge k lies off the straight edge. At rest a patch has the curve that the
+// normals of its corners ask for (the middle of a cubic edge of Vlachos et al., Curved PN triangles, 2001);
+// there D_k is written in the corners and a fourth surfel off the triangle's plane, so it goes with the body:
 //
 //     D_k = c_k0 (x_1 - x_0) + c_k1 (x_2 - x_0) + c_k2 (x_o - x_0).
 //
-// A point of a patch is a sum of surfels whose weights depend on u alone. It moves as the body does where that
-// moves as a rigid one, its gap changes by its weights times the surfels' velocities, and impulses on it keep
-// angular momentum. Where a load has pressed the surfels flat, so is the patch.
+// A point of a patch is a sum of surfels whose weights depend on u alone. It moves as the body does where
+// that moves as a rigid one, its gap changes by its weights times the velocities of surfels, and impulses on
+// it keep angular momentum. Where a load has pressed the surfels flat, so is the patch.
 #pragma once
 #include "geometry/surface.h"
 #include "math/vec3.h"
 
 namespace dfm {
 
-// Makes the patches of a surface at rest. Faces whose normals differ by less than `degrees` at a corner are of
-// one smooth surface there. Patches that would be hollow stay flat.
+// Makes the patches of a surface at rest. Edges whose faces' normals differ by at most `degrees` are smooth.
+// Patches that would be hollow stay flat.
 void make_bulges(Surface &surface, double degrees);
 
 struct Patch {
@@ -45,7 +45,7 @@ struct Patch {
   }
 };
 
-// The heights over a plane of a patch: of its corners, and 4 times those of D_k at the middles.
+// The heights of a patch over a plane: of its corners, and of D_k.
 struct PatchHeights {
   double corner[3], off[3];
 
@@ -59,10 +59,12 @@ struct PatchHeights {
     for (int k = 0; k < 3; ++k) sum += u[k] * corner[k] + 4 * u[k] * u[(k + 1) % 3] * off[k];
     return sum;
   }
-  // The lowest point between the ends of edge k; false: it is an end.
+  // The lowest point of the curve over edge k, of the surface over the triangle, also beyond their ends,
+  // where some u < 0. False: there is none.
   bool lowest_of_edge(int k, double u[3]) const;
-  // The lowest point inside; false: it lies on an edge.
-  bool lowest_inside(double u[3]) const;
+  bool lowest(double u[3]) const;
 };
+
+inline bool in_triangle(const double u[3]) { return u[0] >= 0 && u[1] >= 0 && u[2] >= 0; }
 
 }  // namespace dfm

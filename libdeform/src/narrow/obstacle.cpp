@@ -1,7 +1,7 @@
 // Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the
 // obstacle. Where the obstacle is smaller than a triangle, edges and faces of the body count too, with the
-// same rule as between bodies: only local minima of the distance, seen from outside. So they do where the body's
-// surface means to be smooth and bulges between its surfels (geometry/bulge.h).
+// same rule as between bodies: only local minima of the distance, seen from outside. So they do where the
+// body's surface means to be smooth and bulges between its surfels (geometry/bulge.h).
 #include <algorithm>
 
 #include "geometry/area.h"
@@ -158,13 +158,13 @@ namespace {
 
 // Of a box edge contacts have numbers below this, and the faces that bulges touch have those from it on.
 constexpr uint32_t kFaces = 32;
-// The obstacle's normal depends on the place, and the lowest place on the normal. On a plane the second is
-// exact, off a round shape each has a share of the error of the one before.
+// The obstacle's normal depends on the place, and the lowest place on the normal. On a plane the first is
+// exact; of two spheres of radius R and r each has R / (R + r) of the error of the one before.
 constexpr int kPlaces = 8;
 
-// The lowest place of a smooth surface over one of its edges or triangles is a contact where it lies below the
-// edge's ends, or the triangle's border, by more than what corners are worth alone. find(heights, u, border):
-// whether there is one, and the lowest height of the border.
+// The lowest place of a smooth surface over one of its edges or triangles is a contact where it lies below
+// the edge's ends, or the triangle's border, by more than kLeastDip. find(heights, u, border): whether there
+// is one, which may lie beyond the border, and the lowest height of the border.
 template <class Find>
 bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t feature, Find &&find,
                  ContactPoint &c) {
@@ -173,10 +173,15 @@ bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t fe
   double u[3], w[4];
   Vec3 p = (1.0 / 3) * (at(patch.node[0]) + at(patch.node[1]) + at(patch.node[2]));
   ObstaclePoint o = shape.closest(p);
+  bool touches = false;
   for (int k = 0; k < kPlaces; ++k) {
     const PatchHeights heights(patch, o.normal, at);
     double border;
-    if (!find(heights, u, border) || !(heights.at(u) < border - kLeastDip * pair.offset)) return false;
+    if (!find(heights, u, border)) return false;
+    touches = in_triangle(u) && heights.at(u) < border - kLeastDip * pair.offset;
+    double sum = 0;
+    for (double &part : u) sum += part = std::max(part, 0.0);
+    for (double &part : u) part /= sum;
     patch.weights(u, w);
     p = {};
     for (int i = 0; i < 4; ++i) p += w[i] * at(patch.node[i]);
@@ -184,6 +189,7 @@ bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t fe
     o = shape.closest(p);
     if (norm2(o.normal - before) == 0) break;
   }
+  if (!touches) return false;
   if (!(o.distance < reach_of(pair, patch.node, o.point)) || off_an_edge(shape, o)) return false;
   c = blank(pair, kPrimitive, type, feature, kFaces + o.face);
   for (int i = 0; i < 4; ++i) add_node(c, pair.a.first_node + patch.node[i], w[i]);
@@ -224,8 +230,8 @@ void triangle_bulge(const Pair &pair, uint32_t t, Array<ContactPoint> &out) {
   const auto find = [](const PatchHeights &h, double u[3], double &border) {
     border = std::min({h.corner[0], h.corner[1], h.corner[2]});
     for (int k = 0; k < 3; ++k)
-      if (h.lowest_of_edge(k, u)) border = std::min(border, h.at(u));
-    return h.lowest_inside(u);
+      if (h.lowest_of_edge(k, u) && in_triangle(u)) border = std::min(border, h.at(u));
+    return h.lowest(u);
   };
   ContactPoint c;
   if (touch_bulge(pair, Patch(s, t), 2, t, find, c)) finish_bulge(pair, c, out);

@@ -121,7 +121,8 @@ void make_body_surface(Body &b, const dfm_surface_def *def, double smooth) {
   }
   if (!(smooth >= 0 && smooth <= 180))
     fail(DFM_E_ARG,
-         "body '%s': smooth is %g; it is the angle in degrees, 0 to 180, between faces below which they are of "
+         "body '%s': smooth is %g; it is the angle in degrees, 0 to 180, between faces below which they are "
+         "of "
          "one smooth surface, and 0 leaves all flat",
          b.name.c_str(), smooth);
   b.smooth = smooth;
