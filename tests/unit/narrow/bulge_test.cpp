@@ -10,10 +10,10 @@ namespace {
 using namespace dfm;
 using namespace test;
 
-constexpr double kAngle = 60;
+constexpr double kBulgeAngle = 60;
 
 // The nearest contact; checks that its surfels' weights give its own point.
-ContactPoint nearest(const Scene &scene) {
+ContactPoint nearest_touch(const Scene &scene) {
   const auto contacts = scene.contacts();
   EXPECT_EQ(flaw(scene, contacts), "");
   EXPECT_TRUE(same_bits(contacts, scene.listed())) << "lists hold all";
@@ -33,7 +33,7 @@ ContactPoint nearest(const Scene &scene) {
   return best;
 }
 
-struct Over {
+struct Beneath {
   const char *name;
   Shape shape;
   Vec3 at;
@@ -44,22 +44,22 @@ struct Over {
 // Turned by any angle, a sphere touches what lies below it near its own lowest point, to a sixth of what its
 // facets miss.
 TEST(Bulge, SphereAtAnyAngle_TouchesAtItsLowestPoint) {
-  for (const Over &o :
-       {Over{"plane", Shape::plane, {}}, Over{"box", Shape::box, {0, 0, -0.5}},
-        Over{"sphere", Shape::sphere, {0, 0, -2}}, Over{"capsule", Shape::capsule, {0, 0, -3}}}) {
+  for (const Beneath &o :
+       {Beneath{"plane", Shape::plane, {}}, Beneath{"box", Shape::box, {0, 0, -0.5}},
+        Beneath{"sphere", Shape::sphere, {0, 0, -2}}, Beneath{"capsule", Shape::capsule, {0, 0, -3}}}) {
     double facets = 0, smooth = 0, aside = 0;
     for (int i = 0; i < 60; ++i)
       for (const bool bulges : {false, true}) {
         Scene scene;
         Surface &s = scene.add(
             moved(sphere_mesh(1, 2), turn({1.0 + i % 7, 2.0 - i % 5, 0.5}, 0.37 * i), {0.1, 0.05, 1.0005}));
-        if (bulges) make_bulges(s, kAngle);
+        if (bulges) make_bulges(s, kBulgeAngle);
         scene.offset = 0.03;
         ObstacleView &view = scene.add(o.shape, o.at);
         view.half_size = {3, 3, 0.5};
         view.radius = 2;
         view.half_length = 1;
-        const ContactPoint c = nearest(scene);
+        const ContactPoint c = nearest_touch(scene);
         ASSERT_LT(c.distance, HUGE_VAL) << o.name << ' ' << i;
         if (o.shape == Shape::plane || o.shape == Shape::box) {
           (bulges ? smooth : facets) = std::max(bulges ? smooth : facets, std::fabs(c.distance - 5e-4));
@@ -82,7 +82,7 @@ TEST(Bulge, SphereAtAnyAngle_TouchesAtItsLowestPoint) {
 TEST(Bulge, Patches_FollowTheirSurfels) {
   Scene scene;
   Surface &s = scene.add(sphere_mesh(1, 1));
-  make_bulges(s, kAngle);
+  make_bulges(s, kBulgeAngle);
   const Quat q = turn({1, 2, 3}, 1.1);
   const auto at = [&](uint32_t i) { return load3(&s.x[4 * size_t{i}]); };
   const auto turned = [&](uint32_t i) { return rotate(q, at(i)) + Vec3{1, 2, 3}; };
@@ -102,10 +102,10 @@ TEST(Bulge, Patches_FollowTheirSurfels) {
 TEST(Bulge, FlatFacesAndCreases_AreAsWithout) {
   Scene scene;
   Surface &s = scene.add(box_mesh({1, 1, 1}, 3, 3, 3));
-  make_bulges(s, kAngle);
+  make_bulges(s, kBulgeAngle);
   for (const uint32_t from : s.bulge_from) EXPECT_EQ(from, kNone);
   Surface &c = scene.add(cylinder_mesh(1, 1, 16, 3));
-  make_bulges(c, kAngle);
+  make_bulges(c, kBulgeAngle);
   for (uint32_t t = 0; t < c.ntri; ++t) {
     const Vec3 normal = c.area2(t, [&](uint32_t i) { return load3(&c.x[4 * size_t{i}]); });
     EXPECT_EQ(c.bulge_from[t] == kNone, std::fabs(normal.y) > 0.5 * norm(normal))
