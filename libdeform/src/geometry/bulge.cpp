@@ -76,15 +76,14 @@ struct Maker {
     if (!(rise > 0) || !(depth >= rise)) return;
     const Vec3 a = x(c[1]) - x(c[0]), b = x(c[2]) - x(c[0]), o = x(from) - x(c[0]);
     const double det = dot(cross(a, b), o);
-    for (int k = 0; k < 3; ++k)
-      store3(&s.bulge[9 * size_t{t} + 3 * size_t(k)],
-             (1 / det) * Vec3{dot(cross(off[k], b), o), dot(cross(a, off[k]), o), dot(cross(a, b), off[k])});
     s.bulge_from[t] = from;
-    const double middle[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3};
-    double w[4], sum = 0;
-    Patch(s, t).weights(middle, w);
-    for (const double weight : w) sum += std::fabs(weight);
-    s.bulge_sum = std::max(s.bulge_sum, sum);
+    for (int k = 0; k < 3; ++k) {
+      const Vec3 w =
+          (1 / det) * Vec3{dot(cross(off[k], b), o), dot(cross(a, off[k]), o), dot(cross(a, b), off[k])};
+      store3(&s.bulge[9 * size_t{t} + 3 * size_t(k)], w);
+      const double sum = std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z) + std::fabs(w.x + w.y + w.z);
+      s.bulge_sum = std::max(s.bulge_sum, 1 + 4.0 / 3 * sum);
+    }
   }
 };
 

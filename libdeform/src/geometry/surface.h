@@ -51,7 +51,7 @@ struct Surface {
   Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;          // m, rest
   // Quadratic patches over the triangles (geometry/bulge.h): [ntri] a fourth surfel, kNone: a flat one;
-  // [ntri,9]; at least 1, the largest sum of |weight| of a point of a patch. Empty: all are flat.
+  // [ntri,9]; at least 1, a bound of the sum of |weight| of a point of a patch. Empty: all are flat.
   Array<uint32_t> bulge_from;
   Array<double> bulge;
   double bulge_sum = 1;

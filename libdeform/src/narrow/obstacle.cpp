@@ -158,8 +158,7 @@ namespace {
 
 // Of a box edge contacts have numbers below this, and the faces that bulges touch have those from it on.
 constexpr uint32_t kFaces = 32;
-// The obstacle's normal depends on the place, and the lowest place on the normal. On a plane the first is
-// exact; of two spheres of radius R and r each has R / (R + r) of the error of the one before.
+// Newton's steps to the place that is nearest to a round obstacle; to a flat one the first is exact.
 constexpr int kPlaces = 8;
 
 // The lowest place of a smooth surface over one of its edges or triangles is a contact where it lies below
@@ -170,12 +169,18 @@ bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t fe
                  ContactPoint &c) {
   const ObstacleShape &shape = *pair.shape;
   const auto at = [&](uint32_t s) { return pair.xa(s); };
-  double u[3], w[4];
-  Vec3 p = (1.0 / 3) * (at(patch.node[0]) + at(patch.node[1]) + at(patch.node[2]));
+  const Vec3 x[3] = {at(patch.node[0]), at(patch.node[1]), at(patch.node[2])};
+  double u[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3}, w[4];
+  Vec3 p = (1.0 / 3) * (x[0] + x[1] + x[2]);
   ObstaclePoint o = shape.closest(p);
   bool touches = false;
-  for (int k = 0; k < kPlaces; ++k) {
-    const PatchHeights heights(patch, o.normal, at);
+  for (int step = 0; step < kPlaces; ++step) {
+    PatchHeights heights(patch, o.normal, at);
+    const Vec3 over = u[0] * x[0] + u[1] * x[1] + u[2] * x[2];
+    for (int k = 0; k < 3; ++k) {
+      heights.corner[k] += 0.5 * shape.bend(o, x[k] - over);
+      heights.off[k] -= 0.125 * shape.bend(o, x[(k + 1) % 3] - x[k]);
+    }
     double border;
     if (!find(heights, u, border)) return false;
     touches = in_triangle(u) && heights.at(u) < border - kLeastDip * pair.offset;

@@ -108,6 +108,9 @@ void tell_of_long_edges(const Body &b) {
 
 void make_body_surface(Body &b, const dfm_surface_def *def, double smooth) {
   const Memory &m = b.world->memory();
+  if (!(smooth >= 0 && smooth <= 180))
+    fail(DFM_E_ARG, "body '%s': smooth %g; it is an angle between faces in degrees, 0 (flat faces) to 180",
+         b.name.c_str(), smooth);
   if (def) {
     check_surface(*def, b.name.c_str());
     make_surface(m, def->npoint, def->points, def->triangles, def->ntriangle, b.surface);
@@ -119,12 +122,6 @@ void make_body_surface(Body &b, const dfm_surface_def *def, double smooth) {
     make_surface(m, b.p.n, b.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
                  b.surface);
   }
-  if (!(smooth >= 0 && smooth <= 180))
-    fail(DFM_E_ARG,
-         "body '%s': smooth is %g; it is the angle in degrees, 0 to 180, between faces below which they are "
-         "of "
-         "one smooth surface, and 0 leaves all flat",
-         b.name.c_str(), smooth);
   b.smooth = smooth;
   if (smooth > 0) make_bulges(b.surface, smooth);
   gather_surface(b.surface, b.p.x.data(), b.p.v.data());

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "detect_scene.h"
+#include "geometry/obstacle_shape.h"
 
 namespace {
 
@@ -36,41 +37,41 @@ ContactPoint nearest_touch(const Scene &scene) {
 struct Beneath {
   const char *name;
   Shape shape;
+  double radius;
   Vec3 at;
+  Quat turned{};
 };
 
 }  // namespace
 
 // Turned by any angle, a sphere touches what lies below it near its own lowest point, to a sixth of what its
-// facets miss.
+// facets miss, also what is much more curved than itself.
 TEST(Bulge, SphereAtAnyAngle_TouchesAtItsLowestPoint) {
-  for (const Beneath &o :
-       {Beneath{"plane", Shape::plane, {}}, Beneath{"box", Shape::box, {0, 0, -0.5}},
-        Beneath{"sphere", Shape::sphere, {0, 0, -2}}, Beneath{"capsule", Shape::capsule, {0, 0, -3}}}) {
+  const Quat lying = turn({0, 1, 0}, M_PI / 2);
+  for (const Beneath &o : {Beneath{"plane", Shape::plane, 0, {}}, Beneath{"box", Shape::box, 0, {0, 0, -0.5}},
+                           Beneath{"sphere", Shape::sphere, 2, {0, 0, -2}},
+                           Beneath{"small ball", Shape::sphere, 0.2, {0.1, 0.05, -0.2}},
+                           Beneath{"capsule", Shape::capsule, 2, {0, 0, -3}},
+                           Beneath{"rod", Shape::capsule, 0.1, {0.1, 0.05, -0.1}, lying}}) {
     double facets = 0, smooth = 0, aside = 0;
     for (int i = 0; i < 60; ++i)
       for (const bool bulges : {false, true}) {
         Scene scene;
-        Surface &s = scene.add(
-            moved(sphere_mesh(1, 2), turn({1.0 + i % 7, 2.0 - i % 5, 0.5}, 0.37 * i), {0.1, 0.05, 1.0005}));
+        const Vec3 center{0.1, 0.05, 1.0005};
+        Surface &s =
+            scene.add(moved(sphere_mesh(1, 2), turn({1.0 + i % 7, 2.0 - i % 5, 0.5}, 0.37 * i), center));
         if (bulges) make_bulges(s, kBulgeAngle);
         scene.offset = 0.03;
-        ObstacleView &view = scene.add(o.shape, o.at);
+        ObstacleView &view = scene.add(o.shape, o.at, o.turned);
         view.half_size = {3, 3, 0.5};
-        view.radius = 2;
+        view.radius = o.radius;
         view.half_length = 1;
         const ContactPoint c = nearest_touch(scene);
         ASSERT_LT(c.distance, HUGE_VAL) << o.name << ' ' << i;
-        if (o.shape == Shape::plane || o.shape == Shape::box) {
-          (bulges ? smooth : facets) = std::max(bulges ? smooth : facets, std::fabs(c.distance - 5e-4));
-          if (bulges) aside = std::max(aside, std::hypot(c.point[0] - 0.1, c.point[1] - 0.05));
-        } else {
-          const Vec3 center{0.1, 0.05, 1.0005};
-          Vec3 from = center - o.at;
-          if (o.shape == Shape::capsule) from.z = std::max(0.0, from.z - 1);
-          const double truth = norm(from) - 3;
-          (bulges ? smooth : facets) = std::max(bulges ? smooth : facets, std::fabs(c.distance - truth));
-        }
+        const ObstaclePoint truth = ObstacleShape(view).closest(center);
+        double &most = bulges ? smooth : facets;
+        most = std::max(most, std::fabs(c.distance - (truth.distance - 1)));
+        if (bulges) aside = std::max(aside, norm(cross(load3(c.point) - center, truth.normal)));
       }
     EXPECT_GT(facets, 0.02) << o.name;
     EXPECT_LT(smooth, facets / 6) << o.name;
@@ -96,6 +97,28 @@ TEST(Bulge, Patches_FollowTheirSurfels) {
       EXPECT_LT(norm(patch.off(k, turned) - rotate(q, d)), 1e-12);
       EXPECT_EQ(patch.off(k, flat).z, 0);
     }
+  }
+}
+
+// Lists are as wide as a place may move when its surfels do.
+TEST(Bulge, BoundOfWeights_HoldsEverywhere) {
+  Scene scene;
+  for (const Mesh &mesh : {sphere_mesh(1, 1), cylinder_mesh(1, 1, 16, 3)}) {
+    Surface &s = scene.add(mesh);
+    make_bulges(s, kBulgeAngle);
+    double most = 0;
+    for (uint32_t t = 0; t < s.ntri; ++t) {
+      if (s.bulge_from[t] == kNone) continue;
+      for (int i = 0; i <= 12; ++i)
+        for (int j = 0; i + j <= 12; ++j) {
+          const double u[3] = {i / 12.0, j / 12.0, (12 - i - j) / 12.0};
+          double w[4];
+          Patch(s, t).weights(u, w);
+          most = std::max(most, std::fabs(w[0]) + std::fabs(w[1]) + std::fabs(w[2]) + std::fabs(w[3]));
+        }
+    }
+    EXPECT_GT(most, 1.1);
+    EXPECT_LE(most, s.bulge_sum);
   }
 }
 
