@@ -117,9 +117,10 @@ INSTANTIATE_TEST_SUITE_P(Each, ShippedScene,
                                          "gravity_anisotropy", "gravity_beams", "guard_shot", "lattice_drop",
                                          "liver", "orange", "pinched_tube", "pressed_ring", "probe_block",
                                          "rabbits_slope", "reduced_models", "rigid_on_ball", "rigid_on_bed",
-                                         "rigid_pinch", "rollback_compare", "slope_block", "surface_organ",
-                                         "ten_bodies", "terrain", "torn_dough", "two_cylinders",
-                                         "two_cylinders_coarse", "two_materials", "viscoelastic_bars"),
+                                         "rigid_pinch", "rollback_compare", "slope_block", "smooth_rolling",
+                                         "surface_organ", "ten_bodies", "terrain", "torn_dough",
+                                         "two_cylinders", "two_cylinders_coarse", "two_materials",
+                                         "viscoelastic_bars"),
                          [](const auto &scene) { return std::string(scene.param); });
 
 namespace {

@@ -488,26 +488,26 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
 }
 
 // Edges and triangles are listed only where surfels alone would let the obstacle through: edges at a round
-// shape or at the edges of a box, triangles at a round shape or at the corners of a box; of surfaces that
-// bulge, all near the obstacle.
+// shape or at the edges of a box, triangles at a round shape or at the corners of a box; and where the surface
+// bulges.
 bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
   const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};
   const Shape kind = shape.view().shape;
   const bool bulges = !a.surface->bulge.empty();
-  const double near =
-      kRounding * (a.surface->bulge_sum * a.margin + thing.margin + recovery_depth(*a.surface)) +
-      (bulges ? largest_bulge(fa) : 0);
+  const double near = kRounding * (a.margin + thing.margin + recovery_depth(*a.surface));
+  const double near_bulges = kRounding * (a.surface->bulge_sum * a.margin + thing.margin);
+  const double widest = bulges ? std::max(near, near_bulges + largest_bulge(fa)) : near;
   const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
   const double limit = near + round, limit2 = limit * limit;
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
   if (kind != Shape::plane) shape.bounds(bounds.lo, bounds.hi);
   const Vec3 n = shape.axis(2);
   const auto box_near = [&](const Box &b) {
-    if (kind != Shape::plane) return box_distance2(b, bounds) <= near * near;
+    if (kind != Shape::plane) return box_distance2(b, bounds) <= widest * widest;
     double lowest = -dot(n, shape.view().position);
     for (int k = 0; k < 3; ++k) lowest += n[k] * (n[k] > 0 ? b.lo[k] : b.hi[k]);
-    return lowest <= near;
+    return lowest <= widest;
   };
   const auto edge_near = [&](Vec3 p, Vec3 q) {
     if (kind != Shape::box) return closest_segments(p, q, shape.end(0), shape.end(1)).distance2 <= limit2;
@@ -528,23 +528,26 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
     }
     return false;
   };
-  const auto all_near = [&](uint32_t t) {
-    const Vec3 center = (1.0 / 3) * (fa.corner(t, 0) + fa.corner(t, 1) + fa.corner(t, 2));
-    double size2 = 0;
-    for (int k = 0; k < 3; ++k) size2 = std::max(size2, norm2(fa.corner(t, k) - center));
-    return shape.closest(center).distance <= near + std::sqrt(size2);
+  // The obstacle, which is convex, lies behind the plane through what is nearest to the middle of the patch.
+  const auto bulge_near = [&](uint32_t t) {
+    if (!bulges || t == kNone || fa.surface.bulge_from[t] == kNone) return false;
+    const ObstaclePoint o = shape.closest((1.0 / 3) * (fa.corner(t, 0) + fa.corner(t, 1) + fa.corner(t, 2)));
+    const PatchHeights heights(Patch(fa.surface, t), o.normal, [&](uint32_t s) { return fa.point(s); });
+    return heights.least() - dot(o.normal, o.point) <= near_bulges;
   };
   near_triangles(a.tree, box_near, [&](uint32_t t) {
-    const bool all = bulges && all_near(t);
     const uint32_t owns = fa.surface.tri_owns[t];
     for (int k = 0; k < 3; ++k) {
       if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near)
         found.vf.push_back(fa.surface.tri[3 * size_t{t} + k]);
-      if (owns >> (3 + k) & 1 &&
-          (all || (kind != Shape::plane && edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))))
-        found.ee.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
+      if (!(owns >> (3 + k) & 1)) continue;
+      const uint32_t edge = fa.surface.tri_edge[3 * size_t{t} + k];
+      const uint32_t *const sides = &fa.surface.edge_tri[2 * size_t{edge}];
+      if ((kind != Shape::plane && edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3))) ||
+          bulge_near(sides[0]) || bulge_near(sides[1]))
+        found.ee.push_back(edge);
     }
-    if (all || (kind != Shape::plane && triangle_near(t))) found.fv.push_back(t);
+    if ((kind != Shape::plane && triangle_near(t)) || bulge_near(t)) found.fv.push_back(t);
   });
   for (Array<uint64_t> *list : {&found.vf, &found.ee, &found.fv})
     for (uint64_t &f : *list) f <<= 32;

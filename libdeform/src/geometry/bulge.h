@@ -12,6 +12,8 @@
 // that moves as a rigid one, its gap changes by its weights times the velocities of surfels, and impulses on
 // it keep angular momentum. Where a load has pressed the surfels flat, so is the patch.
 #pragma once
+#include <algorithm>
+
 #include "geometry/surface.h"
 #include "math/vec3.h"
 
@@ -51,13 +53,22 @@ struct PatchHeights {
 
   template <class At>
   PatchHeights(const Patch &patch, Vec3 normal, At &&at) {
-    for (int k = 0; k < 3; ++k) corner[k] = dot(normal, at(patch.node[k]));
-    for (int k = 0; k < 3; ++k) off[k] = dot(normal, patch.off(k, at));
+    double h[4];
+    for (int i = 0; i < 4; ++i) h[i] = dot(normal, at(patch.node[i]));
+    for (int k = 0; k < 3; ++k) {
+      const double *const c = &patch.c[3 * k];
+      corner[k] = h[k];
+      off[k] = c[0] * (h[1] - h[0]) + c[1] * (h[2] - h[0]) + c[2] * (h[3] - h[0]);
+    }
   }
   double at(const double u[3]) const {
     double sum = 0;
     for (int k = 0; k < 3; ++k) sum += u[k] * corner[k] + 4 * u[k] * u[(k + 1) % 3] * off[k];
     return sum;
+  }
+  // No place is lower.
+  double least() const {
+    return std::min({corner[0], corner[1], corner[2]}) + 4.0 / 3 * std::min({0.0, off[0], off[1], off[2]});
   }
   // The lowest point of the curve over edge k, of the surface over the triangle, also beyond their ends,
   // where some u < 0. False: there is none.

@@ -173,9 +173,11 @@ bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t fe
   double u[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3}, w[4];
   Vec3 p = (1.0 / 3) * (x[0] + x[1] + x[2]);
   ObstaclePoint o = shape.closest(p);
+  const double reach = reach_of(pair, patch.node, o.point);
   bool touches = false;
   for (int step = 0; step < kPlaces; ++step) {
     PatchHeights heights(patch, o.normal, at);
+    if (heights.least() - dot(o.normal, o.point) >= reach) return false;
     const Vec3 over = u[0] * x[0] + u[1] * x[1] + u[2] * x[2];
     for (int k = 0; k < 3; ++k) {
       heights.corner[k] += 0.5 * shape.bend(o, x[k] - over);
@@ -194,8 +196,7 @@ bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t fe
     o = shape.closest(p);
     if (norm2(o.normal - before) == 0) break;
   }
-  if (!touches) return false;
-  if (!(o.distance < reach_of(pair, patch.node, o.point)) || off_an_edge(shape, o)) return false;
+  if (!touches || !(o.distance < reach) || off_an_edge(shape, o)) return false;
   c = blank(pair, kPrimitive, type, feature, kFaces + o.face);
   for (int i = 0; i < 4; ++i) add_node(c, pair.a.first_node + patch.node[i], w[i]);
   place(c, p, o.point, o.normal, o.distance);
