@@ -68,7 +68,7 @@ TEST(DefSizes, DefaultsOfAnOlderOrANewerHeader_FillItsStructAndNothingBehind) {
           grown = sizeof defaults.cookie;
         if constexpr (requires { defaults.mass_scaling; })
           grown += sizeof defaults.mass_scaling + sizeof defaults.cells + sizeof defaults.cell +
-                   sizeof defaults.reserved2 + sizeof defaults.cell_inside;
+                   sizeof defaults.reserved2 + sizeof defaults.cell_inside + sizeof defaults.smooth;
         if constexpr (requires { defaults.only; }) grown += sizeof defaults.only;
         EXPECT_EQ(first + grown, known)
             << "it has grown: this number stays, and the line above takes the new size";

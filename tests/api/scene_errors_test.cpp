@@ -131,6 +131,7 @@ TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
          {"/gravity=[0,0]", {"/gravity", "three numbers"}},
          {"/gravity=[0,0,\"down\"]", {"/gravity/2", "number"}},
          {"/bodies/0/mass_scaling=0.2", {"/bodies/0/mass_scaling", "0.1"}},
+         {"/bodies/0/smooth=200", {"/bodies/0/smooth", "180"}},
          {"/bodies/0/device=tpu", {"/bodies/0/device", "\"cpu\""}},
          {"/bodies={}", {"/bodies", "array"}},
          {"/bodies/0=[]", {"/bodies/0", "expected an object"}},

@@ -117,9 +117,9 @@ INSTANTIATE_TEST_SUITE_P(Each, ShippedScene,
                                          "gravity_anisotropy", "gravity_beams", "guard_shot", "lattice_drop",
                                          "liver", "orange", "pinched_tube", "pressed_ring", "probe_block",
                                          "rabbits_slope", "reduced_models", "rigid_on_ball", "rigid_on_bed",
-                                         "rigid_pinch", "rollback_compare", "slope_block", "ten_bodies",
-                                         "terrain", "torn_dough", "two_cylinders", "two_cylinders_coarse",
-                                         "two_materials", "viscoelastic_bars"),
+                                         "rigid_pinch", "rollback_compare", "slope_block", "smooth_rolling",
+                                         "ten_bodies", "terrain", "torn_dough", "two_cylinders",
+                                         "two_cylinders_coarse", "two_materials", "viscoelastic_bars"),
                          [](const auto &scene) { return std::string(scene.param); });
 
 namespace {
@@ -170,6 +170,7 @@ struct Made {
     d.name = name;
     d.material = material;
     d.mass_scaling = 0.01;
+    d.smooth = 30;
     test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
     d.npoint = info.npoint;
     d.ntet = info.ntet;
@@ -191,6 +192,7 @@ TEST(WriteScene, WorldOfAProgram_ContinuesWithTheSameBits) {
   EXPECT_EQ(all(write(made.world, path, DFM_SCENE_SNAPSHOT)), "");
   EXPECT_NE(test::read_file(path).find("\"max_sweeps\":77"), std::string::npos) << test::read_file(path);
   EXPECT_NE(test::read_file(path).find("\"mass_scaling\": 0.01"), std::string::npos);
+  EXPECT_NE(test::read_file(path).find("\"smooth\": 30"), std::string::npos);
   const dfm_world back = load(made.context, path);
   ASSERT_TRUE(back);
   const std::vector<unsigned char> bytes = read(folder_of("program") + "/program_files/snapshot.state");

@@ -63,3 +63,31 @@ TEST(BallIncline, TooLittleFriction_DoesNotRoll) {
 
 // soak: long, and a jittered run of what another test runs
 TEST(BallIncline, JitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 1, 10, {}, 3, rolls); }
+
+// Coarse balls and cylinders on 5 degrees, from rest: those with smooth surfaces go g sin / (1 + k) t^2 / 2, k =
+// 2/5 and 1/2. On facets the ball stays behind, and the cylinder stays.
+namespace {
+
+bool rolls_smoothly(const test::SceneRun &run) {
+  const double way = 0.5 * 0.855 * 1.6 * 1.6;
+  return std::fabs(run.last("smooth_ball").com[0] / (way / 1.4) - 1) < 0.05 &&
+         std::fabs(run.last("smooth_cylinder").com[0] / (way / 1.5) - 1) < 0.05;
+}
+
+}  // namespace
+
+TEST(SmoothRolling, OnFacets_StaysBehind) {
+  const test::SceneRun run("smooth_rolling", {});
+  run.expect_sound(4, "smooth");
+  EXPECT_TRUE(rolls_smoothly(run));
+  EXPECT_LT(run.last("ball").com[0], 0.95 * run.last("smooth_ball").com[0]);
+  EXPECT_LT(run.last("cylinder").com[0], 0.5 * run.last("smooth_cylinder").com[0]);
+  EXPECT_FALSE(rolls_smoothly(
+      test::SceneRun("smooth_rolling", {"--set", "/bodies/1/smooth=0", "--set", "/bodies/3/smooth=0"})));
+  EXPECT_FALSE(rolls_smoothly(test::SceneRun("smooth_rolling", {"--set", test::kFrictionless})));
+}
+
+// soak: long, and a jittered run of what another test runs
+TEST(SmoothRolling, JitteredRuns_AllRoll) {
+  test::expect_jittered("smooth_rolling", 1, 10, {}, 4, rolls_smoothly);
+}

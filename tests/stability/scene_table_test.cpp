@@ -49,6 +49,7 @@ constexpr Row kRows[] = {
     {"rigid_pinch", 20, 0.6},
     {"rollback_compare", 15, 0.2},
     {"slope_block", 10, 0.2},
+    {"smooth_rolling", 4, 0.1},
     {"surface_organ", 0, 0},
     {"ten_bodies", 60, 0.9},
     {"terrain", 12, 0.6},

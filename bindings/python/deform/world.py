@@ -291,7 +291,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  surface: TriMesh | str | None = None, coupling: str = "barycentric",
                  fields: Mapping[str, Any] | None = None, integrator: str = "auto", category: int = 1,
                  collides_with: int = EVERYTHING, scale: float = 1, on: Obstacle | None = None,
-                 mass_scaling: float = 0) -> Body:
+                 mass_scaling: float = 0, smooth: float = 0) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
         model: "msm" (default), "corotational_fem", ...; params: of the model, by key. material: of
@@ -301,7 +301,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         or the path of its file. fields: model parameters that differ by cell, [m] or [m,width] by key. scale:
         of the points of mesh and surface, 0.001 where they are in millimeters. on: an obstacle, onto which
         the body is moved from its position along gravity. mass_scaling: share of its mass, at most 0.1, that
-        may be moved to the points that bound explicit sub-steps.
+        may be moved to the points that bound explicit sub-steps. smooth: degrees; across edges with smaller
+        angles the body touches planes, spheres, boxes and capsules as a curved surface.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -365,6 +366,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
         definition.integrator = word("integrator", integrator, INTEGRATORS)
         definition.mass_scaling = mass_scaling
+        definition.smooth = smooth
         definition.category = whole(category, "category")
         definition.collides_with = whole(collides_with, "collides_with")
         return self._know(self._body(self._created(lib.dfm_body_create, definition)))

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Frames of scenes side by side: attached.png, grasp.png, scenes.png, fill_drop.png, pressed_ring.png,
 rigid.png, ode_scenes.png, stability.png, torn_dough.png, orange.png, cheese.png,
-liver.png, lattice_drop.png, surface_organ.png.
+liver.png, lattice_drop.png, smooth_rolling.png, surface_organ.png.
 
 scene_frames.py DEFORM_COMMAND [NAME.png...] [--out FOLDER]
 
@@ -50,6 +50,7 @@ PICTURES = {
     "fill_drop.png": [("0, 0.4, 1.8 s", [("fill_drop", (), t) for t in (0, 0.4, 1.8)])],
     "bending_cells.png": [(None, [("bending_cells", (), 1.5)])],
     "lattice_drop.png": [("0, 0.2, 1.2 s", [("lattice_drop", (), t) for t in (0, 0.2, 1.2)])],
+    "smooth_rolling.png": [(None, [("smooth_rolling", (), t) for t in (0, 0.8, 1.2)])],
     "surface_organ.png": [(None, [("surface_organ", (), t) for t in (0, 0.2, 0.6)])],
     "pressed_ring.png": [(None, [("pressed_ring", FINE_RING, 0.5)])],
     "rigid.png": [("rigid_on_ball", [("rigid_on_ball", (), t) for t in (0, 1, 2)]),

@@ -80,6 +80,10 @@ typedef struct dfm_body_def {
   /* Hexahedra that are only in part material, or whose material reaches beyond them, as dfm_tetmesh_inside
    * gives them: [ncell,27], copied. NULL: whole cells. */
   const double *cell_inside;
+  /* Degrees: the surface means to be smooth across edges where its normals differ by at most this. There it
+   * touches planes, spheres, boxes and capsules as a curved one (doc/concepts/detection.md). 0: all faces are
+   * flat. */
+  double smooth;
 } dfm_body_def;
 
 /** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "geometry/bulge.h"
 #include "geometry/closest.h"
 #include "geometry/obstacle_shape.h"
 #include "geometry/tree_walk.h"
@@ -51,6 +52,18 @@ struct Features {  // corners of a surface as listed
   Vec3 corner(uint32_t t, int k) const { return point(surface.tri[3 * size_t{t} + k]); }
   Vec3 edge(uint32_t e, int k) const { return point(surface.edge[2 * size_t{e} + k]); }
 };
+
+// m, the farthest that a patch as listed lies off its triangle
+double largest_bulge(const Features &f) {
+  double most = 0;
+  for (uint32_t t = 0; t < f.surface.bulge_from.size(); ++t) {
+    if (f.surface.bulge_from[t] == kNone) continue;
+    const Patch patch(f.surface, t);
+    for (int k = 0; k < 3; ++k)
+      most = std::max(most, norm2(patch.off(k, [&](uint32_t s) { return f.point(s); })));
+  }
+  return 4.0 / 3 * std::sqrt(most);
+}
 
 constexpr size_t kLook = 1000;  // surfels that are worth a job
 
@@ -475,22 +488,26 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
 }
 
 // Edges and triangles are listed only where surfels alone would let the obstacle through: edges at a round
-// shape or at the edges of a box, triangles at a round shape or at the corners of a box.
+// shape or at the edges of a box, triangles at a round shape or at the corners of a box; and where the surface
+// bulges.
 bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
   const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};
   const Shape kind = shape.view().shape;
+  const bool bulges = !a.surface->bulge.empty();
   const double near = kRounding * (a.margin + thing.margin + recovery_depth(*a.surface));
+  const double near_bulges = kRounding * (a.surface->bulge_sum * a.margin + thing.margin);
+  const double widest = bulges ? std::max(near, near_bulges + largest_bulge(fa)) : near;
   const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
   const double limit = near + round, limit2 = limit * limit;
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
   if (kind != Shape::plane) shape.bounds(bounds.lo, bounds.hi);
   const Vec3 n = shape.axis(2);
   const auto box_near = [&](const Box &b) {
-    if (kind != Shape::plane) return box_distance2(b, bounds) <= near * near;
+    if (kind != Shape::plane) return box_distance2(b, bounds) <= widest * widest;
     double lowest = -dot(n, shape.view().position);
     for (int k = 0; k < 3; ++k) lowest += n[k] * (n[k] > 0 ? b.lo[k] : b.hi[k]);
-    return lowest <= near;
+    return lowest <= widest;
   };
   const auto edge_near = [&](Vec3 p, Vec3 q) {
     if (kind != Shape::box) return closest_segments(p, q, shape.end(0), shape.end(1)).distance2 <= limit2;
@@ -511,16 +528,26 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
     }
     return false;
   };
+  // The obstacle, which is convex, lies behind the plane through what is nearest to the middle of the patch.
+  const auto bulge_near = [&](uint32_t t) {
+    if (!bulges || t == kNone || fa.surface.bulge_from[t] == kNone) return false;
+    const ObstaclePoint o = shape.closest((1.0 / 3) * (fa.corner(t, 0) + fa.corner(t, 1) + fa.corner(t, 2)));
+    const PatchHeights heights(Patch(fa.surface, t), o.normal, [&](uint32_t s) { return fa.point(s); });
+    return heights.least() - dot(o.normal, o.point) <= near_bulges;
+  };
   near_triangles(a.tree, box_near, [&](uint32_t t) {
     const uint32_t owns = fa.surface.tri_owns[t];
     for (int k = 0; k < 3; ++k) {
       if (owns >> k & 1 && shape.closest(fa.corner(t, k)).distance <= near)
         found.vf.push_back(fa.surface.tri[3 * size_t{t} + k]);
-      if (kind != Shape::plane && owns >> (3 + k) & 1 &&
-          edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3)))
-        found.ee.push_back(fa.surface.tri_edge[3 * size_t{t} + k]);
+      if (!(owns >> (3 + k) & 1)) continue;
+      const uint32_t edge = fa.surface.tri_edge[3 * size_t{t} + k];
+      const uint32_t *const sides = &fa.surface.edge_tri[2 * size_t{edge}];
+      if ((kind != Shape::plane && edge_near(fa.corner(t, k), fa.corner(t, (k + 1) % 3))) ||
+          bulge_near(sides[0]) || bulge_near(sides[1]))
+        found.ee.push_back(edge);
     }
-    if (kind != Shape::plane && triangle_near(t)) found.fv.push_back(t);
+    if ((kind != Shape::plane && triangle_near(t)) || bulge_near(t)) found.fv.push_back(t);
   });
   for (Array<uint64_t> *list : {&found.vf, &found.ee, &found.fv})
     for (uint64_t &f : *list) f <<= 32;
@@ -532,7 +559,7 @@ void BroadPhase::add_segments(const Pair &pair, std::span<const Found> parts) {
   const auto [a, b, obstacle] = pair;
   const Shape shape = obstacle ? things_[b].view.shape : Shape::none;
   add_segment(a, b, obstacle, 0, parts, &Found::vf);
-  if (shape == Shape::plane) return;
+  if (shape == Shape::plane && bodies_[a].surface->bulge.empty()) return;
   if (shape != Shape::voxels) add_segment(a, b, obstacle, 1, parts, &Found::ee);
   if (obstacle) add_segment(a, b, true, 2, parts, &Found::fv);
   else add_segment(b, a, false, 0, parts, &Found::fv);

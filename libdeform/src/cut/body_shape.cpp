@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "cut/carry_state.h"
 #include "geometry/box_tree.h"
+#include "geometry/bulge.h"
 #include "mesh/mesh.h"
 #include "state/material.h"
 #include "state/search_tree.h"
@@ -30,7 +31,7 @@ void take_rows(const From &from, const Array<uint32_t> &number, size_t width, Li
 // The cells of a mesh that is cut from a body with this rest shape, share and makeup, and their surface.
 // inner: with the list of inner faces, which takes the same sorted faces.
 void take_cells(const Memory &m, const Array<double> &rest, const Array<double> &share, const Makeup &makeup,
-                const CutMesh &mesh, bool inner, BodyShape &out) {
+                const CutMesh &mesh, bool inner, double smooth, BodyShape &out) {
   use_memory(m, out.anchor, out.surfel_impulse, out.share, out.surface.named);
   out.p.size(m, static_cast<uint32_t>(mesh.point.size()));
   take_rows(rest, mesh.point, 3, out.p.rest);
@@ -49,6 +50,8 @@ void take_cells(const Memory &m, const Array<double> &rest, const Array<double> 
   const Array<uint32_t> boundary = boundary_triangles(faces, out.tets.data());
   make_surface(m, out.p.n, out.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
                out.surface);
+  out.smooth = smooth;
+  if (smooth > 0) make_bulges(out.surface, smooth);
 }
 
 void put_at_rest(Phyxels &p) {
@@ -170,7 +173,7 @@ std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh,
   for (const uint32_t c : mesh.cell) out.cut.cell.push_back(again ? b.cut.cell[c] : c);
   out.cut.open = std::move(open);
 
-  take_cells(m, b.p.rest, b.share, b.makeup, mesh, inner, out);
+  take_cells(m, b.p.rest, b.share, b.makeup, mesh, inner, b.smooth, out);
   name_features(b, mesh, out.surface, out.cut);
   find_laid(m, *out.cut.whole, out.cut, out.surface);
   make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
@@ -343,7 +346,7 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
-  take_cells(m, whole->rest, whole->share, whole->makeup, mesh, false, out);
+  take_cells(m, whole->rest, whole->share, whole->makeup, mesh, false, like.smooth, out);
   put_at_rest(out.p);
   if (b.world->def.sleep) out.anchor = out.p.x;
   out.surfel_impulse.assign(size_t{3} * out.surface.nsurfel, 0.0);

@@ -51,6 +51,17 @@ ObstaclePoint ObstacleShape::closest(Vec3 p) const {
   return {c + view_.radius * n, n, d - view_.radius, 0};
 }
 
+double ObstacleShape::bend(const ObstaclePoint &o, Vec3 way) const {
+  if (view_.shape != Shape::sphere && view_.shape != Shape::capsule) return 0;
+  const auto along = [&](Vec3 v) { return dot(axis_[2], v); };
+  const double out = dot(o.normal, way);
+  double aside = norm2(way) - out * out;
+  // the shaft is straight
+  if (std::fabs(along(o.point - view_.radius * o.normal - view_.position)) < view_.half_length)
+    aside -= along(way) * along(way);
+  return aside / (view_.radius + o.distance);
+}
+
 ObstaclePoint ObstacleShape::closest_on_box(Vec3 p) const {
   Vec3 local, outside;
   bool inside = true;

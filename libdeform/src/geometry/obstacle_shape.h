@@ -30,6 +30,9 @@ class ObstacleShape {
   Vec3 face_normal(uint32_t i) const { return i & 1 ? axis_[i >> 1] : -axis_[i >> 1]; }
 
   ObstaclePoint closest(Vec3 p) const;  // not of a mesh
+  // The second derivative of closest().distance along `way`, at the place whose closest point is o; not of
+  // voxels, nor off an edge of a box.
+  double bend(const ObstaclePoint &o, Vec3 way) const;
   Vec3 local(Vec3 p) const { return rotate_back(view_.rotation, p - view_.position); }
   // Voxels: may p, or a place near it, be nearer than `limit`? (VoxelGrid::near)
   bool voxels_near(Vec3 p, double limit) const;

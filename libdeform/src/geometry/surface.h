@@ -50,6 +50,11 @@ struct Surface {
   uint64_t whole(uint64_t own) const { return named.empty() ? own : named.front().id; }
   Array<uint32_t> fan_begin, fan;  // [nsurfel+1], triangles around each surfel, ascending
   double median_edge = 0;          // m, rest
+  // Quadratic patches over the triangles (geometry/bulge.h): [ntri] a fourth surfel, kNone: a flat one;
+  // [ntri,9]; at least 1, a bound of the sum of |weight| of a point of a patch. Empty: all are flat.
+  Array<uint32_t> bulge_from;
+  Array<double> bulge;
+  double bulge_sum = 1;
 
   // Coupling x_s = N x_p. Identity: row, col, weight and rest are empty and point[s] is surfel s's phyxel.
   // Else N in CSR, columns ascending, and point is empty.

@@ -1,9 +1,11 @@
 // Bodies against planes, spheres, boxes and capsules, in closed form. A surfel sees the nearest point of the
 // obstacle. Where the obstacle is smaller than a triangle, edges and faces of the body count too, with the
-// same rule as between bodies: only local minima of the distance, seen from outside.
+// same rule as between bodies: only local minima of the distance, seen from outside. So they do where the
+// body's surface means to be smooth and bulges between its surfels (geometry/bulge.h).
 #include <algorithm>
 
 #include "geometry/area.h"
+#include "geometry/bulge.h"
 #include "geometry/closest.h"
 #include "narrow/detail.h"
 
@@ -152,6 +154,97 @@ bool off_an_edge(const ObstacleShape &shape, const ObstaclePoint &o) {
 
 }  // namespace
 
+namespace {
+
+// Of a box edge contacts have numbers below this, and the faces that bulges touch have those from it on.
+constexpr uint32_t kFaces = 32;
+// Newton's steps to the place that is nearest to a round obstacle; to a flat one the first is exact.
+constexpr int kPlaces = 8;
+
+// The lowest place of a smooth surface over one of its edges or triangles is a contact where it lies below
+// the edge's ends, or the triangle's border, by more than kLeastDip. find(heights, u, border): whether there
+// is one, which may lie beyond the border, and the lowest height of the border.
+template <class Find>
+bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t feature, Find &&find,
+                 ContactPoint &c) {
+  const ObstacleShape &shape = *pair.shape;
+  const auto at = [&](uint32_t s) { return pair.xa(s); };
+  const Vec3 x[3] = {at(patch.node[0]), at(patch.node[1]), at(patch.node[2])};
+  double u[3] = {1.0 / 3, 1.0 / 3, 1.0 / 3}, w[4];
+  Vec3 p = (1.0 / 3) * (x[0] + x[1] + x[2]);
+  ObstaclePoint o = shape.closest(p);
+  const double reach = reach_of(pair, patch.node, o.point);
+  bool touches = false;
+  for (int step = 0; step < kPlaces; ++step) {
+    PatchHeights heights(patch, o.normal, at);
+    if (heights.least() - dot(o.normal, o.point) >= reach) return false;
+    const Vec3 over = u[0] * x[0] + u[1] * x[1] + u[2] * x[2];
+    for (int k = 0; k < 3; ++k) {
+      heights.corner[k] += 0.5 * shape.bend(o, x[k] - over);
+      heights.off[k] -= 0.125 * shape.bend(o, x[(k + 1) % 3] - x[k]);
+    }
+    double border;
+    if (!find(heights, u, border)) return false;
+    touches = in_triangle(u) && heights.at(u) < border - kLeastDip * pair.offset;
+    double sum = 0;
+    for (double &part : u) sum += part = std::max(part, 0.0);
+    for (double &part : u) part /= sum;
+    patch.weights(u, w);
+    p = {};
+    for (int i = 0; i < 4; ++i) p += w[i] * at(patch.node[i]);
+    const Vec3 before = o.normal;
+    o = shape.closest(p);
+    if (norm2(o.normal - before) == 0) break;
+  }
+  if (!touches || !(o.distance < reach) || off_an_edge(shape, o)) return false;
+  c = blank(pair, kPrimitive, type, feature, kFaces + o.face);
+  for (int i = 0; i < 4; ++i) add_node(c, pair.a.first_node + patch.node[i], w[i]);
+  place(c, p, o.point, o.normal, o.distance);
+  return true;
+}
+
+void finish_bulge(const Pair &pair, ContactPoint &c, Array<ContactPoint> &out) {
+  const Vec3 normal = load3(c.normal), half = (0.5 * c.distance) * normal, middle = load3(c.point);
+  finish(pair, c, middle + half, middle - half, normal, c.distance, c.feature_b, out);
+}
+
+// The two patches of an edge are one curve where the edge is smooth; at a crease the nearer one counts.
+void edge_bulge(const Pair &pair, uint32_t edge, Array<ContactPoint> &out) {
+  const Surface &s = *pair.a.surface;
+  ContactPoint nearest{}, c;
+  bool any = false;
+  for (int side = 0; side < 2; ++side) {
+    const uint32_t t = s.edge_tri[2 * size_t{edge} + size_t(side)];
+    if (t == kNone || s.bulge_from[t] == kNone) continue;
+    const uint32_t *const edges = &s.tri_edge[3 * size_t{t}];
+    const int k = edges[0] == edge ? 0 : edges[1] == edge ? 1 : 2;
+    const auto find = [&](const PatchHeights &h, double u[3], double &border) {
+      border = std::min(h.corner[k], h.corner[(k + 1) % 3]);
+      return h.lowest_of_edge(k, u);
+    };
+    if (!touch_bulge(pair, Patch(s, t), 1, edge, find, c) || (any && !(c.distance < nearest.distance)))
+      continue;
+    nearest = c;
+    any = true;
+  }
+  if (any) finish_bulge(pair, nearest, out);
+}
+
+void triangle_bulge(const Pair &pair, uint32_t t, Array<ContactPoint> &out) {
+  const Surface &s = *pair.a.surface;
+  if (s.bulge_from[t] == kNone) return;
+  const auto find = [](const PatchHeights &h, double u[3], double &border) {
+    border = std::min({h.corner[0], h.corner[1], h.corner[2]});
+    for (int k = 0; k < 3; ++k)
+      if (h.lowest_of_edge(k, u) && in_triangle(u)) border = std::min(border, h.at(u));
+    return h.lowest(u);
+  };
+  ContactPoint c;
+  if (touch_bulge(pair, Patch(s, t), 2, t, find, c)) finish_bulge(pair, c, out);
+}
+
+}  // namespace
+
 void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   for (const Candidate &candidate : run) {
     const uint32_t s = candidate.feature_a;
@@ -168,25 +261,27 @@ void surfel_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
 
 void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const Surface &surface = *pair.a.surface;
-  const bool box = pair.shape->view().shape == Shape::box;
+  const bool box = pair.shape->view().shape == Shape::box, plane = pair.shape->view().shape == Shape::plane;
   for (const Candidate &candidate : run) {
     const uint32_t number = candidate.feature_a;
     const bool convex = box && edge_becomes_convex(surface, number, pair.h);
-    if (box ? !convex && !pair.bears(number)
-            : edge_hollow(surface, number) && edge_hollow(surface, number, 2 * pair.h))
-      continue;
-    Edge e(pair, number);
-    if (box) edge_box(e, convex, out);
-    else edge_round(e, out);
+    if (!plane && (box ? convex || pair.bears(number)
+                       : !edge_hollow(surface, number) || !edge_hollow(surface, number, 2 * pair.h))) {
+      Edge e(pair, number);
+      if (box) edge_box(e, convex, out);
+      else edge_round(e, out);
+    }
+    if (!surface.bulge.empty()) edge_bulge(pair, number, out);
   }
 }
 
 // Faces against the center of a sphere, the ends of a capsule's axis, the corners of a box.
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const ObstacleShape &shape = *pair.shape;
-  const bool box = shape.view().shape == Shape::box;
+  const Shape kind = shape.view().shape;
+  const bool box = kind == Shape::box;
   const double radius = box ? 0 : shape.view().radius, depth = recovery_depth(*pair.a.surface);
-  const uint32_t points = box ? 8 : shape.view().shape == Shape::sphere ? 1 : 2;
+  const uint32_t points = kind == Shape::plane ? 0 : box ? 8 : kind == Shape::sphere ? 1 : 2;
   for (const Candidate &candidate : run) {
     const std::span<const uint32_t> corner(&pair.a.surface->tri[3 * size_t{candidate.feature_a}], 3);
     const Vec3 a = pair.xa(corner[0]), b = pair.xa(corner[1]), d = pair.xa(corner[2]);
@@ -210,6 +305,7 @@ void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
       for (int i = 0; i < 3; ++i) add_node(p, pair.a.first_node + corner[i], q.weight[i]);
       finish(pair, p, q.point, c - radius * m, -m, distance, p.feature_b, out);
     }
+    if (!pair.a.surface->bulge.empty()) triangle_bulge(pair, candidate.feature_a, out);
   }
 }
 

@@ -26,7 +26,7 @@ constexpr Row kObjects[] = {
     {"body",
      "name mesh material model integrator pose velocity spin fix forces surface nodal_bc fill lattice "
      "springs anisotropy materials_by_group fields start switch attach sensor id separate cut_delay place "
-     "-pressure mass_scaling device"},
+     "-pressure mass_scaling smooth device"},
     {"place", "on"},
     {"separate", "least_cells crumbs"},
     {"model", "type params precision"},

@@ -356,6 +356,7 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   for (const Node &entry : node.items("attach")) b.attach.push_back(read_attach(entry));
   b.def.mass_scaling = node.number("mass_scaling", 0.0, Range{0, kMostScaled, false, false});
+  b.def.smooth = node.number("smooth", 0.0, Range{0, 180, false, false});
   b.cut_delay = node.number("cut_delay", 0.0, kNotNegative);
   if (node.has("separate")) b.separate = read_separate(node.member("separate"));
   read_carriers(node, type, context, b);

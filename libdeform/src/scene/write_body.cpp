@@ -140,6 +140,7 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
   write_choice(type, given, out["model"]);
   put_integrator(out, b.origin.integrator);
   if (b.scaling.asked > 0) out["mass_scaling"] = b.scaling.asked;
+  if (b.smooth > 0) out["smooth"] = b.smooth;
 }
 
 void write_fields(SceneWriter &to, const Body &b, Written &out) {

@@ -114,6 +114,7 @@ struct Structure {
   Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
   Surface surface;
   SurfaceZones zones;
+  double smooth = 0;  // degrees, of make_bulges(); 0: faces are flat
   CutRecord cut;
   // a new number after each cut: what is derived from points, cells or surface is out of date
   uint64_t shape = 0;

@@ -4,6 +4,7 @@
 
 #include "body/make_surface.h"
 #include "core/error.h"
+#include "geometry/bulge.h"
 #include "mesh/mesh.h"
 #include "plugin/context.h"
 #include "state/world.h"
@@ -105,8 +106,11 @@ void tell_of_long_edges(const Body &b) {
 
 }  // namespace
 
-void make_body_surface(Body &b, const dfm_surface_def *def) {
+void make_body_surface(Body &b, const dfm_surface_def *def, double smooth) {
   const Memory &m = b.world->memory();
+  if (!(smooth >= 0 && smooth <= 180))
+    fail(DFM_E_ARG, "body '%s': smooth %g; it is an angle between faces in degrees, 0 (flat faces) to 180",
+         b.name.c_str(), smooth);
   if (def) {
     check_surface(*def, b.name.c_str());
     make_surface(m, def->npoint, def->points, def->triangles, def->ntriangle, b.surface);
@@ -118,6 +122,8 @@ void make_body_surface(Body &b, const dfm_surface_def *def) {
     make_surface(m, b.p.n, b.p.rest.data(), boundary.data(), static_cast<uint32_t>(boundary.size() / 3),
                  b.surface);
   }
+  b.smooth = smooth;
+  if (smooth > 0) make_bulges(b.surface, smooth);
   gather_surface(b.surface, b.p.x.data(), b.p.v.data());
 }
 

@@ -5,8 +5,8 @@
 namespace dfm {
 
 // b.p (rest, x, v) and b.tets are complete. Throws Error; logs a warning if its own surface is outside the
-// cells.
-void make_body_surface(Body &b, const dfm_surface_def *def);
+// cells. smooth: degrees, of make_bulges().
+void make_body_surface(Body &b, const dfm_surface_def *def, double smooth);
 
 // The coupling in the form that models get; valid as long as the surface of the body and this object.
 class MeshCoupling {

@@ -202,7 +202,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   check_velocity("body", b.name.c_str(), load3(def.velocity), load3(def.spin), far);
 
   b.edges = unique_edges(w.memory(), def.ntet, b.tets.data());
-  make_body_surface(b, def.surface);
+  make_body_surface(b, def.surface, def.smooth);
   check_resolved(b.name.c_str(), far, b.surface.median_edge);
   if (def.surface) {
     b.coupling = def.surface->coupling;

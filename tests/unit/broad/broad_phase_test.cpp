@@ -4,6 +4,7 @@
 
 #include "../narrow/detect_scene.h"
 #include "body/obstacle_mesh.h"
+#include "geometry/bulge.h"
 #include "geometry/closest.h"
 
 namespace {
@@ -36,8 +37,9 @@ Scene random_scene(unsigned seed, double speed) {
                           box_mesh({1, 0.01, 0.02}, 12, 1, 1), sphere_mesh(0.2, 1)};
   for (const Mesh &m : meshes) {
     const Quat q = random_turn(random);
-    deform_at_random(scene.add(moved(m, q, 0.4 * Vec3{unit(random), unit(random), unit(random)})), random,
-                     0.004, speed);
+    Surface &s = scene.add(moved(m, q, 0.4 * Vec3{unit(random), unit(random), unit(random)}));
+    if (seed % 4 < 2) make_bulges(s, 60);
+    deform_at_random(s, random, 0.004, speed);
   }
   scene.add(Shape::plane, {0, 0, -0.4}, turn({1, 0, 0}, 0.2));
   ObstacleView &ball = scene.add(Shape::sphere, {0.4, 0.1, 0.2});

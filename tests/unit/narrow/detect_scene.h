@@ -175,8 +175,8 @@ struct Scene {
       }
       for (const ObstacleView &o : obstacles) {
         if (!filter.may_touch(a, o)) continue;
-        const uint32_t count[3] = {s.nsurfel, o.shape == Shape::plane ? 0 : s.nedge,
-                                   o.shape == Shape::plane ? 0 : s.ntri};
+        const bool surfels_alone = o.shape == Shape::plane && s.bulge.empty();
+        const uint32_t count[3] = {s.nsurfel, surfels_alone ? 0 : s.nedge, surfels_alone ? 0 : s.ntri};
         for (uint8_t k = 0; k < 3; ++k)
           for (uint32_t i = 0; i < count[k]; ++i) c.push_back({a.slot, o.slot, i, 0, k, 1});
       }
@@ -230,8 +230,10 @@ inline std::string flaw(const Scene &scene, const Array<ContactPoint> &contacts)
       const int s = c.node[k] >= first && c.node[k] < first + n ? 0 : 1;
       sum[s] += c.weight[k];
       side[s] += c.weight[k] * at[c.node[k]];
-      // An edge may count as up to a quarter longer for what slides in over its ends.
-      if (s == 0 && !(c.weight[k] > (c.kind == kEdgeEdge || (c.obstacle && c.type_a == 1) ? -0.25 : 0.0)))
+      // An edge may count as up to a quarter longer for what slides in over its ends; a bulge has a fourth
+      // surfel.
+      if (s == 0 && !(c.obstacle && c.nnode == 4) &&
+          !(c.weight[k] > (c.kind == kEdgeEdge || (c.obstacle && c.type_a == 1) ? -0.25 : 0.0)))
         return which + "weight of side a is out of range";
     }
     if (std::fabs(sum[0] - 1) > 1e-12 || std::fabs(sum[1] + (c.obstacle ? 0 : 1)) > 1e-12)
