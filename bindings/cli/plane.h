@@ -1,5 +1,5 @@
-// Length of a vector in a plane. std::hypot of two numbers is the C library's: one of glibc 2.35, which older
-// systems lack, and other bits elsewhere; of three it is the compiler's.
+// Length of a vector in a plane. std::hypot of two numbers asks for a symbol of glibc 2.35, which systems of
+// 2021 lack, and has other bits with other C libraries; that of three numbers is compiled from a header.
 #pragma once
 #include <cmath>
 

@@ -159,6 +159,7 @@ double advance(char c) {
   return right + kGap;
 }
 
+// std::hypot of three numbers: cli/plane.h says why.
 double distance(Point p, Point a, Point b) {
   const double dx = b.x - a.x, dy = b.y - a.y, length = dx * dx + dy * dy;
   if (length == 0) return std::hypot(p.x - a.x, p.y - a.y, 0.0) - kDot;
