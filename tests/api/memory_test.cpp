@@ -118,6 +118,11 @@ TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
     o.name = "right";
     o.position = {0.45, 0, 1e-4};
     test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+    o.name = "round";
+    o.position = {2, 0, -0.9999};
+    o.smooth = 40;
+    test::make_body(c, w, "cylinder", {0.05, 0.05, 0}, 100, o);
+    test::add_plane(w, "floor", {0, 0, -1});
     test::add_mesh(w, "hills", test::height_field(0.3, 20, [](double x, double y) {
                      return 0.01 * std::sin(20 * x) * std::cos(30 * y);
                    }));
@@ -132,7 +137,7 @@ TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
     dfm_obstacle obstacle = 0;
     test::ok(dfm_obstacle_create(w, &d, &obstacle));
     for (int i = 0; i < 2000; ++i) ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << dfm_last_error();
-    ASSERT_EQ(test::pairs(w).size(), 2u) << "one on the hills, one on the slab";
+    ASSERT_EQ(test::pairs(w).size(), 3u) << "one on the hills, one on the slab, one on the floor";
     const Calls before{hooks};
     dfm_status bad = DFM_OK;
     for (int i = 0; i < 1000; ++i)
@@ -322,6 +327,7 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
         for (int k = 0; k < 2 && status == DFM_OK; ++k) {
           bd.pose.position[2] = 0.0501 + 0.1002 * k;
           bd.velocity[2] = -0.1;
+          bd.smooth = 40;
           bd.surface = k ? &surface : nullptr;
           status = dfm_body_create(world, &bd, &bodies[k]);
         }

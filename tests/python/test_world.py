@@ -59,6 +59,12 @@ class Building(unittest.TestCase):
             with self.assertRaisesRegex(deform.ArgumentError, "mass_scaling"):
                 ball(world, z=1, mass_scaling=0.2)
 
+    def test_smooth_is_told(self):
+        with deform.World() as world:
+            ball(world, smooth=40)
+            with self.assertRaisesRegex(deform.ArgumentError, "smooth -1"):
+                ball(world, z=1, smooth=-1)
+
     def test_body_from_arrays(self):
         points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float32)
         with deform.World(gravity=(0, 0, 0)) as world:

@@ -64,8 +64,8 @@ TEST(BallIncline, TooLittleFriction_DoesNotRoll) {
 // soak: long, and a jittered run of what another test runs
 TEST(BallIncline, JitteredRuns_AllRoll) { test::expect_jittered("ball_incline", 1, 10, {}, 3, rolls); }
 
-// Coarse balls and cylinders on 5 degrees, from rest: those with smooth surfaces go g sin / (1 + k) t^2 / 2, k =
-// 2/5 and 1/2. On facets the ball stays behind, and the cylinder stays.
+// Coarse balls and cylinders on 5 degrees, from rest: those with smooth surfaces go g sin / (1 + k) t^2 / 2,
+// k = 2/5 and 1/2. On facets the ball stays behind, and the cylinder stays.
 namespace {
 
 bool rolls_smoothly(const test::SceneRun &run) {

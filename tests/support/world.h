@@ -52,7 +52,8 @@ struct Tet {
 
 struct BodyOptions {
   std::string name, model;
-  double young = 1e5, poisson = 0.3, density = 1000, damping_stiffness = 0, damping_mass = 0, volume = -1;
+  double young = 1e5, poisson = 0.3, density = 1000, damping_stiffness = 0, damping_mass = 0, volume = -1,
+         smooth = 0;
   std::array<double, 3> position{}, velocity{}, spin{};
   std::array<double, 4> rotation{0, 0, 0, 1};
   const dfm_surface_def *surface = nullptr;
@@ -103,6 +104,7 @@ inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::ar
   for (int k = 0; k < 4; ++k) d.pose.rotation[k] = o.rotation[k];
   d.surface = o.surface;
   d.integrator = o.integrator;
+  d.smooth = o.smooth;
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
   ok(dfm_tetmesh_destroy(mesh));

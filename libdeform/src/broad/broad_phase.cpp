@@ -488,8 +488,8 @@ bool BroadPhase::list_voxels(const Body &a, const Thing &thing, Found &found) co
 }
 
 // Edges and triangles are listed only where surfels alone would let the obstacle through: edges at a round
-// shape or at the edges of a box, triangles at a round shape or at the corners of a box; and where the surface
-// bulges.
+// shape or at the edges of a box, triangles at a round shape or at the corners of a box; and where the
+// surface bulges.
 bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) const {
   const ObstacleShape shape(thing.view);
   const Features fa{*a.surface, a.x.data()};

@@ -1,5 +1,5 @@
-// Smooth bodies that are thrown at obstacles: no surfel is ever inside one, the bulges between them are by less
-// than the way of a sub-step, and come out again.
+// Smooth bodies that are thrown at obstacles: no surfel is ever inside one, the bulges between them are by
+// less than the way of a sub-step, and come out again.
 #include <limits>
 
 #include "body/make_surface.h"
@@ -11,6 +11,8 @@
 namespace {
 
 using namespace dfm;
+
+constexpr double kRadius = 0.1;
 
 struct LowestPlaces { double surfel = HUGE_VAL, patch = HUGE_VAL; };
 
@@ -45,9 +47,10 @@ struct ThrowTarget {
 }  // namespace
 
 TEST(SmoothThrow, At20MetersPerSecond_StaysOutside) {
-  for (const ThrowTarget &o : {ThrowTarget{Shape::plane, DFM_SHAPE_PLANE, 0, 0}, ThrowTarget{Shape::box, DFM_SHAPE_BOX, 0, 0},
-                          ThrowTarget{Shape::sphere, DFM_SHAPE_SPHERE, 0.03, 0},
-                          ThrowTarget{Shape::capsule, DFM_SHAPE_CAPSULE, 0.02, 0.2}})
+  for (const ThrowTarget &o :
+       {ThrowTarget{Shape::plane, DFM_SHAPE_PLANE, 0, 0}, ThrowTarget{Shape::box, DFM_SHAPE_BOX, 0, 0},
+        ThrowTarget{Shape::sphere, DFM_SHAPE_SPHERE, 0.03, 0},
+        ThrowTarget{Shape::capsule, DFM_SHAPE_CAPSULE, 0.02, 0.2}})
     for (int turn = 0; turn < 2; ++turn) {
       test::Context context;
       const dfm_world world = test::make_world(context, {0, 0, 0});
@@ -66,26 +69,15 @@ TEST(SmoothThrow, At20MetersPerSecond_StaysOutside) {
       }
       dfm_obstacle obstacle = 0;
       test::ok(dfm_obstacle_create(world, &at, &obstacle));
-      dfm_tetmesh mesh = 0;
-      const double size[3] = {0.1, 0, 0};
-      test::ok(dfm_tetmesh_make(context, "ball", size, 500, &mesh));
-      dfm_body_def d = dfm_body_def_default();
-      test::lend(mesh, d);
       test::BodyOptions soft;
       soft.young = 2e5;
       soft.damping_stiffness = 1e-4;
-      d.material = test::make_material(world, soft);
-      d.smooth = 40;
-      d.pose.position[1] = 0.004 * turn;
-      d.pose.position[2] = 0.25;
-      d.pose.rotation[0] = std::sin(turn);
-      d.pose.rotation[3] = std::cos(turn);
-      d.velocity[0] = 2;
-      d.velocity[2] = -20;
-      d.spin[1] = 30;
-      dfm_body body = 0;
-      test::ok(dfm_body_create(world, &d, &body));
-      test::ok(dfm_tetmesh_destroy(mesh));
+      soft.smooth = 40;
+      soft.position = {0, 0.004 * turn, 0.25};
+      soft.rotation = {std::sin(turn), 0, 0, std::cos(turn)};
+      soft.velocity = {2, 0, -20};
+      soft.spin = {0, 30, 0};
+      test::make_body(context, world, "ball", {kRadius, 0, 0}, 500, soft);
       LowestPlaces least, now;
       for (int i = 0; i < 80; ++i) {
         test::run(world, 5e-4, 5e-4);
@@ -96,7 +88,7 @@ TEST(SmoothThrow, At20MetersPerSecond_StaysOutside) {
       EXPECT_GT(least.surfel, 0) << o.shape << ' ' << turn;
       EXPECT_GT(least.patch, -20 * 0.04 / double(test::stats(world).substeps)) << o.shape << ' ' << turn;
       EXPECT_LT(least.patch, 0.01) << "they have met";
-      EXPECT_GT(now.patch, -0.005 * size[0]) << o.shape << ' ' << turn;
+      EXPECT_GT(now.patch, -0.005 * kRadius) << o.shape << ' ' << turn;
     }
 }
 
