@@ -9,7 +9,6 @@
 #include "step/context.h"
 #include "step/rigid/tool_touch.h"
 #include "step/solve/bristles.h"
-#include "step/solve/tolerance.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "step/watch/pair_energy.h"
