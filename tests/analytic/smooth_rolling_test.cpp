@@ -1,6 +1,6 @@
 // Coarse balls, cylinders and hoops whose surface is smooth, on a plane, against rigid rolling:
 // a = g sin / (1 + k), k = I / (m R^2), and 1 / (1 + k) of the speed that they were thrown with. k is that of
-// the meshed body. On the facets of the same meshes they lose more than half of a (doc/concepts/detection.md).
+// the meshed body. On facets of the same meshes they lose more than half of a (doc/concepts/detection.md).
 #include "rigid.h"
 #include "support.h"
 
