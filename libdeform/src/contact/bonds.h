@@ -1,5 +1,4 @@
-// Bonds of the contact solve. Their impulses have neither sign condition nor law, so all bonds together form
-// one symmetric linear system.
+// Bonds of the contact solve: what their impulses must be, for sweeps, Newton's method and residuals.
 #pragma once
 #include <cstdint>
 
@@ -16,8 +15,7 @@ Vec3 bond_residual(const ContactRows &rows, uint32_t row);
 // again in a solve: of a drag that could stop the edge or let it pass there would be two answers.
 void limit_drag(ContactRows &rows, uint32_t row);
 
-// Solves all bonds of a part with fixed contact impulses, until no residual is above `tolerance`, m/s.
-// Returns the number of passes over the bonds.
-uint32_t solve_bonds(ContactRows &rows, const RowsPart &part, double tolerance, Array<double> &scratch);
+// One sweep: each bond of the part in turn is solved with the impulses that all others have.
+void sweep_bonds(ContactRows &rows, const RowsPart &part);
 
 }  // namespace dfm

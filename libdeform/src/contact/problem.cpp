@@ -292,7 +292,8 @@ void ContactProblem::transfer(Transfer &t) {
   for (ContactRows::BondRow &b : rows.bond) {
     for (Vec3 *v : {&b.rate, &b.inverse[0], &b.inverse[1], &b.inverse[2], &b.along}) t.one(*v);
     for (double *x : {&b.soft, &b.most, &b.due, &b.w}) t.one(*x);
-    t.one(b.sticks);
+    bool stuck = false;  // kept by version 1 alone
+    t.one(stuck);
   }
   t.many(state.law);
   t.many(state.area);

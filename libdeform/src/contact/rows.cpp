@@ -383,7 +383,6 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
     row.along = b.along;
     row.most = b.most;
     row.due = b.due;
-    row.sticks = false;
     if (row.drags()) {
       row.w = dot(b.along, diagonal(i, b.along));
       continue;

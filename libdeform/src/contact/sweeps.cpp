@@ -13,9 +13,8 @@ namespace {
 constexpr uint32_t kPolish = 20;
 // The limit on sweeps is so many times larger where there are so many contacts, whose matrix is dearer.
 constexpr uint32_t kMany = 100, kManySweeps = 4;
-// Bonds are solved to a share of their tolerance, so that the residual of the next sweep comes from contacts;
-// a pass to a share of what its laws are then judged by.
-constexpr double kBondShare = 0.1, kPassShare = 0.5;
+// A pass is solved to a share of what its laws are then judged by.
+constexpr double kPassShare = 0.5;
 
 // Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
 // sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
@@ -45,7 +44,7 @@ class Looks {
 
 }  // namespace
 
-Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_, scratch_); }
+Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
 bool Sweeps::good(const Residual &left, double most) const {
   return left.relative <= most || (left.due <= most && count_ >= kPolish);
@@ -54,10 +53,8 @@ bool Sweeps::good(const Residual &left, double most) const {
 void Sweeps::sweep_once() {
   laws_->spend(part_->all());
   sweep(*rows_, *part_, *state_, h_);
+  sweep_bonds(*rows_, *part_);
   ++count_;
-  if (!part_->nbond) return;
-  const uint32_t passes = solve_bonds(*rows_, *part_, kBondShare * tolerance_->bond, scratch_);
-  laws_->spend(uint64_t{passes} * part_->nbond);
 }
 
 // With the laws as they were last evaluated. False: not finite.

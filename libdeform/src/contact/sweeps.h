@@ -31,8 +31,7 @@ class Sweeps {
   double h_ = 0;
   uint32_t count_ = 0, most_ = 0;
   Acceleration acceleration_;
-  Array<double> start_;    // [rows,3] impulses, of the part one after the other
-  Array<double> scratch_;  // of solve_bonds()
+  Array<double> start_;  // [rows,3] impulses, of the part one after the other
 
   void sweep_once();
   bool pass();
