@@ -211,7 +211,11 @@ void ContactNewton::set_penalties(double factor) {
     const double whole = rows.whole_answer(i), wn = rows.wn[i] - whole, wt = rows.wt[i] - whole;
     rho_[2 * k] = wn > 0 ? factor / wn : 0;
     rho_[2 * k + 1] = wt > 0 ? factor / wt : 0;
-    if (row_[k].kind == Kind::bond) rho_[2 * k] = rho_[2 * k + 1] = std::min(rho_[2 * k], rho_[2 * k + 1]);
+    if (row_[k].kind == Kind::bond) {
+      const double soft = rows.bond[i - rows.n].soft;
+      rho_[2 * k] = std::min(rho_[2 * k], rho_[2 * k + 1]) + (soft > 0 ? factor / soft : 0);
+      rho_[2 * k + 1] = rho_[2 * k];
+    }
     if (row_[k].kind == Kind::drag) {
       const double w_along = rows.bond[i - rows.n].w;
       rho_[2 * k] = w_along > 0 ? factor / w_along : 0;
