@@ -107,6 +107,7 @@ TEST(Islands, OfExplicitBodiesBesideImplicitOnes_HaveTheBitsThatTheyHaveAlone) {
   for (size_t k = 0; k < 3; ++k) EXPECT_EQ(both[k], alone[k]) << k;
 }
 
+// unsanitized: too slow there; ten bodies on one to eight threads are islands too
 TEST(Islands, OnMoreThreads_HaveTheSameBits) {
   const std::vector<Stack> stacks = {stack(0, 0.2, "msm", kAuto), stack(1, -0.9, "msm", kAuto),
                                      stack(2, 0.4, "corotational_fem", kImplicit)};

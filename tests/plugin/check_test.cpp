@@ -335,6 +335,7 @@ TEST(BrokenLaw, ThatWaitsForEver_IsEndedWhileResultsArePrintedAsTheyCome) {
 
 // ---- shipped plugins --------------------------------------------------------------------------------------
 
+// unsanitized: minutes there; each plugin has tests of its own
 TEST(PluginCheck, EveryShippedPlugin_KeepsEveryRule) {
   int laws = 0, models = 0;
   for (const auto &entry : std::filesystem::directory_iterator(DEFORM_PLUGIN_DIR)) {
