@@ -66,7 +66,9 @@ DEFORM_INLINE void apply(const RowsView &rows, double *y, uint32_t i, double a, 
   }
 }
 
-void sweep(const RowsView &rows, const LawView &law, double h, double *y, double *impulse) {
+Found sweep(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h, double *y,
+            double *impulse) {
+  Found found;
   for (uint32_t i = 0; i < rows.n; ++i) {
     const double wn = rows.wn[i], wt = rows.wt[i];
     if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
@@ -80,12 +82,15 @@ void sweep(const RowsView &rows, const LawView &law, double h, double *y, double
       const double *const c = rows.cross + 2 * size_t(i);
       t = friction_impulse(law, i, h, wt, l[1], l[2], ln, get(u, 1) + c[0] * d, get(u, 2) + c[1] * d);
     }
-    if (d == 0 && t.a == l[1] && t.b == l[2]) continue;
-    apply(rows, y, i, d, t.a - l[1], t.b - l[2]);
+    const double a = t.a - l[1], b = t.b - l[2];
+    if (d == 0 && a == 0 && b == 0) continue;
+    note(found, tolerance, i, wn * d, wt * wt * (a * a + b * b), get(u, 1), get(u, 2));
+    apply(rows, y, i, d, a, b);
     l[0] = ln;
     l[1] = t.a;
     l[2] = t.b;
   }
+  return found;
 }
 
 Residual residual(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h,
@@ -115,7 +120,7 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     r.speed = larger(r.speed, tangent);
   }
   // larger() ignores NaN
-  if (poison != 0) r.relative = r.due = __builtin_inf();
+  if (poison != 0) r.relative = r.due = r.speed = __builtin_inf();
   return r;
 }
 

@@ -88,5 +88,17 @@ __attribute__((always_inline)) static inline Pair friction_impulse(const LawView
   return l;
 }
 
+// What a sweep finds at contact i, m/s: it changes what the normal impulse does by dn, what that along the
+// tangents does by the root of dt2, at the slip (u1, u2). NaN is found.
+__attribute__((always_inline)) static inline void note(Found &found, const ToleranceView &tolerance,
+                                                       uint32_t i, double dn, double dt2, double u1,
+                                                       double u2) {
+  const double normal = __builtin_fabs(dn);
+  const double slip2 = 1e-6 * (u1 * u1 + u2 * u2), t = tolerance.tangent[i];
+  const bool tangent = !(dt2 <= larger(t * t, slip2));
+  found.any |= tangent | !(normal <= tolerance.normal[i]);
+  found.much |= tangent | !(normal <= tolerance.most_normal);
+}
+
 }  // namespace
 }  // namespace dfm

@@ -50,7 +50,9 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
 namespace {
 
 // As the kernel, where impulses at one dof change others.
-void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
+Found sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law,
+                    const ToleranceView &tolerance, double h) {
+  Found found;
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
@@ -61,22 +63,36 @@ void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, 
     if (ln > 0 && rows.wt[i] > 0)
       t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d,
                            u.z + rows.cross[2 * size_t(i) + 1] * d);
-    if (d == 0 && t.a == l[1] && t.b == l[2]) return;
-    rows.apply(i, {d, t.a - l[1], t.b - l[2]});
+    const double a = t.a - l[1], b = t.b - l[2];
+    if (d == 0 && a == 0 && b == 0) return;
+    note(found, tolerance, i, rows.wn[i] * d, rows.wt[i] * rows.wt[i] * (a * a + b * b), u.y, u.z);
+    rows.apply(i, {d, a, b});
     l[0] = ln;
     l[1] = t.a;
     l[2] = t.b;
   });
+  return found;
+}
+
+ToleranceView of_run(const Tolerance &tolerance, uint32_t first) {
+  return {tolerance.normal + first, tolerance.tangent + first, tolerance.most_normal};
 }
 
 }  // namespace
 
-void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h) {
+Found sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, const Tolerance &tolerance,
+            double h) {
+  Found found;
   if (part.alone)
-    for (const RowRun &run : part.contacts)
-      rows.kernels().sweep(rows.view(run), law.view(run.first), h, rows.y.data(),
-                           rows.impulse.data() + size_t(3) * run.first);
-  else sweep_answers(rows, part, law.view(), h);
+    for (const RowRun &run : part.contacts) {
+      const Found one =
+          rows.kernels().sweep(rows.view(run), law.view(run.first), of_run(tolerance, run.first), h,
+                               rows.y.data(), rows.impulse.data() + size_t(3) * run.first);
+      found = {found.any || one.any, found.much || one.much};
+    }
+  else found = sweep_answers(rows, part, law.view(), of_run(tolerance, 0), h);
+  const bool bonds = sweep_bonds(rows, part) > tolerance.bond;
+  return {found.any || bonds, found.much || bonds};
 }
 
 namespace {
@@ -204,7 +220,7 @@ Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Toleran
     r.due = std::max(r.due, left / tolerance.bond);
     r.speed = std::max(r.speed, left);
   });
-  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
+  if (poison != 0) r.relative = r.due = r.speed = std::numeric_limits<double>::infinity();
   return r;
 }
 
@@ -231,7 +247,7 @@ Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &
     r.speed = std::max(r.speed, tangent);
   });
   // max() passes over what is no number
-  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
+  if (poison != 0) r.relative = r.due = r.speed = std::numeric_limits<double>::infinity();
   return r;
 }
 
@@ -242,23 +258,16 @@ Residual larger(const Residual &a, const Residual &b) {
           std::max(a.normal, b.normal)};
 }
 
-Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                        const Tolerance &tolerance) {
+Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
+                       const Tolerance &tolerance) {
   Residual r;
   if (part.alone)
     for (const RowRun &run : part.contacts)
-      r = larger(r, rows.kernels().residual(
-                        rows.view(run), law.view(run.first),
-                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
-                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
-  else r = residual(rows, part, law.view(), h, tolerance);
+      r = larger(r, rows.kernels().residual(rows.view(run), answer.view(run.first),
+                                            of_run(tolerance, run.first), h, rows.y.data(),
+                                            rows.impulse.data() + size_t(3) * run.first));
+  else r = residual(rows, part, answer.view(), h, tolerance);
   return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
-}
-
-// At the state at which a law was evaluated, the sweeps have its value.
-Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
-                       const Tolerance &tolerance) {
-  return inner_residual(rows, part, answer, h, tolerance);
 }
 
 namespace {

@@ -33,9 +33,8 @@ class Sweeps {
   Acceleration acceleration_;
   Array<double> start_;  // [rows,3] impulses, of the part one after the other
 
-  void sweep_once();
-  bool pass();
-  bool good(const Residual &left, double most) const;
+  void pass();
+  bool good(bool precise, bool enough) const;
 };
 
 }  // namespace dfm
