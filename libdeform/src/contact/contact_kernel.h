@@ -48,8 +48,8 @@ struct ToleranceView {
 // most_normal for normal[i]: the required accuracy; the rest may be left to the warm start of the next
 // sub-step. `normal` is the worst r_n alone, m/s.
 struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
-// Whether a sweep has found a contact off by more than its tolerances, before it changed it: by more than
-// Residual::relative (any) or Residual::due (much) may be.
+// Whether a sweep has found a contact off by more than half of its tolerances, before it changed it: of
+// those of Residual::relative (any) or Residual::due (much).
 struct Found { bool any = false, much = false; };
 
 struct ContactKernels {

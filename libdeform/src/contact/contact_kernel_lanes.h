@@ -74,8 +74,8 @@ Found sweep(const RowsView &rows, const LawView &law, const ToleranceView &toler
     if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
     double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 3 * size_t(i)),
-                 d = ln - l[0];
+    const double *const yields = rows.yields + 3 * size_t(i), k = get(u, 0) + rows.rate[i];
+    const double ln = normal_impulse(l[0], k, wn, yields), d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
     Pair t{0, 0};
     if (ln > 0 && wt > 0) {
@@ -84,7 +84,8 @@ Found sweep(const RowsView &rows, const LawView &law, const ToleranceView &toler
     }
     const double a = t.a - l[1], b = t.b - l[2];
     if (d == 0 && a == 0 && b == 0) continue;
-    note(found, tolerance, i, wn * d, wt * wt * (a * a + b * b), get(u, 1), get(u, 2));
+    note(found, tolerance, i, normal_residual(l[0], k, wn, yields), wt * wt * (a * a + b * b), get(u, 1),
+         get(u, 2));
     apply(rows, y, i, d, a, b);
     l[0] = ln;
     l[1] = t.a;
@@ -102,9 +103,8 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     if (!(wn > 0)) continue;
     const double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.yields + 3 * size_t(i)),
-                 closed = wn * l[0];
-    const double normal = __builtin_fabs(open < closed ? open : closed);
+    const double normal =
+        normal_residual(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 3 * size_t(i));
     poison += 0.0 * ((get(u, 0) + get(u, 1)) + (get(u, 2) + l[0]));
     r.relative = larger(r.relative, normal / tolerance.normal[i]);
     r.due = larger(r.due, normal / tolerance.most_normal);

@@ -21,6 +21,11 @@ double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
                         &rows.yields[size_t(i) * 3]);
 }
 
+double normal_residual(const ContactRows &rows, uint32_t i, double un) {
+  return normal_residual(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
+                         &rows.yields[size_t(i) * 3]);
+}
+
 }  // namespace
 
 void set_trial(const ContactRows &rows, const RowsPart &part, double h, const double *response,
@@ -65,7 +70,8 @@ Found sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law,
                            u.z + rows.cross[2 * size_t(i) + 1] * d);
     const double a = t.a - l[1], b = t.b - l[2];
     if (d == 0 && a == 0 && b == 0) return;
-    note(found, tolerance, i, rows.wn[i] * d, rows.wt[i] * rows.wt[i] * (a * a + b * b), u.y, u.z);
+    note(found, tolerance, i, normal_residual(rows, i, u.x), rows.wt[i] * rows.wt[i] * (a * a + b * b), u.y,
+         u.z);
     rows.apply(i, {d, a, b});
     l[0] = ln;
     l[1] = t.a;
@@ -91,7 +97,7 @@ Found sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, co
       found = {found.any || one.any, found.much || one.much};
     }
   else found = sweep_answers(rows, part, law.view(), of_run(tolerance, 0), h);
-  const bool bonds = sweep_bonds(rows, part) > tolerance.bond;
+  const bool bonds = sweep_bonds(rows, part) > kPassShare * tolerance.bond;
   return {found.any || bonds, found.much || bonds};
 }
 
@@ -192,12 +198,6 @@ void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
 
 namespace {
 
-double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
-  return std::fabs(
-      std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
-               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 3])));
-}
-
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];
   return rows.wt[i] * std::sqrt(a * a + b * b);
@@ -232,7 +232,7 @@ Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &
     if (!(rows.wn[i] > 0)) return;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double normal = normal_residual(rows, i, u);
+    const double normal = normal_residual(rows, i, u.x);
     poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
     r.relative = std::max(r.relative, normal / tolerance.normal[i]);
     r.due = std::max(r.due, normal / tolerance.most_normal);
@@ -289,7 +289,7 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);
     const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
-    const double normal = normal_residual(rows, i, u);
+    const double normal = normal_residual(rows, i, u.x);
     const double tangent = rubs ? tangent_residual(rows, i, answered(rows, law, i, h, u)) : 0;
     each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);
