@@ -12,7 +12,7 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kNone = UINT32_MAX, kAlone = kNone - 1;
-constexpr uint32_t kMembers = 64;    // points of a patch
+constexpr uint32_t kMembers = 48;    // points of a patch
 constexpr uint32_t kFactored = 256;  // coarse points up to which their matrix is factored
 constexpr double kReduction = 0.1;   // of the residual of a level that is not factored
 // In a patch of one point, or of points on a line, some rigid motions move no point. A small addition to the
