@@ -52,9 +52,8 @@ TEST(CoarseSpace, Iterations_DoNotGrowWithTheBody) {
   }
 }
 
-// unsanitized: too slow there; linear_solver_test.cpp has two levels on threads
 TEST(CoarseSpace, ThreeLevelsOnSeveralThreads_SameBits) {
-  const test::BlockSystem system = cylinder(52000, 1.0 / 60);
+  const test::BlockSystem system = cylinder(35000, 1.0 / 60);
   ASSERT_GT(system.n, 128 * 48u);  // more points than two levels serve
   std::vector<double> first;
   for (const char *simd : {"sse2", "avx2"})
