@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "math/vec3.h"
 #include "math/width.h"
@@ -10,12 +11,15 @@ namespace dfm {
 
 namespace {
 
-// Inverse of a symmetric 3x3 block by L D L^T, which stands blocks that are almost singular; false where it
-// is not positive definite.
+// Inverse of a symmetric 3x3 block by L D L^T, accurate where the block is almost singular; false where it is
+// not positive definite.
 bool invert(const double *a, double *out) {
-  const double l10 = a[1] / a[0], l20 = a[2] / a[0], d1 = a[4] - l10 * a[1], below = a[5] - l10 * a[2];
-  const double l21 = below / d1, d2 = a[8] - l20 * a[2] - l21 * below, m20 = l10 * l21 - l20;
-  if (!(a[0] > 0) || !(d1 > 0) || !(d2 > 0)) return false;
+  if (!(a[0] > 0)) return false;
+  const double l10 = a[1] / a[0], l20 = a[2] / a[0], d1 = a[4] - l10 * a[1];
+  if (!(d1 > 0)) return false;
+  const double l21 = (a[5] - l10 * a[2]) / d1, d2 = a[8] - l20 * a[2] - l21 * (a[5] - l10 * a[2]);
+  if (!(d2 > 0)) return false;
+  const double m20 = l10 * l21 - l20;
   out[0] = 1 / a[0] + l10 * l10 / d1 + m20 * m20 / d2;
   out[1] = out[3] = -l10 / d1 - m20 * l21 / d2;
   out[2] = out[6] = m20 / d2;
@@ -56,21 +60,21 @@ void PcgSolver::place(const double *points, uint32_t stride) {
 }
 
 bool PcgSolver::factor(const double *blk) {
+  const double *const points = std::exchange(points_, nullptr);
+  ready_ = with_coarse_ = false;  // also if there is not enough memory
   a_.set_values(tasks_, blk);
-  ready_ = sum([&](uint32_t begin, uint32_t end) {
-             bool good = true;
-             for (uint32_t i = begin; i < end; ++i)
-               good = invert(a_.diagonal(i), &inverse_[9 * size_t{i}]) && good;
-             return good ? 0.0 : 1.0;
-           }) == 0;
-  with_coarse_ = ready_ && points_ && a_.size() >= kOneLevel;
-  if (with_coarse_) {
+  const double bad = sum([&](uint32_t begin, uint32_t end) {
+    bool good = true;
+    for (uint32_t i = begin; i < end; ++i) good = invert(a_.diagonal(i), &inverse_[9 * size_t{i}]) && good;
+    return good ? 0.0 : 1.0;
+  });
+  if (bad > 0) return false;
+  if (points && a_.size() >= kOneLevel) {
     if (!patched_) coarse_.analyse(a_.rows(), a_.size());
     patched_ = true;
-    with_coarse_ = coarse_.factor(a_.rows(), points_, stride_);
+    with_coarse_ = coarse_.factor(a_.rows(), points, stride_);
   }
-  points_ = nullptr;
-  return ready_;
+  return ready_ = true;
 }
 
 // Calls f(begin, end) for each grain of points, however the work is divided among threads.
