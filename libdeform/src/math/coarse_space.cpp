@@ -11,7 +11,7 @@ namespace dfm {
 
 namespace {
 
-constexpr uint32_t kNone = UINT32_MAX, kAlone = kNone - 1;
+constexpr uint32_t kNone = UINT32_MAX, kIsolated = kNone - 1;
 constexpr uint32_t kMembers = 48;    // points of a patch
 constexpr uint32_t kFactored = 256;  // coarse points up to which their matrix is factored
 constexpr double kReduction = 0.1;   // of the residual of a level that is not factored
@@ -28,8 +28,9 @@ CoarseSpace::CoarseSpace(const Memory &memory, Tasks *tasks, bool motions)
 }
 
 // Patches grow breadth first, each from a point next to the existing patches. A remainder that is too small
-// joins a neighbor. The motions of a finer patch stay together. What is tied to nothing is in no patch, which
-// is written as one more: D^-1 serves it, and every patch has two points or more.
+// joins a neighbor. The motions of a finer patch stay together. What is tied to nothing is in no patch,
+// and its patch_ is the number of patches: D^-1 serves it. Each patch then has at least two points or finer
+// patches, so that the patches of a level are at most half as many as those of the level before.
 void CoarseSpace::form_patches(const BlockRows &rows) {
   const uint32_t motions = motions_ ? 2 : 1;
   patch_.assign(n_, kNone);
@@ -58,7 +59,7 @@ void CoarseSpace::form_patches(const BlockRows &rows) {
           edge.push_back(j);
         }
       }
-    if (beside == kNone && queue.size() == 1) beside = kAlone;
+    if (beside == kNone && queue.size() == 1) beside = kIsolated;
     if (beside != kNone && queue.size() < kMembers / 3)
       for (const uint32_t i : queue)
         for (uint32_t m = 0; m < motions; ++m) patch_[i + m] = beside;
