@@ -1,6 +1,8 @@
 // What each linear solver costs on the matrix of an implicit step, four sizes of a cylinder.
 //
-//   solver_bench [--csv FILE --commit HASH] [--plugin FILE --solver NAME]
+//   solver_bench [--csv FILE --commit HASH] [--plugin FILE --solver NAME] [--large]
+//
+// --large: conjugate gradients alone, 4,000 to 1,000,000 points (8 GB), also the matrix of equilibrium.
 //
 // Linear elasticity, E 1e5 Pa, nu 0.3, density 1,000 kg/m^3, step 1/60 s, one end held. `analyse` is paid
 // once, `factor` whenever the matrix changes; `solve` is per right-hand side, one at a time and 64 together,
@@ -56,13 +58,14 @@ double best_ms(const std::function<void()> &f) {
   return 1e3 * best;
 }
 
-// "pcg_one_level": told no places, so it has block Jacobi alone.
+// "pcg_one_level": told no places, so it has block Jacobi alone. "pcg_static": the matrix of equilibrium.
 void measure(const bench::Csv &sink, const dfm_context &context, const char *label, uint32_t threads,
              const test::BlockSystem &system, uint32_t ntet) {
   CountedMemory counted;
   const bool one_level = std::strcmp(label, "pcg_one_level") == 0;
-  const char *const name = one_level ? "pcg" : label;
+  const char *const name = std::strncmp(label, "pcg", 3) == 0 ? "pcg" : label;
   dfm::Tasks tasks(threads, nullptr, nullptr);
+  const dfm::Tasks::Step step(tasks);  // workers stay awake as they do while a world steps
   const auto solver =
       dfm::make_solver({name, system.n, false, 0}, context, counted.memory, threads > 1 ? &tasks : nullptr);
   const double analyse = best_ms([&] { solver->analyse(system.pattern()); });
@@ -71,7 +74,8 @@ void measure(const bench::Csv &sink, const dfm_context &context, const char *lab
     if (!solver->factor(system.blk.data())) std::puts("not positive definite");
   });
   const size_t rows = 3 * size_t{system.n};
-  std::vector<double> b(rows * kMany), x(rows * kMany);
+  const size_t nrhs = solver->direct() ? kMany : 1;
+  std::vector<double> b(rows * nrhs), x(rows * nrhs);
   for (size_t k = 0; k < b.size(); ++k) b[k] = double((k * 7919) % 1000) / 1000 - 0.3;
   dfm::SolveInfo info;
   const double one = best_ms([&] {
@@ -121,6 +125,14 @@ int main(int argc, char **argv) {
   std::printf("%-13s %s %6s %7s %9s %9s %9s %9s %6s %8s %9s %9s %8s\n", "solver", "t", "points", "tets",
               "analyse", "factor", "solve", "of 64", "iter", "ns/it/t", "S 50", "S 300", "B/tet");
   std::vector<const char *> names = {"ldlt", "pcg", "pcg_one_level"};
+  std::vector<uint32_t> sizes = {650, 4800, 11500, 20200};
+  std::vector<double> steps = {1.0 / 60};
+  for (int n = 1; n < argc; ++n) {
+    if (std::strcmp(argv[n], "--large") != 0) continue;
+    names = {"pcg"};
+    sizes = {20200, 118000, 475000, 1720000, 5800000};
+    steps.push_back(HUGE_VAL);
+  }
   dfm_context *context = nullptr;
   const dfm_context_def def = dfm_context_def_default();
   if (dfm_context_create(&def, &context) != DFM_OK) return 1;
@@ -129,14 +141,17 @@ int main(int argc, char **argv) {
       std::puts(dfm_last_error());
     if (!std::strcmp(argv[n], "--solver")) names.push_back(argv[n + 1]);
   }
-  for (const uint32_t cells : {650u, 4800u, 11500u, 20200u}) {
+  for (const uint32_t cells : sizes) {
     const dfm::TetMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
-    test::BlockSystem system = test::elastic_system(mesh, 1e5, 0.3, 1.0 / 60);
-    std::vector<uint8_t> mask(system.n, 0);
-    for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : 0;
-    dfm::hold_components(system.pattern(), mask.data(), system.blk.data());
-    for (const char *name : names)
-      for (const uint32_t threads : {1u, 2u}) measure(sink, *context, name, threads, system, mesh.ntet());
+    for (const double h : steps) {
+      test::BlockSystem system = test::elastic_system(mesh, 1e5, 0.3, h);
+      std::vector<uint8_t> mask(system.n, 0);
+      for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : 0;
+      dfm::hold_components(system.pattern(), mask.data(), system.blk.data());
+      for (const char *name : names)
+        for (const uint32_t threads : {1u, 2u})
+          measure(sink, *context, std::isinf(h) ? "pcg_static" : name, threads, system, mesh.ntet());
+    }
   }
   dfm_context_destroy(context);
 }

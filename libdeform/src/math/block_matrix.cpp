@@ -61,14 +61,14 @@ void BlockMatrix::set_pattern(const BlockPattern &pattern) {
   value_.assign(9 * size_t{count} + 1, 0.0);  // one more: the load of the last column reads it
 }
 
-void BlockMatrix::set_values(const double *blk) {
-  for (uint32_t b = 0; b < nb_; ++b) {
-    const double *const a = blk + 9 * size_t{b};
+void BlockMatrix::set_values(Tasks *tasks, const double *blk) {
+  each_on(n_ > kAlone ? tasks : nullptr, nb_, kGrain, [&](size_t b) {
+    const double *const a = blk + 9 * b;
     double *const u = &value_[9 * size_t{upper_[b]}], *const l = &value_[9 * size_t{lower_[b]}];
     for (uint32_t r = 0; r < 3; ++r)
       for (uint32_t c = 0; c < 3; ++c) u[3 * c + r] = a[3 * r + c];
     if (l != u) std::copy(a, a + 9, l);
-  }
+  });
 }
 
 void BlockMatrix::multiply(Tasks *tasks, const double *x, double *y) const {

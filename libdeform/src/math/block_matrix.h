@@ -25,8 +25,8 @@ class BlockMatrix {
   explicit BlockMatrix(const Memory &memory);
 
   void set_pattern(const BlockPattern &pattern);
-  void set_values(const double *blk);
-  uint32_t size() const { return n_; }  // points
+  void set_values(Tasks *tasks, const double *blk);  // tasks may be null
+  uint32_t size() const { return n_; }               // points
   // Blocks of row i: column[k] and value + 9k for k in [row[i], row[i+1]), columns of the matrix rising; each
   // block column after column. Rows have an even number of blocks: one of zeros on the diagonal may follow.
   BlockRows rows() const { return {row_.data(), column_.data(), value_.data()}; }
@@ -36,7 +36,7 @@ class BlockMatrix {
   double multiply(uint32_t begin, uint32_t end, const double *x, double *y) const {
     return kernels_.multiply(rows(), begin, end, x, y);
   }
-  void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; tasks may be null
+  void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; the same
 
   static constexpr uint32_t kGrain = 64;   // rows that one thread takes at a time
   static constexpr uint32_t kAlone = 512;  // rows up to which one thread alone is faster

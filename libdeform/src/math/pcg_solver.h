@@ -8,7 +8,9 @@ namespace dfm {
 class PcgSolver final : public LinearSolver {
  public:
   // max_iterations per right-hand side; 0: as many as the matrix has rows
-  explicit PcgSolver(const Memory &memory, Tasks *tasks = nullptr, uint32_t max_iterations = 0);
+  // motions: points 2p and 2p + 1 are translation and rotation of a patch (coarse_space.h)
+  explicit PcgSolver(const Memory &memory, Tasks *tasks = nullptr, uint32_t max_iterations = 0,
+                     bool motions = false);
 
   const char *name() const override { return "pcg"; }
   bool direct() const override { return false; }
@@ -26,7 +28,7 @@ class PcgSolver final : public LinearSolver {
   template <class F>
   double sum(F &&f);
   template <class F>
-  double precondition(const double *r, F &&before);
+  double precondition(F &&before);
 
   const BlockKernels &kernels_;
   Tasks *tasks_;
@@ -34,12 +36,13 @@ class PcgSolver final : public LinearSolver {
   bool ready_ = false;
   BlockMatrix a_;
   Array<double> inverse_;  // [n,9] of the diagonal blocks
-  Array<double> r_, z_, p_, q_, partial_;
-  Array<uint32_t> ij_;  // pattern, for the coarse level
+  Array<double> r_, z_, p_, q_;
+  Array<double> partial_, other_;  // scratch: sums of grains, of r.z and z.q
+  double z_q_ = 0;
   CoarseSpace coarse_;
   const double *points_ = nullptr;
   uint32_t stride_ = 0;
-  bool two_levels_ = false, patched_ = false;  // in use; patches exist
+  bool with_coarse_ = false, patched_ = false;  // has a factor; has patches
   RestrictedBySolving by_solving_;
 };
 

@@ -119,6 +119,7 @@ bool Equilibrium::factor(double share) {
   });
   Array<double> &blocks = stiffness_.blocks();
   hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
+  solver_->place(p_.x.data(), kStride);
   return solver_->factor(blocks.data());
 }
 

@@ -2,9 +2,7 @@
 // A = M / h^2 + K, in the blocks of math/block_matrix.h.
 #pragma once
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <vector>
 
 #include "math/block_matrix.h"
@@ -21,14 +19,28 @@ struct BlockSystem {
   dfm::BlockPattern pattern() const { return {n, uint32_t(ij.size() / 2), ij.data()}; }
 };
 
-// Steps of h seconds, Young's modulus and Poisson's ratio, density 1,000 kg/m^3.
+// Steps of h seconds (infinity: equilibrium), Young's modulus and Poisson's ratio, density 1,000 kg/m^3.
 inline BlockSystem elastic_system(const dfm::TetMesh &mesh, double young, double poisson, double h) {
   const double lambda = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu = young / (2 + 2 * poisson);
-  std::map<std::array<uint32_t, 2>, std::array<double, 9>> blocks;
   BlockSystem out;
   out.n = mesh.npoint();
   out.points.assign(mesh.points.begin(), mesh.points.end());
-  for (uint32_t i = 0; i < out.n; ++i) blocks[{i, i}] = {};
+  std::vector<std::vector<uint32_t>> columns(out.n);  // of the upper triangle
+  for (uint32_t i = 0; i < out.n; ++i) columns[i].push_back(i);
+  for (uint32_t t = 0; t < mesh.ntet(); ++t)
+    for (int a = 0; a < 4; ++a)
+      for (int b = 0; b < 4; ++b) {
+        const uint32_t i = mesh.tets[4 * size_t{t} + size_t(a)], j = mesh.tets[4 * size_t{t} + size_t(b)];
+        if (i < j && std::find(columns[i].begin(), columns[i].end(), j) == columns[i].end())
+          columns[i].push_back(j);
+      }
+  std::vector<size_t> row(1, 0);
+  for (uint32_t i = 0; i < out.n; ++i) {
+    std::sort(columns[i].begin(), columns[i].end());
+    for (const uint32_t j : columns[i]) out.ij.insert(out.ij.end(), {i, j});
+    row.push_back(out.ij.size() / 2);
+  }
+  out.blk.assign(9 * row.back(), 0.0);
   for (uint32_t t = 0; t < mesh.ntet(); ++t) {
     const uint32_t *const p = &mesh.tets[4 * size_t{t}];
     dfm::Vec3 x[4], gradient[4];
@@ -41,19 +53,17 @@ inline BlockSystem elastic_system(const dfm::TetMesh &mesh, double young, double
     for (int a = 0; a < 4; ++a)
       for (int b = 0; b < 4; ++b) {
         if (p[a] > p[b]) continue;
-        auto &block = blocks[{p[a], p[b]}];
+        const std::vector<uint32_t> &in_row = columns[p[a]];
+        const auto at = std::lower_bound(in_row.begin(), in_row.end(), p[b]) - in_row.begin();
+        double *const block = &out.blk[9 * (row[p[a]] + size_t(at))];
         const dfm::Vec3 ga = gradient[a], gb = gradient[b];
         for (int r = 0; r < 3; ++r)
           for (int c = 0; c < 3; ++c)
-            block[size_t(3 * r + c)] += volume * (lambda * ga[r] * gb[c] + mu * ga[c] * gb[r] +
-                                                  (r == c ? mu * dfm::dot(ga, gb) : 0.0));
+            block[3 * r + c] += volume * (lambda * ga[r] * gb[c] + mu * ga[c] * gb[r] +
+                                          (r == c ? mu * dfm::dot(ga, gb) : 0.0));
         if (a == b)
-          for (size_t r = 0; r < 3; ++r) block[4 * r] += 1000 * volume / 4 / (h * h);
+          for (int r = 0; r < 3; ++r) block[4 * r] += 1000 * volume / 4 / (h * h);
       }
-  }
-  for (const auto &[pair, block] : blocks) {
-    out.ij.insert(out.ij.end(), pair.begin(), pair.end());
-    out.blk.insert(out.blk.end(), block.begin(), block.end());
   }
   return out;
 }
