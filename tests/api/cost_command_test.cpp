@@ -433,6 +433,70 @@ TEST(Cost, StaticScene_IsStudiedWithoutTime) {
   EXPECT_GT(s.report.find("front")->items.size(), 1u);
 }
 
+// A bar of few linear tetrahedra sags by half of the true figure, one of few hexahedra by nearly all of it:
+// they are offered, they are the reference, and what is claimed of all choices is true.
+TEST(Cost, CellsOfOtherKinds_AreOfferedAndTheReference) {
+  const Study s =
+      study("kinds", bar(R"("duration": 1, "mode": "static")", R"(, "model": {"type": "corotational_fem"})"),
+            {"--axes", "mesh,cells", "--budget", "300", "--target", "0.1", "--apply",
+             test::scratch("cost_kinds_applied") + "/applied.json"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  const std::string truth = s.folder + "/truth";
+  const std::string bricks = R"(/bodies/0/mesh={"make": "bricks", "size": [0.3, 0.1, 0.1], "cells": 400})";
+  ASSERT_EQ(test::deform({"run", s.scene, "--set", bricks, "--out", truth, "--quiet"}).exit_code, 0);
+  const auto away = [](const std::array<double, 4> &tip) {
+    return std::array<double, 3>{tip[1] - 0.3, tip[2] - 0.05, tip[3] - 0.05};
+  };
+  const auto length = [](const std::array<double, 3> &d) { return std::hypot(d[0], d[1], d[2]); };
+  const std::array<double, 3> exact = away(path(truth).back());
+  size_t hexahedra = 0, second_order = 0;
+  for (const JsonValue &choice : s.report.find("choices")->items) {
+    const std::string label = choice.get("label");
+    hexahedra += label.find("lattice") != std::string::npos;
+    second_order += label.find("second-order tetrahedra") != std::string::npos;
+    ASSERT_EQ(choice.get("state"), "done") << label << ": " << choice.get("why");
+    const std::array<double, 3> there = away(path(choice.get("folder")).back());
+    const double found =
+        length({there[0] - exact[0], there[1] - exact[1], there[2] - exact[2]}) / length(exact);
+    if (std::max(found, number(choice, "headline")) < 0.01) continue;
+    EXPECT_LT(number(choice, "headline"), 2 * found) << label;
+    EXPECT_GT(number(choice, "headline"), found / 2) << label;
+  }
+  EXPECT_GE(hexahedra, 3u);
+  EXPECT_GE(second_order, 3u);
+  const JsonValue &reference = row(s.report, s.report.find("reference")->get("choice"));
+  EXPECT_NE(reference.get("label").find("lattice"), std::string::npos) << reference.get("label");
+  const JsonValue &chosen = row(s.report, s.report.find("pick")->get("index"));
+  EXPECT_NE(chosen.get("label").find("lattice"), std::string::npos) << chosen.get("label");
+  EXPECT_GT(number(row(s.report, "0"), "headline"), 0.2);
+  // what is applied stands alone
+  const std::string applied = s.folder + "/../cost_kinds_applied/applied.json";
+  EXPECT_EQ(test::deform({"run", applied, "--out", s.folder + "/applied", "--quiet"}).exit_code, 0);
+}
+
+// A body that is filled gets a lattice in place of its tetrahedra; one that is a lattice gets other numbers.
+TEST(Cost, FilledBodyAndLattice_AreStudiedAsLattices) {
+  for (const char *cells :
+       {R"("fill": {"cells": 150})", R"("lattice": {"cells": 20})", R"("lattice": {"size": 0.03})"}) {
+    SCOPED_TRACE(cells);
+    const Study s = study("lattice",
+                          R"({"format": "deform-scene", "version": 1, "gravity": [9.81, 0, 0],
+      "time": {"duration": 1, "mode": "static"}, "materials": {"gel": {"young": 3e4, "poisson": 0.3}},
+      "bodies": [{"name": "organ", "mesh": ")" DEFORM_SOURCE_DIR
+                          R"(/examples/data/organ.obj", "material": "gel",
+                  "model": {"type": "corotational_fem"}, "fix": [{"box": [[-1, -1, -1], [1, 1, -0.03]]}], )" +
+                              std::string(cells) + "}]}",
+                          {"--axes", "mesh,cells", "--budget", "300"});
+    ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+    size_t lattices = 0;
+    for (const JsonValue &choice : s.report.find("choices")->items) {
+      EXPECT_EQ(choice.get("state"), "done") << choice.get("label") << ": " << choice.get("why");
+      lattices += cli::json_text(*choice.find("set")).find("lattice") != std::string::npos;
+    }
+    EXPECT_GE(lattices, 3u);
+  }
+}
+
 TEST(Cost, WhatCannotBeStudied_IsReportedInOneSentence) {
   const auto refused = [](const std::string &name, const std::string &scene, std::vector<std::string> words,
                           const std::string &part) {

@@ -1,6 +1,7 @@
 #include "axes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -35,6 +36,7 @@ class Finder {
     axis("model", {"model"}, model_reason(), [&] { models(); });
     out_.steps = axis("time", {"time"}, time_reason(), [&] { steps(); });
     out_.meshes = axis("mesh", {"space"}, mesh_left_out, [&] { meshes(); });
+    axis("cells", {"space"}, mesh_left_out.empty() ? kinds_reason() : mesh_left_out, [&] { kinds(); });
     axis("volume", {"model"}, volume_reason(), [&] { volumes(); });
     axis("contact", {"contact"}, contact_reason(), [&] { contacts(); });
     axis("law", {"contact"}, law_reason(), [&] { laws(); });
@@ -169,6 +171,57 @@ class Finder {
     }
   }
 
+  std::string at_body(size_t i, const char *key) const { return "/bodies/" + std::to_string(i) + key; }
+
+  // Whether every body can have such cells, and has others.
+  bool can_be(Cells kind) const {
+    bool other = false;
+    for (size_t i = 0; i < s_.bodies.size(); ++i) {
+      const JsonValue *const mesh = s_.find(at_body(i, "/mesh"));
+      const bool made = mesh && mesh->kind == JsonValue::object,
+                 bricks = made && mesh->get("make") == "bricks";
+      const bool lattice = s_.find(at_body(i, "/lattice"));
+      if (kind == Cells::second_order && (!made || bricks)) return false;
+      other |= kind == Cells::hexahedra ? !lattice && !bricks : mesh->get("order") != "2";
+    }
+    return other;
+  }
+
+  // The scene's own models where they take such cells, else the one of the reference, else any.
+  bool model_for(Cells kind, Knobs &knobs) const {
+    const uint32_t cell = kind == Cells::hexahedra ? DFM_CELL_HEX8 : DFM_CELL_TET10;
+    const auto takes = [&](const std::string &name) {
+      const Offered *const model = s_.model(name);
+      return model && (model->cells & cell) && lacks(s_, *model).empty();
+    };
+    if (std::all_of(s_.bodies.begin(), s_.bodies.end(), [&](auto &body) { return takes(body.model); }))
+      return true;
+    knobs.model = out_.reference_model;
+    return takes(knobs.model);
+  }
+
+  std::string kinds_reason() const {
+    if (s_.find("/cuts")) return "a body that is cut has tetrahedra";
+    if (!can_be(Cells::second_order) && !can_be(Cells::hexahedra)) return "all bodies have such cells";
+    Knobs k;
+    if (!model_for(Cells::hexahedra, k)) return "no model of this study takes other cells than tetrahedra";
+    return "";
+  }
+
+  // Hexahedra with as many points as the scene's tetrahedra or fewer, and such second-order tetrahedra.
+  void kinds() {
+    for (const auto &[kind, numbers] : kKinds) {
+      Knobs k;
+      k.kind = kind;
+      if (!can_be(kind) || !model_for(kind, k)) continue;
+      for (const double times : numbers) {
+        k.cells = times;
+        add(k, "cells");
+      }
+      out_.lattices |= kind == Cells::hexahedra;
+    }
+  }
+
   void precisions() {
     Knobs k;
     k.precision = precision_of(s_) == "single" ? "double" : "single";
@@ -224,8 +277,29 @@ class Finder {
     add(k, "guard");
   }
 
+  // Such cells with the steps that cells of their size allow, and with long ones.
+  void front_of_kinds() {
+    if (!out_.steps) return;
+    const std::vector<Candidate> given = out_.candidates;
+    std::vector<double> steps = long_steps();
+    if (steps.size() > 2) steps.resize(2);
+    for (const Candidate &c : given) {
+      if (c.knobs.kind == Cells::own) continue;
+      Knobs k = c.knobs;
+      k.integrator = "symplectic_euler";
+      k.step = "\"auto\"";
+      add(k, "front");
+      k.integrator = "tr_bdf2";
+      for (const double step : steps) {
+        k.step = seconds(step);
+        add(k, "front");
+      }
+    }
+  }
+
   // What a person would try: each model on fewer cells and with long steps.
   void fronts() {
+    front_of_kinds();
     const bool models = out_.axes[0].left_out.empty();
     std::vector<std::string> names;
     if (models)
@@ -263,6 +337,9 @@ class Finder {
   }
 
   static constexpr double kCells[] = {0.125, 0.25, 0.5, 2};
+  static constexpr std::pair<Cells, std::array<double, 3>> kKinds[] = {
+      {Cells::second_order, {1.0 / 64, 1.0 / 16, 1.0 / 8}},
+      {Cells::hexahedra, {kHexahedron / 16, kHexahedron / 4, kHexahedron}}};
   const Subject &s_;
   const std::vector<std::string> &wanted_;
   Axes out_;
@@ -271,8 +348,8 @@ class Finder {
 }  // namespace
 
 const std::vector<std::string> &axis_names() {
-  static const std::vector<std::string> names = {"model", "time", "mesh",  "volume",   "contact",
-                                                 "law",   "self", "guard", "precision"};
+  static const std::vector<std::string> names = {"model",   "time", "mesh", "cells", "volume",
+                                                 "contact", "law",  "self", "guard", "precision"};
   return names;
 }
 

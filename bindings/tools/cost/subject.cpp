@@ -34,7 +34,8 @@ void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &f
       context,
       [](void *user, const dfm_type *type, const char *file) {
         Found &f = *static_cast<Found *>(user);
-        Offered offered{short_name(type->id), type->id, {}};
+        Offered offered{short_name(type->id), type->id, {}, 0};
+        if (type->kind == DFM_KIND_MODEL) offered.cells = static_cast<const dfm_model *>(type->ops)->cells;
         for (const char *const *e = type->effects; e && *e; ++e) offered.effects.push_back(*e);
         if (type->kind == DFM_KIND_SOLVER) return;
         (type->kind == DFM_KIND_FRICTION ? f.subject.laws : f.subject.models).push_back(offered);

@@ -15,6 +15,7 @@ namespace cli::cost {
 struct Offered {
   std::string name, id;  // name: short where the scene may say it so
   std::vector<std::string> effects;
+  uint32_t cells = 0;  // DFM_CELL_* that a model takes
 };
 
 struct SubjectBody {
