@@ -173,21 +173,21 @@ class Finder {
 
   std::string at_body(size_t i, const char *key) const { return "/bodies/" + std::to_string(i) + key; }
 
-  // Whether every body can have such cells, and has others.
+  // Whether every body can have such cells, and one has others. The border of a lattice is not its shape.
   bool can_be(Cells kind) const {
     bool other = false;
     for (size_t i = 0; i < s_.bodies.size(); ++i) {
-      const JsonValue *const mesh = s_.find(at_body(i, "/mesh"));
-      const bool made = mesh && mesh->kind == JsonValue::object,
-                 bricks = made && mesh->get("make") == "bricks";
+      const JsonValue &mesh = *s_.find(at_body(i, "/mesh"));
+      const bool made = mesh.kind == JsonValue::object, bricks = made && mesh.get("make") == "bricks";
       const bool lattice = s_.find(at_body(i, "/lattice"));
-      if (kind == Cells::second_order && (!made || bricks)) return false;
-      other |= kind == Cells::hexahedra ? !lattice && !bricks : mesh->get("order") != "2";
+      if (kind == Cells::second_order ? !made || bricks : s_.find(at_body(i, "/surface/from")) != nullptr)
+        return false;
+      other |= kind == Cells::hexahedra ? !lattice && !bricks : mesh.get("order") != "2";
     }
     return other;
   }
 
-  // The scene's own models where they take such cells, else the one of the reference, else any.
+  // The scene's own models where they take such cells, else that of the reference.
   bool model_for(Cells kind, Knobs &knobs) const {
     const uint32_t cell = kind == Cells::hexahedra ? DFM_CELL_HEX8 : DFM_CELL_TET10;
     const auto takes = [&](const std::string &name) {
@@ -202,7 +202,8 @@ class Finder {
 
   std::string kinds_reason() const {
     if (s_.find("/cuts")) return "a body that is cut has tetrahedra";
-    if (!can_be(Cells::second_order) && !can_be(Cells::hexahedra)) return "all bodies have such cells";
+    if (!can_be(Cells::second_order) && !can_be(Cells::hexahedra))
+      return "all bodies have such cells, or show the border of theirs";
     Knobs k;
     if (!model_for(Cells::hexahedra, k)) return "no model of this study takes other cells than tetrahedra";
     return "";
