@@ -435,6 +435,7 @@ TEST(Cost, StaticScene_IsStudiedWithoutTime) {
 
 // A bar of few linear tetrahedra sags by half of the true figure, one of few hexahedra by nearly all of it:
 // they are offered, they are the reference, and what is claimed of all choices is true.
+// unsanitized: too slow there
 TEST(Cost, CellsOfOtherKinds_AreOfferedAndTheReference) {
   const Study s =
       study("kinds", bar(R"("duration": 1, "mode": "static")", R"(, "model": {"type": "corotational_fem"})"),
@@ -475,6 +476,7 @@ TEST(Cost, CellsOfOtherKinds_AreOfferedAndTheReference) {
 }
 
 // A body that is filled gets a lattice in place of its tetrahedra; one that is a lattice gets other numbers.
+// unsanitized: too slow there
 TEST(Cost, FilledBodyAndLattice_AreStudiedAsLattices) {
   for (const char *cells :
        {R"("fill": {"cells": 150})", R"("lattice": {"cells": 20})", R"("lattice": {"size": 0.03})"}) {
