@@ -173,26 +173,25 @@ class Finder {
 
   std::string at_body(size_t i, const char *key) const { return "/bodies/" + std::to_string(i) + key; }
 
-  // Whether every body can have such cells, and one has others. The border of a lattice is not its shape.
+  // Whether every body can have such cells, and one has others. The boundary of a lattice is not the shape.
   bool can_be(Cells kind) const {
     bool other = false;
     for (size_t i = 0; i < s_.bodies.size(); ++i) {
       const JsonValue &mesh = *s_.find(at_body(i, "/mesh"));
-      const bool made = mesh.kind == JsonValue::object, bricks = made && mesh.get("make") == "bricks";
-      const bool lattice = s_.find(at_body(i, "/lattice"));
-      if (kind == Cells::second_order ? !made || bricks : s_.find(at_body(i, "/surface/from")) != nullptr)
+      const bool made = mesh.kind == JsonValue::object, hexahedra = has_hexahedra(s_, i);
+      if (kind == Cells::second_order ? !made || hexahedra : s_.find(at_body(i, "/surface/from")) != nullptr)
         return false;
-      other |= kind == Cells::hexahedra ? !lattice && !bricks : mesh.get("order") != "2";
+      other |= kind == Cells::hexahedra ? !hexahedra : mesh.get("order") != "2";
     }
     return other;
   }
 
   // The scene's own models where they take such cells, else that of the reference.
   bool model_for(Cells kind, Knobs &knobs) const {
-    const uint32_t cell = kind == Cells::hexahedra ? DFM_CELL_HEX8 : DFM_CELL_TET10;
     const auto takes = [&](const std::string &name) {
       const Offered *const model = s_.model(name);
-      return model && (model->cells & cell) && lacks(s_, *model).empty();
+      return model && (kind == Cells::hexahedra ? model->lattices : model->second_order) &&
+             lacks(s_, *model).empty();
     };
     if (std::all_of(s_.bodies.begin(), s_.bodies.end(), [&](auto &body) { return takes(body.model); }))
       return true;
@@ -200,13 +199,28 @@ class Finder {
     return takes(knobs.model);
   }
 
+  // Only first-order tetrahedra can be cut or torn.
+  bool may_be_cut() const {
+    const auto any = [](const std::vector<JsonValue> &rows, const char *key) {
+      return std::any_of(rows.begin(), rows.end(), [&](auto &row) { return row.find(key); });
+    };
+    const JsonValue *const materials = s_.find("/materials");
+    return !s_.scene.list("cuts").empty() || any(s_.scene.list("tools"), "cuts") ||
+           any(s_.scene.list("bodies"), "separate") || any(s_.scene.list("bodies"), "cut_delay") ||
+           (materials && std::any_of(materials->members.begin(), materials->members.end(),
+                                     [](const JsonMember &m) { return m.value.find("tear"); }));
+  }
+
   std::string kinds_reason() const {
-    if (s_.find("/cuts")) return "a body that is cut has tetrahedra";
-    if (!can_be(Cells::second_order) && !can_be(Cells::hexahedra))
-      return "all bodies have such cells, or show the border of theirs";
-    Knobs k;
-    if (!model_for(Cells::hexahedra, k)) return "no model of this study takes other cells than tetrahedra";
-    return "";
+    if (may_be_cut()) return "a body may be cut or torn, which only first-order tetrahedra can be";
+    bool can = false;
+    for (const Cells kind : {Cells::second_order, Cells::hexahedra}) {
+      Knobs k;
+      can |= can_be(kind);
+      if (can_be(kind) && model_for(kind, k)) return "";
+    }
+    return can ? "no model of this study takes other cells than first-order tetrahedra"
+               : "bodies have such cells, show the boundary of theirs, or come from different sources";
   }
 
   // Hexahedra with as many points as the scene's tetrahedra or fewer, and such second-order tetrahedra.

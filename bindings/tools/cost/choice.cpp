@@ -48,7 +48,7 @@ void set_model(const Subject &subject, const std::string &body, size_t i, const 
   if (model != own || !knobs.volume.empty() || precision) out.emplace_back(body + "/model", json_text(value));
 }
 
-// The shape as a surface of its own: a lattice takes no other.
+// A lattice lies under a surface of its own.
 void set_lattice(const Subject &subject, const std::string &body, const std::string &surface,
                  const std::string &cells, Settings &out) {
   if (!surface.empty()) out.emplace_back(body + "/mesh", quoted(surface));
@@ -63,19 +63,22 @@ void set_cells(const Subject &subject, const Surfaces &surfaces, size_t i, const
     const JsonValue *const value = subject.find(body + key);
     return value ? std::strtod(value->text.c_str(), nullptr) : otherwise;
   };
-  const auto scaled = [&](double n) { return std::to_string(std::max(1L, std::lround(n * knobs.cells))); };
+  // those that are hexahedra already are so many times as many as they are
+  const bool already = knobs.kind == Cells::hexahedra && has_hexahedra(subject, i);
+  const double times = already ? knobs.cells / kHexahedron : knobs.cells;
+  const auto scaled = [&](double n) { return std::to_string(std::max(1L, std::lround(n * times))); };
   const JsonValue *const mesh = subject.find(body + "/mesh");
   if (const JsonValue *const lattice = subject.find(body + "/lattice")) {
     const bool counted = lattice->find("cells");
     out.emplace_back(body + (counted ? "/lattice/cells" : "/lattice/size"),
                      counted ? scaled(number_at("/lattice/cells", 1))
-                             : number(number_at("/lattice/size", 1) / std::cbrt(knobs.cells)));
-  } else if (knobs.kind == Cells::hexahedra) {
-    set_lattice(subject, body, surfaces.file(i, knobs.cells), scaled(subject.bodies[i].cells), out);
+                             : number(number_at("/lattice/size", 1) / std::cbrt(times)));
+  } else if (knobs.kind == Cells::hexahedra && !already) {
+    set_lattice(subject, body, surfaces.file(i, times), scaled(subject.bodies[i].cells), out);
   } else if (mesh && mesh->kind == JsonValue::object) {
     out.emplace_back(body + "/mesh/cells", scaled(number_at("/mesh/cells", 1000)));
     if (knobs.kind == Cells::second_order) out.emplace_back(body + "/mesh/order", "2");
-  } else if (const std::string surface = surfaces.file(i, knobs.cells); surface.empty()) {
+  } else if (const std::string surface = surfaces.file(i, times); surface.empty()) {
     out.emplace_back(body + "/fill/cells", scaled(number_at("/fill/cells", 5000)));
   } else {
     out.emplace_back(body + "/mesh", quoted(surface));
@@ -84,6 +87,11 @@ void set_cells(const Subject &subject, const Surfaces &surfaces, size_t i, const
 }
 
 }  // namespace
+
+bool has_hexahedra(const Subject &subject, size_t i) {
+  const std::string body = "/bodies/" + std::to_string(i);
+  return subject.find(body + "/lattice") || subject.word(body + "/mesh/make", "") == "bricks";
+}
 
 std::string seconds(double h) {
   char text[40];
@@ -96,7 +104,7 @@ Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Kno
   for (size_t i = 0; i < subject.bodies.size(); ++i) {
     const std::string body = "/bodies/" + std::to_string(i);
     set_model(subject, body, i, knobs, out);
-    if (knobs.cells != 1 || knobs.kind != Cells::own) set_cells(subject, surfaces, i, knobs, out);
+    if (!knobs.own_mesh()) set_cells(subject, surfaces, i, knobs, out);
   }
   if (!knobs.integrator.empty()) out.emplace_back("/time/integrator", quoted(knobs.integrator));
   if (!knobs.step.empty()) out.emplace_back("/time/step", knobs.step);

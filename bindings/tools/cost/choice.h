@@ -1,5 +1,6 @@
 // One way to simulate the scene: what is changed in it, as the words of `deform run --set`.
 #pragma once
+#include <map>
 #include <set>
 #include <string>
 #include <utility>
@@ -19,6 +20,7 @@ struct Knobs {
   std::string model, integrator, step, tolerance, law, self, guard, volume, precision;
   Cells kind = Cells::own;
   double cells = 1;  // times the scene's number
+  bool own_mesh() const { return kind == Cells::own && cells == 1; }
   bool operator==(const Knobs &) const = default;
 };
 
@@ -37,8 +39,10 @@ class Surfaces {
   const Subject &subject_;
   std::string folder_;
   mutable std::set<std::string> written_;
+  mutable std::map<size_t, uint32_t> triangles_;  // by body: of the boundary of the scene's mesh
 };
 
+bool has_hexahedra(const Subject &subject, size_t body);  // as the scene is
 std::string seconds(double h);  // a step as JSON text
 Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs);
 // "corotational_fem, implicit_euler 0.01 s, cells x0.5"; "the scene as it is" where nothing is chosen.

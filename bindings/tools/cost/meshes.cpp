@@ -40,7 +40,9 @@ Context quiet_context() {
 struct Made {
   std::string kind;
   std::vector<double> size;
-  explicit Made(const JsonValue &mesh) : kind(mesh.get("make") == "bricks" ? "beam" : mesh.get("make")) {
+  uint32_t cells;
+  explicit Made(const JsonValue &mesh)
+      : kind(mesh.get("make")), cells(mesh.find("cells") ? uint32_t(mesh.scalar("cells")) : 1000) {
     for (const char *key : {"inner", "radius", "length"})
       if (mesh.find(key)) size.push_back(mesh.scalar(key));
     if (const JsonValue *const edges = mesh.find("size"))
@@ -49,17 +51,15 @@ struct Made {
   }
 };
 
-// A lattice has the volume of its surface, and a round one of triangles as large as cells has less than the
-// shape: edges are half of those of tetrahedra as large as the hexahedra. So both errors fall alike.
-uint32_t triangles_for(dfm_context *context, const Made &shape, uint32_t cells, double times) {
+uint32_t triangles_of(dfm_context *context, const Made &shape) {
   dfm_tetmesh mesh = 0;
-  need(dfm_tetmesh_make(context, shape.kind.c_str(), shape.size.data(), cells, &mesh));
+  need(dfm_tetmesh_make(context, shape.kind.c_str(), shape.size.data(), shape.cells, &mesh));
   dfm_tetmesh_info info = {};
   info.size = sizeof info;
   const dfm_status counted = dfm_tetmesh_get_info(mesh, &info);
   dfm_tetmesh_destroy(mesh);
   need(counted);
-  return uint32_t(std::lround(4 * info.ntriangle * std::pow(times / kHexahedron, 2.0 / 3)));
+  return info.ntriangle;
 }
 
 std::string file_of(const Subject &subject, const std::string &pointer) {
@@ -93,8 +93,12 @@ std::string Surfaces::file(size_t body, double times) const {
   const auto place = [&] { path = fs::absolute(fs::path(folder_) / (path + ".obj")).string(); };
   if (mesh.kind == JsonValue::object) {
     const Made shape(mesh);
-    const uint32_t n = triangles_for(context.get(), shape,
-                                     mesh.find("cells") ? uint32_t(mesh.scalar("cells")) : 1000, times);
+    uint32_t &own = triangles_[body];
+    if (own == 0) own = triangles_of(context.get(), shape);
+    // A lattice has the volume of its surface. That of a round one of triangles as large as cells is less than
+    // the shape's: edges are half of those of tetrahedra as large as the hexahedra, so that both errors fall
+    // alike.
+    const auto n = uint32_t(std::lround(4.0 * own * std::pow(times / kHexahedron, 2.0 / 3)));
     path += "_" + std::to_string(n);
     place();
     if (!written_.insert(path).second) return path;

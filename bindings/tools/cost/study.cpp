@@ -431,7 +431,7 @@ class Student {
     }
     own.mesh = out_.rows[size_t(own.reference)].headline;
     for (size_t i = 0; i < out_.rows.size(); ++i) {
-      if (!out_.rows[i].compared || out_.rows[i].candidate.knobs.cells != 1 || !same_physics(int(i)))
+      if (!out_.rows[i].compared || !out_.rows[i].candidate.knobs.own_mesh() || !same_physics(int(i)))
         continue;
       own.error[i] = largest(errors(i, figures_[size_t(own.reference)]));
     }

@@ -34,8 +34,12 @@ void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &f
       context,
       [](void *user, const dfm_type *type, const char *file) {
         Found &f = *static_cast<Found *>(user);
-        Offered offered{short_name(type->id), type->id, {}, 0};
-        if (type->kind == DFM_KIND_MODEL) offered.cells = static_cast<const dfm_model *>(type->ops)->cells;
+        Offered offered{short_name(type->id), type->id, {}};
+        if (type->kind == DFM_KIND_MODEL) {
+          const dfm_model &model = *static_cast<const dfm_model *>(type->ops);
+          offered.second_order = model.cells & DFM_CELL_TET10;
+          offered.lattices = (model.cells & DFM_CELL_HEX8) && (model.caps & DFM_CAP_INSIDE);
+        }
         for (const char *const *e = type->effects; e && *e; ++e) offered.effects.push_back(*e);
         if (type->kind == DFM_KIND_SOLVER) return;
         (type->kind == DFM_KIND_FRICTION ? f.subject.laws : f.subject.models).push_back(offered);
@@ -132,7 +136,9 @@ void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
     const BodyView &view = scene.bodies()[i];
     SubjectBody body;
     body.name = view.name;
-    body.cells = view.ntet;
+    // a second-order tetrahedron is seen as 8 (dfm_tetmesh_cells)
+    const std::string mesh = "/bodies/" + std::to_string(i) + "/mesh";
+    body.cells = out.find(mesh + "/order") && out.find(mesh + "/order")->text == "2" ? view.ntet / 8 : view.ntet;
     const JsonValue *const row = rows && i < rows->items.size() ? &rows->items[i] : nullptr;
     body.model = row ? short_name(row->get("model")) : "";
     const JsonValue *const effects = row ? row->find("effects") : nullptr;
@@ -256,7 +262,10 @@ const Offered *Subject::model(const std::string &name) const {
   return nullptr;
 }
 
-const JsonValue *Subject::find(const std::string &pointer) const { return at_pointer(scene, pointer); }
+const JsonValue *Subject::find(const std::string &pointer) const {
+  const JsonValue *const v = at_pointer(scene, pointer);
+  return v && v->kind != JsonValue::null ? v : nullptr;
+}
 
 std::string Subject::word(const std::string &pointer, const std::string &otherwise) const {
   const JsonValue *const v = find(pointer);

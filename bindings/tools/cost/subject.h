@@ -15,13 +15,13 @@ namespace cli::cost {
 struct Offered {
   std::string name, id;  // name: short where the scene may say it so
   std::vector<std::string> effects;
-  uint32_t cells = 0;  // DFM_CELL_* that a model takes
+  bool second_order = false, lattices = false;  // cells of this kind are accepted by a model
 };
 
 struct SubjectBody {
   std::string name, model;           // short name
   std::vector<std::string> effects;  // those at work
-  uint32_t cells = 0;
+  uint32_t cells = 0;                // tetrahedra, of either order
   double size = 0;                          // m, diagonal of the box around it at the start
   std::vector<std::array<double, 3>> ends;  // rest frame: two points of the surface far from each other
 };

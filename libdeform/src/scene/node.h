@@ -37,8 +37,8 @@ class Node {
   // delivered are refused.
   const Node &object(const std::string &kind, const std::vector<std::string> &further = {}) const;
   bool has(const char *key) const { return value_->is_object() && value_->contains(key); }
-  // The same of a key that null takes away, as --set says it.
-  bool has_any(const char *key) const {
+  // Whether the key has a value: null, as in `--set KEY=null`, is none, and such a key is removed.
+  bool has_value(const char *key) const {
     if (has(key) && (*value_)[key].is_null()) value_->erase(key);
     return has(key);
   }

@@ -318,7 +318,7 @@ double weight_of(const Node &quantity, const std::vector<Probe> &probes, bool &f
 }
 
 void read_wanted(const Node &scene, Definition &def) {
-  const bool accuracy = scene.has_any("accuracy"), budget = scene.has_any("budget");
+  const bool accuracy = scene.has_value("accuracy"), budget = scene.has_value("budget");
   if (accuracy && budget)
     scene.member("budget").fail(
         "\"accuracy\" is given too, and the planner aims at one of the two; keep one");
