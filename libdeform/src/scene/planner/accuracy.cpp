@@ -62,7 +62,7 @@ double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &
 }
 
 // Of a held body that a load bends at once. Cells that stiffen it by s let it sag by 1/(1+s) and swing
-// sqrt(1+s) times as fast, so that it is ever farther from its place. Root mean square over the time.
+// sqrt(1+s) times as fast; without damping the difference in phase grows. Root mean square over the time.
 double swing_error(const BodyRegime &b, const Estimate &e) {
   constexpr double kStep = 2 * kPi / 16;  // rad
   constexpr int kLeast = 64, kMost = 4096;
@@ -70,7 +70,9 @@ double swing_error(const BodyRegime &b, const Estimate &e) {
   const auto place = [&](double times, double t) {
     const double w = e.frequency * std::sqrt(times),
                  rate = 0.5 * (b.damping_mass + b.damping_stiffness * w * w);
-    return (1 - std::exp(-rate * t) * std::cos(w * t)) / times;
+    // 1 - exp(-rate t) cos(w t), exact for short times
+    const double half = std::sin(0.5 * w * t);
+    return (2 * std::exp(-rate * t) * half * half - std::expm1(-rate * t)) / times;
   };
   double off = 0, all = 0;
   for (int i = 1; i <= n; ++i) {
@@ -78,7 +80,7 @@ double swing_error(const BodyRegime &b, const Estimate &e) {
     off += d * d;
     all += exact * exact;
   }
-  return std::sqrt(off / all);
+  return all > 0 ? std::sqrt(off / all) : 0;
 }
 
 // The factor of a free body is that of linear tetrahedra.
@@ -301,8 +303,7 @@ class Planner {
       const Estimate &e = tries_[i].e;
       out_.assumed.push_back(format(
           "body '%s': %u points, %.2g cells across its thinnest side; load %.3g m/s2 and speed %.3g m/s make "
-          "a "
-          "strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz%s, which lasts %.3g s%s%s",
+          "a strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz%s, which lasts %.3g s%s%s",
           b.name.c_str(), b.points, b.thickness / b.edge, b.load, b.speed, e.strain, e.rotation,
           e.frequency / (2 * kPi), b.held ? on_mesh(b, e).c_str() : "", e.lasts, b.held ? "; held" : "; free",
           b.touches ? ", may touch something" : ", touches nothing"));
@@ -319,7 +320,7 @@ class Planner {
     }
   }
 
-  // What a model says of its own modes.
+  // The lowest mode of the bar with these cells, which is that of a model on this mesh.
   static std::string on_mesh(const BodyRegime &b, const Estimate &e) {
     return format(" (%.3g Hz on this mesh)", std::sqrt(1 + stiffening(b)) * e.frequency / (2 * kPi));
   }
@@ -339,10 +340,17 @@ class Planner {
     return out;
   }
 
-  // Of linear cells: the error goes with the square of their edges. Hexahedra bend as they should.
-  static std::string more_cells(const BodyRegime &b, double mesh, double allowed) {
+  // The least number whose error is allowed, in steps of 5 %: where phases differ it does not go with a power
+  // of the edge. First-order tetrahedra are too stiff against bending, hexahedra are not.
+  std::string more_cells(BodyRegime b, const Estimate &e, double allowed) const {
+    constexpr double kStep = 1.05, kMost = 1e9;
     const bool locks = b.held && b.stiffens > kBendingOfHexahedra;
-    return format("about %.2g times as many cells%s", 1.05 * std::pow(mesh / allowed, 1.5),
+    double times = 1;
+    while (times < kMost && wish_.weight * mesh_error(b, e) > allowed) {
+      times *= kStep;
+      b.edge /= std::cbrt(kStep);
+    }
+    return format("about %.2g times as many cells%s", times,
                   locks ? ", or few hexahedra (\"lattice\", bricks)" : "");
   }
 
@@ -361,7 +369,7 @@ class Planner {
       needs.push_back(
           format("a time.step of at most %.2g ms", 1e3 * out_.way.substep * 0.5 * target / w.time_error));
     // then a half is left to model and time
-    if (w.mesh_error > 0.5 * target) needs.push_back(more_cells(b, w.mesh_error, 0.5 * target));
+    if (w.mesh_error > 0.5 * target) needs.push_back(more_cells(b, tries_[i].e, 0.5 * target));
     if (needs.empty()) needs.push_back(named ? "a shorter time.step and a finer mesh" : "a finer mesh");
     return format(
         "the target of %.3g %% is not met: body '%s' has a predicted error of %.3g %% (model %.2g %%, "

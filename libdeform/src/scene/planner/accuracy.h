@@ -65,7 +65,8 @@ struct BodyRegime {
   uint32_t points = 0;
   double length = 0, thickness = 0;  // m, longest and shortest side of the box around the body at rest
   double edge = 0;                   // m, median edge of the cells
-  // What the cells add to the stiffness of bending where one edge spans the thickness; falls with the square.
+  // Relative increase of the bending stiffness by cells as large as the thickness; goes with the square of the
+  // edge.
   double stiffens = bending_of_tetrahedra(0.3);
   double cell_size = 0;                            // m, dfm_tetmesh_info.wave_path
   double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
@@ -108,7 +109,7 @@ struct Estimate {
   double duration = 0;
 };
 Estimate estimate(const BodyRegime &body, double duration);
-// The part by which its cells stiffen it against bending.
+// Relative increase of the bending stiffness by the cells of its mesh.
 double stiffening(const BodyRegime &body);
 // Whether it is touched over less than its own thickness, which dents it where it is touched.
 bool dented(const BodyRegime &body);
