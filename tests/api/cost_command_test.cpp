@@ -499,6 +499,50 @@ TEST(Cost, FilledBodyAndLattice_AreStudiedAsLattices) {
   }
 }
 
+// Cells are counted from those that each body has: bricks stay as they are where bars become as large.
+TEST(Cost, BricksBesideTetrahedra_KeepTheirShare) {
+  const Study s = study("bricks", R"({"format": "deform-scene", "version": 1, "accuracy": null,
+      "time": {"duration": 1, "mode": "static"}, "materials": {"gel": {"young": 5e4, "poisson": 0.3}},
+      "bodies": [{"name": "tetrahedra", "mesh": {"make": "beam", "size": [0.3, 0.1, 0.1], "cells": 90},
+                  "material": "gel", "model": {"type": "corotational_fem"}, "fill": null, "lattice": null,
+                  "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]},
+                 {"name": "bricks", "mesh": {"make": "bricks", "size": [0.3, 0.1, 0.1], "cells": 100},
+                  "material": "gel", "model": {"type": "corotational_fem"},
+                  "pose": {"position": [0, 1, 0]}, "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}]})",
+                        {"--axes", "cells", "--budget", "300"});
+  ASSERT_EQ(s.result.exit_code, 0) << s.result.err;
+  std::vector<double> bricks;
+  for (const JsonValue &choice : s.report.find("choices")->items) {
+    EXPECT_EQ(choice.get("state"), "done") << choice.get("label") << ": " << choice.get("why");
+    const JsonValue &set = *choice.find("set");
+    if (set.find("/bodies/0/lattice")) bricks.push_back(set.scalar("/bodies/1/mesh/cells"));
+    EXPECT_EQ(set.find("/bodies/1/lattice"), nullptr) << choice.get("label");
+  }
+  EXPECT_EQ(bricks, (std::vector<double>{6, 25, 100}));
+}
+
+// A body that may be cut has first-order tetrahedra, whatever would cut it.
+TEST(Cost, BodyThatMayBeCut_KeepsTheKindOfItsCells) {
+  const std::string time = R"("duration": 0.01, "step": 0.001)",
+                    fem = R"(, "model": {"type": "corotational_fem"})";
+  const auto left_out = [&](const std::string &scene) {
+    const Study s = study("cut", scene, {"--axes", "cells", "--budget", "300"});
+    EXPECT_EQ(s.result.exit_code, 0) << s.result.err;
+    std::string why;
+    for (const JsonValue &axis : s.report.list("left_out"))
+      if (axis.get("axis") == "cells") why = axis.get("why");
+    return why;
+  };
+  std::string tears = bar(time, fem);
+  tears.replace(tears.find("\"density\""), 0, "\"tear\": 1e6, ");
+  const std::string cuts = R"(, "cuts": [{"body": "bar", "t": 0.005, "shape": "plane",
+                                          "point": [0.15, 0, 0], "normal": [1, 0, 0]}])";
+  for (const std::string &scene : {tears, bar(time, fem, cuts), bar(time, fem + R"(, "separate": {})"),
+                                   bar(time, fem + R"(, "cut_delay": 0.1)")})
+    EXPECT_EQ(left_out(scene), "a body may be cut or torn, which only first-order tetrahedra can be")
+        << scene;
+}
+
 TEST(Cost, WhatCannotBeStudied_IsReportedInOneSentence) {
   const auto refused = [](const std::string &name, const std::string &scene, std::vector<std::string> words,
                           const std::string &part) {

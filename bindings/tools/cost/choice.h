@@ -43,7 +43,7 @@ class Surfaces {
 };
 
 bool has_hexahedra(const Subject &subject, size_t body);  // as the scene is
-std::string seconds(double h);  // a step as JSON text
+std::string seconds(double h);                            // a step as JSON text
 Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs);
 // "corotational_fem, implicit_euler 0.01 s, cells x0.5"; "the scene as it is" where nothing is chosen.
 std::string label_of(const Knobs &knobs);

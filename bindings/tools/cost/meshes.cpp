@@ -95,9 +95,9 @@ std::string Surfaces::file(size_t body, double times) const {
     const Made shape(mesh);
     uint32_t &own = triangles_[body];
     if (own == 0) own = triangles_of(context.get(), shape);
-    // A lattice has the volume of its surface. That of a round one of triangles as large as cells is less than
-    // the shape's: edges are half of those of tetrahedra as large as the hexahedra, so that both errors fall
-    // alike.
+    // A lattice has the volume of its surface. A round surface of triangles as large as cells has less volume
+    // than the shape: edges are half of those of tetrahedra as large as the hexahedra, so that both errors
+    // fall alike.
     const auto n = uint32_t(std::lround(4.0 * own * std::pow(times / kHexahedron, 2.0 / 3)));
     path += "_" + std::to_string(n);
     place();

@@ -200,8 +200,8 @@ TEST(Planner, CoarseMesh_MissesTheTargetInASentence) {
   EXPECT_NE(plan.assumed[1].find("its mesh alone makes an error of about 26"), std::string::npos)
       << plan.assumed[1];
   EXPECT_FALSE(plan.meets);
-  for (const char *word :
-       {"the target of 10 % is not met", "body 'bar'", "mesh 26 %)", " times as many cells, or few hexahedra"})
+  for (const char *word : {"the target of 10 % is not met", "body 'bar'", "mesh 26 %)",
+                           " times as many cells, or few hexahedra"})
     EXPECT_NE(plan.missed.find(word), std::string::npos) << word << ": " << plan.missed;
   // what it says it takes leaves half of the target to model and time
   const char about[] = "about ";

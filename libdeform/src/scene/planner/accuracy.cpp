@@ -303,7 +303,8 @@ class Planner {
       const Estimate &e = tries_[i].e;
       out_.assumed.push_back(format(
           "body '%s': %u points, %.2g cells across its thinnest side; load %.3g m/s2 and speed %.3g m/s make "
-          "a strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz%s, which lasts %.3g s%s%s",
+          "a strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz%s, which lasts %.3g "
+          "s%s%s",
           b.name.c_str(), b.points, b.thickness / b.edge, b.load, b.speed, e.strain, e.rotation,
           e.frequency / (2 * kPi), b.held ? on_mesh(b, e).c_str() : "", e.lasts, b.held ? "; held" : "; free",
           b.touches ? ", may touch something" : ", touches nothing"));

@@ -65,8 +65,8 @@ struct BodyRegime {
   uint32_t points = 0;
   double length = 0, thickness = 0;  // m, longest and shortest side of the box around the body at rest
   double edge = 0;                   // m, median edge of the cells
-  // Relative increase of the bending stiffness by cells as large as the thickness; goes with the square of the
-  // edge.
+  // Relative increase of the bending stiffness by cells as large as the thickness; goes with the square of
+  // the edge.
   double stiffens = bending_of_tetrahedra(0.3);
   double cell_size = 0;                            // m, dfm_tetmesh_info.wave_path
   double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
