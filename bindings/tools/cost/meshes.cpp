@@ -41,8 +41,11 @@ struct Made {
   std::string kind;
   std::vector<double> size;
   uint32_t cells;
+  bool second_order;
   explicit Made(const JsonValue &mesh)
-      : kind(mesh.get("make")), cells(mesh.find("cells") ? uint32_t(mesh.scalar("cells")) : 1000) {
+      : kind(mesh.get("make")),
+        cells(mesh.find("cells") ? uint32_t(mesh.scalar("cells")) : 1000),
+        second_order(mesh.get("order") == "2") {
     for (const char *key : {"inner", "radius", "length"})
       if (mesh.find(key)) size.push_back(mesh.scalar(key));
     if (const JsonValue *const edges = mesh.find("size"))
@@ -51,6 +54,7 @@ struct Made {
   }
 };
 
+// Of the boundary, as fine as the tetrahedra of SubjectBody::cells.
 uint32_t triangles_of(dfm_context *context, const Made &shape) {
   dfm_tetmesh mesh = 0;
   need(dfm_tetmesh_make(context, shape.kind.c_str(), shape.size.data(), shape.cells, &mesh));
@@ -59,7 +63,7 @@ uint32_t triangles_of(dfm_context *context, const Made &shape) {
   const dfm_status counted = dfm_tetmesh_get_info(mesh, &info);
   dfm_tetmesh_destroy(mesh);
   need(counted);
-  return info.ntriangle;
+  return info.ntriangle * (shape.second_order ? 4 : 1);
 }
 
 std::string file_of(const Subject &subject, const std::string &pointer) {

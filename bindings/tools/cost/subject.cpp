@@ -136,10 +136,7 @@ void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
     const BodyView &view = scene.bodies()[i];
     SubjectBody body;
     body.name = view.name;
-    // a second-order tetrahedron is seen as 8 (dfm_tetmesh_cells)
-    const std::string mesh = "/bodies/" + std::to_string(i) + "/mesh";
-    body.cells =
-        out.find(mesh + "/order") && out.find(mesh + "/order")->text == "2" ? view.ntet / 8 : view.ntet;
+    body.cells = view.ntet;
     const JsonValue *const row = rows && i < rows->items.size() ? &rows->items[i] : nullptr;
     body.model = row ? short_name(row->get("model")) : "";
     const JsonValue *const effects = row ? row->find("effects") : nullptr;
