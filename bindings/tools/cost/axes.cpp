@@ -35,8 +35,9 @@ class Finder {
     choose_reference();
     axis("model", {"model"}, model_reason(), [&] { models(); });
     out_.steps = axis("time", {"time"}, time_reason(), [&] { steps(); });
-    out_.meshes = axis("mesh", {"space"}, mesh_left_out, [&] { meshes(); });
-    axis("cells", {"space"}, mesh_left_out.empty() ? kinds_reason() : mesh_left_out, [&] { kinds(); });
+    numbers_ = axis("mesh", {"space"}, mesh_left_out, [&] { meshes(); });
+    const std::string left_out = mesh_left_out.empty() ? kinds_reason() : mesh_left_out;
+    out_.meshes = axis("cells", {"space"}, left_out, [&] { kinds(); }) || numbers_;
     axis("volume", {"model"}, volume_reason(), [&] { volumes(); });
     axis("contact", {"contact"}, contact_reason(), [&] { contacts(); });
     axis("law", {"contact"}, law_reason(), [&] { laws(); });
@@ -329,7 +330,7 @@ class Finder {
         k.step = "\"auto\"";
         add(k, "front");
         for (const double times : {0.5, 0.25, 0.125}) {
-          if (!out_.meshes) break;
+          if (!numbers_) break;
           k.cells = times;
           add(k, "front");
         }
@@ -338,11 +339,11 @@ class Finder {
         k.integrator = "implicit_euler";
         k.step = seconds(steps[std::min<size_t>(1, steps.size() - 1)]);
         for (const double times : {1.0, 0.5, 0.25}) {
-          if (times != 1 && !out_.meshes) break;
+          if (times != 1 && !numbers_) break;
           k.cells = times;
           add(k, "front");
         }
-      } else if (out_.meshes) {
+      } else if (numbers_) {
         for (const double times : {0.5, 0.25}) {
           k.cells = times;
           add(k, "front");
@@ -358,6 +359,7 @@ class Finder {
   const Subject &s_;
   const std::vector<std::string> &wanted_;
   Axes out_;
+  bool numbers_ = false;  // of cells may vary
 };
 
 }  // namespace
