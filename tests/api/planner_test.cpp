@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 
 #include "support.h"
 
@@ -47,16 +48,28 @@ class PlannerScene : public testing::Test {
 }  // namespace
 
 TEST_F(PlannerScene, Accuracy_ChoosesAndSaysWhy) {
-  const test::CommandResult r = test::deform({"explain", bar(R"("accuracy": {"target": 0.2},)")});
+  const test::CommandResult r = test::deform({"explain", bar(R"("accuracy": {"target": 0.4},)")});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   for (const char *word : {"planner (predicted, not measured",
                            "by costs of: ", "assumed: body 'bar': ", "chosen: ", "error of the model ",
                            "--set /bodies/0/model/type=", "--set /time/integrator="})
     EXPECT_TRUE(has(r.out, word)) << "no '" << word << "' in: " << r.out;
   const test::CommandResult run =
-      test::deform({"run", bar(R"("accuracy": {"target": 0.2},)"), "--out", folder() + "/out", "--quiet"});
+      test::deform({"run", bar(R"("accuracy": {"target": 0.4},)"), "--out", folder() + "/out", "--quiet"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_TRUE(has(test::read_file(folder() + "/out/summary.json"), "\"planner\""));
+}
+
+// What the planner says of a bar's lowest mode on its mesh is what the model that computes it says.
+TEST_F(PlannerScene, LowestMode_IsThatOfTheModel) {
+  const test::CommandResult r = test::deform({"explain", bar(R"("accuracy": {"target": 0.4},)")});
+  const auto number_after = [&](const char *word) {
+    const size_t at = r.out.find(word);
+    return at == std::string::npos ? 0.0 : std::strtod(r.out.c_str() + at + std::strlen(word), nullptr);
+  };
+  const double model = number_after("lowest: "), mesh = number_after(" Hz (");
+  ASSERT_GT(model, 0) << r.out;
+  EXPECT_NEAR(mesh, model, 0.1 * model) << "of the bar itself: " << number_after("lowest mode at ");
 }
 
 // The lines that explain prints make the same scene without a planner: the same bits.

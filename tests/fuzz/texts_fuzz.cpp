@@ -10,7 +10,7 @@
 #include "json_text.h"
 #include "mesh/raw_mesh.h"
 #include "messages.h"
-#include "scene/planner.h"
+#include "scene/planner/planner.h"
 #include "scene/table.h"
 
 namespace {

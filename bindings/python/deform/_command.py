@@ -85,9 +85,9 @@ def cost(scene: Any, *, budget: float = 120, target: float | None = None, axes: 
     """What accuracy costs on a scene: `deform cost SCENE` as a table. Takes minutes.
 
     budget: s for all runs; target: relative error for which the cheapest choice is sought; axes: what varies
-    (model, time, mesh, volume, contact, law, self, guard; all); quantities: what is compared (all probes);
-    out: a folder that keeps the runs, so that a larger budget goes on; apply: a file for the scene with the
-    cheapest choice."""
+    (model, time, mesh, cells, volume, contact, law, self, guard, precision; all); quantities: what is
+    compared (all probes); out: a folder that keeps the runs, so that a larger budget goes on; apply: a file
+    for the scene with the cheapest choice."""
     with tempfile.TemporaryDirectory() as folder:
         arguments = ["cost", scene, "--json", "--budget", budget, "--out", out or folder]
         for option, value in (("--target", target), ("--axes", ",".join(axes) if axes else None),

@@ -1,6 +1,7 @@
 #include "axes.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdio>
 
@@ -34,7 +35,9 @@ class Finder {
     choose_reference();
     axis("model", {"model"}, model_reason(), [&] { models(); });
     out_.steps = axis("time", {"time"}, time_reason(), [&] { steps(); });
-    out_.meshes = axis("mesh", {"space"}, mesh_left_out, [&] { meshes(); });
+    numbers_ = axis("mesh", {"space"}, mesh_left_out, [&] { meshes(); });
+    const std::string left_out = mesh_left_out.empty() ? kinds_reason() : mesh_left_out;
+    out_.meshes = axis("cells", {"space"}, left_out, [&] { kinds(); }) || numbers_;
     axis("volume", {"model"}, volume_reason(), [&] { volumes(); });
     axis("contact", {"contact"}, contact_reason(), [&] { contacts(); });
     axis("law", {"contact"}, law_reason(), [&] { laws(); });
@@ -169,6 +172,72 @@ class Finder {
     }
   }
 
+  std::string at_body(size_t i, const char *key) const { return "/bodies/" + std::to_string(i) + key; }
+
+  // Whether every body can have such cells, and one has others. The boundary of a lattice is not the shape.
+  bool can_be(Cells kind) const {
+    bool other = false;
+    for (size_t i = 0; i < s_.bodies.size(); ++i) {
+      const JsonValue &mesh = *s_.find(at_body(i, "/mesh"));
+      const bool made = mesh.kind == JsonValue::object, hexahedra = has_hexahedra(s_, i);
+      if (kind == Cells::second_order ? !made || hexahedra : s_.find(at_body(i, "/surface/from")) != nullptr)
+        return false;
+      other |= kind == Cells::hexahedra ? !hexahedra : mesh.get("order") != "2";
+    }
+    return other;
+  }
+
+  // The scene's own models where they take such cells, else that of the reference.
+  bool model_for(Cells kind, Knobs &knobs) const {
+    const auto takes = [&](const std::string &name) {
+      const Offered *const model = s_.model(name);
+      return model && (kind == Cells::hexahedra ? model->lattices : model->second_order) &&
+             lacks(s_, *model).empty();
+    };
+    if (std::all_of(s_.bodies.begin(), s_.bodies.end(), [&](auto &body) { return takes(body.model); }))
+      return true;
+    knobs.model = out_.reference_model;
+    return takes(knobs.model);
+  }
+
+  // Only first-order tetrahedra can be cut or torn.
+  bool may_be_cut() const {
+    const auto any = [](const std::vector<JsonValue> &rows, const char *key) {
+      return std::any_of(rows.begin(), rows.end(), [&](auto &row) { return row.find(key); });
+    };
+    const JsonValue *const materials = s_.find("/materials");
+    return !s_.scene.list("cuts").empty() || any(s_.scene.list("tools"), "cuts") ||
+           any(s_.scene.list("bodies"), "separate") || any(s_.scene.list("bodies"), "cut_delay") ||
+           (materials && std::any_of(materials->members.begin(), materials->members.end(),
+                                     [](const JsonMember &m) { return m.value.find("tear"); }));
+  }
+
+  std::string kinds_reason() const {
+    if (may_be_cut()) return "a body may be cut or torn, which only first-order tetrahedra can be";
+    bool can = false;
+    for (const Cells kind : {Cells::second_order, Cells::hexahedra}) {
+      Knobs k;
+      can |= can_be(kind);
+      if (can_be(kind) && model_for(kind, k)) return "";
+    }
+    return can ? "no model of this study takes other cells than first-order tetrahedra"
+               : "bodies have such cells, show the boundary of theirs, or come from different sources";
+  }
+
+  // Hexahedra with as many points as the scene's tetrahedra or fewer, and such second-order tetrahedra.
+  void kinds() {
+    for (const auto &[kind, numbers] : kKinds) {
+      Knobs k;
+      k.kind = kind;
+      if (!can_be(kind) || !model_for(kind, k)) continue;
+      for (const double times : numbers) {
+        k.cells = times;
+        add(k, "cells");
+      }
+      out_.lattices |= kind == Cells::hexahedra;
+    }
+  }
+
   void precisions() {
     Knobs k;
     k.precision = precision_of(s_) == "single" ? "double" : "single";
@@ -224,8 +293,29 @@ class Finder {
     add(k, "guard");
   }
 
+  // Such cells with the steps that cells of their size allow, and with long ones.
+  void front_of_kinds() {
+    if (!out_.steps) return;
+    const std::vector<Candidate> given = out_.candidates;
+    std::vector<double> steps = long_steps();
+    if (steps.size() > 2) steps.resize(2);
+    for (const Candidate &c : given) {
+      if (c.knobs.kind == Cells::own) continue;
+      Knobs k = c.knobs;
+      k.integrator = "symplectic_euler";
+      k.step = "\"auto\"";
+      add(k, "front");
+      k.integrator = "tr_bdf2";
+      for (const double step : steps) {
+        k.step = seconds(step);
+        add(k, "front");
+      }
+    }
+  }
+
   // What a person would try: each model on fewer cells and with long steps.
   void fronts() {
+    front_of_kinds();
     const bool models = out_.axes[0].left_out.empty();
     std::vector<std::string> names;
     if (models)
@@ -240,7 +330,7 @@ class Finder {
         k.step = "\"auto\"";
         add(k, "front");
         for (const double times : {0.5, 0.25, 0.125}) {
-          if (!out_.meshes) break;
+          if (!numbers_) break;
           k.cells = times;
           add(k, "front");
         }
@@ -249,11 +339,11 @@ class Finder {
         k.integrator = "implicit_euler";
         k.step = seconds(steps[std::min<size_t>(1, steps.size() - 1)]);
         for (const double times : {1.0, 0.5, 0.25}) {
-          if (times != 1 && !out_.meshes) break;
+          if (times != 1 && !numbers_) break;
           k.cells = times;
           add(k, "front");
         }
-      } else if (out_.meshes) {
+      } else if (numbers_) {
         for (const double times : {0.5, 0.25}) {
           k.cells = times;
           add(k, "front");
@@ -263,16 +353,20 @@ class Finder {
   }
 
   static constexpr double kCells[] = {0.125, 0.25, 0.5, 2};
+  static constexpr std::pair<Cells, std::array<double, 3>> kKinds[] = {
+      {Cells::second_order, {1.0 / 64, 1.0 / 16, 1.0 / 8}},
+      {Cells::hexahedra, {kHexahedron / 16, kHexahedron / 4, kHexahedron}}};
   const Subject &s_;
   const std::vector<std::string> &wanted_;
   Axes out_;
+  bool numbers_ = false;  // of cells may vary
 };
 
 }  // namespace
 
 const std::vector<std::string> &axis_names() {
-  static const std::vector<std::string> names = {"model", "time", "mesh",  "volume",   "contact",
-                                                 "law",   "self", "guard", "precision"};
+  static const std::vector<std::string> names = {"model",   "time", "mesh", "cells", "volume",
+                                                 "contact", "law",  "self", "guard", "precision"};
   return names;
 }
 

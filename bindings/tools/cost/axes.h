@@ -25,8 +25,9 @@ struct Axes {
   std::vector<Candidate> candidates;  // the scene as it is comes first
   std::string reference_model;        // "": the models that the scene names
   std::string reference_why;
-  bool meshes = false;  // cells may vary
-  bool steps = false;   // integrator and step may vary
+  bool meshes = false;    // number or kind of the cells may vary
+  bool lattices = false;  // and may be hexahedra, which have the least error for their cost
+  bool steps = false;     // integrator and step may vary
 };
 
 // Axis names in the order of the table.

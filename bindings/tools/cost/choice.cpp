@@ -48,17 +48,38 @@ void set_model(const Subject &subject, const std::string &body, size_t i, const 
   if (model != own || !knobs.volume.empty() || precision) out.emplace_back(body + "/model", json_text(value));
 }
 
-void set_cells(const Subject &subject, const std::string &body, size_t i, const std::string &surface,
-               double times, Settings &out) {
+// A lattice lies under a surface of its own.
+void set_lattice(const Subject &subject, const std::string &body, const std::string &surface,
+                 const std::string &cells, Settings &out) {
+  if (!surface.empty()) out.emplace_back(body + "/mesh", quoted(surface));
+  if (subject.find(body + "/fill")) out.emplace_back(body + "/fill", "null");
+  out.emplace_back(body + "/lattice", "{\"cells\": " + cells + "}");
+}
+
+void set_cells(const Subject &subject, const Surfaces &surfaces, size_t i, const Knobs &knobs,
+               Settings &out) {
+  const std::string body = "/bodies/" + std::to_string(i);
+  const auto number_at = [&](const char *key, double otherwise) {
+    const JsonValue *const value = subject.find(body + key);
+    return value ? std::strtod(value->text.c_str(), nullptr) : otherwise;
+  };
+  // those that are hexahedra already are so many times as many as they are
+  const bool already = knobs.kind == Cells::hexahedra && has_hexahedra(subject, i);
+  const double times = already ? knobs.cells / kHexahedron : knobs.cells;
   const auto scaled = [&](double n) { return std::to_string(std::max(1L, std::lround(n * times))); };
   const JsonValue *const mesh = subject.find(body + "/mesh");
-  if (mesh && mesh->kind == JsonValue::object) {
-    const std::string cells = mesh->get("cells");
-    out.emplace_back(body + "/mesh/cells",
-                     scaled(cells.empty() ? 1000 : std::strtod(cells.c_str(), nullptr)));
-  } else if (surface.empty()) {
-    const JsonValue *const cells = subject.find(body + "/fill/cells");
-    out.emplace_back(body + "/fill/cells", scaled(cells ? std::strtod(cells->text.c_str(), nullptr) : 5000));
+  if (const JsonValue *const lattice = subject.find(body + "/lattice")) {
+    const bool counted = lattice->find("cells");
+    out.emplace_back(body + (counted ? "/lattice/cells" : "/lattice/size"),
+                     counted ? scaled(number_at("/lattice/cells", 1))
+                             : number(number_at("/lattice/size", 1) / std::cbrt(times)));
+  } else if (knobs.kind == Cells::hexahedra && !already) {
+    set_lattice(subject, body, surfaces.file(i, times), scaled(subject.bodies[i].cells), out);
+  } else if (mesh && mesh->kind == JsonValue::object) {
+    out.emplace_back(body + "/mesh/cells", scaled(number_at("/mesh/cells", 1000)));
+    if (knobs.kind == Cells::second_order) out.emplace_back(body + "/mesh/order", "2");
+  } else if (const std::string surface = surfaces.file(i, times); surface.empty()) {
+    out.emplace_back(body + "/fill/cells", scaled(number_at("/fill/cells", 5000)));
   } else {
     out.emplace_back(body + "/mesh", quoted(surface));
     out.emplace_back(body + "/fill/cells", scaled(subject.bodies[i].cells));
@@ -66,6 +87,11 @@ void set_cells(const Subject &subject, const std::string &body, size_t i, const 
 }
 
 }  // namespace
+
+bool has_hexahedra(const Subject &subject, size_t i) {
+  const std::string body = "/bodies/" + std::to_string(i);
+  return subject.find(body + "/lattice") || subject.word(body + "/mesh/make", "") == "bricks";
+}
 
 std::string seconds(double h) {
   char text[40];
@@ -78,7 +104,7 @@ Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Kno
   for (size_t i = 0; i < subject.bodies.size(); ++i) {
     const std::string body = "/bodies/" + std::to_string(i);
     set_model(subject, body, i, knobs, out);
-    if (knobs.cells != 1) set_cells(subject, body, i, surfaces[i], knobs.cells, out);
+    if (!knobs.own_mesh()) set_cells(subject, surfaces, i, knobs, out);
   }
   if (!knobs.integrator.empty()) out.emplace_back("/time/integrator", quoted(knobs.integrator));
   if (!knobs.step.empty()) out.emplace_back("/time/step", knobs.step);
@@ -110,6 +136,8 @@ std::string label_of(const Knobs &knobs) {
   const std::string step = knobs.step == "\"auto\"" ? "auto step" : knobs.step + " s";
   if (!knobs.integrator.empty()) add(knobs.integrator + (knobs.step.empty() ? "" : " " + step));
   else if (!knobs.step.empty()) add(step);
+  if (knobs.kind == Cells::second_order) add("second-order tetrahedra");
+  if (knobs.kind == Cells::hexahedra) add("lattice");
   if (knobs.cells != 1) {
     char text[40];
     std::snprintf(text, sizeof text, "cells x%.3g", knobs.cells);

@@ -1,5 +1,7 @@
 // One way to simulate the scene: what is changed in it, as the words of `deform run --set`.
 #pragma once
+#include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -8,19 +10,40 @@
 
 namespace cli::cost {
 
+// Cells of the bodies: the scene's own, second-order tetrahedra, or hexahedra of a lattice under the surface.
+enum class Cells { own, second_order, hexahedra };
+// Of the number of tetrahedra: hexahedra as large as the cubes that 12 of a body-centered lattice make.
+inline constexpr double kHexahedron = 1.0 / 12;
+
 // What may be chosen. A word that is empty leaves the scene as it is; others are JSON text.
 struct Knobs {
   std::string model, integrator, step, tolerance, law, self, guard, volume, precision;
-  double cells = 1;  // times the scene's
+  Cells kind = Cells::own;
+  double cells = 1;  // times the scene's number
+  bool own_mesh() const { return kind == Cells::own && cells == 1; }
   bool operator==(const Knobs &) const = default;
 };
 
 using Settings = std::vector<std::pair<std::string, std::string>>;  // pointer, JSON text
 
-// Surfaces of bodies that are filled again, if the scene gives cells in a file: by body, "" elsewhere.
-using Surfaces = std::vector<std::string>;
+// Surfaces under which bodies get other cells (meshes.cpp).
+class Surfaces {
+ public:
+  Surfaces(const Subject &subject, std::string folder) : subject_(subject), folder_(std::move(folder)) {}
+  // Absolute path of the surface of a body whose cells are made, or come from a file; "" where the mesh of
+  // the scene is a surface. It is written at the first call. Triangles of a shape that is made are as large
+  // as `times` the cells of the scene need.
+  std::string file(size_t body, double times) const;
 
-std::string seconds(double h);  // a step as JSON text
+ private:
+  const Subject &subject_;
+  std::string folder_;
+  mutable std::set<std::string> written_;
+  mutable std::map<size_t, uint32_t> triangles_;  // by body: of the boundary of the scene's mesh
+};
+
+bool has_hexahedra(const Subject &subject, size_t body);  // as the scene is
+std::string seconds(double h);                            // a step as JSON text
 Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs);
 // "corotational_fem, implicit_euler 0.01 s, cells x0.5"; "the scene as it is" where nothing is chosen.
 std::string label_of(const Knobs &knobs);

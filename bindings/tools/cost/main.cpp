@@ -43,9 +43,7 @@ int cost_of(CostOptions options, Globals &globals) {
   const cost::Subject subject = cost::read_subject(options.scene, globals);
   make_folder(options.out);
   const std::string cells_stay = cost::why_cells_stay(subject);
-  const cost::Surfaces surfaces = cells_stay.empty()
-                                      ? cost::write_surfaces(subject, options.out + "/surfaces")
-                                      : cost::Surfaces(subject.bodies.size());
+  const cost::Surfaces surfaces(subject, options.out + "/surfaces");
   cost::Study study;
   {
     cost::Runs runs(subject, options.out, options.parallel, options.study.budget,
@@ -96,8 +94,8 @@ void add_commands(Command app, Globals &globals, int *exit_code) {
       .type_name("NAME")
       .repeated();
   sub.option("--axes", options->study.axes,
-             "what varies, with commas: model, time, mesh, volume, contact, law, self, guard, "
-             "precision (all)")
+             "what varies, with commas: model, time, mesh, cells, volume, contact, law, self, "
+             "guard, precision (all)")
       .type_name("LIST")
       .repeated();
   sub.option("--out", options->out, "folder for the results (out/SCENE_cost)").type_name("DIR");

@@ -6,7 +6,7 @@
 namespace cli::cost {
 namespace {
 
-constexpr double kLeastOrder = 0.8, kMostOrder = 3, kOrderOfCells = 2, kSlowest = 1e-3;
+constexpr double kLeastOrder = 0.8, kOrderOfCells = 2, kSlowest = 1e-3;
 constexpr double kOfThree = 1.25, kWithoutOrder = 3;  // factors of safety
 constexpr double kLeastRatio = 1.001;                 // of sizes of cells: below, meshes are alike
 constexpr double kNothing = 1e-12;                    // a distance of two runs that is rounding
@@ -82,7 +82,7 @@ Limit find_limit(const Quantity &fine, const Quantity &middle, const Quantity *c
   const double quotient = before / apart;
   const bool same_way = !fine.event && apart > 0 && cosine(fine, middle, *coarse) >= kSameWay;
   if (same_way) out.order = order_of(quotient, h);
-  out.used = out.order >= kLeastOrder && out.order <= kMostOrder;
+  out.used = out.order >= kLeastOrder;
   if (out.used) {
     const double p = std::min(out.order, kOrderOfCells), rest = rest_of(h[0], h[1], p);
     limit = beyond(fine, middle, rest);

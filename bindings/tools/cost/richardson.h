@@ -18,11 +18,11 @@ struct Limit {
 };
 
 // Assumed is x_h(t) = x(t) + C(t) h^p. Then differences of neighbors point the same way at all times, and
-// their lengths are as h2^p - h1^p: that gives p. It is used where both are so and p is 0.8 to 3, first order
-// in contact to what scatters above second; taken on by is at most 2, the order of linear cells. The error is
-// how far the same extrapolation from the two coarser meshes is, and not less than a quarter of the
-// correction: three figures of one number meet in any order, and the grid convergence index of three meshes
-// is 1.25 times the correction (Roache 1994).
+// their lengths are as h2^p - h1^p: that gives p. It is used where both are so and p is at least 0.8, first
+// order in contact; taken on by is at most 2, the order of linear cells. More shows that the coarsest mesh is
+// too coarse, which the error then has: it is how far the same extrapolation from the two coarser meshes is,
+// and not less than a quarter of the correction: three figures of one number meet in any order, and the grid
+// convergence index of three meshes is 1.25 times the correction (Roache 1994).
 //
 // Else the finest run is the limit. If p is less, 1.25 times the correction with that p is error and bound.
 // Where there is no p, the error is an estimate, as if the finest converged in first order: from its distance

@@ -121,22 +121,30 @@ class Student {
       return add({k, {"reference"}});
     };
     const std::string own, automatic = "\"auto\"", explicit_time = kExplicit;
-    if (out_.axes.meshes) {
-      const std::string integrator = out_.axes.steps ? explicit_time : own;
-      const std::string step = out_.axes.steps ? automatic : own;
-      // all filled in one way; the scene's own mesh may be of another kind
+    const std::string integrator = out_.axes.steps ? explicit_time : own;
+    const std::string step = out_.axes.steps ? automatic : own;
+    // all of one kind; the scene's own mesh may be of another one
+    const auto pairs_of = [&](double unit, std::initializer_list<double> times) {
+      for (const double *t = times.begin(); t + 1 < times.end(); ++t) {
+        const int fine = row(unit * t[0], integrator, step);
+        ladder_.emplace_back(fine, row(unit * t[1], integrator, step));
+      }
+    };
+    const auto beyond = [&](double unit) {  // what a small scene affords
       double cells = 0;
-      for (const SubjectBody &body : s_.bodies) cells += body.cells;
-      for (const auto &[times, most] : kBeyond)  // what a small scene affords
-        if (times * cells <= most) {
-          const int fine = row(times, integrator, step), coarse = row(times / 4, integrator, step);
-          ladder_.emplace_back(fine, coarse);
-        }
-      const int x4 = row(4, integrator, step), x2 = row(2, integrator, step),
-                half = row(0.5, integrator, step), quarter = row(0.25, integrator, step),
-                eighth = row(0.125, integrator, step);
-      for (const auto &pair : {std::pair(x4, x2), {x2, half}, {half, quarter}, {quarter, eighth}})
-        ladder_.push_back(pair);
+      for (const SubjectBody &body : s_.bodies) cells += unit * body.cells;
+      for (const auto &[times, most] : kBeyond)
+        if (times * cells <= most) pairs_of(unit, {times, times / 4});
+    };
+    if (out_.axes.meshes) {
+      if (out_.axes.lattices) {
+        k.kind = Cells::hexahedra;
+        beyond(kHexahedron);
+        pairs_of(kHexahedron, {4, 1, 1.0 / 4, 1.0 / 16});
+        k.kind = Cells::own;
+      }
+      beyond(1);
+      pairs_of(1, {4, 2, 0.5, 0.25, 0.125});
       if (out_.axes.steps && s_.stable > 0) {
         out_.own_mesh.reference = row(1, explicit_time, seconds(0.5 * s_.stable));
         out_.own_mesh.check = row(1, explicit_time, automatic);
@@ -423,7 +431,7 @@ class Student {
     }
     own.mesh = out_.rows[size_t(own.reference)].headline;
     for (size_t i = 0; i < out_.rows.size(); ++i) {
-      if (!out_.rows[i].compared || out_.rows[i].candidate.knobs.cells != 1 || !same_physics(int(i)))
+      if (!out_.rows[i].compared || !out_.rows[i].candidate.knobs.own_mesh() || !same_physics(int(i)))
         continue;
       own.error[i] = largest(errors(i, figures_[size_t(own.reference)]));
     }

@@ -80,12 +80,8 @@ struct Study {
 Study make_study(const Subject &subject, const Surfaces &surfaces, const std::string &mesh_left_out,
                  const StudyOptions &options, Runs &runs);
 
-// meshes.cpp: surfaces from which bodies are filled with another number of cells.
-// Why the cells of this scene's bodies cannot vary; "" where they can.
+// meshes.cpp: why the cells of this scene's bodies cannot vary; "" where they can.
 std::string why_cells_stay(const Subject &subject);
-// Writes the boundary of each body whose cells come from a file to folder/BODY.obj. Absolute paths, by body;
-// "" for a body that is made or filled already.
-Surfaces write_surfaces(const Subject &subject, const std::string &folder);
 
 // patch.cpp: the choice as a JSON merge patch (RFC 7396), and as a scene.
 // It contains whole lists, because a merge patch cannot change a part of one. Null: nothing is chosen.

@@ -35,6 +35,11 @@ void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &f
       [](void *user, const dfm_type *type, const char *file) {
         Found &f = *static_cast<Found *>(user);
         Offered offered{short_name(type->id), type->id, {}};
+        if (type->kind == DFM_KIND_MODEL) {
+          const dfm_model &model = *static_cast<const dfm_model *>(type->ops);
+          offered.second_order = model.cells & DFM_CELL_TET10;
+          offered.lattices = (model.cells & DFM_CELL_HEX8) && (model.caps & DFM_CAP_INSIDE);
+        }
         for (const char *const *e = type->effects; e && *e; ++e) offered.effects.push_back(*e);
         if (type->kind == DFM_KIND_SOLVER) return;
         (type->kind == DFM_KIND_FRICTION ? f.subject.laws : f.subject.models).push_back(offered);
@@ -255,7 +260,10 @@ const Offered *Subject::model(const std::string &name) const {
   return nullptr;
 }
 
-const JsonValue *Subject::find(const std::string &pointer) const { return at_pointer(scene, pointer); }
+const JsonValue *Subject::find(const std::string &pointer) const {
+  const JsonValue *const v = at_pointer(scene, pointer);
+  return v && v->kind != JsonValue::null ? v : nullptr;
+}
 
 std::string Subject::word(const std::string &pointer, const std::string &otherwise) const {
   const JsonValue *const v = find(pointer);

@@ -15,12 +15,13 @@ namespace cli::cost {
 struct Offered {
   std::string name, id;  // name: short where the scene may say it so
   std::vector<std::string> effects;
+  bool second_order = false, lattices = false;  // cells of this kind are accepted by a model
 };
 
 struct SubjectBody {
-  std::string name, model;           // short name
-  std::vector<std::string> effects;  // those at work
-  uint32_t cells = 0;
+  std::string name, model;                  // short name
+  std::vector<std::string> effects;         // those at work
+  uint32_t cells = 0;                       // tetrahedra; a second-order one is 8 (dfm_tetmesh_cells)
   double size = 0;                          // m, diagonal of the box around it at the start
   std::vector<std::array<double, 3>> ends;  // rest frame: two points of the surface far from each other
 };

@@ -8,7 +8,7 @@
 
 #include "core/error.h"
 #include "deform/deform.h"
-#include "plan/accuracy.h"
+#include "scene/planner/accuracy.h"
 
 namespace dfm::scene {
 

@@ -7,7 +7,7 @@
 #include "core/handle.h"
 #include "plugin/quiet.h"
 #include "scene/build.h"
-#include "scene/planner.h"
+#include "scene/planner/planner.h"
 #include "state/world.h"
 #include "world/body_effects.h"
 

@@ -37,6 +37,11 @@ class Node {
   // delivered are refused.
   const Node &object(const std::string &kind, const std::vector<std::string> &further = {}) const;
   bool has(const char *key) const { return value_->is_object() && value_->contains(key); }
+  // Whether the key has a value: null, as in `--set KEY=null`, is none, and such a key is removed.
+  bool has_value(const char *key) const {
+    if (has(key) && (*value_)[key].is_null()) value_->erase(key);
+    return has(key);
+  }
   Node at(const std::string &key) const;                      // an error if absent: the key is required
   Node member(const std::string &key) const;                  // must exist
   Node member(const std::string &key, json otherwise) const;  // the latter where it is absent

@@ -318,10 +318,8 @@ double weight_of(const Node &quantity, const std::vector<Probe> &probes, bool &f
 }
 
 void read_wanted(const Node &scene, Definition &def) {
-  // null: none, as --set takes it away
-  for (const char *const key : {"accuracy", "budget"})
-    if (scene.has(key) && scene.member(key).value().is_null()) scene.value().erase(key);
-  if (scene.has("accuracy") && scene.has("budget"))
+  const bool accuracy = scene.has_value("accuracy"), budget = scene.has_value("budget");
+  if (accuracy && budget)
     scene.member("budget").fail(
         "\"accuracy\" is given too, and the planner aims at one of the two; keep one");
   const char *const key = scene.has("accuracy") ? "accuracy" : "budget";

@@ -139,13 +139,13 @@ void read_surface(const Node &node, OwnSurface &out) {
 
 void read_carriers(const Node &body, const dfm_type *model, ReadContext &context, Body &b) {
   if (body.has("surface")) read_surface(body.member("surface"), b.surface);
-  if (body.has("fill")) {
+  if (body.has_value("fill")) {
     const Node cells = body.member("fill").object("fill").at("cells");
     const double n = cells.number(Range{0, kMostCells, false, false});
     if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
     b.fill = uint32_t(n);
   }
-  if (body.has("lattice")) read_lattice(body.member("lattice"), b);
+  if (body.has_value("lattice")) read_lattice(body.member("lattice"), b);
   if (b.lattice() && b.fill)
     body.member("lattice").fail("the body is filled with tetrahedra by \"fill\" too; keep one");
   if (body.has("materials_by_group")) read_materials_by_group(body.member("materials_by_group"), context, b);

@@ -7,7 +7,7 @@
 #include "scene/build.h"
 #include "scene/device.h"
 #include "scene/node.h"
-#include "scene/planner.h"
+#include "scene/planner/planner.h"
 #include "scene/read.h"
 
 namespace dfm::scene {

@@ -1,4 +1,4 @@
-#include "plan/accuracy.h"
+#include "scene/planner/accuracy.h"
 
 #include <algorithm>
 #include <cmath>
@@ -61,12 +61,33 @@ double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &
   return dented(b) && wish.force ? std::max(error, m.dent_force) : error;
 }
 
-// Linear tetrahedra: second order in edge over thickness. The factor of bending is that of a bar of 0.1 m
-// with edges of 0.019 m (doc/models/compared.md: 1.7 %).
-double mesh_error(const BodyRegime &b) {
-  constexpr double kBending = 0.45, kElse = 0.1;
-  const double cells = b.thickness / b.edge;
-  return at_most((b.held ? kBending : kElse) / (cells * cells), 1);
+// Of a held body that a load bends at once. Cells that stiffen it by s let it sag by 1/(1+s) and swing
+// sqrt(1+s) times as fast; without damping the difference in phase grows. Root mean square over the time.
+double swing_error(const BodyRegime &b, const Estimate &e) {
+  constexpr double kStep = 2 * kPi / 16;  // rad
+  constexpr int kLeast = 64, kMost = 4096;
+  const int n = int(std::clamp(e.frequency * e.duration / kStep, double(kLeast), double(kMost)));
+  const auto place = [&](double times, double t) {
+    const double w = e.frequency * std::sqrt(times),
+                 rate = 0.5 * (b.damping_mass + b.damping_stiffness * w * w);
+    // 1 - exp(-rate t) cos(w t), exact for short times
+    const double half = std::sin(0.5 * w * t);
+    return (2 * std::exp(-rate * t) * half * half - std::expm1(-rate * t)) / times;
+  };
+  double off = 0, all = 0;
+  for (int i = 1; i <= n; ++i) {
+    const double t = e.duration * i / n, exact = place(1, t), d = place(1 + stiffening(b), t) - exact;
+    off += d * d;
+    all += exact * exact;
+  }
+  return all > 0 ? std::sqrt(off / all) : 0;
+}
+
+// The factor of a free body is that of linear tetrahedra.
+double mesh_error(const BodyRegime &b, const Estimate &e) {
+  constexpr double kElse = 0.1;
+  const double size = b.edge / b.thickness;
+  return at_most(b.held ? swing_error(b, e) : kElse * size * size, 1);
 }
 
 // rad of the lowest mode that TR-BDF2 passes by backward Euler, because the body touches something. A held
@@ -131,7 +152,7 @@ BodyWay way_of(const MeasuredModel &m, Scheme scheme, double h, const Try &t, co
   w.scheme = own;
   w.model_error = model_error(m, *t.body, t.e, wish);
   w.time_error = at_most(wish.weight * time_error(own, m.steps_itself, h, *t.body, t.e), 1);
-  w.mesh_error = at_most(wish.weight * mesh_error(*t.body), 1);
+  w.mesh_error = at_most(wish.weight * mesh_error(*t.body, t.e), 1);
   w.cpu_s_per_s = cpu_per_s(m, own, h, *t.body);
   return w;
 }
@@ -282,19 +303,27 @@ class Planner {
       const Estimate &e = tries_[i].e;
       out_.assumed.push_back(format(
           "body '%s': %u points, %.2g cells across its thinnest side; load %.3g m/s2 and speed %.3g m/s make "
-          "a "
-          "strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz, which lasts %.3g s%s%s",
+          "a strain of about %.2g and turn parts by %.2g rad; lowest mode at %.3g Hz%s, which lasts %.3g "
+          "s%s%s",
           b.name.c_str(), b.points, b.thickness / b.edge, b.load, b.speed, e.strain, e.rotation,
-          e.frequency / (2 * kPi), e.lasts, b.held ? "; held" : "; free",
+          e.frequency / (2 * kPi), b.held ? on_mesh(b, e).c_str() : "", e.lasts, b.held ? "; held" : "; free",
           b.touches ? ", may touch something" : ", touches nothing"));
       if (dented(b)) out_.assumed.push_back(dent(b));
-      const double mesh = mesh_error(b) * wish_.weight;
+      if (b.touches && !b.held)
+        out_.assumed.push_back(
+            format("body '%s': what its mesh does to its contacts is not predicted", b.name.c_str()));
+      const double mesh = mesh_error(b, e) * wish_.weight;
       if (wish_.target > 0 && mesh > wish_.target)
         out_.assumed.push_back(
             format("body '%s': its mesh alone makes an error of about %.3g %%, which no model "
                    "and no step makes less",
                    b.name.c_str(), 100 * mesh));
     }
+  }
+
+  // The lowest mode of the bar with these cells, which is that of a model on this mesh.
+  static std::string on_mesh(const BodyRegime &b, const Estimate &e) {
+    return format(" (%.3g Hz on this mesh)", std::sqrt(1 + stiffening(b)) * e.frequency / (2 * kPi));
   }
 
   // The body with the largest error, and its number.
@@ -312,9 +341,18 @@ class Planner {
     return out;
   }
 
-  // Of linear cells: the error goes with the square of their edges.
-  static std::string more_cells(double mesh, double allowed) {
-    return format("about %.2g times as many cells", 1.05 * std::pow(mesh / allowed, 1.5));
+  // The least number whose error is allowed, in steps of 5 %: where phases differ it does not go with a power
+  // of the edge. First-order tetrahedra are too stiff against bending, hexahedra are not.
+  std::string more_cells(BodyRegime b, const Estimate &e, double allowed) const {
+    constexpr double kStep = 1.05, kMost = 1e9;
+    const bool locks = b.held && b.stiffens > kBendingOfHexahedra;
+    double times = 1;
+    while (times < kMost && wish_.weight * mesh_error(b, e) > allowed) {
+      times *= kStep;
+      b.edge /= std::cbrt(kStep);
+    }
+    return format("about %.2g times as many cells%s", times,
+                  locks ? ", or few hexahedra (\"lattice\", bricks)" : "");
   }
 
   std::string target_missed() const {
@@ -332,7 +370,7 @@ class Planner {
       needs.push_back(
           format("a time.step of at most %.2g ms", 1e3 * out_.way.substep * 0.5 * target / w.time_error));
     // then a half is left to model and time
-    if (w.mesh_error > 0.5 * target) needs.push_back(more_cells(w.mesh_error, 0.5 * target));
+    if (w.mesh_error > 0.5 * target) needs.push_back(more_cells(b, tries_[i].e, 0.5 * target));
     if (needs.empty()) needs.push_back(named ? "a shorter time.step and a finer mesh" : "a finer mesh");
     return format(
         "the target of %.3g %% is not met: body '%s' has a predicted error of %.3g %% (model %.2g %%, "
@@ -402,6 +440,11 @@ const char *meets_name(Meets meets) {
   return kNames[static_cast<size_t>(meets)];
 }
 
+double stiffening(const BodyRegime &b) {
+  const double size = b.edge / b.thickness;
+  return b.stiffens * size * size;
+}
+
 bool dented(const BodyRegime &b) { return b.touches && b.contact < b.thickness; }
 
 Meets what_it_meets(const BodyRegime &b) {
@@ -436,6 +479,7 @@ Estimate estimate(const BodyRegime &b, double duration) {
   e.strain = at_most(std::max(e.strain, impact), 1);
   e.rotation = at_most(std::max(b.held ? 4.0 / 3 * deflection : e.strain, impact), kPi / 2);
   e.sag = std::max(deflection, impact) * b.length;
+  e.duration = duration;
   e.lasts = rate > 0 ? std::min(duration, 3 / rate) : duration;
   return e;
 }

@@ -55,12 +55,20 @@ struct Measured {
 
 // ---- input of the planner -------------------------------------------------------------------------------
 
+// Measured on the lowest modes of held bars, 1 to 5 edges across: 1.08 to 1.8 at 0.3, 1.6 to 2.5 at 0.45.
+inline double bending_of_tetrahedra(double poisson) { return 1.08 * std::pow(1 - 2 * poisson, -0.29); }
+// doc/models/corotational_fem.md, cells that bend; a clamped bar of five cells (doc/concepts/filling.md)
+inline constexpr double kBendingOfSecondOrder = 0.01, kBendingOfHexahedra = 0.022;
+
 struct BodyRegime {
   std::string name;
   uint32_t points = 0;
   double length = 0, thickness = 0;  // m, longest and shortest side of the box around the body at rest
   double edge = 0;                   // m, median edge of the cells
-  double cell_size = 0;              // m, dfm_tetmesh_info.wave_path
+  // Relative increase of the bending stiffness by cells as large as the thickness; goes with the square of
+  // the edge.
+  double stiffens = bending_of_tetrahedra(0.3);
+  double cell_size = 0;                            // m, dfm_tetmesh_info.wave_path
   double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
   double damping_mass = 0, damping_stiffness = 0;  // 1/s, s
   double load = 0;                                 // m/s2: of gravity and of forces
@@ -98,8 +106,11 @@ struct Estimate {
   double strain = 0, rotation = 0;
   double sag = 0;    // m, of the shape
   double lasts = 0;  // s, until damping has ended the motion
+  double duration = 0;
 };
 Estimate estimate(const BodyRegime &body, double duration);
+// Relative increase of the bending stiffness by the cells of its mesh.
+double stiffening(const BodyRegime &body);
 // Whether it is touched over less than its own thickness, which dents it where it is touched.
 bool dented(const BodyRegime &body);
 Meets what_it_meets(const BodyRegime &body);

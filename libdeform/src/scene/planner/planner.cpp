@@ -1,4 +1,4 @@
-#include "scene/planner.h"
+#include "scene/planner/planner.h"
 
 #include <algorithm>
 #include <cmath>
@@ -218,6 +218,19 @@ class Reader {
     return out;
   }
 
+  // Of cells that are seen as several tetrahedra each, the edges are not those of these.
+  static void set_cells(const dfm_tetmesh_info &info, double poisson, BodyRegime &r) {
+    r.edge = info.edge_median;
+    r.stiffens = bending_of_tetrahedra(std::clamp(poisson, 0.0, 0.49));
+    if (info.cell == DFM_CELL_HEX8) {
+      r.edge = std::cbrt(info.volume / info.ncell);
+      r.stiffens = kBendingOfHexahedra;
+    } else if (info.cell == DFM_CELL_TET10) {
+      r.edge *= 2;
+      r.stiffens = kBendingOfSecondOrder;
+    }
+  }
+
   BodyRegime regime(size_t i, const Measured &measured) {
     const Body &b = def_.bodies[i];
     const BodyMesh &mesh = meshes_[i];
@@ -230,7 +243,8 @@ class Reader {
     for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
     r.length = *std::max_element(side, side + 3);
     r.thickness = *std::min_element(side, side + 3);
-    r.edge = info.edge_median * b.scale;
+    set_cells(info, m.def.poisson, r);
+    r.edge *= b.scale;
     r.cell_size = info.wave_path * b.scale;
     r.young = m.def.young;
     r.poisson = m.def.poisson;

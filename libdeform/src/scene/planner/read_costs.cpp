@@ -1,6 +1,6 @@
 // The measured costs that the planner reads: JSON as `deform calibrate` writes it (doc/reference/outputs.md).
 #include "core/system.h"
-#include "scene/planner.h"
+#include "scene/planner/planner.h"
 #include "shipped_costs.h"
 
 namespace dfm::scene {

@@ -1,7 +1,7 @@
 // The planner of a scene that names an accuracy or a budget: derives properties and contacts of each body
-// from the definition and its meshes, lets plan/accuracy.h choose, and returns the corresponding scene keys.
+// from the definition and its meshes, lets accuracy.h choose, and returns the corresponding scene keys.
 #pragma once
-#include "plan/accuracy.h"
+#include "scene/planner/accuracy.h"
 #include "scene/defs.h"
 #include "scene/node.h"
 
