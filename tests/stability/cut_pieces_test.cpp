@@ -252,7 +252,7 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
 }
 
 // Sides of a slit cross before the part comes off at 0.33 s. Contact of the two pieces was off from there on:
-// 46 pairs. At this step one start in seven leaves one or two pairs crossed.
+// 46 pairs. At this step one start in eight leaves one or two pairs crossed.
 TEST(CutPieces, SidesOfASlitThatCrossed_ComeApartAsPieces) {
   const std::string scene = pulled_bar(R"({"duration": 0.5, "step": 0.01})",
                                        R"({"density": 1000, "young": 3e4, "tear": 0.2})", 500);

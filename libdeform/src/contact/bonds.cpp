@@ -22,11 +22,29 @@ Drag drag_of(const ContactRows &rows, uint32_t row) {
   return {paid, paid};
 }
 
+void solve_drag(ContactRows &rows, uint32_t row) {
+  double *const l = &rows.impulse[size_t{3} * row];
+  const Vec3 next = drag_of(rows, row).impulse * rows.bond[row - rows.n].along, change = next - load3(l);
+  if (change.x == 0 && change.y == 0 && change.z == 0) return;
+  rows.apply(row, change);
+  store3(l, next);
+}
+
 // Of a residual, what the bond's impulse is to bring to zero.
 Vec3 counted(const ContactRows::BondRow &b, Vec3 r) {
   for (int c = 0; c < 3; ++c)
     if (b.inverse[c][c] == 0) r[c] = 0;
   return r;
+}
+
+void solve_held(ContactRows &rows, uint32_t row) {
+  const ContactRows::BondRow &b = rows.bond[row - rows.n];
+  const Vec3 r = bond_residual(rows, row);
+  const Vec3 change{-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
+  if (change.x == 0 && change.y == 0 && change.z == 0) return;
+  rows.apply(row, change);
+  double *const l = &rows.impulse[size_t{3} * row];
+  store3(l, load3(l) + change);
 }
 
 }  // namespace
@@ -40,21 +58,11 @@ Vec3 bond_residual(const ContactRows &rows, uint32_t row) {
 
 void limit_drag(ContactRows &rows, uint32_t row) { rows.bond[row - rows.n].most = drag_of(rows, row).limit; }
 
-double sweep_bonds(ContactRows &rows, const RowsPart &part) {
-  double most = 0;
+void sweep_bonds(ContactRows &rows, const RowsPart &part) {
   each_row(part.bonds, [&](uint32_t row) {
-    const ContactRows::BondRow &b = rows.bond[row - rows.n];
-    double *const l = &rows.impulse[size_t{3} * row];
-    const Vec3 r = bond_residual(rows, row);
-    const Vec3 change =
-        b.drags() ? drag_of(rows, row).impulse * b.along - load3(l)
-                  : Vec3{-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
-    most = std::max(most, norm(r));
-    if (change.x == 0 && change.y == 0 && change.z == 0) return;
-    rows.apply(row, change);
-    store3(l, load3(l) + change);
+    if (rows.bond[row - rows.n].drags()) solve_drag(rows, row);
+    else solve_held(rows, row);
   });
-  return most;
 }
 
 }  // namespace dfm

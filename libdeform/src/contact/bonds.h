@@ -15,8 +15,7 @@ Vec3 bond_residual(const ContactRows &rows, uint32_t row);
 // again in a solve: of a drag that could stop the edge or let it pass there would be two answers.
 void limit_drag(ContactRows &rows, uint32_t row);
 
-// One sweep: each bond of the part in turn is solved with the impulses that all others have. Returns the
-// largest residual that it has found, m/s.
-double sweep_bonds(ContactRows &rows, const RowsPart &part);
+// One sweep: each bond of the part in turn is solved with the impulses that all others have.
+void sweep_bonds(ContactRows &rows, const RowsPart &part);
 
 }  // namespace dfm

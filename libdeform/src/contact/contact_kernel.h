@@ -48,14 +48,10 @@ struct ToleranceView {
 // most_normal for normal[i]: the required accuracy; the rest may be left to the warm start of the next
 // sub-step. `normal` is the worst r_n alone, m/s.
 struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
-// Whether a sweep has found a contact off by more than half of its tolerances, before it changed it: of
-// those of Residual::relative (any) or Residual::due (much).
-struct Found { bool any = false, much = false; };
 
 struct ContactKernels {
   // One sweep of block Gauss-Seidel in contact order; y [ndof,4] and impulse [n,3] change.
-  Found (*sweep)(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h,
-                 double *y, double *impulse);
+  void (*sweep)(const RowsView &rows, const LawView &law, double h, double *y, double *impulse);
   // Of all contacts by the linearized laws.
   Residual (*residual)(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h,
                        const double *y, const double *impulse);

@@ -66,32 +66,26 @@ DEFORM_INLINE void apply(const RowsView &rows, double *y, uint32_t i, double a, 
   }
 }
 
-Found sweep(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h, double *y,
-            double *impulse) {
-  Found found;
+void sweep(const RowsView &rows, const LawView &law, double h, double *y, double *impulse) {
   for (uint32_t i = 0; i < rows.n; ++i) {
     const double wn = rows.wn[i], wt = rows.wt[i];
     if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
     double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double *const yields = rows.yields + 3 * size_t(i), k = get(u, 0) + rows.rate[i];
-    const double ln = normal_impulse(l[0], k, wn, yields), d = ln - l[0];
+    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 3 * size_t(i)),
+                 d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
     Pair t{0, 0};
     if (ln > 0 && wt > 0) {
       const double *const c = rows.cross + 2 * size_t(i);
       t = friction_impulse(law, i, h, wt, l[1], l[2], ln, get(u, 1) + c[0] * d, get(u, 2) + c[1] * d);
     }
-    const double a = t.a - l[1], b = t.b - l[2];
-    if (d == 0 && a == 0 && b == 0) continue;
-    note(found, tolerance, i, normal_residual(l[0], k, wn, yields), wt * wt * (a * a + b * b), get(u, 1),
-         get(u, 2));
-    apply(rows, y, i, d, a, b);
+    if (d == 0 && t.a == l[1] && t.b == l[2]) continue;
+    apply(rows, y, i, d, t.a - l[1], t.b - l[2]);
     l[0] = ln;
     l[1] = t.a;
     l[2] = t.b;
   }
-  return found;
 }
 
 Residual residual(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h,
@@ -103,8 +97,9 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     if (!(wn > 0)) continue;
     const double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double normal =
-        normal_residual(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 3 * size_t(i));
+    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.yields + 3 * size_t(i)),
+                 closed = wn * l[0];
+    const double normal = __builtin_fabs(open < closed ? open : closed);
     poison += 0.0 * ((get(u, 0) + get(u, 1)) + (get(u, 2) + l[0]));
     r.relative = larger(r.relative, normal / tolerance.normal[i]);
     r.due = larger(r.due, normal / tolerance.most_normal);
@@ -120,7 +115,7 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     r.speed = larger(r.speed, tangent);
   }
   // larger() ignores NaN
-  if (poison != 0) r.relative = r.due = r.speed = __builtin_inf();
+  if (poison != 0) r.relative = r.due = __builtin_inf();
   return r;
 }
 

@@ -88,25 +88,5 @@ __attribute__((always_inline)) static inline Pair friction_impulse(const LawView
   return l;
 }
 
-// m/s, residual along the normal of the impulse l, for k = u_n + rate.
-static inline double normal_residual(double l, double k, double wn, const double *yields) {
-  const double open = k + given(l, yields), closed = wn * l;
-  return __builtin_fabs(open < closed ? open : closed);
-}
-
-// Sweeps are compared with this share of the tolerances by which the laws are then judged.
-constexpr double kPassShare = 0.5;
-
-// What a sweep finds at contact i, m/s: a residual along the normal, and a change of what the impulse along
-// the tangents does by the root of dt2, at the slip (u1, u2). NaN is found.
-__attribute__((always_inline)) static inline void note(Found &found, const ToleranceView &tolerance,
-                                                       uint32_t i, double normal, double dt2,
-                                                       double u1, double u2) {
-  const double slip2 = 1e-6 * (u1 * u1 + u2 * u2), t = tolerance.tangent[i];
-  const bool tangent = !(dt2 <= kPassShare * kPassShare * larger(t * t, slip2));
-  found.any |= tangent | !(normal <= kPassShare * tolerance.normal[i]);
-  found.much |= tangent | !(normal <= kPassShare * tolerance.most_normal);
-}
-
 }  // namespace
 }  // namespace dfm

@@ -21,11 +21,6 @@ double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
                         &rows.yields[size_t(i) * 3]);
 }
 
-double normal_residual(const ContactRows &rows, uint32_t i, double un) {
-  return normal_residual(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
-                         &rows.yields[size_t(i) * 3]);
-}
-
 }  // namespace
 
 void set_trial(const ContactRows &rows, const RowsPart &part, double h, const double *response,
@@ -55,9 +50,7 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
 namespace {
 
 // As the kernel, where impulses at one dof change others.
-Found sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law,
-                    const ToleranceView &tolerance, double h) {
-  Found found;
+void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
@@ -68,37 +61,22 @@ Found sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law,
     if (ln > 0 && rows.wt[i] > 0)
       t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d,
                            u.z + rows.cross[2 * size_t(i) + 1] * d);
-    const double a = t.a - l[1], b = t.b - l[2];
-    if (d == 0 && a == 0 && b == 0) return;
-    note(found, tolerance, i, normal_residual(rows, i, u.x), rows.wt[i] * rows.wt[i] * (a * a + b * b), u.y,
-         u.z);
-    rows.apply(i, {d, a, b});
+    if (d == 0 && t.a == l[1] && t.b == l[2]) return;
+    rows.apply(i, {d, t.a - l[1], t.b - l[2]});
     l[0] = ln;
     l[1] = t.a;
     l[2] = t.b;
   });
-  return found;
-}
-
-ToleranceView of_run(const Tolerance &tolerance, uint32_t first) {
-  return {tolerance.normal + first, tolerance.tangent + first, tolerance.most_normal};
 }
 
 }  // namespace
 
-Found sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, const Tolerance &tolerance,
-            double h) {
-  Found found;
+void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h) {
   if (part.alone)
-    for (const RowRun &run : part.contacts) {
-      const Found one =
-          rows.kernels().sweep(rows.view(run), law.view(run.first), of_run(tolerance, run.first), h,
-                               rows.y.data(), rows.impulse.data() + size_t(3) * run.first);
-      found = {found.any || one.any, found.much || one.much};
-    }
-  else found = sweep_answers(rows, part, law.view(), of_run(tolerance, 0), h);
-  const bool bonds = sweep_bonds(rows, part) > kPassShare * tolerance.bond;
-  return {found.any || bonds, found.much || bonds};
+    for (const RowRun &run : part.contacts)
+      rows.kernels().sweep(rows.view(run), law.view(run.first), h, rows.y.data(),
+                           rows.impulse.data() + size_t(3) * run.first);
+  else sweep_answers(rows, part, law.view(), h);
 }
 
 namespace {
@@ -198,6 +176,12 @@ void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
 
 namespace {
 
+double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
+  return std::fabs(
+      std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
+               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 3])));
+}
+
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
   const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];
   return rows.wt[i] * std::sqrt(a * a + b * b);
@@ -220,7 +204,7 @@ Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Toleran
     r.due = std::max(r.due, left / tolerance.bond);
     r.speed = std::max(r.speed, left);
   });
-  if (poison != 0) r.relative = r.due = r.speed = std::numeric_limits<double>::infinity();
+  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
   return r;
 }
 
@@ -232,7 +216,7 @@ Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &
     if (!(rows.wn[i] > 0)) return;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double normal = normal_residual(rows, i, u.x);
+    const double normal = normal_residual(rows, i, u);
     poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
     r.relative = std::max(r.relative, normal / tolerance.normal[i]);
     r.due = std::max(r.due, normal / tolerance.most_normal);
@@ -247,7 +231,7 @@ Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &
     r.speed = std::max(r.speed, tangent);
   });
   // max() passes over what is no number
-  if (poison != 0) r.relative = r.due = r.speed = std::numeric_limits<double>::infinity();
+  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
   return r;
 }
 
@@ -258,16 +242,23 @@ Residual larger(const Residual &a, const Residual &b) {
           std::max(a.normal, b.normal)};
 }
 
-Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
-                       const Tolerance &tolerance) {
+Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                        const Tolerance &tolerance) {
   Residual r;
   if (part.alone)
     for (const RowRun &run : part.contacts)
-      r = larger(r, rows.kernels().residual(rows.view(run), answer.view(run.first),
-                                            of_run(tolerance, run.first), h, rows.y.data(),
-                                            rows.impulse.data() + size_t(3) * run.first));
-  else r = residual(rows, part, answer.view(), h, tolerance);
+      r = larger(r, rows.kernels().residual(
+                        rows.view(run), law.view(run.first),
+                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
+                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
+  else r = residual(rows, part, law.view(), h, tolerance);
   return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
+}
+
+// At the state at which a law was evaluated, the sweeps have its value.
+Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
+                       const Tolerance &tolerance) {
+  return inner_residual(rows, part, answer, h, tolerance);
 }
 
 namespace {
@@ -289,7 +280,7 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);
     const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
-    const double normal = normal_residual(rows, i, u.x);
+    const double normal = normal_residual(rows, i, u);
     const double tangent = rubs ? tangent_residual(rows, i, answered(rows, law, i, h, u)) : 0;
     each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);

@@ -17,21 +17,9 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
 // Of smooth laws what sweeps and residuals need of dft_dvt; after each answer, and after new slopes.
 void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &state);
 
-// Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:
-//   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
-//                                         of its margin; less where laws remember
-//   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
-// (doc/decisions/contact_solver.md).
-struct Tolerance {
-  double most_normal = 0;
-  double bond = 0;                               // of |u + rate + soft l|, all bonds of the part
-  double *normal = nullptr, *tangent = nullptr;  // by contact of the rows
-};
-
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
-// that new normal impulse. Bonds follow (bonds.h). Returns what it has found.
-Found sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, const Tolerance &tolerance,
-            double h);
+// that new normal impulse. Bonds are solved behind it (bonds.h).
+void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h);
 
 // Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
 // contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
@@ -57,8 +45,21 @@ class Acceleration {
   double gram_[kWindow][kWindow] = {};
 };
 
+// Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:
+//   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
+//                                         of its margin; less where laws remember
+//   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
+// (doc/decisions/contact_solver.md).
+struct Tolerance {
+  double most_normal = 0;
+  double bond = 0;                               // of |u + rate + soft l|, all bonds of the part
+  double *normal = nullptr, *tangent = nullptr;  // by contact of the rows
+};
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
-// With the laws evaluated at this state, whose value the sweeps have, too.
+// of the linearized laws
+Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                        const Tolerance &tolerance);
+// with the laws evaluated at this state
 Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
                        const Tolerance &tolerance);
 // of parts together

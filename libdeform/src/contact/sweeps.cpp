@@ -13,22 +13,61 @@ namespace {
 constexpr uint32_t kPolish = 20;
 // The limit on sweeps is so many times larger where there are so many contacts, whose matrix is dearer.
 constexpr uint32_t kMany = 100, kManySweeps = 4;
+// A pass is solved to a share of what its laws are then judged by.
+constexpr double kPassShare = 0.5;
+
+// Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
+// sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
+// before left more than 0.7 of it; so the residual is computed when it could be small enough at the earliest
+// (doc/decisions/contact_solver.md).
+class Looks {
+ public:
+  bool due(const RowsPart &part, uint32_t sweeps, uint32_t most) const {
+    return sweeps >= std::min({next_, kPolish, most}) || !part.blocks.empty();
+  }
+  void note(uint32_t sweeps, const Residual &left, double most) {
+    const int size = std::ilogb(left.due / most);  // in halves
+    const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
+    const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
+    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMostUnseen));
+    known_ = true;
+    size_ = size;
+    at_ = sweeps;
+  }
+
+ private:
+  static constexpr int kMostUnseen = 4;
+  bool known_ = false;
+  int size_ = 0;
+  uint32_t at_ = 0, next_ = 0;
+};
 
 }  // namespace
 
 Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
-bool Sweeps::good(bool precise, bool enough) const { return precise || (enough && count_ >= kPolish); }
+bool Sweeps::good(const Residual &left, double most) const {
+  return left.relative <= most || (left.due <= most && count_ >= kPolish);
+}
 
-// With the laws as they were last evaluated. A sweep has found what the one before has left, so the state is
-// better than that.
-void Sweeps::pass() {
+void Sweeps::sweep_once() {
+  laws_->spend(part_->all());
+  sweep(*rows_, *part_, *state_, h_);
+  sweep_bonds(*rows_, *part_);
+  ++count_;
+}
+
+// With the laws as they were last evaluated. False: not finite.
+bool Sweeps::pass() {
   acceleration_.start(*rows_, *part_);
-  for (;;) {
-    laws_->spend(part_->all());
-    const Found found = sweep(*rows_, *part_, *state_, *tolerance_, h_);
-    ++count_;
-    if (good(!found.any, !found.much) || count_ >= most_ || !laws_->goes_on()) return;
+  for (Looks looks;;) {
+    sweep_once();
+    if (looks.due(*part_, count_, most_)) {
+      const Residual left = inner_residual(*rows_, *part_, *state_, h_, *tolerance_);
+      if (!std::isfinite(left.due)) return false;
+      if (good(left, kPassShare) || count_ >= most_ || !laws_->goes_on()) return true;
+      looks.note(count_, left, kPassShare);
+    }
     acceleration_.follow(*rows_, *part_);
   }
 }
@@ -51,8 +90,9 @@ bool Sweeps::solve(ContactRows &rows, const RowsPart &part, ContactState &state,
     return !laws.judge(left) || !laws.goes_on();
   };
   for (uint32_t passes = 1;; ++passes) {
-    pass();  // at least one sweep on a warm start is part of the method
-    if (!laws.judge(left) || good(left.relative <= 1, left.due <= 1)) return true;
+    // at least one sweep on a warm start is part of the method
+    if (!pass()) return give_up();
+    if (!laws.judge(left) || good(left, 1)) return true;
     const bool ends = !laws.goes_on();
     if (ends || count_ >= most_ || passes >= limits.passes) {
       if (left.due <= 1) return true;

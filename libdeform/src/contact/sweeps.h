@@ -33,8 +33,9 @@ class Sweeps {
   Acceleration acceleration_;
   Array<double> start_;  // [rows,3] impulses, of the part one after the other
 
-  void pass();
-  bool good(bool precise, bool enough) const;
+  void sweep_once();
+  bool pass();
+  bool good(const Residual &left, double most) const;
 };
 
 }  // namespace dfm
