@@ -270,8 +270,8 @@ TEST(CutPieces, SidesOfASlitThatCrossed_SeldomStayCrossed) {
                                      R"({"density": 1000, "young": 3e4, "tear": 0.2})", 500));
   int crossed = 0, stopped = 0;
   for (int start = 0; start < 48; ++start) {
-    const test::CommandResult r = test::deform({"run", scene, "--quiet", "--check", "--jitter",
-                                                std::to_string(start), "--out", out + "/result"});
+    const test::CommandResult r = test::deform(
+        {"run", scene, "--quiet", "--check", "--jitter", std::to_string(start), "--out", out + "/result"});
     const unsigned long found = crossings_of(out + "/result");
     EXPECT_LE(found, 2u) << start;
     crossed += found > 0;

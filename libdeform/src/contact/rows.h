@@ -110,7 +110,7 @@ struct ContactRows {
     Vec3 inverse[3];
     Vec3 along;  // of a drag (contact/bond.h), else zero
     double most, due;
-    double w;     // 1/kg, of a drag along it; zero: nothing moves
+    double w;  // 1/kg, of a drag along it; zero: nothing moves
     bool drags() const { return along.x != 0 || along.y != 0 || along.z != 0; }
   };
   Array<BondRow> bond;  // [nbond]
