@@ -180,6 +180,11 @@ std::string pulled_bar(const char *time, const char *material, int cells) {
     "obstacles": [{"name": "floor", "shape": "plane"}]})";
 }
 
+std::string torn_slit() {
+  return pulled_bar(R"({"duration": 0.5, "step": 0.01})", R"({"density": 1000, "young": 3e4, "tear": 0.2})",
+                    500);
+}
+
 }  // namespace
 
 // A first scene at the defaults (tests/bench/first_scenes, seed 140): two halves of a bar of jelly that falls
@@ -258,16 +263,13 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
 // Sides of a slit cross before the part comes off at 0.33 s. Contact of the two pieces was off from there on:
 // 46 pairs. At this step one start in eight leaves one or two pairs crossed.
 TEST(CutPieces, SidesOfASlitThatCrossed_ComeApartAsPieces) {
-  const std::string scene = pulled_bar(R"({"duration": 0.5, "step": 0.01})",
-                                       R"({"density": 1000, "young": 3e4, "tear": 0.2})", 500);
-  EXPECT_EQ(crossings("torn_slit", scene), 0u);
+  EXPECT_EQ(crossings("torn_slit", torn_slit()), 0u);
 }
 
 // soak: three minutes. Of 192 starts 23 left one or two pairs crossed, one jammed.
 TEST(CutPieces, SidesOfASlitThatCrossed_SeldomStayCrossed) {
   const std::string out = test::scratch("torn_slits"), scene = out + "/scene.json";
-  test::write_file(scene, pulled_bar(R"({"duration": 0.5, "step": 0.01})",
-                                     R"({"density": 1000, "young": 3e4, "tear": 0.2})", 500));
+  test::write_file(scene, torn_slit());
   int crossed = 0, stopped = 0;
   for (int start = 0; start < 48; ++start) {
     const test::CommandResult r = test::deform(

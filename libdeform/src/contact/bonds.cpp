@@ -22,14 +22,6 @@ Drag drag_of(const ContactRows &rows, uint32_t row) {
   return {paid, paid};
 }
 
-void solve_drag(ContactRows &rows, uint32_t row) {
-  double *const l = &rows.impulse[size_t{3} * row];
-  const Vec3 next = drag_of(rows, row).impulse * rows.bond[row - rows.n].along, change = next - load3(l);
-  if (change.x == 0 && change.y == 0 && change.z == 0) return;
-  rows.apply(row, change);
-  store3(l, next);
-}
-
 // Of a residual, what the bond's impulse is to bring to zero.
 Vec3 counted(const ContactRows::BondRow &b, Vec3 r) {
   for (int c = 0; c < 3; ++c)
@@ -37,14 +29,12 @@ Vec3 counted(const ContactRows::BondRow &b, Vec3 r) {
   return r;
 }
 
-void solve_held(ContactRows &rows, uint32_t row) {
+// N s, by which the bond's impulse changes while all others stay.
+Vec3 change_of(const ContactRows &rows, uint32_t row) {
   const ContactRows::BondRow &b = rows.bond[row - rows.n];
+  if (b.drags()) return drag_of(rows, row).impulse * b.along - load3(&rows.impulse[size_t{3} * row]);
   const Vec3 r = bond_residual(rows, row);
-  const Vec3 change{-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
-  if (change.x == 0 && change.y == 0 && change.z == 0) return;
-  rows.apply(row, change);
-  double *const l = &rows.impulse[size_t{3} * row];
-  store3(l, load3(l) + change);
+  return {-dot(b.inverse[0], r), -dot(b.inverse[1], r), -dot(b.inverse[2], r)};
 }
 
 }  // namespace
@@ -60,8 +50,11 @@ void limit_drag(ContactRows &rows, uint32_t row) { rows.bond[row - rows.n].most 
 
 void sweep_bonds(ContactRows &rows, const RowsPart &part) {
   each_row(part.bonds, [&](uint32_t row) {
-    if (rows.bond[row - rows.n].drags()) solve_drag(rows, row);
-    else solve_held(rows, row);
+    const Vec3 change = change_of(rows, row);
+    if (change.x == 0 && change.y == 0 && change.z == 0) return;
+    rows.apply(row, change);
+    double *const l = &rows.impulse[size_t{3} * row];
+    store3(l, load3(l) + change);
   });
 }
 

@@ -292,7 +292,7 @@ void ContactProblem::transfer(Transfer &t) {
   for (ContactRows::BondRow &b : rows.bond) {
     for (Vec3 *v : {&b.rate, &b.inverse[0], &b.inverse[1], &b.inverse[2], &b.along}) t.one(*v);
     for (double *x : {&b.soft, &b.most, &b.due, &b.w}) t.one(*x);
-    bool stuck = false;  // kept by version 1 alone
+    bool stuck = false;  // of drags: in files of this version, read by nothing
     t.one(stuck);
   }
   t.many(state.law);

@@ -18,7 +18,7 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
 void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &state);
 
 // One sweep in contact order. Every contact first gets its normal impulse, then its friction impulse with
-// that new normal impulse. Bonds are solved behind it (bonds.h).
+// that new normal impulse. Bonds are swept behind it (bonds.h).
 void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h);
 
 // Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <random>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
 #include "dense.h"
 #include "math/block_matrix.h"
+#include "math/ldlt_solver.h"
 
 namespace test {
 
@@ -92,6 +94,18 @@ inline double worst(const std::vector<double> &a, const std::vector<double> &b) 
     size = std::max(size, std::fabs(b[k]));
   }
   return difference / size;
+}
+
+// Of a system with a pattern and blocks (also block_system.h).
+template <class System>
+std::vector<double> direct_solution(const System &system, const std::vector<double> &b) {
+  dfm::LdltSolver solver(dfm::Memory::standard());
+  solver.analyse(system.pattern());
+  std::vector<double> x(b.size());
+  dfm::SolveInfo info;
+  if (!solver.factor(system.blk.data()) || !solver.solve(1, b.data(), x.data(), 0, info))
+    throw std::runtime_error("the matrix is not positive definite");
+  return x;
 }
 
 }  // namespace test
