@@ -137,7 +137,6 @@ struct Pressed {
     dfm_world_def wd = dfm_world_def_default();
     wd.gravity[2] = 0;
     wd.contact_offset = offset;
-    wd.max_sweeps = 200;
     ok(dfm_world_create(context, &wd, &world));
     cells = mesh(context);
     volume = cells.lumped([](uint32_t) { return 1.0; });
@@ -364,7 +363,6 @@ inline Line pressed_line(double R, double young, double nu, double load, uint32_
   dfm_world_def wd = dfm_world_def_default();
   wd.gravity[2] = 0;
   wd.contact_offset = 1e-4 * a * a / R;
-  wd.max_sweeps = 200;
   dfm_world world = 0;
   ok(dfm_world_create(context, &wd, &world));
   Cells cells = make_cells(context, "beam", {width, 2 * edge, height}, 12 * (10 * across) * 2 * (5 * across));

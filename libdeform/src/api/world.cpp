@@ -117,7 +117,7 @@ void select_effects(World &w) {
 void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
   dfm_world_def d{};
   d.gravity[2] = -9.81;
-  d.max_sweeps = 50;
+  d.max_sweeps = 200;
   d.max_passes = 20;
   d.max_substeps = 10000;
   d.sleep_speed = 0.01;

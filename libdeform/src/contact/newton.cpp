@@ -88,7 +88,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     if (!fresh && !factored_) continue;
     if (fresh && !refactor()) return false;
     const Gmres::Result found = gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance,
-                                           fresh ? set_.products : set_.kept, by, precondition);
+                                           set_.inner, by, precondition);
     products_ += found.iterations;
     if (fresh || found.left <= tolerance) break;
   }
@@ -98,13 +98,13 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   const double before = size(), left = error();
-  failed = !find_way(false, std::clamp(set_.share * tolerance / left, 1e-8, 1e-2));
+  failed = !find_way(false, std::min(set_.accuracy * tolerance / left, set_.linear));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
   ++steps_;
   for (const double share : {1.0, 0.5}) {
     move(share);
-    if (evaluate(false) && size() <= (1 - set_.falls * share) * before) return true;
+    if (evaluate(false) && size() <= (1 - set_.accuracy * share) * before) return true;
   }
   v_.swap(base_);
   failed = !evaluate(false);
@@ -116,13 +116,13 @@ bool ContactNewton::frozen_steps() {
   freeze();
   if (!evaluate(true)) return false;
   const double start = size();
-  for (uint32_t trip = 0; trip < set_.passes && steps_ < limit_; ++trip) {
+  while (steps_ < limit_) {
     const auto slope = [&] {
       double sum = 0;
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
-    if (!find_way(true, 1e-2)) return false;
+    if (!find_way(true, set_.linear)) return false;
     const double first = slope();
     base_.assign(v_.begin(), v_.end());
     ++steps_;
@@ -130,11 +130,11 @@ bool ContactNewton::frozen_steps() {
     // the share of the way at which the slope has nearly gone, between one where it is negative and one where
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
-    for (uint32_t trial = 0; trial < set_.trials; ++trial) {
+    for (uint32_t trial = 0; trial < set_.inner; ++trial) {
       move(share);
       const bool known = evaluate(true);
       const double now = known ? slope() : std::numeric_limits<double>::infinity();
-      if (known && now <= -set_.flat * first && (share == 1 || now >= set_.flat * first)) break;
+      if (known && now <= -set_.accuracy * first && (share == 1 || now >= set_.accuracy * first)) break;
       if (now > 0) {
         high = share;
         at_high = now;
@@ -145,7 +145,7 @@ bool ContactNewton::frozen_steps() {
       const double ratio = std::isfinite(at_high) ? at_low / (at_low - at_high) : 0.5;
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
-    if (!(size() > set_.share * start)) break;
+    if (!(size() > set_.accuracy * start)) break;
   }
   return evaluate(false);
 }
@@ -188,8 +188,7 @@ void ContactNewton::scale_penalties(double by) {
 
 bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   found_ = false;
-  most_ = steps;
-  limit_ = steps_ + most_;
+  limit_ = steps_ + steps;
   set_penalties(set_.penalty);
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
@@ -198,14 +197,14 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   bool spent = false;
   uint32_t slow = 0, stood = 0;
   Array<double> &before = kept_;
-  for (passes_ = 0; passes_ < set_.passes;) {
+  for (passes_ = 0; passes_ < steps;) {
     ++passes_;
     before.assign(v_.begin(), v_.end());
-    const double goal = std::clamp(set_.share * aim, set_.share * tolerance, set_.coarse);
+    const double goal = set_.accuracy * std::max(aim, tolerance);
     bool round;
     if (!newton(goal, round)) return false;
-    if (round && steps_ < limit_ && passes_ < set_.passes) {
-      scale_penalties(set_.softens);
+    if (round && steps_ < limit_) {
+      scale_penalties(1 / set_.growth);
       slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
@@ -215,7 +214,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
     const double off = error(), due = std::max(residual_.relative, off / tolerance);
-    found_ = due <= set_.within;
+    found_ = due <= set_.accuracy;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
       best = now;
@@ -230,19 +229,19 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
-    const bool still = passes_ > 3 && moved <= set_.share * tolerance;
-    const bool stands = still && residual_.normal <= set_.stands * normal;
+    const bool still = passes_ > set_.rounds && moved <= set_.accuracy * tolerance;
+    const bool stands = still && residual_.normal <= set_.contradiction * normal;
     if (still && off <= tolerance) {
-      found_ = stood++ >= set_.firm && stands;
+      found_ = stood++ >= set_.rounds && stands;
       if (found_) break;
-      scale_penalties(set_.grows);
+      scale_penalties(set_.growth);
     }
     aim = stands ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
-    if (slow < 3) continue;
+    if (slow < set_.rounds) continue;
     slow = 0;
-    scale_penalties(set_.grows);
+    scale_penalties(set_.growth);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);
@@ -252,7 +251,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     if (!host_->judge(residual_)) return false;
   }
   if (found_ && residual_.due > 1) residual_.due = residual_.relative = 1;
-  return found_ || spent || residual_.due <= 1 || !gains(normal) || penalties_alone();
+  return found_ || spent || residual_.due <= 1 || !gains(normal) || penalties_alone(tolerance, steps);
 }
 
 // Whether normal impulses do more work than residuals of this size explain.
@@ -271,11 +270,11 @@ bool ContactNewton::gains(double normal) const {
 
 // Where rows ask for what cannot be, multipliers grow without end. Impulses of the penalties alone resist
 // motion in proportion to it: bodies give way a little, and no contact does work that its law does not allow.
-bool ContactNewton::penalties_alone() {
+bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   std::fill(lh_.begin(), lh_.end(), 0.0);
-  limit_ = steps_ + most_;
-  for (bool round = true; round && steps_ < limit_; scale_penalties(set_.softens))
-    if (!newton(set_.coarse, round)) return false;
+  limit_ = steps_ + steps;
+  for (bool round = true; round && steps_ < limit_; scale_penalties(1 / set_.growth))
+    if (!newton(tolerance, round)) return false;
   put_rows();
   return host_->judge(residual_);
 }

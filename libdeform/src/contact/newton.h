@@ -31,21 +31,13 @@ namespace dfm {
 
 // Nominal values hold for all scenes that were tried; the comment says what a change trades.
 struct NewtonSettings {
-  double penalty = 10;     // rho w: larger, fewer passes with more Newton steps each
-  double grows = 3;        // of rho after three passes in a row that leave more than half
-  double softens = 0.1;    // of rho, where Newton steps of a pass go round
-  uint32_t rounds = 4;     // frozen phases of a pass after which they do
-  uint32_t firm = 6;       // times that rho grows before rows count as contradicting each other
-  uint32_t passes = 100;   // the limit on outer passes
-  uint32_t kept = 12;      // products for which a kept factor is worth more than a new one
-  uint32_t products = 40;  // the limit on products of one Newton step
-  double share = 0.1;      // of the tolerance of a pass that Newton steps leave; of g that a frozen one does
-  double coarse = 1e-2;    // m/s, that the Newton steps of a pass leave at most
-  double falls = 0.2;      // of |g|, that a full step has to take away
-  double flat = 0.3;       // of the slope, that a line search may leave
-  uint32_t trials = 24;    // of a line search
-  double within = 0.3;     // of the tolerance, that a solve leaves
-  double stands = 20;      // of the tolerance, by which normals may miss what velocities no longer follow
+  double penalty = 10;        // rho w: larger, fewer passes with more Newton steps each
+  double growth = 10;         // of rho where passes are slow; of 1/rho where Newton steps of a pass go round
+  double accuracy = 0.3;      // of what an iteration is judged by, that the one inside of it leaves
+  double linear = 1e-2;       // relative residual of the linear system of a Newton step, at most
+  double contradiction = 20;  // of the tolerance, by which normals may miss what velocities no longer follow
+  uint32_t rounds = 3;        // in a row, after which passes are slow, steps go round, or rows contradict
+  uint32_t inner = 12;        // the limit on products of a Newton step and on trials of a line search
 };
 
 // What a solve asks of the laws, and of the one who knows tolerances and budget.
@@ -71,8 +63,8 @@ class ContactNewton {
   void begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
              ContactState &state, SolveLaws &host, double h);
   // From the present impulses, so that it goes on where rates or limits of the rows have changed. tolerance:
-  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. steps: the
-  // limit on Newton steps, what the solve may cost. False: a law or a model has failed; neither rows nor
+  // m/s, of what the motion of the bodies may be off by; normal: of velocities along normals. steps:
+  // the limit on Newton steps, and on passes. False: a law or a model has failed; neither rows nor
   // bodies have a result.
   bool solve(double tolerance, double normal, uint32_t steps = 600);
   // The bodies' velocities become those of the solution.
@@ -143,7 +135,7 @@ class ContactNewton {
   bool found_ = false;
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
-  uint32_t most_ = 0, limit_ = 0;  // steps of this solve; on steps_
+  uint32_t limit_ = 0;             // on steps_
   uint32_t told_ = 0;              // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
@@ -171,7 +163,7 @@ class ContactNewton {
   bool coupled_step(double tolerance, bool &failed);
   bool frozen_steps();
   bool gains(double normal) const;
-  bool penalties_alone();
+  bool penalties_alone(double tolerance, uint32_t steps);
   void put_rows();
 };
 

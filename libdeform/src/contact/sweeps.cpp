@@ -11,10 +11,6 @@ namespace {
 // Residual::relative is stricter than what is required (Residual::due). At most this many sweeps are spent on
 // it where the latter is met, because the next sub-step continues from there.
 constexpr uint32_t kPolish = 20;
-// The limit on sweeps is so many times larger where there are so many contacts, whose matrix is dearer.
-constexpr uint32_t kMany = 100, kManySweeps = 4;
-// A pass is solved to a share of what its laws are then judged by.
-constexpr double kPassShare = 0.5;
 
 // Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
 // sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
@@ -25,8 +21,8 @@ class Looks {
   bool due(const RowsPart &part, uint32_t sweeps, uint32_t most) const {
     return sweeps >= std::min({next_, kPolish, most}) || !part.blocks.empty();
   }
-  void note(uint32_t sweeps, const Residual &left, double most) {
-    const int size = std::ilogb(left.due / most);  // in halves
+  void note(uint32_t sweeps, const Residual &left) {
+    const int size = std::ilogb(left.due);  // in halves
     const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
     const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
     next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMostUnseen));
@@ -46,8 +42,8 @@ class Looks {
 
 Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
-bool Sweeps::good(const Residual &left, double most) const {
-  return left.relative <= most || (left.due <= most && count_ >= kPolish);
+bool Sweeps::good(const Residual &left) const {
+  return left.relative <= 1 || (left.due <= 1 && count_ >= kPolish);
 }
 
 void Sweeps::sweep_once() {
@@ -65,8 +61,8 @@ bool Sweeps::pass() {
     if (looks.due(*part_, count_, most_)) {
       const Residual left = inner_residual(*rows_, *part_, *state_, h_, *tolerance_);
       if (!std::isfinite(left.due)) return false;
-      if (good(left, kPassShare) || count_ >= most_ || !laws_->goes_on()) return true;
-      looks.note(count_, left, kPassShare);
+      if (good(left) || count_ >= most_ || !laws_->goes_on()) return true;
+      looks.note(count_, left);
     }
     acceleration_.follow(*rows_, *part_);
   }
@@ -81,7 +77,7 @@ bool Sweeps::solve(ContactRows &rows, const RowsPart &part, ContactState &state,
   tolerance_ = &tolerance;
   h_ = h;
   count_ = 0;
-  most_ = limits.sweeps * (part.n < kMany ? 1 : kManySweeps);
+  most_ = limits.sweeps;
   start_.resize(3 * size_t{part.all()});
   take_impulses(rows, part, start_.data());
   // block Gauss-Seidel need not converge in a jam with strong friction
@@ -92,7 +88,7 @@ bool Sweeps::solve(ContactRows &rows, const RowsPart &part, ContactState &state,
   for (uint32_t passes = 1;; ++passes) {
     // at least one sweep on a warm start is part of the method
     if (!pass()) return give_up();
-    if (!laws.judge(left) || good(left, 1)) return true;
+    if (!laws.judge(left) || good(left)) return true;
     const bool ends = !laws.goes_on();
     if (ends || count_ >= most_ || passes >= limits.passes) {
       if (left.due <= 1) return true;

@@ -7,8 +7,8 @@
 namespace dfm {
 
 struct SweepLimits {
-  uint32_t sweeps, passes;  // of a problem with few contacts
-  double start;             // m/s, the residual at the start
+  uint32_t sweeps, passes;
+  double start;  // m/s, the residual at the start
 };
 
 // The sweeps of one part of the rows, with what they keep between solves.
@@ -35,7 +35,7 @@ class Sweeps {
 
   void sweep_once();
   bool pass();
-  bool good(const Residual &left, double most) const;
+  bool good(const Residual &left) const;
 };
 
 }  // namespace dfm
