@@ -120,6 +120,22 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
   return mesh;
 }
 
+// Of a generated mesh: edges are half of those of tetrahedra as many as are asked for, because a round surface
+// of triangles as large as cells has less volume than the shape, which both errors then leave alike.
+std::string MeshFiles::make_surface(const Body &b) {
+  const MadeMesh &m = b.made;
+  const std::string pointer = b.pointer + "/mesh";
+  const dfm_tetmesh_info own = info_of(cells_.at(make(b)), pointer);
+  const double wanted = b.lattice_cells ? kTetsOfHexahedron * b.lattice_cells
+                        : b.fill        ? std::max(*b.fill, 1u)
+                                        : own.ntet;
+  const auto n = uint32_t(std::lround(4 * own.ntriangle * std::pow(wanted / own.ntet, 2.0 / 3)));
+  const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
+  dfm_trimesh &mesh = surfaces_[name];
+  if (!mesh) def_.require(dfm_trimesh_make(context_, kind.c_str(), m.size, n, &mesh), pointer);
+  return name;
+}
+
 dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &pointer) {
   dfm_trimesh &mesh = surfaces_[path];
   if (!mesh) def_.require(dfm_trimesh_read(context_, path.c_str(), &mesh), pointer);
@@ -166,10 +182,6 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
                   "the mesh is a surface, and the cells that fill it belong to no group");
     return;
   }
-  if (b.fill)
-    def_.refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
-  if (b.lattice())
-    def_.refuse(b.pointer + "/lattice", "the mesh holds cells already; \"lattice\" is for a closed surface");
   if (b.surface.coupled && b.surface.mesh.empty())
     def_.refuse(b.surface.pointer + "/coupling",
                 "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
@@ -234,9 +246,11 @@ void MeshFiles::split_skin(BodyMesh &out) {
 }
 
 BodyMesh MeshFiles::load(const Body &b) {
-  const std::string path = b.made.kind.empty() ? path_of(b.mesh) : make(b), pointer = b.pointer + "/mesh";
+  const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice();
+  const std::string path = !made ? path_of(b.mesh) : anew ? make_surface(b) : make(b),
+                    pointer = b.pointer + "/mesh";
   BodyMesh out;
-  const bool whole = has_cells(path, pointer);
+  const bool whole = !anew && has_cells(path, pointer);
   out.filled = !whole && b.fill != 0u;
   check_keys(b, whole, out.filled);
   take_cells(whole ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
@@ -249,7 +263,7 @@ BodyMesh MeshFiles::load(const Body &b) {
     if (!out.wears_skin) tell_of_steps(b, out);
     split_skin(out);
   }
-  if (!whole && !b.has_scale) tell_of_unit(b, out);
+  if (!whole && !made && !b.has_scale) tell_of_unit(b, out);
   return out;
 }
 
