@@ -126,9 +126,10 @@ std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";
   const dfm_tetmesh_info own = info_of(cells_.at(make(b)), pointer);
-  const double wanted = b.lattice_cells ? kTetsOfHexahedron * b.lattice_cells
-                        : b.fill        ? std::max(*b.fill, 1u)
-                                        : own.ntet;
+  const double hexahedra = b.lattice_cells ? b.lattice_cells : own.volume * std::pow(b.scale / b.lattice_size, 3);
+  const double wanted = b.lattice()           ? kTetsOfHexahedron * hexahedra
+                        : b.fill.value_or(0) ? *b.fill
+                                             : own.ntet;
   const auto n = uint32_t(std::lround(4 * own.ntriangle * std::pow(wanted / own.ntet, 2.0 / 3)));
   const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
   dfm_trimesh &mesh = surfaces_[name];
@@ -170,16 +171,16 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
   if (!has_cells) {
     if (filled && !b.nodal_bc.empty())
       def_.refuse(b.pointer + "/nodal_bc",
-                  "the mesh is a surface, and its nodes are not points of the filled body; use \"fix\" and "
+                  "the body is a filled surface, and nodes of the mesh are not its points; use \"fix\" and "
                   "\"forces\"");
     if (!b.fields.empty())
       def_.refuse(
           b.fields[0].pointer,
-          "the mesh is a surface, so its file has no cells to give values for; fill it first with deform "
+          "the body is a filled surface, so its file has no cells to give values for; fill it first with deform "
           "mesh fill and use the result as mesh");
     if (!b.by_group.empty())
       def_.refuse(b.by_group[0].pointer,
-                  "the mesh is a surface, and the cells that fill it belong to no group");
+                  "the body is a filled surface, and the cells that fill it belong to no group");
     return;
   }
   if (b.surface.coupled && b.surface.mesh.empty())
@@ -289,7 +290,7 @@ void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
       "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
       "\"boundary\"%s make smaller steps",
       b.name.c_str(), cells.ntriangle, mesh.inside ? cells.ncell : cells.ntet, b.scale * cells.edge_median,
-      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.mesh.c_str(),
+      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.made.kind.empty() ? b.mesh.c_str() : "the surface",
       mesh.inside ? "; more cells (\"lattice\")" : ", as a body that is cut needs it; more cells (\"fill\")");
 }
 
