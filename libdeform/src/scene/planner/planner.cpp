@@ -149,7 +149,7 @@ class Reader {
           b.scale * std::cbrt(files_.info_of(meshes_[i].handle, b.pointer).volume / (times * meshes_[i].ntet)));
       try {
         const BodyMesh mesh = files_.load(b);
-        if (!carries(b, mesh, own[i].edge, meshes_[i])) continue;
+        if (!carries(b, mesh, meshes_[i])) continue;
         set_mesh(b, mesh, out[i]);
       } catch (const Error &) {
         continue;  // its surface is open or crosses itself, or a box of the scene has none of its points
@@ -172,25 +172,34 @@ class Reader {
            });
   }
 
-  Extent held_of(const Body &b, const BodyMesh &mesh) const {
-    Extent out;
-    for (const Fix &f : b.fixes)
-      for (const uint32_t p : select(f.where, mesh, def_.file)) out.add(load3(&mesh.points[3 * size_t{p}]));
-    return out;
+  // m, by how much what a mesh holds ends elsewhere than what the scene selects.
+  double held_off(const Fix &fix, const BodyMesh &mesh, const BodyMesh &own) const {
+    const auto held = [&](const BodyMesh &by) {
+      Extent out;
+      for (const uint32_t p : select(fix.where, by, def_.file)) out.add(load3(&by.points[3 * size_t{p}]));
+      return out;
+    };
+    const bool by_box = fix.where.group.empty() && fix.where.points.empty();
+    const Extent there = held(mesh), here = by_box ? Extent{} : held(own);
+    double off = 0;
+    for (int k = 0; k < 3; ++k) {
+      const double lo = by_box ? std::max(fix.where.lo[k], own.lo[k]) : here.lo[k],
+                   hi = by_box ? std::min(fix.where.hi[k], own.hi[k]) : here.hi[k];
+      off = std::max({off, std::fabs(there.lo[k] - lo), std::fabs(there.hi[k] - hi)});
+    }
+    return off;
   }
 
-  // Whether these cells are held where the body's own are, to an edge of those. Throws Error where they have
-  // nothing that a force, a spring or an attachment selects.
-  bool carries(const Body &b, const BodyMesh &mesh, double edge, const BodyMesh &own) const {
+  // Whether these cells are held where the scene says as exactly as the body's own are. Throws Error where
+  // they have nothing that a force, a spring or an attachment selects.
+  bool carries(const Body &b, const BodyMesh &mesh, const BodyMesh &own) const {
     for (const Force &f : b.forces) share(f, mesh, def_.file);
     for (const Spring &s : b.springs)
       if (!s.at_point) select_skin(s.where, mesh, def_.file);
     for (const Attach &a : b.attach) select_skin(a.where, mesh, def_.file);
-    const Extent there = held_of(b, mesh), here = held_of(b, own);
-    for (int k = 0; k < 3; ++k)
-      if (std::max(std::fabs(there.lo[k] - here.lo[k]), std::fabs(there.hi[k] - here.hi[k])) > edge)
-        return false;
-    return true;
+    return std::ranges::all_of(b.fixes, [&](const Fix &f) {
+      return held_off(f, mesh, own) <= held_off(f, own, own) + 1e-9 * own.size;
+    });
   }
 
   // Nothing in the scene is about the body's own cells or points.
