@@ -108,18 +108,18 @@ TEST_F(PlannerScene, ChoiceWrittenIntoTheScene_IsTheSameRun) {
 }
 
 // Few hexahedra bend as they should where as many tetrahedra do not. What the choice claims is compared with
-// 1,000 bricks: held bars that rest, and one that swings.
+// 250 bricks: held bars that rest, and one that swings.
 // soak: the references are slow
 TEST_F(PlannerScene, HeldBar_TakesALatticeThatErrsAsItSays) {
-  for (const char *const damping : {R"({"mass": 20, "stiffness": 2e-4})", R"({"mass": 1, "stiffness": 2e-4})"}) {
-    for (const char *const size : {"[0.4, 0.1, 0.1]", "[0.5, 0.05, 0.05]"}) {
+  for (const char *const damping : {"20", "1"}) {
+    for (const char *const size : {"[0.4, 0.1, 0.1]", "[0.6, 0.1, 0.1]", "[0.5, 0.1, 0.08]"}) {
       SCOPED_TRACE(std::string(size) + damping);
-      const std::string out = folder() + "/" + size[2] + damping[9], path = out + ".json";
+      const std::string out = folder() + "/" + size[3] + damping, path = out + ".json";
       const auto scene = [&](const std::string &wish, const std::string &mesh) {
-        test::write_file(path, R"({"format": "deform-scene", "version": 1, )" + wish + R"("time": {"duration": 0.5},
- "materials": {"gel": {"young": 1e6, "damping": )" + damping +
-                                   R"(}}, "output": {"every": 0.005}, "gravity": [0, 0, -9.81],
- "bodies": [{"name": "bar", "material": "gel", )" +
+        test::write_file(path, R"({"format": "deform-scene", "version": 1, )" + wish + R"("time": {"duration": 0.5, "integrator": "symplectic_euler"},
+ "materials": {"gel": {"young": 1e7, "damping": {"mass": )" + damping +
+                                   R"(}}}, "output": {"every": 0.005}, "gravity": [0, 0, -9.81],
+ "bodies": [{"name": "bar", "material": "gel", "model": {"type": "corotational_fem"}, )" +
                                    mesh + R"(, "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}],
  "probes": [{"name": "tip", "body": "bar", "point": [0.4, 0.02, 0.02]}]})");
         return path;
@@ -131,8 +131,7 @@ TEST_F(PlannerScene, HeldBar_TakesALatticeThatErrsAsItSays) {
         return rows;
       };
       const std::string shape = std::string(R"("size": )") + size;
-      ASSERT_EQ(test::deform({"run", scene("", R"("model": {"type": "corotational_fem"}, "mesh": {"make": "bricks", )" +
-                                                   shape + R"(, "cells": 1000})"),
+      ASSERT_EQ(test::deform({"run", scene("", R"("mesh": {"make": "bricks", )" + shape + R"(, "cells": 250})"),
                               "--out", out + "truth", "--quiet"})
                     .exit_code,
                 0);
@@ -158,7 +157,6 @@ TEST_F(PlannerScene, HeldBar_TakesALatticeThatErrsAsItSays) {
         }
       }
       const double error = std::sqrt(off / all), claimed = plan.find("predicted")->scalar("error");
-      std::printf("error %g claimed %g\n", error, claimed);
       EXPECT_LT(error, 0.1);
       EXPECT_LT(claimed, 2 * error);
       EXPECT_GT(claimed, 0.5 * error);
