@@ -39,9 +39,9 @@ std::string old_costs() {
   const std::string sizes = R"([{"points": 100, "ns_per_point": 200}])";
   test::write_file(path, R"({"format": "deform-costs", "version": 4, "machine": "old", "models": [
   {"model": "corotational_fem", "steps_itself": false, "wave_steps": 1.2, "errors": {"bends_little": 0,
-   "bends_far": 0, "turns": 0, "lies": 0, "dents": 0, "dent_force": 0}, "costs": {"symplectic_euler": {"free": )" +
-                             sizes + R"(, "touching": )" + sizes + R"(, "pressed": )" + sizes + R"(, "stacked": )" +
-                             sizes + "}}}]}");
+   "bends_far": 0, "turns": 0, "lies": 0, "dents": 0, "dent_force": 0}, "costs": {"symplectic_euler": {
+   "free": )" + sizes + R"(, "touching": )" +
+                             sizes + R"(, "pressed": )" + sizes + R"(, "stacked": )" + sizes + "}}}]}");
   return path;
 }
 
@@ -77,7 +77,8 @@ TEST_F(PlannerScene, Accuracy_ChoosesAndSaysWhy) {
 
 // What the planner says of a bar's lowest mode on its mesh is what the model that computes it says.
 TEST_F(PlannerScene, LowestMode_IsThatOfTheModel) {
-  const test::CommandResult r = test::deform({"explain", bar(R"("accuracy": {"target": 0.4},)", R"("lattice": null, )")});
+  const test::CommandResult r =
+      test::deform({"explain", bar(R"("accuracy": {"target": 0.4},)", R"("lattice": null, )")});
   const auto number_after = [&](const char *word) {
     const size_t at = r.out.find(word);
     return at == std::string::npos ? 0.0 : std::strtod(r.out.c_str() + at + std::strlen(word), nullptr);
@@ -116,8 +117,10 @@ TEST_F(PlannerScene, HeldBar_TakesALatticeThatErrsAsItSays) {
       SCOPED_TRACE(std::string(size) + damping);
       const std::string out = folder() + "/" + size[3] + damping, path = out + ".json";
       const auto scene = [&](const std::string &wish, const std::string &mesh) {
-        test::write_file(path, R"({"format": "deform-scene", "version": 1, )" + wish + R"("time": {"duration": 0.5, "integrator": "symplectic_euler"},
- "materials": {"gel": {"young": 1e7, "damping": {"mass": )" + damping +
+        test::write_file(path, R"({"format": "deform-scene", "version": 1, )" + wish +
+                                   R"("time": {"duration": 0.5, "integrator": "symplectic_euler"},
+ "materials": {"gel": {"young": 1e7, "damping": {"mass": )" +
+                                   damping +
                                    R"(}}}, "output": {"every": 0.005}, "gravity": [0, 0, -9.81],
  "bodies": [{"name": "bar", "material": "gel", "model": {"type": "corotational_fem"}, )" +
                                    mesh + R"(, "fix": [{"box": [[-1, -1, -1], [1e-6, 1, 1]]}]}],
@@ -127,16 +130,19 @@ TEST_F(PlannerScene, HeldBar_TakesALatticeThatErrsAsItSays) {
       const auto tips = [&](const std::string &run) {
         std::vector<std::array<double, 4>> rows;
         for (const auto &row : test::read_csv(run + "/probes.csv"))
-          if (row[0] != "t") rows.push_back({std::stod(row[0]), std::stod(row[2]), std::stod(row[3]), std::stod(row[4])});
+          if (row[0] != "t")
+            rows.push_back({std::stod(row[0]), std::stod(row[2]), std::stod(row[3]), std::stod(row[4])});
         return rows;
       };
       const std::string shape = std::string(R"("size": )") + size;
-      ASSERT_EQ(test::deform({"run", scene("", R"("mesh": {"make": "bricks", )" + shape + R"(, "cells": 250})"),
-                              "--out", out + "truth", "--quiet"})
-                    .exit_code,
-                0);
-      ASSERT_EQ(test::deform({"run", scene(R"("accuracy": {"target": 0.1, "quantity": "tip"}, )",
-                                           R"("mesh": {"make": "beam", )" + shape + R"(, "cells": 400})"),
+      ASSERT_EQ(
+          test::deform({"run", scene("", R"("mesh": {"make": "bricks", )" + shape + R"(, "cells": 250})"),
+                        "--out", out + "truth", "--quiet"})
+              .exit_code,
+          0);
+      ASSERT_EQ(test::deform({"run",
+                              scene(R"("accuracy": {"target": 0.1, "quantity": "tip"}, )",
+                                    R"("mesh": {"make": "beam", )" + shape + R"(, "cells": 400})"),
                               "--out", out, "--quiet"})
                     .exit_code,
                 0);
@@ -167,20 +173,23 @@ TEST_F(PlannerScene, HeldBar_TakesALatticeThatErrsAsItSays) {
 TEST_F(PlannerScene, HeldBar_SaysWhatALatticeTakesThePlaceOf) {
   const std::string scene = bar(R"("accuracy": {"target": 0.05},)");
   const test::CommandResult r = test::deform({"explain", scene});
-  for (const char *word : {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells, with which the error is ",
-                           "\"lattice\": null keeps them", "--set /bodies/0/lattice/size="})
+  for (const char *word :
+       {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells, with which the error is ",
+        "\"lattice\": null keeps them", "--set /bodies/0/lattice/size="})
     EXPECT_TRUE(has(r.out, word)) << "no '" << word << "' in: " << r.out;
   setenv("DEFORM_COSTS", old_costs().c_str(), 1);
   const test::CommandResult old = test::deform({"explain", scene});
   unsetenv("DEFORM_COSTS");
   EXPECT_EQ(old.exit_code, 0) << old.err;
-  EXPECT_TRUE(has(old.out, "no lattice is proposed where the costs of its hexahedra are not measured")) << old.out;
+  EXPECT_TRUE(has(old.out, "no lattice is proposed where the costs of its hexahedra are not measured"))
+      << old.out;
   EXPECT_FALSE(has(old.out, "lattice/size")) << old.out;
 }
 
 // What is about the body's own cells, or needs them, keeps them.
 TEST_F(PlannerScene, BodyThatNeedsItsCells_KeepsThem) {
-  const std::string wish = R"("accuracy": {"target": 0.05},)", corotational = R"("model": {"type": "corotational_fem"}, )";
+  const std::string wish = R"("accuracy": {"target": 0.05},)",
+                    corotational = R"("model": {"type": "corotational_fem"}, )";
   std::string values = "young\n";
   for (int i = 0; i < 336; ++i) values += "5e6\n";
   test::write_file(folder() + "/young.csv", values);
@@ -197,17 +206,20 @@ TEST_F(PlannerScene, BodyThatNeedsItsCells_KeepsThem) {
   for (const std::string &set :
        {std::string(R"(/bodies/0/fix=[{"box": [[-1, -1, -1], [0.03, 1, 1]]}])"),
         std::string(R"(/bodies/0/fix=[{"points": [0, 1, 2, 3]}])"),
-        std::string(R"(/cuts=[{"body": "bar", "t": 0.05, "shape": "plane", "point": [0.2, 0, 0], "normal": [1, 0, 0]}])"),
-        std::string(R"(/obstacles=[{"name": "probe", "shape": "sphere", "radius": 0.02, "motion": {"keyframes": [
+        std::string(
+            R"(/cuts=[{"body": "bar", "t": 0.05, "shape": "plane", "point": [0.2, 0, 0],
+             "normal": [1, 0, 0]}])"),
+        std::string(
+            R"(/obstacles=[{"name": "probe", "shape": "sphere", "radius": 0.02, "motion": {"keyframes": [
           {"t": 0, "position": [0.3, 0.05, 0.121]}, {"t": 0.1, "position": [0.3, 0.05, 0.115]}]}}])"),
         std::string("/bodies/0/fix=[]")}) {
     const test::CommandResult r = test::deform({"explain", bar(wish, corotational), "--set", set});
     EXPECT_EQ(r.exit_code, 0) << set << r.err;
     EXPECT_FALSE(has(r.out, "lattice/size=")) << set << r.out;
   }
-  const test::CommandResult groups =
-      test::deform({"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_materials.json", "--set",
-                    R"(/accuracy={"target": 0.05})", "--set", R"(/bodies/2/model={"type": "corotational_fem"})"});
+  const test::CommandResult groups = test::deform(
+      {"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_materials.json", "--set",
+       R"(/accuracy={"target": 0.05})", "--set", R"(/bodies/2/model={"type": "corotational_fem"})"});
   EXPECT_EQ(groups.exit_code, 0) << groups.err;
   EXPECT_FALSE(has(groups.out, "lattice/size=")) << groups.out;
 }

@@ -332,16 +332,17 @@ TEST(SceneFill, ClosedSurface_BecomesABodyOfItsVolume) {
 
 // What a mesh has as cells, in a file or as it is made, goes where others are asked for.
 TEST(SceneFill, MeshWithCells_KeepsItsShapeUnderOthers) {
-  constexpr const char *kModel = "/bodies/0/model={\"type\": \"linear_fem\"}", *kLattice = "/bodies/0/lattice={\"size\": 0.1}",
+  constexpr const char *kModel = "/bodies/0/model={\"type\": \"linear_fem\"}",
+                       *kLattice = "/bodies/0/lattice={\"size\": 0.1}",
                        *kBall = R"(/bodies/0/mesh={"make": "ball", "radius": 0.1, "cells": 500})";
   struct Case {
     std::vector<const char *> set;
     double volume;
     uint32_t ntet;
   };
-  for (const auto &[set, volume, ntet] : {Case{{kModel, kFill}, 0.002, 600}, Case{{kModel, kLattice}, 0.002, 12},
-                                          Case{{kModel, kBall, kFill}, 4e-3 / 3 * M_PI, 600},
-                                          Case{{kModel, kBall, kLattice}, 3.94e-3, 48}}) {
+  for (const auto &[set, volume, ntet] :
+       {Case{{kModel, kFill}, 0.002, 600}, Case{{kModel, kLattice}, 0.002, 12},
+        Case{{kModel, kBall, kFill}, 4e-3 / 3 * M_PI, 600}, Case{{kModel, kBall, kLattice}, 3.94e-3, 48}}) {
     const Loaded l(set);
     EXPECT_NEAR(test::measure(l.body).volume, volume, 0.03 * volume) << set.back();
     EXPECT_NEAR(l.info().ntet, ntet, 0.1 * ntet) << set.back();

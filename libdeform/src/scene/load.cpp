@@ -120,16 +120,15 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
   return mesh;
 }
 
-// Of a generated mesh: edges are half of those of tetrahedra as many as are asked for, because a round surface
-// of triangles as large as cells has less volume than the shape, which both errors then leave alike.
+// Of a generated mesh. A round surface of triangles as large as cells has less volume than the shape: edges are
+// half of those of as many tetrahedra as are asked for, so that both errors fall alike.
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";
   const dfm_tetmesh_info own = info_of(cells_.at(make(b)), pointer);
-  const double hexahedra = b.lattice_cells ? b.lattice_cells : own.volume * std::pow(b.scale / b.lattice_size, 3);
-  const double wanted = b.lattice()           ? kTetsOfHexahedron * hexahedra
-                        : b.fill.value_or(0) ? *b.fill
-                                             : own.ntet;
+  const double hexahedra =
+      b.lattice_cells ? b.lattice_cells : own.volume * std::pow(b.scale / b.lattice_size, 3);
+  const double wanted = b.lattice() ? kTetsOfHexahedron * hexahedra : b.fill.value_or(0) ? *b.fill : own.ntet;
   const auto n = uint32_t(std::lround(4 * own.ntriangle * std::pow(wanted / own.ntet, 2.0 / 3)));
   const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
   dfm_trimesh &mesh = surfaces_[name];
@@ -174,10 +173,10 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
                   "the body is a filled surface, and nodes of the mesh are not its points; use \"fix\" and "
                   "\"forces\"");
     if (!b.fields.empty())
-      def_.refuse(
-          b.fields[0].pointer,
-          "the body is a filled surface, so its file has no cells to give values for; fill it first with deform "
-          "mesh fill and use the result as mesh");
+      def_.refuse(b.fields[0].pointer,
+                  "the body is a filled surface, so its file has no cells to give values for; fill it first "
+                  "with deform "
+                  "mesh fill and use the result as mesh");
     if (!b.by_group.empty())
       def_.refuse(b.by_group[0].pointer,
                   "the body is a filled surface, and the cells that fill it belong to no group");
@@ -248,7 +247,9 @@ void MeshFiles::split_skin(BodyMesh &out) {
 
 BodyMesh MeshFiles::load(const Body &b) {
   const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice();
-  const std::string path = !made ? path_of(b.mesh) : anew ? make_surface(b) : make(b),
+  const std::string path = !made  ? path_of(b.mesh)
+                           : anew ? make_surface(b)
+                                  : make(b),
                     pointer = b.pointer + "/mesh";
   BodyMesh out;
   const bool whole = !anew && has_cells(path, pointer);
@@ -290,7 +291,8 @@ void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
       "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
       "\"boundary\"%s make smaller steps",
       b.name.c_str(), cells.ntriangle, mesh.inside ? cells.ncell : cells.ntet, b.scale * cells.edge_median,
-      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.made.kind.empty() ? b.mesh.c_str() : "the surface",
+      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle,
+      b.made.kind.empty() ? b.mesh.c_str() : "the surface",
       mesh.inside ? "; more cells (\"lattice\")" : ", as a body that is cut needs it; more cells (\"fill\")");
 }
 

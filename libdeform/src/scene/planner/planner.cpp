@@ -101,11 +101,12 @@ std::string short_id(const std::string &id) {
 double round_to_digits(double x) { return std::strtod(format("%.3g", x).c_str(), nullptr); }
 
 std::string lattice_said(const Body &b, double size, const Way &lattice, const Way &own) {
-  std::string out =
-      format("body '%s': hexahedra (\"lattice\": {\"size\": %g}) take the place of its cells", b.name.c_str(), size);
+  std::string out = format("body '%s': hexahedra (\"lattice\": {\"size\": %g}) take the place of its cells",
+                           b.name.c_str(), size);
   if (!own.bodies.empty())
-    out += format(", with which the error is %.3g %% at %.3g s of processor per second, not %.3g %% at %.3g s",
-                  100 * own.error, own.cpu_s_per_s, 100 * lattice.error, lattice.cpu_s_per_s);
+    out +=
+        format(", with which the error is %.3g %% at %.3g s of processor per second, not %.3g %% at %.3g s",
+               100 * own.error, own.cpu_s_per_s, 100 * lattice.error, lattice.cpu_s_per_s);
   return out + "; \"lattice\": null keeps them";
 }
 
@@ -126,8 +127,8 @@ class Reader {
     return out;
   }
 
-  // Bodies that may have a lattice of so many cells for each of their tetrahedra have one in `out`, of the edge
-  // in `sizes`, m. False: none has. `unmeasured`: one would, had its model measured costs.
+  // Bodies that may have a lattice of so many cells for each of their tetrahedra have one in `out`, with its
+  // edge in `sizes`, m. False: none has. `unmeasured`: one would, had its model measured costs.
   bool lattices(const std::vector<BodyRegime> &own, double times, const Measured &measured,
                 std::vector<BodyRegime> &out, std::vector<double> &sizes, bool &unmeasured) {
     out = own;
@@ -139,14 +140,16 @@ class Reader {
       if (!own[i].model.empty()) std::erase_if(models, [&](auto &m) { return m != own[i].model; });
       if (models.empty()) continue;
       std::erase_if(models, [&](auto &id) {
-        return std::ranges::none_of(measured.models, [&](auto &m) { return m.id == id && m.hexahedra.any(); });
+        return std::ranges::none_of(measured.models,
+                                    [&](auto &m) { return m.id == id && m.hexahedra.any(); });
       });
       unmeasured |= models.empty();
       if (models.empty()) continue;
       Body b = def_.bodies[i];
       b.fill.reset();
-      b.lattice_size = round_to_digits(
-          b.scale * std::cbrt(files_.info_of(meshes_[i].handle, b.pointer).volume / (times * meshes_[i].ntet)));
+      b.lattice_size =
+          round_to_digits(b.scale * std::cbrt(files_.info_of(meshes_[i].handle, b.pointer).volume /
+                                              (times * meshes_[i].ntet)));
       try {
         const BodyMesh mesh = files_.load(b);
         if (!carries(b, mesh, meshes_[i])) continue;
@@ -438,7 +441,8 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   for (const double larger : {16.0, 4.0, 1.0}) {  // as many points as the tetrahedra have, or fewer
     std::vector<BodyRegime> others;
     std::vector<double> sizes;
-    if (!reader.lattices(own, 1 / (larger * kTetsOfHexahedron), measured, others, sizes, unmeasured)) continue;
+    if (!reader.lattices(own, 1 / (larger * kTetsOfHexahedron), measured, others, sizes, unmeasured))
+      continue;
     PlannedWay other = plan_accuracy(others, measured, wish);
     if (!wins(other, plan, wish)) continue;
     plan = std::move(other);
