@@ -177,8 +177,12 @@ TEST_F(PlannerScene, HeldBar_SaysWhatALatticeTakesThePlaceOf) {
        {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells, with which the error is ",
         "\"lattice\": null keeps them", "--set /bodies/0/lattice/size="})
     EXPECT_TRUE(has(r.out, word)) << "no '" << word << "' in: " << r.out;
+  const test::CommandResult filled =
+      test::deform({"explain", bar(R"("accuracy": {"target": 0.05},)", R"("fill": {"cells": 800}, )")});
+  for (const char *word : {"--set /bodies/0/fill=null", "--set /bodies/0/lattice/size="})
+    EXPECT_TRUE(has(filled.out, word)) << "no '" << word << "' in: " << filled.out << filled.err;
   setenv("DEFORM_COSTS", old_costs().c_str(), 1);
-  const test::CommandResult old = test::deform({"explain", scene});
+  const test::CommandResult old = test::deform({"explain", bar(R"("accuracy": {"target": 0.05},)")});
   unsetenv("DEFORM_COSTS");
   EXPECT_EQ(old.exit_code, 0) << old.err;
   EXPECT_TRUE(has(old.out, "no lattice is proposed where the costs of its hexahedra are not measured"))

@@ -120,8 +120,8 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
   return mesh;
 }
 
-// Of a generated mesh. A round surface of triangles as large as cells has less volume than the shape: edges are
-// half of those of as many tetrahedra as are asked for, so that both errors fall alike.
+// Of a generated mesh. A round surface of triangles as large as cells has less volume than the shape: edges
+// are half of those of as many tetrahedra as are asked for, so that both errors fall alike.
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";

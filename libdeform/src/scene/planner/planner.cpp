@@ -175,20 +175,23 @@ class Reader {
            });
   }
 
-  // m, by how much what a mesh holds ends elsewhere than what the scene selects.
-  double held_off(const Fix &fix, const BodyMesh &mesh, const BodyMesh &own) const {
+  // m, by how much what a mesh holds ends elsewhere than what the scene selects: of a box the part in the
+  // body, whose surface has the box of `lattice`; else what the own mesh holds.
+  double held_off(const Fix &fix, const BodyMesh &mesh, const BodyMesh &own, const BodyMesh &lattice) const {
     const auto held = [&](const BodyMesh &by) {
       Extent out;
       for (const uint32_t p : select(fix.where, by, def_.file)) out.add(load3(&by.points[3 * size_t{p}]));
       return out;
     };
-    const bool by_box = fix.where.group.empty() && fix.where.points.empty();
-    const Extent there = held(mesh), here = by_box ? Extent{} : held(own);
+    const Extent there = held(mesh);
+    Extent here = held(own);
     double off = 0;
     for (int k = 0; k < 3; ++k) {
-      const double lo = by_box ? std::max(fix.where.lo[k], own.lo[k]) : here.lo[k],
-                   hi = by_box ? std::min(fix.where.hi[k], own.hi[k]) : here.hi[k];
-      off = std::max({off, std::fabs(there.lo[k] - lo), std::fabs(there.hi[k] - hi)});
+      if (fix.where.group.empty() && fix.where.points.empty()) {
+        here.lo[k] = std::max(fix.where.lo[k], lattice.lo[k]);
+        here.hi[k] = std::min(fix.where.hi[k], lattice.hi[k]);
+      }
+      off = std::max({off, std::fabs(there.lo[k] - here.lo[k]), std::fabs(there.hi[k] - here.hi[k])});
     }
     return off;
   }
@@ -201,7 +204,7 @@ class Reader {
       if (!s.at_point) select_skin(s.where, mesh, def_.file);
     for (const Attach &a : b.attach) select_skin(a.where, mesh, def_.file);
     return std::ranges::all_of(b.fixes, [&](const Fix &f) {
-      return held_off(f, mesh, own) <= held_off(f, own, own) + 1e-9 * own.size;
+      return held_off(f, mesh, own, mesh) <= held_off(f, own, own, mesh) + 1e-9 * own.size;
     });
   }
 
@@ -329,6 +332,10 @@ class Reader {
   void set_mesh(const Body &b, const BodyMesh &mesh, BodyRegime &r) const {
     const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
     r.points = mesh.npoint;
+    double side[3];
+    for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
+    r.length = *std::max_element(side, side + 3);
+    r.thickness = *std::min_element(side, side + 3);
     r.edge = info.edge_median;
     r.stiffens = bending_of_tetrahedra(std::clamp(material(b).def.poisson, 0.0, 0.49));
     r.hexahedra = info.cell == DFM_CELL_HEX8;
@@ -350,10 +357,6 @@ class Reader {
     const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
     BodyRegime r;
     r.name = b.name;
-    double side[3];
-    for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
-    r.length = *std::max_element(side, side + 3);
-    r.thickness = *std::min_element(side, side + 3);
     set_mesh(b, mesh, r);
     r.young = m.def.young;
     r.poisson = m.def.poisson;
