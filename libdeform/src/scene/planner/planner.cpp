@@ -319,9 +319,8 @@ class Reader {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.find(DFM_KIND_MODEL, m.id);
-      if (!type || types_.off_card(*type)) continue;
-      const dfm_model &model = *static_cast<const dfm_model *>(type->ops);
-      if (!(model.cells & cell) || (cell == DFM_CELL_HEX8 && !(model.caps & DFM_CAP_INSIDE))) continue;
+      if (!type || types_.off_card(*type) || !(static_cast<const dfm_model *>(type->ops)->cells & cell))
+        continue;
       if (b.device == "gpu" && !whole_on_card(context_, def_, types_, b, *type)) continue;
       out.push_back(m.id);
     }
