@@ -369,8 +369,8 @@ TEST(Planner, WhatABodyMeets_DecidesItsCost) {
   EXPECT_EQ(dfm::what_it_meets(b), dfm::Meets::ground);
 }
 
-// A lattice has costs and a longest step of its own; of two plans the one that meets the target is taken, then
-// the cheaper one.
+// A lattice has costs and a longest step of its own; of two plans the one that meets the target is taken,
+// then the cheaper one.
 TEST(Planner, Hexahedra_CostWhatIsMeasuredForThem) {
   BodyRegime b = bar();
   b.models = {"elements"};
