@@ -265,7 +265,8 @@ def planned(command, folder, name, truth):
     path, summary = run(command, tree, os.path.join(folder, name, "planned"), quantity)
     body = summary["planner"]["predicted"]["bodies"][0]
     claimed = body["model_error"] + body["time_error"] + body["mesh_error"]
-    label = f'{body["model"]}, {body["integrator"]}'
+    lattice = ", lattice" if any("/lattice/" in key for key in summary["planner"]["set"]) else ""
+    label = f'{body["model"]}, {body["integrator"]}{lattice}'
     cells = summary["bodies"]["body"]["cells"]
     yield "planner", label, cells, claimed, error(path, truth, quantity), body["cpu_s_per_s"]
 

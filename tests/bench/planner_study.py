@@ -28,7 +28,7 @@ CUBE = {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 600}
 def scene(young, damping, bodies, probes, duration, floor):
     out = {"format": "deform-scene", "version": 1, "time": {"duration": duration},
            "materials": {"gel": {"young": young, "damping": {"stiffness": damping}}},
-           "bodies": [dict(b, material="gel") for b in bodies],
+           "bodies": [dict(b, material="gel", lattice=None) for b in bodies],
            "probes": probes, "output": {"every": duration / 100}}
     if floor:
         out["obstacles"], out["contact"] = FLOOR, FRICTION

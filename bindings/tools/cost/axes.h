@@ -1,6 +1,5 @@
 // What may vary in a scene, axis by axis, and why an axis is left out.
 #pragma once
-#include <map>
 #include <string>
 #include <vector>
 
@@ -33,7 +32,7 @@ struct Axes {
 // Axis names in the order of the table.
 const std::vector<std::string> &axis_names();
 
-// wanted: names of axes, all where empty. surfaces: as the bodies' meshes need them (meshes.h).
+// wanted: names of axes, all where empty.
 Axes find_axes(const Subject &subject, const std::string &mesh_left_out,
                const std::vector<std::string> &wanted);
 

@@ -75,7 +75,8 @@ struct Setting {
   double size[3] = {0.4, 0.1, 0.1};  // m
   uint32_t cells = 1000;
   double young = kYoung, damping_mass = 0, damping_stiffness = 1e-3, gravity = kGravity, spin = 0;
-  bool held = false;  // at its end x = 0; where it is pressed, at its base z = 0
+  bool held = false;     // at its end x = 0; where it is pressed, at its base z = 0
+  bool lattice = false;  // of hexahedra as large as 12 tetrahedra, under triangles as fine as theirs
   Touch touch = Touch::free;
 };
 
@@ -165,9 +166,7 @@ class Bar {
     w.step = kFrame;
     need(dfm_world_create(context_, &w, &world_));
     const bool pressed = s.touch == Touch::pressed;
-    need(dfm_tetmesh_make(context_, "beam", pressed ? kBlock : s.size, s.cells, &mesh_));
-    info_.size = sizeof info_;
-    need(dfm_tetmesh_get_info(mesh_, &info_));
+    make_mesh(pressed ? kBlock : s.size, s);
     dfm_material_def m = dfm_material_def_default();
     m.density = kDensity;
     m.young = s.young;
@@ -178,6 +177,18 @@ class Bar {
     need(dfm_material_create(world_, &m, &b.material));
     const double *points = nullptr;
     need(dfm_tetmesh_data(mesh_, &points, &b.tets, nullptr));
+    need(dfm_tetmesh_cells(mesh_, &b.cell, &b.cells));
+    need(dfm_tetmesh_inside(mesh_, &b.cell_inside));
+    dfm_surface_def skin = {sizeof(dfm_surface_def), DFM_COUPLING_BARYCENTRIC, 0, 0, nullptr, nullptr, 0};
+    if (surface_) {
+      dfm_trimesh_info triangles = {};
+      triangles.size = sizeof triangles;
+      need(dfm_trimesh_get_info(surface_, &triangles));
+      skin.npoint = triangles.npoint;
+      skin.ntriangle = triangles.ntriangle;
+      need(dfm_trimesh_data(surface_, &skin.points, &skin.triangles, nullptr));
+      b.surface = &skin;
+    }
     std::vector<uint8_t> fixed(info_.npoint, 0);
     for (uint32_t i = 0; s.held && i < info_.npoint; ++i)
       if (points[3 * size_t(i) + (pressed ? 2 : 0)] < 1e-9) fixed[i] = 7;
@@ -206,6 +217,16 @@ class Bar {
     uint32_t n = 0;
     need(dfm_body_get_state(body_, info_.npoint, start_.data(), nullptr, &n));
   }
+  void make_mesh(const double size[3], const Setting &s) {
+    need(dfm_tetmesh_make(context_, "beam", size, s.cells, &mesh_));
+    info_.size = sizeof info_;
+    need(dfm_tetmesh_get_info(mesh_, &info_));
+    if (!s.lattice) return;
+    need(dfm_trimesh_make(context_, "beam", size, 4 * info_.ntriangle, &surface_));
+    need(dfm_tetmesh_destroy(std::exchange(mesh_, 0)));
+    need(dfm_tetmesh_lattice(surface_, s.cells / 12, 0, &mesh_));
+    need(dfm_tetmesh_get_info(mesh_, &info_));
+  }
   void add_obstacle(bool pressed) {
     dfm_obstacle_def d = dfm_obstacle_def_default();
     if (pressed) {
@@ -219,6 +240,7 @@ class Bar {
   }
   void close() {
     if (mesh_) dfm_tetmesh_destroy(mesh_);
+    if (surface_) dfm_trimesh_destroy(surface_);
     if (world_) dfm_world_destroy(world_);
   }
 
@@ -226,6 +248,7 @@ class Bar {
   dfm_context *context_;
   dfm_world world_ = 0;
   dfm_tetmesh mesh_ = 0;
+  dfm_trimesh surface_ = 0;  // of a lattice
   dfm_tetmesh_info info_ = {};
   dfm_body body_ = 0;
   uint32_t nbody_ = 1;
@@ -331,17 +354,19 @@ class Calibration {
     need(dfm_plugin_visit(
         context,
         [](void *user, const dfm_type *type, const char *) {
-          if (type->kind == DFM_KIND_MODEL)
-            static_cast<std::vector<std::string> *>(user)->push_back(type->id);
+          if (type->kind != DFM_KIND_MODEL) return;
+          const dfm_model &ops = *static_cast<const dfm_model *>(type->ops);
+          static_cast<std::vector<Model> *>(user)->push_back(
+              {type->id, (ops.cells & DFM_CELL_HEX8) && (ops.caps & DFM_CAP_INSIDE)});
         },
         &models_));
     if (only.empty()) return;
     for (const std::string &name : only)
-      if (std::none_of(models_.begin(), models_.end(), [&](auto &id) { return named(id, name); }))
+      if (std::none_of(models_.begin(), models_.end(), [&](auto &m) { return named(m.id, name); }))
         throw Failure(kBadInput,
                       "--model: no loaded plugin offers the model \"" + name + "\"; see: deform plugin list");
-    std::erase_if(models_, [&](const std::string &id) {
-      return std::none_of(only.begin(), only.end(), [&](auto &name) { return named(id, name); });
+    std::erase_if(models_, [&](const Model &m) {
+      return std::none_of(only.begin(), only.end(), [&](auto &name) { return named(m.id, name); });
     });
   }
 
@@ -353,12 +378,12 @@ class Calibration {
                   turned(context_, kReference), lying(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER),
                   dented(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER)};
     std::vector<std::string> rows;
-    for (const std::string &id : models_) {
-      const Patience patience(wanted_, "measuring " + id);
+    for (const Model &m : models_) {
+      const Patience patience(wanted_, "measuring " + m.id);
       try {
-        rows.push_back(model_row(id));
+        rows.push_back(model_row(m));
       } catch (const Failure &why) {
-        left_out.push_back("the model " + id + " is left out of the costs: " + why.what());
+        left_out.push_back("the model " + m.id + " is left out of the costs: " + why.what());
       }
     }
     return JsonObject()
@@ -374,6 +399,10 @@ class Calibration {
   static constexpr double kLittle = 0.02, kFar = 0.8;  // sag over length of the linear bar
 
   using Clock = double (*)();
+  struct Model {
+    std::string id;
+    bool lattices;  // it takes their cells
+  };
 
   static std::string short_name(const std::string &id) { return id.substr(id.rfind('.') + 1); }
   static bool named(const std::string &id, const std::string &name) {
@@ -385,14 +414,31 @@ class Calibration {
     Dent dented;
   };
 
-  std::string model_row(const std::string &id) {
+  // The longest explicit step and the costs, on cells of one kind.
+  void add_cells(const std::string &id, bool lattice, bool itself, JsonObject &out) {
+    Setting s = bound_of(id);
+    s.lattice = lattice;
+    const Bar bar(context_, s);
+    JsonObject costs;
+    costs.add("symplectic_euler", sizes(id, lattice, DFM_INTEGRATOR_SYMPLECTIC_EULER, itself));
+    if (!itself) {
+      costs.add("implicit_euler", sizes(id, lattice, DFM_INTEGRATOR_IMPLICIT_EULER, false));
+      costs.add("tr_bdf2", sizes(id, lattice, DFM_INTEGRATOR_TR_BDF2, false));
+    }
+    out.add("wave_steps", number(itself ? 0 : bar.bound() / bar.wave_time())).add("costs", costs.text());
+  }
+
+  static Setting bound_of(const std::string &id) {
     Setting s;
     s.model = id;
     s.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
     s.damping_stiffness = 0;
-    const Bar bar(context_, s);
-    const double stable = bar.stable_step();
-    const bool itself = !std::isfinite(stable);
+    return s;
+  }
+
+  std::string model_row(const Model &m) {
+    const std::string &id = m.id;
+    const bool itself = !std::isfinite(Bar(context_, bound_of(id)).stable_step());
     const int32_t still = itself ? DFM_INTEGRATOR_AUTO : DFM_INTEGRATOR_IMPLICIT_EULER;
     JsonObject errors;
     errors.add("bends_little", number(difference(bent(context_, id, still, kLittle), reference_.little)))
@@ -402,22 +448,18 @@ class Calibration {
     const Dent dent = dented(context_, id, still);
     errors.add("dents", number(difference(dent.displacements, reference_.dented.displacements)))
         .add("dent_force", number(force_difference(dent.force, reference_.dented.force)));
-    JsonObject costs;
-    costs.add("symplectic_euler", sizes(id, DFM_INTEGRATOR_SYMPLECTIC_EULER, itself));
-    if (!itself) {
-      costs.add("implicit_euler", sizes(id, DFM_INTEGRATOR_IMPLICIT_EULER, false));
-      costs.add("tr_bdf2", sizes(id, DFM_INTEGRATOR_TR_BDF2, false));
-    }
-    return JsonObject()
-        .add("model", quoted(short_name(id)))
+    JsonObject row;
+    row.add("model", quoted(short_name(id)))
         .add("steps_itself", itself ? "true" : "false")
-        .add("wave_steps", number(itself ? 0 : bar.bound() / bar.wave_time()))
-        .add("errors", errors.text())
-        .add("costs", costs.text())
-        .text();
+        .add("errors", errors.text());
+    add_cells(id, false, itself, row);
+    if (!m.lattices) return row.text();
+    JsonObject hexahedra;
+    add_cells(id, true, itself, hexahedra);
+    return row.add("hexahedra", hexahedra.text()).text();
   }
 
-  std::string sizes(const std::string &id, int32_t integrator, bool itself) {
+  std::string sizes(const std::string &id, bool lattice, int32_t integrator, bool itself) {
     JsonObject out;
     for (const auto &[touch, name] : kTouches) {
       std::vector<std::string> rows;
@@ -428,6 +470,7 @@ class Calibration {
         s.model = id;
         s.integrator = integrator;
         s.cells = cells;
+        s.lattice = lattice;
         s.held = touch == Touch::free || touch == Touch::pressed;
         s.touch = touch;
         const bool pressed = touch == Touch::pressed;
@@ -482,7 +525,7 @@ class Calibration {
 
   dfm_context *context_;
   bool wanted_;
-  std::vector<std::string> models_;
+  std::vector<Model> models_;
   Reference reference_;
 };
 

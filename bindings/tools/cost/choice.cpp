@@ -48,16 +48,7 @@ void set_model(const Subject &subject, const std::string &body, size_t i, const 
   if (model != own || !knobs.volume.empty() || precision) out.emplace_back(body + "/model", json_text(value));
 }
 
-// A lattice lies under a surface of its own.
-void set_lattice(const Subject &subject, const std::string &body, const std::string &surface,
-                 const std::string &cells, Settings &out) {
-  if (!surface.empty()) out.emplace_back(body + "/mesh", quoted(surface));
-  if (subject.find(body + "/fill")) out.emplace_back(body + "/fill", "null");
-  out.emplace_back(body + "/lattice", "{\"cells\": " + cells + "}");
-}
-
-void set_cells(const Subject &subject, const Surfaces &surfaces, size_t i, const Knobs &knobs,
-               Settings &out) {
+void set_cells(const Subject &subject, size_t i, const Knobs &knobs, Settings &out) {
   const std::string body = "/bodies/" + std::to_string(i);
   const auto number_at = [&](const char *key, double otherwise) {
     const JsonValue *const value = subject.find(body + key);
@@ -74,15 +65,13 @@ void set_cells(const Subject &subject, const Surfaces &surfaces, size_t i, const
                      counted ? scaled(number_at("/lattice/cells", 1))
                              : number(number_at("/lattice/size", 1) / std::cbrt(times)));
   } else if (knobs.kind == Cells::hexahedra && !already) {
-    set_lattice(subject, body, surfaces.file(i, times), scaled(subject.bodies[i].cells), out);
-  } else if (mesh && mesh->kind == JsonValue::object) {
+    if (subject.find(body + "/fill")) out.emplace_back(body + "/fill", "null");
+    out.emplace_back(body + "/lattice", "{\"cells\": " + scaled(subject.bodies[i].cells) + "}");
+  } else if (mesh && mesh->kind == JsonValue::object && !subject.find(body + "/fill")) {
     out.emplace_back(body + "/mesh/cells", scaled(number_at("/mesh/cells", 1000)));
     if (knobs.kind == Cells::second_order) out.emplace_back(body + "/mesh/order", "2");
-  } else if (const std::string surface = surfaces.file(i, times); surface.empty()) {
-    out.emplace_back(body + "/fill/cells", scaled(number_at("/fill/cells", 5000)));
   } else {
-    out.emplace_back(body + "/mesh", quoted(surface));
-    out.emplace_back(body + "/fill/cells", scaled(subject.bodies[i].cells));
+    out.emplace_back(body + "/fill/cells", scaled(number_at("/fill/cells", subject.bodies[i].cells)));
   }
 }
 
@@ -99,12 +88,12 @@ std::string seconds(double h) {
   return text;
 }
 
-Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs) {
+Settings settings_of(const Subject &subject, const Knobs &knobs) {
   Settings out;
   for (size_t i = 0; i < subject.bodies.size(); ++i) {
     const std::string body = "/bodies/" + std::to_string(i);
     set_model(subject, body, i, knobs, out);
-    if (!knobs.own_mesh()) set_cells(subject, surfaces, i, knobs, out);
+    if (!knobs.own_mesh()) set_cells(subject, i, knobs, out);
   }
   if (!knobs.integrator.empty()) out.emplace_back("/time/integrator", quoted(knobs.integrator));
   if (!knobs.step.empty()) out.emplace_back("/time/step", knobs.step);

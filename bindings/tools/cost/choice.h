@@ -1,7 +1,5 @@
 // One way to simulate the scene: what is changed in it, as the words of `deform run --set`.
 #pragma once
-#include <map>
-#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,25 +24,9 @@ struct Knobs {
 
 using Settings = std::vector<std::pair<std::string, std::string>>;  // pointer, JSON text
 
-// Surfaces under which bodies get other cells (meshes.cpp).
-class Surfaces {
- public:
-  Surfaces(const Subject &subject, std::string folder) : subject_(subject), folder_(std::move(folder)) {}
-  // Absolute path of the surface of a body whose cells are made, or come from a file; "" where the mesh of
-  // the scene is a surface. It is written at the first call. Triangles of a shape that is made are as large
-  // as `times` the cells of the scene need.
-  std::string file(size_t body, double times) const;
-
- private:
-  const Subject &subject_;
-  std::string folder_;
-  mutable std::set<std::string> written_;
-  mutable std::map<size_t, uint32_t> triangles_;  // by body: of the boundary of the scene's mesh
-};
-
 bool has_hexahedra(const Subject &subject, size_t body);  // as the scene is
 std::string seconds(double h);                            // a step as JSON text
-Settings settings_of(const Subject &subject, const Surfaces &surfaces, const Knobs &knobs);
+Settings settings_of(const Subject &subject, const Knobs &knobs);
 // "corotational_fem, implicit_euler 0.01 s, cells x0.5"; "the scene as it is" where nothing is chosen.
 std::string label_of(const Knobs &knobs);
 // What the scene says, in words for a table; of several, all.

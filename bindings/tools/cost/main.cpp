@@ -43,12 +43,11 @@ int cost_of(CostOptions options, Globals &globals) {
   const cost::Subject subject = cost::read_subject(options.scene, globals);
   make_folder(options.out);
   const std::string cells_stay = cost::why_cells_stay(subject);
-  const cost::Surfaces surfaces(subject, options.out + "/surfaces");
   cost::Study study;
   {
     cost::Runs runs(subject, options.out, options.parallel, options.study.budget,
                     !globals.quiet && !globals.json);
-    study = cost::make_study(subject, surfaces, cells_stay, options.study, runs);
+    study = cost::make_study(subject, cells_stay, options.study, runs);
   }
   const std::string report = cost::json_report(subject, study, cost::scene_patch(subject, study));
   write_whole(options.out + "/cost.csv", cost::csv_text(subject, study));

@@ -1,11 +1,9 @@
 #include "study.h"
 
-#include <algorithm>
 #include <filesystem>
 
 #include "cli.h"
 #include "file.h"
-#include "messages.h"
 
 namespace fs = std::filesystem;
 
@@ -55,19 +53,10 @@ void write_applied(const Subject &subject, const Study &study, const std::string
   const fs::path folder = fs::absolute(path).parent_path();
   std::error_code error;
   fs::create_directories(folder, error);
-  const Settings changes = settings_of_pick(study);
   for (const std::string &pointer : file_pointers(scene)) {
     JsonValue name = *at_pointer(scene, pointer);
-    const bool ours = std::any_of(changes.begin(), changes.end(),
-                                  [&](const auto &setting) { return setting.first == pointer; });
-    fs::path file = fs::absolute(fs::path(subject.folder) / name.text).lexically_normal();
-    if (ours) {
-      const fs::path copy = folder / (fs::path(path).stem().string() + "_" + file.filename().string());
-      fs::copy_file(file, copy, fs::copy_options::overwrite_existing, error);
-      if (error) throw Failure(kBadInput, copy.string() + ": cannot be written: " + error.message());
-      file = copy;
-    }
-    if (fs::path(name.text).is_absolute() && !ours) continue;
+    if (fs::path(name.text).is_absolute()) continue;
+    const fs::path file = fs::absolute(fs::path(subject.folder) / name.text).lexically_normal();
     name.text = file.lexically_relative(folder.lexically_normal()).generic_string();
     set_pointer(scene, pointer, name);
   }

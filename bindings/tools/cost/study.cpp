@@ -36,8 +36,7 @@ constexpr struct { double times, most; } kBeyond[] = {{64, 4000}, {16, 40000}};
 
 class Student {
  public:
-  Student(const Subject &subject, const Surfaces &surfaces, Runs &runs, Study &study)
-      : s_(subject), surfaces_(surfaces), runs_(runs), out_(study) {}
+  Student(const Subject &subject, Runs &runs, Study &study) : s_(subject), runs_(runs), out_(study) {}
 
   void study() {
     for (const Candidate &c : out_.axes.candidates) add(c);
@@ -82,7 +81,7 @@ class Student {
     Row row;
     row.candidate = candidate;
     row.job.label = label_of(candidate.knobs);
-    row.job.set = settings_of(s_, surfaces_, candidate.knobs);
+    row.job.set = settings_of(s_, candidate.knobs);
     for (auto &setting : observe()) row.job.set.push_back(std::move(setting));
     runs_.prepare(row.job);
     out_.rows.push_back(std::move(row));
@@ -610,7 +609,6 @@ class Student {
   }
 
   const Subject &s_;
-  const Surfaces &surfaces_;
   Runs &runs_;
   Study &out_;
   std::vector<std::pair<int, int>> ladder_;
@@ -620,13 +618,13 @@ class Student {
 
 }  // namespace
 
-Study make_study(const Subject &subject, const Surfaces &surfaces, const std::string &mesh_left_out,
-                 const StudyOptions &options, Runs &runs) {
+Study make_study(const Subject &subject, const std::string &mesh_left_out, const StudyOptions &options,
+                 Runs &runs) {
   Study out;
   out.options = options;
   if (subject.at_rest) out.cost_unit = "s";
   out.axes = find_axes(subject, mesh_left_out, options.axes);
-  Student(subject, surfaces, runs, out).study();
+  Student(subject, runs, out).study();
   return out;
 }
 

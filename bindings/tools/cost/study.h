@@ -77,8 +77,8 @@ struct Study {
 };
 
 // Throws Failure where nothing can be compared within the budget.
-Study make_study(const Subject &subject, const Surfaces &surfaces, const std::string &mesh_left_out,
-                 const StudyOptions &options, Runs &runs);
+Study make_study(const Subject &subject, const std::string &mesh_left_out, const StudyOptions &options,
+                 Runs &runs);
 
 // meshes.cpp: why the cells of this scene's bodies cannot vary; "" where they can.
 std::string why_cells_stay(const Subject &subject);
@@ -87,7 +87,7 @@ std::string why_cells_stay(const Subject &subject);
 // It contains whole lists, because a merge patch cannot change a part of one. Null: nothing is chosen.
 JsonValue scene_patch(const Subject &subject, const Study &study);
 // Writes the scene with the pick's changes to `path`. Files keep their places: names are made relative to
-// the new scene's folder, and surfaces that the study has written are copied beside it.
+// the new scene's folder.
 void write_applied(const Subject &subject, const Study &study, const std::string &path);
 
 // page.cpp: cost.html, the study on one page in one file, pictures included; needs no network and no script.

@@ -139,6 +139,7 @@ struct Body : Thing {
   // of a lattice: one of these; m
   uint32_t lattice_cells = 0;
   double lattice_size = 0;
+  bool lattice_open = false;  // the planner may take one: the scene has no such key, not even as null
   bool lattice() const { return lattice_cells > 0 || lattice_size > 0; }
   std::vector<GroupMaterial> by_group;
   std::vector<FieldFile> fields;

@@ -120,6 +120,22 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
   return mesh;
 }
 
+// Of a generated mesh. A round surface of triangles as large as cells has less volume than the shape: edges
+// are half of those of as many tetrahedra as are asked for, so that both errors fall alike.
+std::string MeshFiles::make_surface(const Body &b) {
+  const MadeMesh &m = b.made;
+  const std::string pointer = b.pointer + "/mesh";
+  const dfm_tetmesh_info own = info_of(cells_.at(make(b)), pointer);
+  const double hexahedra =
+      b.lattice_cells ? b.lattice_cells : own.volume * std::pow(b.scale / b.lattice_size, 3);
+  const double wanted = b.lattice() ? kTetsOfHexahedron * hexahedra : b.fill.value_or(0) ? *b.fill : own.ntet;
+  const auto n = uint32_t(std::lround(4 * own.ntriangle * std::pow(wanted / own.ntet, 2.0 / 3)));
+  const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
+  dfm_trimesh &mesh = surfaces_[name];
+  if (!mesh) def_.require(dfm_trimesh_make(context_, kind.c_str(), m.size, n, &mesh), pointer);
+  return name;
+}
+
 dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &pointer) {
   dfm_trimesh &mesh = surfaces_[path];
   if (!mesh) def_.require(dfm_trimesh_read(context_, path.c_str(), &mesh), pointer);
@@ -154,22 +170,18 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
   if (!has_cells) {
     if (filled && !b.nodal_bc.empty())
       def_.refuse(b.pointer + "/nodal_bc",
-                  "the mesh is a surface, and its nodes are not points of the filled body; use \"fix\" and "
+                  "the body is a filled surface, and nodes of the mesh are not its points; use \"fix\" and "
                   "\"forces\"");
     if (!b.fields.empty())
-      def_.refuse(
-          b.fields[0].pointer,
-          "the mesh is a surface, so its file has no cells to give values for; fill it first with deform "
-          "mesh fill and use the result as mesh");
+      def_.refuse(b.fields[0].pointer,
+                  "the body is a filled surface, so its file has no cells to give values for; fill it first "
+                  "with deform "
+                  "mesh fill and use the result as mesh");
     if (!b.by_group.empty())
       def_.refuse(b.by_group[0].pointer,
-                  "the mesh is a surface, and the cells that fill it belong to no group");
+                  "the body is a filled surface, and the cells that fill it belong to no group");
     return;
   }
-  if (b.fill)
-    def_.refuse(b.pointer + "/fill", "the mesh holds tetrahedra already; \"fill\" is for a closed surface");
-  if (b.lattice())
-    def_.refuse(b.pointer + "/lattice", "the mesh holds cells already; \"lattice\" is for a closed surface");
   if (b.surface.coupled && b.surface.mesh.empty())
     def_.refuse(b.surface.pointer + "/coupling",
                 "the surface is the boundary of the cells, whose points are the body's own; a coupling needs "
@@ -234,9 +246,13 @@ void MeshFiles::split_skin(BodyMesh &out) {
 }
 
 BodyMesh MeshFiles::load(const Body &b) {
-  const std::string path = b.made.kind.empty() ? path_of(b.mesh) : make(b), pointer = b.pointer + "/mesh";
+  const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice();
+  const std::string path = !made  ? path_of(b.mesh)
+                           : anew ? make_surface(b)
+                                  : make(b),
+                    pointer = b.pointer + "/mesh";
   BodyMesh out;
-  const bool whole = has_cells(path, pointer);
+  const bool whole = !anew && has_cells(path, pointer);
   out.filled = !whole && b.fill != 0u;
   check_keys(b, whole, out.filled);
   take_cells(whole ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
@@ -249,7 +265,7 @@ BodyMesh MeshFiles::load(const Body &b) {
     if (!out.wears_skin) tell_of_steps(b, out);
     split_skin(out);
   }
-  if (!whole && !b.has_scale) tell_of_unit(b, out);
+  if (!whole && !made && !b.has_scale) tell_of_unit(b, out);
   return out;
 }
 
@@ -275,7 +291,8 @@ void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
       "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
       "\"boundary\"%s make smaller steps",
       b.name.c_str(), cells.ntriangle, mesh.inside ? cells.ncell : cells.ntet, b.scale * cells.edge_median,
-      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle, b.mesh.c_str(),
+      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle,
+      b.made.kind.empty() ? b.mesh.c_str() : "the surface",
       mesh.inside ? "; more cells (\"lattice\")" : ", as a body that is cut needs it; more cells (\"fill\")");
 }
 

@@ -1,4 +1,5 @@
-// Mesh files of a scene, each read once; a body whose file is a surface gets its cells by filling it.
+// Mesh files of a scene, each read once; a body whose file is a surface, or which asks for other cells than
+// its file's, gets them by filling that surface, or the boundary of those cells.
 #pragma once
 #include <deque>
 #include <map>
@@ -13,6 +14,8 @@
 namespace dfm::scene {
 
 inline constexpr uint32_t kFillCells = 5000;  // if a scene gives no number
+// As large as a hexahedron: the cubes that 12 of a body-centered lattice make.
+inline constexpr double kTetsOfHexahedron = 12;
 
 class MeshFiles {
  public:
@@ -34,6 +37,7 @@ class MeshFiles {
   bool has_cells(const std::string &path, const std::string &pointer);
   // gives the name under which `cells` knows it
   std::string make(const Body &body);
+  std::string make_surface(const Body &body);  // the same for `surface`
   dfm_tetmesh cells(const std::string &path, const std::string &pointer);
   dfm_trimesh surface(const std::string &path, const std::string &pointer);
   dfm_tetmesh filling(const std::string &path, const Body &body);

@@ -145,6 +145,7 @@ void read_carriers(const Node &body, const dfm_type *model, ReadContext &context
     if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
     b.fill = uint32_t(n);
   }
+  b.lattice_open = context.planned && !body.has("lattice");
   if (body.has_value("lattice")) read_lattice(body.member("lattice"), b);
   if (b.lattice() && b.fill)
     body.member("lattice").fail("the body is filled with tetrahedra by \"fill\" too; keep one");

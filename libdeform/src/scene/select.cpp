@@ -135,7 +135,7 @@ std::vector<uint32_t> select_nodes(const Selection &where, const BodyMesh &mesh,
   const std::string pointer = where.pointer + "/points";
   if (mesh.filled)
     fail(DFM_E_ARG,
-         "%s: %s: the mesh is a surface, and its nodes are not points of the filled body; use \"box\" or "
+         "%s: %s: the body is a filled surface, and nodes of the mesh are not its points; use \"box\" or "
          "\"group\"",
          file.c_str(), pointer.c_str());
   const std::vector<uint32_t> point_of = points_of_nodes(mesh);

@@ -369,6 +369,29 @@ TEST(Planner, WhatABodyMeets_DecidesItsCost) {
   EXPECT_EQ(dfm::what_it_meets(b), dfm::Meets::ground);
 }
 
+// A lattice has costs and a longest step of its own; of two plans the one that meets the target is taken,
+// then the cheaper one.
+TEST(Planner, Hexahedra_CostWhatIsMeasuredForThem) {
+  BodyRegime b = bar();
+  b.models = {"elements"};
+  b.scheme = static_cast<int>(Scheme::explicit_euler);
+  b.hexahedra = true;
+  Measured costs = measured();
+  const PlannedWay as_tetrahedra = plan_accuracy({b}, costs, accuracy(0.1));
+  dfm::MeasuredCells &lattice = costs.models[1].hexahedra;
+  lattice.costs[0].fill({{100, 100}, {1000, 100}});
+  lattice.wave_steps = 2 * costs.models[1].wave_steps;
+  const PlannedWay own = plan_accuracy({b}, costs, accuracy(0.1));
+  EXPECT_NEAR(own.way.substep, 2 * as_tetrahedra.way.substep, 1e-12);
+  EXPECT_NEAR(own.way.cpu_s_per_s, as_tetrahedra.way.cpu_s_per_s / 6, 1e-9);
+  EXPECT_TRUE(wins(own, as_tetrahedra, accuracy(0.1)));
+  EXPECT_FALSE(wins(as_tetrahedra, own, accuracy(0.1)));
+  b.edge = b.thickness;
+  const PlannedWay coarse = plan_accuracy({b}, costs, accuracy(0.1));
+  ASSERT_FALSE(coarse.meets);
+  EXPECT_TRUE(wins(own, coarse, accuracy(0.1)));
+}
+
 // Where a probe is, is known to a sub-step, and so is its force.
 TEST(Planner, ProbeThatComes_IsKnownToASubStep) {
   BodyRegime b = bar();

@@ -37,8 +37,12 @@ double ns_per_point(const std::vector<CostAt> &costs, double points, double h) {
   return from * std::pow(std::max(points, costs[0].points) / a.points, slope);
 }
 
+const MeasuredCells &cells_of(const MeasuredModel &m, const BodyRegime &b) {
+  return b.hexahedra && m.hexahedra.any() ? m.hexahedra : m;
+}
+
 const std::vector<CostAt> &costs_of(const MeasuredModel &m, Scheme scheme, const BodyRegime &b) {
-  return m.costs[static_cast<size_t>(scheme)][static_cast<size_t>(what_it_meets(b))];
+  return cells_of(m, b).costs[static_cast<size_t>(scheme)][static_cast<size_t>(what_it_meets(b))];
 }
 
 // Of bending: along the power law through the two bars that were measured, by the angles that `estimate`
@@ -124,7 +128,7 @@ double time_error(Scheme scheme, bool steps_itself, double h, const BodyRegime &
 double explicit_step(const MeasuredModel &m, const BodyRegime &b) {
   const double nu = std::min(std::max(b.poisson, 0.0), 0.49);
   const double pressure = std::sqrt(b.young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)) / b.density);
-  const double h0 = m.wave_steps * b.cell_size / pressure, beta = b.damping_stiffness;
+  const double h0 = cells_of(m, b).wave_steps * b.cell_size / pressure, beta = b.damping_stiffness;
   return kOffered * h0 * h0 / (std::sqrt(h0 * h0 + beta * beta) + beta);
 }
 
@@ -447,6 +451,8 @@ double stiffening(const BodyRegime &b) {
 
 bool dented(const BodyRegime &b) { return b.touches && b.contact < b.thickness; }
 
+bool mesh_error_known(const BodyRegime &b) { return b.held && !dented(b); }
+
 Meets what_it_meets(const BodyRegime &b) {
   if (!b.touches) return Meets::nothing;
   if (b.meets_body) return Meets::body;
@@ -501,6 +507,12 @@ double ms_per_step(const Way &way) { return 1e3 * way.cpu_s_per_s * way.frame; }
 
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish) {
   return Planner(bodies, measured, wish).run();
+}
+
+bool wins(const PlannedWay &a, const PlannedWay &b, const Wish &wish) {
+  if (a.found != b.found) return a.found;
+  if (a.meets != b.meets) return a.meets;
+  return a.meets == (wish.target > 0) ? a.way.cpu_s_per_s < b.way.cpu_s_per_s : a.way.error < b.way.error;
 }
 
 }  // namespace dfm

@@ -33,19 +33,29 @@ enum class Meets { nothing, ground, probe, body };
 inline constexpr size_t kMeets = 4;
 const char *meets_name(Meets meets);  // as a file of costs names it
 
-struct MeasuredModel {
-  std::string id;       // short name
-  std::string machine;  // on which it was measured; empty: that of all
+// Of cells of one kind.
+struct MeasuredCells {
+  // The largest explicit step that is proven, over the time in which a pressure wave goes by `cell_size`.
+  double wave_steps = 0;
+  // by scheme and by what is met; empty: the model has no such scheme
+  std::array<std::array<std::vector<CostAt>, kMeets>, kSchemes> costs;
+  bool any() const {
+    for (const auto &scheme : costs)
+      if (!scheme[0].empty()) return true;
+    return false;
+  }
+};
+
+struct MeasuredModel : MeasuredCells {  // of tetrahedra
+  MeasuredCells hexahedra;              // of lattices
+  std::string id;                       // short name
+  std::string machine;                  // on which it was measured; empty: that of all
   bool steps_itself = false;
   // Relative errors of positions against corotational_fem on the same mesh: a bar that bends by 0.02 and by
   // 0.8 of its length, a bar that turns, a block that lies on a plane, a held block that a small sphere
   // dents.
   double bends_little = 0, bends_far = 0, turns = 0, lies = 0, dents = 0;
   double dent_force = 0;  // relative error of the sphere's force at the same depths
-  // The largest explicit step that is proven, over the time in which a pressure wave goes by `cell_size`.
-  double wave_steps = 0;
-  // by scheme and by what is met; empty: the model has no such scheme
-  std::array<std::array<std::vector<CostAt>, kMeets>, kSchemes> costs;
 };
 
 struct Measured {
@@ -68,6 +78,7 @@ struct BodyRegime {
   // Relative increase of the bending stiffness by cells as large as the thickness; goes with the square of
   // the edge.
   double stiffens = bending_of_tetrahedra(0.3);
+  bool hexahedra = false;
   double cell_size = 0;                            // m, dfm_tetmesh_info.wave_path
   double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
   double damping_mass = 0, damping_stiffness = 0;  // 1/s, s
@@ -139,6 +150,10 @@ struct PlannedWay {
   std::string missed;                // if it does not meet: what is predicted and what would meet
 };
 PlannedWay plan_accuracy(const std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish);
+// Whether the first is taken rather than the second: plans of the same scene with other cells.
+bool wins(const PlannedWay &a, const PlannedWay &b, const Wish &wish);
+// Whether the error of its cells is predicted, so that others may be compared with them.
+bool mesh_error_known(const BodyRegime &body);
 
 // s of processor time per second, on a card by the clock, of a body that a model moves in the scheme that the
 // body names, else explicitly, in steps of a scene; infinite where it was not measured.

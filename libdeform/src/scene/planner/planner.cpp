@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 
 #include "math/extent.h"
 #include "math/turn.h"
@@ -96,6 +97,19 @@ std::string short_id(const std::string &id) {
   return dot == std::string::npos ? id : id.substr(dot + 1);
 }
 
+// Three, as a person would write it.
+double round_to_digits(double x) { return std::strtod(format("%.3g", x).c_str(), nullptr); }
+
+std::string lattice_said(const Body &b, double size, const Way &lattice, const Way &own) {
+  std::string out = format("body '%s': hexahedra (\"lattice\": {\"size\": %g}) take the place of its cells",
+                           b.name.c_str(), size);
+  if (!own.bodies.empty())
+    out +=
+        format(", with which the error is %.3g %% at %.3g s of processor per second, not %.3g %% at %.3g s",
+               100 * own.error, own.cpu_s_per_s, 100 * lattice.error, lattice.cpu_s_per_s);
+  return out + "; \"lattice\": null keeps them";
+}
+
 class Reader {
  public:
   Reader(dfm_context *context, const Definition &def, const Types &types)
@@ -113,7 +127,102 @@ class Reader {
     return out;
   }
 
+  // Bodies that may have a lattice of so many cells for each of their tetrahedra have one in `out`, with its
+  // edge in `sizes`, m. False: none has. `unmeasured`: one would, had its model measured costs.
+  bool lattices(const std::vector<BodyRegime> &own, double times, const Measured &measured,
+                std::vector<BodyRegime> &out, std::vector<double> &sizes, bool &unmeasured) {
+    out = own;
+    sizes.assign(own.size(), 0);
+    bool any = false;
+    for (size_t i = 0; i < own.size(); ++i) {
+      if (!may_have_lattice(i) || !mesh_error_known(own[i])) continue;
+      std::vector<std::string> models = candidates(measured, def_.bodies[i], DFM_CELL_HEX8);
+      if (!own[i].model.empty()) std::erase_if(models, [&](auto &m) { return m != own[i].model; });
+      if (models.empty()) continue;
+      std::erase_if(models, [&](auto &id) {
+        return std::ranges::none_of(measured.models,
+                                    [&](auto &m) { return m.id == id && m.hexahedra.any(); });
+      });
+      unmeasured |= models.empty();
+      if (models.empty()) continue;
+      Body b = def_.bodies[i];
+      b.fill.reset();
+      b.lattice_size =
+          round_to_digits(b.scale * std::cbrt(files_.info_of(meshes_[i].handle, b.pointer).volume /
+                                              (times * meshes_[i].ntet)));
+      try {
+        const BodyMesh mesh = files_.load(b);
+        if (!carries(b, mesh, meshes_[i])) continue;
+        set_mesh(b, mesh, out[i]);
+      } catch (const Error &) {
+        continue;  // its surface is open or crosses itself, or a box of the scene has none of its points
+      }
+      out[i].models = models;
+      sizes[i] = b.lattice_size;
+      any = true;
+    }
+    return any;
+  }
+
  private:
+  // Only first-order tetrahedra can be cut or torn.
+  bool may_be_cut() const {
+    return !def_.cuts.empty() ||
+           std::ranges::any_of(def_.tools, [](const Tool &t) { return !t.cuts.pointer.empty(); }) ||
+           std::ranges::any_of(def_.bodies, [](const Body &b) { return b.separate || b.cut_delay > 0; }) ||
+           std::ranges::any_of(def_.materials, [](const Material &m) {
+             return std::ranges::find(m.extra.keys, "tear") != m.extra.keys.end();
+           });
+  }
+
+  // m, by how much what a mesh holds ends elsewhere than what the scene selects: of a box the part in the
+  // body, whose surface has the box of `lattice`; else what the own mesh holds.
+  double held_off(const Fix &fix, const BodyMesh &mesh, const BodyMesh &own, const BodyMesh &lattice) const {
+    const auto held = [&](const BodyMesh &by) {
+      Extent out;
+      for (const uint32_t p : select(fix.where, by, def_.file)) out.add(load3(&by.points[3 * size_t{p}]));
+      return out;
+    };
+    const Extent there = held(mesh);
+    Extent here = held(own);
+    double off = 0;
+    for (int k = 0; k < 3; ++k) {
+      if (fix.where.group.empty() && fix.where.points.empty()) {
+        here.lo[k] = std::max(fix.where.lo[k], lattice.lo[k]);
+        here.hi[k] = std::min(fix.where.hi[k], lattice.hi[k]);
+      }
+      off = std::max({off, std::fabs(there.lo[k] - here.lo[k]), std::fabs(there.hi[k] - here.hi[k])});
+    }
+    return off;
+  }
+
+  // Whether these cells are held where the scene says as exactly as the body's own are. Throws Error where
+  // they have nothing that a force, a spring or an attachment selects.
+  bool carries(const Body &b, const BodyMesh &mesh, const BodyMesh &own) const {
+    for (const Force &f : b.forces) share(f, mesh, def_.file);
+    for (const Spring &s : b.springs)
+      if (!s.at_point) select_skin(s.where, mesh, def_.file);
+    for (const Attach &a : b.attach) select_skin(a.where, mesh, def_.file);
+    return std::ranges::all_of(b.fixes, [&](const Fix &f) {
+      return held_off(f, mesh, own, mesh) <= held_off(f, own, own, mesh) + 1e-9 * own.size;
+    });
+  }
+
+  // Nothing in the scene is about the body's own cells or points.
+  bool may_have_lattice(size_t i) const {
+    const Body &b = def_.bodies[i];
+    const auto own_parts = [&](const auto &list) {
+      return !meshes_[i].filled && std::ranges::any_of(list, [](const auto &entry) {
+        return !entry.where.group.empty() || !entry.where.points.empty();
+      });
+    };
+    return b.lattice_open && b.fill.value_or(1) && meshes_[i].cell != DFM_CELL_HEX8 && !may_be_cut() &&
+           b.by_group.empty() && b.fields.empty() && b.nodal_bc.empty() && b.surface.mesh.empty() &&
+           !b.surface.boundary && !b.device && b.switches.empty() && b.rule.far.type.empty() &&
+           b.start.kind != StartKind::state && !own_parts(b.fixes) && !own_parts(b.forces) &&
+           !own_parts(b.springs) && !own_parts(b.attach);
+  }
+
   const Material &material(const Body &b) const {
     static const Material kNone = {};
     for (const Material &m : def_.materials)
@@ -219,16 +328,25 @@ class Reader {
   }
 
   // Of cells that are seen as several tetrahedra each, the edges are not those of these.
-  static void set_cells(const dfm_tetmesh_info &info, double poisson, BodyRegime &r) {
+  void set_mesh(const Body &b, const BodyMesh &mesh, BodyRegime &r) const {
+    const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
+    r.points = mesh.npoint;
+    double side[3];
+    for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
+    r.length = *std::max_element(side, side + 3);
+    r.thickness = *std::min_element(side, side + 3);
     r.edge = info.edge_median;
-    r.stiffens = bending_of_tetrahedra(std::clamp(poisson, 0.0, 0.49));
-    if (info.cell == DFM_CELL_HEX8) {
+    r.stiffens = bending_of_tetrahedra(std::clamp(material(b).def.poisson, 0.0, 0.49));
+    r.hexahedra = info.cell == DFM_CELL_HEX8;
+    if (r.hexahedra) {
       r.edge = std::cbrt(info.volume / info.ncell);
       r.stiffens = kBendingOfHexahedra;
     } else if (info.cell == DFM_CELL_TET10) {
       r.edge *= 2;
       r.stiffens = kBendingOfSecondOrder;
     }
+    r.edge *= b.scale;
+    r.cell_size = info.wave_path * b.scale;
   }
 
   BodyRegime regime(size_t i, const Measured &measured) {
@@ -238,14 +356,7 @@ class Reader {
     const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
     BodyRegime r;
     r.name = b.name;
-    r.points = mesh.npoint;
-    double side[3];
-    for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
-    r.length = *std::max_element(side, side + 3);
-    r.thickness = *std::min_element(side, side + 3);
-    set_cells(info, m.def.poisson, r);
-    r.edge *= b.scale;
-    r.cell_size = info.wave_path * b.scale;
+    set_mesh(b, mesh, r);
     r.young = m.def.young;
     r.poisson = m.def.poisson;
     r.density = m.def.density;
@@ -322,8 +433,24 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
   wish.duration = def.duration;
   wish.step = def.step;
   const Measured measured = read_costs();
-  const std::vector<BodyRegime> bodies = regimes(context, def, types, measured);
-  PlannedWay plan = plan_accuracy(bodies, measured, wish);
+  Reader reader(context, def, types);
+  std::vector<BodyRegime> bodies = reader.run(measured);
+  const std::vector<BodyRegime> own = bodies;
+  PlannedWay plan = plan_accuracy(own, measured, wish);
+  const Way of_own = plan.way;
+  std::vector<double> lattice(own.size(), 0);
+  bool unmeasured = false;
+  for (const double larger : {16.0, 4.0, 1.0}) {  // as many points as the tetrahedra have, or fewer
+    std::vector<BodyRegime> others;
+    std::vector<double> sizes;
+    if (!reader.lattices(own, 1 / (larger * kTetsOfHexahedron), measured, others, sizes, unmeasured))
+      continue;
+    PlannedWay other = plan_accuracy(others, measured, wish);
+    if (!wins(other, plan, wish)) continue;
+    plan = std::move(other);
+    bodies = std::move(others);
+    lattice = std::move(sizes);
+  }
   const char *const key = wish.target > 0 ? "accuracy" : "budget";
   if (!plan.found)
     fail(DFM_E_UNSUPPORTED,
@@ -336,6 +463,9 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
     tree[json::json_pointer(pointer)] = value;
     set[pointer] = value;
   };
+  if (unmeasured)
+    plan.assumed.push_back(
+        "no lattice is proposed where the costs of its hexahedra are not measured: run deform calibrate");
   bool implicit = false;
   for (size_t i = 0; i < bodies.size(); ++i) {
     const BodyWay &way = plan.way.bodies[i];
@@ -343,6 +473,11 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
     if (b.device == "gpu" && b.def.integrator == DFM_INTEGRATOR_AUTO)
       write(b.pointer + "/integrator", scheme_name(way.scheme));
     if (b.model_open) write(b.pointer + "/model/type", way.model);
+    if (lattice[i] > 0) {
+      if (b.fill) write(b.pointer + "/fill", nullptr);
+      write(b.pointer + "/lattice/size", lattice[i]);
+      plan.assumed.push_back(lattice_said(b, lattice[i], plan.way, of_own));
+    }
     if (way.scheme != Scheme::explicit_euler && def.world.integrator == DFM_INTEGRATOR_AUTO && !implicit) {
       write("/time/integrator", scheme_name(way.scheme));
       implicit = true;

@@ -18,19 +18,8 @@ std::vector<CostAt> read_sizes(const Node &sizes) {
   return out;
 }
 
-MeasuredModel read_model(const Node &node) {
-  MeasuredModel m;
-  m.id = node.at("model").text();
-  if (node.has("machine")) m.machine = node.member("machine").text();
-  m.steps_itself = node.at("steps_itself").boolean();
+void read_cells(const Node &node, MeasuredCells &m) {
   m.wave_steps = node.at("wave_steps").number(kNotNegative);
-  const Node errors = node.at("errors");
-  m.bends_little = errors.at("bends_little").number(kNotNegative);
-  m.bends_far = errors.at("bends_far").number(kNotNegative);
-  m.turns = errors.at("turns").number(kNotNegative);
-  m.lies = errors.at("lies").number(kNotNegative);
-  m.dents = errors.at("dents").number(kNotNegative);
-  m.dent_force = errors.at("dent_force").number(kNotNegative);
   const Node costs = node.at("costs");
   for (size_t s = 0; s < kSchemes; ++s) {
     const char *const scheme = scheme_name(static_cast<Scheme>(s));
@@ -38,6 +27,22 @@ MeasuredModel read_model(const Node &node) {
     for (size_t k = 0; k < kMeets; ++k)
       m.costs[s][k] = read_sizes(costs.member(scheme).at(meets_name(static_cast<Meets>(k))));
   }
+}
+
+MeasuredModel read_model(const Node &node) {
+  MeasuredModel m;
+  m.id = node.at("model").text();
+  if (node.has("machine")) m.machine = node.member("machine").text();
+  m.steps_itself = node.at("steps_itself").boolean();
+  read_cells(node, m);
+  if (node.has("hexahedra")) read_cells(node.member("hexahedra"), m.hexahedra);
+  const Node errors = node.at("errors");
+  m.bends_little = errors.at("bends_little").number(kNotNegative);
+  m.bends_far = errors.at("bends_far").number(kNotNegative);
+  m.turns = errors.at("turns").number(kNotNegative);
+  m.lies = errors.at("lies").number(kNotNegative);
+  m.dents = errors.at("dents").number(kNotNegative);
+  m.dent_force = errors.at("dent_force").number(kNotNegative);
   return m;
 }
 
