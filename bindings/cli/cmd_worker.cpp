@@ -61,10 +61,9 @@ std::string last_line(int file) {
   throw Failure(kBadInput, std::string("worker: ") + what + ": " + std::strerror(errno));
 }
 
-struct Streams { FILE *requests, *answers; };
+struct Streams { FILE *requests, *replies; };
 
-// Those that the worker was started with. Whoever reads or writes the standard streams from here on has
-// /dev/null.
+// The streams the worker was started with; the standard streams are /dev/null from here on.
 Streams take_streams() {
   const int in = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3), out = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
   const int null = ::open("/dev/null", O_RDWR | O_CLOEXEC);
@@ -94,7 +93,7 @@ void wait_for(pid_t child, int run, int caller) {
   }
 }
 
-void answer(const RunOptions &options, const Globals &globals, const Streams &streams) {
+void handle_requests(const RunOptions &options, const Globals &globals, const Streams &streams) {
   const int errors = memfd_create("errors", MFD_CLOEXEC);
   if (errors < 0) give_up("no memory file");
   int ends[2];
@@ -114,8 +113,8 @@ void answer(const RunOptions &options, const Globals &globals, const Streams &st
   reply.add("code", std::to_string(ended ? WEXITSTATUS(status) : -1));
   reply.add("signal", std::to_string(ended ? 0 : WTERMSIG(status))).add("said", quoted(last_line(errors)));
   close(errors);
-  std::fprintf(streams.answers, "%s\n", reply.text().c_str());
-  std::fflush(streams.answers);
+  std::fprintf(streams.replies, "%s\n", reply.text().c_str());
+  std::fflush(streams.replies);
 }
 
 void work(Globals &globals) {
@@ -131,7 +130,7 @@ void work(Globals &globals) {
     options.scene = request.get("scene");
     options.out = request.get("out");
     for (const JsonValue &value : request.list("set")) options.set.push_back(value.text);
-    answer(options, globals, streams);
+    handle_requests(options, globals, streams);
   }
 }
 

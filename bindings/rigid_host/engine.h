@@ -93,12 +93,12 @@ struct Member {
   virtual bool enabled() const = 0;
   virtual Facts facts() const = 0;
   virtual std::array<double, 2> idle_limits() const = 0;  // m/s, rad/s
-  Motion answer(const Motion &p) const {                  // M^-1 p at the start
-    return is_none(p.v) && is_none(p.w) ? Motion{} : answer_of(p);
+  Motion response(const Motion &p) const {                // M^-1 p at the start
+    return is_none(p.v) && is_none(p.w) ? Motion{} : response_of(p);
   }
 
  private:
-  Motion answer_of(const Motion &p) const;
+  Motion response_of(const Motion &p) const;
   dfm_rigid_state marked_{};
 };
 

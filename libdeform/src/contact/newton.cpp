@@ -214,8 +214,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     for (const Row &r : row_)
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
-    const double off = error(), due = std::max(residual_.relative, off / tolerance);
-    found_ = due <= set_.within;
+    const double off = error(), required = std::max(residual_.relative, off / tolerance);
+    found_ = required <= set_.within;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
       best = now;
@@ -231,13 +231,13 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
     const bool still = passes_ > 3 && moved <= set_.share * tolerance;
-    const bool stands = still && residual_.normal <= set_.stands * normal;
+    const bool stalled = still && residual_.normal <= set_.stalled_factor * normal;
     if (still && off <= tolerance) {
-      found_ = stood++ >= set_.firm && stands;
+      found_ = stood++ >= set_.firm && stalled;
       if (found_) break;
       scale_penalties(set_.grows);
     }
-    aim = stands ? off : now;
+    aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
     if (slow < 3) continue;
@@ -251,8 +251,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     put_rows();
     if (!host_->judge(residual_)) return false;
   }
-  if (found_ && residual_.due > 1) residual_.due = residual_.relative = 1;
-  return found_ || spent || residual_.due <= 1 || !gains(normal) || penalties_alone();
+  if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;
+  return found_ || spent || residual_.required <= 1 || !gains(normal) || penalties_alone();
 }
 
 // Whether normal impulses do more work than residuals of this size explain.
@@ -264,7 +264,7 @@ bool ContactNewton::gains(double normal) const {
     const double l = l_[3 * size_t{k}];
     all += l;
     const Vec3 u = times(k, v_.data(), kStride) + load3(&bias_[3 * size_t{k}]);
-    work += l * (u.x + rows_->rate[i] + given(l, &rows_->yields[3 * size_t{i}]));
+    work += l * (u.x + rows_->rate[i] + given(l, &rows_->compliance[3 * size_t{i}]));
   }
   return work > normal * all;
 }

@@ -45,7 +45,7 @@ struct NewtonSettings {
   double flat = 0.3;       // of the slope, that a line search may leave
   uint32_t trials = 24;    // of a line search
   double within = 0.3;     // of the tolerance, that a solve leaves
-  double stands = 20;      // of the tolerance, by which normals may miss what velocities no longer follow
+  double stalled_factor = 20;  // of the tolerance, by which normals may miss what velocities no longer follow
 };
 
 // What a solve asks of the laws, and of the one who knows tolerances and budget.
@@ -54,7 +54,7 @@ class SolveLaws {
   virtual ~SolveLaws() = default;
   // Evaluates the laws at the state's fn where slip and force lie on the line of ft_stop with these responses
   // [rows], 1/kg (friction/local_solve.cpp); their slopes there. False: a law has failed.
-  virtual bool answer(const double *response) = 0;
+  virtual bool evaluate_local(const double *response) = 0;
   virtual bool slopes() = 0;
   // The residual of rows.impulse at rows.y; the state then has the laws there. False: a law has failed.
   virtual bool judge(Residual &residual) = 0;

@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct Waits final : dfm::Aside::Job {
+struct Waits final : dfm::Background::Job {
   std::atomic<bool> begun{false}, end{false};
   void run() noexcept override {
     begun = true;
@@ -25,9 +25,9 @@ struct Waits final : dfm::Aside::Job {
   }
 };
 
-TEST(Aside, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
+TEST(Background, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
   const auto first = std::make_shared<Waits>();
-  dfm::Aside aside;
+  dfm::Background aside;
   aside.start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   auto second = std::make_shared<Waits>();
@@ -40,9 +40,9 @@ TEST(Aside, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
   while (!aside.finish(first, 1s)) {}
 }
 
-TEST(Aside, WhatIsDropped_GoesOnTheThread_OneAtATime) {
+TEST(Background, WhatIsDropped_GoesOnTheThread_OneAtATime) {
   const auto first = std::make_shared<Waits>();
-  dfm::Aside aside;
+  dfm::Background aside;
   aside.start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   std::thread::id freed_by[2];
@@ -62,7 +62,7 @@ TEST(Aside, WhatIsDropped_GoesOnTheThread_OneAtATime) {
 
 // On machines that tell how much of the time a thread works.
 #if defined(__linux__)
-struct Computes final : dfm::Aside::Job {
+struct Computes final : dfm::Background::Job {
   static double own_time() {
     timespec t{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -77,9 +77,9 @@ struct Computes final : dfm::Aside::Job {
 
 // It is waited for beyond the patience while it has a core. What is not waited for had less than half of the
 // last millisecond, since others took the core.
-TEST(Aside, JobThatRuns_IsWaitedFor) {
+TEST(Background, JobThatRuns_IsWaitedFor) {
   const auto job = std::make_shared<Computes>();
-  dfm::Aside aside;
+  dfm::Background aside;
   aside.start(job);
   while (!(job->took > 0)) std::this_thread::sleep_for(100us);
   const auto begin = std::chrono::steady_clock::now();
@@ -95,9 +95,9 @@ TEST(Aside, JobThatRuns_IsWaitedFor) {
 
 #if defined(__unix__)
 // The child has the list, but not the thread: it does the job itself, and ends.
-TEST(Aside, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
+TEST(Background, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
   const auto first = std::make_shared<Waits>();
-  dfm::Aside *aside = new dfm::Aside;
+  dfm::Background *aside = new dfm::Background;
   aside->start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   first->end = true;
@@ -119,9 +119,9 @@ TEST(Aside, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
 }
 #endif
 
-TEST(Aside, JobThatSleeps_IsNotWaitedFor) {
+TEST(Background, JobThatSleeps_IsNotWaitedFor) {
   const auto job = std::make_shared<Waits>();
-  dfm::Aside aside;
+  dfm::Background aside;
   aside.start(job);
   while (!job->begun) std::this_thread::sleep_for(1ms);
   EXPECT_FALSE(aside.finish(job, 5ms));
