@@ -187,7 +187,7 @@ void OdeEngine::find_ties() {
     }
 }
 
-void OdeEngine::give_back() {
+void OdeEngine::restore_forces() {
   for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
 }
 
@@ -337,7 +337,7 @@ class OdeEngine::Lent {
 };
 
 void OdeEngine::put_forces(double h) {
-  give_back();
+  restore_forces();
   for (size_t i = 0; i < members.size(); ++i) {
     const OdeMember &m = member(i);
     if (m.wakes) dBodyEnable(m.body);

@@ -117,7 +117,7 @@ void Engine::end(double time) {
     restore(true);
     stepped_ = false;  // friction forgets what it has seen of it
   }
-  if (time == begun_) give_back();
+  if (time == begun_) restore_forces();
   close();
   stepped_ = false;
   ended();

@@ -289,7 +289,7 @@ bool sub_step(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   step.driven.clear();
   step.guard.start();
   step.guard.planned = step.h;
-  step.ended = step.struck = false;
+  step.ended = step.in_impact = false;
   for (const PlannedStage &planned : w.plan.stages) {
     const auto start = std::chrono::steady_clock::now();
     const bool solves = planned.role == StageRole::solves;
