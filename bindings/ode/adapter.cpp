@@ -110,10 +110,10 @@ dfm_status Adapter::look() {
   std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
   for (auto &g : geoms_) TRY(follow(*g));
   bool restored = false;
-  TRY(clock_.evaluate(world_, restored));
+  TRY(clock_.poll(world_, restored));
   if (restored && !keeps_friction_) near_.forget();
   if (restored) keeps_friction_ = false;
-  TRY(states_.evaluate(world_));
+  TRY(states_.poll(world_));
   for (auto &b : bodies_) TRY(b->agree(restored, states_));
   return DFM_OK;
 }
@@ -240,13 +240,13 @@ dfm_status Adapter::step(double dt) {
   }
   ++steps_;
   // The status of the step comes first, then those of the bodies; all bodies are updated after an error.
-  dfm_status states_status = states_.evaluate(world_);
+  dfm_status states_status = states_.poll(world_);
   for (auto &b : bodies_) {
     const dfm_status of_body = b->after(status, states_);
     if (states_status == DFM_OK) states_status = of_body;
   }
   bool restored = false;
-  TRY(clock_.evaluate(world_, restored));
+  TRY(clock_.poll(world_, restored));
   return status != DFM_OK ? status : states_status;
 }
 

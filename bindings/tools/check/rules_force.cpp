@@ -234,7 +234,7 @@ struct Difference {
         step(h),
         best(size_t(at.n) * 2, HUGE_VAL),
         seen(size_t(at.n) * 2, 0.0) {}
-  // input(b, i): the varied number, size(i): its scale, given(row, i): the law's derivative, floor(i): about 0
+  // input(b, i): the varied number, size(i): its scale, given(row, i): the law's derivative, floor(i): zero
   template <class Input, class Size, class Given, class Floor>
   void run(Input input, Size size, Given given, Floor floor) {
     for (int decade = 2; decade <= 7; ++decade) {
