@@ -107,7 +107,7 @@ inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
 
 // The passes below select values instead of branching: real batches mix stick and slip, and a mispredicted
 // branch costs more than computing both sides. Returns whether any lane slips; with kinetic_stop these are
-// the lanes beyond the band, and answer() finds those that stop.
+// the lanes beyond the band, and forces() finds those that stop.
 struct Found { bool slips, odd; };
 template <bool kKineticStop>
 DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {

@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "broad/self_list.h"
-#include "core/aside.h"
+#include "core/background.h"
 #include "core/error.h"
 #include "cut/body_shape.h"
 #include "cut/cut.h"

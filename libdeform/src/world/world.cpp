@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/aside.h"
+#include "core/background.h"
 #include "plugin/context.h"
 #include "state/material.h"
 #include "state/obstacle.h"

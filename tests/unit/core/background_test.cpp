@@ -1,5 +1,5 @@
 // Jobs beside the steps: what a step does not wait for takes no memory.
-#include "core/aside.h"
+#include "core/background.h"
 
 #include <gtest/gtest.h>
 #if defined(__unix__)
@@ -27,28 +27,28 @@ struct Waits final : dfm::Background::Job {
 
 TEST(Background, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
   const auto first = std::make_shared<Waits>();
-  dfm::Background aside;
-  aside.start(first);
+  dfm::Background background;
+  background.start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   auto second = std::make_shared<Waits>();
-  aside.start(second);
-  EXPECT_FALSE(aside.finish(second, 0us));
+  background.start(second);
+  EXPECT_FALSE(background.finish(second, 0us));
   const std::weak_ptr<Waits> kept = second;
   second.reset();
   EXPECT_TRUE(kept.expired());
   first->end = true;
-  while (!aside.finish(first, 1s)) {}
+  while (!background.finish(first, 1s)) {}
 }
 
 TEST(Background, WhatIsDropped_GoesOnTheThread_OneAtATime) {
   const auto first = std::make_shared<Waits>();
-  dfm::Background aside;
-  aside.start(first);
+  dfm::Background background;
+  background.start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   std::thread::id freed_by[2];
   std::atomic<int> freed{0};
   for (std::thread::id &by : freed_by)
-    aside.drop(std::shared_ptr<int>(new int, [&](int *p) {
+    background.drop(std::shared_ptr<int>(new int, [&](int *p) {
       delete p;
       by = std::this_thread::get_id();
       ++freed;
@@ -79,12 +79,12 @@ struct Computes final : dfm::Background::Job {
 // last millisecond, since others took the core.
 TEST(Background, JobThatRuns_IsWaitedFor) {
   const auto job = std::make_shared<Computes>();
-  dfm::Background aside;
-  aside.start(job);
+  dfm::Background background;
+  background.start(job);
   while (!(job->took > 0)) std::this_thread::sleep_for(100us);
   const auto begin = std::chrono::steady_clock::now();
   const double had = job->took;
-  const bool done = aside.finish(job, 1ms);
+  const bool done = background.finish(job, 1ms);
   const double did = job->took - had;
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
   if (!done) {
@@ -97,36 +97,36 @@ TEST(Background, JobThatRuns_IsWaitedFor) {
 // The child has the list, but not the thread: it does the job itself, and ends.
 TEST(Background, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
   const auto first = std::make_shared<Waits>();
-  dfm::Background *aside = new dfm::Background;
-  aside->start(first);
+  dfm::Background *background = new dfm::Background;
+  background->start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   first->end = true;
-  while (!aside->finish(first, 1s)) {}
+  while (!background->finish(first, 1s)) {}
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
     alarm(10);  // ends a child that waits for what is not there
     const auto job = std::make_shared<Waits>();
-    aside->start(job);
-    const bool done = aside->finish(job, 1ms);
-    delete aside;
+    background->start(job);
+    const bool done = background->finish(job, 1ms);
+    delete background;
     _exit(done || job->begun ? 1 : 0);
   }
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_EQ(status, 0);
-  delete aside;
+  delete background;
 }
 #endif
 
 TEST(Background, JobThatSleeps_IsNotWaitedFor) {
   const auto job = std::make_shared<Waits>();
-  dfm::Background aside;
-  aside.start(job);
+  dfm::Background background;
+  background.start(job);
   while (!job->begun) std::this_thread::sleep_for(1ms);
-  EXPECT_FALSE(aside.finish(job, 5ms));
+  EXPECT_FALSE(background.finish(job, 5ms));
   job->end = true;
-  while (!aside.finish(job, 1s)) {}
+  while (!background.finish(job, 1s)) {}
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "core/aside.h"
+#include "core/background.h"
 
 #include <algorithm>
 #include <deque>
