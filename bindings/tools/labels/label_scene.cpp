@@ -41,7 +41,7 @@ class Maker {
     read();
     reduce();
     surfaces_ = surfaces_of(volume_, target_, o_.passes);
-    report_.restored = surfaces_.restore_start;
+    report_.restored = surfaces_.restored;
     report_.crossing = surfaces_.crossing;
     cli::make_folder(o_.out);
     cli::make_folder(o_.out + "/surfaces");

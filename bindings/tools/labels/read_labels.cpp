@@ -338,7 +338,7 @@ Volume read_labels(const std::string &path, std::string_view bytes, double unit)
     out.origin[k] *= unit;
     for (double &x : out.axis[k]) x *= unit;
   }
-  check_axes(told, out);
+  check_axes(where, out);
   read_voxels(path, bytes, stored, out);
   return out;
 }
