@@ -255,20 +255,20 @@ void OdeEngine::pull_awake() {
 
 // A body falls asleep when all bodies connected to it have been idle for long enough.
 void OdeEngine::rest(double h) {
-  std::vector<uint8_t> tired(saved_.size(), 0);
+  std::vector<uint8_t> still(saved_.size(), 0);
   bool any = false;
   for (size_t i = 0; i < saved_.size(); ++i) {
     Saved &s = saved_[i];
     Member *const m = i < members.size() ? members[i] : nullptr;
-    any |= tired[i] = tire(s.body, h, share_of_step(h), m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
+    any |= still[i] = tire(s.body, h, share_of_step(h), m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
   }
   if (!any) return;
   std::vector<size_t> awake;
   for (size_t i = 0; i < saved_.size(); ++i)
-    if (!tired[i] && dBodyIsEnabled(saved_[i].body)) awake.push_back(i);
-  flood(std::move(awake), [&](size_t i) { return std::exchange(tired[i], 0) != 0; });
+    if (!still[i] && dBodyIsEnabled(saved_[i].body)) awake.push_back(i);
+  flood(std::move(awake), [&](size_t i) { return std::exchange(still[i], 0) != 0; });
   for (size_t i = 0; i < saved_.size(); ++i) {
-    if (!tired[i]) continue;
+    if (!still[i]) continue;
     dBodyDisable(saved_[i].body);
     dBodySetLinearVel(saved_[i].body, 0, 0, 0);
     dBodySetAngularVel(saved_[i].body, 0, 0, 0);
