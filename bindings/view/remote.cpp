@@ -88,7 +88,7 @@ void Remote::send_request(const char *what, const std::function<void(cli::JsonOb
   cli::JsonObject request;
   request.add("do", cli::quoted(what));
   if (more) more(request);
-  receiver_.send_request(request, replaces);
+  receiver_.send(request, replaces);
 }
 
 bool Remote::steers() const {
