@@ -237,7 +237,7 @@ class Engine:
     def _scene(self, folder: pathlib.Path, file: str, values: Mapping[str, Any], limit: float) -> Results:
         request = {"scene": file, "out": str(folder),
                    "set": [f"{pointer}={json.dumps(value)}" for pointer, value in values.items()]}
-        answer = self._request(request, limit)
+        answer = self._call(request, limit)
         if answer["signal"] or answer["code"] == INTERRUPTED:
             raise Died(f"the run was ended by {_signal(answer['signal'])}")
         if answer["code"]:
@@ -246,7 +246,7 @@ class Engine:
             raise Failed("; ".join(clauses) or f"the run ended with exit code {answer['code']}")
         return Results(folder, json.loads((folder / "summary.json").read_text()))
 
-    def _request(self, request: Mapping[str, Any], limit: float) -> Any:
+    def _call(self, request: Mapping[str, Any], limit: float) -> Any:
         worker = self.process or self._start(["worker"], stdin=subprocess.PIPE)
         to, replies = worker.stdin, worker.stdout
         assert to is not None and replies is not None
