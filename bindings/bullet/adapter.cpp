@@ -9,8 +9,7 @@
 namespace dfm_bullet_detail {
 namespace {
 
-// Finds the adapter of a Bullet world. Bullet's callbacks get the world alone, and its user info belongs to
-// the user.
+// The adapter of a Bullet world: callbacks get the world alone, and its user info belongs to the user.
 struct Worlds {
   std::mutex mutex;
   std::unordered_map<const btDynamicsWorld *, Adapter *> all;
@@ -179,8 +178,8 @@ dfm_status Adapter::look(double h) {
   if (!props_.empty()) std::erase_if(props_, [&](const auto &p) { return !by_id_.count(p.first); });
   for (auto &o : objects_) TRY(follow(*o, h));
   bool restored = false;
-  TRY(clock_.ask(world_, restored));
-  TRY(states_.ask(world_));
+  TRY(clock_.poll(world_, restored));
+  TRY(states_.poll(world_));
   for (auto &o : objects_)
     if (o->body) TRY(o->body->agree(restored, states_));
   return DFM_OK;
@@ -277,10 +276,10 @@ dfm_status Adapter::follow(Object &o, double h) {
   if (o.body || o.obstacles.empty() || h == 0) return DFM_OK;
   const Pose target = from_bullet(o.id->getWorldTransform());
   const btRigidBody *const body = btRigidBody::upcast(o.id);
-  const bool told = body && body->isKinematicObject();
-  o.pose = told ? towards(o.pose, target, from_bullet(body->getLinearVelocity()),
-                          from_bullet(body->getAngularVelocity()), h)
-                : target;
+  const bool driven = body && body->isKinematicObject();
+  o.pose = driven ? towards(o.pose, target, from_bullet(body->getLinearVelocity()),
+                            from_bullet(body->getAngularVelocity()), h)
+                  : target;
   for (size_t i = 0; i < o.obstacles.size(); ++i)
     if (o.obstacles[i]) TRY(dfm_rigid_detail::follow(o.obstacles[i], o.sent[i], o.pose * o.local[i]));
   return DFM_OK;
@@ -297,14 +296,14 @@ dfm_status Adapter::tick(double h) {
     status = dfm_world_step(world_, h, &trouble_);
   }
   ++ticks_;
-  dfm_status told = states_.ask(world_);
+  dfm_status states_status = states_.poll(world_);
   for (auto &o : objects_) {
     const dfm_status of_body = o->body ? o->body->after(status, states_) : dfm_status{DFM_OK};
-    if (told == DFM_OK) told = of_body;
+    if (states_status == DFM_OK) states_status = of_body;
   }
   bool restored = false;
-  TRY(clock_.ask(world_, restored));
-  return status != DFM_OK ? status : told;
+  TRY(clock_.poll(world_, restored));
+  return status != DFM_OK ? status : states_status;
 }
 
 dfm_status Adapter::step(double dt, int max_sub_steps, double fixed, int *ticks) {

@@ -371,7 +371,7 @@ void BulletEngine::run(double h) {
     flags_.push_back(s.body->getFlags());
     s.body->setFlags(flags_.back() & ~kGyroscopic);
     if (!s.member || s.member->kind == Member::still) continue;
-    const Motion change = s.member->answer(s.member->impulse);
+    const Motion change = s.member->response(s.member->impulse);
     s.body->setLinearVelocity(s.body->getLinearVelocity() + to_bullet(change.v));
     s.body->setAngularVelocity(s.body->getAngularVelocity() + to_bullet(change.w));
   }
@@ -400,7 +400,7 @@ void BulletEngine::finish(BulletMember &m, double h) {
   }
   const Vec x = load(m.start.position);
   if (m.kind == Member::free) {
-    const Vec v = m.plain.v + m.answer(m.impulse).v;
+    const Vec v = m.plain.v + m.response(m.impulse).v;
     store(m.ended.velocity, v);
     store(m.ended.position, x + h * v);
     return;

@@ -95,7 +95,7 @@ class BulletEngine : public Engine {
   void run(double h) override;
   void turned(Member &m, Quat to, Vec spin) override;
   void rest(double h) override;
-  void give_back() override {}  // forces were never taken from the bodies
+  void restore_forces() override {}  // forces were never taken from the bodies
   void close() override {}
 
  private:

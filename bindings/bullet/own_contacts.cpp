@@ -17,18 +17,18 @@ bool before(const btBroadphasePair &a, const btBroadphasePair &b) {
 }
 
 bool may_touch(const btBroadphaseProxy &a, const btBroadphaseProxy &b) {
-  const auto stands = [](const btBroadphaseProxy &p) {
+  const auto is_static = [](const btBroadphaseProxy &p) {
     return static_cast<const btCollisionObject *>(p.m_clientObject)->isStaticOrKinematicObject();
   };
   return (a.m_collisionFilterGroup & b.m_collisionFilterMask) != 0 &&
-         (b.m_collisionFilterGroup & a.m_collisionFilterMask) != 0 && !(stands(a) && stands(b));
+         (b.m_collisionFilterGroup & a.m_collisionFilterMask) != 0 && !(is_static(a) && is_static(b));
 }
 
 std::pair<int, int> bodies_of(const btPersistentManifold &m) {
   return {m.getBody0()->getUserIndex(), m.getBody1()->getUserIndex()};
 }
 
-constexpr double kMost = 1e9;
+constexpr double kMax = 1e9;
 // A count, or the number of a body, from a snapshot; -1: it is out of range (a snapshot of another program).
 int number(double x, double most) { return x >= 0 && x <= most ? int(x) : -1; }
 
@@ -52,7 +52,7 @@ btManifoldPoint point_of(const double *in) {
   p.m_prevRHS = btScalar(in[12]);
   p.m_appliedImpulseLateral1 = btScalar(in[13]);
   p.m_appliedImpulseLateral2 = btScalar(in[14]);
-  p.m_lifeTime = std::max(number(in[15], kMost), 0);
+  p.m_lifeTime = std::max(number(in[15], kMax), 0);
   return p;
 }
 
@@ -118,7 +118,7 @@ bool OwnContacts::are_of_now(const double *in) const {
   return std::memcmp(in, now_.data(), now_.size() * sizeof(double)) == 0;
 }
 
-void OwnContacts::put_back(const double *in) {
+void OwnContacts::restore(const double *in) {
   const int n = number(in[0], double(room_ - 1));
   now_.assign(in, in + 1 + std::max(n, 0));
   put_ = true;
@@ -139,7 +139,7 @@ void OwnContacts::fill() {
   const int n = dispatcher_.getNumManifolds();
   for (int i = 0; i < n; ++i) manifolds[i]->clearManifold();
   for (size_t at = 1; at + kHead <= now_.size();) {
-    const std::pair bodies(number(now_[at], kMost), number(now_[at + 1], kMost));
+    const std::pair bodies(number(now_[at], kMax), number(now_[at + 1], kMax));
     const int points = number(now_[at + 2], MANIFOLD_CACHE_SIZE);
     at += kHead;
     if (points <= 0 || at + size_t(points) * kPoint > now_.size()) return;

@@ -39,7 +39,7 @@ class OwnContacts {
   uint32_t room() const { return room_; }
   void write(double *out, bool last);  // last: are_of_now() compares with them
   bool are_of_now(const double *in) const;
-  void put_back(const double *in);         // with the next collision
+  void restore(const double *in);          // with the next collision
   void collided(btCollisionWorld &world);  // after the world's collision, before its islands
 
  private:

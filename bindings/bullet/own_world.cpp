@@ -30,7 +30,7 @@ class BulletWorld : public OwnWorld {
   uint32_t memory() const override { return contacts_.room(); }
   void remember(double *out, bool last) override { contacts_.write(out, last); }
   bool remembers(const double *in) const override { return contacts_.are_of_now(in); }
-  void recall(const double *in) override { contacts_.put_back(in); }
+  void recall(const double *in) override { contacts_.restore(in); }
   void set_correction(double share) override {
     world_.getSolverInfo().m_erp = world_.getSolverInfo().m_erp2 = btScalar(share);
   }

@@ -255,11 +255,11 @@ int explain(const Options &options, Globals &globals, MeasureEffects *measure) {
       std::printf(", bounded by point %s of \"%s\"", step->get("worst_point").c_str(), body.c_str());
     if (const std::string reason = step->get("reason"); !reason.empty()) std::printf(": %s", reason.c_str());
     std::printf("\n");
-    const double stable = step->scalar("stable_s"), asked = scene.settings().step;
-    if (asked > 0 && stable > 0)
-      std::printf("  the scene asks for %g s: %s%g sub-step%s each\n", asked,
-                  asked > stable ? "at least " : "", std::ceil(asked / stable - 1e-9),
-                  asked > stable ? "s" : "");
+    const double stable = step->scalar("stable_s"), requested = scene.settings().step;
+    if (requested > 0 && stable > 0)
+      std::printf("  the scene asks for %g s: %s%g sub-step%s each\n", requested,
+                  requested > stable ? "at least " : "", std::ceil(requested / stable - 1e-9),
+                  requested > stable ? "s" : "");
   }
   return kDone;
 }

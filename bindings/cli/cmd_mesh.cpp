@@ -51,7 +51,7 @@ bool open(MeshSession &s, const std::string &file, bool as_surface) {
 int info(const Globals &globals, const std::string &file) {
   MeshSession s(globals);
   {
-    const Patience patience(told(globals), "reading " + file);
+    const Patience patience(show_progress(globals), "reading " + file);
     if (!open(s, file, false)) return fail(dfm_last_error());
   }
   return report_mesh(globals, file, s, true);
@@ -117,7 +117,7 @@ int convert(const Globals &globals, const std::string &in, const std::string &ou
   MeshSession s(globals);
   std::vector<std::string> lost;
   {
-    const Patience patience(told(globals), "converting " + in);
+    const Patience patience(show_progress(globals), "converting " + in);
     if (const int failed = convert_file(s, in, out, lost)) return failed;
   }
   return report_mesh(globals, out, s, false, lost);
@@ -156,7 +156,7 @@ int make(const Globals &globals, const Shape &shape) {
                 "mesh fill SURFACE --out " +
                 filling_file(shape.out));
   {
-    const Patience patience(told(globals), "making " + shape.out);
+    const Patience patience(show_progress(globals), "making " + shape.out);
     const dfm_status made =
         surface ? dfm_trimesh_make(s.context, shape.kind == "bricks" ? "beam" : shape.kind.c_str(),
                                    size.data(), shape.cells, &s.surface)

@@ -1,5 +1,4 @@
-// What the subcommands of `deform mesh` share: a quiet context with a mesh of either kind, and
-// its report.
+// Common to the subcommands of `deform mesh`: a quiet context with a mesh of either kind, and its report.
 #pragma once
 #include <string>
 #include <vector>
@@ -27,17 +26,16 @@ struct MeshSession {
 
 // Reports the mesh of the session. asked: all that is known, as a table; else one line and, on stderr, the
 // warnings. --json: everything. `notes` come with the warnings: what a conversion could not keep.
-int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
+int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool show,
                 const std::vector<std::string> &notes = {});
 
 // Where `out` cannot hold how much of each cell is material, and the mesh knows it: the sentence about it.
 std::string lost_shares(dfm_tetmesh cells, const std::string &out);
-// A mesh that is longer than most bodies: what to do if its file, which names no unit, is in millimeters.
-// Else empty.
+// A hint for a mesh longer than most bodies, whose file names no unit: it may be in millimeters. Else empty.
 std::string unit_hint(const double lo[3], const double hi[3]);
 std::vector<std::string> lines_of(const char *text);  // what the library's infos hold as one text
 // whether a terminal hears how long it takes
-inline bool told(const Globals &globals) { return !globals.quiet && !globals.json; }
+inline bool show_progress(const Globals &globals) { return !globals.quiet && !globals.json; }
 
 // How a file name ending is written: cells (.msh .msh2 .mesh), a surface (.obj .ply .stl .off) or either
 // (.vtk .vtu, anything unknown).

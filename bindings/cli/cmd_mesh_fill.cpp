@@ -108,7 +108,7 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
   Filled filled;
   const Clock::time_point begin = Clock::now();
   {
-    const Patience patience(told(globals), "filling " + in);
+    const Patience patience(show_progress(globals), "filling " + in);
     if (!s.context) return fail(dfm_last_error());
     std::string sentence;
     if (!import_surface(in, s, sentence)) return fail(sentence);

@@ -368,16 +368,15 @@ std::vector<std::string> lines_of(const char *text) {
   return out;
 }
 
-int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool asked,
+int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool show,
                 const std::vector<std::string> &notes) {
   Report r;
-  if (!(session.cells ? describe_cells(session.cells, asked, r)
-                      : describe_surface(session.surface, asked, r)))
+  if (!(session.cells ? describe_cells(session.cells, show, r) : describe_surface(session.surface, show, r)))
     return fail(dfm_last_error());
-  if (const std::string hint = unit_hint(r.lo, r.hi); asked && !hint.empty()) r.warnings.push_back(hint);
+  if (const std::string hint = unit_hint(r.lo, r.hi); show && !hint.empty()) r.warnings.push_back(hint);
   if (globals.json) {
     print_json(file, r, notes);
-  } else if (asked) {
+  } else if (show) {
     print_table(file, r);
   } else if (!globals.quiet) {
     for (const std::string &w : r.warnings) std::fprintf(stderr, "deform: warning: %s\n", shown(w).c_str());

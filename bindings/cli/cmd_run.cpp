@@ -56,7 +56,7 @@ double wall_seconds() {
 class Schedule {
  public:
   explicit Schedule(double interval) : interval_(interval) {}
-  bool due(double t) {
+  bool is_time(double t) {
     if (interval_ <= 0 || t < double(next_) * interval_ - 1e-9 * interval_) return false;
     next_ = uint64_t(std::floor(t / interval_ + 1e-9)) + 1;
     return true;
@@ -67,7 +67,7 @@ class Schedule {
   uint64_t next_ = 0;
 };
 
-bool asks_for_spoiled_start(const SceneFile &scene) {
+bool requests_spoiled_start(const SceneFile &scene) {
   for (size_t b = 0; b < scene.bodies().size(); ++b)
     if (!scene.value("/bodies/" + std::to_string(b) + "/start").empty()) return true;
   return false;
@@ -86,7 +86,7 @@ class Runner {
         world_(scene.world()),
         duration_(scene.settings().duration),
         static_(scene.value("/time/mode") == "\"static\""),
-        spoiled_(asks_for_spoiled_start(scene)),
+        spoiled_(requests_spoiled_start(scene)),
         check_every_step_(options.check || scene.settings().check),
         progress_(!globals.quiet && !globals.json),
         outputs_(scene, options.out),
@@ -405,20 +405,20 @@ class Runner {
     const double t = result_.simulated;
     if (!static_ && !result_.hold_begun && t >= result_.start + duration_ / 2)
       result_.hold_begun = dfm_world_hold_begin(world_) == DFM_OK;
-    at_record_ = record_.due(t - result_.start);
-    const bool frame_due = frames_ && frame_.due(t - result_.start);
+    at_record_ = record_.is_time(t - result_.start);
+    const bool draws_frame = frames_ && frame_.is_time(t - result_.start);
     if (comparison_) comparison_->look(scene_);
     for (; saved_ < options_.saves.size() && t - result_.start >= options_.saves[saved_].at * (1 - 1e-9);
          ++saved_)
       write_state(scene_, options_.saves[saved_].path);
-    if (at_record_ || frame_due || check_every_step_) {
+    if (at_record_ || draws_frame || check_every_step_) {
       if (!start_state) count_time();
       if (at_record_) record();
       if (at_record_ || check_every_step_) check(start_state);
-      if (frame_due) draw(t);
+      if (draws_frame) draw(t);
       mark_ = {wall_seconds(), cpu_seconds()};
     }
-    if (result_.steps % 16 != 0 && !frame_due && last_step_ < kSlowStep) return;
+    if (result_.steps % 16 != 0 && !draws_frame && last_step_ < kSlowStep) return;
     const double spent = result_.wall + wall_seconds() - mark_.wall;
     progress_.show(t - result_.start, duration_,
                    result_.steps && spent > 0 ? double(result_.steps) / spent : 0, result_.pictures,

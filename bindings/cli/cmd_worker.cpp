@@ -57,18 +57,17 @@ std::string last_line(int file) {
   return all.substr(all.rfind('\n') + 1);
 }
 
-[[noreturn]] void give_up(const char *what) {
+[[noreturn]] void fail_worker(const char *what) {
   throw Failure(kBadInput, std::string("worker: ") + what + ": " + std::strerror(errno));
 }
 
-struct Streams { FILE *requests, *answers; };
+struct Streams { FILE *requests, *replies; };
 
-// Those that the worker was started with. Whoever reads or writes the standard streams from here on has
-// /dev/null.
+// The streams the worker was started with; the standard streams are /dev/null from here on.
 Streams take_streams() {
   const int in = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3), out = fcntl(STDOUT_FILENO, F_DUPFD_CLOEXEC, 3);
   const int null = ::open("/dev/null", O_RDWR | O_CLOEXEC);
-  if (in < 0 || out < 0 || null < 0) give_up("no streams");
+  if (in < 0 || out < 0 || null < 0) fail_worker("no streams");
   dup2(null, STDIN_FILENO);
   dup2(null, STDOUT_FILENO);
   close(null);
@@ -86,7 +85,7 @@ bool read_line(FILE *file, std::string &line) {
 void wait_for(pid_t child, int run, int caller) {
   pollfd ends[] = {{run, 0, 0}, {caller, 0, 0}};
   while (!(ends[0].revents & POLLHUP)) {
-    if (poll(ends, 2, -1) < 0 && errno != EINTR) give_up("poll");
+    if (poll(ends, 2, -1) < 0 && errno != EINTR) fail_worker("poll");
     if (ends[1].revents & POLLHUP) {
       kill(child, SIGKILL);
       return;
@@ -94,28 +93,28 @@ void wait_for(pid_t child, int run, int caller) {
   }
 }
 
-void answer(const RunOptions &options, const Globals &globals, const Streams &streams) {
+void handle_requests(const RunOptions &options, const Globals &globals, const Streams &streams) {
   const int errors = memfd_create("errors", MFD_CLOEXEC);
-  if (errors < 0) give_up("no memory file");
+  if (errors < 0) fail_worker("no memory file");
   int ends[2];
-  if (pipe2(ends, O_CLOEXEC) != 0) give_up("no pipe");
+  if (pipe2(ends, O_CLOEXEC) != 0) fail_worker("no pipe");
   const pid_t worker = getpid();
   const pid_t child = fork();
-  if (child < 0) give_up("no process");
+  if (child < 0) fail_worker("no process");
   if (child == 0) run_in_child(options, globals, worker, errors);
   close(ends[1]);
   wait_for(child, ends[0], fileno(streams.requests));
   close(ends[0]);
   int status = 0;
   while (waitpid(child, &status, 0) < 0)
-    if (errno != EINTR) give_up("waitpid");
+    if (errno != EINTR) fail_worker("waitpid");
   const bool ended = WIFEXITED(status);
   JsonObject reply;
   reply.add("code", std::to_string(ended ? WEXITSTATUS(status) : -1));
   reply.add("signal", std::to_string(ended ? 0 : WTERMSIG(status))).add("said", quoted(last_line(errors)));
   close(errors);
-  std::fprintf(streams.answers, "%s\n", reply.text().c_str());
-  std::fflush(streams.answers);
+  std::fprintf(streams.replies, "%s\n", reply.text().c_str());
+  std::fflush(streams.replies);
 }
 
 void work(Globals &globals) {
@@ -131,7 +130,7 @@ void work(Globals &globals) {
     options.scene = request.get("scene");
     options.out = request.get("out");
     for (const JsonValue &value : request.list("set")) options.set.push_back(value.text);
-    answer(options, globals, streams);
+    handle_requests(options, globals, streams);
   }
 }
 

@@ -30,8 +30,8 @@ void print_cost(const EffectCost &c) {
 void print_laws(const JsonValue &plan) {
   if (!plan.list("laws").empty()) std::printf("effects of each law\n");
   for (const JsonValue &law : plan.list("laws")) {
-    const std::string name = law.get("name"), asked = law.get("asked");
-    if (asked != name) std::printf("  %-20s  in place of %s\n", name.c_str(), asked.c_str());
+    const std::string name = law.get("name"), requested = law.get("asked");
+    if (requested != name) std::printf("  %-20s  in place of %s\n", name.c_str(), requested.c_str());
     for (const JsonValue &effect : law.list("effects")) {
       const bool works = effect.get("works") == "true";
       const char *const word = effect.get("used") == "true" ? "used" : works ? "on, not asked for" : "idle";

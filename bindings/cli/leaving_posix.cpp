@@ -87,7 +87,7 @@ void end(Sentence &s) {
 }
 
 // Of exit, quick_exit and _exit, whatever code they were given.
-void on_leave() {
+void at_exit_handler() {
   if (!undecided) return;
   undecided = 0;
   Sentence s;
@@ -172,8 +172,8 @@ void catch_crashes() {
 
 void guard_leaving() {
   undecided = 1;
-  std::atexit(on_leave);
-  std::at_quick_exit(on_leave);
+  std::atexit(at_exit_handler);
+  std::at_quick_exit(at_exit_handler);
   catch_crashes();
   catch_interrupts();
 }
@@ -201,7 +201,7 @@ void came_back() { alarm(0); }
 // plugin's _exit, too; a system call in its own machine code they do not.
 #if DEFORM_OWN_EXIT
 extern "C" [[gnu::visibility("default")]] void _exit(int code) {  // noreturn by its declaration
-  cli::on_leave();
+  cli::at_exit_handler();
   cli::end_now(code);
 }
 extern "C" [[gnu::visibility("default")]] void _Exit(int code) noexcept { _exit(code); }

@@ -21,7 +21,7 @@ void say(const char *end) {
                folder.c_str());
 }
 
-void on_leave() {
+void at_exit_handler() {
   if (!undecided.exchange(false)) return;
   say("ended the process before its work was done; a plugin must return a status instead");
   std::_Exit(kEndedByPlugin);
@@ -37,7 +37,7 @@ LONG WINAPI on_crash(EXCEPTION_POINTERS *) {
 
 void guard_leaving() {
   undecided = true;
-  std::atexit(on_leave);
+  std::atexit(at_exit_handler);
   SetUnhandledExceptionFilter(on_crash);
 }
 

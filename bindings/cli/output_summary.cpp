@@ -128,8 +128,7 @@ void Checker::check(bool start_state) {
   }
   checks_.finite = checks_.finite && finite;
   if (!finite) return;
-  // The products of exact signs leave the range of double beyond this; no such state is an
-  // answer to anything.
+  // Beyond this, products in exact signs overflow double; no valid state reaches it.
   if (reach > kExactReach) {
     if (!std::exchange(checks_.too_far, true))
       keep_warning("a body is further than 1e90 m away: crossings cannot be counted in such a state");
@@ -424,9 +423,8 @@ void print_shattered(const SceneFile &scene) {
 // Why a run is slow, where contact is why and its mesh can be made coarser: slower than a fifth of real time,
 // half of it in contact of a hundred points.
 void print_contact_share(const SceneFile &scene, const RunResult &run, uint32_t contacts_max) {
-  constexpr double kSlow = 5, kLeast = 0.2, kShare = 0.5, kMany = 100;
-  if (run.wall < kLeast || run.wall < kSlow * (run.simulated - run.begun) || run.contacts_mean < kMany)
-    return;
+  constexpr double kSlow = 5, kMin = 0.2, kShare = 0.5, kMany = 100;
+  if (run.wall < kMin || run.wall < kSlow * (run.simulated - run.begun) || run.contacts_mean < kMany) return;
   double contact = 0;
   for (const dfm_stage_time &s : profile(scene))
     if (std::string_view(s.name) == "contact+friction") contact += s.seconds;
@@ -455,20 +453,20 @@ void print_undamped(const SceneFile &scene) {
 }
 
 void print_stream(const SceneFile &scene, const RtpSender::Report &sent) {
-  constexpr size_t kMost = 5;
+  constexpr size_t kMax = 5;
   std::printf("streamed: %llu frames, %llu packets, %.3g MB, %.2g ms a frame; %.0f %% reported as lost\n",
               static_cast<unsigned long long>(sent.frames), static_cast<unsigned long long>(sent.packets),
               1e-6 * double(sent.bytes), 1e3 * sent.seconds / double(sent.frames), 100 * sent.lost);
   auto rates = stream_rates(scene, sent);
   std::stable_sort(rates.begin(), rates.end(),
                    [](const auto &a, const auto &b) { return a.second > b.second; });
-  for (size_t i = 0; i < rates.size() && i < kMost; ++i)
+  for (size_t i = 0; i < rates.size() && i < kMax; ++i)
     std::printf("streamed of %s: %.4g kbit/s\n", rates[i].first.c_str(), rates[i].second);
 }
 
 void print_swaps(const SceneFile &scene, const RunResult &run) {
-  constexpr size_t kMost = 20;
-  for (size_t i = 0; i < run.swaps.size() && i < kMost; ++i) {
+  constexpr size_t kMax = 20;
+  for (size_t i = 0; i < run.swaps.size() && i < kMax; ++i) {
     const dfm_swap &s = run.swaps[i];
     const std::string &body = scene.name_of(s.body);
     if (s.flags & DFM_SWAP_REFUSED)
@@ -478,8 +476,8 @@ void print_swaps(const SceneFile &scene, const RunResult &run) {
       std::printf("t = %g s: %s changes from %s to %s: elastic energy from %s to %s\n", s.t, body.c_str(),
                   s.from, s.to, joules(s.elastic_before).c_str(), joules(s.elastic_after).c_str());
   }
-  if (run.swaps.size() > kMost)
-    std::printf("and %zu more changes of models, which summary.json lists\n", run.swaps.size() - kMost);
+  if (run.swaps.size() > kMax)
+    std::printf("and %zu more changes of models, which summary.json lists\n", run.swaps.size() - kMax);
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 
 constexpr const char *kFormat = "deform-recording", *kVersion = "1", *kByHand = "2",
                      *kHead = "t,file,state_hash";
-constexpr uint64_t kMostIndex = uint64_t{1} << 28;  // bytes
+constexpr uint64_t kMaxIndex = uint64_t{1} << 28;  // bytes
 
 std::string run_file(const SceneFile &scene, const RunOptions &options, bool by_hand) {
   std::vector<std::string> set;
@@ -69,14 +69,14 @@ Recording read_recording(const std::string &run) {
                                  "--out " +
                                  run + "`");
   JsonValue text;
-  if (!parse_json(read_file(file, kMostIndex, "a recording's run.json"), text) ||
+  if (!parse_json(read_file(file, kMaxIndex, "a recording's run.json"), text) ||
       text.get("format") != kFormat || (text.get("version") != kVersion && text.get("version") != kByHand))
     throw Failure(kBadInput, file + ": not a recording that this version reads; record the run again");
   Recording out;
   out.scene = text.get("scene");
   out.jitter = std::strtoull(text.get("jitter").c_str(), nullptr, 10);
   for (const JsonValue &s : text.list("set")) out.set.push_back(s.text);
-  std::istringstream rows(read_file(index, kMostIndex, "a recording's states.csv"));
+  std::istringstream rows(read_file(index, kMaxIndex, "a recording's states.csv"));
   std::string row;
   for (std::getline(rows, row); std::getline(rows, row);) {
     const size_t first = row.find(','), second = row.find(',', first + 1);
@@ -86,7 +86,7 @@ Recording read_recording(const std::string &run) {
   }
   if (text.get("version") == kByHand) {
     const std::string acts = folder + "/acts.jsonl";
-    std::istringstream lines(read_file(acts, kMostIndex, "a recording's acts.jsonl"));
+    std::istringstream lines(read_file(acts, kMaxIndex, "a recording's acts.jsonl"));
     while (std::getline(lines, row)) {
       RecordedAct act;
       if (!parse_json(row, act.line)) throw Failure(kBadInput, acts + ": damaged; record the run again");

@@ -22,9 +22,9 @@ constexpr std::chrono::milliseconds kRound(600);  // and half of one: who joins 
 constexpr std::chrono::milliseconds kTick(5);     // within which what comes is heard
 constexpr int kPatience = 5;                      // ms
 constexpr double kTooMuch = 0.1, kLittle = 0.02;  // share lost: frames become rarer, and more frequent again
-constexpr size_t kMostRequests = 256;             // that wait; what comes beyond comes again
-constexpr size_t kMostSteerers = 4096;            // that a run knows
-constexpr int kMostHeard = 256;                   // datagrams at a time
+constexpr size_t kMaxRequests = 256;              // that wait; what comes beyond comes again
+constexpr size_t kMaxSteerers = 4096;             // that a run knows
+constexpr int kMaxHeard = 256;                    // datagrams at a time
 constexpr double kTicks = 90000;                  // of the timestamp, in a second
 constexpr double kFrom1900 = 2208988800.0;        // s, to 1970
 constexpr auto kListens = std::chrono::seconds(5);  // who steers is gone after that
@@ -187,12 +187,11 @@ void RtpSender::send_report(bool ends) {
   os::send(socket_, out, ends ? 56 : 48, 0);
 }
 
-// Reports of the receiver, and what it asks for. The socket has only what comes from the address to which
-// it sends.
+// Reports and requests of the receiver. The socket accepts only the address to which it sends.
 void RtpSender::hear() {
   unsigned char in[2048];
   std::ptrdiff_t n = 0;
-  for (int i = 0; i < kMostHeard && (n = os::receive(socket_, in, sizeof in)) > 0; ++i)
+  for (int i = 0; i < kMaxHeard && (n = os::receive(socket_, in, sizeof in)) > 0; ++i)
     each_report(in, static_cast<size_t>(n), [&](const unsigned char *report, size_t size) {
       if (report[1] == kApp) return hear_request(report, size);
       if (size < 32 || (report[0] & 31) == 0 || report[1] != kReceiverReport) return;
@@ -211,11 +210,11 @@ void RtpSender::hear_request(const unsigned char *in, size_t n) {
   const uint32_t source = get32(in + 4);
   if (!same_secret(padded, in + 12, kToken)) return;
   const std::lock_guard lock(mutex_);
-  if (!taken_.contains(source) && taken_.size() >= kMostSteerers) return;
+  if (!taken_.contains(source) && taken_.size() >= kMaxSteerers) return;
   heard_ = Clock::now();
   steerer_ = source;
   uint32_t &taken = taken_[source];
-  if (get32(in + 12 + kToken) != taken + 1 || requests_.size() >= kMostRequests) return;
+  if (get32(in + 12 + kToken) != taken + 1 || requests_.size() >= kMaxRequests) return;
   ++taken;
   requests_.emplace_back(in + kRequestHead, in + n);
 }
@@ -230,7 +229,7 @@ std::vector<std::string> RtpSender::take() {
   return std::exchange(requests_, {});
 }
 
-void RtpSender::tell(const std::string &text) {
+void RtpSender::send_state(const std::string &text) {
   const std::lock_guard lock(mutex_);
   inbox_.text = text;
 }
@@ -240,8 +239,8 @@ RtpSender::Report RtpSender::report() const {
   return report_;
 }
 
-void RtpSender::send_answer(const std::string &text) {
-  std::vector<unsigned char> out = control_packet(source_, kAnswerHead, text);
+void RtpSender::send_reply(const std::string &text) {
+  std::vector<unsigned char> out = control_packet(source_, kReplyHead, text);
   {
     const std::lock_guard lock(mutex_);
     put32(&out[12], steerer_);
@@ -266,8 +265,7 @@ void RtpSender::show() {
   report_.seconds += std::chrono::duration<double>(Clock::now() - now).count();
 }
 
-// A copy of the state, and of the scene where something in it is new. News that still wait are lost; the
-// next round has them.
+// A copy of the state, and of the scene where it is new. Updates not yet sent are replaced.
 void RtpSender::hand_over() {
   teller_.look(world_);
   {
@@ -322,7 +320,7 @@ void RtpSender::work() {
         send_all(frame_, true);
         count_frame();
       }
-      if (!in.text.empty()) send_answer(in.text);
+      if (!in.text.empty()) send_reply(in.text);
       // A scene that changes in every frame waits for the end of a round: who comes late gets all of one.
       const bool over = sent_ >= round_.size();
       if (over && (now >= next_round || !next_scene_.empty())) {

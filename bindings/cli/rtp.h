@@ -34,7 +34,7 @@ inline constexpr uint32_t kRtpHeader = 12;  // bytes
 enum : uint8_t { kSenderReport = 200, kReceiverReport = 201, kDescription = 202, kGoodbye = 203, kApp = 204 };
 // Packets of that type and the name "DFMC": a request is the token, its number and its text; an answer the
 // number of the last request that was taken, and the state.
-inline constexpr size_t kToken = 64, kRequestHead = 12 + kToken + 4, kAnswerHead = 20;  // bytes
+inline constexpr size_t kToken = 64, kRequestHead = 12 + kToken + 4, kReplyHead = 20;  // bytes
 inline constexpr char kControl[] = "DFMC";
 // With `text` behind the head, whose fields behind the name are left zero.
 std::vector<unsigned char> control_packet(uint32_t source, size_t head, const std::string &text);
@@ -65,10 +65,10 @@ class RtpSender {
   RtpSender(const RtpSender &) = delete;
   // After a step: waits where the run is ahead of the clock, and sends where a picture is due.
   void after_step();
-  void show();                         // what is sent next, where a picture is due
-  bool steered() const;                // who has the token listens
-  std::vector<std::string> take();     // what it has asked for since the last call, in order
-  void tell(const std::string &text);  // to it
+  void show();                               // what is sent next, where a picture is due
+  bool steered() const;                      // who has the token listens
+  std::vector<std::string> take();           // what it has asked for since the last call, in order
+  void send_state(const std::string &text);  // to it
   void
   end();  // the last state, twice, and that nothing follows; waits until it is sent, for a second at most
 
@@ -97,7 +97,7 @@ class RtpSender {
   void send_round(double seconds);
   void send(const unsigned char *payload, size_t n, bool marker);
   void send_report(bool ends);
-  void send_answer(const std::string &text);
+  void send_reply(const std::string &text);
   void send_end();
   uint32_t stamp() const;
   void hear();

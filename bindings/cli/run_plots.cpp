@@ -16,7 +16,7 @@
 namespace cli {
 namespace {
 
-constexpr size_t kMost = 6;                 // curves of a plot, and probes that have one
+constexpr size_t kMax = 6;                  // curves of a plot, and probes that have one
 constexpr double kWide = 540, kHigh = 270;  // pixels, of a panel
 enum { kEnergy, kPlace, kSpeed, kForce, kProbe };
 
@@ -144,14 +144,14 @@ class Drawn : public RunPlots {
   }
 
  private:
-  uint32_t probes() const { return std::min<uint32_t>(scene_.settings().nprobe, kMost); }
+  uint32_t probes() const { return std::min<uint32_t>(scene_.settings().nprobe, kMax); }
 
   // The present value of a curve, which had `before` where it was not set.
   void set(size_t plot, const std::string &name, double value, double before = NAN) {
     std::vector<Curve> &curves = plots_[plot].curves;
     auto found = std::ranges::find(curves, name, &Curve::name);
     if (found == curves.end()) {
-      if (curves.size() == kMost) return;
+      if (curves.size() == kMax) return;
       found = curves.insert(found, {name, {}});
     }
     found->y.resize(times_.size(), before);

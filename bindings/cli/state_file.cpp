@@ -17,7 +17,7 @@
 namespace cli {
 namespace {
 
-constexpr uint64_t kMostState = uint64_t{1} << 33;  // bytes
+constexpr uint64_t kMaxState = uint64_t{1} << 33;  // bytes
 constexpr const char *kFormat = "deform-state", *kVersion = "1";
 constexpr const char *kSnapshot = "dfmsnap";  // how the bytes of dfm_world_snapshot begin
 
@@ -180,7 +180,7 @@ void write_state(const SceneFile &scene, const std::string &path) {
 }
 
 void read_state(const SceneFile &scene, const std::string &path) {
-  const std::string text = read_file(path, kMostState, "a state file of `deform run --save`");
+  const std::string text = read_file(path, kMaxState, "a state file of `deform run --save`");
   if (text.rfind(kSnapshot, 0) == 0) {  // which says itself what it belongs to
     if (dfm_world_restore(scene.world(), text.data(), text.size()) < 0) refuse(path, dfm_last_error());
     return;

@@ -62,7 +62,7 @@ void Grip::put(const dfm_pose &pose, double opening) {
   to_ = render::vec(pose.position);
   std::copy_n(pose.rotation, 4, rotation_);
   opening_ = opening;
-  tell();
+  update_pull();
 }
 
 dfm_pose Grip::pose() const {
@@ -72,7 +72,7 @@ dfm_pose Grip::pose() const {
 void Grip::move_to(const Vec &to) {
   if (to.x == to_.x && to.y == to_.y && to.z == to_.z) return;
   to_ = to;
-  tell();
+  update_pull();
 }
 
 void Grip::turn(const Vec &axis, double angle) {
@@ -82,16 +82,16 @@ void Grip::turn(const Vec &axis, double angle) {
   cli::turned(rotation_, by, q);
   const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
   for (int k = 0; k < 4; ++k) rotation_[k] = q[k] / length;
-  tell();
+  update_pull();
 }
 
 void Grip::open(double by) {
   if (!jaws()) return;
   opening_ = std::clamp(opening_ + by, 0.0, 0.5 * std::numbers::pi);
-  tell();
+  update_pull();
 }
 
-void Grip::tell() {
+void Grip::update_pull() {
   const double to[3] = {to_.x, to_.y, to_.z};
   std::vector<std::string> rotation;
   for (const double q : rotation_) rotation.push_back(cli::number(q));

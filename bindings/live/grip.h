@@ -43,7 +43,7 @@ class Grip {
     std::string name;
     bool jaws = false;
   };
-  void tell();
+  void update_pull();
 
   Simulation &simulation_;
   double speed_;

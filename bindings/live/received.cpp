@@ -11,11 +11,11 @@ static_assert(std::endian::native == std::endian::little);
 namespace live {
 namespace {
 
-constexpr size_t kHeader = 32, kChunk = 8;     // bytes
-constexpr size_t kMost = size_t{1} << 22;      // points and triangles of all surfaces together
-constexpr size_t kEach = 64;                   // of them, that a surface counts for beside its own
-constexpr size_t kMostRows = size_t{1} << 16;  // of contacts, and of what is there
-constexpr size_t kLongestName = 100;           // bytes
+constexpr size_t kHeader = 32, kChunk = 8;    // bytes
+constexpr size_t kMax = size_t{1} << 22;      // points and triangles of all surfaces together
+constexpr size_t kEach = 64;                  // of them, that a surface counts for beside its own
+constexpr size_t kMaxRows = size_t{1} << 16;  // of contacts, and of what is there
+constexpr size_t kLongestName = 100;          // bytes
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 // Numbers of frames begin again at 2^32.
@@ -147,7 +147,7 @@ bool Received::fills(Mesh &m, const char *tag, const Chunk &c) {
 }
 
 void Received::body(const Chunk &c) {
-  if (c.has(0, 20)) tell(c, Mesh(), 16);
+  if (c.has(0, 20)) set_triangles(c, Mesh(), 16);
 }
 
 void Received::thing(const Chunk &c) {
@@ -159,11 +159,11 @@ void Received::thing(const Chunk &c) {
   t.radius = c.get<float>(20);
   t.half_length = c.get<float>(24);
   for (size_t k = 0; k < 3; ++k) t.half_size[k] = c.get<float>(28 + 4 * k);
-  tell(c, std::move(t), 40);
+  set_triangles(c, std::move(t), 40);
 }
 
 // One thing has a number, and the newest that was told has it. name: where it stands.
-void Received::tell(const Chunk &c, Mesh fresh, size_t name) {
+void Received::set_triangles(const Chunk &c, Mesh fresh, size_t name) {
   const auto found = meshes_.find(c.get(0));
   if (found != meshes_.end()) {
     Mesh &m = found->second;
@@ -173,7 +173,7 @@ void Received::tell(const Chunk &c, Mesh fresh, size_t name) {
   fresh.points = c.get(8);
   fresh.faces = c.get(12);
   const size_t others = held_ - (found == meshes_.end() ? 0 : weight(found->second));
-  if (others + weight(fresh) > kMost) return;
+  if (others + weight(fresh) > kMax) return;
   fresh.name = c.name(name);
   fresh.shape = c.get(4);
   fresh.frame = packet_frame_;
@@ -185,7 +185,7 @@ void Received::tell(const Chunk &c, Mesh fresh, size_t name) {
     std::unique_ptr<Mesh> before;
     if (!fresh.rigid && !old.rigid && fresh.missing > 0)
       before = old.missing == 0 ? std::make_unique<Mesh>(std::move(old)) : std::move(old.before);
-    if (before && others + weight(fresh) + weight(*before) <= kMost) fresh.before = std::move(before);
+    if (before && others + weight(fresh) + weight(*before) <= kMax) fresh.before = std::move(before);
   }
   held_ = others + weight(fresh);
   meshes_.insert_or_assign(c.get(0), std::move(fresh));
@@ -208,7 +208,7 @@ void Received::base(const Chunk &c) {
     to = c.get<float>(16 + 4 * i);
     m->x[first + i] = double{to} + m->moved[first + i];
   }
-  if (m->missing == 0) settle(*m);
+  if (m->missing == 0) complete(*m);
 }
 
 void Received::triangles(const Chunk &c) {
@@ -224,11 +224,11 @@ void Received::triangles(const Chunk &c) {
     m->missing -= to == UINT32_MAX;
     to = c.get(16 + 4 * i);
   }
-  if (m->missing == 0) settle(*m);
+  if (m->missing == 0) complete(*m);
 }
 
 // Complete: what was drawn before is not needed any more.
-void Received::settle(Mesh &m) {
+void Received::complete(Mesh &m) {
   if (!m.before) return;
   held_ -= weight(*m.before);
   m.before.reset();
@@ -236,7 +236,7 @@ void Received::settle(Mesh &m) {
 
 // What a list that is whole leaves out is gone, unless it was told later.
 void Received::list(const Chunk &c) {
-  if (!c.has(0, 4) || c.get(0) > kMostRows) return;
+  if (!c.has(0, 4) || c.get(0) > kMaxRows) return;
   const size_t all = c.get(0);
   if (listed_ != frame_) listing_.clear();
   listed_ = frame_;
@@ -280,13 +280,13 @@ void Received::surface(const Chunk &c) {
     }
     m.x[first + i] = double{m.base[first + i]} + to;
   }
-  if (m.missing == 0) settle(m);
+  if (m.missing == 0) complete(m);
 }
 
 // A packet that comes again brings none.
 void Received::contacts(const Chunk &c) {
   if (parts_.contains(part_)) return;
-  for (size_t at = 0; c.has(at, 28) && contacts_.size() < kMostRows; at += 28) {
+  for (size_t at = 0; c.has(at, 28) && contacts_.size() < kMaxRows; at += 28) {
     if (!c.finite(at, 6)) continue;
     Contact row;
     for (size_t k = 0; k < 3; ++k) {

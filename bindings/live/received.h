@@ -55,7 +55,7 @@ class Received {
   void chunk(const unsigned char *tag, const Chunk &c);
   void body(const Chunk &c);
   void thing(const Chunk &c);
-  void tell(const Chunk &c, Mesh fresh, size_t name);
+  void set_triangles(const Chunk &c, Mesh fresh, size_t name);
   void base(const Chunk &c);
   void triangles(const Chunk &c);
   void list(const Chunk &c);
@@ -64,7 +64,7 @@ class Received {
   void contacts(const Chunk &c);
   Mesh *mesh(const Chunk &c);
   bool fills(Mesh &m, const char *tag, const Chunk &c);
-  void settle(Mesh &m);
+  void complete(Mesh &m);
   template <class F>
   void forget(F gone);  // the meshes for which gone(number, mesh)
 

@@ -14,9 +14,9 @@ namespace {
 
 constexpr auto kReports = std::chrono::seconds(1), kSilence = std::chrono::seconds(2);
 constexpr auto kAgain = std::chrono::milliseconds(50);  // requests are sent again
-constexpr size_t kMostAsked = 256, kAtOnce = 32;        // requests that wait; of them, that are sent
-constexpr size_t kMostSliders = 64, kLongest = 256;     // sliders; bytes of their texts
-constexpr int kMostHeard = 1024;                        // datagrams at a time
+constexpr size_t kMaxRequests = 256, kAtOnce = 32;      // requests that wait; of them, that are sent
+constexpr size_t kMaxSliders = 64, kLongest = 256;      // sliders; bytes of their texts
+constexpr int kMaxHeard = 1024;                         // datagrams at a time
 constexpr int kBuffer = 1 << 21;                        // bytes, of the system for the socket
 constexpr uint8_t kVersion = 2 << 6;
 
@@ -38,14 +38,14 @@ bool same(const sockaddr_storage &a, socklen_t na, const sockaddr_storage &b, so
 RtpReceiver::RtpReceiver(const std::string &url)
     : url_(cli::rtp_url(url, "view")), socket_(cli::rtp_socket(url_, "view", false)) {
   setsockopt(socket_, SOL_SOCKET, SO_RCVBUF, &kBuffer, sizeof kBuffer);
-  heard_ = reported_ = asked_ = Clock::now();
+  heard_ = reported_ = last_request_ = Clock::now();
 }
 
 RtpReceiver::~RtpReceiver() { close(socket_); }
 
 void RtpReceiver::hear() {
   unsigned char in[1 << 16];
-  for (int i = 0; i < kMostHeard; ++i) {
+  for (int i = 0; i < kMaxHeard; ++i) {
     sockaddr_storage from = {};
     socklen_t size = sizeof from;
     const ssize_t n = recvfrom(socket_, in, sizeof in, 0, reinterpret_cast<sockaddr *>(&from), &size);
@@ -62,13 +62,13 @@ void RtpReceiver::hear() {
     if (!rtp)
       cli::each_report(in, size_t(n), [&](const unsigned char *p, size_t bytes) {
         if (p[1] == cli::kGoodbye) ended_ = true;
-        if (p[1] == cli::kApp) answer(p, bytes);
+        if (p[1] == cli::kApp) handle_reply(p, bytes);
       });
   }
   if (!begun_ || ended_) return;
   const Clock::time_point now = Clock::now();
   if (now >= reported_ + kReports) report();
-  if (!requests_.empty() && now >= asked_ + kAgain) send_requests();
+  if (!requests_.empty() && now >= last_request_ + kAgain) send_requests();
 }
 
 // False: it is none of a run. Whose first one is none is not the sender, and does not get the token.
@@ -100,8 +100,8 @@ bool RtpReceiver::datagram(const unsigned char *in, size_t n) {
   return true;
 }
 
-void RtpReceiver::answer(const unsigned char *in, size_t n) {
-  if (!may_ask() || n < cli::kAnswerHead || std::memcmp(in + 8, cli::kControl, 4) != 0) return;
+void RtpReceiver::handle_reply(const unsigned char *in, size_t n) {
+  if (!may_request() || n < cli::kReplyHead || std::memcmp(in + 8, cli::kControl, 4) != 0) return;
   if (cli::get32(in + 12) != own_) return;
   if (const uint32_t more = cli::get32(in + 16) - taken_; more <= sent_) {
     requests_.erase(requests_.begin(), requests_.begin() + more);
@@ -109,17 +109,16 @@ void RtpReceiver::answer(const unsigned char *in, size_t n) {
     sent_ -= more;
   }
   cli::JsonValue state;
-  if (!cli::parse_json({in + cli::kAnswerHead, in + n}, state) || state.kind != cli::JsonValue::object)
-    return;
+  if (!cli::parse_json({in + cli::kReplyHead, in + n}, state) || state.kind != cli::JsonValue::object) return;
   const double frame = state.scalar("frame");
   if (!(frame >= state_frame_ && frame <= UINT32_MAX)) return;  // it has come late
   state_frame_ = frame;
-  told(state);
+  handle_state(state);
   state_ = std::move(state);
 }
 
 // One slider in each answer; anyone may have sent it.
-void RtpReceiver::told(const cli::JsonValue &state) {
+void RtpReceiver::handle_state(const cli::JsonValue &state) {
   for (const cli::JsonValue &s : state.list("sliders")) {
     Slider fresh = {s.get("name"),    s.get("label"),    s.scalar("low"),
                     s.scalar("high"), s.scalar("value"), s.get("logarithmic") == "true"};
@@ -127,7 +126,7 @@ void RtpReceiver::told(const cli::JsonValue &state) {
     const auto at = std::find_if(sliders_.begin(), sliders_.end(),
                                  [&](const Slider &have) { return have.name == fresh.name; });
     if (at == sliders_.end()) {
-      if (sliders_.size() < kMostSliders) sliders_.push_back(std::move(fresh));
+      if (sliders_.size() < kMaxSliders) sliders_.push_back(std::move(fresh));
       continue;
     }
     if (!requests_.empty())  // it may be from before what was asked for
@@ -137,14 +136,14 @@ void RtpReceiver::told(const cli::JsonValue &state) {
 }
 
 // What may have been taken keeps its text, and what replaces nothing keeps its place among all others.
-void RtpReceiver::ask(const cli::JsonObject &request, const std::string &replaces) {
-  if (!may_ask()) return;
+void RtpReceiver::send(const cli::JsonObject &request, const std::string &replaces) {
+  if (!may_request()) return;
   for (size_t i = requests_.size(); i > sent_ && !replaces.empty() && !requests_[i - 1].replaces.empty(); --i)
     if (requests_[i - 1].replaces == replaces) {
       requests_[i - 1].text = request.text();
       return;
     }
-  if (requests_.size() >= kMostAsked) {
+  if (requests_.size() >= kMaxRequests) {
     const auto waits = std::find_if(requests_.begin() + std::ptrdiff_t(sent_), requests_.end(),
                                     [](const Request &r) { return !r.replaces.empty(); });
     if (waits == requests_.end()) return;
@@ -162,7 +161,7 @@ std::vector<unsigned char> RtpReceiver::request(uint32_t number, const std::stri
 }
 
 void RtpReceiver::send_requests() {
-  asked_ = Clock::now();
+  last_request_ = Clock::now();
   if (!begun_) return;
   sent_ = std::max(sent_, std::min(requests_.size(), kAtOnce));
   for (size_t i = 0; i < sent_; ++i) {
@@ -186,7 +185,7 @@ void RtpReceiver::report() {
   cli::put32(&out[8], source_);
   cli::put32(&out[12], uint32_t(255 * share) << 24 | uint32_t(std::min<uint64_t>(lost(), 0xffffff)));
   cli::put32(&out[16], uint32_t(highest_));
-  if (may_ask()) {  // says that it listens
+  if (may_request()) {  // says that it listens
     const std::vector<unsigned char> here = request(0, "");
     out.insert(out.end(), here.begin(), here.end());
   }

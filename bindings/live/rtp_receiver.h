@@ -28,10 +28,9 @@ class RtpReceiver {
   uint64_t packets() const { return received_; }
   uint64_t lost() const { return highest_ + 1 > first_ + received_ ? highest_ + 1 - first_ - received_ : 0; }
   bool ended() const { return ended_; }  // the sender has said so
-  bool may_ask() const { return !url_.token.empty(); }
-  // replaces: what this one takes the place of while that waits unsent, "pull" or a slider's name; empty:
-  // nothing.
-  void ask(const cli::JsonObject &request, const std::string &replaces = "");
+  bool may_request() const { return !url_.token.empty(); }
+  // replaces: the kind of unsent request that this one replaces, "pull" or a slider's name; empty: none.
+  void send(const cli::JsonObject &request, const std::string &replaces = "");
   // What the sender tells who has the token; null before.
   const cli::JsonValue &state() const { return state_; }
   struct Slider {
@@ -45,8 +44,8 @@ class RtpReceiver {
   using Clock = std::chrono::steady_clock;
   struct Request { std::string text, replaces; };
   bool datagram(const unsigned char *in, size_t n);
-  void answer(const unsigned char *in, size_t n);
-  void told(const cli::JsonValue &state);
+  void handle_reply(const unsigned char *in, size_t n);
+  void handle_state(const cli::JsonValue &state);
   void report();
   void send_requests();
   std::vector<unsigned char> request(uint32_t number, const std::string &text) const;
@@ -59,7 +58,7 @@ class RtpReceiver {
   socklen_t sender_size_ = 0;
   uint64_t first_ = 0, highest_ = 0, received_ = 0, expected_before_ = 0, received_before_ = 0, frames_ = 0;
   uint64_t runs_ = 0;
-  Clock::time_point heard_, reported_, asked_;
+  Clock::time_point heard_, reported_, last_request_;
   Received scene_;
   uint32_t taken_ = 0;            // number of the last one that the sender has taken
   std::deque<Request> requests_;  // those with the next numbers

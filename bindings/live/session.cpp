@@ -102,14 +102,14 @@ void Session::act(const Request &request) {
   try {
     if (!cli::parse_json(request.text, line) || line.kind != cli::JsonValue::object)
       throw cli::Failure(cli::kBadInput, "a request is an object of JSON");
-    ask(line.get("do"), line, request.viewer);
+    handle(line.get("do"), line, request.viewer);
   } catch (const cli::Failure &e) {
     message_ = e.what();
   }
 }
 
 // What a viewer may ask for, with names as in doc/reference/stream.md.
-void Session::ask(const std::string &what, const cli::JsonValue &line, uint32_t viewer) {
+void Session::handle(const std::string &what, const cli::JsonValue &line, uint32_t viewer) {
   if (what == "grab") {
     let_go();
     holder_ = viewer;

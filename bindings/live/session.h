@@ -27,7 +27,7 @@ class Session {
  private:
   using Clock = std::chrono::steady_clock;
   void act(const Request &request);
-  void ask(const std::string &what, const cli::JsonValue &line, uint32_t viewer);
+  void handle(const std::string &what, const cli::JsonValue &line, uint32_t viewer);
   void attempt(const std::function<void()> &what);
   void let_go();
   void advance(double seconds);

@@ -80,8 +80,7 @@ dfm_status Adapter::check(const std::vector<Signature> &signatures) const {
   return DFM_OK;
 }
 
-// Reads only geoms that the space lists and bodies that these geoms name: others may have been destroyed by
-// the caller.
+// Reads only geoms in the space and their bodies: others may have been destroyed by the caller.
 dfm_status Adapter::look() {
   seen_.clear();
   signatures_.clear();
@@ -111,10 +110,10 @@ dfm_status Adapter::look() {
   std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
   for (auto &g : geoms_) TRY(follow(*g));
   bool restored = false;
-  TRY(clock_.ask(world_, restored));
+  TRY(clock_.poll(world_, restored));
   if (restored && !keeps_friction_) near_.forget();
   if (restored) keeps_friction_ = false;
-  TRY(states_.ask(world_));
+  TRY(states_.poll(world_));
   for (auto &b : bodies_) TRY(b->agree(restored, states_));
   return DFM_OK;
 }
@@ -207,8 +206,7 @@ dfm_status Adapter::follow(Geom &g) {
 std::vector<dBodyID> Adapter::hidden_bodies() const {
   std::vector<dBodyID> found, open;
   for (auto &b : bodies_) open.push_back(b->id);
-  // Bodies all of whose geoms are left out (ignored, disabled, rays): ODE moves them, and a repeated solve
-  // must reset them too.
+  // Bodies without a geom that is used: ODE moves them, and a repeated solve must reset them too.
   for (const Signature &s : signatures_)
     if (s.body && !by_body_.count(s.body) && std::find(found.begin(), found.end(), s.body) == found.end()) {
       found.push_back(s.body);
@@ -241,16 +239,15 @@ dfm_status Adapter::step(double dt) {
     status = dfm_world_step(world_, dt, &trouble);
   }
   ++steps_;
-  // the status of the step comes first, then those of the bodies; an error of one body does not keep the
-  // others from being updated
-  dfm_status told = states_.ask(world_);
+  // The status of the step comes first, then those of the bodies; all bodies are updated after an error.
+  dfm_status states_status = states_.poll(world_);
   for (auto &b : bodies_) {
     const dfm_status of_body = b->after(status, states_);
-    if (told == DFM_OK) told = of_body;
+    if (states_status == DFM_OK) states_status = of_body;
   }
   bool restored = false;
-  TRY(clock_.ask(world_, restored));
-  return status != DFM_OK ? status : told;
+  TRY(clock_.poll(world_, restored));
+  return status != DFM_OK ? status : states_status;
 }
 
 dfm_status Adapter::obstacle(dGeomID geom, dfm_obstacle *out) {

@@ -17,7 +17,7 @@ void carry(dBodyID b, Vec force, Vec torque) {
 // short becomes one slightly too long, and back. This leaves the body with a quaternion near it that
 // normalizing does not change. One unit in the last place, added to the largest part of the short one, ends
 // the cycle (2e6 random quaternions: 6 rounds at most).
-void settle_rotation(dBodyID b) {
+void normalize_rotation(dBodyID b) {
   const auto get = [&] {
     const dReal *const q = dBodyGetQuaternion(b);
     return std::array<dReal, 4>{q[0], q[1], q[2], q[3]};
@@ -187,13 +187,13 @@ void OdeEngine::find_ties() {
     }
 }
 
-void OdeEngine::give_back() {
+void OdeEngine::restore_forces() {
   for (const Saved &s : saved_) carry(s.body, s.force, s.torque);
 }
 
 // The last sub-step has been committed or undone.
 void OdeEngine::close() {
-  if (friction && stepped()) friction->settle(step_length());
+  if (friction && stepped()) friction->finish_step(step_length());
   else if (friction) friction->drop();
   if (contacts) dJointGroupEmpty(contacts);
 }
@@ -202,7 +202,7 @@ void OdeEngine::close() {
 void OdeEngine::ended() {
   for (size_t i = members.size(); i < saved_.size(); ++i) {
     idle_[saved_[i].body] = saved_[i].next_idle;
-    settle_rotation(saved_[i].body);
+    normalize_rotation(saved_[i].body);
   }
 }
 
@@ -255,20 +255,20 @@ void OdeEngine::pull_awake() {
 
 // A body falls asleep when all bodies connected to it have been idle for long enough.
 void OdeEngine::rest(double h) {
-  std::vector<uint8_t> due(saved_.size(), 0);
+  std::vector<uint8_t> still(saved_.size(), 0);
   bool any = false;
   for (size_t i = 0; i < saved_.size(); ++i) {
     Saved &s = saved_[i];
     Member *const m = i < members.size() ? members[i] : nullptr;
-    any |= due[i] = tire(s.body, h, share_of_step(h), m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
+    any |= still[i] = tire(s.body, h, share_of_step(h), m ? m->idle : s.idle, m ? m->next_idle : s.next_idle);
   }
   if (!any) return;
   std::vector<size_t> awake;
   for (size_t i = 0; i < saved_.size(); ++i)
-    if (!due[i] && dBodyIsEnabled(saved_[i].body)) awake.push_back(i);
-  flood(std::move(awake), [&](size_t i) { return std::exchange(due[i], 0) != 0; });
+    if (!still[i] && dBodyIsEnabled(saved_[i].body)) awake.push_back(i);
+  flood(std::move(awake), [&](size_t i) { return std::exchange(still[i], 0) != 0; });
   for (size_t i = 0; i < saved_.size(); ++i) {
-    if (!due[i]) continue;
+    if (!still[i]) continue;
     dBodyDisable(saved_[i].body);
     dBodySetLinearVel(saved_[i].body, 0, 0, 0);
     dBodySetAngularVel(saved_[i].body, 0, 0, 0);
@@ -337,7 +337,7 @@ class OdeEngine::Lent {
 };
 
 void OdeEngine::put_forces(double h) {
-  give_back();
+  restore_forces();
   for (size_t i = 0; i < members.size(); ++i) {
     const OdeMember &m = member(i);
     if (m.wakes) dBodyEnable(m.body);

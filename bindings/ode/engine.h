@@ -88,7 +88,7 @@ class OdeEngine : public Engine {
   void run(double h) override;
   void turned(Member &m, Quat to, Vec spin) override;
   void rest(double h) override;
-  void give_back() override;
+  void restore_forces() override;
   void close() override;
   void ended() override;
 

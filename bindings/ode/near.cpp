@@ -8,7 +8,7 @@
 namespace dfm_ode_detail {
 namespace {
 
-constexpr uint32_t kMost = 64;
+constexpr uint32_t kMax = 64;
 // m: contacts of two sub-steps that are farther apart are different contacts
 constexpr double kSamePlace = 0.01;
 
@@ -64,7 +64,7 @@ dfm_status RigidFriction::set_law(dfm_context *context, const char *law, const d
 }
 
 // One contact in a batch of eight lanes.
-RigidFriction::Answer RigidFriction::ask(const Contact &c, const double vt[2], double dt) const {
+RigidFriction::LawResult RigidFriction::evaluate(const Contact &c, const double vt[2], double dt) const {
   constexpr uint32_t kLanes = 8;
   alignas(64) double fn[kLanes] = {c.fn}, v[2 * kLanes] = {}, stop[2 * kLanes] = {}, area[kLanes] = {area_},
                      dwell[kLanes] = {};
@@ -104,7 +104,7 @@ RigidFriction::Answer RigidFriction::ask(const Contact &c, const double vt[2], d
   out.limit = limit;
   out.state = next.data();
   out.mode = mode;
-  Answer a{};
+  LawResult a{};
   a.good = dfm_law_eval(law_, &in, &out) == DFM_OK;
   if (!a.good) return a;
   a.ft[0] = ft[0];
@@ -152,9 +152,9 @@ int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
   // ODE swaps the bodies of a joint if the first one is the world; motion and slip then change their signs
   if (!dGeomGetBody(a)) std::swap(a, b);
   const dBodyID body_a = dGeomGetBody(a), body_b = dGeomGetBody(b);
-  dContact contacts[kMost];
+  dContact contacts[kMax];
   const int found =
-      dCollide(a, b, static_cast<int>(std::min(most, kMost)), &contacts[0].geom, sizeof(dContact));
+      dCollide(a, b, static_cast<int>(std::min(most, kMax)), &contacts[0].geom, sizeof(dContact));
   std::vector<bool> taken;
   for (int i = 0; i < found; ++i) {
     dContact &c = contacts[i];
@@ -180,14 +180,14 @@ int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
     const Vec u = velocity_at(body_a, mine.point) - velocity_at(body_b, mine.point);
     const double vt[2] = {dot(u, mine.tangent[0]), dot(u, mine.tangent[1])};
     if (set_valued_ && !(mine.fn > 0)) mine.fn = 1;  // a coefficient needs some force for its evaluation
-    const Answer answer = ask(mine, vt, dt);
-    if (answer.good && set_valued_) {
-      c.surface.mu = answer.limit / mine.fn;
-    } else if (answer.good) {
+    const LawResult result = evaluate(mine, vt, dt);
+    if (result.good && set_valued_) {
+      c.surface.mu = result.limit / mine.fn;
+    } else if (result.good) {
       c.surface.mode = dContactMu2 | dContactFDir1;
-      c.surface.mu = c.surface.mu2 = std::min(answer.limit, double{dInfinity});
+      c.surface.mu = c.surface.mu2 = std::min(result.limit, double{dInfinity});
       store(c.fdir1, mine.tangent[0]);
-      const double *const d = answer.d, *const f = answer.ft;
+      const double *const d = result.d, *const f = result.ft;
       if (d[0] > 0) {
         c.surface.mode |= dContactSlip1 | dContactMotion1;
         c.surface.slip1 = 1 / d[0];
@@ -206,7 +206,7 @@ int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
   return found;
 }
 
-void RigidFriction::settle(double dt) {
+void RigidFriction::finish_step(double dt) {
   if (!law_) return drop();
   last_.clear();
   for (Contact &c : now_) {
@@ -214,8 +214,8 @@ void RigidFriction::settle(double dt) {
     const double vt[2] = {dot(u, c.tangent[0]), dot(u, c.tangent[1])};
     c.fn = std::max(0.0, dot(load(c.feedback.f1), c.normal));
     if (nstate_) {
-      Answer answer = ask(c, vt, dt);
-      if (answer.good) c.state = std::move(answer.state);
+      LawResult result = evaluate(c, vt, dt);
+      if (result.good) c.state = std::move(result.state);
     }
     last_[c.key].push_back(std::move(c));
   }

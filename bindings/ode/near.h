@@ -47,7 +47,7 @@ class RigidFriction {
   void clear_law();
   int collide(dGeomID a, dGeomID b, double h);  // contact joints made
   // after ODE's step, while its joints exist: keeps forces and states for the next sub-step
-  void settle(double h);
+  void finish_step(double h);
   // after a sub-step that failed: drops its contacts, since their bodies may be destroyed next
   void drop() { now_.clear(); }
   void forget() { last_.clear(); }
@@ -67,12 +67,12 @@ class RigidFriction {
   uint32_t nstate_ = 0;
   Memory last_;
   std::deque<Contact> now_;  // ODE keeps the addresses of the feedbacks
-  struct Answer {
+  struct LawResult {
     double ft[2], d[2], limit;
     std::vector<double> state;
     bool good;
   };
-  Answer ask(const Contact &c, const double vt[2], double h) const;
+  LawResult evaluate(const Contact &c, const double vt[2], double h) const;
   const Contact *match(const Key &key, Vec place, std::vector<bool> &taken) const;
   void take_over(Contact &c, const Contact &old) const;
 };

@@ -35,10 +35,10 @@ bool flag(double x) { return x == 0 || x == 1; }
 
 // Valid as written by save(): finite, a unit quaternion, enabled 0 or 1, an idle time of 0 or more.
 bool good_body(const double *p) {
-  double poison = 0;
-  for (size_t i = 0; i < kPerBody; ++i) poison += 0.0 * p[i];
+  double nan_flag = 0;
+  for (size_t i = 0; i < kPerBody; ++i) nan_flag += 0.0 * p[i];
   const double q = p[3] * p[3] + p[4] * p[4] + p[5] * p[5] + p[6] * p[6];
-  return poison == 0 && std::fabs(q - 1) < 1e-3 && flag(p[13]) && p[14] >= 0 && p[15] >= 0;
+  return nan_flag == 0 && std::fabs(q - 1) < 1e-3 && flag(p[13]) && p[14] >= 0 && p[15] >= 0;
 }
 
 void save(dBodyID b, const OdeEngine::Idle &idle, std::vector<double> &out) {

@@ -26,8 +26,8 @@ static uint32_t nvalue, nstate; /* doubles of all parameters, and of the state o
 static dfm_friction law;
 static dfm_type type;
 static const dfm_type *const types[] = {&type};
-static void leave(void);
-static const dfm_plugin plugin = {sizeof plugin, DFM_ABI, DFM_ABI_DRAFT, 1, types, leave};
+static void shutdown_law(void);
+static const dfm_plugin plugin = {sizeof plugin, DFM_ABI, DFM_ABI_DRAFT, 1, types, shutdown_law};
 
 static void take(void *to, size_t bytes) {
   char *at = to;
@@ -84,7 +84,7 @@ static const char *const *texts(void) {
   return out;
 }
 
-static void leave(void) {
+static void shutdown_law(void) {
   if (--users > 0) return;
   while (nkept) free(kept[--nkept]);
   if (channel >= 0) close(channel);
@@ -210,11 +210,11 @@ const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint
   broken = 0;
   channel = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
   if (channel < 0 || connect(channel, (const struct sockaddr *)&address, sizeof address) != 0) {
-    leave();
+    shutdown_law();
     return NULL;
   }
   describe();
   if (!broken) return &plugin;
-  leave();
+  shutdown_law();
   return NULL;
 }

@@ -10,11 +10,10 @@ namespace {
 constexpr double kForget = 0.05;  // s
 // share of a jointed body's change by contact that may be missing before contact is solved again
 constexpr double kResidual = 0.01;
-// m/s: of a body that contact changes by less, what is missing counts against this (then 1e-6 m/s,
-// as in the solve)
+// m/s: the error of a body is relative to at least this change by contact (1e-6 m/s, as in the solve)
 constexpr double kSlow = 1e-4;
 constexpr double kDrifts = 1, kFellAsleep = 2;  // extra[12]
-constexpr int kMostCorrections = 3;  // per sub-step; more than one only where joints or motors jump
+constexpr int kMaxCorrections = 3;  // per sub-step; more than one only where joints or motors jump
 
 // Principal axes of a symmetric matrix by Jacobi's rotations.
 void principal(double a[3][3], Vec &moments, Quat &axes) {
@@ -101,7 +100,7 @@ Inertia inertia_of(double mass, const double tensor[3][3]) {
   return out;
 }
 
-Motion Member::answer_of(const Motion &p) const {
+Motion Member::response_of(const Motion &p) const {
   if (is_none(p.w)) return {(1 / inertia.mass) * each(moves_along, p.v), {}};
   const Vec turned = in_axes(rotation_of(start), inverse(inertia.moments), each(turns_about, p.w));
   return {(1 / inertia.mass) * each(moves_along, p.v), each(turns_about, turned)};
@@ -118,7 +117,7 @@ void Engine::end(double time) {
     restore(true);
     stepped_ = false;  // friction forgets what it has seen of it
   }
-  if (time == begun_) give_back();
+  if (time == begun_) restore_forces();
   close();
   stepped_ = false;
   ended();
@@ -157,7 +156,7 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   const Vec v = load(m.start.velocity), w = load(m.start.spin);
   const Quat q = rotation_of(m.start);
   if (m.turns) m.turn_momentum = in_axes(q, m.inertia.moments, w) + step.h * f.torque;
-  const Motion pull = m.answer({f.force, f.torque});
+  const Motion pull = m.response({f.force, f.torque});
   m.plain.v = v + step.h * (f.gravity + pull.v);
   m.plain.w =
       m.turns ? mean_spin(q, inverse(m.inertia.moments), m.turn_momentum, step.h) : w + step.h * pull.w;
@@ -168,7 +167,7 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
     m.drift = kept;
     return;
   }
-  const Motion carried = m.answer(kept);  // b is what was in balance with this
+  const Motion carried = m.response(kept);  // b is what was in balance with this
   m.bias = {-1.0 * carried.v - (1 / step.h) * (m.plain.v - v),
             -1.0 * carried.w - (1 / step.h) * (m.plain.w - w)};
 }
@@ -200,7 +199,7 @@ void Engine::respond(const Member &m, double matrix[36]) const {
   const double along[3] = {m.moves_along.x, m.moves_along.y, m.moves_along.z};
   for (int k = 0; k < 3; ++k) {
     matrix[7 * k] = along[k] / m.inertia.mass;
-    const Vec column = m.answer({{}, {k == 0 ? 1.0 : 0, k == 1 ? 1.0 : 0, k == 2 ? 1.0 : 0}}).w;
+    const Vec column = m.response({{}, {k == 0 ? 1.0 : 0, k == 1 ? 1.0 : 0, k == 2 ? 1.0 : 0}}).w;
     matrix[6 * 3 + 3 + k] = column.x;
     matrix[6 * 4 + 3 + k] = column.y;
     matrix[6 * 5 + 3 + k] = column.z;
@@ -246,7 +245,7 @@ double Engine::judge(Member &m, double h) {
   const dfm_rigid_state &end = m.end();
   const Motion got{(1 / h) * (load(end.position) - load(m.start.position)),
                    (1 / h) * turn_of(rotation_of(end) * conjugate(rotation_of(m.start)))};
-  const Motion own = m.answer(m.impulse);
+  const Motion own = m.response(m.impulse);
   m.next_bias = {(1 / h) * (got.v - m.plain.v - own.v), (1 / h) * (got.w - m.plain.w - own.w)};
   const double contact = dot(m.impulse.v, own.v) + dot(m.impulse.w, own.w);
   if (!(contact > 0)) return 0;
@@ -261,7 +260,7 @@ bool Engine::wake_sleepers(double h) {
   bool woken = false;
   for (Member *m : members) {
     if (!m->asleep || m->kinematic) continue;
-    const Motion push = m->answer(m->impulse);
+    const Motion push = m->response(m->impulse);
     const double left = std::max(0.0, 1 - h / kForget);
     m->drift.v = left * m->drift.v + (m->plain.v - load(m->start.velocity)) + push.v + h * m->bias.v;
     m->drift.w = left * m->drift.w + (m->plain.w - load(m->start.spin)) + push.w + h * m->bias.w;
@@ -279,7 +278,7 @@ bool Engine::commit(Member &m, uint32_t number, dfm_rigid_state *state, double *
     advance(h);
     residual = 0;
     for (Member *each : members) residual = std::max(residual, judge(*each, h));
-    again_ = again = woken || (residual > kResidual && rounds_ < kMostCorrections);
+    again_ = again = woken || (residual > kResidual && rounds_ < kMaxCorrections);
     if (again) {
       ++corrections;
       ++rounds_;

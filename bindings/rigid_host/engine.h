@@ -93,12 +93,12 @@ struct Member {
   virtual bool enabled() const = 0;
   virtual Facts facts() const = 0;
   virtual std::array<double, 2> idle_limits() const = 0;  // m/s, rad/s
-  Motion answer(const Motion &p) const {                  // M^-1 p at the start
-    return is_none(p.v) && is_none(p.w) ? Motion{} : answer_of(p);
+  Motion response(const Motion &p) const {                // M^-1 p at the start
+    return is_none(p.v) && is_none(p.w) ? Motion{} : response_of(p);
   }
 
  private:
-  Motion answer_of(const Motion &p) const;
+  Motion response_of(const Motion &p) const;
   dfm_rigid_state marked_{};
 };
 
@@ -143,10 +143,10 @@ class Engine {
   virtual void run(double h) = 0;         // the engine's own step
   // a free body's end, which is computed here: rotation of its principal axes, spin
   virtual void turned(Member &m, Quat to, Vec spin) = 0;
-  virtual void rest(double h) = 0;  // who falls asleep after it
-  virtual void give_back() = 0;     // the caller's forces
-  virtual void close() = 0;         // what the engine made for a sub-step goes
-  virtual void ended() {}           // all of the step is over
+  virtual void rest(double h) = 0;    // who falls asleep after it
+  virtual void restore_forces() = 0;  // the caller's forces
+  virtual void close() = 0;           // what the engine made for a sub-step goes
+  virtual void ended() {}             // all of the step is over
   bool stepped() const { return stepped_; }
   double step_length() const { return h_; }
 

@@ -45,7 +45,7 @@ class SeatHost : public Host {
   bool commit(const dfm_rigid_step &step, dfm_rigid_state *state, double *extra) override {
     return member_.engine->commit(member_, 0, state, extra, step.h);
   }
-  dfm_status may_destroy() override { return seat_.leaves ? dfm_status{DFM_OK} : seat_.refuse(); }
+  dfm_status may_destroy() override { return seat_.removable ? dfm_status{DFM_OK} : seat_.refuse(); }
 
  private:
   const EngineKind &kind_;

@@ -14,7 +14,7 @@ struct Seat {
   static constexpr uint64_t kMagic = 0x6465666f726d6f64ull;
   uint64_t magic = kMagic;
   Member *member = nullptr;
-  bool leaves = false;                 // its adapter removes it
+  bool removable = false;              // its adapter removes it
   std::function<dfm_status()> refuse;  // dfm_rigid_destroy: the sentence that says what to call instead
 };
 

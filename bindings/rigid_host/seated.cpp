@@ -30,7 +30,7 @@ dfm_status Seated::create(dfm_world in, const char *host, Member &m) {
   return dfm_rigid_get_state(rigid, &world);
 }
 
-dfm_status States::ask(dfm_world world) {
+dfm_status States::poll(dfm_world world) {
   next_ = count_ = 0;
   uint32_t n = 0;
   const auto room = [&] { return static_cast<uint32_t>(rigids_.size()); };
@@ -71,7 +71,7 @@ dfm_status Seated::agree(bool restored, States &now) {
 }
 
 dfm_status Seated::release() {
-  seat.leaves = true;
+  seat.removable = true;
   return dfm_rigid_destroy(rigid);
 }
 
@@ -79,13 +79,13 @@ dfm_status Seated::after(dfm_status of_step, States &now) {
   Member &m = *seat.member;
   const dfm_rigid_state *const known = now.of(rigid);
   if (known) world = *known;
-  const dfm_status told = known ? dfm_status{DFM_OK} : dfm_rigid_get_state(rigid, &world);
-  if (of_step != DFM_OK && told == DFM_OK && !same(world, m.state())) m.put(world);
+  const dfm_status get_status = known ? dfm_status{DFM_OK} : dfm_rigid_get_state(rigid, &world);
+  if (of_step != DFM_OK && get_status == DFM_OK && !same(world, m.state())) m.put(world);
   m.mark();
-  return told;
+  return get_status;
 }
 
-dfm_status Clock::ask(dfm_world world, bool &restored) {
+dfm_status Clock::poll(dfm_world world, bool &restored) {
   dfm_world_stats now{};
   now.size = sizeof now;
   TRY(dfm_world_get_stats(world, &now));

@@ -21,7 +21,7 @@ dfm_pose to_pose(const Pose &p);
 // The states of a dfm_world's rigid bodies, asked for in one call.
 class States {
  public:
-  dfm_status ask(dfm_world world);
+  dfm_status poll(dfm_world world);
   // Quick where bodies are asked for in the order in which they were made.
   // null: there is no such body.
   const dfm_rigid_state *of(dfm_rigid rigid);
@@ -54,7 +54,7 @@ struct Seated {
 struct Clock {
   double time = 0;
   uint64_t steps = 0;
-  dfm_status ask(dfm_world world, bool &restored);
+  dfm_status poll(dfm_world world, bool &restored);
 };
 
 // The caller may have destroyed the obstacle that represents a shape: then the shape takes no further part.

@@ -38,7 +38,7 @@ class Stream {
   void hear() {
     const std::vector<std::string> requests = sender_.take();
     if (sender_.steered() != (viewer_ != 0)) {
-      if (viewer_) server_.leave(viewer_);
+      if (viewer_) server_.remove_viewer(viewer_);
       viewer_ = viewer_ ? 0 : server_.join();
     }
     for (const std::string &text : requests) server_.hear(viewer_, text);
@@ -46,7 +46,7 @@ class Stream {
   void show() {
     try {
       sender_.show();
-      if (viewer_) sender_.tell(session_.brief_state(viewer_, told_++));
+      if (viewer_) sender_.send_state(session_.brief_state(viewer_, sent_slider_++));
     } catch (const cli::Failure &) {  // of which the session tells
     }
   }
@@ -56,8 +56,8 @@ class Stream {
   live::Session &session_;
   Server &server_;
   cli::RtpSender sender_;
-  uint32_t viewer_ = 0;  // its number; 0: none steers
-  size_t told_ = 0;      // the slider of which it is told next
+  uint32_t viewer_ = 0;     // its number; 0: none steers
+  size_t sent_slider_ = 0;  // the slider of which it is told next
 };
 
 // Until a signal ends it.

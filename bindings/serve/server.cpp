@@ -14,8 +14,8 @@ namespace serve {
 namespace {
 
 constexpr size_t kLongestText = 1024;  // bytes of a viewer's message
-constexpr size_t kMostRequests = 256;  // that wait for the simulation; what comes beyond is dropped
-constexpr size_t kMostViewers = 32, kMostChanges = 64;
+constexpr size_t kMaxRequests = 256;   // that wait for the simulation; what comes beyond is dropped
+constexpr size_t kMaxViewers = 32, kMaxChanges = 64;
 
 struct Http { size_t sent; };  // of the page
 
@@ -92,7 +92,7 @@ struct Server::Call {
     switch (reason) {
       case LWS_CALLBACK_FILTER_PROTOCOL_CONNECTION: return of(wsi).allowed(wsi) ? 0 : -1;
       case LWS_CALLBACK_ESTABLISHED: of(wsi).joins(*viewer, wsi); return 0;
-      case LWS_CALLBACK_CLOSED: of(wsi).leave(viewer->number); return 0;
+      case LWS_CALLBACK_CLOSED: of(wsi).remove_viewer(viewer->number); return 0;
       case LWS_CALLBACK_RECEIVE: {
         if (lws_frame_is_binary(wsi)) return -1;  // of text the library checks that it is UTF-8
         const bool ends = lws_is_final_fragment(wsi) && lws_remaining_packet_payload(wsi) == 0;
@@ -180,7 +180,7 @@ void Server::show_scene(Bytes whole, Bytes changed) {
     ++scene_number_;
     if (part) changes_.push_back({scene_number_, std::move(part)});
     else changes_.clear();
-    if (changes_.size() > kMostChanges) changes_.pop_front();
+    if (changes_.size() > kMaxChanges) changes_.pop_front();
   }
   wake();
 }
@@ -254,7 +254,7 @@ bool Server::allowed(lws *wsi) const {
 
 uint32_t Server::join() {
   const std::lock_guard lock(mutex_);
-  if (present_.size() >= kMostViewers) return 0;
+  if (present_.size() >= kMaxViewers) return 0;
   present_.push_back(++last_viewer_);
   if (!control_) control_ = last_viewer_;
   return last_viewer_;
@@ -265,7 +265,7 @@ void Server::joins(Viewer &viewer, lws *wsi) {
   if (viewer.number) lws_callback_on_writable(wsi);
 }
 
-void Server::leave(uint32_t viewer) {
+void Server::remove_viewer(uint32_t viewer) {
   const std::lock_guard lock(mutex_);
   std::erase(present_, viewer);
   if (control_ == viewer) control_ = present_.empty() ? 0 : present_.front();
@@ -276,7 +276,7 @@ void Server::hear(uint32_t viewer, const std::string &text) {
   std::erase_if(bare, [](char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; });
   const std::lock_guard lock(mutex_);
   if (viewer && bare == R"({"do":"take"})") control_ = viewer;
-  else if (viewer && viewer == control_ && requests_.size() < kMostRequests)
+  else if (viewer && viewer == control_ && requests_.size() < kMaxRequests)
     requests_.push_back({viewer, text});
 }
 

@@ -38,7 +38,7 @@ class Server final : public live::Viewers {
   uint32_t in_control() const override;
   // A viewer by another transport, which has its place among those of control. 0: there are too many.
   uint32_t join();
-  void leave(uint32_t viewer);
+  void remove_viewer(uint32_t viewer);
   void hear(uint32_t viewer, const std::string &text);
   bool works() const;  // false: the network has failed
 

@@ -10,12 +10,11 @@
 
 namespace cli {
 
-// dfm_slot is 16 bytes in all of ABI 1; longer rows are of another type and say so, smaller ones are a
-// mistake.
+// dfm_slot is 16 bytes in ABI 1; longer rows are of a later type, shorter ones are an error.
 constexpr uint32_t kSlotHead = 16;
 static_assert(sizeof(dfm_slot) == kSlotHead);
 
-inline bool slot_size_sound(uint32_t slot_size) {
+inline bool is_slot_size(uint32_t slot_size) {
   return slot_size == 0 ||
          (slot_size >= kSlotHead && slot_size <= 65536 && slot_size % sizeof(uint32_t) == 0);
 }
@@ -35,8 +34,7 @@ inline std::optional<std::vector<dfm_slot>> slot_rows(const dfm_slots *own) {
   if (!own || own->size < kHead || own->size > 65536) return std::nullopt;
   dfm_slots full{};
   std::memcpy(&full, own, std::min<size_t>(own->size, sizeof full));
-  if (full.nslot > 4096 || (full.nslot && !full.slots) || !slot_size_sound(full.slot_size))
-    return std::nullopt;
+  if (full.nslot > 4096 || (full.nslot && !full.slots) || !is_slot_size(full.slot_size)) return std::nullopt;
   return slot_rows(full.slots, full.nslot, full.slot_size);
 }
 

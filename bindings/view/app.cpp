@@ -110,19 +110,19 @@ void App::attempt(const std::function<void()> &what) {
 void App::frame() {
   const bool idle = !script_ && !running_ && held_ < 0 && !space_mouse_ && !stage_->pull.holds();
   std::vector<Input> inputs = window_->poll(idle ? 0.05 : 0);
-  std::vector<ScriptLine> due;
+  std::vector<ScriptLine> current;
   const double now = window_->now();
   double seconds = std::min(now - last_, 0.1);
   if (script_) {
     seconds = kFrame;
-    script_->frame(double(frames_) * kFrame, inputs, due);
+    script_->frame(double(frames_) * kFrame, inputs, current);
   }
   frame_ms_ += 0.1 * (1e3 * (now - last_) - frame_ms_);
   last_ = now;
   ++frames_;
   window_->begin_panels(inputs, seconds);
   for (const Input &in : inputs) handle(in);
-  for (const ScriptLine &line : due)
+  for (const ScriptLine &line : current)
     if (line.kind == ScriptLine::slider) set_slider(line.name, line.value);
   attempt([&] {
     pull_to_mouse();
@@ -132,7 +132,7 @@ void App::frame() {
   stage_->plots.sample();
   panels();
   if (!draw()) return;
-  for (const ScriptLine &line : due)
+  for (const ScriptLine &line : current)
     if (line.kind == ScriptLine::shot) shot(line.name);
   window_->show();
   if (script_ && script_->done()) quit_ = true;
@@ -147,7 +147,7 @@ void App::first_look() {
 
 void App::key(const std::string &name) {
   message_.clear();
-  if (name != "b") asked_ = false;
+  if (name != "b") confirmed_ = false;
   if (name == "space") {
     if (replay_ && !running_ && shown_ + 1 == replay_->states.size()) show_state(0);
     if (!replay_ && !running_ && stage_->simulation.at_end()) stage_->simulation.go_on();

@@ -47,7 +47,7 @@ class App final : public Hands {
   bool leads(double dx, double dy) override;
   bool leads_deeper(double turns) override;
   bool tool_key(const std::string &name);  // false: no key of tools
-  void ask_for_probe();
+  void request_probe();
   void lead(double dx, double dy);  // the tool in hand by the mouse
   void lead_by_space_mouse(double now);
   void add_probe();
@@ -92,7 +92,7 @@ class App final : public Hands {
   double lead_[6] = {};           // from the tool in hand to where it shall go
   double strongest_[2] = {0, 0};  // N, N m, of an arrow of full length
   std::string message_;           // for the user, until the next one
-  bool asked_ = false;            // whether b shall start the scene again; the next key answers
+  bool confirmed_ = false;        // whether b shall start the scene again; the next key answers
   uint32_t saved_ = 0;            // states
   size_t shown_ = 0;              // state of the recording
 };

@@ -10,7 +10,7 @@ using render::Vec;
 namespace {
 
 constexpr double kNear = 0.05, kLine = 0.3, kFar = 4;  // of the way to what the camera looks at
-constexpr double kLeast = 1e-3;                        // of a stroke, about radians
+constexpr double kMin = 1e-3;                          // of a stroke, about radians
 
 }  // namespace
 
@@ -68,7 +68,7 @@ void Hands::mouse(const Input &in) {
         blade[3 * i + 1] = corners[i].y;
         blade[3 * i + 2] = corners[i].z;
       }
-      if (render::norm(begin.direction - end.direction) > kLeast) cut(blade);
+      if (render::norm(begin.direction - end.direction) > kMin) cut(blade);
     }
   }
   if (in.kind != Input::move || held_ < 0 || leads(dx, dy)) return;

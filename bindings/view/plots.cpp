@@ -8,14 +8,14 @@
 namespace view {
 namespace {
 
-constexpr size_t kMost = 600;  // samples
+constexpr size_t kMax = 600;  // samples
 
 }  // namespace
 
 void Plot::add(double time, const double *values) {
   if (!times.empty() && time <= times.back()) return;
   const auto push = [](auto &list, auto x) {
-    if (list.size() == kMost) list.erase(list.begin());
+    if (list.size() == kMax) list.erase(list.begin());
     list.push_back(x);
   };
   push(times, time);

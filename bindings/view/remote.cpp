@@ -16,7 +16,7 @@ using render::Vec;
 
 namespace {
 
-constexpr size_t kMostPlots = 32;  // probes
+constexpr size_t kMaxPlots = 32;  // probes
 
 // Distance along a ray to triangles; infinite: it meets none.
 double distance(const live::Received::Mesh &m, const Ray &ray) {
@@ -51,21 +51,21 @@ Remote::Remote(const Options &options, const cli::Globals &globals)
 void Remote::frame() {
   std::vector<Input> inputs = window_->poll(0.004);
   receiver_.hear();
-  std::vector<ScriptLine> due;
+  std::vector<ScriptLine> current;
   const double now = window_->now();
   if (size_ == 0) first_look();
   if (size_ == 0) began_ = now;
-  else if (script_) script_->frame(now - began_, inputs, due);
+  else if (script_) script_->frame(now - began_, inputs, current);
   window_->begin_panels(inputs, now - last_);
   last_ = now;
   for (const Input &in : inputs) handle(in);
-  for (const ScriptLine &line : due)
+  for (const ScriptLine &line : current)
     if (line.kind == ScriptLine::slider) set_slider(line.name, line.value);
   pull_to_mouse();
   sample();
   panels();
   draw();
-  for (const ScriptLine &line : due)
+  for (const ScriptLine &line : current)
     if (line.kind == ScriptLine::shot) shot(line.name);
   window_->show();
   if (script_ && (script_->done() || (size_ == 0 && receiver_.ended()))) quit_ = true;
@@ -83,12 +83,12 @@ void Remote::first_look() {
   orbit_.set(render::auto_camera(picture, canvas_.aspect()));
 }
 
-void Remote::ask(const char *what, const std::function<void(cli::JsonObject &)> &more,
-                 const std::string &replaces) {
+void Remote::send_request(const char *what, const std::function<void(cli::JsonObject &)> &more,
+                          const std::string &replaces) {
   cli::JsonObject request;
   request.add("do", cli::quoted(what));
   if (more) more(request);
-  receiver_.ask(request, replaces);
+  receiver_.send(request, replaces);
 }
 
 bool Remote::steers() const {
@@ -98,13 +98,13 @@ bool Remote::steers() const {
 
 void Remote::key(const std::string &name) {
   if (name == "space") {
-    ask("run", [&](cli::JsonObject &r) { r.add("on", running() ? "false" : "true"); });
+    send_request("run", [&](cli::JsonObject &r) { r.add("on", running() ? "false" : "true"); });
   } else if (name == "s" || name == ".") {
-    ask("step");
+    send_request("step");
   } else if (name == "r") {
-    ask("reset");
+    send_request("reset");
   } else if (name == "c") {
-    ask("take");
+    send_request("take");
   } else if (name == "home") {
     size_ = 0;
     set_ = false;
@@ -116,13 +116,13 @@ void Remote::key(const std::string &name) {
 void Remote::release(int button) {
   if (button != kLeft || !pulled_) return;
   pulled_.reset();
-  ask("release");
+  send_request("release");
 }
 
 void Remote::cut(const double blade[12]) {
   std::vector<std::string> corners;
   for (int i = 0; i < 12; ++i) corners.push_back(cli::number(blade[i]));
-  ask("cut", [&](cli::JsonObject &r) { r.add("blade", cli::json_array(corners)); });
+  send_request("cut", [&](cli::JsonObject &r) { r.add("blade", cli::json_array(corners)); });
 }
 
 void Remote::press(int button) {
@@ -136,7 +136,7 @@ void Remote::press(int button) {
     return;
   }
   pulled_ = at.origin + at.direction * far;
-  ask("grab", [&](cli::JsonObject &r) {
+  send_request("grab", [&](cli::JsonObject &r) {
     r.add("from", live::text_of(at.origin)).add("along", live::text_of(at.direction));
   });
 }
@@ -147,11 +147,11 @@ void Remote::pull_to_mouse() {
   const Vec to = orbit_.at_depth(across(), above(), aspect(), *pulled_);
   if (render::norm(to - *pulled_) == 0) return;
   pulled_ = to;
-  ask("pull", [&](cli::JsonObject &r) { r.add("to", live::text_of(to)); }, "pull");
+  send_request("pull", [&](cli::JsonObject &r) { r.add("to", live::text_of(to)); }, "pull");
 }
 
 void Remote::set_slider(const std::string &name, double value) {
-  ask(
+  send_request(
       "slider",
       [&](cli::JsonObject &r) { r.add("name", cli::quoted(name)).add("value", cli::number(value)); },
       "slider " + name);
@@ -168,7 +168,7 @@ void Remote::sample() {
     const bool good =
         time == plotted_ && std::ranges::all_of(values, [](double v) { return std::fabs(v) < 1e9; });
     const auto at = plots_.find(title);
-    if (!good || values.size() != fresh.curves.size() || (at == plots_.end() && plots_.size() >= kMostPlots))
+    if (!good || values.size() != fresh.curves.size() || (at == plots_.end() && plots_.size() >= kMaxPlots))
       return;
     Plot &plot = at == plots_.end() ? plots_.emplace(title, fresh).first->second : at->second;
     plot.add(time, values.data());

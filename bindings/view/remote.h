@@ -30,8 +30,8 @@ class Remote final : public Hands {
   void cut(const double blade[12]) override;
   void pull_to_mouse();
   void set_slider(const std::string &name, double value);
-  void ask(const char *what, const std::function<void(cli::JsonObject &)> &more = {},
-           const std::string &replaces = "");
+  void send_request(const char *what, const std::function<void(cli::JsonObject &)> &more = {},
+                    const std::string &replaces = "");
   bool steers() const override;
   bool running() const { return receiver_.state().get("running") == "true"; }
   void first_look();

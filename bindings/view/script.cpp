@@ -11,8 +11,8 @@
 namespace view {
 namespace {
 
-constexpr uint64_t kMost = uint64_t{1} << 24;  // bytes
-constexpr double kEarly = 1e-9;                // s, rounding of the frame clock
+constexpr uint64_t kMax = uint64_t{1} << 24;  // bytes
+constexpr double kEarly = 1e-9;               // s, rounding of the frame clock
 
 // The words of a line, taken one after another.
 class Words {
@@ -98,7 +98,7 @@ Input mouse(Input::Kind kind, const double at[2], int button) {
 }  // namespace
 
 Script::Script(const std::string &path) : path_(path) {
-  std::istringstream text(cli::read_file(path, kMost, "a script of `deform view`"));
+  std::istringstream text(cli::read_file(path, kMax, "a script of `deform view`"));
   size_t number = 0;
   for (std::string line; std::getline(text, line);) {
     ++number;
@@ -111,7 +111,7 @@ Script::Script(const std::string &path) : path_(path) {
                    [](const ScriptLine &a, const ScriptLine &b) { return a.t < b.t; });
 }
 
-void Script::frame(double t, std::vector<Input> &inputs, std::vector<ScriptLine> &due) {
+void Script::frame(double t, std::vector<Input> &inputs, std::vector<ScriptLine> &current) {
   for (const ScriptLine &d : drags_) {
     const double way = d.seconds > 0 ? std::min((t - d.t) / d.seconds, 1.0) : 1;
     const double at[2] = {d.from[0] + way * (d.to[0] - d.from[0]), d.from[1] + way * (d.to[1] - d.from[1])};
@@ -135,7 +135,7 @@ void Script::frame(double t, std::vector<Input> &inputs, std::vector<ScriptLine>
       drags_.push_back(line);
       drags_.back().t = t;
     } else {
-      due.push_back(line);
+      current.push_back(line);
     }
   }
 }

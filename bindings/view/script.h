@@ -32,7 +32,7 @@ class Script {
   // Throws cli::Failure: file, line, what was expected.
   explicit Script(const std::string &path);
   // Inputs of the frame that ends at t, and the sliders and shots of this frame.
-  void frame(double t, std::vector<Input> &inputs, std::vector<ScriptLine> &due);
+  void frame(double t, std::vector<Input> &inputs, std::vector<ScriptLine> &current);
   bool done() const { return next_ == lines_.size() && drags_.empty(); }
   const std::string &path() const { return path_; }
 

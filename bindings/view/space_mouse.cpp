@@ -106,8 +106,8 @@ bool SpaceMouse::listen() {
 // Its z goes away from the user.
 dfm_status SpaceMouse::read(void *self, double t, dfm_device_sample *out) {
   SpaceMouse &m = *static_cast<SpaceMouse *>(self);
-  const double dt = m.asked_ < 0 ? 0 : std::clamp(t - m.asked_, 0.0, kLongest);
-  m.asked_ = t;
+  const double dt = m.polled_ < 0 ? 0 : std::clamp(t - m.polled_, 0.0, kLongest);
+  m.polled_ = t;
   if (!m.listen() || dt == 0) return DFM_DISCARD;
   double share[6];
   for (int k = 0; k < 6; ++k) share[k] = std::clamp(m.motion_[k] / kFull, -1.0, 1.0);

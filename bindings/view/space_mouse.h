@@ -32,7 +32,7 @@ class SpaceMouse {
 
   std::unique_ptr<Library> library_;
   dfm_pose pose_ = {};
-  double opening_ = 0, speed_ = 0, asked_ = -1;
+  double opening_ = 0, speed_ = 0, polled_ = -1;
   render::Vec right_, up_, back_;
   int motion_[6] = {0, 0, 0, 0, 0, 0};  // the last values
   bool pressed_[2] = {false, false};

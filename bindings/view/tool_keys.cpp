@@ -34,7 +34,7 @@ bool App::tool_key(const std::string &name) {
   if (replay_) return true;
   live::Grip &grip = stage_->grip;
   if (name == "b") {
-    ask_for_probe();
+    request_probe();
   } else if (name == "tab") {
     attempt([&] { grip.next(); });
     if (grip.count() == 0) message_ = "The scene has no tool: b adds a ball.";
@@ -95,9 +95,9 @@ bool App::leads_deeper(double turns) {
 }
 
 // What was simulated is lost by it.
-void App::ask_for_probe() {
-  if (stage_->simulation.time() == 0 || asked_) return add_probe();
-  asked_ = true;
+void App::request_probe() {
+  if (stage_->simulation.time() == 0 || confirmed_) return add_probe();
+  confirmed_ = true;
   message_ = "A ball starts the scene again from 0 s: press b once more, or any other key to go on as it is.";
 }
 
@@ -112,7 +112,7 @@ void App::add_probe() {
     fresh->drawing.set_color(stage_->drawing.color());
     stage_ = std::move(fresh);
     options_ = more;
-    asked_ = false;
+    confirmed_ = false;
     stage_->plots.sample();
     wanted_ = stage_->simulation.time();
     saved_ = 0;

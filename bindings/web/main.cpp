@@ -17,7 +17,7 @@
 #include "friction/rig.h"
 #include "live/session.h"
 
-EM_JS(void, give_bytes, (const unsigned char *bytes, size_t n),
+EM_JS(void, copy_bytes, (const unsigned char *bytes, size_t n),
       { Module.give(HEAPU8.slice(bytes, bytes + n).buffer); });
 EM_JS(void, give_text, (const char *utf8), { Module.give(UTF8ToString(utf8)); });
 
@@ -28,10 +28,10 @@ class Page final : public live::Viewers {
  public:
   void show_scene(live::Bytes whole, live::Bytes changed) override {
     const live::Bytes &news = changed.empty() ? whole : changed;
-    give_bytes(news.data(), news.size());
+    copy_bytes(news.data(), news.size());
     whole_ = std::move(whole);
   }
-  void show_frame(live::Bytes &frame) override { give_bytes(frame.data(), frame.size()); }
+  void show_frame(live::Bytes &frame) override { copy_bytes(frame.data(), frame.size()); }
   void show_state(std::string json) override { give_text(json.c_str()); }
   std::vector<live::Request> take() override { return std::exchange(requests_, {}); }
   uint32_t viewers() const override { return 1; }
@@ -41,9 +41,9 @@ class Page final : public live::Viewers {
   void join(const std::string &models, const std::string &laws) const {
     cli::JsonObject out;
     give_text(out.add("you", "1").add("models", models).add("laws", laws).text().c_str());
-    if (!whole_.empty()) give_bytes(whole_.data(), whole_.size());
+    if (!whole_.empty()) copy_bytes(whole_.data(), whole_.size());
   }
-  void ask(const char *text) { requests_.push_back({1, text}); }
+  void add_request(const char *text) { requests_.push_back({1, text}); }
 
  private:
   live::Bytes whole_;
@@ -66,7 +66,7 @@ class Rig {
   explicit Rig(const char *path) : case_(cli::read_case(path)) {}
   void picture() {
     for (const live::Request &request : page.take()) act(request.text);
-    if (std::exchange(due_, false)) run();
+    if (std::exchange(run_pending_, false)) run();
   }
 
  private:
@@ -75,7 +75,7 @@ class Rig {
     if (!cli::parse_json(text, line) || line.get("do") != "slider") return;
     try {
       live::set_slider(sliders_, line);
-      due_ = true;
+      run_pending_ = true;
     } catch (const cli::Failure &e) {
       refuse(e);
     }
@@ -145,7 +145,7 @@ class Rig {
   static constexpr double kStep = 1e-4;  // s
   cli::FrictionCase case_;
   std::vector<live::Slider> sliders_;  // with the ranges that the page has
-  bool due_ = true;
+  bool run_pending_ = true;
 };
 
 std::unique_ptr<Rig> rig;
@@ -192,7 +192,7 @@ EMSCRIPTEN_KEEPALIVE void deform_join() {
   web::page.join(web::ids_of(context.get(), DFM_KIND_MODEL), web::ids_of(context.get(), DFM_KIND_FRICTION));
 }
 // What the viewer asks for, with the next picture.
-EMSCRIPTEN_KEEPALIVE void deform_ask(const char *text) { web::page.ask(text); }
+EMSCRIPTEN_KEEPALIVE void deform_ask(const char *text) { web::page.add_request(text); }
 // s: how long the picture lasts.
 EMSCRIPTEN_KEEPALIVE void deform_picture(double seconds) {
   if (web::session) web::session->picture(seconds);

@@ -44,13 +44,13 @@ struct Batch {
 };
 
 // N: smaller normal forces count as zero; the square of larger ones overflows
-constexpr double kLeast = 1e-140, kMost = 1e140;
+constexpr double kMin = 1e-140, kMax = 1e140;
 constexpr double kFar = 1e100;  // m/s and m: larger values are clamped to this
 constexpr double kWide = 1e20;  // m^2
 
 // Intermediate values of a block of eight contacts.
 struct Block {
-  double poison[kLanes], fn[kLanes], k0[kLanes], k1[kLanes], k2[kLanes];
+  double nan_flag[kLanes], fn[kLanes], k0[kLanes], k1[kLanes], k2[kLanes];
   // by_w = 1/w, constant below 1e-140 m/s
   double vx[kLanes], vy[kLanes], w[kLanes], by_w[kLanes];
   // z0, and 1/fn if the cone has shortened the old bristle, else 0
@@ -85,7 +85,7 @@ struct Columns {
 };
 
 // Whether all eight are within the range of the passes; false if an input is NaN.
-DEFORM_PASS inline bool sound(const dfm_friction_in *in, size_t at) {
+DEFORM_PASS inline bool is_finite(const dfm_friction_in *in, size_t at) {
   const size_t stride = in->stride;
   const double *const fn = in->fn + at;
   const double *const vx = in->vt + at;
@@ -95,7 +95,7 @@ DEFORM_PASS inline bool sound(const dfm_friction_in *in, size_t at) {
   const double *const area = in->area + at;
   uint64_t odd = 0;
   EACH_LANE (i) {
-    const double n = kFar / kMost * fn[i], a = kFar / kWide * area[i];
+    const double n = kFar / kMax * fn[i], a = kFar / kWide * area[i];
     const double size = (vx[i] * vx[i] + vy[i] * vy[i]) + (zx[i] * zx[i] + zy[i] * zy[i]) + (n * n + a * a);
     odd |= size < kFar * kFar ? uint64_t(0) : uint64_t(1);
   }
@@ -116,13 +116,13 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
   uint64_t cuts = 0;
   EACH_LANE (i) {
     // 0 if every input is finite, else NaN, so that a lane with an invalid input has invalid outputs.
-    b.poison[i] =
+    b.nan_flag[i] =
         kSound ? 0.0
                : ((0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * zx[i])) + (0.0 * zy[i] + 0.0 * area[i]);
-    const double touches = fn[i] > kLeast ? fn[i] : 0.0;
+    const double touches = fn[i] > kMin ? fn[i] : 0.0;
     const double a = area[i] > 0 ? area[i] : 0.0;
     const double A = kSound || a < kWide ? a : kWide;
-    b.fn[i] = kSound || touches < kMost ? touches : kMost;
+    b.fn[i] = kSound || touches < kMax ? touches : kMax;
     b.k0[i] = p.sigma0 * A;
     if (!kFlat) {
       b.k1[i] = p.sigma1 * A;
@@ -131,10 +131,10 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
     const double x = kSound ? vx[i] : within(vx[i], kFar);
     const double y = kSound ? vy[i] : within(vy[i], kFar);
     const double square = x * x + y * y;
-    const double ux = square > kLeast * kLeast ? x : 0.0;
-    const double uy = square > kLeast * kLeast ? y : 0.0;
-    const double w = std::sqrt(square > kLeast * kLeast ? square : 0.0);
-    const double by_w = 1.0 / (w > kLeast ? w : kLeast);
+    const double ux = square > kMin * kMin ? x : 0.0;
+    const double uy = square > kMin * kMin ? y : 0.0;
+    const double w = std::sqrt(square > kMin * kMin ? square : 0.0);
+    const double by_w = 1.0 / (w > kMin ? w : kMin);
     b.vx[i] = ux;
     b.vy[i] = uy;
     b.w[i] = w;
@@ -161,7 +161,7 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
     const double scale = outside > 0 ? cone * inverse : 1.0;
     b.zx[i] *= scale;
     b.zy[i] *= scale;
-    b.cut[i] = outside / (b.fn[i] > 0 ? b.fn[i] : kMost);
+    b.cut[i] = outside / (b.fn[i] > 0 ? b.fn[i] : kMax);
   }
 }
 
@@ -204,7 +204,7 @@ DEFORM_PASS inline void damping(const Batch &p, const Block &b, Damping &d) {
       const double level4 = 4.0 * b.g[i];
       const double kw = b.k1[i] * W[i];
       const double sum = level4 + kw;
-      const double inverse = 1.0 / (sum > kLeast ? sum : kLeast);
+      const double inverse = 1.0 / (sum > kMin ? sum : kMin);
       // K1e = K1 share; the limit at g = W = 0 has no effect, because there is no contact
       const double share = level4 * inverse, rest = kw * inverse;
       const double by_speed = -(b.k1[i] * share) * (b.k1[i] * inverse);
@@ -238,12 +238,12 @@ DEFORM_PASS inline void damping(const Batch &p, const Block &b, Damping &d) {
 // motion slips, m = w (Dahl, LuGre). Arguments are pointers that do not overlap; otherwise the compiler would
 // not vectorize.
 template <bool kDamped, bool kFlat, bool kSlips>
-DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, double *__restrict ofx,
-                               double *__restrict ofy, double *__restrict ozx, double *__restrict ozy,
-                               double *__restrict oxx, double *__restrict oxy, double *__restrict oyx,
-                               double *__restrict oyy, double *__restrict onx, double *__restrict ony,
-                               double *__restrict olimit, double *__restrict ostored,
-                               double *__restrict mode) {
+DEFORM_PASS inline void damped_force(const Batch &p, const Block &b, const Damping &d, double *__restrict ofx,
+                                     double *__restrict ofy, double *__restrict ozx, double *__restrict ozy,
+                                     double *__restrict oxx, double *__restrict oxy, double *__restrict oyx,
+                                     double *__restrict oyy, double *__restrict onx, double *__restrict ony,
+                                     double *__restrict olimit, double *__restrict ostored,
+                                     double *__restrict mode) {
   EACH_LANE (i) {
     const double k0 = b.k0[i];
     const double hk = p.h * k0;
@@ -254,8 +254,8 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d,
     const double z0x = b.zx[i];
     const double z0y = b.zy[i];
     const double sum = g + hk * m;
-    const double divisor = sum > kLeast * 1e-10 ? sum : kLeast * 1e-10;
-    const double poison = b.poison[i];
+    const double divisor = sum > kMin * 1e-10 ? sum : kMin * 1e-10;
+    const double nan_flag = b.nan_flag[i];
     // q itself: exactly 1 at rest, so that a holding bristle does not decay
     const double q = g / divisor, inverse = 1.0 / divisor;
     const double tx = z0x + p.h * vx, ty = z0y + p.h * vy, zx = tx * q, zy = ty * q;
@@ -301,27 +301,27 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d,
     }
     const double trial2 = (k0 * tx) * (k0 * tx) + (k0 * ty) * (k0 * ty);
     mode[i] = touches + touches * (trial2 > g * g ? 1.0 : 0.0);
-    ofx[i] = poison - fx;
-    ofy[i] = poison - fy;
-    ozx[i] = zx + poison;
-    ozy[i] = zy + poison;
-    oxx[i] = poison - dxx;
-    oxy[i] = poison - dxy;
-    oyx[i] = poison - dyx;
-    oyy[i] = poison - dyy;
-    onx[i] = poison - fnx;
-    ony[i] = poison - fny;
-    olimit[i] = most + poison;
-    ostored[i] = 0.5 * (k0 * zx * zx + k0 * zy * zy) + poison;
+    ofx[i] = nan_flag - fx;
+    ofy[i] = nan_flag - fy;
+    ozx[i] = zx + nan_flag;
+    ozy[i] = zy + nan_flag;
+    oxx[i] = nan_flag - dxx;
+    oxy[i] = nan_flag - dxy;
+    oyx[i] = nan_flag - dyx;
+    oyy[i] = nan_flag - dyy;
+    onx[i] = nan_flag - fnx;
+    ony[i] = nan_flag - fny;
+    olimit[i] = most + nan_flag;
+    ostored[i] = 0.5 * (k0 * zx * zx + k0 * zy * zy) + nan_flag;
   }
 }
 
 template <bool kDamped, bool kFlat, bool kSlips>
-DEFORM_PASS inline void answer(const Batch &p, const Block &b, const Damping &d, const Columns &c, size_t at,
-                               double *mode) {
-  answer<kDamped, kFlat, kSlips>(p, b, d, c.to(kFx, at), c.to(kFy, at), c.to(kZx, at), c.to(kZy, at),
-                                 c.to(kXx, at), c.to(kXy, at), c.to(kYx, at), c.to(kYy, at), c.to(kNx, at),
-                                 c.to(kNy, at), c.to(kLimit, at), c.to(kStored, at), mode);
+DEFORM_PASS inline void damped_force(const Batch &p, const Block &b, const Damping &d, const Columns &c,
+                                     size_t at, double *mode) {
+  damped_force<kDamped, kFlat, kSlips>(
+      p, b, d, c.to(kFx, at), c.to(kFy, at), c.to(kZx, at), c.to(kZy, at), c.to(kXx, at), c.to(kXy, at),
+      c.to(kYx, at), c.to(kYy, at), c.to(kNx, at), c.to(kNy, at), c.to(kLimit, at), c.to(kStored, at), mode);
 }
 
 // A law of the family defines Law::batch(params), Law::kFlat, and Law::flow(params, batch, block), which
@@ -337,17 +337,17 @@ struct Run {
       double mode[kLanes];
       Block b;
       Damping d;
-      if (sound(in, at)) load<true, kFlat>(p, in, at, b);
+      if (is_finite(in, at)) load<true, kFlat>(p, in, at, b);
       else load<false, kFlat>(p, in, at, b);
       level<kFlat>(p, b);
       const bool fills = Law::flow(in->params, p, b);
       if (!kFlat && p.sigma1 > 0) {
         fills ? damping<false>(p, b, d) : damping<true>(p, b, d);
-        fills ? answer<true, kFlat, false>(p, b, d, to, at, mode)
-              : answer<true, kFlat, true>(p, b, d, to, at, mode);
+        fills ? damped_force<true, kFlat, false>(p, b, d, to, at, mode)
+              : damped_force<true, kFlat, true>(p, b, d, to, at, mode);
       } else {
-        fills ? answer<false, kFlat, false>(p, b, d, to, at, mode)
-              : answer<false, kFlat, true>(p, b, d, to, at, mode);
+        fills ? damped_force<false, kFlat, false>(p, b, d, to, at, mode)
+              : damped_force<false, kFlat, true>(p, b, d, to, at, mode);
       }
       if (out->mode)
         for (uint32_t i = 0; i < kLanes; ++i) out->mode[at + i] = static_cast<uint8_t>(mode[i]);

@@ -75,12 +75,12 @@ DEFORM_NARROW dfm_status eval_narrow(const dfm_friction_in *in, dfm_friction_out
 
 // DEFORM_SIMD (sse2, avx2, avx512) limits the width; read when the plugin is loaded.
 inline Width chosen() {
-  const char *const asked = std::getenv("DEFORM_SIMD");
+  const char *const requested = std::getenv("DEFORM_SIMD");
   const Width most = widest();
-  const Width w = !asked                        ? most
-                  : !std::strcmp(asked, "sse2") ? kNarrow
-                  : !std::strcmp(asked, "avx2") ? kAvx2
-                                                : most;
+  const Width w = !requested                        ? most
+                  : !std::strcmp(requested, "sse2") ? kNarrow
+                  : !std::strcmp(requested, "avx2") ? kAvx2
+                                                    : most;
   return w < most ? w : most;
 }
 inline const Width kChosen = chosen();

@@ -61,7 +61,8 @@ inline Polar polar(double x, double y) {
 
 inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
   const double fn = b.fn[i], drag = p.sigma2 * b.area[i], stiction = p.mu_s * fn;
-  const double poison = 0.0 * fn + 0.0 * b.vx[i] + 0.0 * b.vy[i] + 0.0 * b.sx[i] + 0.0 * b.sy[i] + 0.0 * drag;
+  const double nan_flag =
+      0.0 * fn + 0.0 * b.vx[i] + 0.0 * b.vy[i] + 0.0 * b.sx[i] + 0.0 * b.sy[i] + 0.0 * drag;
   const Polar stop = polar(b.sx[i], b.sy[i]), v = polar(b.vx[i], b.vy[i]);
   const double w = v.length > p.band ? v.length : 0.0;
   const double x = w / p.v_s;
@@ -94,19 +95,19 @@ inline void odd_lane(const Batch &p, const Block &b, Passes &t, uint32_t i) {
       yy = -(across + d * dy * dy);
     }
   }
-  b.fx[i] = fx + poison;
-  b.fy[i] = fy + poison;
-  b.limit[i] = limit + poison;
-  b.nx[i] = nx + poison;
-  b.ny[i] = ny + poison;
-  b.xx[i] = xx + poison;
-  b.xy[i] = b.yx[i] = xy + poison;
-  b.yy[i] = yy + poison;
+  b.fx[i] = fx + nan_flag;
+  b.fy[i] = fy + nan_flag;
+  b.limit[i] = limit + nan_flag;
+  b.nx[i] = nx + nan_flag;
+  b.ny[i] = ny + nan_flag;
+  b.xx[i] = xx + nan_flag;
+  b.xy[i] = b.yx[i] = xy + nan_flag;
+  b.yy[i] = yy + nan_flag;
 }
 
 // The passes below select values instead of branching: real batches mix stick and slip, and a mispredicted
 // branch costs more than computing both sides. Returns whether any lane slips; with kinetic_stop these are
-// the lanes beyond the band, and answer() finds those that stop.
+// the lanes beyond the band, and forces() finds those that stop.
 struct Found { bool slips, odd; };
 template <bool kKineticStop>
 DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
@@ -136,7 +137,7 @@ DEFORM_PASS inline Found decide(const Batch &p, const Block &b, Passes &t) {
 }
 
 template <bool kKineticStop>
-DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double *__restrict ofx,
+DEFORM_PASS inline void forces(const Batch &p, const Block &b, Passes &t, double *__restrict ofx,
                                double *__restrict ofy, double *__restrict olimit, double *__restrict oxx,
                                double *__restrict oxy, double *__restrict oyx, double *__restrict oyy,
                                double *__restrict onx, double *__restrict ony) {
@@ -148,7 +149,7 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double
     const double sx = b.sx[i];
     const double sy = b.sy[i];
     // 0 where every input is finite, NaN otherwise: no output of a bad lane passes for a good one.
-    const double poison = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
+    const double nan_flag = 0.0 * fn + 0.0 * vx + 0.0 * vy + 0.0 * sx + 0.0 * sy + 0.0 * drag;
     const double load = fn > 0 ? fn : 0.0;
     const double mu = p.mu_c + (p.mu_s - p.mu_c) * t.excess[i];
     const double w = t.w[i];
@@ -167,16 +168,16 @@ DEFORM_PASS inline void answer(const Batch &p, const Block &b, Passes &t, double
     const double dx = -ux * inverse, dy = -uy * inverse, across = fs * inverse;
     const double along = ((p.mu_s - p.mu_c) * load * t.slope[i] + drag * w) * inverse;
     const double d = along - across;
-    const double xy = -(d * dx * dy) + poison;
-    ofx[i] = (fs * dx + hx) + poison;
-    ofy[i] = (fs * dy + hy) + poison;
-    olimit[i] = (moves > 0 ? level : stiction) + poison;
-    onx[i] = mu * dx + poison;
-    ony[i] = mu * dy + poison;
-    oxx[i] = poison - (across + d * dx * dx);
+    const double xy = -(d * dx * dy) + nan_flag;
+    ofx[i] = (fs * dx + hx) + nan_flag;
+    ofy[i] = (fs * dy + hy) + nan_flag;
+    olimit[i] = (moves > 0 ? level : stiction) + nan_flag;
+    onx[i] = mu * dx + nan_flag;
+    ony[i] = mu * dy + nan_flag;
+    oxx[i] = nan_flag - (across + d * dx * dx);
     oxy[i] = xy;
     oyx[i] = xy;
-    oyy[i] = poison - (across + d * dy * dy);
+    oyy[i] = nan_flag - (across + d * dy * dy);
     if (kKineticStop) t.mode[i] = mode - stops;
   }
 }
@@ -211,7 +212,7 @@ struct Run {
       Passes t;
       const Found found = decide<Law::kKineticStop>(p, b, t);
       if (found.slips && p.mu_s != p.mu_c) lanes::curve(p.v_s, p.delta, t.w, t.excess, t.slope);
-      answer<Law::kKineticStop>(p, b, t, b.fx, b.fy, b.limit, b.xx, b.xy, b.yx, b.yy, b.nx, b.ny);
+      forces<Law::kKineticStop>(p, b, t, b.fx, b.fy, b.limit, b.xx, b.xy, b.yx, b.yy, b.nx, b.ny);
       for (uint32_t i = 0; found.odd && i < kLanes; ++i)
         if (t.odd[i] > 0) odd_lane(p, b, t, i);
       if (out->mode)

@@ -32,17 +32,17 @@ namespace {
 using lanes::kLanes;
 using lanes::within;
 
-constexpr uint32_t kMost = 16, kUsual = 4;  // elements
-enum { kMuC, kMuS, kVs, kDelta, kSigma2, kC, kK, kNu = kK + kMost };
+constexpr uint32_t kMax = 16, kUsual = 4;  // elements
+enum { kMuC, kMuS, kVs, kDelta, kSigma2, kC, kK, kNu = kK + kMax };
 constexpr dfm_param kRows[] = {
     CURVE_ROWS,
     dfm::plugin::param("sigma2", "viscous friction per area", "N s/m^3", 0, 1e12, 0, DFM_PARAM_RUNTIME),
     dfm::plugin::param("C", "rate at which slipping elements approach their level, per area", "N/(s m^2)", 0,
                        1e15, 1e5, DFM_PARAM_RUNTIME),
     dfm::plugin::param("k", "stiffness of the elements per area, one for each; none: 4e7 3e7 2e7 1e7",
-                       "N/m^3", 0, 1e15, 0, DFM_PARAM_RUNTIME | DFM_PARAM_LIST, kMost),
+                       "N/m^3", 0, 1e15, 0, DFM_PARAM_RUNTIME | DFM_PARAM_LIST, kMax),
     dfm::plugin::param("nu", "shares of the level, together 1; none: 0.2 0.3 0.3 0.2", "1", 0, 1, 0,
-                       DFM_PARAM_RUNTIME | DFM_PARAM_LIST, kMost),
+                       DFM_PARAM_RUNTIME | DFM_PARAM_LIST, kMax),
 };
 constexpr double kUsualK[kUsual] = {4e7, 3e7, 2e7, 1e7}, kUsualNu[kUsual] = {0.2, 0.3, 0.3, 0.2};
 
@@ -51,20 +51,20 @@ constexpr double kUsualK[kUsual] = {4e7, 3e7, 2e7, 1e7}, kUsualNu[kUsual] = {0.2
 constexpr uint32_t flag_of(uint32_t n) { return 2 * n; }
 constexpr uint32_t budget_of(uint32_t n) { return 3 * n; }
 struct Slots {
-  dfm_slot slot[kMost + 1];
+  dfm_slot slot[kMax + 1];
   constexpr explicit Slots(uint32_t n) : slot{} {
     for (uint32_t e = 0; e < n; ++e) slot[e] = {DFM_PER_CONTACT, 2, DFM_SLOT_TANGENT, 0};
     slot[n] = {DFM_PER_CONTACT, n + 1, DFM_SLOT_SCALAR, 0};
   }
 };
 template <size_t... N>
-constexpr std::array<Slots, kMost> all_slots(std::index_sequence<N...>) {
+constexpr std::array<Slots, kMax> all_slots(std::index_sequence<N...>) {
   return {Slots(N + 1)...};
 }
-constexpr std::array<Slots, kMost> kSlots = all_slots(std::make_index_sequence<kMost>{});
+constexpr std::array<Slots, kMax> kSlots = all_slots(std::make_index_sequence<kMax>{});
 
 uint32_t given(const double *p) {  // up to the last nonzero one
-  uint32_t n = kMost;
+  uint32_t n = kMax;
   while (n > 0 && p[n - 1] == 0) --n;
   return n;
 }
@@ -75,7 +75,7 @@ uint32_t elements(const double *params) {
 }
 
 struct Batch {
-  double h, mu_c, mu_s, v_s, delta, sigma2, c, k[kMost] = {}, nu[kMost] = {};
+  double h, mu_c, mu_s, v_s, delta, sigma2, c, k[kMax] = {}, nu[kMax] = {};
   uint32_t n;  // elements
   Batch(const double *p, double dt)
       : h(dt),
@@ -92,11 +92,11 @@ struct Batch {
   }
 };
 
-constexpr double kLeast = 1e-140, kLargest = 1e140, kFar = 1e100, kWide = 1e20;  // as in bristle.h
+constexpr double kMin = 1e-140, kLargest = 1e140, kFar = 1e100, kWide = 1e20;  // as in bristle.h
 
 struct Block {
-  double poison[kLanes], fn[kLanes], area[kLanes], vx[kLanes], vy[kLanes], w[kLanes], ex[kLanes], ey[kLanes],
-      mu[kLanes], g[kLanes], slope[kLanes];
+  double nan_flag[kLanes], fn[kLanes], area[kLanes], vx[kLanes], vy[kLanes], w[kLanes], ex[kLanes],
+      ey[kLanes], mu[kLanes], g[kLanes], slope[kLanes];
   // sums over elements
   double fx[kLanes], fy[kLanes], xx[kLanes], xy[kLanes], yx[kLanes], yy[kLanes], nx[kLanes], ny[kLanes],
       stored[kLanes], slips[kLanes];
@@ -108,18 +108,18 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
   const size_t stride = in->stride;
   const double *fn = in->fn + at, *vx = in->vt + at, *vy = vx + stride, *area = in->area + at;
   EACH_LANE (i) {
-    b.poison[i] = (0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * area[i]);
-    const double touches = fn[i] > kLeast ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0;
+    b.nan_flag[i] = (0.0 * fn[i] + 0.0 * vx[i]) + (0.0 * vy[i] + 0.0 * area[i]);
+    const double touches = fn[i] > kMin ? fn[i] : 0.0, a = area[i] > 0 ? area[i] : 0.0;
     b.fn[i] = touches < kLargest ? touches : kLargest;
     b.area[i] = a < kWide ? a : kWide;
     const double x = within(vx[i], kFar);
     const double y = within(vy[i], kFar);
     const double square = x * x + y * y;
-    const double moves = square > kLeast * kLeast ? 1.0 : 0.0;
+    const double moves = square > kMin * kMin ? 1.0 : 0.0;
     b.vx[i] = x * moves;
     b.vy[i] = y * moves;
     b.w[i] = std::sqrt(square * moves);
-    const double by_w = 1.0 / (b.w[i] > kLeast ? b.w[i] : kLeast);
+    const double by_w = 1.0 / (b.w[i] > kMin ? b.w[i] : kMin);
     b.ex[i] = b.vx[i] * by_w;
     b.ey[i] = b.vy[i] * by_w;
     const double open = b.fn[i] > 0 ? 1.0 : 0.0, drag = open * (p.sigma2 * b.area[i]);
@@ -134,7 +134,7 @@ DEFORM_PASS inline void load(const Batch &p, const dfm_friction_in *in, size_t a
   EACH_LANE (i) {
     b.mu[i] = b.fn[i] > 0 ? p.mu_c + (p.mu_s - p.mu_c) * excess[i] : 0.0;
     b.g[i] = b.mu[i] * b.fn[i];
-    b.slope[i] = (p.mu_s - p.mu_c) * b.fn[i] * fall[i] / (b.w[i] > kLeast ? b.w[i] : kLeast);  // g'(w)
+    b.slope[i] = (p.mu_s - p.mu_c) * b.fn[i] * fall[i] / (b.w[i] > kMin ? b.w[i] : kMin);  // g'(w)
   }
 }
 
@@ -152,7 +152,7 @@ DEFORM_PASS inline void pay(const Batch &p, const dfm_friction_in *in, size_t at
     const double nu = p.nu[e];
     EACH_LANE (i) {
       const double K = p.k[e] * b.area[i];
-      const double by_2k = 0.5 / (K > kLeast ? K : kLeast);
+      const double by_2k = 0.5 / (K > kMin ? K : kMin);
       const double cone = nu * p.mu_s * b.fn[i];
       const double x = within(zx[i], kFar), y = within(zy[i], kFar), rise = p.h * p.c * b.area[i] * nu;
       need[i] += flag[i] > 0.5 ? rise * (2.0 * (K * std::sqrt(x * x + y * y)) + rise) * by_2k : 0.0;
@@ -160,7 +160,7 @@ DEFORM_PASS inline void pay(const Batch &p, const dfm_friction_in *in, size_t at
     }
   }
   EACH_LANE (i) {
-    b.poison[i] += 0.0 * budget[i];
+    b.nan_flag[i] += 0.0 * budget[i];
     const double given = budget[i] > 0 ? budget[i] : 0.0;
     b.budget[i] = given < b.most[i] ? given : b.most[i];
     b.theta[i] = b.budget[i] < need[i] ? b.budget[i] / need[i] : 1.0;
@@ -182,7 +182,7 @@ DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_i
   const auto to = [&](size_t c) { return out->state ? out->state + c * stride + at : spare; };
   double *const ox = to(2 * e), *const oy = to(2 * e + 1), *const oflag = to(flag_of(p.n) + e);
   EACH_LANE (i) {
-    b.poison[i] += (0.0 * zx[i] + 0.0 * zy[i]) + 0.0 * flag[i];
+    b.nan_flag[i] += (0.0 * zx[i] + 0.0 * zy[i]) + 0.0 * flag[i];
     const double K = p.k[e] * b.area[i];
     const double hk = p.h * K;
     const double g = b.g[i];
@@ -192,8 +192,8 @@ DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_i
     const double ay = K * (keeps * within(zy[i], kFar));
     const double a2 = ax * ax + ay * ay;
     // brings the old force into the new cone
-    const double size = std::sqrt(a2 > kLeast * kLeast ? a2 : 1.0);
-    const double r = a2 > kLeast * kLeast ? size : 0.0;
+    const double size = std::sqrt(a2 > kMin * kMin ? a2 : 1.0);
+    const double r = a2 > kMin * kMin ? size : 0.0;
     const double outside = r > cone ? 1.0 : 0.0;
     const double scale = outside > 0 ? cone / size : 1.0;
     const double x0 = scale * (keeps * within(zx[i], kFar));
@@ -208,14 +208,14 @@ DEFORM_PASS inline void element(const Batch &p, uint32_t e, const dfm_friction_i
     const double px = K * tx;
     const double py = K * ty;
     const double t2 = px * px + py * py;
-    const double t = std::sqrt(t2 > kLeast * kLeast ? t2 : 1.0);
-    const double n = t2 > kLeast * kLeast ? t : 0.0;
+    const double t = std::sqrt(t2 > kMin * kMin ? t2 : 1.0);
+    const double n = t2 > kMin * kMin ? t : 0.0;
     const double ux = n > 0 ? px / t : 0.0;
     const double uy = n > 0 ? py / t : 0.0;
     const double forward = x0 * b.vx[i] + y0 * b.vy[i] > 0 ? 1.0 : 0.0, was = flag[i] > 0.5 ? forward : 0.0;
     const double rate = p.h * p.c * b.area[i];
     const double sum = g + rate;
-    const double by_sum = 1.0 / (sum > kLeast * 1e-10 ? sum : kLeast * 1e-10);
+    const double by_sum = 1.0 / (sum > kMin * 1e-10 ? sum : kMin * 1e-10);
     const double goal = f0 + rate * nu;
     const double limit = was > 0 ? g * by_sum * goal : nu * g;
     const double by_g = was > 0 ? rate * by_sum * (goal * by_sum) : nu, by_f0 = was > 0 ? g * by_sum : 0.0;
@@ -277,23 +277,23 @@ struct Gms {
       double *const stored = to(out->stored, 0);
       double *const budget = to(out->state, budget_of(p.n));
       EACH_LANE (i) {
-        const double poison = b.poison[i], drag = b.fn[i] > 0 ? p.sigma2 * b.area[i] : 0.0;
-        fx[i] = poison - b.fx[i];
-        fy[i] = poison - b.fy[i];
-        xx[i] = poison - b.xx[i];
-        xy[i] = poison - b.xy[i];
-        yx[i] = poison - b.yx[i];
-        yy[i] = poison - b.yy[i];
-        nx[i] = poison - b.nx[i];
-        ny[i] = poison - b.ny[i];
-        limit[i] = p.mu_s * b.fn[i] + drag * b.w[i] + poison;
+        const double nan_flag = b.nan_flag[i], drag = b.fn[i] > 0 ? p.sigma2 * b.area[i] : 0.0;
+        fx[i] = nan_flag - b.fx[i];
+        fy[i] = nan_flag - b.fy[i];
+        xx[i] = nan_flag - b.xx[i];
+        xy[i] = nan_flag - b.xy[i];
+        yx[i] = nan_flag - b.yx[i];
+        yy[i] = nan_flag - b.yy[i];
+        nx[i] = nan_flag - b.nx[i];
+        ny[i] = nan_flag - b.ny[i];
+        limit[i] = p.mu_s * b.fn[i] + drag * b.w[i] + nan_flag;
         const double rest = b.budget[i] + b.lost[i];
         const double left = rest > 0 ? rest < b.most[i] ? rest : b.most[i] : 0.0;
         budget[i] = left;
-        stored[i] = b.stored[i] + left + poison;
+        stored[i] = b.stored[i] + left + nan_flag;
       }
       for (uint32_t c = 0; out->state && c < budget_of(p.n) + 1; ++c)
-        EACH_LANE (i) out->state[c * stride + at + i] += b.poison[i];
+        EACH_LANE (i) out->state[c * stride + at + i] += b.nan_flag[i];
       for (uint32_t i = 0; out->mode && i < kLanes; ++i)
         out->mode[at + i] = static_cast<uint8_t>(b.fn[i] > 0 ? b.slips[i] > p.n - 0.5 ? 2 : 1 : 0);
     }
@@ -333,9 +333,9 @@ dfm_status check(const double *p, char *why, size_t cap) {
 }
 
 const dfm_slots *state(const double *params) {
-  static constexpr std::array<dfm_slots, kMost> tables = [] {
-    std::array<dfm_slots, kMost> out{};
-    for (uint32_t n = 1; n <= kMost; ++n) out[n - 1] = {sizeof(dfm_slots), n + 1, kSlots[n - 1].slot, 0, 0};
+  static constexpr std::array<dfm_slots, kMax> tables = [] {
+    std::array<dfm_slots, kMax> out{};
+    for (uint32_t n = 1; n <= kMax; ++n) out[n - 1] = {sizeof(dfm_slots), n + 1, kSlots[n - 1].slot, 0, 0};
     return out;
   }();
   return &tables[elements(params) - 1];
@@ -345,8 +345,8 @@ constexpr dfm_friction make() {
   dfm_friction f = dfm::plugin::friction(DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA,
                                          DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN,
                                          lanes::eval<Gms>, check);
-  f.nslot = kMost + 1;
-  f.slots = kSlots[kMost - 1].slot;
+  f.nslot = kMax + 1;
+  f.slots = kSlots[kMax - 1].slot;
   f.state = state;
   f.without = without::level<kMuC, kMuS, kSigma2>;
   return f;

@@ -5,7 +5,7 @@
 // R is the polar factor of the mean gradient F = sum x_a (x) G_a, S = R^T F. A change e of d turns it by
 //   w = A^-1 sum G_a x e_a,  A = tr S I - S;   (P e)_a = e_a - w x d_a,   (P^T h)_a = h_a - (A^-1 tau) x G_a,
 // tau = sum d_a x h_a = sum u_a x h_a, since K resists no rotation of X. So the forces are the gradient of an
-// energy that no rotation changes, and have no moment, except where kLeastStretch acts: there A^-1 is not the
+// energy that no rotation changes, and have no moment, except where kMinStretch acts: there A^-1 is not the
 // inverse of A. The tangent is R P^T K P R^T, positive semidefinite; what the turning of P adds is left out.
 // The damper is damping_stiffness R P^T K P R^T v.
 //
@@ -121,7 +121,7 @@ class CellBody {
   void bound(const dfm_kin &k, double *ksum, double *csum) const {
     for (uint32_t c = 0; c < ncell_; ++c) {
       const Cell &cell = cell_[c];
-      double more[kMostNodes] = {}, grown = 1;
+      double more[kMaxNodes] = {}, grown = 1;
       if (of_.turns) growth(k, c, grown, more);
       for (uint32_t a = 0; a < nodes_; ++a) {
         const uint32_t i = corner(c, a);
@@ -142,7 +142,7 @@ class CellBody {
       for (int i = 0; i < 9; ++i) h[i / 3][i % 3] = m.s[i] - (i % 4 == 0);
       range_.look(c, h);
     }
-    range_.tell(host, of_.id);
+    range_.warn(host, of_.id);
     return sum;
   }
   void cell_energy(const dfm_kin &k, double *density) const {
@@ -199,22 +199,22 @@ class CellBody {
  private:
   static constexpr uint32_t kParallelCells = 500, kGrain = 64;
   static constexpr int kWeightSteps = 20;
-  static constexpr double kLeastWeight = 1e-3;
+  static constexpr double kMinWeight = 1e-3;
   // Least sum of two stretches that turns a frame: nearer to a reflection the forces are no gradient.
-  static constexpr double kLeastStretch = 0.1;
+  static constexpr double kMinStretch = 0.1;
 
   struct Cell {
     double volume = 0;
-    double rest[kMostNodes][3] = {};  // m, from the mean of the nodes
-    double mean[kMostNodes][3] = {};  // 1/m, G
-    double row[kMostNodes] = {};      // N/m, D_a of this cell
-    double share[kMostNodes] = {};    // |G_a| g / w_a
-    double g = 0, excess = 0;         // sum |G_a| w_a, g max(|G_a| / (w_a D_a))
+    double rest[kMaxNodes][3] = {};  // m, from the mean of the nodes
+    double mean[kMaxNodes][3] = {};  // 1/m, G
+    double row[kMaxNodes] = {};      // N/m, D_a of this cell
+    double share[kMaxNodes] = {};    // |G_a| g / w_a
+    double g = 0, excess = 0;        // sum |G_a| w_a, g max(|G_a| / (w_a D_a))
   };
   // One at the positions of a call.
   struct Moved {
     double r[9], s[9], inverse[9];  // R, S, A^-1
-    double d[kMostNodes][3], u[kMostNodes][3];
+    double d[kMaxNodes][3], u[kMaxNodes][3];
   };
   struct Call {
     CellBody *body;
@@ -259,7 +259,7 @@ class CellBody {
   }
 
   void make_cell(uint32_t c) {
-    double x[3 * kMostNodes], middle[3] = {};
+    double x[3 * kMaxNodes], middle[3] = {};
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t n = 0; n < 3; ++n) {
         x[3 * a + n] = rest_[3 * size_t(corner(c, a)) + n];
@@ -309,11 +309,11 @@ class CellBody {
         most = std::max(most, next_[i]);
       }
       for (uint32_t i = 0; i < npoint_; ++i)
-        weight_[i] = most > 0 ? std::max(next_[i] / most, kLeastWeight) : 1;
+        weight_[i] = most > 0 ? std::max(next_[i] / most, kMinWeight) : 1;
     }
     for (uint32_t c = 0; c < ncell_; ++c) {
       Cell &cell = cell_[c];
-      double length[kMostNodes], sum = 0;
+      double length[kMaxNodes], sum = 0;
       for (uint32_t a = 0; a < nodes_; ++a) {
         const double *g = cell.mean[a];
         length[a] = std::sqrt((g[0] * g[0] + g[1] * g[1]) + g[2] * g[2]);
@@ -333,7 +333,7 @@ class CellBody {
   // Frame and displacements of a cell.
   void move(const dfm_kin &k, uint32_t c, Moved &m) const {
     const Cell &cell = cell_[c];
-    double middle[3] = {}, from[kMostNodes][3], f[9] = {};
+    double middle[3] = {}, from[kMaxNodes][3], f[9] = {};
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t n = 0; n < 3; ++n) {
         from[a][n] = k.x[size_t(k.stride) * corner(c, a) + n];
@@ -358,7 +358,7 @@ class CellBody {
     if (of_.turns) invert_turn(m);
   }
 
-  // A^-1, no eigenvalue of A less than kLeastStretch.
+  // A^-1, no eigenvalue of A less than kMinStretch.
   static void invert_turn(Moved &m) {
     double a[3][3], v[3][3], far = 0;
     const double trace = (m.s[0] + m.s[4]) + m.s[8];
@@ -382,7 +382,7 @@ class CellBody {
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         double sum = 0;
-        for (int n = 0; n < 3; ++n) sum += v[i][n] * v[j][n] / std::max(a[n][n], kLeastStretch);
+        for (int n = 0; n < 3; ++n) sum += v[i][n] * v[j][n] / std::max(a[n][n], kMinStretch);
         m.inverse[3 * i + j] = sum;
       }
   }
@@ -409,7 +409,7 @@ class CellBody {
   }
 
   double energy_of(const dfm_kin &k, uint32_t c, Moved &m) const {
-    double h[kMostNodes][3], sum = 0;
+    double h[kMaxNodes][3], sum = 0;
     move(k, c, m);
     apply(c, m.u, h);
     for (uint32_t a = 0; a < nodes_; ++a)
@@ -440,9 +440,9 @@ class CellBody {
 
   void force_of(const dfm_kin &k, uint32_t c) {
     Moved m;
-    double h[kMostNodes][3], tau[3] = {}, turn[3] = {}, part[3];
+    double h[kMaxNodes][3], tau[3] = {}, turn[3] = {}, part[3];
     move(k, c, m);
-    double pull[kMostNodes][3];
+    double pull[kMaxNodes][3];
     std::copy_n(&m.u[0][0], 3 * nodes_, &pull[0][0]);
     if (const double damp = at(kDampingStiffness, c); damp > 0) {
       rate(k, c, m, h);
@@ -472,9 +472,9 @@ class CellBody {
   }
 
   // grown: factor of the rows at rest; more: what comes on top by node.
-  void growth(const dfm_kin &k, uint32_t c, double &grown, double (&more)[kMostNodes]) const {
+  void growth(const dfm_kin &k, uint32_t c, double &grown, double (&more)[kMaxNodes]) const {
     Moved m;
-    double h[kMostNodes][3], pull[kMostNodes], moment[9] = {}, rows = 0, all = 0, second = 0;
+    double h[kMaxNodes][3], pull[kMaxNodes], moment[9] = {}, rows = 0, all = 0, second = 0;
     move(k, c, m);
     apply(c, m.u, h);
     const Cell &cell = cell_[c];
@@ -501,10 +501,10 @@ class CellBody {
   void add_tangent(const dfm_kin &k, uint32_t c, double by, double *blk) const {
     Moved m;
     move(k, c, m);
-    double z[kMostNodes][9] = {}, turn[kMostNodes][9] = {}, y[9] = {};
+    double z[kMaxNodes][9] = {}, turn[kMaxNodes][9] = {}, y[9] = {};
     for (uint32_t n = 0; of_.turns && n < 3; ++n) {
       // columns: of [u]x it is u x e_n, of A^-1 [G]x it is A^-1 (G x e_n)
-      double unit[3] = {}, column[kMostNodes][3], product[kMostNodes][3], part[3];
+      double unit[3] = {}, column[kMaxNodes][3], product[kMaxNodes][3], part[3];
       unit[n] = 1;
       for (uint32_t a = 0; a < nodes_; ++a) cross(m.u[a], unit, column[a]);
       apply(c, column, product);

@@ -31,7 +31,7 @@
 
 namespace model {
 
-constexpr uint32_t kMostNodes = 10;
+constexpr uint32_t kMaxNodes = 10;
 
 // Largest singular value, or a little more: the largest eigenvalue of the symmetric m^T m is at most mean +
 // sqrt(2/3) |deviator|, equal where the other two are.
@@ -50,26 +50,26 @@ inline double norm_of(const double *m) {
 // One cell at rest.
 struct RestCell {
   double volume = 0;
-  double mean[kMostNodes][3] = {};                        // 1/m, mean gradients of the shape functions
-  double stiffness[3 * kMostNodes][3 * kMostNodes] = {};  // N/m, of the first 3 nodes_of(kind) rows
+  double mean[kMaxNodes][3] = {};                       // 1/m, mean gradients of the shape functions
+  double stiffness[3 * kMaxNodes][3 * kMaxNodes] = {};  // N/m, of the first 3 nodes_of(kind) rows
 };
 
 namespace cells {
 
 constexpr int kInner = 3;  // quadratic displacements of a hexahedron
-constexpr int kMost = kMostNodes + kInner;
+constexpr int kMax = kMaxNodes + kInner;
 constexpr int kWhole = 8, kInside = 27;  // points of the rules
 constexpr double kTie = 0.02;
 constexpr double kThin = 1e-9;  // of the square of a function: it depends on those before it
 
 // At one of the points of a rule.
 struct Point {
-  double at[3];                 // reference coordinates
-  double weight;                // m^3 once the Jacobian is known
-  double local[kMostNodes][3];  // derivatives of the shape functions
-  double inverse[9];            // of the Jacobian
+  double at[3];                // reference coordinates
+  double weight;               // m^3 once the Jacobian is known
+  double local[kMaxNodes][3];  // derivatives of the shape functions
+  double inverse[9];           // of the Jacobian
   double jacobian;
-  double g[kMost][3];  // gradients, 1/m
+  double g[kMax][3];  // gradients, 1/m
 };
 
 constexpr int kTetEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
@@ -132,7 +132,7 @@ inline void gradient(const double *inverse, const double *local, double by, doub
 
 // Projects what the rows hold at the points on 1, xi, eta, zeta, weighted by volume. Returns which of these
 // say something new, as bits.
-inline int project(const Point *q, int points, int rows, double (*theta)[kMost][3]) {
+inline int project(const Point *q, int points, int rows, double (*theta)[kMax][3]) {
   double basis[kInside][4];
   int kept = 0;
   const auto inner = [&](int i, int j) {
@@ -216,15 +216,15 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
   for (int n = 0; inside && n < points; ++n)
     for (int k = 0; k < kInner; ++k)
       for (int c = 0; c < 3; ++c) q[n].g[nodes + k][c] -= spurious[k][c] / out.volume;
-  double theta[kInside][kMost][3];
-  for (int n = 0; n < points; ++n) std::copy_n(&q[n].g[0][0], 3 * kMost, &theta[n][0][0]);
+  double theta[kInside][kMax][3];
+  for (int n = 0; n < points; ++n) std::copy_n(&q[n].g[0][0], 3 * kMax, &theta[n][0][0]);
   const int kept = hex ? project(q, points, rows, theta) : 0;
   for (int n = 0; n < points; ++n)
     for (int k = 0; hex && k < kInner; ++k)
       for (int c = 0; c < 3 && !(kept >> (k + 1) & 1); ++c) q[n].g[nodes + k][c] = theta[n][nodes + k][c] = 0;
   // 2 mu deviator : deviator + bulk theta^2
   const double bulk = m.lambda + 2 * m.mu / 3;
-  double k[3 * kMost][3 * kMost] = {};
+  double k[3 * kMax][3 * kMax] = {};
   for (int n = 0; n < points; ++n)
     for (int a = 0; a < rows; ++a)
       for (int b = 0; b < rows; ++b) {

@@ -7,7 +7,7 @@
 namespace model {
 
 constexpr int kWeightSteps = 20;
-constexpr double kLeastWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
+constexpr double kMinWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
 
 // add(next) adds sum_b N_ab weight_b to next [npoint].
 template <class Add>
@@ -21,7 +21,7 @@ void even_rows(uint32_t npoint, const double *mass, double *weight, double *next
       next[i] = mass[i] > 0 ? next[i] / mass[i] : 0;
       most = std::max(most, next[i]);
     }
-    for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kLeastWeight) : 1;
+    for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kMinWeight) : 1;
   }
 }
 

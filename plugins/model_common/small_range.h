@@ -26,12 +26,12 @@ class SmallRange {
   }
 
   // Warns when a cell leaves the range, and once more when it is much farther out.
-  void tell(const dfm_host *host, const char *who) {
+  void warn(const dfm_host *host, const char *who) {
     const Farthest most = most_;
     most_ = {};
-    if (!(most.beyond > 1) || warnings_ == kMostWarnings) return;
-    if (warnings_ > 0 && !(most.beyond > kMuchFarther * told_)) return;
-    told_ = most.beyond;
+    if (!(most.beyond > 1) || warnings_ == kMaxWarnings) return;
+    if (warnings_ > 0 && !(most.beyond > kMuchFarther * reported_)) return;
+    reported_ = most.beyond;
     ++warnings_;
     char text[320];
     std::snprintf(text, sizeof text,
@@ -47,7 +47,7 @@ class SmallRange {
   // tangent of the rotation, largest strain
   static constexpr double kLargestTurn = 0.27, kLargestStrain = 0.3;
   // Of warnings. From 15 degrees so much farther is 47.
-  static constexpr uint32_t kMostWarnings = 2;
+  static constexpr uint32_t kMaxWarnings = 2;
   static constexpr double kMuchFarther = 4;
 
   // The cell that is farthest from small displacements: of the limits, tangent of its turn, strain.
@@ -62,7 +62,7 @@ class SmallRange {
   }
 
   Farthest most_;
-  double told_ = 0;  // excess over the range at the last warning
+  double reported_ = 0;  // excess over the range at the last warning
   uint32_t warnings_ = 0;
 };
 

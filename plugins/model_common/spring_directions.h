@@ -29,8 +29,8 @@ constexpr int kN = 6;
 // Below this share of the mean pivot the edges all but leave out a strain (points in a plane):
 // nothing to even out.
 constexpr double kFlat = 1e-6;
-constexpr double kLeastFactor = 1.0 / 8, kMostFactor = 3;
-constexpr int kMostSteps = 8;
+constexpr double kMinFactor = 1.0 / 8, kMaxFactor = 3;
+constexpr int kMaxSteps = 8;
 // A mesh is stretched where, after one step, springs of m.S m < kStiff hold more than the share kStretched of
 // sum w (stretched cylinders: 0.07 to 0.09, others below 0.01). Steps end where no m.S m is above kSoftest.
 constexpr double kStiff = 0.7, kStretched = 0.04, kSoftest = 1.02;
@@ -88,7 +88,7 @@ inline void find_directions(uint32_t nedge, const uint32_t *edges, const double 
   };
   for (uint32_t e = 0; e < nedge; ++e) per_modulus[e] = directed(e);  // the factor, until the end
   double nominal = 0;                                                 // sum w of factor 1
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     double c[kN][kN] = {}, total = 0, softest = 0, stiff = 0;
     for (uint32_t e = 0; e < nedge; ++e) {
       if (!directed(e)) continue;
@@ -111,7 +111,7 @@ inline void find_directions(uint32_t nedge, const uint32_t *edges, const double 
     for (uint32_t e = 0; e < nedge; ++e)
       if (directed(e))
         per_modulus[e] =
-            std::clamp(per_modulus[e] * inverse_form(c, m) * (nominal / total), kLeastFactor, kMostFactor);
+            std::clamp(per_modulus[e] * inverse_form(c, m) * (nominal / total), kMinFactor, kMaxFactor);
   }
   for (uint32_t e = 0; e < nedge; ++e)
     if (directed(e)) per_modulus[e] /= edge_length[e] * edge_length[e];

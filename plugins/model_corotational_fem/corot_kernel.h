@@ -92,10 +92,10 @@ struct Kernels {
 
 // The sum of the two smaller stretches of a cell, over the trace of all three, from which on the bound counts
 // it: where it vanishes two rotations are equally near and the energy has a kink.
-constexpr double kLeastPair = 0.1;
+constexpr double kMinPair = 0.1;
 
 // The volume, over that at rest, that a flatter cell counts as having in its Cauchy stress.
-constexpr double kLeastVolume = 1e-3;
+constexpr double kMinVolume = 1e-3;
 
 // The volume, over that at rest, below which a cell resists collapse (corot_collapse.h), and by how much it
 // may fall until the next bound.

@@ -277,14 +277,14 @@ DEFORM_INLINE void times(const v4 *m, const v4 *x, v4 *out) {
 
 // The frame turns with the material, R^T dR = [w]x with (t I - S) w = axial(R^T dF), t = tr S. The inverse
 // of that matrix is adjoint / det. Where two stretches cancel det vanishes, and what needs the inverse
-// fades with share = det / max(det, kLeastPair t^3): `inverse` is share times the inverse, no eigenvalue
-// above 1/(kLeastPair t).
+// fades with share = det / max(det, kMinPair t^3): `inverse` is share times the inverse, no eigenvalue
+// above 1/(kMinPair t).
 struct Turning { v4 inverse[6], share; };
 DEFORM_INLINE void turning(const v4 *s, Turning &out) {
   const v4 t = (s[0] + s[1]) + s[2], a = t - s[0], b = t - s[1], c = t - s[2];
   const v4 xx = b * c - s[4] * s[4], xy = s[5] * s[4] + s[3] * c, zx = s[3] * s[4] + b * s[5];
   const v4 det = (a * xx - s[3] * xy) - s[5] * zx;
-  const v4 over = splat(1) / max4(det, splat(kLeastPair) * ((t * t) * t) + splat(1e-300));
+  const v4 over = splat(1) / max4(det, splat(kMinPair) * ((t * t) * t) + splat(1e-300));
   out.share = det * over;
   out.inverse[0] = over * xx;
   out.inverse[1] = over * (a * c - s[5] * s[5]);
@@ -481,7 +481,7 @@ static inline void forces_with(const Block &b) {
 }
 static inline void forces(const Block &b) { return b.damp ? forces_with<true>(b) : forces_with<false>(b); }
 
-// Cauchy stress P F^T / J times V, without dampers, J no less than kLeastVolume in size.
+// Cauchy stress P F^T / J times V, without dampers, J no less than kMinVolume in size.
 template <Energy kEnergy, bool kFiber, bool kMore = false, bool kCollapse = false>
 static inline void cell_stresses(const Block &b, const uint32_t *cells, double *out) {
   each_four<kEnergy == kLinear>(b, [&](uint32_t n, uint32_t at, v4 *f, const v4 *r,
@@ -490,7 +490,7 @@ static inline void cell_stresses(const Block &b, const uint32_t *cells, double *
     v4 p[9];
     alignas(32) double one[6][4];
     piola<kEnergy, kFiber, false, kMore, kCollapse>(b, n, q, f, r, o, p);
-    const v4 over = splat(1) / max4(abs4(o.det), splat(kLeastVolume));
+    const v4 over = splat(1) / max4(abs4(o.det), splat(kMinVolume));
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     for (int k = 0; k < 6; ++k) {
       const v4 *x = p + 3 * kRow[k], *y = f + 3 * kCol[k];
@@ -594,7 +594,7 @@ static inline void cell_twists(const Block &b) {
     const v4 third = splat(1.0 / 3), mean = third * t, zero = splat(0);
     const v4 variance = max4(third * square - mean * mean, zero);
     const v4 far = sqrt4(splat(2) * variance), most = splat(2) * mean + far;
-    const v4 least = max4(splat(2) * mean - far, splat(kLeastPair) * t) + splat(1e-300);
+    const v4 least = max4(splat(2) * mean - far, splat(kMinPair) * t) + splat(1e-300);
     const v4 mu2 = load4(q.group->mu2 + at);
     const v4 uneven = (splat(6) * variance) / (least * least);  // (s_i - s_j)^2 / (s_i + s_j)^2 at most
     v4 twist;

@@ -17,7 +17,7 @@
 namespace corot {
 namespace {
 
-constexpr double kLeast = 1e-12;  // two stretches that cancel, over the trace
+constexpr double kMin = 1e-12;  // two stretches that cancel, over the trace
 
 void cross(const double *x, const double *y, double *out) {
   for (int k = 0; k < 3; ++k) out[k] = x[(k + 1) % 3] * y[(k + 2) % 3] - x[(k + 2) % 3] * y[(k + 1) % 3];
@@ -40,7 +40,7 @@ struct Shape {
       const int m = (k + 1) % 3, n = (k + 2) % 3;
       const double part = (axis[0][k] * axial[0] + axis[1][k] * axial[1]) + axis[2][k] * axial[2];
       const double pair = stretch[m] + stretch[n];
-      if (pair > kLeast * trace)
+      if (pair > kMin * trace)
         for (int l = 0; l < 3; ++l) w[l] += part / pair * axis[l][k];
     }
     for (int l = 0; l < 3; ++l) {
@@ -59,7 +59,7 @@ struct Shape {
   // det(t I - S) over what it counts as at least
   double share() const {
     const double det = (stretch[0] + stretch[1]) * (stretch[1] + stretch[2]) * (stretch[2] + stretch[0]);
-    const double least = kLeastPair * (trace * trace * trace);
+    const double least = kMinPair * (trace * trace * trace);
     return det < least ? (least > 0 ? std::max(det / least, 0.0) : 0) : 1;
   }
 };
@@ -258,8 +258,7 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
       nodal() ? bulk_here * mean_change(c) - own.mu2[lane] / 3 * more : own.lambda[lane] * more;
   const double pull = pressure - own.mu2[lane];
   for (int m = 0; fiber.empty() && !flows && !direct && m < 3; ++m) {
-    const double pair =
-        std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kLeast * shape.trace);
+    const double pair = std::max(shape.stretch[(m + 1) % 3] + shape.stretch[(m + 2) % 3], kMin * shape.trace);
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
   }
   const auto add_block = [&](int m, int n, double *out) {

@@ -10,7 +10,7 @@
 namespace gpu {
 namespace {
 
-constexpr double kMostSteps = 1e6;
+constexpr double kMaxSteps = 1e6;
 constexpr double kRounding = 1e-6;  // rates of the kernels are binary32
 constexpr double kStrain = 1e-5;    // whose energy is that of a small one
 // Dampers with a lag are at most so stiff, relative to what is beside them; a mode at the own frequency
@@ -198,7 +198,7 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
     // a step that is stable as a whole, as those in contact are, is not divided
     const double all = k.dt / stable - kRounding,
                  steps = all <= 1 ? 1 : std::ceil(k.dt / (Of::kShare * stable) - kRounding);
-    if (!(steps <= kMostSteps)) {
+    if (!(steps <= kMaxSteps)) {
       char text[160];
       std::snprintf(text, sizeof text,
                     "a step of %g s needs %.3g sub-steps of %.3g s; soften or coarsen the body, lower its "

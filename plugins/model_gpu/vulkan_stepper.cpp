@@ -248,7 +248,7 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
 const char *VulkanStepper::run(uint32_t n, double h, const Dampers &dampers, bool moved, bool loaded) {
   *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
-    const uint32_t some = std::min(n - taken, kMostSteps);
+    const uint32_t some = std::min(n - taken, kMaxSteps);
     const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, dampers};
     const uint32_t slot = batch.from + 2 * batch.moved + 4 * batch.loaded + 8 * batch.seen;
     VkResult result = VK_SUCCESS;

@@ -30,7 +30,7 @@ class VulkanStepper : public Stepper {
     bool operator==(const Batch &) const = default;
   };
   static constexpr uint32_t kBatches = 16;
-  static constexpr uint32_t kMostSteps = 1024;  // of a batch: a driver ends what computes for seconds
+  static constexpr uint32_t kMaxSteps = 1024;  // of a batch: a driver ends what computes for seconds
 
   std::shared_ptr<Vulkan> vulkan_;
   uint32_t npoint_, now_ = 0;  // which of place_, speed_ and seen_ is the present

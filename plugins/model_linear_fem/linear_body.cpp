@@ -230,7 +230,7 @@ double Body::energy(const dfm_kin &k) {
     sum += t.volume * density_of(c, k, t);
     look_at(c, k, t);
   }
-  range.tell(host, kId);
+  range.warn(host, kId);
   return sum;
 }
 

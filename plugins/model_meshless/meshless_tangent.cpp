@@ -19,7 +19,7 @@ namespace meshless {
 namespace {
 
 // Two stretches that cancel count as this share of their trace: the energy has a kink there.
-constexpr double kLeastPair = 0.1;
+constexpr double kMinPair = 0.1;
 
 // Largest singular value of lambda a b^T + mu b a^T + mu (a.b) I: across both vectors, and in their plane.
 double norm_of(const Solid &c, const double *a, const double *b) {
@@ -76,7 +76,7 @@ void modes_of(Strain strain, const Solid &c, const double *s, Modes &out) {
       out.turn[i] = green + c.mu * (squares - x * y);
       out.shear[i] = green + c.mu * (squares + x * y);
     } else {
-      const double pair = std::max(x + y, std::max(kLeastPair * std::fabs(trace), 1e-3));
+      const double pair = std::max(x + y, std::max(kMinPair * std::fabs(trace), 1e-3));
       out.turn[i] = 2 * c.mu + (2 * c.lambda * (trace - 3) - 4 * c.mu) / pair;
       out.shear[i] = 2 * c.mu;
     }

@@ -24,7 +24,7 @@ namespace msm {
 namespace {
 
 constexpr int kWeightSteps = 20;
-constexpr double kLeastWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
+constexpr double kMinWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
 
 void row_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
@@ -134,7 +134,7 @@ void Body::find_weights(Room &room) {
       next[i] = mass[i] > 0 ? next[i] / mass[i] : 0;
       most = std::max(most, next[i]);
     }
-    for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kLeastWeight) : 1;
+    for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kMinWeight) : 1;
   }
   std::fill(coupled.data(), coupled.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e) {

@@ -177,7 +177,7 @@ void Body::build_blocks() {
   order_cells(l);
   // Sizes, then one allocation per array, then the data of each block.
   create_points(l, [&](uint32_t b) { return spring_halo(l, b); });
-  if (largest > kMostLocal)
+  if (largest > kMaxLocal)
     throw "a part of 1024 points has springs to more than 64,000 others; check the mesh for points that "
           "share an edge with very many others";
   size_t nquad = 0, ncells = 0;

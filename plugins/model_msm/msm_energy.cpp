@@ -42,7 +42,7 @@ double cell_energy_of(const double *const *x, double bulk, double collapse, doub
     for (int b = 0; b < a; ++b) q += square_of(x[a], x[b]);
   const double u = limit / std::max(q, limit);
   const double now = volume6_of(x[0], x[1], x[2], x[3]) * (__builtin_sqrt(u) * u * (2.5 - 1.5 * u));
-  const double kept = std::min(std::max(now, kLeastVolume * rest), kMostVolume * rest), more = kept - rest;
+  const double kept = std::min(std::max(now, kMinVolume * rest), kMaxVolume * rest), more = kept - rest;
   const double lost = std::max(kCollapseBelow * rest - kept, 0.0);
   return 0.5 * bulk * (more * more) + 0.5 * collapse * (lost * lost) +
          (bulk * more - collapse * lost) * (now - kept);

@@ -5,8 +5,8 @@
 namespace msm {
 namespace {
 
-constexpr uint32_t kMostAround = 64;  // cells around an edge that are considered together
-constexpr uint32_t kTogether = 64;    // fans that may change places, so that those of a group are as long
+constexpr uint32_t kMaxAround = 64;  // cells around an edge that are considered together
+constexpr uint32_t kTogether = 64;   // fans that may change places, so that those of a group are as long
 
 // Cells of one block at a time.
 class Finder {
@@ -51,9 +51,9 @@ Finder::Side Finder::side_of(uint32_t slot, uint32_t a, uint32_t b) const {
 
 // The longest row of cells around an edge that are in no fan yet, each beginning where the last one ends.
 uint32_t Finder::longest(const Around *cells, uint32_t n, uint32_t a, uint32_t b, Fan &fan) const {
-  Side side[kMostAround];
-  uint32_t slot[kMostAround], free = 0;
-  for (uint32_t k = 0; k < n && free < kMostAround; ++k) {
+  Side side[kMaxAround];
+  uint32_t slot[kMaxAround], free = 0;
+  for (uint32_t k = 0; k < n && free < kMaxAround; ++k) {
     if (taken_[cells[k].slot - first_]) continue;
     slot[free] = cells[k].slot;
     side[free++] = side_of(cells[k].slot, a, b);
@@ -64,7 +64,7 @@ uint32_t Finder::longest(const Around *cells, uint32_t n, uint32_t a, uint32_t b
     row.ring[0] = side[start].from;
     row.cells = 0;
     uint64_t used = 0;
-    for (uint32_t at = start; at < free && row.cells < kMostInFan;) {
+    for (uint32_t at = start; at < free && row.cells < kMaxInFan;) {
       used |= uint64_t(1) << at;
       row.slot[row.cells++] = slot[at];
       row.ring[row.cells] = side[at].to;
@@ -92,7 +92,7 @@ uint32_t Finder::find(uint32_t n, Fan *out) {
     return i.edge != j.edge ? i.edge < j.edge : i.slot < j.slot;
   });
   // the longest first: what is left of the others is shorter
-  for (uint32_t wanted = kMostInFan; wanted > 0; --wanted)
+  for (uint32_t wanted = kMaxInFan; wanted > 0; --wanted)
     for (uint32_t begin = 0, end; begin < entries; begin = end) {
       const uint32_t edge = around_[begin].edge;
       for (end = begin; end < entries && around_[end].edge == edge;) ++end;

@@ -9,8 +9,8 @@ namespace msm {
 // without cells holds springs alone.
 struct Fan {
   uint32_t cells, a, b;
-  uint32_t ring[kMostInFan + 1], slot[kMostInFan];  // slot: place in the body's block order
-  uint32_t springs;                                 // bit 0: a b, bit 1 + k: a ring[k]
+  uint32_t ring[kMaxInFan + 1], slot[kMaxInFan];  // slot: place in the body's block order
+  uint32_t springs;                               // bit 0: a b, bit 1 + k: a ring[k]
 };
 
 // All of a body. Every cell and every spring is in one.

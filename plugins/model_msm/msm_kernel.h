@@ -23,7 +23,7 @@
 namespace msm {
 
 // Large bodies wait for memory, so numbers of points within a block have 16 bits.
-constexpr uint32_t kMostLocal = 65536;
+constexpr uint32_t kMaxLocal = 65536;
 // Four springs that leave the same point. Short rows are filled with springs of stiffness zero.
 struct Quad { uint16_t i, j[4]; };
 // A cell: local points, orientation as given.
@@ -73,7 +73,7 @@ struct SinglePoint {
 // Groups of kFans fans of cells (msm_fans.h), a lane of floats each. The points of a group are a, b and its
 // ring; its springs those from a to all others, in that order. Where a fan of a group has fewer
 // cells than another, its last ring point is repeated. What is missing has no stiffness.
-constexpr uint32_t kFans = 8, kMostInFan = 8;  // fans of a group, cells of a fan
+constexpr uint32_t kFans = 8, kMaxInFan = 8;  // fans of a group, cells of a fan
 struct SingleBlock : model::BlockPoints {
   SinglePoint *at;  // [local]
   int *above;       // power of two above the largest offset of the last call: guessed for this one
@@ -127,7 +127,7 @@ constexpr double kCollapseBelow = 0.6, kCollapseCounted = 0.7;
 
 // Where the pressure of a cell stops to grow, in rest volumes, and the sum of its squared edges from which on
 // its volume counts less.
-constexpr double kLeastVolume = -1, kMostVolume = 3, kLimit = 3;
+constexpr double kMinVolume = -1, kMaxVolume = 3, kLimit = 3;
 // With Q that sum, Qm the limit and u = Qm/Q <= 1, the volume that counts is V t, t = u^(3/2) (5 - 3 u)/2,
 // dt/dQ = -15/4 u^(3/2) (1 - u)/Q. Norms of its first two derivatives at a cell beyond the limit: 36 |d|^2 <=
 // kFade1 Qm^2 and 6 |d2| <= kFade2 sqrt(Qm), of six volumes.

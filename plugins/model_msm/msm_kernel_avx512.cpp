@@ -166,8 +166,8 @@ DEFORM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) {
 DEFORM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
   const __m512d rest = _mm512_load_pd(b.volume6 + t);
   const __m512d below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
-  now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kLeastVolume), rest));
-  now = _mm512_min_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMostVolume), rest));
+  now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMinVolume), rest));
+  now = _mm512_min_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMaxVolume), rest));
   const __m512d pressure = _mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now));
   if (!_mm512_cmp_pd_mask(below, now, _CMP_GT_OQ)) return pressure;
   const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, now), _mm512_setzero_pd());

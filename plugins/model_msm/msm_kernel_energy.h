@@ -54,8 +54,7 @@ static inline double cell_energies(const Block &b, const double *x, uint32_t str
     Edges4 g;
     cross(e2, e3, g);
     const v4 now = dot(e1, g) * (sqrt4(u) * u * (splat(2.5) - splat(1.5) * u));
-    const v4 kept = min4(max4(now, splat(kLeastVolume) * rest), splat(kMostVolume) * rest),
-             more = kept - rest;
+    const v4 kept = min4(max4(now, splat(kMinVolume) * rest), splat(kMaxVolume) * rest), more = kept - rest;
     const v4 lost = max4(splat(kCollapseBelow) * rest - kept, splat(0));
     const v4 bulk = load4(b.bulk + t), collapse = load4(b.collapse + t), half = splat(0.5);
     sum = add_lanes(sum, (half * bulk * (more * more) + half * collapse * (lost * lost)) +

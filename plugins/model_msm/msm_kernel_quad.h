@@ -155,7 +155,7 @@ DEFORM_INLINE void spread(const Block &b, const Cell *c, int n, v4 pressure, con
 
 DEFORM_INLINE v4 pressure_of(const Block &b, uint32_t t, v4 now) {
   const v4 rest = load4(b.volume6 + t);
-  now = min4(max4(now, splat(kLeastVolume) * rest), splat(kMostVolume) * rest);
+  now = min4(max4(now, splat(kMinVolume) * rest), splat(kMaxVolume) * rest);
   const v4 pressure = load4(b.bulk + t) * (rest - now), lost = splat(kCollapseBelow) * rest - now;
   return any_above(lost, splat(0)) ? pressure + load4(b.collapse + t) * max4(lost, splat(0)) : pressure;
 }

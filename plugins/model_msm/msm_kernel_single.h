@@ -126,13 +126,13 @@ static inline float load_points(const SingleBlock &b, const double *x, const dou
   __builtin_memcpy(&bits, &largest, sizeof bits);
   int above = int(bits >> 52) - 1022;  // largest < 2^above
   above = above < -90 ? -90 : above;
-  const bool sound = (bad[0] + bad[1]) + bad[2] == 0 && above < 120;
-  if (!sound || above != *b.above) {
-    const v4 scale = splat(sound ? power_of_two(30 - above) : 0);
+  const bool valid = (bad[0] + bad[1]) + bad[2] == 0 && above < 120;
+  if (!valid || above != *b.above) {
+    const v4 scale = splat(valid ? power_of_two(30 - above) : 0);
     for (uint32_t n = 0; n < b.local; ++n) store4_whole(b.at[n].x, (of(x, n) - origin) * scale);
-    *b.above = sound ? above : 0;
+    *b.above = valid ? above : 0;
   }
-  return sound ? float(power_of_two(above - 30)) : __builtin_nanf("");
+  return valid ? float(power_of_two(above - 30)) : __builtin_nanf("");
 }
 
 // Force over d = to - from on `from`: (L - L0)/L + damp (dv.d)/L^2 over one denominator, with L - L0 = (L^2 -
@@ -152,7 +152,7 @@ DEFORM_INLINE vf pull(const SingleBlock &s, size_t slot, vf dd, vf rate, float d
 
 DEFORM_INLINE vf pressure_of(const SingleBlock &b, size_t t, vf now) {
   const vf rest = load(b.volume6 + t);
-  now = smaller(larger(now, float(kLeastVolume) * rest), float(kMostVolume) * rest);
+  now = smaller(larger(now, float(kMinVolume) * rest), float(kMaxVolume) * rest);
   return load(b.bulk + t) * (rest - now) +
          load(b.collapse + t) * larger(float(kCollapseBelow) * rest - now, vf{});
 }
@@ -176,7 +176,7 @@ struct Ray { Three whole, rate; };
 // other sign, so the momentum is kept as exactly as by forces in pairs.
 template <bool kTilts, Damping kDamping, bool kCells>
 static inline void fans(const SingleBlock &b, float unit, float damp) {
-  alignas(64) float out[4 * kLanes * (kMostInFan + 2)];  // b, then the ring
+  alignas(64) float out[4 * kLanes * (kMaxInFan + 2)];  // b, then the ring
   const uint16_t *number = b.number;
   size_t ray_at = 0, cell_at = 0;
   for (uint32_t n = 0; n < b.groups; ++n) {

@@ -8,14 +8,14 @@ namespace {
 
 // Below and above these lengths products of stiffness and volume leave the range of a float.
 constexpr double kShortestEdge = 1e-6, kLongestEdge = 1e4;
-constexpr uint32_t kMostPoints = 16383;  // of a block: four times a number of 16 bits
+constexpr uint32_t kMaxPoints = 16383;  // of a block: four times a number of 16 bits
 
 }  // namespace
 
 const char *Body::keeps_double() const {
   if (has_branch()) return "single precision works with damper voigt only";
   if (choice(kAxisForm) == kFormA) return "single precision works with anisotropy_form B only";
-  if (largest > kMostPoints) return "a block of the body has too many points for single precision";
+  if (largest > kMaxPoints) return "a block of the body has too many points for single precision";
   for (uint32_t e = 0; e < nedge; ++e)
     if (edge_length[e] > 0 && !(edge_length[e] >= kShortestEdge && edge_length[e] <= kLongestEdge))
       return "single precision works with edges of 1e-6 m to 1e4 m only";

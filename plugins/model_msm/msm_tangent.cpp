@@ -113,7 +113,7 @@ void Body::add_cells(const dfm_kin &k, double a, double *blk) const {
     for (int m = 0; m < 4; ++m) x[m] = k.x + size_t(k.stride) * q[m];
     double g[4][3];
     const double now = counted_volume6(x, limit[c], g), rest6 = volume6[c];
-    if (!(now > kLeastVolume * rest6 && now < kMostVolume * rest6)) continue;  // the pressure is constant
+    if (!(now > kMinVolume * rest6 && now < kMaxVolume * rest6)) continue;  // the pressure is constant
     const double s = -a * (now < kCollapseBelow * rest6 ? stiffest : bulk[c]);
     for (int m = 0; m < 4; ++m) add_dyad(blk + 9 * size_t(q[m]), s, g[m], g[m]);
     for (int m = 0; m < 6; ++m) {

@@ -9,7 +9,7 @@ void Basis::create(const dfm_host *host, const Kernels *kernels, size_t size, ui
   pieces_ = padded(size) / kPiece;
   nmode_ = nmode;
   data_.create(host, pieces_ * kPiece * nmode);
-  sums_.create(host, kMostAtOnce * kLanes * nmode);
+  sums_.create(host, kMaxAtOnce * kLanes * nmode);
 }
 
 void Basis::set(uint32_t mode, const double *w) {

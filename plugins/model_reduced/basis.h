@@ -13,7 +13,7 @@ using model::Buffer;
 
 class Basis {
  public:
-  static constexpr uint32_t kMostAtOnce = 3;
+  static constexpr uint32_t kMaxAtOnce = 3;
   static size_t padded(size_t size) { return (size + kPiece - 1) / kPiece * kPiece; }
 
   void create(const dfm_host *host, const Kernels *kernels, size_t size, uint32_t nmode);
@@ -31,7 +31,7 @@ class Basis {
   size_t pieces_ = 0;
   uint32_t nmode_ = 0;
   Buffer<double> data_;
-  mutable Buffer<double> sums_;  // [kMostAtOnce, nmode, kLanes]
+  mutable Buffer<double> sums_;  // [kMaxAtOnce, nmode, kLanes]
 };
 
 }  // namespace reduced

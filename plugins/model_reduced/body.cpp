@@ -88,8 +88,8 @@ void Body::take_integrals() {
 // Room for the columns of C_rest.
 void Body::check_size(uint32_t nsurfel, uint32_t npoint) const {
   const double bytes = 8.0 * 9 * double(nsurfel) * npoint;
-  constexpr double kMost = 2147483648.0;
-  if (bytes <= kMost) return;
+  constexpr double kMax = 2147483648.0;
+  if (bytes <= kMax) return;
   char text[200];
   std::snprintf(
       text, sizeof text,
@@ -105,13 +105,13 @@ void Body::reserve() {
   for (Buffer<double> *b : {&u_, &w_, &f_, &mu_, &mw_, &rest_, &u_to_, &w_to_, &x_to_, &v_to_, &follow_,
                             &follow_to_, &given_[0], &given_[1]})
     b->create(host, padded);
-  for (Buffer<double> *b : {&q_, &qd_, &load_, &q_to_, &qd_to_, &answer_, &softened_})
+  for (Buffer<double> *b : {&q_, &qd_, &load_, &q_to_, &qd_to_, &modal_, &softened_})
     b->create(host, modes_.count);
   coupling_.create(host, 3 * size_t(modes_.count));
   step_.create(host, modes_.count);
   rows_.create(host, 3 * size_t(nsurfel_) * row_width());
   lanes_.create(host, kLanes * row_width());
-  answers_.create(host, kLanes * 3 * size_t(nsurfel_));
+  responses_.create(host, kLanes * 3 * size_t(nsurfel_));
   if (!condensed_) return;
   columns_.create_raw(host, 3 * size_t(nsurfel_) * size());  // memory that is not written costs nothing
   known_.create(host, 3 * size_t(nsurfel_));
@@ -124,7 +124,7 @@ void Body::reserve() {
 void Body::describe() {
   if (params_[kModes] > modes_.count)
     std::snprintf(note_, sizeof note_, "%u modes are used; the mesh has %u, and at most %u are taken",
-                  modes_.count, modes_.available, kMostModes);
+                  modes_.count, modes_.available, kMaxModes);
   char text[200];
   constexpr double kTurn = 6.283185307179586;
   const double lowest = std::sqrt(modes_.lambda[0]) / kTurn,

@@ -138,10 +138,10 @@ class Body {
   Buffer<double> rest_;                // what the modes do not hold of u
   Buffer<double> u_to_, w_to_;         // at the end, in its frame
   Buffer<double> x_to_, v_to_;         // the same in the world
-  Buffer<double> q_, qd_, load_, q_to_, qd_to_, answer_;
-  Buffer<double> coupling_;                // [3,modes] sum m r x W; floating
-  Buffer<double> under_, under_of_;        // condensed: displacement at rest by which uneven forces
-  Buffer<double> rows_, lanes_, answers_;  // of respond
+  Buffer<double> q_, qd_, load_, q_to_, qd_to_, modal_;
+  Buffer<double> coupling_;                  // [3,modes] sum m r x W; floating
+  Buffer<double> under_, under_of_;          // condensed: displacement at rest by which uneven forces
+  Buffer<double> rows_, lanes_, responses_;  // of respond
   Buffer<Transition> step_;
   double step_h_ = -1;
   bool step_soft_ = false;
@@ -154,8 +154,8 @@ class Body {
   double turning_[9] = {};                                        // inverse inertia in the world
   double force_sum_[3] = {}, torque_[3] = {};
   bool named_ = false, checked_ = false;
-  double told_ = 0;     // the displacement gradient that was reported; 0: none, or long ago
-  double outside_ = 0;  // s, when it was last out of its range
+  double reported_ = 0;  // the displacement gradient that was reported; 0: none, or long ago
+  double outside_ = 0;   // s, when it was last out of its range
   uint32_t since_look_ = 0;
 
   size_t size() const { return 3 * size_t(elastic_.npoint); }
@@ -168,7 +168,7 @@ class Body {
   void name_aliases();
 
   Frame frame_of(const double *x, size_t stride, const double *v, double h) const;
-  bool stands_turned(const dfm_kin &k) const;
+  bool is_rotated(const dfm_kin &k) const;
   void displacement(const dfm_kin &k, const Frame &f, double *u) const;
   bool held_displacement(const dfm_kin &k, const Frame &f, double h, double *u) const;
   void follow(const dfm_kin &k, const Frame &f, double h, int which, double *out);
@@ -205,7 +205,7 @@ class Body {
   void match_moment(const double *wanted, const double *c, const double *velocity, const double *x, double *v,
                     size_t stride) const;
   void look_at_gradient(double time, const double *x, size_t stride);
-  void tell_gradient(double time, double most, const char *where, uint32_t which);
+  void warn_gradient(double time, double most, const char *where, uint32_t which);
   void take_near(const dfm_mesh &m);
   bool stays_near(const dfm_kin &k, const double *f);
   void all_points(const dfm_kin &k, dfm_kin &all);

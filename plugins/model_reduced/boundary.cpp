@@ -28,7 +28,7 @@ namespace reduced {
 namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
-constexpr size_t kMostTriangles = 1600;
+constexpr size_t kMaxTriangles = 1600;
 constexpr int kDeepest = 3;
 
 // Of (x, y) against the axis x, in -pi .. pi: the angle is halved three times, then a series.
@@ -237,12 +237,12 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
       place[i] = 0;
     }
   }
-  if (ntriangle() > kMostTriangles) {
+  if (ntriangle() > kMaxTriangles) {
     char text[200];
     std::snprintf(text, sizeof text,
                   "%zu triangles; boundary elements of more than %zu are refused, because time grows "
                   "with their cube; take a coarser surface, or the model condensed",
-                  ntriangle(), kMostTriangles);
+                  ntriangle(), kMaxTriangles);
     model::complain(host, id, text);
     throw model::Refused{};
   }

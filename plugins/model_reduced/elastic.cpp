@@ -98,13 +98,13 @@ double Elastic::volume(uint32_t c) const {
 void Elastic::take(const dfm_mesh &m, const char *id) {
   npoint = m.npoint;
   ncell = m.ncell;
-  if (npoint > kMostPoints) {
+  if (npoint > kMaxPoints) {
     char text[200];
     std::snprintf(text, sizeof text,
                   "%u points; more than %u are refused, because their factor and modes take about a minute; "
                   "take a coarser "
                   "mesh, which a fine surface may hang on, or corotational_fem",
-                  npoint, kMostPoints);
+                  npoint, kMaxPoints);
     model::complain(host_, id, text);
     throw model::Refused{};
   }

@@ -18,7 +18,7 @@
 namespace reduced {
 
 // A factor of more points takes minutes.
-constexpr uint32_t kMostPoints = 10000;
+constexpr uint32_t kMaxPoints = 10000;
 
 class Elastic {
  public:

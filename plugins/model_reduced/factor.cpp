@@ -9,8 +9,8 @@ Factor::~Factor() {
   if (self_) direct_->solver->release(self_);
 }
 
-bool Factor::ask_host(const dfm_host *host, const std::vector<uint32_t> &ij, const std::vector<double> &blk,
-                      const double *places) {
+bool Factor::use_host_solver(const dfm_host *host, const std::vector<uint32_t> &ij,
+                             const std::vector<double> &blk, const double *places) {
   if (!host->extension) return false;
   const auto *const offered = static_cast<const dfm_direct *>(host->extension(host->ctx, DFM_HOST_DIRECT));
   if (!offered || offered->size < sizeof(dfm_direct)) return false;

@@ -128,14 +128,14 @@ class Krylov {
 
 Pairs all_pairs(size_t size, const Apply &c, size_t count) {
   Eigen::MatrixXd full(size, size);
-  std::vector<double> unit(kLanes * size), answer(kLanes * size);
+  std::vector<double> unit(kLanes * size), response(kLanes * size);
   for (size_t k = 0; k < size; k += kLanes) {
     const size_t many = std::min(kLanes, size - k);
     for (size_t l = 0; l < many; ++l) unit[kLanes * (k + l) + l] = 1;
-    c(unit.data(), answer.data());
+    c(unit.data(), response.data());
     for (size_t l = 0; l < many; ++l) {
       unit[kLanes * (k + l) + l] = 0;
-      for (size_t i = 0; i < size; ++i) full(Eigen::Index(i), Eigen::Index(k + l)) = answer[kLanes * i + l];
+      for (size_t i = 0; i < size; ++i) full(Eigen::Index(i), Eigen::Index(k + l)) = response[kLanes * i + l];
     }
   }
   const Eigen::MatrixXd symmetric = 0.5 * (full + full.transpose());

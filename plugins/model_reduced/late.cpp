@@ -17,10 +17,10 @@ namespace {
 
 // Far below what any sum that they are part of can show; smaller numbers would become denormal as they decay.
 constexpr double kNothing = 1e-60, kNothingAtRest = 1e-30;
-constexpr size_t kWidest = 4096;                  // numbers of a slot of state
-constexpr size_t kSweep = 16, kLeastEdges = 256;  // steps that look at all edges; edges in each at least
-constexpr double kEdgesSeeAtLeast = 0.25;         // of the gradient of a cell, as they lie
-constexpr double kAnotherLook = 1.25;             // times what the edges said at the last look
+constexpr size_t kWidest = 4096;                // numbers of a slot of state
+constexpr size_t kSweep = 16, kMinEdges = 256;  // steps that look at all edges; edges in each at least
+constexpr double kEdgesSeeAtLeast = 0.25;       // of the gradient of a cell, as they lie
+constexpr double kAnotherLook = 1.25;           // times what the edges said at the last look
 
 double kept(double a, double nothing) { return std::fabs(a) > nothing ? a : 0; }
 
@@ -123,7 +123,7 @@ dfm_status Body::predict_near(const dfm_kin &k, double *u_s) {
       near_x_[j] += near_rest_[j];
     }
   }
-  double poison = 0;
+  double nan_flag = 0;
   for (size_t n = 0; n < nnear_; ++n) {
     const size_t i = point_[n];
     double r[3];
@@ -143,9 +143,9 @@ dfm_status Body::predict_near(const dfm_kin &k, double *u_s) {
       for (uint32_t e = row_[s]; e < row_[s + 1]; ++e)
         way += weight_[e] * (end_x_[3 * size_t(place_[col_[e]]) + a] - k.x[size_t(col_[e]) * k.stride + a]);
       u_s[3 * size_t(s) + a] = way / h_;
-      poison += 0 * way;
+      nan_flag += 0 * way;
     }
-  return poison == 0 ? DFM_OK : DFM_DISCARD;
+  return nan_flag == 0 ? DFM_OK : DFM_DISCARD;
 }
 
 void Body::commit_near(const dfm_kin &k, const double *p_s, double *x, double *v) {
@@ -161,7 +161,7 @@ void Body::commit_near(const dfm_kin &k, const double *p_s, double *x, double *v
   if (touched) {
     double sum[3] = {}, moment[3] = {};
     take_impulses(k, p_s, sum, moment);
-    const double *const in[] = {answer_.data()};
+    const double *const in[] = {modal_.data()};
     double *const out[] = {near_change_.data()};
     near_shape_.expand(1, in, out);
     std::fill(near_given_.data(), near_given_.data() + rows, 0.0);
@@ -194,7 +194,7 @@ void Body::end_state(const dfm_kin &k, const double *p_s, bool touched, Lead lea
   if (lead == Lead::points) return std::fill(out + kCoordinates, out + nstate_, 0.0);
   const size_t count = modes_.count;
   for (size_t n = 0; n < count; ++n) {
-    const double change = touched ? answer_[n] : 0;
+    const double change = touched ? modal_[n] : 0;
     out[kCoordinates + n] = kept(q_to_[n] + h_ * change, kNothing);
     out[kCoordinates + count + n] = kept(qd_to_[n] + change, kNothing);
   }
@@ -241,10 +241,10 @@ void Body::add_rest_of(const double *state, double *u) {
     for (uint32_t e = row_[s]; e < row_[s + 1]; ++e)
       for (size_t a = 0; a < 3; ++a) f[3 * size_t(col_[e]) + a] += weight_[e] * force[3 * size_t(s) + a];
   const double *const in[] = {f};
-  double *const out[] = {answer_.data()};
+  double *const out[] = {modal_.data()};
   if (pushed) {
     modes_.shape.project(1, in, out);
-    rest_under(f, answer_.data(), mu_.data());
+    rest_under(f, modal_.data(), mu_.data());
   }
   for (size_t j = 0; j < size(); ++j) {
     if (pushed) u[j] += mu_[j];
@@ -343,8 +343,8 @@ bool Body::holds_rest(const double *state) {
 // points are requested.
 void Body::watch_near(const dfm_kin &k, bool touched) {
   near_time_ = k.t;
-  if (k.t - outside_ > kForgotten + kSweep * k.dt) told_ = looked_ = 0;
-  const size_t many = std::min(near_edges_, near_edges_ / kSweep + kLeastEdges);
+  if (k.t - outside_ > kForgotten + kSweep * k.dt) reported_ = looked_ = 0;
+  const size_t many = std::min(near_edges_, near_edges_ / kSweep + kMinEdges);
   const auto end = [&](uint32_t place, size_t a) {
     const size_t j = 3 * size_t(place) + a;
     if (!touched) return near_x_[j];
@@ -373,7 +373,7 @@ void Body::watch_near(const dfm_kin &k, bool touched) {
   }
   most = std::sqrt(most);
   sweep_most_ = std::max(sweep_most_, most);
-  tell_gradient(k.t, most, "along an edge of point", which);
+  warn_gradient(k.t, most, "along an edge of point", which);
 }
 
 // Of the displacement u_, where the edges say that it may be worth it.
@@ -383,7 +383,7 @@ void Body::look_at_cells() {
   looked_ = most_of_edges;
   uint32_t cell = 0;
   const double most = elastic_.largest_gradient(u_.data(), &cell);
-  tell_gradient(near_time_, most, "in cell", cell);
+  warn_gradient(near_time_, most, "in cell", cell);
 }
 
 }  // namespace reduced

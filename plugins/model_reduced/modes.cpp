@@ -93,11 +93,11 @@ void Modes::create(const dfm_host *host, const char *id, const dfm_mesh &m, cons
   available = uint32_t(body.nmoving());
   Search search(body);
   search.load_surface(m);
-  const size_t most = std::min<size_t>(available, kMostModes);
+  const size_t most = std::min<size_t>(available, kMaxModes);
   size_t number = std::min<size_t>(most, params[kModes] > 0 ? size_t(params[kModes]) : kDefaultModes);
   const bool by_rule = frequency > 0 || wanted_share > 0;
-  for (size_t ask = number;; ask = std::min(most, 2 * ask)) {
-    search.find(ask);
+  for (size_t wanted = number;; wanted = std::min(most, 2 * wanted)) {
+    search.find(wanted);
     const std::vector<double> shares = search.shares();
     const size_t found = shares.size();
     size_t below = found;
@@ -107,13 +107,13 @@ void Modes::create(const dfm_host *host, const char *id, const dfm_mesh &m, cons
       for (below = 0; below < found && (below == 0 || shares[below - 1] < wanted_share);) ++below;
     number = below;
     const bool enough = wanted_share > 0 ? shares[below - 1] >= wanted_share : below < found;
-    if (!by_rule || enough || (found < ask || ask == available)) break;
-    if (ask < most) continue;
+    if (!by_rule || enough || (found < wanted || wanted == available)) break;
+    if (wanted < most) continue;
     if (frequency > 0)
       refuse(host, id, "more than %.0f modes lie below the frequency %g Hz; give a lower one, or modes",
-             double(kMostModes), frequency);
+             double(kMaxModes), frequency);
     refuse(host, id, "%.0f modes hold %.3g of the static response, less than share; give less, or modes",
-           double(kMostModes), shares.back());
+           double(kMaxModes), shares.back());
   }
   if (!number)
     refuse(host, id, "no mode lies below the frequency %g Hz; the lowest has %.4g Hz", frequency,

@@ -7,7 +7,7 @@
 namespace reduced {
 
 // Default number of modes of a body, and the most that it may have.
-constexpr uint32_t kDefaultModes = 40, kMostModes = 1024;
+constexpr uint32_t kDefaultModes = 40, kMaxModes = 1024;
 
 struct Modes {
   uint32_t count = 0;

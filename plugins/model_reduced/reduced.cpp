@@ -17,7 +17,7 @@ const dfm_param kParams[kParamCount] = {
     {"damping_stiffness", "Rayleigh damping: damping over stiffness", "s", 0, 1e3, 0, DFM_PARAM_RUNTIME, 1,
      nullptr},
     {"damping_mass", "Rayleigh damping: drag over mass", "1/s", 0, 1e6, 0, DFM_PARAM_RUNTIME, 1, nullptr},
-    {"modes", "number of modes; 0, auto: by frequency or share, else 40", "1", 0, kMostModes, 0,
+    {"modes", "number of modes; 0, auto: by frequency or share, else 40", "1", 0, kMaxModes, 0,
      DFM_PARAM_INTEGER | DFM_PARAM_AUTO, 1, nullptr},
     {"frequency", "all modes up to this frequency; 0: not asked", "Hz", 0, 1e9, 0, 0, 1, nullptr},
     {"share", "modes that hold this share of the static response at the surface; 0: not asked", "1", 0, 0.999,

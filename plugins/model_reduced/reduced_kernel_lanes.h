@@ -20,8 +20,8 @@ typedef double Anywhere __attribute__((vector_size(8 * kWidth), aligned(8), may_
 DEFORM_INLINE V load(const double *p) { return *(const Anywhere *)p; }
 DEFORM_INLINE void store(double *p, V v) { *(Anywhere *)p = v; }
 
-constexpr size_t kMostOpen = 4;  // registers of numbers that one pass over the modes makes
-constexpr size_t kOpen = kPiece / kWidth < kMostOpen ? kPiece / kWidth : kMostOpen;
+constexpr size_t kMaxOpen = 4;  // registers of numbers that one pass over the modes makes
+constexpr size_t kOpen = kPiece / kWidth < kMaxOpen ? kPiece / kWidth : kMaxOpen;
 // Registers of lanes that one pass over a row makes, for kRowsAtOnce rows.
 constexpr size_t kSide = kLanes / kWidth < 2 ? kLanes / kWidth : 2;
 constexpr size_t kRowsAtOnce = 6;

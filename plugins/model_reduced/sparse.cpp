@@ -53,7 +53,7 @@ Matrix lower_triangle(uint32_t n, const std::vector<uint32_t> &ij, const std::ve
 void Factor::create(const dfm_host *host, uint32_t n, const std::vector<uint32_t> &ij,
                     const std::vector<double> &blk, const double *places) {
   n_ = n;
-  if (ask_host(host, ij, blk, places)) return;
+  if (use_host_solver(host, ij, blk, places)) return;
   const std::vector<uint32_t> place = order_of(n, ij);
   Eigen::SimplicialLLT<Matrix, Eigen::Lower, Eigen::NaturalOrdering<int>> llt(
       lower_triangle(n, ij, blk, place));

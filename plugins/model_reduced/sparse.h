@@ -41,8 +41,8 @@ class Factor {
   const dfm_direct *direct_ = nullptr;  // the host's; else what follows is the factor
   void *self_ = nullptr;
   mutable Buffer<double> wide_;  // [2,kLanes,n,3] of the host's: right-hand sides and solutions
-  bool ask_host(const dfm_host *host, const std::vector<uint32_t> &ij, const std::vector<double> &blk,
-                const double *places);
+  bool use_host_solver(const dfm_host *host, const std::vector<uint32_t> &ij, const std::vector<double> &blk,
+                       const double *places);
   void solve_by_host(uint32_t nrhs) const;
   Buffer<uint32_t> place_;          // [n] of a point in the order
   Buffer<uint32_t> begin_, row_;    // [n + 1], [entries / 9]

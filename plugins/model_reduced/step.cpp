@@ -51,7 +51,7 @@ void Body::name_aliases() {
 }
 
 dfm_status Body::predict(const dfm_kin &k, const double *f, double *u_s) {
-  if (!checked_ && !elastic_.floating && !elastic_.turns && stands_turned(k)) {
+  if (!checked_ && !elastic_.floating && !elastic_.turns && is_rotated(k)) {
     model::complain(host, id_,
                     "held components are along the axes of the world, but the pose has turned the body; turn "
                     "the mesh instead, or hold whole points");
@@ -84,7 +84,7 @@ dfm_status Body::predict_all(const dfm_kin &k, const double *f, double *u_s) {
   advance_modes();
   if (elastic_.floating) place_floating();
   else place_held(k);
-  double poison = 0;  // a body crushed to a point has no frame, and no inverse of its inertia
+  double nan_flag = 0;  // a body crushed to a point has no frame, and no inverse of its inertia
   for (uint32_t s = 0; s < nsurfel_; ++s)
     for (size_t a = 0; a < 3; ++a) {
       double way = 0;
@@ -93,9 +93,9 @@ dfm_status Body::predict_all(const dfm_kin &k, const double *f, double *u_s) {
         way += weight_[e] * (x_to_[3 * i + a] - k.x[i * k.stride + a]);
       }
       u_s[3 * size_t(s) + a] = way / h_;
-      poison += 0 * way;
+      nan_flag += 0 * way;
     }
-  return poison == 0 ? DFM_OK : DFM_DISCARD;
+  return nan_flag == 0 ? DFM_OK : DFM_DISCARD;
 }
 
 // The rigid motion: the center of mass by the same transition as a mode without stiffness, the rotation
@@ -257,7 +257,7 @@ bool Body::commit_all(const dfm_kin &k, const double *p_s, double *x, double *v)
     if (condensed_) std::fill(rest_.data(), rest_.data() + size(), 0.0);
     if (condensed_) add_displacement_at_rest(p_s, rest_.data());
     take_impulses(k, p_s, sum, moment);
-    const double *const in[] = {answer_.data()};
+    const double *const in[] = {modal_.data()};
     double *const out[] = {w_.data()};
     modes_.shape.expand(1, in, out);
     if (elastic_.floating) product(turning_, moment, turn);
@@ -302,7 +302,7 @@ bool Body::commit_all(const dfm_kin &k, const double *p_s, double *x, double *v)
 void Body::look_at_gradient(double time, const double *x, size_t stride) {
   double bound = 0;
   for (uint32_t k = 0; k < modes_.count; ++k) bound += std::fabs(q_to_[k]) * gradient_[k];
-  if (told_ > 0 && time - outside_ > kForgotten) told_ = 0;
+  if (reported_ > 0 && time - outside_ > kForgotten) reported_ = 0;
   if (!(bound > kLargestGradient || led_ || has_rest_ || condensed_) || since_look_++ % 16 != 0) return;
   dfm_kin k{};
   k.stride = uint32_t(stride);
@@ -311,14 +311,14 @@ void Body::look_at_gradient(double time, const double *x, size_t stride) {
   whole_displacement(k, f);
   uint32_t cell = 0;
   const double most = elastic_.largest_gradient(u_.data(), &cell);
-  tell_gradient(time, most, "in cell", cell);
+  warn_gradient(time, most, "in cell", cell);
 }
 
-void Body::tell_gradient(double time, double most, const char *where, uint32_t which) {
+void Body::warn_gradient(double time, double most, const char *where, uint32_t which) {
   if (!(most > kLargestGradient)) return;
   outside_ = time;
-  if (!(most > 2 * told_)) return;
-  told_ = most;
+  if (!(most > 2 * reported_)) return;
+  reported_ = most;
   char text[240];
   std::snprintf(text, sizeof text,
                 "%s: the displacement gradient reaches %.2g %s %u: above %g the strains of this model are "

@@ -38,7 +38,7 @@ Frame Body::frame_of(const double *x, size_t stride, const double *v, double h) 
 
 // Of a body that is held in some components only: has its pose turned it against the axes they are of? A pose
 // turns it as a whole; a body that was saved while it sagged is turned in the mean, and deformed as much.
-bool Body::stands_turned(const dfm_kin &k) const {
+bool Body::is_rotated(const dfm_kin &k) const {
   double c[3] = {}, rest[3] = {}, spread[9] = {}, r[9];
   for (size_t i = 0; i < elastic_.npoint; ++i)
     for (size_t a = 0; a < 3; ++a) {
@@ -289,8 +289,8 @@ void Body::find_weight_at_rest() {
 // out = C f less what the modes have of it; load = W^T f
 void Body::rest_under(const double *f, const double *load, double *out) {
   elastic_.compliance(f, out);
-  for (uint32_t k = 0; k < modes_.count; ++k) answer_[k] = load[k] / modes_.lambda[k];
-  const double *const in[] = {answer_.data()};
+  for (uint32_t k = 0; k < modes_.count; ++k) modal_[k] = load[k] / modes_.lambda[k];
+  const double *const in[] = {modal_.data()};
   double *const held[] = {mw_.data()};
   modes_.shape.expand(1, in, held);
   for (size_t j = 0; j < size(); ++j) out[j] -= mw_[j];

@@ -96,7 +96,7 @@ struct Body {
   Buffer<double> part, q;
   Buffer<Cluster> cluster;  // at rest
   Buffer<dfm_slot> slot;
-  bool told_softened = false;
+  bool warned_softened = false;
 
   // of the present step
   double frames_of = 0, step_of = -1;  // its time and length
@@ -105,9 +105,9 @@ struct Body {
   Buffer<double> position;  // [npoint,3] m
   Buffer<double> velocity;  // [npoint,3] m/s, mean without contact
   // of one answer; zero in between
-  Buffer<double> change, answered;  // [npoint,3] m/s, of the points' velocities: before, after the clusters
-  Buffer<double> momentum;          // [ncluster,6] of the change; then the clusters' rigid velocities
-  Buffer<uint32_t> touched, met;    // points and clusters, in the order in which they are met
+  Buffer<double> change, matched;  // [npoint,3] m/s, of the points' velocities: before, after the clusters
+  Buffer<double> momentum;         // [ncluster,6] of the change; then the clusters' rigid velocities
+  Buffer<uint32_t> touched, met;   // points and clusters, in the order in which they are met
   Buffer<uint8_t> is_touched, is_met;
   uint32_t ntouched = 0, nmet = 0;
   Buffer<uint32_t> pushed;  // [nsurfel] surfels with an impulse at the end of the step
@@ -121,7 +121,7 @@ struct Body {
   Mode mode() const { return Mode(uint32_t(params[kMode])); }
 
   Rates rates_of(double h) const;
-  void tell_softened(double h);
+  void warn_softened(double h);
   void fit(uint32_t c, const dfm_kin &k);
   void find_goal(const double *turn, const double *moments, const double *full, Frame &f) const;
   void to_goal(uint32_t point, double *d) const;

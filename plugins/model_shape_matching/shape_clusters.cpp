@@ -54,7 +54,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   take_mesh(m);
   make_clusters();
   frame.create(h, ncluster);
-  for (Buffer<double> *b : {&position, &velocity, &change, &answered}) b->create(h, 3 * size_t(npoint));
+  for (Buffer<double> *b : {&position, &velocity, &change, &matched}) b->create(h, 3 * size_t(npoint));
   momentum.create(h, 6 * size_t(ncluster));
   touched.create(h, npoint);
   is_touched.create(h, npoint);

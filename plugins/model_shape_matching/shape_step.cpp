@@ -24,7 +24,7 @@ constexpr double kCrushed = 0.1;
 constexpr double kTurned = 1e-13, kPoint = 1e-11;
 
 // Of (w h)^2 where clusters share a deviation: the largest stable value (doc/models/shape_matching.md).
-constexpr double kMostLed = 4;
+constexpr double kMaxLed = 4;
 
 double determinant(const double *a) {
   return (a[0] * (a[4] * a[8] - a[5] * a[7]) + a[1] * (a[5] * a[6] - a[3] * a[8])) +
@@ -126,16 +126,16 @@ Rates Body::rates_of(double h) const {
   const double y = omega * h, decay = dfm_exp(-zeta * y), lost = 1 - decay;
   const double half = dfm_sinpi(y * std::sqrt(1 - zeta * zeta) / (2 * kPi));
   const double square = lost * lost + 4 * decay * (half * half);  // |1 - root|^2
-  const double led = std::min(y * y, kMostLed) - square;
+  const double led = std::min(y * y, kMaxLed) - square;
   return {decay * decay, std::min(square / (y * y), 1.0), square / h, led / h,
           dfm_exp(-params[kDampingMass] * h)};
 }
 
-// Clusters that move against each other are as stiff as requested while (w h)^2 is at most kMostLed.
-void Body::tell_softened(double h) {
-  const double longest = std::sqrt(kMostLed) * params[kReferenceStep] / -dfm_log(1 - params[kStiffness]);
-  if (told_softened || ncluster == 1 || h <= longest) return;
-  told_softened = true;
+// Clusters that move against each other are as stiff as requested while (w h)^2 is at most kMaxLed.
+void Body::warn_softened(double h) {
+  const double longest = std::sqrt(kMaxLed) * params[kReferenceStep] / -dfm_log(1 - params[kStiffness]);
+  if (warned_softened || ncluster == 1 || h <= longest) return;
+  warned_softened = true;
   char text[240];
   std::snprintf(
       text, sizeof text,
@@ -285,7 +285,7 @@ void Body::rigid_velocity(uint32_t point, double *out) const {
 }
 
 void Body::predict(const dfm_kin &k, const double *load, double *u_s) {
-  tell_softened(k.dt);
+  warn_softened(k.dt);
   rates = rates_of(k.dt);
   frames_of = k.t;
   step_of = k.dt;
@@ -379,12 +379,12 @@ void Body::respond(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const doub
   touch(n, surfel);
   for (uint32_t r = 0; r < nrhs; ++r, p += 3 * size_t(n), du += 3 * size_t(n)) {
     push(n, surfel, p);
-    for (uint32_t t = 0; t < ntouched; ++t) changed(touched[t], answered.data() + 3 * size_t(touched[t]));
+    for (uint32_t t = 0; t < ntouched; ++t) changed(touched[t], matched.data() + 3 * size_t(touched[t]));
     for (uint32_t s = 0; s < n; ++s)
       for (size_t a = 0; a < 3; ++a) {
         double sum = 0;
         for (uint32_t e = row[surfel[s]]; e < row[surfel[s] + 1]; ++e)
-          sum += coupling[e] * answered[3 * size_t(col[e]) + a];
+          sum += coupling[e] * matched[3 * size_t(col[e]) + a];
         du[3 * size_t(s) + a] = sum;
       }
   }

@@ -47,9 +47,9 @@ class Cholmod {
     right.x = const_cast<double *>(b);
     right.xtype = CHOLMOD_REAL;
     right.dtype = CHOLMOD_DOUBLE;
-    cholmod_solve2(CHOLMOD_A, factor_, &right, nullptr, &answer_, nullptr, &work_y_, &work_e_, &common_);
+    cholmod_solve2(CHOLMOD_A, factor_, &right, nullptr, &solution_, nullptr, &work_y_, &work_e_, &common_);
     if (const dfm_status failed = status("solve")) return failed;
-    std::copy_n(static_cast<const double *>(answer_->x), right.nzmax, x);
+    std::copy_n(static_cast<const double *>(solution_->x), right.nzmax, x);
     return DFM_OK;
   }
 
@@ -97,7 +97,7 @@ class Cholmod {
   }
 
   void release() {
-    cholmod_free_dense(&answer_, &common_);
+    cholmod_free_dense(&solution_, &common_);
     cholmod_free_dense(&work_y_, &common_);
     cholmod_free_dense(&work_e_, &common_);
     cholmod_free_factor(&factor_, &common_);
@@ -111,7 +111,7 @@ class Cholmod {
   cholmod_common common_{};
   cholmod_sparse *matrix_ = nullptr;
   cholmod_factor *factor_ = nullptr;
-  cholmod_dense *answer_ = nullptr, *work_y_ = nullptr, *work_e_ = nullptr;
+  cholmod_dense *solution_ = nullptr, *work_y_ = nullptr, *work_e_ = nullptr;
 };
 
 dfm_status analyse(const dfm_host *host, uint32_t n, uint32_t nb, const uint32_t *ij, void **self) {

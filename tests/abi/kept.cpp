@@ -37,7 +37,7 @@ void need(bool good, const std::string &what) {
   std::exit(1);
 }
 
-void told(const std::string &id, const char *what, const double *values, size_t n) {
+void reported(const std::string &id, const char *what, const double *values, size_t n) {
   uint64_t hash = 0xcbf29ce484222325ull;  // FNV-1a
   for (size_t i = 0; i < n; ++i) {
     unsigned char bytes[sizeof(double)];
@@ -47,8 +47,8 @@ void told(const std::string &id, const char *what, const double *values, size_t 
   std::printf("%s,%s,%zu,%016llx,%.17g\n", id.c_str(), what, n, static_cast<unsigned long long>(hash),
               n ? values[n / 2] : 0.0);
 }
-void told(const std::string &id, const char *what, const std::vector<double> &values) {
-  told(id, what, values.data(), values.size());
+void reported(const std::string &id, const char *what, const std::vector<double> &values) {
+  reported(id, what, values.data(), values.size());
 }
 
 // Numbers without a library: those of Marsaglia's xorshift.
@@ -125,7 +125,7 @@ uint32_t width_of(const dfm_slot *slots, uint32_t n, uint32_t slot_size) {
   return sum;
 }
 
-void ask_law(const Host &host, const dfm_type &type) {
+void call_law(const Host &host, const dfm_type &type) {
   const auto &law = *static_cast<const dfm_friction *>(type.ops);
   const std::vector<double> params = defaults(type);
   const dfm_slots *own = law.state ? law.state(params.data()) : nullptr;
@@ -180,7 +180,7 @@ void ask_law(const Host &host, const dfm_type &type) {
     std::memcpy(state.at, next.at, nstate * n * sizeof(double));
   }
   const char *const names[] = {"ft", "state", "dft_dvt", "dft_dfn", "stored", "limit and mode"};
-  for (size_t k = 0; k < 6; ++k) told(type.id, names[k], all[k]);
+  for (size_t k = 0; k < 6; ++k) reported(type.id, names[k], all[k]);
   if (law.release) law.release(&host.table.known, data);
 }
 
@@ -319,29 +319,29 @@ struct Body {
     k.known.state = state.empty() ? nullptr : state.data();
     k.known.state_out = trial && !state.empty() ? next.data() : nullptr;
   }
-  void told_of(const char *what) const {
+  void reported_by(const char *what) const {
     std::vector<double> all(x.at, x.at + x.n);
     all.insert(all.end(), v.at, v.at + v.n);
     all.insert(all.end(), state.begin(), state.end());
-    told(type.id, what, all);
+    reported(type.id, what, all);
   }
 };
 
-void ask_forces(Body &b) {
+void call_forces(Body &b) {
   Lent<dfm_kin> k;
   b.fill(k, false);
   const uint32_t n = b.solid.n();
   need(b.ops.add_forces(b.self, &k.known, b.f.at) == DFM_OK, "add_forces");
-  told(b.type.id, "add_forces", b.f.at, b.f.n);
+  reported(b.type.id, "add_forces", b.f.at, b.f.n);
   std::vector<double> row(2 * size_t(n), 0.0);
   double h = 1;
   if (b.ops.bound) need(b.ops.bound(b.self, &k.known, row.data(), row.data() + n, &h) == DFM_OK, "bound");
   row.push_back(h);
-  told(b.type.id, "bound", row);
+  reported(b.type.id, "bound", row);
   if (b.ops.caps & DFM_CAP_ENERGY) {
     double joule = 0;
     need(b.ops.energy(b.self, &k.known, &joule) == DFM_OK, "energy");
-    told(b.type.id, "energy", &joule, 1);
+    reported(b.type.id, "energy", &joule, 1);
   }
   if (b.ops.caps & DFM_CAP_STIFFNESS) {
     uint32_t nb = 0;
@@ -352,7 +352,7 @@ void ask_forces(Body &b) {
     need(b.ops.stiffness(b.self, &k.known, 1, 0.5, blocks.at) == DFM_OK, "stiffness");
     std::vector<double> all(ij.begin(), ij.end());
     all.insert(all.end(), blocks.at, blocks.at + blocks.n);
-    told(b.type.id, "pattern and stiffness", all);
+    reported(b.type.id, "pattern and stiffness", all);
   }
   for (int step = 0; step < 20; ++step) {
     Lent<dfm_kin> now;
@@ -367,13 +367,13 @@ void ask_forces(Body &b) {
     b.state = b.next;
     b.t += 1e-4;
   }
-  b.told_of("after 20 steps");
+  b.reported_by("after 20 steps");
 }
 
-void ask_stepper(Body &b, const dfm_stepper &stepper) {
+void call_stepper(Body &b, const dfm_stepper &stepper) {
   const uint32_t n = b.solid.n();
   const uint32_t touched[] = {1, 4, 16};
-  std::vector<double> u(3 * size_t(n)), p(9), du(9), w(27), answers;
+  std::vector<double> u(3 * size_t(n)), p(9), du(9), w(27), results;
   for (int step = 0; step < 20; ++step) {
     Lent<dfm_kin> k;
     b.fill(k, true);
@@ -391,7 +391,7 @@ void ask_stepper(Body &b, const dfm_stepper &stepper) {
     std::vector<double> impulses(3 * size_t(n), 0.0);
     for (int i = 0; i < 9; ++i) impulses[3 * touched[i / 3] + i % 3] = p[i];
     need(stepper.commit(b.self, &k.known, impulses.data(), b.x_end.at, b.v_end.at) == DFM_OK, "commit");
-    for (const auto *part : {&u, &du, &w}) answers.insert(answers.end(), part->begin(), part->end());
+    for (const auto *part : {&u, &du, &w}) results.insert(results.end(), part->begin(), part->end());
     for (uint32_t i = 0; i < 4 * n; ++i) {
       b.x.at[i] = i % 4 == 3 ? 0 : b.x_end.at[i];
       b.v.at[i] = i % 4 == 3 ? 0 : b.v_end.at[i];
@@ -399,29 +399,29 @@ void ask_stepper(Body &b, const dfm_stepper &stepper) {
     b.state = b.next;
     b.t += 1e-4;
   }
-  told(b.type.id, "predict respond diagonal", answers);
-  b.told_of("after 20 steps");
+  reported(b.type.id, "predict respond diagonal", results);
+  b.reported_by("after 20 steps");
 }
 
-void ask_model(const Host &host, const dfm_type &type) {
+void call_model(const Host &host, const dfm_type &type) {
   const Solid solid = block();
   Body b(host, type, solid);
   const auto *stepper = static_cast<const dfm_stepper *>(b.extension("dfm.stepper/1"));
-  if (stepper) ask_stepper(b, *stepper);
-  else ask_forces(b);
+  if (stepper) call_stepper(b, *stepper);
+  else call_forces(b);
   if (const auto *e = static_cast<const dfm_cell_energy *>(b.extension(DFM_EXT_CELL_ENERGY))) {
     Lent<dfm_kin> k;
     b.fill(k, false);
     std::vector<double> density(solid.cells.size() / 4);
     need(e->cell_energy(b.self, &k.known, density.data()) == DFM_OK, "cell_energy");
-    told(type.id, "cell_energy", density);
+    reported(type.id, "cell_energy", density);
   }
   need(!b.extension("dfm.unheard-of/1"), "an answer to an unknown extension");
 }
 
 // ---- solvers: a chain of six points -----------------------------------------------------------------------
 
-void ask_solver(const Host &host, const dfm_type &type) {
+void call_solver(const Host &host, const dfm_type &type) {
   const auto &solver = *static_cast<const dfm_solver *>(type.ops);
   std::vector<uint32_t> ij;
   std::vector<double> blk, b, x(36, 0.0);
@@ -436,7 +436,7 @@ void ask_solver(const Host &host, const dfm_type &type) {
   need(solver.analyse(&host.table.known, 6, uint32_t(ij.size() / 2), ij.data(), &self) == DFM_OK, "analyse");
   need(solver.factor(self, blk.data()) == DFM_OK, "factor");
   need(solver.solve(self, 2, b.data(), x.data(), 1e-12) == DFM_OK, "solve");
-  told(type.id, "solve", x);
+  reported(type.id, "solve", x);
   solver.release(self);
 }
 
@@ -455,9 +455,9 @@ int main(int argc, char **argv) {
   need(plugin->abi == 1 && plugin->abi_draft == 0, "the plugin is of another ABI");
   for (uint32_t i = 0; i < plugin->ntype; ++i) {
     const dfm_type &type = *plugin->types[i];
-    if (type.kind == DFM_KIND_FRICTION) ask_law(host, type);
-    else if (type.kind == DFM_KIND_MODEL) ask_model(host, type);
-    else if (type.kind == DFM_KIND_SOLVER) ask_solver(host, type);
+    if (type.kind == DFM_KIND_FRICTION) call_law(host, type);
+    else if (type.kind == DFM_KIND_MODEL) call_model(host, type);
+    else if (type.kind == DFM_KIND_SOLVER) call_solver(host, type);
   }
   if (plugin->shutdown) plugin->shutdown();
   return 0;

@@ -254,7 +254,7 @@ TEST_P(Pixels, LevelSlab_HasARimWhereTheFloorHasNone) {
   EXPECT_GT(changed(cut, bare), 500) << "of 19200";
 }
 
-TEST_P(Pixels, HiddenValues_AreSeenThroughAsFarAsAsked) {
+TEST_P(Pixels, HiddenValues_AreSeenThroughAsFarAsRequested) {
   const Ball front(0, -1, 1, 0.9), behind(0, 2, 2.0 / 3, 0.3);
   const std::vector<float> values(behind.xyz.size() / 3, 0.5f);
   Scene s = scene_of({front.surface(0.8f, 0.8f, 0.8f), behind.surface(0.8f, 0.8f, 0.8f)}, false);

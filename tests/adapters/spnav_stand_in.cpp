@@ -10,7 +10,7 @@ union Event {
   } motion;
 };
 int looks = 0;
-bool told = false;
+bool reported = false;
 }  // namespace
 
 extern "C" {
@@ -18,8 +18,8 @@ __attribute__((visibility("default"))) int spnav_open() { return 0; }
 __attribute__((visibility("default"))) int spnav_close() { return 0; }
 // One event a look: the second call of each finds none.
 __attribute__((visibility("default"))) int spnav_poll_event(Event *event) {
-  told = !told;
-  if (!told) return 0;
+  reported = !reported;
+  if (!reported) return 0;
   ++looks;
   *event = {};
   event->motion.type = 1;

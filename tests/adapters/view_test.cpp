@@ -89,8 +89,8 @@ class Viewer : public testing::Test {
     return image;
   }
   // Text of a value in the line that tells of a shot.
-  static std::string told(const test::CommandResult &result, const std::string &shot,
-                          const std::string &key) {
+  static std::string reported(const test::CommandResult &result, const std::string &shot,
+                              const std::string &key) {
     const size_t line = result.out.find("/" + shot + "\"");
     const size_t at = result.out.find("\"" + key + "\": ", line);
     if (line == std::string::npos || at == std::string::npos) return "";
@@ -99,13 +99,13 @@ class Viewer : public testing::Test {
     return result.out.substr(begin, result.out.find_first_of(list ? "]" : ",}\n", begin) - begin);
   }
   static double number(const test::CommandResult &result, const std::string &shot, const std::string &key) {
-    const std::string text = told(result, shot, key);
+    const std::string text = reported(result, shot, key);
     return text.empty() ? NAN : std::strtod(text.c_str() + (text[0] == '['), nullptr);
   }
 
   static std::vector<double> vector(const test::CommandResult &result, const std::string &shot,
                                     const std::string &key) {
-    const std::string text = told(result, shot, key);
+    const std::string text = reported(result, shot, key);
     std::vector<double> out(3, NAN);
     if (text.empty()) return out;
     std::sscanf(text.c_str(), "[%lf, %lf, %lf", &out[0], &out[1], &out[2]);
@@ -114,7 +114,7 @@ class Viewer : public testing::Test {
 
   // m, of the block's center of mass
   static double height(const test::CommandResult &result, const std::string &shot) {
-    const std::string text = told(result, shot, "block");
+    const std::string text = reported(result, shot, "block");
     return std::strtod(text.c_str() + std::min(text.rfind(',') + 1, text.size()), nullptr);
   }
 
@@ -149,7 +149,7 @@ TEST_F(Viewer, Pictures_ShowTheSceneAndChangeWhileItRunsOnly) {
   EXPECT_GT(red(start), 1000u);
   EXPECT_EQ(different(start, picture("paused.png")), 0u);
   EXPECT_GT(different(start, picture("running.png")), 100u);
-  EXPECT_EQ(told(done, "turned.png", "state_hash"), told(done, "running.png", "state_hash"));
+  EXPECT_EQ(reported(done, "turned.png", "state_hash"), reported(done, "running.png", "state_hash"));
   EXPECT_GT(different(picture("running.png"), picture("turned.png")), 1000u);
 }
 
@@ -160,7 +160,7 @@ TEST_F(Viewer, UntouchedRun_EndsWithTheBitsOfDeformRun) {
   ASSERT_EQ(run.exit_code, 0) << run.err;
   const size_t at = run.out.find("\"state_hash\": ");
   ASSERT_NE(at, std::string::npos);
-  EXPECT_EQ(told(viewed, "end.png", "state_hash"), run.out.substr(at + 14, 18));
+  EXPECT_EQ(reported(viewed, "end.png", "state_hash"), run.out.substr(at + 14, 18));
   EXPECT_NEAR(number(viewed, "end.png", "t"), 0.2, 1e-9);
 }
 
@@ -170,8 +170,8 @@ TEST_F(Viewer, StepAndRestart_ContinueAndBackToTheFirstBits) {
   ASSERT_EQ(done.exit_code, 0) << done.err;
   EXPECT_NEAR(number(done, "b.png", "t"), 0.002, 1e-12);
   EXPECT_NEAR(number(done, "c.png", "t"), 0.004, 1e-12);
-  EXPECT_EQ(told(done, "d.png", "state_hash"), told(done, "a.png", "state_hash"));
-  EXPECT_NE(told(done, "c.png", "state_hash"), told(done, "b.png", "state_hash"));
+  EXPECT_EQ(reported(done, "d.png", "state_hash"), reported(done, "a.png", "state_hash"));
+  EXPECT_NE(reported(done, "c.png", "state_hash"), reported(done, "b.png", "state_hash"));
 }
 
 // The block rests on the floor; the mouse takes it at its middle, pulls it to the right, and holds it there.
@@ -186,7 +186,7 @@ TEST_F(Viewer, PulledBody_FollowsTheMouseAndStaysOnTheFloor) {
   EXPECT_GT(height(done, "held.png"),
             height(done, "rest.png") - 0.02);  // pulled down too, and the floor bears
   EXPECT_GT(red(picture("held.png")), 1000u);
-  EXPECT_EQ(told(view(pull, longer), "held.png", "state_hash"), told(done, "held.png", "state_hash"));
+  EXPECT_EQ(reported(view(pull, longer), "held.png", "state_hash"), reported(done, "held.png", "state_hash"));
   // a thousand times as stiff: still stable, and nearer to the mouse
   const test::CommandResult stiff = view("0 slider pull 1000\n" + pull, longer);
   ASSERT_EQ(stiff.exit_code, 0) << stiff.err;
@@ -204,7 +204,7 @@ TEST_F(Viewer, PulledBodyOfAModelThatTakesNoSpring_FollowsTheMouse) {
   ASSERT_EQ(done.exit_code, 0) << done.err;
   const double before = number(done, "rest.png", "block");
   EXPECT_GT(number(done, "held.png", "block"), before + 0.03) << done.out;
-  EXPECT_EQ(told(view(pull, modal), "held.png", "state_hash"), told(done, "held.png", "state_hash"));
+  EXPECT_EQ(reported(view(pull, modal), "held.png", "state_hash"), reported(done, "held.png", "state_hash"));
   const test::CommandResult stiff = view("0 slider pull 1000\n" + pull, modal);
   ASSERT_EQ(stiff.exit_code, 0) << stiff.err;
   EXPECT_GT(number(stiff, "held.png", "block"), before + 0.03);
@@ -329,25 +329,25 @@ class Spacenavd {
     thread_ = std::thread([this, first = std::move(first), file = std::move(file), then = std::move(then)] {
       const int client = accept(listens_, nullptr, nullptr);
       if (client < 0) return;
-      uint32_t asked = 0;
-      if (recv(client, &asked, sizeof asked, MSG_WAITALL) == sizeof asked) asked_ = asked;
+      uint32_t requested = 0;
+      if (recv(client, &requested, sizeof requested, MSG_WAITALL) == sizeof requested) asked_ = requested;
       const auto tell = [&](const void *what, size_t size) {
         return send(client, what, size, MSG_NOSIGNAL) == ssize_t(size);
       };
-      bool lives = tell(&asked, sizeof asked);
+      bool lives = tell(&requested, sizeof requested);
       for (const auto &event : first) lives = lives && tell(event.data(), sizeof event);
       pollfd ends{client, POLLIN, 0};
       char byte;
       // until the client goes
-      for (bool told = false; lives && !(poll(&ends, 1, 5) > 0 && recv(client, &byte, 1, 0) == 0);) {
-        if (told || access(file.c_str(), R_OK) != 0) continue;
-        told = true;
+      for (bool reported = false; lives && !(poll(&ends, 1, 5) > 0 && recv(client, &byte, 1, 0) == 0);) {
+        if (reported || access(file.c_str(), R_OK) != 0) continue;
+        reported = true;
         for (const auto &event : then) lives = lives && tell(event.data(), sizeof event);
       }
       close(client);
     });
   }
-  uint32_t asked() const { return asked_; }
+  uint32_t requested() const { return asked_; }
 
  private:
   std::string path_;
@@ -382,7 +382,7 @@ TEST_F(Viewer, SpaceMouseByLibspnav_LeadsTheToolInHand) {
   unsetenv("SPNAV_SOCKET");
   unsetenv("DEFORM_VIEW_SPNAV");
   ASSERT_EQ(done.exit_code, 0) << done.err;
-  EXPECT_EQ(daemon.asked() >> 16, 0x7faau) << "a request of libspnav";
+  EXPECT_EQ(daemon.requested() >> 16, 0x7faau) << "a request of libspnav";
   const std::vector<double> from = vector(done, "a.png", "at"), to = vector(done, "b.png", "at");
   EXPECT_GT(to[0] - from[0], 0.05) << done.out;
   EXPECT_NEAR((to[1] - from[1]) / (to[0] - from[0]), 0.45, 0.1) << "half as far away as to the right";
@@ -412,12 +412,12 @@ TEST_F(Viewer, SavedState_IsLoadedWithItsBitsAndByDeformRun) {
       "0 key space\n0.1 key space\n0.1 key f5\n0.1 shot saved.png\n0.15 key space\n0.2 shot later.png\n"
       "0.25 key f9\n0.25 key space\n0.25 shot loaded.png\n0.3 key space\n0.6 shot end.png\n");
   ASSERT_EQ(done.exit_code, 0) << done.err;
-  EXPECT_EQ(told(done, "loaded.png", "state_hash"), told(done, "saved.png", "state_hash"));
-  EXPECT_NE(told(done, "later.png", "state_hash"), told(done, "saved.png", "state_hash"));
+  EXPECT_EQ(reported(done, "loaded.png", "state_hash"), reported(done, "saved.png", "state_hash"));
+  EXPECT_NE(reported(done, "later.png", "state_hash"), reported(done, "saved.png", "state_hash"));
   const test::CommandResult run =
       test::deform({"run", scene_, "--from", folder_ + "/000.state", "--out", folder_ + "/run", "--json"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  EXPECT_NE(run.out.find(told(done, "end.png", "state_hash")), std::string::npos);
+  EXPECT_NE(run.out.find(reported(done, "end.png", "state_hash")), std::string::npos);
 }
 
 // With a pull, a slider and a pause in it, and beyond the end of the scene.
@@ -436,7 +436,7 @@ TEST_F(Viewer, RecordedSession_IsReplayedToTheSameBitsAndShown) {
       test::deform({"view", "--replay", folder_, "--script", folder_ + "/look.txt", "--out", folder_,
                     "--size", "320x240", "--json"});
   ASSERT_EQ(looked.exit_code, 0) << looked.err;
-  EXPECT_EQ(told(looked, "last.png", "state_hash"), told(done, "end.png", "state_hash"));
+  EXPECT_EQ(reported(looked, "last.png", "state_hash"), reported(done, "end.png", "state_hash"));
   EXPECT_GT(different(picture("first.png"), picture("last.png")), 300u);
   EXPECT_GT(different(picture("last.png"), picture("turned.png")), 1000u);
 }
@@ -446,7 +446,7 @@ TEST_F(Viewer, Stroke_CutsTheBlockAndIsReplayed) {
   const test::CommandResult whole = view("0 key space\n0 key v\n" + stroke);
   const test::CommandResult cut = view("0 key space\n0 key v\n0 key x\n" + stroke);
   ASSERT_EQ(cut.exit_code, 0) << cut.err;
-  EXPECT_NE(told(cut, "end.png", "state_hash"), told(whole, "end.png", "state_hash"));
+  EXPECT_NE(reported(cut, "end.png", "state_hash"), reported(whole, "end.png", "state_hash"));
   EXPECT_NE(test::read_file(folder_ + "/recording/acts.jsonl").find("\"cut\""), std::string::npos);
   const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
   EXPECT_EQ(again.exit_code, 0) << again.err;

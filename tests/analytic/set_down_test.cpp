@@ -9,7 +9,7 @@ namespace {
 
 using namespace test;
 
-constexpr double kMost = 1e-3;  // m/s; depths open at 0.8 of it, and the body may shake
+constexpr double kMax = 1e-3;  // m/s; depths open at 0.8 of it, and the body may shake
 
 // A block of 0.5 kg with its lower face at z, for a tenth of a second, without the weight that would set it
 // moving by itself: the speed of its center of mass, m/s.
@@ -37,15 +37,15 @@ TEST(SetDown, OnAFloor_GetsAMillimeterPerSecond) {
       for (const double z : {0.0, -2e-5}) {
         const std::string what = std::string(model) + ", " + std::to_string(integrator);
         const double speed = set_down(model, 1e7, integrator, 1e-3, z);
-        EXPECT_LT(speed, kMost) << what << ", z " << z;
-        EXPECT_GT(speed, 0.7 * kMost) << what << ", z " << z;
+        EXPECT_LT(speed, kMax) << what << ", z " << z;
+        EXPECT_GT(speed, 0.7 * kMax) << what << ", z " << z;
       }
 }
 
 TEST(SetDown, AtAnyStiffnessAndStep_GetsTheSame) {
   for (const double young : {1e6, 1e8}) {
-    EXPECT_LT(set_down("msm", young, DFM_INTEGRATOR_SYMPLECTIC_EULER, 1e-4, 0), kMost) << young;
-    EXPECT_LT(set_down("msm", young, DFM_INTEGRATOR_IMPLICIT_EULER, 1.0 / 60, 0), kMost) << young;
+    EXPECT_LT(set_down("msm", young, DFM_INTEGRATOR_SYMPLECTIC_EULER, 1e-4, 0), kMax) << young;
+    EXPECT_LT(set_down("msm", young, DFM_INTEGRATOR_IMPLICIT_EULER, 1.0 / 60, 0), kMax) << young;
   }
 }
 
@@ -66,7 +66,7 @@ TEST(SetDown, OnASoftBody_BothStay) {
     ok(dfm_world_step(world, 1e-3, nullptr));
     for (const dfm_body b : {lower, upper}) fastest = std::max(fastest, std::fabs(measure(b).velocity[2]));
   }
-  EXPECT_LT(fastest, 5 * kMost) << "two gaps open at once, and edges come to bear";
+  EXPECT_LT(fastest, 5 * kMax) << "two gaps open at once, and edges come to bear";
 }
 
 // The user's own speed holds here, too.

@@ -259,10 +259,10 @@ TEST(StaticContact, WithoutAnEquilibrium_NothingChanges) {
   EXPECT_EQ(find(w), DFM_E_DIVERGED);
   EXPECT_TRUE(test::snapshot(w) == before);
   // and it continues like a world without the call
-  const uint64_t asked = (test::run(w, 0.02, 1e-3), dfm_world_hash(w));
+  const uint64_t requested = (test::run(w, 0.02, 1e-3), dfm_world_hash(w));
   test::ok(dfm_world_restore(w, before.data(), before.size()));
   test::run(w, 0.02, 1e-3);
-  EXPECT_EQ(dfm_world_hash(w), asked);
+  EXPECT_EQ(dfm_world_hash(w), requested);
   dfm_world_destroy(w);
 }
 

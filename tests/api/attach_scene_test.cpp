@@ -187,7 +187,7 @@ constexpr const char *kRemedy = "give the attachment a \"stiffness\"";
 }  // namespace
 
 // Contact would push out what the attachment holds in place: neither can be satisfied.
-TEST(AttachScene, PointsInAnObstacle_AreToldAtTheStart) {
+TEST(AttachScene, PointsInAnObstacle_AreReportedAtTheStart) {
   const test::CommandResult r = run_of(held_bar(0.12, "", ""));
   EXPECT_NE(r.err.find("body 'bar' and obstacle 'floor' overlap by"), std::string::npos) << r.err;
   EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
@@ -218,7 +218,7 @@ TEST(AttachScene, PointsThatTouchWhatHoldsThem_StayThere) {
   EXPECT_EQ(r.err.find(kCause), std::string::npos) << r.err;
 }
 
-TEST(AttachScene, PointsDeepInWhatHoldsThem_AreToldAtTheStart) {
+TEST(AttachScene, PointsDeepInWhatHoldsThem_AreReportedAtTheStart) {
   const test::CommandResult r = run_of(touching_jaw("[-0.015, 0.025, 0.125]"));
   EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
   EXPECT_NE(r.err.find("leave out \"touch\""), std::string::npos) << r.err;
@@ -236,7 +236,7 @@ TEST(AttachScene, PointsOfASpringInOrOnAnObstacle_Yield) {
 
 // It would be drawn back to where it was.
 // unsanitized: too slow there; shorter tests run the same code
-TEST(AttachScene, UntangledBodyThatIsAttached_StaysAndIsTold) {
+TEST(AttachScene, UntangledBodyThatIsAttached_StaysAndIsReported) {
   std::string text = held_bar(0.12, "", "");
   text.insert(text.find("\"materials\""), R"("contact": {"untangle": true}, )");
   const test::CommandResult r = run_of(text);

@@ -7,13 +7,13 @@
 
 namespace {
 
-struct Asked {
+struct Calls {
   std::vector<std::pair<uint64_t, uint64_t>> pairs;
   uint64_t not_with = 0;
   static bool may_touch(void *user, uint64_t a, uint64_t b) {
-    Asked &asked = *static_cast<Asked *>(user);
-    asked.pairs.emplace_back(a, b);
-    return a != asked.not_with && b != asked.not_with;
+    Calls &calls = *static_cast<Calls *>(user);
+    calls.pairs.emplace_back(a, b);
+    return a != calls.not_with && b != calls.not_with;
   }
 };
 using Pairs = std::vector<std::pair<uint64_t, uint64_t>>;
@@ -77,40 +77,40 @@ struct OnFloor {
 TEST(MayTouch, IsCalledOncePerPairAndItsResultKept) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
-  Asked asked;
-  test::ok(dfm_world_set_may_touch(s.world, &Asked::may_touch, &asked));
+  Calls calls;
+  test::ok(dfm_world_set_may_touch(s.world, &Calls::may_touch, &calls));
   test::run(s.world, 5e-3, 1e-3);
   const Pairs all{{s.lower, s.upper}, {s.lower, s.floor}, {s.upper, s.floor}};
-  EXPECT_EQ(asked.pairs, all);
+  EXPECT_EQ(calls.pairs, all);
   EXPECT_GT(test::pairs(s.world).size(), 0u);
   const dfm_obstacle wall =
       test::add_plane(s.world, "wall", {9, 0, 0}, {0, -std::sqrt(0.5), 0, std::sqrt(0.5)});
   test::run(s.world, 2e-3, 1e-3);
-  EXPECT_EQ(asked.pairs.size(), 5u) << "the new pairs alone";
-  EXPECT_EQ(asked.pairs[3], std::make_pair(s.lower, wall));
-  asked.pairs.clear();
+  EXPECT_EQ(calls.pairs.size(), 5u) << "the new pairs alone";
+  EXPECT_EQ(calls.pairs[3], std::make_pair(s.lower, wall));
+  calls.pairs.clear();
   test::ok(dfm_world_ask_again(s.world, s.upper, s.lower));
   test::run(s.world, 2e-3, 1e-3);
-  EXPECT_EQ(asked.pairs, Pairs({{s.lower, s.upper}}));
-  asked.pairs.clear();
+  EXPECT_EQ(calls.pairs, Pairs({{s.lower, s.upper}}));
+  calls.pairs.clear();
   test::ok(dfm_world_ask_again(s.world, wall, 0));
   test::run(s.world, 1e-3, 1e-3);
-  EXPECT_EQ(asked.pairs, Pairs({{s.lower, wall}, {s.upper, wall}}));
-  asked.pairs.clear();
+  EXPECT_EQ(calls.pairs, Pairs({{s.lower, wall}, {s.upper, wall}}));
+  calls.pairs.clear();
   test::ok(dfm_obstacle_destroy(wall));
   test::run(s.world, 1e-3, 1e-3);
-  EXPECT_TRUE(asked.pairs.empty());
+  EXPECT_TRUE(calls.pairs.empty());
   test::ok(dfm_world_ask_again(s.world, 0, 0));
   test::run(s.world, 1e-3, 1e-3);
-  EXPECT_EQ(asked.pairs, all);
+  EXPECT_EQ(calls.pairs, all);
 }
 
 TEST(MayTouch, ARefusal_LetsBodiesPassUntilTheNextCall) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
-  Asked asked;
-  asked.not_with = s.lower;
-  test::ok(dfm_world_set_may_touch(s.world, &Asked::may_touch, &asked));
+  Calls calls;
+  calls.not_with = s.lower;
+  test::ok(dfm_world_set_may_touch(s.world, &Calls::may_touch, &calls));
   test::run(s.world, 0.03, 1e-3);
   EXPECT_LT(height(s.lower), 0.05 - 0.5 * 9.81 * 0.025 * 0.025) << "it falls through the floor";
   for (const dfm_contact &k : test::contacts(s.world)) EXPECT_NE(k.body_a, s.lower);
@@ -124,15 +124,15 @@ TEST(MayTouch, ARefusal_LetsBodiesPassUntilTheNextCall) {
 TEST(MayTouch, RulesAndMasksComeFirst) {
   test::Context c;
   const test::Stack s = test::make_stack(c);
-  Asked asked;
+  Calls calls;
   test::ok(dfm_world_filter_pair(s.world, "lower", "upper", false));
   test::ok(dfm_body_set_filter(s.upper, 2, 2));
-  test::ok(dfm_world_set_may_touch(s.world, &Asked::may_touch, &asked));
+  test::ok(dfm_world_set_may_touch(s.world, &Calls::may_touch, &calls));
   test::run(s.world, 1e-3, 1e-3);
-  EXPECT_EQ(asked.pairs, Pairs({{s.lower, s.floor}}));
+  EXPECT_EQ(calls.pairs, Pairs({{s.lower, s.floor}}));
   test::ok(dfm_body_set_filter(s.upper, 1, ~0u));
   test::run(s.world, 1e-3, 1e-3);
-  EXPECT_EQ(asked.pairs, Pairs({{s.lower, s.floor}, {s.upper, s.floor}})) << "its masks let it touch again";
+  EXPECT_EQ(calls.pairs, Pairs({{s.lower, s.floor}, {s.upper, s.floor}})) << "its masks let it touch again";
 }
 
 TEST(MayTouch, CallsIntoTheWorld_AreRefused) {
@@ -140,7 +140,7 @@ TEST(MayTouch, CallsIntoTheWorld_AreRefused) {
   const test::Stack s = test::make_stack(c);
   struct Attack {
     test::Stack s;
-    int refused = 0, asked = 0;
+    int refused = 0, calls = 0;
   } attack{s, 0, 0};
   test::ok(dfm_world_set_may_touch(
       s.world,
@@ -148,7 +148,7 @@ TEST(MayTouch, CallsIntoTheWorld_AreRefused) {
         Attack &a = *static_cast<Attack *>(user);
         const dfm_query_shape point = dfm_query_shape_default();
         dfm_query_hits hits{};
-        ++a.asked;
+        ++a.calls;
         a.refused += dfm_world_query(a.s.world, &point, nullptr, 0, nullptr, nullptr, &hits) == DFM_E_BUSY;
         a.refused += dfm_body_destroy(a.s.upper) == DFM_E_BUSY;
         a.refused += dfm_world_ask_again(a.s.world, 0, 0) == DFM_E_BUSY;
@@ -157,7 +157,7 @@ TEST(MayTouch, CallsIntoTheWorld_AreRefused) {
       },
       &attack));
   test::ok(dfm_world_step(s.world, 1e-3, nullptr));
-  EXPECT_EQ(attack.asked, 3);
+  EXPECT_EQ(attack.calls, 3);
   EXPECT_EQ(attack.refused, 9);
 }
 
@@ -340,7 +340,7 @@ TEST(PreSolve, OnSeveralThreads_IsCalledInTheSameOrderWithTheSameBits) {
   EXPECT_EQ(hash[0], hash[1]);
 }
 
-TEST(PreSolve, ImpossibleAnswers_EndTheStepWithAnError) {
+TEST(PreSolve, ImpossibleResults_EndTheStepWithAnError) {
   OnFloor s;
   Choice choice;
   test::ok(dfm_world_set_pre_solve(s.w, &Choice::pre_solve, &choice));
@@ -378,13 +378,13 @@ TEST(PreSolve, CallsIntoTheWorld_AreRefused) {
   OnFloor s;
   struct Attack {
     OnFloor &s;
-    int refused = 0, asked = 0;
+    int refused = 0, calls = 0;
   } attack{s, 0, 0};
   test::ok(dfm_world_set_pre_solve(
       s.w,
       [](void *user, dfm_contact_choice *) {
         Attack &a = *static_cast<Attack *>(user);
-        ++a.asked;
+        ++a.calls;
         dfm_query_hits hits{};
         const dfm_query_shape point = dfm_query_shape_default();
         a.refused += dfm_world_step(a.s.w, 1e-3, nullptr) == DFM_E_BUSY;
@@ -395,8 +395,8 @@ TEST(PreSolve, CallsIntoTheWorld_AreRefused) {
       },
       &attack));
   test::ok(dfm_world_step(s.w, 1e-3, nullptr));
-  EXPECT_GT(attack.asked, 0);
-  EXPECT_EQ(attack.refused, 4 * attack.asked);
+  EXPECT_GT(attack.calls, 0);
+  EXPECT_EQ(attack.refused, 4 * attack.calls);
 }
 
 TEST(PreSolve, OfNoWorld_IsRefused) {

@@ -207,9 +207,9 @@ TEST(Cut, SurvivingContacts_KeepImpulsesAndBristles) {
   // off the top: no surfel that touches goes
   const dfm_cut_info top = cut(b, sphere({0.05, 0.05, 0.11}, 0.03));
   EXPECT_GT(top.cells, 0u);
-  const std::vector<dfm_contact> told = test::contacts(w);
-  ASSERT_EQ(told.size(), before.size());
-  for (size_t i = 0; i < told.size(); ++i) EXPECT_EQ(told[i].key, before[i].key);
+  const std::vector<dfm_contact> reported = test::contacts(w);
+  ASSERT_EQ(reported.size(), before.size());
+  for (size_t i = 0; i < reported.size(); ++i) EXPECT_EQ(reported[i].key, before[i].key);
   steps(w, 1);
   const std::vector<dfm_contact> after = test::contacts(w);
   ASSERT_EQ(after.size(), before.size());

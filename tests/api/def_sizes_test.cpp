@@ -224,7 +224,7 @@ TEST(DefSizes, UnknownMemberOfANewerHeader_IsRefused) {
 }
 
 template <class T, class F>
-void check_report(F ask, uint32_t first, const char *name) {
+void check_report(F query, uint32_t first, const char *name) {
   SCOPED_TRACE(name);
   uint32_t grown = 0;
   if constexpr (requires(T t) { t.cookie; }) grown = sizeof(T::cookie);
@@ -232,14 +232,14 @@ void check_report(F ask, uint32_t first, const char *name) {
   if constexpr (requires(T t) { t.mass_moved; }) grown = sizeof(T::mass_moved) + sizeof(T::frequency_change);
   EXPECT_EQ(first + grown, sizeof(T))
       << "it has grown: this number stays, and the line above takes the new size";
-  for (const uint32_t asked : {0u, 8u, first - 8, first, uint32_t(sizeof(T)) + 32}) {
-    SCOPED_TRACE(asked);
+  for (const uint32_t requested : {0u, 8u, first - 8, first, uint32_t(sizeof(T)) + 32}) {
+    SCOPED_TRACE(requested);
     Bytes out(sizeof(T) + 128, kUntouched);
-    std::memcpy(out.data(), &asked, sizeof asked);
-    test::ok(ask(reinterpret_cast<T *>(out.data())));
+    std::memcpy(out.data(), &requested, sizeof requested);
+    test::ok(query(reinterpret_cast<T *>(out.data())));
     uint32_t filled = 0;
     std::memcpy(&filled, out.data(), sizeof filled);
-    EXPECT_EQ(filled, asked == 0 ? first : std::min<uint32_t>(asked, sizeof(T)));
+    EXPECT_EQ(filled, requested == 0 ? first : std::min<uint32_t>(requested, sizeof(T)));
     for (size_t i = filled; i < out.size(); ++i) ASSERT_EQ(out[i], kUntouched) << "byte " << i;
   }
 }

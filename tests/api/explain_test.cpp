@@ -315,9 +315,9 @@ TEST(Explain, SwitchesOfAnEffect_SwitchItOff) {
     std::string wanted = "used; off with";
     std::vector<std::string> args = {"explain", path};
     for (const char *assignment : c.off) {
-      std::string told = assignment;
-      told[told.find('=')] = ' ';
-      wanted += (wanted.back() == 'h' ? " " : ", ") + told;
+      std::string reported = assignment;
+      reported[reported.find('=')] = ' ';
+      wanted += (wanted.back() == 'h' ? " " : ", ") + reported;
       args.insert(args.end(), {"--set", std::string("/bodies/0/model/params/") + assignment});
     }
     EXPECT_NE(on.find(wanted), std::string::npos) << c.model << ": " << on << "\nwanted: " << wanted;

@@ -40,8 +40,8 @@ TEST(TetmeshFill, Torus_SharesSumUpToItsVolume) {
 }
 
 // Twelve triangles around many cells: only a scene splits them.
-TEST(TetmeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsToldToSplitThem) {
-  const auto told = [](uint32_t triangles) {
+TEST(TetmeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsReportedWithTheRemedy) {
+  const auto reported = [](uint32_t triangles) {
     test::LoggedContext context;
     const double size[3] = {0.2, 0.2, 0.2};
     dfm_trimesh surface = 0;
@@ -72,10 +72,10 @@ TEST(TetmeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsToldToSplitThem) {
     test::ok(dfm_body_create(world, &body, &made));
     return context.log;
   };
-  const std::string coarse = told(12);
+  const std::string coarse = reported(12);
   EXPECT_NE(coarse.find("its surface has edges of up to 0.283 m"), std::string::npos) << coarse;
   EXPECT_NE(coarse.find("split edges longer than"), std::string::npos) << coarse;
-  const std::string fine = told(1000);
+  const std::string fine = reported(1000);
   EXPECT_EQ(fine.find("split edges"), std::string::npos) << fine;
 }
 

@@ -136,12 +136,12 @@ TEST(FrictionBenchmark, Search_FindsTheBestSettingsWhichRunThen) {
 
   const test::CommandResult run = call("run.py", {"--only", "slope_slide", "--out", rows, "--found", out});
   ASSERT_EQ(run.exit_code, 0) << run.err;
-  const auto told = test::read_csv(rows);
-  ASSERT_EQ(told.size(), 4u);  // header; mu 0.2 plain and found; mu 0.5, for which nothing was searched
-  EXPECT_EQ(told[1][10], "fail");
-  EXPECT_EQ(told[2][2], "found by search");
-  EXPECT_EQ(told[2][10], "pass");
-  EXPECT_EQ(told[2].back(), "a 2; b 2");
+  const auto reported = test::read_csv(rows);
+  ASSERT_EQ(reported.size(), 4u);  // header; mu 0.2 plain and found; mu 0.5, for which nothing was searched
+  EXPECT_EQ(reported[1][10], "fail");
+  EXPECT_EQ(reported[2][2], "found by search");
+  EXPECT_EQ(reported[2][10], "pass");
+  EXPECT_EQ(reported[2].back(), "a 2; b 2");
 }
 
 // How far it is comes from the rows alone, so that a run that goes on counts what was done before.

@@ -208,19 +208,19 @@ TEST(FrictionCommand, NormalForceOfAMeasurement_ScalesTheLoop) {
   EXPECT_EQ(out.err, "");
   EXPECT_NEAR(out.figure("F_max"), 5, 1e-12);
   EXPECT_EQ(out.rows.column("t").size(), 9u);
-  const auto told = [&](const std::string &from, const std::string &to, const std::string &words) {
+  const auto reported = [&](const std::string &from, const std::string &to, const std::string &words) {
     std::string other = text;
     const test::CommandResult r =
         test::deform({"friction", file("told.json", other.replace(other.find(from), from.size(), to))});
     EXPECT_EQ(r.exit_code, 0) << r.err;
     EXPECT_TRUE(has(r.err, words)) << "no '" << words << "' in: " << r.err;
   };
-  told("\"normal_force\": 10, ", "", "no normal force is given, so it is 1 N");
-  told("\"freq\": 1", "\"freq\": 1, \"F0\": 10",
-       "/input/F0 is not read for input.kind \"sine_velocity\"; the "
-       "normal force is /normal_force");
-  told("\"law\"", "\"normal_load\": 3, \"law\"", "/normal_load is not read; the normal force is");
-  told("\"freq\": 1", "\"freq\": 1, \"phas\": 1", "did you mean \"phase\"?");
+  reported("\"normal_force\": 10, ", "", "no normal force is given, so it is 1 N");
+  reported("\"freq\": 1", "\"freq\": 1, \"F0\": 10",
+           "/input/F0 is not read for input.kind \"sine_velocity\"; the "
+           "normal force is /normal_force");
+  reported("\"law\"", "\"normal_load\": 3, \"law\"", "/normal_load is not read; the normal force is");
+  reported("\"freq\": 1", "\"freq\": 1, \"phas\": 1", "did you mean \"phase\"?");
   expect_refused({"friction", file("both.json", push("\"mass\"", "\"normal_force\": 3, \"mass\""))},
                  {"/normal_force and /gravity both give the normal force"});
 }

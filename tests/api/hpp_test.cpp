@@ -217,12 +217,12 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   s.world.query(from, down, 10, nullptr, nowhere);
   s.world.query(from, down, 10, nullptr, no_farther);
   EXPECT_THROW(s.world.query(from, down, 10, nullptr, [](const dfm_query_hit &) -> double { throw 7; }), int);
-  int asked = 0;
+  int requested = 0;
   deform::QueryFilter filter;
-  filter.user = &asked;
+  filter.user = &requested;
   filter.accept = [](void *user, uint64_t) { return ++*static_cast<int *>(user) > 0; };
   const std::vector<dfm_query_hit> again = s.world.query(from, down, 10, &filter);
-  EXPECT_EQ(asked, 2);
+  EXPECT_EQ(requested, 2);
   ASSERT_EQ(again.size(), all.size());
   for (size_t i = 0; i < all.size(); ++i) {
     EXPECT_EQ(again[i].distance, all[i].distance);

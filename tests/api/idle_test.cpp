@@ -124,9 +124,9 @@ TEST(Idle, AutoInAScene_IsTheDefaultAndTheCommandShowsWhatDoesNothing) {
   hash(R"({"volume": 0})");
   const test::CommandResult saved =
       test::deform({"run", path, "--out", folder + "/out", "--save-scene", folder + "/saved.json"});
-  const size_t told = saved.err.find("poisson has no effect");
-  ASSERT_NE(told, std::string::npos) << saved.err;
-  EXPECT_EQ(saved.err.find("poisson has no effect", told + 1), std::string::npos)
+  const size_t reported = saved.err.find("poisson has no effect");
+  ASSERT_NE(reported, std::string::npos) << saved.err;
+  EXPECT_EQ(saved.err.find("poisson has no effect", reported + 1), std::string::npos)
       << "the saved scene is loaded to check it, and warns of the same: " << saved.err;
   const test::CommandResult explain = test::deform({"explain", path});
   EXPECT_NE(explain.out.find("poisson does not do what its name says"), std::string::npos) << explain.out;

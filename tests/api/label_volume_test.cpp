@@ -234,9 +234,9 @@ TEST(LabelVolume, WrongFile_IsRefusedInOneSentence) {
       {"solid x\n", "neither NRRD nor MetaImage"},
       {"", "neither NRRD nor MetaImage"}};
   for (const auto &[bytes, words] : cases) {
-    const std::string told = sentence(bytes);
-    EXPECT_NE(told.find(words), std::string::npos) << "no '" << words << "' in: " << told;
-    EXPECT_EQ(told.find('\n'), std::string::npos) << told;
+    const std::string reported = sentence(bytes);
+    EXPECT_NE(reported.find(words), std::string::npos) << "no '" << words << "' in: " << reported;
+    EXPECT_EQ(reported.find('\n'), std::string::npos) << reported;
   }
 }
 

@@ -74,7 +74,7 @@ TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
     EXPECT_EQ(test::read_file(out + name), test::read_file(out + "/again" + name)) << name;
 }
 
-TEST(LabelsCommand, ManyTriangles_AreToldAndTheCommandCanBePasted) {
+TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
   const std::string out = folder() + "/a folder's name";
   const auto fine =
       test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "300"});

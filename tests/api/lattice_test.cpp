@@ -253,7 +253,7 @@ TEST(Lattice, WhatCannotBeOne_SaysSo) {
 
   const std::string folder = test::scratch("lattice_errors"), path = folder + "/scene.json";
   test::ok(dfm_trimesh_write(whole, (folder + "/ball.stl").c_str()));
-  const auto told = [&](const std::string &keys, std::initializer_list<const char *> parts) {
+  const auto reported = [&](const std::string &keys, std::initializer_list<const char *> parts) {
     test::write_file(path, R"({"format": "deform-scene", "version": 1,
       "time": {"duration": 0.02, "step": 0.01},
       "bodies": [{"name": "ball", "model": {"type": "linear_fem"}, )" +
@@ -262,9 +262,9 @@ TEST(Lattice, WhatCannotBeOne_SaysSo) {
     EXPECT_NE(dfm_scene_load(context, path.c_str(), &w), DFM_OK);
     test::says(parts);
   };
-  told(R"("mesh": "ball.stl", "lattice": {})", {"/bodies/0/lattice", "either \"cells\"", "\"size\""});
-  told(R"("mesh": "ball.stl", "lattice": {"cells": 8, "size": 0.1})", {"/bodies/0/lattice", "either"});
-  told(R"("mesh": "ball.stl", "lattice": {"cells": 8}, "fill": {"cells": 80})",
+  reported(R"("mesh": "ball.stl", "lattice": {})", {"/bodies/0/lattice", "either \"cells\"", "\"size\""});
+  reported(R"("mesh": "ball.stl", "lattice": {"cells": 8, "size": 0.1})", {"/bodies/0/lattice", "either"});
+  reported(R"("mesh": "ball.stl", "lattice": {"cells": 8}, "fill": {"cells": 80})",
        {"/bodies/0/lattice", "\"fill\" too"});
-  told(R"("mesh": "ball.stl", "lattice": {"size": 1})", {"/bodies/0/lattice", "larger than the surface"});
+  reported(R"("mesh": "ball.stl", "lattice": {"size": 1})", {"/bodies/0/lattice", "larger than the surface"});
 }

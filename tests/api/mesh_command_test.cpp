@@ -178,9 +178,10 @@ TEST(MeshCommand, MakeSurface_ByEndingOrByFlag) {
       args.insert(args.end(), {"--surface", "--cells", "500", "--out", out});
       const auto made = test::deform(args);
       EXPECT_EQ(made.exit_code, 0) << made.err;
-      const auto told = test::deform({"mesh", "info", "--json", out});
-      EXPECT_EQ(told.exit_code, 0) << told.err;
-      EXPECT_TRUE(has(told.out, "\"kind\": \"surface\"") && has(told.out, "\"open_edges\": 0")) << told.out;
+      const auto reported = test::deform({"mesh", "info", "--json", out});
+      EXPECT_EQ(reported.exit_code, 0) << reported.err;
+      EXPECT_TRUE(has(reported.out, "\"kind\": \"surface\"") && has(reported.out, "\"open_edges\": 0"))
+          << reported.out;
     }
   const auto plain =
       test::deform({"mesh", "make", "ball", "--out", folder() + "/plain.obj", "--cells", "100"});
@@ -209,14 +210,14 @@ TEST(MeshCommand, InfoOfASurface_ReportsHolesGroupsAndRepairs) {
 }
 
 // A file of triangles names no unit: a part of 68 mm is read as one of 68 m.
-TEST(MeshCommand, MeshOfManyMeters_IsAskedForMillimeters) {
+TEST(MeshCommand, MeshOfManyMeters_IsSuspectedToBeInMillimeters) {
   const std::string large = folder() + "/millimeters.stl", small = folder() + "/meters.stl";
   for (const auto &[file, radius] : {std::pair{large, "34"}, {small, "0.034"}})
     ASSERT_EQ(
         test::deform({"mesh", "make", "ball", "--surface", "--radius", radius, "--out", file}).exit_code, 0);
   const std::string hint = "if the file is in millimeters, ", cells = folder() + "/millimeters.vtu";
-  const auto told = test::deform({"mesh", "info", large});
-  EXPECT_TRUE(has(told.out, "warning: it is 67.7 m long: " + hint)) << told.out;
+  const auto reported = test::deform({"mesh", "info", large});
+  EXPECT_TRUE(has(reported.out, "warning: it is 67.7 m long: " + hint)) << reported.out;
   const auto filled = test::deform({"mesh", "fill", large, "--cells", "300", "--out", cells});
   EXPECT_TRUE(has(filled.out, "warning: it is 67.7 m long: " + hint)) << filled.out;
   EXPECT_TRUE(has(filled.out, "}, \"pose\": {\"scale\": 0.001}\n")) << filled.out;

@@ -459,24 +459,24 @@ TEST(CutScene, WrittenAndLoaded_CutsAlike) {
 
 // Where a body will be is not known before, and a run may be continued.
 TEST(CutScene, CutsThatMeetNothingOrComeTooLate_AreWarnedOf) {
-  const auto told = [](const std::string &entries) {
+  const auto reported = [](const std::string &entries) {
     const test::CommandResult r =
         test::deform({"run", written(scene("[" + entries + "]")), "--out", folder() + "/told"});
     EXPECT_EQ(r.exit_code, 0) << r.err;
     return r.err;
   };
-  EXPECT_EQ(told(kPlane).find("its cut at"), std::string::npos);
+  EXPECT_EQ(reported(kPlane).find("its cut at"), std::string::npos);
   const std::string beside =
       R"({"body": "cube", "t": 0.01, "shape": "plane", "point": [0, 0, 1], "normal": [0, 0, 2]})";
-  const std::string missed = told(kPlane + (", " + beside));
+  const std::string missed = reported(kPlane + (", " + beside));
   EXPECT_NE(missed.find("body 'cube': its cut at 0.01 s has met no closed face"), std::string::npos)
       << missed;
   EXPECT_EQ(missed.find("has met"), missed.rfind("has met")) << missed;  // once, of body and piece
   const std::string half = R"({"body": "cube", "t": 0.01, "shape": "sphere", "radius": 0.008,
     "pose": {"position": [0, 0, -0.02]}})";
-  EXPECT_EQ(told(kPlane + (", " + half)).find("has met"), std::string::npos);  // one of the two is met
+  EXPECT_EQ(reported(kPlane + (", " + half)).find("has met"), std::string::npos);  // one of the two is met
   const std::string late = R"({"body": "cube", "t": 3, "shape": "sphere", "radius": 0.008})";
-  const std::string unmade = told(late);
+  const std::string unmade = reported(late);
   EXPECT_NE(unmade.find("/cuts/0/t"), std::string::npos) << unmade;
 }
 

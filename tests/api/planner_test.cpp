@@ -252,17 +252,17 @@ TEST_F(PlannerScene, BudgetThatCannotBeMet_IsReportedByTheRun) {
 }
 
 // A mesh of few cells across cannot bend to within 2 %: that is told with the figures of the choice.
-TEST_F(PlannerScene, TargetThatCannotBeMet_IsToldByRunAndExplain) {
+TEST_F(PlannerScene, TargetThatCannotBeMet_IsReportedByRunAndExplain) {
   const std::string scene = bar(R"("accuracy": {"target": 0.02},)", R"("lattice": null, )");
   const test::CommandResult r = test::deform({"run", scene, "--out", folder() + "/out"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
-  const test::CommandResult told = test::deform({"explain", scene});
-  for (const std::string *text : {&r.err, &told.out})
+  const test::CommandResult reported = test::deform({"explain", scene});
+  for (const std::string *text : {&r.err, &reported.out})
     for (const char *word : {"the target of 2 % is not met: body 'bar' has a predicted error of", "mesh ",
                              " times as many cells", "deform cost"})
       EXPECT_TRUE(has(*text, word)) << "no '" << word << "' in: " << *text;
-  EXPECT_TRUE(has(told.out, "  nearest: ")) << told.out;
-  EXPECT_FALSE(has(told.out, "  chosen: ")) << told.out;
+  EXPECT_TRUE(has(reported.out, "  nearest: ")) << reported.out;
+  EXPECT_FALSE(has(reported.out, "  chosen: ")) << reported.out;
 }
 
 // A silicone finger whose explicit steps would be 2 us.

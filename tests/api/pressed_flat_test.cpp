@@ -27,14 +27,14 @@ std::string said(double young, double mass, double duration = 0.6) {
 
 }  // namespace
 
-TEST(PressedFlat, HeavyBodyOnASoftOne_IsToldWithAModulusThatHolds) {
+TEST(PressedFlat, HeavyBodyOnASoftOne_IsReportedWithAModulusThatHolds) {
   const std::string log = said(3000, 2.5, 2);  // 2453 Pa and half of its own weight; it bounces
   EXPECT_NE(log.find("body 'bed' is pressed flat"), std::string::npos) << log;
   EXPECT_NE(log.find("(\"young\": "), std::string::npos) << log;
   EXPECT_EQ(log.find("own weight"), std::string::npos) << log;
 }
 
-TEST(PressedFlat, WhatTheMaterialBears_IsNotTold) {
+TEST(PressedFlat, WhatTheMaterialBears_IsNotReported) {
   EXPECT_EQ(said(30000, 2).find("pressed flat"), std::string::npos);
   EXPECT_EQ(said(10000, 0.5).find("pressed flat"), std::string::npos);
 }
@@ -46,7 +46,7 @@ TEST(PressedFlat, InvertedCellsOfAnOverload_AreNoMatterOfTheMesh) {
   EXPECT_EQ(log.find("refine the mesh"), std::string::npos) << log;
 }
 
-TEST(PressedFlat, OwnWeight_IsToldWithAModulusThatHolds) {
+TEST(PressedFlat, OwnWeight_IsReportedWithAModulusThatHolds) {
   EXPECT_NE(said(1500, 0.1, 0.01).find("(\"young\": 9.8e+03 loses about 5 % of its height)"),
             std::string::npos);
 }

@@ -161,20 +161,20 @@ TEST(QueryFilter, KindsMasksAndTheCallback_LeaveThingsOut) {
   f.category = 0;
   EXPECT_EQ(overlaps(y.world, all, &f), Things{});
   f = dfm_query_filter_default();
-  struct Asked {
+  struct Calls {
     Things things;
     uint64_t not_this;
-  } asked{{}, y.crate};
-  f.user = &asked;
+  } calls{{}, y.crate};
+  f.user = &calls;
   f.accept = [](void *user, uint64_t thing) {
-    Asked &a = *static_cast<Asked *>(user);
+    Calls &a = *static_cast<Calls *>(user);
     a.things.push_back(thing);
     return thing != a.not_this;
   };
   f.what = DFM_QUERY_OBSTACLES;
   f.collides_with = 3;
   EXPECT_EQ(overlaps(y.world, all, &f), (Things{y.floor, y.ball, y.mesh}));
-  EXPECT_EQ(asked.things, (Things{y.floor, y.ball, y.crate, y.mesh})) << "once each, in order of creation";
+  EXPECT_EQ(calls.things, (Things{y.floor, y.ball, y.crate, y.mesh})) << "once each, in order of creation";
   const dfm_query_hit hit = cast(y.world, sphere({1.5, 0, 1}, 0.1), {5, 0, 0}, &f);
   EXPECT_EQ(hit.thing, y.mesh) << "the crate is refused, the pill masked";
   EXPECT_NEAR(hit.distance, 4 - 0.1 - 0.1 - 1.5, 1e-8);
@@ -184,21 +184,21 @@ TEST(QueryFilter, ACallbackThatChangesTheWorld_IsRefused) {
   test::Context c;
   const Yard y(c);
   dfm_query_filter f = dfm_query_filter_default();
-  struct Asked {
+  struct Calls {
     dfm_world w;
     dfm_body b;
     int refused;
-  } asked{y.world, y.upper, 0};
-  f.user = &asked;
+  } calls{y.world, y.upper, 0};
+  f.user = &calls;
   f.accept = [](void *user, uint64_t) {
-    Asked &a = *static_cast<Asked *>(user);
+    Calls &a = *static_cast<Calls *>(user);
     a.refused += dfm_body_destroy(a.b) == DFM_E_BUSY;
     a.refused += dfm_world_step(a.w, 1e-3, nullptr) == DFM_E_BUSY;
     test::says({"busy with another call"});
     return true;
   };
   EXPECT_EQ(overlaps(y.world, sphere({0, 0, 0}, 20), &f).size(), 7u);
-  EXPECT_EQ(asked.refused, 14);
+  EXPECT_EQ(calls.refused, 14);
 }
 
 TEST(QueryCast, EveryShape_MeetsEveryThingWhereFormulasSay) {
@@ -412,23 +412,23 @@ TEST(Query, Count_IsOfAllHitsAndAsksTheFilterOnce) {
   ASSERT_EQ(all.size(), 8u);
   const dfm_query_shape from = test::point(o, DFM_QUERY_EACH | DFM_QUERY_COUNT);
   dfm_query_filter f = dfm_query_filter_default();
-  int asked = 0;
-  f.user = &asked;
+  int calls = 0;
+  f.user = &calls;
   f.accept = [](void *user, uint64_t) { return ++*static_cast<int *>(user) > 0; };
   for (uint32_t capacity = 0; capacity <= 9; ++capacity) {
     dfm_query_hit rows[9];
     dfm_query_hits hits{sizeof hits, sizeof rows[0], capacity, 0, rows};
-    asked = 0;
+    calls = 0;
     test::ok(dfm_world_query(y.world, &from, d.data(), 100, &f, nullptr, &hits));
     EXPECT_EQ(hits.n, 8u);
-    EXPECT_EQ(asked, 7);
+    EXPECT_EQ(calls, 7);
     const uint32_t kept = std::min(capacity, 8u);
     for (uint32_t i = 0; i < kept; ++i) EXPECT_EQ(std::memcmp(&rows[i], &all[i], sizeof rows[i]), 0);
     uint32_t n = 0;
-    asked = 0;
+    calls = 0;
     test::ok(dfm_world_query_ray_all(y.world, o.data(), d.data(), 100, &f, capacity, rows, &n));
     EXPECT_EQ(n, 8u);
-    EXPECT_EQ(asked, 7);
+    EXPECT_EQ(calls, 7);
     for (uint32_t i = 0; i < kept; ++i) EXPECT_EQ(std::memcmp(&rows[i], &all[i], sizeof rows[i]), 0);
   }
 }
@@ -444,19 +444,19 @@ TEST(QueryFilter, OnlyWhatIsNoThingOfTheWorld_IsRefused) {
     EXPECT_EQ(overlaps(y.world, all, &f), Things{thing}) << "accept is not asked";
   }
   dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 0, 7, nullptr};
-  const auto ask = [&](uint64_t only) {
+  const auto request = [&](uint64_t only) {
     f.only = only;
     return dfm_world_query(y.world, &all, nullptr, 0, &f, nullptr, &hits);
   };
   for (const uint64_t thing : {other.lower, other.floor, y.world, uint64_t{12345}})
-    EXPECT_EQ(ask(thing), DFM_E_HANDLE);
+    EXPECT_EQ(request(thing), DFM_E_HANDLE);
   test::ok(dfm_obstacle_destroy(y.pill));
-  EXPECT_EQ(ask(y.pill), DFM_E_HANDLE);
+  EXPECT_EQ(request(y.pill), DFM_E_HANDLE);
   uint32_t n = 7;
   dfm_cut_def d = dfm_cut_def_default();
   for (double &half : d.half_size) half = 1;
   test::ok(dfm_body_cut(y.lower, &d, nullptr));
-  EXPECT_EQ(ask(y.lower), DFM_E_STATE);
+  EXPECT_EQ(request(y.lower), DFM_E_STATE);
   test::says({"lower", "no cells left"});
   EXPECT_EQ(dfm_body_query_triangles(y.lower, &all, 0, nullptr, &n), DFM_E_STATE);
   EXPECT_EQ(n, 7u);
@@ -535,14 +535,14 @@ TEST(Query, OnSeveralThreads_GivesTheBitsOfOneAndTakesNoMemory) {
   test::Context c;
   const Yard y(c);
   test::ok(dfm_world_step(y.world, 1e-3, nullptr));
-  struct Answers {
+  struct Results {
     std::vector<double> numbers;
-    void ask(dfm_world w) {
+    void request(dfm_world w) {
       numbers.clear();
       for (int i = 0; i < 60; ++i) {
         const double at = -0.5 + 0.08 * i;
         dfm_query_hit rows[8];
-        const auto ask_all = [&](const dfm_query_shape &shape, const double *path, double reach) {
+        const auto query_all = [&](const dfm_query_shape &shape, const double *path, double reach) {
           dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 8, 0, rows};
           test::ok(dfm_world_query(w, &shape, path, reach, nullptr, nullptr, &hits));
           numbers.push_back(hits.n);
@@ -555,23 +555,23 @@ TEST(Query, OnSeveralThreads_GivesTheBitsOfOneAndTakesNoMemory) {
         s.shape = i % 3 == 0 ? DFM_SHAPE_BOX : DFM_SHAPE_CAPSULE;
         s.half_length = s.half_size[0] = 0.04;
         const double path[3] = {0.1 * (i % 5), 0.01, -2};
-        ask_all(s, path, 0);
-        ask_all(s, nullptr, 10);
-        ask_all(s, nullptr, 0);
-        ask_all(test::point({at, 0.1, 0.3}), nullptr, 10);
-        ask_all(test::point({at, 0.1, 0.3}, DFM_QUERY_EACH), path, 10);
+        query_all(s, path, 0);
+        query_all(s, nullptr, 10);
+        query_all(s, nullptr, 0);
+        query_all(test::point({at, 0.1, 0.3}), nullptr, 10);
+        query_all(test::point({at, 0.1, 0.3}, DFM_QUERY_EACH), path, 10);
       }
     }
   };
-  Answers one[4];
-  for (Answers &a : one) a.numbers.reserve(1 << 14);
+  Results one[4];
+  for (Results &a : one) a.numbers.reserve(1 << 14);
   std::vector<std::thread> threads;
-  for (int t = 1; t < 4; ++t) threads.emplace_back([&, t] { one[t].ask(y.world); });
-  one[0].ask(y.world);
+  for (int t = 1; t < 4; ++t) threads.emplace_back([&, t] { one[t].request(y.world); });
+  one[0].request(y.world);
   for (std::thread &t : threads) t.join();
   for (int t = 1; t < 4; ++t) EXPECT_EQ(one[t].numbers, one[0].numbers);
   const uint64_t heap = test::heap_calls;
-  one[0].ask(y.world);
+  one[0].request(y.world);
   EXPECT_EQ(test::heap_calls - heap, 0u);
 }
 
@@ -589,14 +589,14 @@ TEST(Query, WhatIsNoShapeRayOrFilter_IsRefusedWithASentence) {
   const double d[3] = {1, 0, 0}, none[3] = {0, 0, 0};
   dfm_query_hit rows[4];
   dfm_query_hits hits{sizeof hits, sizeof(dfm_query_hit), 4, 77, rows};
-  const auto ask = [&](const dfm_query_shape *s, const double *path, double reach,
-                       const dfm_query_filter *f = nullptr) {
+  const auto request = [&](const dfm_query_shape *s, const double *path, double reach,
+                           const dfm_query_filter *f = nullptr) {
     return dfm_world_query(y.world, s, path, reach, f, nullptr, &hits);
   };
   const auto refused = [&](const dfm_query_shape &s, std::initializer_list<const char *> parts) {
-    EXPECT_EQ(ask(&s, nullptr, 0), DFM_E_ARG);
+    EXPECT_EQ(request(&s, nullptr, 0), DFM_E_ARG);
     test::says(parts);
-    EXPECT_EQ(ask(&s, d, 0), DFM_E_ARG);
+    EXPECT_EQ(request(&s, d, 0), DFM_E_ARG);
   };
   refused(sphere({0, 0, 0}, -1), {"radius", "-1"});
   refused(sphere({NAN, 0, 0}, 1), {"position", "nan"});
@@ -621,23 +621,23 @@ TEST(Query, WhatIsNoShapeRayOrFilter_IsRefusedWithASentence) {
   s.flags = 6;
   refused(s, {"flags is 6"});
   s.flags = 0;
-  EXPECT_EQ(ask(&s, none, 1), DFM_E_ARG);
+  EXPECT_EQ(request(&s, none, 1), DFM_E_ARG);
   test::says({"path is zero"});
   s.shape = DFM_SHAPE_POINT;
-  EXPECT_EQ(ask(&s, none, 0), DFM_E_ARG);
-  EXPECT_EQ(ask(&s, d, -1), DFM_E_ARG);
-  EXPECT_EQ(ask(&s, nullptr, NAN), DFM_E_ARG);
+  EXPECT_EQ(request(&s, none, 0), DFM_E_ARG);
+  EXPECT_EQ(request(&s, d, -1), DFM_E_ARG);
+  EXPECT_EQ(request(&s, nullptr, NAN), DFM_E_ARG);
   test::says({"reach is nan"});
-  EXPECT_EQ(ask(nullptr, d, 1), DFM_E_ARG);
+  EXPECT_EQ(request(nullptr, d, 1), DFM_E_ARG);
   dfm_query_filter f = dfm_query_filter_default();
   f.what = 99;
-  EXPECT_EQ(ask(&s, d, 1, &f), DFM_E_ARG);
+  EXPECT_EQ(request(&s, d, 1, &f), DFM_E_ARG);
   test::says({"what is 99"});
   hits.out = nullptr;
-  EXPECT_EQ(ask(&s, d, 1), DFM_E_ARG);
+  EXPECT_EQ(request(&s, d, 1), DFM_E_ARG);
   test::says({"out is NULL", "capacity of 4"});
   hits.size = 8;
-  EXPECT_EQ(ask(&s, d, 1), DFM_E_ARG);
+  EXPECT_EQ(request(&s, d, 1), DFM_E_ARG);
   EXPECT_EQ(hits.n, 77u) << "untouched";
   struct Newer {
     dfm_query_hits known;

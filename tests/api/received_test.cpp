@@ -309,7 +309,7 @@ TEST(Received, ChunkThatIsNotOfFourBytes_EndsItsPacket) {
 }
 
 // Bodies of nothing, and long names; what is cut, whole again and removed, more often than would fit at once.
-TEST(Received, WhatIsToldAgainAndAgain_TakesNoMoreMemory) {
+TEST(Received, WhatIsReportedAgainAndAgain_TakesNoMoreMemory) {
   live::Received r;
   Words named = {1, 0, 0, 0, 10000};
   named.resize(5 + 2500, 0x61616161);

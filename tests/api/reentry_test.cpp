@@ -474,10 +474,10 @@ TEST_F(Reentry, ALaw_IsNotClosedBeneathItsEvaluation) {
   in.stride = 8;
   in.dt = 1e-3;
   in.vt = in.fn = in.ft_stop = in.area = in.dwell = in.params = zeros;
-  dfm_friction_out answer{};
-  answer.size = sizeof answer;
-  answer.ft = out;
-  walk([&] { return dfm_law_eval(s.law, &in, &answer); },
+  dfm_friction_out output{};
+  output.size = sizeof output;
+  output.ft = out;
+  walk([&] { return dfm_law_eval(s.law, &in, &output); },
        {{"law_close", [&] { return dfm_law_close(s.law); }}, context_calls(s).back()}, {"law"});
 }
 

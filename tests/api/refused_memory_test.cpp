@@ -225,7 +225,7 @@ dfm_world flies(dfm_context *c, dfm_body *body) {
   return w;
 }
 
-uint32_t cuts_told(dfm_world w) {
+uint32_t cuts_reported(dfm_world w) {
   uint32_t n = 0;
   for (const dfm_contact_event &e : test::listed(dfm_world_events, w)) n += e.kind == DFM_EVENT_CUT;
   return n;
@@ -260,8 +260,8 @@ void cut_without(dfm_context *c, int64_t n, bool restores, CutRun &run) {
   run.came = Refusal::disarm();
   EXPECT_TRUE(status == DFM_OK || status == DFM_E_NOMEM) << "allocation " << n << ": " << dfm_last_error();
   run.refused += status != DFM_OK;
-  uint32_t told = cuts_told(w);
-  if (told > 0 && pieces_of(b) == 0) {
+  uint32_t reported = cuts_reported(w);
+  if (reported > 0 && pieces_of(b) == 0) {
     ++run.waited;
     EXPECT_EQ(status, DFM_OK) << "allocation " << n << ": the step has been made";
     EXPECT_EQ(dfm_body_set_model(b, "shape_matching", nullptr), DFM_E_UNSUPPORTED) << dfm_last_error();
@@ -275,16 +275,16 @@ void cut_without(dfm_context *c, int64_t n, bool restores, CutRun &run) {
   }
   for (int i = 0; i < 3; ++i) {
     test::ok(dfm_world_step(w, kCutStep, nullptr));
-    told += cuts_told(w);
+    reported += cuts_reported(w);
   }
-  EXPECT_EQ(told, 1u) << "allocation " << n;
+  EXPECT_EQ(reported, 1u) << "allocation " << n;
   EXPECT_EQ(pieces_of(b), 1u) << "allocation " << n << ": one cut, one piece";
   test::ok(dfm_world_destroy(w));
 }
 
 }  // namespace
 
-TEST(RefusedMemory, InAStepThatCuts_MakesAndTellsTheCutOnce) {
+TEST(RefusedMemory, InAStepThatCuts_MakesAndReportsTheCutOnce) {
   dfm_context *const c = make_context();
   CutRun run;
   cut_without(c, int64_t(1) << 40, false, run);

@@ -347,8 +347,8 @@ TEST(RigidReports, OfAToolThatIsPressedOnSomething_AreItsForce) {
       const double origin[3] = {};
       test::ok(dfm_world_pair_wrench(w, part, under, origin, on, nullptr));
       EXPECT_NEAR(on[2], force[2], 1e-6 * force[2]);
-      const auto told = events(w);
-      EXPECT_EQ(told.size(), list.size());
-      for (const dfm_contact_event &e : told) EXPECT_EQ(e.kind, uint32_t(DFM_EVENT_BEGIN));
+      const auto reported = events(w);
+      EXPECT_EQ(reported.size(), list.size());
+      for (const dfm_contact_event &e : reported) EXPECT_EQ(e.kind, uint32_t(DFM_EVENT_BEGIN));
     }
 }

@@ -432,7 +432,7 @@ TEST(RigidTouch, FastSpin_LeavesNothingInTheFloor) {
 }
 
 // A body of voxels has no corners that could meet a plane: one sentence says so, and the plan names it.
-TEST(RigidTouch, VoxelsOnAPlane_AreTold) {
+TEST(RigidTouch, VoxelsOnAPlane_AreReported) {
   test::LoggedContext context;
   const dfm_world w = test::make_world(context.context, {0, 0, -kG});
   test::add_plane(w, "floor");

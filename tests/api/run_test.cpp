@@ -324,7 +324,7 @@ TEST(Run, MeshThatCrossesItself_IsSaidToBeTheReason) {
 
 // A column of blocks that falls onto the floor at once. Its 200 solves converge; with a budget that holds few
 // sweeps more than half of them do not.
-TEST(Run, SolvesWithoutAnswer_AreSaidWithTheirShare) {
+TEST(Run, SolvesWithoutResult_AreSaidWithTheirShare) {
   const std::string scene = folder() + "/column.json";
   std::string bodies;
   for (int i = 0; i < 5; ++i) {
@@ -497,8 +497,8 @@ TEST(Run, FramesByStress_ShowIt) {
     const Outcome r = run(name, {"--frames", "100", "--time", "0.02", "--set", color, "--set", model});
     EXPECT_EQ(r.result.exit_code, 0) << r.result.err;
     if (r.result.err.find("no pictures") != std::string::npos) return std::string();
-    const bool told = value(r.summary, "warnings").find("body 'low': model") != std::string::npos;
-    EXPECT_EQ(told, std::string(name) == "by_no_stress") << r.summary;
+    const bool reported = value(r.summary, "warnings").find("body 'low': model") != std::string::npos;
+    EXPECT_EQ(reported, std::string(name) == "by_no_stress") << r.summary;
     return test::read_file(r.out + "/frames/frame_000002.png");
   };
   const char *const fem = R"(/bodies/0/model={"type": "corotational_fem"})";
@@ -533,7 +533,7 @@ TEST(Run, FramesByQuantity_HaveTheRangeOfTheWholeRun) {
             test::read_file(fixed.out + "/frames/frame_000000.png"));
 }
 
-TEST(Run, Plot_IsDrawnWhereAskedFor) {
+TEST(Run, Plot_IsDrawnOnRequest) {
   EXPECT_FALSE(fs::exists(run("no_plot", {"--time", "0.01"}).out + "/plots.png"));
   const Outcome r = run("plot", {"--time", "0.04", "--plot"});
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;

@@ -232,7 +232,7 @@ TEST(SavedGame, WithToolsSensorsAndPieces_LoadsWithTheSameBits) {
   const size_t cut = test::listed(dfm_world_bodies, w).size();
   ASSERT_GT(cut, 2u);
   const std::string saved = snapshot(w);
-  const auto told = [](dfm_world world) {
+  const auto reported = [](dfm_world world) {
     test::events(world);
     size_t n = 0;
     for (int i = 0; i < 260; ++i) {
@@ -242,7 +242,7 @@ TEST(SavedGame, WithToolsSensorsAndPieces_LoadsWithTheSameBits) {
     }
     return n;
   };
-  const size_t first = told(w);
+  const size_t first = reported(w);
   EXPECT_GT(first, 0u);
   const uint64_t later = dfm_world_hash(w);
   const dfm_world anew = empty(c);
@@ -252,14 +252,14 @@ TEST(SavedGame, WithToolsSensorsAndPieces_LoadsWithTheSameBits) {
   for (int twice = 0; twice < 2; ++twice) {
     ASSERT_EQ(restore(anew, saved), DFM_OK) << dfm_last_error();
     EXPECT_EQ(test::listed(dfm_world_bodies, anew).size(), cut);
-    EXPECT_EQ(told(anew), first);
+    EXPECT_EQ(reported(anew), first);
     EXPECT_EQ(dfm_world_hash(anew), later);
   }
 }
 
-TEST(SavedGame, AnswersOfTheHost_StayThoseOfTheSamePairs) {
+TEST(SavedGame, DecisionsOfTheHost_StayThoseOfTheSamePairs) {
   test::Context c;
-  int asked = 0;
+  int requested = 0;
   const dfm_may_touch_fn no = [](void *user, uint64_t, uint64_t) {
     ++*static_cast<int *>(user);
     return false;
@@ -272,23 +272,23 @@ TEST(SavedGame, AnswersOfTheHost_StayThoseOfTheSamePairs) {
   test::ok(dfm_body_destroy(gone));
   crate(c, w, "b", {0.05, 0, 1});
   ball(w, "post", 0, 0.2);
-  test::ok(dfm_world_set_may_touch(w, no, &asked));
+  test::ok(dfm_world_set_may_touch(w, no, &requested));
   steps(w, 2);
-  ASSERT_GT(asked, 0);
+  ASSERT_GT(requested, 0);
   const std::string saved = snapshot(w);
   steps(w, 150);
   EXPECT_EQ(test::contacts(w).size(), 0u);
   const uint64_t later = dfm_world_hash(w);
   const dfm_world anew = empty(c);
-  test::ok(dfm_world_set_may_touch(anew, no, &asked));
+  test::ok(dfm_world_set_may_touch(anew, no, &requested));
   ball(anew, "post", 0, 0.2);
   crate(c, anew, "b", {0, 0, 1});
   crate(c, anew, "a", {0.05, 0, 1});
   steps(anew, 1);
-  asked = 0;
+  requested = 0;
   ASSERT_EQ(restore(anew, saved), DFM_OK) << dfm_last_error();
   steps(anew, 150);
-  EXPECT_EQ(asked, 0) << "all pairs have been asked";
+  EXPECT_EQ(requested, 0) << "all pairs have been asked";
   EXPECT_EQ(dfm_world_hash(anew), later);
 }
 

@@ -320,9 +320,9 @@ TEST(SceneFill, ClosedSurface_BecomesABodyOfItsVolume) {
   EXPECT_NEAR(i.rest_volume, 0.016, 0.0002) << "shares of the cells make up the volume, scaled";
   EXPECT_NEAR(i.mass, 1000 * i.rest_volume, 1e-9);
   EXPECT_NEAR(test::measure(l.body).volume, i.rest_volume, 1e-12);
-  const char *const told =
+  const char *const reported =
       R"("surface":"own, barycentric","filled":true,"fields":[{"name":"young","from":"share")";
-  EXPECT_NE(l.explain().find(told), std::string::npos) << l.explain();
+  EXPECT_NE(l.explain().find(reported), std::string::npos) << l.explain();
   const std::vector<double> x = test::listed(dfm_surface_positions, l.body, 3);
   for (int s = 0; s < 8; ++s) {  // the file's points come first
     EXPECT_NEAR(std::fabs(x[size_t(3 * s)] - 0.1), 0.1, 1e-12);
@@ -363,21 +363,22 @@ TEST(SceneFill, CellsBySize_AndByDefault) {
 }
 
 // box.obj is 0.2 m high.
-TEST(SceneFill, FileOfManyMeters_IsAskedForMillimetersUnlessTheSceneSaysItsScale) {
+TEST(SceneFill, FileOfManyMeters_IsSuspectedToBeInMillimetersUnlessTheSceneSaysItsScale) {
   std::string large = kBoxObj;
   for (size_t at = 0; (at = large.find("0.", at)) != std::string::npos;)
     large.replace(at, 3, large.substr(at + 2, 1) + "00");
   test::write_file(folder() + "/millimeters.obj", large);
-  const auto told = [](const std::string &mesh, const std::string &pose) {
+  const auto reported = [](const std::string &mesh, const std::string &pose) {
     return test::deform({"explain", scene(), "--set", "/bodies/0/mesh=" + mesh, "--set", kFill, "--set",
                          "/bodies/0/pose=" + pose})
         .err;
   };
   const std::string hint = ": if millimeters.obj is in millimeters, set \"scale\": 0.001 in its \"pose\"";
-  EXPECT_NE(told("millimeters.obj", "{}").find(hint), std::string::npos) << told("millimeters.obj", "{}");
+  EXPECT_NE(reported("millimeters.obj", "{}").find(hint), std::string::npos)
+      << reported("millimeters.obj", "{}");
   for (const char *scale : {"{\"scale\": 0.001}", "{\"scale\": 1}"})
-    EXPECT_EQ(told("millimeters.obj", scale).find("millimeters,"), std::string::npos) << scale;
-  EXPECT_EQ(told("box.obj", "{}").find("millimeters"), std::string::npos);
+    EXPECT_EQ(reported("millimeters.obj", scale).find("millimeters,"), std::string::npos) << scale;
+  EXPECT_EQ(reported("box.obj", "{}").find("millimeters"), std::string::npos);
 }
 
 TEST(SceneFill, SurfacesMayBeOthers) {
@@ -425,7 +426,7 @@ TEST(SceneFill, GroupsOfTheSurface_HoldAndLoad) {
 }
 
 // What a cut asks for changes what is seen, by how much is said before the run.
-TEST(SceneFill, BorderOfTheCells_IsToldOfBeforeTheRun) {
+TEST(SceneFill, BorderOfTheCells_IsReportedBeforeTheRun) {
   const std::string border = R"(/bodies/0/surface={"from": "boundary"})";
   for (const std::vector<std::string> &command :
        {std::vector<std::string>{"explain", scene()}, {"run", scene(), "--out", folder() + "/border"}}) {

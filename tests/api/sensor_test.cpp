@@ -19,7 +19,7 @@ std::ostream &operator<<(std::ostream &to, const Event &e) {
 }
 
 // Those of sensors; empties the list.
-std::vector<Event> told(dfm_world w) {
+std::vector<Event> events_of(dfm_world w) {
   uint32_t n = 0;
   std::vector<dfm_contact_event> all(4096);
   test::ok(dfm_world_events(w, 4096, all.data(), &n));
@@ -85,7 +85,7 @@ TEST_P(Gate, ABodyThatFallsThrough_EntersLeavesAndFallsFreely) {
   double in = 0, out = 0;
   for (int i = 0; i < 400; ++i) {
     test::ok(dfm_world_step(w, 1e-3, nullptr));
-    for (const Event &e : told(w)) {
+    for (const Event &e : events_of(w)) {
       EXPECT_EQ(e.a, g);
       EXPECT_EQ(e.b, b);
       (e.kind == DFM_EVENT_SENSOR_BEGIN ? in : out) = dfm_world_time(w);
@@ -114,10 +114,10 @@ TEST(Sensor, Plane_DetectsBodiesBelow) {
   const dfm_body low = cube(c, w, -1, "low");
   cube(c, w, 1, "high");
   test::ok(dfm_world_step(w, 1e-3, nullptr));
-  EXPECT_EQ(told(w), (std::vector<Event>{{DFM_EVENT_SENSOR_BEGIN, g, low}}));
+  EXPECT_EQ(events_of(w), (std::vector<Event>{{DFM_EVENT_SENSOR_BEGIN, g, low}}));
   EXPECT_EQ(things(g), std::vector<uint64_t>{low});
   test::ok(dfm_world_step(w, 1e-3, nullptr));
-  EXPECT_TRUE(told(w).empty()) << "told once";
+  EXPECT_TRUE(events_of(w).empty()) << "told once";
 }
 
 TEST(Sensor, EndOfAnOverlap_IsReportedAtOnce) {
@@ -126,31 +126,31 @@ TEST(Sensor, EndOfAnOverlap_IsReportedAtOnce) {
   const dfm_obstacle g = gate(w, DFM_SHAPE_BOX, 0);
   const dfm_body one = cube(c, w, 0, "one"), two = cube(c, w, -0.3, "two");
   test::ok(dfm_world_step(w, 1e-3, nullptr));
-  EXPECT_EQ(told(w), (std::vector<Event>{{DFM_EVENT_SENSOR_BEGIN, g, one}}));
+  EXPECT_EQ(events_of(w), (std::vector<Event>{{DFM_EVENT_SENSOR_BEGIN, g, one}}));
   test::ok(dfm_body_destroy(one));
-  std::vector<Event> end = told(w);
+  std::vector<Event> end = events_of(w);
   ASSERT_EQ(end.size(), 1u);
   EXPECT_EQ(end[0].kind, uint32_t{DFM_EVENT_SENSOR_END});
   EXPECT_EQ(end[0].a, g);
   const dfm_pose there{{0, 0, -0.25}, {0, 0, 0, 1}};
   test::ok(dfm_obstacle_teleport(g, &there));
   test::ok(dfm_world_step(w, 1e-3, nullptr));
-  EXPECT_EQ(told(w), (std::vector<Event>{{DFM_EVENT_SENSOR_BEGIN, g, two}}));
+  EXPECT_EQ(events_of(w), (std::vector<Event>{{DFM_EVENT_SENSOR_BEGIN, g, two}}));
   test::ok(dfm_obstacle_set_sensor(g, false));
-  EXPECT_EQ(told(w), (std::vector<Event>{{DFM_EVENT_SENSOR_END, g, two}}));
+  EXPECT_EQ(events_of(w), (std::vector<Event>{{DFM_EVENT_SENSOR_END, g, two}}));
   uint32_t n = 0;
   EXPECT_EQ(dfm_sensor_things(g, 0, nullptr, &n), DFM_E_ARG);
   test::says({"not a sensor"});
   test::ok(dfm_obstacle_set_sensor(g, true));
   test::ok(dfm_world_step(w, 1e-3, nullptr));
-  told(w);
+  events_of(w);
   test::ok(dfm_obstacle_destroy(g));
-  end = told(w);
+  end = events_of(w);
   ASSERT_EQ(end.size(), 1u);
   EXPECT_EQ(end[0].b, two);
   EXPECT_EQ(dfm_sensor_things(g, 0, nullptr, &n), DFM_E_HANDLE);
   test::ok(dfm_world_step(w, 1e-3, nullptr));
-  EXPECT_TRUE(told(w).empty());
+  EXPECT_TRUE(events_of(w).empty());
 }
 
 TEST(Sensor, MasksAndRules_SelectWhatItDetects) {
@@ -209,10 +209,10 @@ TEST(Sensor, AfterARestore_TheSameEventsAreReported) {
   for (auto *list : {&first, &second}) {
     for (int i = 0; i < 100; ++i) {
       test::ok(dfm_world_step(w, 1e-3, nullptr));
-      list->push_back(told(w));
+      list->push_back(events_of(w));
     }
     test::ok(dfm_world_restore(w, kept.data(), kept.size()));
-    EXPECT_TRUE(told(w).empty());
+    EXPECT_TRUE(events_of(w).empty());
   }
   EXPECT_EQ(first, second);
 }
@@ -236,10 +236,10 @@ TEST(Sensor, InAScene_TheCommandWritesWhatItReports) {
       test::deform({"run", folder + "/scene.json", "--quiet", "--out", folder + "/out"});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   const auto rows = test::read_csv(folder + "/out/sensors.csv");
-  std::vector<std::string> told;
-  for (const auto &row : rows) told.push_back(row[1] + " " + row[2] + " " + row[3]);
-  EXPECT_EQ(told, (std::vector<std::string>{"sensor thing event", "gate cube begin", "ring cube begin",
-                                            "gate cube end", "ring cube end", "pond cube begin"}));
+  std::vector<std::string> events_of;
+  for (const auto &row : rows) events_of.push_back(row[1] + " " + row[2] + " " + row[3]);
+  EXPECT_EQ(events_of, (std::vector<std::string>{"sensor thing event", "gate cube begin", "ring cube begin",
+                                                 "gate cube end", "ring cube end", "pond cube begin"}));
   const std::string summary = test::read_file(folder + "/out/summary.json");
   EXPECT_NE(summary.find("\"sensors\""), std::string::npos) << summary;
   EXPECT_NE(summary.find("\"inside\": [\"cube\"]"), std::string::npos) << summary;

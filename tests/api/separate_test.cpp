@@ -17,7 +17,7 @@ std::vector<dfm_body> pieces(dfm_body b) {
 }
 
 dfm_cut_info separate(dfm_body b) {
-  dfm_cut_info out = ask();
+  dfm_cut_info out = request();
   test::ok(dfm_body_separate(b, nullptr, &out));
   return out;
 }
@@ -214,9 +214,9 @@ TEST(Separate, Contacts_KeepKeysImpulsesAndBristles) {
   test::listed(dfm_world_events, w);
   separate(b);
   const dfm_body piece = pieces(b)[0];
-  const std::vector<dfm_contact> told = test::contacts(w);
-  ASSERT_EQ(told.size(), before.size());
-  for (size_t i = 0; i < told.size(); ++i) EXPECT_EQ(told[i].key, before[i].key);
+  const std::vector<dfm_contact> reported = test::contacts(w);
+  ASSERT_EQ(reported.size(), before.size());
+  for (size_t i = 0; i < reported.size(); ++i) EXPECT_EQ(reported[i].key, before[i].key);
   steps(w, 1);
   uint32_t of_floor = 0, of_piece = 0, alike = 0;
   double force = 0;
@@ -344,7 +344,7 @@ struct CrumbBetween {
     test::ok(dfm_body_set_state(s.b, npoint, now.x.data(), now.v.data()));
   }
   dfm_cut_info part() {
-    dfm_cut_info out = ask();
+    dfm_cut_info out = request();
     test::ok(dfm_body_separate(s.b, &rule, &out));
     return out;
   }

@@ -97,19 +97,20 @@ TEST(SwitchOfAScene, AfterTheLastStep_IsReportedAndListed) {
   const auto change = [](const char *t) {
     return std::string(R"("switch": [{"t": )") + t + R"(, "type": "corotational_fem", "max_jump": 2}])";
   };
-  const std::string told = "is never made";
+  const std::string reported = "is never made";
   for (const char *late : {"0.02", "0.01", "0.0095"}) {
     const test::CommandResult r = run(scene(kStep, change(late)));
     EXPECT_EQ(r.exit_code, 0);
-    EXPECT_NE(r.err.find(told), std::string::npos) << late << "\n" << r.err;
+    EXPECT_NE(r.err.find(reported), std::string::npos) << late << "\n" << r.err;
     EXPECT_NE(r.err.find("/bodies/0/switch/0"), std::string::npos) << r.err;
   }
-  EXPECT_EQ(run(scene(kStep, change("0.009"))).err.find(told), std::string::npos);
-  EXPECT_EQ(run(scene("", change("0.009"))).err.find(told), std::string::npos);
-  EXPECT_NE(run(scene("", change("0.01"))).err.find(told), std::string::npos);
+  EXPECT_EQ(run(scene(kStep, change("0.009"))).err.find(reported), std::string::npos);
+  EXPECT_EQ(run(scene("", change("0.009"))).err.find(reported), std::string::npos);
+  EXPECT_NE(run(scene("", change("0.01"))).err.find(reported), std::string::npos);
   const std::string held = R"(, "fix": [{"box": [[-1, -1, -1], [1, 1, 0.001]]}])";
-  EXPECT_NE(run(scene(R"(, "mode": "static")", change("0.001") + held)).err.find(told), std::string::npos);
-  EXPECT_EQ(run(scene(R"(, "mode": "static")", change("0") + held)).err.find(told), std::string::npos);
+  EXPECT_NE(run(scene(R"(, "mode": "static")", change("0.001") + held)).err.find(reported),
+            std::string::npos);
+  EXPECT_EQ(run(scene(R"(, "mode": "static")", change("0") + held)).err.find(reported), std::string::npos);
 }
 
 // --time is the duration of that run.
@@ -122,28 +123,28 @@ TEST(SwitchOfAScene, AfterTheEndOfAShorterRun_IsReported) {
 }
 
 TEST(SwitchOfAScene, ToTheModelThatTheBodyHas_IsReported) {
-  const auto told = [](const std::string &change, const char *what) {
+  const auto reported = [](const std::string &change, const char *what) {
     const std::string log = run(scene(kStep, "\"switch\": " + change)).err;
     EXPECT_EQ(log.find("the same parameters") != std::string::npos, *what != 0) << change << log;
     EXPECT_NE(log.find(what), std::string::npos) << log;
   };
-  told(R"([{"t": 0.005, "type": "msm"}])",
-       "/bodies/0/switch/0) is to the model that the body already has then");
-  told(R"([{"t": 0.005, "type": "msm", "params": {"young": 2e5}}])", "");
-  told(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "modal"}])", "/bodies/0/switch/1) is to");
-  told(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "msm"}])", "");
-  told(R"({"far": "msm", "touching": "msm"})", "so it changes nothing between them");
+  reported(R"([{"t": 0.005, "type": "msm"}])",
+           "/bodies/0/switch/0) is to the model that the body already has then");
+  reported(R"([{"t": 0.005, "type": "msm", "params": {"young": 2e5}}])", "");
+  reported(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "modal"}])", "/bodies/0/switch/1) is to");
+  reported(R"([{"t": 0.004, "type": "modal"}, {"t": 0.005, "type": "msm"}])", "");
+  reported(R"({"far": "msm", "touching": "msm"})", "so it changes nothing between them");
 }
 
 TEST(SwitchOfAScene, IntegratorOfAModelThatStepsItself_IsReportedAsUnused) {
-  const auto told = [](const std::string &body) {
+  const auto reported = [](const std::string &body) {
     return run(scene(kStep, body)).err.find("implicit_euler, is not used") != std::string::npos;
   };
-  EXPECT_TRUE(told(R"("model": {"type": "modal"}, "integrator": "implicit_euler")"));
-  EXPECT_FALSE(told(R"("model": {"type": "modal"})"));
-  EXPECT_FALSE(told(R"("integrator": "implicit_euler")"));
-  EXPECT_TRUE(told(R"("switch": [{"t": 0.005, "type": "modal", "integrator": "implicit_euler"}])"));
-  EXPECT_FALSE(told(R"("integrator": "implicit_euler", )" + kRuleToModal));
+  EXPECT_TRUE(reported(R"("model": {"type": "modal"}, "integrator": "implicit_euler")"));
+  EXPECT_FALSE(reported(R"("model": {"type": "modal"})"));
+  EXPECT_FALSE(reported(R"("integrator": "implicit_euler")"));
+  EXPECT_TRUE(reported(R"("switch": [{"t": 0.005, "type": "modal", "integrator": "implicit_euler"}])"));
+  EXPECT_FALSE(reported(R"("integrator": "implicit_euler", )" + kRuleToModal));
 }
 
 TEST(SwitchOfAScene, OfAnotherKind_IsRefusedWithBothForms) {
@@ -255,10 +256,10 @@ TEST(SwitchRule, BackAndForth_PumpsNoEnergyIntoAnUndampedBall) {
     }
     EXPECT_GT(rises, 0u) << "changes that add little are made";
     EXPECT_GT(refused, 0u);
-    const size_t told = logged.log.find("earlier changes have put in");
-    ASSERT_NE(told, std::string::npos) << logged.log;
+    const size_t reported = logged.log.find("earlier changes have put in");
+    ASSERT_NE(reported, std::string::npos) << logged.log;
     EXPECT_NE(logged.log.find("body 'ball': from 'org.deform."), std::string::npos);
-    EXPECT_EQ(logged.log.find("earlier changes have put in", told + 1), std::string::npos) << "once";
+    EXPECT_EQ(logged.log.find("earlier changes have put in", reported + 1), std::string::npos) << "once";
   }
 }
 

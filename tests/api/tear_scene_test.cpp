@@ -87,7 +87,7 @@ constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells
 
 // unsanitized: 36 s there; smaller tears have the same accesses
 // Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
-TEST(TearScene, PiecesOfABallThatShatters_AreToldOnceAndNotToBeMoved) {
+TEST(TearScene, PiecesOfABallThatShatters_AreReportedOnceAndNotToBeMoved) {
   const test::CommandResult r =
       shattered("pieces of a ball", "0.03", "3", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
   const std::string &log = r.err;

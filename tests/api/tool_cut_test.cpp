@@ -46,13 +46,13 @@ void move(dfm_world w, dfm_tool t, std::array<double, 3> from, std::array<double
 }
 uint32_t cells(dfm_body b) { return test::cutting::info(b).ntet; }
 // Sum of the keys of the cut events since the last call, and the largest one.
-struct Told { uint64_t sum = 0, most = 0, n = 0; };
-Told told(dfm_world w, dfm_body b, dfm_tool t) {
+struct CutEvents { uint64_t sum = 0, most = 0, n = 0; };
+CutEvents cut_events(dfm_world w, dfm_body b, dfm_tool t) {
   dfm_rigid list[3] = {};
   uint32_t n = 0;
   test::ok(dfm_tool_parts(t, 3, list, &n));
   const std::set<uint64_t> of_tool(list, list + n);
-  Told out;
+  CutEvents out;
   for (const dfm_contact_event &e : test::listed(dfm_world_events, w)) {
     if (e.kind != uint32_t{DFM_EVENT_CUT}) continue;
     EXPECT_EQ(e.a, b);
@@ -81,7 +81,7 @@ TEST(ToolCut, BladeThroughACube_PartsIt_WithoutMassMomentumOrForce) {
     const dfm_body_measure before = test::measure(s.body);
     const uint32_t before_cells = cells(s.body);
     move(s.w, t, {0.001, 0, 0.05}, {0.001, 0, 0.015}, 20);
-    EXPECT_GT(told(s.w, s.body, t).n, 1u) << "a cut grows from step to step";
+    EXPECT_GT(cut_events(s.w, s.body, t).n, 1u) << "a cut grows from step to step";
     EXPECT_EQ(parts(s.body), 1u) << "half way";
     move(s.w, t, {0.001, 0, 0.015}, {0.001, 0, -0.01}, 20);
     EXPECT_EQ(parts(s.body), 2u) << model;
@@ -102,7 +102,7 @@ TEST(ToolCut, Limit_HoldsInEachStep_AndNothingIsForgotten) {
   cuts(t, DFM_CUT_SPLIT, s.body, 5);
   move(whole.w, free, {0.001, 0, 0.05}, {0.001, 0, -0.01}, 60);
   move(s.w, t, {0.001, 0, 0.05}, {0.001, 0, -0.01}, 60);
-  const Told all = told(whole.w, whole.body, free), some = told(s.w, s.body, t);
+  const CutEvents all = cut_events(whole.w, whole.body, free), some = cut_events(s.w, s.body, t);
   EXPECT_GT(all.most, 5u);
   EXPECT_LE(some.most, 5u);
   EXPECT_EQ(some.sum, all.sum);
@@ -119,7 +119,7 @@ TEST(ToolCut, BladeThatDoesNotGoForward_CutsNothing) {
   move(s.w, t, {0.001, 0, 0.02}, {0.001, 0, 0.02}, 5);
   move(s.w, t, {0.001, 0, 0.02}, {-0.015, 0, 0.02}, 20);
   move(s.w, t, {-0.015, 0, 0.02}, {-0.015, 0, 0.06}, 20);
-  EXPECT_EQ(told(s.w, s.body, t).n, 0u);
+  EXPECT_EQ(cut_events(s.w, s.body, t).n, 0u);
   EXPECT_TRUE(test::contacts(s.w).empty()) << "the two do not touch";
 }
 
@@ -150,7 +150,7 @@ TEST(ToolCut, Solids_TakeCellsAway_AsTheyGo) {
     const double before = test::measure(s.body).mass;
     const uint32_t whole = cells(s.body);
     move(s.w, t, {0, 0, 0.06}, {0, 0, 0}, 30);
-    const Told gone = told(s.w, s.body, t);
+    const CutEvents gone = cut_events(s.w, s.body, t);
     EXPECT_GT(gone.sum, 30u) << solid.shape;
     EXPECT_LE(gone.most, 40u);
     EXPECT_EQ(cells(s.body), whole - gone.sum);
@@ -190,12 +190,12 @@ TEST(ToolCut, Scissors_CutWhatTheyCloseOn) {
     }
   }
   EXPECT_EQ(parts(s.body), 2u);
-  told(s.w, s.body, t);
+  cut_events(s.w, s.body, t);
   for (int i = 1; i <= 60; ++i) {
     test::ok(dfm_tool_set_opening(t, 1.5 * i / 60.0));
     test::ok(dfm_world_step(s.w, 1e-3, nullptr));
   }
-  EXPECT_EQ(told(s.w, s.body, t).n, 0u) << "opening cuts nothing";
+  EXPECT_EQ(cut_events(s.w, s.body, t).n, 0u) << "opening cuts nothing";
 }
 
 TEST(ToolCut, Snapshot_TakesBackACut_WhichThenGoesTheSameWay) {
@@ -213,7 +213,7 @@ TEST(ToolCut, Snapshot_TakesBackACut_WhichThenGoesTheSameWay) {
   EXPECT_TRUE(test::snapshot(s.w) == end);
 }
 
-TEST(ToolCut, WhatIsSet_CanBeAsked_AndTakenBack) {
+TEST(ToolCut, WhatIsSet_CanBeRead_AndTakenBack) {
   Cube s;
   const dfm_tool t = blade(s.w);
   uint32_t how = 9, most = 9, n = 9;

@@ -230,7 +230,7 @@ TEST(ToolObstacle, DrawnAside_FrictionIsThatOfThePair) {
 
 // A driven tool goes where it is told, through a floor too: one sentence says so. One that was put into the
 // floor is told of as well, and filters count.
-TEST(ToolObstacle, WhatIsInAFloor_IsToldOnce) {
+TEST(ToolObstacle, WhatIsInAFloor_IsReportedOnce) {
   for (const char *const floor : {"plane", "box", "mesh", "voxels"}) {
     SCOPED_TRACE(floor);
     test::LoggedContext context;

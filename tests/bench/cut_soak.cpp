@@ -17,7 +17,7 @@
 namespace {
 
 struct Total {
-  uint64_t first = 0, last = 0, cuts = 0, missed = 0, steps = 0, refused = 0, undone = 0, tears = 0,
+  uint64_t first = 0, last = 0, cuts = 0, missed = 0, steps = 0, refused = 0, rolled_back = 0, tears = 0,
            pieces = 0, contacts = 0, energy = 0, fast = 0, failed = 0;
   double seconds = 0;
 };
@@ -42,8 +42,8 @@ void write(const char *file, const Total &t, const std::string &commit) {
         out,
         "first_seed,last_seed,cuts,met_nothing,steps,refused,undone,tears,pieces,contacts,energy_steps,fast,"
         "failed,seconds,machine,compiler,commit\n");
-  for (const uint64_t n : {t.first, t.last, t.cuts, t.missed, t.steps, t.refused, t.undone, t.tears, t.pieces,
-                           t.contacts, t.energy, t.fast, t.failed})
+  for (const uint64_t n : {t.first, t.last, t.cuts, t.missed, t.steps, t.refused, t.rolled_back, t.tears,
+                           t.pieces, t.contacts, t.energy, t.fast, t.failed})
     std::fprintf(out, "%llu,", static_cast<unsigned long long>(n));
   std::fprintf(out, "%.0f,%s,%s,%s\n", t.seconds, bench::machine().c_str(), bench::compiler(),
                commit.c_str());
@@ -89,7 +89,7 @@ int main(int argc, char **argv) {
       sum->missed += r.missed;
       sum->steps += r.steps;
       sum->refused += r.refused;
-      sum->undone += r.undone;
+      sum->rolled_back += r.rolled_back;
       sum->tears += r.tears;
       sum->pieces += r.pieces;
       sum->contacts += r.contacts;
@@ -117,7 +117,7 @@ int main(int argc, char **argv) {
       "steps gained energy, %llu worlds fast, %llu worlds failed, %.0f s\n",
       static_cast<unsigned long long>(made + all.cuts), static_cast<unsigned long long>(all.missed),
       static_cast<unsigned long long>(all.steps), static_cast<unsigned long long>(all.refused),
-      static_cast<unsigned long long>(all.undone), static_cast<unsigned long long>(all.tears),
+      static_cast<unsigned long long>(all.rolled_back), static_cast<unsigned long long>(all.tears),
       static_cast<unsigned long long>(all.pieces), static_cast<unsigned long long>(all.contacts),
       static_cast<unsigned long long>(all.energy), static_cast<unsigned long long>(all.fast),
       static_cast<unsigned long long>(all.failed), now());

@@ -56,14 +56,14 @@ struct Questions {
 
 template <class Query>
 void measure(const Sink &sink, const char *query, const char *what, uint32_t triangles, double update_us,
-             Query &&ask) {
+             Query &&request) {
   const Questions q;
   dfm::SearchCount count;
-  for (int i = 0; i < kQueries; ++i) ask(q.from[size_t(i)], q.to[size_t(i)], &count);
+  for (int i = 0; i < kQueries; ++i) request(q.from[size_t(i)], q.to[size_t(i)], &count);
   double best = HUGE_VAL;
   for (int round = 0; round < kRounds; ++round) {
     const auto begin = std::chrono::steady_clock::now();
-    for (int i = 0; i < kQueries; ++i) ask(q.from[size_t(i)], q.to[size_t(i)], nullptr);
+    for (int i = 0; i < kQueries; ++i) request(q.from[size_t(i)], q.to[size_t(i)], nullptr);
     best = std::min(best, seconds_since(begin));
   }
   sink.row(query, what, triangles, double(count.nodes) / kQueries, double(count.triangles) / kQueries,
@@ -71,7 +71,7 @@ void measure(const Sink &sink, const char *query, const char *what, uint32_t tri
 }
 
 // A ray, or (to zero) the closest point.
-void ask(dfm::World &w, Vec3 from, Vec3 to, dfm::SearchCount *count) {
+void request(dfm::World &w, Vec3 from, Vec3 to, dfm::SearchCount *count) {
   dfm_query_hit hit;
   dfm_query_hits hits{sizeof hits, sizeof hit, 1, 0, &hit};
   dfm::ThingQuery q;
@@ -91,16 +91,16 @@ void body(const Sink &sink, const char *what, uint32_t cells, const dfm_surface_
   const dfm_body b = test::make_body(c, world, "ball", {1, 0, 0}, cells, o);
   dfm_body_info info{};
   test::ok(dfm_body_get_info(b, &info));
-  ask(w, {2, 0, 0}, {-1, 0, 0}, nullptr);
+  request(w, {2, 0, 0}, {-1, 0, 0}, nullptr);
   double update = HUGE_VAL;
   for (int round = 0; round < kRounds; ++round) {
     ++w.bodies[0]->x_version;
     const auto begin = std::chrono::steady_clock::now();
-    ask(w, {2, 0, 0}, {-1, 0, 0}, nullptr);
+    request(w, {2, 0, 0}, {-1, 0, 0}, nullptr);
     update = std::min(update, 1e6 * seconds_since(begin));
   }
-  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) { ask(w, from, to, count); };
-  const auto point = [&](Vec3 from, Vec3, dfm::SearchCount *count) { ask(w, from, {}, count); };
+  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) { request(w, from, to, count); };
+  const auto point = [&](Vec3 from, Vec3, dfm::SearchCount *count) { request(w, from, {}, count); };
   measure(sink, "ray", what, info.ntriangle, update, ray);
   measure(sink, "closest", what, info.ntriangle, update, point);
 }
@@ -118,7 +118,7 @@ void obstacle(const Sink &sink, int level) {
   d.triangles = ball.tri.data();
   dfm_obstacle o = 0;
   test::ok(dfm_obstacle_create(world, &d, &o));
-  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) { ask(w, from, to, count); };
+  const auto ray = [&](Vec3 from, Vec3 to, dfm::SearchCount *count) { request(w, from, to, count); };
   measure(sink, "ray", "obstacle", ball.ntri(), 0, ray);
 }
 

@@ -139,11 +139,11 @@ struct Figures {
 };
 
 template <class Ask>  // double ask(query, evaluations &)
-Figures measure(const std::vector<ToiQuery> &queries, bool labeled, const Ask &ask_one) {
+Figures measure(const std::vector<ToiQuery> &queries, bool labeled, const Ask &query_one) {
   Figures f;
   for (const ToiQuery &q : queries) {
     uint32_t evaluations = 0;
-    const double t = ask_one(q, evaluations);
+    const double t = query_one(q, evaluations);
     const bool hit = t <= 1;
     f.hits += hit;
     f.evaluations += evaluations;
@@ -161,7 +161,7 @@ Figures measure(const std::vector<ToiQuery> &queries, bool labeled, const Ask &a
     uint32_t unused = 0;
     double sum = 0;
     const auto begin = std::chrono::steady_clock::now();
-    for (const ToiQuery &q : queries) sum += std::min(ask_one(q, unused), 2.0);
+    for (const ToiQuery &q : queries) sum += std::min(query_one(q, unused), 2.0);
     const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
     if (sum >= 0) f.ns = std::min(f.ns, 1e9 * spent.count() / double(queries.size()));
   }
@@ -271,7 +271,7 @@ void guard(const Sink &sink) {
       for (size_t i = 0; i < surface.x.size(); ++i) end[b].push_back(surface.x[i] + scene.h * surface.v[i]);
     }
     const double floor = scene.offset / 2;
-    dfm::GuardScene asked = test::guard_scene(scene.bodies, end, floor, 0.1 * floor);
+    dfm::GuardScene requested = test::guard_scene(scene.bodies, end, floor, 0.1 * floor);
     dfm::Array<dfm::GuardHit> hits;
     const size_t pairs = broad.candidates().size();
     std::vector<uint32_t> which(pairs);
@@ -279,7 +279,7 @@ void guard(const Sink &sink) {
     double best = HUGE_VAL;
     for (int repetition = 0; repetition < kRepetitions; ++repetition) {
       const auto begin = std::chrono::steady_clock::now();
-      dfm::guard_pairs(asked, broad.candidates(), which, hits);
+      dfm::guard_pairs(requested, broad.candidates(), which, hits);
       const std::chrono::duration<double> spent = std::chrono::steady_clock::now() - begin;
       best = std::min(best, 1e9 * spent.count() / double(pairs));
     }

@@ -46,7 +46,7 @@ struct Moving {
 };
 
 template <auto Call, class Broken>
-void expect_told(Broken broken) {
+void expect_reported(Broken broken) {
   Moving one;
   if (!one.stepper) GTEST_SKIP() << one.missing;
   const auto works = std::exchange((*one.vulkan).*Call, broken);
@@ -58,17 +58,17 @@ void expect_told(Broken broken) {
   EXPECT_EQ(one.stepper->place[0].x, 1);
 }
 
-TEST(GpuDriver, ThatBeginsNoCommands_IsTold) {
-  expect_told<&Vulkan::BeginCommandBuffer>(
+TEST(GpuDriver, ThatBeginsNoCommands_IsReported) {
+  expect_reported<&Vulkan::BeginCommandBuffer>(
       [](VkCommandBuffer, const VkCommandBufferBeginInfo *) { return VK_ERROR_OUT_OF_HOST_MEMORY; });
 }
 
-TEST(GpuDriver, ThatEndsNoCommands_IsTold) {
-  expect_told<&Vulkan::EndCommandBuffer>([](VkCommandBuffer) { return VK_ERROR_OUT_OF_DEVICE_MEMORY; });
+TEST(GpuDriver, ThatEndsNoCommands_IsReported) {
+  expect_reported<&Vulkan::EndCommandBuffer>([](VkCommandBuffer) { return VK_ERROR_OUT_OF_DEVICE_MEMORY; });
 }
 
-TEST(GpuDriver, ThatTakesNoCommands_IsTold) {
-  expect_told<&Vulkan::QueueSubmit>(
+TEST(GpuDriver, ThatTakesNoCommands_IsReported) {
+  expect_reported<&Vulkan::QueueSubmit>(
       [](VkQueue, uint32_t, const VkSubmitInfo *, VkFence) { return VK_ERROR_DEVICE_LOST; });
 }
 

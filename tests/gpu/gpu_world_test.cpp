@@ -163,7 +163,7 @@ TEST_P(GpuWorld, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
     test::run(w.world, 0.1, 2e-3);
     const dfm_body_measure before = w.now();
     const dfm_cut_def sphere = test::cutting::sphere({0.05, 0.05, 0.1}, 0.03);
-    dfm_cut_info done = test::cutting::ask();
+    dfm_cut_info done = test::cutting::request();
     test::ok(dfm_body_cut(w.body, &sphere, &done));
     EXPECT_GT(done.cells, 5u);
     EXPECT_NEAR(w.now().mass + done.mass, before.mass, 1e-12);
@@ -344,7 +344,7 @@ TEST(GpuScene, DeviceBesideAnAccuracy_IsThatOfTheModelThatThePlannerTakes) {
 }
 
 // The card has fewer effects than the processor, and no scene loses one without a word.
-TEST(GpuScene, WhatTheCardLacks_IsTold) {
+TEST(GpuScene, WhatTheCardLacks_IsReported) {
   if (device() == kReference) GTEST_SKIP() << "no driver";
   const test::CommandResult volume = explain_on("gpu", R"("type": "msm")", true);
   EXPECT_NE(volume.exit_code, 0);
@@ -377,7 +377,7 @@ TEST(GpuScene, WhatTheCardLacks_IsTold) {
 }
 
 // A state of a machine where "auto" chose otherwise.
-TEST(GpuScene, StateOfAnotherDevice_IsToldSo) {
+TEST(GpuScene, StateOfAnotherDevice_IsReported) {
   const std::string folder = test::scratch("state"), file = folder + "/scene.json", state = folder + "/s.dfm";
   test::write_file(file,
                    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},

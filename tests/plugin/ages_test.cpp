@@ -23,14 +23,14 @@ struct LaterKin {
   dfm_kin known;
   const uint8_t *held;
 };
-uint32_t told_of_held = 0, not_told = 0;
+uint32_t reported_of_held = 0, not_reported = 0;
 
 bool is_held(const dfm_kin *k, uint32_t point) {
   if (k->size < offsetof(LaterKin, held) + sizeof(const uint8_t *)) {
-    ++not_told;
+    ++not_reported;
     return false;
   }
-  ++told_of_held;
+  ++reported_of_held;
   return reinterpret_cast<const LaterKin *>(k)->held[point];
 }
 
@@ -248,10 +248,10 @@ TEST(Ages, ShorterAndLongerModels_MoveLikeThatOfThisHeader) {
   World present("present"), old("old"), later("later");
   const std::vector<double> moved = present.after(0.05);
   EXPECT_EQ(old.after(0.05), moved);
-  told_of_held = not_told = 0;
+  reported_of_held = not_reported = 0;
   EXPECT_EQ(later.after(0.05), moved) << "this host's dfm_kin ends before held";
-  EXPECT_EQ(told_of_held, 0u);
-  EXPECT_GT(not_told, 0u);
+  EXPECT_EQ(reported_of_held, 0u);
+  EXPECT_GT(not_reported, 0u);
   EXPECT_TRUE(std::isnan(test::measure(old.body).elastic)) << "it claims an energy and ends before it";
   size_t bytes = 0;
   test::ok(dfm_world_explain(later.world, nullptr, &bytes));
@@ -308,15 +308,15 @@ TEST(Ages, LongerStructsOfTheHost_ChangeNothingForThePluginThatDoesNotKnowThem) 
   void *self = nullptr;
   ASSERT_EQ(create(nullptr, &mesh.known, &self), DFM_OK);
   double f[8] = {}, g[8] = {};
-  told_of_held = not_told = 0;
+  reported_of_held = not_reported = 0;
   EXPECT_EQ(static_cast<const dfm_model *>(ops_of(1))->add_forces(self, &k.kin.known, f), DFM_OK);
   EXPECT_EQ(static_cast<const dfm_model *>(ops_of(2))->add_forces(self, &k.kin.known, g), DFM_OK);
   EXPECT_EQ(f[0], -0.5 * kStiffness);
   EXPECT_EQ(f[4], -1 * kStiffness);
   EXPECT_EQ(g[0], f[0]);
   EXPECT_EQ(g[4], 0) << "held, as this host says";
-  EXPECT_EQ(told_of_held, 2u);
-  EXPECT_EQ(not_told, 0u);
+  EXPECT_EQ(reported_of_held, 2u);
+  EXPECT_EQ(not_reported, 0u);
   destroy(self);
 }
 

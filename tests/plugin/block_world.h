@@ -70,7 +70,7 @@ inline void expect_collision_keeps_momentum(Block b, const char *other, double s
 }
 
 // The shipped scene with the model of its first body replaced, for a time and a step (0: its own).
-inline void expect_sound_demo(const std::string &scene, const std::string &model, double duration,
+inline void expect_valid_demo(const std::string &scene, const std::string &model, double duration,
                               double step) {
   const std::string out = scratch(model + "_" + scene);
   std::vector<std::string> arguments = {

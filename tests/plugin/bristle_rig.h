@@ -1,11 +1,10 @@
-// What the tests of the bristle laws share: histories in one dimension, a load held by quasi-static steps,
-// the reference files.
+// Shared by tests of bristle laws: one-dimensional histories, quasi-static loads, the reference files.
 #pragma once
 #include "law_rules.h"
 
 namespace rig {
 
-using rules::ask;
+using rules::evaluate;
 using rules::In;
 using rules::Law;
 using rules::Out;
@@ -21,7 +20,7 @@ struct Contact {
     in.v[0] = vx;
     in.v[1] = vy;
     in.h = h;
-    last = ask(law, in);
+    last = evaluate(law, in);
     std::memcpy(in.state, last.state, sizeof in.state);
     x += h * vx;
     return last;
@@ -38,7 +37,7 @@ struct Contact {
     for (int pass = 0; pass < 60; ++pass) {
       in.v[0] = v;
       in.v[1] = 0;
-      const Out o = ask(law, in);
+      const Out o = evaluate(law, in);
       const double next = v - (o.f[0] - load) / o.dv[0];
       if (std::fabs(next - v) <= 1e-15 * std::fabs(v) || next == v) break;
       v = next;

@@ -260,7 +260,7 @@ TEST(BrokenLaw, ThatAlwaysCrashes_EndsAfterTwoRulesAndTheOneThatSaysWhere) {
 
 // NaN from a speed on is no wrong sign: the sentence names the speed.
 // unsanitized: its rules have limits of time; other tests run them
-TEST(BrokenLaw, ForceThatIsNotFiniteAtSpeed_IsToldWithTheSpeed) {
+TEST(BrokenLaw, ForceThatIsNotFiniteAtSpeed_IsReportedWithTheSpeed) {
   const test::CommandResult r =
       check(broken("no_force_at_speed"), {"--only", "F03", "--only", "F12", "--only", "F16"});
   EXPECT_EQ(rules_that("FAIL", r.out), (std::vector<std::string>{"F03", "F12", "F16"})) << r.out;
@@ -276,7 +276,7 @@ TEST(BrokenLaw, ForceThatIsNotFiniteAtSpeed_IsToldWithTheSpeed) {
 
 // A function that is missing is named once; what would call it is not run.
 // unsanitized: its rules have limits of time; other tests run them
-TEST(BrokenLaw, WithoutEval_IsToldSoInOneSentence) {
+TEST(BrokenLaw, WithoutEval_IsReportedInOneSentence) {
   const test::CommandResult r = check(broken("without_eval"));
   EXPECT_EQ(rules_that("FAIL", r.out), std::vector<std::string>{"V03"}) << r.out;
   EXPECT_EQ(r.out.find("SIG"), std::string::npos) << r.out;
@@ -301,7 +301,7 @@ TEST(BrokenLaw, LogarithmOfTheSlip_ConvergesWithTheStep) {
 
 // The sentence says in which slip and when.
 // unsanitized: its rules have limits of time; other tests run them
-TEST(BrokenLaw, ThatDependsOnTheStep_IsToldWhereMost) {
+TEST(BrokenLaw, ThatDependsOnTheStep_IsReportedWhereMost) {
   const test::CommandResult r = check(broken("depends_on_the_step"), {"--only", "F17"});
   const std::string why = sentence("F17", r.out);
   const std::regex where(R"(: \S+ and \S+ N, \d+ ms after the state was 0, in a slip that swings by )");

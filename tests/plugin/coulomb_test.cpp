@@ -4,7 +4,7 @@
 
 #include "law_rules.h"
 
-using tiny::Answer;
+using tiny::LawOutput;
 using tiny::Batch;
 using tiny::Context;
 using tiny::one_contact;
@@ -35,15 +35,16 @@ struct Parameters {
   }
 };
 
-Answer ask(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy, double sx,
-           double sy, double area = 1) {
+LawOutput evaluate(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy, double sx,
+                   double sy, double area = 1) {
   return one_contact(ops, p.values(), fn, vx, vy, sx, sy, area);
 }
 
 // A slip whose stopping force lies well outside the cone.
-Answer slide(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy, double area = 1) {
+LawOutput slide(const dfm_friction &ops, const Parameters &p, double fn, double vx, double vy,
+                double area = 1) {
   const double w = std::hypot(vx, vy), s = 10 * (p.mu_s * fn + 1);
-  return ask(ops, p, fn, vx, vy, -s * vx / w, -s * vy / w, area);
+  return evaluate(ops, p, fn, vx, vy, -s * vx / w, -s * vy / w, area);
 }
 
 TEST_F(Coulomb, SelfDescription_NamesItsKind) {
@@ -67,7 +68,7 @@ TEST_F(Coulomb, InsideTheStaticCone_ReturnsTheStoppingForceItself) {
   for (double share : {0.0, 0.1, 0.999999, 1.0}) {
     const double fn = 2, s = share * p.mu_s * fn;
     for (double vx : {0.0, 1e-9, 3.0}) {  // whatever the trial slip: what stops it is all there is to know
-      const Answer a = ask(*ops, p, fn, vx, 0, s, 0);
+      const LawOutput a = evaluate(*ops, p, fn, vx, 0, s, 0);
       EXPECT_EQ(a.fx, s);
       EXPECT_EQ(a.fy, 0);
       EXPECT_EQ(a.mode, 1);
@@ -76,12 +77,12 @@ TEST_F(Coulomb, InsideTheStaticCone_ReturnsTheStoppingForceItself) {
       EXPECT_EQ(a.dn[0], 0);
     }
   }
-  EXPECT_EQ(ask(*ops, p, 2, 1, 0, -1.2000000001, 0).mode, 2);
+  EXPECT_EQ(evaluate(*ops, p, 2, 1, 0, -1.2000000001, 0).mode, 2);
 }
 
 TEST_F(Coulomb, OutsideTheStaticCone_SlipsAgainstTheVelocity) {
   const Parameters p{0.4, 0.6, 0.01, 2, 3};
-  const Answer a = slide(*ops, p, 2, 0.03, -0.04, 0.25);
+  const LawOutput a = slide(*ops, p, 2, 0.03, -0.04, 0.25);
   const double level = p.level(2, 0.05) + 3 * 0.25 * 0.05;
   EXPECT_EQ(a.mode, 2);
   EXPECT_NEAR(a.fx, -0.6 * level, 1e-15);
@@ -91,7 +92,7 @@ TEST_F(Coulomb, OutsideTheStaticCone_SlipsAgainstTheVelocity) {
 
 TEST_F(Coulomb, SlipFromRest_GoesTheWayTheStoppingForcePoints) {
   const Parameters p{0.4, 0.6};
-  const Answer a = ask(*ops, p, 2, 0, 0, 30, 40);
+  const LawOutput a = evaluate(*ops, p, 2, 0, 0, 30, 40);
   EXPECT_EQ(a.mode, 2);
   EXPECT_NEAR(a.fx, 0.6 * 1.2, 1e-15);
   EXPECT_NEAR(a.fy, 0.8 * 1.2, 1e-15);
@@ -122,11 +123,11 @@ TEST_F(Coulomb, OppositeSlip_GivesTheOppositeForceToTheBit) {
   std::normal_distribution<double> g;
   for (int i = 0; i < 1000; ++i) {
     const double vx = 0.02 * g(random), vy = 0.02 * g(random), sx = g(random), sy = g(random);
-    const Answer a = ask(*ops, p, 1, vx, vy, sx, sy), b = ask(*ops, p, 1, -vx, -vy, -sx, -sy);
+    const LawOutput a = evaluate(*ops, p, 1, vx, vy, sx, sy), b = evaluate(*ops, p, 1, -vx, -vy, -sx, -sy);
     EXPECT_EQ(a.fx, -b.fx);
     EXPECT_EQ(a.fy, -b.fy);
     EXPECT_EQ(a.limit, b.limit);
-    const Answer swapped = ask(*ops, p, 1, vy, vx, sy, sx);
+    const LawOutput swapped = evaluate(*ops, p, 1, vy, vx, sy, sx);
     EXPECT_EQ(a.fx, swapped.fy) << "mirrored at the diagonal";
   }
 }
@@ -136,7 +137,7 @@ TEST_F(Coulomb, SlipInEachOf360Directions_HasOneForceNorm) {
     const double w = 0.013, expected = p.level(7, w) + p.sigma2 * w;
     for (int degree = 0; degree < 360; ++degree) {
       const double t = degree * kPi / 180, cs = std::cos(t), sn = std::sin(t);
-      const Answer a = slide(*ops, p, 7, w * cs, w * sn);
+      const LawOutput a = slide(*ops, p, 7, w * cs, w * sn);
       EXPECT_NEAR(std::hypot(a.fx, a.fy), expected, 1e-14 * expected) << degree;
       EXPECT_NEAR(a.fx * sn - a.fy * cs, 0, 1e-14 * expected) << degree;
       EXPECT_LT(a.fx * cs + a.fy * sn, 0) << degree;
@@ -148,7 +149,7 @@ TEST_F(Coulomb, SteadyCurve_IsTheClosedForm) {
   for (double delta : {0.5, 1.0, 2.0, 3.3}) {
     const Parameters p{0.15, 0.20, 0.01, delta, 0.4};
     for (double w = 1e-9; w < 1e3; w *= 1.7) {
-      const Answer a = slide(*ops, p, 9.8, -w, 0);
+      const LawOutput a = slide(*ops, p, 9.8, -w, 0);
       const double expected = p.level(9.8, w) + 0.4 * w;
       EXPECT_NEAR(a.fx, expected, 4e-15 * expected) << w << " " << delta;
     }
@@ -157,7 +158,7 @@ TEST_F(Coulomb, SteadyCurve_IsTheClosedForm) {
 
 TEST_F(Coulomb, EqualCoefficients_GiveOneLevelAtEverySpeed) {
   for (double w = 1e-200; w < 1e200; w *= 1e5) {
-    const Answer a = slide(*ops, Parameters{}, 2, w, 0);
+    const LawOutput a = slide(*ops, Parameters{}, 2, w, 0);
     EXPECT_EQ(a.limit, 1.0) << w;
     EXPECT_NEAR(a.fx, -1.0, 3e-16) << w;
   }
@@ -180,16 +181,16 @@ TEST_F(Coulomb, Derivatives_MatchDifferencesOverDecades) {
     for (double w = 1e-7; w < 1e3; w *= 3.1)
       for (double angle : {0.0, 0.4, 2.0, 4.5}) {
         const double v[2] = {w * std::cos(angle), w * std::sin(angle)}, fn = 3, step = 1e-5 * w;
-        const Answer a = slide(*ops, p, fn, v[0], v[1]);
+        const LawOutput a = slide(*ops, p, fn, v[0], v[1]);
         const double scale = std::hypot(a.fx, a.fy) / w;
         for (int k = 0; k < 2; ++k) {
           const double dx = k == 0 ? step : 0, dy = k == 1 ? step : 0;
-          const Answer up = slide(*ops, p, fn, v[0] + dx, v[1] + dy);
-          const Answer down = slide(*ops, p, fn, v[0] - dx, v[1] - dy);
+          const LawOutput up = slide(*ops, p, fn, v[0] + dx, v[1] + dy);
+          const LawOutput down = slide(*ops, p, fn, v[0] - dx, v[1] - dy);
           EXPECT_NEAR(a.dv[k], (up.fx - down.fx) / (2 * step), 1e-8 * scale) << w << " " << angle;
           EXPECT_NEAR(a.dv[2 + k], (up.fy - down.fy) / (2 * step), 1e-8 * scale) << w << " " << angle;
         }
-        const Answer up = slide(*ops, p, fn + 1, v[0], v[1]), down = slide(*ops, p, fn - 1, v[0], v[1]);
+        const LawOutput up = slide(*ops, p, fn + 1, v[0], v[1]), down = slide(*ops, p, fn - 1, v[0], v[1]);
         EXPECT_NEAR(a.dn[0], (up.fx - down.fx) / 2, 1e-15 * (1 + a.limit))
             << "linear in fn: only rounding is left";
         EXPECT_NEAR(a.dn[1], (up.fy - down.fy) / 2, 1e-15 * (1 + a.limit));
@@ -198,7 +199,7 @@ TEST_F(Coulomb, Derivatives_MatchDifferencesOverDecades) {
 
 TEST_F(Coulomb, NoNormalForce_IsOpen) {
   for (double fn : {0.0, -0.0, -1.0, -1e300}) {
-    const Answer a = ask(*ops, Parameters{0.3, 0.5, 0.01, 2, 5}, fn, 1, 2, 3, 4);
+    const LawOutput a = evaluate(*ops, Parameters{0.3, 0.5, 0.01, 2, 5}, fn, 1, 2, 3, 4);
     EXPECT_EQ(a.fx, 0);
     EXPECT_EQ(a.fy, 0);
     EXPECT_EQ(a.limit, 0);
@@ -245,7 +246,7 @@ TEST_F(Coulomb, ExtremesOfTheRange_StayFiniteAndInsideTheCone) {
     for (double fn : values)
       for (double v : values)
         for (double s : values) {
-          const Answer a = ask(*ops, p, fn, v, -v, -s, 0.5 * s);
+          const LawOutput a = evaluate(*ops, p, fn, v, -v, -s, 0.5 * s);
           EXPECT_TRUE(std::isfinite(a.fx) && std::isfinite(a.fy) && std::isfinite(a.limit))
               << fn << " " << v << " " << s;
           for (double d : a.dv) EXPECT_TRUE(std::isfinite(d)) << fn << " " << v << " " << s;
@@ -272,8 +273,8 @@ TEST_F(Coulomb, EveryLane_IsTheSameAloneAndInAnyBatch) {
   int modes[3] = {0, 0, 0};
   for (uint32_t i = 0; i < all.n; ++i) {
     const uint32_t S = all.stride;
-    const Answer one =
-        ask(*ops, p, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i], all.stop[S + i], all.area[i]);
+    const LawOutput one =
+        evaluate(*ops, p, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i], all.stop[S + i], all.area[i]);
     EXPECT_EQ(one.fx, all.ft[i]);
     EXPECT_EQ(one.fy, all.ft[S + i]);
     EXPECT_EQ(one.limit, all.limit[i]);
@@ -284,8 +285,7 @@ TEST_F(Coulomb, EveryLane_IsTheSameAloneAndInAnyBatch) {
   for (int count : modes) EXPECT_GT(count, 20) << "the batch holds every case";
 }
 
-// Every compiler, optimization level and vector width must give these bits (house rule; the inputs use + - *
-// / alone as well).
+// Every compiler, optimization level and vector width must give these bits; inputs use + - * / alone.
 TEST_F(Coulomb, Bits_MatchTheRecordedHash) {
   uint64_t seed = 88172645463325252ull, hash = 14695981039346656037ull;
   const auto uniform = [&] {
@@ -338,7 +338,7 @@ TEST_F(Coulomb, ClosedLoops_Dissipate) {
   std::normal_distribution<double> g;
   for (int i = 0; i < 2000; ++i) {
     const double vx = 0.02 * g(random), vy = 0.02 * g(random), fn = std::fabs(g(random));
-    const Answer a = slide(*ops, p, fn, vx, vy);
+    const LawOutput a = slide(*ops, p, fn, vx, vy);
     EXPECT_LE(a.fx * vx + a.fy * vy, 0);
   }
 }

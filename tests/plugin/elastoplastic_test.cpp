@@ -118,7 +118,7 @@ TEST_F(Elastoplastic, AnyLevelsAndExponents_CreateNoWorkInAnyStep) {
               in.state[1] = -(z / w) * in.v[1];  // opposed but for rounding, as in any reversal
             }
             const double before = 0.5 * 1e4 * (in.state[0] * in.state[0] + in.state[1] * in.state[1]);
-            const Out o = rules::ask(l, in);
+            const Out o = rules::evaluate(l, in);
             const double work = (o.f[0] * in.v[0] + o.f[1] * in.v[1]) * in.h;
             ASSERT_GE(work + before - o.stored, -1e-12 * (std::fabs(work) + before))
                 << "mu_S/mu_C " << ratio << ", i " << i << ", multiplier " << multiplier << ", form " << form
@@ -154,8 +154,7 @@ TEST_F(Elastoplastic, InsideTheElasticZone_NothingIsLost) {
   }
 }
 
-// A load that cycles below the elastic limit leaves no drift: exactly none where the steps return to
-// the same loads.
+// A cyclic load below the elastic limit causes no drift: exactly none where steps repeat the loads.
 TEST_F(Elastoplastic, BiasedLoadBelowTheElasticLimit_DoesNotDrift) {
   Contact k(dev, 9.8);
   double x0 = 0, x1 = 0;
@@ -208,7 +207,8 @@ TEST_F(Elastoplastic, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
         in.v[1] = -0.8 * w;
         in.state[0] = 3e-5;
         in.state[1] = 1e-5;
-        const Out o = rules::ask(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0, 0.7, 1, multiplier}), in);
+        const Out o =
+            rules::evaluate(make({0.15, 0.20, 0.01, 2, 1e4, 20, 0, 0.01, 0, 0.7, 1, multiplier}), in);
         const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
         EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
         EXPECT_NEAR(o.f[1] / fn, -0.8 * mu, 1e-4 * mu);
@@ -269,7 +269,7 @@ TEST_F(Elastoplastic, AlphaMap_MatchesTheReference) {
       in.v[0] = sign * w;
       in.h = 1e-9 / w * 1e-3;
       in.state[0] = z;
-      const Out o = rules::ask(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), in);
+      const Out o = rules::evaluate(make({0.15, 0.20, 0.01, 2, 1e4, 0, 0, 0.01, 0, 0.7, 1, 0}), in);
       const double rate = (o.state[0] - z) / in.h / in.v[0];
       const double expected = t.at(i, sign > 0 ? "alpha_moving_plus" : "alpha_moving_minus");
       EXPECT_NEAR(rate, 1 - expected * 1e4 * std::fabs(z) / level, 2e-6) << z << " " << speed;

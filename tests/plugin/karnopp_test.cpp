@@ -1,10 +1,9 @@
-// The law karnopp against its closed forms, the three tests of (5.7) and reference histories
-// (doc/laws/karnopp.md).
+// The law karnopp against closed forms, three tests of (5.7), reference histories (doc/laws/karnopp.md).
 #include <cstring>
 
 #include "law_rules.h"
 
-using tiny::Answer;
+using tiny::LawOutput;
 using tiny::Batch;
 using tiny::Context;
 using tiny::one_contact;
@@ -33,7 +32,7 @@ struct Karnopp : testing::Test {
 TEST_F(Karnopp, InsideTheBand_HoldsUpToTheStaticLevelWhateverTheSignOfTheSlip) {
   for (double v : {-0.999e-3, -1e-9, 0.0, 1e-9, 0.999e-3})
     for (double s : {-1.2, -0.3, 0.0, 0.7, 1.2}) {
-      const Answer a = one_contact(*ops, plain, 2, v, 0, s, 0);
+      const LawOutput a = one_contact(*ops, plain, 2, v, 0, s, 0);
       EXPECT_EQ(a.fx, s) << v;
       EXPECT_EQ(a.mode, 1) << v;
       EXPECT_EQ(a.limit, 1.2) << v;
@@ -42,7 +41,7 @@ TEST_F(Karnopp, InsideTheBand_HoldsUpToTheStaticLevelWhateverTheSignOfTheSlip) {
 }
 
 TEST_F(Karnopp, InsideTheBandBeyondTheStaticLevel_SaturatesThere) {
-  const Answer a = one_contact(*ops, plain, 2, -0.5e-3, 0, 30, 40);
+  const LawOutput a = one_contact(*ops, plain, 2, -0.5e-3, 0, 30, 40);
   EXPECT_EQ(a.mode, 2);
   EXPECT_NEAR(a.fx, 0.6 * 1.2, 1e-15);
   EXPECT_NEAR(a.fy, 0.8 * 1.2, 1e-15);
@@ -55,14 +54,14 @@ TEST_F(Karnopp, BeyondTheBand_IsBrakedByKineticFrictionAlone) {
   ASSERT_LT(expected, 1.2 - 0.1) << "the level must lie below the static one, or this test says nothing";
   // a stopping force between the two levels: Coulomb would hold it, Karnopp lets it slide on
   for (double s : {expected + 1e-9, 1.0, 1.19}) {
-    const Answer a = one_contact(*ops, plain, 2, 0.03, -0.04, -0.6 * s, 0.8 * s, 0.25);
+    const LawOutput a = one_contact(*ops, plain, 2, 0.03, -0.04, -0.6 * s, 0.8 * s, 0.25);
     EXPECT_EQ(a.mode, 2) << s;
     EXPECT_NEAR(a.fx, -0.6 * expected, 1e-15);
     EXPECT_NEAR(a.fy, 0.8 * expected, 1e-15);
     std::vector<double> five(plain.begin(), plain.end() - 1);
     EXPECT_EQ(one_contact(*coulomb, five, 2, 0.03, -0.04, -0.6 * s, 0.8 * s, 0.25).mode, 1);
   }
-  const Answer a = one_contact(*ops, plain, 2, 0.03, -0.04, -0.5 * expected, 0, 0.25);
+  const LawOutput a = one_contact(*ops, plain, 2, 0.03, -0.04, -0.5 * expected, 0, 0.25);
   EXPECT_EQ(a.mode, 1) << "kinetic friction is enough to stop it within the step";
   EXPECT_EQ(a.fx, -0.5 * expected);
   EXPECT_NEAR(a.limit, expected, 1e-15);
@@ -73,8 +72,8 @@ TEST_F(Karnopp, FarBeyondTheBand_IsCoulombToTheBit) {
   for (double w = 2e-3; w < 1e6; w *= 1.9)
     for (double angle : {0.0, 0.7, 3.0}) {
       const double vx = w * std::cos(angle), vy = w * std::sin(angle), s = 100 + 10 * w;
-      const Answer a = one_contact(*ops, plain, 3, vx, vy, -s * std::cos(angle), -s * std::sin(angle));
-      const Answer b = one_contact(*coulomb, five, 3, vx, vy, -s * std::cos(angle), -s * std::sin(angle));
+      const LawOutput a = one_contact(*ops, plain, 3, vx, vy, -s * std::cos(angle), -s * std::sin(angle));
+      const LawOutput b = one_contact(*coulomb, five, 3, vx, vy, -s * std::cos(angle), -s * std::sin(angle));
       EXPECT_EQ(a.fx, b.fx) << w;
       EXPECT_EQ(a.fy, b.fy) << w;
       EXPECT_EQ(a.limit, b.limit) << w;
@@ -105,8 +104,8 @@ TEST_F(Karnopp, RulesOfEveryLaw_AreKept) {
 TEST_F(Karnopp, OppositeInput_GivesTheOppositeForceToTheBit) {
   for (double v : {1e-6, 0.9e-3, 1.1e-3, 0.3})
     for (double s : {0.1, 0.9, 1.3, 20.0}) {
-      const Answer a = one_contact(*ops, plain, 2, v, -2 * v, -s, s);
-      const Answer b = one_contact(*ops, plain, 2, -v, 2 * v, s, -s);
+      const LawOutput a = one_contact(*ops, plain, 2, v, -2 * v, -s, s);
+      const LawOutput b = one_contact(*ops, plain, 2, -v, 2 * v, s, -s);
       EXPECT_EQ(a.fx, -b.fx) << v << " " << s;
       EXPECT_EQ(a.fy, -b.fy) << v << " " << s;
       EXPECT_EQ(a.mode, b.mode) << v << " " << s;
@@ -160,8 +159,8 @@ TEST_F(Karnopp, EveryLane_IsTheSameAloneAndInAnyBatch) {
   int modes[3] = {0, 0, 0};
   const uint32_t S = all.stride;
   for (uint32_t i = 0; i < all.n; ++i) {
-    const Answer one = one_contact(*ops, plain, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i],
-                                   all.stop[S + i], all.area[i]);
+    const LawOutput one = one_contact(*ops, plain, all.fn[i], all.vt[i], all.vt[S + i], all.stop[i],
+                                      all.stop[S + i], all.area[i]);
     EXPECT_EQ(one.fx, all.ft[i]);
     EXPECT_EQ(one.fy, all.ft[S + i]);
     EXPECT_EQ(one.limit, all.limit[i]);

@@ -83,7 +83,7 @@ inline Out get(const Law &law, const tiny::Batch &b, uint32_t i) {
   return o;
 }
 
-inline Out ask(const Law &law, const In &in) {
+inline Out evaluate(const Law &law, const In &in) {
   tiny::Batch b(1, law.params, law.nstate);
   b.in.dt = in.h;
   put(law, in, b, 0);
@@ -141,7 +141,7 @@ inline void odd_to_the_bit(const Law &law, Draw draw) {
       minus.state[k] = -minus.state[k];
       minus.state[k + 1] = -minus.state[k + 1];
     }
-    const Out a = ask(law, in), b = ask(law, minus);
+    const Out a = evaluate(law, in), b = evaluate(law, minus);
     for (int k = 0; k < 2; ++k) {
       ASSERT_EQ(a.f[k], -b.f[k]);
       ASSERT_EQ(a.dn[k], -b.dn[k]);
@@ -153,13 +153,12 @@ inline void odd_to_the_bit(const Law &law, Draw draw) {
   }
 }
 
-// Force, state and derivatives turn with the frame; limit, energy and mode do not change: 360
-// directions, to 1e-12.
+// Force, state and derivatives turn with the frame; limit, energy, mode do not: 360 directions, 1e-12.
 inline void turns_with_the_frame(const Law &law, Draw draw) {
   for (int degree = 0; degree < 360; ++degree) {
     const In in = draw.next(law);
     const double t = degree * 0.017453292519943295, c = std::cos(t), s = std::sin(t);
-    const Out a = ask(law, in), b = ask(law, turned(law, in, c, s));
+    const Out a = evaluate(law, in), b = evaluate(law, turned(law, in, c, s));
     const double f = norm(a.f) + 1e-300;
     ASSERT_NEAR(b.f[0], c * a.f[0] - s * a.f[1], 1e-12 * f) << degree;
     ASSERT_NEAR(b.f[1], s * a.f[0] + c * a.f[1], 1e-12 * f) << degree;
@@ -193,7 +192,7 @@ inline void mirrored_trajectories(const Law &law, Draw draw) {
     a.v[0] = b.v[0] = scale * std::sin(9 * t);
     a.v[1] = scale * std::cos(23 * t);
     b.v[1] = -a.v[1];
-    const Out p = ask(law, a), q = ask(law, b);
+    const Out p = evaluate(law, a), q = evaluate(law, b);
     ASSERT_EQ(p.f[0], q.f[0]) << n;
     ASSERT_EQ(p.f[1], -q.f[1]) << n;
     std::memcpy(a.state, p.state, sizeof a.state);
@@ -201,15 +200,14 @@ inline void mirrored_trajectories(const Law &law, Draw draw) {
   }
 }
 
-// dF/dv and dF/dfn against central differences. `near` true says that a kink lies within reach of the step:
-// not compared there.
+// dF/dv and dF/dfn against central differences, except where `near`: a kink is within reach of the step.
 inline void derivatives(const Law &law, Draw draw, int draws, double tolerance,
                         const std::function<bool(const In &)> &kink) {
   int compared = 0, cut = 0;
   for (int n = 0; n < draws; ++n) {
     In in = draw.next(law);
     if (kink(in)) continue;
-    const Out a = ask(law, in);
+    const Out a = evaluate(law, in);
     const double w = norm(in.v);
     const double step = 1e-5 * w, noise = 4e-15 * norm(a.f) / step;  // of the difference, in its last digits
     double scale = 0;
@@ -219,7 +217,7 @@ inline void derivatives(const Law &law, Draw draw, int draws, double tolerance,
       In up = in, down = in;
       up.v[k] += step;
       down.v[k] -= step;
-      const Out p = ask(law, up), q = ask(law, down);
+      const Out p = evaluate(law, up), q = evaluate(law, down);
       for (int i = 0; i < 2; ++i)
         ASSERT_NEAR(a.dv[2 * i + k], (p.f[i] - q.f[i]) / (up.v[k] - down.v[k]), tolerance * scale + noise)
             << "d f" << i << " / d v" << k << " at v " << in.v[0] << " " << in.v[1] << ", fn " << in.fn
@@ -229,7 +227,7 @@ inline void derivatives(const Law &law, Draw draw, int draws, double tolerance,
     In up = in, down = in;
     up.fn *= 1 + 1e-5;
     down.fn *= 1 - 1e-5;
-    const Out p = ask(law, up), q = ask(law, down);
+    const Out p = evaluate(law, up), q = evaluate(law, down);
     for (int i = 0; i < 2; ++i)
       ASSERT_NEAR(a.dn[i], (p.f[i] - q.f[i]) / (up.fn - down.fn),
                   tolerance * (norm(a.dn) + norm(a.f) / in.fn * 1e-3))
@@ -262,7 +260,7 @@ inline void extremes(const Law &law, double z_max) {
               in.state[k + 1] = 0.3 * z * z_max;
             }
             for (uint32_t k : law.flags) in.state[k] = k % 2;
-            const Out o = ask(law, in);
+            const Out o = evaluate(law, in);
             const auto where = [&] {
               char text[120];
               std::snprintf(text, sizeof text, "fn %g v %g z %g h %g area %g", fn, v, z, h, area);
@@ -289,7 +287,7 @@ inline void no_normal_force_is_open(const Law &law, double z_max) {
       in.state[k] = z_max;
       in.state[k + 1] = -z_max;
     }
-    const Out o = ask(law, in);
+    const Out o = evaluate(law, in);
     EXPECT_EQ(o.mode, 0);
     EXPECT_EQ(o.limit, 0);
     EXPECT_EQ(o.stored, 0);
@@ -339,7 +337,7 @@ inline void same_alone_and_in_any_batch(const Law &law, Draw draw) {
   ASSERT_EQ(law.ops->eval(&all.in, &all.out), DFM_OK);
   int modes[3] = {0, 0, 0};
   for (uint32_t i = 0; i < all.n; ++i) {
-    const Out a = get(law, all, i), b = ask(law, inputs[i]);
+    const Out a = get(law, all, i), b = evaluate(law, inputs[i]);
     for (int k = 0; k < 2; ++k) {
       ASSERT_EQ(a.f[k], b.f[k]);
       ASSERT_EQ(a.dn[k], b.dn[k]);
@@ -378,10 +376,9 @@ inline double worst_balance(const Law &law, double z_max, int paths, bool runs, 
       in.state[k + 1] = r * std::sin(t);
     }
     for (uint32_t k : law.flags) in.state[k] = random() % 2;
-    // the energy of what was drawn: what the law reports for it at rest, before the cone of
-    // another normal force
+    // energy of the state drawn: reported at rest, before the cone of another normal force
     In rest = in;
-    const double start = ask(law, rest).stored;
+    const double start = evaluate(law, rest).stored;
     double sum = start, size = start, w = decades(1e-5, 3), a = uniform(0, 6.283185307179586);
     for (int step = 0; step < 60; ++step) {
       if (!runs || step % 20 == 0) {
@@ -391,7 +388,7 @@ inline double worst_balance(const Law &law, double z_max, int paths, bool runs, 
       in.v[0] = w * std::cos(a);
       in.v[1] = w * std::sin(a);
       if (step % 7 == 3) in.fn = uniform(0, 1) < 0.2 ? 0 : decades(0.01, 10);
-      const Out o = ask(law, in);
+      const Out o = evaluate(law, in);
       const double work = (o.f[0] * in.v[0] + o.f[1] * in.v[1]) * in.h;
       sum += work;
       size += std::fabs(work);
@@ -402,8 +399,7 @@ inline double worst_balance(const Law &law, double z_max, int paths, bool runs, 
   return worst;
 }
 
-// Every compiler, optimization level and vector width must give these bits; the inputs use + - * /
-// alone as well.
+// Every compiler, optimization level and vector width must give these bits; inputs use + - * / alone.
 inline uint64_t hash_of_bits(const Law &law, double z_max) {
   uint64_t seed = 88172645463325252ull, hash = 14695981039346656037ull;
   const auto uniform = [&] {

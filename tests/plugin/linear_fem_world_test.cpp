@@ -71,7 +71,7 @@ TEST(LinearFemWorld, BodyThatTurns_ReportsThatItLeavesItsRange) {
   test::ok(dfm_body_get_state(top, 0, nullptr, nullptr, &n));
   std::vector<double> rest(size_t(3) * n);
   test::ok(dfm_body_get_state(top, n, rest.data(), nullptr, &n));
-  const auto told = [&](double tangent) {
+  const auto reported = [&](double tangent) {
     std::vector<double> x = rest;
     for (size_t i = 0; i < x.size(); i += 3) {
       x[i] -= tangent * rest[i + 1];
@@ -82,15 +82,15 @@ TEST(LinearFemWorld, BodyThatTurns_ReportsThatItLeavesItsRange) {
     test::measure(top);
     return logged.log;
   };
-  EXPECT_EQ(told(0.2), "");
-  const std::string first = told(0.3057);
+  EXPECT_EQ(reported(0.2), "");
+  const std::string first = reported(0.3057);
   for (const char *part : {"body 'top': org.deform.linear_fem: cell ", "turned by 17 degrees",
                            "strained by 0 %", "swells", "corotational_fem"})
     EXPECT_NE(first.find(part), std::string::npos) << part << "\n" << first;
-  EXPECT_EQ(told(0.4), "") << "told already";
-  EXPECT_EQ(told(1), "") << "worse, but not by much";
-  EXPECT_NE(told(2).find("turned by 63 degrees"), std::string::npos);
-  for (const double tangent : {10, 100, 1000}) EXPECT_EQ(told(tangent), "") << tangent;
+  EXPECT_EQ(reported(0.4), "") << "told already";
+  EXPECT_EQ(reported(1), "") << "worse, but not by much";
+  EXPECT_NE(reported(2).find("turned by 63 degrees"), std::string::npos);
+  for (const double tangent : {10, 100, 1000}) EXPECT_EQ(reported(tangent), "") << tangent;
 }
 
 }  // namespace

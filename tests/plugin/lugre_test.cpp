@@ -1,5 +1,4 @@
-// The law lugre against its closed forms (doc/laws/lugre.md), its passivity, the reference files, and the
-// rules of every law.
+// The law lugre against closed forms (doc/laws/lugre.md), passivity, reference files, and common rules.
 #include "bristle_rig.h"
 
 using rig::Contact;
@@ -60,8 +59,7 @@ TEST_F(Lugre, Bits_MatchTheRecordedHash) {
   EXPECT_EQ(rules::hash_of_bits(falling, 2e-5), 5274140658457432186u);
 }
 
-// Random speeds, steps up to 1/60 s, normal forces including zero: no parameters of the default
-// form create work.
+// Random speeds, steps to 1/60 s, normal forces, also 0: the default form is passive for all parameters.
 TEST_F(Lugre, PassiveForm_CreatesNoWork) {
   for (double sigma1 : {20.0, 316.0, 1e6})
     for (double sigma2 : {0.0, 0.4}) {
@@ -76,8 +74,7 @@ TEST_F(Lugre, PassiveForm_CreatesNoWork) {
     }
 }
 
-// The test of the test: the published parameters with constant sigma1 extract work, at their own passive
-// form they do not.
+// Mutation: the published parameters with constant sigma1 create work, with the passive form they do not.
 TEST_F(Lugre, PublishedParametersWithConstantSigma1_FailThatTest) {
   EXPECT_LT(rules::worst_balance(published, 1.5e-5, 300, false), -0.01);
   Law passive = published;
@@ -88,23 +85,23 @@ TEST_F(Lugre, PublishedParametersWithConstantSigma1_FailThatTest) {
   in.h = 1e-9;
   in.v[0] = 0.05;
   in.state[0] = 1.5e-5;
-  EXPECT_NEAR(rules::ask(published, in).f[0], -6.4, 0.1);
-  EXPECT_GT(rules::ask(passive, in).f[0], -0.1) << "no more than the stored energy pays for";
+  EXPECT_NEAR(rules::evaluate(published, in).f[0], -6.4, 0.1);
+  EXPECT_GT(rules::evaluate(passive, in).f[0], -0.1) << "no more than the stored energy pays for";
 }
 
 TEST_F(Lugre, ConstantSigma1_WarnsWithTheNumbersOfTheInequality) {
-  const auto ask_once = [&](const Law &l) {
+  const auto evaluate_once = [&](const Law &l) {
     c.log.clear();
     tiny::Batch b(1, l.params, 2);
     ASSERT_EQ(dfm_law_eval(handle, &b.in, &b.out), DFM_OK) << dfm_last_error();
   };
-  ask_once(published);
+  evaluate_once(published);
   EXPECT_TRUE(c.logged("sigma2 mu_C >= sigma1 (mu_S - mu_C), and 0.4 < 158.114"));
-  ask_once(dev);
+  evaluate_once(dev);
   EXPECT_FALSE(c.logged("sigma1"));
-  ask_once(make({0.5, 0.5, 0.01, 2, 1e4, 20, 1, 0.01, 0}));
+  evaluate_once(make({0.5, 0.5, 0.01, 2, 1e4, 20, 1, 0.01, 0}));
   EXPECT_FALSE(c.logged("sigma1")) << "one level: constant sigma1 is passive";
-  ask_once(make({0.15, 0.20, 0.01, 2, 1e4, 20, 2, 0.03, 0.4}));
+  evaluate_once(make({0.15, 0.20, 0.01, 2, 1e4, 20, 2, 0.03, 0.4}));
   EXPECT_TRUE(c.logged("above a contact pressure p of 0.42"));
 }
 
@@ -139,7 +136,7 @@ TEST_F(Lugre, VanishingNormalForce_LeavesTheSlopeOfTheCone) {
         in.v[1] = -0.8 * w;
         in.state[0] = 3e-5;
         in.state[1] = 1e-5;
-        const Out o = rules::ask(l, in);
+        const Out o = rules::evaluate(l, in);
         const double mu = 0.15 + 0.05 * std::exp(-w * w / 1e-4);
         EXPECT_NEAR(o.f[0] / fn, 0.6 * mu, 1e-4 * mu) << w << " " << fn;
         EXPECT_NEAR(o.f[1] / fn, -0.8 * mu, 1e-4 * mu);
@@ -172,7 +169,7 @@ TEST_F(Lugre, SmallMotion_IsASpringAndADamper) {
   in.v[0] = 1e-9;
   in.h = 1e-3;
   in.state[0] = 1e-9;
-  const Out o = rules::ask(dev, in);
+  const Out o = rules::evaluate(dev, in);
   EXPECT_NEAR(o.f[0], 1e4 * (1e-9 + 1e-12) + 20.4 * 1e-9, 1e-12);
   EXPECT_NEAR(o.dv[0], 1e4 * 1e-3 + 20 + 0.4, 1e-3);
   EXPECT_NEAR(o.dv[3], 1e4 * 1e-3 + 20 + 0.4, 1e-3);
@@ -247,8 +244,7 @@ TEST_F(Lugre, SteadyCurve_MatchesTheReference) {
   }
 }
 
-// Histories at prescribed velocity: first order in the step, so the error against the reference
-// halves with it.
+// Histories at prescribed velocity: first order in the step, so the error halves with it.
 TEST_F(Lugre, CircleAndTurn_ConvergeToTheReference) {
   for (const char *file : {"vector_circle_lugre.csv", "vector_turn_lugre.csv"}) {
     const rig::Table t = rig::read(file);

@@ -362,7 +362,7 @@ TEST(Modal, StrainsOutOfRange_AreReportedOnceEachTime) {
   const Mesh m = kuhn_bar(8, 1, 1, 0.05);
   Host host;
   Stepper b(host, modal(), m, {{"young", 1e5}, {"damping_mass", 5}}, clamp_of(m));
-  const auto told = [&] {
+  const auto reported = [&] {
     size_t n = 0;
     for (size_t at = 0; (at = host.logged.find("displacement gradient reaches", at)) != std::string::npos;
          ++at)
@@ -377,15 +377,15 @@ TEST(Modal, StrainsOutOfRange_AreReportedOnceEachTime) {
     }
   };
   run(-0.01, 2);
-  EXPECT_EQ(told(), 0u);
+  EXPECT_EQ(reported(), 0u);
   run(-3, 5);
-  const size_t first = told();
+  const size_t first = reported();
   EXPECT_GE(first, 1u) << host.logged;
   EXPECT_LE(first, 3u) << "it swings through the limit many times";
   run(-0.01, 5);
-  EXPECT_EQ(told(), first);
+  EXPECT_EQ(reported(), first);
   run(-3, 5);
-  EXPECT_EQ(told(), 2 * first) << "out of the range anew";
+  EXPECT_EQ(reported(), 2 * first) << "out of the range anew";
 }
 
 TEST(Modal, RefusedMemory_LeavesNothingBehind) {

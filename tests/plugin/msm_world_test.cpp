@@ -10,11 +10,11 @@ struct Scene {
   dfm_body body = 0;
 
   explicit Scene(const std::vector<std::pair<const char *, std::vector<double>>> &params,
-                 std::vector<const char *> asked = {}, uint32_t threads = 1)
+                 std::vector<const char *> requested = {}, uint32_t threads = 1)
       : context(threads) {
     dfm_world_def w = dfm_world_def_default();
-    asked.push_back(nullptr);
-    if (asked.size() > 1) w.effects = asked.data();
+    requested.push_back(nullptr);
+    if (requested.size() > 1) w.effects = requested.data();
     test::ok(dfm_world_create(context, &w, &world));
     std::vector<uint8_t> fixed;
     dfm_body_def d = test::clamped_beam(context, 4, fixed);

@@ -520,7 +520,7 @@ TEST(ShapeMatching, ClustersThatShareTooFewPoints_AreRefusedInOneSentence) {
 
 // (w h)^2 = 4 at h = 2 * 0.01 s / ln(10^4).
 TEST(ShapeMatching, StepAtWhichClustersAreSofterThanRequested_IsReportedOnce) {
-  const auto told = [](double clusters, double h) {
+  const auto reported = [](double clusters, double h) {
     Host host;
     Stepper b(host, shape(), kuhn_bar(4, 2, 2, 0.1), values({{"clusters", clusters}}));
     for (int n = 0; n < 3; ++n) b.advance(h);
@@ -529,9 +529,9 @@ TEST(ShapeMatching, StepAtWhichClustersAreSofterThanRequested_IsReportedOnce) {
     for (size_t at = 0; (at = host.logged.find(what, at)) != std::string::npos; ++at) ++times;
     return times;
   };
-  EXPECT_EQ(told(4, 2.1e-3), 0u);
-  EXPECT_EQ(told(4, 2.2e-3), 1u);
-  EXPECT_EQ(told(1, 2.2e-3), 0u);
+  EXPECT_EQ(reported(4, 2.1e-3), 0u);
+  EXPECT_EQ(reported(4, 2.2e-3), 1u);
+  EXPECT_EQ(reported(1, 2.2e-3), 0u);
 }
 
 TEST(ShapeMatching, RefusedMemory_LeavesNothingBehind) {

@@ -100,18 +100,18 @@ inline std::vector<double> frequencies(const std::string &logged) {
 inline void expect_commit_is_predict_and_respond(Stepper &b, const std::vector<uint32_t> &surfels) {
   b.predict();
   const uint32_t n = uint32_t(surfels.size()), width = 3 * n;
-  std::vector<double> unit(width * width, 0), answer(width * width, 0), diagonal(9 * n);
+  std::vector<double> unit(width * width, 0), response(width * width, 0), diagonal(9 * n);
   for (uint32_t c = 0; c < width; ++c) unit[c * width + c] = 1;
   const dfm_kin k = b.now();
-  ASSERT_EQ(b.ext->respond_many(b.self, &k, n, surfels.data(), width, unit.data(), answer.data()), DFM_OK);
+  ASSERT_EQ(b.ext->respond_many(b.self, &k, n, surfels.data(), width, unit.data(), response.data()), DFM_OK);
   ASSERT_EQ(b.ext->diagonal(b.self, &k, n, surfels.data(), diagonal.data()), DFM_OK);
   double most = 0;
-  for (const double a : answer) most = std::max(most, std::abs(a));
+  for (const double a : response) most = std::max(most, std::abs(a));
   for (uint32_t r = 0; r < width; ++r) {
     for (uint32_t c = 0; c < width; ++c)
-      EXPECT_NEAR(answer[r * width + c], answer[c * width + r], 1e-12 * most);
+      EXPECT_NEAR(response[r * width + c], response[c * width + r], 1e-12 * most);
     for (uint32_t c = 0; c < 3; ++c)
-      EXPECT_NEAR(diagonal[9 * (r / 3) + 3 * (r % 3) + c], answer[(3 * (r / 3) + c) * width + r],
+      EXPECT_NEAR(diagonal[9 * (r / 3) + 3 * (r % 3) + c], response[(3 * (r / 3) + c) * width + r],
                   1e-12 * most);
   }
   std::mt19937 random(3);
@@ -122,7 +122,7 @@ inline void expect_commit_is_predict_and_respond(Stepper &b, const std::vector<u
   double work = 0;
   for (uint32_t c = 0; c < width; ++c) b.p_s[3 * surfels[c / 3] + c % 3] = p[c] = size * any(random);
   for (uint32_t c = 0; c < width; ++c)
-    for (uint32_t r = 0; r < width; ++r) du[r] += answer[c * width + r] * p[c];
+    for (uint32_t r = 0; r < width; ++r) du[r] += response[c * width + r] * p[c];
   for (uint32_t c = 0; c < width; ++c) work += p[c] * du[c];
   EXPECT_GT(work, 0);
   b.commit();

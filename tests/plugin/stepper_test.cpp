@@ -50,12 +50,12 @@ dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
     for (int c = 0; c < 3; ++c) u[3 * s + c] = pending.v[c];
   return DFM_OK;
 }
-uint32_t asked = 0, asked_many = 0, most_at_once = 0;
+uint32_t requested = 0, requested_many = 0, most_at_once = 0;
 bool offers_many = false;
 
 dfm_status respond(void *self, const dfm_kin *, uint32_t n, const uint32_t *, const double *p, double *du) {
   const Toy &t = *static_cast<Toy *>(self);
-  ++asked;
+  ++requested;
   for (int c = 0; c < 3; ++c) {
     double sum = 0;
     for (uint32_t i = 0; i < n; ++i) sum += p[3 * i + c];
@@ -65,10 +65,10 @@ dfm_status respond(void *self, const dfm_kin *, uint32_t n, const uint32_t *, co
 }
 dfm_status respond_many(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
                         const double *p, double *du) {
-  const uint32_t before = asked;
+  const uint32_t before = requested;
   for (uint32_t r = 0; r < nrhs; ++r) respond(self, k, n, surfel, p + 3 * n * r, du + 3 * n * r);
-  asked = before;
-  ++asked_many;
+  requested = before;
+  ++requested_many;
   most_at_once = std::max(most_at_once, nrhs);
   return DFM_OK;
 }
@@ -205,18 +205,18 @@ TEST(Stepper, ThatRespondsToMany_IsCalledOncePerSolve) {
   uint64_t hash[2];
   for (const bool many : {false, true}) {
     offers_many = many;
-    asked = asked_many = most_at_once = 0;
+    requested = requested_many = most_at_once = 0;
     World w(0.5, {0.3, 0, -9.81}, 1e-4);
     test::run(w.world, 0.2, 1e-3);
     const dfm_world_stats s = test::stats(w.world);
     if (many) {
-      EXPECT_EQ(asked, 0u);
-      EXPECT_GT(asked_many, 0u);
-      EXPECT_LE(asked_many, s.substeps);
+      EXPECT_EQ(requested, 0u);
+      EXPECT_GT(requested_many, 0u);
+      EXPECT_LE(requested_many, s.substeps);
       EXPECT_GE(most_at_once, 3u * 9) << "surfels of the lower face";
     } else {
-      EXPECT_GT(asked, s.substeps);
-      EXPECT_EQ(asked_many, 0u);
+      EXPECT_GT(requested, s.substeps);
+      EXPECT_EQ(requested_many, 0u);
     }
     hash[many] = dfm_world_hash(w.world);
   }
@@ -297,8 +297,7 @@ struct Block {
 
 }  // namespace
 
-// From a force model to one that steps itself and back, in contact: the block rests on all the time, and what
-// gives no energy tells none.
+// From a force model to a self-stepping one and back, in contact: the block stays at rest.
 TEST(Stepper, TakesABodyOverInContact_AndGivesItBack) {
   Block b;
   const double z = test::measure(b.body).com[2];

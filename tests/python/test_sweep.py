@@ -219,7 +219,7 @@ class Runs(InAFolder):
         engine = Engine()
         self.addCleanup(engine.close)
         said = f"deform: a.json: stopped at step 3: no; the last good state is in {engine.folder}/run/states"
-        with unittest.mock.patch.object(engine, "_ask", return_value={"code": 3, "signal": 0, "said": said}):
+        with unittest.mock.patch.object(engine, "_call", return_value={"code": 3, "signal": 0, "said": said}):
             outcome = engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
         self.assertEqual(outcome["said"], "a.json: stopped at step 3: no")
 

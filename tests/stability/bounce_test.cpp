@@ -64,12 +64,12 @@ Bounce bounce(double young, const char *model, double h = 0, int32_t integrator 
     out.down = std::max(out.down, -v);
     out.up = std::max(out.up, v);
   }
-  const std::string told = test::written(dfm_world_explain, w);
-  const size_t at = told.find("\"auto\":{");
+  const std::string reported = test::written(dfm_world_explain, w);
+  const size_t at = reported.find("\"auto\":{");
   if (at == std::string::npos) return out;
   const int read =
-      std::sscanf(told.c_str() + at, "\"auto\":{\"steps_s\":%lf,\"implicit_s\":%lf,\"changes\":%u", &out.all,
-                  &out.implicit, &out.changes);
+      std::sscanf(reported.c_str() + at, "\"auto\":{\"steps_s\":%lf,\"implicit_s\":%lf,\"changes\":%u",
+                  &out.all, &out.implicit, &out.changes);
   EXPECT_EQ(read, 3);
   return out;
 }
@@ -165,8 +165,8 @@ TEST(Bounce, InterruptedInAnImpact_IsAsBeforeTheStep) {
     }
     step(tried.world, h);
     ASSERT_EQ(dfm_world_hash(tried.world), dfm_world_hash(plain.world)) << dfm_world_time(plain.world);
-    const std::string told = test::written(dfm_world_explain, tried.world);
-    struck = struck || told.find("until an impact is over") != std::string::npos;
+    const std::string reported = test::written(dfm_world_explain, tried.world);
+    struck = struck || reported.find("until an impact is over") != std::string::npos;
   }
   EXPECT_GT(stopped, 0);
   EXPECT_TRUE(struck);

@@ -1,5 +1,4 @@
-// Pieces of a rough cut rest where they touched as one body: a cut sets nothing in
-// motion.
+// Pieces of a rough cut rest where they touched as one body: a cut causes no motion.
 #include <algorithm>
 #include <cmath>
 
@@ -29,7 +28,7 @@ struct Ball {
   }
   void part() const {
     cut(b, plane(0, 0.005, DFM_CUT_SPLIT));
-    dfm_cut_info out = ask();
+    dfm_cut_info out = request();
     test::ok(dfm_body_separate(b, nullptr, &out));
     ASSERT_GE(out.pieces, 1u);
   }
@@ -241,7 +240,7 @@ TEST(CutPieces, CrossedWhenTheyPart_KeepContactUnlessPlaced) {
   cut(ball.b, plane(0, 0.005, DFM_CUT_SPLIT));
   fold(ball.b, 0.005);
   ASSERT_TRUE(test::listed(dfm_world_overlaps, ball.w).empty());
-  dfm_cut_info out = ask();
+  dfm_cut_info out = request();
   test::ok(dfm_body_separate(ball.b, nullptr, &out));
   ASSERT_GE(out.pieces, 1u);
   const auto parted = test::listed(dfm_world_overlaps, ball.w);

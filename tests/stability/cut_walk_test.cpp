@@ -4,7 +4,7 @@
 
 // soak: long; the other two have the seeds that failed once
 TEST(CutWalk, RandomCuts_KeepMassMomentumContactsAndVolumes) {
-  uint64_t cuts = 0, contacts = 0, pieces = 0, tears = 0, undone = 0, fast = 0;
+  uint64_t cuts = 0, contacts = 0, pieces = 0, tears = 0, rolled_back = 0, fast = 0;
   for (uint64_t seed = 1; seed <= 40; ++seed) {
     const test::cutting::Walked r = test::cutting::walk_cuts(seed, 60);
     EXPECT_EQ(r.failure, "") << "seed " << seed;
@@ -12,11 +12,11 @@ TEST(CutWalk, RandomCuts_KeepMassMomentumContactsAndVolumes) {
     contacts += r.contacts;
     pieces += r.pieces;
     tears += r.tears;
-    undone += r.undone;
+    rolled_back += r.rolled_back;
     fast += r.speed >= test::cutting::CutWalk::kFast;
   }
   EXPECT_GT(cuts, 1000u);
-  for (const uint64_t n : {contacts, pieces, tears, undone}) EXPECT_GT(n, 5u);
+  for (const uint64_t n : {contacts, pieces, tears, rolled_back}) EXPECT_GT(n, 5u);
   // Where jams ended by sweeps alone (doc/decisions/contact_solver.md) two of these worlds reached 155 and
   // 137,156 m/s.
   EXPECT_EQ(fast, 0u);

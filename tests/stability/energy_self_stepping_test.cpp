@@ -143,8 +143,8 @@ struct Bench {
 
 extern "C" const dfm_plugin *dfm_plugin_entry_pumping_steppers(const dfm_host *host, uint32_t, uint32_t) {
   if (!DFM_ABI_OK(host)) return nullptr;
-  static const dfm_model tells = model_of(DFM_CAP_ENERGY), hides = model_of(0);
-  static const dfm_type first = type_of(kModels[0], tells), second = type_of(kModels[1], hides);
+  static const dfm_model reports = model_of(DFM_CAP_ENERGY), hides = model_of(0);
+  static const dfm_type first = type_of(kModels[0], reports), second = type_of(kModels[1], hides);
   static const dfm_type *const types[] = {&first, &second};
   static const dfm_plugin plugin{sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 2, types, nullptr};
   return &plugin;

@@ -1,5 +1,4 @@
-// Bars held at one end: isotropic, and softer along x, y, z at three strengths. Under gravity down they sag,
-// along x they stretch.
+// Bars held at one end, isotropic and softer along x, y, z: gravity down bends, along x it stretches them.
 #include "scenes.h"
 
 namespace {
@@ -46,7 +45,7 @@ bool ordered(const test::SceneRun &run) {
 
 TEST(GravityAnisotropy, Sag_GrowsWithTheSlopeAlongTheBarAndLittleAcross) {
   const test::SceneRun run("gravity_anisotropy", {});
-  run.expect_sound(0, "bars");
+  run.expect_valid(0, "bars");
   EXPECT_TRUE(ordered(run));
   for (const char *bar : {"isotropic", "x3", "y3", "z3"}) EXPECT_LT(run.last(bar).kinetic, 1e-6) << bar;
 }

@@ -69,7 +69,7 @@ const Row &row_of(const std::string &scene) {
 }
 
 // What every run of a contact scene is held to, here and by expect_jittered.
-bool sound(const test::SceneRun &run, double least_contacts) {
+bool is_valid(const test::SceneRun &run, double least_contacts) {
   return run.finite() && run.number("intersections_max") == 0 && run.contacts_max() >= least_contacts;
 }
 
@@ -118,12 +118,12 @@ TEST_P(ContactScene, WithoutContact_MissesItsCriteria) {
   if (row.needs_ode && !test::kHasOde) GTEST_SKIP() << "built without libdeform_ode";
   std::vector<std::string> arguments = until(row.begins);
   const test::SceneRun with(row.scene, arguments);
-  EXPECT_TRUE(sound(with, row.least_contacts))
+  EXPECT_TRUE(is_valid(with, row.least_contacts))
       << with.contacts_max() << " contacts, " << with.number("intersections_max") << " crossings";
   arguments.insert(arguments.end(),
                    {"--set", R"(/contact/filter=[{"between": ["*", "*"], "collide": false}])"});
   const test::SceneRun without(row.scene, arguments);
-  EXPECT_FALSE(sound(without, row.least_contacts));
+  EXPECT_FALSE(is_valid(without, row.least_contacts));
   // the faces of a cut touch each other whatever a filter says
   EXPECT_LT(without.contacts_max(), row.least_contacts);
 }

@@ -131,7 +131,7 @@ class SceneRun {
 
   // What holds in every scene: finite, no crossing triangle pair in any recorded state, and at least so many
   // contacts, so that something was tested.
-  void expect_sound(double least_contacts, const std::string &what) const {
+  void expect_valid(double least_contacts, const std::string &what) const {
     EXPECT_TRUE(finite()) << what;
     EXPECT_GT(number("states_checked"), 1) << what;
     EXPECT_EQ(number("intersections_max"), 0) << what;
@@ -156,7 +156,7 @@ void expect_jittered(const std::string &scene, int from, int to, std::vector<std
     std::vector<std::string> with_seed = arguments;
     with_seed.insert(with_seed.end(), {"--jitter", std::to_string(seed)});
     const SceneRun run(scene, with_seed);
-    run.expect_sound(least_contacts, scene + ", seed " + std::to_string(seed));
+    run.expect_valid(least_contacts, scene + ", seed " + std::to_string(seed));
     EXPECT_TRUE(meets(run)) << scene << ", seed " << seed;
     hashes.insert(run.hash());
   }

@@ -14,7 +14,7 @@ bool stays(const test::SceneRun &run) {
 
 TEST(TwoCylinders, WithFriction_UpperComesToRestAndHolds) {
   const test::SceneRun run("two_cylinders", {});
-  run.expect_sound(12, "with friction");
+  run.expect_valid(12, "with friction");
   EXPECT_TRUE(stays(run));
   EXPECT_EQ(run.number("inverted_max"), 0);
   EXPECT_LT(run.creep_um_per_s(), 1);
@@ -24,7 +24,7 @@ TEST(TwoCylinders, WithFriction_UpperComesToRestAndHolds) {
 
 TEST(TwoCylinders, WithoutFriction_UpperSlidesOffAndFalls) {
   const test::SceneRun run("two_cylinders", {"--time", "4", "--set", test::kFrictionless});
-  run.expect_sound(12, "without friction");
+  run.expect_valid(12, "without friction");
   EXPECT_FALSE(stays(run));
   const test::BodyRow upper = run.last("upper");
   EXPECT_LT(upper.com[2], 0.16) << "lies on the floor: its radius is 0.14 m";
@@ -41,8 +41,8 @@ TEST(TwoCylinders, JitteredRuns_AllStay) {
 TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
   const test::SceneRun with("two_cylinders_coarse", {}),
       without("two_cylinders_coarse", {"--set", test::kFrictionless});
-  with.expect_sound(20, "with friction");
-  without.expect_sound(20, "without friction");
+  with.expect_valid(20, "with friction");
+  without.expect_valid(20, "without friction");
   EXPECT_TRUE(stays(with));
   EXPECT_FALSE(stays(without));
   EXPECT_LT(without.last("upper").com[2], 0.3);
@@ -50,7 +50,7 @@ TEST(TwoCylinders, CoarsePair_StaysWithFrictionAndFallsWithout) {
 
 TEST(TwoCylinders, FinePair_TouchesAtSixtyContactsAndMore) {
   const test::SceneRun run("two_cylinders_fine", {"--time", "1.2"});
-  run.expect_sound(100, "fine pair");
+  run.expect_valid(100, "fine pair");
   EXPECT_TRUE(stays(run));
   EXPECT_GE(run.contacts_mean(), 60);
   EXPECT_LE(run.number("unconverged_steps"), 60) << "of 4,800; crossings that share loads leave 200 and more";

@@ -25,7 +25,7 @@ bool as_theory(const test::SceneRun &run) {
 
 TEST(TwoMaterials, Sags_AreInTheRatioOfBeamTheory) {
   const test::SceneRun run("two_materials", {});
-  run.expect_sound(0, "bars");
+  run.expect_valid(0, "bars");
   EXPECT_TRUE(as_theory(run)) << sag(run, "soft_root") << " " << sag(run, "stiff_root");
   EXPECT_NEAR(sag(run, "by_field"), sag(run, "stiff_root"), 1e-9) << "the same moduli, from a table";
   for (const char *bar : {"stiff_root", "soft_root"}) EXPECT_LT(run.last(bar).kinetic, 1e-6) << bar;

@@ -9,7 +9,7 @@ namespace {
 using test::Cells;
 using test::Shot;
 
-constexpr double kMost = 100;  // the worst step against the median one of the same run, in units of work
+constexpr double kMax = 100;  // the worst step against the median one of the same run, in units of work
 
 void add_cells(Shot &s, const Cells &cells, test::Vec at, test::Vec velocity, double young = 1e6) {
   test::BodyOptions o;
@@ -104,7 +104,7 @@ void costs_little(const std::function<void(Shot &)> &setup, int steps, double dt
     }
     std::nth_element(work.begin(), work.begin() + long(work.size() / 2), work.end());
     const double median = work[work.size() / 2], worst = *std::max_element(work.begin(), work.end());
-    EXPECT_LE(worst, kMost * median) << "seed " << seed;
+    EXPECT_LE(worst, kMax * median) << "seed " << seed;
     const dfm_world_stats now = test::stats(s.world);
     std::printf("%u: worst %g, median %g, factor %.1f; %g sub-steps, %g cuts, %g cheapened\n", seed, worst,
                 median, worst / median, double(now.substeps), double(now.guard_cuts), double(now.cheapened));

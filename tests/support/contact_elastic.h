@@ -77,11 +77,11 @@ inline Cells disc(dfm_context *c, double radius, uint32_t rings) {
 // in steps of a half octave.
 inline CellMaterials even_step(const Cells &cells, double density, double young, double even) {
   CellMaterials m;
-  constexpr int kMost = 24;
-  for (int k = -kMost; k <= kMost; ++k) m.materials.push_back({density * std::pow(2, 0.5 * k), young});
+  constexpr int kMax = 24;
+  for (int k = -kMax; k <= kMax; ++k) m.materials.push_back({density * std::pow(2, 0.5 * k), young});
   m.kind = [&cells, even](uint32_t t) {
     const double size = std::cbrt(6 * std::sqrt(2.0) * cells.volume(t));
-    return uint32_t(kMost + std::clamp(std::lround(4 * std::log2(even / size)), long(-kMost), long(kMost)));
+    return uint32_t(kMax + std::clamp(std::lround(4 * std::log2(even / size)), long(-kMax), long(kMax)));
   };
   return m;
 }

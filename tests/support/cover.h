@@ -178,7 +178,7 @@ class Run {
       most_energy_ = std::max(most_energy_, mechanical);
       rise_ = std::max(rise_, all - start_energy_.first);
     }
-    if (++steps_ % std::lround(kFrame / step_) == 0) look_at_surfaces();
+    if (++steps_ % std::lround(kFrame / step_) == 0) check_surfaces();
   }
 
   // Change of momentum = gravity's impulse + the impulses that the pairs report, of each body.
@@ -229,7 +229,7 @@ class Run {
         seen_.work = std::max(seen_.work, p.friction_work);
   }
 
-  void look_at_surfaces() {
+  void check_surfaces() {
     std::vector<std::vector<double>> x;
     for (const dfm_body b : s_.bodies) x.push_back(surface_positions(b));
     size_t found = 0;

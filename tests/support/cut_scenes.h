@@ -11,7 +11,7 @@
 
 namespace test::cutting {
 
-inline dfm_cut_info ask() {
+inline dfm_cut_info request() {
   dfm_cut_info i{};
   i.size = sizeof i;
   return i;
@@ -26,7 +26,7 @@ inline dfm_body_info info(dfm_body b) {
 
 // Parts that hang together.
 inline uint32_t parts(dfm_body b) {
-  dfm_cut_info i = ask();
+  dfm_cut_info i = request();
   test::ok(dfm_body_remove_cells(b, 0, nullptr, &i));
   return i.parts;
 }
@@ -133,7 +133,7 @@ inline dfm_cut_def plane(int axis, double at, uint32_t how) {
 }
 
 inline dfm_cut_info cut(dfm_body b, const dfm_cut_def &d) {
-  dfm_cut_info out = ask();
+  dfm_cut_info out = request();
   test::ok(dfm_body_cut(b, &d, &out));
   return out;
 }

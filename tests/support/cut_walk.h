@@ -13,7 +13,7 @@ namespace test::cutting {
 struct Walked {
   uint64_t cuts = 0;    // that opened a face or removed a cell
   uint64_t missed = 0;  // that met nothing
-  uint64_t steps = 0, refused = 0, undone = 0, tears = 0, pieces = 0, energy = 0;
+  uint64_t steps = 0, refused = 0, rolled_back = 0, tears = 0, pieces = 0, energy = 0;
   uint64_t contacts = 0;  // of all steps
   double speed = 0;       // m/s, the largest of any point that steps have given it, and not push()
   std::string failure;    // empty: all held
@@ -158,7 +158,7 @@ class CutWalk {
     if (kept_.empty()) return;
     if (!held(dfm_world_restore(w_, kept_.data(), kept_.size()))) return;
     if (dfm_world_hash(w_) != hash_) fail("a restored snapshot has another hash");
-    ++out_.undone;
+    ++out_.rolled_back;
     look();
     sum_ = sum();
   }
@@ -198,7 +198,7 @@ class CutWalk {
       size = std::max(size, hi[k] - lo[k]);
     }
     const uint32_t before = info(b).ntet;
-    dfm_cut_info done = ask();
+    dfm_cut_info done = request();
     dfm_cut_def d = dfm_cut_def_default();
     switch (r_.below(8)) {
       case 0: {
@@ -234,7 +234,7 @@ class CutWalk {
     if (!held(dfm_body_cut(b, &d, &done))) return;
     cut_made(b, before, done);
     if (r_.below(12) == 0 && out_.failure.empty() && is_there(b)) {
-      dfm_cut_info parted = ask();
+      dfm_cut_info parted = request();
       if (!held(dfm_body_separate(b, nullptr, &parted))) return;
       out_.pieces += parted.pieces;
       expect_kept(parted);

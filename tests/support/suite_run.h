@@ -147,7 +147,7 @@ class Observer {
     if (!std::isfinite(all)) seen_.finite = false;
   }
 
-  void look_at_surfaces() {
+  void check_surfaces() {
     std::vector<crossing::Surface> surfaces;
     size_t pierced = 0;
     for (BodyState &b : bodies_) {
@@ -189,7 +189,7 @@ class Observer {
 
   void finish() {
     look_at_energy();
-    look_at_surfaces();
+    check_surfaces();
     seen_.stats = stats(world_);
     for (size_t b = 0; b < bodies_.size(); ++b) {
       const dfm_body_measure m = measure(bodies_[b].handle);
@@ -390,7 +390,7 @@ inline Seen run(const std::string &path, const Settings &how) {
     const double seeing = detail::cpu_now();
     if (seen.steps % look == 0) {
       observer.look_at_energy();
-      observer.look_at_surfaces();
+      observer.check_surfaces();
     }
     if (seen.steps % sample == 0) observer.sample_path();
     const double now = detail::cpu_now();

@@ -38,7 +38,7 @@ _NOBODYS = _Piece(object(), ())
 _UNKEPT = getrefcount(_NOBODYS.view)  # as it is counted below
 
 
-class _Answer:
+class _Result:
     """Hands out memory that nobody looks at any more."""
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class _Answer:
         return spare
 
 
-class Column(_Answer):
+class Column(_Result):
     """One array, filled again at each look. A look gives None where the number of rows is another one."""
 
     def __init__(self, function: Any, handle: int, rows: int, width: int, kind: Any = np.float64):
@@ -84,7 +84,7 @@ class Column(_Answer):
         return piece.view
 
 
-class Rows(_Answer):
+class Rows(_Result):
     """A list of structs whose length differs from look to look; its memory grows, and is then used again."""
 
     def __init__(self, function: Any, handle: int, struct: Any):
@@ -113,7 +113,7 @@ class Rows(_Answer):
         return piece.view[:self._count.value]
 
 
-class Report(_Answer):
+class Report(_Result):
     """One struct that the library fills in: a record, whose members are attributes."""
 
     def __init__(self, function: Any, handle: int, struct: Any):

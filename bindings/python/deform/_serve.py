@@ -99,7 +99,7 @@ class _Pull:
         self.body.set_spring_target(self.spring, to + self.offset)
         self.to = to
 
-    def told(self) -> dict[str, Any]:
+    def state(self) -> dict[str, Any]:
         place = self.weights @ self.body.points[self.near] - self.offset
         return {"place": place.tolist(), "to": self.to.tolist(),
                 "force": float(np.linalg.norm(self.body.spring_force(self.spring)))}
@@ -258,7 +258,7 @@ class Server:
             except (ValueError, RecursionError):
                 request = None
             try:
-                self._ask(request, viewer.value)
+                self._handle(request, viewer.value)
             except Error as refused:
                 self._message = str(refused)
         if self._pull and self._native.deform_serve_control(self._served) != self._holder:
@@ -267,7 +267,7 @@ class Server:
         if self.viewers:
             self._show()
 
-    def _ask(self, request: Any, viewer: int) -> None:
+    def _handle(self, request: Any, viewer: int) -> None:
         """The requests of doc/reference/stream.md."""
         if not isinstance(request, dict):
             raise ArgumentError("a request is an object of JSON", "DFM_E_ARG")
@@ -365,7 +365,7 @@ class Server:
                "sliders": [slider for slider, *_ in self._sliders]}
         if self._pull:
             try:
-                out["pull"] = self._pull.told()
+                out["pull"] = self._pull.state()
             except Error:
                 self._release()
         return out

@@ -36,7 +36,7 @@ def _listen(reader: int, previous: int) -> None:
             main = threading.main_thread().ident
             for world in _all():
                 if world._busy == main:
-                    world._asked = True
+                    world._stop = True
                     quick.dfm_world_interrupt(world.handle)
 
 

@@ -351,8 +351,8 @@ class _Server:
             self.bridge.error = self.bridge.error or raised
             return struct.pack("i", _abi.DFM_E_FATAL)
         doubles = (out.ft, out.state, out.dft_dvt, out.dft_dfn, out.limit, out.stored)
-        told = b"".join(np.asarray(a, np.float64).tobytes() for a in doubles)
-        return struct.pack("i", _abi.DFM_OK) + told + np.asarray(out.mode, np.uint8).tobytes()
+        packed = b"".join(np.asarray(a, np.float64).tobytes() for a in doubles)
+        return struct.pack("i", _abi.DFM_OK) + packed + np.asarray(out.mode, np.uint8).tobytes()
 
     def _checked(self, stream: Any) -> bytes:
         params = self._doubles(stream, self.law.width())

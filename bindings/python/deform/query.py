@@ -217,7 +217,7 @@ class Filter:
         self.accept = accept
 
 
-class _Asked:
+class _Query:
     """A filter during one query: its function with handles in place of objects, and what that has raised."""
 
     def __init__(self, world: Queries, given: Filter | None):
@@ -233,7 +233,7 @@ class _Asked:
             function: Callable[[Any], bool] = accept
             answers: dict[int, bool] = {}  # a query for more hits asks no thing again
 
-            def ask(_user: int, handle: int) -> bool:
+            def call_host(_user: int, handle: int) -> bool:
                 if self.raised is not None:
                     return False
                 try:
@@ -243,8 +243,8 @@ class _Asked:
                 except BaseException as error_:  # nothing may pass through the library's frames
                     self.raised = error_
                     return False
-            self._ask = _AcceptFn(ask)
-            self._struct.accept = ctypes.cast(self._ask, ctypes.c_void_p).value
+            self._accept = _AcceptFn(call_host)
+            self._struct.accept = ctypes.cast(self._accept, ctypes.c_void_p).value
         self.at = ctypes.byref(self._struct)
 
     def done(self, status: int) -> None:
@@ -282,7 +282,7 @@ class Queries:
         A Shape.point meets surfaces alone: on a path it is a ray. each: all triangles of a thing, and where
         a ray leaves it, in place of its nearest hit. most: so many hits at most."""
         self.free()
-        asked, capacity = _Asked(self, filter), 16 if most is None else most
+        query, capacity = _Query(self, filter), 16 if most is None else most
         if not isinstance(shape, Shape):
             raise TypeError(f"a query asks with a deform.Shape, not {shape!r}")
         struct = _abi.dfm_query_shape.from_buffer_copy(shape.struct)
@@ -293,7 +293,7 @@ class Queries:
             out = (_abi.dfm_query_hit * capacity)()
             hits = _abi.dfm_query_hits(ctypes.sizeof(_abi.dfm_query_hits), ctypes.sizeof(_abi.dfm_query_hit),
                                        capacity, 0, ctypes.addressof(out))
-            asked.done(quick.dfm_world_query(self.handle, at, along, real(reach, "reach"), asked.at, None,
+            query.done(quick.dfm_world_query(self.handle, at, along, real(reach, "reach"), query.at, None,
                                              ctypes.byref(hits)))
             if hits.n <= capacity or most is not None:
                 return [self._hit(hit) for hit in out[:hits.n]]
@@ -383,10 +383,10 @@ class Queries:
         discards the step, which raises it."""
         self.free()
 
-        def ask(_user: int, a: int, b: int) -> bool:
+        def call_host(_user: int, a: int, b: int) -> bool:
             answer = self._call(lambda: bool(function(self._thing(a), self._thing(b))))  # type: ignore[misc]
             return True if answer is None else answer
-        call = None if function is None else _MayTouchFn(ask)
+        call = None if function is None else _MayTouchFn(call_host)
         check(quick.dfm_world_set_may_touch(self.handle, ctypes.cast(call, ctypes.c_void_p) if call else None,
                                             None))
         self._decide("may_touch", call)
@@ -408,10 +408,10 @@ class Queries:
         not use the world. An exception in it discards the step, which raises it."""
         self.free()
 
-        def ask(_user: int, address: int) -> None:
+        def call_host(_user: int, address: int) -> None:
             self._call(lambda: function(  # type: ignore[misc]
                 ContactChoice(self, _abi.dfm_contact_choice.from_address(address))))
-        call = None if function is None else _PreSolveFn(ask)
+        call = None if function is None else _PreSolveFn(call_host)
         check(quick.dfm_world_set_pre_solve(self.handle, ctypes.cast(call, ctypes.c_void_p) if call else None,
                                             None))
         self._decide("pre_solve", call)

@@ -113,7 +113,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
     arrays keep their last values, and everything else raises HandleError.
     """
 
-    __slots__ = ("__weakref__", "_asked", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
+    __slots__ = ("__weakref__", "_stop", "_bits", "_bits_at", "_bodies", "_busy", "_finalize", "_functions",
                  "_lists", "_owner", "_streamed", "context", "handle", "shown", "user")
     _finalize: Any
     _instead = ("World.snapshot() gives bytes, which restore() of a world with the same contents takes, and "
@@ -158,7 +158,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         self.shown = Shown()
         self._busy = 0  # the thread that is inside a call
         self._streamed = 64  # bytes, more than a stream has had
-        self._asked = False  # to stop, by a signal
+        self._stop = False  # to stop, by a signal
         self._bits = ctypes.c_uint32(0)
         self._bits_at = ctypes.byref(self._bits)
         self._lists: dict[str, Any] = {}
@@ -555,8 +555,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
 
     def _by_signal(self) -> bool:
         """Did a signal end the last step?"""
-        ended = self._asked and bool(self._bits.value & _abi.DFM_TROUBLE_INTERRUPTED)
-        self._asked = self._asked and not ended
+        ended = self._stop and bool(self._bits.value & _abi.DFM_TROUBLE_INTERRUPTED)
+        self._stop = self._stop and not ended
         return ended
 
     def run(self, duration: float, dt: float | None = None) -> Trouble:
@@ -593,8 +593,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.load_to = real(load_to, "load_to")
         with self.alone():
             status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
-        if status == _abi.DFM_DISCARD and self._asked:  # by a signal whose handler has not raised
-            self._asked = False
+        if status == _abi.DFM_DISCARD and self._stop:  # by a signal whose handler has not raised
+            self._stop = False
             return self.equilibrium(load_steps, load_from=load_from, load_to=load_to, time=time)
         self.accept(status)
 

@@ -1,5 +1,4 @@
-// deform-ccd, which `deform ccd QUERIES.csv` starts: times of impact of the point-triangle and edge-edge
-// queries of a file.
+// deform-ccd, started by `deform ccd QUERIES.csv`: times of impact of the queries in a file.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -148,7 +147,7 @@ struct Tally {
   double seconds = 0;
 };
 
-Tally answer(const CcdOptions &options, const std::vector<CcdQuery> &queries, std::string &rows) {
+Tally run_queries(const CcdOptions &options, const std::vector<CcdQuery> &queries, std::string &rows) {
   const auto method = std::find(kRoots.begin(), kRoots.end(), options.root) - kRoots.begin();
   const dfm_toi_options toi = {sizeof toi, int32_t(method), options.tolerance, options.separation, 0};
   Tally tally;
@@ -225,7 +224,7 @@ int ccd(const CcdOptions &options, const Globals &globals) {
                                  did_you_mean(options.root, kRoots));
   const QueryFile file(options.file);
   std::string rows = "id,hit,t,evaluations\n";
-  const Tally tally = answer(options, file.queries(), rows);
+  const Tally tally = run_queries(options, file.queries(), rows);
   if (!options.csv.empty()) write_whole(options.csv, rows);
   print(options, globals, file.queries().size(), tally);
   return kDone;

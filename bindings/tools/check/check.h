@@ -49,13 +49,12 @@ const std::vector<Rule> &rules();
 const Rule *find_rule(const std::string &id);
 
 // What runs for a type of this kind, DFM_KIND_*; null: nothing.
-std::string (*asked_of(const Rule &rule, uint32_t kind))(const Subject &);
+std::string (*check_for(const Rule &rule, uint32_t kind))(const Subject &);
 
 // Runs one rule here and now.
 Verdict run_here(const Rule &rule, const Subject &subject);
 
-// Bits of the outputs of a fixed set of batches: what V07 compares with another process (`deform plugin check
-// FILE --digest TYPE`).
+// Hash of the outputs of fixed batches, which V07 compares with another process (`--digest TYPE`).
 uint64_t digest(const Subject &subject);
 
 }  // namespace cli::check

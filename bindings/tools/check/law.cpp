@@ -133,16 +133,16 @@ Lanes::Lanes(const Law &l, uint32_t count, uint32_t gap)
          stored};
 }
 
-dfm_status Lanes::ask(double dt) {
+dfm_status Lanes::evaluate(double dt) {
   in.dt = dt;
   const Kept kept("eval");
   const dfm_status status = law.ops.eval(&in, &out);
-  law.subject.plugin->host().give_back_scratch();
+  law.subject.plugin->host().release_scratch();
   return status;
 }
 
 void Lanes::must(double dt) {
-  if (const dfm_status status = ask(dt); status != DFM_OK)
+  if (const dfm_status status = evaluate(dt); status != DFM_OK)
     broken(
         "eval returns %s for finite slip and normal force at a step of %g s; return finite values for every "
         "finite input",
@@ -351,8 +351,7 @@ void Masses::Root::take(double r, int round) {
   at = next;
 }
 
-// The root of r(v) = m (v - v0)/h - f - ft(v), in all lanes at once. With FT_STOP the law itself says where
-// it holds.
+// The root of r(v) = m (v - v0)/h - f - ft(v), in all lanes at once; with FT_STOP the law gives it.
 void Masses::step(const std::vector<double> &force, double h) {
   const uint32_t n = lanes.n;
   roots_.resize(n);

@@ -1,5 +1,4 @@
-// A law under test: its parameters, batches of contacts for it, and how contacts are driven by a given slip
-// or by a force on a mass.
+// A law under test: parameters, batches of contacts, and driving by a given slip or by a force on a mass.
 #pragma once
 #include <cstdint>
 #include <functional>
@@ -33,16 +32,15 @@ struct Law {
   uint32_t nstate = 0;
 };
 
-// n contacts with every column there is. Inputs that the law does not declare hold NaN (area and dwell: NULL,
-// as the host gives them).
+// n contacts with all columns. Undeclared inputs hold NaN (area and dwell: NULL, as the host gives them).
 struct Lanes {
   Lanes(const Law &law, uint32_t n, uint32_t gap = 0);  // gap: lanes between n rounded to 8 and the stride
   Lanes(const Lanes &) = delete;
   Lanes &operator=(const Lanes &) = delete;
-  dfm_status ask(double dt);    // evaluates; the state stays
-  void must(double dt);         // the same, and Broken where the law does not return DFM_OK
-  void must_be_finite() const;  // the force; else Broken, with the inputs of the lane
-  void commit();                // the trial state becomes the state
+  dfm_status evaluate(double dt);  // evaluates; the state stays
+  void must(double dt);            // the same, and Broken where the law does not return DFM_OK
+  void must_be_finite() const;     // the force; else Broken, with the inputs of the lane
+  void commit();                   // the trial state becomes the state
   // trial slip; with FT_STOP a stopping force far beyond any level, against it
   void slip(uint32_t i, double x, double y);
   double ft(uint32_t i) const;           // norm

@@ -67,8 +67,7 @@ Subject subject_of(const Request &request) {
   return s;
 }
 
-// type < 0: a rule about the file; V01 needs no loading, V12 loads it itself, and V02 says itself why
-// loading failed.
+// type < 0: a rule about the file. V01 loads nothing, V12 loads it itself, V02 reports a failed load.
 Verdict judge(const Request &request, const Rule &rule, int type) {
   Subject subject = subject_of(request);
   const std::string id = rule.id;
@@ -115,8 +114,8 @@ std::string listed(const std::string &file) {
 
 int child(const Request &request) {
   report_to(request.report);
-  if (request.digest >= 0) answer({Result::pass, digest_text(request)});
-  else if (const Rule *rule = find_rule(request.rule)) answer(judge(request, *rule, request.type));
+  if (request.digest >= 0) send_verdict({Result::pass, digest_text(request)});
+  else if (const Rule *rule = find_rule(request.rule)) send_verdict(judge(request, *rule, request.type));
   return kDone;
 }
 
@@ -148,9 +147,10 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   if (request.in_process) return {&rule, judge(request, rule, type), 0};
   // V09 counts what is on the heap: only a fresh image has a heap without a past.
   const bool fresh = std::string(rule.id) == "V09";
-  const Answer a = fresh ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type),
-                                            {request.limit})
-                         : in_own_process([&] { answer(judge(request, rule, type)); }, {request.limit});
+  const Outcome a =
+      fresh
+          ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type), {request.limit})
+          : in_own_process([&] { send_verdict(judge(request, rule, type)); }, {request.limit});
   Line line{&rule, a.verdict, a.seconds, a.late, a.late || !a.spoke};
   const std::string found = sanitizer_line(a.said);
   if (!a.spoke)
@@ -202,7 +202,7 @@ class Rules {
       const Rule *const names = find_rule("V03");
       if (!type.usable && !wants("V03")) one(report_.by_type.back(), *names, static_cast<int>(t));
       for (const Rule *rule : wanted_)
-        if (rule->by_type && asked_of(*rule, type.kind))
+        if (rule->by_type && check_for(*rule, type.kind))
           one(report_.by_type.back(), *rule, static_cast<int>(t),
               type.usable || rule == names ? nullptr : kUnusable);
       say_skipped(kUnusable);
@@ -219,8 +219,8 @@ class Rules {
     if (request_.in_process) {
       types = listed(request_.file);
     } else {
-      const Answer a =
-          in_own_process([&] { answer({Result::pass, listed(request_.file)}); }, {request_.limit});
+      const Outcome a =
+          in_own_process([&] { send_verdict({Result::pass, listed(request_.file)}); }, {request_.limit});
       types = a.verdict.detail;
       ended_ += a.late;
       hung_ = a.late;
@@ -237,8 +237,8 @@ class Rules {
   // why: not to be run at all
   void one(std::vector<Line> &to, const Rule &rule, int type, const char *why = nullptr) {
     // What it was that crashed V06 says: it names the array.
-    const bool tells = !hung_ && std::string(rule.id) == "V06";
-    if (!why && ended_ >= kEnough && !tells) why = kEnded;
+    const bool reports = !hung_ && std::string(rule.id) == "V06";
+    if (!why && ended_ >= kEnough && !reports) why = kEnded;
     if (why) return add(to, {&rule, {Result::skip, why}, 0});
     add(to, run_rule(request_, rule, type));
     ended_ += to.back().ended;
@@ -286,7 +286,7 @@ std::string json_lines(const std::vector<Line> &lines) {
   return json_array(out);
 }
 
-int tell(const Globals &globals, const Request &request, const Report &report) {
+int print_report(const Globals &globals, const Request &request, const Report &report) {
   uint32_t count[3] = {0, 0, 0};
   for (const auto *lines : {&report.file})
     for (const Line &l : *lines) ++count[static_cast<int>(l.verdict.result)];
@@ -334,7 +334,7 @@ int run(const Globals &globals, const Request &request) {
   }
   for (const Rule &rule : rules())
     if (request.only.empty()) wanted.push_back(&rule);
-  return tell(globals, request, Rules(globals, request, wanted).run());
+  return print_report(globals, request, Rules(globals, request, wanted).run());
 }
 
 // The file of a plugin that is found by its short name or full id; the same text where it is none of them.

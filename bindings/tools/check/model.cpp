@@ -232,7 +232,8 @@ std::vector<Variant> variants(const Subject &subject) {
   const Solid solid = block(1, 1, 1);
   for (Variant &v : wanted) {
     stage("create with %s", v.name.c_str());
-    const Body body(subject, solid, v, 4, out.empty() ? Body::Refusal::is_broken : Body::Refusal::is_told);
+    const Body body(subject, solid, v, 4,
+                    out.empty() ? Body::Refusal::is_broken : Body::Refusal::is_reported);
     if (body.made()) out.push_back(std::move(v));
   }
   return out;

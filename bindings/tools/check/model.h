@@ -64,7 +64,7 @@ const dfm_model &model_of(const Subject &subject);
 class Body {
  public:
   // Where create refuses: Broken, or made() is false.
-  enum class Refusal { is_broken, is_told };
+  enum class Refusal { is_broken, is_reported };
   Body(const Subject &subject, const Solid &solid, const Variant &variant, uint32_t stride = 4,
        Refusal refusal = Refusal::is_broken);
   ~Body();
@@ -86,7 +86,7 @@ class Body {
   dfm_status call(const char *name, F &&f) const {
     const Kept kept(name);
     const dfm_status status = f();
-    subject.plugin->host().give_back_scratch();
+    subject.plugin->host().release_scratch();
     return status;
   }
   // The same, and Broken where it is not DFM_OK.

@@ -95,7 +95,7 @@ Host::Host() {
   table_.extension = [](void *, const char *) -> const void * { return nullptr; };
 }
 
-void Host::give_back_scratch() {
+void Host::release_scratch() {
   if (!arena.bytes) arena.bytes = std::make_unique_for_overwrite<char[]>(Arena::kBytes);
   arena.used = 0;
 }

@@ -21,7 +21,7 @@ class Host {
   dfm_host &table() { return table_; }
   size_t pieces() const { return lent_.size(); }  // not yet released
   const std::string &said() const { return said_; }
-  void give_back_scratch();  // of this thread
+  void release_scratch();  // of this thread
   // How parallel_for cuts its work: by grains in order, not at all, by some grains in another order.
   enum class Cut { grains, whole, shuffled } cut = Cut::grains;
   std::atomic<uint64_t> parallel_calls{0};

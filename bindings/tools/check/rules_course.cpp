@@ -30,7 +30,7 @@ std::string state_stays_bounded(const Subject &subject) {
   constexpr uint32_t kRuns = 32;
   constexpr int kBlocks = 8, kSteps = 400, kFirst = 1;
   // growth from the second block to the last; the square of the time grows by 16
-  constexpr double kMost = 100;
+  constexpr double kMax = 100;
   double worst = 0;
   for (const double h : {1e-3, 1.0 / 60}) {
     Lanes b(law, kRuns);
@@ -72,7 +72,7 @@ std::string state_stays_bounded(const Subject &subject) {
     for (size_t j = 0; j < n; ++j) {
       if (!(before[j] > 0)) continue;
       worst = std::max(worst, block[j] / before[j]);
-      if (block[j] > kMost * before[j])
+      if (block[j] > kMax * before[j])
         broken(
             "state %zu grows by %.3g while the same %d steps of %g s are repeated %d times; make the state "
             "tend to a finite value, or grow at most in proportion to time",

@@ -23,7 +23,7 @@ void use(const Subject &subject) {
         b.slip(i, round * 1e-3 * i, 1e-4 * i);
       }
       if (round == 2) b.fn[0] = b.vt[0] = std::numeric_limits<double>::quiet_NaN();
-      b.ask(1e-3);
+      b.evaluate(1e-3);
     }
 }
 

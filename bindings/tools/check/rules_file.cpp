@@ -43,8 +43,7 @@ struct Symbol {
   std::string name;
   ElfW(Sym) entry;
 };
-// Symbols of the section of that type (SHT_DYNSYM, SHT_SYMTAB); false where the file carries no
-// section headers.
+// Symbols of that type of section (SHT_DYNSYM, SHT_SYMTAB); false: the file has no section headers.
 bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &out) {
   const auto header = part<ElfW(Ehdr)>(bytes, 0, 1);
   if (header.empty()) return false;
@@ -189,7 +188,7 @@ void reserved_free(const char *what, uint32_t found) {
   if (found) broken("%s has %u in reserved; set it to 0", what, found);
 }
 
-void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
+void check_slots(const std::vector<dfm_slot> &slots, bool law) {
   for (uint32_t i = 0; i < slots.size(); ++i) {
     const dfm_slot &s = slots[i];
     const uint32_t width = s.kind == DFM_SLOT_TANGENT    ? 2
@@ -209,41 +208,41 @@ void slots_sound(const std::vector<dfm_slot> &slots, bool law) {
 
 // slots, nslot, slot_size and reserved of the operations of a law or a model
 template <class Ops>
-void slot_table_sound(const Ops &ops, bool law) {
+void check_slot_table(const Ops &ops, bool law) {
   if (ops.nslot && !ops.slots) broken("it has %u state slots but slots is NULL; set slots", ops.nslot);
   reserved_free(law ? "dfm_friction" : "dfm_model", ops.reserved);
-  if (!slot_size_sound(ops.slot_size))
+  if (!is_slot_size(ops.slot_size))
     broken("slot_size is %u; set it to sizeof(dfm_slot), or to 0, which means the same in all of ABI 1",
            ops.slot_size);
-  slots_sound(slot_rows(ops.slots, ops.nslot, ops.slot_size), law);
+  check_slots(slot_rows(ops.slots, ops.nslot, ops.slot_size), law);
 }
 
 // Of dfm_friction.state and of DFM_EXT_SLOTS.
-void own_slots_sound(const dfm_slots *own, bool law, const char *from, const char *remedy) {
+void check_own_slots(const dfm_slots *own, bool law, const char *from, const char *remedy) {
   const auto rows = slot_rows(own);
   if (!rows) broken("%s, so the host cannot keep its state; %s", from, remedy);
   dfm_slots full{};
   std::memcpy(&full, own, std::min<size_t>(own->size, sizeof full));
   reserved_free("its dfm_slots", full.reserved);
-  slots_sound(*rows, law);
+  check_slots(*rows, law);
 }
 
-void law_sound(const dfm_type &type, const dfm_friction &law) {
+void check_law(const dfm_type &type, const dfm_friction &law) {
   if (!law.prepare != !law.release) broken("it has only one of prepare and release; set both or neither");
   if (law.needs & ~31u) broken("needs has bits that this ABI does not know (%#x); use DFM_NEED_*", law.needs);
   if (law.flags & ~31u) broken("flags has bits that this ABI does not know (%#x); use DFM_FRIC_*", law.flags);
   if ((law.flags & DFM_FRIC_SET_VALUED) && !(law.needs & DFM_NEED_FT_STOP))
     broken("a set-valued law that does not need FT_STOP cannot hold at rest; add DFM_NEED_FT_STOP to needs");
-  slot_table_sound(law, true);
+  check_slot_table(law, true);
   if (!law.state) return;
   const Kept kept("state");
   const std::vector<double> params = default_params(type);
-  own_slots_sound(law.state(params.data()), true, "its function state names no slots for its defaults",
+  check_own_slots(law.state(params.data()), true, "its function state names no slots for its defaults",
                   "return constant tables");
 }
 
 // Numbers that must agree, and functions that some parameters and claims require.
-void model_sound(const dfm_type &type, const dfm_model &model) {
+void check_model(const dfm_type &type, const dfm_model &model) {
   constexpr uint32_t kCells =
       DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX8 | DFM_CELL_TET10;
   if (model.cells & ~kCells)
@@ -271,7 +270,7 @@ bool lacks_its_function(const void *table) {
   return !function;
 }
 
-void effect_rows_sound(const dfm_type &type, const dfm_effect_rows &table) {
+void check_effect_rows(const dfm_type &type, const dfm_effect_rows &table) {
   reserved_free("its dfm_effect_rows", table.reserved);
   if (table.n > 4096 || (table.n && !table.rows))
     broken("its dfm_effect_rows has nrow %u, but rows is NULL or too long; set rows", table.n);
@@ -288,12 +287,12 @@ void effect_rows_sound(const dfm_type &type, const dfm_effect_rows &table) {
 }
 
 // What an instance answers to extension(): tables that begin with their size, nothing where it has none.
-void tables_sound(const Subject &subject) {
+void check_tables(const Subject &subject) {
   const dfm_model &model = model_of(subject);
   if (!model.extension || !(model.cells & DFM_CELL_TET)) return;
   const Solid solid = small_block();
   const Variant defaults = {"the defaults", default_params(*subject.type)};
-  const Body body(subject, solid, defaults, 4, Body::Refusal::is_told);
+  const Body body(subject, solid, defaults, 4, Body::Refusal::is_reported);
   if (!body.made()) return;
   constexpr size_t one = 2 * sizeof(uint32_t) + sizeof(void *);
   const struct {
@@ -340,9 +339,9 @@ void tables_sound(const Subject &subject) {
   if (stepper && stepper->size >= offsetof(dfm_stepper, fetch) + sizeof(void *) && stepper->fetch)
     broken("dfm_stepper.fetch is set, but it is reserved; leave it NULL");
   if (const auto *rows = static_cast<const dfm_effect_rows *>(body.extension(DFM_EXT_EFFECT_ROWS)); rows)
-    effect_rows_sound(*subject.type, *rows);
+    check_effect_rows(*subject.type, *rows);
   if (const auto *own = static_cast<const dfm_slots *>(body.extension(DFM_EXT_SLOTS)); own)
-    own_slots_sound(own, false, "the table of its extension \"" DFM_EXT_SLOTS "\" cannot be read",
+    check_own_slots(own, false, "the table of its extension \"" DFM_EXT_SLOTS "\" cannot be read",
                     "set size to sizeof(dfm_slots) and slot_size to sizeof(dfm_slot)");
   if (body.extension("dfm.unheard-of/1"))
     broken(
@@ -438,7 +437,7 @@ std::string metadata_complete(const Subject &subject) {
       broken("two types of this file have the id \"%s\"; give each its own id", type.id);
   effects_known(type);
   if (type.kind == DFM_KIND_FRICTION) {
-    law_sound(type, law_of(subject));
+    check_law(type, law_of(subject));
   } else if (type.kind == DFM_KIND_SOLVER) {
     const auto &solver = *static_cast<const dfm_solver *>(type.ops);
     if (solver.flags & ~uint32_t(DFM_SOLVER_DIRECT))
@@ -448,9 +447,9 @@ std::string metadata_complete(const Subject &subject) {
     const auto &model = *static_cast<const dfm_model *>(type.ops);
     if (model.cells == 0)
       broken("a model that accepts no kind of cell fits no mesh; set cells to DFM_CELL_*");
-    slot_table_sound(model, false);
-    model_sound(type, model);
-    tables_sound(subject);
+    check_slot_table(model, false);
+    check_model(type, model);
+    check_tables(subject);
   }
   return text("%s %s, %s", type.id, type.version, type.licence);
 }
@@ -491,7 +490,7 @@ void row_sane(const dfm_type &type, uint32_t i) {
 }
 
 // What the law's check does with a small buffer: it must end the sentence inside.
-void asks_check(const dfm_friction &law, const std::vector<double> &params) {
+void runs_check(const dfm_friction &law, const std::vector<double> &params) {
   char room[96];
   for (size_t cap : {size_t(16), size_t(1), size_t(0)}) {
     std::memset(room, 0x5a, sizeof room);
@@ -550,7 +549,7 @@ std::string parameters_sane(const Subject &subject) {
   stage("check is asked about the defaults");
   if (const std::string why = refusal(law, defaults); !why.empty())
     broken("its own check refuses the defaults (%s); choose defaults that check accepts", why.c_str());
-  if (law.check) asks_check(law, defaults);
+  if (law.check) runs_check(law, defaults);
   library_refuses(subject);
   // The ends of every range, one at a time: check refuses them with a sentence, or eval answers them.
   uint32_t refused = 0;

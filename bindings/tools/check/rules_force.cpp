@@ -137,8 +137,7 @@ void loops_dissipate(const Law &law, const Scales &s) {
         b.must_be_finite();
         b.commit();
         for (uint32_t i = 0; turn == 2 && i < n; ++i) {
-          // slip() pushes with far more than the law holds, so a law that stops a contact anyway did not let
-          // it slip: no work
+          // slip() pushes far beyond the limit: a law that stops a contact anyway does no work
           const double vx = law.needs(DFM_NEED_VT) ? b.vt[i] : 0;
           const double vy = law.needs(DFM_NEED_VT) ? b.vt[b.stride + i] : 0;
           work[i] -= h * (b.out_ft[i] * vx + b.out_ft[b.stride + i] * vy);
@@ -235,8 +234,7 @@ struct Difference {
         step(h),
         best(size_t(at.n) * 2, HUGE_VAL),
         seen(size_t(at.n) * 2, 0.0) {}
-  // input(b, i) is the number that moves, size(i) its scale, given(row, i) the law's derivative, floor(i)
-  // what counts as nothing.
+  // input(b, i): the varied number, size(i): its scale, given(row, i): the law's derivative, floor(i): zero
   template <class Input, class Size, class Given, class Floor>
   void run(Input input, Size size, Given given, Floor floor) {
     for (int decade = 2; decade <= 7; ++decade) {
@@ -255,11 +253,11 @@ struct Difference {
           const double down = *input(minus, i);
           const double here = *input(const_cast<Lanes &>(base), i);
           const auto f = [&](const Lanes &b) { return b.out_ft[size_t(row) * b.stride + i]; };
-          const double told = given(row, i);
+          const double returned = given(row, i);
           for (const double seen_now : {(f(plus) - f(minus)) / (up - down), (f(plus) - f(base)) / (up - here),
                                         (f(base) - f(minus)) / (here - down)}) {
-            const double off = std::fabs(seen_now - told);
-            const double error = off == 0 ? 0 : off / (std::fabs(told) + floor(i));
+            const double off = std::fabs(seen_now - returned);
+            const double error = off == 0 ? 0 : off / (std::fabs(returned) + floor(i));
             if (error < best[2 * i + row]) {
               best[2 * i + row] = error;
               seen[2 * i + row] = seen_now;
@@ -320,12 +318,12 @@ std::string derivatives_agree(const Subject &subject) {
         for (uint32_t row = 0; row < 2; ++row) {
           worst = std::max(worst, d.best[2 * i + row]);
           if (!(d.best[2 * i + row] <= 1e-4)) {
-            const double told =
+            const double returned =
                 c < 2 ? b.dv[size_t(2 * row + c) * b.stride + i] : b.dn[size_t(row) * b.stride + i];
             broken(
                 "%s[%u%u] is given as %.6g and differences say %.6g (slip %.3g m/s, normal force %.3g N, "
                 "step %g s); differentiate the same update, or drop DFM_FRIC_JACOBIAN",
-                c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, told, d.seen[2 * i + row], speed(i),
+                c < 2 ? "dft_dvt" : "dft_dfn", row, c < 2 ? c : 0, returned, d.seen[2 * i + row], speed(i),
                 b.fn[i], h);
           }
         }
@@ -393,8 +391,7 @@ std::string bounded_at_every_step(const Subject &subject) {
 
 namespace {
 
-// Largest force from the first touch to steady slip, for each speed: what a contact may answer
-// without any spike.
+// Largest force from first touch to steady slip, by speed: a contact may give it without a spike.
 std::vector<double> from_first_touch(const Law &law, const std::vector<double> &speeds, double fn, double h,
                                      int steps) {
   Lanes b(law, static_cast<uint32_t>(speeds.size()));
@@ -418,8 +415,7 @@ std::string follows_normal_force(const Subject &subject) {
   const double h = 1e-3;
   const int steps = 400;
   const std::vector<double> speeds{0.05 * s.length() / h, 0.5 * s.length() / h, 0.01, 1};
-  // Factors of the normal force, each held for a while: down to nothing and back, down to a tenth, up
-  // by 1e6 and back.
+  // Factors of the normal force, each held for a while: to 0 and back, to 0.1, up by 1e6 and back.
   const std::vector<double> path{1, 0.3, 0.1, 1e-3, 0, 1, 0, 1e-6, 1, 1e6, 1, 1e-6, 1};
   std::vector<std::vector<double>> bound;
   for (const double factor : path) bound.push_back(from_first_touch(law, speeds, factor * s.fn, h, steps));

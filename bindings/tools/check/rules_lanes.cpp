@@ -14,8 +14,7 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// Contacts of every kind: open, at rest, in presliding, sliding; with the states that a few steps of
-// their own make.
+// Contacts of every kind: open, at rest, presliding, sliding; with the states that a few steps make.
 void fill(Lanes &b, const Scales &s, Random &random) {
   for (uint32_t i = 0; i < b.n; ++i) {
     const double angle = random.uniform(0, 6.283185307179586);
@@ -35,7 +34,7 @@ void fill(Lanes &b, const Scales &s, Random &random) {
   }
 }
 
-void settle(Lanes &b, const Scales &s, Random &random, double h) {
+void evaluate_states(Lanes &b, const Scales &s, Random &random, double h) {
   for (int k = 0; k < 4; ++k) {
     fill(b, s, random);
     b.must(h);
@@ -76,7 +75,7 @@ uint64_t digest(const Subject &subject) {
   uint64_t hash = 0xcbf29ce484222325ull;
   for (const double h : kSteps) {
     Lanes b(law, 200);
-    settle(b, scales, random, h);
+    evaluate_states(b, scales, random, h);
     b.must(h);
     hash = hash_of(b, hash);
   }
@@ -89,8 +88,8 @@ std::string same_bits(const Subject &subject) {
   Random random(subject.seed);
   // One batch is evaluated again after others with another step, other parameters and other inputs.
   Lanes first(law, 200), between(plain, 33);
-  settle(first, scales, random, kSteps[0]);
-  settle(between, scales, random, kSteps[1]);
+  evaluate_states(first, scales, random, kSteps[0]);
+  evaluate_states(between, scales, random, kSteps[1]);
   Lanes again(law, 200);
   for (uint32_t i = 0; i < first.n; ++i) again.take(i, first, i);
   first.must(kSteps[0]);
@@ -119,7 +118,7 @@ std::string bad_lane_stays(const Subject &subject) {
   const Scales scales = scales_of(law);
   Random random(subject.seed);
   Lanes good(law, 19), spoilt(law, 19);
-  settle(good, scales, random, 1e-3);
+  evaluate_states(good, scales, random, 1e-3);
   for (uint32_t i = 0; i < good.n; ++i)
     // a contact that is open may answer zero to anything
     if (law.needs(DFM_NEED_FN)) good.fn[i] = scales.fn * random.logarithmic(0.1, 10);
@@ -146,7 +145,7 @@ std::string bad_lane_stays(const Subject &subject) {
       input.column[kBad] = bad;
       stage("%s = %g in lane %u", input.name, bad, kBad);
       // nothing was changed: the host may try smaller
-      if (spoilt.ask(1e-3) != DFM_OK) continue;
+      if (spoilt.evaluate(1e-3) != DFM_OK) continue;
       for (uint32_t i = 0; i < good.n; ++i)
         if (i != kBad && !spoilt.same(i, good, i))
           broken(
@@ -170,7 +169,7 @@ std::string split_equals_whole(const Subject &subject) {
   Random random(subject.seed);
   for (const double h : kSteps) {
     Lanes whole(law, 103);
-    settle(whole, scales, random, h);
+    evaluate_states(whole, scales, random, h);
     whole.must(h);
     for (const uint32_t piece : {1u, 2u, 7u, 8u, 9u, 32u, 64u})
       for (uint32_t begin = 0; begin < whole.n; begin += piece) {
@@ -193,22 +192,21 @@ std::string split_equals_whole(const Subject &subject) {
   return "";
 }
 
-// What counts calls or contacts goes bad only after many; what numbers the contacts of a batch in 16 bits
-// only in large ones.
+// A counter of calls or contacts fails only after many, a 16-bit number of a contact only in large batches.
 std::string endures(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   const Scales scales = scales_of(law);
   Random random(subject.seed);
   constexpr uint32_t kContacts = 1u << 20, kBatch = 4096, kLarge = 70000;
   Lanes first(law, 200), again(law, 200), many(law, kBatch);
-  settle(first, scales, random, 1e-3);
+  evaluate_states(first, scales, random, 1e-3);
   for (uint32_t i = 0; i < first.n; ++i) again.take(i, first, i);
   first.must(1e-3);
   fill(many, scales, random);
-  uint32_t asked = 0;
-  for (; asked < kContacts; asked += kBatch) {
-    stage("%u contacts have been asked for", asked);
-    many.must(kSteps[(asked / kBatch) % 3]);
+  uint32_t summary = 0;
+  for (; summary < kContacts; summary += kBatch) {
+    stage("%u contacts have been asked for", summary);
+    many.must(kSteps[(summary / kBatch) % 3]);
   }
   again.must(1e-3);
   for (uint32_t i = 0; i < first.n; ++i)
@@ -216,7 +214,7 @@ std::string endures(const Subject &subject) {
       broken(
           "lane %u gave (%.17g, %.17g) N and, after %u other contacts, (%.17g, %.17g) N; keep nothing "
           "between calls but state slots",
-          i, first.out_ft[i], first.out_ft[first.stride + i], asked, again.out_ft[i],
+          i, first.out_ft[i], first.out_ft[first.stride + i], summary, again.out_ft[i],
           again.out_ft[again.stride + i]);
   Lanes large(law, kLarge);
   for (uint32_t i = 0; i < kLarge; ++i) large.take(i, many, i % kBatch);
@@ -230,7 +228,7 @@ std::string endures(const Subject &subject) {
           "contacts by uint32_t, and keep no table of fixed size",
           i, kLarge, large.out_ft[i], large.out_ft[large.stride + i], kBatch, many.out_ft[i % kBatch],
           many.out_ft[many.stride + i % kBatch]);
-  return text("%u contacts", asked);
+  return text("%u contacts", summary);
 }
 
 }  // namespace cli::check

@@ -15,7 +15,7 @@ constexpr double kAxis[3] = {2.0 / 7, 3.0 / 7, 6.0 / 7}, kShift[3] = {0.3, -0.2,
 // Shares of an edge by which points are shaken.
 constexpr double kSmall = 1e-3, kMiddle = 0.02, kLarge = 0.15;
 
-void asks_forces(const Subject &subject) {
+void need_forces(const Subject &subject) {
   if (!model_of(subject).add_forces) skip("it steps itself and adds no forces");
 }
 
@@ -98,11 +98,11 @@ std::string rigid_motion_is_free(const Subject &subject) {
             "that turns with the body, or drop the claim",
             with(variant).c_str(), angle, off, largest(before));
       if (!body.can(DFM_CAP_ENERGY)) continue;
-      if (const double told = body.energy(); !(std::fabs(told - joule) <= 1e-8 * std::fabs(joule)))
+      if (const double returned = body.energy(); !(std::fabs(returned - joule) <= 1e-8 * std::fabs(joule)))
         broken(
             "%s the energy of a deformed shape is %.12g J and, turned by %g rad, %.12g J, though it claims "
             "DFM_CAP_ROTATION_INVARIANT; measure strain in a frame that turns with the body",
-            with(variant).c_str(), joule, angle, told);
+            with(variant).c_str(), joule, angle, returned);
     }
   });
 }
@@ -187,11 +187,11 @@ std::string forces_sum_to_zero(const Subject &subject) {
 }
 
 std::string forces_are_the_gradient(const Subject &subject) {
-  asks_forces(subject);
+  need_forces(subject);
   if (!(model_of(subject).caps & DFM_CAP_ENERGY)) skip("it does not claim DFM_CAP_ENERGY");
   Random random(subject.seed);
   double worst = 0;
-  const std::string asked = for_variants(subject, [&](const Variant &variant) {
+  const std::string summary = for_variants(subject, [&](const Variant &variant) {
     for (const double share : {kMiddle, kLarge}) {
       Body body(subject, small_block(), variant);
       if (!body.can(DFM_CAP_ENERGY)) return;
@@ -202,7 +202,7 @@ std::string forces_are_the_gradient(const Subject &subject) {
         for (uint32_t i = 0; i < body.points(); ++i)
           for (int a = 0; a < 3; ++a) body.at(d, i)[a] = random.uniform(-1, 1);
         const double work = std::inner_product(f.begin(), f.end(), d.begin(), 0.0);
-        double best = 1e300, told = 0;
+        double best = 1e300, returned = 0;
         for (double step = 1e-2 * kCube; step > 1e-7 * kCube; step /= 10) {
           double e[2];
           for (int side = 0; side < 2; ++side) {
@@ -212,7 +212,7 @@ std::string forces_are_the_gradient(const Subject &subject) {
           const double slope = (e[1] - e[0]) / (2 * step);
           if (const double off = std::fabs(slope - work); off < best) {
             best = off;
-            told = slope;
+            returned = slope;
           }
         }
         body.x = x;
@@ -223,12 +223,12 @@ std::string forces_are_the_gradient(const Subject &subject) {
               "%s, points shaken by %g of an edge: along a random direction the forces do %.9g J/m of work "
               "and the energy falls by %.9g J/m; let the forces be the negative gradient of the energy, with "
               "every term of both%s",
-              with(variant).c_str(), share, work, told,
+              with(variant).c_str(), share, work, returned,
               body.state.empty() ? "" : " and both of dfm_kin.state, not of state_out");
       }
     }
   });
-  return text("%s, %.0e at most", asked.c_str(), worst);
+  return text("%s, %.0e at most", summary.c_str(), worst);
 }
 
 namespace {
@@ -317,7 +317,7 @@ void tangent_agrees(Body &body, const Variant &variant, const Tangent &t, Random
 }  // namespace
 
 std::string stiffness_is_the_derivative(const Subject &subject) {
-  asks_forces(subject);
+  need_forces(subject);
   if (!(model_of(subject).caps & DFM_CAP_STIFFNESS)) skip("it does not claim DFM_CAP_STIFFNESS");
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
@@ -332,7 +332,7 @@ std::string stiffness_is_the_derivative(const Subject &subject) {
 }
 
 std::string constant_stiffness_is_constant(const Subject &subject) {
-  asks_forces(subject);
+  need_forces(subject);
   if (!(model_of(subject).caps & DFM_CAP_CONSTANT_STIFFNESS))
     skip("it does not claim DFM_CAP_CONSTANT_STIFFNESS");
   Random random(subject.seed);
@@ -351,7 +351,7 @@ std::string constant_stiffness_is_constant(const Subject &subject) {
 }
 
 std::string dampers_take_energy(const Subject &subject) {
-  asks_forces(subject);
+  need_forces(subject);
   const bool damps = (model_of(subject).caps & DFM_CAP_DAMPING) != 0;
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
@@ -462,7 +462,7 @@ void collapse(Body &body, size_t how) {
 
 std::string collapsed_cells_stay_finite(const Subject &subject) {
   uint32_t discarded = 0;
-  const std::string asked = for_variants(subject, [&](const Variant &variant) {
+  const std::string summary = for_variants(subject, [&](const Variant &variant) {
     for (size_t how = 0; how < std::size(kCollapses); ++how) {
       Body body(subject, small_block(), variant);
       collapse(body, how);
@@ -495,14 +495,14 @@ std::string collapsed_cells_stay_finite(const Subject &subject) {
               with(variant).c_str(), kCollapses[how], out[n], n / body.stride);
     }
   });
-  return discarded ? text("%s, %u discarded", asked.c_str(), discarded) : asked;
+  return discarded ? text("%s, %u discarded", summary.c_str(), discarded) : summary;
 }
 
 std::string cell_energy_sums(const Subject &subject) {
   if (!(model_of(subject).caps & DFM_CAP_ENERGY)) skip("it does not claim DFM_CAP_ENERGY");
   Random random(subject.seed);
   bool offered = false;
-  const std::string asked = for_variants(subject, [&](const Variant &variant) {
+  const std::string summary = for_variants(subject, [&](const Variant &variant) {
     Body body(subject, small_block(), variant);
     const auto *own = static_cast<const dfm_cell_energy *>(body.extension(DFM_EXT_CELL_ENERGY));
     if (!own || !own->cell_energy || !body.can(DFM_CAP_ENERGY)) return;
@@ -520,7 +520,7 @@ std::string cell_energy_sums(const Subject &subject) {
           with(variant).c_str(), sum, whole);
   });
   if (!offered) skip("it does not offer " DFM_EXT_CELL_ENERGY);
-  return asked;
+  return summary;
 }
 
 }  // namespace cli::check

@@ -87,7 +87,7 @@ std::string model_parameters_sane(const Subject &subject) {
       Variant one = defaults;
       std::fill_n(one.params.begin() + static_cast<std::ptrdiff_t>(at), type.params[i].width, end);
       stage("parameter \"%s\" at %g", type.params[i].key, end);
-      Body body(subject, solid, one, 4, Body::Refusal::is_told);
+      Body body(subject, solid, one, 4, Body::Refusal::is_reported);
       if (!body.made()) {
         if (body.why().empty())
           broken("create refuses \"%s\" = %g without a reason; log it through dfm_host.log",
@@ -97,14 +97,14 @@ std::string model_parameters_sane(const Subject &subject) {
       }
       Random random(subject.seed);
       body.shake(0.01 * kCube, 0, random);
-      Numbers answer;
+      Numbers output;
       if (body.steps_itself()) {
         body.advance(1e-3);
-        answer = body.x;
+        output = body.x;
       } else {
-        answer = body.forces();
+        output = body.forces();
       }
-      for (const double a : answer)
+      for (const double a : output)
         if (!std::isfinite(a))
           broken(
               "with \"%s\" = %g, the end of its range, a body returns %g at a small strain; narrow the "
@@ -125,10 +125,10 @@ std::string step_keeps_to_itself(const Subject &subject) {
     Body body(subject, small_block(), variant);
     body.shake(0.01 * kCube, 0.01, random);
     StepCalls step(body);
-    const auto told = [&](const char *name, dfm_status status) { must_be_good(name, status); };
+    const auto returned = [&](const char *name, dfm_status status) { must_be_good(name, status); };
     // room that grows in the first steps may: a step allocates nothing once capacities have settled
     for (int round = 0; round < 2; ++round)
-      step.each([&](const char *name, const auto &call) { told(name, body.call(name, call)); });
+      step.each([&](const char *name, const auto &call) { returned(name, body.call(name, call)); });
     step.each([&](const char *name, const auto &call) {
       dfm_status status = DFM_OK;
       const char *found = nullptr;
@@ -138,14 +138,14 @@ std::string step_keeps_to_itself(const Subject &subject) {
         found = watch.run([&] { status = call(); });
         host.parallel_in_watch = false;
       }
-      host.give_back_scratch();
+      host.release_scratch();
       ++calls;
       if (found)
         broken(
             "%s %s calls %s, in its third step; allocate in create, and do not use files, environment, clock "
             "or random numbers",
             with(variant).c_str(), name, spelt(found).c_str());
-      told(name, status);
+      returned(name, status);
     });
   });
   return text("%u calls, %zu entries watched", calls, watch.entries());
@@ -171,7 +171,7 @@ std::string step_writes_no_static(const Subject &subject) {
         trouble = Fenced::guard([&] { call(); }, &at);
         ours = statics.hold(at);
       }
-      subject.plugin->host().give_back_scratch();
+      subject.plugin->host().release_scratch();
       if (trouble.empty()) return;
       if (!ours) broken("%s %s; touch only the arrays that are given", name, trouble.c_str());
       const std::string variable = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
@@ -199,7 +199,7 @@ class FencedBody {
     if (!body.state.empty()) kin().state = numbers("state (input)", body.state, true);
   }
   dfm_kin &kin() { return *static_cast<dfm_kin *>(kin_.data()); }
-  const std::vector<double> &told() const { return told_; }
+  const std::vector<double> &returned() const { return recorded_; }
 
   void run() {
     const dfm_model &ops = body_.ops;
@@ -219,19 +219,19 @@ class FencedBody {
     end_kin.lock();
     const auto *const at_end = static_cast<const dfm_kin *>(end_kin.data());
     *scalar = 1e300;
-    if (ops.bound) ask("bound", [&] { return ops.bound(self, &kin(), ksum, csum, scalar); });
-    if (ops.add_forces) ask("add_forces", [&] { return ops.add_forces(self, at_end, f); });
-    if (body_.can(DFM_CAP_ENERGY)) ask("energy", [&] { return ops.energy(self, &kin(), scalar); });
-    tell(scalar, 1);
-    tell_points(f);
+    if (ops.bound) checked_call("bound", [&] { return ops.bound(self, &kin(), ksum, csum, scalar); });
+    if (ops.add_forces) checked_call("add_forces", [&] { return ops.add_forces(self, at_end, f); });
+    if (body_.can(DFM_CAP_ENERGY)) checked_call("energy", [&] { return ops.energy(self, &kin(), scalar); });
+    record(scalar, 1);
+    record_points(f);
     if (body_.can(DFM_CAP_STIFFNESS)) {
       uint32_t nb = 0;
-      ask("pattern", [&] { return ops.pattern(self, &nb, nullptr); });
+      checked_call("pattern", [&] { return ops.pattern(self, &nb, nullptr); });
       Fenced pairs("the pattern", 2 * sizeof(uint32_t) * nb, place_);
-      ask("pattern", [&] { return ops.pattern(self, &nb, static_cast<uint32_t *>(pairs.data())); });
+      checked_call("pattern", [&] { return ops.pattern(self, &nb, static_cast<uint32_t *>(pairs.data())); });
       double *const blocks = numbers("blk", std::vector<double>(9 * size_t(nb), 0.0), false);
-      ask("stiffness", [&] { return ops.stiffness(self, &kin(), 1, 1, blocks); });
-      tell(blocks, 9 * size_t(nb));
+      checked_call("stiffness", [&] { return ops.stiffness(self, &kin(), 1, 1, blocks); });
+      record(blocks, 9 * size_t(nb));
       spoilt("pattern", pairs, "the pattern");
     }
     if (body_.stepper) {
@@ -247,14 +247,14 @@ class FencedBody {
       double *const u = numbers("u_s", per_surfel, false), *const du = numbers("du_s", per_surfel, false);
       double *const w = numbers("w", w_of, false);
       double *const x = points("x (output)", zero, false), *const v = points("v (output)", zero, false);
-      ask("predict", [&] { return stepper.predict(self, &kin(), load, u); });
-      ask("respond", [&] { return stepper.respond(self, &kin(), s, which, p, du); });
-      ask("diagonal", [&] { return stepper.diagonal(self, &kin(), s, which, w); });
-      ask("commit", [&] { return stepper.commit(self, at_end, p, x, v); });
-      tell(u, 3 * size_t(s));
-      tell(du, 3 * size_t(s));
-      tell_points(x);
-      tell_points(v);
+      checked_call("predict", [&] { return stepper.predict(self, &kin(), load, u); });
+      checked_call("respond", [&] { return stepper.respond(self, &kin(), s, which, p, du); });
+      checked_call("diagonal", [&] { return stepper.diagonal(self, &kin(), s, which, w); });
+      checked_call("commit", [&] { return stepper.commit(self, at_end, p, x, v); });
+      record(u, 3 * size_t(s));
+      record(du, 3 * size_t(s));
+      record_points(x);
+      record_points(v);
     }
     look(f);
   }
@@ -267,12 +267,12 @@ class FencedBody {
              name, offset < 0 ? "before" : "past the end of", what, offset);
   }
   template <class F>
-  void ask(const char *name, const F &call) {
+  void checked_call(const char *name, const F &call) {
     dfm_status status = DFM_OK;
     stage("%s at stride %u", name, body_.stride);
     const Kept kept(name);
     const std::string trouble = Fenced::guard([&] { status = call(); });
-    body_.subject.plugin->host().give_back_scratch();
+    body_.subject.plugin->host().release_scratch();
     if (!trouble.empty())
       broken(
           "at stride %u %s %s; loop to the number of points, step by dfm_kin.stride, write only outputs, and "
@@ -299,9 +299,9 @@ class FencedBody {
       if (i % body_.stride > 2) padded[i] = kPadding;
     return numbers(name, padded, input);
   }
-  void tell(const double *from, size_t n) { told_.insert(told_.end(), from, from + n); }
-  void tell_points(const double *from) {
-    for (uint32_t i = 0; i < body_.points(); ++i) tell(from + size_t(body_.stride) * i, 3);
+  void record(const double *from, size_t n) { recorded_.insert(recorded_.end(), from, from + n); }
+  void record_points(const double *from) {
+    for (uint32_t i = 0; i < body_.points(); ++i) record(from + size_t(body_.stride) * i, 3);
   }
   // Lanes beyond the third of the forces; those of new positions may be anything.
   void look(const double *f) const {
@@ -319,7 +319,7 @@ class FencedBody {
   Fenced kin_;
   std::vector<std::unique_ptr<Fenced>> inputs_;
   std::vector<std::pair<const char *, std::unique_ptr<Fenced>>> outputs_;
-  std::vector<double> told_;
+  std::vector<double> recorded_;
 };
 
 // Arrays that a function adds to hold what others have added: that must still be in them.
@@ -377,8 +377,8 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
         body.shake(0.01 * kCube, 0.01, random);
         FencedBody fenced(body, place);
         fenced.run();
-        if (first.empty()) first = fenced.told();
-        if (std::memcmp(first.data(), fenced.told().data(), first.size() * sizeof(double)) != 0)
+        if (first.empty()) first = fenced.returned();
+        if (std::memcmp(first.data(), fenced.returned().data(), first.size() * sizeof(double)) != 0)
           broken(
               "%s its results have other bits at stride %u than at stride 4; step by dfm_kin.stride, and "
               "read three numbers for each point",
@@ -401,12 +401,12 @@ std::string model_same_bits(const Subject &subject) {
     other.x = body.x;
     other.v = body.v;
     StepCalls first(body), again(body), elsewhere(other);
-    const auto ask = [](Body &of, StepCalls &calls) {
+    const auto checked_call = [](Body &of, StepCalls &calls) {
       calls.each([&](const char *name, const auto &call) { must_be_good(name, of.call(name, call)); });
     };
-    ask(body, first);
-    ask(body, again);
-    ask(other, elsewhere);
+    checked_call(body, first);
+    checked_call(body, again);
+    checked_call(other, elsewhere);
     const auto compare = [&](StepCalls &with_that, const char *what, const char *remedy) {
       const auto equal = [](const auto &a, const auto &b) {
         return a.empty() || std::memcmp(a.data(), b.data(), a.size() * sizeof(double)) == 0;
@@ -450,7 +450,7 @@ void use_model(const Subject &subject) {
   if (!(model_of(subject).cells & DFM_CELL_TET)) return;
   Random random(subject.seed);
   const Variant defaults = {"the defaults", default_params(*subject.type)};
-  Body body(subject, block(1, 1, 1), defaults, 4, Body::Refusal::is_told);
+  Body body(subject, block(1, 1, 1), defaults, 4, Body::Refusal::is_reported);
   if (!body.made()) return;
   body.shake(0.01 * kCube, 0.01, random);
   StepCalls step(body);

@@ -94,7 +94,7 @@ void compare(const Body &body, const dfm_part_forces &table, const char *of) {
 std::string parts_are_the_whole(const Subject &subject) {
   Random random(subject.seed);
   bool offered = false;
-  const std::string asked = for_variants(subject, [&](const Variant &variant) {
+  const std::string summary = for_variants(subject, [&](const Variant &variant) {
     Body body(subject, small_block(), variant);
     const auto *table = static_cast<const dfm_part_forces *>(body.extension(DFM_EXT_PART_FORCES));
     if (!table || !table->parts || !table->forces) return;  // V03
@@ -103,7 +103,7 @@ std::string parts_are_the_whole(const Subject &subject) {
     compare(body, *table, with(variant).c_str());
   });
   if (!offered) skip("it does not offer " DFM_EXT_PART_FORCES);
-  return asked;
+  return summary;
 }
 
 }  // namespace cli::check

@@ -34,8 +34,7 @@ extern "C" size_t __sanitizer_get_current_allocated_bytes();
 namespace cli::check {
 namespace {
 
-// Lanes of every kind: at rest and sliding, open and pressed, with states that grow as the batch
-// is evaluated again.
+// Lanes of every kind: at rest, sliding, open, pressed; repeated evaluations make their states grow.
 void vary(Lanes &b, Random &random, double scale) {
   for (uint32_t i = 0; i < b.n; ++i) {
     const double w = i % 5 == 0 ? 0 : scale * random.logarithmic(1e-6, 10);
@@ -73,7 +72,7 @@ std::string eval_keeps_to_itself(const Subject &subject) {
         b.in.dt = h;
         const Kept kept("eval");
         const char *name = watch.run([&] { law.ops.eval(&b.in, &b.out); });
-        subject.plugin->host().give_back_scratch();
+        subject.plugin->host().release_scratch();
         if (name)
           broken(
               "eval calls %s; use dfm_host.scratch for memory, make tables in prepare, and do not use files, "
@@ -133,8 +132,7 @@ class FencedBatch {
   }
   dfm_friction_in &in() { return *static_cast<dfm_friction_in *>(in_.data()); }
   dfm_friction_out &out() { return *static_cast<dfm_friction_out *>(out_.data()); }
-  // Bytes that changed beside what eval may write, between the columns and around the arrays, and lanes that
-  // it has not written.
+  // Bytes changed outside of what eval may write, around and between columns, and lanes not written.
   void look() const {
     long offset = 0;
     const size_t lanes = (lanes_.n + 7) & ~7u;
@@ -182,13 +180,13 @@ class FencedBatch {
   std::vector<Output> outputs_;
 };
 
-void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
+void evaluate_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   FencedBatch batch(law, lanes, place);
   dfm_status status = DFM_OK;
   stage("batch of %u contacts, stride %u", lanes.n, lanes.stride);
   const Kept kept("eval");
   const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&batch.in(), &batch.out()); });
-  law.subject.plugin->host().give_back_scratch();
+  law.subject.plugin->host().release_scratch();
   if (!trouble.empty())
     broken(
         "in a batch of %u contacts (stride %u) eval %s; loop to in->n, step columns by in->stride, and "
@@ -202,7 +200,7 @@ void asks_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
 }
 
 // Every output may be NULL: alone, or all but one. An output must not depend on which others are requested.
-void asks_with_nulls(const Law &law, Lanes &whole) {
+void evaluate_with_nulls(const Law &law, Lanes &whole) {
   const char *names[] = {"ft", "state", "dft_dvt", "dft_dfn", "limit", "mode", "stored"};
   for (int k = 0; k < 14; ++k) {
     const int one = k % 7;
@@ -223,7 +221,7 @@ void asks_with_nulls(const Law &law, Lanes &whole) {
     dfm_status status = DFM_OK;
     const Kept kept("eval");
     const std::string trouble = Fenced::guard([&] { status = law.ops.eval(&b.in, &out); });
-    law.subject.plugin->host().give_back_scratch();
+    law.subject.plugin->host().release_scratch();
     if (!trouble.empty() || status != DFM_OK)
       broken("with %s%s eval %s; check each pointer for NULL before writing",
              alone ? "every output NULL but " : "the output NULL: ", names[one],
@@ -247,12 +245,12 @@ std::string stays_in_its_arrays(const Subject &subject) {
       for (const Fenced::Place place : {Fenced::at_end, Fenced::at_start}) {
         Lanes lanes(law, n, gap);
         vary(lanes, random, 1e-3);
-        asks_fenced(law, lanes, place);
+        evaluate_fenced(law, lanes, place);
       }
   Lanes whole(law, 13);
   vary(whole, random, 1e-3);
   whole.must(1e-3);
-  asks_with_nulls(law, whole);
+  evaluate_with_nulls(law, whole);
   return "";
 }
 
@@ -321,8 +319,7 @@ std::string unloads_without_leak(const Subject &subject) {
   constexpr int kCycles = 100;
   // bytes: less than one piece in each cycle is the C library's own housekeeping
   constexpr long kSmallestPiece = 24;
-  // What is left once (caches of the C library and the linker) is no leak: both halves after the
-  // warm-up must grow.
+  // What is allocated once (caches of libc, the linker) is no leak: both halves after warm-up must grow.
   struct Use { long heap, pages, files; } at[3] = {};
   for (int i = 0, mark = 0; i <= kCycles; ++i) {
     if (i == 20 || i == 60 || i == 100) at[mark++] = {heap_in_use(), pages_mapped(), files_open()};
@@ -363,7 +360,7 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
   constexpr int kThreads = 4;
   constexpr int kRounds = 20;
   // Each thread has batches of its own; params and data are shared, as in a world.
-  std::vector<std::vector<double>> told(kThreads), alone(kThreads);
+  std::vector<std::vector<double>> returned(kThreads), alone(kThreads);
   const auto work = [&](int t, std::vector<double> &out) {
     Random random(subject.seed + static_cast<uint64_t>(t));
     Lanes b(law, 97);
@@ -379,11 +376,11 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
     }
   };
   std::vector<std::thread> threads;
-  for (int t = 0; t < kThreads; ++t) threads.emplace_back(work, t, std::ref(told[t]));
+  for (int t = 0; t < kThreads; ++t) threads.emplace_back(work, t, std::ref(returned[t]));
   for (std::thread &t : threads) t.join();
   for (int t = 0; t < kThreads; ++t) {
     work(t, alone[t]);
-    if (std::memcmp(told[t].data(), alone[t].data(), told[t].size() * sizeof(double)) != 0)
+    if (std::memcmp(returned[t].data(), alone[t].data(), returned[t].size() * sizeof(double)) != 0)
       broken(
           "evaluated on %d threads at once it gives other forces than on one, so batches share data; keep it "
           "in state slots, or in what prepare() makes and eval only reads",
@@ -417,7 +414,7 @@ std::string writes_no_static(const Subject &subject) {
       trouble = Fenced::guard([&] { law.ops.eval(&b.in, &b.out); }, &at);
       ours = statics.hold(at);
     }
-    law.subject.plugin->host().give_back_scratch();
+    law.subject.plugin->host().release_scratch();
     if (trouble.empty()) return;
     if (!ours) broken("eval %s; touch only the arrays that are given", trouble.c_str());
     const std::string name = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);

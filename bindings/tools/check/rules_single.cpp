@@ -45,7 +45,7 @@ bool prepared(const Body &body, const dfm_f32 &table, const Variant &variant) {
 std::string single_is_close(const Subject &subject) {
   Random random(subject.seed);
   bool offered = false;
-  const std::string asked = for_variants(subject, [&](const Variant &variant) {
+  const std::string summary = for_variants(subject, [&](const Variant &variant) {
     Body body(subject, small_block(), variant);
     const auto *table = static_cast<const dfm_f32 *>(body.extension(DFM_EXT_F32));
     if (!table || !table->prepare || !table->add_forces) return;  // V03
@@ -77,7 +77,7 @@ std::string single_is_close(const Subject &subject) {
              with(variant).c_str());
   });
   if (!offered) skip("it does not offer " DFM_EXT_F32);
-  return asked;
+  return summary;
 }
 
 }  // namespace cli::check

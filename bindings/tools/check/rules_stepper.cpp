@@ -1,5 +1,4 @@
-// M10, M12 to M14, M17 to M19: how a model goes on from step to step, and what bodies that step themselves
-// answer to impulses.
+// M10, M12 to M14, M17 to M19: steps of a model, and the response of self-stepping bodies to impulses.
 #include <time.h>
 
 #include <algorithm>
@@ -104,7 +103,7 @@ std::string state_is_the_hosts(const Subject &subject) {
     again.v = v;
     again.state = state;
     again.t = t;
-    Body between(subject, small_block(Held::one_side), variant, 4, Body::Refusal::is_told);
+    Body between(subject, small_block(Held::one_side), variant, 4, Body::Refusal::is_reported);
     if (between.made()) {
       between.shake(0.05 * kCube, 0.1, random);
       run(between, 2, h);
@@ -164,8 +163,7 @@ std::string cost_grows_with_cells(const Subject &subject) {
 
 namespace {
 
-// The largest value of h^2 K + 2 h C over 4 M that some iterations of the power method find: never above
-// the true one.
+// A lower bound of the largest eigenvalue of h^2 K + 2 h C over 4 M, by the power method.
 double quotient(Body &body, double h, Random &random) {
   const Numbers x = body.x, v = body.v;
   const uint32_t n = body.points();
@@ -209,7 +207,7 @@ std::string bound_is_honest(const Subject &subject) {
   if (!model_of(subject).add_forces) skip("it steps itself and adds no forces");
   if (!model_of(subject).bound) skip("it names no bound; explicit steps take what the scene says");
   double wide = 1, narrow = 0;
-  const std::string asked = for_variants(subject, [&](const Variant &variant) {
+  const std::string summary = for_variants(subject, [&](const Variant &variant) {
     Random random(subject.seed);
     for (const double share : {0.0, 0.05}) {
       Body body(subject, small_block(), variant);
@@ -236,7 +234,7 @@ std::string bound_is_honest(const Subject &subject) {
       wide = std::min(wide, 1 / std::sqrt(over));
     }
   });
-  return text("%s, %.2f to %.2f below the limit", asked.c_str(), wide, narrow);
+  return text("%s, %.2f to %.2f below the limit", summary.c_str(), wide, narrow);
 }
 
 // ---- M14, M18, M19 ----------------------------------------------------------------------------------------
@@ -279,7 +277,7 @@ std::string for_steppers(const Subject &subject, const F &rule) {
   return for_variants(subject, [&](const Variant &variant) {
     for (const Held held : {Held::nothing, Held::one_side}) {
       Random random(subject.seed);
-      Body body(subject, small_block(held), variant, 4, Body::Refusal::is_told);
+      Body body(subject, small_block(held), variant, 4, Body::Refusal::is_reported);
       if (!body.made()) continue;  // held bodies may be none of its
       only_steppers(body);
       stage("%s, %s", with(variant).c_str(), held == Held::nothing ? "free" : "one side held");
@@ -292,7 +290,7 @@ std::string for_steppers(const Subject &subject, const F &rule) {
 
 std::string commit_is_predict_and_respond(const Subject &subject) {
   double worst = 0;
-  const std::string asked = for_steppers(subject, [&](Body &body, const Variant &variant, Random &random) {
+  const std::string summary = for_steppers(subject, [&](Body &body, const Variant &variant, Random &random) {
     Numbers load(body.x.size(), 0.0);
     for (uint32_t i = 0; i < body.points(); ++i) body.at(load, i)[2] = -9.81 * body.solid.mass[i];
     const std::vector<uint32_t> surfels = all_surfels(body);
@@ -311,8 +309,8 @@ std::string commit_is_predict_and_respond(const Subject &subject) {
           mean += body.solid.weight[e] * (body.x[at] - before[at]) / body.dt;
           way = std::max(way, std::fabs(before[at]));
         }
-        const double told = u[3 * size_t(s) + a] + du[3 * size_t(s) + a];
-        most = std::max(most, std::fabs(mean - told));
+        const double returned = u[3 * size_t(s) + a] + du[3 * size_t(s) + a];
+        most = std::max(most, std::fabs(mean - returned));
         speed = std::max(speed, std::fabs(u[3 * size_t(s) + a]) + std::fabs(du[3 * size_t(s) + a]));
       }
     worst = std::max(worst, most / speed);
@@ -323,7 +321,7 @@ std::string commit_is_predict_and_respond(const Subject &subject) {
           "make commit use the velocities of predict and respond",
           with(variant).c_str(), most, speed);
   });
-  return text("%s, %.0e at most", asked.c_str(), worst);
+  return text("%s, %.0e at most", summary.c_str(), worst);
 }
 
 std::string response_is_an_operator(const Subject &subject) {
@@ -422,7 +420,7 @@ std::string cut_does_not_matter(const Subject &subject) {
   const bool forces = model_of(subject).add_forces != nullptr;
   // large enough that threads get work
   const Solid solid = forces ? block(12, 12, 12) : small_block();
-  const auto answers = [&](Host::Cut cut) {
+  const auto results = [&](Host::Cut cut) {
     host.cut = cut;
     Random random(subject.seed);
     Body body(subject, solid, defaults);
@@ -444,11 +442,11 @@ std::string cut_does_not_matter(const Subject &subject) {
     host.cut = Host::Cut::grains;
     return out;
   };
-  const std::vector<double> told = answers(Host::Cut::whole);
+  const std::vector<double> returned = results(Host::Cut::whole);
   const uint64_t calls = host.parallel_calls;
   for (const Host::Cut cut : {Host::Cut::grains, Host::Cut::shuffled}) {
-    if (const std::vector<double> again = answers(cut);
-        std::memcmp(told.data(), again.data(), told.size() * sizeof(double)) != 0)
+    if (const std::vector<double> again = results(cut);
+        std::memcmp(returned.data(), again.data(), returned.size() * sizeof(double)) != 0)
       broken(
           "two steps of a body of %u cells have other bits when parallel_for divides its work otherwise; put "
           "partial sums into slot begin/grain, add them in the order of slots, and let no two pieces write "

@@ -99,7 +99,7 @@ std::string ending_of(int status) {
   _exit(0);
 }
 
-void read_reports(Answer &out, std::string &pending) {
+void read_reports(Outcome &out, std::string &pending) {
   for (size_t end; (end = pending.find('\0')) != std::string::npos; pending.erase(0, end + 1)) {
     const char letter = pending[0];
     const std::string what(pending, 1, end - 1);
@@ -151,7 +151,7 @@ void stage(const char *format, ...) {
   va_end(args);
 }
 
-void answer(const Verdict &verdict) {
+void send_verdict(const Verdict &verdict) {
   if (report >= 0)
     send(verdict.result == Result::pass ? 'P' : verdict.result == Result::fail ? 'F' : 'S', verdict.detail);
 }
@@ -159,7 +159,7 @@ void answer(const Verdict &verdict) {
 Verdict run_here(const Rule &rule, const Subject &subject) {
   try {
     const uint32_t kind = subject.type ? subject.type->kind : uint32_t(DFM_KIND_FRICTION);
-    const auto run = asked_of(rule, kind);
+    const auto run = check_for(rule, kind);
     if (!run) return {Result::skip, "does not apply to this kind of plugin"};
     return {Result::pass, run(subject)};
   } catch (const Broken &b) {
@@ -174,8 +174,8 @@ Verdict run_here(const Rule &rule, const Subject &subject) {
   }
 }
 
-Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments,
-                        const Limits &limits) {
+Outcome in_fresh_process(const std::string &command, std::vector<std::string> arguments,
+                         const Limits &limits) {
   const auto become = [&] {
     fcntl(report, F_SETFD, 0);
     arguments.push_back("--report-to");
@@ -193,7 +193,7 @@ Answer in_fresh_process(const std::string &command, std::vector<std::string> arg
 
 std::string same_elsewhere(const Subject &subject, uint64_t digest, const char *kind, const char *input) {
   const std::string number = std::to_string(subject.index), seed = std::to_string(subject.seed);
-  const Answer other =
+  const Outcome other =
       in_fresh_process(subject.command, {"plugin", "check", subject.file, "--digest", number, "--seed", seed},
                        {0.5 * subject.limit});
   const std::string mine = text("%016llx", static_cast<unsigned long long>(digest));
@@ -219,7 +219,7 @@ void open_pipe(int ends[2]) {
 // What the child writes: its reports, and what comes on its standard streams, of which the start is kept.
 class Heard {
  public:
-  explicit Heard(Answer &out) : out_(out) {}
+  explicit Heard(Outcome &out) : out_(out) {}
   void take_report(const char *bytes, ssize_t n) {
     pending_.append(bytes, static_cast<size_t>(n));
     read_reports(out_, pending_);
@@ -229,7 +229,7 @@ class Heard {
   }
 
  private:
-  Answer &out_;
+  Outcome &out_;
   std::string pending_;
 };
 
@@ -244,7 +244,7 @@ void read_rest(int fd, Take take) {
 
 }  // namespace
 
-Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
+Outcome in_own_process(const std::function<void()> &work, const Limits &limits) {
   int reports[2], output[2];
   open_pipe(reports);
   open_pipe(output);
@@ -257,7 +257,7 @@ Answer in_own_process(const std::function<void()> &work, const Limits &limits) {
   if (child < 0)
     throw Failure(kBadInput,
                   "the system cannot start another process for a rule; close programs, or use --in-process");
-  Answer out;
+  Outcome out;
   Heard heard(out);
   pollfd ends[2] = {{reports[0], POLLIN, 0}, {output[0], POLLIN, 0}};
   clockid_t clock;

@@ -1,5 +1,4 @@
-// How a rule is run: here, or in a process of its own with a limit, so that what crashes or hangs costs its
-// rule and nothing else.
+// Runs a rule here, or in a process with a limit, so that a crash or a hang ends only that rule.
 #pragma once
 #include <functional>
 #include <string>
@@ -19,7 +18,7 @@ void stage(const char *format, ...) __attribute__((format(printf, 1, 2)));
 // The child's side: where stages and the verdict go; -1: this process is not a child.
 void report_to(int descriptor);
 
-struct Answer {
+struct Outcome {
   bool spoke = false;  // the process gave a verdict
   Verdict verdict;
   std::string said;    // what it wrote to its standard streams
@@ -29,13 +28,13 @@ struct Answer {
   bool late = false;   // it was ended because it did not come back
 };
 // Runs work in a process of its own, which has loaded no plugin before, and waits within the limits.
-Answer in_own_process(const std::function<void()> &work, const Limits &limits);
-// The same in a fresh image of this program, with other addresses; the arguments say what to do,
-// --report-to is added.
-Answer in_fresh_process(const std::string &command, std::vector<std::string> arguments, const Limits &limits);
+Outcome in_own_process(const std::function<void()> &work, const Limits &limits);
+// The same in a new process of this program, at other addresses; --report-to is added to the arguments.
+Outcome in_fresh_process(const std::string &command, std::vector<std::string> arguments,
+                         const Limits &limits);
 // The digest, if a fresh process finds the same; else throws Broken. kind: "law"; input: "batches".
 std::string same_elsewhere(const Subject &subject, uint64_t digest, const char *kind, const char *input);
 // The child's last word.
-void answer(const Verdict &verdict);
+void send_verdict(const Verdict &verdict);
 
 }  // namespace cli::check

@@ -90,7 +90,7 @@ const Rule *find_rule(const std::string &id) {
   return nullptr;
 }
 
-std::string (*asked_of(const Rule &rule, uint32_t kind))(const Subject &) {
+std::string (*check_for(const Rule &rule, uint32_t kind))(const Subject &) {
   return kind == DFM_KIND_FRICTION ? rule.law : kind == DFM_KIND_MODEL ? rule.model : rule.solver;
 }
 

@@ -39,7 +39,7 @@ class Replay final : public SolveLaws {
     double least = part_.nbond ? p_.bond : HUGE_VAL;
     for (const double tangent : p_.tangent) least = std::min(least, tangent);
     newton_.begin(p_.rows, part_, systems_, p_.state, *this, p_.h);
-    result.solved = newton_.solve(least, p_.most_normal) && newton_.residual().due <= 1;
+    result.solved = newton_.solve(least, p_.most_normal) && newton_.residual().required <= 1;
     result.speed = newton_.residual().speed;
     result.passes = newton_.passes();
     result.steps = newton_.steps();
@@ -50,13 +50,13 @@ class Replay final : public SolveLaws {
   // remembers or something is attached.
   LocalProblem form();
 
-  bool answer(const double *response) override {
-    return !batches_.answer(p_.h, response, 0.1 * p_.rest, 1e-3, p_.state);
+  bool evaluate_local(const double *response) override {
+    return !batches_.evaluate_local(p_.h, response, 0.1 * p_.rest, 1e-3, p_.state);
   }
   bool slopes() override { return !batches_.slopes(p_.h, p_.state); }
   bool judge(Residual &residual) override {
     set_trial(p_.rows, part_, p_.h, p_.rows.wt.data(), p_.state);
-    if (batches_.answer(p_.h, p_.rows.wt.data(), 0.1 * p_.rest, 1e-2, p_.state)) return false;
+    if (batches_.evaluate_local(p_.h, p_.rows.wt.data(), 0.1 * p_.rest, 1e-2, p_.state)) return false;
     linearize(p_.rows, part_, p_.h, p_.state);
     residual = true_residual(p_.rows, part_, p_.state, p_.h, tolerance_);
     return true;
@@ -76,9 +76,10 @@ class Replay final : public SolveLaws {
 };
 
 // What impulses change of the points of an implicit body.
-class Answers {
+class Responder {
  public:
-  explicit Answers(LinearMotion &m) : m_(m), solver_(Memory::standard()), x_(3 * size_t{m.n}), b_(x_.size()) {
+  explicit Responder(LinearMotion &m)
+      : m_(m), solver_(Memory::standard()), x_(3 * size_t{m.n}), b_(x_.size()) {
     const BlockPattern p = m.pattern();
     std::vector<uint32_t> at(p.nb);
     for (uint32_t b = 0; b < p.nb; ++b) at[b] = b;
@@ -120,21 +121,22 @@ LocalProblem Replay::form() {
   if (!part_.nbond && std::none_of(s.form.begin(), s.form.begin() + std::ptrdiff_t(n), remembers))
     for (size_t i = 0; i < n; ++i)
       out.mu.push_back(s.form[i] == kSetValuedLaw && s.fn[i] > 0 ? s.limit[i] / s.fn[i] : 0);
-  std::vector<std::unique_ptr<Answers>> answers;
-  for (LinearMotion &m : p_.motions) answers.push_back(m.n > 0 ? std::make_unique<Answers>(m) : nullptr);
+  std::vector<std::unique_ptr<Responder>> responders;
+  for (LinearMotion &m : p_.motions) responders.push_back(m.n > 0 ? std::make_unique<Responder>(m) : nullptr);
   Array<double> y = rows.y_free;
   const auto put = [&](uint32_t source, const std::vector<double> &x) {
     for (uint32_t d = 0; d < rows.ndof; ++d)
       if (rows.block[d] == kNone && rows.source[d] == source)
         std::copy_n(&x[3 * size_t{rows.point[d]}], 3, &y[size_t{kStride} * d]);
   };
-  for (uint32_t k = 0; k < answers.size(); ++k)
-    if (answers[k]) put(k, answers[k]->free());
+  for (uint32_t k = 0; k < responders.size(); ++k)
+    if (responders[k]) put(k, responders[k]->free());
   out.q.resize(3 * n);
   for (uint32_t i = 0; i < n; ++i) {
     const Vec3 u = rows.velocity(i, y.data());
     store3(&out.q[3 * size_t{i}], u);
-    out.q[3 * size_t{i}] += rows.rate[i] + given(rows.impulse[3 * size_t{i}], &rows.yields[3 * size_t{i}]);
+    out.q[3 * size_t{i}] +=
+        rows.rate[i] + given(rows.impulse[3 * size_t{i}], &rows.compliance[3 * size_t{i}]);
   }
   out.W = Matrix(3 * n, 3 * n);
   const Array<double> solution = rows.y;
@@ -146,14 +148,14 @@ LocalProblem Replay::form() {
     rows.apply(i, unit);
     y = rows.y;
     const Vec3 push = load3(&rows.frame[size_t{9} * i + 3 * (c % 3)]);
-    for (uint32_t k = 0; k < answers.size(); ++k) {
-      if (!answers[k]) continue;
+    for (uint32_t k = 0; k < responders.size(); ++k) {
+      if (!responders[k]) continue;
       std::vector<double> impulses(3 * size_t{p_.motions[k].n});
       for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
         if (const uint32_t d = rows.dof[j]; rows.block[d] == kNone && rows.source[d] == k)
           store3(&impulses[3 * size_t{rows.point[d]}],
                  load3(&impulses[3 * size_t{rows.point[d]}]) + rows.weight[j] * push);
-      put(k, answers[k]->of(impulses));
+      put(k, responders[k]->of(impulses));
     }
     for (uint32_t j = 0; j < n; ++j) {
       const Vec3 u = rows.velocity(j, y.data()) + load3(&rows.drive[3 * size_t{j}]);

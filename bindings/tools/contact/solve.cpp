@@ -105,7 +105,7 @@ class Solve final : public SolveLaws {
     ImplicitSystem *const none = nullptr;
     std::vector<double> q = problem_.q;
     for (result_.runs = 0; result_.runs < kRuns;) {
-      if (result_.runs++ > 0 && newton_.residual().due > 1) set_response(kAdded);
+      if (result_.runs++ > 0 && newton_.residual().required > 1) set_response(kAdded);
       for (size_t k = 0; k < q.size(); ++k)
         rows_.y_free[4 * (k / 3) + k % 3] = rows_.y[4 * (k / 3) + k % 3] = q[k];
       newton_.begin(rows_, rows_.whole(), {&none, 1}, state_, *this, kStep);
@@ -127,7 +127,7 @@ class Solve final : public SolveLaws {
     }
   }
 
-  bool answer(const double *) override {
+  bool evaluate_local(const double *) override {
     ContactState &s = state_;
     for (uint32_t i = 0; i < n_; ++i) {
       const uint32_t second = s.stride + i;
@@ -153,7 +153,8 @@ class Solve final : public SolveLaws {
       residual.speed = std::max(residual.speed, left(i, v));
     }
     residual.normal = residual.speed;
-    residual.due = residual.relative = siconos_error(problem_, u, rows_.impulse.data()) / (0.1 * kSolved);
+    residual.required = residual.relative =
+        siconos_error(problem_, u, rows_.impulse.data()) / (0.1 * kSolved);
     return true;
   }
 

@@ -25,12 +25,12 @@ namespace {
 
 constexpr double kFrame = 1.0 / 60, kShort = kFrame / 16;  // s
 constexpr double kYoung = 1e5, kPoisson = 0.3, kDensity = 1000, kGravity = 9.81;
-constexpr double kUsed = 0.9;                   // of the proven step
-constexpr double kShare = 0.2, kMostShare = 1;  // s of processor time for one figure
+constexpr double kUsed = 0.9;                  // of the proven step
+constexpr double kShare = 0.2, kMaxShare = 1;  // s of processor time for one figure
 // cells of a body in a stack, where contact takes most of the time
-constexpr uint32_t kMostStacked = 2000;
+constexpr uint32_t kMaxStacked = 2000;
 // cells of a body that the processor moves; on a card the cost per point falls up to larger ones
-constexpr uint32_t kMostHere = 8000;
+constexpr uint32_t kMaxHere = 8000;
 
 double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
 double clock_time() {
@@ -40,14 +40,14 @@ double clock_time() {
 // "hardware" among the words of a model's parameter "device", which is no driver that computes on the
 // processor; -1: the model has none.
 double hardware_of(dfm_context *context, const std::string &model) {
-  struct Asked {
+  struct Requests {
     const std::string *id;
     double found;
-  } asked = {&model, -1};
+  } requested = {&model, -1};
   need(dfm_plugin_visit(
       context,
       [](void *user, const dfm_type *type, const char *) {
-        Asked &of = *static_cast<Asked *>(user);
+        Requests &of = *static_cast<Requests *>(user);
         if (type->kind != DFM_KIND_MODEL || *of.id != type->id) return;
         for (uint32_t i = 0; i < type->nparam; ++i) {
           const auto *const row = reinterpret_cast<const dfm_param *>(
@@ -57,8 +57,8 @@ double hardware_of(dfm_context *context, const std::string &model) {
             if (std::string_view(row->names[k]) == "hardware") of.found = k;
         }
       },
-      &asked));
-  return asked.found;
+      &requested));
+  return requested.found;
 }
 bool on_card(dfm_context *context, const std::string &model) { return hardware_of(context, model) >= 0; }
 
@@ -322,8 +322,7 @@ std::vector<double> lying(dfm_context *context, const std::string &model, int32_
   return bar.displacements();
 }
 
-// A sphere goes into the block in four strokes, each until all rests: forces then, and where points are after
-// the last.
+// A sphere goes into the block in four strokes, each until rest: the forces then, and the last positions.
 struct Dent { std::vector<double> force, displacements; };
 Dent dented(dfm_context *context, const std::string &model, int32_t integrator) {
   constexpr int kStrokes = 4, kMoves = 2, kRests = 10;  // steps
@@ -464,8 +463,8 @@ class Calibration {
     for (const auto &[touch, name] : kTouches) {
       std::vector<std::string> rows;
       for (const uint32_t cells : {400u, 2000u, 8000u, 64000u}) {
-        if (touch == Touch::stacked && cells > kMostStacked) continue;
-        if (cells > kMostHere && !on_card(context_, id)) continue;
+        if (touch == Touch::stacked && cells > kMaxStacked) continue;
+        if (cells > kMaxHere && !on_card(context_, id)) continue;
         Setting s;
         s.model = id;
         s.integrator = integrator;
@@ -516,7 +515,7 @@ class Calibration {
     const double begin = now();
     double spent = 0;
     unsigned n = 0;
-    for (; spent < kShare || (n < 4 && spent < kMostShare); ++n) {
+    for (; spent < kShare || (n < 4 && spent < kMaxShare); ++n) {
       step();
       spent = now() - begin;
     }

@@ -22,7 +22,7 @@ constexpr unsigned kPairs = 11;
 // of 1 - 2 (1 + 11) / 2^11 = 98.8 %, whatever their distribution.
 constexpr unsigned kOutside = 1;
 constexpr double kChunk = 0.03;  // s of processor time; shorter ones are hard to distinguish
-constexpr unsigned kMostSteps = 20000;
+constexpr unsigned kMaxSteps = 20000;
 
 double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
 
@@ -145,7 +145,7 @@ class Meter {
 
   void compare(const SceneFile &with_scene, const SceneFile &without_scene, EffectCost &out) {
     Course with(with_scene, step_), without(without_scene, step_);
-    const double most = std::min(double(kMostSteps), std::max(1.0, scene_.settings().duration / step_));
+    const double most = std::min(double(kMaxSteps), std::max(1.0, scene_.settings().duration / step_));
     unsigned steps = 1;
     // also what the first steps have to make once is out of the way then
     for (double took = 0; (took = with.run(steps)) < kChunk && steps < most;)

@@ -6,9 +6,9 @@
 namespace cli::cost {
 namespace {
 
-constexpr double kLeastOrder = 0.8, kOrderOfCells = 2, kSlowest = 1e-3;
+constexpr double kMinOrder = 0.8, kOrderOfCells = 2, kSlowest = 1e-3;
 constexpr double kOfThree = 1.25, kWithoutOrder = 3;  // factors of safety
-constexpr double kLeastRatio = 1.001;                 // of sizes of cells: below, meshes are alike
+constexpr double kMinRatio = 1.001;                   // of sizes of cells: below, meshes are alike
 constexpr double kNothing = 1e-12;                    // a distance of two runs that is rounding
 constexpr double kSameWay = 0.9;  // least cosine of the angle between differences that point the same way
 
@@ -70,26 +70,26 @@ Limit find_limit(const Quantity &fine, const Quantity &middle, const Quantity *c
   limit = fine;
   const double apart = error_of(middle, fine, scale);
   const auto of_event = [&](double e) { return fine.event ? std::min(e, 1.0) : e; };
-  if (!(h[1] > h[0] * kLeastRatio)) {
+  if (!(h[1] > h[0] * kMinRatio)) {
     out.basis = Basis::same_mesh;
     out.error = out.bound = of_event(apart);
     return out;
   }
   out.error = of_event(apart * rest_of(h[0], h[1], 1));
-  if (!coarse || !(h[2] > h[1] * kLeastRatio)) return out;
+  if (!coarse || !(h[2] > h[1] * kMinRatio)) return out;
 
   const double before = error_of(*coarse, middle, scale), across = error_of(*coarse, fine, scale);
   const double quotient = before / apart;
   const bool same_way = !fine.event && apart > 0 && cosine(fine, middle, *coarse) >= kSameWay;
   if (same_way) out.order = order_of(quotient, h);
-  out.used = out.order >= kLeastOrder;
+  out.used = out.order >= kMinOrder;
   if (out.used) {
     const double p = std::min(out.order, kOrderOfCells), rest = rest_of(h[0], h[1], p);
     limit = beyond(fine, middle, rest);
     out.basis = Basis::order;
     out.error = out.bound = std::max(error_of(beyond(middle, *coarse, rest_of(h[1], h[2], p)), limit, scale),
                                      (kOfThree - 1) * rest * apart);
-  } else if (out.order < kLeastOrder) {
+  } else if (out.order < kMinOrder) {
     out.basis = Basis::slow_order;
     out.error = out.bound = kOfThree * rest_of(h[0], h[1], out.order) * apart;
   } else {

@@ -28,7 +28,7 @@ namespace fs = std::filesystem;
 namespace cli::cost {
 namespace {
 
-constexpr double kLeast = 0.02;        // s of the budget with which a run is worth beginning
+constexpr double kMin = 0.02;          // s of the budget with which a run is worth beginning
 constexpr double kMemoryShare = 0.25;  // of the machine's memory, for runs that wait
 volatile std::sig_atomic_t interrupted = 0;
 
@@ -236,11 +236,11 @@ bool Runs::ended(Child &child) {
     child.made = child.before + now;
   if (waitpid(child.pid, &status, WNOHANG) == 0) {
     if (now > job.limit + 10) kill(child.pid, SIGKILL);
-    if (child.told) return false;
+    if (child.notified) return false;
     if (work_of(child.pid) <= job.work && now <= job.limit) return false;
-    if (left() > kLeast && pause(child)) return true;
+    if (left() > kMin && pause(child)) return true;
     kill(child.pid, SIGTERM);
-    child.told = true;
+    child.notified = true;
     return false;
   }
   child.before += now;
@@ -267,7 +267,7 @@ void Runs::take_result(Child &child, int status) {
   if (code == kDone && whole && summary.get("finite") == "true") {
     o.state = Outcome::done;
     o.sentence.clear();
-  } else if (child.told && code != kStopped) {
+  } else if (child.notified && code != kStopped) {
     o.state = Outcome::cut;
     o.sentence.clear();
   } else if (code == kStopped || code == kDone) {
@@ -294,7 +294,7 @@ void Runs::stop_all(std::vector<Child> &children) {
 }
 
 bool Runs::waits(Job &job) const {
-  if (job.limit < kLeast || job.outcome.settled()) return true;
+  if (job.limit < kMin || job.outcome.final_state()) return true;
   if (job.outcome.state != Outcome::cut) return false;
   const auto same = [&](const Child &c) { return c.job == &job; };
   const bool goes_on = std::any_of(paused_.begin(), paused_.end(), same);

@@ -21,7 +21,7 @@ struct Outcome {
   double limit = 0;               // the least of both limits that ended it
   double steps = 0, cells = 0;
   bool kept = false;  // from an earlier call
-  bool settled() const { return state == done || state == unstable || state == refused; }
+  bool final_state() const { return state == done || state == unstable || state == refused; }
   // s on the clock that the whole run would take; of a run that was cut an estimate by how far it came,
   // infinity where it came nowhere
   double predicted(double duration) const;
@@ -61,9 +61,9 @@ class Runs {
     int pid = 0;
     Job *job = nullptr;
     Clock::time_point begin;
-    double before = 0;  // s at work until it was stopped
-    double made = 0;    // of its outcome
-    bool told = false;  // to end
+    double before = 0;      // s at work until it was stopped
+    double made = 0;        // of its outcome
+    bool notified = false;  // to end
   };
   void start(Job &job, Child &out);
   bool waits(Job &job) const;  // there is nothing to do for it now

@@ -554,7 +554,7 @@ class Student {
     for (auto &[pointer, value] : job.set)
       if (picture && pointer == "/output/frames") value = number(1 / s_.duration);
     runs_.prepare(job, "alone");
-    if (!job.outcome.settled()) {
+    if (!job.outcome.final_state()) {
       if (row.job.outcome.took + (picture ? kPictureTime : 0) > runs_.left()) return;
       job.limit = runs_.left();
       runs_.run({&job}, 1);

@@ -18,7 +18,7 @@ namespace {
 constexpr double kTwoPi = 6.283185307179586476925286766559;
 // N s/m: a prescribed motion does not yield, so the force that would stop it is almost infinite
 constexpr double kFirmDrive = 1e18;
-constexpr double kMostSteps = 2e9;
+constexpr double kMaxSteps = 2e9;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 double sinc(double a) { return std::fabs(a) < 1e-8 ? 1.0 : std::sin(a) / a; }
@@ -254,7 +254,7 @@ class Rig {
   // ---- the runs ----
 
   void refuse_too_many(double steps) const {
-    if (steps > kMostSteps)
+    if (steps > kMaxSteps)
       throw Failure(kBadInput, "--step " + short_text(step_) + " s means " + short_text(steps) +
                                    " steps, expected 2e9 at most");
   }
@@ -390,7 +390,7 @@ class Rig {
       bool after = false;  // the sample behind the peak is still to come
       const uint64_t begun = out_.steps;
       for (int64_t k = 1; v_.vx < 30 * v_s; ++k) {
-        if (double(out_.steps - begun) > kMostSteps / 100)
+        if (double(out_.steps - begun) > kMaxSteps / 100)
           throw Failure(kStopped, "the ramp of " + short_text(rate) + " N/s has not made the mass slide");
         const double slower = v_.vx, earlier = t_;
         advance(earlier, double(k) * h);

@@ -9,9 +9,9 @@
 namespace labels {
 namespace {
 
-constexpr double kLeastQuality = 0.3;  // mean ratio below which no point is moved
-constexpr int kRounds = 8;             // over all points; the last ones change little
-constexpr int kPasses = 4;             // that restore the volume
+constexpr double kMinQuality = 0.3;  // mean ratio below which no point is moved
+constexpr int kRounds = 8;           // over all points; the last ones change little
+constexpr int kPasses = 4;           // that restore the volume
 constexpr uint32_t kNone = ~uint32_t(0);
 
 using Vec = std::array<double, 3>;
@@ -61,7 +61,7 @@ class Near {
     const Key c = key(p);
     Vec best = p;
     double least = std::numeric_limits<double>::infinity();
-    for (int64_t reach = 0; reach < kMostCubes; ++reach) {
+    for (int64_t reach = 0; reach < kMaxCubes; ++reach) {
       if (const double apart = double(reach - 1) * size_; apart > 0 && apart * apart > least) break;
       for (int64_t i = -reach; i <= reach; ++i)
         for (int64_t j = -reach; j <= reach; ++j)
@@ -83,7 +83,7 @@ class Near {
 
  private:
   using Key = std::array<int64_t, 3>;
-  static constexpr int64_t kMostCubes = 16;  // a point of a cell that is half inside is nearer than two
+  static constexpr int64_t kMaxCubes = 16;  // a point of a cell that is half inside is nearer than two
   Vec corner(uint32_t t, size_t i) const {
     const double *x = &shell_.points[3 * size_t(shell_.triangles[3 * size_t(t) + i])];
     return {x[0], x[1], x[2]};
@@ -212,10 +212,10 @@ class Fit {
   void move_outer(uint32_t v) {
     Vec mean = {0, 0, 0};
     for (const uint32_t w : beside_[v]) mean = mean + 1.0 / double(beside_[v].size()) * x_[w];
-    if (moved(v, near_.closest(0.5 * (x_[v] + mean), nullptr), kLeastQuality)) return;
+    if (moved(v, near_.closest(0.5 * (x_[v] + mean), nullptr), kMinQuality)) return;
     const Vec way = near_.closest(x_[v], nullptr) - x_[v];
     for (const double part : {1.0, 0.5, 0.25})
-      if (moved(v, x_[v] + part * way, kLeastQuality)) return;
+      if (moved(v, x_[v] + part * way, kMinQuality)) return;
   }
   // Chords of a round surface lie inside it: all points go outward by what the volume lacks over the area.
   void restore(double volume) {
@@ -230,7 +230,7 @@ class Fit {
     }
     for (uint32_t v = 0; v < x_.size(); ++v)
       if (const double size = std::sqrt(dot(normal[v], normal[v])); on_[v] && size > 0)
-        moved(v, x_[v] + (volume - held) / (area * size) * normal[v], kLeastQuality);
+        moved(v, x_[v] + (volume - held) / (area * size) * normal[v], kMinQuality);
   }
   // To the middle of its cells' points where that makes the worst of its cells better.
   void move_inner(uint32_t v) {

@@ -41,7 +41,7 @@ class Maker {
     read();
     reduce();
     surfaces_ = surfaces_of(volume_, target_, o_.passes);
-    report_.put_back = surfaces_.put_back;
+    report_.restored = surfaces_.restored;
     report_.crossing = surfaces_.crossing;
     cli::make_folder(o_.out);
     cli::make_folder(o_.out + "/surfaces");
@@ -54,7 +54,7 @@ class Maker {
 
  private:
   void warn(const std::string &sentence) { report_.warnings.push_back(sentence); }
-  std::string told(const Entry &e) const {
+  std::string describe(const Entry &e) const {
     return "label " + std::to_string(volume_.value[e.label]) + " (" + e.name + ")";
   }
 
@@ -84,7 +84,7 @@ class Maker {
     for (const size_t n : count_) target_.push_back(double(n) * cell);
     for (const Entry &e : table_.entries)
       if (count_[e.label] < kFewVoxels)
-        warn(told(e) + " has only " + std::to_string(count_[e.label]) +
+        warn(describe(e) + " has only " + std::to_string(count_[e.label]) +
              (count_[e.label] == 1 ? " voxel" : " voxels") + ", too few for its shape to be known");
   }
 
@@ -122,7 +122,7 @@ class Maker {
         refuse(o_.volume,
                "%s has %zu voxels and is lost where %u x %u x %u of them are joined; give a smaller "
                "--spacing, or leave it out by \"skip\": true",
-               told(e).c_str(), count_[e.label], report_.factor[0], report_.factor[1], report_.factor[2]);
+               describe(e).c_str(), count_[e.label], report_.factor[0], report_.factor[1], report_.factor[2]);
   }
 
   std::string beyond(uint16_t label) const {
@@ -180,13 +180,13 @@ class Maker {
     report_.open_edges += shell.open_edges;
     report_.largest_change = std::max(report_.largest_change, std::fabs(r.volume / r.voxel_volume - 1));
     if (std::fabs(r.volume / r.voxel_volume - 1) > 0.02)
-      warn(told(e) + ": its surface encloses " +
+      warn(describe(e) + ": its surface encloses " +
            std::to_string(std::lround(100 * std::fabs(r.volume / r.voxel_volume - 1))) +
            (r.volume < r.voxel_volume ? " % less than" : " % more than") + " its voxels do" +
            (report_.factor[0] * report_.factor[1] * report_.factor[2] > 1 ? "; a smaller --spacing keeps more"
                                                                           : ""));
     if (r.at_border)
-      warn(told(e) + " reaches the border of the volume, where its surface is closed by a plane");
+      warn(describe(e) + " reaches the border of the volume, where its surface is closed by a plane");
     report_.labels.push_back(r);
   }
 
@@ -309,9 +309,9 @@ class Maker {
     dfm_tetmesh_info info = {};
     info.size = sizeof info;
     const uint32_t wanted = cells_of(t);
-    uint32_t asked = wanted;
+    uint32_t requested = wanted;
     for (int again = kRefills;; --again) {
-      need(dfm_tetmesh_fill(h.surface, asked, &h.cells));
+      need(dfm_tetmesh_fill(h.surface, requested, &h.cells));
       need(dfm_tetmesh_get_info(h.cells, &info));
       cells = cells_in(h.cells, info);
       r.quality_min = info.quality_min;
@@ -320,7 +320,8 @@ class Maker {
       fit(shell, group, info.edge_median, cells, r);
       if (again == 0 || cells.share.size() >= 0.9 * wanted) break;
       // cells that are mostly outside have gone, fewer of each hundred the smaller they are
-      asked = uint32_t(asked * std::pow(wanted / std::max(wanted / 8.0, double(cells.share.size())), 0.8));
+      requested =
+          uint32_t(requested * std::pow(wanted / std::max(wanted / 8.0, double(cells.share.size())), 0.8));
       need(dfm_tetmesh_destroy(std::exchange(h.cells, 0)));
     }
     if (info.warnings[0]) warn("the body " + t.name + ": " + info.warnings);
@@ -344,12 +345,12 @@ class Maker {
       const LabelReport &l = report_.labels[e];
       const double more = l.cell_volume / l.voxel_volume - 1;
       if (l.cells > 0 && std::fabs(more) > 0.1)
-        warn(told(table_.entries[e]) + ": its cells hold " +
+        warn(describe(table_.entries[e]) + ": its cells hold " +
              std::to_string(std::lround(100 * std::fabs(more))) +
              (more < 0 ? " % less than" : " % more than") +
              " its voxels do; give more cells by --cells or in the table");
       if (l.cells == 0)
-        warn(told(table_.entries[e]) +
+        warn(describe(table_.entries[e]) +
              " is smaller than a cell and has none; give more cells by --cells or in "
              "the table");
     }

@@ -45,7 +45,7 @@ struct Report {
   std::vector<LabelReport> labels;
   std::vector<ThingReport> things;
   std::vector<Border> borders;
-  size_t open_edges = 0, crossing = 0, put_back = 0;
+  size_t open_edges = 0, crossing = 0, restored = 0;
   double largest_change = 0;  // of a label's volume, share of that of its voxels
   std::vector<std::string> warnings;
 };

@@ -432,8 +432,7 @@ class Net {
     return true;
   }
 
-  // Vertices of what crosses go halfway back to their corners, at the sixth time all the way. Faces of voxels
-  // do not cross, so this ends.
+  // Vertices of crossing triangles go halfway back, the sixth time all the way: voxel faces never cross.
   void uncross(Surfaces &out) {
     std::vector<uint8_t> times(corner_.size(), 0);
     for (int round = 0; round < 200; ++round) {
@@ -449,7 +448,7 @@ class Net {
         times[v] = std::min<uint8_t>(times[v], 100);
       }
     }
-    for (const uint8_t t : times) out.put_back += t > 0;
+    for (const uint8_t t : times) out.restored += t > 0;
   }
 
   void fill(Surfaces &out) const {

@@ -39,7 +39,7 @@ struct Surfaces {
   // counter-clockwise seen from the front
   std::vector<std::array<uint16_t, 2>> sides;
   std::vector<double> volume;  // [value.size()] m3 enclosed
-  size_t put_back = 0;         // vertices that went back toward their corner, so that nothing crosses
+  size_t restored = 0;         // vertices that went back toward their corner, so that nothing crosses
   size_t crossing = 0;         // pairs of triangles that cross or fold onto each other: 0
 };
 // target: [value.size()] m3, volumes that smoothing is to keep. passes: of smoothing; 0: corners of voxels.

@@ -12,8 +12,8 @@ namespace {
 using cli::JsonMember;
 using cli::JsonValue;
 
-constexpr uint64_t kMostBytes = 16 << 20;
-constexpr uint32_t kMostCells = 5000000;
+constexpr uint64_t kMaxBytes = 16 << 20;
+constexpr uint32_t kMaxCells = 5000000;
 
 // For names of files, bodies and groups alike.
 std::string plain_name(const std::string &name) {
@@ -37,7 +37,7 @@ class Reader {
   Reader(const std::string &path, const Volume &volume) : path_(path), volume_(volume) {}
 
   Table read() {
-    const std::string text = cli::read_file(path_, kMostBytes, "a table of labels");
+    const std::string text = cli::read_file(path_, kMaxBytes, "a table of labels");
     JsonValue root;
     size_t where = 0;
     std::string why;
@@ -204,8 +204,8 @@ class Reader {
         }
         if (key.name != "cells") continue;
         int64_t cells = 0;
-        if (!to_number(key.value.text, cells) || cells < 1 || cells > kMostCells)
-          refuse(path_, "%s/cells: expected a whole number from 1 to %u", pointer.c_str(), kMostCells);
+        if (!to_number(key.value.text, cells) || cells < 1 || cells > kMaxCells)
+          refuse(path_, "%s/cells: expected a whole number from 1 to %u", pointer.c_str(), kMaxCells);
         t.cells = uint32_t(cells);
         t.more.members.erase(t.more.members.begin() + long(i--));
       }

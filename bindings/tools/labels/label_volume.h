@@ -11,7 +11,7 @@
 namespace labels {
 
 // A file holds at most this many values that differ; an image of gray values holds more.
-constexpr size_t kMostLabels = 1024;
+constexpr size_t kMaxLabels = 1024;
 
 struct Volume {
   std::array<uint32_t, 3> size{};  // voxels per axis; the first axis runs fastest
@@ -38,8 +38,7 @@ struct Encoding {
 // unit: m that a length of 1 in the file has; 0: as the file says, else millimeters with a note
 Volume read_labels(const std::string &path, double unit = 0);
 
-// The same for bytes in memory. path: for sentences, and the folder of a data file; empty: data files are
-// refused
+// The same for bytes in memory. path: for messages, and the folder of a data file; empty: none allowed
 Volume read_labels(const std::string &path, std::string_view bytes, double unit);
 
 // ---- parts of the readers ----

@@ -1,5 +1,4 @@
-// deform-labels, which `deform mesh from-labels VOLUME --out DIR` and `deform mesh phantom KIND --out FILE`
-// start.
+// deform-labels, started by `deform mesh from-labels` and `deform mesh phantom`.
 #include <cstdio>
 #include <memory>
 
@@ -70,7 +69,7 @@ std::string report_json(const labels::Report &r, const std::string &out) {
       .add("borders", json_array(borders))
       .add("open_edges", whole(r.open_edges))
       .add("crossing_pairs", whole(r.crossing))
-      .add("vertices_put_back", whole(r.put_back))
+      .add("vertices_put_back", whole(r.restored))
       .add("largest_volume_change", number(r.largest_change))
       .add("warnings", json_array(warnings))
       .text();
@@ -107,7 +106,7 @@ void print_table(const labels::Report &r, const labels::Options &o) {
                 b.held ? "held by" : "attached to", shown(b.b).c_str(), b.points);
   std::printf("  closed: %s; pairs of triangles that cross: %zu; largest change of a volume: %.2g %%\n",
               r.open_edges ? "no" : "yes", r.crossing, 100 * r.largest_change);
-  if (r.put_back) std::printf("  %zu vertices are smoothed less, so that no triangles cross\n", r.put_back);
+  if (r.restored) std::printf("  %zu vertices are smoothed less, so that no triangles cross\n", r.restored);
   for (const labels::ThingReport &t : r.things)
     if (!t.obstacle && t.triangles > kManyTriangles * t.cells)
       std::printf("  %s: contact takes time for each of its %u triangles; a larger --spacing makes fewer\n",
@@ -120,7 +119,7 @@ int from_labels(const Globals &globals, const labels::Options &options) {
   if (!s.context) return fail(dfm_last_error());
   labels::Report report;
   {
-    const Patience patience(told(globals), "making surfaces and bodies of " + options.volume);
+    const Patience patience(show_progress(globals), "making surfaces and bodies of " + options.volume);
     report = labels::make_scene(s.context, options);
   }
   write_whole(options.out + "/summary.json", indented(report_json(report, options.out)));

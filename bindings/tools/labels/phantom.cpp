@@ -13,7 +13,7 @@ namespace labels {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kMostVoxels = 1e8;
+constexpr double kMaxVoxels = 1e8;
 
 // A later shape replaces what it covers of earlier ones. An ellipsoid; a cylinder along z with an elliptic
 // section, from end to end of the volume; or a box.
@@ -73,7 +73,7 @@ Phantom make_phantom(const std::string &kind, double voxel) {
     const double cells = cut ? std::floor(2 * half / voxel + 0.5) : std::ceil(2 * half / voxel - 1e-6);
     hi[k] = lo[k] + std::max(1.0, cells) * voxel;
     count *= std::max(1.0, cells);
-    if (count > kMostVoxels)
+    if (count > kMaxVoxels)
       throw cli::Failure(cli::kBadInput, "--voxel: this makes more than 1e8 voxels; give a larger length");
     out.volume.size[size_t(k)] = uint32_t(std::max(1.0, cells));
     out.volume.origin[k] = lo[k] + voxel / 2;

@@ -16,9 +16,9 @@
 namespace labels {
 namespace {
 
-constexpr uint64_t kMostBytes = uint64_t(1) << 32;
+constexpr uint64_t kMaxBytes = uint64_t(1) << 32;
 // Deflate packs at most 258 bytes into 2 bits.
-constexpr uint64_t kMostDeflated = 1032;
+constexpr uint64_t kMaxDeflated = 1032;
 constexpr size_t kBlock = size_t(1) << 18;
 
 bool is_space(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
@@ -174,12 +174,12 @@ class Collector {
     if (value == last_) return last_index_;
     const auto [entry, is_new] = index_.emplace(value, uint16_t(out_.value.size()));
     if (is_new) {
-      if (out_.value.size() == kMostLabels)
+      if (out_.value.size() == kMaxLabels)
         refuse(
             path_,
             "more than %zu values differ, so these are gray values and not labels; give the label map that "
             "a segmentation program writes",
-            kMostLabels);
+            kMaxLabels);
       out_.value.push_back(value);
     }
     last_ = value;
@@ -258,7 +258,7 @@ void take_voxels(const std::string &path, const Stored &stored, std::string_view
     out.take(bytes.data(), size_t(promised));
     return;
   }
-  if (promised / kMostDeflated > bytes.size()) truncated(path, promised - bytes.size() * kMostDeflated);
+  if (promised / kMaxDeflated > bytes.size()) truncated(path, promised - bytes.size() * kMaxDeflated);
   inflate_into(path, bytes, out);
 }
 
@@ -269,7 +269,7 @@ std::string beside(const std::string &path, const std::string &name) {
 
 void read_voxels(const std::string &path, std::string_view bytes, const Stored &stored, Volume &out) {
   const uint64_t promised = uint64_t(out.voxels()) * stored.encoding.bytes;
-  if (promised > kMostBytes)
+  if (promised > kMaxBytes)
     refuse(path, "%u x %u x %u voxels of %u bytes are more than 4 GiB; crop the volume", out.size[0],
            out.size[1], out.size[2], stored.encoding.bytes);
   std::string data, file = path;
@@ -278,14 +278,14 @@ void read_voxels(const std::string &path, std::string_view bytes, const Stored &
     if (path.empty()) refuse("volume", "the voxels lie in a file of their own, which is not read here");
     file = beside(path, stored.file);
     try {
-      data = cli::read_file(file, kMostBytes, "the voxels of a label map");
+      data = cli::read_file(file, kMaxBytes, "the voxels of a label map");
     } catch (const cli::Failure &e) {
       refuse(path, "its voxels lie in a file of their own that cannot be read: %s", e.what());
     }
     held = data;
   }
   // before as much is reserved as the header says
-  if (promised / (stored.encoding.compressed ? kMostDeflated : 1) > held.size())
+  if (promised / (stored.encoding.compressed ? kMaxDeflated : 1) > held.size())
     truncated(file, promised - held.size());
   Collector collector(file, stored.encoding, out);
   take_voxels(file, stored, held, promised, collector);
@@ -318,16 +318,16 @@ void check_axes(const std::string &path, const Volume &v) {
 }  // namespace
 
 Volume read_labels(const std::string &path, std::string_view bytes, double unit) {
-  const std::string told = path.empty() ? "volume" : path;
+  const std::string where = path.empty() ? "volume" : path;
   Stored stored;
-  if (bytes.substr(0, 4) == "NRRD") stored = read_nrrd(told, bytes);
+  if (bytes.substr(0, 4) == "NRRD") stored = read_nrrd(where, bytes);
   else if (trimmed(bytes.substr(0, bytes.find('\n'))).find('=') != std::string_view::npos)
-    stored = read_metaimage(told, bytes);
+    stored = read_metaimage(where, bytes);
   else if (bytes.substr(0, 2) == "\x1f\x8b")
-    refuse(told,
+    refuse(where,
            "is packed as a whole (a NIfTI file, perhaps); save the label map as .nrrd or .mha, whose voxels "
            "may be packed");
-  else refuse(told, "is neither NRRD nor MetaImage; save the label map as .nrrd or .mha");
+  else refuse(where, "is neither NRRD nor MetaImage; save the label map as .nrrd or .mha");
   Volume out = std::move(stored.volume);
   if (unit == 0) unit = stored.unit;
   if (unit == 0) {
@@ -338,13 +338,13 @@ Volume read_labels(const std::string &path, std::string_view bytes, double unit)
     out.origin[k] *= unit;
     for (double &x : out.axis[k]) x *= unit;
   }
-  check_axes(told, out);
+  check_axes(where, out);
   read_voxels(path, bytes, stored, out);
   return out;
 }
 
 Volume read_labels(const std::string &path, double unit) {
-  return read_labels(path, cli::read_file(path, kMostBytes + (1 << 20), "a label map"), unit);
+  return read_labels(path, cli::read_file(path, kMaxBytes + (1 << 20), "a label map"), unit);
 }
 
 }  // namespace labels

@@ -68,7 +68,8 @@ constexpr uint32_t kGrain = 64;
 
 // The first time of every candidate that `wanted`, each into its own place.
 template <class Wanted>
-void ask(World &w, StepContext &step, Buffers &r, std::span<const double *const> fraction, Wanted &&wanted) {
+void query_impacts(World &w, StepContext &step, Buffers &r, std::span<const double *const> fraction,
+                   Wanted &&wanted) {
   const Array<Candidate> &list = step.broad.candidates();
   const ImpactQuery query(step.body_views, step.obstacle_views, step.h, w.offset);
   w.context->tasks.parallel_for(static_cast<uint32_t>(list.size()), kGrain,
@@ -117,12 +118,12 @@ void find_islands(World &w, StepContext &step, Buffers &r) {
   r.hits.resize(list.size());
   r.joins.assign(list.size(), 0);
   r.joined.clear();
-  ask(w, step, r, {}, [](const ImpactQuery &, uint32_t) { return true; });
+  query_impacts(w, step, r, {}, [](const ImpactQuery &, uint32_t) { return true; });
   if (!take_new(r)) return;
   const size_t own = r.joined.size();
   do {
     set_fractions(step, r, query, own);
-    ask(w, step, r, r.fractions, [&](const ImpactQuery &q, uint32_t i) {
+    query_impacts(w, step, r, r.fractions, [&](const ImpactQuery &q, uint32_t i) {
       if (r.joins[i]) return false;
       uint32_t node[4];
       const uint32_t n = q.nodes(list[i], node);
@@ -268,7 +269,7 @@ bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   set_forces(w, step, r);
   for (SolveIsland &island : step.solve_islands->all())
     if (const LawInstance *bad = island.batches.evaluate(step.h, step.state)) {
-      *trouble |= tell_failed_solve(w, step, bad, island.batches.failed());
+      *trouble |= report_failed_solve(w, step, bad, island.batches.failed());
       return false;
     }
   w.stats.passes = step.rows.n > 0;
@@ -288,7 +289,7 @@ bool sub_step(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   step.driven.clear();
   step.guard.start();
   step.guard.planned = step.h;
-  step.ended = step.struck = false;
+  step.ended = step.in_impact = false;
   for (const PlannedStage &planned : w.plan.stages) {
     const auto start = std::chrono::steady_clock::now();
     const bool solves = planned.role == StageRole::solves;
@@ -344,7 +345,7 @@ void take_over(World &w, Buffers &r) {
   prepare(w);
   check(w);
   std::erase_if(w.plan.stages, [](const PlannedStage &s) {
-    return s.role == StageRole::finds_contacts || s.role == StageRole::gives_impulses ||
+    return s.role == StageRole::finds_contacts || s.role == StageRole::reports_impulses ||
            s.role == StageRole::guards;
   });
   r.lagged.resize(w.bodies.size());
@@ -361,12 +362,12 @@ dfm_status Scheme::step(dfm_world world, double dt, uint32_t *trouble) {
     World &w = exclusive(world_of(world));
     StepContext &step = *w.steps;
     take_over(w, *buffers_);
-    if (bound_due(w)) update_bound(w);
+    if (bound_expired(w)) update_bound(w);
     uint32_t bits = 0, done = 0;
     const double start = w.time, goal = start + dt;
     begin_impulses(w.step_impulses, start, dt);
-    for (double left = choose_pieces(w.sizes, dt, w.bound.step); left > 0; --left) {
-      if (bound_due(w)) {
+    for (double left = choose_substeps(w.sizes, dt, w.bound.step); left > 0; --left) {
+      if (bound_expired(w)) {
         update_bound(w);
         left *= cut_finer(w.sizes, (goal - w.time) / left, w.bound.step);
       }
@@ -387,7 +388,7 @@ dfm_status Scheme::step(dfm_world world, double dt, uint32_t *trouble) {
     w.stats.substeps_max = std::max(w.stats.substeps_max, done);
     w.stats.steps = ++w.step_count;
     w.stats.time = w.time;
-    look_at_sensors(w, true);
+    update_sensors(w, true);
     return DFM_OK;
   });
 }

@@ -7,7 +7,7 @@
 
 using namespace dfm;
 
-void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) { give_default(size, out, {}); }
+void dfm_attach_def_default_sized(uint32_t size, dfm_attach_def *out) { write_default(size, out, {}); }
 
 dfm_status dfm_body_attach(dfm_body body, const dfm_attach_def *def, uint32_t *attachment) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
@@ -36,5 +36,5 @@ dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out,
 }
 
 dfm_status dfm_body_get_attachment(dfm_body body, uint32_t attachment, dfm_attachment *out) {
-  return as_status([&] { give(out, attachment_report(settled(body_of(body)), attachment)); });
+  return as_status([&] { copy_out(out, attachment_report(not_in_step(body_of(body)), attachment)); });
 }

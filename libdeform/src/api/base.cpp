@@ -83,7 +83,7 @@ dfm_status dfm_file_write(const char *path, const void *bytes, size_t n) {
 void dfm_context_def_default_sized(uint32_t size, dfm_context_def *out) {
   dfm_context_def def{};
   def.threads = 1;
-  give_default(size, out, def);
+  write_default(size, out, def);
 }
 
 dfm_status dfm_context_create(const dfm_context_def *def, dfm_context **out) {

@@ -106,15 +106,15 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
   Spring s{b.next_load, {d.points, d.points + d.npoint}, {}, {}, load3(d.to), d.stiffness, d.damping};
   if (d.nkey) s.keys.assign(d.keys, d.keys + d.nkey);
   check_keys(s.keys, name);
-  double sum = 0, poison = 0;
+  double sum = 0, nan_flag = 0;
   for (uint32_t i = 0; i < d.npoint; ++i) {
     const double w = d.weights ? d.weights[i] : b.p.mass[d.points[i]];
     if (!(w >= 0)) refuse(b, ": weight %u of a spring is %g; weights are not negative", i, w);
     s.weights.push_back(w);
     sum += w;
   }
-  for (double x : d.to) poison += 0.0 * x;
-  if (!(sum > 0) || std::isinf(sum) || poison != 0)
+  for (double x : d.to) nan_flag += 0.0 * x;
+  if (!(sum > 0) || std::isinf(sum) || nan_flag != 0)
     refuse(b, ": a spring's end and the sum of its weights must be finite, the sum above 0");
   for (double &w : s.weights) w /= sum;
   return s;
@@ -126,7 +126,7 @@ void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out) {
   dfm_body_def d{};
   d.category = 1;
   d.collides_with = ~0u;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *out) {
@@ -146,7 +146,7 @@ dfm_status dfm_body_create(dfm_world world, const dfm_body_def *def, dfm_body *o
 
 dfm_status dfm_body_destroy(dfm_body body) {
   return as_status(any_body_of, body, [&](Body &b) {
-    if (!b.emptied && !b.undone) body_of(body);  // with all of its points
+    if (!b.emptied && !b.rolled_back) body_of(body);  // with all of its points
     exclusive(*b.world);
     destroy_body(b);
   });
@@ -155,7 +155,7 @@ dfm_status dfm_body_destroy(dfm_body body) {
 dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
   return as_status(any_body_of, body, [&](const Body &b) {
     dfm_body_info i{};
-    if (!b.emptied && !b.undone) {
+    if (!b.emptied && !b.rolled_back) {
       i.npoint = b.p.n;
       i.ntet = b.ncell();
       i.nsurfel = b.surface.nsurfel;
@@ -170,7 +170,7 @@ dfm_status dfm_body_get_info(dfm_body body, dfm_body_info *out) {
     i.name = b.name.c_str();
     i.model = b.model.type->id;
     i.user = b.user;
-    give(out, i);
+    copy_out(out, i);
   });
 }
 
@@ -217,7 +217,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
-    if (v) settle_dampers(b.p);
+    if (v) relax_dampers(b.p);
     b.dynamics->points_changed();
     disturb(b);
     if (x) lose_energy(b);
@@ -376,12 +376,12 @@ dfm_status dfm_body_wake(dfm_body body) {
 dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
   return as_status(shown_body_of, body, [&](const Body &b) {
     need(asleep, "asleep");
-    *asleep = b.slumber.asleep;
+    *asleep = b.sleep_state.asleep;
   });
 }
 
 dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
-  return as_status([&] { give(out, measure(body_of(body))); });
+  return as_status([&] { copy_out(out, measure(body_of(body))); });
 }
 
 dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {

@@ -27,7 +27,7 @@ class Call {
   void hold(const void *object) noexcept {
     for (size_t i = 0; i < nheld_; ++i)
       if (held_[i] == object) return;
-    if (nheld_ < kMostHeld) held_[nheld_++] = object;
+    if (nheld_ < kMaxHeld) held_[nheld_++] = object;
   }
   // Whether an outer call uses it.
   bool held_outside(const void *object) const noexcept {
@@ -64,12 +64,12 @@ class Call {
   }
 
  private:
-  static constexpr size_t kMostHeld = 6;  // no function uses more objects
+  static constexpr size_t kMaxHeld = 6;  // no function uses more objects
   static inline thread_local Call *innermost_ = nullptr;
   Call *const outer_;
   std::atomic<bool> *writing_ = nullptr;
   std::atomic<uint32_t> *counted_ = nullptr;
-  const void *held_[kMostHeld] = {};
+  const void *held_[kMaxHeld] = {};
   size_t nheld_ = 0;
 };
 

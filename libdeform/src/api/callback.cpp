@@ -9,7 +9,7 @@ using namespace dfm;
 namespace {
 
 // The tables are rebuilt before the next step, with the pairs that may touch now.
-void ask_pairs_again(World &w) {
+void decide_pairs_again(World &w) {
   w.overlaps.all = true;
   wake_all(w);
   w.changed = true;
@@ -20,7 +20,7 @@ void ask_pairs_again(World &w) {
 dfm_status dfm_world_set_may_touch(dfm_world world, dfm_may_touch_fn may_touch, void *user) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     w.may_touch = {may_touch, user, {}};
-    ask_pairs_again(w);
+    decide_pairs_again(w);
   });
 }
 
@@ -28,11 +28,11 @@ dfm_status dfm_world_ask_again(dfm_world world, uint64_t a, uint64_t b) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     uint64_t first = a ? id_of(w, a, "a") : 0, second = b ? id_of(w, b, "b") : 0;
     if (first == 0) std::swap(first, second);
-    std::erase_if(w.may_touch.answers, [&](const PairAnswer &p) {
+    std::erase_if(w.may_touch.decisions, [&](const PairDecision &p) {
       const auto has = [&](uint64_t id) { return id == 0 || p.a == id || p.b == id; };
       return has(first) && has(second);
     });
-    ask_pairs_again(w);
+    decide_pairs_again(w);
   });
 }
 

@@ -255,7 +255,7 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
                                     uint32_t *n) {
   return as_status([&] {
     Rows<dfm_contact> rows(out, row_size, "dfm_contact");
-    const World &w = settled(world_of(world));
+    const World &w = not_in_step(world_of(world));
     uint32_t count = 0;
     for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
     std::vector<const RigidContact *> rigid;
@@ -282,7 +282,7 @@ dfm_status dfm_world_law_info(dfm_world world, uint32_t law, dfm_law_info *info)
     out.name = l.type->name;
     out.type = l.type;
     out.params = {sizeof(dfm_params), static_cast<uint32_t>(l.by_key.size()), l.by_key.data()};
-    give(info, out);
+    copy_out(info, out);
   });
 }
 
@@ -290,7 +290,7 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
                                  uint32_t *n) {
   return as_status([&] {
     Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
-    World &w = settled(world_of(world));
+    World &w = not_in_step(world_of(world));
     std::vector<PairRow> pairs;
     std::vector<Vec3> com(w.bodies.size());
     std::vector<uint8_t> known(w.bodies.size());

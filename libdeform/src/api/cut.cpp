@@ -79,7 +79,7 @@ SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
 void dfm_cut_def_default_sized(uint32_t size, dfm_cut_def *out) {
   dfm_cut_def d{};
   d.pose.rotation[3] = 1;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out) {
@@ -89,7 +89,7 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
     check_flags(own, 0, "dfm_cut_def");
     const CutShape shape = shape_of(b, own);
     const CutReport report = make_cut(b, shape, own.how, own.most);
-    if (out) give(out, info_of(report));
+    if (out) copy_out(out, info_of(report));
   });
 }
 
@@ -118,8 +118,8 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
       removed[cells[i]] = 1;
     }
     CutReport report = remove_cells(b, removed);
-    separate_if_asked(b, report);
-    if (out) give(out, info_of(report));
+    separate_if_requested(b, report);
+    if (out) copy_out(out, info_of(report));
   });
 }
 
@@ -127,17 +127,17 @@ dfm_status dfm_body_origins(dfm_body body, uint32_t capacity_points, uint32_t *p
                             uint32_t capacity_cells, uint32_t *cells) {
   return as_status(shown_body_of, body, [&](const Body &b) {
     const uint32_t ntet = b.ncell();
-    const bool give_points = points && room(b.p.n, capacity_points, points, nullptr);
-    const bool give_cells = cells && room(ntet, capacity_cells, cells, nullptr);
-    for (uint32_t i = 0; give_points && i < b.p.n; ++i) points[i] = b.cut.whole ? b.cut.point[i] : i;
-    for (uint32_t c = 0; give_cells && c < ntet; ++c) cells[c] = b.cut.whole ? b.cut.cell[c] : c;
+    const bool copy_points = points && room(b.p.n, capacity_points, points, nullptr);
+    const bool copy_cells = cells && room(ntet, capacity_cells, cells, nullptr);
+    for (uint32_t i = 0; copy_points && i < b.p.n; ++i) points[i] = b.cut.whole ? b.cut.point[i] : i;
+    for (uint32_t c = 0; copy_cells && c < ntet; ++c) cells[c] = b.cut.whole ? b.cut.cell[c] : c;
   });
 }
 
 void dfm_separate_def_default_sized(uint32_t size, dfm_separate_def *out) {
   dfm_separate_def d{};
   d.least_cells = 1;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut_info *out) {
@@ -145,7 +145,7 @@ dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut
     const SeparateRule rule = rule_of(b, def);
     CutReport report;
     separate(b, rule, report);
-    if (out) give(out, info_of(report));
+    if (out) copy_out(out, info_of(report));
   });
 }
 
@@ -176,6 +176,6 @@ dfm_status dfm_body_pieces(dfm_body body, uint32_t capacity, dfm_body *pieces, u
     std::vector<dfm_body> found;
     for (const Body *const other : all_bodies(*b.world))
       if (other->piece_of == whole) found.push_back(other->handle);
-    give_list(found, capacity, pieces, n);
+    copy_list(found, capacity, pieces, n);
   });
 }

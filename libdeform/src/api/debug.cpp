@@ -84,13 +84,13 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
 
 dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
   return as_status(body_of, body, [&](const Body &b) {
-    give_vectors(b.p.n, capacity, u, n, [&](uint32_t i) { return displacement(b, i); });
+    copy_vectors(b.p.n, capacity, u, n, [&](uint32_t i) { return displacement(b, i); });
   });
 }
 
 dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
   return as_status(body_of, body, [&](const Body &b) {
-    give_vectors(b.surface.nsurfel, capacity, u, n, [&](uint32_t s) { return surfel_displacement(b, s); });
+    copy_vectors(b.surface.nsurfel, capacity, u, n, [&](uint32_t s) { return surfel_displacement(b, s); });
   });
 }
 

@@ -193,10 +193,10 @@ class Aligned {
 };
 
 bool finite(const double *column, uint32_t width, uint32_t stride, uint32_t n) {
-  double poison = 0;
+  double nan_flag = 0;
   for (uint32_t c = 0; column && c < width; ++c)
-    for (uint32_t i = 0; i < n; ++i) poison += 0.0 * column[size_t(c) * stride + i];
-  return poison == 0;
+    for (uint32_t i = 0; i < n; ++i) nan_flag += 0.0 * column[size_t(c) * stride + i];
+  return nan_flag == 0;
 }
 
 bool finite(const dfm_friction_in &in, const dfm_friction_out &out, uint32_t nstate) {

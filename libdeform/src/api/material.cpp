@@ -25,7 +25,7 @@ void dfm_material_def_default_sized(uint32_t size, dfm_material_def *out) {
   d.density = 1000;
   d.young = 1e5;
   d.poisson = 0.3;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm_material *out) {

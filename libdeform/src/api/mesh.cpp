@@ -12,15 +12,15 @@ using Object = TetMeshObject;
 
 namespace {
 // "About" so many cells are asked for; who gets others by more than a quarter is told.
-void tell_count(TetMesh &mesh, const char *kind, uint32_t asked) {
+void warn_cell_count(TetMesh &mesh, const char *kind, uint32_t requested) {
   constexpr double kAbout = 1.25;
   const CellKind &of = cell_kind(mesh.cell);
   const double made = double(mesh.ntet() / of.tets);
-  if (std::max(made, double(asked)) > kAbout * std::min(made, double(asked)))
+  if (std::max(made, double(requested)) > kAbout * std::min(made, double(requested)))
     mesh.warnings.push_back(
         format("%.0f %s are made where %u were asked for: the lattice of a %s has no number of "
                "well-shaped cells nearer to that",
-               made, of.name, asked, kind));
+               made, of.name, requested, kind));
 }
 }  // namespace
 
@@ -68,7 +68,7 @@ dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double
     const std::string name = kind;
     const Memory &memory = context->memory;
     const auto keep = [&](TetMesh mesh) {
-      tell_count(mesh, kind, cells);
+      warn_cell_count(mesh, kind, cells);
       *out = Object::keep(*context, std::move(mesh));
     };
     if (name == "cylinder") keep(make_cylinder(memory, size[0], size[1], cells));
@@ -85,7 +85,7 @@ dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
 }
 
 dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
-  return as_status(Object::of, mesh, [&](const Object &object) { give(out, object.info); });
+  return as_status(Object::of, mesh, [&](const Object &object) { copy_out(out, object.info); });
 }
 
 dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,

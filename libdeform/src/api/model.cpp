@@ -95,7 +95,7 @@ void dfm_switch_default_sized(uint32_t size, dfm_switch *out) {
   dfm_switch s{};
   s.integrator = DFM_INTEGRATOR_AUTO;
   s.params.size = sizeof s.params;
-  give_default(size, out, s);
+  write_default(size, out, s);
 }
 
 void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
@@ -106,7 +106,7 @@ void dfm_switch_rule_default_sized(uint32_t size, dfm_switch_rule *out) {
   }
   r.hysteresis = 0.1;
   r.wait = 0.1;
-  give_default(size, out, r);
+  write_default(size, out, r);
 }
 
 dfm_status dfm_body_set_switch_rule(dfm_body body, const dfm_switch_rule *rule) {

@@ -38,7 +38,7 @@ inline Body &any_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
 // A body that has cells.
 inline Body &shown_body_of(dfm_body h) {
   Body &b = any_body_of(h);
-  if (b.undone)
+  if (b.rolled_back)
     fail(DFM_E_STATE,
          "body '%s' does not exist in the restored snapshot, which is older than the cut that made it; "
          "destroy it, or restore a later snapshot",
@@ -71,7 +71,7 @@ inline World &exclusive(World &w) {
 }
 
 // For calls that read arrays which are incomplete during a step.
-inline World &settled(World &w) {
+inline World &not_in_step(World &w) {
   if (w.busy) Call::refuse("world");
   return w;
 }
@@ -83,8 +83,8 @@ Part &exclusive(Part &part) {
   return part;
 }
 template <class Part>
-Part &settled(Part &part) {
-  settled(*part.world);
+Part &not_in_step(Part &part) {
+  not_in_step(*part.world);
   return part;
 }
 
@@ -143,7 +143,7 @@ auto &to_change(uint64_t h) {
 }
 template <auto kOf>
 auto &to_read(uint64_t h) {
-  return settled(kOf(h));
+  return not_in_step(kOf(h));
 }
 inline World &whole_to_change(uint64_t h) { return whole(exclusive(world_of(h))); }
 
@@ -192,7 +192,7 @@ inline bool room(size_t size, uint32_t capacity, const void *out, uint32_t *n) {
 }
 
 // A text or buffer whose size the caller queries first.
-inline void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
+inline void copy_bytes(const void *data, size_t size, void *to, size_t *bytes) {
   need(bytes, "bytes");
   const size_t room = *bytes;
   *bytes = size;
@@ -204,13 +204,13 @@ inline void give_bytes(const void *data, size_t size, void *to, size_t *bytes) {
 
 // of(x) for each x of a list, by that convention.
 template <class List, class T, class Of = std::identity>
-void give_list(const List &list, uint32_t capacity, T *out, uint32_t *n, Of of = {}) {
+void copy_list(const List &list, uint32_t capacity, T *out, uint32_t *n, Of of = {}) {
   if (!room(std::size(list), capacity, out, n)) return;
   for (const auto &x : list) *out++ = of(x);
 }
 // [count,3] by it, of(i) each.
 template <class Of>
-void give_vectors(uint32_t count, uint32_t capacity, double *out, uint32_t *n, Of of) {
+void copy_vectors(uint32_t count, uint32_t capacity, double *out, uint32_t *n, Of of) {
   if (!room(count, capacity, out, n)) return;
   for (uint32_t i = 0; i < count; ++i) store3(out + size_t(3) * i, of(i));
 }
@@ -225,11 +225,11 @@ class Rows {
  public:
   Rows(T *out, uint32_t row_size, const char *type)
       : at_(reinterpret_cast<unsigned char *>(out)), step_(row_size) {
-    if (row_size < kLeast || row_size % kLeast != 0)
+    if (row_size < kMin || row_size % kMin != 0)
       fail(DFM_E_ARG,
            "row_size %u is not the size of a %s: expected a multiple of %zu (%zu in this version); pass "
            "sizeof(%s)",
-           row_size, type, kLeast, sizeof(T), type);
+           row_size, type, kMin, sizeof(T), type);
   }
   void add(T row) {
     const size_t known = step_ < sizeof(T) ? step_ : sizeof(T);
@@ -240,8 +240,8 @@ class Rows {
   }
 
  private:
-  static constexpr size_t kLeast = 8;  // `size` and one more; rows are aligned to it
-  static_assert(sizeof(T) % kLeast == 0);
+  static constexpr size_t kMin = 8;  // `size` and one more; rows are aligned to it
+  static_assert(sizeof(T) % kMin == 0);
   unsigned char *at_;
   size_t step_;
 };

@@ -17,7 +17,7 @@ void dfm_obstacle_def_default_sized(uint32_t size, dfm_obstacle_def *out) {
   d.half_length = 0.5;
   d.category = 1;
   d.collides_with = ~0u;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_obstacle_create(dfm_world world, const dfm_obstacle_def *def, dfm_obstacle *out) {
@@ -44,7 +44,7 @@ dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out) {
 }
 
 dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out) {
-  return as_status([&] { give(out, obstacle_of(obstacle).def); });
+  return as_status([&] { copy_out(out, obstacle_of(obstacle).def); });
 }
 
 namespace {

@@ -51,7 +51,7 @@ void dfm_rigid_def_default_sized(uint32_t size, dfm_rigid_def *out) {
   d.mass = 1;
   d.category = 1;
   d.collides_with = ~0u;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_rigid_create(dfm_world world, const char *host, const dfm_rigid_set_def *set, dfm_rigid *out) {
@@ -112,7 +112,7 @@ dfm_status dfm_world_find_rigid(dfm_world world, const char *name, dfm_rigid *ou
 }
 
 dfm_status dfm_rigid_get_def(dfm_rigid rigid, dfm_rigid_def *out) {
-  return as_status(rigid_of, rigid, [&](const Obstacle &o) { give(out, o.rigid->defs[o.rigid_body]); });
+  return as_status(rigid_of, rigid, [&](const Obstacle &o) { copy_out(out, o.rigid->defs[o.rigid_body]); });
 }
 
 dfm_status dfm_rigid_get_state(dfm_rigid rigid, dfm_rigid_state *out) {
@@ -136,7 +136,7 @@ dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *state) {
 
 dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out) {
   return as_status(rigid_of, rigid,
-                   [&](const Obstacle &o) { give(out, measure_rigid(*o.rigid, o.rigid_body)); });
+                   [&](const Obstacle &o) { copy_out(out, measure_rigid(*o.rigid, o.rigid_body)); });
 }
 
 dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]) {

@@ -101,7 +101,7 @@ dfm_status dfm_scene_get_settings(dfm_scene scene, dfm_scene_settings *out) {
     std::memcpy(r.eye, d.eye, sizeof r.eye);
     std::memcpy(r.look_at, d.look_at, sizeof r.look_at);
     r.has_camera = d.has_camera;
-    give(out, r);
+    copy_out(out, r);
   });
 }
 
@@ -121,7 +121,7 @@ dfm_status dfm_scene_probe(dfm_scene scene, uint32_t probe, const char **name, d
 void dfm_scene_write_def_default_sized(uint32_t size, dfm_scene_write_def *out) {
   dfm_scene_write_def d{};
   d.duration = 1;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 namespace {
@@ -147,8 +147,8 @@ void write_scene(const char *call, World &w, const char *path, const dfm_scene_w
     if (d.note) d.note(d.user, sentence.c_str());
     else w.context->logf(DFM_LOG_WARNING, "%s: %s", path, sentence.c_str());
   };
-  uint32_t told = 0;
-  if (!notes) notes = &told;
+  uint32_t local_notes = 0;
+  if (!notes) notes = &local_notes;
   *notes = 0;
   writing::write_scene(w, path, options, *notes);
 }

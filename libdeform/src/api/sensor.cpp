@@ -15,7 +15,7 @@ template <class Part>
 void mark(Part &part, bool sensor) {
   World &w = exclusive(*part.world);
   if (part.sensor == sensor) return;
-  leave_sensors(w, part.id);  // ends overlaps in both directions
+  end_sensor_overlaps(w, part.id);  // ends overlaps in both directions
   if (sensor) {
     ++w.sensors;
   } else {
@@ -61,7 +61,7 @@ dfm_status dfm_is_sensor(uint64_t thing, bool *sensor) {
 dfm_status dfm_sensor_things(uint64_t sensor, uint32_t capacity, uint64_t *out, uint32_t *n) {
   return as_status([&] {
     const Found found = thing_of(sensor);
-    const World &w = settled(*found.world);
+    const World &w = not_in_step(*found.world);
     if (!found.sensor)
       fail(
           DFM_E_ARG,

@@ -19,14 +19,14 @@ static_assert(std::endian::native == std::endian::little);
 void dfm_stream_def_default_sized(uint32_t size, dfm_stream_def *out) {
   dfm_stream_def d{};
   d.kind = DFM_STREAM_FRAME;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 namespace {
 
 constexpr uint32_t kHeader = 32, kChunk = 8, kSurfaceHead = 20, kPackedHead = 48, kRangeHead = 16;  // bytes
 constexpr uint32_t kLongestName = 100;                                                              // bytes
-constexpr uint32_t kLeastPacket = 256, kSensor = 1u << 16;
+constexpr uint32_t kMinPacket = 256, kSensor = 1u << 16;
 constexpr float kSteps = 65535;  // of a range in 16 bits
 
 using Bytes = std::span<const unsigned char>;
@@ -348,9 +348,9 @@ dfm_stream_def checked(const dfm_stream_def *def) {
   if (d.flags & ~uint32_t{DFM_STREAM_FLOAT32 | DFM_STREAM_CONTACTS})
     fail(DFM_E_ARG, "stream: flags are %u; expected DFM_STREAM_FLOAT32 and DFM_STREAM_CONTACTS alone",
          d.flags);
-  if (d.packet != 0 && d.packet < kLeastPacket)
+  if (d.packet != 0 && d.packet < kMinPacket)
     fail(DFM_E_ARG, "stream: packets of %u bytes; expected at least %u, or 0 for one packet", d.packet,
-         kLeastPacket);
+         kMinPacket);
   return d;
 }
 
@@ -358,7 +358,7 @@ dfm_stream_def checked(const dfm_stream_def *def) {
 
 dfm_status dfm_world_stream(dfm_world world, const dfm_stream_def *def, void *buffer, size_t *bytes) {
   return as_status([&] {
-    const World &w = whole(settled(world_of(world)));
+    const World &w = whole(not_in_step(world_of(world)));
     const dfm_stream_def d = checked(def);
     const auto meant = [&](const auto &thing) { return thing->handle == d.body; };
     if (d.body && std::none_of(w.bodies.begin(), w.bodies.end(), meant) &&
@@ -369,9 +369,9 @@ dfm_status dfm_world_stream(dfm_world world, const dfm_stream_def *def, void *bu
     else add_frame(w, d, packets);
     const std::vector<unsigned char> &all = packets.whole();
     const bool ready = !d.packet && (d.kind == DFM_STREAM_SCENE || d.flags & DFM_STREAM_FLOAT32);
-    if (ready) return give_bytes(all.data(), all.size(), buffer, bytes);
+    if (ready) return copy_bytes(all.data(), all.size(), buffer, bytes);
     const std::vector<unsigned char> packed = pack(all, d);
-    give_bytes(packed.data(), packed.size(), buffer, bytes);
+    copy_bytes(packed.data(), packed.size(), buffer, bytes);
   });
 }
 
@@ -381,6 +381,6 @@ dfm_status dfm_stream_pack(const void *packet, size_t size, const dfm_stream_def
     need(packet, "packet");
     const dfm_stream_def d = checked(def);
     const std::vector<unsigned char> out = pack({static_cast<const unsigned char *>(packet), size}, d);
-    give_bytes(out.data(), out.size(), buffer, bytes);
+    copy_bytes(out.data(), out.size(), buffer, bytes);
   });
 }

@@ -12,7 +12,7 @@
 namespace dfm {
 
 // No header has a def of this size: the size was not set.
-constexpr uint32_t kMostDef = 4096;
+constexpr uint32_t kMaxDef = 4096;
 
 // A caller with a newer header must not set members that this library would ignore.
 template <class T>
@@ -32,7 +32,7 @@ template <class T>
 T take_known(const T *given, const T &defaults) {
   T def = defaults;
   if (!given) return def;
-  if (given->size < 2 * sizeof(uint32_t) || given->size > kMostDef)
+  if (given->size < 2 * sizeof(uint32_t) || given->size > kMaxDef)
     fail(DFM_E_ARG,
          "a def's size is %u; start from its _default() function, or set size to sizeof where it has none",
          given->size);
@@ -76,7 +76,7 @@ std::vector<T> take_defs(const T *given, uint32_t n, const T &defaults, const ch
   std::vector<T> defs;
   if (!given || n == 0) return defs;
   const uint32_t step = given->size;
-  if (step < 2 * sizeof(uint32_t) || step % alignof(T) != 0 || step > kMostDef)
+  if (step < 2 * sizeof(uint32_t) || step % alignof(T) != 0 || step > kMaxDef)
     fail(DFM_E_ARG, "%s 0: size is %u, expected %zu; %s", what, step, sizeof(T), from);
   defs.reserve(n);
   for (uint32_t i = 0; i < n; ++i) {
@@ -100,7 +100,7 @@ void take_pointed(const T *&given, T &own) {
 
 // The defaults of a def in the size of the caller's struct: members unknown to this library are zero.
 template <class T>
-void give_default(uint32_t size, T *out, std::type_identity_t<T> value) noexcept {
+void write_default(uint32_t size, T *out, std::type_identity_t<T> value) noexcept {
   if (!out) return;
   value.size = sizeof value;
   if constexpr (requires { value.cookie; }) value.cookie = kCookie;
@@ -111,11 +111,11 @@ void give_default(uint32_t size, T *out, std::type_identity_t<T> value) noexcept
 
 // Fills the part of an out struct that the caller's version has. size 0: that of 0.1.
 template <class T>
-void give(T *out, T value) {
+void copy_out(T *out, T value) {
   static_assert(kFirstSize<T> != 0 && kFirstSize<T> <= sizeof(T));
   if (!out) fail(DFM_E_ARG, "the out argument is NULL");
-  const uint32_t asked = out->size ? out->size : kFirstSize<T>;
-  const uint32_t size = std::min(asked, static_cast<uint32_t>(sizeof(T)));
+  const uint32_t requested = out->size ? out->size : kFirstSize<T>;
+  const uint32_t size = std::min(requested, static_cast<uint32_t>(sizeof(T)));
   value.size = size;
   std::memcpy(static_cast<void *>(out), &value, size);
 }

@@ -7,14 +7,14 @@ using namespace dfm;
 
 dfm_status dfm_surface_positions(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    give_vectors(b.surface.nsurfel, capacity, xyz, n,
+    copy_vectors(b.surface.nsurfel, capacity, xyz, n,
                  [&](uint32_t s) { return b.surface.sum(s, b.p.x.data()); });
   });
 }
 
 dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    give_vectors(b.surface.nsurfel, capacity, xyz, n,
+    copy_vectors(b.surface.nsurfel, capacity, xyz, n,
                  [&](uint32_t s) { return b.surface.sum(s, b.p.v.data()); });
   });
 }
@@ -23,7 +23,7 @@ dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uin
   return as_status(shown_body_of, body, [&](const Body &b) {
     const double h = b.impulse_time();
     const bool acts = b.world->plan.touches() && h > 0;
-    give_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) {
+    copy_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) {
       return acts ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
     });
   });

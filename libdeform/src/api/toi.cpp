@@ -17,7 +17,7 @@ dfm_toi_options checked(const char *function, const dfm_toi_options *given) {
   o.method = DFM_TOI_CONSERVATIVE;
   if (!given) return o;
   const uint32_t least = offsetof(dfm_toi_options, tolerance);
-  if (given->size < least || given->size > kMostDef)
+  if (given->size < least || given->size > kMaxDef)
     fail(DFM_E_ARG, "%s: options.size is %u, at least %u expected; set it to sizeof", function, given->size,
          least);
   refuse_unknown(given);
@@ -47,7 +47,7 @@ void check(const char *function, const char *name, const dfm_motion *motion, int
                end == motion[k].p0 ? "p0" : "p1", i, end[i]);
 }
 
-void give(const ToiHit &hit, double *t, double *at, int n) {
+void copy_out(const ToiHit &hit, double *t, double *at, int n) {
   last_evaluations = hit.evaluations;
   *t = hit.t;
   if (at && hit.t <= 1) std::memcpy(at, hit.at, sizeof(double) * size_t(n));
@@ -66,7 +66,7 @@ dfm_status dfm_toi_point_triangle(const dfm_motion *p, const dfm_motion tri[3],
     check(name, "p", p, 1);
     check(name, "tri", tri, 3);
     if (!t) fail(DFM_E_ARG, "%s: t is NULL", name);
-    give(dfm::toi_point_triangle(*p, tri, o), t, bary, 3);
+    copy_out(dfm::toi_point_triangle(*p, tri, o), t, bary, 3);
   });
 }
 
@@ -78,7 +78,7 @@ dfm_status dfm_toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const
     check(name, "a", a, 2);
     check(name, "b", b, 2);
     if (!t) fail(DFM_E_ARG, "%s: t is NULL", name);
-    give(dfm::toi_edge_edge(a, b, o), t, ab, 2);
+    copy_out(dfm::toi_edge_edge(a, b, o), t, ab, 2);
   });
 }
 

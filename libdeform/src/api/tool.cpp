@@ -22,7 +22,7 @@ void dfm_tool_def_default_sized(uint32_t size, dfm_tool_def *out) {
   d.inertia = 1e-5;
   d.category = 1;
   d.collides_with = ~0u;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_tool_create(dfm_world world, const dfm_tool_def *def, dfm_tool *out) {
@@ -40,7 +40,7 @@ dfm_status dfm_tool_destroy(dfm_tool tool) {
 }
 
 dfm_status dfm_world_tools(dfm_world world, uint32_t capacity, dfm_tool *out, uint32_t *n) {
-  return as_status(world_of, world, [&](const World &w) { give_list(w.tools, capacity, out, n, kHandle); });
+  return as_status(world_of, world, [&](const World &w) { copy_list(w.tools, capacity, out, n, kHandle); });
 }
 
 dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out) {
@@ -49,11 +49,11 @@ dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out)
 }
 
 dfm_status dfm_tool_get_def(dfm_tool tool, dfm_tool_def *out) {
-  return as_status([&] { give(out, tool_of(tool).def); });
+  return as_status([&] { copy_out(out, tool_of(tool).def); });
 }
 
 dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *out, uint32_t *n) {
-  return as_status(tool_of, tool, [&](const Tool &t) { give_list(t.parts, capacity, out, n); });
+  return as_status(tool_of, tool, [&](const Tool &t) { copy_list(t.parts, capacity, out, n); });
 }
 
 dfm_status dfm_tool_set_pose(dfm_tool tool, const dfm_pose *pose, const double velocity[6]) {
@@ -105,7 +105,7 @@ dfm_status dfm_tool_feedback(dfm_tool tool, double force[3], double torque[3]) {
 }
 
 dfm_status dfm_tool_get_state(dfm_tool tool, dfm_tool_state *out) {
-  return as_status([&] { give(out, tool_state(settled(tool_of(tool)))); });
+  return as_status([&] { copy_out(out, tool_state(not_in_step(tool_of(tool)))); });
 }
 
 dfm_status dfm_tool_grab(dfm_tool tool, dfm_body body, double reach, double release, uint32_t capacity,
@@ -136,7 +136,7 @@ dfm_status dfm_tool_cuts(dfm_tool tool, uint32_t *how, uint32_t *most, uint32_t 
       if (const uint64_t handle = t.world->handle_of(id)) list.push_back(handle);
     if (how) *how = t.cuts.how;
     if (most) *most = t.cuts.most;
-    give_list(list, capacity, bodies, n);
+    copy_list(list, capacity, bodies, n);
   });
 }
 

@@ -64,7 +64,7 @@ dfm_status dfm_trimesh_destroy(dfm_trimesh mesh) {
 }
 
 dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
-  return as_status(Object::of, mesh, [&](const Object &object) { give(out, object.info); });
+  return as_status(Object::of, mesh, [&](const Object &object) { copy_out(out, object.info); });
 }
 
 dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points, const uint32_t **triangles,

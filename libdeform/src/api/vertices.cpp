@@ -15,7 +15,7 @@ void dfm_vertex_layout_default_sized(uint32_t size, dfm_vertex_layout *out) {
   d.stride = 24;
   d.normal = 12;
   d.velocity = d.displacement = d.stick = DFM_VERTEX_NONE;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 namespace {

@@ -32,7 +32,7 @@ void destroy_world(uint64_t handle) {
   if (!w) return;
   for (auto &b : w->bodies) handle_destroy(b->handle);
   for (auto &b : w->emptied) handle_destroy(b->handle);
-  for (auto &b : w->undone) handle_destroy(b->handle);
+  for (auto &b : w->rolled_back) handle_destroy(b->handle);
   for (auto &o : w->obstacles) handle_destroy(o->handle);
   for (auto &m : w->materials) handle_destroy(m->handle);
   for (auto &t : w->tools) handle_destroy(t->handle);
@@ -123,7 +123,7 @@ void dfm_world_def_default_sized(uint32_t size, dfm_world_def *out) {
   d.sleep_speed = 0.01;
   d.sleep_time = 0.5;
   d.energy_watch = 0.01;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_world *out) {
@@ -233,7 +233,7 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     if (s == DFM_OK) cut_by_tools(w, passed);
     if (s == DFM_OK) make_planned_cuts(w, passed);
     if (s == DFM_OK) tear_bodies(w);
-    if (s == DFM_OK) look_at_sensors(w, true);
+    if (s == DFM_OK) update_sensors(w, true);
     if (s == DFM_OK) write_devices(w);
     return s;
   });
@@ -243,7 +243,7 @@ void dfm_equilibrium_def_default_sized(uint32_t size, dfm_equilibrium_def *out) 
   dfm_equilibrium_def d{};
   d.load_steps = 1;
   d.load_to = 1;
-  give_default(size, out, d);
+  write_default(size, out, d);
 }
 
 dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def,
@@ -258,7 +258,7 @@ dfm_status dfm_world_equilibrium(dfm_world world, const dfm_equilibrium_def *def
     found.size = sizeof found;
     make_switches(w, 0);
     find_equilibrium(w, d, found);
-    if (info) give(info, found);
+    if (info) copy_out(info, found);
   });
 }
 
@@ -291,7 +291,7 @@ dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *body, ui
     prepare(w);
     // The bound that the next step uses, recomputed only when the step would recompute it, so that reading it
     // changes no result.
-    if (bound_due(w)) update_bound(w);
+    if (bound_expired(w)) update_bound(w);
     *dt = offered_step(w.sizes, w.bound.step);
     const auto accurate = [](const auto &b) { return b->dynamics->abilities().accurate; };
     if (std::any_of(w.bodies.begin(), w.bodies.end(), accurate)) *dt = std::min(*dt, accurate_step(w.sizes));
@@ -308,7 +308,7 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
     prepare(w);
     if (!room(w.overlaps.found.size(), capacity, out, n)) return;
     for (const Overlap &o : w.overlaps.found) {
-      const uint32_t aside = o.aside && !o.separated ? DFM_OVERLAP_ASIDE : 0;
+      const uint32_t aside = o.suspended && !o.separated ? DFM_OVERLAP_ASIDE : 0;
       const uint32_t parted = o.separated ? DFM_OVERLAP_SEPARATED : 0;
       const uint32_t flags = (o.obstacle ? uint32_t{DFM_OVERLAP_OBSTACLE} : 0) | aside | parted;
       rows.add({0, flags, w.handle_of(o.a), w.handle_of(o.b), o.crossings, o.enclosed, o.depth});
@@ -319,10 +319,10 @@ dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t
 dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
   return as_status(whole_to_change, world, [&](World &w) {
     prepare(w);
-    const bool told = w.overlaps.told;
-    w.overlaps.all = w.overlaps.look_only = true;
+    const bool reported = w.overlaps.reported;
+    w.overlaps.all = w.overlaps.report_only = true;
     prepare(w);
-    w.overlaps.told = told;
+    w.overlaps.reported = reported;
     if (n) *n = static_cast<uint32_t>(w.overlaps.found.size());
   });
 }
@@ -353,7 +353,7 @@ dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {
     prepare(w);
     std::vector<unsigned char> data;
     world_snapshot(w, data);
-    give_bytes(data.data(), data.size(), buffer, bytes);
+    copy_bytes(data.data(), data.size(), buffer, bytes);
   });
 }
 
@@ -361,7 +361,7 @@ dfm_status dfm_world_restore(dfm_world world, const void *buffer, size_t bytes) 
   return as_status(whole_to_change, world, [&](World &w) {
     need(buffer, "buffer");
     world_restore(w, buffer, bytes);
-    look_at_sensors(w, false);
+    update_sensors(w, false);
   });
 }
 
@@ -382,12 +382,12 @@ dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out)
 }
 
 dfm_status dfm_world_bodies(dfm_world world, uint32_t capacity, dfm_body *bodies, uint32_t *n) {
-  return as_status(world_of, world, [&](World &w) { give_list(w.bodies, capacity, bodies, n, kHandle); });
+  return as_status(world_of, world, [&](World &w) { copy_list(w.bodies, capacity, bodies, n, kHandle); });
 }
 
 dfm_status dfm_world_obstacles(dfm_world world, uint32_t capacity, dfm_obstacle *obstacles, uint32_t *n) {
   return as_status(world_of, world,
-                   [&](World &w) { give_list(w.obstacles, capacity, obstacles, n, kHandle); });
+                   [&](World &w) { copy_list(w.obstacles, capacity, obstacles, n, kHandle); });
 }
 
 dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
@@ -400,7 +400,7 @@ dfm_status dfm_world_get_stats(dfm_world world, dfm_world_stats *out) {
     s.threads = w.context->tasks.threads();
     s.time = w.time;
     s.asleep = w.sleepers;
-    give(out, s);
+    copy_out(out, s);
   });
 }
 
@@ -422,9 +422,9 @@ dfm_status dfm_world_profile_sized(dfm_world world, uint32_t row_size, uint32_t 
 dfm_status dfm_world_explain(dfm_world world, char *text, size_t *bytes) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     prepare(w);
-    if (bound_due(w)) update_bound(w);
+    if (bound_expired(w)) update_bound(w);
     const std::string json = explain(w);
-    give_bytes(json.c_str(), json.size() + 1, text, bytes);
+    copy_bytes(json.c_str(), json.size() + 1, text, bytes);
   });
 }
 
@@ -439,6 +439,6 @@ dfm_status dfm_world_memory(dfm_world world, dfm_memory *out) {
     all.contacts = m.contacts.bytes();
     all.steps = m.steps.bytes();
     all.total = all.bodies + all.dynamics + all.obstacles + all.detection + all.contacts + all.steps;
-    give(out, all);
+    copy_out(out, all);
   });
 }

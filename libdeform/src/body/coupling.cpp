@@ -481,9 +481,9 @@ void restore_linear(const Array<Vec3> &point, Vec3 x, Array<RowEntry> &row) {
 
 // One row for each surfel, filled by `fill`, from the phyxels that reach it and are not excluded; if there is
 // none, the row of its cell.
-template <class StandsBack, class Fill>
+template <class Occluded, class Fill>
 Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
-                         const StandsBack &stands_back, const Fill &fill) {
+                         const Occluded &occluded, const Fill &fill) {
   std::optional<RestCells> cells;
   Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
   Array<RowEntry> row(HookAllocator<RowEntry>{memory});
@@ -491,7 +491,7 @@ Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cl
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
     const Vec3 x = cloud.rest.surfel[s];
     cloud.reaching(x, reach);
-    std::erase_if(reach, stands_back);
+    std::erase_if(reach, occluded);
     double sum = 0;
     for (uint32_t i : reach) sum += kernel(norm2(x - cloud.rest.point[i]), cloud.support[i]);
     row.clear();
@@ -514,8 +514,8 @@ Coupling couple_mls(const Memory &memory, const CouplingInput &in) {
   const Array<Vec3> &point = cloud.rest.point;
   Neighborhoods near(memory, cloud);
   // A phyxel whose neighbors are in a plane has no gradient: it is excluded if others reach the surfel.
-  const auto stands_back = [&](uint32_t i) { return near.of(i).state == 2; };
-  return couple_by_reach(memory, in, cloud, stands_back,
+  const auto occluded = [&](uint32_t i) { return near.of(i).state == 2; };
+  return couple_by_reach(memory, in, cloud, occluded,
                          [&](Vec3 x, const Array<uint32_t> &reach, double sum, Array<RowEntry> &row) {
                            for (uint32_t i : reach) {
                              const Neighborhoods::Known &k = near.of(i);

@@ -175,7 +175,7 @@ namespace {
 
 // distance of the hull of normals from 0 below which it says less and less of a direction
 constexpr double kNarrow = 0.05;
-constexpr double kMostBack = 3;  // limit on the way of a surfel of a slit, in units of Surface::back
+constexpr double kMaxBack = 3;  // limit on the way of a surfel of a slit, in units of Surface::back
 
 // The corners of a simplex whose hull has the point nearest to 0, and that point.
 struct Nearest {
@@ -229,10 +229,10 @@ struct Nearest {
 
 // The point of the hull of these normals that is nearest to 0: n.c >= c.c for each of them (Gilbert 1966).
 Vec3 nearest_of_normals(const double *normals, std::span<const uint32_t> which) {
-  constexpr int kMost = 32;
+  constexpr int kMax = 32;
   constexpr double kSame = 1e-9;
   Nearest hull;
-  for (int k = 0; k < kMost; ++k) {
+  for (int k = 0; k < kMax; ++k) {
     double least = HUGE_VAL;
     Vec3 next;
     for (const uint32_t l : which) {
@@ -248,7 +248,7 @@ Vec3 nearest_of_normals(const double *normals, std::span<const uint32_t> which) 
   return hull.point;
 }
 
-// The shortest w with n.w = -1, in the least-squares sense; no longer than kMostBack.
+// The shortest w with n.w = -1, in the least-squares sense; no longer than kMaxBack.
 Vec3 least_squares_of(const double *normals, std::span<const uint32_t> which) {
   constexpr double kTilt = 1e-3;  // share of the trace; distinguishes nearly parallel planes
   double sum[9] = {};
@@ -264,27 +264,28 @@ Vec3 least_squares_of(const double *normals, std::span<const uint32_t> which) {
   const double det = dot(a, cross(b, c));
   const Vec3 way = (-1 / det) * Vec3{dot(r, cross(b, c)), dot(r, cross(c, a)), dot(r, cross(a, b))};
   const double far = norm(way);
-  return far > kMostBack ? (kMostBack / far) * way : way;
+  return far > kMaxBack ? (kMaxBack / far) * way : way;
 }
 
 }  // namespace
 
 void ways_back(Surface &s, const double *x, const std::function<void(uint32_t surfel, Vec3 way)> &use) {
   const auto at = [&](uint32_t i) { return load3(x + 4 * size_t{i}); };
-  for (size_t l = 0; l < s.laid.size(); ++l)
-    store3(&s.laid_normal[3 * l], normalized(s.area2(s.laid[l], at)));
-  for (size_t i = 0; i < s.laid_surfel.size(); ++i) {
-    const std::span<const uint32_t> around{s.laid_around.data() + s.laid_begin[i],
-                                           s.laid_around.data() + s.laid_begin[i + 1]};
+  for (size_t l = 0; l < s.coincident.size(); ++l)
+    store3(&s.coincident_normal[3 * l], normalized(s.area2(s.coincident[l], at)));
+  for (size_t i = 0; i < s.coincident_surfel.size(); ++i) {
+    const std::span<const uint32_t> around{s.coincident_around.data() + s.coincident_begin[i],
+                                           s.coincident_around.data() + s.coincident_begin[i + 1]};
     if (around.empty()) continue;
-    if (std::any_of(around.begin(), around.end(), [&](uint32_t l) { return s.laid_tip[l] & kOfSlit; })) {
-      use(s.laid_surfel[i], least_squares_of(s.laid_normal.data(), around));
+    if (std::any_of(around.begin(), around.end(),
+                    [&](uint32_t l) { return s.coincident_tip[l] & kOfSlit; })) {
+      use(s.coincident_surfel[i], least_squares_of(s.coincident_normal.data(), around));
       continue;
     }
-    const Vec3 c = nearest_of_normals(s.laid_normal.data(), around);
+    const Vec3 c = nearest_of_normals(s.coincident_normal.data(), around);
     const double margin = norm(c);
     if (!(margin > 0)) continue;
-    use(s.laid_surfel[i], (-1 / std::max(margin, kNarrow)) * c);
+    use(s.coincident_surfel[i], (-1 / std::max(margin, kNarrow)) * c);
   }
 }
 

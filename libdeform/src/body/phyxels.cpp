@@ -14,7 +14,7 @@ void Phyxels::size(const Memory &m, uint32_t points) {
     *a = zeros(size_t{kStride} * n);
 }
 
-void settle_dampers(Phyxels &p) {
+void relax_dampers(Phyxels &p) {
   if (p.dampers.lag > 0) p.dampers.v.assign(p.v.begin(), p.v.end());
   else p.dampers.v.clear();
 }

@@ -16,7 +16,7 @@ constexpr double kSkinMost = 0.2;
 constexpr double kSpeedGrowth = 1.25;
 // share of the surfels above which the whole lists are renewed: a part takes twice as long for each triangle,
 // and what is left is out of date earlier
-constexpr double kMostAnew = 0.25;
+constexpr double kMaxAnew = 0.25;
 
 bool before(const SelfPair &l, const SelfPair &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
 
@@ -106,7 +106,7 @@ bool SelfList::renew_part(double h, double offset, double change) {
       list->assign(n, 0);
   begun_ = false;
   if (!(room >= 0.5 * wanted && room <= 4 * wanted)) return false;
-  if (!at_.set_again(s, 0.5 * room, uint32_t(kMostAnew * s.nsurfel), anew_[0])) return false;
+  if (!at_.set_again(s, 0.5 * room, uint32_t(kMaxAnew * s.nsurfel), anew_[0])) return false;
   mark_features();
   longest_ = longest_edge(s, at_.x().data());
   moved_ = at_.displaced(s);

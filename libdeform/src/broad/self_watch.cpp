@@ -68,7 +68,7 @@ bool SelfWatch::meets(double h, double offset, double change, const std::functio
 
 // A pair that is not listed is not near: update() and cover() list all pairs within the reach of a contact,
 // and those that are deeper than what contacts push back.
-bool SelfWatch::any_near(double offset, const Ask &ask) {
+bool SelfWatch::any_near(double offset, const SelfQuery &query) {
   const Surface &s = surface_;
   const Array<SelfPair> &faces = list_.vertex_face(), &edges = list_.edge_edge();
   slack_ = left_ = -1;
@@ -86,7 +86,7 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
   }
   const double least = std::max(2 * offset, self_recovery_depth(s));
   double left = list_.covered() - least;
-  const double needs = kRounding * ask.fall;
+  const double needs = kRounding * query.fall;
   const auto is_safe = [&](size_t k) {
     const bool safe = safe_[k] - way_ > needs;
     if (safe) left = std::min(left, safe_[k] - way_);
@@ -98,11 +98,11 @@ bool SelfWatch::any_near(double offset, const Ask &ask) {
     const double closest = std::min(least, kNear * apart_[k]);
     safe_[k] = way_ + distance - closest;
     left = std::min(left, distance - closest);
-    if (distance >= std::max(closest, reach + ask.most)) return false;
+    if (distance >= std::max(closest, reach + query.most)) return false;
     double speed2 = 0;
     for (const uint32_t i : a)
-      for (const uint32_t j : b) speed2 = std::max(speed2, norm2(ask.velocity(i) - ask.velocity(j)));
-    return distance < std::max(closest, reach + std::min(ask.time * std::sqrt(speed2), ask.most));
+      for (const uint32_t j : b) speed2 = std::max(speed2, norm2(query.velocity(i) - query.velocity(j)));
+    return distance < std::max(closest, reach + std::min(query.time * std::sqrt(speed2), query.most));
   };
   for (size_t k = 0; k < faces.size(); ++k)
     if (!is_safe(k) && is_near(k, face_distance(s, faces[k], s.x.data()), {&faces[k].a, 1},

@@ -43,11 +43,11 @@ class SelfWatch {
 
  private:
   // m = min(time * |relative velocity|, most), and no more than fall for any pair.
-  struct Ask {
+  struct SelfQuery {
     double time, most, fall;
     const std::function<Vec3(uint32_t surfel)> &velocity;
   };
-  bool any_near(double offset, const Ask &ask);
+  bool any_near(double offset, const SelfQuery &query);
 
   const Surface &surface_;
   const SelfRest &rest_;

@@ -123,7 +123,7 @@ struct Builder {
   }
 };
 
-toi::Answer solve(const Query &query, int method) {
+toi::Root solve(const Query &query, int method) {
   return method == DFM_TOI_CONSERVATIVE ? toi::conservative(query) : toi::by_roots(query, method);
 }
 
@@ -178,9 +178,9 @@ ToiHit toi_point_triangle(const dfm_motion &p, const dfm_motion tri[3], const df
   int order[3];
   Builder s = build(p, tri, order);
   s.finish(options, margin);
-  const toi::Answer answer = solve(s.query, options.method);
-  ToiHit hit{answer.t, {}, answer.evaluations};
-  const double weight[3] = {1 - answer.u - answer.v, answer.u, answer.v};
+  const toi::Root root = solve(s.query, options.method);
+  ToiHit hit{root.t, {}, root.evaluations};
+  const double weight[3] = {1 - root.u - root.v, root.u, root.v};
   for (int k = 0; k < 3; ++k) hit.at[order[k]] = weight[k];
   return hit;
 }
@@ -190,9 +190,9 @@ ToiHit toi_edge_edge(const dfm_motion a[2], const dfm_motion b[2], const dfm_toi
   EdgeOrder order;
   Builder s = build(a, b, order);
   s.finish(options, margin);
-  const toi::Answer answer = solve(s.query, options.method);
-  const double on_a = order.swap ? answer.v : answer.u, on_b = order.swap ? answer.u : answer.v;
-  return {answer.t, {order.turn_a ? 1 - on_a : on_a, order.turn_b ? 1 - on_b : on_b, 0}, answer.evaluations};
+  const toi::Root root = solve(s.query, options.method);
+  const double on_a = order.swap ? root.v : root.u, on_b = order.swap ? root.u : root.v;
+  return {root.t, {order.turn_a ? 1 - on_a : on_a, order.turn_b ? 1 - on_b : on_b, 0}, root.evaluations};
 }
 
 double distance_point_triangle(const dfm_motion &p, const dfm_motion tri[3], double t) {

@@ -25,31 +25,31 @@ class Advance {
         safe_(query.separation + kRound),
         stop_(query.separation + std::max(query.tolerance, 4 * kRound)) {}
 
-  Answer run() {
-    if (apart_along_axis(q_)) return answer_;
+  Root run() {
+    if (apart_along_axis(q_)) return root_;
     double t = next_suspect(0);
-    if (t > 1) return answer_;
+    if (t > 1) return root_;
     Separation s = look(t);
     double stride = 1;
-    while (s.lower > stop_ && answer_.evaluations < uint32_t(q_.max_iterations)) {
+    while (s.lower > stop_ && root_.evaluations < uint32_t(q_.max_iterations)) {
       const double fixed = plane_holds_until(s, t);
-      if (fixed >= 1) return answer_;
+      if (fixed >= 1) return root_;
       if (const double next = next_suspect(fixed); next > fixed) {
-        if (next > 1) return answer_;
+        if (next > 1) return root_;
         s = look(t = next);
         continue;
       }
       if (!turning_plane(s, t, fixed, stride)) s = look(t = fixed);
     }
-    answer_.t = t;
-    answer_.u = s.u;
-    answer_.v = s.v;
-    return answer_;
+    root_.t = t;
+    root_.u = s.u;
+    root_.v = s.v;
+    return root_;
   }
 
  private:
   Separation look(double t) {
-    ++answer_.evaluations;
+    ++root_.evaluations;
     return separate(q_, t);
   }
 
@@ -57,7 +57,7 @@ class Advance {
   // there is none.
   double next_suspect(double t) {
     const double at_t = c_.f(t);
-    ++answer_.evaluations;
+    ++root_.evaluations;
     if (!(std::fabs(at_t) > clear_)) return t;
     const double sign = at_t > 0 ? 1 : -1;
     double least, largest;
@@ -69,7 +69,7 @@ class Advance {
     for (int k = 0; k < n; ++k) {
       if (ends[k] <= t) continue;
       const double value = sign * c_.f(ends[k]) - clear_;
-      ++answer_.evaluations;
+      ++root_.evaluations;
       if (value <= 0) return last_clear(sign, t, ends[k]);
       t = ends[k];
     }
@@ -84,7 +84,7 @@ class Advance {
     double x = lo;
     while (hi - lo > 0x1p-52) {
       const double value = sign * c_.f(x);
-      ++answer_.evaluations;
+      ++root_.evaluations;
       if (value > clear_) lo = x;
       else hi = x;
       if (value > clear_ && value <= enough) break;
@@ -118,7 +118,7 @@ class Advance {
     const double aim = 0.5 * (safe_ + stop_);
     double to = slope < 0 ? std::min(1.0, t + (s.lower - aim) / -slope) : 1.0;
     to = std::min(to, t + stride);
-    while (to > fixed && answer_.evaluations < uint32_t(q_.max_iterations)) {
+    while (to > fixed && root_.evaluations < uint32_t(q_.max_iterations)) {
       const Separation ahead = look(to);
       if (keeps_apart(s, t, ahead, to)) {
         stride = 4 * (to - t);
@@ -137,11 +137,11 @@ class Advance {
   const double clear_;  // |f| above it: no touch
   const double safe_;   // a proven distance above it: no touch
   const double stop_;   // a distance up to it is called a touch
-  Answer answer_;
+  Root root_;
 };
 
 }  // namespace
 
-Answer conservative(const Query &query) { return Advance(query).run(); }
+Root conservative(const Query &query) { return Advance(query).run(); }
 
 }  // namespace dfm::toi

@@ -51,7 +51,7 @@ Vec3 apart(const Features &f, const Vec3 *way = nullptr, Vec3 *moved = nullptr) 
 }
 
 // Of the contact offset: a smaller rest distance is zero but for rounding, and cannot be kept.
-constexpr double kLeastShare = 1e-6;
+constexpr double kMinShare = 1e-6;
 
 // Features beside copies rest at another distance, and the floor is in proportion to it; not above 0: none.
 double floor_share(const GuardScene &scene, const Features &f) {
@@ -61,7 +61,7 @@ double floor_share(const GuardScene &scene, const Features &f) {
     const double share = rest_of_parts(*a.surface, {f.corner[0], split}, *b.surface, {f.corner[1], 4 - split},
                                        normalized(apart(f)), scene.offset) /
                          scene.offset;
-    return share > kLeastShare ? share : 0;
+    return share > kMinShare ? share : 0;
   }
   double copies = HUGE_VAL;
   const double *const place = f.side[0]->surface->place.data();
@@ -89,12 +89,12 @@ class Near {
 
   void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
     const double now = kRounding * (run.way + run.travel);
-    if (scene_.closed_form(list_[run.begin])) look_at_obstacle(run, begin, end, now);
-    else look_at_surfaces(run, begin, end, now);
+    if (scene_.closed_form(list_[run.begin])) check_obstacle(run, begin, end, now);
+    else check_surfaces(run, begin, end, now);
   }
 
  private:
-  void look_at_surfaces(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+  void check_surfaces(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
     const double *const rest = memory_.rest.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
@@ -140,7 +140,7 @@ class Near {
   }
 
   // A surface and a closed-form shape or voxels, in the frame of the obstacle.
-  void look_at_obstacle(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+  void check_obstacle(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
     const Candidate &first = list_[run.begin];
     const ObstacleView &view = scene_.obstacles[first.slot_b];
     const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
@@ -278,13 +278,13 @@ namespace {
 
 void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory,
                     Array<uint32_t> &near, GuardBlocks &blocks, Tasks &tasks) {
-  while (blocks.near.size() < blocks.pieces.size()) blocks.near.emplace_back(near.get_allocator());
-  each_on(&tasks, blocks.pieces.size(), kTogether, [&](size_t k) {
-    const GuardBlocks::Piece &p = blocks.pieces[k];
+  while (blocks.near.size() < blocks.ranges.size()) blocks.near.emplace_back(near.get_allocator());
+  each_on(&tasks, blocks.ranges.size(), kTogether, [&](size_t k) {
+    const GuardBlocks::Range &p = blocks.ranges[k];
     blocks.near[k].clear();
     Near<true>(scene, list, memory, blocks.near[k]).look(memory.runs[p.run], p.begin, p.end);
   });
-  for (size_t k = 0; k < blocks.pieces.size(); ++k)
+  for (size_t k = 0; k < blocks.ranges.size(); ++k)
     near.insert(near.end(), blocks.near[k].begin(), blocks.near[k].end());
 }
 
@@ -294,7 +294,7 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
                 GuardBlocks *blocks, Tasks *tasks) {
   near.clear();
   const bool parts = blocks && tasks && tasks->parallel() && list.size() > 2 * kBlock;
-  if (parts) blocks->pieces.clear();
+  if (parts) blocks->ranges.clear();
   Near<false> alone(scene, list, memory, near);
   for (uint32_t r = 0; r < memory.runs.size(); ++r) {
     GuardMemory::Run &run = memory.runs[r];
@@ -306,7 +306,7 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
     if (!parts) alone.look(run, run.begin, run.end);
     else
       for (uint32_t from = run.begin; from < run.end; from += kBlock)
-        blocks->pieces.push_back({r, from, std::min(run.end, from + kBlock)});
+        blocks->ranges.push_back({r, from, std::min(run.end, from + kBlock)});
   }
   if (parts) near_in_blocks(scene, list, memory, near, *blocks, *tasks);
 }

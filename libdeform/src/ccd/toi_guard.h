@@ -116,8 +116,8 @@ struct GuardMemory {
 
 // The list divided into blocks for workers, and their results. The division depends on the list alone.
 struct GuardBlocks {
-  struct Piece { uint32_t run, begin, end; };  // of the list, within a run
-  Array<Piece> pieces;
+  struct Range { uint32_t run, begin, end; };  // of the list, within a run
+  Array<Range> ranges;
   std::vector<Array<uint32_t>> near;  // by piece
 };
 

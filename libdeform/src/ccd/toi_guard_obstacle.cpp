@@ -105,7 +105,7 @@ class Judge {
     Vec3 end[3], p, q;
     for (int k = 0; k < 3; ++k) end[k] = load3(path[k].p1);
     double w[3], distance;
-    if (!narrow::dips(*shape.view().grid, end, floor, 2 * narrow::kLeastDip * scene_.floor, w, distance) ||
+    if (!narrow::dips(*shape.view().grid, end, floor, 2 * narrow::kMinDip * scene_.floor, w, distance) ||
         !(distance < floor))
       return;
     for (int k = 0; k < 3; ++k) {

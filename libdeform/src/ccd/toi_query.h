@@ -39,7 +39,7 @@ struct Query {
   }
 };
 
-struct Answer {
+struct Root {
   double t = HUGE_VAL;
   double u = 0, v = 0;  // nearest point of the patch at t
   uint32_t evaluations = 0;
@@ -73,7 +73,7 @@ SharpCubic sharp_coplanarity(const Query &query);
 // Nothing can touch: all corners lie on one side along an axis over the whole step.
 bool apart_along_axis(const Query &query);
 
-Answer conservative(const Query &query);
-Answer by_roots(const Query &query, int method);
+Root conservative(const Query &query);
+Root by_roots(const Query &query, int method);
 
 }  // namespace dfm::toi

@@ -34,33 +34,33 @@ class Roots {
  public:
   Roots(const Query &query, int method) : q_(query), method_(method) {}
 
-  Answer run() {
-    if (apart_along_axis(q_)) return answer_;
+  Root run() {
+    if (apart_along_axis(q_)) return root_;
     const bool contacts = q_.separation == 0;
     if (contacts) plane_ = coplanarity(q_);
     if (!contacts || !(std::fabs(plane_.f.b[0]) > plane_.error)) {
       touch_ = q_.separation + 4 * kRound;
-      if (touches(0)) return answer_;
+      if (touches(0)) return root_;
     }
     // motion of the features within the uncertainty of t
     touch_ = q_.separation + 8 * q_.tolerance + 4 * kRound;
-    if (contacts && !plane_.vanishes && in_order()) return answer_;
+    if (contacts && !plane_.vanishes && in_order()) return root_;
     if (contacts) contact();
     else separation();
     std::sort(time_, time_ + ntime_);
     for (int k = 0; k < ntime_; ++k)
       if ((k == 0 || time_[k] > time_[k - 1]) && touches(time_[k])) break;
-    return answer_;
+    return root_;
   }
 
  private:
   bool touches(double t) {
-    ++answer_.evaluations;
+    ++root_.evaluations;
     const Separation s = separate(q_, t);
     if (!(s.upper <= touch_)) return false;
-    answer_.t = t;
-    answer_.u = s.u;
-    answer_.v = s.v;
+    root_.t = t;
+    root_.u = s.u;
+    root_.v = s.v;
     return true;
   }
 
@@ -91,10 +91,10 @@ class Roots {
     for (int k = 0; k <= nturn; ++k, b.lo = b.hi, b.f_lo = b.f_hi) {
       b.hi = k < nturn ? turn[k] : 1;
       b.f_hi = p(b.hi);
-      ++answer_.evaluations;
+      ++root_.evaluations;
       if ((b.f_lo < 0 && b.f_hi > 0) || (b.f_lo > 0 && b.f_hi < 0))
         out[n++] = find_root(method, p, b, method == method_ ? q_.tolerance : 0x1p-50, q_.max_iterations,
-                             answer_.evaluations);
+                             root_.evaluations);
     }
     return n;
   }
@@ -122,7 +122,7 @@ class Roots {
       if (!(plane_.error > kSharp * std::fabs(slope(time_[k])))) continue;
       const SharpCubic sharp = sharp_coplanarity(q_);
       for (int pass = 0; pass < 4; ++pass) {
-        ++answer_.evaluations;
+        ++root_.evaluations;
         const double step = sharp(time_[k]) / slope(time_[k]), t = time_[k] - step;
         if (!(std::fabs(step) < kSharpenBy && t > 0 && t <= 1)) break;
         time_[k] = t;
@@ -165,10 +165,10 @@ class Roots {
     for (int k = 0; k < n; ++k, b.lo = b.hi, b.f_lo = b.f_hi) {
       b.hi = end[k];
       b.f_hi = p(b.hi);
-      ++answer_.evaluations;
+      ++root_.evaluations;
       if (((b.f_lo < 0 && b.f_hi > 0) || (b.f_lo > 0 && b.f_hi < 0)) &&
           !(n > 1 && apart_between(b.lo, b.hi))) {
-        const double t = find_root(method_, p, b, q_.tolerance, q_.max_iterations, answer_.evaluations);
+        const double t = find_root(method_, p, b, q_.tolerance, q_.max_iterations, root_.evaluations);
         if (!certain(t)) return false;
         if (touches(t)) return true;
       }
@@ -214,11 +214,11 @@ class Roots {
   double touch_ = 0;
   double time_[kMaxTimes];
   int ntime_ = 0;
-  Answer answer_;
+  Root root_;
 };
 
 }  // namespace
 
-Answer by_roots(const Query &query, int method) { return Roots(query, method).run(); }
+Root by_roots(const Query &query, int method) { return Roots(query, method).run(); }
 
 }  // namespace dfm::toi

@@ -29,7 +29,7 @@ void AreaShares::list_owners(std::span<const ContactPoint> contacts, const doubl
     const ContactPoint &c = contacts[i];
     const bool loaded = impulse[3 * size_t{i}] > 0;
     if (c.more > 0 || takes(c) || (loaded || c.distance < touch) == idle) continue;
-    owners_.push_back({c.type_a == 0 ? c.node[0] : c.lender - 1, other_of(c, 0), i, loaded});
+    owners_.push_back({c.type_a == 0 ? c.node[0] : c.area_node_plus_1 - 1, other_of(c, 0), i, loaded});
   }
   std::sort(owners_.begin(), owners_.end(), [](const Owner &l, const Owner &r) {
     return std::tie(l.node, l.other, l.contact) < std::tie(r.node, r.other, r.contact);

@@ -12,9 +12,9 @@
 // A drag holds nothing: its surfel is material in front of an edge that cuts, and `along` the way of it.
 // Its impulse is l along, with s = -along.u the speed at which the edge moves through the material:
 //
-//     0 <= l <= most;   l = most where s > 0, s = 0 where 0 < l < most, s <= 0 where l = 0;   l s <= due
+//     0 <= l <= most;   l = most where s > 0, s = 0 where 0 < l < most, s <= 0 where l = 0;   l s <= max_work
 //
-// which is dry friction that stops a motion, begins none, and does at most the work `due`. Both sides get
+// which is dry friction that stops a motion, begins none, does at most the work `max_work`. Both sides get
 // the impulse at the same point, so that the material is dragged by what the edge feels.
 #pragma once
 #include <cstdint>
@@ -31,13 +31,13 @@ struct Bond {
   uint8_t obstacle, nnode;
   uint32_t node[5];
   double weight[5];
-  Vec3 velocity;  // m/s of the place on an obstacle, mean over the sub-step; 0 for bodies
-  Vec3 rate;      // m/s
-  double soft;    // 1/kg
-  double give;    // share of the surfel's own response that is added to soft
+  Vec3 velocity;    // m/s of the place on an obstacle, mean over the sub-step; 0 for bodies
+  Vec3 rate;        // m/s
+  double soft;      // 1/kg
+  double softness;  // share of the surfel's own response that is added to soft
   // Of a drag: unit length; N s; J. Else `along` is zero.
   Vec3 along;
-  double most, due;
+  double most, max_work;
   bool drags() const { return along.x != 0 || along.y != 0 || along.z != 0; }
 };
 

@@ -17,8 +17,9 @@ Drag drag_of(const ContactRows &rows, uint32_t row) {
   const double speed = b.w * now - dot(b.along, rows.velocity(row));
   if (!(speed > 0)) return {0, b.most};
   const double l = b.w > 0 ? std::min(b.most, speed / b.w) : b.most;
-  if (l * (speed - b.w * l) <= b.due) return {l, b.most};
-  const double paid = 2 * b.due / (speed + std::sqrt(std::max(0.0, speed * speed - 4 * b.w * b.due)));
+  if (l * (speed - b.w * l) <= b.max_work) return {l, b.most};
+  const double paid =
+      2 * b.max_work / (speed + std::sqrt(std::max(0.0, speed * speed - 4 * b.w * b.max_work)));
   return {paid, paid};
 }
 

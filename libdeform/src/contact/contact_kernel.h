@@ -28,7 +28,7 @@ struct RowsView {
   const double *frame, *drive;  // [n,9], [n,3] plus one vector, which is ignored
   const double *across;         // [n,9] the frame transposed, and a vector more
   const double *rate, *wn, *wt, *cross;
-  const double *yields;  // [n,3] softness, its largest effect, the load from which on it acts
+  const double *compliance;  // [n,3] softness, its largest effect, the load from which on it acts
 };
 // Of ContactState.
 struct LawView {
@@ -44,10 +44,10 @@ struct ToleranceView {
 };
 
 // Residual of a state. Of each contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t |lambda_t -
-// law|. `relative` is the worst over its tolerance: at most 1 is converged. `due` is the same with
+// law|. `relative` is the worst over its tolerance: at most 1 is converged. `required` is the same with
 // most_normal for normal[i]: the required accuracy; the rest may be left to the warm start of the next
 // sub-step. `normal` is the worst r_n alone, m/s.
-struct Residual { double relative = 0, due = 0, speed = 0, normal = 0; };
+struct Residual { double relative = 0, required = 0, speed = 0, normal = 0; };
 
 struct ContactKernels {
   // One sweep of block Gauss-Seidel in contact order; y [ndof,4] and impulse [n,3] change.

@@ -72,7 +72,7 @@ void sweep(const RowsView &rows, const LawView &law, double h, double *y, double
     if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
     double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.yields + 3 * size_t(i)),
+    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.compliance + 3 * size_t(i)),
                  d = ln - l[0];
     if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
     Pair t{0, 0};
@@ -91,18 +91,18 @@ void sweep(const RowsView &rows, const LawView &law, double h, double *y, double
 Residual residual(const RowsView &rows, const LawView &law, const ToleranceView &tolerance, double h,
                   const double *y, const double *impulse) {
   Residual r;
-  double poison = 0;
+  double nan_flag = 0;
   for (uint32_t i = 0; i < rows.n; ++i) {
     const double wn = rows.wn[i], wt = rows.wt[i];
     if (!(wn > 0)) continue;
     const double *const l = impulse + 3 * size_t(i);
     const Four u = velocity(rows, y, i);
-    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.yields + 3 * size_t(i)),
+    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.compliance + 3 * size_t(i)),
                  closed = wn * l[0];
     const double normal = __builtin_fabs(open < closed ? open : closed);
-    poison += 0.0 * ((get(u, 0) + get(u, 1)) + (get(u, 2) + l[0]));
+    nan_flag += 0.0 * ((get(u, 0) + get(u, 1)) + (get(u, 2) + l[0]));
     r.relative = larger(r.relative, normal / tolerance.normal[i]);
-    r.due = larger(r.due, normal / tolerance.most_normal);
+    r.required = larger(r.required, normal / tolerance.most_normal);
     r.speed = larger(r.speed, normal);
     r.normal = larger(r.normal, normal);
     if (!(wt > 0) || !(l[0] > 0)) continue;
@@ -111,11 +111,11 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
     const double slip = __builtin_sqrt(get(u, 1) * get(u, 1) + get(u, 2) * get(u, 2));
     const double share = tangent / larger(tolerance.tangent[i], 1e-3 * slip);
     r.relative = larger(r.relative, share);
-    r.due = larger(r.due, share);
+    r.required = larger(r.required, share);
     r.speed = larger(r.speed, tangent);
   }
   // larger() ignores NaN
-  if (poison != 0) r.relative = r.due = __builtin_inf();
+  if (nan_flag != 0) r.relative = r.required = __builtin_inf();
   return r;
 }
 

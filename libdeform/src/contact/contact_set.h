@@ -31,7 +31,7 @@ struct ContactPoint {
   uint8_t nnode;
   uint8_t type_a;  // what feature_a is: 0 surfel, 1 edge, 2 triangle
   // area: for an edge or triangle contact, the node that lent it, plus 1; else 0
-  uint32_t lender;
+  uint32_t area_node_plus_1;
   uint32_t node[4];
   double weight[4];
   double point[3];   // m, midway between the closest points
@@ -39,7 +39,7 @@ struct ContactPoint {
   double distance;   // m, true distance, >= 0; negative: depth below b's surface, for recovery
   double area;       // m2
   // m, >= 0: how far below the rest distance a load may press this contact (doc/decisions/contact_problem.md)
-  double give;
+  double indentation;
   double velocity[3];  // m/s of the obstacle where a's closest point is, belt included; 0 for bodies
 };
 

@@ -18,7 +18,7 @@ void pass_on(const ImpulseSink &s, uint32_t surfel) {
     store3(s.phyxel + size_t(4) * s.surface->point[surfel], load3(s.surfel + size_t(3) * surfel));
 }
 
-void zero(std::span<const ImpulseSink> sinks, const GivenNodes &given) {
+void zero(std::span<const ImpulseSink> sinks, const WrittenNodes &given) {
   if (given.known) {
     for (const uint32_t node : given.list) {
       const ImpulseSink &s = sink_of(sinks, node);
@@ -36,7 +36,7 @@ void zero(std::span<const ImpulseSink> sinks, const GivenNodes &given) {
 }  // namespace
 
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
-                std::span<const ImpulseSink> sinks, GivenNodes &given, std::span<const Bond> bonds,
+                std::span<const ImpulseSink> sinks, WrittenNodes &given, std::span<const Bond> bonds,
                 const double *bond_impulse) {
   zero(sinks, given);
   given.known = false;  // until all that follows is in the list

@@ -23,13 +23,13 @@ struct ImpulseSink {
 
 // The nodes that the last call gave impulses to, if nothing else has changed the sinks' values since: contact
 // reaches few of them. Not known: all are zeroed.
-struct GivenNodes {
+struct WrittenNodes {
   bool known = false;
   Array<uint32_t> list;
 };
 
 void distribute(std::span<const ContactPoint> contacts, const double *frame, const double *impulse,
-                std::span<const ImpulseSink> sinks, GivenNodes &given, std::span<const Bond> bonds = {},
+                std::span<const ImpulseSink> sinks, WrittenNodes &given, std::span<const Bond> bonds = {},
                 const double *bond_impulse = nullptr);
 
 // f_p = N^T f_s of a coupled surface: surfel [nsurfel,3], phyxel [npoint,4] is overwritten. A surfel without

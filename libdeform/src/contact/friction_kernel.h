@@ -12,16 +12,16 @@ static inline double larger(double a, double b) { return a < b ? b : a; }  // as
 // The normal impulse l of a contact: 0 <= l complementary to u_n + rate + min(c max(l - p, 0), m) >= 0, with
 // yields = (c, m, p). For the present l and k = u_n + rate, the new l is a root of
 // k + wn (l' - l) + min(c max(l' - p, 0), m).
-static inline double normal_impulse(double l, double k, double wn, const double *yields) {
+static inline double normal_impulse(double l, double k, double wn, const double *compliance) {
   const double firm = l - k / wn;
-  if (yields[0] == 0) return larger(0.0, firm);
-  const double soft = l - (k + yields[0] * (l - yields[2])) / (wn + yields[0]);
-  return larger(0.0, larger(l - (k + yields[1]) / wn, firm < soft ? firm : soft));
+  if (compliance[0] == 0) return larger(0.0, firm);
+  const double soft = l - (k + compliance[0] * (l - compliance[2])) / (wn + compliance[0]);
+  return larger(0.0, larger(l - (k + compliance[1]) / wn, firm < soft ? firm : soft));
 }
 // m/s, by which the load presses the contact in.
-static inline double given(double l, const double *yields) {
-  const double all = yields[0] * larger(0.0, l - yields[2]);
-  return all < yields[1] ? all : yields[1];
+static inline double given(double l, const double *compliance) {
+  const double all = compliance[0] * larger(0.0, l - compliance[2]);
+  return all < compliance[1] ? all : compliance[1];
 }
 
 // The friction impulse by the linearized law, for the present impulse (l1, l2), slip (u1, u2) and new normal

@@ -213,8 +213,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     for (const Row &r : row_)
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
-    const double off = error(), due = std::max(residual_.relative, off / tolerance);
-    found_ = due <= set_.accuracy;
+    const double off = error(), required = std::max(residual_.relative, off / tolerance);
+    found_ = required <= set_.accuracy;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
       best = now;
@@ -222,7 +222,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       best_g_.assign(g_.begin(), g_.end());
       best_l_.assign(l_.begin(), l_.end());
     }
-    host_->spend(uint64_t{products_ - std::exchange(told_, products_)} * part_.all());
+    host_->spend(uint64_t{products_ - std::exchange(reported_, products_)} * part_.all());
     if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
     lh_.assign(l_.begin(), l_.end());
     double moved = 0;
@@ -230,13 +230,13 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
     const bool still = passes_ > set_.rounds && moved <= set_.accuracy * tolerance;
-    const bool stands = still && residual_.normal <= set_.contradiction * normal;
+    const bool stalled = still && residual_.normal <= set_.contradiction * normal;
     if (still && off <= tolerance) {
-      found_ = stood++ >= set_.rounds && stands;
+      found_ = stood++ >= set_.rounds && stalled;
       if (found_) break;
       scale_penalties(set_.growth);
     }
-    aim = stands ? off : now;
+    aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
     if (slow < set_.rounds) continue;
@@ -250,8 +250,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     put_rows();
     if (!host_->judge(residual_)) return false;
   }
-  if (found_ && residual_.due > 1) residual_.due = residual_.relative = 1;
-  return found_ || spent || residual_.due <= 1 || !gains(normal) || penalties_alone(tolerance, steps);
+  if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;
+  return found_ || spent || residual_.required <= 1 || !gains(normal) || penalties_alone(tolerance, steps);
 }
 
 // Whether normal impulses do more work than residuals of this size explain.
@@ -263,7 +263,7 @@ bool ContactNewton::gains(double normal) const {
     const double l = l_[3 * size_t{k}];
     all += l;
     const Vec3 u = times(k, v_.data(), kStride) + load3(&bias_[3 * size_t{k}]);
-    work += l * (u.x + rows_->rate[i] + given(l, &rows_->yields[3 * size_t{i}]));
+    work += l * (u.x + rows_->rate[i] + given(l, &rows_->compliance[3 * size_t{i}]));
   }
   return work > normal * all;
 }

@@ -46,7 +46,7 @@ class SolveLaws {
   virtual ~SolveLaws() = default;
   // Evaluates the laws at the state's fn where slip and force lie on the line of ft_stop with these responses
   // [rows], 1/kg (friction/local_solve.cpp); their slopes there. False: a law has failed.
-  virtual bool answer(const double *response) = 0;
+  virtual bool evaluate_local(const double *response) = 0;
   virtual bool slopes() = 0;
   // The residual of rows.impulse at rows.y; the state then has the laws there. False: a law has failed.
   virtual bool judge(Residual &residual) = 0;
@@ -136,7 +136,7 @@ class ContactNewton {
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
   uint32_t limit_ = 0;             // on steps_
-  uint32_t told_ = 0;              // of products_, to the host
+  uint32_t reported_ = 0;              // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
   void list_rows();

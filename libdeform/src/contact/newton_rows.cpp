@@ -26,7 +26,7 @@ void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<Imp
   host_ = &host;
   h_ = h;
   found_ = factored_ = shaped_ = false;
-  passes_ = steps_ = products_ = factors_ = told_ = 0;
+  passes_ = steps_ = products_ = factors_ = reported_ = 0;
   number_nodes(systems);
   list_rows();
   set_bias();
@@ -208,7 +208,7 @@ void ContactNewton::set_penalties(double factor) {
   for (size_t k = 0; k < row_.size(); ++k) {
     // over what the nodes answer by themselves, which is stiffer than the bodies are
     const uint32_t i = row_[k].row;
-    const double whole = rows.whole_answer(i), wn = rows.wn[i] - whole, wt = rows.wt[i] - whole;
+    const double whole = rows.whole_response(i), wn = rows.wn[i] - whole, wt = rows.wt[i] - whole;
     rho_[2 * k] = wn > 0 ? factor / wn : 0;
     rho_[2 * k + 1] = wt > 0 ? factor / wt : 0;
     if (row_[k].kind == Kind::bond) {
@@ -284,31 +284,31 @@ bool ContactNewton::evaluate(bool frozen) {
       continue;
     }
     const uint32_t i = row_[k].row;
-    const double rho = rho_[2 * size_t{k}], rub = rho_[2 * size_t{k} + 1];
+    const double rho = rho_[2 * size_t{k}], slide = rho_[2 * size_t{k} + 1];
     const double *const lh = &lh_[3 * size_t{k}];
     double *const l = &l_[3 * size_t{k}];
     std::copy_n(lh, 3, l);
     if (!(rho > 0)) continue;
-    l[0] = normal_impulse(lh[0], u.x + rows_->rate[i], 1 / rho, &rows_->yields[3 * size_t{i}]);
+    l[0] = normal_impulse(lh[0], u.x + rows_->rate[i], 1 / rho, &rows_->compliance[3 * size_t{i}]);
     l[1] = l[2] = 0;
     const bool smooth = s.form[i] == kSmoothLaw;
     s.fn[i] = (frozen && smooth ? frozen_[k] : l[0]) / h_;
     s.vt[i] = s.slip[i] = u.y;
     s.vt[stride + i] = s.slip[stride + i] = u.z;
-    s.ft_stop[i] = (lh[1] - rub * u.y) / h_;
-    s.ft_stop[stride + i] = (lh[2] - rub * u.z) / h_;
+    s.ft_stop[i] = (lh[1] - slide * u.y) / h_;
+    s.ft_stop[stride + i] = (lh[2] - slide * u.z) / h_;
     laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
   }
-  if (finite != 0 || (laws && !host_->answer(response_.data()))) return false;
+  if (finite != 0 || (laws && !host_->evaluate_local(response_.data()))) return false;
   for (uint32_t k = 0; k < row_.size(); ++k) {
     double *const l = &l_[3 * size_t{k}];
     if (row_[k].kind == Kind::contact) {
       const uint32_t i = row_[k].row;
-      const double rub = rho_[2 * size_t{k} + 1];
-      if (rub > 0 && s.fn[i] > 0 && s.form[i] == kSmoothLaw) {
+      const double slide = rho_[2 * size_t{k} + 1];
+      if (slide > 0 && s.fn[i] > 0 && s.form[i] == kSmoothLaw) {
         l[1] = h_ * s.ft[i];
         l[2] = h_ * s.ft[stride + i];
-      } else if (rub > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
+      } else if (slide > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
         const double radius = frozen ? frozen_[k] : h_ * s.limit[i];
         const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[stride + i], all = std::sqrt(a * a + b * b);
         const double share = all > radius ? radius / all : 1;
@@ -343,7 +343,7 @@ bool ContactNewton::find_slopes(bool frozen) {
   for (uint32_t k = 0; k < row_.size(); ++k) {
     const uint32_t i = row_[k].row;
     double *const G = &slope_[9 * size_t{k}];
-    const double rho = rho_[2 * size_t{k}], rub = rho_[2 * size_t{k} + 1];
+    const double rho = rho_[2 * size_t{k}], slide = rho_[2 * size_t{k} + 1];
     const double *const l = &l_[3 * size_t{k}];
     if (!(rho > 0)) continue;
     if (row_[k].kind != Kind::contact) {
@@ -362,15 +362,15 @@ bool ContactNewton::find_slopes(bool frozen) {
     }
     double normal = 0;
     if (l[0] > 0) {
-      const double *const yields = &rows_->yields[3 * size_t{i}];
-      const double gives = yields[0] * (l[0] - yields[2]);
-      normal = gives > 0 && gives < yields[1] ? 1 / (1 / rho + yields[0]) : rho;
+      const double *const compliance = &rows_->compliance[3 * size_t{i}];
+      const double gives = compliance[0] * (l[0] - compliance[2]);
+      normal = gives > 0 && gives < compliance[1] ? 1 / (1 / rho + compliance[0]) : rho;
       G[0] = normal;
     }
-    if (!(rub > 0)) continue;
+    if (!(slide > 0)) continue;
     if (s.form[i] == kSmoothLaw && s.fn[i] > 0) {
       const Slope d = dissipative_slope(s, i);
-      const double t = h_ / rub;
+      const double t = h_ / slide;
       const double m11 = 1 - t * d.a, m22 = 1 - t * d.d, m12 = -t * d.b, m21 = -t * d.c,
                    det = m11 * m22 - m12 * m21;
       // X = (I - D/rho)^-1; G_tt = -X D, G_tn = X (dft/dfn) G_nn
@@ -388,10 +388,10 @@ bool ContactNewton::find_slopes(bool frozen) {
       if (!(radius > 0)) continue;
       const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[n + i], all = std::sqrt(a * a + b * b);
       if (all <= radius) {
-        G[4] = G[8] = rub;
+        G[4] = G[8] = slide;
         continue;
       }
-      const double t1 = a / all, t2 = b / all, across = rub * radius / all;
+      const double t1 = a / all, t2 = b / all, across = slide * radius / all;
       G[4] = across * t2 * t2;
       G[5] = G[7] = -across * t1 * t2;
       G[8] = across * t1 * t1;

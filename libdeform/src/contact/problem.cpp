@@ -136,7 +136,7 @@ bool LinearMotion::matrix(const uint32_t *at, double *blk) {
   return true;
 }
 
-bool LinearMotion::sound() const {
+bool LinearMotion::is_valid() const {
   const auto none_beyond = [&](uint32_t k) { return k < n; };
   return start_.size() == size_t{kStride} * n && places_.size() == start_.size() &&
          inverse_.size() == start_.size() && at_start_.size() == 3 * size_t{n} &&
@@ -243,7 +243,7 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   copy_rows(from.wt, 1, list, rows.wt);
   copy_rows(from.impulse, 3, list, rows.impulse);
   copy_rows(from.rate, 1, contacts, rows.rate);
-  copy_rows(from.yields, 3, contacts, rows.yields);
+  copy_rows(from.compliance, 3, contacts, rows.compliance);
   copy_rows(from.cross, 2, contacts, rows.cross);
   each_row(part.bonds, [&](uint32_t i) { bonds.push_back(i - from.n); });
   copy_rows(from.bond, 1, bonds, rows.bond);
@@ -279,7 +279,7 @@ void ContactProblem::transfer(Transfer &t) {
   t.many(rows.block);
   t.many(rows.rigid);
   for (Array<double> *a : {&rows.alone, &rows.y_free, &rows.arm, &rows.frame, &rows.drive, &rows.rate,
-                           &rows.yields, &rows.wn, &rows.wt, &rows.cross, &rows.impulse, &rows.whole_of})
+                           &rows.compliance, &rows.wn, &rows.wt, &rows.cross, &rows.impulse, &rows.whole_of})
     t.many(*a);
   t.count(rows.blocks);
   for (ContactRows::Block &b : rows.blocks) {
@@ -291,7 +291,7 @@ void ContactProblem::transfer(Transfer &t) {
   t.count(rows.bond);
   for (ContactRows::BondRow &b : rows.bond) {
     for (Vec3 *v : {&b.rate, &b.inverse[0], &b.inverse[1], &b.inverse[2], &b.along}) t.one(*v);
-    for (double *x : {&b.soft, &b.most, &b.due, &b.w}) t.one(*x);
+    for (double *x : {&b.soft, &b.most, &b.max_work, &b.w}) t.one(*x);
     bool stuck = false;  // of drags: in files of this version, read by nothing
     t.one(stuck);
   }
@@ -322,7 +322,7 @@ void ContactProblem::check() const {
               std::ranges::is_sorted(rows.begin) && rows.source.size() == ndof && rows.point.size() == ndof &&
               rows.block.size() == ndof && rows.alone.size() == kStride * ndof &&
               rows.y_free.size() == kStride * ndof && rows.frame.size() == 9 * all &&
-              rows.drive.size() == 3 * all && rows.rate.size() == n && rows.yields.size() == 3 * n &&
+              rows.drive.size() == 3 * all && rows.rate.size() == n && rows.compliance.size() == 3 * n &&
               rows.wn.size() == all && rows.wt.size() == all && rows.cross.size() == 2 * n &&
               rows.impulse.size() == 3 * all && rows.whole_of.size() == motions.size() &&
               rows.bond.size() == rows.nbond && state.law.size() == stride && state.area.size() == stride &&
@@ -339,7 +339,7 @@ void ContactProblem::check() const {
     const auto own = [&](uint32_t k) { return k == uint32_t(&b - rows.blocks.data()); };
     good = good && std::all_of(rows.block.begin() + b.first, rows.block.begin() + b.first + b.count, own);
   }
-  good = good && rows.response_.size() == values && std::ranges::all_of(motions, &LinearMotion::sound);
+  good = good && rows.response_.size() == values && std::ranges::all_of(motions, &LinearMotion::is_valid);
   for (uint32_t i = 0; i < rows.dof.size() && good; ++i) good = rows.dof[i] < ndof;
   for (const Array<uint32_t> *const side : {&rows.rigid, &rows.rigid_a})
     for (const uint32_t d : *side) good = good && (d == kNone || size_t{d} + 1 < ndof);

@@ -29,7 +29,7 @@ class LinearMotion final : public ImplicitSystem {
   void take(const double *) override {}
   template <class Transfer>
   void transfer(Transfer &t);
-  bool sound() const;  // do sizes and numbers fit each other?
+  bool is_valid() const;  // do sizes and numbers fit each other?
 
   uint32_t n = 0;  // points; 0: this is no implicit body
 

@@ -37,16 +37,17 @@ void Renewal::list(std::span<const ContactPoint> contacts, const double *impulse
   }
 }
 
-void Renewal::fill(const uint8_t *stands, const double *aim, double *area) {
+void Renewal::fill(const uint8_t *keeps_area, const double *target_area, double *area) {
   for (size_t i = 0; i < patch_of_.size(); ++i) {
-    if (!stands[i]) continue;
+    if (!keeps_area[i]) continue;
     Patch &p = patches_[patch_of_[i]];
-    p.lacks += aim[i] - area[i];
-    p.below += std::max(0.0, aim[i] - area[i]);
+    p.lacks += target_area[i] - area[i];
+    p.below += std::max(0.0, target_area[i] - area[i]);
   }
   for (size_t i = 0; i < patch_of_.size(); ++i) {
     const Patch &p = patches_[patch_of_[i]];
-    if (stands[i] && p.lacks > 0 && aim[i] > area[i]) area[i] += p.lacks / p.below * (aim[i] - area[i]);
+    if (keeps_area[i] && p.lacks > 0 && target_area[i] > area[i])
+      area[i] += p.lacks / p.below * (target_area[i] - area[i]);
   }
 }
 

@@ -1,4 +1,4 @@
-// How fast the area of a contact approaches its target (its aim: contact/areas.h, contact/exchange.h).
+// How fast the area of a contact approaches its target (contact/areas.h, contact/exchange.h).
 //
 // Bristles are attached to the surface. If area moved with every change of load, different deflections would
 // be mixed, and a rocked patch would lose its memory. Also, which of several redundant contacts is loaded
@@ -7,11 +7,11 @@
 // and so on. A stack of cubes walked by micrometers per second for this reason. So areas of a patch at rest
 // do not change:
 //
-//   a contact that carries nothing   has no bristle out, and gets its aim when it begins to carry
+//   a contact that carries nothing   has no bristle out, and gets its target when it begins to carry
 //   one that carries                 keeps its area, except that
-//     contacts of the patch let go   what the patch lacks then goes to those below their aim; their force is
+//     contacts of the patch let go   what the patch lacks then goes to those below target; their force is
 //                                    kept, their energy falls
-//     sliding renews the bristles    its area goes to its aim by the share r of the way in a sub-step
+//     sliding renews the bristles    its area goes to its target by the share r of the way in a sub-step
 //
 //     r = min(1, sum fn |h v - dz| / sum fn |z|  +  min(|F - F_0| / max(F, F_0), sum fn h / (h + t) / F)),
 //     sums over the patch, F = sum fn:
@@ -34,9 +34,9 @@ class Renewal {
   explicit Renewal(const Memory &memory);
   // impulse: [n,3] of the last sub-step, normal part first.
   void list(std::span<const ContactPoint> contacts, const double *impulse);
-  // For the listed contacts. stands: [n] 1: the contact keeps its area; aim: [n] m2, its area by the load;
-  // area: [n] m2 in and out, for contacts with stands = 1. Allocates nothing.
-  void fill(const uint8_t *stands, const double *aim, double *area);
+  // For the listed contacts. keeps_area: [n] 1: keeps its area; target_area: [n] m2, its area by the load;
+  // area: [n] m2 in and out, for contacts with keeps_area = 1. Allocates nothing.
+  void fill(const uint8_t *keeps_area, const double *target_area, double *area);
   // The slid distance of a contact and the deflection of its bristles, m.
   struct Way { double slid, out; };
   // impulse: [n,3] of this sub-step of h; ways, dwell: [n]; renewed: [n] out, r of the contact's patch.

@@ -20,7 +20,7 @@ const ContactKernels &contact_kernels() {
 
 ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()), loops_(contact_kernels()) {
   use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             given_, frame, drive, rate, borne, start_depth, yields, wn, wt, cross, impulse, bond,
+             unit_response_, frame, drive, rate, borne, start_depth, compliance, wn, wt, cross, impulse, bond,
              dof_of_point_, dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_,
              every_block_, whole_of);
 }
@@ -71,7 +71,7 @@ void ContactRows::set_rigid_sides(std::span<const RigidSides> between_rigids) {
   frame.resize(size_t(9) * all());
   for (Array<double> *a : {&drive, &impulse}) a->resize(size_t(3) * all());
   for (Array<double> *a : {&wn, &wt}) a->resize(all());
-  yields.resize(size_t(3) * n);
+  compliance.resize(size_t(3) * n);
   this->cross.resize(size_t(2) * n);
   rate.resize(n);
   for (uint32_t i = soft(); i < n; ++i) {
@@ -267,7 +267,7 @@ Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
 }
 
 // 1/kg: what the implicit bodies of contact i answer as a whole; their nodes have the rest.
-double ContactRows::whole_answer(uint32_t i) const {
+double ContactRows::whole_response(uint32_t i) const {
   double sum = 0;
   for (uint32_t j = begin[i], last = kNone; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j], s = block[d] == kNone ? source[d] : kNone;
@@ -282,7 +282,7 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
     if (block[d] == kNone) {
-      sum += (weight[j] * weight[j]) * answer(d, a);
+      sum += (weight[j] * weight[j]) * response_alone(d, a);
       continue;
     }
     const Block &b = blocks[block[d]];
@@ -373,16 +373,16 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
       along[c] = 1;
       w[c] = diagonal(i, along);
     }
-    const double body = whole_answer(i);
+    const double body = whole_response(i);
     for (int c = 0; c < 3; ++c) w[c][c] += body;
     wn[i] = w[0].x;
     wt[i] = std::max(w[1].y, w[2].z);
     BondRow &row = bond[k];
     row.rate = b.rate;
-    row.soft = b.soft + b.give * std::max(w[0].x, wt[i]);
+    row.soft = b.soft + b.softness * std::max(w[0].x, wt[i]);
     row.along = b.along;
     row.most = b.most;
-    row.due = b.due;
+    row.max_work = b.max_work;
     if (row.drags()) {
       row.w = dot(b.along, diagonal(i, b.along));
       continue;
@@ -397,7 +397,7 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   frame.resize(size_t(all()) * 9);
   drive.resize(size_t(all()) * 3);
   rate.resize(n);
-  yields.resize(size_t(n) * 3);
+  compliance.resize(size_t(n) * 3);
   wn.resize(all());
   wt.resize(all());
   cross.resize(size_t(n) * 2);
@@ -416,12 +416,12 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     const double from = start_depth.empty() ? 0 : start_depth[i];
     rate[i] = bias_velocity(contacts[i].distance + from, offset, h, planned, most);
     const Vec3 w0 = diagonal(i, normal);
-    const double body = whole_answer(i);
+    const double body = whole_response(i);
     wn[i] = dot(normal, w0) + body;
     // min(c l, m) balances the opening speed of a depth `give` at most: no load presses it deeper.
-    yields[3 * size_t(i)] = contacts[i].give > 0 ? kSoft * wn[i] : 0;
-    yields[3 * size_t(i) + 1] = kCloses * contacts[i].give / planned;
-    yields[3 * size_t(i) + 2] = 0;
+    compliance[3 * size_t(i)] = contacts[i].indentation > 0 ? kSoft * wn[i] : 0;
+    compliance[3 * size_t(i) + 1] = kCloses * contacts[i].indentation / planned;
+    compliance[3 * size_t(i) + 2] = 0;
     cross[2 * size_t(i)] = dot(t1, w0);
     cross[2 * size_t(i) + 1] = dot(t2, w0);
     const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
@@ -437,7 +437,7 @@ void ContactRows::soften_openings(std::span<const double> firm) {
   for (uint32_t i = 0; i < soft(); ++i) {
     const double speed = -rate[i];
     if (!(speed > 0) || !(wn[i] > 0) || (!firm.empty() && firm[i] > 0)) continue;
-    double *const yield = &yields[3 * size_t(i)];
+    double *const yield = &compliance[3 * size_t(i)];
     // a crossing that gives way bears almost nothing while it opens
     if (yield[0] > 0) {
       yield[1] = std::max(yield[1], speed);
@@ -450,7 +450,7 @@ void ContactRows::soften_openings(std::span<const double> firm) {
 }
 
 double ContactRows::load_without_opening(uint32_t i) const {
-  const double l = impulse[3 * size_t(i)], *const yield = &yields[3 * size_t(i)];
+  const double l = impulse[3 * size_t(i)], *const yield = &compliance[3 * size_t(i)];
   if (!(yield[2] > 0)) return l;
   const double most = yield[1] / yield[0], by = std::clamp(l - yield[2], 0.0, most);
   return l - by * by / most;
@@ -488,14 +488,14 @@ void ContactRows::take_response(const Block &b) {
   double *to = &response_[b.response];
   for (size_t column = 0; column < wide; ++column)
     for (size_t k = 0; k < b.count; ++k) {
-      for (size_t row = 0; row < 3; ++row) *to++ = given_[(3 * k + row) * wide + column];
+      for (size_t row = 0; row < 3; ++row) *to++ = unit_response_[(3 * k + row) * wide + column];
       *to++ = 0;
     }
 }
 
-void ContactRows::take_answers(const Block &b) {
+void ContactRows::add_responses(const Block &b) {
   const size_t points = size_t(3) * b.count * b.count;
-  const double *from = given_.data();
+  const double *from = unit_response_.data();
   double *to = &response_[b.response];
   for (size_t k = 0; k < points; ++k, from += 3, to += 4) {
     to[0] = from[0];
@@ -525,7 +525,7 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
       continue;
     }
     double *const to = &y[size_t(d) * 4];
-    store3(to, load3(to) + weight[j] * answer(d, p));
+    store3(to, load3(to) + weight[j] * response_alone(d, p));
   }
 }
 

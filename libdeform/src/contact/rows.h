@@ -97,7 +97,7 @@ struct ContactRows {
   // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the
   // softness c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l -
   // p, 0), m) is added to u_n + rate. 0, 0, 0 for all others.
-  Array<double> yields;
+  Array<double> compliance;
   Array<double> wn, wt;  // [all] 1/kg: W_nn; largest eigenvalue of W_tt, of a bond the larger of W_yy, W_zz
   // [n,2] 1/kg: W_tn, the slip that a unit normal impulse makes at its own contact
   Array<double> cross;
@@ -109,7 +109,7 @@ struct ContactRows {
     double soft;
     Vec3 inverse[3];
     Vec3 along;  // of a drag (contact/bond.h), else zero
-    double most, due;
+    double most, max_work;
     double w;  // 1/kg, of a drag along it; zero: nothing moves
     bool drags() const { return along.x != 0 || along.y != 0 || along.z != 0; }
   };
@@ -128,16 +128,16 @@ struct ContactRows {
   // fill(matrix) writes the block's response, [3 count, 3 count] row-major, 1/kg.
   template <class Fill>
   void set_response(const Block &b, const Fill &fill) {
-    given_.resize(size_t(9) * b.count * b.count);
-    fill(given_.data());
+    unit_response_.resize(size_t(9) * b.count * b.count);
+    fill(unit_response_.data());
     take_response(b);
   }
   // The same where fill(answers) writes what unit impulses change one after another, [3 count, 3 count].
   template <class Fill>
-  void set_answers(const Block &b, const Fill &fill) {
-    given_.resize(size_t(9) * b.count * b.count);
-    fill(given_.data());
-    take_answers(b);
+  void set_responses(const Block &b, const Fill &fill) {
+    unit_response_.resize(size_t(9) * b.count * b.count);
+    fill(unit_response_.data());
+    add_responses(b);
   }
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
   // longer than h where the guard has cut it, or depths would turn into speed. tasks: null: on this thread
@@ -162,7 +162,7 @@ struct ContactRows {
   RowsPart whole();  // all of them; valid until the next call
 
   // 1/kg: the estimate of what implicit bodies answer as a whole, in wn and wt of this row; 0 without any
-  double whole_answer(uint32_t i) const;
+  double whole_response(uint32_t i) const;
   Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;  // of W a of a contact: the rigid body's part
   // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
@@ -201,7 +201,7 @@ struct ContactRows {
   Array<double> across_;  // [n,9] frames transposed, and a vector more
   // per block [3 count columns, 4 count], 1/kg: what an impulse at one dof changes of all, as y has them
   Array<double> response_;
-  Array<double> given_;  // scratch
+  Array<double> unit_response_;  // scratch
   // of whole()
   RowRun every_row_[2] = {};
   Array<uint32_t> every_block_;
@@ -217,7 +217,7 @@ struct ContactRows {
       f(rigid_a[i], load3(&arm_a[size_t(3) * i]), 1.0, turns(arc_a));
   }
   void take_response(const Block &b);
-  void take_answers(const Block &b);
+  void add_responses(const Block &b);
   // Of block b, at dof k's component `row`, by a unit impulse of that column.
   double response(const Block &b, size_t column, size_t k, size_t row) const {
     return response_[b.response + (column * b.count + k) * 4 + row];
@@ -227,12 +227,12 @@ struct ContactRows {
   void set_rigid_sides(std::span<const RigidSides> between_rigids);
   void set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                 const RigidPlaces &rigids, std::span<const Bond> bonds);
-  Vec3 answer(uint32_t d, Vec3 p) const {  // of a dof that is in no block
+  Vec3 response_alone(uint32_t d, Vec3 p) const {  // of a dof that is in no block
     const double *const w = &alone[size_t(d) * 4];
     return {w[0] * p.x, w[1] * p.y, w[2] * p.z};
   }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
-  bool stands(const Block &b) const;
+  bool no_response(const Block &b) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
   void finish_bonds(std::span<const Bond> bonds);
 };

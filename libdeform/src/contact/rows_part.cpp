@@ -19,19 +19,19 @@ RowsView ContactRows::view(RowRun r) const {
           wn.data() + i,
           wt.data() + i,
           cross.data() + 2 * i,
-          yields.data() + 3 * i};
+          compliance.data() + 3 * i};
 }
 
-bool ContactRows::stands(const Block &b) const {
+bool ContactRows::no_response(const Block &b) const {
   if (b.group == kNone) return false;
   const auto zero = [](double value) { return value == 0; };
-  const double *const answers = &response_[b.response], *const now = &y[size_t(4) * b.first];
-  return std::all_of(answers, answers + size_t(12) * b.count * b.count, zero) &&
+  const double *const responses = &response_[b.response], *const now = &y[size_t(4) * b.first];
+  return std::all_of(responses, responses + size_t(12) * b.count * b.count, zero) &&
          std::all_of(now, now + size_t(4) * b.count, zero);
 }
 
 bool ContactRows::is_alone(const RowsPart &part) const {
-  return std::ranges::all_of(part.blocks, [&](uint32_t b) { return stands(blocks[b]); });
+  return std::ranges::all_of(part.blocks, [&](uint32_t b) { return no_response(blocks[b]); });
 }
 
 RowsPart ContactRows::whole() {

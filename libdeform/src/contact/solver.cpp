@@ -18,7 +18,7 @@ Pair friction_impulse(const ContactRows &rows, const LawView &law, uint32_t i, d
 
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return normal_impulse(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
-                        &rows.yields[size_t(i) * 3]);
+                        &rows.compliance[size_t(i) * 3]);
 }
 
 }  // namespace
@@ -50,7 +50,7 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
 namespace {
 
 // As the kernel, where impulses at one dof change others.
-void sweep_answers(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
+void solve_contacts(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
     double *const l = &rows.impulse[size_t(i) * 3];
@@ -76,7 +76,7 @@ void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, dou
     for (const RowRun &run : part.contacts)
       rows.kernels().sweep(rows.view(run), law.view(run.first), h, rows.y.data(),
                            rows.impulse.data() + size_t(3) * run.first);
-  else sweep_answers(rows, part, law.view(), h);
+  else solve_contacts(rows, part, law.view(), h);
 }
 
 namespace {
@@ -179,7 +179,7 @@ namespace {
 double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
   return std::fabs(
       std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
-               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.yields[size_t(i) * 3])));
+               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.compliance[size_t(i) * 3])));
 }
 
 double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
@@ -191,54 +191,54 @@ double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
 // give together with the contact's own response, not by the bare force: the difference is then the velocity
 // that is left to correct. Where a set-valued law just slips, force and slip may differ in direction by much
 // while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
-Pair answered(const ContactRows &rows, const LawView &s, uint32_t i, double h, Vec3 u) {
+Pair law_response(const ContactRows &rows, const LawView &s, uint32_t i, double h, Vec3 u) {
   return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
 }
 
 Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Tolerance &tolerance, Residual r) {
-  double poison = 0;
+  double nan_flag = 0;
   each_row(part.bonds, [&](uint32_t row) {
     const double left = norm(bond_residual(rows, row));
-    poison += 0.0 * left;
+    nan_flag += 0.0 * left;
     r.relative = std::max(r.relative, left / tolerance.bond);
-    r.due = std::max(r.due, left / tolerance.bond);
+    r.required = std::max(r.required, left / tolerance.bond);
     r.speed = std::max(r.speed, left);
   });
-  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
+  if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
   return r;
 }
 
 Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &law, double h,
                   const Tolerance &tolerance) {
   Residual r;
-  double poison = 0;
+  double nan_flag = 0;
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
     const double normal = normal_residual(rows, i, u);
-    poison += 0.0 * ((u.x + u.y) + (u.z + l[0]));
+    nan_flag += 0.0 * ((u.x + u.y) + (u.z + l[0]));
     r.relative = std::max(r.relative, normal / tolerance.normal[i]);
-    r.due = std::max(r.due, normal / tolerance.most_normal);
+    r.required = std::max(r.required, normal / tolerance.most_normal);
     r.speed = std::max(r.speed, normal);
     r.normal = std::max(r.normal, normal);
     if (!(rows.wt[i] > 0) || !(l[0] > 0)) return;
-    const Pair t = answered(rows, law, i, h, u);
+    const Pair t = law_response(rows, law, i, h, u);
     const double tangent = tangent_residual(rows, i, t);
     const double allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
     r.relative = std::max(r.relative, tangent / allowed);
-    r.due = std::max(r.due, tangent / allowed);
+    r.required = std::max(r.required, tangent / allowed);
     r.speed = std::max(r.speed, tangent);
   });
   // max() passes over what is no number
-  if (poison != 0) r.relative = r.due = std::numeric_limits<double>::infinity();
+  if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
   return r;
 }
 
 }  // namespace
 
 Residual larger(const Residual &a, const Residual &b) {
-  return {std::max(a.relative, b.relative), std::max(a.due, b.due), std::max(a.speed, b.speed),
+  return {std::max(a.relative, b.relative), std::max(a.required, b.required), std::max(a.speed, b.speed),
           std::max(a.normal, b.normal)};
 }
 
@@ -256,9 +256,9 @@ Residual inner_residual(const ContactRows &rows, const RowsPart &part, const Con
 }
 
 // At the state at which a law was evaluated, the sweeps have its value.
-Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
-                       const Tolerance &tolerance) {
-  return inner_residual(rows, part, answer, h, tolerance);
+Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state,
+                       double h, const Tolerance &tolerance) {
+  return inner_residual(rows, part, laws_state, h, tolerance);
 }
 
 namespace {
@@ -273,15 +273,15 @@ void each_side(const uint32_t *sides, uint32_t i, T *disturbance, F &&f) {
 
 }  // namespace
 
-void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
+void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state, double h,
                       const uint32_t *sides, double *disturbance) {
-  const LawView law = answer.view();
+  const LawView law = laws_state.view();
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);
-    const bool rubs = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || answer.fn[i] > 0);
+    const bool slides = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || laws_state.fn[i] > 0);
     const double normal = normal_residual(rows, i, u);
-    const double tangent = rubs ? tangent_residual(rows, i, answered(rows, law, i, h, u)) : 0;
+    const double tangent = slides ? tangent_residual(rows, i, law_response(rows, law, i, h, u)) : 0;
     each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);
       d[1] = std::max({d[1], tangent, normal});

@@ -60,15 +60,15 @@ struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at res
 Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
                         const Tolerance &tolerance);
 // with the laws evaluated at this state
-Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
-                       const Tolerance &tolerance);
+Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state,
+                       double h, const Tolerance &tolerance);
 // of parts together
 Residual larger(const Residual &a, const Residual &b);
 
 // d of the bodies of a part: the largest r_t that the warm start leaves at any contact of the body, and the
 // largest of all r_n and r_t; no less than disturbance has already. sides: [contacts,2] numbers of bodies,
 // kNone: an obstacle; disturbance: [bodies,2].
-void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &answer, double h,
+void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state, double h,
                       const uint32_t *sides, double *disturbance);
 // tangent[i] = max(bounds.tangent, 1e-2 d), d the larger one of the two bodies. A contact at rest is warm
 // started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what

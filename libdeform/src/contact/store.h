@@ -44,9 +44,9 @@ struct ContactStore {
   Array<uint32_t> law;            // the law the bristles belong to
   Array<double> dwell, area;      // s in contact, m2
   // m2, area in the next sub-step (contact/renewal.h); empty where no law counts by area
-  Array<double> due;
+  Array<double> next_area;
   Array<double> start_depth;      // m, of what a pair was found with, less what has opened since
-  Array<double> owed;             // [n,3] m, slip to be taken back (step/solve/stuck_slip.h)
+  Array<double> stick_drift;      // [n,3] m, slip to be taken back (step/solve/stuck_slip.h)
   Array<double> path;             // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;  // held: touched and stuck in every sub-step since hold_begin
   Array<uint8_t> began;           // touched for the first time in the last step
@@ -55,7 +55,7 @@ struct ContactStore {
   explicit ContactStore(const Memory &memory);
   uint32_t find(uint64_t key) const;  // index, or kNone
   void order();                       // by_key, from key
-  void drop(uint64_t id);             // contacts of a thing that goes; for stores without due and crossings
+  void drop(uint64_t id);  // contacts of a thing that goes; for stores without next_area and crossings
 };
 
 // f(ColumnOf<..>, column of each store). Memory, reserved room, data of sleepers, the copy for the budget of
@@ -73,9 +73,9 @@ void each_column(F &&f, Store &...c) {
   f(ColumnOf<V::law>{{"contact law", 1}}, c.law...);
   f(ColumnOf<V::not_negative>{{"dwell", 1}}, c.dwell...);
   f(ColumnOf<V::not_negative>{{"contact area", 1}}, c.area...);
-  f(ColumnOf<V::not_negative>{{"area due", kOwnLength, true}}, c.due...);
+  f(ColumnOf<V::not_negative>{{"area due", kOwnLength, true}}, c.next_area...);
   f(ColumnOf<V::not_negative>{{"start depth", 1}}, c.start_depth...);
-  f(ColumnOf<V::finite>{{"slip owed", 3}}, c.owed...);
+  f(ColumnOf<V::finite>{{"slip owed", 3}}, c.stick_drift...);
   f(ColumnOf<V::finite>{{"hold path", 2}}, c.path...);
   f(ColumnOf<V::flag>{{"touching", 1}}, c.touching...);
   f(ColumnOf<V::flag>{{"in hold", 1}}, c.held...);

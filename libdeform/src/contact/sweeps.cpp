@@ -8,7 +8,7 @@
 namespace dfm {
 namespace {
 
-// Residual::relative is stricter than what is required (Residual::due). At most this many sweeps are spent on
+// Residual::relative is stricter than Residual::required. At most this many sweeps are spent on
 // it where the latter is met, because the next sub-step continues from there.
 constexpr uint32_t kPolish = 20;
 
@@ -16,23 +16,23 @@ constexpr uint32_t kPolish = 20;
 // sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
 // before left more than 0.7 of it; so the residual is computed when it could be small enough at the earliest
 // (doc/decisions/contact_solver.md).
-class Looks {
+class ResidualSchedule {
  public:
-  bool due(const RowsPart &part, uint32_t sweeps, uint32_t most) const {
+  bool is_time(const RowsPart &part, uint32_t sweeps, uint32_t most) const {
     return sweeps >= std::min({next_, kPolish, most}) || !part.blocks.empty();
   }
   void note(uint32_t sweeps, const Residual &left) {
-    const int size = std::ilogb(left.due);  // in halves
+    const int size = std::ilogb(left.required);  // in halves
     const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
     const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
-    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMostUnseen));
+    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMaxUnseen));
     known_ = true;
     size_ = size;
     at_ = sweeps;
   }
 
  private:
-  static constexpr int kMostUnseen = 4;
+  static constexpr int kMaxUnseen = 4;
   bool known_ = false;
   int size_ = 0;
   uint32_t at_ = 0, next_ = 0;
@@ -43,7 +43,7 @@ class Looks {
 Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
 bool Sweeps::good(const Residual &left) const {
-  return left.relative <= 1 || (left.due <= 1 && count_ >= kPolish);
+  return left.relative <= 1 || (left.required <= 1 && count_ >= kPolish);
 }
 
 void Sweeps::sweep_once() {
@@ -56,13 +56,13 @@ void Sweeps::sweep_once() {
 // With the laws as they were last evaluated. False: not finite.
 bool Sweeps::pass() {
   acceleration_.start(*rows_, *part_);
-  for (Looks looks;;) {
+  for (ResidualSchedule schedule;;) {
     sweep_once();
-    if (looks.due(*part_, count_, most_)) {
+    if (schedule.is_time(*part_, count_, most_)) {
       const Residual left = inner_residual(*rows_, *part_, *state_, h_, *tolerance_);
-      if (!std::isfinite(left.due)) return false;
+      if (!std::isfinite(left.required)) return false;
       if (good(left) || count_ >= most_ || !laws_->goes_on()) return true;
-      looks.note(count_, left);
+      schedule.note(count_, left);
     }
     acceleration_.follow(*rows_, *part_);
   }
@@ -81,18 +81,18 @@ bool Sweeps::solve(ContactRows &rows, const RowsPart &part, ContactState &state,
   start_.resize(3 * size_t{part.all()});
   take_impulses(rows, part, start_.data());
   // block Gauss-Seidel need not converge in a jam with strong friction
-  const auto give_up = [&] {
+  const auto stop_sweeps = [&] {
     put_impulses(rows, part, start_.data());
     return !laws.judge(left) || !laws.goes_on();
   };
   for (uint32_t passes = 1;; ++passes) {
     // at least one sweep on a warm start is part of the method
-    if (!pass()) return give_up();
+    if (!pass()) return stop_sweeps();
     if (!laws.judge(left) || good(left)) return true;
     const bool ends = !laws.goes_on();
     if (ends || count_ >= most_ || passes >= limits.passes) {
-      if (left.due <= 1) return true;
-      return left.speed <= limits.start ? ends : give_up();
+      if (left.required <= 1) return true;
+      return left.speed <= limits.start ? ends : stop_sweeps();
     }
     if (!laws.slopes()) return true;
   }

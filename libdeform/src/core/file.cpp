@@ -57,16 +57,16 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path, uint6
   // The size that the system reports may be too small (pipes, growing files), so pieces are read until the
   // end.
   Array<char> bytes{HookAllocator<char>(memory)};
-  size_t piece = size_t(file.bytes()) + 1;
+  size_t chunk = size_t(file.bytes()) + 1;
   for (;;) {
     const size_t at = bytes.size();
-    bytes.resize(at + std::max<size_t>(piece, 4096));
+    bytes.resize(at + std::max<size_t>(chunk, 4096));
     const size_t got = file.read(bytes.data() + at, bytes.size() - at);
     const bool ended = got < bytes.size() - at;
     bytes.resize(at + got);
     if (bytes.size() > limit) too_large();
     if (ended) return bytes;
-    piece = std::min<size_t>(bytes.size(), size_t(limit - bytes.size()) + 1);
+    chunk = std::min<size_t>(bytes.size(), size_t(limit - bytes.size()) + 1);
   }
 }
 
@@ -119,7 +119,7 @@ void AtomicFile::commit() {
   bool placed = true;
   if (kind_ == Kind::unnamed) {
     os::remove_file(temporary_);
-    placed = os::give_name(fileno(file_), temporary_);
+    placed = os::link_name(fileno(file_), temporary_);
     if (!placed) fail_io("cannot be written");
     kind_ = Kind::named;
   }

@@ -19,7 +19,7 @@ struct Memory {
 // Memory that counts the bytes allocated through it and not yet freed. Must outlive these allocations.
 class Meter {
  public:
-  explicit Meter(const Memory &under) : under_(under), memory_{this, take, give_back} {}
+  explicit Meter(const Memory &under) : under_(under), memory_{this, take, free_counted} {}
   Meter(const Meter &) = delete;
   const Memory &memory() const { return memory_; }
   uint64_t bytes() const { return bytes_.load(std::memory_order_relaxed); }
@@ -31,7 +31,7 @@ class Meter {
     if (p) m.bytes_.fetch_add(bytes, std::memory_order_relaxed);
     return p;
   }
-  static void give_back(void *self, void *p, size_t bytes, size_t align) {
+  static void free_counted(void *self, void *p, size_t bytes, size_t align) {
     Meter &m = *static_cast<Meter *>(self);
     m.under_.release(m.under_.user, p, bytes, align);
     if (p) m.bytes_.fetch_sub(bytes, std::memory_order_relaxed);

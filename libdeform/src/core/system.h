@@ -33,9 +33,9 @@ int open_input(const std::string &path);   // does not wait for the writer of a 
 int open_stream(const std::string &path);  // to write to a device or pipe; one without a reader is an error
 int create(const std::string &path);       // to write; an error if it exists
 // A file without a name in this folder, which disappears if the process is killed; -1 also where there is no
-// such thing. give_name: an error if `path` exists.
+// such thing. link_name: an error if `path` exists.
 int create_unnamed(const std::string &folder);
-bool give_name(int descriptor, const std::string &path);
+bool link_name(int descriptor, const std::string &path);
 bool rename_over(const std::string &from, const std::string &to);
 void remove_file(const std::string &path);
 long process_number();

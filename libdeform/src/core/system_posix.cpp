@@ -79,7 +79,7 @@ int create_unnamed([[maybe_unused]] const std::string &folder) {
   return -1;
 }
 
-bool give_name(int descriptor, const std::string &path) {
+bool link_name(int descriptor, const std::string &path) {
   const std::string own = format("/proc/self/fd/%d", descriptor);
   return linkat(AT_FDCWD, own.c_str(), AT_FDCWD, path.c_str(), AT_SYMLINK_FOLLOW) == 0;
 }

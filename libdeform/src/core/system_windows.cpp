@@ -71,7 +71,7 @@ int create(const std::string &path) {
 }
 
 int create_unnamed(const std::string &) { return -1; }
-bool give_name(int, const std::string &) { return false; }
+bool link_name(int, const std::string &) { return false; }
 
 bool rename_over(const std::string &from, const std::string &to) {
   std::error_code error;

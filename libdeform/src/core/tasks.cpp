@@ -54,10 +54,10 @@ uint32_t forks() noexcept {
 template <class Ready, class Most>
 bool spin(Ready ready, Most most) {
   using Clock = std::chrono::steady_clock;
-  constexpr auto kMoment = std::chrono::microseconds(20), kUntilYield = std::chrono::microseconds(5);
+  constexpr auto kMoment = std::chrono::microseconds(20), kYieldInterval = std::chrono::microseconds(5);
   constexpr int kLooks = 32;  // between two looks at the clock
   const Clock::time_point start = Clock::now();
-  for (auto due = kMoment;;) {
+  for (auto next_check = kMoment;;) {
     for (int i = 0; i < kLooks; ++i) {
       if (ready()) return true;
 #if defined(__x86_64__)
@@ -66,9 +66,9 @@ bool spin(Ready ready, Most most) {
     }
     const auto passed = Clock::now() - start;
     if (passed > most()) return ready();
-    if (passed <= due) continue;
+    if (passed <= next_check) continue;
     std::this_thread::yield();
-    due = std::chrono::duration_cast<std::chrono::microseconds>(passed) + kUntilYield;
+    next_check = std::chrono::duration_cast<std::chrono::microseconds>(passed) + kYieldInterval;
   }
 }
 

@@ -28,7 +28,7 @@
 namespace dfm {
 namespace {
 
-constexpr size_t kMostTracks = 8;  // blades that cut a body by turns
+constexpr size_t kMaxTracks = 8;  // blades that cut a body by turns
 // of the largest distance between neighbors: how far from the edge sides are kept
 constexpr double kKept = 2;
 // of the median edge: a blade that has moved forward this far has begun to cut; a body this far from it is
@@ -60,7 +60,8 @@ class LineMotion {
 };
 
 double toughness(const Body &b, uint32_t cell) {
-  return b.makeup.materials[b.makeup.of.empty() ? 0 : b.makeup.of[cell]].entry(kToughnessKey, 0);
+  return b.composition.materials[b.composition.of.empty() ? 0 : b.composition.of[cell]].entry(kToughnessKey,
+                                                                                              0);
 }
 
 // m2, of the face between two cells, with its normal from i to j.
@@ -366,9 +367,9 @@ double BladeSweep::energy(size_t n) {
 
 BladeTrack &BladeSweep::keep(Body &b) {
   if (track_ == b.blades.size()) {
-    if (b.blades.size() == kMostTracks) b.blades.erase(b.blades.begin());
+    if (b.blades.size() == kMaxTracks) b.blades.erase(b.blades.begin());
     b.blades.emplace_back();
-    use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides, b.blades.back().dues);
+    use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides, b.blades.back().cut_work);
     track_ = b.blades.size() - 1;
   }
   BladeTrack &t = b.blades[track_];
@@ -385,8 +386,8 @@ BladeTrack &BladeSweep::keep(Body &b) {
     if (kind == SideKind::none || ahead_[i] < -far) continue;
     const double off = to_.length > 0 ? dot(load3(&is_[kStride * i]) - to_.origin, to_.normal) : 0;
     if (std::fabs(off) > far) continue;
-    const bool settled = kind == SideKind::passed || kind == SideKind::behind;
-    if (settled && ahead_[i] > apart_) continue;  // drawn back from
+    const bool decided = kind == SideKind::passed || kind == SideKind::behind;
+    if (decided && ahead_[i] > apart_) continue;  // drawn back from
     t.sides.push_back(sides_[i]);
     t.sides.back().kind = kind;
   }

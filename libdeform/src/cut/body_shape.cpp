@@ -28,19 +28,20 @@ void take_rows(const From &from, const Array<uint32_t> &number, size_t width, Li
   else take(width);
 }
 
-// The cells of a mesh that is cut from a body with this rest shape, share and makeup, and their surface.
+// The cells of a mesh that is cut from a body with this rest shape, share and composition, and their surface.
 // inner: with the list of inner faces, which takes the same sorted faces.
-void take_cells(const Memory &m, const Array<double> &rest, const Array<double> &share, const Makeup &makeup,
-                const CutMesh &mesh, bool inner, double smooth, BodyShape &out) {
+void take_cells(const Memory &m, const Array<double> &rest, const Array<double> &share,
+                const Composition &composition, const CutMesh &mesh, bool inner, double smooth,
+                BodyShape &out) {
   use_memory(m, out.anchor, out.surfel_impulse, out.share, out.surface.named);
   out.p.size(m, static_cast<uint32_t>(mesh.point.size()));
   take_rows(rest, mesh.point, 3, out.p.rest);
   if (!share.empty()) take_rows(share, mesh.cell, 1, out.share);
-  out.makeup.materials = makeup.materials;
-  if (!makeup.of.empty()) take_rows(makeup.of, mesh.cell, 1, out.makeup.of);
-  for (const CellField &f : makeup.given) {
-    out.makeup.given.push_back({f.key, f.from, f.width, Array<double>(HookAllocator<double>(m))});
-    take_rows(f.values, mesh.cell, f.width, out.makeup.given.back().values);
+  out.composition.materials = composition.materials;
+  if (!composition.of.empty()) take_rows(composition.of, mesh.cell, 1, out.composition.of);
+  for (const CellField &f : composition.given) {
+    out.composition.given.push_back({f.key, f.from, f.width, Array<double>(HookAllocator<double>(m))});
+    take_rows(f.values, mesh.cell, f.width, out.composition.given.back().values);
   }
   const uint32_t ntet = static_cast<uint32_t>(mesh.cell.size());
   out.tets = Array<uint32_t>(mesh.tets);
@@ -60,8 +61,8 @@ void put_at_rest(Phyxels &p) {
 
 void weigh(Body &b) {
   CellMaterials cells;
-  for (const Material &material : b.makeup.materials) cells.list.push_back(&material);
-  cells.of = b.makeup.of;
+  for (const Material &material : b.composition.materials) cells.list.push_back(&material);
+  cells.of = b.composition.of;
   dfm_body_def def = dfm_body_def_default();
   def.ntet = b.ncell();
   def.cell_share = b.share.empty() ? nullptr : b.share.data();
@@ -131,32 +132,32 @@ std::shared_ptr<const WholeBody> whole_of(const Body &b) {
   out->share = b.share;
   out->tets = b.tets;
   for (const uint32_t s : b.surface.tri) out->tri.push_back(b.surface.point[s]);
-  out->makeup = b.makeup;
+  out->composition = b.composition;
   out->zones = b.zones;
   return out;
 }
 
 namespace {
 
-// Copies of a point share what is due at it.
-void carry_dues(const CutMesh &mesh, const BladeTrack &from, BladeTrack &to) {
-  if (from.dues.empty()) return;
+// Copies of a point share its work of cutting.
+void carry_cut_work(const CutMesh &mesh, const BladeTrack &from, BladeTrack &to) {
+  if (from.cut_work.empty()) return;
   const auto at = [&](uint32_t point) {
-    const auto before = [](const CutDue &d, uint32_t p) { return d.point < p; };
-    const auto found = std::lower_bound(from.dues.begin(), from.dues.end(), point, before);
-    return found != from.dues.end() && found->point == point ? size_t(found - from.dues.begin())
-                                                             : from.dues.size();
+    const auto before = [](const CutWork &d, uint32_t p) { return d.point < p; };
+    const auto found = std::lower_bound(from.cut_work.begin(), from.cut_work.end(), point, before);
+    return found != from.cut_work.end() && found->point == point ? size_t(found - from.cut_work.begin())
+                                                                 : from.cut_work.size();
   };
-  std::vector<uint32_t> copies(from.dues.size() + 1);
+  std::vector<uint32_t> copies(from.cut_work.size() + 1);
   for (const uint32_t p : mesh.point) ++copies[at(p)];
   for (uint32_t i = 0; i < mesh.point.size(); ++i) {
     const size_t k = at(mesh.point[i]);
-    if (k == from.dues.size()) continue;
-    CutDue due = from.dues[k];
-    due.point = i;
-    due.due /= copies[k];
-    due.force /= copies[k];
-    to.dues.push_back(due);
+    if (k == from.cut_work.size()) continue;
+    CutWork copy = from.cut_work[k];
+    copy.point = i;
+    copy.energy /= copies[k];
+    copy.force /= copies[k];
+    to.cut_work.push_back(copy);
   }
 }
 
@@ -173,10 +174,10 @@ std::unique_ptr<BodyShape> structure_of_part(const Body &b, const CutMesh &mesh,
   for (const uint32_t c : mesh.cell) out.cut.cell.push_back(again ? b.cut.cell[c] : c);
   out.cut.open = std::move(open);
 
-  take_cells(m, b.p.rest, b.share, b.makeup, mesh, inner, b.smooth, out);
+  take_cells(m, b.p.rest, b.share, b.composition, mesh, inner, b.smooth, out);
   name_features(b, mesh, out.surface, out.cut);
-  find_laid(m, *out.cut.whole, out.cut, out.surface);
-  make_cut_zones(m, *out.cut.whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
+  find_coincident(m, *out.cut.whole, out.cut, out.surface);
+  make_cut_zones(m, *out.cut.whole, out.cut, out.composition, out.tets, out.surface, out.zones);
   return shape;
 }
 
@@ -193,7 +194,7 @@ void take_points(const Memory &m, const BodyShape &from, const CutMesh &mesh,
   if (!from.anchor.empty()) take_rows(from.anchor, mesh.point, kStride, to.anchor);
   for (const BladeTrack &t : from.blades) {
     BladeTrack &track = to.blades.emplace_back();
-    use_memory(m, track.x, track.sides, track.dues);
+    use_memory(m, track.x, track.sides, track.cut_work);
     std::copy_n(t.edge, 6, track.edge);
     track.lead = t.lead;
     std::copy_n(t.way, 2, track.way);
@@ -206,7 +207,7 @@ void take_points(const Memory &m, const BodyShape &from, const CutMesh &mesh,
     }
     track.credit = t.credit;
     track.part = t.part;
-    carry_dues(mesh, t, track);
+    carry_cut_work(mesh, t, track);
   }
   to.surface.back = from.surface.back;
   carry_surfels(from.surfel_impulse, surfel, to.surfel_impulse);
@@ -235,10 +236,10 @@ ModelOrigin origin_of(const Body &b, const CutMesh &mesh) {
 }  // namespace
 
 std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open,
-                                      const double *due) {
+                                      const double *open_time) {
   World &w = *b.world;
   auto out = std::make_unique<MadeShape>(MadeShape{std::move(mesh), nullptr, {}, {}, {}, nullptr});
-  out->shape = structure_of_part(b, out->mesh, std::move(open), due != nullptr);
+  out->shape = structure_of_part(b, out->mesh, std::move(open), open_time != nullptr);
   BodyShape &shape = *out->shape;
   shape.surface.named = b.surface.named;
   shape.search = std::make_unique<SearchTree>(w.memory());
@@ -257,8 +258,8 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   exchange(like, *make_body_instance(w, like, *b.model.type, std::move(origin)));
   like.integrator.used = b.integrator.used;
   like.p.dampers.lag = b.p.dampers.lag;
-  if (due) {
-    give_dynamics(w, like, due);
+  if (open_time) {
+    set_dynamics(w, like, open_time);
     like.dynamics.reset();  // it refers to this body
     like.self_rest = std::make_unique<SelfRest>(self_rest_of(w.meters.detection.memory(), like));
     like.surface.tree = tree_at_rest(w.meters.detection.memory(), like);
@@ -279,7 +280,7 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     update_inverse_mass(b.p);
     carry_loads(before, mesh, parts, b);
     const double step = b.integrator.step;
-    give_dynamics(w, b, ahead ? nullptr : &w.time);
+    set_dynamics(w, b, ahead ? nullptr : &w.time);
     if (ahead) b.integrator.step = step;
     keep_integrator(b, before.integrator);
     keep_params(b, before);
@@ -346,7 +347,7 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
   const Memory &m = b.world->memory();
   auto shape = std::make_unique<BodyShape>();
   BodyShape &out = *shape;
-  take_cells(m, whole->rest, whole->share, whole->makeup, mesh, false, like.smooth, out);
+  take_cells(m, whole->rest, whole->share, whole->composition, mesh, false, like.smooth, out);
   put_at_rest(out.p);
   if (b.world->def.sleep) out.anchor = out.p.x;
   out.surfel_impulse.assign(size_t{3} * out.surface.nsurfel, 0.0);
@@ -357,8 +358,8 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
     use_memory(m, out.cut.point, out.cut.cell);
     out.cut.point = mesh.point;
     out.cut.cell = mesh.cell;
-    make_cut_zones(m, *whole, out.cut, out.makeup, out.tets, out.surface, out.zones);
-    find_laid(m, *whole, out.cut, out.surface);
+    make_cut_zones(m, *whole, out.cut, out.composition, out.tets, out.surface, out.zones);
+    find_coincident(m, *whole, out.cut, out.surface);
   } else {
     out.zones = whole->zones;
   }

@@ -34,7 +34,7 @@ struct MadeShape {
 // thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. due: with
 // all that the step would make that begins at this time, s; null: without. Throws Error.
 std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open,
-                                      const double *due);
+                                      const double *open_time);
 // All that make_shape() reads of a body: of the present one, and of what is left of it.
 std::unique_ptr<Body> structure_of(const Body &b);
 std::unique_ptr<Body> structure_left(const Body &before, MadeShape &made);

@@ -256,9 +256,9 @@ void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutReco
   name_patches(before, old, surface, record.next_name[3]);
 }
 
-void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
-  use_memory(m, surface.laid, surface.laid_surfel, surface.laid_tip, surface.place, surface.origin,
-             surface.laid_begin, surface.laid_around, surface.laid_normal);
+void find_coincident(const Memory &m, const WholeBody &whole, const CutRecord &record, Surface &surface) {
+  use_memory(m, surface.coincident, surface.coincident_surfel, surface.coincident_tip, surface.place,
+             surface.origin, surface.coincident_begin, surface.coincident_around, surface.coincident_normal);
   if (record.open.empty()) return;
   std::vector<Corners> open;
   for (const uint64_t face : record.open) {
@@ -269,48 +269,49 @@ void find_laid(const Memory &m, const WholeBody &whole, const CutRecord &record,
     if (common.size() == 3) open.push_back(sorted(common[0], common[1], common[2]));
   }
   std::sort(open.begin(), open.end());
-  std::vector<std::pair<Corners, uint32_t>> found;  // and the place in `laid`
+  std::vector<std::pair<Corners, uint32_t>> found;  // and the place in `coincident`
   for (uint32_t t = 0; t < surface.ntri; ++t) {
     const auto point = [&](size_t k) { return record.point[surface.point[surface.tri[3 * size_t{t} + k]]]; };
     const Corners corners = sorted(point(0), point(1), point(2));
     if (!std::binary_search(open.begin(), open.end(), corners)) continue;
-    found.push_back({corners, static_cast<uint32_t>(surface.laid.size())});
-    surface.laid.push_back(t);
-    for (size_t k = 0; k < 3; ++k) surface.laid_surfel.push_back(surface.tri[3 * size_t{t} + k]);
+    found.push_back({corners, static_cast<uint32_t>(surface.coincident.size())});
+    surface.coincident.push_back(t);
+    for (size_t k = 0; k < 3; ++k) surface.coincident_surfel.push_back(surface.tri[3 * size_t{t} + k]);
   }
-  std::sort(surface.laid_surfel.begin(), surface.laid_surfel.end());
-  surface.laid_surfel.erase(std::unique(surface.laid_surfel.begin(), surface.laid_surfel.end()),
-                            surface.laid_surfel.end());
+  std::sort(surface.coincident_surfel.begin(), surface.coincident_surfel.end());
+  surface.coincident_surfel.erase(
+      std::unique(surface.coincident_surfel.begin(), surface.coincident_surfel.end()),
+      surface.coincident_surfel.end());
   std::sort(found.begin(), found.end());
-  surface.laid_tip.assign(surface.laid.size(), 0);
+  surface.coincident_tip.assign(surface.coincident.size(), 0);
   for (size_t i = 1; i < found.size(); ++i) {
     if (found[i].first != found[i - 1].first) continue;
     surface.slit = true;
     const uint32_t l = found[i].second, other = found[i - 1].second;
-    for (const uint32_t side : {l, other}) surface.laid_tip[side] |= kOfSlit;
-    const uint32_t *const c = &surface.tri[3 * size_t{surface.laid[l]}],
-                          *const d = &surface.tri[3 * size_t{surface.laid[other]}];
+    for (const uint32_t side : {l, other}) surface.coincident_tip[side] |= kOfSlit;
+    const uint32_t *const c = &surface.tri[3 * size_t{surface.coincident[l]}],
+                          *const d = &surface.tri[3 * size_t{surface.coincident[other]}];
     for (uint32_t k = 0; k < 3; ++k)
       for (uint32_t j = 0; j < 3; ++j) {
         if (c[k] != d[j]) continue;
-        surface.laid_tip[l] = static_cast<uint8_t>(surface.laid_tip[l] | 1u << k);
-        surface.laid_tip[other] = static_cast<uint8_t>(surface.laid_tip[other] | 1u << j);
+        surface.coincident_tip[l] = static_cast<uint8_t>(surface.coincident_tip[l] | 1u << k);
+        surface.coincident_tip[other] = static_cast<uint8_t>(surface.coincident_tip[other] | 1u << j);
       }
   }
-  if (surface.laid.empty()) return;
-  surface.laid_normal.assign(3 * surface.laid.size(), 0.0);
-  std::vector<std::pair<uint32_t, uint32_t>> around;  // surfel, triangle of `laid`
-  for (uint32_t l = 0; l < surface.laid.size(); ++l)
+  if (surface.coincident.empty()) return;
+  surface.coincident_normal.assign(3 * surface.coincident.size(), 0.0);
+  std::vector<std::pair<uint32_t, uint32_t>> around;  // surfel, triangle of `coincident`
+  for (uint32_t l = 0; l < surface.coincident.size(); ++l)
     for (uint32_t k = 0; k < 3; ++k)
-      if (!(surface.laid_tip[l] >> k & 1))
-        around.push_back({surface.tri[3 * size_t{surface.laid[l]} + k], l});
+      if (!(surface.coincident_tip[l] >> k & 1))
+        around.push_back({surface.tri[3 * size_t{surface.coincident[l]} + k], l});
   std::sort(around.begin(), around.end());
-  for (const uint32_t surfel : surface.laid_surfel) {
+  for (const uint32_t surfel : surface.coincident_surfel) {
     const auto at = std::lower_bound(around.begin(), around.end(), std::pair(surfel, 0u));
-    surface.laid_begin.push_back(static_cast<uint32_t>(at - around.begin()));
+    surface.coincident_begin.push_back(static_cast<uint32_t>(at - around.begin()));
   }
-  surface.laid_begin.push_back(static_cast<uint32_t>(around.size()));
-  for (const auto &a : around) surface.laid_around.push_back(a.second);
+  surface.coincident_begin.push_back(static_cast<uint32_t>(around.size()));
+  for (const auto &a : around) surface.coincident_around.push_back(a.second);
   surface.place.assign(size_t{4} * surface.nsurfel, 0.0);
   for (const uint32_t p : surface.point) surface.origin.push_back(record.point[p]);
 }
@@ -330,8 +331,9 @@ void take_names(const std::string &body, FeatureNames &names, Surface &surface, 
   surface.named.swap(names.named);
 }
 
-void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &record, const Makeup &makeup,
-                    const Array<uint32_t> &tets, const Surface &surface, SurfaceZones &out) {
+void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &record,
+                    const Composition &composition, const Array<uint32_t> &tets, const Surface &surface,
+                    SurfaceZones &out) {
   const TriangleList skin(static_cast<uint32_t>(whole.tri.size() / 3),
                           [&](size_t k) { return whole.tri[k]; });
   const auto point = [&](size_t k) { return surface.point[surface.tri[k]]; };
@@ -356,10 +358,10 @@ void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &re
     else out.of[t] = whole.zones.of.empty() ? 0 : whole.zones.of[was];
     one = one && out.of[t] == 0;
   };
-  if (makeup.of.empty()) {  // of one material: the cells need not be looked at
+  if (composition.of.empty()) {  // of one material: the cells need not be looked at
     for (uint32_t t = 0; t < surface.ntri; ++t) {
       const size_t k = 3 * size_t{t};
-      find_zone(t, sorted(point(k), point(k + 1), point(k + 2)), makeup.materials[0]);
+      find_zone(t, sorted(point(k), point(k + 1), point(k + 2)), composition.materials[0]);
     }
   } else {
     const TriangleList own(surface.ntri, point);
@@ -367,7 +369,7 @@ void make_cut_zones(const Memory &m, const WholeBody &whole, const CutRecord &re
       for (const auto &f : kTetFace) {
         const Corners face = sorted(tets[c + f[0]], tets[c + f[1]], tets[c + f[2]]);
         if (const uint32_t t = own.find(face); t != kNone)
-          find_zone(t, face, makeup.materials[makeup.of[c / 4]]);
+          find_zone(t, face, composition.materials[composition.of[c / 4]]);
       }
   }
   if (one && out.list.size() == 1) out.of.clear();

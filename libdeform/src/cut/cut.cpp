@@ -63,7 +63,7 @@ CutReport empty(Body &b) {
   out.kinetic = kinetic_of(b);
   out.elastic = elastic_energy(b);
   reserve_places(w, 0);
-  leave_contacts(w, b.id, false);
+  end_contacts(w, b.id, false);
   set_place(w, b, true, false);
   return out;
 }
@@ -140,7 +140,7 @@ OpenFaces with_open(const Body &b, const Array<uint64_t> &more) {
 
 // Opens `more` faces (present cells).
 CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &more) {
-  const OnBehalf speaks(b.name);
+  const OnBehalf prefix(b.name);
   prepare(*b.world);
   check_may_cut(b, b.model);
   Array<uint64_t> whole(HookAllocator<uint64_t>(b.world->memory()));
@@ -198,15 +198,15 @@ uint64_t face_of_whole(const Body &b, uint64_t face) {
 
 CutReport open_faces(Body &b, const Array<uint64_t> &faces) { return cut(b, none_removed(b), faces); }
 
-std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due) {
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double open_time) {
   const Memory &m = b.world->memory();
   OpenFaces open = with_open(b, faces);
   CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), none_removed(b), open.own, b.inner);
-  return make_shape(b, std::move(mesh), std::move(open.whole), &due);
+  return make_shape(b, std::move(mesh), std::move(open.whole), &open_time);
 }
 
 std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made) {
-  const OnBehalf speaks(b.name);
+  const OnBehalf prefix(b.name);
   prepare(*b.world);
   check_may_cut(b, b.model);
   const HostWork work(b);
@@ -217,8 +217,8 @@ CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {
   return cut(b, removed, Array<uint64_t>(HookAllocator<uint64_t>(b.world->memory())));
 }
 
-CutReport remove_by_shape(Body &b, const CutShape &asked, uint32_t most) {
-  const CutShape shape = through(b, asked);
+CutReport remove_by_shape(Body &b, const CutShape &requested, uint32_t most) {
+  const CutShape shape = through(b, requested);
   Array<uint8_t> removed = none_removed(b);
   uint32_t n = 0, left = 0;
   for (uint32_t c = 0; c < b.ncell(); ++c) {
@@ -236,8 +236,8 @@ CutReport remove_by_shape(Body &b, const CutShape &asked, uint32_t most) {
   return out;
 }
 
-CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
-  const CutShape blade = through(b, asked);
+CutReport split_by_blade(Body &b, const CutShape &requested, uint32_t most) {
+  const CutShape blade = through(b, requested);
   BladeSweep sweep(b, blade, nullptr);
   const std::vector<SweptFace> &met = sweep.faces;
   const size_t n = most > 0 ? std::min<size_t>(most, met.size()) : met.size();
@@ -252,7 +252,7 @@ CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
   out.left = static_cast<uint32_t>(met.size() - n);
   out.opened = static_cast<uint32_t>(n);
   out.fracture = work;
-  if (asked.kind == CutKind::plane) return out;  // a plane has no way: no force, and nothing to continue
+  if (requested.kind == CutKind::plane) return out;  // a plane has no way: no force, and nothing to continue
   if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
   // without memory for it, the next blade here starts anew
   found_memory([&] { sweep.keep(b); });
@@ -260,23 +260,23 @@ CutReport split_by_blade(Body &b, const CutShape &asked, uint32_t most) {
 }
 
 void reserve_places(World &w, size_t more) {
-  const size_t n = w.bodies.size() + w.emptied.size() + w.undone.size() + more;
-  for (auto *list : {&w.bodies, &w.emptied, &w.undone}) list->reserve(n);
+  const size_t n = w.bodies.size() + w.emptied.size() + w.rolled_back.size() + more;
+  for (auto *list : {&w.bodies, &w.emptied, &w.rolled_back}) list->reserve(n);
 }
 
-void set_place(World &w, Body &b, bool emptied, bool undone) noexcept {
-  if (b.emptied == emptied && b.undone == undone) return;
+void set_place(World &w, Body &b, bool emptied, bool rolled_back) noexcept {
+  if (b.emptied == emptied && b.rolled_back == rolled_back) return;
   const auto list = [&](bool no_cells, bool gone) -> auto & {
-    return gone ? w.undone : no_cells ? w.emptied : w.bodies;
+    return gone ? w.rolled_back : no_cells ? w.emptied : w.bodies;
   };
-  const auto counts = [&] { return uint32_t(b.sensor && !b.emptied && !b.undone); };
-  auto &from = list(b.emptied, b.undone), &to = list(emptied, undone);
+  const auto counts = [&] { return uint32_t(b.sensor && !b.emptied && !b.rolled_back); };
+  auto &from = list(b.emptied, b.rolled_back), &to = list(emptied, rolled_back);
   w.sensors -= counts();
-  w.tearing -= b.tears && !b.undone;
+  w.tearing -= b.tears && !b.rolled_back;
   b.emptied = emptied;
-  b.undone = undone;
+  b.rolled_back = rolled_back;
   w.sensors += counts();
-  w.tearing += b.tears && !b.undone;
+  w.tearing += b.tears && !b.rolled_back;
   w.bound.body = nullptr;
   w.changed = true;
   if (&from == &to) return;

@@ -40,7 +40,7 @@ CutReport open_faces(Body &b, const Array<uint64_t> &faces);
 
 // The same in two calls (cut/cut_ahead.h), with faces between cells of the whole body. The first reads only
 // what steps do not change; the body must have the same shape in the second. due: s, time of the second.
-std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double due);
+std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double open_time);
 std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made);
 
 // Present cells on both sides of a face of the whole body; kNone: it was removed.
@@ -67,6 +67,6 @@ bool found_memory(F &&f) {
 // Moves a body without cells, or a piece that a restore takes back, out of the list that steps see, or back
 // into it. Allocates nothing after reserve_places().
 void reserve_places(World &w, size_t more);  // for all present bodies and `more` new ones
-void set_place(World &w, Body &b, bool emptied, bool undone) noexcept;
+void set_place(World &w, Body &b, bool emptied, bool rolled_back) noexcept;
 
 }  // namespace dfm

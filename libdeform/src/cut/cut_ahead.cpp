@@ -15,7 +15,7 @@
 #include <vector>
 
 #include "broad/self_list.h"
-#include "core/aside.h"
+#include "core/background.h"
 #include "core/error.h"
 #include "cut/body_shape.h"
 #include "cut/cut.h"
@@ -32,7 +32,7 @@ namespace dfm {
 // The pairs of the whole surface that may touch each other, which the first cut of a body needs. They are
 // listed where the body is as it begins to wait; the step that follows the cut finds anew what has moved far
 // since. Who uses other lists gets the same bits, so no step makes these.
-struct ListJob : Aside::Job {
+struct ListJob : Background::Job {
   std::shared_ptr<const Body> from;
   Surface surface;
   SelfList list;
@@ -58,10 +58,10 @@ struct ListJob : Aside::Job {
   }
 };
 
-struct CutJob : Aside::Job {
+struct CutJob : Background::Job {
   std::shared_ptr<const Body> from;
   Array<uint64_t> faces;
-  double due;  // s, when they open: what follows from the time may not follow from when the job runs
+  double open_time;  // s, when they open: what follows from the time may not follow from when the job runs
   std::unique_ptr<MadeShape> made;
   std::shared_ptr<Body> next;         // the structure that is left
   std::unique_ptr<BodyShape> before;  // what the body was, once it has been cut; the thread frees it
@@ -69,12 +69,14 @@ struct CutJob : Aside::Job {
   std::shared_ptr<ListJob> list;  // of a body that has no lists of itself yet; null: none
 
   explicit CutJob(const Body &b)
-      : from(b.ahead.structure), faces(HookAllocator<uint64_t>(b.world->memory())), due(b.ahead.due) {
+      : from(b.ahead.structure),
+        faces(HookAllocator<uint64_t>(b.world->memory())),
+        open_time(b.ahead.open_time) {
     for (const AheadFace &f : b.ahead.faces) faces.push_back(f.face);
   }
   void run() noexcept override {
     try {
-      made = make_opened(*from, faces, due);
+      made = make_opened(*from, faces, open_time);
       next = structure_left(*from, *made);
     } catch (...) {
       error = std::current_exception();
@@ -113,13 +115,14 @@ std::shared_ptr<CutJob> finish(World &w, Body &b) {
   CutsAhead &a = b.ahead;
   renew_structure(b);
   // what the thread has refused, perhaps for want of memory, is tried once more
-  if (!a.job || !w.aside || !w.aside->finish(a.job, kPatience) || a.job->error) {
+  if (!a.job || !w.background || !w.background->finish(a.job, kPatience) || a.job->error) {
     const std::shared_ptr<ListJob> list = a.job ? a.job->list : nullptr;
     a.job = std::make_shared<CutJob>(b);
     a.job->list = list;
     a.job->run();
   }
-  if (const auto &list = a.job->list; list && w.aside->finish(list, kPatience) && list->made && a.job->made)
+  if (const auto &list = a.job->list;
+      list && w.background->finish(list, kPatience) && list->made && a.job->made)
     a.job->made->list = {list, &list->list};
   return std::move(a.job);
 }
@@ -137,22 +140,22 @@ void open_faces_of(World &w, Body &b) {
     job->before = put_opened(b, *job->made);
     job->next->shape = b.shape;
     a.structure = std::move(job->next);
-    if (w.aside) w.aside->drop(std::move(job));  // with the structure and the shape before
+    if (w.background) w.background->drop(std::move(job));  // with the structure and the shape before
   }
   a.job.reset();
   a.faces.swap(a.later);
   a.later.clear();
-  a.due += a.delay;
+  a.open_time += a.delay;
   for (const auto &[part, n] : by)
     if (n > 0) add_event(w, DFM_EVENT_CUT, id, part, n, w.time);
-  if (any) separate_if_asked(b);
+  if (any) separate_if_requested(b);
 }
 
 // The stable step of the new shapes. Evaluating it takes longer than the exchange, and the next step finds
 // the new pairs of the surfaces, so the step after that one evaluates it (doc/decisions/cutting.md). Where
 // there is no estimate, it is evaluated now, at the positions at which the next step begins.
-void give_bound(World &w, const WorldBound &before, double share, double dt) {
-  if (!bound_due(w) || estimate_bound(w, before, share, dt)) return;
+void set_bound(World &w, const WorldBound &before, double share, double dt) {
+  if (!bound_expired(w) || estimate_bound(w, before, share, dt)) return;
   try {
     update_bound(w);
   } catch (...) {
@@ -173,11 +176,11 @@ void set_cut_delay(Body &b, double delay) {
          b.whole_name.c_str());
   if (delay > 0) check_may_cut(b, b.model);
   std::vector<Body *> all;  // it and its pieces
-  for (const auto *list : {&b.world->bodies, &b.world->emptied, &b.world->undone})
+  for (const auto *list : {&b.world->bodies, &b.world->emptied, &b.world->rolled_back})
     for (auto &other : *list)
       if (other.get() == &b || other->piece_of == b.id) all.push_back(other.get());
   for (const Body *const other : all)
-    if (!other->ahead.faces.empty() && !other->emptied && !other->undone)
+    if (!other->ahead.faces.empty() && !other->emptied && !other->rolled_back)
       fail(DFM_E_STATE,
            "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it",
            other->name.c_str(), other->ahead.faces.size() + other->ahead.later.size());
@@ -198,23 +201,23 @@ void open_later(Body &b, std::span<const uint64_t> faces, uint64_t by) {
   for (const uint64_t face : faces) more.push_back({face_of_whole(b, face), by});
   std::sort(more.begin(), more.end());
   list.swap(more);
-  if (first) a.due = b.world->time + a.delay;
+  if (first) a.open_time = b.world->time + a.delay;
 }
 
-void open_due(World &w, double dt) {
-  std::vector<Body *> due;  // bodies that have cells keep their places; pieces come after
+void open_scheduled(World &w, double dt) {
+  std::vector<Body *> opening;  // bodies that have cells keep their places; pieces come after
   for (auto &b : w.bodies)
-    if (!b->ahead.faces.empty() && w.time + 0.5 * dt > b->ahead.due) due.push_back(b.get());
-  if (due.empty()) return;
+    if (!b->ahead.faces.empty() && w.time + 0.5 * dt > b->ahead.open_time) opening.push_back(b.get());
+  if (opening.empty()) return;
   const WorldBound before = w.bound;
   const size_t bodies = w.bodies.size();
   double share = 1;
-  for (Body *const b : due) {
+  for (Body *const b : opening) {
     const double at_rest = b->integrator.step;
     open_faces_of(w, *b);
     share = std::min(share, b->integrator.step / at_rest);
   }
-  give_bound(w, before, w.bodies.size() == bodies ? share : 0, dt);
+  set_bound(w, before, w.bodies.size() == bodies ? share : 0, dt);
 }
 
 void prepare_cuts(World &w) {
@@ -223,12 +226,12 @@ void prepare_cuts(World &w) {
     if (!(a.delay > 0)) continue;
     renew_structure(*b);
     if (a.faces.empty() || a.job) continue;
-    if (!w.aside) w.aside = std::make_unique<Aside>();
+    if (!w.background) w.background = std::make_unique<Background>();
     a.job = std::make_shared<CutJob>(*b);
     std::shared_ptr<ListJob> &list = a.job->list;  // first, since it is short
     if (lists_after_cut(w, *b) && found_memory([&] { list = std::make_shared<ListJob>(w, *b); }))
-      w.aside->start(list);
-    w.aside->start(a.job);
+      w.background->start(list);
+    w.background->start(a.job);
   }
 }
 
@@ -238,7 +241,7 @@ void inherit_cuts(const Body &from, Body &piece) {
   a.delay = from.ahead.delay;
   a.faces = from.ahead.faces;
   a.later = from.ahead.later;
-  a.due = from.ahead.due;
+  a.open_time = from.ahead.open_time;
 }
 
 }  // namespace dfm

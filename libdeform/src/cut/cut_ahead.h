@@ -15,7 +15,7 @@ void set_cut_delay(Body &b, double delay);
 void open_later(Body &b, std::span<const uint64_t> faces, uint64_t by);
 // Opens the faces that are due; called after the tools have cut. Throws Error; the faces of the body that
 // failed, and of the bodies after it, are tried again after the next step.
-void open_due(World &w, double dt);
+void open_scheduled(World &w, double dt);
 // Called after that: gives the thread the cuts that it has not started.
 void prepare_cuts(World &w);
 // A piece takes over the waiting faces of its body; faces between cells of other pieces have no effect.

@@ -65,7 +65,7 @@ CutReport cut_alone(Body &b, const CutShape &shape, uint32_t how, uint32_t most)
 
 CutReport make_cut(Body &b, const CutShape &shape, uint32_t how, uint32_t most) {
   CutReport out = cut_alone(b, shape, how, most);
-  separate_if_asked(b, out);
+  separate_if_requested(b, out);
   return out;
 }
 
@@ -99,12 +99,12 @@ void plan_no_cuts(Body &b) {
 // back. Its event is reported before its parts become pieces, because these may have to wait for memory of
 // their own.
 void make_planned_cuts(World &w, double dt) {
-  const auto due = [&](const auto &b) {
+  const auto is_scheduled = [&](const auto &b) {
     return !b->planned_cuts.empty() && b->planned_cuts.front().t <= w.time + kOnTime * dt;
   };
   std::vector<Made> made;
   while (true) {
-    const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), due);
+    const auto at = std::find_if(w.bodies.begin(), w.bodies.end(), is_scheduled);
     if (at == w.bodies.end()) break;
     Body &b = **at;
     const PlannedCut cut = b.planned_cuts.front();
@@ -122,7 +122,7 @@ void make_planned_cuts(World &w, double dt) {
     note(made, b, cut, n > 0);
     if (n == 0) continue;
     add_event(w, DFM_EVENT_CUT, b.id, b.id, n, w.time);
-    separate_if_asked(b, done);
+    separate_if_requested(b, done);
   }
   warn(w, made);
 }

@@ -131,7 +131,7 @@ std::string free_name(World &w, const std::string &whole, uint32_t &number) {
 }
 
 // Of the cells that go.
-void tell_what_goes(const Body &b, const Parts &parts, CutReport &out) {
+void report_removed(const Body &b, const Parts &parts, CutReport &out) {
   std::vector<uint8_t> seen(b.p.n);
   for (size_t c = 0; c < parts.of.size(); ++c) {
     if (parts.to[parts.of[c]] != kGoes) continue;
@@ -145,7 +145,7 @@ void tell_what_goes(const Body &b, const Parts &parts, CutReport &out) {
   }
 }
 
-void tell_crumbs(const Body &b, const SeparateRule &rule, const Parts &parts) {
+void log_small_parts(const Body &b, const SeparateRule &rule, const Parts &parts) {
   uint32_t n = 0;
   for (const uint32_t cells : parts.cells) n += cells < rule.least;
   if (n == 0) return;
@@ -159,7 +159,7 @@ void tell_crumbs(const Body &b, const SeparateRule &rule, const Parts &parts) {
 
 void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   World &w = *b.world;
-  const OnBehalf speaks(b.name);
+  const OnBehalf prefix(b.name);
   prepare(w);
   check_may_cut(b, b.model);
   const Parts parts = parts_of(b, rule);
@@ -183,12 +183,12 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     pieces.push_back(&piece);
     place_piece(w, piece.id);
   }
-  tell_what_goes(b, parts, out);
+  report_removed(b, parts, out);
   Share rest = share_of(b, parts, kStays);
   const std::unique_ptr<BodyShape> before = cut_body(b, std::move(rest.mesh), std::move(rest.open), true);
-  const auto put = [&](bool undone) {
-    for (Body *const p : pieces) set_place(w, *p, false, undone);
-    w.next_id += undone ? -uint64_t{parts.pieces} : parts.pieces;
+  const auto put = [&](bool rolled_back) {
+    for (Body *const p : pieces) set_place(w, *p, false, rolled_back);
+    w.next_id += rolled_back ? -uint64_t{parts.pieces} : parts.pieces;
     w.changed = true;
   };
   try {
@@ -223,10 +223,10 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   }
   out.kinetic += kinetic - kinetic_now;
   out.elastic += elastic - elastic_now;
-  tell_crumbs(b, rule, parts);
+  log_small_parts(b, rule, parts);
 }
 
-void separate_if_asked(Body &b, CutReport &out) {
+void separate_if_requested(Body &b, CutReport &out) {
   if (!b.separate.on || b.emptied || out.parts < 2) return;
   CutReport report = out;
   if (found_memory([&] { separate(b, b.separate, report); })) {
@@ -241,27 +241,27 @@ void separate_if_asked(Body &b, CutReport &out) {
         b.name.c_str());
 }
 
-void separate_if_asked(Body &b) {
+void separate_if_requested(Body &b) {
   CutReport report;
   report.parts = kNone;  // unknown
-  separate_if_asked(b, report);
+  separate_if_requested(b, report);
 }
 
 void separate_what_waits(World &w) {
   const size_t n = w.bodies.size();  // new pieces come after
   for (size_t i = 0; i < n; ++i)
-    if (w.bodies[i]->separate.waits) separate_if_asked(*w.bodies[i]);
+    if (w.bodies[i]->separate.waits) separate_if_requested(*w.bodies[i]);
 }
 
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name) {
-  auto at = std::find_if(w.undone.begin(), w.undone.end(), [&](auto &p) { return p->id >= id; });
-  if (at == w.undone.end() || (*at)->id != id) {
+  auto at = std::find_if(w.rolled_back.begin(), w.rolled_back.end(), [&](auto &p) { return p->id >= id; });
+  if (at == w.rolled_back.end() || (*at)->id != id) {
     auto fresh = std::make_unique<Body>();
     fresh->world = &w;
     fresh->id = id;
-    fresh->undone = true;
+    fresh->rolled_back = true;
     fresh->handle = handle_create(Kind::body, fresh.get());
-    at = w.undone.insert(at, std::move(fresh));  // there is room
+    at = w.rolled_back.insert(at, std::move(fresh));  // there is room
   }
   Body &b = **at;
   b.tears = of.tears;  // of none that a step sees
@@ -277,7 +277,7 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.contact_impulse = {};
   b.energy = {};
   b.changes = {};
-  b.slumber = {};
+  b.sleep_state = {};
   b.bound.known = false;
   return b;
 }

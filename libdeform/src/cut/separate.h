@@ -10,13 +10,13 @@ namespace dfm {
 void separate(Body &b, const SeparateRule &rule, CutReport &out);
 // Separates as the body's own rule says, if it has one. If memory runs out, the parts stay in the body, and
 // the rule notes that they wait: the cut before has been made and reported, and is not made again.
-void separate_if_asked(Body &b, CutReport &out);
-void separate_if_asked(Body &b);
+void separate_if_requested(Body &b, CutReport &out);
+void separate_if_requested(Body &b);
 // Tries again for parts that wait.
 void separate_what_waits(World &w);
 
-// A piece without a shape, with this id and name, in World::undone: the one that had the id before a restore
-// undid it, or a new one. `of` made it, or is the body that the host made.
+// A piece without a shape, with this id and name, in World::rolled_back: the one that had the id before a
+// restore undid it, or a new one. `of` made it, or is the body that the host made.
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name);
 
 }  // namespace dfm

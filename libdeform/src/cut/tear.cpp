@@ -17,7 +17,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostPoints = 64;  // per body and step; the most stretched points come first
+constexpr uint32_t kMaxPoints = 64;  // per body and step; the most stretched points come first
 
 // Largest eigenvalue of a symmetric matrix (xx, yy, zz, xy, yz, zx), by Jacobi's rotations; the vector to it.
 double largest_eigenvalue(const double (&a)[6], Vec3 &vector) {
@@ -57,7 +57,7 @@ double largest_eigenvalue(const double (&a)[6], Vec3 &vector) {
 class Tear {
  public:
   explicit Tear(const Body &b) : b_(b), ncell_(b.ncell()), points_(b.p.n) {
-    for (const Material &m : b.makeup.materials) limits_.push_back(m.entry(kTearKey, 0));
+    for (const Material &m : b.composition.materials) limits_.push_back(m.entry(kTearKey, 0));
     for (uint32_t c = 0; c < ncell_; ++c) add(c);
   }
 
@@ -99,7 +99,7 @@ class Tear {
   }
 
   void add(uint32_t cell) {
-    const double limit = limits_[b_.makeup.of.empty() ? 0 : b_.makeup.of[cell]];
+    const double limit = limits_[b_.composition.of.empty() ? 0 : b_.composition.of[cell]];
     if (!(limit > 0)) return;
     const Vec3 a = rest(cell, 1) - rest(cell, 0), b = rest(cell, 2) - rest(cell, 0),
                c = rest(cell, 3) - rest(cell, 0);
@@ -157,7 +157,7 @@ class Tear {
     for (const auto &weak : weakest_) {
       const uint32_t i = weak.second;
       const auto free = [&](uint32_t c) { return !taken[c]; };
-      if (n == kMostPoints || !std::all_of(cells[i].begin(), cells[i].end(), free)) continue;
+      if (n == kMaxPoints || !std::all_of(cells[i].begin(), cells[i].end(), free)) continue;
       const auto first = [&](uint32_t c) { return side(c, i) == side(cells[i].front(), i); };
       if (std::all_of(cells[i].begin(), cells[i].end(), first)) continue;  // a tip of the body
       points_[i].split = true;
@@ -180,13 +180,13 @@ void tear_bodies(World &w) {
   const size_t n = w.bodies.size();  // new pieces come after
   for (size_t i = 0; i < n; ++i) {
     Body &b = *w.bodies[i];
-    if (!b.tears || b.slumber.asleep) continue;
+    if (!b.tears || b.sleep_state.asleep) continue;
     const Array<uint64_t> faces = Tear(b).faces();
     if (faces.empty()) continue;
     reserve_cut_events(w, 1);
     CutReport done = open_faces(b, faces);
     add_event(w, DFM_EVENT_TEAR, b.id, b.id, done.copies, w.time);
-    separate_if_asked(b, done);
+    separate_if_requested(b, done);
   }
 }
 

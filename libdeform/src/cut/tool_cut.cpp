@@ -22,8 +22,8 @@
 namespace dfm {
 namespace {
 
-constexpr double kTurn = 0.1;    // rad: a solid that turns by more in a step is placed at several poses
-constexpr int kMostPlaces = 64;  // of a solid in a step
+constexpr double kTurn = 0.1;   // rad: a solid that turns by more in a step is placed at several poses
+constexpr int kMaxPlaces = 64;  // of a solid in a step
 
 bool has_edge(const Tool &t) { return t.def.shape == DFM_TOOL_BLADE || t.def.shape == DFM_TOOL_SCISSORS; }
 
@@ -101,16 +101,16 @@ class Opening {
   std::vector<Part> parts_;
 
   static void add(const Body &b, uint32_t point, double energy, Vec3 way, BladeTrack &to) {
-    const auto before = [](const CutDue &d, uint32_t i) { return d.point < i; };
-    auto at = std::lower_bound(to.dues.begin(), to.dues.end(), point, before);
-    if (at == to.dues.end() || at->point != point) {
-      CutDue none{};
+    const auto before = [](const CutWork &d, uint32_t i) { return d.point < i; };
+    auto at = std::lower_bound(to.cut_work.begin(), to.cut_work.end(), point, before);
+    if (at == to.cut_work.end() || at->point != point) {
+      CutWork none{};
       none.point = point;
-      at = to.dues.insert(at, none);
+      at = to.cut_work.insert(at, none);
     }
-    store3(at->way, normalized(at->due * load3(at->way) + energy * way));
-    at->due += energy;
-    at->force = at->due / b.surface.median_edge;
+    store3(at->way, normalized(at->energy * load3(at->way) + energy * way));
+    at->energy += energy;
+    at->force = at->energy / b.surface.median_edge;
   }
 };
 
@@ -118,11 +118,11 @@ class Opening {
 // jump: paying takes an edge one edge length on, and the wait for a point to come to the surface two.
 constexpr double kBack = 2, kJumped = 8;  // median edges
 void forget_far(const Body &b, const Edge &edge, const Pose &place, BladeTrack &track) {
-  if (track.dues.empty()) return;
+  if (track.cut_work.empty()) return;
   const Vec3 *const c = edge.blade.corner;
   const Vec3 along = normalized(c[2] - c[3]);
   const double unit = b.surface.median_edge;
-  std::erase_if(track.dues, [&](const CutDue &d) {
+  std::erase_if(track.cut_work, [&](const CutWork &d) {
     const Vec3 r = b.p.x_at(d.point) - c[3];
     return norm(r - dot(r, along) * along) > kJumped * unit ||
            dot(r, rotate(place.rotation, load3(d.way))) > kBack * unit;
@@ -137,7 +137,8 @@ void split(const Tool &t, Body &b, uint32_t &n) {
     BladeSweep sweep(b, edge.blade, edge.forward);
     const uint64_t id = t.set->obstacle[part];
     for (BladeTrack &track : b.blades)
-      if (track.part == id && !sweep.goes_on(track)) track.dues.clear();  // where it has been before a jump
+      if (track.part == id && !sweep.goes_on(track))
+        track.cut_work.clear();  // where it has been before a jump
     if (!sweep.near()) continue;
     std::vector<SweptFace> &met = sweep.faces;
     if (t.cuts.most > 0 && met.size() > t.cuts.most - all) met.resize(t.cuts.most - all);
@@ -202,7 +203,7 @@ std::vector<Solid> solids_of(const Tool &t) {
     double places = norm(rotation_vector(to.rotation * conjugate(from.rotation))) / kTurn;
     if (t.def.shape == DFM_TOOL_CAPSULE)
       places = std::max(places, norm(to.position - from.position) / (0.5 * t.def.radius));
-    const int n = int(std::clamp(std::ceil(places), 1.0, double(kMostPlaces)));
+    const int n = int(std::clamp(std::ceil(places), 1.0, double(kMaxPlaces)));
     Pose last = from;
     for (int k = 1; k <= n; ++k) {
       const double share = double(k) / n;
@@ -304,22 +305,22 @@ void cut_by_tools(World &w, double dt) {
       Body &b = *found;
       reserve_cut_events(w, 1);
       uint32_t n = 0;
-      const auto tell = [&] {
+      const auto report = [&] {
         if (n > 0) add_event(w, DFM_EVENT_CUT, id, t.set->obstacle[t.first_cutting_part()], n, w.time);
       };
       try {
         if (t.cuts.how == DFM_CUT_SPLIT) split(t, b, n);
         else remove(t, b, n);
       } catch (...) {  // the second edge of scissors, where the first has opened faces
-        tell();
+        report();
         b.separate.waits = b.separate.waits || (n > 0 && b.separate.on);
         throw;
       }
-      tell();
-      if (n > 0) separate_if_asked(b);
+      report();
+      if (n > 0) separate_if_requested(b);
     }
   }
-  open_due(w, dt);
+  open_scheduled(w, dt);
   prepare_cuts(w);
 }
 

@@ -42,10 +42,10 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
 bool ExplicitPoints::row_sums(const dfm_kin &k, double &cell) {
   std::fill(stiffness_.begin(), stiffness_.end(), 0.0);
   std::fill(damping_.begin(), damping_.end(), 0.0);
-  const auto ask = [&] {
+  const auto query = [&] {
     return model_.ops->bound(model_.self, &k, stiffness_.data(), damping_.data(), &cell);
   };
-  return model_.call("bound", ask) == DFM_OK;
+  return model_.call("bound", query) == DFM_OK;
 }
 
 // The points at rest, displaced and moving, for forces that are measured there.

@@ -97,7 +97,7 @@ bool ImplicitPoints::bound(double, double, const AddRowSums &outside, StepBound 
 
 // Writes the model's forces at the positions that the velocities v [npoint,4] lead to into f. commits: also
 // its next state.
-bool ImplicitPoints::ask(const double *v, bool commits) {
+bool ImplicitPoints::evaluate_after(const double *v, bool commits) {
   for (size_t j = 0; j < x_.size(); ++j) {
     v_[j] = v[j];
     x_[j] = stage_.x[j] + stage_.h * v[j];
@@ -105,11 +105,11 @@ bool ImplicitPoints::ask(const double *v, bool commits) {
   dfm_kin k = kin(stage_.time + stage_.elapsed, stage_.elapsed, commits);
   k.x = x_.data();
   k.v = v_.data();
-  return ask_here(k, stage_.share);
+  return evaluate_at(k, stage_.share);
 }
 
 // share: position between the loads at the start of the sub-step (0) and those at its end (1).
-bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
+bool ImplicitPoints::evaluate_at(const dfm_kin &k, double share) {
   if (share == 1) std::copy(p_.load.begin(), p_.load.end(), p_.f.begin());
   else
     for (size_t j = 0; j < x_.size(); ++j) p_.f[j] = load_before_[j] + share * (p_.load[j] - load_before_[j]);
@@ -120,17 +120,17 @@ bool ImplicitPoints::ask_here(const dfm_kin &k, double share) {
 bool ImplicitPoints::residual_at(const double *v) { return residual(v, residual_.data()); }
 
 bool ImplicitPoints::residual(const double *v, double *r) {
-  if (!ask(v, false)) return false;
-  double poison = 0;
+  if (!evaluate_after(v, false)) return false;
+  double nan_flag = 0;
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
       const size_t at = size_t{kStride} * i + c, own = size_t{3} * i + c;
       const double force = p_.f[at] + p_.mass[i] * stage_.gravity[int(c)];
       const double change = v[at] - stage_.v[at];
       r[own] = p_.moves(at) ? inertia(i, stage_.h) * change - stage_.h * force : 0;
-      poison += 0.0 * r[own];
+      nan_flag += 0.0 * r[own];
     }
-  return poison == 0;
+  return nan_flag == 0;
 }
 
 // Uses the factor of the rest state instead of A, rotated to the positions of the last force evaluation.
@@ -291,7 +291,7 @@ bool ImplicitPoints::free_motion(const SubStep &now, double &kinetic) {
 // the velocities at the three times, because a difference of positions would lose digits.
 bool ImplicitPoints::two_stages(const SubStep &now) {
   const double part = kPart * now.h;
-  if (!ask_here(kin(now.time, 0), 0)) return false;
+  if (!evaluate_at(kin(now.time, 0), 0)) return false;
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
       const size_t at = size_t{kStride} * i + c;
@@ -391,13 +391,13 @@ void ImplicitPoints::spread_impulses(const double *surfel_impulse, double scale,
 bool ImplicitPoints::end_state(const SubStep &now, const double *, bool touched) {
   if (!staged_ && !(touched && solved_)) p_.v_end = p_.v_free;
   const Array<double> &v = p_.v_end;
-  if (!model_.state.empty() && !ask(v.data(), true)) return false;
-  double poison = 0;
+  if (!model_.state.empty() && !evaluate_after(v.data(), true)) return false;
+  double nan_flag = 0;
   for (size_t j = 0; j < v.size(); ++j) {
-    poison += 0.0 * v[j];
+    nan_flag += 0.0 * v[j];
     p_.x_end[j] = p_.x[j] + now.h * mean()[j];
   }
-  return poison == 0;
+  return nan_flag == 0;
 }
 
 // An impulse moves all points, not only the touched ones.

@@ -52,7 +52,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   EndState end() const override { return {p_.v_end.data(), mean()}; }
   void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
-  bool end_forces(const SubStep &) override { return !staged_ && ask(p_.v_end.data(), false); }
+  bool end_forces(const SubStep &) override { return !staged_ && evaluate_after(p_.v_end.data(), false); }
   void commit(const SubStep &now, double fraction) override;
 
   BlockPattern pattern() const override { return stiffness_.pattern(); }
@@ -113,8 +113,8 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   std::unique_ptr<LinearSolver> new_solver() const;
   bool begin_stage(const SubStep &now);
   const double *mean() const { return staged_ ? p_.v_free.data() : p_.v_end.data(); }
-  bool ask(const double *v, bool commits);
-  bool ask_here(const dfm_kin &k, double share);
+  bool evaluate_after(const double *v, bool commits);
+  bool evaluate_at(const dfm_kin &k, double share);
   bool newton(Array<double> &v);
   bool two_stages(const SubStep &now);
   bool solve_stage(const SubStep &now, Array<double> &v);

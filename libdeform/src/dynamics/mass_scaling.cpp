@@ -21,10 +21,10 @@
 namespace dfm {
 namespace {
 
-constexpr int kTurns = 6;          // of what points get and what they pay
-constexpr double kMostPaid = 0.5;  // of its own mass, by a point
-constexpr double kWorth = 1.25;    // longer sub-steps: they have four sizes to the octave
-constexpr int kHalvings = 40;      // of the interval in which the sub-step lies
+constexpr int kTurns = 6;         // of what points get and what they pay
+constexpr double kMaxPaid = 0.5;  // of its own mass, by a point
+constexpr double kWorth = 1.25;   // longer sub-steps: they have four sizes to the octave
+constexpr int kHalvings = 40;     // of the interval in which the sub-step lies
 
 double step_of(double k, double c, double m) {
   const double bottom = c + std::sqrt(c * c + 4 * m * k);
@@ -57,7 +57,7 @@ class Mover {
       paid_ = paid;
     }
     for (uint32_t i = 0; i < p_.n; ++i)
-      if (!(share_paid(i) <= kMostPaid)) return std::numeric_limits<double>::infinity();
+      if (!(share_paid(i) <= kMaxPaid)) return std::numeric_limits<double>::infinity();
     return moved;
   }
 
@@ -116,7 +116,7 @@ MassScaling scale_mass(const Phyxels &p, const RestRows &rows, double share, std
   const auto median = steps.begin() + p.n / 2;
   std::nth_element(steps.begin(), median, steps.end());
   const double least = *std::min_element(steps.begin(), median + 1);
-  const MassScaling none{.asked = share, .step = least};
+  const MassScaling none{.requested = share, .step = least};
   if (!(*median > kWorth * least) || !std::isfinite(*median)) return none;
   Mover mover(p, rows);
   double low = least, high = *median;  // a level at which half of the points bound is that of the body
@@ -124,7 +124,7 @@ MassScaling scale_mass(const Phyxels &p, const RestRows &rows, double share, std
     const double middle = 0.5 * (low + high);
     (mover.move(middle) > share * mover.total() ? high : low) = middle;
   }
-  MassScaling out{.asked = share, .moved = mover.move(low) / mover.total(), .step = *median};
+  MassScaling out{.requested = share, .moved = mover.move(low) / mover.total(), .step = *median};
   for (uint32_t i = 0; i < p.n; ++i) {
     mass[i] += mover.changed(i);
     out.step = std::min(out.step, step_of(rows.stiffness[i], rows.damping[i], mass[i]));

@@ -12,13 +12,13 @@ struct RestRows {
 };
 
 struct MassScaling {
-  double asked = 0;      // share of the body's mass that may move; 0: none
+  double requested = 0;  // share of the body's mass that may move; 0: none
   double moved = 0;      // share that has moved
   double frequency = 0;  // its share, that a mode quadratic in the place may change by
   double step = 0;       // s, that the rows allow with these masses
 };
 
-inline constexpr double kMostScaled = 0.1;  // of the body's mass that may move
+inline constexpr double kMaxScaled = 0.1;  // of the body's mass that may move
 
 double step_of_point(const Phyxels &p, const RestRows &rows, uint32_t point);
 // The masses for the longest sub-step that moves no more than this share; those of p where no point bounds by

@@ -61,7 +61,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
     }
     if (*why.text()) static_cast<const dfm_context *>(h.ctx)->log(DFM_LOG_ERROR, why.text());
   }
-  const std::optional<std::vector<dfm_slot>> own = ask_extensions();
+  const std::optional<std::vector<dfm_slot>> own = query_extensions();
   if (!stepper && !ops->add_forces)
     fail(DFM_E_UNSUPPORTED, "model '%s' neither adds forces nor steps itself; report it to its author", t.id);
   if (own) slots = *own;
@@ -72,7 +72,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   start();
 }
 
-std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
+std::optional<std::vector<dfm_slot>> ModelInstance::query_extensions() {
   const void *tables[9] = {};
   const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS,       DFM_EXT_EFFECTS,
                              DFM_EXT_IDLE,    DFM_EXT_LIMITED,     DFM_EXT_CAPS,
@@ -95,7 +95,7 @@ std::optional<std::vector<dfm_slot>> ModelInstance::ask_extensions() {
   if (part_forces && !(part_forces->parts && part_forces->forces)) part_forces.reset();
   late = copy_table<dfm_late_points>(tables[7], kLatePoints, type->id, "dfm_late_points");
   if (late && !(stepper && late->commit && late->points && late->look)) late.reset();
-  if (ask_caps() != DFM_OK)
+  if (query_caps() != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' failed to report its abilities; see the log", type->id);
   return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
 }
@@ -114,14 +114,14 @@ void ModelInstance::use_single() {
   single = true;
 }
 
-dfm_status ModelInstance::ask_caps() noexcept {
+dfm_status ModelInstance::query_caps() noexcept {
   uint32_t hold = ~uint32_t{0};
   if (claims && claims->active) {
-    const auto ask = [&] {
+    const auto query = [&] {
       hold = claims->active(self);
       return DFM_OK;
     };
-    if (const dfm_status s = call("caps", ask); s != DFM_OK) return s;
+    if (const dfm_status s = call("caps", query); s != DFM_OK) return s;
   }
   caps_ = ops->caps & hold;
   if (!ops->energy) caps_ &= ~uint32_t{DFM_CAP_ENERGY};
@@ -134,10 +134,10 @@ dfm_status ModelInstance::put_params(const std::vector<double> &values, uint32_t
     return call("set_params", [&] { return ops->set_params(self, v.data()); });
   };
   if (const dfm_status s = put(values); s != DFM_OK) return s;
-  const dfm_status s = ask_caps();
+  const dfm_status s = query_caps();
   if (s == DFM_OK && can(needed)) return DFM_OK;
   put(params);
-  ask_caps();
+  query_caps();
   return s == DFM_OK ? DFM_E_UNSUPPORTED : s;
 }
 

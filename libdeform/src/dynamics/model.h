@@ -95,8 +95,8 @@ struct ModelInstance {
   }
 
  private:
-  std::optional<std::vector<dfm_slot>> ask_extensions();  // and its own state slots; throws Error
-  dfm_status ask_caps() noexcept;                         // after an error caps_ is unchanged
+  std::optional<std::vector<dfm_slot>> query_extensions();  // and its own state slots; throws Error
+  dfm_status query_caps() noexcept;                         // after an error caps_ is unchanged
   uint32_t caps_ = 0;
 };
 

@@ -50,11 +50,11 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
   for (Array<double> *a : {&diagonal_, &b_, &y_, &arm_}) a->assign(size_t{3} * p_.n, 0.0);
   turned_.assign(size_t{9} * p_.n, 0.0);
   for (size_t k = 0; k < turned_.size(); ++k) turned_[k] = k % 9 % 4 == 0;
-  ask_model();  // steps run on any thread, where no memory may be allocated
+  query_stiffness();  // steps run on any thread, where no memory may be allocated
 }
 
 // A model gives its stiffness at the state of its last force evaluation.
-bool RestFactor::ask_model() {
+bool RestFactor::query_stiffness() {
   if (!stiff_.empty() && params_ == model_.params) return true;
   stiff_.clear();
   h_ = 0;
@@ -81,7 +81,7 @@ bool RestFactor::prepare(double h) {
   if (h_ == h && held_ == p_.held && params_ == model_.params) return serves_;
   serves_ = false;
   try {
-    if (!ask_model()) return false;
+    if (!query_stiffness()) return false;
   } catch (const std::bad_alloc &) {  // new parameters, on any thread that moves this body
     return false;
   }

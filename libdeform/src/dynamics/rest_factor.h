@@ -59,7 +59,7 @@ class RestFactor {
   Rigid rigid_ = {};
   Array<double> arm_;  // [npoint,3] m, from the center
 
-  bool ask_model();
+  bool query_stiffness();
   struct Motion { Vec3 speed, spin; };
   Motion motion_of(Vec3 impulse, Vec3 moment) const;
   void find_turns(const double *x);

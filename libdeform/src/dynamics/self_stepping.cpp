@@ -41,10 +41,10 @@ bool SelfStepping::bound(double time, double, const AddRowSums &outside, StepBou
   damping_.assign(p_.n, 0.0);
   const dfm_kin k = kin(time, 0);
   double cell = *contact_step_;
-  const auto ask = [&] {
+  const auto query = [&] {
     return model_.ops->bound(model_.self, &k, stiffness_.data(), damping_.data(), &cell);
   };
-  if (model_.call("bound", ask) != DFM_OK) return false;
+  if (model_.call("bound", query) != DFM_OK) return false;
   outside(stiffness_.data(), damping_.data());
   out.step = std::min(cell, stable_step(p_, stiffness_.data(), damping_.data(), &out.point));
   contact_step_ = out.step;
@@ -100,14 +100,14 @@ bool SelfStepping::respond(const SubStep &now, uint32_t n, const uint32_t *surfe
 }
 
 // If the number of unit impulses is that of the last sub-step, they are the same.
-bool SelfStepping::response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) {
+bool SelfStepping::response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *responses) {
   const uint32_t width = 3 * n;
   if (unit_.size() != size_t(width) * width) {
     unit_.assign(size_t(width) * width, 0.0);
     for (uint32_t c = 0; c < width; ++c) unit_[size_t(c) * width + c] = 1;
   }
-  std::fill_n(answers, unit_.size(), 0.0);
-  return respond(now, n, surfel, width, unit_.data(), answers);
+  std::fill_n(responses, unit_.size(), 0.0);
+  return respond(now, n, surfel, width, unit_.data(), responses);
 }
 
 bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
@@ -120,12 +120,12 @@ bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, b
   const auto ends = model_.late ? model_.late->commit : model_.stepper->commit;
   const auto end = [&] { return ends(model_.self, &k, surfel_impulse, x, v); };
   if (model_.call("commit", end) != DFM_OK) return false;
-  double poison = 0;
+  double nan_flag = 0;
   each_moved([&](size_t j) {
-    poison += 0.0 * x[j] + 0.0 * v[j];
+    nan_flag += 0.0 * x[j] + 0.0 * v[j];
     mean_[j] = (x[j] - p_.x[j]) / now.h;
   });
-  return poison == 0;
+  return nan_flag == 0;
 }
 
 void SelfStepping::bound_ends(double &speed, double &change) const {

@@ -18,7 +18,7 @@ class SelfStepping : public Dynamics {
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double contact_step() override;
   bool free_motion(const SubStep &now, double &kinetic) override;
-  bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *answers) override;
+  bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *responses) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean_.data()}; }
   void bound_ends(double &speed, double &change) const override;

@@ -52,8 +52,8 @@ void ModelStiffness::create(const ModelInstance &model, uint32_t npoint) {
 
 bool ModelStiffness::evaluate(const ModelInstance &model, const dfm_kin &k, double a, double b) {
   std::fill(blocks_.begin(), blocks_.end(), 0.0);
-  const auto ask = [&] { return model.ops->stiffness(model.self, &k, a, b, blocks_.data()); };
-  return model.call("stiffness", ask) == DFM_OK;
+  const auto query = [&] { return model.ops->stiffness(model.self, &k, a, b, blocks_.data()); };
+  return model.call("stiffness", query) == DFM_OK;
 }
 
 }  // namespace dfm

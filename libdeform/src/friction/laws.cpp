@@ -16,8 +16,8 @@ LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<doubl
       params(std::move(values)),
       by_key(param_rows(t, params)),
       host(&h) {
-  asked_type = &t;
-  asked = params;
+  requested_type = &t;
+  requested = params;
   for (const dfm_slot &slot : law_slots(t, h, params.data())) {
     nstate += slot.width;
     tangent.resize(nstate, slot.kind == DFM_SLOT_TANGENT);
@@ -31,20 +31,20 @@ LawInstance::LawInstance(const dfm_type &t, const dfm_host &h, std::vector<doubl
 
 std::vector<LeftOut> left_out_of(const LawInstance &law) {
   std::vector<LeftOut> out;
-  const dfm_type &asked = *law.asked_type;
-  const bool other = law.type != &asked;
-  if (!other && law.params == law.asked) return out;
-  const std::string of = std::string("friction law ") + asked.id,
+  const dfm_type &requested = *law.requested_type;
+  const bool other = law.type != &requested;
+  if (!other && law.params == law.requested) return out;
+  const std::string of = std::string("friction law ") + requested.id,
                     instead = other ? format("%s is used instead", law.type->id) : std::string();
   if (other && is_frictionless(*law.ops)) return {{kFriction, of, instead}};
   const std::vector<LawEffect> left = law_effects(*law.type, *law.host, law.params);
-  for (const LawEffect &e : law_effects(asked, *law.host, law.asked)) {
+  for (const LawEffect &e : law_effects(requested, *law.host, law.requested)) {
     if (!e.works || std::any_of(left.begin(), left.end(),
                                 [&](const LawEffect &l) { return l.works && l.name == e.name; }))
       continue;
     std::vector<std::string> by;
-    for (const dfm_param_value &row : param_rows(asked, law.asked))
-      if (const size_t at = size_t(row.value - law.asked.data()); e.off[at] != law.asked[at])
+    for (const dfm_param_value &row : param_rows(requested, law.requested))
+      if (const size_t at = size_t(row.value - law.requested.data()); e.off[at] != law.requested[at])
         by.push_back(format("%s %g", row.key, *row.value));
     if (other) by.push_back(instead);
     out.push_back({e.name, of, join(by)});
@@ -61,7 +61,7 @@ LawInstance::~LawInstance() {
 }
 
 LawBatches::LawBatches(const Memory &m) {
-  use_memory(m, order_, in_, out_, moved_, answer_, mode_, local_, asked_);
+  use_memory(m, order_, in_, out_, moved_, forces_, mode_, local_, selected_);
 }
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts,
@@ -88,7 +88,7 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const 
   }
 }
 
-void LawBatches::leave_free(std::span<const uint32_t> index, ContactState &state) {
+void LawBatches::set_frictionless(std::span<const uint32_t> index, ContactState &state) {
   for (const uint32_t i : index) {
     state.ft[i] = state.ft[state.stride + i] = state.limit[i] = 0;
     state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0;
@@ -99,7 +99,7 @@ void LawBatches::leave_free(std::span<const uint32_t> index, ContactState &state
 
 const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
   for (const Batch &batch : batches_)
-    if (batch.law->form() == kNoFriction) leave_free({&order_[batch.begin], batch.n}, state);
+    if (batch.law->form() == kNoFriction) set_frictionless({&order_[batch.begin], batch.n}, state);
     else if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state))
       return bad;
   return nullptr;
@@ -109,7 +109,7 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
   for (const Batch &batch : batches_) {
     if ((batch.law->ops->flags & DFM_FRIC_JACOBIAN) || batch.law->form() == kNoFriction) continue;
     for (const Slopes which : {kByVt, kByFn}) {
-      asked_.clear();
+      selected_.clear();
       for (uint32_t k = 0; k < batch.n; ++k) {
         const uint32_t i = order_[batch.begin + k];
         if (state.origin[i].hold & which) continue;
@@ -120,11 +120,11 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
           state.origin[i].made |= which;
           state.origin[i].hold |= which;
         } else {
-          asked_.push_back(i);
+          selected_.push_back(i);
         }
       }
-      if (asked_.empty()) continue;
-      if (const LawInstance *bad = difference(*batch.law, asked_, h, which, state)) return bad;
+      if (selected_.empty()) continue;
+      if (const LawInstance *bad = difference(*batch.law, selected_, h, which, state)) return bad;
     }
   }
   return nullptr;
@@ -132,7 +132,7 @@ const LawInstance *LawBatches::slopes(double h, ContactState &state) {
 
 // If slopes predict the change of force since they were computed to a tenth, each pass reduces the error to a
 // tenth; new slopes are not worth three evaluations.
-void LawBatches::look_back(uint32_t i, ContactState &s) {
+void LawBatches::reuse_slopes(uint32_t i, ContactState &s) {
   constexpr double kGood = 0.1;
   ContactState::Origin &o = s.origin[i];
   if (!o.made) return;
@@ -215,25 +215,25 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
 
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
-    double poison = 0;
+    double nan_flag = 0;
     state.ft[i] = ft[k];
     state.ft[state.stride + i] = ft[column + k];
     state.limit[i] = limit[k];
     state.mode[i] = mode_[k];
     for (uint32_t s = 0; s < S; ++s)
-      poison += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
-    poison += 0.0 * (ft[k] + ft[column + k]);
+      nan_flag += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
+    nan_flag += 0.0 * (ft[k] + ft[column + k]);
     if (given) {
       for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
       state.dft_dfn[i] = dn[k];
       state.dft_dfn[state.stride + i] = dn[column + k];
-      poison += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
-                0.0 * (dn[k] + dn[column + k]);
+      nan_flag += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
+                  0.0 * (dn[k] + dn[column + k]);
     } else {
-      look_back(i, state);
+      reuse_slopes(i, state);
     }
     // the poison of NaN and infinity is not zero; a limit of +inf is valid: no limit
-    if (failed_ == kNone && !(poison == 0 && limit[k] >= 0)) failed_ = i;
+    if (failed_ == kNone && !(nan_flag == 0 && limit[k] >= 0)) failed_ = i;
   }
   if (given && !state.scale.empty())
     for (const uint32_t i : index)
@@ -245,7 +245,7 @@ namespace {
 
 // 0 if the whole column, padded to fours, is finite; else NaN.
 using Four = double __attribute__((vector_size(32)));
-void add_poison(const double *column, size_t n, Four &sum) {
+void add_nan_flag(const double *column, size_t n, Four &sum) {
   const Four *const x = reinterpret_cast<const Four *>(column);
   for (size_t k = 0; k < n / 4; ++k) sum += 0.0 * x[k];
 }
@@ -281,16 +281,16 @@ const LawInstance *LawBatches::evaluate_all(const LawInstance &law, double h, Co
   if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
     return &law;
   if (!given)
-    for (uint32_t i = 0; i < n; ++i) look_back(i, s);
+    for (uint32_t i = 0; i < n; ++i) reuse_slopes(i, s);
 
-  Four poison{0, 0, 0, 0};
-  add_poison(s.ft.data(), 2 * column, poison);
-  add_poison(s.bristle_out.data(), S * column, poison);
+  Four nan_flag{0, 0, 0, 0};
+  add_nan_flag(s.ft.data(), 2 * column, nan_flag);
+  add_nan_flag(s.bristle_out.data(), S * column, nan_flag);
   if (given) {
-    add_poison(s.dft_dvt.data(), 4 * column, poison);
-    add_poison(s.dft_dfn.data(), 2 * column, poison);
+    add_nan_flag(s.dft_dvt.data(), 4 * column, nan_flag);
+    add_nan_flag(s.dft_dfn.data(), 2 * column, nan_flag);
   }
-  bool good = (poison[0] + poison[1]) + (poison[2] + poison[3]) == 0;
+  bool good = (nan_flag[0] + nan_flag[1]) + (nan_flag[2] + nan_flag[3]) == 0;
   for (uint32_t i = 0; i < n; ++i) good &= s.limit[i] >= 0;
   if (good) return nullptr;
   // find the contact; there is none if only the padding is not finite, which a law may leave undefined
@@ -319,34 +319,35 @@ const LawInstance *LawBatches::difference(const LawInstance &law, std::span<cons
   dfm_friction_in in = inputs(law, index, h, state);
   const size_t column = in.stride, n = state.stride;
   const double *const fn = in.fn, *const vt = in.vt;
-  answer_.resize(2 * column);
+  forces_.resize(2 * column);
   dfm_friction_out out{};
   out.size = sizeof out;
-  out.ft = answer_.data();
+  out.ft = forces_.data();
   failed_ = kNone;
   // to: the column of the 2x2 or 2x1 slope, of `width` columns
-  const auto ask = [&](const double *at, size_t columns, size_t c, const double *&input, double least,
-                       Array<double> &to, size_t width) {
+  const auto differs = [&](const double *at, size_t columns, size_t c, const double *&input, double least,
+                           Array<double> &to, size_t width) {
     moved_.assign(at, at + columns * column);
     for (size_t k = 0; k < in.n; ++k)
       moved_[c * column + k] += std::max(least, 1e-6 * std::fabs(at[c * column + k]));
     input = moved_.data();
-    const bool answered =
+    const bool evaluated =
         call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
     input = at;
     for (size_t r = 0; r < 2; ++r)
       for (size_t k = 0; k < in.n; ++k) {
-        const double slope = (answer_[r * column + k] - state.ft[r * n + index[k]]) /
+        const double slope = (forces_[r * column + k] - state.ft[r * n + index[k]]) /
                              (moved_[c * column + k] - at[c * column + k]);
         to[(r * width + c) * n + index[k]] = slope;
         if (failed_ == kNone && !std::isfinite(slope)) failed_ = index[k];
       }
-    return answered;
+    return evaluated;
   };
-  bool answered = true;
+  bool evaluated = true;
   if (which & kByVt)
-    answered = ask(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && ask(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
-  if (answered && (which & kByFn)) answered = ask(fn, 1, 0, in.fn, 1e-9, state.dft_dfn, 1);
+    evaluated =
+        differs(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && differs(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
+  if (evaluated && (which & kByFn)) evaluated = differs(fn, 1, 0, in.fn, 1e-9, state.dft_dfn, 1);
   if ((which & kByFn) && !state.scale.empty())
     for (const uint32_t i : index)
       for (size_t r = 0; r < 2; ++r) state.dft_dfn[r * n + i] *= state.scale[i];
@@ -357,7 +358,7 @@ const LawInstance *LawBatches::difference(const LawInstance &law, std::span<cons
     const uint8_t made = o.made | which, hold = o.hold | which;
     o = {{state.vt[i], state.vt[n + i]}, state.fn[i], {state.ft[i], state.ft[n + i]}, made, hold};
   }
-  return answered && failed_ == kNone ? nullptr : &law;
+  return evaluated && failed_ == kNone ? nullptr : &law;
 }
 
 }  // namespace dfm

@@ -29,8 +29,8 @@ struct LawInstance {
   bool by_default = false;              // used for pairs without a rule
   double restitution = kNoRestitution;  // 0 to 1, of the pairs that have this law
   // The parameters as the rule gives them; the list of effects may have removed some of them.
-  const dfm_type *asked_type = nullptr;
-  std::vector<double> asked;
+  const dfm_type *requested_type = nullptr;
+  std::vector<double> requested;
 
   // throws if check() or prepare() refuses
   LawInstance(const dfm_type &t, const dfm_host &h, std::vector<double> values);
@@ -66,7 +66,8 @@ class LawBatches {
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop gives the slip
   //          that others leave
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
-  const LawInstance *answer(double h, const double *wt, double least, double relative, ContactState &state);
+  const LawInstance *evaluate_local(double h, const double *wt, double least, double relative,
+                                    ContactState &state);
   bool smooth() const { return smooth_; }            // whether any law is not set-valued
   bool differences() const { return differences_; }  // whether any law gives no slopes
   bool remembers() const { return remembers_; }      // whether any law has a state
@@ -89,10 +90,10 @@ class LawBatches {
   std::vector<Batch> batches_;
   Array<uint32_t> order_;         // contacts by law, in contact order within each
   Array<double> in_, out_;        // columns of one batch
-  Array<double> moved_, answer_;  // inputs and force beside the trial, for laws without derivatives
+  Array<double> moved_, forces_;  // inputs and force beside the trial, for laws without derivatives
   Array<uint8_t> mode_;
   Array<Local> local_;
-  Array<uint32_t> asked_;  // contacts of local_ that are evaluated together
+  Array<uint32_t> selected_;  // contacts of local_ that are evaluated together
   bool smooth_ = false, remembers_ = false, differences_ = false;
   uint32_t failed_ = kNone;
   // in in_
@@ -102,15 +103,15 @@ class LawBatches {
                               ContactState &state);
   // The same for all contacts of the sub-step, in state's own columns.
   const LawInstance *evaluate_all(const LawInstance &law, double h, ContactState &state);
-  const LawInstance *settle(const Batch &batch, double h, const double *wt, double least, double relative,
-                            ContactState &state);
+  const LawInstance *solve_local(const Batch &batch, double h, const double *wt, double least,
+                                 double relative, ContactState &state);
   // Slopes by differences at the present trial. Returns the law if it fails.
   const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                                 Slopes which, ContactState &state);
   // The result for contacts without friction, whose law is not evaluated.
-  static void leave_free(std::span<const uint32_t> contacts, ContactState &state);
+  static void set_frictionless(std::span<const uint32_t> contacts, ContactState &state);
   // whether earlier slopes are still valid at the last evaluation
-  static void look_back(uint32_t contact, ContactState &state);
+  static void reuse_slopes(uint32_t contact, ContactState &state);
 };
 
 }  // namespace dfm

@@ -26,10 +26,10 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostAsked = 24;
+constexpr uint32_t kMaxPasses = 24;
 // If the law is evaluated exactly at the edge of its cone, its tangent is that of slip, and the step is too
 // long by a factor 1 + h m sigma0 A, which may be 1e12.
-constexpr double kCut = 1.0 / 16, kLeastFraction = 1e-15;  // of a Newton step that increases the residual
+constexpr double kCut = 1.0 / 16, kMinFraction = 1e-15;  // of a Newton step that increases the residual
 
 struct Residue { double a, b, square; };
 inline Residue residue(const ContactState &s, uint32_t i, double m) {
@@ -40,7 +40,7 @@ inline Residue residue(const ContactState &s, uint32_t i, double m) {
 }
 
 // Whether the slip at which the law was evaluated is close enough to the solution.
-inline bool answers(const ContactState &s, uint32_t i, double m, double least, double relative) {
+inline bool is_accurate(const ContactState &s, uint32_t i, double m, double least, double relative) {
   const Residue g = residue(s, i, m);
   const double v1 = s.vt[i], v2 = s.vt[s.stride + i];
   return g.square <= least * least || std::sqrt(g.square) <= least + relative * std::sqrt(v1 * v1 + v2 * v2);
@@ -60,37 +60,38 @@ void newton_step(const ContactState &s, uint32_t i, double m, double v[2], doubl
 
 }  // namespace
 
-const LawInstance *LawBatches::answer(double h, const double *wt, double least, double relative,
-                                      ContactState &state) {
+const LawInstance *LawBatches::evaluate_local(double h, const double *wt, double least, double relative,
+                                              ContactState &state) {
   for (const Batch &batch : batches_) {
     if (batch.law->form() == kNoFriction) {
-      leave_free({&order_[batch.begin], batch.n}, state);
+      set_frictionless({&order_[batch.begin], batch.n}, state);
       continue;
     }
     if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state)) return bad;
     if (batch.law->ops->flags & DFM_FRIC_SET_VALUED) continue;
-    if (const LawInstance *bad = settle(batch, h, wt, least, relative, state)) return bad;
+    if (const LawInstance *bad = solve_local(batch, h, wt, least, relative, state)) return bad;
   }
   return nullptr;
 }
 
 // All contacts of a batch side by side; finished contacts leave the batch.
-const LawInstance *LawBatches::settle(const Batch &batch, double h, const double *wt, double least,
-                                      double relative, ContactState &s) {
+const LawInstance *LawBatches::solve_local(const Batch &batch, double h, const double *wt, double least,
+                                           double relative, ContactState &s) {
   const uint32_t n = s.stride;
   local_.clear();
   for (uint32_t k = 0; k < batch.n; ++k)
-    if (const uint32_t i = order_[batch.begin + k]; wt[i] > 0 && !answers(s, i, h * wt[i], least, relative))
+    if (const uint32_t i = order_[batch.begin + k];
+        wt[i] > 0 && !is_accurate(s, i, h * wt[i], least, relative))
       local_.push_back({i, false, false, false, {0, 0}, INFINITY, {0, 0}, 0});
   const bool gives_slopes = batch.law->ops->flags & DFM_FRIC_JACOBIAN;
-  for (uint32_t asked = 1; !local_.empty(); ++asked) {
+  for (uint32_t pass = 1; !local_.empty(); ++pass) {
     size_t kept = 0;
-    asked_.clear();
+    selected_.clear();
     for (Local &c : local_) {
       const uint32_t i = c.contact;
       const double m = h * wt[i];
       const Residue g = residue(s, i, m);
-      if (answers(s, i, m, least, relative)) continue;
+      if (is_accurate(s, i, m, least, relative)) continue;
       const double size = std::sqrt(g.square);
       // Beyond the crossing, g points along the step. Deep in stick it is nearly as large there as before, so
       // its size is no criterion.
@@ -98,12 +99,12 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
           size < 0.5 * c.left || (c.from_zero && size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
       c.fresh = false;
       if (std::isinf(c.left) || nearer) {
-        if (asked == kMostAsked) continue;
+        if (pass == kMaxPasses) continue;
         c.fresh = true;
         c.left = size;
         c.fraction = 1;
-        if (!gives_slopes && !(s.origin[i].hold & kByVt)) asked_.push_back(i);
-      } else if (!c.from_zero && asked < kMostAsked) {  // tangents at the present slip do not converge
+        if (!gives_slopes && !(s.origin[i].hold & kByVt)) selected_.push_back(i);
+      } else if (!c.from_zero && pass < kMaxPasses) {  // tangents at the present slip do not converge
         c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
         c.fraction *= kCut;
@@ -112,21 +113,21 @@ const LawInstance *LawBatches::settle(const Batch &batch, double h, const double
     }
     local_.resize(kept);
     if (local_.empty()) break;
-    if (!asked_.empty())
-      if (const LawInstance *bad = difference(*batch.law, asked_, h, kByVt, s)) return bad;
+    if (!selected_.empty())
+      if (const LawInstance *bad = difference(*batch.law, selected_, h, kByVt, s)) return bad;
     for (Local &c : local_) {
       const uint32_t i = c.contact;
       if (c.fresh) newton_step(s, i, h * wt[i], c.v, c.step);
-      // The limit on evaluations, or on shortened steps, is reached: evaluate at the best slip again and
+      // The limit on passes, or on shortened steps, is reached: evaluate at the best slip again and
       // return that.
-      c.last = asked >= kMostAsked || (c.fraction > 0 && c.fraction < kLeastFraction);
+      c.last = pass >= kMaxPasses || (c.fraction > 0 && c.fraction < kMinFraction);
       if (c.last) c.fraction = 0;
       s.vt[i] = c.v[0] + c.fraction * c.step[0];
       s.vt[n + i] = c.v[1] + c.fraction * c.step[1];
     }
-    asked_.clear();
-    for (const Local &c : local_) asked_.push_back(c.contact);
-    if (const LawInstance *bad = evaluate(*batch.law, asked_, h, s)) return bad;
+    selected_.clear();
+    for (const Local &c : local_) selected_.push_back(c.contact);
+    if (const LawInstance *bad = evaluate(*batch.law, selected_, h, s)) return bad;
     local_.erase(std::remove_if(local_.begin(), local_.end(), [](const Local &c) { return c.last; }),
                  local_.end());
   }

@@ -22,7 +22,7 @@ struct NamedBy {
   bool operator==(const NamedBy &) const = default;
 };
 
-inline constexpr uint8_t kOfSlit = 8;  // of Surface::laid_tip
+inline constexpr uint8_t kOfSlit = 8;  // of Surface::coincident_tip
 
 struct Surface {
   uint32_t nsurfel = 0, ntri = 0, nedge = 0;
@@ -91,18 +91,18 @@ struct Surface {
   // some coincide with others of this surface. x is set back there by half of the rest distance of contacts:
   // copies of a point in one place would touch along the normals of all faces around them, which no motion
   // satisfies (doc/decisions/cutting.md).
-  Array<uint32_t> laid, laid_surfel;
-  // [laid] bits 0-2: corner k lies at the tip of a slit: the face on the other side has the same surfel; bit
+  Array<uint32_t> coincident, coincident_surfel;
+  // [coincident] bits 0-2: corner k is the tip of a slit: the face on the other side has the same surfel; bit
   // 3: it is of a slit
-  Array<uint8_t> laid_tip;
+  Array<uint8_t> coincident_tip;
   bool slit = false;
   double back = 0;         // m
   Array<double> place;     // [nsurfel,4] m, x before it is set back; empty without such triangles
   Array<uint32_t> origin;  // [nsurfel] point of the body as it was made; empty without such triangles
-  // around a surfel of laid_surfel, from begin[i] to begin[i+1]: places in `laid`, without those that have
-  // their tip there
-  Array<uint32_t> laid_begin, laid_around;
-  Array<double> laid_normal;  // scratch, [laid,3]
+  // around a surfel of coincident_surfel, from begin[i] to begin[i+1]: places in `coincident`, without those
+  // that have their tip there
+  Array<uint32_t> coincident_begin, coincident_around;
+  Array<double> coincident_normal;  // scratch, [coincident,3]
 
   // Over the triangles at rest, where the surface was made in advance: trees over the present triangles take
   // its topology instead of a search for one. Null: there is none.

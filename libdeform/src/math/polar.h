@@ -9,7 +9,7 @@ namespace dfm {
 inline bool polar_rotation(const double *f, double *r) {
   constexpr int kIterations = 12;
   constexpr double kFlat = 1e-3;  // of the volume of a cube with the same sum of squares
-  constexpr double kSettled = 1e-10;
+  constexpr double kConverged = 1e-10;
   double q[9], square = 0;
   for (int k = 0; k < 9; ++k) square += f[k] * f[k];
   if (!(square > 0)) return false;
@@ -28,7 +28,7 @@ inline bool polar_rotation(const double *f, double *r) {
       change = std::fmax(change, std::fabs(next - q[k]));
       q[k] = next;
     }
-    if (change < kSettled) break;
+    if (change < kConverged) break;
   }
   for (int k = 0; k < 9; ++k) r[k] = q[k];
   return true;

@@ -122,11 +122,11 @@ inline Vec3 mean_spin(Quat q, Vec3 inverse_moments, Vec3 L, double h) {
 // L^2 / 2 of the least moment.
 inline Vec3 free_spin(Quat q, Vec3 inverse_moments, Vec3 L, double h) {
   constexpr double kWhole = 0.5, kPart = 0.1;  // rad
-  constexpr double kMostParts = 4096;
+  constexpr double kMaxParts = 4096;
   const bool round = inverse_moments.x == inverse_moments.y && inverse_moments.y == inverse_moments.z;
   const double turn = h * norm(in_axes(q, inverse_moments, L));
   if (round || !(turn > kWhole)) return mean_spin(q, inverse_moments, L, h);
-  const double parts = std::min(std::ceil(turn / kPart), kMostParts), part = h / parts;
+  const double parts = std::min(std::ceil(turn / kPart), kMaxParts), part = h / parts;
   Quat at = q;
   for (double k = 0; k < parts; ++k) at = turned(at, part * mean_spin(at, inverse_moments, L, part));
   return (1 / h) * rotation_vector(at * conjugate(q));

@@ -13,9 +13,9 @@ struct Vec3 {
 };
 
 inline bool all_finite(const double *x, size_t n) {
-  double poison = 0;
-  for (size_t i = 0; i < n; ++i) poison += 0.0 * x[i];
-  return poison == 0;
+  double nan_flag = 0;
+  for (size_t i = 0; i < n; ++i) nan_flag += 0.0 * x[i];
+  return nan_flag == 0;
 }
 inline Vec3 load3(const double *p) { return {p[0], p[1], p[2]}; }
 inline void store3(double *p, Vec3 a) {

@@ -10,9 +10,9 @@ int doubles_at_once() {
   const bool avx2 = __builtin_cpu_supports("avx2");
   const bool avx512 = __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl") &&
                       __builtin_cpu_supports("avx512dq");
-  const char *const asked = std::getenv("DEFORM_SIMD");
-  if (asked && std::strcmp(asked, "sse2") == 0) return 2;
-  if (asked && std::strcmp(asked, "avx2") == 0 && avx2) return 4;
+  const char *const requested = std::getenv("DEFORM_SIMD");
+  if (requested && std::strcmp(requested, "sse2") == 0) return 2;
+  if (requested && std::strcmp(requested, "avx2") == 0 && avx2) return 4;
   return avx512 ? 8 : avx2 ? 4 : 2;
 #else
   return 2;

@@ -24,11 +24,11 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostCells = 100'000'000;
+constexpr uint32_t kMaxCells = 100'000'000;
 constexpr double kShareFloor = 0.1;  // of the fullest cell around
 // A layer of cells of which a part s is material bends like one of its thickness and s times the modulus, so
 // 1/s^2 times too stiffly. It is told from a factor of four on, if a tenth of the material is concerned.
-constexpr double kThin = 0.5, kTellThin = 0.1;
+constexpr double kThin = 0.5, kWarnThin = 0.1;
 constexpr double kOpening = 0.1;       // openings up to this part of the closed area are filled across
 constexpr double kDeviations = 4;      // sampled and summed volume agree within so many standard deviations
 constexpr double kCloseEnough = 1.02;  // number of cells over the wanted one, or the reverse
@@ -56,7 +56,7 @@ double expected_half_pitch(const FillSurface &s, double cells) {
 
 // As far as a search may go beyond the wanted number.
 uint32_t most_cells(uint32_t cells) {
-  return uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMostCells));
+  return uint32_t(std::min<uint64_t>(4 * uint64_t(cells) + 1000, kMaxCells));
 }
 
 // Below it keys overflow, or the rounding of coordinates (a quarter of the touch tolerance) reaches 1/20 of
@@ -131,7 +131,7 @@ double sum(const Array<double> &x) {
 
 // Shifts every share by the same fraction of its uncertain part until the sum is `wanted` cells, if the
 // difference is within the sampling error.
-bool settle(Filling &f, double wanted, double piece) {
+bool match_volume(Filling &f, double wanted, double piece) {
   Array<double> &share = f.share;
   if (std::fabs(sum(share) - wanted) > kDeviations * 0.5 * std::sqrt(piece * sum(f.loose)) + 1e-9 * wanted)
     return false;
@@ -272,7 +272,7 @@ double raise_to_floor(const Memory &memory, Filling &f) {
 // ---- sentences --------------------------------------------------------------------------------------------
 
 void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) {
-  if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
+  if (cells < 1 || cells > kMaxCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMaxCells);
   if (surface.ntri() == 0) fail(DFM_E_FORMAT, "the surface has no triangles; there is nothing to fill");
   if (!(s.area > 0)) fail(DFM_E_FORMAT, "the surface has no area; there is nothing to fill");
   const double whole = s.area + s.opening_area;
@@ -297,8 +297,8 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
        cells, 2 * needed * s.size, s.size);
 }
 
-void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells, bool settled,
-          double sampled, uint32_t empty, double thin, TetMesh &out) {
+void warn_filling(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells,
+                  bool volume_matched, double sampled, uint32_t empty, double thin, TetMesh &out) {
   const double cube = s.size * s.size * s.size, unit = kLatticeCell * half_pitch * half_pitch * half_pitch;
   if (!s.closed)
     out.warnings.push_back(
@@ -306,7 +306,7 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
                "%% of its area, the box of the widest with a diagonal of %.3g m; the filling closes them",
                s.openings, s.openings == 1 ? "" : "s", s.opening_area * s.size * s.size,
                100 * s.opening_area / (s.area + s.opening_area), s.opening_width * s.size));
-  if (s.closed && !settled)
+  if (s.closed && !volume_matched)
     out.warnings.push_back(
         format("the triangles sum up to a volume of %.6g m3, but %.6g m3 lie inside: the surface crosses "
                "itself, and a volume enclosed twice counts once",
@@ -319,7 +319,7 @@ void tell(const FillSurface &s, const Filling &f, double half_pitch, uint32_t ce
     out.warnings.push_back(
         format("%zu cells instead of %u: this is the nearest number that the lattice gives for this surface",
                f.size(), cells));
-  if (thin > kTellThin)
+  if (thin > kWarnThin)
     out.warnings.push_back(format(
         "%.0f %% of the material is in parts thinner than half a cell, which are at least four times too "
         "stiff in bending: ask for more cells than %u, or give a mesh with tetrahedra",
@@ -338,7 +338,7 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
   const FillShares shares = sample_shares(s, covered, lattice);
   Filling f = arrange(s, covered, shares);
   const double sampled = sum(f.share);
-  const bool settled = s.closed && s.volume > 0 && settle(f, s.volume / unit, shares.piece);
+  const bool volume_matched = s.closed && s.volume > 0 && match_volume(f, s.volume / unit, shares.piece);
   number_points(s.memory, f);
   const uint32_t empty = drop_empty_pieces(s.memory, f);
   if (f.size() == 0)
@@ -359,7 +359,7 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
   out.share = std::move(f.share);
   out.tet_group.assign(out.ntet(), kNoGroup);
   for (uint32_t i = 0; i < out.npoint(); ++i) out.file_point.push_back(i);
-  tell(s, f, half_pitch, cells, settled, sampled, empty, thin, out);
+  warn_filling(s, f, half_pitch, cells, volume_matched, sampled, empty, thin, out);
   return out;
 }
 

@@ -15,7 +15,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kSettled = 0.25;  // a winding number farther than this from 1/2 is decided
+constexpr double kDecided = 0.25;  // a winding number farther than this from 1/2 is decided
 
 Vec3 middle_of(const TriMesh &surface, double *size, double *reach) {
   Extent box;
@@ -222,7 +222,7 @@ FillCover cover(const FillSurface &surface, const Lattice &lattice, uint32_t lim
     if (!surely_inside) {
       const double w = surface.winding.at(lattice.to_box(0.5 * place_of(unpack(key))));
       kind = w > 0.5 ? LatticeCell::inside : LatticeCell::outside;
-      if (!surface.closed && std::fabs(w - 0.5) < kSettled) kind = LatticeCell::mixed;
+      if (!surface.closed && std::fabs(w - 0.5) < kDecided) kind = LatticeCell::mixed;
     }
     out.kind.push_back(kind);
     out.kept += kind != LatticeCell::outside;

@@ -168,10 +168,10 @@ void sort_groups(RawMesh &raw, TetMesh &mesh) {
 
 // Shares are used only if there is one for each cell, all in (0,1]; otherwise the array means something else.
 void take_shares(RawMesh &raw, TetMesh &mesh) {
-  const bool sound =
+  const bool valid =
       raw.tet_share.size() == raw.ntet() &&
       std::all_of(raw.tet_share.begin(), raw.tet_share.end(), [](double s) { return s > 0 && s <= 1; });
-  if (sound) mesh.share = std::move(raw.tet_share);
+  if (valid) mesh.share = std::move(raw.tet_share);
   if (raw.cell == DFM_CELL_HEX8 && raw.inside.size() == raw.cells.size() / 8 * kInsidePoints)
     mesh.inside = std::move(raw.inside);
 }

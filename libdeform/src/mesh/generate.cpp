@@ -115,10 +115,10 @@ Grid choose_grid(const double size[3], uint32_t cells, double each) {
     for (int up = 0; up < 8; ++up) {
       Grid g{};
       for (int k = 0; k < 3; ++k)
-        g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMostCells)));
+        g.n[k] = uint32_t(std::clamp(std::floor(size[k] / edge) + (up >> k & 1), 1.0, double(kMaxCells)));
       const double count = double(g.n[0]) * g.n[1] * g.n[2];
       const double h[3] = {size[0] / g.n[0], size[1] / g.n[1], size[2] / g.n[2]};
-      if (count > kMostCells / each) continue;
+      if (count > kMaxCells / each) continue;
       best.offer(choice_score(std::max({h[0], h[1], h[2]}) / std::min({h[0], h[1], h[2]}), count, cubes), g);
     }
   const uint32_t *const n = best.choice.n;
@@ -259,9 +259,9 @@ struct Disc {  // triangular lattice in rings
 std::array<uint32_t, 2> choose_rings(double radius, double length, uint32_t cells) {
   Best<std::array<uint32_t, 2>> best{{1, 1}};
   for (uint32_t n = 1; n == 1 || 18.0 * n * n <= std::max(4.0 * cells, 2e5); ++n) {
-    const double asked = cells / (18.0 * n * n), even = length * n / radius;
-    for (const double wanted : {asked, even, std::clamp(asked, even / 2, 2 * even)}) {
-      if (wanted > kMostCells / (18.0 * n * n)) continue;
+    const double requested = cells / (18.0 * n * n), even = length * n / radius;
+    for (const double wanted : {requested, even, std::clamp(requested, even / 2, 2 * even)}) {
+      if (wanted > kMaxCells / (18.0 * n * n)) continue;
       const uint32_t m = rounded(wanted);
       best.offer(choice_score(apart(length / m, radius / n), 18.0 * n * n * m, cells), {n, m});
     }

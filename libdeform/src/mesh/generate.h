@@ -10,7 +10,7 @@
 
 namespace dfm {
 
-inline constexpr uint32_t kMostCells = 100'000'000;
+inline constexpr uint32_t kMaxCells = 100'000'000;
 inline constexpr double kTwoPi = 6.2831853071795864769, kSixth = 1.0471975511965977462;  // of a turn, pi/3
 // rows of the triangular lattice lie sqrt(3)/2 edges apart
 inline constexpr double kRow = 0.86602540378443864676;
@@ -20,7 +20,7 @@ inline void check_size(const char *what, double size) {
     fail(DFM_E_ARG, "the %s is %g m; expected a finite length above 0", what, size);
 }
 inline void check_cells(uint32_t cells) {
-  if (cells < 1 || cells > kMostCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMostCells);
+  if (cells < 1 || cells > kMaxCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMaxCells);
 }
 inline void check_beam(double x, double y, double z) {
   check_size("beam's x size", x);
@@ -38,9 +38,9 @@ inline uint32_t rounded(double x) { return uint32_t(std::max(1.0, std::floor(x +
 inline double apart(double a, double b) { return std::max(a, b) / std::min(a, b); }
 // The cost of a choice of counts, 1 at best: weighs elongated cells (cheap up to 2:1; beyond that they spoil
 // the mesh, and more cells are made instead) against a number of cells far from the requested one.
-inline double choice_score(double elongation, double count, double asked) {
+inline double choice_score(double elongation, double count, double requested) {
   const double excess = std::max(1.0, elongation / 2);
-  return std::sqrt(elongation) * excess * excess * excess * apart(count, asked);
+  return std::sqrt(elongation) * excess * excess * excess * apart(count, requested);
 }
 // The choice of the lowest score, the first of equal ones.
 template <class T>
@@ -54,12 +54,12 @@ struct Best {
   }
 };
 // The number of cells may exceed the requested one only up to a limit.
-inline void check_choice(const char *shape, double count, uint32_t asked) {
-  if (count > 100.0 * std::max(asked, 100u))
+inline void check_choice(const char *shape, double count, uint32_t requested) {
+  if (count > 100.0 * std::max(requested, 100u))
     fail(DFM_E_ARG,
          "a %s of these proportions needs about %.2g cells to keep them in shape, %u were asked for; ask for "
          "more, or give sizes nearer to each other",
-         shape, count, asked);
+         shape, count, requested);
 }
 
 // sin and cos on [0, pi/3] by their series: libm's bits depend on the processor.

@@ -39,8 +39,8 @@ class Soup {
 };
 
 void check_triangles(uint32_t triangles) {
-  if (triangles < 1 || triangles > kMostCells)
-    fail(DFM_E_ARG, "the number of triangles is %u; expected 1 to %u", triangles, kMostCells);
+  if (triangles < 1 || triangles > kMaxCells)
+    fail(DFM_E_ARG, "the number of triangles is %u; expected 1 to %u", triangles, kMaxCells);
 }
 
 // Two annuli of triangular lattice at heights 0 and `length`.

@@ -6,7 +6,7 @@
 namespace dfm {
 namespace {
 
-constexpr double kMostElongated = 20;  // beyond it cells are all but flat
+constexpr double kMaxElongated = 20;  // beyond it cells are all but flat
 
 struct Tube { uint32_t around, across, along; };
 
@@ -25,7 +25,7 @@ Tube choose(double inner, double outer, double length, uint32_t cells) {
       const uint32_t around = 3 * rounded(std::min(1e7, round / edge / 3));
       const double h = round / around;
       for (const double wanted : {cells / (6.0 * across * around), length / h}) {
-        if (wanted * across * around > kMostCells / 6) continue;
+        if (wanted * across * around > kMaxCells / 6) continue;
         const uint32_t along = rounded(wanted);
         const double layer = length / along;
         const double longer = std::max({h, row, layer}) / std::min({h, row, layer});
@@ -37,7 +37,7 @@ Tube choose(double inner, double outer, double length, uint32_t cells) {
   const auto &[tube, elongation] = best.choice;
   check_choice("tube", best.score < HUGE_VAL ? 6.0 * tube.around * tube.across * tube.along : HUGE_VAL,
                cells);
-  if (elongation > kMostElongated) check_choice("tube", 6 * (round / wall) * (length / wall), 0);
+  if (elongation > kMaxElongated) check_choice("tube", 6 * (round / wall) * (length / wall), 0);
   return tube;
 }
 

@@ -7,7 +7,7 @@
 // lattice, its moments up to the second, and its energy are those of the inside of the surface to rounding.
 //
 // Cells with little material. Far corners of such a cell have next to no stiffness. So a cell with less than
-// kLeastPart of the material of its fullest neighbor is left out, and its material moves with that neighbor,
+// kMinPart of the material of its fullest neighbor is left out, and its material moves with that neighbor,
 // whose shape functions go on beyond its borders (S. Badia, F. Verdugo, A. F. Martin, The aggregated unfitted
 // finite element method for elliptic problems, Comput. Methods Appl. Mech. Engng 336, 2018). A larger part
 // makes bars askew to the grid too soft, a smaller one too stiff: one to four cells across, in eight
@@ -29,9 +29,9 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostCells = 1'000'000;
+constexpr uint32_t kMaxCells = 1'000'000;
 constexpr uint64_t kBytesPerCell = 600;
-constexpr double kLeastPart = 0.15;
+constexpr double kMinPart = 0.15;
 constexpr double kNothing = 1e-12;  // of a cell, by rounding
 constexpr double kTwice = 1e-6;     // beyond a whole cell: the surface crosses itself
 constexpr int kTries = 10;
@@ -226,12 +226,12 @@ Grid grid_of(const Extent &box, double size) {
     g.lo[k] = box.lo[k];
     g.hi[k] = box.hi[k];
     const double n = std::max(1.0, std::round((g.hi[k] - g.lo[k]) / size));
-    g.n[k] = uint32_t(std::min(n, 1.0 * kMostCells));
+    g.n[k] = uint32_t(std::min(n, 1.0 * kMaxCells));
     g.edge[k] = (g.hi[k] - g.lo[k]) / n;
   }
-  if (all > kMostCells)
+  if (all > kMaxCells)
     fail(DFM_E_ARG, "cells of %g m are %.3g in the box of the surface, %g x %g x %g m; at most %u are made",
-         size, all, g.hi[0] - g.lo[0], g.hi[1] - g.lo[1], g.hi[2] - g.lo[2], kMostCells);
+         size, all, g.hi[0] - g.lo[0], g.hi[1] - g.lo[1], g.hi[2] - g.lo[2], kMaxCells);
   return g;
 }
 
@@ -341,7 +341,7 @@ void give_away(Lattice &l) {
     l.root[c] = uint32_t(c);
     for (const bool faces : {true, false}) {
       const size_t to = fullest(l, c, faces);
-      if (l.root[c] == c && l.part(c) < kLeastPart * l.part(to)) l.root[c] = uint32_t(to);
+      if (l.root[c] == c && l.part(c) < kMinPart * l.part(to)) l.root[c] = uint32_t(to);
     }
     l.kept += l.root[c] == c;
   }
@@ -384,7 +384,7 @@ Lattice seek(const TriMesh &surface, const Extent &box, double volume, uint32_t 
   uint32_t before[3] = {};
   for (int tries = 0; tries < kTries && apart > 0; ++tries) {
     // of a thin shape that lies askew most of the box is empty
-    while (cells_in(box, size) > kMostCells) size *= 1.1;
+    while (cells_in(box, size) > kMaxCells) size *= 1.1;
     const Grid grid = grid_of(box, std::min(size, box.longest()));
     if (std::equal(grid.n, grid.n + 3, before)) break;
     std::copy_n(grid.n, 3, before);
@@ -399,10 +399,10 @@ Lattice seek(const TriMesh &surface, const Extent &box, double volume, uint32_t 
 }
 
 void refuse_unfit(const TriMesh &surface, const Extent &box, uint32_t cells, double size) {
-  if ((cells != 0) == (size != 0) || !(size >= 0 && size < HUGE_VAL) || cells > kMostCells)
+  if ((cells != 0) == (size != 0) || !(size >= 0 && size < HUGE_VAL) || cells > kMaxCells)
     fail(DFM_E_ARG,
          "a lattice has either a number of cells, 1 to %u, or their size in m, above 0; found %u and %g",
-         kMostCells, cells, size);
+         kMaxCells, cells, size);
   const dfm_trimesh_info s = mesh_statistics(surface);
   if (!s.closed)
     fail(DFM_E_FORMAT,

@@ -13,7 +13,7 @@ namespace {
 
 constexpr uint32_t kMaxGroups = 1u << 16;  // limit on the number of names of a file
 // Corners of a polygon up to which its ears are looked for, which takes the cube of them at worst.
-constexpr size_t kMostEars = 512;
+constexpr size_t kMaxEars = 512;
 constexpr double kRounding = 1e-12;  // of areas, of the polygon's
 
 // Whether a triangle of the fan about the first corner is inverted. Needs no memory; called for every polygon
@@ -140,7 +140,7 @@ void RawMesh::add_polygon(const Cursor &at, const uint32_t *corners, size_t n, u
     std::rotate_copy(corners, std::min_element(corners, corners + 4), corners + 4, quad);
     corners = quad;
   }
-  const bool small = n > 3 && n <= kMostEars && std::all_of(corners, corners + n, known);
+  const bool small = n > 3 && n <= kMaxEars && std::all_of(corners, corners + n, known);
   if (small && fan_folds(points, corners, n)) Outline(*memory, points, corners, n).cut(add);
   else
     for (size_t k = 2; k < n; ++k) add(corners[0], corners[k - 1], corners[k]);

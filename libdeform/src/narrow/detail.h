@@ -27,7 +27,7 @@ constexpr double kParallel = 1e-3;
 constexpr double kPast = 0.25;
 // of the rest offset: what a face's inside is nearer to voxels than its corners by less is left
 // to the corners
-constexpr double kLeastDip = 0.1;
+constexpr double kMinDip = 0.1;
 // share of an edge next to its ends that is left to vertex-face contacts: no longer than the default d_c
 constexpr double kEnd = 1e-3;
 
@@ -151,7 +151,7 @@ struct EdgeFaces {
   }
   // Not into the body. At a rim, which has one face only, other bodies may come from the side, along the
   // face.
-  bool leaves(Vec3 n, double slack) const { return dot(n, outward()) > -slack; }
+  bool is_outward(Vec3 n, double slack) const { return dot(n, outward()) > -slack; }
 };
 EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);

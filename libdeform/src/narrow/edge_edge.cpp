@@ -49,7 +49,7 @@ namespace {
 
 // Of the rest distance: with the depth that a contact may keep before it opens at once (contact/rows.cpp), it
 // stays above the distance at which the guard acts, half of the rest distance.
-constexpr double kGive = 0.3;
+constexpr double kIndentation = 0.3;
 
 // Does a vertex this near an edge make a contact of its own there: over one of the edge's faces, or off the
 // edge in the vertex's cone of normals?
@@ -83,9 +83,9 @@ double rise(const EdgeFaces &faces, Vec3 outward, Vec3 across, double length) {
 // rims hold the surfaces apart, and the crossing only repeats them. Not so where both edges are rims, nor
 // where it replaces the contact of a surfel (doc/decisions/contact_problem.md). Faces of a cut touch at the
 // rest distance of their surfaces, which were set back, and must not come nearer.
-double give(const Surface &sa, const Surface &sb, double rise_a, double rise_b, double offset) {
+double indentation(const Surface &sa, const Surface &sb, double rise_a, double rise_b, double offset) {
   if (sa.back > 0 || sb.back > 0) return 0;
-  return kGive * offset * std::clamp(2 - std::min(rise_a, rise_b) / offset, 0.0, 1.0);
+  return kIndentation * offset * std::clamp(2 - std::min(rise_a, rise_b) / offset, 0.0, 1.0);
 }
 
 }  // namespace
@@ -156,7 +156,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const double slack = kCone + std::min(0.3, reach / std::sqrt(std::min(uu, ww)));
     if (!fb.leans_out(normal, slack) || !fa.leans_out(-normal, slack)) continue;
     // Faces that look the same way do not press on each other.
-    if (!fb.leaves(normal, slack) || !fa.leaves(-normal, slack)) continue;
+    if (!fb.is_outward(normal, slack) || !fa.is_outward(-normal, slack)) continue;
     if (place_a != kBetween && end_touches(sa, ea[place_a], q0, q0 + w, fb)) continue;
     if (place_b != kBetween && end_touches(sb, eb[place_b], p0, p0 + u, fa)) continue;
     const double edge_s = s / nn, edge_t = t / nn;
@@ -168,8 +168,8 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     place(c, p0 + edge_s * u, q0 + edge_t * w, normal, distance);
     if (!rests(pair, reach, c)) continue;
     if (!replaces_end(sa, ea, edge_s, q0, q0 + w, fb) && !replaces_end(sb, eb, edge_t, p0, p0 + u, fa))
-      c.give = give(sa, sb, rise(fa, -normal, fb.along, std::sqrt(ww)),
-                    rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);
+      c.indentation = indentation(sa, sb, rise(fa, -normal, fb.along, std::sqrt(ww)),
+                                  rise(fb, normal, fa.along, std::sqrt(uu)), pair.offset);
     out.push_back(c);
   }
   name_contacts(pair, begin, out);

@@ -25,8 +25,8 @@ std::span<const Crossing> of_pair(std::span<const Crossing> all, uint64_t id_a, 
 using Owners = std::span<const ContactPoint>;
 
 // An edge or triangle contact takes the area of the nearest of its corners without a contact with the other
-// side; no area is given twice; 0 if none is free (doc/concepts/detection.md). lender: the node that gave its
-// area.
+// side; no area is given twice; 0 if none is free (doc/concepts/detection.md). area_node_plus_1: that node
+// plus 1.
 class Areas {
  public:
   Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
@@ -90,26 +90,27 @@ class Areas {
     for (size_t i = begin; i < end; ++i) {
       ContactPoint &c = contacts_[i];
       double nearest = 0;
-      const BodyView *lender = nullptr;
+      const BodyView *area_body = nullptr;
       for (int k = 0; k < c.nnode; ++k) {
         if (lent_[c.node[k]]) continue;
         const BodyView &own = c.node[k] - a.first_node < a.surface->nsurfel ? a : *b;
         const uint32_t surfel = c.node[k] - own.first_node;
         const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
-        if (lender && !(d2 < nearest)) continue;
+        if (area_body && !(d2 < nearest)) continue;
         nearest = d2;
-        lender = &own;
-        c.lender = c.node[k] + 1;
+        area_body = &own;
+        c.area_node_plus_1 = c.node[k] + 1;
       }
-      if (!lender) continue;
-      const Vec3 out = lender == &a ? -load3(c.normal) : load3(c.normal);
-      c.area = facing_area(*lender->surface, c.lender - 1 - lender->first_node, out) * (b ? 0.5 : 1.0);
-      lent_[c.lender - 1] = 1;
+      if (!area_body) continue;
+      const Vec3 out = area_body == &a ? -load3(c.normal) : load3(c.normal);
+      c.area = facing_area(*area_body->surface, c.area_node_plus_1 - 1 - area_body->first_node, out) *
+               (b ? 0.5 : 1.0);
+      lent_[c.area_node_plus_1 - 1] = 1;
     }
     mark(a, of_a, 0);
     if (b) mark(*b, of_b, 0);
     for (size_t i = begin; i < end; ++i)
-      if (contacts_[i].lender) lent_[contacts_[i].lender - 1] = 0;
+      if (contacts_[i].area_node_plus_1) lent_[contacts_[i].area_node_plus_1 - 1] = 0;
   }
 
   std::span<const BodyView> bodies_;
@@ -171,7 +172,7 @@ constexpr size_t kBlock = 96;
 }  // namespace
 
 NarrowBlocks::NarrowBlocks(const Memory &m)
-    : memory_(&m), pieces_(HookAllocator<Piece>(m)), speed_(HookAllocator<double>(m)) {}
+    : memory_(&m), ranges_(HookAllocator<Range>(m)), speed_(HookAllocator<double>(m)) {}
 
 double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
   if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
@@ -185,11 +186,11 @@ void NarrowBlocks::add(const Array<Candidate> &list, size_t begin, size_t end, d
   if (!first.obstacle)
     for (size_t at = begin + kBlock; at < end; ++at)
       if (list[at].feature_a != list[at - 1].feature_a) {
-        pieces_.push_back({begin, at, speed});
+        ranges_.push_back({begin, at, speed});
         begin = at;
         at += kBlock - 1;
       }
-  pieces_.push_back({begin, end, speed});
+  ranges_.push_back({begin, end, speed});
 }
 
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,

@@ -26,10 +26,10 @@ namespace dfm {
 class NarrowBlocks {
  public:
   explicit NarrowBlocks(const Memory &memory);
-  void start() { pieces_.clear(); }
-  // m/s, bound over the surfels of body view i: set by tell_speed() since the last find_contacts(), or
+  void start() { ranges_.clear(); }
+  // m/s, bound over the surfels of body view i: set by set_speed() since the last find_contacts(), or
   // computed once in it.
-  void tell_speed(std::span<const BodyView> bodies, size_t i, double speed) {
+  void set_speed(std::span<const BodyView> bodies, size_t i, double speed) {
     if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);
     speed_[i] = speed;
   }
@@ -41,22 +41,22 @@ class NarrowBlocks {
   // memory.
   template <class Find>
   void run(Tasks &tasks, const Array<Candidate> &list, const Find &find, Array<ContactPoint> &out) {
-    while (found_.size() < pieces_.size()) found_.emplace_back(HookAllocator<ContactPoint>(*memory_));
-    each_on(&tasks, pieces_.size(), 1, [&](size_t k) {
+    while (found_.size() < ranges_.size()) found_.emplace_back(HookAllocator<ContactPoint>(*memory_));
+    each_on(&tasks, ranges_.size(), 1, [&](size_t k) {
       found_[k].clear();
-      const Piece &p = pieces_[k];
+      const Range &p = ranges_[k];
       find(std::span(&list[p.begin], p.end - p.begin), p.speed, found_[k]);
     });
-    for (size_t k = 0; k < pieces_.size(); ++k) out.insert(out.end(), found_[k].begin(), found_[k].end());
+    for (size_t k = 0; k < ranges_.size(); ++k) out.insert(out.end(), found_[k].begin(), found_[k].end());
   }
 
  private:
-  struct Piece {
+  struct Range {
     size_t begin, end;
     double speed;  // m/s, bound over body b's surfels
   };
   const Memory *memory_;
-  Array<Piece> pieces_;
+  Array<Range> ranges_;
   Array<double> speed_;
   std::vector<Array<ContactPoint>> found_;  // by piece
 };

@@ -158,7 +158,7 @@ constexpr uint32_t kFaces = 32;
 constexpr int kPlaces = 8;
 
 // The lowest place of a smooth surface over one of its edges or triangles is a contact where it lies below
-// the edge's ends, or the triangle's border, by more than kLeastDip. find(heights, u, border): whether there
+// the edge's ends, or the triangle's border, by more than kMinDip. find(heights, u, border): whether there
 // is one, which may lie beyond the border, and the lowest height of the border.
 template <class Find>
 bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t feature, Find &&find,
@@ -181,7 +181,7 @@ bool touch_bulge(const Pair &pair, const Patch &patch, uint8_t type, uint32_t fe
     }
     double border;
     if (!find(heights, u, border)) return false;
-    touches = in_triangle(u) && heights.at(u) < border - kLeastDip * pair.offset;
+    touches = in_triangle(u) && heights.at(u) < border - kMinDip * pair.offset;
     double sum = 0;
     for (double &part : u) sum += part = std::max(part, 0.0);
     for (double &part : u) part /= sum;

@@ -192,7 +192,7 @@ struct Self {
   bool held(const Kin &k) const;
   double rests_at(const Kin &k, double set_back) const;
   void keep_shallow(size_t begin);
-  bool yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
+  bool defers_to(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const;
   bool minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   Vec3 outward(uint32_t surfel, uint32_t t, const TrianglePoint &at) const;
   // Opened: the body has open faces. Then `kept` is the state of the pair at rest, stored here once.
@@ -209,7 +209,7 @@ struct Self {
 
 // Whether t leaves the feature that it shares with `other` to it, because p belongs to `other`, or is nearer
 // to it, or over its face, or because `other` comes first.
-bool Self::yields(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const {
+bool Self::defers_to(uint32_t t, double distance2, uint32_t other, uint32_t surfel) const {
   if (has(other, surfel)) return true;
   const TrianglePoint o = closest(other, x(surfel));
   if (o.distance2 < distance2 * (1 - kNearer)) return true;
@@ -222,11 +222,11 @@ bool Self::minimum(uint32_t surfel, uint32_t t, const TrianglePoint &at) const {
   if (f < 4) {
     const uint32_t *const sides = &s.edge_tri[2 * size_t{s.tri_edge[3 * size_t{t} + size_t(f - 1)]}];
     const uint32_t beyond = sides[0] == t ? sides[1] : sides[0];
-    return beyond == kNone || !yields(t, at.distance2, beyond, surfel);
+    return beyond == kNone || !defers_to(t, at.distance2, beyond, surfel);
   }
   const uint32_t corner = corners(t)[f - 4];
   for (uint32_t k = s.fan_begin[corner]; k < s.fan_begin[corner + 1]; ++k)
-    if (s.fan[k] != t && yields(t, at.distance2, s.fan[k], surfel)) return false;
+    if (s.fan[k] != t && defers_to(t, at.distance2, s.fan[k], surfel)) return false;
   return true;
 }
 
@@ -447,12 +447,12 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
     for (int k = 0; k < c.nnode; ++k) {
       const uint32_t surfel = c.node[k] - body.first_node;
       const double d2 = norm2(x(surfel) - load3(c.point));
-      if (lent[surfel] || (c.lender && !(d2 < nearest))) continue;
+      if (lent[surfel] || (c.area_node_plus_1 && !(d2 < nearest))) continue;
       nearest = d2;
-      c.lender = c.node[k] + 1;
+      c.area_node_plus_1 = c.node[k] + 1;
       c.area = 0.5 * facing_area(s, surfel, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal));
     }
-    if (c.lender) lent[c.lender - 1 - body.first_node] = 1;
+    if (c.area_node_plus_1) lent[c.area_node_plus_1 - 1 - body.first_node] = 1;
   }
 }
 

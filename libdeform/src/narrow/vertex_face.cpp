@@ -19,8 +19,8 @@
 namespace dfm::narrow {
 namespace {
 
-constexpr uint32_t kMost = 96;  // triangles kept per surfel; beyond that the nearest ones
-constexpr int kWalk = 8;        // triangles around a corner, seldom more, from an edge to where p is
+constexpr uint32_t kMax = 96;  // triangles kept per surfel; beyond that the nearest ones
+constexpr int kWalk = 8;       // triangles around a corner, seldom more, from an edge to where p is
 constexpr double kLoose = 1 + 1e-9;
 // relative: a triangle beside the feature counts as nearer only beyond this
 constexpr double kNearer = 1e-9;
@@ -41,7 +41,7 @@ struct Group {
   double depth;  // m, recovery
   uint32_t surfel = 0, count = 0;
   Vec3 p;
-  Near near[kMost];
+  Near near[kMax];
 
   explicit Group(const Pair &of) : pair(of), depth(recovery_depth(*of.b->surface)) {}
 
@@ -67,7 +67,7 @@ struct Group {
 // Place for a new entry; where all are taken (a surface folded onto itself), that of the farthest, or null.
 // The order of triangles stays.
 Near *place_for(Near *near, uint32_t &count, double distance) {
-  if (count < kMost) return &near[count++];
+  if (count < kMax) return &near[count++];
   uint32_t far = 0;
   for (uint32_t i = 1; i < count; ++i)
     if (near[i].distance >= near[far].distance) far = i;

@@ -84,7 +84,7 @@ bool dips(const VoxelGrid &grid, const Vec3 x[3], double most, double dip, doubl
 void voxel_triangle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const ObstacleShape &shape = *pair.shape;
   const ObstacleView &view = shape.view();
-  const double dip = kLeastDip * pair.offset;
+  const double dip = kMinDip * pair.offset;
   const double widest =
       contact_reach(pair.h, pair.offset,
                     largest_speed(*pair.a.surface) + norm(view.velocity) + norm(view.spin) * view.extent);

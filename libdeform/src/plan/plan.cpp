@@ -16,7 +16,7 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
   };
   std::vector<std::string> names;
   if (f.effects_listed) {
-    names = f.asked;
+    names = f.requested;
   } else {
     for (const auto &p : f.offered) names.push_back(p.effect);
     std::sort(names.begin(), names.end());
@@ -42,13 +42,13 @@ void plan_effects(const SceneFacts &f, Plan &plan) {
   }
   const auto listed = [&](const PlannedEffect &e) { return e.name == kSelfContact; };
   if (f.self_bodies == 0 || std::any_of(plan.effects.begin(), plan.effects.end(), listed)) return;
-  const std::string by = self_asked_by(f);
+  const std::string by = self_requested_by(f);
   plan.effects.push_back({kSelfContact, by.empty() ? "contact.filter" : by, "contact"});
 }
 
-std::string self_asked_by(const SceneFacts &f) {
+std::string self_requested_by(const SceneFacts &f) {
   const auto listed = [&](const std::string &name) {
-    return std::find(f.asked.begin(), f.asked.end(), name) != f.asked.end();
+    return std::find(f.requested.begin(), f.requested.end(), name) != f.requested.end();
   };
   if (f.effects_listed && listed(kSelfContact)) return "effects";
   if (f.self) return "contact.self";

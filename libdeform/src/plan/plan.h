@@ -13,11 +13,11 @@ namespace dfm {
 // Functions of stages on which other stages depend; most stages have none.
 enum class StageRole {
   none,
-  lists_pairs,     // candidates of pairs, and how fast surfaces are
-  finds_contacts,  // contacts of pairs
-  solves,          // contacts act on bodies
-  gives_impulses,  // as impulses on points
-  guards,          // nothing crosses at the end of the sub-step
+  lists_pairs,       // candidates of pairs, and how fast surfaces are
+  finds_contacts,    // contacts of pairs
+  solves,            // contacts act on bodies
+  reports_impulses,  // as impulses on points
+  guards,            // nothing crosses at the end of the sub-step
 };
 
 // Motions and loads that are given over time.
@@ -52,7 +52,7 @@ struct SceneFacts : Varying {
   bool self = false, self_auto = false;  // contact.self
   unsigned self_bodies = 0;              // bodies that may touch themselves, filters applied
   bool self_cut = false;                 // one of them because it has been cut
-  std::vector<std::string> asked;        // where listed
+  std::vector<std::string> requested;    // where listed
   bool operator==(const SceneFacts &) const = default;
 };
 
@@ -85,7 +85,7 @@ struct PlannedStage {
   std::string why;
 };
 struct AbsentStage { std::string name, why; };
-struct PlannedEffect { std::string name, asked_by, provided_by; };
+struct PlannedEffect { std::string name, requested_by, provided_by; };
 
 struct Plan {
   std::vector<PlannedStage> stages;  // in the order of a sub-step
@@ -98,7 +98,7 @@ struct Plan {
 
 inline constexpr char kSelfAuto[] = "contact.self auto";
 // What calls for self contact: "contact.self", "effects", or the effect that needs it; "" if nothing does.
-std::string self_asked_by(const SceneFacts &facts);
+std::string self_requested_by(const SceneFacts &facts);
 
 // The effects. Throws Error(DFM_E_ARG) if nothing in the scene provides a listed one; names what could.
 void plan_effects(const SceneFacts &facts, Plan &plan);

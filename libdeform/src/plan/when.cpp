@@ -85,7 +85,7 @@ StageChoice broad(const SceneFacts &f) { return of_pairs(f); }
 StageChoice narrow(const SceneFacts &f) { return of_pairs(f); }
 
 StageChoice self(const SceneFacts &f) {
-  const std::string by = self_asked_by(f);
+  const std::string by = self_requested_by(f);
   if (f.self_bodies)
     return runs(count(f.self_bodies, "body", "bodies") + " may touch themselves (" +
                 (by.empty() ? "contact.filter" : by) + ")" +

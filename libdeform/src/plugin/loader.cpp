@@ -84,12 +84,12 @@ class Visit {
         file_(file),
         locale_(std::setlocale(LC_NUMERIC, nullptr)),
         boundary_(file.c_str(), "load") {}
-  ~Visit() { put_back(); }
+  ~Visit() { restore_environment(); }
   Visit(const Visit &) = delete;
   // Says so, too, where something was changed.
   void end() {
     char sentence[1024];
-    const char *changed = put_back();
+    const char *changed = restore_environment();
     if (!changed) return;
     std::snprintf(sentence, sizeof sentence,
                   "%s: loading it changed %s, which was restored; a plugin must leave it unchanged",
@@ -98,7 +98,7 @@ class Visit {
   }
 
  private:
-  const char *put_back() noexcept {
+  const char *restore_environment() noexcept {
     const char *changed = boundary_.restore();
     if (locale_ != std::setlocale(LC_NUMERIC, nullptr)) {
       std::setlocale(LC_NUMERIC, locale_.c_str());
@@ -259,10 +259,10 @@ std::vector<const dfm_type *> Loader::types_of(const std::string &path) const {
   return out;
 }
 
-void Loader::scan_if_there(const std::string &directory, bool asked_for) {
+void Loader::scan_if_there(const std::string &directory, bool must_exist) {
   if (directory.empty()) return;
   if (!is_directory(directory)) {
-    if (asked_for)
+    if (must_exist)
       registry_.pass_over(directory, "named in DEFORM_PLUGIN_PATH, but there is no such directory");
     return;
   }

@@ -44,7 +44,7 @@ class Loader {
   const Module *loaded_from(uint64_t device, uint64_t inode) const;  // null: no module
   void keep(Module &&module, const dfm_plugin &plugin);
   void enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin);
-  void scan_if_there(const std::string &directory, bool asked_for);
+  void scan_if_there(const std::string &directory, bool must_exist);
   Registry &registry_;
   const dfm_host &host_;
   std::vector<Module> modules_;

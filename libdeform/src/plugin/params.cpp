@@ -27,7 +27,7 @@ std::vector<std::string> keys_of(const dfm_type &type) {
   return keys;
 }
 
-bool stands_for(const dfm_type &type, const char *given, const char *row) {
+bool names_param(const dfm_type &type, const char *given, const char *row) {
   return std::strcmp(given, "mu") == 0 && !find_row(type, "mu") &&
          (std::strcmp(row, "mu_C") == 0 || std::strcmp(row, "mu_S") == 0);
 }
@@ -37,7 +37,7 @@ void check_keys(const dfm_type &type, std::span<const dfm_param_value> given) {
     if (!given[i].key || !given[i].value)
       fail(DFM_E_ARG, "%s: parameter %zu has no %s", type.id, i, given[i].key ? "value" : "key");
     bool known = find_row(type, given[i].key) != nullptr;
-    for (uint32_t k = 0; k < type.nparam; ++k) known |= stands_for(type, given[i].key, type.params[k].key);
+    for (uint32_t k = 0; k < type.nparam; ++k) known |= names_param(type, given[i].key, type.params[k].key);
     if (!known) {
       const auto keys = keys_of(type);
       fail(DFM_E_ARG, "%s has no parameter \"%s\"%s; it has %s", type.id, given[i].key,
@@ -68,7 +68,7 @@ const dfm_param_value *choose(const dfm_type &type, const dfm_param &row,
   for (const auto &value : given)
     if (std::strcmp(value.key, row.key) == 0) return &value;
   for (const auto &value : given)
-    if (stands_for(type, value.key, row.key)) return &value;
+    if (names_param(type, value.key, row.key)) return &value;
   return fallback ? fallback(row.key) : nullptr;
 }
 

@@ -26,8 +26,8 @@ bool PluginSolver::direct() const { return ops_.flags & DFM_SOLVER_DIRECT; }
 void PluginSolver::analyse(const BlockPattern &pattern) {
   release();
   n_ = pattern.n;
-  const auto ask = [&] { return ops_.analyse(&host_, pattern.n, pattern.nb, pattern.ij, &self_); };
-  const dfm_status status = call_plugin(host_, type_, "analyse", ask);
+  const auto query = [&] { return ops_.analyse(&host_, pattern.n, pattern.nb, pattern.ij, &self_); };
+  const dfm_status status = call_plugin(host_, type_, "analyse", query);
   if (status == DFM_OK && self_) return;
   self_ = nullptr;  // a solver that fails has freed its data
   if (status == DFM_E_NOMEM)
@@ -42,8 +42,8 @@ bool PluginSolver::factor(const double *blk) {
 
 bool PluginSolver::solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) {
   info = {};
-  const auto ask = [&] { return ops_.solve(self_, nrhs, b, x, tolerance); };
-  return ready_ && call_plugin(host_, type_, "solve", ask) == DFM_OK;
+  const auto query = [&] { return ops_.solve(self_, nrhs, b, x, tolerance); };
+  return ready_ && call_plugin(host_, type_, "solve", query) == DFM_OK;
 }
 
 bool PluginSolver::restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,

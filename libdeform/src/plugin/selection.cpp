@@ -57,9 +57,9 @@ std::optional<SelectedLaw> plain_law(const Registry &registry, const dfm_type &t
 Selection::Selection(const char *const *list, const Registry &registry) : listed_(list != nullptr) {
   for (; list && *list; ++list) names_.push_back(*list);
   for (const char *need : kNeedSelf) folds_ = folds_ || lists(need);
-  rubs_ = lists(kMemory);
+  friction_on_ = lists(kMemory);
   for (const dfm_type *law : registry.list(DFM_KIND_FRICTION))
-    for (const std::string &word : effects(*law)) rubs_ = rubs_ || lists(word);
+    for (const std::string &word : effects(*law)) friction_on_ = friction_on_ || lists(word);
 }
 
 bool Selection::lists(const std::string &effect) const {

@@ -30,12 +30,13 @@ class Selection {
   bool listed() const { return listed_; }
   bool lists(const std::string &effect) const;  // by name
   bool wants(const std::string &effect) const {
-    return !listed_ || lists(effect) || (rubs_ && effect == kFriction) || (folds_ && effect == kSelfContact);
+    return !listed_ || lists(effect) || (friction_on_ && effect == kFriction) ||
+           (folds_ && effect == kSelfContact);
   }
   const std::vector<std::string> &names() const { return names_; }
 
  private:
-  bool listed_ = false, rubs_ = false, folds_ = false;
+  bool listed_ = false, friction_on_ = false, folds_ = false;
   std::vector<std::string> names_;
 };
 

@@ -57,7 +57,7 @@ bool meets_a_back(const dfm::Obstacle &o, Vec3 from, Vec3 d) {
 
 // Warns once per obstacle. An open mesh acts on the side that its triangles face; a file whose triangles face
 // the other way looks the same in a picture, and a body that falls on its back sticks to it.
-void tell_back_side(dfm_context *context, const World &world, Vec3 gravity) {
+void warn_back_side(dfm_context *context, const World &world, Vec3 gravity) {
   if (!(norm(gravity) > 0)) return;
   for (const auto &o : world.obstacles) {
     if (!o || !o->mesh || o->mesh->closed || o->sensor || o->rigid) continue;
@@ -93,7 +93,7 @@ double size_of_free(const dfm::Body &b) {
 // Explicit time cuts a step into stable sub-steps; implicit time takes it whole. A body that falls through
 // many of its own sizes in it is far inside of what it lands on, and the search for the moment of contact
 // takes most of the time. step: s, as the scene names it.
-void tell_long_step(dfm_context *context, const World &world, double step) {
+void warn_long_step(dfm_context *context, const World &world, double step) {
   const double g = norm(world.gravity.now), fall = 0.5 * g * step * step;
   if (!(fall > 0) || !world.plan.touches()) return;
   for (const auto &b : world.bodies) {
@@ -164,7 +164,7 @@ class Builder {
     create_world();
     for (Material &m : def_.materials) create_material(m);
     create_things();
-    tell_back_side(context_, world(), load3(def_.world.gravity));
+    warn_back_side(context_, world(), load3(def_.world.gravity));
     for (const Tool &t : def_.tools) set_cuts(t);
     for (Friction &f : def_.friction) add_friction(f);
     for (const Filter &f : def_.filters)
@@ -181,7 +181,7 @@ class Builder {
     def_.require(dfm_world_stable_step(world_, &step, nullptr, nullptr),
                  def_.effects_auto ? "/bodies" : "/effects");
     if (def_.equilibrium) with_pointer("/time/mode", [&] { check_equilibrium(world()); });
-    else if (def_.step > 0) tell_long_step(context_, world(), def_.step);
+    else if (def_.step > 0) warn_long_step(context_, world(), def_.step);
     // What a model that steps itself would refuse in the first step.
     for (const Body &b : def_.bodies)
       with_pointer(b.pointer + "/model", [&] { check_first_step(world(), *world().find_body(b.name)); });
@@ -435,7 +435,7 @@ class Builder {
       rule.otherwise = b.rule.far.view();
       def_.require(dfm_body_set_switch_rule(body, &rule), pointer);
     }
-    tell_idle_changes(resolve<dfm::Body>(Kind::body, body), pointer);
+    warn_idle_changes(resolve<dfm::Body>(Kind::body, body), pointer);
     if (!def_.equilibrium) return;
     with_pointer(pointer, [&] {
       dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
@@ -444,7 +444,7 @@ class Builder {
   }
 
   // Changes to the model that the body already has.
-  void tell_idle_changes(const dfm::Body &b, const std::string &pointer) const {
+  void warn_idle_changes(const dfm::Body &b, const std::string &pointer) const {
     const ModelChoice *last = nullptr;
     for (size_t i = 0; i < b.switches.size(); ++i) {
       const ModelChoice &to = b.switches[i].to;

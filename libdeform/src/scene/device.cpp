@@ -66,13 +66,13 @@ class Chooser {
       if (!b.device) continue;
       const dfm_type &own = *types_.find(DFM_KIND_MODEL, b.model);
       const dfm_type *const card = types_.on_card(own);
-      const bool asked = *b.device == "gpu";
+      const bool requested = *b.device == "gpu";
       std::string why = card ? "" : no_model(own);
-      if (card && !asked) why = slower_on(own, *card, i);
-      if (why.empty()) why = differs(b, own, *card, asked);
-      if (asked && !why.empty()) def_.refuse(b.pointer + "/device", why, DFM_E_UNSUPPORTED);
+      if (card && !requested) why = slower_on(own, *card, i);
+      if (why.empty()) why = differs(b, own, *card, requested);
+      if (requested && !why.empty()) def_.refuse(b.pointer + "/device", why, DFM_E_UNSUPPORTED);
       const bool on_card = why.empty();
-      if (on_card) why = asked ? "the scene asks for it" : faster_;
+      if (on_card) why = requested ? "the scene asks for it" : faster_;
       if (on_card) move(b, own, *card);
       tree_[json::json_pointer(b.pointer + "/device")] = on_card ? "gpu" : "cpu";
       out.push_back({{"name", b.name},
@@ -163,7 +163,7 @@ class Chooser {
           "%s is moved by symplectic_euler alone; leave \"integrator\" out, or take \"device\": \"cpu\"",
           name.c_str());
     Params left = left_for(b.params, own, card);
-    if (!any_driver) ask_for_hardware(card, left);
+    if (!any_driver) set_hardware(card, left);
     const std::vector<std::string> here = effects_of(context_, def_, b, own.id, b.params);
     std::vector<std::string> there;
     try {
@@ -181,7 +181,7 @@ class Chooser {
     return "";
   }
 
-  static void ask_for_hardware(const dfm_type &card, Params &params) {
+  static void set_hardware(const dfm_type &card, Params &params) {
     const dfm_param *const row = find_row(&card, "device");
     for (int k = 0; row && row->names && row->names[k]; ++k) {
       if (std::string_view(row->names[k]) != "hardware") continue;

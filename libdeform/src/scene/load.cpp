@@ -262,15 +262,15 @@ BodyMesh MeshFiles::load(const Body &b) {
     take_skin(surface(path_of(b.surface.mesh), where), b, where, out);
   } else if (out.filled) {
     take_skin(surface(path, pointer), b, pointer, out);
-    if (!out.wears_skin) tell_of_steps(b, out);
+    if (!out.wears_skin) warn_voxel_steps(b, out);
     split_skin(out);
   }
-  if (!whole && !made && !b.has_scale) tell_of_unit(b, out);
+  if (!whole && !made && !b.has_scale) warn_unit(b, out);
   return out;
 }
 
 // Files of triangles name no unit, and most programs that write them count in millimeters.
-void MeshFiles::tell_of_unit(const Body &b, const BodyMesh &mesh) const {
+void MeshFiles::warn_unit(const Body &b, const BodyMesh &mesh) const {
   double longest = 0;
   for (int k = 0; k < 3; ++k) longest = std::max(longest, mesh.hi[k] - mesh.lo[k]);
   if (longest > kLongestBody)
@@ -281,7 +281,7 @@ void MeshFiles::tell_of_unit(const Body &b, const BodyMesh &mesh) const {
 }
 
 // A cut needs the border of the cells as surface, which is not the shape that the file has.
-void MeshFiles::tell_of_steps(const Body &b, const BodyMesh &mesh) const {
+void MeshFiles::warn_voxel_steps(const Body &b, const BodyMesh &mesh) const {
   const dfm_tetmesh_info cells = info_of(mesh.handle, b.surface.pointer);
   double filled = 0;  // cells of the lattice are alike
   for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share_of(t);

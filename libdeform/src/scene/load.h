@@ -45,8 +45,8 @@ class MeshFiles {
   void check_keys(const Body &body, bool has_cells, bool filled) const;
   void take_cells(dfm_tetmesh mesh, const Body &body, BodyMesh &out) const;
   void split_skin(BodyMesh &out);
-  void tell_of_unit(const Body &b, const BodyMesh &mesh) const;
-  void tell_of_steps(const Body &body, const BodyMesh &mesh) const;
+  void warn_unit(const Body &b, const BodyMesh &mesh) const;
+  void warn_voxel_steps(const Body &body, const BodyMesh &mesh) const;
   void take_skin(dfm_trimesh mesh, const Body &body, const std::string &pointer, BodyMesh &out) const;
 
   dfm_context *context_;

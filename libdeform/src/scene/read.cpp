@@ -457,12 +457,12 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
     w.integrator = method == "implicit" ? DFM_INTEGRATOR_IMPLICIT_EULER : DFM_INTEGRATOR_SYMPLECTIC_EULER;
   w.sleep = contact.boolean("sleep", false);
   const bool self_given = contact.has("self");
-  const bool asked = listed(def.effects, "self_contact");
+  const bool requested = listed(def.effects, "self_contact");
   if (self_given && contact.value()["self"] == "auto") w.self_contact = DFM_SELF_AUTO;
   else if (self_given && !contact.value()["self"].is_boolean())
     contact.member("self").fail("expected true, false or \"auto\"");
-  else w.self_contact = contact.boolean("self", asked) ? DFM_SELF_ON : DFM_SELF_OFF;
-  if (self_given && w.self_contact != DFM_SELF_ON && asked)
+  else w.self_contact = contact.boolean("self", requested) ? DFM_SELF_ON : DFM_SELF_OFF;
+  if (self_given && w.self_contact != DFM_SELF_ON && requested)
     contact.member("self").fail(
         "\"self\" is not true, but /effects asks for \"self_contact\"; remove one of the two");
   if (contact.boolean("untangle", false)) w.flags |= DFM_WORLD_UNTANGLE;

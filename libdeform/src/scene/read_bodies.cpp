@@ -355,7 +355,7 @@ Body read_body(const Node &node, ReadContext &context) {
   for (const Node &entry : node.items("forces")) b.forces.push_back(read_force(entry));
   for (const Node &entry : node.items("springs")) b.springs.push_back(read_spring(entry));
   for (const Node &entry : node.items("attach")) b.attach.push_back(read_attach(entry));
-  b.def.mass_scaling = node.number("mass_scaling", 0.0, Range{0, kMostScaled, false, false});
+  b.def.mass_scaling = node.number("mass_scaling", 0.0, Range{0, kMaxScaled, false, false});
   b.def.smooth = node.number("smooth", 0.0, Range{0, 180, false, false});
   b.cut_delay = node.number("cut_delay", 0.0, kNotNegative);
   if (node.has("separate")) b.separate = read_separate(node.member("separate"));
@@ -414,7 +414,7 @@ Quat read_plane(const Node &node, dfm_obstacle_def &def) {
   return turn;
 }
 
-constexpr double kFewestVoxels = 64, kMostVoxels = 1 << 28;
+constexpr double kFewestVoxels = 64, kMaxVoxels = 1 << 28;
 
 }  // namespace
 
@@ -435,7 +435,7 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     turn = read_plane(node, o.def);
   } else if (of_triangles) {
     o.mesh = node.at("mesh").text();
-    if (node.has("cells")) o.def.cells = read_count(node.at("cells"), kFewestVoxels, kMostVoxels);
+    if (node.has("cells")) o.def.cells = read_count(node.at("cells"), kFewestVoxels, kMaxVoxels);
   } else {
     read_solid(node, shape, o.def);
   }

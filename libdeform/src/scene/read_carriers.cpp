@@ -12,8 +12,8 @@ namespace {
 
 constexpr char kPrefix[] = "anisotropy_";
 constexpr char kAxis[] = "anisotropy_axis";
-constexpr double kMostCells = 1e8;    // dfm_tetmesh_fill and dfm_body_create say the same of these two
-constexpr double kMostLattice = 1e6;  // dfm_tetmesh_lattice says the same
+constexpr double kMaxCells = 1e8;    // dfm_tetmesh_fill and dfm_body_create say the same of these two
+constexpr double kMaxLattice = 1e6;  // dfm_tetmesh_lattice says the same
 constexpr double kWidestSupport = 10;
 
 void read_fields(const Node &node, const dfm_type *model, Body &b) {
@@ -110,7 +110,7 @@ void read_lattice(const Node &node, Body &b) {
   node.object("lattice");
   if (node.has("cells") == node.has("size"))
     node.fail("expected either \"cells\", about how many, or \"size\", their edge in m");
-  if (node.has("cells")) b.lattice_cells = read_count(node.at("cells"), 1, kMostLattice);
+  if (node.has("cells")) b.lattice_cells = read_count(node.at("cells"), 1, kMaxLattice);
   else b.lattice_size = node.at("size").number(kPositive);
 }
 
@@ -141,7 +141,7 @@ void read_carriers(const Node &body, const dfm_type *model, ReadContext &context
   if (body.has("surface")) read_surface(body.member("surface"), b.surface);
   if (body.has_value("fill")) {
     const Node cells = body.member("fill").object("fill").at("cells");
-    const double n = cells.number(Range{0, kMostCells, false, false});
+    const double n = cells.number(Range{0, kMaxCells, false, false});
     if (n != std::floor(n)) cells.fail("expected a whole number, found %g", n);
     b.fill = uint32_t(n);
   }

@@ -232,13 +232,13 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
 namespace {
 
 constexpr char kPose[] = "t,x,y,z,qx,qy,qz,qw", kOpening[] = "t,x,y,z,qx,qy,qz,qw,opening_deg";
-constexpr uint64_t kMostRows = 4000000;  // more than an hour at 1 kHz
-constexpr double kWidest = 170;          // degrees
+constexpr uint64_t kMaxRows = 4000000;  // more than an hour at 1 kHz
+constexpr double kWidest = 170;         // degrees
 
 }  // namespace
 
 void read_hand(const std::string &path, Tool &tool) {
-  Table table(path, kPose, kMostRows, 9);
+  Table table(path, kPose, kMaxRows, 9);
   const std::string header = table.first();
   const bool opens = header == kOpening;
   if (!opens && header != kPose)

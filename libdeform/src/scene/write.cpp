@@ -246,7 +246,7 @@ namespace {
 void write_materials(SceneWriter &to) {
   for (const bool named : {true, false}) {
     for (const auto &b : to.w.bodies)
-      for (const Material &m : b->makeup.materials)
+      for (const Material &m : b->composition.materials)
         if (m.name.empty() != named) to.material(m);
     for (const auto &m : to.w.materials)
       if (named && !m->name.empty()) to.material(*m);
@@ -270,11 +270,11 @@ Written write_friction(SceneWriter &to) {
       continue;
     }
     const LawInstance &law = *to.w.laws[r.law];
-    const dfm_type &type = law.asked_type ? *law.asked_type : *law.type;
+    const dfm_type &type = law.requested_type ? *law.requested_type : *law.type;
     Written entry;
     entry["between"] = {r.between[0], r.between[1]};
     entry["law"] = type.id;
-    const Written params = params_of(type, law.asked_type ? law.asked : law.params);
+    const Written params = params_of(type, law.requested_type ? law.requested : law.params);
     if (!params.empty()) entry["params"] = params;
     if (law.restitution != kNoRestitution) entry["restitution"] = law.restitution;
     out.push_back(std::move(entry));
@@ -317,7 +317,7 @@ Written write_filters(SceneWriter &to) {
     const Obstacle *const o = w.obstacle(id);
     return o && !o->added ? o->name : "";
   };
-  for (const PairAnswer &p : w.may_touch.answers)
+  for (const PairDecision &p : w.may_touch.decisions)
     if (const std::string a = name(p.a), b = name(p.b); !p.touch && !a.empty() && !b.empty())
       add(a, b, false);
   return out;
@@ -395,7 +395,7 @@ Written write_probes(SceneWriter &to) {
 }
 
 // What a scene has no word for.
-void tell_what_is_left_out(SceneWriter &to) {
+void note_omissions(SceneWriter &to) {
   const World &w = to.w;
   const dfm_world_def usual = dfm_world_def_default();
   if (w.may_touch.call)
@@ -411,7 +411,7 @@ void tell_what_is_left_out(SceneWriter &to) {
   for (const auto &[member, set] : members)
     if (set) to.note("dfm_world_def.%s is not its default; a scene has no such key", member);
   struct Used {
-    std::set<std::string> ids, told;
+    std::set<std::string> ids, noted;
     SceneWriter *to;
     std::string shipped;
   } used{{}, {}, &to, default_plugin_directory()};
@@ -426,7 +426,7 @@ void tell_what_is_left_out(SceneWriter &to) {
         if (path.rfind("static:", 0) == 0 ? path.rfind("static:host", 0) != 0
                                           : path_of(path).parent_path() == path_of(u.shipped))
           return;
-        if (u.told.insert(type->id).second)
+        if (u.noted.insert(type->id).second)
           u.to->remark(
               format("'%s' comes from %s, which must be loaded to run the scene: name its folder in "
                      "DEFORM_PLUGIN_PATH",
@@ -456,7 +456,7 @@ Written write_root(SceneWriter &to) {
   put(root, "probes", write_probes(to));
   if (const std::string &output = to.options.beside.output; !output.empty())
     root["output"] = Written::parse(output);
-  tell_what_is_left_out(to);
+  note_omissions(to);
   if (to.materials.empty()) root.erase("materials");
   else root["materials"] = to.materials;
   return root;

@@ -48,15 +48,15 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
   const uint32_t ntet = mesh.ntet();
   mesh.tet_group.assign(ntet, kNoGroup);
   std::vector<std::string> keys;
-  for (const Material &m : b.makeup.materials) keys.push_back(to.material(m));
+  for (const Material &m : b.composition.materials) keys.push_back(to.material(m));
   // the body's own, which rules by name mean, and which the others differ from
   size_t own = 0;
-  while (own + 1 < keys.size() && b.makeup.materials[own].name != b.material) ++own;
-  if (b.makeup.materials[own].name == b.material) out["material"] = keys[own];
+  while (own + 1 < keys.size() && b.composition.materials[own].name != b.material) ++own;
+  if (b.composition.materials[own].name == b.material) out["material"] = keys[own];
   else if (!b.material.empty()) out["material"] = to.material(b.material, kDefaultFriction);
   if (out["material"].is_null() || out["material"] == "") out.erase("material");
   for (uint32_t t = 0; t < ntet; ++t) {
-    const size_t m = b.makeup.of.empty() ? 0 : b.makeup.of[t];
+    const size_t m = b.composition.of.empty() ? 0 : b.composition.of[t];
     if (keys[m] == out.value("material", "")) continue;
     if (keys[m].empty()) {
       to.note("body '%s': cells without a material lie beside others; a scene gives them '%s'",
@@ -126,8 +126,9 @@ void write_choice(const dfm_type &type, const std::vector<GivenParam> &given, Wr
 void write_model(SceneWriter &to, const Body &b, Written &out) {
   const dfm_type &type = *b.model.type;
   std::vector<GivenParam> given = rows_of(b.origin.params);
-  const std::vector<double> made = values_asked(to.w, b);
-  const std::vector<double> &now = b.withheld.asked.empty() ? b.model.params : b.withheld.asked;
+  const std::vector<double> made = requested_values(to.w, b);
+  const std::vector<double> &now =
+      b.switched_off.requested.empty() ? b.model.params : b.switched_off.requested;
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
     const dfm_param &row = type.params[i];
@@ -139,12 +140,12 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
   }
   write_choice(type, given, out["model"]);
   put_integrator(out, b.origin.integrator);
-  if (b.scaling.asked > 0) out["mass_scaling"] = b.scaling.asked;
+  if (b.scaling.requested > 0) out["mass_scaling"] = b.scaling.requested;
   if (b.smooth > 0) out["smooth"] = b.smooth;
 }
 
 void write_fields(SceneWriter &to, const Body &b, Written &out) {
-  for (const CellField &f : b.makeup.given) {
+  for (const CellField &f : b.composition.given) {
     const dfm_param *const row = scene::find_row(b.model.type, f.key);
     if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
       to.note("body '%s': the field '%s' is left out, since the model '%s' has no such parameter",

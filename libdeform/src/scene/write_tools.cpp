@@ -75,7 +75,7 @@ void write_cuts(const SceneWriter &to, const Tool &t, Written &out) {
   if (t.cuts.most > 0) out["cuts"]["most"] = t.cuts.most;
 }
 
-void tell(SceneWriter &to, const Tool &t, const ToolValues &v) {
+void note_rigid_tool(SceneWriter &to, const Tool &t, const ToolValues &v) {
   const char *const name = t.name.c_str();
   const std::string own[] = {t.name + ".shape", t.name + ".shaft"};
   const auto is_own = [&](const auto &o) { return !o->added || o->name == own[0] || o->name == own[1]; };
@@ -102,7 +102,7 @@ Written write_tool(SceneWriter &to, const Tool &t) {
   write_coupling(t, out);
   write_cuts(to, t, out);
   to.put_material(out, *to.w.obstacle(t.set->obstacle[0]));
-  tell(to, t, v);
+  note_rigid_tool(to, t, v);
   return out;
 }
 

@@ -69,8 +69,8 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
     laws.back()->restitution = l.restitution;
     for (const auto &own : w.laws)
       if (own->type == &type && own->params == l.params) {
-        laws.back()->asked_type = own->asked_type;
-        laws.back()->asked = own->asked;
+        laws.back()->requested_type = own->requested_type;
+        laws.back()->requested = own->requested;
       }
     most = std::max(most, laws.back()->nstate);
   }
@@ -113,7 +113,7 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
       other.integrator.point = own.point;
       if (other.integrator.chosen == Chosen::no) {
         other.integrator.open = own.open;
-        other.integrator.chosen = own.chosen == Chosen::struck ? Chosen::explicitly : own.chosen;
+        other.integrator.chosen = own.chosen == Chosen::in_impact ? Chosen::explicitly : own.chosen;
       }
     }
     const Dynamics &moves = other.made ? *other.made->dynamics : *b.dynamics;
@@ -141,7 +141,7 @@ struct Things {
 bool good_contacts(const Staged &t, const Things &things) {
   const ContactStore &c = t.store;
   if (c.n > 0 && !(c.h > 0)) return false;
-  if (!c.due.empty() && c.due.size() != c.n) return false;
+  if (!c.next_area.empty() && c.next_area.size() != c.n) return false;
   for (uint32_t i = 0; i < c.n; ++i) {
     const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
     if (!(norm2(n) < 1.01 && norm2(u) < 1.01)) return false;
@@ -160,7 +160,7 @@ bool good_contacts(const Staged &t, const Things &things) {
 
 bool good_tool_contacts(const Staged &t) {
   const ContactStore &c = t.tool_store;
-  if ((c.n > 0 && !(c.h > 0)) || !c.due.empty() || !c.crossings.empty()) return false;
+  if ((c.n > 0 && !(c.h > 0)) || !c.next_area.empty() || !c.crossings.empty()) return false;
   for (uint32_t i = 0; i < c.n; ++i) {
     const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
     if (!(norm2(n) < 1.01 && norm2(u) < 1.01) || c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id)
@@ -177,8 +177,8 @@ bool good_work(const std::vector<PairWork> &work, const Things &things) {
   return true;
 }
 
-bool good_aside(const std::vector<PairAside> &pairs, const Things &things) {
-  return std::all_of(pairs.begin(), pairs.end(), [&](const PairAside &p) {
+bool valid_suspended(const std::vector<SuspendedPair> &pairs, const Things &things) {
+  return std::all_of(pairs.begin(), pairs.end(), [&](const SuspendedPair &p) {
     return things.body(p.a) && (p.obstacle ? things.obstacle(p.b) != nullptr : things.body(p.b) != nullptr);
   });
 }
@@ -197,7 +197,8 @@ bool good_report(const Staged &t, const World &w) {
   if (r.n != t.store.n) return false;
   for (uint32_t i = 0; i < r.n; ++i) {
     const ContactPoint &c = r.contacts[i];
-    const double *const values[] = {c.weight, c.point, c.normal, &c.distance, &c.area, c.velocity, &c.give};
+    const double *const values[] = {c.weight, c.point,    c.normal,      &c.distance,
+                                    &c.area,  c.velocity, &c.indentation};
     const size_t counts[] = {4, 3, 3, 1, 1, 3, 1};
     for (int k = 0; k < 7; ++k)
       if (!must::all_finite(values[k], counts[k])) return false;
@@ -222,11 +223,11 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
   if (!good_tool_contacts(t)) s.refuse("contacts of tools", "contacts that tools can have");
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
-  if (!good_aside(t.overlaps.aside, {w}))
+  if (!valid_suspended(t.overlaps.suspended, {w}))
     s.refuse("pairs that are set aside", "bodies and obstacles that are there");
   if (!good_attachments(t.attachments, {w})) s.refuse("attachments", "surfels of bodies that are there");
   size_t sleepers = 0;
-  for (const StagedBody &b : t.bodies) sleepers += b.slumber.asleep;
+  for (const StagedBody &b : t.bodies) sleepers += b.sleep_state.asleep;
   if (sleepers != t.sleepers) s.refuse("sleepers", "as many as sleep");
   if (t.sleepers > 0 && !good_report(t, w)) s.refuse("report", "the contacts that are kept");
   for (size_t i = 0; i < t.rigid_sets.size(); ++i) {
@@ -301,10 +302,10 @@ void exchange(World &w, Staged &t) noexcept {
     b.ahead.faces.swap(other.ahead.faces);
     b.ahead.later.swap(other.ahead.later);
     b.ahead.job.swap(other.ahead.job);
-    std::swap(b.ahead.due, other.ahead.due);
+    std::swap(b.ahead.open_time, other.ahead.open_time);
     b.bound.known = false;
     if (!other.surfel_impulse.empty()) b.surfel_impulse.swap(other.surfel_impulse);
-    if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
+    if (b.sleep_state.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
   }
   for (size_t i = 0; i < w.obstacles.size(); ++i) {
@@ -328,7 +329,7 @@ void exchange(World &w, Staged &t) noexcept {
   }
   for (size_t i = 0; i < w.tools.size(); ++i) std::swap(w.tools[i]->cuts, t.tools[i].cuts);
   std::swap<WorldState>(w, t);
-  w.overlaps.aside.swap(t.overlaps.aside);
+  w.overlaps.suspended.swap(t.overlaps.suspended);
   w.gravity.keys.swap(t.gravity.keys);
   std::swap(w.def.gravity, t.def.gravity);
   std::swap(w.def.sleep, t.def.sleep);
@@ -357,9 +358,9 @@ uint64_t world_hash(const World &w) {
         *store);
   if (w.def.sleep)
     for (auto &b : w.bodies) {
-      h.add(b->slumber.asleep);
-      h.add(b->slumber.calm);
-      h.add(b->slumber.since);
+      h.add(b->sleep_state.asleep);
+      h.add(b->sleep_state.quiet_time);
+      h.add(b->sleep_state.since);
     }
   // where it is another one than at the first step: until then it follows from how the world was made
   for (auto &b : w.bodies)
@@ -420,7 +421,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     // Rebuilds tables and plan; choices that prepare() would make again are set to those of the snapshot.
     const RestoredChoice choice{staged.gravity.now, staged.bound, staged.offset};
     w.changed = true;
-    w.overlaps.all = w.overlaps.look_only = true;
+    w.overlaps.all = w.overlaps.report_only = true;
     w.sleepers = 0;  // prepare() counts them
     prepare(w, &choice);
   } catch (...) {

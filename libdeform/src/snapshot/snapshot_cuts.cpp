@@ -70,20 +70,20 @@ CutMesh mesh_of(const Memory &m, const WholeBody &whole) {
   return out;
 }
 
-void sort_undone(World &w) noexcept {
-  std::ranges::sort(w.undone, {}, [](const auto &b) { return b->id; });
+void sort_rolled_back(World &w) noexcept {
+  std::ranges::sort(w.rolled_back, {}, [](const auto &b) { return b->id; });
 }
 
 }  // namespace
 
-bool sound(const Array<BladeSide> &sides, size_t ncorner) {
+bool is_valid(const Array<BladeSide> &sides, size_t ncorner) {
   return rises(sides, &BladeSide::cell) && std::ranges::all_of(sides, [&](const BladeSide &s) {
            return s.cell < ncorner / 4 && s.kind <= SideKind::behind && std::isfinite(s.along) &&
                   std::isfinite(s.way) && std::isfinite(s.off);
          });
 }
 
-bool sound(const std::vector<PlannedCut> &cuts) {
+bool is_valid(const std::vector<PlannedCut> &cuts) {
   const auto earlier = [](const PlannedCut &a, const PlannedCut &b) { return a.t < b.t; };
   return std::is_sorted(cuts.begin(), cuts.end(), earlier) &&
          std::all_of(cuts.begin(), cuts.end(), [](const PlannedCut &c) {
@@ -96,14 +96,14 @@ bool sound(const std::vector<PlannedCut> &cuts) {
          });
 }
 
-bool sound(const Array<CutDue> &dues, uint32_t npoint) {
-  return rises(dues, &CutDue::point) && std::ranges::all_of(dues, [&](const CutDue &d) {
-           return d.point < npoint && d.due >= 0 && d.force >= 0 && std::isfinite(d.due) &&
+bool is_valid(const Array<CutWork> &cut_work, uint32_t npoint) {
+  return rises(cut_work, &CutWork::point) && std::ranges::all_of(cut_work, [&](const CutWork &d) {
+           return d.point < npoint && d.energy >= 0 && d.force >= 0 && std::isfinite(d.energy) &&
                   std::isfinite(d.force) && std::isfinite(norm2(load3(d.way)));
          });
 }
 
-bool sound(const Tool::Cuts &cuts, const Tool &tool) {
+bool is_valid(const Tool::Cuts &cuts, const Tool &tool) {
   if (cuts.how > DFM_CUT_SPLIT || !rises(cuts.bodies)) return false;
   if (cuts.bodies.empty()) return true;
   try {
@@ -114,7 +114,7 @@ bool sound(const Tool::Cuts &cuts, const Tool &tool) {
   return true;
 }
 
-bool sound(const std::vector<AheadFace> &faces, const Body &b) {
+bool is_valid(const std::vector<AheadFace> &faces, const Body &b) {
   const size_t n = b.cut.whole ? b.cut.whole->tets.size() / 4 : b.ncell();
   return rises(faces, &AheadFace::face) && std::ranges::all_of(faces, [n](const AheadFace &f) {
            return (f.face & kNone) < n && f.face >> 32 < (f.face & kNone);
@@ -161,9 +161,9 @@ Body &SnapshotShapes::whole_body(Body &b) {
 
 // Of a piece that a restore has removed.
 void SnapshotShapes::change_id(Body &b, uint64_t id) {
-  undo_.push_back({&b, b.id, b.emptied, b.undone, nullptr});
+  undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
   b.id = id;
-  sort_undone(w_);
+  sort_rolled_back(w_);
 }
 
 // Adds the pieces of the snapshot and removes the others; their shapes follow later. After a rewind, a piece
@@ -172,9 +172,9 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
   const std::vector<Body *> bodies = all_bodies(w_);
   reserve_places(w_, rows.size());
   undo_.reserve(3 * (bodies.size() + rows.size()));
-  const auto move = [&](Body &b, bool undone) {
-    undo_.push_back({&b, b.id, b.emptied, b.undone, nullptr});
-    set_place(w_, b, b.emptied && undone, undone);
+  const auto move = [&](Body &b, bool rolled_back) {
+    undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
+    set_place(w_, b, b.emptied && rolled_back, rolled_back);
   };
   for (Body *const b : bodies) {
     if (!b->piece_of) continue;
@@ -182,7 +182,7 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
     const bool there = row != rows.end();
     if (there && row->piece_of == b->piece_of && row->name == b->name) continue;
     move(*b, true);
-    if (there && b->id < kMostIds) change_id(*b, kMostIds + b->id);
+    if (there && b->id < kMaxIds) change_id(*b, kMaxIds + b->id);
   }
   for (const CutRow &r : rows) {
     const std::vector<Body *> now = all_bodies(w_);
@@ -195,11 +195,11 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
            "the snapshot is damaged: piece '%s': expected one of a body of this world, with a name of its "
            "own; nothing was restored",
            r.name.c_str());
-    const auto aside = std::find_if(w_.undone.begin(), w_.undone.end(), [&](const auto &p) {
-      return p->id == kMostIds + r.id && p->piece_of == r.piece_of && p->name == r.name;
+    const auto suspended = std::find_if(w_.rolled_back.begin(), w_.rolled_back.end(), [&](const auto &p) {
+      return p->id == kMaxIds + r.id && p->piece_of == r.piece_of && p->name == r.name;
     });
-    const bool taken = std::ranges::any_of(w_.undone, [&](const auto &p) { return p->id == r.id; });
-    if (aside != w_.undone.end() && !taken) change_id(**aside, r.id);
+    const bool taken = std::ranges::any_of(w_.rolled_back, [&](const auto &p) { return p->id == r.id; });
+    if (suspended != w_.rolled_back.end() && !taken) change_id(**suspended, r.id);
     move(place_for_piece(w_, **whole, r.id, r.name), false);
   }
 }
@@ -207,7 +207,7 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
 void SnapshotShapes::put(Body &b, CutRow *row) {
   const Memory &m = w_.memory();
   const bool emptied = row && row->emptied;
-  undo_.push_back({&b, b.id, b.emptied, b.undone, nullptr});
+  undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
   if (row && row->piece_of != b.piece_of) refuse(b, "a piece: expected it of another body");
   set_place(w_, b, emptied, false);
   if ((emptied && b.dynamics) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
@@ -250,9 +250,9 @@ void SnapshotShapes::take_back() noexcept {
     if (u.shape) exchange(*u.body, *u.shape);
     if (u.body->id != u.id) {
       u.body->id = u.id;
-      sort_undone(w_);
+      sort_rolled_back(w_);
     }
-    set_place(w_, *u.body, u.emptied, u.undone);
+    set_place(w_, *u.body, u.emptied, u.rolled_back);
   }
 }
 

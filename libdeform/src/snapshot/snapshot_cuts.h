@@ -54,7 +54,7 @@ class SnapshotShapes {
   struct Undo {
     Body *body;
     uint64_t id;
-    bool emptied, undone;
+    bool emptied, rolled_back;
     std::unique_ptr<BodyShape> shape;  // null: unchanged
   };
   void change_id(Body &b, uint64_t id);
@@ -70,12 +70,12 @@ class SnapshotShapes {
 std::vector<Body *> all_bodies(const World &w);
 
 // Of cells of a mesh that has ncorner corners of cells, ascending.
-bool sound(const Array<BladeSide> &sides, size_t ncorner);
-bool sound(const Array<CutDue> &dues, uint32_t npoint);
-bool sound(const std::vector<PlannedCut> &cuts);
+bool is_valid(const Array<BladeSide> &sides, size_t ncorner);
+bool is_valid(const Array<CutWork> &cut_work, uint32_t npoint);
+bool is_valid(const std::vector<PlannedCut> &cuts);
 // Of a tool that can cut in this way.
-bool sound(const Tool::Cuts &cuts, const Tool &tool);
+bool is_valid(const Tool::Cuts &cuts, const Tool &tool);
 // Between cells of the whole body, ascending.
-bool sound(const std::vector<AheadFace> &faces, const Body &b);
+bool is_valid(const std::vector<AheadFace> &faces, const Body &b);
 
 }  // namespace dfm

@@ -74,7 +74,7 @@ struct Staged : WorldState {
   std::vector<StagedRigids> rigid_sets;
   std::vector<StagedTool> tools;
   std::vector<StagedLaw> laws;
-  struct { std::vector<PairAside> aside; } overlaps;
+  struct { std::vector<SuspendedPair> suspended; } overlaps;
   explicit Staged(const World &w) : WorldState(w.meters.contacts.memory()) {
     const Memory &m = w.memory();
     bodies.resize(w.bodies.size());
@@ -95,7 +95,7 @@ void param_fields(Stream &s, P &params) {
   s.array("model's keys", params.keys, kAnyCount, must::any);
   s.array("model's widths", params.widths, kAnyCount, must::any);
   s.array("model's values", params.values, kAnyCount, must::finite);
-  s.must_hold("model's keys", "as many as there are values for", [&] { return params.sound(); });
+  s.must_hold("model's keys", "as many as there are values for", [&] { return params.is_valid(); });
 }
 
 template <class Stream, class C>
@@ -202,7 +202,7 @@ inline bool knows_material(const World &w, const std::string &name) {
 }
 
 // s; no bound of a body in SI units is smaller, and a smaller one would stop the world
-inline constexpr double kLeastStep = 1e-15;
+inline constexpr double kMinStep = 1e-15;
 
 // ---- the fields -------------------------------------------------------------------------------------------
 
@@ -263,7 +263,7 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.value("integrator used", b.integrator.used,
           must::Be{[](uint32_t x) { return x - 1 < DFM_INTEGRATOR_TR_BDF2; }, "an integrator"});
   s.value("chosen integrator", b.integrator.chosen,
-          must::Be{[](Chosen x) { return x <= Chosen::struck; }, "no, explicit, implicit or struck"});
+          must::Be{[](Chosen x) { return x <= Chosen::in_impact; }, "no, explicit, implicit or struck"});
   s.value("spectral share", b.integrator.share,
           must::Be{[](double x) { return x > 0 && x <= 1; }, "a share above zero"});
   s.value("lag of dampers", b.p.dampers.lag,
@@ -295,9 +295,9 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.value("least energy", b.energy.base, must::finite);
   s.value("booked work", b.energy.work, must::finite);
   s.value("kinetic energy", b.energy.kinetic, must::finite);
-  s.must_hold("energy known", "what the energy watch writes", [&] { return sound(b.energy); });
+  s.must_hold("energy known", "what the energy watch writes", [&] { return is_valid(b.energy); });
   s.value("model has changed", b.changes.open, must::flag);
-  s.value("refusal told", b.changes.told, must::flag);
+  s.value("refusal told", b.changes.reported, must::flag);
   s.value("largest energy", b.changes.largest, must::not_negative);
   for (auto *x : {&b.changes.unpaid, &b.changes.level, &b.changes.work})
     s.value("energy of changes", *x, must::finite);
@@ -309,11 +309,12 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
     s.value("blade's way of late", blade.lead, must::finite);
     for (auto &way : blade.way) s.value("blade's way", way, must::finite);
     s.array("sides of a blade", blade.sides, kAnyCount, must::any);
-    s.must_hold("sides of a blade", "those of cells", [&] { return sound(blade.sides, like.tets.size()); });
+    s.must_hold("sides of a blade", "those of cells",
+                [&] { return is_valid(blade.sides, like.tets.size()); });
     s.value("blade's credit", blade.credit, must::finite);
     s.value("blade's part", blade.part, must::any);
-    s.array("dues of a blade", blade.dues, kAnyCount, must::any);
-    s.must_hold("dues of a blade", "those of points", [&] { return sound(blade.dues, like.p.n); });
+    s.array("dues of a blade", blade.cut_work, kAnyCount, must::any);
+    s.must_hold("dues of a blade", "those of points", [&] { return is_valid(blade.cut_work, like.p.n); });
   });
   s.list("cuts to come", b.planned_cuts, [&](auto &cut) {
     s.value("cut's time", cut.t, must::not_negative);
@@ -328,16 +329,16 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
     for (auto &x : cut.shape.corner) s.value("cut's corner", x, must::finite);
   });
   s.must_hold("cuts to come", "in order of time, and split by a blade or a plane",
-              [&] { return sound(b.planned_cuts); });
+              [&] { return is_valid(b.planned_cuts); });
   if (like.ahead.delay > 0) {
     const auto faces = [&](const char *name, auto &list) {
       s.array(name, list, kAnyCount, must::any);
       s.must_hold(name, "faces between cells of the body as it was made, ascending",
-                  [&] { return sound(list, like); });
+                  [&] { return is_valid(list, like); });
     };
     faces("faces that wait", b.ahead.faces);
     faces("faces that wait longer", b.ahead.later);
-    s.value("faces open at", b.ahead.due, must::finite);
+    s.value("faces open at", b.ahead.open_time, must::finite);
   }
   s.value("separates", b.separate.on, must::flag);
   s.value("crumbs go", b.separate.removes, must::flag);
@@ -345,15 +346,16 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.value("parts wait for memory", b.separate.waits, must::flag);
   s.must_hold("parts wait for memory", "parts of a body that separates",
               [&] { return !b.separate.waits || b.separate.on; });
-  s.value("asleep", b.slumber.asleep, must::flag);
-  s.value("calm", b.slumber.calm, must::not_negative);
-  s.value("asleep since", b.slumber.since, must::not_negative);
-  s.value("sub-step asleep", b.slumber.h, must::not_negative);
-  s.value("force asleep", b.slumber.force, must::finite);
+  s.value("asleep", b.sleep_state.asleep, must::flag);
+  s.value("calm", b.sleep_state.quiet_time, must::not_negative);
+  s.value("asleep since", b.sleep_state.since, must::not_negative);
+  s.value("sub-step asleep", b.sleep_state.h, must::not_negative);
+  s.value("force asleep", b.sleep_state.force, must::finite);
   s.must_hold("asleep", "a sleep that began in a sub-step before now, where bodies may sleep", [&] {
-    return !b.slumber.asleep || (w.def.sleep && b.slumber.since <= w.time && b.slumber.h > 0);
+    return !b.sleep_state.asleep || (w.def.sleep && b.sleep_state.since <= w.time && b.sleep_state.h > 0);
   });
-  if (b.slumber.asleep) s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
+  if (b.sleep_state.asleep)
+    s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
   if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
   prescribed_fields(s, b, like);
   s.where("", "");
@@ -391,8 +393,8 @@ void rule_fields(Stream &s, W &w, uint64_t laws) {
     between(r);
     s.value("rule's law", r.law, must::below(laws));
   });
-  s.array("pairs that are set aside", w.overlaps.aside, kAnyCount,
-          must::Be{[](const PairAside &x) { return x.obstacle <= 1 && x.a != x.b; }, "two things"});
+  s.array("pairs that are set aside", w.overlaps.suspended, kAnyCount,
+          must::Be{[](const SuspendedPair &x) { return x.obstacle <= 1 && x.a != x.b; }, "two things"});
   s.list("filter rules", w.filters, [&](auto &r) {
     between(r);
     s.value("collide", r.collide, must::flag);
@@ -437,21 +439,21 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("age of the bound", w.bound.age, must::any);
   s.value("strain since the bound", w.bound.strain, must::not_negative);
   s.must_hold("step bound", "a time that a sub-step can have",
-              [&] { return w.bound.age == kNone || w.bound.step >= kLeastStep; });
+              [&] { return w.bound.age == kNone || w.bound.step >= kMinStep; });
   for (auto *r : {&w.sizes.cut, &w.sizes.offer}) {
     s.value("step size", r->size, must::not_negative);
-    s.value("calm of the size", r->calm, must::any);
+    s.value("calm of the size", r->quiet_steps, must::any);
     s.value("patience", r->patience, must::any);
   }
   s.value("accurate step", w.sizes.accurate, must::not_negative);
   s.value("time of steady steps", w.sizes.steady, must::not_negative);
   s.value("damping of changed steps", w.sizes.damping, must::not_negative);
-  s.value("end of an impact", w.struck_until, must::not_negative);
-  s.must_hold("step size", "sizes that the library chooses", [&] { return sound(w.sizes); });
+  s.value("end of an impact", w.impact_until, must::not_negative);
+  s.must_hold("step size", "sizes that the library chooses", [&] { return is_valid(w.sizes); });
   s.value("age of the energies", w.watch.age, must::any);
   s.value("credit of the energies", w.watch.credit, must::any);
   s.value("last sub-step", w.watch.last_h, must::not_negative);
-  s.must_hold("last sub-step", "what the energy watch writes", [&] { return sound(w.watch); });
+  s.must_hold("last sub-step", "what the energy watch writes", [&] { return is_valid(w.watch); });
   s.value("contact offset", w.offset, must::positive);
   s.value("hold start", w.hold.start, must::finite);
   s.value("holding", w.hold.on, must::flag);
@@ -460,7 +462,7 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("gravity", w.gravity.now, must::finite);
   s.value("gravity", w.def.gravity, must::finite);
   s.value("next id", w.next_id,
-          must::Be{[&](uint64_t x) { return x > last_id(like) && x < kMostIds; },
+          must::Be{[&](uint64_t x) { return x > last_id(like) && x < kMaxIds; },
                    "a number above all that are taken"});
   s.array("gravity keys", w.gravity.keys, kAnyCount, must::any);
   s.must_hold("gravity keys", "finite keys at rising times", [&] { return rise(w.gravity.keys); });
@@ -509,7 +511,7 @@ void fields(Stream &s, W &w, const World &like) {
     s.value("most of a cut", cuts.most, must::any);
     s.array("bodies that it cuts", cuts.bodies, kAnyCount, must::any);
     s.must_hold("bodies that it cuts", "ascending numbers, of a tool that cuts in this way",
-                [&] { return sound(cuts, l); });
+                [&] { return is_valid(cuts, l); });
   });
   s.where("", "");
   attachment_fields(s, w);
@@ -519,7 +521,7 @@ void fields(Stream &s, W &w, const World &like) {
   contact_fields(s, w.tool_store, w.laws.size());
   s.where("", "");
   s.array("friction work", w.work, kAnyCount,
-          must::Be{[](const PairWork &x) { return sound(x); }, "finite work, rises not below zero"});
+          must::Be{[](const PairWork &x) { return is_valid(x); }, "finite work, rises not below zero"});
   if (w.sleepers == 0) return;  // contacts that sleep are reported from what the last sub-step left
   auto &r = w.report;
   const uint64_t n = w.store.n;

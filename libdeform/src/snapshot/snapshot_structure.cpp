@@ -19,7 +19,7 @@ void zone(Hash &h, const SurfaceZones::Zone &z) {
   h.add(z.friction);
 }
 
-void makeup(Hash &h, const Makeup &m) {
+void composition(Hash &h, const Composition &m) {
   for (const Material &x : m.materials) {
     h.add(x.def.young);
     h.add(x.def.poisson);
@@ -68,7 +68,7 @@ uint64_t make_of(const Body &b) {
   h.add(b.inside.data(), b.inside.size() * sizeof(double));
   h.add(rest.data(), rest.size() * sizeof(double));
   h.add(mass.data(), mass.size() * sizeof(double));
-  makeup(h, whole ? whole->makeup : b.makeup);
+  composition(h, whole ? whole->composition : b.composition);
   const SurfaceZones &zones = whole ? whole->zones : b.zones;
   const Surface &s = b.surface;
   h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
@@ -127,7 +127,7 @@ uint64_t rest_of_structure(const World &w) {
     h.add(t->keys.data(), t->keys.size() * sizeof(dfm_pose_key));
     h.add(t->opening_keys.data(), t->opening_keys.size() * sizeof(dfm_scale_key));
   }
-  if (const uint8_t asked = asks_self_contact(w)) h.add(asked);
+  if (const uint8_t requested = uses_self_contact(w)) h.add(requested);
   return h.value;
 }
 

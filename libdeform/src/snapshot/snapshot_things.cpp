@@ -127,13 +127,13 @@ uint64_t SnapshotIds::now(uint64_t id) const {
 
 // A piece keeps its id only if its body does, and if no other thing has it in the snapshot; the restore then
 // removes it.
-void SnapshotIds::set_aside_pieces(const ThingRows &rows) {
-  for (auto *const list : {&w_.bodies, &w_.emptied, &w_.undone})
+void SnapshotIds::detach_pieces(const ThingRows &rows) {
+  for (auto *const list : {&w_.bodies, &w_.emptied, &w_.rolled_back})
     for (auto &b : *list) {
       if (!b->piece_of) continue;
       const uint64_t whole = now(b->piece_of);
       const bool taken = has_id(rows.bodies, b->id) || has_id(rows.obstacles, b->id);
-      if ((whole != b->piece_of || taken) && b->id < kMostIds) change(b->id, kMostIds + b->id);
+      if ((whole != b->piece_of || taken) && b->id < kMaxIds) change(b->id, kMaxIds + b->id);
       change(b->piece_of, whole);
     }
 }
@@ -148,13 +148,13 @@ void SnapshotIds::refer(const ThingRows &rows) {
   sensed_ = w_.sensed;
   for (Sensed &s : sensed_) s = {now(s.sensor), now(s.thing)};
   std::sort(sensed_.begin(), sensed_.end());
-  answers_ = w_.may_touch.answers;
-  for (PairAnswer &p : answers_) {
+  decisions_ = w_.may_touch.decisions;
+  for (PairDecision &p : decisions_) {
     p.a = now(p.a);
     p.b = now(p.b);
     if (has_id(rows.bodies, p.b) && p.b < p.a) std::swap(p.a, p.b);
   }
-  std::sort(answers_.begin(), answers_.end(), [](const PairAnswer &l, const PairAnswer &r) {
+  std::sort(decisions_.begin(), decisions_.end(), [](const PairDecision &l, const PairDecision &r) {
     return std::pair(l.a, l.b) < std::pair(r.a, r.b);
   });
   for (auto &set : w_.rigid_sets)
@@ -181,10 +181,10 @@ SnapshotIds::SnapshotIds(World &w, const ThingRows &rows) : w_(w) {
     if (has_id(rows.obstacles, row.id))
       fail(DFM_E_FORMAT,
            "the snapshot is damaged: number of a body: expected that of no obstacle; nothing was restored");
-  words_.reserve(2 * (w.bodies.size() + w.emptied.size() + w.undone.size() + w.obstacles.size()) +
+  words_.reserve(2 * (w.bodies.size() + w.emptied.size() + w.rolled_back.size() + w.obstacles.size()) +
                  w.obstacles.size());
   refer(rows);
-  set_aside_pieces(rows);
+  detach_pieces(rows);
   for (size_t i = 0; i < bodies.size(); ++i) change(bodies[i]->id, rows.bodies[i].id);
   for (size_t i = 0; i < obstacles.size(); ++i) change(obstacles[i]->id, rows.obstacles[i].id);
   exchange();
@@ -196,9 +196,9 @@ void SnapshotIds::exchange() noexcept {
   for (auto &o : w_.obstacles) renew_name(*o);
   for (size_t k = 0; k < cuts_.size(); ++k) w_.tools[k]->cuts.bodies.swap(cuts_[k]);
   w_.sensed.swap(sensed_);
-  w_.may_touch.answers.swap(answers_);
+  w_.may_touch.decisions.swap(decisions_);
   w_.steps->self_bodies.swap(self_);  // they are kept by id
-  for (auto *const list : {&w_.bodies, &w_.emptied, &w_.undone}) sort_by_id(*list);
+  for (auto *const list : {&w_.bodies, &w_.emptied, &w_.rolled_back}) sort_by_id(*list);
   sort_by_id(w_.obstacles);
   sort_by_id(w_.rigid_sets);
   sort_by_id(w_.tools);

@@ -26,7 +26,7 @@ struct ThingRows {
 ThingRows thing_rows(const World &w);
 
 // far more than any run makes, and far below an overflow
-inline constexpr uint64_t kMostIds = uint64_t{1} << 48;
+inline constexpr uint64_t kMaxIds = uint64_t{1} << 48;
 
 template <class Stream, class Rows>
 void thing_fields(Stream &s, Rows &rows) {
@@ -35,7 +35,7 @@ void thing_fields(Stream &s, Rows &rows) {
     s.list(what, things, [&](auto &r) {
       s.value(number, r.id, must::any);
       s.must_hold(number, "rising numbers",
-                  [&] { return r.id > std::exchange(last, r.id) && r.id < kMostIds; });
+                  [&] { return r.id > std::exchange(last, r.id) && r.id < kMaxIds; });
       s.array("name of a thing", r.name, kAnyCount, must::any);
       s.value("make of a thing", r.made, must::any);
     });
@@ -58,7 +58,7 @@ class SnapshotIds {
   struct Name { std::string *at, other; };
   uint64_t now(uint64_t id) const;
   void change(uint64_t &id, uint64_t to);
-  void set_aside_pieces(const ThingRows &rows);
+  void detach_pieces(const ThingRows &rows);
   void refer(const ThingRows &rows);
   void exchange() noexcept;
   World &w_;
@@ -67,7 +67,7 @@ class SnapshotIds {
   std::vector<Name> names_;
   std::vector<std::vector<uint64_t>> cuts_;  // by tool
   std::vector<Sensed> sensed_;
-  std::vector<PairAnswer> answers_;
+  std::vector<PairDecision> decisions_;
   std::vector<std::unique_ptr<SelfBody>> self_;
 };
 

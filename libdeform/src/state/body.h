@@ -55,7 +55,7 @@ inline constexpr int32_t kNoCoupling = -1;
 // infinite: none, or not computed.
 // chosen: what the library has chosen where it was left to it. struck: implicit time, but explicit until an
 // impact is over (step/impact.h).
-enum class Chosen : uint32_t { no, explicitly, implicit, struck };
+enum class Chosen : uint32_t { no, explicitly, implicit, in_impact };
 struct Integrator {
   uint32_t used = DFM_INTEGRATOR_SYMPLECTIC_EULER;
   bool open = false;  // prepare() is to choose it
@@ -69,8 +69,8 @@ struct Integrator {
 
 // What the list of effects has left out of a model: the values as they were given, all rows end to end
 // (empty: nothing is left out), and, [nparam], the rows whose differences between cells are left out.
-struct Withheld {
-  std::vector<double> asked;
+struct SwitchedOff {
+  std::vector<double> requested;
   std::vector<uint8_t> by_cell;
 };
 
@@ -80,9 +80,9 @@ std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<Cel
 struct SpareModel {
   ModelInstance instance;
   ModelOrigin origin;
-  Withheld withheld;
-  const std::vector<double> &asked() const {
-    return withheld.asked.empty() ? instance.params : withheld.asked;
+  SwitchedOff switched_off;
+  const std::vector<double> &requested() const {
+    return switched_off.requested.empty() ? instance.params : switched_off.requested;
   }
 };
 
@@ -91,7 +91,7 @@ struct Squeezed {
   double pressure = 0, at = 0;  // Pa; s, of the last look
   double since = 0;             // s, of the last look at which it was small
   double weight = 0;            // Pa, its own, if it has been told of
-  bool told = false;
+  bool reported = false;
 };
 
 // How a body moves: model instance and dynamics, with the inputs of both.
@@ -101,7 +101,7 @@ struct BodyModel {
   std::vector<CellField> fields;
   std::vector<Unused> unused;
   ModelOrigin origin;
-  Withheld withheld;
+  SwitchedOff switched_off;
   Integrator integrator;
 };
 
@@ -120,7 +120,7 @@ struct Structure {
   uint64_t shape = 0;
   Array<double> share;   // [ntet] how much of each cell is material; empty: all
   Array<double> inside;  // [ncell,27] the same of hexahedra, as dfm_tetmesh_inside gives it; empty: all
-  Makeup makeup;
+  Composition composition;
 };
 
 // What lasts by points. Snapshots have it.
@@ -157,7 +157,7 @@ struct BodyState {
   Vec3 contact_impulse;                  // N s since creation
   EnergyBook energy;
   ChangeBook changes;
-  Slumber slumber;
+  SleepState sleep_state;
 };
 
 struct Body : BodyShape, BodyState {
@@ -169,11 +169,11 @@ struct Body : BodyShape, BodyState {
   bool tears = false;   // a material of its cells tears at a limited strain
   void *user = nullptr;
 
-  uint64_t x_version = 1;  // increases whenever p.x may have changed
-  bool emptied = false;    // a cut has removed all cells; the body is in World::emptied
-  uint64_t piece_of = 0;   // id of the body, made by the host, of which this one is a piece; 0: none
-  std::string whole_name;  // name of that body; its rules of friction and contact apply to this piece too
-  bool undone = false;     // a piece that a restore has removed; it is in World::undone
+  uint64_t x_version = 1;    // increases whenever p.x may have changed
+  bool emptied = false;      // a cut has removed all cells; the body is in World::emptied
+  uint64_t piece_of = 0;     // id of the body, made by the host, of which this one is a piece; 0: none
+  std::string whole_name;    // name of that body; its rules of friction and contact apply to this piece too
+  bool rolled_back = false;  // a piece that a restore has removed; it is in World::rolled_back
   CutsAhead ahead;
   int32_t coupling = kNoCoupling;  // DFM_COUPLING_* of a surface of its own
   double support = 0;              // of that coupling, as in the def

@@ -28,7 +28,7 @@ struct WholeBody {
   uint32_t npoint = 0, nsurfel = 0;
   Array<double> rest, mass, share;  // [npoint,3] m, [npoint] kg; [ntet] or empty
   Array<uint32_t> tets, tri;        // [ntet,4]; [ntri,3] points of the surface's triangles
-  Makeup makeup;
+  Composition composition;
   SurfaceZones zones;
 };
 
@@ -43,23 +43,23 @@ struct BladeSide {
 
 // Energy that a tool owes for what it has cut, at a point of the body beside the cut. It pays over the way
 // that follows, by a force on the point (step/solve/cut_drag.h).
-struct CutDue {
-  double due, force;  // J; N
-  double way[3];      // unit length, of the edge through the material; in the frame of the tool's part
+struct CutWork {
+  double energy, force;  // J; N
+  double way[3];         // unit length, of the edge through the material; in the frame of the tool's part
   uint32_t point, unused = 0;  // no gap at the end: snapshots have its bytes
 };
 
 // The last place of a blade's edge, and the points of the body at that time: the next way of the blade is
 // measured relative to the motion of the body.
 struct BladeTrack {
-  double edge[6] = {};     // m
-  Array<double> x;         // [npoint,4] m
-  Vec3 lead;               // m, way of late; zero where the blade itself says where it looks
-  double way[2] = {};      // m, that each end has moved
-  Array<BladeSide> sides;  // of cells near it, ascending
-  double credit = 0;       // J, zero or less: the sum of work since it was last the largest
-  uint64_t part = 0;       // id of the obstacle that is the tool's part, where it owes anything
-  Array<CutDue> dues;      // by point, ascending
+  double edge[6] = {};      // m
+  Array<double> x;          // [npoint,4] m
+  Vec3 lead;                // m, way of late; zero where the blade itself says where it looks
+  double way[2] = {};       // m, that each end has moved
+  Array<BladeSide> sides;   // of cells near it, ascending
+  double credit = 0;        // J, zero or less: the sum of work since it was last the largest
+  uint64_t part = 0;        // id of the obstacle that is the tool's part, where it owes anything
+  Array<CutWork> cut_work;  // by point, ascending
 };
 
 // A planned cut (dfm_body_plan_cut).
@@ -87,8 +87,8 @@ struct AheadFace {
 
 struct CutsAhead {
   double delay = 0;                     // s; 0: faces open in the step in which a tool comes through
-  std::vector<AheadFace> faces, later;  // that open at `due`, and `delay` after that; both ascending
-  double due = 0;                       // s
+  std::vector<AheadFace> faces, later;  // that open at `open_time`, and `delay` after that; both ascending
+  double open_time = 0;                 // s
   // Derived: what a cut needs of the body, and the cut that is being made. Not in snapshots.
   std::shared_ptr<const Body> structure;
   std::shared_ptr<CutJob> job;

@@ -17,21 +17,21 @@ struct EnergyBook {
 // Begins with the first change. Lasting state.
 struct ChangeBook {
   bool open = false;
-  bool told = false;   // a warning that a change was refused because of the sum has been given
-  double unpaid = 0;   // J that changes have put in and that had not been lost by the last look; below 0:
-                       // that they have taken out
-  double level = 0;    // J, kinetic and elastic energy at the last check
-  double work = 0;     // J of external work on the body since
-  double largest = 0;  // J, largest energy so far, minus the unpaid part
+  bool reported = false;  // a warning that a change was refused because of the sum has been given
+  double unpaid = 0;      // J that changes have put in and that had not been lost by the last look; below 0:
+                          // that they have taken out
+  double level = 0;       // J, kinetic and elastic energy at the last check
+  double work = 0;        // J of external work on the body since
+  double largest = 0;     // J, largest energy so far, minus the unpaid part
 };
 
-inline constexpr uint32_t kMostCredit = 4096;  // sub-steps
+inline constexpr uint32_t kMaxCredit = 4096;  // sub-steps
 
 // Of the world. Lasting state.
 struct EnergyWatch {
   // sub-steps without a check, minus the cost of checks: limits new bases if the host changes something in
   // every step
-  uint32_t credit = kMostCredit;
+  uint32_t credit = kMaxCredit;
   uint32_t age = ~0u;  // sub-steps since the last check
   double last_h = 0;   // s, of the last sub-step
   // s, planned size of the sub-steps before it changed for the next one; 0: it did not. Not state: set in
@@ -39,10 +39,10 @@ struct EnergyWatch {
   double size_before = 0;
   // the last check has stopped the run because of a pair: if the host then changes something, the sums start
   // again; not state
-  bool told = false;
+  bool reported = false;
 };
 
-bool sound(const EnergyBook &e);  // whether a world could have reached it
-bool sound(const EnergyWatch &e);
+bool is_valid(const EnergyBook &e);  // whether a world could have reached it
+bool is_valid(const EnergyWatch &e);
 
 }  // namespace dfm

@@ -72,11 +72,11 @@ void share_mass(Body &b, const double *density, double all) {
 }
 
 // Least part of its mass that a point keeps when moments are set right.
-constexpr double kLeastMass = 0.1;
+constexpr double kMinMass = 0.1;
 
 // Of a lattice. Equal shares of a cell's material to its nodes leave no point without mass, but keep neither
 // center nor moments of inertia. So all masses change by factors that are a quadratic polynomial of the
-// place, by which these are those of the material; where a factor would be less than kLeastMass, the moments
+// place, by which these are those of the material; where a factor would be less than kMinMass, the moments
 // come as near as it allows.
 void lump_inside(Body &b, const double *density, double all) {
   const size_t tets = cell_kind(b.cell_type).tets, ncell = b.ncell() / tets;
@@ -102,7 +102,7 @@ void lump_inside(Body &b, const double *density, double all) {
       for (uint32_t i = 0; i < b.p.n; ++i) change[i] += terms.sums[k] * terms.at[i][k];
     double by = 1;
     for (uint32_t i = 0; i < b.p.n; ++i)
-      if (factor[i] + change[i] < kLeastMass) by = std::min(by, (factor[i] - kLeastMass) / -change[i]);
+      if (factor[i] + change[i] < kMinMass) by = std::min(by, (factor[i] - kMinMass) / -change[i]);
     for (uint32_t i = 0; i < b.p.n; ++i) factor[i] += by * change[i];
   }
   for (uint32_t i = 0; i < b.p.n; ++i) b.mass += b.p.mass[i] = factor[i] * mass[i];

@@ -21,7 +21,7 @@ struct CellField {
 };
 
 // The material of the body, independent of its model: stays with its mesh.
-struct Makeup {
+struct Composition {
   std::vector<Material> materials;  // of its cells, by first cell
   std::vector<uint32_t> of;         // [ntet] index into materials; empty: the first for all
   std::vector<CellField> given;     // fields of its def
@@ -34,7 +34,7 @@ struct ModelParams {
   std::vector<uint32_t> widths;  // [key]
   std::vector<double> values;    // of all keys, end to end
   bool operator==(const ModelParams &) const = default;
-  bool sound() const {
+  bool is_valid() const {
     size_t sum = 0;
     for (const uint32_t width : widths) sum += width;
     return sum == values.size() && size_t(std::count(keys.begin(), keys.end(), '\n')) == widths.size() &&
@@ -42,7 +42,7 @@ struct ModelParams {
   }
 };
 
-// The inputs of the present instance other than the makeup.
+// The inputs of the present instance other than the composition.
 struct ModelOrigin {
   ModelParams params;
   Pose frame;                 // takes the rest positions to where the instance expects them

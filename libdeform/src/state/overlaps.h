@@ -14,28 +14,28 @@ struct Overlap {
   uint32_t crossings = 0;
   uint32_t enclosed = 0;   // surfels of one that lie inside the other, both ways
   double depth = 0;        // m, largest distance of such a surfel from the other surface
-  bool aside = false;      // too deep for contact to resolve: excluded from contact until the two are apart
+  bool suspended = false;  // too deep for contact to resolve: excluded from contact until the two are apart
   bool separated = false;  // untangle() has separated it
   uint64_t whole = 0;      // id of the body of which both are parts, and lie as contact has left them; else 0
 };
-struct PairAside { uint64_t a, b, obstacle; };
+struct SuspendedPair { uint64_t a, b, obstacle; };
 
 struct Overlaps {
   std::vector<uint64_t> placed;  // ids that the next search covers
   // search everything; search only, without moving or excluding anything
-  bool all = false, look_only = false;
+  bool all = false, report_only = false;
   bool untangle = false;       // separate what is found, once, whatever the flags of the world
   std::vector<Overlap> found;  // by the last search
-  std::vector<PairAside> aside;
-  bool told = true;  // a step has reported it
+  std::vector<SuspendedPair> suspended;
+  bool reported = true;  // a step has reported it
   // m by the body of which both are parts: the largest depth that the log has told
-  std::vector<std::pair<uint64_t, double>> told_of_parts;
-  bool is_aside(uint64_t a, uint64_t b, bool obstacle) const {
-    return std::any_of(aside.begin(), aside.end(), [&](const PairAside &p) {
+  std::vector<std::pair<uint64_t, double>> reported_depths;
+  bool is_suspended(uint64_t a, uint64_t b, bool obstacle) const {
+    return std::any_of(suspended.begin(), suspended.end(), [&](const SuspendedPair &p) {
       return p.a == a && p.b == b && (p.obstacle != 0) == obstacle;
     });
   }
-  bool due() const { return all || !placed.empty(); }
+  bool is_pending() const { return all || !placed.empty(); }
   void place(uint64_t id) {
     if (std::find(placed.begin(), placed.end(), id) == placed.end()) placed.push_back(id);
   }

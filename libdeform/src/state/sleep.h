@@ -7,19 +7,19 @@ namespace dfm {
 
 // The rest state of a body. While it sleeps, its positions, its contacts and the forces between it and others
 // stay as they were at `since`.
-struct Slumber {
+struct SleepState {
   bool asleep = false;
-  double calm = 0;   // s during which no point was fast or far from its anchor
-  double since = 0;  // s, when it fell asleep
-  double h = 0;      // s, the sub-step of its last contact impulses
-  Vec3 force;        // N, of its contacts, while asleep
+  double quiet_time = 0;  // s during which no point was fast or far from its anchor
+  double since = 0;       // s, when it fell asleep
+  double h = 0;           // s, the sub-step of its last contact impulses
+  Vec3 force;             // N, of its contacts, while asleep
 };
 
 // What waking has changed within a sub-step: if that fails, the bodies sleep as before.
 struct Roused {
   struct Was {
     uint32_t slot;
-    Slumber slumber;
+    SleepState sleep_state;
     Vec3 impulse;  // N s, of contacts since creation
   };
   Array<Was> bodies;

@@ -17,14 +17,14 @@ constexpr double kSame = 1.06;
 constexpr double kRise = 0.9;
 // s, for implicit bodies: the first step, before an error is known, and the longest step
 constexpr double kFirstOffer = 1e-3, kLongestOffer = 1.0 / 30;
-constexpr uint32_t kLeastCalm = 64;  // sub-steps: four evaluations of the bound
+constexpr uint32_t kMinQuietSteps = 64;  // sub-steps: four evaluations of the bound
 // share of the stable step that sub-steps may have while a host changes its steps: room for damping
 constexpr double kVarying = 0.75;
 // s: changes that are further apart do not follow the rhythm of a mode for long
 constexpr double kLongestRhythm = 0.1;
 // A due impulse is divided among sub-steps, so that it meets each mode in several phases: at most this share,
 // but at least this one of the stable step squared.
-constexpr double kDampingShare = 0.25, kLeastDamping = 1e-3;
+constexpr double kDampingShare = 0.25, kMinDamping = 1e-3;
 
 // The smallest of 1, 2, 3 and (4, 5, 6, 7) 2^k that is not below x.
 double count_above(double x) {
@@ -35,73 +35,74 @@ double count_above(double x) {
   return unit * std::ceil(x / unit);
 }
 
-double pieces(double dt, double longest) { return count_above(dt / longest - kRounding); }
+double substeps_of(double dt, double longest) { return count_above(dt / longest - kRounding); }
 
 // The largest of (4, 5, 6, 7) 2^k s that is not above x.
-double rung_below(double x) {
+double level_below(double x) {
   int e;
   const double m = std::frexp(x, &e);  // in [0.5, 1)
   return std::ldexp(std::floor(8 * m), e - 3);
 }
 
-void take(Rung &r, double size) {
-  if (r.size > 0 && size > r.size) r.patience = std::min(kMostPatience, 2 * r.patience);
+void take(StepLevel &r, double size) {
+  if (r.size > 0 && size > r.size) r.patience = std::min(kMaxPatience, 2 * r.patience);
   r.size = size;
-  r.calm = 0;
+  r.quiet_steps = 0;
 }
 
 // Decreases at once to `most`, the longest stable size. Increases up to `longer`, which is below it by a
 // margin; the larger the gain, the sooner.
-void settle(Rung &r, double stable, double most, double longer) {
+void update_level(StepLevel &r, double stable, double most, double longer) {
   if (!(r.size > 0 && r.size <= stable * (1 + kRounding))) return take(r, most);
-  if (!(longer > r.size * kSame)) r.calm = 0;
+  if (!(longer > r.size * kSame)) r.quiet_steps = 0;
   const double gain = longer / r.size;
-  if (r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience) take(r, longer);
+  if (r.quiet_steps >= kMinQuietSteps && r.quiet_steps * (gain * gain) >= r.patience) take(r, longer);
 }
 
-void settle_offer(Rung &r, double stable) {
-  if (std::isfinite(stable) && stable > 0) settle(r, stable, rung_below(stable), rung_below(kRise * stable));
+void update_offer(StepLevel &r, double stable) {
+  if (std::isfinite(stable) && stable > 0)
+    update_level(r, stable, level_below(stable), level_below(kRise * stable));
 }
 
-void pass(Rung &r) { r.calm += r.calm < kMostPatience; }
+void pass(StepLevel &r) { r.quiet_steps += r.quiet_steps < kMaxPatience; }
 
-bool sound(const Rung &r) {
-  return r.size >= 0 && std::isfinite(r.size) && r.calm <= kMostPatience && r.patience >= kFirstPatience &&
-         r.patience <= kMostPatience;
+bool is_valid(const StepLevel &r) {
+  return r.size >= 0 && std::isfinite(r.size) && r.quiet_steps <= kMaxPatience &&
+         r.patience >= kFirstPatience && r.patience <= kMaxPatience;
 }
 
 }  // namespace
 
 double offered_step(const StepSizes &s, double stable) {
-  Rung r = s.offer;
-  settle_offer(r, stable);
+  StepLevel r = s.offer;
+  update_offer(r, stable);
   return std::isfinite(stable) && stable > 0 ? r.size : stable;
 }
 
 double accurate_step(const StepSizes &s) {
-  return rung_below(s.accurate > 0 ? std::min(s.accurate, kLongestOffer) : kFirstOffer);
+  return level_below(s.accurate > 0 ? std::min(s.accurate, kLongestOffer) : kFirstOffer);
 }
 
 namespace {
 
-void settle_cut(Rung &r, double dt, double stable) {
+void update_cut(StepLevel &r, double dt, double stable) {
   // If a step differs little from the last one, or is a multiple of its sub-steps, their size is kept.
   const double ratio = dt / r.size, same = r.size > 0 ? count_above(ratio / kSame) : 0;
   if (same > 0 && same <= ratio * kSame) {
     r.size = dt / same;
-    settle(r, stable, dt / pieces(dt, stable), dt / pieces(dt, kRise * stable));
+    update_level(r, stable, dt / substeps_of(dt, stable), dt / substeps_of(dt, kRise * stable));
   } else {
-    take(r, dt / pieces(dt, stable));
+    take(r, dt / substeps_of(dt, stable));
   }
 }
 
 // Whether a change is one of the rare ones, forced by the bound or allowed after the patience.
 bool earned(const StepSizes &before, const StepSizes &now, double stable) {
-  const Rung &r = before.cut;
+  const StepLevel &r = before.cut;
   if (now.offer.size != before.offer.size) return true;
   const double gain = now.cut.size / r.size;
   return gain < 1 ? r.size > stable * (1 + kRounding)
-                  : r.calm >= kLeastCalm && r.calm * (gain * gain) >= r.patience;
+                  : r.quiet_steps >= kMinQuietSteps && r.quiet_steps * (gain * gain) >= r.patience;
 }
 
 bool changed_by_host(const StepSizes &before, const StepSizes &now, double stable) {
@@ -120,16 +121,16 @@ double damping_of_change(double was, double is, double stable, double since) {
 
 }  // namespace
 
-double choose_pieces(StepSizes &s, double dt, double stable) {
+double choose_substeps(StepSizes &s, double dt, double stable) {
   const StepSizes before = s;
-  settle_offer(s.offer, stable);
+  update_offer(s.offer, stable);
   if (std::isinf(stable)) return 1;
   double most = s.steady < kSteady ? kVarying * stable : stable;
-  settle_cut(s.cut, dt, most);
+  update_cut(s.cut, dt, most);
   if (changed_by_host(before, s, most)) {
     if (most == stable) {  // until now it was steady
       s.cut = before.cut;
-      settle_cut(s.cut, dt, kVarying * stable);
+      update_cut(s.cut, dt, kVarying * stable);
     }
     s.damping += damping_of_change(before.cut.size, s.cut.size, stable, s.steady);
     s.steady = 0;
@@ -137,13 +138,14 @@ double choose_pieces(StepSizes &s, double dt, double stable) {
   return std::nearbyint(dt / s.cut.size);
 }
 
-double damping_due(StepSizes &s, double h, double stable) {
+double next_damping(StepSizes &s, double h, double stable) {
   if (!(s.damping > 0) || !std::isfinite(stable)) return 0;
   const double square = stable * stable;
   const double room = std::max(0.0, 0.25 * (square - h * h));
-  const double due = std::min({s.damping, std::max(kDampingShare * s.damping, kLeastDamping * square), room});
-  s.damping -= due;
-  return due;
+  const double change =
+      std::min({s.damping, std::max(kDampingShare * s.damping, kMinDamping * square), room});
+  s.damping -= change;
+  return change;
 }
 
 double cut_finer(StepSizes &s, double size, double stable) {
@@ -161,8 +163,8 @@ void pass(StepSizes &s, double h) {
   s.steady = std::min(kSteady, s.steady + h);
 }
 
-bool sound(const StepSizes &s) {
-  return s.accurate >= 0 && sound(s.cut) && sound(s.offer) && s.steady >= 0 && s.steady <= kSteady &&
+bool is_valid(const StepSizes &s) {
+  return s.accurate >= 0 && is_valid(s.cut) && is_valid(s.offer) && s.steady >= 0 && s.steady <= kSteady &&
          s.damping >= 0 && std::isfinite(s.damping);
 }
 

@@ -16,7 +16,7 @@
 
 namespace dfm {
 
-inline constexpr uint32_t kFirstPatience = 256, kMostPatience = 65536;  // sub-steps
+inline constexpr uint32_t kFirstPatience = 256, kMaxPatience = 65536;  // sub-steps
 
 // A step is refused if the rounding of positions (16 digits) over that step exceeds a quarter of the
 // tolerance of contact (1e-6 m/s): 1 ns for each meter of distance from the origin, and at least 1 ns.
@@ -25,17 +25,17 @@ inline constexpr double kShortestStep = 1e-9;  // s
 // s: how long the size must stay the same before sub-steps may be as long as the bound allows again
 inline constexpr double kSteady = 1;
 
-struct Rung {
-  double size = 0;    // s; 0: none yet
-  uint32_t calm = 0;  // sub-steps since the bound last prevented a longer one
+struct StepLevel {
+  double size = 0;           // s; 0: none yet
+  uint32_t quiet_steps = 0;  // sub-steps since the bound last prevented a longer one
   // number of sub-steps for which the bound must allow a slightly longer one before it is used
   uint32_t patience = kFirstPatience;
 };
 
 // Lasting state: a restored world continues with it.
 struct StepSizes {
-  Rung cut;    // of the sub-steps of the last step
-  Rung offer;  // of the step that dfm_world_stable_step returns, whatever step the host takes
+  StepLevel cut;    // of the sub-steps of the last step
+  StepLevel offer;  // of the step that dfm_world_stable_step returns, whatever step the host takes
   // s, the step that the errors of the last sub-step of implicit bodies allow; 0: there was none
   double accurate = 0;
   double steady = kSteady;  // s since the host last changed the size of the sub-steps
@@ -49,15 +49,15 @@ double offered_step(const StepSizes &s, double stable);
 // change often.
 double accurate_step(const StepSizes &s);
 // number of sub-steps of the step dt, which may be too many for an integer
-double choose_pieces(StepSizes &s, double dt, double stable);
+double choose_substeps(StepSizes &s, double dt, double stable);
 // The impulse of stiffness damping c (s2: v -= c M^-1 K v) to be done after a sub-step of h; it counts as
 // done.
-double damping_due(StepSizes &s, double h, double stable);
+double next_damping(StepSizes &s, double h, double stable);
 // within a step, when the bound has fallen below size: into how many parts each sub-step is divided
 double cut_finer(StepSizes &s, double size, double stable);
 bool differ(double size, double other);  // by more than rounding
 void pass(StepSizes &s, double h);       // a sub-step of h has been taken
-bool sound(const StepSizes &s);          // whether a world could have reached it
+bool is_valid(const StepSizes &s);       // whether a world could have reached it
 
 std::string short_step(double dt, double floor);  // the sentence that refuses it
 

@@ -25,7 +25,7 @@
 
 namespace dfm {
 
-class Aside;
+class Background;
 struct LawInstance;
 struct Material;
 struct Obstacle;
@@ -51,7 +51,7 @@ struct PairWork {
   double made = 0;     // that contact has, beyond what recovery puts in
   uint64_t apart = 0;  // 0: still led to the rest distance from where they were placed
 };
-bool sound(const PairWork &p);  // could a world have come to it?
+bool is_valid(const PairWork &p);  // could a world have come to it?
 
 struct Gravity {
   std::vector<dfm_vector_key> keys;
@@ -63,18 +63,18 @@ struct Prescribed {
   double until = HUGE_VAL;  // s: keys and sines are constant from then on
   double share = 1;         // share of the constant loads
   double at(double t) const { return std::min(t, until); }
-  bool stands() const { return until < HUGE_VAL; }
+  bool is_static() const { return until < HUGE_VAL; }
 };
 
 // The host's answers about pairs (deform/callback.h), by ids: the body first, of two bodies the older one.
-struct PairAnswer {
+struct PairDecision {
   uint64_t a, b;
   bool touch;
 };
 struct MayTouch {
   dfm_may_touch_fn call = nullptr;
   void *user = nullptr;
-  std::vector<PairAnswer> answers;  // sorted by (a, b)
+  std::vector<PairDecision> decisions;  // sorted by (a, b)
 };
 struct PreSolve {
   dfm_pre_solve_fn call = nullptr;
@@ -91,8 +91,8 @@ struct Sensed {
 struct IntegratorTimes {
   double all = 0, implicit = 0;  // s
   uint64_t changes = 0;
-  bool told = false;       // a warning has said that bodies are implicit
-  bool told_blow = false;  // and one that a body did not rebound
+  bool reported = false;         // a warning has said that bodies are implicit
+  bool reported_impact = false;  // and one that a body did not rebound
 };
 
 // A measurement of creep (dfm_world_hold_begin).
@@ -103,7 +103,7 @@ struct Hold {
 
 // Number of events that are kept between steps. Beyond it many of the oldest are dropped at once, so that
 // there is room for the next steps.
-inline constexpr size_t kMostEvents = 65536;
+inline constexpr size_t kMaxEvents = 65536;
 inline constexpr size_t kEventsAtOnce = 1024;
 
 // What lasts of a world beside its bodies and obstacles. Snapshots have it.
@@ -113,7 +113,7 @@ struct WorldState {
   uint64_t step_count = 0;
   StepSizes sizes;
   EnergyWatch watch;
-  double struck_until = 0;  // s, until which bodies are explicit because of an impact; 0: none
+  double impact_until = 0;  // s, until which bodies are explicit because of an impact; 0: none
   Hold hold;
   dfm_world_stats stats{};
   std::vector<FrictionRule> friction;
@@ -154,7 +154,7 @@ struct Entities {
   // bodies without cells, which take no part in steps, in id order
   std::vector<std::unique_ptr<Body>> emptied;
   // pieces that a restore has removed; their handles are valid again when a piece gets the same id
-  std::vector<std::unique_ptr<Body>> undone;
+  std::vector<std::unique_ptr<Body>> rolled_back;
   uint64_t shapes = 0;                               // number of the last shape that a cut has made
   std::vector<std::unique_ptr<Obstacle>> obstacles;  // in id order
   std::vector<std::unique_ptr<Material>> materials;
@@ -198,7 +198,7 @@ struct World : WorldMemory, WorldState, Entities, Rules, Derived {
   std::unique_ptr<StepContext> steps;  // buffers: step/context.h
   StepImpulses step_impulses;
   uint32_t sleepers = 0;
-  std::unique_ptr<Aside> aside;  // null: nothing has been made beside the steps
+  std::unique_ptr<Background> background;  // null: nothing has been made beside the steps
 
   explicit World(dfm_context *c);
   ~World();

@@ -24,7 +24,7 @@ namespace {
 
 // Shares at which contact solves of the step end, and at which it goes without guard pieces: of max_time, and
 // of a budget that is not divided.
-constexpr double kFewSweepsAt = 0.5, kNoPiecesAt = 0.75;
+constexpr double kFewSweepsAt = 0.5, kNoCutsAt = 0.75;
 // Share of its sub-step's units at which a contact solve ends; the rest is left to solves that the guard
 // repeats.
 constexpr double kSolveShare = 0.9;
@@ -35,8 +35,8 @@ constexpr uint64_t kRigidWork = 1000;  // of a rigid body, in the automatic limi
 struct StepInterrupted {};
 
 // Worlds that were requested to stop. A signal may arrive while a lock is held, so no lock is used; 0: free.
-constexpr size_t kMostRequests = 64;
-std::array<std::atomic<uint64_t>, kMostRequests> requests{};
+constexpr size_t kMaxRequests = 64;
+std::array<std::atomic<uint64_t>, kMaxRequests> requests{};
 std::atomic<uint32_t> waiting{0};
 static_assert(std::atomic<uint64_t>::is_always_lock_free && std::atomic<uint32_t>::is_always_lock_free);
 
@@ -65,10 +65,10 @@ double used_time(const Budget &b) { return b.end > 0 ? 1 - (b.end - now()) / b.s
 
 // Units per row, where a sweep is one and the laws at a state are four: what a contact solve should have at
 // least, what the end of the present one is given, and the least of any.
-constexpr uint64_t kFairSolve = 36, kEndOfSolve = 24, kBareSolve = 12;
+constexpr uint64_t kDefaultSolve = 36, kEndOfSolve = 24, kMinSolve = 12;
 // What the guard should have: the check of the way, and one of the safe part of it, without which nothing
 // moves. The barest sub-step has the first alone.
-constexpr uint64_t kFairChecks = 2, kBareChecks = 1;
+constexpr uint64_t kDefaultChecks = 2, kMinChecks = 1;
 // A stable step is evaluated as fast as this share of the points and cells moves.
 constexpr double kBoundShareOfWork = 0.5;
 
@@ -80,22 +80,22 @@ uint64_t checks(const World &w, const StepContext &step, uint64_t number) {
 uint64_t sub_step_work(const World &w, const StepContext &step, uint64_t number, uint64_t solve) {
   return 1 + body_work(w, step) + surface_work(w, step) + checks(w, step, number) + solve * step.budget.rows;
 }
-uint64_t fair_work(const World &w, const StepContext &step) {
-  return sub_step_work(w, step, kFairChecks, kFairSolve);
+uint64_t default_work(const World &w, const StepContext &step) {
+  return sub_step_work(w, step, kDefaultChecks, kDefaultSolve);
 }
-uint64_t bare_work(const World &w, const StepContext &step) {
-  return sub_step_work(w, step, kBareChecks, kBareSolve);
+uint64_t min_work(const World &w, const StepContext &step) {
+  return sub_step_work(w, step, kMinChecks, kMinSolve);
 }
 
-uint64_t pieces_to_come(const StepContext &step) {
+uint64_t substeps_to_come(const StepContext &step) {
   return uint64_t{step.budget.to_come} + (step.h < step.rest);
 }
 
 bool holds(StepContext &step, uint64_t units) {
   const Budget &b = step.budget;
   const bool is_left =
-      b.divided ? b.work + units <= b.limit : !(double(b.work) > kNoPiecesAt * double(b.limit));
-  if (is_left && !(used_time(b) > kNoPiecesAt)) return true;
+      b.divided ? b.work + units <= b.limit : !(double(b.work) > kNoCutsAt * double(b.limit));
+  if (is_left && !(used_time(b) > kNoCutsAt)) return true;
   step.budget.cheapened = true;
   return false;
 }
@@ -121,7 +121,7 @@ struct Keep {
     value(uint64_t(a.size()));
   }
 };
-struct PutBack {
+struct Restorer {
   const unsigned char *at;
   template <class T>
   void value(T &x) {
@@ -167,7 +167,7 @@ void changing(Stream &s, World &w) {
     s.value(b->contact_impulse);
     s.value(b->energy);
     s.value(b->changes);
-    s.value(b->slumber);
+    s.value(b->sleep_state);
     s.value(b->bound);
   }
   for (auto &o : w.obstacles) {
@@ -224,21 +224,21 @@ void changed_at_once(Stream &s, World &w) {
   for (auto &t : w.tools) s.array(t->set->extra);
 }
 
-void put_back_changing(PutBack &from, World &w) {
+void restore_changing(Restorer &from, World &w) {
   changing(from, w);
   for (auto &b : w.bodies) {
     ++b->x_version;
-    if (b->slumber.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
+    if (b->sleep_state.asleep) gather_surface(b->surface, b->p.x.data(), b->p.v.data());
   }
   gather_active(w);
 }
 
 void return_to_start(World &w, StepContext &step) {
-  PutBack from{step.budget.start.data()};
+  Restorer from{step.budget.start.data()};
   changed_at_once(from, w);
   if (step.budget.kept) {
-    put_back_changing(from, w);
-    PutBack first{step.budget.start.data()};
+    restore_changing(from, w);
+    Restorer first{step.budget.start.data()};
     changed_at_once(first, w);  // of tools; the rest was saved after the step had changed them
   }
   const uint64_t cheapened = w.stats.cheapened;
@@ -283,13 +283,13 @@ bool is_used_up(const StepContext &step) {
 
 bool ends_here(const World &w, StepContext &step) {
   Budget &b = step.budget;
-  b.ended = is_used_up(step) || (b.divided && b.work + b.aside + bare_work(w, step) > b.limit);
+  b.ended = is_used_up(step) || (b.divided && b.work + b.other_work + min_work(w, step) > b.limit);
   return b.ended;
 }
 
 // Whoever asks for the stable step between two steps has it evaluated there; that changes no later result.
 void allow_for_bound(const World &w, StepContext &step) {
-  if (bound_is_new(w)) step.budget.aside += uint64_t(kBoundShareOfWork * double(body_work(w, step)));
+  if (bound_is_new(w)) step.budget.other_work += uint64_t(kBoundShareOfWork * double(body_work(w, step)));
 }
 
 void charge(World &w, StepContext &step, uint64_t units) {
@@ -305,31 +305,32 @@ void share_work(const World &w, StepContext &step) {
     return;
   }
   const auto left_by = [&](uint64_t kept) { return b.limit > b.work + kept ? b.limit - b.work - kept : 0; };
-  const uint64_t own = b.aside + checks(w, step, kFairChecks) + kEndOfSolve * b.rows;
+  const uint64_t own = b.other_work + checks(w, step, kDefaultChecks) + kEndOfSolve * b.rows;
   // a budget that does not hold all sub-steps ends the step before its end
-  const uint64_t fair = fair_work(w, step), follow = std::min(pieces_to_come(step), left_by(own) / fair);
+  const uint64_t fair = default_work(w, step), follow = std::min(substeps_to_come(step), left_by(own) / fair);
   const double left = double(left_by(own + follow * fair));
-  const double share = std::max(left / double(1 + follow), std::min(left, double(kFairSolve * b.rows)));
+  const double share = std::max(left / double(1 + follow), std::min(left, double(kDefaultSolve * b.rows)));
   b.solve_end = b.work + uint64_t(kSolveShare * share);
 }
 
 bool may_repeat(const World &w, StepContext &step) {
-  return holds(step, step.budget.aside + (2 + uint64_t{step.budget.to_come}) * fair_work(w, step));
+  return holds(step, step.budget.other_work + (2 + uint64_t{step.budget.to_come}) * default_work(w, step));
 }
 
 bool may_refine(const World &w, StepContext &step, double finer) {
-  const uint64_t pieces = (1 + uint64_t{step.budget.to_come}) * uint64_t(finer);
-  return holds(step, step.budget.aside + pieces * fair_work(w, step));
+  const uint64_t remaining = (1 + uint64_t{step.budget.to_come}) * uint64_t(finer);
+  return holds(step, step.budget.other_work + remaining * default_work(w, step));
 }
 
 bool may_solve_again(const World &w, StepContext &step, size_t hits) {
   const Budget &b = step.budget;
-  return holds(step, b.aside + pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1 + kFairChecks) +
-                         kFairSolve * (b.rows + hits));
+  return holds(step, b.other_work + substeps_to_come(step) * default_work(w, step) +
+                         checks(w, step, 1 + kDefaultChecks) + kDefaultSolve * (b.rows + hits));
 }
 
 bool may_check(const World &w, StepContext &step) {
-  return !step.budget.divided || holds(step, pieces_to_come(step) * fair_work(w, step) + checks(w, step, 1));
+  return !step.budget.divided ||
+         holds(step, substeps_to_come(step) * default_work(w, step) + checks(w, step, 1));
 }
 
 void spend(const World &w, const StepContext &, Spent &spent, uint64_t units) {
@@ -349,7 +350,7 @@ void charge(World &w, StepContext &step, const Spent &spent) {
   charge(w, step, spent.work);
 }
 
-void keep_start(World &w, StepContext &step) {
+void save_start(World &w, StepContext &step) {
   Budget &b = step.budget;
   if (b.kept) return;
   Keep to{b.start};
@@ -367,18 +368,18 @@ void write_down(World &w, StepContext &step, std::vector<unsigned char> &out) {
   reserve_others(w, step);
 }
 
-void put_back(World &w, StepContext &step, const std::vector<unsigned char> &from) {
-  PutBack at{from.data()};
+void restore_start(World &w, StepContext &step, const std::vector<unsigned char> &from) {
+  Restorer at{from.data()};
   at.value(w.stats);
   changed_at_once(at, w);
-  put_back_changing(at, w);
+  restore_changing(at, w);
   step.guard.forget();
 }
 
 dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   StepContext &step = *w.steps;
   Budget &b = step.budget;
-  b.work = b.limit = b.aside = 0;
+  b.work = b.limit = b.other_work = 0;
   b.kept = b.ended = b.cheapened = false;
   b.stats = w.stats;
   b.span = w.def.max_time;
@@ -388,11 +389,11 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
-  const bool struck = w.struck_until > 0;
+  const bool in_impact = w.impact_until > 0;
   try {
     status = run_step(w, step, dt, trouble);
   } catch (const StepInterrupted &) {
-    if (w.struck_until > 0 && !struck) end_impact(w);  // it began in this step
+    if (w.impact_until > 0 && !in_impact) end_impact(w);  // it began in this step
     return_to_start(w, step);
     set_last_error(format("step %llu was interrupted; the state is as before the step",
                           static_cast<unsigned long long>(w.step_count))
@@ -403,8 +404,8 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   if (b.ended) ++w.stats.shortened;
   if (b.cheapened) ++w.stats.cheapened;
   if (b.ended || b.cheapened) *trouble |= DFM_TROUBLE_BUDGET;
-  if (w.events.size() > kMostEvents)
-    w.events.erase(w.events.begin(), w.events.end() - kMostEvents + kEventsAtOnce);
+  if (w.events.size() > kMaxEvents)
+    w.events.erase(w.events.begin(), w.events.end() - kMaxEvents + kEventsAtOnce);
   w.stats.work = b.work;
   w.stats.work_max = std::max(w.stats.work_max, b.work);
   return status;

@@ -16,7 +16,7 @@ struct World;
 struct Budget {
   uint64_t work = 0, limit = 0;  // units of the present step; limit 0: not planned yet
   // Units that the step takes beside them, from what is free: that of the stable step.
-  uint64_t aside = 0;
+  uint64_t other_work = 0;
   // Whether the limit is divided: each sub-step has its share, beside what the others need. The default limit
   // is not, because it ends steps that would not end.
   bool divided = false;
@@ -76,9 +76,9 @@ bool may_check(const World &w, StepContext &step);
 // Everything that steps change; between two steps the saved state is restored. Bodies and their dynamics are
 // the same.
 void write_down(World &w, StepContext &step, std::vector<unsigned char> &out);
-void put_back(World &w, StepContext &step, const std::vector<unsigned char> &from);
+void restore_start(World &w, StepContext &step, const std::vector<unsigned char> &from);
 // The state before the step is saved once, before any of it changes.
-void keep_start(World &w, StepContext &step);
+void save_start(World &w, StepContext &step);
 
 // Requests the present step of a world (or the next one, if none runs) to stop. Async-signal-safe. Returns
 // false if too many requests are pending.

@@ -30,13 +30,13 @@ constexpr double kAlong = 0.1;  // of the stable step: a way on which strains ch
 
 // What a host's changes of the step put into bodies (doc/decisions/energy_watch.md).
 void damp_changes_of_size(World &w, const StepContext &step) {
-  const double stable = w.bound.step / kBoundShare, c = damping_due(w.sizes, step.guard.planned, stable);
+  const double stable = w.bound.step / kBoundShare, c = next_damping(w.sizes, step.guard.planned, stable);
   if (!(c > 0)) return;
   w.context->tasks.parallel_for(
       static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToPull),
       [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
-          const OnBehalf speaks(w.bodies[i]->name);
+          const OnBehalf prefix(w.bodies[i]->name);
           w.bodies[i]->dynamics->damp(w.time + step.h, c, kAlong * stable);
         }
       });
@@ -45,7 +45,7 @@ void damp_changes_of_size(World &w, const StepContext &step) {
 
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
-  const bool touched = w.plan.has(StageRole::gives_impulses) && step.rows.all() > 0;
+  const bool touched = w.plan.has(StageRole::reports_impulses) && step.rows.all() > 0;
   const bool guarded = w.plan.has(StageRole::guards);
   if (guarded) step.guard.common.assign(w.bodies.size(), {});
   FirstFailure failed;
@@ -54,8 +54,8 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
       [&](uint32_t begin, uint32_t end) {
         for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
           Body &b = *w.bodies[i];
-          if (guarded) look_at_motion(w, step, i);
-          const OnBehalf speaks(b.name);
+          if (guarded) check_motion(w, step, i);
+          const OnBehalf prefix(b.name);
           if (!b.dynamics->end_state(now, b.surfel_impulse.data(), touched)) failed.note(i);
         }
       });
@@ -72,16 +72,16 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
 
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.ended && !find_ends(w, step, trouble)) return false;
-  step.struck = is_struck(w, step);
-  if (step.struck) return false;
+  step.in_impact = has_impact(w, step);
+  if (step.in_impact) return false;
   const SubStep now = sub_step_of(w, step);
   if (step.guard.motion < 1)
     for (const uint32_t i : step.active) {
       Body &b = *w.bodies[i];
-      const OnBehalf speaks(b.name);
+      const OnBehalf prefix(b.name);
       // for the work over the part of the motion that the guard has left out
       if (b.dynamics->see_end(now)) continue;
-      *trouble |= tell_no_forces(w, b);
+      *trouble |= report_no_forces(w, b);
       return false;
     }
   book_energy(w, step, step.guard.motion);

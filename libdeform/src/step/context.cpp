@@ -24,11 +24,12 @@ StepContext::StepContext(const Meters &meters)
   use_memory(meters.steps.memory(), driven, free_kinetic, looks, block_surfels, near, touching, active, woken,
              stirred, roused.bodies, roused.dwell, roused.total);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
-             best_impulse, tangents, asked_back, owed, match, sharing, aim, stands, ways, renewed, thrown,
-             motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before, goes_on, given.list);
+             best_impulse, tangents, slip_back, stick_drift, match, sharing, target_area, keeps_area, ways,
+             renewed, thrown, motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before, goes_on,
+             given.list);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
-             guard.common, guard.kept, guard.blocks.pieces);
+             guard.common, guard.kept, guard.blocks.ranges);
   GuardMemory &known = guard.memory;
   use_memory(meters.detection.memory(), known.runs, known.old_runs, known.features, known.old_features,
              known.rest, known.old_rest, known.normal, known.old_normal, known.before);

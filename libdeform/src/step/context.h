@@ -46,7 +46,7 @@ struct StepContext {
   double h = 0, left = 0, rest = 0;
   Budget budget;
   double offered = 0;                  // s, length of the step if the library has chosen it, else 0
-  bool struck = false;                 // the sub-step is to be repeated explicitly (step/impact.h)
+  bool in_impact = false;              // the sub-step is to be repeated explicitly (step/impact.h)
   std::vector<StageTime> stage_times;  // by row of the table
 
   // prepare(): the world's entities as the stages see them
@@ -67,7 +67,7 @@ struct StepContext {
   Array<Driven> driven;
   // predict
   Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step
-  Array<EnergyLook> looks;     // [active]
+  Array<EnergySample> looks;   // [active]
   // broad, narrow, self
   BroadPhase broad;
   Array<ContactPoint> contacts;
@@ -92,8 +92,8 @@ struct StepContext {
   Array<RigidMotion> motions;  // [bodies] at the start of the sub-step, of those with such contacts
   Array<uint8_t> marked;       // [bodies] scratch of it
   // both empty where no law holds places (stuck_slip.h)
-  Array<double> asked_back;  // [contacts,2] m/s, slip that the solve takes back; of islands that owe
-  Array<double> owed;        // [contacts,3] m, slip since the contact sticks
+  Array<double> slip_back;    // [contacts,2] m/s, slip that the solve takes back; of islands that owe
+  Array<double> stick_drift;  // [contacts,3] m, slip since the contact sticks
   // [contacts] index of the contact in the store of the last sub-step, or kNone
   Array<uint32_t> match;
   Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
@@ -115,16 +115,16 @@ struct StepContext {
   AreaExchange exchange;
   // law of contacts whose areas follow the load, else kNone
   Array<uint32_t> sharing;
-  bool shares = false;  // whether any law uses area
-  Array<double> aim;    // [contacts] m2, areas by the load, if so
+  bool shares = false;        // whether any law uses area
+  Array<double> target_area;  // [contacts] m2, areas by the load, if so
   Renewal renewal;
-  Array<uint8_t> stands;  // [contacts] is loaded, and keeps its area
+  Array<uint8_t> keeps_area;  // [contacts] is loaded, and keeps its area
   Array<Renewal::Way> ways;
   Array<double> renewed;
 
   // distribute, guard
   std::vector<ImpulseSink> sinks;
-  GivenNodes given;
+  WrittenNodes given;
   bool ended = false;  // find_ends() has been called since the last solve
   Guard guard;
   // commit

@@ -46,7 +46,7 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
   FirstFailure failed;
   const auto forces = [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
-      const OnBehalf speaks(w.bodies[i]->name);
+      const OnBehalf prefix(w.bodies[i]->name);
       // booked with them: work of what holds driven points, and what another size of sub-steps changes
       const bool keep = !w.bodies[i]->motions.empty() || w.watch.size_before > 0;
       if (!w.bodies[i]->dynamics->add_forces(now, keep)) failed.note(i);
@@ -58,11 +58,11 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
     w.context->tasks.parallel_for(n, bodies_together(w, active, kPointsToPull),
                                   [&](uint32_t begin, uint32_t end) { forces(begin, end); });
   if (failed.body == kNone) return true;
-  *trouble |= tell_no_forces(w, *w.bodies[failed.body]);
+  *trouble |= report_no_forces(w, *w.bodies[failed.body]);
   return false;
 }
 
-uint32_t tell_no_forces(const World &w, const Body &b) {
+uint32_t report_no_forces(const World &w, const Body &b) {
   set_last_error(format("step %llu, body '%s': model '%s' could not compute its forces; take a smaller step "
                         "or change the model",
                         static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
@@ -91,7 +91,7 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
   const auto move = [&](uint32_t begin, uint32_t end) {
     for (const uint32_t i : active.subspan(begin, end - begin)) {
       Body &b = *w.bodies[i];
-      const OnBehalf speaks(b.name);
+      const OnBehalf prefix(b.name);
       if (!b.dynamics->free_motion(now, kinetic[i])) failed.note(i);
       if (touches && b.surface.identity())
         gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());

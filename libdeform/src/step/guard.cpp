@@ -39,7 +39,7 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
-constexpr double kLeastCut = 0.25;
+constexpr double kMinCut = 0.25;
 // Strain: above the first a sub-step is repeated finer, until it is below the second.
 constexpr double kHardImpact = 0.08, kSoftImpact = 0.05;
 constexpr double kFinest = 4;    // sub-steps that an impact makes of one
@@ -166,7 +166,7 @@ bool withstands_impacts(World &w, StepContext &step) {
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
     const Impact impact = impact_on(step, b, i);
-    if (impact.strain > kBoundStrain) bound_is_due(w);
+    if (impact.strain > kBoundStrain) expire_bound(w);
     if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);
   }
   if (!(hard > kHardImpact || straight > kStraight) || step.h != g.planned || g.finer > 1) return true;
@@ -236,7 +236,7 @@ void set_sides(World &w, StepContext &step) {
     const Body &b = *w.bodies[i];
     GuardSide &s = scene.sides[i];
     make_room(s, b.surface);
-    s.still = b.slumber.asleep;
+    s.still = b.sleep_state.asleep;
     s.whole = b.surface.origin.empty() ? 0 : b.surface.whole(b.id);
     s.travel = s.spread = step.h * step.guard.speed[i];
     s.drift = {};
@@ -275,7 +275,7 @@ void set_sides(World &w, StepContext &step) {
 double set_back_ends(GuardScene &scene, GuardSide &side, Surface &s) {
   double most = 0;
   const auto straight = [&](uint32_t i) { return scene.fraction * scene.h * s.sum(i, side.mean); };
-  for (const uint32_t t : s.laid)
+  for (const uint32_t t : s.coincident)
     for (size_t k = 0; k < 3; ++k) {
       const uint32_t i = s.tri[3 * size_t{t} + k];
       if (std::exchange(side.stamp[i], scene.round) == scene.round) continue;
@@ -378,7 +378,7 @@ double find_hits(World &w, StepContext &step) {
     return of_one_body(c) ? !(guarded_apart(w, step, c) > 0) : cross_at_start(step, c);
   });
   guard_obstacles(g.scene, list, g.near, g.hits);
-  guard_ask_hits(w, step);
+  guard_filter_hits(w, step);
   double least = 1;
   for (const GuardHit &hit : g.hits) least = std::min(least, hit.safe);
   return least;
@@ -400,7 +400,7 @@ bool wake_hit(World &w, StepContext &step) {
 // problem that it belongs to has no solution, and its rounding error becomes motion. Overlapping bodies at
 // the start have no solution either, but are led apart (concepts/overlaps.md).
 bool overloaded(const World &w, const StepContext &step) {
-  if (!(step.residual.due > 1) || !w.overlaps.found.empty()) return false;
+  if (!(step.residual.required > 1) || !w.overlaps.found.empty()) return false;
   for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight) return true;
   return false;
@@ -410,7 +410,7 @@ bool overloaded(const World &w, const StepContext &step) {
 // would grow from sub-step to sub-step, and their rounding error would become motion. Only prescribed motion
 // can cause this, because a free body yields.
 bool jammed(const World &w, const StepContext &step) {
-  if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.due > 1))
+  if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.required > 1))
     return false;
   // contact may have an answer that the budget has not let it find
   if (step.budget.divided && step.budget.cheapened) return false;
@@ -448,7 +448,7 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
   return yes;
 }
 
-void look_at_motion(const World &w, StepContext &step, uint32_t i) {
+void check_motion(const World &w, StepContext &step, uint32_t i) {
   if (w.plan.has(StageRole::lists_pairs) && step.h * step.broad.speed(i) > kSlow * floor_of(w))
     step.guard.common[i] = common_motion(w.bodies[i]->surface);
 }
@@ -457,7 +457,7 @@ void look_at_motion(const World &w, StepContext &step, uint32_t i) {
 Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.solves == 0) step.guard.kept.clear();
   if (overloaded(w, step)) {
-    *trouble |= tell_jam(w, step);
+    *trouble |= report_jam(w, step);
     return Next::stop;
   }
   if (!find_ends(w, step, trouble)) return Next::stop;
@@ -482,10 +482,10 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     ++w.stats.guard_solves;
     return Next::solve;
   }
-  if (step.guard.pieces < kCuts && may_repeat(w, step)) {
-    ++step.guard.pieces;
+  if (step.guard.cuts < kCuts && may_repeat(w, step)) {
+    ++step.guard.cuts;
     ++w.stats.guard_cuts;
-    step.guard.cut = std::max(safe, kLeastCut);
+    step.guard.cut = std::max(safe, kMinCut);
     step.guard.again = true;
     return Next::stop;
   }
@@ -496,14 +496,14 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
       return of_cut(w, step, (*step.guard.list)[hit.candidate]);
     });
   };
-  const bool cuts = hits_cuts(), saves = step.guard.pieces < kCuts;
+  const bool cuts = hits_cuts(), saves = step.guard.cuts < kCuts;
   if (!(cuts && saves)) take_safe_part(w, step, cuts, safe);
   else if (take_safe_part(w, step, false, safe); step.guard.motion < kNoWay && may_check(w, step)) {
     set_fraction(w, step, 1);
     take_safe_part(w, step, true, safe);
   }
   if (jammed(w, step)) {
-    *trouble |= tell_jam(w, step);
+    *trouble |= report_jam(w, step);
     return Next::stop;
   }
   if (!withstands_impacts(w, step)) return Next::stop;

@@ -54,14 +54,14 @@ struct Guard {
   double planned = 0;  // s, the sub-step before it was shortened
   // Sub-steps into which a hard impact divides it and each later one; limit.
   double finer = 1, most_finer = 1;
-  uint32_t pieces = 0;                // cuts of this planned sub-step
+  uint32_t cuts = 0;                  // cuts of this planned sub-step
   bool acted = false, again = false;  // in this sub-step; it must be repeated
   bool refines = false;               // then: because of an impact, as the first of `finer` sub-steps
   bool lets_slits = false;            // hits across slits no longer count
   double cut = 1;                     // then: factor on its length
   bool fast = false;                  // then: because a rigid thing goes or turns too far
-  double piece = 0;   // s, at which the next piece begins after such a cut; 0: the rest of the sub-step
-  double motion = 1;  // < 1: fraction of the displacement that is taken
+  double next_size = 0;  // s, size of the next sub-step after such a cut; 0: the rest of the sub-step
+  double motion = 1;     // < 1: fraction of the displacement that is taken
 
   void start() {
     kept.clear();
@@ -78,11 +78,11 @@ struct Guard {
 // slot_b if both are bodies.
 bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle);
 // Finds guard.common of body i, beside its end, if it moves so far that the guard needs it.
-void look_at_motion(const World &w, StepContext &step, uint32_t i);
+void check_motion(const World &w, StepContext &step, uint32_t i);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.
 void guard_add_hits(World &w, StepContext &step);
 // Drops hits whose contacts the host rejects (PreSolve).
-void guard_ask_hits(World &w, StepContext &step);
+void guard_filter_hits(World &w, StepContext &step);
 // Called while a solve is prepared, if guard.resolving: takes the impulses and the rates of hits from `kept`.
 void guard_impulses(StepContext &step);
 void guard_rates(StepContext &step);

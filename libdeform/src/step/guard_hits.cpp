@@ -18,7 +18,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostHits = 128;
+constexpr uint32_t kMaxHits = 128;
 
 // Makes a contact from a hit: features, places and normal at the hit time. Returns the distance of the two
 // places along that normal at the start, to which the straight motion is added.
@@ -187,7 +187,7 @@ uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c
   }
 }
 
-// Keeps the earliest hit of each feature with each other side, and of those the earliest kMostHits: an impact
+// Keeps the earliest hit of each feature with each other side, and of those the earliest kMaxHits: an impact
 // triggers all pairs around it, remaining hits are tested again, and a solve with thousands of nearly equal
 // rows would not converge.
 void choose_hits(StepContext &step) {
@@ -208,7 +208,7 @@ void choose_hits(StepContext &step) {
                          [&](const GuardHit &l, const GuardHit &r) { return side(l) == side(r); }),
              hits.end());
   std::sort(hits.begin(), hits.end(), earlier);
-  if (hits.size() > kMostHits) hits.resize(kMostHits);
+  if (hits.size() > kMaxHits) hits.resize(kMaxHits);
 }
 
 bool precedes(const Guard::Kept &l, const Guard::Kept &r) {
@@ -231,7 +231,7 @@ double rests_at(const World &w, const StepContext &step, const ContactPoint &c) 
 
 }  // namespace
 
-void guard_ask_hits(World &w, StepContext &step) {
+void guard_filter_hits(World &w, StepContext &step) {
   if (!w.pre_solve.call) return;
   std::erase_if(step.guard.hits, [&](const GuardHit &hit) {
     ContactPoint c;
@@ -240,7 +240,7 @@ void guard_ask_hits(World &w, StepContext &step) {
     for (const ContactPoint &o : step.contacts)
       if (same_features(o, c)) return false;
     c.key = free_key(w, step, c);
-    return !ask_host(w, step, c);
+    return !query_host(w, step, c);
   });
 }
 
@@ -286,7 +286,7 @@ void guard_add_hits(World &w, StepContext &step) {
       c.key = same->key;
       if (const auto first = kept(*same); !first->hit) {
         c.area = same->area;
-        c.lender = same->lender;
+        c.area_node_plus_1 = same->area_node_plus_1;
         *same = c;
         first->rate = rate;
         first->hit = true;

@@ -17,7 +17,7 @@ namespace dfm {
 namespace {
 
 // A tool goes where its hand or path puts it, unless a spring couples the two.
-bool yields(const World &w, const Obstacle &o) {
+bool can_move(const World &w, const Obstacle &o) {
   if (!o.rigid) return false;
   if (!o.rigid->of_tool) return !o.rigid->defs[o.rigid_body].fixed;
   return std::any_of(w.tools.begin(), w.tools.end(),
@@ -28,12 +28,12 @@ bool yields(const World &w, const Obstacle &o) {
 
 HeldIn held_in(const World &w, OverlapSides &sides, const OverlapPair &p, double deeper) {
   HeldIn most;
-  if (!p.obstacle || yields(w, *w.obstacles[p.b])) return most;
+  if (!p.obstacle || can_move(w, *w.obstacles[p.b])) return most;
   const uint64_t id = w.obstacles[p.b]->id;
   for (const Attachment &a : w.attachments) {
     if (a.released || !a.obstacle || a.body != w.bodies[p.a]->id) continue;
     if (a.to == id && !(a.flags & DFM_ATTACH_TOUCH)) continue;
-    if (a.stiffness > 0 || a.damping > 0 || yields(w, *w.obstacles[obstacle_slot_of(w, a.to)])) continue;
+    if (a.stiffness > 0 || a.damping > 0 || can_move(w, *w.obstacles[obstacle_slot_of(w, a.to)])) continue;
     uint32_t n = 0;
     // where it holds them, which a body that is torn to and fro may have left by now
     for (size_t i = 0; i < a.surfels.size(); ++i) n += sides.depth(p, attached_place(w, a, i)) > deeper;
@@ -42,7 +42,7 @@ HeldIn held_in(const World &w, OverlapSides &sides, const OverlapPair &p, double
   return most;
 }
 
-std::string tell_held_in(const World &w, const HeldIn &held, uint32_t b) {
+std::string describe_held_in(const World &w, const HeldIn &held, uint32_t b) {
   const Obstacle &in = *w.obstacles[b], &to = *w.obstacles[obstacle_slot_of(w, held.by->to)];
   const bool one = held.points == 1;
   const std::string holds =
@@ -55,14 +55,14 @@ std::string tell_held_in(const World &w, const HeldIn &held, uint32_t b) {
                      in.name.c_str(), to.name.c_str());
 }
 
-std::string tell_held_at(World &w, uint32_t a, uint32_t b) {
+std::string describe_held_at(World &w, uint32_t a, uint32_t b) {
   if (w.attachments.empty()) return {};
   OverlapSides sides(w);
   // a contact bears at the rest distance, and what is pressed on it may lag by as much, and by a sub-step
   double way = 0;
   for (const ObstacleView &v : w.steps->obstacle_views) way = std::max(way, w.steps->h * norm(v.velocity));
   const HeldIn held = held_in(w, sides, {a, b, true}, -2 * w.offset - way);
-  return held.by ? tell_held_in(w, held, b) : std::string();
+  return held.by ? describe_held_in(w, held, b) : std::string();
 }
 
 }  // namespace dfm

@@ -21,8 +21,8 @@ struct HeldIn {
 // it, too.
 HeldIn held_in(const World &w, OverlapSides &sides, const OverlapPair &p, double deeper);
 // "its attachment to ... ", what it does, and what to do; b: slot of the obstacle that they are in.
-std::string tell_held_in(const World &w, const HeldIn &held, uint32_t b);
+std::string describe_held_in(const World &w, const HeldIn &held, uint32_t b);
 // For a message about body `a` on obstacle `b`, by slot, in a step that fails: the same, or "".
-std::string tell_held_at(World &w, uint32_t a, uint32_t b);
+std::string describe_held_at(World &w, uint32_t a, uint32_t b);
 
 }  // namespace dfm

@@ -30,14 +30,14 @@ constexpr double kWeights = 2, kWay = 0.05, kLost = 0.5;
 constexpr double kEdges = 36;
 constexpr double kSame = 1e-6;  // relative: a step of the announced length
 
-bool is_implicit(const Body &b) { return b.integrator.chosen == Chosen::implicit && !b.slumber.asleep; }
+bool is_implicit(const Body &b) { return b.integrator.chosen == Chosen::implicit && !b.sleep_state.asleep; }
 
 bool touched(const Body &b) {
   return std::ranges::any_of(b.surfel_impulse, [](double p) { return p != 0; });
 }
 
 // speed: m/s, out, at which it comes: of its mean velocity, or the change of that, if it is hit.
-bool struck(const World &w, const StepContext &step, const Body &b, double &speed) {
+bool in_impact(const World &w, const StepContext &step, const Body &b, double &speed) {
   const double *const end = b.dynamics->end().v;
   Vec3 gained, came;
   double mass = 0, lost = 0;
@@ -55,11 +55,11 @@ bool struck(const World &w, const StepContext &step, const Body &b, double &spee
 }
 
 bool damps(const Body &b) {
-  return !b.model.stepper && !b.slumber.asleep && b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  return !b.model.stepper && !b.sleep_state.asleep && b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
 }
 
 // Once per world: the body keeps nothing of the speed at which it came.
-void tell_blow(World &w, const StepContext &step, const Body &b, double speed) {
+void warn_impact(World &w, const StepContext &step, const Body &b, double speed) {
   const ContactPoint *at = nullptr;  // where it presses most
   double most = 0;
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
@@ -70,7 +70,7 @@ void tell_blow(World &w, const StepContext &step, const Body &b, double speed) {
     at = &c;
   }
   if (!at) return;
-  w.integrator_times.told_blow = true;
+  w.integrator_times.reported_impact = true;
   const std::string &other = at->obstacle           ? w.obstacles[at->slot_b]->name
                              : at->slot_a != b.slot ? w.bodies[at->slot_a]->name
                                                     : w.bodies[at->slot_b]->name;
@@ -94,9 +94,9 @@ size_t turn(World &w, Chosen from, Chosen to) {
     b->dynamics.swap(dynamics);
     b->integrator.chosen = to;
     b->integrator.used =
-        to == Chosen::struck ? uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER} : implicit_integrator(w, *b);
+        to == Chosen::in_impact ? uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER} : implicit_integrator(w, *b);
     b->bound.known = false;
-    settle_dampers(b->p);
+    relax_dampers(b->p);
   }
   if (made.empty()) return 0;
   ++w.integrator_times.changes;
@@ -117,17 +117,17 @@ bool chosen_by_library(const World &w, double dt) {
   return !(std::fabs(dt - w.def.step) <= kSame * w.def.step) && dt <= accurate_step(w.sizes);
 }
 
-bool is_struck(World &w, const StepContext &step) {
-  if (step.rows.soft() == 0 || w.prescribed.stands()) return false;
+bool has_impact(World &w, const StepContext &step) {
+  if (step.rows.soft() == 0 || w.prescribed.is_static()) return false;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
     const bool repeats =
         step.offered > 0 && is_implicit(b) && step.offered / b.integrator.step <= w.def.max_substeps;
-    if (!repeats && (!damps(b) || w.integrator_times.told_blow)) continue;
+    if (!repeats && (!damps(b) || w.integrator_times.reported_impact)) continue;
     double speed = 0;
-    if (!touched(b) || !struck(w, step, b, speed) || has_restitution(w, step, b)) continue;
+    if (!touched(b) || !in_impact(w, step, b, speed) || has_restitution(w, step, b)) continue;
     if (repeats) return true;
-    tell_blow(w, step, b, speed);
+    warn_impact(w, step, b, speed);
   }
   return false;
 }
@@ -138,17 +138,17 @@ void begin_impact(World &w) {
     if (is_implicit(*b))
       lasts = std::max(lasts, kEdges * extent_of(b->p.x.data(), b->p.n, kStride).diagonal() /
                                   b->surface.median_edge * b->integrator.step);
-  turn(w, Chosen::implicit, Chosen::struck);
-  w.struck_until = w.time + lasts;
-  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.struck_until);
+  turn(w, Chosen::implicit, Chosen::in_impact);
+  w.impact_until = w.time + lasts;
+  w.context->logf(DFM_LOG_INFO, "a body was struck: explicit steps until %g s", w.impact_until);
 }
 
 bool end_impact(World &w) {
-  w.struck_until = 0;
+  w.impact_until = 0;
   for (const auto &b : w.bodies)  // parameters may have changed
-    if (b->integrator.chosen == Chosen::struck && !b->model.can(DFM_CAP_STIFFNESS))
+    if (b->integrator.chosen == Chosen::in_impact && !b->model.can(DFM_CAP_STIFFNESS))
       b->integrator.chosen = Chosen::explicitly;
-  return turn(w, Chosen::struck, Chosen::implicit) > 0;
+  return turn(w, Chosen::in_impact, Chosen::implicit) > 0;
 }
 
 void follow_impact(World &w, double dt) {
@@ -156,9 +156,9 @@ void follow_impact(World &w, double dt) {
     return std::ranges::any_of(w.bodies, [&](const auto &b) { return b->integrator.chosen == what; });
   };
   const bool implicit = any(Chosen::implicit);
-  if (implicit || any(Chosen::struck)) w.integrator_times.all += dt;
+  if (implicit || any(Chosen::in_impact)) w.integrator_times.all += dt;
   if (implicit) w.integrator_times.implicit += dt;
-  if (w.struck_until > 0 && !(w.time < w.struck_until)) end_impact(w);
+  if (w.impact_until > 0 && !(w.time < w.impact_until)) end_impact(w);
 }
 
 }  // namespace dfm

@@ -15,7 +15,7 @@ struct World;
 bool chosen_by_library(const World &w, double dt);
 // Before a sub-step is committed: whether one of its bodies has been struck, so that the sub-step is to be
 // repeated after begin_impact(). Warns where it may not be repeated.
-bool is_struck(World &w, const StepContext &step);
+bool has_impact(World &w, const StepContext &step);
 // Why bodies that move by this implicit integrator will not rebound: a clause.
 const char *why_no_rebound(uint32_t integrator);
 // Makes the implicit bodies of the library's choice explicit until the impact is over. The world must be

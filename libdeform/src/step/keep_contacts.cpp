@@ -185,8 +185,8 @@ void keep_contacts(World &w, StepContext &step) {
         if (column.width != kOwnLength) values.resize(column.entries(n, S));
       },
       to);
-  if (step.owed.empty()) std::fill(to.owed.begin(), to.owed.end(), 0.0);
-  else std::copy_n(step.owed.begin(), size_t(3) * n, to.owed.begin());
+  if (step.stick_drift.empty()) std::fill(to.stick_drift.begin(), to.stick_drift.end(), 0.0);
+  else std::copy_n(step.stick_drift.begin(), size_t(3) * n, to.stick_drift.begin());
   w.report.n = n;
   w.report.h = step.h;
   w.report.contacts.resize(n);

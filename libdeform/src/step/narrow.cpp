@@ -91,15 +91,15 @@ void turn_false_depths(World &w, StepContext &step) {
 
 Next stage_narrow(World &w, StepContext &step, uint32_t *) {
   step.narrow.forget_speeds();
-  for (const uint32_t i : step.active) step.narrow.tell_speed(step.body_views, i, step.broad.speed(i));
+  for (const uint32_t i : step.active) step.narrow.set_speed(step.body_views, i, step.broad.speed(i));
   find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
                 w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks);
   turn_false_depths(w, step);
   step.woken.clear();
   if (w.sleepers == 0) return Next::stage;
   for (const ContactPoint &c : step.contacts) {
-    if (w.bodies[c.slot_a]->slumber.asleep) wake(w, *w.bodies[c.slot_a]);
-    if (!c.obstacle && w.bodies[c.slot_b]->slumber.asleep) wake(w, *w.bodies[c.slot_b]);
+    if (w.bodies[c.slot_a]->sleep_state.asleep) wake(w, *w.bodies[c.slot_a]);
+    if (!c.obstacle && w.bodies[c.slot_b]->sleep_state.asleep) wake(w, *w.bodies[c.slot_b]);
   }
   std::sort(step.woken.begin(), step.woken.end());
   return step.woken.empty() ? Next::stage : Next::woken;

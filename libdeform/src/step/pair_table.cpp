@@ -82,19 +82,20 @@ uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> va
   const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, name);
   std::vector<double> packed = pack_params(type, values);
   for (uint32_t i = 0; i < w.laws.size(); ++i)
-    if (w.laws[i]->asked_type == &type && w.laws[i]->asked == packed && w.laws[i]->restitution == restitution)
+    if (w.laws[i]->requested_type == &type && w.laws[i]->requested == packed &&
+        w.laws[i]->restitution == restitution)
       return i;
   auto law = make_law(w, type, std::move(packed), restitution);
   for (const LeftOut &o : left_out_of(*law)) warn_of(*w.context, o);
   return place_law(w, std::move(law), free);
 }
 
-std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked,
+std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> requested,
                                       double restitution) {
-  SelectedLaw made = select_law(w.context->registry, w.context->host, w.selection, type, asked);
+  SelectedLaw made = select_law(w.context->registry, w.context->host, w.selection, type, requested);
   auto law = std::make_unique<LawInstance>(*made.type, w.context->host, std::move(made.values));
-  law->asked_type = &type;
-  law->asked = std::move(asked);
+  law->requested_type = &type;
+  law->requested = std::move(requested);
   law->restitution = restitution;
   return law;
 }

@@ -21,7 +21,7 @@ struct World;
 uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
                  std::span<const uint8_t> free = {}, double restitution = kNoRestitution);
 // The same for the requested law without the effects that the list leaves out.
-std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> asked,
+std::unique_ptr<LawInstance> make_law(const World &w, const dfm_type &type, std::vector<double> requested,
                                       double restitution);
 uint32_t place_law(World &w, std::unique_ptr<LawInstance> law, std::span<const uint8_t> free);
 

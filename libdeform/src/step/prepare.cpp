@@ -137,7 +137,7 @@ Varying varying(const World &w) {
 }
 
 // Updates only the plan, if changed values call for another stage.
-void look_at_plan(World &w, StepContext &step) {
+void check_plan(World &w, StepContext &step) {
   const Varying now = varying(w);
   if (now != static_cast<const Varying &>(step.facts)) {
     SceneFacts facts = step.facts;
@@ -245,21 +245,21 @@ Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
           o.sensor};
 }
 
-bool before_pair(const PairAnswer &l, const PairAnswer &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
+bool before_pair(const PairDecision &l, const PairDecision &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
 
 // For a pair allowed by masks and rules: whether one is a sensor, or the host refuses. The host is called if
 // it has not answered yet: things i < j.
 bool refused(const World &w, const StepContext &step, uint32_t i, uint32_t j, const Partner &a,
-             const Partner &b, std::vector<PairAnswer> &answers) {
+             const Partner &b, std::vector<PairDecision> &decisions) {
   if (a.sensor || b.sensor) return true;
   if (!w.may_touch.call || !b.has_shape) return false;
   if (j < i) return !w.pairs.filter.may_touch(step.body_views[j], step.body_views[i]);
-  const auto find = [](const std::vector<PairAnswer> &in, const PairAnswer &pair) {
+  const auto find = [](const std::vector<PairDecision> &in, const PairDecision &pair) {
     const auto at = std::lower_bound(in.begin(), in.end(), pair, before_pair);
     return at != in.end() && !before_pair(pair, *at) ? &*at : nullptr;
   };
-  PairAnswer pair{a.id, b.id, false};
-  if (const PairAnswer *const known = find(w.may_touch.answers, pair)) {
+  PairDecision pair{a.id, b.id, false};
+  if (const PairDecision *const known = find(w.may_touch.decisions, pair)) {
     pair.touch = known->touch;
   } else {
     const auto handle = [&](uint32_t thing) {
@@ -268,7 +268,7 @@ bool refused(const World &w, const StepContext &step, uint32_t i, uint32_t j, co
     };
     pair.touch = w.may_touch.call(w.may_touch.user, handle(i), handle(j));
   }
-  answers.push_back(pair);
+  decisions.push_back(pair);
   return !pair.touch;
 }
 
@@ -325,9 +325,9 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   w.pairs.zone_table.clear();
   w.pairs.zone_law.clear();
   for (auto &law : w.laws) law->by_default = false;
-  std::vector<PairAnswer> answers;  // kept, or given now
+  std::vector<PairDecision> decisions;  // kept, or given now
   std::vector<uint32_t> used;
-  std::vector<uint8_t> told;  // by law: its effects are listed once, however many pairs use it
+  std::vector<uint8_t> reported;  // by law: its effects are listed once, however many pairs use it
   const std::vector<uint8_t> attached = attached_bodies(w);
   std::vector<Partner> things;
   for (uint32_t i = 0; i < width; ++i) things.push_back(partner_of(w, step, i));
@@ -345,7 +345,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
         touch = pair.filter->collide;
       }
       if (touch && ((attached[i] && parted(w, i, j)) || cut_through(w, i, j) ||
-                    refused(w, step, i, j, a, b, answers))) {
+                    refused(w, step, i, j, a, b, decisions))) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, false);
         touch = false;
       }
@@ -357,16 +357,16 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
         continue;
       }
       pair.law = find_law(w, i, j, used);
-      told.resize(w.laws.size());
+      reported.resize(w.laws.size());
       for (uint32_t law : used)
-        if (!std::exchange(told[law], uint8_t{1})) offer_law(*w.laws[law], facts);
+        if (!std::exchange(reported[law], uint8_t{1})) offer_law(*w.laws[law], facts);
     }
   }
-  std::sort(answers.begin(), answers.end(), before_pair);
-  w.may_touch.answers.swap(answers);
-  keep_overlaps_aside(w);
+  std::sort(decisions.begin(), decisions.end(), before_pair);
+  w.may_touch.decisions.swap(decisions);
+  keep_suspended(w);
   facts.effects_listed = w.selection.listed();
-  facts.asked = w.selection.names();
+  facts.requested = w.selection.names();
   choose_self_bodies(w, step, facts, used);
 }
 
@@ -378,7 +378,8 @@ IntegratorOption option_of(const World &w, const Body &b) {
   if (!b.model.stepper && b.model.can(DFM_CAP_STIFFNESS))
     o.implicit_work = b.model.can(DFM_CAP_CONSTANT_STIFFNESS) ? kConstantWork : kImplicitWork;
   o.open = b.integrator.open;
-  o.implicit = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER || b.integrator.chosen == Chosen::struck;
+  o.implicit =
+      b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER || b.integrator.chosen == Chosen::in_impact;
   return o;
 }
 
@@ -395,32 +396,32 @@ void choose_integrators(World &w) {
   if (std::none_of(w.bodies.begin(), w.bodies.end(), open)) return;
   if (w.step_count == 0) {
     reopen_integrators(w);
-    w.struck_until = 0;
+    w.impact_until = 0;
   }
   std::vector<IntegratorOption> options;
   for (const auto &b : w.bodies) options.push_back(option_of(w, *b));
   choose_integrators(options);
   // A body that comes while others are explicit because of an impact is so, too, and goes back with them.
-  const bool struck = w.struck_until > 0;
+  const bool in_impact = w.impact_until > 0;
   // One warning for all bodies of a scheme, and none for those that come later: a game makes many.
-  struct Told {
+  struct SchemeCount {
     const Body *first = nullptr;
     size_t count = 0;
     double substeps = 0, step = 0;  // of the stiffest
-  } told[2];
+  } reported[2];
   for (size_t i = 0; i < options.size(); ++i) {
     Body &b = *w.bodies[i];
     if (!b.integrator.open) continue;
     const bool was = b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    const bool now = options[i].implicit && !struck;
+    const bool now = options[i].implicit && !in_impact;
     if (now != was) {
       const ImplicitOptions chosen = implicit_choice(w, b);
       b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                  now ? &chosen : nullptr);
-      settle_dampers(b.p);
+      relax_dampers(b.p);
       b.integrator.used = now ? implicit_integrator(w, b) : uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER};
       if (now) {
-        Told &own = told[chosen.second_order];
+        SchemeCount &own = reported[chosen.second_order];
         if (!own.first) own.first = &b;
         ++own.count;
         if (options[i].substeps > own.substeps) {
@@ -431,14 +432,14 @@ void choose_integrators(World &w) {
     }
     b.integrator.open = false;
     b.integrator.chosen = !options[i].implicit ? Chosen::explicitly
-                          : struck             ? Chosen::struck
+                          : in_impact          ? Chosen::in_impact
                                                : Chosen::implicit;
   }
-  if (w.integrator_times.told) return;
+  if (w.integrator_times.reported) return;
   for (const bool second_order : {true, false}) {
-    const Told &own = told[second_order];
+    const SchemeCount &own = reported[second_order];
     if (!own.first) continue;
-    w.integrator_times.told = true;
+    w.integrator_times.reported = true;
     w.context->logf(
         DFM_LOG_WARNING,
         "%s integrated by %s, which damps %s, since explicit integration would take %.0f sub-steps of %.3g s "
@@ -507,8 +508,8 @@ void set_gravity_now(World &w) {
 void prepare(World &w, const RestoredChoice *restored) {
   StepContext &step = *w.steps;
   if (!w.changed) {
-    if (w.revalued) look_at_plan(w, step);
-    return settle_overlaps(w);
+    if (w.revalued) check_plan(w, step);
+    return resolve_overlaps(w);
   }
   for (auto &b : w.bodies) b->dynamics->see_points();
   choose_integrators(w);
@@ -544,7 +545,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   w.offset = restored ? restored->offset : choose_offset(w);
   if (!restored) check_offset(w);
   for (auto &b : w.bodies)
-    if (!b->surface.laid.empty()) b->surface.back = 0.5 * w.offset;
+    if (!b->surface.coincident.empty()) b->surface.back = 0.5 * w.offset;
   for (auto &b : w.bodies)
     if (w.def.sleep && b->anchor.empty()) b->anchor = b->p.x;
   step.active.reserve(nb);
@@ -564,7 +565,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   step.guard.forget();
   w.changed = w.revalued = false;
   ++step.made.tables;
-  settle_overlaps(w);
+  resolve_overlaps(w);
 }
 
 }  // namespace dfm

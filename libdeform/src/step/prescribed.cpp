@@ -38,12 +38,12 @@ void stage_motion(World &w, double h, double rest, Array<Driven> &driven) {
   const double end = w.prescribed.at(w.time + h);
   if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, end));
   for (auto &b : w.bodies) {
-    if (b->slumber.asleep) continue;
+    if (b->sleep_state.asleep) continue;
     if (b->loads_vary()) {
       const auto set = [&](double t) {
         set_loads(*b, t, w.prescribed.share);
         for (const Spring &spring : b->springs) {
-          if (w.prescribed.stands()) add_spring_force(*b, spring, end, 0);
+          if (w.prescribed.is_static()) add_spring_force(*b, spring, end, 0);
           else add_spring_force(*b, spring, w.time, h);
         }
       };

@@ -45,8 +45,8 @@ uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
 }
 
 // What the body calls for, in addition to the setting of the world.
-uint8_t needed_by(const Body &b, uint8_t asked) {
-  if (!b.cut.whole || asked == DFM_SELF_ON) return asked;
+uint8_t needed_by(const Body &b, uint8_t requested) {
+  if (!b.cut.whole || requested == DFM_SELF_ON) return requested;
   return b.surface.slit ? uint8_t{DFM_SELF_ON} : uint8_t{DFM_SELF_AUTO};
 }
 
@@ -224,7 +224,7 @@ SelfBody::SelfBody(const Memory &m, Body &b)
   b.self_rest.reset();
 }
 
-uint8_t asks_self_contact(const World &w) {
+uint8_t uses_self_contact(const World &w) {
   return w.selection.lists(kSelfContact) ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
 }
 
@@ -237,15 +237,15 @@ bool lists_after_cut(const World &w, const Body &b) {
 
 void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used) {
   facts.self = w.def.self_contact == DFM_SELF_ON;
-  const bool always = !self_asked_by(facts).empty();
+  const bool always = !self_requested_by(facts).empty();
   facts.self_auto = w.def.self_contact == DFM_SELF_AUTO;
-  const uint8_t asked = always ? DFM_SELF_ON : facts.self_auto ? DFM_SELF_AUTO : DFM_SELF_OFF;
+  const uint8_t requested = always ? DFM_SELF_ON : facts.self_auto ? DFM_SELF_AUTO : DFM_SELF_OFF;
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
     const std::unique_ptr<FormerSurface> former = std::move(b->former_surface);
     const uint8_t when =
-        w.selection.wants(kSelfContact) ? rule_of(w, *b, needed_by(*b, asked)) : uint8_t{DFM_SELF_OFF};
+        w.selection.wants(kSelfContact) ? rule_of(w, *b, needed_by(*b, requested)) : uint8_t{DFM_SELF_OFF};
     if (promises(*b) || when == DFM_SELF_OFF) continue;
     facts.self_cut = facts.self_cut || b->cut.whole != nullptr;
     const auto same = std::find_if(before.begin(), before.end(),

@@ -33,7 +33,7 @@ struct SelfBody {
 SelfRest self_rest_of(const Memory &memory, Body &b);
 
 // DFM_SELF_*: the setting of the world (dfm_world_def.self_contact, or the effect in its list).
-uint8_t asks_self_contact(const World &w);
+uint8_t uses_self_contact(const World &w);
 // Would a cut have the surface of a body touch itself that has no lists of itself?
 bool lists_after_cut(const World &w, const Body &b);
 // For prepare(): fills step.self_bodies and the facts for the plan; finds the laws of bodies with themselves;

@@ -41,7 +41,7 @@ double last_time(const std::vector<Key> &keys) {
 }
 
 // The time after which prescribed motions and loads of a body no longer change.
-double settled_from(const Body &b) {
+double rest_start(const Body &b) {
   double t = -kForever;
   for (const Load &l : b.loads)
     t = std::max(t, l.sine.amplitude[0] != 0 && l.sine.frequency != 0 ? kForever : last_time(l.keys));
@@ -65,7 +65,7 @@ void join_attached(World &w, Counts counts) {
 
 bool asleep(const World &w, uint64_t id) {
   const uint32_t i = slot_of(w, id);
-  return i != kNone && w.bodies[i]->slumber.asleep;
+  return i != kNone && w.bodies[i]->sleep_state.asleep;
 }
 
 }  // namespace
@@ -87,8 +87,8 @@ void gather_active(World &w) {
   step.given.known = false;
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
-    step.body_views[i].asleep = b.slumber.asleep;
-    if (b.slumber.asleep) continue;
+    step.body_views[i].asleep = b.sleep_state.asleep;
+    if (b.sleep_state.asleep) continue;
     step.active.push_back(i);
     step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
                           b.surfel_impulse.data(), b.dynamics->diagonal() ? b.p.impulse.data() : nullptr});
@@ -117,20 +117,20 @@ void rouse(World &w, std::span<const uint32_t> slots) {
   // Adds the elapsed time to contacts that sleep: their age, and their total impulse.
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const uint32_t a = slot_of(w, w.store.id_a[m]);
-    if (w.store.touching[m] && a != kNone && w.bodies[a]->slumber.asleep &&
+    if (w.store.touching[m] && a != kNone && w.bodies[a]->sleep_state.asleep &&
         std::binary_search(slots.begin(), slots.end(), a))
-      w.store.dwell[m] += w.time - w.bodies[a]->slumber.since;
+      w.store.dwell[m] += w.time - w.bodies[a]->sleep_state.since;
   }
   for (const uint32_t i : slots) {
     Body &b = *w.bodies[i];
-    before.bodies.push_back({i, b.slumber, b.contact_impulse});
-    if (b.slumber.asleep) {
-      b.contact_impulse += (w.time - b.slumber.since) * b.slumber.force;
+    before.bodies.push_back({i, b.sleep_state, b.contact_impulse});
+    if (b.sleep_state.asleep) {
+      b.contact_impulse += (w.time - b.sleep_state.since) * b.sleep_state.force;
       for (Attachment &a : w.attachments)
-        if (a.body == b.id && a.h > 0) a.total += ((w.time - b.slumber.since) / a.h) * a.sum();
+        if (a.body == b.id && a.h > 0) a.total += ((w.time - b.sleep_state.since) / a.h) * a.sum();
       step.woken.push_back(i);
     }
-    b.slumber = {};
+    b.sleep_state = {};
   }
   if (!w.changed) gather_active(w);  // otherwise prepare(w) does it, since its views are out of date
 }
@@ -139,7 +139,7 @@ void undo_waking(World &w, StepContext &step) {
   Roused &before = step.roused;
   if (before.bodies.empty()) return;
   for (auto was = before.bodies.rbegin(); was != before.bodies.rend(); ++was) {
-    w.bodies[was->slot]->slumber = was->slumber;
+    w.bodies[was->slot]->sleep_state = was->sleep_state;
     w.bodies[was->slot]->contact_impulse = was->impulse;
   }
   std::copy(before.dwell.begin(), before.dwell.end(), w.store.dwell.begin());
@@ -151,15 +151,15 @@ void undo_waking(World &w, StepContext &step) {
 // Wakes the whole island, by its contacts at the time when it fell asleep.
 void wake(World &w, Body &b) {
   StepContext &step = *w.steps;
-  b.slumber.calm = 0;
-  if (!b.slumber.asleep) return;
+  b.sleep_state.quiet_time = 0;
+  if (!b.sleep_state.asleep) return;
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
   for (uint32_t m = 0; m < w.store.n; ++m) {
     const uint32_t i = slot_of(w, w.store.id_a[m]), j = slot_of(w, w.store.id_b[m]);
-    if (i != kNone && j != kNone && w.bodies[i]->slumber.asleep && w.bodies[j]->slumber.asleep)
+    if (i != kNone && j != kNone && w.bodies[i]->sleep_state.asleep && w.bodies[j]->sleep_state.asleep)
       step.islands.join(i, j);
   }
-  join_attached(w, [](const Body &x) { return x.slumber.asleep; });
+  join_attached(w, [](const Body &x) { return x.sleep_state.asleep; });
   step.islands.finish();
   const uint32_t k = step.islands.of[slot_of(w, b.id)];
   rouse(w, {&step.islands.member[step.islands.begin[k]], step.islands.begin[k + 1] - step.islands.begin[k]});
@@ -167,7 +167,7 @@ void wake(World &w, Body &b) {
 
 void wake_all(World &w) {
   StepContext &step = *w.steps;
-  for (auto &b : w.bodies) b->slumber.calm = 0;
+  for (auto &b : w.bodies) b->sleep_state.quiet_time = 0;
   if (w.sleepers == 0) return;
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
   step.islands.finish();
@@ -196,16 +196,16 @@ void stage_sleep(World &w, StepContext &step) {
   for (const uint32_t i : step.active) {
     Body &b = *w.bodies[i];
     const Phyxels &p = b.p;
-    double &calm = b.slumber.calm;
+    double &quiet_time = b.sleep_state.quiet_time;
     if (!(largest_norm(p.n, p.v.data(), nullptr) < w.def.sleep_speed)) {
-      calm = 0;
-    } else if (calm > 0 && largest_norm(p.n, p.x.data(), b.anchor.data()) <= kStay * w.offset) {
-      calm += step.h;
+      quiet_time = 0;
+    } else if (quiet_time > 0 && largest_norm(p.n, p.x.data(), b.anchor.data()) <= kStay * w.offset) {
+      quiet_time += step.h;
     } else {
-      calm = step.h;
+      quiet_time = step.h;
       std::copy(p.x.begin(), p.x.end(), b.anchor.begin());
     }
-    tired |= b.slumber.calm >= w.def.sleep_time;
+    tired |= b.sleep_state.quiet_time >= w.def.sleep_time;
   }
   if (!tired || end < last_time(w.gravity.keys)) return;
 
@@ -213,13 +213,14 @@ void stage_sleep(World &w, StepContext &step) {
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
   for (size_t i = 0; i < n; ++i)
     if (!step.contacts[i].obstacle) step.islands.join(step.contacts[i].slot_a, step.contacts[i].slot_b);
-  join_attached(w, [](const Body &b) { return !b.slumber.asleep; });
+  join_attached(w, [](const Body &b) { return !b.sleep_state.asleep; });
   step.islands.finish();
   step.stirred.assign(step.islands.count, 0);
   const double creep = w.def.contact_tolerance > 0 ? w.def.contact_tolerance : 1e-6;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    if (!(b.slumber.calm >= w.def.sleep_time && settled_from(b) <= end)) step.stirred[step.islands.of[i]] = 1;
+    if (!(b.sleep_state.quiet_time >= w.def.sleep_time && rest_start(b) <= end))
+      step.stirred[step.islands.of[i]] = 1;
   }
   for (size_t i = 0; i < n; ++i) {
     const ContactPoint &c = step.contacts[i];
@@ -261,13 +262,13 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   w.stats.sleep_energy += kinetic;
   store3(w.stats.sleep_momentum, load3(w.stats.sleep_momentum) + momentum);
   std::fill(p.v.begin(), p.v.end(), 0.0);
-  settle_dampers(p);
+  relax_dampers(p);
   std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
   b.dynamics->points_changed();
   gather_surface(b.surface, p.x.data(), p.v.data());  // detection continues to see it at its place
   if (w.plan.touches())
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) impulse += load3(&b.surfel_impulse[3 * size_t(s)]);
-  b.slumber = {true, 0, end, step.h, (1 / step.h) * impulse};
+  b.sleep_state = {true, 0, end, step.h, (1 / step.h) * impulse};
   b.bound.known = false;
 }
 
@@ -288,7 +289,7 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
             copy(source, into, column.width);
         },
         w.store, to);
-    if (step.shares) copy(w.store.due.empty() ? w.store.area : w.store.due, to.due, 1);
+    if (step.shares) copy(w.store.next_area.empty() ? w.store.area : w.store.next_area, to.next_area, 1);
     each_report_column([&](size_t width, const auto &source, auto &into) { copy(source, into, width); },
                        step.last_report, w.report);
     if (to.nstate == w.store.nstate) copy(w.store.bristle, to.bristle, w.store.nstate);
@@ -333,7 +334,7 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
 bool sleeps(const World &w, const StepContext &step, uint32_t m) {
   if (w.sleepers == 0) return false;
   const uint32_t slot = step.last_report.contacts[m].slot_a;
-  return slot != kNone && w.bodies[slot]->slumber.asleep;
+  return slot != kNone && w.bodies[slot]->sleep_state.asleep;
 }
 
 // Contacts of sleeping bodies stick: a hold that begins now counts them from now on.

@@ -77,7 +77,7 @@ void set_loads(Body &b, double t, double share);
 void each_held_place(const Body &b, double t, const std::function<void(uint32_t point, Vec3 to)> &use);
 void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
-uint32_t tell_no_forces(const World &w, const Body &b);  // to dfm_last_error(). Gives the trouble bit.
+uint32_t report_no_forces(const World &w, const Body &b);  // to dfm_last_error(). Gives the trouble bit.
 // kinetic: [bodies] J, of the active ones, out.
 bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble);
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
@@ -96,7 +96,7 @@ void stage_sleep(World &w, StepContext &step);  // sleep.cpp
 SubStep sub_step_of(const World &w, const StepContext &step);
 void begin_bodies(World &w, StepContext &step);  // before a sub-step and its repetitions
 // Distributes the present impulses of the rows to the points of bodies.
-void give_impulses(StepContext &step);
+void report_impulses(StepContext &step);
 // Computes the end states of all active bodies with the distributed impulses; the present states are kept.
 bool find_ends(World &w, StepContext &step, uint32_t *trouble);
 void keep_rigids(World &w, StepContext &step);  // after the sub-step has succeeded
@@ -105,10 +105,10 @@ void keep_rigids(World &w, StepContext &step);  // after the sub-step has succee
 void make_rows(World &w, StepContext &step);  // makes rows from contacts, with their stored data
 // Sets the last error. law: failed at this contact, or kNone; null: a value is not finite. Returns the
 // trouble bit.
-uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);
+uint32_t report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);
 // Sets the last error: the guard allows no further motion, and the contact solve has no solution. Returns the
 // trouble bit.
-uint32_t tell_jam(World &w, StepContext &step);
+uint32_t report_jam(World &w, StepContext &step);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 // Of lists to which keep_contacts() and keep_rigids() add.
 void reserve_reports(World &w, const StepContext &step);

@@ -73,7 +73,7 @@ Next solve(World &w, StepContext &step, uint32_t *trouble) {
 }
 Next distribute(World &, StepContext &step, uint32_t *) {
   step.ended = false;
-  give_impulses(step);
+  report_impulses(step);
   return Next::stage;
 }
 Next commit(World &w, StepContext &step, uint32_t *trouble) { return go_on(stage_commit(w, step, trouble)); }
@@ -95,7 +95,8 @@ constexpr Stage kTable[] = {
     {"self contact", row::self, cost::self_surfels, when::self},
     {"contact+friction", row::solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
     {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
-    {"distribute", row::distribute, cost::contacts_and_surfels, when::distribute, StageRole::gives_impulses},
+    {"distribute", row::distribute, cost::contacts_and_surfels, when::distribute,
+     StageRole::reports_impulses},
     {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
     {"commit", row::commit, cost::points, when::commit},
     {"sleep", row::sleep, cost::awake, when::sleep},
@@ -125,7 +126,7 @@ Next run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time
 }
 
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble);
-bool piece(World &w, StepContext &step, uint32_t *trouble);
+bool take_substep(World &w, StepContext &step, uint32_t *trouble);
 bool sub_step(World &w, StepContext &step, uint32_t *trouble);
 
 }  // namespace
@@ -209,13 +210,13 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   check_target_speeds(w, dt);
   check_tool_ways(w, dt);
   release_overlaps(w);
-  if (!std::exchange(w.overlaps.told, true)) *trouble |= DFM_TROUBLE_OVERLAP;
-  if (bound_due(w)) update_bound(w);
+  if (!std::exchange(w.overlaps.reported, true)) *trouble |= DFM_TROUBLE_OVERLAP;
+  if (bound_expired(w)) update_bound(w);
   if (!(least_sub_steps(w, dt) <= w.def.max_substeps) && end_impact(w)) prepare_bound(w);
   if (!(least_sub_steps(w, dt) <= w.def.max_substeps)) return refuse_step(w, dt, trouble);
   const double size_before = w.sizes.cut.size;
   const uint32_t n =
-      static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_pieces(w.sizes, dt, w.bound.step)));
+      static_cast<uint32_t>(std::min<double>(w.def.max_substeps, choose_substeps(w.sizes, dt, w.bound.step)));
   w.watch.size_before = differ(w.sizes.cut.size, size_before) ? size_before : 0;
   plan_work(w, step, n);
   if (n > 1) *trouble |= DFM_TROUBLE_SUBSTEPS;
@@ -226,14 +227,14 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   const double start = w.time;
   uint32_t done = 0;
   for (Division rest(w.time, dt, n); !rest.over();) {
-    if (bound_due(w)) {
+    if (bound_expired(w)) {
       update_bound(w);
       if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
       double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
       if (!(done + more <= w.def.max_substeps) && end_impact(w)) {
         prepare_bound(w);
         step.offered = 0;  // an impact that is too dear is not begun again
-        rest.again(w.time, uint32_t(choose_pieces(w.sizes, rest.goal - w.time, w.bound.step)));
+        rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
         more = rest.left();
       }
       if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
@@ -248,10 +249,10 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
     step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
     const double from = w.time;
     if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) {
-      if (!step.struck) return DFM_E_DIVERGED;
+      if (!step.in_impact) return DFM_E_DIVERGED;
       begin_impact(w);
       prepare_bound(w);
-      rest.again(w.time, uint32_t(choose_pieces(w.sizes, rest.goal - w.time, w.bound.step)));
+      rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
       *trouble |= DFM_TROUBLE_SUBSTEPS;
       continue;
     }
@@ -281,18 +282,18 @@ namespace {
 // One planned sub-step, up to `end`: as a whole, or in pieces if the guard shortens it. last: it is the last
 // of the step, which ends at `goal`.
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
-  step.guard.pieces = 0;
+  step.guard.cuts = 0;
   step.guard.motion = step.guard.finer = 1;
-  step.guard.piece = 0;
+  step.guard.next_size = 0;
   double planned = step.guard.planned = end - w.time;
   for (bool whole = false; !whole;) {
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
     // only where the budget of the step has room for one piece more
-    if (step.guard.piece > 0 && step.guard.piece < step.rest && may_repeat(w, step))
-      step.h = step.guard.piece;
+    if (step.guard.next_size > 0 && step.guard.next_size < step.rest && may_repeat(w, step))
+      step.h = step.guard.next_size;
     // waking changes state that a later failure must restore
-    if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) keep_start(w, step);
+    if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) save_start(w, step);
     charge(w, step, 1);
     view_obstacles(w, step);
     wake_attached(w, step);
@@ -300,7 +301,7 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     if (all_idle(w, step)) {
       w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
       w.step_impulses.idle += step.h;
-    } else if (!piece(w, step, trouble)) return false;
+    } else if (!take_substep(w, step, trouble)) return false;
     if (step.guard.planned != planned) {
       planned = step.guard.planned;
       end = w.time + planned;
@@ -329,7 +330,7 @@ void refine(World &w, StepContext &step) {
 }
 
 // Repeats until bodies and contacts are consistent, and h is short enough for the guard.
-bool piece(World &w, StepContext &step, uint32_t *trouble) {
+bool take_substep(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t before = *trouble;
   struct Undo {
     World &w;
@@ -341,18 +342,18 @@ bool piece(World &w, StepContext &step, uint32_t *trouble) {
   begin_bodies(w, step);
   bool fast = false;
   while (!sub_step(w, step, trouble)) {
-    if (!step.guard.again && !step.struck) return false;
+    if (!step.guard.again && !step.in_impact) return false;
     *trouble = before;
-    if (step.struck) return false;
+    if (step.in_impact) return false;
     fast |= step.guard.fast;
     if (step.guard.refines) refine(w, step);
     step.h *= step.guard.cut;
-    keep_start(w, step);
+    save_start(w, step);
     view_obstacles(w, step);
   }
   // A piece that was shortened for a fast rigid body is likely to be followed by another one: the next piece
   // begins with twice its length, not with all that is left.
-  if (fast || step.guard.piece > 0) step.guard.piece = 2 * step.h;
+  if (fast || step.guard.next_size > 0) step.guard.next_size = 2 * step.h;
   w.stats.guard_steps += step.guard.acted;
   step.guard.memory.keep();
   step.roused.bodies.clear();
@@ -395,7 +396,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   } undo{w, step};
   step.driven.clear();
   step.guard.start();
-  step.ended = step.struck = false;
+  step.ended = step.in_impact = false;
   step.rigid_rounds = 0;
   step.rigid_again = false;
   step.residual = {};
@@ -410,7 +411,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
     if (next == Next::stage) ++at;
   }
   keep_rigids(w, step);
-  if (step.residual.due > 1) {
+  if (step.residual.required > 1) {
     *trouble |= DFM_TROUBLE_UNCONVERGED;
     ++w.stats.unconverged;
   }

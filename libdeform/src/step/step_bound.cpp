@@ -34,7 +34,7 @@ constexpr double kFlat = 0.5;
 constexpr double kHolds = 10;
 // s, of the running mean: in an impact a body may be pressed flat and come back. A look counts for no more
 // than this share.
-constexpr double kLasts = 0.3, kMostShare = 0.25;
+constexpr double kLasts = 0.3, kMaxShare = 0.25;
 
 // Pa: what touches a body presses from two sides, each with half of the forces, on a cube of its volume.
 // Forces that point away from its middle pull.
@@ -55,21 +55,21 @@ double mean_pressure(const Body &b) {
 
 // Tells of bodies that what touches them presses flat: a heavy body on a soft one. Own weight alone is told
 // when a body is made (world/rest_loads.h).
-void tell_squeezed(World &w) {
+void warn_squeezed(World &w) {
   for (auto &one : w.bodies) {
     Body &b = *one;
-    if (b.squeezed.told || b.slumber.asleep || b.surfel_impulse.empty()) continue;
+    if (b.squeezed.reported || b.sleep_state.asleep || b.surfel_impulse.empty()) continue;
     // The sides of a cut, and pieces, press on each other in ways that this sum says nothing of.
     if (b.shape != 0 || b.piece_of != 0) continue;
     const double young = b.young();
     if (!(young > 0)) continue;
     Squeezed &s = b.squeezed;
     const double gone = w.time - std::exchange(s.at, w.time),
-                 share = std::clamp(gone / kLasts, 0.0, kMostShare);
+                 share = std::clamp(gone / kLasts, 0.0, kMaxShare);
     s.pressure += share * ((w.report.n > 0 ? mean_pressure(b) : 0) - s.pressure);
     if (!(s.pressure > std::max(kFlat * young, s.weight))) s.since = w.time;
     if (w.time - s.since < kLasts) continue;
-    s.told = true;
+    s.reported = true;
     w.context->logf(
         DFM_LOG_WARNING,
         "body '%s' is pressed flat: the things that touch it press with %.3g Pa on average (half of "
@@ -86,17 +86,17 @@ void tell_squeezed(World &w) {
 // not, the bound holds on. A look sees rates at one instant, so it counts them for the time before and for
 // that to the next look, and every eighth look evaluates the bound again.
 constexpr uint32_t kBoundEvery = 16;
-constexpr double kLeastStrain = kBoundStrain / 8;
-constexpr uint32_t kMostEstimated = 4;  // sub-steps at an estimated bound
+constexpr double kMinStrain = kBoundStrain / 8;
+constexpr uint32_t kMaxEstimated = 4;  // sub-steps at an estimated bound
 
-void look_at_shape(Body &b) {
+void check_shape(Body &b) {
   // points that are updated late are unknown until they are requested
   b.bound.inverted = b.dynamics->abilities().late ? 0 : inverted_cells(b);
-  b.bound.strain_rate = b.slumber.asleep ? 0 : b.dynamics->strain_rate();
+  b.bound.strain_rate = b.sleep_state.asleep ? 0 : b.dynamics->strain_rate();
 }
 
 // False: its model gives none.
-bool ask_bound(const World &w, Body &b) {
+bool query_bound(const World &w, Body &b) {
   b.bound.known = true;
   b.bound.found = {};
   const auto springs = [&b](double *stiffness, double *damping) {
@@ -122,19 +122,19 @@ void find_near(World &w) {
 }
 
 // Who sleeps keeps what it had.
-bool keeps(const Body &b) { return b.slumber.asleep && b.bound.known; }
+bool keeps(const Body &b) { return b.sleep_state.asleep && b.bound.known; }
 
 // act(body) -> did it answer? Each body that does not keep what it had by itself; no worker is woken for a
 // world that sleeps.
 template <class Act>
-void ask_each(World &w, const Act &act) {
+void update_each(World &w, const Act &act) {
   if (std::ranges::all_of(w.bodies, [](const auto &b) { return keeps(*b); })) return;
   FirstFailure failed;
   w.context->tasks.parallel_for(static_cast<uint32_t>(w.bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
     for (uint32_t i = begin; i < end; ++i) {
       Body &b = *w.bodies[i];
       if (keeps(b)) continue;
-      const OnBehalf speaks(b.name);
+      const OnBehalf prefix(b.name);
       if (!act(b)) failed.note(i);
     }
   });
@@ -148,7 +148,7 @@ void ask_each(World &w, const Act &act) {
 double strain_of_16(const World &w) {
   double fastest = 0;
   for (const auto &b : w.bodies)
-    if (!b->slumber.asleep) fastest = std::max(fastest, b->bound.strain_rate);
+    if (!b->sleep_state.asleep) fastest = std::max(fastest, b->bound.strain_rate);
   return fastest > 0 ? std::min(1.0, fastest * w.bound.step * kBoundEvery) : 0;
 }
 
@@ -162,9 +162,9 @@ uint32_t count_inverted(const World &w) {
 bool holds(World &w) {
   if (w.bound.age == kNone || !std::isfinite(w.bound.step)) return false;
   if (std::ranges::any_of(w.bodies,
-                          [](const auto &b) { return !b->slumber.asleep && !b->model.state.empty(); }))
+                          [](const auto &b) { return !b->sleep_state.asleep && !b->model.state.empty(); }))
     return false;
-  const double strain = w.bound.strain + std::max(2 * strain_of_16(w), kLeastStrain);
+  const double strain = w.bound.strain + std::max(2 * strain_of_16(w), kMinStrain);
   if (!(strain <= kBoundStrain) || count_inverted(w) != w.bound.inverted) return false;
   w.bound.strain = strain;
   w.bound.age = 0;
@@ -203,25 +203,25 @@ void bring_check_forward(World &w, const Body &b) {
   w.bound.age = std::max(w.bound.age, kBoundEvery - n);
 }
 
-bool bound_due(const World &w) { return w.bound.age >= kBoundEvery; }
+bool bound_expired(const World &w) { return w.bound.age >= kBoundEvery; }
 
 bool bound_is_new(const World &w) { return w.bound.age == age_at_first(w.bound.strain); }
 
-void bound_is_due(World &w) { w.bound.age = std::max(w.bound.age, kBoundEvery); }
+void expire_bound(World &w) { w.bound.age = std::max(w.bound.age, kBoundEvery); }
 
 void update_bound(World &w) {
-  ask_each(w, [](Body &b) {
-    look_at_shape(b);
+  update_each(w, [](Body &b) {
+    check_shape(b);
     return true;
   });
-  tell_squeezed(w);
+  warn_squeezed(w);
   if (holds(w)) return;
   w.bound.step = std::numeric_limits<double>::infinity();
   w.bound.body = nullptr;
   w.bound.point = 0;
   uint32_t limited = 0;
   find_near(w);
-  ask_each(w, [&w](Body &b) { return ask_bound(w, b); });
+  update_each(w, [&w](Body &b) { return query_bound(w, b); });
   for (auto &b : w.bodies) {
     limited += b->model.limited_cells();
     const StepBound &found = b->bound.found;
@@ -243,7 +243,7 @@ void update_bound(World &w) {
 bool estimate_bound(World &w, const WorldBound &before, double share, double dt) {
   const double step = std::min(share, 1.0) * before.step, n = std::ceil(dt / step - 1e-9);
   if (before.age >= kBoundEvery || !std::isfinite(step) || !(step > 0)) return false;
-  if (!(n <= kMostEstimated)) return false;
+  if (!(n <= kMaxEstimated)) return false;
   w.bound = before;
   w.bound.step = w.stats.stable_step = step;
   w.bound.strain = kBoundStrain;  // all that the bound allows for, so the next check evaluates it

@@ -17,10 +17,10 @@ inline constexpr double kBoundStrain = 0.05;
 
 // Does any body step itself and name a bound for its contacts?
 bool any_bounds_contact(const World &w);
-bool bound_due(const World &w);     // does the next sub-step look whether it still holds?
-bool bound_is_new(const World &w);  // has it looked since the last sub-step?
-void bound_is_due(World &w);        // the next one does
-void update_bound(World &w);        // w.bound, evaluated again where it may not
+bool bound_expired(const World &w);  // does the next sub-step look whether it still holds?
+bool bound_is_new(const World &w);   // has it looked since the last sub-step?
+void expire_bound(World &w);         // the next one does
+void update_bound(World &w);         // w.bound, evaluated again where it may not
 
 // Behind a new contact that holds a body up, gravity strains its edges at a growing rate, which the last
 // check did not see. Can this strain exceed what the bound allows for before the next check?

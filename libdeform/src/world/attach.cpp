@@ -225,7 +225,7 @@ dfm_attachment attachment_report(const Body &b, uint32_t number) {
   store3(out.point, middle);
   store3(out.force, force);
   store3(out.moment, moment);
-  const double asleep = b.slumber.asleep ? w.time - b.slumber.since : 0;
+  const double asleep = b.sleep_state.asleep ? w.time - b.sleep_state.since : 0;
   store3(out.impulse, total + asleep * force);
   return out;
 }

@@ -34,7 +34,7 @@ std::vector<BodyEffect> body_effects(const Body &b) {
   size_t values = 0;
   for (uint32_t i = 0; i < type.nparam; values += type.params[i++].width) first.push_back(values);
   const std::vector<EffectRow> rows = b.model.effect_rows();
-  const Withheld &held = b.withheld;
+  const SwitchedOff &held = b.switched_off;
   std::vector<BodyEffect> out;
   for (const std::string &name : effects(type)) {
     BodyEffect effect;
@@ -44,12 +44,12 @@ std::vector<BodyEffect> body_effects(const Body &b) {
       if (row.effect != name) continue;
       const double now = b.model.params[first[row.param]];
       effect.switches.push_back({&type.params[row.param], row.off, now});
-      if (held.asked.empty() || b.world->selection.wants(name) || now != row.off) continue;
-      const double asked = held.asked[first[row.param]];
+      if (held.requested.empty() || b.world->selection.wants(name) || now != row.off) continue;
+      const double requested = held.requested[first[row.param]];
       const std::string key = type.params[row.param].key;
       if (held.by_cell[row.param]) effect.would.push_back(key + " by cell");
-      else if (asked != row.off)
-        effect.would.push_back(key + " " + param_text(type.params[row.param], asked));
+      else if (requested != row.off)
+        effect.would.push_back(key + " " + param_text(type.params[row.param], requested));
     }
     out.push_back(std::move(effect));
   }
@@ -58,7 +58,7 @@ std::vector<BodyEffect> body_effects(const Body &b) {
 
 std::vector<LeftOut> left_out_of(const Body &b) {
   std::vector<LeftOut> out;
-  if (b.withheld.asked.empty()) return out;
+  if (b.switched_off.requested.empty()) return out;
   for (const BodyEffect &e : body_effects(b))
     if (!e.would.empty() && !e.works) out.push_back({e.name, "body '" + b.name + "'", join(e.would)});
   return out;

@@ -45,7 +45,7 @@ std::string ended(const ModelParams &params) {
   return keys;
 }
 
-bool asks_single(const dfm_type &type, const ModelParams &params) {
+bool needs_single(const dfm_type &type, const ModelParams &params) {
   bool single = false;
   for_each_param(ended(params), params, [&](const char *key, const double *value, uint32_t) {
     if (is_precision(type, key)) single = *value == 1;
@@ -72,10 +72,10 @@ void check_given(const Body &b, const dfm_params &params) {
 namespace {
 
 // None: its points move explicitly, or the integrator is not chosen yet (out.open).
-std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t asked,
+std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t requested,
                                            Integrator &out) {
-  check_integrator(name, asked);
-  const int32_t which = asked == DFM_INTEGRATOR_AUTO ? w.def.integrator : asked;
+  check_integrator(name, requested);
+  const int32_t which = requested == DFM_INTEGRATOR_AUTO ? w.def.integrator : requested;
   out.open = which == DFM_INTEGRATOR_AUTO;
   if (out.open || which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
   ImplicitOptions options = w.implicit;
@@ -85,7 +85,7 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
 }
 
 // The longest explicit sub-step of the body, for the choice of the integrator.
-void ask_explicit_bound(const World &w, double time, Body &b) {
+void query_explicit_bound(const World &w, double time, Body &b) {
   Integrator &out = b.integrator;
   StepBound bound;
   if (w.def.step == 0 || !b.dynamics->bound(time, out.share, [](double *, double *) {}, bound)) return;
@@ -102,18 +102,18 @@ void measure_explicit(Body &b) {
   b.integrator.share = found.share;
   const bool had = b.p.dampers.lag > 0;
   b.p.dampers.lag = found.lag;
-  if (had != (found.lag > 0)) settle_dampers(b.p);
+  if (had != (found.lag > 0)) relax_dampers(b.p);
 }
 
 bool rest_rows(const Body &b, double share, RestRows &out) {
   return b.dynamics->rest_rows(rest_frame(b), share, out);
 }
 
-void give_scaled_mass(Body &b, double share) {
+void set_scaled_mass(Body &b, double share) {
   const char *const name = b.name.c_str();
-  if (!(share > 0 && share <= kMostScaled))
+  if (!(share > 0 && share <= kMaxScaled))
     fail(DFM_E_ARG, "body '%s': mass_scaling %g; it is a share of the body's mass in [0, %g]", name, share,
-         kMostScaled);
+         kMaxScaled);
   RestRows rows;
   if (!rest_rows(b, 1, rows))
     fail(DFM_E_UNSUPPORTED,
@@ -142,7 +142,7 @@ std::vector<double> rest_for(const dfm_type &type, const Body &b, const Pose &fr
 // Fields for which the type has no parameter stay with the mesh, and are reported.
 std::vector<dfm_cell_field> fields_for(const dfm_type &type, const Body &b, std::vector<Unused> &unused) {
   std::vector<dfm_cell_field> out;
-  for (const CellField &f : b.makeup.given) {
+  for (const CellField &f : b.composition.given) {
     if (by_cell(type, f.key)) out.push_back({f.key.c_str(), f.values.data(), f.width});
     else unused.push_back({f.key, ""});
   }
@@ -153,8 +153,8 @@ std::vector<dfm_cell_field> fields_for(const dfm_type &type, const Body &b, std:
 std::vector<double> values_for(const World &w, const Body &b, const dfm_type &type, const ModelParams &params,
                                MadeModel &out) {
   CellMaterials cells;
-  for (const Material &m : b.makeup.materials) cells.list.push_back(&m);
-  cells.of = b.makeup.of;
+  for (const Material &m : b.composition.materials) cells.list.push_back(&m);
+  cells.of = b.composition.of;
   out.unused = find_unused(type, cells);
   const std::vector<dfm_cell_field> given = fields_for(type, b, out.unused);
   const std::string keys = ended(params);
@@ -175,7 +175,7 @@ bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values
   const ModelOrigin &origin = out.origin;
   const bool turns = rests_unplaced(type);
   const auto fits = [&](const SpareModel &s) {
-    return s.instance.type == &type && s.asked() == values && s.origin.params == origin.params &&
+    return s.instance.type == &type && s.requested() == values && s.origin.params == origin.params &&
            s.origin.held == origin.held &&
            (turns || std::memcmp(&s.origin.frame, &origin.frame, sizeof origin.frame) == 0);
   };
@@ -183,7 +183,7 @@ bool take_spare(Body &b, const dfm_type &type, const std::vector<double> &values
   if (found == b.spares.end()) return false;
   found->instance.start();
   out.model.swap(found->instance);
-  out.withheld = std::move(found->withheld);
+  out.switched_off = std::move(found->switched_off);
   b.spares.erase(found);
   return true;
 }
@@ -221,15 +221,15 @@ void make_instance(World &w, Body &b, const dfm_type &type, std::vector<double> 
   mesh.edges = b.edges.data();
   mesh.fixed = out.origin.held.data();
   mesh.inside = b.inside.empty() ? nullptr : b.inside.data();
-  coupling.tell(mesh);
+  coupling.fill_mesh(mesh);
   if (!take_spare(b, type, values, out)) out.model.create(type, w.context->host, mesh, m, std::move(values));
-  if (asks_single(type, out.origin.params)) out.model.use_single();
+  if (needs_single(type, out.origin.params)) out.model.use_single();
 }
 
-void drop_fields(const dfm_type &type, const Withheld &withheld, std::vector<CellField> &fields) {
+void drop_fields(const dfm_type &type, const SwitchedOff &switched_off, std::vector<CellField> &fields) {
   std::erase_if(fields, [&](const CellField &f) {
     const dfm_param *const row = find_row(type, f.key.c_str());
-    return row && withheld.by_cell[size_t(row - type.params)] != 0;
+    return row && switched_off.by_cell[size_t(row - type.params)] != 0;
   });
 }
 
@@ -238,23 +238,24 @@ void drop_fields(const dfm_type &type, const Withheld &withheld, std::vector<Cel
 void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> values, MadeModel &out) {
   make_instance(w, b, type, values, out);
   if (!w.selection.listed()) return;
-  if (!out.withheld.asked.empty()) return drop_fields(type, out.withheld, out.fields);  // from the spares
-  Withheld withheld{values, differs_by_cell(type, out.fields)};
-  std::vector<uint8_t> left = withheld.by_cell;
+  if (!out.switched_off.requested.empty())
+    return drop_fields(type, out.switched_off, out.fields);  // from the spares
+  SwitchedOff switched_off{values, differs_by_cell(type, out.fields)};
+  std::vector<uint8_t> left = switched_off.by_cell;
   const auto works = [&](const std::string &effect) { return out.model.works(effect); };
   if (!leave_out(type, out.model.effect_rows(), w.selection, works, values, left)) return;
   for (uint32_t row = 0; row < type.nparam; ++row)
-    withheld.by_cell[row] = withheld.by_cell[row] && !left[row];
-  drop_fields(type, withheld, out.fields);
+    switched_off.by_cell[row] = switched_off.by_cell[row] && !left[row];
+  drop_fields(type, switched_off, out.fields);
   ModelInstance().swap(out.model);
   make_instance(w, b, type, std::move(values), out);
-  out.withheld = std::move(withheld);
+  out.switched_off = std::move(switched_off);
 }
 
 void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
                 MadeModel &out) {
   const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
-  const OnBehalf speaks(b.name);
+  const OnBehalf prefix(b.name);
   make_selected(w, b, type, std::move(values), out);
   // the dynamics of a body refer to its own instance and points, which are the new ones by now
   struct Lent {
@@ -269,7 +270,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
                              implicit ? &*implicit : nullptr);
   if (implicit) return;
   measure_explicit(b);
-  ask_explicit_bound(w, w.time, b);
+  query_explicit_bound(w, w.time, b);
 }
 
 }  // namespace
@@ -277,16 +278,16 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
 std::unique_ptr<MadeModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin) {
   auto out = std::make_unique<MadeModel>();
   out->origin = std::move(origin);
-  const OnBehalf speaks(b.name);
+  const OnBehalf prefix(b.name);
   make_selected(w, b, type, values_for(w, b, type, out->origin.params, *out), *out);
   return out;
 }
 
-void give_dynamics(World &w, Body &b, const double *bound_at) {
+void set_dynamics(World &w, Body &b, const double *bound_at) {
   const auto implicit = implicit_of(w, b.name, static_cast<int32_t>(b.integrator.used), b.integrator);
   b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                              implicit ? &*implicit : nullptr);
-  if (!implicit && bound_at) ask_explicit_bound(w, *bound_at, b);
+  if (!implicit && bound_at) query_explicit_bound(w, *bound_at, b);
 }
 
 ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
@@ -313,14 +314,14 @@ ModelParams keep_params(const dfm_type &type, const dfm_params &given) {
   return out;
 }
 
-std::vector<double> values_asked(const World &w, const Body &b, const dfm_type &type,
-                                 const ModelParams &params) {
+std::vector<double> requested_values(const World &w, const Body &b, const dfm_type &type,
+                                     const ModelParams &params) {
   MadeModel unused;
   return values_for(w, b, type, params, unused);
 }
 
-std::vector<double> values_asked(const World &w, const Body &b) {
-  return values_asked(w, b, *b.model.type, b.origin.params);
+std::vector<double> requested_values(const World &w, const Body &b) {
+  return requested_values(w, b, *b.model.type, b.origin.params);
 }
 
 std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,

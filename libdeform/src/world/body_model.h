@@ -13,8 +13,8 @@ void check_integrator(const std::string &body, int32_t integrator);
 void check_given(const Body &b, const dfm_params &params);
 // Copies the parameters of the type. Throws Error for others.
 ModelParams keep_params(const dfm_type &type, const dfm_params &given);
-// Makes one for the body, whose points, cells, surface and makeup are complete. Parameters that the origin
-// does not name follow from the makeup. integrator: DFM_INTEGRATOR_*; AUTO: that of the world, or chosen by
+// Makes one for the body, whose points, cells, surface and composition are complete. Parameters the origin
+// does not name follow from the composition. integrator: DFM_INTEGRATOR_*; AUTO: of the world, or chosen by
 // prepare(). Throws Error.
 std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &type, ModelOrigin origin,
                                            int32_t integrator);
@@ -22,7 +22,7 @@ std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &ty
 // while other bodies step; and the dynamics of a body that has it, by the integrator that it uses. bound_at:
 // s, and the longest explicit sub-step at its present state then; null: not that.
 std::unique_ptr<MadeModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin);
-void give_dynamics(World &w, Body &b, const double *bound_at);
+void set_dynamics(World &w, Body &b, const double *bound_at);
 // How long its explicit sub-steps may be, with its present parameters.
 void measure_explicit(Body &b);
 // What bounds its explicit sub-steps at rest, with this share of the row sums of stiffness; 1: for certain.
@@ -30,17 +30,17 @@ void measure_explicit(Body &b);
 bool rest_rows(const Body &b, double share, RestRows &out);
 // Moves this share of its mass at most to points that bound its explicit sub-steps; its model is to be made
 // again. Throws Error.
-void give_scaled_mass(Body &b, double share);
+void set_scaled_mass(Body &b, double share);
 // Logs a message if an integrator is named for a body whose model steps itself.
 void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
                        int32_t integrator);
 // Hash of type and origin, to compare bodies that are equal otherwise.
 uint64_t model_hash(const Body &b);
-// The values that these parameters, or the origin's, and the makeup specify, in the order of the type's
+// The values that these parameters, or the origin's, and the composition specify, in the order of the type's
 // table. Throws the errors of make_body_model() about parameters.
-std::vector<double> values_asked(const World &w, const Body &b, const dfm_type &type,
-                                 const ModelParams &params);
-std::vector<double> values_asked(const World &w, const Body &b);
+std::vector<double> requested_values(const World &w, const Body &b, const dfm_type &type,
+                                     const ModelParams &params);
+std::vector<double> requested_values(const World &w, const Body &b);
 void exchange(Body &b, MadeModel &other) noexcept;
 
 }  // namespace dfm

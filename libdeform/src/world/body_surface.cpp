@@ -14,10 +14,10 @@ namespace dfm {
 namespace {
 
 // mean distances; beyond it rows hold hundreds of phyxels and the surface no longer follows the body
-constexpr double kMostSupport = 10;
+constexpr double kMaxSupport = 10;
 // of the diagonal of the cells: more than the distance between the boundary of a coarse lattice and a curved
 // surface
-constexpr double kTellOutside = 0.02;
+constexpr double kWarnOutside = 0.02;
 
 void check_surface(const dfm_surface_def &def, const char *name) {
   if (def.size < sizeof(dfm_surface_def))
@@ -26,10 +26,10 @@ void check_surface(const dfm_surface_def &def, const char *name) {
   if (def.coupling < DFM_COUPLING_BARYCENTRIC || def.coupling > DFM_COUPLING_THESIS)
     fail(DFM_E_ARG, "body '%s': surface->coupling %d is unknown; use DFM_COUPLING_BARYCENTRIC, MLS or THESIS",
          name, def.coupling);
-  if (!(def.support >= 0 && def.support <= kMostSupport))
+  if (!(def.support >= 0 && def.support <= kMaxSupport))
     fail(DFM_E_ARG,
          "body '%s': surface->support is %g mean distances; it must lie between 0 (which means 3) and %g",
-         name, def.support, kMostSupport);
+         name, def.support, kMaxSupport);
   check_triangles(def, "body", name, "surface ");
   std::vector<uint8_t> used(def.npoint);
   for (size_t i = 0; i < size_t{3} * def.ntriangle; ++i) used[def.triangles[i]] = 1;
@@ -78,7 +78,7 @@ void couple(Body &b, const dfm_surface_def &def) {
          "same frame and unit (m)",
          name, c.farthest, size);
   // the cells of a lattice need not cover its surface
-  if (b.inside.empty() && c.farthest > kTellOutside * size)
+  if (b.inside.empty() && c.farthest > kWarnOutside * size)
     b.world->context->logf(DFM_LOG_WARNING,
                            "body '%s': %u of %u surfels hang on the nearest cell from outside, the farthest "
                            "%g m away; cells that cover the surface follow it better",
@@ -87,7 +87,7 @@ void couple(Body &b, const dfm_surface_def &def) {
 }
 
 // A scene splits them; here the triangles are the caller's.
-void tell_of_long_edges(const Body &b) {
+void warn_long_edges(const Body &b) {
   double cells = 0, longest = 0;
   for (size_t e = 0; e < b.edges.size(); e += 2)
     cells = std::max(cells, norm(b.p.rest_at(b.edges[e]) - load3(&b.p.rest[size_t{3} * b.edges[e + 1]])));
@@ -115,7 +115,7 @@ void make_body_surface(Body &b, const dfm_surface_def *def, double smooth) {
     check_surface(*def, b.name.c_str());
     make_surface(m, def->npoint, def->points, def->triangles, def->ntriangle, b.surface);
     check_outward(b.surface, b.name.c_str());
-    if (!b.share.empty() || !b.inside.empty()) tell_of_long_edges(b);
+    if (!b.share.empty() || !b.inside.empty()) warn_long_edges(b);
     couple(b, *def);
   } else {
     const Array<uint32_t> boundary = boundary_triangles(m, b.ncell(), b.tets.data());
@@ -136,7 +136,7 @@ MeshCoupling::MeshCoupling(const Memory &memory, const Surface &surface) : surfa
   for (uint32_t s = 0; s <= surface.nsurfel; ++s) row_.push_back(s);
 }
 
-void MeshCoupling::tell(dfm_mesh &mesh) const {
+void MeshCoupling::fill_mesh(dfm_mesh &mesh) const {
   const bool own = surface_.identity();
   mesh.nsurfel = surface_.nsurfel;
   mesh.row = own ? row_.data() : surface_.row.data();

@@ -12,7 +12,7 @@ void make_body_surface(Body &b, const dfm_surface_def *def, double smooth);
 class MeshCoupling {
  public:
   MeshCoupling(const Memory &memory, const Surface &surface);
-  void tell(dfm_mesh &mesh) const;
+  void fill_mesh(dfm_mesh &mesh) const;
 
  private:
   const Surface &surface_;

@@ -12,7 +12,7 @@ namespace {
 
 // Relative to the largest energy of the body: the unpaid energy that is allowed, and the amount that counts
 // as none.
-constexpr double kMost = 0.1, kLittle = 0.01;
+constexpr double kMax = 0.1, kLittle = 0.01;
 // Relative to its elastic energy, if the body has lost what earlier changes added.
 constexpr double kAnother = 4;
 constexpr double kSmallJump = 1e-9;  // J, counts as none
@@ -23,7 +23,7 @@ double jump_of(const Swap &s) { return finite_or_none(s.after) - finite_or_none(
 
 }  // namespace
 
-ChangeBook look_at_changes(const Body &b, double elastic) {
+ChangeBook check_changes(const Body &b, double elastic) {
   ChangeBook out = b.changes;
   const double now = moving_energy(b) + finite_or_none(elastic);
   // energy that changes have removed may be returned by later ones
@@ -39,7 +39,7 @@ ChangeBook look_at_changes(const Body &b, double elastic) {
 // changes can grow, since the body must lose each jump before the next. If the old model has no energy, the
 // jump is unknown.
 void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap) {
-  const double jump = jump_of(swap), share = kMost * before.largest;
+  const double jump = jump_of(swap), share = kMax * before.largest;
   const bool paid = before.unpaid <= kLittle * before.largest;
   if (!(jump > kSmallJump) || (paid && std::isnan(swap.before))) return;
   double limit = std::max(share, paid ? kAnother * swap.before : 0);
@@ -63,7 +63,7 @@ void book_change(const Body &b, ChangeBook &book, const Swap &swap) {
   book.work = 0;
 }
 
-void settle_changes(Body &b) {
+void clear_change_energy(Body &b) {
   if (!b.changes.open) return;
   b.changes.unpaid = std::min(0.0, b.changes.unpaid);
   b.changes.work = 0;

@@ -8,13 +8,13 @@
 namespace dfm {
 
 // The book at the present state, with this elastic energy (NaN: none).
-ChangeBook look_at_changes(const Body &b, double elastic);
+ChangeBook check_changes(const Body &b, double elastic);
 // Adds a change, given by the book before it and the swap. Throws Error, DFM_DISCARD, if the unpaid jumps
 // would exceed the limit.
 void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap);
 void book_change(const Body &b, ChangeBook &book, const Swap &swap);
 // Bodies are at rest: no added energy is left.
-void settle_changes(Body &b);
+void clear_change_energy(Body &b);
 
 // During its lifetime the host changes the state of the body; the change counts as external work.
 class HostWork {

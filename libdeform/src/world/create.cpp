@@ -89,12 +89,12 @@ void place_phyxels(Body &b, const dfm_body_def &def) {
 }
 
 // Copies, valid after the def and its materials are gone.
-void keep_makeup(World &w, Body &b, const dfm_body_def &def, const CellMaterials &cells) {
-  for (const Material *m : cells.list) b.makeup.materials.push_back(*m);
-  b.makeup.of = cells.of;
+void keep_composition(World &w, Body &b, const dfm_body_def &def, const CellMaterials &cells) {
+  for (const Material *m : cells.list) b.composition.materials.push_back(*m);
+  b.composition.of = cells.of;
   for (uint32_t i = 0; i < def.nfield; ++i) {
     const dfm_cell_field &f = def.fields[i];
-    b.makeup.given.push_back(
+    b.composition.given.push_back(
         {f.key, "field", f.width,
          Array<double>(f.values, f.values + size_t(f.width) * def.ntet, HookAllocator<double>(w.memory()))});
   }
@@ -146,7 +146,7 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
 void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials &materials) {
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
   check_fields(type, def, b.name);
-  keep_makeup(w, b, def, materials);
+  keep_composition(w, b, def, materials);
   ModelOrigin origin{keep_params(type, def.model_params),
                      to_pose(def.pose),
                      static_cast<uint32_t>(def.integrator),
@@ -154,7 +154,7 @@ void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials 
   const auto make = [&] { exchange(b, *make_body_model(w, b, type, origin, def.integrator)); };
   make();
   if (def.mass_scaling != 0) {
-    give_scaled_mass(b, def.mass_scaling);
+    set_scaled_mass(b, def.mass_scaling);
     make();
   }
   b.first_model = model_hash(b);
@@ -227,7 +227,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
 
 namespace {
 
-constexpr uint32_t kVoxelCells = 262144, kMostVoxelCells = 1u << 28, kFewestVoxelCells = 64;
+constexpr uint32_t kVoxelCells = 262144, kMaxVoxelCells = 1u << 28, kFewestVoxelCells = 64;
 
 // Points and triangles of a mesh or of voxels: checked and kept.
 void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
@@ -253,9 +253,9 @@ double signed_volume(const Obstacle &o) {
 void make_voxels(Obstacle &o, const Memory &memory) {
   const char *const name = o.name.c_str();
   const uint32_t cells = o.def.cells ? o.def.cells : kVoxelCells;
-  if (cells < kFewestVoxelCells || cells > kMostVoxelCells)
+  if (cells < kFewestVoxelCells || cells > kMaxVoxelCells)
     fail(DFM_E_ARG, "obstacle '%s': %u cells; a grid has between %u and %u", name, cells, kFewestVoxelCells,
-         kMostVoxelCells);
+         kMaxVoxelCells);
   if (!ObstacleMesh(memory, o.def.npoint, o.points.data(), o.def.ntriangle, o.triangles.data()).closed)
     fail(
         DFM_E_ARG,
@@ -339,10 +339,10 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   return o;
 }
 
-void leave_contacts(World &w, uint64_t id, bool obstacle) {
+void end_contacts(World &w, uint64_t id, bool obstacle) {
   drop_attachments(w, id);
   close_slot(w, id, obstacle);
-  leave_sensors(w, id);
+  end_sensor_overlaps(w, id);
   ContactStore &s = w.store;
   reserve_events(w, s.n);
   for (uint32_t i = 0; i < s.n; ++i)
@@ -350,7 +350,7 @@ void leave_contacts(World &w, uint64_t id, bool obstacle) {
       if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
       s.touching[i] = 0;
     }
-  leave_rigid_contacts(w, id);
+  end_rigid_contacts(w, id);
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
   w.changed = true;
 }
@@ -378,7 +378,7 @@ void orphan_pieces(World &w, const Body &whole) {
     p->whole_name.clear();
   }
   const auto is_piece = [&](const auto &p) { return p->piece_of == whole.id; };
-  for (auto *list : {&w.emptied, &w.undone})
+  for (auto *list : {&w.emptied, &w.rolled_back})
     for (auto at = list->begin(); (at = std::find_if(list->begin(), list->end(), is_piece)) != list->end();)
       destroy_body(**at);
 }
@@ -387,15 +387,15 @@ void orphan_pieces(World &w, const Body &whole) {
 
 void destroy_body(Body &b) {
   World &w = *b.world;
-  if (b.undone) {
+  if (b.rolled_back) {
     handle_destroy(b.handle);
-    std::erase_if(w.undone, [&](auto &p) { return p.get() == &b; });
+    std::erase_if(w.rolled_back, [&](auto &p) { return p.get() == &b; });
     return;
   }
   if (!b.piece_of) orphan_pieces(w, b);
   if (!b.emptied) {
     w.sensors -= b.sensor;
-    leave_contacts(w, b.id, false);
+    end_contacts(w, b.id, false);
   }
   w.tearing -= b.tears;
   forget(w, b.handle, b.name);
@@ -406,7 +406,7 @@ void destroy_body(Body &b) {
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
   w.sensors -= o.sensor;
-  leave_contacts(w, o.id, true);
+  end_contacts(w, o.id, true);
   forget(w, o.handle, o.name);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }

@@ -18,6 +18,6 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);
 void destroy_body(Body &b);
 void destroy_obstacle(Obstacle &o);
 // Ends the attachments and contacts, with their events, of a body or obstacle that leaves the simulation.
-void leave_contacts(World &w, uint64_t id, bool obstacle);
+void end_contacts(World &w, uint64_t id, bool obstacle);
 
 }  // namespace dfm

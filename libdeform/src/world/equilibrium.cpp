@@ -74,7 +74,7 @@ class Equilibrium {
 constexpr uint32_t kCuts = 12;  // halvings of a correction that is too long
 // Share of its diagonal that is first added to a singular matrix; a hundred times as much if that is not
 // enough.
-constexpr double kLeastRegular = 1e-9, kMostRegular = 1e-1;
+constexpr double kMinRegular = 1e-9, kMaxRegular = 1e-1;
 
 Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model,
                          const ImplicitOptions &options)
@@ -99,16 +99,16 @@ bool Equilibrium::residual(double time, const Loads &loads) {
   scale_ = 0;
   for (const double f : p_.f) scale_ = std::max(scale_, std::fabs(f));
   if (!rest_.add_forces(time)) return false;
-  double poison = 0;
+  double nan_flag = 0;
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
       const size_t at = size_t{kStride} * i + c;
       const bool moves = p_.moves(at);
       residual_[size_t{3} * i + c] = moves ? p_.f[at] : 0;
       if (!moves) scale_ = std::max(scale_, std::fabs(p_.f[at]));
-      poison += 0.0 * p_.f[at];
+      nan_flag += 0.0 * p_.f[at];
     }
-  return poison == 0;
+  return nan_flag == 0;
 }
 
 // The blocks of A are set; adds a share of the diagonal, applies the held components, and factors.
@@ -125,8 +125,8 @@ bool Equilibrium::factor(double share) {
 
 bool Equilibrium::linearize(double time, const double *softness, bool free) {
   if (factored_ && stiffness_.constant() && held_ == p_.held) return true;
-  for (double share = free ? kLeastRegular : 0; share <= kMostRegular;
-       share = share > 0 ? 100 * share : kLeastRegular) {
+  for (double share = free ? kMinRegular : 0; share <= kMaxRegular;
+       share = share > 0 ? 100 * share : kMinRegular) {
     if (!stiffness_.evaluate(model_, rest_.kin(time), -1, 0)) return false;
     double stiffest = 0, far = 0;
     stiffness_.each_own([&](uint32_t i, double *block) {
@@ -205,7 +205,7 @@ class Search {
   }
   Search(const Search &) = delete;
   ~Search() {
-    if (!done_) put_back(first_);
+    if (!done_) restore_state(first_);
     set_gravity_now(w_);
     for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
   }
@@ -221,7 +221,7 @@ class Search {
     }
     for (auto &b : w_.bodies) {
       std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
-      settle_dampers(b->p);
+      relax_dampers(b->p);
     }
     done_ = true;
   }
@@ -251,7 +251,7 @@ class Search {
       kept_.state.emplace_back(b->model.state.begin(), b->model.state.end());
     }
   }
-  void put_back(const Kept &kept) {
+  void restore_state(const Kept &kept) {
     w_.time = kept.time;
     for (size_t i = 0; i < w_.bodies.size(); ++i) {
       std::copy(kept.x[i].begin(), kept.x[i].end(), w_.bodies[i]->p.x.begin());
@@ -270,7 +270,7 @@ class Search {
       return;
     }
     if (halved == kHalvings || (from.time == to.time && from.share == to.share)) refuse(*failed, to, result);
-    put_back(before);
+    restore_state(before);
     const Station middle = {0.5 * (from.time + to.time), 0.5 * (from.share + to.share)};
     go(from, middle, halved + 1);
     go(middle, to, halved + 1);
@@ -357,7 +357,7 @@ void check_equilibrium(const World &w) {
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
   prepare(w);
   check_equilibrium(w);
-  if (w.plan.touches()) return settle(w, def, info);
+  if (w.plan.touches()) return find_contact_equilibrium(w, def, info);
   {
     Search search(w, def, info);
     search.run(def.load_steps ? def.load_steps : 1);
@@ -366,7 +366,7 @@ void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_
   for (auto &b : w.bodies) {
     b->dynamics->points_changed();
     forget_energy(*b);
-    settle_changes(*b);
+    clear_change_energy(*b);
     ++b->x_version;
     w.overlaps.place(b->id);
   }

@@ -12,6 +12,6 @@ void check_equilibrium(const World &w);
 // Throws Error; then nothing has changed.
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
 // The same with contact and friction, for a prepared world: steps from rest, in settle.cpp.
-void settle(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
+void find_contact_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
 
 }  // namespace dfm

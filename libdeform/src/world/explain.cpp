@@ -47,7 +47,7 @@ std::string integrator(const Body &b) {
     why = std::isfinite(i.step) ? "the model steps itself, and in contact within its bound"
                                 : "the model steps itself";
   else if (i.chosen == Chosen::no) why = "named, or the world's";
-  else if (i.chosen == Chosen::struck) why = "auto: implicit, but explicit until an impact is over";
+  else if (i.chosen == Chosen::in_impact) why = "auto: implicit, but explicit until an impact is over";
   else if (i.used != DFM_INTEGRATOR_SYMPLECTIC_EULER)
     why = "auto: explicit time costs more than four times as much";
   else if (!b.model.can(DFM_CAP_STIFFNESS))
@@ -78,7 +78,7 @@ std::string light(const Body &b) {
   std::vector<std::string> scaled;
   if (!rest_rows(b, 1, rows)) return "";
   std::vector<double> mass;
-  for (const double share : {0.001, 0.01, kMostScaled})
+  for (const double share : {0.001, 0.01, kMaxScaled})
     if (b.scaling.moved == 0)
       scaled.push_back(format("{\"mass_scaling\":%g,\"step_s\":%.4g}", share,
                               kBoundShare * scale_mass(b.p, rows, share, mass).step));
@@ -113,7 +113,7 @@ std::string laws(const World &w) {
       effects.push_back("{\"name\":" + quote(e.name) + ",\"works\":" + (e.works ? "true" : "false") +
                         ",\"used\":" + (e.works && used(w, e.name) ? "true" : "false") +
                         ",\"switchable\":" + (e.switchable ? "true" : "false") + "}");
-    rows.push_back("{\"name\":" + quote(law->type->id) + ",\"asked\":" + quote(law->asked_type->id) +
+    rows.push_back("{\"name\":" + quote(law->type->id) + ",\"asked\":" + quote(law->requested_type->id) +
                    ",\"effects\":[" + join(effects, ",") + "]}");
   }
   return "\"laws\":[" + join(rows, ",") + "]";
@@ -212,7 +212,7 @@ std::string cuts(const Body &b) {
                    ",\"how\":" + quote(c.how == DFM_CUT_SPLIT ? "opens faces" : "removes cells") +
                    format(",\"most\":%u}", c.most));
   double least = HUGE_VAL;
-  for (const Material &m : b.makeup.materials) least = std::min(least, m.entry(kTearKey, HUGE_VAL));
+  for (const Material &m : b.composition.materials) least = std::min(least, m.entry(kTearKey, HUGE_VAL));
   return ",\"cuts\":[" + join(rows, ",") +
          "],\"tears_beyond\":" + (b.tears ? format("%.9g", least) : std::string("null"));
 }
@@ -272,7 +272,7 @@ std::string reason(const World &w) {
 std::string explain(const World &w) {
   std::vector<std::string> effects, stages, absent, bodies;
   for (const PlannedEffect &e : w.plan.effects)
-    effects.push_back("{\"name\":" + quote(e.name) + ",\"asked_by\":" + quote(e.asked_by) +
+    effects.push_back("{\"name\":" + quote(e.name) + ",\"asked_by\":" + quote(e.requested_by) +
                       ",\"provided_by\":" + quote(e.provided_by) +
                       ",\"state\":" + (w.selection.lists(e.name) ? "\"asked\"" : "\"called for\"") + "}");
   for (const PlannedStage &s : w.plan.stages) {

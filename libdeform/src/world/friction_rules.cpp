@@ -70,7 +70,7 @@ bool bring_the_same(const LawInstance &a, const LawInstance &b) {
 void put_params(World &w, FrictionRule &rule, std::vector<double> values, double restitution) {
   forget_pairs(w, 0);
   std::unique_ptr<LawInstance> &law = w.laws[rule.law];
-  auto fresh = make_law(w, *law->asked_type, std::move(values), restitution);
+  auto fresh = make_law(w, *law->requested_type, std::move(values), restitution);
   const bool remembers = same_memory(*law, *fresh);
   // the plan names the effects that the parameters call for
   if (!bring_the_same(*law, *fresh)) w.changed = true;
@@ -107,7 +107,7 @@ void add_friction_rule(World &w, std::string a, std::string b, const char *law,
   w.friction.reserve(w.friction.size() + 1);
   FrictionRule *const before = find_rule(w, rule.between);
   const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, law);
-  if (before && w.laws[before->law]->asked_type == &type) {
+  if (before && w.laws[before->law]->requested_type == &type) {
     put_params(w, *before, pack_params(type, given), restitution);
     move_to_end(w, before);
   } else {
@@ -122,8 +122,8 @@ void add_friction_rule(World &w, std::string a, std::string b, const char *law,
 void set_friction_rule(World &w, const char *a, const char *b, std::span<const dfm_param_value> given) {
   FrictionRule &rule = need_rule(w, a, b);
   const LawInstance &law = *w.laws[rule.law];
-  std::vector<double> values = changed_params(*law.asked_type, given, law.asked);
-  if (values == law.asked) return;
+  std::vector<double> values = changed_params(*law.requested_type, given, law.requested);
+  if (values == law.requested) return;
   put_params(w, rule, std::move(values), law.restitution);
   wake_all(w);
   values_changed(w);

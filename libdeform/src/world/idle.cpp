@@ -55,9 +55,9 @@ std::vector<IdleParam> idle_params(const Body &b) {
   std::vector<IdleParam> out;
   const dfm_type &type = *b.model.type;
   for (const Unused &u : b.unused) {
-    const bool field = u.material.empty() && std::ranges::any_of(b.makeup.given, [&](const CellField &f) {
-                         return f.key == u.key;
-                       });
+    const bool field =
+        u.material.empty() &&
+        std::ranges::any_of(b.composition.given, [&](const CellField &f) { return f.key == u.key; });
     const std::string by = field                ? "a field of the body"
                            : u.material.empty() ? "its material"
                                                 : "material '" + u.material + "'";

@@ -48,7 +48,7 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
 }
 
 bool may_tear(const Body &b) {
-  const std::vector<Material> &list = b.makeup.materials;
+  const std::vector<Material> &list = b.composition.materials;
   return std::any_of(list.begin(), list.end(), [](const Material &m) { return m.entry(kTearKey, 0) > 0; });
 }
 

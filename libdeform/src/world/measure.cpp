@@ -27,9 +27,9 @@ double elastic_energy(Body &b) {
   if (!b.model.can(DFM_CAP_ENERGY)) return NAN;
   double joule = 0;
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
-  const OnBehalf speaks(b.name);
-  const auto ask = [&] { return b.model.ops->energy(b.model.self, &k, &joule); };
-  return b.model.call("energy", ask) == DFM_OK ? joule : NAN;
+  const OnBehalf prefix(b.name);
+  const auto query = [&] { return b.model.ops->energy(b.model.self, &k, &joule); };
+  return b.model.call("energy", query) == DFM_OK ? joule : NAN;
 }
 
 dfm_body_measure measure(Body &b) {
@@ -61,7 +61,8 @@ dfm_body_measure measure(Body &b) {
   store3(m.momentum, momentum);
   store3(m.angular, angular);
   store3(m.contact_impulse,
-         b.contact_impulse + (b.slumber.asleep ? b.world->time - b.slumber.since : 0) * b.slumber.force);
+         b.contact_impulse +
+             (b.sleep_state.asleep ? b.world->time - b.sleep_state.since : 0) * b.sleep_state.force);
   m.kinetic = kinetic;
   m.speed_max = std::sqrt(fastest);
   m.elastic = elastic_energy(b);
@@ -71,17 +72,17 @@ dfm_body_measure measure(Body &b) {
 namespace {
 
 // Values of a model by cell at the present positions. give: the function of an extension that has one.
-template <class Table, class Give>
-void ask_by_cell(Body &b, const char *id, const char *name, const char *what, size_t width, const Give &give,
-                 double *out) {
+template <class Table, class Entry>
+void query_by_cell(Body &b, const char *id, const char *name, const char *what, size_t width,
+                   const Entry &entry_of, double *out) {
   const char *const type = b.model.type->id;
   const auto table =
       copy_table<Table>(b.model.extension(id), 2 * sizeof(uint32_t) + sizeof(void *), type, name);
-  if (!table || !give(*table))
+  if (!table || !entry_of(*table))
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no %s per cell", type, b.name.c_str(), what);
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
   const char *const entry = name + std::strlen("dfm_");
-  if (b.model.call(entry, [&] { return give(*table)(b.model.self, &k, out); }) != DFM_OK)
+  if (b.model.call(entry, [&] { return entry_of(*table)(b.model.self, &k, out); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not give its %s per cell", type, what);
   // each tetrahedron of a cell has the cell's; the last one first, so that none is overwritten before
   const size_t each = cell_kind(b.cell_type).tets;
@@ -94,13 +95,13 @@ void ask_by_cell(Body &b, const char *id, const char *name, const char *what, si
 bool offers(const Body &b, const char *extension) { return b.model.extension(extension) != nullptr; }
 
 void energy_density(Body &b, double *out) {
-  const auto give = [](const dfm_cell_energy &table) { return table.cell_energy; };
-  ask_by_cell<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy", "energy", 1, give, out);
+  const auto entry_of = [](const dfm_cell_energy &table) { return table.cell_energy; };
+  query_by_cell<dfm_cell_energy>(b, DFM_EXT_CELL_ENERGY, "dfm_cell_energy", "energy", 1, entry_of, out);
 }
 
 void cell_stress(Body &b, double *out) {
-  const auto give = [](const dfm_cell_stress &table) { return table.cell_stress; };
-  ask_by_cell<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress", "stress", 6, give, out);
+  const auto entry_of = [](const dfm_cell_stress &table) { return table.cell_stress; };
+  query_by_cell<dfm_cell_stress>(b, DFM_EXT_CELL_STRESS, "dfm_cell_stress", "stress", 6, entry_of, out);
 }
 
 namespace {
@@ -124,7 +125,7 @@ class EffectsAtWork {
 };
 
 // In the model and its values.
-void give_params(Body &b, const std::vector<double> &values) {
+void set_values(Body &b, const std::vector<double> &values) {
   const char *const type = b.model.type->id;
   const dfm_status status = b.model.put_params(values, b.dynamics->abilities().claims);
   if (status == DFM_E_NOMEM)
@@ -153,11 +154,12 @@ void set_model_params(Body &b, const dfm_params &params) {
              "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it during a "
              "run; create the body again",
              b.name.c_str(), f.key.c_str(), f.from.c_str());
-  const std::vector<double> &before_asked = b.withheld.asked.empty() ? b.model.params : b.withheld.asked;
-  const std::vector<double> asked = changed_params(type, given, before_asked);
-  std::vector<double> values = asked;
+  const std::vector<double> &before_requested =
+      b.switched_off.requested.empty() ? b.model.params : b.switched_off.requested;
+  const std::vector<double> requested = changed_params(type, given, before_requested);
+  std::vector<double> values = requested;
   for (size_t k = 0; k < values.size(); ++k)  // what the list of effects leaves out remains left out
-    if (before_asked[k] != b.model.params[k]) values[k] = b.model.params[k];
+    if (before_requested[k] != b.model.params[k]) values[k] = b.model.params[k];
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) &&
@@ -167,16 +169,16 @@ void set_model_params(Body &b, const dfm_params &params) {
   if (!b.model.ops->set_params)
     fail(DFM_E_UNSUPPORTED, "model '%s' accepts no parameters during a run", type.id);
   const EffectsAtWork before(b.model);
-  give_params(b, values);
+  set_values(b, values);
   std::vector<uint8_t> by_cell = differs_by_cell(type, b.fields);
   const auto works = [&](const std::string &effect) { return b.model.works(effect); };
   if (b.world->selection.listed() &&
       leave_out(type, b.model.effect_rows(), b.world->selection, works, values, by_cell)) {
-    give_params(b, values);
+    set_values(b, values);
   }
-  b.withheld.by_cell.resize(type.nparam);
-  const bool cells = std::count(b.withheld.by_cell.begin(), b.withheld.by_cell.end(), 1) > 0;
-  b.withheld.asked = asked == values && !cells ? std::vector<double>() : asked;
+  b.switched_off.by_cell.resize(type.nparam);
+  const bool cells = std::count(b.switched_off.by_cell.begin(), b.switched_off.by_cell.end(), 1) > 0;
+  b.switched_off.requested = requested == values && !cells ? std::vector<double>() : requested;
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
   b.integrator.share = 1;                         // what holds if it cannot be measured

@@ -35,7 +35,7 @@ constexpr double kInstant = 1e-9;    // s, too short for any motion
 constexpr double kSlender = 1e-3;    // of the longest arm: shorter arms define no direction
 constexpr double kOnTime = 1e-6;     // of a step: a switch may be early by this share
 constexpr double kSmallJump = 1e-9;  // J
-constexpr size_t kMostSwaps = 4096;
+constexpr size_t kMaxSwaps = 4096;
 constexpr size_t kSpares = 2;  // a rule has three models
 
 // ---- rigid placement of the body ------------------------------------------------------------------
@@ -151,7 +151,7 @@ void check_surface(World &w, Body &b) {
       });
       most = std::max(most, norm(jump));
     }
-  if (b.slumber.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
+  if (b.sleep_state.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
   if (!knows)
     fail(DFM_DISCARD,
          "body '%s': model '%s' cannot continue from the present shape; change the model where the body is "
@@ -236,7 +236,7 @@ void keep_spare(std::vector<SpareModel> &spares, MadeModel &left) {
   };
   std::erase_if(spares, same);
   if (spares.size() == kSpares) spares.erase(spares.begin());
-  spares.push_back({std::move(left.model), std::move(left.origin), std::move(left.withheld)});
+  spares.push_back({std::move(left.model), std::move(left.origin), std::move(left.switched_off)});
 }
 
 // The inputs of an instance of this type, at the present state of the body.
@@ -309,18 +309,18 @@ ModelChoice choose_model(const Body &b, const char *type, const dfm_params &para
   }
   std::erase_if(own, limit);
   out.params = keep_params(found, {sizeof(dfm_params), static_cast<uint32_t>(own.size()), own.data()});
-  values_asked(*b.world, b, found, out.params);
+  requested_values(*b.world, b, found, out.params);
   return out;
 }
 
 void change_model(Body &b, const ModelChoice &to, Swap &swap) {
   World &w = *b.world;
-  const OnBehalf speaks(b.name);
+  const OnBehalf prefix(b.name);
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   prepare(w);
   ModelOrigin origin = origin_for(b, type, to);
   swap = {b.handle, w.time, b.model.type, &type, elastic_energy(b), NAN, to.max_jump};
-  ChangeBook book = look_at_changes(b, swap.before);
+  ChangeBook book = check_changes(b, swap.before);
   const int32_t integrator = static_cast<int32_t>(origin.integrator);
   b.spares.reserve(kSpares);
   const std::unique_ptr<MadeModel> made = make_body_model(w, b, type, std::move(origin), integrator);
@@ -379,11 +379,11 @@ void check_first_step(World &w, Body &b) {
 }
 
 void keep_swap(World &w, const Swap &swap) {
-  if (w.swaps.size() == kMostSwaps) w.swaps.erase(w.swaps.begin());
+  if (w.swaps.size() == kMaxSwaps) w.swaps.erase(w.swaps.begin());
   w.swaps.push_back(swap);
 }
 
-bool try_change(World &w, Body &b, const ModelChoice &to, bool tell) {
+bool try_change(World &w, Body &b, const ModelChoice &to, bool report) {
   w.swaps.reserve(w.swaps.size() + 1);
   Swap swap;
   try {
@@ -391,11 +391,11 @@ bool try_change(World &w, Body &b, const ModelChoice &to, bool tell) {
   } catch (const Error &e) {
     if (e.status != DFM_DISCARD) throw;
     swap.refused = true;
-    if (tell && !(swap.unpaid && b.changes.told))
+    if (report && !(swap.unpaid && b.changes.reported))
       w.context->logf(DFM_LOG_WARNING, "t = %g s: %s", w.time, e.what());
   }
-  b.changes.told = b.changes.told || swap.unpaid;
-  if (tell || !swap.refused) keep_swap(w, swap);
+  b.changes.reported = b.changes.reported || swap.unpaid;
+  if (report || !swap.refused) keep_swap(w, swap);
   return !swap.refused;
 }
 
@@ -463,7 +463,7 @@ void follow_rules(World &w) {
   find_touching(w, w.steps->touching);
   for (size_t i = 0; i < w.bodies.size(); ++i) {
     Body &b = *w.bodies[i];
-    if (!b.rule.empty() && !b.slumber.asleep) follow(w, b, b.rule[0], w.steps->touching[i]);
+    if (!b.rule.empty() && !b.sleep_state.asleep) follow(w, b, b.rule[0], w.steps->touching[i]);
   }
 }
 

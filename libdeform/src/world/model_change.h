@@ -23,7 +23,7 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
 void check_first_step(World &w, Body &b);
 // Changes the model and keeps the row. Returns false if it was refused because of the energy jump; the row
 // reports that if `tell`.
-bool try_change(World &w, Body &b, const ModelChoice &to, bool tell);
+bool try_change(World &w, Body &b, const ModelChoice &to, bool report);
 // Makes the changes that are due in the step of dt seconds that begins now: by time, then by rules.
 void make_switches(World &w, double dt);
 void keep_swap(World &w, const Swap &swap);

@@ -96,7 +96,7 @@ Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {
   return create_obstacle(w, o);
 }
 
-void ask_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *data) {
+void query_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *data) {
   const uint32_t n = static_cast<uint32_t>(set.defs.size());
   set.group.assign(n, DFM_RIGID_STILL);
   const dfm_rigid_set_def def = {sizeof def, n, set.njoint, 0, set.defs.data(), joints.data(), data};
@@ -193,7 +193,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   set.joints = joints;
   set.elsewhere = def.data != nullptr;
   for (uint32_t k = 0; k < set.njoint; ++k) check_joint(joints[k], k, set.defs);
-  ask_host(set, joints, def.data);
+  query_host(set, joints, def.data);
 
   const size_t n = set.defs.size();
   set.state.resize(n);

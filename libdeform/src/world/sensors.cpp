@@ -44,10 +44,10 @@ std::vector<Sensed> sensed_now(World &w) {
 
 }  // namespace
 
-void look_at_sensors(World &w, bool tell) {
+void update_sensors(World &w, bool report) {
   if (w.sensors == 0 && w.sensed.empty()) return;
   std::vector<Sensed> now = sensed_now(w);
-  if (tell) {
+  if (report) {
     reserve_events(w, now.size() + w.sensed.size());
     const auto in = [](const std::vector<Sensed> &list, const Sensed &s) {
       return std::binary_search(list.begin(), list.end(), s);
@@ -60,7 +60,7 @@ void look_at_sensors(World &w, bool tell) {
   w.sensed = std::move(now);
 }
 
-void leave_sensors(World &w, uint64_t id) {
+void end_sensor_overlaps(World &w, uint64_t id) {
   reserve_events(w, w.sensed.size());
   std::erase_if(w.sensed, [&](const Sensed &s) {
     if (s.sensor != id && s.thing != id) return false;

@@ -5,8 +5,8 @@
 namespace dfm {
 
 // Updates all sensors at the present positions. tell: add an event for each change.
-void look_at_sensors(World &w, bool tell);
+void update_sensors(World &w, bool report);
 // Ends all overlaps of a thing that is removed, or is no longer a sensor.
-void leave_sensors(World &w, uint64_t id);
+void end_sensor_overlaps(World &w, uint64_t id);
 
 }  // namespace dfm

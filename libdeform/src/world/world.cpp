@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "core/aside.h"
+#include "core/background.h"
 #include "plugin/context.h"
 #include "state/material.h"
 #include "state/obstacle.h"
@@ -49,7 +49,7 @@ Obstacle *World::find_obstacle(const std::string &name) {
 }
 
 uint64_t World::handle_of(uint64_t id) const {
-  for (auto *list : {&bodies, &emptied, &undone})
+  for (auto *list : {&bodies, &emptied, &rolled_back})
     for (auto &b : *list)
       if (b->id == id) return b->handle;
   const Obstacle *const o = obstacle(id);

@@ -119,14 +119,14 @@ TEST(BulletLifecycle, BodyMovedByHand_IsThereAtOnce) {
 TEST(BulletLifecycle, KinematicBody_LiftsAndGetsNoForce) {
   Bullet b;
   set_friction(b.soft, 0.8);
-  Told told(at({0, 0, -0.1}));
+  Told reported(at({0, 0, -0.1}));
   btRigidBody *const table = b.box({0.3, 0.3, 0.1}, 0, {0, 0, -0.1});
   table->setCollisionFlags(table->getCollisionFlags() | btCollisionObject::CF_KINEMATIC_OBJECT);
   table->setActivationState(DISABLE_DEACTIVATION);
-  table->setMotionState(&told);
+  table->setMotionState(&reported);
   const dfm_body ball = soft_ball(b, {0, 0, 0.101}, {}, 3e5);
   for (int i = 1; i <= 30; ++i) {
-    told.now = at({0.001 * i, 0, -0.1 + 0.002 * i});
+    reported.now = at({0.001 * i, 0, -0.1 + 0.002 * i});
     b.world.stepSimulation(btScalar(1.0 / 60), 10, btScalar(1.0 / 240));
     ok(dfm_bullet_last_tick(b.adapter, nullptr));
   }

@@ -25,14 +25,14 @@ static void project(struct lane *l) {
 
 /* What every law ends with: force from the new state; NaN where an input was not finite. */
 static inline void finish(struct lane *l, int slips) {
-  const double poison = 0.0 * (l->fn + l->v[0] + l->v[1] + l->stiff);
-  for (int a = 0; a < 2; ++a) l->f[a] = -l->stiff * l->next[a] + poison;
-  l->limit = l->cone + poison;
+  const double nan_flag = 0.0 * (l->fn + l->v[0] + l->v[1] + l->stiff);
+  for (int a = 0; a < 2; ++a) l->f[a] = -l->stiff * l->next[a] + nan_flag;
+  l->limit = l->cone + nan_flag;
   l->mode = l->fn > 0 ? (slips ? 2 : 1) : 0;
   l->stored = 0.5 * l->stiff * (l->next[0] * l->next[0] + l->next[1] * l->next[1]);
 }
 
-static inline void sound(struct lane *l) {
+static inline void correct_lane(struct lane *l) {
   const double before = l->stiff * sqrt(l->z[0] * l->z[0] + l->z[1] * l->z[1]);
   project(l);
   const int projected = before > l->cone && l->cone > 0;

@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void creeps(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   for (int a = 0; a < 2; ++a) l->next[a] /= 1 + 1e-6 * l->h;
   finish(l, l->mode == 2);
 }

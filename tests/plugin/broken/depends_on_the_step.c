@@ -6,7 +6,7 @@ static void fitted(struct lane *l) {
   l->mu *= factor;
   l->cone *= factor;
   l->stiff *= factor;
-  sound(l);
+  correct_lane(l);
 }
 
 #define EFFECTS "hysteresis"

@@ -4,7 +4,7 @@
 
 static inline void lagged(struct lane *l, const dfm_friction_in *in, dfm_friction_out *out, uint32_t i) {
   const double follows = 0.01, viscous = 1e-3 * l->cone;
-  sound(l);
+  correct_lane(l);
   for (uint32_t a = 0; a < 2; ++a) {
     const size_t at = (2 + a) * (size_t)in->stride + i;
     const double old = l->fn > 0 ? in->state[at] : 0.0;

@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void half(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   for (int k = 0; k < 4; ++k) l->dv[k] *= 0.5;
 }
 

@@ -4,7 +4,7 @@
 static void hangs(struct lane *l) {
   volatile double w = fabs(l->v[0]);
   while (w > 1) w = 0.5 * w;
-  sound(l);
+  correct_lane(l);
 }
 
 #define LANE hangs

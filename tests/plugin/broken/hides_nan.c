@@ -3,7 +3,7 @@
 
 static void hides(struct lane *l) {
   if (!(l->fn > 0)) l->fn = 0;
-  sound(l);
+  correct_lane(l);
 }
 
 #define LANE hides

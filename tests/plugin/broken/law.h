@@ -14,7 +14,7 @@
 #define FLAGS (DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE | DFM_FRIC_JACOBIAN)
 #endif
 #ifndef LANE
-#define LANE sound
+#define LANE correct_lane
 #endif
 #ifndef BEFORE_EVAL
 #define BEFORE_EVAL

@@ -1,3 +1,3 @@
 /* V03: claims an energy and has none. */
-#define ASKED_ENERGY NULL
+#define WITH_ENERGY NULL
 #include "net.h"

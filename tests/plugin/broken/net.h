@@ -263,12 +263,12 @@ static const void *extension(const void *self, const char *id) {
 #endif
   return strcmp(id, DFM_EXT_CELL_ENERGY) ? NULL : &by_cell;
 }
-#ifndef ASKED_BOUND
-#define ASKED_BOUND bound
+#ifndef WITH_BOUND
+#define WITH_BOUND bound
 #endif
-#define ADDS_FORCES add_forces, ASKED_BOUND
-#ifndef ASKED_ENERGY
-#define ASKED_ENERGY energy
+#define ADDS_FORCES add_forces, WITH_BOUND
+#ifndef WITH_ENERGY
+#define WITH_ENERGY energy
 #endif
 #include "net_type.h"
 #endif

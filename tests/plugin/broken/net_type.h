@@ -7,8 +7,8 @@
 #define SLOTS NULL
 #endif
 static const dfm_model model = {
-    sizeof(dfm_model), CAPS,         CELLS,   NSLOT,     SLOTS,     create, destroy, NULL, NULL,
-    ADDS_FORCES,       ASKED_ENERGY, pattern, stiffness, extension, 0,      0};
+    sizeof(dfm_model), CAPS,        CELLS,   NSLOT,     SLOTS,     create, destroy, NULL, NULL,
+    ADDS_FORCES,       WITH_ENERGY, pattern, stiffness, extension, 0,      0};
 static const char *const effects[] = {"damping", NULL};
 static const dfm_type type = {sizeof(dfm_type),
                               DFM_KIND_MODEL,

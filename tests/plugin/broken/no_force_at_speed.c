@@ -3,7 +3,7 @@
 
 static void fades(struct lane *l) {
   const double w2 = l->v[0] * l->v[0] + l->v[1] * l->v[1];
-  sound(l);
+  correct_lane(l);
   for (int a = 0; a < 2; ++a) l->f[a] *= sqrt(1 - w2);
 }
 

@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void divides(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   l->f[0] *= l->mu / l->mu;
   l->f[1] *= l->mu / l->mu;
 }

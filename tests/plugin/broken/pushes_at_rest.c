@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void pushes(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   l->f[0] += 1e-4 * l->cone;
 }
 

@@ -123,5 +123,5 @@ static const void *extension(const void *self, const char *id) {
   return strcmp(id, DFM_EXT_CELL_ENERGY) ? NULL : &by_cell;
 }
 #define ADDS_FORCES NULL, NULL
-#define ASKED_ENERGY energy
+#define WITH_ENERGY energy
 #include "net_type.h"

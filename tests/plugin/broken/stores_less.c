@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void stores_less(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   l->stored *= 0.4;
 }
 

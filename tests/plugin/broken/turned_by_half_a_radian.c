@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void turned(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   const double c = cos(0.5), s = sin(0.5), x = l->f[0], y = l->f[1];
   l->f[0] = c * x + s * y;
   l->f[1] = c * y - s * x;

@@ -2,7 +2,7 @@
 #include "base.h"
 
 static void forward(struct lane *l) {
-  sound(l);
+  correct_lane(l);
   l->f[0] = -l->f[0];
   l->f[1] = -l->f[1];
 }

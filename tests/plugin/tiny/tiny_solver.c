@@ -6,7 +6,7 @@
 #ifndef KIND
 #define KIND DFM_SOLVER_DIRECT
 #endif
-enum { kMost = 40 };
+enum { kMax = 40 };
 
 typedef struct Cholesky {
   const dfm_host *host;
@@ -29,7 +29,7 @@ static void release(void *self) {
 static dfm_status analyse(const dfm_host *host, uint32_t n, uint32_t nb, const uint32_t *ij, void **self) {
   Cholesky *c;
   uint32_t k;
-  if (n > kMost) {
+  if (n > kMax) {
     host->log(host->ctx, 3, 0, "tiny solver: at most 40 points");
     return DFM_E_UNSUPPORTED;
   }

@@ -32,10 +32,10 @@ struct Guard {
   }
   double safe() {
     const dfm::Array<dfm::Candidate> &all = scene.all();
-    dfm::GuardScene asked = test::guard_scene(scene.bodies, end, kFloor, kMargin);
+    dfm::GuardScene requested = test::guard_scene(scene.bodies, end, kFloor, kMargin);
     std::vector<uint32_t> which(all.size());
     std::iota(which.begin(), which.end(), 0u);
-    return dfm::guard_pairs(asked, all, which, hits);
+    return dfm::guard_pairs(requested, all, which, hits);
   }
   // Least distance of all pairs at t, by the tests' own arithmetic.
   double least(double t) const {
@@ -190,14 +190,14 @@ TEST(ToiGuard, NearPairsOnSeveralThreads_AreThoseOfOne) {
       for (size_t b = 0; b < mean.size(); ++b)
         for (double &v : mean[b]) v = (step % 3) * 0.4 * normal(random);
       for (int k = 0; k < 2; ++k) {
-        dfm::GuardScene asked;
-        asked.bodies = scene.bodies;
-        asked.obstacles = scene.obstacles;
-        asked.poses = {{scene.obstacles[0].position, scene.obstacles[0].rotation}};
-        asked.h = scene.h;
-        asked.floor = kFloor;
-        asked.margin = kMargin;
-        asked.round = 1;
+        dfm::GuardScene requested;
+        requested.bodies = scene.bodies;
+        requested.obstacles = scene.obstacles;
+        requested.poses = {{scene.obstacles[0].position, scene.obstacles[0].rotation}};
+        requested.h = scene.h;
+        requested.floor = kFloor;
+        requested.margin = kMargin;
+        requested.round = 1;
         for (size_t b = 0; b < mean.size(); ++b) {
           dfm::GuardSide side;
           side.surface = scene.bodies[b].surface;
@@ -205,12 +205,12 @@ TEST(ToiGuard, NearPairsOnSeveralThreads_AreThoseOfOne) {
           side.travel = side.spread = 3 * scene.h;
           side.stamp.assign(side.surface->nsurfel, 0);
           side.end.assign(size_t{4} * side.surface->nsurfel, 0.0);
-          asked.sides.push_back(side);
+          requested.sides.push_back(side);
         }
-        asked.sides.emplace_back().still = true;
+        requested.sides.emplace_back().still = true;
         memory[k].follow(list, k ? &tasks : nullptr);
-        if (k) dfm::guard_near(asked, list, memory[k], near[k], &blocks, &tasks);
-        else dfm::guard_near(asked, list, memory[k], near[k]);
+        if (k) dfm::guard_near(requested, list, memory[k], near[k], &blocks, &tasks);
+        else dfm::guard_near(requested, list, memory[k], near[k]);
         memory[k].keep();
       }
       ASSERT_EQ(near[0], near[1]) << threads << " threads, step " << step;

@@ -222,7 +222,7 @@ TEST_P(ToiRandom, WholeCoordinates_AgreeWithIntegerArithmetic) {
     if (!truth.sure) continue;
     ++sure;
     hits += truth.hit;
-    const double t = ask(q, GetParam()).t;
+    const double t = request(q, GetParam()).t;
     ASSERT_EQ(t <= 1, truth.hit) << n << " t " << t << " exact from " << truth.from;
     if (!truth.hit) continue;
     ASSERT_GE(t, truth.from - 1e-10) << n;
@@ -236,7 +236,7 @@ TEST_P(ToiRandom, FindersAgreeOnEveryTime) {
   Random random(12);
   for (int n = 0; n < 20000; ++n) {
     const ToiQuery q = real_query(random, 2);
-    const double t = ask(q, GetParam()).t, other = ask(q, DFM_TOI_BRENT).t;
+    const double t = request(q, GetParam()).t, other = request(q, DFM_TOI_BRENT).t;
     ASSERT_EQ(t <= 1, other <= 1) << n;
     if (t <= 1) {
       ASSERT_NEAR(t, other, 1e-10) << n;
@@ -255,7 +255,7 @@ TEST(ToiConservative, ExactTouches_AreNeverMissedAndNeverLate) {
     double time;
     const ToiQuery q = exact_touch(random, time);
     ASSERT_LE(distance_at(q, Real(time)), 1e-17 * extent_of(q)) << "the construction itself, " << n;
-    const ToiAnswer a = ask(q, DFM_TOI_CONSERVATIVE);
+    const ToiResult a = request(q, DFM_TOI_CONSERVATIVE);
     ASSERT_LE(a.t, time) << n << (q.edges ? " edges" : " point");
     ASSERT_LE(distance_at(q, Real(a.t)), 2e-12L * Real(extent_of(q)))
         << n << ": called touching while apart, t " << a.t << " exact " << time << " evaluations "
@@ -270,7 +270,7 @@ TEST(ToiConservative, BeforeTheResult_FeaturesAreApart) {
   for (int n = 0; n < 4000; ++n) {
     const ToiQuery q = real_query(random, n % 3 == 0 ? 0.3 : 3);
     const double separation = n % 2 ? 0 : random.real(0, 0.2);
-    const ToiAnswer a = ask(q, DFM_TOI_CONSERVATIVE, separation);
+    const ToiResult a = request(q, DFM_TOI_CONSERVATIVE, separation);
     const double end = std::min(a.t, 1.0);
     hits += a.t <= 1;
     for (int k = 0; k < 64 && end > 0; ++k) {
@@ -294,9 +294,9 @@ TEST(ToiConservative, Separation_AllFindersAgree) {
   for (int n = 0; n < 6000; ++n) {
     const ToiQuery q = real_query(random, 2);
     const double separation = random.real(1e-3, 0.3);
-    const double t = ask(q, DFM_TOI_CONSERVATIVE, separation).t;
+    const double t = request(q, DFM_TOI_CONSERVATIVE, separation).t;
     for (const int method : {DFM_TOI_BISECTION, DFM_TOI_REGULA_FALSI, DFM_TOI_BRENT}) {
-      const double other = ask(q, method, separation).t;
+      const double other = request(q, method, separation).t;
       ASSERT_EQ(t <= 1, other <= 1) << n << " " << kFinderNames[method];
       if (t <= 1) {
         ASSERT_LE(t, other + 1e-12) << n << " " << kFinderNames[method];
@@ -322,7 +322,7 @@ TEST(Toi, Bits_AreThoseOfEveryBuild) {
   for (int n = 0; n < 4000; ++n) {
     const ToiQuery q = n % 4 < 2 ? real_query(random, 2) : whole_query(random, n & 1);
     for (int method = 0; method < 4; ++method) {
-      const ToiAnswer a = ask(q, method, n % 5 == 0 ? 0.05 : 0);
+      const ToiResult a = request(q, method, n % 5 == 0 ? 0.05 : 0);
       add(a.t);
       if (a.t <= 1) {
         add(a.at[0]);

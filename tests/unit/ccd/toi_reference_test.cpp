@@ -12,7 +12,7 @@ using namespace test;
 constexpr double kTolerance = 1e-12;  // the default, a share of the extent over the step
 
 // What is wrong with a result; "" if nothing is.
-std::string judge(const ToiQuery &q, int method, const ToiAnswer &a) {
+std::string judge(const ToiQuery &q, int method, const ToiResult &a) {
   if (std::isnan(a.t)) return "refused";
   const bool hit = a.t <= 1;
   const bool conservative = method == DFM_TOI_CONSERVATIVE;
@@ -30,7 +30,7 @@ std::string judge(const ToiQuery &q, int method, const ToiAnswer &a) {
 
 void expect_right(const std::vector<ToiQuery> &queries, int method) {
   for (const ToiQuery &q : queries) {
-    const ToiAnswer a = ask(q, method);
+    const ToiResult a = request(q, method);
     const std::string wrong = judge(q, method, a);
     EXPECT_EQ(wrong, "") << kFinderNames[method] << " " << q.id << " " << q.category << " t " << a.t
                          << " exact " << q.toi;
@@ -51,7 +51,7 @@ TEST_P(ToiReference, ExactQueries_NoneMissedNoneLate) {
 // a power of two.
 TEST_P(ToiReference, Relabeled_SameBits) {
   for (const ToiQuery &q : reference_queries()) {
-    const double t = ask(q, GetParam()).t;
+    const double t = request(q, GetParam()).t;
     for (int k = 0; k < 3; ++k) {
       ToiQuery other = q;
       if (q.edges && k == 0) {
@@ -60,7 +60,7 @@ TEST_P(ToiReference, Relabeled_SameBits) {
       } else if (q.edges) std::swap(other.m[2 * k - 2], other.m[2 * k - 1]);
       else if (k < 2) std::rotate(other.m + 1, other.m + 2 + k, other.m + 4);
       else std::swap(other.m[1], other.m[3]);
-      EXPECT_EQ(ask(other, GetParam()).t, t) << q.id << " " << q.category << " " << k;
+      EXPECT_EQ(request(other, GetParam()).t, t) << q.id << " " << q.category << " " << k;
     }
     if (q.category == "extreme_scale") continue;  // times 2^40 is not exact there
     ToiQuery scaled = q;
@@ -69,7 +69,7 @@ TEST_P(ToiReference, Relabeled_SameBits) {
         m.p0[i] *= 0x1p40;
         m.p1[i] *= 0x1p40;
       }
-    EXPECT_EQ(ask(scaled, GetParam()).t, t) << q.id << " " << q.category;
+    EXPECT_EQ(request(scaled, GetParam()).t, t) << q.id << " " << q.category;
     if (q.category != "intgrid") continue;
     const double shift[3] = {1000, -77, 65536};
     ToiQuery moved = q;
@@ -78,7 +78,7 @@ TEST_P(ToiReference, Relabeled_SameBits) {
         m.p0[i] += shift[i];
         m.p1[i] += shift[i];
       }
-    EXPECT_EQ(ask(moved, GetParam()).t, t) << q.id << " moved";
+    EXPECT_EQ(request(moved, GetParam()).t, t) << q.id << " moved";
   }
 }
 
@@ -86,11 +86,11 @@ TEST_P(ToiReference, Relabeled_SameBits) {
 // rests on rounding.
 TEST_P(ToiReference, PermutedAxes_SameVerdict) {
   for (const ToiQuery &q : reference_queries()) {
-    const double t = ask(q, GetParam()).t;
+    const double t = request(q, GetParam()).t;
     ToiQuery other = q;
     for (dfm_motion &m : other.m)
       for (double *end : {m.p0, m.p1}) std::rotate(end, end + 1, end + 3);
-    const double turned = ask(other, GetParam()).t;
+    const double turned = request(other, GetParam()).t;
     const bool sharp = q.hit || !(q.miss_distance * q.extent <= 20 * kTolerance * extent_of(q));
     if (sharp) {
       EXPECT_EQ(turned <= 1, t <= 1) << q.id << " " << q.category << " " << t << " " << turned;
@@ -112,7 +112,7 @@ TEST(Toi, PassingNearerThanRounding_IsATouch) {
       std::find_if(queries.begin(), queries.end(), [](const ToiQuery &q) { return q.id == "272"; });
   ASSERT_NE(found, queries.end());
   for (int method = 0; method < 4; ++method) {
-    const double t = ask(*found, method).t;
+    const double t = request(*found, method).t;
     EXPECT_NEAR(t, 0.5, 1e-6) << kFinderNames[method];
     EXPECT_LT(distance_at(*found, Real(t)), kTolerance * extent_of(*found)) << kFinderNames[method];
   }
@@ -125,7 +125,7 @@ TEST(Toi, ConservativeTimes_AreEarlyAtDegenerateQueriesAlone) {
   for (const ToiQuery &q : reference_queries()) {
     if (!q.hit) continue;
     ++hits;
-    const double t = ask(q, DFM_TOI_CONSERVATIVE).t;
+    const double t = request(q, DFM_TOI_CONSERVATIVE).t;
     if (q.toi - t <= 1e-6) continue;
     ++early;
     EXPECT_TRUE(q.multiplicity != 1 || q.id == "272")
@@ -145,7 +145,7 @@ TEST(Toi, ReferenceQueries_NeedLittleWork) {
     double sum = 0;
     uint32_t largest = 0;
     for (const ToiQuery &q : queries) {
-      const uint32_t n = ask(q, method).evaluations;
+      const uint32_t n = request(q, method).evaluations;
       sum += n;
       largest = std::max(largest, n);
     }

@@ -30,15 +30,15 @@ struct ToiQuery {
   double extent = 0;         // largest coordinate difference to p0 at t = 0
 };
 
-struct ToiAnswer {
+struct ToiResult {
   double t, at[3];
   uint32_t evaluations;
 };
 
-inline ToiAnswer ask(const ToiQuery &q, int method, double separation = 0, double tolerance = 0,
-                     int max_iterations = 0) {
+inline ToiResult request(const ToiQuery &q, int method, double separation = 0, double tolerance = 0,
+                         int max_iterations = 0) {
   const dfm_toi_options options = {sizeof options, method, tolerance, separation, max_iterations};
-  ToiAnswer a = {-1, {}, 0};
+  ToiResult a = {-1, {}, 0};
   const dfm_status status = q.edges ? dfm_toi_edge_edge(q.m, q.m + 2, &options, &a.t, a.at)
                                     : dfm_toi_point_triangle(q.m, q.m + 1, &options, &a.t, a.at);
   if (status != DFM_OK) a.t = std::nan("");

@@ -32,7 +32,7 @@ ToiQuery edge_on_still(P a0, P b0, P a1, P b1) {
 
 void expect_time(const ToiQuery &q, double time, const char *what, double separation = 0) {
   for (int method = 0; method < 4; ++method) {
-    const double t = ask(q, method, separation).t;
+    const double t = request(q, method, separation).t;
     if (time > 1) {
       EXPECT_EQ(t, kNever) << what << ", " << kFinderNames[method];
     } else if (method == DFM_TOI_CONSERVATIVE) {
@@ -50,7 +50,7 @@ TEST(Toi, PointThroughFace_TimeAndWeights) {
   const ToiQuery q = point_on_still({1, 2, 3}, {1, 2, -1});
   expect_time(q, 0.75, "straight down");
   for (int method = 0; method < 4; ++method) {
-    const ToiAnswer a = ask(q, method);
+    const ToiResult a = request(q, method);
     EXPECT_NEAR(a.at[0], 0.25, 1e-10);
     EXPECT_NEAR(a.at[1], 0.25, 1e-10);
     EXPECT_NEAR(a.at[2], 0.5, 1e-10);
@@ -64,7 +64,7 @@ TEST(Toi, EdgeOverEdge_TimeAndPlaces) {
   std::swap(swapped.m[0], swapped.m[2]);
   std::swap(swapped.m[1], swapped.m[3]);
   for (int method = 0; method < 4; ++method) {
-    const ToiAnswer a = ask(q, method), b = ask(swapped, method);
+    const ToiResult a = request(q, method), b = request(swapped, method);
     EXPECT_NEAR(a.at[0], 0.75, 1e-10);
     EXPECT_NEAR(a.at[1], 0.75, 1e-10);
     EXPECT_EQ(a.at[0], b.at[1]);
@@ -78,7 +78,7 @@ TEST(Toi, DeformingTriangle_MeetsPointAtRest) {
   const ToiQuery q = query(false, {o, P{-1, -1, 0.2}, P{3, -1, 0.2}, P{-1, 1, 0.6}},
                            {o, P{-1, -1, 0.6}, P{3, -1, 0.6}, P{-1, 1, -1.4}});
   expect_time(q, 0.5, "counter-example");
-  const ToiAnswer a = ask(q, DFM_TOI_CONSERVATIVE);
+  const ToiResult a = request(q, DFM_TOI_CONSERVATIVE);
   EXPECT_NEAR(a.at[0], 0.25, 1e-9);
   EXPECT_NEAR(a.at[1], 0.25, 1e-9);
 }
@@ -112,7 +112,7 @@ TEST(Toi, SeveralRoots_EarliestAdmissibleOneCounts) {
     if (roots < 2) continue;
     ++(expected <= 1 ? later : beside);
     for (int method = 0; method < 4; ++method) {
-      const double t = ask(q, method).t;
+      const double t = request(q, method).t;
       ASSERT_EQ(t <= 1, expected <= 1) << n << " " << kFinderNames[method];
       if (t <= 1) {
         ASSERT_NEAR(t, expected, 1e-10) << n << " " << kFinderNames[method];
@@ -164,7 +164,7 @@ TEST(Toi, GrazingTouch_IsFound) {
   expect_time(tilting(1 - 0x1p-30), 0.5 - 0x1p-15, "through and back");
   expect_time(tilting(1 + 0x1p-30), kNever, "nearly");
   for (int method = 0; method < 4; ++method) {
-    const double t = ask(tilting(1), method).t;
+    const double t = request(tilting(1), method).t;
     EXPECT_LE(t, method == DFM_TOI_CONSERVATIVE ? 0.5 : 0.5 + 1e-9) << kFinderNames[method];
     EXPECT_LE(double(distance_at(tilting(1), Real(t))), 1e-11) << kFinderNames[method];
   }
@@ -216,7 +216,7 @@ TEST(Toi, Bits_DoNotDependOnUnitOriginOrOrder) {
   const ToiQuery q = query(false, {P{0.375, 0.25, 1}, P{-1, -0.5, 0.125}, P{2, -1, 0}, P{0.5, 3, -0.25}},
                            {P{0.125, 0.75, -1.5}, P{-1, -1.5, 0.25}, P{2.5, -1, 0.5}, P{0.5, 2.5, 0.75}});
   for (int method = 0; method < 4; ++method) {
-    const ToiAnswer plain = ask(q, method);
+    const ToiResult plain = request(q, method);
     ASSERT_LE(plain.t, 1);
     for (const double scale : {0x1p-1000, 0x1p-900, 0x1p-60, 0x1p50, 0x1p950, 0x1p1020}) {
       ToiQuery scaled = q;
@@ -225,7 +225,7 @@ TEST(Toi, Bits_DoNotDependOnUnitOriginOrOrder) {
           m.p0[i] *= scale;
           m.p1[i] *= scale;
         }
-      EXPECT_EQ(ask(scaled, method).t, plain.t) << scale;
+      EXPECT_EQ(request(scaled, method).t, plain.t) << scale;
     }
     ToiQuery moved = q;  // exact: all coordinates are eighths
     for (dfm_motion &m : moved.m)
@@ -234,12 +234,12 @@ TEST(Toi, Bits_DoNotDependOnUnitOriginOrOrder) {
         end[1] += 20;
         end[2] += 30;
       }
-    EXPECT_EQ(ask(moved, method).t, plain.t);
+    EXPECT_EQ(request(moved, method).t, plain.t);
     const int orders[5][3] = {{1, 3, 2}, {2, 1, 3}, {2, 3, 1}, {3, 1, 2}, {3, 2, 1}};
     for (const auto &order : orders) {
       ToiQuery other = q;
       for (int k = 0; k < 3; ++k) other.m[k + 1] = q.m[order[k]];
-      const ToiAnswer a = ask(other, method);
+      const ToiResult a = request(other, method);
       EXPECT_EQ(a.t, plain.t);
       for (int k = 0; k < 3; ++k) EXPECT_EQ(a.at[k], plain.at[order[k] - 1]);
     }
@@ -270,9 +270,9 @@ TEST(Toi, IterationCap_StaysOnTheSafeSide) {
         m.p0[i] = random.real(-1, 1);
         m.p1[i] = random.real(-1, 1);
       }
-    const double t = ask(q, DFM_TOI_CONSERVATIVE).t;
+    const double t = request(q, DFM_TOI_CONSERVATIVE).t;
     for (const int cap : {1, 3, 6}) {
-      const double early = ask(q, DFM_TOI_CONSERVATIVE, 0, 0, cap).t;
+      const double early = request(q, DFM_TOI_CONSERVATIVE, 0, 0, cap).t;
       EXPECT_LE(early, t) << n << " cap " << cap;
       capped += early < t;
     }
@@ -295,9 +295,9 @@ TEST(Toi, Evaluations_AreThoseOfTheMethods) {
       }
     q.m[0].p0[2] = 1;
     q.m[0].p1[2] = -1;
-    if (ask(q, DFM_TOI_BRENT).t > 1) continue;
+    if (request(q, DFM_TOI_BRENT).t > 1) continue;
     ++hits;
-    for (int method = 0; method < 3; ++method) sum[method] += ask(q, method).evaluations;
+    for (int method = 0; method < 3; ++method) sum[method] += request(q, method).evaluations;
   }
   ASSERT_GT(hits, 100);
   EXPECT_NEAR(sum[DFM_TOI_BISECTION] / hits, 42, 6);

@@ -23,10 +23,10 @@ struct Tri {
 };
 
 // Every answer must hold for all orders of corners and of the two triangles.
-struct Answer { bool meet, pass; };
-Answer ask(const Tri &a, const Tri &b) {
+struct Outcome { bool meet, pass; };
+Outcome request(const Tri &a, const Tri &b) {
   const int orders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
-  Answer first = {};
+  Outcome first = {};
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) {
       const double *pa[3], *pb[3];
@@ -34,7 +34,7 @@ Answer ask(const Tri &a, const Tri &b) {
         pa[k] = a.p[orders[i][k]];
         pb[k] = b.p[orders[j][k]];
       }
-      const Answer now = {crossing::meet(pa, pb), crossing::pass_through(pa, pb)};
+      const Outcome now = {crossing::meet(pa, pb), crossing::pass_through(pa, pb)};
       EXPECT_EQ(now.meet, crossing::meet(pb, pa));
       EXPECT_EQ(now.pass, crossing::pass_through(pb, pa));
       if (i == 0 && j == 0) first = now;
@@ -48,9 +48,9 @@ Answer ask(const Tri &a, const Tri &b) {
 const Tri kFlat = {{{0, 0, 0}, {4, 0, 0}, {0, 4, 0}}, {}};
 
 void expect(const Tri &b, bool meet, bool pass) {
-  const Answer answer = ask(kFlat, b);
-  EXPECT_EQ(answer.meet, meet);
-  EXPECT_EQ(answer.pass, pass);
+  const Outcome outcome = request(kFlat, b);
+  EXPECT_EQ(outcome.meet, meet);
+  EXPECT_EQ(outcome.pass, pass);
 }
 
 }  // namespace
@@ -81,8 +81,8 @@ TEST(Crossing, EdgeOnEdge_TouchesOnly) { expect({{{2, 0, -1}, {2, 0, 1}, {2, -3,
 TEST(Crossing, BothHaveACornerInTheOthersPlane_Counts) {
   // The common segment runs from a corner of one to a corner of the other: no edge strictly pierces a face.
   const Tri a = {{{0, 0, 0}, {4, -1, 0}, {4, 1, 0}}, {}}, b = {{{5, 0, 0}, {-1, 0, -1}, {-1, 0, 1}}, {}};
-  EXPECT_TRUE(ask(a, b).meet);
-  EXPECT_TRUE(ask(a, b).pass);
+  EXPECT_TRUE(request(a, b).meet);
+  EXPECT_TRUE(request(a, b).pass);
 }
 TEST(Crossing, NoArea_CountsAsItsEdges) {
   expect({{{1, 1, -1}, {1, 1, 0}, {1, 1, 1}}, {}}, true, false);
@@ -100,10 +100,10 @@ TEST(Crossing, FarFromOrigin_IsExact) {
                   {}};
   const Tri through = {
       {{big + 1, big + 1, down}, {big + 1.1, big + 1, big + 1}, {big + 1, big + 1.2, big + 1}}, {}};
-  EXPECT_FALSE(ask(flat, above).meet);
-  EXPECT_TRUE(ask(flat, on).meet);
-  EXPECT_FALSE(ask(flat, on).pass);
-  EXPECT_TRUE(ask(flat, through).pass);
+  EXPECT_FALSE(request(flat, above).meet);
+  EXPECT_TRUE(request(flat, on).meet);
+  EXPECT_FALSE(request(flat, on).pass);
+  EXPECT_TRUE(request(flat, through).pass);
 }
 
 TEST(Crossing, Orientation_AgreesWithWholeNumbers) {

@@ -97,7 +97,7 @@ class Pair {
   std::vector<double> surfel_a = std::vector<double>(3 * kSurfels, 7.0);
   std::vector<double> surfel_b = std::vector<double>(3 * kSurfels, 7.0);
   Array<double> point_a = Array<double>(4 * kPoints, 0.0);
-  GivenNodes given;
+  WrittenNodes given;
 
  private:
   std::mt19937 random_{3};

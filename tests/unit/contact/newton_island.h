@@ -87,7 +87,7 @@ struct BristleLaw {
 
   // At the trial, where slip and force lie on the line v = w h (f - ft_stop): the share s = R / (R + |t|) is
   // the root of a monotone function.
-  void answer(uint32_t i, double h, double w, ContactState &s) const {
+  void evaluate_local(uint32_t i, double h, double w, ContactState &s) const {
     const uint32_t n = s.stride;
     const double kappa = h * sigma, R = mu * s.fn[i], g = w * h, z[2] = {z1, z2};
     double t[2], size = 0;
@@ -128,16 +128,16 @@ class Laws final : public SolveLaws {
     state.resize(rows.n, 0);
     std::fill(state.form.begin(), state.form.end(), uint8_t{kSetValuedLaw});
   }
-  bool answer(const double *response) override {
+  bool evaluate_local(const double *response) override {
     for (uint32_t i = 0; i < rows_.n; ++i)
-      if (law[i].sigma > 0) law[i].answer(i, h_, response[i], state_);
+      if (law[i].sigma > 0) law[i].evaluate_local(i, h_, response[i], state_);
       else coulomb(law[i].mu, i, state_);
     return true;
   }
   bool slopes() override { return true; }
   bool judge(Residual &residual) override {
     set_trial(rows_, part_, h_, rows_.wt.data(), state_);
-    answer(rows_.wt.data());
+    evaluate_local(rows_.wt.data());
     linearize(rows_, part_, h_, state_);
     residual = true_residual(rows_, part_, state_, h_, tolerance);
     return true;
@@ -205,11 +205,11 @@ class Island {
     contacts.push_back(c);
   }
   void hold(uint32_t a, uint32_t b, double soft, Vec3 rate) { bonds.push_back(bond(a, b, soft, rate)); }
-  void drag(uint32_t a, uint32_t b, Vec3 along, double most, double due) {
+  void drag(uint32_t a, uint32_t b, Vec3 along, double most, double max_work) {
     Bond d = bond(a, b, 0, {});
     d.along = normalized(along);
     d.most = most;
-    d.due = due;
+    d.max_work = max_work;
     bonds.push_back(d);
   }
   // Once all rows are there.
@@ -348,10 +348,10 @@ class Island {
     EXPECT_GE(size, 0) << "drag " << k;
     EXPECT_LE(size, b.most * (1 + 1e-12)) << "drag " << k;
     EXPECT_GE(speed, size > 0 ? -tolerance : -1e300) << "drag " << k;
-    EXPECT_LE(size * speed, b.due + tolerance * size) << "drag " << k;
+    EXPECT_LE(size * speed, b.max_work + tolerance * size) << "drag " << k;
     // an edge that moves is held by all that the drag has
     if (speed > tolerance && size < b.most * (1 - 1e-9)) {
-      EXPECT_GE(size * speed, b.due - tolerance * (size + b.due)) << "drag " << k;
+      EXPECT_GE(size * speed, b.max_work - tolerance * (size + b.max_work)) << "drag " << k;
     }
   }
 };

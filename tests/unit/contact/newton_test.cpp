@@ -133,10 +133,9 @@ void expect_law(const AllKinds &p, double mu) {
   }
 }
 
-// Rows that nearly contradict each other may miss by a few tolerances (NewtonSettings::stands): then `due`
-// is 1.
+// Nearly contradictory rows may miss by a few tolerances (NewtonSettings::stalled_factor): `required` is 1.
 void expect_solved(const Island &p) {
-  p.expect_conditions(p.newton.residual().due < 1 ? Island::kTolerance : 20 * Island::kTolerance);
+  p.expect_conditions(p.newton.residual().required < 1 ? Island::kTolerance : 20 * Island::kTolerance);
   EXPECT_LE(p.unbalanced(), 2 * Island::kTolerance);
 }
 
@@ -150,7 +149,7 @@ TEST(ContactNewton, OnePointOnAWall_IsExact) {
     p.touch({{0, 1.0}}, true, {1, 0, 0});
     p.build({0, mu});
     ASSERT_TRUE(p.solve());
-    EXPECT_LE(p.newton.residual().due, 1);
+    EXPECT_LE(p.newton.residual().required, 1);
     const double left = std::max(0.0, 0.5 - mu);
     expect_near(p.velocity(0), {0, 0.6 * left, 0.8 * left}, Island::kTolerance);
     EXPECT_NEAR(p.impulse(0).x, 2, 2 * Island::kTolerance);
@@ -161,7 +160,7 @@ TEST(ContactNewton, EveryKindOfUnknown_MeetsTheConditionsByTheDenseOperator) {
   for (const double mu : {0.0, 0.3, 1.0}) {
     AllKinds p(mu);
     ASSERT_TRUE(p.solve()) << mu;
-    EXPECT_LE(p.newton.residual().due, 1) << mu;
+    EXPECT_LE(p.newton.residual().required, 1) << mu;
     expect_law(p, mu);
   }
 }
@@ -174,7 +173,7 @@ TEST(ContactNewton, RandomIslands_MeetTheConditions) {
     const auto p = any_island(seed, kind);
     SCOPED_TRACE(seed);
     ASSERT_TRUE(p->solve());
-    EXPECT_LE(p->newton.residual().due, 1);
+    EXPECT_LE(p->newton.residual().required, 1);
     expect_solved(*p);
   }
 }
@@ -187,7 +186,7 @@ TEST(ContactNewton, RandomIslandsOfStrongFriction_MeetTheConditions) {
     const auto p = any_island(seed, {});
     SCOPED_TRACE(seed);
     ASSERT_TRUE(p->solve());
-    if (p->newton.residual().due <= 1) expect_solved(*p);
+    if (p->newton.residual().required <= 1) expect_solved(*p);
     else ++unsolved;
     for (uint32_t i = 0; i < p->rows.n; ++i) {
       const Vec3 l = p->impulse(i);
@@ -226,7 +225,7 @@ TEST(ContactNewton, TheSameContactTenTimes_GivesTheVelocityOfOne) {
       p.touch({{1, 1.0}}, true, {0, 0, 1});
       p.build({0, mu});
       ASSERT_TRUE(p.solve(1e-8));
-      EXPECT_LE(p.newton.residual().due, 1);
+      EXPECT_LE(p.newton.residual().required, 1);
       if (times == 1) first = p.velocity(0);
       else expect_near(p.velocity(0), first, 1e-6);
     }
@@ -246,7 +245,7 @@ TEST(ContactNewton, StiffBristles_AreOnTheirLaw) {
         p->laws->set(i, {sigma, std::max(0.05, p->laws->law[i].mu), 0.3 / sigma, -0.4 / sigma});
       SCOPED_TRACE(testing::Message() << "sigma " << sigma << " seed " << seed);
       ASSERT_TRUE(p->solve());
-      EXPECT_LE(p->newton.residual().due, 1);
+      EXPECT_LE(p->newton.residual().required, 1);
       p->expect_conditions();
       EXPECT_LE(p->unbalanced(), 2e-6);
       for (uint32_t i = 0; i < p->rows.n; ++i) {

@@ -82,13 +82,13 @@ TEST(Renewal, LoadThatGrows_RenewsAPatchThatIsBeingMadeAlone) {
 
 TEST(Renewal, WhatAPatchLacks_GoesToThoseBelowTheirAimAndNoFurther) {
   Patches p;
-  const std::vector<uint8_t> stands{1, 1, 1, 0};
-  const std::vector<double> aim{3, 1, 1, 1};
+  const std::vector<uint8_t> keeps_area{1, 1, 1, 0};
+  const std::vector<double> target_area{3, 1, 1, 1};
   std::vector<double> area{1, 2, 4, 5};
-  p.renewal.fill(stands.data(), aim.data(), area.data());
+  p.renewal.fill(keeps_area.data(), target_area.data(), area.data());
   // of 4 the patch had 3; an obstacle's has more than it should, and keeps it
   EXPECT_EQ(area, (std::vector<double>{2, 2, 4, 5}));
   p.renewal.list(p.contacts, p.impulse.data());
-  p.renewal.fill(stands.data(), aim.data(), area.data());
+  p.renewal.fill(keeps_area.data(), target_area.data(), area.data());
   EXPECT_EQ(area, (std::vector<double>{2, 2, 4, 5}));
 }

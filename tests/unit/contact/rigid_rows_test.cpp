@@ -9,7 +9,7 @@ namespace {
 
 using namespace dfm;
 
-constexpr double kStep = 1e-3, kLeast = 1e-9;  // s, m/s
+constexpr double kStep = 1e-3, kMin = 1e-9;  // s, m/s
 
 struct Ball {
   double mass, inertia;
@@ -36,15 +36,15 @@ struct Pair {
     const Vec3 third = cross(kNormal, kTangent);
     store3(rows.drive.data(), {-dot(kNormal, approach), -dot(kTangent, approach), -dot(third, approach)});
     store3(rows.impulse.data(), {});
-    store3(rows.yields.data(), {});
+    store3(rows.compliance.data(), {});
     rows.rate[0] = 0;
-    rows.wn[0] = dot(kNormal, answer(kNormal));
-    rows.wt[0] = std::max(dot(kTangent, answer(kTangent)), dot(third, answer(third)));
-    rows.cross[0] = dot(kTangent, answer(kNormal));
-    rows.cross[1] = dot(third, answer(kNormal));
+    rows.wn[0] = dot(kNormal, response(kNormal));
+    rows.wt[0] = std::max(dot(kTangent, response(kTangent)), dot(third, response(third)));
+    rows.cross[0] = dot(kTangent, response(kNormal));
+    rows.cross[1] = dot(third, response(kNormal));
   }
   // What a unit impulse changes of the velocity of a against b at the place.
-  static Vec3 answer(Vec3 p) {
+  static Vec3 response(Vec3 p) {
     Vec3 sum;
     for (const Ball *ball : {&kA, &kB}) {
       const Vec3 arm = kAt - ball->center;
@@ -69,7 +69,7 @@ TEST(RigidRows, AnImpulse_MovesBothBodiesAtThePlace) {
   pair.rows.apply(0, {0.5, -0.2, 0.1});
   pair.expect_momenta_kept();
   const Vec3 third = cross(kNormal, kTangent),
-             moved = Pair::answer(0.5 * kNormal - 0.2 * kTangent + 0.1 * third);
+             moved = Pair::response(0.5 * kNormal - 0.2 * kTangent + 0.1 * third);
   const Vec3 u = pair.rows.velocity(0);
   EXPECT_NEAR(u.x, dot(kNormal, moved), 1e-14);
   EXPECT_NEAR(u.y, dot(kTangent, moved), 1e-14);
@@ -90,17 +90,17 @@ TEST(RigidRows, TwoBodiesThatMeet_StopAndStickOrSlide) {
       }
       const RowsPart part = rows.whole();
       ContactState state;
-      test::Laws laws(rows, part, state, kStep, kLeast);
+      test::Laws laws(rows, part, state, kStep, kMin);
       laws.set_all({.mu = mu});
       ContactNewton newton{Memory::standard()};
       newton.begin(rows, part, {}, state, laws, kStep);
-      ASSERT_TRUE(newton.solve(kLeast, kLeast));
+      ASSERT_TRUE(newton.solve(kMin, kMin));
       pair.expect_momenta_kept();
       const Vec3 u = rows.velocity(0), l = load3(rows.impulse.data());
       const double slip = std::hypot(u.y, u.z), force = std::hypot(l.y, l.z);
       EXPECT_GT(l.x, 0.1);
-      EXPECT_NEAR(u.x, 0, kLeast);
-      if (mu > 1) EXPECT_NEAR(slip, 0, kLeast);
+      EXPECT_NEAR(u.x, 0, kMin);
+      if (mu > 1) EXPECT_NEAR(slip, 0, kMin);
       else EXPECT_NEAR(force, mu * l.x, 1e-9);
       EXPECT_LE(force, mu * l.x * (1 + 1e-12));
       if (!turns) continue;

@@ -190,12 +190,12 @@ class RowsCase {
           for (size_t c = 0; c < 3 * block.count; ++c)
             *matrix++ = response_(unknown_of(block, r), unknown_of(block, c));
       };
-      const auto by_columns = [&](double *answers) {
+      const auto by_columns = [&](double *results) {
         for (size_t c = 0; c < 3 * block.count; ++c)
           for (size_t r = 0; r < 3 * block.count; ++r)
-            *answers++ = response_(unknown_of(block, r), unknown_of(block, c));
+            *results++ = response_(unknown_of(block, r), unknown_of(block, c));
       };
-      if (block.group == kNone) rows.set_answers(block, by_columns);
+      if (block.group == kNone) rows.set_responses(block, by_columns);
       else rows.set_response(block, by_rows);
     }
     std::vector<double> tangents(3 * contacts.size());

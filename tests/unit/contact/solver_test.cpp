@@ -39,7 +39,7 @@ struct Groove {
     rows.frame = {s, 0, s, s, 0, -s, 0, 1, 0, -s, 0, s, -s, 0, -s, 0, -1, 0};
     rows.drive.assign(6, 0);
     rows.rate.assign(2, 0);
-    rows.yields.assign(6, 0);
+    rows.compliance.assign(6, 0);
     rows.wn.assign(2, 1);
     rows.wt.assign(2, 1);
     rows.cross.assign(4, 0);
@@ -61,7 +61,7 @@ struct Groove {
 };
 
 // The force of Coulomb's law at the trial in `s`: what ends the slip, within mu times the normal force.
-void ask_coulomb(double mu, ContactState &s) {
+void solve_with_coulomb(double mu, ContactState &s) {
   for (uint32_t i = 0; i < s.n; ++i) {
     const uint32_t second = s.stride + i;
     const double size = std::hypot(s.ft_stop[i], s.ft_stop[second]);
@@ -98,13 +98,13 @@ struct Problem : RowsCase {
   std::vector<double> changes() const {
     return delassus() * std::vector<double>(rows.impulse.begin(), rows.impulse.end());
   }
-  void ask() {
+  void request() {
     set_trial(rows, rows.whole(), kStep, rows.wt.data(), state);
-    ask_coulomb(mu, state);
+    solve_with_coulomb(mu, state);
   }
   // One answer of the law, and `sweeps` on it.
   void pass(uint32_t sweeps) {
-    ask();
+    request();
     Acceleration acceleration{Memory::standard()};
     acceleration.start(rows, rows.whole());
     for (uint32_t k = 0; k < sweeps; ++k) {
@@ -143,7 +143,7 @@ TEST(Solver, OnePointThatLeaves_GetsNoForce) {
 TEST(Solver, OnePointThatMeetsAContactThatGives_KeepsWhatItGives) {
   for (const double most : {0.0, 0.3, 0.7, 0.8, 2.0}) {
     Problem p({4}, 0.6, {{1 / 1.75, 0, 0}});
-    p.rows.yields = {3 * 1.75, most, 0};
+    p.rows.compliance = {3 * 1.75, most, 0};
     p.pass(1);
     const double left = std::min(0.75, most);
     EXPECT_NEAR(p.impulse(0).x, (1 - left) / 1.75, 1e-15) << most;
@@ -195,7 +195,7 @@ TEST(Solver, ContactWithARigidBodyThatStands_IsSolvedAmongPoints) {
       p->rows.set_response(block,
                            [&](double *matrix) { std::fill_n(matrix, 9 * block.count * block.count, 0.0); });
     for (uint32_t i = 0; i < 3; ++i) p->rows.apply(i, -taken[i]);
-    p->ask();
+    p->request();
   }
   RowsPart points = quick.rows.whole(), any = slow.rows.whole();
   ASSERT_FALSE(points.blocks.empty());
@@ -206,8 +206,8 @@ TEST(Solver, ContactWithARigidBodyThatStands_IsSolvedAmongPoints) {
     sweep(quick.rows, points, quick.state, RowsCase::kStep);
     sweep(slow.rows, any, slow.state, RowsCase::kStep);
     ASSERT_EQ(quick.rows.impulse, slow.rows.impulse) << k;
-    EXPECT_EQ(inner_residual(quick.rows, points, quick.state, RowsCase::kStep, tolerance).due,
-              inner_residual(slow.rows, any, slow.state, RowsCase::kStep, tolerance).due);
+    EXPECT_EQ(inner_residual(quick.rows, points, quick.state, RowsCase::kStep, tolerance).required,
+              inner_residual(slow.rows, any, slow.state, RowsCase::kStep, tolerance).required);
   }
   EXPECT_GT(quick.impulse(0).x, 0);
 }
@@ -257,7 +257,7 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   const std::vector<double> before = p.velocities();
   p.rows.impulse = {0.5, 0.1, 0.1, 0.25, -0.2, 0, 0.75, 0, 0.3};
   p.rows.restore(p.rows.whole());
-  p.ask();
+  p.request();
   const test::SameTolerance tolerance{3, 0.5, 0.25, 4 * 0.5};
   const Residual found = true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance);
   const std::vector<double> change = p.changes();
@@ -279,20 +279,20 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   EXPECT_NEAR(found.normal, normal, 1e-13);
   EXPECT_NEAR(found.speed, std::max(normal, tangent), 1e-13);
   EXPECT_NEAR(found.relative, std::max(normal / 0.5, share), 1e-12);
-  EXPECT_NEAR(found.due, std::max(normal / (4 * 0.5), share), 1e-12);
+  EXPECT_NEAR(found.required, std::max(normal / (4 * 0.5), share), 1e-12);
   // Where friction may be off by much, the normal residual alone decides: over what it may be off by, and at
   // most.
   const Residual loose = true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep,
                                        test::SameTolerance{3, 0.5, 1e6, 4 * 0.5});
   EXPECT_NEAR(loose.relative, normal / 0.5, 1e-12);
-  EXPECT_NEAR(loose.due, normal / (4 * 0.5), 1e-12);
+  EXPECT_NEAR(loose.required, normal / (4 * 0.5), 1e-12);
 }
 
 // At a solution nothing is left, whatever has led there.
 TEST(Solver, Residual_OfASolutionVanishes) {
   Problem p({0, 2, 6}, 0.4, {{1, 0.2, -0.1}, {-2, 0.5, 0.4}, {1, 2, -1}});
   for (int k = 0; k < 40; ++k) p.pass(20);
-  p.ask();
+  p.request();
   const test::SameTolerance tolerance{3, 1e-6, 1e-6, 4 * 1e-6};
   EXPECT_LT(true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).speed, 1e-11);
 }
@@ -347,5 +347,5 @@ TEST(Sweep, ImpulseThatIsNoNumber_IsNotConverged) {
   g.rows.impulse[0] = NAN;
   g.rows.restore(g.rows.whole());
   const test::SameTolerance t{2, 1e-6, 1e-6, 1e-6};
-  EXPECT_EQ(inner_residual(g.rows, g.rows.whole(), g.law, 1e-3, t).due, INFINITY);
+  EXPECT_EQ(inner_residual(g.rows, g.rows.whole(), g.law, 1e-3, t).required, INFINITY);
 }

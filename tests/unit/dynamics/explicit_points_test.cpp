@@ -122,7 +122,7 @@ TEST(ExplicitPoints, ModelThatGivesOtherParts_HasFailed) {
 }
 
 // Of a plugin's model: its exception is a failure of the call, and forces then come for all points at once.
-TEST(ExplicitPoints, ModelThatThrowsWhereItIsAskedForItsParts_IsMovedWithoutThem) {
+TEST(ExplicitPoints, ModelThatThrowsWhereItListsItsParts_IsMovedWithoutThem) {
   const Falling f;
   f.body->model.part_forces->parts = [](const void *) -> uint32_t { throw 1; };
   f.make_dynamics();

@@ -125,7 +125,7 @@ struct Moving {
 
 }  // namespace
 
-TEST(PointsKernels, WhatIsAskedOfCellsAndEdges_IsThatOfOneAtATime) {
+TEST(PointsKernels, QueriesOfCellsAndEdges_AreThoseOfOneAtATime) {
   check(dfm::points_kernels_sse2());
   if (dfm::doubles_at_once() >= 4) check(dfm::points_kernels_avx2());
 }

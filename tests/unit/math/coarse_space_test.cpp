@@ -105,13 +105,13 @@ TEST(CoarseSpace, PiecesAndMotionsWithoutEffect_EqualTheDirectSolver) {
     dfm::PcgSolver solver(dfm::Memory::standard());
     solver.analyse(system.pattern());
     uint32_t one_level = 0;
-    for (const bool told : {false, true}) {
-      if (told) solver.place(system.points.data(), 3);
+    for (const bool reported : {false, true}) {
+      if (reported) solver.place(system.points.data(), 3);
       ASSERT_TRUE(solver.factor(system.blk.data()));
       std::fill(x.begin(), x.end(), 0.0);
       ASSERT_TRUE(solver.solve(1, b.data(), x.data(), 1e-10, info)) << info.residual;
       EXPECT_LT(test::worst(x, want), 1e-7);
-      if (!told) one_level = info.iterations;
+      if (!reported) one_level = info.iterations;
     }
     EXPECT_LT(3 * info.iterations, 2 * one_level);
   }

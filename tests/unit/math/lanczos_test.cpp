@@ -26,7 +26,7 @@ TEST(Lanczos, LargestOfAChain_IsBoundedWithinAFewPercent) {
   }
 }
 
-TEST(Lanczos, ProductThatFails_IsTold) {
+TEST(Lanczos, ProductThatFails_IsReported) {
   EXPECT_LT(dfm::largest_eigenvalue(3, [](const auto &, auto &) { return false; }), 0);
 }
 

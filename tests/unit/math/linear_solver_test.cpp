@@ -210,11 +210,11 @@ TEST(PcgSolver, PlacesOfThePoints_SpareTwoThirdsOfTheIterations) {
   dfm::SolveInfo one, two;
   dfm::PcgSolver solver(dfm::Memory::standard());
   solver.analyse(system.pattern());
-  for (dfm::SolveInfo *told : {&one, &two}) {
-    if (told == &two) solver.place(system.points.data(), 3);
+  for (dfm::SolveInfo *reported : {&one, &two}) {
+    if (reported == &two) solver.place(system.points.data(), 3);
     ASSERT_TRUE(solver.factor(system.blk.data()));
     std::vector<double> x(b.size(), 0.0);
-    ASSERT_TRUE(solver.solve(1, b.data(), x.data(), 1e-9, *told));
+    ASSERT_TRUE(solver.solve(1, b.data(), x.data(), 1e-9, *reported));
     EXPECT_LT(worst(x, want), 1e-6);
   }
   EXPECT_LT(3 * two.iterations, one.iterations);
@@ -234,7 +234,7 @@ TEST(PcgSolver, StartAtTheSolution_TakesNoIteration) {
   EXPECT_EQ(warm.iterations, 0u);
 }
 
-TEST(PcgSolver, LimitOfIterations_IsReportedWithTheBestAnswer) {
+TEST(PcgSolver, LimitOfIterations_IsReportedWithTheBestResult) {
   const Grid g = grid(5, 4, 4, 0.01);
   const std::vector<double> b = noise(3 * g.n, 3);
   dfm::PcgSolver solver(dfm::Memory::standard(), nullptr, 3);
@@ -324,7 +324,7 @@ TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasRequestedBefore) {
     ASSERT_TRUE(solver->factor(g.blk.data()));
   }
   dfm::SolveInfo info;
-  const auto asked = [&](dfm::LdltSolver &solver, const std::vector<uint32_t> &points) {
+  const auto requested = [&](dfm::LdltSolver &solver, const std::vector<uint32_t> &points) {
     std::vector<double> w(9 * points.size() * points.size());
     EXPECT_TRUE(solver.restricted(uint32_t(points.size()), points.data(), 0, w.data(), info));
     return w;
@@ -332,8 +332,8 @@ TEST(Ldlt, ResponseOfPoints_IsTheSameBitsWhateverWasRequestedBefore) {
   const std::vector<uint32_t> wanted = {40, 7, 93, 12, 55};
   for (const std::vector<uint32_t> &before :
        {std::vector<uint32_t>{93}, {7, 100, 3}, {60, 61, 62, 63, 40, 12, 0, 1, 2, 119}})
-    asked(kept, before);
-  EXPECT_EQ(asked(kept, wanted), asked(fresh, wanted));
+    requested(kept, before);
+  EXPECT_EQ(requested(kept, wanted), requested(fresh, wanted));
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double 
   return out;
 }
 
-void expect_sound(const TetMesh &m) {
+void expect_valid(const TetMesh &m) {
   ASSERT_EQ(m.share.size(), m.ntet());
   ASSERT_EQ(m.tet_group.size(), m.ntet());
   ASSERT_EQ(m.file_point.size(), m.npoint());
@@ -96,7 +96,7 @@ TEST(Fill, CleanSurface_SharesSumUpToTheEnclosedVolume) {
   for (const Case &c : clean()) {
     SCOPED_TRACE(c.name);
     const TetMesh m = fill_surface(c.surface, 5000);
-    expect_sound(m);
+    expect_valid(m);
     EXPECT_NEAR(material(m), c.volume, 2e-3 * c.volume);
     EXPECT_NEAR(material(m), test::enclosed(c.surface), 1e-10 * c.volume);
     EXPECT_EQ(dfm::mesh_statistics(m).npiece, 1u);
@@ -275,7 +275,7 @@ TEST(Fill, HolesAndFlippedTriangles_ChangeTheVolumeByLittle) {
   for (uint32_t t = 0; t < 40; ++t) test::flip(flips, 51 * t);
   for (const TriMesh *s : {&holes, &flips}) {
     const TetMesh m = fill_surface(*s, 1500);
-    expect_sound(m);
+    expect_valid(m);
     EXPECT_NEAR(material(m), volume, 0.02 * volume);
     EXPECT_EQ(dfm::mesh_statistics(m).npiece, 1u);
     ASSERT_EQ(m.warnings.size(), 1u);
@@ -325,7 +325,7 @@ TEST(Fill, NanometersKilometersAndFarAway_GiveTheSameCells) {
   }
   const TriMesh away = test::sphere_surface(0.1, 4, {1e7, -1e7, 1e7});
   const TetMesh far = fill_surface(away, 1000);
-  expect_sound(far);
+  expect_valid(far);
   EXPECT_NEAR(far.ntet(), 1000, 100);
   EXPECT_EQ(uncovered(far, away, 300, 1e-8), 0u);
   const double volume = material(unit) * 1e-3;
@@ -379,7 +379,7 @@ TEST(Fill, NothingToFill_IsRefused) {
 
 void expect_fills(const TriMesh &s, uint32_t cells) {
   const TetMesh m = fill_surface(s, cells);
-  expect_sound(m);
+  expect_valid(m);
   EXPECT_NEAR(m.ntet(), cells, 0.1 * cells);
   EXPECT_NEAR(material(m), test::enclosed(s), 0.02 * test::enclosed(s));
   EXPECT_EQ(uncovered(m, s, 50, 1e-7 * std::cbrt(material(m))), 0u);

@@ -16,20 +16,20 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 const Memory &standard() { return Memory::standard(); }
 
-void expect_sound(const TriMesh &m, uint32_t asked, int euler, double least_quality) {
+void expect_valid(const TriMesh &m, uint32_t requested, int euler, double least_quality) {
   const dfm_trimesh_info s = mesh_statistics(m);
-  EXPECT_TRUE(s.closed) << asked;
+  EXPECT_TRUE(s.closed) << requested;
   EXPECT_EQ(s.npiece, 1u);
-  EXPECT_EQ(int64_t(s.npoint) - s.nedge + s.ntriangle, euler) << asked;
+  EXPECT_EQ(int64_t(s.npoint) - s.nedge + s.ntriangle, euler) << requested;
   EXPECT_GT(s.volume, 0);
-  EXPECT_GT(s.quality_min, asked < 500 ? 0.05 : least_quality) << asked;
+  EXPECT_GT(s.quality_min, requested < 500 ? 0.05 : least_quality) << requested;
   EXPECT_TRUE(m.warnings.empty());
   EXPECT_EQ(m.merged_points + m.turned + m.dropped_points + m.dropped_tris, 0u);
   EXPECT_EQ(m.tri_group.size(), m.ntri());
   for (uint32_t p = 0; p < m.npoint(); ++p) ASSERT_EQ(m.file_point[p], p);
-  if (asked < 500) return;
-  EXPECT_LT(std::max(s.ntriangle / double(asked), asked / double(s.ntriangle)), 1.35)
-      << asked << " asked, " << s.ntriangle << " made";
+  if (requested < 500) return;
+  EXPECT_LT(std::max(s.ntriangle / double(requested), requested / double(s.ntriangle)), 1.35)
+      << requested << " asked, " << s.ntriangle << " made";
 }
 
 std::string refused(const std::function<void()> &f) {
@@ -48,7 +48,7 @@ TEST(GenerateSurface, Balls_AreInscribedInTheirSphere) {
   double last = 0;
   for (const uint32_t n : {1u, 100u, 500u, 2000u, 20000u}) {
     const TriMesh m = make_ball_surface(standard(), 0.5, n);
-    expect_sound(m, n, 2, 0.75);
+    expect_valid(m, n, 2, 0.75);
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(m.points[p], m.points[p + 1], m.points[p + 2]), 0.5, 1e-15);
     const double volume = mesh_statistics(m).volume;
@@ -63,7 +63,7 @@ TEST(GenerateSurface, Beams_FillTheirBox) {
   for (const uint32_t n : {1u, 500u, 5000u})
     for (const auto &size : {std::array{1.0, 1.0, 1.0}, {1.0, 0.1, 0.2}, {1e-9, 2e-9, 3e-9}}) {
       const TriMesh m = make_beam_surface(standard(), size[0], size[1], size[2], n);
-      expect_sound(m, n, 2, 0.5);
+      expect_valid(m, n, 2, 0.5);
       EXPECT_NEAR(mesh_statistics(m).volume / (size[0] * size[1] * size[2]), 1, 1e-13);
     }
 }
@@ -72,7 +72,7 @@ TEST(GenerateSurface, Cylinders_HaveTheVolumeOfTheirPolygon) {
   for (const uint32_t n : {1u, 500u, 5000u})
     for (const double length : {0.3, 1.0, 5.0}) {
       const TriMesh m = make_cylinder_surface(standard(), 0.2, length, n);
-      expect_sound(m, n, 2, 0.5);
+      expect_valid(m, n, 2, 0.5);
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
@@ -85,7 +85,7 @@ TEST(GenerateSurface, Tubes_HaveTheVolumeOfTheirRing) {
   for (const uint32_t n : {1u, 500u, 5000u})
     for (const double inner : {0.05, 0.15, 0.19}) {
       const TriMesh m = make_tube_surface(standard(), inner, 0.2, 0.6, n);
-      expect_sound(m, inner == 0.19 ? 1 : n, 0, inner == 0.05 ? 0.2 : 0.5);
+      expect_valid(m, inner == 0.19 ? 1 : n, 0, inner == 0.05 ? 0.2 : 0.5);
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
         around += m.points[p + 2] == 0 && std::hypot(m.points[p], m.points[p + 1]) > 0.2 - 1e-12;
@@ -97,7 +97,7 @@ TEST(GenerateSurface, Tubes_HaveTheVolumeOfTheirRing) {
 TEST(GenerateSurface, Tori_ApproachTheirVolume) {
   for (const uint32_t n : {1u, 500u, 5000u}) {
     const TriMesh m = make_torus_surface(standard(), 0.06, 0.02, n);
-    expect_sound(m, n, 0, 0.3);
+    expect_valid(m, n, 0, 0.3);
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(std::hypot(m.points[p], m.points[p + 1]) - 0.06, m.points[p + 2]), 0.02, 1e-15);
   }

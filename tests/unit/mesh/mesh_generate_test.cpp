@@ -15,7 +15,7 @@ namespace {
 
 const Memory &standard() { return Memory::standard(); }
 
-void expect_sound(const TetMesh &m) {
+void expect_valid(const TetMesh &m) {
   const dfm_tetmesh_info s = mesh_statistics(m);
   EXPECT_GT(s.quality_min, 0.3);
   EXPECT_EQ(s.npiece, 1u);
@@ -68,7 +68,7 @@ TEST(MeshGenerate, Beams_AreValidAndFillTheirBox) {
                                   std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << x << " " << y << " " << z);
       const TetMesh m = make_beam(standard(), x, y, z, cells);
-      expect_sound(m);
+      expect_valid(m);
       const dfm_tetmesh_info s = mesh_statistics(m);
       EXPECT_NEAR(s.volume / (x * y * z), 1, 1e-12);
       for (int k = 0; k < 3; ++k) EXPECT_EQ(s.lo[k], 0);
@@ -87,7 +87,7 @@ TEST(MeshGenerate, Cylinders_AreValidAndInscribed) {
          {std::pair{0.2, 1.0}, std::pair{1.0, 1.0}, std::pair{1.0, 0.2}, std::pair{0.02, 0.16}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << radius << " " << length);
       const TetMesh m = make_cylinder(standard(), radius, length, cells);
-      expect_sound(m);
+      expect_valid(m);
       const dfm_tetmesh_info s = mesh_statistics(m);
       // The outer ring has 6n points: the body is a prism over a regular polygon.
       uint32_t rim = 0;
@@ -106,7 +106,7 @@ TEST(MeshGenerate, Cylinders_AreValidAndInscribed) {
 }
 
 // One ring has 18 cells a layer and two have 72: between them layers of other heights count.
-TEST(MeshGenerate, SlenderCylinders_HaveAboutTheNumberOfCellsAskedFor) {
+TEST(MeshGenerate, SlenderCylinders_HaveAboutTheNumberOfCellsRequested) {
   for (uint32_t cells = 200; cells < 1500; cells += 7) {
     const double made = make_cylinder(standard(), 0.05, 0.3, cells).ntet();
     EXPECT_LT(std::max(made / cells, cells / made), 1.42) << cells;
@@ -118,7 +118,7 @@ TEST(MeshGenerate, Balls_AreValidAndTheirSurfaceLiesOnTheSphere) {
   for (const uint32_t cells : {1u, 160u, 1000u, 5000u, 20000u}) {
     SCOPED_TRACE(cells);
     const TetMesh m = make_ball(standard(), 0.05, cells);
-    expect_sound(m);
+    expect_valid(m);
     const Array<uint32_t> tri = boundary_triangles(m.tets);
     for (const uint32_t p : tri) {
       const double *x = &m.points[3 * size_t(p)];

@@ -232,7 +232,7 @@ TEST(Abaqus, AssemblyOfOnePart_IsRead) {
   expect_refusal("a.inp", "*Part, name=P\n*Part, name=Q\n", DFM_E_UNSUPPORTED, {"a.inp:2:", "second part"});
 }
 
-TEST(Abaqus, ElementsThatAreNoCells_AreLeftOutAndToldOf) {
+TEST(Abaqus, ElementsThatAreNoCells_AreLeftOutAndReported) {
   const TetMesh mesh = parsed(kTet +
                               "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=SPRINGA\n22, 1, "
                               "2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"

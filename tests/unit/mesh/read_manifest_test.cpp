@@ -188,23 +188,23 @@ TEST_F(PackedMeshes, DefectiveMeshes_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
     return read_tet_mesh(Memory::standard(), folder + "nasty/" + file);
   };
-  const auto told = [](const TetMesh &m, const char *word) {
+  const auto reported = [](const TetMesh &m, const char *word) {
     return std::any_of(m.warnings.begin(), m.warnings.end(),
                        [&](const std::string &w) { return w.find(word) != std::string::npos; });
   };
   EXPECT_EQ(mesh_statistics(read("two_pieces.msh")).npiece, 2u);
-  EXPECT_TRUE(told(read("two_pieces.msh"), "2 pieces that share no point"));
+  EXPECT_TRUE(reported(read("two_pieces.msh"), "2 pieces that share no point"));
   EXPECT_EQ(mesh_statistics(read("duplicate_vertices.vtk")).npiece, 2u);
   EXPECT_EQ(mesh_statistics(read("duplicate_vertices.vtk")).duplicate_points, 4u);
-  EXPECT_TRUE(told(read("duplicate_vertices.vtk"), "4 points"));
+  EXPECT_TRUE(reported(read("duplicate_vertices.vtk"), "4 points"));
   EXPECT_EQ(read("duplicate_tets.vtk").dropped_cells, 2u);
-  EXPECT_TRUE(told(read("duplicate_tets.vtk"), "2 duplicate cells"));
+  EXPECT_TRUE(reported(read("duplicate_tets.vtk"), "2 duplicate cells"));
   EXPECT_EQ(mesh_statistics(read("nonmanifold_contacts.vtk")).nonmanifold_edges, 1u);
-  EXPECT_TRUE(told(read("slivers.vtk"), "nearly flat"));
+  EXPECT_TRUE(reported(read("slivers.vtk"), "nearly flat"));
   EXPECT_NEAR(mesh_statistics(read("slivers.vtk")).quality_min, 0.0027, 5e-5);
-  EXPECT_TRUE(told(read("huge_offset.vtk"), "from the origin"));
-  EXPECT_TRUE(told(read("inverted_rest.vtk"), "tangled"));
-  EXPECT_TRUE(told(read("inverted_rest.vtk"), "39 of 324 cells"));
+  EXPECT_TRUE(reported(read("huge_offset.vtk"), "from the origin"));
+  EXPECT_TRUE(reported(read("inverted_rest.vtk"), "tangled"));
+  EXPECT_TRUE(reported(read("inverted_rest.vtk"), "39 of 324 cells"));
   EXPECT_TRUE(read("tiny_units.vtk").warnings.empty());
   EXPECT_TRUE(read("large_units.vtk").warnings.empty());
 }

@@ -46,11 +46,11 @@ TEST(SurfaceFiles, DefectiveFiles_GiveTheExpectedResults) {
     if (f.volume > 0) {
       EXPECT_NEAR(s.volume / f.volume, 1, 1e-7) << f.file;
     }
-    std::string told;
-    for (const std::string &w : m.warnings) told += w + "\n";
-    EXPECT_NE(told.find(f.warning), std::string::npos) << f.file << ": " << told;
+    std::string reported;
+    for (const std::string &w : m.warnings) reported += w + "\n";
+    EXPECT_NE(reported.find(f.warning), std::string::npos) << f.file << ": " << reported;
     if (std::string(f.file).ends_with(".stl")) {
-      EXPECT_EQ(told, "") << f.file << ": every STL repeats the corners of its triangles";
+      EXPECT_EQ(reported, "") << f.file << ": every STL repeats the corners of its triangles";
     }
   }
 }

@@ -402,7 +402,7 @@ TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   EXPECT_NEAR(c[0].point[2], 0.5e-3, 1e-15);
   for (int k = 0; k < 4; ++k) EXPECT_NEAR(std::fabs(c[0].weight[k]), 0.5, 1e-12);
   EXPECT_EQ(flaw(scene, c), "");
-  EXPECT_EQ(c[0].give, 0);  // nothing else holds the edges apart
+  EXPECT_EQ(c[0].indentation, 0);  // nothing else holds the edges apart
   // No end has a contact of its own, so the nearest end (all equally near: the first) lends its share.
   EXPECT_DOUBLE_EQ(c[0].area, facing_area(*scene.surfaces[0], 0, -load3(c[0].normal)) / 2);
 }
@@ -511,7 +511,7 @@ TEST(EdgeEdge, FlatButBoreInTheLastSubStep_CountsOnWithinItsCone) {
 // under load, less and less where both rise by more than that. Not between the faces of a cut.
 TEST(EdgeEdge, CrossingInAFlatFace_GivesWayUnderLoad) {
   constexpr double kOffset = 0.01;
-  const auto give = [](double rise, bool cut) {
+  const auto indentation = [](double rise, bool cut) {
     Scene scene;
     scene.h = 0;
     scene.offset = kOffset;
@@ -533,15 +533,16 @@ TEST(EdgeEdge, CrossingInAFlatFace_GivesWayUnderLoad) {
     std::vector<double> out;
     for (const ContactPoint &c : scene.contacts(scene.all(), any))
       // the one of the diagonals, not those of rims
-      if (c.kind == kEdgeEdge && std::hypot(c.point[0], c.point[1]) < 1e-9) out.push_back(c.give / kOffset);
+      if (c.kind == kEdgeEdge && std::hypot(c.point[0], c.point[1]) < 1e-9)
+        out.push_back(c.indentation / kOffset);
     EXPECT_EQ(out.size(), 1u) << rise;
     return out.empty() ? -1 : out[0];
   };
-  EXPECT_DOUBLE_EQ(give(0, false), 0.3);
-  EXPECT_NEAR(give(0.9 * kOffset, false), 0.3, 1e-3);
-  EXPECT_NEAR(give(1.5 * kOffset, false), 0.15, 1e-2);
-  EXPECT_EQ(give(2.1 * kOffset, false), 0);
-  EXPECT_EQ(give(0, true), 0);
+  EXPECT_DOUBLE_EQ(indentation(0, false), 0.3);
+  EXPECT_NEAR(indentation(0.9 * kOffset, false), 0.3, 1e-3);
+  EXPECT_NEAR(indentation(1.5 * kOffset, false), 0.15, 1e-2);
+  EXPECT_EQ(indentation(2.1 * kOffset, false), 0);
+  EXPECT_EQ(indentation(0, true), 0);
 }
 
 // A tilted edge over a rim: the closest points of the lines lie inside both, but the distance falls on along

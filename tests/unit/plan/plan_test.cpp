@@ -131,7 +131,7 @@ TEST(Plan, OfAnyFacts_HasTheOrderOfTheTable) {
     }
     const bool touches = f.body_pairs || f.obstacle_pairs || f.self_bodies;
     ASSERT_EQ(plan.touches(), touches);
-    ASSERT_EQ(plan.has(StageRole::gives_impulses), touches);
+    ASSERT_EQ(plan.has(StageRole::reports_impulses), touches);
     ASSERT_EQ(plan.has(StageRole::guards), touches && !f.unguarded);
   }
 }
@@ -145,7 +145,7 @@ TEST(PlanEffects, OfTheContent_NameTheirProviders) {
   ASSERT_EQ(plan.effects.size(), 2u);
   EXPECT_EQ(plan.effects[0].name, "stiction");
   EXPECT_EQ(plan.effects[1].name, "volume");
-  EXPECT_EQ(plan.effects[1].asked_by, "content");
+  EXPECT_EQ(plan.effects[1].requested_by, "content");
   EXPECT_EQ(plan.effects[1].provided_by, "model.a, model.c");
 }
 
@@ -160,7 +160,7 @@ TEST(PlanEffects, ThatNoPluginProvides_AreRefusedWithPossibleProviders) {
   };
   dfm::SceneFacts f = two_bodies();
   f.effects_listed = true;
-  f.asked = {"volume"};
+  f.requested = {"volume"};
   EXPECT_NE(refusal(f).find("no loaded plugin could"), std::string::npos) << refusal(f);
   f.available = {{"volume", "model.a"}};
   EXPECT_NE(refusal(f).find("these loaded plugins could: model.a"), std::string::npos) << refusal(f);
@@ -170,7 +170,7 @@ TEST(PlanEffects, ThatNoPluginProvides_AreRefusedWithPossibleProviders) {
   EXPECT_EQ(refusal(f), "");
   dfm::SceneFacts empty;  // whoever comes first may provide it
   empty.effects_listed = true;
-  empty.asked = {"volume"};
+  empty.requested = {"volume"};
   empty.available = {{"volume", "model.a"}};
   EXPECT_EQ(refusal(empty), "");
 }
@@ -179,16 +179,16 @@ TEST(PlanEffects, ThatNoPluginProvides_AreRefusedWithPossibleProviders) {
 TEST(PlanEffects, ThatFold_CallForSelfContact) {
   dfm::SceneFacts f;
   f.bodies = 1;
-  EXPECT_EQ(dfm::self_asked_by(f), "");
+  EXPECT_EQ(dfm::self_requested_by(f), "");
   f.offered = {{"folding", "model.a"}};
-  EXPECT_EQ(dfm::self_asked_by(f), "folding");
+  EXPECT_EQ(dfm::self_requested_by(f), "folding");
   f.self = true;
-  EXPECT_EQ(dfm::self_asked_by(f), "contact.self");
+  EXPECT_EQ(dfm::self_requested_by(f), "contact.self");
   f.self_bodies = 1;
   const dfm::Plan plan = dfm::make_plan(f);
   ASSERT_EQ(plan.effects.size(), 2u);
   EXPECT_EQ(plan.effects[1].name, dfm::kSelfContact);
-  EXPECT_EQ(plan.effects[1].asked_by, "contact.self");
+  EXPECT_EQ(plan.effects[1].requested_by, "contact.self");
 }
 
 }  // namespace

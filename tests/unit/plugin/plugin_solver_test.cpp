@@ -80,7 +80,7 @@ TEST(PluginSolver, Cholmod_EqualsTheOwnFactorization) {
   ASSERT_EQ(dfm_plugin_load(context.c, file.c_str()), DFM_OK) << dfm_last_error();
   const test::Grid g = test::grid(9, 8, 7, 0.05);
   const std::vector<double> b = test::noise(9 * size_t{g.n}, 1);
-  std::vector<double> answers[2];
+  std::vector<double> results[2];
   for (const char *name : {"ldlt", "cholmod"}) {
     const auto solver = dfm::make_solver({name, g.n, false, 0}, *context.c, memory(), nullptr);
     solver->analyse(g.pattern());
@@ -89,7 +89,7 @@ TEST(PluginSolver, Cholmod_EqualsTheOwnFactorization) {
       for (double &v : blk) v *= scale;
       ASSERT_TRUE(solver->factor(blk.data()));
     }
-    std::vector<double> &x = answers[name[0] == 'c'];
+    std::vector<double> &x = results[name[0] == 'c'];
     x.resize(b.size());
     dfm::SolveInfo info;
     ASSERT_TRUE(solver->solve(3, b.data(), x.data(), 0, info));
@@ -97,7 +97,7 @@ TEST(PluginSolver, Cholmod_EqualsTheOwnFactorization) {
     solver->analyse(bad.pattern());
     EXPECT_FALSE(solver->factor(bad.blk.data()));
   }
-  EXPECT_LT(test::worst(answers[1], answers[0]), 1e-11);
+  EXPECT_LT(test::worst(results[1], results[0]), 1e-11);
 }
 #endif
 

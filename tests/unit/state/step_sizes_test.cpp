@@ -20,7 +20,7 @@ struct Count {
 };
 
 void step(StepSizes &s, double dt, double stable, Count &c) {
-  const double n = choose_pieces(s, dt, stable);
+  const double n = choose_substeps(s, dt, stable);
   ASSERT_LE(dt / n, stable * (1 + 1e-8));
   const double size = dt / n;
   if (c.last > 0 && std::fabs(size - c.last) > 1e-9 * size) ++c.changes;
@@ -34,7 +34,7 @@ void step(StepSizes &s, double dt, double stable, Count &c) {
 TEST(StepSizes, FixedStep_IsCutIntoNumbersOfAShortList) {
   for (double q = 0.01; q < 3000; q *= 1.013) {
     StepSizes s;
-    const double n = choose_pieces(s, q, 1);
+    const double n = choose_substeps(s, q, 1);
     EXPECT_GE(n, q - 1e-6);
     EXPECT_LE(n, std::max(1.0, q + 1) * 1.25);
     int e;
@@ -43,7 +43,7 @@ TEST(StepSizes, FixedStep_IsCutIntoNumbersOfAShortList) {
   }
   for (const double n : {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32}) {
     StepSizes s;
-    EXPECT_EQ(choose_pieces(s, n, 1), n) << "what divides evenly is not cut finer";
+    EXPECT_EQ(choose_substeps(s, n, 1), n) << "what divides evenly is not cut finer";
   }
 }
 
@@ -53,13 +53,13 @@ TEST(StepSizes, OfferedStep_IsARungNotAboveTheStableOneAndNotCut) {
     const double offer = offered_step(s, stable);
     EXPECT_LE(offer, stable);
     EXPECT_GE(offer, 0.8 * stable);
-    EXPECT_EQ(choose_pieces(s, offer, stable), 1);
+    EXPECT_EQ(choose_substeps(s, offer, stable), 1);
     EXPECT_EQ(offered_step(s, stable), offer);
   }
   const double none = std::numeric_limits<double>::infinity();
   EXPECT_EQ(offered_step({}, none), none);
   StepSizes s;
-  EXPECT_EQ(choose_pieces(s, 5, none), 1);
+  EXPECT_EQ(choose_substeps(s, 5, none), 1);
 }
 
 // A bound that wobbles by 30 % for ever, at any period: sizes change with the logarithm of the number of
@@ -73,7 +73,7 @@ TEST(StepSizes, BoundThatSwings_ChangesThemEverMoreRarely) {
         const double stable = 1e-4 * (1 + 0.3 * std::sin(6.283 * i / period));
         step(s, fed_back ? offered_step(s, stable) : 3.1e-4, stable, c);
       }
-      EXPECT_LE(c.changes, 60 + 4 * c.substeps / kMostPatience) << fed_back << ' ' << period;
+      EXPECT_LE(c.changes, 60 + 4 * c.substeps / kMaxPatience) << fed_back << ' ' << period;
     }
 }
 
@@ -109,7 +109,7 @@ TEST(StepSizes, FramesThatDifferALittle_KeepTheirNumberOfSubSteps) {
   for (int i = 0; i < 10000; ++i) {
     const double dt = (1 + 0.03 * (double(random()) / 2147483648.0 - 1)) / 60;
     const double stable = 1.3e-3 * (1 + 0.02 * std::sin(0.1 * i));
-    const double n = choose_pieces(s, dt, stable);
+    const double n = choose_substeps(s, dt, stable);
     changed += last > 0 && n != last;
     last = n;
     for (int k = 0; k < int(n); ++k) pass(s, dt / n);
@@ -119,9 +119,9 @@ TEST(StepSizes, FramesThatDifferALittle_KeepTheirNumberOfSubSteps) {
 
 TEST(StepSizes, BoundThatFallsInAStep_HalvesItsSubSteps) {
   StepSizes s;
-  EXPECT_EQ(choose_pieces(s, 6, 1), 6);
+  EXPECT_EQ(choose_substeps(s, 6, 1), 6);
   EXPECT_EQ(cut_finer(s, 1, 0.97), 2);
-  EXPECT_EQ(choose_pieces(s, 6, 0.97), 12) << "the next step goes on with the same size";
+  EXPECT_EQ(choose_substeps(s, 6, 0.97), 12) << "the next step goes on with the same size";
   EXPECT_EQ(cut_finer(s, 0.5, 0.97), 1);
   EXPECT_GE(cut_finer(s, 1, 0), 1e15) << "no number of sub-steps is enough";
 }
@@ -163,10 +163,10 @@ TEST(StepSizes, ThatAHostVaries_PutNoEnergyIntoAnyMode) {
       }
       double h = 0;
       for (double t = 0, k = 0; t < 6; ++k) {
-        const double dt = host.dt(int(k)), n = choose_pieces(s, dt, 0.9 * bound);
+        const double dt = host.dt(int(k)), n = choose_substeps(s, dt, 0.9 * bound);
         h = dt / n;
         for (int i = 0; i < int(n); ++i) {
-          const double c = damping_due(s, h, bound);
+          const double c = next_damping(s, h, bound);
           for (int m = 0; m < kModes; ++m) {
             v[m] -= w[m] * w[m] * (c * v[m] + h * x[m]);
             x[m] += h * v[m];
@@ -190,21 +190,21 @@ TEST(StepSizes, ThatStaySteady_CallForNoDamping) {
   StepSizes s;
   for (int i = 0; i < 100; ++i) {
     const double stable = 1e-3 * (1 + 0.3 * std::sin(0.1 * i));
-    choose_pieces(s, i < 50 ? 1.0 / 60 : 1.0 / 60 * 2, stable);
-    EXPECT_EQ(damping_due(s, 1e-4, stable), 0) << i;
+    choose_substeps(s, i < 50 ? 1.0 / 60 : 1.0 / 60 * 2, stable);
+    EXPECT_EQ(next_damping(s, 1e-4, stable), 0) << i;
   }
 }
 
 TEST(StepSizes, StateThatNoWorldReaches_IsReported) {
-  EXPECT_TRUE(sound(StepSizes{}));
+  EXPECT_TRUE(is_valid(StepSizes{}));
   for (int bad = 0; bad < 6; ++bad) {
     StepSizes s;
     if (bad == 0) s.cut.size = NAN;
     if (bad == 1) s.offer.size = -1;
     if (bad == 2) s.cut.patience = 0;
-    if (bad == 3) s.offer.calm = kMostPatience + 1;
+    if (bad == 3) s.offer.quiet_steps = kMaxPatience + 1;
     if (bad == 4) s.steady = 2 * kSteady;
     if (bad == 5) s.damping = -1;
-    EXPECT_FALSE(sound(s)) << bad;
+    EXPECT_FALSE(is_valid(s)) << bad;
   }
 }

@@ -200,7 +200,7 @@ TEST(ToolShape, UnderAPlane_FindsEveryCornerThatIsThere) {
     const uint32_t touches = uint32_t(random.in(0, mesh.surface.nsurfel));
     const double height = dot(n, Everything{mesh.surface}.node(touches));
     ToolShape shape(view_of(mesh), &mesh);
-    shape.look_under(n, height, true);
+    shape.select_below(n, height, true);
     std::set<uint32_t> found;
     for (const ToolShape::Corner &c : shape.corners()) found.insert(c.number);
     for (uint32_t i = 0; i < mesh.surface.nsurfel; ++i) {

@@ -350,10 +350,10 @@ TEST(Queries, OnSeveralThreads_GiveTheSameResults) {
   add_ball(s.world);
   for (int round = 0; round < 3; ++round) {
     test::ok(dfm_world_step(s.world, 1e-3, nullptr));  // so that all threads find the trees out of date
-    std::vector<std::vector<double>> answers(4);
+    std::vector<std::vector<double>> results(4);
     std::vector<std::thread> threads;
     std::atomic<int> ready{0};
-    for (auto &own : answers)
+    for (auto &own : results)
       threads.emplace_back([&] {
         Directions at;
         for (++ready; ready < 4;) {}
@@ -364,6 +364,6 @@ TEST(Queries, OnSeveralThreads_GiveTheSameResults) {
         }
       });
     for (std::thread &t : threads) t.join();
-    for (const auto &own : answers) EXPECT_EQ(own, answers[0]);
+    for (const auto &own : results) EXPECT_EQ(own, results[0]);
   }
 }

@@ -237,7 +237,7 @@ class Engine:
     def _scene(self, folder: pathlib.Path, file: str, values: Mapping[str, Any], limit: float) -> Results:
         request = {"scene": file, "out": str(folder),
                    "set": [f"{pointer}={json.dumps(value)}" for pointer, value in values.items()]}
-        answer = self._ask(request, limit)
+        answer = self._call(request, limit)
         if answer["signal"] or answer["code"] == INTERRUPTED:
             raise Died(f"the run was ended by {_signal(answer['signal'])}")
         if answer["code"]:
@@ -246,17 +246,17 @@ class Engine:
             raise Failed("; ".join(clauses) or f"the run ended with exit code {answer['code']}")
         return Results(folder, json.loads((folder / "summary.json").read_text()))
 
-    def _ask(self, request: Mapping[str, Any], limit: float) -> Any:
+    def _call(self, request: Mapping[str, Any], limit: float) -> Any:
         worker = self.process or self._start(["worker"], stdin=subprocess.PIPE)
-        to, answers = worker.stdin, worker.stdout
-        assert to is not None and answers is not None
+        to, replies = worker.stdin, worker.stdout
+        assert to is not None and replies is not None
         try:
             to.write(json.dumps(request) + "\n")
             to.flush()
-            if limit and not select.select([answers], [], [], limit)[0]:
+            if limit and not select.select([replies], [], [], limit)[0]:
                 self._stop()
                 raise Failed(_over(limit))
-            line = answers.readline()
+            line = replies.readline()
         except (BrokenPipeError, ConnectionResetError):
             line = ""
         if not line.endswith("\n"):

@@ -65,9 +65,9 @@ class Spread:
         step, inside = np.zeros(len(at)), np.ones(len(at), dtype=bool)
         while inside.any():
             u, s, rows = np.linalg.svd(self.jacobian[:, inside], full_matrices=False)
-            told = self.stated < WIDE * s
+            resolved = self.stated < WIDE * s
             residuals = self.residuals + self.jacobian[:, ~inside] @ step[~inside]
-            step[inside] = -rows[told].T @ ((u.T @ residuals)[told] / s[told])
+            step[inside] = -rows[resolved].T @ ((u.T @ residuals)[resolved] / s[resolved])
             to = np.clip(at + step, 0, 1) - at
             beyond = inside & (to != at + step - at)
             if not beyond.any():

@@ -26,11 +26,11 @@ namespace dfm {
 namespace {
 
 constexpr double kDrift = 1e-10;  // m and rad: what a joint may be off by at the end of a sub-step
-constexpr uint32_t kMostCorrections = 12;
-constexpr uint32_t kMostSteps = 12;   // toward joints that are kept
-constexpr double kLeastRate = 1e-11;  // m/s and rad/s: what a joint may move apart at
-constexpr double kFar = 0.25;         // rad in a sub-step, of a body without its joints
-constexpr size_t kMotor = 3;          // values of extra per joint: speed, limit, effort of the last sub-step
+constexpr uint32_t kMaxCorrections = 12;
+constexpr uint32_t kMaxSteps = 12;  // toward joints that are kept
+constexpr double kMinRate = 1e-11;  // m/s and rad/s: what a joint may move apart at
+constexpr double kFar = 0.25;       // rad in a sub-step, of a body without its joints
+constexpr size_t kMotor = 3;        // values of extra per joint: speed, limit, effort of the last sub-step
 
 // What a motor does in a sub-step.
 enum class Drive : uint8_t { off, holds, pushes, pulls };
@@ -258,7 +258,7 @@ void Builtin::solve(const dfm_rigid_step &step, const Group &g, const double *im
     best_[k] = (k < g.nhold ? 0 : step.extra[kMotor * g.holding[k - g.nhold]]) - row_rate(g.rows[k], base_);
   g.system.solve(best_);
   double worst = move_by(step, g, best_);
-  for (uint32_t n = 0; n < kMostSteps && worst > kLeastRate; ++n) {
+  for (uint32_t n = 0; n < kMaxSteps && worst > kMinRate; ++n) {
     x_ = target_;
     g.system.solve(x_);
     for (size_t k = 0; k < x_.size(); ++k) x_[k] += best_[k];
@@ -365,7 +365,7 @@ void Builtin::respond(const dfm_rigid_step &step, uint32_t group, double *matrix
 void Builtin::correct(const Group &g, std::span<dfm_rigid_state> state) {
   std::vector<double> &shift = column_;
   shift.resize(6 * parts_.size());
-  for (uint32_t k = 0; k < kMostCorrections; ++k) {
+  for (uint32_t k = 0; k < kMaxCorrections; ++k) {
     scratch_rows_.clear();
     for (const uint32_t j : g.joints) hold_rows(joints_[j], state, scratch_rows_);
     double worst = 0;

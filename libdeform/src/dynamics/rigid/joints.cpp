@@ -39,8 +39,8 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
   j.type = def.type;
   j.a = def.body;
   j.b = def.with;
-  auto stand = [&](uint32_t part) { return part == DFM_RIGID_WORLD ? Pose{} : to_pose(bodies[part].pose); };
-  const Pose a = stand(j.a), b = stand(j.b);
+  auto pose = [&](uint32_t part) { return part == DFM_RIGID_WORLD ? Pose{} : to_pose(bodies[part].pose); };
+  const Pose a = pose(j.a), b = pose(j.b);
   const Vec3 anchor = load3(def.anchor), axis = j.can_drive() ? normalized(load3(def.axis)) : Vec3{0, 0, 1};
   const Vec3 side = any_tangent(axis);
   j.anchor_a = rotate_back(a.rotation, anchor - a.position);

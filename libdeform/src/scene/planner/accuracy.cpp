@@ -69,8 +69,8 @@ double model_error(const MeasuredModel &m, const BodyRegime &b, const Estimate &
 // sqrt(1+s) times as fast; without damping the difference in phase grows. Root mean square over the time.
 double swing_error(const BodyRegime &b, const Estimate &e) {
   constexpr double kStep = 2 * kPi / 16;  // rad
-  constexpr int kLeast = 64, kMost = 4096;
-  const int n = int(std::clamp(e.frequency * e.duration / kStep, double(kLeast), double(kMost)));
+  constexpr int kMin = 64, kMax = 4096;
+  const int n = int(std::clamp(e.frequency * e.duration / kStep, double(kMin), double(kMax)));
   const auto place = [&](double times, double t) {
     const double w = e.frequency * std::sqrt(times),
                  rate = 0.5 * (b.damping_mass + b.damping_stiffness * w * w);
@@ -348,10 +348,10 @@ class Planner {
   // The least number whose error is allowed, in steps of 5 %: where phases differ it does not go with a power
   // of the edge. First-order tetrahedra are too stiff against bending, hexahedra are not.
   std::string more_cells(BodyRegime b, const Estimate &e, double allowed) const {
-    constexpr double kStep = 1.05, kMost = 1e9;
+    constexpr double kStep = 1.05, kMax = 1e9;
     const bool locks = b.held && b.stiffens > kBendingOfHexahedra;
     double times = 1;
-    while (times < kMost && wish_.weight * mesh_error(b, e) > allowed) {
+    while (times < kMax && wish_.weight * mesh_error(b, e) > allowed) {
       times *= kStep;
       b.edge /= std::cbrt(kStep);
     }

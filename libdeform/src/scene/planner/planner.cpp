@@ -13,7 +13,7 @@ namespace dfm::scene {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kDefaultTolerance = 1e-6, kLeastTolerance = 1e-9;  // m/s
+constexpr double kDefaultTolerance = 1e-6, kMinTolerance = 1e-9;  // m/s
 
 double length(const double v[3]) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
@@ -492,7 +492,7 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
     if (b.touches) scale = std::min(scale, std::max({estimate(b, def.duration).sag, b.travel, b.depth}));
   const double creep = 0.1 * wish.target * scale / def.duration;
   if (creep > 0 && !(def.world.contact_tolerance > 0) && creep < kDefaultTolerance) {
-    const double tolerance = std::max(creep, kLeastTolerance);
+    const double tolerance = std::max(creep, kMinTolerance);
     write("/contact/tolerance", tolerance);
     plan.assumed.push_back(
         format("contact tolerance %.2g m/s: what rests creeps in %g s by at most a tenth of the target, of a "

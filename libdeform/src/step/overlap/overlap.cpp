@@ -22,7 +22,7 @@ constexpr uint64_t kReleaseEvery = 16;          // steps: interval at which excl
 constexpr uint64_t kPiece = uint64_t{1} << 63;  // added to ids in Overlaps::placed by place_piece()
 constexpr size_t kSentences = 8;                // number of pairs that the log names individually
 constexpr double kOtherUnits = 100;             // times the size of a body: an obstacle may be in millimeters
-constexpr double kTellAgain = 2;                // times the depth of parts that the log has told
+constexpr double kReportAgain = 2;              // times the depth of parts that the log has told
 
 // Whether the overlap is too deep for contact to resolve. Closed shapes and voxels resolve any depth;
 // triangles only small ones.
@@ -54,7 +54,7 @@ std::vector<Overlap> find_overlaps(World &w) {
   const auto was_placed = [&](uint64_t id) {
     return w.overlaps.all || std::binary_search(placed.begin(), placed.end(), id);
   };
-  const auto asked = [&](uint64_t id) { return was_placed(id) || was_placed(id | kPiece); };
+  const auto body_was_placed = [&](uint64_t id) { return was_placed(id) || was_placed(id | kPiece); };
   // Sides of a slit that cross when a part comes off keep the contact that they had.
   const auto kept = [&](const OverlapPair &p, uint64_t a, uint64_t b) {
     return parts_of_one(w, p) && !was_placed(a) && !was_placed(b);
@@ -63,12 +63,12 @@ std::vector<Overlap> find_overlaps(World &w) {
   OverlapSides sides(w);
   const auto look = [&](const OverlapPair &p) {
     const uint64_t a = w.bodies[p.a]->id, b = other_id(w, p);
-    if ((!asked(a) && !asked(b)) || !sides.may_touch(p)) return;
+    if ((!body_was_placed(a) && !body_was_placed(b)) || !sides.may_touch(p)) return;
     const Crossed c = sides.look(p, w.offset, false);
     if (!c.through || lie_on_cut(w, p, c)) return;
     out.push_back({a, b, p.obstacle, c.crossings, c.enclosed, c.depth, deep(w, p, c) && !kept(p, a, b)});
     // after a restore all counts as placed, and nobody has moved anything
-    if (kept(p, a, b) || (parts_of_one(w, p) && w.overlaps.look_only))
+    if (kept(p, a, b) || (parts_of_one(w, p) && w.overlaps.report_only))
       out.back().whole = made_id(*w.bodies[p.a]);
   };
   for (uint32_t i = 0; i < w.bodies.size(); ++i) {
@@ -98,9 +98,9 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
   const Body &a = *w.body(o.a);
   const Obstacle *const thing = o.obstacle ? w.obstacle(o.b) : nullptr;
   if (const HeldIn held = held_in(w, sides, {a.slot, thing ? thing->slot : 0, o.obstacle}, w.offset); held.by)
-    return tell_held_in(w, held, thing->slot);
+    return describe_held_in(w, held, thing->slot);
   const std::string what =
-      o.aside ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
+      o.suspended ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
   const Body *const b = thing ? nullptr : w.body(o.b);
   const bool came = a.piece_of || (b && b->piece_of);
   const std::string &first = made_name(a), &second = thing ? thing->name : made_name(*b);
@@ -141,10 +141,10 @@ void warn_of_parts(World &w, const std::vector<Overlap> &found) {
       ++n;
       if (!deepest || o.depth > deepest->depth) deepest = &o;
     }
-    auto &told = w.overlaps.told_of_parts;
-    auto at = std::find_if(told.begin(), told.end(), [&](const auto &t) { return t.first == whole; });
-    if (at == told.end()) at = told.insert(at, {whole, 0.0});
-    if (!(deepest->depth > kTellAgain * at->second)) continue;
+    auto &reported = w.overlaps.reported_depths;
+    auto at = std::find_if(reported.begin(), reported.end(), [&](const auto &t) { return t.first == whole; });
+    if (at == reported.end()) at = reported.insert(at, {whole, 0.0});
+    if (!(deepest->depth > kReportAgain * at->second)) continue;
     at->second = deepest->depth;
     const Body &a = *w.body(deepest->a), &b = *w.body(deepest->b);
     w.context->logf(
@@ -159,7 +159,7 @@ void warn_of_parts(World &w, const std::vector<Overlap> &found) {
 
 // It has separated: contact is on again.
 void take_back(World &w, const Overlap &f) {
-  if (std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
+  if (std::erase_if(w.overlaps.suspended, [&](const SuspendedPair &p) {
         return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle;
       }))
     w.pairs.filter.set(f.a, f.b, f.obstacle, true);
@@ -169,12 +169,12 @@ void take_back(World &w, const Overlap &f) {
 
 void place_piece(World &w, uint64_t id) { w.overlaps.place(id | kPiece); }
 
-void settle_overlaps(World &w) {
+void resolve_overlaps(World &w) {
   Overlaps &o = w.overlaps;
-  if (!o.due()) return;
+  if (!o.is_pending()) return;
   std::vector<Overlap> found = find_overlaps(w);
   const bool untangles = w.def.flags & DFM_WORLD_UNTANGLE || o.untangle;
-  if (untangles && !o.look_only) {
+  if (untangles && !o.report_only) {
     // parts of one body are where contact has left them, and it goes on to move them apart
     const auto parts =
         std::stable_partition(found.begin(), found.end(), [](auto &f) { return f.whole == 0; });
@@ -196,29 +196,29 @@ void settle_overlaps(World &w) {
     w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them", n - kSentences);
   warn_of_parts(w, left);
   for (const Overlap &f : left) {
-    if (!f.aside || o.look_only || o.is_aside(f.a, f.b, f.obstacle)) continue;
-    o.aside.push_back({f.a, f.b, f.obstacle});
+    if (!f.suspended || o.report_only || o.is_suspended(f.a, f.b, f.obstacle)) continue;
+    o.suspended.push_back({f.a, f.b, f.obstacle});
     w.pairs.filter.set(f.a, f.b, f.obstacle, false);
   }
   o.found = std::move(found);
-  o.told = left.empty();
+  o.reported = left.empty();
   o.placed.clear();
-  o.all = o.look_only = o.untangle = false;
+  o.all = o.report_only = o.untangle = false;
 }
 
-void keep_overlaps_aside(World &w) {
+void keep_suspended(World &w) {
   const auto gone = [&](const auto &p) {
     return !w.body(p.a) || (p.obstacle ? !w.obstacle(p.b) : !w.body(p.b));
   };
-  std::erase_if(w.overlaps.aside, gone);
+  std::erase_if(w.overlaps.suspended, gone);
   std::erase_if(w.overlaps.found, gone);
-  for (const PairAside &p : w.overlaps.aside) w.pairs.filter.set(p.a, p.b, p.obstacle, false);
+  for (const SuspendedPair &p : w.overlaps.suspended) w.pairs.filter.set(p.a, p.b, p.obstacle, false);
 }
 
 void release_overlaps(World &w) {
-  if (w.overlaps.aside.empty() || w.step_count % kReleaseEvery != 0) return;
+  if (w.overlaps.suspended.empty() || w.step_count % kReleaseEvery != 0) return;
   OverlapSides sides(w);
-  std::erase_if(w.overlaps.aside, [&](const PairAside &p) {
+  std::erase_if(w.overlaps.suspended, [&](const SuspendedPair &p) {
     const uint32_t j = p.obstacle ? w.obstacle(p.b)->slot : w.body(p.b)->slot;
     if (sides.look({w.body(p.a)->slot, j, p.obstacle != 0}, w.offset, true).through) return false;
     w.pairs.filter.set(p.a, p.b, p.obstacle, true);

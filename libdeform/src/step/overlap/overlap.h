@@ -12,13 +12,13 @@ struct World;
 
 uint64_t made_id(const Body &b);  // id of the body that it is a piece of, or its own
 // At the end of prepare(): the pending search, with its warnings. Deep overlaps are excluded from contact.
-void settle_overlaps(World &w);
+void resolve_overlaps(World &w);
 // The next search covers a piece that a separation has made. How it lies in the other parts of its body is
 // what contact has left, and no place that somebody has put it in, so contact with them stays on.
 void place_piece(World &w, uint64_t id);
 // Before a step: includes separated pairs in contact again.
 void release_overlaps(World &w);
 // In prepare(), after the filter has been rebuilt.
-void keep_overlaps_aside(World &w);
+void keep_suspended(World &w);
 
 }  // namespace dfm

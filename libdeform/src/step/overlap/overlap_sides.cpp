@@ -268,7 +268,7 @@ bool OverlapSides::may_touch(const OverlapPair &p) const {
   const BodyView &a = step_.body_views[p.a];
   const uint64_t b = p.obstacle ? step_.obstacle_views[p.b].id : step_.body_views[p.b].id;
   if (p.obstacle && step_.obstacle_views[p.b].shape == Shape::none) return false;
-  return w_.overlaps.is_aside(a.id, b, p.obstacle) ||
+  return w_.overlaps.is_suspended(a.id, b, p.obstacle) ||
          (p.obstacle ? w_.pairs.filter.may_touch(a, step_.obstacle_views[p.b])
                      : w_.pairs.filter.may_touch(a, step_.body_views[p.b]));
 }

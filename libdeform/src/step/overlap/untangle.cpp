@@ -20,9 +20,9 @@ constexpr int kRounds = 64;  // over all pairs; a heap that is not apart by then
 constexpr int kPolish = 6;   // halvings of the step with which the best direction is sought
 // a body that is not convex may be free after a part of the way past the other's hull
 constexpr int kParts = 16;
-constexpr size_t kMostLooks = 96;  // at a pair, for such a part
-constexpr double kConvex = 1.5;    // a way past the hull of up to this many depths is taken as it is
-constexpr double kClear = 1.01;    // of d_c: contact starts without a load
+constexpr size_t kMaxLooks = 96;  // at a pair, for such a part
+constexpr double kConvex = 1.5;   // a way past the hull of up to this many depths is taken as it is
+constexpr double kClear = 1.01;   // of d_c: contact starts without a load
 
 struct Way {
   Vec3 direction;
@@ -52,11 +52,11 @@ class Untangler {
       if (!any) break;
       pairs = through();
     }
-    if (!pairs.empty()) put_back(pairs);
+    if (!pairs.empty()) restore_positions(pairs);
     for (Overlap &f : found) {
       const OverlapPair p = pair_of(f);
       f.separated = moved(p) && !overlap(p);
-      if (!f.separated) tell_failure(p);
+      if (!f.separated) report_failure(p);
     }
     apply();
   }
@@ -138,7 +138,7 @@ class Untangler {
                      [](const Way &l, const Way &r) { return l.length < r.length; });
     // Evenly over all lengths, if there are more than may be tested; the whole ways are among them.
     std::vector<Way> kept;
-    for (size_t i = 0; i < tries.size(); i += tries.size() / kMostLooks + 1) kept.push_back(tries[i]);
+    for (size_t i = 0; i < tries.size(); i += tries.size() / kMaxLooks + 1) kept.push_back(tries[i]);
     kept.push_back(ways.front());
     for (const Way &t : kept)
       if (clear(p, t)) return t;
@@ -185,7 +185,7 @@ class Untangler {
   }
 
   // Whoever has had to do with what is not apart goes back to its place.
-  void put_back(const std::vector<OverlapPair> &pairs) {
+  void restore_positions(const std::vector<OverlapPair> &pairs) {
     std::vector<uint8_t> stuck(w_.bodies.size(), 0);
     for (const OverlapPair &p : pairs) {
       stuck[groups_.root(p.a)] = 1;
@@ -198,7 +198,7 @@ class Untangler {
       }
   }
 
-  void tell_failure(const OverlapPair &p) const {
+  void report_failure(const OverlapPair &p) const {
     const std::string &b = p.obstacle ? w_.obstacles[p.b]->name : w_.bodies[p.b]->name;
     w_.context->logf(DFM_LOG_WARNING, "untangle cannot separate '%s' and '%s': %s",
                      w_.bodies[p.a]->name.c_str(), b.c_str(),

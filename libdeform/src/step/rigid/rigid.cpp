@@ -78,7 +78,7 @@ void place_rigids(World &w) {
   }
 }
 
-bool ask_rigids(World &w, uint32_t *trouble) {
+bool query_rigids(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
   for (auto &set : w.rigid_sets)
     if (const HostFault fault = set->free_motion()) return host_failed(w, *set, fault, said, trouble);
@@ -88,7 +88,7 @@ bool ask_rigids(World &w, uint32_t *trouble) {
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   step.rigid_again = false;
   for (auto &set : w.rigid_sets) set->begin(sub_step_of(w, step));
-  if (!ask_rigids(w, trouble)) return false;
+  if (!query_rigids(w, trouble)) return false;
   if (!step.tools->begin(w, step)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
@@ -191,7 +191,7 @@ void restart_rigids(World &w, StepContext &step) {
 }
 
 // 1: all have ended their step; 2: a host requests another solve; 0: failed.
-int ask_rigid_ends(World &w, uint32_t *trouble) {
+int query_rigid_ends(World &w, uint32_t *trouble) {
   const uint64_t said = sentences();
   bool again = false;
   for (auto &set : w.rigid_sets)
@@ -211,14 +211,14 @@ Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
     return Next::solve;
   }
   step.tools->list(w, step);
-  const int end = ask_rigid_ends(w, trouble);
+  const int end = query_rigid_ends(w, trouble);
   if (end == 0) return Next::stop;
   step.rigid_again = end == 2 && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
                      step.rows.all() > 0;
   if (step.rigid_again) {
     ++step.rigid_rounds;
     ++w.stats.rigid_again;
-    if (!ask_rigids(w, trouble)) return Next::stop;
+    if (!query_rigids(w, trouble)) return Next::stop;
     step.tools->correct();
     return Next::solve;
   }

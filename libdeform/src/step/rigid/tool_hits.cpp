@@ -19,9 +19,9 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMostHits = 4;  // further solves
-constexpr double kSlow = 5e-4;     // m in a sub-step: what moves by less is kept apart by its rows
-constexpr uint32_t kLooks = 16;    // pieces of an edge whose ends are tested
+constexpr uint32_t kMaxHits = 4;  // further solves
+constexpr double kSlow = 5e-4;    // m in a sub-step: what moves by less is kept apart by its rows
+constexpr uint32_t kLooks = 16;   // pieces of an edge whose ends are tested
 // Whether the bounding spheres of the two, or that of one and a plane, do not meet.
 bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
   const auto reach = [](const ObstacleView &v) {
@@ -71,7 +71,7 @@ Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
 
 void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double far = h_ * (fastest(a, at_a, b) + fastest(b, at_b, a));
-  if (far < kSlow || !look_at_each_other(a, b, 2 * far + offset_, pair.jaw)) return;
+  if (far < kSlow || !cull_facing(a, b, 2 * far + offset_, pair.jaw)) return;
   const double floor = 0.5 * offset_;
   narrow::PairMotion m;
   m.edges = true;
@@ -120,7 +120,7 @@ bool ToolTouch::add_hits(const World &w, const StepContext &step) {
 }
 
 bool ToolTouch::finds_more(World &w, StepContext &step) {
-  if (rows_.empty() || hits_found_ == kMostHits || is_used_up(step)) return false;
+  if (rows_.empty() || hits_found_ == kMaxHits || is_used_up(step)) return false;
   if (outruns_rows()) {
     rows_.clear();
     find(w, step);
@@ -132,7 +132,7 @@ bool ToolTouch::finds_more(World &w, StepContext &step) {
 
 // m, how deep one reaches into the other now, by its corners and, if `edges`, along its edges; 0: not at all.
 double ToolTouch::depth(ToolShape &a, ToolShape &b, bool edges) const {
-  if (!look_at_each_other(a, b, offset_, true)) return 0;
+  if (!cull_facing(a, b, offset_, true)) return 0;
   double deepest = 0;
   ObstaclePoint o;
   const auto look = [&](const ToolShape &in, Vec3 p, double round) {
@@ -148,24 +148,24 @@ double ToolTouch::depth(ToolShape &a, ToolShape &b, bool edges) const {
   return deepest;
 }
 
-bool ToolTouch::told(const Pair &pair) const {
-  return std::any_of(told_.begin(), told_.end(),
+bool ToolTouch::reported(const Pair &pair) const {
+  return std::any_of(reported_.begin(), reported_.end(),
                      [&](const auto &known) { return known[0] == pair.id[0] && known[1] == pair.id[1]; });
 }
 
 // Warns, once for each pair, of rigid bodies of other hosts that pass through something. A host with a world
 // of its own may let bodies overlap by a little.
-void ToolTouch::tell_passing(const World &w, const StepContext &step) {
+void ToolTouch::warn_passing(const World &w, const StepContext &step) {
   for (const Pair &pair : passing_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
-    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || balls_apart(va, vb) || told(pair))
+    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb) || balls_apart(va, vb) || reported(pair))
       continue;
     ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
     const bool corners = shape_a.has_corners() || shape_b.has_corners();
     const double deep = corners ? depth(shape_a, shape_b, true) : center_depth(shape_a, shape_b);
     if (!inside(shape_a, shape_b, deep)) continue;
-    told_.push_back({pair.id[0], pair.id[1]});
+    reported_.push_back({pair.id[0], pair.id[1]});
     if (!corners) {
       const Obstacle &body = a.rigid && a.rigid->group[a.rigid_body] != DFM_RIGID_STILL ? a : b;
       w.context->logf(
@@ -190,9 +190,9 @@ void ToolTouch::tell_passing(const World &w, const StepContext &step) {
 
 // Warns, once for each pair, of what the rows do not end: a tool without a coupling that passes through an
 // obstacle, and something placed inside what keeps it out.
-void ToolTouch::tell_deep(const World &w, const Pair &pair, double deep, bool driven) {
-  if (told(pair)) return;
-  told_.push_back({pair.id[0], pair.id[1]});
+void ToolTouch::warn_deep(const World &w, const Pair &pair, double deep, bool driven) {
+  if (reported(pair)) return;
+  reported_.push_back({pair.id[0], pair.id[1]});
   const bool first = pair.wall[0] != kNone;
   const Obstacle &own = *w.obstacles[first ? pair.b : pair.a], &other = *w.obstacles[first ? pair.a : pair.b];
   if (driven)
@@ -210,8 +210,8 @@ void ToolTouch::tell_deep(const World &w, const Pair &pair, double deep, bool dr
 
 // Warns of tools without a coupling that pass through each other or through obstacles. Tools that cut are
 // left out: their edge goes into the table under what they cut.
-void ToolTouch::tell_driven(const World &w, const StepContext &step) {
-  const auto yields = [&](const Side &side, const Obstacle &to) {
+void ToolTouch::warn_driven(const World &w, const StepContext &step) {
+  const auto can_move = [&](const Side &side, const Obstacle &to) {
     const Moved &m = sides_[side.tool];
     return m.responds ||
            (m.gives(to) && std::any_of(m.jaws.begin(), m.jaws.end(),
@@ -221,7 +221,7 @@ void ToolTouch::tell_driven(const World &w, const StepContext &step) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const bool wall_a = pair.wall[0] != kNone, wall_b = pair.wall[1] != kNone;
     const Side at_a = side_of(a, pair.wall[0]), at_b = side_of(b, pair.wall[1]);
-    if ((!wall_a && yields(at_a, b)) || (!wall_b && yields(at_b, a)) || told(pair)) continue;
+    if ((!wall_a && can_move(at_a, b)) || (!wall_b && can_move(at_b, a)) || reported(pair)) continue;
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
     const bool mesh = va.surface || vb.surface;
@@ -229,7 +229,7 @@ void ToolTouch::tell_driven(const World &w, const StepContext &step) {
       if (cuts(w, wall_a ? b : a) || balls_apart(va, vb) || (mesh && w.step_count % kSeldom != 0)) continue;
       ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
       const double deep = depth(shape_a, shape_b, !mesh);
-      if (inside(shape_a, shape_b, deep)) tell_deep(w, pair, deep, true);
+      if (inside(shape_a, shape_b, deep)) warn_deep(w, pair, deep, true);
       continue;
     }
     ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
@@ -237,7 +237,7 @@ void ToolTouch::tell_driven(const World &w, const StepContext &step) {
     hits_.clear();
     if (!(deep > offset_)) find_hits(pair, shape_a, shape_b, at_a, at_b);
     if (!(deep > offset_) && hits_.empty()) continue;
-    told_.push_back({pair.id[0], pair.id[1]});
+    reported_.push_back({pair.id[0], pair.id[1]});
     w.context->logf(DFM_LOG_WARNING,
                     "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly "
                     "where they are told; give one of them a \"coupling\" (stiffness), or filter the pair",

@@ -76,7 +76,7 @@ void ToolTouch::turn_jaws() {
       const dfm_rigid_state &frame = m.set->next[0];
       dfm_rigid_state &s = m.set->next[jaw.part];
       const Vec3 axis = rotate(load_quat(frame.rotation), {0, 1, 0});
-      const double rate = jaw.give * moment;
+      const double rate = jaw.softness * moment;
       const Quat by = turned(Quat{}, h_ * rate * axis);
       const Vec3 arm = load3(s.position) - load3(frame.position), now = rotate(by, arm);
       store3(s.position, load3(frame.position) + now);

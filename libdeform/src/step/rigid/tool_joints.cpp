@@ -21,12 +21,12 @@ namespace {
 
 constexpr double kHeld = 1e-9;     // of the answer without joints: less is rounding, joints allow no motion
 constexpr double kStronger = 0.1;  // of what a place yields where a motor holds that is not at its limit yet
-constexpr double kMostStrong = 1e-6;  // of it: no place gives less
-constexpr double kDriven = 0.01;      // sine: a motor moves a place along a direction
-constexpr double kNever = 1e3;        // m/s, to part by: such a place has no impulse
-constexpr double kRank = 1e-12;       // of the answer without joints: less is rounding
+constexpr double kMaxStrong = 1e-6;  // of it: no place gives less
+constexpr double kDriven = 0.01;     // sine: a motor moves a place along a direction
+constexpr double kNever = 1e3;       // m/s, to part by: such a place has no impulse
+constexpr double kRank = 1e-12;      // of the answer without joints: less is rounding
 
-bool gives_way(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
+bool is_moved(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
 
 bool is_simple(const ObstacleView &v) {
   return v.shape == Shape::sphere || v.shape == Shape::capsule || v.shape == Shape::box;
@@ -64,8 +64,8 @@ bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacl
   if (std::any_of(set.joints.begin(), set.joints.end(),
                   [&](const auto &j) { return names(j, i) && names(j, k); }))
     return true;
-  const bool one_group = set.group[i] == set.group[k] && gives_way(set, i);
-  const bool at_still = gives_way(set, i) ? is_joined(i) && !gives_way(set, k) : is_joined(k);
+  const bool one_group = set.group[i] == set.group[k] && is_moved(set, i);
+  const bool at_still = is_moved(set, i) ? is_joined(i) && !is_moved(set, k) : is_joined(k);
   if (!one_group && !at_still) return false;
   const auto created = [&](const Obstacle &o) {
     ObstacleView v = w.steps->obstacle_views[o.slot];
@@ -87,11 +87,11 @@ void ToolTouch::list_joints(Moved &m) {
   for (const dfm_joint_def &j : set.joints) {
     m.drives = m.drives || j.motor;
     for (const uint32_t body : {j.body, j.with})
-      if (body != DFM_RIGID_WORLD && gives_way(set, body)) m.jointed[set.group[body]] = 1;
+      if (body != DFM_RIGID_WORLD && is_moved(set, body)) m.jointed[set.group[body]] = 1;
   }
 }
 
-void ToolTouch::ask_response(Moved &m, uint32_t g) {
+void ToolTouch::request_response(Moved &m, uint32_t g) {
   RigidSet &set = *m.set;
   const size_t at = m.first[g] != kNone ? m.first[g] : m.response.size();
   if (m.first[g] == kNone) m.response.resize(at + m.wide[g] * m.wide[g], 0.0);
@@ -106,13 +106,13 @@ void ToolTouch::take_response(const Side &side) {
   Moved &m = sides_[side.tool];
   if (!m.set) return;
   const uint32_t g = m.set->group[side.part];
-  if (g != DFM_RIGID_STILL && m.jointed[g] && m.first[g] == kNone) ask_response(m, g);
+  if (g != DFM_RIGID_STILL && m.jointed[g] && m.first[g] == kNone) request_response(m, g);
 }
 
 // 1/kg, how the place would yield without joints; 0: a tool, or it does not.
-double ToolTouch::answer_without_joints(const Side &side, Vec3 along) const {
+double ToolTouch::response_without_joints(const Side &side, Vec3 along) const {
   const Moved &m = sides_[side.tool];
-  if (!m.set || m.set->of_tool || !gives_way(*m.set, side.part)) return 0;
+  if (!m.set || m.set->of_tool || !is_moved(*m.set, side.part)) return 0;
   const dfm_rigid_def &d = m.set->defs[side.part];
   const Vec3 turn = cross(side.arm, along), inverse{1 / d.inertia[0], 1 / d.inertia[1], 1 / d.inertia[2]};
   return 1 / d.mass + dot(turn, in_axes(load_quat(m.set->state[side.part].rotation), inverse, turn));
@@ -120,13 +120,13 @@ double ToolTouch::answer_without_joints(const Side &side, Vec3 along) const {
 
 bool ToolTouch::jointed(const Side &side) const {
   const Moved &m = sides_[side.tool];
-  return m.set && gives_way(*m.set, side.part) && m.jointed[m.set->group[side.part]];
+  return m.set && is_moved(*m.set, side.part) && m.jointed[m.set->group[side.part]];
 }
 
 // 1/kg, below which an answer along this direction is rounding; 0: no side has joints.
 double ToolTouch::rounding_of(const Row &row, Vec3 along) const {
   if (!jointed(row.a) && !jointed(row.b)) return 0;
-  return kHeld * (answer_without_joints(row.a, along) + answer_without_joints(row.b, along));
+  return kHeld * (response_without_joints(row.a, along) + response_without_joints(row.b, along));
 }
 
 // A place that does not yield because a motor holds has a row nevertheless. It gives at first as a free body
@@ -142,7 +142,7 @@ bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
   const RigidSet &set = *sides_[side.tool].set;
   const Vec3 at = center(side) + side.arm;
   return std::any_of(set.joints.begin(), set.joints.end(), [&](const dfm_joint_def &j) {
-    const uint32_t body = gives_way(set, j.body) || j.with == DFM_RIGID_WORLD ? j.body : j.with;
+    const uint32_t body = is_moved(set, j.body) || j.with == DFM_RIGID_WORLD ? j.body : j.with;
     if (!j.motor || set.group[body] != set.group[side.part]) return false;
     const dfm_pose &was = set.defs[body].pose;
     const dfm_rigid_state &s = set.state[body];
@@ -154,7 +154,7 @@ bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
   });
 }
 
-double ToolTouch::give_of_motor(const Row &row) const {
+double ToolTouch::softness_of_motor(const Row &row) const {
   return strong_ / kHeld * rounding_of(row, row.normal);
 }
 
@@ -166,7 +166,7 @@ void ToolTouch::renew_rows() {
     Row &row = rows_[i];
     if (!(jointed(row.a) && sides_[row.a.tool].drives) && !(jointed(row.b) && sides_[row.b.tool].drives))
       continue;
-    set_answers(row);
+    set_responses(row);
     if (!(row.inverse > 0)) {  // no longer moved by anything: nothing is asked of it
       row.inverse = kHeld / rounding_of(row, row.normal);
       row.rate = -kNever;
@@ -176,25 +176,24 @@ void ToolTouch::renew_rows() {
   }
 }
 
-void ToolTouch::ask_again(Moved &m) {
+void ToolTouch::request_again(Moved &m) {
   for (uint32_t g = 0; g < m.set->ngroup; ++g)
-    if (m.jointed[g] && m.first[g] != kNone) ask_response(m, g);
+    if (m.jointed[g] && m.first[g] != kNone) request_response(m, g);
 }
 
 void ToolTouch::renew(const RigidSet &set) {
   Moved *const m = known(set);
   if (!m) return;
   m->free.assign(set.velocity.begin(), set.velocity.end());
-  ask_again(*m);
+  request_again(*m);
   renew_rows();
 }
 
 // Where motors hold against rows: their places give less.
 bool ToolTouch::press_harder() {
-  if (strong_ < kMostStrong ||
-      std::none_of(
-          rows_.begin(), rows_.end(),
-          [](const Row &row) { return !row.jaw && row.soft > 0 && row.impulse > 0; }))
+  if (strong_ < kMaxStrong || std::none_of(
+                                  rows_.begin(), rows_.end(),
+                                  [](const Row &row) { return !row.jaw && row.soft > 0 && row.impulse > 0; }))
     return false;
   strong_ *= kStronger;
   renew_rows();

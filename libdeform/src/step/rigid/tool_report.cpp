@@ -21,12 +21,12 @@ namespace {
 // bodies do (step/keep_contacts.cpp).
 constexpr double kApart = 0.1;
 
-bool gives_way(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
+bool is_moved(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
 
 }  // namespace
 
 // Whether the first of the two is side b of reports.
-bool ToolTouch::b_first(const Obstacle &a, const Obstacle &b) { return gives_way(b) && !gives_way(a); }
+bool ToolTouch::b_first(const Obstacle &a, const Obstacle &b) { return is_moved(b) && !is_moved(a); }
 
 std::string ToolTouch::row_names(const World &w, uint32_t row) const {
   const auto name = [&](uint64_t id) {
@@ -103,12 +103,12 @@ void ToolTouch::report(World &w) noexcept {
       w.rigid_report.contacts.empty())
     return;
   const double end = w.time + w.steps->h;
-  const auto tell = [&](uint32_t kind, const Array<RigidPair> &of, const Array<RigidPair> &but) {
+  const auto add_events = [&](uint32_t kind, const Array<RigidPair> &of, const Array<RigidPair> &but) {
     for (const RigidPair &p : of)
       if (!std::binary_search(but.begin(), but.end(), p)) add_event(w, kind, p.a, p.b, 0, end);
   };
-  tell(DFM_EVENT_BEGIN, now.touching, w.rigid_report.touching);
-  tell(DFM_EVENT_END, w.rigid_report.touching, now.touching);
+  add_events(DFM_EVENT_BEGIN, now.touching, w.rigid_report.touching);
+  add_events(DFM_EVENT_END, w.rigid_report.touching, now.touching);
   for (const RigidContact &c : now.contacts) {
     const double work = c.impulse[1] * c.slip[0] + c.impulse[2] * c.slip[1];
     if (work != 0) work_of(w, {c.a, c.b, true}).friction += work;
@@ -119,7 +119,7 @@ void ToolTouch::report(World &w) noexcept {
   add_rigid_impulses(w);
 }
 
-void leave_rigid_contacts(World &w, uint64_t id) {
+void end_rigid_contacts(World &w, uint64_t id) {
   RigidReport &r = w.rigid_report;
   reserve_events(w, r.touching.size());
   const auto gone = [&](const auto &x) { return x.a == id || x.b == id; };

@@ -52,7 +52,7 @@ void ToolTouch::add_jaw(const Moved::Jaw &jaw, double *matrix, size_t wide) {
   store3(way, jaw.lever);
   store3(way + 3, jaw.axis);
   for (size_t r = 0; r < 6; ++r)
-    for (size_t c = 0; c < 6; ++c) matrix[r * wide + c] += jaw.give * way[r] * way[c];
+    for (size_t c = 0; c < 6; ++c) matrix[r * wide + c] += jaw.softness * way[r] * way[c];
 }
 
 bool ToolTouch::fill_response(uint32_t group, double *matrix) const {
@@ -137,7 +137,7 @@ void ToolTouch::fill_row(const Row &row, ContactRows &to, uint32_t r) const {
   to.wt[r] = row.response;
   for (size_t k = 0; k < 2; ++k) to.cross[2 * size_t{r} + k] = dot(row.tangent[k], row.pressed);
   const bool opens = row.opens > 0;
-  store3(&to.yields[3 * size_t{r}],
+  store3(&to.compliance[3 * size_t{r}],
          {opens ? row.opens : row.soft, opens ? row.rate : std::numeric_limits<double>::max(), 0});
 }
 

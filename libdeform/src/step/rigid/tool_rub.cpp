@@ -73,7 +73,7 @@ void ToolTouch::add_rows_to_velocities(const StepContext &step) {
       const Vec3 p = side == &row.a ? row.given() : -row.given();
       if (const RigidPlace place = place_of(*side); place.group != kNone)
         for (const RigidMember &member : members(step, place.group))
-          add_answer(*side, p, member.body, &m.now[6 * size_t{member.body}]);
+          add_response(*side, p, member.body, &m.now[6 * size_t{member.body}]);
     }
 }
 

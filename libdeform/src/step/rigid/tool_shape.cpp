@@ -28,7 +28,7 @@ bool ToolBox::holds(Vec3 from, Vec3 to) const {
   return a.x <= hi.x && a.y <= hi.y && a.z <= hi.z && b.x >= lo.x && b.y >= lo.y && b.z >= lo.z;
 }
 
-bool ToolShape::Edge::leaves(Vec3 n) const {
+bool ToolShape::Edge::is_outward(Vec3 n) const {
   for (int k = 0; k < faces; ++k)
     if (!(dot(n, beside[k]) < kAlong)) return false;
   return true;
@@ -109,7 +109,7 @@ ToolShape::Edge ToolShape::edge_of_mesh(uint32_t e) const {
 
 // All ascending, as a search through the whole mesh would list them. An edge is listed with the first of its
 // triangles, which is near wherever the edge is.
-void ToolShape::look_at_mesh(const ToolBox &near, bool flat) {
+void ToolShape::select_mesh(const ToolBox &near, bool flat) {
   mesh_->triangles_near(near.lo, near.hi, triangles_);
   std::erase_if(triangles_, [&](uint32_t t) {
     const uint32_t *const c = &surface_->tri[3 * size_t{t}];
@@ -143,7 +143,7 @@ void ToolShape::look_at(const ToolBox &near, bool flat) {
   corners_.clear();
   edges_.clear();
   switch (shape_.view().shape) {
-    case Shape::mesh: return look_at_mesh(near, flat);
+    case Shape::mesh: return select_mesh(near, flat);
     case Shape::box:
       for (uint32_t i = 0; i < 8; ++i) corners_.push_back({shape_.corner(i), i});
       for (uint32_t i = 0; i < 12; ++i) {
@@ -171,7 +171,7 @@ void ToolShape::look_at(const ToolBox &near, bool flat) {
   }
 }
 
-void ToolShape::look_under(Vec3 normal, double height, bool flat) {
+void ToolShape::select_below(Vec3 normal, double height, bool flat) {
   look_at(shape_.view().shape == Shape::mesh ? under(normal, height) : ToolBox{}, flat);
 }
 

@@ -27,7 +27,7 @@ class ToolShape {
     uint32_t end[2] = {};  // numbers of the corners
     bool flat = false;     // its faces lie in one plane: what touches it touches them or their border
     // Whether a motion along n leaves the shape here.
-    bool leaves(Vec3 n) const;
+    bool is_outward(Vec3 n) const;
   };
 
   static bool takes_part(const ObstacleView &view);
@@ -46,7 +46,7 @@ class ToolShape {
   // unless one thing is pressed into the other, as by jaws.
   void look_at(const ToolBox &near, bool flat);
   // The same for what lies at dot(normal, x) <= height.
-  void look_under(Vec3 normal, double height, bool flat);
+  void select_below(Vec3 normal, double height, bool flat);
   struct Corner {
     Vec3 at;
     uint32_t number;
@@ -79,7 +79,7 @@ class ToolShape {
   bool closest(Vec3 p, double limit, ObstaclePoint &out, bool *face = nullptr) const;
 
  private:
-  void look_at_mesh(const ToolBox &near, bool flat);
+  void select_mesh(const ToolBox &near, bool flat);
   ToolBox under(Vec3 normal, double height) const;
   Edge edge_of_mesh(uint32_t edge) const;
   Vec3 node(uint32_t i) const { return load3(&surface_->x[4 * size_t{i}]); }

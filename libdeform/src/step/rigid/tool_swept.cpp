@@ -19,12 +19,12 @@
 namespace dfm {
 namespace {
 
-constexpr double kFar = 0.5;       // of the least thickness: what goes less is kept apart by its rows
-constexpr double kDeep = 2;        // of d_c, by which a corner may end deeper in the other
-constexpr double kCore = 0.5;      // of its radius, that a round thing keeps from the other
-constexpr double kAims = 0.9;      // of the way to where it would cross
-constexpr double kLeastCut = 0.1;  // of a sub-step, by which it is repeated
-constexpr double kLeastPiece = 1.0 / 4096;  // of a planned sub-step
+constexpr double kFar = 0.5;     // of the least thickness: what goes less is kept apart by its rows
+constexpr double kDeep = 2;      // of d_c, by which a corner may end deeper in the other
+constexpr double kCore = 0.5;    // of its radius, that a round thing keeps from the other
+constexpr double kAims = 0.9;    // of the way to where it would cross
+constexpr double kMinCut = 0.1;  // of a sub-step, by which it is repeated
+constexpr double kMinSubstep = 1.0 / 4096;  // of a planned sub-step
 
 // The motion of a shape in the sub-step, and the longest path of its points.
 struct Way {
@@ -190,15 +190,15 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
     ToolShape &of_a = shapes_[0], &of_b = shapes_[1];
     if (of_a.endless() || of_b.endless() || !of_a.has_corners() || !of_b.has_corners()) continue;
     const Way at_a = way_of(a), at_b = way_of(b);
-    if (!look_at_each_other(of_a, of_b, far + offset_, true)) continue;
+    if (!cull_facing(of_a, of_b, far + offset_, true)) continue;
     const double deep = kDeep * offset_;
     first = std::min({first, faces_crossed(of_a, at_a, of_b, at_b, deep, pair.thin),
                       faces_crossed(of_b, at_b, of_a, at_a, deep, pair.thin),
                       edges_crossed(of_a, at_a, of_b, at_b, deep)});
   }
-  if (!(first <= 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step)) return true;
+  if (!(first <= 1) || !(step.h > kMinSubstep * step.guard.planned) || !may_repeat(w, step)) return true;
   step.guard.again = step.guard.fast = true;
-  step.guard.cut = std::max(kLeastCut, kAims * first);
+  step.guard.cut = std::max(kMinCut, kAims * first);
   return false;
 }
 

@@ -26,10 +26,10 @@ constexpr double kDent = 5e-4;             // m: edges that are further on the w
 constexpr double kCross = 1e-6;            // sine between edges that have a normal
 constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
 constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
-constexpr double kLeastPiece = 1.0 / 256;  // of a planned sub-step
-constexpr double kNear = 0.5;        // of the least thickness: a row with an impulse is no longer than this
-constexpr double kFaster = 0.5;      // of the change by the pass before: else passes end
-constexpr uint32_t kMostPasses = 6;  // over what turning adds, until it changes no more
+constexpr double kMinSubstep = 1.0 / 256;  // of a planned sub-step
+constexpr double kNear = 0.5;       // of the least thickness: a row with an impulse is no longer than this
+constexpr double kFaster = 0.5;     // of the change by the pass before: else passes end
+constexpr uint32_t kMaxPasses = 6;  // over what turning adds, until it changes no more
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
 bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
@@ -65,12 +65,12 @@ bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec
   if (p.faces == 0 || q.faces == 0 || !(sine > kCross * norm(p.to - p.from) * norm(q.to - q.from))) {
     if (!(d > 0)) return false;
     n = (1 / d) * apart;
-    return q.leaves(n) && p.leaves(-n);
+    return q.is_outward(n) && p.is_outward(-n);
   }
   n = (1 / sine) * n;
-  if (q.leaves(n) && p.leaves(-n)) return true;
+  if (q.is_outward(n) && p.is_outward(-n)) return true;
   n = -n;
-  return q.leaves(n) && p.leaves(-n);
+  return q.is_outward(n) && p.is_outward(-n);
 }
 
 // Of the rotation vectors that end in the same attitude, whole turns apart, the one nearest to `like`: a ball
@@ -185,7 +185,7 @@ Vec3 ToolTouch::free_speed(const Row &row) const {
 bool ToolTouch::Moved::gives(const Obstacle &to) const { return responds || (to.rigid && !jaws.empty()); }
 
 // Adds to v, m/s and rad/s [6] of a body, what an impulse on a side of the same set changes.
-void ToolTouch::add_answer(const Side &by, Vec3 impulse, uint32_t body, double *v) const {
+void ToolTouch::add_response(const Side &by, Vec3 impulse, uint32_t body, double *v) const {
   const Moved &m = sides_[by.tool];
   const Vec3 moment = cross(by.arm, impulse);
   if (responds(by) && m.set->group[body] == m.set->group[by.part]) {
@@ -198,18 +198,18 @@ void ToolTouch::add_answer(const Side &by, Vec3 impulse, uint32_t body, double *
   }
   for (const Moved::Jaw &jaw : m.jaws) {
     if (jaw.part != by.part || body != by.part) continue;
-    const double rate = jaw.give * (dot(jaw.lever, impulse) + dot(jaw.axis, moment));
+    const double rate = jaw.softness * (dot(jaw.lever, impulse) + dot(jaw.axis, moment));
     add(rate * jaw.lever, v);
     add(rate * jaw.axis, v + 3);
   }
 }
 
 // The relative velocity that an impulse on a, and its opposite on b, makes.
-Vec3 ToolTouch::answer_to(const Row &row, Vec3 impulse) const {
+Vec3 ToolTouch::response_to(const Row &row, Vec3 impulse) const {
   const auto at = [&](const Side &side) {
     double v[6] = {};
     for (const Side *by : {&row.a, &row.b})
-      if (by->tool == side.tool) add_answer(*by, by == &row.a ? impulse : -impulse, side.part, v);
+      if (by->tool == side.tool) add_response(*by, by == &row.a ? impulse : -impulse, side.part, v);
     return load3(v) + cross(load3(v + 3), side.arm);
   };
   return at(row.a) - at(row.b);
@@ -366,24 +366,24 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / planned_;
   row.tangent[0] = any_tangent(normal);
   row.tangent[1] = cross(normal, row.tangent[0]);
-  set_answers(row);
+  set_responses(row);
   if (!(row.inverse > 0)) return;  // neither yields
   rows_.push_back(row);
 }
 
 // How the two sides yield along the normal (inverse 0: they do not) and in the tangent plane.
-void ToolTouch::set_answers(Row &row) {
-  const Vec3 pressed = answer_to(row, row.normal);
+void ToolTouch::set_responses(Row &row) {
+  const Vec3 pressed = response_to(row, row.normal);
   const double w = dot(row.normal, pressed);
   const bool held = !(w > rounding_of(row, row.normal));
   row.inverse = row.response = 0;
   row.pressed = pressed;
-  if (!row.jaw) row.soft = held && motor_holds(row) ? give_of_motor(row) : 0;
+  if (!row.jaw) row.soft = held && motor_holds(row) ? softness_of_motor(row) : 0;
   if (held && !(row.soft > 0)) return;
   row.inverse = 1 / (w + row.soft);
   if (held) return;
   if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
-  const Vec3 first = answer_to(row, row.tangent[0]), second = answer_to(row, row.tangent[1]);
+  const Vec3 first = response_to(row, row.tangent[0]), second = response_to(row, row.tangent[1]);
   const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
                both = dot(row.tangent[0], second);
   row.response = 0.5 * (p + q) + std::sqrt(0.25 * (p - q) * (p - q) + both * both);
@@ -392,13 +392,13 @@ void ToolTouch::set_answers(Row &row) {
 
 // Finds the features of each shape that are this near to the box of the other. Returns false if there are
 // none.
-bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat) {
+bool ToolTouch::cull_facing(ToolShape &a, ToolShape &b, double far, bool flat) {
   if (a.endless() || b.endless()) {
     const ToolShape &plane = a.endless() ? a : b;
     ToolShape &body = a.endless() ? b : a;
     ObstaclePoint o;
     if (!plane.closest(body.position(), HUGE_VAL, o) || o.distance - body.reach() > far) return false;
-    body.look_under(o.normal, dot(o.normal, body.position()) - o.distance + far, flat);
+    body.select_below(o.normal, dot(o.normal, body.position()) - o.distance + far, flat);
     return true;
   }
   if (norm(a.position() - b.position()) - a.reach() - b.reach() > far) return false;
@@ -416,7 +416,7 @@ bool ToolTouch::look_at_each_other(ToolShape &a, ToolShape &b, double far, bool 
 double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const double far = reach + offset_;
-  if (!look_at_each_other(a, b, far, pair.jaw)) return 0;
+  if (!cull_facing(a, b, far, pair.jaw)) return 0;
   for (const Side *side : {&at_a, &at_b}) take_response(*side);
   double deepest = 0;
   ObstaclePoint o;
@@ -485,7 +485,7 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
 void ToolTouch::find(const World &w, const StepContext &step) {
   each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
     const double deep = add_rows(pair, a, b, at_a, at_b);
-    if (!pair.jaw && inside(a, b, deep)) tell_deep(w, pair, deep, false);
+    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
   });
 }
 
@@ -502,7 +502,7 @@ bool ToolTouch::follow(World &w, StepContext &step) {
   changed = std::max(changed, follow_spin());
   charge(w, step, 0);
   if (!(changed > kDone * tangent_at_rest(w, h_)) || !(changed < kFaster * changed_) ||
-      passes_ == kMostPasses || is_used_up(step))
+      passes_ == kMaxPasses || is_used_up(step))
     return false;
   changed_ = changed;
   ++passes_;
@@ -549,7 +549,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
       if (g == DFM_RIGID_STILL || m.wide[g] > 0) continue;
       m.wide[g] = 6 * size_t{step.rigid_groups[set.first_group + g]};
       if (m.jointed[g]) later = true;  // where something is near
-      else ask_response(m, g);
+      else request_response(m, g);
     }
     m.responds = later || std::any_of(m.response.begin(), m.response.end(), [](double x) { return x != 0; });
     for (const auto &t : w.tools)
@@ -583,8 +583,8 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (off_ > kOff * offset_) arrives = std::min(arrives, kLeastPiece * step.guard.planned / step.h);
-  if ((!(turn > 0) && arrives == 1) || !(step.h > kLeastPiece * step.guard.planned) || !may_repeat(w, step))
+  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinSubstep * step.guard.planned / step.h);
+  if ((!(turn > 0) && arrives == 1) || !(step.h > kMinSubstep * step.guard.planned) || !may_repeat(w, step))
     return true;
   step.guard.again = step.guard.fast = true;
   step.guard.cut = arrives;
@@ -598,14 +598,14 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   next_report_.contacts.clear();
   next_report_.touching.clear();
   offset_ = w.offset;
-  if (!passing_.empty()) tell_passing(w, step);
+  if (!passing_.empty()) warn_passing(w, step);
   if (sets_.empty()) return true;
   h_ = step.h;
   planned_ = step.guard.planned;
   strong_ = 1;
   hits_found_ = 0;
   take_sets(w, step);
-  tell_driven(w, step);
+  warn_driven(w, step);
   find(w, step);
   if (rows_.empty() && !add_hits(w, step)) return true;
   if (!follows_arcs(w, step)) return false;
@@ -622,7 +622,7 @@ void ToolTouch::correct() {
     if (!m.set) continue;
     m.free.assign(m.set->velocity.begin(), m.set->velocity.end());
     if (m.responds || !rows_.empty()) straighten(m);
-    if (m.drives) ask_again(m);
+    if (m.drives) request_again(m);
   }
   renew_rows();
 }

@@ -146,7 +146,7 @@ class ToolTouch {
     struct Jaw {
       uint32_t part;
       Vec3 axis, lever;  // velocity of its center by a turn of one about the axis
-      double give;       // rad/s by a moment's impulse of 1 N m s
+      double softness;   // rad/s by a moment's impulse of 1 N m s
       uint32_t alone;    // world-wide number of its group where it moves alone, else kNone
     };
     std::vector<Jaw> jaws;
@@ -181,12 +181,12 @@ class ToolTouch {
   };
   Vec3 speed(const Row &row) const;
   Vec3 free_speed(const Row &row) const;
-  void add_answer(const Side &by, Vec3 impulse, uint32_t body, double *v) const;
-  Vec3 answer_to(const Row &row, Vec3 impulse) const;
+  void add_response(const Side &by, Vec3 impulse, uint32_t body, double *v) const;
+  Vec3 response_to(const Row &row, Vec3 impulse) const;
   void find(const World &w, const StepContext &step);
   using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f);
-  static bool look_at_each_other(ToolShape &a, ToolShape &b, double far, bool flat);
+  static bool cull_facing(ToolShape &a, ToolShape &b, double far, bool flat);
   double add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
@@ -203,7 +203,7 @@ class ToolTouch {
   double follow_arc(Row &row) const;
   Vec3 spin(const Side &side) const;
   Vec3 belt(const Side &side) const;
-  void set_answers(Row &row);
+  void set_responses(Row &row);
   double follow_spin();
   const Moved *known(const RigidSet &set) const;
   Moved *known(const RigidSet &set) { return const_cast<Moved *>(std::as_const(*this).known(set)); }
@@ -217,16 +217,16 @@ class ToolTouch {
   // tool_joints.cpp
   bool belong_together(const World &w, const Obstacle &a, const Obstacle &b);
   static void list_joints(Moved &m);
-  static void ask_response(Moved &m, uint32_t group);
+  static void request_response(Moved &m, uint32_t group);
   void take_response(const Side &side);
-  double answer_without_joints(const Side &side, Vec3 along) const;
+  double response_without_joints(const Side &side, Vec3 along) const;
   bool jointed(const Side &side) const;
   double rounding_of(const Row &row, Vec3 along) const;
   bool motor_holds(const Row &row) const;
   bool is_driven(const Side &side, Vec3 along) const;
-  double give_of_motor(const Row &row) const;
+  double softness_of_motor(const Row &row) const;
   void renew_rows();
-  void ask_again(Moved &m);
+  void request_again(Moved &m);
   static void clean_response(Moved &m, uint32_t group);
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
@@ -235,10 +235,10 @@ class ToolTouch {
   void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   bool add_hits(const World &w, const StepContext &step);
   double depth(ToolShape &a, ToolShape &b, bool edges) const;
-  void tell_driven(const World &w, const StepContext &step);
-  void tell_deep(const World &w, const Pair &pair, double deep, bool driven);
-  void tell_passing(const World &w, const StepContext &step);
-  bool told(const Pair &pair) const;
+  void warn_driven(const World &w, const StepContext &step);
+  void warn_deep(const World &w, const Pair &pair, double deep, bool driven);
+  void warn_passing(const World &w, const StepContext &step);
+  bool reported(const Pair &pair) const;
   bool inside(const ToolShape &a, const ToolShape &b, double deep) const;
   Side side_of(const Obstacle &o, uint32_t wall) const;
   void take_sets(World &w, StepContext &step);
@@ -282,8 +282,8 @@ class ToolTouch {
   std::vector<uint32_t> first_group_;     // scratch
   // m/s, the largest of places with and without the impulses of the start
   struct StartSpeeds { double with = 0, without = 0; };
-  std::vector<StartSpeeds> start_speeds_;      // scratch
-  std::vector<std::array<uint64_t, 2>> told_;  // pairs that have met and pass each other
+  std::vector<StartSpeeds> start_speeds_;          // scratch
+  std::vector<std::array<uint64_t, 2>> reported_;  // pairs that have met and pass each other
   // By row.
   ContactState state_;
   Array<ContactPoint> points_;  // key and normal
@@ -294,7 +294,7 @@ class ToolTouch {
 };
 
 // Ends what the thing touches. At the removal of a thing.
-void leave_rigid_contacts(World &w, uint64_t id);
+void end_rigid_contacts(World &w, uint64_t id);
 // The pairs that these contacts are of.
 void find_touching(const World &w, const ContactStore &of, Array<RigidPair> &out);
 

@@ -40,7 +40,7 @@ Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
 // points, and rigid bonds would need impulses of a thousand times the weight to correct the last micrometer,
 // which throws the body (doc/decisions/contact_problem.md). Each rigid bond of such a body therefore gets
 // this share of its surfel's own response as compliance; at rest that is a gap of at most 1e-9 m.
-constexpr double kGive = 1e-5;
+constexpr double kSoftness = 1e-5;
 
 bool few_motions(const Body &b) { return !b.dynamics->abilities().placed; }
 
@@ -77,14 +77,15 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
       b.soft = 1 / spring;
     } else {
       b.rate = closing(w, step, gap);
-      if (few_motions(*w.bodies[slot_a]) || (!a.obstacle && few_motions(*w.bodies[b.slot_b]))) b.give = kGive;
+      if (few_motions(*w.bodies[slot_a]) || (!a.obstacle && few_motions(*w.bodies[b.slot_b])))
+        b.softness = kSoftness;
     }
     step.bonds.push_back(b);
   }
 }
 
 bool holds(const World &w, const Attachment &a) {
-  return !a.released && !w.bodies[slot_of(w, a.body)]->slumber.asleep;
+  return !a.released && !w.bodies[slot_of(w, a.body)]->sleep_state.asleep;
 }
 
 void add_release(World &w, const Attachment &a, double t) {
@@ -144,7 +145,7 @@ void keep_bonds(World &w, StepContext &step) {
     const Vec3 p = a.sum();
     a.total += p;
     // the way to an equilibrium does not count
-    if (!(a.release > 0 && norm(p) > a.release * step.h) || w.prescribed.stands()) continue;
+    if (!(a.release > 0 && norm(p) > a.release * step.h) || w.prescribed.is_static()) continue;
     a.released = true;
     add_release(w, a, w.time + step.h);
   }
@@ -176,8 +177,8 @@ void wake_attached(World &w, StepContext &step) {
   for (const Attachment &a : w.attachments) {
     if (!a.obstacle || !step.obstacle_views[obstacle_slot_of(w, a.to)].moves()) continue;
     Body &b = *w.bodies[slot_of(w, a.body)];
-    if (!b.slumber.asleep) continue;
-    keep_start(w, step);
+    if (!b.sleep_state.asleep) continue;
+    save_start(w, step);
     wake(w, b);
   }
 }

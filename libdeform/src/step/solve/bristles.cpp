@@ -84,9 +84,9 @@ class Neighborhood {
 // t1, t2: tangents of the contact. Corners count once per triangle; the first twelve triangles of a fan are
 // used.
 Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 t1, Vec3 t2) {
-  constexpr uint32_t kMost = 12;
+  constexpr uint32_t kMax = 12;
   const Surface &s = b.surface;
-  uint32_t points[kMost], n = 0, origin = feature;
+  uint32_t points[kMax], n = 0, origin = feature;
   double corners = 0, shares = 1;
   const auto add_triangle = [&](uint32_t t) {
     if (t == kNone) return;
@@ -96,7 +96,7 @@ Turn turn_of(const Body &b, uint8_t type, uint32_t feature, Vec3 t1, Vec3 t2) {
   };
   if (type == 0) {
     const uint32_t *const fan = &s.fan[s.fan_begin[feature]];
-    n = std::min(kMost, s.fan_begin[feature + 1] - s.fan_begin[feature]);
+    n = std::min(kMax, s.fan_begin[feature + 1] - s.fan_begin[feature]);
     for (uint32_t k = 0; k < n; ++k) {
       const uint32_t *const c = &s.tri[3 * size_t{fan[k]}];
       points[k] = c[0] == feature ? c[1] : c[1] == feature ? c[2] : c[0];
@@ -151,27 +151,27 @@ void share_areas(World &w, StepContext &step) {
   step.shares = std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(), counts);
   if (!step.shares) {
     step.exchange.clear();
-    return step.aim.clear();
+    return step.target_area.clear();
   }
   const uint32_t n = step.rows.soft();
   step.sharing.resize(n);
-  step.aim.resize(n);
-  step.stands.resize(n);
+  step.target_area.resize(n);
+  step.keeps_area.resize(n);
   step.ways.resize(n);
   step.renewed.resize(n);
-  step.areas.share(step.contacts, step.rows.impulse.data(), 1.1 * w.offset, step.aim.data());
+  step.areas.share(step.contacts, step.rows.impulse.data(), 1.1 * w.offset, step.target_area.data());
   for (uint32_t i = 0; i < n; ++i)
     step.sharing[i] = counts(w.pairs.laws[step.state.law[i]]) ? step.state.law[i] : kNone;
-  step.exchange.list(step.contacts, step.sources, step.sharing.data(), step.aim.data());
+  step.exchange.list(step.contacts, step.sources, step.sharing.data(), step.target_area.data());
   step.renewal.list(step.contacts, step.rows.impulse.data());
   for (uint32_t i = 0; i < n; ++i) {
     const uint32_t m = step.match[i];
     const bool carries = step.sharing[i] != kNone && step.rows.impulse[3 * size_t{i}] > 0;
-    step.stands[i] =
-        carries && m < w.store.due.size() && w.store.law[m] == step.state.law[i] && w.store.due[m] > 0;
-    step.state.area[i] = step.stands[i] ? w.store.due[m] : step.aim[i];
+    step.keeps_area[i] = carries && m < w.store.next_area.size() && w.store.law[m] == step.state.law[i] &&
+                         w.store.next_area[m] > 0;
+    step.state.area[i] = step.keeps_area[i] ? w.store.next_area[m] : step.target_area[i];
   }
-  step.renewal.fill(step.stands.data(), step.aim.data(), step.state.area.data());
+  step.renewal.fill(step.keeps_area.data(), step.target_area.data(), step.state.area.data());
 }
 
 // Slip beyond the change of the bristles. The slip of the last evaluation is known to one percent
@@ -179,8 +179,8 @@ void share_areas(World &w, StepContext &step) {
 void follow_load(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   const ContactState &s = step.state;
-  const uint32_t n = static_cast<uint32_t>(step.aim.size());
-  to.due.resize(n == 0 ? 0 : to.n);
+  const uint32_t n = static_cast<uint32_t>(step.target_area.size());
+  to.next_area.resize(n == 0 ? 0 : to.n);
   if (n == 0) return;
   for (uint32_t i = 0; i < n; ++i) {
     step.ways[i] = {0, 0};
@@ -204,11 +204,12 @@ void follow_load(World &w, StepContext &step) {
                        step.renewed.data());
   // At rest renewal is rounding only, and the target areas are not needed.
   if (std::all_of(step.renewed.begin(), step.renewed.end(), [](double r) { return r <= kRests; })) {
-    std::copy_n(s.area.begin(), to.n, to.due.begin());
+    std::copy_n(s.area.begin(), to.n, to.next_area.begin());
     return;
   }
-  step.exchange.pass(step.contacts, step.sources, step.rows.impulse.data(), step.aim.data());
-  for (uint32_t i = 0; i < to.n; ++i) to.due[i] = s.area[i] + step.renewed[i] * (step.aim[i] - s.area[i]);
+  step.exchange.pass(step.contacts, step.sources, step.rows.impulse.data(), step.target_area.data());
+  for (uint32_t i = 0; i < to.n; ++i)
+    to.next_area[i] = s.area[i] + step.renewed[i] * (step.target_area[i] - s.area[i]);
 }
 
 void fit_bristles(World &w, StepContext &step) {

@@ -7,7 +7,7 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-// Sets state.area, if a law has bristles per area: the present area of the contact, or its target (aim) if it
+// Sets state.area, if a law has bristles per area: the present area of the contact, or its target if it
 // has none yet. After the warm start.
 void share_areas(World &w, StepContext &step);
 // After a change of a contact's area: bristles keep their force if it has grown, their deflection if it has

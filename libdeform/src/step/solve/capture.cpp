@@ -36,7 +36,7 @@ void write_problems(const World &w, StepContext &step) {
     for (SolveIsland &own : step.solve_islands->all()) {
       if (!own.problem) continue;
       const std::unique_ptr<ContactProblem> problem = std::exchange(own.problem, nullptr);
-      const bool failed = own.failed || own.bad || own.thrown || own.residual.due > 1;
+      const bool failed = own.failed || own.bad || own.thrown || own.residual.required > 1;
       const uint64_t number = ++capture.solved;
       if (!failed && (capture.every == 0 || number % capture.every != 0)) continue;
       AtomicFile file(format("%s/%06" PRIu64 "-%08" PRIu64 "%s.contact", capture.folder.c_str(), w.step_count,

@@ -19,10 +19,10 @@ constexpr double kRounding = 1e-9;
 // f(body, track, slot of the part) where a tool owes something and still cuts the body.
 template <class F>
 void each_debt(World &w, F &&f) {
-  if (w.tools.empty() || w.prescribed.stands()) return;
+  if (w.tools.empty() || w.prescribed.is_static()) return;
   for (auto &b : w.bodies)
     for (BladeTrack &track : b->blades) {
-      if (track.dues.empty()) continue;
+      if (track.cut_work.empty()) continue;
       const uint32_t slot = obstacle_slot_of(w, track.part);
       if (slot != kNone && passes_through(w, *b, *w.obstacles[slot])) f(*b, track, slot);
     }
@@ -43,19 +43,19 @@ bool tough(const Body &b) {
       if (m.extra_keys[i] == kToughnessKey && m.extra_values[i][0] > 0) return true;
     return false;
   };
-  return std::any_of(b.makeup.materials.begin(), b.makeup.materials.end(), takes);
+  return std::any_of(b.composition.materials.begin(), b.composition.materials.end(), takes);
 }
 
 bool has_dues(const Body &b) {
-  return std::any_of(b.blades.begin(), b.blades.end(), [](auto &t) { return !t.dues.empty(); });
+  return std::any_of(b.blades.begin(), b.blades.end(), [](auto &t) { return !t.cut_work.empty(); });
 }
 
 void make_cut_drags(World &w, StepContext &step, bool again) {
   each_debt(w, [&](const Body &b, const BladeTrack &track, uint32_t slot) {
-    if (b.slumber.asleep) return;
+    if (b.sleep_state.asleep) return;
     const Obstacle &part = *w.obstacles[slot];
     const BodyView &view = step.body_views[b.slot];
-    for (const CutDue &d : track.dues) {
+    for (const CutWork &d : track.cut_work) {
       const uint32_t surfel = surfel_of(b, d.point);
       if (surfel == kNone) continue;
       Bond row{};
@@ -68,7 +68,7 @@ void make_cut_drags(World &w, StepContext &step, bool again) {
       row.velocity = place_velocity(part, load3(&b.p.x[size_t{kStride} * d.point]), step);
       row.along = rotate(attached_frame(part).rotation, load3(d.way));
       row.most = step.h * d.force;
-      row.due = d.due;
+      row.max_work = d.energy;
       step.bonds.push_back(row);
       if (!again)
         for (int k = 0; k < 3; ++k) step.bond_impulse.push_back(0);
@@ -81,24 +81,24 @@ void keep_cut_drags(World &w, StepContext &step) {
   uint32_t k = 0;
   while (k < step.bonds.size() && !step.bonds[k].drags()) ++k;
   each_debt(w, [&](const Body &b, BladeTrack &track, uint32_t) {
-    if (b.slumber.asleep) return;
-    for (CutDue &d : track.dues) {
+    if (b.sleep_state.asleep) return;
+    for (CutWork &d : track.cut_work) {
       if (surfel_of(b, d.point) == kNone) continue;
       const uint32_t row = rows.n + k++;
       // the frame of a bond is that of the world
       const double paid = -dot(load3(&rows.impulse[size_t{3} * row]), rows.velocity(row));
-      d.due -= paid;
-      if (!(d.due > kRounding * paid)) d.due = 0;
+      d.energy -= paid;
+      if (!(d.energy > kRounding * paid)) d.energy = 0;
     }
-    std::erase_if(track.dues, [](const CutDue &d) { return !(d.due > 0); });
+    std::erase_if(track.cut_work, [](const CutWork &d) { return !(d.energy > 0); });
   });
 }
 
 void wake_cut(World &w, StepContext &step) {
   if (w.sleepers == 0) return;
   each_debt(w, [&](Body &b, const BladeTrack &, uint32_t slot) {
-    if (!b.slumber.asleep || !step.obstacle_views[slot].moves()) return;
-    keep_start(w, step);
+    if (!b.sleep_state.asleep || !step.obstacle_views[slot].moves()) return;
+    save_start(w, step);
     wake(w, b);
   });
 }

@@ -49,11 +49,11 @@ std::string sides(const World &w, const StepContext &step, uint32_t i) {
 }
 
 // The inputs of the law at a contact, and whether all are finite.
-struct Asked {
+struct LawInputs {
   std::string text;
-  bool sound;
+  bool is_valid;
 };
-Asked asked(const StepContext &step, const LawInstance &law, uint32_t i) {
+LawInputs law_inputs(const StepContext &step, const LawInstance &law, uint32_t i) {
   const ContactState &s = step.state;
   const size_t n = s.stride;
   double sum = 0;
@@ -72,13 +72,13 @@ Asked asked(const StepContext &step, const LawInstance &law, uint32_t i) {
 
 }  // namespace
 
-uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact) {
+uint32_t report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact) {
   const uint32_t at = law ? contact : spoilt(step);
   const std::string where =
       format("step %llu, %s", static_cast<unsigned long long>(w.step_count), sides(w, step, at).c_str());
   constexpr const char *kDo = "take a smaller step, reduce the loads or change the law";
-  const Asked in = law && at != kNone ? asked(step, *law, at) : Asked{"", true};
-  if (!law || !in.sound) {
+  const LawInputs in = law && at != kNone ? law_inputs(step, *law, at) : LawInputs{"", true};
+  if (!law || !in.is_valid) {
     set_last_error(
         format(
             "%s: the contact solve is not finite%s; %s", where.c_str(),
@@ -96,12 +96,12 @@ uint32_t tell_failed_solve(World &w, StepContext &step, const LawInstance *law, 
   return DFM_TROUBLE_PLUGIN;
 }
 
-uint32_t tell_jam(World &w, StepContext &step) {
+uint32_t report_jam(World &w, StepContext &step) {
   uint32_t worst = kNone;
   for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
   const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
-  const std::string held = c && c->obstacle ? tell_held_at(w, c->slot_a, c->slot_b) : std::string();
+  const std::string held = c && c->obstacle ? describe_held_at(w, c->slot_a, c->slot_b) : std::string();
   set_last_error(format("step %llu, %s: squeezed until nothing can move; %s",
                         static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str(),
                         held.empty()

@@ -48,7 +48,7 @@ dfm_contact_choice choice_of(const World &w, const StepContext &step, const Cont
 }
 
 // Applies and checks the host's answer; returns whether the contact is accepted.
-bool ask(World &w, StepContext &step, const ContactPoint &c, uint32_t law, StepContext::Chosen &to) {
+bool call_host(World &w, StepContext &step, const ContactPoint &c, uint32_t law, StepContext::Chosen &to) {
   dfm_contact_choice choice = choice_of(w, step, c, law);
   w.pre_solve.call(w.pre_solve.user, &choice);
   if (!choice.enabled) return false;
@@ -67,7 +67,7 @@ bool ask(World &w, StepContext &step, const ContactPoint &c, uint32_t law, StepC
 
 }  // namespace
 
-void ask_pre_solve(World &w, StepContext &step) {
+void call_pre_solve(World &w, StepContext &step) {
   step.chosen.clear();
   if (!w.pre_solve.call || step.contacts.empty()) return;
   Array<uint32_t> &law = step.state.law;  // set again for the rows
@@ -86,7 +86,7 @@ void ask_pre_solve(World &w, StepContext &step) {
       while (first < kept && step.contacts[first].key != c.key) ++first;
       if (first == kept) continue;
       chosen = step.chosen[first];
-    } else if (!ask(w, step, c, law[i], chosen)) {
+    } else if (!call_host(w, step, c, law[i], chosen)) {
       continue;
     }
     step.contacts[kept++] = c;
@@ -95,9 +95,9 @@ void ask_pre_solve(World &w, StepContext &step) {
   step.contacts.resize(kept);
 }
 
-bool ask_host(World &w, StepContext &step, const ContactPoint &c) {
+bool query_host(World &w, StepContext &step, const ContactPoint &c) {
   StepContext::Chosen unused;
-  return ask(w, step, c, pair_law(w, c.slot_a, c.obstacle, c.slot_b), unused);
+  return call_host(w, step, c, pair_law(w, c.slot_a, c.obstacle, c.slot_b), unused);
 }
 
 void take_choices(StepContext &step) {

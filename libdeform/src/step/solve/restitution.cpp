@@ -86,7 +86,7 @@ void find_throws(const World &w, StepContext &step) {
       speed += dot(normal, load3(s.velocity) + cross(load3(s.spin), load3(&rows.arm[size_t(3) * i])));
       whole += dot(normal, rows.rigid_diagonal(i, normal));
     } else speed += rows.drive[size_t(3) * i];
-    const double closing = -rows.velocity(i).x, estimate = rows.whole_answer(i);
+    const double closing = -rows.velocity(i).x, estimate = rows.whole_response(i);
     // of implicit bodies what contact estimates of the whole is known here
     const double response = estimate > 0 ? rows.wn[i] - estimate + whole : rows.wn[i];
     if (!(speed > least) || response > kStiff * whole || gap_of(w, c) > step.h * std::max(speed, closing))

@@ -38,8 +38,8 @@ void fill_response(World &w, StepContext &step, const ContactRows::Block &block)
   const Body &b = *w.bodies[block.source];
   step.block_surfels.resize(block.count);
   for (uint32_t k = 0; k < block.count; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
-  step.rows.set_answers(block, [&](double *answers) {
-    if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(), answers))
+  step.rows.set_responses(block, [&](double *responses) {
+    if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(), responses))
       fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
            b.model.type->id, b.name.c_str());
   });
@@ -54,13 +54,13 @@ void fill_responses(World &w, StepContext &step) {
 
 // What a solid body answers at its surface, over the response of its mass: 2.5 at a ball.
 constexpr double kWhole = 2.5;
-constexpr uint32_t kMostRevisions = 12;  // of the responses of rigid hosts, within a sub-step
+constexpr uint32_t kMaxRevisions = 12;  // of the responses of rigid hosts, within a sub-step
 // A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
 // to this share of the planned one.
-constexpr double kLeastPiece = 1.0 / 256;
+constexpr double kMinSubstep = 1.0 / 256;
 
 // m/s, at which a depth opens that a pair was found with.
-constexpr double kSettles = 8e-4;
+constexpr double kRecoverySpeed = 8e-4;
 
 // m, what was left of the depth that the pair was found with; `most` if it is found now.
 double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double most) {
@@ -75,9 +75,9 @@ double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double mo
 // it opens by a speed, whatever the sub-step: a share per sub-step would throw what is stiff. Faces of a cut
 // have distances of their own.
 void find_start_depths(World &w, StepContext &step) {
-  const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kSettles);
+  const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kRecoverySpeed);
   step.rows.start_depth.assign(step.contacts.size(), 0.0);
-  if (w.prescribed.stands()) return;  // an equilibrium has no speed to open by
+  if (w.prescribed.is_static()) return;  // an equilibrium has no speed to open by
   for (uint32_t i = 0; i < step.contacts.size(); ++i) {
     const ContactPoint &c = step.contacts[i];
     const Body &a = *w.bodies[c.slot_a], *const b = c.obstacle ? nullptr : w.bodies[c.slot_b].get();
@@ -93,9 +93,9 @@ void find_start_depths(World &w, StepContext &step) {
 
 }  // namespace
 
-bool may_shorten(const StepContext &step) { return step.h > kLeastPiece * step.guard.planned; }
+bool may_shorten(const StepContext &step) { return step.h > kMinSubstep * step.guard.planned; }
 
-void give_impulses(StepContext &step) {
+void report_impulses(StepContext &step) {
   const ContactRows &rows = step.rows;
   distribute(step.contacts, rows.frame.data(), rows.impulse.data(), step.sinks, step.given, step.bonds,
              rows.impulse.data() + size_t{3} * rows.n);
@@ -122,7 +122,7 @@ void make_rows(World &w, StepContext &step) {
   // carry its part of the load.
   if (nstate > 0)
     for (uint32_t i = 0; i < n; ++i)
-      if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].give = 0;
+      if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].indentation = 0;
   take_choices(step);
   for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
@@ -151,7 +151,7 @@ void make_rows(World &w, StepContext &step) {
   run_belts(step);
   find_throws(w, step);
   bounce(step);
-  reset_owed(w, step);
+  reset_stick_drift(w, step);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
@@ -160,7 +160,7 @@ void make_rows(World &w, StepContext &step) {
   step.tools->put(step.rows, step.state);
   step.solve_islands->find(w, step);
   // an equilibrium has no velocity that an opening could leave
-  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
+  if (!w.prescribed.is_static()) step.rows.soften_openings(step.thrown);
 }
 
 namespace {
@@ -172,7 +172,7 @@ void finish_rows(World &w, StepContext &step) {
   run_belts(step);
   bounce(step);
   if (!step.guard.kept.empty()) guard_rates(step);
-  if (!w.prescribed.stands()) step.rows.soften_openings(step.thrown);
+  if (!w.prescribed.is_static()) step.rows.soften_openings(step.thrown);
 }
 
 // Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed.
@@ -192,7 +192,7 @@ const SolveIsland *solve_revised(World &w, StepContext &step) {
       own.all_sweeps += own.sweeps;
     }
     bool renewed = false;
-    if (bad || step.rows.rigid.empty() || !follow_rigids(w, step, left, revisions < kMostRevisions, renewed))
+    if (bad || step.rows.rigid.empty() || !follow_rigids(w, step, left, revisions < kMaxRevisions, renewed))
       return bad;
     revisions += renewed;
     if (renewed) finish_rows(w, step);
@@ -223,11 +223,11 @@ bool contacts_taken(World &w, StepContext &step) {
     if (a.released) continue;
     for (const uint64_t id : {a.body, a.to})
       if (const uint32_t slot = slot_of(w, id);
-          slot != kNone && !w.bodies[slot]->slumber.asleep && !w.bodies[slot]->dynamics->take_contact())
+          slot != kNone && !w.bodies[slot]->sleep_state.asleep && !w.bodies[slot]->dynamics->take_contact())
         all = false;
   }
   for (auto &b : w.bodies)
-    if (!b->slumber.asleep && has_dues(*b) && !b->dynamics->take_contact()) all = false;
+    if (!b->sleep_state.asleep && has_dues(*b) && !b->dynamics->take_contact()) all = false;
   step.guard.again = step.guard.again || !all;
   return all;
 }
@@ -238,7 +238,7 @@ bool short_enough(World &w, StepContext &step) {
   if (!any_bounds_contact(w)) return true;
   double longest = std::numeric_limits<double>::infinity(), parts = 1;
   const auto look = [&](uint32_t slot) {
-    if (slot != kNone && !w.bodies[slot]->slumber.asleep)
+    if (slot != kNone && !w.bodies[slot]->sleep_state.asleep)
       longest = std::min(longest, w.bodies[slot]->dynamics->contact_step());
   };
   for (const ContactPoint &c : step.contacts) {
@@ -253,7 +253,7 @@ bool short_enough(World &w, StepContext &step) {
   while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
   if (parts == 1) return true;
   Guard &g = step.guard;
-  bound_is_due(w);
+  expire_bound(w);
   if (step.h == g.planned && g.finer == 1) {
     g.finer = parts;
     g.refines = true;
@@ -292,7 +292,7 @@ bool cut_at_landing(World &w, StepContext &step) {
 }  // namespace
 
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
-  ask_pre_solve(w, step);
+  call_pre_solve(w, step);
   if (!contacts_taken(w, step) || !short_enough(w, step)) return false;
   step.passes = step.sweeps = 0;
   step.residual = {};
@@ -310,18 +310,18 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   add_up(step);
   for (const SolveIsland &own : step.solve_islands->all())
     if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
-  double poison = 0;
-  for (double l : step.rows.impulse) poison += 0.0 * l;
-  if (bad || poison != 0) {
-    *trouble |= bad ? tell_failed_solve(w, step, bad->bad, bad->batches.failed())
-                    : tell_failed_solve(w, step, nullptr, kNone);
+  double nan_flag = 0;
+  for (double l : step.rows.impulse) nan_flag += 0.0 * l;
+  if (bad || nan_flag != 0) {
+    *trouble |= bad ? report_failed_solve(w, step, bad->bad, bad->batches.failed())
+                    : report_failed_solve(w, step, nullptr, kNone);
     return false;
   }
   step.bond_impulse.assign(step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n,
                            step.rows.impulse.end());
   // laws may have been evaluated at slips that differ from the solution
   std::swap(step.state.vt, step.state.slip);
-  find_owed(w, step);
+  update_stick_drift(w, step);
   w.stats.passes = step.passes;
   w.stats.sweeps = step.sweeps;
   w.stats.residual = step.residual.speed;

@@ -76,12 +76,13 @@ void solve_rigid(StepContext &step, SolveIsland &own, double least, double norma
 }
 
 // Evaluates the laws at the present state, and its residual. False: a law has failed.
-bool ask(const World &w, StepContext &step, SolveIsland &own) {
+bool evaluate_laws(const World &w, StepContext &step, SolveIsland &own) {
   spend(w, step, own.spent, 4 * uint64_t{own.part.all()});
   const double *const response = step.rows.wt.data();
   set_trial(step.rows, own.part, step.h, response, step.state);
   // The sweeps are the next Newton step: from a slip with an error of 1e-2 they reach one of 1e-4.
-  if ((own.bad = own.batches.answer(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
+  if ((own.bad =
+           own.batches.evaluate_local(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
     return false;
   if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
   ++own.passes;
@@ -91,7 +92,7 @@ bool ask(const World &w, StepContext &step, SolveIsland &own) {
 // m/s, what normals may be off by.
 double normal_tolerance(const World &w, const StepContext &step, const SolveIsland &own) {
   // static mode: no later sub-step corrects what this solve leaves
-  if (w.prescribed.stands()) return tangent_at_rest(w, step.h);
+  if (w.prescribed.is_static()) return tangent_at_rest(w, step.h);
   return (own.batches.remembers() ? kRememberedShare : 1) * normal_at_rest(w, step.h);
 }
 
@@ -99,7 +100,7 @@ double normal_tolerance(const World &w, const StepContext &step, const SolveIsla
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
   own.laws.begin(w, step, own);
   if (own.implicit) begin_newton(step, own);
-  if (ask(w, step, own)) own.laws.slopes();
+  if (evaluate_laws(w, step, own)) own.laws.slopes();
 }
 
 // m/s, of the velocities of bodies: that of the contact that needs most.
@@ -112,11 +113,11 @@ double motion_tolerance(const SolveIsland &own) {
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
-  const bool stands = w.prescribed.stands(), memory = own.batches.remembers();
+  const bool is_static = w.prescribed.is_static(), memory = own.batches.remembers();
   const ToleranceBounds bounds{least,
-                               own.implicit || stands ? least
-                               : memory               ? kRememberedRest * least
-                                                      : normal,
+                               own.implicit || is_static ? least
+                               : memory                  ? kRememberedRest * least
+                                                         : normal,
                                normal};
   const auto allow = [&] {
     set_tolerance(step.rows, own.part, step.contacts, step.h, bounds, step.solve_islands->sides(),
@@ -124,7 +125,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   };
   allow();
   if (own.all_rigid) tighten(step.rows, own);
-  ask_slip_back(w, step, own);
+  find_slip_back(w, step, own);
   if (step.capture) own.problem = take_problem(w, step, own);
   if (!own.implicit) {
     const SweepLimits limits{w.def.max_sweeps, w.def.max_passes, start_residual(step, own)};
@@ -148,9 +149,9 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 
 }  // namespace
 
-bool IslandLaws::answer(const double *response) {
-  own_->bad =
-      own_->batches.answer(step_->h, response, 0.1 * tangent_at_rest(*w_, step_->h), 1e-3, step_->state);
+bool IslandLaws::evaluate_local(const double *response) {
+  own_->bad = own_->batches.evaluate_local(step_->h, response, 0.1 * tangent_at_rest(*w_, step_->h), 1e-3,
+                                           step_->state);
   return !own_->bad;
 }
 
@@ -161,7 +162,7 @@ bool IslandLaws::slopes() {
 }
 
 bool IslandLaws::judge(Residual &residual) {
-  if (!ask(*w_, *step_, *own_)) return false;
+  if (!evaluate_laws(*w_, *step_, *own_)) return false;
   residual = own_->residual = true_residual(step_->rows, own_->part, step_->state, step_->h, own_->tolerance);
   return true;
 }
@@ -238,7 +239,7 @@ void SolveIslands::find(const World &w, StepContext &step) {
   set_sides(step, static_cast<uint32_t>(w.bodies.size()), of_contacts);
   find_cuts(w, step);
   while (islands_.size() < count_) islands_.emplace_back(memory_);
-  give_rows(of_contacts);
+  assign_rows(of_contacts);
   sort_blocks(step.rows.blocks);
   prepare(w, step);
   std::sort(order_.begin(), order_.end(), [&](uint32_t l, uint32_t r) {
@@ -281,7 +282,7 @@ void SolveIslands::split(std::span<const Pair> pairs, Array<RowRun> &out) {
   }
 }
 
-void SolveIslands::give_rows(size_t of_contacts) {
+void SolveIslands::assign_rows(size_t of_contacts) {
   const auto rows_of = [](std::span<const RowRun> runs) {
     uint32_t n = 0;
     for (const RowRun &r : runs) n += r.n;

@@ -32,7 +32,7 @@ class IslandLaws final : public SolveLaws {
     step_ = &step;
     own_ = &own;
   }
-  bool answer(const double *response) override;
+  bool evaluate_local(const double *response) override;
   bool slopes() override;
   bool judge(Residual &residual) override;
   void spend(uint64_t rows) override;
@@ -60,7 +60,7 @@ struct SolveIsland {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
   bool failed = false;        // no velocities were found: a model cannot tell its forces
-  bool owes = false;          // contacts of it owe slip (stuck_slip.h)
+  bool drifts = false;        // contacts of it owe slip (stuck_slip.h)
   std::vector<double> swept;  // [rows,3] N s, scratch
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
@@ -122,7 +122,7 @@ class SolveIslands {
     return {all.data() + begin, begin_[island] - begin};
   }
   // Each island gets its contacts and bonds.
-  void give_rows(size_t of_contacts);
+  void assign_rows(size_t of_contacts);
   void sort_blocks(const Array<ContactRows::Block> &blocks);  // by island
   void prepare(const World &w, StepContext &step);            // each island, with its blocks and laws
 };

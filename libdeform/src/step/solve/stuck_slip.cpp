@@ -30,13 +30,13 @@ namespace {
 
 // All at once would be a velocity as large as the error, which the next solve stops again.
 constexpr double kShare = 0.4;
-constexpr double kMost = 0.5;  // of the tolerance
+constexpr double kMax = 0.5;  // of the tolerance
 
 bool is_projection(const LawInstance &law) { return law.ops->flags & DFM_FRIC_SET_VALUED; }
 
 // An equilibrium leaves nothing over.
 bool holds_places(const World &w) {
-  if (w.prescribed.stands()) return false;
+  if (w.prescribed.is_static()) return false;
   return std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(),
                      [](const LawInstance *law) { return is_projection(*law); });
 }
@@ -54,51 +54,51 @@ Vec3 at_most(double most, Vec3 v) {
 
 }  // namespace
 
-void reset_owed(const World &w, StepContext &step) {
+void reset_stick_drift(const World &w, StepContext &step) {
   const size_t n = holds_places(w) ? step.contacts.size() : 0;
-  step.asked_back.resize(2 * n);
-  step.owed.assign(3 * n, 0.0);
+  step.slip_back.resize(2 * n);
+  step.stick_drift.assign(3 * n, 0.0);
 }
 
 // Newton's method has its multipliers for that.
-void ask_slip_back(const World &w, StepContext &step, SolveIsland &own) {
-  own.owes = false;
-  if (own.implicit || step.owed.empty()) return;
-  double *const owed = step.owed.data(), *const asked = step.asked_back.data();
-  bool owes = false;
+void find_slip_back(const World &w, StepContext &step, SolveIsland &own) {
+  own.drifts = false;
+  if (own.implicit || step.stick_drift.empty()) return;
+  double *const stick_drift = step.stick_drift.data(), *const requested = step.slip_back.data();
+  bool drifts = false;
   each_row(own.part.contacts, [&](uint32_t i) {
     if (i >= step.rows.soft()) return;
     const uint32_t m = step.match[i];
     if (m == kNone || w.store.law[m] != step.state.law[i]) return;
-    const double *const e = &w.store.owed[3 * size_t{m}];
-    store3(owed + 3 * size_t{i}, load3(e));
-    owes = owes || any(e);
+    const double *const e = &w.store.stick_drift[3 * size_t{m}];
+    store3(stick_drift + 3 * size_t{i}, load3(e));
+    drifts = drifts || any(e);
   });
-  own.owes = owes;
-  if (!owes) return;
+  own.drifts = drifts;
+  if (!drifts) return;
   const double rate = kShare / step.guard.planned;
   each_row(own.part.contacts, [&](uint32_t i) {
     if (i >= step.rows.soft()) return;
-    const Vec3 back = at_most(kMost * own.tolerance.tangent[i], rate * load3(owed + 3 * size_t{i}));
+    const Vec3 back = at_most(kMax * own.tolerance.tangent[i], rate * load3(stick_drift + 3 * size_t{i}));
     for (size_t k = 0; k < 2; ++k) {
       const double along = dot(load3(&step.rows.frame[size_t{9} * i + 3 + 3 * k]), back);
-      asked[2 * size_t{i} + k] = along;
+      requested[2 * size_t{i} + k] = along;
       step.rows.drive[3 * size_t{i} + 1 + k] -= along;
     }
   });
 }
 
 void restore_drive(StepContext &step, const SolveIsland &own) {
-  if (!own.owes) return;
+  if (!own.drifts) return;
   each_row(own.part.contacts, [&](uint32_t i) {
     for (size_t k = 0; k < 2 && i < step.rows.soft(); ++k)
-      step.rows.drive[3 * size_t{i} + 1 + k] += step.asked_back[2 * size_t{i} + k];
+      step.rows.drive[3 * size_t{i} + 1 + k] += step.slip_back[2 * size_t{i} + k];
   });
 }
 
 // What goes beyond the tolerance is a slide: the contact sticks where it has come to.
-void find_owed(const World &w, StepContext &step) {
-  if (step.owed.empty()) return;
+void update_stick_drift(const World &w, StepContext &step) {
+  if (step.stick_drift.empty()) return;
   ContactState &s = step.state;
   const uint8_t *const cut = step.solve_islands->of_cuts();
   for (const SolveIsland &own : step.solve_islands->all()) {
@@ -106,18 +106,18 @@ void find_owed(const World &w, StepContext &step) {
     each_row(own.part.contacts, [&](uint32_t i) {
       if (i >= step.rows.soft()) return;
       double &v1 = s.vt[i], &v2 = s.vt[s.stride + i];
-      double *const e = &step.owed[3 * size_t{i}];
+      double *const e = &step.stick_drift[3 * size_t{i}];
       const double r = step.tolerance.tangent[i];
       const bool sticks = s.mode[i] == 1 && step.rows.impulse[3 * size_t{i}] > 0 &&
                           v1 * v1 + v2 * v2 <= r * r && is_projection(*w.pairs.laws[s.law[i]]) &&
                           !(cut && cut[i]);
-      if (own.owes) {
-        v1 -= step.asked_back[2 * size_t{i}];
-        v2 -= step.asked_back[2 * size_t{i} + 1];
+      if (own.drifts) {
+        v1 -= step.slip_back[2 * size_t{i}];
+        v2 -= step.slip_back[2 * size_t{i} + 1];
       }
       const double *const t = &step.rows.frame[size_t{9} * i + 3];
       if (sticks) store3(e, load3(e) + step.h * (v1 * load3(t) + v2 * load3(t + 3)));
-      else if (own.owes) store3(e, Vec3{});
+      else if (own.drifts) store3(e, Vec3{});
     });
   }
 }

@@ -18,13 +18,13 @@ namespace {
 // An energy costs about as much as two sub-steps.
 constexpr uint32_t kEvery = 512;
 // So one check in this many sub-steps costs less than 1 %.
-constexpr uint32_t kLookCosts = 256;
+constexpr uint32_t kEvaluationCost = 256;
 // Share of the energy of the kick: stiff modes return a third of it on average as they calm down, and a check
 // sees it at one instant.
-constexpr double kGivesBack = 0.5;
+constexpr double kReturned = 0.5;
 // Stiff modes whose energy is all motion show it in the kick within a quarter of their period: the base is
 // taken over this time.
-constexpr uint32_t kSettles = 8;     // sub-steps
+constexpr uint32_t kWarmUp = 8;      // sub-steps
 constexpr double kRounding = 1e-12;  // of the sums that a balance is the difference of
 constexpr double kPositionDigits = 8 * 2.3e-16;
 // Share of the largest energy so far that a body that steps itself may gain. What such a model leaves out of
@@ -94,7 +94,7 @@ double rounding_of(const Body &b, double h, double potential, double kinetic, do
 }
 
 // For a body whose model sums over its points, so that a check takes no longer than a step.
-bool look_at_sums(const World &w, const StepContext &step, const Body &b, EnergyLook &out) {
+bool check_sums(const World &w, const StepContext &step, const Body &b, EnergySample &out) {
   if (!steps_itself(b) || hides(b) || books_loads(b)) return false;
   if (std::any_of(b.p.load.begin(), b.p.load.end(), [](double f) { return f != 0; })) return false;
   BodySums sums;
@@ -112,8 +112,8 @@ bool look_at_sums(const World &w, const StepContext &step, const Body &b, Energy
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
 // it may rise as stiff modes calm down. U of a body that flows is that after the flow at x: what flow
 // dissipates is still in U until the sub-step is committed.
-bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
-  if (look_at_sums(w, step, b, out)) return true;
+bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
+  if (check_sums(w, step, b, out)) return true;
   const Phyxels &p = b.p;
   b.dynamics->see_points();
   const bool load_booked = books_loads(b), ends = at_end(b);
@@ -136,9 +136,9 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   double elastic = 0;
   dfm_kin kin = b.dynamics->kin(w.time, 0);
   if (!ends && b.model.works(kFlow)) kin.state = b.model.state_out.data();
-  const OnBehalf speaks(b.name);
-  const auto ask = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
-  if (!hides(b) && b.model.call("energy", ask) != DFM_OK) return false;
+  const OnBehalf prefix(b.name);
+  const auto query = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
+  if (!hides(b) && b.model.call("energy", query) != DFM_OK) return false;
   elastic += b.dynamics->damper_energy(w.time);
   // the call came between its prediction and its commit, which may share memory with the result
   double again = 0;
@@ -149,14 +149,14 @@ bool look(World &w, const StepContext &step, Body &b, EnergyLook &out) {
   out = {kinetic,
          elastic,
          elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
-         kGivesBack * kick,
+         kReturned * kick,
          rounding_of(b, step.h, potential, kinetic, elastic, reach),
          true};
   return true;
 }
 
 // Each body by itself.
-void look_at_all(World &w, StepContext &step) {
+void sum_energies(World &w, StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(step.active.size());
   step.looks.resize(n);
   w.context->tasks.parallel_for(n, 1, [&](uint32_t begin, uint32_t end) {
@@ -309,14 +309,14 @@ double gain_at_end(const World &w, const StepContext &step, const Body &b) {
   gained -= work_of_contact(w, step, b, ends.v);
   double elastic = 0, elastic_end = 0;
   dfm_kin kin = b.dynamics->kin(w.time, 0);
-  const OnBehalf speaks(b.name);
-  const auto ask = [&](double &u) {
+  const OnBehalf prefix(b.name);
+  const auto query = [&](double &u) {
     return b.model.call("energy", [&] { return b.model.ops->energy(b.model.self, &kin, &u); }) == DFM_OK;
   };
-  if (!ask(elastic)) return 0;
+  if (!query(elastic)) return 0;
   kin.x = p.x_end.data();
   kin.v = p.v_end.data();
-  if (!ask(elastic_end)) return 0;
+  if (!query(elastic_end)) return 0;
   return (gained + elastic_end - elastic) / (had + elastic);
 }
 
@@ -352,17 +352,17 @@ void change_gravity(World &w, Vec3 gravity) {
 namespace {
 
 // Whether the energies are to be computed: after kEvery sub-steps, and earlier if a body moves much faster.
-bool check_due(const World &w, const StepContext &step) {
+bool needs_check(const World &w, const StepContext &step) {
   const double limit = w.def.energy_watch * w.stats.energy_max;
-  bool due = w.watch.age >= kEvery || pair_over(w);
+  bool needed = w.watch.age >= kEvery || pair_over(w);
   for (const uint32_t i : step.active) {
     const EnergyBook &e = w.bodies[i]->energy;
     const bool faster = step.free_kinetic[i] > 2 * e.kinetic + limit;
-    const bool wants_base = e.known < kSettles && (e.known > 0 || faster);
-    due = due || (watched(*w.bodies[i]) &&
-                  (e.known == kSettles ? faster : wants_base && w.watch.credit >= kLookCosts));
+    const bool wants_base = e.known < kWarmUp && (e.known > 0 || faster);
+    needed = needed || (watched(*w.bodies[i]) &&
+                        (e.known == kWarmUp ? faster : wants_base && w.watch.credit >= kEvaluationCost));
   }
-  return due;
+  return needed;
 }
 
 // The energies of all watched bodies, J, and what they have gained beyond what their books explain.
@@ -376,24 +376,24 @@ struct Balance {
 Balance take_balance(World &w, StepContext &step) {
   Balance out;
   auto &worst = out.worst;
-  look_at_all(w, step);
+  sum_energies(w, step);
   for (size_t k = 0; k < step.active.size(); ++k) {
     Body &b = *w.bodies[step.active[k]];
-    const EnergyLook &now = step.looks[k];
+    const EnergySample &now = step.looks[k];
     if (!now.known) continue;
     EnergyBook &e = b.energy;
     out.total += now.kinetic + now.elastic;
     if (unbooked(w, b)) continue;
-    const bool settled = e.known == kSettles, hidden = hides(b);
+    const bool warmed_up = e.known == kWarmUp, hidden = hides(b);
     const double rise = now.balance - e.base - now.rounding, share = w.def.energy_watch + allowed(b);
     // before the first check `base` is what a hidden energy may be
-    const double level = now.balance + now.gives_back + (hidden && !e.known ? e.base : 0);
-    if (settled && rise > 0) out.gain += rise;
-    if (settled && rise > share * w.stats.energy_max && rise > worst.rise) worst = {&b, rise, share};
+    const double level = now.balance + now.returned + (hidden && !e.known ? e.base : 0);
+    if (warmed_up && rise > 0) out.gain += rise;
+    if (warmed_up && rise > share * w.stats.energy_max && rise > worst.rise) worst = {&b, rise, share};
     // a hidden energy may give back what it takes
-    if (!settled) e.base = e.known ? std::max(e.base, level) : level;
+    if (!warmed_up) e.base = e.known ? std::max(e.base, level) : level;
     else if (!hidden) e.base = std::min(e.base, level);
-    e.known += !settled;
+    e.known += !warmed_up;
     // what contact takes away again included: it is compared with the same of later sub-steps
     e.kinetic = step.free_kinetic[step.active[k]];
   }
@@ -416,11 +416,11 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   double moving = 0;
   for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
   dfm_world_stats &s = w.stats;
-  if (!check_due(w, step)) {
+  if (!needs_check(w, step)) {
     s.energy_max = std::max(s.energy_max, moving);
     return true;
   }
-  w.watch.credit -= std::min(w.watch.credit, kLookCosts);
+  w.watch.credit -= std::min(w.watch.credit, kEvaluationCost);
   const Balance now = take_balance(w, step);
   const auto &worst = now.worst;
   if (w.watch.age == ~0u) s.energy_start = now.total;
@@ -437,9 +437,9 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
                static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(),
                worst.body->model.type->id, worst.rise, 100 * worst.share, largest));
   s.energy_max = std::max({s.energy_max, now.total, moving});
-  const std::string pair = tell_pair_gain(w);
-  w.watch.told = !pair.empty();
-  return w.watch.told ? stop_for_energy(w, trouble, pair) : true;
+  const std::string pair = describe_pair_gain(w);
+  w.watch.reported = !pair.empty();
+  return w.watch.reported ? stop_for_energy(w, trouble, pair) : true;
 }
 
 void book_energy(World &w, StepContext &step, double motion) {
@@ -464,7 +464,7 @@ void book_energy(World &w, StepContext &step, double motion) {
   w.watch.last_h = motion * step.h;
   w.watch.size_before = 0;
   if (w.watch.age <= kEvery) w.watch.age = std::min(w.watch.age + ages, kEvery);
-  w.watch.credit = std::min(w.watch.credit + ages, kMostCredit);
+  w.watch.credit = std::min(w.watch.credit + ages, kMaxCredit);
 }
 
 // Of a hidden elastic energy as much is left as was there: at most what the body had and was given, less what
@@ -498,13 +498,13 @@ void forget_energy(World &w) {
   for (auto &b : w.bodies) forget_energy(*b);
 }
 
-bool sound(const EnergyBook &e) {
-  return e.known <= kSettles && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 &&
+bool is_valid(const EnergyBook &e) {
+  return e.known <= kWarmUp && std::isfinite(e.base) && std::isfinite(e.work) && e.kinetic >= 0 &&
          std::isfinite(e.kinetic);
 }
 
-bool sound(const EnergyWatch &e) {
-  return (e.age <= kEvery || e.age == ~0u) && e.credit <= kMostCredit && e.last_h >= 0 &&
+bool is_valid(const EnergyWatch &e) {
+  return (e.age <= kEvery || e.age == ~0u) && e.credit <= kMaxCredit && e.last_h >= 0 &&
          std::isfinite(e.last_h);
 }
 

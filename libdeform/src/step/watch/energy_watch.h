@@ -14,8 +14,8 @@ struct World;
 struct Body;
 
 // The present state of a body, J.
-struct EnergyLook {
-  double kinetic = 0, elastic = 0, balance = 0, gives_back = 0, rounding = 0;
+struct EnergySample {
+  double kinetic = 0, elastic = 0, balance = 0, returned = 0, rounding = 0;
   bool known = false;  // else it is not watched, or its model did not answer
 };
 

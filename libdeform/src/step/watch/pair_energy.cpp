@@ -64,9 +64,9 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
   }
   u = Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&rows.drive[size_t(3) * i]);
   const bool smooth = law.form[i] == kSmoothLaw;
-  const double asked = law.ft[i] * law.slip[i] + law.ft[law.stride + i] * law.slip[law.stride + i];
+  const double dissipated = law.ft[i] * law.slip[i] + law.ft[law.stride + i] * law.slip[law.stride + i];
   const double along = remembers(w.pairs.laws[law.law[i]]) ? 0 : l[1] * u.y + l[2] * u.z;
-  return {l[0] * u.x + along, kOpens * l[0] * std::max(0.0, -rows.rate[i]), smooth ? step.h * asked : 0};
+  return {l[0] * u.x + along, kOpens * l[0] * std::max(0.0, -rows.rate[i]), smooth ? step.h * dissipated : 0};
 }
 
 // Bodies wedged in each other may bear any load that balances itself, and a solve may err in it: what
@@ -219,7 +219,7 @@ bool pair_over(const World &w) {
   });
 }
 
-std::string tell_pair_gain(World &w) {
+std::string describe_pair_gain(World &w) {
   const PairWork *worst = nullptr;
   double most = 1, limit = 0;
   for (const PairWork &p : w.work) {
@@ -231,7 +231,7 @@ std::string tell_pair_gain(World &w) {
     most = excess_of(p) / own;
   }
   if (!worst) return {};
-  const bool rubs = worst->rubbed > limit;
+  const bool slides = worst->rubbed > limit;
   const std::string sides =
       worst->a == worst->b ? format("body '%s' on itself", name_of(w, worst->a).c_str())
       : w.body(worst->b)
@@ -241,13 +241,13 @@ std::string tell_pair_gain(World &w) {
       format("%.3g J more than it has taken (limit: %.3g J; %.3g J is the largest energy so far)",
              excess_of(*worst), limit, w.stats.energy_max);
   const std::string law = law_of(w, *worst);
-  if (rubs)
+  if (slides)
     return format(
         "step %llu, %s: friction law '%s' has put in %s; its force must point against the slip: "
         "change the law or its parameters (energy_watch sets the limit, 0 switches the watch off)",
         static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), grown.c_str());
   const uint32_t a = slot_of(w, worst->a), o = w.body(worst->b) ? kNone : obstacle_slot_of(w, worst->b);
-  const std::string held = a != kNone && o != kNone ? tell_held_at(w, a, o) : std::string();
+  const std::string held = a != kNone && o != kNone ? describe_held_at(w, a, o) : std::string();
   return format("step %llu, %s: their contact (law '%s'%s) has put in %s; %s",
                 static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(),
                 models_of(w, *worst).c_str(), grown.c_str(),
@@ -259,12 +259,12 @@ std::string tell_pair_gain(World &w) {
 }
 
 void forget_pairs(World &w, uint64_t id) {
-  if (!w.watch.told) return;
+  if (!w.watch.reported) return;
   for (PairWork &p : w.work)
     if (id == 0 || p.a == id || p.b == id) p.made = p.rubbed = 0;
 }
 
-bool sound(const PairWork &p) {
+bool is_valid(const PairWork &p) {
   return std::isfinite(p.friction) && std::isfinite(p.rubbed) && std::isfinite(p.made) && p.made >= 0 &&
          p.apart <= 1;
 }

@@ -35,7 +35,7 @@ void book_pairs(World &w, StepContext &step);
 // Whether some pair has added more energy than the watch allows.
 bool pair_over(const World &w);
 // The message that names the pair and its friction law; empty if no pair is over the limit.
-std::string tell_pair_gain(World &w);
+std::string describe_pair_gain(World &w);
 // The host changes the body, or (id 0) a friction law. Sums restart only after a stop, because a host may
 // change something in every step.
 void forget_pairs(World &w, uint64_t id);

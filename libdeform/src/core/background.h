@@ -8,7 +8,7 @@
 
 namespace dfm {
 
-class Aside {
+class Background {
  public:
   class Job {
    public:
@@ -16,13 +16,13 @@ class Aside {
     virtual void run() noexcept = 0;
 
    private:
-    friend class Aside;
+    friend class Background;
     enum State { waits, runs, done, left };
     std::atomic<State> state_{waits};
   };
 
-  Aside();
-  ~Aside();  // waits for the job that runs; the others are dropped
+  Background();
+  ~Background();  // waits for the job that runs; the others are dropped
   // The job does not begin if no thread can be made, if the thread is suspended while it holds the list, or
   // in a child of fork(), where the thread is not.
   void start(std::shared_ptr<Job> job) noexcept;

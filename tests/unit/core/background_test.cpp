@@ -1,5 +1,5 @@
 // Jobs beside the steps: what a step does not wait for takes no memory.
-#include "core/aside.h"
+#include "core/background.h"
 
 #include <gtest/gtest.h>
 #if defined(__unix__)
@@ -17,7 +17,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-struct Waits final : dfm::Aside::Job {
+struct Waits final : dfm::Background::Job {
   std::atomic<bool> begun{false}, end{false};
   void run() noexcept override {
     begun = true;
@@ -25,30 +25,30 @@ struct Waits final : dfm::Aside::Job {
   }
 };
 
-TEST(Aside, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
+TEST(Background, JobThatIsLeft_IsDroppedBeforeTheThreadComesToIt) {
   const auto first = std::make_shared<Waits>();
-  dfm::Aside aside;
-  aside.start(first);
+  dfm::Background background;
+  background.start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   auto second = std::make_shared<Waits>();
-  aside.start(second);
-  EXPECT_FALSE(aside.finish(second, 0us));
+  background.start(second);
+  EXPECT_FALSE(background.finish(second, 0us));
   const std::weak_ptr<Waits> kept = second;
   second.reset();
   EXPECT_TRUE(kept.expired());
   first->end = true;
-  while (!aside.finish(first, 1s)) {}
+  while (!background.finish(first, 1s)) {}
 }
 
-TEST(Aside, WhatIsDropped_GoesOnTheThread_OneAtATime) {
+TEST(Background, WhatIsDropped_GoesOnTheThread_OneAtATime) {
   const auto first = std::make_shared<Waits>();
-  dfm::Aside aside;
-  aside.start(first);
+  dfm::Background background;
+  background.start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   std::thread::id freed_by[2];
   std::atomic<int> freed{0};
   for (std::thread::id &by : freed_by)
-    aside.drop(std::shared_ptr<int>(new int, [&](int *p) {
+    background.drop(std::shared_ptr<int>(new int, [&](int *p) {
       delete p;
       by = std::this_thread::get_id();
       ++freed;
@@ -62,7 +62,7 @@ TEST(Aside, WhatIsDropped_GoesOnTheThread_OneAtATime) {
 
 // On machines that tell how much of the time a thread works.
 #if defined(__linux__)
-struct Computes final : dfm::Aside::Job {
+struct Computes final : dfm::Background::Job {
   static double own_time() {
     timespec t{};
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -77,14 +77,14 @@ struct Computes final : dfm::Aside::Job {
 
 // It is waited for beyond the patience while it has a core. What is not waited for had less than half of the
 // last millisecond, since others took the core.
-TEST(Aside, JobThatRuns_IsWaitedFor) {
+TEST(Background, JobThatRuns_IsWaitedFor) {
   const auto job = std::make_shared<Computes>();
-  dfm::Aside aside;
-  aside.start(job);
+  dfm::Background background;
+  background.start(job);
   while (!(job->took > 0)) std::this_thread::sleep_for(100us);
   const auto begin = std::chrono::steady_clock::now();
   const double had = job->took;
-  const bool done = aside.finish(job, 1ms);
+  const bool done = background.finish(job, 1ms);
   const double did = job->took - had;
   const std::chrono::duration<double> time = std::chrono::steady_clock::now() - begin;
   if (!done) {
@@ -95,38 +95,38 @@ TEST(Aside, JobThatRuns_IsWaitedFor) {
 
 #if defined(__unix__)
 // The child has the list, but not the thread: it does the job itself, and ends.
-TEST(Aside, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
+TEST(Background, InAChildOfFork_BeginsNothingAndIsNotWaitedFor) {
   const auto first = std::make_shared<Waits>();
-  dfm::Aside *aside = new dfm::Aside;
-  aside->start(first);
+  dfm::Background *background = new dfm::Background;
+  background->start(first);
   while (!first->begun) std::this_thread::sleep_for(1ms);
   first->end = true;
-  while (!aside->finish(first, 1s)) {}
+  while (!background->finish(first, 1s)) {}
   const pid_t child = fork();
   ASSERT_GE(child, 0);
   if (child == 0) {
     alarm(10);  // ends a child that waits for what is not there
     const auto job = std::make_shared<Waits>();
-    aside->start(job);
-    const bool done = aside->finish(job, 1ms);
-    delete aside;
+    background->start(job);
+    const bool done = background->finish(job, 1ms);
+    delete background;
     _exit(done || job->begun ? 1 : 0);
   }
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
   EXPECT_EQ(status, 0);
-  delete aside;
+  delete background;
 }
 #endif
 
-TEST(Aside, JobThatSleeps_IsNotWaitedFor) {
+TEST(Background, JobThatSleeps_IsNotWaitedFor) {
   const auto job = std::make_shared<Waits>();
-  dfm::Aside aside;
-  aside.start(job);
+  dfm::Background background;
+  background.start(job);
   while (!job->begun) std::this_thread::sleep_for(1ms);
-  EXPECT_FALSE(aside.finish(job, 5ms));
+  EXPECT_FALSE(background.finish(job, 5ms));
   job->end = true;
-  while (!aside.finish(job, 1s)) {}
+  while (!background.finish(job, 1s)) {}
 }
 
 }  // namespace

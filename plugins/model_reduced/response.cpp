@@ -19,10 +19,10 @@ void Body::arm(const dfm_kin &k, uint32_t s, double *r) const {
   }
 }
 
-// answer_ = rates of the modes by impulses at all surfels; sum and moment of these, floating.
+// modal_ = rates of the modes by impulses at all surfels; sum and moment of these, floating.
 void Body::take_impulses(const dfm_kin &k, const double *p, double *sum, double *moment) {
   const size_t count = modes_.count;
-  std::fill(answer_.data(), answer_.data() + count, 0.0);
+  std::fill(modal_.data(), modal_.data() + count, 0.0);
   for (uint32_t s = 0; s < nsurfel_; ++s) {
     const double *const impulse = p + 3 * size_t(s);
     if (impulse[0] == 0 && impulse[1] == 0 && impulse[2] == 0) continue;
@@ -35,9 +35,9 @@ void Body::take_impulses(const dfm_kin &k, const double *p, double *sum, double 
     transposed_product(at_.r, impulse, local);
     const double *const w = surface_.data() + 3 * size_t(s) * count;
     for (size_t m = 0; m < count; ++m)
-      answer_[m] += (local[0] * w[m] + local[1] * w[count + m]) + local[2] * w[2 * count + m];
+      modal_[m] += (local[0] * w[m] + local[1] * w[count + m]) + local[2] * w[2 * count + m];
   }
-  for (size_t m = 0; m < count; ++m) answer_[m] *= softened_[m];
+  for (size_t m = 0; m < count; ++m) modal_[m] *= softened_[m];
 }
 
 // rows_ = J of these surfels, [3 n, width].
@@ -100,9 +100,9 @@ void Body::respond(const dfm_kin &k, uint32_t n, const uint32_t *surfel, uint32_
   for (uint32_t first = 0; first < nrhs; first += kLanes) {
     const uint32_t many = std::min<uint32_t>(kLanes, nrhs - first);
     weigh(n, many, p + size * first);
-    elastic_.kernels->rows(rows_.data(), size, width, lanes_.data(), answers_.data());
+    elastic_.kernels->rows(rows_.data(), size, width, lanes_.data(), responses_.data());
     for (size_t l = 0; l < many; ++l)
-      for (size_t j = 0; j < size; ++j) du[size * (first + l) + j] = answers_[kLanes * j + l];
+      for (size_t j = 0; j < size; ++j) du[size * (first + l) + j] = responses_[kLanes * j + l];
   }
   if (!condensed_) return;
   if (!can_be_late()) find_columns(n, surfel);
@@ -146,8 +146,8 @@ void Body::make_columns(size_t many, const size_t *wanted) {
   elastic_.compliance_of_eight(f, f);
   for (size_t l = 0; l < many; ++l) {
     const double *const w = surface_.data() + wanted[l] * modes_.count;
-    for (uint32_t k = 0; k < modes_.count; ++k) answer_[k] = w[k] / modes_.lambda[k];
-    const double *const in[] = {answer_.data()};
+    for (uint32_t k = 0; k < modes_.count; ++k) modal_[k] = w[k] / modes_.lambda[k];
+    const double *const in[] = {modal_.data()};
     double *const out[] = {w_.data()};
     modes_.shape.expand(1, in, out);
     double *const column = columns_.data() + size() * wanted[l];
@@ -177,10 +177,10 @@ void Body::find_near_response() {
   check_size(nfree_, nfree_);
   near_response_.create_raw(host, rows * rows);
   elastic_.compliance_between(nfree_, point_.data(), near_response_.data());
-  const double *const in[] = {answer_.data()};
+  const double *const in[] = {modal_.data()};
   double *const out[] = {near_x_.data()};
   for (size_t j = 0; j < rows; ++j) {
-    for (uint32_t k = 0; k < count; ++k) answer_[k] = near_shape_.at(j, k) / modes_.lambda[k];
+    for (uint32_t k = 0; k < count; ++k) modal_[k] = near_shape_.at(j, k) / modes_.lambda[k];
     near_shape_.expand(1, in, out);
     for (size_t i = 0; i < rows; ++i) near_response_[rows * j + i] -= near_x_[i];
   }

@@ -1,4 +1,4 @@
-#include "core/aside.h"
+#include "core/background.h"
 
 #include <algorithm>
 #include <deque>
@@ -53,7 +53,7 @@ class Worked {
 #endif
 };
 
-struct Dropped : Aside::Job {
+struct Dropped : Background::Job {
   std::shared_ptr<void> what;
   explicit Dropped(std::shared_ptr<void> &&w) : what(std::move(w)) {}
   void run() noexcept override { what.reset(); }
@@ -61,7 +61,7 @@ struct Dropped : Aside::Job {
 
 }  // namespace
 
-struct Aside::Room {
+struct Background::Room {
   std::mutex mutex;  // of the list
   std::condition_variable begin;
   std::deque<std::shared_ptr<Job>> jobs;
@@ -98,9 +98,9 @@ struct Aside::Room {
   }
 };
 
-Aside::Aside() : room_(std::make_unique<Room>()) {}
+Background::Background() : room_(std::make_unique<Room>()) {}
 
-Aside::~Aside() {
+Background::~Background() {
   if (room_->of_process != forks()) {  // the thread cannot be joined, nor what it waits for destroyed
     (void)room_.release();
     return;
@@ -113,7 +113,7 @@ Aside::~Aside() {
   if (room_->thread.joinable()) room_->thread.join();
 }
 
-void Aside::start(std::shared_ptr<Job> job) noexcept {
+void Background::start(std::shared_ptr<Job> job) noexcept {
   if (room_->of_process != forks()) return;
   try {
     if (!room_->thread.joinable()) room_->thread = std::thread([this] { room_->work(); });
@@ -127,7 +127,7 @@ void Aside::start(std::shared_ptr<Job> job) noexcept {
   }
 }
 
-bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds patience) {
+bool Background::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds patience) {
   Job::State state = Job::waits;
   if (job->state_.compare_exchange_strong(state, Job::left)) {
     // Its memory is not held until the thread comes to it.
@@ -151,7 +151,7 @@ bool Aside::finish(const std::shared_ptr<Job> &job, std::chrono::microseconds pa
   return job->state_ == Job::done;
 }
 
-void Aside::drop(std::shared_ptr<void> what) noexcept {
+void Background::drop(std::shared_ptr<void> what) noexcept {
   if (dropped_) finish(dropped_, std::chrono::microseconds(0));
   dropped_.reset();
   try {

@@ -137,14 +137,14 @@ bool SettlingPoints::free_motion(const SubStep &now, double &) {
   guess_ = p_.v_free;
   if (!found || !solve(impulse_, taken_)) return false;
   stiffest_ = largest_diagonal() / (now.h * now.h);
-  double poison = 0;
+  double nan_flag = 0;
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) {
       const size_t at = size_t{kStride} * i + c;
       p_.v_free[at] -= taken_[size_t{3} * i + c];
-      poison += 0.0 * p_.v_free[at];
+      nan_flag += 0.0 * p_.v_free[at];
     }
-  return poison == 0;
+  return nan_flag == 0;
 }
 
 bool SettlingPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
@@ -175,8 +175,8 @@ constexpr uint32_t kRounds = 4;   // of relaxation
 constexpr uint32_t kRefused = 8;  // consecutive failed steps
 // A body whose step goes back by more than this share of the step before is slowed where it is touched; if it
 // goes on by more than that, it is slowed less, by this factor. Limit on the share that counts.
-constexpr double kOvershoots = 0.5, kSpeedsUp = 0.5, kMostOvershoot = 2;
-constexpr double kMostSlowed = 1e3;
+constexpr double kOvershoots = 0.5, kSpeedsUp = 0.5, kMaxOvershoot = 2;
+constexpr double kMaxSlowed = 1e3;
 constexpr double kAway = 10;  // of its size: a body in contact that has moved so far keeps sliding
 
 class Settling {
@@ -195,7 +195,7 @@ class Settling {
     stats_ = w.stats;
     steps_ = w.step_count;
     sizes_ = w.sizes;
-    aside_ = w.overlaps.aside;
+    suspended_ = w.overlaps.suspended;
     def_ = w.def;
     exchange();
     wake_all(w_);  // adds the contact impulses of the meantime
@@ -209,14 +209,14 @@ class Settling {
     w_.def = def_;
     w_.prescribed = {};
     w_.changed = true;
-    if (!done_) w_.overlaps.aside.swap(aside_);
+    if (!done_) w_.overlaps.suspended.swap(suspended_);
     try {
       set_gravity_now(w_);
       prepare(w_);
     } catch (...) {  // no memory for the tables: they are made at the next use
     }
     if (done_) return;
-    put_back(w_, step_, before_);
+    restore_start(w_, step_, before_);
     w_.events.swap(earlier_);
     for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
   }
@@ -297,7 +297,7 @@ class Settling {
 
   // Number of steps with all prescribed motions at their end.
   uint32_t come_to_rest(const Station &to) {
-    stand_still();
+    stop_motion();
     weigh_all(kLongest);
     double longest = kLongest;
     uint32_t refused = 0, before = 0;
@@ -313,7 +313,7 @@ class Settling {
       const double off = h * w_.stats.residual / w_.offset;  // of contacts, relative to the rest distance
       w_.time = w_.prescribed.at(w_.time);
       const bool there = w_.time >= to.time;
-      stand_still();
+      stop_motion();
       ++info_.iterations;
       if (there) ++steps;
       if (taken) refused = 0;
@@ -359,7 +359,7 @@ class Settling {
     }
     const double overshoot = square > 0 ? -both / square : 0;
     if (overshoot > kOvershoots)
-      one.slowed = std::min(one.slowed + (1 + one.slowed) * std::min(overshoot, kMostOvershoot), kMostSlowed);
+      one.slowed = std::min(one.slowed + (1 + one.slowed) * std::min(overshoot, kMaxOvershoot), kMaxSlowed);
     else if (overshoot < -kOvershoots) one.slowed *= kSpeedsUp;
     if (one.slowed > 0) one.points->slow_touched(one.slowed);
   }
@@ -386,10 +386,10 @@ class Settling {
                                     largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride));
   }
 
-  void stand_still() {
+  void stop_motion() {
     for (auto &b : w_.bodies) {
       std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
-      settle_dampers(b->p);
+      relax_dampers(b->p);
       b->dynamics->points_changed();
     }
   }
@@ -407,14 +407,14 @@ class Settling {
     sum_loads(one);
     const Phyxels &p = one.body->p;
     if (!one.rest->add_forces(w_.time, h)) one.left = HUGE_VAL;
-    double poison = 0;
+    double nan_flag = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
       most = std::max(most, std::fabs(p.f[at]));
       if (!one.last.empty()) one.moved = std::max(one.moved, std::fabs(p.x[at] - one.last[at]));
-      poison += 0.0 * p.f[at];
+      nan_flag += 0.0 * p.f[at];
     }
-    if (poison != 0) one.left = HUGE_VAL;
+    if (nan_flag != 0) one.left = HUGE_VAL;
   }
 
   // Writes loads and contact forces into points().f and sums them. Components that are held at some point do
@@ -559,20 +559,20 @@ class Settling {
   uint64_t steps_ = 0;
   StepSizes sizes_;
   std::vector<dfm_contact_event> earlier_;  // before the search
-  decltype(Overlaps::aside) aside_;
+  decltype(Overlaps::suspended) suspended_;
   dfm_world_def def_{};
   bool done_ = false;
 };
 
 }  // namespace
 
-void settle(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
+void find_contact_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
   {
     Settling search(w, def, info);
     search.run(def.load_steps ? def.load_steps : 1);
   }
   forget_energy(w);
-  for (auto &b : w.bodies) settle_changes(*b);
+  for (auto &b : w.bodies) clear_change_energy(*b);
   w.bound.age = kNone;
   ++w.placements;
 }
