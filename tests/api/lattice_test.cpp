@@ -265,6 +265,6 @@ TEST(Lattice, WhatCannotBeOne_SaysSo) {
   reported(R"("mesh": "ball.stl", "lattice": {})", {"/bodies/0/lattice", "either \"cells\"", "\"size\""});
   reported(R"("mesh": "ball.stl", "lattice": {"cells": 8, "size": 0.1})", {"/bodies/0/lattice", "either"});
   reported(R"("mesh": "ball.stl", "lattice": {"cells": 8}, "fill": {"cells": 80})",
-       {"/bodies/0/lattice", "\"fill\" too"});
+           {"/bodies/0/lattice", "\"fill\" too"});
   reported(R"("mesh": "ball.stl", "lattice": {"size": 1})", {"/bodies/0/lattice", "larger than the surface"});
 }

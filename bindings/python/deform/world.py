@@ -122,9 +122,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
     def __init__(self, gravity: Sequence[float] = (0, 0, -9.81), *, integrator: str = "auto",
                  step: float = 0, sleep: bool = False, self_contact: str = "off",
                  effects: Iterable[str] | None = None, contact_offset: float = 0, max_substeps: int = 10000,
-                 max_sweeps: int = 200, max_time: float = 0, untangle: bool = False, solver: str | None = None,
-                 energy_watch: float = 0.01, recovery_speed: float = 0, obstacle_speed: float = 0,
-                 threads: int = 1, context: Context | None = None):
+                 max_sweeps: int = 200, max_time: float = 0, untangle: bool = False,
+                 solver: str | None = None, energy_watch: float = 0.01, recovery_speed: float = 0,
+                 obstacle_speed: float = 0, threads: int = 1, context: Context | None = None):
         if context is None:
             threads = whole(threads, "threads")
             context = default_context() if threads == 1 else Context(threads)

@@ -87,8 +87,8 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
   for (bool fresh : {false, true}) {
     if (!fresh && !factored_) continue;
     if (fresh && !refactor()) return false;
-    const Gmres::Result found = gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance,
-                                           set_.inner, by, precondition);
+    const Gmres::Result found =
+        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, set_.inner, by, precondition);
     products_ += found.iterations;
     if (fresh || found.left <= tolerance) break;
   }

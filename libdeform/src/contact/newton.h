@@ -135,8 +135,8 @@ class ContactNewton {
   bool found_ = false;
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
-  uint32_t limit_ = 0;             // on steps_
-  uint32_t reported_ = 0;              // of products_, to the host
+  uint32_t limit_ = 0;     // on steps_
+  uint32_t reported_ = 0;  // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
   void list_rows();
