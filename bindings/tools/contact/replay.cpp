@@ -58,7 +58,7 @@ class Replay final : public SolveLaws {
     set_trial(p_.rows, part_, p_.h, p_.rows.wt.data(), p_.state);
     if (batches_.evaluate_local(p_.h, p_.rows.wt.data(), 0.1 * p_.rest, 1e-2, p_.state)) return false;
     linearize(p_.rows, part_, p_.h, p_.state);
-    residual = true_residual(p_.rows, part_, p_.state, p_.h, tolerance_);
+    residual = residual_of(p_.rows, part_, p_.state, p_.h, tolerance_);
     return true;
   }
   void spend(uint64_t) override {}

@@ -88,7 +88,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     if (!fresh && !factored_) continue;
     if (fresh && !refactor()) return false;
     const Gmres::Result found =
-        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, set_.inner, by, precondition);
+        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, set_.products, by, precondition);
     products_ += found.iterations;
     if (fresh || found.left <= tolerance) break;
   }
@@ -130,7 +130,7 @@ bool ContactNewton::frozen_steps() {
     // the share of the way at which the slope has nearly gone, between one where it is negative and one where
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
-    for (uint32_t trial = 0; trial < set_.inner; ++trial) {
+    for (uint32_t trial = 0; trial < set_.trials; ++trial) {
       move(share);
       const bool known = evaluate(true);
       const double now = known ? slope() : std::numeric_limits<double>::infinity();

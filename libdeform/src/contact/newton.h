@@ -37,7 +37,8 @@ struct NewtonSettings {
   double linear = 1e-2;       // relative residual of the linear system of a Newton step, at most
   double contradiction = 20;  // of the tolerance, by which normals may miss what velocities no longer follow
   uint32_t rounds = 3;        // in a row, after which passes are slow, steps go round, or rows contradict
-  uint32_t inner = 12;        // the limit on products of a Newton step and on trials of a line search
+  uint32_t products = 12;     // the limit on those of a Newton step; a kept factor that needs more is renewed
+  uint32_t trials = 24;       // of a line search; bodies near inversion take steps of a thousandth
 };
 
 // What a solve asks of the laws, and of the one who knows tolerances and budget.

@@ -284,7 +284,7 @@ bool ContactNewton::evaluate(bool frozen) {
       continue;
     }
     const uint32_t i = row_[k].row;
-    const double rho = rho_[2 * size_t{k}], slide = rho_[2 * size_t{k} + 1];
+    const double rho = rho_[2 * size_t{k}], rho_t = rho_[2 * size_t{k} + 1];
     const double *const lh = &lh_[3 * size_t{k}];
     double *const l = &l_[3 * size_t{k}];
     std::copy_n(lh, 3, l);
@@ -295,8 +295,8 @@ bool ContactNewton::evaluate(bool frozen) {
     s.fn[i] = (frozen && smooth ? frozen_[k] : l[0]) / h_;
     s.vt[i] = s.slip[i] = u.y;
     s.vt[stride + i] = s.slip[stride + i] = u.z;
-    s.ft_stop[i] = (lh[1] - slide * u.y) / h_;
-    s.ft_stop[stride + i] = (lh[2] - slide * u.z) / h_;
+    s.ft_stop[i] = (lh[1] - rho_t * u.y) / h_;
+    s.ft_stop[stride + i] = (lh[2] - rho_t * u.z) / h_;
     laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
   }
   if (finite != 0 || (laws && !host_->evaluate_local(response_.data()))) return false;
@@ -304,11 +304,11 @@ bool ContactNewton::evaluate(bool frozen) {
     double *const l = &l_[3 * size_t{k}];
     if (row_[k].kind == Kind::contact) {
       const uint32_t i = row_[k].row;
-      const double slide = rho_[2 * size_t{k} + 1];
-      if (slide > 0 && s.fn[i] > 0 && s.form[i] == kSmoothLaw) {
+      const double rho_t = rho_[2 * size_t{k} + 1];
+      if (rho_t > 0 && s.fn[i] > 0 && s.form[i] == kSmoothLaw) {
         l[1] = h_ * s.ft[i];
         l[2] = h_ * s.ft[stride + i];
-      } else if (slide > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
+      } else if (rho_t > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
         const double radius = frozen ? frozen_[k] : h_ * s.limit[i];
         const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[stride + i], all = std::sqrt(a * a + b * b);
         const double share = all > radius ? radius / all : 1;
@@ -343,7 +343,7 @@ bool ContactNewton::find_slopes(bool frozen) {
   for (uint32_t k = 0; k < row_.size(); ++k) {
     const uint32_t i = row_[k].row;
     double *const G = &slope_[9 * size_t{k}];
-    const double rho = rho_[2 * size_t{k}], slide = rho_[2 * size_t{k} + 1];
+    const double rho = rho_[2 * size_t{k}], rho_t = rho_[2 * size_t{k} + 1];
     const double *const l = &l_[3 * size_t{k}];
     if (!(rho > 0)) continue;
     if (row_[k].kind != Kind::contact) {
@@ -367,10 +367,10 @@ bool ContactNewton::find_slopes(bool frozen) {
       normal = gives > 0 && gives < compliance[1] ? 1 / (1 / rho + compliance[0]) : rho;
       G[0] = normal;
     }
-    if (!(slide > 0)) continue;
+    if (!(rho_t > 0)) continue;
     if (s.form[i] == kSmoothLaw && s.fn[i] > 0) {
       const Slope d = dissipative_slope(s, i);
-      const double t = h_ / slide;
+      const double t = h_ / rho_t;
       const double m11 = 1 - t * d.a, m22 = 1 - t * d.d, m12 = -t * d.b, m21 = -t * d.c,
                    det = m11 * m22 - m12 * m21;
       // X = (I - D/rho)^-1; G_tt = -X D, G_tn = X (dft/dfn) G_nn
@@ -388,10 +388,10 @@ bool ContactNewton::find_slopes(bool frozen) {
       if (!(radius > 0)) continue;
       const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[n + i], all = std::sqrt(a * a + b * b);
       if (all <= radius) {
-        G[4] = G[8] = slide;
+        G[4] = G[8] = rho_t;
         continue;
       }
-      const double t1 = a / all, t2 = b / all, across = slide * radius / all;
+      const double t1 = a / all, t2 = b / all, across = rho_t * radius / all;
       G[4] = across * t2 * t2;
       G[5] = G[7] = -across * t1 * t2;
       G[8] = across * t1 * t1;

@@ -242,8 +242,8 @@ Residual larger(const Residual &a, const Residual &b) {
           std::max(a.normal, b.normal)};
 }
 
-Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                        const Tolerance &tolerance) {
+Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                     const Tolerance &tolerance) {
   Residual r;
   if (part.alone)
     for (const RowRun &run : part.contacts)
@@ -253,12 +253,6 @@ Residual inner_residual(const ContactRows &rows, const RowsPart &part, const Con
                         h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
   else r = residual(rows, part, law.view(), h, tolerance);
   return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
-}
-
-// At the state at which a law was evaluated, the sweeps have its value.
-Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state,
-                       double h, const Tolerance &tolerance) {
-  return inner_residual(rows, part, laws_state, h, tolerance);
 }
 
 namespace {
@@ -279,9 +273,9 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
     const Vec3 u = rows.velocity(i);
-    const bool slides = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || laws_state.fn[i] > 0);
+    const bool friction = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || laws_state.fn[i] > 0);
     const double normal = normal_residual(rows, i, u);
-    const double tangent = slides ? tangent_residual(rows, i, law_response(rows, law, i, h, u)) : 0;
+    const double tangent = friction ? tangent_residual(rows, i, law_response(rows, law, i, h, u)) : 0;
     each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);
       d[1] = std::max({d[1], tangent, normal});

@@ -56,12 +56,9 @@ struct Tolerance {
   double *normal = nullptr, *tangent = nullptr;  // by contact of the rows
 };
 struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at rest, at rest, ever
-// of the linearized laws
-Residual inner_residual(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                        const Tolerance &tolerance);
-// with the laws evaluated at this state
-Residual true_residual(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state,
-                       double h, const Tolerance &tolerance);
+// Of the laws as they were last evaluated; between evaluations, as they were linearized there.
+Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &laws, double h,
+                     const Tolerance &tolerance);
 // of parts together
 Residual larger(const Residual &a, const Residual &b);
 

@@ -11,6 +11,8 @@ namespace {
 // Residual::relative is stricter than Residual::required. At most this many sweeps are spent on
 // it where the latter is met, because the next sub-step continues from there.
 constexpr uint32_t kPolish = 20;
+// A pass is solved to this fraction of what its laws are then judged by.
+constexpr double kPassFraction = 0.5;
 
 // Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
 // sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
@@ -22,7 +24,7 @@ class ResidualSchedule {
     return sweeps >= std::min({next_, kPolish, most}) || !part.blocks.empty();
   }
   void note(uint32_t sweeps, const Residual &left) {
-    const int size = std::ilogb(left.required);  // in halves
+    const int size = std::ilogb(left.required / kPassFraction);  // in halves
     const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
     const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
     next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMaxUnseen));
@@ -42,8 +44,8 @@ class ResidualSchedule {
 
 Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
-bool Sweeps::good(const Residual &left) const {
-  return left.relative <= 1 || (left.required <= 1 && count_ >= kPolish);
+bool Sweeps::good(const Residual &left, double fraction) const {
+  return left.relative <= fraction || (left.required <= fraction && count_ >= kPolish);
 }
 
 void Sweeps::sweep_once() {
@@ -59,9 +61,9 @@ bool Sweeps::pass() {
   for (ResidualSchedule schedule;;) {
     sweep_once();
     if (schedule.is_time(*part_, count_, most_)) {
-      const Residual left = inner_residual(*rows_, *part_, *state_, h_, *tolerance_);
+      const Residual left = residual_of(*rows_, *part_, *state_, h_, *tolerance_);
       if (!std::isfinite(left.required)) return false;
-      if (good(left) || count_ >= most_ || !laws_->goes_on()) return true;
+      if (good(left, kPassFraction) || count_ >= most_ || !laws_->goes_on()) return true;
       schedule.note(count_, left);
     }
     acceleration_.follow(*rows_, *part_);
@@ -88,7 +90,7 @@ bool Sweeps::solve(ContactRows &rows, const RowsPart &part, ContactState &state,
   for (uint32_t passes = 1;; ++passes) {
     // at least one sweep on a warm start is part of the method
     if (!pass()) return stop_sweeps();
-    if (!laws.judge(left) || good(left)) return true;
+    if (!laws.judge(left) || good(left, 1)) return true;
     const bool ends = !laws.goes_on();
     if (ends || count_ >= most_ || passes >= limits.passes) {
       if (left.required <= 1) return true;

@@ -35,7 +35,7 @@ class Sweeps {
 
   void sweep_once();
   bool pass();
-  bool good(const Residual &left) const;
+  bool good(const Residual &left, double fraction) const;
 };
 
 }  // namespace dfm

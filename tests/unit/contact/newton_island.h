@@ -139,7 +139,7 @@ class Laws final : public SolveLaws {
     set_trial(rows_, part_, h_, rows_.wt.data(), state_);
     evaluate_local(rows_.wt.data());
     linearize(rows_, part_, h_, state_);
-    residual = true_residual(rows_, part_, state_, h_, tolerance);
+    residual = residual_of(rows_, part_, state_, h_, tolerance);
     return true;
   }
   void spend(uint64_t) override {}

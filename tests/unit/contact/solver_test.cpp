@@ -149,7 +149,7 @@ TEST(Solver, OnePointThatMeetsAContactThatGives_KeepsWhatItGives) {
     EXPECT_NEAR(p.impulse(0).x, (1 - left) / 1.75, 1e-15) << most;
     EXPECT_NEAR(p.rows.velocity(0).x, -left, 1e-15) << most;
     const test::SameTolerance tolerance{1, 1e-9, 1e-9, 1e-9};
-    EXPECT_LT(inner_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).normal, 1e-15)
+    EXPECT_LT(residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).normal, 1e-15)
         << most;
   }
 }
@@ -206,8 +206,8 @@ TEST(Solver, ContactWithARigidBodyThatStands_IsSolvedAmongPoints) {
     sweep(quick.rows, points, quick.state, RowsCase::kStep);
     sweep(slow.rows, any, slow.state, RowsCase::kStep);
     ASSERT_EQ(quick.rows.impulse, slow.rows.impulse) << k;
-    EXPECT_EQ(inner_residual(quick.rows, points, quick.state, RowsCase::kStep, tolerance).required,
-              inner_residual(slow.rows, any, slow.state, RowsCase::kStep, tolerance).required);
+    EXPECT_EQ(residual_of(quick.rows, points, quick.state, RowsCase::kStep, tolerance).required,
+              residual_of(slow.rows, any, slow.state, RowsCase::kStep, tolerance).required);
   }
   EXPECT_GT(quick.impulse(0).x, 0);
 }
@@ -259,7 +259,7 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   p.rows.restore(p.rows.whole());
   p.request();
   const test::SameTolerance tolerance{3, 0.5, 0.25, 4 * 0.5};
-  const Residual found = true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance);
+  const Residual found = residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance);
   const std::vector<double> change = p.changes();
   double normal = 0;
   double tangent = 0;
@@ -282,7 +282,7 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   EXPECT_NEAR(found.required, std::max(normal / (4 * 0.5), share), 1e-12);
   // Where friction may be off by much, the normal residual alone decides: over what it may be off by, and at
   // most.
-  const Residual loose = true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep,
+  const Residual loose = residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep,
                                        test::SameTolerance{3, 0.5, 1e6, 4 * 0.5});
   EXPECT_NEAR(loose.relative, normal / 0.5, 1e-12);
   EXPECT_NEAR(loose.required, normal / (4 * 0.5), 1e-12);
@@ -294,7 +294,7 @@ TEST(Solver, Residual_OfASolutionVanishes) {
   for (int k = 0; k < 40; ++k) p.pass(20);
   p.request();
   const test::SameTolerance tolerance{3, 1e-6, 1e-6, 4 * 1e-6};
-  EXPECT_LT(true_residual(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).speed, 1e-11);
+  EXPECT_LT(residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).speed, 1e-11);
 }
 
 // Before: every sweep multiplied the impulses by the square of the slope, until they were infinite, and the
@@ -347,5 +347,5 @@ TEST(Sweep, ImpulseThatIsNoNumber_IsNotConverged) {
   g.rows.impulse[0] = NAN;
   g.rows.restore(g.rows.whole());
   const test::SameTolerance t{2, 1e-6, 1e-6, 1e-6};
-  EXPECT_EQ(inner_residual(g.rows, g.rows.whole(), g.law, 1e-3, t).required, INFINITY);
+  EXPECT_EQ(residual_of(g.rows, g.rows.whole(), g.law, 1e-3, t).required, INFINITY);
 }

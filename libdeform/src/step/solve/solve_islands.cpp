@@ -136,7 +136,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
     if (own.all_rigid) {
       solve_rigid(step, own, least, normal);
       allow();
-      if (!own.bad) own.residual = true_residual(step.rows, own.part, step.state, step.h, own.tolerance);
+      if (!own.bad) own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
       return;
     }
     begin_newton(step, own);
@@ -163,7 +163,7 @@ bool IslandLaws::slopes() {
 
 bool IslandLaws::judge(Residual &residual) {
   if (!evaluate_laws(*w_, *step_, *own_)) return false;
-  residual = own_->residual = true_residual(step_->rows, own_->part, step_->state, step_->h, own_->tolerance);
+  residual = own_->residual = residual_of(step_->rows, own_->part, step_->state, step_->h, own_->tolerance);
   return true;
 }
 
