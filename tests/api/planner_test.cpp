@@ -221,6 +221,15 @@ TEST_F(PlannerScene, BodyThatNeedsItsCells_KeepsThem) {
     EXPECT_EQ(r.exit_code, 0) << set << r.err;
     EXPECT_FALSE(has(r.out, "lattice/size=")) << set << r.out;
   }
+  for (const char *const shape : {"cylinder", "tube"}) {  // large cells would fill a hole or join its sides
+    const test::CommandResult r = test::deform(
+        {"explain", bar(wish, corotational), "--set",
+         std::string(R"(/bodies/0/mesh={"make": ")") + shape + R"(", "radius": 0.05, "length": 0.4)" +
+             (shape == std::string("tube") ? R"(, "inner": 0.02})" : "}"),
+         "--set", R"(/bodies/0/fix=[{"box": [[-1, -1, -1], [1, 1, 1e-6]]}])"});
+    EXPECT_EQ(r.exit_code, 0) << shape << r.err;
+    EXPECT_EQ(has(r.out, "lattice/size="), shape == std::string("cylinder")) << r.out;
+  }
   const test::CommandResult groups = test::deform(
       {"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_materials.json", "--set",
        R"(/accuracy={"target": 0.05})", "--set", R"(/bodies/2/model={"type": "corotational_fem"})"});
