@@ -174,7 +174,7 @@ TEST_F(PlannerScene, HeldBar_SaysWhatALatticeTakesThePlaceOf) {
   const std::string scene = bar(R"("accuracy": {"target": 0.05},)");
   const test::CommandResult r = test::deform({"explain", scene});
   for (const char *word :
-       {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells, with which the error is ",
+       {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells: the error is ",
         "\"lattice\": null keeps them", "--set /bodies/0/lattice/size="})
     EXPECT_TRUE(has(r.out, word)) << "no '" << word << "' in: " << r.out;
   const test::CommandResult filled =

@@ -491,7 +491,7 @@ TEST(SceneFill, Mistakes_AreReported) {
   expect_refused({kBox, "/bodies/0/fill={\"cell\": 10}"}, {"/bodies/0/fill/cell", "did you mean \"cells\"?"});
   expect_refused({kBox, "/bodies/0/fill={}"}, {"/bodies/0/fill", "\"cells\" is missing"});
   expect_refused({kBox, kFill, R"(/bodies/0/fields={"young": "values.csv"})"},
-                 {"/bodies/0/fields/young", "no cells"});
+                 {"/bodies/0/fields/young", "not those of a file"});
   expect_refused({kBox, kFill, R"(/bodies/0/materials_by_group={"top": "hard"})"},
                  {"/bodies/0/materials_by_group/top", "no group"});
   expect_refused({kBox, kFill, "/bodies/0/nodal_bc=values.csv"}, {"/bodies/0/nodal_bc", "\"fix\""});

@@ -120,9 +120,9 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
   return mesh;
 }
 
-// Of a generated mesh, no coarser than its own. A round surface of triangles as large as cells has less volume
-// than the shape: edges are half of those of as many tetrahedra as are asked for, so that both errors fall
-// alike. More hexahedra than there may be are refused where they are made.
+// Of a generated mesh, no coarser than its own. A round surface of triangles as large as cells has less
+// volume than the shape: edges are half of those of as many tetrahedra as are asked for, so that both errors
+// fall alike. More hexahedra than there may be are refused where they are made.
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";
@@ -177,9 +177,8 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
                   "\"forces\"");
     if (!b.fields.empty())
       def_.refuse(b.fields[0].pointer,
-                  "the body is a filled surface, so its file has no cells to give values for; fill it first "
-                  "with deform "
-                  "mesh fill and use the result as mesh");
+                  "the cells that fill the surface are not those of a file, which has no values for them; "
+                  "fill it first with deform mesh fill and use the result as mesh");
     if (!b.by_group.empty())
       def_.refuse(b.by_group[0].pointer,
                   "the body is a filled surface, and the cells that fill it belong to no group");

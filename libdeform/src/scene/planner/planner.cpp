@@ -105,9 +105,8 @@ std::string lattice_said(const Body &b, double size, const Way &lattice, const W
   std::string out = format("body '%s': hexahedra (\"lattice\": {\"size\": %g}) take the place of its cells",
                            b.name.c_str(), size);
   if (!own.bodies.empty())
-    out +=
-        format(", with which the error is %.3g %% at %.3g s of processor per second, not %.3g %% at %.3g s",
-               100 * own.error, own.cpu_s_per_s, 100 * lattice.error, lattice.cpu_s_per_s);
+    out += format(": the error is %.3g %% at %.3g s of processor per second, with its own %.3g %% at %.3g s",
+                  100 * lattice.error, lattice.cpu_s_per_s, 100 * own.error, own.cpu_s_per_s);
   return out + "; \"lattice\": null keeps them";
 }
 
