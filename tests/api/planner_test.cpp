@@ -174,7 +174,7 @@ TEST_F(PlannerScene, HeldBar_SaysWhatALatticeTakesThePlaceOf) {
   const std::string scene = bar(R"("accuracy": {"target": 0.05},)");
   const test::CommandResult r = test::deform({"explain", scene});
   for (const char *word :
-       {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells, with which the error is ",
+       {"hexahedra (\"lattice\": {\"size\": ", "take the place of its cells: the error is ",
         "\"lattice\": null keeps them", "--set /bodies/0/lattice/size="})
     EXPECT_TRUE(has(r.out, word)) << "no '" << word << "' in: " << r.out;
   const test::CommandResult filled =
@@ -220,6 +220,15 @@ TEST_F(PlannerScene, BodyThatNeedsItsCells_KeepsThem) {
     const test::CommandResult r = test::deform({"explain", bar(wish, corotational), "--set", set});
     EXPECT_EQ(r.exit_code, 0) << set << r.err;
     EXPECT_FALSE(has(r.out, "lattice/size=")) << set << r.out;
+  }
+  for (const char *const shape : {"cylinder", "tube"}) {  // large cells would fill a hole or join its sides
+    const test::CommandResult r = test::deform(
+        {"explain", bar(wish, corotational), "--set",
+         std::string(R"(/bodies/0/mesh={"make": ")") + shape + R"(", "radius": 0.05, "length": 0.4)" +
+             (shape == std::string("tube") ? R"(, "inner": 0.02})" : "}"),
+         "--set", R"(/bodies/0/fix=[{"box": [[-1, -1, -1], [1, 1, 1e-6]]}])"});
+    EXPECT_EQ(r.exit_code, 0) << shape << r.err;
+    EXPECT_EQ(has(r.out, "lattice/size="), shape == std::string("cylinder")) << r.out;
   }
   const test::CommandResult groups = test::deform(
       {"explain", DEFORM_SOURCE_DIR "/examples/scenes/two_materials.json", "--set",

@@ -335,6 +335,7 @@ TEST(SceneFill, MeshWithCells_KeepsItsShapeUnderOthers) {
   constexpr const char *kModel = "/bodies/0/model={\"type\": \"linear_fem\"}",
                        *kLattice = "/bodies/0/lattice={\"size\": 0.1}",
                        *kBall = R"(/bodies/0/mesh={"make": "ball", "radius": 0.1, "cells": 500})";
+  constexpr double kBallVolume = 4e-3 / 3 * M_PI;
   struct Case {
     std::vector<const char *> set;
     double volume;
@@ -342,7 +343,7 @@ TEST(SceneFill, MeshWithCells_KeepsItsShapeUnderOthers) {
   };
   for (const auto &[set, volume, ntet] :
        {Case{{kModel, kFill}, 0.002, 600}, Case{{kModel, kLattice}, 0.002, 12},
-        Case{{kModel, kBall, kFill}, 4e-3 / 3 * M_PI, 600}, Case{{kModel, kBall, kLattice}, 3.94e-3, 48}}) {
+        Case{{kModel, kBall, kFill}, kBallVolume, 600}, Case{{kModel, kBall, kLattice}, kBallVolume, 48}}) {
     const Loaded l(set);
     EXPECT_NEAR(test::measure(l.body).volume, volume, 0.03 * volume) << set.back();
     EXPECT_NEAR(l.info().ntet, ntet, 0.1 * ntet) << set.back();
@@ -350,6 +351,9 @@ TEST(SceneFill, MeshWithCells_KeepsItsShapeUnderOthers) {
   }
   expect_refused({kModel, kLattice, R"(/bodies/0/materials_by_group={"upper": "hard"})"},
                  {"/bodies/0/materials_by_group/upper", "filled surface"});
+  for (const char *const size : {"10", "1e-09"})
+    expect_refused({kModel, kBall, kLattice, (std::string("/bodies/0/lattice/size=") + size).c_str()},
+                   {"/bodies/0/lattice: cells of " + std::string(size) + " m are"});
 }
 
 TEST(SceneFill, CellsBySize_AndByDefault) {
@@ -487,7 +491,7 @@ TEST(SceneFill, Mistakes_AreReported) {
   expect_refused({kBox, "/bodies/0/fill={\"cell\": 10}"}, {"/bodies/0/fill/cell", "did you mean \"cells\"?"});
   expect_refused({kBox, "/bodies/0/fill={}"}, {"/bodies/0/fill", "\"cells\" is missing"});
   expect_refused({kBox, kFill, R"(/bodies/0/fields={"young": "values.csv"})"},
-                 {"/bodies/0/fields/young", "no cells"});
+                 {"/bodies/0/fields/young", "not those of a file"});
   expect_refused({kBox, kFill, R"(/bodies/0/materials_by_group={"top": "hard"})"},
                  {"/bodies/0/materials_by_group/top", "no group"});
   expect_refused({kBox, kFill, "/bodies/0/nodal_bc=values.csv"}, {"/bodies/0/nodal_bc", "\"fix\""});

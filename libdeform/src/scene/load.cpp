@@ -120,16 +120,19 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
   return mesh;
 }
 
-// Of a generated mesh. A round surface of triangles as large as cells has less volume than the shape: edges
-// are half of those of as many tetrahedra as are asked for, so that both errors fall alike.
+// Of a generated mesh, no coarser than its own. A round surface of triangles as large as cells has less
+// volume than the shape: edges are half of those of as many tetrahedra as are asked for, so that both errors
+// fall alike. More hexahedra than there may be are refused where they are made.
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";
   const dfm_tetmesh_info own = info_of(cells_.at(make(b)), pointer);
-  const double hexahedra =
-      b.lattice_cells ? b.lattice_cells : own.volume * std::pow(b.scale / b.lattice_size, 3);
-  const double wanted = b.lattice() ? kTetsOfHexahedron * hexahedra : b.fill.value_or(0) ? *b.fill : own.ntet;
-  const auto n = uint32_t(std::lround(4 * own.ntriangle * std::pow(wanted / own.ntet, 2.0 / 3)));
+  const double hexahedra = b.lattice_cells
+                               ? b.lattice_cells
+                               : std::min(kMaxLattice, own.volume * std::pow(b.scale / b.lattice_size, 3));
+  const double wanted = b.lattice() ? kTetsOfHexahedron * hexahedra : b.fill.value_or(0);
+  const auto n =
+      uint32_t(std::lround(4.0 * own.ntriangle * std::pow(std::max(1.0, wanted / own.ntet), 2.0 / 3)));
   const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
   dfm_trimesh &mesh = surfaces_[name];
   if (!mesh) def_.require(dfm_trimesh_make(context_, kind.c_str(), m.size, n, &mesh), pointer);
@@ -174,9 +177,8 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
                   "\"forces\"");
     if (!b.fields.empty())
       def_.refuse(b.fields[0].pointer,
-                  "the body is a filled surface, so its file has no cells to give values for; fill it first "
-                  "with deform "
-                  "mesh fill and use the result as mesh");
+                  "the cells that fill the surface are not those of a file, which has no values for them; "
+                  "fill it first with deform mesh fill and use the result as mesh");
     if (!b.by_group.empty())
       def_.refuse(b.by_group[0].pointer,
                   "the body is a filled surface, and the cells that fill it belong to no group");

@@ -14,6 +14,7 @@
 namespace dfm::scene {
 
 inline constexpr uint32_t kFillCells = 5000;  // if a scene gives no number
+inline constexpr double kMaxLattice = 1e6;    // cells; dfm_tetmesh_lattice says the same
 // As large as a hexahedron: the cubes that 12 of a body-centered lattice make.
 inline constexpr double kTetsOfHexahedron = 12;
 

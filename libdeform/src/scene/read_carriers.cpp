@@ -5,6 +5,7 @@
 
 #include "core/names.h"
 #include "scene/keys.h"
+#include "scene/load.h"
 #include "scene/read.h"
 
 namespace dfm::scene {
@@ -12,8 +13,7 @@ namespace {
 
 constexpr char kPrefix[] = "anisotropy_";
 constexpr char kAxis[] = "anisotropy_axis";
-constexpr double kMaxCells = 1e8;    // dfm_tetmesh_fill and dfm_body_create say the same of these two
-constexpr double kMaxLattice = 1e6;  // dfm_tetmesh_lattice says the same
+constexpr double kMaxCells = 1e8;  // dfm_tetmesh_fill and dfm_body_create say the same of these two
 constexpr double kWidestSupport = 10;
 
 void read_fields(const Node &node, const dfm_type *model, Body &b) {
