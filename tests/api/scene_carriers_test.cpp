@@ -351,6 +351,9 @@ TEST(SceneFill, MeshWithCells_KeepsItsShapeUnderOthers) {
   }
   expect_refused({kModel, kLattice, R"(/bodies/0/materials_by_group={"upper": "hard"})"},
                  {"/bodies/0/materials_by_group/upper", "filled surface"});
+  expect_refused({R"(/bodies/0/model={"type": "boundary"})", R"(/bodies/0/fill={"cells": 0})",
+                  R"(/bodies/0/fix=[{"points": [0]}])"},
+                 {"/bodies/0/fix/0/points", "nodes of the mesh are not its points"});
   for (const char *const size : {"10", "1e-09"})
     expect_refused({kModel, kBall, kLattice, (std::string("/bodies/0/lattice/size=") + size).c_str()},
                    {"/bodies/0/lattice: cells of " + std::string(size) + " m are"});

@@ -169,9 +169,9 @@ dfm_tetmesh MeshFiles::lattice(const std::string &path, const Body &b) {
 }
 
 // Keys that go with one kind of mesh file only.
-void MeshFiles::check_keys(const Body &b, bool has_cells, bool filled) const {
+void MeshFiles::check_keys(const Body &b, bool has_cells, bool renumbered) const {
   if (!has_cells) {
-    if (filled && !b.nodal_bc.empty())
+    if (renumbered && !b.nodal_bc.empty())
       def_.refuse(b.pointer + "/nodal_bc",
                   "the body is a filled surface, and nodes of the mesh are not its points; use \"fix\" and "
                   "\"forces\"");
@@ -254,9 +254,10 @@ BodyMesh MeshFiles::load(const Body &b) {
                                   : make(b),
                     pointer = b.pointer + "/mesh";
   BodyMesh out;
-  const bool whole = !anew && has_cells(path, pointer);
+  const bool cells_given = made || has_cells(path, pointer), whole = cells_given && !anew;
   out.filled = !whole && b.fill != 0u;
-  check_keys(b, whole, out.filled);
+  out.renumbered = out.filled || (cells_given && anew);
+  check_keys(b, whole, out.renumbered);
   take_cells(whole ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
   out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);
   if (!b.surface.mesh.empty()) {

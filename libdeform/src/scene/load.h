@@ -43,7 +43,7 @@ class MeshFiles {
   dfm_trimesh surface(const std::string &path, const std::string &pointer);
   dfm_tetmesh filling(const std::string &path, const Body &body);
   dfm_tetmesh lattice(const std::string &path, const Body &body);
-  void check_keys(const Body &body, bool has_cells, bool filled) const;
+  void check_keys(const Body &body, bool has_cells, bool renumbered) const;
   void take_cells(dfm_tetmesh mesh, const Body &body, BodyMesh &out) const;
   void split_skin(BodyMesh &out);
   void warn_unit(const Body &b, const BodyMesh &mesh) const;

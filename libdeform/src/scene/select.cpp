@@ -133,7 +133,7 @@ std::vector<uint32_t> marked(const std::vector<uint8_t> &marks) {
 // By the mesh file's numbers.
 std::vector<uint32_t> select_nodes(const Selection &where, const BodyMesh &mesh, const std::string &file) {
   const std::string pointer = where.pointer + "/points";
-  if (mesh.filled)
+  if (mesh.renumbered)
     fail(DFM_E_ARG,
          "%s: %s: the body is a filled surface, and nodes of the mesh are not its points; use \"box\" or "
          "\"group\"",

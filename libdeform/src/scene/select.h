@@ -34,6 +34,7 @@ struct BodyMesh {
   const uint32_t *faces = nullptr, *face_group = nullptr;
   uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0, nface = 0;
   bool filled = false;      // the cells are ours, the file's shape is the skin
+  bool renumbered = false;  // points are not those of the file
   bool wears_skin = false;  // the skin is the body's surface; else that is the boundary of the cells
   Skin skin;                // npoint 0: none
   // [ntet] mass per volume of each cell relative to the others; empty: the same

@@ -149,8 +149,7 @@ TEST(Solver, OnePointThatMeetsAContactThatGives_KeepsWhatItGives) {
     EXPECT_NEAR(p.impulse(0).x, (1 - left) / 1.75, 1e-15) << most;
     EXPECT_NEAR(p.rows.velocity(0).x, -left, 1e-15) << most;
     const test::SameTolerance tolerance{1, 1e-9, 1e-9, 1e-9};
-    EXPECT_LT(residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).normal, 1e-15)
-        << most;
+    EXPECT_LT(residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep, tolerance).normal, 1e-15) << most;
   }
 }
 
@@ -283,7 +282,7 @@ TEST(Solver, Residual_IsThatOfItsDefinition) {
   // Where friction may be off by much, the normal residual alone decides: over what it may be off by, and at
   // most.
   const Residual loose = residual_of(p.rows, p.rows.whole(), p.state, RowsCase::kStep,
-                                       test::SameTolerance{3, 0.5, 1e6, 4 * 0.5});
+                                     test::SameTolerance{3, 0.5, 1e6, 4 * 0.5});
   EXPECT_NEAR(loose.relative, normal / 0.5, 1e-12);
   EXPECT_NEAR(loose.required, normal / (4 * 0.5), 1e-12);
 }
