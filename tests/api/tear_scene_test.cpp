@@ -89,7 +89,7 @@ constexpr const char *kTeeth = "teeth of a cut or tear are as large as the cells
 // Nobody has put pieces in each other, and nothing of them can be moved: one sentence says what they are.
 TEST(TearScene, PiecesOfABallThatShatters_AreReportedOnceAndNotToBeMoved) {
   const test::CommandResult r =
-      shattered("pieces of a ball", "0.03", "3", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
+      shattered("pieces of a ball", "0.03", "3.2", R"("separate": {"least_cells": 1, "crumbs": "stay"},)");
   const std::string &log = r.err;
   const std::string said = "parts of body 'ball' came off with their faces in each other, by up to ";
   size_t times = 0;

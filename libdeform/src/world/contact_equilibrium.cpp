@@ -167,7 +167,7 @@ constexpr double kLongest = 1, kShortest = 1e-4;
 constexpr double kGap = 0.01, kError = 1e-7, kContact = 2e-8, kMoves = 1e-6, kLeft = 1e-6;
 // Limit on the motion of an unsupported body in a step: the median edge at first, less if steps are halved,
 // down to the first share of it; more if they converge well, up to the second share of its size.
-constexpr double kNear = 0.1, kFar = 0.25;
+constexpr double kInner = 0.1, kOuter = 0.25;
 constexpr double kNet = 0.1;      // share of the tolerance, for the sum of forces on a body
 constexpr uint32_t kSteps = 500;  // of a round
 constexpr uint32_t kWaits = 50;   // steps to wait for rest before keys advance
@@ -325,8 +325,8 @@ class Settling {
       weigh_all(h);
       bool rests = taken && off <= kGap;
       for (One &one : bodies_) {
-        one.reach = whole ? std::min(1.5 * one.reach, std::max(one.edge, kFar * one.size))
-                          : std::max(0.5 * one.reach, kNear * one.edge);
+        one.reach = whole ? std::min(1.5 * one.reach, std::max(one.edge, kOuter * one.size))
+                          : std::max(0.5 * one.reach, kInner * one.edge);
         one.slid = there && one.touches ? one.slid + one.moved : 0;
         rests = rests && one.moved <= kMoves * one.size && balanced(one);
       }
