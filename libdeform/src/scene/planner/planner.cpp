@@ -101,7 +101,7 @@ std::string short_id(const std::string &id) {
 // Three, as a person would write it.
 double round_to_digits(double x) { return std::strtod(format("%.3g", x).c_str(), nullptr); }
 
-std::string lattice_said(const Body &b, double size, const Way &lattice, const Way &own) {
+std::string lattice_sentence(const Body &b, double size, const Way &lattice, const Way &own) {
   std::string out = format("body '%s': hexahedra (\"lattice\": {\"size\": %g}) take the place of its cells",
                            b.name.c_str(), size);
   if (!own.bodies.empty())
@@ -493,7 +493,7 @@ json plan_scene(dfm_context *context, const Definition &def, const Types &types,
     if (lattice[i] > 0) {
       if (b.fill) write(b.pointer + "/fill", nullptr);
       write(b.pointer + "/lattice/size", lattice[i]);
-      plan.assumed.push_back(lattice_said(b, lattice[i], plan.way, of_own));
+      plan.assumed.push_back(lattice_sentence(b, lattice[i], plan.way, of_own));
     }
     if (way.scheme != Scheme::explicit_euler && def.world.integrator == DFM_INTEGRATOR_AUTO && !implicit) {
       write("/time/integrator", scheme_name(way.scheme));
