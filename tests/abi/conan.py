@@ -23,8 +23,10 @@ def main():
     run(conan, "profile", "detect", env=env)
     run(conan, "remote", "disable", "*", env=env)
     recipe = pathlib.Path(source) / "cmake" / "packaging" / "conan"
+    unity = ready.settings(build, "DEFORM_UNITY:")[0].split("=")[1]
     given = ["-o", "deform/*:system=True", "-s", "build_type=Release",
-             "-c", "tools.cmake.cmaketoolchain:generator=Ninja"]
+             "-c", "tools.cmake.cmaketoolchain:generator=Ninja",
+             "-c", f"tools.cmake.cmaketoolchain:extra_variables={{'DEFORM_UNITY': '{unity}'}}"]
     run(conan, "create", recipe, "--test-folder=", *given, env=env)
     shutil.copytree(recipe / "test_package", scratch / "test",
                     ignore=shutil.ignore_patterns("build"))

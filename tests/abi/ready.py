@@ -13,22 +13,21 @@ import sys
 # Warnings change no object, and 64 bits are what this compiler makes anyway.
 PASSED_OVER = ("-W", "-w", "-MD", "-m64", "-pipe", "-fdiagnostics")
 UNDONE = ("-ffast-math", "-fno-math-errno", "-fno-trapping-math")  # by -fno-fast-math, where it stands later
-# Where the library looks for plugins at last; one file is made of it.
-LAST_FOLDER = "-DDEFORM_INSTALL_PLUGIN_DIR="
 
 
 def source_of(command):
-    """The tree that the compiled file belongs to."""
+    """The tree of the compiled file; of files compiled together that of the headers."""
     for word in reversed(command):
         for room in ("/libdeform/src/", "/plugins/", "/bindings/"):
-            if room in word and word.startswith("/"):
+            if room in word and word.startswith("/") and "/Unity/" not in word:
                 return word[:word.rindex(room)]
-    return "-"
+    headers = [word for word in command if word.startswith("-I/") and word.endswith("/libdeform/include")]
+    return headers[0][2:-len("/libdeform/include")] if headers else "-"
 
 
 def needs(command, source, build):
-    """(file below the source tree, what its object depends on, object, dependency file) of a command; None
-    where it compiles nothing of the tree."""
+    """(file below the source tree or the build folder, what its object depends on, object, dependency file)
+    of a command; None where it compiles nothing of the tree."""
     flags, target, file, depends = [], None, None, None
     words = iter(command)
     for word in words:
@@ -45,21 +44,20 @@ def needs(command, source, build):
             flags = [flag for flag in flags if flag not in UNDONE]
         elif word.startswith("-") and not word.startswith(PASSED_OVER):
             flags.append(word)
-    if not file or not target or not file.startswith(source + "/"):
+    tree = next((tree for tree in (build, source) if file and file.startswith(tree + "/")), None)
+    if not tree or not target:
         return None
-    file = file[len(source) + 1:]
-    if not file.endswith("/shared_object.cpp"):
-        flags = [flag for flag in flags if not flag.startswith(LAST_FOLDER)]
+    file = file[len(tree) + 1:]
     # put in order last: where the trees lie must not decide about it
     text = " ".join(sorted({flag.replace(build, "BUILD").replace(source, "SOURCE") for flag in flags}))
     return file, text, target, depends
 
 
-def settings(build):
+def settings(build, *wanted):
     """Arguments of CMake that make the commands of another tree those of the build."""
     import pathlib
     cache = (pathlib.Path(build) / "CMakeCache.txt").read_text().split("\n")
-    wanted = ("CMAKE_BUILD_TYPE:", "CMAKE_C_COMPILER:", "CMAKE_CXX_COMPILER:")
+    wanted = wanted or ("CMAKE_BUILD_TYPE:", "CMAKE_C_COMPILER:", "CMAKE_CXX_COMPILER:", "DEFORM_UNITY:")
     return ["-D" + line for line in cache if line.startswith(wanted)]
 
 

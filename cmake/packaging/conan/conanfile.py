@@ -37,7 +37,7 @@ class Deform(ConanFile):
         for pattern in ("CMakeLists.txt", "LICENSE", "README.md", "CHANGELOG.md", "cmake/*",
                         "libdeform/CMake*", "libdeform/include/*", "libdeform/schema/*",
                         "libdeform/src/*", "plugins/*",
-                        "bindings/*"):
+                        "bindings/*", "examples/scenes/two_cylinders.json", "examples/data/cylinder_*.msh"):
             copy(self, pattern, self._root(), self.export_sources_folder, excludes="*__pycache__*")
 
     def layout(self):
@@ -79,7 +79,8 @@ class Deform(ConanFile):
         cmake.build(target="deform_tools")
 
     def package(self):
-        CMake(self).install()
+        for component in ("library", "dev", "command"):   # the pages are no part of a package
+            CMake(self).install(component=component)
         copy(self, "LICENSE", self.source_folder, os.path.join(self.package_folder, "licenses"))
 
     def package_info(self):
