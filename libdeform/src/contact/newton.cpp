@@ -85,11 +85,12 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     factor_.solve(1, in, out, 0, info);
   };
   for (bool fresh : {false, true}) {
-    if (!fresh && !factored_) continue;
+    if (!fresh && (!factored_ || kept_for_ >= set_.products)) continue;
     if (fresh && !refactor()) return false;
     const Gmres::Result found =
         gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, set_.products, by, precondition);
     products_ += found.iterations;
+    kept_for_ = fresh ? 0 : kept_for_ + found.iterations;
     if (fresh || found.left <= tolerance) break;
   }
   return true;

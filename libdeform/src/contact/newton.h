@@ -37,7 +37,7 @@ struct NewtonSettings {
   double linear = 1e-2;       // relative residual of the linear system of a Newton step, at most
   double contradiction = 20;  // of the tolerance, by which normals may miss what velocities no longer follow
   uint32_t rounds = 3;        // in a row, after which passes are slow, steps go round, or rows contradict
-  uint32_t products = 12;     // the limit on those of a Newton step; a kept factor that needs more is renewed
+  uint32_t products = 24;     // of a linear system, at most, and of all that a factor is kept for
   uint32_t trials = 24;       // of a line search; bodies near inversion take steps of a thousandth
 };
 
@@ -137,6 +137,7 @@ class ContactNewton {
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
   uint32_t limit_ = 0;     // on steps_
+  uint32_t kept_for_ = 0;  // products with the present factor since the system that it is of
   uint32_t reported_ = 0;  // of products_, to the host
 
   void number_nodes(std::span<ImplicitSystem *const> systems);
