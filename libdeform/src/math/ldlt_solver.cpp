@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "math/nested_dissection.h"
 #include "math/width.h"
@@ -17,8 +18,6 @@ constexpr uint32_t kBlock = 24;         // columns of a panel that are factored 
 constexpr uint32_t kChunk = 96;         // columns that one pass over an update takes
 constexpr double kShared = 1.0e6;       // multiplications; below that threads cost more than they save
 constexpr uint32_t kTilesPerShare = 4;  // of kTileColumns columns
-// How many points restricted() keeps beyond those of the present call: a factor, and a number.
-constexpr uint32_t kKeepTimes = 2, kKeep = 64;
 
 size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
@@ -26,9 +25,8 @@ size_t rounded(size_t n) { return (n + kTileRows - 1) / kTileRows * kTileRows; }
 
 LdltSolver::LdltSolver(const Memory &memory, Tasks *tasks)
     : kernels_(dense_kernels()), tasks_(tasks), nodes_(memory) {
-  use_memory(memory, entry_begin_, waiting_, row_, column_, fresh_, reach_begin_, reach_);
-  use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_);
-  use_memory(memory, root_, reached_, product_);
+  use_memory(memory, entry_begin_, waiting_, order_, row_, reach_begin_, reach_);
+  use_memory(memory, value_, pivot_, inverse_, floor_, stack_, left_, right_, panels_, reached_);
   use_memory(memory, entry_);
   use_memory(memory, reached_begin_);
 }
@@ -77,9 +75,7 @@ void LdltSolver::find_places(const BlockPattern &pattern) {
   right_.resize(pack);
   value_.resize(nodes_.value_begin[ns]);
   stack_.resize(nodes_.stack);
-  for (Array<double> *v : {&pivot_, &inverse_, &root_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
-  column_.assign(n_, Supernodes::kNone);
-  forget();
+  for (Array<double> *v : {&pivot_, &inverse_, &floor_}) v->assign(3 * size_t{n_}, 0.0);
 }
 
 void LdltSolver::assemble(uint32_t s, const double *blk, double *panel) {
@@ -172,11 +168,7 @@ bool LdltSolver::factor(const double *blk) {
     count = first;
     waiting_[count++] = s;
   }
-  for (size_t k = 0; k < pivot_.size(); ++k) {
-    inverse_[k] = 1 / pivot_[k];
-    root_[k] = std::sqrt(inverse_[k]);
-  }
-  forget();
+  for (size_t k = 0; k < pivot_.size(); ++k) inverse_[k] = 1 / pivot_[k];
   return ready_ = true;
 }
 
@@ -238,28 +230,12 @@ bool LdltSolver::solve(uint32_t nrhs, const double *b, double *x, double, SolveI
   return true;
 }
 
-void LdltSolver::forget() {
-  known_ = 0;
-  std::fill(column_.begin(), column_.end(), Supernodes::kNone);
-  row_.clear();
+// Supernodes that the columns of a panel reach: their own and all ancestors (Gilbert and Peierls 1988).
+void LdltSolver::find_reach() {
   reach_.clear();
   reach_begin_.assign(1, 0);
   reached_begin_.assign(1, 0);
-  product_.clear();
-}
-
-void LdltSolver::forget_restricted() {
-  forget();
-  for (Array<double> *v : {&reached_, &product_}) {
-    v->clear();
-    v->shrink_to_fit();
-  }
-}
-
-// Supernodes that the points of the panels from `first` on reach: their own and all ancestors (Gilbert and
-// Peierls 1988).
-void LdltSolver::find_reach(uint32_t first) {
-  for (size_t c = size_t{first} * kLanes; c < row_.size(); c += kLanes) {
+  for (size_t c = 0; c < row_.size(); c += kLanes) {
     const uint32_t begin = reach_begin_.back();
     for (size_t k = c; k < c + kLanes && row_[k] != Supernodes::kNone; ++k)
       for (uint32_t s = nodes_.owner[row_[k] / 3]; s != Supernodes::kNone; s = nodes_.parent[s])
@@ -271,7 +247,7 @@ void LdltSolver::find_reach(uint32_t first) {
     reach_begin_.push_back(uint32_t(reach_.size()));
     reached_begin_.push_back(reached_begin_.back() + doubles);
   }
-  reached_.resize(std::max(reached_.size(), reached_begin_.back()));
+  reached_.resize(reached_begin_.back());
 }
 
 void LdltSolver::forward_reached(uint32_t p, double *panel) {
@@ -287,9 +263,11 @@ void LdltSolver::forward_reached(uint32_t p, double *panel) {
     const uint32_t s = reach_[e];
     kernels_.forward(nodes_.width(s), nodes_.below(s), &value_[nodes_.value_begin[s]],
                      nodes_.rows.data() + nodes_.row_begin[s], rows(s), panel);
-    const double *const from = rows(s), *const root = &root_[3 * size_t{nodes_.begin[s]}];
-    for (size_t k = 0; k < 3 * size_t{nodes_.width(s)}; ++k)
-      for (size_t lane = 0; lane < kLanes; ++lane) *to++ = from[k * kLanes + lane] * root[k];
+    const double *const from = rows(s), *const inverse = &inverse_[3 * size_t{nodes_.begin[s]}];
+    for (size_t k = 0; k < 3 * size_t{nodes_.width(s)}; ++k) {
+      const double root = std::sqrt(inverse[k]);
+      for (size_t lane = 0; lane < kLanes; ++lane) *to++ = from[k * kLanes + lane] * root;
+    }
   }
 }
 
@@ -313,61 +291,33 @@ void LdltSolver::gram(uint32_t p, uint32_t q, double *sum) const {
   }
 }
 
-// Columns of the points in fresh_, and their products with all known columns. A product depends on its two
-// points alone and not on the order of calls, because rows are added in the order of elimination.
-void LdltSolver::learn() {
-  std::sort(fresh_.begin(), fresh_.end(),
-            [&](uint32_t a, uint32_t b) { return nodes_.place[a] < nodes_.place[b]; });
-  const uint32_t first = uint32_t(row_.size() / kLanes);
-  for (const uint32_t i : fresh_) {
-    column_[i] = uint32_t(row_.size());
-    for (uint32_t c = 0; c < 3; ++c) row_.push_back(3 * nodes_.place[i] + c);
-  }
-  known_ += uint32_t(fresh_.size());
-  row_.resize((row_.size() + kLanes - 1) / kLanes * kLanes, Supernodes::kNone);
-  find_reach(first);
-  const size_t rows = 3 * size_t{n_};
-  const uint32_t count = uint32_t(reach_begin_.size() - 1), together = std::min(count - first, slots());
+// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: forward substitution is enough.
+bool LdltSolver::restricted(uint32_t nsel, const uint32_t *sel, double *w) {
+  if (!ready_) return false;
+  order_.resize(nsel);
+  std::iota(order_.begin(), order_.end(), 0u);
+  std::sort(order_.begin(), order_.end(),
+            [&](uint32_t a, uint32_t b) { return nodes_.place[sel[a]] < nodes_.place[sel[b]]; });
+  const size_t rows = 3 * size_t{n_}, wide = 3 * size_t{nsel};
+  const auto count = uint32_t((wide + kLanes - 1) / kLanes);
+  row_.assign(size_t{count} * kLanes, Supernodes::kNone);
+  for (size_t c = 0; c < wide; ++c) row_[c] = 3 * nodes_.place[sel[order_[c / 3]]] + uint32_t(c % 3);
+  find_reach();
+  const uint32_t together = std::min(count, slots());
   panels_.resize(std::max(panels_.size(), together * rows * kLanes));
-  for (uint32_t p = first; p < count; p += together)
+  for (uint32_t p = 0; p < count; p += together)
     each_on(tasks_, std::min(together, count - p), 1,
             [&](size_t slot) { forward_reached(p + uint32_t(slot), panels_.data() + slot * rows * kLanes); });
-  product_.resize(size_t{count} * (count + 1) / 2 * kLanes * kLanes);
-  each_on(tasks_, count - first, 1, [&](size_t k) {
-    const auto p = uint32_t(first + k);
-    double *const tiles = &product_[size_t{p} * (p + 1) / 2 * kLanes * kLanes];
-    for (uint32_t q = 0; q <= p; ++q) gram(p, q, tiles + size_t{q} * kLanes * kLanes);
-  });
-}
-
-// W = S P^T L^-T D^-1 L^-1 P S^T = Y^T Y with Y = D^-1/2 L^-1 P S^T: forward substitution is enough. It is
-// done once for each point while a factor is in use.
-bool LdltSolver::restricted(uint32_t nsel, const uint32_t *sel, double, double *w, SolveInfo &info) {
-  info = {};
-  if (!ready_) return false;
-  const auto find_fresh = [&] {
-    fresh_.clear();
-    for (uint32_t k = 0; k < nsel; ++k)
-      if (column_[sel[k]] == Supernodes::kNone) fresh_.push_back(sel[k]);
-  };
-  find_fresh();
-  if (known_ + fresh_.size() > size_t{1 + kKeepTimes} * nsel + kKeep) {
-    forget();
-    find_fresh();
-  }
-  if (!fresh_.empty()) learn();
-  const size_t wide = 3 * size_t{nsel};
-  each_on(tasks_, nsel, 1, [&](size_t i) {
-    for (size_t j = 0; j <= i; ++j)
-      for (size_t a = 0; a < 3; ++a)
-        for (size_t b = 0; b < 3; ++b) {
-          size_t p = column_[sel[i]] + a, q = column_[sel[j]] + b;
-          if (p < q) std::swap(p, q);
-          const size_t r = p / kLanes, c = q / kLanes;
-          const double value = product_[((r * (r + 1) / 2 + c) * kLanes + p % kLanes) * kLanes + q % kLanes];
-          w[(3 * i + a) * wide + 3 * j + b] = value;
-          w[(3 * j + b) * wide + 3 * i + a] = value;
-        }
+  const auto place = [&](size_t c) { return 3 * size_t{order_[c / 3]} + c % 3; };
+  each_on(tasks_, count, 1, [&](size_t p) {
+    double sum[kLanes * kLanes];
+    for (uint32_t q = 0; q <= p; ++q) {
+      gram(uint32_t(p), q, sum);
+      for (size_t r = p * kLanes; r < std::min(wide, (p + 1) * kLanes); ++r)
+        for (size_t c = size_t{q} * kLanes; c < std::min(r + 1, size_t{q + 1} * kLanes); ++c)
+          w[place(r) * wide + place(c)] = w[place(c) * wide + place(r)] =
+              sum[(r % kLanes) * kLanes + c % kLanes];
+    }
   });
   return true;
 }

@@ -19,8 +19,9 @@ class LdltSolver final : public LinearSolver {
   void analyse(const BlockPattern &pattern, const double *places);
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
-  bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
-  void forget_restricted();  // frees the cache of restricted(), which is for points that recur
+  // w[3 nsel, 3 nsel] = S A^-1 S^T, row-major and symmetric: how the selected points (each given once)
+  // respond to forces on each other.
+  bool restricted(uint32_t nsel, const uint32_t *sel, double *w);
   size_t factor_doubles() const { return value_.size(); }  // entries of L that are stored
 
  private:
@@ -32,9 +33,7 @@ class LdltSolver final : public LinearSolver {
                         double *c, size_t ldc);
   void solve_one(const double *b, double *x);
   void solve_panel(uint32_t lanes, const double *b, double *x, double *panel) const;
-  void forget();
-  void learn();
-  void find_reach(uint32_t first);
+  void find_reach();
   void forward_reached(uint32_t p, double *panel);
   void gram(uint32_t p, uint32_t q, double *sum) const;
   uint32_t slots() const { return tasks_ ? 2 * tasks_->threads() : 1; }
@@ -54,17 +53,12 @@ class LdltSolver final : public LinearSolver {
   Array<uint32_t> waiting_;                        // supernodes whose updates are on the stack
   Array<double> panels_;                           // scratch: right-hand sides, [slot][3n][kLanes]
 
-  // Results of restricted() for the present factor: Y = D^-1/2 L^-1 P S^T of the points of all calls so far,
-  // and Y^T Y. Columns are in panels of kLanes; every call with new points begins a new panel.
-  uint32_t known_ = 0;      // points
-  Array<uint32_t> row_;     // [columns] row of Y^T's unit vector in the order of elimination; kNone: empty
-  Array<uint32_t> column_;  // [n] first column of a point, kNone
-  Array<uint32_t> fresh_;   // scratch: points that are not known yet
-  Array<double> root_;      // 1/sqrt(D)
+  // Of restricted(), in panels of kLanes columns: Y = D^-1/2 L^-1 P S^T.
+  Array<uint32_t> order_;                // [nsel] the selected points as they are eliminated
+  Array<uint32_t> row_;                  // [columns] row of the unit vector; kNone: the column is empty
   Array<uint32_t> reach_begin_, reach_;  // supernodes that a panel reaches
   Array<size_t> reached_begin_;
-  Array<double> reached_;  // Y by panels, rows of the reached supernodes only
-  Array<double> product_;  // Y^T Y, tiles [kLanes, kLanes] of the lower triangle, row after row
+  Array<double> reached_;  // Y, rows of the reached supernodes only
 };
 
 }  // namespace dfm

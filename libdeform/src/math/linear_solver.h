@@ -27,21 +27,6 @@ class LinearSolver {
   // b, x [nrhs][n,3], not overlapping; an iterative solver starts from x and ends when the residual is at
   // most tolerance times that of x = 0. Returns false if it did not get there; x is then the best iterate.
   virtual bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) = 0;
-  // w[3 nsel, 3 nsel] = S A^-1 S^T, row-major and symmetric: how the selected points (each given once)
-  // respond to forces on each other.
-  virtual bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,
-                          SolveInfo &info) = 0;
-};
-
-// restricted() for a solver that can only solve: one right-hand side per column, several at a time.
-class RestrictedBySolving {
- public:
-  explicit RestrictedBySolving(const Memory &memory) { use_memory(memory, b_, x_); }
-  bool run(LinearSolver &solver, uint32_t points, uint32_t nsel, const uint32_t *sel, double tolerance,
-           double *w, SolveInfo &info);
-
- private:
-  Array<double> b_, x_;
 };
 
 }  // namespace dfm

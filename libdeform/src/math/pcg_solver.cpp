@@ -38,8 +38,7 @@ PcgSolver::PcgSolver(const Memory &memory, Tasks *tasks, uint32_t max_iterations
       tasks_(tasks),
       max_iterations_(max_iterations),
       a_(memory),
-      coarse_(memory, tasks, motions),
-      by_solving_(memory) {
+      coarse_(memory, tasks, motions) {
   use_memory(memory, inverse_, r_, z_, p_, q_, partial_, other_);
 }
 
@@ -169,11 +168,6 @@ bool PcgSolver::solve(uint32_t nrhs, const double *b, double *x, double toleranc
   bool good = true;
   for (uint32_t k = 0; k < nrhs; ++k) good = solve_one(b + k * rows, x + k * rows, tolerance, info) && good;
   return good;
-}
-
-bool PcgSolver::restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) {
-  info = {};
-  return ready_ && by_solving_.run(*this, a_.size(), nsel, sel, tolerance, w, info);
 }
 
 }  // namespace dfm

@@ -19,7 +19,6 @@ class PcgSolver final : public LinearSolver {
   bool factor(const double *blk) override;
   // Stops where sqrt(r.M^-1 r) <= tolerance sqrt(b.M^-1 b).
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
-  bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
 
  private:
   bool solve_one(const double *b, double *x, double tolerance, SolveInfo &info);
@@ -43,7 +42,6 @@ class PcgSolver final : public LinearSolver {
   const double *points_ = nullptr;
   uint32_t stride_ = 0;
   bool with_coarse_ = false, patched_ = false;  // has a factor; has patches
-  RestrictedBySolving by_solving_;
 };
 
 }  // namespace dfm

@@ -77,13 +77,8 @@ dfm_status solve(void *self, uint32_t nrhs, const double *b, double *x, double) 
 void release(void *self) { delete &direct(self); }
 
 dfm_status inverse_at(void *self, uint32_t nsel, const uint32_t *sel, double *w) {
-  SolveInfo info;
-  return guarded(direct(self).host, [&] {
-    LdltSolver &solver = direct(self).solver;
-    const bool done = solver.restricted(nsel, sel, 0, w, info);
-    solver.forget_restricted();
-    return done ? DFM_OK : DFM_DISCARD;
-  });
+  return guarded(direct(self).host,
+                 [&] { return direct(self).solver.restricted(nsel, sel, w) ? DFM_OK : DFM_DISCARD; });
 }
 
 constexpr dfm_solver kSolver = {sizeof(dfm_solver), DFM_SOLVER_DIRECT, analyse, factor, solve, release};

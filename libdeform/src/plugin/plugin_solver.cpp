@@ -7,7 +7,7 @@
 namespace dfm {
 
 PluginSolver::PluginSolver(const dfm_type &type, const dfm_host &host, const Memory &memory)
-    : type_(type), ops_(solver_of(type)), host_(host), by_solving_(memory) {}
+    : type_(type), ops_(solver_of(type)), host_(host) {}
 
 PluginSolver::~PluginSolver() { release(); }
 
@@ -44,12 +44,6 @@ bool PluginSolver::solve(uint32_t nrhs, const double *b, double *x, double toler
   info = {};
   const auto query = [&] { return ops_.solve(self_, nrhs, b, x, tolerance); };
   return ready_ && call_plugin(host_, type_, "solve", query) == DFM_OK;
-}
-
-bool PluginSolver::restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w,
-                              SolveInfo &info) {
-  info = {};
-  return ready_ && by_solving_.run(*this, n_, nsel, sel, tolerance, w, info);
 }
 
 std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const dfm_context &context,

@@ -16,7 +16,6 @@ class PluginSolver final : public LinearSolver {
   void analyse(const BlockPattern &pattern) override;  // throws Error, which names the plugin, if it fails
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
-  bool restricted(uint32_t nsel, const uint32_t *sel, double tolerance, double *w, SolveInfo &info) override;
 
  private:
   void release() noexcept;
@@ -27,7 +26,6 @@ class PluginSolver final : public LinearSolver {
   void *self_ = nullptr;
   uint32_t n_ = 0;
   bool ready_ = false;
-  RestrictedBySolving by_solving_;
 };
 
 // The solver of that name, from the library or a plugin. Throws Error, which lists the existing ones.

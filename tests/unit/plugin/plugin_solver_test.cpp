@@ -36,12 +36,6 @@ TEST(PluginSolver, Solutions_EqualDense) {
     EXPECT_LT(test::worst(std::vector<double>(&x[k * m], &x[k * m] + m),
                           test::solved(a, std::vector<double>(&b[k * m], &b[k * m] + m))),
               1e-11);
-  const std::vector<uint32_t> sel = {30, 2, 17};
-  std::vector<double> w(81), unit(m, 0.0);
-  ASSERT_TRUE(solver->restricted(3, sel.data(), 1e-9, w.data(), info));
-  unit[3 * 2 + 1] = 1;  // column 4 of w
-  unit = test::solved(a, unit);
-  for (size_t r = 0; r < 9; ++r) EXPECT_NEAR(w[9 * r + 4], unit[3 * sel[r / 3] + r % 3], 1e-12);
 }
 
 TEST(PluginSolver, MatrixThatIsNotPositiveDefinite_IsReportedAndNothingIsSolved) {
