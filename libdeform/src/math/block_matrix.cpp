@@ -71,12 +71,4 @@ void BlockMatrix::set_values(Tasks *tasks, const double *blk) {
   });
 }
 
-void BlockMatrix::multiply(Tasks *tasks, const double *x, double *y) const {
-  if (!tasks || n_ <= kAlone) {
-    multiply(0, n_, x, y);
-    return;
-  }
-  tasks->parallel_for(n_, kGrain, [&](uint32_t begin, uint32_t end) { multiply(begin, end, x, y); });
-}
-
 }  // namespace dfm

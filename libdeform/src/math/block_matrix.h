@@ -36,7 +36,6 @@ class BlockMatrix {
   double multiply(uint32_t begin, uint32_t end, const double *x, double *y) const {
     return kernels_.multiply(rows(), begin, end, x, y);
   }
-  void multiply(Tasks *tasks, const double *x, double *y) const;  // all rows; the same
 
   static constexpr uint32_t kGrain = 64;   // rows that one thread takes at a time
   static constexpr uint32_t kAlone = 512;  // rows up to which one thread alone is faster
