@@ -50,8 +50,8 @@ class Replay final : public SolveLaws {
   // remembers or something is attached.
   LocalProblem form();
 
-  bool evaluate_local(const double *response) override {
-    return !batches_.evaluate_local(p_.h, response, 0.1 * p_.rest, 1e-3, p_.state);
+  bool evaluate_local(const double *response, double slip) override {
+    return !batches_.evaluate_local(p_.h, response, slip, 0, p_.state);
   }
   bool slopes() override { return !batches_.slopes(p_.h, p_.state); }
   bool judge(Residual &residual) override {

@@ -127,7 +127,7 @@ class Solve final : public SolveLaws {
     }
   }
 
-  bool evaluate_local(const double *) override {
+  bool evaluate_local(const double *, double) override {
     ContactState &s = state_;
     for (uint32_t i = 0; i < n_; ++i) {
       const uint32_t second = s.stride + i;

@@ -146,7 +146,7 @@ bool ContactNewton::frozen_steps() {
       const double ratio = std::isfinite(at_high) ? at_low / (at_low - at_high) : 0.5;
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
-    if (!(size() > set_.accuracy * start)) break;
+    if (!(size() > set_.accuracy * start && error() > goal_)) break;
   }
   return evaluate(false);
 }
@@ -156,6 +156,7 @@ bool ContactNewton::frozen_steps() {
 // then outweighs what is not symmetric.
 bool ContactNewton::newton(double tolerance, bool &round) {
   round = false;
+  goal_ = tolerance;
   if (!evaluate(false)) return false;
   uint32_t phases = 0;
   while (error() > tolerance && steps_ < limit_) {
@@ -183,6 +184,7 @@ void ContactNewton::put_rows() {
 }
 
 void ContactNewton::scale_penalties(double by) {
+  stiff_ *= by;
   for (double &rho : rho_) rho *= by;
   for (double &response : response_) response /= by;
 }
@@ -191,6 +193,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   found_ = false;
   limit_ = steps_ + steps;
   set_penalties(set_.penalty);
+  goal_ = set_.accuracy * tolerance;
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s

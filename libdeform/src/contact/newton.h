@@ -46,8 +46,9 @@ class SolveLaws {
  public:
   virtual ~SolveLaws() = default;
   // Evaluates the laws at the state's fn where slip and force lie on the line of ft_stop with these responses
-  // [rows], 1/kg (friction/local_solve.cpp); their slopes there. False: a law has failed.
-  virtual bool evaluate_local(const double *response) = 0;
+  // [rows], 1/kg (friction/local_solve.cpp); their slopes there. slip: m/s, that slips may be off by. False:
+  // a law has failed.
+  virtual bool evaluate_local(const double *response, double slip) = 0;
   virtual bool slopes() = 0;
   // The residual of rows.impulse at rows.y; the state then has the laws there. False: a law has failed.
   virtual bool judge(Residual &residual) = 0;
@@ -136,6 +137,8 @@ class ContactNewton {
   bool found_ = false;
   Residual residual_;
   uint32_t passes_ = 0, steps_ = 0, products_ = 0, factors_ = 0;
+  double goal_ = 0;        // m/s, of g in the present pass
+  double stiff_ = 0;       // rho w
   uint32_t limit_ = 0;     // on steps_
   uint32_t kept_for_ = 0;  // products with the present factor since the system that it is of
   uint32_t reported_ = 0;  // of products_, to the host

@@ -203,6 +203,7 @@ void ContactNewton::set_bias() {
 
 void ContactNewton::set_penalties(double factor) {
   const ContactRows &rows = *rows_;
+  stiff_ = factor;
   rho_.resize(2 * row_.size());
   response_.resize(rows.all());
   for (size_t k = 0; k < row_.size(); ++k) {
@@ -299,7 +300,9 @@ bool ContactNewton::evaluate(bool frozen) {
     s.ft_stop[stride + i] = (lh[2] - rho_t * u.z) / h_;
     laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
   }
-  if (finite != 0 || (laws && !host_->evaluate_local(response_.data()))) return false;
+  // a slip that is off by e is an impulse that is off by rho e
+  const double slip = set_.linear * goal_ / stiff_;
+  if (finite != 0 || (laws && !host_->evaluate_local(response_.data(), slip))) return false;
   for (uint32_t k = 0; k < row_.size(); ++k) {
     double *const l = &l_[3 * size_t{k}];
     if (row_[k].kind == Kind::contact) {

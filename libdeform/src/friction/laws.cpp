@@ -97,6 +97,14 @@ void LawBatches::set_frictionless(std::span<const uint32_t> index, ContactState 
   }
 }
 
+const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
+  for (const Batch &batch : batches_)
+    if (batch.law->form() == kNoFriction) set_frictionless({&order_[batch.begin], batch.n}, state);
+    else if (const LawInstance *bad = evaluate(*batch.law, {&order_[batch.begin], batch.n}, h, state))
+      return bad;
+  return nullptr;
+}
+
 const LawInstance *LawBatches::slopes(double h, ContactState &state) {
   for (const Batch &batch : batches_) {
     if ((batch.law->ops->flags & DFM_FRIC_JACOBIAN) || batch.law->form() == kNoFriction) continue;

@@ -128,7 +128,7 @@ class Laws final : public SolveLaws {
     state.resize(rows.n, 0);
     std::fill(state.form.begin(), state.form.end(), uint8_t{kSetValuedLaw});
   }
-  bool evaluate_local(const double *response) override {
+  bool evaluate_local(const double *response, double) override {
     for (uint32_t i = 0; i < rows_.n; ++i)
       if (law[i].sigma > 0) law[i].evaluate_local(i, h_, response[i], state_);
       else coulomb(law[i].mu, i, state_);

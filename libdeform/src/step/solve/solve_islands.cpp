@@ -149,9 +149,8 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 
 }  // namespace
 
-bool IslandLaws::evaluate_local(const double *response) {
-  own_->bad = own_->batches.evaluate_local(step_->h, response, 0.1 * tangent_at_rest(*w_, step_->h), 1e-3,
-                                           step_->state);
+bool IslandLaws::evaluate_local(const double *response, double slip) {
+  own_->bad = own_->batches.evaluate_local(step_->h, response, slip, 0, step_->state);
   return !own_->bad;
 }
 

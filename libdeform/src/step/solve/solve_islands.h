@@ -32,7 +32,7 @@ class IslandLaws final : public SolveLaws {
     step_ = &step;
     own_ = &own;
   }
-  bool evaluate_local(const double *response) override;
+  bool evaluate_local(const double *response, double slip) override;
   bool slopes() override;
   bool judge(Residual &residual) override;
   void spend(uint64_t rows) override;
