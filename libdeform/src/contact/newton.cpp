@@ -131,11 +131,13 @@ bool ContactNewton::frozen_steps() {
     // the share of the way at which the slope has nearly gone, between one where it is negative and one where
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
+    bool found = false;
     for (uint32_t trial = 0; trial < set_.trials; ++trial) {
       move(share);
       const bool known = evaluate(true);
       const double now = known ? slope() : std::numeric_limits<double>::infinity();
-      if (known && now <= -set_.accuracy * first && (share == 1 || now >= set_.accuracy * first)) break;
+      found = known && now <= -set_.accuracy * first && (share == 1 || now >= set_.accuracy * first);
+      if (found) break;
       if (now > 0) {
         high = share;
         at_high = now;
@@ -146,7 +148,8 @@ bool ContactNewton::frozen_steps() {
       const double ratio = std::isfinite(at_high) ? at_low / (at_low - at_high) : 0.5;
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
-    if (!(size() > set_.accuracy * start && error() > goal_)) break;
+    // no such place: there is a jump in a law, at which steps would stay
+    if (!found || !(size() > set_.accuracy * start && error() > goal_)) break;
   }
   return evaluate(false);
 }
