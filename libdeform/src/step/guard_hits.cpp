@@ -268,13 +268,14 @@ void guard_add_hits(World &w, StepContext &step) {
     ContactPoint c;
     double along;
     if (!HitContact(w, step, hit).make(c, along)) continue;
-    // A pair that starts nearer than d_c comes no nearer; the difference to 0.8 d_c closes in the planned
-    // length of the sub-step.
+    // A pair that starts nearer than d_c comes no nearer; what it lacks to 0.8 d_c, and was not found with,
+    // closes in the planned length of the sub-step.
     const Candidate &pair = (*g.list)[hit.candidate];
     const double apart = of_one_body(pair) ? guarded_apart(w, step, pair)
                          : pair.obstacle   ? w.offset
                                            : rests_at(w, step, c);
-    const double opens = std::max(0.0, 0.8 * apart - hit.start) * (step.h / g.planned);
+    const double found_with = start_depth(w, step, c, kNone, apart - hit.start);
+    const double opens = std::max(0.0, 0.8 * apart - hit.start - found_with) * (step.h / g.planned);
     const double target = std::min(apart, std::min(hit.start, along) + opens);
     c.distance += w.offset - apart;
     const double rate = (along - target) / step.h;

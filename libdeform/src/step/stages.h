@@ -103,6 +103,10 @@ void keep_rigids(World &w, StepContext &step);  // after the sub-step has succee
 
 // solve.cpp
 void make_rows(World &w, StepContext &step);  // makes rows from contacts, with their stored data
+// m, of a depth: the part that the contact was found with, less what has opened of it. It counts as distance.
+// match: of the contact in the store; kNone: the most that its pair has left.
+double start_depth(const World &w, const StepContext &step, const ContactPoint &c, uint32_t match,
+                   double depth);
 // Sets the last error. law: failed at this contact, or kNone; null: a value is not finite. Returns the
 // trouble bit.
 uint32_t report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);

@@ -71,27 +71,22 @@ double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double mo
   return left < 0 ? most : left;
 }
 
+}  // namespace
+
 // Of bodies that are set on each other, or by up to d_c into each other. No motion has made this depth, so
 // it opens by a speed, whatever the sub-step: a share per sub-step would throw what is stiff. Faces of a cut
-// have distances of their own.
-void find_start_depths(World &w, StepContext &step) {
+// have distances of their own, and an equilibrium has no speed to open by.
+double start_depth(const World &w, const StepContext &step, const ContactPoint &c, uint32_t match,
+                   double depth) {
+  if (!(depth > 0) || w.prescribed.is_static()) return 0;
   const double opened = step.h * (w.def.recovery_speed > 0 ? w.def.recovery_speed : kRecoverySpeed);
-  step.rows.start_depth.assign(step.contacts.size(), 0.0);
-  if (w.prescribed.is_static()) return;  // an equilibrium has no speed to open by
-  for (uint32_t i = 0; i < step.contacts.size(); ++i) {
-    const ContactPoint &c = step.contacts[i];
-    const Body &a = *w.bodies[c.slot_a], *const b = c.obstacle ? nullptr : w.bodies[c.slot_b].get();
-    const double depth = w.offset - c.distance;
-    const uint32_t m = step.match[i];
-    double left = 0;
-    if (m != kNone) left = w.store.start_depth[m];
-    else if (depth > 0 && !(b && made_id(a) == made_id(*b)))
-      left = left_of_pair(w.store, a.id, b ? b->id : w.obstacles[c.slot_b]->id, 2 * w.offset + opened);
-    step.rows.start_depth[i] = std::max(0.0, std::min(left - opened, depth));
-  }
+  const Body &a = *w.bodies[c.slot_a], *const b = c.obstacle ? nullptr : w.bodies[c.slot_b].get();
+  double left = 0;
+  if (match != kNone) left = w.store.start_depth[match];
+  else if (!(b && made_id(a) == made_id(*b)))
+    left = left_of_pair(w.store, a.id, b ? b->id : w.obstacles[c.slot_b]->id, 2 * w.offset + opened);
+  return std::max(0.0, std::min(left - opened, depth));
 }
-
-}  // namespace
 
 bool may_shorten(const StepContext &step) { return step.h > kMinSubstep * step.guard.planned; }
 
@@ -142,7 +137,10 @@ void make_rows(World &w, StepContext &step) {
              step.match.data(), &w.context->tasks);
   step.rows.borne.resize(n);
   for (uint32_t i = 0; i < n; ++i) step.rows.borne[i] = step.rows.impulse[size_t(3) * i];
-  find_start_depths(w, step);
+  step.rows.start_depth.resize(n);
+  for (uint32_t i = 0; i < n; ++i)
+    step.rows.start_depth[i] =
+        start_depth(w, step, step.contacts[i], step.match[i], w.offset - step.contacts[i].distance);
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
