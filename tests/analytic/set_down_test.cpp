@@ -69,6 +69,43 @@ TEST(SetDown, OnASoftBody_BothStay) {
   EXPECT_LT(fastest, 5 * kMax) << "two gaps open at once, and edges come to bear";
 }
 
+// Into each other by more than half of d_c, the guard looks at the pair as well.
+TEST(SetDown, IntoASoftBody_BothStay) {
+  const Context context;
+  const dfm_world world = make_world(context, {0, 0, 0}, DFM_INTEGRATOR_SYMPLECTIC_EULER);
+  BodyOptions o;
+  o.model = "corotational_fem";
+  o.young = 1e7;
+  o.damping_stiffness = 0.002;
+  make_body(context, world, "beam", {0.2, 0.2, 0.05}, 200, o);
+  o.position = {0.05, 0.05, 0.05 - 3e-5};
+  const dfm_body upper = make_body(context, world, "beam", {0.1, 0.1, 0.05}, 60, o);
+  double fastest = 0;
+  for (int k = 0; k < 30; ++k) {
+    ok(dfm_world_step(world, 1e-3, nullptr));
+    fastest = std::max(fastest, std::fabs(measure(upper).velocity[2]));
+  }
+  EXPECT_LT(fastest, 2 * kMax);
+}
+
+// A body that steps itself, in steps of another length than its contact.
+TEST(SetDown, ModalBodyOnAFloor_DoesNotHop) {
+  const Context context;
+  const dfm_world world = make_world(context, {0, 0, -9.81});
+  add_plane(world, "floor");
+  BodyOptions o;
+  o.model = "modal";
+  o.young = 1e7;
+  o.damping_stiffness = 0.002;
+  const dfm_body body = make_body(context, world, "beam", {0.1, 0.1, 0.05}, 60, o);
+  double fastest = 0;
+  for (int k = 0; k < 500; ++k) {
+    ok(dfm_world_step(world, 1e-4, nullptr));
+    fastest = std::max(fastest, std::fabs(measure(body).velocity[2]));
+  }
+  EXPECT_LT(fastest, 2 * kMax);
+}
+
 // The user's own speed holds here, too.
 TEST(SetDown, WithARecoverySpeed_OpensByThat) {
   const Context context;

@@ -258,7 +258,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     if (!host_->judge(residual_)) return false;
   }
   if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;
-  return found_ || spent || residual_.required <= 1 || !gains(normal) || penalties_alone(tolerance, steps);
+  if (found_ || residual_.required <= 1 || (!spent && !gains(normal))) return true;
+  return penalties_alone(tolerance, steps);
 }
 
 // Whether normal impulses do more work than residuals of this size explain.
@@ -275,10 +276,14 @@ bool ContactNewton::gains(double normal) const {
   return work > normal * all;
 }
 
-// Where rows ask for what cannot be, multipliers grow without end. Impulses of the penalties alone resist
-// motion in proportion to it: bodies give way a little, and no contact does work that its law does not allow.
+// Where rows ask for what cannot be, multipliers grow without end, and where the budget has ended the solve,
+// they need not be in balance. Impulses of the penalties alone resist motion in proportion to it, so no
+// contact does work that its law does not allow; bodies give way a little. From rest the function that steps
+// lower has the energy at the start of the sub-step as its first value, so that they may end anywhere.
 bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   std::fill(lh_.begin(), lh_.end(), 0.0);
+  for (size_t k = 0; k < g_.size(); ++k)
+    if (inverse_[k] > 0) v_[kStride * (k / 3) + k % 3] = 0;
   limit_ = steps_ + steps;
   for (bool round = true; round && steps_ < limit_; scale_penalties(1 / set_.growth))
     if (!newton(tolerance, round)) return false;
