@@ -127,6 +127,33 @@ TEST(Budget, OfImplicitBodies_TakesASubStep) {
   }
 }
 
+// A heap of them: solves that the budget ends leave no motion that the energy watch would have to end.
+TEST(Budget, OfImplicitBodiesInAHeap_MakesNoEnergy) {
+  test::Context context;
+  for (const char *model : {"msm", "corotational_fem"}) {
+    const dfm_world w = test::make_world(context, {0, 0, -9.81}, DFM_INTEGRATOR_IMPLICIT_EULER);
+    test::set_friction(w, 0.5, "coulomb");
+    test::add_plane(w, "floor");
+    test::BodyOptions o;
+    o.model = model;
+    o.young = 1e5;
+    o.damping_stiffness = 2e-3;
+    for (int k = 0; k < 12; ++k) {
+      o.position = {0.04 * (k % 2), 0.03 * (k / 2 % 2), 0.05 + 0.07 * (k / 4)};
+      o.velocity = {0.2 * (k % 3), 0.1 * (k % 5), -2};
+      o.spin = {1.0 + k, 2, 3};
+      test::make_body(context, w, "beam", {0.035, 0.025, 0.06}, 40, o);
+    }
+    test::ok(dfm_world_set_budget(w, 0, 30000));
+    for (int step = 0; step < 30; ++step) {
+      const double before = dfm_world_time(w);
+      ASSERT_EQ(dfm_world_step(w, 1.0 / 60, nullptr), DFM_OK) << model << step << dfm_last_error();
+      ASSERT_GT(dfm_world_time(w), before) << model << step;
+    }
+    EXPECT_GT(test::stats(w).cheapened, 10u) << model;
+  }
+}
+
 // Solves that would need more and ways that cross cost accuracy first, then sub-steps; no step takes more.
 TEST(Budget, OfSolvesThatItEnds_IsKept) {
   test::Context c;
