@@ -39,13 +39,9 @@ struct Skin {
        const Matrix &turn = turned(0, 0, 0)) {
     dfm_mesh_handle straight = 0;
     test::ok(dfm_mesh_make(context, kind, size.data(), DFM_MESH_SURFACE, triangles_wanted, &straight));
-    dfm_mesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_mesh_get_info(straight, &info));
-    const double *x = nullptr;
-    const uint32_t *t = nullptr;
-    x = info.points;
-    t = info.faces;
+    const dfm_mesh_info info = test::info_of(straight);
+    const double *const x = info.points;
+    const uint32_t *const t = info.faces;
     triangles.assign(t, t + 3 * size_t(info.ntriangle));
     for (uint32_t i = 0; i < info.npoint; ++i)
       for (const double v : apply(turn, {x[3 * i], x[3 * i + 1], x[3 * i + 2]})) points.push_back(v);
@@ -59,12 +55,8 @@ struct Hexahedra {
   const uint32_t *corners = nullptr;  // [n,8]
   Hexahedra(const Skin &skin, uint32_t cells, double size) {
     test::ok(dfm_mesh_lattice(skin.mesh, cells, size, &mesh));
-    dfm_mesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_mesh_get_info(mesh, &info));
+    const dfm_mesh_info info = test::info_of(mesh);
     n = info.ncell;
-    uint32_t kind = 0;
-    kind = info.cell;
     corners = info.cells;
   }
 };

@@ -82,9 +82,7 @@ TEST(CellWorlds, MassAndVolume_AreThoseOfTheShape) {
   const dfm_world world = test::make_world(context);
   for (const Kind &kind : {kBall, kBricks}) {
     dfm_mesh_handle mesh = made(context, kind);
-    dfm_mesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_mesh_get_info(mesh, &info));
+    const dfm_mesh_info info = test::info_of(mesh);
     EXPECT_EQ(info.ncell, kind.cells);
     EXPECT_EQ(info.cell, uint32_t(kind.second ? DFM_CELL_TET10 : DFM_CELL_HEX8));
     const dfm_body_def d = def_of(mesh, "corotational_fem");

@@ -20,13 +20,9 @@ dfm_mesh_handle ball(dfm_context *context, double triangles = 1000) {
 // The ball, flatter: it does not roll.
 dfm_mesh_handle pebble(dfm_context *context) {
   const dfm_mesh_handle round = ball(context);
-  dfm_mesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_mesh_get_info(round, &info));
-  const double *x = nullptr;
-  const uint32_t *triangles = nullptr;
-  x = info.points;
-  triangles = info.faces;
+  const dfm_mesh_info info = test::info_of(round);
+  const double *const x = info.points;
+  const uint32_t *const triangles = info.faces;
   std::vector<double> points(x, x + 3 * info.npoint);
   for (size_t i = 2; i < points.size(); i += 3) points[i] *= kFlat;
   dfm_mesh_handle out = 0;
@@ -37,9 +33,7 @@ dfm_mesh_handle pebble(dfm_context *context) {
 struct Worn {
   dfm_surface_def def{};
   explicit Worn(dfm_mesh_handle skin) {
-    dfm_mesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_mesh_get_info(skin, &info));
+    const dfm_mesh_info info = test::info_of(skin);
     def.size = sizeof def;
     def.npoint = info.npoint;
     def.ntriangle = info.ntriangle;

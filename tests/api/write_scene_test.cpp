@@ -163,9 +163,7 @@ struct Made {
                 std::array<double, 4> turn, dfm_material material = 0) {
     dfm_mesh_handle mesh = 0;
     test::ok(dfm_mesh_make(context, kind, size.data(), DFM_MESH_CELLS, 200, &mesh));
-    dfm_mesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_mesh_get_info(mesh, &info));
+    const dfm_mesh_info info = test::info_of(mesh);
     dfm_body_def d = dfm_body_def_default();
     d.name = name;
     d.material = material;

@@ -51,12 +51,9 @@ TEST(CutOwnMesh, TorusCutByABlade_IsNotStopped) {
   test::ok(dfm_obstacle_create(w, &floor, &obstacle));
   dfm_mesh_handle mesh = 0;
   test::ok(dfm_mesh_load(context, path.c_str(), DFM_MESH_CELLS, &mesh));
-  dfm_mesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_mesh_get_info(mesh, &info));
+  const dfm_mesh_info info = test::info_of(mesh);
   dfm_body_def def = dfm_body_def_default();
-  const double *points = nullptr;
-  points = info.points;
+  const double *const points = info.points;
   def.tets = info.tets;
   const double scale = .08 / (info.hi[0] - info.lo[0]);
   std::vector<double> placed(3 * size_t{info.npoint});

@@ -293,13 +293,9 @@ struct Round {
     const double size[3] = {radius, length, 0};
     dfm_mesh_handle mesh = 0;
     ok(dfm_mesh_make(context, kind, size, DFM_MESH_SURFACE, fine.facets, &mesh));
-    dfm_mesh_info info{};
-    info.size = sizeof info;
-    ok(dfm_mesh_get_info(mesh, &info));
-    const double *points = nullptr;
-    const uint32_t *triangles = nullptr;
-    points = info.points;
-    triangles = info.faces;
+    const dfm_mesh_info info = info_of(mesh);
+    const double *const points = info.points;
+    const uint32_t *const triangles = info.faces;
     const dfm_surface_def skin{
         sizeof(dfm_surface_def), DFM_COUPLING_BARYCENTRIC, info.npoint, info.ntriangle, points, triangles, 0};
     BodyOptions o;
