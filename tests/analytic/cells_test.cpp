@@ -31,13 +31,9 @@ double tip(const char *model, const char *kind, uint32_t across, bool second, do
   dfm_mesh_handle mesh = 0;
   test::ok(dfm_mesh_load(context, path.c_str(), DFM_MESH_CELLS, &mesh));
   const dfm_mesh_info info = test::info_of(mesh);
-  uint32_t cell = 0;
-  cell = info.cell;
-  const uint32_t *const nodes = info.cells;
+  const uint32_t *const nodes = info.cells ? info.cells : info.tets;
   const double *const x = info.points;
-  const uint32_t *const tets = info.tets;
-  const uint32_t k = cell == DFM_CELL_HEX8 ? 8 : cell == DFM_CELL_TET10 ? 10 : 4;
-  if (!nodes) nodes = tets;
+  const uint32_t k = info.cell == DFM_CELL_HEX8 ? 8 : info.cell == DFM_CELL_TET10 ? 10 : 4;
   std::vector<double> weight(info.npoint);
   double all = 0;
   for (uint32_t c = 0; c < info.ncell; ++c) {
