@@ -50,8 +50,9 @@ DFM_DEPRECATED dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
 DFM_DEPRECATED dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
   dfm_mesh_info m;
   const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
   if (out && !out->size) out->size = (uint32_t)offsetof(dfm_mesh_info, wave_path); /* that of 0.1 */
-  return status < 0 ? status : dfm_mesh_get_info(mesh, out);
+  return dfm_mesh_get_info(mesh, out);
 }
 DFM_DEPRECATED dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
                                            const uint32_t **file_point) {
