@@ -9,12 +9,13 @@ static void must(dfm_status status) {
   exit(1);
 }
 
-static void drop(dfm_world world, dfm_tetmesh mesh, double x, double z) {
+static void drop(dfm_world world, dfm_mesh_handle mesh, double x, double z) {
   dfm_body_def def = dfm_body_def_default();
-  dfm_tetmesh_info info = {.size = sizeof info};
+  dfm_mesh_info info = {.size = sizeof info};
   dfm_body body;
-  must(dfm_tetmesh_get_info(mesh, &info));
-  must(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  must(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   def.npoint = info.npoint;
   def.ntet = info.ntet;
   def.pose.position[0] = x;
@@ -28,11 +29,11 @@ int main(void) {
   dfm_context *context;
   dfm_world world;
   dfm_obstacle ground;
-  dfm_tetmesh ball;
+  dfm_mesh_handle ball;
   must(dfm_context_create(NULL, &context));
   must(dfm_world_create(context, &world_def, &world));
   must(dfm_obstacle_create(world, &floor_def, &ground));
-  must(dfm_tetmesh_make(context, "ball", (double[]){0.1, 0, 0}, 500, &ball));
+  must(dfm_mesh_make(context, "ball", (double[]){0.1, 0, 0}, DFM_MESH_CELLS, 500, &ball));
   drop(world, ball, 0, 0.11);
   drop(world, ball, 0.01, 0.31);
   for (int i = 0; i < 500; ++i) must(dfm_world_step(world, 1e-3, NULL));

@@ -20,13 +20,14 @@ static int make(dfm_context *context, dfm_world world, const char *name, const d
                 dfm_body *body) {
   dfm_body_def def = dfm_body_def_default();
   dfm_material_def material = dfm_material_def_default();
-  dfm_tetmesh_info info = {.size = sizeof info};
-  dfm_tetmesh mesh;
+  dfm_mesh_info info = {.size = sizeof info};
+  dfm_mesh_handle mesh;
   material.young = 2e5;
   material.damping_stiffness = 2e-3;
-  TRY(dfm_tetmesh_make(context, "beam", size, 150, &mesh));
-  TRY(dfm_tetmesh_get_info(mesh, &info));
-  TRY(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  TRY(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 150, &mesh));
+  TRY(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   TRY(dfm_material_create(world, &material, &def.material));
   def.name = name;
   def.npoint = info.npoint;
@@ -34,7 +35,7 @@ static int make(dfm_context *context, dfm_world world, const char *name, const d
   for (int k = 0; k < 2; ++k) def.pose.position[k] = -0.5 * size[k];
   def.pose.position[2] = z;
   TRY(dfm_body_create(world, &def, body));
-  TRY(dfm_tetmesh_destroy(mesh));
+  TRY(dfm_mesh_destroy(mesh));
   return 0;
 }
 

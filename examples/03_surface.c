@@ -23,9 +23,9 @@ int main(int argc, char **argv) {
                                       {2, 6, 7, 3}, {0, 4, 6, 2}, {1, 3, 7, 5}};
   const char *file = argc > 1 ? argv[1] : "cube.obj";
   dfm_context_def def = dfm_context_def_default();
-  dfm_trimesh_info info = {.size = sizeof info};
+  dfm_mesh_info info = {.size = sizeof info};
   dfm_context *context;
-  dfm_trimesh cube, read;
+  dfm_mesh_handle cube, read;
   double points[36][3];
   uint32_t triangles[36], n = 0;
   for (int t = 0; t < 12; ++t)
@@ -37,13 +37,13 @@ int main(int argc, char **argv) {
     }
   def.log = quiet; /* the warnings are printed below */
   TRY(dfm_context_create(&def, &context));
-  TRY(dfm_trimesh_create(context, n, &points[0][0], n / 3, triangles, &cube));
-  TRY(dfm_trimesh_get_info(cube, &info));
+  TRY(dfm_mesh_create(context, n, &points[0][0], n / 3, triangles, &cube));
+  TRY(dfm_mesh_get_info(cube, &info));
   printf("%s%u points, %u triangles, %s, %.4g m3\n", info.warnings, info.npoint, info.ntriangle,
          info.closed ? "closed" : "open", info.volume);
-  TRY(dfm_trimesh_write(cube, file));
-  TRY(dfm_trimesh_read(context, file, &read));
-  TRY(dfm_trimesh_get_info(read, &info));
+  TRY(dfm_mesh_write(cube, file));
+  TRY(dfm_mesh_load(context, file, DFM_MESH_SURFACE, &read));
+  TRY(dfm_mesh_get_info(read, &info));
   printf("read again: %u points, %s, nothing to repair: %s\n", info.npoint, info.closed ? "closed" : "open",
          *info.warnings ? "no" : "yes");
   dfm_context_destroy(context);

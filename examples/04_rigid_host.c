@@ -66,11 +66,11 @@ int main(void) {
   double force[3], moment[3], mean = 0;
   dfm_context *context;
   dfm_world world;
-  dfm_tetmesh mesh;
+  dfm_mesh_handle mesh;
   dfm_body ball;
   dfm_obstacle floor;
   dfm_rigid box;
-  dfm_tetmesh_info info = {.size = sizeof info};
+  dfm_mesh_info info = {.size = sizeof info};
   dfm_rigid_state state;
   TRY(dfm_rigid_host_register("lift", &table));
   TRY(dfm_context_create(NULL, &context));
@@ -84,9 +84,10 @@ int main(void) {
   material.young = 3e4;
   material.damping_stiffness = 4e-3;
   material.damping_mass = 8;
-  TRY(dfm_tetmesh_make(context, "ball", size, 400, &mesh));
-  TRY(dfm_tetmesh_get_info(mesh, &info));
-  TRY(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  TRY(dfm_mesh_make(context, "ball", size, DFM_MESH_CELLS, 400, &mesh));
+  TRY(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   TRY(dfm_material_create(world, &material, &def.material));
   def.name = "ball";
   def.npoint = info.npoint;

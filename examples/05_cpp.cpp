@@ -5,8 +5,7 @@
 
 namespace {
 
-deform::Body drop(const deform::World &world, const deform::TetMesh &mesh, const char *name,
-                  deform::Vec3 at) {
+deform::Body drop(const deform::World &world, const deform::Mesh &mesh, const char *name, deform::Vec3 at) {
   deform::BodyDef def;
   def.set_mesh(mesh);
   def.name = name;

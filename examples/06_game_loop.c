@@ -27,24 +27,25 @@ static int make_crate(dfm_context *context, dfm_world world, double young, uint3
   const double size[3] = {0.2, 0.2, 0.2};
   dfm_body_def def = dfm_body_def_default();
   dfm_material_def material = dfm_material_def_default();
-  dfm_tetmesh_info info = {.size = sizeof info};
-  dfm_tetmesh mesh;
+  dfm_mesh_info info = {.size = sizeof info};
+  dfm_mesh_handle mesh;
   /* Damping by stiffness quiets what wobbles: at 2 ms a wobble of 10 Hz loses 6 % of its amplitude
    * per radian. */
   material.density = 300;
   material.young = young;
   material.poisson = 0.3;
   material.damping_stiffness = 2e-3;
-  TRY(dfm_tetmesh_make(context, "beam", size, cells, &mesh));
-  TRY(dfm_tetmesh_get_info(mesh, &info));
-  TRY(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  TRY(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, cells, &mesh));
+  TRY(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   TRY(dfm_material_create(world, &material, &def.material));
   def.npoint = info.npoint;
   def.ntet = info.ntet;
   def.pose.position[0] = 0.03 * number;
   def.pose.position[2] = 0.02 + 0.24 * number;
   TRY(dfm_body_create(world, &def, out));
-  TRY(dfm_tetmesh_destroy(mesh));
+  TRY(dfm_mesh_destroy(mesh));
   return 0;
 }
 

@@ -37,11 +37,10 @@ Arrays arrays_of(const btSoftBody &body) {
 
 // Ends the meshes of a filled surface.
 struct Filled {
-  dfm_trimesh surface = 0;
-  dfm_tetmesh cells = 0;
+  dfm_mesh_handle surface = 0, cells = 0;
   ~Filled() {
-    if (cells) dfm_tetmesh_destroy(cells);
-    if (surface) dfm_trimesh_destroy(surface);
+    if (cells) dfm_mesh_destroy(cells);
+    if (surface) dfm_mesh_destroy(surface);
   }
 };
 
@@ -60,14 +59,15 @@ dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, c
     def.npoint = static_cast<uint32_t>(a.points.size() / 3);
     def.ntet = static_cast<uint32_t>(a.tets.size() / 4);
   } else if (!a.faces.empty()) {
-    TRY(dfm_trimesh_create(context, static_cast<uint32_t>(a.points.size() / 3), a.points.data(),
-                           static_cast<uint32_t>(a.faces.size() / 3), a.faces.data(), &filled.surface));
-    TRY(dfm_tetmesh_fill(filled.surface, cells, &filled.cells));
-    dfm_tetmesh_info info{};
+    TRY(dfm_mesh_create(context, static_cast<uint32_t>(a.points.size() / 3), a.points.data(),
+                        static_cast<uint32_t>(a.faces.size() / 3), a.faces.data(), &filled.surface));
+    TRY(dfm_mesh_fill(filled.surface, cells, &filled.cells));
+    dfm_mesh_info info{};
     info.size = sizeof info;
-    TRY(dfm_tetmesh_get_info(filled.cells, &info));
-    TRY(dfm_tetmesh_data(filled.cells, &def.points, &def.tets, nullptr));
-    TRY(dfm_tetmesh_share(filled.cells, &def.cell_share));
+    TRY(dfm_mesh_get_info(filled.cells, &info));
+    def.points = info.points;
+    def.tets = info.tets;
+    def.cell_share = info.share;
     skin.npoint = static_cast<uint32_t>(a.points.size() / 3);
     skin.ntriangle = static_cast<uint32_t>(a.faces.size() / 3);
     skin.points = a.points.data();

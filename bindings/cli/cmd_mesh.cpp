@@ -42,27 +42,24 @@ std::string filling_file(const std::string &out) {
 constexpr const char *kIn =
     "mesh of any format that is read: .msh .vtk .vtu .mesh .inp .ele .obj .ply .stl .off";
 
-bool open(MeshSession &s, const std::string &file, bool as_surface) {
-  if (!s.context) return false;
-  return (as_surface ? dfm_trimesh_read(s.context, file.c_str(), &s.surface)
-                     : dfm_mesh_read(s.context, file.c_str(), &s.cells, &s.surface)) >= 0;
+bool open(MeshSession &s, const std::string &file, uint32_t what = DFM_MESH_ANY) {
+  return s.context && dfm_mesh_load(s.context, file.c_str(), what, &s.mesh) >= 0;
 }
 
 int info(const Globals &globals, const std::string &file) {
   MeshSession s(globals);
   {
     const Patience patience(show_progress(globals), "reading " + file);
-    if (!open(s, file, false)) return fail(dfm_last_error());
+    if (!open(s, file)) return fail(dfm_last_error());
   }
   return report_mesh(globals, file, s, true);
 }
 
 }  // namespace
 
-std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
-  const double *share = nullptr;
+std::string lost_shares(const dfm_mesh_info &cells, const std::string &out) {
   const std::string ending = mesh_ending(out);
-  if (dfm_tetmesh_share(cells, &share) < 0 || !share || ending == "vtk" || ending == "vtu") return "";
+  if (!cells.share || ending == "vtk" || ending == "vtu") return "";
   return "the share of material of each cell, which only .vtk and .vtu store: every cell of ." + ending +
          " counts whole in mass and stiffness; write .vtu";
 }
@@ -70,16 +67,14 @@ std::string lost_shares(dfm_tetmesh cells, const std::string &out) {
 namespace {
 
 // What `out` cannot say of the mesh that was read.
-std::vector<std::string> losses(const MeshSession &s, const std::string &out) {
+std::vector<std::string> losses(const dfm_mesh_info &i, const std::string &out) {
   std::vector<std::string> lost;
   const std::string ending = mesh_ending(out);
-  if (s.cells) {
-    const dfm_tetmesh_info i = got<dfm_tetmesh_info>(dfm_tetmesh_get_info, s.cells);
+  if (i.ntet) {
     if (i.ngroup && ending == "mesh") lost.push_back("names of groups (Medit stores only their numbers)");
-    if (const std::string shares = lost_shares(s.cells, out); !shares.empty()) lost.push_back(shares);
+    if (const std::string shares = lost_shares(i, out); !shares.empty()) lost.push_back(shares);
     return lost;
   }
-  const dfm_trimesh_info i = got<dfm_trimesh_info>(dfm_trimesh_get_info, s.surface);
   if (ending == "stl") lost.push_back("digits beyond the first 7 (STL stores single precision)");
   if (i.ngroup && ending == "ply") lost.push_back("names of groups (PLY stores only their numbers)");
   if (i.ngroup && (ending == "stl" || ending == "off"))
@@ -94,22 +89,20 @@ int convert_file(MeshSession &s, const std::string &in, const std::string &out,
   std::string sentence;
   if (!s.context) return fail(dfm_last_error());
   if (!import_surface(in, s, sentence)) return fail(sentence);
-  if (s.surface) lost.push_back("materials, normals, textures and animation");
-  else if (!open(s, in, false)) return fail(dfm_last_error());
-  if (s.surface && written_by(out) == Writes::cells)
+  if (s.mesh) lost.push_back("materials, normals, textures and animation");
+  else if (!open(s, in)) return fail(dfm_last_error());
+  const dfm_mesh_info i = s.info();
+  if (!i.ntet && written_by(out) == Writes::cells)
     return fail(out + ": ." + mesh_ending(out) + " is written with tetrahedra, and " + in +
                 " is a surface; fill it: deform mesh fill " + shown_word(in) + " --out " + filling_file(out) +
                 ", or convert it to .obj, .ply, .stl, .off, .vtk or .vtu");
-  if (s.cells && written_by(out) == Writes::surface) {
-    const dfm_tetmesh_info i = got<dfm_tetmesh_info>(dfm_tetmesh_get_info, s.cells);
+  if (i.ntet && written_by(out) == Writes::surface) {
     lost.push_back(std::to_string(i.ntet) + (i.ntet == 1 ? " tetrahedron" : " tetrahedra") + ", of which ." +
                    mesh_ending(out) + " holds the boundary alone");
-    s.cells = 0;
-    if (dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
+    if (!open(s, in, DFM_MESH_SURFACE)) return fail(dfm_last_error());
   }
-  if ((s.surface ? dfm_trimesh_write(s.surface, out.c_str()) : dfm_tetmesh_write(s.cells, out.c_str())) < 0)
-    return fail(dfm_last_error());
-  for (const std::string &l : losses(s, out)) lost.push_back(l);
+  if (dfm_mesh_write(s.mesh, out.c_str()) < 0) return fail(dfm_last_error());
+  for (const std::string &l : losses(s.info(), out)) lost.push_back(l);
   return kDone;
 }
 
@@ -157,15 +150,11 @@ int make(const Globals &globals, const Shape &shape) {
                 filling_file(shape.out));
   {
     const Patience patience(show_progress(globals), "making " + shape.out);
-    const dfm_status made =
-        surface ? dfm_trimesh_make(s.context, shape.kind == "bricks" ? "beam" : shape.kind.c_str(),
-                                   size.data(), shape.cells, &s.surface)
-                : dfm_tetmesh_make(s.context, shape.kind.c_str(), size.data(), shape.cells, &s.cells);
-    if (made < 0) return fail(dfm_last_error());
-    if (!surface && shape.order == 2 && dfm_tetmesh_second_order(s.cells, &s.cells) < 0)
-      return fail(dfm_last_error());
-    if ((surface ? dfm_trimesh_write(s.surface, shape.out.c_str())
-                 : dfm_tetmesh_write(s.cells, shape.out.c_str())) < 0)
+    const char *const kind = surface && shape.kind == "bricks" ? "beam" : shape.kind.c_str();
+    if (dfm_mesh_make(s.context, kind, size.data(), surface ? DFM_MESH_SURFACE : DFM_MESH_CELLS, shape.cells,
+                      &s.mesh) < 0 ||
+        (shape.order == 2 && dfm_mesh_second_order(s.mesh, &s.mesh) < 0) ||
+        dfm_mesh_write(s.mesh, shape.out.c_str()) < 0)
       return fail(dfm_last_error());
   }
   return report_mesh(globals, shape.out, s, false);

@@ -21,8 +21,7 @@ double seconds_since(Clock::time_point begin) {
 }
 
 struct Filled {
-  dfm_trimesh_info surface = {};
-  dfm_tetmesh_info cells = {};
+  dfm_mesh_info surface = {}, cells = {};
   double volume = 0, mean_share = 0, least_share = 1, seconds = 0;
   std::vector<std::string> warnings;
   bool imported = false;  // from a format that scenes do not read
@@ -38,23 +37,15 @@ double cell_volume(const double *x, const uint32_t *tet) {
          6;
 }
 
-bool measure(dfm_trimesh surface, dfm_tetmesh mesh, Filled &out) {
-  out.surface.size = sizeof out.surface;
-  out.cells.size = sizeof out.cells;
-  const double *points = nullptr, *share = nullptr;
-  const uint32_t *tets = nullptr;
-  if (dfm_trimesh_get_info(surface, &out.surface) < 0 || dfm_tetmesh_get_info(mesh, &out.cells) < 0 ||
-      dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0)
-    return false;
+void measure(Filled &out) {
   for (uint32_t t = 0; t < out.cells.ntet; ++t) {
-    const double part = share ? share[t] : 1;
-    out.volume += part * cell_volume(points, tets + 4 * size_t(t));
+    const double part = out.cells.share ? out.cells.share[t] : 1;
+    out.volume += part * cell_volume(out.cells.points, out.cells.tets + 4 * size_t(t));
     out.mean_share += part / out.cells.ntet;
     out.least_share = part < out.least_share ? part : out.least_share;
   }
   out.warnings = lines_of(out.surface.warnings);
   for (const std::string &w : lines_of(out.cells.warnings)) out.warnings.push_back(w);
-  return true;
 }
 
 void print_json(const std::string &in, const std::string &file, uint32_t wanted, const Filled &f) {
@@ -112,17 +103,20 @@ int fill(const Globals &globals, const std::string &in, const std::string &out, 
     if (!s.context) return fail(dfm_last_error());
     std::string sentence;
     if (!import_surface(in, s, sentence)) return fail(sentence);
-    filled.imported = s.surface != 0;
-    if (!s.surface && dfm_trimesh_read(s.context, in.c_str(), &s.surface) < 0) return fail(dfm_last_error());
-    if (dfm_tetmesh_fill(s.surface, cells, &s.cells) < 0) return fail(in + ": " + dfm_last_error());
-    if (dfm_tetmesh_write(s.cells, out.c_str()) < 0) return fail(dfm_last_error());
+    filled.imported = s.mesh != 0;
+    if (!s.mesh && dfm_mesh_load(s.context, in.c_str(), DFM_MESH_SURFACE, &s.mesh) < 0)
+      return fail(dfm_last_error());
+    filled.surface = s.info();
+    if (dfm_mesh_fill(s.mesh, cells, &s.mesh) < 0) return fail(in + ": " + dfm_last_error());
+    filled.cells = s.info();
+    if (dfm_mesh_write(s.mesh, out.c_str()) < 0) return fail(dfm_last_error());
   }
   filled.seconds = seconds_since(begin);
-  if (!measure(s.surface, s.cells, filled)) return fail(dfm_last_error());
+  measure(filled);
   if (const std::string hint = unit_hint(filled.surface.lo, filled.surface.hi);
       !filled.imported && !hint.empty())
     filled.warnings.push_back(hint);
-  if (const std::string lost = lost_shares(s.cells, out); !lost.empty())
+  if (const std::string lost = lost_shares(filled.cells, out); !lost.empty())
     filled.warnings.push_back("not kept: " + lost);
   if (globals.json) print_json(in, out, cells, filled);
   else if (!globals.quiet) print_table(in, out, cells, filled);

@@ -56,9 +56,8 @@ bool import_surface(const std::string &path, MeshSession &session, std::string &
     sentence = path + ": no triangles in this file";
     return false;
   }
-  if (dfm_trimesh_create(session.context, static_cast<uint32_t>(points.size() / 3), points.data(),
-                         static_cast<uint32_t>(triangles.size() / 3), triangles.data(),
-                         &session.surface) < 0) {
+  if (dfm_mesh_create(session.context, static_cast<uint32_t>(points.size() / 3), points.data(),
+                      static_cast<uint32_t>(triangles.size() / 3), triangles.data(), &session.mesh) < 0) {
     sentence = path + ": " + dfm_last_error();
     return false;
   }

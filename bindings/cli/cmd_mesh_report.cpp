@@ -43,8 +43,7 @@ std::string text(const char *format, double x) {
   return line;
 }
 
-template <class Info>
-void take_common(Report &r, const Info &i) {
+void take_common(Report &r, const dfm_mesh_info &i) {
   std::copy_n(i.lo, 3, r.lo);
   std::copy_n(i.hi, 3, r.hi);
   r.edge_min = i.edge_min;
@@ -57,18 +56,16 @@ void take_common(Report &r, const Info &i) {
 }
 
 // m3, what a filled mesh has of material: its cells reach out of the surface. Negative: it was not filled.
-double material_of(dfm_tetmesh mesh, uint32_t ntet) {
-  const double *share = nullptr, *x = nullptr;
-  const uint32_t *tets = nullptr;
-  if (dfm_tetmesh_share(mesh, &share) < 0 || !share || dfm_tetmesh_data(mesh, &x, &tets, nullptr) < 0)
-    return -1;
+double material_of(const dfm_mesh_info &mesh) {
+  if (!mesh.share) return -1;
   double sum = 0;
-  for (uint32_t t = 0; t < ntet; ++t) {
+  for (uint32_t t = 0; t < mesh.ntet; ++t) {
+    const uint32_t *const tet = &mesh.tets[size_t{4} * t];
     double e[3][3];
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3; ++k)
-        e[i][k] = x[size_t{3} * tets[4 * t + i + 1] + k] - x[size_t{3} * tets[4 * t] + k];
-    sum += share[t] / 6 *
+        e[i][k] = mesh.points[size_t{3} * tet[i + 1] + k] - mesh.points[size_t{3} * tet[0] + k];
+    sum += mesh.share[t] / 6 *
            (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
             e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
             e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
@@ -181,10 +178,7 @@ void report_crossings(Report &r, const double *points, uint32_t npoint, const ui
                          "itself begins inside; mend the mesh in the program that made it");
 }
 
-bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
-  dfm_tetmesh_info i = {};
-  i.size = sizeof i;
-  if (dfm_tetmesh_get_info(mesh, &i) < 0) return false;
+void describe_cells(const dfm_mesh_info &i, bool crossings, Report &r) {
   take_common(r, i);
   r.kind = "cells";
   r.quality = "mean ratio";
@@ -209,7 +203,7 @@ bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
   count("edges", i.nedge);
   count("pieces", i.npiece);
   r.lines.emplace_back("volume", text("%.10g m3", i.volume));
-  if (const double material = material_of(mesh, i.ntet); material >= 0) {
+  if (const double material = material_of(i); material >= 0) {
     r.measures.push_back({"material_volume", material});
     r.lines.emplace_back("of it material", text("%.10g m3", material));
   }
@@ -220,31 +214,21 @@ bool describe_cells(dfm_tetmesh mesh, bool crossings, Report &r) {
                {"duplicate_points", i.duplicate_points},
                {"nonmanifold_edges", i.nonmanifold_edges},
                {"overlapping_faces", i.overlapping_faces}};
-  const char *const *names = nullptr;
-  dfm_tetmesh_groups(mesh, &names, nullptr);
-  r.groups.resize(i.ngroup);
-  for (uint32_t k = 0; k < i.ngroup; ++k) {
-    r.groups[k].name = names[k];
-    dfm_tetmesh_group_points(mesh, k, &r.groups[k].dimension, nullptr, &r.groups[k].count);
-  }
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  if (crossings && dfm_tetmesh_data(mesh, &points, &tets, nullptr) >= 0) {
-    if (!kind) report_steps(r, points, i.npoint, tets, i.ntet);  // the others have the bound of their model
-    const std::vector<uint32_t> boundary = boundary_of(tets, i.ntet);
-    report_crossings(r, points, i.npoint, boundary.data(), uint32_t(boundary.size() / 3));
+  for (uint32_t k = 0; k < i.ngroup; ++k)
+    r.groups.push_back({i.group_names[k], i.group_dimension[k], i.group_npoint[k], false});
+  if (crossings) {
+    // the others have the bound of their model
+    if (!kind) report_steps(r, i.points, i.npoint, i.tets, i.ntet);
+    const std::vector<uint32_t> boundary = boundary_of(i.tets, i.ntet);
+    report_crossings(r, i.points, i.npoint, boundary.data(), uint32_t(boundary.size() / 3));
   }
   r.summary = std::to_string(i.npoint) + " points, " +
               (kind ? std::to_string(i.ncell) + " " + kind : std::to_string(i.ntet) + " tetrahedra") + ", " +
               std::to_string(i.ntriangle) + " surface triangles, least mean ratio " +
               text("%.3g", i.quality_min);
-  return true;
 }
 
-bool describe_surface(dfm_trimesh mesh, bool crossings, Report &r) {
-  dfm_trimesh_info i = {};
-  i.size = sizeof i;
-  if (dfm_trimesh_get_info(mesh, &i) < 0) return false;
+void describe_surface(const dfm_mesh_info &i, bool crossings, Report &r) {
   take_common(r, i);
   r.kind = "surface";
   r.quality = "quality";
@@ -263,27 +247,20 @@ bool describe_surface(dfm_trimesh mesh, bool crossings, Report &r) {
                                std::to_string(i.nonmanifold_edges) + " edges of more than two triangles");
   r.lines.emplace_back("area", text("%.10g m2", i.area));
   if (i.closed) r.lines.emplace_back("volume", text("%.10g m3", i.volume));
-  r.defects = {{"merged_points", i.merged_points},
+  r.defects = {{"merged_points", i.duplicate_points},
                {"dropped_points", i.dropped_points},
-               {"dropped_triangles", i.dropped_triangles},
+               {"dropped_triangles", i.dropped_cells},
                {"turned", i.turned},
                {"open_edges", i.open_edges},
                {"holes", i.holes},
                {"nonmanifold_edges", i.nonmanifold_edges}};
-  const char *const *names = nullptr;
-  const uint32_t *group = nullptr;
-  dfm_trimesh_groups(mesh, &names, &group);
-  r.groups.resize(i.ngroup);
   for (uint32_t k = 0; k < i.ngroup; ++k)
-    r.groups[k] = {names[k], 2, static_cast<uint32_t>(std::count(group, group + i.ntriangle, k)), true};
-  const double *points = nullptr;
-  const uint32_t *triangles = nullptr;
-  if (crossings && dfm_trimesh_data(mesh, &points, &triangles, nullptr) >= 0)
-    report_crossings(r, points, i.npoint, triangles, i.ntriangle);
+    r.groups.push_back({i.group_names[k], 2,
+                        static_cast<uint32_t>(std::count(i.face_group, i.face_group + i.nface, k)), true});
+  if (crossings) report_crossings(r, i.points, i.npoint, i.faces, i.nface);
   r.summary = std::to_string(i.npoint) + " points, " + std::to_string(i.ntriangle) + " triangles, " +
               (i.closed ? "closed" : std::to_string(i.holes) + " holes") + ", least quality " +
               text("%.3g", i.quality_min);
-  return true;
 }
 
 void print_json(const std::string &file, const Report &r, const std::vector<std::string> &notes) {
@@ -371,8 +348,8 @@ std::vector<std::string> lines_of(const char *text) {
 int report_mesh(const Globals &globals, const std::string &file, const MeshSession &session, bool show,
                 const std::vector<std::string> &notes) {
   Report r;
-  if (!(session.cells ? describe_cells(session.cells, show, r) : describe_surface(session.surface, show, r)))
-    return fail(dfm_last_error());
+  const dfm_mesh_info mesh = session.info();
+  (mesh.ntet ? describe_cells : describe_surface)(mesh, show, r);
   if (const std::string hint = unit_hint(r.lo, r.hi); show && !hint.empty()) r.warnings.push_back(hint);
   if (globals.json) {
     print_json(file, r, notes);

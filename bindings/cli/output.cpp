@@ -175,23 +175,18 @@ FileNodes Outputs::file_nodes(size_t b) const {
   FileNodes out;
   out.body = body.handle;
   out.name = body.name;
-  dfm_tetmesh cells = 0;
-  dfm_trimesh surface = 0;
-  need(dfm_mesh_read(scene_.context(), path.c_str(), &cells, &surface));
-  const uint32_t *file_point = nullptr;
-  if (surface) {
+  dfm_mesh_handle read = 0;
+  need(dfm_mesh_load(scene_.context(), path.c_str(), DFM_MESH_ANY, &read));
+  const dfm_mesh_info info = got<dfm_mesh_info>(dfm_mesh_get_info, read);
+  if (info.ntet) {
+    out.number.assign(info.file_point, info.file_point + body.npoint);
+  } else {
     out.surface = scene_.value(key + "/surface/mesh").empty() && scene_.value(key + "/surface/from").empty();
-    const dfm_trimesh_info info = got<dfm_trimesh_info>(dfm_trimesh_get_info, surface);
     out.number.resize(out.surface ? info.npoint : body.npoint);
     for (uint32_t i = 0; i < out.number.size(); ++i) out.number[i] = i;
-    need(dfm_trimesh_data(surface, nullptr, nullptr, &file_point));
-    if (out.surface) std::copy_n(file_point, out.number.size(), out.number.begin());
-    dfm_trimesh_destroy(surface);
-  } else {
-    need(dfm_tetmesh_data(cells, nullptr, nullptr, &file_point));
-    out.number.assign(file_point, file_point + body.npoint);
-    dfm_tetmesh_destroy(cells);
+    if (out.surface) std::copy_n(info.file_point, out.number.size(), out.number.begin());
   }
+  dfm_mesh_destroy(read);
   return out;
 }
 

@@ -61,8 +61,8 @@ static gripper make_gripper(double force) {
 }
 
 static int make_ball(dfm_context *context, dfm_world soft, dfm_body *out) {
-  dfm_tetmesh mesh;
-  dfm_tetmesh_info info = {.size = sizeof info};
+  dfm_mesh_handle mesh;
+  dfm_mesh_info info = {.size = sizeof info};
   dfm_body_def def = dfm_body_def_default();
   dfm_material_def foam = dfm_material_def_default();
   foam.density = 200;
@@ -70,9 +70,10 @@ static int make_ball(dfm_context *context, dfm_world soft, dfm_body *out) {
   foam.poisson = 0.3;
   foam.damping_mass = 5;
   foam.damping_stiffness = 0.01;
-  TRY(dfm_tetmesh_make(context, "ball", (double[3]){0.05}, 500, &mesh));
-  TRY(dfm_tetmesh_get_info(mesh, &info));
-  TRY(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  TRY(dfm_mesh_make(context, "ball", (double[3]){0.05}, DFM_MESH_CELLS, 500, &mesh));
+  TRY(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   TRY(dfm_material_create(soft, &foam, &def.material));
   def.name = "ball";
   def.npoint = info.npoint;

@@ -19,9 +19,9 @@ def exported(nm, path):
 
 def declared(include):
     names = set()
-    for path in set(pathlib.Path(include).rglob("*.h")) - {pathlib.Path(include) / "deform/deprecated.h"}:
+    for path in pathlib.Path(include).rglob("*.h"):
         text = re.sub(r"/\*.*?\*/", "", path.read_text(), flags=re.S)
-        names |= set(re.findall(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", text, re.M))
+        names |= set(re.findall(r"^DFM_(?:API|DEPRECATED)\b[^;{]*?\b(dfm_\w+)\s*\(", text, re.M))
         names |= set(re.findall(r"^static inline dfm_status (dfm_world_\w+)\s*\(", text, re.M))
         names |= set(re.findall(r"^static inline dfm_\w+ (dfm_\w+_default)\s*\(", text, re.M))
     return names

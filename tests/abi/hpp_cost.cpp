@@ -23,8 +23,7 @@ template class deform::basic::Rigid<deform::Values>;
 template class deform::basic::Material<deform::Values>;
 template class deform::basic::Law<deform::Values>;
 template class deform::basic::Scene<deform::Values>;
-template class deform::basic::TetMesh<deform::Values>;
-template class deform::basic::TriMesh<deform::Values>;
+template class deform::basic::Mesh<deform::Values>;
 template struct deform::basic::Toi<deform::Values>;
 #if defined(__cpp_exceptions)
 template class deform::basic::Context<deform::Throw>;
@@ -35,8 +34,7 @@ template class deform::basic::Rigid<deform::Throw>;
 template class deform::basic::Material<deform::Throw>;
 template class deform::basic::Law<deform::Throw>;
 template class deform::basic::Scene<deform::Throw>;
-template class deform::basic::TetMesh<deform::Throw>;
-template class deform::basic::TriMesh<deform::Throw>;
+template class deform::basic::Mesh<deform::Throw>;
 template struct deform::basic::Toi<deform::Throw>;
 #endif
 

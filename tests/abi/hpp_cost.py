@@ -66,8 +66,7 @@ def header_only(include, compiler, folder):
     """Two translation units with every member in each link into one library without a name defined twice."""
     source = '#include <deform/deform.hpp>\n' + "".join(
         f"template class deform::basic::{name}<deform::{mode}>;\n" for mode in ("Values", "Throw")
-        for name in ("Context", "World", "Body", "Obstacle", "Rigid", "Material", "Law", "Scene", "TetMesh",
-                     "TriMesh"))
+        for name in ("Context", "World", "Body", "Obstacle", "Rigid", "Material", "Law", "Scene", "Mesh"))
     paths = [pathlib.Path(folder) / f"unit{i}.cpp" for i in (1, 2)]
     for path in paths:
         path.write_text(source)

@@ -14,11 +14,12 @@ constexpr double kSide = 0.1, kForce = 0.01;
 std::string bar_file(dfm_context *context, const char *kind, uint32_t across, bool second) {
   const double size[3] = {1, kSide, kSide};
   const uint32_t cubes = 10 * across * across * across;
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_make(context, kind, size, std::strcmp(kind, "bricks") ? 12 * cubes : cubes, &mesh));
-  if (second) test::ok(dfm_tetmesh_second_order(mesh, &mesh));
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(context, kind, size, DFM_MESH_CELLS,
+                         std::strcmp(kind, "bricks") ? 12 * cubes : cubes, &mesh));
+  if (second) test::ok(dfm_mesh_second_order(mesh, &mesh));
   const std::string path = test::scratch("cells_bar") + "/bar.vtu";
-  test::ok(dfm_tetmesh_write(mesh, path.c_str()));
+  test::ok(dfm_mesh_write(mesh, path.c_str()));
   return path;
 }
 
@@ -27,18 +28,12 @@ double tip(const char *model, const char *kind, uint32_t across, bool second, do
   test::Context context;
   const std::string path = bar_file(context, kind, across, second);
   test::Statics s(path, model, 1e5, poisson);
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_read(context, path.c_str(), &mesh));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_tetmesh_get_info(mesh, &info));
-  uint32_t cell = 0;
-  const uint32_t *nodes = nullptr, *tets = nullptr;
-  const double *x = nullptr;
-  test::ok(dfm_tetmesh_cells(mesh, &cell, &nodes));
-  test::ok(dfm_tetmesh_data(mesh, &x, &tets, nullptr));
-  const uint32_t k = cell == DFM_CELL_HEX8 ? 8 : cell == DFM_CELL_TET10 ? 10 : 4;
-  if (!nodes) nodes = tets;
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_load(context, path.c_str(), DFM_MESH_CELLS, &mesh));
+  const dfm_mesh_info info = test::info_of(mesh);
+  const uint32_t *const nodes = info.cells ? info.cells : info.tets;
+  const double *const x = info.points;
+  const uint32_t k = info.cell == DFM_CELL_HEX8 ? 8 : info.cell == DFM_CELL_TET10 ? 10 : 4;
   std::vector<double> weight(info.npoint);
   double all = 0;
   for (uint32_t c = 0; c < info.ncell; ++c) {

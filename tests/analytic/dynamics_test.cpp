@@ -22,12 +22,10 @@ struct Bar {
   Bar(const std::string &mesh_file, bool held, const test::BodyOptions &o, double gravity,
       int32_t integrator = DFM_INTEGRATOR_AUTO) {
     world = test::make_world(context, {0, 0, gravity}, integrator);
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_read(context, (test::mesh_dir() + "/" + mesh_file).c_str(), &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_load(context, (test::mesh_dir() + "/" + mesh_file).c_str(), DFM_MESH_CELLS, &mesh));
     dfm_body_def d = dfm_body_def_default();
-    test::lend(mesh, d);
-    const uint32_t *file_point = nullptr;
-    test::ok(dfm_tetmesh_data(mesh, nullptr, nullptr, &file_point));
+    const uint32_t *const file_point = test::lend(mesh, d).file_point;
     npoint = d.npoint;
     rest.assign(d.points, d.points + 3 * size_t(npoint));
     tets.assign(d.tets, d.tets + 4 * size_t(d.ntet));
@@ -39,7 +37,7 @@ struct Bar {
     d.model = o.model.c_str();
     for (int k = 0; k < 3; ++k) d.spin[k] = o.spin[size_t(k)];
     test::ok(dfm_body_create(world, &d, &body));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     for (uint32_t i = 0; held && i < npoint; ++i)
       if (rest[3 * i] < 1e-9) test::ok(dfm_body_hold(body, 1, &i, 7));
   }

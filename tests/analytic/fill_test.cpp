@@ -22,10 +22,10 @@ struct Box {
     if (!filled) {
       body = test::make_body(context, world, "beam", kSize, cells, o);
     } else {
-      dfm_trimesh skin = 0;
-      dfm_tetmesh mesh = 0;
-      test::ok(dfm_trimesh_make(context, "beam", kSize.data(), 2000, &skin));
-      test::ok(dfm_tetmesh_fill(skin, uint32_t(cells * density), &mesh));
+      dfm_mesh_handle skin = 0;
+      dfm_mesh_handle mesh = 0;
+      test::ok(dfm_mesh_make(context, "beam", kSize.data(), DFM_MESH_SURFACE, 2000, &skin));
+      test::ok(dfm_mesh_fill(skin, uint32_t(cells * density), &mesh));
       make(skin, mesh, o);
     }
     dfm_body_info info{};
@@ -35,21 +35,23 @@ struct Box {
     test::ok(dfm_body_get_rest(body, info.npoint, rest.data(), 0, nullptr));
   }
 
-  void make(dfm_trimesh skin, dfm_tetmesh mesh, const test::BodyOptions &o) {
-    dfm_tetmesh_info info{};
-    dfm_trimesh_info surface{};
+  void make(dfm_mesh_handle skin, dfm_mesh_handle mesh, const test::BodyOptions &o) {
+    dfm_mesh_info info{};
+    dfm_mesh_info surface{};
     info.size = sizeof info;
     surface.size = sizeof surface;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
-    test::ok(dfm_trimesh_get_info(skin, &surface));
+    test::ok(dfm_mesh_get_info(mesh, &info));
+    test::ok(dfm_mesh_get_info(skin, &surface));
     dfm_surface_def def{};
     def.size = sizeof def;
     def.npoint = surface.npoint;
     def.ntriangle = surface.ntriangle;
-    test::ok(dfm_trimesh_data(skin, &def.points, &def.triangles, nullptr));
+    def.points = surface.points;
+    def.triangles = surface.faces;
     dfm_body_def d = dfm_body_def_default();
-    test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
-    test::ok(dfm_tetmesh_share(mesh, &d.cell_share));
+    d.points = info.points;
+    d.tets = info.tets;
+    d.cell_share = info.share;
     dfm_material_def md = dfm_material_def_default();
     md.young = o.young;
     md.poisson = 0.3;

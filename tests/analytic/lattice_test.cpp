@@ -34,37 +34,30 @@ const Matrix kAskew = turned(0.1, 0.23, 0.17);
 struct Skin {
   std::vector<double> points;
   std::vector<uint32_t> triangles;
-  dfm_trimesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   Skin(dfm_context *context, const char *kind, std::array<double, 3> size, uint32_t triangles_wanted,
        const Matrix &turn = turned(0, 0, 0)) {
-    dfm_trimesh straight = 0;
-    test::ok(dfm_trimesh_make(context, kind, size.data(), triangles_wanted, &straight));
-    dfm_trimesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_trimesh_get_info(straight, &info));
-    const double *x = nullptr;
-    const uint32_t *t = nullptr;
-    test::ok(dfm_trimesh_data(straight, &x, &t, nullptr));
+    dfm_mesh_handle straight = 0;
+    test::ok(dfm_mesh_make(context, kind, size.data(), DFM_MESH_SURFACE, triangles_wanted, &straight));
+    const dfm_mesh_info info = test::info_of(straight);
+    const double *const x = info.points;
+    const uint32_t *const t = info.faces;
     triangles.assign(t, t + 3 * size_t(info.ntriangle));
     for (uint32_t i = 0; i < info.npoint; ++i)
       for (const double v : apply(turn, {x[3 * i], x[3 * i + 1], x[3 * i + 2]})) points.push_back(v);
-    test::ok(
-        dfm_trimesh_create(context, info.npoint, points.data(), info.ntriangle, triangles.data(), &mesh));
+    test::ok(dfm_mesh_create(context, info.npoint, points.data(), info.ntriangle, triangles.data(), &mesh));
   }
 };
 
 struct Hexahedra {
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   uint32_t n = 0;
   const uint32_t *corners = nullptr;  // [n,8]
   Hexahedra(const Skin &skin, uint32_t cells, double size) {
-    test::ok(dfm_tetmesh_lattice(skin.mesh, cells, size, &mesh));
-    dfm_tetmesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    test::ok(dfm_mesh_lattice(skin.mesh, cells, size, &mesh));
+    const dfm_mesh_info info = test::info_of(mesh);
     n = info.ncell;
-    uint32_t kind = 0;
-    test::ok(dfm_tetmesh_cells(mesh, &kind, &corners));
+    corners = info.cells;
   }
 };
 
@@ -98,11 +91,11 @@ Solid solid_of(const Skin &s) {
 struct Body {
   dfm_world world;
   dfm_body body = 0;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   Body(dfm_context *context, const Skin &skin, uint32_t cells, double size, const char *model,
        double poisson = 0.3, double spin = 0) {
     world = test::make_world(context, {0, 0, 0});
-    test::ok(dfm_tetmesh_lattice(skin.mesh, cells, size, &mesh));
+    test::ok(dfm_mesh_lattice(skin.mesh, cells, size, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     const dfm_surface_def surface = {sizeof(dfm_surface_def),
@@ -232,7 +225,7 @@ double bent(const char *model, double size, const Matrix &turn) {
   const Skin skin(context, "beam", {1, kSide, kSide}, 12, turn);
   const Hexahedra cells(skin, 0, size);
   const std::string path = test::scratch("lattice_bar") + "/bar.vtu";
-  test::ok(dfm_tetmesh_write(cells.mesh, path.c_str()));
+  test::ok(dfm_mesh_write(cells.mesh, path.c_str()));
   test::Statics s(path, model, 1e5, 0.3);
   const std::vector<double> x = s.rest();
   std::vector<double> force(x.size());

@@ -17,9 +17,9 @@ struct Bar {
 
   explicit Bar(int32_t integrator, double yield = kYield) {
     world = test::make_world(context, {0, 0, 0}, integrator);
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[3] = {kLength, 0.02, 0.02};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 40, &mesh));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 40, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     test::BodyOptions o;
@@ -31,7 +31,7 @@ struct Bar {
     const dfm_param_value values[2] = {{"yield", &yield, 1}, {"hardening", &hardening, 1}};
     d.model_params = {sizeof(dfm_params), 2, values};
     test::ok(dfm_body_create(world, &d, &body));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     rest.resize(3 * size_t(d.npoint));
     test::ok(dfm_body_get_state(body, d.npoint, rest.data(), nullptr, &n));
     double low[3], high = 0;

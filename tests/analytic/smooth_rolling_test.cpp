@@ -24,8 +24,8 @@ struct Roller {
   double k = 0;
 
   dfm_body make(const Round &shape, dfm_world in, bool placed, double speed, double smooth) {
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_make(context, shape.kind, shape.size.data(), shape.cells, &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_make(context, shape.kind, shape.size.data(), DFM_MESH_CELLS, shape.cells, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     test::BodyOptions o;
@@ -46,7 +46,7 @@ struct Roller {
     d.velocity[0] = speed;
     dfm_body out = 0;
     test::ok(dfm_body_create(in, &d, &out));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     return out;
   }
   Roller(const Round &shape, double theta_deg, double speed = 0, double smooth = 40) {
@@ -123,8 +123,8 @@ TEST(SmoothRolling, OnItsFlatEnd_DoesNotCreep) {
   for (const bool smooth : {false, true}) {
     const double theta = 10 * kDegree;
     const dfm_world world = test::make_world(context, {kG * std::sin(theta), 0, -kG * std::cos(theta)});
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_make(context, kCylinder.kind, kCylinder.size.data(), 500, &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_make(context, kCylinder.kind, kCylinder.size.data(), DFM_MESH_CELLS, 500, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     test::BodyOptions o;
@@ -135,7 +135,7 @@ TEST(SmoothRolling, OnItsFlatEnd_DoesNotCreep) {
     d.smooth = smooth ? 40 : 0;
     dfm_body body = 0;
     test::ok(dfm_body_create(world, &d, &body));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     test::add_plane(world, "incline");
     test::set_friction(world, 0.5);
     test::run(world, 0.6, 2e-4);
@@ -152,8 +152,8 @@ TEST(SmoothRolling, OnItsFlatEnd_DoesNotCreep) {
 TEST(SmoothRolling, StruckByASpinningBall_KeepsMomentumAndAngularMomentum) {
   test::Context context;
   const dfm_world world = test::make_world(context, {0, 0, 0});
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_make(context, "ball", kBall.size.data(), 500, &mesh));
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(context, "ball", kBall.size.data(), DFM_MESH_CELLS, 500, &mesh));
   dfm_body_def d = dfm_body_def_default();
   test::lend(mesh, d);
   test::BodyOptions o;
@@ -164,7 +164,7 @@ TEST(SmoothRolling, StruckByASpinningBall_KeepsMomentumAndAngularMomentum) {
   d.smooth = 60;
   dfm_body body = 0;
   test::ok(dfm_body_create(world, &d, &body));
-  test::ok(dfm_tetmesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(mesh));
   dfm_rigid_def r = dfm_rigid_def_default();
   r.shape = DFM_SHAPE_SPHERE;
   r.radius = kR;

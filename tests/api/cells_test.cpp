@@ -16,14 +16,14 @@ struct Kind {
 };
 constexpr Kind kBall = {"ball", true, {0.1, 0, 0}, 160}, kBricks = {"bricks", false, {0.2, 0.2, 0.2}, 27};
 
-dfm_tetmesh made(dfm_context *context, const Kind &kind) {
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_make(context, kind.make, kind.size.data(), kind.cells, &mesh));
-  if (kind.second) test::ok(dfm_tetmesh_second_order(mesh, &mesh));
+dfm_mesh_handle made(dfm_context *context, const Kind &kind) {
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(context, kind.make, kind.size.data(), DFM_MESH_CELLS, kind.cells, &mesh));
+  if (kind.second) test::ok(dfm_mesh_second_order(mesh, &mesh));
   return mesh;
 }
 
-dfm_body_def def_of(dfm_tetmesh mesh, const char *model) {
+dfm_body_def def_of(dfm_mesh_handle mesh, const char *model) {
   dfm_body_def d = dfm_body_def_default();
   test::lend(mesh, d);
   d.model = model;
@@ -38,7 +38,7 @@ struct Drop {
     world = test::make_world(context, {0, 0, -9.81}, integrator);
     test::add_plane(world, "floor");
     test::set_friction(world, 0.5);
-    dfm_tetmesh mesh = made(context, kind);
+    dfm_mesh_handle mesh = made(context, kind);
     dfm_body_def d = def_of(mesh, "corotational_fem");
     test::BodyOptions o;
     o.young = young;
@@ -47,7 +47,7 @@ struct Drop {
     d.spin[0] = 3;
     d.spin[1] = 1;
     test::ok(dfm_body_create(world, &d, &body));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
   }
   ~Drop() { dfm_world_destroy(world); }
 };
@@ -81,10 +81,8 @@ TEST(CellWorlds, MassAndVolume_AreThoseOfTheShape) {
   test::Context context;
   const dfm_world world = test::make_world(context);
   for (const Kind &kind : {kBall, kBricks}) {
-    dfm_tetmesh mesh = made(context, kind);
-    dfm_tetmesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    dfm_mesh_handle mesh = made(context, kind);
+    const dfm_mesh_info info = test::info_of(mesh);
     EXPECT_EQ(info.ncell, kind.cells);
     EXPECT_EQ(info.cell, uint32_t(kind.second ? DFM_CELL_TET10 : DFM_CELL_HEX8));
     const dfm_body_def d = def_of(mesh, "corotational_fem");
@@ -107,7 +105,7 @@ TEST(CellWorlds, MaterialsThatDifferWithinACell_AreThatOfItsFirstTetrahedron) {
   heavy.name = "heavy";
   const dfm_material a = test::make_material(world, light), b = test::make_material(world, heavy);
   for (const Kind &kind : {kBall, kBricks}) {
-    dfm_tetmesh mesh = made(context, kind);
+    dfm_mesh_handle mesh = made(context, kind);
     dfm_body_def d = def_of(mesh, "corotational_fem");
     const uint32_t each = kind.second ? 8 : 6;
     std::vector<dfm_material> mixed(d.ntet, b);
@@ -117,7 +115,7 @@ TEST(CellWorlds, MaterialsThatDifferWithinACell_AreThatOfItsFirstTetrahedron) {
     test::ok(dfm_body_create(world, &d, &body));
     const dfm_body_measure m = test::measure(body);
     EXPECT_NEAR(m.mass, 500 * m.rest_volume, 1e-9);
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
   }
   dfm_world_destroy(world);
 }
@@ -136,7 +134,7 @@ TEST(CellWorlds, Snapshot_ContinuesWithTheSameBits) {
 TEST(CellWorlds, StressAndEnergy_AreThatOfTheCell) {
   test::Context context;
   const dfm_world world = test::make_world(context);
-  dfm_tetmesh mesh = made(context, kBricks);
+  dfm_mesh_handle mesh = made(context, kBricks);
   dfm_body_def d = def_of(mesh, "corotational_fem");
   dfm_body body = 0;
   test::ok(dfm_body_create(world, &d, &body));
@@ -159,7 +157,7 @@ TEST(CellWorlds, WhatTakesNoSuchCells_SaysSo) {
   test::says({"neither cut nor torn", "hexahedra", "first-order tetrahedra"});
   EXPECT_EQ(dfm_body_set_model(d.body, "msm", nullptr), DFM_E_UNSUPPORTED);
   test::says({"msm", "does not accept hexahedra", "corotational_fem"});
-  dfm_tetmesh mesh = made(d.context, kBall);
+  dfm_mesh_handle mesh = made(d.context, kBall);
   dfm_body body = 0;
   for (const char *model : {"msm", "shape_matching", "modal", "condensed", "meshless"}) {
     const dfm_body_def def = def_of(mesh, model);
@@ -181,7 +179,7 @@ TEST(CellWorlds, WhatTakesNoSuchCells_SaysSo) {
     if (first_order) def.cell = DFM_CELL_TET;
     else def.cells = nullptr;
     EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_ARG);
-    test::says({"tetrahedra need no cells", "dfm_tetmesh_cells"});
+    test::says({"tetrahedra need no cells", "dfm_mesh_get_info"});
   }
   const double one = 1;
   const dfm_param_value value{"yield", &one, 1};

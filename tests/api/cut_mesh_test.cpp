@@ -12,13 +12,14 @@ TEST(CutMesh, RabbitCutByTenPlanes_KeepsItsMassAndHalfOfItsStep) {
     for (const bool share : {false, true}) {
       test::Context context;
       const dfm_world w = test::make_world(context, {0, 0, 0}, DFM_INTEGRATOR_SYMPLECTIC_EULER);
-      dfm_trimesh skin = 0;
-      dfm_tetmesh mesh = 0;
-      test::ok(dfm_trimesh_read(context, DEFORM_SOURCE_DIR "/examples/data/rabbit.obj", &skin));
-      test::ok(dfm_tetmesh_fill(skin, 600, &mesh));
+      dfm_mesh_handle skin = 0;
+      dfm_mesh_handle mesh = 0;
+      test::ok(
+          dfm_mesh_load(context, DEFORM_SOURCE_DIR "/examples/data/rabbit.obj", DFM_MESH_SURFACE, &skin));
+      test::ok(dfm_mesh_fill(skin, 600, &mesh));
       dfm_body_def d = dfm_body_def_default();
-      test::lend(mesh, d);
-      if (share) test::ok(dfm_tetmesh_share(mesh, &d.cell_share));
+      const dfm_mesh_info info = test::lend(mesh, d);
+      if (share) d.cell_share = info.share;
       test::BodyOptions o;
       o.young = 5e4;
       o.damping_stiffness = 1e-3;
@@ -56,7 +57,7 @@ TEST(CutMesh, RabbitCutByTenPlanes_KeepsItsMassAndHalfOfItsStep) {
       EXPECT_GT(parts, 5u);
       const State end(b);
       for (const double value : end.x) ASSERT_TRUE(std::isfinite(value)) << model;
-      test::ok(dfm_tetmesh_destroy(mesh));
-      test::ok(dfm_trimesh_destroy(skin));
+      test::ok(dfm_mesh_destroy(mesh));
+      test::ok(dfm_mesh_destroy(skin));
     }
 }

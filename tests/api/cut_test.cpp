@@ -306,9 +306,9 @@ TEST(Cut, LoadsHoldsAndAttachments_FollowTheirPoints) {
 TEST(Cut, PlasticStrain_StaysWithItsCell) {
   test::Context context;
   const dfm_world w = test::make_world(context, {0, 0, 0});
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[] = {0.3, 0.1, 0.1};
-  test::ok(dfm_tetmesh_make(context, "beam", size, 120, &mesh));
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 120, &mesh));
   dfm_body_def d = dfm_body_def_default();
   test::lend(mesh, d);
   test::BodyOptions o;
@@ -544,9 +544,9 @@ struct PulledBar {
   dfm_world w;
   dfm_body b = 0;
   explicit PulledBar(const char *model, double tear) : w(test::make_world(context, {0, 0, 0})) {
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[] = {0.3, 0.06, 0.06};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 200, &mesh));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 200, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     dfm_material_def m = dfm_material_def_default();

@@ -11,10 +11,10 @@ std::string scene(const std::string &name, const std::string &rest) {
   const std::string folder = test::scratch("explain_" + std::to_string(getpid()));
   const std::string path = folder + "/" + name + ".json";
   test::Context context;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[3] = {0.1, 0.1, 0.1};
-  test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
-  test::ok(dfm_tetmesh_write(mesh, (folder + "/block.msh").c_str()));
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 60, &mesh));
+  test::ok(dfm_mesh_write(mesh, (folder + "/block.msh").c_str()));
   test::write_file(
       path,
       R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.1}, )" + rest + "}");

@@ -9,18 +9,19 @@ namespace {
 struct Block {
   test::Context context;
   dfm_world world = 0;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   dfm_body_def def = dfm_body_def_default();
-  dfm_tetmesh_info info{};
+  dfm_mesh_info info{};
 
   Block() {
     world = test::make_world(context);
     test::add_plane(world, "floor");
     const double size[3] = {0.1, 0.1, 0.1};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 60, &mesh));
     info.size = sizeof info;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
-    test::ok(dfm_tetmesh_data(mesh, &def.points, &def.tets, nullptr));
+    test::ok(dfm_mesh_get_info(mesh, &info));
+    def.points = info.points;
+    def.tets = info.tets;
     def.name = "block";
     def.npoint = info.npoint;
     def.ntet = info.ntet;

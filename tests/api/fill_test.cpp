@@ -9,27 +9,21 @@ namespace {
 
 struct Filled {
   test::Context context;
-  dfm_trimesh surface = 0;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle surface = 0;
+  dfm_mesh_handle mesh = 0;
   explicit Filled(const char *kind, std::array<double, 3> size, uint32_t triangles) {
-    test::ok(dfm_trimesh_make(context, kind, size.data(), triangles, &surface));
+    test::ok(dfm_mesh_make(context, kind, size.data(), DFM_MESH_SURFACE, triangles, &surface));
   }
 };
 
 }  // namespace
 
 // unsanitized: too slow there; shorter tests run the same code
-TEST(TetmeshFill, Torus_SharesSumUpToItsVolume) {
+TEST(MeshFill, Torus_SharesSumUpToItsVolume) {
   Filled f("torus", {0.1, 0.03, 0}, 4000);
-  test::ok(dfm_tetmesh_fill(f.surface, 2000, &f.mesh));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_tetmesh_get_info(f.mesh, &info));
-  dfm_trimesh_info skin{};
-  skin.size = sizeof skin;
-  test::ok(dfm_trimesh_get_info(f.surface, &skin));
-  const double *share = nullptr;
-  test::ok(dfm_tetmesh_share(f.mesh, &share));
+  test::ok(dfm_mesh_fill(f.surface, 2000, &f.mesh));
+  const dfm_mesh_info info = test::info_of(f.mesh), skin = test::info_of(f.surface);
+  const double *const share = info.share;
   ASSERT_NE(share, nullptr);
   EXPECT_NEAR(info.ntet, 2000, 200);
   EXPECT_EQ(info.npiece, 1u);
@@ -40,26 +34,23 @@ TEST(TetmeshFill, Torus_SharesSumUpToItsVolume) {
 }
 
 // Twelve triangles around many cells: only a scene splits them.
-TEST(TetmeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsReportedWithTheRemedy) {
+TEST(MeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsReportedWithTheRemedy) {
   const auto reported = [](uint32_t triangles) {
     test::LoggedContext context;
     const double size[3] = {0.2, 0.2, 0.2};
-    dfm_trimesh surface = 0;
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_trimesh_make(context.context, "beam", size, triangles, &surface));
-    test::ok(dfm_tetmesh_fill(surface, 1500, &mesh));
-    dfm_tetmesh_info cells{};
-    cells.size = sizeof cells;
-    dfm_trimesh_info skin{};
-    skin.size = sizeof skin;
+    dfm_mesh_handle surface = 0;
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_make(context.context, "beam", size, DFM_MESH_SURFACE, triangles, &surface));
+    test::ok(dfm_mesh_fill(surface, 1500, &mesh));
+    const dfm_mesh_info cells = test::info_of(mesh), skin = test::info_of(surface);
     dfm_surface_def worn{};
     worn.size = sizeof worn;
     dfm_body_def body = dfm_body_def_default();
-    test::ok(dfm_tetmesh_get_info(mesh, &cells));
-    test::ok(dfm_trimesh_get_info(surface, &skin));
-    test::ok(dfm_tetmesh_data(mesh, &body.points, &body.tets, nullptr));
-    test::ok(dfm_tetmesh_share(mesh, &body.cell_share));
-    test::ok(dfm_trimesh_data(surface, &worn.points, &worn.triangles, nullptr));
+    body.points = cells.points;
+    body.tets = cells.tets;
+    body.cell_share = cells.share;
+    worn.points = skin.points;
+    worn.triangles = skin.faces;
     body.npoint = cells.npoint;
     body.ntet = cells.ntet;
     worn.npoint = skin.npoint;
@@ -79,27 +70,24 @@ TEST(TetmeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsReportedWithTheRemed
   EXPECT_EQ(fine.find("split edges"), std::string::npos) << fine;
 }
 
-TEST(TetmeshFill, MeshThatWasNotFilled_HasNoShare) {
+TEST(MeshFill, MeshThatWasNotFilled_HasNoShare) {
   test::Context context;
   const double size[3] = {1, 1, 1};
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_make(context, "beam", size, 100, &mesh));
-  const double *share = size;
-  test::ok(dfm_tetmesh_share(mesh, &share));
-  EXPECT_EQ(share, nullptr);
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 100, &mesh));
+  EXPECT_EQ(test::info_of(mesh).share, nullptr);
 }
 
-TEST(TetmeshFill, WrongArguments_AreRefusedWithASentence) {
+TEST(MeshFill, WrongArguments_AreRefusedWithASentence) {
   Filled f("ball", {0.1, 0, 0}, 500);
-  EXPECT_EQ(dfm_tetmesh_fill(f.surface, UINT32_MAX, &f.mesh), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_fill(f.surface, 100, nullptr), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_fill(0, 100, &f.mesh), DFM_E_HANDLE);
-  EXPECT_EQ(dfm_tetmesh_share(0, nullptr), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_fill(f.surface, UINT32_MAX, &f.mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_fill(f.surface, 100, nullptr), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_fill(0, 100, &f.mesh), DFM_E_HANDLE);
   const double points[] = {0, 0, 0, 1, 0, 0, 0, 1, 0};
   const uint32_t triangle[] = {0, 1, 2};
-  dfm_trimesh sheet = 0;
-  test::ok(dfm_trimesh_create(f.context, 3, points, 1, triangle, &sheet));
-  EXPECT_EQ(dfm_tetmesh_fill(sheet, 100, &f.mesh), DFM_E_FORMAT);
+  dfm_mesh_handle sheet = 0;
+  test::ok(dfm_mesh_create(f.context, 3, points, 1, triangle, &sheet));
+  EXPECT_EQ(dfm_mesh_fill(sheet, 100, &f.mesh), DFM_E_FORMAT);
   EXPECT_NE(std::string(dfm_last_error()).find("1 opening of 0.5 m2"), std::string::npos) << dfm_last_error();
 }
 
@@ -124,14 +112,14 @@ namespace {
 
 struct FromFile {
   test::Context context;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double *share = nullptr;
-  dfm_tetmesh_info info{};
+  dfm_mesh_info info{};
   explicit FromFile(const std::string &path) {
     info.size = sizeof info;
-    test::ok(dfm_tetmesh_read(context, path.c_str(), &mesh));
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
-    test::ok(dfm_tetmesh_share(mesh, &share));
+    test::ok(dfm_mesh_load(context, path.c_str(), DFM_MESH_CELLS, &mesh));
+    test::ok(dfm_mesh_get_info(mesh, &info));
+    share = info.share;
   }
 };
 

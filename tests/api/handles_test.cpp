@@ -349,57 +349,18 @@ std::vector<Call> law_calls() {
   };
 }
 
-std::vector<Call> tetmesh_calls() {
+std::vector<Call> mesh_calls() {
   return {
-      {"tetmesh_destroy", [](uint64_t h) { return dfm_tetmesh_destroy(h); }},
-      {"tetmesh_get_info",
+      {"mesh_destroy", [](uint64_t h) { return dfm_mesh_destroy(h); }},
+      {"mesh_get_info",
        [](uint64_t h) {
-         dfm_tetmesh_info i{};
-         return dfm_tetmesh_get_info(h, &i);
+         dfm_mesh_info i{};
+         return dfm_mesh_get_info(h, &i);
        }},
-      {"tetmesh_data", [](uint64_t h) { return dfm_tetmesh_data(h, nullptr, nullptr, nullptr); }},
-      {"tetmesh_groups", [](uint64_t h) { return dfm_tetmesh_groups(h, nullptr, nullptr); }},
-      {"tetmesh_group_points",
-       [](uint64_t h) { return dfm_tetmesh_group_points(h, 0, nullptr, nullptr, nullptr); }},
-      {"tetmesh_triangles", [](uint64_t h) { return dfm_tetmesh_triangles(h, nullptr, nullptr, nullptr); }},
-      {"tetmesh_cells", [](uint64_t h) { return dfm_tetmesh_cells(h, nullptr, nullptr); }},
-      {"tetmesh_second_order",
-       [](uint64_t h) {
-         dfm_tetmesh out;
-         return dfm_tetmesh_second_order(h, &out);
-       }},
-      {"tetmesh_file_cells",
-       [](uint64_t h) {
-         const uint32_t *p;
-         return dfm_tetmesh_file_cells(h, &p);
-       }},
-      {"tetmesh_inside",
-       [](uint64_t h) {
-         const double *p;
-         return dfm_tetmesh_inside(h, &p);
-       }},
-      {"tetmesh_share",
-       [](uint64_t h) {
-         const double *p;
-         return dfm_tetmesh_share(h, &p);
-       }},
-      {"tetmesh_write", [](uint64_t h) { return dfm_tetmesh_write(h, "/nonexistent/x.msh"); }},
-  };
-}
-
-std::vector<Call> trimesh_calls() {
-  return {
-      {"trimesh_destroy", [](uint64_t h) { return dfm_trimesh_destroy(h); }},
-      {"trimesh_get_info",
-       [](uint64_t h) {
-         dfm_trimesh_info i{};
-         return dfm_trimesh_get_info(h, &i);
-       }},
-      {"trimesh_data", [](uint64_t h) { return dfm_trimesh_data(h, nullptr, nullptr, nullptr); }},
-      {"trimesh_groups", [](uint64_t h) { return dfm_trimesh_groups(h, nullptr, nullptr); }},
-      {"trimesh_write", [](uint64_t h) { return dfm_trimesh_write(h, "/nonexistent/x.obj"); }},
-      {"tetmesh_fill", [](uint64_t h) { return dfm_tetmesh_fill(h, 100, &made); }},
-      {"tetmesh_lattice", [](uint64_t h) { return dfm_tetmesh_lattice(h, 10, 0, &made); }},
+      {"mesh_write", [](uint64_t h) { return dfm_mesh_write(h, "/nonexistent/x.msh"); }},
+      {"mesh_second_order", [](uint64_t h) { return dfm_mesh_second_order(h, &made); }},
+      {"mesh_fill", [](uint64_t h) { return dfm_mesh_fill(h, 100, &made); }},
+      {"mesh_lattice", [](uint64_t h) { return dfm_mesh_lattice(h, 10, 0, &made); }},
   };
 }
 
@@ -432,8 +393,7 @@ std::vector<Taker> takers() {
           {DFM_HANDLE_TOOL, "a tool", tool_calls()},
           {DFM_HANDLE_MATERIAL, "a material", material_calls()},
           {DFM_HANDLE_LAW, "a law", law_calls()},
-          {DFM_HANDLE_TETMESH, "a mesh", tetmesh_calls()},
-          {DFM_HANDLE_TRIMESH, "a surface mesh", trimesh_calls()},
+          {DFM_HANDLE_MESH, "a mesh", mesh_calls()},
           {DFM_HANDLE_SCENE, "a scene", scene_calls()}};
 }
 
@@ -464,8 +424,7 @@ std::vector<Live> live(dfm_context *c) {
   add(DFM_HANDLE_TOOL, "a tool", dfm_tool_create(s.world, &tool_def, &h), h);
   add(DFM_HANDLE_MATERIAL, "a material", dfm_material_create(s.world, &material_def, &h), h);
   add(DFM_HANDLE_LAW, "a law", dfm_law_open(c, "coulomb", &h), h);
-  add(DFM_HANDLE_TETMESH, "a mesh", dfm_tetmesh_make(c, "ball", size, 100, &h), h);
-  add(DFM_HANDLE_TRIMESH, "a surface mesh", dfm_trimesh_make(c, "ball", size, 100, &h), h);
+  add(DFM_HANDLE_MESH, "a mesh", dfm_mesh_make(c, "ball", size, DFM_MESH_CELLS, 100, &h), h);
   add(DFM_HANDLE_SCENE, "a scene", dfm_scene_open(c, file.c_str(), nullptr, &h), h);
   return out;
 }
@@ -476,7 +435,7 @@ std::multiset<std::string> declared() {
   const std::regex comment(R"(/\*[\s\S]*?\*/)");
   const std::regex function(
       R"(\bdfm_status\s+dfm_(\w+)\s*\(\s*dfm_(world|body|obstacle|rigid|tool|material|law|)"
-      R"(scene|tetmesh|trimesh)\s+\w)");
+      R"(scene|mesh_handle)\s+\w)");
   std::multiset<std::string> out;
   for (const auto &entry :
        std::filesystem::directory_iterator(std::string(DEFORM_SOURCE_DIR) + "/libdeform/include/deform")) {
@@ -606,20 +565,20 @@ TEST(Handles, AfterAWorldIsDestroyed_ItsHandlesAreStale) {
 TEST(Handles, AfterTheContextIsDestroyed_EveryHandleIsStale) {
   test::Stack s;
   dfm_law law = 0;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   {
     test::Context c;
     s = test::make_stack(c);
     test::run(s.world, 5e-3, 1e-3);
     test::ok(dfm_law_open(c, "coulomb", &law));
     const double size[3] = {0.1, 0, 0};
-    test::ok(dfm_tetmesh_make(c, "ball", size, 100, &mesh));
+    test::ok(dfm_mesh_make(c, "ball", size, DFM_MESH_CELLS, 100, &mesh));
   }
   all_refuse(world_calls(), s.world, "stale");
   all_refuse(body_calls(), s.upper, "stale");
   all_refuse(obstacle_calls(), s.floor, "stale");
   all_refuse(law_calls(), law, "stale");
-  all_refuse(tetmesh_calls(), mesh, "stale");
+  all_refuse(mesh_calls(), mesh, "stale");
   dfm_context_destroy(nullptr);
 }
 

@@ -49,7 +49,7 @@ constexpr bool kMixed = std::is_convertible_v<A, B> || std::is_constructible_v<A
                         std::is_assignable_v<A &, B> || requires(A a, B b) { a == b; };
 static_assert(!kMixed<deform::Body, deform::World> && !kMixed<deform::Body, deform::Obstacle> &&
               !kMixed<deform::Obstacle, deform::Body>);
-static_assert(!kMixed<deform::Law, deform::Material> && !kMixed<deform::TetMesh, deform::TriMesh> &&
+static_assert(!kMixed<deform::Law, deform::Material> && !kMixed<deform::Mesh, deform::World> &&
               !kMixed<deform::Scene, deform::World>);
 static_assert(!kMixed<deform::Rigid, deform::Body> &&
               !std::is_convertible_v<deform::Obstacle, deform::Rigid>);
@@ -291,28 +291,30 @@ TEST(Hpp, Meshes_LendTheirArrays) {
   const auto context = deform::Context::make(quiet());
   const auto surface = context.make_surface("ball", {0.1}, 400);
   const auto shape = surface.data();
-  EXPECT_EQ(shape.triangles.size(), 3 * surface.info().ntriangle);
+  EXPECT_EQ(shape.faces.size(), 3 * surface.info().ntriangle);
+  EXPECT_TRUE(shape.tets.empty());
   const auto filled = surface.fill(800);
-  EXPECT_EQ(filled.share().size(), filled.info().ntet)
-      << "a filled mesh tells how much of each cell is material";
+  EXPECT_NE(filled.info().share, nullptr) << "a filled mesh tells how much of each cell is material";
   const auto made = context.make_tets("beam", {0.1, 0.1, 0.4}, 100);
-  EXPECT_TRUE(made.share().empty());
+  EXPECT_EQ(made.info().share, nullptr);
   EXPECT_EQ(made.data().tets.size(), 4 * made.info().ntet);
   deform::BodyDef def;
   def.set_mesh(filled);
-  EXPECT_EQ(def.cell_share, filled.share().data());
+  EXPECT_EQ(def.cell_share, filled.info().share);
   EXPECT_EQ(def.npoint, filled.info().npoint);
   const auto lattice = surface.lattice(30);
   deform::BodyDef of_lattice;
   of_lattice.set_mesh(lattice);
   EXPECT_NE(of_lattice.cell_inside, nullptr);
   EXPECT_EQ(of_lattice.cell_share, nullptr);
-  const auto again = context.make_surface(shape.points, shape.triangles);
+  const auto again = context.make_surface(shape.points, shape.faces);
   EXPECT_EQ(again.info().ntriangle, surface.info().ntriangle);
   EXPECT_THROW((void)context.make_tets("bal", {0.1}, 100), deform::Error);
-  const auto read = context.read_mesh(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces/cube_obj.obj");
-  EXPECT_FALSE(read.cells);
-  EXPECT_EQ(read.surface.info().ntriangle, 12u);
+  const auto read = context.load_mesh(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces/cube_obj.obj");
+  EXPECT_EQ(read.info().ntet, 0u);
+  EXPECT_EQ(read.info().ntriangle, 12u);
+  EXPECT_THROW((void)read.second_order(), deform::Error);
+  EXPECT_EQ(made.second_order().info().ntet, 8 * made.info().ntet);
 }
 
 TEST(Hpp, Switches_BeginWithTheLibrarysDefaults) {

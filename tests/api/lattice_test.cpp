@@ -10,39 +10,35 @@ namespace {
 
 constexpr double kRadius = 0.1, kFlat = 0.6;
 
-dfm_trimesh ball(dfm_context *context, double triangles = 1000) {
+dfm_mesh_handle ball(dfm_context *context, double triangles = 1000) {
   const double size[3] = {kRadius, 0, 0};
-  dfm_trimesh out = 0;
-  test::ok(dfm_trimesh_make(context, "ball", size, uint32_t(triangles), &out));
+  dfm_mesh_handle out = 0;
+  test::ok(dfm_mesh_make(context, "ball", size, DFM_MESH_SURFACE, uint32_t(triangles), &out));
   return out;
 }
 
 // The ball, flatter: it does not roll.
-dfm_trimesh pebble(dfm_context *context) {
-  const dfm_trimesh round = ball(context);
-  dfm_trimesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_trimesh_get_info(round, &info));
-  const double *x = nullptr;
-  const uint32_t *triangles = nullptr;
-  test::ok(dfm_trimesh_data(round, &x, &triangles, nullptr));
+dfm_mesh_handle pebble(dfm_context *context) {
+  const dfm_mesh_handle round = ball(context);
+  const dfm_mesh_info info = test::info_of(round);
+  const double *const x = info.points;
+  const uint32_t *const triangles = info.faces;
   std::vector<double> points(x, x + 3 * info.npoint);
   for (size_t i = 2; i < points.size(); i += 3) points[i] *= kFlat;
-  dfm_trimesh out = 0;
-  test::ok(dfm_trimesh_create(context, info.npoint, points.data(), info.ntriangle, triangles, &out));
+  dfm_mesh_handle out = 0;
+  test::ok(dfm_mesh_create(context, info.npoint, points.data(), info.ntriangle, triangles, &out));
   return out;
 }
 
 struct Worn {
   dfm_surface_def def{};
-  explicit Worn(dfm_trimesh skin) {
-    dfm_trimesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_trimesh_get_info(skin, &info));
+  explicit Worn(dfm_mesh_handle skin) {
+    const dfm_mesh_info info = test::info_of(skin);
     def.size = sizeof def;
     def.npoint = info.npoint;
     def.ntriangle = info.ntriangle;
-    test::ok(dfm_trimesh_data(skin, &def.points, &def.triangles, nullptr));
+    def.points = info.points;
+    def.triangles = info.faces;
   }
 };
 
@@ -54,10 +50,10 @@ struct Resting {
     world = test::make_world(context, {0, 0, -9.81}, integrator);
     test::add_plane(world, "floor");
     test::set_friction(world, 0.5);
-    const dfm_trimesh skin = pebble(context);
+    const dfm_mesh_handle skin = pebble(context);
     const Worn worn(skin);
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_lattice(skin, cells, 0, &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_lattice(skin, cells, 0, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     d.model = "corotational_fem";
@@ -123,7 +119,7 @@ TEST(Lattice, SurfaceFollowsTrilinearFields) {
     field(p);
   }
   test::ok(dfm_body_set_state(r.body, n, x.data(), nullptr));
-  const dfm_trimesh skin = pebble(r.context);
+  const dfm_mesh_handle skin = pebble(r.context);
   const Worn worn(skin);
   std::vector<double> want(worn.def.points, worn.def.points + 3 * worn.def.npoint);
   for (size_t i = 0; i < want.size(); i += 3) field(&want[i]);
@@ -143,7 +139,7 @@ constexpr const char *kScene = R"({"format": "deform-scene", "version": 1,
 TEST(Lattice, Scene_MakesItAndAWrittenSceneHasIt) {
   test::Context context;
   const std::string folder = test::scratch("lattice_scene");
-  test::ok(dfm_trimesh_write(ball(context), (folder + "/ball.stl").c_str()));
+  test::ok(dfm_mesh_write(ball(context), (folder + "/ball.stl").c_str()));
   const test::Written both(context, folder, kScene);
   for (const char *name : {"ball", "fine"}) {
     const dfm_body a = both.same(name);
@@ -164,8 +160,8 @@ TEST(Lattice, HeldSurface_Stays) {
   test::Context context;
   const std::string folder = test::scratch("lattice_held"), path = folder + "/scene.json";
   const double size[3] = {1, 0.3, 0.3};
-  dfm_trimesh straight = 0, askew = 0;
-  test::ok(dfm_trimesh_make(context, "beam", size, 400, &straight));
+  dfm_mesh_handle straight = 0, askew = 0;
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_SURFACE, 400, &straight));
   const Worn worn(straight);
   std::vector<double> points(worn.def.points, worn.def.points + 3 * size_t{worn.def.npoint});
   const double c = std::cos(0.3), s = std::sin(0.3);
@@ -174,9 +170,9 @@ TEST(Lattice, HeldSurface_Stays) {
     points[i] = c * x - s * y;
     points[i + 1] = s * x + c * y;
   }
-  test::ok(dfm_trimesh_create(context, worn.def.npoint, points.data(), worn.def.ntriangle, worn.def.triangles,
-                              &askew));
-  test::ok(dfm_trimesh_write(askew, (folder + "/bar.stl").c_str()));
+  test::ok(dfm_mesh_create(context, worn.def.npoint, points.data(), worn.def.ntriangle, worn.def.triangles,
+                           &askew));
+  test::ok(dfm_mesh_write(askew, (folder + "/bar.stl").c_str()));
   for (const int cells : {3, 12, 40}) {
     test::write_file(path,
                      R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.2, "step": 0.01},
@@ -208,35 +204,35 @@ TEST(Lattice, HeldSurface_Stays) {
 
 TEST(Lattice, WhatCannotBeOne_SaysSo) {
   test::Context context;
-  const dfm_trimesh whole = ball(context);
-  dfm_tetmesh mesh = 0;
-  EXPECT_EQ(dfm_tetmesh_lattice(whole, 0, 0, &mesh), DFM_E_ARG);
+  const dfm_mesh_handle whole = ball(context);
+  dfm_mesh_handle mesh = 0;
+  EXPECT_EQ(dfm_mesh_lattice(whole, 0, 0, &mesh), DFM_E_ARG);
   test::says({"either a number of cells", "or their size"});
-  EXPECT_EQ(dfm_tetmesh_lattice(whole, 5, 0.1, &mesh), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_lattice(whole, 2000000, 0, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_lattice(whole, 5, 0.1, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_lattice(whole, 2000000, 0, &mesh), DFM_E_ARG);
   test::says({"1 to 1000000"});
-  EXPECT_EQ(dfm_tetmesh_lattice(whole, 0, 1e-4, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_lattice(whole, 0, 1e-4, &mesh), DFM_E_ARG);
   test::says({"cells of 0.0001 m", "at most 1000000"});
-  EXPECT_EQ(dfm_tetmesh_lattice(whole, 0, 0.3, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_lattice(whole, 0, 0.3, &mesh), DFM_E_ARG);
   test::says({"cells of 0.3 m are larger than the surface"});
   const Worn worn(whole);
-  dfm_trimesh open = 0;
-  test::ok(dfm_trimesh_create(context, worn.def.npoint, worn.def.points, worn.def.ntriangle - 1,
-                              worn.def.triangles, &open));
-  EXPECT_EQ(dfm_tetmesh_lattice(open, 8, 0, &mesh), DFM_E_FORMAT);
+  dfm_mesh_handle open = 0;
+  test::ok(dfm_mesh_create(context, worn.def.npoint, worn.def.points, worn.def.ntriangle - 1,
+                           worn.def.triangles, &open));
+  EXPECT_EQ(dfm_mesh_lattice(open, 8, 0, &mesh), DFM_E_FORMAT);
   test::says({"the surface is open", "3 edges", "fill"});
   std::vector<double> points(worn.def.points, worn.def.points + 3 * worn.def.npoint);
   std::vector<uint32_t> triangles(worn.def.triangles, worn.def.triangles + 3 * worn.def.ntriangle);
   for (size_t i = 0; i < size_t{3} * worn.def.npoint; ++i) points.push_back(points[i] + (i % 3 ? 0 : 0.03));
   for (size_t i = 0; i < size_t{3} * worn.def.ntriangle; ++i)
     triangles.push_back(triangles[i] + worn.def.npoint);
-  dfm_trimesh crossing = 0;
-  test::ok(dfm_trimesh_create(context, 2 * worn.def.npoint, points.data(), 2 * worn.def.ntriangle,
-                              triangles.data(), &crossing));
-  EXPECT_EQ(dfm_tetmesh_lattice(crossing, 100, 0, &mesh), DFM_E_FORMAT);
+  dfm_mesh_handle crossing = 0;
+  test::ok(dfm_mesh_create(context, 2 * worn.def.npoint, points.data(), 2 * worn.def.ntriangle,
+                           triangles.data(), &crossing));
+  EXPECT_EQ(dfm_mesh_lattice(crossing, 100, 0, &mesh), DFM_E_FORMAT);
   test::says({"crosses itself", "fill"});
 
-  test::ok(dfm_tetmesh_lattice(whole, 8, 0, &mesh));
+  test::ok(dfm_mesh_lattice(whole, 8, 0, &mesh));
   const dfm_world world = test::make_world(context);
   dfm_body_def d = dfm_body_def_default();
   test::lend(mesh, d);
@@ -252,7 +248,7 @@ TEST(Lattice, WhatCannotBeOne_SaysSo) {
   dfm_world_destroy(world);
 
   const std::string folder = test::scratch("lattice_errors"), path = folder + "/scene.json";
-  test::ok(dfm_trimesh_write(whole, (folder + "/ball.stl").c_str()));
+  test::ok(dfm_mesh_write(whole, (folder + "/ball.stl").c_str()));
   const auto reported = [&](const std::string &keys, std::initializer_list<const char *> parts) {
     test::write_file(path, R"({"format": "deform-scene", "version": 1,
       "time": {"duration": 0.02, "step": 0.01},

@@ -292,7 +292,7 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
     def.plugin_dir = plugins.c_str();
     dfm_context *c = nullptr;
     dfm_world world = 0;
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     dfm_body bodies[2] = {};
     int stage = 0;
     dfm_status status = dfm_context_create(&def, &c);
@@ -315,15 +315,16 @@ TEST(Memory, WhenTheNthAllocationFails_TheCallFailsCleanlyAndNothingLeaks) {
         if (status == DFM_OK) status = dfm_obstacle_create(world, &td, &floor);
       }
       const double size[3] = {0.05, 0, 0};
-      if (status == DFM_OK) status = dfm_tetmesh_make(c, "ball", size, 100, &mesh);
+      if (status == DFM_OK) status = dfm_mesh_make(c, "ball", size, DFM_MESH_CELLS, 100, &mesh);
       if (status == DFM_OK) {
         ++stage;
-        dfm_tetmesh_info info{};
-        test::ok(dfm_tetmesh_get_info(mesh, &info));
+        dfm_mesh_info info{};
+        test::ok(dfm_mesh_get_info(mesh, &info));
         dfm_body_def bd = dfm_body_def_default();
         bd.npoint = info.npoint;
         bd.ntet = info.ntet;
-        test::ok(dfm_tetmesh_data(mesh, &bd.points, &bd.tets, nullptr));
+        bd.points = info.points;
+        bd.tets = info.tets;
         for (int k = 0; k < 2 && status == DFM_OK; ++k) {
           bd.pose.position[2] = 0.0501 + 0.1002 * k;
           bd.velocity[2] = -0.1;

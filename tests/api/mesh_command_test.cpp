@@ -360,67 +360,64 @@ TEST(MeshCommand, BadInput_ExitsTwoWithOneSentence) {
 
 TEST(MeshApi, Read_ReportsWarningsAndLendsArrays) {
   test::LoggedContext c;
-  dfm_tetmesh mesh = 0;
-  ASSERT_EQ(dfm_tetmesh_read(c.context, own("cube_msh41_bin_be.msh").c_str(), &mesh), DFM_OK)
+  dfm_mesh_handle mesh = 0;
+  ASSERT_EQ(dfm_mesh_load(c.context, own("cube_msh41_bin_be.msh").c_str(), DFM_MESH_CELLS, &mesh), DFM_OK)
       << dfm_last_error();
   EXPECT_TRUE(has(c.log, "cube_msh41_bin_be.msh: 1 point that no tetrahedron uses was dropped")) << c.log;
-  dfm_tetmesh_info info = {};
+  dfm_mesh_info info = {};
   info.size = sizeof info;
-  ASSERT_EQ(dfm_tetmesh_get_info(mesh, &info), DFM_OK);
+  ASSERT_EQ(dfm_mesh_get_info(mesh, &info), DFM_OK);
   EXPECT_EQ(info.npoint, 8u);
   EXPECT_EQ(info.ngroup, 3u);
   EXPECT_STREQ(info.warnings, "1 point that no tetrahedron uses was dropped\n");
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr, *place = nullptr, *group = nullptr, *skin = nullptr;
-  const char *const *names = nullptr;
-  ASSERT_EQ(dfm_tetmesh_data(mesh, &points, &tets, &place), DFM_OK);
-  EXPECT_EQ(place[2], 3u);
-  ASSERT_EQ(dfm_tetmesh_groups(mesh, &names, &group), DFM_OK);
-  EXPECT_STREQ(names[group[5]], "high end");
-  uint32_t dimension = 9, n = 0;
-  ASSERT_EQ(dfm_tetmesh_group_points(mesh, 0, &dimension, &skin, &n), DFM_OK);
-  EXPECT_EQ(dimension, 2u);
-  EXPECT_EQ(n, 8u);
-  EXPECT_EQ(dfm_tetmesh_group_points(mesh, 3, nullptr, nullptr, nullptr), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_destroy(mesh), DFM_OK);
-  EXPECT_EQ(dfm_tetmesh_get_info(mesh, &info), DFM_E_HANDLE);
-  EXPECT_EQ(dfm_tetmesh_destroy(mesh), DFM_E_HANDLE);
+  EXPECT_EQ(info.file_point[2], 3u);
+  EXPECT_STREQ(info.group_names[info.cell_group[5]], "high end");
+  EXPECT_EQ(info.group_dimension[0], 2u);
+  EXPECT_EQ(info.group_npoint[0], 8u);
+  EXPECT_EQ(dfm_mesh_destroy(mesh), DFM_OK);
+  EXPECT_EQ(dfm_mesh_get_info(mesh, &info), DFM_E_HANDLE);
+  EXPECT_EQ(dfm_mesh_destroy(mesh), DFM_E_HANDLE);
 }
 
 TEST(MeshApi, OlderInfoStruct_IsFilledUpToItsSize) {
   test::LoggedContext c;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[3] = {0.1, 0, 0};
-  ASSERT_EQ(dfm_tetmesh_make(c.context, "ball", size, 100, &mesh), DFM_OK);
-  dfm_tetmesh_info info;
+  ASSERT_EQ(dfm_mesh_make(c.context, "ball", size, DFM_MESH_CELLS, 100, &mesh), DFM_OK);
+  dfm_mesh_info info;
   std::memset(&info, 0xee, sizeof info);
-  info.size = offsetof(dfm_tetmesh_info, turned);
-  ASSERT_EQ(dfm_tetmesh_get_info(mesh, &info), DFM_OK);
+  info.size = offsetof(dfm_mesh_info, turned);
+  ASSERT_EQ(dfm_mesh_get_info(mesh, &info), DFM_OK);
   EXPECT_EQ(info.ntet, 160u);
   EXPECT_EQ(info.turned, 0xeeeeeeeeu);
 }
 
 TEST(MeshApi, ContextDestroyed_TakesItsMeshesAlong) {
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[3] = {1, 1, 1};
   {
     test::LoggedContext c;
-    ASSERT_EQ(dfm_tetmesh_make(c.context, "beam", size, 10, &mesh), DFM_OK);
+    ASSERT_EQ(dfm_mesh_make(c.context, "beam", size, DFM_MESH_CELLS, 10, &mesh), DFM_OK);
   }
-  EXPECT_EQ(dfm_tetmesh_data(mesh, nullptr, nullptr, nullptr), DFM_E_HANDLE);
+  dfm_mesh_info info = {};
+  EXPECT_EQ(dfm_mesh_get_info(mesh, &info), DFM_E_HANDLE);
 }
 
 TEST(MeshApi, WrongArguments_LeaveTheOutputAlone) {
   test::LoggedContext c;
-  dfm_tetmesh mesh = 77;
+  dfm_mesh_handle mesh = 77;
   const double size[3] = {1, 1, 1};
-  EXPECT_EQ(dfm_tetmesh_make(c.context, "cone", size, 10, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_make(c.context, "cone", size, DFM_MESH_CELLS, 10, &mesh), DFM_E_ARG);
   EXPECT_TRUE(has(dfm_last_error(), "cylinder, beam, bricks, ball or tube"));
-  EXPECT_EQ(dfm_tetmesh_make(c.context, "ball", size, 0, &mesh), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_make(nullptr, "ball", size, 10, &mesh), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_make(c.context, "ball", nullptr, 10, &mesh), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_read(c.context, nullptr, &mesh), DFM_E_ARG);
-  EXPECT_EQ(dfm_tetmesh_read(c.context, own("none.msh").c_str(), &mesh), DFM_E_IO);
+  EXPECT_EQ(dfm_mesh_make(c.context, "ball", size, DFM_MESH_CELLS, 0, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_make(nullptr, "ball", size, DFM_MESH_CELLS, 10, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_make(c.context, "ball", nullptr, DFM_MESH_CELLS, 10, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_make(c.context, "ball", size, DFM_MESH_ANY, 10, &mesh), DFM_E_ARG);
+  EXPECT_TRUE(has(dfm_last_error(), "'ball': what is 0; expected DFM_MESH_CELLS or DFM_MESH_SURFACE"));
+  EXPECT_EQ(dfm_mesh_load(c.context, nullptr, DFM_MESH_CELLS, &mesh), DFM_E_ARG);
+  EXPECT_EQ(dfm_mesh_load(c.context, own("none.msh").c_str(), 3, &mesh), DFM_E_ARG);
+  EXPECT_TRUE(has(dfm_last_error(), "what is 3; expected DFM_MESH_ANY"));
+  EXPECT_EQ(dfm_mesh_load(c.context, own("none.msh").c_str(), DFM_MESH_CELLS, &mesh), DFM_E_IO);
   EXPECT_EQ(mesh, 77u);
 }
 

@@ -177,17 +177,17 @@ TEST(MeshObstacleScene, Keys_AreReadAndChecked) {
   const std::string dir = test::scratch("mesh_obstacle_" + std::to_string(getpid()));
   {
     test::Context context;
-    dfm_tetmesh cells = 0;
+    dfm_mesh_handle cells = 0;
     const double size[3] = {0.1, 0.1, 0.1}, slab[3] = {1, 1, 0.2};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 40, &cells));
-    test::ok(dfm_tetmesh_write(cells, (dir + "/block.msh").c_str()));
-    dfm_trimesh surface = 0;
-    test::ok(dfm_trimesh_make(context, "beam", slab, 200, &surface));
-    test::ok(dfm_trimesh_write(surface, (dir + "/slab.ply").c_str()));
-    dfm_trimesh sheet = 0;
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 40, &cells));
+    test::ok(dfm_mesh_write(cells, (dir + "/block.msh").c_str()));
+    dfm_mesh_handle surface = 0;
+    test::ok(dfm_mesh_make(context, "beam", slab, DFM_MESH_SURFACE, 200, &surface));
+    test::ok(dfm_mesh_write(surface, (dir + "/slab.ply").c_str()));
+    dfm_mesh_handle sheet = 0;
     const dfm_obstacle_def d = test::mesh_def("sheet", hills());
-    test::ok(dfm_trimesh_create(context, d.npoint, d.points, d.ntriangle, d.triangles, &sheet));
-    test::ok(dfm_trimesh_write(sheet, (dir + "/sheet.obj").c_str()));
+    test::ok(dfm_mesh_create(context, d.npoint, d.points, d.ntriangle, d.triangles, &sheet));
+    test::ok(dfm_mesh_write(sheet, (dir + "/sheet.obj").c_str()));
   }
   test::write_file(dir + "/scene.json",
                    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1, "step": 0.001},

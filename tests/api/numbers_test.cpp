@@ -254,9 +254,9 @@ std::vector<Number> Scene::numbers() {
       N("path", const double d[3] = {0, x, 1}; return query({0, 0, 0}, d, 1);),
       N("point", const double o[3] = {0, x, 0}; double f[3], m[3];
         return dfm_world_pair_wrench(w, body, floor, o, f, m);),
-      N("beam", const double size[3] = {0.1, x, 0.1}; dfm_tetmesh m = 0;
-        const dfm_status s = dfm_tetmesh_make(c, "beam", size, 10, &m);
-        if (s == DFM_OK) test::ok(dfm_tetmesh_destroy(m)); return s;),
+      N("beam", const double size[3] = {0.1, x, 0.1}; dfm_mesh_handle m = 0;
+        const dfm_status s = dfm_mesh_make(c, "beam", size, DFM_MESH_CELLS, 10, &m);
+        if (s == DFM_OK) test::ok(dfm_mesh_destroy(m)); return s;),
   };
   all.push_back({"reach",
                  [this](double x) {

@@ -193,19 +193,17 @@ dfm_pose tilted(double along) {
 }
 dfm_body filled_cube(dfm_context *c, dfm_world w, const char *name, double along) {
   const double size[3] = {0.2, 0.2, 0.2};
-  dfm_trimesh skin = 0;
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_trimesh_make(c, "beam", size, 400, &skin));
-  test::ok(dfm_tetmesh_fill(skin, 100, &mesh));
+  dfm_mesh_handle skin = 0;
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(c, "beam", size, DFM_MESH_SURFACE, 400, &skin));
+  test::ok(dfm_mesh_fill(skin, 100, &mesh));
   dfm_body_def d = dfm_body_def_default();
-  test::lend(mesh, d);
-  test::ok(dfm_tetmesh_share(mesh, &d.cell_share));
+  d.cell_share = test::lend(mesh, d).share;
   dfm_surface_def s = {};
   s.size = sizeof s;
-  dfm_trimesh_info info = {};
-  info.size = sizeof info;
-  test::ok(dfm_trimesh_get_info(skin, &info));
-  test::ok(dfm_trimesh_data(skin, &s.points, &s.triangles, nullptr));
+  const dfm_mesh_info info = test::info_of(skin);
+  s.points = info.points;
+  s.triangles = info.faces;
   s.npoint = info.npoint;
   s.ntriangle = info.ntriangle;
   d.surface = &s;
@@ -213,8 +211,8 @@ dfm_body filled_cube(dfm_context *c, dfm_world w, const char *name, double along
   d.pose = tilted(along);
   dfm_body b = 0;
   test::ok(dfm_body_create(w, &d, &b));
-  test::ok(dfm_tetmesh_destroy(mesh));
-  test::ok(dfm_trimesh_destroy(skin));
+  test::ok(dfm_mesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(skin));
   return b;
 }
 

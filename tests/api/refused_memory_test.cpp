@@ -338,12 +338,12 @@ bool set_up_without(int64_t n, int &refused) {
   dfm_context_def d = test::refusing_context();
   dfm_context *c = nullptr;
   dfm_world w = 0;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[3] = {0.1, 0.1, 0.1};
   Refusal::arm(n);
   dfm_status status = dfm_context_create(&d, &c);
   if (status == DFM_OK) status = dfm_world_create(c, nullptr, &w);
-  if (status == DFM_OK) status = dfm_tetmesh_make(c, "beam", size, 10, &mesh);
+  if (status == DFM_OK) status = dfm_mesh_make(c, "beam", size, DFM_MESH_CELLS, 10, &mesh);
   const bool through = !Refusal::disarm();
   if (status != DFM_OK) {
     ++refused;

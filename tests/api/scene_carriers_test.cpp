@@ -534,19 +534,15 @@ TEST(SceneSurface, Mistakes_AreReported) {
 TEST(FileCells, AreTheFilesNumbers_WhereADoubleWasDropped) {
   test::Context context;
   folder();
-  dfm_tetmesh mesh = 0;
-  const uint32_t *cells = nullptr;
-  test::ok(dfm_tetmesh_read(context, (folder() + "/column.msh").c_str(), &mesh));
-  test::ok(dfm_tetmesh_file_cells(mesh, &cells));
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_load(context, (folder() + "/column.msh").c_str(), DFM_MESH_CELLS, &mesh));
+  const uint32_t *const cells = test::info_of(mesh).file_cell;
   ASSERT_NE(cells, nullptr);
   EXPECT_EQ(cells[0], 0u);
   EXPECT_EQ(cells[1], 2u) << "number 1 was a double of number 0";
   EXPECT_EQ(cells[47], 48u);
-  EXPECT_EQ(dfm_tetmesh_file_cells(mesh, nullptr), DFM_E_ARG);
   const double size[3] = {1, 1, 1};
-  dfm_tetmesh whole = 0;
-  test::ok(dfm_tetmesh_make(context, "beam", size, 20, &whole));
-  test::ok(dfm_tetmesh_file_cells(whole, &cells));
-  EXPECT_EQ(cells, nullptr) << "none was dropped";
-  EXPECT_EQ(dfm_tetmesh_file_cells(12345, &cells), DFM_E_HANDLE);
+  dfm_mesh_handle whole = 0;
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 20, &whole));
+  EXPECT_EQ(test::info_of(whole).file_cell, nullptr) << "none was dropped";
 }

@@ -31,10 +31,10 @@ const std::string &folder() {
   static const std::string dir = [] {
     const std::string d = test::scratch("scene_errors_" + std::to_string(getpid()));
     test::Context context;
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[3] = {0.1, 0.1, 0.1};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 40, &mesh));
-    test::ok(dfm_tetmesh_write(mesh, (d + "/block.msh").c_str()));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 40, &mesh));
+    test::ok(dfm_mesh_write(mesh, (d + "/block.msh").c_str()));
     test::write_file(d + "/scene.json", kScene);
     return d;
   }();

@@ -386,8 +386,8 @@ TEST(SetModel, SnapshotAfterIt_RestoresBeforeAndAfter) {
 TEST(SetModel, FieldsByCell_StayWithTheMesh) {
   test::Context c;
   const double size[3] = {0.2, 0.1, 0.1};
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_make(c, "beam", size, 60, &mesh));
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(c, "beam", size, DFM_MESH_CELLS, 60, &mesh));
   dfm_body_def d = dfm_body_def_default();
   test::lend(mesh, d);
   std::vector<double> young(d.ntet);
@@ -407,7 +407,7 @@ TEST(SetModel, FieldsByCell_StayWithTheMesh) {
   EXPECT_EQ(test::measure(changed).elastic, test::measure(made).elastic);
   EXPECT_EQ(set_model(changed, "msm", {{"young", 1e5}}), DFM_E_ARG);
   test::says({"young", "field"});
-  test::ok(dfm_tetmesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(mesh));
 }
 
 TEST(SetModel, EffectThatTheSceneRequests_IsNotLostSilently) {

@@ -12,10 +12,10 @@ const std::string &folder() {
   static const std::string dir = [] {
     const std::string d = test::scratch("switch_" + std::to_string(getpid()));
     test::Context context;
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[3] = {0.1, 0.1, 0.1};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
-    test::ok(dfm_tetmesh_write(mesh, (d + "/block.msh").c_str()));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 60, &mesh));
+    test::ok(dfm_mesh_write(mesh, (d + "/block.msh").c_str()));
     return d;
   }();
   return dir;

@@ -161,24 +161,23 @@ struct Made {
   }
   dfm_body make(const char *name, const char *kind, std::array<double, 3> size, std::array<double, 3> at,
                 std::array<double, 4> turn, dfm_material material = 0) {
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_make(context, kind, size.data(), 200, &mesh));
-    dfm_tetmesh_info info{};
-    info.size = sizeof info;
-    test::ok(dfm_tetmesh_get_info(mesh, &info));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_make(context, kind, size.data(), DFM_MESH_CELLS, 200, &mesh));
+    const dfm_mesh_info info = test::info_of(mesh);
     dfm_body_def d = dfm_body_def_default();
     d.name = name;
     d.material = material;
     d.mass_scaling = 0.01;
     d.smooth = 30;
-    test::ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
+    d.points = info.points;
+    d.tets = info.tets;
     d.npoint = info.npoint;
     d.ntet = info.ntet;
     std::copy(at.begin(), at.end(), d.pose.position);
     std::copy(turn.begin(), turn.end(), d.pose.rotation);
     dfm_body out = 0;
     test::ok(dfm_body_create(world, &d, &out));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     return out;
   }
 };

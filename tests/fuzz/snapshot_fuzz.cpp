@@ -31,15 +31,16 @@ struct Scene {
     dfm_obstacle obstacle = 0;
     need(dfm_obstacle_create(world, &floor, &obstacle));
     const double size[3] = {0.1, 0.1, 0.1};
-    dfm_tetmesh mesh = 0;
-    need(dfm_tetmesh_make(c, "beam", size, 10, &mesh));
-    dfm_tetmesh_info info{};
+    dfm_mesh_handle mesh = 0;
+    need(dfm_mesh_make(c, "beam", size, DFM_MESH_CELLS, 10, &mesh));
+    dfm_mesh_info info{};
     info.size = sizeof info;
-    need(dfm_tetmesh_get_info(mesh, &info));
+    need(dfm_mesh_get_info(mesh, &info));
     dfm_body_def b = dfm_body_def_default();
     b.npoint = info.npoint;
     b.ntet = info.ntet;
-    need(dfm_tetmesh_data(mesh, &b.points, &b.tets, nullptr));
+    b.points = info.points;
+    b.tets = info.tets;
     const char *const names[] = {"sleeper", "lower", "upper"};
     const double places[3][3] = {{2, 0, 4e-5}, {0, 0, 4e-5}, {0.01, 0.01, 0.1001}};
     for (int k = 0; k < 3; ++k) {

@@ -19,20 +19,20 @@ using Bytes = std::string_view;
 
 dfm::scene::BodyMesh block() {  // as a scene's reader has it
   static const double size[3] = {0.1, 0.1, 0.1};
-  static dfm_tetmesh mesh = 0;
-  if (!mesh && dfm_tetmesh_make(fuzz::context(), "beam", size, 10, &mesh) != DFM_OK) std::abort();
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  const double *points = nullptr;
-  dfm::scene::BodyMesh out;
-  if (dfm_tetmesh_get_info(mesh, &info) != DFM_OK ||
-      dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point) != DFM_OK ||
-      dfm_tetmesh_file_cells(mesh, &out.file_cell) != DFM_OK)
+  static dfm_mesh_handle mesh = 0;
+  if (!mesh && dfm_mesh_make(fuzz::context(), "beam", size, DFM_MESH_CELLS, 10, &mesh) != DFM_OK)
     std::abort();
-  out.points.assign(points, points + 3 * size_t{info.npoint});
+  dfm_mesh_info info{};
+  info.size = sizeof info;
+  dfm::scene::BodyMesh out;
+  if (dfm_mesh_get_info(mesh, &info) != DFM_OK) std::abort();
+  out.points.assign(info.points, info.points + 3 * size_t{info.npoint});
+  out.tets = info.tets;
+  out.file_point = info.file_point;
+  out.file_cell = info.file_cell;
   out.npoint = info.npoint;
   out.ntet = info.ntet;
-  out.handle = mesh;
+  out.info = info;
   return out;
 }
 

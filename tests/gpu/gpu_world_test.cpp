@@ -18,8 +18,8 @@ struct World {
       : context(threads) {
     world = test::make_world(context, gravity);
     const double size[3] = {0.1, 0.1, 0.1};
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_make(context, "beam", size, 200, &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 200, &mesh));
     dfm_body_def d = dfm_body_def_default();
     d.name = "block";
     d.model = model;
@@ -35,7 +35,7 @@ struct World {
     else if (std::string(model).ends_with("_gpu")) d.model_params = {sizeof(dfm_params), 1, gpu};
     d.pose.position[2] = z;
     test::ok(dfm_body_create(world, &d, &body));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     test::add_plane(world, "floor");
     test::set_friction(world, mu, law);
   }

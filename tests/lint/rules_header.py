@@ -6,7 +6,7 @@ from tree import includes, line_of, without_comments
 PUBLIC = "libdeform/include/deform/"
 C_HEADERS = {"stddef.h", "stdint.h", "stdbool.h"}
 # memcpy is the one way to read the bits of a double that both C and C++ define.
-MORE = {"elementary.h": {"string.h"}, "deprecated.h": {"math.h"}}
+MORE = {"elementary.h": {"string.h"}, "deprecated.h": {"math.h", "string.h"}}
 # These two are for plugins, no part of the library.
 NOT_IN_UMBRELLA = {"deform.h", "elementary.h", "plugin_draft.h"}
 DECLARATION = re.compile(r"^DFM_API\b[^;{]*?\b(dfm_\w+)\s*\(", re.M)

@@ -37,22 +37,19 @@ std::vector<Triangle> border_of(const Mesh &m) {
 // A closed surface without cells of a lattice.
 Mesh fan_of(const char *kind, const double (&size)[3], uint32_t triangles) {
   test::Context context(1);
-  dfm_trimesh surface = 0;
-  dfm_tetmesh cells = 0;
-  test::ok(dfm_trimesh_make(context, kind, size, triangles, &surface));
-  test::ok(dfm_tetmesh_fill(surface, 0, &cells));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_tetmesh_get_info(cells, &info));
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  test::ok(dfm_tetmesh_data(cells, &points, &tets, nullptr));
+  dfm_mesh_handle surface = 0;
+  dfm_mesh_handle cells = 0;
+  test::ok(dfm_mesh_make(context, kind, size, DFM_MESH_SURFACE, triangles, &surface));
+  test::ok(dfm_mesh_fill(surface, 0, &cells));
+  const dfm_mesh_info info = test::info_of(cells);
+  const double *const points = info.points;
+  const uint32_t *const tets = info.tets;
   Mesh m;
   m.rest.assign(points, points + 3 * size_t(info.npoint));
   m.cells.assign(tets, tets + 4 * size_t(info.ntet));
   m.finish();
-  test::ok(dfm_tetmesh_destroy(cells));
-  test::ok(dfm_trimesh_destroy(surface));
+  test::ok(dfm_mesh_destroy(cells));
+  test::ok(dfm_mesh_destroy(surface));
   return m;
 }
 
@@ -154,20 +151,17 @@ TEST(Boundary, SphereOfAThousandTrianglesUnderPressure_IsWithinAPercent) {
 // unsanitized: too slow there; shorter tests run the same code
 TEST(Boundary, TubeUnderInnerPressure_WidensAsLameHasIt) {
   test::Context context(1);
-  dfm_tetmesh made = 0;
+  dfm_mesh_handle made = 0;
   const double size[] = {0.05, 0.1, 0.05};
-  test::ok(dfm_tetmesh_make(context, "tube", size, 1500, &made));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_tetmesh_get_info(made, &info));
-  const double *points = nullptr;
-  const uint32_t *tets = nullptr;
-  test::ok(dfm_tetmesh_data(made, &points, &tets, nullptr));
+  test::ok(dfm_mesh_make(context, "tube", size, DFM_MESH_CELLS, 1500, &made));
+  const dfm_mesh_info info = test::info_of(made);
+  const double *const points = info.points;
+  const uint32_t *const tets = info.tets;
   Mesh m;
   m.rest.assign(points, points + 3 * size_t(info.npoint));
   m.cells.assign(tets, tets + 4 * size_t(info.ntet));
   m.finish();
-  test::ok(dfm_tetmesh_destroy(made));
+  test::ok(dfm_mesh_destroy(made));
   Host host;
   Stepper b(host, boundary(), m, {{"young", 1e5}, {"poisson", 0.3}, {"modes", 5}});
   ASSERT_EQ(b.status, DFM_OK) << host.logged;
@@ -257,13 +251,13 @@ TEST(Boundary, FilledSurface_HasItsVolumeAndCenter) {
 
 std::string why_not_filled(const std::vector<double> &points, const std::vector<uint32_t> &triangles) {
   test::Context context(1);
-  dfm_trimesh surface = 0;
-  dfm_tetmesh cells = 0;
-  test::ok(dfm_trimesh_create(context, uint32_t(points.size() / 3), points.data(),
-                              uint32_t(triangles.size() / 3), triangles.data(), &surface));
-  const dfm_status status = dfm_tetmesh_fill(surface, 0, &cells);
+  dfm_mesh_handle surface = 0;
+  dfm_mesh_handle cells = 0;
+  test::ok(dfm_mesh_create(context, uint32_t(points.size() / 3), points.data(),
+                           uint32_t(triangles.size() / 3), triangles.data(), &surface));
+  const dfm_status status = dfm_mesh_fill(surface, 0, &cells);
   const std::string why = status == DFM_OK ? "filled" : dfm_last_error();
-  test::ok(dfm_trimesh_destroy(surface));
+  test::ok(dfm_mesh_destroy(surface));
   return why;
 }
 
@@ -281,14 +275,14 @@ TEST(Boundary, SurfacesThatOnePointDoesNotFill_AreRefusedInASentence) {
   const std::string apart = why_not_filled(twice, two);
   EXPECT_NE(apart.find("2 separate pieces"), std::string::npos) << apart;
   test::Context context(1);
-  dfm_trimesh torus = 0;
-  dfm_tetmesh cells = 0;
+  dfm_mesh_handle torus = 0;
+  dfm_mesh_handle cells = 0;
   const double size[3] = {0.1, 0.03, 0};
-  test::ok(dfm_trimesh_make(context, "torus", size, 500, &torus));
-  EXPECT_EQ(dfm_tetmesh_fill(torus, 0, &cells), DFM_E_UNSUPPORTED);
+  test::ok(dfm_mesh_make(context, "torus", size, DFM_MESH_SURFACE, 500, &torus));
+  EXPECT_EQ(dfm_mesh_fill(torus, 0, &cells), DFM_E_UNSUPPORTED);
   EXPECT_NE(std::string(dfm_last_error()).find("no point was found that sees all"), std::string::npos)
       << dfm_last_error();
-  test::ok(dfm_trimesh_destroy(torus));
+  test::ok(dfm_mesh_destroy(torus));
 }
 
 // What the log has where a body is refused.

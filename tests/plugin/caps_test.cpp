@@ -116,9 +116,9 @@ struct Body {
     dfm_world_def def = dfm_world_def_default();
     def.step = step;
     test::ok(dfm_world_create(context, &def, &world));
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[] = {0.1, 0.1, 0.1};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 60, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     d.model = name;
@@ -126,7 +126,7 @@ struct Body {
     const dfm_param_value row = {key, &value, 1};
     d.model_params = one(row);
     made = dfm_body_create(world, &d, &body);
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
   }
 };
 

@@ -36,10 +36,10 @@ struct Leaving : testing::Test {
   std::string dir = tiny::folder("leaving"), out = dir + "/out";
   void SetUp() override {
     test::Context context;
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[3] = {0.1, 0.1, 0.1};
-    test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
-    test::ok(dfm_tetmesh_write(mesh, (dir + "/block.msh").c_str()));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 60, &mesh));
+    test::ok(dfm_mesh_write(mesh, (dir + "/block.msh").c_str()));
     std::filesystem::create_directories(dir + "/plugins");
     std::filesystem::copy_file(tiny::plugin("tiny_leaves"), dir + "/plugins/leaves.so");
     setenv("DEFORM_PLUGIN_PATH", (dir + "/plugins").c_str(), 1);

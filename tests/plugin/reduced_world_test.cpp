@@ -244,9 +244,9 @@ TEST_P(ReducedWorld, TurnedInALongStep_GainsNoEnergy) {
 TEST_P(ReducedWorld, PartlyHeldAndTurnedByItsPose_IsRefusedWithTheReason) {
   test::Context context(1);
   const dfm_world world = test::make_world(context, {});
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[] = {0.1, 0.1, 0.1};
-  test::ok(dfm_tetmesh_make(context, "beam", size, 60, &mesh));
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 60, &mesh));
   test::BodyOptions o;
   dfm_body_def d = dfm_body_def_default();
   d.name = "block";

@@ -90,9 +90,9 @@ TEST(ShapeMatchingWorld, BlockAtRest_FallsAsleep) {
 TEST(ShapeMatchingWorld, SnapshotInContact_ContinuesWithTheSameBits) {
   const auto make = [](test::Context &c) {
     const dfm_world world = test::make_world(c);
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[] = {0.2, 0.1, 0.1}, clusters = 3, creep = 30, yield = 1e-3, mode = 2;
-    test::ok(dfm_tetmesh_make(c, "beam", size, 120, &mesh));
+    test::ok(dfm_mesh_make(c, "beam", size, DFM_MESH_CELLS, 120, &mesh));
     dfm_body_def d = dfm_body_def_default();
     d.name = "block";
     d.model = "shape_matching";
@@ -107,7 +107,7 @@ TEST(ShapeMatchingWorld, SnapshotInContact_ContinuesWithTheSameBits) {
     d.spin[1] = 3;
     dfm_body body = 0;
     test::ok(dfm_body_create(world, &d, &body));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     test::add_plane(world, "floor");
     test::set_friction(world, 0.5);
     return world;

@@ -49,14 +49,12 @@ TEST(CutOwnMesh, TorusCutByABlade_IsNotStopped) {
   const dfm_obstacle_def floor = dfm_obstacle_def_default();
   dfm_obstacle obstacle = 0;
   test::ok(dfm_obstacle_create(w, &floor, &obstacle));
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_read(context, path.c_str(), &mesh));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  test::ok(dfm_tetmesh_get_info(mesh, &info));
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_load(context, path.c_str(), DFM_MESH_CELLS, &mesh));
+  const dfm_mesh_info info = test::info_of(mesh);
   dfm_body_def def = dfm_body_def_default();
-  const double *points = nullptr;
-  test::ok(dfm_tetmesh_data(mesh, &points, &def.tets, nullptr));
+  const double *const points = info.points;
+  def.tets = info.tets;
   const double scale = .08 / (info.hi[0] - info.lo[0]);
   std::vector<double> placed(3 * size_t{info.npoint});
   for (size_t i = 0; i < info.npoint; ++i) {
@@ -95,5 +93,5 @@ TEST(CutOwnMesh, TorusCutByABlade_IsNotStopped) {
     test::ok(dfm_tool_set_pose(tool, &pose, nullptr));
     ASSERT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_OK) << "step " << s << ": " << dfm_last_error();
   }
-  test::ok(dfm_tetmesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(mesh));
 }

@@ -379,19 +379,20 @@ TEST(EnergyPair, ProbeThatStops_DoesNoWork) {
   wd.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
   dfm_world world = 0;
   test::ok(dfm_world_create(context, &wd, &world));
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[3] = {0.2, 0.2, 0.1};
-  test::ok(dfm_tetmesh_make(context, "beam", size, 400, &mesh));
-  dfm_tetmesh_info info = {};
+  test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 400, &mesh));
+  dfm_mesh_info info = {};
   info.size = sizeof info;
-  test::ok(dfm_tetmesh_get_info(mesh, &info));
+  test::ok(dfm_mesh_get_info(mesh, &info));
   dfm_material_def material = dfm_material_def_default();
   material.young = 1e5;
   material.poisson = 0.3;
   material.damping_stiffness = 1e-3;
   dfm_body_def body = dfm_body_def_default();
   test::ok(dfm_material_create(world, &material, &body.material));
-  test::ok(dfm_tetmesh_data(mesh, &body.points, &body.tets, nullptr));
+  body.points = info.points;
+  body.tets = info.tets;
   body.npoint = info.npoint;
   body.ntet = info.ntet;
   std::vector<uint8_t> fixed(info.npoint, 0);
@@ -414,5 +415,5 @@ TEST(EnergyPair, ProbeThatStops_DoesNoWork) {
     test::ok(dfm_obstacle_move_to(probe, &pose));
     ASSERT_EQ(dfm_world_step(world, h, nullptr), DFM_OK) << i << ": " << dfm_last_error();
   }
-  test::ok(dfm_tetmesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(mesh));
 }

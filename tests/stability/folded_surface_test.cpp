@@ -92,16 +92,15 @@ TEST(FoldedSurface, HitByABall_GivesNoEnergy) {
 TEST(FoldedSurface, ThrownAtAMesh_GainsNoEnergy) {
   Flight run;
   const double radius[3] = {0.15, 0, 0};
-  dfm_trimesh mesh = 0;
-  const double *points = nullptr;
-  const uint32_t *tris = nullptr;
-  dfm_trimesh_info info{};
+  dfm_mesh_handle mesh = 0;
+  dfm_mesh_info info{};
   info.size = sizeof info;
-  test::ok(dfm_trimesh_make(run.context, "ball", radius, 320, &mesh));
-  test::ok(dfm_trimesh_get_info(mesh, &info));
-  test::ok(dfm_trimesh_data(mesh, &points, &tris, nullptr));
+  test::ok(dfm_mesh_make(run.context, "ball", radius, DFM_MESH_SURFACE, 320, &mesh));
+  test::ok(dfm_mesh_get_info(mesh, &info));
+  const double *const points = info.points;
+  const uint32_t *const tris = info.faces;
   test::Triangles ball{{points, points + 3 * info.npoint}, {tris, tris + 3 * info.ntriangle}};
-  test::ok(dfm_trimesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(mesh));
   for (size_t p = 0; p < ball.points.size(); p += 3) {
     ball.points[p] += 0.4;
     ball.points[p + 1] += 0.3;

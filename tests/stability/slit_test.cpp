@@ -17,15 +17,16 @@ struct Slit {
   double size = 0;  // m
   explicit Slit(const char *model, bool rabbit) : w(test::make_world(context, {0, 0, 0})) {
     test::set_friction(w, 0.3);
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double edges[] = {0.1, 0.1, 0.1};
     if (rabbit) {
-      dfm_trimesh skin = 0;
-      test::ok(dfm_trimesh_read(context, DEFORM_SOURCE_DIR "/examples/data/rabbit.obj", &skin));
-      test::ok(dfm_tetmesh_fill(skin, 1500, &mesh));
-      test::ok(dfm_trimesh_destroy(skin));
+      dfm_mesh_handle skin = 0;
+      test::ok(
+          dfm_mesh_load(context, DEFORM_SOURCE_DIR "/examples/data/rabbit.obj", DFM_MESH_SURFACE, &skin));
+      test::ok(dfm_mesh_fill(skin, 1500, &mesh));
+      test::ok(dfm_mesh_destroy(skin));
     } else {
-      test::ok(dfm_tetmesh_make(context, "beam", edges, 700, &mesh));
+      test::ok(dfm_mesh_make(context, "beam", edges, DFM_MESH_CELLS, 700, &mesh));
     }
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
@@ -36,7 +37,7 @@ struct Slit {
     d.material = test::make_material(w, o);
     d.model = model;
     test::ok(dfm_body_create(w, &d, &b));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     std::vector<double> x = State(b).x;
     double lo[3] = {9, 9, 9}, hi[3] = {-9, -9, -9};
     for (size_t i = 0; i < x.size(); ++i) {

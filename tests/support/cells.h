@@ -33,12 +33,12 @@ struct Cells {
 };
 
 inline Cells make_cells(dfm_context *c, const char *kind, std::array<double, 3> size, uint32_t cells) {
-  dfm_tetmesh mesh = 0;
-  ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
+  dfm_mesh_handle mesh = 0;
+  ok(dfm_mesh_make(c, kind, size.data(), DFM_MESH_CELLS, cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
   lend(mesh, d);
   Cells out{{d.points, d.points + 3 * size_t(d.npoint)}, {d.tets, d.tets + 4 * size_t(d.ntet)}};
-  ok(dfm_tetmesh_destroy(mesh));
+  ok(dfm_mesh_destroy(mesh));
   return out;
 }
 

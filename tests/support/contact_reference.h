@@ -291,14 +291,11 @@ struct Round {
       inertia += (shape.ball ? 2.0 / 3 : 1) * mass[i] * r * r;
     }
     const double size[3] = {radius, length, 0};
-    dfm_trimesh mesh = 0;
-    ok(dfm_trimesh_make(context, kind, size, fine.facets, &mesh));
-    dfm_trimesh_info info{};
-    info.size = sizeof info;
-    ok(dfm_trimesh_get_info(mesh, &info));
-    const double *points = nullptr;
-    const uint32_t *triangles = nullptr;
-    ok(dfm_trimesh_data(mesh, &points, &triangles, nullptr));
+    dfm_mesh_handle mesh = 0;
+    ok(dfm_mesh_make(context, kind, size, DFM_MESH_SURFACE, fine.facets, &mesh));
+    const dfm_mesh_info info = info_of(mesh);
+    const double *const points = info.points;
+    const uint32_t *const triangles = info.faces;
     const dfm_surface_def skin{
         sizeof(dfm_surface_def), DFM_COUPLING_BARYCENTRIC, info.npoint, info.ntriangle, points, triangles, 0};
     BodyOptions o;
@@ -317,7 +314,7 @@ struct Round {
       o.position = {0, -radius / 2, 0.9999 * radius};
     }
     body = make_body(world, cells, o, shape.thin ? &light_inside : nullptr);
-    ok(dfm_trimesh_destroy(mesh));
+    ok(dfm_mesh_destroy(mesh));
     add_plane(world, "incline");
     set_friction(world, mu);
   }

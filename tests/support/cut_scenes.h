@@ -88,8 +88,8 @@ struct Tough {
 };
 
 inline dfm_body make(dfm_context *c, dfm_world w, Tough o) {
-  dfm_tetmesh mesh = 0;
-  test::ok(dfm_tetmesh_make(c, "beam", o.size.data(), o.cells, &mesh));
+  dfm_mesh_handle mesh = 0;
+  test::ok(dfm_mesh_make(c, "beam", o.size.data(), DFM_MESH_CELLS, o.cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
   test::lend(mesh, d);
   o.material.name = "tissue";
@@ -105,7 +105,7 @@ inline dfm_body make(dfm_context *c, dfm_world w, Tough o) {
   if (o.held) d.fixed = fixed.data();
   dfm_body body = 0;
   test::ok(dfm_body_create(w, &d, &body));
-  test::ok(dfm_tetmesh_destroy(mesh));
+  test::ok(dfm_mesh_destroy(mesh));
   return body;
 }
 

@@ -71,8 +71,8 @@ class CutWalk {
     const double sizes[3][3] = {{side, side * r_.within(0.5, 1), side * r_.within(0.5, 1)},
                                 {0.5 * side, 0, 0},
                                 {0.4 * side, side, 0}};
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_make(context_, kinds[kind], sizes[kind], 12 + r_.below(80), &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_make(context_, kinds[kind], sizes[kind], DFM_MESH_CELLS, 12 + r_.below(80), &mesh));
     dfm_body_def d = dfm_body_def_default();
     const std::string name = "body " + std::to_string(i);
     d.name = name.c_str();
@@ -86,7 +86,7 @@ class CutWalk {
     for (double &v : d.spin) v = r_.within(-5, 5);
     dfm_body b = 0;
     test::ok(dfm_body_create(w_, &d, &b));
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     if (r_.below(2) == 0) return;
     dfm_separate_def rule = dfm_separate_def_default();
     rule.least_cells = 1 + r_.below(8);

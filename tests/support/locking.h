@@ -74,9 +74,9 @@ inline double bent_bar(int mesh, double poisson, double locking) {
 // The same bar on cells of the generator, so that nothing is read: about four cells thick.
 inline double bent_made_bar(double poisson, double locking) {
   Context context;
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[3] = {1, 0.1, 0.1}, young = 1e10, force = -10;
-  ok(dfm_tetmesh_make(context, "beam", size, 4000, &mesh));
+  ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 4000, &mesh));
   dfm_body_def d = dfm_body_def_default();
   lend(mesh, d);
   const std::vector<double> points(d.points, d.points + size_t(3) * d.npoint);

@@ -39,17 +39,15 @@ struct Statics {
   Statics(const std::string &mesh_file, const char *model, double young, double poisson,
           const std::vector<dfm_param_value> &choices = {}) {
     world = test::make_world(context, {0, 0, 0});
-    dfm_tetmesh mesh = 0;
-    test::ok(dfm_tetmesh_read(context, mesh_file.c_str(), &mesh));
+    dfm_mesh_handle mesh = 0;
+    test::ok(dfm_mesh_load(context, mesh_file.c_str(), DFM_MESH_CELLS, &mesh));
     dfm_body_def d = dfm_body_def_default();
-    test::lend(mesh, d);
-    const uint32_t *file_point = nullptr;
-    test::ok(dfm_tetmesh_data(mesh, nullptr, nullptr, &file_point));
+    const uint32_t *const file_point = test::lend(mesh, d).file_point;
     d.model_params.size = sizeof d.model_params;
     d.model_params.n = uint32_t(choices.size());
     d.model_params.values = choices.data();
     take(d, file_point, model, young, poisson);
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
   }
   Statics(const std::vector<double> &points, const std::vector<uint32_t> &tets, const char *model,
           double young, double poisson, const std::vector<dfm_param_value> &choices = {}) {

@@ -87,21 +87,21 @@ struct Setting {
 };
 
 // The file's cells; "beam", "cylinder", "ball": the generator's; a surface: filled.
-inline dfm_tetmesh load(dfm_context *context, const std::string &mesh) {
-  dfm_tetmesh cells = 0;
+inline dfm_mesh_handle load(dfm_context *context, const std::string &mesh) {
+  dfm_mesh_handle cells = 0;
   const double size[3] = {mesh == "beam"       ? 0.4
                           : mesh == "cylinder" ? 0.05
                                                : 0.1,
                           mesh == "cylinder" ? 0.3 : 0.1, 0.08};
   if (mesh.find('.') == std::string::npos) {
-    ok(dfm_tetmesh_make(context, mesh.c_str(), size, 600, &cells));
+    ok(dfm_mesh_make(context, mesh.c_str(), size, DFM_MESH_CELLS, 600, &cells));
   } else if (mesh.find(".obj") != std::string::npos) {
-    dfm_trimesh surface = 0;
-    ok(dfm_trimesh_read(context, mesh.c_str(), &surface));
-    ok(dfm_tetmesh_fill(surface, 1000, &cells));
-    ok(dfm_trimesh_destroy(surface));
+    dfm_mesh_handle surface = 0;
+    ok(dfm_mesh_load(context, mesh.c_str(), DFM_MESH_SURFACE, &surface));
+    ok(dfm_mesh_fill(surface, 1000, &cells));
+    ok(dfm_mesh_destroy(surface));
   } else {
-    ok(dfm_tetmesh_read(context, mesh.c_str(), &cells));
+    ok(dfm_mesh_load(context, mesh.c_str(), DFM_MESH_CELLS, &cells));
   }
   return cells;
 }
@@ -111,14 +111,11 @@ inline Setting make(dfm_context *context, const Case &c) {
   const bool hung = c.motion == "hung";
   s.gravity[2] = hung ? -9.81 : 0;
   s.world = make_world(context, {0, 0, s.gravity[2]});
-  const dfm_tetmesh mesh = load(context, c.mesh);
+  const dfm_mesh_handle mesh = load(context, c.mesh);
   BodyOptions o;
   o.volume = c.volume;
   dfm_body_def d = dfm_body_def_default();
-  lend(mesh, d);
-  const double *share = nullptr;
-  ok(dfm_tetmesh_share(mesh, &share));
-  if (share) {
+  if (const double *const share = lend(mesh, d).share) {
     s.share.assign(share, share + d.ntet);
     d.cell_share = s.share.data();
   }
@@ -144,7 +141,7 @@ inline Setting make(dfm_context *context, const Case &c) {
     fixed[i] = d.points[3 * i + size_t(longest)] < lo[longest] + 0.05 * size[longest] ? 7 : 0;
   if (hung) d.fixed = fixed.data();
   ok(dfm_body_create(s.world, &d, &s.body));
-  ok(dfm_tetmesh_destroy(mesh));
+  ok(dfm_mesh_destroy(mesh));
   uint32_t n = 0;
   ok(dfm_body_get_state(s.body, 0, nullptr, nullptr, &n));
   std::vector<double> x(3 * size_t(n));

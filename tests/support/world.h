@@ -60,16 +60,23 @@ struct BodyOptions {
   int32_t integrator = DFM_INTEGRATOR_AUTO;
 };
 
-// Points and cells of a mesh into a def that borrows them.
-inline void lend(dfm_tetmesh mesh, dfm_body_def &d) {
-  dfm_tetmesh_info info{};
+inline dfm_mesh_info info_of(dfm_mesh_handle mesh) {
+  dfm_mesh_info info{};
   info.size = sizeof info;
-  ok(dfm_tetmesh_get_info(mesh, &info));
+  ok(dfm_mesh_get_info(mesh, &info));
+  return info;
+}
+// Points and cells of a mesh into a def that borrows them.
+inline dfm_mesh_info lend(dfm_mesh_handle mesh, dfm_body_def &d) {
+  const dfm_mesh_info info = info_of(mesh);
   d.npoint = info.npoint;
   d.ntet = info.ntet;
-  ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
-  ok(dfm_tetmesh_cells(mesh, &d.cell, &d.cells));
-  ok(dfm_tetmesh_inside(mesh, &d.cell_inside));
+  d.points = info.points;
+  d.tets = info.tets;
+  d.cell = info.cell;
+  d.cells = info.cells;
+  d.cell_inside = info.inside;
+  return info;
 }
 
 inline dfm_material make_material(dfm_world w, const BodyOptions &o) {
@@ -87,8 +94,8 @@ inline dfm_material make_material(dfm_world w, const BodyOptions &o) {
 // A body from a generator: kind "beam", "cylinder" or "ball".
 inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::array<double, 3> size,
                           uint32_t cells, const BodyOptions &o) {
-  dfm_tetmesh mesh = 0;
-  ok(dfm_tetmesh_make(c, kind, size.data(), cells, &mesh));
+  dfm_mesh_handle mesh = 0;
+  ok(dfm_mesh_make(c, kind, size.data(), DFM_MESH_CELLS, cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
   d.name = o.name.empty() ? nullptr : o.name.c_str();
   d.model = o.model.empty() ? nullptr : o.model.c_str();
@@ -107,7 +114,7 @@ inline dfm_body make_body(dfm_context *c, dfm_world w, const char *kind, std::ar
   d.smooth = o.smooth;
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
-  ok(dfm_tetmesh_destroy(mesh));
+  ok(dfm_mesh_destroy(mesh));
   return body;
 }
 
@@ -204,16 +211,11 @@ inline void run(dfm_world w, double seconds, double dt) {
 
 // A beam of 0.5 x 0.1 x 0.1 m whose end of least x is held; `fixed` must outlive the def.
 inline dfm_body_def clamped_beam(dfm_context *context, uint32_t cells, std::vector<uint8_t> &fixed) {
-  dfm_tetmesh mesh = 0;
+  dfm_mesh_handle mesh = 0;
   const double size[] = {0.5, 0.1, 0.1};
-  ok(dfm_tetmesh_make(context, "beam", size, cells, &mesh));
-  dfm_tetmesh_info info{};
-  info.size = sizeof info;
-  ok(dfm_tetmesh_get_info(mesh, &info));
+  ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
-  ok(dfm_tetmesh_data(mesh, &d.points, &d.tets, nullptr));
-  d.npoint = info.npoint;
-  d.ntet = info.ntet;
+  lend(mesh, d);
   double least = 1e300;
   for (uint32_t i = 0; i < d.npoint; ++i) least = std::min(least, d.points[3 * i]);
   fixed.assign(d.npoint, 0);

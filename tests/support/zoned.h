@@ -21,8 +21,8 @@ struct ZonedOptions : BodyOptions {
 // be passed over.
 inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 3> size, uint32_t cells,
                                 const ZonedOptions &o) {
-  dfm_tetmesh mesh = 0;
-  ok(dfm_tetmesh_make(c, "beam", size.data(), cells, &mesh));
+  dfm_mesh_handle mesh = 0;
+  ok(dfm_mesh_make(c, "beam", size.data(), DFM_MESH_CELLS, cells, &mesh));
   dfm_body_def d = dfm_body_def_default();
   lend(mesh, d);
   const auto middle = [&](const uint32_t *corner, int n, double out[3]) {
@@ -66,7 +66,7 @@ inline dfm_body make_zoned_beam(dfm_context *c, dfm_world w, std::array<double, 
   }
   dfm_body body = 0;
   ok(dfm_body_create(w, &d, &body));
-  ok(dfm_tetmesh_destroy(mesh));
+  ok(dfm_mesh_destroy(mesh));
   return body;
 }
 

@@ -41,9 +41,9 @@ def cells_of(cells: Any, width: int, what: str) -> np.ndarray:
 class _Keeper:
     """Owns a mesh of the library as long as anything looks at its arrays."""
 
-    def __init__(self, handle: int, destroy: Any, context: Context):
+    def __init__(self, handle: int, context: Context):
         self.handle = handle
-        self._finalize = weakref.finalize(self, lambda h, _context: destroy(h), handle, context)
+        self._finalize = weakref.finalize(self, lambda h, _context: lib.dfm_mesh_destroy(h), handle, context)
 
 
 def _borrowed(keeper: Any, address: int | None, shape: tuple[int, ...], kind: Any) -> np.ndarray:
@@ -77,17 +77,13 @@ def _groups(names: int | None, count: int) -> list[str]:
 
 class _Mesh(OfThisProcess):
     _instead = "give its arrays (points and cells), or the path of its file"
-    _info_kind: Any
-    _get_info: Any
-    _data: Any
-    _destroy: Any
 
     def __init__(self, handle: Any = None, context: Any = None):
         if not isinstance(context, Context):
             kind = type(self).__name__
             raise ArgumentError(f"a {kind} is made by {kind}.from_arrays(points, cells), read(path) or "
                                 "another of its functions, not by calling the class", "DFM_E_ARG")
-        self._keeper = _Keeper(handle, self._destroy, context)
+        self._keeper = _Keeper(handle, context)
         self._context = context
 
     def __copy__(self) -> Any:
@@ -107,17 +103,18 @@ class _Mesh(OfThisProcess):
         check(function(*arguments, ctypes.byref(out)))
         return cls(out.value, context)
 
-    def _arrays(self) -> tuple[int | None, int | None]:
-        points, corners = ctypes.c_void_p(), ctypes.c_void_p()
-        check(self._data(self.handle, ctypes.byref(points), ctypes.byref(corners), None))
-        return points.value, corners.value
-
     @property
     def info(self) -> Any:
         """Counts, sizes (m, m2, m3), quality (1: regular) and what reading repaired, as the C struct."""
-        out = sized(self._info_kind)
-        check(self._get_info(self.handle, ctypes.byref(out)))
+        out = sized(_abi.dfm_mesh_info)
+        check(quick.dfm_mesh_get_info(self.handle, ctypes.byref(out)))
         return out
+
+    @property
+    def points(self) -> np.ndarray:
+        """[npoint,3] m."""
+        info = self.info
+        return _borrowed(self._keeper, info.points, (info.npoint, 3), ctypes.c_double)
 
     @property
     def warnings(self) -> list[str]:
@@ -136,20 +133,15 @@ class TetMesh(_Mesh):
     Arrays look at the library's memory, without a copy; they stay valid when the mesh is out of scope.
     """
 
-    _info_kind = _abi.dfm_tetmesh_info
-    _get_info = staticmethod(quick.dfm_tetmesh_get_info)
-    _data = staticmethod(quick.dfm_tetmesh_data)
-    _destroy = staticmethod(lib.dfm_tetmesh_destroy)
-
     @classmethod
     def _made(cls, kind: str, size: Sequence[float], cells: int) -> TetMesh:
-        return cls._of(lib.dfm_tetmesh_make, default_context().address, kind.encode(), _size(size),
-                       whole(cells, "cells", 1))
+        return cls._of(lib.dfm_mesh_make, default_context().address, kind.encode(), _size(size),
+                       _abi.DFM_MESH_CELLS, whole(cells, "cells", 1))
 
     @classmethod
     def read(cls, path: Any) -> TetMesh:
         """Reads MSH, VTK, VTU, Medit, Abaqus or TetGen; what was repaired is in `warnings`."""
-        return cls._of(lib.dfm_tetmesh_read, default_context().address, encoded(path))
+        return cls._of(lib.dfm_mesh_load, default_context().address, encoded(path), _abi.DFM_MESH_CELLS)
 
     @classmethod
     def ball(cls, radius: float, cells: int = 1000) -> TetMesh:
@@ -183,7 +175,7 @@ class TetMesh(_Mesh):
         of the surface: give it to add_body too (surface=), which otherwise takes their jagged border. 0: from
         one inner point to the triangles, which are their border; for the model boundary."""
         surface = surface_of(surface, "surface")
-        return cls._of(lib.dfm_tetmesh_fill, surface.handle, whole(cells, "cells", 0),
+        return cls._of(lib.dfm_mesh_fill, surface.handle, whole(cells, "cells", 0),
                        context=surface._context)
 
     @classmethod
@@ -192,28 +184,22 @@ class TetMesh(_Mesh):
         file: about `cells` of them, or of edges of about `size`, m. Give the surface to add_body too
         (surface=), and one of the models that bricks() is for."""
         surface = surface_of(surface, "surface")
-        out = ctypes.c_uint64()
-        check(lib.dfm_tetmesh_lattice(surface.handle, whole(cells, "cells", 0), float(size),
-                                      ctypes.byref(out)))
-        return cls(out.value, surface._context)
+        return cls._of(lib.dfm_mesh_lattice, surface.handle, whole(cells, "cells", 0), float(size),
+                       context=surface._context)
 
     def second_order(self) -> TetMesh:
         """The same shape with points in the middles of the edges, for the same models as bricks()."""
-        return TetMesh._of(lib.dfm_tetmesh_second_order, self.handle, context=self._context)
+        return TetMesh._of(lib.dfm_mesh_second_order, self.handle, context=self._context)
 
     def write(self, path: Any) -> None:
         """Writes *.msh, *.msh2, *.vtk, *.vtu or *.mesh; only VTK and VTU keep the shares of a filled mesh."""
-        check(lib.dfm_tetmesh_write(self.handle, encoded(path)))
-
-    @property
-    def points(self) -> np.ndarray:
-        """[npoint,3] m."""
-        return _borrowed(self._keeper, self._arrays()[0], (self.info.npoint, 3), ctypes.c_double)
+        check(lib.dfm_mesh_write(self.handle, encoded(path)))
 
     @property
     def tets(self) -> np.ndarray:
         """[ntet,4] numbers of points."""
-        return _borrowed(self._keeper, self._arrays()[1], (self.info.ntet, 4), ctypes.c_uint32)
+        info = self.info
+        return _borrowed(self._keeper, info.tets, (info.ntet, 4), ctypes.c_uint32)
 
     @property
     def volume(self) -> float:
@@ -230,43 +216,34 @@ class TetMesh(_Mesh):
 
     @property
     def inside(self) -> np.ndarray | None:
-        """[ncell,27] material of the cells of a lattice, as dfm_tetmesh_inside gives it; else None."""
-        out = ctypes.c_void_p()
-        check(quick.dfm_tetmesh_inside(self.handle, ctypes.byref(out)))
-        shape = (self.info.ncell, 27)
-        return _borrowed(self._keeper, out.value, shape, ctypes.c_double) if out.value else None
+        """[ncell,27] material of the cells of a lattice, as dfm_mesh_info has it; else None."""
+        info = self.info
+        shape = (info.ncell, 27)
+        return _borrowed(self._keeper, info.inside, shape, ctypes.c_double) if info.inside else None
 
     @property
     def share(self) -> np.ndarray | None:
         """[ntet] how much of each cell is material, of a mesh that was filled; else None."""
-        out = ctypes.c_void_p()
-        check(quick.dfm_tetmesh_share(self.handle, ctypes.byref(out)))
-        return _borrowed(self._keeper, out.value, (self.info.ntet,), ctypes.c_double) if out.value else None
+        info = self.info
+        return _borrowed(self._keeper, info.share, (info.ntet,), ctypes.c_double) if info.share else None
 
     @property
     def groups(self) -> dict[str, np.ndarray]:
         """Points of each physical group, [n] numbers, ascending: a named surface is held or loaded by
         them."""
-        names = ctypes.c_void_p()
-        check(quick.dfm_tetmesh_groups(self.handle, ctypes.byref(names), None))
-        out = {}
-        for i, name in enumerate(_groups(names.value, self.info.ngroup)):
-            points, n = ctypes.c_void_p(), ctypes.c_uint32()
-            check(quick.dfm_tetmesh_group_points(self.handle, i, None, ctypes.byref(points), ctypes.byref(n)))
-            out[name] = _borrowed(self._keeper, points.value, (n.value,), ctypes.c_uint32)
-        return out
+        info = self.info
+        counts = _borrowed(self._keeper, info.group_npoint, (info.ngroup,), ctypes.c_uint32)
+        points = _borrowed(self._keeper, info.group_points, (info.ngroup,), ctypes.c_uint64)
+        return {name: _borrowed(self._keeper, int(points[i]), (int(counts[i]),), ctypes.c_uint32)
+                for i, name in enumerate(_groups(info.group_names, info.ngroup))}
 
     def surface_groups(self) -> Any:
         """The named triangles as a body's def takes them, or None where the file has none."""
-        names, triangles, group = ctypes.c_void_p(), ctypes.c_void_p(), ctypes.c_void_p()
-        n = ctypes.c_uint32()
-        check(quick.dfm_tetmesh_groups(self.handle, ctypes.byref(names), None))
-        check(quick.dfm_tetmesh_triangles(self.handle, ctypes.byref(triangles), ctypes.byref(group),
-                                          ctypes.byref(n)))
-        if not n.value:
+        info = self.info
+        if not info.nface:
             return None
-        return _abi.dfm_surface_groups(ctypes.sizeof(_abi.dfm_surface_groups), self.info.ngroup, names.value,
-                                       n.value, 0, triangles.value, group.value)
+        return _abi.dfm_surface_groups(ctypes.sizeof(_abi.dfm_surface_groups), info.ngroup, info.group_names,
+                                       info.nface, 0, info.faces, info.face_group)
 
     @classmethod
     def from_arrays(cls, points: Any, tets: Any, share: Any = None) -> TetMesh:
@@ -329,43 +306,34 @@ def _meshio_cells(mesh: Any, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndar
 class TriMesh(_Mesh):
     """Triangles: a surface to fill, to hang on coarse cells, or an obstacle. Arrays as those of TetMesh."""
 
-    _info_kind = _abi.dfm_trimesh_info
-    _get_info = staticmethod(quick.dfm_trimesh_get_info)
-    _data = staticmethod(quick.dfm_trimesh_data)
-    _destroy = staticmethod(lib.dfm_trimesh_destroy)
-
     @classmethod
     def read(cls, path: Any) -> TriMesh:
         """Reads OBJ, PLY, STL, OFF and what TetMesh.read does; what was repaired is in `warnings`."""
-        return cls._of(lib.dfm_trimesh_read, default_context().address, encoded(path))
+        return cls._of(lib.dfm_mesh_load, default_context().address, encoded(path), _abi.DFM_MESH_SURFACE)
 
     @classmethod
     def from_arrays(cls, points: Any, triangles: Any) -> TriMesh:
         """points [n,3] m, triangles [m,3] counter-clockwise seen from outside; repaired as a file is."""
         p, t = points_of(points), cells_of(triangles, 3, "triangles")
-        return cls._of(lib.dfm_trimesh_create, default_context().address, len(p), p.ctypes.data, len(t),
+        return cls._of(lib.dfm_mesh_create, default_context().address, len(p), p.ctypes.data, len(t),
                        t.ctypes.data)
 
     @classmethod
     def make(cls, kind: str, size: Sequence[float], triangles: int = 1000) -> TriMesh:
         """A closed surface: "ball" [radius], "cylinder" [radius, length], "beam" [x, y, z], "tube" [inner,
         outer, length] or "torus" [ring radius, tube radius]; m."""
-        return cls._of(lib.dfm_trimesh_make, default_context().address, kind.encode(), _size(size),
-                       whole(triangles, "triangles", 1))
+        return cls._of(lib.dfm_mesh_make, default_context().address, kind.encode(), _size(size),
+                       _abi.DFM_MESH_SURFACE, whole(triangles, "triangles", 1))
 
     def write(self, path: Any) -> None:
         """Writes *.obj, *.ply, *.stl, *.off, *.vtk or *.vtu."""
-        check(lib.dfm_trimesh_write(self.handle, encoded(path)))
-
-    @property
-    def points(self) -> np.ndarray:
-        """[npoint,3] m."""
-        return _borrowed(self._keeper, self._arrays()[0], (self.info.npoint, 3), ctypes.c_double)
+        check(lib.dfm_mesh_write(self.handle, encoded(path)))
 
     @property
     def triangles(self) -> np.ndarray:
         """[ntriangle,3] numbers of points, counter-clockwise seen from outside."""
-        return _borrowed(self._keeper, self._arrays()[1], (self.info.ntriangle, 3), ctypes.c_uint32)
+        info = self.info
+        return _borrowed(self._keeper, info.faces, (info.nface, 3), ctypes.c_uint32)
 
     @classmethod
     def from_meshio(cls, mesh: Any) -> TriMesh:

@@ -315,17 +315,12 @@ class World(Queries, Reports, Tools, OfThisProcess):
             if points is not None or tets is not None:
                 raise ArgumentError("add_body takes a mesh, or points and tets, not both", "DFM_E_ARG")
             points, tets = mesh.points, mesh.tets
-            kind, nodes = ctypes.c_uint32(), ctypes.c_void_p()
-            check(lib.dfm_tetmesh_cells(mesh.handle, ctypes.byref(kind), ctypes.byref(nodes)))
-            definition.cell, definition.cells = kind.value, nodes.value
-            inside, share, groups = mesh.inside, mesh.share, mesh.surface_groups()
-            if inside is not None:
-                definition.cell_inside = inside.ctypes.data
-            if share is not None:
-                definition.cell_share = share.ctypes.data
+            info, groups = mesh.info, mesh.surface_groups()
+            definition.cell, definition.cells = info.cell, info.cells
+            definition.cell_inside, definition.cell_share = info.inside, info.share
             if groups is not None:
                 definition.groups = ctypes.addressof(groups)
-            keep += [inside, share, groups]
+            keep.append(groups)
         elif points is None or tets is None:
             raise ArgumentError("add_body needs a mesh, or points and tets", "DFM_E_ARG")
         x, cells = _scaled(points_of(points), scale), cells_of(tets, 4, "tets")

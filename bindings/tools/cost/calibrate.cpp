@@ -175,26 +175,27 @@ class Bar {
     m.damping_stiffness = s.damping_stiffness;
     dfm_body_def b = dfm_body_def_default();
     need(dfm_material_create(world_, &m, &b.material));
-    const double *points = nullptr;
-    need(dfm_tetmesh_data(mesh_, &points, &b.tets, nullptr));
-    need(dfm_tetmesh_cells(mesh_, &b.cell, &b.cells));
-    need(dfm_tetmesh_inside(mesh_, &b.cell_inside));
+    b.points = info_.points;
+    b.tets = info_.tets;
+    b.cell = info_.cell;
+    b.cells = info_.cells;
+    b.cell_inside = info_.inside;
     dfm_surface_def skin = {sizeof(dfm_surface_def), DFM_COUPLING_BARYCENTRIC, 0, 0, nullptr, nullptr, 0};
     if (surface_) {
-      dfm_trimesh_info triangles = {};
+      dfm_mesh_info triangles = {};
       triangles.size = sizeof triangles;
-      need(dfm_trimesh_get_info(surface_, &triangles));
+      need(dfm_mesh_get_info(surface_, &triangles));
       skin.npoint = triangles.npoint;
       skin.ntriangle = triangles.ntriangle;
-      need(dfm_trimesh_data(surface_, &skin.points, &skin.triangles, nullptr));
+      skin.points = triangles.points;
+      skin.triangles = triangles.faces;
       b.surface = &skin;
     }
     std::vector<uint8_t> fixed(info_.npoint, 0);
     for (uint32_t i = 0; s.held && i < info_.npoint; ++i)
-      if (points[3 * size_t(i) + (pressed ? 2 : 0)] < 1e-9) fixed[i] = 7;
+      if (b.points[3 * size_t(i) + (pressed ? 2 : 0)] < 1e-9) fixed[i] = 7;
     b.npoint = info_.npoint;
     b.ntet = info_.ntet;
-    b.points = points;
     b.fixed = fixed.data();
     b.model = s.model.c_str();
     const double hardware = hardware_of(context_, s.model);
@@ -218,14 +219,14 @@ class Bar {
     need(dfm_body_get_state(body_, info_.npoint, start_.data(), nullptr, &n));
   }
   void make_mesh(const double size[3], const Setting &s) {
-    need(dfm_tetmesh_make(context_, "beam", size, s.cells, &mesh_));
+    need(dfm_mesh_make(context_, "beam", size, DFM_MESH_CELLS, s.cells, &mesh_));
     info_.size = sizeof info_;
-    need(dfm_tetmesh_get_info(mesh_, &info_));
+    need(dfm_mesh_get_info(mesh_, &info_));
     if (!s.lattice) return;
-    need(dfm_trimesh_make(context_, "beam", size, 4 * info_.ntriangle, &surface_));
-    need(dfm_tetmesh_destroy(std::exchange(mesh_, 0)));
-    need(dfm_tetmesh_lattice(surface_, s.cells / 12, 0, &mesh_));
-    need(dfm_tetmesh_get_info(mesh_, &info_));
+    need(dfm_mesh_make(context_, "beam", size, DFM_MESH_SURFACE, 4 * info_.ntriangle, &surface_));
+    need(dfm_mesh_destroy(std::exchange(mesh_, 0)));
+    need(dfm_mesh_lattice(surface_, s.cells / 12, 0, &mesh_));
+    need(dfm_mesh_get_info(mesh_, &info_));
   }
   void add_obstacle(bool pressed) {
     dfm_obstacle_def d = dfm_obstacle_def_default();
@@ -239,17 +240,16 @@ class Bar {
     need(dfm_obstacle_create(world_, &d, &probe_));
   }
   void close() {
-    if (mesh_) dfm_tetmesh_destroy(mesh_);
-    if (surface_) dfm_trimesh_destroy(surface_);
+    if (mesh_) dfm_mesh_destroy(mesh_);
+    if (surface_) dfm_mesh_destroy(surface_);
     if (world_) dfm_world_destroy(world_);
   }
 
   static constexpr double kGap = 1e-5;  // m
   dfm_context *context_;
   dfm_world world_ = 0;
-  dfm_tetmesh mesh_ = 0;
-  dfm_trimesh surface_ = 0;  // of a lattice
-  dfm_tetmesh_info info_ = {};
+  dfm_mesh_handle mesh_ = 0, surface_ = 0;  // surface_: of a lattice
+  dfm_mesh_info info_ = {};
   dfm_body body_ = 0;
   uint32_t nbody_ = 1;
   dfm_obstacle probe_ = 0;  // or the floor

@@ -21,7 +21,7 @@ struct Offered {
 struct SubjectBody {
   std::string name, model;                  // short name
   std::vector<std::string> effects;         // those at work
-  uint32_t cells = 0;                       // tetrahedra; a second-order one is 8 (dfm_tetmesh_cells)
+  uint32_t cells = 0;                       // tetrahedra; a second-order one is 8 (dfm_mesh_info)
   double size = 0;                          // m, diagonal of the box around it at the start
   std::vector<std::array<double, 3>> ends;  // rest frame: two points of the surface far from each other
 };

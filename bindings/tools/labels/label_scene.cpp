@@ -25,11 +25,11 @@ constexpr int kRefills = 2;  // until about the wanted number of cells is left
 constexpr size_t kFewVoxels = 27;
 
 struct Handles {
-  dfm_trimesh surface = 0;
-  dfm_tetmesh cells = 0;
+  dfm_mesh_handle surface = 0;
+  dfm_mesh_handle cells = 0;
   ~Handles() {
-    if (cells) dfm_tetmesh_destroy(cells);
-    if (surface) dfm_trimesh_destroy(surface);
+    if (cells) dfm_mesh_destroy(cells);
+    if (surface) dfm_mesh_destroy(surface);
   }
 };
 
@@ -267,14 +267,11 @@ class Maker {
     std::vector<std::string> beyond;    // group of each face
   };
 
-  static Cells cells_in(dfm_tetmesh mesh, const dfm_tetmesh_info &info) {
-    const double *points = nullptr, *share = nullptr;
-    const uint32_t *tets = nullptr;
-    if (dfm_tetmesh_data(mesh, &points, &tets, nullptr) < 0 || dfm_tetmesh_share(mesh, &share) < 0) return {};
+  static Cells cells_in(const dfm_mesh_info &mesh) {
     Cells out;
-    out.points.assign(points, points + 3 * size_t(info.npoint));
-    out.tets.assign(tets, tets + 4 * size_t(info.ntet));
-    out.share.assign(share, share + info.ntet);
+    out.points.assign(mesh.points, mesh.points + 3 * size_t(mesh.npoint));
+    out.tets.assign(mesh.tets, mesh.tets + 4 * size_t(mesh.ntet));
+    out.share.assign(mesh.share, mesh.share + mesh.ntet);
     return out;
   }
 
@@ -303,17 +300,17 @@ class Maker {
     const auto need = [&](dfm_status status) {
       if (status < 0) refuse(o_.volume, "the body %s: %s", t.name.c_str(), dfm_last_error());
     };
-    need(dfm_trimesh_create(context_, uint32_t(shell.from.size()), shell.points.data(),
-                            uint32_t(shell.beyond.size()), shell.triangles.data(), &h.surface));
+    need(dfm_mesh_create(context_, uint32_t(shell.from.size()), shell.points.data(),
+                         uint32_t(shell.beyond.size()), shell.triangles.data(), &h.surface));
     Cells cells;
-    dfm_tetmesh_info info = {};
+    dfm_mesh_info info = {};
     info.size = sizeof info;
     const uint32_t wanted = cells_of(t);
     uint32_t requested = wanted;
     for (int again = kRefills;; --again) {
-      need(dfm_tetmesh_fill(h.surface, requested, &h.cells));
-      need(dfm_tetmesh_get_info(h.cells, &info));
-      cells = cells_in(h.cells, info);
+      need(dfm_mesh_fill(h.surface, requested, &h.cells));
+      need(dfm_mesh_get_info(h.cells, &info));
+      cells = cells_in(info);
       r.quality_min = info.quality_min;
       r.quality_mean = info.quality_mean;
       if (!t.own_boundary) break;
@@ -322,7 +319,7 @@ class Maker {
       // cells that are mostly outside have gone, fewer of each hundred the smaller they are
       requested =
           uint32_t(requested * std::pow(wanted / std::max(wanted / 8.0, double(cells.share.size())), 0.8));
-      need(dfm_tetmesh_destroy(std::exchange(h.cells, 0)));
+      need(dfm_mesh_destroy(std::exchange(h.cells, 0)));
     }
     if (info.warnings[0]) warn("the body " + t.name + ": " + info.warnings);
     if (cells.share.empty())

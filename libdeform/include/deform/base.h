@@ -81,8 +81,8 @@ enum { DFM_LOG_DEBUG = 0, DFM_LOG_INFO = 1, DFM_LOG_WARNING = 2, DFM_LOG_ERROR =
  * - Structs that the library fills in: the caller sets `size` to sizeof; the library writes at most so many
  *   bytes and sets `size` to the number written. 0 is the size of the struct in 0.1.
  * - Lists: see below.
- * The library also exports a symbol for each inline function except those of deprecated.h, for callers that
- * look functions up by name without a C compiler. It uses the structs of 0.1, in every later version too. */
+ * The library also exports a symbol for each inline function (of deprecated.h: DFM_DEPRECATED), for callers
+ * that look functions up by name without a C compiler, with the structs of 0.1 in every later version. */
 
 typedef struct dfm_context dfm_context; /* the only pointer of the API: hooks, loaded plugins, worlds */
 

@@ -72,12 +72,12 @@ typedef struct dfm_body_def {
    * slivers and light points. Mass, center and moments of inertia at rest stay exact; dfm_body_info has what
    * was moved and what it changes (doc/concepts/step.md). Such a body cannot be cut. 0: none. */
   double mass_scaling;
-  /* Cells that are not first-order tetrahedra, as dfm_tetmesh_cells gives them: kind, DFM_CELL_* of plugin.h,
+  /* Cells that are not first-order tetrahedra, as dfm_mesh_info gives them: kind, DFM_CELL_* of plugin.h,
    * and nodes, copied. tets and ntet are then those of the same mesh, and all [ntet] arrays go by these: of a
    * cell the values of its first tetrahedron count. NULL: the cells are the tetrahedra. */
   const uint32_t *cells;
   uint32_t cell, reserved2;
-  /* Hexahedra that are only in part material, or whose material reaches beyond them, as dfm_tetmesh_inside
+  /* Hexahedra that are only in part material, or whose material reaches beyond them, as dfm_mesh_info.inside
    * gives them: [ncell,27], copied. NULL: whole cells. */
   const double *cell_inside;
   /* Degrees: the surface means to be smooth across edges where its normals differ by at most this. There it

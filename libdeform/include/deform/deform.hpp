@@ -88,152 +88,58 @@ class Law : public Handle<dfm_law, struct LawKind> {
 
 // ---- meshes -----------------------------------------------------------------------------------------------
 template <class E>
-class TetMesh : public Handle<dfm_tetmesh, struct TetMeshKind> {
+class Mesh : public Handle<dfm_mesh_handle, struct MeshKind> {
  public:
   using Handle::Handle;
-  static void end(dfm_tetmesh mesh) noexcept { dfm_tetmesh_destroy(mesh); }
-  auto destroy() const { return E::done(dfm_tetmesh_destroy(raw_)); }
+  static void end(dfm_mesh_handle mesh) noexcept { dfm_mesh_destroy(mesh); }
+  auto destroy() const { return E::done(dfm_mesh_destroy(raw_)); }
+  // Counts, sizes, groups, and the arrays, which are borrowed: valid while the mesh lives.
   auto info() const {
-    return produce<E, dfm_tetmesh_info>([&](dfm_tetmesh_info &i) {
+    return produce<E, dfm_mesh_info>([&](dfm_mesh_info &i) {
       i.size = sizeof i;
-      return dfm_tetmesh_get_info(raw_, &i);
+      return dfm_mesh_get_info(raw_, &i);
     });
   }
-  // Spans below are borrowed: valid while the mesh lives.
+  // Those arrays as spans that every mesh has.
   auto data() const {
-    return produce<E, TetData>([&](TetData &d) {
-      const double *points = nullptr;
-      const uint32_t *tets = nullptr, *from = nullptr;
-      return counted([&](const dfm_tetmesh_info &i) {
-        const dfm_status s = dfm_tetmesh_data(raw_, &points, &tets, &from);
-        if (s >= 0) d = {{points, size_t{3} * i.npoint}, {tets, size_t{4} * i.ntet}, {from, i.npoint}};
-        return s;
-      });
-    });
-  }
-  auto groups() const {
-    return produce<E, Groups>([&](Groups &g) {
-      const char *const *names = nullptr;
-      const uint32_t *of = nullptr;
-      return counted([&](const dfm_tetmesh_info &i) {
-        const dfm_status s = dfm_tetmesh_groups(raw_, &names, &of);
-        if (s >= 0) g = {{names, i.ngroup}, {of, of ? i.ntet : 0}};
-        return s;
-      });
-    });
-  }
-  auto triangles() const {
-    return produce<E, GroupTriangles>([&](GroupTriangles &g) {
-      const uint32_t *triangles = nullptr, *group = nullptr;
-      uint32_t n = 0;
-      const dfm_status s = dfm_tetmesh_triangles(raw_, &triangles, &group, &n);
-      if (s >= 0) g = {{triangles, size_t{3} * n}, {group, n}};
+    return produce<E, MeshData>([&](MeshData &d) {
+      dfm_mesh_info i = sized<dfm_mesh_info>();
+      const dfm_status s = dfm_mesh_get_info(raw_, &i);
+      if (s >= 0)
+        d = {{i.points, size_t{3} * i.npoint}, {i.tets, size_t{4} * i.ntet}, {i.faces, size_t{3} * i.nface}};
       return s;
     });
   }
-  auto group_points(uint32_t group) const {
-    return produce<E, GroupPoints>([&](GroupPoints &g) {
-      const uint32_t *points = nullptr;
-      uint32_t n = 0;
-      const dfm_status s = dfm_tetmesh_group_points(raw_, group, &g.dimension, &points, &n);
-      if (s >= 0) g.points = {points, n};
-      return s;
-    });
-  }
-  auto file_cells() const { return per_cell<uint32_t>(dfm_tetmesh_file_cells); }  // empty: as in the file
-  auto share() const { return per_cell<double>(dfm_tetmesh_share); }              // empty: not filled
-  auto write(Text path) const { return E::done(dfm_tetmesh_write(raw_, path.c_str)); }
+  auto write(Text path) const { return E::done(dfm_mesh_write(raw_, path.c_str)); }
   // The same shape with points in the middles of the edges.
   auto second_order() const {
-    return produce<E, Unique<TetMesh<E>>>(
-        [&](auto &mesh) { return dfm_tetmesh_second_order(raw_, mesh.put()); });
+    return produce<E, Unique<Mesh<E>>>([&](auto &mesh) { return dfm_mesh_second_order(raw_, mesh.put()); });
   }
-  // Points, cells and share into a def that borrows them.
-  auto give_to(dfm_body_def &def) const {
-    return E::done(counted([&](const dfm_tetmesh_info &i) {
-      const dfm_status s = dfm_tetmesh_data(raw_, &def.points, &def.tets, nullptr);
-      if (s < 0) return s;
-      def.npoint = i.npoint;
-      def.ntet = i.ntet;
-      if (const dfm_status cells = dfm_tetmesh_cells(raw_, &def.cell, &def.cells); cells < 0) return cells;
-      if (const dfm_status part = dfm_tetmesh_inside(raw_, &def.cell_inside); part < 0) return part;
-      return dfm_tetmesh_share(raw_, &def.cell_share);
-    }));
-  }
-
- private:
-  template <class F>
-  dfm_status counted(F &&f) const {
-    dfm_tetmesh_info i = sized<dfm_tetmesh_info>();
-    const dfm_status s = dfm_tetmesh_get_info(raw_, &i);
-    return s < 0 ? s : f(i);
-  }
-  template <class T>
-  auto per_cell(dfm_status (*f)(dfm_tetmesh, const T **)) const {
-    return produce<E, std::span<const T>>([&](std::span<const T> &out) {
-      return counted([&](const dfm_tetmesh_info &i) {
-        const T *values = nullptr;
-        const dfm_status s = f(raw_, &values);
-        if (s >= 0) out = {values, values ? i.ntet : 0};
-        return s;
-      });
-    });
-  }
-};
-
-template <class E>
-class TriMesh : public Handle<dfm_trimesh, struct TriMeshKind> {
- public:
-  using Handle::Handle;
-  static void end(dfm_trimesh mesh) noexcept { dfm_trimesh_destroy(mesh); }
-  auto destroy() const { return E::done(dfm_trimesh_destroy(raw_)); }
-  auto info() const {
-    return produce<E, dfm_trimesh_info>([&](dfm_trimesh_info &i) {
-      i.size = sizeof i;
-      return dfm_trimesh_get_info(raw_, &i);
-    });
-  }
-  // Spans below are borrowed: valid while the mesh lives.
-  auto data() const {
-    return produce<E, TriData>([&](TriData &d) {
-      const double *points = nullptr;
-      const uint32_t *triangles = nullptr, *from = nullptr;
-      dfm_trimesh_info i = sized<dfm_trimesh_info>();
-      dfm_status s = dfm_trimesh_get_info(raw_, &i);
-      if (s >= 0) s = dfm_trimesh_data(raw_, &points, &triangles, &from);
-      if (s >= 0)
-        d = {{points, size_t{3} * i.npoint}, {triangles, size_t{3} * i.ntriangle}, {from, i.npoint}};
-      return s;
-    });
-  }
-  auto groups() const {
-    return produce<E, Groups>([&](Groups &g) {
-      const char *const *names = nullptr;
-      const uint32_t *of = nullptr;
-      dfm_trimesh_info i = sized<dfm_trimesh_info>();
-      dfm_status s = dfm_trimesh_get_info(raw_, &i);
-      if (s >= 0) s = dfm_trimesh_groups(raw_, &names, &of);
-      if (s >= 0) g = {{names, i.ngroup}, {of, of ? i.ntriangle : 0}};
-      return s;
-    });
-  }
-  auto write(Text path) const { return E::done(dfm_trimesh_write(raw_, path.c_str)); }
-  // Tetrahedra inside.
+  // Tetrahedra inside of a surface.
   auto fill(uint32_t cells) const {
-    return produce<E, Unique<TetMesh<E>>>(
-        [&](auto &mesh) { return dfm_tetmesh_fill(raw_, cells, mesh.put()); });
+    return produce<E, Unique<Mesh<E>>>([&](auto &mesh) { return dfm_mesh_fill(raw_, cells, mesh.put()); });
   }
-  // A coarse grid of hexahedra, by their number (size 0) or edge (cells 0).
+  // A coarse grid of hexahedra under a surface, by their number (size 0) or edge (cells 0).
   auto lattice(uint32_t cells, double size = 0) const {
-    return produce<E, Unique<TetMesh<E>>>(
-        [&](auto &mesh) { return dfm_tetmesh_lattice(raw_, cells, size, mesh.put()); });
+    return produce<E, Unique<Mesh<E>>>(
+        [&](auto &mesh) { return dfm_mesh_lattice(raw_, cells, size, mesh.put()); });
   }
-};
-
-template <class E>
-struct AnyMesh {
-  Unique<TetMesh<E>> cells;
-  Unique<TriMesh<E>> surface;
+  // Points, cells and their material into a def that borrows them.
+  auto give_to(dfm_body_def &def) const {
+    dfm_mesh_info i = sized<dfm_mesh_info>();
+    const dfm_status s = dfm_mesh_get_info(raw_, &i);
+    if (s >= 0) {
+      def.npoint = i.npoint;
+      def.points = i.points;
+      def.ntet = i.ntet;
+      def.tets = i.tets;
+      def.cell = i.cell;
+      def.cells = i.cells;
+      def.cell_inside = i.inside;
+      def.cell_share = i.share;
+    }
+    return E::done(s);
+  }
 };
 
 // ---- bodies -----------------------------------------------------------------------------------------------
@@ -658,36 +564,26 @@ class Context : public Handle<dfm_context *, struct ContextKind> {
         [&](auto &law) { return dfm_law_open(raw_, id_or_path.c_str, law.put()); });
   }
 
-  // Cells, or where the file has none the surface: the other one refers to nothing.
-  auto read_mesh(Text path) const {
-    return produce<E, AnyMesh<E>>(
-        [&](AnyMesh<E> &m) { return dfm_mesh_read(raw_, path.c_str, m.cells.put(), m.surface.put()); });
-  }
-  auto read_tets(Text path) const {
-    return produce<E, Unique<TetMesh<E>>>(
-        [&](auto &m) { return dfm_tetmesh_read(raw_, path.c_str, m.put()); });
+  // Cells, or where the file has none the surface (info().ntet is then 0); or what is asked for.
+  auto load_mesh(Text path, uint32_t what = DFM_MESH_ANY) const {
+    return produce<E, Unique<Mesh<E>>>(
+        [&](auto &m) { return dfm_mesh_load(raw_, path.c_str, what, m.put()); });
   }
   auto make_tets(Text kind, const Size &size, uint32_t cells) const {
-    return produce<E, Unique<TetMesh<E>>>(
-        [&](auto &m) { return dfm_tetmesh_make(raw_, kind.c_str, size.m, cells, m.put()); });
-  }
-  auto read_surface(Text path) const {
-    return produce<E, Unique<TriMesh<E>>>(
-        [&](auto &m) { return dfm_trimesh_read(raw_, path.c_str, m.put()); });
+    return produce<E, Unique<Mesh<E>>>(
+        [&](auto &m) { return dfm_mesh_make(raw_, kind.c_str, size.m, DFM_MESH_CELLS, cells, m.put()); });
   }
   auto make_surface(Text kind, const Size &size, uint32_t triangles) const {
-    return produce<E, Unique<TriMesh<E>>>(
-        [&](auto &m) { return dfm_trimesh_make(raw_, kind.c_str, size.m, triangles, m.put()); });
+    return produce<E, Unique<Mesh<E>>>([&](auto &m) {
+      return dfm_mesh_make(raw_, kind.c_str, size.m, DFM_MESH_SURFACE, triangles, m.put());
+    });
   }
   // Of triangles of the host's: points [n,3], triangles [n,3].
   auto make_surface(std::span<const double> points, std::span<const uint32_t> triangles) const {
-    return produce<E, Unique<TriMesh<E>>>([&](auto &m) {
-      return dfm_trimesh_create(raw_, rows(points.size(), 3), points.data(), rows(triangles.size(), 3),
-                                triangles.data(), m.put());
+    return produce<E, Unique<Mesh<E>>>([&](auto &m) {
+      return dfm_mesh_create(raw_, rows(points.size(), 3), points.data(), rows(triangles.size(), 3),
+                             triangles.data(), m.put());
     });
-  }
-  auto mesh_file_kind(Text path) const {
-    return produce<E, uint32_t>([&](uint32_t &kind) { return dfm_mesh_file_kind(raw_, path.c_str, &kind); });
   }
 
   auto load_plugin(Text path) const { return E::done(dfm_plugin_load(raw_, path.c_str)); }
@@ -763,8 +659,7 @@ using Tool = basic::Tool<Values>;
 using Material = basic::Material<Values>;
 using Law = basic::Law<Values>;
 using Scene = basic::Scene<Values>;
-using TetMesh = basic::TetMesh<Values>;
-using TriMesh = basic::TriMesh<Values>;
+using Mesh = basic::Mesh<Values>;
 using Toi = basic::Toi<Values>;
 }  // namespace values
 
@@ -779,8 +674,7 @@ using Tool = basic::Tool<Throw>;
 using Material = basic::Material<Throw>;
 using Law = basic::Law<Throw>;
 using Scene = basic::Scene<Throw>;
-using TetMesh = basic::TetMesh<Throw>;
-using TriMesh = basic::TriMesh<Throw>;
+using Mesh = basic::Mesh<Throw>;
 using Toi = basic::Toi<Throw>;
 }  // namespace exceptions
 #endif

@@ -85,23 +85,10 @@ struct Touch {
   Vec3 weights{};
 };
 struct EdgeTouch { double t = 0, a = 0, b = 0; };  // where on each edge
-struct TetData {
+// as in dfm_mesh_info
+struct MeshData {
   std::span<const double> points;
-  std::span<const uint32_t> tets, file_point;
-};
-struct TriData {
-  std::span<const double> points;
-  std::span<const uint32_t> triangles, file_point;
-};
-// of: group of each cell or triangle
-struct Groups {
-  std::span<const char *const> names;
-  std::span<const uint32_t> of;
-};
-struct GroupTriangles { std::span<const uint32_t> triangles, group; };
-struct GroupPoints {
-  uint32_t dimension = 0;
-  std::span<const uint32_t> points;
+  std::span<const uint32_t> tets, faces;
 };
 
 }  // namespace deform

@@ -2,9 +2,240 @@
 #ifndef DEFORM_DEPRECATED_H
 #define DEFORM_DEPRECATED_H
 #include <math.h>
+#include <stddef.h>
+#include <string.h>
 
 #include "deform/body.h"
+#include "deform/mesh.h"
 #include "deform/query.h"
+#ifndef DFM_DEPRECATED /* the library has these functions as symbols too, for programs that are linked */
+#define DFM_DEPRECATED static inline
+#endif
+/* Meshes: dfm_mesh_handle and dfm_mesh_* take the place of two kinds. Arguments, results and statuses are as
+ * they were, except that dfm_handle_kind knows one kind, and that dfm_mesh_file_kind reads and repairs. */
+typedef dfm_mesh_handle dfm_tetmesh;
+typedef dfm_mesh_handle dfm_trimesh;
+typedef dfm_mesh_info dfm_tetmesh_info;
+enum { DFM_HANDLE_TETMESH = DFM_HANDLE_MESH, DFM_HANDLE_TRIMESH = 8, DFM_MESH_TETS = DFM_MESH_CELLS };
+typedef struct dfm_trimesh_info {
+  uint32_t size, npoint, ntriangle, nedge, npiece, ngroup;
+  uint32_t merged_points, dropped_points, dropped_triangles, turned;
+  uint32_t open_edges, holes, nonmanifold_edges, closed;
+  double area, volume, edge_min, edge_median, edge_max;
+  double quality_min, quality_mean;
+  uint32_t quality_histogram[10];
+  double lo[3], hi[3];
+  const char *warnings;
+} dfm_trimesh_info;
+static inline dfm_status dfm_mesh_need(dfm_mesh_handle mesh, bool cells, dfm_mesh_info *out) {
+  out->size = (uint32_t)sizeof *out;
+  const dfm_status status = dfm_mesh_get_info(mesh, out);
+  if (status < 0 || (out->ntet > 0) == cells) return status;
+  return dfm_fail(DFM_E_HANDLE,
+                  cells ? "this handle is that of a surface mesh; pass that of a mesh with cells"
+                        : "this handle is that of a mesh with cells; pass that of a surface mesh");
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
+  return dfm_mesh_load(context, path, DFM_MESH_CELLS, out);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3],
+                                           uint32_t cells, dfm_tetmesh *out) {
+  return dfm_mesh_make(context, kind, size, DFM_MESH_CELLS, cells, out);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  return status < 0 ? status : dfm_mesh_destroy(mesh);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
+  if (out && !out->size) out->size = (uint32_t)offsetof(dfm_mesh_info, wave_path); /* that of 0.1 */
+  return dfm_mesh_get_info(mesh, out);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
+                                           const uint32_t **file_point) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
+  if (points) *points = m.points;
+  if (tets) *tets = m.tets;
+  if (file_point) *file_point = m.file_point;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_cells(dfm_tetmesh mesh, uint32_t *kind, const uint32_t **cells) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
+  if (kind) *kind = m.cell;
+  if (cells) *cells = m.cells;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_second_order(dfm_tetmesh mesh, dfm_tetmesh *out) {
+  return dfm_mesh_second_order(mesh, out);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names,
+                                             const uint32_t **cell_group) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
+  if (names) *names = m.group_names;
+  if (cell_group) *cell_group = m.cell_group;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles,
+                                                const uint32_t **group, uint32_t *n) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
+  if (triangles) *triangles = m.faces;
+  if (group) *group = m.face_group;
+  if (n) *n = m.nface;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension,
+                                                   const uint32_t **points, uint32_t *n) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status < 0) return status;
+  if (group >= m.ngroup)
+    return dfm_fail(DFM_E_ARG, "there is no such group; dfm_mesh_info.ngroup says how many there are");
+  if (dimension) *dimension = m.group_dimension[group];
+  if (points) *points = m.group_points[group];
+  if (n) *n = m.group_npoint[group];
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  return status < 0 ? status : dfm_mesh_write(mesh, path);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) {
+  dfm_mesh_info m;
+  if (!file_cell) return dfm_fail(DFM_E_ARG, "argument 'file_cell' is NULL");
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status >= 0) *file_cell = m.file_cell;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_fill(dfm_trimesh surface, uint32_t cells, dfm_tetmesh *out) {
+  return dfm_mesh_fill(surface, cells, out);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_share(dfm_tetmesh mesh, const double **share) {
+  dfm_mesh_info m;
+  if (!share) return dfm_fail(DFM_E_ARG, "argument 'share' is NULL");
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status >= 0) *share = m.share;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_lattice(dfm_trimesh surface, uint32_t cells, double size,
+                                              dfm_tetmesh *out) {
+  return dfm_mesh_lattice(surface, cells, size, out);
+}
+DFM_DEPRECATED dfm_status dfm_tetmesh_inside(dfm_tetmesh mesh, const double **inside) {
+  dfm_mesh_info m;
+  if (!inside) return dfm_fail(DFM_E_ARG, "argument 'inside' is NULL");
+  const dfm_status status = dfm_mesh_need(mesh, true, &m);
+  if (status >= 0) *inside = m.inside;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
+  dfm_mesh_handle mesh = 0;
+  dfm_mesh_info m;
+  if (!kind) return dfm_fail(DFM_E_ARG, "argument 'kind' is NULL");
+  const dfm_status status = dfm_mesh_load(context, path, DFM_MESH_ANY, &mesh);
+  if (status < 0) return status;
+  *kind = dfm_mesh_need(mesh, true, &m) < 0 ? DFM_MESH_SURFACE : DFM_MESH_CELLS;
+  return dfm_mesh_destroy(mesh);
+}
+DFM_DEPRECATED dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells,
+                                        dfm_trimesh *surface) {
+  dfm_mesh_handle mesh = 0;
+  dfm_mesh_info m;
+  if (!cells || !surface) return dfm_fail(DFM_E_ARG, "an out argument is NULL");
+  const dfm_status status = dfm_mesh_load(context, path, DFM_MESH_ANY, &mesh);
+  if (status < 0) return status;
+  const bool solid = dfm_mesh_need(mesh, true, &m) >= 0;
+  *cells = solid ? mesh : 0;
+  *surface = solid ? 0 : mesh;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_read(dfm_context *context, const char *path, dfm_trimesh *out) {
+  return dfm_mesh_load(context, path, DFM_MESH_SURFACE, out);
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_create(dfm_context *context, uint32_t npoint, const double *points,
+                                             uint32_t ntriangle, const uint32_t *triangles,
+                                             dfm_trimesh *out) {
+  return dfm_mesh_create(context, npoint, points, ntriangle, triangles, out);
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_make(dfm_context *context, const char *kind, const double size[3],
+                                           uint32_t triangles, dfm_trimesh *out) {
+  return dfm_mesh_make(context, kind, size, DFM_MESH_SURFACE, triangles, out);
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_destroy(dfm_trimesh mesh) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, false, &m);
+  return status < 0 ? status : dfm_mesh_destroy(mesh);
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_get_info(dfm_trimesh mesh, dfm_trimesh_info *out) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, false, &m);
+  if (status < 0) return status;
+  if (!out) return dfm_fail(DFM_E_ARG, "the out argument is NULL");
+  const uint32_t whole = (uint32_t)sizeof *out;
+  dfm_trimesh_info all = {out->size && out->size < whole ? out->size : whole,
+                          m.npoint,
+                          m.ntriangle,
+                          m.nedge,
+                          m.npiece,
+                          m.ngroup,
+                          m.duplicate_points,
+                          m.dropped_points,
+                          m.dropped_cells,
+                          m.turned,
+                          m.open_edges,
+                          m.holes,
+                          m.nonmanifold_edges,
+                          m.closed,
+                          m.area,
+                          m.volume,
+                          m.edge_min,
+                          m.edge_median,
+                          m.edge_max,
+                          m.quality_min,
+                          m.quality_mean,
+                          {0},
+                          {m.lo[0], m.lo[1], m.lo[2]},
+                          {m.hi[0], m.hi[1], m.hi[2]},
+                          m.warnings};
+  memcpy(all.quality_histogram, m.quality_histogram, sizeof all.quality_histogram);
+  memcpy(out, &all, all.size);
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_data(dfm_trimesh mesh, const double **points,
+                                           const uint32_t **triangles, const uint32_t **file_point) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, false, &m);
+  if (status < 0) return status;
+  if (points) *points = m.points;
+  if (triangles) *triangles = m.faces;
+  if (file_point) *file_point = m.file_point;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_groups(dfm_trimesh mesh, const char *const **names,
+                                             const uint32_t **triangle_group) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, false, &m);
+  if (status < 0) return status;
+  if (names) *names = m.group_names;
+  if (triangle_group) *triangle_group = m.face_group;
+  return status;
+}
+DFM_DEPRECATED dfm_status dfm_trimesh_write(dfm_trimesh mesh, const char *path) {
+  dfm_mesh_info m;
+  const dfm_status status = dfm_mesh_need(mesh, false, &m);
+  return status < 0 ? status : dfm_mesh_write(mesh, path);
+}
 /* Queries: dfm_world_query takes their place. Arguments, results and statuses are as they were, except that
  * hits have the sizes of this header and that a call during a step is DFM_E_BUSY. */
 typedef struct dfm_ray_hit {
@@ -32,22 +263,22 @@ static inline dfm_status dfm_query_first(dfm_world world, const dfm_query_shape 
   if (status >= 0) *out = hit;
   return status;
 }
-static inline dfm_status dfm_world_query_ray(dfm_world world, const double origin[3],
-                                             const double direction[3], double max_distance,
-                                             const dfm_query_filter *filter, dfm_query_hit *hit) {
+DFM_DEPRECATED dfm_status dfm_world_query_ray(dfm_world world, const double origin[3],
+                                              const double direction[3], double max_distance,
+                                              const dfm_query_filter *filter, dfm_query_hit *hit) {
   const double none[3] = {0, 0, 0};
   const dfm_query_shape point = dfm_query_point(origin);
   return dfm_query_first(world, &point, direction ? direction : none, max_distance > 0 ? max_distance : -1,
                          filter, hit);
 }
-static inline dfm_status dfm_world_query_closest(dfm_world world, const double point[3], double max_distance,
-                                                 const dfm_query_filter *filter, dfm_query_hit *hit) {
+DFM_DEPRECATED dfm_status dfm_world_query_closest(dfm_world world, const double point[3], double max_distance,
+                                                  const dfm_query_filter *filter, dfm_query_hit *hit) {
   const dfm_query_shape shape = dfm_query_point(point);
   return dfm_query_first(world, &shape, NULL, max_distance > 0 ? max_distance : -1, filter, hit);
 }
-static inline dfm_status dfm_world_query_cast(dfm_world world, const dfm_query_shape *shape,
-                                              const double path[3], const dfm_query_filter *filter,
-                                              dfm_query_hit *hit) {
+DFM_DEPRECATED dfm_status dfm_world_query_cast(dfm_world world, const dfm_query_shape *shape,
+                                               const double path[3], const dfm_query_filter *filter,
+                                               dfm_query_hit *hit) {
   if (!path) return dfm_fail(DFM_E_ARG, "path is NULL");
   return dfm_query_first(world, shape, path, 0, filter, hit);
 }
@@ -64,8 +295,8 @@ static inline dfm_status dfm_query_ray_hit(dfm_status status, const dfm_query_hi
   for (int k = 0; k < 3; ++k) out->normal[k] = hit->normal[k];
   return status;
 }
-static inline dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
-                                       double max_distance, dfm_ray_hit *hit) {
+DFM_DEPRECATED dfm_status dfm_world_ray(dfm_world world, const double origin[3], const double direction[3],
+                                        double max_distance, dfm_ray_hit *hit) {
   dfm_query_hit found = dfm_query_no_hit();
   return dfm_query_ray_hit(dfm_world_query_ray(world, origin, direction, max_distance, NULL, &found), &found,
                            hit);
@@ -76,18 +307,18 @@ static inline double dfm_query_nearest_body(void *user, const dfm_query_hit *hit
   if (hit->distance < nearest->distance) *nearest = *hit;
   return nearest->distance;
 }
-static inline dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance,
-                                           dfm_ray_hit *hit) {
+DFM_DEPRECATED dfm_status dfm_world_closest(dfm_world world, const double point[3], double max_distance,
+                                            dfm_ray_hit *hit) {
   dfm_query_hit found = dfm_query_no_hit();
   const dfm_query_shape shape = dfm_query_point(point);
   return dfm_query_ray_hit(dfm_world_query(world, &shape, NULL, max_distance > 0 ? max_distance : -1, NULL,
                                            dfm_query_nearest_body, &found),
                            &found, hit);
 }
-static inline dfm_status dfm_world_query_ray_all_sized(dfm_world world, const double origin[3],
-                                                       const double direction[3], double max_distance,
-                                                       const dfm_query_filter *filter, uint32_t row_size,
-                                                       uint32_t capacity, dfm_query_hit *out, uint32_t *n) {
+DFM_DEPRECATED dfm_status dfm_world_query_ray_all_sized(dfm_world world, const double origin[3],
+                                                        const double direction[3], double max_distance,
+                                                        const dfm_query_filter *filter, uint32_t row_size,
+                                                        uint32_t capacity, dfm_query_hit *out, uint32_t *n) {
   const double none[3] = {0, 0, 0};
   dfm_query_shape point = dfm_query_point(origin);
   dfm_query_hits hits = {(uint32_t)sizeof hits, row_size, capacity, 0, out};
@@ -98,10 +329,10 @@ static inline dfm_status dfm_world_query_ray_all_sized(dfm_world world, const do
   if (status >= 0 && n) *n = hits.n;
   return status;
 }
-static inline dfm_status dfm_world_query_ray_all(dfm_world world, const double origin[3],
-                                                 const double direction[3], double max_distance,
-                                                 const dfm_query_filter *filter, uint32_t capacity,
-                                                 dfm_query_hit *out, uint32_t *n) {
+DFM_DEPRECATED dfm_status dfm_world_query_ray_all(dfm_world world, const double origin[3],
+                                                  const double direction[3], double max_distance,
+                                                  const dfm_query_filter *filter, uint32_t capacity,
+                                                  dfm_query_hit *out, uint32_t *n) {
   return dfm_world_query_ray_all_sized(world, origin, direction, max_distance, filter,
                                        (uint32_t)sizeof(dfm_query_hit), capacity, out, n);
 }
@@ -115,18 +346,18 @@ static inline double dfm_query_list_thing(void *user, const dfm_query_hit *hit) 
   ++list->n;
   return INFINITY;
 }
-static inline dfm_status dfm_world_query_overlap(dfm_world world, const dfm_query_shape *shape,
-                                                 const dfm_query_filter *filter, uint32_t capacity,
-                                                 uint64_t *things, uint32_t *n) {
+DFM_DEPRECATED dfm_status dfm_world_query_overlap(dfm_world world, const dfm_query_shape *shape,
+                                                  const dfm_query_filter *filter, uint32_t capacity,
+                                                  uint64_t *things, uint32_t *n) {
   dfm_query_numbers list = {things, NULL, capacity, 0};
   if (capacity > 0 && !things) return dfm_fail(DFM_E_ARG, "the out argument is NULL, and capacity above 0");
   const dfm_status status = dfm_world_query(world, shape, NULL, 0, filter, dfm_query_list_thing, &list);
   if (status >= 0 && n) *n = list.n;
   return status;
 }
-static inline dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box,
-                                              const dfm_query_filter *filter, uint32_t capacity,
-                                              uint64_t *things, uint32_t *n) {
+DFM_DEPRECATED dfm_status dfm_world_query_aabb(dfm_world world, const dfm_aabb *box,
+                                               const dfm_query_filter *filter, uint32_t capacity,
+                                               uint64_t *things, uint32_t *n) {
   dfm_query_shape shape = dfm_query_shape_default();
   if (!box) return dfm_fail(DFM_E_ARG, "box is NULL");
   shape.shape = DFM_SHAPE_BOX;
@@ -154,8 +385,8 @@ static inline double dfm_query_list_triangle(void *user, const dfm_query_hit *hi
   list->triangles[at] = hit->triangle;
   return INFINITY;
 }
-static inline dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape,
-                                                  uint32_t capacity, uint32_t *triangles, uint32_t *n) {
+DFM_DEPRECATED dfm_status dfm_body_query_triangles(dfm_body body, const dfm_query_shape *shape,
+                                                   uint32_t capacity, uint32_t *triangles, uint32_t *n) {
   dfm_query_numbers list = {NULL, triangles, capacity, 0};
   dfm_query_filter filter = dfm_query_filter_default();
   dfm_body_info info;

@@ -15,9 +15,8 @@ typedef uint64_t dfm_obstacle;
 typedef uint64_t dfm_material;
 typedef uint64_t dfm_law;
 typedef uint64_t dfm_scene;
-typedef uint64_t dfm_tetmesh;
-typedef uint64_t dfm_trimesh;
-typedef uint64_t dfm_rigid; /* names a dfm_obstacle too */
+typedef uint64_t dfm_mesh_handle; /* dfm_mesh is what a model gets: plugin.h */
+typedef uint64_t dfm_rigid;       /* names a dfm_obstacle too */
 typedef uint64_t dfm_tool;
 
 /** What a handle refers to. All values but RIGID are the kind in the handle; a dfm_rigid has that of an
@@ -30,8 +29,7 @@ enum {
   DFM_HANDLE_MATERIAL = 4,
   DFM_HANDLE_LAW = 5,
   DFM_HANDLE_SCENE = 6,
-  DFM_HANDLE_TETMESH = 7,
-  DFM_HANDLE_TRIMESH = 8,
+  DFM_HANDLE_MESH = 7,
   DFM_HANDLE_RIGID = 9,
   DFM_HANDLE_TOOL = 10
 };

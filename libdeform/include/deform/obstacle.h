@@ -34,7 +34,7 @@ typedef struct dfm_obstacle_def {
   uint32_t category, collides_with;
   void *user;
   /* Since 0.1. mesh, voxels: a triangle surface in the obstacle's frame; copied. Triangles must share points
-   * (dfm_trimesh_read and dfm_trimesh_create merge equal points). A mesh may be open: it acts on the side
+   * (dfm_mesh_load and dfm_mesh_create merge equal points). A mesh may be open: it acts on the side
    * that its triangles face. Voxels need a closed surface. */
   uint32_t npoint, ntriangle;
   const double *points;      /* [npoint,3] m */

@@ -189,12 +189,12 @@ typedef struct dfm_mesh {             /* rest configuration; borrowed during cre
   const double *const *fields;
   uint32_t nedge, nsurfel;
   /* [nedge,2] i < j, lexicographic: the order of DFM_PER_EDGE state. Of other cells than DFM_CELL_TET
-   * those of the tetrahedra of each (dfm_tetmesh_cells) */
+   * those of the tetrahedra of each (dfm_mesh_info) */
   const uint32_t *edges;
   const uint32_t *row, *col; /* coupling N in CSR: surfel s has points col[row[s] .. row[s+1]) */
   const double *weight;      /* [row[nsurfel]]; x_s = sum weight * x_point */
   const uint8_t *fixed;      /* [npoint] held components, bits 1 x, 2 y, 4 z; the host moves them */
-  /* [ncell,27] material of hexahedra as dfm_tetmesh_inside describes it, only for a model with
+  /* [ncell,27] material of hexahedra as dfm_mesh_info describes it, only for a model with
    * DFM_CAP_INSIDE; NULL: whole cells */
   const double *inside;
 } dfm_mesh;

@@ -8,8 +8,7 @@ using namespace dfm;
 static_assert(DFM_HANDLE_WORLD == int(Kind::world) && DFM_HANDLE_BODY == int(Kind::body));
 static_assert(DFM_HANDLE_OBSTACLE == int(Kind::obstacle) && DFM_HANDLE_MATERIAL == int(Kind::material));
 static_assert(DFM_HANDLE_LAW == int(Kind::law) && DFM_HANDLE_SCENE == int(Kind::scene));
-static_assert(DFM_HANDLE_TETMESH == int(Kind::tetmesh) && DFM_HANDLE_TRIMESH == int(Kind::trimesh));
-static_assert(DFM_HANDLE_TOOL == int(Kind::tool));
+static_assert(DFM_HANDLE_MESH == int(Kind::mesh) && DFM_HANDLE_TOOL == int(Kind::tool));
 
 uint32_t dfm_handle_kind(uint64_t handle) {
   const Kind kind = handle_kind(handle);

@@ -1,16 +1,103 @@
 #include "deform/mesh.h"
 
 #include <algorithm>
+#include <memory>
 #include <string>
+#include <vector>
 
-#include "api/mesh_objects.h"
+#include "api/objects.h"
 #include "mesh/cells.h"
 #include "mesh/raw_mesh.h"
+#include "plugin/context.h"
 
 using namespace dfm;
-using Object = TetMeshObject;
 
 namespace {
+
+template <class T>
+const T *lent(const Array<T> &values) {
+  return values.empty() ? nullptr : values.data();
+}
+void lend_cells(const TetMesh &mesh, dfm_mesh_info &out) {
+  out.tets = mesh.tets.data();
+  out.cells = lent(mesh.cells);
+  out.cell_group = lent(mesh.tet_group);
+  out.file_cell = lent(mesh.file_cell);
+  out.share = lent(mesh.share);
+  out.inside = lent(mesh.inside);
+}
+void lend_cells(const TriMesh &, dfm_mesh_info &) {}
+
+// A mesh behind its handle, with what dfm_mesh_info lends out.
+struct MeshObject {
+  dfm_context &context;
+  AnyMesh mesh;
+  dfm_mesh_info info;
+  std::string warnings;
+  std::vector<const char *> names;
+  std::vector<uint32_t> dimension, npoint;
+  std::vector<const uint32_t *> points;
+
+  MeshObject(dfm_context &c, AnyMesh &&m) : context(c), mesh(std::move(m)) {
+    std::visit([this](const auto &known) { describe(known); }, mesh);
+  }
+  template <class Mesh>
+  void describe(const Mesh &known) {
+    for (const std::string &w : known.warnings) warnings += w + "\n";
+    for (const MeshGroup &g : known.groups) {
+      names.push_back(g.name.c_str());
+      dimension.push_back(static_cast<uint32_t>(g.dimension));
+      npoint.push_back(static_cast<uint32_t>(g.points.size()));
+      points.push_back(g.points.data());
+    }
+    info = mesh_statistics(known);
+    info.warnings = warnings.c_str();
+    info.points = known.points.data();
+    info.file_point = known.file_point.data();
+    info.nface = static_cast<uint32_t>(known.tris.size() / 3);
+    info.faces = lent(known.tris);
+    info.face_group = lent(known.tri_group);
+    info.group_names = names.data();
+    info.group_dimension = dimension.data();
+    info.group_npoint = npoint.data();
+    info.group_points = points.data();
+    lend_cells(known, info);
+  }
+};
+
+MeshObject &mesh_of(dfm_mesh_handle handle) {
+  MeshObject &object = resolve<MeshObject>(Kind::mesh, handle);
+  return held(object, object.context);
+}
+const TetMesh &cells_of(const MeshObject &object, dfm_mesh_handle handle) {
+  if (const TetMesh *const cells = std::get_if<TetMesh>(&object.mesh)) return *cells;
+  fail(DFM_E_HANDLE,
+       "mesh handle 0x%llx is that of a surface mesh; pass the handle of a mesh with cells, as dfm_mesh_fill "
+       "makes it of a surface",
+       static_cast<unsigned long long>(handle));
+}
+const TriMesh &surface_of(const MeshObject &object, dfm_mesh_handle handle) {
+  if (const TriMesh *const surface = std::get_if<TriMesh>(&object.mesh)) return *surface;
+  fail(DFM_E_HANDLE,
+       "mesh handle 0x%llx is that of a mesh with cells; pass the handle of a surface mesh, as dfm_mesh_load "
+       "and "
+       "dfm_mesh_make give with DFM_MESH_SURFACE",
+       static_cast<unsigned long long>(handle));
+}
+
+void end_mesh(uint64_t handle) {
+  auto *const object = static_cast<MeshObject *>(handle_find(Kind::mesh, handle));
+  handle_destroy(handle);
+  delete object;
+}
+// Moves a mesh into a context. from: logs its warnings with this before each.
+void keep(dfm_context &context, AnyMesh &&mesh, dfm_mesh_handle *out, const char *from = nullptr) {
+  if (from)
+    for (const std::string &w : std::visit([](const auto &m) -> const auto & { return m.warnings; }, mesh))
+      context.logf(DFM_LOG_WARNING, "%s: %s", from, w.c_str());
+  *out = keep_live(context, Kind::mesh, std::make_unique<MeshObject>(context, std::move(mesh)), end_mesh);
+}
+
 // "About" so many cells are asked for; who gets others by more than a quarter is told.
 void warn_cell_count(TetMesh &mesh, const char *kind, uint32_t requested) {
   constexpr double kAbout = 1.25;
@@ -22,145 +109,120 @@ void warn_cell_count(TetMesh &mesh, const char *kind, uint32_t requested) {
                "well-shaped cells nearer to that",
                made, of.name, requested, kind));
 }
+TetMesh generate_cells(const Memory &memory, const std::string &kind, const double size[3], uint32_t n) {
+  if (kind == "cylinder") return make_cylinder(memory, size[0], size[1], n);
+  if (kind == "beam") return make_beam(memory, size[0], size[1], size[2], n);
+  if (kind == "bricks") return make_bricks(memory, size[0], size[1], size[2], n);
+  if (kind == "ball") return make_ball(memory, size[0], n);
+  if (kind == "tube") return make_tube(memory, size[0], size[1], size[2], n);
+  fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, bricks, ball or tube", kind.c_str());
+}
+TriMesh generate_surface(const Memory &memory, const std::string &kind, const double size[3], uint32_t n) {
+  if (kind == "cylinder") return make_cylinder_surface(memory, size[0], size[1], n);
+  if (kind == "beam") return make_beam_surface(memory, size[0], size[1], size[2], n);
+  if (kind == "ball") return make_ball_surface(memory, size[0], n);
+  if (kind == "tube") return make_tube_surface(memory, size[0], size[1], size[2], n);
+  if (kind == "torus") return make_torus_surface(memory, size[0], size[1], n);
+  fail(DFM_E_ARG, "no surface generator is called '%s'; expected cylinder, beam, ball, tube or torus",
+       kind.c_str());
+}
 }  // namespace
 
-dfm_status dfm_tetmesh_read(dfm_context *context, const char *path, dfm_tetmesh *out) {
+dfm_status dfm_mesh_load(dfm_context *context, const char *path, uint32_t what, dfm_mesh_handle *out) {
   return as_status([&] {
     used(require(context));
     need(path, "path");
     need(out, "out");
-    TetMesh mesh = read_tet_mesh(context->memory, path);
-    log_warnings(*context, path, mesh.warnings);
-    *out = Object::keep(*context, std::move(mesh));
+    if (what > DFM_MESH_SURFACE)
+      fail(DFM_E_ARG, "%s: what is %u; expected DFM_MESH_ANY, DFM_MESH_CELLS or DFM_MESH_SURFACE", path,
+           what);
+    keep(*context, read_mesh(context->memory, path, what), out, path);
   });
 }
 
-dfm_status dfm_mesh_file_kind(dfm_context *context, const char *path, uint32_t *kind) {
-  return as_status([&] {
-    used(require(context));
-    need(path, "path");
-    need(kind, "kind");
-    *kind = has_cells(path, read_raw(context->memory, path)) ? DFM_MESH_TETS : DFM_MESH_SURFACE;
-  });
-}
-
-dfm_status dfm_mesh_read(dfm_context *context, const char *path, dfm_tetmesh *cells, dfm_trimesh *surface) {
-  return as_status([&] {
-    used(require(context));
-    need(path, "path");
-    need(cells, "cells");
-    need(surface, "surface");
-    AnyMesh mesh = read_any_mesh(context->memory, path);
-    log_warnings(*context, path, mesh.cells ? mesh.cells->warnings : mesh.surface->warnings);
-    const dfm_tetmesh c = mesh.cells ? Object::keep(*context, std::move(*mesh.cells)) : 0;
-    *surface = mesh.surface ? TriMeshObject::keep(*context, std::move(*mesh.surface)) : 0;
-    *cells = c;
-  });
-}
-
-dfm_status dfm_tetmesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t cells,
-                            dfm_tetmesh *out) {
+dfm_status dfm_mesh_make(dfm_context *context, const char *kind, const double size[3], uint32_t what,
+                         uint32_t n, dfm_mesh_handle *out) {
   return as_status([&] {
     used(require(context));
     need(kind, "kind");
     need(size, "size");
     need(out, "out");
-    const std::string name = kind;
-    const Memory &memory = context->memory;
-    const auto keep = [&](TetMesh mesh) {
-      warn_cell_count(mesh, kind, cells);
-      *out = Object::keep(*context, std::move(mesh));
-    };
-    if (name == "cylinder") keep(make_cylinder(memory, size[0], size[1], cells));
-    else if (name == "beam") keep(make_beam(memory, size[0], size[1], size[2], cells));
-    else if (name == "bricks") keep(make_bricks(memory, size[0], size[1], size[2], cells));
-    else if (name == "ball") keep(make_ball(memory, size[0], cells));
-    else if (name == "tube") keep(make_tube(memory, size[0], size[1], size[2], cells));
-    else fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, bricks, ball or tube", kind);
+    if (what == DFM_MESH_SURFACE)
+      return keep(*context, generate_surface(context->memory, kind, size, n), out);
+    if (what != DFM_MESH_CELLS)
+      fail(DFM_E_ARG, "'%s': what is %u; expected DFM_MESH_CELLS or DFM_MESH_SURFACE", kind, what);
+    TetMesh mesh = generate_cells(context->memory, kind, size, n);
+    warn_cell_count(mesh, kind, n);
+    keep(*context, std::move(mesh), out);
   });
 }
 
-dfm_status dfm_tetmesh_destroy(dfm_tetmesh mesh) {
-  return as_status([&] { Object::destroy(mesh); });
-}
-
-dfm_status dfm_tetmesh_get_info(dfm_tetmesh mesh, dfm_tetmesh_info *out) {
-  return as_status(Object::of, mesh, [&](const Object &object) { copy_out(out, object.info); });
-}
-
-dfm_status dfm_tetmesh_data(dfm_tetmesh mesh, const double **points, const uint32_t **tets,
-                            const uint32_t **file_point) {
+dfm_status dfm_mesh_create(dfm_context *context, uint32_t npoint, const double *points, uint32_t ntriangle,
+                           const uint32_t *triangles, dfm_mesh_handle *out) {
   return as_status([&] {
-    const TetMesh &m = Object::of(mesh).mesh;
-    if (points) *points = m.points.data();
-    if (tets) *tets = m.tets.data();
-    if (file_point) *file_point = m.file_point.data();
-  });
-}
-
-dfm_status dfm_tetmesh_cells(dfm_tetmesh mesh, uint32_t *kind, const uint32_t **cells) {
-  return as_status([&] {
-    const TetMesh &m = Object::of(mesh).mesh;
-    if (kind) *kind = m.cell;
-    if (cells) *cells = m.cells.empty() ? nullptr : m.cells.data();
-  });
-}
-
-dfm_status dfm_tetmesh_second_order(dfm_tetmesh mesh, dfm_tetmesh *out) {
-  return as_status([&] {
+    used(require(context));
+    need(points, "points");
+    need(triangles, "triangles");
     need(out, "out");
-    const Object &object = Object::of(mesh);
-    *out = Object::keep(object.context, second_order(object.mesh));
+    for (size_t i = 0; i < 3 * size_t(ntriangle); ++i)
+      if (triangles[i] >= npoint)
+        fail(DFM_E_ARG, "triangle %zu (counted from 0) uses point %u, there are %u; numbers count from 0",
+             i / 3, triangles[i], npoint);
+    RawMesh raw(context->memory);
+    raw.points.assign(points, points + 3 * size_t(npoint));
+    raw.tris.assign(triangles, triangles + 3 * size_t(ntriangle));
+    keep(*context, finish_surface("dfm_mesh_create", std::move(raw)), out, "dfm_mesh_create");
   });
 }
 
-dfm_status dfm_tetmesh_file_cells(dfm_tetmesh mesh, const uint32_t **file_cell) {
+dfm_status dfm_mesh_destroy(dfm_mesh_handle mesh) {
   return as_status([&] {
-    need(file_cell, "file_cell");
-    const TetMesh &m = Object::of(mesh).mesh;
-    *file_cell = m.file_cell.empty() ? nullptr : m.file_cell.data();
+    MeshObject &object = mesh_of(mesh);
+    Call::now().need_alone(&object, "mesh");
+    object.context.remove_live(mesh);
+    end_mesh(mesh);
   });
 }
 
-dfm_status dfm_tetmesh_groups(dfm_tetmesh mesh, const char *const **names, const uint32_t **cell_group) {
-  return as_status(Object::of, mesh, [&](const Object &object) {
-    if (names) *names = object.names.data();
-    if (cell_group) *cell_group = object.mesh.tet_group.data();
-  });
+dfm_status dfm_mesh_get_info(dfm_mesh_handle mesh, dfm_mesh_info *out) {
+  return as_status(mesh_of, mesh, [&](const MeshObject &object) { copy_out(out, object.info); });
 }
 
-dfm_status dfm_tetmesh_triangles(dfm_tetmesh mesh, const uint32_t **triangles, const uint32_t **group,
-                                 uint32_t *n) {
-  return as_status([&] {
-    const TetMesh &m = Object::of(mesh).mesh;
-    if (triangles) *triangles = m.tris.data();
-    if (group) *group = m.tri_group.data();
-    if (n) *n = static_cast<uint32_t>(m.tri_group.size());
-  });
-}
-
-dfm_status dfm_tetmesh_group_points(dfm_tetmesh mesh, uint32_t group, uint32_t *dimension,
-                                    const uint32_t **points, uint32_t *n) {
-  return as_status([&] {
-    const TetMesh &m = Object::of(mesh).mesh;
-    if (group >= m.groups.size())
-      fail(DFM_E_ARG, "there is no group %u; the mesh has %zu", group, m.groups.size());
-    const MeshGroup &g = m.groups[group];
-    if (dimension) *dimension = static_cast<uint32_t>(g.dimension);
-    if (points) *points = g.points.data();
-    if (n) *n = static_cast<uint32_t>(g.points.size());
-  });
-}
-
-dfm_status dfm_tetmesh_write(dfm_tetmesh mesh, const char *path) {
+dfm_status dfm_mesh_write(dfm_mesh_handle mesh, const char *path) {
   return as_status([&] {
     need(path, "path");
-    const Object &object = Object::of(mesh);
-    if (!write_tet_mesh(object.mesh, path))
+    const MeshObject &object = mesh_of(mesh);
+    if (const TriMesh *const surface = std::get_if<TriMesh>(&object.mesh)) write_tri_mesh(*surface, path);
+    else if (!write_tet_mesh(std::get<TetMesh>(object.mesh), path))
       object.context.logf(
           DFM_LOG_WARNING,
           "%s does not keep how much of each cell is material: a body of this file counts every cell "
           "whole in mass and stiffness; write %s",
-          path, object.mesh.inside.empty() ? ".vtu or .vtk, which keep it" : ".vtu, which keeps it");
+          path, object.info.inside ? ".vtu, which keeps it" : ".vtu or .vtk, which keep it");
+  });
+}
+
+dfm_status dfm_mesh_second_order(dfm_mesh_handle mesh, dfm_mesh_handle *out) {
+  return as_status([&] {
+    need(out, "out");
+    const MeshObject &object = mesh_of(mesh);
+    keep(object.context, second_order(cells_of(object, mesh)), out);
+  });
+}
+
+dfm_status dfm_mesh_fill(dfm_mesh_handle surface, uint32_t cells, dfm_mesh_handle *out) {
+  return as_status([&] {
+    need(out, "out");
+    const MeshObject &object = mesh_of(surface);
+    const TriMesh &shell = surface_of(object, surface);
+    keep(object.context, cells ? fill_surface(shell, cells) : fan_surface(shell), out, "filling a surface");
+  });
+}
+
+dfm_status dfm_mesh_lattice(dfm_mesh_handle surface, uint32_t cells, double size, dfm_mesh_handle *out) {
+  return as_status([&] {
+    need(out, "out");
+    const MeshObject &object = mesh_of(surface);
+    keep(object.context, make_lattice(surface_of(object, surface), cells, size), out, "making a lattice");
   });
 }

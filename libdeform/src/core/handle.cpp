@@ -35,8 +35,7 @@ const char *kind_name(Kind kind) {
     case Kind::material: return "material";
     case Kind::law: return "law";
     case Kind::scene: return "scene";
-    case Kind::tetmesh: return "mesh";
-    case Kind::trimesh: return "surface mesh";
+    case Kind::mesh: return "mesh";
     case Kind::tool: return "tool";
     case Kind::none: break;
   }

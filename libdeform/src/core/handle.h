@@ -13,8 +13,7 @@ enum class Kind : uint8_t {
   material = 4,
   law = 5,
   scene = 6,
-  tetmesh = 7,
-  trimesh = 8,
+  mesh = 7,
   // 9: DFM_HANDLE_RIGID; its handles have kind obstacle
   tool = 10
 };

@@ -30,7 +30,7 @@ Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<
 // (Hinton, Rock, Zienkiewicz 1976, A note on mass lumping and related processes).
 void mass_shares(const CellKind &kind, const double *points, const uint32_t *cell, double *out);
 
-// Points by which each hexahedron's material is given (dfm_tetmesh_inside), and their place in its
+// Points by which each hexahedron's material is given (dfm_mesh_info.inside), and their place in its
 // coordinates.
 inline constexpr uint32_t kInsidePoints = 27;
 Vec3 inside_place(uint32_t point);

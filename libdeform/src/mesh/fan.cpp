@@ -45,7 +45,7 @@ bool find_eye(const std::vector<Plane> &planes, double least, Vec3 &eye) {
 }  // namespace
 
 TetMesh fan_surface(const TriMesh &surface) {
-  const dfm_trimesh_info info = mesh_statistics(surface);
+  const dfm_mesh_info info = mesh_statistics(surface);
   if (!info.closed)
     fail(
         DFM_E_FORMAT,

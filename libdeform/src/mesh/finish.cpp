@@ -190,7 +190,7 @@ uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
 
 void add_warnings(TetMesh &mesh, uint32_t crowded) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
-  const dfm_tetmesh_info s = mesh_statistics(mesh);
+  const dfm_mesh_info s = mesh_statistics(mesh);
   if (mesh.turned)
     warn(format("%u of %u cells had negative volume and %s turned", mesh.turned,
                 s.ntet / cell_kind(mesh.cell).tets, was_were(mesh.turned)));
@@ -286,7 +286,7 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   if (raw.tets.empty() && !raw.tris.empty())
     fail(DFM_E_FORMAT,
          "%s: no tetrahedra in this file, only a surface of %u triangles; fill it, and give it to the body "
-         "as its surface: TetMesh.fill and surface= of add_body in Python, dfm_tetmesh_fill and "
+         "as its surface: TetMesh.fill and surface= of add_body in Python, dfm_mesh_fill and "
          "dfm_body_def.surface in C, or deform mesh fill %s --out %s",
          path.c_str(), raw.ntri(), shell_word(path).c_str(),
          shell_word(name_of(path_of(path).replace_extension(".vtu"))).c_str());

@@ -398,7 +398,7 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
 
 void add_warnings(TriMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
-  const dfm_trimesh_info s = mesh_statistics(mesh);
+  const dfm_mesh_info s = mesh_statistics(mesh);
   add_count(mesh.warnings, done.same, "point", "", "merged with another at exactly the same place");
   add_count(mesh.warnings, done.rim, "point", " on open edges",
             "merged with another that differs by rounding only");

@@ -403,7 +403,7 @@ void refuse_unfit(const TriMesh &surface, const Extent &box, uint32_t cells, dou
     fail(DFM_E_ARG,
          "a lattice has either a number of cells, 1 to %u, or their size in m, above 0; found %u and %g",
          kMaxCells, cells, size);
-  const dfm_trimesh_info s = mesh_statistics(surface);
+  const dfm_mesh_info s = mesh_statistics(surface);
   if (!s.closed)
     fail(DFM_E_FORMAT,
          "the surface is open: %u edges have one triangle, %u more than two; a lattice needs a closed one: "

@@ -40,7 +40,7 @@ struct TetMesh {
   Array<uint32_t> file_cell;
   // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
   Array<double> share;
-  Array<double> inside;           // [ncell,27] of a lattice, as dfm_tetmesh_inside gives it; else empty
+  Array<double> inside;           // [ncell,27] of a lattice, as dfm_mesh_info has it; else empty
   std::vector<MeshGroup> groups;  // by dimension, then tag
   // Repairs and observations of the reader.
   uint32_t turned = 0, dropped_points = 0, dropped_cells = 0;
@@ -98,8 +98,8 @@ double tet_volume(const double *points, const uint32_t *tet);
 // an inverted one.
 double tet_quality(const double *points, const uint32_t *tet);
 
-// All but the text of the warnings.
-dfm_tetmesh_info mesh_statistics(const TetMesh &mesh);
+// All but the arrays and the text of the warnings.
+dfm_mesh_info mesh_statistics(const TetMesh &mesh);
 
 // ---- writing ----------------------------------------------------------------------------------------------
 // All write to a temporary file next to the target and rename it, so no partial file remains. Throw

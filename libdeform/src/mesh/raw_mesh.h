@@ -1,9 +1,9 @@
 // The result of a reader: points, tetrahedra and triangles in the file's order, not yet checked as geometry.
 #pragma once
 #include <map>
-#include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "mesh/cursor.h"
@@ -85,14 +85,9 @@ RawMesh parse_raw(const Memory &memory, const std::string &path, const char *byt
 // What kind of mesh a file is, by its first bytes or the ending of its name ("STL"); empty: none is known.
 std::string mesh_kind(const std::string &path, std::string_view bytes);
 
-// A file of either kind: its cells, or the surface that it holds instead.
-struct AnyMesh {
-  std::optional<TetMesh> cells;
-  std::optional<TriMesh> surface;
-};
-AnyMesh read_any_mesh(const Memory &memory, const std::string &path);
-// Whether the file has cells for a body. Throws DFM_E_FORMAT if it has neither cells nor a surface.
-bool has_cells(const std::string &path, const RawMesh &raw);
+using AnyMesh = std::variant<TetMesh, TriMesh>;
+// what: DFM_MESH_*
+AnyMesh read_mesh(const Memory &memory, const std::string &path, uint32_t what);
 
 // Repairs what can be repaired, counts it, and refuses what has no volume.
 TetMesh finish_mesh(const std::string &path, RawMesh &&raw);

@@ -187,19 +187,14 @@ TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char
   return finish_surface(path, parse_raw(memory, path, bytes, size));
 }
 
-bool has_cells(const std::string &path, const RawMesh &raw) {
-  if (raw.tets.empty() && raw.tris.empty())
+AnyMesh read_mesh(const Memory &memory, const std::string &path, uint32_t what) {
+  RawMesh raw = read_raw(memory, path);
+  if (what == DFM_MESH_ANY && raw.tets.empty() && raw.tris.empty())
     fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them",
          path.c_str());
-  return !raw.tets.empty();
-}
-
-AnyMesh read_any_mesh(const Memory &memory, const std::string &path) {
-  RawMesh raw = read_raw(memory, path);
-  AnyMesh out;
-  if (has_cells(path, raw)) out.cells = finish_mesh(path, std::move(raw));
-  else out.surface = finish_surface(path, std::move(raw));
-  return out;
+  if (what == DFM_MESH_SURFACE || (what == DFM_MESH_ANY && raw.tets.empty()))
+    return finish_surface(path, std::move(raw));
+  return finish_mesh(path, std::move(raw));
 }
 
 TriMesh read_tri_mesh(const Memory &memory, const std::string &path) {

@@ -2,6 +2,7 @@
 // or as binary of either byte order. Of the vertices x y z are kept, of the faces the list of corners and a
 // whole-number property that numbers groups; all else is skipped.
 #include <bit>
+#include <optional>
 
 #include "mesh/raw_mesh.h"
 

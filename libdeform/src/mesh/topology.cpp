@@ -146,7 +146,7 @@ uint32_t count_nonmanifold_edges(const Memory &memory, const Array<uint32_t> &tr
   return n;
 }
 
-// As in dfm_tetmesh_info. A corner's gradient is as long as its face's area over three volumes.
+// As in dfm_mesh_info. A corner's gradient is as long as its face's area over three volumes.
 double wave_path(const TetMesh &mesh) {
   Array<double> volume(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
   Array<double> stiffness(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
@@ -172,8 +172,8 @@ double wave_path(const TetMesh &mesh) {
 
 }  // namespace
 
-dfm_tetmesh_info mesh_statistics(const TetMesh &mesh) {
-  dfm_tetmesh_info s{};
+dfm_mesh_info mesh_statistics(const TetMesh &mesh) {
+  dfm_mesh_info s{};
   const Memory &memory = *mesh.memory;
   s.npoint = mesh.npoint();
   s.ntet = mesh.ntet();

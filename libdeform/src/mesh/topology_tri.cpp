@@ -80,15 +80,15 @@ uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
 
 }  // namespace
 
-dfm_trimesh_info mesh_statistics(const TriMesh &mesh) {
-  dfm_trimesh_info s{};
+dfm_mesh_info mesh_statistics(const TriMesh &mesh) {
+  dfm_mesh_info s{};
   s.npoint = mesh.npoint();
   s.ntriangle = mesh.ntri();
   s.ngroup = static_cast<uint32_t>(mesh.groups.size());
   s.turned = mesh.turned;
-  s.merged_points = mesh.merged_points;
+  s.duplicate_points = mesh.merged_points;
   s.dropped_points = mesh.dropped_points;
-  s.dropped_triangles = mesh.dropped_tris;
+  s.dropped_cells = mesh.dropped_tris;
   if (s.ntriangle == 0) return s;
   const double *points = mesh.points.data();
   Array<double> length{HookAllocator<double>(*mesh.memory)};

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/memory.h"
+#include "deform/mesh.h"
 #include "math/extent.h"
 
 namespace dfm {
@@ -27,16 +28,15 @@ Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges);
 // Pieces of cells of so many corners: joined by points.
 uint32_t count_pieces(const Memory &memory, uint32_t npoint, const Array<uint32_t> &corners, size_t each);
 
-// Measures that dfm_tetmesh_info and dfm_trimesh_info share.
-template <class Info>
-void put_edges(Array<double> &lengths, Info &out) {
+// Measures of cells and of surfaces alike.
+inline void put_edges(Array<double> &lengths, dfm_mesh_info &out) {
   std::sort(lengths.begin(), lengths.end());
   out.edge_min = lengths.front();
   out.edge_median = lengths[lengths.size() / 2];
   out.edge_max = lengths.back();
 }
-template <class Info, class Quality>
-void put_qualities(size_t n, Info &out, const Quality &quality) {
+template <class Quality>
+void put_qualities(size_t n, dfm_mesh_info &out, const Quality &quality) {
   out.quality_min = 1;
   for (size_t i = 0; i < n; ++i) {
     const double q = quality(i);
@@ -46,8 +46,7 @@ void put_qualities(size_t n, Info &out, const Quality &quality) {
   }
   out.quality_mean /= double(n);
 }
-template <class Info>
-void put_box(const Array<double> &points, Info &out) {
+inline void put_box(const Array<double> &points, dfm_mesh_info &out) {
   const Extent box = extent_of(points);
   store3(out.lo, box.lo);
   store3(out.hi, box.hi);

@@ -45,7 +45,7 @@ double triangle_area(const double *points, const uint32_t *tri);
 // 4 sqrt(3) area / sum l^2: 1 for an equilateral triangle, 0 for a flat one.
 double triangle_quality(const double *points, const uint32_t *tri);
 
-dfm_trimesh_info mesh_statistics(const TriMesh &mesh);
+dfm_mesh_info mesh_statistics(const TriMesh &mesh);
 
 // Cells of a body-centered cubic lattice that cover the inside of the surface, about `cells` of them, with
 // `share` filled in. The surface need not be clean: inside is where the generalized winding number exceeds

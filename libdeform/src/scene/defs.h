@@ -82,7 +82,7 @@ struct OwnSurface {
   bool boundary = false, coupled = false;  // "from": "boundary" is said; a coupling is said
 };
 
-// A generated mesh (dfm_tetmesh_make).
+// A generated mesh (dfm_mesh_make).
 struct MadeMesh {
   std::string kind;  // empty: the mesh is a file
   double size[3] = {};

@@ -50,23 +50,16 @@ double BodyMesh::share_of(uint32_t tet) const {
 }
 
 MeshFiles::~MeshFiles() {
-  for (auto &[path, mesh] : cells_) dfm_tetmesh_destroy(mesh);
-  for (auto &[key, mesh] : fillings_) dfm_tetmesh_destroy(mesh);
-  for (auto &[key, mesh] : lattices_) dfm_tetmesh_destroy(mesh);
-  for (auto &[path, mesh] : surfaces_) dfm_trimesh_destroy(mesh);
+  for (auto &[path, mesh] : cells_) dfm_mesh_destroy(mesh);
+  for (auto &[key, mesh] : fillings_) dfm_mesh_destroy(mesh);
+  for (auto &[key, mesh] : lattices_) dfm_mesh_destroy(mesh);
+  for (auto &[path, mesh] : surfaces_) dfm_mesh_destroy(mesh);
 }
 
-dfm_tetmesh_info MeshFiles::info_of(dfm_tetmesh mesh, const std::string &pointer) const {
-  dfm_tetmesh_info info = {};
+dfm_mesh_info MeshFiles::info_of(dfm_mesh_handle mesh, const std::string &pointer) const {
+  dfm_mesh_info info = {};
   info.size = sizeof info;
-  def_.require(dfm_tetmesh_get_info(mesh, &info), pointer);
-  return info;
-}
-
-dfm_trimesh_info MeshFiles::surface_info(dfm_trimesh mesh, const std::string &pointer) const {
-  dfm_trimesh_info info = {};
-  info.size = sizeof info;
-  def_.require(dfm_trimesh_get_info(mesh, &info), pointer);
+  def_.require(dfm_mesh_get_info(mesh, &info), pointer);
   return info;
 }
 
@@ -79,17 +72,14 @@ std::string MeshFiles::path_of(const std::string &path) const {
 bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
   if (cells_.count(path)) return true;
   if (surface_only_.count(path)) return false;
-  dfm_tetmesh cells = 0;
-  dfm_trimesh surface = 0;
-  def_.require(dfm_mesh_read(context_, path.c_str(), &cells, &surface), pointer);
-  if (cells) {
-    cells_[path] = cells;
-    return true;
-  }
-  surface_only_.insert(path);
-  // already known as the surface of a body
-  if (!surfaces_.try_emplace(path, surface).second) def_.require(dfm_trimesh_destroy(surface), pointer);
-  return false;
+  dfm_mesh_handle mesh = 0;
+  def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_ANY, &mesh), pointer);
+  const bool cells = info_of(mesh, pointer).ntet > 0;
+  if (!cells) surface_only_.insert(path);
+  // a surface is perhaps known already, as that of a body
+  if (!(cells ? cells_ : surfaces_).try_emplace(path, mesh).second)
+    def_.require(dfm_mesh_destroy(mesh), pointer);
+  return cells;
 }
 
 // Stored under a name that no file can have.
@@ -97,15 +87,16 @@ std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string name = format("/dev/null/%s %a %a %a %u %u", m.kind.c_str(), m.size[0], m.size[1],
                                   m.size[2], m.cells, m.order);
-  dfm_tetmesh &mesh = cells_[name];
+  dfm_mesh_handle &mesh = cells_[name];
   if (mesh) return name;
-  def_.require(dfm_tetmesh_make(context_, m.kind.c_str(), m.size, m.cells, &mesh), b.pointer + "/mesh");
+  def_.require(dfm_mesh_make(context_, m.kind.c_str(), m.size, DFM_MESH_CELLS, m.cells, &mesh),
+               b.pointer + "/mesh");
   if (m.order == 2) {
-    const dfm_tetmesh first = mesh;
-    def_.require(dfm_tetmesh_second_order(first, &mesh), b.pointer + "/mesh");
-    def_.require(dfm_tetmesh_destroy(first), b.pointer + "/mesh");
+    const dfm_mesh_handle first = mesh;
+    def_.require(dfm_mesh_second_order(first, &mesh), b.pointer + "/mesh");
+    def_.require(dfm_mesh_destroy(first), b.pointer + "/mesh");
   }
-  const dfm_tetmesh_info info = info_of(mesh, b.pointer + "/mesh");
+  const dfm_mesh_info info = info_of(mesh, b.pointer + "/mesh");
   if (info.ncell > 2 * uint64_t{m.cells} && info.ncell > m.cells + kCheapCells)
     context_->logf(DFM_LOG_WARNING,
                    "body '%s': its %s has %u cells, not about %u: cells are about as long as thick, and no "
@@ -114,9 +105,9 @@ std::string MeshFiles::make(const Body &b) {
   return name;
 }
 
-dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer) {
-  dfm_tetmesh &mesh = cells_[path];
-  if (!mesh) def_.require(dfm_tetmesh_read(context_, path.c_str(), &mesh), pointer);
+dfm_mesh_handle MeshFiles::cells(const std::string &path, const std::string &pointer) {
+  dfm_mesh_handle &mesh = cells_[path];
+  if (!mesh) def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_CELLS, &mesh), pointer);
   return mesh;
 }
 
@@ -126,7 +117,7 @@ dfm_tetmesh MeshFiles::cells(const std::string &path, const std::string &pointer
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";
-  const dfm_tetmesh_info own = info_of(cells_.at(make(b)), pointer);
+  const dfm_mesh_info own = info_of(cells_.at(make(b)), pointer);
   const double hexahedra = b.lattice_cells
                                ? b.lattice_cells
                                : std::min(kMaxLattice, own.volume * std::pow(b.scale / b.lattice_size, 3));
@@ -134,22 +125,22 @@ std::string MeshFiles::make_surface(const Body &b) {
   const auto n =
       uint32_t(std::lround(4.0 * own.ntriangle * std::pow(std::max(1.0, wanted / own.ntet), 2.0 / 3)));
   const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
-  dfm_trimesh &mesh = surfaces_[name];
-  if (!mesh) def_.require(dfm_trimesh_make(context_, kind.c_str(), m.size, n, &mesh), pointer);
+  dfm_mesh_handle &mesh = surfaces_[name];
+  if (!mesh) def_.require(dfm_mesh_make(context_, kind.c_str(), m.size, DFM_MESH_SURFACE, n, &mesh), pointer);
   return name;
 }
 
-dfm_trimesh MeshFiles::surface(const std::string &path, const std::string &pointer) {
-  dfm_trimesh &mesh = surfaces_[path];
-  if (!mesh) def_.require(dfm_trimesh_read(context_, path.c_str(), &mesh), pointer);
+dfm_mesh_handle MeshFiles::surface(const std::string &path, const std::string &pointer) {
+  dfm_mesh_handle &mesh = surfaces_[path];
+  if (!mesh) def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_SURFACE, &mesh), pointer);
   return mesh;
 }
 
-dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
+dfm_mesh_handle MeshFiles::filling(const std::string &path, const Body &b) {
   const uint32_t wanted = b.fill.value_or(kFillCells);
-  dfm_tetmesh &mesh = fillings_[{path, wanted}];
+  dfm_mesh_handle &mesh = fillings_[{path, wanted}];
   if (!mesh)
-    def_.require(dfm_tetmesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
+    def_.require(dfm_mesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
                  b.pointer + (b.fill ? "/fill" : "/mesh"));
   if (!b.fill)
     context_->logf(DFM_LOG_WARNING,
@@ -159,11 +150,11 @@ dfm_tetmesh MeshFiles::filling(const std::string &path, const Body &b) {
   return mesh;
 }
 
-dfm_tetmesh MeshFiles::lattice(const std::string &path, const Body &b) {
-  dfm_tetmesh &mesh = lattices_[{path, b.lattice_cells, b.lattice_size / b.scale}];
+dfm_mesh_handle MeshFiles::lattice(const std::string &path, const Body &b) {
+  dfm_mesh_handle &mesh = lattices_[{path, b.lattice_cells, b.lattice_size / b.scale}];
   if (!mesh)
-    def_.require(dfm_tetmesh_lattice(surface(path, b.pointer + "/mesh"), b.lattice_cells,
-                                     b.lattice_size / b.scale, &mesh),
+    def_.require(dfm_mesh_lattice(surface(path, b.pointer + "/mesh"), b.lattice_cells,
+                                  b.lattice_size / b.scale, &mesh),
                  b.pointer + "/lattice");
   return mesh;
 }
@@ -190,24 +181,26 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool renumbered) const
                 "\"mesh\"");
 }
 
-void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const {
-  const std::string pointer = b.pointer + "/mesh";
-  const dfm_tetmesh_info info = info_of(mesh, pointer);
-  const double *points = nullptr;
-  def_.require(dfm_tetmesh_data(mesh, &points, &out.tets, &out.file_point), pointer);
-  def_.require(dfm_tetmesh_cells(mesh, &out.cell, &out.nodes), pointer);
-  def_.require(dfm_tetmesh_groups(mesh, &out.group_names, &out.cell_group), pointer);
-  def_.require(dfm_tetmesh_triangles(mesh, &out.faces, &out.face_group, &out.nface), pointer);
-  def_.require(dfm_tetmesh_file_cells(mesh, &out.file_cell), pointer);
-  def_.require(dfm_tetmesh_share(mesh, &out.share), pointer);
-  def_.require(dfm_tetmesh_inside(mesh, &out.inside), pointer);
-  out.handle = mesh;
+void MeshFiles::take_cells(dfm_mesh_handle mesh, const Body &b, BodyMesh &out) const {
+  const dfm_mesh_info info = out.info = info_of(mesh, b.pointer + "/mesh");
+  out.tets = info.tets;
+  out.file_point = info.file_point;
+  out.cell = info.cell;
+  out.nodes = info.cells;
+  out.group_names = info.group_names;
+  out.cell_group = info.cell_group;
+  out.faces = info.faces;
+  out.face_group = info.face_group;
+  out.nface = info.nface;
+  out.file_cell = info.file_cell;
+  out.share = info.share;
+  out.inside = info.inside;
   out.npoint = info.npoint;
   out.ntet = info.ntet;
   out.ngroup = info.ngroup;
   out.dropped_cells = info.dropped_cells;
   out.points.resize(3 * size_t(info.npoint));
-  for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = points[i] * b.scale;
+  for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = info.points[i] * b.scale;
   for (int k = 0; k < 3; ++k) {
     out.lo[k] = info.lo[k] * b.scale;
     out.hi[k] = info.hi[k] * b.scale;
@@ -216,17 +209,18 @@ void MeshFiles::take_cells(dfm_tetmesh mesh, const Body &b, BodyMesh &out) const
                        std::pow(out.hi[2] - out.lo[2], 2));
 }
 
-void MeshFiles::take_skin(dfm_trimesh mesh, const Body &b, const std::string &pointer, BodyMesh &out) const {
-  const dfm_trimesh_info info = surface_info(mesh, pointer);
-  const double *points = nullptr;
+void MeshFiles::take_skin(dfm_mesh_handle mesh, const Body &b, const std::string &pointer,
+                          BodyMesh &out) const {
+  const dfm_mesh_info info = info_of(mesh, pointer);
   Skin &skin = out.skin;
-  def_.require(dfm_trimesh_data(mesh, &points, &skin.triangles, nullptr), pointer);
-  def_.require(dfm_trimesh_groups(mesh, &skin.group_names, &skin.triangle_group), pointer);
+  skin.triangles = info.faces;
+  skin.triangle_group = info.face_group;
+  skin.group_names = info.group_names;
   skin.npoint = info.npoint;
   skin.ntriangle = info.ntriangle;
   skin.ngroup = info.ngroup;
   skin.points.resize(3 * size_t(info.npoint));
-  for (size_t i = 0; i < skin.points.size(); ++i) skin.points[i] = points[i] * b.scale;
+  for (size_t i = 0; i < skin.points.size(); ++i) skin.points[i] = info.points[i] * b.scale;
 }
 
 // Contact with a plane acts at the points of the surface. If triangles were much larger than cells, the body
@@ -285,7 +279,7 @@ void MeshFiles::warn_unit(const Body &b, const BodyMesh &mesh) const {
 
 // A cut needs the border of the cells as surface, which is not the shape that the file has.
 void MeshFiles::warn_voxel_steps(const Body &b, const BodyMesh &mesh) const {
-  const dfm_tetmesh_info cells = info_of(mesh.handle, b.surface.pointer);
+  const dfm_mesh_info &cells = mesh.info;
   double filled = 0;  // cells of the lattice are alike
   for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share_of(t);
   context_->logf(
@@ -301,9 +295,9 @@ void MeshFiles::warn_voxel_steps(const Body &b, const BodyMesh &mesh) const {
 
 void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
   const std::string pointer = o.pointer + "/mesh";
-  const dfm_trimesh mesh = surface(path_of(o.mesh), pointer);
-  const dfm_trimesh_info info = surface_info(mesh, pointer);
-  def_.require(dfm_trimesh_data(mesh, &o.def.points, &o.def.triangles, nullptr), pointer);
+  const dfm_mesh_info info = info_of(surface(path_of(o.mesh), pointer), pointer);
+  o.def.points = info.points;
+  o.def.triangles = info.faces;
   o.def.npoint = info.npoint;
   o.def.ntriangle = info.ntriangle;
   if (o.scale == 1) return;

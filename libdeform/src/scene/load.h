@@ -14,7 +14,7 @@
 namespace dfm::scene {
 
 inline constexpr uint32_t kFillCells = 5000;  // if a scene gives no number
-inline constexpr double kMaxLattice = 1e6;    // cells; dfm_tetmesh_lattice says the same
+inline constexpr double kMaxLattice = 1e6;    // cells; dfm_mesh_lattice says the same
 // As large as a hexahedron: the cubes that 12 of a body-centered lattice make.
 inline constexpr double kTetsOfHexahedron = 12;
 
@@ -27,37 +27,36 @@ class MeshFiles {
   std::string path_of(const std::string &path) const;  // relative to the scene file
   // Cells, surface and groups of a body, scaled. Borrows from this object.
   BodyMesh load(const Body &body);
-  dfm_tetmesh_info info_of(dfm_tetmesh mesh, const std::string &pointer) const;
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
   // rest is borrowed from this object.
   void load(Obstacle &obstacle, std::vector<double> &points);
 
  private:
-  dfm_trimesh_info surface_info(dfm_trimesh mesh, const std::string &pointer) const;
+  dfm_mesh_info info_of(dfm_mesh_handle mesh, const std::string &pointer) const;
   // reads the file; else it has a surface alone
   bool has_cells(const std::string &path, const std::string &pointer);
   // gives the name under which `cells` knows it
   std::string make(const Body &body);
   std::string make_surface(const Body &body);  // the same for `surface`
-  dfm_tetmesh cells(const std::string &path, const std::string &pointer);
-  dfm_trimesh surface(const std::string &path, const std::string &pointer);
-  dfm_tetmesh filling(const std::string &path, const Body &body);
-  dfm_tetmesh lattice(const std::string &path, const Body &body);
+  dfm_mesh_handle cells(const std::string &path, const std::string &pointer);
+  dfm_mesh_handle surface(const std::string &path, const std::string &pointer);
+  dfm_mesh_handle filling(const std::string &path, const Body &body);
+  dfm_mesh_handle lattice(const std::string &path, const Body &body);
   void check_keys(const Body &body, bool has_cells, bool renumbered) const;
-  void take_cells(dfm_tetmesh mesh, const Body &body, BodyMesh &out) const;
+  void take_cells(dfm_mesh_handle mesh, const Body &body, BodyMesh &out) const;
   void split_skin(BodyMesh &out);
   void warn_unit(const Body &b, const BodyMesh &mesh) const;
   void warn_voxel_steps(const Body &body, const BodyMesh &mesh) const;
-  void take_skin(dfm_trimesh mesh, const Body &body, const std::string &pointer, BodyMesh &out) const;
+  void take_skin(dfm_mesh_handle mesh, const Body &body, const std::string &pointer, BodyMesh &out) const;
 
   dfm_context *context_;
   const Definition &def_;
   std::set<std::string> surface_only_;
-  std::map<std::string, dfm_tetmesh> cells_;
-  std::map<std::string, dfm_trimesh> surfaces_;
-  std::map<std::pair<std::string, uint32_t>, dfm_tetmesh> fillings_;  // by file and number of cells
+  std::map<std::string, dfm_mesh_handle> cells_;
+  std::map<std::string, dfm_mesh_handle> surfaces_;
+  std::map<std::pair<std::string, uint32_t>, dfm_mesh_handle> fillings_;  // by file and number of cells
   // by file, number and size of cells
-  std::map<std::tuple<std::string, uint32_t, double>, dfm_tetmesh> lattices_;
+  std::map<std::tuple<std::string, uint32_t, double>, dfm_mesh_handle> lattices_;
   std::deque<Triangles> split_;  // by body, lent to its BodyMesh
 };
 

@@ -13,7 +13,7 @@ namespace {
 
 constexpr char kPrefix[] = "anisotropy_";
 constexpr char kAxis[] = "anisotropy_axis";
-constexpr double kMaxCells = 1e8;  // dfm_tetmesh_fill and dfm_body_create say the same of these two
+constexpr double kMaxCells = 1e8;  // dfm_mesh_fill and dfm_body_create say the same of these two
 constexpr double kWidestSupport = 10;
 
 void read_fields(const Node &node, const dfm_type *model, Body &b) {

@@ -164,10 +164,7 @@ std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh,
            where.group.c_str());
     return out;
   }
-  const uint32_t *points = nullptr;
-  uint32_t n = 0;
-  if (dfm_tetmesh_group_points(mesh.handle, group, nullptr, &points, &n) < 0)
-    fail(DFM_E_HANDLE, "%s", dfm_last_error());
+  const uint32_t *const points = mesh.info.group_points[group], n = mesh.info.group_npoint[group];
   if (n == 0)
     fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(),
          where.pointer.c_str(), where.group.c_str());

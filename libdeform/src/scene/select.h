@@ -28,7 +28,7 @@ struct BodyMesh {
   const uint32_t *nodes = nullptr;  // of cells that are not first-order tetrahedra, of the kind `cell`
   uint32_t cell = 0;
   const double *share = nullptr, *inside = nullptr;
-  dfm_tetmesh handle = 0;  // lends the arrays and the points of its groups
+  dfm_mesh_info info{};  // not scaled; has the points of the groups
   const char *const *group_names = nullptr;
   // [nface,3], [nface] the file's triangles that belong to a group
   const uint32_t *faces = nullptr, *face_group = nullptr;

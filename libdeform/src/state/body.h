@@ -119,7 +119,7 @@ struct Structure {
   // a new number after each cut: what is derived from points, cells or surface is out of date
   uint64_t shape = 0;
   Array<double> share;   // [ntet] how much of each cell is material; empty: all
-  Array<double> inside;  // [ncell,27] the same of hexahedra, as dfm_tetmesh_inside gives it; empty: all
+  Array<double> inside;  // [ncell,27] the same of hexahedra, as dfm_mesh_info has it; empty: all
   Composition composition;
 };
 

@@ -35,7 +35,7 @@ void check_surface(const dfm_surface_def &def, const char *name) {
   for (size_t i = 0; i < size_t{3} * def.ntriangle; ++i) used[def.triangles[i]] = 1;
   for (uint32_t i = 0; i < def.npoint; ++i)
     if (!used[i])
-      fail(DFM_E_ARG, "body '%s': surface point %u belongs to no triangle; drop it (dfm_trimesh_create does)",
+      fail(DFM_E_ARG, "body '%s': surface point %u belongs to no triangle; drop it (dfm_mesh_create does)",
            name, i);
 }
 
@@ -51,7 +51,7 @@ void check_outward(const Surface &s, const char *name) {
   }
   if (volume < 0)
     fail(DFM_E_ARG,
-         "body '%s': its surface is closed and faces inward; reverse its triangles (dfm_trimesh_create does)",
+         "body '%s': its surface is closed and faces inward; reverse its triangles (dfm_mesh_create does)",
          name);
 }
 

@@ -47,7 +47,7 @@ void check_mesh(const dfm_body_def &def, const std::string &name) {
   if (others != (def.cells != nullptr))
     fail(DFM_E_ARG,
          "body '%s': cell is %u and cells is %s; tetrahedra need no cells, and other kinds need both, as "
-         "dfm_tetmesh_cells gives them",
+         "dfm_mesh_get_info gives them",
          name.c_str(), def.cell, def.cells ? "set" : "NULL");
   for (uint32_t i = 0; i < def.npoint; ++i)
     if (!all_finite(def.points + size_t(3) * i, 3))
@@ -131,8 +131,8 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
                               HookAllocator<uint32_t>(m));
     if (def.ntet % kind.tets || tets_of(m, kind, b.cells) != b.tets)
       fail(DFM_E_ARG,
-           "body '%s': its tetrahedra are not those of its %s; give both as dfm_tetmesh_data and "
-           "dfm_tetmesh_cells do",
+           "body '%s': its tetrahedra are not those of its %s; give both as "
+           "dfm_mesh_get_info does",
            b.name.c_str(), kind.name);
     if (def.cell_share)
       fail(DFM_E_UNSUPPORTED, "body '%s': cell_share is for tetrahedra; %s take cell_inside, if any",
@@ -265,7 +265,7 @@ void make_voxels(Obstacle &o, const Memory &memory) {
   if (!(signed_volume(o) > 0))
     fail(DFM_E_ARG,
          "obstacle '%s': its surface encloses no volume or faces inward; reverse its triangles "
-         "(dfm_trimesh_create does)",
+         "(dfm_mesh_create does)",
          name);
   o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);
   const VoxelGrid &g = *o.grid;

@@ -27,7 +27,7 @@ void check_triangles(const Def &def, const char *kind, const char *name, const c
       if (c[k] >= def.npoint)
         fail(DFM_E_ARG, "%s '%s': %striangle %u names point %u of %u", kind, name, part, t, c[k], def.npoint);
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
-      fail(DFM_E_ARG, "%s '%s': %striangle %u names a point twice; drop it (dfm_trimesh_create does)", kind,
+      fail(DFM_E_ARG, "%s '%s': %striangle %u names a point twice; drop it (dfm_mesh_create does)", kind,
            name, part, t);
   }
 }

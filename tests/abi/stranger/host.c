@@ -35,15 +35,16 @@ int main(int argc, char **argv) {
   TRY(dfm_obstacle_create(world, &floor_def, &floor_plane));
 
   const double size[3] = {0.1, 0, 0};
-  dfm_tetmesh mesh = 0;
-  TRY(dfm_tetmesh_make(context, "ball", size, 100, &mesh));
-  dfm_tetmesh_info info = {sizeof info};
-  TRY(dfm_tetmesh_get_info(mesh, &info));
+  dfm_mesh_handle mesh = 0;
+  TRY(dfm_mesh_make(context, "ball", size, DFM_MESH_CELLS, 100, &mesh));
+  dfm_mesh_info info = {sizeof info};
+  TRY(dfm_mesh_get_info(mesh, &info));
   dfm_body_def body_def = dfm_body_def_default();
   body_def.name = "ball";
   body_def.npoint = info.npoint;
   body_def.ntet = info.ntet;
-  TRY(dfm_tetmesh_data(mesh, &body_def.points, &body_def.tets, NULL));
+  body_def.points = info.points;
+  body_def.tets = info.tets;
   body_def.pose.position[2] = 0.101;
   dfm_body body = 0;
   TRY(dfm_body_create(world, &body_def, &body));

@@ -79,11 +79,11 @@ TEST(BulletSoft, VtkFileOfBullet_IsReadAsAMesh) {
       "0 0 0\n1 0 0\n0 1 0\n0 0 1\n1 1 1\n\nCELLS 2 10\n4 0 1 2 3\n4 1 2 3 4\n\n"
       "CELL_TYPES 2\n10\n10\n";
   std::ofstream(path) << text;
-  dfm_tetmesh mesh = 0;
-  ok(dfm_tetmesh_read(c, path.c_str(), &mesh));
-  dfm_tetmesh_info info{};
+  dfm_mesh_handle mesh = 0;
+  ok(dfm_mesh_load(c, path.c_str(), DFM_MESH_CELLS, &mesh));
+  dfm_mesh_info info{};
   info.size = sizeof info;
-  ok(dfm_tetmesh_get_info(mesh, &info));
+  ok(dfm_mesh_get_info(mesh, &info));
   EXPECT_EQ(info.npoint, 5u);
   EXPECT_EQ(info.ntet, 2u);
 }

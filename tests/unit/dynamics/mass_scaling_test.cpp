@@ -27,13 +27,13 @@ struct Bar {
 
   explicit Bar(const char *model, uint32_t slivers, double scaling, double damping = 0, uint32_t n = kCells,
                int32_t integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER) {
-    dfm_tetmesh mesh = 0;
+    dfm_mesh_handle mesh = 0;
     const double size[3] = {kLength, 0.04, 0.04};
-    test::ok(dfm_tetmesh_make(context, "beam", size, n, &mesh));
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, n, &mesh));
     test::lend(mesh, def);
     points.assign(def.points, def.points + size_t{3} * def.npoint);
     tets.assign(def.tets, def.tets + size_t{4} * def.ntet);
-    test::ok(dfm_tetmesh_destroy(mesh));
+    test::ok(dfm_mesh_destroy(mesh));
     uint32_t made = 0;
     for (uint32_t c = 101; made < slivers && c < def.ntet; c += 331) made += flatten(c);
     EXPECT_EQ(made, slivers);

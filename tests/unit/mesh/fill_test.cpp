@@ -31,7 +31,7 @@ Vec3 corner(const TetMesh &m, uint32_t t, int k) {
 
 // Points spread over the triangles that lie in no cell, beyond `tolerance` lengths of the box.
 uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double tolerance) {
-  const dfm_tetmesh_info stat = dfm::mesh_statistics(m);
+  const dfm_mesh_info stat = dfm::mesh_statistics(m);
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
   uint32_t out = 0;
@@ -308,7 +308,7 @@ TEST(Fill, HangingTriangles_AreLeftOutAndReported) {
   TriMesh m = test::sphere_surface(0.5, 4);
   test::append(m, test::surface_of({{2, 0, 0}, {2.1, 0, 0}, {2, 0.1, 0}}, {{0, 1, 2}}));
   const TetMesh filled = fill_surface(m, 1000);
-  const dfm_tetmesh_info s = dfm::mesh_statistics(filled);
+  const dfm_mesh_info s = dfm::mesh_statistics(filled);
   EXPECT_EQ(s.npiece, 1u);
   EXPECT_LT(s.hi[0], 1);
   ASSERT_GE(filled.warnings.size(), 2u);

@@ -92,7 +92,7 @@ TEST(FinishSurface, ValidBox_IsUnchanged) {
   const TriMesh m = finished(s);
   EXPECT_EQ(all_warnings(m), "");
   for (uint32_t i = 0; i < 36; ++i) EXPECT_EQ(m.tris[i], s.tris[i / 3][i % 3]);
-  const dfm_trimesh_info st = mesh_statistics(m);
+  const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(st.nedge, 18u);
   EXPECT_EQ(st.npiece, 1u);
@@ -173,7 +173,7 @@ TEST(FinishSurface, FartherApart_IsNotMerged) {
 TEST(FinishSurface, TurnedAtRandom_FacesOutward) {
   for (const uint32_t every : {1u, 2u, 3u, 4u}) {
     const TriMesh m = finished(turned(box({}, {1, 1, 1}), every));
-    const dfm_trimesh_info st = mesh_statistics(m);
+    const dfm_mesh_info st = mesh_statistics(m);
     EXPECT_TRUE(st.closed) << every;
     EXPECT_NEAR(st.volume, 1, 1e-15) << every;
     EXPECT_EQ(m.turned, (11 + every) / every);
@@ -184,14 +184,14 @@ TEST(FinishSurface, AnySizeAndPlace_SameRepairs) {
   const Soup s = loose(turned(joined(box({}, {3, 3, 3}), box({1, 1, 1}, {2, 2, 2})), 3));
   for (const double scale : {1e-150, 1e-9, 1.0, 1e5, 1e90}) {
     const TriMesh m = finished(s, scale);
-    const dfm_trimesh_info st = mesh_statistics(m);
+    const dfm_mesh_info st = mesh_statistics(m);
     EXPECT_EQ(m.npoint(), 16u) << scale;
     EXPECT_EQ(m.ntri(), 24u) << scale;
     EXPECT_TRUE(st.closed) << scale;
     EXPECT_NEAR(st.volume / scale / scale / scale, scale < 1e-100 ? 0 : 26, 1e-12) << scale;
     EXPECT_NEAR(st.quality_min, std::sqrt(3.0) / 2, 1e-12) << scale;
   }
-  const dfm_trimesh_info far = mesh_statistics(finished(s, 0.125, {1e7, -1e7, 1e7}));
+  const dfm_mesh_info far = mesh_statistics(finished(s, 0.125, {1e7, -1e7, 1e7}));
   EXPECT_TRUE(far.closed);
   EXPECT_NEAR(far.volume, 26 * 0.125 * 0.125 * 0.125, 1e-12);
 }
@@ -232,7 +232,7 @@ TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
   s.tris.erase(s.tris.begin() + 3);
   s.tris.erase(s.tris.begin());
   const TriMesh m = finished(turned(s));
-  const dfm_trimesh_info st = mesh_statistics(m);
+  const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_FALSE(st.closed);
   EXPECT_EQ(st.open_edges, 10u);
   EXPECT_EQ(st.holes, 3u);
@@ -244,7 +244,7 @@ TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
 
 TEST(FinishSurface, RimsThatTouchInAPoint_AreTwo) {
   const Soup bow{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {-1, 0, 0}, {0, -1, 0}}, {{0, 1, 2}, {0, 3, 4}}};
-  const dfm_trimesh_info st = mesh_statistics(finished(bow));
+  const dfm_mesh_info st = mesh_statistics(finished(bow));
   EXPECT_EQ(st.holes, 2u);
   EXPECT_EQ(st.open_edges, 6u);
   EXPECT_EQ(st.npiece, 1u);
@@ -309,7 +309,7 @@ TEST(FinishSurface, FlatAlongANeighborsSide_LeavesNoSlit) {
   s.points.push_back({0.5, 0, 0});  // on the edge 0-1
   s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 1, 3}, {0, 3, 2}, {1, 2, 3}, {0, 1, 4}};
   const TriMesh m = finished(s);
-  const dfm_trimesh_info st = mesh_statistics(m);
+  const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(m.ntri(), 6u);
   EXPECT_NEAR(st.volume, 1.0 / 6, 1e-16);
@@ -345,7 +345,7 @@ TEST(FinishSurface, ListedTwice_IsDropped) {
 // Two closed boxes face to face: keeping one side of the wall would leave edges of three triangles.
 TEST(FinishSurface, TwoBoxesFaceToFace_BecomeOne) {
   const TriMesh m = finished(joined(box({0, 0, 0}, {1, 1, 1}), box({1, 0, 0}, {2, 1, 1})));
-  const dfm_trimesh_info st = mesh_statistics(m);
+  const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(m.ntri(), 20u);
   EXPECT_EQ(st.npiece, 1u);
@@ -365,7 +365,7 @@ TEST(FinishSurface, SheetWithBothSides_KeepsOne) {
 TEST(FinishSurface, BoxesThatShareAnEdge_AreTurnedEachAndCounted) {
   Soup a = box({0, 0, 0}, {1, 1, 1}), b = box({1, 1, 0}, {2, 2, 1});
   const TriMesh m = finished(turned(joined(a, b), 3));
-  const dfm_trimesh_info st = mesh_statistics(m);
+  const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_EQ(st.nonmanifold_edges, 1u);
   EXPECT_FALSE(st.closed);
   EXPECT_NEAR(st.volume, 2, 1e-14);
@@ -377,7 +377,7 @@ TEST(FinishSurface, FinOnABox_IsCountedAndTheBoxFacesOutward) {
   s.points.push_back({0.5, -1, -1});
   s.tris.push_back({0, 1, 8});
   const TriMesh m = finished(s);
-  const dfm_trimesh_info st = mesh_statistics(m);
+  const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_EQ(st.nonmanifold_edges, 1u);
   EXPECT_EQ(st.open_edges, 2u);
   double volume = 0;

@@ -17,7 +17,7 @@ constexpr double kPi = 3.14159265358979323846;
 const Memory &standard() { return Memory::standard(); }
 
 void expect_valid(const TriMesh &m, uint32_t requested, int euler, double least_quality) {
-  const dfm_trimesh_info s = mesh_statistics(m);
+  const dfm_mesh_info s = mesh_statistics(m);
   EXPECT_TRUE(s.closed) << requested;
   EXPECT_EQ(s.npiece, 1u);
   EXPECT_EQ(int64_t(s.npoint) - s.nedge + s.ntriangle, euler) << requested;
@@ -110,7 +110,7 @@ TEST(GenerateTube, Cells_AreValidAndFillTheRing) {
   for (const uint32_t n : {1u, 500u, 3000u, 20000u})
     for (const double inner : {0.05, 0.1, 0.18}) {
       const TetMesh m = make_tube(standard(), inner, 0.2, 0.7, n);
-      const dfm_tetmesh_info s = mesh_statistics(m);
+      const dfm_mesh_info s = mesh_statistics(m);
       EXPECT_GT(s.quality_min, n == 1 ? 0.1 : inner == 0.05 ? 0.25 : 0.45) << n << " " << inner;
       EXPECT_EQ(s.npiece, 1u);
       EXPECT_EQ(s.nonmanifold_edges + s.duplicate_points, 0u);

@@ -16,7 +16,7 @@ namespace {
 const Memory &standard() { return Memory::standard(); }
 
 void expect_valid(const TetMesh &m) {
-  const dfm_tetmesh_info s = mesh_statistics(m);
+  const dfm_mesh_info s = mesh_statistics(m);
   EXPECT_GT(s.quality_min, 0.3);
   EXPECT_EQ(s.npiece, 1u);
   EXPECT_EQ(s.nonmanifold_edges, 0u);
@@ -69,7 +69,7 @@ TEST(MeshGenerate, Beams_AreValidAndFillTheirBox) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << x << " " << y << " " << z);
       const TetMesh m = make_beam(standard(), x, y, z, cells);
       expect_valid(m);
-      const dfm_tetmesh_info s = mesh_statistics(m);
+      const dfm_mesh_info s = mesh_statistics(m);
       EXPECT_NEAR(s.volume / (x * y * z), 1, 1e-12);
       for (int k = 0; k < 3; ++k) EXPECT_EQ(s.lo[k], 0);
       EXPECT_EQ(s.hi[0], x);
@@ -88,7 +88,7 @@ TEST(MeshGenerate, Cylinders_AreValidAndInscribed) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << radius << " " << length);
       const TetMesh m = make_cylinder(standard(), radius, length, cells);
       expect_valid(m);
-      const dfm_tetmesh_info s = mesh_statistics(m);
+      const dfm_mesh_info s = mesh_statistics(m);
       // The outer ring has 6n points: the body is a prism over a regular polygon.
       uint32_t rim = 0;
       for (uint32_t i = 0; i < m.npoint(); ++i) {

@@ -63,7 +63,7 @@ TEST(MeshTopology, Quality_IsOneForRegularZeroForFlatAndBlindToSize) {
 }
 
 TEST(MeshTopology, Statistics_OfTwoCells) {
-  const dfm_tetmesh_info s = mesh_statistics(two_tets());
+  const dfm_mesh_info s = mesh_statistics(two_tets());
   EXPECT_EQ(s.ntriangle, 6u);
   EXPECT_EQ(s.nedge, 9u);
   EXPECT_EQ(s.npiece, 1u);

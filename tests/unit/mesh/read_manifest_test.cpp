@@ -94,7 +94,7 @@ class PackedMeshes : public testing::Test {
   size_t cap_of(const std::string &path) const { return 16384 + 64 * std::filesystem::file_size(path); }
 
   void expect_tets(const Row &row, const TetMesh &mesh) {
-    const dfm_tetmesh_info s = mesh_statistics(mesh);
+    const dfm_mesh_info s = mesh_statistics(mesh);
     EXPECT_GT(s.quality_min, 0);
     if (!mesh.cells.empty()) {  // gmsh's; the table counts corners
       EXPECT_EQ(mesh.turned, 0u);
@@ -123,7 +123,7 @@ class PackedMeshes : public testing::Test {
     EXPECT_GT(mesh.ntri(), 0u);
     for (const uint32_t p : mesh.tris) ASSERT_LT(p, mesh.npoint());
     if (row.volume > 0) {  // formats/: points joined, volume known
-      const dfm_trimesh_info s = mesh_statistics(mesh);
+      const dfm_mesh_info s = mesh_statistics(mesh);
       EXPECT_EQ(s.npoint, row.points);
       EXPECT_EQ(s.ntriangle, row.tris);
       EXPECT_NEAR(s.volume / row.volume, 1, 1e-5);  // some are written with 7 digits
@@ -219,8 +219,7 @@ TEST_F(PackedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
               {"cyl_fine.msh", 2579, 15092, 2386, 18863}};
   for (const auto &row : rows) {
     SCOPED_TRACE(row.file);
-    const dfm_tetmesh_info s =
-        mesh_statistics(read_tet_mesh(Memory::standard(), folder + "thesis/" + row.file));
+    const dfm_mesh_info s = mesh_statistics(read_tet_mesh(Memory::standard(), folder + "thesis/" + row.file));
     EXPECT_EQ(s.npoint, row.points);
     EXPECT_EQ(s.ntet, row.tets);
     EXPECT_EQ(s.ntriangle, row.triangles);

@@ -35,7 +35,7 @@ TEST(SurfaceFiles, DefectiveFiles_GiveTheExpectedResults) {
         {"formats/surf_bin.stl", 121, 238, 1, 0, 0, 0, -1, ""},
         {"thesis/liverlike1.stl", 2401, 4798, 1, 0, 0, 0, -1, ""}}) {
     const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + f.file);
-    const dfm_trimesh_info s = mesh_statistics(m);
+    const dfm_mesh_info s = mesh_statistics(m);
     EXPECT_EQ(s.npoint, f.npoint) << f.file;
     EXPECT_EQ(s.ntriangle, f.ntri) << f.file;
     EXPECT_EQ(s.npiece, f.npiece) << f.file;
@@ -63,7 +63,7 @@ TEST(SurfaceFiles, OneSurfaceInManyFormats_IsOneSurface) {
   uint32_t n = 0;
   for (const std::string &file : test::files_of(meshes() + "formats", {".obj", ".ply", ".stl", ".off"})) {
     if (file.find("ngon") != std::string::npos) continue;
-    const dfm_trimesh_info s = mesh_statistics(read_tri_mesh(Memory::standard(), file));
+    const dfm_mesh_info s = mesh_statistics(read_tri_mesh(Memory::standard(), file));
     EXPECT_TRUE(s.closed) << file;
     EXPECT_EQ(s.npoint, 121u) << file;
     EXPECT_NEAR(s.volume / volume, 1, 1e-6) << file;
@@ -78,10 +78,10 @@ TEST(SurfaceFiles, BoundaryOfABody_EnclosesItsVolume) {
     for (const std::string &file : test::files_of(meshes() + folder, {".msh", ".vtk", ".vtu", ".mesh"})) {
       if (test::refusal(file)) continue;
       const TetMesh body = read_tet_mesh(Memory::standard(), file);
-      const dfm_tetmesh_info b = mesh_statistics(body);
+      const dfm_mesh_info b = mesh_statistics(body);
       // tangled: no surface encloses it; the large ones say nothing new
       if (body.overlapping || b.ntet > 6000) continue;
-      const dfm_trimesh_info s = mesh_statistics(read_tri_mesh(Memory::standard(), file));
+      const dfm_mesh_info s = mesh_statistics(read_tri_mesh(Memory::standard(), file));
       EXPECT_NEAR(s.volume / b.volume, 1, 1e-12) << file;
       EXPECT_EQ(s.closed, b.nonmanifold_edges == 0) << file;
       if (b.duplicate_points == 0) {
@@ -96,7 +96,7 @@ TEST(SurfaceFiles, BoundaryOfABody_EnclosesItsVolume) {
 // polyhedra cut off.
 TEST(SurfaceFiles, HollowBall_HasTwoPiecesAndItsShellsVolume) {
   const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + "misc/shell_sphere.msh");
-  const dfm_trimesh_info s = mesh_statistics(m);
+  const dfm_mesh_info s = mesh_statistics(m);
   EXPECT_EQ(s.npiece, 2u);
   EXPECT_NEAR(s.volume, 3.44e-4, 0.12e-4);
   EXPECT_EQ(m.turned, 0u) << "cells already say which side is outside";

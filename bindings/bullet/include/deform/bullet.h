@@ -105,11 +105,11 @@ DFM_API dfm_status dfm_bullet_debug_draw(dfm_bullet bullet, uint32_t what);
 
 /** Creates a body of the dfm_world from one of Bullet's soft bodies, which does not change. The present
  * positions of its nodes are the rest shape; the body moves at their mean velocity. Cells are its tetrahedra;
- * without any, its faces, which must close, are filled with about `cells` cells (dfm_tetmesh_fill). Nodes of
+ * without any, its faces, which must close, are filled with about `cells` cells (dfm_mesh_fill). Nodes of
  * infinite mass are held. Stiffness and mass are those of `like`'s material, because Bullet's coefficients
- * have no units. (dfm_tetmesh_read reads a .vtk file of Bullet's.)
+ * have no units. (dfm_mesh_load reads a .vtk file of Bullet's.)
  * @param like  name, material, model, filter and so on; mesh, pose and velocity are not looked at
- * @return DFM_OK; DFM_E_ARG neither tetrahedra nor faces; as dfm_trimesh_create, dfm_tetmesh_fill,
+ * @return DFM_OK; DFM_E_ARG neither tetrahedra nor faces; as dfm_mesh_create, dfm_mesh_fill,
  * dfm_body_create. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_bullet_take_soft_body(dfm_context *context, dfm_world world, const btSoftBody *body,
                                              const dfm_body_def *like, uint32_t cells, dfm_body *out);

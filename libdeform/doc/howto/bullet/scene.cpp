@@ -14,8 +14,8 @@ static void must(dfm_status status) {
 
 // A block of gel, 0.3 x 0.3 x 0.1 m, that lies where the plate will land.
 static dfm_body make_cushion(dfm_context *context, dfm_world soft) {
-  dfm_tetmesh mesh;
-  dfm_tetmesh_info info{};
+  dfm_mesh_handle mesh;
+  dfm_mesh_info info{};
   dfm_body body;
   dfm_body_def def = dfm_body_def_default();
   dfm_material_def gel = dfm_material_def_default();
@@ -24,9 +24,10 @@ static dfm_body make_cushion(dfm_context *context, dfm_world soft) {
   gel.young = 3e4;
   gel.damping_mass = 4;
   gel.damping_stiffness = 4e-3;
-  must(dfm_tetmesh_make(context, "beam", size, 900, &mesh));
-  must(dfm_tetmesh_get_info(mesh, &info));
-  must(dfm_tetmesh_data(mesh, &def.points, &def.tets, nullptr));
+  must(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 900, &mesh));
+  must(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   must(dfm_material_create(soft, &gel, &def.material));
   def.name = "cushion";
   def.npoint = info.npoint;

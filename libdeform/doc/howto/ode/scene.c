@@ -30,16 +30,17 @@ static dBodyID box(double mass, double x, double y, double z, double height) {
 
 /* A block of gel, 0.3 x 0.3 x 0.1 m, that lies where the plate will land. */
 static int make_cushion(dfm_context *context, dfm_world soft, dfm_body *out) {
-  dfm_tetmesh mesh;
-  dfm_tetmesh_info info = {.size = sizeof info};
+  dfm_mesh_handle mesh;
+  dfm_mesh_info info = {.size = sizeof info};
   dfm_body_def def = dfm_body_def_default();
   dfm_material_def gel = dfm_material_def_default();
   gel.young = 3e4;
   gel.damping_mass = 4;
   gel.damping_stiffness = 4e-3;
-  TRY(dfm_tetmesh_make(context, "beam", (double[]){0.3, 0.3, 0.1}, 900, &mesh));
-  TRY(dfm_tetmesh_get_info(mesh, &info));
-  TRY(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  TRY(dfm_mesh_make(context, "beam", (double[]){0.3, 0.3, 0.1}, DFM_MESH_CELLS, 900, &mesh));
+  TRY(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   TRY(dfm_material_create(soft, &gel, &def.material));
   def.name = "cushion";
   def.npoint = info.npoint;

@@ -104,17 +104,18 @@ static const dfm_rigid_host table = {.size = sizeof table,
 
 /* A soft bed of 0.9 x 0.4 x 0.15 m, its lowest points held. */
 static int make_bed(dfm_context *context, dfm_world world) {
-  dfm_tetmesh mesh;
+  dfm_mesh_handle mesh;
   dfm_body bed;
-  dfm_tetmesh_info info = {.size = sizeof info};
+  dfm_mesh_info info = {.size = sizeof info};
   dfm_body_def def = dfm_body_def_default();
   dfm_material_def gel = dfm_material_def_default();
   gel.young = 4e4;
   gel.damping_mass = 4;
   gel.damping_stiffness = 4e-3;
-  TRY(dfm_tetmesh_make(context, "beam", (double[]){0.9, 0.4, 0.15}, 2500, &mesh));
-  TRY(dfm_tetmesh_get_info(mesh, &info));
-  TRY(dfm_tetmesh_data(mesh, &def.points, &def.tets, NULL));
+  TRY(dfm_mesh_make(context, "beam", (double[]){0.9, 0.4, 0.15}, DFM_MESH_CELLS, 2500, &mesh));
+  TRY(dfm_mesh_get_info(mesh, &info));
+  def.points = info.points;
+  def.tets = info.tets;
   TRY(dfm_material_create(world, &gel, &def.material));
   def.name = "bed";
   def.npoint = info.npoint;

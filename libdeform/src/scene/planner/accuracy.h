@@ -79,7 +79,7 @@ struct BodyRegime {
   // the edge.
   double stiffens = bending_of_tetrahedra(0.3);
   bool hexahedra = false;
-  double cell_size = 0;                            // m, dfm_tetmesh_info.wave_path
+  double cell_size = 0;                            // m, dfm_mesh_info.wave_path
   double young = 0, poisson = 0, density = 0;      // Pa, 1, kg/m3
   double damping_mass = 0, damping_stiffness = 0;  // 1/s, s
   double load = 0;                                 // m/s2: of gravity and of forces

@@ -160,8 +160,7 @@ class Reader {
       Body b = def_.bodies[i];
       b.fill.reset();
       b.lattice_size =
-          round_to_digits(b.scale * std::cbrt(files_.info_of(meshes_[i].handle, b.pointer).volume /
-                                              (times * meshes_[i].ntet)));
+          round_to_digits(b.scale * std::cbrt(meshes_[i].info.volume / (times * meshes_[i].ntet)));
       try {
         const BodyMesh mesh = files_.load(b);
         if (!carries(b, mesh, meshes_[i])) continue;
@@ -345,7 +344,7 @@ class Reader {
 
   // Of cells that are seen as several tetrahedra each, the edges are not those of these.
   void set_mesh(const Body &b, const BodyMesh &mesh, BodyRegime &r) const {
-    const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
+    const dfm_mesh_info &info = mesh.info;
     r.points = mesh.npoint;
     double side[3];
     for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
@@ -369,7 +368,7 @@ class Reader {
     const Body &b = def_.bodies[i];
     const BodyMesh &mesh = meshes_[i];
     const Material &m = material(b);
-    const dfm_tetmesh_info info = files_.info_of(mesh.handle, b.pointer + "/mesh");
+    const dfm_mesh_info &info = mesh.info;
     BodyRegime r;
     r.name = b.name;
     set_mesh(b, mesh, r);
