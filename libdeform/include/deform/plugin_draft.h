@@ -1,7 +1,6 @@
-/* deform/plugin_draft.h -- what is planned for plugin.h and has no caller in the library yet: a plugin may
- * offer it, and nothing happens. It may change with every version, and is not part of the ABI that plugin.h
- * freezes; plugin.h uses none of its bits and names for anything else. A part moves to plugin.h with its
- * first caller. Conventions as in plugin.h. */
+/* deform/plugin_draft.h -- extensions that are not part of the ABI that plugin.h freezes: the library uses
+ * some of them if a plugin offers them, and each may change with every version. plugin.h uses none of these
+ * bits and names for anything else. Conventions as in plugin.h. */
 #ifndef DEFORM_PLUGIN_DRAFT_H
 #define DEFORM_PLUGIN_DRAFT_H
 #include "deform/plugin.h"

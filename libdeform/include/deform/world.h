@@ -36,7 +36,7 @@ typedef struct dfm_world_def {
   double contact_offset;
   /* m/s, slip that a sticking contact may have; 0: min(1e-6, 0.01 (d_c-d_g)/h); doc/concepts/contact.md */
   double contact_tolerance;
-  /* of explicit islands, before Newton's method goes on; 200 */
+  /* of explicit contact islands, before Newton's method goes on; 200 */
   uint32_t max_sweeps;
   uint32_t max_passes;   /* outer passes of these sweeps; 20 */
   uint32_t max_substeps; /* a step that needs more returns DFM_DISCARD; 10000 */

@@ -10,7 +10,7 @@ struct Pair { double a, b; };
 static inline double larger(double a, double b) { return a < b ? b : a; }  // as std::max, also of a NaN
 
 // The normal impulse l of a contact: 0 <= l complementary to u_n + rate + min(c max(l - p, 0), m) >= 0, with
-// yields = (c, m, p). For the present l and k = u_n + rate, the new l is a root of
+// compliance = (c, m, p). For the present l and k = u_n + rate, the new l is a root of
 // k + wn (l' - l) + min(c max(l' - p, 0), m).
 static inline double normal_impulse(double l, double k, double wn, const double *compliance) {
   const double firm = l - k / wn;

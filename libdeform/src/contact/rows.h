@@ -121,7 +121,8 @@ struct ContactRows {
 
   explicit ContactRows(const Memory &memory);
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller gives their responses, then calls
-  // finish(). Of contacts between rigid things it also gives drive, rate, yields, wn, wt, cross and impulse.
+  // finish(). Of contacts between rigid things it also gives drive, rate, compliance, wn, wt, cross and
+  // impulse.
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
              const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {},
              std::span<const RigidSides> between_rigids = {});

@@ -1,5 +1,5 @@
-// Memory of a context: every array of the library is allocated through the host's hooks, so that a host can
-// count, pool or refuse allocations.
+// Memory of a context: an Array is allocated through the host's hooks, so that a host can count, pool or
+// refuse what grows with meshes and contacts. Smaller tables (std::vector) use the ordinary heap.
 #pragma once
 #include <atomic>
 #include <cstddef>

@@ -1,10 +1,7 @@
 // contact <-> friction (doc/concepts/contact.md): the rows, the revision of bodies whose response depends on
-// the impulses, and what is kept. The outer loop over the laws around the sweeps is in solve_islands.cpp.
-//
-//   warm start: last impulses of the same keys, times h/h_old, applied before the first sweep
-//   repeat   evaluate all laws once, in batches, at the present slip and normal force
-//            residual of the true laws below tolerance: done
-//            sweep the linearized laws until their own residual is below tolerance
+// the impulses, and what is kept. Contacts start with the last impulses of the same keys; solve_islands.cpp
+// solves them, by sweeps (contact/sweeps.cpp) where no body is implicit, then by Newton's method
+// (contact/newton.cpp) where these do not suffice.
 #include <algorithm>
 #include <limits>
 #include <utility>

@@ -1,4 +1,5 @@
-// The outer loop of one island over the laws, around the inner sweeps (doc/concepts/contact.md).
+// Contact islands: how contacts are divided among them, and the solve of each (doc/concepts/contact.md): the
+// sweeps of contact/sweeps.cpp, then Newton's method of contact/newton.cpp.
 #include "step/solve/solve_islands.h"
 
 #include <algorithm>

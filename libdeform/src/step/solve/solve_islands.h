@@ -1,4 +1,4 @@
-// Islands of the contact solve: contacts and bonds that affect each other within the sub-step, because they
+// Contact islands: contacts and bonds that affect each other within the sub-step, because they
 // share an unknown: a point, or a body whose points respond to each other's impulses. Rows of the same two
 // bodies stay together. Each island is solved by itself, with its own acceleration and its own number of
 // sweeps; the disturbance that the warm start leaves at a body sets the tolerances in all of its islands. So
