@@ -137,7 +137,7 @@ class Laws final : public SolveLaws {
   bool slopes() override { return true; }
   bool judge(Residual &residual) override {
     set_trial(rows_, part_, h_, rows_.wt.data(), state_);
-    evaluate_local(rows_.wt.data());
+    evaluate_local(rows_.wt.data(), 0);
     linearize(rows_, part_, h_, state_);
     residual = residual_of(rows_, part_, state_, h_, tolerance);
     return true;
