@@ -47,7 +47,7 @@ struct Guard {
     bool hit;
   };
   // sorted by key, more: results of the previous solve, and rates of contacts made from hits
-  Array<Kept> kept;
+  Array<Kept> kept, kept_before;
   bool resolving = false;  // the next solve starts from `kept`
   uint32_t solves = 0;     // of this sub-step, with hits
 

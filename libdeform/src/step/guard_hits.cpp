@@ -255,12 +255,12 @@ void guard_add_hits(World &w, StepContext &step) {
     return std::find_if(g.kept.begin(), g.kept.end(),
                         [&](const Guard::Kept &k) { return k.key == c.key && k.more == c.more; });
   };
-  Array<Guard::Kept> before;
-  before.swap(g.kept);
+  g.kept_before.swap(g.kept);
+  g.kept.clear();
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
     const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
-    const Guard::Kept *const k = find_kept(before, c);
+    const Guard::Kept *const k = find_kept(g.kept_before, c);
     g.kept.push_back({c.key, c.more, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6),
                       step.rows.rate[i], k && k->hit});
   }

@@ -3,7 +3,7 @@
 //   bound                            if it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
 //   sub-steps                        run_step(): equal ones, more of them if the bound has fallen
 //                                    until the budget is used up; explicit from an impact on (impact.cpp)
-//     pieces                         advance(), piece(): shorter where the guard requires it
+//     pieces                         advance(), take_substep(): shorter where the guard requires it
 //       stages                       sub_step(): all rows of the table that the plan has chosen,
 //                                    or none
 //         Next::woken                narrow has found bodies that contacts wake: catch_up(), narrow again
