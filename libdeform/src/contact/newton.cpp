@@ -149,7 +149,7 @@ bool ContactNewton::frozen_steps() {
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
     // no such place: there is a jump in a law, at which steps would stay
-    if (!found || !(size() > set_.accuracy * start && error() > goal_)) break;
+    if (!found || !(size() > set_.accuracy * start)) break;
   }
   return evaluate(false);
 }
@@ -258,7 +258,9 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     if (!host_->judge(residual_)) return false;
   }
   if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;
-  if (found_ || residual_.required <= 1 || (!spent && !gains(normal))) return true;
+  // what is left of g is a motion of implicit bodies that nothing has caused; single points have none
+  const bool open = spent && !bodies_.empty();
+  if (found_ || residual_.required <= 1 || (!open && (spent || !gains(normal)))) return true;
   return penalties_alone(tolerance, steps);
 }
 
@@ -278,11 +280,11 @@ bool ContactNewton::gains(double normal) const {
 
 // Where rows ask for what cannot be, multipliers grow without end, and where the budget has ended the solve,
 // they need not be in balance. Impulses of the penalties alone resist motion in proportion to it, so no
-// contact does work that its law does not allow; bodies give way a little. From rest the function that steps
-// lower has the energy at the start of the sub-step as its first value, so that they may end anywhere.
+// contact does work that its law does not allow; bodies give way a little. With implicit bodies at rest the
+// function that steps lower has their energy at the start of the sub-step as its first value.
 bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   std::fill(lh_.begin(), lh_.end(), 0.0);
-  for (size_t k = 0; k < g_.size(); ++k)
+  for (size_t k = 0; k < size_t{3} * single_; ++k)
     if (inverse_[k] > 0) v_[kStride * (k / 3) + k % 3] = 0;
   limit_ = steps_ + steps;
   for (bool round = true; round && steps_ < limit_; scale_penalties(1 / set_.growth))
