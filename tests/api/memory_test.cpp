@@ -101,37 +101,6 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
   EXPECT_EQ(hooks.wrong_align, 0);
 }
 
-// The same step again and again: what the guard needs is there after the first time.
-TEST(Memory, AStepInWhichTheGuardSolvesAgain_AllocatesNothing) {
-  Hooks hooks;
-  const dfm_context_def def = hooks.def();
-  dfm_context *c = nullptr;
-  ASSERT_EQ(dfm_context_create(&def, &c), DFM_OK) << dfm_last_error();
-  {
-    const dfm_world w = test::make_world(c, {0, 0, 0});
-    test::BodyOptions o;
-    o.young = 1e5;
-    o.damping_stiffness = 2e-3;
-    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    o.position = {0.03, 0.02, 0.103};
-    o.velocity = {0, 0, -20};
-    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
-    std::string start;
-    for (int i = 0; i < 100 && test::stats(w).guard_solves == 0; ++i) {
-      start = test::snapshot(w);
-      ASSERT_EQ(dfm_world_step(w, 1e-4, nullptr), DFM_OK) << dfm_last_error();
-    }
-    ASSERT_GT(test::stats(w).guard_solves, 0u);
-    for (int i = 0; i < 4; ++i) {
-      test::ok(dfm_world_restore(w, start.data(), start.size()));
-      const Calls before{hooks};
-      ASSERT_EQ(dfm_world_step(w, 1e-4, nullptr), DFM_OK) << dfm_last_error();
-      if (i > 1) before.expect_none();
-    }
-  }
-  dfm_context_destroy(c);
-}
-
 TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
   Hooks hooks;
   const dfm_context_def def = hooks.def();
