@@ -80,8 +80,7 @@ const TriMesh &surface_of(const MeshObject &object, dfm_mesh_handle handle) {
   if (const TriMesh *const surface = std::get_if<TriMesh>(&object.mesh)) return *surface;
   fail(DFM_E_HANDLE,
        "mesh handle 0x%llx is that of a mesh with cells; pass the handle of a surface mesh, as dfm_mesh_load "
-       "and "
-       "dfm_mesh_make give with DFM_MESH_SURFACE",
+       "and dfm_mesh_make give with DFM_MESH_SURFACE",
        static_cast<unsigned long long>(handle));
 }
 

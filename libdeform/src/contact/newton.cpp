@@ -258,10 +258,9 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     if (!host_->judge(residual_)) return false;
   }
   if (found_ && residual_.required > 1) residual_.required = residual_.relative = 1;
-  // what is left of g is a motion of implicit bodies that nothing has caused; single points have none
-  const bool open = spent && !bodies_.empty();
-  if (found_ || residual_.required <= 1 || (!open && (spent || !gains(normal)))) return true;
-  return penalties_alone(tolerance, steps);
+  // what is left of g moves implicit bodies without a cause; single points have what their impulses give
+  const bool makes_energy = spent ? !bodies_.empty() : gains(normal);
+  return found_ || residual_.required <= 1 || !makes_energy || penalties_alone(tolerance, steps);
 }
 
 // Whether normal impulses do more work than residuals of this size explain.

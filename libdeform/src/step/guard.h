@@ -46,7 +46,7 @@ struct Guard {
     double rate;
     bool hit;
   };
-  // sorted by key, more: results of the previous solve, and rates of contacts made from hits
+  // sorted by key, more: results of the previous solve, and rates of contacts made from hits; those before
   Array<Kept> kept, kept_before;
   bool resolving = false;  // the next solve starts from `kept`
   uint32_t solves = 0;     // of this sub-step, with hits
