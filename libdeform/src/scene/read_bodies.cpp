@@ -198,8 +198,13 @@ MadeMesh read_made(const Node &node) {
              tube = made.kind == "tube", along = tube || made.kind == "cylinder";
   const std::pair<const char *, bool> wanted[] = {
       {"radius", round}, {"inner", tube}, {"length", along}, {"size", !round}};
+  std::string all;
   for (const auto &[key, mine] : wanted)
-    if (!mine && node.has(key)) node.member(key).fail("a %s has no \"%s\"", made.kind.c_str(), key);
+    if (mine) all += (all.empty() ? "" : ", ") + std::string(key);
+  for (const auto &[key, mine] : wanted)
+    if (!mine && node.has(key))
+      node.member(key).fail("a %s has no \"%s\"; its size is given by %s", made.kind.c_str(), key,
+                            all.c_str());
   if (round) {
     const double radius = node.at("radius").number(kPositive);
     size_t k = 0;
