@@ -16,6 +16,7 @@
 
 namespace dfm {
 
+struct ContactPoint;
 struct Body;
 struct LawInstance;
 struct StepContext;
