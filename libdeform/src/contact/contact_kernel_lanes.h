@@ -68,23 +68,11 @@ DEFORM_INLINE void apply(const RowsView &rows, double *y, uint32_t i, double a, 
 
 void sweep(const RowsView &rows, const LawView &law, double h, double *y, double *impulse) {
   for (uint32_t i = 0; i < rows.n; ++i) {
-    const double wn = rows.wn[i], wt = rows.wt[i];
-    if (!(wn > 0)) continue;  // both sides are held: impulses have no effect
-    double *const l = impulse + 3 * size_t(i);
-    const Four u = velocity(rows, y, i);
-    const double ln = normal_impulse(l[0], get(u, 0) + rows.rate[i], wn, rows.compliance + 3 * size_t(i)),
-                 d = ln - l[0];
-    if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
-    Pair t{0, 0};
-    if (ln > 0 && wt > 0) {
-      const double *const c = rows.cross + 2 * size_t(i);
-      t = friction_impulse(law, i, h, wt, l[1], l[2], ln, get(u, 1) + c[0] * d, get(u, 2) + c[1] * d);
-    }
-    if (d == 0 && t.a == l[1] && t.b == l[2]) continue;
-    apply(rows, y, i, d, t.a - l[1], t.b - l[2]);
-    l[0] = ln;
-    l[1] = t.a;
-    l[2] = t.b;
+    if (!(rows.wn[i] > 0)) continue;  // both sides are held: impulses have no effect
+    const Four v = velocity(rows, y, i);
+    double by[3];
+    if (solve_row(rows, law, i, h, {get(v, 0), get(v, 1), get(v, 2)}, impulse + 3 * size_t(i), by))
+      apply(rows, y, i, by[0], by[1], by[2]);
   }
 }
 
@@ -93,28 +81,11 @@ Residual residual(const RowsView &rows, const LawView &law, const ToleranceView 
   Residual r;
   double nan_flag = 0;
   for (uint32_t i = 0; i < rows.n; ++i) {
-    const double wn = rows.wn[i], wt = rows.wt[i];
-    if (!(wn > 0)) continue;
-    const double *const l = impulse + 3 * size_t(i);
-    const Four u = velocity(rows, y, i);
-    const double open = get(u, 0) + rows.rate[i] + given(l[0], rows.compliance + 3 * size_t(i)),
-                 closed = wn * l[0];
-    const double normal = __builtin_fabs(open < closed ? open : closed);
-    nan_flag += 0.0 * ((get(u, 0) + get(u, 1)) + (get(u, 2) + l[0]));
-    r.relative = larger(r.relative, normal / tolerance.normal[i]);
-    r.required = larger(r.required, normal / tolerance.most_normal);
-    r.speed = larger(r.speed, normal);
-    r.normal = larger(r.normal, normal);
-    if (!(wt > 0) || !(l[0] > 0)) continue;
-    const Pair t = friction_impulse(law, i, h, wt, l[1], l[2], l[0], get(u, 1), get(u, 2));
-    const double a = t.a - l[1], b = t.b - l[2], tangent = wt * __builtin_sqrt(a * a + b * b);
-    const double slip = __builtin_sqrt(get(u, 1) * get(u, 1) + get(u, 2) * get(u, 2));
-    const double share = tangent / larger(tolerance.tangent[i], 1e-3 * slip);
-    r.relative = larger(r.relative, share);
-    r.required = larger(r.required, share);
-    r.speed = larger(r.speed, tangent);
+    if (!(rows.wn[i] > 0)) continue;
+    const Four v = velocity(rows, y, i);
+    add_residual(rows, law, tolerance, i, h, {get(v, 0), get(v, 1), get(v, 2)}, impulse + 3 * size_t(i), r,
+                 nan_flag);
   }
-  // larger() ignores NaN
   if (nan_flag != 0) r.relative = r.required = __builtin_inf();
   return r;
 }

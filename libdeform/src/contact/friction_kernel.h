@@ -24,6 +24,28 @@ static inline double given(double l, const double *compliance) {
   return all < compliance[1] ? all : compliance[1];
 }
 
+// The point of the disc of this radius that is nearest to (a, b).
+static inline Pair on_disc(double a, double b, double radius) {
+  const double size = __builtin_sqrt(a * a + b * b);
+  if (size <= radius) return {a, b};
+  return {radius / size * a, radius / size * b};
+}
+
+// Of the limit of a set-valued law that slips along the unit vector e: how it grows with the normal force, and,
+// N s/m, with the speed. State: ContactState, or its view.
+template <class State>
+__attribute__((always_inline)) static inline double limit_growth(const State &s, uint32_t i) {
+  const size_t n = s.stride;
+  return __builtin_sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
+}
+template <class State>
+__attribute__((always_inline)) static inline double viscous_slope(const State &s, uint32_t i, double e1,
+                                                                  double e2) {
+  const size_t n = s.stride;
+  return larger(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
+                       e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+}
+
 // The friction impulse by the linearized law, for the present impulse (l1, l2), slip (u1, u2) and new normal
 // impulse of the contact.
 //
@@ -57,22 +79,15 @@ __attribute__((always_inline)) static inline Pair friction_impulse(const LawView
     const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = __builtin_sqrt(a * a + b * b);
     double radius = h * s.limit[i] * ratio;
     if (s.mode[i] == 2) {
-      const double growth = __builtin_sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
-      radius = larger(0.0, h * s.limit[i] + growth * (ln - h * fn));
+      radius = larger(0.0, h * s.limit[i] + limit_growth(s, i) * (ln - h * fn));
       const double v1 = s.vt[i], v2 = s.vt[n + i], speed = __builtin_sqrt(v1 * v1 + v2 * v2);
-      double slope = 0;
-      if (speed > 0) {
-        const double e1 = v1 / speed, e2 = v2 / speed;
-        slope = larger(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
-                              e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
-      }
+      const double slope = speed > 0 ? viscous_slope(s, i, v1 / speed, v2 / speed) : 0;
       if (slope > 0) {
         const double slip = larger(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
         radius = larger(0.0, radius + h * slope * (slip - speed));
       }
     }
-    if (size <= radius) return {a, b};
-    return {radius / size * a, radius / size * b};
+    return on_disc(a, b, radius);
   }
   if (s.form[i] == kNoFriction) return {0, 0};
   const auto &[slope, m11, m12, m21, m22, det] = s.linear[i];
@@ -81,11 +96,77 @@ __attribute__((always_inline)) static inline Pair friction_impulse(const LawView
   const double v1 = u1 - wt * l1 - s.vt[i], v2 = u2 - wt * l2 - s.vt[n + i];
   const double r1 = h * (s.ft[i] + d11 * v1 + d12 * v2 + s.dft_dfn[i] * dfn);
   const double r2 = h * (s.ft[n + i] + d21 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
-  Pair l{(m22 * r1 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det};
-  const double size = __builtin_sqrt(l.a * l.a + l.b * l.b), radius = fn > 0 ? s.limit[i] / fn * ln : 0;
-  const double most = s.mode[i] == 1 ? radius : larger(radius, h * s.limit[i]);
-  if (size > most) l = {most / size * l.a, most / size * l.b};
-  return l;
+  const double radius = fn > 0 ? s.limit[i] / fn * ln : 0;
+  return on_disc((m22 * r1 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det,
+                 s.mode[i] == 1 ? radius : larger(radius, h * s.limit[i]));
+}
+
+// The step of a sweep at row i, whose sides move by u: by, out, is the change of its impulse l. False: there is
+// none. Rows: ContactRows, or their view.
+template <class Rows>
+__attribute__((always_inline)) static inline bool solve_row(const Rows &rows, const LawView &law, uint32_t i,
+                                                            double h, const double (&u)[3], double *l,
+                                                            double (&by)[3]) {
+  const double wn = rows.wn[i], wt = rows.wt[i];
+  const double ln = normal_impulse(l[0], u[0] + rows.rate[i], wn, &rows.compliance[3 * size_t(i)]),
+               d = ln - l[0];
+  if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) return false;
+  Pair t{0, 0};
+  if (ln > 0 && wt > 0) {
+    const double *const c = &rows.cross[2 * size_t(i)];
+    t = friction_impulse(law, i, h, wt, l[1], l[2], ln, u[1] + c[0] * d, u[2] + c[1] * d);
+  }
+  if (d == 0 && t.a == l[1] && t.b == l[2]) return false;
+  by[0] = d;
+  by[1] = t.a - l[1];
+  by[2] = t.b - l[2];
+  l[0] = ln;
+  l[1] = t.a;
+  l[2] = t.b;
+  return true;
+}
+
+// m/s, of row i; u: of its sides along the normal.
+template <class Rows>
+__attribute__((always_inline)) static inline double normal_residual(const Rows &rows, uint32_t i, double u,
+                                                                    const double *l) {
+  const double open = u + rows.rate[i] + given(l[0], &rows.compliance[3 * size_t(i)]),
+               closed = rows.wn[i] * l[0];
+  return __builtin_fabs(open < closed ? open : closed);
+}
+
+// The force of row i by its law, compared by the answer that both give together with the contact's own
+// response, not by the bare force: the difference is the velocity that is left to correct. Where a set-valued
+// law just slips, force and slip may differ in direction by much while that is tiny; a smooth law with a steep
+// slope c would count it 1 + h w_t c times.
+template <class Rows>
+__attribute__((always_inline)) static inline double tangent_residual(const Rows &rows, const LawView &law,
+                                                                     uint32_t i, double h,
+                                                                     const double (&u)[3], const double *l) {
+  const Pair t = friction_impulse(law, i, h, rows.wt[i], l[1], l[2], l[0], u[1], u[2]);
+  const double a = t.a - l[1], b = t.b - l[2];
+  return rows.wt[i] * __builtin_sqrt(a * a + b * b);
+}
+
+// Adds row i to the residual of a state. nan_flag: NaN if a value is not finite, which larger() passes over.
+template <class Rows, class Bounds>
+__attribute__((always_inline)) static inline void add_residual(const Rows &rows, const LawView &law,
+                                                               const Bounds &tolerance, uint32_t i, double h,
+                                                               const double (&u)[3], const double *l,
+                                                               Residual &r, double &nan_flag) {
+  const double normal = normal_residual(rows, i, u[0], l);
+  nan_flag += 0.0 * ((u[0] + u[1]) + (u[2] + l[0]));
+  r.relative = larger(r.relative, normal / tolerance.normal[i]);
+  r.required = larger(r.required, normal / tolerance.most_normal);
+  r.speed = larger(r.speed, normal);
+  r.normal = larger(r.normal, normal);
+  if (!(rows.wt[i] > 0) || !(l[0] > 0)) return;
+  const double tangent = tangent_residual(rows, law, i, h, u, l);
+  const double slip = __builtin_sqrt(u[1] * u[1] + u[2] * u[2]);
+  const double share = tangent / larger(tolerance.tangent[i], 1e-3 * slip);
+  r.relative = larger(r.relative, share);
+  r.required = larger(r.required, share);
+  r.speed = larger(r.speed, tangent);
 }
 
 }  // namespace

@@ -313,10 +313,9 @@ bool ContactNewton::evaluate(bool frozen) {
         l[2] = h_ * s.ft[stride + i];
       } else if (rho_t > 0 && s.form[i] == kSetValuedLaw && (frozen ? frozen_[k] > 0 : l[0] > 0)) {
         const double radius = frozen ? frozen_[k] : h_ * s.limit[i];
-        const double a = h_ * s.ft_stop[i], b = h_ * s.ft_stop[stride + i], all = std::sqrt(a * a + b * b);
-        const double share = all > radius ? radius / all : 1;
-        l[1] = share * a;
-        l[2] = share * b;
+        const Pair t = on_disc(h_ * s.ft_stop[i], h_ * s.ft_stop[stride + i], radius);
+        l[1] = t.a;
+        l[2] = t.b;
       }
     }
     if (l[0] != 0 || l[1] != 0 || l[2] != 0) add_transposed(k, -load3(l), g_.data());
@@ -399,17 +398,14 @@ bool ContactNewton::find_slopes(bool frozen) {
       G[5] = G[7] = -across * t1 * t2;
       G[8] = across * t1 * t1;
       if (frozen) continue;
-      const double grows = s.mode[i] == 2
-                               ? std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i])
-                               : radius / l[0];
+      const double grows = s.mode[i] == 2 ? limit_growth(s, i) : radius / l[0];
       G[3] = grows * normal * t1;
       G[6] = grows * normal * t2;
       // the limit grows with the speed of a viscous law
       const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
       if (!(speed > 0) || s.mode[i] != 2) continue;
       const double e1 = v1 / speed, e2 = v2 / speed;
-      const double viscous = std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
-                                             e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+      const double viscous = viscous_slope(s, i, e1, e2);
       G[4] -= h_ * viscous * t1 * e1;
       G[5] -= h_ * viscous * t1 * e2;
       G[7] -= h_ * viscous * t2 * e1;

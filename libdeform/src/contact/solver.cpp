@@ -9,13 +9,6 @@
 namespace dfm {
 namespace {
 
-// Contact i as the rows have it.
-Pair friction_impulse(const ContactRows &rows, const LawView &law, uint32_t i, double h, double ln, double u1,
-                      double u2) {
-  const double *const l = &rows.impulse[size_t(i) * 3];
-  return friction_impulse(law, i, h, rows.wt[i], l[1], l[2], ln, u1, u2);
-}
-
 double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
   return normal_impulse(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
                         &rows.compliance[size_t(i) * 3]);
@@ -53,19 +46,10 @@ namespace {
 void solve_contacts(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
-    double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double ln = normal_impulse(rows, i, u.x), d = ln - l[0];
-    if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) return;
-    Pair t{0, 0};
-    if (ln > 0 && rows.wt[i] > 0)
-      t = friction_impulse(rows, law, i, h, ln, u.y + rows.cross[2 * size_t(i)] * d,
-                           u.z + rows.cross[2 * size_t(i) + 1] * d);
-    if (d == 0 && t.a == l[1] && t.b == l[2]) return;
-    rows.apply(i, {d, t.a - l[1], t.b - l[2]});
-    l[0] = ln;
-    l[1] = t.a;
-    l[2] = t.b;
+    double by[3];
+    if (solve_row(rows, law, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], by))
+      rows.apply(i, load3(by));
   });
 }
 
@@ -176,25 +160,6 @@ void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
 
 namespace {
 
-double normal_residual(const ContactRows &rows, uint32_t i, Vec3 u) {
-  return std::fabs(
-      std::min(rows.wn[i] * rows.impulse[size_t(i) * 3],
-               u.x + rows.rate[i] + given(rows.impulse[size_t(i) * 3], &rows.compliance[size_t(i) * 3])));
-}
-
-double tangent_residual(const ContactRows &rows, uint32_t i, Pair law) {
-  const double a = law.a - rows.impulse[size_t(i) * 3 + 1], b = law.b - rows.impulse[size_t(i) * 3 + 2];
-  return rows.wt[i] * std::sqrt(a * a + b * b);
-}
-
-// The force of contact i by its law at the present state. They are compared by the answer they
-// give together with the contact's own response, not by the bare force: the difference is then the velocity
-// that is left to correct. Where a set-valued law just slips, force and slip may differ in direction by much
-// while that is tiny; a smooth law with a steep slope c would count it 1 + h w_t c times.
-Pair law_response(const ContactRows &rows, const LawView &s, uint32_t i, double h, Vec3 u) {
-  return friction_impulse(rows, s, i, h, rows.impulse[size_t(i) * 3], u.y, u.z);
-}
-
 Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Tolerance &tolerance, Residual r) {
   double nan_flag = 0;
   each_row(part.bonds, [&](uint32_t row) {
@@ -214,23 +179,9 @@ Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &
   double nan_flag = 0;
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
-    const double *const l = &rows.impulse[size_t(i) * 3];
     const Vec3 u = rows.velocity(i);
-    const double normal = normal_residual(rows, i, u);
-    nan_flag += 0.0 * ((u.x + u.y) + (u.z + l[0]));
-    r.relative = std::max(r.relative, normal / tolerance.normal[i]);
-    r.required = std::max(r.required, normal / tolerance.most_normal);
-    r.speed = std::max(r.speed, normal);
-    r.normal = std::max(r.normal, normal);
-    if (!(rows.wt[i] > 0) || !(l[0] > 0)) return;
-    const Pair t = law_response(rows, law, i, h, u);
-    const double tangent = tangent_residual(rows, i, t);
-    const double allowed = std::max(tolerance.tangent[i], 1e-3 * std::sqrt(u.y * u.y + u.z * u.z));
-    r.relative = std::max(r.relative, tangent / allowed);
-    r.required = std::max(r.required, tangent / allowed);
-    r.speed = std::max(r.speed, tangent);
+    add_residual(rows, law, tolerance, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], r, nan_flag);
   });
-  // max() passes over what is no number
   if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
   return r;
 }
@@ -272,10 +223,11 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
   const LawView law = laws_state.view();
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
-    const Vec3 u = rows.velocity(i);
-    const bool friction = rows.wt[i] > 0 && (rows.impulse[size_t(i) * 3] > 0 || laws_state.fn[i] > 0);
-    const double normal = normal_residual(rows, i, u);
-    const double tangent = friction ? tangent_residual(rows, i, law_response(rows, law, i, h, u)) : 0;
+    const Vec3 v = rows.velocity(i);
+    const double u[3] = {v.x, v.y, v.z}, *const l = &rows.impulse[size_t(i) * 3];
+    const bool friction = rows.wt[i] > 0 && (l[0] > 0 || laws_state.fn[i] > 0);
+    const double normal = normal_residual(rows, i, u[0], l);
+    const double tangent = friction ? tangent_residual(rows, law, i, h, u, l) : 0;
     each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);
       d[1] = std::max({d[1], tangent, normal});

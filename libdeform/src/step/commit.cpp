@@ -30,7 +30,7 @@ constexpr double kAlong = 0.1;  // of the stable step: a way on which strains ch
 
 // What a host's changes of the step put into bodies (doc/decisions/energy_watch.md).
 void damp_changes_of_size(World &w, const StepContext &step) {
-  const double stable = w.bound.step / kBoundShare, c = next_damping(w.sizes, step.guard.planned, stable);
+  const double stable = w.bound.step / kBoundShare, c = next_damping(w.sizes, step.length.planned, stable);
   if (!(c > 0)) return;
   w.context->tasks.parallel_for(
       static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToPull),

@@ -19,6 +19,7 @@
 #include "step/guard.h"
 #include "step/islands.h"
 #include "step/stages.h"
+#include "step/step_length.h"
 #include "step/watch/energy_watch.h"
 #include "step/watch/pair_energy.h"
 
@@ -44,6 +45,7 @@ struct StageTime {
 struct StepContext {
   // s: length of the sub-step; from its start to the end of the step, and of the planned sub-step
   double h = 0, left = 0, rest = 0;
+  StepLength length;
   Budget budget;
   double offered = 0;                  // s, length of the step if the library has chosen it, else 0
   bool in_impact = false;              // the sub-step is to be repeated explicitly (step/impact.h)

@@ -169,15 +169,15 @@ bool withstands_impacts(World &w, StepContext &step) {
     if (impact.strain > kBoundStrain) expire_bound(w);
     if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);
   }
-  if (!(hard > kHardImpact || straight > kStraight) || step.h != g.planned || g.finer > 1) return true;
+  if (!(hard > kHardImpact || straight > kStraight) || step.h != step.length.planned || step.length.parts > 1)
+    return true;
+  const double most = step.length.most_parts;
   double parts = 1;
-  while (straight > parts * kStraight && 2 * parts <= g.most_finer && parts < kFinestOwn) parts *= 2;
-  while (hard > parts * kSoftImpact && 2 * parts <= g.most_finer && parts < kFinest) parts *= 2;
+  while (straight > parts * kStraight && 2 * parts <= most && parts < kFinestOwn) parts *= 2;
+  while (hard > parts * kSoftImpact && 2 * parts <= most && parts < kFinest) parts *= 2;
   while (parts > 1 && !may_refine(w, step, parts)) parts /= 2;
   if (parts == 1) return true;
-  g.finer = parts;
-  g.cut = 1 / parts;
-  g.again = g.refines = true;
+  step.length.divide(step.h, parts);
   return false;
 }
 
@@ -410,7 +410,7 @@ bool overloaded(const World &w, const StepContext &step) {
 // would grow from sub-step to sub-step, and their rounding error would become motion. Only prescribed motion
 // can cause this, because a free body yields.
 bool jammed(const World &w, const StepContext &step) {
-  if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.guard.planned && step.residual.required > 1))
+  if (!(step.guard.motion < kNoWay && step.h > 0.5 * step.length.planned && step.residual.required > 1))
     return false;
   // contact may have an answer that the budget has not let it find
   if (step.budget.divided && step.budget.cheapened) return false;
@@ -453,7 +453,7 @@ void check_motion(const World &w, StepContext &step, uint32_t i) {
     step.guard.common[i] = common_motion(w.bodies[i]->surface);
 }
 
-// Next::stop: trouble, or guard.again: the sub-step is to be repeated, guard.cut times as long.
+// Next::stop: trouble, or the sub-step is to be repeated, shorter.
 Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.solves == 0) step.guard.kept.clear();
   if (overloaded(w, step)) {
@@ -471,7 +471,7 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.hits.empty()) return go_on(withstands_impacts(w, step));
   step.guard.acted = true;
   if (w.sleepers > 0 && may_repeat(w, step) && wake_hit(w, step)) {
-    step.guard.again = true;
+    step.length.repeat(1);
     return Next::stop;
   }
   if (step.guard.solves < kSolves && may_solve_again(w, step, step.guard.hits.size())) {
@@ -485,8 +485,7 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.cuts < kCuts && may_repeat(w, step)) {
     ++step.guard.cuts;
     ++w.stats.guard_cuts;
-    step.guard.cut = std::max(safe, kMinCut);
-    step.guard.again = true;
+    step.length.repeat(std::max(safe, kMinCut));
     return Next::stop;
   }
   // Teeth of a cut that interlock may leave no way at all, where the rest of the world has one: what contact

@@ -51,25 +51,18 @@ struct Guard {
   bool resolving = false;  // the next solve starts from `kept`
   uint32_t solves = 0;     // of this sub-step, with hits
 
-  double planned = 0;  // s, the sub-step before it was shortened
-  // Sub-steps into which a hard impact divides it and each later one; limit.
-  double finer = 1, most_finer = 1;
-  uint32_t cuts = 0;                  // cuts of this planned sub-step
-  bool acted = false, again = false;  // in this sub-step; it must be repeated
-  bool refines = false;               // then: because of an impact, as the first of `finer` sub-steps
-  bool lets_slits = false;            // hits across slits no longer count
-  double cut = 1;                     // then: factor on its length
-  bool fast = false;                  // then: because a rigid thing goes or turns too far
-  double next_size = 0;  // s, size of the next sub-step after such a cut; 0: the rest of the sub-step
-  double motion = 1;     // < 1: fraction of the displacement that is taken
+  uint32_t cuts = 0;        // of this planned sub-step
+  bool acted = false;       // in this sub-step
+  bool lets_slits = false;  // hits across slits no longer count
+  double motion = 1;        // < 1: fraction of the displacement that is taken
 
   void start() {
     kept.clear();
     through.clear();
     crossed.clear();
-    cut = motion = 1;
+    motion = 1;
     solves = 0;
-    acted = again = refines = resolving = lets_slits = fast = false;
+    acted = resolving = lets_slits = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed other than by a step
 };

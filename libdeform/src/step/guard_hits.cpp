@@ -275,7 +275,7 @@ void guard_add_hits(World &w, StepContext &step) {
                          : pair.obstacle   ? w.offset
                                            : rests_at(w, step, c);
     const double found_with = start_depth(w, step, c, kNone, apart - hit.start);
-    const double opens = std::max(0.0, 0.8 * apart - hit.start - found_with) * (step.h / g.planned);
+    const double opens = std::max(0.0, 0.8 * apart - hit.start - found_with) * (step.h / step.length.planned);
     const double target = std::min(apart, std::min(hit.start, along) + opens);
     c.distance += w.offset - apart;
     const double rate = (along - target) / step.h;

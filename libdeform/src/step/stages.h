@@ -27,7 +27,7 @@ enum class Next {
   stage,  // the one behind it
   woken,  // bodies have woken: they catch up with the others, and the stage runs again
   solve,  // the contact solve once more, and what is behind it
-  stop,   // the sub-step has failed, or is to be repeated (Guard::again)
+  stop,   // the sub-step has failed, or is to be repeated (StepLength::repeats)
 };
 inline Next go_on(bool succeeded) { return succeeded ? Next::stage : Next::stop; }
 

@@ -1,7 +1,7 @@
 // One step, from top to bottom:
 //
 //   bound                            if it is due: sizes of the sub-steps (step_bound.cpp, step_sizes.cpp)
-//   sub-steps                        run_step(): equal ones, more of them if the bound has fallen
+//   sub-steps                        take_substeps(): equal ones, more of them if the bound has fallen
 //                                    until the budget is used up; explicit from an impact on (impact.cpp)
 //     pieces                         advance(), take_substep(): shorter where the guard requires it
 //       stages                       sub_step(): all rows of the table that the plan has chosen,
@@ -201,6 +201,60 @@ struct Division {
   double next() const { return last() ? goal : from + span * (double(taken + 1) / n); }  // s, its end
 };
 
+// The rest of the step in sub-steps of the present bound.
+void divide_rest(World &w, Division &rest) {
+  rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
+}
+
+// The bound evaluated again, if it is due: more sub-steps where it has fallen. done: of this step.
+dfm_status follow_bound(World &w, StepContext &step, uint32_t done, Division &rest, uint32_t *trouble) {
+  if (!bound_expired(w)) return DFM_OK;
+  update_bound(w);
+  if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
+  double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
+  if (!(done + more <= w.def.max_substeps) && end_impact(w)) {
+    prepare_bound(w);
+    step.offered = 0;  // an impact that is too dear is not begun again
+    divide_rest(w, rest);
+    more = rest.left();
+  }
+  if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
+  if (!(more > rest.left())) return DFM_OK;
+  if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
+  rest.again(w.time, static_cast<uint32_t>(more));
+  *trouble |= DFM_TROUBLE_SUBSTEPS;
+  return DFM_OK;
+}
+
+// All sub-steps of a step of dt, at first n, until the budget is used up. done: how many were taken.
+dfm_status take_substeps(World &w, StepContext &step, double dt, uint32_t n, uint32_t &done,
+                         uint32_t *trouble) {
+  for (Division rest(w.time, dt, n); !rest.over();) {
+    if (const dfm_status refused = follow_bound(w, step, done, rest, trouble)) return refused;
+    allow_for_bound(w, step);
+    step.budget.to_come = rest.left() - 1;
+    step.length.most_parts = double(w.def.max_substeps - done) / rest.left();
+    const double from = w.time;
+    if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) {
+      if (!step.in_impact) return DFM_E_DIVERGED;
+      begin_impact(w);
+      prepare_bound(w);
+      divide_rest(w, rest);
+      *trouble |= DFM_TROUBLE_SUBSTEPS;
+      continue;
+    }
+    ++done;
+    pass(w.sizes, w.time - from);
+    if (step.budget.ended) break;
+    ++rest.taken;
+    if (step.length.parts > 1) {  // after a hard impact: this sub-step was a finer one, too
+      rest.again(w.time, (rest.left() + 1) * static_cast<uint32_t>(step.length.parts) - 1);
+      *trouble |= DFM_TROUBLE_SUBSTEPS;
+    }
+  }
+  return DFM_OK;
+}
+
 }  // namespace
 
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
@@ -226,45 +280,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   begin_tools(w, dt);
   const double start = w.time;
   uint32_t done = 0;
-  for (Division rest(w.time, dt, n); !rest.over();) {
-    if (bound_expired(w)) {
-      update_bound(w);
-      if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
-      double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
-      if (!(done + more <= w.def.max_substeps) && end_impact(w)) {
-        prepare_bound(w);
-        step.offered = 0;  // an impact that is too dear is not begun again
-        rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
-        more = rest.left();
-      }
-      if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
-      if (more > rest.left()) {
-        if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
-        rest.again(w.time, static_cast<uint32_t>(more));
-        *trouble |= DFM_TROUBLE_SUBSTEPS;
-      }
-    }
-    allow_for_bound(w, step);
-    step.budget.to_come = rest.left() - 1;
-    step.guard.most_finer = double(w.def.max_substeps - done) / rest.left();
-    const double from = w.time;
-    if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) {
-      if (!step.in_impact) return DFM_E_DIVERGED;
-      begin_impact(w);
-      prepare_bound(w);
-      rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
-      *trouble |= DFM_TROUBLE_SUBSTEPS;
-      continue;
-    }
-    ++done;
-    pass(w.sizes, w.time - from);
-    if (step.budget.ended) break;
-    ++rest.taken;
-    if (step.guard.finer > 1) {  // after a hard impact: this sub-step was a finer one, too
-      rest.again(w.time, (rest.left() + 1) * static_cast<uint32_t>(step.guard.finer) - 1);
-      *trouble |= DFM_TROUBLE_SUBSTEPS;
-    }
-  }
+  if (const dfm_status failed = take_substeps(w, step, dt, n, done, trouble)) return failed;
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
   drop_released(w);
@@ -283,15 +299,15 @@ namespace {
 // of the step, which ends at `goal`.
 bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
   step.guard.cuts = 0;
-  step.guard.motion = step.guard.finer = 1;
-  step.guard.next_size = 0;
-  double planned = step.guard.planned = end - w.time;
+  step.guard.motion = 1;
+  step.length.begin(end - w.time);
+  double planned = step.length.planned;
   for (bool whole = false; !whole;) {
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
     // only where the budget of the step has room for one piece more
-    if (step.guard.next_size > 0 && step.guard.next_size < step.rest && may_repeat(w, step))
-      step.h = step.guard.next_size;
+    if (step.length.next_piece > 0 && step.length.next_piece < step.rest && may_repeat(w, step))
+      step.h = step.length.next_piece;
     // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) save_start(w, step);
     charge(w, step, 1);
@@ -302,8 +318,8 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
       w.stats.contacts_mean += (w.stats.contacts - w.stats.contacts_mean) / double(w.stats.substeps + 1);
       w.step_impulses.idle += step.h;
     } else if (!take_substep(w, step, trouble)) return false;
-    if (step.guard.planned != planned) {
-      planned = step.guard.planned;
+    if (step.length.planned != planned) {
+      planned = step.length.planned;
       end = w.time + planned;
       last = false;
     }
@@ -322,11 +338,11 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
 // After a hard impact (doc/decisions/explicit_time.md) planned sub-steps are shorter from this one on. So
 // this one is a whole sub-step, not a piece.
 void refine(World &w, StepContext &step) {
-  Guard &g = step.guard;
-  step.budget.to_come = (step.budget.to_come + 1) * uint32_t(g.finer) - 1;
-  cut_finer(w.sizes, g.planned, g.planned / g.finer);
-  if (!(w.watch.size_before > 0)) w.watch.size_before = g.planned;
-  g.planned = step.rest = g.planned / g.finer;
+  StepLength &length = step.length;
+  step.budget.to_come = (step.budget.to_come + 1) * uint32_t(length.parts) - 1;
+  cut_finer(w.sizes, length.planned, length.planned / length.parts);
+  if (!(w.watch.size_before > 0)) w.watch.size_before = length.planned;
+  length.planned = step.rest = length.planned / length.parts;
 }
 
 // Repeats until bodies and contacts are consistent, and h is short enough for the guard.
@@ -340,20 +356,19 @@ bool take_substep(World &w, StepContext &step, uint32_t *trouble) {
   step.roused.bodies.clear();
   step.guard.acted = false;
   begin_bodies(w, step);
-  bool fast = false;
+  StepLength &length = step.length;
+  bool grows = length.next_piece > 0;
   while (!sub_step(w, step, trouble)) {
-    if (!step.guard.again && !step.in_impact) return false;
+    if (!length.repeats && !step.in_impact) return false;
     *trouble = before;
     if (step.in_impact) return false;
-    fast |= step.guard.fast;
-    if (step.guard.refines) refine(w, step);
-    step.h *= step.guard.cut;
+    grows = grows || length.grows;
+    if (length.divides) refine(w, step);
+    step.h *= length.factor;
     save_start(w, step);
     view_obstacles(w, step);
   }
-  // A piece that was shortened for a fast rigid body is likely to be followed by another one: the next piece
-  // begins with twice its length, not with all that is left.
-  if (fast || step.guard.next_size > 0) step.guard.next_size = 2 * step.h;
+  if (grows) length.next_piece = 2 * step.h;
   w.stats.guard_steps += step.guard.acted;
   step.guard.memory.keep();
   step.roused.bodies.clear();
@@ -396,6 +411,7 @@ bool sub_step(World &w, StepContext &step, uint32_t *trouble) {
   } undo{w, step};
   step.driven.clear();
   step.guard.start();
+  step.length.begin_attempt();
   step.ended = step.in_impact = false;
   step.rigid_rounds = 0;
   step.rigid_again = false;

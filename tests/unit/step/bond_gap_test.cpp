@@ -32,7 +32,7 @@ TEST(BondGap, InPiecesOfTheGuard_ClosesInThePlannedSubStep) {
   dfm::StepContext &step = *w.steps;
   const double open = 0.5 * w.offset;
   w.obstacles[0]->pose.position.z += open;
-  step.guard.planned = 1e-3;
+  step.length.planned = 1e-3;
   for (const double h : {1e-3, 1e-5, 1e-9}) {
     step.h = h;
     dfm::make_bonds(w, step, false);

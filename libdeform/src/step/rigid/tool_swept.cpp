@@ -196,9 +196,8 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
                       faces_crossed(of_b, at_b, of_a, at_a, deep, pair.thin),
                       edges_crossed(of_a, at_a, of_b, at_b, deep)});
   }
-  if (!(first <= 1) || !(step.h > kMinSubstep * step.guard.planned) || !may_repeat(w, step)) return true;
-  step.guard.again = step.guard.fast = true;
-  step.guard.cut = std::max(kMinCut, kAims * first);
+  if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) return true;
+  step.length.repeat_grown(std::max(kMinCut, kAims * first));
   return false;
 }
 

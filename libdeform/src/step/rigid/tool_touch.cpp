@@ -583,12 +583,10 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinSubstep * step.guard.planned / step.h);
-  if ((!(turn > 0) && arrives == 1) || !(step.h > kMinSubstep * step.guard.planned) || !may_repeat(w, step))
+  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinSubstep * step.length.planned / step.h);
+  if ((!(turn > 0) && arrives == 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step))
     return true;
-  step.guard.again = step.guard.fast = true;
-  step.guard.cut = arrives;
-  if (turn > 0) step.guard.cut = std::min(arrives, kAims * kArc / turn);
+  step.length.repeat_grown(turn > 0 ? std::min(arrives, kAims * kArc / turn) : arrives);
   return false;
 }
 
@@ -601,7 +599,7 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   if (!passing_.empty()) warn_passing(w, step);
   if (sets_.empty()) return true;
   h_ = step.h;
-  planned_ = step.guard.planned;
+  planned_ = step.length.planned;
   strong_ = 1;
   hits_found_ = 0;
   take_sets(w, step);

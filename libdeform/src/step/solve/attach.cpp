@@ -30,8 +30,8 @@ void set_nodes(const StepContext &step, const Attachment &a, size_t i, uint32_t 
 // any length, it would throw the body. A gap beyond d_c, made by a host, closes by at most d_c, or at
 // recovery_speed, for the same reason.
 Vec3 closing(const World &w, const StepContext &step, Vec3 gap) {
-  const double most = w.def.recovery_speed > 0 ? w.def.recovery_speed : w.offset / step.guard.planned;
-  const Vec3 rate = (1 / step.guard.planned) * gap;
+  const double most = w.def.recovery_speed > 0 ? w.def.recovery_speed : w.offset / step.length.planned;
+  const Vec3 rate = (1 / step.length.planned) * gap;
   const double speed = norm(rate);
   return norm(gap) > w.offset && speed > most ? (most / speed) * rate : rate;
 }

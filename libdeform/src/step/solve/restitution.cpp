@@ -68,7 +68,7 @@ void find_throws(const World &w, StepContext &step) {
     return step.motions[slot];
   };
   const double falls = step.h * norm(w.gravity.now),
-               least = kWeights * step.guard.planned * norm(w.gravity.now);
+               least = kWeights * step.length.planned * norm(w.gravity.now);
   for (uint32_t i = 0; i < rows.soft(); ++i) {
     const double e = restitution(w, step, i);
     if (!(e > 0)) continue;
@@ -119,7 +119,7 @@ double lands_at(const World &w, StepContext &step) {
     const double closing = -rows.velocity(i).x * step.h, gap = gap_of(w, c);
     if (closing > gap) first = std::min(first, gap / closing);
   }
-  const double last = 1 - kLeft * step.guard.planned / step.h;
+  const double last = 1 - kLeft * step.length.planned / step.h;
   return first < 1 && last > 0 ? std::min(first, last) : 1;
 }
 

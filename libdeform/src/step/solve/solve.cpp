@@ -85,7 +85,7 @@ double start_depth(const World &w, const StepContext &step, const ContactPoint &
   return std::max(0.0, std::min(left - opened, depth));
 }
 
-bool may_shorten(const StepContext &step) { return step.h > kMinSubstep * step.guard.planned; }
+bool may_shorten(const StepContext &step) { return step.h > kMinSubstep * step.length.planned; }
 
 void report_impulses(StepContext &step) {
   const ContactRows &rows = step.rows;
@@ -141,7 +141,7 @@ void make_rows(World &w, StepContext &step) {
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.length.planned, w.offset, step.bonds,
                    &w.context->tasks);
   run_belts(step);
   find_throws(w, step);
@@ -162,7 +162,7 @@ namespace {
 
 // After the operator has changed.
 void finish_rows(World &w, StepContext &step) {
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.guard.planned, w.offset, step.bonds,
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.length.planned, w.offset, step.bonds,
                    &w.context->tasks);
   run_belts(step);
   bounce(step);
@@ -223,7 +223,7 @@ bool contacts_taken(World &w, StepContext &step) {
   }
   for (auto &b : w.bodies)
     if (!b->sleep_state.asleep && has_dues(*b) && !b->dynamics->take_contact()) all = false;
-  step.guard.again = step.guard.again || !all;
+  if (!all) step.length.repeat(1);
   return all;
 }
 
@@ -247,22 +247,15 @@ bool short_enough(World &w, StepContext &step) {
     if (has_dues(*w.bodies[slot])) look(slot);
   while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
   if (parts == 1) return true;
-  Guard &g = step.guard;
   expire_bound(w);
-  if (step.h == g.planned && g.finer == 1) {
-    g.finer = parts;
-    g.refines = true;
-  }
-  g.cut = 1 / parts;
-  g.again = true;
+  step.length.divide(step.h, parts);
   return false;
 }
 
 // In a shorter sub-step a body moves less far from where its forces are known.
 bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t *trouble) {
   if (may_shorten(step)) {
-    step.guard.again = true;
-    step.guard.cut = 0.5;
+    step.length.repeat(0.5);
     return false;
   }
   set_last_error(format("step %llu, body '%s': no state was found in which its forces and contacts agree, "
@@ -279,8 +272,7 @@ bool cut_at_landing(World &w, StepContext &step) {
   if (step.rigid_again || step.guard.resolving) return true;
   const double share = lands_at(w, step);
   if (share == 1 || !may_repeat(w, step)) return true;
-  step.guard.again = true;
-  step.guard.cut = share;
+  step.length.repeat(share);
   return false;
 }
 

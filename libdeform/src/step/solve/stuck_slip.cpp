@@ -76,7 +76,7 @@ void find_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   });
   own.drifts = drifts;
   if (!drifts) return;
-  const double rate = kShare / step.guard.planned;
+  const double rate = kShare / step.length.planned;
   each_row(own.part.contacts, [&](uint32_t i) {
     if (i >= step.rows.soft()) return;
     const Vec3 back = at_most(kMax * own.tolerance.tangent[i], rate * load3(stick_drift + 3 * size_t{i}));

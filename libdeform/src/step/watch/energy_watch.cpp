@@ -84,7 +84,7 @@ double work_of_new_size(const World &w, const StepContext &step, const Body &b) 
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
       if (p.moves(at))
         sum += p.v[at] * (p.f[at] + p.mass[i] * w.gravity.now[int(k)] - (load_booked ? p.load[at] : 0));
-  return 0.5 * (step.guard.planned - w.watch.size_before) * sum;
+  return 0.5 * (step.length.planned - w.watch.size_before) * sum;
 }
 
 double rounding_of(const Body &b, double h, double potential, double kinetic, double elastic, double reach) {
@@ -412,7 +412,7 @@ bool stop_for_energy(World &w, uint32_t *trouble, const std::string &why) {
 
 bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   // pieces of a sub-step are not compared with whole ones
-  if (!watching(w) || step.guard.planned != step.h) return true;
+  if (!watching(w) || step.length.planned != step.h) return true;
   double moving = 0;
   for (const uint32_t i : step.active) moving += watched(*w.bodies[i]) ? step.free_kinetic[i] : 0;
   dfm_world_stats &s = w.stats;
