@@ -15,8 +15,9 @@ void Phyxels::size(const Memory &m, uint32_t points) {
 }
 
 void relax_dampers(Phyxels &p) {
-  if (p.dampers.lag > 0) p.dampers.v.assign(p.v.begin(), p.v.end());
-  else p.dampers.v.clear();
+  for (Array<double> *a : {&p.dampers.v, &p.dampers.slow})
+    if (p.dampers.lag > 0) a->assign(p.v.begin(), p.v.end());
+    else a->clear();
 }
 
 Extent extent_of(const double *x, size_t n, size_t stride) {

@@ -188,8 +188,11 @@ void take_points(const Memory &m, const BodyShape &from, const CutMesh &mesh,
   take_rows(from.p.x, mesh.point, kStride, p.x);
   take_rows(from.p.v, mesh.point, kStride, p.v);
   p.dampers.lag = from.p.dampers.lag;
-  use_memory(m, p.dampers.v);
-  if (!from.p.dampers.v.empty()) take_rows(from.p.dampers.v, mesh.point, kStride, p.dampers.v);
+  use_memory(m, p.dampers.v, p.dampers.slow);
+  if (p.dampers.lag > 0) {
+    take_rows(from.p.dampers.v, mesh.point, kStride, p.dampers.v);
+    take_rows(from.p.dampers.slow, mesh.point, kStride, p.dampers.slow);
+  }
   take_rows(from.p.held, mesh.point, 1, p.held);
   if (!from.anchor.empty()) take_rows(from.anchor, mesh.point, kStride, to.anchor);
   for (const BladeTrack &t : from.blades) {

@@ -17,7 +17,7 @@ constexpr double kMoved = 1e-4;   // of the shortest edge: a difference of force
 // Strain of an edge from which on nothing of the spectrum at rest counts.
 constexpr double kUnlikeRest = 0.5;
 // Dampers with a lag are at most so stiff, relative to the springs beside them: half the step that these
-// allow. A mode at the body's own frequency loses so much of its damping, and is so much faster, at most.
+// allow. At the body's own frequency and decay they see a velocity that is off by so much at most.
 constexpr double kStiffening = 3, kError = 0.02;
 constexpr double kNoDrag = 1e-6;  // of row sums of damping: rounding
 }  // namespace
@@ -134,7 +134,7 @@ double ExplicitPoints::own_frequency(Trial &rest, double edge) {
   return std::sqrt(slowest);
 }
 
-// A lag pays where dampers alone bound the sub-step more than what it makes of them.
+// The longest lag with which the slowest strain is damped as without one; 0: dampers strain nothing.
 double ExplicitPoints::find_lag(Trial &rest, double edge) {
   double cell = 0, ratio = 0;  // s, of damping to stiffness
   if (!row_sums(rest.kin, cell) || *std::max_element(damping_.begin(), damping_.end()) <= 0) return 0;
@@ -143,13 +143,20 @@ double ExplicitPoints::find_lag(Trial &rest, double edge) {
   for (uint32_t i = 0; i < p_.n; ++i)
     if (stiffness_[i] > 0) ratio = std::max(ratio, (damping_[i] - drag(i)) / stiffness_[i]);
   if (!(ratio > 0)) return 0;
-  const double lag = std::min(
-      {ratio / kStiffening, std::sqrt(kError) / frequency, 2 * kError / (ratio * frequency * frequency)});
+  // they see 1 / (1 + 2 (s lag)^2 / (1 + 2 s lag)) of a velocity that varies by e^st
+  const double rate = frequency * std::max(1.0, ratio * frequency);
+  return std::min(ratio / kStiffening, std::sqrt(0.5 * kError) / rate);
+}
+
+// s, stable sub-step at rest; 0: the model fails.
+double ExplicitPoints::step_at_rest(Trial &rest, const ExplicitTime &with) {
+  double cell = 0;
+  if (!row_sums(rest.kin, cell)) return 0;
+  if (with.lag > 0) lag_rows(with.lag);
+  for (uint32_t i = 0; i < p_.n; ++i)
+    stiffness_[i] = with.share * (stiffness_[i] + (with.lag > 0 ? lagged_[i] : 0));
   uint32_t point = 0;
-  const double without = stable_step(p_, stiffness_.data(), damping_.data(), &point);
-  lag_rows(lag);
-  for (uint32_t i = 0; i < p_.n; ++i) stiffness_[i] += lagged_[i];
-  return stable_step(p_, stiffness_.data(), damping_.data(), &point) > without ? lag : 0;
+  return stable_step(p_, stiffness_.data(), damping_.data(), &point);
 }
 
 // Row sums of a mesh are up to twice the largest eigenvalue of its stiffness, which is found by products:
@@ -192,9 +199,13 @@ ExplicitTime ExplicitPoints::measure(const Pose &placed, bool spectrum) {
     edge = std::min(edge, norm(load3(a) - load3(b)));
   }
   Trial rest(*this, placed);
-  out.lag = find_lag(rest, edge);
-  if (spectrum && model_.state.empty()) out.share = find_share(rest, out.lag, edge);
-  return out;
+  ExplicitTime lagged;
+  lagged.lag = find_lag(rest, edge);
+  for (ExplicitTime *with : {&out, &lagged})
+    if (spectrum && model_.state.empty() && (with == &out || with->lag > 0))
+      with->share = find_share(rest, with->lag, edge);
+  // a lag pays where dampers alone bound the sub-step more than what it makes of them
+  return lagged.lag > 0 && step_at_rest(rest, lagged) > step_at_rest(rest, out) ? lagged : out;
 }
 
 bool ExplicitPoints::rest_rows(const Pose &placed, double share, RestRows &out) {
@@ -376,30 +387,37 @@ void ExplicitPoints::commit(const SubStep &now, double fraction) {
   p_.x.swap(p_.x_end);
   p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
-  // The trapezoid: the dampers keep the energy w.C w lag / 2 exactly, less w.C w h of the mean w.
-  const double h = fraction * now.h, part = 2 * h / (h + 2 * p_.dampers.lag);
-  for (size_t at = 0; at < p_.dampers.v.size(); ++at)
-    p_.dampers.v[at] += part * (p_.v[at] - p_.dampers.v[at]);
+  // lag u' = v - (u + w) / 2, 2 lag w' = u - w by the trapezoid: the dampers keep the energy lag (u.C u + w.C w)
+  // / 2 exactly, less h (u.C u + w.C w) / 2 of the means, which is what they take from v.
+  const double k = 0.25 * fraction * now.h / p_.dampers.lag;
+  for (size_t at = 0; at < p_.dampers.v.size(); ++at) {
+    double &u = p_.dampers.v[at], &w = p_.dampers.slow[at];
+    const double mean = ((1 + k) * (2 * k * p_.v[at] + u) - k * w) / ((1 + k) * (1 + k) + k * k);
+    w += 2 * k * (mean - w) / (1 + k);
+    u = 2 * mean - u;
+  }
 }
 
-// From the forces at w and at -w. v_end is free until the end of the sub-step is known.
+// From the forces at u and at -u. v_end is free until the end of the sub-step is known.
 double ExplicitPoints::damper_energy(double time) {
-  Array<double> &w = p_.dampers.v, &f = p_.v_end;
-  if (w.empty() || !find_drag()) return 0;
-  dfm_kin k = kin(time, 0);
-  k.v = w.data();
+  if (p_.dampers.v.empty() || !find_drag()) return 0;
+  Array<double> &f = p_.v_end;
   const auto turn = [](Array<double> &a) {
     for (double &x : a) x = -x;
   };
-  std::fill(f.begin(), f.end(), 0.0);
-  bool known = model_.add_forces(k, f.data()) == DFM_OK;
-  turn(f);
-  turn(w);
-  known = known && model_.add_forces(k, f.data()) == DFM_OK;
-  turn(w);
   double sum = 0;
-  for (size_t at = 0; known && at < w.size(); ++at)
-    sum += w[at] * (0.5 * f[at] - drag(uint32_t(at / kStride)) * w[at]);
+  for (Array<double> *u : {&p_.dampers.v, &p_.dampers.slow}) {
+    dfm_kin k = kin(time, 0);
+    k.v = u->data();
+    std::fill(f.begin(), f.end(), 0.0);
+    bool known = model_.add_forces(k, f.data()) == DFM_OK;
+    turn(f);
+    turn(*u);
+    known = known && model_.add_forces(k, f.data()) == DFM_OK;
+    turn(*u);
+    for (size_t at = 0; known && at < f.size(); ++at)
+      sum += (*u)[at] * (0.5 * f[at] - drag(uint32_t(at / kStride)) * (*u)[at]);
+  }
   return 0.5 * p_.dampers.lag * sum;
 }
 

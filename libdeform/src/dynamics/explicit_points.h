@@ -62,6 +62,7 @@ class ExplicitPoints : public Dynamics {
   void lag_rows(double lag);
   double own_frequency(Trial &rest, double edge);
   double find_lag(Trial &rest, double edge);
+  double step_at_rest(Trial &rest, const ExplicitTime &with);
   double find_share(Trial &rest, double lag, double edge);
   double drag(uint32_t point) const { return drag_.empty() ? 0 : drag_[point]; }
   dfm_kin seen(double time, double h, bool trial = false) const;  // with the velocity that dampers see

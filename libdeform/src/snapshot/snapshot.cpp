@@ -343,7 +343,7 @@ void exchange(World &w, Staged &t) noexcept {
 uint64_t world_hash(const World &w) {
   Hash h;
   for (auto &b : w.bodies) {
-    for (const Array<double> *a : {&b->p.x, &b->p.v, &b->p.dampers.v, &b->model.state})
+    for (const Array<double> *a : {&b->p.x, &b->p.v, &b->p.dampers.v, &b->p.dampers.slow, &b->model.state})
       h.add(a->data(), a->size() * sizeof(double));
   }
   for (auto &set : w.rigid_sets) {

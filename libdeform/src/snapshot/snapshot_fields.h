@@ -82,8 +82,8 @@ struct Staged : WorldState {
     rigid_sets.resize(w.rigid_sets.size());
     tools.resize(w.tools.size());
     for (StagedBody &b : bodies)
-      use_memory(m, b.p.x, b.p.v, b.p.dampers.v, b.p.load, b.p.held, b.model.state, b.surfel_impulse,
-                 b.anchor);
+      use_memory(m, b.p.x, b.p.v, b.p.dampers.v, b.p.dampers.slow, b.p.load, b.p.held, b.model.state,
+                 b.surfel_impulse, b.anchor);
     for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
   }
 };
@@ -268,7 +268,9 @@ void model_fields(Stream &s, B &b, const Body &like) {
           must::Be{[](double x) { return x > 0 && x <= 1; }, "a share above zero"});
   s.value("lag of dampers", b.p.dampers.lag,
           must::Be{[](double x) { return x >= 0 && std::isfinite(x); }, "a time"});
-  s.array("velocity of dampers", b.p.dampers.v, b.p.dampers.lag > 0 ? like.p.x.size() : 0, must::finite);
+  const size_t lagged = b.p.dampers.lag > 0 ? like.p.x.size() : 0;
+  s.array("velocity of dampers", b.p.dampers.v, lagged, must::finite);
+  s.array("slow velocity of dampers", b.p.dampers.slow, lagged, must::finite);
   s.value("explicit sub-step", b.integrator.step,
           must::Be{[](double x) { return x > 0; }, "a time above zero"});
   const bool alike = made_alike(b, like);

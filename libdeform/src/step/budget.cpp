@@ -161,6 +161,7 @@ void changing(Stream &s, World &w) {
     s.array(b->p.x);
     s.array(b->p.v);
     s.array(b->p.dampers.v);
+    s.array(b->p.dampers.slow);
     s.array(b->model.state);
     s.array(b->surfel_impulse);
     s.array(b->anchor);

@@ -38,7 +38,7 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kSolves = 4, kCuts = 8, kFractions = 40;
+constexpr uint32_t kSolves = 16, kCuts = 8, kFractions = 40;
 constexpr double kMinCut = 0.25;
 // Strain: above the first a sub-step is repeated finer, until it is below the second.
 constexpr double kHardImpact = 0.08, kSoftImpact = 0.05;
