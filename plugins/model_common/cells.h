@@ -4,7 +4,11 @@
 // then around the top.
 //
 // TET10: quadratic shape functions; the 8-point rule of degree 3 integrates the stiffness of a straight cell
-// exactly and passes the patch test on curved ones.
+// exactly and passes the patch test on curved ones. A mesh has about as many linear parts of the volume
+// change as displacements, so near poisson 1/2 it would lock: what differs from the mean of the cell counts
+// with the bulk modulus of poisson 0.4 at most (selective integration: Malkus and Hughes 1978, Mixed finite
+// element methods - reduced and selective integration techniques; left out altogether, a lone cell would be a
+// mechanism).
 // HEX8: trilinear shape functions, 2 x 2 x 2 points, with two remedies against locking:
 // - bending: three displacements that are quadratic in one coordinate each, whose gradients are taken at the
 //   center and scaled by the Jacobian, so that constant stresses do no work on them (Taylor, Beresford,
@@ -60,7 +64,8 @@ constexpr int kInner = 3;  // quadratic displacements of a hexahedron
 constexpr int kMax = kMaxNodes + kInner;
 constexpr int kWhole = 8, kInside = 27;  // points of the rules
 constexpr double kTie = 0.02;
-constexpr double kThin = 1e-9;  // of the square of a function: it depends on those before it
+constexpr double kThin = 1e-9;       // of the square of a function: it depends on those before it
+constexpr double kSwell = 14.0 / 3;  // bulk over shear modulus, at poisson 0.4
 
 // At one of the points of a rule.
 struct Point {
@@ -224,6 +229,10 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
       for (int c = 0; c < 3 && !(kept >> (k + 1) & 1); ++c) q[n].g[nodes + k][c] = theta[n][nodes + k][c] = 0;
   // 2 mu deviator : deviator + bulk theta^2
   const double bulk = m.lambda + 2 * m.mu / 3;
+  if (const double by = std::sqrt(kSwell * m.mu / bulk); !hex && by < 1)
+    for (int n = 0; n < points; ++n)
+      for (int a = 0; a < nodes; ++a)
+        for (int c = 0; c < 3; ++c) theta[n][a][c] = out.mean[a][c] + by * (theta[n][a][c] - out.mean[a][c]);
   double k[3 * kMax][3 * kMax] = {};
   for (int n = 0; n < points; ++n)
     for (int a = 0; a < rows; ++a)

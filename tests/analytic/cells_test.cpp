@@ -75,7 +75,8 @@ TEST(Cells, BarOfMoreCellsAcross_IsNearer) {
 TEST(Cells, BarNearlyIncompressible_DoesNotLock) {
   const double exact = kExact * tip("linear_fem", "bricks", 4, false, 0.499, kExact);
   EXPECT_NEAR(tip("linear_fem", "bricks", 1, false, 0.499, exact), 1, 0.02);
-  EXPECT_NEAR(tip("linear_fem", "beam", 2, true, 0.499, exact), 1, 0.03);
+  for (const uint32_t across : {1u, 2u})
+    EXPECT_NEAR(tip("linear_fem", "beam", across, true, 0.499, exact), 1, 0.02) << across;
 }
 
 }  // namespace

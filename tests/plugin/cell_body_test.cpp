@@ -241,6 +241,30 @@ TEST(CellBars, ErrorOfASmoothField_FallsByTheOrderOfTheCells) {
   EXPECT_LT(field_error(DFM_CELL_TET10, 4), 0.5 * field_error(DFM_CELL_TET, 8));
 }
 
+// The displacement u = 2 (a.x) x - |x|^2 a has no shear. What resists it in a lone cell is the linear part
+// 6 a.x of the volume change: by the bulk modulus, at most by that of poisson 0.4.
+TEST(CellBars, LinearVolumeChangeOfSecondOrderTetrahedra_IsSofterNearPoissonOneHalf) {
+  Mesh corners;
+  corners.rest = {0, 0, 0, 0.1, 0, 0, 0, 0.12, 0, 0.02, 0, 0.09};
+  corners.cells = {0, 1, 2, 3};
+  corners.edges = {0, 1};
+  for (size_t i = 0; i < 12; ++i) corners.rest[i] -= i % 3 == 0 ? 0.03 : i % 3 == 1 ? 0.03 : 0.0225;
+  const Vec a = {0.3, -0.5, 0.7};
+  double square = 0;  // integral of (a.x)^2 about the centroid
+  for (uint32_t k = 0; k < 4; ++k) square += corners.volume(0) / 20 * std::pow(dot(a, corners.at(k)), 2);
+  for (double poisson : {0.3, 0.4, 0.49, 0.4999}) {
+    Host host;
+    Body b(host, {"model_linear_fem", DFM_CELL_TET10}, second_order(corners), poisson);
+    ASSERT_EQ(b.status, DFM_OK) << host.logged;
+    for (uint32_t i = 0; i < b.size(); ++i) {
+      const Vec x = b.mesh.at(i);
+      b.set(b.x, i, x + (2 * dot(a, x)) * x - dot(x, x) * a);
+    }
+    const double mu = kYoung / (2 * (1 + poisson)), bulk = kYoung / (3 * (1 - 2 * poisson));
+    EXPECT_NEAR(b.energy() / (18 * std::min(bulk, 14.0 / 3 * mu) * square), 1, 1e-9) << poisson;
+  }
+}
+
 TEST(CellBars, LinearCellsThatTurn_AreWarnedOf) {
   Host host;
   Body b(host, {"model_linear_fem", DFM_CELL_HEX8}, brick_bar(2, 1, 1, {0.1, 0.1, 0.1}));
