@@ -31,8 +31,8 @@ static inline Pair on_disc(double a, double b, double radius) {
   return {radius / size * a, radius / size * b};
 }
 
-// Of the limit of a set-valued law that slips along the unit vector e: how it grows with the normal force, and,
-// N s/m, with the speed. State: ContactState, or its view.
+// Of the limit of a set-valued law that slips along the unit vector e: how it grows with the normal force,
+// and, N s/m, with the speed. State: ContactState, or its view.
 template <class State>
 __attribute__((always_inline)) static inline double limit_growth(const State &s, uint32_t i) {
   const size_t n = s.stride;
@@ -101,8 +101,8 @@ __attribute__((always_inline)) static inline Pair friction_impulse(const LawView
                  s.mode[i] == 1 ? radius : larger(radius, h * s.limit[i]));
 }
 
-// The step of a sweep at row i, whose sides move by u: by, out, is the change of its impulse l. False: there is
-// none. Rows: ContactRows, or their view.
+// The step of a sweep at row i, whose sides move by u: by, out, is the change of its impulse l. False: there
+// is none. Rows: ContactRows, or their view.
 template <class Rows>
 __attribute__((always_inline)) static inline bool solve_row(const Rows &rows, const LawView &law, uint32_t i,
                                                             double h, const double (&u)[3], double *l,
@@ -137,8 +137,8 @@ __attribute__((always_inline)) static inline double normal_residual(const Rows &
 
 // The force of row i by its law, compared by the answer that both give together with the contact's own
 // response, not by the bare force: the difference is the velocity that is left to correct. Where a set-valued
-// law just slips, force and slip may differ in direction by much while that is tiny; a smooth law with a steep
-// slope c would count it 1 + h w_t c times.
+// law just slips, force and slip may differ in direction by much while that is tiny; a smooth law with a
+// steep slope c would count it 1 + h w_t c times.
 template <class Rows>
 __attribute__((always_inline)) static inline double tangent_residual(const Rows &rows, const LawView &law,
                                                                      uint32_t i, double h,

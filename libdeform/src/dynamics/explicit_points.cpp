@@ -387,8 +387,8 @@ void ExplicitPoints::commit(const SubStep &now, double fraction) {
   p_.x.swap(p_.x_end);
   p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
-  // lag u' = v - (u + w) / 2, 2 lag w' = u - w by the trapezoid: the dampers keep the energy lag (u.C u + w.C w)
-  // / 2 exactly, less h (u.C u + w.C w) / 2 of the means, which is what they take from v.
+  // lag u' = v - (u + w) / 2, 2 lag w' = u - w by the trapezoid: the dampers keep the energy lag / 2 (u.C u +
+  // w.C w) exactly, less h / 2 (u.C u + w.C w) of the means, which is what they take from v.
   const double k = 0.25 * fraction * now.h / p_.dampers.lag;
   for (size_t at = 0; at < p_.dampers.v.size(); ++at) {
     double &u = p_.dampers.v[at], &w = p_.dampers.slow[at];

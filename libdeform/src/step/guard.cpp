@@ -3,7 +3,7 @@
 // coming as near as d_g = d_c / 2 on that path (ccd/toi_guard). If it does:
 //
 //   1  each hit becomes a contact, linearized at its hit time, and the solve runs again, warm started,
-//      at most 4 times
+//      at most 16 times
 //   2  the sub-step is repeated, shorter: up to the safe fraction of the path, but no less than a quarter,
 //      at most 8 times
 //   3  everything takes the safe fraction of its path; velocities stay, so motion is lost, but no momentum
