@@ -11,8 +11,9 @@ namespace dfm {
 
 inline constexpr uint32_t kStride = 4;
 
-// What the dampers of a model see of v in explicit sub-steps: a low pass of second order of it. So their forces
-// are those of springs that yield, which bound a sub-step as stiffness does (doc/concepts/step.md#dampers).
+// What the dampers of a model see of v in explicit sub-steps: a low pass of second order of it. So their
+// forces are those of springs that yield, which bound a sub-step as stiffness does
+// (doc/concepts/step.md#dampers).
 struct Dampers {
   double lag = 0;         // s; 0: they see v
   Array<double> v, slow;  // [n,4] m/s, what they see and what that tends to; empty without a lag
