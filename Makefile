@@ -33,7 +33,7 @@ help:
 	@echo "make lint             layout, includes, headers, text"
 	@echo "make format           clang-format on all C and C++ files, one version everywhere"
 	@echo "make tidy             clang-tidy on the library, where it is installed"
-	@echo "make asan, make tsan  the suite under the sanitizers; tsan: what runs on several threads"
+	@echo "make asan, make tsan  the suite under the sanitizers; asan by clang; tsan: several threads"
 	@echo "make fuzz             the readers under libFuzzer"
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make wheel            the Python package for CPython 3.9 up, manylinux: build/dist/"
@@ -65,7 +65,7 @@ setup-fuzz:
 
 # Configured once; ninja calls CMake again by itself where a CMake file changed.
 build/bench/build.ninja: | setup-bench
-build/fuzz/build.ninja: | setup-fuzz
+build/fuzz/build.ninja build/asan/build.ninja: | setup-fuzz
 build/wasm/build.ninja: | setup-wasm
 build/arm64/build.ninja build/windows/build.ninja: | setup-ports
 build/%/build.ninja: | setup

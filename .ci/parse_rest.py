@@ -19,7 +19,10 @@ def compile_commands(build):
 
 
 def sources(entry):
-    """The file that a command compiles, or those that it compiles together."""
+    """The file that a command has compiled, or those that it has compiled together."""
+    words = shlex.split(entry["command"])
+    if not (pathlib.Path(entry["directory"]) / words[words.index("-o") + 1]).exists():
+        return []
     path = pathlib.Path(entry["file"])
     if path.parent.name != "Unity":
         return [entry["file"]]

@@ -71,7 +71,8 @@ dfm_rigid put(dfm_world w, const std::string &kind, double low, const char *name
     d.shape = DFM_SHAPE_NONE;
     for (size_t k = 0; k < 3; ++k) d.inertia[k] = mass / 3 * (test::dot(half, half) - half[k] * half[k]);
     const dfm_rigid r = test::create(w, {d})[0];
-    const dfm_obstacle_def of = test::mesh_def((std::string(name) + ".surface").c_str(), m);
+    const std::string surface = std::string(name) + ".surface";
+    const dfm_obstacle_def of = test::mesh_def(surface.c_str(), m);
     dfm_obstacle shape = 0;
     test::ok(dfm_rigid_add_shape(r, &of, &shape));
     return r;

@@ -9,7 +9,7 @@
 #include "tiny_support.h"
 #include "world.h"
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#ifdef DEFORM_SANITIZED
 #define SANITIZED 1
 #else
 #define SANITIZED 0

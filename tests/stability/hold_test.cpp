@@ -71,7 +71,7 @@ TEST_P(Hold, PulledBackAndForth_DriftsByTheLawsFormulaOrNotAtAll) {
 }
 
 // Implicit bodies at the step of a frame and at 1 ms.
-// soak(dahl|lugre|elastoplastic|gms): long; cover_test has each law with each integrator
+// soak(dahl:lugre:elastoplastic:gms): long; cover_test has each law with each integrator
 TEST_P(Hold, ImplicitBodies_DoNotCreep) {
   const auto held = [](const char *scene, double level, double step, const char *model) {
     const Result r =
