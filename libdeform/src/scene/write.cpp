@@ -10,7 +10,7 @@
 #include "core/path.h"
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 #include "plugin/shared_object.h"
 #include "scene/keys.h"
 #include "scene/node.h"
@@ -138,12 +138,12 @@ std::string SceneWriter::text_file(const std::string &name, std::string text) {
 }
 
 std::string SceneWriter::triangles(const std::string &name, const Obstacle &of) {
-  TriMesh mesh;
+  RestMesh mesh;
   mesh.points.assign(of.points.begin(), of.points.end());
   mesh.tris.assign(of.triangles.begin(), of.triangles.end());
   mesh.tri_group.assign(mesh.ntri(), kNoGroup);
   return file(name + ".vtu",
-              [mesh = std::move(mesh)](const std::string &to_path) { write_tri_mesh(mesh, to_path); });
+              [mesh = std::move(mesh)](const std::string &to_path) { write_mesh(mesh, to_path); });
 }
 
 void SceneWriter::check_name(const char *kind, const std::string &name) const {

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "core/error.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 #include "plugin/context.h"
 #include "scene/keys.h"
 #include "scene/table.h"
@@ -38,7 +38,7 @@ const std::string &zone_group(const Body &b, uint32_t triangle) {
 std::string material_group(const std::string &material) { return "material " + material; }
 
 void write_cells(SceneWriter &to, const Body &b, Written &out) {
-  TetMesh mesh;
+  RestMesh mesh;
   mesh.points.assign(b.p.rest.begin(), b.p.rest.end());
   mesh.tets.assign(b.tets.begin(), b.tets.end());
   mesh.cell = b.cell_type;
@@ -78,7 +78,7 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
 void write_surface(SceneWriter &to, const Body &b, Written &out) {
   const Surface &s = b.surface;
   if (s.identity()) return;
-  TriMesh mesh;
+  RestMesh mesh;
   mesh.points.assign(s.rest.begin(), s.rest.end());
   mesh.tris.assign(s.tri.begin(), s.tri.end());
   for (uint32_t t = 0; t < s.ntri; ++t)
@@ -86,7 +86,7 @@ void write_surface(SceneWriter &to, const Body &b, Written &out) {
                                                       : group_number(mesh.groups, zone_group(b, t), 2));
   Written &own = out["surface"];
   own["mesh"] = to.file(b.name + "_surface.vtu", [mesh = std::move(mesh)](const std::string &to_path) {
-    write_tri_mesh(mesh, to_path);
+    write_mesh(mesh, to_path);
   });
   own["coupling"] = scene::word_of("coupling", uint32_t(b.coupling));
   if (b.coupling != DFM_COUPLING_BARYCENTRIC && b.support > 0) own["support"] = b.support;

@@ -15,9 +15,9 @@ namespace {
 
 // A mesh of the library with what a scene's selections look at.
 struct Cells {
-  dfm::TetMesh mesh;
+  dfm::RestMesh mesh;
   BodyMesh body;
-  explicit Cells(dfm::TetMesh &&m) : mesh(std::move(m)) {
+  explicit Cells(dfm::RestMesh &&m) : mesh(std::move(m)) {
     body.points.assign(mesh.points.begin(), mesh.points.end());
     body.tets = mesh.tets.data();
     body.npoint = mesh.npoint();
