@@ -132,9 +132,9 @@ StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   if (!table.empty() && table.first() != kStateHeader) table.refuse_header();
   table.begin(kStateHeader);
   StartState out;
-  out.x.resize(3 * size_t(mesh.npoint));
+  out.x.resize(3 * size_t(mesh.info.npoint));
   out.v.resize(out.x.size());
-  std::vector<uint8_t> seen(mesh.npoint, 0);
+  std::vector<uint8_t> seen(mesh.info.npoint, 0);
   double cell[7];
   while (table.next(cell)) {
     const size_t line = table.line();
@@ -150,7 +150,7 @@ StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   const auto missing = std::find(seen.begin(), seen.end(), uint8_t(0));
   if (missing != seen.end())
     fail(DFM_E_FORMAT, "%s: node %u of the mesh file has no row", path.c_str(),
-         mesh.file_point[size_t(missing - seen.begin())]);
+         mesh.info.file_point[size_t(missing - seen.begin())]);
   return out;
 }
 
@@ -187,7 +187,7 @@ void make_unit(double *v) {
 
 std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
   const std::string plain = columns_of(field.width), numbered = "cell," + plain;
-  const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
+  const uint32_t nfile = mesh.info.ntet + mesh.info.dropped_cells, w = field.width;
   Table table(path, plain + " or " + numbered, nfile, int(w) + 1);
   std::string header = tidy(table.first());
   if (field.width == 1 && header == field.key) header = plain;
@@ -197,9 +197,9 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
   const bool has_cell = header == numbered;
 
   std::vector<uint32_t> cell_of(nfile, UINT32_MAX);
-  for (uint32_t t = 0; t < mesh.ntet; ++t) cell_of[mesh.file_cell ? mesh.file_cell[t] : t] = t;
+  for (uint32_t t = 0; t < mesh.info.ntet; ++t) cell_of[mesh.info.file_cell ? mesh.info.file_cell[t] : t] = t;
   std::vector<uint8_t> seen(nfile, 0);
-  std::vector<double> out(size_t(mesh.ntet) * w), row(size_t{w} + has_cell);
+  std::vector<double> out(size_t(mesh.info.ntet) * w), row(size_t{w} + has_cell);
   uint32_t next = 0;
   while (table.next(row.data())) {
     const size_t line = table.line();

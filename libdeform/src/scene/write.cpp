@@ -11,6 +11,7 @@
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
 #include "mesh/mesh.h"
+#include "plugin/context.h"
 #include "plugin/shared_object.h"
 #include "scene/keys.h"
 #include "scene/node.h"
@@ -508,7 +509,7 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
   if (whole.extension() != ".json" || whole.stem().empty())
     fail(DFM_E_ARG, "%s: the name of a scene file must end in .json", path.c_str());
   SceneWriter to{w, path, options, notes};
-  for (const std::string &key : scene::Types(w.context).model_keys()) to.model_keys.insert(key);
+  for (const std::string &key : scene::model_keys(w.context->registry)) to.model_keys.insert(key);
   AtomicFile scene(path);  // what cannot be written is found out first
   std::string text;
   print(write_root(to), "", text);
