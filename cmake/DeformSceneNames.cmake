@@ -1,5 +1,5 @@
-# The names of a scene's keys and words are those of the schema. Makes rows {"OBJECT", "key key .."} and
-# {"SET", "word word .."} for scene/keys.cpp, with a "-" before what the schema says is not available yet.
+# The names of a scene's keys and words are those of the schema. Makes rows {"OBJECT", {{"key", true}, ..}},
+# and {"SET", {{"word", true}, ..}}, for scene/keys.cpp; false: the schema says that it is not available yet.
 function(deform_scene_names schema)
   string(JSON defs GET "${schema}" $defs)
   string(JSON last LENGTH "${defs}")
@@ -25,14 +25,15 @@ function(deform_scene_names schema)
           string(JSON said ERROR_VARIABLE none GET "${names}" ${name} description)
           string(REGEX MATCH "^not available yet" missing "${said}")
         endif()
+        set(delivered true)
         if(missing)
-          string(PREPEND name "-")
+          set(delivered false)
         endif()
-        list(APPEND row ${name})
+        list(APPEND row "{\"${name}\", ${delivered}}")
       endforeach()
-      list(JOIN row " " row)
+      list(JOIN row ", " row)
       string(REGEX REPLACE "_word$" "" kind ${kind})
-      string(APPEND rows_${list} "    {\"${kind}\", \"${row}\"},\n")
+      string(APPEND rows_${list} "    {\"${kind}\", {${row}}},\n")
     endforeach()
   endforeach()
   set(SCENE_OBJECTS "${rows_properties}" PARENT_SCOPE)
