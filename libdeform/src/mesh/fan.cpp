@@ -61,8 +61,7 @@ RestMesh fan_surface(const RestMesh &surface) {
   if (info.npiece != 1)
     fail(DFM_E_UNSUPPORTED,
          "the surface has %u separate pieces; without cells of a lattice (\"cells\": 0) it must be one: make "
-         "a "
-         "body of each, or ask for cells",
+         "a body of each, or ask for cells",
          info.npiece);
   const auto at = [&](uint32_t i) { return load3(&surface.points[3 * size_t(i)]); };
   const Vec3 origin = at(0);

@@ -203,8 +203,7 @@ std::string SceneWriter::material(const Material &m) {
   if (second)
     note(
         "there have been two materials '%s', one of which is destroyed; the scene has the second one without "
-        "a "
-        "name, so that rules for \"material=%s\" do not mean it",
+        "a name, so that rules for \"material=%s\" do not mean it",
         m.name.c_str(), m.name.c_str());
   std::string key = m.name.empty() ? "unnamed" : m.name;
   for (int i = 2; taken(key); ++i) key = (m.name.empty() ? "unnamed" : m.name) + format(" %d", i);
