@@ -133,8 +133,7 @@ void print_cuts(const JsonValue &plan) {
     if (each_step)
       std::printf(
           "  %-20s  a step that cuts or tears rebuilds the body of %s cells; any other step checks each of "
-          "them "
-          "once\n",
+          "them once\n",
           "", b.get("cells").c_str());
   }
 }

@@ -448,8 +448,7 @@ void print_undamped(const SceneFile &scene) {
         if (damping->scalar(key) > 0) return;
   std::printf(
       "no material has damping, so bodies may swing for long: \"damping\": {\"mass\": 1, \"stiffness\": "
-      "0.001} "
-      "in a material, for example, lets them come to rest\n");
+      "0.001} in a material, for example, lets them come to rest\n");
 }
 
 void print_stream(const SceneFile &scene, const RtpSender::Report &sent) {

@@ -71,8 +71,7 @@ std::string planned_sentence(const std::string &json) {
   JsonValue plan;
   if (json.empty() || !parse_json(json, plan) || plan.get("meets") == "true") return "";
   return "planner: " + plan.get("missed") +
-         "; the nearest choice is simulated (see: deform explain; deform cost "
-         "measures)";
+         "; the nearest choice is simulated (see: deform explain; deform cost measures)";
 }
 
 }  // namespace cli

@@ -104,7 +104,7 @@ TEST(SceneErrors, UnknownKeys_NameTheNearest) {
          {"/bodies/0/pose/positon=[0,0,0]", {"/bodies/0/pose/positon", "position"}},
          {"/materials/gel/yuong=1", {"/materials/gel/yuong", "young"}},
          {"/time/zzzzzzzz=1",
-          {"/time/zzzzzzzz", "expected one of: start, duration, step, integrator, max_time, max_work, mode"}},
+          {"/time/zzzzzzzz", "expected one of: duration, integrator, max_time, max_work, mode, start, step"}},
          {"/bodies/0/model/params/volum=1", {"/bodies/0/model/params/volum", "volume"}},
          {"/contact/friction/0/params/mu_X=1", {"/contact/friction/0/params/mu_X", "mu_"}},
          {"/obstacles/0/radius=1", {"/obstacles/0/radius", "the shape plane has no \"radius\""}},
@@ -127,7 +127,7 @@ TEST(SceneErrors, StepThatNeedsTooManySubSteps_IsRefusedBeforeTheRun) {
 TEST(SceneErrors, WrongTypes_NameWhatWasExpected) {
   check({{"/gravity=5", {"/gravity", "expected [x, y, z] in m/s2 or an object with keyframes"}},
          {"/bodies/0/model=msm",
-          {"/model", "expected an object with type, params, precision",
+          {"/model", "expected an object with params, precision, type",
            "found string \"msm\"; write {\"type\": \"msm\"}"}},
          {"/contact/friction=0.5", {"/contact/friction", "\"law\": \"coulomb\"", "found number 0.5"}},
          {"/gravity=[0,0]", {"/gravity", "three numbers"}},

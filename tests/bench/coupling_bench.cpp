@@ -13,7 +13,7 @@ using namespace dfm;
 enum Kind { kBarycentric, kMls, kThesis };
 
 struct Coupled {
-  TetMesh cells = make_ball(Memory::standard(), 1, 1500);
+  RestMesh cells = make_ball(Memory::standard(), 1, 1500);
   Surface surface;
   Array<double> x, v, f;
   std::vector<double> load;

@@ -34,7 +34,7 @@ Coupling couple(int kind, const CouplingInput &in) {
 }
 
 struct Study {
-  TetMesh cells = make_ball(Memory::standard(), kRadius, 400);
+  RestMesh cells = make_ball(Memory::standard(), kRadius, 400);
   test::Mesh fine = test::sphere_mesh(0.95 * kRadius, 5);
   CouplingInput in;
   Study() {
@@ -177,7 +177,7 @@ double tip(int kind, double support) {
   o.surface = &surface;
   const dfm_body b = test::make_body(context, w, "beam", size, 500, o);
   // the same that the body was made from
-  const TetMesh cells = make_beam(Memory::standard(), size[0], size[1], size[2], 500);
+  const RestMesh cells = make_beam(Memory::standard(), size[0], size[1], size[2], 500);
   const uint32_t n = cells.npoint();
   const double *const x = cells.points.data();
   CouplingInput in;

@@ -9,7 +9,6 @@
 #include "body/obstacle_mesh.h"
 #include "geometry/voxel_grid.h"
 #include "mesh/mesh.h"
-#include "mesh/tri_mesh.h"
 #include "support.h"
 
 namespace {
@@ -21,7 +20,8 @@ constexpr double kStep = 0.25e-3, kRadius = 0.02, kSqueeze = 0.4e-3;
 
 // Axis along y through the origin, radius kRadius.
 test::Mesh fine_cylinder() {
-  const TetMesh tets = read_tet_mesh(Memory::standard(), test::mesh_dir() + "/thesis/cyl_fine.msh");
+  const RestMesh tets =
+      read_mesh(Memory::standard(), test::mesh_dir() + "/thesis/cyl_fine.msh", DFM_MESH_CELLS);
   const Array<uint32_t> tri = boundary_triangles(tets.tets);
   test::Mesh m;
   m.x.assign(tets.points.begin(), tets.points.end());
@@ -245,8 +245,8 @@ BENCHMARK(voxel_build)->Arg(32768)->Arg(262144)->Iterations(2)->Unit(benchmark::
 // Error of the grid at 100,000 places of the folded basin's surface, where the true distance is zero; time is
 // that of building.
 void voxel_error(benchmark::State &state) {
-  const TriMesh m =
-      read_tri_mesh(Memory::standard(), std::string(DEFORM_SOURCE_DIR) + "/examples/data/basin.obj");
+  const RestMesh m = read_mesh(Memory::standard(),
+                               std::string(DEFORM_SOURCE_DIR) + "/examples/data/basin.obj", DFM_MESH_SURFACE);
   const auto corner = [&](uint32_t t, int k) {
     return load3(&m.points[3 * size_t{m.tris[3 * size_t{t} + size_t(k)]}]);
   };

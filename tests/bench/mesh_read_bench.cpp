@@ -33,13 +33,13 @@ int main(int argc, char **argv) {
     if (std::strcmp(argv[k], "--csv") == 0) csv = argv[k + 1];
   }
   constexpr int kRuns = 3;
-  const dfm::TetMesh beam = dfm::make_beam(dfm::Memory::standard(), 2, 1, 1, cells);
+  const dfm::RestMesh beam = dfm::make_beam(dfm::Memory::standard(), 2, 1, 1, cells);
   const std::string folder = test::scratch("mesh_read_bench");
   std::printf("%-10s %10s %8s %10s %10s %12s %12s\n", "format", "cells", "MB", "parse s", "whole s",
               "peak B/cell", "held B/cell");
   for (const char *name : {"a.msh", "a.msh2", "a.vtk", "a.vtu", "a.mesh"}) {
     const std::string path = folder + "/" + name;
-    dfm::write_tet_mesh(beam, path);
+    dfm::write_mesh(beam, path);
     double parse = std::numeric_limits<double>::max(), whole = parse;
     size_t peak = 0, held = 0;
     for (int run = 0; run < kRuns; ++run) {
@@ -47,7 +47,7 @@ int main(int argc, char **argv) {
       test::CountedMemory memory;
       dfm::RawMesh raw = dfm::read_raw(memory.hooks, path);
       parse = std::min(parse, cpu_seconds() - before);
-      const dfm::TetMesh mesh = dfm::finish_mesh(path, std::move(raw));
+      const dfm::RestMesh mesh = dfm::finish_mesh(path, std::move(raw));
       whole = std::min(whole, cpu_seconds() - before);
       peak = memory.peak;
       held = memory.held;

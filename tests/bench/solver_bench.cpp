@@ -141,7 +141,7 @@ int main(int argc, char **argv) {
     if (!std::strcmp(argv[n], "--solver")) names.push_back(argv[n + 1]);
   }
   for (const uint32_t cells : sizes) {
-    const dfm::TetMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
+    const dfm::RestMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
     for (const double h : steps) {
       test::BlockSystem system = test::elastic_system(mesh, 1e5, 0.3, h);
       std::vector<uint8_t> mask(system.n, 0);

@@ -57,10 +57,10 @@ extern "C" int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size) {
     if (raw.tets.size() != 4 * raw.tet_group.size() || raw.tris.size() != 3 * raw.tri_group.size())
       std::abort();
     if (raw.tets.empty()) {
-      const dfm::TriMesh mesh = dfm::finish_surface("fuzz", std::move(raw));
+      const dfm::RestMesh mesh = dfm::finish_surface("fuzz", std::move(raw));
       check(mesh, mesh.tris, mesh.tri_group);
     } else {
-      const dfm::TetMesh mesh = dfm::finish_mesh("fuzz", std::move(raw));
+      const dfm::RestMesh mesh = dfm::finish_mesh("fuzz", std::move(raw));
       check(mesh, mesh.tets, mesh.tet_group);
       check(mesh, mesh.tris, mesh.tri_group);
     }

@@ -27,11 +27,6 @@ dfm::scene::BodyMesh block() {  // as a scene's reader has it
   dfm::scene::BodyMesh out;
   if (dfm_mesh_get_info(mesh, &info) != DFM_OK) std::abort();
   out.points.assign(info.points, info.points + 3 * size_t{info.npoint});
-  out.tets = info.tets;
-  out.file_point = info.file_point;
-  out.file_cell = info.file_cell;
-  out.npoint = info.npoint;
-  out.ntet = info.ntet;
   out.info = info;
   return out;
 }

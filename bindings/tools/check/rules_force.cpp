@@ -86,8 +86,7 @@ std::string turns_with_frame(const Subject &subject) {
         if (!(error <= 1e-12))
           broken(
               "the same history turned by %u degrees%s gives (%.6g, %.6g) N instead of (%.6g, %.6g) N (off "
-              "by "
-              "%.2g of it); %s",
+              "by %.2g of it); %s",
               i, by_host ? ", its state by the host," : "", b.out_ft[i], b.out_ft[b.stride + i], ex, ey,
               error,
               by_host ? "give pairs of its state that point along the slip the kind DFM_SLOT_TANGENT"

@@ -310,8 +310,7 @@ class FencedBody {
         if (f[size_t(body_.stride) * i + a] != kPadding)
           broken(
               "at stride %u add_forces writes number %u of point %u, which lies between two points; add "
-              "three "
-              "numbers for each point",
+              "three numbers for each point",
               body_.stride, a, i);
   }
   Body &body_;

@@ -190,8 +190,7 @@ void evaluate_fenced(const Law &law, Lanes &lanes, Fenced::Place place) {
   if (!trouble.empty())
     broken(
         "in a batch of %u contacts (stride %u) eval %s; loop to in->n, step columns by in->stride, and "
-        "declare "
-        "the inputs (needs), parameters and state slots that it uses",
+        "declare the inputs (needs), parameters and state slots that it uses",
         lanes.n, lanes.stride, trouble.c_str());
   if (status != DFM_OK)
     broken("eval returns %s for finite input; return finite values for every finite input",

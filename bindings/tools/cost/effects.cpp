@@ -213,8 +213,7 @@ std::vector<EffectCost> measure_effects(Globals &globals, SceneFile &scene,
   std::vector<EffectCost> out;
   if (scene.value("/time/mode") == "\"static\"")
     throw Failure(kBadInput,
-                  "--costs measures steps, and a scene in static mode has none; set /time/mode to "
-                  "dynamic");
+                  "--costs measures steps, and a scene in static mode has none; set /time/mode to dynamic");
   const Patience patience(!globals.quiet && !globals.json, "measuring effects");
   const Quiet quiet(globals);
   Meter meter(globals, scene, set);

@@ -112,8 +112,7 @@ std::string pictures(const Study &study) {
 std::string separated(const Study &study) {
   std::string out =
       "<h2>One change at a time</h2>\n<p>From the scene as it is; each axis against its own finest choice, "
-      "so that errors "
-      "of time, space, model and contact do not mix.</p>\n";
+      "so that errors of time, space, model and contact do not mix.</p>\n";
   for (const Separated &part : study.separated) {
     out += "<h3>" + part.axis + "</h3>\n<p>against " + escaped(study.rows[part.anchor].job.label) +
            "</p>\n<table><tr><th>difference</th><th>" + study.cost_unit + "</th><th>choice</th></tr>\n";

@@ -335,8 +335,7 @@ class Student {
     }
     char text[200];
     std::snprintf(text, sizeof text,
-                  ": no run%s came to its end within the budget of %.3g s; take --budget "
-                  "%.0f or more",
+                  ": no run%s came to its end within the budget of %.3g s; take --budget %.0f or more",
                   any ? " that can be the reference (explicit time, in which contacts rebound)" : "",
                   out_.options.budget, std::ceil(least));
     throw Failure(kBadInput, s_.path + text);

@@ -348,8 +348,7 @@ class Maker {
              " its voxels do; give more cells by --cells or in the table");
       if (l.cells == 0)
         warn(describe(table_.entries[e]) +
-             " is smaller than a cell and has none; give more cells by --cells or in "
-             "the table");
+             " is smaller than a cell and has none; give more cells by --cells or in the table");
     }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, cells, of_cell);
     return info.edge_median;

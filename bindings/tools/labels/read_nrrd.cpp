@@ -255,8 +255,7 @@ class Reader : private HeaderLines {
       else if (sizes_[k] != 1)
         refuse(path_,
                "axis %zu has %lld values per voxel; overlapping segments have one layer each: export them as "
-               "one "
-               "label map of 3 axes",
+               "one label map of 3 axes",
                k, static_cast<long long>(sizes_[k]));
     }
     if (axes.size() != 3) refuse(path_, "the volume has %zu axes of space; a label map has 3", axes.size());

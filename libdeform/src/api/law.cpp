@@ -290,11 +290,6 @@ dfm_status dfm_law_pack(dfm_law law, const dfm_params *params, uint32_t capacity
     const Law &l = law_at(law);
     const std::vector<double> packed = pack_params(
         l.type, params ? std::span(params->values, params->n) : std::span<const dfm_param_value>());
-    if (n) *n = static_cast<uint32_t>(packed.size());
-    if (!values && capacity == 0) return;
-    if (!values || capacity < packed.size())
-      fail(DFM_E_ARG, "dfm_law_pack: %s has %zu values, room for %u is given", l.type.id, packed.size(),
-           values ? capacity : 0);
-    std::copy(packed.begin(), packed.end(), values);
+    copy_list(packed, capacity, values, n);
   });
 }

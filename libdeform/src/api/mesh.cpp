@@ -18,50 +18,41 @@ template <class T>
 const T *lent(const Array<T> &values) {
   return values.empty() ? nullptr : values.data();
 }
-void lend_cells(const TetMesh &mesh, dfm_mesh_info &out) {
-  out.tets = mesh.tets.data();
-  out.cells = lent(mesh.cells);
-  out.cell_group = lent(mesh.tet_group);
-  out.file_cell = lent(mesh.file_cell);
-  out.share = lent(mesh.share);
-  out.inside = lent(mesh.inside);
-}
-void lend_cells(const TriMesh &, dfm_mesh_info &) {}
 
 // A mesh behind its handle, with what dfm_mesh_info lends out.
 struct MeshObject {
   dfm_context &context;
-  AnyMesh mesh;
+  RestMesh mesh;
   dfm_mesh_info info;
   std::string warnings;
   std::vector<const char *> names;
   std::vector<uint32_t> dimension, npoint;
   std::vector<const uint32_t *> points;
 
-  MeshObject(dfm_context &c, AnyMesh &&m) : context(c), mesh(std::move(m)) {
-    std::visit([this](const auto &known) { describe(known); }, mesh);
-  }
-  template <class Mesh>
-  void describe(const Mesh &known) {
-    for (const std::string &w : known.warnings) warnings += w + "\n";
-    for (const MeshGroup &g : known.groups) {
+  MeshObject(dfm_context &c, RestMesh &&m) : context(c), mesh(std::move(m)), info(mesh_statistics(mesh)) {
+    for (const std::string &w : mesh.warnings) warnings += w + "\n";
+    for (const MeshGroup &g : mesh.groups) {
       names.push_back(g.name.c_str());
       dimension.push_back(static_cast<uint32_t>(g.dimension));
       npoint.push_back(static_cast<uint32_t>(g.points.size()));
       points.push_back(g.points.data());
     }
-    info = mesh_statistics(known);
     info.warnings = warnings.c_str();
-    info.points = known.points.data();
-    info.file_point = known.file_point.data();
-    info.nface = static_cast<uint32_t>(known.tris.size() / 3);
-    info.faces = lent(known.tris);
-    info.face_group = lent(known.tri_group);
+    info.points = mesh.points.data();
+    info.file_point = mesh.file_point.data();
+    info.nface = mesh.ntri();
+    info.faces = lent(mesh.tris);
+    info.face_group = lent(mesh.tri_group);
     info.group_names = names.data();
     info.group_dimension = dimension.data();
     info.group_npoint = npoint.data();
     info.group_points = points.data();
-    lend_cells(known, info);
+    info.tets = lent(mesh.tets);
+    info.cells = lent(mesh.cells);
+    info.cell_group = lent(mesh.tet_group);
+    info.file_cell = lent(mesh.file_cell);
+    info.share = lent(mesh.share);
+    info.inside = lent(mesh.inside);
   }
 };
 
@@ -69,15 +60,15 @@ MeshObject &mesh_of(dfm_mesh_handle handle) {
   MeshObject &object = resolve<MeshObject>(Kind::mesh, handle);
   return held(object, object.context);
 }
-const TetMesh &cells_of(const MeshObject &object, dfm_mesh_handle handle) {
-  if (const TetMesh *const cells = std::get_if<TetMesh>(&object.mesh)) return *cells;
+const RestMesh &cells_of(const MeshObject &object, dfm_mesh_handle handle) {
+  if (!object.mesh.tets.empty()) return object.mesh;
   fail(DFM_E_HANDLE,
        "mesh handle 0x%llx is that of a surface mesh; pass the handle of a mesh with cells, as dfm_mesh_fill "
        "makes it of a surface",
        static_cast<unsigned long long>(handle));
 }
-const TriMesh &surface_of(const MeshObject &object, dfm_mesh_handle handle) {
-  if (const TriMesh *const surface = std::get_if<TriMesh>(&object.mesh)) return *surface;
+const RestMesh &surface_of(const MeshObject &object, dfm_mesh_handle handle) {
+  if (object.mesh.tets.empty()) return object.mesh;
   fail(DFM_E_HANDLE,
        "mesh handle 0x%llx is that of a mesh with cells; pass the handle of a surface mesh, as dfm_mesh_load "
        "and dfm_mesh_make give with DFM_MESH_SURFACE",
@@ -90,15 +81,14 @@ void end_mesh(uint64_t handle) {
   delete object;
 }
 // Moves a mesh into a context. from: logs its warnings with this before each.
-void keep(dfm_context &context, AnyMesh &&mesh, dfm_mesh_handle *out, const char *from = nullptr) {
+void keep(dfm_context &context, RestMesh &&mesh, dfm_mesh_handle *out, const char *from = nullptr) {
   if (from)
-    for (const std::string &w : std::visit([](const auto &m) -> const auto & { return m.warnings; }, mesh))
-      context.logf(DFM_LOG_WARNING, "%s: %s", from, w.c_str());
+    for (const std::string &w : mesh.warnings) context.logf(DFM_LOG_WARNING, "%s: %s", from, w.c_str());
   *out = keep_live(context, Kind::mesh, std::make_unique<MeshObject>(context, std::move(mesh)), end_mesh);
 }
 
 // "About" so many cells are asked for; who gets others by more than a quarter is told.
-void warn_cell_count(TetMesh &mesh, const char *kind, uint32_t requested) {
+void warn_cell_count(RestMesh &mesh, const char *kind, uint32_t requested) {
   constexpr double kAbout = 1.25;
   const CellKind &of = cell_kind(mesh.cell);
   const double made = double(mesh.ntet() / of.tets);
@@ -108,7 +98,7 @@ void warn_cell_count(TetMesh &mesh, const char *kind, uint32_t requested) {
                "well-shaped cells nearer to that",
                made, of.name, requested, kind));
 }
-TetMesh generate_cells(const Memory &memory, const std::string &kind, const double size[3], uint32_t n) {
+RestMesh generate_cells(const Memory &memory, const std::string &kind, const double size[3], uint32_t n) {
   if (kind == "cylinder") return make_cylinder(memory, size[0], size[1], n);
   if (kind == "beam") return make_beam(memory, size[0], size[1], size[2], n);
   if (kind == "bricks") return make_bricks(memory, size[0], size[1], size[2], n);
@@ -116,7 +106,7 @@ TetMesh generate_cells(const Memory &memory, const std::string &kind, const doub
   if (kind == "tube") return make_tube(memory, size[0], size[1], size[2], n);
   fail(DFM_E_ARG, "no generator is called '%s'; expected cylinder, beam, bricks, ball or tube", kind.c_str());
 }
-TriMesh generate_surface(const Memory &memory, const std::string &kind, const double size[3], uint32_t n) {
+RestMesh generate_surface(const Memory &memory, const std::string &kind, const double size[3], uint32_t n) {
   if (kind == "cylinder") return make_cylinder_surface(memory, size[0], size[1], n);
   if (kind == "beam") return make_beam_surface(memory, size[0], size[1], size[2], n);
   if (kind == "ball") return make_ball_surface(memory, size[0], n);
@@ -150,7 +140,7 @@ dfm_status dfm_mesh_make(dfm_context *context, const char *kind, const double si
       return keep(*context, generate_surface(context->memory, kind, size, n), out);
     if (what != DFM_MESH_CELLS)
       fail(DFM_E_ARG, "'%s': what is %u; expected DFM_MESH_CELLS or DFM_MESH_SURFACE", kind, what);
-    TetMesh mesh = generate_cells(context->memory, kind, size, n);
+    RestMesh mesh = generate_cells(context->memory, kind, size, n);
     warn_cell_count(mesh, kind, n);
     keep(*context, std::move(mesh), out);
   });
@@ -191,8 +181,7 @@ dfm_status dfm_mesh_write(dfm_mesh_handle mesh, const char *path) {
   return as_status([&] {
     need(path, "path");
     const MeshObject &object = mesh_of(mesh);
-    if (const TriMesh *const surface = std::get_if<TriMesh>(&object.mesh)) write_tri_mesh(*surface, path);
-    else if (!write_tet_mesh(std::get<TetMesh>(object.mesh), path))
+    if (!write_mesh(object.mesh, path))
       object.context.logf(
           DFM_LOG_WARNING,
           "%s does not keep how much of each cell is material: a body of this file counts every cell "
@@ -213,7 +202,7 @@ dfm_status dfm_mesh_fill(dfm_mesh_handle surface, uint32_t cells, dfm_mesh_handl
   return as_status([&] {
     need(out, "out");
     const MeshObject &object = mesh_of(surface);
-    const TriMesh &shell = surface_of(object, surface);
+    const RestMesh &shell = surface_of(object, surface);
     keep(object.context, cells ? fill_surface(shell, cells) : fan_surface(shell), out, "filling a surface");
   });
 }

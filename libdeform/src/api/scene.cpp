@@ -75,12 +75,7 @@ dfm_status dfm_scene_value(dfm_scene scene, const char *pointer, char *text, siz
   return as_status([&] {
     if (!pointer || !bytes) fail(DFM_E_ARG, "dfm_scene_value: %s is NULL", pointer ? "bytes" : "pointer");
     const std::string value = scene_of(scene).value(pointer);
-    const size_t capacity = *bytes;
-    *bytes = value.size() + 1;
-    if (!text) return;
-    if (capacity < value.size() + 1)
-      fail(DFM_E_ARG, "dfm_scene_value: the text needs %zu bytes, %zu given", value.size() + 1, capacity);
-    std::memcpy(text, value.c_str(), value.size() + 1);
+    copy_bytes(value.c_str(), value.size() + 1, text, bytes);
   });
 }
 

@@ -22,8 +22,7 @@ void refuse_unknown(const T *given) {
     if (bytes[i])
       fail(DFM_E_UNSUPPORTED,
            "a def has %u bytes, of which this library (%d.%d.%d) knows %zu, and byte %zu is set: the program "
-           "was "
-           "compiled for a newer library; run it with that one, or leave the def's newer members zero",
+           "was compiled for a newer library; run it with that one, or leave the def's newer members zero",
            given->size, DFM_VERSION_MAJOR, DFM_VERSION_MINOR, DFM_VERSION_PATCH, sizeof(T), i);
 }
 

@@ -123,8 +123,7 @@ void carry_state(const BodyShape &before, const CutMesh &mesh, const std::vector
   };
   if (!std::equal(old.slots.begin(), old.slots.end(), now.slots.begin(), now.slots.end(), same))
     fail(DFM_E_FATAL,
-         "body '%s': model '%s' has another state for the cells that are left; report it to its "
-         "author",
+         "body '%s': model '%s' has another state for the cells that are left; report it to its author",
          b.name.c_str(), now.type->id);
   size_t from = 0, to = 0;
   for (const dfm_slot &slot : now.slots) {

@@ -132,13 +132,13 @@ void each_inside(const double *points, size_t stride, const uint32_t *cell, cons
   }
 }
 
-Array<uint32_t> TetMesh::cell_groups() const {
+Array<uint32_t> RestMesh::cell_groups() const {
   Array<uint32_t> out{HookAllocator<uint32_t>(*memory)};
   for (size_t t = 0; t < tet_group.size(); t += cell_kind(cell).tets) out.push_back(tet_group[t]);
   return out;
 }
 
-TetMesh second_order(const TetMesh &mesh) {
+RestMesh second_order(const RestMesh &mesh) {
   if (mesh.cell != DFM_CELL_TET)
     fail(DFM_E_UNSUPPORTED, "only first-order tetrahedra become second-order ones; these cells are %s",
          cell_kind(mesh.cell).name);
@@ -148,7 +148,7 @@ TetMesh second_order(const TetMesh &mesh) {
          "the shape instead");
   const Memory &memory = *mesh.memory;
   const CellKind &kind = cell_kind(DFM_CELL_TET10);
-  TetMesh out(memory);
+  RestMesh out(memory);
   out.cell = kind.kind;
   out.points = mesh.points;
   out.groups = mesh.groups;

@@ -45,7 +45,7 @@ void each_inside(const double *points, size_t stride, const uint32_t *cell, cons
                  const std::function<void(double volume, Vec3 place)> &use);
 
 // The same shape by second-order tetrahedra whose edges are straight.
-TetMesh second_order(const TetMesh &mesh);
+RestMesh second_order(const RestMesh &mesh);
 
 // Other order of nodes in an MSH file: place of each of ours.
 inline constexpr uint32_t kMshTet10[10] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};

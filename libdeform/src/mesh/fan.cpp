@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "math/vec3.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 namespace {
@@ -44,7 +44,7 @@ bool find_eye(const std::vector<Plane> &planes, double least, Vec3 &eye) {
 
 }  // namespace
 
-TetMesh fan_surface(const TriMesh &surface) {
+RestMesh fan_surface(const RestMesh &surface) {
   const dfm_mesh_info info = mesh_statistics(surface);
   if (!info.closed)
     fail(
@@ -61,8 +61,7 @@ TetMesh fan_surface(const TriMesh &surface) {
   if (info.npiece != 1)
     fail(DFM_E_UNSUPPORTED,
          "the surface has %u separate pieces; without cells of a lattice (\"cells\": 0) it must be one: make "
-         "a "
-         "body of each, or ask for cells",
+         "a body of each, or ask for cells",
          info.npiece);
   const auto at = [&](uint32_t i) { return load3(&surface.points[3 * size_t(i)]); };
   const Vec3 origin = at(0);
@@ -84,7 +83,7 @@ TetMesh fan_surface(const TriMesh &surface) {
         "cells of a lattice",
         surface.ntri());
 
-  TetMesh out(*surface.memory);
+  RestMesh out(*surface.memory);
   const uint32_t n = surface.npoint(), middle = 2 * n;
   out.points.assign(surface.points.begin(), surface.points.end());
   for (uint32_t i = 0; i <= n; ++i) {

@@ -19,7 +19,7 @@
 #include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "mesh/fill_lattice.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 namespace {
@@ -271,7 +271,7 @@ double raise_to_floor(const Memory &memory, Filling &f) {
 
 // ---- sentences --------------------------------------------------------------------------------------------
 
-void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) {
+void refuse_unfit(const RestMesh &surface, const FillSurface &s, uint32_t cells) {
   if (cells < 1 || cells > kMaxCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMaxCells);
   if (surface.ntri() == 0) fail(DFM_E_FORMAT, "the surface has no triangles; there is nothing to fill");
   if (!(s.area > 0)) fail(DFM_E_FORMAT, "the surface has no area; there is nothing to fill");
@@ -298,7 +298,7 @@ void refuse_unfit(const TriMesh &surface, const FillSurface &s, uint32_t cells) 
 }
 
 void warn_filling(const FillSurface &s, const Filling &f, double half_pitch, uint32_t cells,
-                  bool volume_matched, double sampled, uint32_t empty, double thin, TetMesh &out) {
+                  bool volume_matched, double sampled, uint32_t empty, double thin, RestMesh &out) {
   const double cube = s.size * s.size * s.size, unit = kLatticeCell * half_pitch * half_pitch * half_pitch;
   if (!s.closed)
     out.warnings.push_back(
@@ -328,7 +328,7 @@ void warn_filling(const FillSurface &s, const Filling &f, double half_pitch, uin
 
 }  // namespace
 
-TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
+RestMesh fill_surface(const RestMesh &surface, uint32_t cells) {
   const FillSurface s(surface);
   refuse_unfit(surface, s, cells);
   need_memory(kBytesPerCell * uint64_t(cells), format("filling a surface with %u cells", cells).c_str());
@@ -348,7 +348,7 @@ TetMesh fill_surface(const TriMesh &surface, uint32_t cells) {
          surface.ntri(), s.size);
   const double thin = raise_to_floor(s.memory, f);
 
-  TetMesh out(s.memory);
+  RestMesh out(s.memory);
   const double length = half_pitch * s.size;
   out.points.reserve(3 * f.sites.size());
   for (const Site site : f.sites) {

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDecided = 0.25;  // a winding number farther than this from 1/2 is decided
 
-Vec3 middle_of(const TriMesh &surface, double *size, double *reach) {
+Vec3 middle_of(const RestMesh &surface, double *size, double *reach) {
   Extent box;
   for (const uint32_t p : surface.tris) box.add(load3(&surface.points[3 * size_t{p}]));
   const Vec3 lo = box.lo, hi = box.hi;
@@ -33,7 +33,7 @@ Vec3 middle_of(const TriMesh &surface, double *size, double *reach) {
   return {lo[0] + 0.5 * (hi[0] - lo[0]), lo[1] + 0.5 * (hi[1] - lo[1]), lo[2] + 0.5 * (hi[2] - lo[2])};
 }
 
-Array<double> local_points(const TriMesh &surface, Vec3 middle, double size) {
+Array<double> local_points(const RestMesh &surface, Vec3 middle, double size) {
   Array<double> out{HookAllocator<double>(*surface.memory)};
   out.reserve(surface.points.size());
   for (size_t i = 0; i < surface.points.size(); ++i)
@@ -127,7 +127,7 @@ class PieceTest {
 
 }  // namespace
 
-FillSurface::FillSurface(const TriMesh &surface)
+FillSurface::FillSurface(const RestMesh &surface)
     : memory(*surface.memory),
       middle(middle_of(surface, &size, &resolution)),
       points(local_points(surface, middle, size)),

@@ -9,7 +9,7 @@
 #include <functional>
 
 #include "geometry/winding.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 
@@ -60,7 +60,7 @@ enum class LatticeCell : uint8_t { outside, inside, crossed, mixed };
 
 // Surface in a frame of its own: about the middle of its box, in lengths of the box.
 struct FillSurface {
-  explicit FillSurface(const TriMesh &surface);
+  explicit FillSurface(const RestMesh &surface);
   const Memory &memory;
   // diagonal of the box, m; rounding of a coordinate, in box lengths
   double size = 0, resolution = 0;

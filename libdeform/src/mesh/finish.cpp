@@ -57,16 +57,16 @@ void refuse_flat(const std::string &path, const RawMesh &raw) {
        path.c_str(), flat, ntet, flat == 1 ? "is" : "are", first, c[0], c[1], c[2], c[3]);
 }
 
-void turn_negative(RawMesh &raw, TetMesh &mesh) {
+void turn_negative(RawMesh &raw) {
   for (size_t t = 0; t < raw.tets.size(); t += 4)
     if (tet_volume(raw.points.data(), &raw.tets[t]) < 0) {
       std::swap(raw.tets[t + 2], raw.tets[t + 3]);
-      ++mesh.turned;
+      ++raw.turned;
     }
 }
 
 // The same for cells of another kind, whose tetrahedra have one orientation each.
-void turn_cells(const std::string &path, RawMesh &raw, TetMesh &mesh) {
+void turn_cells(const std::string &path, RawMesh &raw) {
   const CellKind &kind = cell_kind(raw.cell);
   for (size_t c = 0; c < raw.cells.size() / kind.nodes; ++c) {
     uint32_t *const cell = &raw.cells[kind.nodes * c];
@@ -87,7 +87,7 @@ void turn_cells(const std::string &path, RawMesh &raw, TetMesh &mesh) {
       if (kind.nodes == 8) swap({{0, 4}, {1, 5}, {2, 6}, {3, 7}});
       else swap({{2, 3}, {5, 8}, {6, 7}});
       tets_of(kind, cell, &raw.tets[4 * kind.tets * c]);
-      ++mesh.turned;
+      ++raw.turned;
       count();
     }
     if (n + flat)
@@ -99,39 +99,42 @@ void turn_cells(const std::string &path, RawMesh &raw, TetMesh &mesh) {
 }
 
 // Triangles without a group add nothing to the boundary of the cells.
-void keep_grouped_triangles(const RawMesh &raw, TetMesh &mesh, const Array<uint32_t> &number) {
+void keep_grouped_triangles(RawMesh &raw, const Array<uint32_t> &number) {
+  size_t kept = 0;
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
     const uint32_t *c = &raw.tris[3 * t];
     if (raw.tri_group[t] == kNoGroup || number[c[0]] == kNoGroup || number[c[1]] == kNoGroup ||
         number[c[2]] == kNoGroup)
       continue;
-    mesh.tris.insert(mesh.tris.end(), {number[c[0]], number[c[1]], number[c[2]]});
-    mesh.tri_group.push_back(raw.tri_group[t]);
+    for (size_t k = 0; k < 3; ++k) raw.tris[3 * kept + k] = number[c[k]];
+    raw.tri_group[kept++] = raw.tri_group[t];
   }
-  mesh.tris.shrink_to_fit();
-  mesh.tri_group.shrink_to_fit();
+  raw.tris.resize(3 * kept);
+  raw.tri_group.resize(kept);
+  raw.tris.shrink_to_fit();
+  raw.tri_group.shrink_to_fit();
 }
 
 // Keeps the points that cells use, in the file's order, and fills the groups' points.
-void renumber(RawMesh &raw, TetMesh &mesh) {
+void renumber(RawMesh &raw) {
   const Memory &memory = *raw.memory;
   Array<uint32_t> number(raw.npoint(), kNoGroup, HookAllocator<uint32_t>(memory));
   for (const uint32_t p : raw.tets) number[p] = 0;
   const uint32_t kept = uint32_t(std::count(number.begin(), number.end(), 0u));
-  mesh.dropped_points = raw.npoint() - kept;
-  mesh.file_point.reserve(kept);
+  raw.dropped_points = raw.npoint() - kept;
+  raw.file_point.reserve(kept);
   for (uint32_t p = 0; p < number.size(); ++p)
     if (number[p] == 0) {
-      number[p] = uint32_t(mesh.file_point.size());
-      mesh.file_point.push_back(p);
+      number[p] = uint32_t(raw.file_point.size());
+      raw.file_point.push_back(p);
     }
   for (size_t i = 0; i < kept; ++i)
-    std::copy_n(&raw.points[3 * size_t(mesh.file_point[i])], 3, &raw.points[3 * i]);
+    std::copy_n(&raw.points[3 * size_t(raw.file_point[i])], 3, &raw.points[3 * i]);
   raw.points.resize(3 * size_t(kept));
   raw.points.shrink_to_fit();
   for (uint32_t &p : raw.tets) p = number[p];
   for (uint32_t &p : raw.cells) p = number[p];
-  keep_grouped_triangles(raw, mesh, number);
+  keep_grouped_triangles(raw, number);
 
   for (MeshGroup &group : raw.groups) {
     for (uint32_t &p : group.points) p = number[p];
@@ -146,7 +149,7 @@ void renumber(RawMesh &raw, TetMesh &mesh) {
 }
 
 // Groups by dimension and number, whatever order the file has them in.
-void sort_groups(RawMesh &raw, TetMesh &mesh) {
+void sort_groups(RawMesh &raw) {
   const uint32_t n = uint32_t(raw.groups.size());
   std::vector<uint32_t> order(n), place(n);
   for (uint32_t g = 0; g < n; ++g) order[g] = g;
@@ -163,20 +166,19 @@ void sort_groups(RawMesh &raw, TetMesh &mesh) {
   raw.groups = std::move(sorted);
   for (uint32_t &g : raw.tet_group)
     if (g != kNoGroup) g = place[g];
-  for (uint32_t &g : mesh.tri_group) g = place[g];
+  for (uint32_t &g : raw.tri_group) g = place[g];
 }
 
 // Shares are used only if there is one for each cell, all in (0,1]; otherwise the array means something else.
-void take_shares(RawMesh &raw, TetMesh &mesh) {
-  const bool valid =
-      raw.tet_share.size() == raw.ntet() &&
-      std::all_of(raw.tet_share.begin(), raw.tet_share.end(), [](double s) { return s > 0 && s <= 1; });
-  if (valid) mesh.share = std::move(raw.tet_share);
-  if (raw.cell == DFM_CELL_HEX8 && raw.inside.size() == raw.cells.size() / 8 * kInsidePoints)
-    mesh.inside = std::move(raw.inside);
+void check_shares(RawMesh &raw) {
+  const bool valid = raw.share.size() == raw.ntet() &&
+                     std::ranges::all_of(raw.share, [](double s) { return s > 0 && s <= 1; });
+  if (!valid) use_memory(*raw.memory, raw.share);
+  if (raw.cell != DFM_CELL_HEX8 || raw.inside.size() != raw.cells.size() / 8 * kInsidePoints)
+    use_memory(*raw.memory, raw.inside);
 }
 
-uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
+uint32_t count_overlaps(const RestMesh &mesh, uint32_t *crowded) {
   const Array<TetFace> faces = sorted_faces(*mesh.memory, mesh.ntet(), mesh.tets.data());
   uint32_t same_side = 0;
   *crowded = 0;
@@ -188,7 +190,7 @@ uint32_t count_overlaps(const TetMesh &mesh, uint32_t *crowded) {
   return same_side;
 }
 
-void add_warnings(TetMesh &mesh, uint32_t crowded) {
+void add_warnings(RestMesh &mesh, uint32_t crowded) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const dfm_mesh_info s = mesh_statistics(mesh);
   if (mesh.turned)
@@ -262,11 +264,11 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
   for (uint32_t t = 0; t < ntet; ++t)
     if (!drop[t]) {
       std::copy_n(&raw.tets[4 * size_t(t)], 4, &raw.tets[4 * kept]);
-      if (raw.tet_share.size() == ntet) raw.tet_share[kept] = raw.tet_share[t];
+      if (raw.share.size() == ntet) raw.share[kept] = raw.share[t];
       raw.tet_group[kept++] = raw.tet_group[t];
       if (file_cell) file_cell->push_back(t);
     }
-  if (raw.tet_share.size() == ntet) raw.tet_share.resize(kept);
+  if (raw.share.size() == ntet) raw.share.resize(kept);
   raw.tets.resize(4 * kept);
   raw.tet_group.resize(kept);
   return dropped;
@@ -280,9 +282,7 @@ std::string coarse_coordinates(const double lo[3], const double hi[3], double ed
                 reach, DBL_EPSILON * reach);
 }
 
-TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
-  TetMesh mesh(*raw.memory);
-  mesh.warnings = std::move(raw.warnings);
+RestMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   if (raw.tets.empty() && !raw.tris.empty())
     fail(DFM_E_FORMAT,
          "%s: no tetrahedra in this file, only a surface of %u triangles; fill it, and give it to the body "
@@ -296,27 +296,21 @@ TetMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   check_points(path, raw.points);
   if (raw.cells.empty()) {
     refuse_flat(path, raw);
-    turn_negative(raw, mesh);
+    turn_negative(raw);
   } else {
-    turn_cells(path, raw, mesh);
+    turn_cells(path, raw);
   }
-  mesh.dropped_cells = drop_duplicate_cells(raw, &mesh.file_cell);
-  if (mesh.dropped_cells && !raw.cells.empty())
+  raw.dropped_cells = drop_duplicate_cells(raw, &raw.file_cell);
+  if (raw.dropped_cells && !raw.cells.empty())
     fail(DFM_E_FORMAT, "%s: cells lie on one another; write each of the %s once", path.c_str(),
          cell_kind(raw.cell).name);
-  take_shares(raw, mesh);
-  renumber(raw, mesh);
-  sort_groups(raw, mesh);
-  mesh.points = std::move(raw.points);
-  mesh.cell = raw.cell;
-  mesh.cells = std::move(raw.cells);
-  mesh.tets = std::move(raw.tets);
-  mesh.tet_group = std::move(raw.tet_group);
-  mesh.groups = std::move(raw.groups);
+  check_shares(raw);
+  renumber(raw);
+  sort_groups(raw);
   uint32_t crowded = 0;
-  mesh.overlapping = count_overlaps(mesh, &crowded);
-  add_warnings(mesh, crowded);
-  return mesh;
+  raw.overlapping = count_overlaps(raw, &crowded);
+  add_warnings(raw, crowded);
+  return std::move(raw);
 }
 
 }  // namespace dfm

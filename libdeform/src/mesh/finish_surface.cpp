@@ -12,6 +12,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/error.h"
+#include "deform/plugin.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
 #include "mesh/finish.h"
@@ -210,8 +211,7 @@ uint32_t take_boundary(RawMesh &raw) {
   Array<uint8_t> inner(raw.npoint(), 0, HookAllocator<uint8_t>(*raw.memory));
   for (const uint32_t p : raw.tets) inner[p] = 1;
   for (const uint32_t p : raw.tris) inner[p] = 0;
-  raw.tets.clear();
-  raw.tet_group.clear();
+  use_memory(*raw.memory, raw.cells, raw.tets, raw.tet_group, raw.share, raw.inside);
   return uint32_t(std::count(inner.begin(), inner.end(), 1));
 }
 
@@ -351,25 +351,25 @@ void drop_doubles(RawMesh &raw, Repairs &done) {
 
 // ---- numbers and groups -----------------------------------------------------------------------------------
 
-void renumber(RawMesh &raw, TriMesh &mesh, uint32_t inner) {
+void renumber(RawMesh &raw, uint32_t inner) {
   const uint32_t npoint = raw.npoint();
   Array<uint32_t> number(npoint, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
   for (const uint32_t p : raw.tris) number[p] = 0;
   for (uint32_t p = 0; p < npoint; ++p)
     if (number[p] == 0) {
-      number[p] = uint32_t(mesh.file_point.size());
-      mesh.file_point.push_back(p);
-      mesh.points.insert(mesh.points.end(), &raw.points[3 * size_t(p)], &raw.points[3 * size_t(p)] + 3);
+      number[p] = uint32_t(raw.file_point.size());
+      std::copy_n(&raw.points[3 * size_t(p)], 3, &raw.points[3 * size_t(number[p])]);
+      raw.file_point.push_back(p);
     }
   for (uint32_t &p : raw.tris) p = number[p];
-  mesh.dropped_points = npoint - mesh.merged_points - inner - mesh.npoint();
-  mesh.points.shrink_to_fit();
-  mesh.tris = std::move(raw.tris);
+  raw.points.resize(3 * raw.file_point.size());
+  raw.points.shrink_to_fit();
+  raw.dropped_points = npoint - raw.merged_points - inner - raw.npoint();
 }
 
 // Groups that triangles carry, by number; their points are those of the triangles, not of the
 // file's elements.
-void take_groups(RawMesh &raw, TriMesh &mesh) {
+void sort_groups(RawMesh &raw) {
   std::vector<uint32_t> order, place(raw.groups.size(), kNoGroup);
   for (const uint32_t g : raw.tri_group)
     if (g != kNoGroup && place[g] == kNoGroup) {
@@ -379,24 +379,25 @@ void take_groups(RawMesh &raw, TriMesh &mesh) {
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
     return std::pair(raw.groups[a].tag, a) < std::pair(raw.groups[b].tag, b);
   });
+  std::vector<MeshGroup> groups;
   for (const uint32_t g : order) {
-    place[g] = uint32_t(mesh.groups.size());
-    mesh.groups.push_back(
+    place[g] = uint32_t(groups.size());
+    groups.push_back(
         {raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(HookAllocator<uint32_t>(*raw.memory))});
   }
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
     if (raw.tri_group[t] == kNoGroup) continue;
     raw.tri_group[t] = place[raw.tri_group[t]];
-    Array<uint32_t> &points = mesh.groups[raw.tri_group[t]].points;
-    points.insert(points.end(), &mesh.tris[3 * t], &mesh.tris[3 * t] + 3);
+    Array<uint32_t> &points = groups[raw.tri_group[t]].points;
+    points.insert(points.end(), &raw.tris[3 * t], &raw.tris[3 * t] + 3);
   }
-  for (MeshGroup &group : mesh.groups) sort_once(group.points);
-  mesh.tri_group = std::move(raw.tri_group);
+  for (MeshGroup &group : groups) sort_once(group.points);
+  raw.groups = std::move(groups);
 }
 
 // ---- what was done ----------------------------------------------------------------------------------------
 
-void add_warnings(TriMesh &mesh, const Repairs &done) {
+void add_warnings(RestMesh &mesh, const Repairs &done) {
   const auto warn = [&](const std::string &text) { mesh.warnings.push_back(text); };
   const dfm_mesh_info s = mesh_statistics(mesh);
   add_count(mesh.warnings, done.same, "point", "", "merged with another at exactly the same place");
@@ -425,9 +426,7 @@ void add_warnings(TriMesh &mesh, const Repairs &done) {
 
 }  // namespace
 
-TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
-  TriMesh mesh(*raw.memory);
-  mesh.warnings = std::move(raw.warnings);
+RestMesh finish_surface(const std::string &path, RawMesh &&raw) {
   if (raw.tris.empty() && raw.tets.empty())
     fail(DFM_E_FORMAT,
          "%s: no triangles in this file; a surface needs triangles, or polygons to cut into them",
@@ -438,9 +437,9 @@ TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
   check_points(path, raw.points);
   raw.tri_group.resize(count(raw), kNoGroup);
   Repairs done;
-  mesh.merged_points = merge_points(raw);
-  if (!raw.own_corners) done.same = mesh.merged_points;
-  if (raw.tets.empty()) mesh.merged_points += done.rim = Rims(raw).merge();
+  raw.merged_points = merge_points(raw);
+  if (!raw.own_corners) done.same = raw.merged_points;
+  if (raw.tets.empty()) raw.merged_points += done.rim = Rims(raw).merge();
   const uint32_t inner = raw.tets.empty() ? 0 : take_boundary(raw);
 
   const uint32_t given = count(raw);
@@ -453,12 +452,13 @@ TriMesh finish_surface(const std::string &path, RawMesh &&raw) {
          "%s: all %u triangles are without area or cancel each other; a surface needs triangles with three "
          "corners apart",
          path.c_str(), given);
-  mesh.dropped_tris = given - count(raw);
-  renumber(raw, mesh, inner);
-  take_groups(raw, mesh);
-  mesh.turned = orient_triangles(*raw.memory, mesh.points, mesh.tris, &done.twisted);
-  add_warnings(mesh, done);
-  return mesh;
+  raw.dropped_cells = given - count(raw);
+  renumber(raw, inner);
+  sort_groups(raw);
+  raw.turned = orient_triangles(*raw.memory, raw.points, raw.tris, &done.twisted);
+  raw.cell = DFM_CELL_TET;  // as of every mesh without cells
+  add_warnings(raw, done);
+  return std::move(raw);
 }
 
 }  // namespace dfm

@@ -59,14 +59,14 @@ void check_tube(double inner, double outer, double length) {
          outer);
 }
 
-void add_point(TetMesh &mesh, Vec3 p) { mesh.points.insert(mesh.points.end(), {p.x, p.y, p.z}); }
-void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
+void add_point(RestMesh &mesh, Vec3 p) { mesh.points.insert(mesh.points.end(), {p.x, p.y, p.z}); }
+void add_tet(RestMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d) {
   uint32_t tet[4] = {a, b, c, d};
   if (tet_volume(mesh.points.data(), tet) < 0) std::swap(tet[2], tet[3]);
   mesh.tets.insert(mesh.tets.end(), tet, tet + 4);
 }
 
-TetMesh finished(TetMesh mesh) {
+RestMesh finished(RestMesh mesh) {
   mesh.tet_group.assign(mesh.ntet(), kNoGroup);
   mesh.file_point.resize(mesh.npoint());
   for (uint32_t i = 0; i < mesh.npoint(); ++i) mesh.file_point[i] = i;
@@ -130,7 +130,7 @@ Grid choose_grid(const double size[3], uint32_t cells, double each) {
 
 class BallBuilder {
  public:
-  BallBuilder(TetMesh &mesh, double radius, uint32_t n) : mesh_(mesh), radius_(radius), n_(n) {
+  BallBuilder(RestMesh &mesh, double radius, uint32_t n) : mesh_(mesh), radius_(radius), n_(n) {
     number_edges();
     add_point(mesh_, {});
     for (uint32_t k = 1; k <= n_; ++k) add_layer(k);
@@ -236,7 +236,7 @@ class BallBuilder {
     add_tet(mesh_, axis[0], axis[1], v[1], u[0]);
   }
 
-  TetMesh &mesh_;
+  RestMesh &mesh_;
   double radius_;
   uint32_t n_;
   const Icosahedron ico_;
@@ -273,12 +273,12 @@ std::array<uint32_t, 2> choose_rings(double radius, double length, uint32_t cell
 
 }  // namespace
 
-TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
+RestMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells) {
   check_beam(x, y, z);
   check_cells(cells);
   const double size[3] = {x, y, z};
   const Grid g = choose_grid(size, cells, 12);
-  TetMesh mesh(memory);
+  RestMesh mesh(memory);
   const auto at = [&](double i, double j, double k) {
     add_point(mesh, {x * (i / g.n[0]), y * (j / g.n[1]), z * (k / g.n[2])});
   };
@@ -321,13 +321,13 @@ TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t c
   return finished(std::move(mesh));
 }
 
-TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells) {
+RestMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells) {
   check_beam(x, y, z);
   check_cells(cells);
   const double size[3] = {x, y, z};
   const Grid g = choose_grid(size, cells, 1);
   const CellKind &kind = cell_kind(DFM_CELL_HEX8);
-  TetMesh mesh(memory);
+  RestMesh mesh(memory);
   mesh.cell = kind.kind;
   for (uint32_t i = 0; i <= g.n[0]; ++i)
     for (uint32_t j = 0; j <= g.n[1]; ++j)
@@ -346,12 +346,12 @@ TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t
   return finished(std::move(mesh));
 }
 
-TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
+RestMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells) {
   check_cylinder(radius, length);
   check_cells(cells);
   const auto [n, m] = choose_rings(radius, length, cells);
   const Disc disc{n};
-  TetMesh mesh(memory);
+  RestMesh mesh(memory);
   // The disc: points, and their colors in the triangular lattice (axial coordinates of hexagon directions,
   // difference modulo 3).
   static constexpr int kAxial[7][2] = {{1, 0}, {0, 1}, {-1, 1}, {-1, 0}, {0, -1}, {1, -1}, {1, 0}};
@@ -384,12 +384,12 @@ TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32
   return finished(std::move(mesh));
 }
 
-TetMesh make_ball(const Memory &memory, double radius, uint32_t cells) {
+RestMesh make_ball(const Memory &memory, double radius, uint32_t cells) {
   check_size("ball's radius", radius);
   check_cells(cells);
   uint32_t n = 1;
   while (apart(20.0 * (n + 1) * (n + 1) * (n + 1), cells) < apart(20.0 * n * n * n, cells)) ++n;
-  TetMesh mesh(memory);
+  RestMesh mesh(memory);
   BallBuilder(mesh, radius, n);
   return finished(std::move(mesh));
 }

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "math/vec3.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 
@@ -71,12 +71,12 @@ Vec3 unit_on_circle(uint64_t i, uint64_t n);
 // shifted by half a step.
 Vec3 on_annulus(double inner, double outer, uint32_t k, uint32_t rings, uint32_t j, uint32_t n);
 
-void add_point(TetMesh &mesh, Vec3 p);
-void add_tet(TetMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);  // turned to positive volume
+void add_point(RestMesh &mesh, Vec3 p);
+void add_tet(RestMesh &mesh, uint32_t a, uint32_t b, uint32_t c, uint32_t d);  // turned to positive volume
 // The prism over a triangle of a layer, cut in three by the colors of its corners; layers are mirrored in
 // turn, so that the surface diagonals zigzag.
 template <class Color>
-void add_prism(TetMesh &mesh, uint32_t layer, uint32_t slab, std::array<uint32_t, 3> v, const Color &color) {
+void add_prism(RestMesh &mesh, uint32_t layer, uint32_t slab, std::array<uint32_t, 3> v, const Color &color) {
   std::sort(v.begin(), v.end(),
             [&](uint32_t a, uint32_t b) { return layer % 2 ? color(a) > color(b) : color(a) < color(b); });
   const uint32_t low = layer * slab, up = low + slab;
@@ -85,7 +85,7 @@ void add_prism(TetMesh &mesh, uint32_t layer, uint32_t slab, std::array<uint32_t
   add_tet(mesh, low + v[0], up + v[0], up + v[1], up + v[2]);
 }
 // without groups, points numbered in their order
-TetMesh finished(TetMesh mesh);
+RestMesh finished(RestMesh mesh);
 
 // The icosahedron on the unit sphere.
 struct Icosahedron {

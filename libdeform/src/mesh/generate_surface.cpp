@@ -26,8 +26,8 @@ class Soup {
       triangle(b, d, a);
     }
   }
-  TriMesh finish() {
-    TriMesh mesh = finish_surface("generator", std::move(raw_));
+  RestMesh finish() {
+    RestMesh mesh = finish_surface("generator", std::move(raw_));
     for (uint32_t p = 0; p < mesh.npoint(); ++p) mesh.file_point[p] = p;
     mesh.merged_points = mesh.turned = 0;
     mesh.warnings.clear();
@@ -69,7 +69,7 @@ void add_side(Soup &soup, uint32_t around, uint32_t along, double length, const 
 
 }  // namespace
 
-TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangles) {
+RestMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangles) {
   check_size("ball's radius", radius);
   check_triangles(triangles);
   const uint32_t n = rounded(std::sqrt(triangles / 20.0));
@@ -89,7 +89,7 @@ TriMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangle
   return soup.finish();
 }
 
-TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles) {
+RestMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles) {
   check_beam(x, y, z);
   check_triangles(triangles);
   const double size[3] = {x, y, z}, squares = std::max(6.0, triangles / 2.0);
@@ -126,7 +126,7 @@ TriMesh make_beam_surface(const Memory &memory, double x, double y, double z, ui
   return soup.finish();
 }
 
-TriMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles) {
+RestMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles) {
   check_cylinder(radius, length);
   check_triangles(triangles);
   Best<std::array<uint32_t, 2>> best{{1, 1}};
@@ -161,8 +161,8 @@ TriMesh make_cylinder_surface(const Memory &memory, double radius, double length
   return soup.finish();
 }
 
-TriMesh make_tube_surface(const Memory &memory, double inner, double outer, double length,
-                          uint32_t triangles) {
+RestMesh make_tube_surface(const Memory &memory, double inner, double outer, double length,
+                           uint32_t triangles) {
   check_tube(inner, outer, length);
   check_triangles(triangles);
   const double wall = outer - inner, round = kTwoPi * (0.5 * (inner + outer)), area = 2 * (length + wall);
@@ -186,7 +186,7 @@ TriMesh make_tube_surface(const Memory &memory, double inner, double outer, doub
   return soup.finish();
 }
 
-TriMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles) {
+RestMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles) {
   check_size("torus's ring radius", ring);
   check_size("torus's tube radius", radius);
   check_triangles(triangles);

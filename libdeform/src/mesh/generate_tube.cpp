@@ -43,12 +43,12 @@ Tube choose(double inner, double outer, double length, uint32_t cells) {
 
 }  // namespace
 
-TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells) {
+RestMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells) {
   check_tube(inner, outer, length);
   check_cells(cells);
   const Tube tube = choose(inner, outer, length, cells);
   const uint32_t n = tube.around, slab = n * (tube.across + 1);
-  TetMesh mesh(memory);
+  RestMesh mesh(memory);
   for (uint32_t layer = 0; layer <= tube.along; ++layer)
     for (uint32_t k = 0; k <= tube.across; ++k)
       for (uint32_t j = 0; j < n; ++j) {

@@ -20,11 +20,12 @@
 #include <cmath>
 #include <vector>
 
+#include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "deform/plugin.h"
 #include "math/extent.h"
 #include "mesh/cells.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 namespace {
@@ -88,7 +89,7 @@ class Integrals {
         grid_(grid),
         flux_(grid.size(), Flux{}, HookAllocator<Flux>(memory)) {}
 
-  void run(const TriMesh &surface) {
+  void run(const RestMesh &surface) {
     for (size_t t = 0; t < surface.tris.size(); t += 3) {
       Polygon p;
       for (size_t k = 0; k < 3; ++k) {
@@ -266,16 +267,11 @@ size_t fullest(const Lattice &l, size_t cell, bool faces) {
 // Kept cells that faces join, each with the lowest number of its cells.
 class Joined {
  public:
-  explicit Joined(const Lattice &l) : l_(l), up_(l.grid.size()) {
-    for (size_t c = 0; c < up_.size(); ++c) up_[c] = uint32_t(c);
-    for (size_t c = 0; c < up_.size(); ++c)
+  explicit Joined(const Lattice &l) : l_(l), sets_(Memory::standard(), uint32_t(l.grid.size())) {
+    for (size_t c = 0; c < l.grid.size(); ++c)
       if (kept(c)) join_faces(c);
   }
   bool kept(size_t c) const { return l_.root[c] == c; }
-  uint32_t of(size_t c) {
-    while (up_[c] != c) c = up_[c] = up_[up_[c]];
-    return uint32_t(c);
-  }
   void join_faces(size_t c) {
     uint32_t at[3];
     l_.grid.place(c, at);
@@ -284,7 +280,7 @@ class Joined {
       to[face / 2] += face % 2 ? 1 : UINT32_MAX;
       if (to[face / 2] >= l_.grid.n[face / 2]) continue;
       const size_t other = l_.grid.number(to[0], to[1], to[2]);
-      if (kept(other)) up_[std::max(of(c), of(other))] = std::min(of(c), of(other));
+      if (kept(other)) sets_.join(uint32_t(c), uint32_t(other));
     }
   }
   // Whether kept cells meet at a corner of this one and are of more than one piece.
@@ -302,8 +298,9 @@ class Joined {
         }
         const size_t other = within ? l_.grid.number(to[0], to[1], to[2]) : c;
         if (other == c || !kept(other)) continue;
-        if (piece != UINT32_MAX && of(other) != piece) return true;
-        piece = of(other);
+        const uint32_t of = sets_.root(uint32_t(other));
+        if (piece != UINT32_MAX && of != piece) return true;
+        piece = of;
       }
     }
     return false;
@@ -311,7 +308,7 @@ class Joined {
 
  private:
   const Lattice &l_;
-  std::vector<uint32_t> up_;
+  DisjointSets sets_;
 };
 
 // Keeps cells that were to be left out, those with most material first, until none is left at a hinge.
@@ -361,7 +358,7 @@ void give_away(Lattice &l) {
   }
 }
 
-Lattice lay(const TriMesh &surface, const Grid &grid) {
+Lattice lay(const RestMesh &surface, const Grid &grid) {
   need_memory(kBytesPerCell * grid.size(), format("a lattice of %zu cells", grid.size()).c_str());
   Integrals of(*surface.memory, grid);
   of.run(surface);
@@ -378,7 +375,7 @@ Lattice lay(const TriMesh &surface, const Grid &grid) {
 }
 
 // The size that gives the nearest number of cells.
-Lattice seek(const TriMesh &surface, const Extent &box, double volume, uint32_t cells) {
+Lattice seek(const RestMesh &surface, const Extent &box, double volume, uint32_t cells) {
   Lattice best;
   double size = std::cbrt(volume / cells), apart = HUGE_VAL;
   uint32_t before[3] = {};
@@ -398,7 +395,7 @@ Lattice seek(const TriMesh &surface, const Extent &box, double volume, uint32_t 
   return best;
 }
 
-void refuse_unfit(const TriMesh &surface, const Extent &box, uint32_t cells, double size) {
+void refuse_unfit(const RestMesh &surface, const Extent &box, uint32_t cells, double size) {
   if ((cells != 0) == (size != 0) || !(size >= 0 && size < HUGE_VAL) || cells > kMaxCells)
     fail(DFM_E_ARG,
          "a lattice has either a number of cells, 1 to %u, or their size in m, above 0; found %u and %g",
@@ -421,7 +418,7 @@ void refuse_unfit(const TriMesh &surface, const Extent &box, uint32_t cells, dou
 
 }  // namespace
 
-TetMesh make_lattice(const TriMesh &surface, uint32_t cells, double size) {
+RestMesh make_lattice(const RestMesh &surface, uint32_t cells, double size) {
   const Memory &memory = *surface.memory;
   Extent box;
   for (const uint32_t p : surface.tris) box.add(load3(&surface.points[3 * size_t{p}]));
@@ -431,7 +428,7 @@ TetMesh make_lattice(const TriMesh &surface, uint32_t cells, double size) {
   constexpr uint32_t kCorner[8][3] = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0},
                                       {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
   const Grid &g = l.grid;
-  TetMesh out(memory);
+  RestMesh out(memory);
   Array<uint64_t> corners{HookAllocator<uint64_t>(memory)};
   for (size_t c = 0; c < g.size(); ++c) {
     if (l.root[c] != c) continue;

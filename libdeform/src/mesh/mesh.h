@@ -1,5 +1,5 @@
-// Tetrahedral meshes before they become bodies: reading, repair, topology, generators, writing. Set-up code:
-// nothing here runs in a step.
+// Meshes before they become bodies or surfaces of bodies: reading, repair, topology, generators, writing.
+// Set-up code: nothing here runs in a step.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -19,8 +19,9 @@ struct MeshGroup {
   Array<uint32_t> points;  // ascending, each once
 };
 
-struct TetMesh {
-  explicit TetMesh(const Memory &m = Memory::standard()) : memory(&m) {
+// Cells, or a surface: triangles alone.
+struct RestMesh {
+  explicit RestMesh(const Memory &m = Memory::standard()) : memory(&m) {
     use_memory(m, points, cells, tets, tet_group, tris, tri_group, file_point, file_cell, share, inside);
   }
   const Memory *memory;
@@ -31,22 +32,24 @@ struct TetMesh {
   Array<uint32_t> cells;
   Array<uint32_t> tets;       // [ntet,4], every volume positive
   Array<uint32_t> tet_group;  // [ntet] index into groups, kNoGroup without
-  // [n,3] the file's triangles that belong to a group, so that it survives writing; in the
-  // file's sense of turn
+  // [ntri,3] of a surface: neighbors agree, closed pieces face outward; beside cells: the file's triangles
+  // that belong to a group, so that it survives writing, in the file's sense of turn
   Array<uint32_t> tris;
-  Array<uint32_t> tri_group;   // [n] index into groups
-  Array<uint32_t> file_point;  // [npoint] 0-based position of the point in its file
+  Array<uint32_t> tri_group;  // [ntri] index into groups, kNoGroup without
+  // [npoint] 0-based position of the point in its file (the first of those merged)
+  Array<uint32_t> file_point;
   // [ntet] 0-based position among the file's tetrahedra; empty where none was dropped
   Array<uint32_t> file_cell;
   // [ntet] of a filled surface: how much of the cell is material, (0,1]; else empty
   Array<double> share;
   Array<double> inside;           // [ncell,27] of a lattice, as dfm_mesh_info has it; else empty
   std::vector<MeshGroup> groups;  // by dimension, then tag
-  // Repairs and observations of the reader.
-  uint32_t turned = 0, dropped_points = 0, dropped_cells = 0;
+  // Repairs and observations of the reader; cells: triangles of a surface.
+  uint32_t turned = 0, merged_points = 0, dropped_points = 0, dropped_cells = 0;
   uint32_t overlapping = 0;           // faces whose two cells lie on the same side: the mesh is tangled there
   std::vector<std::string> warnings;  // one sentence each
   uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
+  uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }
   uint32_t ntet() const { return static_cast<uint32_t>(tets.size() / 4); }
   // The cells as they are written: nodes, and the group of each.
   const Array<uint32_t> &nodes() const { return cells.empty() ? tets : cells; }
@@ -60,20 +63,40 @@ std::string ending_of(const std::string &path);
 
 // ---- reading ----------------------------------------------------------------------------------------------
 // By file name ending; throws Error (IO, FORMAT, UNSUPPORTED) with one sentence. Memory stays within a small
-// multiple of the file's size.
-TetMesh read_tet_mesh(const Memory &memory, const std::string &path);
-// The same from bytes in memory; `path` gives the format and the name for errors.
-TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size);
+// multiple of the file's size. what: DFM_MESH_*
+RestMesh read_mesh(const Memory &memory, const std::string &path, uint32_t what);
 
 // ---- generators (SI units, near-isotropic cells, about `cells` of them) -----------------------------------
 // axis z, base at the origin
-TetMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);
-TetMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);    // from the origin
-TetMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells);  // as the beam
+RestMesh make_cylinder(const Memory &memory, double radius, double length, uint32_t cells);
+RestMesh make_beam(const Memory &memory, double x, double y, double z, uint32_t cells);    // from the origin
+RestMesh make_bricks(const Memory &memory, double x, double y, double z, uint32_t cells);  // as the beam
 // about the origin
-TetMesh make_ball(const Memory &memory, double radius, uint32_t cells);
+RestMesh make_ball(const Memory &memory, double radius, uint32_t cells);
 // as the cylinder, with a hole
-TetMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells);
+RestMesh make_tube(const Memory &memory, double inner, double outer, double length, uint32_t cells);
+// Closed surfaces of about `triangles` near-equilateral triangles, in the places of the bodies of the same
+// names.
+RestMesh make_cylinder_surface(const Memory &memory, double radius, double length, uint32_t triangles);
+RestMesh make_beam_surface(const Memory &memory, double x, double y, double z, uint32_t triangles);
+RestMesh make_ball_surface(const Memory &memory, double radius, uint32_t triangles);
+RestMesh make_tube_surface(const Memory &memory, double inner, double outer, double length,
+                           uint32_t triangles);
+// about the origin, axis z
+RestMesh make_torus_surface(const Memory &memory, double ring, double radius, uint32_t triangles);
+
+// ---- cells for a surface ----------------------------------------------------------------------------------
+// Cells of a body-centered cubic lattice that cover the inside of the surface, about `cells` of them, with
+// `share` filled in. The surface need not be clean: inside is where the generalized winding number exceeds
+// one half. Throws Error(FORMAT) where nothing is inside.
+RestMesh fill_surface(const RestMesh &surface, uint32_t cells);
+// Cells from one inner point to the triangles, in two layers, for a closed surface of which it sees all
+// triangles: no lattice, the surface is the border of the cells. Throws Error(UNSUPPORTED) without such a
+// point.
+RestMesh fan_surface(const RestMesh &surface);
+// Hexahedra of a regular grid over the box of a closed surface: about `cells` of them, or of edges of about
+// `size`; the other is 0.
+RestMesh make_lattice(const RestMesh &surface, uint32_t cells, double size);
 
 // ---- topology ---------------------------------------------------------------------------------------------
 // Corners of the four faces of a cell, outward for a positive cell; face f lies opposite corner f.
@@ -97,21 +120,25 @@ double tet_volume(const double *points, const uint32_t *tet);
 // Mean ratio 12 (3V)^(2/3) / sum l^2: 1 for a regular tetrahedron, 0 for a flat one, negative for
 // an inverted one.
 double tet_quality(const double *points, const uint32_t *tet);
+double triangle_area(const double *points, const uint32_t *tri);
+// 4 sqrt(3) area / sum l^2: 1 for an equilateral triangle, 0 for a flat one.
+double triangle_quality(const double *points, const uint32_t *tri);
 
 // All but the arrays and the text of the warnings.
-dfm_mesh_info mesh_statistics(const TetMesh &mesh);
+dfm_mesh_info mesh_statistics(const RestMesh &mesh);
 
 // ---- writing ----------------------------------------------------------------------------------------------
 // All write to a temporary file next to the target and rename it, so no partial file remains. Throw
 // Error(DFM_E_IO).
-void write_msh41(const TetMesh &mesh, const std::string &path);  // binary
-void write_msh22(const TetMesh &mesh, const std::string &path);  // binary
-void write_vtk(const TetMesh &mesh, const std::string &path);    // legacy 3.0, binary
-void write_medit(const TetMesh &mesh, const std::string &path);  // text; groups by number alone
-void write_vtu(const TetMesh &mesh, const std::string &path);    // with groups and share as cell data
-// By ending: .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh. False: cells are in part material, and the format
-// does not hold how much.
-bool write_tet_mesh(const TetMesh &mesh, const std::string &path);
+void write_msh41(const RestMesh &mesh, const std::string &path);  // binary
+void write_msh22(const RestMesh &mesh, const std::string &path);  // binary
+void write_vtk(const RestMesh &mesh, const std::string &path);    // legacy 3.0, binary
+void write_medit(const RestMesh &mesh, const std::string &path);  // text; groups by number alone
+void write_vtu(const RestMesh &mesh, const std::string &path);    // with groups and share as cell data
+// By ending: cells as .msh (4.1), .msh2 (2.2), .vtk, .vtu, .mesh; a surface as .obj, .ply, .stl, .off, .vtk,
+// .vtu. False: cells are in part material, and the format does not hold how much.
+bool write_mesh(const RestMesh &mesh, const std::string &path);
+void write_surface(const RestMesh &mesh, const std::string &path);
 
 // VTU (XML, appended raw data), as ParaView reads it.
 struct VtuArray {

@@ -155,8 +155,8 @@ void RawMesh::add_second_triangle(const Cursor &at, const uint32_t *nodes, uint3
 
 void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {
   for (size_t k = 2; k < n; ++k) {
-    const bool turned = k % 2 != 0;
-    add_triangle(at, corners[k - 2], corners[k - !turned], corners[k - turned], in_group);
+    const bool odd = k % 2 != 0;
+    add_triangle(at, corners[k - 2], corners[k - !odd], corners[k - odd], in_group);
   }
   keep_points(corners, n, in_group);
 }

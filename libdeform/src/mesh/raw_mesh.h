@@ -3,36 +3,19 @@
 #include <map>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "mesh/cursor.h"
 #include "mesh/mesh.h"
-#include "mesh/tri_mesh.h"
 
 namespace dfm {
 
-struct RawMesh {
-  explicit RawMesh(const Memory &m) : memory(&m) {
-    use_memory(m, points, cells, tets, tet_group, tet_share, inside, tris, tri_group);
-  }
-  const Memory *memory;
-  Array<double> points;
-  uint32_t cell = 0;          // as in TetMesh; 0 before the first one
-  Array<uint32_t> cells;      // of another kind than tetrahedra
-  Array<uint32_t> tets;       // 0-based positions of points in the file
-  Array<uint32_t> tet_group;  // index into groups
-  // how much of each is material, where the file says so of all; else of no use (finish_mesh decides)
-  Array<double> tet_share;
-  Array<double> inside;               // [ncell,27] of hexahedra, likewise
-  Array<uint32_t> tris;               // polygons are cut into triangles by the readers
-  Array<uint32_t> tri_group;          // index into groups, kNoGroup without
-  bool own_corners = false;           // the format gives each triangle points of its own
-  std::vector<MeshGroup> groups;      // points: without those of tet_group, in file order, with repeats
-  std::vector<std::string> warnings;  // one sentence each, printed before those of repair
-  uint32_t npoint() const { return static_cast<uint32_t>(points.size() / 3); }
-  uint32_t ntri() const { return static_cast<uint32_t>(tris.size() / 3); }
-  uint32_t ntet() const { return static_cast<uint32_t>(tets.size() / 4); }
+struct RawMesh : RestMesh {
+  explicit RawMesh(const Memory &m) : RestMesh(m) { cell = 0; }  // until the first one
+  // share: how much of each tetrahedron is material, where the file says so of all; inside, of hexahedra,
+  // likewise; else of no use (finish_mesh decides). tris: polygons are cut into triangles by the readers.
+  // Points of groups: without those of tet_group, in file order, with repeats.
+  bool own_corners = false;  // the format gives each triangle points of its own
 
   // Index of the group, made where it is new. tag 0 is "no group".
   uint32_t group(const Cursor &at, int32_t dimension, int32_t tag);
@@ -85,13 +68,9 @@ RawMesh parse_raw(const Memory &memory, const std::string &path, const char *byt
 // What kind of mesh a file is, by its first bytes or the ending of its name ("STL"); empty: none is known.
 std::string mesh_kind(const std::string &path, std::string_view bytes);
 
-using AnyMesh = std::variant<TetMesh, TriMesh>;
-// what: DFM_MESH_*
-AnyMesh read_mesh(const Memory &memory, const std::string &path, uint32_t what);
-
 // Repairs what can be repaired, counts it, and refuses what has no volume.
-TetMesh finish_mesh(const std::string &path, RawMesh &&raw);
+RestMesh finish_mesh(const std::string &path, RawMesh &&raw);
 // The same for the triangles (or, where the file has tetrahedra, their boundary): merge, drop, turn, count.
-TriMesh finish_surface(const std::string &path, RawMesh &&raw);
+RestMesh finish_surface(const std::string &path, RawMesh &&raw);
 
 }  // namespace dfm

@@ -174,31 +174,14 @@ RawMesh read_raw(const Memory &memory, const std::string &path) {
   return parse_raw(memory, path, bytes.data(), bytes.size());
 }
 
-TetMesh parse_tet_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
-  return finish_mesh(path, parse_raw(memory, path, bytes, size));
-}
-
-TetMesh read_tet_mesh(const Memory &memory, const std::string &path) {
-  // the file's bytes are free before the repair begins
-  return finish_mesh(path, read_raw(memory, path));
-}
-
-TriMesh parse_tri_mesh(const Memory &memory, const std::string &path, const char *bytes, size_t size) {
-  return finish_surface(path, parse_raw(memory, path, bytes, size));
-}
-
-AnyMesh read_mesh(const Memory &memory, const std::string &path, uint32_t what) {
-  RawMesh raw = read_raw(memory, path);
+RestMesh read_mesh(const Memory &memory, const std::string &path, uint32_t what) {
+  RawMesh raw = read_raw(memory, path);  // the file's bytes are free before the repair begins
   if (what == DFM_MESH_ANY && raw.tets.empty() && raw.tris.empty())
     fail(DFM_E_FORMAT, "%s: no tetrahedra and no triangles in this file; a body needs one of them",
          path.c_str());
   if (what == DFM_MESH_SURFACE || (what == DFM_MESH_ANY && raw.tets.empty()))
     return finish_surface(path, std::move(raw));
   return finish_mesh(path, std::move(raw));
-}
-
-TriMesh read_tri_mesh(const Memory &memory, const std::string &path) {
-  return finish_surface(path, read_raw(memory, path));
 }
 
 }  // namespace dfm

@@ -209,8 +209,7 @@ class AbaqusReader {
       in_.seek(keyword_at_);
       in_.unsupported(
           "elements of type %s; tetrahedra of 4 and 10 nodes (C3D4, C3D10) and hexahedra of 8 (C3D8) are "
-          "read: "
-          "mesh the volume with one of these",
+          "read: mesh the volume with one of these",
           Cursor::quote(*type).c_str());
     }
     if (dimension == 1) return;  // lines

@@ -255,7 +255,7 @@ class VtkReader {
       sink_.add(in_, types_[c], cells_.data() + start_[c], start_[c + 1] - start_[c],
                 labels_.empty() ? 0 : labels_[c]);
     for (size_t c = 0; shares_.size() == types_.size() && c < types_.size(); ++c)
-      if (types_[c] == 10) out_.tet_share.push_back(shares_[c]);
+      if (types_[c] == 10) out_.share.push_back(shares_[c]);
     sink_.finish(in_);
   }
 

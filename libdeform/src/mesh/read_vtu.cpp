@@ -224,7 +224,7 @@ class VtuReader {
       const int64_t label = group ? group->in.integer(group->type, "a cell's group") : 0;
       sink_.add(in_, static_cast<uint8_t>(type), corners_.data(), corners_.size(), label);
       const double part = share ? share->in.real(share->type, "a cell's share") : 1;
-      if (share && type == 10) out_.tet_share.push_back(part);
+      if (share && type == 10) out_.share.push_back(part);
       for (uint32_t q = 0; inside && q < kInsidePoints; ++q) {
         const double weight = inside->in.real(inside->type, "a cell's weight");
         if (type == 12) out_.inside.push_back(weight);

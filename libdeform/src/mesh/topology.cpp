@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
+#include "math/extent.h"
 #include "mesh/cells.h"
 #include "mesh/faces.h"
 #include "mesh/mesh.h"
@@ -126,7 +127,7 @@ double tet_quality(const double *points, const uint32_t *tet) {
 
 namespace {
 
-uint32_t count_duplicate_points(const TetMesh &mesh) {
+uint32_t count_duplicate_points(const RestMesh &mesh) {
   Array<uint32_t> order(mesh.npoint(), HookAllocator<uint32_t>(*mesh.memory));
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto at = [&](uint32_t i) { return mesh.points.data() + 3 * size_t(i); };
@@ -147,7 +148,7 @@ uint32_t count_nonmanifold_edges(const Memory &memory, const Array<uint32_t> &tr
 }
 
 // As in dfm_mesh_info. A corner's gradient is as long as its face's area over three volumes.
-double wave_path(const TetMesh &mesh) {
+double wave_path(const RestMesh &mesh) {
   Array<double> volume(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
   Array<double> stiffness(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
   for (size_t t = 0; t < mesh.tets.size(); t += 4) {
@@ -170,21 +171,12 @@ double wave_path(const TetMesh &mesh) {
   return 2 * std::sqrt(least);
 }
 
-}  // namespace
-
-dfm_mesh_info mesh_statistics(const TetMesh &mesh) {
-  dfm_mesh_info s{};
+void measure_cells(const RestMesh &mesh, dfm_mesh_info &s) {
   const Memory &memory = *mesh.memory;
-  s.npoint = mesh.npoint();
   s.ntet = mesh.ntet();
   s.cell = mesh.cell;
   s.ncell = s.ntet / cell_kind(mesh.cell).tets;
-  s.ngroup = static_cast<uint32_t>(mesh.groups.size());
-  s.turned = mesh.turned;
-  s.dropped_points = mesh.dropped_points;
-  s.dropped_cells = mesh.dropped_cells;
   s.overlapping_faces = mesh.overlapping;
-  if (s.ntet == 0) return s;
   {
     const Array<uint32_t> triangles = boundary_triangles(mesh.tets);
     s.ntriangle = uint32_t(triangles.size() / 3);
@@ -210,7 +202,23 @@ dfm_mesh_info mesh_statistics(const TetMesh &mesh) {
     return q;
   });
   s.wave_path = wave_path(mesh);
-  put_box(mesh.points, s);
+}
+
+}  // namespace
+
+dfm_mesh_info mesh_statistics(const RestMesh &mesh) {
+  dfm_mesh_info s{};
+  s.npoint = mesh.npoint();
+  s.ngroup = static_cast<uint32_t>(mesh.groups.size());
+  s.turned = mesh.turned;
+  s.dropped_points = mesh.dropped_points;
+  s.dropped_cells = mesh.dropped_cells;
+  if (mesh.tets.empty() && mesh.tris.empty()) return s;
+  const Extent box = extent_of(mesh.points);
+  store3(s.lo, box.lo);
+  store3(s.hi, box.hi);
+  if (mesh.tets.empty()) measure_surface(mesh, s);
+  else measure_cells(mesh, s);
   return s;
 }
 

@@ -5,7 +5,7 @@
 
 #include "core/disjoint_sets.h"
 #include "math/vec3.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 
@@ -53,7 +53,7 @@ namespace {
 
 // Boundary loops: from each end of an open edge around that point, through the triangles between, to the
 // loop's next open edge.
-uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
+uint32_t count_holes(const RestMesh &mesh, const Array<uint32_t> &twin) {
   Array<uint32_t> open{HookAllocator<uint32_t>(*mesh.memory)};
   Array<uint32_t> number(twin.size(), HookAllocator<uint32_t>(*mesh.memory));
   for (uint32_t h = 0; h < twin.size(); ++h)
@@ -80,16 +80,9 @@ uint32_t count_holes(const TriMesh &mesh, const Array<uint32_t> &twin) {
 
 }  // namespace
 
-dfm_mesh_info mesh_statistics(const TriMesh &mesh) {
-  dfm_mesh_info s{};
-  s.npoint = mesh.npoint();
+void measure_surface(const RestMesh &mesh, dfm_mesh_info &s) {
   s.ntriangle = mesh.ntri();
-  s.ngroup = static_cast<uint32_t>(mesh.groups.size());
-  s.turned = mesh.turned;
   s.duplicate_points = mesh.merged_points;
-  s.dropped_points = mesh.dropped_points;
-  s.dropped_cells = mesh.dropped_tris;
-  if (s.ntriangle == 0) return s;
   const double *points = mesh.points.data();
   Array<double> length{HookAllocator<double>(*mesh.memory)};
   {
@@ -111,7 +104,6 @@ dfm_mesh_info mesh_statistics(const TriMesh &mesh) {
   }
   put_edges(length, s);
   s.npiece = count_pieces(*mesh.memory, s.npoint, mesh.tris, 3);
-  put_box(mesh.points, s);
   // Volume from cones to the middle of the box: far from the origin nothing cancels.
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
   put_qualities(s.ntriangle, s, [&](size_t t) {
@@ -123,7 +115,6 @@ dfm_mesh_info mesh_statistics(const TriMesh &mesh) {
     s.volume += dot(cross(a - middle, b - middle), c - middle) / 6;
     return triangle_quality(points, tri);
   });
-  return s;
 }
 
 }  // namespace dfm

@@ -2,9 +2,7 @@
 #pragma once
 #include <algorithm>
 
-#include "core/memory.h"
-#include "deform/mesh.h"
-#include "math/extent.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 
@@ -46,10 +44,7 @@ void put_qualities(size_t n, dfm_mesh_info &out, const Quality &quality) {
   }
   out.quality_mean /= double(n);
 }
-inline void put_box(const Array<double> &points, dfm_mesh_info &out) {
-  const Extent box = extent_of(points);
-  store3(out.lo, box.lo);
-  store3(out.hi, box.hi);
-}
+// Those of a surface alone.
+void measure_surface(const RestMesh &mesh, dfm_mesh_info &out);
 
 }  // namespace dfm

@@ -61,8 +61,7 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
   if (is_one_of({11, 13, 14, 15, 16, 25, 26, 27, 29, 31, 32, 33, 37, 41, 42, 72, 73, 74}))
     in.unsupported(
         "cell %zu is a volume cell of type %d (voxel, wedge, pyramid, polyhedron, or a hexahedron above "
-        "first "
-        "order); tetrahedra (types 10 and 24) and hexahedra (12) are read: mesh the shape with these",
+        "first order); tetrahedra (types 10 and 24) and hexahedra (12) are read: mesh the shape with these",
         cell, type);
 }
 

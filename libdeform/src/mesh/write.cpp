@@ -13,7 +13,7 @@ std::string text(uint64_t n) { return std::to_string(n); }
 
 // The file's number of each cell's and then each triangle's group, 0 without. Empty where there are no
 // groups at all.
-Array<uint32_t> group_numbers(const TetMesh &mesh) {
+Array<uint32_t> group_numbers(const RestMesh &mesh) {
   Array<uint32_t> out(HookAllocator<uint32_t>(*mesh.memory));
   if (mesh.groups.empty()) return out;
   const Array<uint32_t> cells = mesh.cell_groups();
@@ -25,7 +25,7 @@ Array<uint32_t> group_numbers(const TetMesh &mesh) {
 }
 
 // Triangles have no share; they take 1 so that a picture by share shows them whole.
-Array<double> shares(const TetMesh &mesh) {
+Array<double> shares(const RestMesh &mesh) {
   Array<double> out(HookAllocator<double>(*mesh.memory));
   if (mesh.share.empty()) return out;
   out.assign(mesh.share.begin(), mesh.share.end());
@@ -35,7 +35,7 @@ Array<double> shares(const TetMesh &mesh) {
 
 // Behind the cells, because gmsh expects POINTS first. Names are characters, each name ended by a zero,
 // because meshio refuses a file with strings.
-void put_group_names(AtomicFile &out, const TetMesh &mesh) {
+void put_group_names(AtomicFile &out, const RestMesh &mesh) {
   if (mesh.groups.empty()) return;
   out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " + text(mesh.groups.size()) +
             " int\n");
@@ -71,7 +71,7 @@ class TextRows {
     }
   }
   void elements(const char *keyword, uint32_t corners, const Array<uint32_t> &points,
-                const Array<uint32_t> &group, const TetMesh &mesh) {
+                const Array<uint32_t> &group, const RestMesh &mesh) {
     if (group.empty()) return;
     out_.write(std::string(keyword) + "\n" + text(group.size()) + "\n");
     for (size_t t = 0; t < group.size(); ++t) {
@@ -88,7 +88,7 @@ class TextRows {
 
 }  // namespace
 
-void write_vtk(const TetMesh &mesh, const std::string &path) {
+void write_vtk(const RestMesh &mesh, const std::string &path) {
   AtomicFile out(path);
   const CellKind &kind = cell_kind(mesh.cell);
   const uint64_t ntri = mesh.tri_group.size(), nvolume = mesh.ntet() / kind.tets, ncell = nvolume + ntri;
@@ -118,7 +118,7 @@ void write_vtk(const TetMesh &mesh, const std::string &path) {
   out.commit();
 }
 
-void write_vtu(const TetMesh &mesh, const std::string &path) {
+void write_vtu(const RestMesh &mesh, const std::string &path) {
   const Array<uint32_t> groups = group_numbers(mesh);
   const Array<double> share = shares(mesh);
   VtuGrid grid;
@@ -140,7 +140,7 @@ void write_vtu(const TetMesh &mesh, const std::string &path) {
   write_vtu(path, grid);
 }
 
-void write_medit(const TetMesh &mesh, const std::string &path) {
+void write_medit(const RestMesh &mesh, const std::string &path) {
   AtomicFile out(path);
   const CellKind &kind = cell_kind(mesh.cell);
   out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + text(mesh.npoint()) + "\n");
@@ -158,7 +158,11 @@ void write_medit(const TetMesh &mesh, const std::string &path) {
   out.commit();
 }
 
-bool write_tet_mesh(const TetMesh &mesh, const std::string &path) {
+bool write_mesh(const RestMesh &mesh, const std::string &path) {
+  if (mesh.tets.empty()) {
+    write_surface(mesh, path);
+    return true;
+  }
   const std::string ending = path.rfind('.') == 0 ? "" : ending_of(path);  // a hidden file has none
   if (ending == "msh") write_msh41(mesh, path);
   else if (ending == "msh2") write_msh22(mesh, path);

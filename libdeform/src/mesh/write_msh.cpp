@@ -43,7 +43,7 @@ void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t 
 
 // Everything that is written, lowest dimension first. Of lines only the points are known, so their
 // groups are left out.
-std::vector<Run> runs_of(const TetMesh &mesh, const Array<uint32_t> &cell_groups) {
+std::vector<Run> runs_of(const RestMesh &mesh, const Array<uint32_t> &cell_groups) {
   std::vector<Run> runs;
   for (uint32_t g = 0; g < mesh.groups.size(); ++g) {
     const Array<uint32_t> &points = mesh.groups[g].points;
@@ -63,7 +63,7 @@ uint64_t elements(const std::vector<Run> &runs) {
 }
 
 // Groups of cells, and of what the runs hold.
-std::vector<uint32_t> written_groups(const TetMesh &mesh, const std::vector<Run> &runs) {
+std::vector<uint32_t> written_groups(const RestMesh &mesh, const std::vector<Run> &runs) {
   std::vector<uint8_t> written(mesh.groups.size());
   for (uint32_t g = 0; g < written.size(); ++g) written[g] = mesh.groups[g].dimension == 3;
   for (const Run &r : runs)
@@ -74,7 +74,7 @@ std::vector<uint32_t> written_groups(const TetMesh &mesh, const std::vector<Run>
   return out;
 }
 
-void put_names(AtomicFile &out, const TetMesh &mesh, const std::vector<uint32_t> &groups) {
+void put_names(AtomicFile &out, const RestMesh &mesh, const std::vector<uint32_t> &groups) {
   if (groups.empty()) return;
   out.write("$PhysicalNames\n" + text(groups.size()) + "\n");
   for (const uint32_t g : groups)
@@ -83,11 +83,11 @@ void put_names(AtomicFile &out, const TetMesh &mesh, const std::vector<uint32_t>
   out.write("$EndPhysicalNames\n");
 }
 
-int32_t entity_of(const TetMesh &mesh, uint32_t group) {  // one entity per group, the last for cells without
+int32_t entity_of(const RestMesh &mesh, uint32_t group) {  // one entity per group, the last for cells without
   return static_cast<int32_t>(group == kNoGroup ? mesh.groups.size() + 1 : group + 1);
 }
 
-void put_entities(AtomicFile &out, const TetMesh &mesh, std::vector<uint32_t> groups) {
+void put_entities(AtomicFile &out, const RestMesh &mesh, std::vector<uint32_t> groups) {
   const Extent box = extent_of(mesh.points);
   groups.push_back(kNoGroup);
   const auto dimension = [&](uint32_t g) { return g == kNoGroup ? 3 : mesh.groups[g].dimension; };
@@ -110,7 +110,7 @@ void put_entities(AtomicFile &out, const TetMesh &mesh, std::vector<uint32_t> gr
 
 }  // namespace
 
-void write_msh41(const TetMesh &mesh, const std::string &path) {
+void write_msh41(const RestMesh &mesh, const std::string &path) {
   AtomicFile out(path);
   const Array<uint32_t> cell_groups = mesh.cell_groups();
   const std::vector<Run> runs = runs_of(mesh, cell_groups);
@@ -144,7 +144,7 @@ void write_msh41(const TetMesh &mesh, const std::string &path) {
   out.commit();
 }
 
-void write_msh22(const TetMesh &mesh, const std::string &path) {
+void write_msh22(const RestMesh &mesh, const std::string &path) {
   if (mesh.npoint() > INT32_MAX)
     fail(DFM_E_UNSUPPORTED, "%s: MSH 2.2 holds up to %d nodes, the mesh has %u; write MSH 4.1", path.c_str(),
          INT32_MAX, mesh.npoint());

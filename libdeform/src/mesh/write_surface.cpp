@@ -8,14 +8,14 @@
 #include "core/error.h"
 #include "math/vec3.h"
 #include "core/file.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace dfm {
 namespace {
 
 std::string text(uint64_t n) { return std::to_string(n); }
 
-void put_points(AtomicFile &out, const TriMesh &mesh, const char *before) {
+void put_points(AtomicFile &out, const RestMesh &mesh, const char *before) {
   for (size_t p = 0; p < mesh.points.size(); p += 3)
     out.write(
         format("%s%.17g %.17g %.17g\n", before, mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]));
@@ -27,7 +27,7 @@ std::string one_line(std::string name) {
   return name;
 }
 
-void put_obj(AtomicFile &out, const TriMesh &mesh) {
+void put_obj(AtomicFile &out, const RestMesh &mesh) {
   out.write(format("# %u points, %u triangles, m\n", mesh.npoint(), mesh.ntri()));
   put_points(out, mesh, "v ");
   uint32_t group = kNoGroup;
@@ -41,7 +41,7 @@ void put_obj(AtomicFile &out, const TriMesh &mesh) {
   }
 }
 
-void put_off(AtomicFile &out, const TriMesh &mesh) {
+void put_off(AtomicFile &out, const RestMesh &mesh) {
   out.write("OFF\n" + text(mesh.npoint()) + " " + text(mesh.ntri()) + " 0\n");
   put_points(out, mesh, "");
   for (size_t i = 0; i < mesh.tris.size(); i += 3)
@@ -49,7 +49,7 @@ void put_off(AtomicFile &out, const TriMesh &mesh) {
 }
 
 // As text, because gmsh reads no binary doubles, and meshio no binary numbers behind a list.
-void put_ply(AtomicFile &out, const TriMesh &mesh) {
+void put_ply(AtomicFile &out, const RestMesh &mesh) {
   const bool grouped = !mesh.groups.empty();
   out.write("ply\nformat ascii 1.0\nelement vertex " + text(mesh.npoint()) +
             "\nproperty double x\nproperty double y\nproperty double z\nelement face " + text(mesh.ntri()) +
@@ -64,7 +64,7 @@ void put_ply(AtomicFile &out, const TriMesh &mesh) {
   }
 }
 
-void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
+void put_stl(AtomicFile &out, const RestMesh &mesh, const std::string &path) {
   for (const double x : mesh.points)
     if (std::fabs(x) > FLT_MAX)
       fail(DFM_E_UNSUPPORTED, "%s: STL holds coordinates up to %g m, the surface has %g m; write .ply",
@@ -86,22 +86,13 @@ void put_stl(AtomicFile &out, const TriMesh &mesh, const std::string &path) {
   }
 }
 
-// The formats of cells hold triangles too: a body without cells, all of whose triangles are in the file.
-TetMesh as_cells(const TriMesh &mesh) {
-  TetMesh out(*mesh.memory);
-  out.points = mesh.points;
-  out.tris = mesh.tris;
-  out.tri_group = mesh.tri_group;
-  out.groups = mesh.groups;
-  return out;
-}
-
 }  // namespace
 
-void write_tri_mesh(const TriMesh &mesh, const std::string &path) {
+void write_surface(const RestMesh &mesh, const std::string &path) {
   const std::string ending = ending_of(path);
-  if (ending == "vtk") return write_vtk(as_cells(mesh), path);
-  if (ending == "vtu") return write_vtu(as_cells(mesh), path);
+  // the formats of cells hold triangles too
+  if (ending == "vtk") return write_vtk(mesh, path);
+  if (ending == "vtu") return write_vtu(mesh, path);
   if (ending != "obj" && ending != "ply" && ending != "stl" && ending != "off")
     fail(DFM_E_UNSUPPORTED,
          "%s: a surface is written as .obj, .ply, .stl, .off, .vtk, .vtu, chosen by the ending of the file "

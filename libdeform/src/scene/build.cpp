@@ -252,25 +252,26 @@ class Builder {
 
   // Material of each cell; empty if no group has its own material.
   std::vector<dfm_material> materials_by_group(const Body &b, const BodyMesh &mesh) const {
-    std::vector<dfm_material> of_group(mesh.ngroup, material(b.material)), out;
+    std::vector<dfm_material> of_group(mesh.info.ngroup, material(b.material)), out;
     if (b.by_group.empty()) return out;
     std::vector<std::string> names;
-    std::vector<uint32_t> cells(mesh.ngroup, 0);
-    for (uint32_t t = 0; t < mesh.ntet; ++t)
-      if (mesh.cell_group[t] != UINT32_MAX) ++cells[mesh.cell_group[t]];
-    for (uint32_t g = 0; g < mesh.ngroup; ++g)
-      if (cells[g]) names.push_back(mesh.group_names[g]);
+    std::vector<uint32_t> cells(mesh.info.ngroup, 0);
+    for (uint32_t t = 0; t < mesh.info.ntet; ++t)
+      if (mesh.info.cell_group[t] != UINT32_MAX) ++cells[mesh.info.cell_group[t]];
+    for (uint32_t g = 0; g < mesh.info.ngroup; ++g)
+      if (cells[g]) names.push_back(mesh.info.group_names[g]);
     for (const GroupMaterial &m : b.by_group) {
       if (std::find(names.begin(), names.end(), m.group) == names.end())
         fail(DFM_E_ARG, "%s: %s: the mesh has no physical group of cells \"%s\"%s%s", def_.file.c_str(),
              m.pointer.c_str(), m.group.c_str(),
              names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
              did_you_mean(m.group, names).c_str());
-      for (uint32_t g = 0; g < mesh.ngroup; ++g)
-        if (cells[g] && m.group == mesh.group_names[g]) of_group[g] = material(m.material);
+      for (uint32_t g = 0; g < mesh.info.ngroup; ++g)
+        if (cells[g] && m.group == mesh.info.group_names[g]) of_group[g] = material(m.material);
     }
-    for (uint32_t t = 0; t < mesh.ntet; ++t)
-      out.push_back(mesh.cell_group[t] == UINT32_MAX ? material(b.material) : of_group[mesh.cell_group[t]]);
+    for (uint32_t t = 0; t < mesh.info.ntet; ++t)
+      out.push_back(mesh.info.cell_group[t] == UINT32_MAX ? material(b.material)
+                                                          : of_group[mesh.info.cell_group[t]]);
     return out;
   }
 
@@ -280,16 +281,22 @@ class Builder {
     if (mesh.wears_skin)
       return {size, mesh.skin.ngroup, mesh.skin.group_names,   mesh.skin.ntriangle,
               0,    nullptr,          mesh.skin.triangle_group};
-    return {size, mesh.nface ? mesh.ngroup : 0, mesh.group_names, mesh.nface, 0, mesh.faces, mesh.face_group};
+    return {size,
+            mesh.info.nface ? mesh.info.ngroup : 0,
+            mesh.info.group_names,
+            mesh.info.nface,
+            0,
+            mesh.info.faces,
+            mesh.info.face_group};
   }
 
   // Weights of forces that are divided by mass: density times share.
   std::vector<double> cell_weights(const BodyMesh &mesh, const std::vector<dfm_material> &materials) const {
     std::vector<double> out;
-    if (!mesh.share && !mesh.inside && materials.empty()) return out;
+    if (!mesh.info.share && !mesh.info.inside && materials.empty()) return out;
     std::map<dfm_material, double> density = {{0, dfm_material_def_default().density}};
     for (const Material &m : def_.materials) density[materials_.at(m.name)] = m.def.density;
-    for (uint32_t t = 0; t < mesh.ntet; ++t)
+    for (uint32_t t = 0; t < mesh.info.ntet; ++t)
       out.push_back(mesh.share_of(t) * (materials.empty() ? 1 : density.at(materials[t])));
     return out;
   }
@@ -308,7 +315,7 @@ class Builder {
       values.push_back(with_pointer(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
       fields.push_back({f.key.c_str(), values.back().data(), f.width});
     }
-    std::vector<uint8_t> fixed(mesh.npoint, 0);
+    std::vector<uint8_t> fixed(mesh.info.npoint, 0);
     std::vector<std::vector<uint32_t>> held;
     for (const Fix &f : b.fixes) {
       held.push_back(select(f.where, mesh, def_.file));
@@ -318,12 +325,12 @@ class Builder {
 
     dfm_body_def &d = b.def;
     d.name = b.name.c_str();
-    d.npoint = mesh.npoint;
-    d.ntet = mesh.ntet;
+    d.npoint = mesh.info.npoint;
+    d.ntet = mesh.info.ntet;
     d.points = mesh.points.data();
-    d.tets = mesh.tets;
-    d.cell = mesh.cell;
-    d.cells = mesh.nodes;
+    d.tets = mesh.info.tets;
+    d.cell = mesh.info.cell;
+    d.cells = mesh.info.cells;
     d.material = material(b.material);
     d.model = b.model.c_str();
     d.model_params = b.params.view();
@@ -331,8 +338,8 @@ class Builder {
     d.nfield = uint32_t(fields.size());
     d.fields = fields.data();
     if (!materials.empty()) d.cell_materials = materials.data();
-    d.cell_share = mesh.share;
-    d.cell_inside = mesh.inside;
+    d.cell_share = mesh.info.share;
+    d.cell_inside = mesh.info.inside;
     const Skin &skin = mesh.skin;
     const dfm_surface_def surface = {sizeof(dfm_surface_def), b.surface.coupling, skin.npoint,
                                      skin.ntriangle,          skin.points.data(), skin.triangles,
@@ -351,7 +358,7 @@ class Builder {
     if (b.sensor) def_.require(dfm_body_set_sensor(body, true), b.pointer);
     if (b.start.kind != StartKind::rest && b.start.kind != StartKind::state)
       def_.require(
-          dfm_body_set_state(body, mesh.npoint, start_positions(b.start, mesh, d.pose).data(), nullptr),
+          dfm_body_set_state(body, mesh.info.npoint, start_positions(b.start, mesh, d.pose).data(), nullptr),
           b.start.pointer);
     for (size_t i = 0; i < b.fixes.size(); ++i) move_held(body, b.fixes[i], held[i]);
     add_loads(body, b, mesh, nodal);
@@ -394,16 +401,18 @@ class Builder {
         with_pointer(pointer, [&] { return read_start_state(files_.path_of(b.start.state), mesh); });
     dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
     if (!made.dynamics->abilities().placed)
-      fail(DFM_E_UNSUPPORTED,
-           "%s: %s: the model '%s' moves the body as a whole, so its points cannot be placed one by one",
-           def_.file.c_str(), pointer.c_str(), made.model.type->id);
-    for (uint32_t i = 0; i < mesh.npoint; ++i)
+      def_.refuse(
+          pointer,
+          format("the model '%s' moves the body as a whole, so its points cannot be placed one by one",
+                 made.model.type->id),
+          DFM_E_UNSUPPORTED);
+    for (uint32_t i = 0; i < mesh.info.npoint; ++i)
       for (size_t k = 0; k < 3; ++k)
         if (made.p.held[i] & (1u << k)) {
           made.p.x[kStride * size_t{i} + k] = state.x[3 * size_t{i} + k];
           made.p.v[kStride * size_t{i} + k] = state.v[3 * size_t{i} + k];
         }
-    def_.require(dfm_body_set_state(body, mesh.npoint, state.x.data(), state.v.data()), pointer);
+    def_.require(dfm_body_set_state(body, mesh.info.npoint, state.x.data(), state.v.data()), pointer);
   }
 
   // Checks the complete world, so that an impossible change is an error of the scene.
@@ -516,11 +525,8 @@ class Builder {
                    const BodyMesh &mesh, uint32_t corners[4], double weights[4]) const {
     const double away = locate(mesh, point, corners, weights);
     if (!(away <= 0.25 * mesh.size))
-      fail(DFM_E_ARG,
-           "%s: %s/point: lies %g m away from \"%s\", which at rest, scaled but before its pose, spans [%g, "
-           "%g, %g] to [%g, %g, %g]",
-           def_.file.c_str(), pointer.c_str(), away, name.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2],
-           mesh.hi[0], mesh.hi[1], mesh.hi[2]);
+      def_.refuse(pointer + "/point",
+                  format("lies %g m away from \"%s\"; ", away, name.c_str()) + span_of(mesh));
   }
 
   void add_spring(dfm_body body, const Spring &s, const std::string &name, const BodyMesh &mesh) const {
@@ -574,9 +580,9 @@ class Builder {
     probe.name = p.name;
     probe.body = body;
     locate_near(p.point, p.pointer, p.body, mesh, probe.points, probe.weights);
-    probe.npoint = mesh.npoint;
-    probe.ntet = mesh.ntet;
-    while (!std::equal(probe.points, probe.points + 4, mesh.tets + 4 * size_t(probe.cell))) ++probe.cell;
+    probe.npoint = mesh.info.npoint;
+    probe.ntet = mesh.info.ntet;
+    while (!std::equal(probe.points, probe.points + 4, mesh.info.tets + 4 * size_t(probe.cell))) ++probe.cell;
     // Probes are reported in the scene's order, whatever the order of their bodies.
     if (probes_.size() < def_.probes.size()) probes_.resize(def_.probes.size());
     probes_[size_t(&p - def_.probes.data())] = std::move(probe);

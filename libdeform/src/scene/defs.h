@@ -10,6 +10,10 @@
 #include "deform/deform.h"
 #include "scene/planner/accuracy.h"
 
+namespace dfm {
+class Registry;
+}
+
 namespace dfm::scene {
 
 // Parameters by key, owning what a dfm_params borrows.
@@ -256,25 +260,9 @@ struct Definition {
   std::string color;
 };
 
-// Types that the context has loaded: parameters are checked against their own tables.
-class Types {
- public:
-  explicit Types(dfm_context *context);
-  const dfm_type *find(uint32_t kind, const std::string &name) const;  // short name or full id; nullptr
-  std::vector<std::string> names(uint32_t kind) const;                 // short names
-  std::vector<std::string> model_keys() const;                         // parameters of any model
-  std::vector<const dfm_type *> models() const;
-  // The model NAME_gpu beside the model NAME, which a graphics card moves, and the reverse; nullptr: none.
-  const dfm_type *on_card(const dfm_type &model) const;
-  const dfm_type *off_card(const dfm_type &model) const;
-  // A file that was not loaded and why: the one that speaks of this type, else the first; "": all were.
-  std::string passed_over(const std::string &name) const;
-
- private:
-  std::vector<const dfm_type *> types_;
-  std::vector<std::string> passed_over_;
-};
-std::vector<const dfm_param *> rows_of(const dfm_type *type);
-const dfm_param *find_row(const dfm_type *type, const std::string &key);
+// The model NAME_gpu beside the model NAME, which a graphics card moves, and the reverse; nullptr: none.
+const dfm_type *on_card(const Registry &types, const dfm_type &model);
+const dfm_type *off_card(const Registry &types, const dfm_type &model);
+std::vector<std::string> model_keys(const Registry &types);  // parameters of any model
 
 }  // namespace dfm::scene

@@ -5,6 +5,8 @@
 
 #include "core/error.h"
 #include "core/handle.h"
+#include "plugin/context.h"
+#include "plugin/params.h"
 #include "plugin/quiet.h"
 #include "scene/build.h"
 #include "scene/planner/planner.h"
@@ -15,11 +17,6 @@ namespace dfm::scene {
 namespace {
 
 constexpr double kFrame = 1.0 / 60;  // s, where the scene names no step
-
-std::string short_id(const dfm_type &type) {
-  const std::string id = type.id;
-  return id.substr(id.rfind('.') + 1);
-}
 
 // Effects that work in this body with this model, in a world without other things. Warnings come when the
 // scene is built.
@@ -56,16 +53,16 @@ std::string lost(const std::vector<std::string> &here, const std::vector<std::st
 
 class Chooser {
  public:
-  Chooser(dfm_context *context, const Definition &def, const Types &types, json &tree)
-      : context_(context), def_(def), types_(types), tree_(tree) {}
+  Chooser(dfm_context *context, const Definition &def, json &tree)
+      : context_(context), def_(def), types_(context->registry), tree_(tree) {}
 
   json run() {
     json out = json::array();
     for (size_t i = 0; i < def_.bodies.size(); ++i) {
       const Body &b = def_.bodies[i];
       if (!b.device) continue;
-      const dfm_type &own = *types_.find(DFM_KIND_MODEL, b.model);
-      const dfm_type *const card = types_.on_card(own);
+      const dfm_type &own = *types_.try_find(DFM_KIND_MODEL, b.model);
+      const dfm_type *const card = on_card(types_, own);
       const bool requested = *b.device == "gpu";
       std::string why = card ? "" : no_model(own);
       if (card && !requested) why = slower_on(own, *card, i);
@@ -77,7 +74,7 @@ class Chooser {
       tree_[json::json_pointer(b.pointer + "/device")] = on_card ? "gpu" : "cpu";
       out.push_back({{"name", b.name},
                      {"device", on_card ? "gpu" : "cpu"},
-                     {"model", short_id(on_card ? *card : own)},
+                     {"model", short_name(on_card ? *card : own)},
                      {"why", why}});
     }
     return out;
@@ -86,10 +83,10 @@ class Chooser {
  private:
   std::string no_model(const dfm_type &own) const {
     std::vector<std::string> able;
-    for (const dfm_type *t : types_.models())
-      if (types_.on_card(*t)) able.push_back(short_id(*t));
+    for (const dfm_type *t : types_.list(DFM_KIND_MODEL))
+      if (on_card(types_, *t)) able.push_back(short_name(*t));
     return format("no loaded model computes what %s does on a graphics card%s%s; take \"device\": \"cpu\"",
-                  short_id(own).c_str(), able.empty() ? "" : "; that exists for ", join(able).c_str());
+                  short_name(own).c_str(), able.empty() ? "" : "; that exists for ", join(able).c_str());
   }
 
   // Why the processor is taken by the costs; empty: it is not, and faster_ says why.
@@ -97,15 +94,15 @@ class Chooser {
     if (def_.equilibrium) return "the processor finds equilibria";
     if (regimes_.empty()) {
       measured_ = read_costs();
-      regimes_ = regimes(context_, def_, types_, measured_);
+      regimes_ = regimes(context_, def_, measured_);
     }
     const BodyRegime &b = regimes_[body];
     const double step = def_.step > 0 ? def_.step : kFrame;
-    const double here = 1e3 * step * predicted_cost(measured_, short_id(own), b, step),
-                 there = 1e3 * step * predicted_cost(measured_, short_id(card), b, step);
+    const double here = 1e3 * step * predicted_cost(measured_, short_name(own), b, step),
+                 there = 1e3 * step * predicted_cost(measured_, short_name(card), b, step);
     if (!std::isfinite(here) || !std::isfinite(there))
       return format("no costs of %s are known; deform calibrate measures them where there is a card",
-                    std::isfinite(here) ? short_id(card).c_str() : short_id(own).c_str());
+                    std::isfinite(here) ? short_name(card).c_str() : short_name(own).c_str());
     const std::string times = format(
         "%u points that touch %s: %.2g ms per step of %.3g s on a card (costs of %s), %.2g ms on the "
         "processor (%s)",
@@ -117,7 +114,7 @@ class Chooser {
 
   std::string machine(const dfm_type &model) const {
     for (const MeasuredModel &m : measured_.models)
-      if (m.id == short_id(model) && !m.machine.empty()) return m.machine;
+      if (m.id == short_name(model) && !m.machine.empty()) return m.machine;
     return measured_.machine;
   }
 
@@ -139,7 +136,7 @@ class Chooser {
   // A parameter that the card's model lacks and that is not 0, which leaves out what it is for.
   static std::string lacking(const Params &params, const dfm_type &own, const dfm_type &card) {
     for (size_t k = 0; k < params.keys.size(); ++k)
-      if (find_row(&own, params.keys[k]) && !find_row(&card, params.keys[k]) &&
+      if (find_row(own, params.keys[k].c_str()) && !find_row(card, params.keys[k].c_str()) &&
           std::ranges::any_of(params.values[k], [](double v) { return v != 0; }))
         return params.keys[k];
     return "";
@@ -148,12 +145,12 @@ class Chooser {
   // Why the card would not move the body as the processor does; empty: it would. A driver that computes on
   // the processor counts where the card is asked for. Throws Error where the model of the processor refuses.
   std::string differs(const Body &b, const dfm_type &own, const dfm_type &card, bool any_driver) const {
-    const std::string name = short_id(card);
+    const std::string name = short_name(card);
     std::string key = lacking(b.params, own, card);
     for (const Params *given : of_materials(b))
       if (key.empty()) key = lacking(*given, own, card);
     for (const FieldFile &f : b.fields)
-      if (const dfm_param *row = find_row(&card, f.key); !row || !(row->flags & DFM_PARAM_PER_CELL))
+      if (const dfm_param *row = find_row(card, f.key.c_str()); !row || !(row->flags & DFM_PARAM_PER_CELL))
         key = f.key;
     if (!key.empty())
       return format("%s has no \"%s\" here; leave it out, or take \"device\": \"cpu\"", name.c_str(),
@@ -177,12 +174,12 @@ class Chooser {
       return format(
           "%s has no %s; switch it off in %s (deform explain says by what), take \"device\": "
           "\"cpu\", or name the model %s",
-          name.c_str(), effect.c_str(), short_id(own).c_str(), name.c_str());
+          name.c_str(), effect.c_str(), short_name(own).c_str(), name.c_str());
     return "";
   }
 
   static void set_hardware(const dfm_type &card, Params &params) {
-    const dfm_param *const row = find_row(&card, "device");
+    const dfm_param *const row = find_row(card, "device");
     for (int k = 0; row && row->names && row->names[k]; ++k) {
       if (std::string_view(row->names[k]) != "hardware") continue;
       params.keys.push_back(row->key);
@@ -198,7 +195,7 @@ class Chooser {
   static Params left_for(const Params &params, const dfm_type &own, const dfm_type &card) {
     Params out;
     for (size_t k = 0; k < params.keys.size(); ++k)
-      if (find_row(&card, params.keys[k]) || !find_row(&own, params.keys[k])) {
+      if (find_row(card, params.keys[k].c_str()) || !find_row(own, params.keys[k].c_str())) {
         out.keys.push_back(params.keys[k]);
         out.values.push_back(params.values[k]);
       }
@@ -210,12 +207,12 @@ class Chooser {
     json &model = tree_[json::json_pointer(b.pointer + "/model")];
     model["type"] = card.id;
     for (const std::string &key : b.params.keys)
-      if (find_row(&own, key) && !find_row(&card, key)) model["params"].erase(key);
+      if (find_row(own, key.c_str()) && !find_row(card, key.c_str())) model["params"].erase(key);
   }
 
   dfm_context *context_;
   const Definition &def_;
-  const Types &types_;
+  const Registry &types_;
   json &tree_;
   Measured measured_;
   std::vector<BodyRegime> regimes_;
@@ -224,9 +221,8 @@ class Chooser {
 
 }  // namespace
 
-bool whole_on_card(dfm_context *context, const Definition &def, const Types &types, const Body &body,
-                   const dfm_type &own) {
-  const dfm_type *const card = types.on_card(own);
+bool whole_on_card(dfm_context *context, const Definition &def, const Body &body, const dfm_type &own) {
+  const dfm_type *const card = on_card(context->registry, own);
   if (!card) return false;
   const std::vector<std::string> here = effects_of(context, def, body, own.id, {});
   try {
@@ -236,8 +232,8 @@ bool whole_on_card(dfm_context *context, const Definition &def, const Types &typ
   }
 }
 
-json choose_devices(dfm_context *context, const Definition &def, const Types &types, json &tree) {
-  return Chooser(context, def, types, tree).run();
+json choose_devices(dfm_context *context, const Definition &def, json &tree) {
+  return Chooser(context, def, tree).run();
 }
 
 }  // namespace dfm::scene

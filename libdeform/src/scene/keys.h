@@ -1,5 +1,4 @@
-// The table of all names in scene files; reader, error messages and the shipped schema are checked against
-// it.
+// All names in scene files, as the schema has them.
 #pragma once
 #include <cstdint>
 #include <string>
@@ -13,12 +12,10 @@ struct Key {
 };
 
 // Objects by kind ("scene", "time", "body", ...); kinds are also the names of the schema's definitions.
-const std::vector<std::string> &object_kinds();
 const std::vector<Key> &keys_of(const std::string &kind);
 
 // The allowed words of a value, if the format fixes them ("time.mode", "shape", ...).
 const std::vector<Key> &words_of(const std::string &what);
-const std::vector<std::string> &word_sets();
 // A word's place among them: its number in the public headers where it has one there; and back.
 uint32_t number_of(const std::string &what, const std::string &word);
 const std::string &word_of(const std::string &what, uint32_t number);

@@ -17,14 +17,16 @@ namespace {
 constexpr uint32_t kCheapCells = 1000;
 // m; a body that is longer is asked for the unit of its file.
 constexpr double kLongestBody = 10;
+// Of the keys of meshes.
+const std::string kCells = "cells ", kSurface = "surface ";
 
 // m. All cells of a lattice are alike, so the first one is enough.
 double longest_edge(const BodyMesh &mesh) {
   double longest = 0;
   for (int i = 0; i < 4; ++i)
     for (int j = 0; j < i; ++j) {
-      const double *const a = &mesh.points[3 * size_t{mesh.tets[i]}],
-                          *const b = &mesh.points[3 * size_t{mesh.tets[j]}];
+      const double *const a = &mesh.points[3 * size_t{mesh.info.tets[i]}],
+                          *const b = &mesh.points[3 * size_t{mesh.info.tets[j]}];
       longest = std::max(longest, std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]));
     }
   return longest;
@@ -32,28 +34,31 @@ double longest_edge(const BodyMesh &mesh) {
 
 // m, of the skin's edges. Each cell of a lattice has points of the skin.
 double longest_of_skin(const BodyMesh &mesh) {
-  if (!mesh.inside) return kLongestEdge * longest_edge(mesh);
+  if (!mesh.info.inside) return kLongestEdge * longest_edge(mesh);
   double longest = 0;
   for (const size_t k : {1, 3, 4})
     for (size_t c = 0; c < 3; ++c)
-      longest = std::max(
-          longest, mesh.points[3 * size_t{mesh.nodes[k]} + c] - mesh.points[3 * size_t{mesh.nodes[0]} + c]);
+      longest = std::max(longest, mesh.points[3 * size_t{mesh.info.cells[k]} + c] -
+                                      mesh.points[3 * size_t{mesh.info.cells[0]} + c]);
   return longest;
+}
+
+std::vector<double> scaled(const dfm_mesh_info &mesh, double scale) {
+  std::vector<double> out(mesh.points, mesh.points + 3 * size_t{mesh.npoint});
+  for (double &x : out) x *= scale;
+  return out;
 }
 
 }  // namespace
 
 double BodyMesh::share_of(uint32_t tet) const {
-  if (!inside) return share ? share[tet] : 1;
-  const double *const weights = inside + size_t{kInsidePoints} * (tet / cell_kind(cell).tets);
+  if (!info.inside) return info.share ? info.share[tet] : 1;
+  const double *const weights = info.inside + size_t{kInsidePoints} * (tet / cell_kind(info.cell).tets);
   return std::accumulate(weights, weights + kInsidePoints, 0.0);
 }
 
 MeshFiles::~MeshFiles() {
-  for (auto &[path, mesh] : cells_) dfm_mesh_destroy(mesh);
-  for (auto &[key, mesh] : fillings_) dfm_mesh_destroy(mesh);
-  for (auto &[key, mesh] : lattices_) dfm_mesh_destroy(mesh);
-  for (auto &[path, mesh] : surfaces_) dfm_mesh_destroy(mesh);
+  for (auto &[key, mesh] : meshes_) dfm_mesh_destroy(mesh);
 }
 
 dfm_mesh_info MeshFiles::info_of(dfm_mesh_handle mesh, const std::string &pointer) const {
@@ -70,14 +75,14 @@ std::string MeshFiles::path_of(const std::string &path) const {
 }
 
 bool MeshFiles::has_cells(const std::string &path, const std::string &pointer) {
-  if (cells_.count(path)) return true;
+  if (meshes_.count(kCells + path)) return true;
   if (surface_only_.count(path)) return false;
   dfm_mesh_handle mesh = 0;
   def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_ANY, &mesh), pointer);
   const bool cells = info_of(mesh, pointer).ntet > 0;
   if (!cells) surface_only_.insert(path);
   // a surface is perhaps known already, as that of a body
-  if (!(cells ? cells_ : surfaces_).try_emplace(path, mesh).second)
+  if (!meshes_.try_emplace((cells ? kCells : kSurface) + path, mesh).second)
     def_.require(dfm_mesh_destroy(mesh), pointer);
   return cells;
 }
@@ -87,7 +92,7 @@ std::string MeshFiles::make(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string name = format("/dev/null/%s %a %a %a %u %u", m.kind.c_str(), m.size[0], m.size[1],
                                   m.size[2], m.cells, m.order);
-  dfm_mesh_handle &mesh = cells_[name];
+  dfm_mesh_handle &mesh = meshes_[kCells + name];
   if (mesh) return name;
   def_.require(dfm_mesh_make(context_, m.kind.c_str(), m.size, DFM_MESH_CELLS, m.cells, &mesh),
                b.pointer + "/mesh");
@@ -106,9 +111,9 @@ std::string MeshFiles::make(const Body &b) {
 }
 
 dfm_mesh_handle MeshFiles::cells(const std::string &path, const std::string &pointer) {
-  dfm_mesh_handle &mesh = cells_[path];
-  if (!mesh) def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_CELLS, &mesh), pointer);
-  return mesh;
+  return once(kCells + path, pointer, [&](dfm_mesh_handle *mesh) {
+    return dfm_mesh_load(context_, path.c_str(), DFM_MESH_CELLS, mesh);
+  });
 }
 
 // Of a generated mesh, no coarser than its own. A round surface of triangles as large as cells has less
@@ -117,7 +122,7 @@ dfm_mesh_handle MeshFiles::cells(const std::string &path, const std::string &poi
 std::string MeshFiles::make_surface(const Body &b) {
   const MadeMesh &m = b.made;
   const std::string pointer = b.pointer + "/mesh";
-  const dfm_mesh_info own = info_of(cells_.at(make(b)), pointer);
+  const dfm_mesh_info own = info_of(cells(make(b), pointer), pointer);
   const double hexahedra = b.lattice_cells
                                ? b.lattice_cells
                                : std::min(kMaxLattice, own.volume * std::pow(b.scale / b.lattice_size, 3));
@@ -125,23 +130,24 @@ std::string MeshFiles::make_surface(const Body &b) {
   const auto n =
       uint32_t(std::lround(4.0 * own.ntriangle * std::pow(std::max(1.0, wanted / own.ntet), 2.0 / 3)));
   const std::string kind = m.kind == "bricks" ? "beam" : m.kind, name = make(b) + format(" %u", n);
-  dfm_mesh_handle &mesh = surfaces_[name];
-  if (!mesh) def_.require(dfm_mesh_make(context_, kind.c_str(), m.size, DFM_MESH_SURFACE, n, &mesh), pointer);
+  once(kSurface + name, pointer, [&](dfm_mesh_handle *mesh) {
+    return dfm_mesh_make(context_, kind.c_str(), m.size, DFM_MESH_SURFACE, n, mesh);
+  });
   return name;
 }
 
 dfm_mesh_handle MeshFiles::surface(const std::string &path, const std::string &pointer) {
-  dfm_mesh_handle &mesh = surfaces_[path];
-  if (!mesh) def_.require(dfm_mesh_load(context_, path.c_str(), DFM_MESH_SURFACE, &mesh), pointer);
-  return mesh;
+  return once(kSurface + path, pointer, [&](dfm_mesh_handle *mesh) {
+    return dfm_mesh_load(context_, path.c_str(), DFM_MESH_SURFACE, mesh);
+  });
 }
 
 dfm_mesh_handle MeshFiles::filling(const std::string &path, const Body &b) {
   const uint32_t wanted = b.fill.value_or(kFillCells);
-  dfm_mesh_handle &mesh = fillings_[{path, wanted}];
-  if (!mesh)
-    def_.require(dfm_mesh_fill(surface(path, b.pointer + "/mesh"), wanted, &mesh),
-                 b.pointer + (b.fill ? "/fill" : "/mesh"));
+  const dfm_mesh_handle skin = surface(path, b.pointer + "/mesh");
+  const dfm_mesh_handle mesh =
+      once(format("fill %u ", wanted) + path, b.pointer + (b.fill ? "/fill" : "/mesh"),
+           [&](dfm_mesh_handle *made) { return dfm_mesh_fill(skin, wanted, made); });
   if (!b.fill)
     context_->logf(DFM_LOG_WARNING,
                    "body '%s': %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": "
@@ -151,12 +157,10 @@ dfm_mesh_handle MeshFiles::filling(const std::string &path, const Body &b) {
 }
 
 dfm_mesh_handle MeshFiles::lattice(const std::string &path, const Body &b) {
-  dfm_mesh_handle &mesh = lattices_[{path, b.lattice_cells, b.lattice_size / b.scale}];
-  if (!mesh)
-    def_.require(dfm_mesh_lattice(surface(path, b.pointer + "/mesh"), b.lattice_cells,
-                                  b.lattice_size / b.scale, &mesh),
-                 b.pointer + "/lattice");
-  return mesh;
+  const dfm_mesh_handle skin = surface(path, b.pointer + "/mesh");
+  const double size = b.lattice_size / b.scale;
+  return once(format("lattice %u %a ", b.lattice_cells, size) + path, b.pointer + "/lattice",
+              [&](dfm_mesh_handle *mesh) { return dfm_mesh_lattice(skin, b.lattice_cells, size, mesh); });
 }
 
 // Keys that go with one kind of mesh file only.
@@ -182,25 +186,8 @@ void MeshFiles::check_keys(const Body &b, bool has_cells, bool renumbered) const
 }
 
 void MeshFiles::take_cells(dfm_mesh_handle mesh, const Body &b, BodyMesh &out) const {
-  const dfm_mesh_info info = out.info = info_of(mesh, b.pointer + "/mesh");
-  out.tets = info.tets;
-  out.file_point = info.file_point;
-  out.cell = info.cell;
-  out.nodes = info.cells;
-  out.group_names = info.group_names;
-  out.cell_group = info.cell_group;
-  out.faces = info.faces;
-  out.face_group = info.face_group;
-  out.nface = info.nface;
-  out.file_cell = info.file_cell;
-  out.share = info.share;
-  out.inside = info.inside;
-  out.npoint = info.npoint;
-  out.ntet = info.ntet;
-  out.ngroup = info.ngroup;
-  out.dropped_cells = info.dropped_cells;
-  out.points.resize(3 * size_t(info.npoint));
-  for (size_t i = 0; i < out.points.size(); ++i) out.points[i] = info.points[i] * b.scale;
+  const dfm_mesh_info &info = out.info = info_of(mesh, b.pointer + "/mesh");
+  out.points = scaled(info, b.scale);
   for (int k = 0; k < 3; ++k) {
     out.lo[k] = info.lo[k] * b.scale;
     out.hi[k] = info.hi[k] * b.scale;
@@ -219,8 +206,7 @@ void MeshFiles::take_skin(dfm_mesh_handle mesh, const Body &b, const std::string
   skin.npoint = info.npoint;
   skin.ntriangle = info.ntriangle;
   skin.ngroup = info.ngroup;
-  skin.points.resize(3 * size_t(info.npoint));
-  for (size_t i = 0; i < skin.points.size(); ++i) skin.points[i] = info.points[i] * b.scale;
+  skin.points = scaled(info, b.scale);
 }
 
 // Contact with a plane acts at the points of the surface. If triangles were much larger than cells, the body
@@ -287,10 +273,11 @@ void MeshFiles::warn_voxel_steps(const Body &b, const BodyMesh &mesh) const {
       "body '%s' is drawn and touches with the %u triangles around its %u cells, in steps of about "
       "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
       "\"boundary\"%s make smaller steps",
-      b.name.c_str(), cells.ntriangle, mesh.inside ? cells.ncell : cells.ntet, b.scale * cells.edge_median,
-      100 * (cells.ntet / filled - 1), mesh.skin.ntriangle,
+      b.name.c_str(), cells.ntriangle, mesh.info.inside ? cells.ncell : cells.ntet,
+      b.scale * cells.edge_median, 100 * (cells.ntet / filled - 1), mesh.skin.ntriangle,
       b.made.kind.empty() ? b.mesh.c_str() : "the surface",
-      mesh.inside ? "; more cells (\"lattice\")" : ", as a body that is cut needs it; more cells (\"fill\")");
+      mesh.info.inside ? "; more cells (\"lattice\")"
+                       : ", as a body that is cut needs it; more cells (\"fill\")");
 }
 
 void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
@@ -301,8 +288,7 @@ void MeshFiles::load(Obstacle &o, std::vector<double> &points) {
   o.def.npoint = info.npoint;
   o.def.ntriangle = info.ntriangle;
   if (o.scale == 1) return;
-  points.assign(o.def.points, o.def.points + 3 * size_t(info.npoint));
-  for (double &x : points) x *= o.scale;
+  points = scaled(info, o.scale);
   o.def.points = points.data();
 }
 

@@ -5,8 +5,6 @@
 #include <map>
 #include <set>
 #include <string>
-#include <tuple>
-#include <utility>
 
 #include "scene/select.h"
 #include "scene/split.h"
@@ -32,6 +30,13 @@ class MeshFiles {
   void load(Obstacle &obstacle, std::vector<double> &points);
 
  private:
+  // The mesh of this key, made by the first call.
+  template <class Make>
+  dfm_mesh_handle once(const std::string &key, const std::string &pointer, Make &&make) {
+    dfm_mesh_handle &mesh = meshes_[key];
+    if (!mesh) def_.require(make(&mesh), pointer);
+    return mesh;
+  }
   dfm_mesh_info info_of(dfm_mesh_handle mesh, const std::string &pointer) const;
   // reads the file; else it has a surface alone
   bool has_cells(const std::string &path, const std::string &pointer);
@@ -52,12 +57,8 @@ class MeshFiles {
   dfm_context *context_;
   const Definition &def_;
   std::set<std::string> surface_only_;
-  std::map<std::string, dfm_mesh_handle> cells_;
-  std::map<std::string, dfm_mesh_handle> surfaces_;
-  std::map<std::pair<std::string, uint32_t>, dfm_mesh_handle> fillings_;  // by file and number of cells
-  // by file, number and size of cells
-  std::map<std::tuple<std::string, uint32_t, double>, dfm_mesh_handle> lattices_;
-  std::deque<Triangles> split_;  // by body, lent to its BodyMesh
+  std::map<std::string, dfm_mesh_handle> meshes_;  // by what is made, and its file or name
+  std::deque<Triangles> split_;                    // by body, lent to its BodyMesh
 };
 
 }  // namespace dfm::scene

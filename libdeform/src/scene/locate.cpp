@@ -51,92 +51,43 @@ double from_cell(const double *const corner[4], const double *point, double weig
   return away;
 }
 
+void corners_of(const BodyMesh &mesh, uint32_t cell, const double *corner[4]) {
+  for (size_t k = 0; k < 4; ++k) corner[k] = &mesh.points[3 * size_t{mesh.info.tets[4 * size_t{cell} + k]}];
+}
+
+Array<RestBox> boxes_of(const BodyMesh &mesh) {
+  Array<RestBox> out;
+  for (uint32_t c = 0; c < mesh.info.ntet; ++c) {
+    const double *corner[4];
+    corners_of(mesh, c, corner);
+    Extent box;
+    for (const double *x : corner) box.add(load3(x));
+    out.push_back({box.lo, box.hi});
+  }
+  return out;
+}
+
 }  // namespace
 
-Locator::Locator(const BodyMesh &mesh) : mesh_(mesh) {
-  const Extent box = extent_of(mesh.points);
-  const Vec3 hi = box.hi;
-  store3(lo_, box.lo);
-  // About one cubic bin per cell; a bin is never thinner than the thinnest extent of the body requires.
-  const double extent = std::max({hi[0] - lo_[0], hi[1] - lo_[1], hi[2] - lo_[2]});
-  double volume = 1;
-  for (int k = 0; k < 3; ++k) volume *= std::max(hi[k] - lo_[k], 1e-3 * extent) / extent;
-  const double edge = extent * std::cbrt(volume / std::max(1u, mesh.ntet));
-  least_width_ = INFINITY;
-  for (int k = 0; k < 3; ++k) {
-    n_[k] = std::clamp(int((hi[k] - lo_[k]) / edge), 1, 1000);
-    width_[k] = std::max(hi[k] - lo_[k], 1e-3 * extent) / n_[k];
-    least_width_ = std::min(least_width_, width_[k]);
-  }
-  // Two passes over the bins that each cell's box overlaps: count, then fill in the order of the cells.
-  begin_.assign(size_t(n_[0]) * size_t(n_[1]) * size_t(n_[2]) + 1, 0);
-  for (int pass = 0; pass < 2; ++pass) {
-    std::vector<uint32_t> at(begin_.begin(), begin_.end() - 1);
-    for (uint32_t c = 0; c < mesh.ntet; ++c) {
-      int first[3], last[3];
-      for (int k = 0; k < 3; ++k) {
-        double least = INFINITY, most = -INFINITY;
-        for (int j = 0; j < 4; ++j) {
-          const double x = mesh.points[3 * size_t(mesh.tets[4 * size_t(c) + size_t(j)]) + size_t(k)];
-          least = std::min(least, x);
-          most = std::max(most, x);
-        }
-        first[k] = bin(least, k);
-        last[k] = bin(most, k);
-      }
-      for (int i = first[0]; i <= last[0]; ++i)
-        for (int j = first[1]; j <= last[1]; ++j)
-          for (int k = first[2]; k <= last[2]; ++k) {
-            const size_t b = (size_t(i) * size_t(n_[1]) + size_t(j)) * size_t(n_[2]) + size_t(k);
-            if (pass == 0) ++begin_[b + 1];
-            else cell_[at[b]++] = c;
-          }
-    }
-    if (pass == 1) break;
-    for (size_t b = 1; b < begin_.size(); ++b) begin_[b] += begin_[b - 1];
-    cell_.resize(begin_.back());
-  }
-}
-
-int Locator::bin(double x, int axis) const {
-  return int(std::clamp((x - lo_[axis]) / width_[axis], 0.0, double(n_[axis] - 1)));
-}
-
-void Locator::look(int i, int j, int k, const double *point, Best &best) const {
-  const size_t b = (size_t(i) * size_t(n_[1]) + size_t(j)) * size_t(n_[2]) + size_t(k);
-  for (uint32_t n = begin_[b]; n < begin_[b + 1]; ++n) {
-    const uint32_t c = cell_[n], *const t = mesh_.tets + 4 * size_t(c);
-    if (best.away == 0 && c >= best.cell) return;
-    const double *const corner[4] = {&mesh_.points[3 * size_t(t[0])], &mesh_.points[3 * size_t(t[1])],
-                                     &mesh_.points[3 * size_t(t[2])], &mesh_.points[3 * size_t(t[3])]};
-    Best here = {0, c, {}};
-    here.away = from_cell(corner, point, here.weights);
-    if (here.away < best.away || (here.away == best.away && c < best.cell)) best = here;
-  }
-}
+Locator::Locator(const BodyMesh &mesh) : mesh_(mesh), box_(boxes_of(mesh)), tree_(Memory::standard(), box_) {}
 
 double Locator::find(const double point[3], uint32_t corners[4], double weights[4]) const {
-  Best best = {INFINITY, UINT32_MAX, {}};
-  const int at[3] = {bin(point[0], 0), bin(point[1], 1), bin(point[2], 2)};
-  const int rings = std::max({n_[0], n_[1], n_[2]});
-  // Bins of ring r lie at least r - 1 bins away; a point outside the grid is nearer to none of them than
-  // its projection.
-  for (int r = 0; r < rings && !(best.away < (r - 1) * least_width_) && !(r > 0 && best.away == 0); ++r) {
-    int first[3], last[3];
-    for (int k = 0; k < 3; ++k) {
-      first[k] = std::max(at[k] - r, 0);
-      last[k] = std::min(at[k] + r, n_[k] - 1);
-    }
-    for (int i = first[0]; i <= last[0]; ++i)
-      for (int j = first[1]; j <= last[1]; ++j)
-        for (int k = first[2]; k <= last[2]; ++k)
-          if (std::max({std::abs(i - at[0]), std::abs(j - at[1]), std::abs(k - at[2])}) == r)
-            look(i, j, k, point, best);
-  }
-  if (best.cell == UINT32_MAX) return best.away;
-  std::copy_n(mesh_.tets + 4 * size_t(best.cell), 4, corners);
-  std::copy_n(best.weights, 4, weights);
-  return best.away;
+  constexpr double kRounding = 1e-12;  // of the distances of a cell and of its box
+  double away = INFINITY, limit2 = INFINITY;
+  uint32_t cell = UINT32_MAX;
+  tree_.near(load3(point), limit2, [&](uint32_t c) {
+    const double *corner[4];
+    double here[4] = {};
+    corners_of(mesh_, c, corner);
+    const double distance = from_cell(corner, point, here);
+    if (distance > away || (distance == away && c > cell)) return;
+    away = distance;
+    cell = c;
+    std::copy_n(here, 4, weights);
+    limit2 = std::pow(away + kRounding * (away + mesh_.size), 2);
+  });
+  if (cell != UINT32_MAX) std::copy_n(mesh_.info.tets + 4 * size_t{cell}, 4, corners);
+  return away;
 }
 
 }  // namespace dfm::scene

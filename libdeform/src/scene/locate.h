@@ -1,8 +1,6 @@
-// Finds the cell that contains a point, for probes and for surface points coupled to cells, by the bins of a
-// uniform grid.
+// Finds the cell that contains a point, for probes and for surface points coupled to cells.
 #pragma once
-#include <cstdint>
-#include <vector>
+#include "geometry/rest_tree.h"
 
 namespace dfm::scene {
 
@@ -18,17 +16,9 @@ class Locator {
   double find(const double point[3], uint32_t corners[4], double weights[4]) const;
 
  private:
-  struct Best {
-    double away;
-    uint32_t cell;
-    double weights[4];
-  };
-  int bin(double x, int axis) const;
-  void look(int i, int j, int k, const double *point, Best &best) const;
   const BodyMesh &mesh_;
-  int n_[3];
-  double lo_[3], width_[3], least_width_;
-  std::vector<uint32_t> begin_, cell_;  // cells of each bin, ascending
+  Array<RestBox> box_;
+  RestTree tree_;
 };
 
 }  // namespace dfm::scene

@@ -131,8 +131,7 @@ void refuse_mesh(const std::string &path, const std::string &text) {
       DFM_E_FORMAT,
       "%s: this is a mesh (%s), and a scene is expected; write one beside it: {\"format\": \"deform-scene\", "
       "\"version\": 1, \"time\": {\"duration\": 1}, \"bodies\": [{\"name\": \"body\", \"mesh\": %s}]}, or "
-      "look at "
-      "the mesh: deform mesh info %s",
+      "look at the mesh: deform mesh info %s",
       path.c_str(), kind.c_str(), name.dump(-1, ' ', false, json::error_handler_t::replace).c_str(),
       shell_word(path).c_str());
 }

@@ -6,6 +6,8 @@
 
 #include "core/names.h"
 #include "core/path.h"
+#include "plugin/params.h"
+#include "plugin/registry.h"
 #include "scene/keys.h"
 #include "state/step_sizes.h"
 
@@ -14,93 +16,24 @@ namespace dfm::scene {
 // ---- loaded types and their parameters --------------------------------------------------------------------
 
 namespace {
-
-std::string short_name(const dfm_type *type) {
-  const char *dot = std::strrchr(type->id, '.');
-  return dot ? dot + 1 : type->id;
-}
-
-const dfm_param &row(const dfm_type *type, uint32_t i) {
-  return *reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type->params) +
-                                              size_t(i) * type->param_size);
-}
-
-}  // namespace
-
-Types::Types(dfm_context *context) {
-  dfm_plugin_visit(
-      context,
-      [](void *user, const dfm_type *type, const char *) {
-        static_cast<std::vector<const dfm_type *> *>(user)->push_back(type);
-      },
-      &types_);
-  dfm_plugin_visit_passed(
-      context,
-      [](void *user, const char *file, const char *reason) {
-        static_cast<std::vector<std::string> *>(user)->push_back(std::string(file) + ": " + reason);
-      },
-      &passed_over_);
-}
-
-const dfm_type *Types::find(uint32_t kind, const std::string &name) const {
-  for (const dfm_type *t : types_)
-    if (t->kind == kind && name == t->id) return t;
-  for (const dfm_type *t : types_)
-    if (t->kind == kind && name == short_name(t)) return t;
-  return nullptr;
-}
-
-std::vector<std::string> Types::names(uint32_t kind) const {
-  std::vector<std::string> out;
-  for (const dfm_type *t : types_)
-    if (t->kind == kind) out.push_back(short_name(t));
-  return out;
-}
-
-std::string Types::passed_over(const std::string &name) const {
-  for (const std::string &line : passed_over_)
-    if (line.find(name) != std::string::npos) return line;
-  return passed_over_.empty() ? "" : passed_over_.front();
-}
-
-std::vector<const dfm_type *> Types::models() const {
-  std::vector<const dfm_type *> out;
-  for (const dfm_type *t : types_)
-    if (t->kind == DFM_KIND_MODEL) out.push_back(t);
-  return out;
-}
-
-namespace {
 constexpr std::string_view kOnCard = "_gpu";
 }
 
-const dfm_type *Types::on_card(const dfm_type &model) const {
-  return find(DFM_KIND_MODEL, std::string(model.id).append(kOnCard));
+const dfm_type *on_card(const Registry &types, const dfm_type &model) {
+  return types.try_find(DFM_KIND_MODEL, std::string(model.id).append(kOnCard));
 }
 
-const dfm_type *Types::off_card(const dfm_type &model) const {
+const dfm_type *off_card(const Registry &types, const dfm_type &model) {
   const std::string_view id = model.id;
   if (!id.ends_with(kOnCard)) return nullptr;
-  return find(DFM_KIND_MODEL, std::string(id.substr(0, id.size() - kOnCard.size())));
+  return types.try_find(DFM_KIND_MODEL, id.substr(0, id.size() - kOnCard.size()));
 }
 
-std::vector<std::string> Types::model_keys() const {
+std::vector<std::string> model_keys(const Registry &types) {
   std::vector<std::string> out;
-  for (const dfm_type *t : types_)
-    for (uint32_t i = 0; t->kind == DFM_KIND_MODEL && i < t->nparam; ++i) out.push_back(row(t, i).key);
+  for (const dfm_type *t : types.list(DFM_KIND_MODEL))
+    for (uint32_t i = 0; i < t->nparam; ++i) out.push_back(t->params[i].key);
   return out;
-}
-
-std::vector<const dfm_param *> rows_of(const dfm_type *type) {
-  std::vector<const dfm_param *> out;
-  for (uint32_t i = 0; i < type->nparam; ++i) out.push_back(&row(type, i));
-  return out;
-}
-
-const dfm_param *find_row(const dfm_type *type, const std::string &key) {
-  for (uint32_t i = 0; i < type->nparam; ++i)
-    if (key == row(type, i).key) return &row(type, i);
-  return nullptr;
 }
 
 dfm_params Params::view() {
@@ -162,13 +95,13 @@ Params read_params(const Node &params, const dfm_type *type) {
   Params out;
   if (!params.value().is_object()) params.fail("expected an object of parameters by key");
   std::vector<std::string> valid;
-  for (uint32_t i = 0; i < type->nparam; ++i) valid.push_back(row(type, i).key);
+  for (uint32_t i = 0; i < type->nparam; ++i) valid.push_back(type->params[i].key);
   // "mu" is shorthand for mu_C = mu_S; the law's own table may hold one or both.
-  const bool shorthand = !find_row(type, "mu") && find_row(type, "mu_C");
+  const bool shorthand = !find_row(*type, "mu") && find_row(*type, "mu_C");
   if (shorthand) valid.push_back("mu");
   for (const auto &entry : params.value().items()) {
     const Node value = params.member(entry.key());
-    const dfm_param *p = find_row(type, shorthand && entry.key() == "mu" ? "mu_C" : entry.key());
+    const dfm_param *p = find_row(*type, shorthand && entry.key() == "mu" ? "mu_C" : entry.key().c_str());
     if (!p) {
       const std::string near = nearest(entry.key(), valid);
       if (valid.empty()) value.fail("%s has no parameters", type->id);
@@ -184,13 +117,25 @@ Params read_params(const Node &params, const dfm_type *type) {
   return out;
 }
 
-const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types) {
+// A file that was not loaded and why: the one that speaks of this type, else the first; "": all were.
+static std::string passed_over(const Registry &types, const std::string &name) {
+  std::string first;
+  for (const PassedFile &p : types.passed()) {
+    const std::string line = p.file + ": " + p.reason;
+    if (line.find(name) != std::string::npos) return line;
+    if (first.empty()) first = line;
+  }
+  return first;
+}
+
+const dfm_type *read_type(const Node &name, uint32_t kind, const Registry &types) {
   const std::string wanted = name.text();
-  if (const dfm_type *type = types.find(kind, wanted)) return type;
-  const std::vector<std::string> loaded = types.names(kind);
+  if (const dfm_type *type = types.try_find(kind, wanted)) return type;
+  std::vector<std::string> loaded;
+  for (const dfm_type *type : types.list(kind)) loaded.push_back(short_name(*type));
   const char *what = kind == DFM_KIND_MODEL ? "model" : "law";
   const std::string meant = did_you_mean(wanted, loaded);
-  const std::string passed = types.passed_over(wanted);
+  const std::string passed = passed_over(types, wanted);
   // A name in reverse-DNS form that nothing resembles is that of a plugin in a folder of its own.
   const bool elsewhere = meant.empty() && passed.empty() && wanted.find('.') != std::string::npos;
   fail(DFM_E_UNSUPPORTED, "%s: %s: no loaded plugin offers the %s \"%s\"; loaded: %s%s%s%s",
@@ -362,11 +307,11 @@ void read_effects(const Node &scene, Definition &def) {
 }
 
 // A further entry of a material: numbers, or a word of an enumeration that some model has under this key.
-std::vector<double> read_extra(const Node &value, const std::string &key, const Types &types) {
+std::vector<double> read_extra(const Node &value, const std::string &key, const Registry &types) {
   std::vector<double> out;
   if (value.value().is_string()) {
-    for (const dfm_type *model : types.models()) {
-      const dfm_param *row = find_row(model, key);
+    for (const dfm_type *model : types.list(DFM_KIND_MODEL)) {
+      const dfm_param *row = find_row(*model, key.c_str());
       const bool automatic = row && (row->flags & DFM_PARAM_AUTO) && value.text() == kAuto;
       if (!automatic && (!row || !(row->flags & DFM_PARAM_ENUM) || !row->names)) continue;
       const double number = automatic ? row->def : enum_value(value, row->names);
@@ -388,9 +333,9 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
   if (!scene.has("materials")) return;
   const Node materials = scene.member("materials");
   if (!materials.value().is_object()) materials.fail("expected an object of materials by name");
-  const std::vector<std::string> model_keys = context.types.model_keys();
+  const std::vector<std::string> of_models = model_keys(context.types);
   for (const auto &entry : materials.value().items()) {
-    const Node node = materials.member(entry.key()).object("material", model_keys);
+    const Node node = materials.member(entry.key()).object("material", of_models);
     Material m;
     m.pointer = node.pointer();
     m.name = m.title = entry.key();
@@ -569,7 +514,7 @@ void read_output(const Node &scene, Definition &def) {
 
 }  // namespace
 
-Definition read_scene(json &tree, const std::string &file, const Types &types) {
+Definition read_scene(json &tree, const std::string &file, const Registry &types) {
   const Node scene(&tree, "", &file);
   scene.object("scene");
   const Node format = scene.at("format"), version = scene.at("version");

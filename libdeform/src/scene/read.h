@@ -9,20 +9,20 @@
 namespace dfm::scene {
 
 struct ReadContext {
-  const Types &types;
+  const Registry &types;
   std::vector<std::string> materials, titles;  // keys so far, and names for the sides of rules
   std::vector<std::string> sides;              // bodies and obstacles
   std::vector<std::string> bodies{};
   bool planned = false;  // the planner chooses models that are not named
 };
 
-Definition read_scene(json &tree, const std::string &file, const Types &types);
+Definition read_scene(json &tree, const std::string &file, const Registry &types);
 
 // Parts that more than one file needs.
 uint32_t read_count(const Node &node, double least, double most);  // a whole number
 Params read_params(const Node &params, const dfm_type *type);
 std::vector<double> read_param(const Node &value, const dfm_param &row);
-const dfm_type *read_type(const Node &name, uint32_t kind, const Types &types);
+const dfm_type *read_type(const Node &name, uint32_t kind, const Registry &types);
 int32_t integrator_of(const Node &holder);  // its key `integrator`, DFM_INTEGRATOR_*
 dfm_sine read_sine(const Node &sine, bool scalar);
 void check_rising(const Node &key, double previous, double t);

@@ -250,7 +250,7 @@ void read_precision(const Node &model, Params &params) {
   params.values.push_back({1});
 }
 
-ModelWords read_model(const Node &node, const Types &types) {
+ModelWords read_model(const Node &node, const Registry &types) {
   ModelWords out;
   const dfm_type *const type = read_type(node.at("type"), DFM_KIND_MODEL, types);
   out.type = type->id;
@@ -265,7 +265,7 @@ ModelWords read_model(const Node &node, const Types &types) {
   return out;
 }
 
-void read_switches(const Node &list, const Types &types, Body &b) {
+void read_switches(const Node &list, const Registry &types, Body &b) {
   for (const Node &entry : list.items()) {
     Switch s;
     entry.object("switch");
@@ -281,7 +281,7 @@ void read_switches(const Node &list, const Types &types, Body &b) {
 }
 
 // A model by name only, or with its inputs.
-ModelWords read_word(const Node &rule, const char *key, const Types &types) {
+ModelWords read_word(const Node &rule, const char *key, const Registry &types) {
   if (!rule.has(key)) return {};
   const Node node = rule.member(key);
   if (node.value().is_object()) return read_model(node.object("switch_model"), types);
@@ -290,7 +290,7 @@ ModelWords read_word(const Node &rule, const char *key, const Types &types) {
   return out;
 }
 
-void read_rule(const Node &rule, const Types &types, SwitchRule &out) {
+void read_rule(const Node &rule, const Registry &types, SwitchRule &out) {
   rule.object("switch_rule");
   out.touching = read_word(rule, "touching", types);
   out.near = read_word(rule, "near", types);
@@ -321,11 +321,11 @@ void check_open(const Node &body, const Node &model) {
 }
 
 // The model of a card has its own defaults: it is no other name for that of the processor.
-void read_device(const Node &body, const dfm_type *named, const Types &types, Body &b) {
+void read_device(const Node &body, const dfm_type *named, const Registry &types, Body &b) {
   if (!body.has("device")) return;
   const Node node = body.member("device");
   const std::string device = node.word("device");
-  const dfm_type *const other = types.off_card(*named);
+  const dfm_type *const other = off_card(types, *named);
   if (device != "gpu" && other)
     node.fail("%s is the model of a graphics card; name %s in /model/type, or take \"device\": \"gpu\"",
               named->id, other->id);

@@ -2,8 +2,11 @@
 // anisotropy, surface and fill.
 #include <algorithm>
 #include <cmath>
+#include <span>
 
 #include "core/names.h"
+#include "plugin/params.h"
+#include "plugin/registry.h"
 #include "scene/keys.h"
 #include "scene/load.h"
 #include "scene/read.h"
@@ -16,14 +19,16 @@ constexpr char kAxis[] = "anisotropy_axis";
 constexpr double kMaxCells = 1e8;  // dfm_mesh_fill and dfm_body_create say the same of these two
 constexpr double kWidestSupport = 10;
 
+std::span<const dfm_param> rows_of(const dfm_type &type) { return {type.params, type.nparam}; }
+
 void read_fields(const Node &node, const dfm_type *model, Body &b) {
   if (!node.value().is_object()) node.fail("expected an object of files by parameter of the model");
   std::vector<std::string> valid;
-  for (const dfm_param *row : rows_of(model))
-    if (row->flags & DFM_PARAM_PER_CELL) valid.push_back(row->key);
+  for (const dfm_param &row : rows_of(*model))
+    if (row.flags & DFM_PARAM_PER_CELL) valid.push_back(row.key);
   for (const auto &entry : node.value().items()) {
     const Node value = node.member(entry.key());
-    const dfm_param *row = find_row(model, entry.key());
+    const dfm_param *row = find_row(*model, entry.key().c_str());
     if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
       const std::string meant = row ? "" : did_you_mean(entry.key(), valid);
       const std::string has = valid.empty() ? "it has none" : "it has: " + join(valid);
@@ -48,14 +53,14 @@ void read_materials_by_group(const Node &node, const ReadContext &context, Body 
 void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) {
   if (!params.value().is_object()) params.fail("expected an object of parameters by key");
   std::vector<std::string> valid;
-  for (const dfm_param *row : rows_of(model)) {
-    const std::string key = row->key;
+  for (const dfm_param &row : rows_of(*model)) {
+    const std::string key = row.key;
     if (key.rfind(kPrefix, 0) == 0 && key != kAxis) valid.push_back(key.substr(sizeof kPrefix - 1));
   }
   for (const auto &entry : params.value().items()) {
     const Node value = params.member(entry.key());
-    const dfm_param *row = find_row(model, kPrefix + entry.key());
-    if (!row) row = find_row(model, entry.key());
+    const dfm_param *row = find_row(*model, (kPrefix + entry.key()).c_str());
+    if (!row) row = find_row(*model, entry.key().c_str());
     if (!row)
       value.fail("%s has no anisotropy parameter \"%s\"%s; it has: %s", model->id, entry.key().c_str(),
                  did_you_mean(entry.key(), valid).c_str(), valid.empty() ? "none" : join(valid).c_str());
@@ -68,13 +73,13 @@ void read_anisotropy_params(const Node &params, const dfm_type *model, Body &b) 
   }
 }
 
-void read_anisotropy(const Node &node, const dfm_type *model, const Types &types, Body &b) {
+void read_anisotropy(const Node &node, const dfm_type *model, const Registry &types, Body &b) {
   node.object("anisotropy");
-  const dfm_param *row = find_row(model, kAxis);
+  const dfm_param *row = find_row(*model, kAxis);
   if (!row || row->width != 3) {
     std::vector<std::string> able;
-    for (const dfm_type *t : types.models())
-      if (find_row(t, kAxis)) able.push_back(t->id);
+    for (const dfm_type *t : types.list(DFM_KIND_MODEL))
+      if (find_row(*t, kAxis)) able.push_back(t->id);
     node.fail(
         "%s is the same in all directions; %s%s", model->id,
         able.empty() ? "no loaded model has a direction" : "models with a direction: ", join(able).c_str());

@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "core/error.h"
+#include "plugin/context.h"
 #include "scene/build.h"
 #include "scene/device.h"
 #include "scene/node.h"
@@ -37,17 +38,16 @@ Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_opti
       fail(DFM_E_ARG, "scene options: set[%u] is NULL, expected \"/json/pointer=value\"", i);
     apply_set(tree_->root, options->set[i], path);
   }
-  const Types types(context);
-  definition_ = read_scene(tree_->root, path, types);
+  definition_ = read_scene(tree_->root, path, context->registry);
   // The scene then says what was chosen, and is read as if its file had said so.
   json chosen, devices;
   if (definition_.wanted.any()) {
-    chosen = plan_scene(context, definition_, types, tree_->root);
-    definition_ = read_scene(tree_->root, path, types);
+    chosen = plan_scene(context, definition_, tree_->root);
+    definition_ = read_scene(tree_->root, path, context->registry);
   }
   if (std::ranges::any_of(definition_.bodies, [](const Body &b) { return b.device.has_value(); })) {
-    devices = choose_devices(context, definition_, types, tree_->root);
-    definition_ = read_scene(tree_->root, path, types);
+    devices = choose_devices(context, definition_, tree_->root);
+    definition_ = read_scene(tree_->root, path, context->registry);
   }
   if (!chosen.is_null())
     tree_->root[definition_.wanted.target > 0 ? "accuracy" : "budget"]["chosen"] = std::move(chosen);

@@ -33,10 +33,15 @@ void normalize(std::vector<double> &weights) {
 
 std::vector<uint32_t> points_of_nodes(const BodyMesh &mesh) {
   uint32_t highest = 0;
-  for (uint32_t i = 0; i < mesh.npoint; ++i) highest = std::max(highest, mesh.file_point[i]);
+  for (uint32_t i = 0; i < mesh.info.npoint; ++i) highest = std::max(highest, mesh.info.file_point[i]);
   std::vector<uint32_t> out(size_t(highest) + 1, UINT32_MAX);
-  for (uint32_t i = 0; i < mesh.npoint; ++i) out[mesh.file_point[i]] = i;
+  for (uint32_t i = 0; i < mesh.info.npoint; ++i) out[mesh.info.file_point[i]] = i;
   return out;
+}
+
+std::string span_of(const BodyMesh &mesh) {
+  return format("the body at rest, scaled but before its pose, spans [%g, %g, %g] to [%g, %g, %g]",
+                mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1], mesh.hi[2]);
 }
 
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]) {
@@ -64,13 +69,19 @@ uint32_t find_group(const std::string &group, const char *const *names, uint32_t
   return g;
 }
 
+// Error at a key of a selection.
+[[noreturn]] void refuse(const Selection &where, const char *key, const std::string &file,
+                         const std::string &sentence) {
+  fail(DFM_E_ARG, "%s: %s/%s: %s", file.c_str(), where.pointer.c_str(), key, sentence.c_str());
+}
+
 [[noreturn]] void no_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
-  std::vector<std::string> names(mesh.group_names, mesh.group_names + mesh.ngroup);
+  std::vector<std::string> names(mesh.info.group_names, mesh.info.group_names + mesh.info.ngroup);
   names.insert(names.end(), mesh.skin.group_names, mesh.skin.group_names + mesh.skin.ngroup);
-  fail(DFM_E_ARG, "%s: %s/group: the mesh has no physical group \"%s\"%s%s", file.c_str(),
-       where.pointer.c_str(), where.group.c_str(),
-       names.empty() ? "; it has none at all" : ("; it has: " + join(names)).c_str(),
-       did_you_mean(where.group, names).c_str());
+  refuse(where, "group", file,
+         "the mesh has no physical group \"" + where.group + "\"" +
+             (names.empty() ? "; it has none at all" : "; it has: " + join(names)) +
+             did_you_mean(where.group, names));
 }
 
 // Triangles of the skin by group, or those with three corners in the box.
@@ -95,11 +106,10 @@ std::vector<uint32_t> skin_triangles(const Selection &where, const BodyMesh &mes
 // f(point, weight) for those that a point of the skin follows, as in the body's coupling.
 template <class F>
 void each_point_of(const BodyMesh &mesh, uint32_t s, F f) {
-  if (mesh.nodes && mesh.cell == DFM_CELL_HEX8) {
+  if (mesh.info.cells && mesh.info.cell == DFM_CELL_HEX8) {
     if (!mesh.rows) {
-      const CouplingInput in{mesh.npoint,        mesh.ntet, mesh.skin.npoint,
-                             mesh.points.data(), mesh.tets, mesh.skin.points.data(),
-                             mesh.nodes};
+      const CouplingInput in{mesh.info.npoint, mesh.info.ntet,          mesh.skin.npoint, mesh.points.data(),
+                             mesh.info.tets,   mesh.skin.points.data(), mesh.info.cells};
       mesh.rows = std::make_shared<const Coupling>(couple_barycentric(Memory::standard(), in));
     }
     for (uint32_t k = mesh.rows->row[s]; k < mesh.rows->row[s + 1]; ++k)
@@ -132,42 +142,37 @@ std::vector<uint32_t> marked(const std::vector<uint8_t> &marks) {
 
 // By the mesh file's numbers.
 std::vector<uint32_t> select_nodes(const Selection &where, const BodyMesh &mesh, const std::string &file) {
-  const std::string pointer = where.pointer + "/points";
   if (mesh.renumbered)
-    fail(DFM_E_ARG,
-         "%s: %s: the body is a filled surface, and nodes of the mesh are not its points; use \"box\" or "
-         "\"group\"",
-         file.c_str(), pointer.c_str());
+    refuse(
+        where, "points", file,
+        "the body is a filled surface, and nodes of the mesh are not its points; use \"box\" or \"group\"");
   const std::vector<uint32_t> point_of = points_of_nodes(mesh);
-  std::vector<uint8_t> point(mesh.npoint, 0);
+  std::vector<uint8_t> point(mesh.info.npoint, 0);
   for (const uint32_t node : where.points) {
     if (node >= point_of.size() || point_of[node] == UINT32_MAX)
-      fail(DFM_E_ARG, "%s: %s: no tetrahedron of the mesh file has a node %u; nodes are numbered from 0",
-           file.c_str(), pointer.c_str(), node);
+      refuse(where, "points", file,
+             format("no tetrahedron of the mesh file has a node %u; nodes are numbered from 0", node));
     point[point_of[node]] = 1;
   }
   return marked(point);
 }
 
 std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh, const std::string &file) {
-  const uint32_t group = find_group(where.group, mesh.group_names, mesh.ngroup);
-  if (group == mesh.ngroup) {
+  const uint32_t group = find_group(where.group, mesh.info.group_names, mesh.info.ngroup);
+  if (group == mesh.info.ngroup) {
     if (find_group(where.group, mesh.skin.group_names, mesh.skin.ngroup) == mesh.skin.ngroup)
       no_group(where, mesh, file);
-    std::vector<uint8_t> surfel(mesh.skin.npoint, 0), point(mesh.npoint, 0);
+    std::vector<uint8_t> surfel(mesh.skin.npoint, 0), point(mesh.info.npoint, 0);
     for (uint32_t t : skin_triangles(where, mesh))
       for (int k = 0; k < 3; ++k) surfel[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
     mark_cells(surfel, mesh, point);
     std::vector<uint32_t> out = marked(point);
-    if (out.empty())
-      fail(DFM_E_ARG, "%s: %s/group: the group \"%s\" has no triangle", file.c_str(), where.pointer.c_str(),
-           where.group.c_str());
+    if (out.empty()) refuse(where, "group", file, "the group \"" + where.group + "\" has no triangle");
     return out;
   }
   const uint32_t *const points = mesh.info.group_points[group], n = mesh.info.group_npoint[group];
   if (n == 0)
-    fail(DFM_E_ARG, "%s: %s/group: the physical group \"%s\" has no point of a tetrahedron", file.c_str(),
-         where.pointer.c_str(), where.group.c_str());
+    refuse(where, "group", file, "the physical group \"" + where.group + "\" has no point of a tetrahedron");
   return {points, points + n};
 }
 
@@ -176,8 +181,8 @@ std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh,
 std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const std::string &file) {
   if (!where.group.empty()) return select_group(where, mesh, file);
   if (!where.points.empty()) return select_nodes(where, mesh, file);
-  std::vector<uint8_t> point(mesh.npoint, 0);
-  for (uint32_t i = 0; i < mesh.npoint; ++i) point[i] = in_box(where, mesh, &mesh.points[3 * size_t(i)]);
+  std::vector<uint8_t> point(mesh.info.npoint, 0);
+  for (uint32_t i = 0; i < mesh.info.npoint; ++i) point[i] = in_box(where, mesh, &mesh.points[3 * size_t(i)]);
   if (mesh.filled) {
     std::vector<uint8_t> surfel(mesh.skin.npoint, 0);
     for (uint32_t s = 0; s < mesh.skin.npoint; ++s)
@@ -185,12 +190,7 @@ std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const
     mark_cells(surfel, mesh, point);
   }
   std::vector<uint32_t> out = marked(point);
-  if (out.empty())
-    fail(DFM_E_ARG,
-         "%s: %s/box: no point of the body lies in this box; the body at rest, scaled but before its pose, "
-         "spans [%g, %g, %g] to [%g, %g, %g]",
-         file.c_str(), where.pointer.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1],
-         mesh.hi[2]);
+  if (out.empty()) refuse(where, "box", file, "no point of the body lies in this box; " + span_of(mesh));
   return out;
 }
 
@@ -202,8 +202,8 @@ std::vector<uint32_t> select_skin(const Selection &where, const BodyMesh &mesh, 
   } else if (!where.points.empty()) {
     for (const uint32_t s : where.points) {
       if (s >= mesh.skin.npoint)
-        fail(DFM_E_ARG, "%s: %s/points: the body's surface has the points 0 to %u, and no point %u",
-             file.c_str(), where.pointer.c_str(), mesh.skin.npoint - 1, s);
+        refuse(where, "points", file,
+               format("the body's surface has the points 0 to %u, and no point %u", mesh.skin.npoint - 1, s));
       marks[s] = 1;
     }
   } else {
@@ -213,19 +213,14 @@ std::vector<uint32_t> select_skin(const Selection &where, const BodyMesh &mesh, 
   std::vector<uint32_t> out = marked(marks);
   if (!out.empty()) return out;
   if (!where.group.empty()) no_group(where, mesh, file);
-  fail(
-      DFM_E_ARG,
-      "%s: %s: no point of the body's surface lies in the box; at rest, scaled but before its pose, the body "
-      "spans [%g, %g, %g] to [%g, %g, %g]",
-      file.c_str(), where.pointer.c_str(), mesh.lo[0], mesh.lo[1], mesh.lo[2], mesh.hi[0], mesh.hi[1],
-      mesh.hi[2]);
+  refuse(where, "box", file, "no point of the body's surface lies in the box; " + span_of(mesh));
 }
 
 std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const BodyMesh &mesh) {
-  const std::vector<uint32_t> rank = ranks(points, mesh.npoint);
+  const std::vector<uint32_t> rank = ranks(points, mesh.info.npoint);
   std::vector<double> weights(points.size(), 0.0);
-  for (uint32_t c = 0; c < mesh.ntet; ++c) {
-    const uint32_t *t = mesh.tets + 4 * size_t(c);
+  for (uint32_t c = 0; c < mesh.info.ntet; ++c) {
+    const uint32_t *t = mesh.info.tets + 4 * size_t(c);
     const double *const p = mesh.points.data();
     const double *const corner[4] = {p + 3 * size_t(t[0]), p + 3 * size_t(t[1]), p + 3 * size_t(t[2]),
                                      p + 3 * size_t(t[3])};
@@ -240,7 +235,7 @@ std::vector<double> share_by_mass(const std::vector<uint32_t> &points, const Bod
 
 std::vector<double> share_by_area(const std::vector<uint32_t> &points, const BodyMesh &mesh,
                                   const std::vector<uint32_t> &triangles) {
-  const std::vector<uint32_t> rank = ranks(points, mesh.npoint);
+  const std::vector<uint32_t> rank = ranks(points, mesh.info.npoint);
   std::vector<double> weights(points.size(), 0.0);
   bool any = false;
   for (size_t i = 0; i + 2 < triangles.size(); i += 3) {
@@ -259,8 +254,8 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
 
 Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mesh) {
   const Skin &skin = mesh.skin;
-  std::vector<double> surfel(skin.npoint, 0.0), point(mesh.npoint, 0.0);
-  std::vector<uint8_t> touched(mesh.npoint, 0);
+  std::vector<double> surfel(skin.npoint, 0.0), point(mesh.info.npoint, 0.0);
+  std::vector<uint8_t> touched(mesh.info.npoint, 0);
   for (uint32_t t : triangles) {
     const uint32_t *c = skin.triangles + 3 * size_t(t);
     const double *p = skin.points.data();
@@ -294,18 +289,16 @@ Shared share_on_cells(const Force &force, const BodyMesh &mesh, const std::strin
     out.weights = share_by_mass(out.points, mesh);
     return out;
   }
-  const Array<uint32_t> faces = boundary_triangles(Memory::standard(), mesh.ntet, mesh.tets);
+  const Array<uint32_t> faces = boundary_triangles(Memory::standard(), mesh.info.ntet, mesh.info.tets);
   const std::vector<uint32_t> triangles(faces.begin(), faces.end());
   out.weights = share_by_area(out.points, mesh, triangles);
   if (force.by == "area") {
     if (out.weights.empty())
-      fail(DFM_E_ARG,
-           "%s: %s/by: no boundary triangle has its three corners in this selection; enlarge it or share by "
-           "\"mass\"",
-           file.c_str(), force.where.pointer.c_str());
+      refuse(force.where, "by", file,
+             "no boundary triangle has its three corners in this selection; enlarge it or share by \"mass\"");
     return out;
   }
-  std::vector<uint8_t> boundary(mesh.npoint, 0);
+  std::vector<uint8_t> boundary(mesh.info.npoint, 0);
   for (uint32_t p : triangles) boundary[p] = 1;
   const bool face =
       std::all_of(out.points.begin(), out.points.end(), [&](uint32_t p) { return boundary[p] != 0; });
@@ -316,16 +309,15 @@ Shared share_on_cells(const Force &force, const BodyMesh &mesh, const std::strin
 }  // namespace
 
 Shared share(const Force &force, const BodyMesh &mesh, const std::string &file) {
-  const bool of_cells = find_group(force.where.group, mesh.group_names, mesh.ngroup) < mesh.ngroup;
+  const bool of_cells =
+      find_group(force.where.group, mesh.info.group_names, mesh.info.ngroup) < mesh.info.ngroup;
   const bool on_skin = force.where.points.empty() && (force.where.group.empty() ? mesh.filled : !of_cells);
   if (!on_skin || force.by == "mass") return share_on_cells(force, mesh, file);
   const std::vector<uint32_t> triangles = skin_triangles(force.where, mesh);
   if (!triangles.empty()) return share_on_skin(triangles, mesh);
   if (force.by == "area" && force.where.group.empty())
-    fail(DFM_E_ARG,
-         "%s: %s/by: no triangle of the surface has its three corners in this box; enlarge it or share by "
-         "\"mass\"",
-         file.c_str(), force.where.pointer.c_str());
+    refuse(force.where, "by", file,
+           "no triangle of the surface has its three corners in this box; enlarge it or share by \"mass\"");
   Shared out;
   out.points = select(force.where, mesh, file);
   out.weights = share_by_mass(out.points, mesh);

@@ -24,19 +24,11 @@ struct Skin {
 // A mesh file read once, with the scale of one body.
 struct BodyMesh {
   std::vector<double> points;  // [n,3] rest, scaled
-  const uint32_t *tets = nullptr, *file_point = nullptr, *cell_group = nullptr, *file_cell = nullptr;
-  const uint32_t *nodes = nullptr;  // of cells that are not first-order tetrahedra, of the kind `cell`
-  uint32_t cell = 0;
-  const double *share = nullptr, *inside = nullptr;
-  dfm_mesh_info info{};  // not scaled; has the points of the groups
-  const char *const *group_names = nullptr;
-  // [nface,3], [nface] the file's triangles that belong to a group
-  const uint32_t *faces = nullptr, *face_group = nullptr;
-  uint32_t npoint = 0, ntet = 0, ngroup = 0, dropped_cells = 0, nface = 0;
-  bool filled = false;      // the cells are ours, the file's shape is the skin
-  bool renumbered = false;  // points are not those of the file
-  bool wears_skin = false;  // the skin is the body's surface; else that is the boundary of the cells
-  Skin skin;                // npoint 0: none
+  dfm_mesh_info info{};        // the rest of it, not scaled
+  bool filled = false;         // the cells are ours, the file's shape is the skin
+  bool renumbered = false;     // points are not those of the file
+  bool wears_skin = false;     // the skin is the body's surface; else that is the boundary of the cells
+  Skin skin;                   // npoint 0: none
   // [ntet] mass per volume of each cell relative to the others; empty: the same
   std::vector<double> cell_weight;
   double lo[3] = {}, hi[3] = {}, size = 0;         // of the scaled points; size: diagonal
@@ -73,6 +65,8 @@ struct Shared {
 // by its barycentric weights, so that force and torque are those of the traction.
 Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mesh);
 Shared share(const Force &force, const BodyMesh &mesh, const std::string &file);
+
+std::string span_of(const BodyMesh &mesh);  // for errors
 
 // see Locator::find
 double locate(const BodyMesh &mesh, const double point[3], uint32_t corners[4], double weights[4]);

@@ -31,11 +31,14 @@ class Table {
                                std::max(kMiB, 2 * rows * uint64_t(columns) * kCellBytes),
                                ("a table with the header " + expected_).c_str())) {}
   bool empty() const { return bytes_.empty(); }
-  size_t line() const { return line_; }
 
   std::string first() {  // the first line
     std::string_view line;
     return next_line(line) ? std::string(line) : "";
+  }
+  // Of the row that was read last.
+  [[noreturn]] void refuse(const std::string &why, dfm_status code = DFM_E_FORMAT) const {
+    fail(code, "%s:%zu: %s", path_.c_str(), line_, why.c_str());
   }
   [[noreturn]] void refuse_header() const {
     fail(DFM_E_FORMAT, "%s:1: expected the header %s", path_.c_str(), expected_.c_str());
@@ -74,13 +77,12 @@ class Table {
       const char *first = cell.data() + (!cell.empty() && cell.front() == '+');
       const auto result = std::from_chars(first, cell.data() + cell.size(), row[n]);
       if (result.ec != std::errc() || result.ptr != cell.data() + cell.size() || !std::isfinite(row[n]))
-        fail(DFM_E_FORMAT, "%s:%zu: expected a finite number in column %d of %s, found \"%.*s\"",
-             path_.c_str(), line_, n + 1, header_.c_str(), int(std::min<size_t>(cell.size(), 40)),
-             cell.data());
+        refuse(format("expected a finite number in column %d of %s, found \"%.*s\"", n + 1, header_.c_str(),
+                      int(std::min<size_t>(cell.size(), 40)), cell.data()));
     }
     if (n != columns_)
-      fail(DFM_E_FORMAT, "%s:%zu: expected the %d column%s %s, found %d", path_.c_str(), line_, columns_,
-           columns_ == 1 ? "" : "s", header_.c_str(), n);
+      refuse(format("expected the %d column%s %s, found %d", columns_, columns_ == 1 ? "" : "s",
+                    header_.c_str(), n));
   }
 
   std::string path_, expected_, header_;
@@ -104,21 +106,21 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
   std::vector<NodalRow> rows;
   double cell[7];
   while (table.next(cell)) {
-    const size_t line = table.line();
     if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()))
-      fail(DFM_E_ARG, "%s:%zu: there is no node %g; the mesh file has the nodes 0 to %zu", path.c_str(), line,
-           cell[0], point_of.size() - 1);
+      table.refuse(
+          format("there is no node %g; the mesh file has the nodes 0 to %zu", cell[0], point_of.size() - 1),
+          DFM_E_ARG);
     NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};
     for (int k = 0; k < 3; ++k) {
       if (cell[1 + k] != 0 && cell[1 + k] != 1)
-        fail(DFM_E_ARG, "%s:%zu: fix%c is 0 or 1, found %g", path.c_str(), line, "xyz"[k], cell[1 + k]);
+        table.refuse(format("fix%c is 0 or 1, found %g", "xyz"[k], cell[1 + k]), DFM_E_ARG);
       if (cell[1 + k] == 1) row.axes = uint8_t(row.axes | (1u << k));
     }
     if (row.point == UINT32_MAX) {
       // A node without cells has no phyxel: holding it has no effect, and a force on it would be lost.
       if (cell[4] != 0 || cell[5] != 0 || cell[6] != 0)
-        fail(DFM_E_ARG, "%s:%zu: node %g belongs to no tetrahedron, so no force can act on it", path.c_str(),
-             line, cell[0]);
+        table.refuse(format("node %g belongs to no tetrahedron, so no force can act on it", cell[0]),
+                     DFM_E_ARG);
       continue;
     }
     rows.push_back(row);
@@ -132,17 +134,16 @@ StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   if (!table.empty() && table.first() != kStateHeader) table.refuse_header();
   table.begin(kStateHeader);
   StartState out;
-  out.x.resize(3 * size_t(mesh.npoint));
+  out.x.resize(3 * size_t(mesh.info.npoint));
   out.v.resize(out.x.size());
-  std::vector<uint8_t> seen(mesh.npoint, 0);
+  std::vector<uint8_t> seen(mesh.info.npoint, 0);
   double cell[7];
   while (table.next(cell)) {
-    const size_t line = table.line();
     if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()) ||
         point_of[size_t(cell[0])] == UINT32_MAX)
-      fail(DFM_E_ARG, "%s:%zu: no tetrahedron of the mesh file has a node %g", path.c_str(), line, cell[0]);
+      table.refuse(format("no tetrahedron of the mesh file has a node %g", cell[0]), DFM_E_ARG);
     const size_t point = point_of[size_t(cell[0])];
-    if (seen[point]) fail(DFM_E_ARG, "%s:%zu: node %g has a row already", path.c_str(), line, cell[0]);
+    if (seen[point]) table.refuse(format("node %g has a row already", cell[0]), DFM_E_ARG);
     seen[point] = 1;
     std::copy_n(cell + 1, 3, &out.x[3 * point]);
     std::copy_n(cell + 4, 3, &out.v[3 * point]);
@@ -150,7 +151,7 @@ StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   const auto missing = std::find(seen.begin(), seen.end(), uint8_t(0));
   if (missing != seen.end())
     fail(DFM_E_FORMAT, "%s: node %u of the mesh file has no row", path.c_str(),
-         mesh.file_point[size_t(missing - seen.begin())]);
+         mesh.info.file_point[size_t(missing - seen.begin())]);
   return out;
 }
 
@@ -167,29 +168,18 @@ std::string columns_of(uint32_t width) {
   return out;
 }
 
-namespace {
-
-// Without spaces around its names.
-std::string tidy(const std::string &header) {
-  std::string out;
-  for (char c : header)
-    if (c != ' ' && c != '\t' && c != '\r') out += c;
-  return out;
-}
-
-void make_unit(double *v) {
+static void make_unit(double *v) {
   const double norm = std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
   if (norm > 0)
     for (int k = 0; k < 3; ++k) v[k] /= norm;
 }
 
-}  // namespace
-
 std::vector<double> read_field(const std::string &path, const FieldFile &field, const BodyMesh &mesh) {
   const std::string plain = columns_of(field.width), numbered = "cell," + plain;
-  const uint32_t nfile = mesh.ntet + mesh.dropped_cells, w = field.width;
+  const uint32_t nfile = mesh.info.ntet + mesh.info.dropped_cells, w = field.width;
   Table table(path, plain + " or " + numbered, nfile, int(w) + 1);
-  std::string header = tidy(table.first());
+  std::string header = table.first();
+  std::erase_if(header, [](char c) { return c == ' ' || c == '\t' || c == '\r'; });
   if (field.width == 1 && header == field.key) header = plain;
   if (field.width == 1 && header == "cell," + field.key) header = numbered;
   if (header != plain && header != numbered) table.refuse_header();
@@ -197,21 +187,19 @@ std::vector<double> read_field(const std::string &path, const FieldFile &field, 
   const bool has_cell = header == numbered;
 
   std::vector<uint32_t> cell_of(nfile, UINT32_MAX);
-  for (uint32_t t = 0; t < mesh.ntet; ++t) cell_of[mesh.file_cell ? mesh.file_cell[t] : t] = t;
+  for (uint32_t t = 0; t < mesh.info.ntet; ++t) cell_of[mesh.info.file_cell ? mesh.info.file_cell[t] : t] = t;
   std::vector<uint8_t> seen(nfile, 0);
-  std::vector<double> out(size_t(mesh.ntet) * w), row(size_t{w} + has_cell);
+  std::vector<double> out(size_t(mesh.info.ntet) * w), row(size_t{w} + has_cell);
   uint32_t next = 0;
   while (table.next(row.data())) {
-    const size_t line = table.line();
     const double number = has_cell ? row[0] : double(next);
     if (!has_cell && next == nfile)
-      fail(DFM_E_FORMAT, "%s:%zu: more rows than the %u tetrahedra of the mesh file", path.c_str(), line,
-           nfile);
+      table.refuse(format("more rows than the %u tetrahedra of the mesh file", nfile));
     if (number < 0 || number != std::floor(number) || number >= nfile)
-      fail(DFM_E_ARG, "%s:%zu: there is no cell %g; the mesh file has the tetrahedra 0 to %u", path.c_str(),
-           line, number, nfile - 1);
+      table.refuse(format("there is no cell %g; the mesh file has the tetrahedra 0 to %u", number, nfile - 1),
+                   DFM_E_ARG);
     const uint32_t cell = uint32_t(number);
-    if (seen[cell]) fail(DFM_E_ARG, "%s:%zu: cell %u has a row already", path.c_str(), line, cell);
+    if (seen[cell]) table.refuse(format("cell %u has a row already", cell), DFM_E_ARG);
     seen[cell] = 1;
     ++next;
     if (cell_of[cell] == UINT32_MAX) continue;  // a duplicate that was dropped when reading
@@ -248,15 +236,13 @@ void read_hand(const std::string &path, Tool &tool) {
   double v[9];
   while (table.next(v)) {
     if (!tool.keys.empty() && !(v[0] > tool.keys.back().t))
-      fail(DFM_E_FORMAT, "%s:%zu: times must increase, but %g s follows %g s", path.c_str(), table.line(),
-           v[0], tool.keys.back().t);
+      table.refuse(format("times must increase, but %g s follows %g s", v[0], tool.keys.back().t));
     if (!(v[4] * v[4] + v[5] * v[5] + v[6] * v[6] + v[7] * v[7] > 0))
-      fail(DFM_E_FORMAT, "%s:%zu: the quaternion qx,qy,qz,qw is zero", path.c_str(), table.line());
+      table.refuse("the quaternion qx,qy,qz,qw is zero");
     tool.keys.push_back({v[0], {{v[1], v[2], v[3]}, {v[4], v[5], v[6], v[7]}}});
     if (!opens || !jaws) continue;
     if (!(v[8] >= 0 && v[8] <= kWidest))
-      fail(DFM_E_FORMAT, "%s:%zu: an opening of %g degrees; it is between 0 and %g", path.c_str(),
-           table.line(), v[8], kWidest);
+      table.refuse(format("an opening of %g degrees; it is between 0 and %g", v[8], kWidest));
     tool.opening_keys.push_back({v[0], kRadian * v[8]});
   }
   if (tool.keys.empty()) fail(DFM_E_FORMAT, "%s: no rows below the header", path.c_str());

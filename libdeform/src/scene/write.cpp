@@ -10,7 +10,8 @@
 #include "core/path.h"
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
+#include "plugin/context.h"
 #include "plugin/shared_object.h"
 #include "scene/keys.h"
 #include "scene/node.h"
@@ -138,12 +139,12 @@ std::string SceneWriter::text_file(const std::string &name, std::string text) {
 }
 
 std::string SceneWriter::triangles(const std::string &name, const Obstacle &of) {
-  TriMesh mesh;
+  RestMesh mesh;
   mesh.points.assign(of.points.begin(), of.points.end());
   mesh.tris.assign(of.triangles.begin(), of.triangles.end());
   mesh.tri_group.assign(mesh.ntri(), kNoGroup);
   return file(name + ".vtu",
-              [mesh = std::move(mesh)](const std::string &to_path) { write_tri_mesh(mesh, to_path); });
+              [mesh = std::move(mesh)](const std::string &to_path) { write_mesh(mesh, to_path); });
 }
 
 void SceneWriter::check_name(const char *kind, const std::string &name) const {
@@ -202,8 +203,7 @@ std::string SceneWriter::material(const Material &m) {
   if (second)
     note(
         "there have been two materials '%s', one of which is destroyed; the scene has the second one without "
-        "a "
-        "name, so that rules for \"material=%s\" do not mean it",
+        "a name, so that rules for \"material=%s\" do not mean it",
         m.name.c_str(), m.name.c_str());
   std::string key = m.name.empty() ? "unnamed" : m.name;
   for (int i = 2; taken(key); ++i) key = (m.name.empty() ? "unnamed" : m.name) + format(" %d", i);
@@ -508,7 +508,7 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
   if (whole.extension() != ".json" || whole.stem().empty())
     fail(DFM_E_ARG, "%s: the name of a scene file must end in .json", path.c_str());
   SceneWriter to{w, path, options, notes};
-  for (const std::string &key : scene::Types(w.context).model_keys()) to.model_keys.insert(key);
+  for (const std::string &key : scene::model_keys(w.context->registry)) to.model_keys.insert(key);
   AtomicFile scene(path);  // what cannot be written is found out first
   std::string text;
   print(write_root(to), "", text);

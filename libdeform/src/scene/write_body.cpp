@@ -6,8 +6,9 @@
 #include <map>
 
 #include "core/error.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 #include "plugin/context.h"
+#include "plugin/params.h"
 #include "scene/keys.h"
 #include "scene/table.h"
 #include "scene/write.h"
@@ -38,7 +39,7 @@ const std::string &zone_group(const Body &b, uint32_t triangle) {
 std::string material_group(const std::string &material) { return "material " + material; }
 
 void write_cells(SceneWriter &to, const Body &b, Written &out) {
-  TetMesh mesh;
+  RestMesh mesh;
   mesh.points.assign(b.p.rest.begin(), b.p.rest.end());
   mesh.tets.assign(b.tets.begin(), b.tets.end());
   mesh.cell = b.cell_type;
@@ -78,16 +79,15 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
 void write_surface(SceneWriter &to, const Body &b, Written &out) {
   const Surface &s = b.surface;
   if (s.identity()) return;
-  TriMesh mesh;
+  RestMesh mesh;
   mesh.points.assign(s.rest.begin(), s.rest.end());
   mesh.tris.assign(s.tri.begin(), s.tri.end());
   for (uint32_t t = 0; t < s.ntri; ++t)
     mesh.tri_group.push_back(zone_group(b, t).empty() ? kNoGroup
                                                       : group_number(mesh.groups, zone_group(b, t), 2));
   Written &own = out["surface"];
-  own["mesh"] = to.file(b.name + "_surface.vtu", [mesh = std::move(mesh)](const std::string &to_path) {
-    write_tri_mesh(mesh, to_path);
-  });
+  own["mesh"] = to.file(b.name + "_surface.vtu",
+                        [mesh = std::move(mesh)](const std::string &to_path) { write_mesh(mesh, to_path); });
   own["coupling"] = scene::word_of("coupling", uint32_t(b.coupling));
   if (b.coupling != DFM_COUPLING_BARYCENTRIC && b.support > 0) own["support"] = b.support;
 }
@@ -116,7 +116,7 @@ std::vector<GivenParam> rows_of(const ModelParams &params) {
 void write_choice(const dfm_type &type, const std::vector<GivenParam> &given, Written &out) {
   out["type"] = type.id;
   for (const GivenParam &p : given) {
-    const dfm_param *const row = scene::find_row(&type, p.key);
+    const dfm_param *const row = find_row(type, p.key.c_str());
     if (row) out["params"][p.key] = value_of(*row, p.values.data());
     else if (p.values[0] == 1) out["precision"] = "single";
   }
@@ -146,7 +146,7 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
 
 void write_fields(SceneWriter &to, const Body &b, Written &out) {
   for (const CellField &f : b.composition.given) {
-    const dfm_param *const row = scene::find_row(b.model.type, f.key);
+    const dfm_param *const row = find_row(*b.model.type, f.key.c_str());
     if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
       to.note("body '%s': the field '%s' is left out, since the model '%s' has no such parameter",
               b.name.c_str(), f.key.c_str(), b.model.type->id);

@@ -129,8 +129,7 @@ void check_values(const Body &b, const dfm_attach_def &def) {
     if (!(x >= 0 && std::isfinite(x)))
       fail(DFM_E_ARG,
            "body '%s': max_distance, stiffness, damping and release of an attachment are zero or positive, "
-           "and "
-           "finite",
+           "and finite",
            b.name.c_str());
   if (def.box && !std::all_of(def.box, def.box + 6, [](double x) { return !std::isnan(x); }))
     fail(DFM_E_ARG, "body '%s': the box of an attachment is not a number", b.name.c_str());
@@ -159,8 +158,7 @@ uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle 
   if (a.surfels.empty())
     fail(DFM_E_ARG,
          "body '%s': nothing of its surface is attached: the points, surfels, group and box of the def name "
-         "none "
-         "that is near enough",
+         "none that is near enough",
          b.name.c_str());
   a.number = b.next_load;
   a.body = b.id;

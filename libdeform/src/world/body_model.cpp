@@ -118,8 +118,7 @@ void set_scaled_mass(Body &b, double share) {
   if (!rest_rows(b, 1, rows))
     fail(DFM_E_UNSUPPORTED,
          "body '%s': mass_scaling lengthens the explicit sub-steps of a body, and nothing bounds those of "
-         "this "
-         "one (model %s%s); leave it out",
+         "this one (model %s%s); leave it out",
          name, b.model.type->id, b.model.stepper ? ", which steps itself" : "");
   std::vector<double> mass;
   b.scaling = scale_mass(b.p, rows, share, mass);

@@ -98,9 +98,8 @@ void warn_long_edges(const Body &b) {
   if (longest > kLongestEdge * (1 + 1e-6) * cells)
     b.world->context->logf(
         DFM_LOG_WARNING,
-        "body '%s': its surface has edges of up to %.3g m, and the cells that fill it of up "
-        "to %.3g m, so it will sink into what it touches; split edges longer than %.3g m, "
-        "or let a scene fill the body",
+        "body '%s': its surface has edges of up to %.3g m, and the cells that fill it of up to %.3g m, so it "
+        "will sink into what it touches; split edges longer than %.3g m, or let a scene fill the body",
         b.name.c_str(), longest, cells, kLongestEdge * cells);
 }
 

@@ -131,8 +131,7 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
                               HookAllocator<uint32_t>(m));
     if (def.ntet % kind.tets || tets_of(m, kind, b.cells) != b.tets)
       fail(DFM_E_ARG,
-           "body '%s': its tetrahedra are not those of its %s; give both as "
-           "dfm_mesh_get_info does",
+           "body '%s': its tetrahedra are not those of its %s; give both as dfm_mesh_get_info does",
            b.name.c_str(), kind.name);
     if (def.cell_share)
       fail(DFM_E_UNSUPPORTED, "body '%s': cell_share is for tetrahedra; %s take cell_inside, if any",

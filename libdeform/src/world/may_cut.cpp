@@ -32,8 +32,7 @@ void check_may_cut(const Body &b, const ModelInstance &model) {
     fail(DFM_E_UNSUPPORTED,
          "body '%s' can be neither cut nor torn: it has its own surface; create it with the boundary of its "
          "cells as surface (in a scene: \"surface\": {\"from\": \"boundary\"}), which is then drawn and "
-         "touches: "
-         "steps as large as its %u cells in place of %u triangles",
+         "touches: steps as large as its %u cells in place of %u triangles",
          name, b.ncell(), b.surface.ntri);
   if (b.scaling.moved > 0)
     fail(DFM_E_UNSUPPORTED,

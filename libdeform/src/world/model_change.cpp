@@ -212,9 +212,8 @@ void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
   if (!std::isinf(swap.max_jump) || !(jump > has + kSmallJump)) return;
   w.context->logf(
       DFM_LOG_WARNING,
-      "t = %g s, body '%s': from '%s' to '%s' its elastic energy jumps from %g J to %g J, by more "
-      "than all the energy it has; change the model where it is less deformed and has turned less, or "
-      "give max_jump",
+      "t = %g s, body '%s': from '%s' to '%s' its elastic energy jumps from %g J to %g J, by more than all "
+      "the energy it has; change the model where it is less deformed and has turned less, or give max_jump",
       w.time, b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after);
 }
 

@@ -45,7 +45,7 @@ struct Case {
 // ball a little.
 Case ball(double scale = 1, Vec3 shift = {}, int level = 3) {
   const double size[1] = {1};
-  const TetMesh m = make_ball(Memory::standard(), size[0], 400);
+  const RestMesh m = make_ball(Memory::standard(), size[0], 400);
   Case c;
   c.tet.assign(m.tets.begin(), m.tets.end());
   const auto put = [&](std::vector<double> &to, Vec3 x) {
@@ -325,7 +325,7 @@ TEST_F(Reference, TransposedForces_MatchAndLiteralSpreadingIsAnotherThing) {
 
 TEST(Gather, WeightsOfAPlainRow_ComeBackToTheBit) {
   // Identity as a matrix: a surfel on a phyxel is that phyxel, whatever the number of cells around it.
-  const TetMesh m = make_ball(Memory::standard(), 1, 400);
+  const RestMesh m = make_ball(Memory::standard(), 1, 400);
   const auto boundary = boundary_triangles(Memory::standard(), m.ntet(), m.tets.data());
   Surface identity, coupled;
   make_surface(Memory::standard(), m.npoint(), m.points.data(), boundary.data(),

@@ -7,11 +7,11 @@
 
 namespace {
 
-using dfm::TriMesh;
+using dfm::RestMesh;
 using dfm::Vec3;
 using dfm::WindingTree;
 
-WindingTree tree_of(const TriMesh &m) {
+WindingTree tree_of(const RestMesh &m) {
   return WindingTree(dfm::Memory::standard(), m.points.data(), m.ntri(), m.tris.data());
 }
 
@@ -29,7 +29,7 @@ std::vector<Vec3> places(uint32_t n, double reach) {
 }
 
 TEST(Winding, ClosedSurface_OneInsideZeroOutside) {
-  const TriMesh box = test::box_surface({-0.5, -0.3, -0.2}, {0.5, 0.3, 0.2});
+  const RestMesh box = test::box_surface({-0.5, -0.3, -0.2}, {0.5, 0.3, 0.2});
   const WindingTree tree = tree_of(box);
   for (const Vec3 &p : places(2000, 0.7)) {
     const bool inside = std::fabs(p.x) < 0.5 && std::fabs(p.y) < 0.3 && std::fabs(p.z) < 0.2;
@@ -38,14 +38,14 @@ TEST(Winding, ClosedSurface_OneInsideZeroOutside) {
 }
 
 TEST(Winding, CubeWithoutAFace_FromItsCenterFiveSixths) {
-  TriMesh cube = test::box_surface({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
+  RestMesh cube = test::box_surface({-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5});
   test::remove(cube, 0);
   test::remove(cube, 0);
   EXPECT_NEAR(tree_of(cube).exactly_at({}), 5.0 / 6, 1e-15);
 }
 
 TEST(Winding, OneTriangle_AnOctantIsAnEighthAndItsBackIsMinusThat) {
-  TriMesh m = test::surface_of({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2}});
+  RestMesh m = test::surface_of({{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}, {{0, 1, 2}});
   EXPECT_NEAR(tree_of(m).exactly_at({}), 0.125, 1e-16);
   test::flip(m, 0);
   EXPECT_NEAR(tree_of(m).exactly_at({}), -0.125, 1e-16);
@@ -55,8 +55,8 @@ TEST(Winding, OneTriangle_AnOctantIsAnEighthAndItsBackIsMinusThat) {
 // a polygon, so the exact sum over the rest of the sphere must equal one minus what the removed triangles
 // are seen under.
 TEST(Winding, SphereWithAHole_MissesTheSolidAngleOfTheHole) {
-  TriMesh whole = test::sphere_surface(0.5, 4), hole = whole;
-  TriMesh cap = test::surface_of({}, {});
+  RestMesh whole = test::sphere_surface(0.5, 4), hole = whole;
+  RestMesh cap = test::surface_of({}, {});
   cap.points = whole.points;
   for (uint32_t t = whole.ntri(); t-- > 0;) {
     double z = 0;
@@ -72,16 +72,16 @@ TEST(Winding, SphereWithAHole_MissesTheSolidAngleOfTheHole) {
 }
 
 TEST(Winding, NestedAndOverlappingShells_CountHowOften) {
-  TriMesh m = test::sphere_surface(0.5, 3);
+  RestMesh m = test::sphere_surface(0.5, 3);
   test::append(m, test::sphere_surface(0.25, 3));
   EXPECT_NEAR(tree_of(m).exactly_at({0.05, 0.02, 0.01}), 2, 1e-12);
   EXPECT_NEAR(tree_of(m).exactly_at({0.35, 0.02, 0.01}), 1, 1e-12);
 }
 
 TEST(Winding, Tree_WithinItsStatedErrorOfTheSum) {
-  TriMesh ball = test::sphere_surface(0.3, 5), torus = test::torus_surface(0.3, 0.1, 80, 40);
+  RestMesh ball = test::sphere_surface(0.3, 5), torus = test::torus_surface(0.3, 0.1, 80, 40);
   for (uint32_t t = 0; t < torus.ntri(); t += 37) test::flip(torus, t);
-  for (const TriMesh *m : {&ball, &torus}) {
+  for (const RestMesh *m : {&ball, &torus}) {
     const WindingTree tree = tree_of(*m);
     double worst = 0;
     for (const Vec3 &p : places(3000, 0.5))

@@ -20,7 +20,7 @@ struct BlockSystem {
 };
 
 // Steps of h seconds (infinity: equilibrium), Young's modulus and Poisson's ratio, density 1,000 kg/m^3.
-inline BlockSystem elastic_system(const dfm::TetMesh &mesh, double young, double poisson, double h) {
+inline BlockSystem elastic_system(const dfm::RestMesh &mesh, double young, double poisson, double h) {
   const double lambda = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), mu = young / (2 + 2 * poisson);
   BlockSystem out;
   out.n = mesh.npoint();

@@ -16,7 +16,7 @@ using test::noise;
 
 // A cylinder of tetrahedra, held at one end.
 test::BlockSystem cylinder(uint32_t cells, double h) {
-  const dfm::TetMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
+  const dfm::RestMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
   test::BlockSystem system = test::elastic_system(mesh, 1e5, 0.3, h);
   std::vector<uint8_t> mask(system.n, 0);
   for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : 0;

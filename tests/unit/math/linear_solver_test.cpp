@@ -198,7 +198,7 @@ TEST(LinearSolver, MatrixThatIsNotPositiveDefinite_IsReportedAndNothingIsSolved)
 
 // Held points lie in many patches: no motion of a patch may move them.
 TEST(PcgSolver, PlacesOfThePoints_SpareTwoThirdsOfTheIterations) {
-  const dfm::TetMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.02, 0.2, 2500);
+  const dfm::RestMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.02, 0.2, 2500);
   test::BlockSystem system = test::elastic_system(mesh, 1e6, 0.3, 1.0 / 60);
   std::vector<uint8_t> mask(system.n, 0);
   for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : i % 7 == 0;

@@ -7,6 +7,7 @@
 
 #include "deform/plugin.h"
 #include "math/vec3.h"
+#include "mesh/raw_mesh.h"
 #include "mesh_support.h"
 
 namespace {
@@ -23,7 +24,7 @@ void expect_refusal(const std::string &text, dfm_status status, const std::vecto
 
 const Memory &kMemory = Memory::standard();
 
-TetMesh made(uint32_t kind) {
+RestMesh made(uint32_t kind) {
   if (kind == DFM_CELL_HEX8) return make_bricks(kMemory, 0.3, 0.2, 0.2, 12);
   return second_order(make_beam(kMemory, 0.3, 0.2, 0.2, 100));
 }
@@ -35,7 +36,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Cells, testing::Values(DFM_CELL_TET10, DFM_CELL_
 
 // All are positive, fill the box, and have no other boundary than the box, whatever the numbers of points.
 TEST_P(Cells, Tetrahedra_FillTheShapeAndMeet) {
-  TetMesh mesh = made(GetParam());
+  RestMesh mesh = made(GetParam());
   const CellKind &kind = cell_kind(mesh.cell);
   for (int shuffle = 0; shuffle < 3; ++shuffle) {
     ASSERT_EQ(mesh.ntet(), kind.tets * (mesh.cells.size() / kind.nodes));
@@ -55,7 +56,7 @@ TEST_P(Cells, Tetrahedra_FillTheShapeAndMeet) {
     EXPECT_NEAR(area, 2 * (0.06 + 0.06 + 0.04), 1e-14);
     // other numbers of the points
     const uint32_t n = mesh.npoint();
-    TetMesh other = mesh;
+    RestMesh other = mesh;
     const auto number = [&](uint32_t p) { return uint32_t((uint64_t{p} * 101 + uint32_t(shuffle) + 3) % n); };
     ASSERT_EQ(std::gcd(n, 101u), 1u);
     for (uint32_t p = 0; p < n; ++p)
@@ -67,12 +68,12 @@ TEST_P(Cells, Tetrahedra_FillTheShapeAndMeet) {
 }
 
 TEST_P(Cells, MassShares_ArePositiveAndHaveTheCenterOfTheCell) {
-  const TetMesh mesh = made(GetParam());
+  const RestMesh mesh = made(GetParam());
   const CellKind &kind = cell_kind(mesh.cell);
-  TetMesh moved = mesh;
+  RestMesh moved = mesh;
   for (size_t k = 0; k < moved.points.size(); k += 3) moved.points[k] *= 1 + moved.points[k + 1];  // a taper
   const bool straight = kind.nodes == 10;
-  const TetMesh &of = straight ? mesh : moved;
+  const RestMesh &of = straight ? mesh : moved;
   for (size_t c = 0; c < of.cells.size() / kind.nodes; ++c) {
     double share[10], sum = 0, volume = 0;
     Vec3 center, mean;
@@ -93,14 +94,14 @@ TEST_P(Cells, MassShares_ArePositiveAndHaveTheCenterOfTheCell) {
 }
 
 TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
-  TetMesh mesh = made(GetParam());
+  RestMesh mesh = made(GetParam());
   const CellKind &kind = cell_kind(mesh.cell);
   mesh.groups.push_back({"left", 3, 4, Array<uint32_t>()});
   for (uint32_t t = 0; t < mesh.ntet() / 2 / kind.tets * kind.tets; ++t) mesh.tet_group[t] = 0;
   for (const char *ending : {"msh", "msh2", "vtk", "vtu", "mesh"}) {
     const std::string path = test::scratch("cells") + "/a." + ending;
-    ASSERT_TRUE(write_tet_mesh(mesh, path));
-    const TetMesh back = read_tet_mesh(kMemory, path);
+    ASSERT_TRUE(write_mesh(mesh, path));
+    const RestMesh back = read_mesh(kMemory, path, DFM_MESH_CELLS);
     EXPECT_EQ(back.cell, mesh.cell) << ending;
     EXPECT_EQ(back.cells, mesh.cells) << ending;
     EXPECT_EQ(back.tets, mesh.tets) << ending;
@@ -116,12 +117,12 @@ const std::string kTen =
     "$Nodes\n10\n1 0 0 0\n2 2 0 0\n3 0 2 0\n4 0 0 2\n5 1 0 0\n6 1 1 0\n7 0 1 0\n8 0 0 1\n9 0 1 1\n10 1 0 "
     "1\n$EndNodes\n";
 
-TetMesh parsed(const std::string &name, const std::string &text) {
-  return parse_tet_mesh(kMemory, name, text.data(), text.size());
+RestMesh parsed(const std::string &name, const std::string &text) {
+  return finish_mesh(name, parse_raw(kMemory, name, text.data(), text.size()));
 }
 
 TEST(CellFiles, GmshsOrderOfEdges_IsTurnedIntoVtks) {
-  const TetMesh mesh =
+  const RestMesh mesh =
       parsed("a.msh", kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n");
   ASSERT_EQ(mesh.cell, uint32_t(DFM_CELL_TET10));
   EXPECT_EQ(mesh.cells, (Array<uint32_t>{0, 1, 2, 3, 4, 5, 6, 7, 9, 8}));
@@ -130,14 +131,14 @@ TEST(CellFiles, GmshsOrderOfEdges_IsTurnedIntoVtks) {
 }
 
 TEST(CellFiles, ReflectedCells_AreTurned) {
-  const TetMesh mesh =
+  const RestMesh mesh =
       parsed("a.msh", kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 3 2 4 7 6 5 8 10 9\n$EndElements\n");
   EXPECT_EQ(mesh.turned, 1u);
   EXPECT_NEAR(mesh_statistics(mesh).volume, 8.0 / 6, 1e-14);
 }
 
 // Whether each triangle of the mesh is one of the boundary.
-bool on_boundary(const TetMesh &mesh) {
+bool on_boundary(const RestMesh &mesh) {
   std::set<std::set<uint32_t>> faces;
   const auto add = [](std::set<std::set<uint32_t>> &to, const Array<uint32_t> &of) {
     for (size_t f = 0; f < of.size(); f += 3) to.insert({of[f], of[f + 1], of[f + 2]});
@@ -163,7 +164,7 @@ TEST(CellFiles, GroupsOfQuadrangles_AreTrianglesOfTheBoundary) {
     }
     msh += "\n2 5 2 0 1 1 2 3 4 5 6 7 8\n$EndElements\n";
     vtk += "\nCELL_TYPES 2\n12 9\nCELL_DATA 2\nSCALARS group int 1\nLOOKUP_TABLE default\n3 7\n";
-    for (const TetMesh &mesh : {parsed("a.msh", msh), parsed("a.vtk", vtk)}) {
+    for (const RestMesh &mesh : {parsed("a.msh", msh), parsed("a.vtk", vtk)}) {
       EXPECT_EQ(mesh.tri_group.size(), 2u);
       EXPECT_TRUE(on_boundary(mesh)) << first;
     }
@@ -171,17 +172,17 @@ TEST(CellFiles, GroupsOfQuadrangles_AreTrianglesOfTheBoundary) {
 }
 
 TEST(CellFiles, GroupsOfSecondOrderTriangles_AreTrianglesOfTheBoundary) {
-  const TetMesh msh =
+  const RestMesh msh =
       parsed("a.msh", kMsh22 + kTen +
                           "$Elements\n2\n1 9 2 7 1 1 3 2 7 6 5\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n"
                           "$EndElements\n");
-  const TetMesh vtk =
+  const RestMesh vtk =
       parsed("a.vtk",
              "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 10 double\n"
              "0 0 0 1 0 0 0 1 0 0 0 1 .5 0 0 .5 .5 0 0 .5 0 0 0 .5 .5 0 .5 0 .5 .5\nCELLS 2 18\n"
              "10 0 1 2 3 4 5 6 7 8 9\n6 0 2 1 6 5 4\nCELL_TYPES 2\n24 22\nCELL_DATA 2\nSCALARS group int 1\n"
              "LOOKUP_TABLE default\n3 7\n");
-  for (const TetMesh &mesh : {msh, vtk}) {
+  for (const RestMesh &mesh : {msh, vtk}) {
     EXPECT_EQ(mesh.tri_group.size(), 4u);
     EXPECT_TRUE(on_boundary(mesh));
     for (const MeshGroup &g : mesh.groups)
@@ -193,7 +194,7 @@ TEST(CellFiles, GroupsOfSecondOrderTriangles_AreTrianglesOfTheBoundary) {
 
 // The triangle 1 4 5 is no face of a cell; point 3 of the file is in no cell.
 TEST(SecondOrder, TrianglesThatAreNoFaces_StayWhole) {
-  const TetMesh mesh = second_order(parsed(
+  const RestMesh mesh = second_order(parsed(
       "a.msh", kMsh22 +
                    "$Nodes\n6\n1 0 0 0\n2 1 0 0\n3 9 9 9\n4 0 1 0\n5 0.3 0.3 1\n6 0.3 0.3 -1\n$EndNodes\n"
                    "$Elements\n4\n1 4 2 0 1 1 2 4 5\n2 4 2 0 1 1 4 2 6\n3 2 2 7 1 1 5 6\n4 2 2 7 1 1 2 5\n"
@@ -216,7 +217,7 @@ TEST(CellFiles, WhatIsNoBody_IsRefused) {
       kMsh22 + kTen +
           "$Elements\n2\n1 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n2 11 2 0 1 1 2 3 4 5 6 7 8 9 10\n$EndElements\n",
       DFM_E_FORMAT, {"on one another"});
-  TetMesh filled = make_beam(kMemory, 1, 1, 1, 50);
+  RestMesh filled = make_beam(kMemory, 1, 1, 1, 50);
   filled.share.assign(filled.ntet(), 0.5);
   EXPECT_THROW(second_order(filled), Error);
   EXPECT_THROW(second_order(made(DFM_CELL_HEX8)), Error);

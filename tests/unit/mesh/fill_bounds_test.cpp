@@ -12,14 +12,14 @@ using namespace dfm;
 
 namespace {
 
-TriMesh tetrahedron(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
+RestMesh tetrahedron(Vec3 a, Vec3 b, Vec3 c, Vec3 d) {
   return test::surface_of({a, b, c, d}, {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {0, 3, 2}});
 }
 
 // The cells, or the sentence of a refusal.
-std::string outcome(const TriMesh &surface, uint32_t cells) {
+std::string outcome(const RestMesh &surface, uint32_t cells) {
   try {
-    const TetMesh mesh = fill_surface(surface, cells);
+    const RestMesh mesh = fill_surface(surface, cells);
     EXPECT_LE(mesh.ntet(), 4 * uint64_t(cells) + 1000);
     return "";
   } catch (const Error &e) {
@@ -48,7 +48,7 @@ TEST(FillBounds, CoordinatesTooCoarseForTheCells_AreRefusedWithTheirResolution) 
 }
 
 TEST(FillBounds, PartsTooFarApart_AreRefused) {
-  TriMesh both = test::sphere_surface(0.1, 2);
+  RestMesh both = test::sphere_surface(0.1, 2);
   test::append(both, test::sphere_surface(0.1, 2, {1e7, 0, 0}));
   const std::string sentence = outcome(both, 2000);
   EXPECT_NE(sentence.find("too far apart"), std::string::npos) << sentence;
@@ -58,7 +58,7 @@ TEST(FillBounds, SpikesAndStrayCorners_GiveCellsOrAnError) {
   std::mt19937 draw(7);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (const double reach : {1e2, 1e6, 1e20}) {
-    TriMesh spiked = test::sphere_surface(0.1, 3);
+    RestMesh spiked = test::sphere_surface(0.1, 3);
     for (int i = 0; i < 10; ++i) {
       double *const p = &spiked.points[3 * size_t(draw() % spiked.npoint())];
       for (int k = 0; k < 3; ++k) p[k] = reach * unit(draw);
@@ -70,7 +70,7 @@ TEST(FillBounds, SpikesAndStrayCorners_GiveCellsOrAnError) {
 TEST(FillBounds, TangleOfTriangles_GivesCellsOrAnError) {
   std::mt19937 draw(11);
   std::uniform_real_distribution<double> unit(-1, 1);
-  TriMesh tangle;
+  RestMesh tangle;
   for (int i = 0; i < 100; ++i) {
     const auto any = [&] { return Vec3{unit(draw), unit(draw), unit(draw)}; };
     test::append(tangle, tetrahedron(any(), any(), any(), any()));
@@ -84,7 +84,7 @@ TEST(FillBounds, MoreCellsThanMemoryHolds_AreRefusedBeforeTheWorkBegins) {
 }
 
 TEST(FillBounds, SurfaceTurnedInsideOut_IsNotFilledFromOnePoint) {
-  const TriMesh inside_out = tetrahedron({0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1});
+  const RestMesh inside_out = tetrahedron({0, 0, 0}, {0, 1, 0}, {1, 0, 0}, {0, 0, 1});
   try {
     fan_surface(inside_out);
     FAIL() << "filled";

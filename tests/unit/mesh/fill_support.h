@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "math/vec3.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 
 namespace test {
 
-inline dfm::TriMesh surface_of(const std::vector<dfm::Vec3> &points,
-                               const std::vector<std::array<uint32_t, 3>> &tris) {
-  dfm::TriMesh out;
+inline dfm::RestMesh surface_of(const std::vector<dfm::Vec3> &points,
+                                const std::vector<std::array<uint32_t, 3>> &tris) {
+  dfm::RestMesh out;
   for (const dfm::Vec3 &p : points) out.points.insert(out.points.end(), {p.x, p.y, p.z});
   for (const auto &t : tris) out.tris.insert(out.tris.end(), t.begin(), t.end());
   out.tri_group.assign(tris.size(), dfm::kNoGroup);
@@ -20,7 +20,7 @@ inline dfm::TriMesh surface_of(const std::vector<dfm::Vec3> &points,
   return out;
 }
 
-inline dfm::TriMesh box_surface(dfm::Vec3 lo, dfm::Vec3 hi) {
+inline dfm::RestMesh box_surface(dfm::Vec3 lo, dfm::Vec3 hi) {
   std::vector<dfm::Vec3> p;
   for (int i = 0; i < 8; ++i) p.push_back({i & 1 ? hi.x : lo.x, i & 2 ? hi.y : lo.y, i & 4 ? hi.z : lo.z});
   return surface_of(p, {{0, 2, 1},
@@ -38,7 +38,7 @@ inline dfm::TriMesh box_surface(dfm::Vec3 lo, dfm::Vec3 hi) {
 }
 
 // Octahedron, each triangle cut into four `cuts` times, pushed out to the sphere.
-inline dfm::TriMesh sphere_surface(double radius, int cuts, dfm::Vec3 center = {}) {
+inline dfm::RestMesh sphere_surface(double radius, int cuts, dfm::Vec3 center = {}) {
   std::vector<dfm::Vec3> p{{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   std::vector<std::array<uint32_t, 3>> t{{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
                                          {2, 0, 5}, {1, 2, 5}, {3, 1, 5}, {0, 3, 5}};
@@ -61,7 +61,7 @@ inline dfm::TriMesh sphere_surface(double radius, int cuts, dfm::Vec3 center = {
 }
 
 // About z, `around` quads round the ring and `tube` round its tube.
-inline dfm::TriMesh torus_surface(double ring, double radius, uint32_t around, uint32_t tube) {
+inline dfm::RestMesh torus_surface(double ring, double radius, uint32_t around, uint32_t tube) {
   std::vector<dfm::Vec3> p;
   std::vector<std::array<uint32_t, 3>> t;
   for (uint32_t i = 0; i < around; ++i)
@@ -75,7 +75,7 @@ inline dfm::TriMesh torus_surface(double ring, double radius, uint32_t around, u
   return surface_of(p, t);
 }
 
-inline void append(dfm::TriMesh &to, const dfm::TriMesh &from) {
+inline void append(dfm::RestMesh &to, const dfm::RestMesh &from) {
   const uint32_t first = to.npoint();
   to.points.insert(to.points.end(), from.points.begin(), from.points.end());
   for (const uint32_t i : from.tris) to.tris.push_back(first + i);
@@ -83,16 +83,16 @@ inline void append(dfm::TriMesh &to, const dfm::TriMesh &from) {
   to.file_point.resize(to.npoint());
 }
 
-inline void flip(dfm::TriMesh &m, uint32_t t) {
+inline void flip(dfm::RestMesh &m, uint32_t t) {
   std::swap(m.tris[3 * size_t(t) + 1], m.tris[3 * size_t(t) + 2]);
 }
-inline void remove(dfm::TriMesh &m, uint32_t t) {
+inline void remove(dfm::RestMesh &m, uint32_t t) {
   m.tris.erase(m.tris.begin() + 3 * t, m.tris.begin() + 3 * t + 3);
   m.tri_group.pop_back();
 }
 
 // By the triangles; exact for a clean closed surface.
-inline double enclosed(const dfm::TriMesh &m) {
+inline double enclosed(const dfm::RestMesh &m) {
   double v = 0;
   for (size_t t = 0; t < m.tris.size(); t += 3) {
     const auto p = [&](int k) { return dfm::load3(&m.points[3 * size_t(m.tris[t + k])]); };

@@ -14,23 +14,23 @@
 namespace {
 
 using dfm::fill_surface;
-using dfm::TetMesh;
-using dfm::TriMesh;
+using dfm::RestMesh;
+using dfm::RestMesh;
 using dfm::Vec3;
 
-double material(const TetMesh &m) {
+double material(const RestMesh &m) {
   double v = 0;
   for (uint32_t t = 0; t < m.ntet(); ++t)
     v += m.share[t] * dfm::tet_volume(m.points.data(), &m.tets[4 * size_t(t)]);
   return v;
 }
 
-Vec3 corner(const TetMesh &m, uint32_t t, int k) {
+Vec3 corner(const RestMesh &m, uint32_t t, int k) {
   return dfm::load3(&m.points[3 * size_t(m.tets[4 * size_t(t) + size_t(k)])]);
 }
 
 // Points spread over the triangles that lie in no cell, beyond `tolerance` lengths of the box.
-uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double tolerance) {
+uint32_t uncovered(const RestMesh &m, const RestMesh &s, uint32_t samples, double tolerance) {
   const dfm_mesh_info stat = dfm::mesh_statistics(m);
   std::mt19937_64 random(7);
   std::uniform_real_distribution<double> unit(0, 1);
@@ -62,7 +62,7 @@ uint32_t uncovered(const TetMesh &m, const TriMesh &s, uint32_t samples, double 
   return out;
 }
 
-void expect_valid(const TetMesh &m) {
+void expect_valid(const RestMesh &m) {
   ASSERT_EQ(m.share.size(), m.ntet());
   ASSERT_EQ(m.tet_group.size(), m.ntet());
   ASSERT_EQ(m.file_point.size(), m.npoint());
@@ -77,7 +77,7 @@ void expect_valid(const TetMesh &m) {
 // volume by closed form of the smooth shape, 0: of the triangles
 struct Case {
   const char *name;
-  TriMesh surface;
+  RestMesh surface;
   double volume;
 };
 
@@ -95,7 +95,7 @@ std::vector<Case> clean() {
 TEST(Fill, CleanSurface_SharesSumUpToTheEnclosedVolume) {
   for (const Case &c : clean()) {
     SCOPED_TRACE(c.name);
-    const TetMesh m = fill_surface(c.surface, 5000);
+    const RestMesh m = fill_surface(c.surface, 5000);
     expect_valid(m);
     EXPECT_NEAR(material(m), c.volume, 2e-3 * c.volume);
     EXPECT_NEAR(material(m), test::enclosed(c.surface), 1e-10 * c.volume);
@@ -106,19 +106,19 @@ TEST(Fill, CleanSurface_SharesSumUpToTheEnclosedVolume) {
 }
 
 TEST(Fill, PartsThinnerThanHalfACell_AreNamed) {
-  const auto thin = [](const TriMesh &surface, uint32_t cells) {
+  const auto thin = [](const RestMesh &surface, uint32_t cells) {
     for (const std::string &w : fill_surface(surface, cells).warnings)
       if (w.find(" % of the material is in parts thinner than half a cell") != std::string::npos)
         return std::stoi(w);
     return 0;
   };
-  const TriMesh sheet = test::box_surface({0, 0, 0}, {1, 1, 0.004});
+  const RestMesh sheet = test::box_surface({0, 0, 0}, {1, 1, 0.004});
   EXPECT_EQ(thin(sheet, 1000), 100);
   EXPECT_EQ(thin(test::box_surface({0, 0, 0}, {1, 0.02, 0.02}), 200), 100);  // a rope
   EXPECT_EQ(thin(test::box_surface({0, 0, 0}, {1, 0.02, 0.02}), 2000), 0);
   EXPECT_EQ(thin(test::sphere_surface(0.5, 4), 50), 0);  // coarse, not thin
   EXPECT_EQ(thin(test::box_surface({0, 0, 0}, {1, 1, 1}), 50), 0);
-  TriMesh lollipop = test::sphere_surface(0.1, 4);
+  RestMesh lollipop = test::sphere_surface(0.1, 4);
   test::append(lollipop, test::box_surface({-0.5, 1, -0.002}, {0.5, 2, 0.002}));
   const int part = thin(lollipop, 2000);
   EXPECT_GT(part, 30);
@@ -150,7 +150,7 @@ TEST(Fill, SampledShares_AgreeWithTheVolumeBeforeTheyAreMadeTo) {
 // One face of a big box through the lattice: the share of a cell is what a plane leaves of it, known by
 // clipping at finer and finer cuts.
 TEST(Fill, ShareOfACellCutByAPlane_WithinItsStatedError) {
-  const TriMesh box = test::box_surface({-1, -1, -1}, {1, 1, 0.0123});
+  const RestMesh box = test::box_surface({-1, -1, -1}, {1, 1, 0.0123});
   const dfm::FillSurface s(box);
   dfm::Lattice lattice;
   lattice.half_pitch = 0.05;
@@ -201,7 +201,7 @@ TEST(Fill, CleanSurface_LiesWithinTheCells) {
 TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
   // At this pitch the walls of the cube lie in planes of the lattice: the cells outside them hold nothing and
   // are not needed.
-  const TriMesh cube = test::box_surface({0, 0, 0}, {1, 1, 1});
+  const RestMesh cube = test::box_surface({0, 0, 0}, {1, 1, 1});
   const dfm::FillSurface s(cube);
   dfm::Lattice lattice;
   lattice.half_pitch = 0.125 / s.size;
@@ -220,7 +220,7 @@ TEST(Fill, AlignedBox_KeepsNoCellsThatItOnlyTouches) {
 TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
   for (const Case &c : clean())
     for (const uint32_t wanted : {300u, 2000u}) {
-      const TetMesh m = fill_surface(c.surface, wanted);
+      const RestMesh m = fill_surface(c.surface, wanted);
       EXPECT_NEAR(m.ntet(), wanted, 0.1 * wanted) << c.name;
     }
   EXPECT_GE(fill_surface(test::sphere_surface(1, 3), 1).ntet(), 1u);
@@ -231,8 +231,8 @@ TEST(Fill, WantedNumber_IsMetWithinTenPercent) {
 // unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, Ball_MassCenterAndInertiaWithinOnePercent) {
   const double r = 0.5;
-  const TriMesh s = test::sphere_surface(r, 6, {0.3, -0.2, 0.1});
-  const TetMesh m = fill_surface(s, 20000);
+  const RestMesh s = test::sphere_surface(r, 6, {0.3, -0.2, 0.1});
+  const RestMesh m = fill_surface(s, 20000);
   double mass = 0, inertia = 0;
   Vec3 center;
   for (uint32_t t = 0; t < m.ntet(); ++t) {
@@ -256,7 +256,7 @@ TEST(Fill, Ball_MassCenterAndInertiaWithinOnePercent) {
 }
 
 TEST(Fill, Shares_NeverBelowTheFloorOfTheirNeighborhood) {
-  const TetMesh m = fill_surface(test::sphere_surface(0.5, 5), 5000);
+  const RestMesh m = fill_surface(test::sphere_surface(0.5, 5), 5000);
   std::vector<double> fullest(m.npoint(), 0.0);
   for (size_t i = 0; i < m.tets.size(); ++i)
     fullest[m.tets[i]] = std::max(fullest[m.tets[i]], m.share[i / 4]);
@@ -268,13 +268,13 @@ TEST(Fill, Shares_NeverBelowTheFloorOfTheirNeighborhood) {
 }
 
 TEST(Fill, HolesAndFlippedTriangles_ChangeTheVolumeByLittle) {
-  const TriMesh clean = test::sphere_surface(0.5, 4);
+  const RestMesh clean = test::sphere_surface(0.5, 4);
   const double volume = test::enclosed(clean);
-  TriMesh holes = clean, flips = clean;
+  RestMesh holes = clean, flips = clean;
   for (uint32_t t = 40; t-- > 0;) test::remove(holes, 51 * t);
   for (uint32_t t = 0; t < 40; ++t) test::flip(flips, 51 * t);
-  for (const TriMesh *s : {&holes, &flips}) {
-    const TetMesh m = fill_surface(*s, 1500);
+  for (const RestMesh *s : {&holes, &flips}) {
+    const RestMesh m = fill_surface(*s, 1500);
     expect_valid(m);
     EXPECT_NEAR(material(m), volume, 0.02 * volume);
     EXPECT_EQ(dfm::mesh_statistics(m).npiece, 1u);
@@ -284,9 +284,9 @@ TEST(Fill, HolesAndFlippedTriangles_ChangeTheVolumeByLittle) {
 }
 
 TEST(Fill, ShellsThroughEachOther_CountWhatIsInsideOnce) {
-  TriMesh two = test::sphere_surface(0.5, 5);
+  RestMesh two = test::sphere_surface(0.5, 5);
   test::append(two, test::sphere_surface(0.5, 5, {0.5, 0, 0}));
-  const TetMesh m = fill_surface(two, 5000);
+  const RestMesh m = fill_surface(two, 5000);
   // of two balls of radius r at distance r: 5 pi r^3 / 12
   const double ball = 4 * M_PI / 3 * 0.125, lens = 5 * M_PI / 12 * 0.125;
   EXPECT_NEAR(material(m), 2 * ball - lens, 0.005 * ball);
@@ -295,19 +295,19 @@ TEST(Fill, ShellsThroughEachOther_CountWhatIsInsideOnce) {
 }
 
 TEST(Fill, CavityAndSecondPiece_AreSeen) {
-  TriMesh hollow = test::sphere_surface(0.5, 5), inner = test::sphere_surface(0.3, 5);
+  RestMesh hollow = test::sphere_surface(0.5, 5), inner = test::sphere_surface(0.3, 5);
   for (uint32_t t = 0; t < inner.ntri(); ++t) test::flip(inner, t);
   test::append(hollow, inner);
   EXPECT_NEAR(material(fill_surface(hollow, 5000)), 4 * M_PI / 3 * (0.125 - 0.027), 0.005);
-  TriMesh two = test::sphere_surface(0.5, 4);
+  RestMesh two = test::sphere_surface(0.5, 4);
   test::append(two, test::sphere_surface(0.5, 4, {1.5, 0, 0}));
   EXPECT_EQ(dfm::mesh_statistics(fill_surface(two, 5000)).npiece, 2u);
 }
 
 TEST(Fill, HangingTriangles_AreLeftOutAndReported) {
-  TriMesh m = test::sphere_surface(0.5, 4);
+  RestMesh m = test::sphere_surface(0.5, 4);
   test::append(m, test::surface_of({{2, 0, 0}, {2.1, 0, 0}, {2, 0.1, 0}}, {{0, 1, 2}}));
-  const TetMesh filled = fill_surface(m, 1000);
+  const RestMesh filled = fill_surface(m, 1000);
   const dfm_mesh_info s = dfm::mesh_statistics(filled);
   EXPECT_EQ(s.npiece, 1u);
   EXPECT_LT(s.hi[0], 1);
@@ -316,15 +316,15 @@ TEST(Fill, HangingTriangles_AreLeftOutAndReported) {
 }
 
 TEST(Fill, NanometersKilometersAndFarAway_GiveTheSameCells) {
-  const TetMesh unit = fill_surface(test::sphere_surface(1, 4), 1000);
+  const RestMesh unit = fill_surface(test::sphere_surface(1, 4), 1000);
   for (const double size : {1e-9, 1e5}) {
-    const TetMesh m = fill_surface(test::sphere_surface(size, 4), 1000);
+    const RestMesh m = fill_surface(test::sphere_surface(size, 4), 1000);
     ASSERT_EQ(m.ntet(), unit.ntet());
     EXPECT_TRUE(std::equal(m.tets.begin(), m.tets.end(), unit.tets.begin()));
     EXPECT_NEAR(material(m) / (size * size * size), material(unit), 1e-9);
   }
-  const TriMesh away = test::sphere_surface(0.1, 4, {1e7, -1e7, 1e7});
-  const TetMesh far = fill_surface(away, 1000);
+  const RestMesh away = test::sphere_surface(0.1, 4, {1e7, -1e7, 1e7});
+  const RestMesh far = fill_surface(away, 1000);
   expect_valid(far);
   EXPECT_NEAR(far.ntet(), 1000, 100);
   EXPECT_EQ(uncovered(far, away, 300, 1e-8), 0u);
@@ -333,15 +333,15 @@ TEST(Fill, NanometersKilometersAndFarAway_GiveTheSameCells) {
 }
 
 TEST(Fill, SameSurface_SameBits) {
-  const TriMesh s = test::torus_surface(0.5, 0.2, 40, 20);
-  const TetMesh a = fill_surface(s, 2000), b = fill_surface(s, 2000);
+  const RestMesh s = test::torus_surface(0.5, 0.2, 40, 20);
+  const RestMesh a = fill_surface(s, 2000), b = fill_surface(s, 2000);
   ASSERT_EQ(a.points.size(), b.points.size());
   EXPECT_EQ(std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(double)), 0);
   EXPECT_EQ(std::memcmp(a.share.data(), b.share.data(), a.share.size() * sizeof(double)), 0);
   EXPECT_TRUE(a.tets == b.tets);
 }
 
-std::string refusal(const TriMesh &s, uint32_t cells) {
+std::string refusal(const RestMesh &s, uint32_t cells) {
   try {
     fill_surface(s, cells);
   } catch (const dfm::Error &e) {
@@ -351,7 +351,7 @@ std::string refusal(const TriMesh &s, uint32_t cells) {
 }
 
 TEST(Fill, HugeOpening_IsRefusedWithItsSize) {
-  TriMesh half = test::sphere_surface(1, 4);
+  RestMesh half = test::sphere_surface(1, 4);
   for (uint32_t t = half.ntri(); t-- > 0;) {
     double z = 0;
     for (size_t k = 0; k < 3; ++k) z += half.points[3 * size_t(half.tris[3 * size_t(t) + k]) + 2];
@@ -360,7 +360,7 @@ TEST(Fill, HugeOpening_IsRefusedWithItsSize) {
   const std::string text = refusal(half, 1000);
   EXPECT_NE(text.find("1 opening of 3.14 m2"), std::string::npos) << text;
   EXPECT_NE(text.find("a diagonal of 2.83 m"), std::string::npos) << text;
-  TriMesh cube = test::box_surface({0, 0, 0}, {1, 1, 1});
+  RestMesh cube = test::box_surface({0, 0, 0}, {1, 1, 1});
   test::remove(cube, 0);
   test::remove(cube, 0);
   EXPECT_NE(refusal(cube, 1000).find("1 opening of 1 m2"), std::string::npos);
@@ -371,14 +371,14 @@ TEST(Fill, NothingToFill_IsRefused) {
   EXPECT_NE(refusal(test::surface_of({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{0, 1, 2}}), 100).find("no area"),
             std::string::npos);
   EXPECT_NE(refusal(test::sphere_surface(1, 2), 0).find("cells is 0"), std::string::npos);
-  TriMesh inside_out = test::sphere_surface(1, 2);
+  RestMesh inside_out = test::sphere_surface(1, 2);
   for (uint32_t t = 0; t < inside_out.ntri(); ++t) test::flip(inside_out, t);
   EXPECT_NE(refusal(inside_out, 100).find("nothing lies inside"), std::string::npos)
       << refusal(inside_out, 100);
 }
 
-void expect_fills(const TriMesh &s, uint32_t cells) {
-  const TetMesh m = fill_surface(s, cells);
+void expect_fills(const RestMesh &s, uint32_t cells) {
+  const RestMesh m = fill_surface(s, cells);
   expect_valid(m);
   EXPECT_NEAR(m.ntet(), cells, 0.1 * cells);
   EXPECT_NEAR(material(m), test::enclosed(s), 0.02 * test::enclosed(s));
@@ -386,8 +386,8 @@ void expect_fills(const TriMesh &s, uint32_t cells) {
 }
 
 // A flat region of triangles, drawn out along z: its outline, inner ones too, becomes walls.
-TriMesh prism(const std::vector<std::array<double, 2>> &region,
-              const std::vector<std::array<uint32_t, 3>> &tris, double depth) {
+RestMesh prism(const std::vector<std::array<double, 2>> &region,
+               const std::vector<std::array<uint32_t, 3>> &tris, double depth) {
   const uint32_t n = uint32_t(region.size());
   std::vector<Vec3> p;
   for (const double z : {0.0, depth})
@@ -410,7 +410,7 @@ TriMesh prism(const std::vector<std::array<double, 2>> &region,
 TEST(Fill, SharpShapes_AreFilled) {
   const struct {
     const char *name;
-    TriMesh surface;
+    RestMesh surface;
     double volume;
   } shapes[] = {
       {"spike",
@@ -442,7 +442,7 @@ void expect_files_fill(const std::vector<std::string> &files, uint32_t cells, si
   EXPECT_EQ(files.size(), number);
   for (const std::string &path : files) {
     SCOPED_TRACE(path);
-    expect_fills(dfm::read_tri_mesh(dfm::Memory::standard(), path), cells);
+    expect_fills(dfm::read_mesh(dfm::Memory::standard(), path, DFM_MESH_SURFACE), cells);
   }
 }
 std::vector<std::string> surfaces_of(const std::string &folder) {

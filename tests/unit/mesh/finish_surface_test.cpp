@@ -63,11 +63,11 @@ RawMesh raw_of(const Soup &s, double scale = 1, Vec3 offset = {}) {
   return raw;
 }
 
-TriMesh finished(const Soup &s, double scale = 1, Vec3 offset = {}) {
+RestMesh finished(const Soup &s, double scale = 1, Vec3 offset = {}) {
   return finish_surface("soup", raw_of(s, scale, offset));
 }
 
-std::string all_warnings(const TriMesh &m) {
+std::string all_warnings(const RestMesh &m) {
   std::string out;
   for (const std::string &w : m.warnings) out += w + "\n";
   return out;
@@ -89,7 +89,7 @@ const Soup kTetrahedron{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}},
 
 TEST(FinishSurface, ValidBox_IsUnchanged) {
   const Soup s = box({1, 2, 3}, {2, 4, 6});
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   EXPECT_EQ(all_warnings(m), "");
   for (uint32_t i = 0; i < 36; ++i) EXPECT_EQ(m.tris[i], s.tris[i / 3][i % 3]);
   const dfm_mesh_info st = mesh_statistics(m);
@@ -104,7 +104,7 @@ TEST(FinishSurface, ValidBox_IsUnchanged) {
 
 TEST(FinishSurface, LooseCorners_AreMergedToTheFirst) {
   const Soup s = loose(box({}, {1, 1, 1}));
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   EXPECT_EQ(m.npoint(), 8u);
   EXPECT_EQ(m.merged_points, 28u);
   EXPECT_EQ(m.dropped_points, 0u);
@@ -137,7 +137,7 @@ TEST(FinishSurface, OneRoundingApart_IsMerged) {
         p = {std::min(p.x + apart * (n % 3), 1.0), std::min(p.y + apart * (n % 2), 1.0), p.z};
         ++n;
       }
-      const TriMesh m = finished(s, scale);
+      const RestMesh m = finished(s, scale);
       EXPECT_EQ(m.npoint(), 8u) << scale << ' ' << apart;
       EXPECT_TRUE(mesh_statistics(m).closed) << scale << ' ' << apart;
       EXPECT_EQ(m.merged_points, 28u);
@@ -172,7 +172,7 @@ TEST(FinishSurface, FartherApart_IsNotMerged) {
 
 TEST(FinishSurface, TurnedAtRandom_FacesOutward) {
   for (const uint32_t every : {1u, 2u, 3u, 4u}) {
-    const TriMesh m = finished(turned(box({}, {1, 1, 1}), every));
+    const RestMesh m = finished(turned(box({}, {1, 1, 1}), every));
     const dfm_mesh_info st = mesh_statistics(m);
     EXPECT_TRUE(st.closed) << every;
     EXPECT_NEAR(st.volume, 1, 1e-15) << every;
@@ -183,7 +183,7 @@ TEST(FinishSurface, TurnedAtRandom_FacesOutward) {
 TEST(FinishSurface, AnySizeAndPlace_SameRepairs) {
   const Soup s = loose(turned(joined(box({}, {3, 3, 3}), box({1, 1, 1}, {2, 2, 2})), 3));
   for (const double scale : {1e-150, 1e-9, 1.0, 1e5, 1e90}) {
-    const TriMesh m = finished(s, scale);
+    const RestMesh m = finished(s, scale);
     const dfm_mesh_info st = mesh_statistics(m);
     EXPECT_EQ(m.npoint(), 16u) << scale;
     EXPECT_EQ(m.ntri(), 24u) << scale;
@@ -201,14 +201,14 @@ TEST(FinishSurface, Nested_AlternatesOutwardAndIntoTheHole) {
   Soup s = joined(joined(box({0, 0, 0}, {9, 9, 9}), box({1, 1, 1}, {8, 8, 8})),
                   joined(box({2, 2, 2}, {4, 4, 4}), box({5, 5, 5}, {7, 7, 7})));
   for (const Soup &given : {s, turned(s), turned(s, 5)}) {
-    const TriMesh m = finished(given);
+    const RestMesh m = finished(given);
     EXPECT_NEAR(mesh_statistics(m).volume, 729 - 343 + 8 + 8, 1e-11);
     EXPECT_EQ(mesh_statistics(m).npiece, 4u);
   }
 }
 
 TEST(FinishSurface, Crossing_IsNotNested) {
-  const TriMesh m = finished(turned(joined(box({0, 0, 0}, {4, 4, 4}), box({1, 1, 1}, {3, 3, 5})), 2));
+  const RestMesh m = finished(turned(joined(box({0, 0, 0}, {4, 4, 4}), box({1, 1, 1}, {3, 3, 5})), 2));
   EXPECT_NEAR(mesh_statistics(m).volume, 64 + 16, 1e-12);
 }
 
@@ -216,13 +216,13 @@ TEST(FinishSurface, Crossing_IsNotNested) {
 // lies in the opening of an L.
 TEST(FinishSurface, BesideInTheBoundingBox_IsNotNested) {
   Soup l = kTetrahedron;
-  const TriMesh m = finished(turned(joined(l, box({0.7, 0.7, 0.7}, {0.9, 0.9, 0.9})), 3));
+  const RestMesh m = finished(turned(joined(l, box({0.7, 0.7, 0.7}, {0.9, 0.9, 0.9})), 3));
   EXPECT_NEAR(mesh_statistics(m).volume, 1.0 / 6 + 0.008, 1e-14);
 }
 
 TEST(FinishSurface, NestedPieceThatTouchesTheOuter_StillFacesIntoTheHole) {
   // shares the plane x = 0
-  const TriMesh m = finished(joined(box({0, 0, 0}, {3, 3, 3}), box({0, 1, 1}, {2, 2, 2})));
+  const RestMesh m = finished(joined(box({0, 0, 0}, {3, 3, 3}), box({0, 1, 1}, {2, 2, 2})));
   EXPECT_NEAR(mesh_statistics(m).volume, 27 - 2, 1e-12);
 }
 
@@ -231,7 +231,7 @@ TEST(FinishSurface, MissingTriangles_AreCountedAndTheRestFacesOutward) {
   s.tris.erase(s.tris.begin() + 12, s.tris.begin() + 14);  // z = 0 of the second: a square hole
   s.tris.erase(s.tris.begin() + 3);
   s.tris.erase(s.tris.begin());
-  const TriMesh m = finished(turned(s));
+  const RestMesh m = finished(turned(s));
   const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_FALSE(st.closed);
   EXPECT_EQ(st.open_edges, 10u);
@@ -258,7 +258,7 @@ TEST(FinishSurface, OpenSheet_KeepsTheSideOfItsMajority) {
     s.tris.push_back({a, a + 5, a + 1});
     s.tris.push_back({a, a + 4, a + 5});
   }
-  const TriMesh m = finished(turned(s, 4));
+  const RestMesh m = finished(turned(s, 4));
   EXPECT_EQ(m.turned, 5u);
   for (uint32_t t = 0; t < m.ntri(); ++t) {
     const uint32_t *c = &m.tris[3 * size_t(t)];
@@ -282,7 +282,7 @@ TEST(FinishSurface, MoebiusStrip_IsReportedAndLeft) {
     s.tris.push_back({a, c, b});
     s.tris.push_back({b, c, d});
   }
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   EXPECT_EQ(m.turned, 0u);
   EXPECT_NE(all_warnings(m).find("1 piece has no two sides"), std::string::npos) << all_warnings(m);
   EXPECT_EQ(mesh_statistics(m).holes, 1u);
@@ -295,8 +295,8 @@ TEST(FinishSurface, WithoutArea_IsDropped) {
   s.tris.push_back({0, 0, 1});
   s.tris.push_back({2, 2, 2});
   s.tris.push_back({8, 3, 8});
-  const TriMesh m = finished(s);
-  EXPECT_EQ(m.dropped_tris, 3u);
+  const RestMesh m = finished(s);
+  EXPECT_EQ(m.dropped_cells, 3u);
   EXPECT_EQ(m.dropped_points, 2u);
   EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_EQ(all_warnings(m),
@@ -308,7 +308,7 @@ TEST(FinishSurface, FlatAlongANeighborsSide_LeavesNoSlit) {
   Soup s = kTetrahedron;
   s.points.push_back({0.5, 0, 0});  // on the edge 0-1
   s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 1, 3}, {0, 3, 2}, {1, 2, 3}, {0, 1, 4}};
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(m.ntri(), 6u);
@@ -324,7 +324,7 @@ TEST(FinishSurface, FlatBesideFlat_IsTakenUpInTurn) {
   s.points.push_back({0.75, 0, 0});
   s.tris = {{0, 2, 1}, {0, 4, 3}, {4, 5, 3}, {5, 6, 3}, {6, 1, 3},
             {0, 3, 2}, {1, 2, 3}, {0, 1, 5}, {0, 5, 4}, {5, 1, 6}};
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_EQ(m.ntri(), 10u);
   EXPECT_NEAR(mesh_statistics(m).volume, 1.0 / 6, 1e-16);
@@ -335,16 +335,16 @@ TEST(FinishSurface, ListedTwice_IsDropped) {
   s.tris.push_back(s.tris[3]);
   s.tris.push_back({s.tris[4][0], s.tris[4][2], s.tris[4][1]});
   s.tris.push_back(s.tris[5]);
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   EXPECT_EQ(m.ntri(), 12u);
-  EXPECT_EQ(m.dropped_tris, 3u);
+  EXPECT_EQ(m.dropped_cells, 3u);
   EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_EQ(all_warnings(m), "3 duplicate triangles were dropped\n");
 }
 
 // Two closed boxes face to face: keeping one side of the wall would leave edges of three triangles.
 TEST(FinishSurface, TwoBoxesFaceToFace_BecomeOne) {
-  const TriMesh m = finished(joined(box({0, 0, 0}, {1, 1, 1}), box({1, 0, 0}, {2, 1, 1})));
+  const RestMesh m = finished(joined(box({0, 0, 0}, {1, 1, 1}), box({1, 0, 0}, {2, 1, 1})));
   const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_TRUE(st.closed);
   EXPECT_EQ(m.ntri(), 20u);
@@ -357,14 +357,14 @@ TEST(FinishSurface, TwoBoxesFaceToFace_BecomeOne) {
 
 TEST(FinishSurface, SheetWithBothSides_KeepsOne) {
   Soup s{{{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}}, {{0, 1, 2}, {0, 2, 3}, {0, 2, 1}, {0, 3, 2}}};
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   EXPECT_EQ(m.ntri(), 2u);
   EXPECT_EQ(mesh_statistics(m).area, 1);
 }
 
 TEST(FinishSurface, BoxesThatShareAnEdge_AreTurnedEachAndCounted) {
   Soup a = box({0, 0, 0}, {1, 1, 1}), b = box({1, 1, 0}, {2, 2, 1});
-  const TriMesh m = finished(turned(joined(a, b), 3));
+  const RestMesh m = finished(turned(joined(a, b), 3));
   const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_EQ(st.nonmanifold_edges, 1u);
   EXPECT_FALSE(st.closed);
@@ -376,7 +376,7 @@ TEST(FinishSurface, FinOnABox_IsCountedAndTheBoxFacesOutward) {
   Soup s = turned(box({}, {1, 1, 1}), 2);
   s.points.push_back({0.5, -1, -1});
   s.tris.push_back({0, 1, 8});
-  const TriMesh m = finished(s);
+  const RestMesh m = finished(s);
   const dfm_mesh_info st = mesh_statistics(m);
   EXPECT_EQ(st.nonmanifold_edges, 1u);
   EXPECT_EQ(st.open_edges, 2u);
@@ -391,7 +391,7 @@ TEST(FinishSurface, FinOnABox_IsCountedAndTheBoxFacesOutward) {
 }
 
 TEST(FinishSurface, Tetrahedra_GiveTheirBoundaryWithTheGroupsOfTheSkin) {
-  const TetMesh ball = make_ball(Memory::standard(), 1, 160);
+  const RestMesh ball = make_ball(Memory::standard(), 1, 160);
   RawMesh raw(Memory::standard());
   raw.points = ball.points;
   raw.tets = ball.tets;
@@ -403,7 +403,7 @@ TEST(FinishSurface, Tetrahedra_GiveTheirBoundaryWithTheGroupsOfTheSkin) {
   const Array<uint32_t> skin = boundary_triangles(ball.tets);
   raw.tris.assign({skin[5], skin[4], skin[3]});
   raw.tri_group.assign({1});
-  const TriMesh m = finish_surface("ball", std::move(raw));
+  const RestMesh m = finish_surface("ball", std::move(raw));
   EXPECT_TRUE(mesh_statistics(m).closed);
   EXPECT_NEAR(mesh_statistics(m).volume, mesh_statistics(ball).volume, 1e-14);
   EXPECT_EQ(m.ntri(), skin.size() / 3);
@@ -417,13 +417,13 @@ TEST(FinishSurface, Tetrahedra_GiveTheirBoundaryWithTheGroupsOfTheSkin) {
 
 // Where the cells only lie side by side in the file, the faces between them are no surface.
 TEST(FinishSurface, CellsApartAtOnePlace_AreJoined) {
-  const TetMesh beam = make_beam(Memory::standard(), 1, 1, 1, 12);
+  const RestMesh beam = make_beam(Memory::standard(), 1, 1, 1, 12);
   RawMesh raw(Memory::standard());
   for (const uint32_t p : beam.tets) {
     raw.tets.push_back(raw.npoint());
     raw.points.insert(raw.points.end(), &beam.points[3 * size_t(p)], &beam.points[3 * size_t(p)] + 3);
   }
-  const TriMesh m = finish_surface("cells", std::move(raw));
+  const RestMesh m = finish_surface("cells", std::move(raw));
   EXPECT_EQ(m.ntri(), boundary_triangles(beam.tets).size() / 3);
   EXPECT_EQ(m.merged_points, beam.tets.size() - beam.npoint());
   EXPECT_EQ(m.dropped_points, 0u);
@@ -436,7 +436,7 @@ TEST(FinishSurface, Groups_FollowTheirTriangles) {
   raw.groups.push_back({"a", 2, 3, {}});
   raw.tri_group[0] = raw.tri_group[1] = 0;
   raw.tri_group[2] = 1;
-  const TriMesh m = finish_surface("soup", std::move(raw));
+  const RestMesh m = finish_surface("soup", std::move(raw));
   ASSERT_EQ(m.groups.size(), 2u);
   EXPECT_EQ(m.groups[0].name, "a");
   EXPECT_EQ(m.groups[1].points.size(), 4u);

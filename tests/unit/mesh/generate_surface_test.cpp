@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "core/hash.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 #include "mesh_support.h"
 
 using namespace dfm;
@@ -16,7 +16,7 @@ namespace {
 constexpr double kPi = 3.14159265358979323846;
 const Memory &standard() { return Memory::standard(); }
 
-void expect_valid(const TriMesh &m, uint32_t requested, int euler, double least_quality) {
+void expect_valid(const RestMesh &m, uint32_t requested, int euler, double least_quality) {
   const dfm_mesh_info s = mesh_statistics(m);
   EXPECT_TRUE(s.closed) << requested;
   EXPECT_EQ(s.npiece, 1u);
@@ -24,7 +24,7 @@ void expect_valid(const TriMesh &m, uint32_t requested, int euler, double least_
   EXPECT_GT(s.volume, 0);
   EXPECT_GT(s.quality_min, requested < 500 ? 0.05 : least_quality) << requested;
   EXPECT_TRUE(m.warnings.empty());
-  EXPECT_EQ(m.merged_points + m.turned + m.dropped_points + m.dropped_tris, 0u);
+  EXPECT_EQ(m.merged_points + m.turned + m.dropped_points + m.dropped_cells, 0u);
   EXPECT_EQ(m.tri_group.size(), m.ntri());
   for (uint32_t p = 0; p < m.npoint(); ++p) ASSERT_EQ(m.file_point[p], p);
   if (requested < 500) return;
@@ -47,7 +47,7 @@ std::string refused(const std::function<void()> &f) {
 TEST(GenerateSurface, Balls_AreInscribedInTheirSphere) {
   double last = 0;
   for (const uint32_t n : {1u, 100u, 500u, 2000u, 20000u}) {
-    const TriMesh m = make_ball_surface(standard(), 0.5, n);
+    const RestMesh m = make_ball_surface(standard(), 0.5, n);
     expect_valid(m, n, 2, 0.75);
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(m.points[p], m.points[p + 1], m.points[p + 2]), 0.5, 1e-15);
@@ -62,7 +62,7 @@ TEST(GenerateSurface, Balls_AreInscribedInTheirSphere) {
 TEST(GenerateSurface, Beams_FillTheirBox) {
   for (const uint32_t n : {1u, 500u, 5000u})
     for (const auto &size : {std::array{1.0, 1.0, 1.0}, {1.0, 0.1, 0.2}, {1e-9, 2e-9, 3e-9}}) {
-      const TriMesh m = make_beam_surface(standard(), size[0], size[1], size[2], n);
+      const RestMesh m = make_beam_surface(standard(), size[0], size[1], size[2], n);
       expect_valid(m, n, 2, 0.5);
       EXPECT_NEAR(mesh_statistics(m).volume / (size[0] * size[1] * size[2]), 1, 1e-13);
     }
@@ -71,7 +71,7 @@ TEST(GenerateSurface, Beams_FillTheirBox) {
 TEST(GenerateSurface, Cylinders_HaveTheVolumeOfTheirPolygon) {
   for (const uint32_t n : {1u, 500u, 5000u})
     for (const double length : {0.3, 1.0, 5.0}) {
-      const TriMesh m = make_cylinder_surface(standard(), 0.2, length, n);
+      const RestMesh m = make_cylinder_surface(standard(), 0.2, length, n);
       expect_valid(m, n, 2, 0.5);
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
@@ -84,7 +84,7 @@ TEST(GenerateSurface, Cylinders_HaveTheVolumeOfTheirPolygon) {
 TEST(GenerateSurface, Tubes_HaveTheVolumeOfTheirRing) {
   for (const uint32_t n : {1u, 500u, 5000u})
     for (const double inner : {0.05, 0.15, 0.19}) {
-      const TriMesh m = make_tube_surface(standard(), inner, 0.2, 0.6, n);
+      const RestMesh m = make_tube_surface(standard(), inner, 0.2, 0.6, n);
       expect_valid(m, inner == 0.19 ? 1 : n, 0, inner == 0.05 ? 0.2 : 0.5);
       uint32_t around = 0;
       for (size_t p = 0; p < m.points.size(); p += 3)
@@ -96,7 +96,7 @@ TEST(GenerateSurface, Tubes_HaveTheVolumeOfTheirRing) {
 
 TEST(GenerateSurface, Tori_ApproachTheirVolume) {
   for (const uint32_t n : {1u, 500u, 5000u}) {
-    const TriMesh m = make_torus_surface(standard(), 0.06, 0.02, n);
+    const RestMesh m = make_torus_surface(standard(), 0.06, 0.02, n);
     expect_valid(m, n, 0, 0.3);
     for (size_t p = 0; p < m.points.size(); p += 3)
       EXPECT_NEAR(std::hypot(std::hypot(m.points[p], m.points[p + 1]) - 0.06, m.points[p + 2]), 0.02, 1e-15);
@@ -109,7 +109,7 @@ TEST(GenerateSurface, Tori_ApproachTheirVolume) {
 TEST(GenerateTube, Cells_AreValidAndFillTheRing) {
   for (const uint32_t n : {1u, 500u, 3000u, 20000u})
     for (const double inner : {0.05, 0.1, 0.18}) {
-      const TetMesh m = make_tube(standard(), inner, 0.2, 0.7, n);
+      const RestMesh m = make_tube(standard(), inner, 0.2, 0.7, n);
       const dfm_mesh_info s = mesh_statistics(m);
       EXPECT_GT(s.quality_min, n == 1 ? 0.1 : inner == 0.05 ? 0.25 : 0.45) << n << " " << inner;
       EXPECT_EQ(s.npiece, 1u);
@@ -130,7 +130,7 @@ TEST(GenerateTube, Cells_AreValidAndFillTheRing) {
 
 // Mirrored layers: along the axis diagonals go up as often as down, so a tube under tension does not twist.
 TEST(GenerateTube, Surface_HasNoSense) {
-  const TetMesh m = make_tube(standard(), 0.15, 0.2, 0.7, 6000);
+  const RestMesh m = make_tube(standard(), 0.15, 0.2, 0.7, 6000);
   const Array<uint32_t> edges = unique_edges(m.tets);
   double twist = 0, all = 0;
   for (size_t i = 0; i < edges.size(); i += 2) {
@@ -144,12 +144,12 @@ TEST(GenerateTube, Surface_HasNoSense) {
 
 TEST(GenerateSurface, SameBitsEveryTime) {
   Hash h;
-  for (const TriMesh &m : {make_ball_surface(standard(), 1, 500), make_torus_surface(standard(), 2, 1, 500),
-                           make_tube_surface(standard(), 1, 2, 3, 500)}) {
+  for (const RestMesh &m : {make_ball_surface(standard(), 1, 500), make_torus_surface(standard(), 2, 1, 500),
+                            make_tube_surface(standard(), 1, 2, 3, 500)}) {
     h.add(m.points.data(), m.points.size() * sizeof(double));
     h.add(m.tris.data(), m.tris.size() * sizeof(uint32_t));
   }
-  const TetMesh t = make_tube(standard(), 1, 2, 3, 500);
+  const RestMesh t = make_tube(standard(), 1, 2, 3, 500);
   h.add(t.points.data(), t.points.size() * sizeof(double));
   h.add(t.tets.data(), t.tets.size() * sizeof(uint32_t));
   EXPECT_EQ(h.value, 10497315447834092805u);

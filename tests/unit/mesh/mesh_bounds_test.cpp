@@ -32,10 +32,10 @@ bool read_capped(const std::string &name, const std::string &bytes) {
     for (const Array<uint32_t> *corners : {&raw.tets, &raw.tris})
       for (const uint32_t p : *corners) EXPECT_LT(p, raw.npoint()) << name;
     if (raw.tets.empty()) {
-      const TriMesh mesh = finish_surface(name, std::move(raw));
+      const RestMesh mesh = finish_surface(name, std::move(raw));
       mesh_statistics(mesh);
     } else {
-      const TetMesh mesh = finish_mesh(name, std::move(raw));
+      const RestMesh mesh = finish_mesh(name, std::move(raw));
       mesh_statistics(mesh);
       for (uint32_t t = 0; t < mesh.ntet(); ++t)
         EXPECT_GT(tet_volume(mesh.points.data(), &mesh.tets[4 * size_t(t)]), 0) << name;
@@ -208,7 +208,7 @@ TEST(MeshBounds, RealMesh_TakesASmallMultipleOfItsFile) {
   const size_t bytes = std::filesystem::file_size(path);
   test::CountedMemory memory;
   {
-    const TetMesh mesh = read_tet_mesh(memory.hooks, path);
+    const RestMesh mesh = read_mesh(memory.hooks, path, DFM_MESH_CELLS);
     EXPECT_LT(memory.peak, 5 * bytes);
     EXPECT_LT(memory.held, 2 * bytes);
   }
@@ -218,14 +218,14 @@ TEST(MeshBounds, RealMesh_TakesASmallMultipleOfItsFile) {
 // What a large mesh may take: 600 bytes per tetrahedron while it is read, 400 once settled, whatever its
 // format (1e6: tests/bench/mesh_read_bench.cpp).
 TEST(MeshBounds, LargeMesh_TakesSixHundredBytesPerTetrahedronWhileRead) {
-  const TetMesh beam = make_beam(Memory::standard(), 2, 1, 1, 100000);
+  const RestMesh beam = make_beam(Memory::standard(), 2, 1, 1, 100000);
   for (const char *name : {"/large.msh", "/large.msh2", "/large.vtk", "/large.vtu", "/large.mesh"}) {
     SCOPED_TRACE(name);
     const std::string path = test::scratch("mesh_bounds") + name;
-    write_tet_mesh(beam, path);
+    write_mesh(beam, path);
     test::CountedMemory memory;
     {
-      const TetMesh mesh = read_tet_mesh(memory.hooks, path);
+      const RestMesh mesh = read_mesh(memory.hooks, path, DFM_MESH_CELLS);
       ASSERT_EQ(mesh.ntet(), beam.ntet());
       EXPECT_LT(memory.peak, 600ull * mesh.ntet());
       EXPECT_LT(memory.held, 400ull * mesh.ntet());
@@ -243,7 +243,7 @@ TEST(MeshBounds, EveryFailingAllocation_IsOutOfMemory) {
       test::CountedMemory memory;
       memory.refuse_from = n;
       try {
-        const TetMesh mesh = read_tet_mesh(memory.hooks, file);
+        const RestMesh mesh = read_mesh(memory.hooks, file, DFM_MESH_CELLS);
         whole = memory.calls <= n;
         EXPECT_TRUE(whole) << "allocation " << n << " failed unnoticed";
       } catch (const std::bad_alloc &) {}

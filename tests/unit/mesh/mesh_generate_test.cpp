@@ -15,7 +15,7 @@ namespace {
 
 const Memory &standard() { return Memory::standard(); }
 
-void expect_valid(const TetMesh &m) {
+void expect_valid(const RestMesh &m) {
   const dfm_mesh_info s = mesh_statistics(m);
   EXPECT_GT(s.quality_min, 0.3);
   EXPECT_EQ(s.npiece, 1u);
@@ -53,7 +53,7 @@ void expect_valid(const TetMesh &m) {
   EXPECT_NEAR(volume / s.volume, 1, 1e-12);
 }
 
-uint64_t hash_of(const TetMesh &m) {
+uint64_t hash_of(const RestMesh &m) {
   Hash h;
   h.add(m.points.data(), m.points.size() * sizeof(double));
   h.add(m.tets.data(), m.tets.size() * sizeof(uint32_t));
@@ -67,7 +67,7 @@ TEST(MeshGenerate, Beams_AreValidAndFillTheirBox) {
     for (const auto &[x, y, z] : {std::tuple{1.0, 0.1, 0.1}, std::tuple{0.1, 0.1, 0.1},
                                   std::tuple{1.0, 1.0, 0.1}, std::tuple{2e-9, 1e-9, 3e-9}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << x << " " << y << " " << z);
-      const TetMesh m = make_beam(standard(), x, y, z, cells);
+      const RestMesh m = make_beam(standard(), x, y, z, cells);
       expect_valid(m);
       const dfm_mesh_info s = mesh_statistics(m);
       EXPECT_NEAR(s.volume / (x * y * z), 1, 1e-12);
@@ -86,7 +86,7 @@ TEST(MeshGenerate, Cylinders_AreValidAndInscribed) {
     for (const auto &[radius, length] :
          {std::pair{0.2, 1.0}, std::pair{1.0, 1.0}, std::pair{1.0, 0.2}, std::pair{0.02, 0.16}}) {
       SCOPED_TRACE(testing::Message() << cells << " cells, " << radius << " " << length);
-      const TetMesh m = make_cylinder(standard(), radius, length, cells);
+      const RestMesh m = make_cylinder(standard(), radius, length, cells);
       expect_valid(m);
       const dfm_mesh_info s = mesh_statistics(m);
       // The outer ring has 6n points: the body is a prism over a regular polygon.
@@ -117,7 +117,7 @@ TEST(MeshGenerate, Balls_AreValidAndTheirSurfaceLiesOnTheSphere) {
   double last_gap = 1;
   for (const uint32_t cells : {1u, 160u, 1000u, 5000u, 20000u}) {
     SCOPED_TRACE(cells);
-    const TetMesh m = make_ball(standard(), 0.05, cells);
+    const RestMesh m = make_ball(standard(), 0.05, cells);
     expect_valid(m);
     const Array<uint32_t> tri = boundary_triangles(m.tets);
     for (const uint32_t p : tri) {
@@ -136,7 +136,7 @@ TEST(MeshGenerate, Balls_AreValidAndTheirSurfaceLiesOnTheSphere) {
 TEST(MeshGenerate, Lattices_HaveNoPreferredDirection) {
   // The tensor of edge directions (sum of d d^T over |d|^2) is a multiple of the identity by symmetry
   // of the lattices.
-  const auto anisotropy = [](const TetMesh &m, int axes) {
+  const auto anisotropy = [](const RestMesh &m, int axes) {
     const Array<uint32_t> edges = unique_edges(m.tets);
     double t[3][3] = {};
     for (size_t i = 0; i < edges.size(); i += 2) {
@@ -192,7 +192,7 @@ TEST(MeshGenerate, ExtremeProportions_NeitherHangNorFill) {
   for (const double x : {1e-8, 1e-4, 1e4, 1e8}) {
     for (int shape = 0; shape < 2; ++shape) {
       try {
-        const TetMesh m = shape ? make_cylinder(standard(), 1, x, 100) : make_beam(standard(), 1, 1, x, 100);
+        const RestMesh m = shape ? make_cylinder(standard(), 1, x, 100) : make_beam(standard(), 1, 1, x, 100);
         EXPECT_LE(m.ntet(), 10'000u);
         for (uint32_t t = 0; t < m.ntet(); ++t)
           ASSERT_GT(tet_volume(m.points.data(), &m.tets[4 * size_t(t)]), 0);

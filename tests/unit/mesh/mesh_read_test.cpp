@@ -18,10 +18,10 @@ const std::string kOneCell = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
 const std::string kMsh41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
 const std::string kMsh22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
 
-TetMesh read_text(const std::string &name, const std::string &text) {
+RestMesh read_text(const std::string &name, const std::string &text) {
   const std::string path = test::scratch("mesh") + "/" + name;
   test::write_file(path, text);
-  return read_tet_mesh(Memory::standard(), path);
+  return read_mesh(Memory::standard(), path, DFM_MESH_CELLS);
 }
 
 void expect_refusal(const std::string &name, const std::string &text, dfm_status status,
@@ -36,7 +36,7 @@ void expect_refusal(const std::string &name, const std::string &text, dfm_status
 using Corner = std::array<double, 3>;
 
 // The cells as places in space, whatever the numbers.
-std::set<std::set<Corner>> cells_in_space(const TetMesh &m) {
+std::set<std::set<Corner>> cells_in_space(const RestMesh &m) {
   std::set<std::set<Corner>> out;
   for (uint32_t t = 0; t < m.ntet(); ++t) {
     std::set<Corner> cell;
@@ -58,7 +58,7 @@ TEST(MeshRead, EveryDialect_GivesTheSameBody) {
   std::set<std::set<Corner>> expected;
   for (const std::string &file : files) {
     SCOPED_TRACE(file);
-    const TetMesh m = read_tet_mesh(Memory::standard(), file);
+    const RestMesh m = read_mesh(Memory::standard(), file, DFM_MESH_CELLS);
     ASSERT_EQ(m.npoint(), 8u);
     ASSERT_EQ(m.ntet(), 6u);
     EXPECT_EQ(m.turned, 0u);
@@ -78,7 +78,7 @@ TEST(MeshRead, PhysicalGroups_KeepNamesCellsAndPoints) {
   for (const std::string &file : test::own_meshes()) {
     if (file.find(".msh") == std::string::npos && file.find(".vtu") == std::string::npos) continue;
     SCOPED_TRACE(file);
-    const TetMesh m = read_tet_mesh(Memory::standard(), file);
+    const RestMesh m = read_mesh(Memory::standard(), file, DFM_MESH_CELLS);
     ASSERT_EQ(m.groups.size(), 3u);
     EXPECT_EQ(m.groups[0].name, "skin");
     EXPECT_EQ(m.groups[0].dimension, 2);
@@ -103,8 +103,9 @@ TEST(MeshRead, PhysicalGroups_KeepNamesCellsAndPoints) {
 }
 
 TEST(MeshRead, MeditReferences_AreGroupsByNumber) {
-  const TetMesh m = read_tet_mesh(Memory::standard(),
-                                  std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_medit.mesh");
+  const RestMesh m =
+      read_mesh(Memory::standard(), std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_medit.mesh",
+                DFM_MESH_CELLS);
   ASSERT_EQ(m.groups.size(), 4u);
   const struct {
     const char *name;
@@ -138,7 +139,7 @@ TEST(MeshRead, MeditStructure_IsChecked) {
   expect_refusal("m.mesh", head + four + "Tetrahedra 1\n0 1 2 3 0\nEnd\n", DFM_E_FORMAT, {"vertex 0"});
   expect_refusal("m.mesh", head + four + "Tetrahedra 9\n1 2 3 4 0\nEnd\n", DFM_E_FORMAT, {"9 tetrahedra"});
   // as several writers leave it
-  const TetMesh endless = read_text("m.mesh", head + four + "Tetrahedra 1\n1 2 3 4 0\n");
+  const RestMesh endless = read_text("m.mesh", head + four + "Tetrahedra 1\n1 2 3 4 0\n");
   EXPECT_EQ(endless.ntet(), 1u);
   ASSERT_EQ(endless.warnings.size(), 1u);
   EXPECT_NE(endless.warnings[0].find("End is missing"), std::string::npos);
@@ -151,15 +152,15 @@ TEST(MeshRead, MeditStructure_IsChecked) {
 }
 
 TEST(MeshRead, GroupWithoutName_IsCalledByItsNumber) {
-  const TetMesh m = read_text("unnamed.msh", kMsh22 +
-                                                 "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
-                                                 "$Elements\n1\n1 4 2 42 1 1 2 3 4\n$EndElements\n");
+  const RestMesh m = read_text("unnamed.msh", kMsh22 +
+                                                  "$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n"
+                                                  "$Elements\n1\n1 4 2 42 1 1 2 3 4\n$EndElements\n");
   ASSERT_EQ(m.groups.size(), 1u);
   EXPECT_EQ(m.groups[0].name, "42");
 }
 
 TEST(MeshRead, NegativeCell_IsTurnedAndCounted) {
-  const TetMesh m = read_text("turned.vtk", kVtk + kFour + "CELLS 1 5\n4 0 2 1 3\nCELL_TYPES 1\n10\n");
+  const RestMesh m = read_text("turned.vtk", kVtk + kFour + "CELLS 1 5\n4 0 2 1 3\nCELL_TYPES 1\n10\n");
   EXPECT_EQ(m.turned, 1u);
   EXPECT_GT(tet_volume(m.points.data(), m.tets.data()), 0);
   ASSERT_EQ(m.warnings.size(), 1u);
@@ -167,7 +168,7 @@ TEST(MeshRead, NegativeCell_IsTurnedAndCounted) {
 }
 
 TEST(MeshRead, DuplicateCellInAnotherOrder_IsDroppedAndCounted) {
-  const TetMesh m =
+  const RestMesh m =
       read_text("double.vtk", kVtk + kFour + "CELLS 2 10\n4 0 1 2 3\n4 3 1 0 2\nCELL_TYPES 2\n10\n10\n");
   EXPECT_EQ(m.ntet(), 1u);
   EXPECT_EQ(m.dropped_cells, 1u);
@@ -175,9 +176,9 @@ TEST(MeshRead, DuplicateCellInAnotherOrder_IsDroppedAndCounted) {
 }
 
 TEST(MeshRead, OverlappingCells_AreReportedAsTangled) {
-  const TetMesh m = read_text("tangled.vtk", kVtk +
-                                                 "POINTS 5 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.1 0.1 2\n"
-                                                 "CELLS 2 10\n4 0 1 2 3\n4 0 1 2 4\nCELL_TYPES 2\n10\n10\n");
+  const RestMesh m = read_text("tangled.vtk", kVtk +
+                                                  "POINTS 5 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n0.1 0.1 2\n"
+                                                  "CELLS 2 10\n4 0 1 2 3\n4 0 1 2 4\nCELL_TYPES 2\n10\n10\n");
   EXPECT_EQ(m.overlapping, 1u);
   EXPECT_NE(m.warnings.at(0).find("tangled"), std::string::npos);
 }
@@ -187,7 +188,7 @@ TEST(MeshRead, AnySize_LoadsWithoutAbsoluteEpsilon) {
     char text[512];
     std::snprintf(text, sizeof text, "POINTS 4 double\n0 0 0\n%.17g 0 0\n0 %.17g 0\n0 0 %.17g\n", size, size,
                   size);
-    const TetMesh m = read_text("size.vtk", kVtk + text + kOneCell);
+    const RestMesh m = read_text("size.vtk", kVtk + text + kOneCell);
     EXPECT_NEAR(mesh_statistics(m).volume / (size * size * size), 1.0 / 6, 1e-15);
     EXPECT_TRUE(m.warnings.empty()) << m.warnings[0];
   }
@@ -204,7 +205,7 @@ TEST(MeshRead, CellThinnerThanItsCoordinatesResolve_IsFlat) {
       read_text("near.vtk", kVtk + "POINTS 4 double\n0 0 0\n0.002 0 0\n0 0.001 0\n0 0 0.001\n" + kOneCell)
           .ntet(),
       1u);
-  const TetMesh sliver =
+  const RestMesh sliver =
       read_text("sliver.vtk", kVtk + "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0.3 0.3 1e-9\n" + kOneCell);
   EXPECT_EQ(mesh_statistics(sliver).flat_cells, 1u);
   EXPECT_NE(sliver.warnings.at(0).find("nearly flat"), std::string::npos);
@@ -241,7 +242,7 @@ TEST(MeshRead, NumbersThatAreNone_AreRefusedWithTheirLine) {
 
 TEST(MeshRead, Locale_HasNoInfluence) {
   const char *set = std::setlocale(LC_ALL, "de_DE.UTF-8");
-  const TetMesh m =
+  const RestMesh m =
       read_text("locale.vtk", kVtk + "POINTS 4 double\n0 0 0\n1.5 0 0\n0 1 0\n0 0 1\n" + kOneCell);
   std::setlocale(LC_ALL, "C");
   EXPECT_EQ(m.points[3], 1.5) << (set ? set : "locale not installed");
@@ -257,10 +258,10 @@ TEST(MeshRead, LongLinesAndCarriageReturns_AreFine) {
 
 // VTK and our writer of old: names as strings, before the points.
 TEST(MeshRead, VtkNamesAsStrings_NameTheGroups) {
-  const TetMesh m = read_text("named.vtk", kVtk + "FIELD FieldData 2\ngroup_number 2 1 int\n3 7\n" +
-                                               "group_name 1 1 string\nsoft part\n" + kFour +
-                                               "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\n" +
-                                               "SCALARS group int 1\nLOOKUP_TABLE default\n7\n");
+  const RestMesh m = read_text("named.vtk", kVtk + "FIELD FieldData 2\ngroup_number 2 1 int\n3 7\n" +
+                                                "group_name 1 1 string\nsoft part\n" + kFour +
+                                                "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\nCELL_DATA 1\n" +
+                                                "SCALARS group int 1\nLOOKUP_TABLE default\n7\n");
   ASSERT_EQ(m.groups.size(), 1u);
   EXPECT_EQ(m.groups[0].name, "soft part");
 }

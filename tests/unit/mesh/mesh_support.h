@@ -56,7 +56,7 @@ inline std::vector<std::string> own_surfaces() {
 inline std::optional<dfm::Error> refusal(const std::string &path,
                                          const dfm::Memory &memory = dfm::Memory::standard()) {
   try {
-    dfm::read_tet_mesh(memory, path);
+    dfm::read_mesh(memory, path, DFM_MESH_CELLS);
   } catch (const dfm::Error &e) {
     return e;
   }

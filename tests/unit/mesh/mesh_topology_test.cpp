@@ -9,8 +9,8 @@ using namespace dfm;
 
 namespace {
 
-TetMesh two_tets() {  // share the face 1 2 3
-  TetMesh m;
+RestMesh two_tets() {  // share the face 1 2 3
+  RestMesh m;
   m.points = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1};
   m.tets = {0, 1, 2, 3, 4, 2, 1, 3};
   m.tet_group.assign(2, kNoGroup);
@@ -20,7 +20,7 @@ TetMesh two_tets() {  // share the face 1 2 3
 }  // namespace
 
 TEST(MeshTopology, Faces_OfAPositiveCellPointOutward) {
-  const TetMesh m = two_tets();
+  const RestMesh m = two_tets();
   ASSERT_GT(tet_volume(m.points.data(), &m.tets[4]), 0);
   // Divergence theorem: the sum of signed cones from the origin is the volume only if every triangle
   // points outward.
@@ -76,14 +76,14 @@ TEST(MeshTopology, Statistics_OfTwoCells) {
 }
 
 TEST(MeshTopology, Pieces_AreJoinedByPoints) {
-  TetMesh m = two_tets();
+  RestMesh m = two_tets();
   m.points.insert(m.points.end(), {5, 0, 0, 6, 0, 0, 5, 1, 0, 5, 0, 1});
   m.tets.insert(m.tets.end(), {5, 6, 7, 8});
   EXPECT_EQ(mesh_statistics(m).npiece, 2u);
 }
 
 TEST(MeshTopology, EdgeWhereBodiesTouch_IsNonManifold) {
-  TetMesh m = two_tets();
+  RestMesh m = two_tets();
   m.tets = {0, 1, 2, 3, 0, 1, 5, 4};  // they share the edge 0 1 alone
   m.points.insert(m.points.end(), {0, -1, -1});
   EXPECT_EQ(mesh_statistics(m).nonmanifold_edges, 1u);

@@ -17,8 +17,8 @@ namespace {
 std::string folder() { return test::scratch("mesh_write"); }
 
 // Coordinates that need all 17 digits, cells of alternating groups.
-TetMesh sample() {
-  TetMesh m = make_ball(Memory::standard(), 1.0 / 3, 500);
+RestMesh sample() {
+  RestMesh m = make_ball(Memory::standard(), 1.0 / 3, 500);
   m.groups.push_back({"skin", 2, 3, {0, 1}});
   m.groups.push_back({"inner part", 3, 4, {}});
   m.groups.push_back({"outer", 3, 9, {}});
@@ -26,7 +26,7 @@ TetMesh sample() {
   return m;
 }
 
-void expect_same_bits(const TetMesh &a, const TetMesh &b) {
+void expect_same_bits(const RestMesh &a, const RestMesh &b) {
   ASSERT_EQ(a.points.size(), b.points.size());
   EXPECT_EQ(std::memcmp(a.points.data(), b.points.data(), a.points.size() * sizeof(double)), 0);
   EXPECT_EQ(a.tets, b.tets);
@@ -39,11 +39,11 @@ size_t files_in(const std::string &path) {
 }  // namespace
 
 TEST(MeshWrite, MshBinary_ReadsBackToTheBitWithGroups) {
-  const TetMesh m = sample();
+  const RestMesh m = sample();
   for (const char *name : {"/a.msh", "/a.msh2", "/UPPER.MSH"}) {
     SCOPED_TRACE(name);
-    write_tet_mesh(m, folder() + name);
-    const TetMesh back = read_tet_mesh(Memory::standard(), folder() + name);
+    write_mesh(m, folder() + name);
+    const RestMesh back = read_mesh(Memory::standard(), folder() + name, DFM_MESH_CELLS);
     expect_same_bits(m, back);
     ASSERT_EQ(back.groups.size(), 2u);
     EXPECT_EQ(back.groups[0].name, "inner part");
@@ -56,17 +56,17 @@ TEST(MeshWrite, MshBinary_ReadsBackToTheBitWithGroups) {
 }
 
 TEST(MeshWrite, VtkBinary_ReadsBackToTheBit) {
-  const TetMesh m = sample();
-  write_tet_mesh(m, folder() + "/a.vtk");
-  expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/a.vtk"));
+  const RestMesh m = sample();
+  write_mesh(m, folder() + "/a.vtk");
+  expect_same_bits(m, read_mesh(Memory::standard(), folder() + "/a.vtk", DFM_MESH_CELLS));
 }
 
 namespace {
 
 // A beam whose ends are named: groups of cells, of triangles, of points, and of lines, of which only the
 // points are known.
-TetMesh grouped() {
-  TetMesh m = make_beam(Memory::standard(), 2, 1, 1, 100);
+RestMesh grouped() {
+  RestMesh m = make_beam(Memory::standard(), 2, 1, 1, 100);
   m.groups.push_back({"corner", 0, 4, {0, 1}});
   m.groups.push_back({"edge", 1, 5, {0, 1}});
   m.groups.push_back({"left end", 2, 8, {}});
@@ -89,7 +89,7 @@ TetMesh grouped() {
 using Named = std::map<std::pair<int32_t, std::string>, std::set<uint32_t>>;
 
 // By dimension and name (number where the format keeps no names): the elements.
-Named named(const TetMesh &m, bool by_number) {
+Named named(const RestMesh &m, bool by_number) {
   Named out;
   const auto key = [&](uint32_t g) {
     return std::pair(m.groups[g].dimension, by_number ? std::to_string(m.groups[g].tag) : m.groups[g].name);
@@ -107,12 +107,12 @@ Named named(const TetMesh &m, bool by_number) {
 }  // namespace
 
 TEST(MeshWrite, Groups_SurviveEveryFormat) {
-  const TetMesh m = grouped();
+  const RestMesh m = grouped();
   ASSERT_GT(m.tri_group.size(), 4u);
   for (const char *name : {"/g.msh", "/g.msh2", "/g.vtk", "/g.vtu", "/g.mesh"}) {
     SCOPED_TRACE(name);
-    write_tet_mesh(m, folder() + name);
-    const TetMesh back = read_tet_mesh(Memory::standard(), folder() + name);
+    write_mesh(m, folder() + name);
+    const RestMesh back = read_mesh(Memory::standard(), folder() + name, DFM_MESH_CELLS);
     expect_same_bits(m, back);
     const bool by_number = std::strcmp(name, "/g.mesh") == 0;
     EXPECT_EQ(named(back, by_number), named(m, by_number));
@@ -127,9 +127,9 @@ TEST(MeshWrite, Groups_SurviveEveryFormat) {
 }
 
 TEST(MeshWrite, Vtu_HasTheShareOfFilledCells) {
-  TetMesh m = grouped();
+  RestMesh m = grouped();
   for (uint32_t t = 0; t < m.ntet(); ++t) m.share.push_back(1.0 / (t + 1));
-  write_tet_mesh(m, folder() + "/share.vtu");
+  write_mesh(m, folder() + "/share.vtu");
   const std::string text = test::read_file(folder() + "/share.vtu");
   const size_t at = text.find("Name=\"share\"");
   ASSERT_NE(at, std::string::npos);
@@ -140,9 +140,9 @@ TEST(MeshWrite, Vtu_HasTheShareOfFilledCells) {
   std::memcpy(&bytes, &text[start], 8);
   EXPECT_EQ(bytes, 8 * (m.ntet() + m.tri_group.size()));
   EXPECT_EQ(std::memcmp(&text[start + 8], m.share.data(), 8 * m.share.size()), 0);
-  expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/share.vtu"));
-  write_tet_mesh(m, folder() + "/share.vtk");
-  expect_same_bits(m, read_tet_mesh(Memory::standard(), folder() + "/share.vtk"));
+  expect_same_bits(m, read_mesh(Memory::standard(), folder() + "/share.vtu", DFM_MESH_CELLS));
+  write_mesh(m, folder() + "/share.vtk");
+  expect_same_bits(m, read_mesh(Memory::standard(), folder() + "/share.vtk", DFM_MESH_CELLS));
 }
 
 TEST(MeshWrite, FailedWrite_LeavesOldFileAndNothingElse) {
@@ -150,12 +150,12 @@ TEST(MeshWrite, FailedWrite_LeavesOldFileAndNothingElse) {
   std::filesystem::remove_all(home);
   std::filesystem::create_directories(home + "/taken.msh/inside");
   // a folder stands there: renaming fails
-  EXPECT_THROW(write_tet_mesh(sample(), home + "/taken.msh"), Error);
+  EXPECT_THROW(write_mesh(sample(), home + "/taken.msh"), Error);
   EXPECT_EQ(files_in(home), 1u);
-  EXPECT_THROW(write_tet_mesh(sample(), home + "/none/a.msh"), Error);
+  EXPECT_THROW(write_mesh(sample(), home + "/none/a.msh"), Error);
   test::write_file(home + "/old.obj", "old");
   try {
-    write_tet_mesh(sample(), home + "/old.obj");
+    write_mesh(sample(), home + "/old.obj");
     ADD_FAILURE();
   } catch (const Error &e) {
     EXPECT_EQ(e.status, DFM_E_UNSUPPORTED);
@@ -177,7 +177,7 @@ TEST(MeshWrite, DiskThatFills_LeavesNothing) {
   setrlimit(RLIMIT_FSIZE, &small);
   for (const char *name : {"/a.msh", "/a.msh2", "/a.vtk", "/a.vtu", "/a.mesh"}) {
     try {
-      write_tet_mesh(sample(), home + name);
+      write_mesh(sample(), home + name);
       ADD_FAILURE() << name;
     } catch (const Error &e) {
       EXPECT_EQ(e.status, DFM_E_IO);
@@ -189,7 +189,7 @@ TEST(MeshWrite, DiskThatFills_LeavesNothing) {
 }
 
 TEST(MeshWrite, Vtu_OffsetsLeadToItsArrays) {
-  const TetMesh m = make_beam(Memory::standard(), 2, 1, 1, 24);
+  const RestMesh m = make_beam(Memory::standard(), 2, 1, 1, 24);
   std::vector<double> u(m.points.size(), 0.25), energy(m.ntet(), 7);
   std::vector<uint32_t> part(m.ntet(), 3);
   VtuGrid grid;
@@ -233,7 +233,7 @@ TEST(MeshWrite, Vtu_OffsetsLeadToItsArrays) {
 }
 
 TEST(MeshWrite, VtuOfTriangles_HasTriangleCells) {
-  const TetMesh m = make_beam(Memory::standard(), 1, 1, 1, 12);
+  const RestMesh m = make_beam(Memory::standard(), 1, 1, 1, 12);
   const Array<uint32_t> tri = boundary_triangles(m.tets);
   VtuGrid grid;
   grid.npoint = m.npoint();

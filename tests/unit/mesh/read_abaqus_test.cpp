@@ -7,7 +7,7 @@
 #include "deform/plugin.h"
 #include "mesh/cells.h"
 #include "mesh/numbers.h"
-#include "mesh/tri_mesh.h"
+#include "mesh/raw_mesh.h"
 #include "mesh_support.h"
 
 using namespace dfm;
@@ -18,19 +18,19 @@ const Memory &kStandard = Memory::standard();
 const std::string kFour = "*NODE\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n";
 const std::string kTet = kFour + "*ELEMENT, TYPE=C3D4, ELSET=all\n7, 1, 2, 3, 4\n";
 
-TetMesh parsed(const std::string &text) {
-  return parse_tet_mesh(kStandard, "a.inp", text.data(), text.size());
+RestMesh parsed(const std::string &text) {
+  return finish_mesh("a.inp", parse_raw(kStandard, "a.inp", text.data(), text.size()));
 }
 
-TetMesh made(uint32_t kind) {
+RestMesh made(uint32_t kind) {
   if (kind == DFM_CELL_HEX8) return make_bricks(kStandard, 0.3, 0.2, 0.2, 12);
-  const TetMesh beam = make_beam(kStandard, 0.3, 0.2, 0.2, 100);
+  const RestMesh beam = make_beam(kStandard, 0.3, 0.2, 0.2, 100);
   return kind == DFM_CELL_TET10 ? second_order(beam) : beam;
 }
 
 // The first half of the cells is the group "left".
-TetMesh grouped(uint32_t kind) {
-  TetMesh mesh = made(kind);
+RestMesh grouped(uint32_t kind) {
+  RestMesh mesh = made(kind);
   const uint32_t tets = cell_kind(kind).tets;
   mesh.groups.push_back({"left", 3, 4, Array<uint32_t>()});
   for (uint32_t t = 0; t < mesh.ntet() / 2 / tets * tets; ++t) mesh.tet_group[t] = 0;
@@ -47,14 +47,14 @@ std::string number(double x) {
   std::snprintf(text, sizeof text, "%.17g", x);
   return text;
 }
-std::string point(const TetMesh &mesh, size_t p, const char *between) {
+std::string point(const RestMesh &mesh, size_t p, const char *between) {
   std::string out;
   for (size_t k = 0; k < 3; ++k) out += between + number(mesh.points[3 * p + k]);
   return out;
 }
 
 // Numbers with gaps that fall; the nodes of a cell stand on two lines.
-std::string abaqus(const TetMesh &mesh, const std::string &type) {
+std::string abaqus(const RestMesh &mesh, const std::string &type) {
   const CellKind &kind = cell_kind(mesh.cell);
   const size_t n = mesh.nodes().size() / kind.nodes;
   const auto tag = [&](size_t p) { return std::to_string(10 + 3 * (mesh.npoint() - p)); };
@@ -74,7 +74,7 @@ std::string abaqus(const TetMesh &mesh, const std::string &type) {
 }
 
 // place: of each of TetGen's nodes among ours
-void write_tetgen(const TetMesh &mesh, const std::string &stem, size_t first) {
+void write_tetgen(const RestMesh &mesh, const std::string &stem, size_t first) {
   constexpr uint32_t kPlace[10] = {0, 1, 2, 3, 9, 7, 4, 5, 8, 6};
   const CellKind &kind = cell_kind(mesh.cell);
   const size_t n = mesh.nodes().size() / kind.nodes;
@@ -91,14 +91,14 @@ void write_tetgen(const TetMesh &mesh, const std::string &stem, size_t first) {
                    }));
 }
 
-void expect_same(const TetMesh &a, const TetMesh &b) {
+void expect_same(const RestMesh &a, const RestMesh &b) {
   EXPECT_EQ(a.cell, b.cell);
   EXPECT_EQ(a.points, b.points);
   EXPECT_EQ(a.cells, b.cells);
   EXPECT_EQ(a.tets, b.tets);
   EXPECT_EQ(a.turned, 0u);
   EXPECT_TRUE(a.warnings.empty()) << a.warnings[0];
-  const auto tags = [](const TetMesh &m, bool of_left) {
+  const auto tags = [](const RestMesh &m, bool of_left) {
     std::vector<bool> out;
     for (const uint32_t g : m.tet_group)
       out.push_back(g != kNoGroup && of_left && m.groups[g].name != "whole");
@@ -107,7 +107,7 @@ void expect_same(const TetMesh &a, const TetMesh &b) {
   EXPECT_EQ(tags(a, true), tags(b, true));
 }
 
-const MeshGroup &group_of(const TetMesh &mesh, const std::string &name, int32_t dimension) {
+const MeshGroup &group_of(const RestMesh &mesh, const std::string &name, int32_t dimension) {
   for (const MeshGroup &g : mesh.groups)
     if (g.name == name && g.dimension == dimension) return g;
   ADD_FAILURE() << "no group " << name;
@@ -135,22 +135,22 @@ INSTANTIATE_TEST_SUITE_P(Kinds, MeshesOfEngineers,
 
 TEST_P(MeshesOfEngineers, EveryFormat_GivesTheMeshThatMshGives) {
   const std::string folder = test::scratch("engineers");
-  const TetMesh mesh = grouped(GetParam());
-  write_tet_mesh(mesh, folder + "/a.msh");
-  const TetMesh msh = read_tet_mesh(kStandard, folder + "/a.msh");
+  const RestMesh mesh = grouped(GetParam());
+  write_mesh(mesh, folder + "/a.msh");
+  const RestMesh msh = read_mesh(kStandard, folder + "/a.msh", DFM_MESH_CELLS);
   for (const char *more : {"", "H", "R", "MH"}) {
-    const TetMesh back = parsed(abaqus(mesh, "C3D" + std::to_string(cell_kind(mesh.cell).nodes) + more));
+    const RestMesh back = parsed(abaqus(mesh, "C3D" + std::to_string(cell_kind(mesh.cell).nodes) + more));
     expect_same(back, msh);
     EXPECT_EQ(group_of(back, "left", 3).points, group_of(msh, "left", 3).points);
     EXPECT_EQ(group_of(back, "whole", 3).points.size(), back.npoint());
   }
-  write_tet_mesh(mesh, folder + "/a.mesh");
-  expect_same(read_tet_mesh(kStandard, folder + "/a.mesh"), msh);
+  write_mesh(mesh, folder + "/a.mesh");
+  expect_same(read_mesh(kStandard, folder + "/a.mesh", DFM_MESH_CELLS), msh);
   for (const size_t first : {0, 1, 5}) {
     if (mesh.cell == DFM_CELL_HEX8) continue;
     write_tetgen(mesh, folder + "/t", first);
     for (const char *ending : {".ele", ".node"}) {
-      const TetMesh back = read_tet_mesh(kStandard, folder + "/t" + ending);
+      const RestMesh back = read_mesh(kStandard, folder + "/t" + ending, DFM_MESH_CELLS);
       expect_same(back, msh);
       EXPECT_EQ(group_of(back, "4", 3).points, group_of(msh, "left", 3).points);
     }
@@ -159,7 +159,7 @@ TEST_P(MeshesOfEngineers, EveryFormat_GivesTheMeshThatMshGives) {
 
 // Nodes of C3D10 as Abaqus numbers them: the middles of 12 23 13 14 24 34.
 TEST(Abaqus, MiddlesOfEdges_LieOnThem) {
-  const TetMesh mesh = parsed(
+  const RestMesh mesh = parsed(
       "*NODE\n1, 0, 0, 0\n2, 2, 0, 0\n3, 0, 2, 0\n4, 0, 0, 2\n5, 1, 0, 0\n6, 1, 1, 0\n7, 0, 1, 0\n8, 0, 0, "
       "1\n"
       "9, 1, 0, 1\n10, 0, 1, 1\n*ELEMENT, TYPE=C3D10M\n1, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10\n");
@@ -175,7 +175,7 @@ TEST(Abaqus, MiddlesOfEdges_LieOnThem) {
 }
 
 TEST(Abaqus, Sets_AreGroupsHoweverTheyAreWritten) {
-  const TetMesh mesh = parsed(
+  const RestMesh mesh = parsed(
       "*node, nset=ALL\n1, 0, 0, 0\n2, 1, 0, 0\n3, 0, 1, 0\n4, 0, 0, 1\n5, 1, 1, 1\n"
       "*Element, Type=C3D4\n 1, 1, 2, 3, 4\n 2, 2, 5, 3, 4\n*ELEMENT, TYPE=S3, ELSET=Face\n 3, 1, 3, 2\n"
       "*NSET, NSET=odd, GENERATE\n1, 5, 2\n*NSET, nset=Two\n1,\n2\n*NSET, NSET=both\nODD, two\n"
@@ -201,11 +201,11 @@ TEST(Abaqus, SectionsDivideTheCells_WhateverOtherSetsSay) {
   const std::string two = kFour +
                           "5, 1, 1, 1\n*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n2, 2, 5, 3, 4\n"
                           "*ELSET, ELSET=one\n1\n*ELSET, ELSET=loaded\n1, 2\n";
-  const auto groups = [](const TetMesh &m) {
+  const auto groups = [](const RestMesh &m) {
     return std::vector{m.groups.at(m.tet_group.at(0)).name, m.groups.at(m.tet_group.at(1)).name};
   };
   EXPECT_EQ(groups(parsed(two)), (std::vector<std::string>{"loaded", "loaded"}));
-  const TetMesh mesh = parsed(two + "*SOLID SECTION, MATERIAL=a, ELSET=ALL\n*SOLID SECTION, ELSET=one\n");
+  const RestMesh mesh = parsed(two + "*SOLID SECTION, MATERIAL=a, ELSET=ALL\n*SOLID SECTION, ELSET=one\n");
   EXPECT_EQ(groups(mesh), (std::vector<std::string>{"one", "all"}));
   EXPECT_EQ(group_of(mesh, "loaded", 3).points.size(), 5u);
   EXPECT_EQ(group_of(mesh, "all", 3).points.size(), 5u);
@@ -218,12 +218,12 @@ TEST(Abaqus, AssemblyOfOnePart_IsRead) {
       "*End Instance\n*Node\n1, 9., 9., 9.\n*Nset, nset=reference\n 1,\n*Nset, nset=Fixed, instance=P-1\n 1, "
       "2\n"
       "*End Assembly\n";
-  const TetMesh mesh = parsed(part + "*Instance, name=P-1, part=P\n" + rest);
+  const RestMesh mesh = parsed(part + "*Instance, name=P-1, part=P\n" + rest);
   EXPECT_EQ(mesh.npoint(), 4u);
   EXPECT_EQ(mesh.groups.size(), 2u);
   EXPECT_EQ(group_of(mesh, "Fixed", 0).points, (Array<uint32_t>{0, 1}));
   EXPECT_TRUE(mesh.warnings.empty());
-  const TetMesh moved = parsed(part + "*Instance, name=P-1, part=P\n 1., 0., 0.\n" + rest);
+  const RestMesh moved = parsed(part + "*Instance, name=P-1, part=P\n 1., 0., 0.\n" + rest);
   EXPECT_EQ(moved.points, mesh.points);
   ASSERT_EQ(moved.warnings.size(), 1u);
   EXPECT_NE(moved.warnings[0].find("place of the instance"), std::string::npos);
@@ -233,10 +233,10 @@ TEST(Abaqus, AssemblyOfOnePart_IsRead) {
 }
 
 TEST(Abaqus, ElementsThatAreNoCells_AreLeftOutAndReported) {
-  const TetMesh mesh = parsed(kTet +
-                              "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=SPRINGA\n22, 1, "
-                              "2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"
-                              "*ELSET, ELSET=mixed\n7, 20, 21\n");
+  const RestMesh mesh = parsed(kTet +
+                               "*ELEMENT, TYPE=SPRINGA, ELSET=s\n20, 1, 2\n*ELEMENT, TYPE=SPRINGA\n22, 1, "
+                               "2\n*ELEMENT, TYPE=T3D2\n21, 1, 2\n"
+                               "*ELSET, ELSET=mixed\n7, 20, 21\n");
   ASSERT_EQ(mesh.warnings.size(), 2u);
   EXPECT_NE(mesh.warnings[0].find("'SPRINGA'"), std::string::npos);
   EXPECT_NE(mesh.warnings[1].find("2 entries"), std::string::npos);
@@ -310,7 +310,7 @@ TEST(Abaqus, RangesOfFarSteps_CostWhatTheyName) {
 TEST(Tetgen, MarkersAndRegions_AreGroups) {
   const std::string cube = std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_tetgen";
   for (const char *ending : {".ele", ".node", ".face"}) {
-    const TetMesh m = read_tet_mesh(kStandard, cube + ending);
+    const RestMesh m = read_mesh(kStandard, cube + ending, DFM_MESH_CELLS);
     ASSERT_EQ(m.groups.size(), 3u);  // markers of points are those of their triangles
     EXPECT_EQ(group_of(m, "7", 2).points.size(), 8u);
     EXPECT_EQ(m.tri_group.size(), 12u);
@@ -320,7 +320,7 @@ TEST(Tetgen, MarkersAndRegions_AreGroups) {
   const std::string stem = test::scratch("tetgen") + "/a";
   test::write_file(stem + ".node", test::read_file(cube + ".node"));
   test::write_file(stem + ".ele", test::read_file(cube + ".ele"));
-  EXPECT_EQ(group_of(read_tet_mesh(kStandard, stem + ".ele"), "3", 0).points.size(), 8u);
+  EXPECT_EQ(group_of(read_mesh(kStandard, stem + ".ele", DFM_MESH_CELLS), "3", 0).points.size(), 8u);
 }
 
 // After the corners tetgen -po2 writes the middles of 12 23 31, tetgen -po2f those of 23 31 12, tetgen -o2 of
@@ -328,7 +328,7 @@ TEST(Tetgen, MarkersAndRegions_AreGroups) {
 TEST(Tetgen, SecondOrderTriangles_AreTheBoundaryHoweverTheirMiddlesAreOrdered) {
   const std::string stem = test::scratch("tetgen2") + "/a";
   write_tetgen(second_order(parsed(kTet)), stem, 0);
-  const TetMesh plain = read_tet_mesh(kStandard, stem + ".ele");
+  const RestMesh plain = read_mesh(kStandard, stem + ".ele", DFM_MESH_CELLS);
   const auto at = [&](uint32_t a, uint32_t b) {
     for (uint32_t p = 4; p < 10; ++p) {
       bool is = true;
@@ -342,15 +342,15 @@ TEST(Tetgen, SecondOrderTriangles_AreTheBoundaryHoweverTheirMiddlesAreOrdered) {
        {at(0, 2) + at(2, 1) + at(0, 1), at(2, 1) + at(0, 1) + at(0, 2), std::string()}) {
     for (const char *marker : {" 5", " 5 0 -1"}) {
       test::write_file(stem + ".face", "1 1\n  0 0 2 1" + middles + marker + "\n# made by tetgen\n");
-      const TetMesh mesh = read_tet_mesh(kStandard, stem + ".face");
+      const RestMesh mesh = read_mesh(kStandard, stem + ".face", DFM_MESH_CELLS);
       EXPECT_EQ(mesh.tri_group.size(), 4u);
       EXPECT_EQ(group_of(mesh, "5", 2).points.size(), 6u);
-      const TriMesh skin = read_tri_mesh(kStandard, stem + ".ele");
+      const RestMesh skin = read_mesh(kStandard, stem + ".ele", DFM_MESH_SURFACE);
       ASSERT_EQ(skin.groups.size(), 1u);  // each of the four is a triangle of the boundary
       EXPECT_EQ(std::count(skin.tri_group.begin(), skin.tri_group.end(), 0u), 4);
     }
     test::write_file(stem + ".face", "1 0\n  0 0 2 1" + middles + "\n");
-    expect_same(read_tet_mesh(kStandard, stem + ".ele"), plain);
+    expect_same(read_mesh(kStandard, stem + ".ele", DFM_MESH_CELLS), plain);
   }
 }
 

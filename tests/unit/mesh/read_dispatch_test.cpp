@@ -38,7 +38,8 @@ TEST(ReadDispatch, WrongFileNameEnding_IsWarnedOfAndTheFileRead) {
   EXPECT_EQ(parse("a", kOff).warnings.at(0),
             "read as OFF, as its first bytes show, although its name has no ending");
   EXPECT_TRUE(parse("A.OFF", kOff).warnings.empty());
-  const TriMesh mesh = parse_tri_mesh(Memory::standard(), "a.ply", kOff.data(), kOff.size());
+  const RestMesh mesh =
+      finish_surface("a.ply", parse_raw(Memory::standard(), "a.ply", kOff.data(), kOff.size()));
   ASSERT_FALSE(mesh.warnings.empty());
   EXPECT_EQ(mesh.warnings[0], raw.warnings[0]);
 }

@@ -93,7 +93,7 @@ class PackedMeshes : public testing::Test {
   // Memory for reading and repair of a file, as tests/unit/mesh/mesh_bounds_test.cpp bounds it.
   size_t cap_of(const std::string &path) const { return 16384 + 64 * std::filesystem::file_size(path); }
 
-  void expect_tets(const Row &row, const TetMesh &mesh) {
+  void expect_tets(const Row &row, const RestMesh &mesh) {
     const dfm_mesh_info s = mesh_statistics(mesh);
     EXPECT_GT(s.quality_min, 0);
     if (!mesh.cells.empty()) {  // gmsh's; the table counts corners
@@ -119,7 +119,7 @@ class PackedMeshes : public testing::Test {
     }
   }
 
-  void expect_surface(const Row &row, uint32_t raw_points, uint32_t raw_tris, const TriMesh &mesh) {
+  void expect_surface(const Row &row, uint32_t raw_points, uint32_t raw_tris, const RestMesh &mesh) {
     EXPECT_GT(mesh.ntri(), 0u);
     for (const uint32_t p : mesh.tris) ASSERT_LT(p, mesh.npoint());
     if (row.volume > 0) {  // formats/: points joined, volume known
@@ -154,12 +154,12 @@ TEST_F(PackedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
       const uint32_t points = raw.npoint(), tris = raw.ntri();
       EXPECT_FALSE(is_foreign(row)) << "a format that is not ours was read";
       if (!raw.tets.empty()) {
-        const TetMesh mesh = finish_mesh(path, std::move(raw));
+        const RestMesh mesh = finish_mesh(path, std::move(raw));
         expect_tets(row, mesh);
         ++done["tets"];
       } else {
         EXPECT_EQ(row.tets, 0u);
-        const TriMesh mesh = finish_surface(path, std::move(raw));
+        const RestMesh mesh = finish_surface(path, std::move(raw));
         expect_surface(row, points, tris, mesh);
         ++done["surface"];
       }
@@ -186,9 +186,9 @@ TEST_F(PackedMeshes, EveryFileOfTheManifest_IsReadRepairedOrRefusedAsItSays) {
 
 TEST_F(PackedMeshes, DefectiveMeshes_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
-    return read_tet_mesh(Memory::standard(), folder + "nasty/" + file);
+    return read_mesh(Memory::standard(), folder + "nasty/" + file, DFM_MESH_CELLS);
   };
-  const auto reported = [](const TetMesh &m, const char *word) {
+  const auto reported = [](const RestMesh &m, const char *word) {
     return std::any_of(m.warnings.begin(), m.warnings.end(),
                        [&](const std::string &w) { return w.find(word) != std::string::npos; });
   };
@@ -219,7 +219,8 @@ TEST_F(PackedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
               {"cyl_fine.msh", 2579, 15092, 2386, 18863}};
   for (const auto &row : rows) {
     SCOPED_TRACE(row.file);
-    const dfm_mesh_info s = mesh_statistics(read_tet_mesh(Memory::standard(), folder + "thesis/" + row.file));
+    const dfm_mesh_info s =
+        mesh_statistics(read_mesh(Memory::standard(), folder + "thesis/" + row.file, DFM_MESH_CELLS));
     EXPECT_EQ(s.npoint, row.points);
     EXPECT_EQ(s.ntet, row.tets);
     EXPECT_EQ(s.ntriangle, row.triangles);
@@ -229,12 +230,12 @@ TEST_F(PackedMeshes, ThesisCylinders_HaveTheirPublishedCounts) {
 
 TEST_F(PackedMeshes, DefectiveSurfaces_AreRepairedAndReported) {
   const auto read = [&](const char *file) {
-    return read_tri_mesh(Memory::standard(), folder + "nasty/" + file);
+    return read_mesh(Memory::standard(), folder + "nasty/" + file, DFM_MESH_SURFACE);
   };
   EXPECT_GT(mesh_statistics(read("open_surface.obj")).open_edges, 0u);
   EXPECT_GT(read("mixed_winding.obj").turned, 0u);
   EXPECT_TRUE(mesh_statistics(read("mixed_winding.obj")).closed);
   EXPECT_EQ(mesh_statistics(read("nonmanifold_edge.ply")).nonmanifold_edges, 1u);
-  EXPECT_GT(read("degenerate_triangles.off").dropped_tris, 0u);
+  EXPECT_GT(read("degenerate_triangles.off").dropped_cells, 0u);
   EXPECT_EQ(mesh_statistics(read("self_intersecting.stl")).npiece, 2u);
 }

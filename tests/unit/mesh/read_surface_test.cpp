@@ -69,7 +69,7 @@ TEST(ReadSurface, EveryDialect_GivesTheSameCube) {
     EXPECT_EQ(raw.tri_group.size(), 12u);
     EXPECT_TRUE(raw.tets.empty());
     EXPECT_DOUBLE_EQ(volume6(raw), 6.0);
-    const TriMesh mesh = read_tri_mesh(Memory::standard(), file);
+    const RestMesh mesh = read_mesh(Memory::standard(), file, DFM_MESH_SURFACE);
     EXPECT_EQ(mesh.npoint(), 8u);
     EXPECT_EQ(mesh.ntri(), 12u);
     EXPECT_EQ(mesh.turned, 0u);

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "mesh/tri_mesh.h"
+#include "mesh/mesh.h"
 #include "mesh_support.h"
 
 using namespace dfm;
@@ -34,7 +34,7 @@ TEST(SurfaceFiles, DefectiveFiles_GiveTheExpectedResults) {
         {"formats/surf_ascii_two_solids.stl", 121, 238, 1, 0, 0, 0, -1, ""},
         {"formats/surf_bin.stl", 121, 238, 1, 0, 0, 0, -1, ""},
         {"thesis/liverlike1.stl", 2401, 4798, 1, 0, 0, 0, -1, ""}}) {
-    const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + f.file);
+    const RestMesh m = read_mesh(Memory::standard(), meshes() + f.file, DFM_MESH_SURFACE);
     const dfm_mesh_info s = mesh_statistics(m);
     EXPECT_EQ(s.npoint, f.npoint) << f.file;
     EXPECT_EQ(s.ntriangle, f.ntri) << f.file;
@@ -58,12 +58,13 @@ TEST(SurfaceFiles, DefectiveFiles_GiveTheExpectedResults) {
 // The same surface in every format: those of one precision give the same box and volume.
 TEST(SurfaceFiles, OneSurfaceInManyFormats_IsOneSurface) {
   const double volume =
-      mesh_statistics(read_tri_mesh(Memory::standard(), meshes() + "formats/surf_plain.obj")).volume;
+      mesh_statistics(read_mesh(Memory::standard(), meshes() + "formats/surf_plain.obj", DFM_MESH_SURFACE))
+          .volume;
   EXPECT_GT(volume, 0);
   uint32_t n = 0;
   for (const std::string &file : test::files_of(meshes() + "formats", {".obj", ".ply", ".stl", ".off"})) {
     if (file.find("ngon") != std::string::npos) continue;
-    const dfm_mesh_info s = mesh_statistics(read_tri_mesh(Memory::standard(), file));
+    const dfm_mesh_info s = mesh_statistics(read_mesh(Memory::standard(), file, DFM_MESH_SURFACE));
     EXPECT_TRUE(s.closed) << file;
     EXPECT_EQ(s.npoint, 121u) << file;
     EXPECT_NEAR(s.volume / volume, 1, 1e-6) << file;
@@ -77,11 +78,11 @@ TEST(SurfaceFiles, BoundaryOfABody_EnclosesItsVolume) {
   for (const char *folder : {"bars", "misc", "spheres", "formats", "nasty", "bench"})
     for (const std::string &file : test::files_of(meshes() + folder, {".msh", ".vtk", ".vtu", ".mesh"})) {
       if (test::refusal(file)) continue;
-      const TetMesh body = read_tet_mesh(Memory::standard(), file);
+      const RestMesh body = read_mesh(Memory::standard(), file, DFM_MESH_CELLS);
       const dfm_mesh_info b = mesh_statistics(body);
       // tangled: no surface encloses it; the large ones say nothing new
       if (body.overlapping || b.ntet > 6000) continue;
-      const dfm_mesh_info s = mesh_statistics(read_tri_mesh(Memory::standard(), file));
+      const dfm_mesh_info s = mesh_statistics(read_mesh(Memory::standard(), file, DFM_MESH_SURFACE));
       EXPECT_NEAR(s.volume / b.volume, 1, 1e-12) << file;
       EXPECT_EQ(s.closed, b.nonmanifold_edges == 0) << file;
       if (b.duplicate_points == 0) {
@@ -95,7 +96,7 @@ TEST(SurfaceFiles, BoundaryOfABody_EnclosesItsVolume) {
 // The wall of the hole is a piece of its own and faces into the hole: 4/3 pi (0.05^3 - 0.035^3) less what
 // polyhedra cut off.
 TEST(SurfaceFiles, HollowBall_HasTwoPiecesAndItsShellsVolume) {
-  const TriMesh m = read_tri_mesh(Memory::standard(), meshes() + "misc/shell_sphere.msh");
+  const RestMesh m = read_mesh(Memory::standard(), meshes() + "misc/shell_sphere.msh", DFM_MESH_SURFACE);
   const dfm_mesh_info s = mesh_statistics(m);
   EXPECT_EQ(s.npiece, 2u);
   EXPECT_NEAR(s.volume, 3.44e-4, 0.12e-4);

@@ -13,23 +13,23 @@ namespace {
 
 std::string folder() { return test::scratch("write_surface"); }
 
-TriMesh ball_in_groups() {
-  TriMesh m = make_ball_surface(Memory::standard(), 0.1, 320);
+RestMesh ball_in_groups() {
+  RestMesh m = make_ball_surface(Memory::standard(), 0.1, 320);
   m.groups.push_back({"north pole", 2, 3, {}});
   m.groups.push_back({"south", 2, 8, {}});
   for (uint32_t t = 0; t < m.ntri(); ++t) m.tri_group[t] = t % 5 == 0 ? 0 : t % 5 < 3 ? 1 : kNoGroup;
   return m;
 }
 
-TriMesh there_and_back(const TriMesh &m, const std::string &ending) {
+RestMesh there_and_back(const RestMesh &m, const std::string &ending) {
   const std::string path = folder() + "/ball" + ending;
-  write_tri_mesh(m, path);
-  return read_tri_mesh(Memory::standard(), path);
+  write_mesh(m, path);
+  return read_mesh(Memory::standard(), path, DFM_MESH_SURFACE);
 }
 
-std::string refused(const TriMesh &m, const std::string &name, dfm_status status) {
+std::string refused(const RestMesh &m, const std::string &name, dfm_status status) {
   try {
-    write_tri_mesh(m, folder() + "/" + name);
+    write_mesh(m, folder() + "/" + name);
   } catch (const Error &e) {
     EXPECT_EQ(e.status, status);
     return e.what();
@@ -40,9 +40,9 @@ std::string refused(const TriMesh &m, const std::string &name, dfm_status status
 }  // namespace
 
 TEST(WriteSurface, ThereAndBack_KeepsEveryBit) {
-  const TriMesh m = ball_in_groups();
+  const RestMesh m = ball_in_groups();
   for (const char *ending : {".obj", ".ply", ".off", ".vtk", ".vtu", ".OBJ", ".Vtu"}) {
-    const TriMesh back = there_and_back(m, ending);
+    const RestMesh back = there_and_back(m, ending);
     EXPECT_EQ(back.points, m.points) << ending;
     EXPECT_EQ(back.tris, m.tris) << ending;
     EXPECT_TRUE(back.warnings.empty()) << ending << back.warnings.front();
@@ -50,9 +50,9 @@ TEST(WriteSurface, ThereAndBack_KeepsEveryBit) {
 }
 
 TEST(WriteSurface, Groups_ComeBackWhereTheFormatHasThem) {
-  const TriMesh m = ball_in_groups();
+  const RestMesh m = ball_in_groups();
   for (const char *ending : {".obj", ".vtk", ".vtu"}) {
-    const TriMesh back = there_and_back(m, ending);
+    const RestMesh back = there_and_back(m, ending);
     ASSERT_EQ(back.groups.size(), 2u) << ending;
     EXPECT_EQ(back.groups[0].name, "north pole") << ending;
     EXPECT_EQ(back.groups[1].name, "south") << ending;
@@ -61,7 +61,7 @@ TEST(WriteSurface, Groups_ComeBackWhereTheFormatHasThem) {
 }
 
 TEST(WriteSurface, PlyGroups_ComeBackByNumber) {
-  const TriMesh m = ball_in_groups(), back = there_and_back(m, ".ply");
+  const RestMesh m = ball_in_groups(), back = there_and_back(m, ".ply");
   ASSERT_EQ(back.groups.size(), 2u);
   EXPECT_EQ(back.groups[0].name, "3");
   EXPECT_EQ(back.groups[1].tag, 8);
@@ -69,7 +69,7 @@ TEST(WriteSurface, PlyGroups_ComeBackByNumber) {
 }
 
 TEST(WriteSurface, Stl_KeepsSinglePrecision) {
-  const TriMesh m = ball_in_groups(), back = there_and_back(m, ".stl");
+  const RestMesh m = ball_in_groups(), back = there_and_back(m, ".stl");
   ASSERT_EQ(back.ntri(), m.ntri());
   EXPECT_EQ(back.npoint(), m.npoint());
   EXPECT_TRUE(mesh_statistics(back).closed);
@@ -82,7 +82,7 @@ TEST(WriteSurface, Stl_KeepsSinglePrecision) {
 
 TEST(WriteSurface, StlNormals_PointOutward) {
   const std::string path = folder() + "/ball.stl";
-  write_tri_mesh(ball_in_groups(), path);
+  write_mesh(ball_in_groups(), path);
   const std::string bytes = test::read_file(path);
   ASSERT_EQ(bytes.size(), 84u + 50 * 320);
   for (size_t t = 0; t < 320; ++t) {
@@ -96,7 +96,7 @@ TEST(WriteSurface, StlNormals_PointOutward) {
 // Numbers that no short text holds, from nanometers to the largest that is read.
 TEST(WriteSurface, ExtremeCoordinates_SurviveText) {
   for (const double scale : {1e-9 / 3, 1e5 / 3, 1e99 / 3}) {
-    TriMesh m = make_ball_surface(Memory::standard(), 1, 20);
+    RestMesh m = make_ball_surface(Memory::standard(), 1, 20);
     for (double &x : m.points) x *= scale;
     for (const char *ending : {".obj", ".off"})
       EXPECT_EQ(there_and_back(m, ending).points, m.points) << ending << scale;
@@ -104,7 +104,7 @@ TEST(WriteSurface, ExtremeCoordinates_SurviveText) {
 }
 
 TEST(WriteSurface, WhatAFormatCannotHold_IsRefusedAndLeavesNoFile) {
-  TriMesh m = make_ball_surface(Memory::standard(), 1e50, 20);
+  RestMesh m = make_ball_surface(Memory::standard(), 1e50, 20);
   EXPECT_NE(refused(m, "big.stl", DFM_E_UNSUPPORTED).find("STL holds coordinates up to"), std::string::npos);
   EXPECT_NE(refused(m, "ball.xyz", DFM_E_UNSUPPORTED).find(".obj, .ply, .stl, .off, .vtk, .vtu"),
             std::string::npos);

@@ -148,9 +148,9 @@ TEST(Share, FaceOfACube_GetsTheConsistentLoad) {
   for (int i = 0; i < 8; ++i)
     mesh.points.insert(mesh.points.end(), {double(i & 1), double((i >> 1) & 1), double((i >> 2) & 1)});
   const std::vector<uint32_t> tets = {0, 1, 2, 4, 1, 3, 2, 7, 1, 7, 4, 5, 2, 7, 6, 4, 1, 2, 4, 7};
-  mesh.tets = tets.data();
-  mesh.npoint = 8;
-  mesh.ntet = 5;
+  mesh.info.tets = tets.data();
+  mesh.info.npoint = 8;
+  mesh.info.ntet = 5;
   mesh.size = std::sqrt(3.0);
   const std::vector<uint32_t> triangles = {1, 3, 7, 1, 7, 5, 0, 4, 2, 2, 4, 6};
   const std::vector<uint32_t> face = {1, 3, 5, 7};
@@ -180,8 +180,8 @@ TEST(Share, FaceOfACube_GetsTheConsistentLoad) {
 TEST(Nodal, Table_IsReadByFileNumbers) {
   BodyMesh mesh;
   const std::vector<uint32_t> file_point = {4, 0, 2};
-  mesh.npoint = 3;
-  mesh.file_point = file_point.data();
+  mesh.info.npoint = 3;
+  mesh.info.file_point = file_point.data();
   const std::string path = test::scratch("nodal") + "/bc.csv";
   test::write_file(path,
                    "node,fixx,fixy,fixz,fx,fy,fz\n0,1,0,1,0,0,0\n4,0,0,0,1.5,-2e-1,0\n\n1,1,1,1,0,0,0\n");

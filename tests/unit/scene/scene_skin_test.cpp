@@ -15,13 +15,13 @@ namespace {
 
 // A mesh of the library with what a scene's selections look at.
 struct Cells {
-  dfm::TetMesh mesh;
+  dfm::RestMesh mesh;
   BodyMesh body;
-  explicit Cells(dfm::TetMesh &&m) : mesh(std::move(m)) {
+  explicit Cells(dfm::RestMesh &&m) : mesh(std::move(m)) {
     body.points.assign(mesh.points.begin(), mesh.points.end());
-    body.tets = mesh.tets.data();
-    body.npoint = mesh.npoint();
-    body.ntet = mesh.ntet();
+    body.info.tets = mesh.tets.data();
+    body.info.npoint = mesh.npoint();
+    body.info.ntet = mesh.ntet();
     for (int k = 0; k < 3; ++k) {
       body.lo[k] = INFINITY;
       body.hi[k] = -INFINITY;
@@ -37,13 +37,13 @@ struct Cells {
 
 // One cell alone: a mesh on which a search has nothing to choose.
 double one_cell(const BodyMesh &all, uint32_t cell, const double *point) {
-  const uint32_t own[4] = {0, 1, 2, 3}, *const t = all.tets + 4 * size_t(cell);
+  const uint32_t own[4] = {0, 1, 2, 3}, *const t = all.info.tets + 4 * size_t(cell);
   BodyMesh one;
   for (int k = 0; k < 4; ++k)
     one.points.insert(one.points.end(), &all.points[3 * size_t(t[k])], &all.points[3 * size_t(t[k])] + 3);
-  one.npoint = 4;
-  one.tets = own;
-  one.ntet = 1;
+  one.info.npoint = 4;
+  one.info.tets = own;
+  one.info.ntet = 1;
   uint32_t corners[4];
   double weights[4];
   return Locator(one).find(point, corners, weights);
@@ -62,7 +62,7 @@ TEST(Locator, FindsTheCellThatASearchThroughAllFinds) {
     for (int n = 0; n < 40; ++n) {
       double point[3], least = INFINITY;
       for (int k = 0; k < 3; ++k) point[k] = c.body.lo[k] + in(random) * (c.body.hi[k] - c.body.lo[k]);
-      for (uint32_t t = 0; t < c.body.ntet; ++t) least = std::min(least, one_cell(c.body, t, point));
+      for (uint32_t t = 0; t < c.body.info.ntet; ++t) least = std::min(least, one_cell(c.body, t, point));
       uint32_t corners[4];
       double weights[4], sum = 0;
       EXPECT_EQ(locate(c.body, point, corners, weights), least) << shape << " " << n;

@@ -7,6 +7,7 @@
 
 #include "math/extent.h"
 #include "math/turn.h"
+#include "plugin/context.h"
 #include "scene/device.h"
 #include "scene/load.h"
 
@@ -93,11 +94,6 @@ Extent box_of(const Obstacle &o, const std::vector<double> &scaled) {
   return place(own.lo, own.hi, o.def.pose);
 }
 
-std::string short_id(const std::string &id) {
-  const size_t dot = id.rfind('.');
-  return dot == std::string::npos ? id : id.substr(dot + 1);
-}
-
 // Three, as a person would write it.
 double round_to_digits(double x) { return std::strtod(format("%.3g", x).c_str(), nullptr); }
 
@@ -124,8 +120,8 @@ bool convex(const Skin &s, double edge) {
 
 class Reader {
  public:
-  Reader(dfm_context *context, const Definition &def, const Types &types)
-      : context_(context), def_(def), types_(types), files_(context, def) {
+  Reader(dfm_context *context, const Definition &def)
+      : context_(context), def_(def), types_(context->registry), files_(context, def) {
     g_ = length(def.world.gravity);
     for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? def.world.gravity[k] / g_ : 0;
   }
@@ -160,7 +156,7 @@ class Reader {
       Body b = def_.bodies[i];
       b.fill.reset();
       b.lattice_size =
-          round_to_digits(b.scale * std::cbrt(meshes_[i].info.volume / (times * meshes_[i].ntet)));
+          round_to_digits(b.scale * std::cbrt(meshes_[i].info.volume / (times * meshes_[i].info.ntet)));
       try {
         const BodyMesh mesh = files_.load(b);
         if (!carries(b, mesh, meshes_[i])) continue;
@@ -231,7 +227,7 @@ class Reader {
         return !entry.where.group.empty() || !entry.where.points.empty();
       });
     };
-    return b.lattice_open && b.fill.value_or(1) && meshes_[i].cell != DFM_CELL_HEX8 && !may_be_cut() &&
+    return b.lattice_open && b.fill.value_or(1) && meshes_[i].info.cell != DFM_CELL_HEX8 && !may_be_cut() &&
            b.by_group.empty() && b.fields.empty() && b.nodal_bc.empty() && b.surface.mesh.empty() &&
            !b.surface.boundary && !b.device && b.switches.empty() && b.rule.far.type.empty() &&
            b.start.kind != StartKind::state && !own_parts(b.fixes) && !own_parts(b.forces) &&
@@ -333,10 +329,9 @@ class Reader {
   std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
-      const dfm_type *const type = types_.find(DFM_KIND_MODEL, m.id);
-      if (!type || types_.off_card(*type) || !(static_cast<const dfm_model *>(type->ops)->cells & cell))
-        continue;
-      if (b.device == "gpu" && !whole_on_card(context_, def_, types_, b, *type)) continue;
+      const dfm_type *const type = types_.try_find(DFM_KIND_MODEL, m.id);
+      if (!type || off_card(types_, *type) || !(model_of(*type).cells & cell)) continue;
+      if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
       out.push_back(m.id);
     }
     return out;
@@ -345,7 +340,7 @@ class Reader {
   // Of cells that are seen as several tetrahedra each, the edges are not those of these.
   void set_mesh(const Body &b, const BodyMesh &mesh, BodyRegime &r) const {
     const dfm_mesh_info &info = mesh.info;
-    r.points = mesh.npoint;
+    r.points = mesh.info.npoint;
     double side[3];
     for (int k = 0; k < 3; ++k) side[k] = mesh.hi[k] - mesh.lo[k];
     r.length = *std::max_element(side, side + 3);
@@ -398,17 +393,17 @@ class Reader {
       r.speed = std::sqrt(r.speed * r.speed + 2 * g_ * way);
     }
     r.turns = !r.held && (r.touches || length(b.def.spin) > 0);
-    if (!b.model_open) r.model = short_id(b.model);
+    if (!b.model_open) r.model = short_name(*types_.try_find(DFM_KIND_MODEL, b.model));
     const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
     if (b.device == "gpu" && named == DFM_INTEGRATOR_AUTO) r.scheme = 0;
-    r.models = b.model_open ? candidates(measured, b, mesh.cell) : std::vector<std::string>{};
+    r.models = b.model_open ? candidates(measured, b, mesh.info.cell) : std::vector<std::string>{};
     return r;
   }
 
   dfm_context *context_;
   const Definition &def_;
-  const Types &types_;
+  const Registry &types_;
   MeshFiles files_;
   double g_ = 0, down_[3] = {};
   std::vector<BodyMesh> meshes_;
@@ -439,17 +434,16 @@ json way_json(const Way &way, const Definition &def) {
 
 }  // namespace
 
-std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Types &types,
-                                const Measured &measured) {
-  return Reader(context, def, types).run(measured);
+std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Measured &measured) {
+  return Reader(context, def).run(measured);
 }
 
-json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree) {
+json plan_scene(dfm_context *context, const Definition &def, json &tree) {
   Wish wish = def.wanted;
   wish.duration = def.duration;
   wish.step = def.step;
   const Measured measured = read_costs();
-  Reader reader(context, def, types);
+  Reader reader(context, def);
   std::vector<BodyRegime> bodies = reader.run(measured);
   const std::vector<BodyRegime> own = bodies;
   PlannedWay plan = plan_accuracy(own, measured, wish);

@@ -12,11 +12,10 @@ namespace dfm::scene {
 Measured read_costs();
 
 // What the planner derives of each body.
-std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Types &types,
-                                const Measured &measured);
+std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Measured &measured);
 
 // Chooses what the scene leaves open (model of a body, integrator, step, contact tolerance), writes it into
 // the tree and returns the value of /accuracy/chosen or /budget/chosen. Keys that the scene names are kept.
-json plan_scene(dfm_context *context, const Definition &def, const Types &types, json &tree);
+json plan_scene(dfm_context *context, const Definition &def, json &tree);
 
 }  // namespace dfm::scene
