@@ -6,8 +6,8 @@ namespace dfm {
 
 struct StepLength {
   double planned = 0;  // s, the sub-step before it was shortened
-  // Equal sub-steps that are made of it, and of each that is planned after it; the most that the step has room
-  // for.
+  // Equal sub-steps that are made of it, and of each that is planned after it; the most that the step has
+  // room for.
   double parts = 1, most_parts = 1;
   double next_piece = 0;  // s, with which the rest of the sub-step begins; 0: as a whole
 
