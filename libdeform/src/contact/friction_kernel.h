@@ -137,8 +137,8 @@ __attribute__((always_inline)) static inline double normal_residual(const Rows &
 
 // The force of row i by its law, compared by the answer that both give together with the contact's own
 // response, not by the bare force: the difference is the velocity that is left to correct. Where a set-valued
-// law just slips, force and slip may differ in direction by much while that is tiny; a smooth law with a steep
-// slope c would count it 1 + h w_t c times.
+// law just slips, force and slip may differ in direction by much while that is tiny; a smooth law with a
+// steep slope c would count it 1 + h w_t c times.
 template <class Rows>
 __attribute__((always_inline)) static inline double tangent_residual(const Rows &rows, const LawView &law,
                                                                      uint32_t i, double h,

@@ -14,13 +14,14 @@ namespace dfm {
 namespace {
 
 // Nominal values hold for all scenes that were tried; the comment says what a change trades.
-constexpr double kPenalty = 10;        // rho w: larger, fewer passes with more Newton steps each
-constexpr double kGrowth = 10;         // of rho where passes are slow; of 1/rho where Newton steps go round
-constexpr double kAccuracy = 0.3;      // of what an iteration is judged by, that the one inside of it leaves
-constexpr double kContradiction = 20;  // of the tolerance, by which normals may miss what velocities do not follow
-constexpr uint32_t kRounds = 3;        // in a row, after which passes are slow, steps go round, rows contradict
-constexpr uint32_t kProducts = 24;     // of a linear system, at most, and of all that a factor is kept for
-constexpr uint32_t kTrials = 24;       // of a line search; bodies near inversion take steps of a thousandth
+constexpr double kPenalty = 10;    // rho w: larger, fewer passes with more Newton steps each
+constexpr double kGrowth = 10;     // of rho where passes are slow; of 1/rho where Newton steps go round
+constexpr double kAccuracy = 0.3;  // of what an iteration is judged by, that the one inside of it leaves
+constexpr double kContradiction =
+    20;                          // of the tolerance, by which normals may miss what velocities do not follow
+constexpr uint32_t kRounds = 3;  // in a row, after which passes are slow, steps go round, rows contradict
+constexpr uint32_t kProducts = 24;  // of a linear system, at most, and of all that a factor is kept for
+constexpr uint32_t kTrials = 24;    // of a line search; bodies near inversion take steps of a thousandth
 
 }  // namespace
 

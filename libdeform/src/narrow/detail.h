@@ -116,14 +116,18 @@ inline bool rests(const Pair &pair, double reach, ContactPoint &c) {
   return c.distance < reach;
 }
 
+struct AreaOwner {
+  const BodyView &body;
+  Vec3 out;  // of its surface, at the contact
+};
 // An edge or triangle contact takes the share of the area of the nearest of its nodes that has not lent its
-// own (doc/concepts/detection.md). area_node_plus_1: that node plus 1. owner(k): the body of node k, and the
-// direction out of it; lent: [nodes] from `first` on
+// own (doc/concepts/detection.md). area_node_plus_1: that node plus 1. owner(k): AreaOwner of node k;
+// lent: [nodes] from `first` on
 template <class Owner>
 void take_area(ContactPoint &c, double share, const Owner &owner, uint32_t first, Array<uint8_t> &lent) {
   double nearest = 0;
   for (int k = 0; k < c.nnode; ++k) {
-    const auto &[body, out] = owner(k);
+    const auto [body, out] = owner(k);
     const uint32_t surfel = c.node[k] - body.first_node;
     const double d2 = norm2(load3(&body.surface->x[4 * size_t{surfel}]) - load3(c.point));
     if (lent[c.node[k] - first] || (c.area_node_plus_1 && !(d2 < nearest))) continue;

@@ -89,7 +89,7 @@ class Areas {
       ContactPoint &c = contacts_[i];
       const auto owner = [&](int k) {
         const bool own = c.node[k] - a.first_node < a.surface->nsurfel;
-        return std::pair<const BodyView &, Vec3>(own ? a : *b, own ? -load3(c.normal) : load3(c.normal));
+        return narrow::AreaOwner{own ? a : *b, own ? -load3(c.normal) : load3(c.normal)};
       };
       narrow::take_area(c, b ? 0.5 : 1.0, owner, 0, lent_);
     }

@@ -444,7 +444,7 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
   for (size_t i = edges; i < out.size(); ++i) {
     ContactPoint &c = out[i];
     const auto owner = [&](int k) {
-      return std::pair<const BodyView &, Vec3>(body, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal));
+      return AreaOwner{body, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal)};
     };
     take_area(c, 0.5, owner, body.first_node, lent);
   }
