@@ -288,7 +288,7 @@ bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
 bool sub_step(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   step.driven.clear();
   step.guard.start();
-  step.length.planned = step.h;
+  step.length.begin(step.h);
   step.ended = step.in_impact = false;
   for (const PlannedStage &planned : w.plan.stages) {
     const auto start = std::chrono::steady_clock::now();

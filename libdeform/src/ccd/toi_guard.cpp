@@ -80,12 +80,12 @@ double floor_share(const GuardScene &scene, const Features &f) {
 constexpr uint32_t kBlock = 192;
 constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
 
-// Shared: several of them look at blocks of the list at the same time.
-template <bool Shared>
 class Near {
  public:
-  Near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near)
-      : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)) {}
+  // shared: several of them look at blocks of the list at the same time
+  Near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+       bool shared)
+      : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)), shared_(shared) {}
 
   void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
     const double now = kRounding * (run.way + run.travel);
@@ -129,14 +129,10 @@ class Near {
   }
   bool stays_apart(Features &f, Vec3 n, double start) {
     if (!(start > floor_)) return false;
-    if constexpr (Shared) {
-      double own[4][4];
-      f.find_ends(scene_, own);
-      return height(f.end, f.split, n) > floor_;
-    } else {
-      f.find_ends(scene_);
-      return height(f.end, f.split, n) > floor_;
-    }
+    double own[4][4];
+    if (shared_) f.find_ends(scene_, own);
+    else f.find_ends(scene_);
+    return height(f.end, f.split, n) > floor_;
   }
 
   // A surface and a closed-form shape or voxels, in the frame of the obstacle.
@@ -193,8 +189,7 @@ class Near {
     return end > floor_;
   }
   Vec3 end_of(GuardSide &body, uint32_t surfel) {
-    if constexpr (Shared) return scene_.end_of(body, surfel);
-    else return load3(scene_.end(body, surfel));
+    return shared_ ? scene_.end_of(body, surfel) : load3(scene_.end(body, surfel));
   }
   bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
     const Vec3 x = frame.at_start(load3(&body.surface->x[4 * size_t{list_[i].feature_a}]));
@@ -206,7 +201,8 @@ class Near {
   const Array<Candidate> &list_;
   GuardMemory &memory_;
   Array<uint32_t> &near_;
-  double floor_;
+  const double floor_;
+  const bool shared_;
   GuardSide *a_ = nullptr, *b_ = nullptr;  // of the run, of two surfaces
 };
 
@@ -282,7 +278,7 @@ void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory
   each_on(&tasks, blocks.ranges.size(), kTogether, [&](size_t k) {
     const GuardBlocks::Range &p = blocks.ranges[k];
     blocks.near[k].clear();
-    Near<true>(scene, list, memory, blocks.near[k]).look(memory.runs[p.run], p.begin, p.end);
+    Near(scene, list, memory, blocks.near[k], true).look(memory.runs[p.run], p.begin, p.end);
   });
   for (size_t k = 0; k < blocks.ranges.size(); ++k)
     near.insert(near.end(), blocks.near[k].begin(), blocks.near[k].end());
@@ -295,7 +291,7 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
   near.clear();
   const bool parts = blocks && tasks && tasks->parallel() && list.size() > 2 * kBlock;
   if (parts) blocks->ranges.clear();
-  Near<false> alone(scene, list, memory, near);
+  Near alone(scene, list, memory, near, false);
   for (uint32_t r = 0; r < memory.runs.size(); ++r) {
     GuardMemory::Run &run = memory.runs[r];
     const Candidate &c = list[run.begin];
@@ -311,10 +307,9 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
   if (parts) near_in_blocks(scene, list, memory, near, *blocks, *tasks);
 }
 
-double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
-                   Array<GuardHit> &out) {
+void guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                 Array<GuardHit> &out) {
   out.clear();
-  double least = 1;
   for (const uint32_t i : which) {
     const Candidate &c = list[i];
     if (scene.closed_form(c)) continue;
@@ -325,11 +320,8 @@ double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<co
     const double share = floor_share(scene, f), floor = share * scene.floor, margin = share * scene.margin;
     if (!(share > 0) || pair.far_apart(floor) || pair.plane_apart(floor)) continue;
     const auto touch = [&](double d, double within) { return pair.touch(d, within); };
-    if (!narrow::judge(touch, [&] { return pair.distance(0); }, floor, margin, hit)) continue;
-    out.push_back(hit);
-    least = std::min(least, hit.safe);
+    if (narrow::judge(touch, [&] { return pair.distance(0); }, floor, margin, hit)) out.push_back(hit);
   }
-  return least;
 }
 
 }  // namespace dfm

@@ -131,15 +131,14 @@ void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &me
 
 // Of the candidates that `which` names, those between two surfaces; those that touch at the start are
 // passed over: what is through already cannot be kept out. out is cleared; hits come in the order of the
-// list. Returns the least `safe` of all hits, 1 where there are none. Does not allocate once out's
-// capacity has settled.
-double guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
-                   Array<GuardHit> &out);
+// list. Does not allocate once out's capacity has settled.
+void guard_pairs(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                 Array<GuardHit> &out);
 
 // The same for closed-form shapes and voxels, appended to out. In the obstacle's own frame, where it stands
 // still and surfels move on the straight line from start to end: for a shape that turns that is another path
 // than in the world, but one that has the same ends. Surfels that start inside the shape are let out.
-double guard_obstacles(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
-                       Array<GuardHit> &out);
+void guard_obstacles(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                     Array<GuardHit> &out);
 
 }  // namespace dfm

@@ -65,7 +65,6 @@ bool reaches_in(const ObstacleShape &box, std::span<const dfm_motion> corners) {
 class Judge {
  public:
   Judge(GuardScene &scene, Array<GuardHit> &out) : scene_(scene), out_(out) {}
-  double least() const { return least_; }
 
   void pair(uint32_t candidate, const Candidate &c) {
     if (c.slot_b != slot_) {
@@ -159,27 +158,23 @@ class Judge {
     keep(trips, hit);
   }
   bool keep(bool trips, const GuardHit &hit) {
-    if (!trips) return false;
-    out_.push_back(hit);
-    least_ = std::min(least_, hit.safe);
-    return true;
+    if (trips) out_.push_back(hit);
+    return trips;
   }
 
   GuardScene &scene_;
   std::optional<ObstacleFrame> frame_;  // of the obstacle of the last query
   uint32_t slot_ = kNone;
-  double least_ = 1;
   Array<GuardHit> &out_;
 };
 
 }  // namespace
 
-double guard_obstacles(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
-                       Array<GuardHit> &out) {
+void guard_obstacles(GuardScene &scene, const Array<Candidate> &list, std::span<const uint32_t> which,
+                     Array<GuardHit> &out) {
   Judge judge(scene, out);
   for (const uint32_t i : which)
     if (scene.closed_form(list[i])) judge.pair(i, list[i]);
-  return judge.least();
 }
 
 }  // namespace dfm

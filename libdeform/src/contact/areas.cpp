@@ -8,9 +8,7 @@ namespace dfm {
 namespace {
 
 // The side opposite to that of a node.
-uint32_t other_of(const ContactPoint &c, int node) {
-  return c.weight[node] < 0 ? c.slot_a : c.slot_b | (c.obstacle ? 0x80000000u : 0u);
-}
+uint32_t other_of(const ContactPoint &c, int node) { return c.weight[node] < 0 ? c.slot_a : side_b(c); }
 // Contacts that take area from corners: a crossing between bodies, and other contacts without an area from
 // detection. The area of a contact is that of its first row.
 bool takes(const ContactPoint &c) { return c.more == 0 && (!(c.area > 0) || (c.type_a != 0 && !c.obstacle)); }

@@ -61,12 +61,8 @@ struct ContactState {
     clear_padding();
   }
 
-  LawView view() const {
-    return {stride,         fn.data(),    vt.data(),   ft.data(),   dft_dvt.data(),
-            dft_dfn.data(), limit.data(), mode.data(), form.data(), linear.data()};
-  }
   // from contact i on
-  LawView view(uint32_t i) const {
+  LawView view(uint32_t i = 0) const {
     return {stride,           fn.data() + i,      vt.data() + i,
             ft.data() + i,    dft_dvt.data() + i, dft_dfn.data() + i,
             limit.data() + i, mode.data() + i,    form.data() + i,
@@ -100,15 +96,16 @@ inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   return {scale * (top - a), turn - scale * b, -turn - scale * b, scale * (top - c)};
 }
 
-// Of a smooth law, for a contact with this response, 1/kg.
-inline void linearize(ContactState &s, uint32_t i, double h, double wt) {
-  LinearLaw &l = s.linear[i];
+// Of a smooth law, for a contact with this response over the sub-step, s/kg.
+inline LinearLaw linear_law(const ContactState &s, uint32_t i, double response) {
+  LinearLaw l;
   l.slope = dissipative_slope(s, i);
-  l.m11 = 1 - h * wt * l.slope.a;
-  l.m22 = 1 - h * wt * l.slope.d;
-  l.m12 = -h * wt * l.slope.b;
-  l.m21 = -h * wt * l.slope.c;
+  l.m11 = 1 - response * l.slope.a;
+  l.m22 = 1 - response * l.slope.d;
+  l.m12 = -response * l.slope.b;
+  l.m21 = -response * l.slope.c;
   l.det = l.m11 * l.m22 - l.m12 * l.m21;
+  return l;
 }
 
 }  // namespace dfm

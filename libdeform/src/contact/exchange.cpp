@@ -23,8 +23,7 @@ void AreaExchange::list(std::span<const ContactPoint> contacts, std::span<const 
     // A contact may have less area than its triangles (detection gives it half between two meshes, and none
     // if the guard added it): it has the same share of each of them.
     part_[i] = c.area > 0 ? std::min(1.0, area[i] / ((c.obstacle ? 1 : 2) * c.area)) : 0;
-    if (c.type_a == 0 && law[i] != kNone && area[i] > 0)
-      fresh_.push_back({c.node[0], c.slot_b | (c.obstacle ? 0x80000000u : 0u), i, law[i]});
+    if (c.type_a == 0 && law[i] != kNone && area[i] > 0) fresh_.push_back({c.node[0], side_b(c), i, law[i]});
   }
   const bool same = std::equal(
       fresh_.begin(), fresh_.end(), last_.begin(), last_.end(), [](const Corner &l, const Corner &r) {

@@ -19,7 +19,7 @@ static inline double normal_impulse(double l, double k, double wn, const double 
   return larger(0.0, larger(l - (k + compliance[1]) / wn, firm < soft ? firm : soft));
 }
 // m/s, by which the load presses the contact in.
-static inline double given(double l, const double *compliance) {
+static inline double yield_speed(double l, const double *compliance) {
   const double all = compliance[0] * larger(0.0, l - compliance[2]);
   return all < compliance[1] ? all : compliance[1];
 }
@@ -130,7 +130,7 @@ __attribute__((always_inline)) static inline bool solve_row(const Rows &rows, co
 template <class Rows>
 __attribute__((always_inline)) static inline double normal_residual(const Rows &rows, uint32_t i, double u,
                                                                     const double *l) {
-  const double open = u + rows.rate[i] + given(l[0], &rows.compliance[3 * size_t(i)]),
+  const double open = u + rows.rate[i] + yield_speed(l[0], &rows.compliance[3 * size_t(i)]),
                closed = rows.wn[i] * l[0];
   return __builtin_fabs(open < closed ? open : closed);
 }

@@ -11,6 +11,19 @@
 #include "contact/friction_kernel.h"
 
 namespace dfm {
+namespace {
+
+// Nominal values hold for all scenes that were tried; the comment says what a change trades.
+constexpr double kPenalty = 10;    // rho w: larger, fewer passes with more Newton steps each
+constexpr double kGrowth = 10;     // of rho where passes are slow; of 1/rho where Newton steps go round
+constexpr double kAccuracy = 0.3;  // of what an iteration is judged by, that the one inside of it leaves
+constexpr double kContradiction =
+    20;                          // of the tolerance, by which normals may miss what velocities do not follow
+constexpr uint32_t kRounds = 3;  // in a row, after which passes are slow, steps go round, rows contradict
+constexpr uint32_t kProducts = 24;  // of a linear system, at most, and of all that a factor is kept for
+constexpr uint32_t kTrials = 24;    // of a line search; bodies near inversion take steps of a thousandth
+
+}  // namespace
 
 // m/s: what g would change of the velocities of points by themselves, of bodies as a whole, and, through the
 // motions of blocks, of contacts.
@@ -85,10 +98,10 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     factor_.solve(1, in, out, 0, info);
   };
   for (bool fresh : {false, true}) {
-    if (!fresh && (!factored_ || kept_for_ >= set_.products)) continue;
+    if (!fresh && (!factored_ || kept_for_ >= kProducts)) continue;
     if (fresh && !refactor()) return false;
     const Gmres::Result found =
-        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, set_.products, by, precondition);
+        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, kProducts, by, precondition);
     products_ += found.iterations;
     kept_for_ = fresh ? 0 : kept_for_ + found.iterations;
     if (fresh || found.left <= tolerance) break;
@@ -99,13 +112,13 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   const double before = size(), left = error();
-  failed = !find_way(false, std::min(set_.accuracy * tolerance / left, set_.linear));
+  failed = !find_way(false, std::min(kAccuracy * tolerance / left, kLinear));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
   ++steps_;
   for (const double share : {1.0, 0.5}) {
     move(share);
-    if (evaluate(false) && size() <= (1 - set_.accuracy * share) * before) return true;
+    if (evaluate(false) && size() <= (1 - kAccuracy * share) * before) return true;
   }
   v_.swap(base_);
   failed = !evaluate(false);
@@ -123,7 +136,7 @@ bool ContactNewton::frozen_steps() {
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
-    if (!find_way(true, set_.linear)) return false;
+    if (!find_way(true, kLinear)) return false;
     const double first = slope();
     base_.assign(v_.begin(), v_.end());
     ++steps_;
@@ -132,11 +145,11 @@ bool ContactNewton::frozen_steps() {
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
     bool found = false;
-    for (uint32_t trial = 0; trial < set_.trials; ++trial) {
+    for (uint32_t trial = 0; trial < kTrials; ++trial) {
       move(share);
       const bool known = evaluate(true);
       const double now = known ? slope() : std::numeric_limits<double>::infinity();
-      found = known && now <= -set_.accuracy * first && (share == 1 || now >= set_.accuracy * first);
+      found = known && now <= -kAccuracy * first && (share == 1 || now >= kAccuracy * first);
       if (found) break;
       if (now > 0) {
         high = share;
@@ -149,7 +162,7 @@ bool ContactNewton::frozen_steps() {
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
     // no such place: there is a jump in a law, at which steps would stay
-    if (!found || !(size() > set_.accuracy * start)) break;
+    if (!found || !(size() > kAccuracy * start)) break;
   }
   return evaluate(false);
 }
@@ -165,7 +178,7 @@ bool ContactNewton::newton(double tolerance, bool &round) {
   while (error() > tolerance && steps_ < limit_) {
     bool failed = false;
     if (coupled_step(tolerance, failed)) continue;
-    if (!failed && phases++ == set_.rounds) return round = true;
+    if (!failed && phases++ == kRounds) return round = true;
     if (failed || !frozen_steps()) return false;
   }
   return true;
@@ -195,8 +208,8 @@ void ContactNewton::scale_penalties(double by) {
 bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   found_ = false;
   limit_ = steps_ + steps;
-  set_penalties(set_.penalty);
-  goal_ = set_.accuracy * tolerance;
+  set_penalties(kPenalty);
+  goal_ = kAccuracy * tolerance;
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
@@ -207,11 +220,11 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   for (passes_ = 0; passes_ < steps;) {
     ++passes_;
     before.assign(v_.begin(), v_.end());
-    const double goal = set_.accuracy * std::max(aim, tolerance);
+    const double goal = kAccuracy * std::max(aim, tolerance);
     bool round;
     if (!newton(goal, round)) return false;
     if (round && steps_ < limit_) {
-      scale_penalties(1 / set_.growth);
+      scale_penalties(1 / kGrowth);
       slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
@@ -221,7 +234,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
     const double off = error(), required = std::max(residual_.relative, off / tolerance);
-    found_ = required <= set_.accuracy;
+    found_ = required <= kAccuracy;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
       best = now;
@@ -236,19 +249,19 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
-    const bool still = passes_ > set_.rounds && moved <= set_.accuracy * tolerance;
-    const bool stalled = still && residual_.normal <= set_.contradiction * normal;
+    const bool still = passes_ > kRounds && moved <= kAccuracy * tolerance;
+    const bool stalled = still && residual_.normal <= kContradiction * normal;
     if (still && off <= tolerance) {
-      found_ = stood++ >= set_.rounds && stalled;
+      found_ = stood++ >= kRounds && stalled;
       if (found_) break;
-      scale_penalties(set_.growth);
+      scale_penalties(kGrowth);
     }
     aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
-    if (slow < set_.rounds) continue;
+    if (slow < kRounds) continue;
     slow = 0;
-    scale_penalties(set_.growth);
+    scale_penalties(kGrowth);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);
@@ -272,7 +285,7 @@ bool ContactNewton::gains(double normal) const {
     const double l = l_[3 * size_t{k}];
     all += l;
     const Vec3 u = times(k, v_.data(), kStride) + load3(&bias_[3 * size_t{k}]);
-    work += l * (u.x + rows_->rate[i] + given(l, &rows_->compliance[3 * size_t{i}]));
+    work += l * (u.x + rows_->rate[i] + yield_speed(l, &rows_->compliance[3 * size_t{i}]));
   }
   return work > normal * all;
 }
@@ -286,8 +299,10 @@ bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   for (size_t k = 0; k < size_t{3} * single_; ++k)
     if (inverse_[k] > 0) v_[kStride * (k / 3) + k % 3] = 0;
   limit_ = steps_ + steps;
-  for (bool round = true; round && steps_ < limit_; scale_penalties(1 / set_.growth))
+  for (bool round = true; round && steps_ < limit_;) {
     if (!newton(tolerance, round)) return false;
+    if (round) scale_penalties(1 / kGrowth);
+  }
   put_rows();
   return host_->judge(residual_);
 }

@@ -29,18 +29,6 @@
 
 namespace dfm {
 
-// Nominal values hold for all scenes that were tried; the comment says what a change trades.
-struct NewtonSettings {
-  double penalty = 10;        // rho w: larger, fewer passes with more Newton steps each
-  double growth = 10;         // of rho where passes are slow; of 1/rho where Newton steps of a pass go round
-  double accuracy = 0.3;      // of what an iteration is judged by, that the one inside of it leaves
-  double linear = 1e-2;       // relative residual of the linear system of a Newton step, at most
-  double contradiction = 20;  // of the tolerance, by which normals may miss what velocities no longer follow
-  uint32_t rounds = 3;        // in a row, after which passes are slow, steps go round, or rows contradict
-  uint32_t products = 24;     // of a linear system, at most, and of all that a factor is kept for
-  uint32_t trials = 24;       // of a line search; bodies near inversion take steps of a thousandth
-};
-
 // What a solve asks of the laws, and of the one who knows tolerances and budget.
 class SolveLaws {
  public:
@@ -58,7 +46,7 @@ class SolveLaws {
 
 class ContactNewton {
  public:
-  explicit ContactNewton(const Memory &memory, const NewtonSettings &settings = {});
+  explicit ContactNewton(const Memory &memory);
 
   // systems: by source; null: not an implicit body. mass: of one. Rows and host stay valid until the solve
   // has ended. rows.impulse is the start of lh.
@@ -89,12 +77,14 @@ class ContactNewton {
     uint32_t row;
     Kind kind;
   };
-  NewtonSettings set_;
   ContactRows *rows_ = nullptr;
   RowsPart part_;
   ContactState *state_ = nullptr;
   SolveLaws *host_ = nullptr;
   double h_ = 0;
+
+  // relative residual of the linear system of a Newton step, at most
+  static constexpr double kLinear = 1e-2;
 
   std::vector<Body> bodies_;
   // of all; the first that is a single point, and the first that is a motion of blocks

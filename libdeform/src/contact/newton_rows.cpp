@@ -8,8 +8,7 @@
 
 namespace dfm {
 
-ContactNewton::ContactNewton(const Memory &m, const NewtonSettings &settings)
-    : set_(settings), factor_(m), gmres_(m) {
+ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
   use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, seen_, bias_, heavy_, v_,
              base_, g_, kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_,
              response_, slope_, frozen_, keys_, pairs_, at_, own_, spot_, blocks_, matrix_, places_,
@@ -301,7 +300,7 @@ bool ContactNewton::evaluate(bool frozen) {
     laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
   }
   // a slip that is off by e is an impulse that is off by rho e
-  const double slip = set_.linear * goal_ / stiff_;
+  const double slip = kLinear * goal_ / stiff_;
   if (finite != 0 || (laws && !host_->evaluate_local(response_.data(), slip))) return false;
   for (uint32_t k = 0; k < row_.size(); ++k) {
     double *const l = &l_[3 * size_t{k}];

@@ -1,79 +1,16 @@
 #include "contact/problem.h"
 
 #include <algorithm>
-#include <cstring>
 #include <utility>
 
 #include "body/phyxels.h"
+#include "core/byte_stream.h"
 #include "core/error.h"
 
 namespace dfm {
 namespace {
 
 constexpr std::string_view kHead = "deform contact problem 1\n";
-
-// Both directions name the members of a problem in the same order. Numbers lie as this machine has them,
-// which is little-endian wherever the library runs.
-class Writer {
- public:
-  std::string out{kHead};
-  // Whether what only some problems have follows.
-  static bool more(bool has) { return has; }
-  template <class T>
-  void one(const T &x) {
-    out.append(reinterpret_cast<const char *>(&x), sizeof x);
-  }
-  template <class C>
-  void many(const C &c) {
-    one(uint64_t{c.size()});
-    out.append(reinterpret_cast<const char *>(c.data()), c.size() * sizeof c[0]);
-  }
-  template <class C>
-  void count(const C &c) {
-    one(uint64_t{c.size()});
-  }
-};
-
-class Reader {
- public:
-  explicit Reader(std::string_view in) : left_(in) {
-    if (left_.substr(0, kHead.size()) != kHead)
-      fail(DFM_E_FORMAT, "this is no contact problem of this version of the library");
-    left_.remove_prefix(kHead.size());
-  }
-  template <class T>
-  void one(T &x) {
-    std::memcpy(&x, next(1, sizeof x), sizeof x);
-  }
-  template <class C>
-  void many(C &c) {
-    uint64_t n = 0;
-    one(n);
-    const char *const from = next(n, sizeof c[0]);
-    c.resize(n);
-    if (n > 0) std::memcpy(c.data(), from, n * sizeof c[0]);
-  }
-  // of things that follow, each of some bytes
-  template <class C>
-  void count(C &c) {
-    uint64_t n = 0;
-    one(n);
-    if (n > left_.size()) refuse();
-    c.resize(n);
-  }
-  [[noreturn]] static void refuse() { fail(DFM_E_FORMAT, "the contact problem is cut short or damaged"); }
-  bool ended() const { return left_.empty(); }
-  bool more(bool) const { return !ended(); }
-
- private:
-  std::string_view left_;
-  const char *next(uint64_t n, size_t size) {
-    if (n > left_.size() / size) refuse();
-    const char *const at = left_.data();
-    left_.remove_prefix(n * size);
-    return at;
-  }
-};
 
 template <class C>
 void copy_rows(const C &from, size_t width, const std::vector<uint32_t> &rows, C &to) {
@@ -157,16 +94,8 @@ void LinearMotion::transfer(Transfer &t) {
 }
 
 // number: of the dofs that are taken, in their order.
-void ContactProblem::take_dofs(const ContactRows &from, const std::vector<uint32_t> &number) {
-  std::vector<uint32_t> dofs;
-  for (uint32_t d = 0; d < from.ndof; ++d)
-    if (number[d] != kNone) dofs.push_back(d);
-  rows.ndof = static_cast<uint32_t>(dofs.size());
-  copy_rows(from.source, 1, dofs, rows.source);
-  copy_rows(from.point, 1, dofs, rows.point);
-  copy_rows(from.alone, kStride, dofs, rows.alone);
-  copy_rows(from.y_free, kStride, dofs, rows.y_free);
-  rows.block.assign(dofs.size(), kNone);
+void ContactProblem::take_blocks(const ContactRows &from, const std::vector<uint32_t> &number) {
+  rows.block.assign(rows.ndof, kNone);
   rows.blocks.clear();
   rows.response_.clear();
   for (const ContactRows::Block &b : from.blocks) {
@@ -181,7 +110,7 @@ void ContactProblem::take_dofs(const ContactRows &from, const std::vector<uint32
 
 bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const ContactState &of,
                           std::span<ImplicitSystem *const> systems) {
-  std::vector<uint32_t> list, contacts;
+  std::vector<uint32_t> list, contacts, dofs;
   each_row(part.contacts, [&](uint32_t i) { contacts.push_back(i); });
   list = contacts;
   each_row(part.bonds, [&](uint32_t i) { list.push_back(i); });
@@ -194,11 +123,23 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
     if (number[d] != kNone && from.source[d] != kNone) sources[from.source[d]] = 0;
   number_all(number);
   motions.resize(number_all(sources));
-  take_dofs(from, number);
+  for (uint32_t d = 0; d < from.ndof; ++d)
+    if (number[d] != kNone) dofs.push_back(d);
   rows.n = part.n;
+  rows.ndof = static_cast<uint32_t>(dofs.size());
   rows.nrigid =
       static_cast<uint32_t>(std::ranges::count_if(contacts, [&](uint32_t i) { return i >= from.soft(); }));
   rows.nbond = part.nbond;
+  ContactRows::each_column([&](auto column, size_t width, ContactRows::Per per) {
+    if (per == ContactRows::Per::side && from.rigid.empty()) (rows.*column).clear();
+    else
+      copy_rows(from.*column, width,
+                per == ContactRows::Per::dof       ? dofs
+                : per == ContactRows::Per::contact ? contacts
+                                                   : list,
+                rows.*column);
+  });
+  take_blocks(from, number);
   rows.whole_of.clear();
   for (size_t s = 0; s < systems.size(); ++s) {
     if (sources[s] == kNone) continue;
@@ -217,34 +158,26 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   rows.begin.assign(1, 0);
   rows.dof.clear();
   rows.weight.clear();
-  for (Array<uint32_t> *a : {&rows.rigid, &rows.rigid_a}) a->clear();
-  for (Array<double> *a : {&rows.arm, &rows.arm_a, &rows.arc, &rows.arc_a}) a->clear();
+  rows.rigid_a.clear();
+  for (Array<double> *a : {&rows.arm_a, &rows.arc, &rows.arc_a}) a->clear();
   for (const uint32_t i : list) {
     for (uint32_t j = from.begin[i]; j < from.begin[i + 1]; ++j) {
       rows.dof.push_back(number[from.dof[j]]);
       rows.weight.push_back(from.weight[j]);
     }
     rows.begin.push_back(static_cast<uint32_t>(rows.dof.size()));
-    const auto take_side = [&](const Array<uint32_t> &side, Array<uint32_t> &to) {
-      if (!side.empty()) to.push_back(side[i] == kNone ? kNone : number[side[i]]);
-    };
-    take_side(from.rigid, rows.rigid);
-    if (rows.nrigid) take_side(from.rigid_a, rows.rigid_a);
   }
-  if (!from.rigid.empty()) copy_rows(from.arm, 3, list, rows.arm);
-  if (rows.nrigid) copy_rows(from.arm_a, 3, list, rows.arm_a);
+  if (rows.nrigid) {
+    copy_rows(from.rigid_a, 1, list, rows.rigid_a);
+    copy_rows(from.arm_a, 3, list, rows.arm_a);
+  }
   if (rows.nrigid && !from.arc.empty()) {
     copy_rows(from.arc, 9, list, rows.arc);
     copy_rows(from.arc_a, 9, list, rows.arc_a);
   }
-  copy_rows(from.frame, 9, list, rows.frame);
-  copy_rows(from.drive, 3, list, rows.drive);
-  copy_rows(from.wn, 1, list, rows.wn);
-  copy_rows(from.wt, 1, list, rows.wt);
-  copy_rows(from.impulse, 3, list, rows.impulse);
-  copy_rows(from.rate, 1, contacts, rows.rate);
-  copy_rows(from.compliance, 3, contacts, rows.compliance);
-  copy_rows(from.cross, 2, contacts, rows.cross);
+  for (Array<uint32_t> *side : {&rows.rigid, &rows.rigid_a})
+    for (uint32_t &d : *side)
+      if (d != kNone) d = number[d];
   each_row(part.bonds, [&](uint32_t i) { bonds.push_back(i - from.n); });
   copy_rows(from.bond, 1, bonds, rows.bond);
   state.resize(part.n, of.nstate);
@@ -274,18 +207,12 @@ void ContactProblem::transfer(Transfer &t) {
   t.many(rows.begin);
   t.many(rows.dof);
   t.many(rows.weight);
-  t.many(rows.source);
-  t.many(rows.point);
-  t.many(rows.block);
-  t.many(rows.rigid);
-  for (Array<double> *a : {&rows.alone, &rows.y_free, &rows.arm, &rows.frame, &rows.drive, &rows.rate,
-                           &rows.compliance, &rows.wn, &rows.wt, &rows.cross, &rows.impulse, &rows.whole_of})
-    t.many(*a);
+  ContactRows::each_column([&](auto column, size_t, ContactRows::Per) { t.many(rows.*column); });
+  t.many(rows.whole_of);
   t.count(rows.blocks);
   for (ContactRows::Block &b : rows.blocks) {
     for (uint32_t *x : {&b.source, &b.first, &b.count, &b.group}) t.one(*x);
     t.one(b.response);
-    if (b.count > rows.ndof || b.first > rows.ndof - b.count) Reader::refuse();
   }
   t.many(rows.response_);
   t.count(rows.bond);
@@ -309,9 +236,10 @@ void ContactProblem::transfer(Transfer &t) {
 }
 
 std::string ContactProblem::bytes() {
-  Writer writer;
+  std::string out{kHead};
+  ByteWriter writer(out);
   transfer(writer);
-  return std::move(writer.out);
+  return out;
 }
 
 // Whether every number in it names something that is there.
@@ -319,22 +247,23 @@ void ContactProblem::check() const {
   const size_t n = rows.n, all = size_t{rows.all()}, ndof = rows.ndof, stride = (n + 7) & ~size_t{7};
   bool good = normal.size() == n && tangent.size() == n && rows.begin.size() == all + 1 &&
               rows.dof.size() == rows.weight.size() && rows.begin.back() == rows.dof.size() &&
-              std::ranges::is_sorted(rows.begin) && rows.source.size() == ndof && rows.point.size() == ndof &&
-              rows.block.size() == ndof && rows.alone.size() == kStride * ndof &&
-              rows.y_free.size() == kStride * ndof && rows.frame.size() == 9 * all &&
-              rows.drive.size() == 3 * all && rows.rate.size() == n && rows.compliance.size() == 3 * n &&
-              rows.wn.size() == all && rows.wt.size() == all && rows.cross.size() == 2 * n &&
-              rows.impulse.size() == 3 * all && rows.whole_of.size() == motions.size() &&
+              std::ranges::is_sorted(rows.begin) && rows.whole_of.size() == motions.size() &&
               rows.bond.size() == rows.nbond && state.law.size() == stride && state.area.size() == stride &&
               state.dwell.size() == stride && (state.scale.empty() || state.scale.size() == n) &&
-              state.bristle.size() == stride * state.nstate &&
-              (rows.rigid.empty() || (rows.rigid.size() == all && rows.arm.size() == 3 * all));
+              state.bristle.size() == stride * state.nstate;
+  ContactRows::each_column([&](auto column, size_t width, ContactRows::Per per) {
+    using Per = ContactRows::Per;
+    const size_t entries = per == Per::dof ? ndof : per == Per::contact ? n : all;
+    good = good && ((rows.*column).size() == width * entries || (per == Per::side && rows.rigid.empty()));
+  });
   const size_t sides = rows.nrigid ? all : 0, arcs = rows.arc.empty() ? 0 : 9 * all;
   good = good && rows.nrigid <= n && rows.rigid.size() >= sides && rows.rigid_a.size() == sides &&
          rows.arm_a.size() == 3 * sides && rows.arc.size() == arcs && rows.arc_a.size() == arcs;
   size_t values = 0;
   for (const ContactRows::Block &b : rows.blocks) {
-    good = good && b.response == values;
+    if (b.count > ndof || b.first > ndof - b.count) good = false;
+    if (!good) break;
+    good = b.response == values;
     values += size_t{12} * b.count * b.count;
     const auto own = [&](uint32_t k) { return k == uint32_t(&b - rows.blocks.data()); };
     good = good && std::all_of(rows.block.begin() + b.first, rows.block.begin() + b.first + b.count, own);
@@ -353,7 +282,9 @@ void ContactProblem::check() const {
 }
 
 void ContactProblem::read(std::string_view bytes) {
-  Reader reader(bytes);
+  if (bytes.substr(0, kHead.size()) != kHead)
+    fail(DFM_E_FORMAT, "this is no contact problem of this version of the library");
+  ByteReader reader(bytes.substr(kHead.size()), "contact problem");
   transfer(reader);
   if (!reader.ended()) fail(DFM_E_FORMAT, "the contact problem is longer than it says");
   check();

@@ -65,7 +65,7 @@ struct ContactProblem {
  private:
   template <class Transfer>
   void transfer(Transfer &t);
-  void take_dofs(const ContactRows &from, const std::vector<uint32_t> &number);
+  void take_blocks(const ContactRows &from, const std::vector<uint32_t> &number);
   void check() const;
 };
 

@@ -8,7 +8,7 @@ namespace {
 
 // The same number for corners of one body on the other and of the other on the one.
 uint64_t sides_of(const ContactPoint &c) {
-  const uint64_t a = c.slot_a, b = c.slot_b | (c.obstacle ? 0x80000000u : 0u);
+  const uint64_t a = c.slot_a, b = side_b(c);
   return std::min(a, b) << 32 | std::max(a, b);
 }
 

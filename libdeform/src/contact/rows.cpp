@@ -412,13 +412,13 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     store3(f + 3, t1);
     store3(f + 6, t2);
     const Vec3 v = load3(contacts[i].velocity);
-    store3(&drive[size_t(i) * 3], {dot(normal, v), dot(t1, v), dot(t2, v)});
+    store3(&drive[size_t(i) * 3], in_frame(f, v));
     const double from = start_depth.empty() ? 0 : start_depth[i];
     rate[i] = bias_velocity(contacts[i].distance + from, offset, h, planned, most);
     const Vec3 w0 = diagonal(i, normal);
     const double body = whole_response(i);
     wn[i] = dot(normal, w0) + body;
-    // min(c l, m) balances the opening speed of a depth `give` at most: no load presses it deeper.
+    // min(c l, m) balances the opening speed of a depth `indentation` at most: no load presses it deeper.
     compliance[3 * size_t(i)] = contacts[i].indentation > 0 ? kSoft * wn[i] : 0;
     compliance[3 * size_t(i) + 1] = kCloses * contacts[i].indentation / planned;
     compliance[3 * size_t(i) + 2] = 0;
@@ -479,30 +479,17 @@ Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
           sign * Vec3{dot(load3(turns), spin), dot(load3(turns + 3), spin), dot(load3(turns + 6), spin)};
   });
   const double *const f = &frame[size_t(i) * 9];
-  return Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} + turned -
-         load3(&drive[size_t(i) * 3]);
+  return in_frame(f, u) + turned - load3(&drive[size_t(i) * 3]);
 }
 
-void ContactRows::take_response(const Block &b) {
-  const size_t wide = size_t(3) * b.count;
+// along: between values of one answer of unit_response_; across: from one answer to the next.
+void ContactRows::take_response(const Block &b, size_t along, size_t across) {
   double *to = &response_[b.response];
-  for (size_t column = 0; column < wide; ++column)
+  for (size_t column = 0; column < size_t(3) * b.count; ++column)
     for (size_t k = 0; k < b.count; ++k) {
-      for (size_t row = 0; row < 3; ++row) *to++ = unit_response_[(3 * k + row) * wide + column];
+      for (size_t row = 0; row < 3; ++row) *to++ = unit_response_[(3 * k + row) * along + column * across];
       *to++ = 0;
     }
-}
-
-void ContactRows::add_responses(const Block &b) {
-  const size_t points = size_t(3) * b.count * b.count;
-  const double *from = unit_response_.data();
-  double *to = &response_[b.response];
-  for (size_t k = 0; k < points; ++k, from += 3, to += 4) {
-    to[0] = from[0];
-    to[1] = from[1];
-    to[2] = from[2];
-    to[3] = 0;
-  }
 }
 
 void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
@@ -511,13 +498,17 @@ void ContactRows::response_apply(const Block &b, uint32_t d, Vec3 p) {
                      &y[size_t(b.first) * 4]);
 }
 
-void ContactRows::apply(uint32_t i, Vec3 q) {
-  const double *const f = &frame[size_t(i) * 9];
-  const Vec3 p = q.x * load3(f) + q.y * load3(f + 3) + q.z * load3(f + 6);
+void ContactRows::apply_to_rigids(uint32_t i, Vec3 p) {
   each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
     response_apply(blocks[block[d]], d, sign * p);
     response_apply(blocks[block[d]], d + 1, sign * dfm::cross(r, p));
   });
+}
+
+void ContactRows::apply(uint32_t i, Vec3 q) {
+  const double *const f = &frame[size_t(i) * 9];
+  const Vec3 p = from_frame(f, &q.x);
+  apply_to_rigids(i, p);
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
     if (block[d] != kNone) {
@@ -535,11 +526,7 @@ void ContactRows::restart_rigids() {
       std::copy_n(&y[size_t(4) * b.first], size_t(4) * b.count, &y_free[size_t(4) * b.first]);
   for (uint32_t i = 0; i < all(); ++i) {
     const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
-    const Vec3 p = q[0] * load3(f) + q[1] * load3(f + 3) + q[2] * load3(f + 6);
-    each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
-      response_apply(blocks[block[d]], d, sign * p);
-      response_apply(blocks[block[d]], d + 1, sign * dfm::cross(r, p));
-    });
+    apply_to_rigids(i, from_frame(f, q));
   }
 }
 

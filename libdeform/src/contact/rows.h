@@ -94,7 +94,7 @@ struct ContactRows {
   Array<double> rate;         // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
   Array<double> borne;        // [soft()] N s, normal impulses at the start of the sub-step
   Array<double> start_depth;  // [soft()] m, that counts as distance (ContactStore); empty: none
-  // [n,3] Of a contact that is compliant under its load l (ContactPoint::give, soften_openings()): the
+  // [n,3] Of a contact that is compliant under its load l (ContactPoint::indentation, soften_openings()): the
   // softness c, 1/kg, its largest effect m, m/s, and the load p, N s, from which on it yields: min(c max(l -
   // p, 0), m) is added to u_n + rate. 0, 0, 0 for all others.
   Array<double> compliance;
@@ -116,6 +116,29 @@ struct ContactRows {
   Array<BondRow> bond;  // [nbond]
 
   Array<double> whole_of;  // [sources] DofSource::whole
+
+  // What a column has an entry for; side: a row, where some row has a rigid body.
+  enum class Per { dof, row, contact, side };
+  // f(column, values of an entry, Per): what rows keep in a file, in its order.
+  template <class F>
+  static void each_column(const F &f) {
+    f(&ContactRows::source, 1, Per::dof);
+    f(&ContactRows::point, 1, Per::dof);
+    f(&ContactRows::block, 1, Per::dof);
+    f(&ContactRows::rigid, 1, Per::side);
+    f(&ContactRows::alone, 4, Per::dof);
+    f(&ContactRows::y_free, 4, Per::dof);
+    f(&ContactRows::arm, 3, Per::side);
+    f(&ContactRows::frame, 9, Per::row);
+    f(&ContactRows::drive, 3, Per::row);
+    f(&ContactRows::rate, 1, Per::contact);
+    f(&ContactRows::compliance, 3, Per::contact);
+    f(&ContactRows::wn, 1, Per::row);
+    f(&ContactRows::wt, 1, Per::row);
+    f(&ContactRows::cross, 2, Per::contact);
+    f(&ContactRows::impulse, 3, Per::row);
+  }
+
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;
 
@@ -131,14 +154,14 @@ struct ContactRows {
   void set_response(const Block &b, const Fill &fill) {
     unit_response_.resize(size_t(9) * b.count * b.count);
     fill(unit_response_.data());
-    take_response(b);
+    take_response(b, size_t(3) * b.count, 1);
   }
   // The same where fill(answers) writes what unit impulses change one after another, [3 count, 3 count].
   template <class Fill>
   void set_responses(const Block &b, const Fill &fill) {
     unit_response_.resize(size_t(9) * b.count * b.count);
     fill(unit_response_.data());
-    add_responses(b);
+    take_response(b, 1, size_t(3) * b.count);
   }
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
   // longer than h where the guard has cut it, or depths would turn into speed. tasks: null: on this thread
@@ -217,8 +240,7 @@ struct ContactRows {
     if (!rigid_a.empty() && rigid_a[i] != kNone)
       f(rigid_a[i], load3(&arm_a[size_t(3) * i]), 1.0, turns(arc_a));
   }
-  void take_response(const Block &b);
-  void add_responses(const Block &b);
+  void take_response(const Block &b, size_t along, size_t across);
   // Of block b, at dof k's component `row`, by a unit impulse of that column.
   double response(const Block &b, size_t column, size_t k, size_t row) const {
     return response_[b.response + (column * b.count + k) * 4 + row];
@@ -233,6 +255,7 @@ struct ContactRows {
     return {w[0] * p.x, w[1] * p.y, w[2] * p.z};
   }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
+  void apply_to_rigids(uint32_t i, Vec3 p);
   bool no_response(const Block &b) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
   void finish_bonds(std::span<const Bond> bonds);

@@ -36,7 +36,7 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
 
 void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactState &s) {
   each_row(part.contacts, [&](uint32_t i) {
-    if (s.form[i] == kSmoothLaw) linearize(s, i, h, rows.wt[i]);
+    if (s.form[i] == kSmoothLaw) s.linear[i] = linear_law(s, i, h * rows.wt[i]);
   });
 }
 

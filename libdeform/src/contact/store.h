@@ -46,7 +46,7 @@ struct ContactStore {
   // m2, area in the next sub-step (contact/renewal.h); empty where no law counts by area
   Array<double> next_area;
   Array<double> start_depth;      // m, of what a pair was found with, less what has opened since
-  Array<double> stick_drift;      // [n,3] m, slip to be taken back (step/solve/stuck_slip.h)
+  Array<double> stick_drift;      // [n,3] m, slip to be taken back (step/solve/friction_memory.h)
   Array<double> path;             // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;  // held: touched and stuck in every sub-step since hold_begin
   Array<uint8_t> began;           // touched for the first time in the last step

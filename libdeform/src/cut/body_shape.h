@@ -31,8 +31,8 @@ struct MadeShape {
   std::shared_ptr<const SelfList> list;  // of the surface before, for lists that nobody else has; or null
 };
 // The shape of the mesh that a cut leaves. Reads what steps do not change, and nothing of the state: any
-// thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. due: with
-// all that the step would make that begins at this time, s; null: without. Throws Error.
+// thread may do it, if no other one changes `b` meanwhile other than by steps. open: as below. open_time:
+// with all that the step would make that begins at this time, s; null: without. Throws Error.
 std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint64_t> &&open,
                                       const double *open_time);
 // All that make_shape() reads of a body: of the present one, and of what is left of it.

@@ -39,7 +39,8 @@ CutReport split_by_blade(Body &b, const CutShape &blade, uint32_t most);
 CutReport open_faces(Body &b, const Array<uint64_t> &faces);
 
 // The same in two calls (cut/cut_ahead.h), with faces between cells of the whole body. The first reads only
-// what steps do not change; the body must have the same shape in the second. due: s, time of the second.
+// what steps do not change; the body must have the same shape in the second. open_time: s, of the
+// second.
 std::unique_ptr<MadeShape> make_opened(const Body &b, const Array<uint64_t> &faces, double open_time);
 std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made);
 

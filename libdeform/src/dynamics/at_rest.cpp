@@ -10,15 +10,7 @@ AtRest::AtRest(const Memory &memory, Phyxels &points, ModelInstance &model) : p_
 }
 
 dfm_kin AtRest::kin(double time, double dt) const {
-  dfm_kin k{};
-  k.size = sizeof k;
-  k.stride = kStride;
-  k.t = time;
-  k.dt = dt;
-  k.x = p_.x.data();
-  k.v = zero_.data();
-  k.state = model_.state.data();
-  return k;
+  return kin_at(time, dt, p_.x.data(), zero_.data(), model_.state.data());
 }
 
 bool AtRest::add_forces(double time, double dt) {

@@ -15,14 +15,7 @@ Dynamics::Dynamics(Phyxels &points, Surface &surface, ModelInstance &model)
 const double *Dynamics::contact_velocity() const { return diagonal() ? point_velocity() : surface_.v.data(); }
 
 dfm_kin Dynamics::kin(double time, double h, bool trial) const {
-  dfm_kin k{};
-  k.size = sizeof k;
-  k.stride = kStride;
-  k.t = time;
-  k.dt = h;
-  k.x = p_.x.data();
-  k.v = p_.v.data();
-  k.state = model_.state.data();
+  dfm_kin k = kin_at(time, h, p_.x.data(), p_.v.data(), model_.state.data());
   k.state_out = trial && !model_.state_out.empty() ? model_.state_out.data() : nullptr;
   return k;
 }

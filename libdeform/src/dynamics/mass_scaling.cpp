@@ -16,6 +16,7 @@
 #include <limits>
 #include <utility>
 
+#include "dynamics/symplectic_euler.h"
 #include "math/quadratics.h"
 
 namespace dfm {
@@ -25,11 +26,6 @@ constexpr int kTurns = 6;         // of what points get and what they pay
 constexpr double kMaxPaid = 0.5;  // of its own mass, by a point
 constexpr double kWorth = 1.25;   // longer sub-steps: they have four sizes to the octave
 constexpr int kHalvings = 40;     // of the interval in which the sub-step lies
-
-double step_of(double k, double c, double m) {
-  const double bottom = c + std::sqrt(c * c + 4 * m * k);
-  return bottom > 0 ? 4 * m / bottom : std::numeric_limits<double>::infinity();
-}
 
 class Mover {
  public:
@@ -106,7 +102,7 @@ class Mover {
 }  // namespace
 
 double step_of_point(const Phyxels &p, const RestRows &rows, uint32_t point) {
-  return step_of(rows.stiffness[point], rows.damping[point], p.mass[point]);
+  return stable_step(rows.stiffness[point], rows.damping[point], p.mass[point]);
 }
 
 MassScaling scale_mass(const Phyxels &p, const RestRows &rows, double share, std::vector<double> &mass) {
@@ -127,7 +123,7 @@ MassScaling scale_mass(const Phyxels &p, const RestRows &rows, double share, std
   MassScaling out{.requested = share, .moved = mover.move(low) / mover.total(), .step = *median};
   for (uint32_t i = 0; i < p.n; ++i) {
     mass[i] += mover.changed(i);
-    out.step = std::min(out.step, step_of(rows.stiffness[i], rows.damping[i], mass[i]));
+    out.step = std::min(out.step, stable_step(rows.stiffness[i], rows.damping[i], mass[i]));
   }
   out.frequency = 0.5 * mover.energy_change();
   if (out.step > kWorth * least) return out;

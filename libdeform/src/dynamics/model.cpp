@@ -5,6 +5,7 @@
 #include <iterator>
 #include <utility>
 
+#include "body/phyxels.h"
 #include "core/error.h"
 #include "mesh/cells.h"
 #include "plugin/context.h"
@@ -21,6 +22,18 @@ constexpr size_t kPartForces = offsetof(dfm_part_forces, forces) + sizeof(void *
 constexpr size_t kF32Head = offsetof(dfm_f32, add_forces) + sizeof(void *);
 
 }  // namespace
+
+dfm_kin kin_at(double time, double h, const double *x, const double *v, const double *state) {
+  dfm_kin k{};
+  k.size = sizeof k;
+  k.stride = kStride;
+  k.t = time;
+  k.dt = h;
+  k.x = x;
+  k.v = v;
+  k.state = state;
+  return k;
+}
 
 size_t model_state_size(std::span<const dfm_slot> slots, uint32_t npoint, uint32_t ncell, uint32_t nedge) {
   size_t total = 0;

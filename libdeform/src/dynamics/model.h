@@ -15,6 +15,9 @@
 
 namespace dfm {
 
+// The state in which a model is asked: [n,4] places and velocities of the points, and its own values.
+dfm_kin kin_at(double time, double h, const double *x, const double *v, const double *state);
+
 struct ModelInstance {
   const dfm_type *type = nullptr;
   const dfm_model *ops = nullptr;

@@ -60,12 +60,7 @@ bool RestFactor::query_stiffness() {
   h_ = 0;
   const Array<double> still(rest_.size(), 0.0, rest_.get_allocator());
   Array<double> force(still);
-  dfm_kin k{};
-  k.size = sizeof k;
-  k.stride = kStride;
-  k.x = rest_.data();
-  k.v = still.data();
-  k.state = state_.data();
+  const dfm_kin k = kin_at(0, 0, rest_.data(), still.data(), state_.data());
   if (model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, force.data()); }) !=
           DFM_OK ||
       !stiffness_.evaluate(model_, k, 0, 1))

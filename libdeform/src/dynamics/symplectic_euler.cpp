@@ -51,9 +51,7 @@ double stable_step(const Phyxels &p, const double *ksum, const double *csum, uin
     const double k = ksum[i], c = csum[i], m = p.mass[i];
     // q = 4 / (kBeyond best): where 4 k < q (m q - 2 c), c + sqrt(c^2 + 4 m k) < m q, so h > best.
     if (4 * k < q * (m * q - 2 * c)) continue;
-    // h = 4m / (c + sqrt(c^2 + 4 m k)): the same root without cancellation, and defined for k = 0
-    const double bottom = c + std::sqrt(c * c + 4 * m * k);
-    const double h = bottom > 0 ? 4 * m / bottom : std::numeric_limits<double>::infinity();
+    const double h = stable_step(k, c, m);
     if (h < best) {
       best = h;
       q = 4 / (kBeyond * best);

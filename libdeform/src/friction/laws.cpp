@@ -70,7 +70,7 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const 
   uint32_t n = 0, end = 0;
   for (const RowRun &r : contacts) n += r.n;
   order_.resize(n);
-  smooth_ = remembers_ = differences_ = false;
+  has_smooth_ = remembers_ = differences_ = false;
   for (uint32_t l = 0; l < laws.size() && end < n; ++l) {
     const uint32_t begin = end;
     const LawForm form = laws[l]->form();
@@ -81,7 +81,7 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const 
       state.origin[i].made = state.origin[i].hold = kNoSlope;
     });
     if (end == begin) continue;
-    smooth_ |= form != kSetValuedLaw;
+    has_smooth_ |= form == kSmoothLaw;
     remembers_ |= laws[l]->nstate > 0;
     differences_ |= !(laws[l]->ops->flags & DFM_FRIC_JACOBIAN);
     batches_.push_back({laws[l], begin, end - begin});
@@ -145,10 +145,39 @@ void LawBatches::reuse_slopes(uint32_t i, ContactState &s) {
   o.hold = e1 * e1 + e2 * e2 <= kGood * kGood * (p1 * p1 + p2 * p2) ? o.made : uint8_t(kNoSlope);
 }
 
+namespace {
+
+// Whether the law reads and writes the columns of `state` themselves: these are all contacts, in their order.
+bool in_place(std::span<const uint32_t> index, const ContactState &state) {
+  return index.size() == state.n && state.scale.empty();
+}
+
+}  // namespace
+
 dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint32_t> index, double h,
                                    const ContactState &state) {
-  const uint32_t n = static_cast<uint32_t>(index.size()), stride = (n + 7) & ~7u, S = law.nstate;
-  const size_t column = stride;
+  const uint32_t n = static_cast<uint32_t>(index.size()), needs = law.ops->needs, S = law.nstate;
+  dfm_friction_in in{};
+  in.size = sizeof in;
+  in.n = n;
+  in.dt = h;
+  in.params = law.params.data();
+  in.data = law.data;
+  const auto set = [&](uint32_t stride, const double *fn, const double *vt, const double *stop,
+                       const double *area, const double *dwell, const double *bristle) {
+    in.stride = stride;
+    in.fn = fn;
+    in.vt = vt;
+    in.ft_stop = stop;
+    in.area = needs & DFM_NEED_AREA ? area : nullptr;
+    in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
+    in.state = bristle;
+    return in;
+  };
+  if (in_place(index, state))
+    return set(state.stride, state.fn.data(), state.vt.data(), state.ft_stop.data(), state.area.data(),
+               state.dwell.data(), state.bristle.data());
+  const size_t column = (n + 7) & ~7u;
   in_.assign(column * (7 + S), 0.0);
   double *const fn = in_.data();
   double *const vt = fn + column;
@@ -158,7 +187,7 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
   double *const bristle = dwell + column;
   for (uint32_t k = 0; k < n; ++k) {
     const uint32_t i = index[k];
-    fn[k] = state.fn[i];
+    fn[k] = state.scale.empty() ? state.fn[i] : state.fn[i] * state.scale[i];
     area[k] = state.area[i];
     dwell[k] = state.dwell[i];
     vt[k] = state.vt[i];
@@ -167,147 +196,66 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
     stop[column + k] = state.ft_stop[state.stride + i];
     for (uint32_t s = 0; s < S; ++s) bristle[s * column + k] = state.bristle[size_t(s) * state.stride + i];
   }
-  if (!state.scale.empty())
-    for (uint32_t k = 0; k < n; ++k) fn[k] *= state.scale[index[k]];
-  const uint32_t needs = law.ops->needs;
-  dfm_friction_in in{};
-  in.size = sizeof in;
-  in.n = n;
-  in.stride = stride;
-  in.dt = h;
-  in.params = law.params.data();
-  in.data = law.data;
-  in.fn = fn;
-  in.vt = vt;
-  in.ft_stop = stop;
-  in.area = needs & DFM_NEED_AREA ? area : nullptr;
-  in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
-  in.state = bristle;
-  return in;
+  return set(uint32_t(column), fn, vt, stop, area, dwell, bristle);
 }
 
 const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h,
                                         ContactState &state) {
-  if (index.size() == state.n && state.scale.empty()) return evaluate_all(law, h, state);
   const dfm_friction_in in = inputs(law, index, h, state);
-  const uint32_t n = in.n, S = law.nstate;
-  const size_t column = in.stride;
-  out_.resize(column * (11 + S));
-  mode_.resize(column);
-  double *const ft = out_.data();
-  double *const dv = ft + 2 * column;
-  double *const dn = dv + 4 * column;
-  double *const limit = dn + 2 * column;
-  double *const next = limit + 3 * column;
+  const bool own = in_place(index, state), given = law.ops->flags & DFM_FRIC_JACOBIAN;
+  const size_t column = in.stride, stride = state.stride, S = law.nstate;
   dfm_friction_out out{};
   out.size = sizeof out;
-  out.ft = ft;
-  out.state = next;
-  out.dft_dvt = dv;
-  out.dft_dfn = dn;
-  out.limit = limit;
-  out.mode = mode_.data();
-  const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
+  if (own) {
+    out.ft = state.ft.data();
+    out.dft_dvt = state.dft_dvt.data();
+    out.dft_dfn = state.dft_dfn.data();
+    out.limit = state.limit.data();
+    out.state = state.bristle_out.data();
+    out.mode = state.mode.data();
+  } else {
+    out_.resize(column * (11 + S));
+    mode_.resize(column);
+    out.ft = out_.data();
+    out.dft_dvt = out.ft + 2 * column;
+    out.dft_dfn = out.dft_dvt + 4 * column;
+    out.limit = out.dft_dfn + 2 * column;
+    out.state = out.limit + 3 * column;
+    out.mode = mode_.data();
+  }
   if (!given) out.dft_dvt = out.dft_dfn = nullptr;
   failed_ = kNone;
   if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
     return &law;
 
-  for (uint32_t k = 0; k < n; ++k) {
+  // f(column of the result, columns, state's own): the results that this law gives, but for limit and mode
+  const auto each_result = [&](const auto &f) {
+    f(out.ft, size_t{2}, state.ft);
+    f(out.state, S, state.bristle_out);
+    if (!given) return;
+    f(out.dft_dvt, size_t{4}, state.dft_dvt);
+    f(out.dft_dfn, size_t{2}, state.dft_dfn);
+  };
+  for (size_t k = 0; k < in.n; ++k) {
     const uint32_t i = index[k];
     double nan_flag = 0;
-    state.ft[i] = ft[k];
-    state.ft[state.stride + i] = ft[column + k];
-    state.limit[i] = limit[k];
-    state.mode[i] = mode_[k];
-    for (uint32_t s = 0; s < S; ++s)
-      nan_flag += 0.0 * (state.bristle_out[size_t(s) * state.stride + i] = next[s * column + k]);
-    nan_flag += 0.0 * (ft[k] + ft[column + k]);
-    if (given) {
-      for (uint32_t j = 0; j < 4; ++j) state.dft_dvt[size_t(j) * state.stride + i] = dv[j * column + k];
-      state.dft_dfn[i] = dn[k];
-      state.dft_dfn[state.stride + i] = dn[column + k];
-      nan_flag += 0.0 * (dv[k] + dv[column + k] + dv[2 * column + k] + dv[3 * column + k]) +
-                  0.0 * (dn[k] + dn[column + k]);
-    } else {
-      reuse_slopes(i, state);
+    each_result([&](const double *from, size_t width, Array<double> &to) {
+      for (size_t c = 0; c < width; ++c) {
+        nan_flag += 0.0 * from[c * column + k];
+        if (!own) to[c * stride + i] = from[c * column + k];
+      }
+    });
+    if (!own) {
+      state.limit[i] = out.limit[k];
+      state.mode[i] = out.mode[k];
     }
+    if (!given) reuse_slopes(i, state);
     // the poison of NaN and infinity is not zero; a limit of +inf is valid: no limit
-    if (failed_ == kNone && !(nan_flag == 0 && limit[k] >= 0)) failed_ = i;
+    if (failed_ == kNone && !(nan_flag == 0 && out.limit[k] >= 0)) failed_ = i;
   }
   if (given && !state.scale.empty())
     for (const uint32_t i : index)
-      for (const uint32_t at : {i, state.stride + i}) state.dft_dfn[at] *= state.scale[i];
-  return failed_ == kNone ? nullptr : &law;
-}
-
-namespace {
-
-// 0 if the whole column, padded to fours, is finite; else NaN.
-using Four = double __attribute__((vector_size(32)));
-void add_nan_flag(const double *column, size_t n, Four &sum) {
-  const Four *const x = reinterpret_cast<const Four *>(column);
-  for (size_t k = 0; k < n / 4; ++k) sum += 0.0 * x[k];
-}
-
-}  // namespace
-
-const LawInstance *LawBatches::evaluate_all(const LawInstance &law, double h, ContactState &s) {
-  const uint32_t n = s.n, needs = law.ops->needs;
-  const size_t column = s.stride, S = law.nstate;
-  const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
-  dfm_friction_in in{};
-  in.size = sizeof in;
-  in.n = n;
-  in.stride = s.stride;
-  in.dt = h;
-  in.params = law.params.data();
-  in.data = law.data;
-  in.fn = s.fn.data();
-  in.vt = s.vt.data();
-  in.ft_stop = s.ft_stop.data();
-  in.area = needs & DFM_NEED_AREA ? s.area.data() : nullptr;
-  in.dwell = needs & DFM_NEED_DWELL ? s.dwell.data() : nullptr;
-  in.state = s.bristle.data();
-  dfm_friction_out out{};
-  out.size = sizeof out;
-  out.ft = s.ft.data();
-  out.state = s.bristle_out.data();
-  out.dft_dvt = given ? s.dft_dvt.data() : nullptr;
-  out.dft_dfn = given ? s.dft_dfn.data() : nullptr;
-  out.limit = s.limit.data();
-  out.mode = s.mode.data();
-  failed_ = kNone;
-  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
-    return &law;
-  if (!given)
-    for (uint32_t i = 0; i < n; ++i) reuse_slopes(i, s);
-
-  Four nan_flag{0, 0, 0, 0};
-  add_nan_flag(s.ft.data(), 2 * column, nan_flag);
-  add_nan_flag(s.bristle_out.data(), S * column, nan_flag);
-  if (given) {
-    add_nan_flag(s.dft_dvt.data(), 4 * column, nan_flag);
-    add_nan_flag(s.dft_dfn.data(), 2 * column, nan_flag);
-  }
-  bool good = (nan_flag[0] + nan_flag[1]) + (nan_flag[2] + nan_flag[3]) == 0;
-  for (uint32_t i = 0; i < n; ++i) good &= s.limit[i] >= 0;
-  if (good) return nullptr;
-  // find the contact; there is none if only the padding is not finite, which a law may leave undefined
-  for (uint32_t i = 0; i < n && failed_ == kNone; ++i) {
-    double bad = 0;
-    const auto add = [&](const Array<double> &a, size_t width) {
-      for (size_t c = 0; c < width; ++c) bad += 0.0 * a[c * column + i];
-    };
-    add(s.ft, 2);
-    add(s.bristle_out, S);
-    if (given) {
-      add(s.dft_dvt, 4);
-      add(s.dft_dfn, 2);
-    }
-    // a limit of +inf is valid: no limit
-    if (!(bad == 0 && s.limit[i] >= 0)) failed_ = i;
-  }
+      for (const size_t at : {size_t{i}, stride + i}) state.dft_dfn[at] *= state.scale[i];
   return failed_ == kNone ? nullptr : &law;
 }
 

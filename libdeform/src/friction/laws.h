@@ -68,7 +68,7 @@ class LawBatches {
   //   least, relative   m/s, 1: a contact's slip need not be known closer than least + relative of it
   const LawInstance *evaluate_local(double h, const double *wt, double least, double relative,
                                     ContactState &state);
-  bool smooth() const { return smooth_; }            // whether any law is not set-valued
+  bool has_smooth() const { return has_smooth_; }
   bool differences() const { return differences_; }  // whether any law gives no slopes
   bool remembers() const { return remembers_; }      // whether any law has a state
   // After a law has failed: the contact whose result is invalid; kNone: the law refused the whole batch.
@@ -94,15 +94,13 @@ class LawBatches {
   Array<uint8_t> mode_;
   Array<Local> local_;
   Array<uint32_t> selected_;  // contacts of local_ that are evaluated together
-  bool smooth_ = false, remembers_ = false, differences_ = false;
+  bool has_smooth_ = false, remembers_ = false, differences_ = false;
   uint32_t failed_ = kNone;
-  // in in_
+  // in in_, or, of all contacts of the sub-step, state's own columns
   dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                          const ContactState &state);
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                               ContactState &state);
-  // The same for all contacts of the sub-step, in state's own columns.
-  const LawInstance *evaluate_all(const LawInstance &law, double h, ContactState &state);
   const LawInstance *solve_local(const Batch &batch, double h, const double *wt, double least,
                                  double relative, ContactState &state);
   // Slopes by differences at the present trial. Returns the law if it fails.

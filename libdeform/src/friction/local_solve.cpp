@@ -49,13 +49,11 @@ inline bool is_accurate(const ContactState &s, uint32_t i, double m, double leas
 // Starts from the present slip, which becomes v.
 void newton_step(const ContactState &s, uint32_t i, double m, double v[2], double step[2]) {
   const Residue g = residue(s, i, m);
-  const auto [d11, d12, d21, d22] = dissipative_slope(s, i);
-  const double m11 = 1 - m * d11, m22 = 1 - m * d22, m12 = -m * d12, m21 = -m * d21,
-               det = m11 * m22 - m12 * m21;
+  const LinearLaw l = linear_law(s, i, m);
   v[0] = s.vt[i];
   v[1] = s.vt[s.stride + i];
-  step[0] = -(m22 * g.a - m12 * g.b) / det;
-  step[1] = -(m11 * g.b - m21 * g.a) / det;
+  step[0] = -(l.m22 * g.a - l.m12 * g.b) / l.det;
+  step[1] = -(l.m11 * g.b - l.m21 * g.a) / l.det;
 }
 
 }  // namespace

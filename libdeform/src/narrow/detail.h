@@ -7,6 +7,7 @@
 
 #include "contact/contact_set.h"
 #include "contact/reach.h"
+#include "geometry/area.h"
 #include "geometry/convex.h"
 #include "geometry/obstacle_shape.h"
 #include "geometry/views.h"
@@ -113,6 +114,28 @@ inline bool rests(const Pair &pair, double reach, ContactPoint &c) {
   c.distance += pair.offset - rest_of_parts(*pair.a.surface, *pair.b->surface, c.kind, c.feature_a,
                                             c.feature_b, load3(c.normal), pair.offset);
   return c.distance < reach;
+}
+
+struct AreaOwner {
+  const BodyView &body;
+  Vec3 out;  // of its surface, at the contact
+};
+// An edge or triangle contact takes the share of the area of the nearest of its nodes that has not lent its
+// own (doc/concepts/detection.md). area_node_plus_1: that node plus 1. owner(k): AreaOwner of node k;
+// lent: [nodes] from `first` on
+template <class Owner>
+void take_area(ContactPoint &c, double share, const Owner &owner, uint32_t first, Array<uint8_t> &lent) {
+  double nearest = 0;
+  for (int k = 0; k < c.nnode; ++k) {
+    const auto [body, out] = owner(k);
+    const uint32_t surfel = c.node[k] - body.first_node;
+    const double d2 = norm2(load3(&body.surface->x[4 * size_t{surfel}]) - load3(c.point));
+    if (lent[c.node[k] - first] || (c.area_node_plus_1 && !(d2 < nearest))) continue;
+    nearest = d2;
+    c.area_node_plus_1 = c.node[k] + 1;
+    c.area = share * facing_area(*body.surface, surfel, out);
+  }
+  if (c.area_node_plus_1) lent[c.area_node_plus_1 - 1 - first] = 1;
 }
 
 // Gives contacts of surfaces, from `begin` on, their keys: those of one feature of a with one patch of b are

@@ -1,8 +1,7 @@
 // Two edges cross over each other: closest points of their lines n . r / |n| with n = u x w, both inside the
-// edges, both edges convex,
-// and the direction inside both cones of normals. The faces beside the edges give the sign, so that edges
-// which have slipped through each
-// other by a little are pushed back the way they came.
+// edges, both edges convex, and the direction inside both cones of normals. The faces beside the edges give
+// the sign, so that edges which have slipped through each other by a little are pushed back the way they
+// came.
 //
 // Edges that bore each other in the last sub-step count on, convex or not, within their cones of normals: the
 // load itself presses them flat and a little hollow, and left out there they would lose it, spring back and

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "geometry/area.h"
 #include "narrow/detail.h"
 
 namespace dfm {
@@ -24,9 +23,8 @@ std::span<const Crossing> of_pair(std::span<const Crossing> all, uint64_t id_a, 
 // Contacts of surfels of one body with one other side: a run of the list.
 using Owners = std::span<const ContactPoint>;
 
-// An edge or triangle contact takes the area of the nearest of its corners without a contact with the other
-// side; no area is given twice; 0 if none is free (doc/concepts/detection.md). area_node_plus_1: that node
-// plus 1.
+// Areas of edge and triangle contacts, from corners without a contact with the other side; no area is given
+// twice; 0 if none is free.
 class Areas {
  public:
   Areas(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
@@ -89,23 +87,11 @@ class Areas {
     if (b) mark(*b, of_b, 1);
     for (size_t i = begin; i < end; ++i) {
       ContactPoint &c = contacts_[i];
-      double nearest = 0;
-      const BodyView *area_body = nullptr;
-      for (int k = 0; k < c.nnode; ++k) {
-        if (lent_[c.node[k]]) continue;
-        const BodyView &own = c.node[k] - a.first_node < a.surface->nsurfel ? a : *b;
-        const uint32_t surfel = c.node[k] - own.first_node;
-        const double d2 = norm2(load3(&own.surface->x[4 * size_t{surfel}]) - load3(c.point));
-        if (area_body && !(d2 < nearest)) continue;
-        nearest = d2;
-        area_body = &own;
-        c.area_node_plus_1 = c.node[k] + 1;
-      }
-      if (!area_body) continue;
-      const Vec3 out = area_body == &a ? -load3(c.normal) : load3(c.normal);
-      c.area = facing_area(*area_body->surface, c.area_node_plus_1 - 1 - area_body->first_node, out) *
-               (b ? 0.5 : 1.0);
-      lent_[c.area_node_plus_1 - 1] = 1;
+      const auto owner = [&](int k) {
+        const bool own = c.node[k] - a.first_node < a.surface->nsurfel;
+        return narrow::AreaOwner{own ? a : *b, own ? -load3(c.normal) : load3(c.normal)};
+      };
+      narrow::take_area(c, b ? 0.5 : 1.0, owner, 0, lent_);
     }
     mark(a, of_a, 0);
     if (b) mark(*b, of_b, 0);

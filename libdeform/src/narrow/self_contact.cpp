@@ -443,16 +443,10 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
   for (size_t i = begin; i < edges; ++i) lent[out[i].feature_a] = 1;
   for (size_t i = edges; i < out.size(); ++i) {
     ContactPoint &c = out[i];
-    double nearest = 0;
-    for (int k = 0; k < c.nnode; ++k) {
-      const uint32_t surfel = c.node[k] - body.first_node;
-      const double d2 = norm2(x(surfel) - load3(c.point));
-      if (lent[surfel] || (c.area_node_plus_1 && !(d2 < nearest))) continue;
-      nearest = d2;
-      c.area_node_plus_1 = c.node[k] + 1;
-      c.area = 0.5 * facing_area(s, surfel, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal));
-    }
-    if (c.area_node_plus_1) lent[c.area_node_plus_1 - 1 - body.first_node] = 1;
+    const auto owner = [&](int k) {
+      return AreaOwner{body, c.weight[k] > 0 ? -load3(c.normal) : load3(c.normal)};
+    };
+    take_area(c, 0.5, owner, body.first_node, lent);
   }
 }
 

@@ -3,10 +3,9 @@
 #include <array>
 #include <atomic>
 #include <chrono>
-#include <cstring>
-#include <type_traits>
 
 #include "body/make_surface.h"
+#include "core/byte_stream.h"
 #include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "plugin/context.h"
@@ -15,6 +14,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/impact.h"
+#include "step/messages.h"
 #include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
@@ -31,6 +31,8 @@ constexpr double kSolveShare = 0.9;
 // Default limit: this factor times the cost of the planned sub-steps without contact.
 constexpr uint64_t kAutomaticFactor = 16000;
 constexpr uint64_t kRigidWork = 1000;  // of a rigid body, in the automatic limit
+
+constexpr const char *kStart = "saved start of a step";
 
 struct StepInterrupted {};
 
@@ -100,108 +102,66 @@ bool holds(StepContext &step, uint64_t units) {
   return false;
 }
 
-// One list of what a step changes is used for saving and restoring. Room: memory for restoring is reserved in
+// One list of what a step changes is used for saving and restoring. Memory for restoring is reserved in
 // advance.
-struct Keep {
-  std::vector<unsigned char> &out;
-  template <class T>
-  void value(const T &x) {
-    static_assert(std::is_trivially_copyable_v<T>);
-    const auto *const p = reinterpret_cast<const unsigned char *>(&x);
-    out.insert(out.end(), p, p + sizeof x);
-  }
-  template <class A>
-  void array(const A &a) {
-    value(uint64_t(a.size()));
-    const auto *const p = reinterpret_cast<const unsigned char *>(a.data());
-    out.insert(out.end(), p, p + a.size() * sizeof(a[0]));
-  }
-  template <class A>
-  void length(const A &a) {
-    value(uint64_t(a.size()));
-  }
-};
-struct Restorer {
-  const unsigned char *at;
-  template <class T>
-  void value(T &x) {
-    std::memcpy(&x, at, sizeof x);
-    at += sizeof x;
-  }
-  template <class A>
-  void array(A &a) {
-    uint64_t n;
-    value(n);
-    a.resize(n);
-    if (n) std::memcpy(static_cast<void *>(a.data()), at, n * sizeof(a[0]));
-    at += n * sizeof(a[0]);
-  }
-  template <class A>
-  void length(A &a) {
-    uint64_t n;
-    value(n);
-    a.resize(n);
-  }
-};
-
 template <class Stream>
 void changing(Stream &s, World &w) {
-  s.value(w.time);
-  s.value(w.bound.step);
-  s.value(w.bound.inverted);
-  s.value(w.bound.age);
-  s.value(w.bound.strain);
-  s.value(w.bound.body);
-  s.value(w.bound.point);
-  s.value(w.gravity.now);
-  s.value(w.step_count);
-  s.value(w.sleepers);
-  s.value(w.watch);
+  s.one(w.time);
+  s.one(w.bound.step);
+  s.one(w.bound.inverted);
+  s.one(w.bound.age);
+  s.one(w.bound.strain);
+  s.one(w.bound.body);
+  s.one(w.bound.point);
+  s.one(w.gravity.now);
+  s.one(w.step_count);
+  s.one(w.sleepers);
+  s.one(w.watch);
   for (auto &b : w.bodies) {
-    s.array(b->p.x);
-    s.array(b->p.v);
-    s.array(b->p.dampers.v);
-    s.array(b->p.dampers.slow);
-    s.array(b->model.state);
-    s.array(b->surfel_impulse);
-    s.array(b->anchor);
-    s.value(b->contact_impulse);
-    s.value(b->energy);
-    s.value(b->changes);
-    s.value(b->sleep_state);
-    s.value(b->bound);
+    s.many(b->p.x);
+    s.many(b->p.v);
+    s.many(b->p.dampers.v);
+    s.many(b->p.dampers.slow);
+    s.many(b->model.state);
+    s.many(b->surfel_impulse);
+    s.many(b->anchor);
+    s.one(b->contact_impulse);
+    s.one(b->energy);
+    s.one(b->changes);
+    s.one(b->sleep_state);
+    s.one(b->bound);
   }
   for (auto &o : w.obstacles) {
-    s.value(o->pose);
-    s.value(o->has_target);
+    s.one(o->pose);
+    s.one(o->has_target);
   }
   for (auto &set : w.rigid_sets) {
-    s.array(set->state);
-    s.array(set->extra);
-    s.array(set->total);
-    s.array(set->impulse);
-    s.value(set->last_h);
+    s.many(set->state);
+    s.many(set->extra);
+    s.many(set->total);
+    s.many(set->impulse);
+    s.one(set->last_h);
   }
   for (auto *const store : {&w.store, &w.tool_store}) {
-    s.value(store->n);
-    s.value(store->nstate);
-    s.value(store->h);
-    each_column([&](const ContactColumn &, auto &column) { s.array(column); }, *store);
+    s.one(store->n);
+    s.one(store->nstate);
+    s.one(store->h);
+    each_column([&](const ContactColumn &, auto &column) { s.many(column); }, *store);
   }
-  s.value(w.report.n);
-  s.value(w.report.h);
-  each_report_column([&](size_t, auto &column) { s.array(column); }, w.report);
-  s.value(w.rigid_report.h);
-  s.array(w.rigid_report.contacts);
-  s.array(w.rigid_report.touching);
+  s.one(w.report.n);
+  s.one(w.report.h);
+  each_report_column([&](size_t, auto &column) { s.many(column); }, w.report);
+  s.one(w.rigid_report.h);
+  s.many(w.rigid_report.contacts);
+  s.many(w.rigid_report.touching);
   for (Attachment &a : w.attachments) {
-    s.array(a.impulse);
-    s.value(a.h);
-    s.value(a.total);
-    s.value(a.released);
+    s.many(a.impulse);
+    s.one(a.h);
+    s.one(a.total);
+    s.one(a.released);
   }
-  s.array(w.work);
-  s.length(w.events);  // steps only append to it, and the host may read it after many steps
+  s.many(w.work);
+  s.count(w.events);  // steps only append to it, and the host may read it after many steps
 }
 
 // The stores and the reports are swapped with others at the end of sub-steps, so the saved data may have to
@@ -219,13 +179,13 @@ void reserve_others(World &w, StepContext &step) {
 // Data that the step changes at its start, before it is known whether more must be saved.
 template <class Stream>
 void changed_at_once(Stream &s, World &w) {
-  s.array(w.step_impulses.pairs);
-  s.value(w.step_impulses.idle);
-  s.value(w.sizes);
-  for (auto &t : w.tools) s.array(t->set->extra);
+  s.many(w.step_impulses.pairs);
+  s.one(w.step_impulses.idle);
+  s.one(w.sizes);
+  for (auto &t : w.tools) s.many(t->set->extra);
 }
 
-void restore_changing(Restorer &from, World &w) {
+void restore_changing(ByteReader &from, World &w) {
   changing(from, w);
   for (auto &b : w.bodies) {
     ++b->x_version;
@@ -235,11 +195,11 @@ void restore_changing(Restorer &from, World &w) {
 }
 
 void return_to_start(World &w, StepContext &step) {
-  Restorer from{step.budget.start.data()};
+  ByteReader from(step.budget.start, kStart);
   changed_at_once(from, w);
   if (step.budget.kept) {
     restore_changing(from, w);
-    Restorer first{step.budget.start.data()};
+    ByteReader first(step.budget.start, kStart);
     changed_at_once(first, w);  // of tools; the rest was saved after the step had changed them
   }
   const uint64_t cheapened = w.stats.cheapened;
@@ -354,24 +314,24 @@ void charge(World &w, StepContext &step, const Spent &spent) {
 void save_start(World &w, StepContext &step) {
   Budget &b = step.budget;
   if (b.kept) return;
-  Keep to{b.start};
+  ByteWriter to(b.start);
   changing(to, w);
   reserve_others(w, step);
   b.kept = true;
 }
 
-void write_down(World &w, StepContext &step, std::vector<unsigned char> &out) {
+void write_down(World &w, StepContext &step, std::string &out) {
   out.clear();
-  Keep to{out};
-  to.value(w.stats);
+  ByteWriter to(out);
+  to.one(w.stats);
   changed_at_once(to, w);
   changing(to, w);
   reserve_others(w, step);
 }
 
-void restore_start(World &w, StepContext &step, const std::vector<unsigned char> &from) {
-  Restorer at{from.data()};
-  at.value(w.stats);
+void restore_start(World &w, StepContext &step, std::string_view from) {
+  ByteReader at(from, kStart);
+  at.one(w.stats);
   changed_at_once(at, w);
   restore_changing(at, w);
   step.guard.forget();
@@ -386,7 +346,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   b.span = w.def.max_time;
   b.end = b.span > 0 ? now() + b.span : 0;
   b.start.clear();
-  Keep to{b.start};
+  ByteWriter to(b.start);
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
@@ -396,9 +356,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   } catch (const StepInterrupted &) {
     if (w.impact_until > 0 && !in_impact) end_impact(w);  // it began in this step
     return_to_start(w, step);
-    set_last_error(format("step %llu was interrupted; the state is as before the step",
-                          static_cast<unsigned long long>(w.step_count))
-                       .c_str());
+    set_last_error((at_step(w) + " was interrupted; the state is as before the step").c_str());
     *trouble = DFM_TROUBLE_INTERRUPTED;
     ++w.stats.discarded;
   }

@@ -3,7 +3,8 @@
 // count on every machine, with any number of threads.
 #pragma once
 #include <cstdint>
-#include <vector>
+#include <string>
+#include <string_view>
 
 #include "core/memory.h"
 #include "deform/world.h"
@@ -29,7 +30,7 @@ struct Budget {
   bool cheapened = false;  // the step has left something out
   bool ended = false;      // the step ends before its end: the budget is used up
   bool kept = false;       // `start` holds the state before this step
-  std::vector<unsigned char> start;
+  std::string start;
   dfm_world_stats stats{};  // before the step
 };
 
@@ -75,8 +76,8 @@ bool may_solve_again(const World &w, StepContext &step, size_t hits);
 bool may_check(const World &w, StepContext &step);
 // Everything that steps change; between two steps the saved state is restored. Bodies and their dynamics are
 // the same.
-void write_down(World &w, StepContext &step, std::vector<unsigned char> &out);
-void restore_start(World &w, StepContext &step, const std::vector<unsigned char> &from);
+void write_down(World &w, StepContext &step, std::string &out);
+void restore_start(World &w, StepContext &step, std::string_view from);
 // The state before the step is saved once, before any of it changes.
 void save_start(World &w, StepContext &step);
 

@@ -1,19 +1,24 @@
 // Jobs whose blocks are bodies.
 #pragma once
+#include <atomic>
 #include <cstdint>
 #include <span>
 
+#include "plugin/context.h"
+#include "plugin/on_behalf.h"
 #include "state/world.h"
 
 namespace dfm {
 
 // Fewer points in all explicit bodies are no job for their motion (8 ns a point), or their forces (0.1 us).
 inline constexpr uint32_t kPointsToMove = 250, kPointsToPull = 20;
+inline constexpr uint32_t kOnThisThread = ~0u;  // no points are
 
 // How many of the active bodies a block has. Explicit bodies of few points, less than `worth` in all, are no
 // work for two threads. Otherwise each body is a block, so that in all stages the same threads have the same
 // bodies.
 inline uint32_t bodies_together(const World &w, std::span<const uint32_t> active, uint32_t worth) {
+  if (worth == kOnThisThread) return static_cast<uint32_t>(active.size());
   uint32_t points = 0;
   for (const uint32_t i : active) {
     const Body &b = *w.bodies[i];
@@ -21,6 +26,31 @@ inline uint32_t bodies_together(const World &w, std::span<const uint32_t> active
     if (points >= worth || b.model.stepper || b.integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER) return 1;
   }
   return static_cast<uint32_t>(active.size());
+}
+
+// The first body, in id order, for which something failed, independent of the division of bodies among
+// threads.
+struct FirstFailure {
+  std::atomic<uint32_t> body{kNone};
+  void note(uint32_t i) {
+    uint32_t seen = body;
+    while (i < seen && !body.compare_exchange_weak(seen, i)) {}
+  }
+};
+
+// act(body) -> has it succeeded? The active bodies side by side. Returns the first, in id order, for which it
+// has not, or null.
+template <class Act>
+const Body *each_active(const World &w, std::span<const uint32_t> active, uint32_t worth, const Act &act) {
+  FirstFailure failed;
+  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), bodies_together(w, active, worth),
+                                [&](uint32_t begin, uint32_t end) {
+                                  for (const uint32_t i : active.subspan(begin, end - begin)) {
+                                    const OnBehalf prefix(w.bodies[i]->name);
+                                    if (!act(*w.bodies[i])) failed.note(i);
+                                  }
+                                });
+  return failed.body == kNone ? nullptr : w.bodies[failed.body].get();
 }
 
 }  // namespace dfm

@@ -4,18 +4,16 @@
 #include <limits>
 
 #include "core/error.h"
-#include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "step/by_body.h"
 #include "step/context.h"
-#include "step/first_failure.h"
 #include "step/impact.h"
+#include "step/messages.h"
 #include "step/solve/attach.h"
 #include "step/solve/cut_drag.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
-#include "step/watch/change_work.h"
 #include "step/watch/energy_watch.h"
 
 namespace dfm {
@@ -32,14 +30,10 @@ constexpr double kAlong = 0.1;  // of the stable step: a way on which strains ch
 void damp_changes_of_size(World &w, const StepContext &step) {
   const double stable = w.bound.step / kBoundShare, c = next_damping(w.sizes, step.length.planned, stable);
   if (!(c > 0)) return;
-  w.context->tasks.parallel_for(
-      static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToPull),
-      [&](uint32_t begin, uint32_t end) {
-        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
-          const OnBehalf prefix(w.bodies[i]->name);
-          w.bodies[i]->dynamics->damp(w.time + step.h, c, kAlong * stable);
-        }
-      });
+  each_active(w, step.active, kPointsToPull, [&](Body &b) {
+    b.dynamics->damp(w.time + step.h, c, kAlong * stable);
+    return true;
+  });
 }
 }  // namespace
 
@@ -48,25 +42,18 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const bool touched = w.plan.has(StageRole::reports_impulses) && step.rows.all() > 0;
   const bool guarded = w.plan.has(StageRole::guards);
   if (guarded) step.guard.common.assign(w.bodies.size(), {});
-  FirstFailure failed;
-  w.context->tasks.parallel_for(
-      static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToMove),
-      [&](uint32_t begin, uint32_t end) {
-        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
-          Body &b = *w.bodies[i];
-          if (guarded) check_motion(w, step, i);
-          const OnBehalf prefix(b.name);
-          if (!b.dynamics->end_state(now, b.surfel_impulse.data(), touched)) failed.note(i);
-        }
-      });
+  const Body *const failed = each_active(w, step.active, kPointsToMove, [&](Body &b) {
+    if (guarded) check_motion(w, step, b.slot);
+    return b.dynamics->end_state(now, b.surfel_impulse.data(), touched);
+  });
   step.ended = true;
-  if (failed.body == kNone) return true;
+  if (!failed) return true;
   *trouble |= DFM_TROUBLE_PLUGIN;
-  const Body &b = *w.bodies[failed.body];
-  set_last_error(format("step %llu, body '%s': model '%s' could not end its step, or ended it with something "
-                        "not finite; take a smaller step or change the model",
-                        static_cast<unsigned long long>(w.step_count), b.name.c_str(), b.model.type->id)
-                     .c_str());
+  set_last_error(
+      format("%s: model '%s' could not end its step, or ended it with something not finite; take a "
+             "smaller step or change the model",
+             at_step(w, *failed).c_str(), failed->model.type->id)
+          .c_str());
   return false;
 }
 
@@ -89,22 +76,18 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   for (const uint32_t i : step.active)
     accurate = std::min(accurate, w.bodies[i]->dynamics->accurate_step(now));
   w.sizes.accurate = std::isfinite(accurate) ? accurate : 0;
-  w.context->tasks.parallel_for(
-      static_cast<uint32_t>(step.active.size()), bodies_together(w, step.active, kPointsToMove),
-      [&](uint32_t begin, uint32_t end) {
-        for (const uint32_t i : std::span(step.active).subspan(begin, end - begin)) {
-          Body &b = *w.bodies[i];
-          ready_change_work(b, now);
-          b.dynamics->commit(now, step.guard.motion);  // the guard may shorten the displacement
-          if (reads_points(w, b)) b.dynamics->see_points();
-          ++b.x_version;
-          book_change_work(w, b, now.h);
-          if (!w.plan.touches()) continue;
-          Vec3 sum;
-          for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);
-          b.contact_impulse += sum;
-        }
-      });
+  each_active(w, step.active, kPointsToMove, [&](Body &b) {
+    ready_change_work(b, now);
+    b.dynamics->commit(now, step.guard.motion);  // the guard may shorten the displacement
+    if (reads_points(w, b)) b.dynamics->see_points();
+    ++b.x_version;
+    book_change_work(w, b, now.h);
+    if (!w.plan.touches()) return true;
+    Vec3 sum;
+    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);
+    b.contact_impulse += sum;
+    return true;
+  });
   if (w.plan.touches()) {
     keep_contacts(w, step);
     keep_bonds(w, step);

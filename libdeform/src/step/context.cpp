@@ -21,12 +21,12 @@ StepContext::StepContext(const Meters &meters)
       next_store(meters.contacts.memory()),
       last_report(meters.contacts.memory()),
       islands(meters.steps.memory()) {
-  use_memory(meters.steps.memory(), driven, free_kinetic, looks, block_surfels, near, touching, active, woken,
-             stirred, roused.bodies, roused.dwell, roused.total);
+  use_memory(meters.steps.memory(), driven, free_kinetic, looks, near, touching, active, woken, stirred,
+             roused.bodies, roused.dwell, roused.total);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
-             best_impulse, tangents, slip_back, stick_drift, match, sharing, target_area, keeps_area, ways,
-             renewed, thrown, motions, marked, bonds, bond_impulse, chosen, mean, pairs_made, before, goes_on,
-             given.list);
+             impulse_before_rebuild, tangents, slip_back, stick_drift, match, sharing, target_area,
+             keeps_area, ways, renewed, rebound_speed, motions, marked, bonds, bond_impulse, chosen, mean,
+             pairs_made, before, goes_on, given.list);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.common, guard.kept, guard.kept_before, guard.blocks.ranges);

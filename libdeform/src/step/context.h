@@ -87,19 +87,18 @@ struct StepContext {
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most
-  Array<double> disturbance, best_impulse;
+  Array<double> disturbance, impulse_before_rebuild;
   Array<double> tangents;
   // [contacts] m/s, at which sides leave each other at least; empty where no pair has a restitution
-  Array<double> thrown;
+  Array<double> rebound_speed;
   Array<RigidMotion> motions;  // [bodies] at the start of the sub-step, of those with such contacts
   Array<uint8_t> marked;       // [bodies] scratch of it
-  // both empty where no law holds places (stuck_slip.h)
+  // both empty where no law holds places (friction_memory.h)
   Array<double> slip_back;    // [contacts,2] m/s, slip that the solve takes back; of islands that owe
   Array<double> stick_drift;  // [contacts,3] m, slip since the contact sticks
   // [contacts] index of the contact in the store of the last sub-step, or kNone
   Array<uint32_t> match;
-  Array<uint32_t> block_surfels;  // responses of bodies whose points answer each other
-  bool bodies_part = false;       // the motion of some body depends on whether there are contacts
+  bool bodies_part = false;  // the motion of some body depends on whether there are contacts
   struct Chosen {
     uint32_t law;
     double scale;  // of friction

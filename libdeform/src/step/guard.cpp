@@ -31,6 +31,7 @@
 #include "step/context.h"
 #include "step/move_obstacles.h"
 #include "step/self_contact.h"
+#include "step/sides.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/watch/energy_watch.h"
@@ -115,7 +116,7 @@ Impact impact_on(const StepContext &step, const Body &b, uint32_t slot) {
 bool meets(const World &w, const StepContext &step, uint32_t slot) {
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
-    if (c.slot_a != slot && (c.obstacle || c.slot_b != slot)) continue;
+    if (!is_side(c, slot)) continue;
     if (!(step.rows.impulse[3 * size_t{i}] > 0)) continue;
     const uint32_t before = step.match[i];
     if (before == kNone || !w.store.touching[before]) return true;

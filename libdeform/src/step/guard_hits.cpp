@@ -2,6 +2,7 @@
 // sees ends outside.
 #include <algorithm>
 #include <array>
+#include <tuple>
 
 #include "ccd/toi_guard_motion.h"
 #include "dynamics/rigid/rigid_set.h"
@@ -12,7 +13,9 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/guard.h"
+#include "step/rigid/rigid.h"
 #include "step/self_contact.h"
+#include "step/sides.h"
 #include "step/solve/pre_solve.h"
 
 namespace dfm {
@@ -80,18 +83,16 @@ class HitContact {
     (weight < 0 ? on_b_ : on_a_) += std::fabs(weight) * at;
   }
   void on_body(ContactPoint &out) {
-    const Surface &a = *step_.body_views[c_.slot_a].surface, &b = *step_.body_views[c_.slot_b].surface;
+    const Surface &b = *step_.body_views[c_.slot_b].surface;
     out.kind = c_.kind;
     if (c_.kind == kEdgeEdge) {
       out.type_a = 1;
-      const uint32_t *const ea = &a.edge[2 * size_t{c_.feature_a}];
       const uint32_t *const eb = &b.edge[2 * size_t{c_.feature_b}];
-      add(out, c_.slot_a, ea[0], 1 - hit_.at[0]);
-      add(out, c_.slot_a, ea[1], hit_.at[0]);
+      add_feature(out, 1, c_.feature_a);
       add(out, c_.slot_b, eb[0], hit_.at[1] - 1);
       add(out, c_.slot_b, eb[1], -hit_.at[1]);
     } else {
-      add(out, c_.slot_a, c_.feature_a, 1);
+      add_feature(out, 0, c_.feature_a);
       for (int k = 0; k < 3; ++k)
         add(out, c_.slot_b, b.tri[3 * size_t{c_.feature_b} + size_t(k)], -hit_.at[k]);
     }
@@ -126,8 +127,7 @@ class HitContact {
     now_ = o.distance > 0 ? on_a_ - o.point : o.normal;
     middle_ = 0.5 * (on_a_ + o.point);
     GuardPose to = end_;
-    if (const Obstacle &rigid = *w_.obstacles[c_.slot_b];
-        rigid.rigid && rigid.rigid->group[rigid.rigid_body] != DFM_RIGID_STILL) {
+    if (const Obstacle &rigid = *w_.obstacles[c_.slot_b]; is_moved(rigid)) {
       const double *const free = &rigid.rigid->velocity[6 * size_t{rigid.rigid_body}];
       to = {v.position + step_.h * load3(free), turned(v.rotation, step_.h * load3(free + 3))};
     }
@@ -172,7 +172,7 @@ bool same_features(const ContactPoint &l, const ContactPoint &r) {
 uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c) {
   const uint64_t id_a = w.bodies[c.slot_a]->id;
   const Surface &a = w.bodies[c.slot_a]->surface;
-  const uint64_t id_b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  const uint64_t id_b = id_of_b(w, c);
   const Surface *const b = c.obstacle ? nullptr : &w.bodies[c.slot_b]->surface;
   uint32_t patch = c.feature_b;
   if (b) {
@@ -261,8 +261,7 @@ void guard_add_hits(World &w, StepContext &step) {
     const ContactPoint &c = step.contacts[i];
     const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
     const Guard::Kept *const k = find_kept(g.kept_before, c);
-    g.kept.push_back({c.key, c.more, l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6),
-                      step.rows.rate[i], k && k->hit});
+    g.kept.push_back({c.key, c.more, from_frame(f, l), step.rows.rate[i], k && k->hit});
   }
   for (const GuardHit &hit : g.hits) {
     ContactPoint c;
@@ -299,21 +298,12 @@ void guard_add_hits(World &w, StepContext &step) {
     g.kept.push_back({c.key, c.more, {}, rate, true});
   }
   std::sort(g.kept.begin(), g.kept.end(), precedes);
-  const auto id_b = [&](const ContactPoint &c) {
-    return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  const auto order = [&](const ContactPoint &c) {
+    return std::tuple(c.more > 0, of_one_body(c), w.bodies[c.slot_a]->id, c.obstacle, id_of_b(w, c), c.kind,
+                      c.type_a, c.feature_a, c.feature_b, c.key, c.more);
   };
-  std::sort(step.contacts.begin(), step.contacts.end(), [&](const ContactPoint &l, const ContactPoint &r) {
-    if ((l.more > 0) != (r.more > 0)) return r.more > 0;
-    if (of_one_body(l) != of_one_body(r)) return of_one_body(r);
-    if (l.slot_a != r.slot_a) return w.bodies[l.slot_a]->id < w.bodies[r.slot_a]->id;
-    if (l.obstacle != r.obstacle) return l.obstacle < r.obstacle;
-    if (l.slot_b != r.slot_b) return id_b(l) < id_b(r);
-    if (l.kind != r.kind) return l.kind < r.kind;
-    if (l.type_a != r.type_a) return l.type_a < r.type_a;
-    if (l.feature_a != r.feature_a) return l.feature_a < r.feature_a;
-    if (l.feature_b != r.feature_b) return l.feature_b < r.feature_b;
-    return l.key != r.key ? l.key < r.key : l.more < r.more;
-  });
+  std::sort(step.contacts.begin(), step.contacts.end(),
+            [&](const ContactPoint &l, const ContactPoint &r) { return order(l) < order(r); });
 }
 
 void guard_impulses(StepContext &step) {

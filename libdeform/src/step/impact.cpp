@@ -12,6 +12,8 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/messages.h"
+#include "step/sides.h"
 #include "step/solve/restitution.h"
 #include "step/stages.h"
 
@@ -65,15 +67,14 @@ void warn_impact(World &w, const StepContext &step, const Body &b, double speed)
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
     const double normal = step.rows.impulse[size_t(3) * i];
-    if ((c.slot_a != b.slot && (c.obstacle || c.slot_b != b.slot)) || !(normal > most)) continue;
+    if (!is_side(c, b.slot) || !(normal > most)) continue;
     most = normal;
     at = &c;
   }
   if (!at) return;
   w.integrator_times.reported_impact = true;
-  const std::string &other = at->obstacle           ? w.obstacles[at->slot_b]->name
-                             : at->slot_a != b.slot ? w.bodies[at->slot_a]->name
-                                                    : w.bodies[at->slot_b]->name;
+  const uint64_t a = w.bodies[at->slot_a]->id;
+  const std::string &other = name_of(w, a == b.id ? id_of_b(w, *at) : a);
   w.context->logf(
       DFM_LOG_WARNING,
       "body '%s' falls on '%s' at %.3g m/s (t = %.4g s) and will not rebound: %s; give the pair a "

@@ -8,7 +8,8 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/rigid/tool_touch.h"
-#include "step/solve/bristles.h"
+#include "step/sides.h"
+#include "step/solve/friction_memory.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "step/watch/pair_energy.h"
@@ -88,7 +89,7 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   const bool stick = l[0] > 0 && step.state.mode[i] == 1;
   to.key[i] = c.key;
   to.id_a[i] = w.bodies[c.slot_a]->id;
-  to.id_b[i] = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+  to.id_b[i] = id_of_b(w, c);
   to.law[i] = step.state.law[i];
   store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
   store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
@@ -123,8 +124,7 @@ void book_friction(World &w, const StepContext &step) {
     const ContactPoint &c = step.contacts[i];
     const double *const l = &step.rows.impulse[size_t(i) * 3];
     if (l[1] == 0 && l[2] == 0) continue;
-    const uint64_t b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
-    work_of(w, {w.bodies[c.slot_a]->id, b, c.obstacle != 0}).friction +=
+    work_of(w, {w.bodies[c.slot_a]->id, id_of_b(w, c), c.obstacle != 0}).friction +=
         l[1] * step.state.vt[i] + l[2] * step.state.vt[step.state.stride + i];
   }
 }
@@ -140,7 +140,7 @@ uint32_t join_rows(StepContext &step) {
                  to = size_t(std::find_if(step.contacts.begin(), end, is_same) - step.contacts.begin());
     const double *const f = &step.rows.frame[9 * from], *const t = &step.rows.frame[9 * to];
     double *const l = &step.rows.impulse[3 * from], *const sum = &step.rows.impulse[3 * to];
-    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    const Vec3 p = from_frame(f, l);
     for (size_t k = 0; k < 3; ++k) sum[k] += dot(load3(t + 3 * k), p);
     std::fill_n(l, 3, 0.0);
   }

@@ -27,6 +27,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/solve/cut_drag.h"
+#include "step/solve/tolerance.h"
 #include "step/stages.h"
 
 namespace dfm {
@@ -216,7 +217,7 @@ void stage_sleep(World &w, StepContext &step) {
   join_attached(w, [](const Body &b) { return !b.sleep_state.asleep; });
   step.islands.finish();
   step.stirred.assign(step.islands.count, 0);
-  const double creep = w.def.contact_tolerance > 0 ? w.def.contact_tolerance : 1e-6;
+  const double creep = tangent_at_rest(w, step.h);
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
     if (!(b.sleep_state.quiet_time >= w.def.sleep_time && rest_start(b) <= end))

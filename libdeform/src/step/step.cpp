@@ -21,6 +21,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/impact.h"
+#include "step/messages.h"
 #include "step/move_obstacles.h"
 #include "step/overlap/overlap.h"
 #include "step/rigid/tools.h"
@@ -166,10 +167,9 @@ dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
 }
 // The bound has fallen so far within the step that the rest of it needs too many.
 dfm_status refuse_rest(World &w, double goal) {
-  set_last_error(format("step %llu: the shape of body '%s' has changed so much that the rest of the "
+  set_last_error(format("%s: the shape of body '%s' has changed so much that the rest of the "
                         "step needs %g sub-steps of %g s (max_substeps %u); take a shorter step",
-                        static_cast<unsigned long long>(w.step_count),
-                        w.bound.body ? w.bound.body->name.c_str() : "?",
+                        at_step(w).c_str(), w.bound.body ? w.bound.body->name.c_str() : "?",
                         std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)
                      .c_str());
   return DFM_E_DIVERGED;

@@ -7,14 +7,15 @@
 
 #include "core/error.h"
 #include "dynamics/symplectic_euler.h"
+#include "math/elementary.h"
 #include "mesh/cells.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/spring.h"
 #include "state/world.h"
-#include "step/first_failure.h"
+#include "step/by_body.h"
+#include "step/sides.h"
 #include "step/stages.h"
-#include "math/elementary.h"
 
 namespace dfm {
 
@@ -107,18 +108,10 @@ bool query_bound(const World &w, Body &b) {
   return true;
 }
 
-// By the stored contacts, so that a restored world has the same bound.
 void find_near(World &w) {
   if (!any_bounds_contact(w)) return;
   for (auto &b : w.bodies) b->bound.near = false;
-  const auto mark = [&](uint64_t id) {
-    if (const uint32_t i = slot_of(w, id); i != kNone) w.bodies[i]->bound.near = true;
-  };
-  for (uint32_t m = 0; m < w.store.n; ++m)
-    for (const uint64_t id : {w.store.id_a[m], w.store.id_b[m]}) mark(id);
-  for (const Attachment &a : w.attachments)
-    for (const uint64_t id : {a.body, a.to})
-      if (!a.released) mark(id);
+  each_body_held(w, [&](uint32_t i) { w.bodies[i]->bound.near = true; });
 }
 
 // Who sleeps keeps what it had.

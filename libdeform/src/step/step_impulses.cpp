@@ -5,6 +5,7 @@
 
 #include "state/obstacle.h"
 #include "state/world.h"
+#include "step/sides.h"
 
 namespace dfm {
 namespace {
@@ -63,13 +64,12 @@ void add(const World &w, double at, double time, Array<StepImpulses::Pair> &pair
     const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
     if (!(l[0] > 0)) continue;
     const ContactPoint &c = w.report.contacts[i];
-    uint64_t a = w.bodies[c.slot_a]->id, b = c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
+    uint64_t a = w.bodies[c.slot_a]->id, b = id_of_b(w, c);
     const bool turned = !c.obstacle && b < a;
     if (turned) std::swap(a, b);
     if (!pair || pair->a != a || pair->b != b) pair = &pair_of(pairs, a, b);
     const double normal = scale * l[0];
-    if (a != b)
-      pair->now += (turned ? -scale : scale) * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
+    if (a != b) pair->now += (turned ? -scale : scale) * from_frame(f, l);
     pair->now_normal += normal;
     pair->place += normal * load3(c.point);
   }

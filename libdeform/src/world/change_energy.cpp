@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/error.h"
-#include "step/watch/change_work.h"
+#include "step/watch/energy_watch.h"
 #include "world/measure.h"
 
 namespace dfm {

@@ -1,7 +1,7 @@
 // Limit on the energy that changes of its model may add to a body (doc/concepts/changing_models.md). A change
 // keeps positions and velocities, so the elastic energy jumps, and repeated changes back and forth could pump
 // energy. The added energy counts until the body has lost as much; its loss is the work done on it from
-// outside (step/watch/change_work.h) minus the growth of its energy.
+// outside (step/watch/energy_watch.h) minus the growth of its energy.
 #pragma once
 #include "state/body.h"
 

@@ -554,7 +554,7 @@ class Settling {
   double tolerance_ = kLeft;
   uint32_t most_ = kSteps;
   std::vector<One> bodies_;
-  std::vector<unsigned char> before_;
+  std::string before_;
   dfm_world_stats stats_{};
   uint64_t steps_ = 0;
   StepSizes sizes_;

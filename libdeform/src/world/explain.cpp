@@ -10,6 +10,7 @@
 #include "state/tool.h"
 #include "step/context.h"
 #include "step/impact.h"
+#include "step/messages.h"
 #include "step/step_bound.h"
 #include "step/watch/energy_watch.h"
 #include "world/body_effects.h"
@@ -188,7 +189,7 @@ std::string attachments(const Body &b) {
   std::vector<std::string> rows;
   const auto name = [&](const Attachment &a) -> const std::string & {
     const World &w = *b.world;
-    return a.obstacle ? w.obstacles[obstacle_slot_of(w, a.to)]->name : w.bodies[slot_of(w, a.to)]->name;
+    return name_of(w, a.to);
   };
   for (const Attachment &a : b.world->attachments)
     if (a.body == b.id && !a.released)

@@ -35,7 +35,10 @@ struct Guard {
     dfm::GuardScene requested = test::guard_scene(scene.bodies, end, kFloor, kMargin);
     std::vector<uint32_t> which(all.size());
     std::iota(which.begin(), which.end(), 0u);
-    return dfm::guard_pairs(requested, all, which, hits);
+    dfm::guard_pairs(requested, all, which, hits);
+    double least = 1;
+    for (const dfm::GuardHit &hit : hits) least = std::min(least, hit.safe);
+    return least;
   }
   // Least distance of all pairs at t, by the tests' own arithmetic.
   double least(double t) const {

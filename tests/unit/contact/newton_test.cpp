@@ -133,7 +133,8 @@ void expect_law(const AllKinds &p, double mu) {
   }
 }
 
-// Nearly contradictory rows may miss by a few tolerances (NewtonSettings::contradiction): `required` is 1.
+// Nearly contradictory rows may miss by a few tolerances (kContradiction in contact/newton.cpp): `required`
+// is 1.
 void expect_solved(const Island &p) {
   p.expect_conditions(p.newton.residual().required < 1 ? Island::kTolerance : 20 * Island::kTolerance);
   EXPECT_LE(p.unbalanced(), 2 * Island::kTolerance);

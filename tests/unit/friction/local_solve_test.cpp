@@ -77,7 +77,7 @@ TEST(LocalSolve, AnyStiffnessAndStep_MeetsTheRadialReturn) {
       }
       const dfm::RowRun contacts{0, n};
       batches.gather({&law}, {&contacts, 1}, s);
-      EXPECT_TRUE(batches.smooth());
+      EXPECT_TRUE(batches.has_smooth());
       ASSERT_EQ(batches.evaluate_local(h, wt.data(), 1e-8, 1e-4, s), nullptr);
       for (uint32_t i = 0; i < n; ++i) {
         const auto expected = by_hand(cases[i], sigma0, h);

@@ -11,7 +11,6 @@
 #include "state/world.h"
 #include "step/held_in.h"
 #include "step/overlap/overlap_sides.h"
-#include "step/overlap/untangle.h"
 
 namespace dfm {
 

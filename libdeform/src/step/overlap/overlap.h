@@ -2,6 +2,7 @@
 // pose or snapshot is set. Searched once each time, not in every step; doc/concepts/overlaps.md.
 #pragma once
 #include <cstdint>
+#include <vector>
 
 #include "state/overlaps.h"
 
@@ -18,6 +19,11 @@ void resolve_overlaps(World &w);
 void place_piece(World &w, uint64_t id);
 // Before a step: includes separated pairs in contact again.
 void release_overlaps(World &w);
+// Puts things that are through each other apart before a step is taken: moves bodies as they are, without
+// turning or bending them, so that no elastic energy and no velocity comes of it, until nothing of `found`
+// overlaps any more, or not at all where it finds no way (doc/decisions/detection_and_guard.md). Marks in
+// `found` what is apart now.
+void untangle(World &w, std::vector<Overlap> &found);
 // In prepare(), after the filter has been rebuilt.
 void keep_suspended(World &w);
 

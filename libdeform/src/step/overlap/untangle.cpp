@@ -1,4 +1,4 @@
-#include "step/overlap/untangle.h"
+#include "step/overlap/overlap.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,5 +1,4 @@
 // The two stages of rigid bodies around the solve: motion without contact, and the end with contact.
-#include "state/bounds.h"
 #include "step/rigid/rigid.h"
 
 #include <algorithm>
@@ -8,9 +7,11 @@
 #include "body/obstacle_mesh.h"
 #include "core/error.h"
 #include "math/turn.h"
+#include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/messages.h"
 #include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 
@@ -24,9 +25,8 @@ bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, ui
   *trouble |= DFM_TROUBLE_PLUGIN;
   const std::string why =
       said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
-  set_last_error(format("step %llu, rigid body '%s' and those with it: host '%s' %s; %s",
-                        static_cast<unsigned long long>(w.step_count), set.defs[0].name,
-                        set.host_name.c_str(), fault.what, why.c_str())
+  set_last_error(format("%s, rigid body '%s' and those with it: host '%s' %s; %s", at_step(w).c_str(),
+                        set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str())
                      .c_str());
   return false;
 }
@@ -38,6 +38,8 @@ Obstacle &rigid_obstacle(World &w, uint64_t id) {
     if (o->id == id) return *o;
   fail(DFM_E_FATAL, "a rigid body has lost its shape");
 }
+
+bool is_moved(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
 
 Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
   return o.added ? load_pose(s) * o.local : load_pose(s);
@@ -70,12 +72,10 @@ void place_rigids(World &w) {
     for (uint32_t i = 0; i < set->defs.size(); ++i)
       if (const uint32_t g = set->group[i]; g != DFM_RIGID_STILL)
         step.rigid_members[step.rigid_first[set->first_group + g] + set->place[i]] = {set.get(), i};
-  for (auto &o : w.obstacles) {
-    if (!o->rigid) continue;
-    const uint32_t g = o->rigid->group[o->rigid_body];
-    if (g != DFM_RIGID_STILL)
-      step.rigid_places[o->slot] = {o->rigid->first_group + g, o->rigid->place[o->rigid_body], {}};
-  }
+  for (auto &o : w.obstacles)
+    if (is_moved(*o))
+      step.rigid_places[o->slot] = {
+          o->rigid->first_group + o->rigid->group[o->rigid_body], o->rigid->place[o->rigid_body], {}};
 }
 
 bool query_rigids(World &w, uint32_t *trouble) {
@@ -92,7 +92,7 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
   if (!step.tools->begin(w, step)) return false;
   for (auto &set : w.rigid_sets) set->first.assign(set->velocity.begin(), set->velocity.end());
   for (auto &o : w.obstacles) {
-    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    if (!is_moved(*o)) continue;
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
     ObstacleView &view = step.obstacle_views[o->slot];
@@ -154,7 +154,7 @@ void sum_rigid_impulses(World &w, StepContext &step) {
     if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
     const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
     const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
-    const Vec3 p = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
+    const Vec3 p = from_frame(f, l);
     double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
     store3(to, load3(to) - p);
     store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
@@ -228,7 +228,7 @@ Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   reserve_reports(w, step);
   // From here on (guard) their true motion is used.
   for (auto &o : w.obstacles) {
-    if (!o->rigid || o->rigid->group[o->rigid_body] == DFM_RIGID_STILL) continue;
+    if (!is_moved(*o)) continue;
     const Pose from = shape_pose(*o, o->rigid->state[o->rigid_body]);
     const Pose to = shape_pose(*o, o->rigid->next[o->rigid_body]);
     step.obstacle_views[o->slot].velocity = (1 / step.h) * (to.position - from.position);
@@ -271,8 +271,7 @@ dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
 
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   RigidSet &set = *o.rigid;
-  if (set.group[o.rigid_body] == DFM_RIGID_STILL)
-    fail(DFM_E_ARG, "rigid body '%s' is fixed and cannot be moved", o.name.c_str());
+  if (!is_moved(o)) fail(DFM_E_ARG, "rigid body '%s' is fixed and cannot be moved", o.name.c_str());
   if (!finite_values({&given, 1}))
     fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
   check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);

@@ -13,6 +13,10 @@ struct StepContext;
 struct World;
 struct Obstacle;
 
+// Of a body with this velocity and spin [6], at an arm from its center.
+inline Vec3 velocity_at(const double *v, Vec3 arm) { return load3(v) + cross(load3(v + 3), arm); }
+inline void add3(double *to, Vec3 by) { store3(to, load3(to) + by); }
+
 // Throws Error; then the world is unchanged. out: [nbody] handles.
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);
 void destroy_rigids(RigidSet &set);  // throws Error if the host owns its bodies
@@ -27,6 +31,7 @@ bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool 
 void restart_rigids(World &w, StepContext &step);  // then, once the rows are finished again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);  // of the body that the shape belongs to
+bool is_moved(const Obstacle &o);                                 // the shape of a body that its host moves
 // pose of a body's shape for this state of the body
 Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);
 Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def);

@@ -14,6 +14,7 @@
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/context.h"
+#include "step/rigid/rigid.h"
 #include "step/rigid/tool_touch.h"
 
 namespace dfm {
@@ -24,13 +25,11 @@ constexpr double kSlow = 5e-4;    // m in a sub-step: what moves by less is kept
 constexpr uint32_t kLooks = 16;   // pieces of an edge whose ends are tested
 // Whether the bounding spheres of the two, or that of one and a plane, do not meet.
 bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
-  const auto reach = [](const ObstacleView &v) {
-    return v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
-  };
   if (a.shape == Shape::plane && b.shape == Shape::plane) return true;
-  if (a.shape == Shape::plane) return dot(rotate(a.rotation, {0, 0, 1}), b.position - a.position) > reach(b);
+  if (a.shape == Shape::plane)
+    return dot(rotate(a.rotation, {0, 0, 1}), b.position - a.position) > ball_around(b);
   if (b.shape == Shape::plane) return balls_apart(b, a);
-  const double far = reach(a) + reach(b);
+  const double far = ball_around(a) + ball_around(b);
   return norm2(a.position - b.position) > far * far;
 }
 
@@ -167,7 +166,7 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
     if (!inside(shape_a, shape_b, deep)) continue;
     reported_.push_back({pair.id[0], pair.id[1]});
     if (!corners) {
-      const Obstacle &body = a.rigid && a.rigid->group[a.rigid_body] != DFM_RIGID_STILL ? a : b;
+      const Obstacle &body = is_moved(a) ? a : b;
       w.context->logf(
           DFM_LOG_WARNING,
           "the center of '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because rigid "
@@ -176,9 +175,7 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
           body.name.c_str(), deep, (&body == &a ? b : a).name.c_str(), w.time);
       continue;
     }
-    const auto held = [](const Obstacle &o) {
-      return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL && o.rigid->host_name != "builtin";
-    };
+    const auto held = [](const Obstacle &o) { return is_moved(o) && o.rigid->host_name != "builtin"; };
     const Obstacle &body = held(a) ? a : b, &other = held(a) ? b : a;
     w.context->logf(DFM_LOG_WARNING,
                     "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because host '%s' "

@@ -4,14 +4,13 @@
 #include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
 #include "step/context.h"
+#include "step/rigid/rigid.h"
 #include "step/rigid/tool_touch.h"
 
 namespace dfm {
 namespace {
 
 constexpr double kJaw = 1e4;  // N/m, of a jaw at its tip
-
-void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
 }  // namespace
 
@@ -81,8 +80,8 @@ void ToolTouch::turn_jaws() {
       const Vec3 arm = load3(s.position) - load3(frame.position), now = rotate(by, arm);
       store3(s.position, load3(frame.position) + now);
       store_quat(s.rotation, by * load_quat(s.rotation));
-      add((1 / h_) * (now - arm), s.velocity);
-      add(rate * axis, s.spin);
+      add3(s.velocity, (1 / h_) * (now - arm));
+      add3(s.spin, rate * axis);
     }
 }
 

@@ -191,9 +191,10 @@ void ToolTouch::renew(const RigidSet &set) {
 
 // Where motors hold against rows: their places give less.
 bool ToolTouch::press_harder() {
-  if (strong_ < kMaxStrong || std::none_of(
-                                  rows_.begin(), rows_.end(),
-                                  [](const Row &row) { return !row.jaw && row.soft > 0 && row.impulse > 0; }))
+  if (strong_ < kMaxStrong ||
+      std::none_of(
+          rows_.begin(), rows_.end(),
+          [](const Row &row) { return !row.pair->jaw && row.soft > 0 && row.impulse > 0; }))
     return false;
   strong_ *= kStronger;
   renew_rows();

@@ -9,6 +9,8 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/messages.h"
+#include "step/rigid/rigid.h"
 #include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
@@ -21,33 +23,27 @@ namespace {
 // bodies do (step/keep_contacts.cpp).
 constexpr double kApart = 0.1;
 
-bool is_moved(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
-
 }  // namespace
 
 // Whether the first of the two is side b of reports.
 bool ToolTouch::b_first(const Obstacle &a, const Obstacle &b) { return is_moved(b) && !is_moved(a); }
 
 std::string ToolTouch::row_names(const World &w, uint32_t row) const {
-  const auto name = [&](uint64_t id) {
-    const auto at =
-        std::find_if(w.obstacles.begin(), w.obstacles.end(), [&](const auto &o) { return o->id == id; });
-    return at == w.obstacles.end() ? std::string() : (*at)->name;
-  };
-  const Row &r = rows_[row];
-  return format("'%s' and '%s'", name(r.pair[0]).c_str(), name(r.pair[1]).c_str());
+  const uint64_t *const ids = rows_[row].pair->id;
+  return format("'%s' and '%s'", name_of(w, ids[0]).c_str(), name_of(w, ids[1]).c_str());
 }
 
 // Seen from the other side the normal and the first tangent are the opposite ones, and the second tangent,
 // their product, stays: forces, slips and deflections change their sign along it alone.
 void ToolTouch::list_contact(const World &w, uint32_t i, const ContactState &state, uint32_t first) {
   const Row &row = rows_[i];
-  const double side = row.b_first ? -1 : 1;
+  const Pair &pair = *row.pair;
+  const double side = pair.b_first ? -1 : 1;
   const Vec3 v = slip(row);
   RigidContact c{};
   c.key = row.key;
-  c.a = row.pair[row.b_first];
-  c.b = row.pair[!row.b_first];
+  c.a = pair.id[pair.b_first];
+  c.b = pair.id[!pair.b_first];
   c.point = row.at;
   c.normal = side * row.normal;
   c.tangent = side * row.tangent[0];
@@ -57,10 +53,10 @@ void ToolTouch::list_contact(const World &w, uint32_t i, const ContactState &sta
   c.slip[0] = dot(row.tangent[0], v);
   c.slip[1] = side * dot(row.tangent[1], v);
   c.gap = row.gap - offset_;
-  c.law = row.law;
+  c.law = pair.law;
   c.sticks = row.response > 0 && state.mode[first + i] == 1;
   c.began = match_[i] == kNone;
-  for (size_t s = 0; s < std::min<size_t>(2, w.pairs.laws[row.law]->nstate); ++s)
+  for (size_t s = 0; s < std::min<size_t>(2, w.pairs.laws[pair.law]->nstate); ++s)
     c.bristle[s] = (s == 1 ? side : 1) * state.bristle_out[s * state.stride + first + i];
   next_report_.contacts.push_back(c);
 }
@@ -81,7 +77,7 @@ void ToolTouch::list_contacts(const World &w, const ContactState &state, uint32_
   to.touching.reserve(rows_.size());
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     const Row &row = rows_[i];
-    const RigidPair pair{row.pair[row.b_first], row.pair[!row.b_first]};
+    const RigidPair pair{row.pair->id[row.pair->b_first], row.pair->id[!row.pair->b_first]};
     if (row.impulse > 0) list_contact(w, i, state, first);
     else if (!(row.gap - offset_ < kApart * offset_) ||
              !std::binary_search(before.begin(), before.end(), pair))

@@ -7,6 +7,7 @@
 #include "dynamics/rigid/rigid_set.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/rigid/rigid.h"
 #include "step/rigid/tool_touch.h"
 
 namespace dfm {
@@ -122,15 +123,12 @@ void ToolTouch::set_arcs(const Row &row, ContactRows &to, uint32_t r) const {
 }
 
 void ToolTouch::fill_row(const Row &row, ContactRows &to, uint32_t r) const {
-  const auto at = [&](const Side &side) {
-    const double *const v = first_of(side);
-    return load3(v) + cross(load3(v + 3), side.arm);
-  };
+  const auto at = [&](const Side &side) { return velocity_at(first_of(side), side.arm); };
   const Vec3 without = at(row.a) - at(row.b);
   store3(&to.drive[3 * size_t{r}],
          {-(dot(row.normal, without) + row.lift), -dot(row.tangent[0], without + row.bend),
           -dot(row.tangent[1], without + row.bend)});
-  if (row.frees) set_arcs(row, to, r);
+  if (row.pair->frees) set_arcs(row, to, r);
   store3(&to.impulse[3 * size_t{r}], {row.impulse, row.along[0], row.along[1]});
   to.rate[r] = -row.rate;
   to.wn[r] = 1 / row.inverse;
@@ -143,7 +141,7 @@ void ToolTouch::fill_row(const Row &row, ContactRows &to, uint32_t r) const {
 
 void ToolTouch::put(ContactRows &to, ContactState &state) const {
   if (rows_.empty()) return;
-  if (std::any_of(rows_.begin(), rows_.end(), [](const Row &row) { return row.frees; }))
+  if (std::any_of(rows_.begin(), rows_.end(), [](const Row &row) { return row.pair->frees; }))
     for (Array<double> *arc : {&to.arc, &to.arc_a}) arc->assign(9 * size_t{to.all()}, 0.0);
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     const uint32_t r = to.soft() + i;

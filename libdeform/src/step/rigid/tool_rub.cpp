@@ -34,7 +34,7 @@ uint64_t ToolTouch::key_of(const uint64_t pair[2], Name name) {
 void ToolTouch::take_last(const World &w, const StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(rows_.size());
   uint32_t nstate = 0;
-  for (const Row &row : rows_) nstate = std::max(nstate, w.pairs.laws[row.law]->nstate);
+  for (const Row &row : rows_) nstate = std::max(nstate, w.pairs.laws[row.pair->law]->nstate);
   state_.resize(n, nstate);
   points_.assign(n, {});
   tangents_.resize(3 * size_t{n});
@@ -42,7 +42,7 @@ void ToolTouch::take_last(const World &w, const StepContext &step) {
   for (uint32_t i = 0; i < n; ++i) {
     points_[i].key = rows_[i].key;
     store3(points_[i].normal, rows_[i].normal);
-    state_.law[i] = rows_[i].law;
+    state_.law[i] = rows_[i].pair->law;
     state_.area[i] = kArea;
   }
   warm_start(w.tool_store, points_, h_, start_, state_, tangents_.data(), match_.data());
@@ -102,7 +102,7 @@ void ToolTouch::drop_bad_starts(const StepContext &step) {
     if (StartSpeeds *const s = speeds_of(row)) {
       const Vec3 belts = belt(row.a) - belt(row.b);
       s->with = std::max(s->with, norm(speed(row) + belts));
-      s->without = std::max(s->without, norm(free_speed(row) + belts) + std::fabs(row.rate));
+      s->without = std::max(s->without, norm(speed(row, &Moved::free) + belts) + std::fabs(row.rate));
     }
   bool any = false;
   for (Row &row : rows_)
@@ -133,14 +133,14 @@ void ToolTouch::keep_next(const ContactState &state, uint32_t first) {
     const Row &row = rows_[i];
     if (!(row.impulse > 0)) continue;
     to.key[n] = row.key;
-    to.id_a[n] = row.pair[0];
-    to.id_b[n] = row.pair[1];
+    to.id_a[n] = row.pair->id[0];
+    to.id_b[n] = row.pair->id[1];
     store3(&to.normal[3 * size_t{n}], row.normal);
     store3(&to.tangent[3 * size_t{n}], row.tangent[0]);
     store3(&to.impulse[3 * size_t{n}], {row.impulse, row.along[0], row.along[1]});
     for (uint32_t s = 0; s < to.nstate; ++s)
       to.bristle[size_t{to.nstate} * n + s] = state.bristle_out[size_t{s} * state.stride + first + i];
-    to.law[n] = row.law;
+    to.law[n] = row.pair->law;
     to.dwell[n] = state_.dwell[i] + h_;
     to.area[n] = kArea;
     to.touching[n] = 1;

@@ -12,6 +12,11 @@ namespace dfm {
 
 struct ObstacleMesh;
 
+// m, from its position to no point of it; not of a plane
+inline double ball_around(const ObstacleView &v) {
+  return v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
+}
+
 // Axis-parallel.
 struct ToolBox {
   Vec3 lo, hi;

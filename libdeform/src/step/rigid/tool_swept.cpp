@@ -159,13 +159,11 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
     const ObstacleView &v = step.obstacle_views[o.slot];
     Way out;
     out.from = {v.position, v.rotation};
-    const bool free = o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL;
-    out.to = free ? shape_pose(o, o.rigid->next[o.rigid_body])
-                  : Pose{v.position + step.h * v.velocity, turned(v.rotation, step.h * v.spin)};
+    out.to = is_moved(o) ? shape_pose(o, o.rigid->next[o.rigid_body])
+                         : Pose{v.position + step.h * v.velocity, turned(v.rotation, step.h * v.spin)};
     const double turn = norm(rotation_vector(out.to.rotation * conjugate(out.from.rotation)));
     out.most = norm(out.to.position - out.from.position);
-    const double reach = v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
-    if (turn > 0 && v.shape != Shape::plane && v.shape != Shape::sphere) out.most += turn * reach;
+    if (turn > 0 && v.shape != Shape::plane && v.shape != Shape::sphere) out.most += turn * ball_around(v);
     return out;
   };
   ways_.resize(w.obstacles.size());
@@ -173,7 +171,7 @@ bool ToolTouch::stays_out(const World &w, StepContext &step) {
   for (size_t i = 0; i < ways_.size(); ++i) {
     const Obstacle &o = *w.obstacles[i];
     const ObstacleView &v = step.obstacle_views[o.slot];
-    const bool goes = (o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL) || v.moves();
+    const bool goes = is_moved(o) || v.moves();
     ways_[i] = goes && ToolShape::takes_part(v) ? way_of(o).most : 0;
     most = std::max(most, ways_[i]);
   }

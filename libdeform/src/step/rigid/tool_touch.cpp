@@ -1,3 +1,4 @@
+#include "step/rigid/rigid.h"
 #include "step/rigid/tool_touch.h"
 
 #include <algorithm>
@@ -37,9 +38,9 @@ bool of_tool(const Obstacle &o) { return o.rigid && o.rigid->of_tool; }
 bool is_jaw(const Obstacle &o) { return of_tool(o) && o.rigid_body > 0; }
 
 // Whether contact moves it, as far as its joints allow.
-bool is_free(const Obstacle &o) { return builtin(o) && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
+bool is_free(const Obstacle &o) { return builtin(o) && is_moved(o); }
 // Does not yield, whatever touches it.
-bool is_wall(const Obstacle &o) { return !o.rigid || o.rigid->group[o.rigid_body] == DFM_RIGID_STILL; }
+bool is_wall(const Obstacle &o) { return !is_moved(o); }
 
 // Whether the rows of this file keep the two apart, filters aside.
 bool kept_apart(const Obstacle &a, const Obstacle &b) {
@@ -82,8 +83,6 @@ Vec3 nearest_turn(Vec3 turn, Vec3 like) {
   const Vec3 axis = angle > 1e-6 ? (1 / angle) * turn : (1 / length) * like;
   return turn + kWhole * std::round((dot(axis, like) - dot(axis, turn)) / kWhole) * axis;
 }
-
-void add(Vec3 p, double *to) { store3(to, load3(to) + p); }
 
 // Whether a rigid body of another host passes through something, because neither this file nor its host keeps
 // the two apart. A host with a world of its own knows what is in that world.
@@ -166,18 +165,10 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
           mesh->make_tree(w.meters.obstacles.memory());
 }
 
-Vec3 ToolTouch::speed(const Row &row) const {
+// Of the places of a row against each other, by these velocities of their bodies.
+Vec3 ToolTouch::speed(const Row &row, const std::vector<double> Moved::*of) const {
   const auto at = [&](const Side &side) {
-    const double *const v = &sides_[side.tool].now[6 * size_t{side.part}];
-    return load3(v) + cross(load3(v + 3), side.arm);
-  };
-  return at(row.a) - at(row.b);
-}
-
-Vec3 ToolTouch::free_speed(const Row &row) const {
-  const auto at = [&](const Side &side) {
-    const double *const v = &sides_[side.tool].free[6 * size_t{side.part}];
-    return load3(v) + cross(load3(v + 3), side.arm);
+    return velocity_at(&(sides_[side.tool].*of)[6 * size_t{side.part}], side.arm);
   };
   return at(row.a) - at(row.b);
 }
@@ -199,8 +190,8 @@ void ToolTouch::add_response(const Side &by, Vec3 impulse, uint32_t body, double
   for (const Moved::Jaw &jaw : m.jaws) {
     if (jaw.part != by.part || body != by.part) continue;
     const double rate = jaw.softness * (dot(jaw.lever, impulse) + dot(jaw.axis, moment));
-    add(rate * jaw.lever, v);
-    add(rate * jaw.axis, v + 3);
+    add3(v, rate * jaw.lever);
+    add3(v + 3, rate * jaw.axis);
   }
 }
 
@@ -210,7 +201,7 @@ Vec3 ToolTouch::response_to(const Row &row, Vec3 impulse) const {
     double v[6] = {};
     for (const Side *by : {&row.a, &row.b})
       if (by->tool == side.tool) add_response(*by, by == &row.a ? impulse : -impulse, side.part, v);
-    return load3(v) + cross(load3(v + 3), side.arm);
+    return velocity_at(v, side.arm);
   };
   return at(row.a) - at(row.b);
 }
@@ -227,8 +218,8 @@ void ToolTouch::add_impulses() const {
       if (!set) continue;
       const Vec3 p = side == &row.a ? row.given() : -row.given();
       double *const to = &set->impulse[6 * size_t{side->part}];
-      add(p, to);
-      add(cross(side->arm, p), to + 3);
+      add3(to, p);
+      add3(to + 3, cross(side->arm, p));
     }
 }
 
@@ -248,15 +239,15 @@ double ToolTouch::follow_spin() {
       if (m.jointed[m.set->group[i]]) {
         const Vec3 goes = load3(m.set->next[i].position) - load3(m.set->state[i].position);
         const Vec3 change = (1 / h_) * goes - load3(&m.now[at - 3]);
-        add(change, &m.now[at - 3]);
-        add(change, &m.turn[at - 3]);
+        add3(&m.now[at - 3], change);
+        add3(&m.turn[at - 3], change);
         most = std::max(most, norm(change));
       }
       const Quat turned = load_quat(m.set->next[i].rotation) * conjugate(load_quat(m.set->state[i].rotation));
       const Vec3 taken = load3(&m.now[at]);
       const Vec3 change = (1 / h_) * nearest_turn(rotation_vector(turned), h_ * taken) - taken;
-      add(change, &m.now[at]);
-      add(change, &m.turn[at]);
+      add3(&m.now[at], change);
+      add3(&m.turn[at], change);
       most = std::max(most, m.reach[i] * norm(change));
       if (m.jointed[m.set->group[i]]) off_ = std::max(off_, h_ * most);
     }
@@ -305,7 +296,8 @@ double ToolTouch::follow_arc(Row &row) const {
   const Vec3 now = bend(row.a, row.b) + belt(row.a) - bend(row.b, row.a) - belt(row.b);
   const double changed = norm(now - row.bend);
   row.bend = now;
-  if (row.frees) row.lift = dot(row.normal, bend(spin(row.a), row.a.bone) - bend(spin(row.b), row.b.bone));
+  if (row.pair->frees)
+    row.lift = dot(row.normal, bend(spin(row.a), row.a.bone) - bend(spin(row.b), row.b.bone));
   return changed;
 }
 
@@ -346,18 +338,13 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   a.bone = pair.jaw ? a.arm : place.bone_a - center(a);
   b.bone = pair.jaw ? b.arm : place.bone_b - center(b);
   Row row{};
+  row.pair = &pair;
   row.a = a;
   row.b = b;
-  row.frees = pair.frees;
-  row.jaw = pair.jaw;
-  row.b_first = pair.b_first;
   row.at = place.at;
   row.gap = gap;
   row.far = gap > kNear * pair.thin;
   row.normal = normal;
-  row.law = pair.law;
-  row.pair[0] = pair.id[0];
-  row.pair[1] = pair.id[1];
   row.key = key_of(pair.id, name);
   if (pair.jaw) {
     row.soft = 1 / (h_ * h_ * kFace);
@@ -378,11 +365,11 @@ void ToolTouch::set_responses(Row &row) {
   const bool held = !(w > rounding_of(row, row.normal));
   row.inverse = row.response = 0;
   row.pressed = pressed;
-  if (!row.jaw) row.soft = held && motor_holds(row) ? softness_of_motor(row) : 0;
+  if (!row.pair->jaw) row.soft = held && motor_holds(row) ? softness_of_motor(row) : 0;
   if (held && !(row.soft > 0)) return;
   row.inverse = 1 / (w + row.soft);
   if (held) return;
-  if (row.frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
+  if (row.pair->frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
   const Vec3 first = response_to(row, row.tangent[0]), second = response_to(row, row.tangent[1]);
   const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
                both = dot(row.tangent[0], second);
@@ -559,7 +546,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
   }
 }
 
-// A corner moves along an arc. The passes of solve() over it converge by a factor of about h w each; from
+// A corner moves along an arc. The rounds of the solve over it converge by a factor of about h w each; from
 // about a radian on they do not, the corner ends inside a floor, and energy is created. False: something that
 // touches turns so far that the sub-step must be repeated, shorter. The arc leaves its tangent by at most (h
 // w)^2 r / 2: what stays farther away than that does not touch. Where places are off by what the passes have
@@ -567,9 +554,9 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
 bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
   double turn = 0, arrives = 1;
   for (const Row &row : rows_) {
-    if (row.jaw) continue;
+    if (row.pair->jaw) continue;
     if (row.far && row.impulse > 0) {
-      const double closes = -h_ * dot(row.normal, free_speed(row)), gap = offset_ - h_ * row.rate;
+      const double closes = -h_ * dot(row.normal, speed(row, &Moved::free)), gap = offset_ - h_ * row.rate;
       arrives = std::min(arrives, closes > gap ? kAims * gap / closes : 0.5);
     }
     double most = 0, leaves = 0;

@@ -57,7 +57,7 @@ class ToolTouch {
   void prepare(World &w, SceneFacts &facts);
 
   // Called before detection: finds the rows of this sub-step, and adds to the sets' velocities what their
-  // impulses of the last one do. Returns false if the sub-step must be repeated, shorter (Guard::again).
+  // impulses of the last one do. Returns false if the sub-step must be repeated, shorter (StepLength).
   bool begin(World &w, StepContext &step);
   // The rows as part of a contact problem: sides of each row, sizes of the groups of bodies that answer each
   // other, by world-wide number. Jaws that move alone have numbers behind those of the hosts' groups.
@@ -107,22 +107,29 @@ class ToolTouch {
     Vec3 arm;   // of the place, from its center
     Vec3 bone;  // of a round shape: of the corner or axis inside; else, and beside a jaw, arm
   };
+  // Two obstacles that may touch, by their places in World::obstacles.
+  struct Pair {
+    uint32_t a, b, law;
+    uint64_t id[2];
+    bool frees, jaw;   // none is of a tool; one is a jaw
+    bool b_first;      // reports have b first
+    uint32_t wall[2];  // number among walls_; kNone: it is in a set
+    double thin;       // m, least thickness of the two
+  };
   struct Row {
+    const Pair *pair;
     Side a, b;
-    uint64_t key, pair[2];    // lasting names: of itself, of the two obstacles
-    Vec3 normal, tangent[2];  // from b to a
-    double rate;              // m/s, that u_n must reach
-    double soft;              // 1/kg, of the face of a jaw
-    double opens;             // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
-    double inverse;           // kg
-    double response;          // 1/kg, the largest one in the tangent plane; 0: does not rub
-    Vec3 pressed;             // 1/kg, the change of velocity by a unit impulse along the normal
-    uint32_t law;
+    uint64_t key;              // lasting name
+    Vec3 normal, tangent[2];   // from b to a
+    double rate;               // m/s, that u_n must reach
+    double soft;               // 1/kg, of the face of a jaw
+    double opens;              // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
+    double inverse;            // kg
+    double response;           // 1/kg, the largest one in the tangent plane; 0: does not rub
+    Vec3 pressed;              // 1/kg, the change of velocity by a unit impulse along the normal
     double impulse, along[2];  // N s on a: along the normal and the tangents
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
-    bool frees, jaw;           // none is of a tool; one is a jaw
     bool far;                  // the gap is large beside the thickness of the two
-    bool b_first;              // reports have b first
     Vec3 at;                   // m, of the place
     double gap;                // m
     double lift;               // m/s, what turning adds to the speed along the normal, of free bodies
@@ -154,15 +161,6 @@ class ToolTouch {
     // to tools and bodies, but not to obstacles: its poses may lead it along a table.
     bool gives(const Obstacle &to) const;
   };
-  // Two obstacles that may touch, by their places in World::obstacles.
-  struct Pair {
-    uint32_t a, b, law;
-    uint64_t id[2];
-    bool frees, jaw;   // none is of a tool; one is a jaw
-    bool b_first;      // reports have b first
-    uint32_t wall[2];  // number among walls_; kNone: it is in a set
-    double thin;       // m, least thickness of the two
-  };
   // Which features of the two meet.
   enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
   struct Name {
@@ -179,8 +177,7 @@ class ToolTouch {
     Vec3 normal;
     double gap;
   };
-  Vec3 speed(const Row &row) const;
-  Vec3 free_speed(const Row &row) const;
+  Vec3 speed(const Row &row, const std::vector<double> Moved::*of = &Moved::now) const;
   void add_response(const Side &by, Vec3 impulse, uint32_t body, double *v) const;
   Vec3 response_to(const Row &row, Vec3 impulse) const;
   void find(const World &w, const StepContext &step);

@@ -8,12 +8,11 @@
 #include "step/context.h"
 #include "step/move_obstacles.h"
 #include "step/rigid/rigid.h"
+#include "step/sides.h"
 #include "step/stages.h"
 
 namespace dfm {
 namespace {
-
-bool feels(const Obstacle &o) { return o.rigid && o.rigid->group[o.rigid_body] != DFM_RIGID_STILL; }
 
 void set_nodes(const StepContext &step, const Attachment &a, size_t i, uint32_t slot_b, Bond &b) {
   const BodyView &other = step.body_views[slot_b];
@@ -62,7 +61,7 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
     if (a.obstacle) {
       b.slot_b = obstacle_slot_of(w, a.to);
       const Obstacle &o = *w.obstacles[b.slot_b];
-      if (feels(o)) {
+      if (is_moved(o)) {
         b.velocity = place_velocity(o, x, step);
       } else if (step.obstacle_views[b.slot_b].moves()) {
         const Pose end = end_pose(w, step, o);
@@ -165,8 +164,7 @@ void drop_attachments(World &w, uint64_t id) {
   for (const Attachment &a : w.attachments) {
     if (!of(a)) continue;
     if (!a.released) add_release(w, a, w.time);
-    for (const uint64_t side : {a.body, a.to})
-      if (const uint32_t slot = slot_of(w, side); slot != kNone) wake(w, *w.bodies[slot]);
+    each_body(w, a, [&](uint32_t slot) { wake(w, *w.bodies[slot]); });
     part(w, a);
   }
   std::erase_if(w.attachments, of);

@@ -10,7 +10,7 @@
 // their middle, in the plane of n,
 //     tan(angle) = sum n . (r x r') / sum r . r'
 // is the rotation of least squares (Kabsch 1976, in the plane); exact for a rigid motion, whatever its size.
-#include "step/solve/bristles.h"
+#include "step/solve/friction_memory.h"
 
 #include <algorithm>
 

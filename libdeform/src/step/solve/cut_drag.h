@@ -1,6 +1,6 @@
 // A tool pays the energy of its cuts along the way that follows, by rows of the contact solve: each is
-// between a point of the body beside the cut and the part of the tool that cuts (contact/bond.h, decision
-// 0402). Both get the impulse at that point.
+// between a point of the body beside the cut and the part of the tool that cuts (contact/bond.h,
+// doc/decisions/cutting.md). Both get the impulse at that point.
 #pragma once
 
 namespace dfm {

@@ -9,6 +9,8 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/held_in.h"
+#include "step/messages.h"
+#include "step/sides.h"
 #include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 
@@ -42,10 +44,7 @@ std::string sides(const World &w, const StepContext &step, uint32_t i) {
   if (i >= step.contacts.size() && w.bodies.empty()) return "rigid things that touch";
   if (i >= step.contacts.size()) return format("body '%s' (the fastest one)", fastest(w).name.c_str());
   const ContactPoint &c = step.contacts[i];
-  if (c.obstacle)
-    return format("body '%s' on obstacle '%s'", w.bodies[c.slot_a]->name.c_str(),
-                  w.obstacles[c.slot_b]->name.c_str());
-  return format("bodies '%s' and '%s'", w.bodies[c.slot_a]->name.c_str(), w.bodies[c.slot_b]->name.c_str());
+  return names_of(w, w.bodies[c.slot_a]->id, id_of_b(w, c));
 }
 
 // The inputs of the law at a contact, and whether all are finite.
@@ -74,8 +73,7 @@ LawInputs law_inputs(const StepContext &step, const LawInstance &law, uint32_t i
 
 uint32_t report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact) {
   const uint32_t at = law ? contact : spoilt(step);
-  const std::string where =
-      format("step %llu, %s", static_cast<unsigned long long>(w.step_count), sides(w, step, at).c_str());
+  const std::string where = at_step(w) + ", " + sides(w, step, at);
   constexpr const char *kDo = "take a smaller step, reduce the loads or change the law";
   const LawInputs in = law && at != kNone ? law_inputs(step, *law, at) : LawInputs{"", true};
   if (!law || !in.is_valid) {
@@ -102,12 +100,11 @@ uint32_t report_jam(World &w, StepContext &step) {
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
   const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
   const std::string held = c && c->obstacle ? describe_held_at(w, c->slot_a, c->slot_b) : std::string();
-  set_last_error(format("step %llu, %s: squeezed until nothing can move; %s",
-                        static_cast<unsigned long long>(w.step_count), sides(w, step, worst).c_str(),
-                        held.empty()
-                            ? "open what closes on it, move that more slowly, or make the body stiffer"
-                            : held.c_str())
-                     .c_str());
+  set_last_error(
+      format("%s, %s: squeezed until nothing can move; %s", at_step(w).c_str(), sides(w, step, worst).c_str(),
+             held.empty() ? "open what closes on it, move that more slowly, or make the body stiffer"
+                          : held.c_str())
+          .c_str());
   return DFM_TROUBLE_UNCONVERGED;
 }
 

@@ -9,6 +9,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/sides.h"
 
 namespace dfm {
 namespace {
@@ -39,13 +40,6 @@ RigidMotion motion_of(const Body &b) {
   return rigid_motion(b.p.n, b.p.mass.data(), at(b.p.x), at(b.p.v));
 }
 
-// act(slot): bodies of a contact.
-template <class Act>
-void each_body(const ContactPoint &c, const Act &act) {
-  act(c.slot_a);
-  if (!c.obstacle) act(c.slot_b);
-}
-
 // Whether all bodies of a contact are marked.
 bool all_marked(const Array<uint8_t> &marked, const ContactPoint &c) {
   return marked[c.slot_a] && (c.obstacle || marked[c.slot_b]);
@@ -56,11 +50,11 @@ bool all_marked(const Array<uint8_t> &marked, const ContactPoint &c) {
 // Bodies meet as they move as a whole: their points tremble, and stop before the body does where a sub-step
 // is short. What gravity makes after the impact is taken off, as in free motion.
 void find_throws(const World &w, StepContext &step) {
-  step.thrown.clear();
+  step.rebound_speed.clear();
   const auto has = [](const LawInstance *law) { return law->restitution > 0; };
   if (std::ranges::none_of(w.pairs.laws, has)) return;
   const ContactRows &rows = step.rows;
-  step.thrown.assign(rows.soft(), 0);
+  step.rebound_speed.assign(rows.soft(), 0);
   step.motions.resize(w.bodies.size());
   step.marked.assign(w.bodies.size(), 0);
   const auto motion = [&](uint32_t slot) -> const RigidMotion & {
@@ -91,17 +85,17 @@ void find_throws(const World &w, StepContext &step) {
     const double response = estimate > 0 ? rows.wn[i] - estimate + whole : rows.wn[i];
     if (!(speed > least) || response > kStiff * whole || gap_of(w, c) > step.h * std::max(speed, closing))
       continue;
-    step.thrown[i] = std::max(0.0, e * speed - std::clamp(closing - speed, 0.0, falls));
+    step.rebound_speed[i] = std::max(0.0, e * speed - std::clamp(closing - speed, 0.0, falls));
   }
 }
 
 void bounce(StepContext &step) {
-  for (uint32_t i = 0; i < step.thrown.size(); ++i)
-    if (step.thrown[i] > 0) step.rows.rate[i] = std::min(step.rows.rate[i], -step.thrown[i]);
+  for (uint32_t i = 0; i < step.rebound_speed.size(); ++i)
+    if (step.rebound_speed[i] > 0) step.rows.rate[i] = std::min(step.rows.rate[i], -step.rebound_speed[i]);
 }
 
 double lands_at(const World &w, StepContext &step) {
-  if (step.thrown.empty()) return 1;
+  if (step.rebound_speed.empty()) return 1;
   const ContactRows &rows = step.rows;
   const auto is_near = [&](const ContactPoint &c) {
     double edge = w.bodies[c.slot_a]->surface.median_edge;
@@ -110,12 +104,12 @@ double lands_at(const World &w, StepContext &step) {
   };
   step.marked.assign(w.bodies.size(), 0);  // touches, or is about to
   for (uint32_t i = 0; i < rows.soft(); ++i)
-    if (rows.impulse[size_t(3) * i] > 0 || (step.thrown[i] > 0 && is_near(step.contacts[i])))
+    if (rows.impulse[size_t(3) * i] > 0 || (step.rebound_speed[i] > 0 && is_near(step.contacts[i])))
       each_body(step.contacts[i], [&](uint32_t slot) { step.marked[slot] = 1; });
   double first = 1;
   for (uint32_t i = 0; i < rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
-    if (!(step.thrown[i] > 0) || is_near(c) || all_marked(step.marked, c)) continue;
+    if (!(step.rebound_speed[i] > 0) || is_near(c) || all_marked(step.marked, c)) continue;
     const double closing = -rows.velocity(i).x * step.h, gap = gap_of(w, c);
     if (closing > gap) first = std::min(first, gap / closing);
   }
@@ -127,7 +121,7 @@ bool has_restitution(const World &w, const StepContext &step, const Body &b) {
   bool any = false;
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
-    if (c.slot_a != b.slot && (c.obstacle || c.slot_b != b.slot)) continue;
+    if (!is_side(c, b.slot)) continue;
     if (!(step.rows.impulse[size_t(3) * i] > 0)) continue;
     if (restitution(w, step, i) == kNoRestitution) return false;
     any = true;

@@ -9,7 +9,7 @@ struct Body;
 struct StepContext;
 struct World;
 
-// Finds step.thrown, m/s, from the rows without contact. Empty: no pair has a restitution.
+// Finds step.rebound_speed, m/s, from the rows without contact. Empty: no pair has a restitution.
 void find_throws(const World &w, StepContext &step);
 // After the rows have been finished.
 void bounce(StepContext &step);

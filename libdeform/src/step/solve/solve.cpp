@@ -13,17 +13,18 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/messages.h"
 #include "step/overlap/overlap.h"
 #include "step/pair_table.h"
 #include "step/rigid/rigid.h"
 #include "step/rigid/tool_touch.h"
+#include "step/sides.h"
 #include "step/solve/attach.h"
-#include "step/solve/bristles.h"
+#include "step/solve/friction_memory.h"
 #include "step/solve/cut_drag.h"
 #include "step/solve/pre_solve.h"
 #include "step/solve/restitution.h"
 #include "step/solve/solve_islands.h"
-#include "step/solve/stuck_slip.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 
@@ -33,10 +34,9 @@ namespace {
 // Responses between the touched surfels of bodies whose points respond to each other's impulses.
 void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
   const Body &b = *w.bodies[block.source];
-  step.block_surfels.resize(block.count);
-  for (uint32_t k = 0; k < block.count; ++k) step.block_surfels[k] = step.rows.point[block.first + k];
+  const uint32_t *const surfels = &step.rows.point[block.first];
   step.rows.set_responses(block, [&](double *responses) {
-    if (!b.dynamics->response(sub_step_of(w, step), block.count, step.block_surfels.data(), responses))
+    if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
       fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
            b.model.type->id, b.name.c_str());
   });
@@ -68,6 +68,20 @@ double left_of_pair(const ContactStore &store, uint64_t a, uint64_t b, double mo
   return left < 0 ? most : left;
 }
 
+// Once the responses are known.
+void finish_frames(World &w, StepContext &step) {
+  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.length.planned, w.offset, step.bonds,
+                   &w.context->tasks);
+  run_belts(step);
+}
+
+void finish_rates(const World &w, StepContext &step) {
+  bounce(step);
+  if (!step.guard.kept.empty()) guard_rates(step);
+  // an equilibrium has no velocity that an opening could leave
+  if (!w.prescribed.is_static()) step.rows.soften_openings(step.rebound_speed);
+}
+
 }  // namespace
 
 // Of bodies that are set on each other, or by up to d_c into each other. No motion has made this depth, so
@@ -97,7 +111,8 @@ void report_impulses(StepContext &step) {
 void make_rows(World &w, StepContext &step) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
   const bool again = step.rigid_again || step.guard.resolving;
-  if (step.rigid_again) step.best_impulse.assign(step.rows.impulse.begin(), step.rows.impulse.end());
+  if (step.rigid_again)
+    step.impulse_before_rebuild.assign(step.rows.impulse.begin(), step.rows.impulse.end());
   make_bonds(w, step, again);
   make_cut_drags(w, step, again);
   const std::span<const RigidSides> between_rigids = step.tools->sides(step);
@@ -141,34 +156,20 @@ void make_rows(World &w, StepContext &step) {
   share_areas(w, step);
   fit_bristles(w, step);
   step.rows.recovery = w.def.recovery_speed;
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.length.planned, w.offset, step.bonds,
-                   &w.context->tasks);
-  run_belts(step);
+  finish_frames(w, step);
   find_throws(w, step);
-  bounce(step);
+  finish_rates(w, step);
   reset_stick_drift(w, step);
   std::copy(step.bond_impulse.begin(), step.bond_impulse.end(),
             step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n);
   if (step.guard.resolving) guard_impulses(step);
-  if (!step.guard.kept.empty()) guard_rates(step);
-  if (step.rigid_again) std::copy_n(step.best_impulse.begin(), 3 * size_t{n}, step.rows.impulse.begin());
+  if (step.rigid_again)
+    std::copy_n(step.impulse_before_rebuild.begin(), 3 * size_t{n}, step.rows.impulse.begin());
   step.tools->put(step.rows, step.state);
   step.solve_islands->find(w, step);
-  // an equilibrium has no velocity that an opening could leave
-  if (!w.prescribed.is_static()) step.rows.soften_openings(step.thrown);
 }
 
 namespace {
-
-// After the operator has changed.
-void finish_rows(World &w, StepContext &step) {
-  step.rows.finish(step.contacts, step.tangents.data(), step.h, step.length.planned, w.offset, step.bonds,
-                   &w.context->tasks);
-  run_belts(step);
-  bounce(step);
-  if (!step.guard.kept.empty()) guard_rates(step);
-  if (!w.prescribed.is_static()) step.rows.soften_openings(step.thrown);
-}
 
 // Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed.
 const SolveIsland *solve_revised(World &w, StepContext &step) {
@@ -190,7 +191,10 @@ const SolveIsland *solve_revised(World &w, StepContext &step) {
     if (bad || step.rows.rigid.empty() || !follow_rigids(w, step, left, revisions < kMaxRevisions, renewed))
       return bad;
     revisions += renewed;
-    if (renewed) finish_rows(w, step);
+    if (renewed) {
+      finish_frames(w, step);
+      finish_rates(w, step);
+    }
     restart_rigids(w, step);
     for (SolveIsland &own : all) own.open = own.rigid;
   }
@@ -210,19 +214,7 @@ void add_up(StepContext &step) {
 // False: the sub-step is to be repeated, with the integrator that contacts need.
 bool contacts_taken(World &w, StepContext &step) {
   bool all = true;
-  for (const ContactPoint &c : step.contacts) {
-    if (!w.bodies[c.slot_a]->dynamics->take_contact()) all = false;
-    if (!c.obstacle && !w.bodies[c.slot_b]->dynamics->take_contact()) all = false;
-  }
-  for (const Attachment &a : w.attachments) {
-    if (a.released) continue;
-    for (const uint64_t id : {a.body, a.to})
-      if (const uint32_t slot = slot_of(w, id);
-          slot != kNone && !w.bodies[slot]->sleep_state.asleep && !w.bodies[slot]->dynamics->take_contact())
-        all = false;
-  }
-  for (auto &b : w.bodies)
-    if (!b->sleep_state.asleep && has_dues(*b) && !b->dynamics->take_contact()) all = false;
+  each_body_touched(w, step, [&](uint32_t slot) { all &= w.bodies[slot]->dynamics->take_contact(); });
   if (!all) step.length.repeat(1);
   return all;
 }
@@ -232,19 +224,10 @@ bool contacts_taken(World &w, StepContext &step) {
 bool short_enough(World &w, StepContext &step) {
   if (!any_bounds_contact(w)) return true;
   double longest = std::numeric_limits<double>::infinity(), parts = 1;
-  const auto look = [&](uint32_t slot) {
-    if (slot != kNone && !w.bodies[slot]->sleep_state.asleep)
+  each_body_touched(w, step, [&](uint32_t slot) {
+    if (!w.bodies[slot]->sleep_state.asleep)
       longest = std::min(longest, w.bodies[slot]->dynamics->contact_step());
-  };
-  for (const ContactPoint &c : step.contacts) {
-    look(c.slot_a);
-    if (!c.obstacle) look(c.slot_b);
-  }
-  for (const Attachment &a : w.attachments)
-    for (const uint64_t id : {a.body, a.to})
-      if (!a.released) look(slot_of(w, id));
-  for (uint32_t slot = 0; slot < w.bodies.size(); ++slot)
-    if (has_dues(*w.bodies[slot])) look(slot);
+  });
   while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
   if (parts == 1) return true;
   expire_bound(w);
@@ -258,10 +241,9 @@ bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t
     step.length.repeat(0.5);
     return false;
   }
-  set_last_error(format("step %llu, body '%s': no state was found in which its forces and contacts agree, "
-                        "not even in a sub-step of %g s; take a smaller step, or lower the stiffness",
-                        static_cast<unsigned long long>(w.step_count),
-                        w.bodies[own.implicit_body]->name.c_str(), step.h)
+  set_last_error(format("%s: no state was found in which its forces and contacts agree, not even in a "
+                        "sub-step of %g s; take a smaller step, or lower the stiffness",
+                        at_step(w, *w.bodies[own.implicit_body]).c_str(), step.h)
                      .c_str());
   *trouble |= DFM_TROUBLE_NONFINITE;
   return false;

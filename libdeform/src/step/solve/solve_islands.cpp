@@ -12,7 +12,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/solve/capture.h"
-#include "step/solve/stuck_slip.h"
+#include "step/solve/friction_memory.h"
 #include "step/solve/tolerance.h"
 
 namespace dfm {
@@ -85,7 +85,7 @@ bool evaluate_laws(const World &w, StepContext &step, SolveIsland &own) {
   if ((own.bad =
            own.batches.evaluate_local(step.h, response, 0.1 * tangent_at_rest(w, step.h), 1e-2, step.state)))
     return false;
-  if (own.batches.smooth()) linearize(step.rows, own.part, step.h, step.state);
+  if (own.batches.has_smooth()) linearize(step.rows, own.part, step.h, step.state);
   ++own.passes;
   return true;
 }

@@ -60,7 +60,7 @@ struct SolveIsland {
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
   bool failed = false;        // no velocities were found: a model cannot tell its forces
-  bool drifts = false;        // contacts of it owe slip (stuck_slip.h)
+  bool drifts = false;        // contacts of it owe slip (friction_memory.h)
   std::vector<double> swept;  // [rows,3] N s, scratch
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed

@@ -14,7 +14,7 @@
 // e / T and at most r / 2, r the tolerance of the sub-step: the state without slip, which solves the contacts
 // without e, is good enough in any case, and contradictions change impulses by no more than the tolerance
 // does.
-#include "step/solve/stuck_slip.h"
+#include "step/solve/friction_memory.h"
 
 #include <algorithm>
 #include <bit>

@@ -1,4 +1,4 @@
-#include "step/watch/change_work.h"
+#include "step/watch/energy_watch.h"
 
 #include <algorithm>
 

@@ -9,6 +9,7 @@
 #include "plugin/on_behalf.h"
 #include "state/world.h"
 #include "step/context.h"
+#include "step/messages.h"
 #include "step/stages.h"
 #include "step/watch/pair_energy.h"
 
@@ -430,12 +431,12 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   if (worst.rise > worst.share * largest)
     return stop_for_energy(
         w, trouble,
-        format("step %llu, body '%s' of model '%s': its energy has grown by %.3g J beyond what loads, "
+        format("%s of model '%s': its energy has grown by %.3g J beyond what loads, "
                "motions and contact have put in (limit: %g %% of %.3g J, the largest energy so far); take a "
                "shorter step, or give the material stiffness damping; where the model is a plugin's, check "
                "its forces (energy_watch sets the limit, 0 switches the watch off)",
-               static_cast<unsigned long long>(w.step_count), worst.body->name.c_str(),
-               worst.body->model.type->id, worst.rise, 100 * worst.share, largest));
+               at_step(w, *worst.body).c_str(), worst.body->model.type->id, worst.rise, 100 * worst.share,
+               largest));
   s.energy_max = std::max({s.energy_max, now.total, moving});
   const std::string pair = describe_pair_gain(w);
   w.watch.reported = !pair.empty();

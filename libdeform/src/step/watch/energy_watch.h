@@ -5,6 +5,7 @@
 #pragma once
 #include <cstdint>
 
+#include "dynamics/dynamics.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -39,5 +40,13 @@ void forget_energy(Body &b);
 // unknown, and the body is not watched any more.
 void lose_energy(Body &b);
 void forget_energy(World &w);
+
+// External work on a body whose model has changed: the decrease of its energy beyond that work is its own
+// loss, which compensates the energy added by changes (world/change_energy.h).
+double moving_energy(const Body &b);  // J, kinetic energy of the free components
+// Before the commit: forces at the end, where the work at driven points follows from them.
+void ready_change_work(Body &b, const SubStep &now);
+// After it: forces times the way that their points went.
+void book_change_work(const World &w, Body &b, double h);
 
 }  // namespace dfm

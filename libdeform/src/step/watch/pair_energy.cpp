@@ -10,6 +10,8 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/held_in.h"
+#include "step/messages.h"
+#include "step/sides.h"
 #include "step/solve/solve_islands.h"
 #include "step/stages.h"
 #include "step/watch/energy_watch.h"
@@ -62,7 +64,7 @@ Made made_by(const World &w, const StepContext &step, uint32_t i, bool ends) {
     const double *const v = end ? end + size_t{kStride} * rows.point[d] : &step.mean[size_t{kStride} * d];
     u += rows.weight[k] * load3(v);
   }
-  u = Vec3{dot(load3(f), u), dot(load3(f + 3), u), dot(load3(f + 6), u)} - load3(&rows.drive[size_t(3) * i]);
+  u = in_frame(f, u) - load3(&rows.drive[size_t(3) * i]);
   const bool smooth = law.form[i] == kSmoothLaw;
   const double dissipated = law.ft[i] * law.slip[i] + law.ft[law.stride + i] * law.slip[law.stride + i];
   const double along = remembers(w.pairs.laws[law.law[i]]) ? 0 : l[1] * u.y + l[2] * u.z;
@@ -122,13 +124,6 @@ Scale scale_of(const World &w, const PairWork &p) {
           hidden};
 }
 
-const std::string &name_of(const World &w, uint64_t id) {
-  static const std::string gone = "?";
-  if (const Body *const b = w.body(id)) return b->name;
-  const Obstacle *const o = w.obstacle(id);
-  return o ? o->name : gone;
-}
-
 // The law of the contact of the pair with the largest load.
 std::string law_of(const World &w, const PairWork &p) {
   const LawInstance *law = nullptr;
@@ -176,8 +171,7 @@ void book_pairs(World &w, StepContext &step) {
     const bool ends = c.obstacle || by_halves(c.slot_a) != by_halves(c.slot_b);
     PairMade sum;
     sum.contact = begin;
-    sum.ids = {w.bodies[c.slot_a]->id, c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id,
-               c.obstacle != 0};
+    sum.ids = {w.bodies[c.slot_a]->id, id_of_b(w, c), c.obstacle != 0};
     bool touch = false;
     for (uint32_t k = begin; k < i; ++k) {
       if (!(step.rows.impulse[size_t(3) * k] > 0)) continue;
@@ -232,24 +226,19 @@ std::string describe_pair_gain(World &w) {
   }
   if (!worst) return {};
   const bool slides = worst->rubbed > limit;
-  const std::string sides =
-      worst->a == worst->b ? format("body '%s' on itself", name_of(w, worst->a).c_str())
-      : w.body(worst->b)
-          ? format("bodies '%s' and '%s'", name_of(w, worst->a).c_str(), name_of(w, worst->b).c_str())
-          : format("body '%s' on obstacle '%s'", name_of(w, worst->a).c_str(), name_of(w, worst->b).c_str());
+  const std::string where = at_step(w) + ", " + names_of(w, worst->a, worst->b);
   const std::string grown =
       format("%.3g J more than it has taken (limit: %.3g J; %.3g J is the largest energy so far)",
              excess_of(*worst), limit, w.stats.energy_max);
   const std::string law = law_of(w, *worst);
   if (slides)
     return format(
-        "step %llu, %s: friction law '%s' has put in %s; its force must point against the slip: "
+        "%s: friction law '%s' has put in %s; its force must point against the slip: "
         "change the law or its parameters (energy_watch sets the limit, 0 switches the watch off)",
-        static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(), grown.c_str());
+        where.c_str(), law.c_str(), grown.c_str());
   const uint32_t a = slot_of(w, worst->a), o = w.body(worst->b) ? kNone : obstacle_slot_of(w, worst->b);
   const std::string held = a != kNone && o != kNone ? describe_held_at(w, a, o) : std::string();
-  return format("step %llu, %s: their contact (law '%s'%s) has put in %s; %s",
-                static_cast<unsigned long long>(w.step_count), sides.c_str(), law.c_str(),
+  return format("%s: their contact (law '%s'%s) has put in %s; %s", where.c_str(), law.c_str(),
                 models_of(w, *worst).c_str(), grown.c_str(),
                 held.empty()
                     ? "take a shorter step, repair their surfaces, or, where a model of a plugin steps "

@@ -1,0 +1,31 @@
+#include "step/messages.h"
+
+#include "core/error.h"
+#include "state/obstacle.h"
+#include "state/world.h"
+
+namespace dfm {
+
+std::string at_step(const World &w) {
+  return format("step %llu", static_cast<unsigned long long>(w.step_count));
+}
+
+std::string at_step(const World &w, const Body &b) {
+  return format("%s, body '%s'", at_step(w).c_str(), b.name.c_str());
+}
+
+const std::string &name_of(const World &w, uint64_t id) {
+  static const std::string gone = "?";
+  if (const Body *const b = w.body(id)) return b->name;
+  const Obstacle *const o = w.obstacle(id);
+  return o ? o->name : gone;
+}
+
+std::string names_of(const World &w, uint64_t a, uint64_t b) {
+  const char *const first = name_of(w, a).c_str(), *const second = name_of(w, b).c_str();
+  if (a == b) return format("body '%s' on itself", first);
+  return w.body(b) ? format("bodies '%s' and '%s'", first, second)
+                   : format("body '%s' on obstacle '%s'", first, second);
+}
+
+}  // namespace dfm
