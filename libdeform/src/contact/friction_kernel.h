@@ -1,6 +1,7 @@
 // The friction impulse by the linearized law of a contact. Internal linkage only.
 #pragma once
 #include "contact_kernel.h"
+#include "solve_settings.h"
 
 namespace dfm {
 namespace {
@@ -163,7 +164,7 @@ __attribute__((always_inline)) static inline void add_residual(const Rows &rows,
   if (!(rows.wt[i] > 0) || !(l[0] > 0)) return;
   const double tangent = tangent_residual(rows, law, i, h, u, l);
   const double slip = __builtin_sqrt(u[1] * u[1] + u[2] * u[2]);
-  const double share = tangent / larger(tolerance.tangent[i], 1e-3 * slip);
+  const double share = tangent / larger(tolerance.tangent[i], SolveSettings::of_slip * slip);
   r.relative = larger(r.relative, share);
   r.required = larger(r.required, share);
   r.speed = larger(r.speed, tangent);

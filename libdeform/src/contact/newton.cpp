@@ -9,21 +9,11 @@
 #include "body/phyxels.h"
 #include "contact/bonds.h"
 #include "contact/friction_kernel.h"
+#include "contact/solve_settings.h"
 
 namespace dfm {
-namespace {
 
-// Nominal values hold for all scenes that were tried; the comment says what a change trades.
-constexpr double kPenalty = 10;    // rho w: larger, fewer passes with more Newton steps each
-constexpr double kGrowth = 10;     // of rho where passes are slow; of 1/rho where Newton steps go round
-constexpr double kAccuracy = 0.3;  // of what an iteration is judged by, that the one inside of it leaves
-constexpr double kContradiction =
-    20;                          // of the tolerance, by which normals may miss what velocities do not follow
-constexpr uint32_t kRounds = 3;  // in a row, after which passes are slow, steps go round, rows contradict
-constexpr uint32_t kProducts = 24;  // of a linear system, at most, and of all that a factor is kept for
-constexpr uint32_t kTrials = 24;    // of a line search; bodies near inversion take steps of a thousandth
-
-}  // namespace
+using Set = SolveSettings;
 
 // m/s: what g would change of the velocities of points by themselves, of bodies as a whole, and, through the
 // motions of blocks, of contacts.
@@ -98,10 +88,10 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     factor_.solve(1, in, out, 0, info);
   };
   for (bool fresh : {false, true}) {
-    if (!fresh && (!factored_ || kept_for_ >= kProducts)) continue;
+    if (!fresh && (!factored_ || kept_for_ >= Set::products)) continue;
     if (fresh && !refactor()) return false;
     const Gmres::Result found =
-        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, kProducts, by, precondition);
+        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, Set::products, by, precondition);
     products_ += found.iterations;
     kept_for_ = fresh ? 0 : kept_for_ + found.iterations;
     if (fresh || found.left <= tolerance) break;
@@ -112,13 +102,13 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   const double before = size(), left = error();
-  failed = !find_way(false, std::min(kAccuracy * tolerance / left, kLinear));
+  failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::linear));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
   ++steps_;
   for (const double share : {1.0, 0.5}) {
     move(share);
-    if (evaluate(false) && size() <= (1 - kAccuracy * share) * before) return true;
+    if (evaluate(false) && size() <= (1 - Set::accuracy * share) * before) return true;
   }
   v_.swap(base_);
   failed = !evaluate(false);
@@ -136,7 +126,7 @@ bool ContactNewton::frozen_steps() {
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
-    if (!find_way(true, kLinear)) return false;
+    if (!find_way(true, Set::linear)) return false;
     const double first = slope();
     base_.assign(v_.begin(), v_.end());
     ++steps_;
@@ -145,11 +135,11 @@ bool ContactNewton::frozen_steps() {
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
     bool found = false;
-    for (uint32_t trial = 0; trial < kTrials; ++trial) {
+    for (uint32_t trial = 0; trial < Set::trials; ++trial) {
       move(share);
       const bool known = evaluate(true);
       const double now = known ? slope() : std::numeric_limits<double>::infinity();
-      found = known && now <= -kAccuracy * first && (share == 1 || now >= kAccuracy * first);
+      found = known && now <= -Set::accuracy * first && (share == 1 || now >= Set::accuracy * first);
       if (found) break;
       if (now > 0) {
         high = share;
@@ -162,7 +152,7 @@ bool ContactNewton::frozen_steps() {
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
     // no such place: there is a jump in a law, at which steps would stay
-    if (!found || !(size() > kAccuracy * start)) break;
+    if (!found || !(size() > Set::accuracy * start)) break;
   }
   return evaluate(false);
 }
@@ -178,7 +168,7 @@ bool ContactNewton::newton(double tolerance, bool &round) {
   while (error() > tolerance && steps_ < limit_) {
     bool failed = false;
     if (coupled_step(tolerance, failed)) continue;
-    if (!failed && phases++ == kRounds) return round = true;
+    if (!failed && phases++ == Set::rounds) return round = true;
     if (failed || !frozen_steps()) return false;
   }
   return true;
@@ -208,8 +198,8 @@ void ContactNewton::scale_penalties(double by) {
 bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   found_ = false;
   limit_ = steps_ + steps;
-  set_penalties(kPenalty);
-  goal_ = kAccuracy * tolerance;
+  set_penalties(Set::penalty);
+  goal_ = Set::accuracy * tolerance;
   lh_.assign(l_.begin(), l_.end());
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
@@ -220,11 +210,11 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   for (passes_ = 0; passes_ < steps;) {
     ++passes_;
     before.assign(v_.begin(), v_.end());
-    const double goal = kAccuracy * std::max(aim, tolerance);
+    const double goal = Set::accuracy * std::max(aim, tolerance);
     bool round;
     if (!newton(goal, round)) return false;
     if (round && steps_ < limit_) {
-      scale_penalties(1 / kGrowth);
+      scale_penalties(1 / Set::growth);
       slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
@@ -234,7 +224,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
     const double off = error(), required = std::max(residual_.relative, off / tolerance);
-    found_ = required <= kAccuracy;
+    found_ = required <= Set::accuracy;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
       best = now;
@@ -249,19 +239,19 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
-    const bool still = passes_ > kRounds && moved <= kAccuracy * tolerance;
-    const bool stalled = still && residual_.normal <= kContradiction * normal;
+    const bool still = passes_ > Set::rounds && moved <= Set::accuracy * tolerance;
+    const bool stalled = still && residual_.normal <= Set::contradiction * normal;
     if (still && off <= tolerance) {
-      found_ = stood++ >= kRounds && stalled;
+      found_ = stood++ >= Set::rounds && stalled;
       if (found_) break;
-      scale_penalties(kGrowth);
+      scale_penalties(Set::growth);
     }
     aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
-    if (slow < kRounds) continue;
+    if (slow < Set::rounds) continue;
     slow = 0;
-    scale_penalties(kGrowth);
+    scale_penalties(Set::growth);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);
@@ -301,7 +291,7 @@ bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   limit_ = steps_ + steps;
   for (bool round = true; round && steps_ < limit_;) {
     if (!newton(tolerance, round)) return false;
-    if (round) scale_penalties(1 / kGrowth);
+    if (round) scale_penalties(1 / Set::growth);
   }
   put_rows();
   return host_->judge(residual_);

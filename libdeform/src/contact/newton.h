@@ -83,9 +83,6 @@ class ContactNewton {
   SolveLaws *host_ = nullptr;
   double h_ = 0;
 
-  // relative residual of the linear system of a Newton step, at most
-  static constexpr double kLinear = 1e-2;
-
   std::vector<Body> bodies_;
   // of all; the first that is a single point, and the first that is a motion of blocks
   uint32_t nodes_ = 0, single_ = 0, points_ = 0;

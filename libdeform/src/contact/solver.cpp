@@ -5,6 +5,7 @@
 
 #include "contact/bonds.h"
 #include "contact/friction_kernel.h"
+#include "contact/solve_settings.h"
 
 namespace dfm {
 namespace {
@@ -245,8 +246,8 @@ void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<cons
     if (i < rows.soft()) normal = std::max(normal, 0x1p-49 * norm(load3(contacts[i].point)) / h);
     double tangent = bounds.tangent;
     each_side(sides, i, disturbance, [&](const double *d) {
-      tangent = std::max(tangent, 1e-2 * d[0]);
-      normal = std::max(normal, 2e-2 * d[1]);
+      tangent = std::max(tangent, SolveSettings::of_start * d[0]);
+      normal = std::max(normal, SolveSettings::of_start_normal * d[1]);
     });
     tolerance.normal[i] = std::min(normal, bounds.most_normal);
     tolerance.tangent[i] = tangent;
@@ -254,7 +255,7 @@ void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<cons
   // what a bond has left over is part of its gap in the next sub-step
   double change = 0;
   each_row(part.bonds, [&](uint32_t row) { change = std::max(change, norm(bond_residual(rows, row))); });
-  tolerance.bond = std::max(bounds.tangent, 1e-3 * change);
+  tolerance.bond = std::max(bounds.tangent, SolveSettings::of_slip * change);
 }
 
 }  // namespace dfm

@@ -4,15 +4,12 @@
 #include <cmath>
 
 #include "contact/bonds.h"
+#include "contact/solve_settings.h"
 
 namespace dfm {
 namespace {
 
-// Residual::relative is stricter than Residual::required. At most this many sweeps are spent on
-// it where the latter is met, because the next sub-step continues from there.
-constexpr uint32_t kPolish = 20;
-// A pass is solved to this fraction of what its laws are then judged by.
-constexpr double kPassFraction = 0.5;
+using Set = SolveSettings;
 
 // Decides after which sweeps the residual is computed. For explicit bodies it costs as much as a sweep. A
 // sweep seldom reduces the residual to less than a quarter, and seldom to less than a half if the sweeps
@@ -21,20 +18,19 @@ constexpr double kPassFraction = 0.5;
 class ResidualSchedule {
  public:
   bool is_time(const RowsPart &part, uint32_t sweeps, uint32_t most) const {
-    return sweeps >= std::min({next_, kPolish, most}) || !part.blocks.empty();
+    return sweeps >= std::min({next_, Set::polish, most}) || !part.blocks.empty();
   }
   void note(uint32_t sweeps, const Residual &left) {
-    const int size = std::ilogb(left.required / kPassFraction);  // in halves
+    const int size = std::ilogb(left.required / Set::pass_fraction);  // in halves
     const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
     const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
-    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, kMaxUnseen));
+    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, Set::unseen));
     known_ = true;
     size_ = size;
     at_ = sweeps;
   }
 
  private:
-  static constexpr int kMaxUnseen = 4;
   bool known_ = false;
   int size_ = 0;
   uint32_t at_ = 0, next_ = 0;
@@ -45,7 +41,7 @@ class ResidualSchedule {
 Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
 bool Sweeps::good(const Residual &left, double fraction) const {
-  return left.relative <= fraction || (left.required <= fraction && count_ >= kPolish);
+  return left.relative <= fraction || (left.required <= fraction && count_ >= Set::polish);
 }
 
 void Sweeps::sweep_once() {
@@ -63,7 +59,7 @@ bool Sweeps::pass() {
     if (schedule.is_time(*part_, count_, most_)) {
       const Residual left = residual_of(*rows_, *part_, *state_, h_, *tolerance_);
       if (!std::isfinite(left.required)) return false;
-      if (good(left, kPassFraction) || count_ >= most_ || !laws_->goes_on()) return true;
+      if (good(left, Set::pass_fraction) || count_ >= most_ || !laws_->goes_on()) return true;
       schedule.note(count_, left);
     }
     acceleration_.follow(*rows_, *part_);

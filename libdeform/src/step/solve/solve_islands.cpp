@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "contact/bonds.h"
+#include "contact/solve_settings.h"
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -18,13 +19,7 @@
 namespace dfm {
 namespace {
 
-// Laws with memory accumulate errors of the normal force instead of averaging them out. Whenever the force
-// falls, the friction cone cuts off a part of the bristle, which does not come back when the force rises. A
-// point that oscillates under a bristle of share s stretches it by (1 - s) of each way forth and slackens it
-// by (1 + s) of each way back. Both make a held contact creep. Islands with such laws therefore use this
-// share of the normal tolerance while bodies move, and this share of the tangential one at rest
-// (doc/decisions/friction_memory.md).
-constexpr double kRememberedShare = 0.05, kRememberedRest = 1e-3;
+using Set = SolveSettings;
 
 // m/s, the residual of the start, at least.
 double start_residual(const StepContext &step, const SolveIsland &own) {
@@ -38,21 +33,15 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
   return most;
 }
 
-// Where all is rigid, nothing is elastic: no later sub-step makes good what a solve leaves, and loads that
-// share a place wander where gaps differ by it. Sweeps go on to the rounding of what contact changes. What
-// they leave below a share of the tolerance at rest is good enough; above it Newton's method gets this many
-// steps (what these do not find, more do not), and the better result counts.
-constexpr double kRigidRounding = 1e-11, kRigidRest = 1e-2;
-constexpr uint32_t kRigidSteps = 30;
-
 void tighten(const ContactRows &rows, SolveIsland &own) {
   double scale = 0;
   each_row(own.part.contacts, [&](uint32_t i) {
     scale = std::max(scale, std::fabs(rows.rate[i]) + norm(rows.velocity(i, rows.y_free.data())));
   });
-  own.tolerance.most_normal = kRigidRounding * scale;
-  each_row(own.part.contacts,
-           [&](uint32_t i) { own.tolerance.normal[i] = own.tolerance.tangent[i] = kRigidRounding * scale; });
+  own.tolerance.most_normal = Set::rigid_rounding * scale;
+  each_row(own.part.contacts, [&](uint32_t i) {
+    own.tolerance.normal[i] = own.tolerance.tangent[i] = Set::rigid_rounding * scale;
+  });
 }
 
 void begin_newton(StepContext &step, SolveIsland &own) {
@@ -63,11 +52,11 @@ void begin_newton(StepContext &step, SolveIsland &own) {
 // After sweeps. least: m/s, of tangents at rest. normal: of normals.
 void solve_rigid(StepContext &step, SolveIsland &own, double least, double normal) {
   const double swept = own.residual.speed;
-  if (own.bad || swept <= kRigidRest * least) return;
+  if (own.bad || swept <= Set::rigid_at_rest * least) return;
   own.swept.resize(3 * size_t{own.part.all()});
   take_impulses(step.rows, own.part, own.swept.data());
   begin_newton(step, own);
-  const bool found = own.newton->solve(0.1 * kRigidRest * least, normal, kRigidSteps);
+  const bool found = own.newton->solve(0.1 * Set::rigid_at_rest * least, normal, Set::rigid_steps);
   own.sweeps += own.newton->steps();
   own.residual = own.newton->residual();
   if (found && !own.bad && own.residual.speed <= swept) return;
@@ -94,7 +83,7 @@ bool evaluate_laws(const World &w, StepContext &step, SolveIsland &own) {
 double normal_tolerance(const World &w, const StepContext &step, const SolveIsland &own) {
   // static mode: no later sub-step corrects what this solve leaves
   if (w.prescribed.is_static()) return tangent_at_rest(w, step.h);
-  return (own.batches.remembers() ? kRememberedShare : 1) * normal_at_rest(w, step.h);
+  return (own.batches.remembers() ? Set::remembered : 1) * normal_at_rest(w, step.h);
 }
 
 // Evaluates the laws at the warm start.
@@ -117,7 +106,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   const bool is_static = w.prescribed.is_static(), memory = own.batches.remembers();
   const ToleranceBounds bounds{least,
                                own.implicit || is_static ? least
-                               : memory                  ? kRememberedRest * least
+                               : memory                  ? Set::remembered_at_rest * least
                                                          : normal,
                                normal};
   const auto allow = [&] {

@@ -9,17 +9,18 @@
 // remember know places by their bristles.
 //
 // Where more contacts carry load than points can move, not every set of velocities can be asked for. The
-// slips of all contacts since the same instant can be taken back: the points go where they were. But contacts
-// begin and end, and what those that stay owe then belongs to no motion of the points. So a(e) / T is kShare
-// e / T and at most r / 2, r the tolerance of the sub-step: the state without slip, which solves the contacts
-// without e, is good enough in any case, and contradictions change impulses by no more than the tolerance
-// does.
+// slips of all contacts since the same instant can be taken back: the points go where they were. But
+// contacts begin and end, and what those that stay owe then belongs to no motion of the points. So a(e) /
+// T is a share of e / T and at most r / 2, r the tolerance of the sub-step: the state without slip, which
+// solves the contacts without e, is good enough in any case, and contradictions change impulses by no more
+// than the tolerance does.
 #include "step/solve/friction_memory.h"
 
 #include <algorithm>
 #include <bit>
 
 #include "contact/rows_part.h"
+#include "contact/solve_settings.h"
 #include "friction/laws.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -27,10 +28,6 @@
 
 namespace dfm {
 namespace {
-
-// All at once would be a velocity as large as the error, which the next solve stops again.
-constexpr double kShare = 0.4;
-constexpr double kMax = 0.5;  // of the tolerance
 
 bool is_projection(const LawInstance &law) { return law.ops->flags & DFM_FRIC_SET_VALUED; }
 
@@ -76,10 +73,11 @@ void find_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   });
   own.drifts = drifts;
   if (!drifts) return;
-  const double rate = kShare / step.length.planned;
+  const double rate = SolveSettings::take_back / step.length.planned;
   each_row(own.part.contacts, [&](uint32_t i) {
     if (i >= step.rows.soft()) return;
-    const Vec3 back = at_most(kMax * own.tolerance.tangent[i], rate * load3(stick_drift + 3 * size_t{i}));
+    const Vec3 back = at_most(SolveSettings::most_back * own.tolerance.tangent[i],
+                              rate * load3(stick_drift + 3 * size_t{i}));
     for (size_t k = 0; k < 2; ++k) {
       const double along = dot(load3(&step.rows.frame[size_t{9} * i + 3 + 3 * k]), back);
       requested[2 * size_t{i} + k] = along;
