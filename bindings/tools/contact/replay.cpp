@@ -136,7 +136,7 @@ LocalProblem Replay::form() {
     const Vec3 u = rows.velocity(i, y.data());
     store3(&out.q[3 * size_t{i}], u);
     out.q[3 * size_t{i}] +=
-        rows.rate[i] + given(rows.impulse[3 * size_t{i}], &rows.compliance[3 * size_t{i}]);
+        rows.rate[i] + yield_speed(rows.impulse[3 * size_t{i}], &rows.compliance[3 * size_t{i}]);
   }
   out.W = Matrix(3 * n, 3 * n);
   const Array<double> solution = rows.y;
