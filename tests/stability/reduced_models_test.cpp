@@ -9,12 +9,13 @@ bool holds(const test::SceneRun &run) { return run.creep_um_per_s() < 20; }
 }  // namespace
 
 TEST(ReducedModels, BlocksOnASlope_LeanAsTheirModelsLetThem) {
-  const test::SceneRun run("reduced_models", {});
+  // how far they slide as they land depends on the sub-step, of which the models choose different ones
+  const test::SceneRun run("reduced_models", {"--set", "/time/step=0.00025"});
   run.expect_valid(30, "condensed");
   EXPECT_TRUE(holds(run)) << run.creep_um_per_s();
   const double modal = run.last("modal").com[0], condensed = run.last("condensed").com[0],
                full = run.last("full").com[0];
-  EXPECT_NEAR(condensed, full, 2e-4);
+  EXPECT_NEAR(condensed, full, 1e-4);
   EXPECT_LT(modal, full - 4e-4) << "forty modes do not hold all of a dent";
   EXPECT_GT(modal, 0.051);
 }

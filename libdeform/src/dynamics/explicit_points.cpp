@@ -247,13 +247,10 @@ double ExplicitPoints::largest_strain() const {
 bool ExplicitPoints::bound(double time, double share, const AddRowSums &outside, StepBound &out) {
   if (!model_.ops->bound) return true;
   double cell = std::numeric_limits<double>::infinity();
-  if (!row_sums(seen(time, 0), cell)) return false;
-  const double now = share < 1 ? share + (1 - share) * std::min(1.0, largest_strain() / kUnlikeRest) : 1;
   out.lagged = p_.dampers.lag > 0;
-  if (out.lagged) {
-    if (!find_drag()) return false;
-    lag_rows(p_.dampers.lag);
-  }
+  if ((out.lagged && !find_drag()) || !row_sums(seen(time, 0), cell)) return false;
+  const double now = share < 1 ? share + (1 - share) * std::min(1.0, largest_strain() / kUnlikeRest) : 1;
+  if (out.lagged) lag_rows(p_.dampers.lag);
   for (double &sum : stiffness_) sum *= now;
   outside(stiffness_.data(), damping_.data());
   for (uint32_t i = 0; out.lagged && i < p_.n; ++i) stiffness_[i] += now * lagged_[i];

@@ -265,6 +265,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
     ~Lent() { exchange(b, made); }
   } lent(b, out);
   use_memory(w.meters.dynamics.memory(), b.p.dampers.v, b.p.dampers.slow);
+  b.p.dampers = out.dampers;  // of the points, which are the same
   b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                              implicit ? &*implicit : nullptr);
   if (implicit) return;
