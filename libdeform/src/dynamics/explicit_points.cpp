@@ -187,6 +187,8 @@ double ExplicitPoints::find_share(Trial &rest, double lag, double edge) {
     });
     return true;
   });
+  rest.x = x;
+  std::fill(rest.v.begin(), rest.v.end(), 0.0);
   return found > 0 && found < most ? found / most : 1;
 }
 
