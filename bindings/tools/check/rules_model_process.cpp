@@ -463,7 +463,7 @@ std::string instances_share_nothing(const Subject &subject) {
   if (!sanitized())
     skip(
         "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
-        "plugin with the same -fsanitize");
+        "plugin by the same compiler and -fsanitize");
   constexpr size_t kThreads = 4;
   std::vector<std::unique_ptr<Body>> bodies, alone;
   const Variant defaults = variants(subject).front();

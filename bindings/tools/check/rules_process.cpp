@@ -354,7 +354,7 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
   if (!DEFORM_SANITIZED)
     skip(
         "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
-        "plugin with the same -fsanitize");
+        "plugin by the same compiler and -fsanitize");
   const Law law(subject, lively_params(subject));
   constexpr int kThreads = 4;
   constexpr int kRounds = 20;
