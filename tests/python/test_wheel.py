@@ -1,5 +1,5 @@
-"""The wheel from this build, installed into a fresh environment, used in another folder: ten lines, plugins,
-command, picture. No registry is asked: NumPy is the system's."""
+"""The wheel from this build, installed into a fresh environment, used in another folder: demo, ten lines,
+plugins, command, picture. No registry is asked: NumPy is the system's."""
 import json
 import os
 import pathlib
@@ -37,8 +37,22 @@ class Wheel(unittest.TestCase):
                            env=clean())
             wheel, = (folder / "dist").iterdir()
             self.assertRegex(wheel.name, r"^deform-\d+\.\d+\.\d+-py3-none-(many)?linux\w+\.whl$")
-            subprocess.run([*pip, "install", "--no-index", wheel], check=True, env=clean())
             (folder / "other").mkdir()
+            installing = time.monotonic()
+            subprocess.run([*pip, "install", "--no-index", wheel], check=True, env=clean())
+            said = subprocess.run([python, "-m", "deform", "demo"], cwd=folder / "other", capture_output=True,
+                                  text=True, env=clean())
+            demo = time.monotonic() - installing
+            self.assertEqual(said.returncode, 0, said.stderr)
+            self.assertRegex(said.stdout, r"picture deform_demo.two_cylinders\.png")
+            pictures = sorted((folder / "other" / "deform_demo").rglob("*.png"))
+            self.assertIn("two_cylinders.png", [picture.name for picture in pictures])
+            for picture in pictures:
+                self.assertEqual(picture.read_bytes()[:8], b"\x89PNG\r\n\x1a\n")
+                self.assertGreater(picture.stat().st_size, 1000, picture)
+            runs = json.loads((folder / "other" / "deform_demo" / "summary.json").read_text())["runs"]
+            self.assertLess(runs["with friction"]["upper"]["moved_m"], 0.3)
+            self.assertGreater(runs["without friction"]["upper"]["moved_m"], 1)
             first = re.search(r"^```python\n(.*?)^```", GUIDE.read_text(), re.M | re.S).group(1)
             program = folder / "other" / "ten lines.py"
             program.write_text(first + "import numpy\nprint(deform.__file__, len(world.context.types))\n")
@@ -60,7 +74,8 @@ class Wheel(unittest.TestCase):
             said = subprocess.run([other, "-c", where], cwd=folder / "other", capture_output=True, text=True,
                                   env=clean())
             self.assertIn(str(folder / "of sources"), said.stdout, said.stderr)
-            print(f"environment, wheel, install and first picture: {first_picture:.1f} s")
+            print(f"pip install and the demo with its picture: {demo:.1f} s, aim 60 s; "
+                  f"environment, wheel and both programs: {first_picture:.1f} s")
             shutil.copy(SOURCE / "tests" / "python" / "test_law.py", folder / "other")
             law = "import test_law; print(test_law.Bristle().check(only=['F01', 'F02']).column('result'))"
             said = subprocess.run([python, "-c", law], cwd=folder / "other", capture_output=True, text=True,
@@ -69,7 +84,7 @@ class Wheel(unittest.TestCase):
             version = subprocess.run([folder / "venv" / "bin" / "deform", "--version"], capture_output=True,
                                      text=True, env=clean(), check=True).stdout
             self.assertIn(re.search(r"-([\d.]+)-py3", wheel.name).group(1), version)
-            # python -m deform, and what its demo runs; `make demo` does the rest
+            # other words of python -m deform are those of the command
             plan = ("import runpy, sys; from deform._library import demo_scene; sys.argv[1:] = "
                     "['explain', str(demo_scene())]; runpy.run_module('deform', run_name='__main__')")
             said = subprocess.run([python, "-c", plan], cwd=folder / "other", capture_output=True, text=True,
