@@ -91,18 +91,18 @@ void MshReader::run() {
       read_physical_names();
     } else if (four_ && section == "$Entities") {
       if (elements) in_.refuse("$Entities after $Elements; expected them first");
-      read_entities_41();
+      read_entities_4();
     } else if (parametric || section == "$Nodes") {
       if (nodes)
         in_.refuse("a second %s; one mesh per file is read", four_ ? "$Nodes section" : "section of nodes");
-      if (four_) read_nodes_41();
+      if (four_) read_nodes_4();
       else read_nodes_22(parametric);
       nodes_.finish(in_);
       nodes = true;
     } else if (section == "$Elements") {
       if (!nodes) in_.refuse("$Elements before $Nodes; expected the nodes first");
       if (elements) in_.refuse("a second $Elements section; one mesh per file is read");
-      if (four_) read_elements_41();
+      if (four_) read_elements_4();
       else read_elements_22();
       elements = true;
     } else if (section[0] == '$') skip_section(in_, section);
@@ -129,14 +129,14 @@ void read_msh(Cursor &in, RawMesh &out) {
   }
   const double version = in.real("the format version");
   const int64_t type = in.integer("the file type"), size = in.integer("the data size");
-  const bool two = version >= 2.0 && version <= 2.2, four = version == 4.1;
+  const bool two = version >= 2.0 && version <= 2.2, four = version == 4.0 || version == 4.1;
   if (!two && !four) {
-    if (version == 1.0 || version == 4.0 || version == 3.0)
+    if (version == 1.0 || version == 3.0)
       in.unsupported("MSH version %.1f is not read; %s", version, kConvertMsh);
-    in.unsupported("MSH version %g is not known; 2.2 and 4.1 are read", version);
+    in.unsupported("MSH version %g is not known; 2.2, 4.0 and 4.1 are read", version);
   }
   if (type != 0 && type != 1) in.refuse("file type %lld; expected 0 (ASCII) or 1 (binary)", ll(type));
-  if (size != 8 && !(four && size == 4)) in.refuse("data size %lld; expected 8", ll(size));
+  if (size != 8 && !(version == 4.1 && size == 4)) in.refuse("data size %lld; expected 8", ll(size));
   if (type == 1) {
     in.end_line("the data size");
     in.binary = true;
@@ -145,7 +145,7 @@ void read_msh(Cursor &in, RawMesh &out) {
     in.swap = one != 1;
   }
   in.expect("$EndMeshFormat", "the format");
-  MshReader(in, out, four, size == 8).run();
+  MshReader(in, out, version, size == 8).run();
 }
 
 }  // namespace dfm

@@ -1,5 +1,5 @@
-// Reader of gmsh files: sections and elements are the same in MSH 2.0 to 2.2 (read_msh22.cpp) and 4.1
-// (read_msh41.cpp).
+// Reader of gmsh files: sections and elements are the same in MSH 2.0 to 2.2 (read_msh22.cpp), 4.0 and 4.1
+// (read_msh4.cpp).
 #pragma once
 #include <cstdint>
 
@@ -13,11 +13,12 @@ constexpr const char *kConvertMsh =
 
 class MshReader {
  public:
-  // four: 4.1; wide: its counts and numbers have 8 bytes, not 4
-  MshReader(Cursor &in, RawMesh &out, bool four, bool wide)
+  // wide: counts of version 4, and numbers of 4.1, have 8 bytes, not 4
+  MshReader(Cursor &in, RawMesh &out, double version, bool wide)
       : in_(in),
         out_(out),
-        four_(four),
+        four_(version >= 4.0),
+        first_four_(version == 4.0),
         wide_(wide),
         nodes_(*out.memory, "node"),
         entities_(HookAllocator<Entity>(*out.memory)) {}
@@ -53,15 +54,16 @@ class MshReader {
 
   int64_t size(const char *what);
   Number size_type() const { return wide_ ? Number::u64 : Number::u32; }
-  size_t size_bytes() const { return in_.binary ? bytes_of(size_type()) : 2; }
-  void read_entities_41();
-  void read_nodes_41();
-  void read_elements_41();
+  int64_t tag(const char *what) { return first_four_ ? number(what) : size(what); }  // of node and element
+  size_t tag_bytes() const { return !in_.binary ? 2 : first_four_ ? 4 : bytes_of(size_type()); }
+  void read_entities_4();
+  void read_nodes_4();
+  void read_elements_4();
   uint32_t group_of(int32_t dimension, int32_t tag) const;
 
   Cursor &in_;
   RawMesh &out_;
-  bool four_, wide_;
+  bool four_, first_four_, wide_;
   Numbers nodes_;
   Array<Entity> entities_;
   Element element_{0, 0};  // of begin_elements()

@@ -62,6 +62,29 @@ def msh22():
               "\n$EndElements\n")
 
 
+def msh40(name, order=""):
+    """In binary where order says so, which gmsh itself did up to 4.1.5; a block of nodes has parameters."""
+    def rows(*parts):
+        if order:
+            return b"".join(struct.pack(order + kinds, *values) for kinds, values in parts) + b"\n"
+        return words(values for _, values in parts)
+    box = (0, 0, 0, 1, 1, 1)
+    entities = rows(("4Q", (1, 0, 1, 2)), ("i6dQ", (9, *6 * (0,), 0)), ("i6dQiQ", (4, *box, 1, 7, 0)),
+                    ("i6dQiQi", (5, *box, 1, 1, 1, 4)), ("i6dQiQi", (6, *box, 1, 2, 1, -4)))
+    nodes = rows(("2Q", (2, 9)), ("3iQ", (4, 2, 1, 3)),
+                 *(("i5d", (TAGS[i], *POINTS[i], 0.25, 0.75)) for i in range(3)),
+                 ("3iQ", (5, 3, 0, 6)), *(("i3d", (TAGS[i], *POINTS[i])) for i in range(3, 9)))
+    blocks = [("2Q", (4, 1 + len(SKIN) + len(TETS))), ("3iQ", (9, 0, 15, 1)), ("2i", (1, TAGS[0]))]
+    for entity, dim, kind, first, cells in ((4, 2, 2, 2, SKIN), (5, 3, 4, 101, TETS[:3]),
+                                            (6, 3, 4, 104, TETS[3:])):
+        blocks += [("3iQ", (entity, dim, kind, len(cells)))]
+        blocks += [(f"{1 + len(t)}i", (first + i, *tags(t))) for i, t in enumerate(cells)]
+    write(name, f"$MeshFormat\n4 {1 if order else 0} 8\n",
+          struct.pack(order + "i", 1) + b"\n" if order else "", "$EndMeshFormat\n", NAMES, "$Entities\n",
+          entities, "$EndEntities\n$Nodes\n", nodes, "$EndNodes\n$Elements\n", rows(*blocks),
+          "$EndElements\n")
+
+
 def msh41_text(parametric):
     skin_nodes, body_nodes = [0, 1, 2], [3, 4, 5, 6, 7, 8]  # two blocks of nodes
     flag = 1 if parametric else 0
@@ -327,6 +350,9 @@ def surfaces():
 
 
 msh22()
+msh40("cube_msh40_ascii.msh")
+msh40("cube_msh40_bin_le.msh", "<")
+msh40("cube_msh40_bin_be.msh", ">")
 msh41_text(False)
 msh41_text(True)
 msh41_binary("<", 8, "cube_msh41_bin_le.msh")

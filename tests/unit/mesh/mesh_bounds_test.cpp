@@ -114,12 +114,15 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
   const std::string v = "# vtk DataFile Version 3.0\nt\n", grid = "DATASET UNSTRUCTURED_GRID\n";
   const std::string four = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
   const std::string m22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
+  const std::string m40 = "$MeshFormat\n4 0 8\n$EndMeshFormat\n";
   const std::string m41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
   const std::string nodes22 = "$Nodes\n1\n1 0 0 0\n$EndNodes\n";
+  const std::string nodes40 = "$Nodes\n1 1\n1 3 0 1\n1 0 0 0\n$EndNodes\n";
   const std::string nodes41 = "$Nodes\n1 1 1 1\n3 1 0 1\n1\n0 0 0\n$EndNodes\n";
   const std::string one("\1\0\0\0", 4), huge("\0\xe4\x0b\x54\x02\0\0\0", 8), eight(8, '\0');
   const std::string endless("\0\xff\xff\xff\xff\xff\xff\xff", 8), run("\4\0\0\0\xff\xff\xff\x7f\0\0\0\0", 12);
   const std::string b22 = "$MeshFormat\n2.2 1 8\n" + one + "\n$EndMeshFormat\n";
+  const std::string b40 = "$MeshFormat\n4 1 8\n" + one + "\n$EndMeshFormat\n";
   const std::string b41 = "$MeshFormat\n4.1 1 8\n" + one + "\n$EndMeshFormat\n";
   const std::string medit = "MeshVersionFormatted 2\nDimension 3\n";
   const auto vtu = [](uint64_t points, uint64_t cells, const std::string &form, const std::string &data,
@@ -154,6 +157,12 @@ TEST(MeshBounds, PromiseOfTenGigabytes_IsRefusedWithLittleMemory) {
       {"names22.msh", m22 + "$PhysicalNames\n10000000000\n3 1 \"a\"\n"},
       {"nodes22_bin.msh", b22 + "$Nodes\n10000000000\n" + eight},
       {"run22_bin.msh", b22 + "$Nodes\n0\n$EndNodes\n$Elements\n2000000000\n" + run + eight},
+      {"nodes40.msh", m40 + "$Nodes\n1 10000000000\n1 3 0 10000000000\n1 0 0 0\n"},
+      {"empty_blocks40.msh", m40 + "$Nodes\n9223372036854775807 1\n1 3 0 0\n1 3 0 0\n"},
+      {"elements40.msh", m40 + nodes40 + "$Elements\n1 10000000000\n1 3 4 10000000000\n1 1 1 1 1\n"},
+      {"entities40.msh", m40 + "$Entities\n10000000000 0 0 0\n1 0 0 0 1 1 1 0\n"},
+      {"nodes40_bin.msh", b40 + "$Nodes\n" + eight + huge + eight + eight},
+      {"entities40_bin.msh", b40 + "$Entities\n" + huge + huge + huge + huge},
       {"nodes41.msh", m41 + "$Nodes\n1 10000000000 1 1\n3 1 0 10000000000\n1\n"},
       {"blocks41.msh", m41 + "$Nodes\n10000000000 1 1 1\n3 1 0 1\n1\n0 0 0\n"},
       {"empty_blocks41.msh", m41 + "$Nodes\n9223372036854775807 1 1 1\n3 1 0 0\n3 1 0 0\n"},

@@ -15,6 +15,7 @@ namespace {
 const std::string kVtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\n";
 const std::string kFour = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 const std::string kOneCell = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
+const std::string kMsh40 = "$MeshFormat\n4 0 8\n$EndMeshFormat\n";  // as gmsh writes 4.0
 const std::string kMsh41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
 const std::string kMsh22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
 
@@ -53,7 +54,7 @@ std::set<std::set<Corner>> cells_in_space(const RestMesh &m) {
 
 TEST(MeshRead, EveryDialect_GivesTheSameBody) {
   auto files = test::own_meshes();
-  ASSERT_EQ(files.size(), 27u);
+  ASSERT_EQ(files.size(), 30u);
   files.push_back(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes/cube_tetgen.ele");
   std::set<std::set<Corner>> expected;
   for (const std::string &file : files) {
@@ -99,7 +100,7 @@ TEST(MeshRead, PhysicalGroups_KeepNamesCellsAndPoints) {
     EXPECT_EQ(kept, skin);
     ++checked;
   }
-  EXPECT_EQ(checked, 17u);
+  EXPECT_EQ(checked, 20u);
 }
 
 TEST(MeshRead, MeditReferences_AreGroupsByNumber) {
@@ -318,10 +319,10 @@ TEST(MeshRead, MshStructure_IsChecked) {
   expect_refusal("m.msh", "", DFM_E_FORMAT, {"empty"});
   expect_refusal("m.msh", "solid\n", DFM_E_FORMAT, {"$MeshFormat", "solid"});
   expect_refusal("m.msh", "$NOD\n4\n", DFM_E_UNSUPPORTED, {"version 1", "gmsh", "msh41"});
-  expect_refusal("m.msh", "$MeshFormat\n4 0 8\n$EndMeshFormat\n", DFM_E_UNSUPPORTED,
-                 {"version 4.0 ", "gmsh", "msh41"});
+  expect_refusal("m.msh", "$MeshFormat\n3 0 8\n$EndMeshFormat\n", DFM_E_UNSUPPORTED,
+                 {"version 3.0 ", "gmsh", "msh41"});
   expect_refusal("m.msh", "$MeshFormat\n9.7 0 8\n$EndMeshFormat\n", DFM_E_UNSUPPORTED,
-                 {"9.7", "2.2 and 4.1"});
+                 {"9.7", "2.2, 4.0 and 4.1"});
   expect_refusal("m.msh", "$MeshFormat\n4.1 2 8\n$EndMeshFormat\n", DFM_E_FORMAT, {"file type 2"});
   expect_refusal("m.msh", kMsh41, DFM_E_FORMAT, {"no $Nodes section"});
   expect_refusal("m.msh", kMsh41 + nodes, DFM_E_FORMAT, {"no $Elements section"});
@@ -351,6 +352,38 @@ TEST(MeshRead, MshStructure_IsChecked) {
       kMsh41 + nodes +
           "$Elements\n1 1 1 1\n3 1 29 1\n1 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4 1 2 3 4\n$EndElements\n",
       DFM_E_UNSUPPORTED, {"above second order", "-order 1"});
+}
+
+TEST(MeshRead, StructureOfMsh40_IsChecked) {
+  const std::string four = "1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n",
+                    nodes = "$Nodes\n1 4\n1 3 0 4\n" + four;
+  const std::string cells = "$Elements\n1 1\n1 3 4 1\n1 1 2 3 4\n$EndElements\n";
+  EXPECT_EQ(read_text("m.msh", kMsh40 + nodes + cells).ntet(), 1u);
+  EXPECT_EQ(read_text("m.msh", "$MeshFormat\n4.0 0 8\n$EndMeshFormat\n" + nodes + cells).ntet(), 1u);
+  EXPECT_EQ(read_text("m.msh", kMsh40 + "$Nodes\n1 4\n1 3 1 4\n" + four + cells).ntet(),
+            1u);  // a volume has no parameters
+  const std::string entities = "$Entities\n1 0 0 1\n9 0 0 0 0 0 0 1 3\n1 0 0 0 1 1 1 1 5 0\n$EndEntities\n";
+  const RestMesh grouped = read_text("m.msh", kMsh40 + entities + nodes + cells);
+  ASSERT_EQ(grouped.groups.size(), 2u);
+  EXPECT_EQ(grouped.groups[grouped.tet_group[0]].tag, 5);
+  const std::pair<std::string, std::vector<std::string>> wrong[] = {
+      {"$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n", {"node"}},  // as in 4.1
+      {"$Nodes\n1 4\n1 4 0 4\n" + four + cells, {"dimension 4"}},
+      {"$Nodes\n1 4\n1 3 2 4\n" + four + cells, {"parametric flag 2"}},
+      {"$Nodes\n1 4\n1 3 0 5\n" + four + cells, {"block of 5 nodes"}},
+      {"$Nodes\n1 5\n1 3 0 4\n" + four + cells, {"promises 5 nodes"}},
+      {"$Nodes\n1 1\n1 3 0 1\n3000000000 0 0 0\n$EndNodes\n" + cells, {"3000000000", "32 bits"}},
+      {nodes + "$Elements\n1 1\n1 3 4 1\n1 1 2 3 5\n$EndElements\n", {"node 5"}},
+      {nodes + "$Elements\n1 2\n1 3 4 1\n1 1 2 3 4\n$EndElements\n", {"promises 2 elements"}},
+      {nodes + "$Elements\n1 1\n1 3 4 2\n1 1 2 3 4\n$EndElements\n", {"block of 2 elements"}},
+      {entities + nodes + "$Elements\n1 1\n1 3 2 1\n1 1 2 3\n$EndElements\n", {"type 2", "dimension 3"}},
+      {nodes + cells.substr(0, cells.size() - 14), {"$EndElements"}}};
+  for (const auto &[text, words] : wrong) {
+    SCOPED_TRACE(text);
+    expect_refusal("m.msh", kMsh40 + text, DFM_E_FORMAT, words);
+  }
+  expect_refusal("m.msh", "$MeshFormat\n4 0 4\n$EndMeshFormat\n", DFM_E_FORMAT,
+                 {"data size 4", "expected 8"});
 }
 
 TEST(MeshRead, OtherFiles_AreRefusedByEnding) {

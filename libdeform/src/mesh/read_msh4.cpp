@@ -1,6 +1,7 @@
-// MSH 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities has
-// the physical groups of each. Counts and numbers are size_t of the writing machine (data size 8 or 4),
-// entity and type numbers are int.
+// MSH 4.0 and 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities
+// has the physical groups of each. Counts and numbers are size_t of the writing machine (data size 8 or 4),
+// entity and type numbers are int. In 4.0 all numbers are int, points have a box, too, blocks begin with
+// their entity, and a node's number stands before its place.
 #include <algorithm>
 
 #include "mesh/msh.h"
@@ -16,7 +17,7 @@ int64_t MshReader::size(const char *what) {
   return v;
 }
 
-void MshReader::read_entities_41() {
+void MshReader::read_entities_4() {
   in_.begin_data("$Entities");
   int64_t n[4];
   for (int64_t &k : n) k = size("a number of entities");
@@ -24,7 +25,7 @@ void MshReader::read_entities_41() {
     const uint64_t m = in_.count(n[d], in_.binary ? 20 : 6, "entities");
     for (uint64_t i = 0; i < m; ++i) {
       const int32_t tag = number("an entity's number");
-      for (int k = 0; k < (d == 0 ? 3 : 6); ++k) real("an entity's box");
+      for (int k = 0; k < (d == 0 && !first_four_ ? 3 : 6); ++k) real("an entity's box");
       const uint64_t physical =
           in_.count(size("an entity's number of physical groups"), in_.binary ? 4 : 2, "physical groups");
       for (uint64_t k = 0; k < physical; ++k) {
@@ -48,30 +49,34 @@ uint32_t MshReader::group_of(int32_t dimension, int32_t tag) const {
   return at != entities_.end() && !(wanted < *at) ? at->group : kNoGroup;
 }
 
-void MshReader::read_nodes_41() {
+void MshReader::read_nodes_4() {
   in_.begin_data("$Nodes");
   const int64_t nblock = size("the number of node blocks");
-  const uint64_t nnode =
-      in_.count(size("the number of nodes"), size_bytes() + (in_.binary ? 24 : 6), "nodes");
-  size("the least node number");
-  size("the greatest node number");
+  const uint64_t nnode = in_.count(size("the number of nodes"), tag_bytes() + (in_.binary ? 24 : 6), "nodes");
+  if (!first_four_) {
+    size("the least node number");
+    size("the greatest node number");
+  }
   nodes_.reserve(nnode);
   out_.points.reserve(3 * nnode);
   for (int64_t b = 0; b < nblock; ++b) {
+    if (first_four_) number("a node block's entity");
     const int32_t dimension = number("a node block's dimension");
-    number("a node block's entity");
+    if (!first_four_) number("a node block's entity");
     const int32_t parametric = number("a node block's parametric flag");
     const int64_t n = size("a node block's number of nodes");
     if (dimension < 0 || dimension > 3)
       in_.refuse("a node block of dimension %d; expected 0 to 3", dimension);
     if (parametric != 0 && parametric != 1) in_.refuse("parametric flag %d; expected 0 or 1", parametric);
+    const int32_t parameters = !parametric || (first_four_ && dimension == 3) ? 0 : dimension;
     if (n < 0 || uint64_t(n) > nnode - nodes_.size())
       in_.refuse("a block of %lld nodes where %llu of the %llu promised are left", ll(n),
                  ull(nnode - nodes_.size()), ull(nnode));
-    for (int64_t i = 0; i < n; ++i) nodes_.add(size("a node's number"));
+    for (int64_t i = 0; i < n && !first_four_; ++i) nodes_.add(tag("a node's number"));
     for (int64_t i = 0; i < n; ++i) {
+      if (first_four_) nodes_.add(tag("a node's number"));
       for (int k = 0; k < 3; ++k) out_.points.push_back(real("a node's coordinate"));
-      for (int k = 0; k < (parametric ? dimension : 0); ++k) real("a node's parameter");
+      for (int k = 0; k < parameters; ++k) real("a node's parameter");
     }
   }
   in_.expect("$EndNodes", "the node blocks promised");
@@ -79,30 +84,33 @@ void MshReader::read_nodes_41() {
     in_.refuse("$Nodes promises %llu nodes, its blocks hold %zu", ull(nnode), nodes_.size());
 }
 
-void MshReader::read_elements_41() {
+void MshReader::read_elements_4() {
   in_.begin_data("$Elements");
   const int64_t nblock = size("the number of element blocks");
-  const uint64_t nelement = in_.count(size("the number of elements"), 2 * size_bytes(), "elements");
-  size("the least element number");
-  size("the greatest element number");
+  const uint64_t nelement = in_.count(size("the number of elements"), 2 * tag_bytes(), "elements");
+  if (!first_four_) {
+    size("the least element number");
+    size("the greatest element number");
+  }
   uint64_t done = 0;
   for (int64_t b = 0; b < nblock; ++b) {
+    int32_t entity = first_four_ ? number("an element block's entity") : 0;
     const int32_t dimension = number("an element block's dimension");
-    const int32_t entity = number("an element block's entity");
+    if (!first_four_) entity = number("an element block's entity");
     const int32_t type = number("an element block's type");
     const int64_t n = size("an element block's number of elements");
     if (n < 0 || uint64_t(n) > nelement - done)
       in_.refuse("a block of %lld elements where %llu of the %llu promised are left", ll(n),
                  ull(nelement - done), ull(nelement));
     begin_elements(type);
-    in_.count(n, size_bytes() * (1 + element_.points), "elements in a block");
+    in_.count(n, tag_bytes() * (1 + element_.points), "elements in a block");
     if (type == kTet) out_.expect_tets(size_t(n));
     const uint32_t group = group_of(dimension, entity);
     if (group != kNoGroup && element_.dimension != dimension)
       in_.refuse("elements of type %d in an entity of dimension %d", type, dimension);
     for (int64_t i = 0; i < n; ++i) {
-      size("an element's number");
-      for (uint32_t k = 0; k < element_.points; ++k) tags_[k] = size("an element's node");
+      tag("an element's number");
+      for (uint32_t k = 0; k < element_.points; ++k) tags_[k] = tag("an element's node");
       add_element(group);
     }
     done += uint64_t(n);
