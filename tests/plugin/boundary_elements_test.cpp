@@ -338,4 +338,51 @@ TEST(Boundary, WhatItCannotTake_IsRefusedInASentence) {
   EXPECT_EQ(host.live, 0u);
 }
 
+// N, between a cube of 0.1 m and the planes that press it by 2 %, on which it sticks.
+double force_of_pressed_cube(const char *model, const char *mesh, uint32_t cells, double poisson) {
+  test::Context context(1);
+  const dfm_world w = test::make_world(context, {0, 0, 0});
+  test::BodyOptions o;
+  o.model = model;
+  o.poisson = poisson;
+  o.damping_stiffness = 0.02;
+  const double offset = 5e-5, edge = 0.1;
+  o.position = {0, 0, offset};
+  test::make_body(context, w, mesh, {edge, edge, edge}, cells, o);
+  test::add_plane(w, "bottom");
+  const dfm_obstacle top = test::add_plane(w, "top", {0, 0, edge + 2 * offset}, {1, 0, 0, 0});
+  test::set_friction(w, 1);
+  const auto press = [&](double depth) {
+    const dfm_pose pose{{0, 0, edge + 2 * offset - depth}, {1, 0, 0, 0}};
+    test::ok(dfm_obstacle_move_to(top, &pose));
+  };
+  if (model == std::string("boundary")) {  // which steps itself, so there is no static mode
+    for (int n = 1; n <= 50; ++n) {
+      press(0.02 * edge * n / 50);
+      test::run(w, 2e-3, 2e-3);
+    }
+    test::run(w, 0.12, 2e-3);
+  } else {
+    press(0.02 * edge);
+    const dfm_equilibrium_def def = dfm_equilibrium_def_default();
+    test::ok(dfm_world_equilibrium(w, &def, nullptr));
+  }
+  const std::vector<dfm_pair_report> pairs = test::listed(dfm_world_pairs, w);
+  dfm_world_destroy(w);
+  EXPECT_EQ(pairs.size(), 2u);
+  if (pairs.size() < 2) return NAN;
+  EXPECT_NEAR(pairs[0].normal / pairs[1].normal, 1, 1e-5);
+  return pairs[0].normal;
+}
+
+// With free sides it would be 20 N at any Poisson's ratio.
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Boundary, CubePressedBetweenPlanes_AnswersWithTheForceOfFiniteElements) {
+  for (const double poisson : {0.3, 0.45}) {
+    const double force = force_of_pressed_cube("boundary", "beam", 3000, poisson);
+    const double cells = force_of_pressed_cube("corotational_fem", "bricks", 729, poisson);
+    EXPECT_NEAR(force / cells, 1, 0.03) << poisson;
+  }
+}
+
 }  // namespace
