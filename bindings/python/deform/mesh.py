@@ -140,7 +140,7 @@ class TetMesh(_Mesh):
 
     @classmethod
     def read(cls, path: Any) -> TetMesh:
-        """Reads MSH, VTK, VTU, Medit, Abaqus or TetGen; what was repaired is in `warnings`."""
+        """Reads MSH, VTK, VTU, Medit, Abaqus, TetGen or Netgen; what was repaired is in `warnings`."""
         return cls._of(lib.dfm_mesh_load, default_context().address, encoded(path), _abi.DFM_MESH_CELLS)
 
     @classmethod

@@ -9,7 +9,7 @@ extern "C" {
 #endif
 /** What a mesh holds. ANY: cells if there are some, else a surface. */
 enum { DFM_MESH_ANY = 0, DFM_MESH_CELLS = 1, DFM_MESH_SURFACE = 2 };
-/** Reads MSH 2.2 and 4.1, legacy VTK 2.0 to 5.1, VTU, Medit, Abaqus, TetGen, and surfaces of OBJ, PLY, STL,
+/** Reads MSH 2 and 4, legacy VTK 2.0 to 5.1, VTU, Medit, Abaqus, TetGen, Netgen, surfaces of OBJ, PLY, STL,
  * OFF (doc/reference/mesh_files.md). The first bytes, else the ending, tell the format. Memory is bounded
  * by the size of the file. Each repair is counted in dfm_mesh_info and has a sentence in its warnings and
  * the log.

@@ -55,6 +55,7 @@ void read_vtu(Cursor &in, RawMesh &out);
 void read_medit(Cursor &in, RawMesh &out);
 void read_abaqus(Cursor &in, RawMesh &out);
 void read_tetgen(Cursor &in, RawMesh &out);
+void read_netgen(Cursor &in, RawMesh &out);
 void read_obj(Cursor &in, RawMesh &out);
 void read_ply(Cursor &in, RawMesh &out);
 void read_stl(Cursor &in, RawMesh &out);

@@ -36,6 +36,7 @@ const std::vector<Format> &formats() {
       {"OFF", {"off", "coff", "noff"}, read_off, nullptr},
       {"Abaqus", {"inp"}, read_abaqus, nullptr},
       {"TetGen", {"ele", "node", "face"}, read_tetgen, nullptr},
+      {"Netgen", {"vol"}, read_netgen, nullptr},
       {"TetGen's input or edges", {"poly", "smesh", "edge"}, nullptr, "read the .ele that tetgen writes"},
       {"binary Medit", {"meshb"}, nullptr, "convert it first: gmsh -3 -format mesh FILE -o OUT.mesh"},
       {"glTF", {"gltf", "glb"}, nullptr, kAssimp},
@@ -103,6 +104,7 @@ const Format *format_by_content(std::string_view bytes) {
   const std::string_view word = head.substr(0, head.find_first_of(" \t\r\n"));
   if (word == "$MeshFormat" || word == "$NOD" || word == "$Comments") return format_called("MSH");
   if (word == "MeshVersionFormatted") return format_called("Medit");
+  if (word == "mesh3d") return format_called("Netgen");
   if (word == "ply") return format_called("PLY");
   if (word == "OFF" || word == "COFF" || word == "NOFF" || word == "CNOFF" || word == "STOFF")
     return format_called("OFF");

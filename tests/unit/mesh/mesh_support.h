@@ -45,7 +45,7 @@ inline std::vector<std::string> files_of(const std::string &folder, const std::v
 }
 inline std::vector<std::string> own_meshes() {
   return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/meshes",
-                  {".msh", ".vtk", ".vtu", ".mesh", ".inp"});
+                  {".msh", ".vtk", ".vtu", ".mesh", ".inp", ".vol"});
 }
 inline std::vector<std::string> own_surfaces() {
   return files_of(std::string(DEFORM_SOURCE_DIR) + "/tests/data/surfaces",

@@ -69,7 +69,7 @@ TEST(ReadDispatch, ForeignEndings_AreRefusedWithTheWayToConvert) {
 TEST(ReadDispatch, UnknownEnding_NamesTheNearestAndAllThatAreRead) {
   expect_unsupported(
       "a.stll", "x",
-      {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off, .inp, .ele"});
+      {"'stll'", "did you mean .stl?", ".msh, .vtk, .vtu, .mesh, .obj, .ply, .stl, .off, .inp, .ele, .vol"});
   expect_unsupported("a.d/mesh", "x", {"unknown mesh file ending ''"});
 }
 
