@@ -35,9 +35,10 @@ SEARCH = {"step": [5e-4, 1e-3, 2e-3, 4e-3], "cone": [None, "elliptic"],
                                                     "0.9999 0.9999 1e-5"],
           "diagexact": [None, "enable"], "solver": [None, "CG"], "iterations": [None, 20, 300],
           "tolerance": [None, 1e-5, 1e-10], "dof": [None, "trilinear", "quadratic"], "margin": [None, 1e-4],
-          "cellcount": [None, "2 2 1", "2 2 2", "4 4 1"]}
-BEGIN = [{**SETTINGS["hard 4 ms"], "dof": dof, "tolerance": tolerance}
-         for dof in ("trilinear", "quadratic") for tolerance in (1e-5, 1e-8)]
+          "cellcount": [None, "2 2 1", "2 2 2", "4 4 1"], "ipc": [None, "enable"]}
+BEGIN = [*({**SETTINGS["hard 4 ms"], "dof": dof, "tolerance": tolerance}
+           for dof in ("trilinear", "quadratic") for tolerance in (1e-5, 1e-8)),
+         {**SETTINGS["hard 4 ms"], "dof": "trilinear", "tolerance": 1e-5, "ipc": "enable"}]
 OPTION_KEYS = ("cone", "impratio", "tolerance", "iterations", "solver")
 # nothing in them is faster, and at the cases' own step they take four times as long
 LEAST_STEP = {"pinch_hold": 2e-3, "rotating_pad": 2e-3}
@@ -119,10 +120,10 @@ class Entry:
         touch = contact_of(case, given)
         flex += '<contact selfcollide="none" condim="3" %s/>%s</flexcomp>' % (touch, pin)
         xml = ('<mujoco><size memory="1G"/><option timestep="%g" integrator="discrete" %s><flag '
-               'diagexact="%s"/></option>'
+               'diagexact="%s" ipc="%s"/></option>'
                '<default><geom %s/></default><worldbody>%s%s</worldbody></mujoco>') % (
-            case["step"], option, given.get("diagexact", "disable"), touch, walls, holder % flex if holder
-            else flex)
+            case["step"], option, given.get("diagexact", "disable"), given.get("ipc", "disable"), touch,
+            walls, holder % flex if holder else flex)
         try:
             model = self.mj.MjModel.from_xml_string(xml)
         except ValueError as error:

@@ -41,6 +41,6 @@ def settings(entry, case, parameters):
 
 def told(given):
     """Settings in one line."""
-    plain = {key: value["type"] if isinstance(value, dict) else "%.4g" % value if isinstance(value, float)
-             else value for key, value in given.items()}
+    plain = {key: next(iter(value.values())) if isinstance(value, dict) else "%.4g" % value
+             if isinstance(value, float) else value for key, value in given.items()}
     return "; ".join("%s %s" % pair for pair in sorted(plain.items())) or "all as it comes"

@@ -82,7 +82,7 @@ def searched(entry, case, named, known, given):
         if len(tried) >= given.trials or spent >= given.seconds or number > 20 * given.trials:
             break
         key = json.dumps(settings, sort_keys=True)
-        if key in tried:
+        if key in tried or not getattr(entry, "possible", lambda _: True)(settings):
             continue
         entry.settings = {**type(entry).settings, found.FOUND: settings}
         begun = used_now()

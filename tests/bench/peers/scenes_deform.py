@@ -12,6 +12,7 @@ import json
 import math
 import os
 import resource
+import signal
 import subprocess
 
 import mesh_file
@@ -27,7 +28,8 @@ GAP = 2e-5  # m, start distance: settles without an impact
 
 
 class Entry:
-    name, settings, SEARCH, lattice = "deform", SETTINGS, entry_deform.SEARCH, None
+    name, settings, SEARCH, BEGIN = "deform", SETTINGS, entry_deform.SEARCH, entry_deform.BEGIN
+    lattice, lay, possible = None, entry_deform.Entry.lay, staticmethod(entry_deform.Entry.possible)
 
     def __init__(self, command, work):
         self.command, self.work, self.meshes = command, work, {}
@@ -43,9 +45,7 @@ class Entry:
             path = os.path.join(self.work, "mesh_%d.msh" % len(self.meshes))
             mesh_file.make(self.command, body, path)
             self.meshes[key] = path
-            surface = path.replace(".msh", ".obj")
-            subprocess.run([self.command, "mesh", "convert", path, surface, "--quiet"], check=True)
-        return self.meshes[key].replace(".msh", ".obj") if self.lattice else self.meshes[key]
+        return self.meshes[key]
 
     def run(self, case, configuration):
         scene = getattr(self, "scene_" + case["name"])(case)
@@ -63,8 +63,8 @@ class Entry:
                                                         "params": {"mu": case["mu"]}}]
         for body in scene["bodies"]:
             body.update(mesh=self.mesh(case["body"]), material="gel", **({"model": given["model"]} if "model"
-                                                                         in given else {}),
-                        **({"lattice": self.lattice} if self.lattice else {}))
+                                                                         in given else {}))
+        self.surface = self.lay(scene, self.mesh(case["body"]), self.lattice) if self.lattice else None
         path, folder = os.path.join(self.work, "scene.json"), os.path.join(self.work, "run")
         with open(path, "w") as f:
             json.dump(scene, f)
@@ -74,7 +74,7 @@ class Entry:
                               text=True,
                               preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (most, most + 5)))
         used = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-        if done.returncode and used > most - 2:
+        if done.returncode and (used > most - 2 or done.returncode == -signal.SIGXCPU):
             raise scenes.friction_cases.TooSlow(0, scene["time"]["duration"], most)
         if done.returncode:
             raise RuntimeError((done.stderr or done.stdout).strip().splitlines()[-1])
@@ -165,7 +165,7 @@ class Entry:
 
     def points(self, body):
         if self.lattice:
-            with open(self.mesh(body)) as f:
+            with open(self.surface) as f:
                 return [[float(x) for x in line.split()[1:4]] for line in f if line.startswith("v ")], None
         path = os.path.join(self.work, "points.msh2")
         mesh_file.make(self.command, body, path)
