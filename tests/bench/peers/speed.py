@@ -74,6 +74,7 @@ def picture(rows, path):
                  "--picture")
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    import matplotlib.ticker
     by_name = {}
     for (case, _), by in runs(rows).items():
         by_name.setdefault(case, []).extend((*who, *what) for who, what in by.items())
@@ -85,6 +86,9 @@ def picture(rows, path):
                             color=COLORS.get(engine, "#7a7a7a"), label=engine)
         axis.axhline(1, color="k", lw=0.8, ls=":")
         axis.set_ylim(4e-5, 2.5e4)
+        low, high = (math.log10(x) for x in axis.get_xlim())
+        axis.set_xlim(10 ** math.floor(low), 10 ** math.ceil(high))  # a label at each end
+        axis.xaxis.set_minor_formatter(matplotlib.ticker.NullFormatter())
         axis.set_title(case, fontsize=10)
         axis.grid(True, alpha=0.25)
         axis.set_xlabel("processor time per simulated second (s)", fontsize=8)
