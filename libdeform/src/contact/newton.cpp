@@ -88,10 +88,10 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     factor_.solve(1, in, out, 0, info);
   };
   for (bool fresh : {false, true}) {
-    if (!fresh && (!factored_ || kept_for_ >= Set::products)) continue;
+    if (!fresh && (!factored_ || kept_for_ >= Set::inner)) continue;
     if (fresh && !refactor()) return false;
     const Gmres::Result found =
-        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, Set::products, by, precondition);
+        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, Set::inner, by, precondition);
     products_ += found.iterations;
     kept_for_ = fresh ? 0 : kept_for_ + found.iterations;
     if (fresh || found.left <= tolerance) break;
@@ -102,7 +102,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   const double before = size(), left = error();
-  failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::linear));
+  failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::of_start));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
   ++steps_;
@@ -126,7 +126,7 @@ bool ContactNewton::frozen_steps() {
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
-    if (!find_way(true, Set::linear)) return false;
+    if (!find_way(true, Set::of_start)) return false;
     const double first = slope();
     base_.assign(v_.begin(), v_.end());
     ++steps_;
@@ -135,7 +135,7 @@ bool ContactNewton::frozen_steps() {
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
     bool found = false;
-    for (uint32_t trial = 0; trial < Set::trials; ++trial) {
+    for (uint32_t trial = 0; trial < Set::inner; ++trial) {
       move(share);
       const bool known = evaluate(true);
       const double now = known ? slope() : std::numeric_limits<double>::infinity();
@@ -214,7 +214,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     bool round;
     if (!newton(goal, round)) return false;
     if (round && steps_ < limit_) {
-      scale_penalties(1 / Set::growth);
+      scale_penalties(1 / Set::penalty);
       slow = 0;
       v_.assign(before.begin(), before.end());
       continue;
@@ -244,14 +244,14 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     if (still && off <= tolerance) {
       found_ = stood++ >= Set::rounds && stalled;
       if (found_) break;
-      scale_penalties(Set::growth);
+      scale_penalties(Set::penalty);
     }
     aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
     if (slow < Set::rounds) continue;
     slow = 0;
-    scale_penalties(Set::growth);
+    scale_penalties(Set::penalty);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
     v_.swap(best_v_);
@@ -291,7 +291,7 @@ bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   limit_ = steps_ + steps;
   for (bool round = true; round && steps_ < limit_;) {
     if (!newton(tolerance, round)) return false;
-    if (round) scale_penalties(1 / Set::growth);
+    if (round) scale_penalties(1 / Set::penalty);
   }
   put_rows();
   return host_->judge(residual_);

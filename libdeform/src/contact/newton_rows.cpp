@@ -301,7 +301,7 @@ bool ContactNewton::evaluate(bool frozen) {
     laws = laws || (s.form[i] != kNoFriction && s.fn[i] > 0 && !(frozen && !smooth));
   }
   // a slip that is off by e is an impulse that is off by rho e
-  const double slip = SolveSettings::linear * goal_ / stiff_;
+  const double slip = SolveSettings::of_start * goal_ / stiff_;
   if (finite != 0 || (laws && !host_->evaluate_local(response_.data(), slip))) return false;
   for (uint32_t k = 0; k < row_.size(); ++k) {
     double *const l = &l_[3 * size_t{k}];

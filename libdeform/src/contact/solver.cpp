@@ -247,7 +247,7 @@ void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<cons
     double tangent = bounds.tangent;
     each_side(sides, i, disturbance, [&](const double *d) {
       tangent = std::max(tangent, SolveSettings::of_start * d[0]);
-      normal = std::max(normal, SolveSettings::of_start_normal * d[1]);
+      normal = std::max(normal, SolveSettings::of_start * d[1]);
     });
     tolerance.normal[i] = std::min(normal, bounds.most_normal);
     tolerance.tangent[i] = tangent;

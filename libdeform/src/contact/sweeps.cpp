@@ -18,13 +18,13 @@ using Set = SolveSettings;
 class ResidualSchedule {
  public:
   bool is_time(const RowsPart &part, uint32_t sweeps, uint32_t most) const {
-    return sweeps >= std::min({next_, Set::polish, most}) || !part.blocks.empty();
+    return sweeps >= std::min({next_, Set::inner, most}) || !part.blocks.empty();
   }
   void note(uint32_t sweeps, const Residual &left) {
-    const int size = std::ilogb(left.required / Set::pass_fraction);  // in halves
+    const int size = std::ilogb(left.required / Set::accuracy);  // in halves
     const bool slow = known_ && 2 * (size_ - size) <= int(sweeps - at_);
     const int sweeps_left = slow ? size + 1 : (size + 2) / 2;
-    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, Set::unseen));
+    next_ = sweeps + uint32_t(std::clamp(sweeps_left, 1, int(Set::rounds)));
     known_ = true;
     size_ = size;
     at_ = sweeps;
@@ -41,7 +41,7 @@ class ResidualSchedule {
 Sweeps::Sweeps(const Memory &memory) : acceleration_(memory) { use_memory(memory, start_); }
 
 bool Sweeps::good(const Residual &left, double fraction) const {
-  return left.relative <= fraction || (left.required <= fraction && count_ >= Set::polish);
+  return left.relative <= fraction || (left.required <= fraction && count_ >= Set::inner);
 }
 
 void Sweeps::sweep_once() {
@@ -58,8 +58,8 @@ bool Sweeps::pass() {
     sweep_once();
     if (schedule.is_time(*part_, count_, most_)) {
       const Residual left = residual_of(*rows_, *part_, *state_, h_, *tolerance_);
-      if (!std::isfinite(left.required)) return false;
-      if (good(left, Set::pass_fraction) || count_ >= most_ || !laws_->goes_on()) return true;
+      if (!std::isfinite(left.relative)) return false;
+      if (good(left, Set::accuracy) || count_ >= most_ || !laws_->goes_on()) return true;
       schedule.note(count_, left);
     }
     acceleration_.follow(*rows_, *part_);

@@ -33,30 +33,19 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
   return most;
 }
 
-void tighten(const ContactRows &rows, SolveIsland &own) {
-  double scale = 0;
-  each_row(own.part.contacts, [&](uint32_t i) {
-    scale = std::max(scale, std::fabs(rows.rate[i]) + norm(rows.velocity(i, rows.y_free.data())));
-  });
-  own.tolerance.most_normal = Set::rigid_rounding * scale;
-  each_row(own.part.contacts, [&](uint32_t i) {
-    own.tolerance.normal[i] = own.tolerance.tangent[i] = Set::rigid_rounding * scale;
-  });
-}
-
 void begin_newton(StepContext &step, SolveIsland &own) {
   if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
   own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
 }
 
-// After sweeps. least: m/s, of tangents at rest. normal: of normals.
-void solve_rigid(StepContext &step, SolveIsland &own, double least, double normal) {
+// After sweeps. Where rows contradict each other, the better result counts.
+void solve_rigid(StepContext &step, SolveIsland &own, double tolerance, double normal) {
   const double swept = own.residual.speed;
-  if (own.bad || swept <= Set::rigid_at_rest * least) return;
+  if (own.bad || swept <= tolerance) return;
   own.swept.resize(3 * size_t{own.part.all()});
   take_impulses(step.rows, own.part, own.swept.data());
   begin_newton(step, own);
-  const bool found = own.newton->solve(0.1 * Set::rigid_at_rest * least, normal, Set::rigid_steps);
+  const bool found = own.newton->solve(tolerance, normal, Set::inner);
   own.sweeps += own.newton->steps();
   own.residual = own.newton->residual();
   if (found && !own.bad && own.residual.speed <= swept) return;
@@ -103,10 +92,9 @@ double motion_tolerance(const SolveIsland &own) {
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
-  const bool is_static = w.prescribed.is_static(), memory = own.batches.remembers();
   const ToleranceBounds bounds{least,
-                               own.implicit || is_static ? least
-                               : memory                  ? Set::remembered_at_rest * least
+                               own.implicit              ? least
+                               : own.batches.remembers() ? Set::exact * least
                                                          : normal,
                                normal};
   const auto allow = [&] {
@@ -114,7 +102,12 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
                   step.disturbance.data(), own.tolerance);
   };
   allow();
-  if (own.all_rigid) tighten(step.rows, own);
+  const double exact = Set::exact * least;
+  if (own.all_rigid) {
+    const double sought = own.tolerance.most_normal = Set::exact * exact;
+    each_row(own.part.contacts,
+             [&](uint32_t i) { own.tolerance.normal[i] = own.tolerance.tangent[i] = sought; });
+  }
   find_slip_back(w, step, own);
   if (step.capture) own.problem = take_problem(w, step, own);
   if (!own.implicit) {
@@ -124,7 +117,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
     own.sweeps = own.sweeping.count();
     if (done) return;
     if (own.all_rigid) {
-      solve_rigid(step, own, least, normal);
+      solve_rigid(step, own, exact, normal);
       allow();
       if (!own.bad) own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
       return;

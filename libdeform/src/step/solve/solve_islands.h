@@ -56,12 +56,12 @@ struct SolveIsland {
   std::unique_ptr<ContactNewton> newton;  // null until it is needed
   IslandLaws laws;
   Tolerance tolerance;
+  std::vector<double> swept;  // [rows,3] N s, scratch
   // of the last solve
   Residual residual;
   uint32_t passes = 0, sweeps = 0;
-  bool failed = false;        // no velocities were found: a model cannot tell its forces
-  bool drifts = false;        // contacts of it owe slip (friction_memory.h)
-  std::vector<double> swept;  // [rows,3] N s, scratch
+  bool failed = false;  // no velocities were found: a model cannot tell its forces
+  bool drifts = false;  // contacts of it owe slip (friction_memory.h)
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
   std::exception_ptr thrown;

@@ -76,7 +76,7 @@ void find_slip_back(const World &w, StepContext &step, SolveIsland &own) {
   const double rate = SolveSettings::take_back / step.length.planned;
   each_row(own.part.contacts, [&](uint32_t i) {
     if (i >= step.rows.soft()) return;
-    const Vec3 back = at_most(SolveSettings::most_back * own.tolerance.tangent[i],
+    const Vec3 back = at_most(SolveSettings::accuracy * own.tolerance.tangent[i],
                               rate * load3(stick_drift + 3 * size_t{i}));
     for (size_t k = 0; k < 2; ++k) {
       const double along = dot(load3(&step.rows.frame[size_t{9} * i + 3 + 3 * k]), back);
