@@ -115,7 +115,8 @@ bool ContactNewton::coupled_step(double tolerance, bool &failed) {
   return false;
 }
 
-// Steps on the convex function with frozen limits of friction, until its gradient has fallen to a tenth.
+// Steps on the convex function with frozen limits of friction, until its gradient has fallen to 0.3 of the
+// first.
 bool ContactNewton::frozen_steps() {
   freeze();
   if (!evaluate(true)) return false;

@@ -14,18 +14,21 @@ struct SolveSettings {
   // rho w: larger, fewer passes with more Newton steps each. Also the factor by which rho grows where passes
   // are slow, and falls where steps go round.
   static constexpr double penalty = 10;
-  // Of the tolerance, by which normals may miss what velocities no longer follow.
+  // What normals may be off by where velocities no longer change, over their tolerance.
   static constexpr double contradiction = 20;
-  // In a row, after which passes are slow, steps go round, rows contradict; sweeps without a residual, which
-  // costs as much as a sweep.
+  // In a row: slow passes, after which rho grows; phases of frozen steps, after which steps go round; passes
+  // at rest, after which rows contradict each other. Also sweeps, at most, from one residual to the next,
+  // since a residual costs as much as a sweep.
   static constexpr uint32_t rounds = 3;
   // Of an inner iteration, at most: products of a system, and of all that a factor is kept for; trials of a
   // line search, since bodies near inversion take steps of a thousandth; Newton steps where all is rigid
   // (what these do not find, more do not); sweeps that go below what is required, for the next sub-step.
   static constexpr uint32_t inner = 24;
 
-  // Tolerances. Of normals, as a share of half of d_c over h; of tangents, m/s at rest; both also as shares
-  // of the slip, and of what the start leaves; the last also of the system of a Newton step.
+  // Tolerances. gap: of normals, as a share of half of d_c over h. at_rest: of tangents, m/s. of_slip: of
+  // tangents, as a share of the slip; of bonds, of what the start leaves. of_start: of normals and tangents,
+  // as a share of what the start leaves; also the relative residual of the system of a Newton step, at most,
+  // and the share of a pass's goal over rho w to which slips of laws are known.
   static constexpr double gap = 0.01;
   static constexpr double at_rest = 1e-6;
   static constexpr double of_slip = 1e-3;

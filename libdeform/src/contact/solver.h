@@ -70,7 +70,7 @@ void find_disturbance(const ContactRows &rows, const RowsPart &part, const Conta
 // tangent[i] = max(bounds.tangent, 1e-2 d), d the larger one of the two bodies. A contact at rest is warm
 // started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what
 // the sub-step changes is enough, and what is left is part of the next sub-step's d. normal[i] =
-// max(bounds.normal, 2e-2 d), with the second d, up to most_normal. bond = max(bounds.tangent, 1e-3 of the
+// max(bounds.normal, 1e-2 d), with the second d, up to most_normal. bond = max(bounds.tangent, 1e-3 of the
 // largest that the warm start leaves).
 void set_tolerance(const ContactRows &rows, const RowsPart &part, std::span<const ContactPoint> contacts,
                    double h, const ToleranceBounds &bounds, const uint32_t *sides, const double *disturbance,

@@ -97,7 +97,7 @@ const Format *format_by_content(std::string_view bytes) {
                          : head.find("<X3D") != head.npos   ? "X3D or Blender"
                                                             : "");
   }
-  while (starts(head, "#")) {  // OFF and Medit may begin with comments
+  while (starts(head, "#")) {  // OFF, Medit and Netgen may begin with comments
     head.remove_prefix(std::min(head.find('\n'), head.size()));
     head.remove_prefix(std::min(head.find_first_not_of(" \t\r\n"), head.size()));
   }

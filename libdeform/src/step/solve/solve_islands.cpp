@@ -38,7 +38,8 @@ void begin_newton(StepContext &step, SolveIsland &own) {
   own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
 }
 
-// After sweeps. Where rows contradict each other, the better result counts.
+// After sweeps. Where rows contradict each other, the better result counts. tolerance, normal: m/s, as of
+// ContactNewton::solve().
 void solve_rigid(StepContext &step, SolveIsland &own, double tolerance, double normal) {
   const double swept = own.residual.speed;
   if (own.bad || swept <= tolerance) return;

@@ -11,7 +11,7 @@
 // Where more contacts carry load than points can move, not every set of velocities can be asked for. The
 // slips of all contacts since the same instant can be taken back: the points go where they were. But
 // contacts begin and end, and what those that stay owe then belongs to no motion of the points. So a(e) /
-// T is a share of e / T and at most r / 2, r the tolerance of the sub-step: the state without slip, which
+// T is a share of e / T and at most 0.3 r, r the tolerance of the sub-step: the state without slip, which
 // solves the contacts without e, is good enough in any case, and contradictions change impulses by no more
 // than the tolerance does.
 #include "step/solve/friction_memory.h"
