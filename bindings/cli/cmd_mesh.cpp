@@ -40,7 +40,7 @@ std::string filling_file(const std::string &out) {
 }
 
 constexpr const char *kIn =
-    "mesh of any format that is read: .msh .vtk .vtu .mesh .inp .ele .obj .ply .stl .off";
+    "mesh of any format that is read: .msh .vtk .vtu .mesh .inp .ele .vol .obj .ply .stl .off";
 
 bool open(MeshSession &s, const std::string &file, uint32_t what = DFM_MESH_ANY) {
   return s.context && dfm_mesh_load(s.context, file.c_str(), what, &s.mesh) >= 0;

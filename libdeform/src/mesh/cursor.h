@@ -140,6 +140,11 @@ class Cursor {
     if (claimed > 0 && uint64_t(claimed) <= (left() + 1) / (2 * words_each)) return uint64_t(claimed);
     return count(claimed, 2 * words_each, what);
   }
+  // The number of a group.
+  int32_t in_32_bits(int64_t value, const char *what) const {
+    if (value < INT32_MIN || value > INT32_MAX) refuse("%s %lld does not fit 32 bits", what, ll(value));
+    return static_cast<int32_t>(value);
+  }
   // A promised number of what 32 bits can name.
   uint32_t small(uint64_t n, const char *what) const {
     if (n > kMaxPoints) unsupported("%llu %s; up to %u are read", ull(n), what, kMaxPoints);

@@ -47,11 +47,6 @@ void MshReader::add_element(uint32_t group) {
   }
 }
 
-int32_t MshReader::in_32_bits(int64_t value, const char *what) const {
-  if (value < INT32_MIN || value > INT32_MAX) in_.refuse("%s %lld does not fit 32 bits", what, ll(value));
-  return static_cast<int32_t>(value);
-}
-
 namespace {
 
 // Moves past "$NAME" content that is not used, to after "$EndNAME".
@@ -70,7 +65,7 @@ void MshReader::read_physical_names() {
     const int64_t dimension = in_.integer("a physical group's dimension");
     if (dimension < 0 || dimension > 3)
       in_.refuse("a physical group of dimension %lld; expected 0 to 3", ll(dimension));
-    const int32_t tag = in_32_bits(in_.integer("a physical group's number"), "the physical group number");
+    const int32_t tag = in_.in_32_bits(in_.integer("a physical group's number"), "the physical group number");
     const std::string_view text = in_.line();
     const size_t open = text.find('"'), close = text.rfind('"');
     if (open == std::string_view::npos || close == open)

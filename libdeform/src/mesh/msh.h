@@ -45,9 +45,8 @@ class MshReader {
   // file has nothing straight.
   void begin_elements(int64_t type);  // checks that elements of this type can be taken
   void add_element(uint32_t group);   // of nodes tags_
-  int32_t in_32_bits(int64_t value, const char *what) const;
   double real(const char *what) { return in_.real(Number::f64, what); }
-  int32_t number(const char *what) { return in_32_bits(in_.integer(Number::i32, what), what); }
+  int32_t number(const char *what) { return in_.in_32_bits(in_.integer(Number::i32, what), what); }
 
   void read_nodes_22(bool parametric);
   void read_elements_22();

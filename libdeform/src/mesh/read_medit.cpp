@@ -74,10 +74,8 @@ class MeditReader {
     uint32_t corner[10];
     for (uint64_t i = 0; i < n; ++i) {
       for (uint32_t k = 0; k < corners; ++k) corner[k] = point();
-      const int64_t reference = in_.integer("an element's reference");
-      if (reference < INT32_MIN || reference > INT32_MAX)
-        in_.refuse("reference %lld does not fit 32 bits", ll(reference));
-      const uint32_t group = out_.group(in_, dimension, static_cast<int32_t>(reference));
+      const int32_t reference = in_.in_32_bits(in_.integer("an element's reference"), "reference");
+      const uint32_t group = out_.group(in_, dimension, reference);
       if (dimension == 3) out_.add_cell(in_, kind, corner, group);
       else if (corners == 6) out_.add_second_triangle(in_, corner, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);

@@ -40,7 +40,7 @@ void MshReader::read_elements_22() {
       int32_t physical = 0;
       for (int64_t k = 0; k < ntag; ++k) {
         const int64_t tag = next("an element's tag");
-        if (k == 0) physical = in_32_bits(tag, "the physical group number");
+        if (k == 0) physical = in_.in_32_bits(tag, "the physical group number");
       }
       for (uint32_t k = 0; k < element_.points; ++k) tags_[k] = next("an element's node");
       add_element(out_.group(in_, element_.dimension, physical));

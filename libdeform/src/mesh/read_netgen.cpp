@@ -68,9 +68,8 @@ class NetgenReader {
     const uint64_t n = in_.text_count(in_.integer("the number of elements"), 6, "elements");
     for (uint64_t i = 0; i < n; ++i) {
       if (dimension == 2) in_.integer("an element's surface");
-      const int64_t number = in_.integer("an element's material or boundary condition");
-      if (number < INT32_MIN || number > INT32_MAX)
-        in_.refuse("number %lld does not fit 32 bits", ll(number));
+      const char *const names = dimension == 2 ? "boundary condition" : "material";
+      const int32_t number = in_.in_32_bits(in_.integer(names), names);
       if (dimension == 2)
         for (int k = 0; k < 2; ++k) in_.integer("a domain beside an element");
       const int64_t corners = in_.integer("an element's number of points");
@@ -84,7 +83,7 @@ class NetgenReader {
       for (uint32_t k = 0; k < corners; ++k)
         nodes[dimension == 3 ? kCell[k] : second ? kTriangle[k] : k] = point();
       in_.line();
-      const uint32_t group = out_.group(in_, dimension, static_cast<int32_t>(number));
+      const uint32_t group = out_.group(in_, dimension, number);
       if (dimension == 3) out_.add_cell(in_, second ? DFM_CELL_TET10 : DFM_CELL_TET, nodes, group);
       else if (second) out_.add_second_triangle(in_, nodes, group);
       else out_.add_polygon(in_, nodes, size_t(corners), group);
@@ -104,9 +103,9 @@ class NetgenReader {
     for (uint64_t i = 0; i < n; ++i) {
       const int64_t number = in_.integer("the number of a name");
       const std::string_view first = in_.line_word(), rest = in_.line();
-      if (first.empty() || first == "default") continue;  // Netgen's word for none
-      const std::string_view name(first.data(), size_t(rest.data() + rest.size() - first.data()));
-      names_[{dimension, number}] = name.substr(0, name.find_last_not_of(" \t\r") + 1);
+      std::string_view name(first.data(), size_t(rest.data() + rest.size() - first.data()));
+      name = name.substr(0, name.find_last_not_of(" \t\r") + 1);
+      if (!first.empty() && name != "default") names_[{dimension, number}] = name;  // Netgen's word for none
     }
   }
 

@@ -105,7 +105,12 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   allow();
   const double exact = Set::exact * least;
   if (own.all_rigid) {
-    const double sought = own.tolerance.most_normal = Set::exact * exact;
+    double scale = 0;  // m/s, of what rounds
+    each_row(own.part.contacts, [&](uint32_t i) {
+      scale = std::max(scale,
+                       std::fabs(step.rows.rate[i]) + norm(step.rows.velocity(i, step.rows.y_free.data())));
+    });
+    const double sought = own.tolerance.most_normal = std::max(Set::exact * exact, 0x1p-49 * scale);
     each_row(own.part.contacts,
              [&](uint32_t i) { own.tolerance.normal[i] = own.tolerance.tangent[i] = sought; });
   }
