@@ -32,8 +32,7 @@ struct Seen {
 class Run {
  public:
   Run(const Row &row, Seen &seen)
-      : row_(row),
-        seen_(seen),
+      : seen_(seen),
         s_(row),
         explicit_(level(row, kIntegrator) == "symplectic_euler"),
         self_(s_.upper == s_.lower),
@@ -296,7 +295,6 @@ class Run {
       say("slides with %.3g m/s at most: not the scene that it should be", seen_.slip);
   }
 
-  const Row row_;
   Seen &seen_;
   Scene s_;
   bool explicit_, self_;
