@@ -58,7 +58,7 @@ std::vector<T *> find_things(const std::vector<T *> &things, const std::vector<T
   std::vector<T *> named, unnamed, out;
   for (T *const x : things) (x->name == usual_name(*x, x->id) ? unnamed : named).push_back(x);
   std::ranges::sort(named, {}, &T::name);
-  size_t next = 0, taken = 0;
+  size_t next = 0;
   for (const ThingRow &r : rows) {
     if (r.name.empty()) {
       if (next == unnamed.size())
@@ -74,7 +74,6 @@ std::vector<T *> find_things(const std::vector<T *> &things, const std::vector<T
     if (at == named.end() || (*at)->name != r.name)
       differs(what, r.name, "is not in this world", "create it before you restore");
     out.push_back(*at);
-    ++taken;
   }
   std::vector<const T *> found(out.begin(), out.end());
   std::sort(found.begin(), found.end());
