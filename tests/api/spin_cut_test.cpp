@@ -64,39 +64,43 @@ struct Books {
   }
 };
 
+// A blade that falls through a turning cube parts it. Returns whether angular momentum was kept.
+bool cut_by_a_falling_blade(const char *model, double young, Random &random, int run) {
+  Spin s(model, young, random.direction(3 + random(1.5)), run % 2 ? 320 : 60);
+  const double x = random(0.01), speed = 1 + random(0.5), tilt = random(0.02);
+  steps(s.w, 3);
+  const Books books(s.b);
+  double z = 0.12;
+  while (z > -0.12) {
+    dfm_cut_def d = dfm_cut_def_default();
+    d.shape = DFM_CUT_BLADE;
+    d.how = DFM_CUT_SPLIT;
+    const double next = z - 1e-3 * speed;
+    const double corner[4][3] = {
+        {x, -0.5, z - tilt}, {x, 0.5, z + tilt}, {x, 0.5, next + tilt}, {x, -0.5, next - tilt}};
+    std::memcpy(d.blade, corner, sizeof corner);
+    cut(s.b, d);
+    steps(s.w, 1);
+    z = next;
+  }
+  EXPECT_EQ(parts(s.b), 2u) << model << " " << young << " " << run;
+  return books.check(s.b, run);
+}
+
 }  // namespace
 
-// Teeth that jam may bear loads that cancel each other, at points a rest distance apart: of 120 runs (three
-// seeds) 112 keep their angular momentum, 36 to 39 of each 40.
+// Teeth that jam may bear loads that cancel each other, at points a rest distance apart. Of 120 runs 112 keep
+// their angular momentum to a thousandth, 36 to 39 of the 40 of a seed: one seed alone tells little.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(SpinCut, MovingBlade_PartsACubeThatTurns) {
   int kept = 0;
   for (const char *model : kModels)
-    for (const double young : {2e4, 2e6}) {
-      Random random(17);
-      for (int run = 0; run < 10; ++run) {
-        Spin s(model, young, random.direction(3 + random(1.5)), run % 2 ? 320 : 60);
-        const double x = random(0.01), speed = 1 + random(0.5), tilt = random(0.02);
-        steps(s.w, 3);
-        const Books books(s.b);
-        double z = 0.12;
-        for (int i = 0; z > -0.12; ++i) {
-          dfm_cut_def d = dfm_cut_def_default();
-          d.shape = DFM_CUT_BLADE;
-          d.how = DFM_CUT_SPLIT;
-          const double next = z - 1e-3 * speed;
-          const double corner[4][3] = {
-              {x, -0.5, z - tilt}, {x, 0.5, z + tilt}, {x, 0.5, next + tilt}, {x, -0.5, next - tilt}};
-          std::memcpy(d.blade, corner, sizeof corner);
-          cut(s.b, d);
-          steps(s.w, 1);
-          z = next;
-        }
-        EXPECT_EQ(parts(s.b), 2u) << model << " " << young << " " << run;
-        kept += books.check(s.b, run);
+    for (const double young : {2e4, 2e6})
+      for (const uint64_t seed : {17, 18, 19}) {
+        Random random(seed);
+        for (int run = 0; run < 10; ++run) kept += cut_by_a_falling_blade(model, young, random, run);
       }
-    }
-  EXPECT_GE(kept, 36) << "of 40";
+  EXPECT_GE(kept, 110) << "of 120";
 }
 
 // Cuts, copies of points and what follows from them keep angular momentum to rounding. What books.check()

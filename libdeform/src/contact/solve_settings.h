@@ -42,7 +42,7 @@ struct SolveSettings {
   static constexpr double remembered = 0.05;
   // Where errors add up, rows are solved to this share of the tolerance at rest: normals, if laws remember,
   // and all rows where all is rigid. Nothing is elastic there, so no later sub-step makes good what a solve
-  // leaves, and loads that share a place wander where gaps differ by it: sweeps go on to this share of that.
+  // leaves, and loads that share a place wander where gaps differ by it; sweeps there go on to its square.
   static constexpr double exact = 1e-3;
 
   // Of the slip that a stuck contact owes, the share that is taken back over a planned sub-step (all at once

@@ -68,8 +68,8 @@ class NetgenReader {
     const uint64_t n = in_.text_count(in_.integer("the number of elements"), 6, "elements");
     for (uint64_t i = 0; i < n; ++i) {
       if (dimension == 2) in_.integer("an element's surface");
-      const char *const names = dimension == 2 ? "boundary condition" : "material";
-      const int32_t number = in_.in_32_bits(in_.integer(names), names);
+      const char *const what = dimension == 2 ? "boundary condition" : "material";
+      const int32_t number = in_.in_32_bits(in_.integer(what), what);
       if (dimension == 2)
         for (int k = 0; k < 2; ++k) in_.integer("a domain beside an element");
       const int64_t corners = in_.integer("an element's number of points");
