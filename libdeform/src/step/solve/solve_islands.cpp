@@ -86,7 +86,8 @@ void start_island(const World &w, StepContext &step, SolveIsland &own) {
 // m/s, of the velocities of bodies: that of the contact that needs most.
 double motion_tolerance(const SolveIsland &own) {
   double least = own.part.nbond ? own.tolerance.bond : std::numeric_limits<double>::infinity();
-  each_row(own.part.contacts, [&](uint32_t i) { least = std::min(least, own.tolerance.tangent[i]); });
+  each_row(own.part.contacts,
+           [&](uint32_t i) { least = std::min({least, own.tolerance.tangent[i], own.tolerance.normal[i]}); });
   return least;
 }
 
