@@ -46,12 +46,9 @@ constexpr double kHardImpact = 0.08, kSoftImpact = 0.05;
 constexpr double kFinest = 4;    // sub-steps that an impact makes of one
 constexpr double kNoWay = 0.02;  // of the motion of a sub-step: less counts as none
 constexpr double kSlow = 0.01;   // of d_g: what moves by less needs no closer look at how it does
-// Of an implicit body in contact: edges that it moves a point beyond where its velocity leads, and the share
-// of its energy that the sub-step adds; above both a sub-step is repeated finer.
-constexpr double kTurns = 0.5, kGains = 0.01;
-// Of a body that steps itself: way that contact moves its points along a straight line, over its size, above
-// which a sub-step is repeated finer; sub-steps that are made of one.
-constexpr double kStraight = 0.1, kFinestOwn = 32;
+// Share of its energy that an end may add to a body whose scheme dissipates; pieces that are made of a
+// sub-step above it.
+constexpr double kGains = 0.01, kFinestGain = 32;
 
 Guard::Common common_motion(const Surface &s) {
   Vec3 sum;
@@ -124,29 +121,14 @@ bool meets(const World &w, const StepContext &step, uint32_t slot) {
   return false;
 }
 
-// A body that steps itself turns its frame without contact; what contact changes is added along straight
-// lines. A spin w that contact stops leaves 1 - cos(h w) of the size as strain; way over size is about h w.
-double straight_way(const StepContext &step, const Body &b, uint32_t slot) {
-  if (!b.model.stepper || !b.model.can(DFM_CAP_ENERGY)) return 0;
-  const double way = step.h * step.guard.change[slot];
-  if (!(way > kStraight * b.surface.median_edge)) return 0;
-  return way / extent_of(b.surface.x.data(), b.surface.nsurfel, kStride).diagonal();
-}
-
-// The equation of backward Euler may have further solutions in which the body, or a part of it, is turned
-// over within the sub-step: cells that an early iteration inverts may take on another rotation. Contact does
-// much negative work along the way, and inner forces as much positive work, which no elastic energy pays for.
-// So such an end gains energy, which the scheme cannot do as long as cells turn by little
-// (doc/decisions/energy_watch.md). Returns the way that it moves a point beyond where its velocity leads,
-// over kTurns edges; 0: it is no such end.
-double turned_over(const World &w, const StepContext &step, const Body &b, uint32_t slot) {
-  if (!b.dynamics->abilities().damps || b.model.stepper || !(step.guard.change[slot] > 0)) return 0;
-  const double *const end = b.dynamics->end().v;
-  double most = 0;
-  for (uint32_t i = 0; i < b.p.n; ++i)
-    most = std::max(most, norm2(load3(end + size_t{kStride} * i) - load3(&b.p.v[size_t{kStride} * i])));
-  const double share = step.h * std::sqrt(most) / (kTurns * b.surface.median_edge);
-  return share > 1 && gain_at_end(w, step, b) > kGains ? share : 0;
+// The share of its energy that an end adds to a body whose scheme dissipates, where contact moves it; order
+// four in the length of the sub-step. Backward Euler lowers the energy as long as cells turn by little, but
+// its equation may have further solutions, in which a part of the body is turned over. A body that steps
+// itself turns its frame without contact, and what contact changes is added along straight lines: a spin w
+// that contact makes or stops leaves 1 - cos(h w) of the size as strain (doc/decisions/energy_watch.md).
+double gain_of(const World &w, const StepContext &step, const Body &b, uint32_t slot) {
+  const bool moves = step.h * step.guard.change[slot] > kBoundStrain * b.surface.median_edge;
+  return moves ? gain_at_end(w, step, b) : 0;
 }
 
 // An impact is a change of a point's velocity by contact that strains an edge in this sub-step by more than
@@ -159,10 +141,10 @@ double turned_over(const World &w, const StepContext &step, const Body &b, uint3
 bool withstands_impacts(World &w, StepContext &step) {
   if (step.rows.ndof == 0) return true;
   Guard &g = step.guard;
-  double hard = 0, straight = 0;
+  double hard = 0, gain = 0;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    straight = std::max({straight, straight_way(step, b, i), kStraight * turned_over(w, step, b, i)});
+    gain = std::max(gain, gain_of(w, step, b, i));
     if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
     if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
@@ -170,13 +152,18 @@ bool withstands_impacts(World &w, StepContext &step) {
     if (impact.strain > kBoundStrain) expire_bound(w);
     if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);
   }
-  if (!(hard > kHardImpact || straight > kStraight) || step.h != step.length.planned || step.length.parts > 1)
-    return true;
-  const double most = step.length.most_parts;
+  // impacts divide what is planned, gains any piece of it
+  const bool whole = step.h == step.length.planned && step.length.parts == 1;
+  const auto fits = [&](double parts) {
+    return whole ? parts <= step.length.most_parts && may_refine(w, step, parts) : may_repeat(w, step);
+  };
   double parts = 1;
-  while (straight > parts * kStraight && 2 * parts <= most && parts < kFinestOwn) parts *= 2;
-  while (hard > parts * kSoftImpact && 2 * parts <= most && parts < kFinest) parts *= 2;
-  while (parts > 1 && !may_refine(w, step, parts)) parts /= 2;
+  while (gain > kGains * (parts * parts) * (parts * parts) &&
+         2 * parts * step.length.planned <= kFinestGain * step.h)
+    parts *= 2;
+  if (whole && hard > kHardImpact)
+    while (hard > parts * kSoftImpact && parts < kFinest) parts *= 2;
+  while (parts > 1 && !fits(parts)) parts /= 2;
   if (parts == 1) return true;
   step.length.divide(step.h, parts);
   return false;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "body/rigid_motion.h"
+#include "body/turning.h"
 #include "core/error.h"
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
@@ -46,6 +46,9 @@ bool at_end(const Body &b) { return b.dynamics->abilities().damps || steps_itsel
 bool books(const Body &b) { return b.dynamics->abilities().energy || at_end(b); }
 // Its elastic energy is unknown, but not below zero: the kinetic energy comes from that at the start and from
 // the work done since.
+bool is_held(const Body &b) {
+  return std::any_of(b.p.held.begin(), b.p.held.end(), [](uint8_t held) { return held != 0; });
+}
 bool hides(const Body &b) { return steps_itself(b) && !b.model.can(DFM_CAP_ENERGY); }
 double allowed(const Body &b) { return hides(b) ? kHidden : steps_itself(b) ? kOwnSteps : 0; }
 bool watched(const Body &b) { return books(b) && (b.model.can(DFM_CAP_ENERGY) || hides(b)); }
@@ -110,6 +113,12 @@ bool check_sums(const World &w, const StepContext &step, const Body &b, EnergySa
   return true;
 }
 
+// A model that steps itself may share memory between its energy and its prediction, which its commit needs.
+bool predict_again(const World &w, const StepContext &step, const Body &b) {
+  double kinetic = 0;
+  return !steps_itself(b) || b.dynamics->free_motion(sub_step_of(w, step), kinetic);
+}
+
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
 // it may rise as stiff modes calm down. U of a body that flows is that after the flow at x: what flow
 // dissipates is still in U until the sub-step is committed.
@@ -141,11 +150,7 @@ bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
   const auto query = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
   if (!hides(b) && b.model.call("energy", query) != DFM_OK) return false;
   elastic += b.dynamics->damper_energy(w.time);
-  // the call came between its prediction and its commit, which may share memory with the result
-  double again = 0;
-  if (steps_itself(b) && (!hides(b) || b.dynamics->abilities().late) &&
-      !b.dynamics->free_motion(sub_step_of(w, step), again))
-    return false;
+  if ((!hides(b) || b.dynamics->abilities().late) && !predict_again(w, step, b)) return false;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
   out = {kinetic,
          elastic,
@@ -197,31 +202,12 @@ void book_contact(World &w, StepContext &step) {
   }
 }
 
-// The rotation of a body in a sub-step that moves its points along chords.
-struct Turning {
-  Vec3 velocity, spin;  // m/s of the center of mass, rad/s
-  double half = 0;      // s, of the sub-step
-  // The difference between a point's velocity at the end of its arc and the mean one, which is that of the
-  // chord. m/s
-  Vec3 arc(Vec3 v) const { return half * cross(spin, v - velocity); }
-};
-
-// The rotation that has the angular momentum of the mean velocities at the middle of the chords.
-Turning turning_of(const Body &b, double h) {
-  const Phyxels &p = b.p;
-  const double *const end = b.dynamics->end().v;
-  const auto velocity = [&](uint32_t i) { return load3(end + size_t(i) * kStride); };
-  const auto middle = [&](uint32_t i) { return load3(&p.x[size_t(i) * kStride]) + 0.5 * h * velocity(i); };
-  const RigidMotion motion = rigid_motion(p.n, p.mass.data(), middle, velocity);
-  return {motion.velocity, motion.spin, 0.5 * h};
-}
-
 // At the ends of the arcs, see book_end(). way: [npoint,4] m/s
 double work_of_contact(const World &w, const StepContext &step, const Body &b, const double *way) {
   const Phyxels &p = b.p;
   double contact = 0;
   if (w.plan.touches()) {
-    const Turning turning = steps_itself(b) ? Turning{} : turning_of(b, step.h);
+    const Turning turning = steps_itself(b) ? Turning{} : turning_of(p, way, step.h);
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const double *const q = &b.surfel_impulse[3 * size_t(s)];
       if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
@@ -294,8 +280,8 @@ void book_body(World &w, StepContext &step, Body &b, double motion) {
 bool has_balance(const Body &b) { return watched(b); }
 
 double gain_at_end(const World &w, const StepContext &step, const Body &b) {
-  if (!b.dynamics->abilities().damps || steps_itself(b) || !b.model.can(DFM_CAP_ENERGY)) return 0;
-  if (!b.motions.empty() || b.model.works(kFlow)) return 0;
+  if (!at_end(b) || !b.model.can(DFM_CAP_ENERGY) || !b.motions.empty() || b.model.works(kFlow)) return 0;
+  if (steps_itself(b) && is_held(b)) return 0;  // steps may leave out points
   const Phyxels &p = b.p;
   const EndState ends = b.dynamics->end();
   double had = 0, gained = 0;
@@ -307,7 +293,7 @@ double gain_at_end(const World &w, const StepContext &step, const Body &b) {
       gained += 0.5 * m * (after * after - before * before) -
                 step.h * ends.mean[at] * (p.load[at] + m * w.gravity.now[int(k)]);
     }
-  gained -= work_of_contact(w, step, b, ends.v);
+  gained -= work_of_contact(w, step, b, steps_itself(b) ? ends.mean : ends.v);
   double elastic = 0, elastic_end = 0;
   dfm_kin kin = b.dynamics->kin(w.time, 0);
   const OnBehalf prefix(b.name);
@@ -317,7 +303,9 @@ double gain_at_end(const World &w, const StepContext &step, const Body &b) {
   if (!query(elastic)) return 0;
   kin.x = p.x_end.data();
   kin.v = p.v_end.data();
-  if (!query(elastic_end)) return 0;
+  if (steps_itself(b)) kin.state = b.model.state_out.data();
+  const bool known = query(elastic_end);
+  if (!known || !predict_again(w, step, b)) return 0;
   return (gained + elastic_end - elastic) / (had + elastic);
 }
 
