@@ -114,6 +114,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   bool begin_stage(const SubStep &now);
   const double *mean() const { return staged_ ? p_.v_free.data() : p_.v_end.data(); }
   bool evaluate_after(const double *v, bool commits);
+  void turn_on();
   bool evaluate_at(const dfm_kin &k, double share);
   bool newton(Array<double> &v);
   bool two_stages(const SubStep &now);
