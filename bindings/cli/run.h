@@ -74,7 +74,7 @@ struct RunResult {
   std::string sensors;                           // JSON, Sensors::json(); empty: there are none
   bool interrupted = false, stopped = false;
   std::string stop_reason, stop_body;
-  // of equilibria: those found, linear solves, share of the forces that the last one leaves
+  // of equilibria: those found, steps from rest, share of the forces that the last one leaves
   uint64_t load_steps = 0, iterations = 0;
   double residual = 0;
   double contacts_mean = 0;  // of sub-steps; static: of equilibria

@@ -182,6 +182,27 @@ TEST(Equilibrium, FreeBodyUnderBalancedLoads_Stretches) {
   EXPECT_NEAR((bar.pulled() - low) / (force * 0.4 / (1e5 * area)), 1, 0.05);
 }
 
+// It turns down like a pendulum, far from where it starts.
+TEST(Equilibrium, BarOnAHinge_HangsBelowIt) {
+  Bar bar("corotational_fem", 0.3, {0, 0, -9.81}, false);
+  std::vector<uint32_t> edge;
+  for (const uint32_t i : bar.low)
+    if (bar.rest[3 * size_t{i} + 2] > 0.1 - 1e-9) edge.push_back(i);
+  test::ok(dfm_body_hold(bar.body, uint32_t(edge.size()), edge.data(), 7));
+  test::ok(bar.find());
+  const auto m = test::measure(bar.body);
+  EXPECT_NEAR(m.com[0], 0, 1e-8);
+  EXPECT_LT(m.com[2], -0.1);
+}
+
+TEST(Equilibrium, Interrupted_EndsWithTheWorldAsItWas) {
+  Bar bar("linear_fem", 0.3, {0, 0, -9.81});
+  const uint64_t before = dfm_world_hash(bar.world);
+  test::ok(dfm_world_interrupt(bar.world));
+  EXPECT_EQ(bar.find(), DFM_DISCARD);
+  EXPECT_EQ(dfm_world_hash(bar.world), before);
+}
+
 TEST(Equilibrium, WhatItCannotDo_IsRefusedByName) {
   Bar bar("linear_fem");
   dfm_equilibrium_def def = dfm_equilibrium_def_default();

@@ -151,13 +151,13 @@ DFM_API dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble)
 /** Load steps, tolerance and limits of dfm_world_equilibrium. */
 typedef struct dfm_equilibrium_def {
   uint32_t size;
-  uint32_t load_steps; /* 0: 1. Each starts from the one before; a load step without a solution is halved */
+  uint32_t load_steps; /* 0: 1. Each starts from the one before */
   /* fraction of gravity and loads at the start and the end; those with keys or a sine follow them instead */
   double load_from, load_to;
   double time; /* s that pass during the load steps, for keys and sines; 0 */
   /* residual force at a point over the largest load or reaction; 0: 1e-10, with contact 1e-6 */
   double tolerance;
-  /* of Newton's method per load step and body; 0: 200. With contact, steps from rest per load step; 0: 500 */
+  /* steps from rest per load step; 0: 500 */
   uint32_t max_iterations;
   uint32_t reserved;
   uint64_t cookie; /* set by the default function */
@@ -165,7 +165,7 @@ typedef struct dfm_equilibrium_def {
 typedef struct dfm_equilibrium_info {
   uint32_t size;
   uint32_t load_steps; /* number taken */
-  uint64_t iterations; /* linear solves, of all bodies and load steps; with contact, steps from rest */
+  uint64_t iterations; /* steps from rest, of all load steps */
   double residual; /* of the last load step: residual force over the largest load or reaction, worst body */
 } dfm_equilibrium_info;
 /** dfm_equilibrium_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
@@ -178,7 +178,7 @@ static inline dfm_equilibrium_def dfm_equilibrium_def_default(void) {
 }
 /** Moves all bodies to an equilibrium of internal forces, contact, friction, gravity, loads and springs, with
  * held points and obstacles at their prescribed places; velocities are zero (doc/concepts/static.md).
- * Relaxation and flow are complete. dfm_world_interrupt stops a search with contact.
+ * Relaxation and flow are complete. dfm_world_interrupt stops a search.
  * @param def   NULL: the default
  * @param info  out; may be NULL
  * @return DFM_OK; DFM_E_DIVERGED no equilibrium was found: a body without support has loads that do not

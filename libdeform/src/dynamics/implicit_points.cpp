@@ -249,12 +249,6 @@ bool ImplicitPoints::begin_stage(const SubStep &now) {
 
 double ImplicitPoints::largest_diagonal() const { return largest(weight_); }
 
-double ImplicitPoints::own_stiffness(uint32_t point) const {
-  const double *const own = &weight_[size_t{3} * point];
-  const double most = std::max({own[0], own[1], own[2]});
-  return std::max(0.0, most - inertia(point, stage_.h)) / (stage_.h * stage_.h);
-}
-
 bool ImplicitPoints::take_first_way(const SubStep &now) {
   if (!begin_stage(now) || !linearize() || !solve_way(residual_)) return false;
   add(p_.v_free, 1);

@@ -68,10 +68,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   ImplicitOptions options_;
   Array<double> softness_;  // [npoint] N/m, stiffness of loads; empty: none
 
-  bool solve(const Array<double> &b, Array<double> &x);
-  double largest_diagonal() const;             // kg, of A
-  double own_stiffness(uint32_t point) const;  // N/m, largest diagonal entry of the model's, in the present A
-  void softness_changed() { factor_h_ = 0; }   // A is made again
+  double largest_diagonal() const;  // kg, of A
   // v_free: Newton's first correction of the velocities at the start, as a whole
   bool take_first_way(const SubStep &now);
   // adds scale times the impulses at the surfels [nsurfel,3] to the free points [npoint,3]
@@ -124,6 +121,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   void see_diagonal();
   bool assemble();
   bool linearize();
+  bool solve(const Array<double> &b, Array<double> &x);
   bool patient(double left);
   double inertia(uint32_t point, double h) const {  // kg
     return softness_.empty() ? p_.mass[point] : p_.mass[point] + h * h * softness_[point];

@@ -1,342 +1,528 @@
+// Each step is a step of the world from rest, with the usual contact, friction and guard. Two things differ:
+// the dynamics of bodies (SettlingPoints), and prescribed motions and loads are constant at their
+// values at the end of the load step (World::prescribed). Where nothing can touch anything, a step is
+// Newton's method for the equilibrium itself: it is so long that the mass of a held body does not count.
+//
+//   load step   gravity and loads at its share; keys and sines go on to its time
+//     rounds    what relaxes has done so, until that changes nothing
+//       steps   until forces are balanced and nothing has moved
 #include "world/equilibrium.h"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
-#include <functional>
 
 #include "core/error.h"
+#include "dynamics/at_rest.h"
+#include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
+#include "step/budget.h"
+#include "step/context.h"
 #include "step/stages.h"
+#include "step/step_impulses.h"
 #include "step/watch/energy_watch.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
-#include "plugin/plugin_solver.h"
-#include "dynamics/line_search.h"
-#include "math/linear_solver.h"
-#include "dynamics/stiffness.h"
-#include "dynamics/dynamics.h"
-#include "dynamics/at_rest.h"
+#include "dynamics/implicit_points.h"
 
 namespace dfm {
 namespace {
 
-// The equilibrium of the points of one body: f(x) + loads = 0 in all components that are not held, by
-// Newton's method with line search on the stiffness of the model.
+// s, length of a step. The longer it is, the more the stiffness and the less the mass of a body decides its
+// end. Where nothing can touch anything, a step may last forever.
+constexpr double kLongest = 1, kShortest = 1e-4;
+// Tolerances: of Newton's method and contact in a step, relative to the median edge of a body; of the motion
+// in the last step, relative to the size of the body; of forces at a point, relative to the largest load,
+// reaction or contact force (or their rounding); of contacts and friction, relative to the rest distance.
+constexpr double kGap = 0.01, kError = 1e-7, kContact = 2e-8, kMoves = 1e-6, kLeft = 1e-6;
+constexpr double kAlone = 1e-10;  // of Newton's method and of forces where nothing can touch anything
+// Share of the tolerance, for the sum of forces on a body. What the sum of loads on a body that nothing holds
+// may be, relative to their norms.
+constexpr double kNet = 0.1, kBalance = 1e-9;
+// Limit on the motion of an unsupported body in a step: the median edge at first, less if steps are halved,
+// more if they converge well, up to this share of its size.
+constexpr double kReach = 0.25;
+constexpr uint32_t kSteps = 500;  // of a round
+constexpr uint32_t kRounds = 4;   // of relaxation
+constexpr uint32_t kRefused = 8;  // consecutive failed steps
+constexpr double kAway = 10;      // of its size: a body in contact that has moved so far keeps sliding
 
-struct EquilibriumLimits {
-  double tolerance = 1e-10;  // N left per N of the largest load or reaction
-  uint32_t iterations = 200;
-};
-struct EquilibriumResult {
-  bool found = false;
-  uint32_t iterations = 0;  // linear solves
-  double left = 0;          // N, largest component of an unbalanced force
-  double scale = 0;         // N, largest component of a load or of a reaction
-};
+// Points on their way to an equilibrium, in steps of backward Euler from rest:
+//
+//   f(x) + loads + M g + contact = (M / h^2 + S) (x - x0)        S: stiffness of loads, N/m
+//
+// which is the condition of equilibrium once x stops changing. M / h^2 decides the length of a step, not
+// where steps end; it bounds the motion of bodies that nothing holds (the proximal point method, Rockafellar
+// 1976). A step starts with the contact forces of the step before. Without them bodies would fall freely by
+// h^2 g before contacts are found, which is meters in a step of a second.
+//
+// Each step solves for the impulses of contacts whose places and normals are those before it. Where a body
+// gives way, they turn: the foot of a sphere on a face moves away from the corner that it has pressed down.
+// If its next place overshoots by more than it was off, whole steps go to and fro for ever, so a touched body
+// goes Aitken's share of its way (Irons and Tuck 1969): doc/decisions/implicit_time.md.
 
-class Equilibrium {
+class SettlingPoints : public ImplicitPoints {
  public:
-  // Throws Error if the model has no stiffness.
-  Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model, const ImplicitOptions &options);
+  // softness: [npoint] N/m, S. error: m, tolerance of Newton's method for points at rest. alone: nothing can
+  // touch them.
+  SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                 const ImplicitOptions &options, const std::vector<double> &softness, double error,
+                 bool alone);
 
-  // Writes loads at the present positions, weight included, into f [npoint,4] N.
-  using Loads = std::function<void(double *f)>;
-  // Goes from the present positions to the equilibrium. softness: [npoint] N/m, stiffness of the loads, added
-  // to the matrix. free: no point is held, so the matrix must be regularized. If no equilibrium is found,
-  // positions are undefined. Velocities are taken as zero.
-  EquilibriumResult find(const EquilibriumLimits &limits, double time, const Loads &loads,
-                         const double *softness, bool free);
+  // The contact forces to start with: impulses at the surfels [nsurfel,3] over h seconds; h 0: none.
+  void start_from(const double *surfel_impulse, double h);
+  void forget_way() { std::fill(way_.begin(), way_.end(), 0.0); }  // the next step goes its whole way
+  const double *contact_force() const { return force_.data(); }    // [npoint,3] N, of the last step
+  double stiffest() const { return stiffest_; }                    // N/m, of a point, in the last step
+
+  Abilities abilities() const override {
+    Abilities a = ImplicitPoints::abilities();
+    a.damps = false;  // its steps are not steps in time
+    return a;
+  }
+  bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
+  bool free_motion(const SubStep &now, double &kinetic) override;
+  const double *start() const override { return p_.v_free.data(); }  // with the last contact forces
+  void take(const double *v) override;
+  double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
+  void commit(const SubStep &now, double fraction) override;
 
  private:
-  Phyxels &p_;
-  ModelInstance &model_;
-  ModelStiffness stiffness_;
-  std::unique_ptr<LinearSolver> solver_;
-  double solve_tolerance_;
-  AtRest rest_;
-  Array<double> residual_, way_;  // [npoint,3] N; m
-  Array<uint8_t> held_;           // as in the present factor
-  double floor_ = 0;              // N, rounding of forces at the present positions
-  double scale_ = 0;              // N, the largest load or reaction
-  bool factored_ = false;
-
-  bool residual(double time, const Loads &loads);
-  bool linearize(double time, const double *softness, bool free);
-  bool factor(double share);
-  bool search(double time, const Loads &loads);
-  void move(double share);
-  double left() const;
+  bool alone_;
+  double error_allowed_, stiffest_ = 0;
+  double h_ = 0, share_ = 1, last_share_ = 1;  // s, of this step; of its way, and of that of the last step
+  Array<double> way_;                          // [npoint,4] m, the whole way of the last step; 0: unknown
+  Array<double> force_;                        // [npoint,3] N, contact forces of the last step
+  Array<double> load_;                         // [npoint,4] N, loads alone
 };
 
-constexpr uint32_t kCuts = 12;  // halvings of a correction that is too long
-// Share of its diagonal that is first added to a singular matrix; a hundred times as much if that is not
-// enough.
-constexpr double kMinRegular = 1e-9, kMaxRegular = 1e-1;
-
-Equilibrium::Equilibrium(const Memory &memory, Phyxels &points, ModelInstance &model,
-                         const ImplicitOptions &options)
-    : p_(points),
-      model_(model),
-      stiffness_(memory),
-      solve_tolerance_(options.tolerance),
-      rest_(memory, points, model) {
-  use_memory(memory, residual_, way_, held_);
-  residual_.assign(size_t{3} * p_.n, 0.0);
-  way_ = residual_;
-  stiffness_.create(model, p_.n);
-  solver_ = make_solver({options.solver.c_str(), p_.n, stiffness_.constant() || p_.n <= kFactoredAtRest,
-                         options.solver_iterations},
-                        *static_cast<const dfm_context *>(model.host->ctx), memory, options.tasks);
-  solver_->analyse(stiffness_.pattern());
+SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
+                               const ImplicitOptions &options, const std::vector<double> &softness,
+                               double error, bool alone)
+    : ImplicitPoints(memory, points, surface, model, options), alone_(alone), error_allowed_(error) {
+  use_memory(memory, softness_, way_, force_, load_);
+  force_.assign(size_t{3} * points.n, 0.0);
+  way_.assign(size_t{kStride} * points.n, 0.0);
+  softness_.assign(softness.begin(), softness.end());
 }
 
-// The unbalanced forces at the present positions, and the largest load or reaction.
-bool Equilibrium::residual(double time, const Loads &loads) {
-  loads(p_.f.data());
-  scale_ = 0;
-  for (const double f : p_.f) scale_ = std::max(scale_, std::fabs(f));
-  if (!rest_.add_forces(time)) return false;
-  double nan_flag = 0;
-  for (uint32_t i = 0; i < p_.n; ++i)
-    for (uint32_t c = 0; c < 3; ++c) {
-      const size_t at = size_t{kStride} * i + c;
-      const bool moves = p_.moves(at);
-      residual_[size_t{3} * i + c] = moves ? p_.f[at] : 0;
-      if (!moves) scale_ = std::max(scale_, std::fabs(p_.f[at]));
-      nan_flag += 0.0 * p_.f[at];
-    }
-  return nan_flag == 0;
+void SettlingPoints::start_from(const double *surfel_impulse, double h) {
+  std::fill(force_.begin(), force_.end(), 0.0);
+  if (h > 0) spread_impulses(surfel_impulse, 1 / h, force_);
 }
 
-// The blocks of A are set; adds a share of the diagonal, applies the held components, and factors.
-bool Equilibrium::factor(double share) {
-  stiffness_.each_own([&](uint32_t, double *block) {
-    const double mean = (block[0] + block[4] + block[8]) / 3;
-    for (size_t c = 0; c < 9; c += 4) block[c] += share * mean;
-  });
-  Array<double> &blocks = stiffness_.blocks();
-  hold_components(stiffness_.pattern(), p_.held.data(), blocks.data());
-  solver_->place(p_.x.data(), kStride);
-  return solver_->factor(blocks.data());
+// The scheme is stable at any step, also with loads that depend on positions.
+bool SettlingPoints::bound(double, double, const AddRowSums &, StepBound &out) {
+  out = {};
+  return true;
 }
 
-bool Equilibrium::linearize(double time, const double *softness, bool free) {
-  if (factored_ && stiffness_.constant() && held_ == p_.held) return true;
-  for (double share = free ? kMinRegular : 0; share <= kMaxRegular;
-       share = share > 0 ? 100 * share : kMinRegular) {
-    if (!stiffness_.evaluate(model_, rest_.kin(time), -1, 0)) return false;
-    double stiffest = 0, far = 0;
-    stiffness_.each_own([&](uint32_t i, double *block) {
-      for (size_t c = 0; c < 9; c += 4) {
-        block[c] += softness[i];
-        stiffest = std::max(stiffest, block[c]);
-      }
-    });
-    for (const double x : p_.x) far = std::max(far, std::fabs(x));
-    floor_ = kForceRounding * (stiffest * far);
-    factored_ = factor(share);
-    held_ = p_.held;
-    if (factored_) return true;
+// With contact one linear correction only: with contact forces that do not rotate with the body, a standing
+// body may have no equilibrium near, and Newton's method would search for it forever.
+bool SettlingPoints::free_motion(const SubStep &now, double &kinetic) {
+  options_.rest = error_allowed_ / now.h;
+  h_ = now.h;
+  share_ = 1;
+  bool found;
+  if (alone_) found = ImplicitPoints::free_motion(now, kinetic);
+  else {
+    load_ = p_.load;
+    for (uint32_t i = 0; i < p_.n; ++i)
+      for (uint32_t c = 0; c < 3; ++c) p_.load[size_t{kStride} * i + c] += force_[size_t{3} * i + c];
+    found = take_first_way(now);
+    p_.load.swap(load_);
   }
-  return false;
+  stiffest_ = largest_diagonal() / (now.h * now.h);
+  return found && std::ranges::all_of(p_.v_free, [&](double v) { return std::fabs(v) <= now.fastest; });
 }
 
-void Equilibrium::move(double share) {
-  for (uint32_t i = 0; i < p_.n; ++i)
-    for (uint32_t c = 0; c < 3; ++c) p_.x[size_t{kStride} * i + c] += share * way_[size_t{3} * i + c];
-}
-
-double Equilibrium::left() const {
-  double most = 0;
-  for (const double r : residual_) most = std::max(most, std::fabs(r));
-  return most;
-}
-
-// Moves along the correction, and computes the residual there.
-bool Equilibrium::search(double time, const Loads &loads) {
-  return search_line(
-      product(residual_, way_), kCuts, [&](double share) { move(share); },
-      [&](double &slope) {
-        const bool known = residual(time, loads);
-        slope = product(residual_, way_);
-        return known;
-      });
-}
-
-EquilibriumResult Equilibrium::find(const EquilibriumLimits &limits, double time, const Loads &loads,
-                                    const double *softness, bool free) {
-  EquilibriumResult out;
-  bool polished = false;
-  if (!residual(time, loads)) return out;
-  while (true) {
-    out.left = left();
-    out.scale = scale_;
-    const bool small = out.left <= std::max(limits.tolerance * scale_, floor_);
-    // one more correction after the residual is small: forces converge earlier than positions
-    if ((small && polished) || (out.left == 0)) break;
-    polished = small;
-    if (out.iterations == limits.iterations || !linearize(time, softness, free)) return out;
-    ++out.iterations;
-    SolveInfo info;
-    std::fill(way_.begin(), way_.end(), 0.0);
-    if (!solver_->solve(1, residual_.data(), way_.data(), solve_tolerance_, info)) return out;
-    if (!search(time, loads)) return out;
+void SettlingPoints::take(const double *v) {
+  ImplicitPoints::take(v);
+  double along = 0, square = 0;
+  for (size_t j = 0; j < way_.size(); ++j) {
+    const double change = h_ * v[j] - way_[j];
+    along -= way_[j] * change;
+    square += change * change;
   }
-  out.found = true;
-  return out;
+  share_ = along > 0 ? std::min(1.0, last_share_ * along / square) : 1;
+  if (share_ < 1)
+    for (double &end : p_.v_end) end *= share_;
 }
 
-// How often a load step without a solution is halved.
-constexpr uint32_t kHalvings = 6;
-// Limit on alternations between relaxation and equilibrium, which depend on each other.
-constexpr uint32_t kRelaxations = 4;
+void SettlingPoints::commit(const SubStep &now, double fraction) {
+  if (alone_) return p_.x.swap(p_.x_end);  // the state of the model goes on at rest
+  for (size_t j = 0; j < way_.size(); ++j) way_[j] = now.h / share_ * p_.v_end[j];
+  last_share_ = share_;
+  ImplicitPoints::commit(now, fraction);
+}
 
-class Search {
+class Settling {
  public:
-  Search(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info)
-      : w_(w), info_(info), start_{w.time, def.load_from}, end_{w.time + def.time, def.load_to} {
-    if (def.tolerance > 0) limits_.tolerance = def.tolerance;
-    if (def.max_iterations) limits_.iterations = def.max_iterations;
-    for (const auto &b : w.bodies) bodies_.push_back(make(*b, w.implicit));
-    keep();
+  Settling(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info)
+      : w_(w),
+        step_(*w.steps),
+        info_(info),
+        alone_(!w.plan.touches()),
+        start_{w.time, def.load_from},
+        end_{w.time + def.time, def.load_to},
+        tolerance_(def.tolerance > 0 ? def.tolerance
+                   : alone_          ? kAlone
+                                     : kLeft),
+        most_(def.max_iterations ? def.max_iterations : kSteps) {
+    for (auto &b : w.bodies) bodies_.push_back(make(*b));
+    earlier_.swap(w.events);  // a long search produces more than a world keeps
+    write_down(w_, step_, before_);
+    stats_ = w.stats;
+    steps_ = w.step_count;
+    sizes_ = w.sizes;
+    suspended_ = w.overlaps.suspended;
+    def_ = w.def;
+    exchange();
+    wake_all(w_);  // adds the contact impulses of the meantime
+    for (One &one : bodies_) one.contact_impulse = one.body->contact_impulse;
+    w.def.sleep = 0;
+    w.changed = true;
   }
-  Search(const Search &) = delete;
-  ~Search() {
-    if (!done_) restore_state(first_);
-    set_gravity_now(w_);
+  Settling(const Settling &) = delete;
+  ~Settling() {
+    exchange();
+    w_.def = def_;
+    w_.prescribed = {};
+    w_.changed = true;
+    if (!done_) w_.overlaps.suspended.swap(suspended_);
+    try {
+      set_gravity_now(w_);
+      prepare(w_);
+    } catch (...) {  // no memory for the tables: they are made at the next use
+    }
+    if (done_) return;
+    restore_start(w_, step_, before_);
+    w_.events.swap(earlier_);
     for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
   }
 
   void run(uint32_t load_steps) {
-    first_ = kept_;
-    Station at = start_;
+    prepare(w_);
     for (uint32_t k = 1; k <= load_steps; ++k) {
-      const double done = double(k) / load_steps;
-      const Station to = k == load_steps ? end_ : between(start_, end_, done);
-      go(at, to, 0);
-      at = to;
+      reach(k == load_steps ? end_ : between(start_, end_, double(k) / load_steps));
+      ++info_.load_steps;
     }
-    for (auto &b : w_.bodies) {
-      std::fill(b->p.v.begin(), b->p.v.end(), 0.0);
-      relax_dampers(b->p);
-    }
-    done_ = true;
+    keep();
   }
 
  private:
   struct One {
     Body *body;
-    std::unique_ptr<Equilibrium> solver;
+    std::unique_ptr<Dynamics> other;  // its normal dynamics; exchanged during the search
+    SettlingPoints *points;
     std::unique_ptr<AtRest> rest;
-    std::vector<double> softness;  // [npoint] N/m of the body's springs
-    bool free;                     // without held points and without springs
+    double size, edge;           // m
+    Vec3 contact_impulse;        // N s, before the search
+    double reach = 0;            // m, limit on its motion without contact in the next step
+    double slid = 0;             // m moved since it has been in contact
+    std::vector<double> last{};  // [npoint,4] m, at the start of the step
+    double left = 0, scale = 0;  // N, largest component of unbalanced forces; of all forces
+    double moved = 0;            // m, in the last step
+    Vec3 net{};                  // N, sum of external forces
+    double all = 0;              // N, sum of their norms
+    double pull = 0;             // m/s2, acceleration by their sum
+    uint8_t held = 0;            // components that are held at some point
+    bool touches = false;
   };
-  struct Kept {
-    double time;
-    std::vector<std::vector<double>> x, state;
-  };
 
-  One make(Body &b, const ImplicitOptions &options) const {
-    return {&b, std::make_unique<Equilibrium>(w_.memory(), b.p, b.model, options),
-            std::make_unique<AtRest>(w_.memory(), b.p, b.model), softness_of(b), is_free(b)};
+  One make(Body &b) const {
+    ImplicitOptions options = w_.implicit;
+    options.rest_factor = false;
+    if (options.solver == "auto" && b.p.n <= kFactoredAtRest) options.solver = "ldlt";
+    options.newton = std::max(options.newton, ImplicitOptions{}.newton);
+    auto points =
+        std::make_unique<SettlingPoints>(w_.memory(), b.p, b.surface, b.model, options, softness_of(b),
+                                         (alone_ ? kAlone : kError) * b.surface.median_edge, alone_);
+    if (!alone_) points->start_from(b.surfel_impulse.data(), b.impulse_time());
+    SettlingPoints *const own = points.get();
+    return {.body = &b,
+            .other = std::move(points),
+            .points = own,
+            .rest = std::make_unique<AtRest>(w_.memory(), b.p, b.model),
+            .size = extent_of(b.p.x.data(), b.p.n, kStride).longest(),
+            .edge = b.surface.median_edge,
+            .contact_impulse = {}};
   }
 
-  void keep() {
-    kept_ = {w_.time, {}, {}};
-    for (const auto &b : w_.bodies) {
-      kept_.x.emplace_back(b->p.x.begin(), b->p.x.end());
-      kept_.state.emplace_back(b->model.state.begin(), b->model.state.end());
-    }
-  }
-  void restore_state(const Kept &kept) {
-    w_.time = kept.time;
-    for (size_t i = 0; i < w_.bodies.size(); ++i) {
-      std::copy(kept.x[i].begin(), kept.x[i].end(), w_.bodies[i]->p.x.begin());
-      std::copy(kept.state[i].begin(), kept.state[i].end(), w_.bodies[i]->model.state.begin());
-    }
+  void exchange() {
+    for (One &one : bodies_) one.body->dynamics.swap(one.other);
   }
 
-  // Goes from an equilibrium at `from` to one at `to`; halves the step if it finds none.
-  void go(const Station &from, const Station &to, uint32_t halved) {
-    const Kept before = kept_;
-    const One *failed = nullptr;
-    EquilibriumResult result;
-    if (reach(to, failed, result)) {
-      ++info_.load_steps;
-      keep();
-      return;
-    }
-    if (halved == kHalvings || (from.time == to.time && from.share == to.share)) refuse(*failed, to, result);
-    restore_state(before);
-    const Station middle = {0.5 * (from.time + to.time), 0.5 * (from.share + to.share)};
-    go(from, middle, halved + 1);
-    go(middle, to, halved + 1);
-  }
-
-  bool reach(const Station &to, const One *&failed, EquilibriumResult &result) {
-    w_.time = to.time;
-    set_gravity_now(w_);
-    if (w_.gravity.keys.empty()) w_.gravity.now = to.share * w_.gravity.now;
-    info_.residual = 0;
+  void reach(const Station &to) {
+    w_.prescribed = {to.time, to.share};
+    if (w_.gravity.keys.empty()) w_.gravity.now = to.share * load3(w_.def.gravity);
     for (One &one : bodies_) {
-      Body &b = *one.body;
-      set_loads(b, to.time, to.share);
-      each_held_place(b, to.time, [&](uint32_t point, Vec3 x) {
-        for (int k = 0; k < 3; ++k)
-          if (b.p.held[point] & (1 << k)) b.p.x[size_t(point) * kStride + size_t(k)] = x[k];
-      });
-      check_balance(one);
-      for (uint32_t round = 0;; ++round) {
-        result = one.solver->find(
-            limits_, to.time, [&](double *f) { loads_at_rest(w_, b, f); }, one.softness.data(), one.free);
-        info_.iterations += result.iterations;
-        if (!result.found) {
-          failed = &one;
-          return false;
-        }
-        // done when relaxation changes nothing
-        if ((round > 0 && result.iterations <= 1) || round == kRelaxations || !one.rest->relax(to.time))
-          break;
-      }
-      info_.residual = std::max(info_.residual, result.scale > 0 ? result.left / result.scale : 0);
+      set_loads(*one.body, w_.prescribed.at(w_.time), to.share);
+      one.reach = one.edge;
+      one.slid = 0;
     }
+    for (uint32_t round = 0;; ++round) {
+      const uint32_t steps = come_to_rest(to);
+      if ((round > 0 && steps <= 1) || round == kRounds || !relax()) return;
+    }
+  }
+
+  bool relax() {
+    bool any = false;
+    for (One &one : bodies_) any = one.rest->relax(w_.time) || any;
+    return any;
+  }
+
+  // Number of steps, but for those in which prescribed motions go on.
+  uint32_t come_to_rest(const Station &to) {
+    weigh_all(kLongest);
+    for (One &one : bodies_) one.points->forget_way();
+    const double limit = alone_ ? kForever : kLongest;
+    double longest = std::ranges::all_of(bodies_, hangs) ? limit : kLongest;
+    uint32_t refused = 0;
+    // Keys advance after bodies rest under the new loads: otherwise unloaded contacts would not carry bodies
+    // along.
+    bool goes_on = alone_ || w_.time >= to.time;
+    for (uint32_t steps = 0;;) {
+      const double h = length(longest);
+      w_.prescribed.until = goes_on ? next_stop(to) : w_.time;
+      const uint64_t pieces = w_.stats.substeps;
+      const bool taken = step(h);
+      const bool whole = taken && w_.stats.substeps == pieces + 1;
+      const double off = h * w_.stats.residual;  // m, of contacts
+      w_.time = w_.prescribed.at(w_.time);
+      const bool there = w_.time >= to.time;
+      ++info_.iterations;
+      if (there || !goes_on) ++steps;
+      if (taken) refused = 0;
+      else if (++refused == kRefused)
+        fail(DFM_E_DIVERGED,
+             "no equilibrium was found, because a step from rest failed (%s); use more load_steps, hold what "
+             "moves freely, or raise max_time and max_work",
+             dfm_last_error());
+      weigh_all(h);
+      bool rests = taken && (alone_ || off <= kGap * w_.offset);
+      for (One &one : bodies_) {
+        if (alone_) check_balance(one);
+        if (!whole || !there) one.points->forget_way();
+        one.reach =
+            whole ? std::min(1.5 * one.reach, std::max(one.edge, kReach * one.size)) : 0.5 * one.reach;
+        one.slid = there && one.touches ? one.slid + one.moved : 0;
+        rests = rests && one.moved <= kMoves * one.size && balanced(one);
+      }
+      if (rests && there) return steps;
+      goes_on = goes_on || rests;
+      longest = whole ? std::min(limit, 2 * h) : std::min(kLongest, 0.5 * h);
+      check_progress(steps, h);
+    }
+  }
+
+  // Returns false if it failed; the world is then at the end of its last completed part.
+  bool step(double h) {
+    double edge = HUGE_VAL;
+    for (One &one : bodies_) {
+      one.last.assign(one.body->p.x.begin(), one.body->p.x.end());
+      edge = std::min(edge, one.edge);
+    }
+    w_.def.contact_tolerance = kContact * edge / h;
+    uint32_t trouble = 0;
+    const dfm_status status = step_within_budget(w_, h, &trouble);
+    if (trouble & DFM_TROUBLE_INTERRUPTED)
+      fail(DFM_DISCARD, "the search for an equilibrium was interrupted; the world is as before it");
+    if (status != DFM_OK) return false;
+    if (alone_) return true;
+    for (const One &one : bodies_)
+      one.points->start_from(one.body->surfel_impulse.data(), one.body->impulse_time());
     return true;
   }
 
+  bool balanced(const One &one) const {
+    const double rounding = kForceRounding * one.points->stiffest() *
+                            largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride);
+    return (alone_ || norm(one.net) <= std::max(kNet * tolerance_ * one.all, rounding)) &&
+           one.left <= std::max(tolerance_ * one.scale, rounding);
+  }
+
   void check_balance(const One &one) const {
-    if (!one.free) return;
-    const Body &b = *one.body;
-    Vec3 sum;
-    double all = 0;
-    for (size_t i = 0; i < b.p.n; ++i) {
-      const Vec3 f = load3(&b.p.load[i * kStride]) + b.p.mass[i] * w_.gravity.now;
-      sum += f;
-      all += std::sqrt(norm2(f));
-    }
-    if (!(std::sqrt(norm2(sum)) > 1e-9 * all)) return;
+    if (!one.body->springs.empty() || norm(one.net) <= kBalance * one.all) return;
     fail(DFM_E_DIVERGED,
          "body '%s' has no equilibrium: nothing holds it, and its loads sum to [%g, %g, %g] N; hold some of "
          "its points (fix), or balance its loads",
-         b.name.c_str(), sum.x, sum.y, sum.z);
+         one.body->name.c_str(), one.net.x, one.net.y, one.net.z);
   }
 
-  [[noreturn]] void refuse(const One &one, const Station &at, const EquilibriumResult &r) const {
+  // Stops all bodies, too.
+  void weigh_all(double h) {
+    for (One &one : bodies_) {
+      Phyxels &p = one.body->p;
+      std::fill(p.v.begin(), p.v.end(), 0.0);
+      relax_dampers(p);
+      set_loads(*one.body, w_.time, w_.prescribed.share);  // without springs
+      weigh(one, h);
+    }
+  }
+
+  // Computes the unbalanced forces at the present positions, with the contact forces of the last step of h
+  // seconds.
+  void weigh(One &one, double h) {
+    sum_loads(one);
+    const Phyxels &p = one.body->p;
+    if (!one.rest->add_forces(w_.time, h)) one.left = HUGE_VAL;
+    double nan_flag = 0;
+    for (size_t at = 0; at < p.x.size(); ++at) {
+      double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
+      most = std::max(most, std::fabs(p.f[at]));
+      if (!one.last.empty()) one.moved = std::max(one.moved, std::fabs(p.x[at] - one.last[at]));
+      nan_flag += 0.0 * p.f[at];
+    }
+    if (nan_flag != 0) one.left = HUGE_VAL;
+  }
+
+  // Writes loads and contact forces into points().f and sums them. Components that are held at some point do
+  // not count: there the body is supported.
+  void sum_loads(One &one) const {
+    Body &b = *one.body;
+    Phyxels &p = b.p;
+    const double *const contact = one.points->contact_force();
+    loads_at_rest(w_, b, p.f.data());
+    one.scale = one.moved = one.left = one.all = 0;
+    one.touches = false;
+    one.held = 0;
+    for (const uint8_t bits : p.held) one.held |= bits;
+    Vec3 center, torque;
+    one.net = {};
+    for (uint32_t i = 0; i < p.n; ++i) center += (p.mass[i] / b.mass) * p.x_at(i);
+    double inertia = 0, far = 0;
+    for (uint32_t i = 0; i < p.n; ++i) {
+      double *const f = &p.f[size_t{kStride} * i];
+      Vec3 free;
+      for (uint32_t c = 0; c < 3; ++c) {
+        const double push = contact[3 * size_t{i} + c];
+        one.scale = std::max({one.scale, std::fabs(f[c]), std::fabs(push)});
+        one.all += std::fabs(f[c]) + std::fabs(push);
+        one.touches = one.touches || push != 0;
+        f[c] += push;
+        if (!(one.held & (1 << c))) free[int(c)] = f[c];
+      }
+      const Vec3 arm = p.x_at(i) - center;
+      one.net += free;
+      torque += cross(arm, free);
+      inertia += p.mass[i] * norm2(arm);
+      far = std::max(far, norm2(arm));
+    }
+    one.pull = norm(one.net) / b.mass + norm(torque) / inertia * std::sqrt(far);
+  }
+
+  // Limits the next step so that an unsupported body moves no farther than its reach.
+  double length(double longest) const {
+    double h = longest;
+    for (const One &one : bodies_)
+      if (!alone_ && !hangs(one) && one.pull > 0) h = std::min(h, std::sqrt(one.reach / one.pull));
+    return std::max(h, kShortest);
+  }
+
+  // s, to which keys advance in the next step, so that no prescribed motion exceeds the reach of a body. The
+  // length of the step itself is unchanged: in a short step, friction would have to accelerate the body's
+  // mass.
+  double next_stop(const Station &to) const {
+    if (alone_) return to.time;
+    double part = to.time - w_.time, reach = HUGE_VAL;
+    for (const One &one : bodies_) reach = std::min(reach, one.reach);
+    while (part > kShortest && prescribed_way(part) > reach) part *= 0.5;
+    return std::min(to.time, w_.time + std::max(part, kShortest));
+  }
+
+  // m, the largest prescribed motion in the next h seconds, also if it returns in between.
+  double prescribed_way(double h) const {
+    double most = 0;
+    for (const double part : {1.0, 0.5, 0.25, 0.125})
+      most = std::max(most, prescribed_distance(w_.time + part * h));
+    return most;
+  }
+  double prescribed_distance(double t) const {
+    double most = 0, size = 0;
+    for (const One &one : bodies_) {
+      size = std::max(size, one.size);
+      each_held_place(*one.body, t, [&](uint32_t point, Vec3 x) {
+        most = std::max(most, norm(x - one.body->p.x_at(point)));
+      });
+    }
+    for (const auto &o : w_.obstacles) {
+      if (!o->moves()) continue;
+      const Pose to = o->pose_at_time(t);
+      const double turn = norm(spin_between(o->pose.rotation, to.rotation, 1));
+      most = std::max(most, norm(to.position - o->pose.position) + turn * size);
+    }
+    return most;
+  }
+
+  void check_progress(uint32_t steps, double h) const {
+    for (const One &one : bodies_)
+      if (one.slid > kAway * one.size) refuse(one, steps, h);
+    if (steps < most_) return;
+    const auto worse = [](const One &a, const One &b) { return a.left * b.scale < b.left * a.scale; };
+    refuse(*std::max_element(bodies_.begin(), bodies_.end(), worse), steps, h);
+  }
+
+  static bool hangs(const One &one) { return one.held == 7; }
+
+  // A body that is held cannot slide away.
+  static const char *advice(const One &one) {
+    return hangs(one)
+               ? "use more load_steps, or run the world in time with damping (integrator tr_bdf2) until it "
+                 "rests"
+               : "hold it (fix), raise the friction, or run the world in time";
+  }
+
+  [[noreturn]] void refuse(const One &one, uint32_t steps, double h) const {
     fail(DFM_E_DIVERGED,
-         "body '%s': no equilibrium was found at %g of the loads (%u iterations; %g N are not balanced, the "
-         "largest load or reaction is %g N); lower the loads, hold what may move freely, or look for "
-         "parameters that leave the body without stiffness",
-         one.body->name.c_str(), at.share, r.iterations, r.left, r.scale);
+         "body '%s' finds no rest at %g of the loads: the last of %u steps from rest (%g s) has moved it by "
+         "%g m, and %g N at a point are not balanced (the largest load or reaction is %g N); %s",
+         one.body->name.c_str(), w_.prescribed.share, steps, h, one.moved, one.left, one.scale, advice(one));
+  }
+
+  // The result becomes the present state; the steps of the search leave no trace.
+  void keep() {
+    info_.residual = 0;
+    for (One &one : bodies_) {
+      info_.residual = std::max(info_.residual, one.scale > 0 ? one.left / one.scale : 0);
+      one.body->contact_impulse = one.contact_impulse;
+      if (def_.sleep) one.body->anchor = one.body->p.x;
+      ++one.body->x_version;
+      set_loads(*one.body, w_.time, 1);
+    }
+    const dfm_world_stats now = w_.stats;
+    w_.stats = stats_;
+    w_.stats.contacts = now.contacts;
+    w_.stats.sticking = now.sticking;
+    w_.stats.contacts_max = std::max(w_.stats.contacts_max, now.contacts);
+    w_.stats.time = w_.time;
+    w_.step_count = steps_;
+    w_.sizes = sizes_;
+    begin_impulses(w_.step_impulses, w_.time, 0);
+    for (dfm_contact_event &event : w_.events) event.t = w_.time;
+    w_.events.insert(w_.events.begin(), earlier_.begin(), earlier_.end());
+    done_ = true;
   }
 
   World &w_;
+  StepContext &step_;
   dfm_equilibrium_info &info_;
-  Station start_, end_;
-  EquilibriumLimits limits_;
+  const bool alone_;  // nothing can touch anything
+  const Station start_, end_;
+  const double tolerance_;
+  const uint32_t most_;
   std::vector<One> bodies_;
-  Kept kept_, first_;
+  std::string before_;
+  dfm_world_stats stats_{};
+  uint64_t steps_ = 0;
+  StepSizes sizes_;
+  std::vector<dfm_contact_event> earlier_;  // before the search
+  decltype(Overlaps::suspended) suspended_;
+  dfm_world_def def_{};
   bool done_ = false;
 };
 
@@ -357,24 +543,17 @@ void check_equilibrium(const World &w) {
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
   prepare(w);
   check_equilibrium(w);
-  if (w.plan.touches()) return find_contact_equilibrium(w, def, info);
   {
-    Search search(w, def, info);
+    Settling search(w, def, info);
     search.run(def.load_steps ? def.load_steps : 1);
   }
-  wake_all(w);
+  forget_energy(w);
   for (auto &b : w.bodies) {
-    b->dynamics->points_changed();
-    forget_energy(*b);
     clear_change_energy(*b);
-    ++b->x_version;
-    w.overlaps.place(b->id);
+    if (!w.plan.touches()) w.overlaps.place(b->id);
   }
-  for (auto &o : w.obstacles)
-    if (o->moves()) o->pose = o->pose_at_time(w.time);
   w.bound.age = kNone;
   ++w.placements;
-  w.stats.time = w.time;
 }
 
 }  // namespace dfm

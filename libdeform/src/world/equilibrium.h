@@ -11,7 +11,5 @@ void check_equilibrium(const World &w);
 // Sets positions at which every body is in equilibrium, zero velocities, and advances time by def.time.
 // Throws Error; then nothing has changed.
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
-// The same with contact and friction, for a prepared world: steps from rest, in settle.cpp.
-void find_contact_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info);
 
 }  // namespace dfm

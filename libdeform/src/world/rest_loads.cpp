@@ -45,10 +45,6 @@ std::vector<double> softness_of(const Body &b) {
   return softness;
 }
 
-bool is_free(const Body &b) {
-  return b.springs.empty() && std::all_of(b.p.held.begin(), b.p.held.end(), [](uint8_t h) { return h == 0; });
-}
-
 void warn_of_own_weight(const World &w, Body &b) {
   const Vec3 down = w.gravity.now;
   const double g = norm(down), young = b.young();

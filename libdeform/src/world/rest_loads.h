@@ -15,7 +15,6 @@ inline Station between(const Station &a, const Station &b, double part) {
 void loads_at_rest(const World &w, const Body &b, double *f);
 // [npoint] N/m, row sums of the stiffness of these loads.
 std::vector<double> softness_of(const Body &b);
-bool is_free(const Body &b);  // no held points and no springs
 
 // Logs a warning if the weight of a new body presses it flat. The usual causes are a mesh in millimeters and
 // a material that was forgotten.
