@@ -24,10 +24,11 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <utility>
 
 #include "buffer.h"
+#include "cell_blocks.h"
 #include "cells.h"
+#include "edges.h"
 #include "entry.h"
 #include "params.h"
 #include "rotation.h"
@@ -72,12 +73,12 @@ class CellBody {
     const bool part = m.size >= offsetof(dfm_mesh, inside) + sizeof m.inside && m.inside;
     if (part) inside_.create_copy(h, m.inside, size_t{cells::kInside} * ncell_);
     cell_.create(h, ncell_);
-    block_.create(h, 9 * nblock() * ncell_);
+    block_.create(h, kind_, ncell_);
     force_.create(h, 3 * size_t(nodes_) * ncell_);
     drag_.create(h, npoint_);
     weight_.create(h, npoint_);
     next_.create(h, npoint_);
-    norm_.create(h, nblock() * ncell_);
+    norm_.create(h, block_.each() * ncell_);
     find_places();
     apply_params(m.params);
   }
@@ -233,11 +234,7 @@ class CellBody {
   double at(Param which, uint32_t c) const {
     return field_[which].empty() ? params_[which] : field_[which][c];
   }
-  size_t nblock() const { return size_t(nodes_) * (nodes_ + 1) / 2; }
   uint32_t corner(uint32_t c, uint32_t a) const { return cells_[size_t(nodes_) * c + a]; }
-  // Block (a, b), a <= b, in the order (0, 0), (0, 1) ...
-  size_t place(uint32_t a, uint32_t b) const { return size_t(a) * nodes_ - a * (a + 1) / 2 + b; }
-  const double *blocks(uint32_t c) const { return block_.data() + 9 * nblock() * c; }
 
   template <class Piece>
   void run(uint32_t n, Piece piece, Call &call) const {
@@ -267,8 +264,7 @@ class CellBody {
       }
     RestCell made;
     const double *const inside = inside_.empty() ? nullptr : &inside_[size_t{cells::kInside} * c];
-    if (!make_rest_cell(kind_, x, inside, lame_of(at(kYoung, c), at(kPoisson, c)), made))
-      throw "a cell is inverted or flat at rest; mesh the shape again with less curved cells";
+    if (!make_rest_cell(kind_, x, inside, lame_of(at(kYoung, c), at(kPoisson, c)), made)) throw kFlatCell;
     Cell &out = cell_[c];
     out.volume = made.volume;
     for (uint32_t a = 0; a < nodes_; ++a)
@@ -276,12 +272,8 @@ class CellBody {
         out.rest[a][n] = x[3 * a + n] - middle[n];
         out.mean[a][n] = made.mean[a][n];
       }
-    for (uint32_t a = 0; a < nodes_; ++a)
-      for (uint32_t b = a; b < nodes_; ++b) {
-        double *const k = block_.data() + 9 * (nblock() * c + place(a, b));
-        for (uint32_t n = 0; n < 9; ++n) k[n] = made.stiffness[3 * a + n / 3][3 * b + n % 3];
-        norm_[nblock() * c + place(a, b)] = norm_of(k);
-      }
+    block_.set(c, made);
+    for (size_t n = 0; n < block_.each(); ++n) norm_[block_.each() * c + n] = norm_of(block_.of(c) + 9 * n);
     for (uint32_t a = 0; a < nodes_; ++a) {
       drag_[corner(c, a)] += made.volume * at(kDampingMass, c);
       weight_[corner(c, a)] += made.volume;
@@ -289,10 +281,10 @@ class CellBody {
   }
 
   double row_of(uint32_t c, uint32_t a) const {
-    const double *const norm = norm_.data() + nblock() * c;
+    const double *const norm = norm_.data() + block_.each() * c;
     double sum = 0;
     for (uint32_t b = 0; b < nodes_; ++b)
-      sum += norm[a < b ? place(a, b) : place(b, a)] * weight_[corner(c, b)];
+      sum += norm[block_.place(std::min(a, b), std::max(a, b))] * weight_[corner(c, b)];
     return sum;
   }
 
@@ -396,25 +388,10 @@ class CellBody {
     for (int i = 0; i < 3; ++i) out[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2];
   }
 
-  // out = K u
-  void apply(uint32_t c, const double (*u)[3], double (*out)[3]) const {
-    std::fill(&out[0][0], &out[0][0] + 3 * nodes_, 0.0);
-    const double *k = blocks(c);
-    for (uint32_t a = 0; a < nodes_; ++a)
-      for (uint32_t b = a; b < nodes_; ++b, k += 9)
-        for (uint32_t i = 0; i < 3; ++i) {
-          out[a][i] += (k[3 * i] * u[b][0] + k[3 * i + 1] * u[b][1]) + k[3 * i + 2] * u[b][2];
-          if (b > a) out[b][i] += (k[i] * u[a][0] + k[3 + i] * u[a][1]) + k[6 + i] * u[a][2];
-        }
-  }
-
   double energy_of(const dfm_kin &k, uint32_t c, Moved &m) const {
-    double h[kMaxNodes][3], sum = 0;
+    double h[kMaxNodes][3];
     move(k, c, m);
-    apply(c, m.u, h);
-    for (uint32_t a = 0; a < nodes_; ++a)
-      sum += (m.u[a][0] * h[a][0] + m.u[a][1] * h[a][1]) + m.u[a][2] * h[a][2];
-    return 0.5 * sum;
+    return block_.energy(c, m.u, h);
   }
 
   // The rate of u: R^T v less the turning of the frame.
@@ -449,7 +426,7 @@ class CellBody {
       for (uint32_t a = 0; a < nodes_; ++a)
         for (int n = 0; n < 3; ++n) pull[a][n] += damp * h[a][n];
     }
-    apply(c, pull, h);
+    block_.apply(c, pull, h);
     for (uint32_t a = 0; of_.turns && a < nodes_; ++a) {
       cross(m.u[a], h[a], part);
       for (int n = 0; n < 3; ++n) tau[n] += part[n];
@@ -476,7 +453,7 @@ class CellBody {
     Moved m;
     double h[kMaxNodes][3], pull[kMaxNodes], moment[9] = {}, rows = 0, all = 0, second = 0;
     move(k, c, m);
-    apply(c, m.u, h);
+    block_.apply(c, m.u, h);
     const Cell &cell = cell_[c];
     const auto square = [](const double *x) { return (x[0] * x[0] + x[1] * x[1]) + x[2] * x[2]; };
     for (uint32_t a = 0; a < nodes_; ++a) {
@@ -507,7 +484,7 @@ class CellBody {
       double unit[3] = {}, column[kMaxNodes][3], product[kMaxNodes][3], part[3];
       unit[n] = 1;
       for (uint32_t a = 0; a < nodes_; ++a) cross(m.u[a], unit, column[a]);
-      apply(c, column, product);
+      block_.apply(c, column, product);
       for (uint32_t a = 0; a < nodes_; ++a) {
         for (uint32_t i = 0; i < 3; ++i) z[a][3 * i + n] = product[a][i];
         cross(product[a], m.u[a], part);  // [u]x^T p = p x u
@@ -518,7 +495,7 @@ class CellBody {
         for (uint32_t i = 0; i < 3; ++i) turn[a][3 * i + n] = t[i];
       }
     }
-    const double *own = blocks(c);
+    const double *own = block_.of(c);
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t b = a; b < nodes_; ++b, own += 9) {
         double sum[9], half[9] = {}, full[9] = {};
@@ -538,7 +515,8 @@ class CellBody {
           for (uint32_t j = 0; j < 3; ++j)
             for (uint32_t n = 0; n < 3; ++n) full[3 * i + j] += half[3 * i + n] * m.r[3 * j + n];
         const uint32_t i = corner(c, a), j = corner(c, b);
-        const size_t slot = a == b ? i : npoint_ + slot_[(nblock() - nodes_) * c + place(a, b) - (a + 1)];
+        const size_t slot =
+            a == b ? i : npoint_ + slot_[(block_.each() - nodes_) * c + block_.place(a, b) - (a + 1)];
         for (uint32_t n = 0; n < 9; ++n) blk[9 * slot + n] -= by * full[i > j ? 3 * (n % 3) + n / 3 : n];
       }
   }
@@ -546,32 +524,15 @@ class CellBody {
   // Pairs i < j of points of a cell, ascending; made when an implicit step first asks.
   void ready_pairs() const {
     if (!pair_.empty()) return;
-    const size_t each = nblock() - nodes_;
-    Buffer<uint64_t> key;
-    key.create(host, each * ncell_);
-    slot_.create(host, each * ncell_);
-    size_t n = 0;
-    const auto each_pair = [&](auto &&use) {
-      for (uint32_t c = 0; c < ncell_; ++c)
-        for (uint32_t a = 0; a < nodes_; ++a)
-          for (uint32_t b = a + 1; b < nodes_; ++b) {
-            const auto [i, j] = std::minmax({corner(c, a), corner(c, b)});
-            use(uint64_t(i) << 32 | j);
-          }
-    };
-    each_pair([&](uint64_t of) { key[n++] = of; });
-    std::sort(key.data(), key.data() + n);
-    const size_t kept = size_t(std::unique(key.data(), key.data() + n) - key.data());
+    Buffer<uint32_t> pair;
+    npair_ = list_pairs(host, cells_.data(), ncell_, nodes_, pair);
+    slot_.create(host, (block_.each() - nodes_) * ncell_);
     size_t at = 0;
-    each_pair([&](uint64_t of) {
-      slot_[at++] = uint32_t(std::lower_bound(key.data(), key.data() + kept, of) - key.data());
-    });
-    npair_ = uint32_t(kept);
-    pair_.create(host, 2 * kept);
-    for (size_t p = 0; p < kept; ++p) {
-      pair_[2 * p] = uint32_t(key[p] >> 32);
-      pair_[2 * p + 1] = uint32_t(key[p]);
-    }
+    for (uint32_t c = 0; c < ncell_; ++c)
+      for (uint32_t a = 0; a < nodes_; ++a)
+        for (uint32_t b = a + 1; b < nodes_; ++b)
+          slot_[at++] = find_edge(pair.data(), npair_, corner(c, a), corner(c, b));
+    pair_.swap(pair);  // made
   }
 
   Of of_{};
@@ -582,11 +543,12 @@ class CellBody {
   Buffer<double> inside_;              // [ncell,27] of a lattice, as dfm_mesh has it; else empty
   Buffer<uint32_t> cells_;             // [ncell,nodes]
   Buffer<Cell> cell_;                  // [ncell]
-  Buffer<double> block_, norm_;        // [ncell,nblock,9] N/m, [ncell,nblock] their norms
-  Buffer<double> force_;               // [ncell,nodes,3] N
-  Buffer<uint32_t> begin_, place_;     // [npoint + 1], [ncell * nodes]
-  Buffer<double> drag_;                // [npoint] kg/s
-  Buffer<double> weight_, next_;       // [npoint]
+  CellBlocks block_;
+  Buffer<double> norm_;             // [ncell] of each of its blocks, N/m
+  Buffer<double> force_;            // [ncell,nodes,3] N
+  Buffer<uint32_t> begin_, place_;  // [npoint + 1], [ncell * nodes]
+  Buffer<double> drag_;             // [npoint] kg/s
+  Buffer<double> weight_, next_;    // [npoint]
   SmallRange range_;
   mutable Buffer<uint32_t> pair_, slot_;  // [npair,2], [ncell, pairs of its nodes]
   mutable uint32_t npair_ = 0;

@@ -1,5 +1,4 @@
-// Cells with more nodes than a tetrahedron's corners: their shape functions, and the stiffness of one at
-// rest.
+// Cells of any kind: their shape functions, and the stiffness of one at rest.
 // Orders of nodes are VTK's: the edges of a tetrahedron 01 12 02 03 13 23; a hexahedron around the bottom,
 // then around the top.
 //
@@ -32,6 +31,7 @@
 
 #include "entry.h"
 #include "material.h"
+#include "tetrahedron.h"
 
 namespace model {
 
@@ -50,6 +50,9 @@ inline double norm_of(const double *m) {
   const double deviator2 = ((x * x + y * y) + z * z) + 2 * ((a[3] * a[3] + a[4] * a[4]) + a[5] * a[5]);
   return std::sqrt(mean + std::sqrt(deviator2 * (2.0 / 3)));
 }
+
+constexpr const char *kFlatCell =
+    "a cell is inverted or flat at rest; mesh the shape again with less curved cells";
 
 // One cell at rest.
 struct RestCell {
@@ -184,11 +187,31 @@ inline void eliminate(double (&k)[kSize][kSize], int n, int all) {
 
 }  // namespace cells
 
+// Strain and stress are constant in a first-order tetrahedron: one point.
+inline bool make_rest_tetrahedron(const double *x, const Lame &m, RestCell &out) {
+  Tetrahedron t;
+  if (!make_tetrahedron(x, x + 3, x + 6, x + 9, t) || !(t.volume > 0)) return false;
+  out.volume = t.volume;
+  for (int a = 0; a < 4; ++a) std::copy_n(t.g[a], 3, out.mean[a]);
+  for (int a = 0; a < 4; ++a)
+    for (int b = 0; b < 4; ++b) {
+      double across = 0;
+      for (int k = 0; k < 3; ++k) across += t.g[a][k] * t.g[b][k];
+      for (int r = 0; r < 3; ++r)
+        for (int s = 0; s < 3; ++s)
+          out.stiffness[3 * a + r][3 * b + s] =
+              t.volume * ((m.lambda * t.g[a][r] * t.g[b][s] + m.mu * t.g[b][r] * t.g[a][s]) +
+                          (r == s ? m.mu * across : 0));
+    }
+  return true;
+}
+
 // x [nodes,3] m; inside [27] or null. False if the Jacobian is not positive at a point: the cell is inverted
 // or flat there.
 inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside, const Lame &m,
                            RestCell &out) {
   using namespace cells;
+  if (kind == DFM_CELL_TET) return make_rest_tetrahedron(x, m, out);
   const bool hex = kind == DFM_CELL_HEX8;
   const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes,
             points = inside ? kInside : kWhole;

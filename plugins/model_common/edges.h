@@ -1,7 +1,10 @@
-// Edges of a tetrahedron in the list of its mesh.
+// Edges of a tetrahedron in the list of its mesh, and the pairs of points that share a cell of any kind.
 #pragma once
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+
+#include "buffer.h"
 
 namespace model {
 
@@ -50,6 +53,26 @@ inline void find_edges_by_rows(const uint32_t *edges, const uint32_t *row, const
 // Numbers of the edges of a cell.
 inline void find_edges(const uint32_t *edges, uint32_t nedge, const uint32_t *cell, uint32_t *out) {
   for (int n = 0; n < 6; ++n) out[n] = find_edge(edges, nedge, cell[kEdgeOf[n][0]], cell[kEdgeOf[n][1]]);
+}
+
+// pair [.,2]: all pairs i < j of points of a cell, lexicographic; cells [ncell,nodes]. Returns their number.
+inline uint32_t list_pairs(const dfm_host *host, const uint32_t *cells, uint32_t ncell, uint32_t nodes,
+                           Buffer<uint32_t> &pair) {
+  Buffer<uint64_t> key;
+  key.create(host, size_t(nodes) * (nodes - 1) / 2 * ncell);
+  size_t n = 0;
+  for (const uint32_t *q = cells; q < cells + size_t(nodes) * ncell; q += nodes)
+    for (uint32_t a = 0; a < nodes; ++a)
+      for (uint32_t b = a + 1; b < nodes; ++b)
+        key[n++] = uint64_t(std::min(q[a], q[b])) << 32 | std::max(q[a], q[b]);
+  std::sort(key.data(), key.data() + n);
+  n = size_t(std::unique(key.data(), key.data() + n) - key.data());
+  pair.create(host, 2 * n);
+  for (size_t p = 0; p < n; ++p) {
+    pair[2 * p] = uint32_t(key[p] >> 32);
+    pair[2 * p + 1] = uint32_t(key[p]);
+  }
+  return uint32_t(n);
 }
 
 }  // namespace model

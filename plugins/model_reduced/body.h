@@ -221,9 +221,11 @@ class Body {
 };
 
 struct Modal : Body {
+  static constexpr uint32_t kCells = DFM_CELL_TET | DFM_CELL_HEX8 | DFM_CELL_TET10;
   Modal() : Body(kModalId, false) {}
 };
 struct Condensed : Body {
+  static constexpr uint32_t kCells = Modal::kCells;
   Condensed() : Body(kCondensedId, true) {}
 };
 // Condensed, with the stiffness of boundary elements (boundary.h).

@@ -11,8 +11,6 @@
 
 namespace reduced {
 
-using model::Tetrahedron;
-
 namespace {
 
 // Rows of the rigid motions about the origin, at x: three translations, three rotations.
@@ -84,17 +82,6 @@ model::Lame Elastic::lame(uint32_t c) const {
                         field_[kPoisson].empty() ? poisson_ : field_[kPoisson][c]);
 }
 
-bool Elastic::cell(uint32_t c, Tetrahedron &out) const {
-  const uint32_t *const q = cells_.data() + 4 * size_t(c);
-  const auto x = [&](int a) { return rest.data() + 3 * size_t(q[a]); };
-  return model::make_tetrahedron(x(0), x(1), x(2), x(3), out) && out.volume > 0;
-}
-
-double Elastic::volume(uint32_t c) const {
-  Tetrahedron t;
-  return cell(c, t) ? t.volume : 0;
-}
-
 void Elastic::take(const dfm_mesh &m, const char *id) {
   npoint = m.npoint;
   ncell = m.ncell;
@@ -115,8 +102,8 @@ void Elastic::take(const dfm_mesh &m, const char *id) {
   mass.create_copy(host_, m.mass, npoint);
   held.create(host_, npoint);
   work_.create(host_, 3 * size_t(npoint));
-  cells_.create_copy(host_, m.cells, 4 * size_t(ncell));
-  edges_.create_copy(host_, m.edges, 2 * size_t(m.nedge));
+  nodes_ = model::nodes_of(m.cell);
+  cells_.create_copy(host_, m.cells, nodes_ * size_t(ncell));
   turns = true;
   for (uint32_t i = 0; i < npoint; ++i) {
     if (!(mass[i] > 0)) throw "a point has no mass; every point must belong to a cell";
@@ -150,26 +137,37 @@ void Elastic::place_origin(const dfm_mesh &m) {
     }
 }
 
-void Elastic::assemble() {
-  for (uint32_t c = 0; c < ncell; ++c) {
-    Tetrahedron t;
-    if (!cell(c, t)) continue;
-    const model::Lame m = lame(c);
-    const uint32_t *const q = cells_.data() + 4 * size_t(c);
-    for (int a = 0; a < 4; ++a)
-      for (int b = 0; b < 4; ++b) {
-        if (q[a] > q[b]) continue;
-        const size_t at =
-            a == b ? q[a] : npoint + size_t(model::find_edge(edges_.data(), nedge_, q[a], q[b]));
-        double across = 0;
-        for (int k = 0; k < 3; ++k) across += t.g[a][k] * t.g[b][k];
-        for (int r = 0; r < 3; ++r)
-          for (int s = 0; s < 3; ++s)
-            block_[9 * at + size_t(3 * r + s)] +=
-                t.volume * ((m.lambda * t.g[a][r] * t.g[b][s] + m.mu * t.g[b][r] * t.g[a][s]) +
-                            (r == s ? m.mu * across : 0));
-      }
+// Volumes and mean gradients; the stiffness too, if it is that of the cells.
+void Elastic::take_cells(const dfm_mesh &m) {
+  volume_.create(host_, ncell);
+  mean_.create(host_, 3 * size_t(nodes_) * ncell);
+  if (m.cell != DFM_CELL_TET) cell_block_.create(host_, m.cell, ncell);
+  const bool part = m.size >= offsetof(dfm_mesh, inside) + sizeof m.inside && m.inside;
+  for (size_t c = 0; c < ncell; ++c) {
+    double x[3 * model::kMaxNodes];
+    for (size_t a = 0; a < nodes_; ++a) std::copy_n(&rest[3 * size_t(cells_[nodes_ * c + a])], 3, x + 3 * a);
+    model::RestCell made;
+    const double *const inside = part ? m.inside + model::cells::kInside * c : nullptr;
+    if (!model::make_rest_cell(m.cell, x, inside, lame(uint32_t(c)), made)) {
+      if (m.cell == DFM_CELL_TET) continue;
+      throw model::kFlatCell;
+    }
+    volume_[c] = made.volume;
+    std::copy_n(made.mean[0], 3 * size_t(nodes_), &mean_[3 * nodes_ * c]);
+    if (!cell_block_.block.empty()) cell_block_.set(uint32_t(c), made);
+    if (!by_surface_) add_cell(uint32_t(c), made);
   }
+}
+
+void Elastic::add_cell(uint32_t c, const model::RestCell &cell) {
+  const uint32_t *const q = cells_.data() + nodes_ * size_t(c);
+  for (uint32_t a = 0; a < nodes_; ++a)
+    for (uint32_t b = 0; b < nodes_; ++b) {
+      if (q[a] > q[b]) continue;
+      const size_t at = a == b ? q[a] : npoint + size_t(model::find_edge(edges_.data(), nedge_, q[a], q[b]));
+      for (size_t r = 0; r < 3; ++r)
+        for (size_t s = 0; s < 3; ++s) block_[9 * at + 3 * r + s] += cell.stiffness[3 * a + r][3 * b + s];
+    }
 }
 
 // Gram and Schmidt's method, twice, by mass.
@@ -302,11 +300,11 @@ void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bo
   if (by_surface) surface_.find(host, id, m);  // its limit is the lower one
   take(m, id);
   place_origin(m);
-  nedge_ = m.nedge;
   if (by_surface) take_surface(m, id);
+  else nedge_ = model::list_pairs(host, cells_.data(), ncell, nodes_, edges_);
   block_.create(host, 9 * (size_t(npoint) + nedge_));
+  take_cells(m);
   if (by_surface) surface_.assemble(id, *kernels, rest.data(), young_, poisson_, block_.data());
-  else assemble();
   if (floating) {
     find_rigid();
     find_pins();
@@ -414,21 +412,20 @@ void Elastic::follow(double *u) const {
 }
 
 // h = sum u_a g_a^T
-void Elastic::gradient(uint32_t c, const Tetrahedron &t, const double *u, double *h) const {
-  const uint32_t *const q = cells_.data() + 4 * size_t(c);
+void Elastic::gradient(uint32_t c, const double *u, double *h) const {
+  const uint32_t *const q = cells_.data() + nodes_ * size_t(c);
+  const double *const g = mean_.data() + 3 * nodes_ * size_t(c);
   std::fill(h, h + 9, 0.0);
-  for (size_t a = 1; a < 4; ++a)
+  for (size_t a = 1; a < nodes_; ++a)
     for (size_t r = 0; r < 3; ++r)
       for (size_t s = 0; s < 3; ++s)
-        h[3 * r + s] += (u[3 * size_t(q[a]) + r] - u[3 * size_t(q[0]) + r]) * t.g[a][s];
+        h[3 * r + s] += (u[3 * size_t(q[a]) + r] - u[3 * size_t(q[0]) + r]) * g[3 * a + s];
 }
 
 double Elastic::largest_gradient(const double *u, uint32_t *where) const {
   double most = 0, h[9];
-  Tetrahedron t;
   for (uint32_t c = 0; c < ncell; ++c) {
-    if (!cell(c, t)) continue;
-    gradient(c, t, u, h);
+    gradient(c, u, h);
     double square = 0;
     for (const double x : h) square += x * x;
     if (!(square > most)) continue;
@@ -439,11 +436,8 @@ double Elastic::largest_gradient(const double *u, uint32_t *where) const {
 }
 
 void Elastic::stress(uint32_t c, const double *u, double *out) const {
-  Tetrahedron t;
-  std::fill(out, out + 9, 0.0);
-  if (!cell(c, t)) return;
   double h[9];
-  gradient(c, t, u, h);
+  gradient(c, u, h);
   const model::Lame m = lame(c);
   const double pressure = m.lambda * ((h[0] + h[4]) + h[8]);
   for (size_t r = 0; r < 3; ++r)
@@ -473,10 +467,15 @@ size_t Elastic::nmoving() const {
 }
 
 double Elastic::density(uint32_t c, const double *u) const {
-  Tetrahedron t;
-  if (!cell(c, t)) return 0;
+  if (!(volume_[c] > 0)) return 0;
+  if (!cell_block_.block.empty()) {
+    double own[model::kMaxNodes][3], force[model::kMaxNodes][3];
+    for (uint32_t a = 0; a < nodes_; ++a)
+      std::copy_n(u + 3 * size_t(cells_[nodes_ * size_t(c) + a]), 3, own[a]);
+    return cell_block_.energy(c, own, force) / volume_[c];
+  }
   double h[9], s[9], sum = 0;
-  gradient(c, t, u, h);
+  gradient(c, u, h);
   stress(c, u, s);
   for (size_t n = 0; n < 9; ++n) sum += s[n] * h[n];
   return 0.5 * sum;

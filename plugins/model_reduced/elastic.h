@@ -9,8 +9,8 @@
 #include <array>
 #include <vector>
 
+#include "../model_common/cell_blocks.h"
 #include "../model_common/material.h"
-#include "../model_common/tetrahedron.h"
 #include "boundary.h"
 #include "params.h"
 #include "sparse.h"
@@ -48,16 +48,18 @@ class Elastic {
   double largest_gradient(const double *u, uint32_t *where) const;
   double density(uint32_t c, const double *u) const;            // J/m3
   void stress(uint32_t c, const double *u, double *out) const;  // 3 x 3
-  double volume(uint32_t c) const;
-  double energy(const double *u) const;  // J
-  size_t nmoving() const;                // components that have a displacement of their own
+  double volume(uint32_t c) const { return volume_[c]; }        // 0: flat or inverted, without stiffness
+  double energy(const double *u) const;                         // J
+  size_t nmoving() const;  // components that have a displacement of their own
 
  private:
   const dfm_host *host_ = nullptr;
   double young_ = 0, poisson_ = 0;
   Buffer<double> field_[kParamCount];
-  Buffer<uint32_t> cells_, edges_;
-  uint32_t nedge_ = 0;
+  Buffer<uint32_t> cells_, edges_;  // [ncell,nodes_], [nedge_,2]: all pairs that the stiffness joins
+  uint32_t nodes_ = 4, nedge_ = 0;
+  Buffer<double> volume_, mean_;  // [ncell] m3, [ncell,nodes_,3] mean gradients of the shape functions
+  model::CellBlocks cell_block_;  // empty where strain is constant in a cell
   Buffer<double> block_;  // [npoint + nedge, 9]; dropped where nothing is held and cells have the energy
   bool by_surface_ = false;
   Boundary surface_;
@@ -68,12 +70,12 @@ class Elastic {
   bool is_held(size_t component) const { return held[component / 3] >> (component % 3) & 1; }
   void multiply(const double *u, double scale, double *out) const;
   void take_surface(const dfm_mesh &m, const char *id);
-  bool cell(uint32_t c, model::Tetrahedron &out) const;
   model::Lame lame(uint32_t c) const;
-  void gradient(uint32_t c, const model::Tetrahedron &t, const double *u, double *h) const;
+  void gradient(uint32_t c, const double *u, double *h) const;
   void take(const dfm_mesh &m, const char *id);
   void place_origin(const dfm_mesh &m);
-  void assemble();
+  void take_cells(const dfm_mesh &m);
+  void add_cell(uint32_t c, const model::RestCell &cell);
   void find_rigid();
   void find_pins();
   void check_holding() const;

@@ -108,8 +108,9 @@ struct Entry {
   static constexpr dfm_slot kSlots[] = {{DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
 
   static constexpr dfm_model kModel = {sizeof(dfm_model),
-                                       DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
-                                       DFM_CELL_TET,
+                                       DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT |
+                                           (model::cells_of<B>() == DFM_CELL_TET ? 0 : DFM_CAP_INSIDE),
+                                       model::cells_of<B>(),
                                        1,
                                        kSlots,
                                        create,
@@ -130,7 +131,7 @@ const char *const kEffects[] = {"large_rotation", "damping", nullptr};
 
 const dfm_type kModal =
     dfm::plugin::type(DFM_KIND_MODEL, kModalId, "modes of linear elasticity", "0.1.0", "MIT",
-                      "modes of first-order tetrahedra (Pentland, Williams 1989, Good Vibrations, SIGGRAPH) "
+                      "modes of finite elements (Pentland, Williams 1989, Good Vibrations, SIGGRAPH) "
                       "in a floating frame (Shabana 2020, Dynamics of Multibody Systems, ch. 5)",
                       kParams, kEffects, &Entry<Modal>::kModel);
 

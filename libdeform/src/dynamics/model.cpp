@@ -55,12 +55,13 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   params = std::move(values);
   if (!(ops->cells & mesh.cell))
     fail(DFM_E_UNSUPPORTED,
-         "model '%s' does not accept %s; take corotational_fem or linear_fem, or a mesh of first-order "
-         "tetrahedra",
+         "model '%s' does not accept %s; take corotational_fem, linear_fem, modal or condensed, or a mesh of "
+         "first-order tetrahedra",
          t.id, cell_kind(mesh.cell).name);
   if (mesh.inside && !(ops->caps & DFM_CAP_INSIDE))
     fail(DFM_E_UNSUPPORTED,
-         "model '%s' takes whole hexahedra, not the cells of a lattice; take corotational_fem or linear_fem",
+         "model '%s' takes whole hexahedra, not the cells of a lattice; take corotational_fem, linear_fem, "
+         "modal or condensed",
          t.id);
   {
     const Overheard why;
