@@ -137,6 +137,8 @@ struct Single {
   using V = double;
   static double splat(double a) { return a; }
   static double root(double a) { return std::sqrt(a); }
+  static double more(double a, double b) { return a > b ? a : b; }
+  static double less(double a, double b) { return a < b ? a : b; }
 };
 
 // The closed form where it is accurate, else nearest(): what the kernels do with each of their lanes.

@@ -3,6 +3,7 @@
 // the equations used here.
 #include <string.h>
 
+#include "../model_common/plastic.h"
 #include "corot_body.h"
 #include "deform/plugin_draft.h"
 
@@ -92,11 +93,11 @@ dfm_status set_params(void *self, const double *params) {
 
 dfm_status state_init(const void *self, double *state) {
   const Body &body = static_cast<const AnyBody *>(self)->tet;
-  if (body.plastic()) std::fill(state, state + size_t(kPlasticState) * body.ncell, 0.0);
+  if (body.plastic()) std::fill(state, state + size_t(model::plastic::kState) * body.ncell, 0.0);
   return DFM_OK;
 }
 
-const dfm_slot kPlasticSlot = {DFM_PER_CELL, kPlasticState, DFM_SLOT_SCALAR, 0};
+const dfm_slot kPlasticSlot = {DFM_PER_CELL, model::plastic::kState, DFM_SLOT_SCALAR, 0};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
                 kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot, 0, 0};
 

@@ -25,7 +25,7 @@
 // With the volume change of the points (corot_nodal.cpp) the square of their mean replaces the mean of the
 // squares of their cells, which is no less (Jensen): the rows at rest hold. The pressure of c is that of the
 // points.
-// Plastic cells (corot_plastic.h) have s = s(e) - 2 mu p with the flow's moduli in place of D, which are no
+// Plastic cells (plastic.h) have s = s(e) - 2 mu p with the flow's moduli in place of D, which are no
 // more (the potential is a least value over the flow). What p adds is -2 mu p : d2S, and S X + X S = 2 (dF^T
 // dF - dS^2) for X = d2S, from S^2 = F^T F. Both terms are positive semidefinite, so their difference is at
 // most sqrt(|A|^4 + |dS|^4) in norm; |dS|^2 <= (1 + d^2) |A|^2; hence, with c the least sum of two stretches,

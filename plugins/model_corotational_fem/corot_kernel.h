@@ -30,11 +30,10 @@ struct FiberGroup {
   double most[kGroup];                                // largest eigenvalue of the elasticity, or more
 };
 
-// Plastic cells (corot_plastic.h): constants of the material, the first two times the volume. A cell that
+// Plastic cells (plastic.h): constants of the material, the first two times the volume. A cell that
 // does not flow has kNoYield.
 struct PlasticGroup { double yield[kGroup], hardening[kGroup], limit[kGroup]; };
 constexpr double kNoYield = 1e300;
-constexpr uint32_t kPlasticState = 7;  // doubles of state by cell: the plastic strain, its length so far
 
 // The rotation of a cell from its gradient, both row-major.
 using Rotate = void (*)(const double *gradient, double *rotation);

@@ -4,15 +4,16 @@
 #include <stddef.h>
 
 #include "../model_common/block_lanes.h"
+#include "../model_common/plastic.h"
 #include "../model_common/polar_lanes.h"
 #include "corot_kernel.h"
 #include "corot_collapse.h"
-#include "corot_plastic.h"
 
 namespace corot {
 namespace {
 
 using namespace lanes;
+using namespace model::plastic;
 
 // Four cells of a group, from lane `at` on.
 struct Four {
@@ -153,7 +154,7 @@ DEFORM_INLINE void load_plastic(const Block &b, uint32_t n, const Four &q, Plast
   v4 first[4], last[4];  // components 0 to 3, and 3 to 6
   for (uint32_t c = 0; c < 4; ++c) {
     const uint32_t number = b.cell[size_t(kGroup) * n + q.at + c];
-    const double *own = b.state + size_t(kPlasticState) * (number == ~0u ? 0 : number);
+    const double *own = b.state + size_t(kState) * (number == ~0u ? 0 : number);
     first[c] = load4_anywhere(own);
     last[c] = load4_anywhere(own + 3);
   }
@@ -166,13 +167,13 @@ DEFORM_INLINE void load_plastic(const Block &b, uint32_t n, const Four &q, Plast
          load4(own.limit + q.at),    splat(b.flow),           splat(b.per_flow)};
 }
 DEFORM_INLINE void store_plastic(const Block &b, uint32_t n, const Four &q, const PlasticState<Wide> &s) {
-  alignas(32) double one[kPlasticState][4];
+  alignas(32) double one[kState][4];
   for (int k = 0; k < 6; ++k) store4(one[k], s.strain[k]);
   store4(one[6], s.length);
   for (uint32_t c = 0; c < 4; ++c) {
     const uint32_t number = b.cell[size_t(kGroup) * n + q.at + c];
-    for (uint32_t k = 0; number != ~0u && k < kPlasticState; ++k)
-      b.state_out[size_t(kPlasticState) * number + k] = one[k][c];
+    for (uint32_t k = 0; number != ~0u && k < kState; ++k)
+      b.state_out[size_t(kState) * number + k] = one[k][c];
   }
 }
 // At the end of the flow for the strain e.
@@ -190,10 +191,7 @@ DEFORM_INLINE v4 plastic_energy(const Block &b, uint32_t n, const Four &q, const
   PlasticFlow<Wide> flow;
   load_plastic(b, n, q, s, law);
   find_flow<Wide>(law, e, s, flow);
-  const v4 own = (s.strain[0] * e[0] + s.strain[1] * e[1]) + s.strain[2] * e[2];
-  const v4 mixed = (s.strain[3] * e[3] + s.strain[4] * e[4]) + s.strain[5] * e[5];
-  const v4 kept = law.mu2 * (splat(0.5) * square_of<Wide>(s.strain) - (own + splat(2) * mixed));
-  return kept - flow.step * (flow.over - splat(0.5) * ((flow.stiff * law.per_flow) * flow.step));
+  return flow_energy<Wide>(law, e, s, flow);
 }
 
 struct Fibers { v4 a[3], alpha, beta, shear; };

@@ -9,13 +9,16 @@
 // change of S (the damper's times its fading, see strain_rate in corot_kernel_cells.h). What fibers under
 // stress change as S turns against their axes is left out.
 #include "../model_common/edges.h"
+#include "../model_common/plastic.h"
 #include "../model_common/rotation.h"
 #include "corot_body.h"
 #include "corot_collapse.h"
-#include "corot_plastic.h"
 
 namespace corot {
 namespace {
+
+using namespace model::plastic;
+using model::rotation::Single;
 
 constexpr double kMin = 1e-12;  // two stretches that cancel, over the trace
 
@@ -159,14 +162,6 @@ void each_block(const SlotGroup &at, uint32_t lane, double *blk, const Add &add)
     add(model::kEdgeOf[e][0], model::kEdgeOf[e][1], blk + 9 * size_t(at.slot[4 + e][lane]));
 }
 
-struct Single {
-  using V = double;
-  static double splat(double a) { return a; }
-  static double root(double a) { return __builtin_sqrt(a); }
-  static double more(double a, double b) { return a > b ? a : b; }
-  static double less(double a, double b) { return a < b ? a : b; }
-};
-
 }  // namespace
 
 void Body::pattern(uint32_t *ij) const {
@@ -183,9 +178,8 @@ void Body::pattern(uint32_t *ij) const {
     }
 }
 
-// Takes from the elasticity d, times the volume, what the flow at the stretch s takes: the shear modulus
-// falls by the share of the way that flows, and along the way it becomes that of hardening. See
-// corot_plastic.h. False: no plastic strain; `flows`: now.
+// Takes from the elasticity d, times the volume, what the flow at the stretch s takes. False: no plastic
+// strain; `flows`: now.
 bool Body::soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], double (*d)[6],
                        bool &flows) const {
   const size_t place = place_of[c], lane = place % kGroup;
@@ -195,22 +189,12 @@ bool Body::soften_cell(const dfm_kin &k, uint32_t c, const double (*s)[3], doubl
       group[place / kGroup].mu2[lane], own.yield[lane], own.hardening[lane], own.limit[lane], part,
       part > 0 ? 1 / part : 0};
   PlasticState<Single> state;
-  const double *from = k.state + kPlasticState * size_t(c);
+  const double *from = k.state + kState * size_t(c);
   std::copy(from, from + 6, state.strain);
   state.length = from[6];
   PlasticFlow<Single> flow;
   find_flow<Single>(law, e, state, flow);
-  if (flow.step > 0) {
-    const bool ended = flow.step < part * flow.over / flow.stiff;  // at the limit nothing flows any more
-    const double along = ended ? 1 : 1 - 1.5 * part * law.mu2 / flow.stiff, across = 1 - flow.share;
-    for (int i = 0; i < 6; ++i)
-      for (int j = 0; j < 6; ++j) {
-        const double deviator = (i == j ? (i < 3 ? 1 : 0.5) : 0) - (i < 3 && j < 3 ? 1.0 / 3 : 0);
-        const double dyad = flow.way[i] / flow.norm * (flow.way[j] / flow.norm);
-        d[i][j] += law.mu2 * ((across - 1) * (deviator - dyad) + (along - 1) * dyad);
-      }
-  }
-  flows = flow.step > 0;
+  flows = soften(law, flow, d);
   return flows || square_of<Single>(state.strain) > 0;
 }
 

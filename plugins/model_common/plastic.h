@@ -1,4 +1,5 @@
-// Plastic flow of a cell, for vectors of lanes and for double alike. With e the strain in the frame, p the
+// Plastic flow at a point of a cell (a first-order tetrahedron has one), for vectors of lanes and for double
+// alike. With e the strain in the frame, p the
 // plastic strain (trace 0) and a its length so far (accumulated equivalent plastic strain), the stress is
 //   2 mu (dev e - p) + k tr(e) I,   size = sqrt(3/2) 2 mu |dev e - p|  (von Mises).
 // Beyond the yield stress Y = yield + hardening a it flows along dev e - p by the equivalent plastic strain
@@ -12,10 +13,12 @@
 //   mu |dev e - p|^2 - g (size - Y - (3 mu + hardening)/(2 flow) g).
 // Once p and a are taken over as the state, the elastic energy is less by Y g and more: what has dissipated.
 #pragma once
+#include <cstdint>
 
-namespace corot {
-namespace {
+namespace model {
+namespace plastic {
 
+constexpr uint32_t kState = 7;  // doubles by point: the plastic strain, its length so far
 constexpr double kEquivalent = 0x1.3988e1409212ep+0;  // sqrt(3/2)
 
 template <class Ops>
@@ -64,5 +67,35 @@ static inline __attribute__((always_inline)) void take_flow(const PlasticFlow<Op
   s.length = s.length + flow.step;
 }
 
-}  // namespace
-}  // namespace corot
+// The potential less the energy of the elastic material, before the flow is taken.
+template <class Ops>
+static inline __attribute__((always_inline)) typename Ops::V flow_energy(const PlasticLaw<Ops> &law,
+                                                                         const typename Ops::V *e,
+                                                                         const PlasticState<Ops> &s,
+                                                                         const PlasticFlow<Ops> &flow) {
+  using V = typename Ops::V;
+  const V own = (s.strain[0] * e[0] + s.strain[1] * e[1]) + s.strain[2] * e[2];
+  const V mixed = (s.strain[3] * e[3] + s.strain[4] * e[4]) + s.strain[5] * e[5];
+  const V kept = law.mu2 * (Ops::splat(0.5) * square_of<Ops>(s.strain) - (own + Ops::splat(2) * mixed));
+  return kept - flow.step * (flow.over - Ops::splat(0.5) * ((flow.stiff * law.per_flow) * flow.step));
+}
+
+// Adds to the elasticity d (material.h) what the flow takes: the shear modulus falls by the share of the way
+// that flows, and along the way it becomes that of hardening. False: nothing flows.
+template <class Ops>
+static inline bool soften(const PlasticLaw<Ops> &law, const PlasticFlow<Ops> &flow, double (*d)[6]) {
+  if (!(flow.step > 0)) return false;
+  // at the limit nothing flows any more
+  const bool ended = flow.step < law.flow * flow.over / flow.stiff;
+  const double along = ended ? 1 : 1 - 1.5 * law.flow * law.mu2 / flow.stiff, across = 1 - flow.share;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) {
+      const double deviator = (i == j ? (i < 3 ? 1 : 0.5) : 0) - (i < 3 && j < 3 ? 1.0 / 3 : 0);
+      const double dyad = flow.way[i] / flow.norm * (flow.way[j] / flow.norm);
+      d[i][j] += law.mu2 * ((across - 1) * (deviator - dyad) + (along - 1) * dyad);
+    }
+  return true;
+}
+
+}  // namespace plastic
+}  // namespace model
