@@ -33,7 +33,15 @@ struct ByKind {
   void apply_params(const double *values) {
     with([&](auto &b) { b.apply_params(values); });
   }
-  bool lacks_state(const dfm_kin &k) const { return !by_cells && tet.lacks_state(k); }
+  bool plastic() const {
+    return with([](auto &b) { return b.plastic(); });
+  }
+  size_t state_size() const {
+    return with([](auto &b) { return b.state_size(); });
+  }
+  bool lacks_state(const dfm_kin &k) const {
+    return with([&](auto &b) { return b.lacks_state(k); });
+  }
   void add_forces(const dfm_kin &k, double *f) {
     with([&](auto &b) { b.add_forces(k, f); });
   }
@@ -61,7 +69,9 @@ struct ByKind {
   const char *const *active() const {
     return with([](auto &b) -> const char *const * { return b.active_effects; });
   }
-  const char *idle(Row which) const { return by_cells ? nullptr : tet.idle(which); }
+  const char *idle(Row which) const {
+    return with([&](auto &b) { return b.idle(which); });
+  }
 };
 
 }  // namespace model

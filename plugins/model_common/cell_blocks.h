@@ -26,10 +26,9 @@ struct CellBlocks {
         for (uint32_t n = 0; n < 9; ++n) *k++ = cell.stiffness[3 * a + n / 3][3 * b + n % 3];
   }
 
-  // out = K u
-  void apply(uint32_t c, const double (*u)[3], double (*out)[3]) const {
+  // out = K u, K the blocks of a cell
+  void apply(const double *k, const double (*u)[3], double (*out)[3]) const {
     std::fill(&out[0][0], &out[0][0] + 3 * nodes, 0.0);
-    const double *k = of(c);
     for (uint32_t a = 0; a < nodes; ++a)
       for (uint32_t b = a; b < nodes; ++b, k += 9)
         for (uint32_t i = 0; i < 3; ++i) {
@@ -40,7 +39,7 @@ struct CellBlocks {
   // J, of displacements u; h becomes K u.
   double energy(uint32_t c, const double (*u)[3], double (*h)[3]) const {
     double sum = 0;
-    apply(c, u, h);
+    apply(of(c), u, h);
     for (uint32_t a = 0; a < nodes; ++a) sum += (u[a][0] * h[a][0] + u[a][1] * h[a][1]) + u[a][2] * h[a][2];
     return 0.5 * sum;
   }

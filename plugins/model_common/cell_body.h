@@ -7,7 +7,9 @@
 // tau = sum d_a x h_a = sum u_a x h_a, since K resists no rotation of X. So the forces are the gradient of an
 // energy that no rotation changes, and have no moment, except where kMinStretch acts: there A^-1 is not the
 // inverse of A. The tangent is R P^T K P R^T, positive semidefinite; what the turning of P adds is left out.
-// The damper is damping_stiffness R P^T K P R^T v.
+// The damper is damping_stiffness R P^T K P R^T v. With yield, E is the potential of the step (cell_points.h)
+// and h its derivative, which resists no rotation of X either; E as a function of u is convex, and its second
+// derivative is at most K.
 //
 // The step bound. With N_ab >= |K_ab| and any weights w > 0, D_a = sum_b N_ab w_b / w_a dominates K (corot's
 // corot_bound.cpp). Let q = sum |G_a| |u_a| of a change u, alpha >= |A^-1|, hence |w| <= alpha q and
@@ -27,30 +29,62 @@
 
 #include "buffer.h"
 #include "cell_blocks.h"
+#include "cell_points.h"
 #include "cells.h"
 #include "edges.h"
 #include "entry.h"
+#include "fibers.h"
 #include "params.h"
 #include "rotation.h"
 #include "small_range.h"
 
 namespace model {
 
+// True, once logged, where the host gives no state that a plastic body needs.
+template <class Body>
+bool lacks_state(const Body &b, const char *who, const dfm_kin &k) {
+  if (!b.plastic() || k.state) return false;
+  complain(b.host, who,
+           "the host gives no state, which yield needs: it must ask the instance for the "
+           "extension " DFM_EXT_SLOTS);
+  return true;
+}
+
 class CellBody {
  public:
-  // Rows that each model with these cells begins its parameters with.
-  enum Param : uint32_t { kYoung, kPoisson, kDampingStiffness, kDampingMass, kParamCount };
+  // The four rows that each model with these cells begins its parameters with; four of plastic flow and four
+  // of fibers, which a model may have. All are one wide but the last.
+  enum Param : uint32_t {
+    kYoung,
+    kPoisson,
+    kDampingStiffness,
+    kDampingMass,
+    kYield,
+    kHardening,
+    kCreep,
+    kPlasticLimit,
+    kYoungAlong,
+    kPoissonAlong,
+    kShearAlong,
+    kAxis,
+    kParamCount,
+    kValueCount = kAxis + 3
+  };
   struct Of {
     const char *id;
     const dfm_param *rows;
     uint32_t nrow;
-    bool turns;  // the frames of the cells
+    bool turns;      // the frames of the cells
+    int32_t row[3];  // with which each four begin, -1: the model has none; a value begins at its row's number
+    bool has(uint32_t r) const {
+      return std::any_of(row, row + 3, [&](int32_t at) { return at >= 0 && r - uint32_t(at) < 4; });
+    }
   };
 
-  // Whether all rows but the first have their defaults; else the reason has been logged.
+  // Whether all rows that these cells lack have their defaults; else the reason has been logged.
   static bool takes(const dfm_host *h, const Of &of, const double *values) {
     for (uint32_t r = 0; r < of.nrow; values += of.rows[r++].width)
-      for (uint32_t w = 0; r >= kParamCount && w < of.rows[r].width; ++w)
+      for (uint32_t w = 0; !of.has(r) && w < of.rows[r].width; ++w)
         if (values[w] != of.rows[r].def) return refuse(h, of, of.rows[r].key);
     return true;
   }
@@ -64,9 +98,13 @@ class CellBody {
     ncell_ = m.ncell;
     if (!takes(h, of, m.params)) throw Refused{};
     for (uint32_t k = 0; m.field_keys && m.field_keys[k]; ++k)
-      for (uint32_t r = kParamCount; r < of.nrow; ++r)
-        if (!std::strcmp(m.field_keys[k], of.rows[r].key) && !refuse(h, of, of.rows[r].key)) throw Refused{};
-    take_fields(h, of.id, of.rows, kParamCount, m, field_, [](uint32_t, double) { return true; });
+      for (uint32_t r = 0; r < of.nrow; ++r)
+        if (!of.has(r) && !std::strcmp(m.field_keys[k], of.rows[r].key) && !refuse(h, of, of.rows[r].key))
+          throw Refused{};
+    for (int part = 0; part < 3; ++part)
+      if (of.row[part] >= 0)
+        take_fields(h, of.id, of.rows + of.row[part], 4, m, field_ + 4 * part,
+                    [](uint32_t, double) { return true; });
     rest_.create_copy(h, m.rest, 3 * size_t(npoint_));
     mass_.create_copy(h, m.mass, npoint_);
     cells_.create_copy(h, m.cells, size_t(nodes_) * ncell_);
@@ -80,13 +118,21 @@ class CellBody {
     next_.create(h, npoint_);
     norm_.create(h, block_.each() * ncell_);
     find_places();
+    const double yield = of.row[1] < 0 ? 0 : m.params[of.row[1]];
+    if (model::largest_of(field_[kYield], yield, ncell_) > 0) points_.create(h, kind_, ncell_);
     apply_params(m.params);
   }
 
   // Throws before anything changes.
   void apply_params(const double *values) {
     if (!takes(host, of_, values)) throw Refused{};
-    std::copy(values, values + kParamCount, params_);
+    double own[kValueCount];
+    std::copy(params_, params_ + kValueCount, own);
+    for (int part = 0; part < 3; ++part)
+      if (of_.row[part] >= 0) std::copy_n(values + of_.row[part], part < 2 ? 4 : 6, own + 4 * part);
+    bool fibers = false;
+    try_params(params_, own, [&] { fibers = check_params(); });
+    fibers_ = fibers;
     std::fill(drag_.data(), drag_.data() + npoint_, 0.0);
     std::fill(weight_.data(), weight_.data() + npoint_, 0.0);
     for (uint32_t c = 0; c < ncell_; ++c) make_cell(c);
@@ -96,18 +142,30 @@ class CellBody {
     if (of_.turns) *effect++ = "volume";
     if (damped) *effect++ = "damping";
     if (of_.turns) *effect++ = "large_rotation";
+    if (fibers_) *effect++ = "anisotropy";
+    if (largest_of(kYield) > 0) *effect++ = "deform.plasticity";
     *effect = nullptr;
     for (uint32_t i = 0; i < npoint_; ++i) drag_[i] = weight_[i] > 0 ? mass_[i] * (drag_[i] / weight_[i]) : 0;
     find_rows();
   }
 
+  // Whether the points of the cells have a plastic strain, which cannot change: it is state.
+  bool plastic() const { return !points_.empty(); }
+  size_t state_size() const { return plastic() ? size_t(CellPoints::kState) * ncell_ : 0; }
+  bool lacks_state(const dfm_kin &k) const { return model::lacks_state(*this, of_.id, k); }
+  const char *idle(uint32_t row) const {
+    if (of_.row[1] >= 0 && row - uint32_t(of_.row[1]) - 1 < 3 && !(largest_of(kYield) > 0))
+      return plastic::kIdle;
+    return of_.row[2] >= 0 && row == uint32_t(of_.row[2]) + 3 && !fibers_ ? kNoAxis : nullptr;
+  }
+
   void add_forces(const dfm_kin &k, double *f) {
-    Call call{this, &k, f};
+    Call call{this, &k, f, flow_at(k)};
     run(
         ncell_,
         [](void *user, uint32_t begin, uint32_t end) {
           const Call &of = *static_cast<const Call *>(user);
-          for (uint32_t c = begin; c < end; ++c) of.body->force_of(*of.k, c);
+          for (uint32_t c = begin; c < end; ++c) of.body->force_of(*of.k, of.flow, c);
         },
         call);
     run(
@@ -120,10 +178,11 @@ class CellBody {
   }
 
   void bound(const dfm_kin &k, double *ksum, double *csum) const {
+    const double flow = flow_at(k);
     for (uint32_t c = 0; c < ncell_; ++c) {
       const Cell &cell = cell_[c];
       double more[kMaxNodes] = {}, grown = 1;
-      if (of_.turns) growth(k, c, grown, more);
+      if (of_.turns) growth(k, flow, c, grown, more);
       for (uint32_t a = 0; a < nodes_; ++a) {
         const uint32_t i = corner(c, a);
         ksum[i] += grown * cell.row[a] + more[a];
@@ -134,10 +193,11 @@ class CellBody {
   }
 
   double energy(const dfm_kin &k) {
+    const double flow = flow_at(k);
     double sum = 0;
     for (uint32_t c = 0; c < ncell_; ++c) {
       Moved m;
-      sum += energy_of(k, c, m);
+      sum += energy_of(k, flow, c, m);
       if (of_.turns) continue;
       double h[3][3];
       for (int i = 0; i < 9; ++i) h[i / 3][i % 3] = m.s[i] - (i % 4 == 0);
@@ -147,25 +207,41 @@ class CellBody {
     return sum;
   }
   void cell_energy(const dfm_kin &k, double *density) const {
+    const double flow = flow_at(k);
     for (uint32_t c = 0; c < ncell_; ++c) {
       Moved m;
-      density[c] = energy_of(k, c, m) / cell_[c].volume;
+      density[c] = energy_of(k, flow, c, m) / cell_[c].volume;
     }
   }
 
   // Of the mean strain in the frame, turned into the axes of the world.
   void cell_stress(const dfm_kin &k, double *stress) const {
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
+    const double flow = flow_at(k);
     for (uint32_t c = 0; c < ncell_; ++c) {
       Moved m;
       move(k, c, m);
-      const Lame l = lame_of(at(kYoung, c), at(kPoisson, c));
+      const Along along(*this, c, fibers_);
+      const Lame l = along.material.lame;
       const double trace = ((m.s[0] + m.s[4]) + m.s[8]) - 3;
       double local[9], half[9] = {};
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
           local[3 * i + j] =
               l.mu * (m.s[3 * i + j] + m.s[3 * j + i]) + (i == j ? l.lambda * trace - 2 * l.mu : 0);
+      if (along.material.fiber) {
+        double e[9];
+        for (int i = 0; i < 9; ++i) e[i] = 0.5 * (m.s[i] + m.s[i % 3 * 3 + i / 3]) - (i % 4 == 0);
+        add_fiber_stress(along.fiber, along.axis, e, local);
+      }
+      if (plastic()) {
+        double less[6];
+        points_.mean_stress(c, law_of(flow, c), state_of(k, c), m.u, less);
+        for (int n = 0; n < 6; ++n) {
+          local[3 * kRow[n] + kCol[n]] -= less[n];
+          if (n > 2) local[3 * kCol[n] + kRow[n]] -= less[n];
+        }
+      }
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
           for (int n = 0; n < 3; ++n) half[3 * i + j] += m.r[3 * i + n] * local[3 * n + j];
@@ -188,14 +264,16 @@ class CellBody {
   }
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk) const {
     ready_pairs();
+    const double flow = flow_at(k);
     for (uint32_t c = 0; c < ncell_; ++c)
-      if (const double by = a + b * at(kDampingStiffness, c); by != 0) add_tangent(k, c, by, blk);
+      if (const double by = a + b * at(kDampingStiffness, c); by != 0)
+        add_tangent(k, flow, c, by, a / by, blk);
     for (uint32_t i = 0; i < npoint_; ++i)
       for (size_t n = 0; n < 9; n += 4) blk[9 * size_t(i) + n] -= b * drag_[i];
   }
 
   const dfm_host *host = nullptr;
-  const char *active_effects[4] = {};  // of the present parameters, NULL-terminated
+  const char *active_effects[6] = {};  // of the present parameters, NULL-terminated
 
  private:
   static constexpr uint32_t kParallelCells = 500, kGrain = 64;
@@ -221,6 +299,24 @@ class CellBody {
     CellBody *body;
     const dfm_kin *k;
     double *f;
+    double flow;
+  };
+  // The material of a cell; refuses constants along the axis without a positive energy.
+  struct Along {
+    CellMaterial material;
+    Fiber fiber;
+    double axis[3];
+    Along(const CellBody &b, uint32_t c, bool fibers)
+        : material{lame_of(b.at(kYoung, c), b.at(kPoisson, c))} {
+      if (!fibers) return;
+      fiber = fiber_of_cell(b.host, b.of_.id, c, b.at(kYoung, c), b.at(kPoisson, c), b.at(kYoungAlong, c),
+                            b.at(kPoissonAlong, c), b.at(kShearAlong, c));
+      const double *const a = b.field_[kAxis].empty() ? b.params_ + kAxis : &b.field_[kAxis][3 * size_t(c)];
+      const double length = std::sqrt((a[0] * a[0] + a[1] * a[1]) + a[2] * a[2]);
+      for (int n = 0; n < 3; ++n) axis[n] = a[n] / length;
+      material = {{fiber.lambda, fiber.mu}, &fiber, axis};
+    }
+    Along(const Along &) = delete;
   };
 
   static bool refuse(const dfm_host *h, const Of &of, const char *key) {
@@ -233,6 +329,29 @@ class CellBody {
   }
   double at(Param which, uint32_t c) const {
     return field_[which].empty() ? params_[which] : field_[which][c];
+  }
+  double largest_of(Param which) const { return model::largest_of(field_[which], params_[which], ncell_); }
+  // Returns whether there are fibers.
+  bool check_params() const {
+    const bool fibers = largest_of(kYoungAlong) != kAuto || largest_of(kPoissonAlong) != kAuto ||
+                        largest_of(kShearAlong) != kAuto;
+    const char *const wrong = plastic() && fibers                    ? plastic::kNoFibers
+                              : !plastic() && largest_of(kYield) > 0 ? plastic::kMadeWithout
+                                                                     : nullptr;
+    if (wrong) {
+      complain(host, of_.id, wrong);
+      throw Refused{};
+    }
+    for (uint32_t c = 0; fibers && c < ncell_; ++c) (void)Along(*this, c, true);
+    return fibers;
+  }
+  double flow_at(const dfm_kin &k) const { return plastic() ? plastic::flow_in(params_[kCreep], k.dt) : 0; }
+  CellPoints::Law law_of(double flow, uint32_t c) const {
+    return {lame_of(at(kYoung, c), at(kPoisson, c)).mu, at(kYield, c), at(kHardening, c),
+            at(kPlasticLimit, c), flow};
+  }
+  static const double *state_of(const dfm_kin &k, uint32_t c) {
+    return k.state + size_t(CellPoints::kState) * c;
   }
   uint32_t corner(uint32_t c, uint32_t a) const { return cells_[size_t(nodes_) * c + a]; }
 
@@ -264,7 +383,8 @@ class CellBody {
       }
     RestCell made;
     const double *const inside = inside_.empty() ? nullptr : &inside_[size_t{cells::kInside} * c];
-    if (!make_rest_cell(kind_, x, inside, lame_of(at(kYoung, c), at(kPoisson, c)), made)) throw kFlatCell;
+    cells::RestPoints *const points = plastic() ? &points_.of(c) : nullptr;
+    if (!make_rest_cell(kind_, x, inside, Along(*this, c, fibers_).material, made, points)) throw kFlatCell;
     Cell &out = cell_[c];
     out.volume = made.volume;
     for (uint32_t a = 0; a < nodes_; ++a)
@@ -388,10 +508,11 @@ class CellBody {
     for (int i = 0; i < 3; ++i) out[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2];
   }
 
-  double energy_of(const dfm_kin &k, uint32_t c, Moved &m) const {
+  double energy_of(const dfm_kin &k, double flow, uint32_t c, Moved &m) const {
     double h[kMaxNodes][3];
     move(k, c, m);
-    return block_.energy(c, m.u, h);
+    const double elastic = block_.energy(c, m.u, h);
+    return plastic() ? elastic + points_.energy(c, law_of(flow, c), state_of(k, c), m.u) : elastic;
   }
 
   // The rate of u: R^T v less the turning of the frame.
@@ -415,7 +536,7 @@ class CellBody {
     }
   }
 
-  void force_of(const dfm_kin &k, uint32_t c) {
+  void force_of(const dfm_kin &k, double flow, uint32_t c) {
     Moved m;
     double h[kMaxNodes][3], tau[3] = {}, turn[3] = {}, part[3];
     move(k, c, m);
@@ -426,7 +547,11 @@ class CellBody {
       for (uint32_t a = 0; a < nodes_; ++a)
         for (int n = 0; n < 3; ++n) pull[a][n] += damp * h[a][n];
     }
-    block_.apply(c, pull, h);
+    block_.apply(block_.of(c), pull, h);
+    if (plastic()) {
+      double *const next = k.state_out ? k.state_out + size_t(CellPoints::kState) * c : nullptr;
+      points_.relieve(c, law_of(flow, c), state_of(k, c), next, m.u, h);
+    }
     for (uint32_t a = 0; of_.turns && a < nodes_; ++a) {
       cross(m.u[a], h[a], part);
       for (int n = 0; n < 3; ++n) tau[n] += part[n];
@@ -449,11 +574,12 @@ class CellBody {
   }
 
   // grown: factor of the rows at rest; more: what comes on top by node.
-  void growth(const dfm_kin &k, uint32_t c, double &grown, double (&more)[kMaxNodes]) const {
+  void growth(const dfm_kin &k, double flow, uint32_t c, double &grown, double (&more)[kMaxNodes]) const {
     Moved m;
     double h[kMaxNodes][3], pull[kMaxNodes], moment[9] = {}, rows = 0, all = 0, second = 0;
     move(k, c, m);
-    block_.apply(c, m.u, h);
+    block_.apply(block_.of(c), m.u, h);
+    if (plastic()) points_.relieve(c, law_of(flow, c), state_of(k, c), nullptr, m.u, h);
     const Cell &cell = cell_[c];
     const auto square = [](const double *x) { return (x[0] * x[0] + x[1] * x[1]) + x[2] * x[2]; };
     for (uint32_t a = 0; a < nodes_; ++a) {
@@ -474,17 +600,24 @@ class CellBody {
   }
 
   // blk -= by R P^T K P R^T. With Z_a = sum K_ab [u_b]x, Y = sum [u_a]x^T Z_a, C_a = A^-1 [G_a]x:
-  // P^T K P = K + Z C + (Z C)^T + C^T Y C.
-  void add_tangent(const dfm_kin &k, uint32_t c, double by, double *blk) const {
+  // P^T K P = K + Z C + (Z C)^T + C^T Y C. The flow softens K in the share `soft` of it.
+  void add_tangent(const dfm_kin &k, double flow, uint32_t c, double by, double soft, double *blk) const {
     Moved m;
     move(k, c, m);
+    const double *own = block_.of(c);
+    double softened[9 * kMaxNodes * (kMaxNodes + 1) / 2];
+    if (plastic() && soft > 0) {
+      std::copy_n(own, 9 * block_.each(), softened);
+      points_.soften(c, law_of(flow, c), state_of(k, c), m.u, soft, softened);
+      own = softened;
+    }
     double z[kMaxNodes][9] = {}, turn[kMaxNodes][9] = {}, y[9] = {};
     for (uint32_t n = 0; of_.turns && n < 3; ++n) {
       // columns: of [u]x it is u x e_n, of A^-1 [G]x it is A^-1 (G x e_n)
       double unit[3] = {}, column[kMaxNodes][3], product[kMaxNodes][3], part[3];
       unit[n] = 1;
       for (uint32_t a = 0; a < nodes_; ++a) cross(m.u[a], unit, column[a]);
-      block_.apply(c, column, product);
+      block_.apply(own, column, product);
       for (uint32_t a = 0; a < nodes_; ++a) {
         for (uint32_t i = 0; i < 3; ++i) z[a][3 * i + n] = product[a][i];
         cross(product[a], m.u[a], part);  // [u]x^T p = p x u
@@ -495,7 +628,6 @@ class CellBody {
         for (uint32_t i = 0; i < 3; ++i) turn[a][3 * i + n] = t[i];
       }
     }
-    const double *own = block_.of(c);
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t b = a; b < nodes_; ++b, own += 9) {
         double sum[9], half[9] = {}, full[9] = {};
@@ -537,13 +669,16 @@ class CellBody {
 
   Of of_{};
   uint32_t kind_ = 0, nodes_ = 0, npoint_ = 0, ncell_ = 0;
-  double params_[kParamCount] = {};
+  // What a model has no row for stays as it is here.
+  double params_[kValueCount] = {0, 0, 0, 0, 0, 0, plastic::kAtOnce, 0, kAuto, kAuto, kAuto, 1, 1, 1};
   Buffer<double> field_[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
   Buffer<double> rest_, mass_;         // [npoint,3] m, [npoint] kg
   Buffer<double> inside_;              // [ncell,27] of a lattice, as dfm_mesh has it; else empty
   Buffer<uint32_t> cells_;             // [ncell,nodes]
   Buffer<Cell> cell_;                  // [ncell]
   CellBlocks block_;
+  bool fibers_ = false;
+  CellPoints points_;               // empty without yield
   Buffer<double> norm_;             // [ncell] of each of its blocks, N/m
   Buffer<double> force_;            // [ncell,nodes,3] N
   Buffer<uint32_t> begin_, place_;  // [npoint + 1], [ncell * nodes]

@@ -51,6 +51,13 @@ inline double norm_of(const double *m) {
   return std::sqrt(mean + std::sqrt(deviator2 * (2.0 / 3)));
 }
 
+// Isotropic, or with an axis of unit length: then lambda and mu are those of the fiber.
+struct CellMaterial {
+  Lame lame;
+  const Fiber *fiber = nullptr;
+  const double *axis = nullptr;
+};
+
 constexpr const char *kFlatCell =
     "a cell is inverted or flat at rest; mesh the shape again with less curved cells";
 
@@ -69,6 +76,15 @@ constexpr int kWhole = 8, kInside = 27;  // points of the rules
 constexpr double kTie = 0.02;
 constexpr double kThin = 1e-9;       // of the square of a function: it depends on those before it
 constexpr double kSwell = 14.0 / 3;  // bulk over shear modulus, at poisson 0.4
+
+// The strain at the points of a cell, as displacements of its nodes give it: sum d_a (x) g_a over its nodes
+// and inner displacements, component r of which is minus the sum of inner[r] times all components before it.
+// They are at rest under elastic stresses. Weights m^3, 0: no such point.
+struct RestPoints {
+  double weight[kWhole];
+  double g[kWhole][kMax][3];
+  double inner[3 * kInner][3 * kMax];
+};
 
 // At one of the points of a rule.
 struct Point {
@@ -113,6 +129,16 @@ inline void hex8_place(int n, const double *inside, Point &p) {
   for (int c = 0, step = 1; c < 3; ++c, step *= 3)
     p.at[c] = inside ? kThree * (n / step % 3 - 1) : kHigh[n] >> c & 1 ? kGauss : -kGauss;
   p.weight = inside ? 8 * inside[n] : 1;
+}
+
+// The weights of a cell that is all material. Those of others may be negative, so that no potential of the
+// flow at their points has a least value: such a cell flows by its mean strain, which has no more energy
+// than the elastic cell.
+inline bool is_whole(const double *inside) {
+  constexpr double kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  for (int n = 0; n < kInside; ++n)
+    if (std::fabs(inside[n] - kShare[n % 3] * kShare[n / 3 % 3] * kShare[n / 9]) > 1e-9) return false;
+  return true;
 }
 
 // The Jacobian dx_i/dxi_j, its determinant and inverse; false if it is not positive.
@@ -175,6 +201,28 @@ inline int project(const Point *q, int points, int rows, double (*theta)[kMax][3
   return kept;
 }
 
+// What the stress along the axis adds to the stiffness between a node with gradient g and volume change t and
+// another one: the strain e has the deviator of its own and the trace t.u.
+struct AlongAxis {
+  double e[3][3], q[3], t[3];  // e.a, a.e.a by component of the displacement
+  AlongAxis(const double *axis, const double *g, const double *theta) {
+    const double along = (g[0] * axis[0] + g[1] * axis[1]) + g[2] * axis[2];
+    for (int i = 0; i < 3; ++i) {
+      t[i] = theta[i];
+      q[i] = 0;
+      for (int k = 0; k < 3; ++k) {
+        e[k][i] = 0.5 * ((k == i ? along : 0) + g[k] * axis[i]) + (theta[i] - g[i]) / 3 * axis[k];
+        q[i] += axis[k] * e[k][i];
+      }
+    }
+  }
+  static double block(const Fiber &c, const AlongAxis &a, int i, const AlongAxis &b, int j) {
+    const double both = (a.e[0][i] * b.e[0][j] + a.e[1][i] * b.e[1][j]) + a.e[2][i] * b.e[2][j];
+    return c.alpha * (a.t[i] * b.q[j] + a.q[i] * b.t[j]) + 4 * (c.mu_along - c.mu) * both +
+           c.beta * a.q[i] * b.q[j];
+  }
+};
+
 // Eliminates the rows of k from n on, the last one first: each pivot is positive, or its row is zero.
 template <int kSize>
 inline void eliminate(double (&k)[kSize][kSize], int n, int all) {
@@ -206,11 +254,12 @@ inline bool make_rest_tetrahedron(const double *x, const Lame &m, RestCell &out)
   return true;
 }
 
-// x [nodes,3] m; inside [27] or null. False if the Jacobian is not positive at a point: the cell is inverted
-// or flat there.
-inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside, const Lame &m,
-                           RestCell &out) {
+// x [nodes,3] m; inside [27] or null; points may be null, and is for cells that are no first-order
+// tetrahedra. False if the Jacobian is not positive at a point: the cell is inverted or flat there.
+inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside, const CellMaterial &material,
+                           RestCell &out, cells::RestPoints *at_points = nullptr) {
   using namespace cells;
+  const Lame &m = material.lame;
   if (kind == DFM_CELL_TET) return make_rest_tetrahedron(x, m, out);
   const bool hex = kind == DFM_CELL_HEX8;
   const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes,
@@ -268,15 +317,41 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
             k[3 * a + i][3 * b + j] += q[n].weight * (m.mu * shear + bulk * (ta[i] * tb[j]));
           }
       }
+  for (int n = 0; material.fiber && n < points; ++n)
+    for (int a = 0; a < rows; ++a) {
+      const AlongAxis of_a(material.axis, q[n].g[a], theta[n][a]);
+      for (int b = 0; b < rows; ++b) {
+        const AlongAxis of_b(material.axis, q[n].g[b], theta[n][b]);
+        for (int i = 0; i < 3; ++i)
+          for (int j = 0; j < 3; ++j)
+            k[3 * a + i][3 * b + j] += q[n].weight * AlongAxis::block(*material.fiber, of_a, i, of_b, j);
+      }
+    }
   eliminate(k, 3 * nodes, 3 * rows);
+  if (at_points && !inside) {
+    *at_points = RestPoints();
+    for (int n = 0; n < points; ++n) {
+      at_points->weight[n] = q[n].weight;
+      std::copy_n(q[n].g[0], 3 * rows, at_points->g[n][0]);
+    }
+    for (int r = 3 * nodes; r < 3 * rows; ++r)
+      for (int j = 0; j < r && k[r][r] > 0; ++j) at_points->inner[r - 3 * nodes][j] = k[r][j] / k[r][r];
+  }
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j) out.stiffness[i][j] = 0.5 * (k[i][j] + k[j][i]);
   if (!inside) return true;
   RestCell whole;
-  if (!make_rest_cell(kind, x, nullptr, m, whole)) return false;
+  if (!make_rest_cell(kind, x, nullptr, material, whole, at_points)) return false;
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j)
       out.stiffness[i][j] += kTie * (out.volume / whole.volume * whole.stiffness[i][j] - out.stiffness[i][j]);
+  if (at_points && !is_whole(inside)) {
+    *at_points = RestPoints();
+    at_points->weight[0] = out.volume;
+    for (int a = 0; a < nodes; ++a)
+      for (int c = 0; c < 3; ++c)
+        at_points->g[0][a][c] = out.mean[a][c] + kTie * (whole.mean[a][c] - out.mean[a][c]);
+  }
   return true;
 }
 

@@ -3,7 +3,6 @@
 // the equations used here.
 #include <string.h>
 
-#include "../model_common/plastic.h"
 #include "corot_body.h"
 #include "deform/plugin_draft.h"
 
@@ -76,30 +75,25 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
 
 dfm_status set_params(void *self, const double *params) {
   AnyBody *any = static_cast<AnyBody *>(self);
-  Body *body = &any->tet;
   if (!check_params(any->host, params)) return DFM_E_ARG;
-  if (any->by_cells) return model::change(*any, params);
-  if (params[kLocking] != body->params[kLocking]) {
-    complain(body->host, "parameter locking cannot change during a run; create the body again");
+  if (params[kLocking] != any->tet.params[kLocking] && !any->by_cells) {
+    complain(any->host, "parameter locking cannot change during a run; create the body again");
     return DFM_E_ARG;
   }
-  if (params[kYield] > 0 && !body->plastic()) {
-    complain(body->host,
-             "the body was created without yield and has no plastic strain; create it again with yield");
-    return DFM_E_ARG;
-  }
-  return model::change(*body, params);
+  return model::change(*any, params);
 }
 
 dfm_status state_init(const void *self, double *state) {
-  const Body &body = static_cast<const AnyBody *>(self)->tet;
-  if (body.plastic()) std::fill(state, state + size_t(model::plastic::kState) * body.ncell, 0.0);
+  std::fill_n(state, static_cast<const AnyBody *>(self)->state_size(), 0.0);
   return DFM_OK;
 }
 
-const dfm_slot kPlasticSlot = {DFM_PER_CELL, model::plastic::kState, DFM_SLOT_SCALAR, 0};
+// The plastic strain at the points of a cell, of which a first-order tetrahedron has one.
+const dfm_slot kPoint = {DFM_PER_CELL, model::plastic::kState, DFM_SLOT_SCALAR, 0},
+               kPoints = {DFM_PER_CELL, model::CellPoints::kState, DFM_SLOT_SCALAR, 0};
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
-                kSlots = {sizeof(dfm_slots), 1, &kPlasticSlot, 0, 0};
+                kSlots = {sizeof(dfm_slots), 1, &kPoint, 0, 0},
+                kSlotsOfPoints = {sizeof(dfm_slots), 1, &kPoints, 0, 0};
 
 constexpr uint32_t kCaps =
     DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_INSIDE;
@@ -122,8 +116,10 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CAPS)) return &kOwnCaps;
   if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
-  if (!strcmp(id, DFM_EXT_SLOTS))
-    return static_cast<const AnyBody *>(self)->tet.plastic() ? &kSlots : &kNoSlots;
+  if (!strcmp(id, DFM_EXT_SLOTS)) {
+    const AnyBody &body = *static_cast<const AnyBody *>(self);
+    return !body.plastic() ? &kNoSlots : body.by_cells ? &kSlotsOfPoints : &kSlots;
+  }
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;

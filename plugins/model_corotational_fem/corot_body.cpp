@@ -70,15 +70,7 @@ void stress_pass(void *user, uint32_t begin, uint32_t end) {
 }  // namespace
 
 double Body::flow_at(const dfm_kin &k) const {
-  return !plastic() ? 0 : params[kCreep] == kAuto ? 1 : 1 - dfm_exp(-params[kCreep] * k.dt);
-}
-
-bool Body::lacks_state(const dfm_kin &k) const {
-  if (!plastic() || k.state) return false;
-  complain(host,
-           "the host gives no state, which yield needs: it must ask the instance for the "
-           "extension " DFM_EXT_SLOTS);
-  return true;
+  return plastic() ? model::plastic::flow_in(params[kCreep], k.dt) : 0;
 }
 
 void Body::add_forces(const dfm_kin &k, double *f_out) {

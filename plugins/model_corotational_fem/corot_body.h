@@ -42,13 +42,13 @@ enum RotationBy : uint32_t { kPolar, kSvd, kQr };
 enum Locking : uint32_t { kLocked, kNodal };
 enum Tangent : uint32_t { kUsual, kExact };
 extern const dfm_param kParams[kParamCount];
-constexpr double kAuto = -1;  // constants along the axis: as without an axis; creep: at once
+using model::kAuto;  // creep: at once
 constexpr const char *kId = "org.deform.corotational_fem";
 void complain(const dfm_host *h, const char *what);
 
 struct Body : model::Blocks<Block> {
   using Row = Param;
-  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, true};
+  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, true, {0, kYield, kYoungAlong}};
   // From this size on blocks go through the host's parallel_for; below it waking a worker costs more than it
   // saves. Summing the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 3000, kParallelMergeCells = 100000;
@@ -116,8 +116,9 @@ struct Body : model::Blocks<Block> {
 
   // Whether the cells have a plastic strain, which cannot change: it is state.
   bool plastic() const { return made_plastic; }
-  bool lacks_state(const dfm_kin &k) const;  // logs it
-  double flow_at(const dfm_kin &k) const;    // share of the flow that occurs in the step
+  size_t state_size() const { return plastic() ? size_t(model::plastic::kState) * ncell : 0; }
+  bool lacks_state(const dfm_kin &k) const { return model::lacks_state(*this, kId, k); }
+  double flow_at(const dfm_kin &k) const;  // share of the flow that occurs in the step
   bool nodal() const { return choice(kLocking) == kNodal; }
   void dilate(const dfm_kin &k);  // before all code that uses the volume change of the points
   // Positions of the corners of a cell.

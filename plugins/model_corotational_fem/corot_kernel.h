@@ -30,10 +30,8 @@ struct FiberGroup {
   double most[kGroup];                                // largest eigenvalue of the elasticity, or more
 };
 
-// Plastic cells (plastic.h): constants of the material, the first two times the volume. A cell that
-// does not flow has kNoYield.
+// Plastic cells (model_common/plastic.h): constants of the material, the first two times the volume.
 struct PlasticGroup { double yield[kGroup], hardening[kGroup], limit[kGroup]; };
-constexpr double kNoYield = 1e300;
 
 // The rotation of a cell from its gradient, both row-major.
 using Rotate = void (*)(const double *gradient, double *rotation);

@@ -1,6 +1,7 @@
 // Converts parameters and fields by cell to the arrays that the passes read. Unused arrays stay empty.
 #include <stdio.h>
 
+#include "../model_common/fibers.h"
 #include "../model_common/params.h"
 #include "../model_common/rotation.h"
 #include "corot_body.h"
@@ -25,26 +26,9 @@ double Body::largest_of(Param which) const { return model::largest_of(field[whic
 
 bool Body::given(Param which) const { return largest_of(which) != kAuto; }
 
-// Constants of a cell as a transversely isotropic solid: `auto` values are those of the isotropic one.
-// Refuses constants without a positive energy.
 model::Fiber Body::fiber_at(uint32_t c) const {
-  const auto or_else = [&](Param which, double otherwise) {
-    const double x = at(which, c);
-    return x == kAuto ? otherwise : x;
-  };
-  const double young = at(kYoung, c), poisson = at(kPoisson, c);
-  const model::Transverse t = {young, poisson, or_else(kYoungAlong, young), or_else(kPoissonAlong, poisson),
-                               or_else(kShearAlong, model::lame_of(young, poisson).mu)};
-  model::Fiber out;
-  if (model::fiber_of(t, out)) return out;
-  char text[240];
-  snprintf(
-      text, sizeof text,
-      "anisotropy_young %g, anisotropy_poisson %g and anisotropy_shear %g with young %g and poisson %g have "
-      "no positive energy in cell %u; raise anisotropy_young or lower anisotropy_poisson",
-      t.young_along, t.poisson_along, t.shear_along, young, poisson, c);
-  complain(host, text);
-  throw model::Refused{};
+  return model::fiber_of_cell(host, kId, c, at(kYoung, c), at(kPoisson, c), at(kYoungAlong, c),
+                              at(kPoissonAlong, c), at(kShearAlong, c));
 }
 
 void Body::make_room(Room &room) const {
@@ -60,10 +44,12 @@ void Body::make_room(Room &room) const {
              "locking none");
     throw model::Refused{};
   }
+  if (!plastic() && largest_of(kYield) > 0) {
+    complain(host, model::plastic::kMadeWithout);
+    throw model::Refused{};
+  }
   if (plastic() && (has_fibers() || choice(kEnergy) != kLinear)) {
-    complain(
-        host,
-        "yield works with the energy corotational and without anisotropy only; choose these, or yield 0");
+    complain(host, model::plastic::kNoFibers);
     throw model::Refused{};
   }
   if (has_fibers()) room.fiber.create(host, groups);
@@ -92,10 +78,11 @@ void Body::fill_material(Room &room) {
     if (!damp.empty()) damp[n] = c == kNone ? 0 : at(kDampingStiffness, c);
     if (plastic()) {
       PlasticGroup &flow = plastic_group[n / kGroup];
-      const bool flows = v > 0 && at(kYield, like) > 0;
-      flow.yield[lane] = flows ? at(kYield, like) * v : kNoYield;
-      flow.hardening[lane] = flows ? at(kHardening, like) * v : 0;
-      flow.limit[lane] = at(kPlasticLimit, like) > 0 ? at(kPlasticLimit, like) : kNoYield;
+      const model::plastic::Yield own =
+          model::plastic::yield_of(at(kYield, like), at(kHardening, like), at(kPlasticLimit, like), v);
+      flow.yield[lane] = own.stress;
+      flow.hardening[lane] = own.hardening;
+      flow.limit[lane] = own.limit;
     }
     if (!has_fibers()) {
       const model::Lame lame = model::lame_of(at(kYoung, like), at(kPoisson, like));
@@ -157,10 +144,9 @@ void Body::find_effects() {
 
 const char *Body::idle(Param which) const {
   if ((which == kHardening || which == kCreep || which == kPlasticLimit) && !(largest_of(kYield) > 0))
-    return "yield is 0";
+    return model::plastic::kIdle;
   if (which == kCollapse && choice(kEnergy) != kLinear) return "energy is not corotational";
-  if (which == kAxis && !has_fibers())
-    return "anisotropy_young, anisotropy_poisson and anisotropy_shear are all auto";
+  if (which == kAxis && !has_fibers()) return model::kNoAxis;
   return nullptr;
 }
 

@@ -19,7 +19,7 @@ constexpr const char *kId = "org.deform.linear_fem";
 
 struct Body {
   using Row = Param;
-  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, false};
+  static constexpr model::CellBody::Of kOf = {kId, kParams, kParamCount, false, {0, -1, -1}};
   const dfm_host *host = nullptr;
   uint32_t npoint = 0, ncell = 0, nedge = 0;
   double params[kParamCount] = {};

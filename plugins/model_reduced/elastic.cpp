@@ -148,7 +148,7 @@ void Elastic::take_cells(const dfm_mesh &m) {
     for (size_t a = 0; a < nodes_; ++a) std::copy_n(&rest[3 * size_t(cells_[nodes_ * c + a])], 3, x + 3 * a);
     model::RestCell made;
     const double *const inside = part ? m.inside + model::cells::kInside * c : nullptr;
-    if (!model::make_rest_cell(m.cell, x, inside, lame(uint32_t(c)), made)) {
+    if (!model::make_rest_cell(m.cell, x, inside, {lame(uint32_t(c))}, made)) {
       if (m.cell == DFM_CELL_TET) continue;
       throw model::kFlatCell;
     }

@@ -7,6 +7,8 @@ namespace {
 
 constexpr double kYoung = 1e6, kYield = 2e4, kHardening = 2e5, kLength = 0.1, kPull = 0.06;
 
+enum class Cells { tetrahedra, second_order, hexahedra };
+
 struct Bar {
   test::Context context;
   dfm_world world;
@@ -15,11 +17,13 @@ struct Bar {
   std::vector<double> rest;
   std::vector<uint32_t> end;
 
-  explicit Bar(int32_t integrator, double yield = kYield) {
+  explicit Bar(int32_t integrator, double yield = kYield, Cells cells = Cells::tetrahedra) {
     world = test::make_world(context, {0, 0, 0}, integrator);
     dfm_mesh_handle mesh = 0;
     const double size[3] = {kLength, 0.02, 0.02};
-    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, 40, &mesh));
+    test::ok(dfm_mesh_make(context, cells == Cells::hexahedra ? "bricks" : "beam", size, DFM_MESH_CELLS, 40,
+                           &mesh));
+    if (cells == Cells::second_order) test::ok(dfm_mesh_second_order(mesh, &mesh));
     dfm_body_def d = dfm_body_def_default();
     test::lend(mesh, d);
     test::BodyOptions o;
@@ -51,13 +55,15 @@ struct Bar {
   }
   ~Bar() { dfm_world_destroy(world); }
 
-  // The end goes out by kPull and stays there.
-  void move_out() {
-    dfm_pose_key keys[2] = {};
+  // The end goes out by kPull, and then in by `back`, where it stays.
+  void move_out(double back = -kPull) {
+    dfm_pose_key keys[3] = {};
     for (dfm_pose_key &key : keys) key.pose = dfm_body_def_default().pose;
     keys[1].t = 0.3;
+    keys[2].t = 0.6;
     keys[1].pose.position[0] = kPull * kLength;
-    test::ok(dfm_body_move_held(body, uint32_t(end.size()), end.data(), 2, keys, nullptr));
+    keys[2].pose.position[0] = -back * kLength;
+    test::ok(dfm_body_move_held(body, uint32_t(end.size()), end.data(), 3, keys, nullptr));
   }
   void pull(double h) {
     move_out();
@@ -102,6 +108,50 @@ TEST(Plastic, BarPulledBeyondYieldAndLetGo_KeepsThePermanentStrain) {
     elastic.let_go(h);
     EXPECT_NEAR(elastic.strain(), 0, 0.01 * permanent) << integrator;
   }
+}
+
+TEST(Plastic, BarOfCellsThatBend_KeepsThePermanentStrainAndContinuesFromASnapshot) {
+  const double permanent = (kYoung * kPull - kYield) / (kYoung + kHardening);
+  constexpr int32_t kExplicit = DFM_INTEGRATOR_SYMPLECTIC_EULER, kImplicit = DFM_INTEGRATOR_IMPLICIT_EULER;
+  struct Way {
+    Cells cells;
+    int32_t integrator;
+    double h;
+  };
+  for (const Way &w : {Way{Cells::second_order, kImplicit, 1.0 / 240},
+                       Way{Cells::hexahedra, kImplicit, 1.0 / 240}, Way{Cells::hexahedra, kExplicit, 5e-4}}) {
+    Bar bar(w.integrator, kYield, w.cells);
+    bar.pull(w.h);
+    EXPECT_NEAR(bar.strain(), kPull, 1e-12);
+    const std::string shot = test::snapshot(bar.world);
+    bar.let_go(w.h);
+    EXPECT_NEAR(bar.strain(), permanent, 0.01 * permanent) << w.integrator;
+    const uint64_t straight = dfm_world_hash(bar.world);
+    test::ok(dfm_world_restore(bar.world, shot.data(), shot.size()));
+    bar.let_go(w.h);
+    EXPECT_EQ(dfm_world_hash(bar.world), straight);
+  }
+}
+
+// Out beyond yield, in beyond it again, let go: uniform strains, which all cells have alike.
+TEST(Plastic, BarPulledAndPushed_KeepsTheStrainWhateverItsCells) {
+  std::vector<double> strain;
+  for (const Cells cells : {Cells::tetrahedra, Cells::second_order, Cells::hexahedra}) {
+    Bar bar(DFM_INTEGRATOR_AUTO, kYield, cells);
+    bar.move_out(0.04);
+    dfm_equilibrium_def def = dfm_equilibrium_def_default();
+    def.load_steps = 3;
+    for (const double t : {0.3, 0.6}) {
+      def.time = t;
+      test::ok(dfm_world_equilibrium(bar.world, &def, nullptr));
+    }
+    EXPECT_NEAR(bar.strain(), -0.04, 1e-12);
+    bar.release();
+    test::ok(dfm_world_equilibrium(bar.world, nullptr, nullptr));
+    strain.push_back(bar.strain());
+  }
+  EXPECT_LT(strain[0], -0.005);
+  for (const double s : strain) EXPECT_NEAR(s / strain[0], 1, 1e-6);
 }
 
 TEST(Plastic, BarInEquilibriumBeyondYieldAndFree_KeepsThePermanentStrain) {

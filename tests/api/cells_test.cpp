@@ -223,11 +223,11 @@ TEST(CellWorlds, WhatTakesNoSuchCells_SaysSo) {
     test::says({"tetrahedra need no cells", "dfm_mesh_get_info"});
   }
   const double one = 1;
-  const dfm_param_value value{"yield", &one, 1};
+  const dfm_param_value value{"locking", &one, 1};
   def = def_of(mesh, "corotational_fem");
   def.model_params = {sizeof(dfm_params), 1, &value};
   EXPECT_EQ(dfm_body_create(d.world, &def, &body), DFM_E_ARG);
-  test::says({"yield", "first-order tetrahedra alone"});
+  test::says({"locking", "first-order tetrahedra alone"});
 }
 
 constexpr const char *kScene = R"({"format": "deform-scene", "version": 1,

@@ -282,13 +282,16 @@ TEST(CellBars, ParametersOfTetrahedraAlone_AreRefusedByName) {
   const Mesh m = brick_bar(1, 1, 1, {0.1, 0.1, 0.1});
   size_t at = 0;
   for (uint32_t r = 0; r < type.nparam; at += type.params[r++].width) {
-    if (r < 4) continue;
+    const std::string key = type.params[r].key;
+    if (r < 4 || key == "yield" || key == "hardening" || key == "creep" || key == "plastic_limit" ||
+        key.starts_with("anisotropy"))
+      continue;
     Host host;
     std::vector<double> values = material(type, kYoung, 0.3);
     values[at] = type.params[r].def == 1 ? 2 : 1;
     ModelInstance refused(host, type, m, values);
-    EXPECT_EQ(refused.status, DFM_E_ARG) << type.params[r].key;
-    EXPECT_NE(host.logged.find(type.params[r].key), std::string::npos);
+    EXPECT_EQ(refused.status, DFM_E_ARG) << key;
+    EXPECT_NE(host.logged.find(key), std::string::npos);
     EXPECT_NE(host.logged.find("first-order tetrahedra alone"), std::string::npos) << host.logged;
     Body b(host, of, m);
     EXPECT_EQ(b.ops->set_params(b.self, values.data()), DFM_E_ARG);
