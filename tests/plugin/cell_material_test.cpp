@@ -305,6 +305,36 @@ TEST(CellMaterial, ValuesByCell_AreThoseOfTheCells) {
   for (uint32_t c = 0; c < 4; ++c) EXPECT_NEAR(stress[6 * c], c < 2 ? 500 : 100, 1) << c;
 }
 
+// Pieces in any cut and order give the same bits, of the state too.
+TEST(CellMaterial, Flow_DoesNotDependOnTheDivisionOfTheWork) {
+  Host one, many;
+  many.shuffle = 1;
+  const Mesh m = brick_bar(12, 8, 8, {0.1, 0.1, 0.1});
+  Instance a(one, m, soft()), b(many, m, soft());
+  for (Instance *i : {&a, &b}) {
+    i->shake(1e-2, 1);
+    i->forces_and_step();
+  }
+  EXPECT_EQ(std::vector<double>(a.f, a.f + 4 * a.size()), std::vector<double>(b.f, b.f + 4 * b.size()));
+  EXPECT_EQ(a.state, b.state);
+  EXPECT_GT(*std::max_element(a.state.begin(), a.state.end()), 0);
+}
+
+TEST(CellMaterial, MemoryThatRunsOut_IsReportedAndGivenBack) {
+  const Mesh m = brick_bar(2, 1, 1, {0.1, 0.1, 0.1});
+  bool made = false;
+  for (size_t n = 0; !made; ++n) {
+    Host host;
+    host.fail_at = n;
+    {
+      const Instance b(host, m, soft());
+      made = b.status == DFM_OK;
+      EXPECT_TRUE(made || b.status == DFM_E_NOMEM) << n;
+    }
+    EXPECT_EQ(host.live, 0u) << n;
+  }
+}
+
 TEST(CellMaterial, Refusals_GiveTheReason) {
   const Mesh m = brick_bar(1, 1, 1, {0.1, 0.1, 0.1});
   const auto refused = [&](const Params &p, const char *word) {
