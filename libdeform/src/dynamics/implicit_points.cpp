@@ -112,8 +112,8 @@ bool ImplicitPoints::evaluate_after(const double *v, bool commits) {
 
 // Backward Euler's velocities are those of chords. In the frame at the end of a rotation by the angle a they
 // expand the body at the rate a^2 / 2h: dampers that saw them would press a spinning body together, and that
-// gains energy. They see the velocities at the ends of the arcs. Where forces are linear, a rotation is a
-// strain.
+// gains energy. They see the velocities at the ends of the arcs. Models of constant stiffness take a rotation
+// for a strain in any case.
 void ImplicitPoints::turn_on() {
   const Turning turning = turning_of(p_, v_.data(), stage_.h);
   for (uint32_t i = 0; i < p_.n; ++i) {

@@ -127,8 +127,14 @@ bool meets(const World &w, const StepContext &step, uint32_t slot) {
 // itself turns its frame without contact, and what contact changes is added along straight lines: a spin w
 // that contact makes or stops leaves 1 - cos(h w) of the size as strain (doc/decisions/energy_watch.md).
 double gain_of(const World &w, const StepContext &step, const Body &b, uint32_t slot) {
-  const bool moves = step.h * step.guard.change[slot] > kBoundStrain * b.surface.median_edge;
-  return moves ? gain_at_end(w, step, b) : 0;
+  const double least = kBoundStrain * b.surface.median_edge;
+  if (!(step.h * step.guard.change[slot] > least)) return 0;
+  // not what holds a weight up, which changes the free motion alone
+  const double *const end = b.dynamics->end().v;
+  double most = 0;
+  for (uint32_t i = 0; i < b.p.n; ++i)
+    most = std::max(most, norm2(load3(end + size_t{kStride} * i) - load3(&b.p.v[size_t{kStride} * i])));
+  return step.h * std::sqrt(most) > least ? gain_at_end(w, step, b) : 0;
 }
 
 // An impact is a change of a point's velocity by contact that strains an edge in this sub-step by more than

@@ -153,6 +153,7 @@ bool end_impact(World &w) {
 }
 
 void follow_impact(World &w, double dt) {
+  if (w.prescribed.is_static()) return;  // no time passes, and the search has its own dynamics
   const auto any = [&](Chosen what) {
     return std::ranges::any_of(w.bodies, [&](const auto &b) { return b->integrator.chosen == what; });
   };

@@ -44,11 +44,11 @@ bool steps_itself(const Body &b) { return b.model.stepper.has_value(); }
 // at the end of the sub-step.
 bool at_end(const Body &b) { return b.dynamics->abilities().damps || steps_itself(b); }
 bool books(const Body &b) { return b.dynamics->abilities().energy || at_end(b); }
-// Its elastic energy is unknown, but not below zero: the kinetic energy comes from that at the start and from
-// the work done since.
 bool is_held(const Body &b) {
   return std::any_of(b.p.held.begin(), b.p.held.end(), [](uint8_t held) { return held != 0; });
 }
+// Its elastic energy is unknown, but not below zero: the kinetic energy comes from that at the start and from
+// the work done since.
 bool hides(const Body &b) { return steps_itself(b) && !b.model.can(DFM_CAP_ENERGY); }
 double allowed(const Body &b) { return hides(b) ? kHidden : steps_itself(b) ? kOwnSteps : 0; }
 bool watched(const Body &b) { return books(b) && (b.model.can(DFM_CAP_ENERGY) || hides(b)); }
@@ -113,12 +113,6 @@ bool check_sums(const World &w, const StepContext &step, const Body &b, EnergySa
   return true;
 }
 
-// A model that steps itself may share memory between its energy and its prediction, which its commit needs.
-bool predict_again(const World &w, const StepContext &step, const Body &b) {
-  double kinetic = 0;
-  return !steps_itself(b) || b.dynamics->free_motion(sub_step_of(w, step), kinetic);
-}
-
 // The energy that the scheme keeps, U(x) - F.x + v.M v_free / 2, and half of the energy of the kick, by which
 // it may rise as stiff modes calm down. U of a body that flows is that after the flow at x: what flow
 // dissipates is still in U until the sub-step is committed.
@@ -150,7 +144,11 @@ bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
   const auto query = [&] { return b.model.ops->energy(b.model.self, &kin, &elastic); };
   if (!hides(b) && b.model.call("energy", query) != DFM_OK) return false;
   elastic += b.dynamics->damper_energy(w.time);
-  if ((!hides(b) || b.dynamics->abilities().late) && !predict_again(w, step, b)) return false;
+  // the call came between its prediction and its commit, which may share memory with the result
+  double again = 0;
+  if (steps_itself(b) && (!hides(b) || b.dynamics->abilities().late) &&
+      !b.dynamics->free_motion(sub_step_of(w, step), again))
+    return false;
   const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
   out = {kinetic,
          elastic,
@@ -284,12 +282,13 @@ double gain_at_end(const World &w, const StepContext &step, const Body &b) {
   if (steps_itself(b) && is_held(b)) return 0;  // steps may leave out points
   const Phyxels &p = b.p;
   const EndState ends = b.dynamics->end();
-  double had = 0, gained = 0;
+  double had = 0, has = 0, gained = 0;
   for (uint32_t i = 0; i < p.n; ++i)
     for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
       if (!p.moves(at)) continue;
       const double before = p.v[at], after = ends.v[at], m = p.mass[i];
       had += 0.5 * m * (before * before);
+      has += 0.5 * m * (after * after);
       gained += 0.5 * m * (after * after - before * before) -
                 step.h * ends.mean[at] * (p.load[at] + m * w.gravity.now[int(k)]);
     }
@@ -304,9 +303,8 @@ double gain_at_end(const World &w, const StepContext &step, const Body &b) {
   kin.x = p.x_end.data();
   kin.v = p.v_end.data();
   if (steps_itself(b)) kin.state = b.model.state_out.data();
-  const bool known = query(elastic_end);
-  if (!known || !predict_again(w, step, b)) return 0;
-  return (gained + elastic_end - elastic) / (had + elastic);
+  if (!query(elastic_end)) return 0;
+  return (gained + elastic_end - elastic) / std::max(had + elastic, has + elastic_end);
 }
 
 const char *unwatched(const World &w, const Body &b) {
