@@ -224,24 +224,22 @@ class CellBody {
       const Along along(*this, c, fibers_);
       const Lame l = along.material.lame;
       const double trace = ((m.s[0] + m.s[4]) + m.s[8]) - 3;
-      double local[9], half[9] = {};
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          local[3 * i + j] =
-              l.mu * (m.s[3 * i + j] + m.s[3 * j + i]) + (i == j ? l.lambda * trace - 2 * l.mu : 0);
-      if (along.material.fiber) {
-        double e[9];
-        for (int i = 0; i < 9; ++i) e[i] = 0.5 * (m.s[i] + m.s[i % 3 * 3 + i / 3]) - (i % 4 == 0);
-        add_fiber_stress(along.fiber, along.axis, e, local);
+      double twice[6], own[6], less[6] = {}, local[9], half[9] = {};
+      for (int n = 0; n < 6; ++n) {
+        twice[n] = m.s[3 * kRow[n] + kCol[n]] + m.s[3 * kCol[n] + kRow[n]];
+        own[n] = l.mu * twice[n] + (n < 3 ? l.lambda * trace - 2 * l.mu : 0);
       }
-      if (plastic()) {
-        double less[6];
-        points_.mean_stress(c, law_of(flow, c), state_of(k, c), m.u, less);
+      if (along.material.fiber) {
+        double d[6][6];
+        elasticity_matrix(along.fiber, along.axis, d);
         for (int n = 0; n < 6; ++n) {
-          local[3 * kRow[n] + kCol[n]] -= less[n];
-          if (n > 2) local[3 * kCol[n] + kRow[n]] -= less[n];
+          own[n] = 0;
+          for (int o = 0; o < 6; ++o) own[n] += d[n][o] * (o < 3 ? 0.5 * twice[o] - 1 : twice[o]);
         }
       }
+      if (plastic()) points_.mean_stress(c, law_of(flow, c), state_of(k, c), m.u, less);
+      for (int n = 0; n < 6; ++n)
+        local[3 * kRow[n] + kCol[n]] = local[3 * kCol[n] + kRow[n]] = own[n] - less[n];
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
           for (int n = 0; n < 3; ++n) half[3 * i + j] += m.r[3 * i + n] * local[3 * n + j];
@@ -383,8 +381,9 @@ class CellBody {
       }
     RestCell made;
     const double *const inside = inside_.empty() ? nullptr : &inside_[size_t{cells::kInside} * c];
-    cells::RestPoints *const points = plastic() ? &points_.of(c) : nullptr;
-    if (!make_rest_cell(kind_, x, inside, Along(*this, c, fibers_).material, made, points)) throw kFlatCell;
+    if (!make_rest_cell(kind_, x, inside, Along(*this, c, fibers_).material, made, points_.of(c),
+                        points_.inner_of(c)))
+      throw kFlatCell;
     Cell &out = cell_[c];
     out.volume = made.volume;
     for (uint32_t a = 0; a < nodes_; ++a)

@@ -15,7 +15,8 @@ namespace plastic {
 constexpr double kAtOnce = -1, kNever = 1e300;
 constexpr const char *kIdle = "yield is 0";
 constexpr const char *kNoFibers =
-    "yield works with the energy corotational and without anisotropy only; choose these, or yield 0";
+    "yield excludes anisotropy and energies other than corotational; leave these at their defaults, or "
+    "yield at 0";
 constexpr const char *kMadeWithout =
     "the body was created without yield and has no plastic strain; create it again with yield";
 
@@ -42,9 +43,12 @@ class CellPoints {
     nodes_ = nodes_of(kind);
     rows_ = nodes_ + (kind == DFM_CELL_HEX8 ? cells::kInner : 0);
     points_.create(host, ncell);
+    if (rows_ > nodes_) inner_.create(host, ncell);
   }
   bool empty() const { return points_.empty(); }
-  cells::RestPoints &of(uint32_t c) { return points_[c]; }
+  // Null where there are none.
+  cells::RestPoints *of(uint32_t c) { return points_.empty() ? nullptr : &points_[c]; }
+  cells::RestInner *inner_of(uint32_t c) { return inner_.empty() ? nullptr : &inner_[c]; }
 
   // Takes from f, elastic forces of the displacements u, those of the plastic strain after the flow, which
   // `next` gets unless it is null.
@@ -67,7 +71,7 @@ class CellPoints {
         sum[a][2] += by * ((e[5] * g[0] + e[4] * g[1]) + e[2] * g[2]);
       }
     });
-    fold(p, &sum[0][0]);
+    fold(c, &sum[0][0]);
     for (uint32_t a = 0; a < nodes_; ++a)
       for (int i = 0; i < 3; ++i) f[a][i] -= sum[a][i];
   }
@@ -100,15 +104,9 @@ class CellPoints {
     each_point(c, law, state, u, [&](int n, const At &at) {
       double d[6][6] = {};
       if (!plastic::soften(at.law, at.flow, d)) return;
-      double strain[6][3 * cells::kMax] = {}, stress[6][3 * kMaxNodes] = {};  // engineering shears
-      for (uint32_t a = 0; a < rows_; ++a)
-        for (uint32_t i = 0; i < 3; ++i) {
-          const uint32_t j = (i + 1) % 3;
-          strain[i][3 * a + i] = p.g[n][a][i];
-          strain[3 + i][3 * a + i] = p.g[n][a][j];
-          strain[3 + i][3 * a + j] = p.g[n][a][i];
-        }
-      for (auto &row : strain) fold(p, row);
+      double strain[6][3 * cells::kMax] = {}, stress[6][3 * kMaxNodes] = {};
+      cells::strain_of(int(rows_), p.g[n], strain);
+      for (auto &row : strain) fold(c, row);
       for (int k = 0; k < 6; ++k)
         for (int l = 0; l < 6; ++l)
           for (uint32_t r = 0; r < 3 * nodes_; ++r) stress[k][r] += by * d[k][l] * strain[l][r];
@@ -132,9 +130,9 @@ class CellPoints {
   };
 
   // Forces on inner displacements become forces on the nodes.
-  void fold(const cells::RestPoints &p, double *f) const {
+  void fold(uint32_t c, double *f) const {
     for (uint32_t r = 3 * rows_; r-- > 3 * nodes_;)
-      for (uint32_t j = 0; j < r; ++j) f[j] -= p.inner[r - 3 * nodes_][j] * f[r];
+      for (uint32_t j = 0; j < r; ++j) f[j] -= inner_[c].share[r - 3 * nodes_][j] * f[r];
   }
 
   template <class Use>
@@ -144,7 +142,7 @@ class CellPoints {
     std::copy_n(u[0], 3 * nodes_, d);
     for (uint32_t r = 3 * nodes_; r < 3 * rows_; ++r) {
       d[r] = 0;
-      for (uint32_t j = 0; j < r; ++j) d[r] -= p.inner[r - 3 * nodes_][j] * d[j];
+      for (uint32_t j = 0; j < r; ++j) d[r] -= inner_[c].share[r - 3 * nodes_][j] * d[j];
     }
     for (int n = 0; n < cells::kWhole && p.weight[n] > 0; ++n) {
       double h[9] = {};
@@ -166,6 +164,7 @@ class CellPoints {
 
   uint32_t nodes_ = 0, rows_ = 0;
   Buffer<cells::RestPoints> points_;
+  Buffer<cells::RestInner> inner_;  // of hexahedra
 };
 
 }  // namespace model

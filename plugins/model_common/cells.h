@@ -70,21 +70,23 @@ struct RestCell {
 
 namespace cells {
 
-constexpr int kInner = 3;  // quadratic displacements of a hexahedron
-constexpr int kMax = kMaxNodes + kInner;
+constexpr int kInner = 3;         // quadratic displacements of a hexahedron
+constexpr int kMax = 8 + kInner;  // gradients at a point: no other kind has more
+static_assert(kMax >= int(kMaxNodes));
 constexpr int kWhole = 8, kInside = 27;  // points of the rules
 constexpr double kTie = 0.02;
 constexpr double kThin = 1e-9;       // of the square of a function: it depends on those before it
 constexpr double kSwell = 14.0 / 3;  // bulk over shear modulus, at poisson 0.4
 
 // The strain at the points of a cell, as displacements of its nodes give it: sum d_a (x) g_a over its nodes
-// and inner displacements, component r of which is minus the sum of inner[r] times all components before it.
-// They are at rest under elastic stresses. Weights m^3, 0: no such point.
+// and inner displacements. Weights m^3, 0: no such point.
 struct RestPoints {
   double weight[kWhole];
   double g[kWhole][kMax][3];
-  double inner[3 * kInner][3 * kMax];
 };
+// The inner displacements of a hexahedron, at rest under elastic stresses: component r is minus the sum of
+// share[r] times all components before it.
+struct RestInner { double share[3 * kInner][3 * kMax]; };
 
 // At one of the points of a rule.
 struct Point {
@@ -201,27 +203,32 @@ inline int project(const Point *q, int points, int rows, double (*theta)[kMax][3
   return kept;
 }
 
-// What the stress along the axis adds to the stiffness between a node with gradient g and volume change t and
-// another one: the strain e has the deviator of its own and the trace t.u.
-struct AlongAxis {
-  double e[3][3], q[3], t[3];  // e.a, a.e.a by component of the displacement
-  AlongAxis(const double *axis, const double *g, const double *theta) {
-    const double along = (g[0] * axis[0] + g[1] * axis[1]) + g[2] * axis[2];
+// Strain (material.h) of displacements with these gradients, a column for each component.
+inline void strain_of(int rows, const double (*g)[3], double (*strain)[3 * kMax]) {
+  for (int a = 0; a < rows; ++a)
     for (int i = 0; i < 3; ++i) {
-      t[i] = theta[i];
-      q[i] = 0;
-      for (int k = 0; k < 3; ++k) {
-        e[k][i] = 0.5 * ((k == i ? along : 0) + g[k] * axis[i]) + (theta[i] - g[i]) / 3 * axis[k];
-        q[i] += axis[k] * e[k][i];
-      }
+      const int j = (i + 1) % 3;
+      strain[i][3 * a + i] = strain[3 + i][3 * a + j] = g[a][i];
+      strain[3 + i][3 * a + i] = g[a][j];
     }
+}
+
+// Adds the stiffness at a point with the elasticity d: the strain has the deviator of its own and the volume
+// change theta.
+inline void add_stiffness(const double (*d)[6], const Point &p, const double (*theta)[3], int rows,
+                          double (*k)[3 * kMax]) {
+  double strain[6][3 * kMax] = {};
+  strain_of(rows, p.g, strain);
+  for (int r = 0; r < 3 * rows; ++r)
+    for (int m = 0; m < 3; ++m) strain[m][r] += (theta[r / 3][r % 3] - p.g[r / 3][r % 3]) / 3;
+  for (int r = 0; r < 3 * rows; ++r) {
+    double stress[6] = {};
+    for (int m = 0; m < 6; ++m)
+      for (int n = 0; n < 6; ++n) stress[m] += p.weight * d[m][n] * strain[n][r];
+    for (int s = 0; s < 3 * rows; ++s)
+      for (int m = 0; m < 6; ++m) k[r][s] += stress[m] * strain[m][s];
   }
-  static double block(const Fiber &c, const AlongAxis &a, int i, const AlongAxis &b, int j) {
-    const double both = (a.e[0][i] * b.e[0][j] + a.e[1][i] * b.e[1][j]) + a.e[2][i] * b.e[2][j];
-    return c.alpha * (a.t[i] * b.q[j] + a.q[i] * b.t[j]) + 4 * (c.mu_along - c.mu) * both +
-           c.beta * a.q[i] * b.q[j];
-  }
-};
+}
 
 // Eliminates the rows of k from n on, the last one first: each pivot is positive, or its row is zero.
 template <int kSize>
@@ -254,10 +261,12 @@ inline bool make_rest_tetrahedron(const double *x, const Lame &m, RestCell &out)
   return true;
 }
 
-// x [nodes,3] m; inside [27] or null; points may be null, and is for cells that are no first-order
-// tetrahedra. False if the Jacobian is not positive at a point: the cell is inverted or flat there.
+// x [nodes,3] m; inside [27] or null. at_points may be null, and is for cells that are no first-order
+// tetrahedra; with it hexahedra need inner. False if the Jacobian is not positive at a point: the cell is
+// inverted or flat there.
 inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside, const CellMaterial &material,
-                           RestCell &out, cells::RestPoints *at_points = nullptr) {
+                           RestCell &out, cells::RestPoints *at_points = nullptr,
+                           cells::RestInner *inner = nullptr) {
   using namespace cells;
   const Lame &m = material.lame;
   if (kind == DFM_CELL_TET) return make_rest_tetrahedron(x, m, out);
@@ -305,8 +314,10 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
     for (int n = 0; n < points; ++n)
       for (int a = 0; a < nodes; ++a)
         for (int c = 0; c < 3; ++c) theta[n][a][c] = out.mean[a][c] + by * (theta[n][a][c] - out.mean[a][c]);
-  double k[3 * kMax][3 * kMax] = {};
-  for (int n = 0; n < points; ++n)
+  double k[3 * kMax][3 * kMax] = {}, d[6][6];
+  if (material.fiber) elasticity_matrix(*material.fiber, material.axis, d);
+  for (int n = 0; material.fiber && n < points; ++n) add_stiffness(d, q[n], theta[n], rows, k);
+  for (int n = 0; !material.fiber && n < points; ++n)
     for (int a = 0; a < rows; ++a)
       for (int b = 0; b < rows; ++b) {
         const double *ga = q[n].g[a], *gb = q[n].g[b], *ta = theta[n][a], *tb = theta[n][b];
@@ -317,16 +328,6 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
             k[3 * a + i][3 * b + j] += q[n].weight * (m.mu * shear + bulk * (ta[i] * tb[j]));
           }
       }
-  for (int n = 0; material.fiber && n < points; ++n)
-    for (int a = 0; a < rows; ++a) {
-      const AlongAxis of_a(material.axis, q[n].g[a], theta[n][a]);
-      for (int b = 0; b < rows; ++b) {
-        const AlongAxis of_b(material.axis, q[n].g[b], theta[n][b]);
-        for (int i = 0; i < 3; ++i)
-          for (int j = 0; j < 3; ++j)
-            k[3 * a + i][3 * b + j] += q[n].weight * AlongAxis::block(*material.fiber, of_a, i, of_b, j);
-      }
-    }
   eliminate(k, 3 * nodes, 3 * rows);
   if (at_points && !inside) {
     *at_points = RestPoints();
@@ -334,19 +335,21 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
       at_points->weight[n] = q[n].weight;
       std::copy_n(q[n].g[0], 3 * rows, at_points->g[n][0]);
     }
+    if (hex) *inner = RestInner();
     for (int r = 3 * nodes; r < 3 * rows; ++r)
-      for (int j = 0; j < r && k[r][r] > 0; ++j) at_points->inner[r - 3 * nodes][j] = k[r][j] / k[r][r];
+      for (int j = 0; j < r && k[r][r] > 0; ++j) inner->share[r - 3 * nodes][j] = k[r][j] / k[r][r];
   }
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j) out.stiffness[i][j] = 0.5 * (k[i][j] + k[j][i]);
   if (!inside) return true;
   RestCell whole;
-  if (!make_rest_cell(kind, x, nullptr, material, whole, at_points)) return false;
+  if (!make_rest_cell(kind, x, nullptr, material, whole, at_points, inner)) return false;
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j)
       out.stiffness[i][j] += kTie * (out.volume / whole.volume * whole.stiffness[i][j] - out.stiffness[i][j]);
   if (at_points && !is_whole(inside)) {
     *at_points = RestPoints();
+    *inner = RestInner();
     at_points->weight[0] = out.volume;
     for (int a = 0; a < nodes; ++a)
       for (int c = 0; c < 3; ++c)

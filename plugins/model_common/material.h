@@ -41,19 +41,6 @@ inline bool fiber_of(const Transverse &t, Fiber &out) {
   return true;
 }
 
-// Adds to the stress of the strain e, both 3 x 3, what the axis (of unit length) adds to lambda and mu.
-inline void add_fiber_stress(const Fiber &c, const double *a, const double *e, double *stress) {
-  double along[3], q = 0;
-  for (int i = 0; i < 3; ++i) along[i] = (e[3 * i] * a[0] + e[3 * i + 1] * a[1]) + e[3 * i + 2] * a[2];
-  for (int i = 0; i < 3; ++i) q += a[i] * along[i];
-  const double trace = (e[0] + e[4]) + e[8], both = c.alpha * trace + c.beta * q,
-               shear = 2 * (c.mu_along - c.mu);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      stress[3 * i + j] +=
-          (i == j ? c.alpha * q : 0) + both * a[i] * a[j] + shear * (a[i] * along[j] + along[i] * a[j]);
-}
-
 // No strain has more than this times its square as twice its energy: the axially symmetric strains have the
 // 2 x 2 matrix of c11 + c12, sqrt 2 c13, c33, the others 2 mu and 2 mu_along.
 inline double largest_modulus(const Fiber &c) {

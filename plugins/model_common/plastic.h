@@ -1,6 +1,6 @@
 // Plastic flow at a point of a cell (a first-order tetrahedron has one), for vectors of lanes and for double
-// alike. With e the strain in the frame, p the
-// plastic strain (trace 0) and a its length so far (accumulated equivalent plastic strain), the stress is
+// alike. With e the strain in the frame, p the plastic strain (trace 0) and a its length so far (accumulated
+// equivalent plastic strain), the stress is
 //   2 mu (dev e - p) + k tr(e) I,   size = sqrt(3/2) 2 mu |dev e - p|  (von Mises).
 // Beyond the yield stress Y = yield + hardening a it flows along dev e - p by the equivalent plastic strain
 //   g = min(flow (size - Y) / (3 mu + hardening), limit - a),

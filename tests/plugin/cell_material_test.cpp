@@ -344,14 +344,21 @@ TEST(CellMaterial, Refusals_GiveTheReason) {
     EXPECT_NE(host.logged.find(word), std::string::npos) << host.logged;
     EXPECT_EQ(host.live, 0u);
   };
-  refused(soft({{"anisotropy_young", {1e6}}}), "yield works with the energy corotational");
+  refused(soft({{"anisotropy_young", {1e6}}}),
+          "yield excludes anisotropy and energies other than corotational");
   refused(fibers({{"anisotropy_poisson", {9}}}), "no positive energy");
   refused(soft({{"creep", {-0.5}}}), "creep");
   Host host;
   Instance elastic(host, m);
-  const std::vector<double> values = Instance::row(soft()), before = Instance::row({});
+  elastic.shake(1e-2, 1);
+  const auto forces = [&] {
+    elastic.forces();
+    return std::vector<double>(elastic.f, elastic.f + 4 * elastic.size());
+  };
+  const std::vector<double> values = Instance::row(soft({{"young", {2 * kYoung}}})), before = forces();
   EXPECT_EQ(elastic.ops->set_params(elastic.self, values.data()), DFM_E_ARG);
   EXPECT_NE(host.logged.find("created without yield"), std::string::npos);
+  EXPECT_EQ(forces(), before);
   Instance b(host, m, soft());
   dfm_kin k = b.kin();
   k.state = nullptr;

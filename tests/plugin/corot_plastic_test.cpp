@@ -205,8 +205,9 @@ TEST(CorotPlastic, Refusals_GiveTheReason) {
     EXPECT_EQ(b.status, DFM_E_ARG) << word;
     EXPECT_NE(host.logged.find(word), std::string::npos) << host.logged;
   };
-  refused(soft({{"energy", {1}}}), "yield works with the energy corotational");
-  refused(soft({{"anisotropy_young", {1e6}}}), "yield works with the energy corotational");
+  refused(soft({{"energy", {1}}}), "yield excludes anisotropy and energies other than corotational");
+  refused(soft({{"anisotropy_young", {1e6}}}),
+          "yield excludes anisotropy and energies other than corotational");
   refused(soft({{"creep", {-0.5}}}), "creep");
   Host host;
   Instance elastic(host, regular_tet());
