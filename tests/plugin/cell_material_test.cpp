@@ -115,24 +115,13 @@ TEST(CellMaterial, UniformStrain_HasTheStressOfAFirstOrderTetrahedronWithFibers)
   }
 }
 
-// Some steps of flow back and forth, so that the plastic strain has axes of its own.
-void work(Instance &b, double amount) {
-  std::vector<double> x(b.x, b.x + 4 * b.size());
-  for (unsigned seed = 1; seed < 4; ++seed) {
-    std::copy(x.begin(), x.end(), b.x);
-    b.shake(amount, 0, seed);
-    b.forces_and_step();
-  }
-  std::copy(x.begin(), x.end(), b.x);
-}
-
 TEST(CellMaterial, Forces_AreTheGradientOfThePotentialAndHaveNoMoment) {
   for (const Case &kind : meshes())
     for (std::vector<Params> all = flows(); const Params &p : {all[0], all[1], all[2], all[3], fibers()}) {
       Host host;
       Instance b(host, kind.mesh, p);
       strain(b, 0.02, 1.2);
-      work(b, 0.004);
+      b.work(0.004);
       b.shake(0.004, 0, 9);
       expect_force_is_gradient(b, 1e-7, 1e-5, std::string(kind.name) + ", " + p.rbegin()->first);
       if (b.state.empty()) continue;
@@ -151,7 +140,7 @@ TEST(CellMaterial, Tangent_IsThatOfTheFlowAndOfFibers) {
       p["yield"] = {1e-4 * kYield};
       if (p.count("plastic_limit")) p["plastic_limit"] = {3e-6};
       Instance b(host, kind.mesh, p), elastic(host, kind.mesh, {{"young", {kYoung}}});
-      work(b, 1e-6);
+      b.work(1e-6);
       b.shake(1e-6, 0, 11);
       std::copy(b.x, b.x + 4 * b.size(), elastic.x);
       const Dense k = tangent(b, 1, 0), whole = tangent(elastic, 1, 0);
@@ -177,7 +166,7 @@ TEST(CellMaterial, Bound_IsAboveTheLargestEigenvalue) {
         Host host;
         Instance b(host, kind.mesh, p);
         strain(b, 0.02, 0.7);
-        if (p.count("yield")) work(b, 0.004);
+        if (p.count("yield")) b.work(0.004);
         b.shake(amount, 0);
         const double most = Operator(b).largest(b.bound(), 100);
         EXPECT_LT(most, 4.0) << kind.name << ", " << p.rbegin()->first;

@@ -13,16 +13,6 @@ Params soft(Params more = {}) {
   for (const auto &[key, value] : more) p[key] = value;
   return p;
 }
-// Some steps of flow back and forth, so that the plastic strain has axes of its own.
-void work(Instance &b, double amount) {
-  std::vector<double> x(b.x, b.x + 4 * b.size());
-  for (unsigned seed = 1; seed < 4; ++seed) {
-    std::copy(x.begin(), x.end(), b.x);
-    b.shake(amount, 0, seed);
-    b.forces_and_step();
-  }
-  std::copy(x.begin(), x.end(), b.x);
-}
 void stretch(Instance &b, Vec by) {
   for (uint32_t i = 0; i < b.size(); ++i) {
     const Vec x = b.mesh.at(i);
@@ -74,7 +64,7 @@ TEST(CorotPlastic, Force_IsTheGradientOfThePotentialOfTheStep) {
   for (const Params &p : kinds()) {
     Host host;
     Instance b(host, kuhn_bar(3, 2, 2, 0.1, 0.2), p);
-    work(b, 0.01);
+    b.work(0.01);
     EXPECT_GT(largest_length(b), 0);
     b.shake(0.01, 0, 9);
     expect_force_is_gradient(b, 1e-7, 1e-5, p.rbegin()->first);
@@ -164,7 +154,7 @@ TEST(CorotPlastic, Tangent_IsThatOfTheFlow) {
       p.erase("damping_stiffness");
       if (p.count("plastic_limit")) p["plastic_limit"] = {3e-6};
       Instance b(host, kuhn_bar(2, 2, 1, 0.1), p);
-      work(b, 1e-6);
+      b.work(1e-6);
       stretch(b, {1, 1, 1});
       b.shake(1e-6, 0, 11);
       const Dense k = tangent(b, 1, 0);
@@ -184,7 +174,7 @@ TEST(CorotPlastic, TangentOfEveryShape_IsNegativeSemidefiniteAndFinite) {
         Host host;
         p["tangent"] = {tangent_kind};
         Instance b(host, kuhn_bar(2, 2, 1, 0.1, 0.2), p);
-        work(b, 0.02);
+        b.work(0.02);
         for (uint32_t i = 0; i < b.size(); ++i) {
           const Vec x = b.mesh.at(i);
           b.set(b.x, i, {size * x[0], x[1], std::sqrt(std::abs(size)) * x[2]});

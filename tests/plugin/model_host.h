@@ -380,6 +380,16 @@ struct ModelInstance {
       set(v, i, get(v, i) + speed * Vec{u(random), u(random), u(random)});
     }
   }
+  // Some steps of flow back and forth, so that the plastic strain has axes of its own.
+  void work(double amount) {
+    const std::vector<double> start(x, x + 4 * size());
+    for (unsigned seed = 1; seed < 4; ++seed) {
+      std::copy(start.begin(), start.end(), x);
+      shake(amount, 0, seed);
+      forces_and_step();
+    }
+    std::copy(start.begin(), start.end(), x);
+  }
 };
 
 // J, from the energy per volume of each cell.
