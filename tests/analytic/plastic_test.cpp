@@ -5,7 +5,7 @@
 
 namespace {
 
-constexpr double kYoung = 1e6, kYield = 2e4, kHardening = 2e5, kLength = 0.1, kPull = 0.06;
+constexpr double kYoung = 1e6, kYield = 2e4, kHardening = 2e5, kLength = 0.1, kArea = 4e-4, kPull = 0.06;
 
 enum class Cells { tetrahedra, second_order, hexahedra };
 
@@ -166,6 +166,43 @@ TEST(Plastic, BarInEquilibriumBeyondYieldAndFree_KeepsThePermanentStrain) {
   test::ok(dfm_world_equilibrium(bar.world, nullptr, nullptr));
   const double permanent = (kYoung * kPull - kYield) / (kYoung + kHardening);
   EXPECT_NEAR(bar.strain(), permanent, 1e-6 * permanent);
+}
+
+// Flow is complete, however slow it is; a free body gets there in few steps.
+TEST(Plastic, FreeBarInEquilibrium_FlowsToTheEndWhateverItsSpeed) {
+  std::vector<double> length;
+  for (const double creep : {-1.0, 1e-2}) {
+    Bar bar(DFM_INTEGRATOR_AUTO);
+    const dfm_param_value value = {"creep", &creep, 1};
+    const dfm_params params = {sizeof params, 1, &value};
+    test::ok(dfm_body_set_params(bar.body, &params));
+    const double low = *std::min_element(bar.rest.begin(), bar.rest.end());
+    std::vector<uint32_t> start;
+    for (uint32_t i = 0; i < bar.n; ++i) {
+      test::ok(dfm_body_hold(bar.body, 1, &i, 0));
+      if (bar.rest[3 * i] < low + 1e-9) start.push_back(i);
+    }
+    for (const auto *points : {&start, &bar.end}) {
+      const double sign = points == &start ? -1 : 1, count = double(points->size());
+      std::vector<double> f(3 * points->size(), 0);
+      for (size_t k = 0; k < f.size(); k += 3) f[k] = sign * 1.2 * kYield * kArea / count;
+      test::ok(dfm_body_add_load(bar.body, uint32_t(points->size()), points->data(), f.data(), 0, nullptr,
+                                 nullptr, nullptr));
+    }
+    dfm_equilibrium_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_world_equilibrium(bar.world, nullptr, &info));
+    EXPECT_LT(info.iterations, 200u) << creep;
+    std::vector<double> x(bar.rest.size());
+    uint32_t n = 0;
+    test::ok(dfm_body_get_state(bar.body, bar.n, x.data(), nullptr, &n));
+    double sum = 0;
+    for (const uint32_t i : bar.end) sum += x[3 * i] / double(bar.end.size());
+    for (const uint32_t i : start) sum -= x[3 * i] / double(start.size());
+    length.push_back(sum);
+  }
+  EXPECT_GT(length[0], kLength * (1 + 1.2 * kYield / kYoung + 0.1 * kYield / kHardening));
+  EXPECT_NEAR(length[1], length[0], 1e-6 * kLength);
 }
 
 TEST(Plastic, SnapshotAndDiscardedStepInTheFlow_ContinueToTheSameBits) {

@@ -182,6 +182,80 @@ TEST(Equilibrium, FreeBodyUnderBalancedLoads_Stretches) {
   EXPECT_NEAR((bar.pulled() - low) / (force * 0.4 / (1e5 * area)), 1, 0.05);
 }
 
+// Its loads are balanced only at the end of the time that passes.
+TEST(Equilibrium, FreeBodyUnderLoadsWithKeys_NeedsBalanceOnlyAtTheEnd) {
+  for (const char *model : {"linear_fem", "corotational_fem"}) {
+    Bar bar(model, 0, {0, 0, 0}, false);
+    for (const auto *end : {&bar.low, &bar.high}) {
+      const bool grows = end == &bar.high;
+      std::vector<double> f(3 * end->size(), 0);
+      for (size_t i = 0; i < end->size(); ++i) f[3 * i] = (grows ? 5 : -5) / double(end->size());
+      const dfm_scale_key keys[] = {{0, grows ? 0.0 : 1.0}, {10, 1}};
+      test::ok(dfm_body_add_load(bar.body, uint32_t(end->size()), end->data(), f.data(), 2, keys, nullptr,
+                                 nullptr));
+    }
+    const uint64_t before = dfm_world_hash(bar.world);
+    dfm_equilibrium_def def = dfm_equilibrium_def_default();
+    def.time = 5;
+    EXPECT_EQ(bar.find(def), DFM_E_DIVERGED) << model;
+    test::says({"body1", "nothing holds it"});
+    EXPECT_EQ(dfm_world_hash(bar.world), before);
+    def.time = 10;
+    dfm_equilibrium_info info = info_of();
+    const double start = test::measure(bar.body).com[0];
+    test::ok(bar.find(def, &info));
+    EXPECT_NEAR(test::measure(bar.body).com[0], start, 1e-6) << model;
+    EXPECT_LT(info.iterations, 100u) << model;
+    EXPECT_EQ(dfm_world_time(bar.world), 10);
+  }
+}
+
+TEST(Equilibrium, FreeBodyThatFindsNone_GetsAdviceThatDoesNotSpeakOfFriction) {
+  Bar bar("corotational_fem", 0, {0, 0, 0}, false);
+  for (const auto *end : {&bar.low, &bar.high}) {
+    std::vector<double> f(3 * end->size(), 0);
+    for (size_t i = 0; i < end->size(); ++i) f[3 * i] = (end == &bar.high ? 20 : -20) / double(end->size());
+    test::ok(dfm_body_add_load(bar.body, uint32_t(end->size()), end->data(), f.data(), 0, nullptr, nullptr,
+                               nullptr));
+  }
+  dfm_equilibrium_def def = dfm_equilibrium_def_default();
+  def.max_iterations = 1;
+  EXPECT_EQ(bar.find(def), DFM_E_DIVERGED);
+  test::says({"body1", "hold more of its points"});
+  EXPECT_EQ(std::string(dfm_last_error()).find("friction"), std::string::npos);
+}
+
+// Its integrator is the explicit one at that moment, until the end of the impact.
+TEST(Equilibrium, BodyInAnImpact_IsFoundAndTheImpactGoesOn) {
+  for (const bool alone : {false, true}) {
+    test::Context context;
+    dfm_world_def d = dfm_world_def_default();
+    d.step = 1.0 / 60;
+    dfm_world w = 0;
+    test::ok(dfm_world_create(context, &d, &w));
+    test::BodyOptions o;
+    o.model = "corotational_fem";
+    o.young = 3e8;
+    o.position = {0, 0, 0.002};
+    o.velocity = {0, 0, -4};
+    const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 100, o);
+    const dfm_obstacle floor = test::add_plane(w, "floor");
+    const auto struck = [&] { return test::explain(w).find("\"changes\":0") == std::string::npos; };
+    for (int i = 0; i < 20 && !struck(); ++i) test::ok(dfm_world_step(w, 1e-3, nullptr));
+    ASSERT_TRUE(struck()) << test::explain(w);
+    if (alone) {
+      const uint32_t held[] = {0, 1, 2, 3, 4, 5, 6, 7};
+      test::ok(dfm_body_hold(b, 8, held, 7));
+      test::ok(dfm_obstacle_destroy(floor));
+    }
+    test::ok(dfm_world_equilibrium(w, nullptr, nullptr));
+    EXPECT_EQ(test::measure(b).speed_max, 0);
+    test::run(w, 0.1, 1e-3);
+    EXPECT_LT(test::measure(b).speed_max, 1e-3);
+    dfm_world_destroy(w);
+  }
+}
+
 // It turns down like a pendulum, far from where it starts.
 TEST(Equilibrium, BarOnAHinge_HangsBelowIt) {
   Bar bar("corotational_fem", 0.3, {0, 0, -9.81}, false);

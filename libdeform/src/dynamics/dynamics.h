@@ -177,7 +177,7 @@ class Dynamics {
   virtual bool sums(BodySums &) const { return false; }
 
   // trial: with memory for the next state of the model
-  dfm_kin kin(double time, double h, bool trial = false) const;
+  virtual dfm_kin kin(double time, double h, bool trial = false) const;
   void push(uint32_t point, double weight, const double *impulse);  // N s, between sub-steps
 
  protected:

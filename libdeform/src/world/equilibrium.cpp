@@ -1,7 +1,7 @@
 // Each step is a step of the world from rest, with the usual contact, friction and guard. Two things differ:
 // the dynamics of bodies (SettlingPoints), and prescribed motions and loads are constant at their
-// values at the end of the load step (World::prescribed). Where nothing can touch anything, a step is
-// Newton's method for the equilibrium itself: it is so long that the mass of a held body does not count.
+// values at the end of the load step (World::prescribed). Where nothing can touch anything, a step solves by
+// Newton's method, and is so long that the mass of a held body does not count; the next one finishes it.
 //
 //   load step   gravity and loads at its share; keys and sines go on to its time
 //     rounds    what relaxes has done so, until that changes nothing
@@ -16,6 +16,7 @@
 
 #include "core/error.h"
 #include "dynamics/at_rest.h"
+#include "dynamics/implicit_points.h"
 #include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -26,7 +27,6 @@
 #include "step/watch/energy_watch.h"
 #include "world/change_energy.h"
 #include "world/rest_loads.h"
-#include "dynamics/implicit_points.h"
 
 namespace dfm {
 namespace {
@@ -45,6 +45,7 @@ constexpr double kNet = 0.1, kBalance = 1e-9;
 // Limit on the motion of an unsupported body in a step: the median edge at first, less if steps are halved,
 // more if they converge well, up to this share of its size.
 constexpr double kReach = 0.25;
+constexpr double kLags = 0.5;     // share of inertia in the forces left, above which steps get longer
 constexpr uint32_t kSteps = 500;  // of a round
 constexpr uint32_t kRounds = 4;   // of relaxation
 constexpr uint32_t kRefused = 8;  // consecutive failed steps
@@ -82,6 +83,10 @@ class SettlingPoints : public ImplicitPoints {
     Abilities a = ImplicitPoints::abilities();
     a.damps = false;  // its steps are not steps in time
     return a;
+  }
+  // Flow is complete however long the step is.
+  dfm_kin kin(double time, double h, bool trial) const override {
+    return ImplicitPoints::kin(time, alone_ ? kForever : h, trial);
   }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
@@ -154,7 +159,9 @@ void SettlingPoints::take(const double *v) {
 
 void SettlingPoints::commit(const SubStep &now, double fraction) {
   if (alone_) return p_.x.swap(p_.x_end);  // the state of the model goes on at rest
-  for (size_t j = 0; j < way_.size(); ++j) way_[j] = now.h / share_ * p_.v_end[j];
+  if (fraction < 1) forget_way();          // the guard has taken another share
+  else
+    for (size_t j = 0; j < way_.size(); ++j) way_[j] = now.h / share_ * p_.v_end[j];
   last_share_ = share_;
   ImplicitPoints::commit(now, fraction);
 }
@@ -173,16 +180,15 @@ class Settling {
                                      : kLeft),
         most_(def.max_iterations ? def.max_iterations : kSteps) {
     for (auto &b : w.bodies) bodies_.push_back(make(*b));
-    earlier_.swap(w.events);  // a long search produces more than a world keeps
+    suspended_ = w.overlaps.suspended;
     write_down(w_, step_, before_);
+    earlier_.swap(w.events);  // a long search produces more than a world keeps; from here on nothing throws
     stats_ = w.stats;
     steps_ = w.step_count;
     sizes_ = w.sizes;
-    suspended_ = w.overlaps.suspended;
+    last_h_ = w.watch.last_h;
     def_ = w.def;
     exchange();
-    wake_all(w_);  // adds the contact impulses of the meantime
-    for (One &one : bodies_) one.contact_impulse = one.body->contact_impulse;
     w.def.sleep = 0;
     w.changed = true;
   }
@@ -199,12 +205,14 @@ class Settling {
     } catch (...) {  // no memory for the tables: they are made at the next use
     }
     if (done_) return;
-    restore_start(w_, step_, before_);
     w_.events.swap(earlier_);
+    restore_start(w_, step_, before_);
     for (auto &b : w_.bodies) set_loads(*b, w_.time, 1);
   }
 
   void run(uint32_t load_steps) {
+    wake_all(w_);  // adds the contact impulses of the meantime
+    for (One &one : bodies_) one.contact_impulse = one.body->contact_impulse;
     prepare(w_);
     for (uint32_t k = 1; k <= load_steps; ++k) {
       reach(k == load_steps ? end_ : between(start_, end_, double(k) / load_steps));
@@ -221,15 +229,15 @@ class Settling {
     std::unique_ptr<AtRest> rest;
     double size, edge;           // m
     Vec3 contact_impulse;        // N s, before the search
+    uint8_t held;                // components that are held at some point
     double reach = 0;            // m, limit on its motion without contact in the next step
     double slid = 0;             // m moved since it has been in contact
     std::vector<double> last{};  // [npoint,4] m, at the start of the step
     double left = 0, scale = 0;  // N, largest component of unbalanced forces; of all forces
-    double moved = 0;            // m, in the last step
+    double moved = 0, lag = 0;   // m, in the last step; N, largest component of M / h^2 times it
     Vec3 net{};                  // N, sum of external forces
     double all = 0;              // N, sum of their norms
     double pull = 0;             // m/s2, acceleration by their sum
-    uint8_t held = 0;            // components that are held at some point
     bool touches = false;
   };
 
@@ -243,13 +251,16 @@ class Settling {
                                          (alone_ ? kAlone : kError) * b.surface.median_edge, alone_);
     if (!alone_) points->start_from(b.surfel_impulse.data(), b.impulse_time());
     SettlingPoints *const own = points.get();
+    uint8_t held = 0;
+    for (const uint8_t bits : b.p.held) held |= bits;
     return {.body = &b,
             .other = std::move(points),
             .points = own,
             .rest = std::make_unique<AtRest>(w_.memory(), b.p, b.model),
             .size = extent_of(b.p.x.data(), b.p.n, kStride).longest(),
             .edge = b.surface.median_edge,
-            .contact_impulse = {}};
+            .contact_impulse = {},
+            .held = held};
   }
 
   void exchange() {
@@ -278,10 +289,12 @@ class Settling {
 
   // Number of steps, but for those in which prescribed motions go on.
   uint32_t come_to_rest(const Station &to) {
+    const bool all_hang = std::ranges::all_of(bodies_, hangs);
+    if (alone_ && !all_hang) w_.time = to.time;  // loads need not be balanced in between
     weigh_all(kLongest);
     for (One &one : bodies_) one.points->forget_way();
     const double limit = alone_ ? kForever : kLongest;
-    double longest = std::ranges::all_of(bodies_, hangs) ? limit : kLongest;
+    double longest = all_hang ? limit : kLongest;
     uint32_t refused = 0;
     // Keys advance after bodies rest under the new loads: otherwise unloaded contacts would not carry bodies
     // along.
@@ -305,8 +318,12 @@ class Settling {
              dfm_last_error());
       weigh_all(h);
       bool rests = taken && (alone_ || off <= kGap * w_.offset);
+      bool longer = !alone_;
       for (One &one : bodies_) {
         if (alone_) check_balance(one);
+        // not if Newton's method left more: it converges worse in longer steps, because tangents lack the
+        // stiffness of loads that turn a free body
+        longer = longer || one.lag > kLags * one.left;
         if (!whole || !there) one.points->forget_way();
         one.reach =
             whole ? std::min(1.5 * one.reach, std::max(one.edge, kReach * one.size)) : 0.5 * one.reach;
@@ -315,7 +332,8 @@ class Settling {
       }
       if (rests && there) return steps;
       goes_on = goes_on || rests;
-      longest = whole ? std::min(limit, 2 * h) : std::min(kLongest, 0.5 * h);
+      if (!whole) longest = std::min(kLongest, 0.5 * h);
+      else if (longer) longest = std::min(limit, 2 * h);
       check_progress(steps, h);
     }
   }
@@ -370,12 +388,14 @@ class Settling {
   void weigh(One &one, double h) {
     sum_loads(one);
     const Phyxels &p = one.body->p;
-    if (!one.rest->add_forces(w_.time, h)) one.left = HUGE_VAL;
+    if (!one.rest->add_forces(w_.time, alone_ ? kForever : h)) one.left = HUGE_VAL;
     double nan_flag = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
       most = std::max(most, std::fabs(p.f[at]));
-      if (!one.last.empty()) one.moved = std::max(one.moved, std::fabs(p.x[at] - one.last[at]));
+      const double moved = one.last.empty() ? 0 : std::fabs(p.x[at] - one.last[at]);
+      one.moved = std::max(one.moved, moved);
+      if (p.moves(at)) one.lag = std::max(one.lag, p.mass[at / kStride] * moved / (h * h));
       nan_flag += 0.0 * p.f[at];
     }
     if (nan_flag != 0) one.left = HUGE_VAL;
@@ -388,10 +408,8 @@ class Settling {
     Phyxels &p = b.p;
     const double *const contact = one.points->contact_force();
     loads_at_rest(w_, b, p.f.data());
-    one.scale = one.moved = one.left = one.all = 0;
+    one.scale = one.moved = one.lag = one.left = one.all = 0;
     one.touches = false;
-    one.held = 0;
-    for (const uint8_t bits : p.held) one.held |= bits;
     Vec3 center, torque;
     one.net = {};
     for (uint32_t i = 0; i < p.n; ++i) center += (p.mass[i] / b.mass) * p.x_at(i);
@@ -470,7 +488,9 @@ class Settling {
   static bool hangs(const One &one) { return one.held == 7; }
 
   // A body that is held cannot slide away.
-  static const char *advice(const One &one) {
+  const char *advice(const One &one) const {
+    if (alone_ && !hangs(one))
+      return "use more load_steps, hold more of its points (fix), or run the world in time";
     return hangs(one)
                ? "use more load_steps, or run the world in time with damping (integrator tr_bdf2) until it "
                  "rests"
@@ -502,6 +522,7 @@ class Settling {
     w_.stats.time = w_.time;
     w_.step_count = steps_;
     w_.sizes = sizes_;
+    w_.watch.last_h = last_h_;
     begin_impulses(w_.step_impulses, w_.time, 0);
     for (dfm_contact_event &event : w_.events) event.t = w_.time;
     w_.events.insert(w_.events.begin(), earlier_.begin(), earlier_.end());
@@ -520,6 +541,7 @@ class Settling {
   dfm_world_stats stats_{};
   uint64_t steps_ = 0;
   StepSizes sizes_;
+  double last_h_ = 0;
   std::vector<dfm_contact_event> earlier_;  // before the search
   decltype(Overlaps::suspended) suspended_;
   dfm_world_def def_{};
