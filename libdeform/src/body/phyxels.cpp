@@ -47,6 +47,12 @@ LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const u
   return sum;
 }
 
+uint8_t Phyxels::held_anywhere() const {
+  uint8_t all = 0;
+  for (const uint8_t bits : held) all |= bits;
+  return all;
+}
+
 void update_inverse_mass(Phyxels &p) {
   for (uint32_t i = 0; i < p.n; ++i)
     for (int k = 0; k < 3; ++k)

@@ -38,6 +38,7 @@ struct Phyxels {
   Vec3 x_at(size_t i) const { return load3(&x[kStride * i]); }
   Vec3 v_at(size_t i) const { return load3(&v[kStride * i]); }
   void size(const Memory &m, uint32_t points);  // all arrays but those of the dampers, with zeros
+  uint8_t held_anywhere() const;                // bits of the components that are held at some point
   bool moves(size_t component) const { return inv_mass[component] > 0; }  // of [n,4]: not held
 };
 

@@ -424,7 +424,7 @@ double ExplicitPoints::damper_energy(double time) {
 // strained body it would seem to. f, x_end and v_end are free until the next sub-step.
 void ExplicitPoints::damp(double time, double c, double ahead) {
   const auto place = [&](uint32_t i) { return load3(&p_.x[size_t(i) * kStride]); };
-  const bool held = std::any_of(p_.held.begin(), p_.held.end(), [](uint8_t bits) { return bits != 0; });
+  const bool held = p_.held_anywhere() != 0;
   const auto rigid_part = [&](const Array<double> &v) {
     return held ? RigidMotion{} : rigid_motion(p_.n, p_.mass.data(), place, [&](uint32_t i) {
       return load3(&v[size_t(i) * kStride]);

@@ -82,7 +82,7 @@ bool RestFactor::prepare(double h) {
   }
   h_ = h;
   held_ = p_.held;
-  loose_ = std::all_of(held_.begin(), held_.end(), [](uint8_t held) { return held == 0; });
+  loose_ = p_.held_anywhere() == 0;
   const bool in_part =
       std::any_of(held_.begin(), held_.end(), [](uint8_t held) { return held != 0 && held != 7; });
   if (turns_ && in_part) return false;

@@ -251,8 +251,6 @@ class Settling {
                                          (alone_ ? kAlone : kError) * b.surface.median_edge, alone_);
     if (!alone_) points->start_from(b.surfel_impulse.data(), b.impulse_time());
     SettlingPoints *const own = points.get();
-    uint8_t held = 0;
-    for (const uint8_t bits : b.p.held) held |= bits;
     return {.body = &b,
             .other = std::move(points),
             .points = own,
@@ -260,7 +258,7 @@ class Settling {
             .size = extent_of(b.p.x.data(), b.p.n, kStride).longest(),
             .edge = b.surface.median_edge,
             .contact_impulse = {},
-            .held = held};
+            .held = b.p.held_anywhere()};
   }
 
   void exchange() {

@@ -34,12 +34,11 @@ class Untangler {
   explicit Untangler(World &w)
       : w_(w), sides_(w), shift_(w.bodies.size()), groups_(w.memory(), uint32_t(w.bodies.size())) {
     for (auto &b : w.bodies) {
-      const bool held = std::any_of(b->p.held.begin(), b->p.held.end(), [](uint8_t h) { return h != 0; });
       // what is attached to it would draw it back to where it was
       const bool attached = std::any_of(w.attachments.begin(), w.attachments.end(), [&](const Attachment &x) {
         return !x.released && x.obstacle && x.body == b->id && x.stiffness == 0 && x.damping == 0;
       });
-      movable_.push_back(!held && !attached && b->dynamics->abilities().placed);
+      movable_.push_back(b->p.held_anywhere() == 0 && !attached && b->dynamics->abilities().placed);
     }
   }
 

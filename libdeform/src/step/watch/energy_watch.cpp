@@ -44,9 +44,6 @@ bool steps_itself(const Body &b) { return b.model.stepper.has_value(); }
 // at the end of the sub-step.
 bool at_end(const Body &b) { return b.dynamics->abilities().damps || steps_itself(b); }
 bool books(const Body &b) { return b.dynamics->abilities().energy || at_end(b); }
-bool is_held(const Body &b) {
-  return std::any_of(b.p.held.begin(), b.p.held.end(), [](uint8_t held) { return held != 0; });
-}
 // Its elastic energy is unknown, but not below zero: the kinetic energy comes from that at the start and from
 // the work done since.
 bool hides(const Body &b) { return steps_itself(b) && !b.model.can(DFM_CAP_ENERGY); }
@@ -279,7 +276,7 @@ bool has_balance(const Body &b) { return watched(b); }
 
 double gain_at_end(const World &w, const StepContext &step, const Body &b) {
   if (!at_end(b) || !b.model.can(DFM_CAP_ENERGY) || !b.motions.empty() || b.model.works(kFlow)) return 0;
-  if (steps_itself(b) && is_held(b)) return 0;  // steps may leave out points
+  if (steps_itself(b) && b.p.held_anywhere() != 0) return 0;  // steps may leave out points
   const Phyxels &p = b.p;
   const EndState ends = b.dynamics->end();
   double had = 0, has = 0, gained = 0;
