@@ -321,6 +321,48 @@ TEST(PreSolve, LawByNumber_IsTheContactsLaw) {
   for (const dfm_contact &k : test::contacts(s.w)) EXPECT_EQ(k.law, none);
 }
 
+// A crossing of a law without memory gives way, and with a law that has one it bears its part of the load,
+// whoever has chosen the law.
+TEST(PreSolve, ALawWithMemory_BearsAtCrossingsAsByARule) {
+  const auto sinks = [](const char *rule, bool choose) {
+    test::Context c;
+    const dfm_world w = test::make_world(c);
+    test::set_friction(w, 0.5, rule);
+    dfm_friction_def f{};
+    f.size = sizeof f;
+    f.between[0] = f.between[1] = "top";  // no contact has it by itself
+    f.law = "lugre";
+    const double mu = 0.5;
+    const dfm_param_value v{"mu", &mu, 1};
+    f.params = {sizeof(dfm_params), 1, &v};
+    test::add_plane(w, "floor");
+    test::BodyOptions o;
+    o.damping_stiffness = 2e-3;
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 12, o);
+    o.name = "top";
+    o.position = {0.03, 0.02, 0.101};
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 12, o);
+    test::ok(dfm_world_add_friction(w, &f));
+    test::ok(dfm_world_step(w, 1e-3, nullptr));
+    Choice choice;
+    for (uint32_t law = 0;; ++law) {
+      dfm_law_info info{};
+      info.size = sizeof info;
+      if (dfm_world_law_info(w, law, &info) != DFM_OK) break;
+      if (choose && std::string(info.id) == "org.deform.lugre") choice.law = law;
+    }
+    test::ok(dfm_world_set_pre_solve(w, &Choice::pre_solve, &choice));
+    test::run(w, 0.05, 1e-3);
+    double crossings = 0;
+    for (const dfm_contact &k : test::contacts(w))
+      if (k.kind == DFM_CONTACT_EDGE_EDGE) crossings += k.fn;
+    return crossings;
+  };
+  const double ruled = sinks("lugre", false), chosen = sinks("coulomb", true), soft = sinks("coulomb", false);
+  EXPECT_GT(ruled, 1.5 * soft);
+  EXPECT_NEAR(chosen, ruled, 0.05 * ruled);
+}
+
 TEST(PreSolve, OnSeveralThreads_IsCalledInTheSameOrderWithTheSameBits) {
   std::vector<double> seen[2];
   uint64_t hash[2];

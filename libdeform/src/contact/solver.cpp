@@ -207,6 +207,24 @@ Residual residual_of(const ContactRows &rows, const RowsPart &part, const Contac
   return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
 }
 
+double share_of_least_work(const ContactRows &rows, const RowsPart &part) {
+  double none = 0, full = 0;  // J, the slope of the function without impulses and with all of them
+  const auto add = [&](uint32_t i, Vec3 rate, Vec3 yields) {
+    const Vec3 l = load3(&rows.impulse[size_t(3) * i]);
+    none += dot(l, rows.velocity(i, rows.y_free.data()) + rate);
+    full += dot(l, rows.velocity(i) + rate + yields);
+  };
+  each_row(part.contacts, [&](uint32_t i) {
+    const double l = rows.impulse[size_t(3) * i];
+    add(i, {rows.rate[i], 0, 0}, {yield_speed(l, &rows.compliance[size_t(3) * i]), 0, 0});
+  });
+  each_row(part.bonds, [&](uint32_t i) {
+    const ContactRows::BondRow &b = rows.bond[i - rows.n];
+    add(i, b.rate, b.soft * load3(&rows.impulse[size_t(3) * i]));
+  });
+  return full > 0 ? std::clamp(none / (none - full), 0.0, 1.0) : 1;
+}
+
 namespace {
 
 // f(entries of the body) for both sides of contact i.

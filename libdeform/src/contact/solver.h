@@ -59,6 +59,9 @@ struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at res
 // Of the laws as they were last evaluated; between evaluations, as they were linearized there.
 Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &laws, double h,
                      const Tolerance &tolerance);
+// Of the impulses of a part: the share, at most 1, at which the function that a solve lowers is least along
+// them, 1/2 l W l + l (u_free + rate). At a solution, and where the law dissipates, 1.
+double share_of_least_work(const ContactRows &rows, const RowsPart &part);
 // of parts together
 Residual larger(const Residual &a, const Residual &b);
 

@@ -32,6 +32,10 @@ void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &chan
   change = std::sqrt(most);
 }
 
+void Dynamics::take_part(double share) {
+  for (size_t j = 0; j < p_.x.size(); ++j) p_.x_end[j] = p_.x[j] + share * (p_.x_end[j] - p_.x[j]);
+}
+
 void Dynamics::push(uint32_t point, double weight, const double *impulse) {
   const size_t at = size_t(point) * kStride;
   for (size_t k = 0; k < 3; ++k) p_.v[at + k] += weight * p_.inv_mass[at + k] * impulse[k];

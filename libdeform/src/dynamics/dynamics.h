@@ -155,14 +155,13 @@ class Dynamics {
   // For a body whose scheme damps: writes the forces at the end into points().f, including loads of the
   // sub-step. Returns false if the model fails. After end_state().
   virtual bool end_forces(const SubStep &) { return false; }
-  // Before commit() takes only a part of the displacement: computes the points of the end that steps leave
-  // out, and points().f is that of the last add_forces(), whether it was kept or not, but for rounding and
-  // for held components. Returns false if the model fails.
-  virtual bool see_end(const SubStep &) { return true; }
+  // Before commit(): of the displacement only this share is taken; velocities are those of the end. Where
+  // points move explicitly, forces act on them for this share of the sub-step only, or bodies that cannot
+  // move would get the same impulse again and again, and no energy pays for it.
+  virtual void take_part(double share);
   // J, stored in dampers that see the velocity with a lag
   virtual double damper_energy(double /*time*/) { return 0; }
-  // fraction: share of the displacement that is taken; velocities are those of the end.
-  virtual void commit(const SubStep &now, double fraction) = 0;
+  virtual void commit(const SubStep &now) = 0;
   // After commit(): takes c M^-1 K v from the velocities, c in s2, K the stiffness of the model, which is
   // taken as constant over `ahead` (s) of the motion. Momentum and angular momentum stay.
   virtual void damp(double /*time*/, double /*c*/, double /*ahead*/) {}

@@ -314,26 +314,6 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
          std::find(part_kinetic_.begin(), part_kinetic_.end(), kNotGiven) == part_kinetic_.end();
 }
 
-// A motion of parts has left its forces in what it has changed of the velocities: the model need not compute
-// them again. Held components have none.
-bool ExplicitPoints::see_end(const SubStep &now) {
-  if (!moved_) return true;
-  if (!ways_known_) return find_forces(now);  // other code has changed the free motion
-  for (uint32_t i = 0; i < p_.n; ++i)
-    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at)
-      p_.f[at] = p_.moves(at) ? force_of(at, p_.v_free[at], now) : 0;
-  // contact moves these
-  for (size_t m = 0; m < reached_.size(); ++m)
-    for (size_t k = 0, at = reached_[m]; k < 3; ++k, ++at)
-      if (p_.moves(at)) p_.f[at] = force_of(at, before_[3 * m + k], now);
-  return true;
-}
-
-double ExplicitPoints::force_of(size_t at, double free, const SubStep &now) const {
-  const double m = p_.mass[at / kStride];
-  return (free - p_.v[at]) * (m / now.h) - m * now.gravity[int(at % kStride)];
-}
-
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   kinetic = moved_ ? std::accumulate(part_kinetic_.begin(), part_kinetic_.end(), 0.0)
                    : predict(loops_, p_, now.gravity, now.h);
@@ -381,14 +361,29 @@ void ExplicitPoints::free_again(const SubStep &now) {
   reached_.clear();
 }
 
-void ExplicitPoints::commit(const SubStep &now, double fraction) {
-  if (fraction < 1) shorten(p_, end().mean, now.h * fraction);
+// Impulses of contact act in full, so that what has met does not go on as if it had not.
+void ExplicitPoints::take_part(double share) {
+  Dynamics::take_part(share);
+  const auto each_reached = [&](auto &&f) {
+    for (size_t m = 0; m < reached_.size(); ++m)
+      for (size_t k = 0; k < 3; ++k) f(p_.v_free[reached_[m] + k], before_[3 * m + k]);
+  };
+  each_reached([](double &v, double &of_contact) {
+    std::swap(v, of_contact);
+    of_contact -= v;
+  });
+  Array<double> &end = in_place_ ? p_.v_free : p_.v_end;
+  for (size_t at = 0; at < end.size(); ++at) end[at] -= (1 - share) * (p_.v_free[at] - p_.v[at]);
+  each_reached([](double &v, double of_contact) { v += of_contact; });
+}
+
+void ExplicitPoints::commit(const SubStep &now) {
   p_.x.swap(p_.x_end);
   p_.v.swap(in_place_ ? p_.v_free : p_.v_end);
   model_.commit_state();
   // lag u' = v - (u + w) / 2, 2 lag w' = u - w by the trapezoid: the dampers keep the energy lag / 2 (u.C u +
   // w.C w) exactly, less h / 2 (u.C u + w.C w) of the means, which is what they take from v.
-  const double k = 0.25 * fraction * now.h / p_.dampers.lag;
+  const double k = 0.25 * now.h / p_.dampers.lag;
   for (size_t at = 0; at < p_.dampers.v.size(); ++at) {
     double &u = p_.dampers.v[at], &w = p_.dampers.slow[at];
     const double mean = ((1 + k) * (2 * k * p_.v[at] + u) - k * w) / ((1 + k) * (1 + k) + k * k);

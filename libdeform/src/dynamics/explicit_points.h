@@ -28,14 +28,14 @@ class ExplicitPoints : public Dynamics {
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   void free_again(const SubStep &now) override;
-  bool see_end(const SubStep &now) override;
+  void take_part(double share) override;
   void free_changed() override { ways_known_ = false; }
   EndState end() const override {
     const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();
     return {v, v};
   }
   double damper_energy(double time) override;
-  void commit(const SubStep &now, double fraction) override;
+  void commit(const SubStep &now) override;
   void damp(double time, double c, double ahead) override;
 
  private:
@@ -69,8 +69,6 @@ class ExplicitPoints : public Dynamics {
   const double *loads();
   double largest_strain() const;
   bool find_forces(const SubStep &now);  // in points().f
-  // N, that leads to this velocity without contact
-  double force_of(size_t at, double free, const SubStep &now) const;
   bool move_parts(const SubStep &now);
 };
 

@@ -438,8 +438,7 @@ double ImplicitPoints::accurate_step(const SubStep &now) const {
   return now.h * (share < kGrows * kGrows * kGrows ? dfm_pow(share, 1.0 / 3) : kGrows);
 }
 
-void ImplicitPoints::commit(const SubStep &now, double fraction) {
-  if (fraction < 1) shorten(p_, mean(), fraction * now.h);
+void ImplicitPoints::commit(const SubStep &) {
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();

@@ -53,7 +53,7 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
   bool end_forces(const SubStep &) override { return !staged_ && evaluate_after(p_.v_end.data(), false); }
-  void commit(const SubStep &now, double fraction) override;
+  void commit(const SubStep &now) override;
 
   BlockPattern pattern() const override { return stiffness_.pattern(); }
   double mass() const override { return moving_; }

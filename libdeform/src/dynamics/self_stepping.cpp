@@ -132,9 +132,7 @@ void SelfStepping::bound_ends(double &speed, double &change) const {
   bound_surfel_ends(mean_.data(), speed, change);
 }
 
-void SelfStepping::commit(const SubStep &, double fraction) {
-  if (fraction < 1)
-    for (size_t j = 0; j < p_.x.size(); ++j) p_.x_end[j] = p_.x[j] + fraction * (p_.x_end[j] - p_.x[j]);
+void SelfStepping::commit(const SubStep &) {
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);
   model_.commit_state();
@@ -142,17 +140,18 @@ void SelfStepping::commit(const SubStep &, double fraction) {
 }
 
 // A partial displacement is no state of the model: it then continues from the positions of all points.
-bool SelfStepping::see_end(const SubStep &) {
-  if (!model_.late) return true;
-  see_points();
-  dfm_kin k = kin(0, 0);
-  k.x = p_.x_end.data();
-  k.v = p_.v_end.data();
-  k.state = model_.state_out.data();
-  model_.call("points",
-              [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
-  model_.call("look", [&] { return model_.late->look(model_.self, model_.state_out.data()); });
-  return true;
+void SelfStepping::take_part(double share) {
+  if (model_.late) {
+    see_points();
+    dfm_kin k = kin(0, 0);
+    k.x = p_.x_end.data();
+    k.v = p_.v_end.data();
+    k.state = model_.state_out.data();
+    model_.call("points",
+                [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
+    model_.call("look", [&] { return model_.late->look(model_.self, model_.state_out.data()); });
+  }
+  Dynamics::take_part(share);
 }
 
 void SelfStepping::see_points() {

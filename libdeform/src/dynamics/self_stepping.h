@@ -22,9 +22,9 @@ class SelfStepping : public Dynamics {
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean_.data()}; }
   void bound_ends(double &speed, double &change) const override;
-  void commit(const SubStep &now, double fraction) override;
+  void commit(const SubStep &now) override;
   void see_points() override;
-  bool see_end(const SubStep &now) override;
+  void take_part(double share) override;
   void points_changed() override;
   bool sums(BodySums &out) const override;
 

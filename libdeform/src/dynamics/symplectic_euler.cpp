@@ -6,14 +6,6 @@
 
 namespace dfm {
 
-namespace {
-
-using Point = double __attribute__((vector_size(32)));
-static_assert(kStride == 4 && sizeof(Point) == kStride * sizeof(double));
-Point *points(Array<double> &a) { return reinterpret_cast<Point *>(a.data()); }
-
-}  // namespace
-
 const PointsKernels &points_kernels() {
   if constexpr (kHasWider) {
     if (doubles_at_once() >= 4) return points_kernels_avx2();
@@ -34,12 +26,6 @@ FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h) {
 void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h) {
   loops.end(p.n, h, p.x.data(), p.v_free.data(), p.inv_mass.data(), touched ? p.impulse.data() : nullptr,
             p.x_end.data(), p.v_end.data());
-}
-
-void shorten(Phyxels &p, const double *mean, double h) {
-  Point *const x_end = points(p.x_end);
-  const Point *const x = points(p.x), *const u = reinterpret_cast<const Point *>(mean);
-  for (uint32_t i = 0; i < p.n; ++i) x_end[i] = x[i] + h * u[i];
 }
 
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst) {

@@ -18,8 +18,6 @@ double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h);
 FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h);  // gravity: [4]
 // v_end = v_free + M^-1 impulse (impulse may be absent: `touched` false), x_end = x + h v_end.
 void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h);
-// x_end for a shorter way: h times the mean velocity [n,4].
-void shorten(Phyxels &p, const double *mean, double h);
 
 // Largest stable sub-step. For every mode of K - w^2 M with dampers C taken from the start of the step the
 // scheme is stable iff h^2 k + 2 h c <= 4 m; with Gershgorin row sums this holds for the whole matrix if it

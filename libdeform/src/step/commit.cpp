@@ -62,14 +62,12 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   step.in_impact = has_impact(w, step);
   if (step.in_impact) return false;
   const SubStep now = sub_step_of(w, step);
+  SubStep moved = now;
+  moved.h *= step.guard.motion;
   if (step.guard.motion < 1)
     for (const uint32_t i : step.active) {
-      Body &b = *w.bodies[i];
-      const OnBehalf prefix(b.name);
-      // for the work over the part of the motion that the guard has left out
-      if (b.dynamics->see_end(now)) continue;
-      *trouble |= report_no_forces(w, b);
-      return false;
+      const OnBehalf prefix(w.bodies[i]->name);
+      w.bodies[i]->dynamics->take_part(step.guard.motion);
     }
   book_energy(w, step, step.guard.motion);
   double accurate = std::numeric_limits<double>::infinity();
@@ -78,7 +76,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   w.sizes.accurate = std::isfinite(accurate) ? accurate : 0;
   each_active(w, step.active, kPointsToMove, [&](Body &b) {
     ready_change_work(b, now);
-    b.dynamics->commit(now, step.guard.motion);  // the guard may shorten the displacement
+    b.dynamics->commit(moved);
     if (reads_points(w, b)) b.dynamics->see_points();
     ++b.x_version;
     book_change_work(w, b, now.h);

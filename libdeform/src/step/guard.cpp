@@ -6,7 +6,8 @@
 //      at most 16 times
 //   2  the sub-step is repeated, shorter: up to the safe fraction of the path, but no less than a quarter,
 //      at most 8 times
-//   3  everything takes the safe fraction of its path; velocities stay, so motion is lost, but no momentum
+//   3  everything takes the safe fraction of its path, and motion is lost; contact acts in full, forces on
+//      points of explicit bodies for that fraction (Dynamics::take_part)
 //
 // Pairs that are not listed are not tested: broad/ covers the motion after the solve too (BroadPhase::cover).
 // Reasons for this order, and for shortening the sub-step of the whole world:
@@ -464,7 +465,8 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   const double safe = find_hits(w, step);
   if (step.guard.hits.empty()) return go_on(withstands_impacts(w, step));
   step.guard.acted = true;
-  if (w.sleepers > 0 && may_repeat(w, step) && wake_hit(w, step)) {
+  // also where the budget holds no repetition: the impulse of a contact needs two bodies that move
+  if (w.sleepers > 0 && wake_hit(w, step)) {
     step.length.repeat(1);
     return Next::stop;
   }

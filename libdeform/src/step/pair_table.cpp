@@ -158,16 +158,15 @@ uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b) {
   return rule ? rule->law : default_law(w, a.zone.friction, b.zone.friction);
 }
 
-void set_zone_laws(const World &w, std::span<const ContactPoint> contacts, Array<uint32_t> &law) {
+uint32_t contact_law(const World &w, const ContactPoint &c) {
   const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
-  for (uint32_t i = 0; i < contacts.size(); ++i) {
-    const ContactPoint &c = contacts[i];
-    const uint32_t table = w.pairs.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
-    if (table == kNone) continue;
-    const Zones zones = zones_of(w, c);
-    const size_t others = c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size();
-    law[i] = w.pairs.zone_law[table + zones.a * others + zones.b];
-  }
+  const uint32_t table =
+      w.pairs.zone_table.empty() ? kNone
+                                 : w.pairs.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
+  if (table == kNone) return pair_law(w, c.slot_a, c.obstacle, c.slot_b);
+  const Zones zones = zones_of(w, c);
+  const size_t others = c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size();
+  return w.pairs.zone_law[table + zones.a * others + zones.b];
 }
 
 void rename_law(World &w, const FrictionRule &rule, uint32_t to) {

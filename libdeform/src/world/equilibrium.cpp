@@ -93,10 +93,14 @@ class SettlingPoints : public ImplicitPoints {
   const double *start() const override { return p_.v_free.data(); }  // with the last contact forces
   void take(const double *v) override;
   double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
-  void commit(const SubStep &now, double fraction) override;
+  void take_part(double share) override {
+    ImplicitPoints::take_part(share);
+    whole_ = false;
+  }
+  void commit(const SubStep &now) override;
 
  private:
-  bool alone_;
+  bool alone_, whole_ = true;  // the guard has taken the whole step
   double error_allowed_, stiffest_ = 0;
   double h_ = 0, share_ = 1, last_share_ = 1;  // s, of this step; of its way, and of that of the last step
   Array<double> way_;                          // [npoint,4] m, the whole way of the last step; 0: unknown
@@ -131,6 +135,7 @@ bool SettlingPoints::free_motion(const SubStep &now, double &kinetic) {
   options_.rest = error_allowed_ / now.h;
   h_ = now.h;
   share_ = 1;
+  whole_ = true;
   bool found;
   if (alone_) found = ImplicitPoints::free_motion(now, kinetic);
   else {
@@ -157,13 +162,13 @@ void SettlingPoints::take(const double *v) {
     for (double &end : p_.v_end) end *= share_;
 }
 
-void SettlingPoints::commit(const SubStep &now, double fraction) {
+void SettlingPoints::commit(const SubStep &now) {
   if (alone_) return p_.x.swap(p_.x_end);  // the state of the model goes on at rest
-  if (fraction < 1) forget_way();          // the guard has taken another share
+  if (!whole_) forget_way();
   else
     for (size_t j = 0; j < way_.size(); ++j) way_[j] = now.h / share_ * p_.v_end[j];
   last_share_ = share_;
-  ImplicitPoints::commit(now, fraction);
+  ImplicitPoints::commit(now);
 }
 
 class Settling {

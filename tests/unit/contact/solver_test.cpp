@@ -298,6 +298,23 @@ TEST(Solver, Residual_OfASolutionVanishes) {
 
 // Before: every sweep multiplied the impulses by the square of the slope, until they were infinite, and the
 // law was asked at a slip that is no number.
+// Impulses from elsewhere may do any work: the share of them that lowers the energy most does none.
+TEST(Solver, ShareOfLeastWork_IsThatOfTheSolutionAlongTheImpulses) {
+  Groove g(0, 0, 0);
+  const RowsPart all = g.rows.whole();
+  const auto share = [&](double first, double second) {
+    g.rows.impulse = {first, 0, 0, second, 0, 0};
+    g.rows.restore(all);
+    return share_of_least_work(g.rows, all);
+  };
+  const double s = std::sqrt(0.5), one = s * (1 - 0.3), other = s * (1 + 0.3);  // both walls stop the point
+  EXPECT_NEAR(share(one, other), 1, 1e-15);
+  EXPECT_EQ(share(0.5 * one, 0.5 * other), 1);
+  EXPECT_NEAR(share(4 * one, 4 * other), 0.25, 1e-15);
+  g.rows.rate = {10, 10};  // both are far away
+  EXPECT_EQ(share(one, other), 0);
+}
+
 TEST(Sweep, LawThatIsSteepWhereItWasEvaluated_StaysWithinItsLimit) {
   for (const uint8_t mode : {1, 2}) {
     Groove g(10, 0.5, mode);

@@ -23,7 +23,7 @@ Vec3 free_velocity(const StepContext &step, const ContactPoint &c) {
   return u - load3(c.velocity);
 }
 
-dfm_contact_choice choice_of(const World &w, const StepContext &step, const ContactPoint &c, uint32_t law) {
+dfm_contact_choice choice_of(const World &w, const StepContext &step, const ContactPoint &c) {
   dfm_contact_choice out{};
   out.size = sizeof out;
   out.a = w.bodies[c.slot_a]->handle;
@@ -42,14 +42,14 @@ dfm_contact_choice choice_of(const World &w, const StepContext &step, const Cont
   out.gap = c.distance - w.offset;
   store3(out.velocity, free_velocity(step, c));
   out.enabled = 1;
-  out.law = law;
+  out.law = contact_law(w, c);
   out.friction_scale = 1;
   return out;
 }
 
 // Applies and checks the host's answer; returns whether the contact is accepted.
-bool call_host(World &w, StepContext &step, const ContactPoint &c, uint32_t law, StepContext::Chosen &to) {
-  dfm_contact_choice choice = choice_of(w, step, c, law);
+bool call_host(World &w, StepContext &step, const ContactPoint &c, StepContext::Chosen &to) {
+  dfm_contact_choice choice = choice_of(w, step, c);
   w.pre_solve.call(w.pre_solve.user, &choice);
   if (!choice.enabled) return false;
   const Vec3 belt = load3(choice.surface_velocity);
@@ -70,13 +70,6 @@ bool call_host(World &w, StepContext &step, const ContactPoint &c, uint32_t law,
 void call_pre_solve(World &w, StepContext &step) {
   step.chosen.clear();
   if (!w.pre_solve.call || step.contacts.empty()) return;
-  Array<uint32_t> &law = step.state.law;  // set again for the rows
-  law.resize(step.contacts.size());
-  for (size_t i = 0; i < step.contacts.size(); ++i) {
-    const ContactPoint &c = step.contacts[i];
-    law[i] = pair_law(w, c.slot_a, c.obstacle, c.slot_b);
-  }
-  if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, law);
   size_t kept = 0;
   for (size_t i = 0; i < step.contacts.size(); ++i) {
     const ContactPoint &c = step.contacts[i];
@@ -86,7 +79,7 @@ void call_pre_solve(World &w, StepContext &step) {
       while (first < kept && step.contacts[first].key != c.key) ++first;
       if (first == kept) continue;
       chosen = step.chosen[first];
-    } else if (!call_host(w, step, c, law[i], chosen)) {
+    } else if (!call_host(w, step, c, chosen)) {
       continue;
     }
     step.contacts[kept++] = c;
@@ -97,7 +90,7 @@ void call_pre_solve(World &w, StepContext &step) {
 
 bool query_host(World &w, StepContext &step, const ContactPoint &c) {
   StepContext::Chosen unused;
-  return call_host(w, step, c, pair_law(w, c.slot_a, c.obstacle, c.slot_b), unused);
+  return call_host(w, step, c, unused);
 }
 
 void take_choices(StepContext &step) {

@@ -121,16 +121,15 @@ void make_rows(World &w, StepContext &step) {
   step.state.resize(n + static_cast<uint32_t>(between_rigids.size()), nstate);
   for (uint32_t i = 0; i < n; ++i) {
     const ContactPoint &c = step.contacts[i];
-    step.state.law[i] = pair_law(w, c.slot_a, c.obstacle, c.slot_b);
+    step.state.law[i] = contact_law(w, c);
     step.state.area[i] = c.area;
   }
-  if (!w.pairs.zone_table.empty()) set_zone_laws(w, step.contacts, step.state.law);
+  take_choices(step);
   // The force of laws with memory is proportional to area. A crossing has its part of the area, so it has to
   // carry its part of the load.
   if (nstate > 0)
     for (uint32_t i = 0; i < n; ++i)
       if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].indentation = 0;
-  take_choices(step);
   for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
     step.sources[i].velocity = b.dynamics->contact_velocity();

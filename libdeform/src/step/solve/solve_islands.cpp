@@ -91,6 +91,19 @@ double motion_tolerance(const SolveIsland &own) {
   return least;
 }
 
+// Impulses that are no solution (the budget has ended, or rows contradict each other) may do work that no law
+// allows: the share of them counts that lowers the energy most.
+void limit_work(StepContext &step, SolveIsland &own) {
+  if (own.bad || own.residual.required <= 1) return;
+  const double share = share_of_least_work(step.rows, own.part);
+  if (share == 1) return;
+  own.swept.resize(3 * size_t{own.part.all()});
+  take_impulses(step.rows, own.part, own.swept.data());
+  for (double &l : own.swept) l *= share;
+  put_impulses(step.rows, own.part, own.swept.data());
+  own.laws.judge(own.residual);
+}
+
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (own.bad || own.thrown) return;
   const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
@@ -124,12 +137,12 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
     const bool done = own.sweeping.solve(step.rows, own.part, step.state, own.laws, own.tolerance, limits,
                                          step.h, own.residual);
     own.sweeps = own.sweeping.count();
-    if (done) return;
+    if (done) return limit_work(step, own);
     if (own.all_rigid) {
       solve_rigid(step, own, exact, normal);
       allow();
       if (!own.bad) own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
-      return;
+      return limit_work(step, own);
     }
     begin_newton(step, own);
   }
@@ -137,6 +150,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   own.sweeps += own.newton->steps();
   own.residual = own.newton->residual();
   if (!own.bad && !own.failed) own.newton->take();
+  if (!own.implicit) limit_work(step, own);
 }
 
 }  // namespace

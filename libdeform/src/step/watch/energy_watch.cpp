@@ -252,22 +252,14 @@ void book_end(World &w, StepContext &step, Body &b, double motion) {
   b.energy.work += contact + loads + held + (1 - motion) * (gained - loads - contact);
 }
 
-// Loads without a potential; and, where the guard left out a part of the way, what the inner forces would
-// have done on it.
-void book_body(World &w, StepContext &step, Body &b, double motion) {
-  const bool load_booked = books_loads(b);
+// Loads without a potential, which act for this share of the sub-step (Dynamics::take_part).
+void book_loads(const StepContext &step, Body &b, double motion) {
   const Phyxels &p = b.p;
+  const double *const end = b.dynamics->end().v;
   double sum = 0;
-  for (uint32_t i = 0; i < p.n; ++i)
-    for (size_t k = 0, at = size_t(i) * kStride; k < 3; ++k, ++at) {
-      const double booked = load_booked ? p.load[at] : 0;
-      if (!p.moves(at) || (booked == 0 && motion == 1)) continue;
-      const double end = b.dynamics->end().v[at];
-      sum += step.h * booked * 0.5 * (p.v[at] + end);
-      if (motion < 1)
-        sum += (1 - motion) * step.h * end * (p.f[at] + p.mass[i] * w.gravity.now[int(k)] - booked);
-    }
-  b.energy.work += sum;
+  for (size_t at = 0; at < p.v.size(); ++at)
+    if (p.moves(at)) sum += step.h * p.load[at] * 0.5 * (p.v[at] + end[at]);
+  b.energy.work += motion * sum;
 }
 
 }  // namespace
@@ -443,7 +435,7 @@ void book_energy(World &w, StepContext &step, double motion) {
     }
     if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
     if (books(b)) b.energy.work += work_of_new_size(w, step, b);
-    if (books(b) && (motion < 1 || books_loads(b))) book_body(w, step, b, motion);
+    if (books(b) && books_loads(b)) book_loads(step, b, motion);
   }
   w.watch.last_h = motion * step.h;
   w.watch.size_before = 0;
