@@ -2,9 +2,6 @@
 // are wrong, and what is saved.
 #include <gtest/gtest.h>
 
-#include <map>
-#include <set>
-
 #include "support.h"
 #include "zoned.h"
 
@@ -240,23 +237,4 @@ TEST(PairTable, SceneWithGroups_SlidesByThem) {
   EXPECT_NEAR(speed[1], 1 - 0.4 * 9.81 * 0.2, 0.05);
   // sqrt(0.01 * 0.5): the material's own coefficient and the floor's default
   EXPECT_NEAR(speed[0], 1 - std::sqrt(0.005) * 9.81 * 0.2, 0.02);
-}
-
-// A hit of the guard becomes a contact: the host sees the law that this contact has.
-TEST(PairTable, PreSolveOfAHit_SeesTheLawOfItsZone) {
-  Table t;
-  test::ok(test::friction(t.world, "material=ice", "*", 0.1));
-  test::ok(test::friction(t.world, "material=rubber", "*", 0.2));
-  struct Seen {
-    std::map<uint32_t, std::set<uint32_t>> laws;  // by feature of the block
-    static void look(void *user, dfm_contact_choice *c) {
-      static_cast<Seen *>(user)->laws[c->feature_a].insert(c->law);
-    }
-  } seen;
-  test::ok(dfm_world_set_pre_solve(t.world, &Seen::look, &seen));
-  test::set_velocity(t.block, {0, 0, -40});
-  test::run(t.world, 0.02, 1e-3);
-  EXPECT_GT(test::stats(t.world).guard_solves, 0u);
-  EXPECT_GT(seen.laws.size(), 4u);
-  for (const auto &[feature, laws] : seen.laws) EXPECT_EQ(laws.size(), 1u) << "point " << feature;
 }

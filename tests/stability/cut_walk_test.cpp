@@ -22,9 +22,10 @@ TEST(CutWalk, RandomCuts_KeepMassMomentumContactsAndVolumes) {
   EXPECT_EQ(fast, 0u);
 }
 
-// Pieces with interlocked teeth jam: a solve that did not converge threw points at 471 m/s to 3e8 m/s.
+// Pieces with interlocked teeth jam: a solve that did not converge threw points at 471 m/s to 3e8 m/s, and at
+// up to 155 m/s where a small budget ended it and forces drove what could not move.
 TEST(CutWalk, JammedPieces_AreNotThrown) {
-  for (const uint64_t seed : {52u, 186u, 197u, 212u}) {
+  for (const uint64_t seed : {52u, 186u, 197u, 212u, 2u, 19u, 28u}) {
     const test::cutting::Walked r = test::cutting::walk_cuts(seed, 60);
     EXPECT_EQ(r.failure, "") << "seed " << seed;
     EXPECT_LT(r.speed, test::cutting::CutWalk::kFast) << "seed " << seed;

@@ -123,6 +123,16 @@ TEST(EnergyWatch, SwitchedOff_StopsNothing) {
   EXPECT_EQ(test::stats(b.world).energy_gain, 0);
 }
 
+// Nothing moves it but rounding, which grows like any motion of a body that nothing damps.
+TEST(EnergyWatch, UndampedBodyAtRest_IsNotStopped) {
+  test::Context context;
+  const dfm_world w = test::make_world(context);
+  test::BodyOptions o;
+  o.young = 1e7;
+  test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  for (int i = 0; i < 5; ++i) ASSERT_EQ(dfm_world_step(w, 0.1, nullptr), DFM_OK) << dfm_last_error();
+}
+
 // Each of these lengths is stable by itself. Without the damping that such changes call for, their sequence
 // adds energy to the stiff modes until the watch stops the run.
 TEST(EnergyWatch, StepsOfRandomLength_AddNoEnergy) {

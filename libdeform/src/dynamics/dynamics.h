@@ -157,8 +157,9 @@ class Dynamics {
   virtual bool end_forces(const SubStep &) { return false; }
   // Before commit(): of the displacement only this share is taken; velocities are those of the end. Where
   // points move explicitly, forces act on them for this share of the sub-step only, or bodies that cannot
-  // move would get the same impulse again and again, and no energy pays for it.
-  virtual void take_part(double share);
+  // move would get the same impulse again and again, and no energy pays for it. Contact does so with these
+  // impulses, also in points().impulse; null: there are none.
+  virtual void take_part(double share, const double *surfel_impulse);
   // J, stored in dampers that see the velocity with a lag
   virtual double damper_energy(double /*time*/) { return 0; }
   virtual void commit(const SubStep &now) = 0;

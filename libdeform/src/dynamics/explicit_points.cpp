@@ -361,20 +361,17 @@ void ExplicitPoints::free_again(const SubStep &now) {
   reached_.clear();
 }
 
-// Impulses of contact act in full, so that what has met does not go on as if it had not.
-void ExplicitPoints::take_part(double share) {
-  Dynamics::take_part(share);
-  const auto each_reached = [&](auto &&f) {
-    for (size_t m = 0; m < reached_.size(); ++m)
-      for (size_t k = 0; k < 3; ++k) f(p_.v_free[reached_[m] + k], before_[3 * m + k]);
-  };
-  each_reached([](double &v, double &of_contact) {
-    std::swap(v, of_contact);
-    of_contact -= v;
-  });
-  Array<double> &end = in_place_ ? p_.v_free : p_.v_end;
-  for (size_t at = 0; at < end.size(); ++at) end[at] -= (1 - share) * (p_.v_free[at] - p_.v[at]);
-  each_reached([](double &v, double of_contact) { v += of_contact; });
+void ExplicitPoints::take_part(double share, const double *surfel_impulse) {
+  Dynamics::take_part(share, surfel_impulse);
+  for (size_t m = 0; m < reached_.size(); ++m) std::copy_n(&before_[3 * m], 3, &p_.v_free[reached_[m]]);
+  for (size_t at = 0; at < p_.v.size(); ++at) p_.v_free[at] = p_.v[at] + share * (p_.v_free[at] - p_.v[at]);
+  if (!in_place_)
+    for (size_t at = 0; at < p_.v.size(); ++at)
+      p_.v_end[at] = p_.v_free[at] + (surfel_impulse ? p_.inv_mass[at] * p_.impulse[at] : 0);
+  else if (surfel_impulse)
+    for (uint32_t s = 0; s < surface_.nsurfel; ++s)
+      for (size_t k = 0, at = size_t{kStride} * surface_.point[s]; k < 3; ++k, ++at)
+        p_.v_free[at] += p_.inv_mass[at] * surfel_impulse[3 * size_t{s} + k];
 }
 
 void ExplicitPoints::commit(const SubStep &now) {

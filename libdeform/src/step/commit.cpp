@@ -11,6 +11,7 @@
 #include "step/messages.h"
 #include "step/solve/attach.h"
 #include "step/solve/cut_drag.h"
+#include "step/solve/solve_islands.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
@@ -64,11 +65,15 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
   SubStep moved = now;
   moved.h *= step.guard.motion;
-  if (step.guard.motion < 1)
+  if (step.guard.motion < 1) {
+    const bool touched = step.rows.all() > 0;
+    if (touched) take_part_of_contact(w, step, step.guard.motion);
     for (const uint32_t i : step.active) {
-      const OnBehalf prefix(w.bodies[i]->name);
-      w.bodies[i]->dynamics->take_part(step.guard.motion);
+      Body &b = *w.bodies[i];
+      const OnBehalf prefix(b.name);
+      b.dynamics->take_part(step.guard.motion, touched ? b.surfel_impulse.data() : nullptr);
     }
+  }
   book_energy(w, step, step.guard.motion);
   double accurate = std::numeric_limits<double>::infinity();
   for (const uint32_t i : step.active)

@@ -15,6 +15,7 @@
 #include "step/solve/capture.h"
 #include "step/solve/friction_memory.h"
 #include "step/solve/tolerance.h"
+#include "step/stages.h"
 
 namespace dfm {
 namespace {
@@ -93,15 +94,18 @@ double motion_tolerance(const SolveIsland &own) {
 
 // Impulses that are no solution (the budget has ended, or rows contradict each other) may do work that no law
 // allows: the share of them counts that lowers the energy most.
-void limit_work(StepContext &step, SolveIsland &own) {
-  if (own.bad || own.residual.required <= 1) return;
+bool take_least_work(StepContext &step, SolveIsland &own) {
   const double share = share_of_least_work(step.rows, own.part);
-  if (share == 1) return;
+  if (share == 1) return false;
   own.swept.resize(3 * size_t{own.part.all()});
   take_impulses(step.rows, own.part, own.swept.data());
   for (double &l : own.swept) l *= share;
   put_impulses(step.rows, own.part, own.swept.data());
-  own.laws.judge(own.residual);
+  return true;
+}
+
+void limit_work(StepContext &step, SolveIsland &own) {
+  if (!own.bad && own.residual.required > 1 && take_least_work(step, own)) own.laws.judge(own.residual);
 }
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
@@ -398,6 +402,24 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     if (own.bad && !bad) bad = &own;
   }
   return bad;
+}
+
+// With the forces of that share contact would stop less, and its impulses in full would throw what they hold.
+void take_part_of_contact(const World &w, StepContext &step, double share) {
+  ContactRows &rows = step.rows;
+  for (uint32_t d = 0; d < rows.ndof; ++d) {
+    if (rows.block[d] != kNone) continue;
+    double *const free = &rows.y_free[size_t{kStride} * d];
+    const double *const start = &w.bodies[rows.source[d]]->p.v[size_t{kStride} * rows.point[d]];
+    for (size_t c = 0; c < 3; ++c) free[c] = start[c] + share * (free[c] - start[c]);
+  }
+  for (SolveIsland &own : step.solve_islands->all()) {
+    if (own.implicit || !own.part.blocks.empty()) continue;
+    rows.restore(own.part);
+    take_least_work(step, own);
+  }
+  step.bond_impulse.assign(rows.impulse.begin() + std::ptrdiff_t{3} * rows.n, rows.impulse.end());
+  report_impulses(step);
 }
 
 }  // namespace dfm

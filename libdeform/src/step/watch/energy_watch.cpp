@@ -10,6 +10,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/messages.h"
+#include "step/solve/tolerance.h"
 #include "step/stages.h"
 #include "step/watch/pair_energy.h"
 
@@ -402,7 +403,10 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   if (w.watch.age == ~0u) s.energy_start = now.total;
   w.watch.age = 0;
   s.energy_gain = std::max(s.energy_gain, now.gain);
-  const double largest = std::max(s.energy_max, now.total - worst.rise);
+  // what moves by less than contact counts as rest is at rest
+  const double at_rest = tangent_at_rest(w, step.h);
+  const double largest = std::max({s.energy_max, now.total - worst.rise,
+                                   worst.body ? 0.5 * worst.body->mass * (at_rest * at_rest) : 0});
   if (worst.rise > worst.share * largest)
     return stop_for_energy(
         w, trouble,
