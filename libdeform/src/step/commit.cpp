@@ -89,6 +89,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     return true;
   });
   if (w.plan.touches()) {
+    end_idle(w);
     keep_contacts(w, step);
     keep_bonds(w, step);
     keep_cut_drags(w, step);
