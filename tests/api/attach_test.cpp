@@ -396,6 +396,29 @@ TEST(Attach, HangingBody_SleepsAndWakesWithItsSupport) {
   EXPECT_NEAR(info(beam, held).point[0] - after.point[0], 0.001, 1e-8);
 }
 
+// What a cut takes away has borne its part until the cut.
+TEST(Attach, ASleeperThatIsCut_KeepsTheImpulseOfItsSleep) {
+  World s;
+  const dfm_obstacle hook = s.hook();
+  const dfm_body beam = s.beam("msm");
+  const uint32_t held = attach(beam, hook);
+  test::ok(dfm_world_set_sleep(s.w, true));
+  bool asleep = false;
+  for (int i = 0; i < 400 && !asleep; ++i) {
+    s.run(0.01);
+    test::ok(dfm_body_is_asleep(beam, &asleep));
+  }
+  ASSERT_TRUE(asleep);
+  s.run(0.5);
+  const double before = info(beam, held).impulse[2];
+  dfm_cut_def cut = dfm_cut_def_default();
+  cut.shape = DFM_CUT_BOX;
+  cut.how = DFM_CUT_REMOVE;
+  cut.half_size[0] = cut.half_size[1] = cut.half_size[2] = 0.011;
+  test::ok(dfm_body_cut(beam, &cut, nullptr));
+  EXPECT_NEAR(info(beam, held).impulse[2], before, 1e-9 * before);
+}
+
 // A step that is given up changes nothing of what is attached.
 TEST(Attach, ADiscardedStep_LeavesItAsItWas) {
   const auto make = [](World &s) {
