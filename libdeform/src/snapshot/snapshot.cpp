@@ -325,6 +325,7 @@ void exchange(World &w, Staged &t) noexcept {
     StagedRigids &other = t.rigid_sets[i];
     set.state.swap(other.state);
     set.extra.swap(other.extra);
+    set.motors.swap(other.motors);
     set.total.swap(other.total);
     std::swap(set.last_h, other.last_h);
   }
