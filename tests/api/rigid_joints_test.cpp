@@ -386,6 +386,27 @@ TEST(RigidJoints, Motors_ComeBackWithASnapshot) {
   }
 }
 
+// The rest distance of the first step is that of the bodies that the world has then: what a door hangs on is
+// decided by it, and stays so.
+TEST(RigidJoints, ADoorBesideItsPost_IsTheSameAfterARestore) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG});
+  add_box(w, "post", {0.03, 0.03, 0.6}, {-0.0301, 0, 0.6});
+  const auto door = test::create(w, {test::box("door", {0.4, 0.02, 0.5}, 10, {0.39, 0, 0.52})},
+                                 {test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0.5}, {0, 0, 1})});
+  test::ok(dfm_rigid_set_motor(door[0], 0, 1, 20));
+  test::BodyOptions o;
+  o.position = {5, 0, 0};
+  test::make_body(context, w, "beam", {0.4, 0.4, 0.4}, 40, o);
+  go(w, 1e-3, 0.01);
+  const std::string data = test::snapshot(w);
+  go(w, 1e-3, 0.05);
+  const uint64_t hash = dfm_world_hash(w);
+  test::ok(dfm_world_restore(w, data.data(), data.size()));
+  go(w, 1e-3, 0.05);
+  EXPECT_EQ(dfm_world_hash(w), hash);
+}
+
 // A driven tool and a coupled one open a door, do not go into it, and feel what it is pushed with.
 TEST(RigidJoints, Tools_OpenADoor) {
   for (const double stiffness : {0.0, 1000.0}) {
