@@ -470,12 +470,13 @@ void choose_plan(World &w, StepContext &step, SceneFacts &facts, const SceneFact
   ++step.made.plans;
 }
 
-// While contacts exist it only decreases: a larger value would turn their rest distance into a depth, and
-// push them apart at 0.1 d_c / h.
+// While contacts exist, also of rigid things with each other, it only decreases: a larger value would turn
+// their rest distance into a depth, and push them apart at 0.1 d_c / h.
 double choose_offset(const World &w, const SceneFacts &facts) {
   if (w.def.contact_offset > 0) return w.def.contact_offset;
   const double wanted = contact_offset(w);
-  return when::acts(facts) && w.store.n > 0 ? std::min(w.offset, wanted) : wanted;
+  const bool exist = (when::acts(facts) && w.store.n > 0) || w.tool_store.n > 0;
+  return exist ? std::min(w.offset, wanted) : wanted;
 }
 
 }  // namespace
