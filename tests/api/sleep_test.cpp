@@ -200,6 +200,31 @@ TEST(Sleep, BesideABodyThatMoves_KeepsReportAndForces) {
   EXPECT_TRUE(test::events(s.world).empty() || test::stats(s.world).asleep == 2);
 }
 
+// Others go on with shorter sub-steps: what a body reports after it was woken, and before the next step, are
+// the forces with which it slept.
+TEST(Wake, BeforeTheNextStep_ForcesAreThoseOfTheSleep) {
+  const Rest s;
+  for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
+  const auto forces = [&] { return test::listed(dfm_surface_forces, s.lower, 3); };
+  const auto before = forces();
+  test::ok(dfm_body_wake(s.far));
+  for (int i = 0; i < 8; ++i) test::ok(dfm_world_step(s.world, kStep / 8, nullptr));
+  ASSERT_TRUE(asleep(s.lower) && !asleep(s.far));
+  test::ok(dfm_body_wake(s.lower));
+  EXPECT_EQ(forces(), before);
+  const std::string data = test::snapshot(s.world);
+  test::ok(dfm_world_step(s.world, kStep / 8, nullptr));
+  const auto after = forces();
+  double sum[2] = {};
+  for (size_t i = 2; i < after.size(); i += 3) {
+    sum[0] += before[i];
+    sum[1] += after[i];
+  }
+  EXPECT_NEAR(sum[1], sum[0], 0.05 * sum[0]);
+  test::ok(dfm_world_restore(s.world, data.data(), data.size()));
+  EXPECT_EQ(forces(), before);
+}
+
 TEST(Sleep, DoesNotComeWhileALoadVaries) {
   for (const bool sine : {false, true}) {
     const test::Context c;

@@ -279,7 +279,6 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.contact_impulse = {};
   b.energy = {};
   b.changes = {};
-  b.sleep_state = {};
   b.bound.known = false;
   return b;
 }

@@ -357,7 +357,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.must_hold("asleep", "a sleep that began in a sub-step before now, where bodies may sleep", [&] {
     return !b.sleep_state.asleep || (w.def.sleep && b.sleep_state.since <= w.time && b.sleep_state.h > 0);
   });
-  if (b.sleep_state.asleep)
+  if (b.sleep_state.h > 0)
     s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
   if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
   prescribed_fields(s, b, like);

@@ -81,6 +81,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     b.dynamics->commit(now, step.guard.motion);  // the guard may shorten the displacement
     if (reads_points(w, b)) b.dynamics->see_points();
     ++b.x_version;
+    b.sleep_state.h = 0;
     book_change_work(w, b, now.h);
     if (!w.plan.touches()) return true;
     Vec3 sum;

@@ -131,7 +131,7 @@ void rouse(World &w, std::span<const uint32_t> slots) {
         if (a.body == b.id && a.h > 0) a.total += ((w.time - b.sleep_state.since) / a.h) * a.sum();
       step.woken.push_back(i);
     }
-    b.sleep_state = {};
+    b.sleep_state = {false, 0, 0, b.sleep_state.h, {}};  // h: of its impulses, until the next ones
   }
   if (!w.changed) gather_active(w);  // otherwise prepare(w) does it, since its views are out of date
 }
