@@ -302,6 +302,39 @@ TEST(Attach, ReleaseForce_ReleasesAndReportsAnEvent) {
   EXPECT_EQ(dfm_body_get_attachment(beam, held, &a), DFM_E_ARG);
 }
 
+// What has come off within a step touches from the next sub-step on: a glued block that falls on a floor
+// bounces, however many sub-steps the step has. Where that step is taken back, the glue holds again.
+TEST(Attach, Release_LetsTheTwoTouchInTheSameStep) {
+  const auto make = [](World &s) {
+    const dfm_obstacle floor = test::add_plane(s.w, "floor");
+    test::BodyOptions o;
+    o.young = 1e6;
+    o.damping_mass = 1;
+    o.damping_stiffness = 5e-4;
+    o.velocity = {0, 0, -1};
+    o.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+    const dfm_body block = test::make_body(s.context, s.w, "beam", {0.1, 0.1, 0.1}, 300, o);
+    attach(block, floor, false, [](dfm_attach_def &d) { d.release = 1; });
+    return block;
+  };
+  World a, b;
+  const dfm_body block = make(a), other = make(b);
+  const uint64_t before = dfm_world_hash(b.w);
+  const auto stop = [](void *world, dfm_contact_choice *) {
+    test::ok(dfm_world_interrupt(*static_cast<dfm_world *>(world)));
+  };
+  test::ok(dfm_world_set_pre_solve(b.w, stop, &b.w));
+  EXPECT_EQ(dfm_world_step(b.w, 0.02, nullptr), DFM_DISCARD);
+  EXPECT_EQ(dfm_world_hash(b.w), before);
+  EXPECT_EQ(test::listed(dfm_body_attachments, other).size(), 1u);
+  test::ok(dfm_world_set_pre_solve(b.w, nullptr, nullptr));
+  for (World *const s : {&a, &b}) test::ok(dfm_world_step(s->w, 0.02, nullptr));
+  EXPECT_GT(test::stats(a.w).last_substeps, 10u);
+  EXPECT_TRUE(test::listed(dfm_body_attachments, block).empty());
+  EXPECT_GT(test::lowest(block), -1e-3);
+  EXPECT_EQ(dfm_world_hash(a.w), dfm_world_hash(b.w));
+}
+
 TEST(Attach, Detach_LetsTheTwoTouchAgain) {
   World s;
   const dfm_obstacle hook = s.hook({0, 0, -0.15});
@@ -394,6 +427,29 @@ TEST(Attach, HangingBody_SleepsAndWakesWithItsSupport) {
   s.run(1e-3);
   EXPECT_FALSE(asleep());
   EXPECT_NEAR(info(beam, held).point[0] - after.point[0], 0.001, 1e-8);
+}
+
+// What a cut takes away has borne its part until the cut.
+TEST(Attach, ASleeperThatIsCut_KeepsTheImpulseOfItsSleep) {
+  World s;
+  const dfm_obstacle hook = s.hook();
+  const dfm_body beam = s.beam("msm");
+  const uint32_t held = attach(beam, hook);
+  test::ok(dfm_world_set_sleep(s.w, true));
+  bool asleep = false;
+  for (int i = 0; i < 400 && !asleep; ++i) {
+    s.run(0.01);
+    test::ok(dfm_body_is_asleep(beam, &asleep));
+  }
+  ASSERT_TRUE(asleep);
+  s.run(0.5);
+  const double before = info(beam, held).impulse[2];
+  dfm_cut_def cut = dfm_cut_def_default();
+  cut.shape = DFM_CUT_BOX;
+  cut.how = DFM_CUT_REMOVE;
+  cut.half_size[0] = cut.half_size[1] = cut.half_size[2] = 0.011;
+  test::ok(dfm_body_cut(beam, &cut, nullptr));
+  EXPECT_NEAR(info(beam, held).impulse[2], before, 1e-9 * before);
 }
 
 // A step that is given up changes nothing of what is attached.

@@ -139,6 +139,49 @@ TEST(PairImpulses, OfAStackAtRest_AreItsWeight_AlsoWhileItSleeps) {
   EXPECT_EQ(checked, 20);
 }
 
+// A block that sleeps is struck in the middle of a step: the time before has the forces of the sleep.
+TEST(PairImpulses, OfASleeperThatIsStruck_AreTheMomentumThatItGot) {
+  test::Context context;
+  const dfm_world w = test::make_world(context);
+  test::ok(dfm_world_set_sleep(w, true));
+  const dfm_obstacle floor = test::add_plane(w, "floor");
+  test::set_friction(w, 0, "none");
+  test::BodyOptions o;
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.position = {0, 0, 1e-4};
+  const dfm_body block = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  constexpr double kDt = 0.02, kStart = 3.01;
+  const dfm_pose_key keys[] = {{0, {{0.152, 0.05, 0.05}, {0, 0, 0, 1}}},
+                               {kStart, {{0.152, 0.05, 0.05}, {0, 0, 0, 1}}},
+                               {kStart + 1, {{-0.848, 0.05, 0.05}, {0, 0, 0, 1}}}};
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.shape = DFM_SHAPE_BOX;
+  for (double &half : d.half_size) half = 0.05;
+  d.nkey = 3;
+  d.keys = keys;
+  dfm_obstacle ram = 0;
+  test::ok(dfm_obstacle_create(w, &d, &ram));
+  while (dfm_world_time(w) < kStart - 0.5 * kDt - 1e-9) test::ok(dfm_world_step(w, kDt, nullptr));
+  ASSERT_EQ(test::stats(w).asleep, 1u);
+  test::ok(dfm_world_step(w, kDt, nullptr));
+  ASSERT_EQ(test::stats(w).asleep, 0u);
+  const dfm_body_measure m = test::measure(block);
+  const double weight = 9.81 * m.mass;
+  ASSERT_LT(m.momentum[0], -0.1 * m.mass);
+  const auto list = impulses(w);
+  ASSERT_EQ(list.size(), 2u);
+  std::map<uint64_t, dfm_pair_impulse> by;
+  for (const dfm_pair_impulse &p : list) by[p.b] = p;
+  EXPECT_NEAR(by[ram].impulse[0], m.momentum[0], 1e-4 * m.mass);
+  EXPECT_NEAR(by[ram].impulse[2] + by[floor].impulse[2], m.momentum[2] + weight * kDt, 1e-3 * weight * kDt);
+  EXPECT_LT(by[ram].touching, 0.5 * kDt);
+  for (int k = 0; k < 4; ++k) {
+    EXPECT_EQ(by[ram].part[k], 0) << k;
+    EXPECT_NEAR(by[floor].part[k], weight * kDt / 8, 1e-3 * weight * kDt) << k;
+  }
+}
+
 TEST(PairImpulses, ArgumentsThatDoNotFit_AreRefused) {
   Throw t;
   test::ok(dfm_world_step(t.world, 0.1, nullptr));

@@ -352,6 +352,61 @@ TEST(RigidJoints, ADoorInItsPost_Opens) {
   }
 }
 
+// An arm that a motor turns until it meets a stop: a snapshot knows the motor, whatever it has become since,
+// and so does a world made anew.
+TEST(RigidJoints, Motors_ComeBackWithASnapshot) {
+  struct Arm {
+    test::Context context;
+    dfm_world w = test::make_world(context, {0, 0, 0});
+    dfm_rigid arm;
+    Arm() {
+      add_box(w, "stop", {0.05, 0.05, 0.1}, {0.3, 0.2, 0});
+      arm = test::create(w, {test::box("arm", {0.2, 0.02, 0.02}, 1, {0.2, 0, 0})},
+                         {test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0}, {0, 0, 1})})[0];
+    }
+    void motor(double velocity, double max) { test::ok(dfm_rigid_set_motor(arm, 0, velocity, max)); }
+    void restore(const std::string &data) { test::ok(dfm_world_restore(w, data.data(), data.size())); }
+  };
+  for (const double max : {50.0, 1e6}) {
+    Arm a, anew;
+    a.motor(1, max);
+    go(a.w, 1e-3, 0.1);
+    const std::string data = test::snapshot(a.w);
+    go(a.w, 1e-3, 0.9);
+    const uint64_t hash = dfm_world_hash(a.w);
+    const double angle = test::reading(a.arm, 0).position;
+    a.motor(0, 0);
+    for (Arm *const b : {&a, &anew}) {
+      b->restore(data);
+      EXPECT_TRUE(test::snapshot(b->w) == data);
+      go(b->w, 1e-3, 0.9);
+      EXPECT_EQ(dfm_world_hash(b->w), hash);
+      EXPECT_EQ(test::reading(b->arm, 0).position, angle);
+    }
+  }
+}
+
+// The rest distance of the first step is that of the bodies that the world has then: what a door hangs on is
+// decided by it, and stays so.
+TEST(RigidJoints, ADoorBesideItsPost_IsTheSameAfterARestore) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG});
+  add_box(w, "post", {0.03, 0.03, 0.6}, {-0.0301, 0, 0.6});
+  const auto door = test::create(w, {test::box("door", {0.4, 0.02, 0.5}, 10, {0.39, 0, 0.52})},
+                                 {test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0.5}, {0, 0, 1})});
+  test::ok(dfm_rigid_set_motor(door[0], 0, 1, 20));
+  test::BodyOptions o;
+  o.position = {5, 0, 0};
+  test::make_body(context, w, "beam", {0.4, 0.4, 0.4}, 40, o);
+  go(w, 1e-3, 0.01);
+  const std::string data = test::snapshot(w);
+  go(w, 1e-3, 0.05);
+  const uint64_t hash = dfm_world_hash(w);
+  test::ok(dfm_world_restore(w, data.data(), data.size()));
+  go(w, 1e-3, 0.05);
+  EXPECT_EQ(dfm_world_hash(w), hash);
+}
+
 // A driven tool and a coupled one open a door, do not go into it, and feel what it is pushed with.
 TEST(RigidJoints, Tools_OpenADoor) {
   for (const double stiffness : {0.0, 1000.0}) {

@@ -376,6 +376,28 @@ TEST(RigidTouch, SnapshotsAndFilters_Count) {
   EXPECT_LT(test::state(r).position[2], -0.1);
 }
 
+// Boxes that lie on each other do not rise when a soft body comes far away, with whose size the rest distance
+// would grow.
+TEST(RigidTouch, ATower_StaysWhenASoftBodyComes) {
+  test::Context context;
+  const dfm_world w = test::make_world(context, {0, 0, -kG});
+  test::add_plane(w, "floor");
+  std::vector<dfm_rigid> boxes;
+  for (int i = 0; i < 5; ++i)
+    boxes.push_back(test::create(
+        w, {test::box(("box" + std::to_string(i)).c_str(), {0.1, 0.1, 0.1}, 1, {0, 0, 0.1 + 0.2 * i})})[0]);
+  go(w, 1e-4, 0.5);
+  test::BodyOptions o;
+  o.position = {5, 0, 5};
+  test::make_body(context, w, "beam", {0.4, 0.4, 0.4}, 40, o);
+  double fastest = 0;
+  for (int i = 0; i < 20; ++i) {
+    go(w, 1e-4, 1e-4);
+    for (const dfm_rigid r : boxes) fastest = std::max(fastest, test::state(r).velocity[2]);
+  }
+  EXPECT_LT(fastest, 1e-3);
+}
+
 // What a hinge connects falls on the floor and stays there, and nothing is to be told.
 TEST(RigidTouch, WhatAHingeConnects_StaysOnAFloor) {
   test::LoggedContext context;

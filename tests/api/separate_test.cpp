@@ -203,6 +203,26 @@ TEST(Separate, Snapshot_TakesPiecesBackWithTheirHandles) {
   }
 }
 
+// An obstacle that comes after a restore has the number of the piece that is gone, and keeps its own handle.
+TEST(Separate, AnObstacleAfterARestore_IsNotThePieceThatIsGone) {
+  test::Context context;
+  const test::Stack s = test::make_stack(context);
+  const std::string before = test::snapshot(s.world);
+  dfm_separate_def d = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(s.upper, &d));
+  EXPECT_EQ(cut(s.upper, plane(0, 0.056, DFM_CUT_SPLIT)).pieces, 1u);
+  const dfm_body piece = pieces(s.upper)[0];
+  restore(s.world, before);
+  const dfm_obstacle wall = test::add_plane(s.world, "wall", {0, 0, 1e-4});
+  steps(s.world, 30);
+  bool met = false;
+  for (const dfm_contact_event &e : test::events(s.world)) {
+    EXPECT_NE(e.b, piece);
+    met = met || e.b == wall;
+  }
+  EXPECT_TRUE(met);
+}
+
 TEST(Separate, Contacts_KeepKeysImpulsesAndBristles) {
   const CubeOnFloor scene("corotational_fem", 1e5, true);
   const dfm_world w = scene.w;

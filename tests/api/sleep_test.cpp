@@ -200,6 +200,31 @@ TEST(Sleep, BesideABodyThatMoves_KeepsReportAndForces) {
   EXPECT_TRUE(test::events(s.world).empty() || test::stats(s.world).asleep == 2);
 }
 
+// Others go on with shorter sub-steps: what a body reports after it was woken, and before the next step, are
+// the forces with which it slept.
+TEST(Wake, BeforeTheNextStep_ForcesAreThoseOfTheSleep) {
+  const Rest s;
+  for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
+  const auto forces = [&] { return test::listed(dfm_surface_forces, s.lower, 3); };
+  const auto before = forces();
+  test::ok(dfm_body_wake(s.far));
+  for (int i = 0; i < 8; ++i) test::ok(dfm_world_step(s.world, kStep / 8, nullptr));
+  ASSERT_TRUE(asleep(s.lower) && !asleep(s.far));
+  test::ok(dfm_body_wake(s.lower));
+  EXPECT_EQ(forces(), before);
+  const std::string data = test::snapshot(s.world);
+  test::ok(dfm_world_step(s.world, kStep / 8, nullptr));
+  const auto after = forces();
+  double sum[2] = {};
+  for (size_t i = 2; i < after.size(); i += 3) {
+    sum[0] += before[i];
+    sum[1] += after[i];
+  }
+  EXPECT_NEAR(sum[1], sum[0], 0.05 * sum[0]);
+  test::ok(dfm_world_restore(s.world, data.data(), data.size()));
+  EXPECT_EQ(forces(), before);
+}
+
 TEST(Sleep, DoesNotComeWhileALoadVaries) {
   for (const bool sine : {false, true}) {
     const test::Context c;
@@ -343,6 +368,69 @@ TEST(Wake, OfWhatStoodOnARemovedBody_ComesWithItsRemoval) {
   steps(s.world, 100);
   EXPECT_LT(test::measure(s.upper).velocity[2], -0.3) << "it falls";
   EXPECT_TRUE(asleep(s.far));
+}
+
+// While others sleep, the report stays: what it says of a removed thing names no other one.
+TEST(Wake, ARemovedBody_LeavesNothingInWhatIsReported) {
+  Rest s;
+  for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
+  steps(s.world, 1);
+  const auto pairs = [&] { return test::listed(dfm_world_pair_impulses, s.world); };
+  const auto before = pairs();
+  ASSERT_EQ(before.size(), 3u);
+  test::ok(dfm_body_destroy(s.lower));
+  const auto after = pairs();  // of the last step, as it was
+  ASSERT_EQ(after.size(), 3u);
+  for (size_t i = 0; i < 3; ++i) EXPECT_EQ(after[i].normal_impulse, before[i].normal_impulse);
+  dfm_vertex_layout l = dfm_vertex_layout_default();
+  l.normal = DFM_VERTEX_NONE;
+  l.stride = 16;
+  l.stick = 12;
+  const auto marked = [&](dfm_body b) {
+    uint32_t n = 0;
+    test::ok(dfm_surface_vertices(b, nullptr, 0, nullptr, &n));
+    std::vector<float> out(4 * size_t{n});
+    test::ok(dfm_surface_vertices(b, &l, 4 * out.size(), out.data(), &n));
+    size_t sum = 0;
+    for (size_t i = 3; i < out.size(); i += 4) sum += out[i] > 0;
+    return sum;
+  };
+  EXPECT_EQ(marked(s.upper), 0u) << "these are those of the third one";
+  EXPECT_GT(marked(s.far), 0u);
+  steps(s.world, 1);
+  for (const dfm_pair_impulse &p : pairs()) EXPECT_TRUE(p.a == s.far && p.b == s.floor);
+}
+
+TEST(Wake, ARemovedObstacle_LeavesNothingInWhatIsReported) {
+  const test::Context context;
+  const dfm_world w = make_sleepy(context, true);
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.shape = DFM_SHAPE_BOX;
+  for (double &half : d.half_size) half = 0.05;
+  test::BodyOptions o;
+  o.young = 2e5;
+  o.damping_stiffness = 2e-3;
+  o.damping_mass = 20;
+  dfm_obstacle table[2];
+  dfm_body body[2];
+  for (size_t k = 0; k < 2; ++k) {
+    d.pose.position[0] = 0.05 + double(k);
+    d.pose.position[1] = 0.05;
+    d.pose.position[2] = -0.05;
+    test::ok(dfm_obstacle_create(w, &d, &table[k]));
+    o.position = {double(k), 0, 1e-4};
+    body[k] = test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 20, o);
+  }
+  for (const dfm_body b : body) ASSERT_GE(until_asleep(w, b), 0);
+  steps(w, 1);
+  test::ok(dfm_obstacle_destroy(table[1]));
+  EXPECT_EQ(test::listed(dfm_world_pair_impulses, w).size(), 2u);
+  test::ok(dfm_body_destroy(body[1]));
+  steps(w, 1);
+  const auto pairs = test::listed(dfm_world_pair_impulses, w);
+  ASSERT_EQ(pairs.size(), 1u);
+  EXPECT_EQ(pairs[0].a, body[0]);
+  EXPECT_EQ(pairs[0].b, table[0]);
 }
 
 // An obstacle on keys that starts to move long after all sleep, and comes down on the stack.

@@ -17,6 +17,7 @@
 #include "state/material.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "step/step_impulses.h"
 #include "world/change_energy.h"
 #include "world/create.h"
 #include "world/may_cut.h"
@@ -71,6 +72,8 @@ CutReport empty(Body &b) {
 // Exchanges the body with what a cut has left of it.
 std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
   World &w = *b.world;
+  wake(w, b);  // while its attachments have all that they bore
+  end_idle(w);
   std::unique_ptr<BodyShape> before = take_shape(b, made, false, ahead);
   try {
     Lasting lasting(w, {{b.id, b.slot, made.features}});
@@ -92,7 +95,6 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
     exchange(b, *before);
     throw;
   }
-  wake(w, b);
   return before;
 }
 

@@ -17,6 +17,7 @@
 #include "state/world.h"
 #include "step/overlap/overlap.h"
 #include "step/stages.h"
+#include "step/step_impulses.h"
 #include "world/change_energy.h"
 #include "world/create.h"
 #include "world/may_cut.h"
@@ -170,6 +171,7 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   }
 
   wake(w, b);
+  end_idle(w);
   const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
   const HostWork work(b);
   reserve_places(w, parts.pieces);
@@ -277,7 +279,6 @@ Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &
   b.contact_impulse = {};
   b.energy = {};
   b.changes = {};
-  b.sleep_state = {};
   b.bound.known = false;
   return b;
 }

@@ -88,13 +88,15 @@ void write_rigid_start(const RigidSet &set, uint32_t i, Written &out) {
                   {"spin", vector_of(s.spin)}};
 }
 
-Written joint_of(const RigidSet &set, const dfm_joint_def &j) {
+Written joint_of(const RigidSet &set, size_t number) {
+  const dfm_joint_def &j = set.joints[number];
+  const RigidMotor &motor = set.motors[number];
   Written out;
   out["type"] = scene::word_of("joint_type", j.type);
   if (j.with != DFM_RIGID_WORLD) out["with"] = set.defs[j.with].name;
   out["anchor"] = vector_of(j.anchor);
   if (j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER) out["axis"] = vector_of(j.axis);
-  if (j.motor) out["motor"] = {{"velocity", j.velocity}, {"max", j.max}};
+  if (motor.max > 0) out["motor"] = {{"velocity", motor.velocity}, {"max", motor.max}};
   return out;
 }
 
@@ -170,10 +172,11 @@ Written write_rigid(SceneWriter &to) {
   for (const RigidSet *set : sets) {
     std::vector<Written> rows;
     for (uint32_t i = 0; i < set->defs.size(); ++i) rows.push_back(rigid_body_of(to, *set, i));
-    for (const dfm_joint_def &j : set->joints) {
+    for (size_t k = 0; k < set->njoint; ++k) {
+      const dfm_joint_def &j = set->joints[k];
       Written &body = rows[j.body];
       const bool gone = j.with != DFM_RIGID_WORLD && rows[j.with].is_null();
-      if (!body.is_null() && !gone) body["joints"].push_back(joint_of(*set, j));
+      if (!body.is_null() && !gone) body["joints"].push_back(joint_of(*set, k));
     }
     for (Written &row : rows)
       if (!row.is_null()) bodies.push_back(std::move(row));

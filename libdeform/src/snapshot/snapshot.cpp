@@ -20,6 +20,7 @@
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/rigid/tool_touch.h"
+#include "step/step_impulses.h"
 #include "step/stages.h"
 #include "world/body_model.h"
 #include "world/obstacle_change.h"
@@ -324,6 +325,7 @@ void exchange(World &w, Staged &t) noexcept {
     StagedRigids &other = t.rigid_sets[i];
     set.state.swap(other.state);
     set.extra.swap(other.extra);
+    set.motors.swap(other.motors);
     set.total.swap(other.total);
     std::swap(set.last_h, other.last_h);
   }
@@ -390,6 +392,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   const unsigned char *const p = static_cast<const unsigned char *>(data);
   const uint64_t structure = check_head(p, bytes);
   SnapshotReader s(p + sizeof(SnapshotHead), p + bytes);
+  end_idle(w);
   ThingRows things;
   thing_fields(s, things);
   SnapshotIds ids(w, things);

@@ -55,6 +55,7 @@ struct StagedObstacle : ObstacleState { dfm_obstacle_def def{}; };
 struct StagedRigids {
   Array<dfm_rigid_state> state;
   Array<double> extra, total;
+  Array<RigidMotor> motors;
   double last_h = 0;
 };
 struct StagedTool { Tool::Cuts cuts; };
@@ -84,7 +85,7 @@ struct Staged : WorldState {
     for (StagedBody &b : bodies)
       use_memory(m, b.p.x, b.p.v, b.p.dampers.v, b.p.dampers.slow, b.p.load, b.p.held, b.model.state,
                  b.surfel_impulse, b.anchor);
-    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total);
+    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total, r.motors);
   }
 };
 
@@ -356,7 +357,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.must_hold("asleep", "a sleep that began in a sub-step before now, where bodies may sleep", [&] {
     return !b.sleep_state.asleep || (w.def.sleep && b.sleep_state.since <= w.time && b.sleep_state.h > 0);
   });
-  if (b.sleep_state.asleep)
+  if (b.sleep_state.h > 0)
     s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
   if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
   prescribed_fields(s, b, like);
@@ -502,6 +503,11 @@ void fields(Stream &s, W &w, const World &like) {
             must::Be{[](const dfm_rigid_state &x) { return good_state(x); },
                      "finite states and unit quaternions"});
     s.array("host's values", r.extra, l.extra.size(), must::finite);
+    s.array("motors", r.motors, l.motors.size(),
+            must::Be{[](const RigidMotor &x) {
+                       return std::isfinite(x.velocity) && x.max >= 0 && std::isfinite(x.max);
+                     },
+                     "a finite speed and a finite limit that is not negative"});
     s.array("impulse", r.total, l.total.size(), must::finite);
   });
   at = 0;

@@ -28,6 +28,6 @@ double Body::young() const {
   return 0;
 }
 
-double Body::impulse_time() const { return sleep_state.asleep ? sleep_state.h : world->report.h; }
+double Body::impulse_time() const { return sleep_state.h > 0 ? sleep_state.h : world->report.h; }
 
 }  // namespace dfm

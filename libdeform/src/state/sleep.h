@@ -11,7 +11,7 @@ struct SleepState {
   bool asleep = false;
   double quiet_time = 0;  // s during which no point was fast or far from its anchor
   double since = 0;       // s, when it fell asleep
-  double h = 0;           // s, the sub-step of its last contact impulses
+  double h = 0;           // s, the sub-step of its contact impulses, until it has new ones; else 0
   Vec3 force;             // N, of its contacts, while asleep
 };
 

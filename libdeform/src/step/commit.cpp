@@ -84,6 +84,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     b.dynamics->commit(moved);
     if (reads_points(w, b)) b.dynamics->see_points();
     ++b.x_version;
+    b.sleep_state.h = 0;
     book_change_work(w, b, now.h);
     if (!w.plan.touches()) return true;
     Vec3 sum;
@@ -92,6 +93,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     return true;
   });
   if (w.plan.touches()) {
+    end_idle(w);
     keep_contacts(w, step);
     keep_bonds(w, step);
     keep_cut_drags(w, step);

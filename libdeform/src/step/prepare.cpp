@@ -470,12 +470,13 @@ void choose_plan(World &w, StepContext &step, SceneFacts &facts, const SceneFact
   ++step.made.plans;
 }
 
-// While contacts exist it only decreases: a larger value would turn their rest distance into a depth, and
-// push them apart at 0.1 d_c / h.
-double choose_offset(const World &w) {
+// While contacts exist, also of rigid things with each other, it only decreases: a larger value would turn
+// their rest distance into a depth, and push them apart at 0.1 d_c / h.
+double choose_offset(const World &w, const SceneFacts &facts) {
   if (w.def.contact_offset > 0) return w.def.contact_offset;
   const double wanted = contact_offset(w);
-  return w.store.n > 0 ? std::min(w.offset, wanted) : wanted;
+  const bool exist = (when::acts(facts) && w.store.n > 0) || w.tool_store.n > 0;
+  return exist ? std::min(w.offset, wanted) : wanted;
 }
 
 }  // namespace
@@ -518,10 +519,14 @@ void prepare(World &w, const RestoredChoice *restored) {
   const SceneFacts planned = std::exchange(facts, {});
   struct Unplanned {  // where this fails before there is a plan, the next call makes one
     SceneFacts *facts;
+    World &w;
+    double offset;
     ~Unplanned() {
-      if (facts) *facts = {};
+      if (!facts) return;
+      *facts = {};
+      w.offset = offset;
     }
-  } unplanned{&facts};
+  } unplanned{&facts, w, w.offset};
   facts.bodies = nb;
   facts.obstacles = static_cast<unsigned>(w.obstacles.size());
   facts.sleep = w.def.sleep != 0;
@@ -533,6 +538,7 @@ void prepare(World &w, const RestoredChoice *restored) {
   view_obstacles_anew(w, step);
   view_rigids(w, facts);
   make_pair_tables(w, step, facts);
+  w.offset = restored ? restored->offset : choose_offset(w, facts);
   step.tools->prepare(w, facts);
   w.pairs.laws.clear();
   for (auto &l : w.laws) w.pairs.laws.push_back(l.get());
@@ -541,8 +547,6 @@ void prepare(World &w, const RestoredChoice *restored) {
   if (!restored && !w.plan.touches()) end_contacts(w);
   if (!w.plan.has(StageRole::finds_contacts) && !facts.self_bodies) step.contacts.clear();
 
-  const double before = w.offset;
-  w.offset = restored ? restored->offset : choose_offset(w);
   if (!restored) check_offset(w);
   for (auto &b : w.bodies)
     if (!b->surface.coincident.empty()) b->surface.back = 0.5 * w.offset;
@@ -551,7 +555,8 @@ void prepare(World &w, const RestoredChoice *restored) {
   step.active.reserve(nb);
   step.sinks.reserve(nb);
   reserve_sleep(w, step, nb);
-  if (w.sleepers > 0 && w.offset != before) wake_all(w);  // the rest distance of contacts has changed
+  if (w.sleepers > 0 && w.offset != unplanned.offset)
+    wake_all(w);  // the rest distance of contacts has changed
   gather_active(w);
   set_gravity_now(w);
   w.bound.age = kNone;

@@ -131,7 +131,7 @@ void rouse(World &w, std::span<const uint32_t> slots) {
         if (a.body == b.id && a.h > 0) a.total += ((w.time - b.sleep_state.since) / a.h) * a.sum();
       step.woken.push_back(i);
     }
-    b.sleep_state = {};
+    b.sleep_state = {false, 0, 0, b.sleep_state.h, {}};  // h: of its impulses, until the next ones
   }
   if (!w.changed) gather_active(w);  // otherwise prepare(w) does it, since its views are out of date
 }
@@ -344,18 +344,25 @@ void hold_sleepers(World &w) {
     w.store.held[m] = w.store.impulse[size_t(3) * m] > 0 && asleep(w, w.store.id_a[m]);
 }
 
-// Called before a body or an obstacle is removed from the world: bodies that touched it wake, and higher
-// slots in the contacts of sleeping bodies move down by one.
+// Called before a body or an obstacle is removed from the world: bodies that touched it wake, its contacts
+// name nothing and bear nothing until the next sub-step removes them, and higher slots in the contacts of
+// sleeping bodies move down by one.
 void close_slot(World &w, uint64_t id, bool obstacle) {
   const uint32_t slot = obstacle ? obstacle_slot_of(w, id) : slot_of(w, id);
   if (obstacle) wake_touching(w, id);
   else wake(w, *w.bodies[slot]);
   if (w.sleepers == 0) w.report.n = 0;
-  for (ContactPoint &c : w.report.contacts) {
-    // no longer touches; the next sub-step removes it
-    if (!obstacle && c.slot_a == slot) c.slot_a = kNone;
-    else if (!obstacle && c.slot_a > slot && c.slot_a != kNone) --c.slot_a;
-    if (bool(c.obstacle) == obstacle && c.slot_b > slot) --c.slot_b;
+  for (uint32_t i = 0; i < w.report.n; ++i) {
+    ContactPoint &c = w.report.contacts[i];
+    if (c.slot_a == kNone) continue;
+    const bool of_b = bool(c.obstacle) == obstacle;
+    if ((!obstacle && c.slot_a == slot) || (of_b && c.slot_b == slot)) {
+      c.slot_a = c.slot_b = kNone;
+      std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
+      continue;
+    }
+    if (!obstacle && c.slot_a > slot) --c.slot_a;
+    if (of_b && c.slot_b > slot) --c.slot_b;
   }
 }
 

@@ -64,7 +64,7 @@ void add(const World &w, double at, double time, Array<StepImpulses::Pair> &pair
     const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
     if (!(l[0] > 0)) continue;
     const ContactPoint &c = w.report.contacts[i];
-    uint64_t a = w.bodies[c.slot_a]->id, b = id_of_b(w, c);
+    uint64_t a = w.store.id_a[i], b = w.store.id_b[i];
     const bool turned = !c.obstacle && b < a;
     if (turned) std::swap(a, b);
     if (!pair || pair->a != a || pair->b != b) pair = &pair_of(pairs, a, b);
@@ -88,6 +88,7 @@ void begin_impulses(StepImpulses &s, double start, double length) {
 void reserve_impulses(World &w, size_t contacts, size_t pairs) {
   Array<StepImpulses::Pair> &list = w.step_impulses.pairs;
   const size_t most = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
+  if (w.step_impulses.idle > 0) contacts += w.report.n;
   list.reserve(list.size() + std::min(contacts, most) + pairs);
 }
 
@@ -103,6 +104,14 @@ void add_rigid_impulses(World &w) {
     pair.place += c.impulse[0] * c.point;
   }
   end(w.step_impulses, w.time, w.rigid_report.h, pairs);
+}
+
+void end_idle(World &w) {
+  StepImpulses &s = w.step_impulses;
+  if (!(s.idle > 0)) return;
+  reserve_impulses(w, 0, 0);
+  add(w, w.time - s.idle, s.idle, s.pairs);
+  s.idle = 0;
 }
 
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out) {

@@ -13,6 +13,8 @@ void begin_impulses(StepImpulses &s, double start, double length);  // s
 void reserve_impulses(World &w, size_t contacts, size_t pairs);
 void add_impulses(World &w);        // of the sub-step that the report holds
 void add_rigid_impulses(World &w);  // of the one that the report of rigid things holds
+// Before the report changes: adds what sleepers have exchanged in the idle sub-steps up to now.
+void end_idle(World &w);
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out);
 
 }  // namespace dfm

@@ -20,6 +20,7 @@
 #include "step/rigid/tool_touch.h"
 #include "step/solve/attach.h"
 #include "step/stages.h"
+#include "step/step_impulses.h"
 #include "world/body_effects.h"
 #include "world/body_model.h"
 #include "world/body_surface.h"
@@ -339,6 +340,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {
+  end_idle(w);
   drop_attachments(w, id);
   close_slot(w, id, obstacle);
   end_sensor_overlaps(w, id);

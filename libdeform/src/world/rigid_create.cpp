@@ -129,6 +129,7 @@ void query_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *d
     fail(DFM_E_FATAL, "rigid host '%s' leaves out a group number", host);
   set.extra.assign(nextra, 0.0);
   set.next_extra.assign(nextra, 0.0);
+  set.motors.resize(set.njoint);
   for (uint32_t k = 0; k < set.njoint; ++k)
     if (joints[k].motor) set_rigid_motor(set, k, joints[k].velocity, joints[k].max);
 }

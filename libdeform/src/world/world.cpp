@@ -49,11 +49,15 @@ Obstacle *World::find_obstacle(const std::string &name) {
 }
 
 uint64_t World::handle_of(uint64_t id) const {
-  for (auto *list : {&bodies, &emptied, &rolled_back})
-    for (auto &b : *list)
-      if (b->id == id) return b->handle;
-  const Obstacle *const o = obstacle(id);
-  return o ? o->handle : 0;
+  const auto among = [id](const auto &list) -> const Body * {
+    const auto at = std::ranges::find(list, id, [](const auto &b) { return b->id; });
+    return at != list.end() ? at->get() : nullptr;
+  };
+  if (const Body *const b = among(bodies)) return b->handle;
+  if (const Body *const b = among(emptied)) return b->handle;
+  if (const Obstacle *const o = obstacle(id)) return o->handle;
+  const Body *const gone = among(rolled_back);  // last: what came after the restore may have its id
+  return gone ? gone->handle : 0;
 }
 
 }  // namespace dfm

@@ -23,7 +23,7 @@ bool finite_values(std::span<const dfm_rigid_state> states) {
 
 RigidSet::RigidSet(World &w, const Memory &m, const std::string &name)
     : world(&w), host_name(name), host(find_host(name)) {
-  use_memory(m, state, next);
+  use_memory(m, state, next, motors);
   use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
 }
 

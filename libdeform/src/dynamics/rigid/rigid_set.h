@@ -25,13 +25,15 @@ struct HostFault {
 void need_memory(dfm_status status);  // throws std::bad_alloc if the host had no memory
 bool finite_values(std::span<const dfm_rigid_state> states);
 
+struct RigidMotor { double velocity = 0, max = 0; };  // max 0: none
+
 struct RigidSet {
   World *world;
   std::string host_name;
   dfm_rigid_host host;
   void *self = nullptr;
   std::vector<dfm_rigid_def> defs;                   // without names: the obstacles have them
-  std::vector<dfm_joint_def> joints;                 // [njoint] with their motors as they were last set
+  std::vector<dfm_joint_def> joints;                 // [njoint] as created
   std::vector<uint64_t> obstacle;                    // [n] ids
   bool elsewhere = false;                            // made with data: bodies of a world that the host owns
   uint32_t njoint = 0, ngroup = 0, first_group = 0;  // first_group: of this set among the world's
@@ -40,6 +42,7 @@ struct RigidSet {
 
   Array<dfm_rigid_state> state, next;  // [n] now; at the end of the sub-step
   Array<double> extra, next_extra;     // the host's
+  Array<RigidMotor> motors;            // [njoint] as the host was last told
   // [n,6] mean velocity without contact; contact impulse of the last sub-step
   Array<double> velocity, impulse;
   // [n,6] velocity that detection used; the solve starts from the later one

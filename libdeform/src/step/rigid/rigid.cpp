@@ -305,9 +305,7 @@ void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max)
          velocity, max);
   check_joint(set, joint, DFM_OK);
   check_joint(set, joint, set.host.set_motor(set.self, joint, velocity, max, set.extra.data()));
-  set.joints[joint].motor = max > 0;
-  set.joints[joint].velocity = velocity;
-  set.joints[joint].max = max;
+  set.motors[joint] = {velocity, max};
 }
 
 void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort) {

@@ -84,8 +84,8 @@ bool ToolTouch::belong_together(const World &w, const Obstacle &a, const Obstacl
 void ToolTouch::list_joints(Moved &m) {
   const RigidSet &set = *m.set;
   m.jointed.assign(set.ngroup, 0);
+  for (const RigidMotor &motor : set.motors) m.drives = m.drives || motor.max > 0;
   for (const dfm_joint_def &j : set.joints) {
-    m.drives = m.drives || j.motor;
     for (const uint32_t body : {j.body, j.with})
       if (body != DFM_RIGID_WORLD && is_moved(set, body)) m.jointed[set.group[body]] = 1;
   }
@@ -143,7 +143,8 @@ bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
   const Vec3 at = center(side) + side.arm;
   return std::any_of(set.joints.begin(), set.joints.end(), [&](const dfm_joint_def &j) {
     const uint32_t body = is_moved(set, j.body) || j.with == DFM_RIGID_WORLD ? j.body : j.with;
-    if (!j.motor || set.group[body] != set.group[side.part]) return false;
+    if (!(set.motors[size_t(&j - set.joints.data())].max > 0) || set.group[body] != set.group[side.part])
+      return false;
     const dfm_pose &was = set.defs[body].pose;
     const dfm_rigid_state &s = set.state[body];
     const Quat turn = load_quat(s.rotation) * conjugate(unit_quat(was.rotation));

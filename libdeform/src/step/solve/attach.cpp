@@ -150,6 +150,15 @@ void keep_bonds(World &w, StepContext &step) {
   }
 }
 
+size_t part_released(World &w, size_t known) {
+  const auto released = [](const Attachment &a) { return a.released; };
+  const size_t n = size_t(std::ranges::count_if(w.attachments, released));
+  if (n > known)
+    for (const Attachment &a : w.attachments)
+      if (a.released) part(w, a);
+  return n;
+}
+
 void drop_released(World &w) {
   const auto gone = [](const Attachment &a) { return a.released; };
   if (std::none_of(w.attachments.begin(), w.attachments.end(), gone)) return;
