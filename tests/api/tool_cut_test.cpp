@@ -473,6 +473,22 @@ TEST(ToolCut, SnapshotOfABladeThatOwes_GoesOnTheSameWay) {
   EXPECT_TRUE(test::snapshot(s.w) == end);
 }
 
+// A tool that has gone, or cuts no more, owes nothing: the body rests.
+TEST(ToolCut, BladeThatOwesAndStopsCutting_LetsTheBodySleep) {
+  for (const bool destroyed : {true, false}) {
+    Tough s(2000, all, "msm", DFM_INTEGRATOR_IMPLICIT_EULER);
+    test::ok(dfm_world_filter_pair(s.w, "cube", "knife", false));
+    test::ok(dfm_world_set_sleep(s.w, true));
+    s.down(0.01, 0.1);
+    test::run(s.w, 0.7, 1e-2);
+    EXPECT_EQ(test::stats(s.w).asleep, 0u) << "the blade pulls at it";
+    if (destroyed) test::ok(dfm_tool_destroy(s.t));
+    else test::ok(dfm_tool_set_cuts(s.t, DFM_CUT_SPLIT, 0, 0, nullptr));
+    test::run(s.w, 0.7, 1e-2);
+    EXPECT_EQ(test::stats(s.w).asleep, 1u) << destroyed;
+  }
+}
+
 // ---- scenes ---------------------------------------------------------------------------------------------
 
 namespace {

@@ -17,6 +17,7 @@
 #include "state/tool.h"
 #include "state/world.h"
 #include "step/stages.h"
+#include "step/solve/cut_drag.h"
 #include "world/may_cut.h"
 
 namespace dfm {
@@ -284,6 +285,7 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
   t.cuts.bodies.swap(ids);
   wake_all(w);
   w.changed = true;
+  forget_dues(w, t);
 }
 
 void begin_cuts(World &w) {
