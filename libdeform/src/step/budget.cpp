@@ -130,6 +130,7 @@ void changing(Stream &s, World &w) {
     s.one(b->changes);
     s.one(b->sleep_state);
     s.one(b->bound);
+    for (BladeTrack &track : b->blades) s.many(track.cut_work);
   }
   for (auto &o : w.obstacles) {
     s.one(o->pose);
