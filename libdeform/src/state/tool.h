@@ -30,7 +30,8 @@ struct Tool {
   struct Cuts {
     uint32_t how = 0, most = 0;
     std::vector<uint64_t> bodies;  // ids, ascending
-    std::vector<Pose> from;        // places of its parts at the start of the step; empty: it has never cut
+    std::vector<Pose> from;        // places of its parts up to which it has cut; empty: it has never cut
+    bool waits = false;            // a step has failed: what it moved in that is yet to be cut
   } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
   // with its pieces

@@ -304,6 +304,7 @@ void teleport_tool(Tool &t, const dfm_pose &pose) {
   World &w = *t.world;
   const Pose place = to_pose(pose);
   start_at(t, place);
+  t.cuts.waits = false;
   ToolValues v = t.values();
   v.keyed = 0;
   t.store(v);
