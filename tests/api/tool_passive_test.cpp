@@ -245,3 +245,25 @@ TEST(ToolPassive, StepsThatTheBudgetEnds_CountTheWayMade) {
   EXPECT_GT(std::abs(given), 5e-7);
   EXPECT_NEAR(s.state().port_work, given, 1e-12);
 }
+
+// Of a device that is late by more steps than there are forces kept.
+TEST(ToolPassive, ManyShortStepsOfALateDevice_AreCountedWithTheirForces) {
+  constexpr double kShort = 5e-5, kLate = 0.05;
+  constexpr size_t kSteps = 1000;
+  Scene s(uint32_t{DFM_SHAPE_PLANE}, 300, 1.0, DFM_TOOL_PASSIVE, kLate);
+  std::deque<double> force(kSteps + 1, 0.0);
+  double z = 0.011, given = 0;
+  for (int i = 0; i < 6000; ++i) {
+    const double way = i < 3000 ? -1e-6 : 5e-7;
+    const dfm_pose p = {{0, 0, z += way}, {0, 0, 0, 1}};
+    test::ok(dfm_tool_set_pose(s.tool, &p, nullptr));
+    given -= force.front() * way;
+    test::ok(dfm_world_step(s.w, kShort, nullptr));
+    double f[3], t[3];
+    test::ok(dfm_tool_feedback(s.tool, f, t));
+    force.push_back(f[2]);
+    force.pop_front();
+  }
+  EXPECT_GT(std::abs(given), 1e-5);
+  EXPECT_NEAR(s.state().port_work, given, 0.01 * std::abs(given));
+}

@@ -121,7 +121,7 @@ void end_tools(World &w, double dt) {
     // the hand gets the other side of what holds the tool
     for (int k = 0; k < 6; ++k) v.given[k] = -v.coupling[k] / dt;
     if (t->def.flags & DFM_TOOL_PASSIVE) keep_passive(t->motion, v);
-    if (t->motion.late > 0) t->remember(w.time, v);
+    if (t->is_to_remember(w.time, v)) t->remember(w.time, v);
     t->store(v);
   }
 }
