@@ -567,6 +567,26 @@ void fall_into_shaft(double shift, ShaftFall &out) {
 
 }  // namespace
 
+// Also off what is thinner than a dent.
+TEST(RigidTouch, APlateOnAPlate_IsLiftedOff) {
+  for (const double half : {5e-4, 5e-5, 5e-6}) {
+    test::Context c;
+    const dfm_world w = test::make_world(c, {0, 0, 0});
+    dfm_rigid_def lower = test::box("lower", {2e-3, 2e-3, half}, 1), upper = lower;
+    lower.fixed = 1;
+    upper.name = "upper";
+    upper.pose.position[2] = 2 * half + 1e-6;
+    upper.pose.rotation[2] = std::sin(3.14159265358979 / 8);
+    upper.pose.rotation[3] = std::cos(3.14159265358979 / 8);
+    upper.velocity[2] = 0.3;
+    test::create(w, {lower});
+    const dfm_rigid plate = test::create(w, {upper})[0];
+    test::run(w, 0.01, 1e-3);
+    EXPECT_NEAR(test::state(plate).velocity[2], 0.3, 1e-9) << half;
+    for (int k = 0; k < 3; ++k) EXPECT_NEAR(test::state(plate).spin[k], 0, 1e-6) << half;
+  }
+}
+
 // They jam, turn and carry each other: no corner goes into a wall or the floor, and no step makes energy.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, BoxesInAShaft_StayInside) {

@@ -473,6 +473,82 @@ TEST(ToolCut, SnapshotOfABladeThatOwes_GoesOnTheSameWay) {
   EXPECT_TRUE(test::snapshot(s.w) == end);
 }
 
+// A tool that has gone, or cuts no more, owes nothing: the body rests.
+TEST(ToolCut, BladeThatOwesAndStopsCutting_LetsTheBodySleep) {
+  for (const bool destroyed : {true, false}) {
+    Tough s(2000, all, "msm", DFM_INTEGRATOR_IMPLICIT_EULER);
+    test::ok(dfm_world_filter_pair(s.w, "cube", "knife", false));
+    test::ok(dfm_world_set_sleep(s.w, true));
+    s.down(0.01, 0.1);
+    test::run(s.w, 0.7, 1e-2);
+    EXPECT_EQ(test::stats(s.w).asleep, 0u) << "the blade pulls at it";
+    if (destroyed) test::ok(dfm_tool_destroy(s.t));
+    else test::ok(dfm_tool_set_cuts(s.t, DFM_CUT_SPLIT, 0, 0, nullptr));
+    test::run(s.w, 0.7, 1e-2);
+    EXPECT_EQ(test::stats(s.w).asleep, 1u) << destroyed;
+  }
+}
+
+// A step that is interrupted gives back what its sub-steps have paid of it.
+TEST(ToolCut, InterruptedWhereABladePays_IsAsBeforeTheStep) {
+  struct Stop {
+    dfm_world world;
+    int at, met = 0;
+    static void pre_solve(void *user, dfm_contact_choice *) {
+      Stop &s = *static_cast<Stop *>(user);
+      if (s.met++ == s.at) test::ok(dfm_world_interrupt(s.world));
+    }
+  };
+  Tough plain(0, sides), s(0, sides);
+  plain.down(0.02, 0.2);
+  s.down(0.02, 0.2);
+  Stop none{plain.w, -1};
+  test::ok(dfm_world_set_pre_solve(plain.w, &Stop::pre_solve, &none));
+  plain.down(0.0198, 0.2);
+  ASSERT_GT(test::stats(plain.w).last_substeps, 1u);
+  Stop stop{s.w, none.met - 1};  // at the last contact of the step
+  test::ok(dfm_world_set_pre_solve(s.w, &Stop::pre_solve, &stop));
+  const dfm_pose p{{0.001, 0, 0.0198}, {0, 0, 0, 1}};
+  test::ok(dfm_tool_set_pose(s.t, &p, nullptr));
+  ASSERT_EQ(dfm_world_step(s.w, 1e-3, nullptr), DFM_DISCARD);
+  s.down(0.0198, 0.2);
+  EXPECT_EQ(dfm_world_hash(s.w), dfm_world_hash(plain.w));
+}
+
+// A load that overflows in the middle of a step ends it there, and the blade has moved on.
+TEST(ToolCut, StepThatFailsHalfWay_LeavesNoBridge) {
+  for (const uint32_t how : {DFM_CUT_SPLIT, DFM_CUT_REMOVE}) {
+    Cube whole, s;
+    uint32_t opened[2] = {};
+    for (Cube *const c : {&whole, &s}) {
+      const dfm_tool t =
+          how == DFM_CUT_SPLIT ? blade(c->w) : make(c->w, DFM_TOOL_SPHERE, {}, {0.001, 0, 0.05}, 0.004);
+      cuts(t, how, c->body);
+      test::BodyOptions o;
+      o.name = "far";
+      o.position = {1, 0, 0};
+      const dfm_body far = test::make_body(c->context, c->w, "beam", {0.04, 0.04, 0.04}, 60, o);
+      move(c->w, t, {0.001, 0, 0.05}, {0.001, 0, 0.021}, 2);
+      const dfm_pose p{{0.001, 0, -0.03}, {0, 0, 0, 1}};
+      test::ok(dfm_tool_set_pose(t, &p, nullptr));
+      const double huge[3] = {0, 0, 1.7e308}, now = dfm_world_time(c->w);
+      const dfm_scale_key grow[2] = {{now + 6e-4, 0}, {now + 7e-4, 1e20}};
+      uint32_t load = 0, point = 4;
+      if (c == &s) {
+        test::ok(dfm_body_add_load(far, 1, &point, huge, 2, grow, nullptr, &load));
+        ASSERT_EQ(dfm_world_step(c->w, 1e-3, nullptr), DFM_E_DIVERGED);
+        ASSERT_GT(dfm_world_time(c->w), now);
+        test::ok(dfm_body_remove_load(far, load));
+      }
+      test::ok(dfm_world_step(c->w, now + 1e-3 - dfm_world_time(c->w), nullptr));
+      opened[c == &s] = uint32_t(cut_events(c->w, c->body, t).sum);
+    }
+    EXPECT_GT(opened[0], 0u);
+    EXPECT_EQ(opened[1], opened[0]) << how;
+    EXPECT_EQ(parts(s.body), parts(whole.body)) << how;
+  }
+}
+
 // ---- scenes ---------------------------------------------------------------------------------------------
 
 namespace {

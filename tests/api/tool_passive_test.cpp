@@ -219,3 +219,51 @@ TEST(ToolPassive, AgainstAnObstacle_TheHandGetsNoMoreThanOnABody) {
     EXPECT_LT(bound.swing, 0.01);
   }
 }
+
+// A step that its budget ends early is work over the way that the device has made by then.
+TEST(ToolPassive, StepsThatTheBudgetEnds_CountTheWayMade) {
+  Scene s(2e6, 300, 1.0, DFM_TOOL_PASSIVE);
+  test::BodyOptions o;  // short sub-steps
+  o.position = {1, 0, 0};
+  o.velocity = {0, 0, 1};
+  o.young = 1e7;
+  o.damping_stiffness = 1e-5;
+  o.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  test::make_body(s.context, s.w, "beam", {0.05, 0.05, 0.05}, 60, o);
+  double given = 0;
+  for (int i = 0; i < 400; ++i) {
+    if (i == 5) test::ok(dfm_world_set_budget(s.w, 0, 1));
+    const dfm_pose p = {{0, 0, 0.011 - (i < 100 ? 2e-4 : -2e-4)}, {0, 0, 0, 1}};
+    const double from = s.state().device.position[2];
+    double f[3], t[3];
+    test::ok(dfm_tool_feedback(s.tool, f, t));
+    test::ok(dfm_tool_set_pose(s.tool, &p, nullptr));
+    test::ok(dfm_world_step(s.w, 100 * kStep, nullptr));
+    given -= f[2] * (s.state().device.position[2] - from);
+  }
+  EXPECT_GT(test::stats(s.w).shortened, 300u);
+  EXPECT_GT(std::abs(given), 5e-7);
+  EXPECT_NEAR(s.state().port_work, given, 1e-12);
+}
+
+// Of a device that is late by more steps than there are forces kept.
+TEST(ToolPassive, ManyShortStepsOfALateDevice_AreCountedWithTheirForces) {
+  constexpr double kShort = 5e-5, kLate = 0.05;
+  constexpr size_t kSteps = 1000;
+  Scene s(uint32_t{DFM_SHAPE_PLANE}, 300, 1.0, DFM_TOOL_PASSIVE, kLate);
+  std::deque<double> force(kSteps + 1, 0.0);
+  double z = 0.011, given = 0;
+  for (int i = 0; i < 6000; ++i) {
+    const double way = i < 3000 ? -1e-6 : 5e-7;
+    const dfm_pose p = {{0, 0, z += way}, {0, 0, 0, 1}};
+    test::ok(dfm_tool_set_pose(s.tool, &p, nullptr));
+    given -= force.front() * way;
+    test::ok(dfm_world_step(s.w, kShort, nullptr));
+    double f[3], t[3];
+    test::ok(dfm_tool_feedback(s.tool, f, t));
+    force.push_back(f[2]);
+    force.pop_front();
+  }
+  EXPECT_GT(std::abs(given), 1e-5);
+  EXPECT_NEAR(s.state().port_work, given, 0.01 * std::abs(given));
+}

@@ -172,6 +172,39 @@ TEST(Bounce, InterruptedInAnImpact_IsAsBeforeTheStep) {
   EXPECT_TRUE(struck);
 }
 
+// A step that is too long for explicit bodies ends the impact.
+TEST(Bounce, InterruptedWhereAnImpactEnds_IsAsBeforeTheStep) {
+  const test::Context one, other;
+  dfm_world w[2] = {0, 0};
+  for (int k = 0; k < 2; ++k) {
+    dfm_world_def d = scene();
+    d.max_substeps = 300;
+    test::ok(dfm_world_create(k == 0 ? one : other, &d, &w[k]));
+    drop(k == 0 ? one : other, w[k], 2e7, "msm");
+  }
+  const auto struck = [](dfm_world world) {
+    return test::explain(world).find("until an impact is over") != std::string::npos;
+  };
+  while (!struck(w[0]) && dfm_world_time(w[0]) < 0.4) {
+    const double h = std::min(offered(w[0]), 0.002);
+    for (const dfm_world world : w) step(world, h);
+  }
+  ASSERT_TRUE(struck(w[0]));
+  test::ok(dfm_world_interrupt(w[1]));
+  ASSERT_EQ(dfm_world_step(w[1], 0.1, nullptr), DFM_DISCARD);
+  EXPECT_NE(std::string(dfm_last_error()).find("interrupted"), std::string::npos) << dfm_last_error();
+  EXPECT_TRUE(struck(w[1]));
+  EXPECT_EQ(dfm_world_hash(w[1]), dfm_world_hash(w[0]));
+  for (int k = 0; k < 5; ++k) {
+    const double h = std::min(offered(w[0]), 0.002);
+    EXPECT_EQ(std::min(offered(w[1]), 0.002), h);
+    for (const dfm_world world : w) step(world, h);
+    EXPECT_EQ(dfm_world_hash(w[1]), dfm_world_hash(w[0]));
+  }
+  step(w[1], 0.1);
+  EXPECT_FALSE(struck(w[1]));
+}
+
 TEST(Bounce, RestoredWithinAnImpact_ContinuesWithTheSameBits) {
   const test::Context one, many(3);
   dfm_world w[2] = {0, 0};

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <utility>
 #include <vector>
 
 #include "core/error.h"
@@ -16,6 +17,7 @@
 #include "state/obstacle.h"
 #include "state/tool.h"
 #include "state/world.h"
+#include "step/solve/cut_drag.h"
 #include "step/stages.h"
 #include "world/may_cut.h"
 
@@ -277,19 +279,23 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
     for (Body *const b : bodies)
       if (b->inner.empty()) b->inner = inner_faces(*b);
   t.cuts.from.resize(t.motion.parts.size());
+  t.cuts.waits = false;
   for (auto &o : w.obstacles)
     if (o->rigid == t.set) w.overlaps.place(o->id);  // what it was in without touching it
   t.cuts.how = how;
   t.cuts.most = most;
   t.cuts.bodies.swap(ids);
+  forget_dues(w, t);
   wake_all(w);
   w.changed = true;
 }
 
 void begin_cuts(World &w) {
-  for (auto &t : w.tools)
+  for (auto &t : w.tools) {
+    if (std::exchange(t->cuts.waits, true)) continue;
     for (size_t part = 0; part < t->cuts.from.size(); ++part)
       t->cuts.from[part] = load_pose(t->set->state[part]);
+  }
 }
 
 void cut_by_tools(World &w, double dt) {
@@ -319,6 +325,7 @@ void cut_by_tools(World &w, double dt) {
       report();
       if (n > 0) separate_if_requested(b);
     }
+    t.cuts.waits = false;
   }
   open_scheduled(w, dt);
   prepare_cuts(w);

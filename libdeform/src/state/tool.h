@@ -30,7 +30,8 @@ struct Tool {
   struct Cuts {
     uint32_t how = 0, most = 0;
     std::vector<uint64_t> bodies;  // ids, ascending
-    std::vector<Pose> from;        // places of its parts at the start of the step; empty: it has never cut
+    std::vector<Pose> from;        // places of its parts up to which it has cut; empty: it has never cut
+    bool waits = false;            // a step has failed: what it moved in that is yet to be cut
   } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
   // with its pieces
@@ -49,6 +50,11 @@ struct Tool {
     ToolGiven g;
     std::memcpy(&g, set->extra.data() + kToolValues + row * (sizeof g / sizeof(double)), sizeof g);
     return g;
+  }
+  // Of steps that are many to the delay only some: what is kept reaches back as far as the device is late.
+  bool is_to_remember(double t, const ToolValues &v) const {
+    const size_t n = static_cast<size_t>(v.ngiven);
+    return motion.late > 0 && (n == 0 || !(t - past((n - 1) % kToolPast).t < motion.late / (kToolPast - 1)));
   }
   void remember(double t, ToolValues &v) {
     const size_t row = static_cast<size_t>(v.ngiven) % kToolPast;

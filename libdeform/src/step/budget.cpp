@@ -130,6 +130,7 @@ void changing(Stream &s, World &w) {
     s.one(b->changes);
     s.one(b->sleep_state);
     s.one(b->bound);
+    for (BladeTrack &track : b->blades) s.many(track.cut_work);
   }
   for (auto &o : w.obstacles) {
     s.one(o->pose);
@@ -350,11 +351,11 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
-  const bool in_impact = w.impact_until > 0;
+  const double impact_until = w.impact_until;
   try {
     status = run_step(w, step, dt, trouble);
   } catch (const StepInterrupted &) {
-    if (w.impact_until > 0 && !in_impact) end_impact(w);  // it began in this step
+    undo_impact(w, impact_until);
     return_to_start(w, step);
     set_last_error((at_step(w) + " was interrupted; the state is as before the step").c_str());
     *trouble = DFM_TROUBLE_INTERRUPTED;

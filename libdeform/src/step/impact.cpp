@@ -11,6 +11,7 @@
 #include "plugin/context.h"
 #include "state/obstacle.h"
 #include "state/world.h"
+#include "step/budget.h"
 #include "step/context.h"
 #include "step/messages.h"
 #include "step/sides.h"
@@ -91,6 +92,8 @@ size_t turn(World &w, Chosen from, Chosen to) {
     made.emplace_back(b.get(), make_dynamics(w.meters.dynamics.memory(), b->p, b->surface, b->model, b->edges,
                                              to == Chosen::implicit ? &implicit : nullptr));
   }
+  if (made.empty()) return 0;
+  save_start(w, *w.steps);  // dampers
   for (auto &[b, dynamics] : made) {
     b->dynamics.swap(dynamics);
     b->integrator.chosen = to;
@@ -99,7 +102,6 @@ size_t turn(World &w, Chosen from, Chosen to) {
     b->bound.known = false;
     relax_dampers(b->p);
   }
-  if (made.empty()) return 0;
   ++w.integrator_times.changes;
   w.changed = true;
   w.sizes = {};  // another bound, and other errors
@@ -150,6 +152,12 @@ bool end_impact(World &w) {
     if (b->integrator.chosen == Chosen::in_impact && !b->model.can(DFM_CAP_STIFFNESS))
       b->integrator.chosen = Chosen::explicitly;
   return turn(w, Chosen::in_impact, Chosen::implicit) > 0;
+}
+
+void undo_impact(World &w, double until) {
+  if (w.impact_until > 0 && until == 0) end_impact(w);
+  if (w.impact_until == 0 && until > 0) turn(w, Chosen::implicit, Chosen::in_impact);
+  w.impact_until = until;
 }
 
 void follow_impact(World &w, double dt) {

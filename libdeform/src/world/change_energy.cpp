@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/error.h"
 #include "step/watch/energy_watch.h"
@@ -15,13 +16,20 @@ namespace {
 constexpr double kMax = 0.1, kLittle = 0.01;
 // Relative to its elastic energy, if the body has lost what earlier changes added.
 constexpr double kAnother = 4;
-constexpr double kSmallJump = 1e-9;  // J, counts as none
+// Relative to its energies: counts as none.
+constexpr double kSmallJump = 1e-9;
 
 double finite_or_none(double joule) { return std::isfinite(joule) ? joule : 0; }
 double energy_now(Body &b) { return moving_energy(b) + finite_or_none(elastic_energy(b)); }
 double jump_of(const Swap &s) { return finite_or_none(s.after) - finite_or_none(s.before); }
 
 }  // namespace
+
+double rounded_energy(const Body &b) {
+  double young = 0;
+  for (const Material &m : b.composition.materials) young = std::max(young, m.def.young);
+  return std::numeric_limits<double>::epsilon() * young * b.rest_volume;
+}
 
 ChangeBook check_changes(const Body &b, double elastic) {
   ChangeBook out = b.changes;
@@ -41,7 +49,8 @@ ChangeBook check_changes(const Body &b, double elastic) {
 void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap) {
   const double jump = jump_of(swap), share = kMax * before.largest;
   const bool paid = before.unpaid <= kLittle * before.largest;
-  if (!(jump > kSmallJump) || (paid && std::isnan(swap.before))) return;
+  const double none = rounded_energy(b) + kSmallJump * std::max(before.largest, finite_or_none(swap.before));
+  if (!(jump > none) || (paid && std::isnan(swap.before))) return;
   double limit = std::max(share, paid ? kAnother * swap.before : 0);
   if (std::isfinite(swap.max_jump)) limit = std::max(limit, swap.max_jump);
   if (before.unpaid + jump <= limit) return;

@@ -7,6 +7,8 @@
 
 namespace dfm {
 
+// J: rounding of positions makes less elastic energy. It is that of a strain of the square root of epsilon.
+double rounded_energy(const Body &b);
 // The book at the present state, with this elastic energy (NaN: none).
 ChangeBook check_changes(const Body &b, double elastic);
 // Adds a change, given by the book before it and the swap. Throws Error, DFM_DISCARD, if the unpaid jumps

@@ -31,10 +31,9 @@ namespace {
 constexpr char kMaxJump[] = "max_jump";
 // Largest displacement of the surface, relative to the size of the body, by a model that steps itself.
 constexpr double kSurfaceStays = 1e-6;
-constexpr double kInstant = 1e-9;    // s, too short for any motion
-constexpr double kSlender = 1e-3;    // of the longest arm: shorter arms define no direction
-constexpr double kOnTime = 1e-6;     // of a step: a switch may be early by this share
-constexpr double kSmallJump = 1e-9;  // J
+constexpr double kInstant = 1e-9;  // s, too short for any motion
+constexpr double kSlender = 1e-3;  // of the longest arm: shorter arms define no direction
+constexpr double kOnTime = 1e-6;   // of a step: a switch may be early by this share
 constexpr size_t kMaxSwaps = 4096;
 constexpr size_t kSpares = 2;  // a rule has three models
 
@@ -209,7 +208,7 @@ void check_jump(const Body &b, const Swap &swap) {
 void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
   const double jump = std::fabs(swap.after - swap.before);
   const double has = std::min(swap.before, swap.after) + kinetic_of(b);
-  if (!std::isinf(swap.max_jump) || !(jump > has + kSmallJump)) return;
+  if (!std::isinf(swap.max_jump) || !(jump > has + rounded_energy(b))) return;
   w.context->logf(
       DFM_LOG_WARNING,
       "t = %g s, body '%s': from '%s' to '%s' its elastic energy jumps from %g J to %g J, by more than all "

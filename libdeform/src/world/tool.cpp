@@ -11,6 +11,7 @@
 #include "state/tool.h"
 #include "state/world.h"
 #include "step/rigid/rigid.h"
+#include "step/solve/cut_drag.h"
 #include "step/stages.h"
 #include "world/attach.h"
 #include "world/find.h"
@@ -240,6 +241,8 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
 
 void destroy_tool(Tool &t) {
   World &w = *t.world;
+  t.cuts.bodies.clear();
+  forget_dues(w, t);
   destroy_rigids(*t.set);
   handle_destroy(t.handle);
   std::erase_if(w.tools, [&](auto &p) { return p.get() == &t; });
@@ -301,6 +304,7 @@ void teleport_tool(Tool &t, const dfm_pose &pose) {
   World &w = *t.world;
   const Pose place = to_pose(pose);
   start_at(t, place);
+  t.cuts.waits = false;
   ToolValues v = t.values();
   v.keyed = 0;
   t.store(v);

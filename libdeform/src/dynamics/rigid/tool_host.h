@@ -44,7 +44,7 @@ struct ToolValues {
   double port_work;                // J, with `given` held while the hand makes a step
   double tank;                     // J, port_work, whose negative part decays over time
   double given[6];                 // N and N m on the hand after the last step, world frame
-  double ngiven;                   // forces given so far, of a late device
+  double ngiven;                   // forces kept so far, of a late device
 };
 inline constexpr size_t kToolValues = sizeof(ToolValues) / sizeof(double);
 // After the values, for a late device: the last forces and their times. Force number k is in row k mod

@@ -23,13 +23,13 @@ namespace {
 constexpr double kDone = 1e-2;             // of what slips may be off by at rest: less changes nothing
 constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
 constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
-constexpr double kDent = 5e-4;             // m: edges that are further on the wrong side do not touch there
+constexpr double kDent = 5e-4;             // m, Pair::dent, of what is not thin
 constexpr double kCross = 1e-6;            // sine between edges that have a normal
 constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
 constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
 constexpr double kMinSubstep = 1.0 / 256;  // of a planned sub-step
-constexpr double kNear = 0.5;       // of the least thickness: a row with an impulse is no longer than this
-constexpr double kFaster = 0.5;     // of the change by the pass before: else passes end
+constexpr double kNear = 0.5;    // of the least thickness: no row with an impulse is longer, no dent deeper
+constexpr double kFaster = 0.5;  // of the change by the pass before: else passes end
 constexpr uint32_t kMaxPasses = 6;  // over what turning adds, until it changes no more
 
 bool builtin(const Obstacle &o) { return o.rigid && !o.rigid->of_tool && o.rigid->host_name == "builtin"; }
@@ -134,7 +134,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
         touch = rule->collide;
       if (!touch || belong_together(w, a, b)) continue;
       if (!apart) {
-        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0});
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0, 0});
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
@@ -145,6 +145,8 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       const bool frees = !of_tool(a) && !of_tool(b), jaw = is_jaw(a) || is_jaw(b);
       facts.rigid_pairs += frees;
       const uint32_t wall_a = wall(i), wall_b = wall(j);
+      const auto thick = [&](const Obstacle &o) { return frees || of_tool(o) ? thickness(o) : HUGE_VAL; };
+      const double least = std::min(thick(a), thick(b));
       pairs_.push_back({i,
                         j,
                         law_of_obstacles(w, a, b),
@@ -153,7 +155,8 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
                         jaw,
                         b_first(a, b),
                         {wall_a, wall_b},
-                        frees ? std::min(thickness(a), thickness(b)) : HUGE_VAL});
+                        frees ? least : HUGE_VAL,
+                        std::min(kDent, kNear * least)});
       thinnest_ = std::min(thinnest_, pairs_.back().thin);
     }
   facts.rigid_rows = !pairs_.empty();
@@ -436,7 +439,7 @@ double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at
       Vec3 n;
       if (!between(p, q, on_a - on_b, n)) continue;
       const double gap = dot(n, on_a - on_b) - round;
-      if (gap < -kDent) continue;
+      if (gap < -(round > 0 ? kDent : pair.dent)) continue;
       add_row(pair, {kEdges, p.number, q.number}, at_a, at_b,
               {on_b + (b.round() + 0.5 * gap) * n, on_a, on_b}, n, gap, reach);
     }

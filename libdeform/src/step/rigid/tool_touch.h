@@ -115,6 +115,7 @@ class ToolTouch {
     bool b_first;      // reports have b first
     uint32_t wall[2];  // number among walls_; kNone: it is in a set
     double thin;       // m, least thickness of the two
+    double dent;       // m: edges that are further on the wrong side do not touch there
   };
   struct Row {
     const Pair *pair;

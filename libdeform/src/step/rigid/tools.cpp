@@ -46,6 +46,14 @@ ToolForce felt(const Tool &tool, const ToolValues &v, double now) {
   return {};
 }
 
+// J, of the hand that goes this way against what it feels.
+double work_of(const ToolForce &hand, const Way &way) {
+  return -dot(hand.force, way.path) - dot(hand.torque, way.turn);
+}
+
+// What is left of a tank after a step of dt.
+double forgiven(double tank, double dt) { return tank < 0 ? tank * (kForgiven / (kForgiven + dt)) : tank; }
+
 // A share of the force, the smaller the more the hand has got that it never gave. A loop with a small gain is
 // stable with every delay; damping, which would act as late as the force does, is not.
 void keep_passive(const ToolMotion &m, ToolValues &v) {
@@ -82,12 +90,9 @@ bool passes_through(const World &w, const Body &b, const Obstacle &o) {
 void begin_tools(World &w, double dt) {
   for (auto &t : w.tools) {
     ToolValues v = aimed(*t, w.time + dt);
-    const Way way = way_of(*t, v);
-    const ToolForce hand = felt(*t, v, w.time);
-    const double work = -dot(hand.force, way.path) - dot(hand.torque, way.turn);
+    const double work = work_of(felt(*t, v, w.time), way_of(*t, v));
     v.port_work += work;
-    v.tank += work;
-    if (v.tank < 0) v.tank *= kForgiven / (kForgiven + dt);
+    v.tank = forgiven(v.tank + work, dt);
     v.measured = v.measured == kToolMeasuredNext ? kToolMeasured : 0;
     v.goal = w.time + dt;
     v.time = 0;
@@ -98,13 +103,25 @@ void begin_tools(World &w, double dt) {
   }
 }
 
+void take_back_work(World &w, double start) {
+  for (auto &t : w.tools) {
+    ToolValues v = t->values();
+    if (!(w.time < v.goal)) continue;
+    const double work = work_of(felt(*t, v, start), way_of(*t, v)), dt = v.goal - start;
+    v.port_work -= work;
+    if (v.tank < 0) v.tank *= (kForgiven + dt) / kForgiven;
+    v.tank = forgiven(v.tank - work, w.time - start);
+    t->store(v);
+  }
+}
+
 void end_tools(World &w, double dt) {
   for (auto &t : w.tools) {
     ToolValues v = t->values();
     // the hand gets the other side of what holds the tool
     for (int k = 0; k < 6; ++k) v.given[k] = -v.coupling[k] / dt;
     if (t->def.flags & DFM_TOOL_PASSIVE) keep_passive(t->motion, v);
-    if (t->motion.late > 0) t->remember(w.time, v);
+    if (t->is_to_remember(w.time, v)) t->remember(w.time, v);
     t->store(v);
   }
 }

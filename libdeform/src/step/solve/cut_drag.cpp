@@ -4,6 +4,7 @@
 
 #include "state/material.h"
 #include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/rigid/tools.h"
@@ -48,6 +49,14 @@ bool tough(const Body &b) {
 
 bool has_dues(const Body &b) {
   return std::any_of(b.blades.begin(), b.blades.end(), [](auto &t) { return !t.cut_work.empty(); });
+}
+
+void forget_dues(World &w, const Tool &t) {
+  for (auto &b : w.bodies) {
+    if (t.cuts.how == DFM_CUT_SPLIT && t.cuts_body(*b)) continue;
+    for (BladeTrack &track : b->blades)
+      if (std::ranges::find(t.set->obstacle, track.part) != t.set->obstacle.end()) track.cut_work.clear();
+  }
 }
 
 void make_cut_drags(World &w, StepContext &step, bool again) {
