@@ -430,3 +430,19 @@ TEST(WriteScene, OfAStaticScene_LooksForEquilibriaAgain) {
   test::ok(dfm_scene_value(again, "/time/mode", mode, &bytes));
   EXPECT_STREQ(mode, "\"static\"");
 }
+TEST(WriteScene, OfASceneWithoutAStep_HasNone) {
+  test::Context context;
+  const std::string folder = folder_of("auto"), path = folder + "/made.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},
+    "bodies": [{"name": "b", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 60}}]})");
+  dfm_scene scene = 0;
+  ASSERT_EQ(dfm_scene_open(context, path.c_str(), nullptr, &scene), DFM_OK) << dfm_last_error();
+  dfm_scene_write_def def = dfm_scene_write_def_default();
+  for (const auto &[step, text] : {std::pair{0.0, R"("step":"auto")"}, {0.25, R"("step":0.25)"}}) {
+    def.step = step;
+    test::ok(dfm_scene_write(scene, (folder + "/again.json").c_str(), &def, nullptr));
+    const std::string again = test::read_file(folder + "/again.json");
+    EXPECT_NE(again.find(text), std::string::npos) << again;
+  }
+}
+

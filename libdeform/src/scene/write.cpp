@@ -358,8 +358,7 @@ Written write_time(const SceneWriter &to) {
   Written out;
   if (w.time > 0) out["start"] = w.time;
   out["duration"] = to.options.duration;
-  const double step = to.options.step > 0 ? to.options.step : w.def.step;
-  if (step > 0) out["step"] = step;
+  if (to.options.step > 0) out["step"] = to.options.step;
   else out["step"] = "auto";
   put_integrator(out, w.def.integrator);
   if (to.options.beside.equilibrium) out["mode"] = "static";

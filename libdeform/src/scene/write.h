@@ -23,7 +23,7 @@ struct Beside {
 };
 
 struct WriteOptions {
-  double duration = 1, step = 0;  // s; step 0: that of the world's def, else "auto"
+  double duration = 1, step = 0;  // s; step 0: "auto"
   bool snapshot = false;          // beside the scene, for `deform run --from`
   bool partial = false;           // what a scene cannot say is left out; else it is refused
   Beside beside;
