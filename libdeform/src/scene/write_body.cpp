@@ -308,12 +308,20 @@ bool write_spring_place(const Body &b, const Spring &s, Written &out) {
   for (size_t i = 0; i < s.points.size(); ++i)
     by_mass = by_mass && std::fabs(s.weights[i] - b.p.mass[s.points[i]] / whole) < 1e-12;
   if (by_mass) {
+bool in_one_cell(const Body &b, const std::vector<uint32_t> &points) {
+  for (size_t t = 0; t < b.tets.size(); t += 4)
+    if (std::all_of(points.begin(), points.end(),
+                    [&](uint32_t p) { return std::find(&b.tets[t], &b.tets[t] + 4, p) != &b.tets[t] + 4; }))
+      return true;
+  return false;
+}
+
     std::vector<uint32_t> points = s.points;
     std::sort(points.begin(), points.end());
     out["points"] = points;
     return true;
   }
-  if (s.points.size() > 4) return false;
+  if (!in_one_cell(b, s.points)) return false;
   Vec3 x;
   for (size_t i = 0; i < s.points.size(); ++i) x += s.weights[i] * load3(&b.p.rest[3 * size_t{s.points[i]}]);
   out["point"] = vector_of(x);
