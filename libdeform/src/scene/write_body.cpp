@@ -15,6 +15,7 @@
 #include "state/obstacle.h"
 #include "step/solve/attach.h"
 #include "world/body_model.h"
+#include "world/model_change.h"
 
 namespace dfm::writing {
 namespace {
@@ -166,6 +167,12 @@ Written choice_of(SceneWriter &to, const ModelChoice &c) {
   return out;
 }
 
+// What is a matter of the present state, which a snapshot holds.
+void note_state(SceneWriter &to, const std::string &sentence) {
+  if (to.options.snapshot) to.remark(sentence + "; the snapshot contains its state");
+  else to.note("%s", sentence.c_str());
+}
+
 void write_switches(SceneWriter &to, const Body &b, Written &out) {
   if (!b.switches.empty() && !b.rule.empty())
     to.note("body '%s': a scene has either changes of the model by time or a rule; the rule is left out",
@@ -188,6 +195,10 @@ void write_switches(SceneWriter &to, const Body &b, Written &out) {
   }
   rule["far"] = choice_of(to, r.far);
   rule["wait"] = r.wait;
+  if (!begins_alike(b, r))
+    note_state(to, format("body '%s': the rule for its model begins anew in the scene, before any contact, "
+                          "so its first step may change the model",
+                          b.name.c_str()));
   if (r.far.max_jump < HUGE_VAL) rule["max_jump"] = r.far.max_jump;
 }
 
@@ -208,12 +219,9 @@ void write_state(SceneWriter &to, const Body &b, Written &out) {
   }
   if (rests) return;
   if (!b.dynamics->abilities().placed) {
-    const std::string sentence = format(
-        "body '%s': its model '%s' moves it as a whole, so a scene cannot describe its present state; it "
-        "begins at rest where it was created",
-        b.name.c_str(), b.model.type->id);
-    if (to.options.snapshot) to.remark(sentence + "; the snapshot contains its state");
-    else to.note("%s", sentence.c_str());
+    note_state(to, format("body '%s': its model '%s' moves it as a whole, so a scene cannot describe its "
+                          "present state; it begins at rest where it was created",
+                          b.name.c_str(), b.model.type->id));
     return;
   }
   std::string rows = std::string(scene::kStateHeader) + "\n";
