@@ -284,8 +284,8 @@ TEST(Run, DisplacementsOfFilledAndReorderedBodies_AreOfTheNodesOfTheirFiles) {
                                          R"(/bodies=[{"name": "filled", "id": 3, "mesh": "fine.msh",
       "material": "gel", "fill": {"cells": 8000}, "pose": {"position": [0, 0, 1]}},
      {"name": "whole", "id": 2, "mesh": "coarse.msh", "material": "gel", "pose": {"position": [0, 0, 2]}},
-     {"name": "grid", "id": 4, "mesh": "coarse.msh", "material": "gel", "lattice": {"cells": 300}, "model": {"type": "corotational_fem"},
-      "pose": {"position": [0, 0, 3]}}])",
+     {"name": "grid", "id": 4, "mesh": "coarse.msh", "material": "gel", "lattice": {"cells": 300},
+      "model": {"type": "corotational_fem"}, "pose": {"position": [0, 0, 3]}}])",
                                          "--set", "/probes=[]"});
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
   for (const auto &[name, nodes] : {std::pair{"filled", filled}, {"whole", whole}}) {

@@ -308,14 +308,6 @@ void write_loads(SceneWriter &to, const Body &b, Written &out) {
   write_nodal(to, b, constant, out);
 }
 
-// Where a spring pulls: at the center of mass of points, or at a place in a cell.
-bool write_spring_place(const Body &b, const Spring &s, Written &out) {
-  double whole = 0;
-  for (const uint32_t p : s.points) whole += b.p.mass[p];
-  bool by_mass = true;
-  for (size_t i = 0; i < s.points.size(); ++i)
-    by_mass = by_mass && std::fabs(s.weights[i] - b.p.mass[s.points[i]] / whole) < 1e-12;
-  if (by_mass) {
 bool in_one_cell(const Body &b, const std::vector<uint32_t> &points) {
   for (size_t t = 0; t < b.tets.size(); t += 4)
     if (std::all_of(points.begin(), points.end(),
@@ -324,6 +316,14 @@ bool in_one_cell(const Body &b, const std::vector<uint32_t> &points) {
   return false;
 }
 
+// Where a spring pulls: at the center of mass of points, or at a place in a cell.
+bool write_spring_place(const Body &b, const Spring &s, Written &out) {
+  double whole = 0;
+  for (const uint32_t p : s.points) whole += b.p.mass[p];
+  bool by_mass = true;
+  for (size_t i = 0; i < s.points.size(); ++i)
+    by_mass = by_mass && std::fabs(s.weights[i] - b.p.mass[s.points[i]] / whole) < 1e-12;
+  if (by_mass) {
     std::vector<uint32_t> points = s.points;
     std::sort(points.begin(), points.end());
     out["points"] = points;
