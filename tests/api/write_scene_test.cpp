@@ -278,6 +278,22 @@ TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrReported) {
   EXPECT_TRUE(load(made.context, path));
 }
 
+namespace {
+
+// Makes two bodies of one, at the plane of that x, m.
+void part(dfm_body body, double x) {
+  const dfm_separate_def separate = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(body, &separate));
+  dfm_cut_def cut = dfm_cut_def_default();
+  cut.shape = DFM_CUT_PLANE;
+  cut.how = DFM_CUT_SPLIT;
+  cut.blade[0] = x;
+  cut.blade[3] = 1;
+  test::ok(dfm_body_cut(body, &cut, nullptr));
+}
+
+}  // namespace
+
 // Rigid bodies that pass each other, a tool of triangles that nothing touches, and a piece that falls through
 // the floor as its whole did.
 TEST(WriteScene, MasksAndRules_HoldForRigidBodiesToolsAndPieces) {
@@ -315,14 +331,7 @@ TEST(WriteScene, MasksAndRules_HoldForRigidBodiesToolsAndPieces) {
   egg.collides_with = 0;
   test::tools::make(world, egg);
   test::ok(dfm_world_filter_pair(world, "cube", "floor", false));
-  const dfm_separate_def separate = dfm_separate_def_default();
-  test::ok(dfm_body_set_separate(cube, &separate));
-  dfm_cut_def cut = dfm_cut_def_default();
-  cut.shape = DFM_CUT_PLANE;
-  cut.how = DFM_CUT_SPLIT;
-  const double plane[] = {1.021, 0, 0, 1, 0, 0};
-  std::copy(plane, plane + 6, cut.blade);
-  test::ok(dfm_body_cut(cube, &cut, nullptr));
+  part(cube, 1.021);
   ASSERT_EQ(test::listed(dfm_world_bodies, world).size(), 3u);
 
   const std::string path = folder_of("masks") + "/masks.json";
@@ -342,6 +351,29 @@ TEST(WriteScene, MasksAndRules_HoldForRigidBodiesToolsAndPieces) {
     EXPECT_NEAR(z, test::state(rigid[i]).position[2], 1e-3) << i;
     EXPECT_NEAR(z, (i == 0 ? low : i == 1 ? high : bare).pose.position[2] - fall, 2e-3) << i;
   }
+}
+
+// A piece slides as the body did that it came from.
+TEST(WriteScene, FrictionOfABody_HoldsForItsPieces) {
+  test::Context context;
+  const std::string folder = folder_of("pieces"), path = folder + "/made.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.001},
+    "materials": {"gel": {"young": 3e4, "damping": {"stiffness": 0.002}}},
+    "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.04, 0.04, 0.04], "cells": 250},
+      "material": "gel", "pose": {"position": [0, 0, 1e-4]}, "velocity": [0, 0.5, 0]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}],
+    "contact": {"friction": [{"between": ["cube", "floor"], "law": "coulomb", "params": {"mu": 0}}]}})");
+  const dfm_world world = load(context, path);
+  ASSERT_TRUE(world);
+  dfm_body cube = 0, piece = 0;
+  test::ok(dfm_world_find_body(world, "cube", &cube));
+  part(cube, 0.021);
+  write(world, folder + "/again.json", DFM_SCENE_PARTIAL);
+  const dfm_world again = load(context, folder + "/again.json");
+  ASSERT_TRUE(again);
+  steps(again, 60, 1e-3);
+  test::ok(dfm_world_find_body(again, "cube.1", &piece));
+  EXPECT_NEAR(test::measure(piece).velocity[1], 0.5, 0.02);
 }
 
 TEST(WriteScene, RuleForADestroyedMaterial_IsLeftOut) {

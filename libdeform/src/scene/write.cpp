@@ -260,24 +260,55 @@ void write_materials(SceneWriter &to) {
 
 // ---- contact ----------------------------------------------------------------------------------------------
 
+// group: ":NAME"; empty: the whole body.
+bool has_group(const Body &b, const std::string &group) {
+  const auto is_it = [&](uint32_t zone) { return ":" + b.zones.list[zone].group == group; };
+  return group.empty() || (b.zones.of.empty() ? is_it(0) : std::ranges::any_of(b.zones.of, is_it));
+}
+
 bool in_scene(const SceneWriter &to, const std::string &side) {
   if (side == "*") return true;
   if (side.rfind("material=", 0) == 0) return to.materials.contains(side.substr(9));
-  return to.has(side) || to.has(side.substr(0, side.find(':')));
+  const size_t colon = side.find(':');
+  const Body *const whole = colon == side.npos ? nullptr : to.w.find_body(side.substr(0, colon));
+  return to.has(side) || (whole && has_group(*whole, side.substr(colon)));
 }
 
-// Whether the scene has both sides of a rule, which it refuses otherwise.
-bool both_in_scene(SceneWriter &to, const char *what, const std::string between[2]) {
-  if (in_scene(to, between[0]) && in_scene(to, between[1])) return true;
-  to.note("the %s for '%s' and '%s' is left out, since the scene does not have both of them", what,
-          between[0].c_str(), between[1].c_str());
-  return false;
+// What a side of the world's rules means in the scene: the same, and the pieces of the body that it names,
+// which are bodies like any other there.
+std::vector<std::string> sides_in_scene(const SceneWriter &to, const std::string &side) {
+  std::vector<std::string> out;
+  if (in_scene(to, side)) out.push_back(side);
+  for (const auto &b : to.w.bodies) {
+    if (b->whole_name.empty() || !names(side, b->whole_name)) continue;
+    const std::string group = side.substr(b->whole_name.size());
+    if (has_group(*b, group)) out.push_back(b->name + group);
+  }
+  return out;
+}
+
+// A rule for each two sides that the scene has; it refuses others.
+template <class Rule>
+std::vector<Rule> rules_in_scene(SceneWriter &to, const char *what, const std::vector<Rule> &rules) {
+  std::vector<Rule> out;
+  for (const Rule &r : rules) {
+    const size_t before = out.size();
+    for (const std::string &a : sides_in_scene(to, r.between[0]))
+      for (const std::string &b : sides_in_scene(to, r.between[1])) {
+        out.push_back(r);
+        out.back().between[0] = a;
+        out.back().between[1] = b;
+      }
+    if (out.size() == before)
+      to.note("the %s for '%s' and '%s' is left out, since the scene does not have both of them", what,
+              r.between[0].c_str(), r.between[1].c_str());
+  }
+  return out;
 }
 
 Written write_friction(SceneWriter &to) {
   Written out = Written::array();
-  for (const FrictionRule &r : to.w.friction) {
-    if (!both_in_scene(to, "friction rule", r.between)) continue;
+  for (const FrictionRule &r : rules_in_scene(to, "friction rule", to.w.friction)) {
     const LawInstance &law = *to.w.laws[r.law];
     const dfm_type &type = law.requested_type ? *law.requested_type : *law.type;
     Written entry;
@@ -320,12 +351,10 @@ bool may_meet(const Touching &a, const Touching &b) {
 }
 
 // The world's rules, and one for each pair of which they would say something else in the scene: it has no
-// masks, no answers of a host, and no bodies that are pieces of others.
+// masks and no answers of a host.
 Written write_filters(SceneWriter &to) {
   const World &w = to.w;
-  std::vector<FilterRule> rules, pairs;
-  for (const FilterRule &r : w.filters)
-    if (both_in_scene(to, "filter", r.between)) rules.push_back(r);
+  std::vector<FilterRule> rules = rules_in_scene(to, "filter", w.filters), pairs;
   std::set<std::pair<uint64_t, uint64_t>> refused;
   for (const PairDecision &p : w.may_touch.decisions)
     if (!p.touch) refused.insert(std::minmax(p.a, p.b));
