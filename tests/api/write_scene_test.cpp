@@ -376,6 +376,27 @@ TEST(WriteScene, FrictionOfABody_HoldsForItsPieces) {
   EXPECT_NEAR(test::measure(piece).velocity[1], 0.5, 0.02);
 }
 
+TEST(WriteScene, AttachmentToAShapeThatIsLeftOut_IsLeftOutToo) {
+  Made made;
+  const std::vector<dfm_rigid> hook =
+      test::create(made.world, {test::box("hook", {0.1, 0.1, 0.01}, 1, {0, 0, 0.5})});
+  dfm_obstacle_def ball = dfm_obstacle_def_default();
+  ball.name = "knob";
+  ball.shape = DFM_SHAPE_SPHERE;
+  ball.radius = 0.02;
+  dfm_obstacle knob = 0;
+  test::ok(dfm_rigid_add_shape(hook[0], &ball, &knob));
+  const double everywhere[] = {-9, -9, -9, 9, 9, 9};
+  dfm_attach_def d = dfm_attach_def_default();
+  d.to = knob;
+  d.box = everywhere;
+  test::ok(dfm_body_attach(made.ball, &d, nullptr));
+  const std::string path = folder_of("knob") + "/knob.json";
+  EXPECT_NE(all(write(made.world, path, DFM_SCENE_PARTIAL)).find("attachment to 'knob' is left out"),
+            std::string::npos);
+  EXPECT_TRUE(load(made.context, path));
+}
+
 TEST(WriteScene, RuleForADestroyedMaterial_IsLeftOut) {
   Made made;
   dfm_material_def d = dfm_material_def_default();

@@ -361,6 +361,11 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     const Body *const other = to.w.body(a.to);
     const Obstacle *const thing = to.w.obstacle(a.to);
     const std::string name = other ? other->name : thing ? thing->name : "";
+    if (!to.has(name)) {
+      to.note("body '%s': its attachment to '%s' is left out, since the scene does not have that",
+              b.name.c_str(), name.c_str());
+      continue;
+    }
     Written entry;
     entry["to"] = name;
     std::vector<uint32_t> points;
