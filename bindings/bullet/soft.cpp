@@ -1,7 +1,10 @@
 #include <BulletSoftBody/btSoftBody.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "deform/bullet.h"
@@ -35,6 +38,25 @@ Arrays arrays_of(const btSoftBody &body) {
   return a;
 }
 
+// Of the cell that holds a place: the one in which its least barycentric coordinate is largest.
+std::array<uint32_t, 4> corners_around(const dfm_mesh_info &mesh, Vec place) {
+  const uint32_t *best = mesh.tets;
+  double deepest = -HUGE_VAL;
+  for (uint32_t t = 0; t < mesh.ntet; ++t) {
+    const uint32_t *const tet = mesh.tets + 4 * size_t{t};
+    const auto volume = [&](int moved) {
+      Vec x[4];
+      for (int k = 0; k < 4; ++k) x[k] = k == moved ? place : load(mesh.points + 3 * size_t{tet[k]});
+      return dot(x[1] - x[0], cross(x[2] - x[0], x[3] - x[0]));
+    };
+    const double least = std::min({volume(0), volume(1), volume(2), volume(3)}) / volume(-1);
+    if (!(least > deepest)) continue;
+    deepest = least;
+    best = tet;
+  }
+  return {best[0], best[1], best[2], best[3]};
+}
+
 // Ends the meshes of a filled surface.
 struct Filled {
   dfm_mesh_handle surface = 0, cells = 0;
@@ -46,7 +68,7 @@ struct Filled {
 
 dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, const dfm_body_def &like,
                 uint32_t cells, dfm_body *out) {
-  const Arrays a = arrays_of(body);
+  Arrays a = arrays_of(body);
   dfm_body_def def = dfm_body_def_default();
   std::memcpy(static_cast<void *>(&def), &like, std::min<size_t>(sizeof def, like.size));
   store(def.velocity, a.velocity);
@@ -76,14 +98,22 @@ dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, c
     def.surface = &skin;
     def.npoint = info.npoint;
     def.ntet = info.ntet;
+    std::vector<uint32_t> corners;  // which hold the nodes of the surface
+    for (const uint32_t node : a.held) {
+      const auto around = corners_around(info, load(&a.points[3 * size_t{node}]));
+      corners.insert(corners.end(), around.begin(), around.end());
+    }
+    a.held = std::move(corners);
   } else {
     return failed(DFM_E_ARG,
                   "the btSoftBody has neither tetrahedra nor faces; the library needs a volume, which ropes "
                   "and bodies made only of links do not have");
   }
   TRY(dfm_body_create(world, &def, out));
-  if (a.tets.empty() || a.held.empty()) return DFM_OK;
-  return dfm_body_hold(*out, static_cast<uint32_t>(a.held.size()), a.held.data(), 7);
+  if (a.held.empty()) return DFM_OK;
+  const dfm_status held = dfm_body_hold(*out, static_cast<uint32_t>(a.held.size()), a.held.data(), 7);
+  if (held != DFM_OK) dfm_body_destroy(std::exchange(*out, 0));
+  return held;
 }
 
 }  // namespace

@@ -67,10 +67,13 @@ class Schedule {
   uint64_t next_ = 0;
 };
 
+// A state from a file is none: it is that of a run, or one that has no fault of itself.
 bool requests_spoiled_start(const SceneFile &scene) {
-  for (size_t b = 0; b < scene.bodies().size(); ++b)
-    if (!scene.value("/bodies/" + std::to_string(b) + "/start").empty()) return true;
-  return false;
+  return std::ranges::any_of(scene.bodies(), [&](const BodyView &body) {
+    const std::string start = scene.pointer_of(body.name) + "/start";
+    return !scene.value(start + "/scramble").empty() || !scene.value(start + "/flatten").empty() ||
+           scene.value(start + "/invert") == "true";
+  });
 }
 
 // The faces of a cut or a tear are those of cells.
@@ -282,11 +285,8 @@ class Runner {
                                              : "; take a shorter step";
     }
     const std::string &whole = scene_.name_of(at->whole);
-    for (size_t b = 0; !scene_.value("/bodies/" + std::to_string(b)).empty(); ++b) {
-      const std::string body = "/bodies/" + std::to_string(b);
-      if (scene_.value(body + "/name") == '"' + whole + '"' && !scene_.value(body + "/separate").empty())
-        return std::string(", where it is cut or torn: ") + kTeeth;
-    }
+    if (!scene_.value(scene_.pointer_of(whole) + "/separate").empty())
+      return std::string(", where it is cut or torn: ") + kTeeth;
     return "; take a shorter step, or set \"separate\" of body '" + whole + "' to make its parts bodies";
   }
 

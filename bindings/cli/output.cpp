@@ -77,7 +77,8 @@ Outputs::Outputs(const SceneFile &scene, const std::string &folder)
     index_ = std::make_unique<Csv>(folder + "/states/index.csv", "index,t");
   }
   last_time_ = dfm_world_time(scene.world());
-  for (size_t b = 0; b < scene.bodies().size() && s.nodes; ++b) nodes_.push_back(file_nodes(b));
+  if (!s.nodes) return;
+  for (const BodyView &body : scene.bodies()) nodes_.push_back(file_nodes(body));
 }
 
 void Outputs::record() {
@@ -158,9 +159,9 @@ void Outputs::write_last() {
 // The numbers of the mesh file's nodes. Of a filled body they are the first points of
 // the surface that it wears (those of split edges follow); where it wears another one, its own points are
 // numbered in their order.
-FileNodes Outputs::file_nodes(size_t b) const {
-  const BodyView &body = scene_.bodies()[b];
-  const std::string key = "/bodies/" + std::to_string(b);
+FileNodes Outputs::file_nodes(const BodyView &body) const {
+  const std::string key = scene_.pointer_of(body.name);
+  const auto has = [&](const char *what) { return scene_.value(key + what).starts_with('{'); };
   JsonValue mesh;
   if (!parse_json(scene_.value(key + "/mesh"), mesh))
     throw Failure(kBadInput, "body \"" + body.name + "\" has no mesh file");
@@ -176,12 +177,14 @@ FileNodes Outputs::file_nodes(size_t b) const {
   out.body = body.handle;
   out.name = body.name;
   dfm_mesh_handle read = 0;
-  need(dfm_mesh_load(scene_.context(), path.c_str(), DFM_MESH_ANY, &read));
+  const bool lattice = has("/lattice"), own_cells = !lattice && !has("/fill");
+  need(dfm_mesh_load(scene_.context(), path.c_str(), own_cells ? DFM_MESH_ANY : DFM_MESH_SURFACE, &read));
   const dfm_mesh_info info = got<dfm_mesh_info>(dfm_mesh_get_info, read);
-  if (info.ntet) {
+  if (own_cells && info.ntet) {
     out.number.assign(info.file_point, info.file_point + body.npoint);
   } else {
-    out.surface = scene_.value(key + "/surface/mesh").empty() && scene_.value(key + "/surface/from").empty();
+    out.surface = !lattice && scene_.value(key + "/surface/mesh").empty() &&
+                  scene_.value(key + "/surface/from").empty();
     out.number.resize(out.surface ? info.npoint : body.npoint);
     for (uint32_t i = 0; i < out.number.size(); ++i) out.number[i] = i;
     if (out.surface) std::copy_n(info.file_point, out.number.size(), out.number.begin());

@@ -47,7 +47,7 @@ class Outputs {
   void write_nodes();  // nodes/BODY.csv
 
  private:
-  FileNodes file_nodes(size_t body) const;
+  FileNodes file_nodes(const BodyView &body) const;
   static std::vector<double> node_displacements(const FileNodes &nodes);
   void write_body(double t, uint64_t handle, const std::string &name, const dfm_body_measure &m);
   void write_bodies(double t);

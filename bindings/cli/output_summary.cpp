@@ -405,18 +405,14 @@ void print_shattered(const SceneFile &scene) {
   for (const BodyView &body : scene.bodies()) ++parts[body.whole];
   for (const auto &[whole, n] : parts) {
     if (n < kMany) continue;
-    const std::string name = quoted(scene.name_of(whole));
-    size_t b = 0;
-    const auto value = [&](const char *of) { return scene.value("/bodies/" + std::to_string(b) + of); };
-    while (!value("/model").empty() || !value("/mesh").empty())
-      if (value("/name") == name) break;
-      else ++b;
-    const std::string least = value("/separate/least_cells");
+    const std::string name = quoted(scene.name_of(whole)),
+                      separate = scene.pointer_of(scene.name_of(whole)) + "/separate",
+                      least = scene.value(separate + "/least_cells");
     std::printf(
         "body %s has come apart into %zu bodies; where that is slow, \"least_cells\" above %s%s in its "
         "\"separate\", or a larger \"tear\", makes fewer\n",
         name.c_str(), n, least.empty() ? "1" : least.c_str(),
-        value("/separate/crumbs") == "\"remove\"" ? "" : " with \"crumbs\": \"remove\"");
+        scene.value(separate + "/crumbs") == "\"remove\"" ? "" : " with \"crumbs\": \"remove\"");
   }
 }
 

@@ -142,6 +142,13 @@ std::string SceneFile::value(const std::string &pointer) const {
   return text;
 }
 
+std::string SceneFile::pointer_of(const std::string &body) const {
+  for (size_t b = 0;; ++b) {
+    const std::string pointer = "/bodies/" + std::to_string(b), name = value(pointer + "/name");
+    if (name.empty() || name == '"' + body + '"') return pointer;
+  }
+}
+
 std::string SceneFile::explain() const {
   size_t bytes = 0;
   need(dfm_world_explain(world_, nullptr, &bytes));

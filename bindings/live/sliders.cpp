@@ -89,9 +89,8 @@ bool takes_young(const cli::SceneFile &scene, const std::string &model) {
 
 void add_stiffness(Simulation &simulation, std::vector<Slider> &out) {
   const cli::SceneFile &scene = simulation.scene();
-  for (size_t i = 0; i < scene.bodies().size(); ++i) {
-    const cli::BodyView &body = scene.bodies()[i];
-    const std::string at = "/bodies/" + std::to_string(i);
+  for (const cli::BodyView &body : scene.bodies()) {
+    const std::string at = scene.pointer_of(body.name);
     std::string text = scene.value(at + "/model/params/young");
     const std::string material = scene.value(at + "/material");
     if (text.empty() && material.size() > 2)

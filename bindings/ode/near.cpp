@@ -68,7 +68,7 @@ RigidFriction::LawResult RigidFriction::evaluate(const Contact &c, const double 
   constexpr uint32_t kLanes = 8;
   alignas(64) double fn[kLanes] = {c.fn}, v[2 * kLanes] = {}, stop[2 * kLanes] = {}, area[kLanes] = {area_},
                      dwell[kLanes] = {};
-  alignas(64) double ft[2 * kLanes] = {}, d[4 * kLanes] = {}, limit[kLanes] = {};
+  alignas(64) double ft[2 * kLanes] = {}, d[4 * kLanes] = {}, by_fn[2 * kLanes] = {}, limit[kLanes] = {};
   std::vector<double> state(size_t{kLanes} * std::max(1u, nstate_)), next(state.size());
   v[0] = vt[0];
   v[kLanes] = vt[1];
@@ -101,6 +101,7 @@ RigidFriction::LawResult RigidFriction::evaluate(const Contact &c, const double 
   out.size = sizeof out;
   out.ft = ft;
   out.dft_dvt = d;
+  out.dft_dfn = by_fn;
   out.limit = limit;
   out.state = next.data();
   out.mode = mode;
@@ -113,7 +114,9 @@ RigidFriction::LawResult RigidFriction::evaluate(const Contact &c, const double 
   a.d[1] = -d[size_t{3} * kLanes];
   a.limit = limit[0];
   // of one that slides: what it slides with
-  if (set_valued_ && mode[0] == 2) a.limit = std::sqrt(a.ft[0] * a.ft[0] + a.ft[1] * a.ft[1]);
+  const bool slides = set_valued_ && mode[0] == 2;
+  if (slides) a.limit = std::hypot(a.ft[0], a.ft[1]);
+  a.by_fn = slides ? std::hypot(by_fn[0], by_fn[kLanes]) : c.fn > 0 ? a.limit / c.fn : 0;
   for (uint32_t i = 0; i < nstate_; ++i) a.state.push_back(next[size_t{kLanes} * i]);
   return a;
 }
@@ -179,10 +182,13 @@ int RigidFriction::collide(dGeomID a, dGeomID b, double dt) {
     if (const Contact *old = match(mine.key, mine.place, taken)) take_over(mine, *old);
     const Vec u = velocity_at(body_a, mine.point) - velocity_at(body_b, mine.point);
     const double vt[2] = {dot(u, mine.tangent[0]), dot(u, mine.tangent[1])};
-    if (set_valued_ && !(mine.fn > 0)) mine.fn = 1;  // a coefficient needs some force for its evaluation
+    // A coefficient needs some force for its evaluation. How much a viscous part is beside one that is not
+    // known yet cannot be said: it is left out until the next sub-step.
+    const bool fresh = set_valued_ && !(mine.fn > 0);
+    if (fresh) mine.fn = 1;
     const LawResult result = evaluate(mine, vt, dt);
     if (result.good && set_valued_) {
-      c.surface.mu = result.limit / mine.fn;
+      c.surface.mu = fresh ? result.by_fn : result.limit / mine.fn;
     } else if (result.good) {
       c.surface.mode = dContactMu2 | dContactFDir1;
       c.surface.mu = c.surface.mu2 = std::min(result.limit, double{dInfinity});

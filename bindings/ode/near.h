@@ -68,7 +68,7 @@ class RigidFriction {
   Memory last_;
   std::deque<Contact> now_;  // ODE keeps the addresses of the feedbacks
   struct LawResult {
-    double ft[2], d[2], limit;
+    double ft[2], d[2], limit, by_fn;  // by_fn: what grows with the normal force, over it
     std::vector<double> state;
     bool good;
   };

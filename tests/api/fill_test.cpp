@@ -70,6 +70,42 @@ TEST(MeshFill, BodyWithTrianglesMuchLargerThanItsCells_IsReportedWithTheRemedy) 
   EXPECT_EQ(fine.find("split edges"), std::string::npos) << fine;
 }
 
+// All of mass and stiffness by one share: the cells move as full ones do, with fibers and where they flow.
+TEST(MeshFill, CellsOfOneShare_MoveAsFullOnes) {
+  test::Context context;
+  const double young = 1e5, along = 1e6, shear = 2e5, yield = 500, hardening = 3e4;
+  const auto places = [&](double share, std::vector<dfm_param_value> params) {
+    std::vector<uint8_t> fixed;
+    dfm_body_def d = test::clamped_beam(context, 200, fixed);
+    const std::vector<double> shares(d.ntet, share);
+    if (share < 1) d.cell_share = shares.data();
+    params.push_back({"young", &young, 1});
+    d.model = "corotational_fem";
+    d.model_params = {sizeof(dfm_params), uint32_t(params.size()), params.data()};
+    const dfm_world world = test::make_world(context);
+    dfm_body body = 0;
+    test::ok(dfm_body_create(world, &d, &body));
+    test::run(world, 0.1, 1e-3);
+    std::vector<double> x(3 * size_t{d.npoint});
+    test::ok(dfm_body_get_state(body, d.npoint, x.data(), nullptr, nullptr));
+    return x;
+  };
+  const std::vector<dfm_param_value> fibers = {{"anisotropy_young", &along, 1},
+                                               {"anisotropy_shear", &shear, 1}},
+                                     flow = {{"yield", &yield, 1}, {"hardening", &hardening, 1}};
+  const std::vector<double> plain = places(1, {});
+  for (const auto &params : {fibers, flow}) {
+    const std::vector<double> full = places(1, params), part = places(0.25, params);
+    double most = 0, changed = 0;
+    for (size_t i = 0; i < full.size(); ++i) {
+      most = std::max(most, std::fabs(full[i] - part[i]));
+      changed = std::max(changed, std::fabs(full[i] - plain[i]));
+    }
+    EXPECT_GT(changed, 1e-3) << params[0].key;
+    EXPECT_LT(most, 1e-9) << params[0].key;
+  }
+}
+
 TEST(MeshFill, MeshThatWasNotFilled_HasNoShare) {
   test::Context context;
   const double size[3] = {1, 1, 1};

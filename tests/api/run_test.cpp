@@ -262,6 +262,44 @@ TEST(Run, Displacements_ComeInTheMeshFilesOrder) {
   }
 }
 
+// The world has bodies in the order of their ids, which need not be that of the file; where a body is filled
+// anew, its nodes are those of the file's surface, and not its points.
+TEST(Run, DisplacementsOfFilledAndReorderedBodies_AreOfTheNodesOfTheirFiles) {
+  test::Context context;
+  const auto make = [&](const char *name, uint32_t cells, uint32_t what) {
+    dfm_mesh_handle mesh = 0, read = 0;
+    const double size[3] = {0.1, 0.1, 0.1};
+    test::ok(dfm_mesh_make(context, "beam", size, DFM_MESH_CELLS, cells, &mesh));
+    test::ok(dfm_mesh_write(mesh, (folder() + name).c_str()));
+    test::ok(dfm_mesh_load(context, (folder() + name).c_str(), what, &read));
+    dfm_mesh_info info{};
+    info.size = sizeof info;
+    test::ok(dfm_mesh_get_info(read, &info));
+    return std::set<uint32_t>(info.file_point, info.file_point + info.npoint);
+  };
+  const auto filled = make("/fine.msh", 1000, DFM_MESH_SURFACE),
+             whole = make("/coarse.msh", 60, DFM_MESH_ANY);
+  ASSERT_GT(filled.size(), 2 * whole.size());
+  const Outcome r = run("filled_nodes", {"--time", "0.002", "--set",
+                                         R"(/bodies=[{"name": "filled", "id": 3, "mesh": "fine.msh",
+      "material": "gel", "fill": {"cells": 8000}, "pose": {"position": [0, 0, 1]}},
+     {"name": "whole", "id": 2, "mesh": "coarse.msh", "material": "gel", "pose": {"position": [0, 0, 2]}},
+     {"name": "grid", "id": 4, "mesh": "coarse.msh", "material": "gel", "lattice": {"cells": 300},
+      "model": {"type": "corotational_fem"}, "pose": {"position": [0, 0, 3]}}])",
+                                         "--set", "/probes=[]"});
+  ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
+  for (const auto &[name, nodes] : {std::pair{"filled", filled}, {"whole", whole}}) {
+    const auto rows = test::read_csv(r.out + "/nodes/" + name + ".csv");
+    ASSERT_EQ(rows.size(), 1 + nodes.size()) << name;
+    size_t row = 0;
+    for (const uint32_t node : nodes) {
+      ASSERT_EQ(rows[++row][0], std::to_string(node)) << name;
+      ASSERT_NEAR(std::stod(rows[row][3]), -0.5 * 9.81 * 0.002 * 0.002, 6e-6) << name;
+    }
+  }
+  EXPECT_GT(test::read_csv(r.out + "/nodes/grid.csv").size(), 1 + whole.size()) << "the points of the grid";
+}
+
 TEST(Run, SameScene_GivesTheSameHashWhateverItWrites) {
   const std::string plain = hash_of("plain", {"--quiet", "--set", "/output/states=false"});
   EXPECT_EQ(hash_of("more", {"--quiet", "--check", "--set", "/output/every=0.003", "--profile"}), plain);
@@ -291,6 +329,23 @@ TEST(Run, CrossingBodies_AreCounted) {
   ASSERT_EQ(r.result.exit_code, 0) << r.result.err;
   EXPECT_GT(std::stoi(value(r.summary, "intersections_max")), 0);
   EXPECT_NE(value(r.summary, "warnings").find("surfaces cross"), std::string::npos);
+}
+
+// Bodies that pass through each other and are apart in the end; one is of a scene that a run has written.
+TEST(Run, CrossingThatPasses_IsReportedOfABodyThatStartsFromAState) {
+  const std::vector<std::string> flight = {"--set", "/gravity=[0,0,0]",
+                                           "--set", "/bodies/0/fix=[]",
+                                           "--set", "/bodies/1/velocity=[20,0,0]",
+                                           "--set", "/bodies/1/pose/position=[-0.11,0.01,0.01]",
+                                           "--set", "/contact/filter=[{\"between\":[\"low\",\"top\"]}]"};
+  auto first = flight;
+  first.insert(first.end(), {"--time", "0.001", "--save-scene", folder() + "/flight.json"});
+  ASSERT_EQ(run("flight", first).result.exit_code, 0);
+  const test::CommandResult r = test::deform(
+      {"run", folder() + "/flight.json", "--time", "0.012", "--check", "--out", folder() + "/flight_on"});
+  ASSERT_EQ(r.exit_code, 0) << r.err;
+  const std::string summary = test::read_file(folder() + "/flight_on/summary.json");
+  EXPECT_NE(value(summary, "warnings").find("of two surfaces in one state"), std::string::npos) << summary;
 }
 
 // Two cubes in one file that overlap. Self contact keeps apart what is apart at the start: it is no remedy.

@@ -160,6 +160,48 @@ TEST(SceneStart, Jitter_MovesTheChangedBodyToo) {
   EXPECT_NE(still.state("other")[0], moved.state("other")[0]);
 }
 
+// A state as a whole, but for one whose points a motion places.
+TEST(SceneStart, Jitter_MovesStates) {
+  const std::vector<double> rest = Opened(scene(R"({"invert": false})")).state("rested")[0];
+  std::string table = "node,x,y,z,vx,vy,vz\n";
+  for (size_t i = 0; i < rest.size(); i += 3) {
+    char row[160];
+    std::snprintf(row, sizeof row, "%zu,%.17g,%.17g,%.17g,%.17g,0,0\n", i / 3, rest[i], rest[i + 1],
+                  rest[i + 2] + 0.25, 1 + rest[i + 1]);
+    table += row;
+  }
+  test::write_file(test::scratch("scene_start_" + std::to_string(getpid())) + "/table.csv", table);
+  std::string free = scene(R"({"state": "table.csv"})");
+  const std::string led = scene(R"({"state": "table.csv"})", R"(, "fix": [{"points": [0], "motion":
+    {"keyframes": [{"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0, 0, 1]}]}}])");
+  free.insert(free.rfind('}'), R"(, "rigid": {"bodies": [{"name": "ball", "shape": "sphere", "radius": 0.1,
+    "mass": 1, "start": {"position": [0, 0, 9], "velocity": [1, 0, 0], "spin": [0, 2, 0]}}]})");
+  const Opened still(free), moved(free, 1), other(free, 2), led_still(led), led_moved(led, 1);
+  ASSERT_EQ(moved.status, DFM_OK) << dfm_last_error();
+  ASSERT_EQ(led_moved.status, DFM_OK) << dfm_last_error();
+  EXPECT_EQ(led_moved.state("other"), led_still.state("other"));
+  EXPECT_NE(moved.state("other"), other.state("other"));
+  const auto [x, v] = still.state("other");
+  const auto [y, u] = moved.state("other");
+  const auto apart = [](const std::vector<double> &of, size_t i) {
+    return std::hypot(of[3 * i] - of[0], of[3 * i + 1] - of[1], of[3 * i + 2] - of[2]);
+  };
+  double most = 0;
+  for (size_t i = 0; i < x.size() / 3; ++i) {
+    ASSERT_NEAR(apart(y, i), apart(x, i), 1e-14) << i;
+    ASSERT_NEAR(std::hypot(u[3 * i], u[3 * i + 1], u[3 * i + 2]) / v[3 * i], u[0] / v[0], 1e-4) << i;
+    for (size_t k = 0; k < 3; ++k) most = std::max(most, std::fabs(y[3 * i + k] - x[3 * i + k]));
+  }
+  EXPECT_GT(most, 1e-5);
+  EXPECT_LT(most, 5e-3);
+  dfm_rigid_state balls[2] = {};
+  for (const Opened *s : {&still, &moved})
+    test::ok(dfm_rigid_get_state(test::listed(dfm_world_rigids, s->world)[0], &balls[s == &moved]));
+  EXPECT_NE(balls[0].position[2], balls[1].position[2]);
+  EXPECT_NEAR(balls[0].position[2], balls[1].position[2], 1e-3);
+  EXPECT_NE(balls[0].velocity[0], balls[1].velocity[0]);
+}
+
 TEST(SceneStart, Mistakes_AreRefusedWithTheirPlace) {
   const std::pair<const char *, std::vector<const char *>> cases[] = {
       {"{}", {"/bodies/1/start", "scramble", "flatten", "invert"}},

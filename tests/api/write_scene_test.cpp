@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "support.h"
+#include "tool.h"
 #include "world.h"
 
 namespace {
@@ -277,6 +278,191 @@ TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrReported) {
   EXPECT_TRUE(load(made.context, path));
 }
 
+namespace {
+
+// Makes two bodies of one, at the plane of that x, m.
+void part(dfm_body body, double x) {
+  const dfm_separate_def separate = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(body, &separate));
+  dfm_cut_def cut = dfm_cut_def_default();
+  cut.shape = DFM_CUT_PLANE;
+  cut.how = DFM_CUT_SPLIT;
+  cut.blade[0] = x;
+  cut.blade[3] = 1;
+  test::ok(dfm_body_cut(body, &cut, nullptr));
+}
+
+}  // namespace
+
+// Rigid bodies that pass each other, a tool of triangles that nothing touches, and a piece that falls through
+// the floor as its whole did.
+TEST(WriteScene, MasksAndRules_HoldForRigidBodiesToolsAndPieces) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  test::add_plane(world, "floor");
+  const auto block = [&](const char *name, double x) {
+    test::BodyOptions o;
+    o.name = name;
+    o.young = 3e4;
+    o.damping_stiffness = 2e-3;
+    o.position = {x, 0, 0.001};
+    return test::make_body(context, world, "beam", {0.04, 0.04, 0.04}, 250, o);
+  };
+  const dfm_body cube = block("cube", 1);
+  block("bed", 2);
+  dfm_rigid_def low = test::box("low", {0.1, 0.1, 0.1}, 1, {0, 0, 0.11}),
+                high = test::box("high", {0.1, 0.1, 0.1}, 1, {0, 0, 0.33});
+  low.collides_with = high.collides_with = 2;
+  dfm_rigid_def bare = test::box("bare", {0, 0, 0}, 1, {5, 0, 0.5});
+  bare.shape = DFM_SHAPE_NONE;
+  std::fill(bare.inertia, bare.inertia + 3, 0.01);
+  const std::vector<dfm_rigid> rigid = test::create(world, {low, high, bare});
+  dfm_obstacle_def ball = dfm_obstacle_def_default();
+  ball.shape = DFM_SHAPE_SPHERE;
+  ball.radius = 0.1;
+  ball.collides_with = 2;
+  dfm_obstacle added = 0;
+  test::ok(dfm_rigid_add_shape(rigid[2], &ball, &added));
+  dfm_tool_def egg = dfm_tool_def_default();
+  egg.name = "egg";
+  egg.shape = DFM_TOOL_ELLIPSOID;
+  std::fill(egg.half_size, egg.half_size + 3, 0.02);
+  egg.pose = test::tools::pose({2.02, 0.02, 0.05});
+  egg.collides_with = 0;
+  test::tools::make(world, egg);
+  test::ok(dfm_world_filter_pair(world, "cube", "floor", false));
+  part(cube, 1.021);
+  ASSERT_EQ(test::listed(dfm_world_bodies, world).size(), 3u);
+
+  const std::string path = folder_of("masks") + "/masks.json";
+  EXPECT_EQ(all(write(world, path, DFM_SCENE_PARTIAL)).find("left out"), std::string::npos);
+  const dfm_world again = load(context, path);
+  ASSERT_TRUE(again);
+  for (const dfm_world w : {world, again}) steps(w, 150, 1e-3);
+  for (const char *name : {"cube", "cube.1", "bed"}) {
+    dfm_body body = 0;
+    test::ok(dfm_world_find_body(again, name, &body));
+    EXPECT_EQ(test::measure(body).com[2] < 0, std::string(name) != "bed") << name;
+  }
+  const std::vector<dfm_rigid> there = test::listed(dfm_world_rigids, again);
+  ASSERT_EQ(there.size(), rigid.size());
+  for (size_t i = 0; i < rigid.size(); ++i) {
+    const double z = test::state(there[i]).position[2], fall = 0.5 * 9.81 * 0.15 * 0.15;
+    EXPECT_NEAR(z, test::state(rigid[i]).position[2], 1e-3) << i;
+    EXPECT_NEAR(z, (i == 0 ? low : i == 1 ? high : bare).pose.position[2] - fall, 2e-3) << i;
+  }
+}
+
+// A piece slides as the body did that it came from.
+TEST(WriteScene, FrictionOfABody_HoldsForItsPieces) {
+  test::Context context;
+  const std::string folder = folder_of("pieces"), path = folder + "/made.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.001},
+    "materials": {"gel": {"young": 3e4, "damping": {"stiffness": 0.002}}},
+    "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.04, 0.04, 0.04], "cells": 250},
+      "material": "gel", "pose": {"position": [0, 0, 1e-4]}, "velocity": [0, 0.5, 0]}],
+    "obstacles": [{"name": "floor", "shape": "plane"}],
+    "contact": {"friction": [{"between": ["cube", "floor"], "law": "coulomb", "params": {"mu": 0}}]}})");
+  const dfm_world world = load(context, path);
+  ASSERT_TRUE(world);
+  dfm_body cube = 0, piece = 0;
+  test::ok(dfm_world_find_body(world, "cube", &cube));
+  part(cube, 0.021);
+  write(world, folder + "/again.json", DFM_SCENE_PARTIAL);
+  const dfm_world again = load(context, folder + "/again.json");
+  ASSERT_TRUE(again);
+  steps(again, 60, 1e-3);
+  test::ok(dfm_world_find_body(again, "cube.1", &piece));
+  EXPECT_NEAR(test::measure(piece).velocity[1], 0.5, 0.02);
+}
+
+TEST(WriteScene, AttachmentToAShapeThatIsLeftOut_IsLeftOutToo) {
+  Made made;
+  const std::vector<dfm_rigid> hook =
+      test::create(made.world, {test::box("hook", {0.1, 0.1, 0.01}, 1, {0, 0, 0.5})});
+  dfm_obstacle_def ball = dfm_obstacle_def_default();
+  ball.name = "knob";
+  ball.shape = DFM_SHAPE_SPHERE;
+  ball.radius = 0.02;
+  dfm_obstacle knob = 0;
+  test::ok(dfm_rigid_add_shape(hook[0], &ball, &knob));
+  const double everywhere[] = {-9, -9, -9, 9, 9, 9};
+  dfm_attach_def d = dfm_attach_def_default();
+  d.to = knob;
+  d.box = everywhere;
+  test::ok(dfm_body_attach(made.ball, &d, nullptr));
+  const std::string path = folder_of("knob") + "/knob.json";
+  EXPECT_NE(all(write(made.world, path, DFM_SCENE_PARTIAL)).find("attachment to 'knob' is left out"),
+            std::string::npos);
+  EXPECT_TRUE(load(made.context, path));
+}
+
+TEST(WriteScene, RuleForADestroyedMaterial_IsLeftOut) {
+  Made made;
+  dfm_material_def d = dfm_material_def_default();
+  d.name = "wax";
+  dfm_material wax = 0;
+  test::ok(dfm_material_create(made.world, &d, &wax));
+  test::ok(dfm_world_filter_pair(made.world, "*", "material=wax", false));
+  test::ok(dfm_material_destroy(wax));
+  const std::string path = folder_of("wax") + "/wax.json";
+  EXPECT_EQ(dfm_world_write_scene(made.world, path.c_str(), nullptr, nullptr), DFM_E_UNSUPPORTED);
+  test::says({"the filter for '*' and 'material=wax'"});
+  write(made.world, path, DFM_SCENE_PARTIAL);
+  EXPECT_TRUE(load(made.context, path));
+}
+
+// A scene hangs a spring on one cell.
+TEST(WriteScene, SpringWithWeights_IsWrittenWhereItsPointsAreOfOneCell) {
+  Made made;
+  dfm_mesh_handle mesh = 0;  // of the block
+  const double size[] = {0.1, 0.1, 0.1};
+  test::ok(dfm_mesh_make(made.context, "beam", size, DFM_MESH_CELLS, 200, &mesh));
+  const dfm_mesh_info info = test::info_of(mesh);
+  const auto add = [&](const std::vector<uint32_t> &points) {
+    const double weights[] = {0.6, 0.1, 0.3};
+    dfm_spring_def spring{};
+    spring.size = sizeof spring;
+    spring.npoint = uint32_t(points.size());
+    spring.points = points.data();
+    spring.weights = weights;
+    spring.stiffness = 5;
+    spring.to[2] = 0.5;
+    test::ok(dfm_body_add_spring(made.block, &spring, nullptr));
+  };
+  const std::string folder = folder_of("springs");
+  add({info.tets[1], info.tets[2], info.tets[3]});
+  EXPECT_EQ(all(write(made.world, folder + "/one.json")), "");
+  const dfm_world back = load(made.context, folder + "/one.json");
+  ASSERT_TRUE(back);
+  for (const dfm_world w : {made.world, back}) steps(w, 20, 1e-4);
+  EXPECT_LT(apart(back, made.world), 1e-12);
+  add({0, info.npoint - 1});
+  EXPECT_EQ(dfm_world_write_scene(made.world, (folder + "/two.json").c_str(), nullptr, nullptr),
+            DFM_E_UNSUPPORTED);
+  test::says({"a spring pulls at 2 points with its own weights"});
+}
+
+// A scene has no contacts, so what touches does not touch when its first step begins.
+TEST(WriteScene, RuleThatKeepsAModel_IsReported) {
+  test::Context context;
+  const std::string folder = folder_of("rule"), path = folder + "/made.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1, "step": 0.001},
+    "bodies": [{"name": "b", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60},
+      "pose": {"position": [0, 0, 0.0005]}, "model": {"type": "msm"},
+      "switch": {"touching": "corotational_fem", "far": "msm", "wait": 0.5}}],
+    "obstacles": [{"name": "floor", "shape": "plane"}]})");
+  const dfm_world world = load(context, path);
+  ASSERT_TRUE(world);
+  EXPECT_EQ(all(write(world, folder + "/start.json")), "");
+  steps(world, 30, 1e-3);
+  EXPECT_EQ(dfm_world_write_scene(world, (folder + "/later.json").c_str(), nullptr, nullptr),
+            DFM_E_UNSUPPORTED);
+  test::says({"body 'b': the rule for its model begins anew"});
+  EXPECT_NE(all(write(world, folder + "/later.json", DFM_SCENE_SNAPSHOT)).find("the snapshot contains"),
+            std::string::npos);
+}
+
 TEST(WriteScene, Restitution_IsWrittenBesideTheLaw) {
   Made made;
   dfm_friction_def f{};
@@ -409,6 +595,22 @@ TEST(WriteScene, OfAScene_HasItsProbesAndOutputs) {
   EXPECT_EQ(dfm_scene_write(scene, "", nullptr, nullptr), DFM_E_ARG);
   EXPECT_EQ(std::string(dfm_last_error()).find("dfm_scene_write:"), 0u) << dfm_last_error();
   EXPECT_EQ(dfm_scene_write(world, (folder + "/a.json").c_str(), nullptr, nullptr), DFM_E_HANDLE);
+}
+
+TEST(WriteScene, OfASceneWithoutAStep_HasNone) {
+  test::Context context;
+  const std::string folder = folder_of("auto"), path = folder + "/made.json";
+  test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},
+    "bodies": [{"name": "b", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 60}}]})");
+  dfm_scene scene = 0;
+  ASSERT_EQ(dfm_scene_open(context, path.c_str(), nullptr, &scene), DFM_OK) << dfm_last_error();
+  dfm_scene_write_def def = dfm_scene_write_def_default();
+  for (const auto &[step, text] : {std::pair{0.0, R"("step":"auto")"}, {0.25, R"("step":0.25)"}}) {
+    def.step = step;
+    test::ok(dfm_scene_write(scene, (folder + "/again.json").c_str(), &def, nullptr));
+    const std::string again = test::read_file(folder + "/again.json");
+    EXPECT_NE(again.find(text), std::string::npos) << again;
+  }
 }
 
 TEST(WriteScene, OfAStaticScene_LooksForEquilibriaAgain) {

@@ -2,6 +2,7 @@
 on the rig and before the validator."""
 import gc
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -100,6 +101,15 @@ class Loaded(unittest.TestCase):
             out = law(fn=[10.0], vt=[[0.01], [0]], dt=1e-3, state=state, mu=0.5)
             state = out["state"]
         self.assertAlmostEqual(out["ft"][0, 0], -5, delta=0.05)
+
+    def test_rows_of_state_that_are_not_used_are_zero(self):
+        law, slip = deform.Law("gms"), np.ones((2, 4)) * 1e-3
+        first = law(np.ones(4), slip, 1e-3)
+        with mock.patch("numpy.empty", lambda shape, dtype=float: np.full(shape, 77, dtype)):
+            again = law(np.ones(4), slip, 1e-3)
+        self.assertEqual(again["state"].shape, (law.nstate, 4))
+        self.assertTrue((again["state"][-1] == 0).all())
+        np.testing.assert_array_equal(again["state"], first["state"])
 
 
 class InPython(unittest.TestCase):

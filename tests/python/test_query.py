@@ -166,6 +166,44 @@ class Decisions(unittest.TestCase):
                     set_function(None)
                     world.step(1e-3)
 
+    def test_pieces_and_tools_that_come_later_are_known(self):
+        with deform.World() as world:
+            world.add_obstacle("plane", name="floor")
+            body = ball(world, "ball", (0, 0, 0.11))
+            asked, seen = set(), set()
+            world.set_may_touch(lambda a, b: asked.add((a.name, b.name)) or True)
+            world.set_pre_solve(lambda contact: seen.update((contact.a.name, contact.b.name)))
+            world.add_tool("sphere", name="tip", position=(0, 0, 0.215), radius=0.01)
+            body.set_separate()
+            body.cut("plane", point=(0.001, 0, 0), normal=(1, 0, 0))
+            before = world.snapshot()
+            world.run(0.05, dt=1e-3)
+            self.assertLessEqual({("ball", "tip"), ("ball.1", "floor"), ("ball", "ball.1")}, asked)
+            self.assertLessEqual({"ball", "ball.1", "floor", "tip"}, seen)
+            world.restore(before)
+            world.step(1e-3)
+
+    def test_a_pair_is_asked_about_again_where_the_function_raised(self):
+        with deform.World() as world:
+            world.add_obstacle("plane", name="floor")
+            body = ball(world, "ball")
+            answers = []
+
+            def once(a, b):
+                answers.append(b.name)
+                if len(answers) < 3:
+                    raise ZeroDivisionError
+                return False
+
+            world.set_may_touch(once)
+            with self.assertRaises(ZeroDivisionError):
+                world.step(1e-3)
+            with self.assertRaises(ZeroDivisionError):
+                _ = world.stable_step
+            world.run(0.05, dt=1e-3)
+            self.assertEqual(len(answers), 3)
+            self.assertLess(body.measure.com[2], 0.095)
+
     def test_a_callback_that_uses_the_world_is_told_so(self):
         with deform.World() as world:
             world.add_obstacle("plane")

@@ -418,7 +418,8 @@ class Law:
         given = _abi.dfm_friction_in(ctypes.sizeof(_abi.dfm_friction_in), n, n, 0, dt,
                                      packed.ctypes.data, None, *(array.ctypes.data for array in (
                                          normal, slip, stop, lane, dwelt, before)))
-        out = {"ft": np.empty((2, n)), "state": np.empty((self.nstate, n)), "limit": np.empty(n),
+        # a law may use fewer rows of state with these parameters
+        out = {"ft": np.empty((2, n)), "state": np.zeros((self.nstate, n)), "limit": np.empty(n),
                "mode": np.empty(n, np.uint8), "stored": np.empty(n)}
         wanted = _abi.dfm_friction_out(ctypes.sizeof(_abi.dfm_friction_out))
         for key, array in out.items():

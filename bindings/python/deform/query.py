@@ -259,6 +259,7 @@ class Queries:
     __slots__ = ("_known", "_raised")
 
     handle: int
+    _busy: int
     _raised: BaseException | None
     _known: dict[int, Any] | None
 
@@ -339,9 +340,10 @@ class Queries:
     # ---- functions that decide about contacts ----------------------------------------------------------
 
     def _thing(self, handle: int) -> Any:
-        """The object of a handle while the world is busy and cannot be queried."""
+        """The object of a handle within a step, in which pieces and the parts of a tool may be new."""
         assert self._known is not None
-        return self._known[handle]
+        known = self._known.get(handle)
+        return self._know(self.owner(handle)) if known is None else known
 
     def _know(self, thing: Any) -> Any:
         """Keeps what is made while functions decide about contacts, who are called with it."""
@@ -350,17 +352,21 @@ class Queries:
         return thing
 
     def _call(self, function: Callable[..., Any], *arguments: Any) -> Any:
-        """Result of a function of the user; an exception in it ends the step, which raises it."""
+        """Result of a function of the user; an exception in it ends the step or call, which raises it."""
         if self._raised is None:
             try:
                 return function(*arguments)
             except BaseException as raised:  # nothing may pass through the library's frames
                 self._raised = raised
-                quick.dfm_world_interrupt(self.handle)
+                if self._busy:  # else no step would be ended but the next one
+                    quick.dfm_world_interrupt(self.handle)
         return None
 
     def _take_raised(self) -> BaseException | None:
+        """What a function has raised. The library keeps what was answered in its place: it asks again."""
         raised, self._raised = self._raised, None
+        if raised is not None and self._functions.get("may_touch") is not None:
+            check(quick.dfm_world_ask_again(self.handle, 0, 0))
         return raised
 
     def _decide(self, key: str, keep: Any) -> None:

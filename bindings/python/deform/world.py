@@ -532,6 +532,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         seconds = dt if type(dt) is float else real(dt, "dt")
         if self._busy:
             self.free()
+        if self._raised is not None:  # in a call since then that needs the decisions
+            raise self._take_raised()  # type: ignore[misc]
         self._busy = get_ident()
         try:
             status = _step(self.handle, seconds, self._bits_at)
@@ -609,6 +611,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         out = ctypes.c_double()
         self.free()
         check(quick.dfm_world_stable_step(self.handle, ctypes.byref(out), None, None))
+        if self._raised is not None:
+            raise self._take_raised()  # type: ignore[misc]
         return out.value
 
     def set_gravity(self, gravity: Sequence[float]) -> None:

@@ -153,7 +153,9 @@ void write_scene(const char *call, World &w, const char *path, const dfm_scene_w
 dfm_status dfm_world_write_scene(dfm_world world, const char *path, const dfm_scene_write_def *def,
                                  uint32_t *notes) {
   return as_status(to_change<world_of>, world, [&](World &w) {
-    write_scene("dfm_world_write_scene", w, path, take_def(def, dfm_scene_write_def_default()), {}, notes);
+    dfm_scene_write_def d = take_def(def, dfm_scene_write_def_default());
+    if (d.step == 0) d.step = w.def.step;
+    write_scene("dfm_world_write_scene", w, path, d, {}, notes);
   });
 }
 

@@ -347,7 +347,7 @@ class Builder {
     if (mesh.wears_skin) d.surface = &surface;
     const dfm_surface_groups groups = groups_of(mesh);
     if (groups.ngroup) d.groups = &groups;
-    if (jittered_) {
+    if (jittered_ && b.start.kind != StartKind::state) {
       const double center[3] = {(mesh.lo[0] + mesh.hi[0]) / 2, (mesh.lo[1] + mesh.hi[1]) / 2,
                                 (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, center, d.pose, d.velocity, d.spin);
@@ -395,11 +395,12 @@ class Builder {
   }
 
   // Also moves held points, which dfm_body_set_state does not move.
-  void set_state(dfm_body body, const Body &b, const BodyMesh &mesh) const {
+  void set_state(dfm_body body, const Body &b, const BodyMesh &mesh) {
     const std::string pointer = b.start.pointer + "/state";
-    const StartState state =
+    StartState state =
         with_pointer(pointer, [&] { return read_start_state(files_.path_of(b.start.state), mesh); });
     dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
+    if (jittered_ && made.motions.empty()) jitter(state, mesh.size);  // else its points are placed by these
     if (!made.dynamics->abilities().placed)
       def_.refuse(
           pointer,
@@ -413,6 +414,21 @@ class Builder {
           made.p.v[kStride * size_t{i} + k] = state.v[3 * size_t{i} + k];
         }
     def_.require(dfm_body_set_state(body, mesh.info.npoint, state.x.data(), state.v.data()), pointer);
+  }
+
+  // Moves a state as a rigid body, about the center of its points.
+  void jitter(StartState &state, double size) {
+    Extent box;
+    for (size_t i = 0; i < state.x.size(); i += 3) box.add(load3(&state.x[i]));
+    double center[3], velocity_scale[3] = {1, 1, 1}, none[3] = {};
+    store3(center, 0.5 * (box.lo + box.hi));
+    dfm_pose moved{};
+    jitter_.apply(size, center, moved, velocity_scale, none);
+    const Pose by = load_pose(moved);
+    for (size_t i = 0; i < state.x.size(); i += 3) {
+      store3(&state.x[i], place(by, load3(&state.x[i])));
+      store3(&state.v[i], velocity_scale[0] * rotate(by.rotation, load3(&state.v[i])));
+    }
   }
 
   // Checks the complete world, so that an impossible change is an error of the scene.
@@ -619,7 +635,14 @@ class Builder {
         const double center[3] = {0, 0, 0}, *const a = b.def.half_size;
         const double size = b.def.shape == DFM_SHAPE_BOX ? 2 * std::max({a[0], a[1], a[2]})
                                                          : 2 * (b.def.radius + b.def.half_length);
-        jitter_.apply(size, center, b.def.pose, b.def.velocity, b.def.spin);
+        if (b.start) {
+          dfm_pose now{};
+          store_pose(now, load_pose(*b.start));
+          jitter_.apply(size, center, now, b.start->velocity, b.start->spin);
+          store_pose(*b.start, load_pose(now));
+        } else {
+          jitter_.apply(size, center, b.def.pose, b.def.velocity, b.def.spin);
+        }
       }
       bodies.push_back(b.def);
       for (Joint &j : b.joints) {

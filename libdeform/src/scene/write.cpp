@@ -147,6 +147,11 @@ std::string SceneWriter::triangles(const std::string &name, const Obstacle &of) 
               [mesh = std::move(mesh)](const std::string &to_path) { write_mesh(mesh, to_path); });
 }
 
+bool SceneWriter::has(const std::string &name) const {
+  const Obstacle *const o = w.find_obstacle(name);
+  return w.find_body(name) || (o && shape_in_scene(w, *o));
+}
+
 void SceneWriter::check_name(const char *kind, const std::string &name) const {
   scene::json text = name;
   try {
@@ -255,20 +260,55 @@ void write_materials(SceneWriter &to) {
 
 // ---- contact ----------------------------------------------------------------------------------------------
 
-bool sides_known(const SceneWriter &to, const std::string &side) {
+// group: ":NAME"; empty: the whole body.
+bool has_group(const Body &b, const std::string &group) {
+  const auto is_it = [&](uint32_t zone) { return ":" + b.zones.list[zone].group == group; };
+  return group.empty() || (b.zones.of.empty() ? is_it(0) : std::ranges::any_of(b.zones.of, is_it));
+}
+
+bool in_scene(const SceneWriter &to, const std::string &side) {
   if (side == "*") return true;
   if (side.rfind("material=", 0) == 0) return to.materials.contains(side.substr(9));
-  return to.knows(side) || to.knows(side.substr(0, side.find(':')));
+  const size_t colon = side.find(':');
+  const Body *const whole = colon == side.npos ? nullptr : to.w.find_body(side.substr(0, colon));
+  return to.has(side) || (whole && has_group(*whole, side.substr(colon)));
+}
+
+// What a side of the world's rules means in the scene: the same, and the pieces of the body that it names,
+// which are bodies like any other there.
+std::vector<std::string> sides_in_scene(const SceneWriter &to, const std::string &side) {
+  std::vector<std::string> out;
+  if (in_scene(to, side)) out.push_back(side);
+  for (const auto &b : to.w.bodies) {
+    if (b->whole_name.empty() || !names(side, b->whole_name)) continue;
+    const std::string group = side.substr(b->whole_name.size());
+    if (has_group(*b, group)) out.push_back(b->name + group);
+  }
+  return out;
+}
+
+// A rule for each two sides that the scene has; it refuses others.
+template <class Rule>
+std::vector<Rule> rules_in_scene(SceneWriter &to, const char *what, const std::vector<Rule> &rules) {
+  std::vector<Rule> out;
+  for (const Rule &r : rules) {
+    const size_t before = out.size();
+    for (const std::string &a : sides_in_scene(to, r.between[0]))
+      for (const std::string &b : sides_in_scene(to, r.between[1])) {
+        out.push_back(r);
+        out.back().between[0] = a;
+        out.back().between[1] = b;
+      }
+    if (out.size() == before)
+      to.note("the %s for '%s' and '%s' is left out, since the scene does not have both of them", what,
+              r.between[0].c_str(), r.between[1].c_str());
+  }
+  return out;
 }
 
 Written write_friction(SceneWriter &to) {
   Written out = Written::array();
-  for (const FrictionRule &r : to.w.friction) {
-    if (!sides_known(to, r.between[0]) || !sides_known(to, r.between[1])) {
-      to.note("the friction rule for '%s' and '%s' is left out, since the world does not have both of them",
-              r.between[0].c_str(), r.between[1].c_str());
-      continue;
-    }
+  for (const FrictionRule &r : rules_in_scene(to, "friction rule", to.w.friction)) {
     const LawInstance &law = *to.w.laws[r.law];
     const dfm_type &type = law.requested_type ? *law.requested_type : *law.type;
     Written entry;
@@ -282,44 +322,59 @@ Written write_friction(SceneWriter &to) {
   return out;
 }
 
-// By masks and by the host's answers; a rule that names the two decides in place of the masks.
+// A thing of the scene: what its world's rules and masks see, and the name that it has in the scene.
+struct Touching {
+  PairSide side;
+  std::string name;
+  uint64_t id;
+  uint32_t category, collides_with;
+  const Obstacle *shape;  // null: of a body
+};
+
+std::vector<Touching> touching_of(const World &w) {
+  std::vector<Touching> out;
+  for (const auto &b : w.bodies)
+    out.push_back(
+        {{b->name, {}, b->material, b->whole_name}, b->name, b->id, b->category, b->collides_with, nullptr});
+  for (const auto &o : w.obstacles)
+    if (const Obstacle *const s = shape_in_scene(w, *o); s && s->def.shape != DFM_SHAPE_NONE)
+      out.push_back({{s->name, {}, s->material}, o->name, s->id, s->def.category, s->def.collides_with, s});
+  return out;
+}
+
+// Whether anything would keep them apart: no two obstacles, nor two shapes of a rigid body or a tool.
+bool may_meet(const Touching &a, const Touching &b) {
+  if (!a.shape || !b.shape) return true;
+  const RigidSet *const set = a.shape->rigid;
+  if (!set || set != b.shape->rigid) return set || b.shape->rigid;
+  return !set->of_tool && a.shape->rigid_body != b.shape->rigid_body;
+}
+
+// The world's rules, and one for each pair of which they would say something else in the scene: it has no
+// masks and no answers of a host.
 Written write_filters(SceneWriter &to) {
-  World &w = to.w;
-  Written out = Written::array();
-  const auto add = [&](const std::string &a, const std::string &b, bool collide) {
-    out.push_back({{"between", {a, b}}, {"collide", collide}});
-  };
-  const auto pair = [&](const Body &a, const std::string &name, const std::string &material,
-                        uint32_t category, uint32_t with) {
-    if ((a.category & with) && (category & a.collides_with)) return;
-    const PairSide one{a.name, {}, a.material}, other{name, {}, material};
-    for (const FilterRule &r : w.filters)
-      if (rule_weight(r.between, one, other)) return;
-    add(a.name, name, false);
-  };
-  for (size_t i = 0; i < w.bodies.size(); ++i) {
-    const Body &a = *w.bodies[i];
-    for (size_t k = i + 1; k < w.bodies.size(); ++k) {
-      const Body &b = *w.bodies[k];
-      pair(a, b.name, b.material, b.category, b.collides_with);
-    }
-    for (const auto &o : w.obstacles)
-      if (!o->added) pair(a, o->name, o->material, o->def.category, o->def.collides_with);
-  }
-  for (const FilterRule &r : w.filters) {
-    if (to.knows(r.between[0]) && to.knows(r.between[1])) add(r.between[0], r.between[1], r.collide);
-    else if (r.between[0] == "*" || r.between[1] == "*" || r.between[0].rfind("material=", 0) == 0 ||
-             r.between[1].rfind("material=", 0) == 0)
-      add(r.between[0], r.between[1], r.collide);
-  }
-  const auto name = [&](uint64_t id) -> std::string {
-    if (const Body *const b = w.body(id)) return b->name;
-    const Obstacle *const o = w.obstacle(id);
-    return o && !o->added ? o->name : "";
-  };
+  const World &w = to.w;
+  std::vector<FilterRule> rules = rules_in_scene(to, "filter", w.filters), pairs;
+  std::set<std::pair<uint64_t, uint64_t>> refused;
   for (const PairDecision &p : w.may_touch.decisions)
-    if (const std::string a = name(p.a), b = name(p.b); !p.touch && !a.empty() && !b.empty())
-      add(a, b, false);
+    if (!p.touch) refused.insert(std::minmax(p.a, p.b));
+  const std::vector<Touching> things = touching_of(w);
+  for (size_t i = 0; i < things.size(); ++i)
+    for (size_t k = i + 1; k < things.size(); ++k) {
+      const Touching &a = things[i], &b = things[k];
+      if (!may_meet(a, b)) continue;
+      const FilterRule *const rule = best_rule(w.filters, a.side, b.side);
+      const bool allowed =
+          rule ? rule->collide : (a.category & b.collides_with) && (b.category & a.collides_with);
+      const bool touch = allowed && !refused.contains(std::minmax(a.id, b.id));
+      const FilterRule *const written =
+          best_rule(rules, {a.name, {}, a.side.material}, {b.name, {}, b.side.material});
+      if (touch != (!written || written->collide)) pairs.push_back({{a.name, b.name}, touch});
+    }
+  Written out = Written::array();
+  for (const auto *const list : {&rules, &pairs})
+    for (const FilterRule &r : *list)
+      out.push_back({{"between", {r.between[0], r.between[1]}}, {"collide", r.collide}});
   return out;
 }
 
@@ -358,8 +413,7 @@ Written write_time(const SceneWriter &to) {
   Written out;
   if (w.time > 0) out["start"] = w.time;
   out["duration"] = to.options.duration;
-  const double step = to.options.step > 0 ? to.options.step : w.def.step;
-  if (step > 0) out["step"] = step;
+  if (to.options.step > 0) out["step"] = to.options.step;
   else out["step"] = "auto";
   put_integrator(out, w.def.integrator);
   if (to.options.beside.equilibrium) out["mode"] = "static";

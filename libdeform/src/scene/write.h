@@ -23,7 +23,7 @@ struct Beside {
 };
 
 struct WriteOptions {
-  double duration = 1, step = 0;  // s; step 0: that of the world's def, else "auto"
+  double duration = 1, step = 0;  // s; step 0: "auto"
   bool snapshot = false;          // beside the scene, for `deform run --from`
   bool partial = false;           // what a scene cannot say is left out; else it is refused
   Beside beside;
@@ -64,7 +64,8 @@ struct SceneWriter {
   std::string text_file(const std::string &name, std::string text);
   std::string triangles(const std::string &name, const Obstacle &of);  // of a mesh, as a file
   void check_name(const char *kind, const std::string &name) const;  // throws where a scene has no such name
-  bool knows(const std::string &name) const { return w.find_body(name) || w.find_obstacle(name); }
+  // Whether the scene has a body or obstacle of that name.
+  bool has(const std::string &name) const;
 };
 
 Written vector_of(const double *v);
@@ -85,6 +86,8 @@ bool same_bits(const void *a, const void *b, size_t bytes);
 Written write_body(SceneWriter &to, Body &b);
 Written write_obstacle(SceneWriter &to, const Obstacle &o);
 Written write_rigid(SceneWriter &to);  // null: there are none
+// The one whose shape the scene has under the name of o; null: the scene has nothing of that name.
+const Obstacle *shape_in_scene(const World &w, const Obstacle &o);
 Written write_tool(SceneWriter &to, const Tool &t);
 void write_cuts(SceneWriter &to, const Body &b, Written &out);  // those to come, appended
 

@@ -15,6 +15,7 @@
 #include "state/obstacle.h"
 #include "step/solve/attach.h"
 #include "world/body_model.h"
+#include "world/model_change.h"
 
 namespace dfm::writing {
 namespace {
@@ -166,6 +167,12 @@ Written choice_of(SceneWriter &to, const ModelChoice &c) {
   return out;
 }
 
+// What is a matter of the present state, which a snapshot holds.
+void note_state(SceneWriter &to, const std::string &sentence) {
+  if (to.options.snapshot) to.remark(sentence + "; the snapshot contains its state");
+  else to.note("%s", sentence.c_str());
+}
+
 void write_switches(SceneWriter &to, const Body &b, Written &out) {
   if (!b.switches.empty() && !b.rule.empty())
     to.note("body '%s': a scene has either changes of the model by time or a rule; the rule is left out",
@@ -188,6 +195,10 @@ void write_switches(SceneWriter &to, const Body &b, Written &out) {
   }
   rule["far"] = choice_of(to, r.far);
   rule["wait"] = r.wait;
+  if (!begins_alike(b, r))
+    note_state(to, format("body '%s': the rule for its model begins anew in the scene, before any contact, "
+                          "so its first step may change the model",
+                          b.name.c_str()));
   if (r.far.max_jump < HUGE_VAL) rule["max_jump"] = r.far.max_jump;
 }
 
@@ -208,12 +219,9 @@ void write_state(SceneWriter &to, const Body &b, Written &out) {
   }
   if (rests) return;
   if (!b.dynamics->abilities().placed) {
-    const std::string sentence = format(
-        "body '%s': its model '%s' moves it as a whole, so a scene cannot describe its present state; it "
-        "begins at rest where it was created",
-        b.name.c_str(), b.model.type->id);
-    if (to.options.snapshot) to.remark(sentence + "; the snapshot contains its state");
-    else to.note("%s", sentence.c_str());
+    note_state(to, format("body '%s': its model '%s' moves it as a whole, so a scene cannot describe its "
+                          "present state; it begins at rest where it was created",
+                          b.name.c_str(), b.model.type->id));
     return;
   }
   std::string rows = std::string(scene::kStateHeader) + "\n";
@@ -300,6 +308,14 @@ void write_loads(SceneWriter &to, const Body &b, Written &out) {
   write_nodal(to, b, constant, out);
 }
 
+bool in_one_cell(const Body &b, const std::vector<uint32_t> &points) {
+  for (size_t t = 0; t < b.tets.size(); t += 4)
+    if (std::all_of(points.begin(), points.end(),
+                    [&](uint32_t p) { return std::find(&b.tets[t], &b.tets[t] + 4, p) != &b.tets[t] + 4; }))
+      return true;
+  return false;
+}
+
 // Where a spring pulls: at the center of mass of points, or at a place in a cell.
 bool write_spring_place(const Body &b, const Spring &s, Written &out) {
   double whole = 0;
@@ -313,7 +329,7 @@ bool write_spring_place(const Body &b, const Spring &s, Written &out) {
     out["points"] = points;
     return true;
   }
-  if (s.points.size() > 4) return false;
+  if (!in_one_cell(b, s.points)) return false;
   Vec3 x;
   for (size_t i = 0; i < s.points.size(); ++i) x += s.weights[i] * load3(&b.p.rest[3 * size_t{s.points[i]}]);
   out["point"] = vector_of(x);
@@ -345,6 +361,11 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     const Body *const other = to.w.body(a.to);
     const Obstacle *const thing = to.w.obstacle(a.to);
     const std::string name = other ? other->name : thing ? thing->name : "";
+    if (!to.has(name)) {
+      to.note("body '%s': its attachment to '%s' is left out, since the scene does not have that",
+              b.name.c_str(), name.c_str());
+      continue;
+    }
     Written entry;
     entry["to"] = name;
     std::vector<uint32_t> points;

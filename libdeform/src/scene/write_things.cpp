@@ -5,6 +5,7 @@
 #include "scene/keys.h"
 #include "scene/write.h"
 #include "state/obstacle.h"
+#include "state/tool.h"
 
 namespace dfm::writing {
 namespace {
@@ -72,6 +73,13 @@ const Obstacle *only_shape(const World &w, const RigidSet &set, uint32_t body) {
 bool has_added(const World &w, const RigidSet &set, uint32_t body) {
   return std::any_of(w.obstacles.begin(), w.obstacles.end(),
                      [&](const auto &o) { return o->rigid == &set && o->rigid_body == body && o->added; });
+}
+
+// Every tool of its kind has these.
+bool is_of_tool(const World &w, const Obstacle &o) {
+  return std::any_of(w.tools.begin(), w.tools.end(), [&](const auto &t) {
+    return t->set == o.rigid && (o.name == t->name + ".shape" || o.name == t->name + ".shaft");
+  });
 }
 
 void write_rigid_start(const RigidSet &set, uint32_t i, Written &out) {
@@ -160,6 +168,12 @@ std::string host_of(SceneWriter &to, const std::vector<const RigidSet *> &sets) 
 }
 
 }  // namespace
+
+const Obstacle *shape_in_scene(const World &w, const Obstacle &o) {
+  if (o.added) return is_of_tool(w, o) ? &o : nullptr;
+  const bool other = o.rigid && !o.rigid->of_tool && o.def.shape == DFM_SHAPE_NONE;
+  return other ? only_shape(w, *o.rigid, o.rigid_body) : &o;
+}
 
 Written write_rigid(SceneWriter &to) {
   std::vector<const RigidSet *> sets;

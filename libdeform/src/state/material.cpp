@@ -214,23 +214,31 @@ CellField *add_field(std::vector<CellField> &fields, const World &w, const dfm_p
   return &fields.back();
 }
 
-void scale_young(const Body &b, const World &w, const char *model, const Row &row,
-                 std::vector<CellField> &fields, CellField *field, uint32_t ntet) {
-  if (!(row.param.flags & DFM_PARAM_PER_CELL)) {
+// A modulus or a stress: a cell that is filled in part has its share of it.
+bool is_shared(const dfm_param &p) { return p.width == 1 && std::strcmp(p.unit, "Pa") == 0; }
+
+void scale_by_share(const Body &b, const World &w, const char *model, const Row &row,
+                    std::vector<CellField> &fields, CellField *field, uint32_t ntet) {
+  const dfm_param &p = row.param;
+  const auto is_used = [&](double value) {
+    return value != 0 && (value != p.def || !(p.flags & DFM_PARAM_AUTO));
+  };
+  if (!(field ? std::ranges::any_of(field->values, is_used) : is_used(*row.of(0)))) return;
+  if (!(p.flags & DFM_PARAM_PER_CELL)) {
     w.context->logf(DFM_LOG_WARNING,
-                    "body '%s': %s takes one Young's modulus for all cells, so cells that are filled in part "
-                    "are as stiff as full ones",
-                    b.name.c_str(), model);
+                    "body '%s': %s takes one '%s' for all cells, so that of cells that are filled in part is "
+                    "as large as that of full ones",
+                    b.name.c_str(), model, p.key);
     return;
   }
   if (!field) {
-    field = add_field(fields, w, row.param, "share", ntet);
+    field = add_field(fields, w, p, "share", ntet);
     std::fill(field->values.begin(), field->values.end(), *row.of(0));
   } else {
     field->from += " and share";
   }
   for (uint32_t t = 0; t < ntet; ++t)
-    field->values[t] = std::max(row.param.min, field->values[t] * b.share[t]);
+    if (double &value = field->values[t]; is_used(value)) value = std::max(p.min, value * b.share[t]);
 }
 
 }  // namespace
@@ -275,8 +283,7 @@ std::vector<double> model_values(const World &w, const Body &b, const dfm_type &
       for (uint32_t t = 0; t < def.ntet; ++t)
         std::copy_n(row.of(cells.of[t]), p.width, &field->values[size_t(t) * p.width]);
     }
-    if (!b.share.empty() && std::strcmp(p.key, "young") == 0 && p.width == 1)
-      scale_young(b, w, type.id, row, fields, field, def.ntet);
+    if (!b.share.empty() && is_shared(p)) scale_by_share(b, w, type.id, row, fields, field, def.ntet);
   }
   return std::move(packed[0]);
 }

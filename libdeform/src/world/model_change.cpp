@@ -467,6 +467,12 @@ void follow_rules(World &w) {
 
 }  // namespace
 
+bool begins_alike(const Body &b, const SwitchRule &r) {
+  SwitchRule fresh = r;
+  fresh.level = uint32_t(SwitchLevel::undecided);
+  return r.level == fresh.level || r.level == uint32_t(called_for(b, fresh, false));
+}
+
 void make_switches(World &w, double dt) {
   for (auto &b : w.bodies)
     while (!b->switches.empty() && b->switches.front().t <= w.time + kOnTime * dt) {

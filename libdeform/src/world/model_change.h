@@ -26,6 +26,8 @@ void check_first_step(World &w, Body &b);
 bool try_change(World &w, Body &b, const ModelChoice &to, bool report);
 // Makes the changes that are due in the step of dt seconds that begins now: by time, then by rules.
 void make_switches(World &w, double dt);
+// Whether a rule with these inputs that begins now, before any contact, asks for the level that the body has.
+bool begins_alike(const Body &b, const SwitchRule &r);
 void keep_swap(World &w, const Swap &swap);
 
 }  // namespace dfm

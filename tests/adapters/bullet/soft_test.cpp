@@ -24,6 +24,11 @@ struct Cube {
     body = std::make_unique<btSoftBody>(&info, 8, corners, masses);
     for (int i = 0; i < 8; ++i) body->m_nodes[i].m_v = btVector3(1, 0, 2);
   }
+  void append_faces() {
+    const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                              {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+    for (const auto &f : faces) body->appendFace(f[0], f[1], f[2]);
+  }
 };
 
 dfm_body taken(Bullet &b, const Cube &cube, uint32_t cells) {
@@ -55,10 +60,19 @@ TEST(BulletSoft, Tetrahedra_AreTakenWithHeldNodesAndVelocity) {
 TEST(BulletSoft, FacesThatClose_AreFilled) {
   Bullet b;
   Cube cube;
-  const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  for (const auto &f : faces) cube.body->appendFace(f[0], f[1], f[2]);
+  cube.append_faces();
   EXPECT_NEAR(measure(taken(b, cube, 300)).mass, 8, 0.1);
+}
+
+TEST(BulletSoft, PinnedNodesOfFaces_HoldTheCellsAroundThem) {
+  Bullet b;
+  Cube cube;
+  cube.append_faces();
+  for (int i = 4; i < 8; ++i) cube.body->setMass(i, 0);
+  cube.body->setVelocity(btVector3(0, 0, 0));
+  const dfm_body hung = taken(b, cube, 300);
+  for (int i = 0; i < 100; ++i) b.step(1e-2);
+  EXPECT_GT(measure(hung).com[2], 0.05);  // it hangs by its corners
 }
 
 TEST(BulletSoft, LinksAlone_AreRefused) {

@@ -52,6 +52,21 @@ TEST(OdeFriction, StribeckCurve_IsFollowedDownToRest) {
   EXPECT_NEAR(sliding_path(ode), path, 0.01 * path);
 }
 
+// A box that is set down while it slides loses mu times the impulse that stops its fall, and then what
+// Coulomb and viscous friction take: dv/dt = -(mu g + r v).
+TEST(OdeFriction, ViscousPart_DoesNotGrowWithTheImpulseOfTouchDown) {
+  for (const char *law : {"coulomb", "karnopp"}) {
+    Ode ode;
+    ok(use(ode, law, {{"mu", 0.3}, {"sigma2", 500}}));
+    dCreatePlane(ode.space, 0, 0, 1, 0);
+    const dBodyID box = ode.box({0.4, 0.4, 0.02}, 2, {0, 0, 0.03}, {5, 0, 0});
+    const double fall = std::sqrt(2 * 0.01 / 9.81), rate = 4 * 500 * 1e-3 / 2, at = 0.3 * 9.81 / rate;
+    const double landed = 5 - 0.3 * 9.81 * fall, left = (landed + at) * std::exp(-rate * (0.2 - fall)) - at;
+    ode.run(0.2);
+    EXPECT_NEAR(velocity(box)[0], left, 0.01 * left) << law;
+  }
+}
+
 // A law with a state: pushed with half of what it carries, the box moves by its bristles' bending and comes
 // back when let go.
 TEST(OdeFriction, LawWithAState_BendsAndComesBack) {
