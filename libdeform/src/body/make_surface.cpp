@@ -302,8 +302,7 @@ void gather_surface(Surface &surface, const double *x, const double *v) {
   if (!surface.place.empty()) std::memcpy(surface.place.data(), surface.x.data(), kPoint * surface.nsurfel);
   if (surface.back > 0)
     ways_back(surface, surface.x.data(), [&](uint32_t surfel, Vec3 way) {
-      double *const to = &surface.x[4 * size_t{surfel}];
-      store3(to, load3(to) + surface.back * way);
+      add3(&surface.x[4 * size_t{surfel}], surface.back * way);
     });
 }
 

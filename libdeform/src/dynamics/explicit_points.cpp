@@ -449,7 +449,7 @@ void ExplicitPoints::damp(double time, double c, double ahead) {
   const RigidMotion turn = rigid_part(change);
   for (uint32_t i = 0; i < p_.n; ++i) {
     const size_t at = size_t(i) * kStride;
-    store3(&p_.v[at], load3(&p_.v[at]) + (load3(&change[at]) - turn.at(place(i))));
+    add3(&p_.v[at], load3(&change[at]) - turn.at(place(i)));
   }
 }
 
