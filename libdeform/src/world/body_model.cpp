@@ -345,8 +345,7 @@ uint64_t model_hash(const Body &b) {
   Hash h;
   const ModelParams &p = b.origin.params;
   h.add(b.model.type->id, std::strlen(b.model.type->id));
-  h.add(p.keys.data(), p.keys.size());
-  h.add(p.values.data(), p.values.size() * sizeof(double));
+  h.list(p.keys, p.values);
   h.add(b.origin.frame);
   h.add(b.origin.integrator);
   return h.value;
