@@ -135,9 +135,7 @@ FillSurface::FillSurface(const RestMesh &surface)
       winding(memory, points.data(), surface.ntri(), tris.data()) {
   resolution = size > 0 ? DBL_EPSILON * resolution / size : 0;
   for (size_t t = 0; t < tris.size(); t += 3) {
-    const Vec3 a = load3(&points[3 * size_t(tris[t])]);
-    const Vec3 b = load3(&points[3 * size_t(tris[t + 1])]);
-    const Vec3 c = load3(&points[3 * size_t(tris[t + 2])]);
+    const auto [a, b, c] = corners_of(points.data(), &tris[t]);
     area += 0.5 * norm(cross(b - a, c - a));
     volume += dot(a, cross(b, c)) / 6;
   }

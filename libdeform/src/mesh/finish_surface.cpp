@@ -222,9 +222,7 @@ bool has_double_corner(const uint32_t *c) { return c[0] == c[1] || c[1] == c[2] 
 // An altitude below a few roundings of the coordinates is meaningless. Relative to the longest edge, so that
 // no product overflows.
 bool is_flat(const RawMesh &raw, const uint32_t *c) {
-  const Vec3 a = load3(&raw.points[3 * size_t(c[0])]);
-  const Vec3 b = load3(&raw.points[3 * size_t(c[1])]);
-  const Vec3 d = load3(&raw.points[3 * size_t(c[2])]);
+  const auto [a, b, d] = corners_of(raw.points.data(), c);
   double longest = 0, reach = 0;
   for (int k = 0; k < 3; ++k) {
     longest = std::max({longest, std::fabs(b[k] - a[k]), std::fabs(d[k] - a[k]), std::fabs(d[k] - b[k])});
@@ -353,17 +351,8 @@ void drop_doubles(RawMesh &raw, Repairs &done) {
 
 void renumber(RawMesh &raw, uint32_t inner) {
   const uint32_t npoint = raw.npoint();
-  Array<uint32_t> number(npoint, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
-  for (const uint32_t p : raw.tris) number[p] = 0;
-  for (uint32_t p = 0; p < npoint; ++p)
-    if (number[p] == 0) {
-      number[p] = uint32_t(raw.file_point.size());
-      std::copy_n(&raw.points[3 * size_t(p)], 3, &raw.points[3 * size_t(number[p])]);
-      raw.file_point.push_back(p);
-    }
+  const Array<uint32_t> number = keep_points(raw, raw.tris);
   for (uint32_t &p : raw.tris) p = number[p];
-  raw.points.resize(3 * raw.file_point.size());
-  raw.points.shrink_to_fit();
   raw.dropped_points = npoint - raw.merged_points - inner - raw.npoint();
 }
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
-#include "math/vec3.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
@@ -34,17 +33,13 @@ Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges) {
 }
 
 double triangle_area(const double *points, const uint32_t *tri) {
-  const Vec3 a = load3(points + 3 * size_t(tri[0]));
-  const Vec3 b = load3(points + 3 * size_t(tri[1]));
-  const Vec3 c = load3(points + 3 * size_t(tri[2]));
+  const auto [a, b, c] = corners_of(points, tri);
   const double l = std::sqrt(std::max({norm2(b - a), norm2(c - a), norm2(c - b)}));
   return l > 0 ? 0.5 * l * (l * norm(cross((1 / l) * (b - a), (1 / l) * (c - a)))) : 0;
 }
 
 double triangle_quality(const double *points, const uint32_t *tri) {
-  const Vec3 a = load3(points + 3 * size_t(tri[0]));
-  const Vec3 b = load3(points + 3 * size_t(tri[1]));
-  const Vec3 c = load3(points + 3 * size_t(tri[2]));
+  const auto [a, b, c] = corners_of(points, tri);
   const double sum = norm2(b - a) + norm2(c - b) + norm2(a - c), l = std::sqrt(sum);
   return l > 0 ? 2 * std::sqrt(3.0) * norm(cross((1 / l) * (b - a), (1 / l) * (c - a))) : 0;
 }
@@ -108,9 +103,7 @@ void measure_surface(const RestMesh &mesh, dfm_mesh_info &s) {
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
   put_qualities(s.ntriangle, s, [&](size_t t) {
     const uint32_t *tri = &mesh.tris[3 * t];
-    const Vec3 a = load3(points + 3 * size_t(tri[0]));
-    const Vec3 b = load3(points + 3 * size_t(tri[1]));
-    const Vec3 c = load3(points + 3 * size_t(tri[2]));
+    const auto [a, b, c] = corners_of(points, tri);
     s.area += triangle_area(points, tri);
     s.volume += dot(cross(a - middle, b - middle), c - middle) / 6;
     return triangle_quality(points, tri);
