@@ -87,6 +87,14 @@ Part &not_in_step(Part &part) {
   return part;
 }
 
+// Ends what keep_live() below keeps.
+template <Kind kKind, class T>
+void end_live(uint64_t handle) {
+  T *const object = static_cast<T *>(handle_find(kKind, handle));
+  handle_destroy(handle);
+  delete object;
+}
+
 // Gives an object to a context, which ends it by `end` if the host does not; returns its handle.
 template <class T>
 uint64_t keep_live(dfm_context &context, Kind kind, std::unique_ptr<T> object, void (*end)(uint64_t)) {
