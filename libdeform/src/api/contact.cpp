@@ -374,7 +374,7 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
   return as_status([&] {
     Rows<dfm_pair_impulse> rows(out, row_size, "dfm_pair_impulse");
     const World &w = world_of(world);
-    Array<StepImpulses::Pair> pairs(HookAllocator<StepImpulses::Pair>(w.memory()));
+    Array<StepImpulses::Pair> pairs(w.memory());
     list_impulses(w, pairs);
     if (!room(pairs.size(), capacity, out, n)) return;
     for (const StepImpulses::Pair &p : pairs) {

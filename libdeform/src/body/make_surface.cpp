@@ -95,12 +95,12 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   find_edges(out);
 
   const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
-  Array<Vec3> normal(ntri, Vec3{}, HookAllocator<Vec3>(memory));
+  Array<Vec3> normal(ntri, Vec3{}, memory);
   for (uint32_t t = 0; t < ntri; ++t) normal[t] = normalized(out.area2(t, at));
   find_patches(normal, out);
   find_fans(out);
 
-  Array<double> length{HookAllocator<double>(memory)};
+  Array<double> length{memory};
   for (uint32_t e = 0; e < out.nedge; ++e)
     length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
   if (!length.empty()) {

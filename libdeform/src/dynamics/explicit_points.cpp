@@ -27,8 +27,8 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
     : Dynamics(points, surface, model),
       edges_(edges),
       loops_(points_kernels()),
-      stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
-      damping_(points.n, 0.0, HookAllocator<double>(memory)) {
+      stiffness_(points.n, 0.0, memory),
+      damping_(points.n, 0.0, memory) {
   use_memory(memory, part_kinetic_, reached_, before_, lagged_, drag_, load_);
   uint32_t parts = 0;  // after a failure: none, and forces come for all points at once
   if (model.part_forces)

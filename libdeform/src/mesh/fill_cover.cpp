@@ -34,7 +34,7 @@ Vec3 middle_of(const RestMesh &surface, double *size, double *reach) {
 }
 
 Array<double> local_points(const RestMesh &surface, Vec3 middle, double size) {
-  Array<double> out{HookAllocator<double>(*surface.memory)};
+  Array<double> out{*surface.memory};
   out.reserve(surface.points.size());
   for (size_t i = 0; i < surface.points.size(); ++i)
     out.push_back(size > 0 ? (surface.points[i] - middle[int(i % 3)]) / size : 0);
@@ -150,7 +150,7 @@ void FillSurface::measure_openings() {
     uint32_t a, b;
     int32_t way;
   };
-  Array<Edge> edges{HookAllocator<Edge>(memory)};
+  Array<Edge> edges{memory};
   const Array<TriEdge> all = sorted_edges(memory, uint32_t(tris.size() / 3), tris.data());
   for (size_t i = 0, j; i < all.size(); i = j) {
     const auto low = uint32_t(all[i].key >> 32), high = uint32_t(all[i].key);

@@ -211,7 +211,7 @@ void add_warnings(RestMesh &mesh, uint32_t crowded) {
 }  // namespace
 
 Array<uint32_t> keep_points(RawMesh &raw, const Array<uint32_t> &used) {
-  Array<uint32_t> number(raw.npoint(), kNoGroup, HookAllocator<uint32_t>(*raw.memory));
+  Array<uint32_t> number(raw.npoint(), kNoGroup, *raw.memory);
   for (const uint32_t p : used) number[p] = 0;
   raw.file_point.reserve(size_t(std::count(number.begin(), number.end(), 0u)));
   for (uint32_t p = 0; p < number.size(); ++p)
@@ -246,7 +246,7 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
     bool operator<(const Key &o) const { return corner != o.corner ? corner < o.corner : cell < o.cell; }
   };
   const uint32_t ntet = uint32_t(raw.tets.size() / 4);
-  Array<Key> keys{HookAllocator<Key>(*raw.memory)};
+  Array<Key> keys{*raw.memory};
   keys.reserve(ntet);
   for (uint32_t t = 0; t < ntet; ++t) {
     Key key{{}, t};
@@ -256,7 +256,7 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
   }
   std::sort(keys.begin(), keys.end());
   uint32_t dropped = 0;
-  Array<uint8_t> drop(ntet, 0, HookAllocator<uint8_t>(*raw.memory));
+  Array<uint8_t> drop(ntet, 0, *raw.memory);
   for (size_t i = 1; i < keys.size(); ++i)
     if (keys[i].corner == keys[i - 1].corner) {
       drop[keys[i].cell] = 1;

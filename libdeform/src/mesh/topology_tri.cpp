@@ -9,7 +9,7 @@
 namespace dfm {
 
 Array<TriEdge> sorted_edges(const Memory &memory, uint32_t ntri, const uint32_t *tris) {
-  Array<TriEdge> edges{HookAllocator<TriEdge>(memory)};
+  Array<TriEdge> edges{memory};
   edges.reserve(3 * size_t(ntri));
   for (uint32_t h = 0; h < 3 * ntri; ++h) {
     const uint32_t a = tris[h], b = tris[next_half_edge(h)];
@@ -20,7 +20,7 @@ Array<TriEdge> sorted_edges(const Memory &memory, uint32_t ntri, const uint32_t 
 }
 
 Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges) {
-  Array<uint32_t> twin(edges.size(), kOpenEdge, HookAllocator<uint32_t>(memory));
+  Array<uint32_t> twin(edges.size(), kOpenEdge, memory);
   for (size_t i = 0, j = 0; i < edges.size(); i = j) {
     while (j < edges.size() && edges[j].key == edges[i].key) ++j;
     if (j - i == 2) {
@@ -49,8 +49,8 @@ namespace {
 // Boundary loops: from each end of an open edge around that point, through the triangles between, to the
 // loop's next open edge.
 uint32_t count_holes(const RestMesh &mesh, const Array<uint32_t> &twin) {
-  Array<uint32_t> open{HookAllocator<uint32_t>(*mesh.memory)};
-  Array<uint32_t> number(twin.size(), HookAllocator<uint32_t>(*mesh.memory));
+  Array<uint32_t> open{*mesh.memory};
+  Array<uint32_t> number(twin.size(), *mesh.memory);
   for (uint32_t h = 0; h < twin.size(); ++h)
     if (twin[h] == kOpenEdge) {
       number[h] = uint32_t(open.size());
@@ -79,7 +79,7 @@ void measure_surface(const RestMesh &mesh, dfm_mesh_info &s) {
   s.ntriangle = mesh.ntri();
   s.duplicate_points = mesh.merged_points;
   const double *points = mesh.points.data();
-  Array<double> length{HookAllocator<double>(*mesh.memory)};
+  Array<double> length{*mesh.memory};
   {
     const Array<TriEdge> edges = sorted_edges(*mesh.memory, s.ntriangle, mesh.tris.data());
     const Array<uint32_t> twin = edge_twins(*mesh.memory, edges);

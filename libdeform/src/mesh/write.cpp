@@ -12,7 +12,7 @@ namespace {
 // The file's number of each cell's and then each triangle's group, 0 without. Empty where there are no
 // groups at all.
 Array<uint32_t> group_numbers(const RestMesh &mesh) {
-  Array<uint32_t> out(HookAllocator<uint32_t>(*mesh.memory));
+  Array<uint32_t> out(*mesh.memory);
   if (mesh.groups.empty()) return out;
   const Array<uint32_t> cells = mesh.cell_groups();
   out.reserve(cells.size() + mesh.tri_group.size());
@@ -24,7 +24,7 @@ Array<uint32_t> group_numbers(const RestMesh &mesh) {
 
 // Triangles have no share; they take 1 so that a picture by share shows them whole.
 Array<double> shares(const RestMesh &mesh) {
-  Array<double> out(HookAllocator<double>(*mesh.memory));
+  Array<double> out(*mesh.memory);
   if (mesh.share.empty()) return out;
   out.assign(mesh.share.begin(), mesh.share.end());
   out.resize(mesh.ntet() + mesh.tri_group.size(), 1.0);
