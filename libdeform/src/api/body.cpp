@@ -70,10 +70,8 @@ void disturb(Body &b) {
 void sum_loads(Body &b) {
   std::fill(b.p.load.begin(), b.p.load.end(), 0.0);
   for (const Load &load : b.loads)
-    for (size_t i = 0; i < load.points.size(); ++i) {
-      double *const f = &b.p.load[size_t(load.points[i]) * kStride];
-      store3(f, load3(f) + load3(&load.force[3 * i]));
-    }
+    for (size_t i = 0; i < load.points.size(); ++i)
+      add3(&b.p.load[size_t(load.points[i]) * kStride], load3(&load.force[3 * i]));
   disturb(b);
   values_changed(*b.world);
 }

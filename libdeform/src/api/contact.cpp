@@ -175,9 +175,9 @@ void add_rigid_pairs(const World &w, std::vector<PairRow> &pairs) {
     ++p.count;
     p.sticking += c.sticks;
     p.normal += c.impulse[0] / h;
-    store3(p.force, load3(p.force) + force);
-    store3(p.friction, load3(p.friction) + friction);
-    store3(p.moment, load3(p.moment) + cross(c.point - center_of(w, c.a, h), force));
+    add3(p.force, force);
+    add3(p.friction, friction);
+    add3(p.moment, cross(c.point - center_of(w, c.a, h), force));
     p.slip_max = std::max(p.slip_max, std::sqrt(c.slip[0] * c.slip[0] + c.slip[1] * c.slip[1]));
   }
 }
@@ -325,9 +325,9 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       it->sticking += l[0] > 0 && w.report.mode[i] == 1;
       it->normal += l[0] / w.report.h;
       if (ia != ib) {  // forces of a body on itself sum to zero
-        store3(it->force, load3(it->force) + force);
-        store3(it->friction, load3(it->friction) + friction);
-        store3(it->moment, load3(it->moment) + cross(load3(c.point) - com[body], force));
+        add3(it->force, force);
+        add3(it->friction, friction);
+        add3(it->moment, cross(load3(c.point) - com[body], force));
       }
       const double *const slip = &w.report.slip[size_t(2) * i];
       if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
@@ -374,7 +374,7 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
   return as_status([&] {
     Rows<dfm_pair_impulse> rows(out, row_size, "dfm_pair_impulse");
     const World &w = world_of(world);
-    Array<StepImpulses::Pair> pairs(HookAllocator<StepImpulses::Pair>(w.memory()));
+    Array<StepImpulses::Pair> pairs(w.memory());
     list_impulses(w, pairs);
     if (!room(pairs.size(), capacity, out, n)) return;
     for (const StepImpulses::Pair &p : pairs) {

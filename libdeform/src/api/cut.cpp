@@ -111,7 +111,7 @@ dfm_status dfm_body_plan_cut(dfm_body body, double t, const dfm_cut_def *def) {
 dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cells, dfm_cut_info *out) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
     if (n) need(cells, "cells");
-    Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
+    Array<uint8_t> removed(b.ncell(), 0, b.world->memory());
     for (uint32_t i = 0; i < n; ++i) {
       if (cells[i] >= removed.size())
         refuse(b, " has no cell %u to remove; it has %zu", cells[i], removed.size());

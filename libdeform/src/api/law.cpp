@@ -54,12 +54,6 @@ struct Law {
   }
 };
 
-void destroy(uint64_t handle) {
-  Law *law = static_cast<Law *>(handle_find(Kind::law, handle));
-  handle_destroy(handle);
-  delete law;
-}
-
 Law &law_at(dfm_law handle) {
   Law &law = resolve<Law>(Kind::law, handle);
   return held(law, law.context);
@@ -260,7 +254,7 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
     const dfm_type &type =
         path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);
     std::unique_ptr<Law> law(new Law{*context, type, {}, nullptr});
-    *out = keep_live(*context, Kind::law, std::move(law), destroy);
+    *out = keep_live(*context, Kind::law, std::move(law), end_live<Kind::law, Law>);
   });
 }
 
@@ -268,7 +262,7 @@ dfm_status dfm_law_close(dfm_law law) {
   return as_status(law_at, law, [&](Law &l) {
     Call::now().need_alone(&l, "law");
     l.context.remove_live(law);
-    destroy(law);
+    end_live<Kind::law, Law>(law);
   });
 }
 

@@ -75,16 +75,12 @@ const RestMesh &surface_of(const MeshObject &object, dfm_mesh_handle handle) {
        static_cast<unsigned long long>(handle));
 }
 
-void end_mesh(uint64_t handle) {
-  auto *const object = static_cast<MeshObject *>(handle_find(Kind::mesh, handle));
-  handle_destroy(handle);
-  delete object;
-}
 // Moves a mesh into a context. from: logs its warnings with this before each.
 void keep(dfm_context &context, RestMesh &&mesh, dfm_mesh_handle *out, const char *from = nullptr) {
   if (from)
     for (const std::string &w : mesh.warnings) context.logf(DFM_LOG_WARNING, "%s: %s", from, w.c_str());
-  *out = keep_live(context, Kind::mesh, std::make_unique<MeshObject>(context, std::move(mesh)), end_mesh);
+  *out = keep_live(context, Kind::mesh, std::make_unique<MeshObject>(context, std::move(mesh)),
+                   end_live<Kind::mesh, MeshObject>);
 }
 
 // "About" so many cells are asked for; who gets others by more than a quarter is told.
@@ -169,7 +165,7 @@ dfm_status dfm_mesh_destroy(dfm_mesh_handle mesh) {
     MeshObject &object = mesh_of(mesh);
     Call::now().need_alone(&object, "mesh");
     object.context.remove_live(mesh);
-    end_mesh(mesh);
+    end_live<Kind::mesh, MeshObject>(mesh);
   });
 }
 

@@ -1,7 +1,6 @@
 // Objects of handles, for the files of api/: each function throws Error(DFM_E_HANDLE).
 #pragma once
 #include <cstdarg>
-#include <cstdio>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -88,6 +87,14 @@ Part &not_in_step(Part &part) {
   return part;
 }
 
+// Ends what keep_live() below keeps.
+template <Kind kKind, class T>
+void end_live(uint64_t handle) {
+  T *const object = static_cast<T *>(handle_find(kKind, handle));
+  handle_destroy(handle);
+  delete object;
+}
+
 // Gives an object to a context, which ends it by `end` if the host does not; returns its handle.
 template <class T>
 uint64_t keep_live(dfm_context &context, Kind kind, std::unique_ptr<T> object, void (*end)(uint64_t)) {
@@ -124,12 +131,11 @@ inline dfm_context &exclusive(dfm_context &context) {
 // Error(DFM_E_ARG) with the body's name before the sentence.
 [[noreturn]] inline void refuse(const Body &b, const char *sentence, ...) DEFORM_PRINTF(2, 3);
 inline void refuse(const Body &b, const char *sentence, ...) {
-  char text[1024];
   va_list rest;
   va_start(rest, sentence);
-  std::vsnprintf(text, sizeof text, sentence, rest);
+  const std::string text = vformat(sentence, rest);
   va_end(rest);
-  fail(DFM_E_ARG, "body '%s'%s", b.name.c_str(), text);
+  fail(DFM_E_ARG, "body '%s'%s", b.name.c_str(), text.c_str());
 }
 
 inline void need(const void *p, const char *name) {

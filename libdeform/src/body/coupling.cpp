@@ -30,8 +30,7 @@ struct RowEntry {
 struct LocalRest {
   Array<Vec3> point, surfel;
   LocalRest(const Memory &memory, const CouplingInput &in)
-      : point(in.npoint, Vec3{}, HookAllocator<Vec3>(memory)),
-        surfel(in.nsurfel, Vec3{}, HookAllocator<Vec3>(memory)) {
+      : point(in.npoint, Vec3{}, memory), surfel(in.nsurfel, Vec3{}, memory) {
     const Vec3 origin = in.npoint ? load3(in.point) : Vec3{};
     for (uint32_t i = 0; i < in.npoint; ++i) point[i] = load3(in.point + size_t{3} * i) - origin;
     for (uint32_t s = 0; s < in.nsurfel; ++s) surfel[s] = load3(in.surfel + size_t{3} * s) - origin;
@@ -52,7 +51,7 @@ double cell_distance2(Vec3 x, const Vec3 c[4]) {
 }
 
 Array<RestBox> cell_boxes(const Memory &memory, const CouplingInput &in, const LocalRest &rest) {
-  Array<RestBox> boxes(in.ntet, RestBox{}, HookAllocator<RestBox>(memory));
+  Array<RestBox> boxes(in.ntet, RestBox{}, memory);
   for (uint32_t t = 0; t < in.ntet; ++t) {
     Extent box;
     for (size_t k = 0; k < 4; ++k) box.add(rest.point[in.tet[size_t{4} * t + k]]);
@@ -239,9 +238,7 @@ void append_row(Coupling &out, Array<RowEntry> &row) {
 }
 
 Coupling empty_coupling(const Memory &memory, uint32_t nsurfel) {
-  Coupling out{Array<uint32_t>(HookAllocator<uint32_t>(memory)),
-               Array<uint32_t>(HookAllocator<uint32_t>(memory)),
-               Array<double>(HookAllocator<double>(memory))};
+  Coupling out{Array<uint32_t>(memory), Array<uint32_t>(memory), Array<double>(memory)};
   out.row.reserve(size_t{nsurfel} + 1);
   out.row.push_back(0);
   return out;
@@ -252,7 +249,7 @@ Coupling empty_coupling(const Memory &memory, uint32_t nsurfel) {
 Array<uint32_t> cells_of_surfels(const Memory &memory, const CouplingInput &in) {
   const LocalRest rest(memory, in);
   const RestCells cells(memory, in, rest);
-  Array<uint32_t> out(in.nsurfel, 0u, HookAllocator<uint32_t>(memory));
+  Array<uint32_t> out(in.nsurfel, 0u, memory);
   double away;
   for (uint32_t s = 0; s < in.nsurfel; ++s) out[s] = cells.find(rest.surfel[s], away);
   return out;
@@ -264,7 +261,7 @@ Coupling couple_barycentric(const Memory &memory, const CouplingInput &in) {
   Coupling out = empty_coupling(memory, in.nsurfel);
   out.col.reserve(size_t{4} * in.nsurfel);
   out.weight.reserve(size_t{4} * in.nsurfel);
-  Array<RowEntry> row(HookAllocator<RowEntry>{memory});
+  Array<RowEntry> row(memory);
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
     row.clear();
     const double far = cells.row(rest.surfel[s], row);
@@ -340,7 +337,7 @@ class Cloud {
  public:
   Cloud(const Memory &memory, const CouplingInput &in)
       : rest(memory, in),
-        support(in.npoint, 0.0, HookAllocator<double>(memory)),
+        support(in.npoint, 0.0, memory),
         dots_(dots(memory, rest.point)),
         dot_tree_(memory, dots_),
         cubes_(find_supports(memory, in.support)),
@@ -373,13 +370,13 @@ class Cloud {
   RestTree cube_tree_;
 
   static Array<RestBox> dots(const Memory &memory, const Array<Vec3> &x) {
-    Array<RestBox> out(HookAllocator<RestBox>{memory});
+    Array<RestBox> out(memory);
     for (const Vec3 p : x) out.push_back({p, p});
     return out;
   }
   // Sets the supports; returns the cubes around them.
   Array<RestBox> find_supports(const Memory &memory, double factor) {
-    Array<RestBox> cubes(HookAllocator<RestBox>{memory});
+    Array<RestBox> cubes(memory);
     for (uint32_t i = 0; i < support.size(); ++i) {
       double nearest[kNeighbors], limit2 = std::numeric_limits<double>::infinity();
       uint32_t n = 0;
@@ -406,10 +403,7 @@ class Cloud {
 class Neighborhoods {
  public:
   Neighborhoods(const Memory &memory, const Cloud &cloud)
-      : cloud_(cloud),
-        known_(cloud.support.size(), Known{}, HookAllocator<Known>(memory)),
-        neighbor_(HookAllocator<uint32_t>(memory)),
-        list_(HookAllocator<uint32_t>(memory)) {}
+      : cloud_(cloud), known_(cloud.support.size(), Known{}, memory), neighbor_(memory), list_(memory) {}
   // state 0 not computed, 1 spans space, 2 flat
   struct Known {
     size_t begin = 0, end = 0;
@@ -485,8 +479,8 @@ template <class Occluded, class Fill>
 Coupling couple_by_reach(const Memory &memory, const CouplingInput &in, const Cloud &cloud,
                          const Occluded &occluded, const Fill &fill) {
   std::optional<RestCells> cells;
-  Array<uint32_t> reach(HookAllocator<uint32_t>{memory});
-  Array<RowEntry> row(HookAllocator<RowEntry>{memory});
+  Array<uint32_t> reach(memory);
+  Array<RowEntry> row(memory);
   Coupling out = empty_coupling(memory, in.nsurfel);
   for (uint32_t s = 0; s < in.nsurfel; ++s) {
     const Vec3 x = cloud.rest.surfel[s];

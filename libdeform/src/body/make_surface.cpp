@@ -11,18 +11,12 @@
 #include "core/disjoint_sets.h"
 #include "geometry/closest.h"
 #include "math/vec3.h"
+#include "mesh/topology_tri.h"
 
 namespace dfm {
 namespace {
 
 constexpr double kPatchCosine = 0.5;  // faces within 60 degrees are one patch (doc/concepts/detection.md)
-
-struct Side {
-  uint64_t key;  // {lower surfel, higher surfel}
-  uint32_t tri;
-  uint8_t corner;  // the edge runs from this corner to the next one
-  bool forward;    // from the lower to the higher surfel
-};
 
 void number_surfels(uint32_t npoint, const uint32_t *tris, uint32_t ntri, Surface &out) {
   Array<uint32_t> number(size_t{npoint}, kNone, out.tri.get_allocator());
@@ -40,30 +34,23 @@ void number_surfels(uint32_t npoint, const uint32_t *tris, uint32_t ntri, Surfac
 }
 
 void find_edges(Surface &out) {
-  Array<Side> sides(out.tri.get_allocator());
-  sides.reserve(out.tri.size());
-  for (uint32_t t = 0; t < out.ntri; ++t)
-    for (uint8_t k = 0; k < 3; ++k) {
-      const uint32_t i = out.tri[3 * t + k], j = out.tri[3 * t + (k + 1) % 3];
-      sides.push_back({uint64_t{std::min(i, j)} << 32 | std::max(i, j), t, k, i < j});
-    }
-  std::sort(sides.begin(), sides.end(),
-            [](const Side &a, const Side &b) { return a.key != b.key ? a.key < b.key : a.tri < b.tri; });
+  const Array<TriEdge> sides = sorted_edges(*out.tri.get_allocator().memory, out.ntri, out.tri.data());
   out.edge.clear();
   out.edge_tri.clear();
   out.tri_edge.assign(size_t{3} * out.ntri, kNone);
   out.tri_owns.assign(out.ntri, 0);
   for (size_t s = 0; s < sides.size(); ++s) {
-    if (s == 0 || sides[s].key != sides[s - 1].key) {
-      out.edge.push_back(uint32_t(sides[s].key >> 32));
-      out.edge.push_back(uint32_t(sides[s].key));
+    const auto [key, half] = sides[s];
+    if (s == 0 || key != sides[s - 1].key) {
+      out.edge.push_back(uint32_t(key >> 32));
+      out.edge.push_back(uint32_t(key));
       out.edge_tri.insert(out.edge_tri.end(), {kNone, kNone});
-      out.tri_owns[sides[s].tri] |= 8u << sides[s].corner;
+      out.tri_owns[half / 3] |= 8u << half % 3;
     }
     const uint32_t e = uint32_t(out.edge.size() / 2 - 1);
-    out.tri_edge[3 * sides[s].tri + sides[s].corner] = e;
-    uint32_t &slot = out.edge_tri[2 * e + (sides[s].forward ? 0 : 1)];
-    if (slot == kNone) slot = sides[s].tri;
+    out.tri_edge[half] = e;
+    uint32_t &slot = out.edge_tri[2 * e + (out.tri[half] < out.tri[next_half_edge(half)] ? 0 : 1)];
+    if (slot == kNone) slot = half / 3;
   }
   out.nedge = uint32_t(out.edge.size() / 2);
   Array<uint8_t> owned(out.nsurfel, 0, out.tri.get_allocator());
@@ -108,12 +95,12 @@ void make_surface(const Memory &memory, uint32_t npoint, const double *rest, con
   find_edges(out);
 
   const auto at = [&](uint32_t surfel) { return load3(rest + size_t{3} * out.point[surfel]); };
-  Array<Vec3> normal(ntri, Vec3{}, HookAllocator<Vec3>(memory));
+  Array<Vec3> normal(ntri, Vec3{}, memory);
   for (uint32_t t = 0; t < ntri; ++t) normal[t] = normalized(out.area2(t, at));
   find_patches(normal, out);
   find_fans(out);
 
-  Array<double> length{HookAllocator<double>(memory)};
+  Array<double> length{memory};
   for (uint32_t e = 0; e < out.nedge; ++e)
     length.push_back(norm(at(out.edge[2 * e + 1]) - at(out.edge[2 * e])));
   if (!length.empty()) {
@@ -301,10 +288,8 @@ void gather_surface(Surface &surface, const double *x, const double *v) {
   }
   if (!surface.place.empty()) std::memcpy(surface.place.data(), surface.x.data(), kPoint * surface.nsurfel);
   if (surface.back > 0)
-    ways_back(surface, surface.x.data(), [&](uint32_t surfel, Vec3 way) {
-      double *const to = &surface.x[4 * size_t{surfel}];
-      store3(to, load3(to) + surface.back * way);
-    });
+    ways_back(surface, surface.x.data(),
+              [&](uint32_t surfel, Vec3 way) { add3(&surface.x[4 * size_t{surfel}], surface.back * way); });
 }
 
 }  // namespace dfm

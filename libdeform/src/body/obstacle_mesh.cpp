@@ -47,7 +47,7 @@ void keep_first_features(Surface &s) {
 
 ObstacleMesh::ObstacleMesh(const Memory &memory, uint32_t npoint, const double *points, uint32_t ntri,
                            const uint32_t *tris)
-    : local(HookAllocator<double>(memory)) {
+    : local(memory) {
   make_surface(memory, npoint, points, tris, ntri, surface);
   closed = is_closed(surface);
   keep_first_features(surface);
@@ -79,7 +79,7 @@ void ObstacleMesh::place(Vec3 at, Quat turned, Vec3 velocity, Vec3 spin) {
 }
 
 void ObstacleMesh::make_tree(const Memory &memory) {
-  Array<double> x(size_t{4} * surface.nsurfel, 0.0, HookAllocator<double>(memory));
+  Array<double> x(size_t{4} * surface.nsurfel, 0.0, memory);
   for (uint32_t s = 0; s < surface.nsurfel; ++s) store3(&x[4 * size_t{s}], load3(&local[3 * size_t{s}]));
   auto made = std::make_unique<BoxTree>(memory);
   made->build(surface.tri, x.data());

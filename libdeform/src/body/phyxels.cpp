@@ -6,10 +6,10 @@ namespace dfm {
 
 void Phyxels::size(const Memory &m, uint32_t points) {
   n = points;
-  const auto zeros = [&](size_t count) { return Array<double>(count, 0.0, HookAllocator<double>(m)); };
+  const auto zeros = [&](size_t count) { return Array<double>(count, 0.0, m); };
   rest = zeros(size_t{3} * n);
   mass = zeros(n);
-  held = Array<uint8_t>(n, 0, HookAllocator<uint8_t>(m));
+  held = Array<uint8_t>(n, 0, m);
   for (Array<double> *a : {&x, &v, &v_free, &x_end, &v_end, &f, &load, &impulse, &inv_mass})
     *a = zeros(size_t{kStride} * n);
 }

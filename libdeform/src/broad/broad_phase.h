@@ -92,7 +92,7 @@ class BroadPhase {
     uint32_t refits = 0, rebuilds = 0;  // of the tree, not in stats_ yet
     BoxTree tree;
     Array<double> x;  // [nsurfel,4] when the lists were made
-    explicit Side(const Memory &m) : tree(m), x(HookAllocator<double>(m)) {}
+    explicit Side(const Memory &m) : tree(m), x(m) {}
   };
   struct Body : Side {
     uint64_t id = 0;

@@ -19,7 +19,7 @@ struct PairFilter {
   uint64_t version = 0;   // increases with every change, so that lists built with older rules are rebuilt
 
   PairFilter() = default;
-  explicit PairFilter(const Memory &memory) : rules(HookAllocator<PairRule>(memory)) {}
+  explicit PairFilter(const Memory &memory) : rules(memory) {}
 
   void set(uint64_t a, uint64_t b, bool obstacle, bool touch) {
     if (!obstacle && b < a) std::swap(a, b);

@@ -11,7 +11,7 @@ namespace dfm {
 // Positions of a surface at one time, and the rotation that fits best since.
 class RigidReference {
  public:
-  explicit RigidReference(const Memory &memory) : x_(HookAllocator<double>(memory)) {}
+  explicit RigidReference(const Memory &memory) : x_(memory) {}
   void set(const Surface &surface);
   // m, largest since set(), beyond the rigid motion that fits best
   double displaced(const Surface &surface);

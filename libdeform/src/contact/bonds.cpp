@@ -54,8 +54,7 @@ void sweep_bonds(ContactRows &rows, const RowsPart &part) {
     const Vec3 change = change_of(rows, row);
     if (change.x == 0 && change.y == 0 && change.z == 0) return;
     rows.apply(row, change);
-    double *const l = &rows.impulse[size_t{3} * row];
-    store3(l, load3(l) + change);
+    add3(&rows.impulse[size_t{3} * row], change);
   });
 }
 

@@ -45,8 +45,7 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
     for (uint32_t k = 0; k < c.nnode; ++k) {
       const uint32_t node = c.node[k];
       const ImpulseSink &sink = sink_of(sinks, node);
-      double *const to = sink.surfel + size_t(3) * (node - sink.first_node);
-      store3(to, load3(to) + c.weight[k] * p);
+      add3(sink.surfel + size_t(3) * (node - sink.first_node), c.weight[k] * p);
       pass_on(sink, node - sink.first_node);
       given.list.push_back(node);
     }

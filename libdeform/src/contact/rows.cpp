@@ -515,8 +515,7 @@ void ContactRows::apply(uint32_t i, Vec3 q) {
       response_apply(blocks[block[d]], d, weight[j] * p);
       continue;
     }
-    double *const to = &y[size_t(d) * 4];
-    store3(to, load3(to) + weight[j] * response_alone(d, p));
+    add3(&y[size_t(d) * 4], weight[j] * response_alone(d, p));
   }
 }
 

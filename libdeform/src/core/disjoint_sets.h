@@ -12,9 +12,7 @@ namespace dfm {
 struct DisjointSets {
   Array<uint32_t> of;  // [n] a member nearer to the root; after number(): the number of the set
 
-  explicit DisjointSets(const Memory &memory, uint32_t n = 0) : of{HookAllocator<uint32_t>(memory)} {
-    start(n);
-  }
+  explicit DisjointSets(const Memory &memory, uint32_t n = 0) : of{memory} { start(n); }
   void start(uint32_t n) {
     of.resize(n);
     std::iota(of.begin(), of.end(), 0u);

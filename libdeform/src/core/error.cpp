@@ -42,12 +42,6 @@ size_t character(const unsigned char *s) {
   return n;
 }
 
-std::string vformat(const char *format, va_list args) {
-  char text[1024];
-  std::vsnprintf(text, sizeof text, format, args);
-  return text;
-}
-
 size_t edit_distance(const std::string &a, const std::string &b) {
   std::vector<size_t> row(b.size() + 1);
   for (size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -64,6 +58,12 @@ size_t edit_distance(const std::string &a, const std::string &b) {
 }
 
 }  // namespace
+
+std::string vformat(const char *format, va_list args) {
+  char text[1024];
+  std::vsnprintf(text, sizeof text, format, args);
+  return text;
+}
 
 void fail(dfm_status status, const char *format, ...) {
   va_list args;

@@ -27,6 +27,7 @@ struct Error : std::exception {
 // printf-style; the message is one sentence: what was wrong, where, and what to do.
 [[noreturn]] void fail(dfm_status status, const char *format, ...) DEFORM_PRINTF(2, 3);
 std::string format(const char *format, ...) DEFORM_PRINTF(1, 2);
+std::string vformat(const char *format, va_list args);
 
 // Makes a text safe for any terminal: control characters (file names may contain them) become \uXXXX, bytes
 // that are not valid UTF-8 become "?".

@@ -56,7 +56,7 @@ Array<char> read_whole_file(const Memory &memory, const std::string &path, uint6
   if (file.bytes() > limit) too_large();
   // The size that the system reports may be too small (pipes, growing files), so pieces are read until the
   // end.
-  Array<char> bytes{HookAllocator<char>(memory)};
+  Array<char> bytes{memory};
   size_t chunk = size_t(file.bytes()) + 1;
   for (;;) {
     const size_t at = bytes.size();

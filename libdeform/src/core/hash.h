@@ -15,6 +15,10 @@ struct Hash {
   void add(const T &x) {
     add(&x, sizeof x);
   }
+  template <class... List>
+  void list(const List &...lists) {
+    (add(lists.data(), lists.size() * sizeof lists[0]), ...);
+  }
 };
 
 }  // namespace dfm

@@ -51,7 +51,7 @@ struct HookAllocator {
   using value_type = T;
   const Memory *memory = &Memory::standard();
   HookAllocator() = default;
-  explicit HookAllocator(const Memory &m) : memory(&m) {}
+  HookAllocator(const Memory &m) : memory(&m) {}
   template <class U>
   HookAllocator(const HookAllocator<U> &other) : memory(other.memory) {}
   T *allocate(size_t n) {
@@ -76,7 +76,7 @@ using Array = std::vector<T, HookAllocator<T>>;
 // Empties arrays; they allocate from m from now on.
 template <class... T>
 void use_memory(const Memory &m, Array<T> &...arrays) {
-  ((arrays = Array<T>(HookAllocator<T>(m))), ...);
+  ((arrays = Array<T>(m)), ...);
 }
 
 }  // namespace dfm

@@ -40,7 +40,7 @@ void take_cells(const Memory &m, const Array<double> &rest, const Array<double> 
   out.composition.materials = composition.materials;
   if (!composition.of.empty()) take_rows(composition.of, mesh.cell, 1, out.composition.of);
   for (const CellField &f : composition.given) {
-    out.composition.given.push_back({f.key, f.from, f.width, Array<double>(HookAllocator<double>(m))});
+    out.composition.given.push_back({f.key, f.from, f.width, Array<double>(m)});
     take_rows(f.values, mesh.cell, f.width, out.composition.given.back().values);
   }
   const uint32_t ntet = static_cast<uint32_t>(mesh.cell.size());

@@ -145,7 +145,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &mor
   const OnBehalf prefix(b.name);
   prepare(*b.world);
   check_may_cut(b, b.model);
-  Array<uint64_t> whole(HookAllocator<uint64_t>(b.world->memory()));
+  Array<uint64_t> whole(b.world->memory());
   for (const uint64_t face : more) whole.push_back(face_of_whole(b, face));
   OpenFaces open = with_open(b, whole);
   const bool opens = open.whole.size() > b.cut.open.size();
@@ -157,9 +157,7 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, const Array<uint64_t> &mor
   return cut(b, removed, std::move(open));
 }
 
-Array<uint8_t> none_removed(const Body &b) {
-  return Array<uint8_t>(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
-}
+Array<uint8_t> none_removed(const Body &b) { return Array<uint8_t>(b.ncell(), 0, b.world->memory()); }
 
 // Turns a plane into a blade in it, so large that the whole body lies within the first of the blade's two
 // triangles: no line of the body meets the edge between them.
@@ -216,7 +214,7 @@ std::unique_ptr<BodyShape> put_opened(Body &b, MadeShape &made) {
 }
 
 CutReport remove_cells(Body &b, const Array<uint8_t> &removed) {
-  return cut(b, removed, Array<uint64_t>(HookAllocator<uint64_t>(b.world->memory())));
+  return cut(b, removed, Array<uint64_t>(b.world->memory()));
 }
 
 CutReport remove_by_shape(Body &b, const CutShape &requested, uint32_t most) {
@@ -243,7 +241,7 @@ CutReport split_by_blade(Body &b, const CutShape &requested, uint32_t most) {
   BladeSweep sweep(b, blade, nullptr);
   const std::vector<SweptFace> &met = sweep.faces;
   const size_t n = most > 0 ? std::min<size_t>(most, met.size()) : met.size();
-  Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
+  Array<uint64_t> more{b.world->memory()};
   Vec3 way;
   for (size_t k = 0; k < n; ++k) {
     more.push_back(met[k].face);

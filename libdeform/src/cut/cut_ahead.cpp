@@ -69,9 +69,7 @@ struct CutJob : Background::Job {
   std::shared_ptr<ListJob> list;  // of a body that has no lists of itself yet; null: none
 
   explicit CutJob(const Body &b)
-      : from(b.ahead.structure),
-        faces(HookAllocator<uint64_t>(b.world->memory())),
-        open_time(b.ahead.open_time) {
+      : from(b.ahead.structure), faces(b.world->memory()), open_time(b.ahead.open_time) {
     for (const AheadFace &f : b.ahead.faces) faces.push_back(f.face);
   }
   void run() noexcept override {

@@ -78,7 +78,7 @@ void lead_crumbs(const Body &b, const SeparateRule &rule, size_t heaviest, Parts
 
 Parts parts_of(const Body &b, const SeparateRule &rule) {
   const Memory &m = b.world->memory();
-  Parts out{Array<uint32_t>(HookAllocator<uint32_t>(m)), {}, {}};
+  Parts out{Array<uint32_t>(m), {}, {}};
   const uint32_t ncell = b.ncell();
   out.of = parts_of_cells(m, b.p.n, ncell, b.tets.data(), out.n);
   out.cells.assign(out.n, 0);
@@ -108,9 +108,9 @@ struct Share {
 Share share_of(const Body &b, const Parts &parts, uint32_t to) {
   const Memory &m = b.world->memory();
   const uint32_t ncell = b.ncell();
-  Array<uint8_t> removed(ncell, 0, HookAllocator<uint8_t>(m));
+  Array<uint8_t> removed(ncell, 0, m);
   for (uint32_t c = 0; c < ncell; ++c) removed[c] = parts.to[parts.of[c]] != to;
-  const Array<uint64_t> none{HookAllocator<uint64_t>(m)};
+  const Array<uint64_t> none{m};
   Share out{make_cut_mesh(m, b.p.n, ncell, b.tets.data(), removed, none, b.inner), Array<uint64_t>(none)};
   std::vector<uint32_t> whole;  // ascending
   for (const uint32_t c : out.mesh.cell) whole.push_back(b.cut.whole ? b.cut.cell[c] : c);

@@ -63,7 +63,7 @@ class Tear {
 
   // Faces between cells that open.
   Array<uint64_t> faces() {
-    Array<uint64_t> out{HookAllocator<uint64_t>(b_.world->memory())};
+    Array<uint64_t> out{b_.world->memory()};
     find_weakest();
     if (weakest_.empty()) return out;
     mark();

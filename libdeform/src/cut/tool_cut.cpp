@@ -147,7 +147,7 @@ void split(const Tool &t, Body &b, uint32_t &n) {
     all += uint32_t(met.size());
     const Opening opening(b, met, sweep.energy(met.size()));
     if (!met.empty()) {
-      Array<uint64_t> more{HookAllocator<uint64_t>(b.world->memory())};
+      Array<uint64_t> more{b.world->memory()};
       for (const SweptFace &f : met) more.push_back(f.face);
       if (b.ahead.delay > 0) {
         open_later(b, more, t.set->obstacle[t.first_cutting_part()]);
@@ -223,7 +223,7 @@ void remove(const Tool &t, Body &b, uint32_t &n) {
   const std::vector<Solid> solids = solids_of(t);
   const Extent whole = extent_of(b.p.x.data(), b.p.n, kStride);
   if (std::none_of(solids.begin(), solids.end(), [&](const Solid &s) { return s.box.meets(whole); })) return;
-  Array<uint8_t> removed(b.ncell(), 0, HookAllocator<uint8_t>(b.world->memory()));
+  Array<uint8_t> removed(b.ncell(), 0, b.world->memory());
   uint32_t met = 0;
   for (size_t c = 0; c < b.ncell() && (t.cuts.most == 0 || met < t.cuts.most); ++c) {
     Extent box;

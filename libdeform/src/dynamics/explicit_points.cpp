@@ -27,8 +27,8 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
     : Dynamics(points, surface, model),
       edges_(edges),
       loops_(points_kernels()),
-      stiffness_(points.n, 0.0, HookAllocator<double>(memory)),
-      damping_(points.n, 0.0, HookAllocator<double>(memory)) {
+      stiffness_(points.n, 0.0, memory),
+      damping_(points.n, 0.0, memory) {
   use_memory(memory, part_kinetic_, reached_, before_, lagged_, drag_, load_);
   uint32_t parts = 0;  // after a failure: none, and forces come for all points at once
   if (model.part_forces)
@@ -441,7 +441,7 @@ void ExplicitPoints::damp(double time, double c, double ahead) {
   const RigidMotion turn = rigid_part(change);
   for (uint32_t i = 0; i < p_.n; ++i) {
     const size_t at = size_t(i) * kStride;
-    store3(&p_.v[at], load3(&p_.v[at]) + (load3(&change[at]) - turn.at(place(i))));
+    add3(&p_.v[at], load3(&change[at]) - turn.at(place(i)));
   }
 }
 

@@ -118,7 +118,7 @@ void ImplicitPoints::turn_on() {
   const Turning turning = turning_of(p_, v_.data(), stage_.h);
   for (uint32_t i = 0; i < p_.n; ++i) {
     double *const v = &v_[size_t{kStride} * i];
-    store3(v, load3(v) + turning.arc(load3(v)));
+    add3(v, turning.arc(load3(v)));
   }
 }
 

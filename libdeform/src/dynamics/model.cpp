@@ -81,7 +81,7 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   if (own) slots = *own;
   else slots.assign(ops->slots, ops->slots + ops->nslot);
   const size_t nstate = model_state_size(slots, mesh.npoint, mesh.ncell, mesh.nedge);
-  state = Array<double>(nstate, 0.0, HookAllocator<double>(memory));
+  state = Array<double>(nstate, 0.0, memory);
   state_out = state;
   start();
 }

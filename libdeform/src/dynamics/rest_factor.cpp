@@ -190,7 +190,7 @@ bool RestFactor::solve(const double *b, double *x) {
   if (!loose_) return true;
   const Motion found = motion_of(impulse, moment);
   const Motion more{given.speed - found.speed, given.spin - found.spin};
-  for (uint32_t i = 0; i < p_.n; ++i) store3(x + size_t{3} * i, load3(x + size_t{3} * i) + rigid_at(more, i));
+  for (uint32_t i = 0; i < p_.n; ++i) add3(x + size_t{3} * i, rigid_at(more, i));
   return true;
 }
 

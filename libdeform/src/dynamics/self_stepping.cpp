@@ -11,8 +11,8 @@ namespace dfm {
 
 SelfStepping::SelfStepping(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model)
     : Dynamics(points, surface, model),
-      mean_(size_t(kStride) * points.n, 0.0, HookAllocator<double>(memory)),
-      surfels_(size_t(3) * surface.nsurfel, 0.0, HookAllocator<double>(memory)) {
+      mean_(size_t(kStride) * points.n, 0.0, memory),
+      surfels_(size_t(3) * surface.nsurfel, 0.0, memory) {
   use_memory(memory, unit_, near_, stiffness_, damping_);
   if (!model.late) return;
   std::vector<uint8_t> near(points.n, 0);

@@ -94,7 +94,7 @@ void make_bulges(Surface &surface, double degrees) {
   surface.bulge = Array<double>(size_t{9} * surface.ntri, 0.0, surface.x.get_allocator());
   surface.bulge_sum = 1;
   Maker maker{surface, sin_turns(0.25 - degrees / 360),
-              Array<Vec3>(surface.ntri, Vec3{}, HookAllocator<Vec3>(*surface.tri.get_allocator().memory)),
+              Array<Vec3>(surface.ntri, Vec3{}, *surface.tri.get_allocator().memory),
               Array<uint32_t>(surface.tri.get_allocator())};
   for (uint32_t t = 0; t < surface.ntri; ++t)
     maker.face[t] = surface.area2(t, [&](uint32_t i) { return maker.x(i); });

@@ -61,6 +61,8 @@ Span span_of(const Vec3 *x, int n, Vec3 axis) {
   return s;
 }
 
+bool apart(Span a, Span b) { return a.high < b.low || b.high < a.low; }
+
 // All points `center` plus shares of -1 to 1 of the directions.
 Span span_of(Vec3 center, const Vec3 *direction, int n, Vec3 axis) {
   double half = 0;
@@ -77,10 +79,7 @@ bool box_meets(const CutShape &s, const Vec3 x[4]) {
   }
   along[3] = 0.5 * s.way;
   const Vec3 center = s.position + along[3];
-  const auto parts = [&](Vec3 axis) {
-    const Span a = span_of(center, along, 4, axis), b = span_of(x, 4, axis);
-    return a.high < b.low || b.high < a.low;
-  };
+  const auto parts = [&](Vec3 axis) { return apart(span_of(center, along, 4, axis), span_of(x, 4, axis)); };
   for (const auto &f : kFace)
     if (parts(cross(x[f[1]] - x[f[0]], x[f[2]] - x[f[0]]))) return false;
   for (int i = 0; i < 4; ++i) {
@@ -93,10 +92,7 @@ bool box_meets(const CutShape &s, const Vec3 x[4]) {
 }
 
 bool triangle_meets(const Vec3 t[3], const Vec3 x[4]) {
-  const auto parts = [&](Vec3 axis) {
-    const Span a = span_of(t, 3, axis), b = span_of(x, 4, axis);
-    return a.high < b.low || b.high < a.low;
-  };
+  const auto parts = [&](Vec3 axis) { return apart(span_of(t, 3, axis), span_of(x, 4, axis)); };
   const Vec3 side[3] = {t[1] - t[0], t[2] - t[1], t[0] - t[2]}, normal = cross(side[0], side[1]);
   if (parts(normal)) return false;
   for (const auto &f : kFace)

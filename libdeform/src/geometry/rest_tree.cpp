@@ -5,9 +5,7 @@
 namespace dfm {
 
 RestTree::RestTree(const Memory &memory, const Array<RestBox> &boxes)
-    : node_(HookAllocator<Node>(memory)),
-      item_(boxes.size(), 0u, HookAllocator<uint32_t>(memory)),
-      box_(boxes) {
+    : node_(memory), item_(boxes.size(), 0u, memory), box_(boxes) {
   for (uint32_t i = 0; i < item_.size(); ++i) item_[i] = i;
   if (item_.empty()) return;
   node_.reserve(item_.size());

@@ -38,7 +38,7 @@ class Distances {
         tris_(tris),
         origin_(low),
         scale_(1 / norm(high - low)),
-        scaled_(HookAllocator<double>(memory)),
+        scaled_(memory),
         boxes_(make_boxes(memory, points, ntri, tris)),
         tree_(memory, boxes_),
         winding_(memory, make_scaled(ntri), ntri, tris) {}
@@ -58,7 +58,7 @@ class Distances {
   Vec3 at(uint32_t i) const { return load3(points_ + 3 * size_t{i}); }
   static Array<RestBox> make_boxes(const Memory &memory, const double *points, uint32_t ntri,
                                    const uint32_t *tris) {
-    Array<RestBox> boxes{HookAllocator<RestBox>(memory)};
+    Array<RestBox> boxes{memory};
     boxes.reserve(ntri);
     for (uint32_t t = 0; t < ntri; ++t) {
       Extent b;

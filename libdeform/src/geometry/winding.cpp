@@ -63,9 +63,9 @@ void add_triangle(AngleSum &sum, Vec3 a, Vec3 b, Vec3 c) {
 }  // namespace
 
 WindingTree::WindingTree(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris)
-    : boxes_(HookAllocator<Box>(memory)), corners_(HookAllocator<Vec3>(memory)) {
-  Array<Vec3> centers{HookAllocator<Vec3>(memory)};
-  Array<uint32_t> order{HookAllocator<uint32_t>(memory)};
+    : boxes_(memory), corners_(memory) {
+  Array<Vec3> centers{memory};
+  Array<uint32_t> order{memory};
   centers.reserve(ntri);
   order.reserve(ntri);
   corners_.reserve(3 * size_t(ntri));

@@ -29,6 +29,7 @@ inline Vec3 operator-(Vec3 a) { return {-a.x, -a.y, -a.z}; }
 inline Vec3 operator*(double s, Vec3 a) { return {s * a.x, s * a.y, s * a.z}; }
 inline Vec3 &operator+=(Vec3 &a, Vec3 b) { return a = a + b; }
 inline Vec3 &operator-=(Vec3 &a, Vec3 b) { return a = a - b; }
+inline void add3(double *to, Vec3 a) { store3(to, load3(to) + a); }
 inline double dot(Vec3 a, Vec3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 inline Vec3 cross(Vec3 a, Vec3 b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};

@@ -57,7 +57,7 @@ void tets_of(const CellKind &kind, const uint32_t *cell, uint32_t *out) {
 
 Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<uint32_t> &cells) {
   const size_t n = cells.size() / kind.nodes;
-  Array<uint32_t> out(4 * kind.tets * n, HookAllocator<uint32_t>(memory));
+  Array<uint32_t> out(4 * kind.tets * n, memory);
   for (size_t c = 0; c < n; ++c) tets_of(kind, &cells[kind.nodes * c], &out[4 * kind.tets * c]);
   return out;
 }
@@ -133,7 +133,7 @@ void each_inside(const double *points, size_t stride, const uint32_t *cell, cons
 }
 
 Array<uint32_t> RestMesh::cell_groups() const {
-  Array<uint32_t> out{HookAllocator<uint32_t>(*memory)};
+  Array<uint32_t> out{*memory};
   for (size_t t = 0; t < tet_group.size(); t += cell_kind(cell).tets) out.push_back(tet_group[t]);
   return out;
 }

@@ -1,15 +1,13 @@
 #include "mesh/cursor.h"
 
 #include <algorithm>
-#include <cstdio>
 
 namespace dfm {
 
 void Cursor::refuse_as(dfm_status status, const char *sentence, va_list args) const {
-  char text[768];
-  std::vsnprintf(text, sizeof text, sentence, args);
-  if (binary) fail(status, "%s, byte %zu: %s", path_.c_str(), offset(), text);
-  fail(status, "%s:%zu: %s", path_.c_str(), 1 + size_t(std::count(begin_, p_, '\n')), text);
+  const std::string text = vformat(sentence, args);
+  if (binary) fail(status, "%s, byte %zu: %s", path_.c_str(), offset(), text.c_str());
+  fail(status, "%s:%zu: %s", path_.c_str(), 1 + size_t(std::count(begin_, p_, '\n')), text.c_str());
 }
 
 void Cursor::refuse(const char *sentence, ...) const {

@@ -40,7 +40,7 @@ DisjointSets join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, 
 CutMesh::CutMesh(const Memory &memory) { use_memory(memory, tets, point, cell); }
 
 Array<uint32_t> inner_faces(const Array<TetFace> &faces) {
-  Array<uint32_t> out{HookAllocator<uint32_t>(faces.get_allocator())};
+  Array<uint32_t> out{faces.get_allocator()};
   out.reserve(faces.size());
   each_inner_face(faces, [&](uint32_t i, uint32_t j) {
     out.push_back(i);
@@ -53,9 +53,8 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
                       const Array<uint8_t> &removed, const Array<uint64_t> &open,
                       const Array<uint32_t> &inner) {
   CutMesh out(memory);
-  const HookAllocator<uint32_t> a(memory);
-  Array<uint32_t> number(npoint, UINT32_MAX, a), copy(a);
-  Array<uint8_t> split{HookAllocator<uint8_t>(memory)};
+  Array<uint32_t> number(npoint, UINT32_MAX, memory), copy(memory);
+  Array<uint8_t> split{memory};
   DisjointSets corners(memory);
   if (!open.empty()) {
     corners = join_corners(memory, npoint, ntet, tets, removed, open, inner, split);
@@ -71,7 +70,7 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
       number[p] = uint32_t(out.point.size());
       out.point.push_back(p);
     }
-  Array<uint8_t> taken(npoint, 0, HookAllocator<uint8_t>(memory));  // the first copy has its cells
+  Array<uint8_t> taken(npoint, 0, memory);  // the first copy has its cells
   for (const uint32_t t : out.cell)
     for (uint32_t k = 0; k < 4; ++k) {
       const uint32_t p = tets[size_t{4} * t + k];
@@ -95,11 +94,10 @@ CutMesh make_cut_mesh(const Memory &memory, uint32_t npoint, uint32_t ntet, cons
 
 Array<uint32_t> parts_of_cells(const Memory &memory, uint32_t npoint, uint32_t ntet, const uint32_t *tets,
                                uint32_t &n) {
-  const HookAllocator<uint32_t> a(memory);
   DisjointSets points(memory, npoint);
   for (size_t t = 0; t < size_t{4} * ntet; t += 4)
     for (size_t k = 1; k < 4; ++k) points.join(tets[t], tets[t + k]);
-  Array<uint32_t> number(npoint, UINT32_MAX, a), out(ntet, 0u, a);
+  Array<uint32_t> number(npoint, UINT32_MAX, memory), out(ntet, 0u, memory);
   n = 0;
   for (uint32_t t = 0; t < ntet; ++t) {
     uint32_t &mine = number[points.root(tets[size_t{4} * t])];

@@ -151,7 +151,7 @@ bool match_volume(Filling &f, double wanted, double piece) {
 // Cells in order, without cells near an opening that are outside.
 Filling arrange(const FillSurface &surface, const FillCover &cover, const FillShares &shares) {
   const Memory &memory = surface.memory;
-  Array<uint32_t> order{HookAllocator<uint32_t>(memory)};
+  Array<uint32_t> order{memory};
   for (uint32_t i = 0; i < cover.cells.size(); ++i)
     if (cover.kind[i] != LatticeCell::outside &&
         !(shares.share[i] == 0 && cover.kind[i] == LatticeCell::mixed))
@@ -164,7 +164,7 @@ Filling arrange(const FillSurface &surface, const FillCover &cover, const FillSh
 }
 
 void number_points(const Memory &memory, Filling &f) {
-  Array<uint64_t> sites{HookAllocator<uint64_t>(memory)};
+  Array<uint64_t> sites{memory};
   sites.reserve(4 * f.size());
   for (const Site key : f.keys) {
     Site corner[4];
@@ -184,7 +184,7 @@ void number_points(const Memory &memory, Filling &f) {
 uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
   DisjointSets pieces(memory, uint32_t(f.sites.size()));
   for (size_t i = 0; i < f.tets.size(); ++i) pieces.join(f.tets[i], f.tets[i / 4 * 4]);
-  Array<double> material(f.sites.size(), 0.0, HookAllocator<double>(memory));
+  Array<double> material(f.sites.size(), 0.0, memory);
   for (size_t c = 0; c < f.size(); ++c) material[pieces.root(f.tets[4 * c])] += f.share[c];
   Filling kept(memory);
   for (size_t c = 0; c < f.size(); ++c)
@@ -201,8 +201,7 @@ uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
 struct Around {
   Array<uint32_t> row, cell;
   Around(const Memory &memory, const Filling &f)
-      : row(f.sites.size() + 1, 0u, HookAllocator<uint32_t>(memory)),
-        cell(f.tets.size(), HookAllocator<uint32_t>(memory)) {
+      : row(f.sites.size() + 1, 0u, memory), cell(f.tets.size(), memory) {
     for (const uint32_t p : f.tets) ++row[p + 1];
     for (size_t p = 1; p < row.size(); ++p) row[p] += row[p - 1];
     Array<uint32_t> at = row;
@@ -229,8 +228,7 @@ double raise_to_floor(const Memory &memory, Filling &f) {
   }
   const double typical = second / first;
   const size_t n = f.size();
-  Array<double> fullest(n, 0.0, HookAllocator<double>(memory)), need = fullest, from = fullest,
-                                                                gift = fullest, part = fullest;
+  Array<double> fullest(n, 0.0, memory), need = fullest, from = fullest, gift = fullest, part = fullest;
   double common = 0, thin = 0;
   for (size_t c = 0; c < n; ++c) {
     around.each(f, c, [&](size_t d) { fullest[c] = std::max(fullest[c], f.share[d]); });

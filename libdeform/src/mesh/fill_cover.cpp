@@ -34,7 +34,7 @@ Vec3 middle_of(const RestMesh &surface, double *size, double *reach) {
 }
 
 Array<double> local_points(const RestMesh &surface, Vec3 middle, double size) {
-  Array<double> out{HookAllocator<double>(*surface.memory)};
+  Array<double> out{*surface.memory};
   out.reserve(surface.points.size());
   for (size_t i = 0; i < surface.points.size(); ++i)
     out.push_back(size > 0 ? (surface.points[i] - middle[int(i % 3)]) / size : 0);
@@ -135,9 +135,7 @@ FillSurface::FillSurface(const RestMesh &surface)
       winding(memory, points.data(), surface.ntri(), tris.data()) {
   resolution = size > 0 ? DBL_EPSILON * resolution / size : 0;
   for (size_t t = 0; t < tris.size(); t += 3) {
-    const Vec3 a = load3(&points[3 * size_t(tris[t])]);
-    const Vec3 b = load3(&points[3 * size_t(tris[t + 1])]);
-    const Vec3 c = load3(&points[3 * size_t(tris[t + 2])]);
+    const auto [a, b, c] = corners_of(points.data(), &tris[t]);
     area += 0.5 * norm(cross(b - a, c - a));
     volume += dot(a, cross(b, c)) / 6;
   }
@@ -152,7 +150,7 @@ void FillSurface::measure_openings() {
     uint32_t a, b;
     int32_t way;
   };
-  Array<Edge> edges{HookAllocator<Edge>(memory)};
+  Array<Edge> edges{memory};
   const Array<TriEdge> all = sorted_edges(memory, uint32_t(tris.size() / 3), tris.data());
   for (size_t i = 0, j; i < all.size(); i = j) {
     const auto low = uint32_t(all[i].key >> 32), high = uint32_t(all[i].key);

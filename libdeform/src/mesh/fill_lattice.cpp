@@ -103,8 +103,7 @@ bool TetShape::meets(const Vec3 triangle[3], double tolerance) const {
 
 // ---- set of keys ------------------------------------------------------------------------------------------
 
-KeySet::KeySet(const Memory &memory)
-    : keys_(HookAllocator<uint64_t>(memory)), table_(64, UINT32_MAX, HookAllocator<uint32_t>(memory)) {}
+KeySet::KeySet(const Memory &memory) : keys_(memory), table_(64, UINT32_MAX, memory) {}
 
 size_t KeySet::slot(uint64_t key) const {
   const size_t mask = table_.size() - 1;

@@ -89,7 +89,7 @@ struct Lattice {
 // Cells that the surface needs: those that a triangle enters, and those inside. A triangle in a face between
 // two cells enters neither.
 struct FillCover {
-  explicit FillCover(const Memory &memory) : cells(memory), kind(HookAllocator<LatticeCell>(memory)) {}
+  explicit FillCover(const Memory &memory) : cells(memory), kind(memory) {}
   KeySet cells;
   // by number; outside for cells that were only tested
   Array<LatticeCell> kind;

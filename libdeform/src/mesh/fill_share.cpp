@@ -20,7 +20,7 @@ class Sampler {
       : surface_(surface),
         lattice_(lattice),
         cuts_(cuts),
-        level_(size_t(cuts) + 1, Array<uint32_t>(HookAllocator<uint32_t>(surface.memory))) {}
+        level_(size_t(cuts) + 1, Array<uint32_t>(surface.memory)) {}
 
   // Of the whole cell, in parts of one.
   void run(Site key, const uint32_t *tris, uint32_t ntri, double *share, double *loose) {
@@ -141,7 +141,7 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
     bool operator==(const Pair &o) const { return cell == o.cell && tri == o.tri; }
   };
   const Memory &memory = surface.memory;
-  Array<Pair> pairs{HookAllocator<Pair>(memory)};
+  Array<Pair> pairs{memory};
   // Cutting a cell costs some 170 tests for each triangle in it.
   const uint64_t most = 128 * (surface.tris.size() / 3 + cover.cells.size());
   const uint64_t work = 8 * crossing_work(surface, cover.cells.size());
@@ -162,12 +162,11 @@ FillShares sample_shares(const FillSurface &surface, const FillCover &cover, con
     return k == LatticeCell::crossed || k == LatticeCell::mixed;
   }));
   const uint32_t n = cover.cells.size();
-  FillShares out{Array<double>(n, 0.0, HookAllocator<double>(memory)),
-                 Array<double>(n, 0.0, HookAllocator<double>(memory)), 1};
+  FillShares out{Array<double>(n, 0.0, memory), Array<double>(n, 0.0, memory), 1};
   const int cuts = sampled > kFineCells ? 2 : 3;
   out.piece = cuts == 2 ? 1.0 / 64 : 1.0 / 512;
   Sampler sampler(surface, lattice, cuts);
-  Array<uint32_t> tris{HookAllocator<uint32_t>(memory)};
+  Array<uint32_t> tris{memory};
   size_t at = 0;
   for (uint32_t i = 0; i < n; ++i) {
     tris.clear();

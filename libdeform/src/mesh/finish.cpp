@@ -117,21 +117,9 @@ void keep_grouped_triangles(RawMesh &raw, const Array<uint32_t> &number) {
 
 // Keeps the points that cells use, in the file's order, and fills the groups' points.
 void renumber(RawMesh &raw) {
-  const Memory &memory = *raw.memory;
-  Array<uint32_t> number(raw.npoint(), kNoGroup, HookAllocator<uint32_t>(memory));
-  for (const uint32_t p : raw.tets) number[p] = 0;
-  const uint32_t kept = uint32_t(std::count(number.begin(), number.end(), 0u));
-  raw.dropped_points = raw.npoint() - kept;
-  raw.file_point.reserve(kept);
-  for (uint32_t p = 0; p < number.size(); ++p)
-    if (number[p] == 0) {
-      number[p] = uint32_t(raw.file_point.size());
-      raw.file_point.push_back(p);
-    }
-  for (size_t i = 0; i < kept; ++i)
-    std::copy_n(&raw.points[3 * size_t(raw.file_point[i])], 3, &raw.points[3 * i]);
-  raw.points.resize(3 * size_t(kept));
-  raw.points.shrink_to_fit();
+  const uint32_t npoint = raw.npoint();
+  const Array<uint32_t> number = keep_points(raw, raw.tets);
+  raw.dropped_points = npoint - raw.npoint();
   for (uint32_t &p : raw.tets) p = number[p];
   for (uint32_t &p : raw.cells) p = number[p];
   keep_grouped_triangles(raw, number);
@@ -222,6 +210,21 @@ void add_warnings(RestMesh &mesh, uint32_t crowded) {
 
 }  // namespace
 
+Array<uint32_t> keep_points(RawMesh &raw, const Array<uint32_t> &used) {
+  Array<uint32_t> number(raw.npoint(), kNoGroup, *raw.memory);
+  for (const uint32_t p : used) number[p] = 0;
+  raw.file_point.reserve(size_t(std::count(number.begin(), number.end(), 0u)));
+  for (uint32_t p = 0; p < number.size(); ++p)
+    if (number[p] == 0) {
+      number[p] = uint32_t(raw.file_point.size());
+      std::copy_n(&raw.points[3 * size_t(p)], 3, &raw.points[3 * raw.file_point.size()]);
+      raw.file_point.push_back(p);
+    }
+  raw.points.resize(3 * raw.file_point.size());
+  raw.points.shrink_to_fit();
+  return number;
+}
+
 void check_points(const std::string &path, const Array<double> &points) {
   for (size_t i = 0; i < points.size(); ++i)
     if (!(std::fabs(points[i]) <= kLargestCoordinate))
@@ -243,7 +246,7 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
     bool operator<(const Key &o) const { return corner != o.corner ? corner < o.corner : cell < o.cell; }
   };
   const uint32_t ntet = uint32_t(raw.tets.size() / 4);
-  Array<Key> keys{HookAllocator<Key>(*raw.memory)};
+  Array<Key> keys{*raw.memory};
   keys.reserve(ntet);
   for (uint32_t t = 0; t < ntet; ++t) {
     Key key{{}, t};
@@ -253,7 +256,7 @@ uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
   }
   std::sort(keys.begin(), keys.end());
   uint32_t dropped = 0;
-  Array<uint8_t> drop(ntet, 0, HookAllocator<uint8_t>(*raw.memory));
+  Array<uint8_t> drop(ntet, 0, *raw.memory);
   for (size_t i = 1; i < keys.size(); ++i)
     if (keys[i].corner == keys[i - 1].corner) {
       drop[keys[i].cell] = 1;

@@ -10,6 +10,9 @@ namespace dfm {
 
 inline constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of lengths overflow
 
+// Keeps the used points, in the file's order: moves them together and fills file_point. Returns their new
+// numbers, kNoGroup for the others.
+Array<uint32_t> keep_points(RawMesh &raw, const Array<uint32_t> &used);
 void check_points(const std::string &path, const Array<double> &points);
 void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each once
 // Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null):

@@ -63,9 +63,9 @@ class Orienter {
         points_(points),
         tris_(tris),
         ntri_(uint32_t(tris.size() / 3)),
-        flip_(ntri_, 0, HookAllocator<uint8_t>(memory)),
-        patch_of_(ntri_, UINT32_MAX, HookAllocator<uint32_t>(memory)),
-        order_(HookAllocator<uint32_t>(memory)) {
+        flip_(ntri_, 0, memory),
+        patch_of_(ntri_, UINT32_MAX, memory),
+        order_(memory) {
     const Extent box = extent_of(points);
     origin_ = box.lo;
     scale_ = 1 / box.longest();

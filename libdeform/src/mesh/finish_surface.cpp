@@ -65,10 +65,10 @@ uint64_t place_hash(const double *p) {
 // order, so the result is unique.
 uint32_t merge_points(RawMesh &raw) {
   const uint32_t n = raw.npoint();
-  Array<uint32_t> into(n, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
+  Array<uint32_t> into(n, kNoGroup, *raw.memory);
   for (const uint32_t p : raw.tets) into[p] = p;
   for (const uint32_t p : raw.tris) into[p] = p;
-  Array<uint32_t> table(std::bit_ceil(2 * size_t(n) + 1), kNoGroup, HookAllocator<uint32_t>(*raw.memory));
+  Array<uint32_t> table(std::bit_ceil(2 * size_t(n) + 1), kNoGroup, *raw.memory);
   const size_t mask = table.size() - 1;
   uint32_t merged = 0;
   for (uint32_t p = 0; p < n; ++p) {
@@ -138,7 +138,7 @@ class Rims {
 
   Array<uint64_t> open_edges() const {
     const Array<TriEdge> edges = sorted_edges(*raw_.memory, count(raw_), raw_.tris.data());
-    Array<uint64_t> out{HookAllocator<uint64_t>(*raw_.memory)};
+    Array<uint64_t> out{*raw_.memory};
     for (size_t i = 0, j = 0; i < edges.size(); i = j) {
       while (j < edges.size() && edges[j].key == edges[i].key) ++j;
       if (j - i == 1 && first_end(edges[i].key) != second_end(edges[i].key)) out.push_back(edges[i].key);
@@ -208,7 +208,7 @@ uint32_t take_boundary(RawMesh &raw) {
     const auto found = std::lower_bound(skin.begin(), skin.end(), key);
     if (found != skin.end() && found->first == key.first) raw.tri_group[t] = found->second;
   }
-  Array<uint8_t> inner(raw.npoint(), 0, HookAllocator<uint8_t>(*raw.memory));
+  Array<uint8_t> inner(raw.npoint(), 0, *raw.memory);
   for (const uint32_t p : raw.tets) inner[p] = 1;
   for (const uint32_t p : raw.tris) inner[p] = 0;
   use_memory(*raw.memory, raw.cells, raw.tets, raw.tet_group, raw.share, raw.inside);
@@ -222,9 +222,7 @@ bool has_double_corner(const uint32_t *c) { return c[0] == c[1] || c[1] == c[2] 
 // An altitude below a few roundings of the coordinates is meaningless. Relative to the longest edge, so that
 // no product overflows.
 bool is_flat(const RawMesh &raw, const uint32_t *c) {
-  const Vec3 a = load3(&raw.points[3 * size_t(c[0])]);
-  const Vec3 b = load3(&raw.points[3 * size_t(c[1])]);
-  const Vec3 d = load3(&raw.points[3 * size_t(c[2])]);
+  const auto [a, b, d] = corners_of(raw.points.data(), c);
   double longest = 0, reach = 0;
   for (int k = 0; k < 3; ++k) {
     longest = std::max({longest, std::fabs(b[k] - a[k]), std::fabs(d[k] - a[k]), std::fabs(d[k] - b[k])});
@@ -258,8 +256,8 @@ uint32_t split_beside_flat(RawMesh &raw) {
   for (int round = 0; round < kSplitRounds && before != split; ++round) {
     before = split;
     const uint32_t n = count(raw);
-    Array<uint8_t> skip(n, 0, HookAllocator<uint8_t>(*raw.memory));  // flat, or changed in this round
-    Array<uint32_t> flat{HookAllocator<uint32_t>(*raw.memory)};
+    Array<uint8_t> skip(n, 0, *raw.memory);  // flat, or changed in this round
+    Array<uint32_t> flat{*raw.memory};
     for (uint32_t t = 0; t < n; ++t)
       if (is_flat(raw, corners(raw, t))) {
         skip[t] = 1;
@@ -329,7 +327,7 @@ void drop_doubles(RawMesh &raw, Repairs &done) {
   keys.reserve(n);
   for (uint32_t t = 0; t < n; ++t) keys.emplace_back(sorted_corners(corners(raw, t)), t);
   std::sort(keys.begin(), keys.end());
-  Array<uint8_t> drop(n, 0, HookAllocator<uint8_t>(*raw.memory)), twice = drop;
+  Array<uint8_t> drop(n, 0, *raw.memory), twice = drop;
   for (size_t i = 0, j = 0; i < keys.size(); i = j) {
     while (j < keys.size() && keys[j].first == keys[i].first) ++j;
     for (size_t k = i + 1; k < j; ++k) {
@@ -353,17 +351,8 @@ void drop_doubles(RawMesh &raw, Repairs &done) {
 
 void renumber(RawMesh &raw, uint32_t inner) {
   const uint32_t npoint = raw.npoint();
-  Array<uint32_t> number(npoint, kNoGroup, HookAllocator<uint32_t>(*raw.memory));
-  for (const uint32_t p : raw.tris) number[p] = 0;
-  for (uint32_t p = 0; p < npoint; ++p)
-    if (number[p] == 0) {
-      number[p] = uint32_t(raw.file_point.size());
-      std::copy_n(&raw.points[3 * size_t(p)], 3, &raw.points[3 * size_t(number[p])]);
-      raw.file_point.push_back(p);
-    }
+  const Array<uint32_t> number = keep_points(raw, raw.tris);
   for (uint32_t &p : raw.tris) p = number[p];
-  raw.points.resize(3 * raw.file_point.size());
-  raw.points.shrink_to_fit();
   raw.dropped_points = npoint - raw.merged_points - inner - raw.npoint();
 }
 
@@ -382,8 +371,7 @@ void sort_groups(RawMesh &raw) {
   std::vector<MeshGroup> groups;
   for (const uint32_t g : order) {
     place[g] = uint32_t(groups.size());
-    groups.push_back(
-        {raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(HookAllocator<uint32_t>(*raw.memory))});
+    groups.push_back({raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(*raw.memory)});
   }
   for (size_t t = 0; t < raw.tri_group.size(); ++t) {
     if (raw.tri_group[t] == kNoGroup) continue;

@@ -85,9 +85,7 @@ class Integrals {
   Array<Moments> moments;
 
   Integrals(const Memory &memory, const Grid &grid)
-      : moments(grid.size(), Moments{}, HookAllocator<Moments>(memory)),
-        grid_(grid),
-        flux_(grid.size(), Flux{}, HookAllocator<Flux>(memory)) {}
+      : moments(grid.size(), Moments{}, memory), grid_(grid), flux_(grid.size(), Flux{}, memory) {}
 
   void run(const RestMesh &surface) {
     for (size_t t = 0; t < surface.tris.size(); t += 3) {
@@ -362,8 +360,7 @@ Lattice lay(const RestMesh &surface, const Grid &grid) {
   need_memory(kBytesPerCell * grid.size(), format("a lattice of %zu cells", grid.size()).c_str());
   Integrals of(*surface.memory, grid);
   of.run(surface);
-  Lattice out{grid, std::move(of.moments),
-              Array<uint32_t>(grid.size(), UINT32_MAX, HookAllocator<uint32_t>(*surface.memory))};
+  Lattice out{grid, std::move(of.moments), Array<uint32_t>(grid.size(), UINT32_MAX, *surface.memory)};
   for (size_t c = 0; c < grid.size(); ++c)
     if (!(out.part(c) > -kTwice && out.part(c) < 1 + kTwice))
       fail(DFM_E_FORMAT,
@@ -429,7 +426,7 @@ RestMesh make_lattice(const RestMesh &surface, uint32_t cells, double size) {
                                       {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}};
   const Grid &g = l.grid;
   RestMesh out(memory);
-  Array<uint64_t> corners{HookAllocator<uint64_t>(memory)};
+  Array<uint64_t> corners{memory};
   for (size_t c = 0; c < g.size(); ++c) {
     if (l.root[c] != c) continue;
     uint32_t at[3];

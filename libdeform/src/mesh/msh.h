@@ -21,7 +21,7 @@ class MshReader {
         first_four_(version == 4.0),
         wide_(wide),
         nodes_(*out.memory, "node"),
-        entities_(HookAllocator<Entity>(*out.memory)) {}
+        entities_(*out.memory) {}
   void run();
 
  private:

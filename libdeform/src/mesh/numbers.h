@@ -10,7 +10,7 @@ namespace dfm {
 class Numbers {
  public:
   Numbers(const Memory &m, const char *of)  // of: "node", in sentences
-      : of_(of), tags_(HookAllocator<int64_t>(m)), order_(HookAllocator<uint32_t>(m)) {}
+      : of_(of), tags_(m), order_(m) {}
   void reserve(size_t n) { tags_.reserve(n); }
   void add(int64_t tag) { tags_.push_back(tag); }
   size_t size() const { return tags_.size(); }

@@ -33,7 +33,7 @@ bool fan_folds(const Array<double> &points, const uint32_t *corners, size_t n) {
 class Outline {
  public:
   Outline(const Memory &memory, const Array<double> &points, const uint32_t *corners, size_t n)
-      : corners_(corners, n), at_(HookAllocator<Vec3>(memory)), left_(HookAllocator<uint32_t>(memory)) {
+      : corners_(corners, n), at_(memory), left_(memory) {
     at_.reserve(n);
     for (size_t k = 0; k < n; ++k) at_.push_back(load3(&points[3 * size_t{corners[k]}]));
     for (size_t k = 2; k < n; ++k) normal_ += cross(at_[k - 1] - at_[0], at_[k] - at_[0]);
@@ -86,8 +86,7 @@ uint32_t RawMesh::group(const Cursor &at, int32_t dimension, int32_t tag) {
   const auto [entry, fresh] = group_index_.try_emplace({dimension, tag}, uint32_t(groups.size()));
   if (fresh) {
     if (groups.size() == kMaxGroups) at.refuse("more than %u groups", kMaxGroups);
-    groups.push_back(
-        {std::to_string(tag), dimension, tag, Array<uint32_t>(HookAllocator<uint32_t>(*memory))});
+    groups.push_back({std::to_string(tag), dimension, tag, Array<uint32_t>(*memory)});
   }
   return entry->second;
 }

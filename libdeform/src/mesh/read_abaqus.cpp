@@ -39,7 +39,7 @@ class AbaqusReader {
         bytes_(in.left()),
         nodes_(*out.memory, "node"),
         elements_(*out.memory, "element"),
-        places_(HookAllocator<Place>(*out.memory)) {
+        places_(*out.memory) {
     in.separator = ',';
   }
 
@@ -172,7 +172,7 @@ class AbaqusReader {
   Set *set_called(Sets &sets, const std::string_view *name) {
     if (!name || name->empty()) return nullptr;
     const auto [at, fresh] = sets.index.try_emplace(key(*name), uint32_t(sets.all.size()));
-    if (fresh) sets.all.push_back({*name, Array<uint32_t>(HookAllocator<uint32_t>(*out_.memory))});
+    if (fresh) sets.all.push_back({*name, Array<uint32_t>(*out_.memory)});
     return &sets.all[at->second];
   }
 
@@ -304,7 +304,7 @@ class AbaqusReader {
     for (Set &set : element_sets_.all)
       if (set.section) take(set);
     const Array<uint32_t> &nodes = out_.cells.empty() ? out_.tets : out_.cells;
-    Array<uint32_t> last(out_.npoint(), kNoGroup, HookAllocator<uint32_t>(*out_.memory));
+    Array<uint32_t> last(out_.npoint(), kNoGroup, *out_.memory);
     for (Set &set : element_sets_.all)
       for (const uint32_t e : set.members) {
         const Place at = places_[e];

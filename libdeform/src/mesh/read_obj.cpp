@@ -8,7 +8,7 @@ namespace {
 
 class ObjReader {
  public:
-  ObjReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {}
+  ObjReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(*out.memory) {}
 
   void run() {
     bool any = false;

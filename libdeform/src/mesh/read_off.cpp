@@ -10,9 +10,7 @@ namespace {
 
 class OffReader {
  public:
-  OffReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {
-    in.comment = '#';
-  }
+  OffReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(*out.memory) { in.comment = '#'; }
 
   void run() {
     read_keyword();

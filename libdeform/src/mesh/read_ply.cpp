@@ -22,7 +22,7 @@ struct Element {
 
 class PlyReader {
  public:
-  PlyReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {}
+  PlyReader(Cursor &in, RawMesh &out) : in_(in), out_(out), corners_(*out.memory) {}
 
   void run() {
     read_head();

@@ -117,7 +117,7 @@ class TetgenReader {
   using Middle = std::array<uint32_t, 3>;  // the ends of an edge, ascending, and its middle
   static Middle middle(uint32_t a, uint32_t b, uint32_t of) { return {std::min(a, b), std::max(a, b), of}; }
   Array<Middle> middles_of_edges() const {
-    Array<Middle> out{HookAllocator<Middle>(*out_.memory)};
+    Array<Middle> out{*out_.memory};
     if (corners_ != 10) return out;
     out.reserve(out_.cells.size() / 10 * 6);
     constexpr uint32_t kEdges[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};

@@ -22,8 +22,7 @@ struct Piece {
 
 class VtuReader {
  public:
-  VtuReader(Cursor &in, RawMesh &out)
-      : in_(in), out_(out), sink_(out), corners_(HookAllocator<uint32_t>(*out.memory)) {}
+  VtuReader(Cursor &in, RawMesh &out) : in_(in), out_(out), sink_(out), corners_(*out.memory) {}
 
   void run() {
     find_head();

@@ -21,7 +21,7 @@ void sort_by_lowest(Array<Item> &items, const Key &key) {
   for (const Item &f : items) most = std::max(most, key(f));
   // numbers far beyond the items would make the table larger than the work
   if (items.empty() || most > 4 * items.size() + 64) return std::sort(items.begin(), items.end());
-  Array<uint32_t> begin(size_t{most} + 2, 0u, HookAllocator<uint32_t>(items.get_allocator()));
+  Array<uint32_t> begin(size_t{most} + 2, 0u, items.get_allocator());
   for (const Item &f : items) ++begin[key(f) + 1];
   for (size_t p = 1; p < begin.size(); ++p) begin[p] += begin[p - 1];
   Array<Item> sorted(items.size(), Item{}, items.get_allocator());
@@ -35,7 +35,7 @@ void sort_by_lowest(Array<Item> &items, const Key &key) {
 }  // namespace
 
 Array<TetFace> sorted_faces(const Memory &memory, uint32_t ntet, const uint32_t *tets) {
-  Array<TetFace> faces{HookAllocator<TetFace>(memory)};
+  Array<TetFace> faces{memory};
   faces.reserve(size_t(ntet) * 4);
   for (uint32_t t = 0; t < ntet; ++t)
     for (uint32_t f = 0; f < 4; ++f) {
@@ -81,7 +81,7 @@ Array<uint32_t> boundary_triangles(const Array<TetFace> &faces, const uint32_t *
 }
 
 Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t *tets) {
-  Array<uint64_t> keys{HookAllocator<uint64_t>(memory)};
+  Array<uint64_t> keys{memory};
   keys.reserve(size_t(ntet) * 6);
   for (uint32_t t = 0; t < ntet; ++t)
     for (const auto &e : kTetEdge) {
@@ -90,7 +90,7 @@ Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t
     }
   sort_by_lowest(keys, [](uint64_t key) { return uint32_t(key >> 32); });
   keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
-  Array<uint32_t> edges{HookAllocator<uint32_t>(memory)};
+  Array<uint32_t> edges{memory};
   edges.reserve(keys.size() * 2);
   for (const uint64_t key : keys) {
     edges.push_back(uint32_t(key >> 32));
@@ -128,7 +128,7 @@ double tet_quality(const double *points, const uint32_t *tet) {
 namespace {
 
 uint32_t count_duplicate_points(const RestMesh &mesh) {
-  Array<uint32_t> order(mesh.npoint(), HookAllocator<uint32_t>(*mesh.memory));
+  Array<uint32_t> order(mesh.npoint(), *mesh.memory);
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   const auto at = [&](uint32_t i) { return mesh.points.data() + 3 * size_t(i); };
   std::sort(order.begin(), order.end(), [&](uint32_t a, uint32_t b) {
@@ -149,8 +149,8 @@ uint32_t count_nonmanifold_edges(const Memory &memory, const Array<uint32_t> &tr
 
 // As in dfm_mesh_info. A corner's gradient is as long as its face's area over three volumes.
 double wave_path(const RestMesh &mesh) {
-  Array<double> volume(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
-  Array<double> stiffness(mesh.npoint(), 0.0, HookAllocator<double>(*mesh.memory));
+  Array<double> volume(mesh.npoint(), 0.0, *mesh.memory);
+  Array<double> stiffness(mesh.npoint(), 0.0, *mesh.memory);
   for (size_t t = 0; t < mesh.tets.size(); t += 4) {
     Vec3 x[4];
     for (size_t k = 0; k < 4; ++k) x[k] = load3(&mesh.points[3 * size_t(mesh.tets[t + k])]);
@@ -185,7 +185,7 @@ void measure_cells(const RestMesh &mesh, dfm_mesh_info &s) {
   {
     const Array<uint32_t> edges = unique_edges(mesh.tets);
     s.nedge = uint32_t(edges.size() / 2);
-    Array<double> length{HookAllocator<double>(memory)};
+    Array<double> length{memory};
     length.reserve(s.nedge);
     for (size_t i = 0; i < edges.size(); i += 2)
       length.push_back(

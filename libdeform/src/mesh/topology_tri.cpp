@@ -4,13 +4,12 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
-#include "math/vec3.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
 
 Array<TriEdge> sorted_edges(const Memory &memory, uint32_t ntri, const uint32_t *tris) {
-  Array<TriEdge> edges{HookAllocator<TriEdge>(memory)};
+  Array<TriEdge> edges{memory};
   edges.reserve(3 * size_t(ntri));
   for (uint32_t h = 0; h < 3 * ntri; ++h) {
     const uint32_t a = tris[h], b = tris[next_half_edge(h)];
@@ -21,7 +20,7 @@ Array<TriEdge> sorted_edges(const Memory &memory, uint32_t ntri, const uint32_t 
 }
 
 Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges) {
-  Array<uint32_t> twin(edges.size(), kOpenEdge, HookAllocator<uint32_t>(memory));
+  Array<uint32_t> twin(edges.size(), kOpenEdge, memory);
   for (size_t i = 0, j = 0; i < edges.size(); i = j) {
     while (j < edges.size() && edges[j].key == edges[i].key) ++j;
     if (j - i == 2) {
@@ -34,17 +33,13 @@ Array<uint32_t> edge_twins(const Memory &memory, const Array<TriEdge> &edges) {
 }
 
 double triangle_area(const double *points, const uint32_t *tri) {
-  const Vec3 a = load3(points + 3 * size_t(tri[0]));
-  const Vec3 b = load3(points + 3 * size_t(tri[1]));
-  const Vec3 c = load3(points + 3 * size_t(tri[2]));
+  const auto [a, b, c] = corners_of(points, tri);
   const double l = std::sqrt(std::max({norm2(b - a), norm2(c - a), norm2(c - b)}));
   return l > 0 ? 0.5 * l * (l * norm(cross((1 / l) * (b - a), (1 / l) * (c - a)))) : 0;
 }
 
 double triangle_quality(const double *points, const uint32_t *tri) {
-  const Vec3 a = load3(points + 3 * size_t(tri[0]));
-  const Vec3 b = load3(points + 3 * size_t(tri[1]));
-  const Vec3 c = load3(points + 3 * size_t(tri[2]));
+  const auto [a, b, c] = corners_of(points, tri);
   const double sum = norm2(b - a) + norm2(c - b) + norm2(a - c), l = std::sqrt(sum);
   return l > 0 ? 2 * std::sqrt(3.0) * norm(cross((1 / l) * (b - a), (1 / l) * (c - a))) : 0;
 }
@@ -54,8 +49,8 @@ namespace {
 // Boundary loops: from each end of an open edge around that point, through the triangles between, to the
 // loop's next open edge.
 uint32_t count_holes(const RestMesh &mesh, const Array<uint32_t> &twin) {
-  Array<uint32_t> open{HookAllocator<uint32_t>(*mesh.memory)};
-  Array<uint32_t> number(twin.size(), HookAllocator<uint32_t>(*mesh.memory));
+  Array<uint32_t> open{*mesh.memory};
+  Array<uint32_t> number(twin.size(), *mesh.memory);
   for (uint32_t h = 0; h < twin.size(); ++h)
     if (twin[h] == kOpenEdge) {
       number[h] = uint32_t(open.size());
@@ -84,7 +79,7 @@ void measure_surface(const RestMesh &mesh, dfm_mesh_info &s) {
   s.ntriangle = mesh.ntri();
   s.duplicate_points = mesh.merged_points;
   const double *points = mesh.points.data();
-  Array<double> length{HookAllocator<double>(*mesh.memory)};
+  Array<double> length{*mesh.memory};
   {
     const Array<TriEdge> edges = sorted_edges(*mesh.memory, s.ntriangle, mesh.tris.data());
     const Array<uint32_t> twin = edge_twins(*mesh.memory, edges);
@@ -108,9 +103,7 @@ void measure_surface(const RestMesh &mesh, dfm_mesh_info &s) {
   const Vec3 middle = 0.5 * (load3(s.lo) + load3(s.hi));
   put_qualities(s.ntriangle, s, [&](size_t t) {
     const uint32_t *tri = &mesh.tris[3 * t];
-    const Vec3 a = load3(points + 3 * size_t(tri[0]));
-    const Vec3 b = load3(points + 3 * size_t(tri[1]));
-    const Vec3 c = load3(points + 3 * size_t(tri[2]));
+    const auto [a, b, c] = corners_of(points, tri);
     s.area += triangle_area(points, tri);
     s.volume += dot(cross(a - middle, b - middle), c - middle) / 6;
     return triangle_quality(points, tri);

@@ -1,7 +1,9 @@
 // The triangles at each edge. Half-edge 3 t + k runs from corner k of triangle t to its next corner.
 #pragma once
 #include <algorithm>
+#include <array>
 
+#include "math/vec3.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
@@ -11,6 +13,12 @@ inline constexpr uint32_t kCrowdedEdge = UINT32_MAX - 1, kOpenEdge = UINT32_MAX;
 
 inline uint32_t next_half_edge(uint32_t h) { return h % 3 == 2 ? h - 2 : h + 1; }
 inline uint32_t previous_half_edge(uint32_t h) { return h % 3 == 0 ? h + 2 : h - 1; }
+
+// The corners of a triangle; points [n,3].
+inline std::array<Vec3, 3> corners_of(const double *points, const uint32_t *tri) {
+  const auto at = [&](int k) { return load3(points + 3 * size_t(tri[k])); };
+  return {at(0), at(1), at(2)};
+}
 
 struct TriEdge {
   uint64_t key;  // lower point << 32 | higher point

@@ -141,7 +141,7 @@ class Unpacker {
       in_.refuse(
           "promises %llu blocks of %llu bytes, but the %llu packed bytes left in the file cannot hold them",
           ull(nblock), ull(size), ull(packed_left));
-    Array<uint64_t> packed(size_t(nblock), HookAllocator<uint64_t>(*out.get_allocator().memory));
+    Array<uint64_t> packed(size_t(nblock), *out.get_allocator().memory);
     for (uint64_t &p : packed) {
       p = length();
       if (p > packed_left || (&p != &packed.back() && size > kMaxDeflation * (p + 1)))
@@ -150,7 +150,7 @@ class Unpacker {
     }
     const uint64_t total = nblock == 0 ? 0 : size * (nblock - 1) + (last ? last : size);
     out.resize(size_t(total));
-    Array<char> block(HookAllocator<char>(*out.get_allocator().memory));
+    Array<char> block(*out.get_allocator().memory);
     for (uint64_t b = 0; b < nblock; ++b) {
       if (packed[b] > source_.at_most()) in_.refuse("the file ends inside compressed block %llu", ull(b));
       block.resize(size_t(packed[b]));
@@ -254,7 +254,7 @@ VtuPlace vtu_place(Cursor &in, const XmlTag &tag) {
 
 VtuNumbers::VtuNumbers(const Memory &memory, const Cursor &file, const VtuPacking &packing,
                        const VtuPlace &place)
-    : in(file), type(place.type), unpacked_(HookAllocator<char>(memory)) {
+    : in(file), type(place.type), unpacked_(memory) {
   if (type == Number::text) type = Number::i8;
   if (bytes_of(type) == 0) file.unsupported("DataArray '%s' of bits is not read", place.name.c_str());
   if (place.format == "ascii") {

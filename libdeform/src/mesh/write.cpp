@@ -9,12 +9,10 @@
 namespace dfm {
 namespace {
 
-std::string text(uint64_t n) { return std::to_string(n); }
-
 // The file's number of each cell's and then each triangle's group, 0 without. Empty where there are no
 // groups at all.
 Array<uint32_t> group_numbers(const RestMesh &mesh) {
-  Array<uint32_t> out(HookAllocator<uint32_t>(*mesh.memory));
+  Array<uint32_t> out(*mesh.memory);
   if (mesh.groups.empty()) return out;
   const Array<uint32_t> cells = mesh.cell_groups();
   out.reserve(cells.size() + mesh.tri_group.size());
@@ -26,7 +24,7 @@ Array<uint32_t> group_numbers(const RestMesh &mesh) {
 
 // Triangles have no share; they take 1 so that a picture by share shows them whole.
 Array<double> shares(const RestMesh &mesh) {
-  Array<double> out(HookAllocator<double>(*mesh.memory));
+  Array<double> out(*mesh.memory);
   if (mesh.share.empty()) return out;
   out.assign(mesh.share.begin(), mesh.share.end());
   out.resize(mesh.ntet() + mesh.tri_group.size(), 1.0);
@@ -37,16 +35,16 @@ Array<double> shares(const RestMesh &mesh) {
 // because meshio refuses a file with strings.
 void put_group_names(AtomicFile &out, const RestMesh &mesh) {
   if (mesh.groups.empty()) return;
-  out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " + text(mesh.groups.size()) +
-            " int\n");
+  out.write(std::string("FIELD FieldData 2\n") + kVtkGroupNumber + " 2 " +
+            std::to_string(mesh.groups.size()) + " int\n");
   std::string names;
   for (const MeshGroup &g : mesh.groups) {
     out.put(g.dimension, std::endian::big);
     out.put(g.tag, std::endian::big);
     names += g.name + '\0';
   }
-  out.write(std::string("\n") + kVtkGroupName + " 1 " + text(names.size()) + " unsigned_char\n" + names +
-            "\n");
+  out.write(std::string("\n") + kVtkGroupName + " 1 " + std::to_string(names.size()) + " unsigned_char\n" +
+            names + "\n");
 }
 
 void put_cells(AtomicFile &out, const Array<uint32_t> &cells, uint32_t corners) {
@@ -73,7 +71,7 @@ class TextRows {
   void elements(const char *keyword, uint32_t corners, const Array<uint32_t> &points,
                 const Array<uint32_t> &group, const RestMesh &mesh) {
     if (group.empty()) return;
-    out_.write(std::string(keyword) + "\n" + text(group.size()) + "\n");
+    out_.write(std::string(keyword) + "\n" + std::to_string(group.size()) + "\n");
     for (size_t t = 0; t < group.size(); ++t) {
       for (uint32_t k = 0; k < corners; ++k) put(points[corners * t + k] + 1, ' ');
       put(group[t] == kNoGroup ? 0 : mesh.groups[group[t]].tag, '\n');
@@ -93,18 +91,19 @@ void write_vtk(const RestMesh &mesh, const std::string &path) {
   const CellKind &kind = cell_kind(mesh.cell);
   const uint64_t ntri = mesh.tri_group.size(), nvolume = mesh.ntet() / kind.tets, ncell = nvolume + ntri;
   out.write("# vtk DataFile Version 3.0\ntetrahedra\nBINARY\nDATASET UNSTRUCTURED_GRID\n");
-  out.write("POINTS " + text(mesh.npoint()) + " double\n");
+  out.write("POINTS " + std::to_string(mesh.npoint()) + " double\n");
   for (const double x : mesh.points) out.put(x, std::endian::big);
-  out.write("\nCELLS " + text(ncell) + " " + text((kind.nodes + 1) * nvolume + 4 * ntri) + "\n");
+  out.write("\nCELLS " + std::to_string(ncell) + " " + std::to_string((kind.nodes + 1) * nvolume + 4 * ntri) +
+            "\n");
   put_cells(out, mesh.nodes(), kind.nodes);
   put_cells(out, mesh.tris, 3);
-  out.write("\nCELL_TYPES " + text(ncell) + "\n");
+  out.write("\nCELL_TYPES " + std::to_string(ncell) + "\n");
   for (uint64_t t = 0; t < ncell; ++t) out.put(int32_t(t < nvolume ? kind.vtk : 5), std::endian::big);
   out.write("\n");
   put_group_names(out, mesh);
   const Array<uint32_t> groups = group_numbers(mesh);
   const Array<double> share = shares(mesh);
-  if (!groups.empty() || !share.empty()) out.write("CELL_DATA " + text(ncell) + "\n");
+  if (!groups.empty() || !share.empty()) out.write("CELL_DATA " + std::to_string(ncell) + "\n");
   if (!groups.empty()) {
     out.write(std::string("SCALARS ") + kVtkGroup + " int 1\nLOOKUP_TABLE default\n");
     for (const uint32_t g : groups) out.put(g, std::endian::big);
@@ -143,7 +142,7 @@ void write_vtu(const RestMesh &mesh, const std::string &path) {
 void write_medit(const RestMesh &mesh, const std::string &path) {
   AtomicFile out(path);
   const CellKind &kind = cell_kind(mesh.cell);
-  out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + text(mesh.npoint()) + "\n");
+  out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + std::to_string(mesh.npoint()) + "\n");
   TextRows rows(out);
   for (size_t i = 0; i < mesh.points.size(); i += 3) {
     for (size_t k = 0; k < 3; ++k) rows.put(mesh.points[i + k], ' ');

@@ -11,8 +11,6 @@
 namespace dfm {
 namespace {
 
-std::string text(uint64_t n) { return std::to_string(n); }
-
 void put_head(AtomicFile &out, const char *version) {
   out.write(std::string("$MeshFormat\n") + version + " 1 8\n");
   out.put<int32_t>(1);
@@ -76,7 +74,7 @@ std::vector<uint32_t> written_groups(const RestMesh &mesh, const std::vector<Run
 
 void put_names(AtomicFile &out, const RestMesh &mesh, const std::vector<uint32_t> &groups) {
   if (groups.empty()) return;
-  out.write("$PhysicalNames\n" + text(groups.size()) + "\n");
+  out.write("$PhysicalNames\n" + std::to_string(groups.size()) + "\n");
   for (const uint32_t g : groups)
     out.write(std::to_string(mesh.groups[g].dimension) + " " + std::to_string(mesh.groups[g].tag) + " \"" +
               mesh.groups[g].name + "\"\n");
@@ -153,12 +151,12 @@ void write_msh22(const RestMesh &mesh, const std::string &path) {
   const std::vector<Run> runs = runs_of(mesh, cell_groups);
   put_head(out, "2.2");
   put_names(out, mesh, written_groups(mesh, runs));
-  out.write("$Nodes\n" + text(mesh.npoint()) + "\n");
+  out.write("$Nodes\n" + std::to_string(mesh.npoint()) + "\n");
   for (uint32_t i = 0; i < mesh.npoint(); ++i) {
     out.put(int32_t(i + 1));
     out.write(&mesh.points[3 * size_t(i)], 3 * sizeof(double));
   }
-  out.write("\n$EndNodes\n$Elements\n" + text(elements(runs)) + "\n");
+  out.write("\n$EndNodes\n$Elements\n" + std::to_string(elements(runs)) + "\n");
   int32_t number = 0;
   for (const Run &r : runs) {
     out.put(r.type);

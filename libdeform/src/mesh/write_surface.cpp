@@ -8,12 +8,10 @@
 #include "core/error.h"
 #include "math/vec3.h"
 #include "core/file.h"
-#include "mesh/mesh.h"
+#include "mesh/topology_tri.h"
 
 namespace dfm {
 namespace {
-
-std::string text(uint64_t n) { return std::to_string(n); }
 
 void put_points(AtomicFile &out, const RestMesh &mesh, const char *before) {
   for (size_t p = 0; p < mesh.points.size(); p += 3)
@@ -37,28 +35,28 @@ void put_obj(AtomicFile &out, const RestMesh &mesh) {
       out.write("g " + (group == kNoGroup ? "default" : one_line(mesh.groups[group].name)) + "\n");
     }
     const uint32_t *c = &mesh.tris[3 * size_t(t)];
-    out.write("f " + text(c[0] + 1ull) + " " + text(c[1] + 1ull) + " " + text(c[2] + 1ull) + "\n");
+    out.write(format("f %u %u %u\n", c[0] + 1, c[1] + 1, c[2] + 1));
   }
 }
 
 void put_off(AtomicFile &out, const RestMesh &mesh) {
-  out.write("OFF\n" + text(mesh.npoint()) + " " + text(mesh.ntri()) + " 0\n");
+  out.write(format("OFF\n%u %u 0\n", mesh.npoint(), mesh.ntri()));
   put_points(out, mesh, "");
   for (size_t i = 0; i < mesh.tris.size(); i += 3)
-    out.write("3 " + text(mesh.tris[i]) + " " + text(mesh.tris[i + 1]) + " " + text(mesh.tris[i + 2]) + "\n");
+    out.write(format("3 %u %u %u\n", mesh.tris[i], mesh.tris[i + 1], mesh.tris[i + 2]));
 }
 
 // As text, because gmsh reads no binary doubles, and meshio no binary numbers behind a list.
 void put_ply(AtomicFile &out, const RestMesh &mesh) {
   const bool grouped = !mesh.groups.empty();
-  out.write("ply\nformat ascii 1.0\nelement vertex " + text(mesh.npoint()) +
-            "\nproperty double x\nproperty double y\nproperty double z\nelement face " + text(mesh.ntri()) +
-            "\nproperty list uchar uint vertex_indices\n" + (grouped ? "property int group\n" : "") +
-            "end_header\n");
+  out.write("ply\nformat ascii 1.0\nelement vertex " + std::to_string(mesh.npoint()) +
+            "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+            std::to_string(mesh.ntri()) + "\nproperty list uchar uint vertex_indices\n" +
+            (grouped ? "property int group\n" : "") + "end_header\n");
   put_points(out, mesh, "");
   for (uint32_t t = 0; t < mesh.ntri(); ++t) {
     const uint32_t *c = &mesh.tris[3 * size_t(t)], group = mesh.tri_group[t];
-    out.write("3 " + text(c[0]) + " " + text(c[1]) + " " + text(c[2]));
+    out.write(format("3 %u %u %u", c[0], c[1], c[2]));
     if (grouped) out.write(" " + std::to_string(group == kNoGroup ? 0 : mesh.groups[group].tag));
     out.write("\n");
   }
@@ -77,8 +75,7 @@ void put_stl(AtomicFile &out, const RestMesh &mesh, const std::string &path) {
     for (int k = 0; k < 3; ++k) out.put(float(v[k]), std::endian::little);
   };
   for (size_t i = 0; i < mesh.tris.size(); i += 3) {
-    Vec3 corner[3];
-    for (int k = 0; k < 3; ++k) corner[k] = load3(&mesh.points[3 * size_t(mesh.tris[i + k])]);
+    const std::array<Vec3, 3> corner = corners_of(mesh.points.data(), &mesh.tris[i]);
     const Vec3 u = corner[1] - corner[0], v = corner[2] - corner[0];
     put_vector(normalized(cross((1 / norm(u)) * u, (1 / norm(v)) * v)));
     for (const Vec3 &p : corner) put_vector(p);

@@ -157,8 +157,7 @@ constexpr size_t kBlock = 96;
 
 }  // namespace
 
-NarrowBlocks::NarrowBlocks(const Memory &m)
-    : memory_(&m), ranges_(HookAllocator<Range>(m)), speed_(HookAllocator<double>(m)) {}
+NarrowBlocks::NarrowBlocks(const Memory &m) : memory_(&m), ranges_(m), speed_(m) {}
 
 double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
   if (speed_.size() != bodies.size()) speed_.assign(bodies.size(), -1.0);

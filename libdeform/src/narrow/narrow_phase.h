@@ -41,7 +41,7 @@ class NarrowBlocks {
   // memory.
   template <class Find>
   void run(Tasks &tasks, const Array<Candidate> &list, const Find &find, Array<ContactPoint> &out) {
-    while (found_.size() < ranges_.size()) found_.emplace_back(HookAllocator<ContactPoint>(*memory_));
+    while (found_.size() < ranges_.size()) found_.emplace_back(*memory_);
     each_on(&tasks, ranges_.size(), 1, [&](size_t k) {
       found_[k].clear();
       const Range &p = ranges_[k];

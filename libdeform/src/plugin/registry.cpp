@@ -96,9 +96,7 @@ void copy_rows(RegisteredType &out) {
     bad_type(id, format("its parameter table has %u rows of %u bytes; at least %u bytes a row expected",
                         type.nparam, type.param_size, kParamHead));
   for (uint32_t i = 0; i < type.nparam; ++i) {
-    dfm_param row{};
-    std::memcpy(&row, reinterpret_cast<const char *>(type.params) + size_t(i) * type.param_size,
-                std::min<size_t>(type.param_size, sizeof row));
+    const dfm_param row = row_at(type.params, type.param_size, i);
     check_row(id, row, out.rows);
     out.rows.push_back(row);
   }
@@ -160,8 +158,7 @@ std::vector<dfm_slot> copy_slots(const std::string &id, const dfm_slot *slots, u
                         row, kSlotHead));
   std::vector<dfm_slot> out(n);
   for (uint32_t i = 0; i < n; ++i) {
-    dfm_slot &s = out[i];
-    std::memcpy(&s, reinterpret_cast<const char *>(slots) + size_t(i) * row, std::min<size_t>(row, sizeof s));
+    const dfm_slot &s = out[i] = row_at(slots, row, i);
     const uint32_t width = s.kind == DFM_SLOT_TANGENT    ? 2
                            : s.kind == DFM_SLOT_VECTOR   ? 3
                            : s.kind == DFM_SLOT_ROTATION ? 4

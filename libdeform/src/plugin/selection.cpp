@@ -76,9 +76,7 @@ std::vector<EffectRow> copy_effect_rows(const dfm_type &type, const void *from) 
   const auto table = copy_table<dfm_effect_rows>(from, kTableHead, type.id, "dfm_effect_rows");
   if (!table || !table->rows || table->row_size < kRowHead) return out;
   for (uint32_t i = 0; i < table->n; ++i) {
-    dfm_effect_row row{};
-    std::memcpy(&row, reinterpret_cast<const char *>(table->rows) + size_t(table->row_size) * i,
-                std::min<size_t>(table->row_size, sizeof row));
+    const dfm_effect_row row = row_at(table->rows, table->row_size, i);
     if (row.effect && row.param < type.nparam) out.push_back({row.effect, row.param, row.off});
   }
   return out;

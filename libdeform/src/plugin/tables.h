@@ -43,6 +43,15 @@ std::optional<T> copy_table(const void *from, size_t head, const std::string &id
   return full;
 }
 
+// Row i of a list whose rows may be longer or shorter than those of this library.
+template <class Row>
+Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
+  Row row{};
+  std::memcpy(&row, reinterpret_cast<const char *>(rows) + size_t(row_size) * i,
+              std::min<size_t>(row_size, sizeof row));
+  return row;
+}
+
 // Rows of state slots; throws Error, which names the type, if unit, kind and width of a slot do not agree.
 std::vector<dfm_slot> copy_slots(const std::string &id, const dfm_slot *slots, uint32_t n, uint32_t slot_size,
                                  bool law);

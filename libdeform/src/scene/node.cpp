@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdarg>
-#include <cstdio>
 
 #include "scene/keys.h"
 
@@ -44,12 +43,11 @@ std::string escape_pointer(const std::string &key) {
 }
 
 void Node::fail(const char *text, ...) const {
-  char buffer[1024];
   va_list args;
   va_start(args, text);
-  std::vsnprintf(buffer, sizeof buffer, text, args);
+  const std::string line = vformat(text, args);
   va_end(args);
-  dfm::fail(DFM_E_ARG, "%s: %s: %s", file_->c_str(), pointer_.empty() ? "/" : pointer_.c_str(), buffer);
+  dfm::fail(DFM_E_ARG, "%s: %s: %s", file_->c_str(), pointer_.empty() ? "/" : pointer_.c_str(), line.c_str());
 }
 
 void Node::not_yet() const {

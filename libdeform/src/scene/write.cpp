@@ -99,10 +99,9 @@ Written params_of(const dfm_type &type, const std::vector<double> &values) {
 // ---- the writer -------------------------------------------------------------------------------------------
 
 void SceneWriter::note(const char *text, ...) {
-  char line[1024];
   va_list rest;
   va_start(rest, text);
-  std::vsnprintf(line, sizeof line, text, rest);
+  const std::string line = vformat(text, rest);
   va_end(rest);
   if (notes++ == 0) first = line;
   remark(line);

@@ -95,30 +95,12 @@ void write_surface(SceneWriter &to, const Body &b, Written &out) {
 
 // ---- the model --------------------------------------------------------------------------------------------
 
-struct GivenParam {
-  std::string key;
-  std::vector<double> values;
-};
-
-std::vector<GivenParam> rows_of(const ModelParams &params) {
-  std::vector<GivenParam> out;
-  const char *key = params.keys.c_str();
-  const double *value = params.values.data();
-  for (const uint32_t width : params.widths) {
-    const char *const end = std::strchr(key, '\n');
-    out.push_back({{key, end}, {value, value + width}});
-    key = end + 1;
-    value += width;
-  }
-  return out;
-}
-
 // "type", "params" and "precision".
 void write_choice(const dfm_type &type, const std::vector<GivenParam> &given, Written &out) {
   out["type"] = type.id;
   for (const GivenParam &p : given) {
     const dfm_param *const row = find_row(type, p.key.c_str());
-    if (row) out["params"][p.key] = value_of(*row, p.values.data());
+    if (row) out["params"][p.key] = value_of(*row, p.values);
     else if (p.values[0] == 1) out["precision"] = "single";
   }
 }
@@ -137,7 +119,7 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
     if (std::any_of(b.fields.begin(), b.fields.end(), [&](const CellField &f) { return f.key == row.key; }))
       continue;
     std::erase_if(given, [&](const GivenParam &p) { return p.key == row.key; });
-    given.push_back({row.key, {&now[at], &now[at] + row.width}});
+    given.push_back({row.key, &now[at], row.width});
   }
   write_choice(type, given, out["model"]);
   put_integrator(out, b.origin.integrator);

@@ -344,18 +344,12 @@ void exchange(World &w, Staged &t) noexcept {
 
 uint64_t world_hash(const World &w) {
   Hash h;
-  for (auto &b : w.bodies) {
-    for (const Array<double> *a : {&b->p.x, &b->p.v, &b->p.dampers.v, &b->p.dampers.slow, &b->model.state})
-      h.add(a->data(), a->size() * sizeof(double));
-  }
-  for (auto &set : w.rigid_sets) {
-    h.add(set->state.data(), set->state.size() * sizeof(dfm_rigid_state));
-    h.add(set->extra.data(), set->extra.size() * sizeof(double));
-  }
+  for (auto &b : w.bodies) h.list(b->p.x, b->p.v, b->p.dampers.v, b->p.dampers.slow, b->model.state);
+  for (auto &set : w.rigid_sets) h.list(set->state, set->extra);
   for (const ContactStore *const store : {&w.store, &w.tool_store})
     each_column(
         [&](const ContactColumn &column, const auto &values) {
-          if (column.hashed) h.add(values.data(), values.size() * sizeof(values[0]));
+          if (column.hashed) h.list(values);
         },
         *store);
   if (w.def.sleep)

@@ -214,7 +214,7 @@ void SnapshotShapes::put(Body &b, CutRow *row) {
   Body &like = whole_body(b);
   if (!like.surface.identity()) refuse(b, "cells left: expected a body that cells can be cut from");
   const std::shared_ptr<const WholeBody> whole = whole_of(like);
-  Array<uint64_t> open{HookAllocator<uint64_t>(m)};
+  Array<uint64_t> open{m};
   if (row && !emptied) {
     check(b, *whole, *row);
     open.assign(row->open.begin(), row->open.end());

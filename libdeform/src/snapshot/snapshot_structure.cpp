@@ -14,8 +14,7 @@ namespace dfm {
 namespace {
 
 void zone(Hash &h, const SurfaceZones::Zone &z) {
-  h.add(z.group.data(), z.group.size());
-  h.add(z.material.data(), z.material.size());
+  h.list(z.group, z.material);
   h.add(z.friction);
 }
 
@@ -25,16 +24,10 @@ void composition(Hash &h, const Composition &m) {
     h.add(x.def.poisson);
     h.add(x.def.damping_mass);
     h.add(x.def.damping_stiffness);
-    for (size_t i = 0; i < x.extra_keys.size(); ++i) {
-      h.add(x.extra_keys[i].data(), x.extra_keys[i].size());
-      h.add(x.extra_values[i].data(), x.extra_values[i].size() * sizeof(double));
-    }
+    for (size_t i = 0; i < x.extra_keys.size(); ++i) h.list(x.extra_keys[i], x.extra_values[i]);
   }
-  h.add(m.of.data(), m.of.size() * sizeof(uint32_t));
-  for (const CellField &f : m.given) {
-    h.add(f.key.data(), f.key.size());
-    h.add(f.values.data(), f.values.size() * sizeof(double));
-  }
+  h.list(m.of);
+  for (const CellField &f : m.given) h.list(f.key, f.values);
 }
 
 // The def in a unique form: a rotation of length zero means none (dfm_pose), and sizes that the shape does
@@ -60,26 +53,17 @@ uint64_t make_of(const Body &b) {
   if (b.ahead.delay > 0) h.add(b.ahead.delay);
   h.add(whole ? whole->npoint : b.p.n);
   h.add(whole ? whole->nsurfel : b.surface.nsurfel);
-  h.add(b.material.data(), b.material.size());
-  const Array<uint32_t> &tets = whole ? whole->tets : b.tets;
-  const Array<double> &rest = whole ? whole->rest : b.p.rest, &mass = whole ? whole->mass : b.p.mass;
-  h.add(tets.data(), tets.size() * sizeof(uint32_t));
-  h.add(b.cells.data(), b.cells.size() * sizeof(uint32_t));
-  h.add(b.inside.data(), b.inside.size() * sizeof(double));
-  h.add(rest.data(), rest.size() * sizeof(double));
-  h.add(mass.data(), mass.size() * sizeof(double));
+  h.list(b.material, whole ? whole->tets : b.tets, b.cells, b.inside, whole ? whole->rest : b.p.rest,
+         whole ? whole->mass : b.p.mass);
   composition(h, whole ? whole->composition : b.composition);
   const SurfaceZones &zones = whole ? whole->zones : b.zones;
   const Surface &s = b.surface;
-  h.add(s.row.data(), s.row.size() * sizeof(uint32_t));
-  h.add(s.col.data(), s.col.size() * sizeof(uint32_t));
-  h.add(s.weight.data(), s.weight.size() * sizeof(double));
-  h.add(s.rest.data(), s.rest.size() * sizeof(double));
-  if (!s.identity()) h.add(s.tri.data(), s.tri.size() * sizeof(uint32_t));
+  h.list(s.row, s.col, s.weight, s.rest);
+  if (!s.identity()) h.list(s.tri);
   zone(h, zones.list[0]);
   if (zones.of.empty()) return h.value;
   for (const auto &z : zones.list) zone(h, z);
-  h.add(zones.of.data(), zones.of.size() * sizeof(uint32_t));
+  h.list(zones.of);
   return h.value;
 }
 
@@ -93,8 +77,7 @@ uint64_t make_of(const Obstacle &o) {
   h.add(d.radius);
   h.add(d.half_length);
   if (!o.points.empty()) {
-    h.add(o.points.data(), o.points.size() * sizeof(double));
-    h.add(o.triangles.data(), o.triangles.size() * sizeof(uint32_t));
+    h.list(o.points, o.triangles);
     h.add(d.cells);
   }
   if (o.added) {
@@ -108,24 +91,23 @@ uint64_t make_of(const Obstacle &o) {
 uint64_t rest_of_structure(const World &w) {
   Hash h;
   for (auto &set : w.rigid_sets) {
-    h.add(set->host_name.data(), set->host_name.size());
+    h.list(set->host_name);
     h.add(set->njoint);
     h.add(uint64_t(set->extra.size()));
-    h.add(set->group.data(), set->group.size() * sizeof(uint32_t));
+    h.list(set->group);
     for (const dfm_rigid_def &d : set->defs) {
       h.add(d.mass);
       h.add(d.inertia);
     }
   }
   for (auto &t : w.tools) {
-    h.add(t->name.data(), t->name.size());
+    h.list(t->name);
     const ToolMotion &m = t->motion;
     for (const double x :
          {m.stiffness, m.damping, m.turn_stiffness, m.turn_damping, m.mass, m.inertia, m.late})
       h.add(x);
     h.add(t->def.flags);
-    h.add(t->keys.data(), t->keys.size() * sizeof(dfm_pose_key));
-    h.add(t->opening_keys.data(), t->opening_keys.size() * sizeof(dfm_scale_key));
+    h.list(t->keys, t->opening_keys);
   }
   if (const uint8_t requested = uses_self_contact(w)) h.add(requested);
   return h.value;
@@ -135,7 +117,7 @@ uint64_t snapshot_structure(const World &w) {
   Hash h;
   const auto add = [&](const auto &thing) {
     h.add(thing.id);
-    h.add(thing.name.data(), thing.name.size());
+    h.list(thing.name);
     h.add(make_of(thing));
   };
   for (const Body *const b : all_bodies(w))

@@ -209,8 +209,7 @@ struct Row {
 
 CellField *add_field(std::vector<CellField> &fields, const World &w, const dfm_param &row, const char *from,
                      uint32_t ntet) {
-  fields.push_back({row.key, from, row.width,
-                    Array<double>(size_t(ntet) * row.width, 0.0, HookAllocator<double>(w.memory()))});
+  fields.push_back({row.key, from, row.width, Array<double>(size_t(ntet) * row.width, 0.0, w.memory())});
   return &fields.back();
 }
 

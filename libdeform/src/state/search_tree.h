@@ -13,7 +13,7 @@ namespace dfm {
 
 class SearchTree {
  public:
-  explicit SearchTree(const Memory &memory) : tree_(memory), x_(HookAllocator<double>(memory)) {}
+  explicit SearchTree(const Memory &memory) : tree_(memory), x_(memory) {}
 
   // version: of the positions, above zero. fill(x) writes them, [npoint,4].
   template <class Fill>

@@ -20,10 +20,8 @@ Vec3 spring_force(const Body &b, const Spring &s, double t, double h) {
 
 void add_spring_force(Body &b, const Spring &s, double t, double h) {
   const Vec3 pull = spring_force(b, s, t, h);
-  for (size_t i = 0; i < s.points.size(); ++i) {
-    double *const f = &b.p.load[size_t(s.points[i]) * kStride];
-    store3(f, load3(f) + s.weights[i] * pull);
-  }
+  for (size_t i = 0; i < s.points.size(); ++i)
+    add3(&b.p.load[size_t(s.points[i]) * kStride], s.weights[i] * pull);
 }
 
 void add_spring_bound(const Spring &s, double *stiffness, double *damping) {

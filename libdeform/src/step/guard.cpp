@@ -278,7 +278,7 @@ double set_back_ends(GuardScene &scene, GuardSide &side, Surface &s) {
     }
   ways_back(s, side.end.data(), [&](uint32_t i, Vec3 way) {
     double *const end = &side.end[4 * size_t{i}];
-    store3(end, load3(end) + s.back * way);
+    add3(end, s.back * way);
     most = std::max(most, norm2(load3(end) - load3(&s.x[4 * size_t{i}]) - straight(i)));
   });
   return std::sqrt(most);

@@ -12,10 +12,8 @@ void set_loads(Body &b, double t, double share) {
     const bool varies = load.sine.amplitude[0] != 0;
     double scale = load.keys.empty() ? (varies ? 1 : share) : scale_at(load.keys, t);
     if (varies) scale *= 1 + load.sine.amplitude[0] * sine_at(load.sine, t);
-    for (size_t i = 0; i < load.points.size(); ++i) {
-      double *const f = &b.p.load[size_t(load.points[i]) * kStride];
-      store3(f, load3(f) + scale * load3(&load.force[3 * i]));
-    }
+    for (size_t i = 0; i < load.points.size(); ++i)
+      add3(&b.p.load[size_t(load.points[i]) * kStride], scale * load3(&load.force[3 * i]));
   }
 }
 

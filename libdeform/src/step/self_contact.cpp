@@ -182,7 +182,7 @@ bool is_tangled(SelfBody &b, uint32_t surfel) {
 void follow_cut(const World &w, const SelfList &before, const Array<double> &ways, const FeatureMap &features,
                 SelfBody &now) {
   constexpr double kSame = 1e-6;  // ways are of length one or so
-  Array<uint8_t> moved(now.body->surface.nsurfel, 0, HookAllocator<uint8_t>(w.meters.detection.memory()));
+  Array<uint8_t> moved(now.body->surface.nsurfel, 0, w.meters.detection.memory());
   const auto way = [](const Array<double> &all, size_t i) {
     return all.empty() ? Vec3{} : load3(&all[4 * i]);
   };
@@ -197,7 +197,7 @@ void follow_cut(const World &w, const SelfList &before, const Array<double> &way
 SelfRest self_rest_of(const Memory &m, Body &b) {
   SelfRest rest;
   Surface &s = b.surface;
-  rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
+  rest.x = Array<double>(size_t{4} * s.nsurfel, 0.0, m);
   const auto at = [&](uint32_t phyxel) { return load3(&b.p.rest[size_t{3} * phyxel]); };
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
     Vec3 x;
@@ -209,7 +209,7 @@ SelfRest self_rest_of(const Memory &m, Body &b) {
   rest.thin = 2 * std::max(s.median_edge, median(cells));
   rest.opened = opened_surface(m, b);
   if (!rest.opened.any()) return rest;
-  rest.way = Array<double>(size_t{4} * s.nsurfel, 0.0, HookAllocator<double>(m));
+  rest.way = Array<double>(size_t{4} * s.nsurfel, 0.0, m);
   ways_back(s, rest.x.data(), [&](uint32_t i, Vec3 way) { store3(&rest.way[4 * size_t{i}], way); });
   return rest;
 }

@@ -261,7 +261,7 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
     kinetic += 0.5 * p.mass[i] * norm2(v);
   }
   w.stats.sleep_energy += kinetic;
-  store3(w.stats.sleep_momentum, load3(w.stats.sleep_momentum) + momentum);
+  add3(w.stats.sleep_momentum, momentum);
   std::fill(p.v.begin(), p.v.end(), 0.0);
   relax_dampers(p);
   std::fill(p.v_free.begin(), p.v_free.end(), 0.0);

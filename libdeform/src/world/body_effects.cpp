@@ -13,15 +13,6 @@
 namespace dfm {
 namespace {
 
-// Row i of a list whose rows may be longer or shorter than those of this library.
-template <class Row>
-Row row_at(const Row *rows, uint32_t row_size, uint32_t i) {
-  Row row{};
-  std::memcpy(&row, reinterpret_cast<const char *>(rows) + size_t(row_size) * i,
-              std::min<size_t>(row_size, sizeof row));
-  return row;
-}
-
 // The first fields of a row of ABI 1.
 constexpr uint32_t kFactHead = offsetof(dfm_fact, value) + sizeof(double);
 constexpr size_t kFactsHead = offsetof(dfm_facts, list) + sizeof(void *);  // of their table

@@ -28,32 +28,27 @@ bool is_precision(const dfm_type &type, const char *key) {
   return key && std::strcmp(key, kPrecision) == 0 && !find_row(type, kPrecision);
 }
 
-// Calls use(key, value, width) for each; keys end in a zero.
-template <class Use>
-void for_each_param(const std::string &keys, const ModelParams &params, const Use &use) {
-  const char *key = keys.c_str();
-  const double *value = params.values.data();
-  for (const uint32_t width : params.widths) {
-    use(key, value, width);
-    key += std::strlen(key) + 1;
-    value += width;
-  }
-}
-std::string ended(const ModelParams &params) {
-  std::string keys = params.keys;
-  std::replace(keys.begin(), keys.end(), '\n', '\0');
-  return keys;
-}
-
 bool needs_single(const dfm_type &type, const ModelParams &params) {
   bool single = false;
-  for_each_param(ended(params), params, [&](const char *key, const double *value, uint32_t) {
-    if (is_precision(type, key)) single = *value == 1;
-  });
+  for (const GivenParam &p : rows_of(params))
+    if (is_precision(type, p.key.c_str())) single = *p.values == 1;
   return single;
 }
 
 }  // namespace
+
+std::vector<GivenParam> rows_of(const ModelParams &params) {
+  std::vector<GivenParam> out;
+  const char *key = params.keys.c_str();
+  const double *values = params.values.data();
+  for (const uint32_t width : params.widths) {
+    const char *const end = std::strchr(key, '\n');
+    out.push_back({{key, end}, values, width});
+    key = end + 1;
+    values += width;
+  }
+  return out;
+}
 
 void check_integrator(const std::string &body, int32_t integrator) {
   if (integrator < DFM_INTEGRATOR_AUTO || integrator > DFM_INTEGRATOR_TR_BDF2)
@@ -156,11 +151,10 @@ std::vector<double> values_for(const World &w, const Body &b, const dfm_type &ty
   cells.of = b.composition.of;
   out.unused = find_unused(type, cells);
   const std::vector<dfm_cell_field> given = fields_for(type, b, out.unused);
-  const std::string keys = ended(params);
+  const std::vector<GivenParam> own = rows_of(params);
   std::vector<dfm_param_value> rows;
-  for_each_param(keys, params, [&](const char *key, const double *value, uint32_t width) {
-    if (!is_precision(type, key)) rows.push_back({key, value, width});
-  });
+  for (const GivenParam &p : own)
+    if (!is_precision(type, p.key.c_str())) rows.push_back({p.key.c_str(), p.values, p.width});
   dfm_body_def def = dfm_body_def_default();
   def.ntet = b.ncell();
   def.model_params = {sizeof(dfm_params), static_cast<uint32_t>(rows.size()), rows.data()};
@@ -335,18 +329,15 @@ std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &ty
 void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
                        int32_t integrator) {
   if (!model.stepper || integrator == DFM_INTEGRATOR_AUTO) return;
-  const char *const name =
-      integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler" : integrator_name(integrator);
   w.context->logf(DFM_LOG_WARNING, "body '%s': model '%s' steps itself, so its integrator, %s, is not used",
-                  body.c_str(), model.type->id, name);
+                  body.c_str(), model.type->id, integrator_name(uint32_t(integrator)));
 }
 
 uint64_t model_hash(const Body &b) {
   Hash h;
   const ModelParams &p = b.origin.params;
   h.add(b.model.type->id, std::strlen(b.model.type->id));
-  h.add(p.keys.data(), p.keys.size());
-  h.add(p.values.data(), p.values.size() * sizeof(double));
+  h.list(p.keys, p.values);
   h.add(b.origin.frame);
   h.add(b.origin.integrator);
   return h.value;

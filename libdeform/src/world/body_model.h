@@ -13,6 +13,13 @@ void check_integrator(const std::string &body, int32_t integrator);
 void check_given(const Body &b, const dfm_params &params);
 // Copies the parameters of the type. Throws Error for others.
 ModelParams keep_params(const dfm_type &type, const dfm_params &given);
+// One by one; they point into the values of `params`.
+struct GivenParam {
+  std::string key;
+  const double *values;
+  uint32_t width;
+};
+std::vector<GivenParam> rows_of(const ModelParams &params);
 // Makes one for the body, whose points, cells, surface and composition are complete. Parameters the origin
 // does not name follow from the composition. integrator: DFM_INTEGRATOR_*; AUTO: of the world, or chosen by
 // prepare(). Throws Error.

@@ -105,7 +105,7 @@ void make_zones(Body &b, const dfm_body_def &def, const CellMaterials &materials
   };
   SurfaceZones &zones = b.zones;
   zones.list.clear();
-  zones.of = Array<uint32_t>(HookAllocator<uint32_t>(b.world->memory()));
+  zones.of = Array<uint32_t>(b.world->memory());
   if (!def.groups && materials.of.empty()) {
     zones.list.push_back({"", name(0), friction_of(*materials.list[0])});
     return;

@@ -97,7 +97,7 @@ void keep_composition(World &w, Body &b, const dfm_body_def &def, const CellMate
     const dfm_cell_field &f = def.fields[i];
     b.composition.given.push_back(
         {f.key, "field", f.width,
-         Array<double>(f.values, f.values + size_t(f.width) * def.ntet, HookAllocator<double>(w.memory()))});
+         Array<double>(f.values, f.values + size_t(f.width) * def.ntet, w.memory())});
   }
 }
 
@@ -124,12 +124,11 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
   std::copy_n(def.points, p.rest.size(), p.rest.begin());
   if (def.fixed)
     for (uint32_t i = 0; i < p.n; ++i) p.held[i] = def.fixed[i] & 7;
-  b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, HookAllocator<uint32_t>(m));
+  b.tets = Array<uint32_t>(def.tets, def.tets + size_t(4) * def.ntet, m);
   if (def.cells) {
     const CellKind &kind = cell_kind(def.cell);
     b.cell_type = kind.kind;
-    b.cells = Array<uint32_t>(def.cells, def.cells + size_t(def.ntet / kind.tets) * kind.nodes,
-                              HookAllocator<uint32_t>(m));
+    b.cells = Array<uint32_t>(def.cells, def.cells + size_t(def.ntet / kind.tets) * kind.nodes, m);
     if (def.ntet % kind.tets || tets_of(m, kind, b.cells) != b.tets)
       fail(DFM_E_ARG,
            "body '%s': its tetrahedra are not those of its %s; give both as dfm_mesh_get_info does",
@@ -139,8 +138,7 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
            b.name.c_str(), kind.name);
   }
   if (def.cell_inside) take_inside(b, def);
-  if (def.cell_share)
-    b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, HookAllocator<double>(m));
+  if (def.cell_share) b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, m);
 }
 
 void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials &materials) {
@@ -233,9 +231,8 @@ constexpr uint32_t kVoxelCells = 262144, kMaxVoxelCells = 1u << 28, kFewestVoxel
 void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
   check_triangles(def, "obstacle", o.name.c_str(), "");
   const Memory &m = o.world->meters.obstacles.memory();
-  o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, HookAllocator<double>(m));
-  o.triangles =
-      Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, HookAllocator<uint32_t>(m));
+  o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, m);
+  o.triangles = Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, m);
   o.def.points = o.points.data();
   o.def.triangles = o.triangles.data();
 }

@@ -8,9 +8,11 @@ struct Body;
 struct Obstacle;
 struct World;
 
-// The name in scenes of an implicit integrator.
-inline const char *integrator_name(int32_t implicit) {
-  return implicit == DFM_INTEGRATOR_TR_BDF2 ? "tr_bdf2" : "implicit_euler";
+// Its name in scenes.
+inline const char *integrator_name(uint32_t integrator) {
+  return integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler"
+         : integrator == DFM_INTEGRATOR_TR_BDF2        ? "tr_bdf2"
+                                                       : "implicit_euler";
 }
 
 Body &create_body(World &w, const dfm_body_def &def);

@@ -33,11 +33,9 @@ std::string quote(const std::string &s) {
   return out + "\"";
 }
 
-const char *word_of(uint32_t integrator) {
-  return integrator == DFM_INTEGRATOR_SYMPLECTIC_EULER ? "symplectic_euler"
-                                                       : integrator_name(int32_t(integrator));
+const char *word_of(const Body &b) {
+  return b.model.stepper ? "its own" : integrator_name(b.integrator.used);
 }
-const char *word_of(const Body &b) { return b.model.stepper ? "its own" : word_of(b.integrator.used); }
 
 // Its integrator, and the explicit sub-step.
 std::string integrator(const Body &b) {
@@ -163,7 +161,7 @@ std::string facts(const Body &b) {
 std::string change(const ModelChoice &c, const std::string &when) {
   std::string out = "{\"name\":" + quote(c.type) + ",\"when\":" + quote(when);
   if (c.integrator != kSameIntegrator && c.integrator != uint32_t{DFM_INTEGRATOR_AUTO})
-    out += ",\"integrator\":" + quote(word_of(c.integrator));
+    out += ",\"integrator\":" + quote(integrator_name(c.integrator));
   if (c.stable >= 0)
     out += std::isfinite(c.stable) ? format(",\"stable_s\":%.9g", c.stable) : ",\"stable_s\":null";
   if (c.max_jump < HUGE_VAL) out += format(",\"max_jump_J\":%.9g", c.max_jump);
@@ -187,13 +185,9 @@ std::string changes(const Body &b) {
 // Attachments.
 std::string attachments(const Body &b) {
   std::vector<std::string> rows;
-  const auto name = [&](const Attachment &a) -> const std::string & {
-    const World &w = *b.world;
-    return name_of(w, a.to);
-  };
   for (const Attachment &a : b.world->attachments)
     if (a.body == b.id && !a.released)
-      rows.push_back("{\"to\":" + quote(name(a)) +
+      rows.push_back("{\"to\":" + quote(name_of(*b.world, a.to)) +
                      format(",\"surfels\":%zu,\"stiffness\":%.9g,\"damping\":%.9g,\"release\":%.9g}",
                             a.surfels.size(), a.stiffness, a.damping, a.release));
   return ",\"attached\":[" + join(rows, ",") + "]";

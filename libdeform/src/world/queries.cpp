@@ -130,10 +130,7 @@ void surface_normals(const Body &b, double *out) {
   std::fill(out, out + size_t(3) * b.surface.nsurfel, 0.0);
   for (uint32_t t = 0; t < b.surface.ntri; ++t) {
     const Vec3 n = b.surface.area2(t, [&](uint32_t s) { return b.surface.sum(s, b.p.x.data()); });
-    for (int k = 0; k < 3; ++k) {
-      double *const to = out + size_t(3) * b.surface.tri[size_t(3) * t + size_t(k)];
-      store3(to, load3(to) + n);
-    }
+    for (size_t k = 0; k < 3; ++k) add3(out + size_t(3) * b.surface.tri[size_t(3) * t + k], n);
   }
   for (uint32_t s = 0; s < b.surface.nsurfel; ++s)
     store3(out + size_t(3) * s, normalized(load3(out + size_t(3) * s)));

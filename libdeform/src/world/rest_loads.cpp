@@ -32,10 +32,7 @@ void loads_at_rest(const World &w, const Body &b, double *f) {
       f[i * kStride + k] = p.load[i * kStride + k] + p.mass[i] * w.gravity.now[int(k)];
   for (const Spring &s : b.springs) {
     const Vec3 pull = s.stiffness * (spring_end(s, w.time) - mean_of(b, s));
-    for (size_t i = 0; i < s.points.size(); ++i) {
-      double *const at = f + size_t(s.points[i]) * kStride;
-      store3(at, load3(at) + s.weights[i] * pull);
-    }
+    for (size_t i = 0; i < s.points.size(); ++i) add3(f + size_t(s.points[i]) * kStride, s.weights[i] * pull);
   }
 }
 

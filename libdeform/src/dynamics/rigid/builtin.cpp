@@ -184,8 +184,7 @@ void Builtin::start_from(const dfm_rigid_step &step, const Group &g, const doubl
     const JointRow row = drive_row(joints_[j], states(step));
     auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
       if (part == DFM_RIGID_WORLD || group_[part] == DFM_RIGID_STILL) return;
-      double *const v = &base_[6 * size_t{part}];
-      store3(v, load3(v) + (parts_[part].inverse_mass * motor_[j]) * l);
+      add3(&base_[6 * size_t{part}], (parts_[part].inverse_mass * motor_[j]) * l);
       base_momentum_[part] += motor_[j] * a;
     };
     add(row.a, row.la, row.aa);
@@ -207,8 +206,7 @@ double Builtin::move_by(const dfm_rigid_step &step, const Group &g, std::span<co
     const JointRow &r = g.rows[k];
     auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
       if (part == DFM_RIGID_WORLD || group_[part] == DFM_RIGID_STILL) return;
-      double *const v = &end_[6 * size_t{part}];
-      store3(v, load3(v) + (parts_[part].inverse_mass * x[k]) * l);
+      add3(&end_[6 * size_t{part}], (parts_[part].inverse_mass * x[k]) * l);
       end_momentum_[part] += x[k] * a;
     };
     add(r.a, r.la, r.aa);
@@ -381,7 +379,7 @@ void Builtin::correct(const Group &g, std::span<dfm_rigid_state> state) {
     JointSystem::push(scratch_rows_, x_, parts_, state, shift);
     for (const uint32_t i : g.parts) {
       dfm_rigid_state &s = state[i];
-      store3(s.position, load3(s.position) + load3(&shift[6 * size_t{i}]));
+      add3(s.position, load3(&shift[6 * size_t{i}]));
       store_quat(s.rotation, turned(load_quat(s.rotation), load3(&shift[6 * size_t{i} + 3])));
     }
   }

@@ -171,8 +171,8 @@ void JointSystem::push(std::span<const JointRow> rows, std::span<const double> x
       Vec3 dv, dw;
       response(x[i] * l, x[i] * a, parts[part], state[part], dv, dw);
       double *const v = &velocity[6 * size_t{part}];
-      store3(v, load3(v) + dv);
-      store3(v + 3, load3(v + 3) + dw);
+      add3(v, dv);
+      add3(v + 3, dw);
     };
     add(r.a, r.la, r.aa);
     add(r.b, r.lb, r.ab);

@@ -153,12 +153,12 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
     held += motion_.mass * (mean.velocity - load3(step.state[0].velocity));
     held_turn += motion_.inertia * (mean.spin - load3(step.state[0].spin));
   }
-  store3(v.contact, load3(v.contact) + p);
+  add3(v.contact, p);
   // about a point that is fixed during the step, because the origin moves in each sub-step
   store3(v.contact + 3,
          load3(v.contact + 3) + turn + cross(load3(step.state[0].position) - load3(v.about), p));
-  store3(v.coupling, load3(v.coupling) + held);
-  store3(v.coupling + 3, load3(v.coupling + 3) + held_turn);
+  add3(v.coupling, held);
+  add3(v.coupling + 3, held_turn);
   v.work += (dot(held, way) + dot(held_turn, turned_by)) / step.h;
   v.time += step.h;
   v.opening = w.opening;

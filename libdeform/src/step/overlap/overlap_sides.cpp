@@ -87,7 +87,7 @@ void probe_inner(OverlapSkin &a, OverlapSkin &b, double least, Crossed &out) {
 }  // namespace
 
 OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
-    : memory_(&memory), surface_(&b.surface), x_(HookAllocator<double>(memory)) {
+    : memory_(&memory), surface_(&b.surface), x_(memory) {
   const Surface &s = b.surface;
   x_.assign(size_t{4} * s.nsurfel, 0.0);
   for (uint32_t i = 0; i < s.nsurfel; ++i) {
@@ -105,8 +105,8 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Body &b)
 }
 
 OverlapSkin::OverlapSkin(const Memory &memory, const Obstacle &o)
-    : memory_(&memory), surface_(&own_), x_(HookAllocator<double>(memory)) {
-  Array<double> box{HookAllocator<double>(memory)};
+    : memory_(&memory), surface_(&own_), x_(memory) {
+  Array<double> box{memory};
   const Array<double> *points = &o.points;
   if (o.def.shape == DFM_SHAPE_BOX) {
     constexpr uint32_t faces[36] = {0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6, 0, 1, 4, 1, 5, 4,
@@ -160,7 +160,7 @@ const BoxTree &OverlapSkin::tree() {
 
 double OverlapSkin::turns(Vec3 p) {
   if (!winding_) {
-    Array<double> points{HookAllocator<double>(*memory_)};
+    Array<double> points{*memory_};
     for (uint32_t s = 0; s < nsurfel(); ++s)
       for (int k = 0; k < 3; ++k) points.push_back(scale_ * (x(s)[k] - origin_[k]));
     winding_ = std::make_unique<WindingTree>(*memory_, points.data(), surface_->ntri, surface_->tri.data());
@@ -258,11 +258,7 @@ Crossed cross_shape(OverlapSkin &a, const ObstacleShape &b, double offset) {
 }
 
 OverlapSides::OverlapSides(World &w)
-    : w_(w),
-      step_(*w.steps),
-      bodies_(w.bodies.size()),
-      obstacles_(w.obstacles.size()),
-      stack_(HookAllocator<PairOfTriangles>(w.memory())) {}
+    : w_(w), step_(*w.steps), bodies_(w.bodies.size()), obstacles_(w.obstacles.size()), stack_(w.memory()) {}
 
 bool OverlapSides::may_touch(const OverlapPair &p) const {
   const BodyView &a = step_.body_views[p.a];

@@ -224,8 +224,7 @@ class Untangler {
                        "untangle moved body '%s' by (%.4g, %.4g, %.4g) m; its energy in gravity and springs "
                        "changed by %.3g J",
                        b.name.c_str(), by.x, by.y, by.z, potential(b, by));
-      for (uint32_t k = 0; k < b.p.n; ++k)
-        store3(&b.p.x[size_t(k) * kStride], load3(&b.p.x[size_t(k) * kStride]) + by);
+      for (uint32_t k = 0; k < b.p.n; ++k) add3(&b.p.x[size_t(k) * kStride], by);
       b.dynamics->points_changed();
       wake(w_, b);
       forget_energy(b);  // the change of potential is not counted as work

@@ -15,7 +15,6 @@ struct Obstacle;
 
 // Of a body with this velocity and spin [6], at an arm from its center.
 inline Vec3 velocity_at(const double *v, Vec3 arm) { return load3(v) + cross(load3(v + 3), arm); }
-inline void add3(double *to, Vec3 by) { store3(to, load3(to) + by); }
 
 // Throws Error; then the world is unchanged. out: [nbody] handles.
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out);

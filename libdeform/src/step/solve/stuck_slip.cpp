@@ -114,7 +114,7 @@ void update_stick_drift(const World &w, StepContext &step) {
         v2 -= step.slip_back[2 * size_t{i} + 1];
       }
       const double *const t = &step.rows.frame[size_t{9} * i + 3];
-      if (sticks) store3(e, load3(e) + step.h * (v1 * load3(t) + v2 * load3(t + 3)));
+      if (sticks) add3(e, step.h * (v1 * load3(t) + v2 * load3(t + 3)));
       else if (own.drifts) store3(e, Vec3{});
     });
   }
