@@ -109,14 +109,15 @@ class ContactNewton {
   Array<double> frozen_;  // [row_] limit of friction, N s, or the normal impulse of a smooth law
   // matrix
   BlockPattern pattern_;
-  Array<uint64_t> keys_;
-  Array<uint32_t> pairs_;          // [nb,2]
-  Array<uint32_t> analysed_;       // of the order that factor_ has, by minimum degree
-  Array<uint32_t> at_;             // blocks of the bodies' patterns among them
-  Array<uint32_t> own_;            // [nodes] diagonal block
-  Array<uint32_t> spot_;           // of each pair of entries of each row
-  Array<double> places_;           // [nodes,3] m
-  Array<double> blocks_, matrix_;  // [nb,9] A + J' sym(G) J; A
+  Array<uint32_t> pairs_, begin_, by_lower_, number_, higher_;  // of shape()
+  Array<uint32_t> ij_;                                          // [nb,2]
+  Array<uint32_t> analysed_;        // of the order that factor_ has, by minimum degree
+  Array<uint32_t> place_;           // among them:
+  std::span<const uint32_t> at_;    // of the blocks of the bodies' patterns
+  std::span<const uint32_t> own_;   // [nodes] of the diagonal
+  std::span<const uint32_t> spot_;  // of each pair of entries of each row
+  Array<double> places_;            // [nodes,3] m
+  Array<double> blocks_, matrix_;   // [nb,9] A + J' sym(G) J; A
   LdltSolver factor_;
   bool factored_ = false, shaped_ = false;
   Gmres gmres_;

@@ -12,8 +12,8 @@ namespace dfm {
 ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
   use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, seen_, bias_, heavy_, v_,
              base_, g_, kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_,
-             response_, slope_, frozen_, keys_, pairs_, at_, own_, spot_, blocks_, matrix_, places_,
-             analysed_);
+             response_, slope_, frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_,
+             matrix_, places_, analysed_);
   use_memory(m, motions_.g, motions_.s, motions_.columns, motions_.left, motions_.first_column,
              motions_.column_count, motions_.first_value);
 }
@@ -439,48 +439,53 @@ void ContactNewton::symmetric_part(const double *G, double *out) {
   }
 }
 
-// The pattern of A + J' G J, which holds until begin().
+// The pattern of A + J' G J, which holds until begin(): blocks of the bodies, the diagonal, pairs of entries of
+// each row. Pairs of nodes are ordered by the lower one, then the higher ones of each.
 void ContactNewton::shape() {
-  keys_.clear();
-  for (const Body &b : bodies_) {
-    const BlockPattern p = b.system->pattern();
-    for (uint32_t k = 0; k < p.nb; ++k)
-      keys_.push_back(uint64_t{b.first + p.ij[2 * size_t{k}]} << 32 | (b.first + p.ij[2 * size_t{k} + 1]));
-  }
-  for (uint32_t k = 0; k < nodes_; ++k) keys_.push_back(uint64_t{k} << 32 | k);
-  const auto key = [&](uint32_t e, uint32_t f) {
-    const uint32_t i = std::min(node_[e], node_[f]), j = std::max(node_[e], node_[f]);
-    return uint64_t{i} << 32 | j;
-  };
-  const auto each_pair = [&](auto &&f) {
-    for (size_t k = 0; k < row_.size(); ++k)
-      for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a)
-        for (uint32_t b = a; b < entry_[k + 1]; ++b) f(key(a, b));
-  };
-  each_pair([&](uint64_t value) { keys_.push_back(value); });
-  std::sort(keys_.begin(), keys_.end());
-  keys_.erase(std::unique(keys_.begin(), keys_.end()), keys_.end());
-  const auto place = [&](uint64_t value) {
-    return uint32_t(std::lower_bound(keys_.begin(), keys_.end(), value) - keys_.begin());
-  };
   pairs_.clear();
-  for (const uint64_t value : keys_) {
-    pairs_.push_back(uint32_t(value >> 32));
-    pairs_.push_back(uint32_t(value));
-  }
-  pattern_ = {nodes_, static_cast<uint32_t>(keys_.size()), pairs_.data()};
-  at_.clear();
+  const auto add = [&](uint32_t i, uint32_t j) {
+    pairs_.insert(pairs_.end(), {std::min(i, j), std::max(i, j)});
+  };
   for (Body &b : bodies_) {
     const BlockPattern p = b.system->pattern();
-    b.pattern = at_.size();
-    for (uint32_t k = 0; k < p.nb; ++k)
-      at_.push_back(
-          place(uint64_t{b.first + p.ij[2 * size_t{k}]} << 32 | (b.first + p.ij[2 * size_t{k} + 1])));
+    b.pattern = pairs_.size() / 2;
+    for (uint32_t k = 0; k < p.nb; ++k) add(b.first + p.ij[2 * size_t{k}], b.first + p.ij[2 * size_t{k} + 1]);
   }
-  own_.resize(nodes_);
-  for (uint32_t k = 0; k < nodes_; ++k) own_[k] = place(uint64_t{k} << 32 | k);
-  spot_.clear();
-  each_pair([&](uint64_t value) { spot_.push_back(place(value)); });
+  const size_t blocks = pairs_.size() / 2;
+  for (uint32_t k = 0; k < nodes_; ++k) add(k, k);
+  for (size_t k = 0; k < row_.size(); ++k)
+    for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a)
+      for (uint32_t b = a; b < entry_[k + 1]; ++b) add(node_[a], node_[b]);
+  const size_t n = pairs_.size() / 2;
+  begin_.assign(nodes_ + size_t{1}, 0);
+  for (size_t p = 0; p < n; ++p) ++begin_[pairs_[2 * p] + 1];
+  for (uint32_t k = 0; k < nodes_; ++k) begin_[k + 1] += begin_[k];
+  by_lower_.resize(n);
+  for (size_t p = 0; p < n; ++p) by_lower_[begin_[pairs_[2 * p]]++] = uint32_t(p);
+  ij_.clear();
+  place_.resize(n);
+  number_.assign(nodes_, kNone);
+  for (uint32_t i = 0, p = 0; i < nodes_; ++i) {  // begin_[i] is now where those of i end
+    const uint32_t first = p;
+    higher_.clear();
+    for (; p < begin_[i]; ++p) {
+      const uint32_t j = pairs_[2 * size_t{by_lower_[p]} + 1];
+      if (number_[j] == i) continue;
+      number_[j] = i;
+      higher_.push_back(j);
+    }
+    std::sort(higher_.begin(), higher_.end());
+    for (const uint32_t j : higher_) {
+      number_[j] = uint32_t(ij_.size() / 2);
+      ij_.insert(ij_.end(), {i, j});
+    }
+    for (p = first; p < begin_[i]; ++p) place_[by_lower_[p]] = number_[pairs_[2 * size_t{by_lower_[p]} + 1]];
+    for (const uint32_t j : higher_) number_[j] = kNone;
+  }
+  pattern_ = {nodes_, static_cast<uint32_t>(ij_.size() / 2), ij_.data()};
+  at_ = {place_.data(), blocks};
+  own_ = {place_.data() + blocks, nodes_};
+  spot_ = {place_.data() + blocks + nodes_, n - blocks - nodes_};
   blocks_.resize(size_t{9} * pattern_.nb);
   matrix_.resize(size_t{9} * pattern_.nb);
   shaped_ = true;
@@ -540,13 +545,13 @@ bool ContactNewton::refactor() {
     }
   }
   const bool dissected = points_ >= kDissected;  // motions of blocks have no place
-  if (!factored_ && (dissected || analysed_ != pairs_)) {
+  if (!factored_ && (dissected || analysed_ != ij_)) {
     analysed_.clear();
     if (dissected) {
       factor_.analyse(pattern_, places_.data());
     } else {
       factor_.analyse(pattern_);
-      analysed_.assign(pairs_.begin(), pairs_.end());
+      analysed_.assign(ij_.begin(), ij_.end());
     }
   }
   ++factors_;

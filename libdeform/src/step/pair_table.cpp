@@ -160,9 +160,9 @@ uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b) {
 
 uint32_t contact_law(const World &w, const ContactPoint &c) {
   const size_t nb = w.bodies.size(), width = nb + w.obstacles.size();
-  const uint32_t table =
-      w.pairs.zone_table.empty() ? kNone
-                                 : w.pairs.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
+  const uint32_t table = w.pairs.zone_table.empty()
+                             ? kNone
+                             : w.pairs.zone_table[c.slot_a * width + (c.obstacle ? nb : 0) + c.slot_b];
   if (table == kNone) return pair_law(w, c.slot_a, c.obstacle, c.slot_b);
   const Zones zones = zones_of(w, c);
   const size_t others = c.obstacle ? 1 : w.bodies[c.slot_b]->zones.list.size();

@@ -114,7 +114,8 @@ TEST(ExplicitPoints, APartOfTheWay_HasTheForcesOfThatPart) {
     if (!in_place) f.body->dynamics->free_changed();
     const std::vector<double> q = f.impulses(1, 2);
     for (uint32_t s = 0; s < f.body->surface.nsurfel; ++s)
-      for (size_t k = 0; k < 3; ++k) f.body->p.impulse[4 * size_t{f.body->surface.point[s]} + k] = q[3 * s + k];
+      for (size_t k = 0; k < 3; ++k)
+        f.body->p.impulse[4 * size_t{f.body->surface.point[s]} + k] = q[3 * s + k];
     f.end(q);
     const double *end = f.body->dynamics->end().v;
     const std::vector<double> v(end, end + free.size());
