@@ -439,8 +439,8 @@ void ContactNewton::symmetric_part(const double *G, double *out) {
   }
 }
 
-// The pattern of A + J' G J, which holds until begin(): blocks of the bodies, the diagonal, pairs of entries of
-// each row. Pairs of nodes are ordered by the lower one, then the higher ones of each.
+// The pattern of A + J' G J, which holds until begin(): blocks of the bodies, the diagonal, pairs of entries
+// of each row. Pairs of nodes are ordered by the lower one, then the higher ones of each.
 void ContactNewton::shape() {
   pairs_.clear();
   const auto add = [&](uint32_t i, uint32_t j) {

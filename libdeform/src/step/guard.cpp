@@ -6,8 +6,8 @@
 //      at most 16 times
 //   2  the sub-step is repeated, shorter: up to the safe fraction of the path, but no less than a quarter,
 //      at most 8 times
-//   3  everything takes the safe fraction of its path, and motion is lost; contact acts in full, forces on
-//      points of explicit bodies for that fraction (Dynamics::take_part)
+//   3  everything takes the safe fraction of its path, and motion is lost; forces on explicit bodies act for
+//      that fraction (Dynamics::take_part), and contact stops what is left (take_part_of_contact)
 //
 // Pairs that are not listed are not tested: broad/ covers the motion after the solve too (BroadPhase::cover).
 // Reasons for this order, and for shortening the sub-step of the whole world:
