@@ -273,6 +273,16 @@ TEST(PlannedCut, SnapshotsBeforeAndAfter_GoOnToTheBit) {
   }
 }
 
+// A plane has no size, so that none is asked of its def.
+TEST(PlannedCut, APlaneWithoutASize_IsRestored) {
+  Cube c;
+  dfm_cut_def across = kAcross;
+  across.half_size[1] = NAN;
+  c.plan(1, across);
+  const std::string data = test::snapshot(c.w);
+  test::ok(dfm_world_restore(c.w, data.data(), data.size()));
+}
+
 TEST(PlannedCut, WhatIsWrong_IsRefusedInASentence) {
   Cube c;
   const dfm_cut_def d = plane(0);

@@ -314,6 +314,33 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   EXPECT_NE(std::strstr(dfm_last_error(), "not a rigid body"), nullptr);
 }
 
+// One part is refused after another could have been made: state, reports and sleepers are as before.
+TEST(RigidBodies, RefusedForItsLastPart_LeavesTheWorldAsItWas) {
+  Context c;
+  dfm_body ball = 0;
+  dfm_rigid plate = 0;
+  const dfm_world w = falling_on_ball(c, &ball, &plate);
+  run(w, 0.05, 1e-3);
+  const size_t touching = contacts(w).size();
+  ASSERT_GT(touching, 0u);
+  const std::string before = snapshot(w);
+  Set set{{box("first", {0.1, 0.1, 0.1}, 1), box("second", {0.1, 0.1, 0.1}, 1)}, {}};
+  set.bodies[1].material = plate;
+  EXPECT_EQ(set.create(w), DFM_E_HANDLE);
+  dfm_tool_def tool = dfm_tool_def_default();
+  const double corner[9] = {0, 0, 0, 0.1, 0, 0, 0, 0.1, 0};
+  const uint32_t triangle[3] = {0, 1, 3};
+  tool.shape = DFM_TOOL_MESH;
+  tool.npoint = 3;
+  tool.points = corner;
+  tool.ntriangle = 1;
+  tool.triangles = triangle;
+  dfm_tool out = 0;
+  EXPECT_EQ(dfm_tool_create(w, &tool, &out), DFM_E_ARG) << "there is no point 3";
+  EXPECT_TRUE(snapshot(w) == before);
+  EXPECT_EQ(contacts(w).size(), touching);
+}
+
 // Scene errors name their place.
 TEST(RigidBodies, SceneErrors_NameTheirPlace) {
   const std::string scene = std::string(DEFORM_SOURCE_DIR) + "/examples/scenes/rigid_pinch.json";

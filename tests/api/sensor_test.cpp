@@ -72,6 +72,16 @@ dfm_body cube(dfm_context *c, dfm_world w, double z, const char *name = "cube") 
 
 }  // namespace
 
+// Two planes are nowhere apart, and tell nothing.
+TEST(Sensor, APlaneAmongPlanes_FindsBodiesAlone) {
+  test::Context c;
+  const test::Stack s = test::make_stack(c);
+  const dfm_obstacle level = test::add_plane(s.world, "level", {0, 0, 0.05});
+  test::ok(dfm_obstacle_set_sensor(level, true));
+  test::run(s.world, 2e-3, 1e-3);
+  EXPECT_EQ(things(level), std::vector<uint64_t>{s.lower});
+}
+
 class Gate : public ::testing::TestWithParam<uint32_t> {};
 
 TEST_P(Gate, ABodyThatFallsThrough_EntersLeavesAndFallsFreely) {

@@ -150,6 +150,37 @@ TEST(Snapshot, OfAWorldChangedWhileRunning_HoldsTheChanges) {
   EXPECT_TRUE(changed_model) << "young of msm is a runtime parameter: " << dfm_last_error();
 }
 
+// The columns of contacts stay as wide as the widest law that they had, though another has its place.
+TEST(Snapshot, AfterALawWithMemoryGaveWay_IsRestored) {
+  test::Context c;
+  const test::Stack s = build(c);
+  dfm_friction_def rule{};
+  rule.size = sizeof rule;
+  rule.between[0] = rule.between[1] = "*";
+  rule.law = "lugre";
+  test::ok(dfm_world_add_friction(s.world, &rule));
+  steps(s.world, 5);
+  test::ok(dfm_body_destroy(s.upper));
+  test::ok(dfm_body_destroy(s.lower));
+  steps(s.world, 1);
+  test::ok(dfm_world_remove_friction(s.world, "*", "*"));
+  rule.law = "coulomb";
+  test::ok(dfm_world_add_friction(s.world, &rule));
+  const std::string data = snapshot(s.world);
+  test::ok(restore(s.world, data));
+}
+
+// The host may give a rotation of any length.
+TEST(Snapshot, OfAnObstacleTurnedByALongQuaternion_IsRestored) {
+  test::Context c;
+  const test::Stack s = build(c);
+  test::add_plane(s.world, "wall", {0.3, 0, 0}, {0, -3, 0, 3});
+  steps(s.world, 5);
+  const std::string data = snapshot(s.world);
+  test::ok(restore(s.world, data));
+  EXPECT_TRUE(snapshot(s.world) == data);
+}
+
 TEST(Snapshot, OfAHoldMeasure_ContinuesMeasuring) {
   test::Context c;
   const test::Stack s = test::make_stack(c), fresh = test::make_stack(c);

@@ -359,6 +359,28 @@ TEST(Tool, LivesAndDies) {
   EXPECT_EQ(dfm_tool_set_opening(pair, 0), DFM_E_HANDLE);
 }
 
+// What is left when the last rigid thing goes: a sub-step looks for no motion of it.
+TEST(Tool, OfTwoJawsThatIsGone_LeavesAnAttachedBodyToItsObstacle) {
+  Scene s;
+  const dfm_rigid free = test::create(s.w, {test::box("free", {0.01, 0.01, 0.01}, 1, {0.3, 0, 0.1})})[0];
+  dfm_tool_def d = tool_def("pair", DFM_TOOL_GRASPER, {0.1, 0, 0.1});
+  d.half_size[0] = d.half_size[1] = 0.001;
+  d.half_size[2] = 0.02;
+  d.radius = 0;
+  const dfm_tool pair = make(s.w, d);
+  const dfm_obstacle wall = test::add_plane(s.w, "wall", {0, 0, -0.021});
+  test::run(s.w, 2e-3, 1e-3);
+  test::ok(dfm_tool_destroy(pair));
+  test::ok(dfm_rigid_destroy(free));
+  dfm_attach_def hold = dfm_attach_def_default();
+  const double below[6] = {-1, -1, -1, 1, 1, -0.019};
+  hold.to = wall;
+  hold.box = below;
+  test::ok(dfm_body_attach(s.block, &hold, nullptr));
+  test::run(s.w, 5e-3, 1e-3);
+  EXPECT_LT(test::measure(s.block).speed_max, 1e-9);
+}
+
 TEST(Tool, WrongArguments_AreNamed) {
   Scene s;
   dfm_tool out = 0;

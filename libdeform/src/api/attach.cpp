@@ -27,7 +27,7 @@ dfm_status dfm_body_detach(dfm_body body, uint32_t attachment) {
 
 dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    const auto own = [&](const Attachment &a) { return a.body == b.id; };
+    const auto own = [&](const Attachment &a) { return a.body == b.id && !a.released; };
     const auto &list = b.world->attachments;
     if (!room(size_t(std::count_if(list.begin(), list.end(), own)), capacity, out, n)) return;
     for (const Attachment &a : list)

@@ -36,7 +36,7 @@ CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   const Pose pose = to_pose(def.pose);
   s.position = pose.position;
   s.rotation = pose.rotation;
-  s.half_size = load3(def.half_size);
+  if (!flat) s.half_size = load3(def.half_size);
   s.way = load3(def.motion);
   for (int k = 0; k < 4; ++k) s.corner[k] = load3(def.blade + 3 * k);
   const double length = norm(s.corner[1]);

@@ -58,7 +58,6 @@ uint64_t check_head(const unsigned char *data, size_t bytes) {
 std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, const World &w,
                                                     const Staged &t) {
   std::vector<std::unique_ptr<LawInstance>> laws;
-  uint32_t most = 0;
   for (const StagedLaw &l : t.laws) {
     const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, l.id);
     if (l.params.size() != packed_width(type))
@@ -73,10 +72,7 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
         laws.back()->requested_type = own->requested_type;
         laws.back()->requested = own->requested;
       }
-    most = std::max(most, laws.back()->nstate);
   }
-  if (std::max(t.store.nstate, t.tool_store.nstate) > most)
-    s.refuse("contact states", "no more than a law has");
   return laws;
 }
 

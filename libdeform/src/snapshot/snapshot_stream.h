@@ -85,12 +85,9 @@ inline constexpr Be pose{[](const Pose &p) {
                            return all_finite(p.position) && rotation.is(q);
                          },
                          "a finite position and a unit quaternion"};
-inline constexpr Be given_pose{[](const dfm_pose &p) {
-                                 const double none[4] = {};
-                                 return all_finite(p.position) &&
-                                        (std::equal(none, none + 4, p.rotation) || rotation.is(p.rotation));
-                               },
-                               "a finite position and a unit quaternion, or zeros"};
+// As the host gave it: a rotation of any length.
+inline constexpr Be given_pose{
+    [](const dfm_pose &p) { return all_finite(p.position) && all_finite(p.rotation); }, "a finite pose"};
 inline constexpr Be flag{[](auto x) { return x == 0 || x == 1; }, "0 or 1"};
 inline auto below(uint64_t n) {
   return Be{[n](uint64_t x) { return x < n; }, "a number of something that is there"};

@@ -332,7 +332,9 @@ bool cover_self(World &w, StepContext &step) {
 bool join_self(StepContext &step, const Array<Candidate> *pairs, Array<Candidate> &to) {
   if (std::none_of(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; })) {
     for (auto &s : step.self_bodies) s->joined = 0;
-    return false;
+    if (pairs) return false;
+    to.clear();  // what the broad phase lists is of an earlier plan, whose bodies may be gone
+    return true;
   }
   to.clear();
   if (pairs) to.insert(to.end(), pairs->begin(), pairs->end());

@@ -280,7 +280,7 @@ void make_voxels(Obstacle &o, const Memory &memory) {
 
 }  // namespace
 
-Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
+std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def) {
   auto owned = std::make_unique<Obstacle>();
   Obstacle &o = *owned;
   o.world = &w;
@@ -331,9 +331,18 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
   check_motion_speed(w, o);
   check_velocity("obstacle", name, load3(def.velocity_surface));
   o.def.name = o.name.c_str();
-  add_to_world(w, Kind::obstacle, std::move(owned), w.obstacles);
+  return owned;
+}
+
+Obstacle &add_obstacle(World &w, std::unique_ptr<Obstacle> obstacle) {
+  Obstacle &o = *obstacle;
+  add_to_world(w, Kind::obstacle, std::move(obstacle), w.obstacles);
   wake_all(w);  // it may be where a body sleeps
   return o;
+}
+
+Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
+  return add_obstacle(w, make_obstacle(w, def));
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {

@@ -1,5 +1,8 @@
 // Creates and removes bodies and obstacles. All functions throw Error; then the world is unchanged.
 #pragma once
+#include <memory>
+#include <string>
+
 #include "deform/deform.h"
 
 namespace dfm {
@@ -17,6 +20,13 @@ inline const char *integrator_name(uint32_t integrator) {
 
 Body &create_body(World &w, const dfm_body_def &def);
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);
+// The same in two steps, for what has several parts: all are made before the world gets the first, so that
+// one that is refused leaves nothing behind. Only memory can be missing in add_obstacle().
+std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def);
+Obstacle &add_obstacle(World &w, std::unique_ptr<Obstacle> obstacle);
+// A further shape of the rigid body that another obstacle is.
+std::unique_ptr<Obstacle> make_rigid_shape(World &w, const std::string &body, const dfm_obstacle_def &def);
+Obstacle &join_rigid_shape(Obstacle &body, std::unique_ptr<Obstacle> shape);
 void destroy_body(Body &b);
 void destroy_obstacle(Obstacle &o);
 // Ends the attachments and contacts, with their events, of a body or obstacle that leaves the simulation.

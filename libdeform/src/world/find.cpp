@@ -307,11 +307,9 @@ bool ThingFilter::passes(const Thing &thing) const {
 }
 
 bool overlap(const Thing &a, const Thing &b) {
-  if (b.obstacle && shape_of(*b.obstacle) == Shape::plane) return overlap(b, a);
-  if (a.obstacle && shape_of(*a.obstacle) == Shape::plane) {
-    if (b.obstacle && shape_of(*b.obstacle) == Shape::plane) return false;
-    return plane_overlaps(*a.obstacle, b);
-  }
+  const auto is_plane = [](const Thing &t) { return t.obstacle && shape_of(*t.obstacle) == Shape::plane; };
+  if (is_plane(a)) return !is_plane(b) && plane_overlaps(*a.obstacle, b);
+  if (is_plane(b)) return plane_overlaps(*b.obstacle, a);
   if (a.obstacle && is_convex(*a.obstacle)) return overlaps(convex_of(*a.obstacle), b);
   if (b.obstacle && is_convex(*b.obstacle)) return overlaps(convex_of(*b.obstacle), a);
   if (!has_triangles(a) || !has_triangles(b)) return false;  // a rigid body without shapes

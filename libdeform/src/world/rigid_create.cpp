@@ -80,7 +80,7 @@ void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_
     fail(DFM_E_ARG, "joint %u of rigid body '%s': only hinges and sliders have motors", number, name);
 }
 
-Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {
+std::unique_ptr<Obstacle> make_part(World &w, const dfm_rigid_def &d) {
   dfm_obstacle_def o{};
   o.size = sizeof o;
   o.shape = d.shape;
@@ -93,7 +93,7 @@ Obstacle &make_obstacle(World &w, const dfm_rigid_def &d) {
   o.category = d.category;
   o.collides_with = d.collides_with;
   o.user = d.user;
-  return create_obstacle(w, o);
+  return make_obstacle(w, o);
 }
 
 void query_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *data) {
@@ -155,24 +155,31 @@ void destroy_rigids(RigidSet &set) {
   w.changed = true;
 }
 
-Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
+std::unique_ptr<Obstacle> make_rigid_shape(World &w, const std::string &body, const dfm_obstacle_def &def) {
   const char *const name = def.name ? def.name : "(unnamed)";
   if (def.shape == DFM_SHAPE_PLANE || def.shape == DFM_SHAPE_NONE)
     fail(DFM_E_ARG, "shape '%s' of rigid body '%s' is %s; add a sphere, a box, a capsule, a mesh or voxels",
-         name, body.name.c_str(), def.shape == DFM_SHAPE_PLANE ? "a plane, which has no inside" : "none");
+         name, body.c_str(), def.shape == DFM_SHAPE_PLANE ? "a plane, which has no inside" : "none");
   if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0)
     fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name,
-         body.name.c_str());
-  World &w = *body.world;
+         body.c_str());
+  return make_obstacle(w, def);
+}
+
+Obstacle &join_rigid_shape(Obstacle &body, std::unique_ptr<Obstacle> shape) {
   RigidSet &set = *body.rigid;
   const uint32_t number = body.rigid_body;
-  Obstacle &o = create_obstacle(w, def);
+  Obstacle &o = add_obstacle(*body.world, std::move(shape));
   o.rigid = &set;
   o.rigid_body = number;
   o.added = true;
   o.local = o.pose;
   o.pose = load_pose(set.state[number]) * o.local;
   return o;
+}
+
+Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
+  return join_rigid_shape(body, make_rigid_shape(*body.world, body.name, def));
 }
 
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
@@ -204,11 +211,17 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   set.revised.assign(6 * n, 0.0);
   set.total.assign(3 * n, 0.0);
   w.rigid_sets.reserve(w.rigid_sets.size() + 1);
+  std::vector<std::unique_ptr<Obstacle>> parts;
+  for (uint32_t i = 0; i < n; ++i) {
+    parts.push_back(make_part(w, set.defs[i]));
+    if (std::find(names.begin(), names.begin() + i, names[i]) != names.begin() + i)
+      fail(DFM_E_ARG, "rigid body '%s': the name is taken in this set; names are unique", names[i].c_str());
+  }
   std::vector<uint64_t> handles;
   try {
     for (uint32_t i = 0; i < n; ++i) {
       dfm_rigid_def &d = set.defs[i];
-      Obstacle &o = make_obstacle(w, d);
+      Obstacle &o = add_obstacle(w, std::move(parts[i]));
       set.obstacle.push_back(o.id);
       handles.push_back(o.handle);
       o.rigid = &set;

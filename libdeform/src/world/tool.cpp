@@ -14,6 +14,7 @@
 #include "step/solve/cut_drag.h"
 #include "step/stages.h"
 #include "world/attach.h"
+#include "world/create.h"
 #include "world/find.h"
 #include "world/queries.h"
 
@@ -132,7 +133,8 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
 }
 
 // Shapes that the rigid body itself cannot have: a shaft, the triangles of a mesh or an ellipsoid.
-void add_shapes(const dfm_tool_def &d, const std::string &name, Obstacle &frame) {
+std::vector<std::unique_ptr<Obstacle>> make_shapes(World &w, const dfm_tool_def &d, const std::string &name) {
+  std::vector<std::unique_ptr<Obstacle>> out;
   dfm_obstacle_def shape{};
   shape.size = sizeof shape;
   shape.material = d.material;
@@ -146,9 +148,9 @@ void add_shapes(const dfm_tool_def &d, const std::string &name, Obstacle &frame)
     shape.shape = DFM_SHAPE_CAPSULE;
     shape.half_length = d.half_length;
     shape.pose.position[2] = d.half_length;
-    add_rigid_shape(frame, shape);
+    out.push_back(make_rigid_shape(w, name, shape));
   }
-  if (d.shape != DFM_TOOL_MESH && d.shape != DFM_TOOL_ELLIPSOID) return;
+  if (d.shape != DFM_TOOL_MESH && d.shape != DFM_TOOL_ELLIPSOID) return out;
   const std::string skin = name + ".shape";
   shape.name = skin.c_str();
   shape.shape = DFM_SHAPE_MESH;
@@ -164,7 +166,8 @@ void add_shapes(const dfm_tool_def &d, const std::string &name, Obstacle &frame)
     shape.points = ball.points.data();
     shape.triangles = ball.triangles.data();
   }
-  add_rigid_shape(frame, shape);
+  out.push_back(make_rigid_shape(w, name, shape));
+  return out;
 }
 
 void start_at(Tool &t, const Pose &place) {
@@ -213,11 +216,13 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
                                  &t.motion};
   t.parts.resize(parts.size());
   w.tools.reserve(w.tools.size() + 1);
+  std::vector<std::unique_ptr<Obstacle>> shapes = make_shapes(w, t.def, t.name);
   create_rigids(w, kToolHost, set, t.parts.data());
   t.set = w.rigid_sets.back().get();
   t.set->of_tool = true;
   try {
-    add_shapes(t.def, t.name, rigid_obstacle(w, t.set->obstacle[0]));
+    for (std::unique_ptr<Obstacle> &shape : shapes)
+      join_rigid_shape(rigid_obstacle(w, t.set->obstacle[0]), std::move(shape));
     t.handle = handle_create(Kind::tool, &t);
   } catch (...) {
     destroy_rigids(*t.set);

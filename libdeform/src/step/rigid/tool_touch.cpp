@@ -107,6 +107,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   sides_.clear();
   thinnest_ = HUGE_VAL;
   sets_.clear();
+  alone_.clear();
   walls_.clear();
   w.pairs.tool_law.clear();
   if (w.rigid_sets.empty()) return;
