@@ -115,8 +115,9 @@ RigidFriction::LawResult RigidFriction::evaluate(const Contact &c, const double 
   a.limit = limit[0];
   // of one that slides: what it slides with
   const bool slides = set_valued_ && mode[0] == 2;
-  if (slides) a.limit = std::hypot(a.ft[0], a.ft[1]);
-  a.by_fn = slides ? std::hypot(by_fn[0], by_fn[kLanes]) : c.fn > 0 ? a.limit / c.fn : 0;
+  const auto size = [](double x, double y) { return std::sqrt(x * x + y * y); };  // hypot needs a later glibc
+  if (slides) a.limit = size(a.ft[0], a.ft[1]);
+  a.by_fn = slides ? size(by_fn[0], by_fn[kLanes]) : c.fn > 0 ? a.limit / c.fn : 0;
   for (uint32_t i = 0; i < nstate_; ++i) a.state.push_back(next[size_t{kLanes} * i]);
   return a;
 }

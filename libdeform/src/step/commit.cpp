@@ -22,7 +22,7 @@ namespace dfm {
 namespace {
 // Between this sub-step and the next.
 bool reads_points(const World &w, const Body &b) {
-  return w.def.sleep || b.changes.open || !b.switches.empty() || !b.rule.empty() || !w.overlaps.found.empty();
+  return w.def.sleep || b.changes.open || !b.switches.empty() || !b.rule.empty() || !w.overlaps.suspended.empty();
 }
 
 constexpr double kAlong = 0.1;  // of the stable step: a way on which strains change little

@@ -392,13 +392,16 @@ bool wake_hit(World &w, StepContext &step) {
 }
 
 // An impulse that alone would move its point faster than light is opposed by others that grow with it: the
-// problem that it belongs to has no solution, and its rounding error becomes motion. Overlapping bodies at
-// the start have no solution either, but are led apart (concepts/overlaps.md).
-bool overloaded(const World &w, const StepContext &step) {
-  if (!(step.residual.required > 1) || !w.overlaps.found.empty()) return false;
-  for (uint32_t i = 0; i < step.rows.soft(); ++i)
-    if (step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight) return true;
-  return false;
+// problem that it belongs to has no solution, and its rounding error becomes motion. Things that are in each
+// other have no solution either, but are led apart (concepts/overlaps.md).
+bool overloaded(const StepContext &step) {
+  if (!(step.residual.required > 1)) return false;
+  bool over = false;
+  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
+    if (step.contacts[i].distance < 0) return false;
+    over = over || step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight;
+  }
+  return over;
 }
 
 // No motion is left, and the contact solve has no solution: the bodies are jammed. Impulses that cannot help
@@ -451,7 +454,7 @@ void check_motion(const World &w, StepContext &step, uint32_t i) {
 // Next::stop: trouble, or the sub-step is to be repeated, shorter.
 Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.solves == 0) step.guard.kept.clear();
-  if (overloaded(w, step)) {
+  if (overloaded(step)) {
     *trouble |= report_jam(w, step);
     return Next::stop;
   }
