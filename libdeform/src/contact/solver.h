@@ -60,7 +60,7 @@ struct ToleranceBounds { double tangent, normal, most_normal; };  // m/s: at res
 Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &laws, double h,
                      const Tolerance &tolerance);
 // Of the impulses of a part: the share, at most 1, at which the function that a solve lowers is least along
-// them, 1/2 l W l + l (u_free + rate). At a solution, and where the law dissipates, 1.
+// them, 1/2 l W l + l (u_free + rate). At a solution 1, unless bristles give back what they have stored.
 double share_of_least_work(const ContactRows &rows, const RowsPart &part);
 // of parts together
 Residual larger(const Residual &a, const Residual &b);

@@ -32,7 +32,7 @@ void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &chan
   change = std::sqrt(most);
 }
 
-void Dynamics::take_part(double share, const double *) {
+void Dynamics::take_part(double share, bool, const double *) {
   for (size_t j = 0; j < p_.x.size(); ++j) p_.x_end[j] = p_.x[j] + share * (p_.x_end[j] - p_.x[j]);
 }
 

@@ -155,11 +155,10 @@ class Dynamics {
   // For a body whose scheme damps: writes the forces at the end into points().f, including loads of the
   // sub-step. Returns false if the model fails. After end_state().
   virtual bool end_forces(const SubStep &) { return false; }
-  // Before commit(): of the displacement only this share is taken; velocities are those of the end. Where
-  // points move explicitly, forces act on them for this share of the sub-step only, or bodies that cannot
-  // move would get the same impulse again and again, and no energy pays for it. Contact does so with these
-  // impulses, also in points().impulse; null: there are none.
-  virtual void take_part(double share, const double *surfel_impulse);
+  // Before commit(): the guard takes only this share of the displacement. Velocities are those of the end,
+  // but unless `in_full`, forces on points that move explicitly act for the share only: they would drive
+  // again and again what cannot move. surfel_impulse: what contact then does, as points().impulse; null: none.
+  virtual void take_part(double share, bool in_full, const double *surfel_impulse);
   // J, stored in dampers that see the velocity with a lag
   virtual double damper_energy(double /*time*/) { return 0; }
   virtual void commit(const SubStep &now) = 0;

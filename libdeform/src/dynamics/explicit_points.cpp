@@ -361,17 +361,18 @@ void ExplicitPoints::free_again(const SubStep &now) {
   reached_.clear();
 }
 
-void ExplicitPoints::take_part(double share, const double *surfel_impulse) {
-  Dynamics::take_part(share, surfel_impulse);
+void ExplicitPoints::take_part(double share, bool in_full, const double *surfel_impulse) {
+  Dynamics::take_part(share, in_full, surfel_impulse);
+  if (in_full) return;
   for (size_t m = 0; m < reached_.size(); ++m) std::copy_n(&before_[3 * m], 3, &p_.v_free[reached_[m]]);
-  for (size_t at = 0; at < p_.v.size(); ++at) p_.v_free[at] = p_.v[at] + share * (p_.v_free[at] - p_.v[at]);
-  if (!in_place_)
-    for (size_t at = 0; at < p_.v.size(); ++at)
-      p_.v_end[at] = p_.v_free[at] + (surfel_impulse ? p_.inv_mass[at] * p_.impulse[at] : 0);
-  else if (surfel_impulse)
-    for (uint32_t s = 0; s < surface_.nsurfel; ++s)
-      for (size_t k = 0, at = size_t{kStride} * surface_.point[s]; k < 3; ++k, ++at)
-        p_.v_free[at] += p_.inv_mass[at] * surfel_impulse[3 * size_t{s} + k];
+  for (size_t at = 0; at < p_.v.size(); ++at) {
+    p_.v_free[at] = p_.v[at] + share * (p_.v_free[at] - p_.v[at]);
+    if (!in_place_) p_.v_end[at] = p_.v_free[at] + (surfel_impulse ? p_.inv_mass[at] * p_.impulse[at] : 0);
+  }
+  if (!in_place_ || !surfel_impulse) return;
+  for (uint32_t s = 0; s < surface_.nsurfel; ++s)
+    for (size_t k = 0, at = size_t{kStride} * surface_.point[s]; k < 3; ++k, ++at)
+      p_.v_free[at] += p_.inv_mass[at] * surfel_impulse[3 * size_t{s} + k];
 }
 
 void ExplicitPoints::commit(const SubStep &now) {

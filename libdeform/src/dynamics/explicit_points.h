@@ -28,7 +28,7 @@ class ExplicitPoints : public Dynamics {
   const double *point_velocity() const override { return p_.v_free.data(); }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   void free_again(const SubStep &now) override;
-  void take_part(double share, const double *surfel_impulse) override;
+  void take_part(double share, bool in_full, const double *surfel_impulse) override;
   void free_changed() override { ways_known_ = false; }
   EndState end() const override {
     const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();

@@ -140,7 +140,7 @@ void SelfStepping::commit(const SubStep &) {
 }
 
 // A partial displacement is no state of the model: it then continues from the positions of all points.
-void SelfStepping::take_part(double share, const double *surfel_impulse) {
+void SelfStepping::take_part(double share, bool in_full, const double *surfel_impulse) {
   if (model_.late) {
     see_points();
     dfm_kin k = kin(0, 0);
@@ -151,7 +151,7 @@ void SelfStepping::take_part(double share, const double *surfel_impulse) {
                 [&] { return model_.late->points(model_.self, &k, p_.x_end.data(), p_.v_end.data()); });
     model_.call("look", [&] { return model_.late->look(model_.self, model_.state_out.data()); });
   }
-  Dynamics::take_part(share, surfel_impulse);
+  Dynamics::take_part(share, in_full, surfel_impulse);
 }
 
 void SelfStepping::see_points() {

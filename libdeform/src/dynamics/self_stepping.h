@@ -24,7 +24,7 @@ class SelfStepping : public Dynamics {
   void bound_ends(double &speed, double &change) const override;
   void commit(const SubStep &now) override;
   void see_points() override;
-  void take_part(double share, const double *surfel_impulse) override;
+  void take_part(double share, bool in_full, const double *surfel_impulse) override;
   void points_changed() override;
   bool sums(BodySums &out) const override;
 

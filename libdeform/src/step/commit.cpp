@@ -22,7 +22,12 @@ namespace dfm {
 namespace {
 // Between this sub-step and the next.
 bool reads_points(const World &w, const Body &b) {
-  return w.def.sleep || b.changes.open || !b.switches.empty() || !b.rule.empty() || !w.overlaps.suspended.empty();
+  return w.def.sleep || b.changes.open || !b.switches.empty() || !b.rule.empty() ||
+         !w.overlaps.suspended.empty();
+}
+
+bool has_impulses(const World &w, const StepContext &step) {
+  return w.plan.has(StageRole::reports_impulses) && step.rows.all() > 0;
 }
 
 constexpr double kAlong = 0.1;  // of the stable step: a way on which strains change little
@@ -40,7 +45,7 @@ void damp_changes_of_size(World &w, const StepContext &step) {
 
 bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   const SubStep now = sub_step_of(w, step);
-  const bool touched = w.plan.has(StageRole::reports_impulses) && step.rows.all() > 0;
+  const bool touched = has_impulses(w, step);
   const bool guarded = w.plan.has(StageRole::guards);
   if (guarded) step.guard.common.assign(w.bodies.size(), {});
   const Body *const failed = each_active(w, step.active, kPointsToMove, [&](Body &b) {
@@ -66,12 +71,14 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
   SubStep moved = now;
   moved.h *= step.guard.motion;
   if (step.guard.motion < 1) {
-    const bool touched = step.rows.all() > 0;
+    const bool touched = has_impulses(w, step);
+    step.in_full.clear();
     if (touched) take_part_of_contact(w, step, step.guard.motion);
     for (const uint32_t i : step.active) {
       Body &b = *w.bodies[i];
       const OnBehalf prefix(b.name);
-      b.dynamics->take_part(step.guard.motion, touched ? b.surfel_impulse.data() : nullptr);
+      b.dynamics->take_part(step.guard.motion, step.acts_in_full(i),
+                            touched ? b.surfel_impulse.data() : nullptr);
     }
   }
   book_energy(w, step, step.guard.motion);

@@ -21,8 +21,8 @@ StepContext::StepContext(const Meters &meters)
       next_store(meters.contacts.memory()),
       last_report(meters.contacts.memory()),
       islands(meters.steps.memory()) {
-  use_memory(meters.steps.memory(), driven, free_kinetic, looks, near, touching, active, woken, stirred,
-             roused.bodies, roused.dwell, roused.total);
+  use_memory(meters.steps.memory(), driven, free_kinetic, looks, in_full, near, touching, active, woken,
+             stirred, roused.bodies, roused.dwell, roused.total);
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              impulse_before_rebuild, tangents, slip_back, stick_drift, match, sharing, target_area,
              keeps_area, ways, renewed, rebound_speed, motions, marked, bonds, bond_impulse, chosen, mean,

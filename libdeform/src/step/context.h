@@ -70,6 +70,10 @@ struct StepContext {
   // predict
   Array<double> free_kinetic;  // [bodies] J, without contact; of this sub-step
   Array<EnergySample> looks;   // [active]
+  // [bodies] where the guard takes a part of the motion: contact and forces act in full
+  // (take_part_of_contact)
+  Array<uint8_t> in_full;
+  bool acts_in_full(uint32_t slot) const { return slot < in_full.size() && in_full[slot]; }
   // broad, narrow, self
   BroadPhase broad;
   Array<ContactPoint> contacts;

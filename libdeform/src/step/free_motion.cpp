@@ -44,16 +44,13 @@ bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble)
   };
   const uint32_t together = fewer_than_threads_and_large(w, active) ? kOnThisThread : kPointsToPull;
   const Body *const failed = each_active(w, active, together, forces);
-  if (failed) *trouble |= report_no_forces(w, *failed);
-  return !failed;
-}
-
-uint32_t report_no_forces(const World &w, const Body &b) {
+  if (!failed) return true;
+  *trouble |= DFM_TROUBLE_PLUGIN;
   set_last_error(
       format("%s: model '%s' could not compute its forces; take a smaller step or change the model",
-             at_step(w, b).c_str(), b.model.type->id)
+             at_step(w, *failed).c_str(), failed->model.type->id)
           .c_str());
-  return DFM_TROUBLE_PLUGIN;
+  return false;
 }
 
 namespace {

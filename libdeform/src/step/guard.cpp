@@ -33,6 +33,7 @@
 #include "step/move_obstacles.h"
 #include "step/self_contact.h"
 #include "step/sides.h"
+#include "step/solve/solve_islands.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/watch/energy_watch.h"
@@ -396,12 +397,17 @@ bool wake_hit(World &w, StepContext &step) {
 // other have no solution either, but are led apart (concepts/overlaps.md).
 bool overloaded(const StepContext &step) {
   if (!(step.residual.required > 1)) return false;
-  bool over = false;
-  for (uint32_t i = 0; i < step.rows.soft(); ++i) {
-    if (step.contacts[i].distance < 0) return false;
-    over = over || step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight;
+  for (const SolveIsland &own : step.solve_islands->all()) {
+    if (!(own.residual.required > 1)) continue;
+    bool over = false, within = false;
+    each_row(own.part.contacts, [&](uint32_t i) {
+      if (i >= step.rows.soft()) return;
+      over = over || step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight;
+      within = within || step.contacts[i].distance < 0;
+    });
+    if (over && !within) return true;
   }
-  return over;
+  return false;
 }
 
 // No motion is left, and the contact solve has no solution: the bodies are jammed. Impulses that cannot help

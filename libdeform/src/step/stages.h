@@ -78,7 +78,6 @@ void set_loads(Body &b, double t, double share);
 void each_held_place(const Body &b, double t, const std::function<void(uint32_t point, Vec3 to)> &use);
 void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
 bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
-uint32_t report_no_forces(const World &w, const Body &b);  // to dfm_last_error(). Gives the trouble bit.
 // kinetic: [bodies] J, of the active ones, out.
 bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble);
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp

@@ -93,8 +93,8 @@ class SettlingPoints : public ImplicitPoints {
   const double *start() const override { return p_.v_free.data(); }  // with the last contact forces
   void take(const double *v) override;
   double accurate_step(const SubStep &) const override { return std::numeric_limits<double>::infinity(); }
-  void take_part(double share, const double *surfel_impulse) override {
-    ImplicitPoints::take_part(share, surfel_impulse);
+  void take_part(double share, bool in_full, const double *surfel_impulse) override {
+    ImplicitPoints::take_part(share, in_full, surfel_impulse);
     whole_ = false;
   }
   void commit(const SubStep &now) override;

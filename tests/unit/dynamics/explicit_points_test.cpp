@@ -119,7 +119,7 @@ TEST(ExplicitPoints, APartOfTheWay_HasTheForcesOfThatPart) {
     f.end(q);
     const double *end = f.body->dynamics->end().v;
     const std::vector<double> v(end, end + free.size());
-    f.body->dynamics->take_part(0.25, q.data());
+    f.body->dynamics->take_part(0.25, false, q.data());
     end = f.body->dynamics->end().v;
     size_t moved = 0;
     for (size_t k = 0; k < free.size(); ++k) {

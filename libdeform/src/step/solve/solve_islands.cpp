@@ -92,20 +92,25 @@ double motion_tolerance(const SolveIsland &own) {
   return least;
 }
 
-// Impulses that are no solution (the budget has ended, or rows contradict each other) may do work that no law
-// allows: the share of them counts that lowers the energy most.
-bool take_least_work(StepContext &step, SolveIsland &own) {
-  const double share = share_of_least_work(step.rows, own.part);
+// False: that is all of them.
+bool take_least_work(ContactRows &rows, const RowsPart &part) {
+  const double share = share_of_least_work(rows, part);
   if (share == 1) return false;
-  own.swept.resize(3 * size_t{own.part.all()});
-  take_impulses(step.rows, own.part, own.swept.data());
-  for (double &l : own.swept) l *= share;
-  put_impulses(step.rows, own.part, own.swept.data());
+  const auto scale = [&](uint32_t i) {
+    double *const l = &rows.impulse[3 * size_t{i}];
+    store3(l, share * load3(l));
+  };
+  each_row(part.contacts, scale);
+  each_row(part.bonds, scale);
+  rows.restore(part);
   return true;
 }
 
+// Impulses that are no solution (the budget has ended, or rows contradict each other) may do work that no law
+// allows: the share of them counts that lowers the energy most.
 void limit_work(StepContext &step, SolveIsland &own) {
-  if (!own.bad && own.residual.required > 1 && take_least_work(step, own)) own.laws.judge(own.residual);
+  if (own.bad || own.failed || own.residual.required <= 1 || !take_least_work(step.rows, own.part)) return;
+  own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
 }
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
@@ -404,21 +409,43 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   return bad;
 }
 
-// With the forces of that share contact would stop less, and its impulses in full would throw what they hold.
+// Impulses that hold more than forces of that share would throw what they hold.
 void take_part_of_contact(const World &w, StepContext &step, double share) {
   ContactRows &rows = step.rows;
+  Array<uint8_t> &full = step.in_full;
+  full.assign(w.bodies.size(), 0);
+  const std::span<SolveIsland> all = step.solve_islands->all();
+  const auto each_body = [&](const SolveIsland &own, auto &&f) {
+    const auto of_row = [&](uint32_t i) {
+      for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
+        if (const uint32_t s = rows.source[rows.dof[j]]; s != kNone) f(s);
+    };
+    each_row(own.part.contacts, of_row);
+    each_row(own.part.bonds, of_row);
+  };
+  const auto keeps = [&](const SolveIsland &own) {
+    bool any = own.implicit || !own.part.blocks.empty();
+    each_body(own, [&](uint32_t slot) { any = any || full[slot]; });
+    return any;
+  };
+  for (bool spreads = true; spreads;) {  // a body may be in several
+    spreads = false;
+    for (const SolveIsland &own : all)
+      if (keeps(own))
+        each_body(own, [&](uint32_t slot) { spreads = !std::exchange(full[slot], 1) || spreads; });
+  }
   for (uint32_t d = 0; d < rows.ndof; ++d) {
-    if (rows.block[d] != kNone) continue;
+    const uint32_t slot = rows.source[d];
+    if (slot == kNone || full[slot]) continue;
     double *const free = &rows.y_free[size_t{kStride} * d];
-    const double *const start = &w.bodies[rows.source[d]]->p.v[size_t{kStride} * rows.point[d]];
+    const double *const start = &w.bodies[slot]->p.v[size_t{kStride} * rows.point[d]];
     for (size_t c = 0; c < 3; ++c) free[c] = start[c] + share * (free[c] - start[c]);
   }
-  for (SolveIsland &own : step.solve_islands->all()) {
-    if (own.implicit || !own.part.blocks.empty()) continue;
+  for (const SolveIsland &own : all) {
+    if (keeps(own)) continue;
     rows.restore(own.part);
-    take_least_work(step, own);
+    take_least_work(rows, own.part);
   }
-  step.bond_impulse.assign(rows.impulse.begin() + std::ptrdiff_t{3} * rows.n, rows.impulse.end());
   report_impulses(step);
 }
 

@@ -134,8 +134,8 @@ bool may_shorten(const StepContext &step);
 // law has failed, or null.
 const SolveIsland *solve_islands(World &w, StepContext &step);
 
-// The guard takes this share of the motion: where only points move that have their own mass, impulses become
-// those that do the least work for forces of that share.
+// The guard takes this share of the motion: in islands of explicit bodies alone, impulses become the share of
+// them that does the least work with forces of that share. Other bodies (step.in_full) keep theirs.
 void take_part_of_contact(const World &w, StepContext &step, double share);
 
 }  // namespace dfm

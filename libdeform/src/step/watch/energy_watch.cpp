@@ -253,6 +253,16 @@ void book_end(World &w, StepContext &step, Body &b, double motion) {
   b.energy.work += contact + loads + held + (1 - motion) * (gained - loads - contact);
 }
 
+// What forces that act in full do on the part of the way that the guard has left out.
+void book_unmoved(Body &b, double motion) {
+  const Phyxels &p = b.p;
+  const double *const end = b.dynamics->end().v;
+  double sum = 0;
+  for (size_t at = 0; at < p.v.size(); ++at)
+    if (p.moves(at)) sum += (p.mass[at / kStride] * (end[at] - p.v[at]) - p.impulse[at]) * end[at];
+  b.energy.work += (1 - motion) * sum;
+}
+
 // Loads without a potential, which act for this share of the sub-step (Dynamics::take_part).
 void book_loads(const StepContext &step, Body &b, double motion) {
   const Phyxels &p = b.p;
@@ -405,8 +415,8 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
   s.energy_gain = std::max(s.energy_gain, now.gain);
   // what moves by less than contact counts as rest is at rest
   const double at_rest = tangent_at_rest(w, step.h);
-  const double largest = std::max({s.energy_max, now.total - worst.rise,
-                                   worst.body ? 0.5 * worst.body->mass * (at_rest * at_rest) : 0});
+  const double largest = std::max(
+      {s.energy_max, now.total - worst.rise, worst.body ? 0.5 * worst.body->mass * (at_rest * at_rest) : 0});
   if (worst.rise > worst.share * largest)
     return stop_for_energy(
         w, trouble,
@@ -424,8 +434,7 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
 
 void book_energy(World &w, StepContext &step, double motion) {
   if (!watching(w)) return;
-  const bool touched = w.plan.touches() && step.rows.all() > 0;
-  if (touched) {
+  if (w.plan.touches() && step.rows.all() > 0) {
     book_contact(w, step);
     book_pairs(w, step);
   }
@@ -440,6 +449,7 @@ void book_energy(World &w, StepContext &step, double motion) {
     if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
     if (books(b)) b.energy.work += work_of_new_size(w, step, b);
     if (books(b) && books_loads(b)) book_loads(step, b, motion);
+    if (books(b) && motion < 1 && step.acts_in_full(i)) book_unmoved(b, motion);
   }
   w.watch.last_h = motion * step.h;
   w.watch.size_before = 0;
