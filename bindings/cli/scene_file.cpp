@@ -74,6 +74,9 @@ SceneFile::SceneFile(const Globals &globals, const std::string &path, const std:
   }
   need(dfm_scene_world(scene_, &world_));
   settings_ = got<dfm_scene_settings>(dfm_scene_get_settings, scene_);
+  std::string name;
+  for (size_t b = 0; !(name = value("/bodies/" + std::to_string(b) + "/name")).empty(); ++b)
+    places_.emplace(name, b);
 
   renew_list();
   for (const dfm_obstacle handle : listed<dfm_obstacle>(dfm_world_obstacles, world_)) {
@@ -143,10 +146,8 @@ std::string SceneFile::value(const std::string &pointer) const {
 }
 
 std::string SceneFile::pointer_of(const std::string &body) const {
-  for (size_t b = 0;; ++b) {
-    const std::string pointer = "/bodies/" + std::to_string(b), name = value(pointer + "/name");
-    if (name.empty() || name == '"' + body + '"') return pointer;
-  }
+  const auto at = places_.find('"' + body + '"');
+  return "/bodies/" + std::to_string(at == places_.end() ? places_.size() : at->second);
 }
 
 std::string SceneFile::explain() const {

@@ -58,7 +58,8 @@ class SceneFile {
   const std::vector<RigidView> &rigids() const { return rigids_; }
   const std::string &name_of(uint64_t handle) const;    // of a body or an obstacle
   std::string value(const std::string &pointer) const;  // JSON text; "" where nothing is
-  // Of a body of the file by its name: the world has them in another order where the file gives them ids.
+  // Of a body of the file by its name: the world has them in another order where the file gives them ids. Of
+  // others, as pieces, one where nothing is.
   std::string pointer_of(const std::string &body) const;
   std::string explain() const;
 
@@ -72,6 +73,7 @@ class SceneFile {
   mutable std::vector<BodyView> bodies_;
   std::vector<ObstacleView> obstacles_;
   std::vector<RigidView> rigids_;
+  std::map<std::string, size_t> places_;  // of bodies in the file, by their names as JSON text
   mutable std::map<uint64_t, std::string> names_;
   mutable std::map<uint64_t, uint32_t> numbers_;
 };

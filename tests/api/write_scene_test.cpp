@@ -376,6 +376,47 @@ TEST(WriteScene, FrictionOfABody_HoldsForItsPieces) {
   EXPECT_NEAR(test::measure(piece).velocity[1], 0.5, 0.02);
 }
 
+// A rule that names the body on both sides means each piece with each; the scene has one for each pair at
+// most, and no filter where they would touch without one.
+TEST(WriteScene, RulesOfABodyInManyPieces_AreWrittenOncePerPair) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  test::add_plane(world, "floor");
+  test::BodyOptions o;
+  o.name = "rod";
+  const dfm_body rod = test::make_body(context, world, "beam", {0.6, 0.02, 0.02}, 400, o);
+  o.name = "dust";
+  const dfm_body dust = test::make_body(context, world, "beam", {0.02, 0.02, 0.02}, 5, o);
+  test::ok(dfm_world_filter_pair(world, "rod", "rod", true));
+  test::ok(dfm_world_filter_pair(world, "rod", "floor", false));
+  test::ok(dfm_world_filter_pair(world, "rod", "dust", false));
+  dfm_friction_def law{};
+  law.size = sizeof law;
+  law.between[0] = law.between[1] = "rod";
+  law.law = "coulomb";
+  test::ok(dfm_world_add_friction(world, &law));
+  dfm_cut_def all = dfm_cut_def_default();
+  all.shape = DFM_CUT_BOX;
+  std::fill(all.half_size, all.half_size + 3, 1);
+  test::ok(dfm_body_cut(dust, &all, nullptr));  // so that the scene has no such body
+  for (int i = 1; i < 60; ++i) part(rod, 0.01 * i + 1e-3);
+  const size_t n = test::listed(dfm_world_bodies, world).size();
+  ASSERT_GT(n, 50u);
+  const std::string path = folder_of("rod") + "/rod.json";
+  const auto written = [&](const std::string &key) {
+    write(world, path, DFM_SCENE_PARTIAL);
+    EXPECT_TRUE(load(context, path));
+    const std::string text = test::read_file(path);
+    size_t count = 0;
+    for (size_t at = 0; (at = text.find(key, at)) != text.npos; ++at) ++count;
+    return count;
+  };
+  EXPECT_EQ(written("\"collide\""), n + n);  // each with itself and with the floor
+  EXPECT_EQ(written("\"law\""), n * (n + 1) / 2);
+  test::ok(dfm_world_filter_pair(world, "rod", "rod", false));
+  EXPECT_EQ(written("\"collide\""), n + n + n * (n - 1) / 2);
+}
+
 TEST(WriteScene, AttachmentToAShapeThatIsLeftOut_IsLeftOutToo) {
   Made made;
   const std::vector<dfm_rigid> hook =

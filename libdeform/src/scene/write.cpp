@@ -147,8 +147,9 @@ std::string SceneWriter::triangles(const std::string &name, const Obstacle &of) 
 }
 
 bool SceneWriter::has(const std::string &name) const {
+  const Body *const b = w.find_body(name);
   const Obstacle *const o = w.find_obstacle(name);
-  return w.find_body(name) || (o && shape_in_scene(w, *o));
+  return (b && !b->emptied) || (o && shape_in_scene(w, *o));
 }
 
 void SceneWriter::check_name(const char *kind, const std::string &name) const {
@@ -261,8 +262,12 @@ void write_materials(SceneWriter &to) {
 
 // group: ":NAME"; empty: the whole body.
 bool has_group(const Body &b, const std::string &group) {
-  const auto is_it = [&](uint32_t zone) { return ":" + b.zones.list[zone].group == group; };
-  return group.empty() || (b.zones.of.empty() ? is_it(0) : std::ranges::any_of(b.zones.of, is_it));
+  const SurfaceZones &zones = b.zones;
+  for (uint32_t z = 0; z < zones.list.size(); ++z)
+    if (":" + zones.list[z].group == group &&
+        (zones.of.empty() ? z == 0 : std::ranges::find(zones.of, z) != zones.of.end()))
+      return true;
+  return group.empty();
 }
 
 bool in_scene(const SceneWriter &to, const std::string &side) {
@@ -270,7 +275,7 @@ bool in_scene(const SceneWriter &to, const std::string &side) {
   if (side.rfind("material=", 0) == 0) return to.materials.contains(side.substr(9));
   const size_t colon = side.find(':');
   const Body *const whole = colon == side.npos ? nullptr : to.w.find_body(side.substr(0, colon));
-  return to.has(side) || (whole && has_group(*whole, side.substr(colon)));
+  return to.has(side) || (whole && !whole->emptied && has_group(*whole, side.substr(colon)));
 }
 
 // What a side of the world's rules means in the scene: the same, and the pieces of the body that it names,
@@ -286,21 +291,26 @@ std::vector<std::string> sides_in_scene(const SceneWriter &to, const std::string
   return out;
 }
 
-// A rule for each two sides that the scene has; it refuses others.
+// A rule for each two sides that the scene has; it refuses others. kept, if not null, gets the world's rules
+// that are there as a whole. Of others, with several bodies on both sides, only what they say of a body with
+// itself is: the caller says what pairs need, whose number grows with the square.
 template <class Rule>
-std::vector<Rule> rules_in_scene(SceneWriter &to, const char *what, const std::vector<Rule> &rules) {
+std::vector<Rule> rules_in_scene(SceneWriter &to, const char *what, const std::vector<Rule> &rules,
+                                 std::vector<Rule> *kept = nullptr) {
   std::vector<Rule> out;
   for (const Rule &r : rules) {
-    const size_t before = out.size();
-    for (const std::string &a : sides_in_scene(to, r.between[0]))
-      for (const std::string &b : sides_in_scene(to, r.between[1])) {
-        out.push_back(r);
-        out.back().between[0] = a;
-        out.back().between[1] = b;
-      }
-    if (out.size() == before)
+    const std::vector<std::string> a = sides_in_scene(to, r.between[0]), b = sides_in_scene(to, r.between[1]);
+    const bool same = r.between[0] == r.between[1], alone = kept && a.size() > 1 && b.size() > 1;
+    if (a.empty() || b.empty())
       to.note("the %s for '%s' and '%s' is left out, since the scene does not have both of them", what,
               r.between[0].c_str(), r.between[1].c_str());
+    else if (kept && !alone) kept->push_back(r);
+    for (size_t i = 0; i < a.size(); ++i)
+      for (size_t k = same ? i : 0; k < (!alone ? b.size() : same ? i + 1 : 0); ++k) {
+        out.push_back(r);
+        out.back().between[0] = a[i];
+        out.back().between[1] = b[k];
+      }
   }
   return out;
 }
@@ -350,10 +360,10 @@ bool may_meet(const Touching &a, const Touching &b) {
 }
 
 // The world's rules, and one for each pair of which they would say something else in the scene: it has no
-// masks and no answers of a host.
+// masks, no answers of a host, and no pieces of one body.
 Written write_filters(SceneWriter &to) {
   const World &w = to.w;
-  std::vector<FilterRule> rules = rules_in_scene(to, "filter", w.filters), pairs;
+  std::vector<FilterRule> kept, rules = rules_in_scene(to, "filter", w.filters, &kept), pairs;
   std::set<std::pair<uint64_t, uint64_t>> refused;
   for (const PairDecision &p : w.may_touch.decisions)
     if (!p.touch) refused.insert(std::minmax(p.a, p.b));
@@ -366,8 +376,8 @@ Written write_filters(SceneWriter &to) {
       const bool allowed =
           rule ? rule->collide : (a.category & b.collides_with) && (b.category & a.collides_with);
       const bool touch = allowed && !refused.contains(std::minmax(a.id, b.id));
-      const FilterRule *const written =
-          best_rule(rules, {a.name, {}, a.side.material}, {b.name, {}, b.side.material});
+      const FilterRule *const written = best_rule(kept, {a.name, {}, a.side.material, a.side.whole},
+                                                  {b.name, {}, b.side.material, b.side.whole});
       if (touch != (!written || written->collide)) pairs.push_back({{a.name, b.name}, touch});
     }
   Written out = Written::array();
