@@ -156,8 +156,9 @@ class Dynamics {
   // sub-step. Returns false if the model fails. After end_state().
   virtual bool end_forces(const SubStep &) { return false; }
   // Before commit(): the guard takes only this share of the displacement. Velocities are those of the end,
-  // but unless `in_full`, forces on points that move explicitly act for the share only: they would drive
-  // again and again what cannot move. surfel_impulse: what contact then does, as points().impulse; null: none.
+  // but unless `in_full`, forces on points that move explicitly act for the share only: in full they would
+  // drive what cannot move again and again. surfel_impulse: what contact then does, as points().impulse;
+  // null: none.
   virtual void take_part(double share, bool in_full, const double *surfel_impulse);
   // J, stored in dampers that see the velocity with a lag
   virtual double damper_energy(double /*time*/) { return 0; }
