@@ -335,6 +335,76 @@ TEST(Attach, Release_LetsTheTwoTouchInTheSameStep) {
   EXPECT_EQ(dfm_world_hash(a.w), dfm_world_hash(b.w));
 }
 
+// What comes off within a step may lie in what held it, and the two are then listed as an overlap. Where the
+// step is taken back, they are not.
+TEST(Attach, InterruptedAfterARelease_ListsNoOverlap) {
+  World s;
+  test::add_plane(s.w, "floor", {0, 0, -0.2});
+  const dfm_body beam = s.beam("msm", DFM_INTEGRATOR_SYMPLECTIC_EULER);
+  attach(beam, s.hook({0, 0, -0.05}), true, [](dfm_attach_def &d) { d.release = 1e-3; });
+  test::BodyOptions o;
+  o.position = {0, 0.5, -0.2};
+  o.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+  test::make_body(s.context, s.w, "beam", {0.05, 0.05, 0.05}, 60, o);
+  struct Stop {
+    dfm_world w;
+    int left;
+  } stop{s.w, 100};
+  const auto call = [](void *user, dfm_contact_choice *) {
+    Stop &at = *static_cast<Stop *>(user);
+    if (--at.left == 0) test::ok(dfm_world_interrupt(at.w));
+  };
+  test::ok(dfm_world_set_pre_solve(s.w, call, &stop));
+  const uint64_t before = dfm_world_hash(s.w);
+  EXPECT_EQ(dfm_world_step(s.w, 0.02, nullptr), DFM_DISCARD);
+  EXPECT_EQ(dfm_world_hash(s.w), before);
+  EXPECT_TRUE(test::listed(dfm_world_overlaps, s.w).empty());
+  EXPECT_EQ(test::listed(dfm_body_attachments, beam).size(), 1u);
+  test::ok(dfm_world_step(s.w, 0.02, nullptr));
+  EXPECT_TRUE(test::listed(dfm_body_attachments, beam).empty());
+  EXPECT_EQ(test::listed(dfm_world_overlaps, s.w).size(), 1u);
+}
+
+// A body that stiffens as it is stretched has as many sub-steps where others come off all the time.
+TEST(Attach, Releases_LeaveTheBoundOfTheStepFollowed) {
+  constexpr double kSpan = 0.4;
+  constexpr int kPieces = 60;
+  uint32_t substeps[2] = {}, planned = 0;
+  for (const bool comes_off : {false, true}) {
+    World s({0, 0, 0});
+    const dfm_vector_key grows[2] = {{0, {0, 0, 0}}, {kSpan, {0, 0, -kG}}};
+    test::ok(dfm_world_set_gravity_keys(s.w, 2, grows));
+    const dfm_obstacle hook = s.hook();
+    const dfm_body beam = s.beam("msm", DFM_INTEGRATOR_SYMPLECTIC_EULER, {1, 0, -0.05});
+    std::vector<uint32_t> ends[2];
+    const std::vector<double> x = test::points(beam);
+    for (size_t i = 0; i < x.size() / 3; ++i) {
+      if (x[3 * i + 2] > -1e-9) ends[1].push_back(uint32_t(i));
+      if (x[3 * i + 2] < -0.05 + 1e-9) ends[0].push_back(uint32_t(i));
+    }
+    for (const auto &end : ends) test::ok(dfm_body_hold(beam, uint32_t(end.size()), end.data(), 7));
+    const dfm_pose_key up[2] = {{0, {{0, 0, 0}, {0, 0, 0, 1}}}, {kSpan, {{0, 0, 0.05}, {0, 0, 0, 1}}}};
+    test::ok(dfm_body_move_held(beam, uint32_t(ends[1].size()), ends[1].data(), 2, up, nullptr));
+    for (int i = 0; i < kPieces; ++i) {
+      test::BodyOptions o;
+      o.young = 1e4;
+      o.position = {0, 0.1 * (i + 1), -0.05};
+      o.integrator = DFM_INTEGRATOR_SYMPLECTIC_EULER;
+      const dfm_body piece = test::make_body(s.context, s.w, "beam", {0.05, 0.05, 0.05}, 5, o);
+      const double weight = kG * test::measure(piece).mass;
+      attach(piece, hook, true,
+             [&](dfm_attach_def &d) { d.release = comes_off ? weight * (i + 1) / (kPieces + 1) : 0; });
+    }
+    double first = 0;
+    test::ok(dfm_world_stable_step(s.w, &first, nullptr, nullptr));
+    planned = uint32_t(kSpan / first);
+    test::ok(dfm_world_step(s.w, kSpan, nullptr));
+    substeps[comes_off] = test::stats(s.w).last_substeps;
+  }
+  EXPECT_GT(substeps[0], planned + planned / 10);
+  EXPECT_EQ(substeps[1], substeps[0]);
+}
+
 TEST(Attach, Detach_LetsTheTwoTouchAgain) {
   World s;
   const dfm_obstacle hook = s.hook({0, 0, -0.15});

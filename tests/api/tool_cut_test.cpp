@@ -515,7 +515,8 @@ TEST(ToolCut, InterruptedWhereABladePays_IsAsBeforeTheStep) {
   EXPECT_EQ(dfm_world_hash(s.w), dfm_world_hash(plain.w));
 }
 
-// A load that overflows in the middle of a step ends it there, and the blade has moved on.
+// A load that overflows in the middle of a step ends it there, and the blade has moved on. A snapshot knows
+// how far it has cut.
 TEST(ToolCut, StepThatFailsHalfWay_LeavesNoBridge) {
   for (const uint32_t how : {DFM_CUT_SPLIT, DFM_CUT_REMOVE}) {
     Cube whole, s;
@@ -529,6 +530,7 @@ TEST(ToolCut, StepThatFailsHalfWay_LeavesNoBridge) {
       o.position = {1, 0, 0};
       const dfm_body far = test::make_body(c->context, c->w, "beam", {0.04, 0.04, 0.04}, 60, o);
       move(c->w, t, {0.001, 0, 0.05}, {0.001, 0, 0.021}, 2);
+      cut_events(c->w, c->body, t);  // which a snapshot does not keep
       const dfm_pose p{{0.001, 0, -0.03}, {0, 0, 0, 1}};
       test::ok(dfm_tool_set_pose(t, &p, nullptr));
       const double huge[3] = {0, 0, 1.7e308}, now = dfm_world_time(c->w);
@@ -539,6 +541,9 @@ TEST(ToolCut, StepThatFailsHalfWay_LeavesNoBridge) {
         ASSERT_EQ(dfm_world_step(c->w, 1e-3, nullptr), DFM_E_DIVERGED);
         ASSERT_GT(dfm_world_time(c->w), now);
         test::ok(dfm_body_remove_load(far, load));
+        const std::string kept = test::snapshot(c->w);
+        test::ok(dfm_world_restore(c->w, kept.data(), kept.size()));
+        EXPECT_TRUE(test::snapshot(c->w) == kept);
       }
       test::ok(dfm_world_step(c->w, now + 1e-3 - dfm_world_time(c->w), nullptr));
       opened[c == &s] = uint32_t(cut_events(c->w, c->body, t).sum);

@@ -292,7 +292,7 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
 
 void begin_cuts(World &w) {
   for (auto &t : w.tools) {
-    if (std::exchange(t->cuts.waits, true)) continue;
+    if (t->cuts.waits) continue;
     for (size_t part = 0; part < t->cuts.from.size(); ++part)
       t->cuts.from[part] = load_pose(t->set->state[part]);
   }

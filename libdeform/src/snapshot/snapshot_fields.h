@@ -422,6 +422,7 @@ void attachment_fields(Stream &s, W &w) {
     s.array("attachment impulse", a.impulse, 3 * n, must::finite);
     s.value("attachment total", a.total, must::finite);
     s.value("attachment released", a.released, must::flag);
+    s.value("attachment parted", a.parted, must::flag);
   });
 }
 
@@ -520,6 +521,8 @@ void fields(Stream &s, W &w, const World &like) {
     s.array("bodies that it cuts", cuts.bodies, kAnyCount, must::any);
     s.must_hold("bodies that it cuts", "ascending numbers, of a tool that cuts in this way",
                 [&] { return is_valid(cuts, l); });
+    s.value("way is yet to be cut", cuts.waits, must::flag);
+    if (cuts.waits) s.array("start of the way", cuts.from, l.motion.parts.size(), must::pose);
   });
   s.where("", "");
   attachment_fields(s, w);

@@ -24,6 +24,7 @@ struct Attachment {
   double h = 0;                 // s, of that sub-step; 0: none yet
   Vec3 total;                   // N s since creation
   bool released = false;        // no longer holds; removed before the next step
+  bool parted = false;          // and what it held may touch again
   Vec3 sum() const {
     Vec3 p;
     for (size_t i = 0; i < impulse.size(); i += 3) p += load3(&impulse[i]);

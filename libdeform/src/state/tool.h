@@ -31,7 +31,7 @@ struct Tool {
     uint32_t how = 0, most = 0;
     std::vector<uint64_t> bodies;  // ids, ascending
     std::vector<Pose> from;        // places of its parts up to which it has cut; empty: it has never cut
-    bool waits = false;            // a step has failed: what it moved in that is yet to be cut
+    bool waits = false;            // its way of this step, or of failed ones before, is yet to be cut
   } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
   // with its pieces

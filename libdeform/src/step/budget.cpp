@@ -114,6 +114,10 @@ void changing(Stream &s, World &w) {
   s.one(w.bound.body);
   s.one(w.bound.point);
   s.one(w.gravity.now);
+  s.one(w.offset);
+  s.many(w.overlaps.found);
+  s.many(w.overlaps.suspended);
+  s.one(w.overlaps.reported);
   s.one(w.step_count);
   s.one(w.sleepers);
   s.one(w.watch);
@@ -160,6 +164,7 @@ void changing(Stream &s, World &w) {
     s.one(a.h);
     s.one(a.total);
     s.one(a.released);
+    s.one(a.parted);
   }
   s.many(w.work);
   s.count(w.events);  // steps only append to it, and the host may read it after many steps
@@ -183,7 +188,11 @@ void changed_at_once(Stream &s, World &w) {
   s.many(w.step_impulses.pairs);
   s.one(w.step_impulses.idle);
   s.one(w.sizes);
-  for (auto &t : w.tools) s.many(t->set->extra);
+  s.one(w.integrator_times.changes);
+  for (auto &t : w.tools) {
+    s.many(t->set->extra);
+    s.one(t->cuts.waits);
+  }
 }
 
 void restore_changing(ByteReader &from, World &w) {
@@ -196,6 +205,7 @@ void restore_changing(ByteReader &from, World &w) {
 }
 
 void return_to_start(World &w, StepContext &step) {
+  for (const Attachment &a : w.attachments) w.changed = w.changed || a.parted;  // it holds again
   ByteReader from(step.budget.start, kStart);
   changed_at_once(from, w);
   if (step.budget.kept) {
@@ -355,7 +365,8 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   try {
     status = run_step(w, step, dt, trouble);
   } catch (const StepInterrupted &) {
-    undo_impact(w, impact_until);
+    return_to_start(w, step);
+    undo_impact(w, impact_until);  // may fail, and changes dampers and sizes
     return_to_start(w, step);
     set_last_error((at_step(w) + " was interrupted; the state is as before the step").c_str());
     *trouble = DFM_TROUBLE_INTERRUPTED;

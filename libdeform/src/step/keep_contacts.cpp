@@ -51,6 +51,7 @@ void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, do
 }
 
 void end_contacts(World &w) {
+  end_idle(w);
   ContactStore &s = w.store;
   reserve_events(w, s.n);
   for (uint32_t i = 0; i < s.n; ++i)

@@ -126,9 +126,7 @@ Next run(size_t row, World &w, StepContext &step, uint32_t *trouble, Clock::time
   return stage.run(w, step, trouble);
 }
 
-struct Released;
-bool advance(World &w, StepContext &step, double end, double goal, bool last, Released &released,
-             uint32_t *trouble);
+bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble);
 bool take_substep(World &w, StepContext &step, uint32_t *trouble);
 bool sub_step(World &w, StepContext &step, uint32_t *trouble);
 
@@ -183,18 +181,14 @@ void prepare_bound(World &w) {
   update_bound(w);
 }
 
-// Attachments that have come off in this step. What they held may touch from the next piece on; after the
-// step, also where it is taken back, the next one makes its tables anew.
-struct Released {
-  World &w;
-  size_t known = 0;
-  void part() {
-    const size_t now = part_released(w, known);
-    if (now > known) prepare_bound(w);
-    known = now;
-  }
-  ~Released() { w.changed = w.changed || known > 0; }
-};
+// What attachments that have come off held may touch from the next piece on. The bound keeps its age, so that
+// it is followed also where something comes off all the time.
+void prepare_released(World &w) {
+  if (!part_released(w)) return;
+  const WorldBound bound = w.bound;
+  prepare(w);
+  w.bound = bound;
+}
 
 // The rest of a step, from `from` to `goal`, in `n` equal sub-steps, of which the first `taken` are done.
 struct Division {
@@ -244,14 +238,18 @@ dfm_status follow_bound(World &w, StepContext &step, uint32_t done, Division &re
 // All sub-steps of a step of dt, at first n, until the budget is used up. done: how many were taken.
 dfm_status take_substeps(World &w, StepContext &step, double dt, uint32_t n, uint32_t &done,
                          uint32_t *trouble) {
-  Released released{w};
+  struct Hands {  // also where this throws
+    World &w;
+    double start;
+    ~Hands() { take_back_work(w, start); }
+  } hands{w, w.time};
   for (Division rest(w.time, dt, n); !rest.over();) {
     if (const dfm_status refused = follow_bound(w, step, done, rest, trouble)) return refused;
     allow_for_bound(w, step);
     step.budget.to_come = rest.left() - 1;
     step.length.most_parts = double(w.def.max_substeps - done) / rest.left();
     const double from = w.time;
-    if (!advance(w, step, rest.next(), rest.goal, rest.last(), released, trouble)) {
+    if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) {
       if (!step.in_impact) return DFM_E_DIVERGED;
       begin_impact(w);
       prepare_bound(w);
@@ -297,7 +295,6 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   const double start = w.time;
   uint32_t done = 0;
   const dfm_status failed = take_substeps(w, step, dt, n, done, trouble);
-  take_back_work(w, start);
   if (failed) return failed;
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
@@ -315,14 +312,13 @@ namespace {
 
 // One planned sub-step, up to `end`: as a whole, or in pieces if the guard shortens it. last: it is the last
 // of the step, which ends at `goal`.
-bool advance(World &w, StepContext &step, double end, double goal, bool last, Released &released,
-             uint32_t *trouble) {
+bool advance(World &w, StepContext &step, double end, double goal, bool last, uint32_t *trouble) {
   step.guard.cuts = 0;
   step.guard.motion = 1;
   step.length.begin(end - w.time);
   double planned = step.length.planned;
   for (bool whole = false; !whole;) {
-    released.part();
+    prepare_released(w);
     step.rest = step.h = end - w.time;
     step.left = goal - w.time;
     // only where the budget of the step has room for one piece more

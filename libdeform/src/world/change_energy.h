@@ -7,7 +7,7 @@
 
 namespace dfm {
 
-// J: rounding of positions makes less elastic energy. It is that of a strain of the square root of epsilon.
+// J: rounding of positions makes less elastic energy. It is twice that of a strain of sqrt(epsilon).
 double rounded_energy(const Body &b);
 // The book at the present state, with this elastic energy (NaN: none).
 ChangeBook check_changes(const Body &b, double elastic);

@@ -199,7 +199,7 @@ void resolve_overlaps(World &w) {
     o.suspended.push_back({f.a, f.b, f.obstacle});
     w.pairs.filter.set(f.a, f.b, f.obstacle, false);
   }
-  o.found = std::move(found);
+  o.found.assign(found.begin(), found.end());  // an interrupt gives back what was there, in this memory
   o.reported = left.empty();
   o.placed.clear();
   o.all = o.report_only = o.untangle = false;

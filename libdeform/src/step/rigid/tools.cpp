@@ -96,6 +96,7 @@ void begin_tools(World &w, double dt) {
     v.measured = v.measured == kToolMeasuredNext ? kToolMeasured : 0;
     v.goal = w.time + dt;
     v.time = 0;
+    if (!t->cuts.bodies.empty() && !w.prescribed.is_static()) t->cuts.waits = true;
     std::fill(v.contact, v.contact + 6, 0.0);
     store3(v.about, load_pose(t->set->state[0]).position);
     std::fill(v.coupling, v.coupling + 6, 0.0);

@@ -92,9 +92,9 @@ void add_release(World &w, const Attachment &a, double t) {
 }
 
 // They may touch from now on, and may overlap at present.
-void part(World &w, const Attachment &a) {
+void part(World &w, Attachment &a) {
   w.overlaps.place(a.body);
-  w.changed = true;
+  a.parted = w.changed = true;
 }
 
 }  // namespace
@@ -150,27 +150,25 @@ void keep_bonds(World &w, StepContext &step) {
   }
 }
 
-size_t part_released(World &w, size_t known) {
-  const auto released = [](const Attachment &a) { return a.released; };
-  const size_t n = size_t(std::ranges::count_if(w.attachments, released));
-  if (n > known)
-    for (const Attachment &a : w.attachments)
-      if (a.released) part(w, a);
-  return n;
+bool part_released(World &w) {
+  bool any = false;
+  for (Attachment &a : w.attachments) {
+    if (!a.released || a.parted) continue;
+    part(w, a);
+    any = true;
+  }
+  return any;
 }
 
 void drop_released(World &w) {
-  const auto gone = [](const Attachment &a) { return a.released; };
-  if (std::none_of(w.attachments.begin(), w.attachments.end(), gone)) return;
-  for (const Attachment &a : w.attachments)
-    if (a.released) part(w, a);
-  std::erase_if(w.attachments, gone);
+  part_released(w);
+  if (std::erase_if(w.attachments, [](const Attachment &a) { return a.released; }) > 0) w.changed = true;
 }
 
 void drop_attachments(World &w, uint64_t id) {
   reserve_events(w, w.attachments.size());
   const auto of = [&](const Attachment &a) { return a.body == id || a.to == id; };
-  for (const Attachment &a : w.attachments) {
+  for (Attachment &a : w.attachments) {
     if (!of(a)) continue;
     if (!a.released) add_release(w, a, w.time);
     each_body(w, a, [&](uint32_t slot) { wake(w, *w.bodies[slot]); });

@@ -17,8 +17,8 @@ struct World;
 void make_bonds(World &w, StepContext &step, bool again);
 // Keeps the impulses of the completed sub-step. Releases attachments whose force is above their limit.
 void keep_bonds(World &w, StepContext &step);
-// Within a step: how many are released; where these are more than `known`, what they held may touch.
-size_t part_released(World &w, size_t known);
+// Lets what released attachments held touch, once. False: there are no new ones.
+bool part_released(World &w);
 // Removes released attachments, between two steps.
 void drop_released(World &w);
 // Removes all attachments of a removed body or obstacle, with an event each.
