@@ -22,6 +22,7 @@
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/context.h"
+#include "step/solve/attach.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "step/watch/energy_watch.h"
@@ -566,6 +567,7 @@ void check_equilibrium(const World &w) {
 }
 
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {
+  drop_released(w);  // of a step that has failed: what the search gives back has none
   prepare(w);
   check_equilibrium(w);
   {

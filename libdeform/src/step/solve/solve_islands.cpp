@@ -110,6 +110,7 @@ bool take_least_work(ContactRows &rows, const RowsPart &part) {
 // allows: the share of them counts that lowers the energy most.
 void limit_work(StepContext &step, SolveIsland &own) {
   if (own.bad || own.failed || own.residual.required <= 1 || !take_least_work(step.rows, own.part)) return;
+  set_trial(step.rows, own.part, step.h, step.rows.wt.data(), step.state);  // slips as they are now
   own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
 }
 
