@@ -473,19 +473,28 @@ TEST(Attach, Snapshot_ContinuesWithTheSameBits) {
   EXPECT_EQ(dfm_world_hash(a.w), hash);
 }
 
+namespace {
+
+bool is_asleep(dfm_body b) {
+  bool is = false;
+  test::ok(dfm_body_is_asleep(b, &is));
+  return is;
+}
+// Whether it is asleep in the end.
+bool hang_until_asleep(World &s, dfm_body b) {
+  test::ok(dfm_world_set_sleep(s.w, true));
+  for (int i = 0; i < 400 && !is_asleep(b); ++i) s.run(0.01);
+  return is_asleep(b);
+}
+
+}  // namespace
+
 TEST(Attach, HangingBody_SleepsAndWakesWithItsSupport) {
   World s;
   const dfm_obstacle hook = s.hook();
   const dfm_body beam = s.beam("msm");
   const uint32_t held = attach(beam, hook);
-  test::ok(dfm_world_set_sleep(s.w, true));
-  const auto asleep = [&] {
-    bool is = false;
-    test::ok(dfm_body_is_asleep(beam, &is));
-    return is;
-  };
-  for (int i = 0; i < 400 && !asleep(); ++i) s.run(0.01);
-  ASSERT_TRUE(asleep());
+  ASSERT_TRUE(hang_until_asleep(s, beam));
   const double weight = kG * test::measure(beam).mass;
   const dfm_attachment before = info(beam, held);
   s.run(0.5);
@@ -495,7 +504,7 @@ TEST(Attach, HangingBody_SleepsAndWakesWithItsSupport) {
   const dfm_pose to = {{0.001, 0, 0.05}, {0, 0, 0, 1}};
   test::ok(dfm_obstacle_move_to(hook, &to));
   s.run(1e-3);
-  EXPECT_FALSE(asleep());
+  EXPECT_FALSE(is_asleep(beam));
   EXPECT_NEAR(info(beam, held).point[0] - after.point[0], 0.001, 1e-8);
 }
 
@@ -505,13 +514,7 @@ TEST(Attach, ASleeperThatIsCut_KeepsTheImpulseOfItsSleep) {
   const dfm_obstacle hook = s.hook();
   const dfm_body beam = s.beam("msm");
   const uint32_t held = attach(beam, hook);
-  test::ok(dfm_world_set_sleep(s.w, true));
-  bool asleep = false;
-  for (int i = 0; i < 400 && !asleep; ++i) {
-    s.run(0.01);
-    test::ok(dfm_body_is_asleep(beam, &asleep));
-  }
-  ASSERT_TRUE(asleep);
+  ASSERT_TRUE(hang_until_asleep(s, beam));
   s.run(0.5);
   const double before = info(beam, held).impulse[2];
   dfm_cut_def cut = dfm_cut_def_default();

@@ -66,7 +66,6 @@ struct Sequence {
   std::vector<uint64_t> ever, materials;  // ever: every handle that there has been, here or in another world
   std::vector<std::string> snapshots;
   std::vector<dfm_status> callbacks;  // what calls from inside a step gave
-  bool refused_step = false;          // by a device
 
   Sequence(dfm_context *c, Random r) : context(c) {
     ok(dfm_plugin_visit(c, take_type, this));

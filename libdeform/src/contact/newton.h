@@ -110,12 +110,12 @@ class ContactNewton {
   // matrix
   BlockPattern pattern_;
   Array<uint32_t> pairs_, begin_, by_lower_, number_, higher_;  // of shape()
-  Array<uint32_t> ij_;                                          // [nb,2]
-  Array<uint32_t> analysed_;        // of the order that factor_ has, by minimum degree
-  Array<uint32_t> place_;           // among them:
-  std::span<const uint32_t> at_;    // of the blocks of the bodies' patterns
-  std::span<const uint32_t> own_;   // [nodes] of the diagonal
-  std::span<const uint32_t> spot_;  // of each pair of entries of each row
+  Array<uint32_t> ij_;                                          // [nb,2] the blocks of the matrix
+  Array<uint32_t> analysed_;        // ij_ of the order that factor_ has, by minimum degree
+  Array<uint32_t> place_;           // the block of each pair, of which are
+  std::span<const uint32_t> at_;    // those of the bodies' patterns
+  std::span<const uint32_t> own_;   // [nodes] the diagonal
+  std::span<const uint32_t> spot_;  // pairs of entries of each row
   Array<double> places_;            // [nodes,3] m
   Array<double> blocks_, matrix_;   // [nb,9] A + J' sym(G) J; A
   LdltSolver factor_;

@@ -37,8 +37,8 @@ void put_law(World &w, uint32_t a, uint32_t b, const PairLaw &known);
 // The law of two obstacles, of which a tool is one.
 uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);
-uint32_t contact_law(const World &w,
-                     const ContactPoint &c);  // of its zones, where they have laws of their own
+// That of its zones, where these have laws of their own.
+uint32_t contact_law(const World &w, const ContactPoint &c);
 // The effects of the law with its present parameters, and with other parameters.
 void offer_law(const LawInstance &law, SceneFacts &facts);
 void rename_law(World &w, const FrictionRule &rule, uint32_t to);  // in the store, of contacts it holds for

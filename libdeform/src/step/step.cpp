@@ -294,8 +294,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   begin_tools(w, dt);
   const double start = w.time;
   uint32_t done = 0;
-  const dfm_status failed = take_substeps(w, step, dt, n, done, trouble);
-  if (failed) return failed;
+  if (const dfm_status failed = take_substeps(w, step, dt, n, done, trouble)) return failed;
   w.stats.last_substeps = done;
   w.stats.substeps_max = std::max(w.stats.substeps_max, done);
   drop_released(w);

@@ -105,30 +105,32 @@ TEST(ExplicitPoints, ModelThatThrowsWhereItListsItsParts_IsMovedWithoutThem) {
   EXPECT_TRUE(f.body->dynamics->add_forces(f.now, false));
 }
 
-// Where the guard takes a part of the way, forces have acted for that part, and contact in full.
+// Where the guard takes a part of the way, forces have acted for that part, or in full, and contact in full.
 TEST(ExplicitPoints, APartOfTheWay_HasTheForcesOfThatPart) {
-  for (const bool in_place : {true, false}) {
-    const Falling f;
-    const dfm::Phyxels &p = f.body->p;
-    const std::vector<double> free(p.v_free.begin(), p.v_free.end());
-    if (!in_place) f.body->dynamics->free_changed();
-    const std::vector<double> q = f.impulses(1, 2);
-    for (uint32_t s = 0; s < f.body->surface.nsurfel; ++s)
-      for (size_t k = 0; k < 3; ++k)
-        f.body->p.impulse[4 * size_t{f.body->surface.point[s]} + k] = q[3 * s + k];
-    f.end(q);
-    const double *end = f.body->dynamics->end().v;
-    const std::vector<double> v(end, end + free.size());
-    f.body->dynamics->take_part(0.25, false, q.data());
-    end = f.body->dynamics->end().v;
-    size_t moved = 0;
-    for (size_t k = 0; k < free.size(); ++k) {
-      EXPECT_NEAR(end[k], p.v[k] + 0.25 * (free[k] - p.v[k]) + (v[k] - free[k]), 1e-12) << k;
-      EXPECT_NEAR(p.x_end[k], p.x[k] + 0.25 * f.now.h * v[k], 1e-12) << k;
-      moved += v[k] != free[k];
+  for (const bool in_full : {false, true})
+    for (const bool in_place : {true, false}) {
+      const Falling f;
+      const dfm::Phyxels &p = f.body->p;
+      const std::vector<double> free(p.v_free.begin(), p.v_free.end());
+      if (!in_place) f.body->dynamics->free_changed();
+      const std::vector<double> q = f.impulses(1, 2);
+      for (uint32_t s = 0; s < f.body->surface.nsurfel; ++s)
+        for (size_t k = 0; k < 3; ++k)
+          f.body->p.impulse[4 * size_t{f.body->surface.point[s]} + k] = q[3 * s + k];
+      f.end(q);
+      const double *end = f.body->dynamics->end().v;
+      const std::vector<double> v(end, end + free.size());
+      f.body->dynamics->take_part(0.25, in_full, q.data());
+      end = f.body->dynamics->end().v;
+      size_t moved = 0;
+      for (size_t k = 0; k < free.size(); ++k) {
+        const double forces = (in_full ? 1 : 0.25) * (free[k] - p.v[k]);
+        EXPECT_NEAR(end[k], p.v[k] + forces + (v[k] - free[k]), 1e-12) << k;
+        EXPECT_NEAR(p.x_end[k], p.x[k] + 0.25 * f.now.h * v[k], 1e-12) << k;
+        moved += v[k] != free[k];
+      }
+      EXPECT_GT(moved, 10u);
     }
-    EXPECT_GT(moved, 10u);
-  }
 }
 
 // A body that is pressed together and cannot move: its forces would drive its points further with each

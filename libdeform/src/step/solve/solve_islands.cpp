@@ -92,7 +92,7 @@ double motion_tolerance(const SolveIsland &own) {
   return least;
 }
 
-// False: that is all of them.
+// Impulses become the share of them that does the least work. False: that is all of them.
 bool take_least_work(ContactRows &rows, const RowsPart &part) {
   const double share = share_of_least_work(rows, part);
   if (share == 1) return false;
@@ -107,9 +107,10 @@ bool take_least_work(ContactRows &rows, const RowsPart &part) {
 }
 
 // Impulses that are no solution (the budget has ended, or rows contradict each other) may do work that no law
-// allows: the share of them counts that lowers the energy most.
+// allows. Of implicit bodies the method itself sees to that (ContactNewton::penalties_alone).
 void limit_work(StepContext &step, SolveIsland &own) {
-  if (own.bad || own.failed || own.residual.required <= 1 || !take_least_work(step.rows, own.part)) return;
+  if (own.implicit || own.bad || own.failed || own.residual.required <= 1) return;
+  if (!take_least_work(step.rows, own.part)) return;
   set_trial(step.rows, own.part, step.h, step.rows.wt.data(), step.state);  // slips as they are now
   own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
 }
@@ -147,12 +148,12 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
     const bool done = own.sweeping.solve(step.rows, own.part, step.state, own.laws, own.tolerance, limits,
                                          step.h, own.residual);
     own.sweeps = own.sweeping.count();
-    if (done) return limit_work(step, own);
+    if (done) return;
     if (own.all_rigid) {
       solve_rigid(step, own, exact, normal);
       allow();
       if (!own.bad) own.residual = residual_of(step.rows, own.part, step.state, step.h, own.tolerance);
-      return limit_work(step, own);
+      return;
     }
     begin_newton(step, own);
   }
@@ -160,7 +161,6 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   own.sweeps += own.newton->steps();
   own.residual = own.newton->residual();
   if (!own.bad && !own.failed) own.newton->take();
-  if (!own.implicit) limit_work(step, own);
 }
 
 }  // namespace
@@ -396,6 +396,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
                        step.disturbance.data());
   run([&](SolveIsland &own) {
     solve_island(w, step, own);
+    limit_work(step, own);
     restore_drive(step, own);
   });
   for (const SolveIsland &own : all)
@@ -410,7 +411,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   return bad;
 }
 
-// Impulses that hold more than forces of that share would throw what they hold.
+// Impulses that hold the whole forces would throw what has a part of them.
 void take_part_of_contact(const World &w, StepContext &step, double share) {
   ContactRows &rows = step.rows;
   Array<uint8_t> &full = step.in_full;

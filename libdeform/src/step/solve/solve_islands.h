@@ -134,8 +134,9 @@ bool may_shorten(const StepContext &step);
 // law has failed, or null.
 const SolveIsland *solve_islands(World &w, StepContext &step);
 
-// The guard takes this share of the motion: in islands of explicit bodies alone, impulses become the share of
-// them that does the least work with forces of that share. Other bodies (step.in_full) keep theirs.
+// Where the guard takes only this share of the motion, forces of explicit bodies act for that share
+// (Dynamics::take_part), and impulses of islands that have no other bodies are reduced to what is then left
+// to stop. Bodies of all other islands keep forces and impulses in full: step.in_full.
 void take_part_of_contact(const World &w, StepContext &step, double share);
 
 }  // namespace dfm
