@@ -57,9 +57,8 @@ void add_lagged(World &w, StepContext &step, const Buffers &r) {
     Phyxels &p = b->p;
     const std::vector<double> &force = r.lagged[b->slot];
     if (std::ranges::all_of(force, [](double f) { return f == 0; })) continue;
-    const double *const diagonal = b->dynamics->diagonal();
+    const double *const diagonal = b->dynamics->unknowns().diagonal;
     for (size_t i = 0; i < p.v_free.size(); ++i) p.v_free[i] += step.h * (diagonal[i] * force[i]);
-    b->dynamics->free_changed();
     gather_surface(b->surface, p.x.data(), p.v_free.data());
   }
 }
@@ -185,7 +184,7 @@ void set_forces(World &w, StepContext &step, const Buffers &r) {
       const Body &b = body_of_node(w, step, c.node[k], s);
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const double *const force = &r.lagged[b.slot][at];
-      const double *const d = b.dynamics->diagonal() + at;
+      const double *const d = b.dynamics->unknowns().diagonal + at;
       pull += c.weight[k] * (step.h * Vec3{d[0] * force[0], d[1] * force[1], d[2] * force[2]});
     }
     const double *const f = &step.rows.frame[size_t(i) * 9];
@@ -206,7 +205,6 @@ void roll_back(World &w, StepContext &step, const Buffers &r) {
   for (size_t i = 0; i < step.body_views.size(); ++i) {
     Body &b = *w.bodies[step.body_views[i].slot];
     const double *const fraction = r.fractions[i];
-    b.dynamics->free_changed();
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
       const size_t at = size_t{b.surface.point[s]} * kStride;
       const Vec3 before = load3(&b.p.v_free[at]);
@@ -215,6 +213,7 @@ void roll_back(World &w, StepContext &step, const Buffers &r) {
       store3(&b.surfel_impulse[3 * size_t{s}], step.h * load3(&r.lagged[b.slot][at]) + lost);
       store3(&b.p.v_free[at], after);
     }
+    for (size_t at = 0; at < b.p.x.size(); ++at) b.p.x_end[at] = b.p.x[at] + step.h * b.p.v_free[at];
   }
 }
 
@@ -307,7 +306,7 @@ bool sub_step(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
 
 const char *lacking(const Body &b) {
   return !b.dynamics->abilities().placed          ? "a model that steps itself"
-         : b.dynamics->system()                   ? "an implicit integrator"
+         : b.dynamics->unknowns().system          ? "an implicit integrator"
          : !b.surface.identity()                  ? "a surface of its own"
          : !b.motions.empty()                     ? "a motion of held points"
          : b.tears || !b.planned_cuts.empty()     ? "cuts"

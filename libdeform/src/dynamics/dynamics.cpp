@@ -12,24 +12,10 @@ namespace dfm {
 Dynamics::Dynamics(Phyxels &points, Surface &surface, ModelInstance &model)
     : p_(points), surface_(surface), model_(model) {}
 
-const double *Dynamics::contact_velocity() const { return diagonal() ? point_velocity() : surface_.v.data(); }
-
 dfm_kin Dynamics::kin(double time, double h, bool trial) const {
   dfm_kin k = kin_at(time, h, p_.x.data(), p_.v.data(), model_.state.data());
   k.state_out = trial && !model_.state_out.empty() ? model_.state_out.data() : nullptr;
   return k;
-}
-
-// From the mean velocities of the points [npoint,4]; without contact surface.v holds those of the surfels.
-void Dynamics::bound_surfel_ends(const double *mean, double &speed, double &change) const {
-  double fastest = 0, most = 0;
-  for (uint32_t s = 0; s < surface_.nsurfel; ++s) {
-    const Vec3 u = surface_.sum(s, mean);
-    fastest = std::max(fastest, norm2(u));
-    most = std::max(most, norm2(u - load3(&surface_.v[size_t(s) * kStride])));
-  }
-  speed = std::sqrt(fastest);
-  change = std::sqrt(most);
 }
 
 void Dynamics::take_part(double share, bool, const double *) {

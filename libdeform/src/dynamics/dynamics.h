@@ -6,9 +6,10 @@
 //   add_forces    forces that follow from the state
 //   free_motion   the mean velocity over the sub-step without contact
 //   take_contact  contacts are known: is the free motion one that goes with them?
-//   diagonal      what an impulse changes of that velocity, where points do not answer each other's impulses;
-//   response      else, between the touched surfels; or
-//   system        the equations of motion of its points, which the solve of contact solves together with it
+//   unknowns      that velocity, and what an impulse changes of it where points do not answer each other's
+//                 impulses; or the equations of motion of its points, which the solve of contact solves
+//                 together with it; else
+//   response      between the touched surfels
 //   end_state     where it ends with the impulses of the solve; called again after a further solve
 //   commit        the end becomes the present
 //
@@ -71,6 +72,16 @@ struct ImplicitOptions {
   bool second_order = false;  // TR-BDF2 without contact; else backward Euler always
 };
 
+// What contact solves for of a body. Velocities without contact are valid after free_motion().
+struct Unknowns {
+  const double *velocity = nullptr;  // m/s: [npoint,4], or [nsurfel,4], those of the surfels, surface.v
+  // [npoint,4] 1/kg, change of velocity per impulse at the same point; null: the unknowns are the touched
+  // surfels, which respond to each other's impulses, or points with a `system`
+  const double *diagonal = nullptr;
+  ImplicitSystem *system = nullptr;  // the equations of motion, of points that move implicitly
+  const double *of_points() const { return diagonal || system ? velocity : nullptr; }
+};
+
 // Sums over all points of a body, computed without visiting each point.
 struct BodySums {
   double kinetic = 0, elastic = 0;  // J
@@ -110,8 +121,6 @@ class Dynamics {
   virtual bool bound(double time, double share, const AddRowSums &outside, StepBound &out) = 0;
   // s, the longest sub-step with contacts, at the last bound; infinite: any.
   virtual double contact_step() { return std::numeric_limits<double>::infinity(); }
-  // 1/s, of the edge that stretches fastest; 0 if the bound does not depend on the shape
-  virtual double strain_rate() const { return 0; }
   // touched: the last sub-step ended with contacts. Called once for a sub-step and its repetitions.
   virtual void begin(bool) {}
   // The present loads are those at the start of the sub-step; those at its end follow. Not called if loads do
@@ -125,30 +134,18 @@ class Dynamics {
   virtual bool add_forces(const SubStep &, bool /*keep*/) { return true; }
   virtual bool free_motion(const SubStep &now, double &kinetic) = 0;
 
-  // [npoint,4] 1/kg, change of velocity per impulse at the same point; null: the unknowns of contact are the
-  // touched surfels, which respond to each other's impulses.
-  virtual const double *diagonal() const { return nullptr; }
-  // If diagonal() is null: the response of n distinct surfels to impulses at them, [3n,3n] 1/kg: one column
-  // per unit impulse; symmetric up to rounding. Returns false if the model fails.
+  virtual Unknowns unknowns() = 0;
+  // Where the unknowns are surfels: the response of n distinct ones to impulses at them, [3n,3n] 1/kg: one
+  // column per unit impulse; symmetric up to rounding. Returns false if the model fails.
   virtual bool response(const SubStep &, uint32_t, const uint32_t *, double *) { return false; }
-  // The equations of motion, of points that move implicitly: then both of these are null.
-  virtual ImplicitSystem *system() { return nullptr; }
-  // [npoint,4] m/s without contact; null: free_motion() has written those of the surfels, surface.v.
-  virtual const double *point_velocity() const { return nullptr; }
-  virtual const double *contact_velocity() const;  // of the unknowns: [npoint,4], or [nsurfel,4]
 
   // Takes the impulses in points().impulse, or at the surfels [nsurfel,3] if points respond to each other.
   // touched: there are impulses. Returns false if the model fails, or the end is not finite.
   virtual bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) = 0;
   virtual EndState end() const = 0;
-  // point_velocity() is that without contact again, before a further solve: end_state() may have put the end
-  // in its place.
+  // The unknowns have the velocity without contact again, before a further solve: end_state() may have put
+  // the end in its place.
   virtual void free_again(const SubStep &) {}
-  // After other code has changed point_velocity().
-  virtual void free_changed() {}
-  // Bounds of the surfels' mean velocities and of what contact has changed of them, m/s, as the linear
-  // response gives them: replaced by the true ones where the end need not agree with it. After end_state().
-  virtual void bound_ends(double &, double &) const {}
   // s, the sub-step that would have the wanted error, estimated from the error of this one; infinite: not
   // known. After end_state().
   virtual double accurate_step(const SubStep &) const { return std::numeric_limits<double>::infinity(); }
@@ -184,8 +181,6 @@ class Dynamics {
   Phyxels &p_;
   Surface &surface_;
   ModelInstance &model_;
-
-  void bound_surfel_ends(const double *mean, double &speed, double &change) const;
 };
 
 // Makes the dynamics of a body with this model. edges: [nedge,2] of its mesh. implicit: null if the library

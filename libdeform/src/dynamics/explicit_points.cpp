@@ -267,12 +267,6 @@ bool ExplicitPoints::bound(double time, double share, const AddRowSums &outside,
   return true;
 }
 
-// Turning gives none.
-double ExplicitPoints::strain_rate() const {
-  if (!model_.ops->bound) return 0;
-  return loops_.strain_rate(uint32_t(edges_.size() / 2), edges_.data(), p_.x.data(), p_.v.data());
-}
-
 bool ExplicitPoints::add_forces(const SubStep &now, bool keep) {
   moved_ = !keep && !part_kinetic_.empty();
   return moved_ ? move_parts(now) : find_forces(now);
@@ -317,7 +311,6 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
   kinetic = moved_ ? std::accumulate(part_kinetic_.begin(), part_kinetic_.end(), 0.0)
                    : predict(loops_, p_, now.gravity, now.h);
-  ways_known_ = true;
   in_place_ = false;
   reached_.clear();
   // A lightest point at the limit has so much alone; who has less need not be looked at point by point.
@@ -330,7 +323,7 @@ bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
 // Contact reaches few points, where surfels are points: only those move otherwise than freely.
 bool ExplicitPoints::end_state(const SubStep &now, const double *surfel_impulse, bool touched) {
   free_again(now);
-  in_place_ = ways_known_ && (!touched || surface_.identity());
+  in_place_ = !touched || surface_.identity();
   if (!in_place_) {
     find_end(loops_, p_, touched, now.h);
     return true;

@@ -21,15 +21,12 @@ class ExplicitPoints : public Dynamics {
   ExplicitTime measure(const Pose &placed, bool spectrum) override;
   bool rest_rows(const Pose &placed, double share, RestRows &out) override;
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
-  double strain_rate() const override;
   bool add_forces(const SubStep &now, bool keep) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
-  const double *diagonal() const override { return p_.inv_mass.data(); }
-  const double *point_velocity() const override { return p_.v_free.data(); }
+  Unknowns unknowns() override { return {p_.v_free.data(), p_.inv_mass.data(), nullptr}; }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   void free_again(const SubStep &now) override;
   void take_part(double share, bool in_full, const double *surfel_impulse) override;
-  void free_changed() override { ways_known_ = false; }
   EndState end() const override {
     const double *const v = in_place_ ? p_.v_free.data() : p_.v_end.data();
     return {v, v};
@@ -51,7 +48,6 @@ class ExplicitPoints : public Dynamics {
   bool moved_ = false;  // in this sub-step points have moved part by part, and their forces are not kept
   // The end is the free motion but for the few points that contact reaches: it is stored in v_free, and the
   // former values of these points are kept.
-  bool ways_known_ = false;  // x_end follows from v_free
   bool in_place_ = false;
   Array<size_t> reached_;  // places in v_free
   Array<double> before_;   // [reached,3] m/s

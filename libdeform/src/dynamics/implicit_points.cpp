@@ -408,11 +408,6 @@ bool ImplicitPoints::end_state(const SubStep &now, const double *, bool touched)
   return nan_flag == 0;
 }
 
-// An impulse moves all points, not only the touched ones.
-void ImplicitPoints::bound_ends(double &speed, double &change) const {
-  bound_surfel_ends(mean(), speed, change);
-}
-
 // The error of backward Euler is h^2 a / 2 in the position, with the acceleration a; that of TR-BDF2 follows
 // from the velocities at its three times (Hosea and Shampine 1996). The part that all points have in common
 // deforms nothing and is left out.

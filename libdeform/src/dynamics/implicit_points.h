@@ -45,12 +45,9 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
   void loads_before() override { load_before_ = p_.load; }
   bool take_contact() override { return !std::exchange(staged_, false); }
   bool free_motion(const SubStep &now, double &kinetic) override;
-  const double *point_velocity() const override { return p_.v_free.data(); }
-  const double *contact_velocity() const override { return p_.v_free.data(); }
-  ImplicitSystem *system() override { return this; }
+  Unknowns unknowns() override { return {p_.v_free.data(), nullptr, this}; }
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean()}; }
-  void bound_ends(double &speed, double &change) const override;
   double accurate_step(const SubStep &now) const override;
   bool end_forces(const SubStep &) override { return !staged_ && evaluate_after(p_.v_end.data(), false); }
   void commit(const SubStep &now) override;

@@ -128,10 +128,6 @@ bool SelfStepping::end_state(const SubStep &now, const double *surfel_impulse, b
   return nan_flag == 0;
 }
 
-void SelfStepping::bound_ends(double &speed, double &change) const {
-  bound_surfel_ends(mean_.data(), speed, change);
-}
-
 void SelfStepping::commit(const SubStep &) {
   p_.x.swap(p_.x_end);
   p_.v.swap(p_.v_end);

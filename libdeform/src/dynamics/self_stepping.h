@@ -18,10 +18,10 @@ class SelfStepping : public Dynamics {
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   double contact_step() override;
   bool free_motion(const SubStep &now, double &kinetic) override;
+  Unknowns unknowns() override { return {surface_.v.data()}; }
   bool response(const SubStep &now, uint32_t n, const uint32_t *surfel, double *responses) override;
   bool end_state(const SubStep &now, const double *surfel_impulse, bool touched) override;
   EndState end() const override { return {p_.v_end.data(), mean_.data()}; }
-  void bound_ends(double &speed, double &change) const override;
   void commit(const SubStep &now) override;
   void see_points() override;
   void take_part(double share, bool in_full, const double *surfel_impulse) override;

@@ -71,7 +71,7 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
   const Body *const failed = each_active(w, active, kPointsToMove, [&](Body &b) {
     const bool moved = b.dynamics->free_motion(now, kinetic[b.slot]);
     if (touches && b.surface.identity())
-      gather_surface(b.surface, b.p.x.data(), b.dynamics->point_velocity());
+      gather_surface(b.surface, b.p.x.data(), b.dynamics->unknowns().of_points());
     return moved;
   });
   if (!failed) return true;
@@ -81,8 +81,9 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
     return false;
   }
   *trouble |= DFM_TROUBLE_NONFINITE;
-  const size_t n = b.dynamics->point_velocity() ? b.p.n : b.surface.nsurfel;
-  const double speed = largest_coordinate(b.dynamics->contact_velocity(), n, kStride);
+  const Unknowns unknowns = b.dynamics->unknowns();
+  const size_t n = unknowns.of_points() ? b.p.n : b.surface.nsurfel;
+  const double speed = largest_coordinate(unknowns.velocity, n, kStride);
   const std::string what = speed > kLight && std::isfinite(speed)
                                ? format("a point would move at %.3g m/s, faster than light", speed)
                                : "forces or velocities are not finite";
@@ -98,7 +99,7 @@ void stage_gather(World &w, Active active) {
   for (const uint32_t i : active) {
     const auto &b = w.bodies[i];
     if (b->surface.identity()) continue;
-    const double *const v = b->dynamics->point_velocity();
+    const double *const v = b->dynamics->unknowns().of_points();
     w.context->tasks.parallel_for(b->surface.nsurfel, 1024, [&](uint32_t begin, uint32_t end) {
       gather_rows(b->surface, b->p.x.data(), v, begin, end);
     });

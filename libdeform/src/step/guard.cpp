@@ -64,6 +64,20 @@ Guard::Common common_motion(const Surface &s) {
 // m, d_g
 double floor_of(const World &w) { return 0.5 * w.offset; }
 
+// Where an impulse moves all points, or the end need not agree with the linear response: the largest mean
+// velocity of a surfel, and the largest change of one by contact; without it surface.v holds them.
+void end_speeds(const Body &b, double &speed, double &change) {
+  const double *const mean = b.dynamics->end().mean;
+  double fastest = 0, most = 0;
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+    const Vec3 u = b.surface.sum(s, mean);
+    fastest = std::max(fastest, norm2(u));
+    most = std::max(most, norm2(u - load3(&b.surface.v[size_t{kStride} * s])));
+  }
+  speed = std::sqrt(fastest);
+  change = std::sqrt(most);
+}
+
 // Only bodies with contacts move otherwise than predicted.
 void bound_speeds(World &w, StepContext &step) {
   Guard &g = step.guard;
@@ -86,7 +100,7 @@ void bound_speeds(World &w, StepContext &step) {
     speed = std::sqrt(speed);
     g.change[i] = b.surface.weight_sum * std::sqrt(g.change[i]);
     speed = b.surface.identity() ? std::max(speed, before) : before + g.change[i];
-    b.dynamics->bound_ends(speed, g.change[i]);
+    if (!b.dynamics->unknowns().diagonal) end_speeds(b, speed, g.change[i]);
   }
 }
 
@@ -155,7 +169,7 @@ bool withstands_impacts(World &w, StepContext &step) {
     gain = std::max(gain, gain_of(w, step, b, i));
     if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
-    if (!b.dynamics->diagonal() || !std::isfinite(b.bound.found.step)) continue;
+    if (!b.dynamics->unknowns().diagonal || !std::isfinite(b.bound.found.step)) continue;
     const Impact impact = impact_on(step, b, i);
     if (impact.strain > kBoundStrain) expire_bound(w);
     if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);

@@ -162,11 +162,10 @@ void view_bodies(World &w, StepContext &step, SceneFacts &facts) {
     step.bodies_part = step.bodies_part || b.dynamics->abilities().parts;
     const Surface &s = b.surface;
     step.body_views.push_back({i, node, b.category, b.collides_with, b.id, &s});
-    ImplicitSystem *const system = b.dynamics->system();
-    step.systems.push_back(system);
+    const Unknowns own = b.dynamics->unknowns();
+    step.systems.push_back(own.system);
     step.sources.push_back({node, s.nsurfel, point, b.p.n, &s,
-                            system ? system->diagonal_inverse() : b.dynamics->diagonal(),
-                            b.dynamics->contact_velocity()});
+                            own.system ? own.system->diagonal_inverse() : own.diagonal, own.velocity});
     if (!s.identity()) {
       ++facts.coupled;
       facts.coupled_surfels += s.nsurfel;

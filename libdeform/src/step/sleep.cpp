@@ -92,7 +92,8 @@ void gather_active(World &w) {
     if (b.sleep_state.asleep) continue;
     step.active.push_back(i);
     step.sinks.push_back({step.body_views[i].first_node, b.surface.nsurfel, b.p.n, &b.surface,
-                          b.surfel_impulse.data(), b.dynamics->diagonal() ? b.p.impulse.data() : nullptr});
+                          b.surfel_impulse.data(),
+                          b.dynamics->unknowns().diagonal ? b.p.impulse.data() : nullptr});
   }
   w.sleepers = static_cast<uint32_t>(w.bodies.size() - step.active.size());
 }

@@ -90,10 +90,14 @@ constexpr uint32_t kBoundEvery = 16;
 constexpr double kMinStrain = kBoundStrain / 8;
 constexpr uint32_t kMaxEstimated = 4;  // sub-steps at an estimated bound
 
+// A rigid turn stretches no edge.
 void check_shape(Body &b) {
   // points that are updated late are unknown until they are requested
   b.bound.inverted = b.dynamics->abilities().late ? 0 : inverted_cells(b);
-  b.bound.strain_rate = b.sleep_state.asleep ? 0 : b.dynamics->strain_rate();
+  const bool follows = !b.sleep_state.asleep && b.dynamics->unknowns().diagonal && b.model.ops->bound;
+  b.bound.strain_rate = follows ? points_kernels().strain_rate(uint32_t(b.edges.size() / 2), b.edges.data(),
+                                                               b.p.x.data(), b.p.v.data())
+                                : 0;
 }
 
 // False: its model gives none.
@@ -186,7 +190,7 @@ bool any_bounds_contact(const World &w) {
 }
 
 bool gravity_exceeds_bound(const World &w, const Body &b) {
-  return w.bound.age + 1 < kBoundEvery && b.dynamics->diagonal() && std::isfinite(w.bound.step) &&
+  return w.bound.age + 1 < kBoundEvery && b.dynamics->unknowns().diagonal && std::isfinite(w.bound.step) &&
          strain_of_fall(w, b, kBoundEvery - w.bound.age) > kBoundStrain;
 }
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <random>
 #include <vector>
 
@@ -39,6 +40,14 @@ struct Falling {
   void make_dynamics() const {
     dfm::Body &b = *body;
     b.dynamics = dfm::make_dynamics(test::inside(world).memory(), b.p, b.surface, b.model, b.edges, nullptr);
+  }
+  // Each surfel with its point, as if it had several.
+  void couple() const {
+    dfm::Surface &s = body->surface;
+    s.row.resize(s.nsurfel + size_t{1});
+    std::iota(s.row.begin(), s.row.end(), 0u);
+    s.col = s.point;
+    s.weight.assign(s.nsurfel, 1.0);
   }
   void end(const std::vector<double> &q) const {
     EXPECT_TRUE(body->dynamics->end_state(now, q.data(), true));
@@ -112,7 +121,7 @@ TEST(ExplicitPoints, APartOfTheWay_HasTheForcesOfThatPart) {
       const Falling f;
       const dfm::Phyxels &p = f.body->p;
       const std::vector<double> free(p.v_free.begin(), p.v_free.end());
-      if (!in_place) f.body->dynamics->free_changed();
+      if (!in_place) f.couple();
       const std::vector<double> q = f.impulses(1, 2);
       for (uint32_t s = 0; s < f.body->surface.nsurfel; ++s)
         for (size_t k = 0; k < 3; ++k)
@@ -183,7 +192,7 @@ TEST(ExplicitPoints, BeforeAFurtherSolve_TheVelocityIsFreeAgain) {
   const std::vector<double> free(f.body->p.v_free.begin(), f.body->p.v_free.end());
   f.end(f.impulses(1, 2));
   f.body->dynamics->free_again(f.now);
-  const double *const v = f.body->dynamics->point_velocity();
+  const double *const v = f.body->dynamics->unknowns().velocity;
   for (size_t k = 0; k < free.size(); ++k) EXPECT_EQ(v[k], free[k]) << k;
 }
 

@@ -124,9 +124,9 @@ TEST(ImplicitPoints, HeldPoints_TakeNoImpulses) {
     double kinetic = 0;
     const dfm::SubStep now{0, kStep, {}, 1e9, {}};
     ASSERT_TRUE(body.dynamics->free_motion(now, kinetic));
-    const double *const alone = body.dynamics->system()->diagonal_inverse();
+    const double *const alone = body.dynamics->unknowns().system->diagonal_inverse();
     std::vector<double> r(3 * size_t{body.p.n}), v(4 * size_t{body.p.n}, 1.0);
-    ASSERT_TRUE(body.dynamics->system()->residual(v.data(), r.data()));
+    ASSERT_TRUE(body.dynamics->unknowns().system->residual(v.data(), r.data()));
     for (size_t c = 0; c < 3; ++c) {
       EXPECT_EQ(alone[c], 0) << model;
       EXPECT_EQ(r[c], 0) << model;

@@ -132,7 +132,7 @@ void make_rows(World &w, StepContext &step) {
       if (w.pairs.laws[step.state.law[i]]->nstate > 0) step.contacts[i].indentation = 0;
   for (size_t i = 0; i < w.bodies.size(); ++i) {  // the present state and the last end may have been swapped
     const Body &b = *w.bodies[i];
-    step.sources[i].velocity = b.dynamics->contact_velocity();
+    step.sources[i].velocity = b.dynamics->unknowns().velocity;
     const double mass = step.systems[i] ? step.systems[i]->mass() : 0;
     step.sources[i].whole = mass > 0 ? kWhole / mass : 0;
     const bool set_back = b.surface.identity() && (b.surface.slit || b.surface.back > 0);
