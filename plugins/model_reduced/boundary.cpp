@@ -412,7 +412,7 @@ void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vec
   const Kelvin kelvin(young, poisson);
   const size_t rows = 3 * t.size(), columns = 3 * point.size(), own = 3 * inner.size(), row_size = padded();
   follow_.create(host_, own * row_size);
-  packed_.create(host_, kLanes * row_size);
+  packed_.create(host_, kLanes * (row_size + own));
   std::vector<double> loads(rows * kLanes);
   for (size_t first = 0; first < own; first += kLanes) {
     const size_t many = std::min(kLanes, own - first);
@@ -552,31 +552,30 @@ void Boundary::gather(double *f) const {
 
 // Of one vector eight sums side by side.
 template <size_t kWide>
-void Boundary::spread(double *u) const {
-  const size_t size = 3 * point.size(), row_size = padded();
-  double *const own = packed_.data();
+void Boundary::spread(const Kernels &kernels, double *u) const {
+  const size_t size = 3 * point.size(), row_size = padded(), rows = 3 * inner.size();
+  double *const own = packed_.data(), *const led = own + kLanes * row_size;
   for (size_t j = 0; j < row_size; ++j)
     for (size_t w = 0; w < kWide; ++w)
       own[kWide * j + w] = j < size ? u[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] : 0;
-  for (size_t row = 0; row < 3 * inner.size(); ++row) {
-    const double *const follows = follow_.data() + row_size * row;
-    double *const to = u + kWide * (3 * size_t(inner[row / 3]) + row % 3);
-    double sum[kLanes] = {};
-    if constexpr (kWide == 1) {
+  if constexpr (kWide == 1) {
+    for (size_t row = 0; row < rows; ++row) {
+      const double *const follows = follow_.data() + row_size * row;
+      double sum[kLanes] = {};
       for (size_t j = 0; j < row_size; j += kLanes)
         for (size_t w = 0; w < kLanes; ++w) sum[w] += follows[j + w] * own[j + w];
-      *to = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
-    } else {
-      for (size_t j = 0; j < size; ++j)
-        for (size_t w = 0; w < kLanes; ++w) sum[w] += follows[j] * own[kLanes * j + w];
-      std::copy(sum, sum + kLanes, to);
+      led[row] = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
     }
+  } else {
+    kernels.rows(follow_.data(), rows, row_size, own, led);
   }
+  for (size_t row = 0; row < rows; ++row)
+    std::copy_n(led + kWide * row, kWide, u + kWide * (3 * size_t(inner[row / 3]) + row % 3));
 }
 
 template void Boundary::gather<1>(double *) const;
 template void Boundary::gather<kLanes>(double *) const;
-template void Boundary::spread<1>(double *) const;
-template void Boundary::spread<kLanes>(double *) const;
+template void Boundary::spread<1>(const Kernels &, double *) const;
+template void Boundary::spread<kLanes>(const Kernels &, double *) const;
 
 }  // namespace reduced

@@ -31,7 +31,7 @@ class Boundary {
   template <size_t kWide>
   void gather(double *f) const;
   template <size_t kWide>
-  void spread(double *u) const;
+  void spread(const Kernels &kernels, double *u) const;
 
  private:
   struct Triangle;
@@ -43,7 +43,7 @@ class Boundary {
   size_t ntriangle() const { return triangles_.size() / 3; }
   std::vector<uint32_t> triangles_;  // [.,3] counter-clockwise from outside, places in `point`
   Buffer<double> follow_;            // [3 inner, padded 3 surface]
-  mutable Buffer<double> packed_;    // [padded 3 surface, kLanes]
+  mutable Buffer<double> packed_;    // [padded 3 surface, kLanes]; behind it [3 inner, kLanes]
   size_t padded() const { return (3 * point.size() + kLanes - 1) / kLanes * kLanes; }
   void add_pairs(const std::vector<Triangle> &t, double young, double poisson, std::vector<double> &single,
                  std::vector<double> &both, double *block);

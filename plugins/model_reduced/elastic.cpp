@@ -359,7 +359,7 @@ void Elastic::respond(const double *f, double *u) const {
     if constexpr (kWide == 1) factor_.solve(u, u);
     else factor_.solve_eight(*kernels, u, u);
     if (!by_surface_) return;
-    surface_.spread<kWide>(u);
+    surface_.spread<kWide>(*kernels, u);
     clear_given();
   };
   std::copy(f, f + kWide * size, u);
@@ -407,7 +407,7 @@ void Elastic::follow(double *u) const {
   for (const uint32_t j : given_) f[j] = u[j];
   std::copy(f, f + size, u);
   if (!by_surface_) return;
-  surface_.spread<1>(u);
+  surface_.spread<1>(*kernels, u);
   for (const uint32_t j : given_) u[j] = f[j];
 }
 

@@ -74,10 +74,6 @@ void update(uint32_t m, uint32_t begin, uint32_t end, uint32_t k, const double *
     }
 }
 
-DEFORM_INLINE double *row_of(const uint32_t *rows, uint32_t point, double *y) {
-  return y + 3 * size_t(rows[point]) * kLanes;
-}
-
 // sum[3 points] = rows `first` ... of the panel times the columns [0, n) of right-hand sides
 template <uint32_t kPoints>
 DEFORM_INLINE void times_columns(uint32_t n, const double *l, size_t ld, const double *x,
@@ -107,39 +103,45 @@ DEFORM_INLINE void eliminate(double *to, double l, const double *from) {
     store(to + p * kWidth, load(to + p * kWidth) - splat(l) * load(from + p * kWidth));
 }
 
-template <uint32_t kPoints>
-DEFORM_INLINE void forward_rows(uint32_t point, uint32_t n, const double *l, size_t ld, const uint32_t *rows,
-                                const double *x, double *y) {
-  Vector sum[3 * kPoints][kParts] = {};
-  times_columns<kPoints>(n, l, ld, x, sum);
-  DEFORM_UNROLL
-  for (uint32_t q = 0; q < kPoints; ++q) {
-    double *const to = row_of(rows, point + q, y);
+// Points [begin, end) less these rows of the panel times its n columns; to(point): their right-hand sides.
+template <uint32_t kPoints, class To>
+DEFORM_INLINE void forward_rows(uint32_t begin, uint32_t end, uint32_t n, const double *l, size_t ld,
+                                const double *x, const To &to) {
+  for (; begin + kPoints <= end; begin += kPoints) {
+    Vector sum[3 * kPoints][kParts] = {};
+    times_columns<kPoints>(n, l + 3 * size_t(begin), ld, x, sum);
     DEFORM_UNROLL
-    for (uint32_t r = 0; r < 3; ++r) subtract(to + r * kLanes, sum[3 * q + r]);
+    for (uint32_t q = 0; q < kPoints; ++q) DEFORM_UNROLL
+    for (uint32_t r = 0; r < 3; ++r) subtract(to(begin + q) + r * kLanes, sum[3 * q + r]);
   }
+  if constexpr (kPoints > 1) forward_rows<1>(begin, end, n, l, ld, x, to);
 }
 
 constexpr uint32_t kPoints = kWidth == 2 ? 1 : kWidth == 4 ? 2 : 3;  // as many sums as there are registers
+// Columns of so many points are used up before the next ones: the rows that one pass touches then lie in as
+// many pages as have a place in the first translation buffer.
+constexpr uint32_t kColumnPoints = 8;
 
 void forward(uint32_t width, uint32_t below, const double *l, const uint32_t *rows, double *x, double *y) {
   const size_t ld = 3 * size_t(width + below);
-  for (uint32_t w = 0; w < width; ++w) {
-    double *const own = x + 3 * size_t(w) * kLanes;
-    const double *const block = l + 3 * size_t(w);
-    Vector sum[3][kParts] = {};
-    times_columns<1>(3 * w, block, ld, x, sum);
-    DEFORM_UNROLL
-    for (uint32_t r = 0; r < 3; ++r) subtract(own + r * kLanes, sum[r]);
-    const double *const diagonal = block + 3 * size_t(w) * ld;
-    eliminate(own + kLanes, diagonal[1], own);
-    eliminate(own + 2 * kLanes, diagonal[2], own);
-    eliminate(own + 2 * kLanes, diagonal[2 + ld], own + kLanes);
+  for (uint32_t first = 0; first < width; first += kColumnPoints) {
+    const uint32_t last = width - first > kColumnPoints ? first + kColumnPoints : width,
+                   n = 3 * (last - first);
+    const double *const columns = l + 3 * size_t(first) * ld;
+    double *const solved = x + 3 * size_t(first) * kLanes;
+    for (uint32_t w = first; w < last; ++w) {
+      double *const own = x + 3 * size_t(w) * kLanes;
+      forward_rows<1>(w, w + 1, 3 * (w - first), columns, ld, solved, [&](uint32_t) { return own; });
+      const double *const diagonal = l + 3 * size_t(w) * (ld + 1);
+      eliminate(own + kLanes, diagonal[1], own);
+      eliminate(own + 2 * kLanes, diagonal[2], own);
+      eliminate(own + 2 * kLanes, diagonal[2 + ld], own + kLanes);
+    }
+    forward_rows<kPoints>(last, width, n, columns, ld, solved,
+                          [&](uint32_t point) { return x + 3 * size_t(point) * kLanes; });
+    forward_rows<kPoints>(width, width + below, n, columns, ld, solved,
+                          [&](uint32_t point) { return y + 3 * size_t(rows[point - width]) * kLanes; });
   }
-  uint32_t b = 0;
-  for (; b + kPoints <= below; b += kPoints)
-    forward_rows<kPoints>(b, 3 * width, l + 3 * size_t(width + b), ld, rows, x, y);
-  for (; b < below; ++b) forward_rows<1>(b, 3 * width, l + 3 * size_t(width + b), ld, rows, x, y);
 }
 
 // sum[3] += columns of a point of the panel times three rows of right-hand sides
