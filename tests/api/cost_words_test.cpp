@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "cost/calibrate.h"
 #include "cost/report.h"
 #include "support.h"
 
@@ -171,6 +172,17 @@ TEST(CostSubject, FilesOfTools_AreAmongThoseOfTheScene) {
       {"name": "b", "mesh": "blade.obj", "motion": {"keyframes": []}}]})",
                          scene));
   EXPECT_EQ(file_pointers(scene), (std::vector<std::string>{"/tools/0/motion/file", "/tools/1/mesh"}));
+}
+
+// `deform calibrate --model` measures one of them.
+TEST(Costs, OfOtherModels_StayWhereThisMachineHasMeasuredThem) {
+  const std::string path = test::scratch("costs_kept") + "/costs.json";
+  test::write_file(path, R"({"format": "deform-costs", "version": 4, "machine": "this one", "models": [
+    {"model": "msm", "wave_steps": 2}, {"model": "modal", "wave_steps": 3}]})");
+  EXPECT_EQ(kept_rows(path, "this one", {"modal"}),
+            std::vector<std::string>{R"({"model": "msm", "wave_steps": 2})"});
+  EXPECT_TRUE(kept_rows(path, "another one", {"modal"}).empty());
+  EXPECT_TRUE(kept_rows(path + ".none", "this one", {"modal"}).empty());
 }
 
 }  // namespace cli::cost
