@@ -164,7 +164,9 @@ TEST(LabelVolume, DetachedVoxels_LieBesideTheHeader) {
   test::write_file(dir + "/c.nhdr", nhdr("raw", "byte skip: 4\ndata file: skipped.raw\n"));
   test::write_file(dir + "/d.nhdr", nhdr("raw", "byte skip: -1\ndata file: skipped.raw\n"));
   test::write_file(dir + "/e.mhd", meta_header("MET_SHORT", false, false, "voxels.raw"));
-  for (const char *name : {"/a.nhdr", "/b.nhdr", "/c.nhdr", "/d.nhdr", "/e.mhd"})
+  test::write_file(dir + "/skipped.raw.gz", packed("head" + bytes_of(kVoxels, 2, false), 31));
+  test::write_file(dir + "/g.nhdr", nhdr("gzip", "byte skip: 4\ndata file: skipped.raw.gz\n"));
+  for (const char *name : {"/a.nhdr", "/b.nhdr", "/c.nhdr", "/d.nhdr", "/e.mhd", "/g.nhdr"})
     expect_volume(labels::read_labels(dir + name), name);
   test::write_file(dir + "/f.mhd", meta_header("MET_SHORT", false, false, "none.raw"));
   try {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <utility>
 
@@ -47,7 +48,7 @@ class Maker {
     cli::make_folder(o_.out + "/surfaces");
     for (size_t e = 0; e < table_.entries.size(); ++e) write_label(e);
     for (size_t t = 0; t < table_.things.size(); ++t) write_thing(t);
-    cli::write_whole(o_.out + "/labels.json", table_text(table_, volume_) + "\n");
+    if (writes_table_) cli::write_whole(o_.out + "/labels.json", table_text(table_, volume_) + "\n");
     write_scene();
     return std::move(report_);
   }
@@ -73,6 +74,12 @@ class Maker {
           "one "
           "body; change " +
           o_.out + "/labels.json and give it by --table");
+    const std::string own = o_.out + "/labels.json";  // the user changes it
+    std::error_code absent;
+    writes_table_ = !std::filesystem::equivalent(o_.table, own, absent);
+    if (o_.table.empty() && std::filesystem::exists(own) &&
+        cli::read_file(own, 64u << 20, "a table of labels") != table_text(table_, volume_) + "\n")
+      refuse(own, "a table with other entries is there already; give it by --table, or remove it");
     std::vector<bool> kept(volume_.value.size(), false);
     for (const Entry &e : table_.entries) kept[e.label] = true;
     count_.assign(volume_.value.size(), 0);
@@ -110,7 +117,6 @@ class Maker {
     std::vector<uint32_t> group(volume_.value.size(), 0);
     for (const Entry &e : table_.entries) group[e.label] = uint32_t(e.thing) + 1;
     repaired_ = compose(o_.volume, volume_, group);
-    report_.taken = volume_.size;
     if (repaired_.voxels)
       warn(std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
            " another label than in the file: there a label touched itself only along an edge or at a corner, "
@@ -631,8 +637,10 @@ class Maker {
       for (const JsonValue &o : own->items) obstacles.push_back(cli::json_text(o));
     else if (!held) {
       const double point[3] = {0, 0, lowest_};
+      std::string name = "floor";
+      while (std::ranges::find(table_.things, name, &Thing::name) != table_.things.end()) name += '_';
       obstacles.push_back(JsonObject()
-                              .add("name", "\"floor\"")
+                              .add("name", cli::quoted(name))
                               .add("shape", "\"plane\"")
                               .add("point", cli::json_vector(point))
                               .text());
@@ -685,6 +693,7 @@ class Maker {
   std::vector<double> inverse_;  // rows that give voxels for meters
   double lowest_ = INFINITY;
   Report report_;
+  bool writes_table_ = true;
 };
 
 }  // namespace
