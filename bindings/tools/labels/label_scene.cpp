@@ -7,6 +7,7 @@
 #include <map>
 #include <utility>
 
+#include "cell_volume.h"
 #include "file.h"
 #include "label_fit.h"
 #include "messages.h"
@@ -337,7 +338,7 @@ class Maker {
     r.cells = uint32_t(cells.share.size());
     std::vector<double> volume(r.cells);
     for (uint32_t c = 0; c < r.cells; ++c)
-      volume[c] = cells.share[c] * cell_volume(cells.points.data(), &cells.tets[4 * size_t(c)]);
+      volume[c] = cells.share[c] * cli::cell_volume(cells.points.data(), &cells.tets[4 * size_t(c)]);
     const std::vector<size_t> of_cell = labels_of(t, cells.points.data(), cells.tets.data(), volume);
     for (uint32_t c = 0; c < r.cells; ++c) {
       LabelReport &label = report_.labels[of_cell[c]];
@@ -358,16 +359,6 @@ class Maker {
     }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, cells, of_cell);
     return info.edge_median;
-  }
-
-  static double cell_volume(const double *x, const uint32_t *tet) {
-    double e[3][3];
-    for (size_t k = 0; k < 3; ++k)
-      for (size_t c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
-    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
-            e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
-           6;
   }
 
   // Places in a cell that each label of this body has, of 35; where none has one, the nearest voxel's label.
