@@ -58,8 +58,8 @@ std::string cube(const std::string &out, const std::string &name) {
   test::write_file(volume,
                    "NRRD0005\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 8 8 8\n"
                    "space directions: (5,0,0) (0,5,0) (0,0,5)\nencoding: raw\n"
-                   "Segment0_LabelValue:=1\nSegment0_Name:=" + name + "\n\n" +
-                       voxels);
+                   "Segment0_LabelValue:=1\nSegment0_Name:=" +
+                       name + "\n\n" + voxels);
   return volume;
 }
 
@@ -92,8 +92,8 @@ TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
 TEST(LabelsCommand, LabelNamedFloor_HasAFloorOfAnotherName) {
   const std::string out = test::scratch("labels_command_floor");
   std::filesystem::remove_all(out + "/made");
-  const auto made = test::deform(
-      {"mesh", "from-labels", cube(out, "floor"), "--out", out + "/made", "--cells", "300"});
+  const auto made =
+      test::deform({"mesh", "from-labels", cube(out, "floor"), "--out", out + "/made", "--cells", "300"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
   const auto read = test::deform({"explain", out + "/made/scene.json"});
   EXPECT_EQ(read.exit_code, 0) << read.err;
@@ -103,7 +103,7 @@ TEST(LabelsCommand, TableThatTheUserHasChanged_IsNotReplaced) {
   const std::string out = test::scratch("labels_command_table"), made = out + "/made",
                     table = made + "/labels.json";
   std::filesystem::remove_all(made);
-  std::vector<std::string> words = {"mesh", "from-labels", cube(out, "liver"), "--out", made,
+  std::vector<std::string> words = {"mesh",    "from-labels", cube(out, "liver"), "--out", made,
                                     "--cells", "300"};
   for (int i = 0; i < 2; ++i) EXPECT_EQ(test::deform(words).exit_code, 0);
   const std::string changed = test::read_file(table) + "\n\n";

@@ -321,9 +321,9 @@ TEST_F(PlannerScene, ToolsPlacesAndAttachments_CountAsWhatTheyAre) {
   EXPECT_FALSE(has(placed, "touches nothing")) << placed;
   EXPECT_EQ(placed, planned(R"(, "pose": {"position": [0, 0, 3e-5]})", table));
 
-  const std::string hung = planned(
-      R"(, "attach": [{"to": "wall", "box": [[-1, -1, -1], [1e-6, 1, 1]]}])",
-      R"("obstacles": [{"name": "wall", "shape": "box", "half_size": [0.1, 0.2, 0.2],
+  const std::string hung =
+      planned(R"(, "attach": [{"to": "wall", "box": [[-1, -1, -1], [1e-6, 1, 1]]}])",
+              R"("obstacles": [{"name": "wall", "shape": "box", "half_size": [0.1, 0.2, 0.2],
                         "pose": {"position": [-0.1, 0.1, 0.05]}}])");
   EXPECT_TRUE(has(hung, "; held")) << hung;
 }
@@ -336,7 +336,8 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
                  {"/accuracy/quantity", "force"});
   expect_refused(bar(target, "", R"(, "mode": "static")"), {"/accuracy", "a static scene has no step"});
   const std::string two = folder() + "/two.json";
-  test::write_file(two, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1}, )" + target + R"(
+  test::write_file(two,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1}, )" + target + R"(
  "bodies": [{"name": "a", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 300},
              "model": {"type": "corotational_fem"}, "integrator": "tr_bdf2"},
             {"name": "b", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 300},

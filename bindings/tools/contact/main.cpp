@@ -152,7 +152,8 @@ class Run {
     if (fs::equivalent(path, to, absent)) throw std::runtime_error("the export would replace it");
     const auto [other, first] = written_.try_emplace(to, path);
     if (!first)
-      throw std::runtime_error("not exported: " + to + " is that of " + other->second + "; export each folder by itself");
+      throw std::runtime_error("not exported: " + to + " is that of " + other->second +
+                               "; export each folder by itself");
     write_local_problem(to, form);
   }
 

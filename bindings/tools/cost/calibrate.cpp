@@ -373,8 +373,8 @@ class Calibration {
 
   std::vector<std::string> left_out;  // sentences
 
-  // Costs as JSON. `out`: the file that will have them, whose rows of other models stay, if they were measured
-  // on this machine.
+  // Costs as JSON. `out`: the file that will have them, whose rows of other models stay, if this machine has
+  // measured them.
   std::string run(const std::string &machine, const std::string &out) {
     reference_ = {bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kLittle),
                   bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kFar),

@@ -7,7 +7,7 @@
 namespace cli {
 
 void add_calibrate(Command app, Globals &globals, int *exit_code);
-// Rows of a file of costs, as JSON, for models that are not measured now: those that this machine has measured.
+// Rows of a file of costs, as JSON, for models that are not measured now, if this machine has measured them.
 std::vector<std::string> kept_rows(const std::string &file, const std::string &machine,
                                    const std::vector<std::string> &measured);
 

@@ -226,8 +226,8 @@ void find_labels(const Volume &v, std::array<uint32_t, 3> &lo, std::array<uint32
 
 }  // namespace
 
-// Blocks begin with the first layer of a label, so that no block of air takes layers from it. Where the volume
-// ends in air, air follows; where a label reaches the end, the last block has at least half of its layers.
+// Blocks begin with the first layer of a label, so that no block of air takes layers from it. Where the
+// volume ends in air, air follows; where a label reaches the end, the last block is at least half full.
 Volume coarsened(const Volume &v, const std::array<uint32_t, 3> &factor) {
   Volume out;
   out.value = v.value;

@@ -272,8 +272,7 @@ class Reader {
   // Something moves toward it, independent of gravity.
   bool something_moves() const {
     return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moves) || !def_.tools.empty() ||
-           !def_.rigid.bodies.empty() ||
-           (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
+           !def_.rigid.bodies.empty() || (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
   }
   bool one_is_thrown() const { return std::any_of(def_.bodies.begin(), def_.bodies.end(), thrown); }
 
