@@ -581,6 +581,11 @@ TEST(WriteScene, NamesThatAreFilesOfOthers_KeepTheirMeshes) {
   EXPECT_EQ(all(write(world, folder + "/again.json")), "");
   const dfm_world again = load(context, folder + "/again.json");
   EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
+  dfm_body skinned = 0;
+  uint32_t n = 0;
+  test::ok(dfm_world_find_body(again, "a", &skinned));
+  test::ok(dfm_surface_positions(skinned, 0, nullptr, &n));
+  EXPECT_EQ(n, 4u);
 }
 
 TEST(WriteScene, SnapshotOfAnEarlierScene_IsRemoved) {
