@@ -205,7 +205,6 @@ dfm_status Adapter::bind_body(Object &o) {
     auto made = std::make_unique<LinkMember>();
     made->body = link->m_multiBody;
     made->link = link->m_link;
-    made->gravity = from_bullet(engine_.world->getGravity());
     made->read();
     o.body->member = std::move(made);
   } else {

@@ -160,7 +160,7 @@ Facts LinkMember::facts() const {
   Facts f;
   f.enabled = body->isAwake();
   f.plain = f.turns = false;
-  f.gravity = gravity;
+  f.gravity = from_bullet(static_cast<BulletEngine *>(engine)->world->getGravity());
   return f;
 }
 

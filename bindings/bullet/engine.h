@@ -63,7 +63,6 @@ struct LinkMember : AnyMember {
   LinkMember() : AnyMember(true) {}
   btMultiBody *body = nullptr;
   int link = -1;
-  Vec gravity;
 
   dfm_rigid_state state() const override;
   void put(const dfm_rigid_state &) override {}  // its joints determine its place

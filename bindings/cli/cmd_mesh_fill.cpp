@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "arguments.h"
+#include "cell_volume.h"
 #include "cmd_mesh.h"
 #include "json_text.h"
 #include "progress.h"
@@ -26,16 +27,6 @@ struct Filled {
   std::vector<std::string> warnings;
   bool imported = false;  // from a format that scenes do not read
 };
-
-double cell_volume(const double *x, const uint32_t *tet) {
-  double e[3][3];
-  for (int k = 0; k < 3; ++k)
-    for (int c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
-  return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
-          e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-          e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
-         6;
-}
 
 void measure(Filled &out) {
   for (uint32_t t = 0; t < out.cells.ntet; ++t) {

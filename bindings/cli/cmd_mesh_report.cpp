@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <deform/plugin.h>
 
+#include "cell_volume.h"
 #include "cmd_mesh.h"
 #include "crossing.h"
 #include "json_text.h"
@@ -59,17 +60,8 @@ void take_common(Report &r, const dfm_mesh_info &i) {
 double material_of(const dfm_mesh_info &mesh) {
   if (!mesh.share) return -1;
   double sum = 0;
-  for (uint32_t t = 0; t < mesh.ntet; ++t) {
-    const uint32_t *const tet = &mesh.tets[size_t{4} * t];
-    double e[3][3];
-    for (int i = 0; i < 3; ++i)
-      for (int k = 0; k < 3; ++k)
-        e[i][k] = mesh.points[size_t{3} * tet[i + 1] + k] - mesh.points[size_t{3} * tet[0] + k];
-    sum += mesh.share[t] / 6 *
-           (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
-            e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
-            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0]));
-  }
+  for (uint32_t t = 0; t < mesh.ntet; ++t)
+    sum += mesh.share[t] * cell_volume(mesh.points, &mesh.tets[size_t{4} * t]);
   return sum;
 }
 

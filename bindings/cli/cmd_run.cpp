@@ -81,9 +81,52 @@ constexpr const char *kTeeth =
     "teeth of a cut or tear are as large as the cells; a mesh with layers of cells along the cut has none, "
     "smaller cells have smaller ones";
 
+void check_saves(const SceneFile &scene, const RunOptions &options) {
+  const double duration = scene.settings().duration;
+  if (!options.saves.empty()) refuse_static(scene, "--save");
+  if (options.record) refuse_static(scene, "--record");
+  if (!options.save_scene.empty()) check_scene_path(scene, options.save_scene);
+  for (const RunOptions::Save &save : options.saves) {
+    if (!may_write_beside(save.path))
+      throw Failure(kBadInput, "--save " + save.path + ": cannot be written there: " + std::strerror(errno));
+    if (save.at > duration * (1 + 1e-9))
+      throw Failure(kBadInput, "--save " + save.path + ": the run ends at " + seconds(duration) +
+                                   ", before " + seconds(save.at) +
+                                   "; give an earlier time, or a longer --time");
+  }
+}
+
+void go_on_from(const SceneFile &scene, const std::string &path) {
+  refuse_static(scene, "--from");
+  const double start = dfm_world_time(scene.world()), duration = scene.settings().duration;
+  read_state(scene, path);
+  const double t = dfm_world_time(scene.world()) - start;
+  if (t >= duration * (1 - 1e-9))
+    throw Failure(kBadInput, path + ": a state at " + seconds(t) + ", and the run ends at " +
+                                 seconds(duration) +
+                                 "; give a longer --time, counted from the scene's start");
+}
+
+// All that may be refused, before the results of an earlier run are deleted: the state to continue from may
+// be one of them.
+void prepare(const SceneFile &scene, const RunOptions &options) {
+  check_saves(scene, options);
+  if (!options.stream.empty()) {
+    refuse_static(scene, "--stream");
+    rtp_url(options.stream, "--stream");
+  }
+  if (!options.problems.empty()) {
+    make_folder(options.problems);
+    need(dfm_debug_contact_problems(scene.world(), options.problems.c_str(), options.every));
+  }
+  if (!options.from.empty()) go_on_from(scene, options.from);
+}
+
 class Runner {
  public:
-  Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals, Comparison *comparison)
+  // start: time of the scene's start, s; the world may be in a later state.
+  Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals, Comparison *comparison,
+         double start)
       : scene_(scene),
         options_(options),
         world_(scene.world()),
@@ -101,24 +144,15 @@ class Runner {
         record_(scene.settings().every),
         frame_(frame_interval()),
         comparison_(comparison) {
+    result_.start = start;
     if (options.record) recorder_.emplace(scene, options);
     if (options.plot) plots_ = RunPlots::create(scene);
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
   void run() {
-    result_.start = dfm_world_time(world_);
-    check_saves();
-    if (!options_.problems.empty()) {
-      make_folder(options_.problems);
-      need(dfm_debug_contact_problems(world_, options_.problems.c_str(), options_.every));
-    }
-    if (!options_.from.empty()) go_on_from(options_.from);
     result_.begun = result_.simulated = dfm_world_time(world_);
-    if (!options_.stream.empty()) {
-      refuse_static(scene_, "--stream");
-      stream_.emplace(world_, options_.stream);
-    }
+    if (!options_.stream.empty()) stream_.emplace(world_, options_.stream);
     count_overlaps();
     add_unwatched(scene_, result_);
     outputs(true);
@@ -300,32 +334,6 @@ class Runner {
     return rate > 0 ? 1 / rate : 0;
   }
 
-  // Before the first step, so that nothing is simulated for a file that cannot be written.
-  void check_saves() const {
-    if (!options_.saves.empty()) refuse_static(scene_, "--save");
-    if (options_.record) refuse_static(scene_, "--record");
-    if (!options_.save_scene.empty()) check_scene_path(scene_, options_.save_scene);
-    for (const RunOptions::Save &save : options_.saves) {
-      if (!may_write_beside(save.path))
-        throw Failure(kBadInput,
-                      "--save " + save.path + ": cannot be written there: " + std::strerror(errno));
-      if (save.at > duration_ * (1 + 1e-9))
-        throw Failure(kBadInput, "--save " + save.path + ": the run ends at " + seconds(duration_) +
-                                     ", before " + seconds(save.at) +
-                                     "; give an earlier time, or a longer --time");
-    }
-  }
-
-  void go_on_from(const std::string &path) {
-    refuse_static(scene_, "--from");
-    read_state(scene_, path);
-    const double t = dfm_world_time(world_) - result_.start;
-    if (t >= duration_ * (1 - 1e-9))
-      throw Failure(kBadInput, path + ": a state at " + seconds(t) + ", and the run ends at " +
-                                   seconds(duration_) +
-                                   "; give a longer --time, counted from the scene's start");
-  }
-
   void record() {
     outputs_.record();
     attachments_.record();
@@ -501,12 +509,14 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
   if (const std::string short_of = planned_sentence(planned); !short_of.empty()) warn(short_of);
   if (!globals.quiet && !globals.json) print_choice(planned);
   check_first_step(scene);
+  const double start = dfm_world_time(scene.world());
+  prepare(scene, options);
   RunResult result;
   Checks checks;
   results_lie_in(options.out);
   catch_signals();
   {
-    Runner runner(scene, options, globals, comparison);
+    Runner runner(scene, options, globals, comparison, start);
     runner.run();
     for (const std::string &remark : runner.remarks()) keep_warning(remark);
     for (const std::string &fault : runner.faults()) warn(fault);

@@ -3,20 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cell_volume.h"
 #include "messages.h"
 
 namespace cli {
 namespace {
-
-double volume_of(const double *x, const uint32_t *c) {
-  double e[3][3];
-  for (size_t k = 0; k < 9; ++k)
-    e[k / 3][k % 3] = x[3 * size_t(c[k / 3 + 1]) + k % 3] - x[3 * size_t(c[0]) + k % 3];
-  return std::fabs(e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) +
-                   e[0][1] * (e[1][2] * e[2][0] - e[1][0] * e[2][2]) +
-                   e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
-         6;
-}
 
 double von_mises(const double *s) {
   const double xy = s[0] - s[1], yz = s[1] - s[2], zx = s[2] - s[0];
@@ -34,7 +25,7 @@ SurfaceStress::SurfaceStress(const BodyView &body, const std::vector<double> &su
   std::vector<double> x(3 * size_t(body.npoint));
   need(dfm_body_get_rest(body_, body.npoint, x.data(), body.ntet, cells_.data()));
   for (size_t c = 0; c < cells_.size(); c += 4) {
-    volume_.push_back(volume_of(x.data(), &cells_[c]));
+    volume_.push_back(std::fabs(cell_volume(x.data(), &cells_[c])));
     for (size_t k = 0; k < 4; ++k) around_[cells_[c + k]] += volume_.back();
   }
   uint32_t n = 0;

@@ -1,9 +1,13 @@
 // What `deform cost` says of its choice.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
+#include "cost/calibrate.h"
 #include "cost/report.h"
+#include "support.h"
 
 namespace cli::cost {
 namespace {
@@ -108,6 +112,77 @@ TEST(CostWords, ChoiceOnTheScenesOwnMesh_IsApplied) {
   study.proven = false;
   study.mesh_stays = true;
   EXPECT_EQ(refusal_to_apply(study), "");
+}
+
+namespace {
+
+Subject subject_of(const std::string &name, const std::string &bodies) {
+  const std::string path = test::scratch("cost_subject") + "/" + name + ".json";
+  test::write_file(path,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+    "bodies": [)" + bodies +
+                       "]}");
+  Globals globals;
+  return read_subject(path, globals);
+}
+
+std::string bar(const std::string &more) {
+  return R"({"name": "bar", "mesh": {"make": "beam", "size": [0.3, 0.1, 0.1], "cells": 50})" + more + "}";
+}
+
+}  // namespace
+
+// The world has a body with an id before those without.
+TEST(CostSubject, BodiesWithIds_KeepTheirPlacesInTheFile) {
+  const Subject s = subject_of("ids", bar(R"(, "pose": {"position": [0, 0, 5]})") +
+                                          R"(, {"name": "cube", "id": 3,
+      "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 5},
+      "model": {"type": "corotational_fem"}})");
+  ASSERT_EQ(s.bodies.size(), 2u);
+  EXPECT_EQ(s.bodies[0].name, "bar");
+  EXPECT_EQ(s.bodies[1].name, "cube");
+  EXPECT_GT(s.bodies[0].cells, s.bodies[1].cells);
+  EXPECT_EQ(s.bodies[1].model, "corotational_fem");
+}
+
+TEST(CostSubject, EndsOfATurnedBody_LieInTheFrameOfItsMesh) {
+  const Subject s = subject_of("axis",
+                               bar(R"(, "pose": {"rotation": {"axis": [0, 1, 0], "angle_deg": 60}})")),
+                q = subject_of("quaternion", bar(R"(, "pose": {"rotation": {"quaternion":
+                                                   [0, 1, 0, 1.7320508075688772]}})"));
+  for (const Subject *of : {&s, &q})
+    for (const auto &end : of->bodies[0].ends)
+      for (size_t k = 0; k < 3; ++k) {
+        const double size = k == 0 ? 0.3 : 0.1;
+        EXPECT_LT(std::min(std::fabs(end[k]), std::fabs(end[k] - size)), 1e-9) << k;
+      }
+}
+
+// Other meshes have other nodes of these numbers.
+TEST(CostSubject, BodyHeldByNumbersOfNodes_KeepsItsCells) {
+  EXPECT_EQ(why_cells_stay(subject_of("box", bar(R"(, "fix": [{"box": [[-1, -1, -1], [0, 1, 1]]}])"))), "");
+  EXPECT_TRUE(has(why_cells_stay(subject_of("fix", bar(R"(, "fix": [{"points": [0, 1, 2]}])"))),
+                  "body 'bar' has fix by points"));
+}
+
+// As --apply renames them where it writes into another folder.
+TEST(CostSubject, FilesOfTools_AreAmongThoseOfTheScene) {
+  JsonValue scene;
+  ASSERT_TRUE(parse_json(R"({"tools": [{"name": "a", "motion": {"file": "hand.csv"}},
+      {"name": "b", "mesh": "blade.obj", "motion": {"keyframes": []}}]})",
+                         scene));
+  EXPECT_EQ(file_pointers(scene), (std::vector<std::string>{"/tools/0/motion/file", "/tools/1/mesh"}));
+}
+
+// `deform calibrate --model` measures one of them.
+TEST(Costs, OfOtherModels_StayWhereThisMachineHasMeasuredThem) {
+  const std::string path = test::scratch("costs_kept") + "/costs.json";
+  test::write_file(path, R"({"format": "deform-costs", "version": 4, "machine": "this one", "models": [
+    {"model": "msm", "wave_steps": 2}, {"model": "modal", "wave_steps": 3}]})");
+  EXPECT_EQ(kept_rows(path, "this one", {"modal"}),
+            std::vector<std::string>{R"({"model": "msm", "wave_steps": 2})"});
+  EXPECT_TRUE(kept_rows(path, "another one", {"modal"}).empty());
+  EXPECT_TRUE(kept_rows(path + ".none", "this one", {"modal"}).empty());
 }
 
 }  // namespace cli::cost

@@ -164,7 +164,9 @@ TEST(LabelVolume, DetachedVoxels_LieBesideTheHeader) {
   test::write_file(dir + "/c.nhdr", nhdr("raw", "byte skip: 4\ndata file: skipped.raw\n"));
   test::write_file(dir + "/d.nhdr", nhdr("raw", "byte skip: -1\ndata file: skipped.raw\n"));
   test::write_file(dir + "/e.mhd", meta_header("MET_SHORT", false, false, "voxels.raw"));
-  for (const char *name : {"/a.nhdr", "/b.nhdr", "/c.nhdr", "/d.nhdr", "/e.mhd"})
+  test::write_file(dir + "/skipped.raw.gz", packed("head" + bytes_of(kVoxels, 2, false), 31));
+  test::write_file(dir + "/g.nhdr", nhdr("gzip", "byte skip: 4\ndata file: skipped.raw.gz\n"));
+  for (const char *name : {"/a.nhdr", "/b.nhdr", "/c.nhdr", "/d.nhdr", "/e.mhd", "/g.nhdr"})
     expect_volume(labels::read_labels(dir + name), name);
   test::write_file(dir + "/f.mhd", meta_header("MET_SHORT", false, false, "none.raw"));
   try {
@@ -271,6 +273,29 @@ TEST(LabelSurface, OfSeveralLabels_IsClosedAndKeepsVolumes) {
     EXPECT_GT(common(1, 3), 40u);
     EXPECT_EQ(common(2, 3), 0u);
   }
+}
+
+// Blocks of voxels begin with the label, whose air stays air: it is not cut where it ends before the file
+// does. Where the file ends it, the last block is one that is at least half full.
+TEST(LabelVolume, JoinedVoxels_KeepWhereALabelBeginsAndEnds) {
+  for (const uint32_t factor : {1, 2, 3, 4})
+    for (const uint32_t layers : {8, 9, 10, 11})
+      for (const uint32_t air : {0, 1, 3}) {
+        SCOPED_TRACE(testing::Message() << layers << " layers by " << factor << ", air " << air);
+        Volume v;
+        v.size = {layers + 2 * air, 8, 8};
+        v.value = {0, 1};
+        for (int k = 0; k < 3; ++k) v.axis[k][k] = 1;
+        for (uint32_t i = 0; i < v.size[0] * 64; ++i) {
+          const uint32_t x = i % v.size[0];
+          v.voxel.push_back(x >= air && x < air + layers);
+        }
+        const Volume out = labels::cropped(labels::coarsened(labels::cropped(v), {factor, 1, 1}));
+        const uint32_t first = air > 0, n = out.size[0] - 2 * first;
+        for (uint32_t x = 0; x < out.size[0]; ++x) EXPECT_EQ(out.voxel[x], x >= first && x < first + n) << x;
+        EXPECT_DOUBLE_EQ(out.origin[0] + (first - 0.5) * factor, air - 0.5);
+        EXPECT_LE(std::fabs(double(n * factor) - layers), 0.5 * factor);
+      }
 }
 
 // Smoothing must do what it is for: normals of a ball's surface, which are axes on voxels, point outward.

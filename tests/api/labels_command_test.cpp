@@ -49,6 +49,20 @@ double number(const std::string &json, const std::string &pattern) {
   return std::stod(m[1]);
 }
 
+// A cube of one label.
+std::string cube(const std::string &out, const std::string &name) {
+  const std::string volume = out + "/scan.nrrd";
+  std::string voxels;
+  for (int i = 0; i < 512; ++i)
+    voxels += char(std::min({i % 8, i / 8 % 8, i / 64}) > 0 && std::max({i % 8, i / 8 % 8, i / 64}) < 7);
+  test::write_file(volume,
+                   "NRRD0005\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 8 8 8\n"
+                   "space directions: (5,0,0) (0,5,0) (0,0,5)\nencoding: raw\n"
+                   "Segment0_LabelValue:=1\nSegment0_Name:=" +
+                       name + "\n\n" + voxels);
+  return volume;
+}
+
 }  // namespace
 
 TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
@@ -72,6 +86,35 @@ TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
   EXPECT_TRUE(has(again.err, "(nodule): its cells hold")) << again.err;  // few cells make a coarse ball
   for (const char *name : {"/scene.json", "/labels.json", "/body.vtk", "/body.obj"})
     EXPECT_EQ(test::read_file(out + name), test::read_file(out + "/again" + name)) << name;
+}
+
+// What nothing holds falls onto a floor, whatever is called so already.
+TEST(LabelsCommand, LabelNamedFloor_HasAFloorOfAnotherName) {
+  const std::string out = test::scratch("labels_command_floor");
+  std::filesystem::remove_all(out + "/made");
+  const auto made =
+      test::deform({"mesh", "from-labels", cube(out, "floor"), "--out", out + "/made", "--cells", "300"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const auto read = test::deform({"explain", out + "/made/scene.json"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+}
+
+TEST(LabelsCommand, TableThatTheUserHasChanged_IsNotReplaced) {
+  const std::string out = test::scratch("labels_command_table"), made = out + "/made",
+                    table = made + "/labels.json";
+  std::filesystem::remove_all(made);
+  std::vector<std::string> words = {"mesh",    "from-labels", cube(out, "liver"), "--out", made,
+                                    "--cells", "300"};
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(test::deform(words).exit_code, 0);
+  const std::string changed = test::read_file(table) + "\n\n";
+  test::write_file(table, changed);
+  const auto refused = test::deform(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_TRUE(has(refused.err, table + ": ") && has(refused.err, "--table")) << refused.err;
+  EXPECT_EQ(test::read_file(table), changed);
+  words.insert(words.end(), {"--table", table});
+  EXPECT_EQ(test::deform(words).exit_code, 0);
+  EXPECT_EQ(test::read_file(table), changed);
 }
 
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {

@@ -291,6 +291,43 @@ TEST_F(PlannerScene, StiffFingerUnderAProbe_MovesImplicitly) {
   EXPECT_TRUE(has(r.out, "--set /time/integrator=tr_bdf2")) << r.out;
 }
 
+// The same path of a tool, of an obstacle; the place that "place" means, given by a pose; a bar on a wall.
+TEST_F(PlannerScene, ToolsPlacesAndAttachments_CountAsWhatTheyAre) {
+  const auto planned = [](const std::string &body, const std::string &more) {
+    const std::string path = folder() + "/scene.json";
+    test::write_file(path, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.5},
+ "accuracy": {"target": 0.2}, "materials": {"gel": {"young": 2e4, "damping": {"stiffness": 2e-3}}},
+ "bodies": [{"name": "block", "material": "gel", "lattice": null,
+   "mesh": {"make": "beam", "size": [0.2, 0.2, 0.1], "cells": 600})" +
+                               body + "}], " + more + "}");
+    const test::CommandResult r = test::deform({"explain", path});
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    std::string out;
+    for (const char *word : {"assumed: body 'block'", "--set "})
+      for (size_t at = 0; (at = r.out.find(word, at)) != std::string::npos; ++at)
+        out += r.out.substr(at, r.out.find('\n', at) - at) + "\n";
+    return out;
+  };
+  const std::string held = R"(, "fix": [{"box": [[-1, -1, -1], [1, 1, 1e-6]]}])",
+                    probe = R"({"name": "probe", "shape": "sphere", "radius": 0.05, "motion": {"keyframes": [
+   {"t": 0, "position": [0.1, 0.1, 0.151]}, {"t": 0.3, "position": [0.1, 0.1, 0.142]}]}})";
+  const std::string pressed = planned(held, "\"tools\": [" + probe + "]");
+  EXPECT_TRUE(has(pressed, "'probe' touches it")) << pressed;
+  EXPECT_EQ(pressed, planned(held, "\"obstacles\": [" + probe + "]"));
+
+  const std::string table = R"("obstacles": [{"name": "table", "shape": "plane"}])";
+  const std::string placed =
+      planned(R"(, "pose": {"position": [0, 0, 0.8]}, "place": {"on": "table"})", table);
+  EXPECT_FALSE(has(placed, "touches nothing")) << placed;
+  EXPECT_EQ(placed, planned(R"(, "pose": {"position": [0, 0, 3e-5]})", table));
+
+  const std::string hung =
+      planned(R"(, "attach": [{"to": "wall", "box": [[-1, -1, -1], [1e-6, 1, 1]]}])",
+              R"("obstacles": [{"name": "wall", "shape": "box", "half_size": [0.1, 0.2, 0.2],
+                        "pose": {"position": [-0.1, 0.1, 0.05]}}])");
+  EXPECT_TRUE(has(hung, "; held")) << hung;
+}
+
 TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
   const std::string target = R"("accuracy": {"target": 0.1},)";
   expect_refused(bar(target + R"("budget": {"ms_per_step": 1},)"), {"/budget", "keep one"});
@@ -298,6 +335,15 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
   expect_refused(bar(R"("accuracy": {"target": 0.1, "quantity": "color"},)"),
                  {"/accuracy/quantity", "force"});
   expect_refused(bar(target, "", R"(, "mode": "static")"), {"/accuracy", "a static scene has no step"});
+  const std::string two = folder() + "/two.json";
+  test::write_file(two,
+                   R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1}, )" + target + R"(
+ "bodies": [{"name": "a", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 300},
+             "model": {"type": "corotational_fem"}, "integrator": "tr_bdf2"},
+            {"name": "b", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 300},
+             "model": {"type": "corotational_fem"}, "integrator": "implicit_euler",
+             "pose": {"position": [0, 1, 0]}}]})");
+  expect_refused(two, {"/accuracy", "different integrators"});
   expect_refused(bar(target, R"("model": {"params": {"volume": 0}}, )"),
                  {"/bodies/0/model/params", "name it in"});
 }

@@ -124,6 +124,29 @@ TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
        "equilibria");
 }
 
+// The folder of the run holds what an earlier run wrote, and the state to continue from.
+TEST(Replay, RunIntoItsOwnFolder_ContinuesFromItsRecordingAndARefusedOneDeletesNothing) {
+  const Folder f;
+  const std::string out = f.path + "/own", recording = out + "/recording/000001.state";
+  ASSERT_EQ(f.run({"--out", out, "--time", "0.03", "--record"}).exit_code, 0);
+  const std::string summary = test::read_file(out + "/summary.json"), state = test::read_file(recording);
+  for (const std::vector<std::string> &refused :
+       std::vector<std::vector<std::string>>{{"--save", "9", f.path + "/x.state"},
+                                             {"--from", f.path + "/none"},
+                                             {"--save-scene", f.path + "/scene.vtu"},
+                                             {"--stream", "nowhere"}}) {
+    std::vector<std::string> arguments = {"--out", out, "--time", "0.03"};
+    arguments.insert(arguments.end(), refused.begin(), refused.end());
+    EXPECT_EQ(f.run(arguments).exit_code, 2) << refused[0];
+    EXPECT_EQ(test::read_file(out + "/summary.json"), summary) << refused[0];
+    EXPECT_EQ(test::read_file(recording), state) << refused[0];
+  }
+  const std::string hash = f.hash("own");
+  const test::CommandResult rest = f.run({"--out", out, "--time", "0.03", "--from", recording});
+  EXPECT_EQ(rest.exit_code, 0) << rest.err;
+  EXPECT_EQ(f.hash("own"), hash);
+}
+
 // The model that a body has, the one that it changes to and its law, by version: neither the other plugins
 // that are loaded nor what tells one build of them from another.
 TEST(Replay, SavedState_NamesWhatTheSceneCallsByVersion) {

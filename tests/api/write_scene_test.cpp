@@ -564,6 +564,43 @@ TEST(WriteScene, Materials_AreThoseOfEachBody) {
   EXPECT_EQ(dfm_world_hash(both), dfm_world_hash(made.world));
 }
 
+// A body may have the name that the surface of another one has as a file.
+TEST(WriteScene, NamesThatAreFilesOfOthers_KeepTheirMeshes) {
+  test::Context context;
+  const std::string folder = folder_of("names"), first = folder + "/first.json";
+  std::filesystem::create_directories(folder);
+  test::write_file(folder + "/skin.obj",
+                   "v 0.01 0.01 0.01\nv 0.09 0.01 0.01\nv 0.01 0.09 0.01\nv 0.01 0.01 0.09\n"
+                   "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n");
+  test::write_file(first, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1}, "bodies": [
+    {"name": "a", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 50},
+     "surface": {"mesh": "skin.obj"}},
+    {"name": "a_surface", "mesh": {"make": "beam", "size": [0.2, 0.1, 0.1], "cells": 50},
+     "pose": {"position": [1, 0, 0]}}]})");
+  const dfm_world world = load(context, first);
+  EXPECT_EQ(all(write(world, folder + "/again.json")), "");
+  const dfm_world again = load(context, folder + "/again.json");
+  EXPECT_EQ(dfm_world_hash(again), dfm_world_hash(world));
+  dfm_body skinned = 0;
+  uint32_t n = 0;
+  test::ok(dfm_world_find_body(again, "a", &skinned));
+  test::ok(dfm_surface_positions(skinned, 0, nullptr, &n));
+  EXPECT_EQ(n, 4u);
+}
+
+TEST(WriteScene, SnapshotOfAnEarlierScene_IsRemoved) {
+  test::Context context;
+  const std::string folder = folder_of("stale"), first = folder + "/first.json";
+  std::filesystem::create_directories(folder);
+  test::write_file(first, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1}, "bodies": [
+    {"name": "a", "mesh": {"make": "beam", "size": [0.2, 0.1, 0.1], "cells": 50}}]})");
+  const dfm_world world = load(context, first);
+  write(world, folder + "/made.json", DFM_SCENE_SNAPSHOT);
+  EXPECT_TRUE(std::filesystem::exists(folder + "/made_files/snapshot.state"));
+  write(world, folder + "/made.json");
+  EXPECT_FALSE(std::filesystem::exists(folder + "/made_files/snapshot.state"));
+}
+
 TEST(WriteScene, WrongArguments_AreReportedInOneSentence) {
   Made made;
   const auto refused = [&](const char *path, dfm_status status, const char *part) {

@@ -2,6 +2,7 @@
 import json
 import os
 import pathlib
+import shutil
 import subprocess
 import tempfile
 import unittest
@@ -45,6 +46,22 @@ class ContactProblems(unittest.TestCase):
                 self.assertEqual(before["contacts"], after["contacts"])
                 self.assertEqual(before["rank"], after["rank"])
                 self.assertLess(after["error"], 1e-8)
+
+    def test_exports_replace_neither_each_other_nor_problems(self):
+        problem = sorted(SET.glob("stack3-*.contact"))[0]
+        runs = [self.folder / name for name in ("first", "second")]
+        for run in runs:
+            run.mkdir()
+            shutil.copy(problem, run / "000001.contact")
+        found, said = contact("--export", self.folder, *runs, expected=1)
+        self.assertEqual(found["refused"], 1)
+        self.assertIn(f"{runs[1]}/000001.contact: not exported: ", said)
+        self.assertIn(f"is that of {runs[0]}/000001.contact", said)
+        exported = self.folder / "000001.hdf5"
+        before = exported.read_bytes()
+        _, said = contact("--export", self.folder, exported, expected=1)
+        self.assertIn("would replace it", said)
+        self.assertEqual(exported.read_bytes(), before)
 
     def test_text_of_siconos_is_read_dense_in_blocks_and_global(self):
         # one contact of a mass of 2 that moves at (-1, 3, 4): it sticks at mu 10, and slides at 0.5

@@ -210,14 +210,15 @@ void Lanes::take(uint32_t i, const Lanes &from, uint32_t k) {
 
 bool Lanes::same(uint32_t i, const Lanes &other, uint32_t k) const {
   const auto equal = [&](const double *a, const double *b, uint32_t width) {
-    for (uint32_t c = 0; c < width; ++c)
+    for (uint32_t c = 0; a && c < width; ++c)
       if (std::memcmp(a + size_t(c) * stride + i, b + size_t(c) * other.stride + k, sizeof(double)) != 0)
         return false;
     return true;
   };
-  return equal(out_ft, other.out_ft, 2) && equal(out_state, other.out_state, law.nstate) &&
-         equal(limit, other.limit, 1) && equal(stored, other.stored, 1) && mode[i] == other.mode[k] &&
-         (!out.dft_dvt || (equal(dv, other.dv, 4) && equal(dn, other.dn, 2)));
+  return equal(out.ft, other.out_ft, 2) && equal(out.state, other.out_state, law.nstate) &&
+         equal(out.limit, other.limit, 1) && equal(out.stored, other.stored, 1) &&
+         (!out.mode || mode[i] == other.mode[k]) && equal(out.dft_dvt, other.dv, 4) &&
+         equal(out.dft_dfn, other.dn, 2);
 }
 
 void Lanes::turn_state(uint32_t i, uint32_t k, double angle) {

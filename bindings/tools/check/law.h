@@ -46,7 +46,8 @@ struct Lanes {
   double ft(uint32_t i) const;           // norm
   std::string inputs(uint32_t i) const;  // for a sentence: " at a slip of .."
   void spoil_padding();                  // NaN in the input lanes beyond n
-  // A lane's inputs from another batch, and whether its outputs are those of another lane, bit by bit.
+  // A lane's inputs from another batch, and whether its outputs, but for those that are NULL in `out`, are
+  // those of another lane, bit by bit.
   void take(uint32_t i, const Lanes &from, uint32_t k);
   bool same(uint32_t i, const Lanes &other, uint32_t k) const;
   // The state of lane k in lane i, with its tangent pairs turned.

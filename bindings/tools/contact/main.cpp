@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <sstream>
 #include <stdexcept>
 
@@ -143,6 +144,18 @@ class Run {
   dfm_context *context_ = nullptr;
   Sums sums_[3] = {{"explicit"}, {"implicit"}, {"of others"}};
   uint32_t refused_ = 0, lines_ = 0;
+  std::map<std::string, std::string> written_;  // from which problem
+
+  // Problems of several runs have the same names; a folder may be that of the problems.
+  void write(const std::string &path, const std::string &to, const LocalProblem &form) {
+    std::error_code absent;
+    if (fs::equivalent(path, to, absent)) throw std::runtime_error("the export would replace it");
+    const auto [other, first] = written_.try_emplace(to, path);
+    if (!first)
+      throw std::runtime_error("not exported: " + to + " is that of " + other->second +
+                               "; export each folder by itself");
+    write_local_problem(to, form);
+  }
 
   void one(const std::string &path) {
     const bool captured = path.ends_with(".contact");
@@ -165,7 +178,7 @@ class Run {
       if (form.mu.empty())
         std::fprintf(stderr, "deform: %s is not exported: a law of it remembers, or something is attached\n",
                      path.c_str());
-      else write_local_problem(options_.folder + "/" + fs::path(path).stem().string() + ".hdf5", form);
+      else write(path, options_.folder + "/" + fs::path(path).stem().string() + ".hdf5", form);
     } catch (const std::exception &e) {
       ++refused_;
       std::fprintf(stderr, "deform: %s: %s\n", path.c_str(), e.what());

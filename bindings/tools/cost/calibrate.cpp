@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <utility>
@@ -19,6 +20,7 @@
 #include "messages.h"
 #include "progress.h"
 #include "run_folder.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -371,7 +373,9 @@ class Calibration {
 
   std::vector<std::string> left_out;  // sentences
 
-  std::string run(const std::string &machine) {
+  // Costs as JSON. `out`: the file that will have them, whose rows of other models stay, if this machine has
+  // measured them.
+  std::string run(const std::string &machine, const std::string &out) {
     reference_ = {bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kLittle),
                   bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kFar),
                   turned(context_, kReference), lying(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER),
@@ -385,6 +389,9 @@ class Calibration {
         left_out.push_back("the model " + m.id + " is left out of the costs: " + why.what());
       }
     }
+    std::vector<std::string> measured;
+    for (const Model &m : models_) measured.push_back(short_name(m.id));
+    for (std::string &row : kept_rows(out, machine, measured)) rows.push_back(std::move(row));
     return JsonObject()
         .add("format", quoted("deform-costs"))
         .add("version", "4")
@@ -537,7 +544,7 @@ int calibrate(std::string out, const std::vector<std::string> &models, Globals &
   std::string text;
   {
     const Quiet quiet(globals);
-    text = calibration.run(machine_name());
+    text = calibration.run(machine_name(), out);
   }
   for (const std::string &sentence : calibration.left_out) warn(sentence);
   const size_t slash = out.rfind('/');
@@ -549,6 +556,17 @@ int calibrate(std::string out, const std::vector<std::string> &models, Globals &
 }
 
 }  // namespace
+
+std::vector<std::string> kept_rows(const std::string &file, const std::string &machine,
+                                   const std::vector<std::string> &measured) {
+  std::vector<std::string> out;
+  JsonValue costs;
+  if (std::filesystem::exists(path_of(file)) && parse_json(read_file(file, 64u << 20, "costs"), costs) &&
+      costs.get("version") == "4" && costs.get("machine") == machine)
+    for (const JsonValue &row : costs.list("models"))
+      if (std::ranges::find(measured, row.get("model")) == measured.end()) out.push_back(json_text(row));
+  return out;
+}
 
 void add_calibrate(Command app, Globals &globals, int *exit_code) {
   struct Options {

@@ -188,8 +188,6 @@ Described describe(const Subject &subject, const Row &row) {
   Described d;
   d.model = k.model.empty() ? models_of(subject) : k.model;
   d.integrator = k.integrator.empty() ? subject.word("/time/integrator", "auto") : k.integrator;
-  const JsonValue *const step = subject.find("/time/step");
-  d.requested_step = !k.step.empty() ? k.step : step ? step->text : "auto";
   d.step = o.steps > 0 ? o.simulated / o.steps : 0;
   d.law = k.law.empty() ? laws_of(subject) : k.law;
   d.precision = k.precision.empty() ? precision_of(subject) : k.precision;

@@ -14,7 +14,7 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
 std::string percent(double part);
 // What a choice is in full, with what the scene says where it leaves it.
 struct Described {
-  std::string model, integrator, requested_step, law, precision;
+  std::string model, integrator, law, precision;
   double step = 0;  // s, mean of those taken
 };
 Described describe(const Subject &subject, const Row &row);

@@ -8,6 +8,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <memory>
 
 #include "become.h"
@@ -52,6 +53,15 @@ void read_offers(dfm_context *context, Subject &out, std::vector<std::string> &f
 std::array<double, 4> inverse_rotation(const JsonValue *pose) {
   std::array<double, 4> q{0, 0, 0, 1};
   const JsonValue *rotation = pose ? pose->find("rotation") : nullptr;
+  if (const JsonValue *given = rotation ? rotation->find("quaternion") : nullptr) {
+    double n = 0;
+    for (size_t k = 0; k < 4; ++k) {
+      q[k] = (k < 3 ? -1 : 1) * std::strtod(given->items[k].text.c_str(), nullptr);
+      n += q[k] * q[k];
+    }
+    for (double &x : q) x /= std::sqrt(n);
+    return q;
+  }
   const JsonValue *axis = rotation ? rotation->find("axis") : nullptr;
   if (!axis || axis->items.size() != 3) return q;
   double a[3], n = 0;
@@ -132,6 +142,7 @@ void fix_plan(const SceneFile &scene, Subject &out) {
 
 void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
   const JsonValue *rows = plan.find("bodies");
+  std::map<size_t, SubjectBody> places;  // in the file: the world and the plan have them in order of ids
   for (size_t i = 0; i < scene.bodies().size(); ++i) {
     const BodyView &view = scene.bodies()[i];
     SubjectBody body;
@@ -145,9 +156,11 @@ void read_bodies(const SceneFile &scene, const JsonValue &plan, Subject &out) {
     const JsonValue *const integrator = row ? row->find("integrator") : nullptr;
     const std::string used = integrator ? integrator->get("used") : "";
     out.implicit |= used == "implicit_euler" || used == "tr_bdf2";
-    find_ends(view.handle, out.find("/bodies/" + std::to_string(i) + "/pose"), body);
-    out.bodies.push_back(std::move(body));
+    const std::string at = scene.pointer_of(view.name);
+    find_ends(view.handle, out.find(at + "/pose"), body);
+    places[std::stoul(at.substr(at.rfind('/') + 1))] = std::move(body);
   }
+  for (auto &[place, body] : places) out.bodies.push_back(std::move(body));
 }
 
 double stable_step(const JsonValue &plan) {
@@ -251,6 +264,9 @@ std::vector<std::string> file_pointers(const JsonValue &scene) {
   const JsonValue *const obstacles = scene.find("obstacles");
   for (size_t i = 0; obstacles && i < obstacles->items.size(); ++i)
     add("/obstacles/" + std::to_string(i) + "/mesh");
+  const JsonValue *const tools = scene.find("tools");
+  for (size_t i = 0; tools && i < tools->items.size(); ++i)
+    for (const char *key : {"/mesh", "/motion/file"}) add("/tools/" + std::to_string(i) + key);
   return out;
 }
 

@@ -204,17 +204,48 @@ Repaired compose(const std::string &path, Volume &volume, const std::vector<uint
   return out;
 }
 
+namespace {
+
+// Per axis from the first layer that has a label to behind the last one; 0 to 0 where nothing has.
+void find_labels(const Volume &v, std::array<uint32_t, 3> &lo, std::array<uint32_t, 3> &hi) {
+  lo = v.size;
+  hi = {};
+  size_t at = 0;
+  for (uint32_t k = 0; k < v.size[2]; ++k)
+    for (uint32_t j = 0; j < v.size[1]; ++j)
+      for (uint32_t i = 0; i < v.size[0]; ++i)
+        if (v.voxel[at++] != 0) {
+          const uint32_t c[3] = {i, j, k};
+          for (size_t a = 0; a < 3; ++a) {
+            lo[a] = std::min(lo[a], c[a]);
+            hi[a] = std::max(hi[a], c[a] + 1);
+          }
+        }
+  if (hi[0] == 0) lo = {};
+}
+
+}  // namespace
+
+// Blocks begin with the first layer of a label, so that no block of air takes layers from it. Where the
+// volume ends in air, air follows; where a label reaches the end, the last block is at least half full.
 Volume coarsened(const Volume &v, const std::array<uint32_t, 3> &factor) {
   Volume out;
   out.value = v.value;
   out.name = v.name;
   out.notes = v.notes;
   std::copy_n(v.origin, 3, out.origin);
+  std::array<uint32_t, 3> lo, hi;
+  find_labels(v, lo, hi);
+  int64_t begin[3];
   for (size_t k = 0; k < 3; ++k) {
-    out.size[k] = (v.size[k] + factor[k] - 1) / factor[k];
+    const int64_t f = factor[k];
+    begin[k] = lo[k] > 0 ? lo[k] - f : 0;
+    const int64_t layers = hi[k] - begin[k];
+    out.size[k] = uint32_t(hi[k] < v.size[k] ? (layers + f - 1) / f + 1
+                                             : std::max(int64_t{1}, (2 * layers + f) / (2 * f)));
     for (size_t c = 0; c < 3; ++c) {
-      out.axis[k][c] = v.axis[k][c] * factor[k];
-      out.origin[c] += v.axis[k][c] * (factor[k] - 1) / 2;
+      out.axis[k][c] = v.axis[k][c] * double(f);
+      out.origin[c] += v.axis[k][c] * (double(begin[k]) + double(f - 1) / 2);
     }
   }
   out.voxel.resize(out.voxels());
@@ -225,11 +256,20 @@ Volume coarsened(const Volume &v, const std::array<uint32_t, 3> &factor) {
   for (o[2] = 0; o[2] < out.size[2]; ++o[2])
     for (o[1] = 0; o[1] < out.size[1]; ++o[1])
       for (o[0] = 0; o[0] < out.size[0]; ++o[0]) {
-        std::array<uint32_t, 3> end;
-        for (size_t k = 0; k < 3; ++k) end[k] = std::min(v.size[k], (o[k] + 1) * factor[k]);
-        for (uint32_t k = o[2] * factor[2]; k < end[2]; ++k)
-          for (uint32_t j = o[1] * factor[1]; j < end[1]; ++j)
-            for (uint32_t i = o[0] * factor[0]; i < end[0]; ++i) {
+        std::array<uint32_t, 3> from, end;
+        uint32_t all = 1, read = 1;
+        for (size_t k = 0; k < 3; ++k) {
+          const int64_t first = begin[k] + int64_t{o[k]} * factor[k], size = v.size[k];
+          from[k] = uint32_t(std::clamp(first, int64_t{0}, size));
+          end[k] = uint32_t(std::clamp(first + factor[k], int64_t{0}, size));
+          read *= end[k] - from[k];
+          all *= first >= 0 && hi[k] == v.size[k] ? end[k] - from[k] : factor[k];
+        }
+        votes[0] = all - read;  // beyond the volume
+        if (all > read) seen.push_back(0);
+        for (uint32_t k = from[2]; k < end[2]; ++k)
+          for (uint32_t j = from[1]; j < end[1]; ++j)
+            for (uint32_t i = from[0]; i < end[0]; ++i) {
               const uint16_t label = v.voxel[i + size_t(v.size[0]) * (j + size_t(v.size[1]) * k)];
               if (votes[label]++ == 0) seen.push_back(label);
             }
@@ -244,25 +284,14 @@ Volume coarsened(const Volume &v, const std::array<uint32_t, 3> &factor) {
 }
 
 Volume cropped(const Volume &v) {
-  std::array<uint32_t, 3> lo = v.size, hi{};
-  size_t at = 0;
-  for (uint32_t k = 0; k < v.size[2]; ++k)
-    for (uint32_t j = 0; j < v.size[1]; ++j)
-      for (uint32_t i = 0; i < v.size[0]; ++i)
-        if (v.voxel[at++] != 0) {
-          const uint32_t c[3] = {i, j, k};
-          for (size_t a = 0; a < 3; ++a) {
-            lo[a] = std::min(lo[a], c[a]);
-            hi[a] = std::max(hi[a], c[a] + 1);
-          }
-        }
+  std::array<uint32_t, 3> lo, hi;
+  find_labels(v, lo, hi);
   Volume out;
   out.value = v.value;
   out.name = v.name;
   out.notes = v.notes;
   std::copy_n(v.origin, 3, out.origin);
   for (size_t a = 0; a < 3; ++a) {
-    if (hi[a] == 0) lo[a] = 0;  // nothing but background
     if (lo[a] > 0) --lo[a];
     if (hi[a] < v.size[a]) ++hi[a];
     out.size[a] = hi[a] - lo[a];

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <utility>
 
+#include "cell_volume.h"
 #include "file.h"
 #include "label_fit.h"
 #include "messages.h"
@@ -47,7 +49,7 @@ class Maker {
     cli::make_folder(o_.out + "/surfaces");
     for (size_t e = 0; e < table_.entries.size(); ++e) write_label(e);
     for (size_t t = 0; t < table_.things.size(); ++t) write_thing(t);
-    cli::write_whole(o_.out + "/labels.json", table_text(table_, volume_) + "\n");
+    if (writes_table_) cli::write_whole(o_.out + "/labels.json", table_text(table_, volume_) + "\n");
     write_scene();
     return std::move(report_);
   }
@@ -73,6 +75,12 @@ class Maker {
           "one "
           "body; change " +
           o_.out + "/labels.json and give it by --table");
+    const std::string own = o_.out + "/labels.json";  // the user changes it
+    std::error_code absent;
+    writes_table_ = !std::filesystem::equivalent(o_.table, own, absent);
+    if (o_.table.empty() && std::filesystem::exists(own) &&
+        cli::read_file(own, 64u << 20, "a table of labels") != table_text(table_, volume_) + "\n")
+      refuse(own, "a table with other entries is there already; give it by --table, or remove it");
     std::vector<bool> kept(volume_.value.size(), false);
     for (const Entry &e : table_.entries) kept[e.label] = true;
     count_.assign(volume_.value.size(), 0);
@@ -110,7 +118,6 @@ class Maker {
     std::vector<uint32_t> group(volume_.value.size(), 0);
     for (const Entry &e : table_.entries) group[e.label] = uint32_t(e.thing) + 1;
     repaired_ = compose(o_.volume, volume_, group);
-    report_.taken = volume_.size;
     if (repaired_.voxels)
       warn(std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
            " another label than in the file: there a label touched itself only along an edge or at a corner, "
@@ -331,7 +338,7 @@ class Maker {
     r.cells = uint32_t(cells.share.size());
     std::vector<double> volume(r.cells);
     for (uint32_t c = 0; c < r.cells; ++c)
-      volume[c] = cells.share[c] * cell_volume(cells.points.data(), &cells.tets[4 * size_t(c)]);
+      volume[c] = cells.share[c] * cli::cell_volume(cells.points.data(), &cells.tets[4 * size_t(c)]);
     const std::vector<size_t> of_cell = labels_of(t, cells.points.data(), cells.tets.data(), volume);
     for (uint32_t c = 0; c < r.cells; ++c) {
       LabelReport &label = report_.labels[of_cell[c]];
@@ -352,16 +359,6 @@ class Maker {
     }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, cells, of_cell);
     return info.edge_median;
-  }
-
-  static double cell_volume(const double *x, const uint32_t *tet) {
-    double e[3][3];
-    for (size_t k = 0; k < 3; ++k)
-      for (size_t c = 0; c < 3; ++c) e[k][c] = x[3 * size_t(tet[k + 1]) + c] - x[3 * size_t(tet[0]) + c];
-    return (e[0][0] * (e[1][1] * e[2][2] - e[1][2] * e[2][1]) -
-            e[0][1] * (e[1][0] * e[2][2] - e[1][2] * e[2][0]) +
-            e[0][2] * (e[1][0] * e[2][1] - e[1][1] * e[2][0])) /
-           6;
   }
 
   // Places in a cell that each label of this body has, of 35; where none has one, the nearest voxel's label.
@@ -631,8 +628,10 @@ class Maker {
       for (const JsonValue &o : own->items) obstacles.push_back(cli::json_text(o));
     else if (!held) {
       const double point[3] = {0, 0, lowest_};
+      std::string name = "floor";
+      while (std::ranges::find(table_.things, name, &Thing::name) != table_.things.end()) name += '_';
       obstacles.push_back(JsonObject()
-                              .add("name", "\"floor\"")
+                              .add("name", cli::quoted(name))
                               .add("shape", "\"plane\"")
                               .add("point", cli::json_vector(point))
                               .text());
@@ -685,6 +684,7 @@ class Maker {
   std::vector<double> inverse_;  // rows that give voxels for meters
   double lowest_ = INFINITY;
   Report report_;
+  bool writes_table_ = true;
 };
 
 }  // namespace

@@ -40,8 +40,7 @@ struct Border {
   double stiffness = 0, damping = 0;  // N/m, N s/m
 };
 struct Report {
-  std::array<uint32_t, 3> size{}, taken{};  // voxels of the file, and of what the surfaces were made from
-  std::array<uint32_t, 3> factor{};
+  std::array<uint32_t, 3> size{}, factor{};  // voxels of the file, and how many were joined
   std::vector<LabelReport> labels;
   std::vector<ThingReport> things;
   std::vector<Border> borders;

@@ -264,8 +264,10 @@ Table default_table(const Volume &v, const std::vector<std::array<uint16_t, 2>> 
     e.label = uint16_t(i);
     const auto named = v.name.find(v.value[i]);
     if (named != v.name.end()) e.name = plain_name(named->second);
-    if (e.name.empty() || !names.insert(e.name).second) e.name = "label_" + std::to_string(v.value[i]);
-    names.insert(e.name);
+    if (e.name.empty() || !names.insert(e.name).second) {
+      e.name = "label_" + std::to_string(v.value[i]);
+      while (!names.insert(e.name).second) e.name += '_';  // the file gives it to another one
+    }
     e.material = "tissue";
     size_t t = 0;
     while (t < out.things.size() && out.entries[out.things[t].entries[0]].label != first[i]) ++t;

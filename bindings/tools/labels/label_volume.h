@@ -47,8 +47,9 @@ Volume read_labels(const std::string &path, std::string_view bytes, double unit)
 struct Stored {
   Volume volume;  // all but voxel and value
   Encoding encoding;
-  std::string file;  // with the voxels, as the header names it; empty: they follow the header
-  int64_t skip = 0;  // bytes before the data; -1: the data are the last bytes
+  std::string file;            // with the voxels, as the header names it; empty: they follow the header
+  int64_t skip = 0;            // bytes before the data; -1: the data are the last bytes
+  uint64_t skip_unpacked = 0;  // bytes of what is unpacked
   uint32_t skip_lines = 0;
   size_t data_at = 0;  // where the header ends
   double unit = 0;     // m; 0: the header does not say

@@ -205,7 +205,7 @@ class Collector {
 }
 
 // gzip and zlib alike; members that follow each other are one stream.
-void inflate_into(const std::string &path, std::string_view packed, Collector &out) {
+void inflate_into(const std::string &path, std::string_view packed, uint64_t skip, Collector &out) {
   struct Stream {
     z_stream z = {};
     Stream() {
@@ -221,7 +221,9 @@ void inflate_into(const std::string &path, std::string_view packed, Collector &o
     z.next_out = reinterpret_cast<Bytef *>(block.data());
     z.avail_out = uInt(block.size());
     const int code = inflate(&z, Z_NO_FLUSH);
-    out.take(block.data(), block.size() - z.avail_out);
+    const size_t n = block.size() - z.avail_out, skipped = size_t(std::min(uint64_t(n), skip));
+    skip -= skipped;
+    out.take(block.data() + skipped, n - skipped);
     if (code == Z_STREAM_END && z.avail_in > 0 && !out.full()) inflateReset(&z);
     else if (code == Z_BUF_ERROR || (code == Z_OK && z.avail_in == 0 && z.avail_out > 0)) break;
     else if (code == Z_STREAM_END) break;
@@ -259,7 +261,7 @@ void take_voxels(const std::string &path, const Stored &stored, std::string_view
     return;
   }
   if (promised / kMaxDeflated > bytes.size()) truncated(path, promised - bytes.size() * kMaxDeflated);
-  inflate_into(path, bytes, out);
+  inflate_into(path, bytes, stored.skip_unpacked, out);
 }
 
 std::string beside(const std::string &path, const std::string &name) {

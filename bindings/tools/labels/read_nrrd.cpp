@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "header_lines.h"
 
@@ -235,6 +236,8 @@ class Reader : private HeaderLines {
 
   // Three axes of space are left, and each has a step.
   void finish() {
+    if (stored_.encoding.compressed && stored_.skip > 0)  // NRRD counts them so
+      stored_.skip_unpacked = uint64_t(std::exchange(stored_.skip, 0));
     if (stored_.encoding.bytes == 0) missing("type");
     if (!encoded_) missing("encoding");
     if (dimension_ == 0) missing("dimension");

@@ -352,7 +352,7 @@ class Builder {
                                 (mesh.lo[2] + mesh.hi[2]) / 2};
       jitter_.apply(mesh.size, center, d.pose, d.velocity, d.spin);
     }
-    if (!b.on.empty()) put_on(b, mesh);
+    if (!b.on.empty()) d.pose = put_on(context_, def_, files_, b, mesh);
     dfm_body body = 0;
     def_.require(dfm_body_create(world_, &d, &body), b.pointer);
     if (b.sensor) def_.require(dfm_body_set_sensor(body, true), b.pointer);
@@ -370,28 +370,6 @@ class Builder {
     }
     for (const Probe &p : def_.probes)
       if (p.body == b.name) add_probe(body, p, mesh);
-  }
-
-  // At about the rest distance of contacts above what it lies on, so that it neither overlaps nor falls.
-  void put_on(Body &b, const BodyMesh &mesh) {
-    constexpr double kGap = 1e-4;  // of the body's size
-    Obstacle o = *std::find_if(def_.obstacles.begin(), def_.obstacles.end(),
-                               [&b](const Obstacle &it) { return it.name == b.on; });
-    o.def.name = o.name.c_str();
-    if (o.start) o.def.pose = *o.start;
-    o.def.nkey = o.start ? 0 : uint32_t(o.keys.size());
-    o.def.keys = o.keys.data();
-    std::vector<double> scaled, points = mesh.wears_skin ? mesh.skin.points : mesh.points;
-    if (!o.mesh.empty()) files_.load(o, scaled);
-    const Quat turn = unit_quat(b.def.pose.rotation);
-    for (size_t i = 0; i < points.size(); i += 3)
-      store3(&points[i], rotate(turn, load3(&points[i])) + load3(b.def.pose.position));
-    const Vec3 down = load3(def_.world.gravity);
-    double up[3];
-    store3(up, norm(down) > 0 ? (-1 / norm(down)) * down : Vec3{0, 0, 1});
-    const double lift =
-        with_pointer(b.pointer + "/place", [&] { return lift_onto(context_, o.def, points, up); });
-    for (size_t k = 0; k < 3; ++k) b.def.pose.position[k] += (lift + kGap * mesh.size) * up[k];
   }
 
   // Also moves held points, which dfm_body_set_state does not move.

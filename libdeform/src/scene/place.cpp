@@ -6,6 +6,7 @@
 #include "core/error.h"
 #include "deform/query.h"
 #include "deform/world.h"
+#include "math/turn.h"
 #include "math/vec3.h"
 
 namespace dfm::scene {
@@ -44,8 +45,8 @@ double reach_of(const dfm_obstacle_def &o) {
   return out;
 }
 
-}  // namespace
-
+// m, along `up` (unit), negative where it is down: how far points [n,3] move so that their convex hull
+// touches the obstacle from above. It is found in a world of its own by the queries that any program has.
 double lift_onto(dfm_context *context, const dfm_obstacle_def &on, const std::vector<double> &points,
                  const double up_[3]) {
   Scratch scratch;
@@ -83,6 +84,36 @@ double lift_onto(dfm_context *context, const dfm_obstacle_def &on, const std::ve
   if (hits.n == 0)
     fail(DFM_E_ARG, "the body is not above or below '%s'; move it there by its \"pose\"", on.name);
   return raised - hit.distance;
+}
+
+}  // namespace
+
+dfm_pose put_on(dfm_context *context, const Definition &def, MeshFiles &files, const Body &b,
+                const BodyMesh &mesh) {
+  constexpr double kGap = 1e-4;  // of the body's size
+  Obstacle o = *std::find_if(def.obstacles.begin(), def.obstacles.end(),
+                             [&b](const Obstacle &it) { return it.name == b.on; });
+  o.def.name = o.name.c_str();
+  if (o.start) o.def.pose = *o.start;
+  o.def.nkey = o.start ? 0 : uint32_t(o.keys.size());
+  o.def.keys = o.keys.data();
+  std::vector<double> scaled, points = mesh.wears_skin ? mesh.skin.points : mesh.points;
+  if (!o.mesh.empty()) files.load(o, scaled);
+  const Quat turn = unit_quat(b.def.pose.rotation);
+  for (size_t i = 0; i < points.size(); i += 3)
+    store3(&points[i], rotate(turn, load3(&points[i])) + load3(b.def.pose.position));
+  const Vec3 down = load3(def.world.gravity);
+  double up[3];
+  store3(up, norm(down) > 0 ? (-1 / norm(down)) * down : Vec3{0, 0, 1});
+  double lift = 0;
+  try {
+    lift = lift_onto(context, o.def, points, up);
+  } catch (const Error &e) {
+    def.refuse(b.pointer + "/place", e.what(), e.status);
+  }
+  dfm_pose pose = b.def.pose;
+  for (size_t k = 0; k < 3; ++k) pose.position[k] += (lift + kGap * mesh.size) * up[k];
+  return pose;
 }
 
 }  // namespace dfm::scene

@@ -1,15 +1,12 @@
 // A body put on an obstacle, as "place" asks.
 #pragma once
-#include <vector>
-
-#include "deform/obstacle.h"
+#include "scene/load.h"
 
 namespace dfm::scene {
 
-// m, along `up` (unit), negative where it is down: how far points [n,3] move so that their convex hull
-// touches the obstacle from above. It is found in a world of its own by the queries that any program has.
-// Throws where the obstacle is a wall, or does not lie below or above the points.
-double lift_onto(dfm_context *context, const dfm_obstacle_def &on, const std::vector<double> &points,
-                 const double up[3]);
+// At about the rest distance of contacts above the obstacle of its scene that it lies on, so that it neither
+// overlaps nor falls. Throws where that is a wall, or does not lie below or above the body.
+dfm_pose put_on(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
+                const BodyMesh &mesh);
 
 }  // namespace dfm::scene

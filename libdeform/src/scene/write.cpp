@@ -125,8 +125,12 @@ std::string beside(const std::string &path, const std::string &name) {
 }  // namespace
 
 std::string SceneWriter::file(const std::string &name, std::function<void(const std::string &)> write) {
-  files.push_back({name, std::move(write)});
-  return folder_name(path) + "/" + name;
+  std::string fresh = name;  // a body may be called as the surface of another one
+  const size_t end = std::min(name.rfind('.'), name.size());
+  for (int k = 2; !file_names.insert(fresh).second; ++k)
+    fresh = name.substr(0, end) + "_" + std::to_string(k) + name.substr(end);
+  files.push_back({fresh, std::move(write)});
+  return folder_name(path) + "/" + fresh;
 }
 
 std::string SceneWriter::text_file(const std::string &name, std::string text) {
@@ -545,8 +549,10 @@ void print(const Written &value, const std::string &before, std::string &out) {
   out += "\n" + before + (value.is_object() ? "}" : "]");
 }
 
+constexpr const char *kSnapshot = "snapshot.state";
+
 // A snapshot fits a world that was made in the same way, so the scene is read and compared.
-void write_snapshot(SceneWriter &to, const std::string &name) {
+void write_snapshot(SceneWriter &to) {
   scene::Scene back(to.w.context, to.path, nullptr);
   const World &made = resolve<World>(Kind::world, back.world());
   if (snapshot_structure(made) != snapshot_structure(to.w)) {
@@ -559,7 +565,7 @@ void write_snapshot(SceneWriter &to, const std::string &name) {
   }
   std::vector<unsigned char> bytes;
   world_snapshot(to.w, bytes);
-  AtomicFile file(beside(to.path, name));
+  AtomicFile file(beside(to.path, kSnapshot));
   file.write(bytes.data(), bytes.size());
   file.commit();
 }
@@ -585,7 +591,9 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
   for (const SceneWriter::File &f : to.files) f.write(beside(path, f.name));
   scene.write(text + "\n");
   scene.commit();
-  if (options.snapshot) write_snapshot(to, "snapshot.state");
+  std::error_code absent;  // that of an earlier scene
+  std::filesystem::remove(whole.parent_path() / path_of(folder_name(path)) / kSnapshot, absent);
+  if (options.snapshot) write_snapshot(to);
 }
 
 }  // namespace dfm::writing

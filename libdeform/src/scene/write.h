@@ -45,7 +45,8 @@ struct SceneWriter {
     std::function<void(const std::string &path)> write;
   };
   std::vector<File> files{};  // written when it is known that nothing is refused
-  std::string first{};        // of the sentences
+  std::set<std::string> file_names{};
+  std::string first{};  // of the sentences
   Written materials = Written::object();
   std::map<std::string, std::pair<std::string, Written>> material_keys{};  // name and entries by key
   std::set<std::string> model_keys{};                                      // parameters of any loaded model

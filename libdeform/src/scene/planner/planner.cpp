@@ -10,6 +10,7 @@
 #include "plugin/context.h"
 #include "scene/device.h"
 #include "scene/load.h"
+#include "scene/place.h"
 
 namespace dfm::scene {
 namespace {
@@ -128,8 +129,11 @@ class Reader {
 
   std::vector<BodyRegime> run(const Measured &measured) {
     for (const Body &b : def_.bodies) meshes_.push_back(files_.load(b));
-    for (size_t i = 0; i < meshes_.size(); ++i)
-      boxes_.push_back(place(load3(meshes_[i].lo), load3(meshes_[i].hi), def_.bodies[i].def.pose));
+    for (size_t i = 0; i < meshes_.size(); ++i) {
+      const Body &b = def_.bodies[i];
+      const dfm_pose pose = b.on.empty() ? b.def.pose : put_on(context_, def_, files_, b, meshes_[i]);
+      boxes_.push_back(place(load3(meshes_[i].lo), load3(meshes_[i].hi), pose));
+    }
     std::vector<BodyRegime> out;
     for (size_t i = 0; i < meshes_.size(); ++i) out.push_back(regime(i, measured));
     return out;
@@ -243,12 +247,32 @@ class Reader {
 
   static bool moves(const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; }
   static bool thrown(const Body &b) { return length(b.def.velocity) > 0 || length(b.def.spin) > 0; }
-  static bool held(const Body &b) { return !b.fixes.empty() || !b.nodal_bc.empty(); }
+  static bool fixed(const Body &b) { return !b.fixes.empty() || !b.nodal_bc.empty(); }
+  bool held(const Body &b) const {
+    const auto holds = [&](const Attach &a) {
+      return std::ranges::find(def_.obstacles, a.to, &Obstacle::name) != def_.obstacles.end() ||
+             std::ranges::any_of(def_.bodies, [&](const Body &o) { return o.name == a.to && fixed(o); });
+    };
+    return fixed(b) || std::ranges::any_of(b.attach, holds);
+  }
+
+  // Jaws, blades and ellipsoids count as boxes. Without keys it is not known where the tool comes to.
+  static Obstacle solid_of(const Tool &t) {
+    constexpr int32_t kShapes[] = {DFM_SHAPE_SPHERE, DFM_SHAPE_CAPSULE, DFM_SHAPE_BOX, DFM_SHAPE_MESH};
+    Obstacle o = t.solid;
+    o.def.shape = t.def.shape <= DFM_TOOL_MESH ? kShapes[t.def.shape] : DFM_SHAPE_BOX;
+    o.def.radius = t.def.radius;
+    o.def.half_length = t.def.half_length;
+    std::copy_n(t.def.half_size, 3, o.def.half_size);
+    o.def.pose = t.def.pose;
+    o.keys = t.keys;
+    return o;
+  }
 
   // Something moves toward it, independent of gravity.
   bool something_moves() const {
-    return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moves) || !def_.rigid.bodies.empty() ||
-           (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
+    return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moves) || !def_.tools.empty() ||
+           !def_.rigid.bodies.empty() || (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
   }
   bool one_is_thrown() const { return std::any_of(def_.bodies.begin(), def_.bodies.end(), thrown); }
 
@@ -281,7 +305,7 @@ class Reader {
       comes += length(by) > 0;
       r.approach = std::max(r.approach, length(by) / (o.keys[k].t - o.keys[k - 1].t));
     }
-    if (o.def.sine.frequency > 0) comes = HUGE_VAL;
+    if (o.def.sine.frequency > 0 || o.keys.empty()) comes = HUGE_VAL;
     r.presses += comes;
     const double swing = length(o.def.sine.amplitude);
     r.approach = std::max(r.approach, 2 * kPi * o.def.sine.frequency * swing);
@@ -296,17 +320,18 @@ class Reader {
       r.met = "'" + name + "'";
     };
     const bool flies = one_is_thrown();
-    for (const Obstacle &o : def_.obstacles) {
+    const auto meet = [&](Obstacle copy, bool comes) {
       std::vector<double> scaled;
-      Obstacle copy = o;
       if (!copy.mesh.empty()) files_.load(copy, scaled);
       const bool plane = copy.def.shape == DFM_SHAPE_PLANE;
       const double least = plane ? fall_to_plane(boxes_[i], down_, copy.def.pose)
                                  : fall_to_box(boxes_[i], down_, box_of(copy, scaled));
       fall = std::min(fall, least);
-      if ((!r.held && least <= falls) || moves(o) || flies) narrow(width_of(i, copy, scaled), o.name);
-      if (moves(o)) add_approach(i, o, r);
-    }
+      if ((!r.held && least <= falls) || comes || flies) narrow(width_of(i, copy, scaled), copy.name);
+      if (comes) add_approach(i, copy, r);
+    };
+    for (const Obstacle &o : def_.obstacles) meet(o, moves(o));
+    for (const Tool &t : def_.tools) meet(solid_of(t), true);
     for (const RigidBody &body : def_.rigid.bodies) {
       const dfm_rigid_def &d = body.def;
       const bool round = d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE;
@@ -462,6 +487,14 @@ json plan_scene(dfm_context *context, const Definition &def, json &tree) {
     lattice = std::move(sizes);
   }
   const char *const key = wish.target > 0 ? "accuracy" : "budget";
+  const auto named = [](const BodyRegime &b) { return b.scheme >= 0; };
+  const auto first = std::ranges::find_if(bodies, named);
+  const auto differs = [&](const BodyRegime &b) { return named(b) && b.scheme != first->scheme; };
+  if (!plan.found && std::ranges::any_of(bodies, differs))
+    fail(DFM_E_UNSUPPORTED,
+         "%s: /%s: bodies that name different integrators are not planned; name one for all of them, or name "
+         "models and step and remove \"%s\"",
+         def.file.c_str(), key, key);
   if (!plan.found)
     fail(DFM_E_UNSUPPORTED,
          "%s: /%s: there are no measured costs for the models and integrators that this scene names; run "
