@@ -101,9 +101,10 @@ uint32_t Finder::find(uint32_t n, Fan *out) {
       const uint32_t slot = around_[begin].slot, *own = &body_.cell_edge[6 * size_t(body_.cell_id[slot])];
       const auto *ends = model::kEdgeOf[std::find(own, own + 6, edge) - own];
       const uint32_t p = body_.cell[slot].p[ends[0]], q = body_.cell[slot].p[ends[1]];
-      while (longest(&around_[begin], end - begin, std::min(p, q), std::max(p, q), out[found]) >= wanted) {
-        for (uint32_t k = 0; k < out[found].cells; ++k) taken_[out[found].slot[k] - first_] = 1;
-        ++found;
+      Fan fan;
+      while (longest(&around_[begin], end - begin, std::min(p, q), std::max(p, q), fan) >= wanted) {
+        for (uint32_t k = 0; k < fan.cells; ++k) taken_[fan.slot[k] - first_] = 1;
+        out[found++] = fan;
       }
     }
   return found;

@@ -122,3 +122,30 @@ TEST(Impact, UndampedBallOnPlane_NeverGainsEnergy) {
     EXPECT_NEAR(test::measure(ball).velocity[0], 0.2, 1e-12);
   }
 }
+
+// Blocks that pass each other with some clearance do not touch, neither with small steps nor with large ones,
+// within which they could come nearer by more than the clearance.
+TEST(Impact, BlocksThatPassEachOther_DoNotTouch) {
+  struct Row { double clearance, step, speed; };
+  for (const Row &row : {Row{1e-3, 1e-3, 1.0}, {5e-4, 2.5e-4, 1.0}, {9e-3, 5e-3, 1.0}, {11e-3, 16e-3, 0.5}}) {
+    test::Context context;
+    const dfm_world world = test::make_world(context, {0, 0, 0});
+    test::BodyOptions a, b;
+    a.name = "still";
+    b.name = "passing";
+    a.young = b.young = 2e5;
+    a.integrator = b.integrator = row.step > 1e-3 ? DFM_INTEGRATOR_TR_BDF2 : DFM_INTEGRATOR_AUTO;
+    b.position = {-0.1 - row.clearance, 0.02, 0.2};
+    b.velocity = {0, 0, -row.speed};
+    test::make_body(context, world, "beam", {0.1, 0.1, 0.1}, 96, a);
+    const dfm_body passing = test::make_body(context, world, "beam", {0.1, 0.06, 0.1}, 96, b);
+    uint32_t most = 0;
+    for (double t = 0; t < 0.3 / row.speed; t += row.step) {
+      test::run(world, row.step, row.step);
+      most = std::max(most, test::stats(world).contacts);
+    }
+    EXPECT_EQ(most, 0u) << row.clearance;
+    const dfm_body_measure m = test::measure(passing);
+    EXPECT_NEAR(m.momentum[2] / m.mass, -row.speed, 1e-9) << row.clearance;
+  }
+}

@@ -104,6 +104,35 @@ TEST(SelfContact, LegsThrownTogether_StayApartWhereItIsOnAndPassWhereItIsOff) {
   }
 }
 
+// Edges that end beside other edges come past them, not onto them.
+TEST(SelfContact, PiecesThatPassEachOther_DoNotTouch) {
+  const test::Context c;
+  const dfm_world w = test::make_self_world(c);
+  const double size[3] = {0.1, 0.06, 0.1};
+  dfm_mesh_handle block = 0;
+  test::ok(dfm_mesh_make(c, "beam", size, DFM_MESH_CELLS, 96, &block));
+  const dfm_mesh_info info = test::info_of(block);
+  std::vector<double> points(info.points, info.points + 3 * info.npoint), v(6 * info.npoint, 0.0);
+  std::vector<uint32_t> tets(info.tets, info.tets + 4 * info.ntet);
+  const double shift[3] = {-0.101, 0.02, 0.2};
+  for (size_t i = 0; i < 3 * info.npoint; ++i) points.push_back(points[i] + shift[i % 3]);
+  for (size_t i = 0; i < 4 * info.ntet; ++i) tets.push_back(tets[i] + info.npoint);
+  for (size_t i = 3 * info.npoint + 2; i < v.size(); i += 3) v[i] = -1;
+  dfm_body_def d = dfm_body_def_default();
+  d.npoint = 2 * info.npoint;
+  d.ntet = 2 * info.ntet;
+  d.points = points.data();
+  d.tets = tets.data();
+  d.material = test::make_material(w, {});
+  dfm_body b = 0;
+  test::ok(dfm_body_create(w, &d, &b));
+  test::ok(dfm_body_set_state(b, d.npoint, points.data(), v.data()));
+  test::run(w, 0.3, 1e-3);
+  EXPECT_EQ(test::stats(w).contacts_max, 0u);
+  const State after = state(b);
+  for (size_t i = 2; i < v.size(); i += 3) EXPECT_NEAR(after.v[i], v[i], 1e-9);
+}
+
 TEST(SelfContact, Report_NamesItselfOnBothSidesAndSumsToZero) {
   const test::Context c;
   const dfm_world w = test::make_self_world(c);

@@ -255,6 +255,17 @@ TEST(Lattice, WhatCannotBeOne_SaysSo) {
   EXPECT_EQ(dfm_mesh_lattice(crossing, 100, 0, &mesh), DFM_E_FORMAT);
   test::says({"crosses itself", "fill"});
 
+  // askew to the axes, so that it is in many cells and fills none
+  const double thin = 1e-9;
+  const std::vector<double> needle{0, 0, 0, thin, -thin, 0, 0, thin, -thin, 1, 1, 1};
+  const std::vector<uint32_t> sides{0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3};
+  dfm_mesh_handle hair = 0;
+  test::ok(dfm_mesh_create(context, 4, needle.data(), 4, sides.data(), &hair));
+  for (const double size : {0.0, 0.5}) {
+    EXPECT_EQ(dfm_mesh_lattice(hair, size > 0 ? 0 : 10, size, &mesh), DFM_E_FORMAT);
+    test::says({"encloses less than 1e-12 of every cell"});
+  }
+
   test::ok(dfm_mesh_lattice(whole, 8, 0, &mesh));
   const dfm_world world = test::make_world(context);
   dfm_body_def d = dfm_body_def_default();

@@ -18,5 +18,5 @@ int main(int argc, char **argv) {
 
 TEST(Smoke, StateHash_IsTheRecordedOne) {
   const scenes::Scene scene = {"ten_in_a_box", [](dfm_context *c) { return scenes::ten_in_a_box(c); }, 80};
-  EXPECT_EQ(scenes::hex(scenes::run(scene)), "ea8160152d7adfee");
+  EXPECT_EQ(scenes::hex(scenes::run(scene)), "f2db41443b7f564e");
 }

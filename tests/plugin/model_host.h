@@ -34,6 +34,10 @@ inline Vec cross(Vec a, Vec b) {
 }
 inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 
+// What stays as it is behind the end of each allocation.
+constexpr size_t kBehind = 256;
+constexpr char kUntouched = 0x5a;
+
 // Services. `shuffle` > 0: parallel_for hands out its pieces in a random cut and order.
 struct Host {
   dfm_host table{};
@@ -51,10 +55,15 @@ struct Host {
       if (h.calls++ == h.fail_at) return nullptr;
       h.live += bytes;
       h.peak = std::max(h.peak, h.live);
-      return std::aligned_alloc(align, (bytes + align - 1) / align * align);
+      void *p = std::aligned_alloc(align, (bytes + kBehind + align - 1) / align * align);
+      std::memset(static_cast<char *>(p) + bytes, kUntouched, kBehind);
+      return p;
     };
     table.release = [](void *c, void *p, size_t bytes, size_t) {
       static_cast<Host *>(c)->live -= bytes;
+      const char *behind = static_cast<char *>(p) + bytes;
+      EXPECT_TRUE(std::all_of(behind, behind + kBehind, [](char b) { return b == kUntouched; }))
+          << "written behind the end of " << bytes << " bytes";
       std::free(p);
     };
     table.log = [](void *c, int32_t, uint32_t, const char *text) {

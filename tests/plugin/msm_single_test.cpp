@@ -180,6 +180,23 @@ TEST(MsmSingle, CellsAroundOneEdge_AnyNumber_HaveTheForcesOfDouble) {
       }
 }
 
+// Every cell is a fan of its own then, and their array is full.
+TEST(MsmSingle, CellsThatShareNoFace_HaveTheForcesOfDouble) {
+  Mesh m;
+  const Mesh one = regular_tet();
+  for (uint32_t c = 0; c < 8; ++c) {
+    for (const uint32_t k : one.cells) m.cells.push_back(m.npoint() + k);
+    for (uint32_t k = 0; k < 4; ++k)
+      for (const double x : one.at(k) + Vec{2.0 * c, 0, 0}) m.rest.push_back(x);
+  }
+  m.finish();
+  Host host;
+  Single b(host, m, kFull);
+  ASSERT_EQ(b.prepare(), DFM_OK);
+  b.shake(5e-3, 0.1);
+  EXPECT_LT(b.difference(), bound_of(kFull, 1));
+}
+
 TEST(MsmSingle, ParametersAndMasks_ReachBoth) {
   Host host;
   const double h = 0.1;

@@ -266,8 +266,8 @@ double first_below(const double b[4], double lo, double hi, double limit, int ha
 }  // namespace
 
 // Along a line, what is joined trilinearly is a cubic from one cell's border to the next; four places inside
-// give it, borders themselves may belong to either side. Bricks that are not kept are further than the band
-// from the surface.
+// give it, borders themselves may belong to either side. Outside the grid, distances have a bound and so do
+// their changes: 1 by the way to the grid, sqrt(3) by the place in it.
 double VoxelGrid::touch(Vec3 from, Vec3 way, double limit) const {
   constexpr int kHalvings = 40;
   for (double t = 0; t < 1;) {
@@ -278,20 +278,24 @@ double VoxelGrid::touch(Vec3 from, Vec3 way, double limit) const {
       const double border = way[k] > 0 ? std::floor(x + 1e-9) + 1 : std::ceil(x - 1e-9) - 1;
       next = std::min(next, std::max((origin_[k] + border * cell_ - from[k]) / way[k], t + 1e-12));
     }
-    const Place middle = place(from + (0.5 * (t + next)) * way);
-    if (brick_[index(middle.brick)] != kNone) {
-      double p[4], b[4];
-      for (int i = 0; i < 4; ++i) p[i] = at(from + (t + (0.125 + 0.25 * i) * (next - t)) * way).distance;
-      // p(v) = a0 + a1 v + a2 v^2 + a3 v^3 through v = -3/2, -1/2, 1/2, 3/2; the ends are v = -2 and 2
-      const double a0 = (9 * (p[1] + p[2]) - p[0] - p[3]) / 16, a1 = (p[0] - p[3] + 27 * (p[2] - p[1])) / 24;
-      const double a2 = (p[0] - p[1] - p[2] + p[3]) / 4, a3 = (p[3] - p[0] + 3 * (p[1] - p[2])) / 6;
-      b[0] = a0 - 2 * a1 + 4 * a2 - 8 * a3;
-      b[3] = a0 + 2 * a1 + 4 * a2 + 8 * a3;
-      b[1] = b[0] + (4.0 / 3) * (a1 - 4 * a2 + 12 * a3);
-      b[2] = b[3] - (4.0 / 3) * (a1 + 4 * a2 + 12 * a3);
-      const double first = first_below(b, t, next, limit, kHalvings);
-      if (first < HUGE_VAL) return first;
+    const Vec3 middle = from + (0.5 * (t + next)) * way;
+    if (norm2(middle - place(middle).inside) > 0) {
+      const double change = (1 + kSqrt3) * 0.5 * (next - t) * norm(way);
+      if (limit > margin_ && !(at(middle).distance - change > limit)) return t;
+      t = next;
+      continue;
     }
+    double p[4], b[4];
+    for (int i = 0; i < 4; ++i) p[i] = at(from + (t + (0.125 + 0.25 * i) * (next - t)) * way).distance;
+    // p(v) = a0 + a1 v + a2 v^2 + a3 v^3 through v = -3/2, -1/2, 1/2, 3/2; the ends are v = -2 and 2
+    const double a0 = (9 * (p[1] + p[2]) - p[0] - p[3]) / 16, a1 = (p[0] - p[3] + 27 * (p[2] - p[1])) / 24;
+    const double a2 = (p[0] - p[1] - p[2] + p[3]) / 4, a3 = (p[3] - p[0] + 3 * (p[1] - p[2])) / 6;
+    b[0] = a0 - 2 * a1 + 4 * a2 - 8 * a3;
+    b[3] = a0 + 2 * a1 + 4 * a2 + 8 * a3;
+    b[1] = b[0] + (4.0 / 3) * (a1 - 4 * a2 + 12 * a3);
+    b[2] = b[3] - (4.0 / 3) * (a1 + 4 * a2 + 12 * a3);
+    const double first = first_below(b, t, next, limit, kHalvings);
+    if (first < HUGE_VAL) return first;
     t = next;
   }
   return HUGE_VAL;

@@ -55,9 +55,10 @@ class AngleSum {
 
 // Half the solid angle of a triangle seen from the origin is the angle of (x, y) (van Oosterom and
 // Strackee 1983, eq. 8).
-void add_triangle(AngleSum &sum, Vec3 a, Vec3 b, Vec3 c) {
-  const double la = norm(a), lb = norm(b), lc = norm(c);
-  sum.add(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb, dot(a, cross(b, c)));
+void add_triangle(AngleSum &sum, Vec3 a, Vec3 b, Vec3 c, double flat = -1) {
+  const double la = norm(a), lb = norm(b), lc = norm(c), triple = dot(a, cross(b, c));
+  if (std::fabs(triple) <= flat * (la * lb * lc)) return;
+  sum.add(la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb, triple);
 }
 
 }  // namespace
@@ -134,7 +135,7 @@ void WindingTree::sum_up(Box &box) const {
   box.reach = std::sqrt(reach2);
 }
 
-double WindingTree::at(Vec3 place) const {
+double WindingTree::at(Vec3 place, double flat) const {
   AngleSum near;
   double far = 0;
   uint32_t stack[64], top = 0;
@@ -155,7 +156,7 @@ double WindingTree::at(Vec3 place) const {
           i3 * (dot(r, box.area) + box.moment[0][0] + box.moment[1][1] + box.moment[2][2] - 3 * along / r2);
     } else if (box.right == 0) {
       for (uint32_t t = 3 * box.begin; t < 3 * box.end; t += 3)
-        add_triangle(near, corners_[t] - place, corners_[t + 1] - place, corners_[t + 2] - place);
+        add_triangle(near, corners_[t] - place, corners_[t + 1] - place, corners_[t + 2] - place, flat);
     } else {
       stack[top++] = box.right;
       stack[top++] = number + 1;

@@ -19,7 +19,9 @@ class WindingTree {
  public:
   // points [.,3], tris [ntri,3]. Lengths should be of order one: cubes of distances are formed.
   WindingTree(const Memory &memory, const double *points, uint32_t ntri, const uint32_t *tris);
-  double at(Vec3 place) const;          // by the tree
+  // By the tree. Near triangles whose unit vectors to the corners have a triple product of at most `flat`
+  // count 0: those in whose plane the place lies.
+  double at(Vec3 place, double flat = -1) const;
   double exactly_at(Vec3 place) const;  // the sum over all triangles
 
  private:

@@ -66,8 +66,8 @@ void LdltSolver::find_places(const BlockPattern &pattern) {
       const auto last = nodes_.rows.begin() + nodes_.row_begin[s + 1];
       at = nodes_.width(s) + uint32_t(std::lower_bound(first, last, row) - first);
     }
-    const uint32_t ld = 3 * nodes_.height(s);
-    entry_[waiting_[s]++] = {b, 3 * at + 3 * (own - nodes_.begin[s]) * ld, i < j};
+    const size_t ld = 3 * size_t{nodes_.height(s)};
+    entry_[waiting_[s]++] = {3 * size_t{at} + 3 * (own - nodes_.begin[s]) * ld, b, i < j};
   }
   size_t pack = 0;
   for (uint32_t s = 0; s < ns; ++s) pack = std::max(pack, rounded(3 * size_t{nodes_.height(s)}) * kChunk);

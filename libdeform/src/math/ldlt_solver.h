@@ -43,9 +43,12 @@ class LdltSolver final : public LinearSolver {
   Supernodes nodes_;
   uint32_t n_ = 0;
   bool ready_ = false;
-  // Blocks of A by the supernode of their column: index of the block, place of its first value in the panel,
+  // Blocks of A by the supernode of their column: place of its first value in the panel, index of the block,
   // and whether it goes there transposed.
-  struct Entry { uint32_t block, at, transposed; };
+  struct Entry {
+    size_t at;
+    uint32_t block, transposed;
+  };
   Array<uint32_t> entry_begin_;
   Array<Entry> entry_;
   Array<double> value_, pivot_, inverse_, floor_;  // L, D, 1/D, least pivots

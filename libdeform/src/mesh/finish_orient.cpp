@@ -4,14 +4,17 @@
 // outside from inside. A patch inside an odd number of others is the wall of a hole and faces into it:
 //
 //      +--------------+      depth 0 faces outward, depth 1 into the hole, depth 2 (a kernel in the hole)
-//      | ^  +----+    |      outward again. Inside is where the winding number (solid angle over 4 pi) of the
-//      | |  | <- |    |      other patch is one: van Oosterom and Strackee 1983, eq. 8. Patches that only
+//      | ^  +----+    |      outward again. Inside is where the winding number of the
+//      | |  | <- |    |      other patch is one (geometry/winding.h). Patches that only
 //      |    +----+    |      cross each other are not nested.
 //      +--------------+
 #include <algorithm>
 #include <cmath>
+#include <memory>
+#include <numeric>
 
 #include "core/disjoint_sets.h"
+#include "geometry/winding.h"
 #include "math/extent.h"
 #include "math/vec3.h"
 #include "mesh/finish.h"
@@ -22,8 +25,9 @@ namespace {
 
 // area of the fans over the area of the patch, up to which it still bounds a solid
 constexpr double kSmallOpening = 0.25;
-constexpr double kOnTriangle = 1e-10;  // triple product of the unit vectors to the corners
-constexpr double kFourPi = 12.566370614359172954;
+// triple product of the unit vectors to the corners, up to which a triangle that contains the point counts 0
+// instead of half a turn whose sign rounding decides
+constexpr double kOnTriangle = 1e-10;
 
 struct Corners { Vec3 a, b, c; };
 
@@ -39,7 +43,8 @@ struct Patch {
   bool two_sided = true, solid = false;
   double volume6 = 0, area2 = 0, fan_area2 = 0;
   Extent box;
-  std::vector<Corners> fans;  // over its openings, facing like the patch
+  std::vector<Corners> fans;          // over its openings, facing like the patch
+  std::unique_ptr<WindingTree> tree;  // made when first used
   uint32_t depth = 0;
 };
 
@@ -47,14 +52,6 @@ struct Rim { uint32_t patch, from, to; };  // a boundary edge as its patch runs 
 
 double volume6(const Corners &t, Vec3 o) { return dot(cross(t.a - o, t.b - o), t.c - o); }
 double area2(const Corners &t) { return norm(cross(t.b - t.a, t.c - t.a)); }
-
-// For a triangle that contains the point: 0 instead of a sign decided by rounding.
-double solid_angle(const Corners &t, Vec3 at) {
-  const Vec3 a = t.a - at, b = t.b - at, c = t.c - at;
-  const double la = norm(a), lb = norm(b), lc = norm(c), triple = dot(cross(a, b), c);
-  if (std::fabs(triple) <= kOnTriangle * (la * lb * lc)) return 0;
-  return 2 * std::atan2(triple, la * lb * lc + dot(a, b) * lc + dot(a, c) * lb + dot(b, c) * la);
-}
 
 class Orienter {
  public:
@@ -189,11 +186,19 @@ class Orienter {
     if (!p.solid) p.fans = {};
   }
 
-  double winding(const Patch &p, Vec3 at) const {
-    double sum = 0;
-    for (uint32_t i = p.begin; i < p.end; ++i) sum += solid_angle(corners(order_[i]), at);
-    for (const Corners &t : p.fans) sum += solid_angle(t, at);
-    return sum / kFourPi;
+  double winding(Patch &p, Vec3 at) const {
+    if (!p.tree) {
+      Array<double> points{memory_};
+      const auto add = [&](const Corners &t) {
+        for (const Vec3 &c : {t.a, t.b, t.c}) points.insert(points.end(), {c.x, c.y, c.z});
+      };
+      for (uint32_t i = p.begin; i < p.end; ++i) add(corners(order_[i]));
+      for (const Corners &t : p.fans) add(t);
+      Array<uint32_t> tris(points.size() / 3, 0, memory_);
+      std::iota(tris.begin(), tris.end(), 0u);
+      p.tree = std::make_unique<WindingTree>(memory_, points.data(), uint32_t(tris.size() / 3), tris.data());
+    }
+    return p.tree->at(at, kOnTriangle);
   }
 
   // Samples triangles at the ends of the box and some between: if a patch only intersects another, one of
@@ -226,7 +231,7 @@ class Orienter {
   }
 
   // Near one half the sample is on the other surface and decides nothing.
-  bool inside(const std::vector<Vec3> &of_patch, const Patch &other) const {
+  bool inside(const std::vector<Vec3> &of_patch, Patch &other) const {
     bool any = false;
     for (const Vec3 &s : of_patch) {
       const double w = std::fabs(winding(other, s));

@@ -368,6 +368,11 @@ Lattice lay(const RestMesh &surface, const Grid &grid) {
            "times; mesh it again, or let \"fill\" fill it, which counts what is enclosed twice once",
            out.part(c));
   give_away(out);
+  if (!out.kept)
+    fail(DFM_E_FORMAT,
+         "the surface encloses less than %g of every cell of the lattice: ask for smaller cells, or make "
+         "lattices of parts that lie far apart one by one",
+         kNothing);
   return out;
 }
 

@@ -84,9 +84,9 @@ void MshReader::run() {
     const bool parametric = !four_ && section == "$ParametricNodes";
     if (section == "$PhysicalNames") {
       read_physical_names();
-    } else if (four_ && section == "$Entities") {
+    } else if (four_ && (section == "$Entities" || section == "$PartitionedEntities")) {
       if (elements) in_.refuse("$Entities after $Elements; expected them first");
-      read_entities_4();
+      read_entities_4(section != "$Entities");
     } else if (parametric || section == "$Nodes") {
       if (nodes)
         in_.refuse("a second %s; one mesh per file is read", four_ ? "$Nodes section" : "section of nodes");

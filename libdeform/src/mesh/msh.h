@@ -55,7 +55,7 @@ class MshReader {
   Number size_type() const { return wide_ ? Number::u64 : Number::u32; }
   int64_t tag(const char *what) { return first_four_ ? number(what) : size(what); }  // of node and element
   size_t tag_bytes() const { return !in_.binary ? 2 : first_four_ ? 4 : bytes_of(size_type()); }
-  void read_entities_4();
+  void read_entities_4(bool partitioned);
   void read_nodes_4();
   void read_elements_4();
   uint32_t group_of(int32_t dimension, int32_t tag) const;

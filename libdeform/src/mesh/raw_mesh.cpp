@@ -103,7 +103,7 @@ uint32_t RawMesh::named_group(const Cursor &at, int32_t dimension, std::string_v
 }
 
 void RawMesh::expect_tets(size_t n) {
-  if (n >= kMaxTets) return;  // add_tet says so
+  if (n >= kMaxTets) return;  // add_cell says so
   const size_t all = ntet() + n;
   if (tets.capacity() >= 4 * all) return;
   // many small blocks still cost linear time

@@ -19,10 +19,10 @@ struct Family {
   const char *prefix;
   uint8_t dimension;
 };
-constexpr Family kFamilies[] = {{"c3d", 3},  {"ac3d", 3},  {"dc3d", 3},  {"ec3d", 3}, {"f3d", 3},
-                                {"sc", 3},   {"css", 3},   {"coh3d", 3}, {"s", 2},    {"ds", 2},
-                                {"stri", 2}, {"cps", 2},   {"cpe", 2},   {"cax", 2},  {"m3d", 2},
-                                {"r3d", 2},  {"sfm3d", 2}, {"b", 1},     {"t2d", 1},  {"t3d", 1}};
+constexpr Family kFamilies[] = {{"c3d", 3}, {"ac3d", 3}, {"dc3d", 3},  {"ec3d", 3}, {"fc3d", 3}, {"f3d", 2},
+                                {"sc", 3},  {"css", 3},  {"coh3d", 3}, {"s", 2},    {"ds", 2},   {"stri", 2},
+                                {"cps", 2}, {"cpe", 2},  {"cax", 2},   {"m3d", 2},  {"r3d", 2},  {"sfm3d", 2},
+                                {"b", 1},   {"t2d", 1},  {"t3d", 1}};
 
 std::string_view trimmed(std::string_view text) {
   constexpr const char *kBlank = " \t\r";

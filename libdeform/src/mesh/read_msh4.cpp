@@ -1,7 +1,8 @@
 // MSH 4.0 and 4.1, ASCII and binary: nodes and elements in blocks, one per entity of the geometry; $Entities
 // has the physical groups of each. Counts and numbers are size_t of the writing machine (data size 8 or 4),
 // entity and type numbers are int. In 4.0 all numbers are int, points have a box, too, blocks begin with
-// their entity, and a node's number stands before its place.
+// their entity, and a node's number stands before its place. Of a mesh that gmsh divided, elements are in
+// $PartitionedEntities.
 #include <algorithm>
 
 #include "mesh/msh.h"
@@ -17,30 +18,44 @@ int64_t MshReader::size(const char *what) {
   return v;
 }
 
-void MshReader::read_entities_4() {
+void MshReader::read_entities_4(bool partitioned) {
   in_.begin_data("$Entities");
+  const auto pass = [&](size_t numbers_each, const char *some, const char *one) {
+    const uint64_t m = in_.count(size(some), numbers_each * (in_.binary ? 4 : 2), some);
+    for (uint64_t k = 0; k < numbers_each * m; ++k) number(one);
+  };
+  if (partitioned) {
+    size("the number of partitions");
+    pass(2, "the number of ghost entities", "a ghost entity");
+  }
+  Array<Entity> found{*out_.memory};
   int64_t n[4];
   for (int64_t &k : n) k = size("a number of entities");
   for (int32_t d = 0; d < 4; ++d) {
     const uint64_t m = in_.count(n[d], in_.binary ? 20 : 6, "entities");
     for (uint64_t i = 0; i < m; ++i) {
       const int32_t tag = number("an entity's number");
+      uint32_t group = kNoGroup;
+      if (partitioned) {
+        const int32_t dimension = number("a parent's dimension"), parent = number("a parent's number");
+        pass(1, "an entity's number of partitions", "a partition");
+        if (dimension == d) group = group_of(d, parent);
+      }
       for (int k = 0; k < (d == 0 && !first_four_ ? 3 : 6); ++k) real("an entity's box");
       const uint64_t physical =
           in_.count(size("an entity's number of physical groups"), in_.binary ? 4 : 2, "physical groups");
       for (uint64_t k = 0; k < physical; ++k) {
-        const int32_t group = number("a physical group's number");
-        if (k == 0) entities_.push_back({d, tag, out_.group(in_, d, group)});
+        // a minus turns the entity round
+        const int64_t named = std::abs(int64_t{number("a physical group's number")});
+        if (k == 0) group = out_.group(in_, d, in_.in_32_bits(named, "a physical group's number"));
       }
-      if (d > 0) {
-        const uint64_t bounding =
-            in_.count(size("an entity's number of boundaries"), in_.binary ? 4 : 2, "boundary entities");
-        for (uint64_t k = 0; k < bounding; ++k) number("a boundary entity");
-      }
+      if (group != kNoGroup) found.push_back({d, tag, group});
+      if (d > 0) pass(1, "an entity's number of boundaries", "a boundary entity");
     }
   }
+  entities_.insert(entities_.end(), found.begin(), found.end());
   std::sort(entities_.begin(), entities_.end());
-  in_.expect("$EndEntities", "the entities promised");
+  in_.expect(partitioned ? "$EndPartitionedEntities" : "$EndEntities", "the entities promised");
 }
 
 uint32_t MshReader::group_of(int32_t dimension, int32_t tag) const {

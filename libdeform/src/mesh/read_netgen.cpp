@@ -103,9 +103,10 @@ class NetgenReader {
     for (uint64_t i = 0; i < n; ++i) {
       const int64_t number = in_.integer("the number of a name");
       const std::string_view first = in_.line_word(), rest = in_.line();
+      if (first.empty()) continue;
       std::string_view name(first.data(), size_t(rest.data() + rest.size() - first.data()));
       name = name.substr(0, name.find_last_not_of(" \t\r") + 1);
-      if (!first.empty() && name != "default") names_[{dimension, number}] = name;  // Netgen's word for none
+      if (name != "default") names_[{dimension, number}] = name;  // Netgen's word for none
     }
   }
 

@@ -13,16 +13,18 @@ class ObjReader {
   void run() {
     bool any = false;
     for (; in_.left(); in_.line()) {
-      const std::string_view word = in_.line_word();
+      ended_ = false;
+      const std::string_view word = next();
       if (word == "v") read_point();
       else if (word == "f" || word == "fo") read_face();
       else if (word == "g") set(group_, name());
       else if (word == "usemtl") set(material_, name());
       else if (word == "o") set(object_, name());
-      else if (word.empty() || word.front() == '#') continue;
+      else if (word.empty()) continue;
       else if (!is_known(word))
         in_.refuse("expected a record such as v, vn, vt, f or g, found %s", Cursor::quote(word).c_str());
       any = true;
+      while (!next().empty()) {}
     }
     if (!any) in_.refuse("no records; the file holds no mesh");
   }
@@ -39,10 +41,17 @@ class ObjReader {
     return false;
   }
 
+  // The next word of a record, which may go on in further lines; empty at its end and before a comment.
+  std::string_view next() {
+    const std::string_view word = ended_ ? std::string_view() : in_.line_word();
+    ended_ = word.empty() || word.front() == '#';
+    return ended_ ? std::string_view() : word;
+  }
+
   // A record's name: the rest of its line without blanks at its ends.
   std::string_view name() {
-    const std::string_view first = in_.line_word();
-    if (first.empty() || first.front() == '#') return {};
+    const std::string_view first = next();
+    if (first.empty()) return {};
     std::string_view last = first;
     for (std::string_view w = in_.line_word(); !w.empty(); w = in_.line_word()) last = w;
     return {first.data(), size_t(last.data() + last.size() - first.data())};
@@ -63,9 +72,7 @@ class ObjReader {
 
   void read_face() {
     corners_.clear();
-    for (std::string_view word = in_.line_word(); !word.empty() && word.front() != '#';
-         word = in_.line_word())
-      corners_.push_back(corner(word));
+    for (std::string_view word = next(); !word.empty(); word = next()) corners_.push_back(corner(word));
     if (corners_.size() < 3) in_.refuse("a face with %zu corners; expected 3 or more", corners_.size());
     if (stale_) {
       in_group_ = out_.named_group(in_, 2, current_);
@@ -89,7 +96,7 @@ class ObjReader {
   RawMesh &out_;
   Array<uint32_t> corners_;
   std::string_view group_, material_, object_, current_;
-  bool stale_ = false;
+  bool stale_ = false, ended_ = false;
   uint32_t in_group_ = kNoGroup;
 };
 

@@ -180,5 +180,8 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge);
 bool edge_becomes_convex(const Surface &surface, uint32_t edge, double h);
 constexpr int kNowhere = -2, kBetween = -1;  // else the end: 0 or 1
 int place_on_edge(double at, double slide);
+// Whether the lines p0 + s u and q0 + t w cross on both edges, or come to within 2 h, beginning within reach.
+// v: velocity of the crossing's point on the first relative to that on the second
+bool slides_in(Vec3 p0, Vec3 u, Vec3 q0, Vec3 w, double s, double t, Vec3 v, double h, double reach);
 
 }  // namespace dfm::narrow

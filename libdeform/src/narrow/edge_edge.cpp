@@ -32,9 +32,9 @@ EdgeFaces edge_faces(const Surface &surface, uint32_t edge) {
 
 // Where the crossing at `at` (0 and 1: the ends) lies on an edge: kNowhere on it, between its ends, or so
 // close to one of them that the end itself may make the contact (vertex-face); a second one in the same place
-// with nearly the same normal would only make the solve ill-conditioned. Where the crossing may slide in over
-// an end within the sub-step (by `slide`, in lengths of the edge), the edges would be through each other
-// before they were seen: then the edge counts as that much longer.
+// with nearly the same normal would only make the solve ill-conditioned. Where the crossing may slide over an
+// end within the sub-step (by `slide`, in lengths of the edge), the edge counts as that much longer, for
+// slides_in() to decide.
 int place_on_edge(double at, double slide) {
   if (slide > kEnd) {
     const double margin = std::min(slide, kPast);
@@ -42,6 +42,17 @@ int place_on_edge(double at, double slide) {
   }
   if (!(at > 0 && at < 1)) return kNowhere;
   return at <= kEnd ? 0 : at >= 1 - kEnd ? 1 : kBetween;
+}
+
+// Edges whose crossing moves in over an end would be through each other before they were seen. Edges that
+// pass each other, however near, must not touch. Lists of candidates hold edges that are within reach.
+bool slides_in(Vec3 p0, Vec3 u, Vec3 q0, Vec3 w, double s, double t, Vec3 v, double h, double reach) {
+  const auto on = [](double at) { return at >= 0 && at <= 1; };
+  if (on(s) && on(t)) return true;
+  const double uw = dot(u, w), uv = dot(u, v), wv = dot(w, v), ahead = 2 * h / norm2(cross(u, w));
+  const auto comes = [&](double at, double way) { return on(at) || (at < 0 ? at + way > 0 : at + way < 1); };
+  return comes(s, ahead * (uw * wv - norm2(w) * uv)) && comes(t, ahead * (norm2(u) * wv - uw * uv)) &&
+         closest_segments(p0, p0 + u, q0, q0 + w).distance2 < reach * reach;
 }
 
 namespace {
@@ -138,6 +149,10 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const int place_a = place_on_edge(s / nn, 2 * pair.h * std::sqrt(speed2 / uu));
     const int place_b = place_on_edge(t / nn, 2 * pair.h * std::sqrt(speed2 / ww));
     if (place_a == kNowhere || place_b == kNowhere) continue;
+    const double edge_s = s / nn, edge_t = t / nn;
+    const Vec3 vq0 = pair.vb(eb[0]), vq1 = pair.vb(eb[1]);
+    const Vec3 v = vp0 + edge_s * (vp1 - vp0) - (vq0 + edge_t * (vq1 - vq0));
+    if (!slides_in(p0, u, q0, w, edge_s, edge_t, v, pair.h, reach)) continue;
 
     if (!(convex && edge_becomes_convex(sb, candidate.feature_b, pair.h)) &&
         !(bears && pair.bears(last_a, candidate.feature_b)))
@@ -158,7 +173,6 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     if (!fb.is_outward(normal, slack) || !fa.is_outward(-normal, slack)) continue;
     if (place_a != kBetween && end_touches(sa, ea[place_a], q0, q0 + w, fb)) continue;
     if (place_b != kBetween && end_touches(sb, eb[place_b], p0, p0 + u, fa)) continue;
-    const double edge_s = s / nn, edge_t = t / nn;
     ContactPoint c = blank(pair, kEdgeEdge, 1, candidate.feature_a, candidate.feature_b);
     add_node(c, pair.a.first_node + ea[0], 1 - edge_s);
     add_node(c, pair.a.first_node + ea[1], edge_s);

@@ -399,6 +399,8 @@ void Self::edge_edge(uint32_t a, uint32_t b, Kin *kept) {
   if (nowhere(place_on_edge(on_a, 2 * h * std::sqrt(speed2 / uu))) ||
       nowhere(place_on_edge(on_b, 2 * h * std::sqrt(speed2 / ww))))
     return;
+  const Vec3 velocity = v(ea[0]) + on_a * (v(ea[1]) - v(ea[0])) - (v(eb[0]) + on_b * (v(eb[1]) - v(eb[0])));
+  if (!slides_in(p0, u, q0, w, on_a, on_b, velocity, h, reach)) return;
   if (Opened && !kept->known) *kept = rest.of_edges(a, b);
   const Kin k = Opened ? *kept : rest.of_edges(a, b);
   if (!k.touches) return;

@@ -91,11 +91,7 @@ std::vector<dfm_param_value> param_rows(const dfm_type &type, const std::vector<
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; ++i) {
     const dfm_param &row = type.params[i];
-    uint32_t width = row.width;
-    // Zeros that fill a short list are not values if the range excludes zero.
-    if ((row.flags & DFM_PARAM_LIST) && row.min > 0)
-      while (width > 1 && packed[at + width - 1] == 0) --width;
-    rows.push_back({row.key, &packed[at], width});
+    rows.push_back({row.key, &packed[at], row.width});
     at += row.width;
   }
   return rows;

@@ -17,6 +17,7 @@ const std::string kFour = "POINTS 4 double\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n";
 const std::string kOneCell = "CELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n";
 const std::string kMsh40 = "$MeshFormat\n4 0 8\n$EndMeshFormat\n";  // as gmsh writes 4.0
 const std::string kMsh41 = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n";
+const std::string kMshNodes = "$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n";
 const std::string kMsh22 = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n";
 
 RestMesh read_text(const std::string &name, const std::string &text) {
@@ -159,6 +160,35 @@ TEST(MeshRead, GroupWithoutName_IsCalledByItsNumber) {
                                                   "$Elements\n1\n1 4 2 42 1 1 2 3 4\n$EndElements\n");
   ASSERT_EQ(m.groups.size(), 1u);
   EXPECT_EQ(m.groups[0].name, "42");
+}
+
+// gmsh gives entities that a group turns round its negative number (Geometry.OrientedPhysicals).
+TEST(MeshRead, EntitiesTurnedRound_AreOfTheirGroup) {
+  const std::string names = "$PhysicalNames\n1\n2 3 \"wall\"\n$EndPhysicalNames\n";
+  const std::string entities =
+      "$Entities\n0 0 2 1\n1 0 0 0 1 1 1 1 3 0\n2 0 0 0 1 1 1 1 -3 0\n1 0 0 0 1 1 1 0 0\n$EndEntities\n";
+  const RestMesh m = read_text("turned.msh", kMsh41 + names + entities + kMshNodes +
+                                                 "$Elements\n3 3 1 3\n2 1 2 1\n1 1 2 3\n2 2 2 1\n2 1 2 4\n"
+                                                 "3 1 4 1\n3 1 2 3 4\n$EndElements\n");
+  ASSERT_EQ(m.groups.size(), 1u);
+  EXPECT_EQ(m.groups[0].name, "wall");
+  EXPECT_EQ(m.groups[0].points.size(), 4u);
+}
+
+// Elements of a mesh that gmsh divided are in entities of their own.
+TEST(MeshRead, PartitionedEntities_HaveTheirGroupsOrThoseOfTheirParents) {
+  const std::string entities =
+      "$Entities\n0 0 1 1\n1 0 0 0 1 1 1 1 3 0\n1 0 0 0 1 1 1 1 7 0\n$EndEntities\n"
+      "$PartitionedEntities\n2\n1\n9 1\n1 0 2 1\n5 2 1 2 1 2 0 0 0 0\n"
+      "4 2 1 1 1 0 0 0 1 1 1 1 3 1 2\n5 2 1 1 2 0 0 0 1 1 1 0 0\n2 3 1 1 1 0 0 0 1 1 1 0 2 4 5\n"
+      "$EndPartitionedEntities\n";
+  const RestMesh m = read_text("parts.msh", kMsh41 + entities + kMshNodes +
+                                                "$Elements\n3 3 1 3\n2 4 2 1\n1 1 2 3\n2 5 2 1\n2 1 2 4\n"
+                                                "3 2 4 1\n3 1 2 3 4\n$EndElements\n");
+  ASSERT_EQ(m.groups.size(), 2u);
+  EXPECT_EQ(m.groups[0].name, "3");
+  EXPECT_EQ(m.groups[0].points.size(), 4u);
+  EXPECT_EQ(m.groups[m.tet_group[0]].name, "7");
 }
 
 TEST(MeshRead, NegativeCell_IsTurnedAndCounted) {
@@ -311,7 +341,7 @@ TEST(MeshRead, VtkStructure_IsChecked) {
 }
 
 TEST(MeshRead, MshStructure_IsChecked) {
-  const std::string nodes = "$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n";
+  const std::string &nodes = kMshNodes;
   const std::string cells = "$Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n";
   EXPECT_EQ(read_text("m.msh", kMsh41 + nodes + cells).ntet(), 1u);
   const std::string comments = "$Comments\nanything $ at all\n$EndComments\n";

@@ -243,6 +243,18 @@ TEST(Abaqus, ElementsThatAreNoCells_AreLeftOutAndReported) {
   EXPECT_EQ(group_of(mesh, "mixed", 3).points.size(), 4u);
 }
 
+// F3D3 and F3D4 are the faces that enclose a fluid, FC3D4 are its cells.
+TEST(Abaqus, FacesOfAFluidCavity_AreTriangles) {
+  const RestMesh mesh = parsed(kTet +
+                               "*ELEMENT, TYPE=F3D4, ELSET=cavity\n30, 1, 2, 3, 4\n"
+                               "*ELEMENT, TYPE=F3D3, ELSET=side\n31, 1, 2, 4\n");
+  EXPECT_EQ(mesh.ntet(), 1u);
+  EXPECT_TRUE(mesh.warnings.empty());
+  EXPECT_EQ(group_of(mesh, "cavity", 2).points.size(), 4u);
+  EXPECT_EQ(group_of(mesh, "side", 2).points.size(), 3u);
+  EXPECT_EQ(parsed(kTet + "*ELEMENT, TYPE=FC3D4\n30, 1, 2, 3, 4\n").warnings.size(), 1u) << "a double cell";
+}
+
 TEST(Abaqus, WhatWouldLosePartOfTheMesh_IsRefused) {
   const auto refuse = [](const std::string &text, dfm_status status, const std::vector<std::string> &words) {
     expect_refusal("a.inp", text, status, words);

@@ -59,7 +59,7 @@ TEST(Netgen, SectionsInAnyOrderAndOthersBetween_AreTheSameMesh) {
 }
 
 TEST(Netgen, GroupsOfOneName_AreOne) {
-  const std::string names = "bcnames\n4\n1 side\n2 default\n3 side\n4 none\n";
+  const std::string names = "bcnames\n5\n1 side\n2 default\n3 side\n4 none\n5\n";
   const RestMesh mesh = finish_mesh(
       "a.vol", parse(kHead + "surfaceelements\n4\n1 3 1 0 3 1 3 2\n1 2 1 0 3 1 2 4\n1 1 1 0 3 1 4 3\n" +
                      "1 5 1 0 3 2 3 4\n" + kOne + kPoints + names + kEnd));

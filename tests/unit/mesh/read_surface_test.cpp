@@ -102,6 +102,12 @@ TEST(ReadSurface, ObjGroup_IsWhatGSaysElseTheMaterialElseTheObject) {
   EXPECT_TRUE(parse("a.obj", v + "g empty\ng\n" + f).groups.empty());  // a group without faces is none
 }
 
+TEST(ReadSurface, ObjRecordsThatAreSkipped_MayBeContinued) {
+  const std::string v = "v 0 0 0\nv 1 0 0 1 \\\n 0 0\nv 0 1 0\n", f = "f 1 2 \\\n 3\n";
+  EXPECT_EQ(parse("a.obj", v + "l 1 2 \\\r\n3\n" + f + "# f 1 \\\n" + f + "f 1 2 3 # f 2 \\\n" + f).ntri(),
+            4u);
+}
+
 TEST(ReadSurface, PolygonOfNCorners_IsAFanOfNMinusTwoTriangles) {
   std::string text;
   for (int k = 0; k < 7; ++k) text += "v " + std::to_string(k) + " " + std::to_string(k * k) + " 0\n";

@@ -407,27 +407,64 @@ TEST(EdgeEdge, CrossedTetrahedra_MeetEdgeOnEdge) {
   EXPECT_DOUBLE_EQ(c[0].area, facing_area(*scene.surfaces[0], 0, -load3(c[0].normal)) / 2);
 }
 
+// The same with the upper one moved, and moving.
+Scene moving_tetrahedra(double gap, Vec3 shift, Vec3 velocity) {
+  Scene scene = crossed_tetrahedra(gap);
+  Surface &upper = *scene.surfaces[1];
+  for (uint32_t s = 0; s < upper.nsurfel; ++s) {
+    store3(&upper.x[4 * s], load3(&upper.x[4 * s]) + shift);
+    store3(&upper.v[4 * s], velocity);
+  }
+  return scene;
+}
+std::vector<ContactPoint> crossings(const Scene &scene) {  // of the first edges
+  std::vector<ContactPoint> out;
+  for (const ContactPoint &c : scene.contacts())
+    if (c.kind == kEdgeEdge && c.feature_a == 0 && c.feature_b == 0) out.push_back(c);
+  return out;
+}
+
 // The upper edge starts a little beyond the end of the lower one and slides in over it: at the end of the
 // sub-step they would be through each other without ever having been seen side by side. At rest the same
 // place makes no edge contact.
 TEST(EdgeEdge, EdgeThatSlidesInOverAnEnd_IsSeenBefore) {
-  for (const double speed : {0.0, 50.0}) {
-    Scene scene = crossed_tetrahedra(1e-3);
+  EXPECT_TRUE(crossings(moving_tetrahedra(1e-3, {1.02, 0, 0}, {})).empty());
+  const auto edges = crossings(moving_tetrahedra(1e-3, {1.02, 0, 0}, {-50, 0, -5}));
+  ASSERT_EQ(edges.size(), 1u);
+  EXPECT_NEAR(edges[0].weight[0], -0.01, 1e-12);
+  EXPECT_NEAR(edges[0].weight[1], 1.01, 1e-12);
+  EXPECT_NEAR(edges[0].distance, 1e-3, 1e-12);
+}
+
+// Beside the end, the edges pass each other. Neither a body that falls past another, nor one that moves away
+// from the end or along the other's edge, may be held.
+TEST(EdgeEdge, EdgeThatPassesAnEnd_IsNoContact) {
+  for (const Vec3 velocity : {Vec3{0, 0, -50}, {50, 0, -5}, {0, 50, -5}, {0, -50, -5}})
+    EXPECT_TRUE(crossings(moving_tetrahedra(1e-3, {1.02, 0, 0}, velocity)).empty());
+}
+
+// What counts is how the crossing moves, not an end of the edge: here the far end of the upper edge turns in.
+TEST(EdgeEdge, CrossingBeyondAnEnd_MovesWithTheEdgesThere) {
+  for (const double turning : {-50.0, 50.0}) {
+    Scene scene = moving_tetrahedra(1e-3, {1.02, -0.9, 0}, {});
     Surface &upper = *scene.surfaces[1];
-    for (uint32_t s = 0; s < upper.nsurfel; ++s) {
-      upper.x[4 * s] += 1.02;
-      upper.v[4 * s] = -speed;
-      upper.v[4 * s + 2] = -0.1 * speed;
+    for (uint32_t s = 0; s < upper.nsurfel;
+         ++s) {  // about a place of the upper edge that is off its crossing
+      const Vec3 r = load3(&upper.x[4 * s]) - Vec3{1.02, -0.3, 0};
+      store3(&upper.v[4 * s], {-turning * r.y, turning * r.x, -5});
     }
-    int edges = 0;
-    for (const ContactPoint &c : scene.contacts())
-      if (c.kind == kEdgeEdge && c.feature_a == 0 && c.feature_b == 0) {
-        ++edges;
-        EXPECT_NEAR(c.weight[0], -0.01, 1e-12);
-        EXPECT_NEAR(c.weight[1], 1.01, 1e-12);
-        EXPECT_NEAR(c.distance, 1e-3, 1e-12);
-      }
-    EXPECT_EQ(edges, speed > 0 ? 1 : 0);
+    EXPECT_EQ(crossings(scene).size(), turning > 0 ? 1u : 0u);
+  }
+}
+
+// Lists of candidates hold edges within reach alone, so a crossing beyond ends makes no contact of others.
+TEST(EdgeEdge, LinesThatAreNearerThanTheirEdges_AreNoContact) {
+  for (const double past : {0.02, 0.065}) {
+    const Vec3 velocity{-36, -36, -1};
+    const Scene scene = moving_tetrahedra(0.08, {1 + past, 1 + past, 0}, velocity);
+    const double reach = contact_reach(scene.h, scene.offset, norm(velocity));
+    EXPECT_LT(0.08, reach);
+    EXPECT_EQ(crossings(scene).size(), std::sqrt(0.08 * 0.08 + 2 * past * past) < reach ? 1u : 0u) << past;
   }
 }
 

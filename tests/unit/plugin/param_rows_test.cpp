@@ -9,10 +9,9 @@ constexpr dfm_param kRows[] = {
     {"mu", "", "1", 0, 1, 0.5, 0, 1, nullptr},
     {"axis", "", "1", -1, 1, 0, 0, 3, nullptr},
     {"levels", "", "1", 0, 9, 0, DFM_PARAM_LIST, 4, nullptr},
-    {"rates", "", "1", 1, 9, 1, DFM_PARAM_LIST, 4, nullptr},
 };
 constexpr dfm_type kType = {
-    sizeof(dfm_type), DFM_KIND_MODEL, "org.example.rows", "", "1", "MIT", "none", kRows, 4, sizeof(dfm_param),
+    sizeof(dfm_type), DFM_KIND_MODEL, "org.example.rows", "", "1", "MIT", "none", kRows, 3, sizeof(dfm_param),
     nullptr,          nullptr};
 
 }  // namespace
@@ -20,13 +19,11 @@ constexpr dfm_type kType = {
 TEST(ParamRows, OfPackedValues_PackToTheSame) {
   const double axis[] = {0, 0, 1};
   const double levels[] = {3, 0};
-  const double rates[] = {2, 5};
-  const dfm_param_value given[] = {{"axis", axis, 3}, {"levels", levels, 2}, {"rates", rates, 2}};
+  const dfm_param_value given[] = {{"axis", axis, 3}, {"levels", levels, 2}};
   const std::vector<double> packed = dfm::pack_params(kType, given);
   const std::vector<dfm_param_value> rows = dfm::param_rows(kType, packed);
-  ASSERT_EQ(rows.size(), 4u);
-  EXPECT_EQ(rows[2].width, 4u) << "zero is a value of this list";
-  EXPECT_EQ(rows[3].width, 2u) << "zero is no value of this list";
-  EXPECT_EQ(rows[3].value[1], 5);
+  ASSERT_EQ(rows.size(), 3u);
+  EXPECT_EQ(rows[2].width, 4u);
+  EXPECT_EQ(rows[1].value[2], 1);
   EXPECT_EQ(dfm::pack_params(kType, rows), packed);
 }
