@@ -83,18 +83,18 @@ constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
 class Near {
  public:
   // shared: several of them look at blocks of the list at the same time
-  Near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+  Near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,
        bool shared)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)), shared_(shared) {}
 
-  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
+  void look(const ListMemory::Run &run, uint32_t begin, uint32_t end) {
     const double now = kRounding * (run.way + run.travel);
     if (scene_.closed_form(list_[run.begin])) check_obstacle(run, begin, end, now);
     else check_surfaces(run, begin, end, now);
   }
 
  private:
-  void check_surfaces(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+  void check_surfaces(const ListMemory::Run &run, uint32_t begin, uint32_t end, double now) {
     const double *const rest = memory_.rest.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
@@ -136,7 +136,7 @@ class Near {
   }
 
   // A surface and a closed-form shape or voxels, in the frame of the obstacle.
-  void check_obstacle(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+  void check_obstacle(const ListMemory::Run &run, uint32_t begin, uint32_t end, double now) {
     const Candidate &first = list_[run.begin];
     const ObstacleView &view = scene_.obstacles[first.slot_b];
     const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
@@ -199,7 +199,7 @@ class Near {
 
   GuardScene &scene_;
   const Array<Candidate> &list_;
-  GuardMemory &memory_;
+  ListMemory &memory_;
   Array<uint32_t> &near_;
   const double floor_;
   const bool shared_;
@@ -225,54 +225,9 @@ void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
   s.stamp[surfel] = round;
 }
 
-void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
-  old_runs.swap(runs);
-  old_features.swap(features);
-  old_rest.swap(rest);
-  old_normal.swap(normal);
-  runs.clear();
-  const size_t n = list.size();
-  features.resize(n);
-  rest.resize(n);
-  normal.resize(3 * n);
-  for (size_t i = 0; i < n;) {
-    const size_t end = end_of_run(list, i);
-    runs.push_back({uint32_t(i), uint32_t(end), list[i], 0, 0});
-    i = end;
-  }
-  // Runs come in one order in all lists, pairs in a run by their features.
-  size_t next = 0;
-  before.assign(runs.size(), kNone);
-  for (size_t r = 0; r < runs.size(); ++r) {
-    const auto same = [&](const Run &o) { return same_run(o.of, runs[r].of); };
-    const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
-    if (found == old_runs.end()) continue;
-    before[r] = static_cast<uint32_t>(found - old_runs.begin());
-    next = size_t{before[r]} + 1;
-  }
-  each_on(n > 2 * kBlock ? tasks : nullptr, runs.size(), kTogether,
-          [&](size_t r) { carry_over(list, runs[r], before[r]); });
-}
-
-void GuardMemory::carry_over(const Array<Candidate> &list, Run &run, uint32_t from) {
-  uint32_t j = 0, last = 0;
-  if (from != kNone) {
-    run.way = old_runs[from].way;
-    j = old_runs[from].begin;
-    last = old_runs[from].end;
-  }
-  for (uint32_t i = run.begin; i < run.end; ++i) {
-    features[i] = uint64_t{list[i].feature_a} << 32 | list[i].feature_b;
-    while (j < last && old_features[j] < features[i]) ++j;
-    const bool known = j < last && old_features[j] == features[i];
-    rest[i] = known ? old_rest[j] : -1;
-    for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
-  }
-}
-
 namespace {
 
-void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory,
+void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory,
                     Array<uint32_t> &near, GuardBlocks &blocks, Tasks &tasks) {
   while (blocks.near.size() < blocks.ranges.size()) blocks.near.emplace_back(near.get_allocator());
   each_on(&tasks, blocks.ranges.size(), kTogether, [&](size_t k) {
@@ -286,14 +241,14 @@ void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory
 
 }  // namespace
 
-void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+void guard_near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,
                 GuardBlocks *blocks, Tasks *tasks) {
   near.clear();
   const bool parts = blocks && tasks && tasks->parallel() && list.size() > 2 * kBlock;
   if (parts) blocks->ranges.clear();
   Near alone(scene, list, memory, near, false);
   for (uint32_t r = 0; r < memory.runs.size(); ++r) {
-    GuardMemory::Run &run = memory.runs[r];
+    ListMemory::Run &run = memory.runs[r];
     const Candidate &c = list[run.begin];
     const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
     run.travel = &a == &b ? 2 * a.deform

@@ -12,7 +12,7 @@ struct World;
 
 struct Guard {
   GuardScene scene;
-  GuardMemory memory;
+  ListMemory memory;
   Array<Candidate> joined;                 // if bodies may touch themselves: candidates of pairs, then theirs
   const Array<Candidate> *list = nullptr;  // the list of `memory`: `joined`, or the candidates of pairs
   Array<uint32_t> near;                    // candidates that may reach the floor
