@@ -16,12 +16,10 @@ namespace {
 using narrow::Features;
 using narrow::PairMotion;
 
-constexpr double kRounding = 1 + 1e-6;  // bounds hold despite rounding; negligible relative to the margin
-
 // A pair that stays above this never triggers, so skipping it does not change the result, whatever is known
 // from before.
 double clear_of(const GuardScene &scene) {
-  return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
+  return ListMemory::kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
 }
 
 // Least height of the features over each other along n.
@@ -88,37 +86,37 @@ class Near {
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)), shared_(shared) {}
 
   void look(const ListMemory::Run &run, uint32_t begin, uint32_t end) {
-    const double now = kRounding * (run.way + run.travel);
+    const double now = ListMemory::limit(run.way + run.travel, floor_);
     if (scene_.closed_form(list_[run.begin])) check_obstacle(run, begin, end, now);
     else check_surfaces(run, begin, end, now);
   }
 
  private:
   void check_surfaces(const ListMemory::Run &run, uint32_t begin, uint32_t end, double now) {
-    const double *const rest = memory_.rest.data();
+    const double *const apart = memory_.apart.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
     const PairAtRest *const own = a_ == b_ && a_->opened ? a_->pairs[run.of.kind == kEdgeEdge] : nullptr;
     for (uint32_t i = begin; i < end; ++i)
-      if (!(now < rest[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
+      if (!(now < apart[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
   }
   // The height along any direction is a lower bound of the distance, so the value for the start is kept.
   void look(uint32_t i, double way, double now) {
     Features f(*a_, *b_, list_[i]);
-    double *const known = &memory_.normal[3 * size_t{i}], &rest = memory_.rest[i];
+    double *const known = &memory_.normal[3 * size_t{i}], &bound = memory_.apart[i];
     Vec3 n = load3(known);
     if (norm2(n) > 0) {
       const double start = height(f.start, f.split, n);
-      rest = way + start - floor_;
-      if (now < rest || stays_apart(f, n, start)) return;
+      bound = std::max(bound, way + start);
+      if (now < bound || stays_apart(f, n, start)) return;
     }
     const Vec3 v = apart(f);
     const double d = norm(v);
     if (d > 0) {
       n = (1 / d) * v;
       store3(known, n);
-      rest = way + d - floor_;
-      if (now < rest || stays_apart(f, n, height(f.start, f.split, n))) return;
+      bound = std::max(bound, way + d);
+      if (now < bound || stays_apart(f, n, height(f.start, f.split, n))) return;
     }
     near_.push_back(i);
   }
@@ -142,7 +140,7 @@ class Near {
     const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
     GuardSide &body = scene_.side(first, false);
     for (uint32_t i = begin; i < end; ++i) {
-      if (now < memory_.rest[i]) continue;
+      if (now < memory_.apart[i]) continue;
       const bool away = view.shape == Shape::voxels ? list_[i].kind == 0 && far(frame, body, i, run.way, now)
                                                     : clear(frame, body, i, run.way);
       if (!away) near_.push_back(i);
@@ -181,7 +179,7 @@ class Near {
         on = p.point;
       }
     }
-    memory_.rest[i] = way + start - floor_;
+    memory_.apart[i] = way + start;
     if (!(start > floor_)) return false;
     double end = HUGE_VAL;
     for (int k = 0; k <= c.kind; ++k)
@@ -193,8 +191,8 @@ class Near {
   }
   bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
     const Vec3 x = frame.at_start(load3(&body.surface->x[4 * size_t{list_[i].feature_a}]));
-    memory_.rest[i] = way + frame.shape.view().grid->clearance(x) - floor_;
-    return now < memory_.rest[i];
+    memory_.apart[i] = way + frame.shape.view().grid->clearance(x);
+    return now < memory_.apart[i];
   }
 
   GuardScene &scene_;

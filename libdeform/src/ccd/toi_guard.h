@@ -95,8 +95,8 @@ struct GuardBlocks {
 };
 
 // The candidates that may come to the floor, ascending: the other functions need no others.
-// Nearly all of a list ends at the first comparison (way + travel < rest), nearly all others at a plane that
-// keeps the two features apart at the start and at the end. memory follows the list.
+// Nearly all of a list ends at the first comparison (way + travel + floor < apart), nearly all others at a
+// plane that keeps the two features apart at the start and at the end. memory follows the list.
 //   blocks, tasks   the same for work on several threads; null: none. Throws std::bad_alloc where a block
 //                   has no memory
 void guard_near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,

@@ -13,12 +13,12 @@ constexpr size_t kJob = 384, kTogether = 4;
 void ListMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
   old_runs.swap(runs);
   old_features.swap(features);
-  old_rest.swap(rest);
+  old_apart.swap(apart);
   old_normal.swap(normal);
   runs.clear();
   const size_t n = list.size();
   features.resize(n);
-  rest.resize(n);
+  apart.resize(n);
   normal.resize(3 * n);
   for (size_t i = 0; i < n;) {
     const size_t end = end_of_run(list, i);
@@ -40,18 +40,32 @@ void ListMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
 }
 
 void ListMemory::carry_over(const Array<Candidate> &list, Run &run, uint32_t from) {
-  uint32_t j = 0, last = 0;
-  if (from != kNone) {
-    run.way = old_runs[from].way;
-    j = old_runs[from].begin;
-    last = old_runs[from].end;
+  const size_t n = run.end - run.begin;
+  uint64_t *const now = features.data() + run.begin;
+  for (size_t i = 0; i < n; ++i)
+    now[i] = uint64_t{list[run.begin + i].feature_a} << 32 | list[run.begin + i].feature_b;
+  double *const to = apart.data() + run.begin, *const along = normal.data() + 3 * size_t{run.begin};
+  if (from == kNone) {
+    std::fill_n(to, n, -1.0);
+    std::fill_n(along, 3 * n, 0.0);
+    return;
   }
-  for (uint32_t i = run.begin; i < run.end; ++i) {
-    features[i] = uint64_t{list[i].feature_a} << 32 | list[i].feature_b;
-    while (j < last && old_features[j] < features[i]) ++j;
-    const bool known = j < last && old_features[j] == features[i];
-    rest[i] = known ? old_rest[j] : -1;
-    for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
+  const Run &old = old_runs[from];
+  run.way = old.way;
+  const uint64_t *const before_then = old_features.data() + old.begin;
+  const double *const known = old_apart.data() + old.begin;
+  const double *const known_along = old_normal.data() + 3 * size_t{old.begin};
+  const size_t known_n = old.end - old.begin;
+  if (std::equal(now, now + n, before_then, before_then + known_n)) {
+    std::copy_n(known, n, to);
+    std::copy_n(known_along, 3 * n, along);
+    return;
+  }
+  for (size_t i = 0, j = 0; i < n; ++i) {
+    while (j < known_n && before_then[j] < now[i]) ++j;
+    const bool same = j < known_n && before_then[j] == now[i];
+    to[i] = same ? known[j] : -1;
+    for (size_t k = 0; k < 3; ++k) along[3 * i + k] = same ? known_along[3 * j + k] : 0;
   }
 }
 

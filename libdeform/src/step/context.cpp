@@ -32,7 +32,7 @@ StepContext::StepContext(const Meters &meters)
              guard.common, guard.kept, guard.kept_before, guard.blocks.ranges);
   ListMemory &known = guard.memory;
   use_memory(meters.detection.memory(), known.runs, known.old_runs, known.features, known.old_features,
-             known.rest, known.old_rest, known.normal, known.old_normal, known.before);
+             known.apart, known.old_apart, known.normal, known.old_normal, known.before);
 }
 
 StepContext::~StepContext() = default;

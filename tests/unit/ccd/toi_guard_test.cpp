@@ -217,7 +217,7 @@ TEST(ToiGuard, NearPairsOnSeveralThreads_AreThoseOfOne) {
         memory[k].keep();
       }
       ASSERT_EQ(near[0], near[1]) << threads << " threads, step " << step;
-      ASSERT_EQ(memory[0].rest, memory[1].rest) << threads << " threads, step " << step;
+      ASSERT_EQ(memory[0].apart, memory[1].apart) << threads << " threads, step " << step;
       ASSERT_EQ(memory[0].normal, memory[1].normal) << threads << " threads, step " << step;
       found += near[0].size();
     }
