@@ -13,10 +13,10 @@ using namespace test;
 TEST(FindContacts, KnownDistances_DoNotChangeContacts) {
   for (const uint32_t threads : {1u, 3u}) {
     Scene scene;
-    const Mesh cylinder = cylinder_mesh(0.2, 1, 24, 20);
+    const Mesh cylinder = cylinder_mesh(0.2, 1, 16, 8);
     scene.add(cylinder);
     scene.add(moved(cylinder, turn({0, 0, 1}, 0.02), {0.4005, 0.01, 0.003}));
-    scene.add(moved(box_mesh({1, 1, 1}, 3, 3, 3), {0.1, 0.2, 0.3, 0.9}, {0.2, 0.75, 0}));
+    scene.add(moved(box_mesh({1, 1, 1}, 2, 2, 2), {0.1, 0.2, 0.3, 0.9}, {0.2, 0.75, 0}));
     Tasks tasks(threads, nullptr, nullptr);
     BroadPhase broad(Memory::standard());
     NarrowBlocks blocks(Memory::standard());
