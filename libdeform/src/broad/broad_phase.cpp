@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kRounding = 1 + 1e-9;  // margins hold despite rounded distances
 constexpr double kSkinLeast = 0.02;     // of the median edge: a resting body keeps its lists
-constexpr double kSkinMost = 0.5;       // beyond half an edge, lists grow faster than they last
+constexpr double kSkinMost = 0.25;      // beyond, lists grow faster than they last
 // Beside a surface that is this many times finer, its edges count: its own skin is used up so soon that the
 // pair is listed again in nearly every sub-step, each time with all that lies in the skin of the coarse one.
 constexpr double kMuchFiner = 4;

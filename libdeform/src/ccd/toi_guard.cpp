@@ -16,12 +16,10 @@ namespace {
 using narrow::Features;
 using narrow::PairMotion;
 
-constexpr double kRounding = 1 + 1e-6;  // bounds hold despite rounding; negligible relative to the margin
-
 // A pair that stays above this never triggers, so skipping it does not change the result, whatever is known
 // from before.
 double clear_of(const GuardScene &scene) {
-  return kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
+  return ListMemory::kRounding * (scene.floor + 2 * narrow::kSharp * scene.margin);
 }
 
 // Least height of the features over each other along n.
@@ -83,42 +81,42 @@ constexpr uint32_t kTogether = 4;  // pieces of a block: most runs are short
 class Near {
  public:
   // shared: several of them look at blocks of the list at the same time
-  Near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+  Near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,
        bool shared)
       : scene_(scene), list_(list), memory_(memory), near_(near), floor_(clear_of(scene)), shared_(shared) {}
 
-  void look(const GuardMemory::Run &run, uint32_t begin, uint32_t end) {
-    const double now = kRounding * (run.way + run.travel);
+  void look(const ListMemory::Run &run, uint32_t begin, uint32_t end) {
+    const double now = ListMemory::limit(run.way + run.travel, floor_);
     if (scene_.closed_form(list_[run.begin])) check_obstacle(run, begin, end, now);
     else check_surfaces(run, begin, end, now);
   }
 
  private:
-  void check_surfaces(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
-    const double *const rest = memory_.rest.data();
+  void check_surfaces(const ListMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+    const double *const apart = memory_.apart.data();
     a_ = &scene_.side(list_[run.begin], false);
     b_ = &scene_.side(list_[run.begin], true);
     const PairAtRest *const own = a_ == b_ && a_->opened ? a_->pairs[run.of.kind == kEdgeEdge] : nullptr;
     for (uint32_t i = begin; i < end; ++i)
-      if (!(now < rest[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
+      if (!(now < apart[i]) && !(own && held(own[i - run.begin]))) look(i, run.way, now);
   }
   // The height along any direction is a lower bound of the distance, so the value for the start is kept.
   void look(uint32_t i, double way, double now) {
     Features f(*a_, *b_, list_[i]);
-    double *const known = &memory_.normal[3 * size_t{i}], &rest = memory_.rest[i];
+    double *const known = &memory_.normal[3 * size_t{i}], &bound = memory_.apart[i];
     Vec3 n = load3(known);
     if (norm2(n) > 0) {
       const double start = height(f.start, f.split, n);
-      rest = way + start - floor_;
-      if (now < rest || stays_apart(f, n, start)) return;
+      bound = std::max(bound, way + start);
+      if (now < bound || stays_apart(f, n, start)) return;
     }
     const Vec3 v = apart(f);
     const double d = norm(v);
     if (d > 0) {
       n = (1 / d) * v;
       store3(known, n);
-      rest = way + d - floor_;
-      if (now < rest || stays_apart(f, n, height(f.start, f.split, n))) return;
+      bound = std::max(bound, way + d);
+      if (now < bound || stays_apart(f, n, height(f.start, f.split, n))) return;
     }
     near_.push_back(i);
   }
@@ -136,13 +134,13 @@ class Near {
   }
 
   // A surface and a closed-form shape or voxels, in the frame of the obstacle.
-  void check_obstacle(const GuardMemory::Run &run, uint32_t begin, uint32_t end, double now) {
+  void check_obstacle(const ListMemory::Run &run, uint32_t begin, uint32_t end, double now) {
     const Candidate &first = list_[run.begin];
     const ObstacleView &view = scene_.obstacles[first.slot_b];
     const narrow::ObstacleFrame frame(view, scene_.poses[first.slot_b]);
     GuardSide &body = scene_.side(first, false);
     for (uint32_t i = begin; i < end; ++i) {
-      if (now < memory_.rest[i]) continue;
+      if (now < memory_.apart[i]) continue;
       const bool away = view.shape == Shape::voxels ? list_[i].kind == 0 && far(frame, body, i, run.way, now)
                                                     : clear(frame, body, i, run.way);
       if (!away) near_.push_back(i);
@@ -181,7 +179,7 @@ class Near {
         on = p.point;
       }
     }
-    memory_.rest[i] = way + start - floor_;
+    memory_.apart[i] = way + start;
     if (!(start > floor_)) return false;
     double end = HUGE_VAL;
     for (int k = 0; k <= c.kind; ++k)
@@ -193,13 +191,13 @@ class Near {
   }
   bool far(const narrow::ObstacleFrame &frame, GuardSide &body, uint32_t i, double way, double now) {
     const Vec3 x = frame.at_start(load3(&body.surface->x[4 * size_t{list_[i].feature_a}]));
-    memory_.rest[i] = way + frame.shape.view().grid->clearance(x) - floor_;
-    return now < memory_.rest[i];
+    memory_.apart[i] = way + frame.shape.view().grid->clearance(x);
+    return now < memory_.apart[i];
   }
 
   GuardScene &scene_;
   const Array<Candidate> &list_;
-  GuardMemory &memory_;
+  ListMemory &memory_;
   Array<uint32_t> &near_;
   const double floor_;
   const bool shared_;
@@ -225,54 +223,9 @@ void GuardScene::find_end(GuardSide &s, uint32_t surfel) {
   s.stamp[surfel] = round;
 }
 
-void GuardMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
-  old_runs.swap(runs);
-  old_features.swap(features);
-  old_rest.swap(rest);
-  old_normal.swap(normal);
-  runs.clear();
-  const size_t n = list.size();
-  features.resize(n);
-  rest.resize(n);
-  normal.resize(3 * n);
-  for (size_t i = 0; i < n;) {
-    const size_t end = end_of_run(list, i);
-    runs.push_back({uint32_t(i), uint32_t(end), list[i], 0, 0});
-    i = end;
-  }
-  // Runs come in one order in all lists, pairs in a run by their features.
-  size_t next = 0;
-  before.assign(runs.size(), kNone);
-  for (size_t r = 0; r < runs.size(); ++r) {
-    const auto same = [&](const Run &o) { return same_run(o.of, runs[r].of); };
-    const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
-    if (found == old_runs.end()) continue;
-    before[r] = static_cast<uint32_t>(found - old_runs.begin());
-    next = size_t{before[r]} + 1;
-  }
-  each_on(n > 2 * kBlock ? tasks : nullptr, runs.size(), kTogether,
-          [&](size_t r) { carry_over(list, runs[r], before[r]); });
-}
-
-void GuardMemory::carry_over(const Array<Candidate> &list, Run &run, uint32_t from) {
-  uint32_t j = 0, last = 0;
-  if (from != kNone) {
-    run.way = old_runs[from].way;
-    j = old_runs[from].begin;
-    last = old_runs[from].end;
-  }
-  for (uint32_t i = run.begin; i < run.end; ++i) {
-    features[i] = uint64_t{list[i].feature_a} << 32 | list[i].feature_b;
-    while (j < last && old_features[j] < features[i]) ++j;
-    const bool known = j < last && old_features[j] == features[i];
-    rest[i] = known ? old_rest[j] : -1;
-    for (size_t k = 0; k < 3; ++k) normal[3 * size_t{i} + k] = known ? old_normal[3 * size_t{j} + k] : 0;
-  }
-}
-
 namespace {
 
-void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory,
+void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory,
                     Array<uint32_t> &near, GuardBlocks &blocks, Tasks &tasks) {
   while (blocks.near.size() < blocks.ranges.size()) blocks.near.emplace_back(near.get_allocator());
   each_on(&tasks, blocks.ranges.size(), kTogether, [&](size_t k) {
@@ -286,14 +239,14 @@ void near_in_blocks(GuardScene &scene, const Array<Candidate> &list, GuardMemory
 
 }  // namespace
 
-void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+void guard_near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,
                 GuardBlocks *blocks, Tasks *tasks) {
   near.clear();
   const bool parts = blocks && tasks && tasks->parallel() && list.size() > 2 * kBlock;
   if (parts) blocks->ranges.clear();
   Near alone(scene, list, memory, near, false);
   for (uint32_t r = 0; r < memory.runs.size(); ++r) {
-    GuardMemory::Run &run = memory.runs[r];
+    ListMemory::Run &run = memory.runs[r];
     const Candidate &c = list[run.begin];
     const GuardSide &a = scene.side(c, false), &b = scene.side(c, true);
     run.travel = &a == &b ? 2 * a.deform

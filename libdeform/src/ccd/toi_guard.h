@@ -16,6 +16,7 @@
 #include "core/memory.h"
 #include "core/tasks.h"
 #include "geometry/views.h"
+#include "narrow/list_memory.h"
 
 namespace dfm {
 
@@ -86,34 +87,6 @@ struct GuardScene {
   Vec3 end_of(const GuardSide &s, uint32_t surfel) const;  // the same, without storing it
 };
 
-// Data on the listed pairs that save work and do not change results. Valid as long as d_c and the bodies are
-// the same; pairs that two lists share are carried over.
-struct GuardMemory {
-  struct Run {  // of the list: one pair of sides, one kind
-    uint32_t begin, end;
-    Candidate of;  // its first one
-    // m, bounds of the motion of the two sides against each other: in all sub-steps since the run is
-    // known; in this one
-    double way, travel;
-  };
-  Array<Run> runs, old_runs;
-  Array<uint64_t> features, old_features;  // by candidate: feature a, feature b
-  Array<double> rest, old_rest;            // m, `way` up to which it stays clear of the floor
-  // [n,3] direction along which it was last found to be apart; zero: none
-  Array<double> normal, old_normal;
-  Array<uint32_t> before;  // by run: its place in old_runs, or kNone
-
-  // tasks: null: on this thread alone
-  void follow(const Array<Candidate> &list, Tasks *tasks = nullptr);
-  void forget() { runs.clear(); }
-  // the sub-step has been taken
-  void keep() {
-    for (Run &r : runs) r.way += r.travel;
-  }
-  // from: place in old_runs, or kNone
-  void carry_over(const Array<Candidate> &list, Run &run, uint32_t from);
-};
-
 // The list divided into blocks for workers, and their results. The division depends on the list alone.
 struct GuardBlocks {
   struct Range { uint32_t run, begin, end; };  // of the list, within a run
@@ -122,11 +95,11 @@ struct GuardBlocks {
 };
 
 // The candidates that may come to the floor, ascending: the other functions need no others.
-// Nearly all of a list ends at the first comparison (way + travel < rest), nearly all others at a plane that
-// keeps the two features apart at the start and at the end. memory follows the list.
+// Nearly all of a list ends at the first comparison (way + travel + floor < apart), nearly all others at a
+// plane that keeps the two features apart at the start and at the end. memory follows the list.
 //   blocks, tasks   the same for work on several threads; null: none. Throws std::bad_alloc where a block
 //                   has no memory
-void guard_near(GuardScene &scene, const Array<Candidate> &list, GuardMemory &memory, Array<uint32_t> &near,
+void guard_near(GuardScene &scene, const Array<Candidate> &list, ListMemory &memory, Array<uint32_t> &near,
                 GuardBlocks *blocks = nullptr, Tasks *tasks = nullptr);
 
 // Of the candidates that `which` names, those between two surfaces; those that touch at the start are

@@ -100,8 +100,8 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
 }
 
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
-bool ContactNewton::coupled_step(double tolerance, bool &failed) {
-  const double before = size(), left = error();
+bool ContactNewton::coupled_step(double tolerance, double left, bool &failed) {
+  const double before = size();
   failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::of_start));
   if (failed) return false;
   base_.assign(v_.begin(), v_.end());
@@ -158,18 +158,21 @@ bool ContactNewton::frozen_steps() {
   return evaluate(false);
 }
 
-// v with g = 0 for the present multipliers, up to a tolerance in m/s. round: coupled and frozen steps undo
-// each other. With strong friction g may have no zero that they reach; it has one where rho is small, since A
-// then outweighs what is not symmetric.
-bool ContactNewton::newton(double tolerance, bool &round) {
+// v with g = 0 for the present multipliers, up to a tolerance in m/s; left: the error. round: coupled and
+// frozen steps undo each other. With strong friction g may have no zero that they reach; it has one where rho
+// is small, since A then outweighs what is not symmetric.
+bool ContactNewton::newton(double tolerance, double &left, bool &round) {
   round = false;
   goal_ = tolerance;
   if (!evaluate(false)) return false;
   uint32_t phases = 0;
-  while (error() > tolerance && steps_ < limit_) {
+  while ((left = error()) > tolerance && steps_ < limit_) {
     bool failed = false;
-    if (coupled_step(tolerance, failed)) continue;
-    if (!failed && phases++ == Set::rounds) return round = true;
+    if (coupled_step(tolerance, left, failed)) continue;
+    if (!failed && phases++ == Set::rounds) {
+      left = error();
+      return round = true;
+    }
     if (failed || !frozen_steps()) return false;
   }
   return true;
@@ -212,8 +215,9 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     ++passes_;
     before.assign(v_.begin(), v_.end());
     const double goal = Set::accuracy * std::max(aim, tolerance);
+    double off;
     bool round;
-    if (!newton(goal, round)) return false;
+    if (!newton(goal, off, round)) return false;
     if (round && steps_ < limit_) {
       scale_penalties(1 / Set::penalty);
       slow = 0;
@@ -224,7 +228,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     for (const Row &r : row_)
       if (r.kind == Kind::drag) limit_drag(*rows_, r.row);
     if (!host_->judge(residual_)) return false;
-    const double off = error(), required = std::max(residual_.relative, off / tolerance);
+    const double required = std::max(residual_.relative, off / tolerance);
     found_ = required <= Set::accuracy;
     const double now = std::max(residual_.speed, off);
     if (now < best) {
@@ -290,8 +294,9 @@ bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   for (size_t k = 0; k < size_t{3} * single_; ++k)
     if (inverse_[k] > 0) v_[kStride * (k / 3) + k % 3] = 0;
   limit_ = steps_ + steps;
+  double left;
   for (bool round = true; round && steps_ < limit_;) {
-    if (!newton(tolerance, round)) return false;
+    if (!newton(tolerance, left, round)) return false;
     if (round) scale_penalties(1 / Set::penalty);
   }
   put_rows();

@@ -151,9 +151,9 @@ class ContactNewton {
   void move(double share);
   double error() const;  // m/s, largest of inverse g
   double size() const;   // of g, in the metric of the inverse diagonal
-  bool newton(double tolerance, bool &round);
+  bool newton(double tolerance, double &left, bool &round);
   void scale_penalties(double by);
-  bool coupled_step(double tolerance, bool &failed);
+  bool coupled_step(double tolerance, double left, bool &failed);
   bool frozen_steps();
   bool gains(double normal) const;
   bool penalties_alone(double tolerance, uint32_t steps);

@@ -141,14 +141,14 @@ void ContactNewton::list_rows() {
       if (turns) seen_.insert(seen_.end(), jac_.end() - 9, jac_.end());
     }
     for (uint32_t q = 0; points_ + q < nodes_; ++q) {
-      double part[9];
+      const size_t columns = std::min<size_t>(3, motions_.rank - 3 * size_t{q});
+      double part[9] = {};
       const auto take = [&](const Array<double> &from) {
         bool any = false;
         for (size_t r = 0; r < 3; ++r)
-          for (size_t c = 0; c < 3; ++c) {
-            const size_t column = 3 * size_t{q} + c;
-            part[3 * r + c] = column < motions_.rank ? from[(3 * k + r) * width + column] : 0;
-            any = any || part[3 * r + c] != 0;
+          for (size_t c = 0; c < columns; ++c) {
+            part[3 * r + c] = from[(3 * k + r) * width + 3 * size_t{q} + c];
+            any |= part[3 * r + c] != 0;
           }
         return any;
       };
@@ -487,14 +487,14 @@ void ContactNewton::shape() {
   own_ = {place_.data() + blocks, nodes_};
   spot_ = {place_.data() + blocks + nodes_, n - blocks - nodes_};
   blocks_.resize(size_t{9} * pattern_.nb);
-  matrix_.resize(size_t{9} * pattern_.nb);
+  matrix_.assign(size_t{9} * pattern_.nb, 0.0);
   shaped_ = true;
 }
 
 // A at the present state, and the inverse of its diagonal.
 bool ContactNewton::set_matrix() {
   if (!shaped_) shape();
-  std::fill(matrix_.begin(), matrix_.end(), 0.0);
+  for (const uint32_t b : at_) std::fill_n(&matrix_[9 * size_t{b}], 9, 0.0);
   for (const Body &b : bodies_)
     if (!b.system->matrix(&at_[b.pattern], matrix_.data())) return false;
   for (uint32_t k = single_; k < nodes_; ++k)

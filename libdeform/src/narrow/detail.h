@@ -12,6 +12,7 @@
 #include "geometry/obstacle_shape.h"
 #include "geometry/views.h"
 #include "geometry/voxel_grid.h"
+#include "narrow/list_memory.h"
 #include "narrow/parts.h"
 
 namespace dfm::narrow {
@@ -40,6 +41,7 @@ struct Pair {
   double speed_b;                         // m/s, bound over body b's surfels
   std::span<const Crossing> crossings{};  // of this pair, in their order
   bool parts = false;                     // of one body, made by a cut (narrow/parts.h)
+  KnownRun known{};                       // of the candidates
 
   Vec3 xa(uint32_t s) const { return load3(&a.surface->x[4 * size_t{s}]); }
   Vec3 va(uint32_t s) const { return load3(&a.surface->v[4 * size_t{s}]); }

@@ -115,7 +115,12 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const double depth = edge_recovery_depth(sa, sb);
   EdgeFaces fa;
   bool known = false, convex = false, bears = false;  // fa belongs to last_a; so do convex and bears
-  for (const Candidate &candidate : run) {
+  // with what either may count as longer
+  const double farthest = std::max(contact_reach(pair.h, pair.offset, pair.known.speed), depth) +
+                          2 * 2 * pair.h * pair.known.speed;
+  for (size_t i = 0; i < run.size(); ++i) {
+    if (pair.known.beyond(i, farthest)) continue;
+    const Candidate &candidate = run[i];
     const uint32_t *ea = &sa.edge[2 * size_t{candidate.feature_a}];
     const uint32_t *eb = &sb.edge[2 * size_t{candidate.feature_b}];
     if (candidate.feature_a != last_a) {
@@ -136,10 +141,14 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
     const Vec3 q0 = pair.xb(eb[0]), w = pair.xb(eb[1]) - q0, r = p0 - q0;
     const Vec3 n = cross(u, w);
     const double nn = norm2(n), nr = dot(n, r), ww = norm2(w);
-    if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww)) continue;
     const double uw = dot(u, w), ur = dot(u, r), wr = dot(w, r);
     const double s = uw * wr - ww * ur, t = uu * wr - uw * ur;  // times nn
-    if (!(s > -kPast * nn && s < (1 + kPast) * nn && t > -kPast * nn && t < (1 + kPast) * nn)) continue;
+    if (!(nr * nr <= widest2 * nn) || !(nn > kParallel * kParallel * uu * ww) ||
+        !(s > -kPast * nn && s < (1 + kPast) * nn && t > -kPast * nn && t < (1 + kPast) * nn)) {
+      if (pair.known.apart)
+        pair.known.found(i, std::sqrt(closest_segments(p0, p0 + u, q0, q0 + w).distance2));
+      continue;
+    }
     double speed2 = 0;
     for (const uint32_t e : {eb[0], eb[1]})
       speed2 = std::max({speed2, norm2(vp0 - pair.vb(e)), norm2(vp1 - pair.vb(e))});

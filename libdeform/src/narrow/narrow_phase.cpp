@@ -1,6 +1,7 @@
 #include "narrow/narrow_phase.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "narrow/detail.h"
 
@@ -122,8 +123,7 @@ struct Finder {
            !(c.obstacle ? find_slot(obstacles, c.slot_b)->moves() : !find_slot(bodies, c.slot_b)->asleep);
   }
 
-  // speed: m/s, bound over body b's surfels
-  void operator()(narrow::Run run, double speed, Array<ContactPoint> &out) const {
+  void operator()(narrow::Run run, const NarrowBlocks::Range &range, Array<ContactPoint> &out) const {
     const Candidate &c = run.front();
     const BodyView &a = *find_slot(bodies, c.slot_a);
     if (!c.obstacle) {
@@ -133,9 +133,10 @@ struct Finder {
                               nullptr,
                               h,
                               offset,
-                              speed,
+                              range.speed,
                               of_pair(crossings, a.id, b->id),
-                              parts_of_one(*a.surface, a.id, *b->surface, b->id)};
+                              parts_of_one(*a.surface, a.id, *b->surface, b->id),
+                              range.known};
       return (c.kind == 0 ? narrow::vertex_face : narrow::edge_edge)(pair, run, out);
     }
     const ObstacleView &view = *find_slot(obstacles, c.slot_b);
@@ -165,43 +166,55 @@ double NarrowBlocks::speed(std::span<const BodyView> bodies, size_t i) {
   return speed_[i];
 }
 
-void NarrowBlocks::add(const Array<Candidate> &list, size_t begin, size_t end, double speed) {
-  const Candidate &first = list[begin];
+void NarrowBlocks::add(const Array<Candidate> &list, Range run) {
+  const size_t end = run.end;
+  const auto add_to = [&](size_t at) {
+    run.end = at;
+    ranges_.push_back(run);
+    if (run.known.apart) run.known.apart += at - run.begin;
+    run.begin = at;
+  };
   // a run of two surfaces may be divided between features of body a; other runs not
-  if (!first.obstacle)
-    for (size_t at = begin + kBlock; at < end; ++at)
+  if (!list[run.begin].obstacle)
+    for (size_t at = run.begin + kBlock; at < end; ++at)
       if (list[at].feature_a != list[at - 1].feature_a) {
-        ranges_.push_back({begin, at, speed});
-        begin = at;
+        add_to(at);
         at += kBlock - 1;
       }
-  ranges_.push_back({begin, end, speed});
+  add_to(end);
 }
 
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                    const Array<Candidate> &candidates, double h, double offset,
                    std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out,
-                   NarrowBlocks *blocks, Tasks *tasks) {
+                   NarrowBlocks *blocks, Tasks *tasks, ListMemory *known) {
   out.clear();
   Finder find{bodies, obstacles, h, offset, crossings};
   for (const BodyView &b : bodies) find.nnode = std::max(find.nnode, b.first_node + b.surface->nsurfel);
   const bool parts = blocks && tasks && tasks->parallel() && candidates.size() > 2 * kBlock;
   if (parts) blocks->start();
-  const BodyView *fast = nullptr;
-  double speed = 0;
-  for (size_t i = 0; i < candidates.size();) {
+  struct Fast {  // the body that was last looked at
+    const BodyView *body = nullptr;
+    double speed = 0;
+  } fast[2];
+  const auto speed_of = [&](int side, uint32_t slot) {
+    const BodyView *const b = find_slot(bodies, slot);
+    if (std::exchange(fast[side].body, b) != b)
+      fast[side].speed =
+          blocks ? blocks->speed(bodies, size_t(b - bodies.data())) : largest_speed(*b->surface);
+    return fast[side].speed;
+  };
+  size_t number = 0;  // of the run
+  for (size_t i = 0; i < candidates.size(); ++number) {
     const Candidate &c = candidates[i];
-    const size_t begin = i, end = end_of_run(candidates, i);
-    i = end;
+    NarrowBlocks::Range run{i, end_of_run(candidates, i), 0};
+    i = run.end;
     if (find.skips(c)) continue;
-    if (!c.obstacle) {
-      const BodyView *const b = find_slot(bodies, c.slot_b);
-      if (b != fast)
-        speed = blocks ? blocks->speed(bodies, size_t(b - bodies.data())) : largest_speed(*b->surface);
-      fast = b;
-    }
-    if (parts) blocks->add(candidates, begin, end, speed);
-    else find(narrow::Run(&c, end - begin), speed, out);
+    if (!c.obstacle) run.speed = speed_of(1, c.slot_b);
+    if (!c.obstacle && known)
+      run.known = {&known->apart[run.begin], known->runs[number].way, speed_of(0, c.slot_a) + run.speed};
+    if (parts) blocks->add(candidates, run);
+    else find(narrow::Run(&c, run.end - run.begin), run, out);
   }
   if (parts) blocks->run(*tasks, candidates, find, out);
   if (blocks) blocks->forget_speeds();

@@ -18,6 +18,7 @@
 #include "core/memory.h"
 #include "core/tasks.h"
 #include "geometry/views.h"
+#include "narrow/list_memory.h"
 
 namespace dfm {
 
@@ -35,9 +36,14 @@ class NarrowBlocks {
   }
   double speed(std::span<const BodyView> bodies, size_t i);
   void forget_speeds() { speed_.clear(); }
+  struct Range {  // of the list: candidates of one pair and kind
+    size_t begin, end;
+    double speed;      // m/s, bound over body b's surfels
+    KnownRun known{};  // of its first one on
+  };
   // A run of the list: all candidates of one pair and kind.
-  void add(const Array<Candidate> &list, size_t begin, size_t end, double speed);
-  // find(candidates, speed, contacts) for each block, re-entrant. Throws std::bad_alloc where one has no
+  void add(const Array<Candidate> &list, Range run);
+  // find(candidates, range, contacts) for each block, re-entrant. Throws std::bad_alloc where one has no
   // memory.
   template <class Find>
   void run(Tasks &tasks, const Array<Candidate> &list, const Find &find, Array<ContactPoint> &out) {
@@ -45,16 +51,12 @@ class NarrowBlocks {
     each_on(&tasks, ranges_.size(), 1, [&](size_t k) {
       found_[k].clear();
       const Range &p = ranges_[k];
-      find(std::span(&list[p.begin], p.end - p.begin), p.speed, found_[k]);
+      find(std::span(&list[p.begin], p.end - p.begin), p, found_[k]);
     });
     for (size_t k = 0; k < ranges_.size(); ++k) out.insert(out.end(), found_[k].begin(), found_[k].end());
   }
 
  private:
-  struct Range {
-    size_t begin, end;
-    double speed;  // m/s, bound over body b's surfels
-  };
   const Memory *memory_;
   Array<Range> ranges_;
   Array<double> speed_;
@@ -69,10 +71,11 @@ class NarrowBlocks {
 //   crossings  ascending: what edges bore in the last sub-step
 //   lent       scratch that the caller keeps
 //   blocks, tasks   the same for work on several threads; null: none
+//   known           follows a list that begins with candidates; null: none
 // Values that are not finite make no contact.
 void find_contacts(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
                    const Array<Candidate> &candidates, double h, double offset,
                    std::span<const Crossing> crossings, Array<uint8_t> &lent, Array<ContactPoint> &out,
-                   NarrowBlocks *blocks = nullptr, Tasks *tasks = nullptr);
+                   NarrowBlocks *blocks = nullptr, Tasks *tasks = nullptr, ListMemory *known = nullptr);
 
 }  // namespace dfm

@@ -48,7 +48,7 @@ struct Group {
   const uint32_t *corners(const Near &n) const { return &pair.b->surface->tri[3 * size_t{n.tri}]; }
   double reach_to(Vec3 v, const uint32_t *corners) const;
   bool reaches(Run run, Vec3 v, double widest2) const;
-  void collect(Run run);
+  void collect(Run run, size_t begin, size_t end);
   uint32_t nearest() const;
   bool has_feature(const Near &other, const Near &of) const;
   bool local_minimum(const Near &n) const;
@@ -100,18 +100,21 @@ bool Group::reaches(Run run, Vec3 v, double widest2) const {
   return false;
 }
 
-void Group::collect(Run run) {
+void Group::collect(Run run, size_t begin, size_t end) {
   count = 0;
   const Vec3 v = pair.va(surfel);
   const double reach = contact_reach(pair.h, pair.offset, norm(v) + pair.speed_b);
-  if (!reaches(run, v, reach * reach)) return;
-  const double widest = std::max(reach, depth), widest2 = widest * widest;
-  for (const Candidate &candidate : run) {
+  if (!pair.known.apart && !reaches(run.subspan(begin, end - begin), v, reach * reach)) return;
+  const double widest = std::max(reach, depth);
+  for (size_t i = begin; i < end; ++i) {
+    if (pair.known.beyond(i, widest)) continue;
+    const Candidate &candidate = run[i];
     const uint32_t *c = &pair.b->surface->tri[3 * size_t{candidate.feature_b}];
     const Vec3 a = pair.xb(c[0]), b = pair.xb(c[1]), d = pair.xb(c[2]);
     const TrianglePoint t = closest_on_triangle(p, a, b, d);
-    if (!(t.distance2 <= widest2)) continue;
     const double distance = std::sqrt(t.distance2);
+    pair.known.found(i, distance);
+    if (!(t.distance2 <= widest * widest)) continue;
     Near *n = place_for(near, count, distance);
     if (!n) continue;
     n->tri = candidate.feature_b;
@@ -367,12 +370,17 @@ void name_contacts(const Pair &pair, size_t begin, Array<ContactPoint> &out) {
 
 void vertex_face(const Pair &pair, Run run, Array<ContactPoint> &out) {
   Group group(pair);
+  const double widest = std::max(contact_reach(pair.h, pair.offset, pair.known.speed), group.depth);
   for (size_t i = 0; i < run.size();) {
+    if (pair.known.beyond(i, widest)) {
+      ++i;
+      continue;
+    }
     size_t end = i + 1;
     while (end < run.size() && run[end].feature_a == run[i].feature_a) ++end;
     group.surfel = run[i].feature_a;
     group.p = pair.xa(group.surfel);
-    group.collect(run.subspan(i, end - i));
+    group.collect(run, i, end);
     i = end;
     if (!group.count) continue;
     const size_t begin = out.size();

@@ -30,9 +30,9 @@ StepContext::StepContext(const Meters &meters)
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.common, guard.kept, guard.kept_before, guard.blocks.ranges);
-  GuardMemory &known = guard.memory;
+  ListMemory &known = guard.memory;
   use_memory(meters.detection.memory(), known.runs, known.old_runs, known.features, known.old_features,
-             known.rest, known.old_rest, known.normal, known.old_normal, known.before);
+             known.apart, known.old_apart, known.normal, known.old_normal, known.before);
 }
 
 StepContext::~StepContext() = default;

@@ -191,21 +191,12 @@ bool withstands_impacts(World &w, StepContext &step) {
   return false;
 }
 
-// All pairs that may come near: candidates of two sides, followed by those of bodies with themselves.
-void follow_lists(World &w, StepContext &step) {
-  Guard &g = step.guard;
-  const bool pairs = w.plan.has(StageRole::lists_pairs);
-  if (pairs)
-    step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, g.speed,
+// The lists after the solve.
+void follow_ends(World &w, StepContext &step) {
+  if (w.plan.has(StageRole::lists_pairs))
+    step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, step.guard.speed,
                      &w.context->tasks);
-  const bool fresh = cover_self(w, step);
-  if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
-  const uint64_t renewals = step.broad.stats().renewals;
-  if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
-  g.lists = renewals;
-  g.list = join_self(step, pairs ? &step.broad.candidates() : nullptr, g.joined) ? &g.joined
-                                                                                 : &step.broad.candidates();
-  g.memory.follow(*g.list, &w.context->tasks);
+  guard_follow_lists(w, step, cover_self(w, step));
 }
 
 void make_room(GuardSide &s, const Surface &surface) {
@@ -466,6 +457,18 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
   return yes;
 }
 
+void guard_follow_lists(World &w, StepContext &step, bool fresh) {
+  Guard &g = step.guard;
+  if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
+  const uint64_t renewals = step.broad.stats().renewals;
+  if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
+  g.lists = renewals;
+  const Array<Candidate> &pairs = step.broad.candidates();
+  g.list =
+      join_self(step, w.plan.has(StageRole::lists_pairs) ? &pairs : nullptr, g.joined) ? &g.joined : &pairs;
+  g.memory.follow(*g.list, &w.context->tasks);
+}
+
 void check_motion(const World &w, StepContext &step, uint32_t i) {
   if (w.plan.has(StageRole::lists_pairs) && step.h * step.broad.speed(i) > kSlow * floor_of(w))
     step.guard.common[i] = common_motion(w.bodies[i]->surface);
@@ -480,7 +483,7 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   }
   if (!find_ends(w, step, trouble)) return Next::stop;
   bound_speeds(w, step);
-  follow_lists(w, step);
+  follow_ends(w, step);
   set_sides(w, step);
   set_fraction(w, step, 1);
   guard_near(step.guard.scene, *step.guard.list, step.guard.memory, step.guard.near, &step.guard.blocks,

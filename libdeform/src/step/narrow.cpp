@@ -92,8 +92,11 @@ void turn_false_depths(World &w, StepContext &step) {
 Next stage_narrow(World &w, StepContext &step, uint32_t *) {
   step.narrow.forget_speeds();
   for (const uint32_t i : step.active) step.narrow.set_speed(step.body_views, i, step.broad.speed(i));
+  const bool known = w.plan.has(StageRole::guards);
+  if (known) guard_follow_lists(w, step, false);
   find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
-                w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks);
+                w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks,
+                known ? &step.guard.memory : nullptr);
   turn_false_depths(w, step);
   step.woken.clear();
   if (w.sleepers == 0) return Next::stage;

@@ -176,7 +176,7 @@ TEST(ToiGuard, NearPairsOnSeveralThreads_AreThoseOfOne) {
     scene.add(cylinder);
     scene.add(test::moved(cylinder, test::turn({0, 0, 1}, 0.02), {0.4012, 0.01, 0.003}));
     scene.add(dfm::Shape::plane, {0, 0, -0.0005});
-    dfm::GuardMemory memory[2];
+    dfm::ListMemory memory[2];
     dfm::GuardBlocks blocks;
     dfm::Array<uint32_t> near[2];
     std::mt19937 random(5);
@@ -217,7 +217,7 @@ TEST(ToiGuard, NearPairsOnSeveralThreads_AreThoseOfOne) {
         memory[k].keep();
       }
       ASSERT_EQ(near[0], near[1]) << threads << " threads, step " << step;
-      ASSERT_EQ(memory[0].rest, memory[1].rest) << threads << " threads, step " << step;
+      ASSERT_EQ(memory[0].apart, memory[1].apart) << threads << " threads, step " << step;
       ASSERT_EQ(memory[0].normal, memory[1].normal) << threads << " threads, step " << step;
       found += near[0].size();
     }
