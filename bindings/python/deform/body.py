@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Column, Report
-from ._context import choice, number_of
+from ._context import choice, listed
 from ._library import ArgumentError, OfThisProcess, check, default, lib, quick, sized
 from ._values import array_of, pose_of, real, text, vector, whole
 from .cut import CutInfo, cut_def, separate_def
@@ -67,7 +67,8 @@ def vector_keys(times: Any, values: Any, what: str) -> Any:
 def numbers_of(numbers: Any, what: str = "points") -> np.ndarray:
     """Numbers of points, or of `what`, as the library takes them."""
     given = np.atleast_1d(np.asarray(numbers))
-    if given.ndim != 1 or (given.size and (given.dtype.kind not in "iu" or given.min() < 0)):
+    if given.ndim != 1 or (given.size and (
+            given.dtype.kind not in "iu" or given.min() < 0 or given.max() >= 2**32)):
         raise ArgumentError(f"{what} must be a list of whole numbers from 0 on, numbers of {what} of the "
                             "body", "DFM_E_ARG")
     return np.ascontiguousarray(given, dtype=np.uint32)
@@ -117,10 +118,7 @@ class _Part(OfThisProcess):
         """What overlapped this sensor at the end of the last step: bodies, then obstacles and rigid bodies,
         each in order of creation. World.events tells what comes and goes."""
         self.world.free()
-        n = number_of(quick.dfm_sensor_things, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(quick.dfm_sensor_things(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return [self.world.owner(handle) for handle in out[:n]]
+        return [self.world.owner(handle) for handle in listed(quick.dfm_sensor_things, self.handle)]
 
     def __repr__(self) -> str:
         return f"<deform.{type(self).__name__} '{self.name}'>"
@@ -460,10 +458,7 @@ class Body(_Part):
     def attachments(self) -> list[int]:
         """Numbers of the attachments that hold now, in order of creation."""
         self.world.free()
-        n = number_of(quick.dfm_body_attachments, self.handle)
-        out = (ctypes.c_uint32 * max(n, 1))()
-        check(quick.dfm_body_attachments(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return list(out[:n])
+        return listed(quick.dfm_body_attachments, self.handle, kind=ctypes.c_uint32)
 
     def attachment(self, number: int) -> _abi.dfm_attachment:
         """What it does, as the C struct: to (a handle), nsurfel, stiffness N/m, damping N s/m, release N,
@@ -569,10 +564,8 @@ class Body(_Part):
         """Bodies that have come off it (set_separate), in order of creation; of a piece, those of the body
         that it came off."""
         self.world.free()
-        n = number_of(quick.dfm_body_pieces, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(quick.dfm_body_pieces(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return [body for body in map(self.world.owner, out[:n]) if isinstance(body, Body)]
+        pieces = map(self.world.owner, listed(quick.dfm_body_pieces, self.handle))
+        return [body for body in pieces if isinstance(body, Body)]
 
     @property
     def origins(self) -> tuple[np.ndarray, np.ndarray]:
@@ -660,9 +653,10 @@ class Obstacle(_Part):
                                             whole(collides_with, "collides_with")))
 
     def set_material(self, material: Any = None) -> None:
-        """Its material, of World.add_material, for friction by material; None: no material."""
+        """Its material, of World.add_material or as a dict of entries, for friction by material; None: no
+        material."""
         self.world.free()
-        check(quick.dfm_obstacle_set_material(self.handle, 0 if material is None else material.handle))
+        check(quick.dfm_obstacle_set_material(self.handle, self.world._material(material)))
 
     def definition(self) -> _abi.dfm_obstacle_def:
         """Its def as created, as the C struct."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Rows
+from ._context import listed
 from ._library import check, lib, quick, read_text, sized
 from ._values import vector, whole
 from .body import Body, Obstacle, handle_of
@@ -89,13 +90,10 @@ class Reports:
     @property
     def profile(self: Any) -> dict[str, tuple[float, int]]:
         """Of each stage of the steps since the world was created: seconds by the clock, and calls."""
-        n, row = ctypes.c_uint32(), ctypes.sizeof(_abi.dfm_stage_time)
+        row = _abi.dfm_stage_time
         self.free()
-        check(quick.dfm_world_profile_sized(self.handle, row, 0, None, ctypes.byref(n)))
-        out = (_abi.dfm_stage_time * max(n.value, 1))()
-        if n.value:
-            check(quick.dfm_world_profile_sized(self.handle, row, n.value, ctypes.byref(out), None))
-        return {stage.name.decode(): (stage.seconds, int(stage.calls)) for stage in out[:n.value]}
+        stages = listed(quick.dfm_world_profile_sized, self.handle, ctypes.sizeof(row), kind=row)
+        return {stage.name.decode(): (stage.seconds, int(stage.calls)) for stage in stages}
 
     @property
     def hash(self: Any) -> int:

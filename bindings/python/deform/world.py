@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Report, Rows
-from ._context import Context, Params, choice, default_context, number_of, strings, word
+from ._context import Context, Params, choice, default_context, listed, strings, word
 from ._library import (ArgumentError, BusyError, OfThisProcess, check, default, encoded, error, lib, quick,
                        sized)
 from ._signals import watch
@@ -407,7 +407,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                    host: str | None = None) -> list[Rigid]:
         """A set of rigid bodies and the joints between them. host: what moves them; None: the library's own
         solver."""
-        rows = (_abi.dfm_rigid_def * max(len(bodies), 1))(*(body.struct() for body in bodies))
+        rows = (_abi.dfm_rigid_def * max(len(bodies), 1))(*(body.struct(self) for body in bodies))
         links = (_abi.dfm_joint_def * max(len(joints), 1))(*(joint.struct() for joint in joints))
         group = sized(_abi.dfm_rigid_set_def)
         group.nbody, group.bodies = len(bodies), ctypes.addressof(rows)
@@ -433,10 +433,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
 
     def _handles(self, function: Any) -> list[int]:
         self.free()
-        n = number_of(function, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(function(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return list(out[:n])
+        return listed(function, self.handle)
 
     @property
     def bodies(self) -> list[Body]:
@@ -588,8 +585,12 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.load_steps, definition.time = whole(load_steps, "load_steps", 1), real(time, "time")
         definition.load_from = real(load_from, "load_from")
         definition.load_to = real(load_to, "load_to")
-        with self.alone():
-            status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
+        try:
+            with self.alone():
+                status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
+        except BaseException:  # raised by the handler of a signal
+            self._stop = False
+            raise
         if status == _abi.DFM_DISCARD and self._stop:  # by a signal whose handler has not raised
             self._stop = False
             return self.equilibrium(load_steps, load_from=load_from, load_to=load_to, time=time)
@@ -626,8 +627,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
         self.free()
         check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
-        if np.size(times):
-            self.shown.upright = Upright(times, gravity)
+        self.shown.upright = Upright(times, gravity) if np.size(times) else None
 
     def set_sleep(self, sleep: bool = True) -> None:
         """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
@@ -746,6 +746,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                                 f"{type(snapshot).__name__}", "DFM_E_ARG") from None
         self.free()
         check(quick.dfm_world_restore(self.handle, taken, len(taken)))
+        self.shown.upright = None
         for body in list(self._bodies.values()):
             body._renew_name()  # a name that the library has made may be another one
 
