@@ -463,6 +463,14 @@ class Threads(unittest.TestCase):
                     world.equilibrium()
             self.assertFalse(world._stop)
 
+    def test_a_call_that_changes_a_world_has_it_alone(self):
+        seen = []
+        with deform.World() as world:
+            with mock.patch.object(deform.world.lib, "dfm_world_filter_pair",
+                                   lambda *_: seen.append(world._busy) or 0):
+                world.filter_pair("*", "*", True)
+        self.assertEqual(seen, [threading.get_ident()])
+
     def test_two_worlds_in_two_threads(self):
         hashes = {}
 

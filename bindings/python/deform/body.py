@@ -10,7 +10,7 @@ import numpy as np
 from . import _abi
 from ._arrays import Column, Report
 from ._context import choice, listed
-from ._library import ArgumentError, OfThisProcess, check, default, lib, quick, sized
+from ._library import ArgumentError, OfThisProcess, check, default, encoded, lib, quick, sized
 from ._values import array_of, pose_of, real, text, vector, whole
 from .cut import CutInfo, cut_def, separate_def
 from .mesh import points_of
@@ -372,9 +372,8 @@ class Body(_Part):
 
     def set_params(self, **params: Any) -> None:
         """Changes run-time parameters of the body's model by key."""
-        self.world.free()
         values = self.world.context.params("model", self.model, params)
-        check(lib.dfm_body_set_params(self.handle, ctypes.byref(values.struct)))
+        self.world.call(lib.dfm_body_set_params, self.handle, ctypes.byref(values.struct))
 
     def set_model(self, model: str, params: Mapping[str, Any] | None = None) -> None:
         """Gives the body another model between two steps; positions and velocities stay."""
@@ -445,14 +444,12 @@ class Body(_Part):
                            ("damping", damping)):
             setattr(definition, key, real(value, key))
         number = ctypes.c_uint32()
-        self.world.free()
-        check(lib.dfm_body_attach(self.handle, ctypes.byref(definition), ctypes.byref(number)))
+        self.world.call(lib.dfm_body_attach, self.handle, ctypes.byref(definition), ctypes.byref(number))
         return number.value
 
     def detach(self, attachment: int) -> None:
         """Ends an attachment."""
-        self.world.free()
-        check(lib.dfm_body_detach(self.handle, whole(attachment, "attachment")))
+        self.world.call(lib.dfm_body_detach, self.handle, whole(attachment, "attachment"))
 
     @property
     def attachments(self) -> list[int]:
@@ -485,9 +482,7 @@ class Body(_Part):
         definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most,
                              radius)
         info = sized(_abi.dfm_cut_info)
-        with self.world.alone():
-            status = lib.dfm_body_cut(self.handle, ctypes.byref(definition), ctypes.byref(info))
-        check(status)
+        self.world.call(lib.dfm_body_cut, self.handle, ctypes.byref(definition), ctypes.byref(info))
         return CutInfo.of(info)
 
     def plan_cut(self, t: float, shape: str = "plane", *, corners: Any = None, point: Any = None,
@@ -498,50 +493,38 @@ class Body(_Part):
         or later."""
         definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most,
                              radius)
-        with self.world.alone():
-            status = lib.dfm_body_plan_cut(self.handle, real(t, "t"), ctypes.byref(definition))
-        check(status)
+        self.world.call(lib.dfm_body_plan_cut, self.handle, real(t, "t"), ctypes.byref(definition))
 
     def plan_no_cuts(self) -> None:
         """No planned cut of the body and of its pieces is to come any more."""
-        with self.world.alone():
-            status = lib.dfm_body_plan_cut(self.handle, 0, None)
-        check(status)
+        self.world.call(lib.dfm_body_plan_cut, self.handle, 0, None)
 
     def separate(self, least_cells: int = 1, crumbs: str = "stay") -> CutInfo:
         """Makes parts that hang together no more bodies of their own: each but the heaviest that has
         least_cells or more. They are named "NAME.1", "NAME.2" and so on, and world.bodies has them. crumbs,
         the smaller parts: "stay" with the part next to them, or "remove": they go with their mass."""
         rule, info = separate_def(least_cells, crumbs), sized(_abi.dfm_cut_info)
-        with self.world.alone():
-            status = lib.dfm_body_separate(self.handle, ctypes.byref(rule), ctypes.byref(info))
-        check(status)
+        self.world.call(lib.dfm_body_separate, self.handle, ctypes.byref(rule), ctypes.byref(info))
         return CutInfo.of(info)
 
     def set_separate(self, least_cells: int | None = 1, crumbs: str = "stay") -> None:
         """From now on each cut and each tear is followed by a separation (see separate); with least_cells
         None parts stay in one body."""
         rule = None if least_cells is None else ctypes.byref(separate_def(least_cells, crumbs))
-        with self.world.alone():
-            status = lib.dfm_body_set_separate(self.handle, rule)
-        check(status)
+        self.world.call(lib.dfm_body_set_separate, self.handle, rule)
 
     def remove_cells(self, cells: Any) -> CutInfo:
         """Takes cells away by their numbers [n], between two steps."""
         numbers, info = numbers_of(cells, "cells"), sized(_abi.dfm_cut_info)
-        with self.world.alone():
-            status = lib.dfm_body_remove_cells(self.handle, numbers.size, numbers.ctypes.data,
-                                               ctypes.byref(info))
-        check(status)
+        self.world.call(lib.dfm_body_remove_cells, self.handle, numbers.size, numbers.ctypes.data,
+                        ctypes.byref(info))
         return CutInfo.of(info)
 
     def set_cut_delay(self, delay: float = 0) -> None:
         """From now on faces that the edge of a tool passes open `delay` s later, and a second thread makes
         the cut body meanwhile; 0: at the end of the step in which it passes them."""
         seconds = real(delay, "delay")
-        with self.world.alone():
-            status = lib.dfm_body_set_cut_delay(self.handle, seconds)
-        check(status)
+        self.world.call(lib.dfm_body_set_cut_delay, self.handle, seconds)
 
     @property
     def cut_delay(self) -> float:
@@ -592,18 +575,15 @@ class Body(_Part):
 
     def write(self, path: Any) -> None:
         """Its points and cells as *.vtu."""
-        self.world.free()
-        check(lib.dfm_debug_write_body(self.handle, str(path).encode()))
+        self.world.call(lib.dfm_debug_write_body, self.handle, encoded(path))
 
     def write_surface(self, path: Any) -> None:
         """Its surface with displacements, velocities and contact forces as *.vtu."""
-        self.world.free()
-        check(lib.dfm_debug_write_surface(self.handle, str(path).encode()))
+        self.world.call(lib.dfm_debug_write_surface, self.handle, encoded(path))
 
     def remove(self) -> None:
         """Takes the body out of its world; its contacts end. Arrays keep their last values."""
-        self.world.free()
-        check(lib.dfm_body_destroy(self.handle))
+        self.world.call(lib.dfm_body_destroy, self.handle)
 
     def to_meshio(self) -> Any:
         """Its present state as a `meshio.Mesh`, with the velocity of each point."""
@@ -667,8 +647,7 @@ class Obstacle(_Part):
 
     def remove(self) -> None:
         """Takes the obstacle out of its world; its contacts end."""
-        self.world.free()
-        check(lib.dfm_obstacle_destroy(self.handle))
+        self.world.call(lib.dfm_obstacle_destroy, self.handle)
 
 
 class Rigid(Obstacle):
@@ -743,5 +722,4 @@ class Rigid(Obstacle):
 
     def remove(self) -> None:
         """Takes the whole set that it came with out of the world."""
-        self.world.free()
-        check(lib.dfm_rigid_destroy(self.handle))
+        self.world.call(lib.dfm_rigid_destroy, self.handle)

@@ -39,18 +39,14 @@ class Reports:
 
     def find_overlaps(self: Any) -> np.ndarray:
         """Checks all pairs now, and changes nothing: overlaps of the present state, as `overlaps`."""
-        with self.alone():
-            status = lib.dfm_world_find_overlaps(self.handle, None)
-        check(status)
+        self.call(lib.dfm_world_find_overlaps, self.handle, None)
         return self.overlaps
 
     def untangle(self: Any) -> int:
         """Moves overlapping bodies apart, as whole bodies, without energy and speed. Returns the number of
         pairs that still overlap; the log says why."""
         left = ctypes.c_uint32()
-        with self.alone():
-            status = lib.dfm_world_untangle(self.handle, ctypes.byref(left))
-        check(status)
+        self.call(lib.dfm_world_untangle, self.handle, ctypes.byref(left))
         return left.value
 
     def wrench(self: Any, a: Body | Obstacle, b: Body | Obstacle,

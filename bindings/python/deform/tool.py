@@ -147,9 +147,8 @@ class Tool:
             raise ArgumentError(f"{expected}, not {bodies!r}", "DFM_E_ARG")
         given = [handle_of(body, Body, expected) for body in bodies]
         handles = (ctypes.c_uint64 * max(len(given), 1))(*given)
-        self.world.free()
-        check(lib.dfm_tool_set_cuts(self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)],
-                                    whole(most, "most"), len(given), ctypes.byref(handles)))
+        self.world.call(lib.dfm_tool_set_cuts, self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)],
+                        whole(most, "most"), len(given), ctypes.byref(handles))
 
     def _shape(self) -> int:
         out = sized(_abi.dfm_tool_def)
@@ -166,8 +165,7 @@ class Tool:
 
     def remove(self) -> None:
         """Takes it out of its world with its parts; contacts and attachments end."""
-        self.world.free()
-        check(lib.dfm_tool_destroy(self.handle))
+        self.world.call(lib.dfm_tool_destroy, self.handle)
 
 
 class Tools:

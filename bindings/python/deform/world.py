@@ -220,12 +220,15 @@ class World(Queries, Reports, Tools, OfThisProcess):
         finally:
             self._busy = 0
 
+    def call(self, function: Any, *arguments: Any) -> None:
+        """Such a call; raises what its status means."""
+        with self.alone():
+            check(function(*arguments))
+
     def _created(self, function: Any, definition: Any) -> int:
         """The handle of what a function of the library makes in this world."""
         out = ctypes.c_uint64()
-        with self.alone():
-            status = function(self.handle, ctypes.byref(definition), ctypes.byref(out))
-        check(status)
+        self.call(function, self.handle, ctypes.byref(definition), ctypes.byref(out))
         return out.value
 
     def accept(self, status: int) -> int:
@@ -257,8 +260,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
             setattr(definition, key, real(value, f"{key} of a material"))
         definition.extra = values.struct
         out = ctypes.c_uint64()
-        self.free()
-        check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
+        self.call(lib.dfm_material_create, self.handle, ctypes.byref(definition), ctypes.byref(out))
         self.shown.softest = min(self.shown.softest, definition.young)
         return Material(self, out.value, name)
 
@@ -413,9 +415,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         group.nbody, group.bodies = len(bodies), ctypes.addressof(rows)
         group.njoint, group.joints = len(joints), ctypes.addressof(links)
         out = (ctypes.c_uint64 * max(len(bodies), 1))()
-        with self.alone():
-            status = lib.dfm_rigid_create(self.handle, encoded(host), ctypes.byref(group), ctypes.byref(out))
-        check(status)
+        self.call(lib.dfm_rigid_create, self.handle, encoded(host), ctypes.byref(group), ctypes.byref(out))
         return [self._know(self._obstacle(handle)) for handle in out[:len(bodies)]]
 
     def _obstacle(self, handle: int) -> Obstacle:
@@ -494,29 +494,24 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.law, definition.params = name.encode(), values.struct
         if restitution is not None:
             definition.flags, definition.restitution = _abi.DFM_FRICTION_RESTITUTION, restitution
-        self.free()
-        check(lib.dfm_world_add_friction(self.handle, ctypes.byref(definition)))
+        self.call(lib.dfm_world_add_friction, self.handle, ctypes.byref(definition))
 
     def set_friction(self, a: Any, b: Any, **params: Any) -> None:
         """Changes parameters of a rule while the world runs; those that are not given keep their values."""
-        self.free()
         values = Params(params)
-        check(lib.dfm_world_set_friction(self.handle, _side(a), _side(b), ctypes.byref(values.struct)))
+        self.call(lib.dfm_world_set_friction, self.handle, _side(a), _side(b), ctypes.byref(values.struct))
 
     def remove_friction(self, a: Any, b: Any) -> None:
         """Takes back what add_friction or set_friction said of the two; less specific rules count again."""
-        self.free()
-        check(lib.dfm_world_remove_friction(self.handle, _side(a), _side(b)))
+        self.call(lib.dfm_world_remove_friction, self.handle, _side(a), _side(b))
 
     def filter_pair(self, a: Any, b: Any, collide: bool) -> None:
         """Lets two named sides pass (False) or touch (True)."""
-        self.free()
-        check(lib.dfm_world_filter_pair(self.handle, _side(a), _side(b), collide))
+        self.call(lib.dfm_world_filter_pair, self.handle, _side(a), _side(b), collide)
 
     def remove_filter(self, a: Any, b: Any) -> None:
         """Takes back what filter_pair said of the two."""
-        self.free()
-        check(lib.dfm_world_remove_filter(self.handle, _side(a), _side(b)))
+        self.call(lib.dfm_world_remove_filter, self.handle, _side(a), _side(b))
 
     # ---- time ------------------------------------------------------------------------------------------
 
