@@ -220,11 +220,9 @@ bool App::leads(double dx, double dy) {
 
 void App::cut(const double blade[12]) {
   if (replay_) return;
-  std::vector<std::string> corners;
-  for (int i = 0; i < 12; ++i) corners.push_back(cli::number(blade[i]));
   attempt([&] {
     cli::JsonObject line;
-    stage_->simulation.act(line.add("do", "\"cut\"").add("blade", cli::json_array(corners)));
+    stage_->simulation.act(line.add("do", "\"cut\"").add("blade", cli::json_numbers({blade, 12})));
   });
 }
 
