@@ -52,7 +52,13 @@ std::string json_array(const std::vector<std::string> &values) {
   return out + "]";
 }
 
-std::string json_vector(const double v[3]) { return json_array({number(v[0]), number(v[1]), number(v[2])}); }
+std::string json_numbers(std::span<const double> values) {
+  std::vector<std::string> items;
+  for (const double x : values) items.push_back(number(x));
+  return json_array(items);
+}
+
+std::string json_vector(const double v[3]) { return json_numbers({v, 3}); }
 
 std::string indented(const std::string &json) {
   std::string out;

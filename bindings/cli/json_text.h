@@ -1,5 +1,6 @@
 // JSON that the command writes, and the little it must read back: the library's own explain text.
 #pragma once
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -19,6 +20,7 @@ class JsonObject {
   std::vector<std::pair<std::string, std::string>> members_;
 };
 std::string json_array(const std::vector<std::string> &values);
+std::string json_numbers(std::span<const double> values);
 std::string json_vector(const double v[3]);
 std::string indented(const std::string &json);  // objects and arrays of objects on lines of their own
 

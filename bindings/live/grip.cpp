@@ -93,13 +93,11 @@ void Grip::open(double by) {
 
 void Grip::update_pull() {
   const double to[3] = {to_.x, to_.y, to_.z};
-  std::vector<std::string> rotation;
-  for (const double q : rotation_) rotation.push_back(cli::number(q));
   cli::JsonObject line;
   simulation_.act(line.add("do", "\"tool\"")
                       .add("tool", cli::quoted(name(size_t(taken_))))
                       .add("to", cli::json_vector(to))
-                      .add("rotation", cli::json_array(rotation))
+                      .add("rotation", cli::json_numbers(rotation_))
                       .add("opening", cli::number(opening_))
                       .add("speed", cli::number(speed_)));
 }

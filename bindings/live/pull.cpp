@@ -22,7 +22,8 @@ Vec at(const std::vector<double> &xyz, size_t i) { return render::vec(&xyz[3 * i
 
 // The points near a place, the nearer the heavier: one point alone would tear its cells.
 struct Patch {
-  std::vector<std::string> points, weights;
+  std::vector<std::string> points;
+  std::vector<double> weights;
   Vec middle;
 };
 
@@ -38,7 +39,7 @@ Patch patch_around(const std::vector<double> &x, const Vec &place) {
     const double away = near[k].first / reach, w = 1 - away * away;
     if (!(w > 0)) continue;
     out.points.push_back(std::to_string(near[k].second));
-    out.weights.push_back(cli::number(w));
+    out.weights.push_back(w);
     out.middle = out.middle + at(x, near[k].second) * w;
     sum += w;
   }
@@ -108,7 +109,7 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
   line.add("do", "\"pull\"")
       .add("body", cli::quoted(body.name))
       .add("points", cli::json_array(patch.points))
-      .add("weights", cli::json_array(patch.weights))
+      .add("weights", cli::json_numbers(patch.weights))
       .add("to", text_of(patch.middle))
       .add("stiffness", cli::number(k))
       .add("damping", cli::number(std::sqrt(k * info.mass)));  // half of the critical one
@@ -119,15 +120,12 @@ bool Pull::grab(const Vec &origin, const Vec &direction) {
   } catch (const cli::Failure &) {
     offset_ = {};
     cli::JsonObject held;
-    std::vector<std::string> corners, weights;
-    for (int c = 0; c < 3; ++c) {
-      corners.push_back(std::to_string(corners_[c]));
-      weights.push_back(cli::number(weights_[c]));
-    }
+    std::vector<std::string> corners;
+    for (const uint32_t corner : corners_) corners.push_back(std::to_string(corner));
     held.add("do", "\"drag\"")
         .add("body", cli::quoted(body.name))
         .add("corners", cli::json_array(corners))
-        .add("weights", cli::json_array(weights));
+        .add("weights", cli::json_vector(weights_));
     return drag(held, info.mass);
   }
 }

@@ -22,9 +22,7 @@ std::string list_of(const cli::JsonValue &line, const char *key, size_t n) {
   if (x.size() != n || !std::all_of(x.begin(), x.end(), [](double v) { return std::fabs(v) <= kFar; }))
     throw cli::Failure(cli::kBadInput,
                        std::string("expected ") + std::to_string(n) + " numbers under \"" + key + "\"");
-  std::vector<std::string> out;
-  for (const double v : x) out.push_back(cli::number(v));
-  return cli::json_array(out);
+  return cli::json_numbers(x);
 }
 
 render::Vec vector(const cli::JsonValue &line, const char *key) {

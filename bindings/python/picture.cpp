@@ -1,5 +1,5 @@
 // Pictures for the Python package: the renderer behind plain C functions that ctypes calls. What is added
-// stays until it is drawn. One thread at a time for each picture; the package sees to that.
+// stays until the next one begins. One thread at a time for each picture; the package sees to that.
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -63,8 +63,6 @@ PICTURE_API void *deform_picture_create(uint32_t width, uint32_t height, char *w
   return nullptr;
 }
 
-PICTURE_API void deform_picture_destroy(void *picture) { delete static_cast<Picture *>(picture); }
-
 /** A body's color, repeating after ten. @param rgb out, [3] 0..1 */
 PICTURE_API void deform_picture_palette(uint32_t i, double *rgb) {
   const render::Color color = render::palette(i);
@@ -82,10 +80,14 @@ PICTURE_API void deform_picture_map(uint32_t map, uint32_t n, double *rgb) {
   }
 }
 
-/** @param up [3] unit, against gravity; tilts: it changes during the film that this is a frame of */
-PICTURE_API void deform_picture_upright(void *picture, const double *up, uint32_t tilts) {
-  copy(static_cast<Picture *>(picture)->scene.up, up);
-  static_cast<Picture *>(picture)->tilts = tilts != 0;
+/** Forgets what was added before, also where it was never drawn.
+ * @param up [3] unit, against gravity; tilts: it changes during the film that this is a frame of */
+PICTURE_API void deform_picture_begin(void *picture, const double *up, uint32_t tilts) {
+  Picture &p = *static_cast<Picture *>(picture), next;
+  next.renderer = std::move(p.renderer);
+  copy(next.scene.up, up);
+  next.tilts = tilts != 0;
+  p = std::move(next);
 }
 
 /** What the colors of values mean. @param low, high at the ends of the map */
@@ -143,7 +145,7 @@ PICTURE_API void deform_picture_shape(void *picture, uint32_t shape, const doubl
 }
 
 /** @param eye, look_at [3] m, world. Without it the camera finds its place by itself. After
- * deform_picture_upright. */
+ * deform_picture_begin. */
 PICTURE_API void deform_picture_camera(void *picture, const double *eye, const double *look_at) {
   render::Camera camera = {};
   copy(camera.eye, eye);
@@ -159,7 +161,7 @@ PICTURE_API void deform_picture_text(void *picture, const char *text) {
   texts.emplace_back(text, 28 + 22.0 * double(texts.size()));
 }
 
-/** Draws what was added and forgets it. @param rgb out, [height,width,3], rows from the top
+/** Draws what was added. @param rgb out, [height,width,3], rows from the top
  * @return 1; 0: why says what was refused */
 PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_t capacity) {
   Picture &picture = *static_cast<Picture *>(handle);
@@ -185,11 +187,6 @@ PICTURE_API int deform_picture_draw(void *handle, uint8_t *rgb, char *why, size_
       render::draw_text(image, 16, y, 14, text, {0.15f, 0.17f, 0.2f});
   if (const auto &l = picture.legend; drawn && l)
     render::legend(image, picture.scene.map, l->low, l->high, l->title, l->unit);
-  picture.legend.reset();
-  picture.tilts = false;
-  picture.scene = {};
-  picture.surfaces.clear();
-  picture.texts.clear();
   if (!drawn) return refuse(reason, why, capacity);
   std::copy(image.rgb.begin(), image.rgb.end(), rgb);
   return 1;

@@ -60,8 +60,6 @@ constexpr Lch kEmber[] = {{0, 0.28f, 0.10f, 295},
                           {1, 0.93f, 0.12f, 462}};
 constexpr Lch kLagoon[] = {
     {0, 0.30f, 0.11f, 275}, {0.33f, 0.50f, 0.11f, 235}, {0.66f, 0.71f, 0.12f, 180}, {1, 0.93f, 0.14f, 112}};
-constexpr Lch kCold[] = {{0, 0.40f, 0.15f, 262}, {1, 0.90f, 0.005f, 262}};
-constexpr Lch kWarm[] = {{0, 0.90f, 0.005f, 30}, {1, 0.45f, 0.17f, 30}};
 
 }  // namespace
 
@@ -75,12 +73,7 @@ Color palette(uint32_t i) {
 
 Color map_color(ColorMap map, float t) {
   t = t > 0 ? std::min(t, 1.f) : 0.f;
-  switch (map) {
-    case ColorMap::lagoon: return along(kLagoon, t);
-    case ColorMap::balance: return t < 0.5f ? along(kCold, 2 * t) : along(kWarm, 2 * t - 1);
-    case ColorMap::ember: break;
-  }
-  return along(kEmber, t);
+  return map == ColorMap::lagoon ? along(kLagoon, t) : along(kEmber, t);
 }
 
 }  // namespace render

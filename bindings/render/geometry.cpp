@@ -150,7 +150,7 @@ void Shape::surface(const Surface &s) {
       const uint32_t i = s.tri[3 * size_t(t) + k];
       Vertex v{};
       put(v.p, vec(s.xyz + 3 * size_t(i)) - origin);
-      put(v.n, s.normal ? unit(vec(s.normal + 3 * size_t(i)), f.normal[t]) : corner_normal(s, f, t, i));
+      put(v.n, corner_normal(s, f, t, i));
       std::copy_n(s.rgb, 3, v.rgb);
       if (s.scalar && !std::isnan(s.scalar[i])) {
         v.value = std::clamp(s.scalar[i], 0.f, 1.f);

@@ -38,14 +38,9 @@ struct Surface {
   uint32_t n = 0;
   const uint32_t *tri = nullptr;  // [ntri,3]
   uint32_t ntri = 0;
-  // [n,3]; null (the better choice): smooth across flat edges, sharp across rims of more than 40 degrees
-  const double *normal = nullptr;
   float rgb[3] = {0.8f, 0.8f, 0.8f};
   // [n] 0..1 through Scene::map; NaN shows rgb there; null shows rgb everywhere
   const float *scalar = nullptr;
-  // values from here down to 0 run out into rgb: 0.25 makes contact patches without a jagged rim
-  float fade = 0;
-  bool edges = false;  // triangle edges as thin darker lines
   // how much of the color of its values is seen through whatever hides them
   float through = 0;
 };
@@ -86,8 +81,8 @@ struct Lines {
   bool on_top = false;  // not hidden by what lies before them
 };
 
-// our own paths through OKLab: dark to light warm, dark to light cool, blue-gray-red
-enum class ColorMap { ember, lagoon, balance };
+// our own paths through OKLab: dark to light warm, dark to light cool
+enum class ColorMap { ember, lagoon };
 
 struct Scene {
   std::vector<Surface> surfaces;

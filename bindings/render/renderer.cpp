@@ -43,8 +43,8 @@ struct Batch {
   GLint first = 0;
   GLsizei count = 0;
   Kind kind = Kind::lit;
-  float alpha = 1, fade = 0;
-  bool edges = false, shadow = true, on_top = false;
+  float alpha = 1;
+  bool shadow = true, on_top = false;
   double depth = 0;  // of its middle, for the order of what is seen through
 };
 
@@ -182,7 +182,6 @@ void add_values(const Surface &s, Frame &frame) {
   Batch b;
   b.kind = Kind::through;
   b.alpha = s.through;
-  b.fade = s.fade;
   b.shadow = false;
   batch(frame, b, [&] { frame.shape.surface(part); });
 }
@@ -223,10 +222,7 @@ Frame compose(const Scene &scene, double aspect, double pixels_high) {
   frame.key = unit(frame.up * 1.15 - frame.view.right * 0.62 + level * 0.55);
 
   for (const Surface &s : scene.surfaces) {
-    Batch b;
-    b.edges = s.edges;
-    b.fade = s.fade;
-    batch(frame, b, [&] { frame.shape.surface(s); });
+    batch(frame, {}, [&] { frame.shape.surface(s); });
     if (s.scalar && s.through > 0) add_values(s, frame);
   }
   const Hidden hidden(scene, frame.view.eye + middle);
@@ -600,9 +596,7 @@ void GlRenderer::draw_colors(const Frame &frame, const Mat4 &key, const std::vec
     gl_.DepthFunc(b.on_top ? GL_ALWAYS : b.kind == Kind::through ? GL_GREATER : GL_LEQUAL);
     gl_.DepthMask(b.alpha >= 1 && !b.on_top && b.kind != Kind::through ? GL_TRUE : GL_FALSE);
     use(main_[int(b.kind)]);
-    set("edges", int(b.edges));
     set("alpha", double(b.alpha));
-    set("fade", double(b.fade));
     gl_.DrawArrays(GL_TRIANGLES, b.first, b.count);
   }
   gl_.DepthMask(GL_TRUE);

@@ -15,14 +15,11 @@ centroid out vec3 p;
 centroid out vec3 n;
 flat out vec3 rgb;
 centroid out vec2 scalar;
-centroid out vec3 corner;
 void main() {
   p = position;
   n = normal;
   rgb = color;
   scalar = value;
-  int k = gl_VertexID % 3;
-  corner = vec3(k == 0, k == 1, k == 2);
   gl_Position = to_clip * vec4(position, 1.0);
 }
 )";
@@ -34,10 +31,7 @@ centroid in vec3 p;
 centroid in vec3 n;
 flat in vec3 rgb;     // one color a body: interpolation over triangles seen edge-on would round it
 centroid in vec2 scalar;
-centroid in vec3 corner;
 const int kind = 0;          // 0 lit, 1 floor, 2 plain color, 3 values seen through: a program each
-uniform int edges;
-uniform float fade;          // values below it run out into the plain color
 uniform float alpha;
 uniform vec3 eye;
 uniform vec3 up;
@@ -109,7 +103,6 @@ void main() {
   // Corners without a value weigh nothing in it; the flat ends of the step hide what interpolation over
   // slivers rounds.
   float value = scalar.x / max(scalar.y, 0.01), valued = smoothstep(0.1, 0.9, scalar.y);
-  if (fade > 0.0) valued *= smoothstep(0.0, fade, value);
   if (kind == 3) {
     result = vec4(texture(map, vec2(value * 256.0 / 257.0 + 0.5 / 257.0, 0.5)).rgb, alpha * valued);
     return;
@@ -125,11 +118,6 @@ void main() {
     a *= 1.0 - smoothstep(0.12, 1.0, far);
     gloss = 0.0;
     if (!gl_FrontFacing) { result = vec4(encoded(base), a); return; }  // a veil with lines, seen from below
-  }
-  if (edges == 1) {
-    vec3 w = fwidth(corner), d = corner / max(w, vec3(1e-6));
-    float size = 1.0 / max(max(w.x, w.y), max(w.z, 1e-6));  // height of the triangle in pixels
-    base *= 1.0 - 0.5 * clamp(1.1 - min(d.x, min(d.y, d.z)), 0.0, 1.0) * clamp((size - 3.0) / 6.0, 0.0, 1.0);
   }
   float facing = dot(nn, key), lit = facing > 0.0 ? facing * key_light(nn) : 0.0, open = sky_light(nn);
   float below = 0.5 - 0.5 * dot(nn, up);

@@ -61,6 +61,12 @@ std::optional<cli::Recording> recording_of(const Options &options) {
   return out;
 }
 
+// The first name of which there is no file yet: what was kept before stays.
+std::string free_name(const std::function<std::string(uint32_t)> &name) {
+  for (uint32_t n = 0;; ++n)
+    if (std::string path = name(n); !std::filesystem::exists(cli::path_of(path))) return path;
+}
+
 std::string text_of(const render::Vec &v) {
   const double x[3] = {v.x, v.y, v.z};
   return cli::json_vector(x);
@@ -93,7 +99,11 @@ App::App(const Options &options, const cli::Globals &globals)
   if (!script_ || std::getenv("DEFORM_VIEW_SPNAV")) space_mouse_ = SpaceMouse::open(no_space_mouse_);
   first_look();
   stage_->plots.sample();
-  if (replay_) show_state(0);
+  if (replay_) {
+    // as simulation.time(), which the clock follows
+    for (cli::RecordedState &s : replay_->states) s.t -= dfm_world_time(stage_->scene.world());
+    show_state(0);
+  }
   wanted_ = stage_->simulation.time();
   last_ = window_->now();
 }
@@ -149,18 +159,17 @@ void App::key(const std::string &name) {
   message_.clear();
   if (name != "b") confirmed_ = false;
   if (name == "space") {
-    if (replay_ && !running_ && shown_ + 1 == replay_->states.size()) show_state(0);
+    if (replay_ && !running_ && shown_ + 1 == replay_->states.size()) attempt([&] { show_state(0); });
     if (!replay_ && !running_ && stage_->simulation.at_end()) stage_->simulation.go_on();
     running_ = !running_;
     wanted_ = stage_->simulation.time();
   } else if (name == "s" || name == ".") {
     running_ = false;
-    if (replay_) {
-      show_state(std::min(shown_ + 1, replay_->states.size() - 1));
-    } else {
-      if (stage_->simulation.at_end()) stage_->simulation.go_on();
-      attempt([&] { stage_->simulation.step(); });
-    }
+    if (!replay_ && stage_->simulation.at_end()) stage_->simulation.go_on();
+    attempt([&] {
+      if (replay_) show_state(std::min(shown_ + 1, replay_->states.size() - 1));
+      else stage_->simulation.step();
+    });
     wanted_ = stage_->simulation.time();
   } else if (name == "r") {
     restart();
@@ -211,11 +220,9 @@ bool App::leads(double dx, double dy) {
 
 void App::cut(const double blade[12]) {
   if (replay_) return;
-  std::vector<std::string> corners;
-  for (int i = 0; i < 12; ++i) corners.push_back(cli::number(blade[i]));
   attempt([&] {
     cli::JsonObject line;
-    stage_->simulation.act(line.add("do", "\"cut\"").add("blade", cli::json_array(corners)));
+    stage_->simulation.act(line.add("do", "\"cut\"").add("blade", cli::json_numbers({blade, 12})));
   });
 }
 
@@ -238,6 +245,7 @@ void App::set_slider(const std::string &name, double value) {
     size_t i = 0;
     while (i + 1 < replay_->states.size() && replay_->states[i + 1].t <= value + 1e-9) ++i;
     show_state(i);
+    wanted_ = stage_->simulation.time();
     return;
   }
   std::string names = replay_ ? "speed, pull, time" : "speed, pull";
@@ -281,8 +289,7 @@ void App::advance(double seconds) {
 }
 
 void App::show_state(size_t i) {
-  const cli::RecordedState &state = replay_->states[i];
-  cli::read_state(stage_->scene, state.path);
+  cli::read_state(stage_->scene, replay_->states[i].path);
   if (i < shown_) stage_->plots.clear();
   shown_ = i;
 }
@@ -290,27 +297,28 @@ void App::show_state(size_t i) {
 void App::save() {
   attempt([&] {
     cli::make_folder(options_.out);
-    char name[32];
-    std::snprintf(name, sizeof name, "/%03u.state", saved_);
-    stage_->simulation.save(options_.out + name);
-    ++saved_;
-    message_ = "Saved: " + options_.out + name;
+    const std::string path = free_name([this](uint32_t n) {
+      char name[32];
+      std::snprintf(name, sizeof name, "/%03u.state", n);
+      return options_.out + name;
+    });
+    stage_->simulation.save(path);
+    saved_ = path;
+    message_ = "Saved: " + saved_;
   });
 }
 
 void App::load() {
-  if (saved_ == 0) {
+  if (saved_.empty()) {
     message_ = "Nothing was saved yet: f5 saves.";
     return;
   }
   attempt([&] {
-    char name[32];
-    std::snprintf(name, sizeof name, "/%03u.state", saved_ - 1);
-    stage_->simulation.load(options_.out + name);
+    stage_->simulation.load(saved_);
     stage_->grip.forget();
     stage_->plots.clear();
     wanted_ = stage_->simulation.time();
-    message_ = "Loaded: " + options_.out + name;
+    message_ = "Loaded: " + saved_;
   });
 }
 
@@ -318,26 +326,32 @@ void App::record() {
   attempt([&] {
     if (stage_->simulation.recording()) {
       const uint32_t n = stage_->simulation.stop_recording();
-      message_ = std::to_string(n) + " states recorded: deform replay " + cli::shown_word(options_.out);
+      message_ = std::to_string(n) + " states recorded: deform replay " + cli::shown_word(recorded_);
       return;
     }
-    cli::make_folder(options_.out);
+    const std::string folder = "/recording";
+    const std::string found = free_name(
+        [&](uint32_t n) { return options_.out + (n == 0 ? "" : "/" + std::to_string(n + 1)) + folder; });
+    recorded_ = found.substr(0, found.size() - folder.size());
+    cli::make_folder(recorded_);
     cli::RunOptions run;
-    run.out = options_.out;
+    run.out = recorded_;
     run.set = options_.set;
     stage_->simulation.start_recording(run);
   });
 }
 
 void App::restart() {
-  if (replay_) show_state(0);
-  else stage_->simulation.restart();
-  stage_->grip.forget();
-  for (live::Slider &s : stage_->sliders) s.value = s.first;
-  stage_->plots.clear();
-  stage_->plots.sample();
-  wanted_ = stage_->simulation.time();
   running_ = false;
+  attempt([&] {
+    if (replay_) show_state(0);
+    else stage_->simulation.restart();
+    stage_->grip.forget();
+    for (live::Slider &s : stage_->sliders) s.value = s.first;
+    stage_->plots.clear();
+    stage_->plots.sample();
+    wanted_ = stage_->simulation.time();
+  });
 }
 
 bool App::draw() {

@@ -93,7 +93,7 @@ class App final : public Hands {
   double strongest_[2] = {0, 0};  // N, N m, of an arrow of full length
   std::string message_;           // for the user, until the next one
   bool confirmed_ = false;        // whether b shall start the scene again; the next key answers
-  uint32_t saved_ = 0;            // states
+  std::string saved_, recorded_;  // the last state; the folder of the last recording
   size_t shown_ = 0;              // state of the recording
 };
 

@@ -120,9 +120,7 @@ void Remote::release(int button) {
 }
 
 void Remote::cut(const double blade[12]) {
-  std::vector<std::string> corners;
-  for (int i = 0; i < 12; ++i) corners.push_back(cli::number(blade[i]));
-  send_request("cut", [&](cli::JsonObject &r) { r.add("blade", cli::json_array(corners)); });
+  send_request("cut", [&](cli::JsonObject &r) { r.add("blade", cli::json_numbers({blade, 12})); });
 }
 
 void Remote::press(int button) {

@@ -115,7 +115,7 @@ void App::add_probe() {
     confirmed_ = false;
     stage_->plots.sample();
     wanted_ = stage_->simulation.time();
-    saved_ = 0;
+    saved_.clear();
     strongest_[0] = strongest_[1] = 0;
     stage_->grip.take(int(stage_->grip.count()) - 1);
     message_ = "The scene starts again, with " + stage_->grip.name(stage_->grip.count() - 1) + " in hand.";

@@ -127,11 +127,7 @@ class Rig {
       std::vector<std::string> columns, rows, sliders;
       for (const live::Slider &s : sliders_) sliders.push_back(live::slider_text(s));
       for (const std::string &name : result.columns) columns.push_back(cli::quoted(name));
-      for (const std::vector<double> &row : result.rows) {
-        std::vector<std::string> cells;
-        for (const double x : row) cells.push_back(cli::number(x));
-        rows.push_back(cli::json_array(cells));
-      }
+      for (const std::vector<double> &row : result.rows) rows.push_back(cli::json_numbers(row));
       cli::JsonObject out;
       out.add("law", cli::quoted(law.type().id)).add("message", cli::quoted(result.stopped));
       out.add("normal", cli::number(law.normal_force())).add("steps", std::to_string(result.steps));

@@ -14,6 +14,7 @@
 #include <atomic>
 #include <cmath>
 #include <cstdlib>
+#include <filesystem>
 #include <thread>
 
 #include "render/render.h"
@@ -74,6 +75,8 @@ class Viewer : public testing::Test {
  protected:
   void SetUp() override {
     if (!display_.there()) GTEST_SKIP() << "no Xvfb on this machine: install Debian's xvfb";
+    std::filesystem::remove_all(folder_);  // the viewer keeps the files of earlier runs
+    std::filesystem::create_directories(folder_);
     test::write_file(scene_, kScene);
   }
   test::CommandResult view(const std::string &script, std::vector<std::string> more = {}) {
@@ -368,7 +371,6 @@ TEST_F(Viewer, SpaceMouseByLibspnav_LeadsTheToolInHand) {
       "/tmp/deform_spnav_" + std::to_string(getpid());  // a path of 107 letters at most
   Spacenavd daemon(socket);
   ASSERT_TRUE(daemon.there());
-  unlink((folder_ + "/b.png").c_str());
   daemon.serve({{0, 150, 0, 75, 0, 0, 0, 16}}, folder_ + "/b.png",
                {{0, 0, 0, 0, 0, 0, 0, 16}, {1, 1, 0, 0, 0, 0, 0, 0}});
   setenv("SPNAV_SOCKET", socket.c_str(), 1);
@@ -418,6 +420,28 @@ TEST_F(Viewer, SavedState_IsLoadedWithItsBitsAndByDeformRun) {
       test::deform({"run", scene_, "--from", folder_ + "/000.state", "--out", folder_ + "/run", "--json"});
   ASSERT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find(reported(done, "end.png", "state_hash")), std::string::npos);
+  const std::string kept = test::read_file(folder_ + "/000.state");
+  const test::CommandResult next = view("0 key f5\n0 key s\n0 key f5\n0 key f9\n0.1 shot a.png\n");
+  ASSERT_EQ(next.exit_code, 0) << next.err;
+  EXPECT_TRUE(test::read_file(folder_ + "/000.state") == kept);
+  EXPECT_EQ(number(next, "a.png", "t"), 0.002);
+  EXPECT_TRUE(std::filesystem::exists(folder_ + "/002.state"));
+}
+
+// The clock of the window counts from the start of the scene.
+TEST_F(Viewer, ReplayOfASceneThatBeginsLater_PlaysAtOnce) {
+  const std::vector<std::string> later = {"--set", "/time/start=5"};
+  const test::CommandResult done = view("0 key space\n0 key v\n0.15 key v\n0.15 shot end.png\n", later);
+  ASSERT_EQ(done.exit_code, 0) << done.err;
+  test::write_file(folder_ + "/look.txt",
+                   "0 key space\n0.05 shot a.png\n0.08 slider time 0.1\n0.08 shot b.png\n"
+                   "0.15 shot c.png\n");
+  const test::CommandResult looked = test::deform(
+      {"view", "--replay", folder_, "--script", folder_ + "/look.txt", "--out", folder_, "--json"});
+  ASSERT_EQ(looked.exit_code, 0) << looked.err;
+  EXPECT_NEAR(number(looked, "a.png", "t"), 0.05, 0.011);
+  EXPECT_NEAR(number(looked, "b.png", "t"), 0.1, 1e-9);
+  EXPECT_GT(number(looked, "c.png", "t"), 0.12);
 }
 
 // With a pull, a slider and a pause in it, and beyond the end of the scene.
@@ -447,8 +471,10 @@ TEST_F(Viewer, Stroke_CutsTheBlockAndIsReplayed) {
   const test::CommandResult cut = view("0 key space\n0 key v\n0 key x\n" + stroke);
   ASSERT_EQ(cut.exit_code, 0) << cut.err;
   EXPECT_NE(reported(cut, "end.png", "state_hash"), reported(whole, "end.png", "state_hash"));
-  EXPECT_NE(test::read_file(folder_ + "/recording/acts.jsonl").find("\"cut\""), std::string::npos);
-  const test::CommandResult again = test::deform({"replay", folder_, "--out", folder_ + "/again"});
+  EXPECT_EQ(test::read_file(folder_ + "/recording/acts.jsonl").find("\"cut\""), std::string::npos);
+  const std::string second = folder_ + "/2";
+  EXPECT_NE(test::read_file(second + "/recording/acts.jsonl").find("\"cut\""), std::string::npos);
+  const test::CommandResult again = test::deform({"replay", second, "--out", folder_ + "/again"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_NE(again.out.find("the same bits in all "), std::string::npos) << again.out;
 }

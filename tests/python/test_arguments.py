@@ -42,11 +42,15 @@ class Arguments(unittest.TestCase):
     def test_points_are_numbers_of_points_and_forces_fit_them(self):
         with deform.World() as world:
             ball = world.add_body(deform.TetMesh.ball(0.1, cells=100), position=(0, 0, 0.2))
-            for wrong in ("x", None, [[1, 2]], [-1], [0.5], [True, False]):
+            for wrong in ("x", None, [[1, 2]], [-1], [2**32], [0.5], [True, False]):
                 self.refused("points must be a list of whole numbers", lambda wrong=wrong: ball.hold(wrong))
             ball.hold([])
             self.refused(r"force has the shape \(2,\); expected \(3,\), or \(1, 3\)",
                          lambda: ball.add_load([0], (1, 2)))
+
+    def test_names_of_files_need_not_be_utf8(self):
+        with self.assertRaises(deform.FileError):
+            deform.TetMesh.read("/nothing/\udcff.msh")
 
     def test_misspelled_attribute_is_an_error(self):
         with deform.World() as world:

@@ -16,6 +16,9 @@ import numpy as np
 import scipy.stats
 
 import deform
+from deform.study.engine import Failed
+from deform.study.fit import Problem
+from deform.study.spec import read_study
 from deform.study.statistics import Spread
 from study_files import COM, MU, SPEED, write_box
 
@@ -142,6 +145,20 @@ class Said(InAFolder):
         found = deform.fit(self.study(self.measured(), optimizer={"method": "differential_evolution",
                                                                   "evaluations": 1}), workers=2)
         self.assertAlmostEqual(found.values["mu"] / TRUTH["mu"], 1, delta=5e-3)
+        self.assertRegex(found.notes[1], 'differential_evolution was stopped by "evaluations" after 1 points')
+
+    def test_a_failing_run_beside_a_bound_is_told(self):
+        study = read_study(self.study(self.measured()))
+        study.parameters.pop()
+
+        class Here(Problem):
+            def find(self, many):
+                n = len(study.residuals[0].measured)
+                return [Failed("no more") if u[0] > 1e-3 else [np.full(n, u[0])] for u in many]
+
+        for start in 0, 1e-10:
+            with self.assertRaisesRegex(deform.Error, "the run at mu = 0.109 failed: no more"):
+                Here(study, None, lambda _: None).jacobian(np.array([start]), 0.01)
 
     def test_rough_derivatives_name_their_parameter(self):
         """Of a speed on a logarithmic scale, by steps of a third and two thirds of it."""
@@ -190,6 +207,16 @@ class Said(InAFolder):
         study["parameters"].pop("v")
         said = "\n".join(deform.fit(study, workers=2).notes)
         self.assertIn("times as large as sigma says", said)
+
+    def test_measured_tables_of_other_programs(self):
+        plain = self.measured().read_text()
+        for encoded in b"\xef\xbb\xbf" + plain.encode(), b"# 20 \xb5m\n" + plain.encode():
+            (self.folder / "other.csv").write_bytes(encoded)
+            residual, = read_study(self.study(self.folder / "other.csv")).residuals
+            np.testing.assert_array_equal(residual.measured, self.x)
+        (self.folder / "other.csv").write_text("a,b\n1,2,3\n")
+        with self.assertRaisesRegex(deform.FormatError, 'other.csv has no column "t"; it has a, b'):
+            read_study(self.study(self.folder / "other.csv"))
 
     def test_wrong_studies(self):
         def refused(sentence, **changes):

@@ -1,6 +1,10 @@
 """Friction laws from Python: those that are loaded, and laws as Python classes, by themselves, in a world,
 on the rig and before the validator."""
 import gc
+import socket
+import struct
+import tempfile
+import threading
 import unittest
 from unittest import mock
 
@@ -208,6 +212,34 @@ class InPython(unittest.TestCase):
         self.assertEqual(len(figure.axes), 1)
         with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'spring_pull'"):
             deform.friction("lugre", "spring_pul")
+
+
+    def test_what_refuse_raises_in_another_process(self):
+        refuses = type("Refuses", (Tanh,), {"id": "com.example.refuses",
+                                            "refuse": lambda self, params: params["nu"]})
+        with self.assertRaisesRegex(KeyError, "nu"):
+            deform.friction(refuses(), "sine_velocity", normal=10)
+
+    def test_other_processes_reach_it_whatever_the_temporary_folder(self):
+        with tempfile.TemporaryDirectory(suffix="_" * 90) as folder, mock.patch("tempfile.tempdir", folder):
+            rows = deform.friction(Tanh(), "sine_velocity", normal=10)
+        self.assertAlmostEqual(rows["F"].max(), 5, delta=1e-9)
+
+    def test_a_process_that_dies_within_a_message(self):
+        raised, before = [], set(threading.enumerate())
+        with mock.patch("threading.excepthook", raised.append):
+            with Tanh().served() as (_, environment):
+                for sent in struct.pack("III", 1, 1, 0), struct.pack("III", 1, 1, 0) + bytes(12):
+                    with socket.socket(socket.AF_UNIX) as channel:
+                        channel.settimeout(20)
+                        channel.connect(environment["DEFORM_PYTHON_LAW"])
+                        channel.sendall(sent)
+                        channel.shutdown(socket.SHUT_WR)
+                        while channel.recv(4096):  # until it has been read
+                            pass
+            for thread in set(threading.enumerate()) - before:
+                thread.join()
+        self.assertEqual(raised, [])
 
 
 class Validator(unittest.TestCase):

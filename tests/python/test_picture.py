@@ -74,6 +74,17 @@ class Pictures(unittest.TestCase):
             for wrong in ({"color": "colour"}, {"eye": (0, 0, 1)}, {"size": (0, 10)}):
                 with self.assertRaises(deform.ArgumentError):
                     world.picture(**wrong)
+            with self.assertRaisesRegex(deform.ArgumentError, "1 to 8192 each are allowed"):
+                world.picture(size=(8193, 9))
+            camera["size"] = list(camera["size"])
+            plain = world.picture(**camera, label=False).rgb
+            with self.assertRaises(deform.ArgumentError):  # when its surfaces are added already
+                world.picture(**{**camera, "look_at": (0, 0)})
+            world.bodies[0].remove()
+            empty = world.picture(**camera, label=False).rgb
+            world.add_body(deform.TetMesh.ball(0.1, 300), position=(0, 0, 0.3))
+            np.testing.assert_array_equal(world.picture(**camera, label=False).rgb, plain)
+            self.assertLess(abs(int(empty[60, 80, 2]) - int(empty[60, 80, 0])), 40)
         self.assertIsNone(world._repr_png_())
 
     def test_every_quantity_has_its_colors_and_a_legend(self):
@@ -136,6 +147,24 @@ class Pictures(unittest.TestCase):
             level = world.picture(**camera).rgb
             world.set_gravity((4, 0, -9))
             self.assertFalse(np.array_equal(world.picture(**camera).rgb, level))
+
+    def test_up_is_that_of_a_snapshot(self):
+        with deform.World() as world, deform.World(gravity=(0, 9, 0)) as other:
+            kept = world.snapshot()
+            world.set_gravity((-9, 0, 0))
+            world.restore(kept)
+            np.testing.assert_array_equal(deform.picture.upright_of(world).at(0), [0, 0, 1])
+            table = world.add_obstacle("box", name="table", half_size=(0.5, 0.5, 0.1))
+            ball = world.add_body(deform.TetMesh.ball(0.1, 300), on=table, position=(0, 0, 1))
+            np.testing.assert_allclose(ball.measure.com, [0, 0, 0.2], atol=3e-3)
+            world.set_gravity_keys([0, 1], [(3, 0, -4), (0, 0, -4)])
+            keyed = world.snapshot()
+            world.set_gravity_keys([], [])
+            np.testing.assert_allclose(deform.picture.upright_of(world).at(0), [0, 0, 1])
+            world.restore(keyed)
+            np.testing.assert_allclose(deform.picture.upright_of(world).at(0), [-0.6, 0, 0.8])
+            other.restore(kept)
+            np.testing.assert_array_equal(deform.picture.upright_of(other).at(0), [0, 0, 1])
 
     def test_frames_of_a_run(self):
         run = dropped()

@@ -124,6 +124,13 @@ class Serve(unittest.TestCase):
         self.viewer.connection.send({"do": "release"})
         self.go(lambda: "pull" not in self.viewer.state)
 
+    def test_what_the_program_cuts_is_let_go(self):
+        self.go(lambda: self.viewer.frames > 0)
+        self.viewer.connection.send({"do": "grab", "from": [0.05, -1, 0.05], "along": [0, 1, 0]})
+        self.go(lambda: self.server._pull)
+        self.body.remove_cells(range(self.body.ntet - 20))
+        self.go(lambda: not self.server._pull)
+
     def test_slider_and_reset_act_between_steps(self):
         given = []
         self.server.add_slider("gravity", 9.81, 0, 20, lambda g: (given.append(g),

@@ -1,6 +1,7 @@
 """Sweeps: designs, results that stay whatever ends a run, a worker or the sweep, tables, plots, exports."""
 import csv
 import importlib.util
+import io
 import json
 import os
 import pathlib
@@ -15,7 +16,10 @@ import time
 import unittest
 import unittest.mock
 
+import numpy as np
+
 import deform
+from deform.study import __main__ as command_line
 from deform.study.design import points
 from deform.study.engine import Engine, Failed, Results
 from deform.study.executors import Dask
@@ -144,7 +148,25 @@ class Designs(InAFolder):
             "m": {"at": "/mesh", "values": ["a.ele", "a.node", "box.json"]}}))
         with unittest.mock.patch("deform.study.spec._of_file", return_value="0") as of_file:
             study.keys([{"m": name} for name in study.parameters[0].values] * 9)
-        self.assertEqual(of_file.call_count, 3)
+        read = [call.args[0] for call in of_file.call_args_list]
+        self.assertEqual(len([path for path in read if str(self.folder) in path]), 3)
+
+    def test_results_depend_on_the_build(self):
+        study, point = read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}
+        rebuilt = self.folder / "libdeform.so"
+        rebuilt.write_bytes(deform.study.spec.PATH.read_bytes() + b"0")
+        before = study.keys([point])
+        with unittest.mock.patch("deform.study.spec.PATH", rebuilt):
+            self.assertNotEqual(study.keys([point]), before)
+        self.assertEqual(study.keys([point]), before)
+
+    def test_values_may_be_numpys(self):
+        of_lists, of_arrays = (
+            points(read_study(sweep_study(self.scene, parameters={"n": {"at": MU, "values": values}})))
+            for values in ([1, 2], np.array([1, 2])))
+        self.assertEqual(of_arrays, of_lists)
+        with self.assertRaisesRegex(deform.ArgumentError, "is no value of JSON"):
+            read_study(sweep_study(self.scene, set={"/a": {1}}))
 
     def test_wrong_studies_say_where(self):
         for changes, sentence in (
@@ -209,6 +231,13 @@ class Runs(InAFolder):
         self.assertEqual(len((self.out / "runs.jsonl").read_text().splitlines()), 4)
         self.assertEqual(len(moon.done), 2)
 
+    def test_quantities_in_another_order_keep_their_numbers(self):
+        study = sweep_study(self.scene, design={"method": "sobol", "runs": 2})
+        first = deform.sweep(study, out=self.out)
+        study["quantities"] = dict(reversed(study["quantities"].items()))
+        for row, turned in zip(first, deform.sweep(study, out=self.out)):
+            self.assertEqual((row["slid"], row["steps"]), (turned["slid"], turned["steps"]))
+
     def test_a_run_that_takes_too_long_is_ended(self):
         study = sweep_study(self.scene, set={"/time/duration": 3000}, limit_s=0.5,
                             design={"method": "sobol", "runs": 1})
@@ -218,10 +247,16 @@ class Runs(InAFolder):
     def test_sentences_name_no_files_that_are_gone(self):
         engine = Engine()
         self.addCleanup(engine.close)
-        said = f"deform: a.json: stopped at step 3: no; the last good state is in {engine.folder}/run/states"
-        with unittest.mock.patch.object(engine, "_call", return_value={"code": 3, "signal": 0, "said": said}):
-            outcome = engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
-        self.assertEqual(outcome["said"], "a.json: stopped at step 3: no")
+        run = f"{engine.folder}/run"
+        for said, kept in (
+                (f"a.json: stopped at step 3: no; the last good state is in {run}/states",
+                 "a.json: stopped at step 3: no"),
+                (f"{run}/bodies.csv: cannot be written: No space left on device",
+                 "bodies.csv: cannot be written: No space left on device")):
+            answer = {"code": 3, "signal": 0, "said": f"deform: {said}"}
+            with unittest.mock.patch.object(engine, "_call", return_value=answer):
+                outcome = engine.run(task_of(read_study(sweep_study(self.scene)), {"mu": 0.3, "v": 0.5}))
+            self.assertEqual(outcome["said"], kept)
 
     def test_what_plugins_print_is_no_answer(self):
         engine = Engine()
@@ -234,6 +269,12 @@ class Runs(InAFolder):
         (self.folder / "rows.csv").write_text("x\n1\nnan\n")
         with self.assertRaisesRegex(Failed, 'column "x" of rows.csv holds "nan", no number'):
             Results(self.folder, {}).column({"table": "rows", "where": {}}, "x")
+
+    def test_lists_are_counted_from_0(self):
+        results = Results(self.folder, {"probes": [1, 2]})
+        self.assertEqual(results.read({"summary": "/probes/1"}), 2)
+        with self.assertRaisesRegex(Failed, "the summary has no value /probes/-1"):
+            results.read({"summary": "/probes/-1"})
 
     def test_rig(self):
         case = pathlib.Path(os.environ["DEFORM_SOURCE"]) / "examples" / "friction" / "braked_mass.json"
@@ -380,8 +421,14 @@ class Outputs(InAFolder):
         self.command("sweep", study.name, "--out", self.out.name, "--export", "slurm")
         array = self.out / "array.sh"
         self.assertIn("#SBATCH --array=0-9", array.read_text())
+        wide = self.folder / "my study.json"
+        shutil.copy(study, wide)
+        self.command("sweep", wide, "--out", self.folder / "wide", "--export", "slurm")
+        self.assertIn("#SBATCH --job-name='my study'\n", (self.folder / "wide" / "array.sh").read_text())
         self.command("sweep", study, "--out", self.out, "--export", "snakemake")
-        compile((self.out / "Snakefile").read_text().split("rule")[0], "Snakefile", "exec")
+        flow = (self.out / "Snakefile").read_text()
+        compile(flow.split("rule")[0], "Snakefile", "exec")
+        self.assertIn(f"    input: ['{study}', '{self.scene}']", flow)
         for i in range(0, 10, 3):
             done = subprocess.run(["sh", array], env={**os.environ, "SLURM_ARRAY_TASK_ID": str(i)},
                                   cwd="/", capture_output=True, text=True)
@@ -410,6 +457,12 @@ class Outputs(InAFolder):
         self.assertRegex(self.command("sweep", self.folder / "none.json", code=2).stderr,
                          "^deform: .*none.json: cannot be opened")
         self.assertRegex(self.command("sweep", code=2).stderr, "STUDY.json .*--help")
+        full = unittest.mock.Mock(side_effect=OSError(28, "Full"))
+        with unittest.mock.patch.multiple(command_line, sweep=full), \
+                unittest.mock.patch.multiple(sys, argv=["deform", "sweep", "x"], stderr=io.StringIO()), \
+                unittest.mock.patch("signal.signal"):
+            self.assertEqual(command_line.main(), 2)
+            self.assertEqual(sys.stderr.getvalue(), "deform: the results cannot be written: Full\n")
         said = self.command("sweep", "x", code=2, DEFORM_PYTHON="/no/python").stderr
         self.assertIn("the Python interpreter /no/python cannot be started", said)
         bare = self.folder / "python"

@@ -49,6 +49,15 @@ class Scenery(unittest.TestCase):
         return [[x, -1, -1], [x, 1, -1], [x, 1, 1], [x, -1, 1]]
 
 
+class Shapes(Scenery):
+    def test_mesh(self):
+        ball = deform.TriMesh.make("ball", [0.01], 100)
+        self.world.add_tool("mesh", mesh=ball, position=(0, 0, 1))
+        self.assertAlmostEqual(self.world.ray((0, 0, 2), (0, 0, -1))["distance"], 0.99, delta=1e-3)
+        with self.assertRaisesRegex(deform.ArgumentError, "the mesh of a tool is a .* the path"):
+            self.world.add_tool("mesh", mesh=7)
+
+
 class Cuts(Scenery):
     def test_split_doubles_points_and_keeps_mass(self):
         points, cells, mass = self.body.npoint, self.body.ntet, self.body.measure.mass

@@ -11,6 +11,7 @@ import textwrap
 import threading
 import time
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -293,7 +294,9 @@ class Rest(unittest.TestCase):
             world.remove_filter(body, floor)
 
     def test_rigid_bodies_by_name_and_what_they_weigh(self):
-        box = self.world.add_rigid("box", half_size=(0.1, 0.1, 0.1), mass=2, name="crate", velocity=(1, 0, 0))
+        box = self.world.add_rigid("box", half_size=(0.1, 0.1, 0.1), mass=2, name="crate", velocity=(1, 0, 0),
+                                   material={"friction": 0.3})
+        self.world.add_obstacle("sphere", radius=1, position=(9, 0, 0)).set_material({"friction": 0.3})
         self.world.add_tool("sphere", radius=0.01, position=(0, 0, 1))
         self.assertEqual(self.world.rigids, [box])
         self.assertEqual(self.world.find_rigid("crate"), box)
@@ -448,6 +451,25 @@ class Threads(unittest.TestCase):
         """)
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
         self.assertEqual(done.stdout, "interrupted True\nwent on True\n", done.stderr)
+
+    def test_ctrl_c_in_equilibrium_leaves_nothing_behind(self):
+        with deform.World() as world:
+            def interrupted(*_):
+                world._stop = True  # as the thread that hears of the signal does
+                raise KeyboardInterrupt
+
+            with mock.patch.object(deform.world.lib, "dfm_world_equilibrium", interrupted):
+                with self.assertRaises(KeyboardInterrupt):
+                    world.equilibrium()
+            self.assertFalse(world._stop)
+
+    def test_a_call_that_changes_a_world_has_it_alone(self):
+        seen = []
+        with deform.World() as world:
+            with mock.patch.object(deform.world.lib, "dfm_world_filter_pair",
+                                   lambda *_: seen.append(world._busy) or 0):
+                world.filter_pair("*", "*", True)
+        self.assertEqual(seen, [threading.get_ident()])
 
     def test_two_worlds_in_two_threads(self):
         hashes = {}

@@ -241,11 +241,14 @@ def default_context() -> Context:
         return _default
 
 
-def number_of(function: Any, *arguments: Any) -> int:
-    """How many entries a list has (capacity 0)."""
+def listed(function: Any, *arguments: Any, kind: Any = ctypes.c_uint64) -> list[Any]:
+    """All entries of a list of the library; the call with a capacity of 0 counts them."""
     count = ctypes.c_uint32(0)
     check(function(*arguments, 0, None, ctypes.byref(count)))
-    return count.value
+    out = (kind * max(count.value, 1))()
+    if count.value:
+        check(function(*arguments, count.value, ctypes.byref(out), None))
+    return list(out[:count.value])
 
 
 __all__ = ["Context", "Parameter", "Params", "PluginType", "default_context", "quick"]

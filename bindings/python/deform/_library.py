@@ -178,7 +178,21 @@ def sized(kind: type) -> Any:
 
 
 def encoded(text: Any) -> bytes | None:
-    return None if text is None else os.fspath(text).encode() if not isinstance(text, bytes) else text
+    if text is None or isinstance(text, bytes):
+        return text
+    return os.fspath(text).encode(errors="surrogateescape")  # names of files need not be UTF-8
+
+
+def write_whole(path: pathlib.Path, data: bytes) -> None:
+    """The file is there as a whole, or as it was before."""
+    part = path.with_name(f"{path.name}.part{os.getpid()}")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror}", "DFM_E_IO") from None
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def read_text(function: Any, *arguments: Any) -> str:

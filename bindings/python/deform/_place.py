@@ -9,7 +9,7 @@ import numpy as np
 from . import _abi
 from ._library import ArgumentError
 from .body import Obstacle, handle_of
-from .picture import turned
+from .picture import turned, upright_of
 from .query import Filter, Shape
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def _reach(definition: Any) -> float:
 def put_on(world: World, on: Obstacle, points: np.ndarray, pose: Any) -> None:
     """Moves a pose along gravity so that the convex hull of points [n,3] m lies on the obstacle."""
     handle = handle_of(on, Obstacle, "on is an obstacle, as add_obstacle and find_obstacle return it")
-    up = world.shown.upright.at(world.time)
+    up = upright_of(world).at(world.time)
     x = turned(np.array(pose.rotation), points) + np.array(pose.position)
     origin, rotation = on.pose
     definition = on.definition()

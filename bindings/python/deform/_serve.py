@@ -15,6 +15,7 @@ import numpy as np
 from ._library import PATH, ArgumentError, Error, StateError, UnsupportedError, quick
 from ._values import real, whole
 from .body import Body
+from .picture import upright_of
 
 if TYPE_CHECKING:
     from .world import World
@@ -85,7 +86,7 @@ class _Pull:
         near = np.argsort(away, kind="stable")[:wanted]
         reach = np.partition(away, wanted)[wanted] if wanted < len(x) else 1.1 * away.max()
         weights = 1 - (away[near] / reach)**2
-        self.body, self.near = body, near[weights > 0]
+        self.body, self.near, self.triangles = body, near[weights > 0], body.triangles
         self.weights = weights[weights > 0] / weights[weights > 0].sum()
         self.offset = self.weights @ x[self.near] - place
         self.to = place
@@ -100,6 +101,8 @@ class _Pull:
         self.to = to
 
     def state(self) -> dict[str, Any]:
+        if not np.array_equal(self.body.triangles, self.triangles):
+            raise StateError("a cut has changed the numbers of the points that are held", "DFM_E_STATE")
         place = self.weights @ self.body.points[self.near] - self.offset
         return {"place": place.tolist(), "to": self.to.tolist(),
                 "force": float(np.linalg.norm(self.body.spring_force(self.spring)))}
@@ -361,7 +364,7 @@ class Server:
         out = {"scene": "", "time": at, "frame": self._frame, "running": self.running,
                "message": self._message, "step_ms": self._took, "real": speed, "viewers": self.viewers,
                "control": int(self._native.deform_serve_control(self._served)),
-               "up": self.world.shown.upright.at(at).tolist(), "probes": [],
+               "up": upright_of(self.world).at(at).tolist(), "probes": [],
                "sliders": [slider for slider, *_ in self._sliders]}
         if self._pull:
             try:

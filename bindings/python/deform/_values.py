@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import numbers
 from typing import Any
 
@@ -25,6 +26,15 @@ def real(value: Any, what: str) -> float:
         raise KindError(f"{what} is {value!r}; expected a number", "DFM_E_ARG") from None
     except OverflowError:
         raise ArgumentError(f"{what} is a number beyond the range of a float", "DFM_E_ARG") from None
+
+
+def json_of(value: Any) -> str:
+    """As JSON, NumPy's numbers and arrays too."""
+    def plain(given: Any) -> Any:
+        if isinstance(given, (np.generic, np.ndarray)):
+            return given.tolist()
+        raise KindError(f"{given!r} is no value of JSON; expected numbers, texts, lists, dicts", "DFM_E_ARG")
+    return json.dumps(value, default=plain)
 
 
 def whole(value: Any, what: str, least: int = 0, bits: int = 32) -> int:

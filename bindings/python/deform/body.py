@@ -9,8 +9,8 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Column, Report
-from ._context import choice, number_of
-from ._library import ArgumentError, OfThisProcess, check, default, lib, quick, sized
+from ._context import choice, listed
+from ._library import ArgumentError, OfThisProcess, check, default, encoded, lib, quick, sized
 from ._values import array_of, pose_of, real, text, vector, whole
 from .cut import CutInfo, cut_def, separate_def
 from .mesh import points_of
@@ -67,7 +67,8 @@ def vector_keys(times: Any, values: Any, what: str) -> Any:
 def numbers_of(numbers: Any, what: str = "points") -> np.ndarray:
     """Numbers of points, or of `what`, as the library takes them."""
     given = np.atleast_1d(np.asarray(numbers))
-    if given.ndim != 1 or (given.size and (given.dtype.kind not in "iu" or given.min() < 0)):
+    if given.ndim != 1 or (given.size and (
+            given.dtype.kind not in "iu" or given.min() < 0 or given.max() >= 2**32)):
         raise ArgumentError(f"{what} must be a list of whole numbers from 0 on, numbers of {what} of the "
                             "body", "DFM_E_ARG")
     return np.ascontiguousarray(given, dtype=np.uint32)
@@ -117,10 +118,7 @@ class _Part(OfThisProcess):
         """What overlapped this sensor at the end of the last step: bodies, then obstacles and rigid bodies,
         each in order of creation. World.events tells what comes and goes."""
         self.world.free()
-        n = number_of(quick.dfm_sensor_things, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(quick.dfm_sensor_things(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return [self.world.owner(handle) for handle in out[:n]]
+        return [self.world.owner(handle) for handle in listed(quick.dfm_sensor_things, self.handle)]
 
     def __repr__(self) -> str:
         return f"<deform.{type(self).__name__} '{self.name}'>"
@@ -374,9 +372,8 @@ class Body(_Part):
 
     def set_params(self, **params: Any) -> None:
         """Changes run-time parameters of the body's model by key."""
-        self.world.free()
         values = self.world.context.params("model", self.model, params)
-        check(lib.dfm_body_set_params(self.handle, ctypes.byref(values.struct)))
+        self.world.call(lib.dfm_body_set_params, self.handle, ctypes.byref(values.struct))
 
     def set_model(self, model: str, params: Mapping[str, Any] | None = None) -> None:
         """Gives the body another model between two steps; positions and velocities stay."""
@@ -447,23 +444,18 @@ class Body(_Part):
                            ("damping", damping)):
             setattr(definition, key, real(value, key))
         number = ctypes.c_uint32()
-        self.world.free()
-        check(lib.dfm_body_attach(self.handle, ctypes.byref(definition), ctypes.byref(number)))
+        self.world.call(lib.dfm_body_attach, self.handle, ctypes.byref(definition), ctypes.byref(number))
         return number.value
 
     def detach(self, attachment: int) -> None:
         """Ends an attachment."""
-        self.world.free()
-        check(lib.dfm_body_detach(self.handle, whole(attachment, "attachment")))
+        self.world.call(lib.dfm_body_detach, self.handle, whole(attachment, "attachment"))
 
     @property
     def attachments(self) -> list[int]:
         """Numbers of the attachments that hold now, in order of creation."""
         self.world.free()
-        n = number_of(quick.dfm_body_attachments, self.handle)
-        out = (ctypes.c_uint32 * max(n, 1))()
-        check(quick.dfm_body_attachments(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return list(out[:n])
+        return listed(quick.dfm_body_attachments, self.handle, kind=ctypes.c_uint32)
 
     def attachment(self, number: int) -> _abi.dfm_attachment:
         """What it does, as the C struct: to (a handle), nsurfel, stiffness N/m, damping N s/m, release N,
@@ -490,9 +482,7 @@ class Body(_Part):
         definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most,
                              radius)
         info = sized(_abi.dfm_cut_info)
-        with self.world.alone():
-            status = lib.dfm_body_cut(self.handle, ctypes.byref(definition), ctypes.byref(info))
-        check(status)
+        self.world.call(lib.dfm_body_cut, self.handle, ctypes.byref(definition), ctypes.byref(info))
         return CutInfo.of(info)
 
     def plan_cut(self, t: float, shape: str = "plane", *, corners: Any = None, point: Any = None,
@@ -503,50 +493,38 @@ class Body(_Part):
         or later."""
         definition = cut_def(shape, corners, point, normal, position, rotation, half_size, motion, how, most,
                              radius)
-        with self.world.alone():
-            status = lib.dfm_body_plan_cut(self.handle, real(t, "t"), ctypes.byref(definition))
-        check(status)
+        self.world.call(lib.dfm_body_plan_cut, self.handle, real(t, "t"), ctypes.byref(definition))
 
     def plan_no_cuts(self) -> None:
         """No planned cut of the body and of its pieces is to come any more."""
-        with self.world.alone():
-            status = lib.dfm_body_plan_cut(self.handle, 0, None)
-        check(status)
+        self.world.call(lib.dfm_body_plan_cut, self.handle, 0, None)
 
     def separate(self, least_cells: int = 1, crumbs: str = "stay") -> CutInfo:
         """Makes parts that hang together no more bodies of their own: each but the heaviest that has
         least_cells or more. They are named "NAME.1", "NAME.2" and so on, and world.bodies has them. crumbs,
         the smaller parts: "stay" with the part next to them, or "remove": they go with their mass."""
         rule, info = separate_def(least_cells, crumbs), sized(_abi.dfm_cut_info)
-        with self.world.alone():
-            status = lib.dfm_body_separate(self.handle, ctypes.byref(rule), ctypes.byref(info))
-        check(status)
+        self.world.call(lib.dfm_body_separate, self.handle, ctypes.byref(rule), ctypes.byref(info))
         return CutInfo.of(info)
 
     def set_separate(self, least_cells: int | None = 1, crumbs: str = "stay") -> None:
         """From now on each cut and each tear is followed by a separation (see separate); with least_cells
         None parts stay in one body."""
         rule = None if least_cells is None else ctypes.byref(separate_def(least_cells, crumbs))
-        with self.world.alone():
-            status = lib.dfm_body_set_separate(self.handle, rule)
-        check(status)
+        self.world.call(lib.dfm_body_set_separate, self.handle, rule)
 
     def remove_cells(self, cells: Any) -> CutInfo:
         """Takes cells away by their numbers [n], between two steps."""
         numbers, info = numbers_of(cells, "cells"), sized(_abi.dfm_cut_info)
-        with self.world.alone():
-            status = lib.dfm_body_remove_cells(self.handle, numbers.size, numbers.ctypes.data,
-                                               ctypes.byref(info))
-        check(status)
+        self.world.call(lib.dfm_body_remove_cells, self.handle, numbers.size, numbers.ctypes.data,
+                        ctypes.byref(info))
         return CutInfo.of(info)
 
     def set_cut_delay(self, delay: float = 0) -> None:
         """From now on faces that the edge of a tool passes open `delay` s later, and a second thread makes
         the cut body meanwhile; 0: at the end of the step in which it passes them."""
         seconds = real(delay, "delay")
-        with self.world.alone():
-            status = lib.dfm_body_set_cut_delay(self.handle, seconds)
-        check(status)
+        self.world.call(lib.dfm_body_set_cut_delay, self.handle, seconds)
 
     @property
     def cut_delay(self) -> float:
@@ -569,10 +547,8 @@ class Body(_Part):
         """Bodies that have come off it (set_separate), in order of creation; of a piece, those of the body
         that it came off."""
         self.world.free()
-        n = number_of(quick.dfm_body_pieces, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(quick.dfm_body_pieces(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return [body for body in map(self.world.owner, out[:n]) if isinstance(body, Body)]
+        pieces = map(self.world.owner, listed(quick.dfm_body_pieces, self.handle))
+        return [body for body in pieces if isinstance(body, Body)]
 
     @property
     def origins(self) -> tuple[np.ndarray, np.ndarray]:
@@ -599,18 +575,15 @@ class Body(_Part):
 
     def write(self, path: Any) -> None:
         """Its points and cells as *.vtu."""
-        self.world.free()
-        check(lib.dfm_debug_write_body(self.handle, str(path).encode()))
+        self.world.call(lib.dfm_debug_write_body, self.handle, encoded(path))
 
     def write_surface(self, path: Any) -> None:
         """Its surface with displacements, velocities and contact forces as *.vtu."""
-        self.world.free()
-        check(lib.dfm_debug_write_surface(self.handle, str(path).encode()))
+        self.world.call(lib.dfm_debug_write_surface, self.handle, encoded(path))
 
     def remove(self) -> None:
         """Takes the body out of its world; its contacts end. Arrays keep their last values."""
-        self.world.free()
-        check(lib.dfm_body_destroy(self.handle))
+        self.world.call(lib.dfm_body_destroy, self.handle)
 
     def to_meshio(self) -> Any:
         """Its present state as a `meshio.Mesh`, with the velocity of each point."""
@@ -660,9 +633,10 @@ class Obstacle(_Part):
                                             whole(collides_with, "collides_with")))
 
     def set_material(self, material: Any = None) -> None:
-        """Its material, of World.add_material, for friction by material; None: no material."""
+        """Its material, of World.add_material or as a dict of entries, for friction by material; None: no
+        material."""
         self.world.free()
-        check(quick.dfm_obstacle_set_material(self.handle, 0 if material is None else material.handle))
+        check(quick.dfm_obstacle_set_material(self.handle, self.world._material(material)))
 
     def definition(self) -> _abi.dfm_obstacle_def:
         """Its def as created, as the C struct."""
@@ -673,8 +647,7 @@ class Obstacle(_Part):
 
     def remove(self) -> None:
         """Takes the obstacle out of its world; its contacts end."""
-        self.world.free()
-        check(lib.dfm_obstacle_destroy(self.handle))
+        self.world.call(lib.dfm_obstacle_destroy, self.handle)
 
 
 class Rigid(Obstacle):
@@ -749,5 +722,4 @@ class Rigid(Obstacle):
 
     def remove(self) -> None:
         """Takes the whole set that it came with out of the world."""
-        self.world.free()
-        check(lib.dfm_rigid_destroy(self.handle))
+        self.world.call(lib.dfm_rigid_destroy, self.handle)

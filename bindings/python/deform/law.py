@@ -259,16 +259,21 @@ class Bridge:
 
     def refuse(self, params: int, why: int, capacity: int) -> int:
         """dfm_friction.check."""
+        values = np.array((ctypes.c_double * max(self.law.width(), 1)).from_address(params))
+        status, sentence = self.checked(values)
+        if sentence and why and capacity:
+            said = sentence[:capacity - 1] + b"\0"
+            ctypes.memmove(why, said, len(said))
+        return status
+
+    def checked(self, params: np.ndarray) -> tuple[int, bytes]:
+        """The status of packed parameters, and why they are refused."""
         try:
-            values = np.array((ctypes.c_double * max(self.law.width(), 1)).from_address(params))
-            sentence = self.law.refuse(self.law.by_key(values))
-            if sentence and why and capacity:
-                ctypes.memmove(why, sentence.encode()[:capacity - 1] + b"\0",
-                               min(len(sentence.encode()), capacity - 1) + 1)
-            return _abi.DFM_E_ARG if sentence else _abi.DFM_OK
+            sentence = (self.law.refuse(self.law.by_key(params)) or "").encode()
+            return _abi.DFM_E_ARG if sentence else _abi.DFM_OK, sentence
         except BaseException as raised:
             self.error = self.error or raised
-            return _abi.DFM_E_FATAL
+            return _abi.DFM_E_FATAL, b""
 
 
 class _Server:
@@ -281,7 +286,7 @@ class _Server:
             raise Error(f"{self.file} is not there: this library was built without it")
 
     def __enter__(self) -> _Server:
-        self._folder = tempfile.TemporaryDirectory(prefix="deform")
+        self._folder = tempfile.TemporaryDirectory(prefix="deform", dir="/tmp")  # an address has 107 letters
         path = os.path.join(self._folder.name, "law")
         self.environment = {"DEFORM_PYTHON_LAW": path}
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -329,8 +334,8 @@ class _Server:
                 kind, n, present = struct.unpack("III", head)
                 stream.write(self._evaluated(stream, n, present) if kind == 1 else self._checked(stream))
                 stream.flush()
-        except OSError:
-            pass  # the other process has ended
+        except (OSError, ValueError, struct.error):
+            pass  # the other process has ended, perhaps within a message
         finally:
             channel.close()
 
@@ -355,9 +360,8 @@ class _Server:
         return struct.pack("i", _abi.DFM_OK) + packed + np.asarray(out.mode, np.uint8).tobytes()
 
     def _checked(self, stream: Any) -> bytes:
-        params = self._doubles(stream, self.law.width())
-        sentence = (self.law.refuse(self.law.by_key(params)) or "").encode()[:511]
-        return struct.pack("iI", _abi.DFM_E_ARG if sentence else _abi.DFM_OK, len(sentence)) + sentence
+        status, sentence = self.bridge.checked(self._doubles(stream, self.law.width()))
+        return struct.pack("iI", status, len(sentence[:511])) + sentence[:511]
 
 
 class Law:

@@ -2,17 +2,18 @@
 from __future__ import annotations
 
 import ctypes
+import json
 import math
-import os
 import pathlib
 import struct
+import tempfile
 import threading
 import zlib
 from typing import TYPE_CHECKING, Any, Iterable, Sequence
 
 import numpy as np
 
-from ._library import PATH, ArgumentError, UnsupportedError
+from ._library import PATH, ArgumentError, UnsupportedError, write_whole
 from .body import vector
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ _lock = threading.Lock()
 _module: Any = None
 _renderers: dict[tuple[int, int], int] = {}
 _MODULE = "libdeform_python.so"
-_LARGEST = 16384  # pixels
+_LARGEST = 8192   # pixels, of the renderer
 _THROUGH = 0.45   # of a contact patch that something hides
 _ROUNDING = 1e-10  # strains, and displacements for coordinates of 1 m, that are drawn as zero
 # what colors may mean: title and unit
@@ -42,7 +43,7 @@ def _native() -> Any:
         p, u, t, d = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_char_p, ctypes.c_double
         for name, result, arguments in (
                 ("create", p, [u, u, p, ctypes.c_size_t]), ("palette", None, [u, p]),
-                ("map", None, [u, u, p]), ("upright", None, [p, p, u]), ("legend", None, [p, u, d, d, t, t]),
+                ("map", None, [u, u, p]), ("begin", None, [p, p, u]), ("legend", None, [p, u, d, d, t, t]),
                 ("surface", None, [p, u, p, u, p, p, p, d]), ("shape", None, [p, u, p, p, p]),
                 ("camera", None, [p, p, p]), ("text", None, [p, t]),
                 ("draw", ctypes.c_int, [p, p, p, ctypes.c_size_t])):
@@ -76,9 +77,7 @@ class Picture:
         target = pathlib.Path(path)
         if target.suffix.lower() != ".png":
             raise ArgumentError(f"{target}: pictures are written as .png", "DFM_E_ARG")
-        partial = target.with_name(f"{target.name}.part{os.getpid()}")
-        partial.write_bytes(self._repr_png_())
-        partial.replace(target)
+        write_whole(target, self._repr_png_())
         return target
 
     def _repr_png_(self) -> bytes:
@@ -133,7 +132,17 @@ class Shown:
 
     def __init__(self) -> None:
         self.softest = math.inf
-        self.upright = Upright([], [])
+        self.upright: Upright | None = None  # only the world knows; upright_of() asks it
+
+
+def upright_of(world: World) -> Upright:
+    """Of a world, which may have the gravity of a snapshot."""
+    if world.shown.upright is None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = pathlib.Path(folder) / "world.json"
+            world.write_scene(path, partial=True)
+            world.shown.upright = Upright.of_scene(json.loads(path.read_text())["gravity"])
+    return world.shown.upright
 
 
 class Solid:
@@ -178,10 +187,10 @@ def solids(world: World) -> list[Solid]:
 def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: Iterable[Solid], *,
          size: tuple[int, int] = (960, 720), eye: Any = None, look_at: Any = None,
          texts: Sequence[str] = (), color: str = "body",
-         value_range: tuple[float, float] = (0, 0), upright: Upright | None = None, t: float = 0) -> Picture:
+         value_range: tuple[float, float], upright: Upright, t: float) -> Picture:
     """Draws surfaces (points [n,3] m, triangles [m,3], color [3], values [n] 0..1 or None) and obstacles,
     with a legend of what the values mean."""
-    width, height = size
+    key = width, height = int(size[0]), int(size[1])
     if not (0 < width <= _LARGEST and 0 < height <= _LARGEST):
         raise ArgumentError(f"a picture of {width} x {height} pixels; 1 to {_LARGEST} each are allowed",
                             "DFM_E_ARG")
@@ -189,12 +198,11 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
         raise ArgumentError("a camera has both eye and look_at", "DFM_E_ARG")
     native, why = _native(), ctypes.create_string_buffer(512)
     with _lock:
-        picture = _renderers.get(size) or native.deform_picture_create(width, height, why, len(why))
+        picture = _renderers.get(key) or native.deform_picture_create(width, height, why, len(why))
         if not picture:
             raise UnsupportedError(f"no pictures: {why.value.decode()}", "DFM_E_UNSUPPORTED")
-        _renderers[size] = picture
-        if upright is not None:
-            native.deform_picture_upright(picture, vector(upright.at(t), "up"), upright.tilts)
+        _renderers[key] = picture
+        native.deform_picture_begin(picture, vector(upright.at(t), "up"), upright.tilts)
         if color in COLORS:
             title, unit = (word.encode() for word in COLORS[color])
             native.deform_picture_legend(picture, int(color == "displacement"), *value_range, title, unit)
@@ -306,7 +314,7 @@ def picture(world: World, *, size: tuple[int, int] = (960, 720), color: str = "b
     surfaces = [(b.positions, b.triangles, palette(i), scaled(v, span, color))
                 for i, (b, v) in enumerate(zip(bodies, values))]
     return draw(surfaces, solids(world), size=size, eye=eye, look_at=look_at, color=color, value_range=span,
-                upright=world.shown.upright, t=world.time, texts=[f"t = {world.time:.3f} s"] if label else [])
+                upright=upright_of(world), t=world.time, texts=[f"t = {world.time:.3f} s"] if label else [])
 
 
 def png_or_none(shown: Any) -> bytes | None:

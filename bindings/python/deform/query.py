@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _abi
 from ._context import choice
-from ._library import ArgumentError, check, default, lib, quick
+from ._library import ArgumentError, check, default, encoded, lib, quick
 from ._values import pose_of, real, vector, whole
 from .body import EVERYTHING, Body, Obstacle
 from .mesh import points_of
@@ -447,7 +447,7 @@ def write_scene(function: Any, handle: int, path: str | os.PathLike[str], durati
     definition.flags = ((_abi.DFM_SCENE_SNAPSHOT if snapshot else 0)
                         | (_abi.DFM_SCENE_PARTIAL if partial else 0))
     definition.note = ctypes.cast(note, ctypes.c_void_p).value
-    check(function(handle, os.fspath(path).encode(), ctypes.byref(definition), None))
+    check(function(handle, encoded(path), ctypes.byref(definition), None))
     return sentences
 
 

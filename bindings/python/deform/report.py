@@ -9,6 +9,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Rows
+from ._context import listed
 from ._library import check, lib, quick, read_text, sized
 from ._values import vector, whole
 from .body import Body, Obstacle, handle_of
@@ -38,18 +39,14 @@ class Reports:
 
     def find_overlaps(self: Any) -> np.ndarray:
         """Checks all pairs now, and changes nothing: overlaps of the present state, as `overlaps`."""
-        with self.alone():
-            status = lib.dfm_world_find_overlaps(self.handle, None)
-        check(status)
+        self.call(lib.dfm_world_find_overlaps, self.handle, None)
         return self.overlaps
 
     def untangle(self: Any) -> int:
         """Moves overlapping bodies apart, as whole bodies, without energy and speed. Returns the number of
         pairs that still overlap; the log says why."""
         left = ctypes.c_uint32()
-        with self.alone():
-            status = lib.dfm_world_untangle(self.handle, ctypes.byref(left))
-        check(status)
+        self.call(lib.dfm_world_untangle, self.handle, ctypes.byref(left))
         return left.value
 
     def wrench(self: Any, a: Body | Obstacle, b: Body | Obstacle,
@@ -89,13 +86,10 @@ class Reports:
     @property
     def profile(self: Any) -> dict[str, tuple[float, int]]:
         """Of each stage of the steps since the world was created: seconds by the clock, and calls."""
-        n, row = ctypes.c_uint32(), ctypes.sizeof(_abi.dfm_stage_time)
+        row = _abi.dfm_stage_time
         self.free()
-        check(quick.dfm_world_profile_sized(self.handle, row, 0, None, ctypes.byref(n)))
-        out = (_abi.dfm_stage_time * max(n.value, 1))()
-        if n.value:
-            check(quick.dfm_world_profile_sized(self.handle, row, n.value, ctypes.byref(out), None))
-        return {stage.name.decode(): (stage.seconds, int(stage.calls)) for stage in out[:n.value]}
+        stages = listed(quick.dfm_world_profile_sized, self.handle, ctypes.sizeof(row), kind=row)
+        return {stage.name.decode(): (stage.seconds, int(stage.calls)) for stage in stages}
 
     @property
     def hash(self: Any) -> int:

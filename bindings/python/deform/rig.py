@@ -14,6 +14,7 @@ import numpy as np
 from ._context import choice
 from ._library import ArgumentError
 from ._command import command
+from ._values import json_of
 from .law import Law, PythonLaw
 
 INPUTS: dict[str, dict[str, Any]] = {
@@ -67,7 +68,7 @@ def friction(law: Any, kind: str = "sine_velocity", *, normal: float = 1.0,
     served: Any = law.served() if isinstance(law, PythonLaw) else nullcontext((law, {}))
     with tempfile.TemporaryDirectory() as name, served as (file, environment):
         folder = pathlib.Path(name)
-        (folder / "case.json").write_text(json.dumps(case))
+        (folder / "case.json").write_text(json_of(case))
         command("friction", folder / "case.json", "--law", os.fspath(file), "--step", step, "--csv",
                 folder / "rows.csv", environment=environment)
         with open(folder / "rows.csv", newline="") as rows:

@@ -2,13 +2,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Sequence
+from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 from . import _abi
 from ._context import word
 from ._library import OfThisProcess, default, encoded, sized
 from ._values import pose_of, real, vector, whole
-from .body import handle_of
 
 if TYPE_CHECKING:
     from .world import World
@@ -45,10 +44,10 @@ class RigidDef:
     inertia: Sequence[float] = (0, 0, 0)
     velocity: Sequence[float] = (0, 0, 0)
     spin: Sequence[float] = (0, 0, 0)
-    material: Material | None = None
+    material: Material | Mapping[str, Any] | None = None
     fixed: bool = False
 
-    def struct(self) -> _abi.dfm_rigid_def:
+    def struct(self, world: World) -> _abi.dfm_rigid_def:
         out = default(_abi.dfm_rigid_def)
         out.shape = word("shape", self.shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
         out.name, out.fixed = encoded(self.name), self.fixed
@@ -57,7 +56,7 @@ class RigidDef:
             setattr(out, key, real(getattr(self, key), key))
         for key in ("half_size", "inertia", "velocity", "spin"):
             setattr(out, key, vector(getattr(self, key), key))
-        out.material = 0 if self.material is None else handle_of(self.material, Material, MATERIAL)
+        out.material = world._material(self.material)
         return out
 
 

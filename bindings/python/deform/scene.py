@@ -14,8 +14,8 @@ from . import _abi
 from ._arrays import row_type
 from ._context import Context, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, read_text, sized
-from ._values import real
-from .picture import Picture, Solid, Upright, body_values, draw, ends, palette, scaled, solids
+from ._values import json_of, real
+from .picture import Picture, Solid, Upright, body_values, draw, ends, palette, scaled, solids, upright_of
 from .query import write_scene
 from .world import Trouble, World
 
@@ -55,7 +55,7 @@ class Scene(OfThisProcess):
                                 "pathlib.Path('scene.json').write_text(json.dumps(scene))", "DFM_E_ARG")
         if context is None:
             context = default_context() if threads == 1 else Context(threads)
-        words = [encoded(f"{pointer}={json.dumps(value)}") for pointer, value in (set or {}).items()]
+        words = [encoded(f"{pointer}={json_of(value)}") for pointer, value in (set or {}).items()]
         pointers = (ctypes.c_char_p * max(len(words), 1))(*words)
         options = _abi.dfm_scene_options(ctypes.sizeof(_abi.dfm_scene_options), len(words),
                                          ctypes.addressof(pointers), jitter)
@@ -147,7 +147,7 @@ class Run:
     """What a run recorded: `frames`, and at its end `stats` (dfm_world_stats) and `hash`. A notebook shows
     it as a view that can be turned and played (html()); picture(i) draws one frame."""
 
-    def __init__(self, color: str, camera: Any, color_range: Any = None, upright: Upright | None = None):
+    def __init__(self, color: str, camera: Any, color_range: Any, upright: Upright):
         self.color, self.camera, self.color_range, self.upright = color, camera, color_range, upright
         self.frames: list[Frame] = []
         self.triangles: dict[str, np.ndarray] = {}
@@ -160,7 +160,7 @@ class Run:
     @classmethod
     def of(cls, world: World, color: str = "body", camera: Any = None, color_range: Any = None) -> Run:
         """An empty one for a world that is stepped by hand; add() records a frame (World.film)."""
-        run = cls(color, camera, color_range, world.shown.upright)
+        run = cls(color, camera, color_range, upright_of(world))
         run.world = world
         run.triangles = {body.name: body.triangles.copy() for body in world.bodies}
         run.add()
@@ -253,7 +253,7 @@ class _Runner:
 
     def run(self) -> Run:
         settings = self.settings
-        out = self.run_ = Run(settings.color, settings.camera, settings.color_range, self.world.shown.upright)
+        out = self.run_ = Run(settings.color, settings.camera, settings.color_range, upright_of(self.world))
         out.world = self.world
         out.triangles = {body.name: body.triangles.copy() for body in self.world.bodies}
         self.record()

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 import numpy as np
 
 from . import _abi
-from ._context import choice, number_of
+from ._context import choice, listed
 from ._library import ArgumentError, check, default, encoded, lib, quick, sized
 from ._values import pose_of, real, text, vector, whole
-from .body import EVERYTHING, Body, Obstacle, handle_of, numbers_of
+from .body import EVERYTHING, Body, Obstacle, handle_of
 from .cut import CUT_WAYS
+from .mesh import TriMesh, surface_of
 
 if TYPE_CHECKING:
-    from .mesh import TriMesh
     from .world import Material, World
 
 TOOL_SHAPES = {"sphere": 0, "capsule": 1, "box": 2, "mesh": 3, "grasper": 4, "scissors": 5, "ellipsoid": 6,
@@ -117,10 +117,8 @@ class Tool:
     def parts(self) -> list[Obstacle]:
         """Its rigid bodies: frame or shaft, then the left and the right jaw."""
         self.world.free()
-        n = number_of(quick.dfm_tool_parts, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(quick.dfm_tool_parts(self.handle, n, ctypes.byref(out), None))
-        return [part for part in map(self.world.owner, out[:n]) if isinstance(part, Obstacle)]
+        parts = map(self.world.owner, listed(quick.dfm_tool_parts, self.handle))
+        return [part for part in parts if isinstance(part, Obstacle)]
 
     def grab(self, body: Body, reach: float = 0, release: float = 0) -> list[int]:
         """Attaches what it touches, or what is nearer than `reach` (m), to its parts.
@@ -149,9 +147,8 @@ class Tool:
             raise ArgumentError(f"{expected}, not {bodies!r}", "DFM_E_ARG")
         given = [handle_of(body, Body, expected) for body in bodies]
         handles = (ctypes.c_uint64 * max(len(given), 1))(*given)
-        self.world.free()
-        check(lib.dfm_tool_set_cuts(self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)],
-                                    whole(most, "most"), len(given), ctypes.byref(handles)))
+        self.world.call(lib.dfm_tool_set_cuts, self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)],
+                        whole(most, "most"), len(given), ctypes.byref(handles))
 
     def _shape(self) -> int:
         out = sized(_abi.dfm_tool_def)
@@ -162,18 +159,13 @@ class Tool:
     @property
     def cuts(self) -> list[Body]:
         """The bodies that it cuts."""
-        n = ctypes.c_uint32()
         self.world.free()
-        check(quick.dfm_tool_cuts(self.handle, None, None, 0, None, ctypes.byref(n)))
-        out = (ctypes.c_uint64 * max(n.value, 1))()
-        if n.value:
-            check(quick.dfm_tool_cuts(self.handle, None, None, n.value, ctypes.byref(out), None))
-        return [body for body in map(self.world.owner, out[:n.value]) if isinstance(body, Body)]
+        bodies = map(self.world.owner, listed(quick.dfm_tool_cuts, self.handle, None, None))
+        return [body for body in bodies if isinstance(body, Body)]
 
     def remove(self) -> None:
         """Takes it out of its world with its parts; contacts and attachments end."""
-        self.world.free()
-        check(lib.dfm_tool_destroy(self.handle))
+        self.world.call(lib.dfm_tool_destroy, self.handle)
 
 
 class Tools:
@@ -218,7 +210,8 @@ class Tools:
             raise ArgumentError('a tool of the shape "mesh" needs a mesh, and no other tool has one',
                                 "DFM_E_ARG")
         if mesh is not None:
-            points, triangles = mesh.points, numbers_of(mesh.triangles).reshape(-1, 3)
+            mesh = surface_of(mesh, "the mesh of a tool")
+            points, triangles = mesh.points, mesh.triangles
             definition.npoint, definition.ntriangle = len(points), len(triangles)
             definition.points, definition.triangles = points.ctypes.data, triangles.ctypes.data
         return self._tool(self._created(lib.dfm_tool_create, definition))

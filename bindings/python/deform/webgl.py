@@ -121,7 +121,7 @@ def _legend(run: Run) -> str:
 def document(run: Run) -> str:
     """The whole document; its file may be opened by any browser, and loads nothing."""
     page = next(path for path in _PLACES if path.exists()).read_text(encoding="utf-8")
-    ups = [(run.upright.at(frame.t) if run.upright else np.array([0, 0, 1])).tolist() for frame in run.frames]
+    ups = [run.upright.at(frame.t).tolist() for frame in run.frames]
     film = json.dumps({"packets": base64.b64encode(packets_of(run)).decode(), "ups": ups,
                        "map": color_map(run.color, _COLORS).ravel().tolist(), "legend": _legend(run)},
                       separators=(",", ":")).replace("</", "<\\/")

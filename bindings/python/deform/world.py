@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Report, Rows
-from ._context import Context, Params, choice, default_context, number_of, strings, word
+from ._context import Context, Params, choice, default_context, listed, strings, word
 from ._library import (ArgumentError, BusyError, OfThisProcess, check, default, encoded, error, lib, quick,
                        sized)
 from ._signals import watch
@@ -220,12 +220,15 @@ class World(Queries, Reports, Tools, OfThisProcess):
         finally:
             self._busy = 0
 
+    def call(self, function: Any, *arguments: Any) -> None:
+        """Such a call; raises what its status means."""
+        with self.alone():
+            check(function(*arguments))
+
     def _created(self, function: Any, definition: Any) -> int:
         """The handle of what a function of the library makes in this world."""
         out = ctypes.c_uint64()
-        with self.alone():
-            status = function(self.handle, ctypes.byref(definition), ctypes.byref(out))
-        check(status)
+        self.call(function, self.handle, ctypes.byref(definition), ctypes.byref(out))
         return out.value
 
     def accept(self, status: int) -> int:
@@ -257,8 +260,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
             setattr(definition, key, real(value, f"{key} of a material"))
         definition.extra = values.struct
         out = ctypes.c_uint64()
-        self.free()
-        check(lib.dfm_material_create(self.handle, ctypes.byref(definition), ctypes.byref(out)))
+        self.call(lib.dfm_material_create, self.handle, ctypes.byref(definition), ctypes.byref(out))
         self.shown.softest = min(self.shown.softest, definition.young)
         return Material(self, out.value, name)
 
@@ -407,15 +409,13 @@ class World(Queries, Reports, Tools, OfThisProcess):
                    host: str | None = None) -> list[Rigid]:
         """A set of rigid bodies and the joints between them. host: what moves them; None: the library's own
         solver."""
-        rows = (_abi.dfm_rigid_def * max(len(bodies), 1))(*(body.struct() for body in bodies))
+        rows = (_abi.dfm_rigid_def * max(len(bodies), 1))(*(body.struct(self) for body in bodies))
         links = (_abi.dfm_joint_def * max(len(joints), 1))(*(joint.struct() for joint in joints))
         group = sized(_abi.dfm_rigid_set_def)
         group.nbody, group.bodies = len(bodies), ctypes.addressof(rows)
         group.njoint, group.joints = len(joints), ctypes.addressof(links)
         out = (ctypes.c_uint64 * max(len(bodies), 1))()
-        with self.alone():
-            status = lib.dfm_rigid_create(self.handle, encoded(host), ctypes.byref(group), ctypes.byref(out))
-        check(status)
+        self.call(lib.dfm_rigid_create, self.handle, encoded(host), ctypes.byref(group), ctypes.byref(out))
         return [self._know(self._obstacle(handle)) for handle in out[:len(bodies)]]
 
     def _obstacle(self, handle: int) -> Obstacle:
@@ -433,10 +433,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
 
     def _handles(self, function: Any) -> list[int]:
         self.free()
-        n = number_of(function, self.handle)
-        out = (ctypes.c_uint64 * max(n, 1))()
-        check(function(self.handle, n, ctypes.byref(out), None) if n else 0)
-        return list(out[:n])
+        return listed(function, self.handle)
 
     @property
     def bodies(self) -> list[Body]:
@@ -497,29 +494,24 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.law, definition.params = name.encode(), values.struct
         if restitution is not None:
             definition.flags, definition.restitution = _abi.DFM_FRICTION_RESTITUTION, restitution
-        self.free()
-        check(lib.dfm_world_add_friction(self.handle, ctypes.byref(definition)))
+        self.call(lib.dfm_world_add_friction, self.handle, ctypes.byref(definition))
 
     def set_friction(self, a: Any, b: Any, **params: Any) -> None:
         """Changes parameters of a rule while the world runs; those that are not given keep their values."""
-        self.free()
         values = Params(params)
-        check(lib.dfm_world_set_friction(self.handle, _side(a), _side(b), ctypes.byref(values.struct)))
+        self.call(lib.dfm_world_set_friction, self.handle, _side(a), _side(b), ctypes.byref(values.struct))
 
     def remove_friction(self, a: Any, b: Any) -> None:
         """Takes back what add_friction or set_friction said of the two; less specific rules count again."""
-        self.free()
-        check(lib.dfm_world_remove_friction(self.handle, _side(a), _side(b)))
+        self.call(lib.dfm_world_remove_friction, self.handle, _side(a), _side(b))
 
     def filter_pair(self, a: Any, b: Any, collide: bool) -> None:
         """Lets two named sides pass (False) or touch (True)."""
-        self.free()
-        check(lib.dfm_world_filter_pair(self.handle, _side(a), _side(b), collide))
+        self.call(lib.dfm_world_filter_pair, self.handle, _side(a), _side(b), collide)
 
     def remove_filter(self, a: Any, b: Any) -> None:
         """Takes back what filter_pair said of the two."""
-        self.free()
-        check(lib.dfm_world_remove_filter(self.handle, _side(a), _side(b)))
+        self.call(lib.dfm_world_remove_filter, self.handle, _side(a), _side(b))
 
     # ---- time ------------------------------------------------------------------------------------------
 
@@ -588,8 +580,12 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.load_steps, definition.time = whole(load_steps, "load_steps", 1), real(time, "time")
         definition.load_from = real(load_from, "load_from")
         definition.load_to = real(load_to, "load_to")
-        with self.alone():
-            status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
+        try:
+            with self.alone():
+                status = lib.dfm_world_equilibrium(self.handle, ctypes.byref(definition), None)
+        except BaseException:  # raised by the handler of a signal
+            self._stop = False
+            raise
         if status == _abi.DFM_DISCARD and self._stop:  # by a signal whose handler has not raised
             self._stop = False
             return self.equilibrium(load_steps, load_from=load_from, load_to=load_to, time=time)
@@ -626,8 +622,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
         self.free()
         check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
-        if np.size(times):
-            self.shown.upright = Upright(times, gravity)
+        self.shown.upright = Upright(times, gravity) if np.size(times) else None
 
     def set_sleep(self, sleep: bool = True) -> None:
         """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
@@ -746,6 +741,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                                 f"{type(snapshot).__name__}", "DFM_E_ARG") from None
         self.free()
         check(quick.dfm_world_restore(self.handle, taken, len(taken)))
+        self.shown.upright = None
         for body in list(self._bodies.values()):
             body._renew_name()  # a name that the library has made may be another one
 

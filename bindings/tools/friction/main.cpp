@@ -40,12 +40,6 @@ std::string csv_text(const RigResult &result) {
   return text + "\n";
 }
 
-std::string list_text(const std::vector<double> &values) {
-  std::vector<std::string> items;
-  for (const double x : values) items.push_back(number(x));
-  return json_array(items);
-}
-
 void print(const FrictionOptions &options, const Globals &globals, const FrictionCase &rig, const RigLaw &law,
            const RigResult &result) {
   if (globals.json) {
@@ -63,7 +57,7 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
     for (const auto &[name, values] : result.figures) {
       const bool list = values.size() != 1 || name.find("times") != std::string::npos ||
                         name.find("per_") != std::string::npos;
-      out.add(name, list ? list_text(values) : number(values[0]));
+      out.add(name, list ? json_numbers(values) : number(values[0]));
     }
     std::vector<std::string> said;
     for (const std::string &w : warnings()) said.push_back(quoted(w));

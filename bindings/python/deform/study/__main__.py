@@ -87,7 +87,8 @@ def main() -> int:
         print(f"deform: {error}", file=sys.stderr)
         return 3 if error.status == "DFM_E_FATAL" else 2
     except OSError as error:
-        print(f"deform: {error.filename}: {error.strerror}", file=sys.stderr)
+        what = error.filename or "the results cannot be written"
+        print(f"deform: {what}: {error.strerror}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print("deform: interrupted; what is done is kept, and the next call goes on", file=sys.stderr)

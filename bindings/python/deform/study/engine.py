@@ -36,21 +36,25 @@ class Failed(Exception):
     """A run that gives no result, with its sentence."""
 
 
+def _key(of: Any, word: str) -> Any:
+    word = word.replace("~1", "/").replace("~0", "~")
+    if not isinstance(of, list):
+        return word
+    if not word.isdecimal():  # int() takes -1, too
+        raise IndexError(word)
+    return int(word)
+
+
 def _resolve(value: Any, pointer: str) -> Any:
-    for key in pointer.split("/")[1:]:
-        key = key.replace("~1", "/").replace("~0", "~")
-        value = value[int(key)] if isinstance(value, list) else value[key]
+    for word in pointer.split("/")[1:]:
+        value = value[_key(value, word)]
     return value
 
 
 def _set(value: Any, pointer: str, new: Any) -> None:
-    above, _, key = pointer.rpartition("/")
-    key = key.replace("~1", "/").replace("~0", "~")
+    above, _, word = pointer.rpartition("/")
     at = _resolve(value, above) if above else value
-    if isinstance(at, list):
-        at[int(key)] = new
-    else:
-        at[key] = new
+    at[_key(at, word)] = new
 
 
 # ---- what is read of a run --------------------------------------------------------------------------------
@@ -242,8 +246,9 @@ class Engine:
             raise Died(f"the run was ended by {_signal(answer['signal'])}")
         if answer["code"]:
             # its files do not stay
-            clauses = [part for part in _last(answer["said"]).split("; ") if str(folder) not in part]
-            raise Failed("; ".join(clauses) or f"the run ended with exit code {answer['code']}")
+            clauses = [part for part in _last(answer["said"]).split("; ") if f" is in {folder}" not in part]
+            said = "; ".join(clauses).replace(f"{folder}/", "")
+            raise Failed(said or f"the run ended with exit code {answer['code']}")
         return Results(folder, json.loads((folder / "summary.json").read_text()))
 
     def _call(self, request: Mapping[str, Any], limit: float) -> Any:

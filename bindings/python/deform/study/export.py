@@ -20,6 +20,7 @@ rule all:
     shell: {gather!r}  # exit code 1: some runs have failed, which the page says
 
 rule block:
+    input: {inputs!r}  # a changed one makes the runs anew
     output: touch({done!r})
     shell: {run!r}
 '''
@@ -51,13 +52,14 @@ def export(study: Any, kind: str, *, out: Any = None, block: int = 0) -> pathlib
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / ("Snakefile" if kind == "snakemake" else "array.sh")
     if kind == "slurm":
-        path.write_text(SLURM.format(file=shlex.quote(str(path)), gather=gather, name=read.name, n=n,
-                                     most=n - 1, last=-(-n // block) - 1, block=block, run=run))
+        path.write_text(SLURM.format(file=shlex.quote(str(path)), gather=gather, name=shlex.quote(read.name),
+                                     n=n, most=n - 1, last=-(-n // block) - 1, block=block, run=run))
         return path
     blocks = [f"{first}-{min(first + block, n) - 1}" for first in range(0, n, block)]
     braces = run.replace("{", "{{").replace("}", "}}")
     path.write_text(SNAKEFILE.format(file=shlex.quote(str(path)), blocks=blocks,
                                      done=str(folder / "runs" / "{block}.done"),
+                                     inputs=[str(pathlib.Path(study).absolute()), read.runs[0][0]],
                                      gather=gather.replace("{", "{{").replace("}", "}}") + " || [ $? = 1 ]",
                                      run=braces + " --only {wildcards.block}"))
     return path

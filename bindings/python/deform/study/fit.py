@@ -10,7 +10,7 @@ from typing import Any, Callable, Mapping, Sequence
 import numpy as np
 
 from .._command import Table
-from .._library import ArgumentError, Error, UnsupportedError
+from .._library import ArgumentError, Error, UnsupportedError, write_whole
 from . import plots
 from .engine import Failed
 from .executors import Dask, Local, executor as named_executor
@@ -52,16 +52,16 @@ class Fit(Table):
                   "curves": [{key: value.tolist() if isinstance(value, np.ndarray) else value
                               for key, value in curve.items()} for curve in self.curves]}
         written = [self.folder / "fit.json", self.folder / "fit.html"]
-        written[0].write_text(json.dumps(_finite(report), indent=1) + "\n")
+        write_whole(written[0], (json.dumps(_finite(report), indent=1) + "\n").encode())
         sentences, figures = list(self.notes), {}
         try:
             figures["fit"] = plots.png(self.figure())
             written.append(self.folder / "fit.png")
-            written[-1].write_bytes(figures["fit"])
+            write_whole(written[-1], figures["fit"])
         except UnsupportedError as missing:
             sentences.append(str(missing))
-        written[1].write_text(page(f"Fit {self.study.name}", sentences, figures,
-                                   [table(self, self.columns, {})]))
+        write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures,
+                                     [table(self, self.columns, {})]))
         return written
 
 
@@ -157,8 +157,9 @@ class Problem:
         for i in range(len(shares)):
             (low, a), (high, b) = ((end, value) if np.isfinite(value).all() else (shares, here)
                                    for end, value in zip(ends[2 * i:2 * i + 2], values[2 * i:2 * i + 2]))
-            if low[i] == high[i]:
-                self.curves(ends[2 * i])  # raises
+            if high[i] - low[i] < step / 2:  # a difference of rounding
+                for end in ends[2 * i:2 * i + 2]:
+                    self.curves(end)  # raises what the run there said
             columns.append((b - a) / (high[i] - low[i]))
         return np.array(columns).T
 
@@ -266,6 +267,9 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
         at_start = problem.curves(start)
         problem.residuals([start])  # the best, until a search finds a better one
         best, ended = _search(problem, start, method, read.optimizer, read.optimizer["evaluations"])
+        searched = [] if ended or method == "least_squares" else [
+            f'{method} was stopped by "evaluations" after {problem.evaluations} points, and least squares '
+            f"went on from its best one: raise it, or a better minimum elsewhere may remain unseen"]
         if method != "least_squares":  # which only makes the residuals smaller
             best, ended = _search(problem, best, "least_squares", read.optimizer, 0)
         jacobian, coarse = problem.jacobian(best, step), problem.jacobian(best, 2 * step)
@@ -276,7 +280,8 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
         low, high = (p.place(min(max(best[i] + sign * spread.half[i], 0.0), 1.0)) for sign in (-1, 1))
         rows.append({"parameter": p.name, "value": p.place(best[i]), "low": low, "high": high, "unit": p.unit,
                      "start": p.start})
-    notes = [_summary(spread, len(jacobian), problem.evaluations), *_notes(read, spread, best, ended, coarse)]
+    notes = [_summary(spread, len(jacobian), problem.evaluations), *searched,
+             *_notes(read, spread, best, ended, coarse)]
     return Fit(read, rows, notes, _curves(read, at_start, at_best), spread, problem.evaluations,
                out_folder(read, out))
 

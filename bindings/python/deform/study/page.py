@@ -23,9 +23,9 @@ def table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str], units: Mapp
     return f'<div class=rows><table><tr>{head}</tr>{"".join(lines)}</table></div>'
 
 
-def page(title: str, sentences: Sequence[str], figures: Mapping[str, bytes], tables: Sequence[str]) -> str:
+def page(title: str, sentences: Sequence[str], figures: Mapping[str, bytes], tables: Sequence[str]) -> bytes:
     said = "".join(f"<p>{escape(text)}</p>" for text in sentences)
     drawn = "".join(f'<p><img alt="{escape(name)}" src="data:image/png;base64,'
                     f'{base64.b64encode(data).decode()}"></p>' for name, data in figures.items())
     return (f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
-            f'<style>{STYLE}</style><h1>{escape(title)}</h1>{said}{drawn}{"".join(tables)}</html>\n')
+            f'<style>{STYLE}</style><h1>{escape(title)}</h1>{said}{drawn}{"".join(tables)}</html>\n').encode()

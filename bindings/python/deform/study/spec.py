@@ -13,7 +13,9 @@ from typing import Any, Callable, Iterable, Mapping
 
 import numpy as np
 
-from .._library import FileError, FormatError, quick
+from .._context import Context
+from .._library import PATH, FileError, FormatError, command_path
+from .._values import json_of
 from .tables import finite, read_csv
 
 TABLES = {"bodies", "contacts", "probes", "attachments", "sensors", "tools", "rows"}
@@ -227,7 +229,7 @@ class Study:
         of_file = functools.lru_cache(maxsize=None)(_of_file)  # the points of a study name the same few
         inputs = [(of_file(file), _of_named(json.loads(pathlib.Path(file).read_text()), file, of_file), fixed,
                    _of_named(fixed, file, of_file)) for file, fixed in self.runs]
-        digest = _of_json([quick.dfm_version(None, None, None).decode(), self.kind, inputs, self.quantities])
+        digest = _of_json([_built(), self.kind, inputs, list(self.quantities.items())])
         keys = []
         for values in map(self.values, points):
             named = [_of_named(values, file, of_file) for file, _ in self.runs]
@@ -241,6 +243,12 @@ def _of_json(value: Any) -> str:
 
 def _of_file(path: str) -> str:
     return hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+
+
+def _built() -> list[str]:
+    """Of what makes the runs: the library, the command and all plugins."""
+    plugins = (plugin.file for plugin in Context().types)
+    return sorted(map(_of_file, {str(PATH), str(command_path()), *filter(None, plugins)}))
 
 
 def _of_named(value: Any, file: str, of_file: Callable[[str], str]) -> list[str]:
@@ -286,7 +294,7 @@ def read_columns(path: pathlib.Path, names: list[str], at: Place) -> list[np.nda
     out = []
     for name in names:
         if not rows or name not in rows[0]:
-            has = ", ".join(rows[0]) if rows else "no rows"
+            has = ", ".join(filter(None, rows[0])) if rows else "no rows"
             raise at.fail(f'{path} has no column "{name}"; it has {has}')
         try:
             out.append(np.array(finite(rows, name)))
@@ -320,7 +328,7 @@ def read_residual(at: Place, run: int, folder: pathlib.Path) -> Residual:
 def read_study(source: Any) -> Study:
     """From the path of a file, or from a dict, whose paths count from the working folder."""
     if isinstance(source, Mapping):
-        value, file, folder = dict(source), "study", pathlib.Path()
+        value, file, folder = json.loads(json_of(dict(source))), "study", pathlib.Path()
     else:
         file = str(source)
         try:

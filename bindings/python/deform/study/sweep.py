@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 from typing import Any, Sequence
 
 from .._command import Table
-from .._library import ArgumentError, UnsupportedError
+from .._library import ArgumentError, UnsupportedError, write_whole
 from . import plots, tables
 from .design import points
 from .executors import executor as named_executor
@@ -54,10 +54,10 @@ class Sweep(Table):
             sentences.append(str(missing))
         for name, data in figures.items():
             written.append(self.folder / f"{name}.png")
-            written[-1].write_bytes(data)
+            write_whole(written[-1], data)
         written.append(self.folder / "sweep.html")
-        written[-1].write_text(page(f"Sweep {self.study.name}", sentences, figures,
-                                    [table(self, self.columns, self.units)]))
+        write_whole(written[-1], page(f"Sweep {self.study.name}", sentences, figures,
+                                      [table(self, self.columns, self.units)]))
         return written
 
 

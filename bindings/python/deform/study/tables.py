@@ -3,19 +3,19 @@ header and in the metadata of the columns."""
 from __future__ import annotations
 
 import csv
+import io
 import json
 import math
-import os
 import pathlib
 from typing import Any, Mapping, Sequence
 
-from .._library import UnsupportedError
+from .._library import UnsupportedError, write_whole
 
 Rows = Sequence[Mapping[str, Any]]
 
 
 def read_csv(path: pathlib.Path) -> list[dict[str, str]]:
-    with open(path, newline="") as file:
+    with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
         return list(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
@@ -37,13 +37,12 @@ def titled(name: str, units: Mapping[str, str]) -> str:
 
 
 def write_csv(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
-    part = path.with_name(path.name + ".part")
-    with open(part, "w", newline="") as file:
-        out = csv.writer(file)
-        out.writerow([titled(name, units) for name in columns])
-        for row in rows:
-            out.writerow(["" if row.get(name) is None else row[name] for name in columns])
-    os.replace(part, path)
+    text = io.StringIO(newline="")
+    out = csv.writer(text)
+    out.writerow([titled(name, units) for name in columns])
+    for row in rows:
+        out.writerow(["" if row.get(name) is None else row[name] for name in columns])
+    write_whole(path, text.getvalue().encode())
 
 
 def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
@@ -59,9 +58,9 @@ def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units:
         arrays.append(array)
         metadata = {"unit": units[name]} if units.get(name) else None
         fields.append(arrow.field(name, array.type, metadata=metadata))
-    part = path.with_name(path.name + ".part")
-    arrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), part)
-    os.replace(part, path)
+    file = io.BytesIO()
+    arrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), file)
+    write_whole(path, file.getvalue())
 
 
 def shown(value: Any) -> str:
