@@ -190,8 +190,7 @@ TEST(Meshless, Blocks_AreTheDerivativeOfTheForces) {
     // as implicit time asks for both
     const Dense both = tangent(b, -1e-2, -1e-1), k_now = tangent(b, 1, 0);
     Dense sum(both.rows, both.columns);
-    for (size_t i = 0; i < sum.value.size(); ++i)
-      sum.value[i] = -1e-2 * k_now.value[i] - 1e-1 * c.value[i];
+    for (size_t i = 0; i < sum.value.size(); ++i) sum.value[i] = -1e-2 * k_now.value[i] - 1e-1 * c.value[i];
     EXPECT_LT(largest_difference(both, sum), 1e-12 * largest(sum)) << strain;
   }
 }
