@@ -24,6 +24,7 @@
 #include "contact/contact_state.h"
 #include "contact/rows.h"
 #include "contact/solver.h"
+#include "math/anderson.h"
 #include "math/gmres.h"
 #include "math/ldlt_solver.h"
 
@@ -103,6 +104,8 @@ class ContactNewton {
   Array<double> inverse_;                   // [nodes,3] of A's diagonal; zero where held
   Array<double> u_, l_, lh_;                // [row_,3]
   Array<double> best_v_, best_g_, best_l_;  // of the pass that leaves least
+  Array<double> weight_, change_;           // [row_,3] of multipliers
+  Anderson ways_;                           // of multipliers, from the last change of rho
   Array<double> rho_;                       // [row_,2]
   Array<double> response_;                  // [rows] 1/rho_t, by row
   Array<double> slope_;                     // [row_,9] G, row-major
@@ -160,6 +163,7 @@ class ContactNewton {
   double size() const;   // of g, in the metric of the inverse diagonal
   bool newton(double tolerance, bool &round);
   void scale_penalties(double by);
+  void next_multipliers(bool extrapolated);
   bool coupled_step(double tolerance, bool &failed);
   bool frozen_steps();
   bool gains(double normal) const;
