@@ -228,7 +228,7 @@ void Body::add_point(const dfm_kin &k, uint32_t point, double a, double b, doubl
       y[3 * size_t(e) + i] = (s.axis[0][i] * ge[0] + s.axis[1][i] * ge[1]) + s.axis[2][i] * ge[2];
       turned[3 * size_t(e) + i] = dot(f + 3 * i, ge);
     }
-  if (damp > 0) find_twists(k, point, n, twist, inverse);
+  if (damp != 0) find_twists(k, point, n, twist, inverse);
   for (uint32_t p = 0; p < n; ++p)
     for (uint32_t q = 0; q < n; ++q) {
       const uint32_t from = p ? neighbor[begin[point] + p - 1] : point;
@@ -245,7 +245,7 @@ void Body::add_point(const dfm_kin &k, uint32_t point, double a, double b, doubl
                    ((one[3 * r] * u[3 * j] + one[3 * r + 1] * u[3 * j + 1]) + one[3 * r + 2] * u[3 * j + 2]);
           block[3 * i + j] = a * (c.volume * sum + (i == j ? left : 0));
         }
-      if (damp > 0) {
+      if (damp != 0) {
         const double *const fp = turned + 3 * size_t(p), *const fq = turned + 3 * size_t(q);
         const double gg = c.mu * dot(g + 3 * size_t(p), g + 3 * size_t(q));
         const double *const bp = twist + 9 * size_t(p), *const bq = twist + 9 * size_t(q);

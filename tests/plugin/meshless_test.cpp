@@ -187,6 +187,11 @@ TEST(Meshless, Blocks_AreTheDerivativeOfTheForces) {
     b.shake(0, 1);
     const Dense c = tangent(b, 0, 1), by_v = differences(b, b.v, 1e-3);
     EXPECT_LT(largest_difference(c, by_v), 1e-8 * largest(c)) << strain;
+    // as implicit time asks for both
+    const Dense both = tangent(b, -1e-2, -1e-1), k_now = tangent(b, 1, 0);
+    Dense sum(both.rows, both.columns);
+    for (size_t i = 0; i < sum.value.size(); ++i) sum.value[i] = -1e-2 * k_now.value[i] - 1e-1 * c.value[i];
+    EXPECT_LT(largest_difference(both, sum), 1e-12 * largest(sum)) << strain;
   }
 }
 

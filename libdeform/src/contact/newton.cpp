@@ -49,8 +49,8 @@ void ContactNewton::move(double share) {
       v_[size_t{kStride} * k + c] = base_[size_t{kStride} * k + c] + share * way_[3 * size_t{k} + c];
 }
 
-// out = (A + J' G J) in
-void ContactNewton::multiply(const double *in, double *out, bool symmetric) const {
+// out = A in, of the points of bodies.
+void ContactNewton::multiply_bodies(const double *in, double *out) const {
   std::fill_n(out, size_t{3} * nodes_, 0.0);
   for (const uint32_t b : at_) {
     const uint32_t i = pattern_.ij[2 * size_t{b}], j = pattern_.ij[2 * size_t{b} + 1];
@@ -62,6 +62,11 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
     double *const to = out + 3 * size_t{j};
     for (size_t c = 0; c < 3; ++c) to[c] += a[c] * z[0] + a[3 + c] * z[1] + a[6 + c] * z[2];
   }
+}
+
+// out = (A + J' G J) in
+void ContactNewton::multiply(const double *in, double *out, bool symmetric) const {
+  multiply_bodies(in, out);
   for (uint32_t k = single_; k < nodes_; ++k)
     for (size_t c = 0; c < 3; ++c)
       out[3 * size_t{k} + c] = matrix_[9 * size_t{own_[k]} + 4 * c] * in[3 * size_t{k} + c];
@@ -80,7 +85,8 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
 
 // way = -(A + J'GJ)^-1 g to this relative residual, with the last factor while it is good enough.
 bool ContactNewton::find_way(bool symmetric, double tolerance) {
-  if (!find_slopes(symmetric) || !set_matrix()) return false;
+  if (!find_slopes(symmetric) || !(current_ || set_matrix())) return false;
+  current_ = true;
   for (size_t k = 0; k < g_.size(); ++k) minus_[k] = inverse_[k] > 0 ? -g_[k] : 0;
   const auto by = [&](const double *in, double *out) { multiply(in, out, symmetric); };
   const auto precondition = [&](const double *in, double *out) {
@@ -99,16 +105,42 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
   return true;
 }
 
+// A step begins at v.
+void ContactNewton::begin_step() {
+  base_.assign(v_.begin(), v_.end());
+  base_r_.assign(r_.begin(), r_.end());
+}
+
+// Whether r has changed from base to v as A says, to the accuracy of a step's system. A new A would then give
+// no better step, and models take longer for it than the other parts of a step together.
+bool ContactNewton::is_linear() {
+  const size_t n = size_t{3} * single_;
+  for (size_t k = 0; k < n; ++k) {
+    const size_t at = kStride * (k / 3) + k % 3;
+    way_[k] = v_[at] - base_[at];
+  }
+  multiply_bodies(way_.data(), minus_.data());
+  double off = 0, all = 0;
+  for (size_t k = 0; k < n; ++k) {
+    const double e = r_[k] - base_r_[k] - minus_[k];
+    off += inverse_[k] * (e * e);
+    all += inverse_[k] * (minus_[k] * minus_[k]);
+  }
+  return off <= Set::of_start * Set::of_start * all;
+}
+
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, double left, bool &failed) {
   const double before = size();
   failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::of_start));
   if (failed) return false;
-  base_.assign(v_.begin(), v_.end());
+  begin_step();
   ++steps_;
   for (const double share : {1.0, 0.5}) {
     move(share);
-    if (evaluate(false) && size() <= (1 - Set::accuracy * share) * before) return true;
+    if (!evaluate(false) || !(size() <= (1 - Set::accuracy * share) * before)) continue;
+    current_ = is_linear();
+    return true;
   }
   v_.swap(base_);
   failed = !evaluate(false);
@@ -129,7 +161,7 @@ bool ContactNewton::frozen_steps() {
     };
     if (!find_way(true, Set::of_start)) return false;
     const double first = slope();
-    base_.assign(v_.begin(), v_.end());
+    begin_step();
     ++steps_;
     if (!(first < 0)) return evaluate(false);
     // the share of the way at which the slope has nearly gone, between one where it is negative and one where
@@ -152,6 +184,7 @@ bool ContactNewton::frozen_steps() {
       const double ratio = std::isfinite(at_high) ? at_low / (at_low - at_high) : 0.5;
       share = low + std::clamp(trial % 3 == 2 ? 0.5 : ratio, 0.05, 0.95) * (high - low);
     }
+    current_ = known_ && is_linear();
     // no such place: there is a jump in a law, at which steps would stay
     if (!found || !(size() > Set::accuracy * start)) break;
   }
@@ -197,10 +230,30 @@ void ContactNewton::scale_penalties(double by) {
   stiff_ *= by;
   for (double &rho : rho_) rho *= by;
   for (double &response : response_) response /= by;
+  ways_.start(l_.size());
+}
+
+// The next multipliers: the impulses of this pass, or where the last passes seem to lead.
+void ContactNewton::next_multipliers(bool extrapolated) {
+  if (!extrapolated) {
+    lh_.assign(l_.begin(), l_.end());
+    return;
+  }
+  weight_.resize(l_.size());
+  change_.resize(l_.size());
+  for (size_t k = 0; k < l_.size(); ++k) {
+    const double rho = rho_[2 * (k / 3) + (k % 3 > 0)];
+    weight_[k] = rho > 0 ? 1 / rho : 0;
+    change_[k] = l_[k] - lh_[k];
+  }
+  ways_.next(lh_.data(), change_.data(), weight_.data(), change_.data());
+  for (size_t k = 0; k < l_.size(); ++k) lh_[k] += change_[k];
+  for (size_t k = 0; k < row_.size(); ++k)
+    if (row_[k].kind == Kind::contact) lh_[3 * k] = std::max(0.0, lh_[3 * k]);
 }
 
 bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
-  found_ = false;
+  found_ = known_ = current_ = false;
   limit_ = steps_ + steps;
   set_penalties(Set::penalty);
   goal_ = Set::accuracy * tolerance;
@@ -208,7 +261,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
-  bool spent = false;
+  bool spent = false, grown = false, refused = false;
   uint32_t slow = 0, stood = 0;
   Array<double> &before = kept_;
   for (passes_ = 0; passes_ < steps;) {
@@ -219,9 +272,12 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     bool round;
     if (!newton(goal, off, round)) return false;
     if (round && steps_ < limit_) {
+      // What slow passes ask for has been refused: rho would rise and fall without end.
+      refused = grown;
       scale_penalties(1 / Set::penalty);
       slow = 0;
       v_.assign(before.begin(), before.end());
+      current_ = false;
       continue;
     }
     put_rows();
@@ -239,7 +295,6 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     }
     host_->spend(uint64_t{products_ - std::exchange(reported_, products_)} * part_.all());
     if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
-    lh_.assign(l_.begin(), l_.end());
     double moved = 0;
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
@@ -254,8 +309,11 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
+    if (slow == 0) ways_.start(l_.size());
+    next_multipliers(refused);
     if (slow < Set::rounds) continue;
     slow = 0;
+    grown = true;
     scale_penalties(Set::penalty);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {
@@ -293,6 +351,7 @@ bool ContactNewton::penalties_alone(double tolerance, uint32_t steps) {
   std::fill(lh_.begin(), lh_.end(), 0.0);
   for (size_t k = 0; k < size_t{3} * single_; ++k)
     if (inverse_[k] > 0) v_[kStride * (k / 3) + k % 3] = 0;
+  current_ = false;
   limit_ = steps_ + steps;
   double left;
   for (bool round = true; round && steps_ < limit_;) {

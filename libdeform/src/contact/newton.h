@@ -24,6 +24,7 @@
 #include "contact/contact_state.h"
 #include "contact/rows.h"
 #include "contact/solver.h"
+#include "math/anderson.h"
 #include "math/gmres.h"
 #include "math/ldlt_solver.h"
 
@@ -103,10 +104,14 @@ class ContactNewton {
   Array<double> inverse_;                   // [nodes,3] of A's diagonal; zero where held
   Array<double> u_, l_, lh_;                // [row_,3]
   Array<double> best_v_, best_g_, best_l_;  // of the pass that leaves least
+  Array<double> weight_, change_;           // [row_,3] of multipliers
+  Anderson ways_;                           // of multipliers, from the last change of rho
   Array<double> rho_;                       // [row_,2]
   Array<double> response_;                  // [rows] 1/rho_t, by row
   Array<double> slope_;                     // [row_,9] G, row-major
-  Array<double> frozen_;  // [row_] limit of friction, N s, or the normal impulse of a smooth law
+  Array<double> frozen_;             // [row_] limit of friction, N s, or the normal impulse of a smooth law
+  Array<double> r_, base_r_, of_v_;  // r of bodies, and at base_; the velocities that r_ is of
+  bool known_ = false;               // r_ is of some
   // matrix
   BlockPattern pattern_;
   Array<uint32_t> pairs_, begin_, by_lower_, number_, higher_;  // of shape()
@@ -120,6 +125,7 @@ class ContactNewton {
   Array<double> blocks_, matrix_;   // [nb,9] A + J' sym(G) J; A
   LdltSolver factor_;
   bool factored_ = false, shaped_ = false;
+  bool current_ = false;  // A is that at v, to the accuracy of a step's system
   Gmres gmres_;
 
   bool found_ = false;
@@ -139,6 +145,7 @@ class ContactNewton {
   Vec3 entry_times(uint32_t e, const double *x) const;
   Vec3 times(uint32_t k, const double *x, size_t stride) const;  // J_k x
   void add_transposed(uint32_t k, Vec3 z, double *to) const;
+  bool find_residual();
   bool evaluate(bool frozen);
   void evaluate_bond(uint32_t k);
   bool find_slopes(bool frozen);
@@ -147,12 +154,16 @@ class ContactNewton {
   bool refactor();
   static void symmetric_part(const double *G, double *out);
   bool find_way(bool symmetric, double tolerance);
+  void begin_step();
+  bool is_linear();
+  void multiply_bodies(const double *in, double *out) const;
   void multiply(const double *in, double *out, bool symmetric) const;
   void move(double share);
   double error() const;  // m/s, largest of inverse g
   double size() const;   // of g, in the metric of the inverse diagonal
   bool newton(double tolerance, double &left, bool &round);
   void scale_penalties(double by);
+  void next_multipliers(bool extrapolated);
   bool coupled_step(double tolerance, double left, bool &failed);
   bool frozen_steps();
   bool gains(double normal) const;

@@ -9,11 +9,11 @@
 
 namespace dfm {
 
-ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
+ContactNewton::ContactNewton(const Memory &m) : ways_(m), factor_(m), gmres_(m) {
   use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, seen_, bias_, heavy_, v_,
              base_, g_, kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_,
              response_, slope_, frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_,
-             matrix_, places_, analysed_);
+             matrix_, places_, analysed_, r_, base_r_, of_v_, weight_, change_);
   use_memory(m, motions_.g, motions_.s, motions_.columns, motions_.left, motions_.first_column,
              motions_.column_count, motions_.first_value);
 }
@@ -32,6 +32,7 @@ void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<Imp
   set_bias();
   for (Array<double> *a : {&g_, &kept_, &way_, &minus_}) a->resize(size_t{3} * nodes_);
   base_.resize(v_.size());
+  r_.resize(size_t{3} * single_);
   const size_t n = row_.size();
   u_.resize(3 * n);
   l_.resize(3 * n);
@@ -261,12 +262,23 @@ void ContactNewton::evaluate_bond(uint32_t k) {
   store3(&l_[3 * size_t{k}], l);
 }
 
+// r of the bodies at v: multipliers and limits change without v, and the forces of models are dear.
+bool ContactNewton::find_residual() {
+  const auto end = v_.begin() + std::ptrdiff_t(kStride * size_t{single_});
+  if (known_ && std::equal(v_.begin(), end, of_v_.begin())) return true;
+  known_ = false;
+  for (const Body &b : bodies_)
+    if (!b.system->residual(&v_[size_t{kStride} * b.first], &r_[size_t{3} * b.first])) return false;
+  of_v_.assign(v_.begin(), end);
+  return known_ = true;
+}
+
 // g, u, l at v. frozen: with the limits of friction of freeze(). False: a model or a law cannot tell.
 bool ContactNewton::evaluate(bool frozen) {
   ContactState &s = *state_;
   const size_t stride = s.stride;
-  for (const Body &b : bodies_)
-    if (!b.system->residual(&v_[size_t{kStride} * b.first], &g_[size_t{3} * b.first])) return false;
+  if (!find_residual()) return false;
+  std::copy(r_.begin(), r_.end(), g_.begin());
   for (uint32_t k = single_; k < points_; ++k)
     for (size_t c = 0; c < 3; ++c)
       g_[3 * size_t{k} + c] =

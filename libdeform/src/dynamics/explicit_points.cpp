@@ -144,7 +144,9 @@ double ExplicitPoints::find_lag(Trial &rest, double edge) {
     if (stiffness_[i] > 0) ratio = std::max(ratio, (damping_[i] - drag(i)) / stiffness_[i]);
   if (!(ratio > 0)) return 0;
   // they see 1 / (1 + 2 (s lag)^2 / (1 + 2 s lag)) of a velocity that varies by e^st
-  const double rate = frequency * std::max(1.0, ratio * frequency);
+  // and of the roots s of s^2 + ratio w^2 s + w^2 the larger is w in size until they are real
+  const double damped = std::max(1.0, 0.5 * ratio * frequency);
+  const double rate = frequency * (damped + std::sqrt(damped * damped - 1));
   return std::min(ratio / kStiffening, std::sqrt(0.5 * kError) / rate);
 }
 

@@ -115,9 +115,7 @@ void edge_edge(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const double depth = edge_recovery_depth(sa, sb);
   EdgeFaces fa;
   bool known = false, convex = false, bears = false;  // fa belongs to last_a; so do convex and bears
-  // with what either may count as longer
-  const double farthest = std::max(contact_reach(pair.h, pair.offset, pair.known.speed), depth) +
-                          2 * 2 * pair.h * pair.known.speed;
+  const double farthest = std::max(contact_reach(pair.h, pair.offset, pair.known.speed), depth);
   for (size_t i = 0; i < run.size(); ++i) {
     if (pair.known.beyond(i, farthest)) continue;
     const Candidate &candidate = run[i];

@@ -46,7 +46,9 @@ class LinearSystem final : public ImplicitSystem {
     }
     return true;
   }
+  uint32_t assembled = 0;  // times
   bool matrix(const uint32_t *at, double *blk) override {
+    ++assembled;
     for (size_t b = 0; b < pairs_.size() / 2; ++b)
       for (size_t k = 0; k < 9; ++k)
         blk[9 * size_t{at[b]} + k] += a_(3 * pairs_[2 * b] + k / 3, 3 * pairs_[2 * b + 1] + k % 3);
