@@ -267,10 +267,23 @@ double first_below(const double b[4], double lo, double hi, double limit, int ha
 
 // Along a line, what is joined trilinearly is a cubic from one cell's border to the next; four places inside
 // give it, borders themselves may belong to either side. Outside the grid, distances have a bound and so do
-// their changes: 1 by the way to the grid, sqrt(3) by the place in it.
+// their changes: 1 by the way to the grid, sqrt(3) by the place in it. What lies further beyond the grid than
+// the limit exceeds that bound is passed over at once, since every cell of a long way would take a look.
 double VoxelGrid::touch(Vec3 from, Vec3 way, double limit) const {
   constexpr int kHalvings = 40;
-  for (double t = 0; t < 1;) {
+  const double beyond = std::ceil(std::max(0.0, (limit - margin_) * per_cell_)) + 1;
+  double enters = 0, leaves = 1;
+  for (int k = 0; k < 3; ++k) {
+    const double low = origin_[k] - beyond * cell_ - from[k];
+    const double high = origin_[k] + (double(bricks_[k]) * kBrick + beyond) * cell_ - from[k];
+    if (way[k] == 0) {
+      if (low > 0 || high < 0) return HUGE_VAL;
+      continue;
+    }
+    enters = std::max(enters, (way[k] > 0 ? low : high) / way[k]);
+    leaves = std::min(leaves, (way[k] > 0 ? high : low) / way[k]);
+  }
+  for (double t = enters; t < leaves;) {
     double next = 1;
     for (int k = 0; k < 3; ++k) {
       if (way[k] == 0) continue;

@@ -35,3 +35,14 @@ TEST(VoxelTouch, RandomWays_FirstPlaceNotAboveTheLimit) {
   }
   EXPECT_GT(hits, 200);
 }
+
+// Every cell of the way would take a look: this would not end.
+TEST(VoxelTouch, FromAfar_LooksWhereTheGridIs) {
+  const test::Triangles box = test::box_surface({0.02, 0.03, 0.01}, 2);
+  const dfm::VoxelGrid grid(dfm::Memory::standard(), box.points.data(), uint32_t(box.tris.size() / 3),
+                            box.tris.data(), 4000);
+  constexpr double kFar = 1e9;
+  EXPECT_NEAR(kFar * grid.touch({-kFar, 0, 0}, {2 * kFar, 0, 0}, 1e-3), 0.5 * kFar, 0.1);
+  EXPECT_EQ(grid.touch({-kFar, 1, 0}, {2 * kFar, 0, 0}, 1e-3), HUGE_VAL);
+  EXPECT_EQ(grid.touch({0.1, 0, 0}, {kFar, kFar, 0}, 1e-3), HUGE_VAL);
+}
