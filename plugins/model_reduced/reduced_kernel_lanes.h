@@ -89,7 +89,7 @@ DEFORM_INLINE void some_rows(const double *row, size_t width, const double *y, d
   }
 }
 
-// nrow is a multiple of three: a surfel has as many.
+// nrow is a multiple of three: a surfel or a point has as many.
 void rows(const double *rows, size_t nrow, size_t width, const double *y, double *out) {
   size_t j = 0;
   for (; j + kRowsAtOnce <= nrow; j += kRowsAtOnce)

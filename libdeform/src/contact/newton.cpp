@@ -132,6 +132,7 @@ bool ContactNewton::is_linear() {
 // A step with the coupled derivative. False: it does not lower g enough; v is where it was.
 bool ContactNewton::coupled_step(double tolerance, double left, bool &failed) {
   const double before = size();
+  const bool kept = current_;
   failed = !find_way(false, std::min(Set::accuracy * tolerance / left, Set::of_start));
   if (failed) return false;
   begin_step();
@@ -143,6 +144,7 @@ bool ContactNewton::coupled_step(double tolerance, double left, bool &failed) {
     return true;
   }
   v_.swap(base_);
+  current_ = !kept;
   failed = !evaluate(false);
   return false;
 }
@@ -159,11 +161,15 @@ bool ContactNewton::frozen_steps() {
       for (size_t k = 0; k < g_.size(); ++k) sum += g_[k] * way_[k];
       return sum;
     };
+    const bool kept = current_;
     if (!find_way(true, Set::of_start)) return false;
     const double first = slope();
     begin_step();
     ++steps_;
-    if (!(first < 0)) return evaluate(false);
+    if (!(first < 0)) {
+      current_ = !kept;
+      return evaluate(false);
+    }
     // the share of the way at which the slope has nearly gone, between one where it is negative and one where
     // it is not, or where the function is not known
     double low = 0, high = 0, at_low = first, at_high = 0, share = 1;
@@ -202,10 +208,7 @@ bool ContactNewton::newton(double tolerance, double &left, bool &round) {
   while ((left = error()) > tolerance && steps_ < limit_) {
     bool failed = false;
     if (coupled_step(tolerance, left, failed)) continue;
-    if (!failed && phases++ == Set::rounds) {
-      left = error();
-      return round = true;
-    }
+    if (!failed && phases++ == Set::rounds) return round = true;
     if (failed || !frozen_steps()) return false;
   }
   return true;
@@ -272,7 +275,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     bool round;
     if (!newton(goal, off, round)) return false;
     if (round && steps_ < limit_) {
-      // What slow passes ask for has been refused: rho would rise and fall without end.
+      // What slow passes ask for has been refused: rho would rise and fall without end, so it stays.
       refused = grown;
       scale_penalties(1 / Set::penalty);
       slow = 0;
@@ -311,7 +314,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     left = now;
     if (slow == 0) ways_.start(l_.size());
     next_multipliers(refused);
-    if (slow < Set::rounds) continue;
+    if (slow < Set::rounds || refused) continue;
     slow = 0;
     grown = true;
     scale_penalties(Set::penalty);

@@ -7,8 +7,8 @@
 // moves by itself, a point of an implicit body, or three motions of a body that is known by its response.
 //
 //   outer pass    with multipliers lh and penalties rho (kg): v with g = 0, l_i(v) = P_i(lh_i - rho_i u_i),
-//                 then lh <- l(v). The normal part of P is the positive part, the friction part the law at
-//                 the normal impulse of this pass and the slip u + (l - lh)/rho.
+//                 then lh <- l(v), or extrapolated. The normal part of P is the positive part, the friction
+//                 part the law at the normal impulse of this pass and the slip u + (l - lh)/rho.
 //   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J. It is
 //                 taken where it makes g smaller. Where it does not, limits of friction are frozen: g is then
 //                 the gradient of a convex function (but for arcs), and steps with a line search lower that.

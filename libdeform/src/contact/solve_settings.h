@@ -28,7 +28,8 @@ struct SolveSettings {
   // Tolerances. gap: of normals, as a share of half of d_c over h. at_rest: of tangents, m/s. of_slip: of
   // tangents, as a share of the slip; of bonds, of what the start leaves. of_start: of normals and tangents,
   // as a share of what the start leaves; also the relative residual of the system of a Newton step, at most,
-  // and the share of a pass's goal over rho w to which slips of laws are known.
+  // the relative error of r by A up to which A is kept, and the share of a pass's goal over rho w to which
+  // slips of laws are known.
   static constexpr double gap = 0.01;
   static constexpr double at_rest = 1e-6;
   static constexpr double of_slip = 1e-3;

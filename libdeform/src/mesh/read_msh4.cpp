@@ -19,7 +19,7 @@ int64_t MshReader::size(const char *what) {
 }
 
 void MshReader::read_entities_4(bool partitioned) {
-  in_.begin_data("$Entities");
+  in_.begin_data(partitioned ? "$PartitionedEntities" : "$Entities");
   const auto pass = [&](size_t numbers_each, const char *some, const char *one) {
     const uint64_t m = in_.count(size(some), numbers_each * (in_.binary ? 4 : 2), some);
     for (uint64_t k = 0; k < numbers_each * m; ++k) number(one);

@@ -9,8 +9,8 @@
 
 namespace dfm {
 
-// Data on the listed pairs that save work and do not change results. Valid as long as d_c and the bodies are
-// the same; pairs that two lists share are carried over.
+// Data on the listed pairs that save work and do not change results. Valid while d_c is the same and surfaces
+// move in sub-steps alone that keep() counts; pairs that two lists share are carried over.
 struct ListMemory {
   static constexpr double kRounding = 1 + 1e-6;  // bounds hold despite rounding
 

@@ -439,6 +439,7 @@ void take_safe_part(World &w, StepContext &step, bool lets_slits, double safe) {
     if (step.guard.motion == 0) break;
     safe = find_hits(w, step);
   }
+  step.guard.forget();  // surfaces that are set back may have moved by more than counts
 }
 
 }  // namespace
@@ -464,9 +465,14 @@ void guard_follow_lists(World &w, StepContext &step, bool fresh) {
   if (!fresh && !g.memory.runs.empty() && g.lists == renewals) return;
   g.lists = renewals;
   const Array<Candidate> &pairs = step.broad.candidates();
-  g.list =
-      join_self(step, w.plan.has(StageRole::lists_pairs) ? &pairs : nullptr, g.joined) ? &g.joined : &pairs;
-  g.memory.follow(*g.list, &w.context->tasks);
+  try {
+    g.list =
+        join_self(step, w.plan.has(StageRole::lists_pairs) ? &pairs : nullptr, g.joined) ? &g.joined : &pairs;
+    g.memory.follow(*g.list, &w.context->tasks);
+  } catch (...) {
+    g.forget();  // out of memory: what is known is of no list
+    throw;
+  }
 }
 
 void check_motion(const World &w, StepContext &step, uint32_t i) {

@@ -90,10 +90,10 @@ constexpr uint32_t kBoundEvery = 16;
 constexpr double kMinStrain = kBoundStrain / 8;
 constexpr uint32_t kMaxEstimated = 4;  // sub-steps at an estimated bound
 
-// A rigid turn stretches no edge.
 void check_shape(Body &b) {
   // points that are updated late are unknown until they are requested
   b.bound.inverted = b.dynamics->abilities().late ? 0 : inverted_cells(b);
+  // a rigid turn stretches no edge
   const bool follows = !b.sleep_state.asleep && b.dynamics->unknowns().diagonal && b.model.ops->bound;
   b.bound.strain_rate = follows ? points_kernels().strain_rate(uint32_t(b.edges.size() / 2), b.edges.data(),
                                                                b.p.x.data(), b.p.v.data())
