@@ -19,6 +19,7 @@ struct RawMesh : RestMesh {
 
   // Index of the group, made where it is new. tag 0 is "no group".
   uint32_t group(const Cursor &at, int32_t dimension, int32_t tag);
+  bool has_group(int32_t dimension, int32_t tag) const { return group_index_.contains({dimension, tag}); }
   // The same where a file knows groups by name alone; they are numbered as they come. No name is "no group".
   uint32_t named_group(const Cursor &at, int32_t dimension, std::string_view name);
 

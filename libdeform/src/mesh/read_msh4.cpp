@@ -4,6 +4,7 @@
 // their entity, and a node's number stands before its place. Of a mesh that gmsh divided, elements are in
 // $PartitionedEntities.
 #include <algorithm>
+#include <cstdlib>
 
 #include "mesh/msh.h"
 
@@ -45,8 +46,9 @@ void MshReader::read_entities_4(bool partitioned) {
       const uint64_t physical =
           in_.count(size("an entity's number of physical groups"), in_.binary ? 4 : 2, "physical groups");
       for (uint64_t k = 0; k < physical; ++k) {
-        // a minus turns the entity round
-        const int64_t named = std::abs(int64_t{number("a physical group's number")});
+        int64_t named = number("a physical group's number");
+        // a minus turns the entity round, but where a group has that number
+        if (!out_.has_group(d, int32_t(named))) named = std::abs(named);
         if (k == 0) group = out_.group(in_, d, in_.in_32_bits(named, "a physical group's number"));
       }
       if (group != kNoGroup) found.push_back({d, tag, group});
