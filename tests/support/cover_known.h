@@ -15,8 +15,6 @@ inline std::string known_failure(const Row &row) {
       {"corotational_fem,thesis,soft:modal,gms,symplectic_euler", kFeet},
       {"modal,thesis,soft:shape_matching,karnopp,symplectic_euler", kFeet},
       {"meshless,thesis,soft:corotational_fem,dahl,symplectic_euler", kFeet},
-      {"corotational_fem,thesis,soft:corotational_fem,none,implicit_euler",
-       "its feet plough the slab's mesh"},
       {"linear_fem,thesis,self,karnopp,symplectic_euler", "what thesis shrinks does not meet"},
       {"corotational_fem,mls,soft:msm,gms,symplectic_euler", "gms soft on soft (doc/laws/gms.md, limits)"},
       {"shape_matching,mls,self,coulomb,symplectic_euler", kProngs},
