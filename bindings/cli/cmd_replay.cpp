@@ -1,5 +1,6 @@
 // deform replay DIR: the run that `deform run --record` recorded, simulated again or shown again.
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "arguments.h"
@@ -8,6 +9,7 @@
 #include "recording.h"
 #include "run.h"
 #include "state_file.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -73,6 +75,11 @@ int replay(ReplayOptions options, const Globals &globals) {
   const Recording recording = read_recording(options.folder);
   only_outputs(options.set);
   if (options.out.empty()) options.out = options.folder + "/replay";
+  std::error_code absent;
+  if (std::filesystem::equivalent(path_of(options.out), path_of(options.folder), absent))
+    throw Failure(kBadInput, "--out " + options.out +
+                                 ": the folder of the recording, whose states would be deleted; give "
+                                 "another one");
   std::vector<std::string> set = recording.set;
   set.insert(set.end(), options.set.begin(), options.set.end());
   return (options.shown_only ? show : simulate)(recording, options, globals, set);

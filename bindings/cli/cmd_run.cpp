@@ -96,7 +96,11 @@ void check_saves(const SceneFile &scene, const RunOptions &options) {
   }
 }
 
-void go_on_from(const SceneFile &scene, const std::string &path) {
+void restore(const SceneFile &scene, const std::string &snapshot) {
+  need(dfm_world_restore(scene.world(), snapshot.data(), snapshot.size()));
+}
+
+void check_from(const SceneFile &scene, const std::string &path) {
   refuse_static(scene, "--from");
   const double start = dfm_world_time(scene.world()), duration = scene.settings().duration;
   read_state(scene, path);
@@ -107,9 +111,9 @@ void go_on_from(const SceneFile &scene, const std::string &path) {
                                  "; give a longer --time, counted from the scene's start");
 }
 
-// All that may be refused, before the results of an earlier run are deleted: the state to continue from may
-// be one of them.
-void prepare(const SceneFile &scene, const RunOptions &options) {
+// What may be refused, before the results of an earlier run are deleted. The state to continue from may be
+// one of them: returned as a snapshot, empty without one; the world stays at its start.
+std::string prepare(const SceneFile &scene, const RunOptions &options) {
   check_saves(scene, options);
   if (!options.stream.empty()) {
     refuse_static(scene, "--stream");
@@ -119,14 +123,19 @@ void prepare(const SceneFile &scene, const RunOptions &options) {
     make_folder(options.problems);
     need(dfm_debug_contact_problems(scene.world(), options.problems.c_str(), options.every));
   }
-  if (!options.from.empty()) go_on_from(scene, options.from);
+  if (options.from.empty()) return "";
+  const std::string start = snapshot_of(scene);
+  check_from(scene, options.from);
+  std::string from = snapshot_of(scene);
+  restore(scene, start);
+  return from;
 }
 
 class Runner {
  public:
-  // start: time of the scene's start, s; the world may be in a later state.
+  // from: snapshot to go on from, empty: the scene's start, where the world is now.
   Runner(const SceneFile &scene, const RunOptions &options, const Globals &globals, Comparison *comparison,
-         double start)
+         const std::string &from)
       : scene_(scene),
         options_(options),
         world_(scene.world()),
@@ -143,14 +152,16 @@ class Runner {
         tools_(scene, options.out),
         record_(scene.settings().every),
         frame_(frame_interval()),
-        comparison_(comparison) {
-    result_.start = start;
+        comparison_(comparison),
+        from_(from) {
+    result_.start = dfm_world_time(world_);
     if (options.record) recorder_.emplace(scene, options);
     if (options.plot) plots_ = RunPlots::create(scene);
     if (frame_interval() > 0) frames_ = Frames::create(scene, options.out + "/frames");
   }
 
   void run() {
+    if (!from_.empty()) restore(scene_, from_);
     result_.begun = result_.simulated = dfm_world_time(world_);
     if (!options_.stream.empty()) stream_.emplace(world_, options_.stream);
     count_overlaps();
@@ -488,6 +499,7 @@ class Runner {
   std::unique_ptr<RunPlots> plots_;
   std::optional<RtpSender> stream_;
   Comparison *comparison_;
+  const std::string &from_;
   size_t saved_ = 0;                         // of options_.saves, which are in order of time
   static constexpr double kSlowStep = 0.02;  // s; after a longer step the progress is shown at once
   double last_step_ = 0;                     // s, wall time
@@ -509,14 +521,13 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
   if (const std::string short_of = planned_sentence(planned); !short_of.empty()) warn(short_of);
   if (!globals.quiet && !globals.json) print_choice(planned);
   check_first_step(scene);
-  const double start = dfm_world_time(scene.world());
-  prepare(scene, options);
+  const std::string from = prepare(scene, options);
   RunResult result;
   Checks checks;
   results_lie_in(options.out);
   catch_signals();
   {
-    Runner runner(scene, options, globals, comparison, start);
+    Runner runner(scene, options, globals, comparison, from);
     runner.run();
     for (const std::string &remark : runner.remarks()) keep_warning(remark);
     for (const std::string &fault : runner.faults()) warn(fault);

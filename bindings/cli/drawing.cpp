@@ -29,7 +29,11 @@ double softest_of(const SceneFile &scene) {
 
 Drawing::Drawing(const SceneFile &scene, const std::string &color)
     : scene_(scene), upright_(scene), softest_(softest_of(scene)) {
-  for (const BodyView &body : scene.bodies()) make(body, buffers_.emplace_back());
+  scene.renew_list();  // the world may be in a later state already
+  for (size_t i = 0; i < scene.bodies().size(); ++i) {
+    scene.renew(i);
+    make(scene.bodies()[i], buffers_.emplace_back());
+  }
   for (const Buffers &b : buffers_)
     for (const double x : b.xyz) reach_ = std::max(reach_, std::fabs(x));
   placed_.resize(scene.obstacles().size());

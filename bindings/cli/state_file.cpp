@@ -171,12 +171,17 @@ void write_as_scene(const SceneFile &scene, const std::string &path) {
   need(dfm_scene_write(scene.scene(), path.c_str(), &def, nullptr));
 }
 
-void write_state(const SceneFile &scene, const std::string &path) {
+std::string snapshot_of(const SceneFile &scene) {
   size_t bytes = 0;
   need(dfm_world_snapshot(scene.world(), nullptr, &bytes));
   std::string snapshot(bytes, '\0');
   need(dfm_world_snapshot(scene.world(), snapshot.data(), &bytes));
-  write_whole(path, head_of(scene, bytes) + snapshot);
+  return snapshot;
+}
+
+void write_state(const SceneFile &scene, const std::string &path) {
+  const std::string snapshot = snapshot_of(scene);
+  write_whole(path, head_of(scene, snapshot.size()) + snapshot);
 }
 
 void read_state(const SceneFile &scene, const std::string &path) {

@@ -14,6 +14,7 @@ uint64_t scene_hash(const SceneFile &scene);
 
 // Throw Failure: the file cannot be written; equilibria have no state to go on from.
 void refuse_static(const SceneFile &scene, const std::string &option);
+std::string snapshot_of(const SceneFile &scene);  // the bytes of dfm_world_snapshot
 void write_state(const SceneFile &scene, const std::string &path);
 
 // The world as it is now as a scene at path, with the scene's probes and outputs, and its state beside it for

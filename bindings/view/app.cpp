@@ -63,8 +63,9 @@ std::optional<cli::Recording> recording_of(const Options &options) {
 
 // The first name of which there is no file yet: what was kept before stays.
 std::string free_name(const std::function<std::string(uint32_t)> &name) {
+  std::error_code absent;
   for (uint32_t n = 0;; ++n)
-    if (std::string path = name(n); !std::filesystem::exists(cli::path_of(path))) return path;
+    if (std::string path = name(n); !std::filesystem::exists(cli::path_of(path), absent)) return path;
 }
 
 std::string text_of(const render::Vec &v) {

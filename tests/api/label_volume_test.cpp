@@ -296,6 +296,12 @@ TEST(LabelVolume, JoinedVoxels_KeepWhereALabelBeginsAndEnds) {
         EXPECT_DOUBLE_EQ(out.origin[0] + (first - 0.5) * factor, air - 0.5);
         EXPECT_LE(std::fabs(double(n * factor) - layers), 0.5 * factor);
       }
+  Volume thin;  // less than half a block, at the end of the file
+  thin.size = {4, 1, 1};
+  thin.value = {0, 1};
+  for (int k = 0; k < 3; ++k) thin.axis[k][k] = 1;
+  thin.voxel = {0, 0, 0, 1};
+  EXPECT_EQ(labels::coarsened(thin, {4, 1, 1}).voxel, (std::vector<uint16_t>{0, 1}));
 }
 
 // Smoothing must do what it is for: normals of a ball's surface, which are axes on voxels, point outward.

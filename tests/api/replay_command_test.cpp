@@ -118,6 +118,9 @@ TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
        "written with 'org.deform.lugre' 9.8.7, and ");
   says(test::deform({"replay", f.path}), "no recording in this folder");
   says(test::deform({"replay", out, "--set", "/time/step=1e-3"}), "only values under /output");
+  says(test::deform({"replay", out, "--out", out + "/."}), "the folder of the recording");
+  says(test::deform({"replay", out, "--states", "--out", out}), "the folder of the recording");
+  EXPECT_TRUE(fs::exists(out + "/recording/000001.state"));
   EXPECT_EQ(test::read_file(state), kept);
   says(test::deform({"run", f.scene, "--set", "/time/mode=\"static\"", "--set", "/bodies/0/switch=[]",
                      "--out", other, "--save", "0.05", f.path + "/x.state"}),

@@ -165,6 +165,11 @@ class Pictures(unittest.TestCase):
             np.testing.assert_allclose(deform.picture.upright_of(world).at(0), [-0.6, 0, 0.8])
             other.restore(kept)
             np.testing.assert_array_equal(deform.picture.upright_of(other).at(0), [0, 0, 1])
+        with deform.World(gravity=(0, 9, 0)) as world:  # no scene may have the name: the last one known
+            world.add_body(deform.TetMesh.ball(0.1, 300), name="arm/left")
+            world.restore(world.snapshot())
+            np.testing.assert_array_equal(deform.picture.upright_of(world).at(0), [0, -1, 0])
+            self.assertIsInstance(world.picture(size=(8, 8)), deform.Picture)
 
     def test_frames_of_a_run(self):
         run = dropped()
@@ -173,6 +178,8 @@ class Pictures(unittest.TestCase):
         with tempfile.TemporaryDirectory(suffix=" with space") as folder:
             path = last.save(pathlib.Path(folder) / "last.png")
             np.testing.assert_array_equal(decoded(path.read_bytes()), last.rgb)
+            with self.assertRaisesRegex(deform.FileError, "last.png/x.png: cannot be written"):
+                last.save(path / "x.png")
 
 
 class View(unittest.TestCase):

@@ -5,6 +5,7 @@ shorter than a switch of threads, and no step can begin beneath it.
 """
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import os
 import pathlib
@@ -192,7 +193,8 @@ def write_whole(path: pathlib.Path, data: bytes) -> None:
     except OSError as error:
         raise FileError(f"{path}: cannot be written: {error.strerror}", "DFM_E_IO") from None
     finally:
-        part.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            part.unlink()
 
 
 def read_text(function: Any, *arguments: Any) -> str:

@@ -1,6 +1,7 @@
 """Pictures of a world without a display, by the renderer of the command."""
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import json
 import math
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Iterable, Sequence
 
 import numpy as np
 
-from ._library import PATH, ArgumentError, UnsupportedError, write_whole
+from ._library import PATH, ArgumentError, Error, UnsupportedError, write_whole
 from .body import vector
 
 if TYPE_CHECKING:
@@ -132,16 +133,19 @@ class Shown:
 
     def __init__(self) -> None:
         self.softest = math.inf
-        self.upright: Upright | None = None  # only the world knows; upright_of() asks it
+        self.upright = Upright([], [])
+        self.asked = True  # False: only the world knows its gravity; upright_of() asks it
 
 
 def upright_of(world: World) -> Upright:
     """Of a world, which may have the gravity of a snapshot."""
-    if world.shown.upright is None:
-        with tempfile.TemporaryDirectory() as folder:
+    if not world.shown.asked:
+        world.shown.asked = True
+        # a name that no scene may have, no room: the last one known stays
+        with contextlib.suppress(Error, OSError), tempfile.TemporaryDirectory() as folder:
             path = pathlib.Path(folder) / "world.json"
             world.write_scene(path, partial=True)
-            world.shown.upright = Upright.of_scene(json.loads(path.read_text())["gravity"])
+            world.shown.upright = Upright.of_scene(json.loads(path.read_bytes())["gravity"])
     return world.shown.upright
 
 

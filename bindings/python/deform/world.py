@@ -622,7 +622,10 @@ class World(Queries, Reports, Tools, OfThisProcess):
         keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
         self.free()
         check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
-        self.shown.upright = Upright(times, gravity) if np.size(times) else None
+        if np.size(times):
+            self.shown.upright = Upright(times, gravity)
+        else:
+            self.shown.asked = False
 
     def set_sleep(self, sleep: bool = True) -> None:
         """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
@@ -741,7 +744,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
                                 f"{type(snapshot).__name__}", "DFM_E_ARG") from None
         self.free()
         check(quick.dfm_world_restore(self.handle, taken, len(taken)))
-        self.shown.upright = None
+        self.shown.asked = False
         for body in list(self._bodies.values()):
             body._renew_name()  # a name that the library has made may be another one
 

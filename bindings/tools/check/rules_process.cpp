@@ -228,9 +228,8 @@ void evaluate_with_nulls(const Law &law, Lanes &whole) {
     for (uint32_t i = 0; i < b.n; ++i)
       if (!b.same(i, whole, i))
         broken(
-            "with %s%s the outputs of lane %u differ from those where all are wanted; let no output depend "
-            "on "
-            "which others are requested",
+            "with %s%s the outputs of lane %u differ from those where all are wanted; let no output "
+            "depend on which others are requested",
             alone ? "nothing wanted but " : "no ", names[one], i);
   }
 }

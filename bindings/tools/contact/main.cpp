@@ -115,7 +115,8 @@ class Run {
     else
       std::printf("%-44s %4s %9s %3s %5s %5s %6s %4s %8s %8s %7s  %s\n", "problem", "nc", "rank", "run",
                   "pass", "step", "prod", "fact", "error", "m/s", "s", "Siconos");
-    for (const std::string &path : files_of(options_.paths)) one(path);
+    files_ = files_of(options_.paths);
+    for (const std::string &path : files_) one(path);
     if (options_.json) std::printf("\n], \"kinds\": [");
     uint32_t solved = 0, read = 0;
     for (const Sums &s : sums_) {
@@ -144,12 +145,17 @@ class Run {
   dfm_context *context_ = nullptr;
   Sums sums_[3] = {{"explicit"}, {"implicit"}, {"of others"}};
   uint32_t refused_ = 0, lines_ = 0;
+  std::vector<std::string> files_;
   std::map<std::string, std::string> written_;  // from which problem
 
   // Problems of several runs have the same names; a folder may be that of the problems.
   void write(const std::string &path, const std::string &to, const LocalProblem &form) {
-    std::error_code absent;
-    if (fs::equivalent(path, to, absent)) throw std::runtime_error("the export would replace it");
+    const auto is = [&](const std::string &file) {
+      std::error_code absent;
+      return fs::equivalent(file, to, absent);
+    };
+    if (std::ranges::any_of(files_, is))
+      throw std::runtime_error("the export would replace " + to + "; give another folder");
     const auto [other, first] = written_.try_emplace(to, path);
     if (!first)
       throw std::runtime_error("not exported: " + to + " is that of " + other->second +

@@ -380,17 +380,16 @@ class Calibration {
                   bent(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER, kFar),
                   turned(context_, kReference), lying(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER),
                   dented(context_, kReference, DFM_INTEGRATOR_IMPLICIT_EULER)};
-    std::vector<std::string> rows;
+    std::vector<std::string> rows, measured;
     for (const Model &m : models_) {
       const Patience patience(wanted_, "measuring " + m.id);
       try {
         rows.push_back(model_row(m));
+        measured.push_back(short_name(m.id));
       } catch (const Failure &why) {
-        left_out.push_back("the model " + m.id + " is left out of the costs: " + why.what());
+        left_out.push_back("the model " + m.id + " is not measured, earlier costs of it stay: " + why.what());
       }
     }
-    std::vector<std::string> measured;
-    for (const Model &m : models_) measured.push_back(short_name(m.id));
     for (std::string &row : kept_rows(out, machine, measured)) rows.push_back(std::move(row));
     return JsonObject()
         .add("format", quoted("deform-costs"))

@@ -287,7 +287,7 @@ class CaseReader {
       if (!(last >= 0)) refuse("/T", "is " + number(last) + " s, expected an end at 0 or later");
       if (!(dt > 0) || !(last / dt < 1e7))
         refuse("/dt", "is not a time between rows, expected T/dt below 1e7");
-      for (int i = 0; i <= int(last / dt + 1e-9); ++i) c.times.push_back(i * dt);
+      for (int i = 0; i <= int(last / dt * (1 + 1e-9)); ++i) c.times.push_back(i * dt);
     } else {
       refuse("/output_times",
              "is missing, expected the times of the rows in s, or T and dt" + instead(root_, "output_times"));

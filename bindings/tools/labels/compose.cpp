@@ -241,8 +241,9 @@ Volume coarsened(const Volume &v, const std::array<uint32_t, 3> &factor) {
     const int64_t f = factor[k];
     begin[k] = lo[k] > 0 ? lo[k] - f : 0;
     const int64_t layers = hi[k] - begin[k];
-    out.size[k] = uint32_t(hi[k] < v.size[k] ? (layers + f - 1) / f + 1
-                                             : std::max(int64_t{1}, (2 * layers + f) / (2 * f)));
+    out.size[k] = uint32_t(
+        hi[k] < v.size[k] ? (layers + f - 1) / f + 1
+                          : std::max(int64_t{begin[k] < int64_t{lo[k]} ? 2 : 1}, (2 * layers + f) / (2 * f)));
     for (size_t c = 0; c < 3; ++c) {
       out.axis[k][c] = v.axis[k][c] * double(f);
       out.origin[c] += v.axis[k][c] * (double(begin[k]) + double(f - 1) / 2);

@@ -192,35 +192,40 @@ class Reader {
 
   // m, by how much what a mesh holds ends elsewhere than what the scene selects: of a box the part in the
   // body, whose surface has the box of `lattice`; else what the own mesh holds.
-  double held_off(const Fix &fix, const BodyMesh &mesh, const BodyMesh &own, const BodyMesh &lattice) const {
+  double held_off(const Selection &where, const BodyMesh &mesh, const BodyMesh &own,
+                  const BodyMesh &lattice) const {
     const auto held = [&](const BodyMesh &by) {
       Extent out;
-      for (const uint32_t p : select(fix.where, by, def_.file)) out.add(load3(&by.points[3 * size_t{p}]));
+      for (const uint32_t p : select(where, by, def_.file)) out.add(load3(&by.points[3 * size_t{p}]));
       return out;
     };
     const Extent there = held(mesh);
     Extent here = held(own);
     double off = 0;
     for (int k = 0; k < 3; ++k) {
-      if (fix.where.group.empty() && fix.where.points.empty()) {
-        here.lo[k] = std::max(fix.where.lo[k], lattice.lo[k]);
-        here.hi[k] = std::min(fix.where.hi[k], lattice.hi[k]);
+      if (where.group.empty() && where.points.empty()) {
+        here.lo[k] = std::max(where.lo[k], lattice.lo[k]);
+        here.hi[k] = std::min(where.hi[k], lattice.hi[k]);
       }
       off = std::max({off, std::fabs(there.lo[k] - here.lo[k]), std::fabs(there.hi[k] - here.hi[k])});
     }
     return off;
   }
 
-  // Whether these cells are held where the scene says as exactly as the body's own are. Throws Error where
-  // they have nothing that a force, a spring or an attachment selects.
+  // Whether these cells are held and attached where the scene says as exactly as the body's own are. Throws
+  // Error where they have nothing that a force, a spring or an attachment selects.
   bool carries(const Body &b, const BodyMesh &mesh, const BodyMesh &own) const {
     for (const Force &f : b.forces) share(f, mesh, def_.file);
     for (const Spring &s : b.springs)
       if (!s.at_point) select_skin(s.where, mesh, def_.file);
     for (const Attach &a : b.attach) select_skin(a.where, mesh, def_.file);
-    return std::ranges::all_of(b.fixes, [&](const Fix &f) {
-      return held_off(f, mesh, own, mesh) <= held_off(f, own, own, mesh) + 1e-9 * own.size;
-    });
+    const auto stays = [&](const auto &entry) {
+      return held_off(entry.where, mesh, own, mesh) <=
+             held_off(entry.where, own, own, mesh) + 1e-9 * own.size;
+    };
+    // points of an attachment may be those of the surface, which `select` does not know
+    return std::ranges::all_of(b.fixes, stays) &&
+           std::ranges::all_of(b.attach, [&](const Attach &a) { return a.where.points.empty() && stays(a); });
   }
 
   // Nothing in the scene is about the body's own cells or points.
