@@ -233,26 +233,6 @@ void ContactNewton::scale_penalties(double by) {
   stiff_ *= by;
   for (double &rho : rho_) rho *= by;
   for (double &response : response_) response /= by;
-  ways_.start(l_.size());
-}
-
-// The next multipliers: the impulses of this pass, or where the last passes seem to lead.
-void ContactNewton::next_multipliers(bool extrapolated) {
-  if (!extrapolated) {
-    lh_.assign(l_.begin(), l_.end());
-    return;
-  }
-  weight_.resize(l_.size());
-  change_.resize(l_.size());
-  for (size_t k = 0; k < l_.size(); ++k) {
-    const double rho = rho_[2 * (k / 3) + (k % 3 > 0)];
-    weight_[k] = rho > 0 ? 1 / rho : 0;
-    change_[k] = l_[k] - lh_[k];
-  }
-  ways_.next(lh_.data(), change_.data(), weight_.data(), change_.data());
-  for (size_t k = 0; k < l_.size(); ++k) lh_[k] += change_[k];
-  for (size_t k = 0; k < row_.size(); ++k)
-    if (row_[k].kind == Kind::contact) lh_[3 * k] = std::max(0.0, lh_[3 * k]);
 }
 
 bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
@@ -264,7 +244,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
   if (!evaluate(false) || !host_->judge(residual_)) return false;
   double left = std::max(residual_.speed, error()), aim = left;  // m/s
   double best = std::numeric_limits<double>::infinity();
-  bool spent = false, grown = false, refused = false;
+  bool spent = false;
   uint32_t slow = 0, stood = 0;
   Array<double> &before = kept_;
   for (passes_ = 0; passes_ < steps;) {
@@ -275,8 +255,6 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     bool round;
     if (!newton(goal, off, round)) return false;
     if (round && steps_ < limit_) {
-      // What slow passes ask for has been refused: rho would rise and fall without end, so it stays.
-      refused = grown;
       scale_penalties(1 / Set::penalty);
       slow = 0;
       v_.assign(before.begin(), before.end());
@@ -298,6 +276,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     }
     host_->spend(uint64_t{products_ - std::exchange(reported_, products_)} * part_.all());
     if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
+    lh_.assign(l_.begin(), l_.end());
     double moved = 0;
     for (size_t k = 0; k < v_.size(); ++k) moved = std::max(moved, std::fabs(v_[k] - before[k]));
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
@@ -312,11 +291,8 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     aim = stalled ? off : now;
     slow = now > 0.5 * left ? slow + 1 : 0;
     left = now;
-    if (slow == 0) ways_.start(l_.size());
-    next_multipliers(refused);
-    if (slow < Set::rounds || refused) continue;
+    if (slow < Set::rounds) continue;
     slow = 0;
-    grown = true;
     scale_penalties(Set::penalty);
   }
   if (!found_ && std::max(residual_.speed, error()) > best) {

@@ -7,8 +7,8 @@
 // moves by itself, a point of an implicit body, or three motions of a body that is known by its response.
 //
 //   outer pass    with multipliers lh and penalties rho (kg): v with g = 0, l_i(v) = P_i(lh_i - rho_i u_i),
-//                 then lh <- l(v), or extrapolated. The normal part of P is the positive part, the friction
-//                 part the law at the normal impulse of this pass and the slip u + (l - lh)/rho.
+//                 then lh <- l(v). The normal part of P is the positive part, the friction part the law at
+//                 the normal impulse of this pass and the slip u + (l - lh)/rho.
 //   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J. It is
 //                 taken where it makes g smaller. Where it does not, limits of friction are frozen: g is then
 //                 the gradient of a convex function (but for arcs), and steps with a line search lower that.
@@ -24,7 +24,6 @@
 #include "contact/contact_state.h"
 #include "contact/rows.h"
 #include "contact/solver.h"
-#include "math/anderson.h"
 #include "math/gmres.h"
 #include "math/ldlt_solver.h"
 
@@ -104,8 +103,6 @@ class ContactNewton {
   Array<double> inverse_;                   // [nodes,3] of A's diagonal; zero where held
   Array<double> u_, l_, lh_;                // [row_,3]
   Array<double> best_v_, best_g_, best_l_;  // of the pass that leaves least
-  Array<double> weight_, change_;           // [row_,3] of multipliers
-  Anderson ways_;                           // of multipliers, from the last change of rho
   Array<double> rho_;                       // [row_,2]
   Array<double> response_;                  // [rows] 1/rho_t, by row
   Array<double> slope_;                     // [row_,9] G, row-major
@@ -163,7 +160,6 @@ class ContactNewton {
   double size() const;   // of g, in the metric of the inverse diagonal
   bool newton(double tolerance, double &left, bool &round);
   void scale_penalties(double by);
-  void next_multipliers(bool extrapolated);
   bool coupled_step(double tolerance, double left, bool &failed);
   bool frozen_steps();
   bool gains(double normal) const;
