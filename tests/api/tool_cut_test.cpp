@@ -500,18 +500,19 @@ TEST(ToolCut, InterruptedWhereABladePays_IsAsBeforeTheStep) {
     }
   };
   Tough plain(0, sides), s(0, sides);
-  plain.down(0.02, 0.2);
-  s.down(0.02, 0.2);
+  for (Tough *const t : {&plain, &s}) {
+    t->down(0.02, 0.2);
+    const dfm_pose p{{0.001, 0, 0.0196}, {0, 0, 0, 1}};
+    test::ok(dfm_tool_set_pose(t->t, &p, nullptr));
+  }
   Stop none{plain.w, -1};
   test::ok(dfm_world_set_pre_solve(plain.w, &Stop::pre_solve, &none));
-  plain.down(0.0198, 0.2);
+  test::ok(dfm_world_step(plain.w, 1e-3, nullptr));
   ASSERT_GT(test::stats(plain.w).last_substeps, 1u);
   Stop stop{s.w, none.met - 1};  // at the last contact of the step
   test::ok(dfm_world_set_pre_solve(s.w, &Stop::pre_solve, &stop));
-  const dfm_pose p{{0.001, 0, 0.0198}, {0, 0, 0, 1}};
-  test::ok(dfm_tool_set_pose(s.t, &p, nullptr));
   ASSERT_EQ(dfm_world_step(s.w, 1e-3, nullptr), DFM_DISCARD);
-  s.down(0.0198, 0.2);
+  test::ok(dfm_world_step(s.w, 1e-3, nullptr));
   EXPECT_EQ(dfm_world_hash(s.w), dfm_world_hash(plain.w));
 }
 
