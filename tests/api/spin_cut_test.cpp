@@ -129,35 +129,37 @@ TEST(SpinCut, CutsThemselves_KeepAngularMomentumToRounding) {
   }
 }
 
+// As above; of 160 runs (seeds 5 to 12) 146.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(SpinCut, ToolWithAnEdge_PartsACubeThatTurns) {
   int kept = 0;
-  for (const char *model : kModels) {
-    Random random(5);
-    for (int run = 0; run < 10; ++run) {
-      Spin s(model, 2e4, random.direction(3 + random(1.5)), run % 2 ? 320 : 60);
-      const double x = random(0.01), speed = 1 + random(0.5);
-      dfm_tool_def d = dfm_tool_def_default();
-      d.name = "knife";
-      d.shape = DFM_TOOL_BLADE;
-      d.half_size[0] = 0.0005;
-      d.half_size[1] = 0.15;
-      d.half_size[2] = 0.15;
-      d.pose.position[0] = x;
-      d.pose.position[2] = 0.27;
-      dfm_tool t = 0;
-      test::ok(dfm_tool_create(s.w, &d, &t));
-      test::ok(dfm_tool_set_cuts(t, DFM_CUT_SPLIT, 0, 1, &s.b));
-      const Books books(s.b);
-      for (double z = 0.27; z > 0.03;) {
-        z -= 1e-3 * speed;
-        const dfm_pose p{{x, 0, z}, {0, 0, 0, 1}};
-        test::ok(dfm_tool_set_pose(t, &p, nullptr));
-        steps(s.w, 1);
+  for (const char *model : kModels)
+    for (const uint64_t seed : {5, 6, 7, 8}) {
+      Random random(seed);
+      for (int run = 0; run < 10; ++run) {
+        Spin s(model, 2e4, random.direction(3 + random(1.5)), run % 2 ? 320 : 60);
+        const double x = random(0.01), speed = 1 + random(0.5);
+        dfm_tool_def d = dfm_tool_def_default();
+        d.name = "knife";
+        d.shape = DFM_TOOL_BLADE;
+        d.half_size[0] = 0.0005;
+        d.half_size[1] = 0.15;
+        d.half_size[2] = 0.15;
+        d.pose.position[0] = x;
+        d.pose.position[2] = 0.27;
+        dfm_tool t = 0;
+        test::ok(dfm_tool_create(s.w, &d, &t));
+        test::ok(dfm_tool_set_cuts(t, DFM_CUT_SPLIT, 0, 1, &s.b));
+        const Books books(s.b);
+        for (double z = 0.27; z > 0.03;) {
+          z -= 1e-3 * speed;
+          const dfm_pose p{{x, 0, z}, {0, 0, 0, 1}};
+          test::ok(dfm_tool_set_pose(t, &p, nullptr));
+          steps(s.w, 1);
+        }
+        EXPECT_EQ(parts(s.b), 2u) << model << " " << seed << " " << run;
+        kept += books.check(s.b, run);
       }
-      EXPECT_EQ(parts(s.b), 2u) << model << " " << run;
-      kept += books.check(s.b, run);
     }
-  }
-  EXPECT_GE(kept, 19) << "of 20";
+  EXPECT_GE(kept, 73) << "of 80";
 }
