@@ -139,12 +139,8 @@ TEST(SpinCut, ToolWithAnEdge_PartsACubeThatTurns) {
       for (int run = 0; run < 10; ++run) {
         Spin s(model, 2e4, random.direction(3 + random(1.5)), run % 2 ? 320 : 60);
         const double x = random(0.01), speed = 1 + random(0.5);
-        dfm_tool_def d = dfm_tool_def_default();
-        d.name = "knife";
-        d.shape = DFM_TOOL_BLADE;
-        d.half_size[0] = 0.0005;
-        d.half_size[1] = 0.15;
-        d.half_size[2] = 0.15;
+        dfm_tool_def d = knife();
+        d.half_size[1] = d.half_size[2] = 0.15;
         d.pose.position[0] = x;
         d.pose.position[2] = 0.27;
         dfm_tool t = 0;

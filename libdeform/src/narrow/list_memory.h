@@ -39,6 +39,8 @@ struct ListMemory {
   void keep() {
     for (Run &r : runs) r.way += r.travel;
   }
+
+ private:
   // from: place in old_runs, or kNone
   void carry_over(const Array<Candidate> &list, Run &run, uint32_t from);
 };

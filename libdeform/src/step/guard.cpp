@@ -196,7 +196,7 @@ void follow_ends(World &w, StepContext &step) {
   if (w.plan.has(StageRole::lists_pairs))
     step.broad.cover(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, step.guard.speed,
                      &w.context->tasks);
-  guard_follow_lists(w, step, cover_self(w, step));
+  follow_pairs(w, step, cover_self(w, step));
 }
 
 void make_room(GuardSide &s, const Surface &surface) {
@@ -458,7 +458,7 @@ bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool ob
   return yes;
 }
 
-void guard_follow_lists(World &w, StepContext &step, bool fresh) {
+void follow_pairs(World &w, StepContext &step, bool fresh) {
   Guard &g = step.guard;
   if (std::exchange(g.placements, w.placements) != w.placements) g.forget();
   const uint64_t renewals = step.broad.stats().renewals;

@@ -70,9 +70,9 @@ struct Guard {
 // Whether two surfaces cross at the start of the sub-step. Each pair is tested once per sub-step. slot_a <
 // slot_b if both are bodies.
 bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle);
-// The memory follows all pairs that may come near: candidates of two sides, then those of bodies with
-// themselves. fresh: lists of the latter have changed.
-void guard_follow_lists(World &w, StepContext &step, bool fresh);
+// Guard::memory follows all pairs that may come near, before the narrow phase and before the guard's checks:
+// candidates of two sides, then those of bodies with themselves. fresh: lists of the latter have changed.
+void follow_pairs(World &w, StepContext &step, bool fresh);
 // Finds guard.common of body i, beside its end, if it moves so far that the guard needs it.
 void check_motion(const World &w, StepContext &step, uint32_t i);
 // guard_hits.cpp: the earliest hits as contacts of the sub-step, among those that it has.

@@ -93,7 +93,7 @@ Next stage_narrow(World &w, StepContext &step, uint32_t *) {
   step.narrow.forget_speeds();
   for (const uint32_t i : step.active) step.narrow.set_speed(step.body_views, i, step.broad.speed(i));
   const bool known = w.plan.has(StageRole::guards);
-  if (known) guard_follow_lists(w, step, false);
+  if (known) follow_pairs(w, step, false);
   find_contacts(step.body_views, step.obstacle_views, step.broad.candidates(), step.h, w.offset,
                 w.store.crossings, step.lent, step.contacts, &step.narrow, &w.context->tasks,
                 known ? &step.guard.memory : nullptr);
