@@ -111,10 +111,20 @@ void check_from(const SceneFile &scene, const std::string &path) {
                                  "; give a longer --time, counted from the scene's start");
 }
 
+void check_states(const SceneFile &scene) {
+  if (!scene.settings().states) return;
+  for (const BodyView &body : scene.bodies())
+    for (const BodyView &other : scene.bodies())
+      if (other.name == body.name + "_surface")
+        throw Failure(kBadInput, "/bodies: the states of '" + other.name + "' would have the files of the " +
+                                     "surface of '" + body.name + "'; rename one of them");
+}
+
 // What may be refused, before the results of an earlier run are deleted. The state to continue from may be
 // one of them: returned as a snapshot, empty without one; the world stays at its start.
 std::string prepare(const SceneFile &scene, const RunOptions &options) {
   check_saves(scene, options);
+  check_states(scene);
   if (!options.stream.empty()) {
     refuse_static(scene, "--stream");
     rtp_url(options.stream, "--stream");

@@ -514,6 +514,15 @@ TEST(Run, EarlierNumberedFiles_AreRemoved) {
   EXPECT_TRUE(fs::exists(out + "/states/notes.txt"));
 }
 
+TEST(Run, StatesOfTwoBodiesInOneFile_AreRefused) {
+  const Outcome r = run("one_file", {"--set", R"(/bodies/1/name="low_surface")"});
+  EXPECT_EQ(r.result.exit_code, 2);
+  EXPECT_NE(r.result.err.find("states of 'low_surface' would have the files of the surface of 'low'"),
+            std::string::npos)
+      << r.result.err;
+  EXPECT_FALSE(fs::exists(r.out)) << "refused before the folder is made";
+}
+
 // A change to a stiffer material in a body that is pressed would have its energy from nowhere.
 TEST(Run, ChangeThatPutsEnergyIn_IsRefusedUnlessAllowed) {
   const auto change = [](const std::string &to) {
