@@ -515,9 +515,9 @@ TEST(Run, EarlierNumberedFiles_AreRemoved) {
 }
 
 TEST(Run, StatesOfTwoBodiesInOneFile_AreRefused) {
-  const Outcome r = run("one_file", {"--set", R"(/bodies/1/name="low_surface")"});
+  const Outcome r = run("one_file", {"--set", R"(/bodies/0/name="top_surface")"});
   EXPECT_EQ(r.result.exit_code, 2);
-  EXPECT_NE(r.result.err.find("states of 'low_surface' would have the files of the surface of 'low'"),
+  EXPECT_NE(r.result.err.find("states of 'top_surface' would have the files of the surface of 'top'"),
             std::string::npos)
       << r.result.err;
   EXPECT_FALSE(fs::exists(r.out)) << "refused before the folder is made";
