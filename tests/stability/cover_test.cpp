@@ -19,7 +19,7 @@ TEST(CoverRows, EveryPairOfLevels_IsInOne) {
   EXPECT_FALSE(pairs.first(row));
 }
 
-// soak(linear_fem_thesis_self_*:shape_matching_mls_self_*): long, and known not to hold
+// soak(linear_fem_thesis_self_*:shape_matching_mls_self_*): long
 TEST_P(Cover, Row_Holds) {
   const Row row = GetParam();
   const Seen seen = run(row);

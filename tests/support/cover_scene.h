@@ -252,9 +252,9 @@ class Scene {
   void prongs() {
     along = 1;
     // points of a meshless body see each other across gaps (doc/models/meshless.md, errors): a wide one, and
-    // prongs long enough to close it
-    const bool meshless = level(row_, kModel) == "meshless";
-    Shape shape{meshless ? fork(10, 0.02) : fork(5, 0.001), {}, 1e5};
+    // prongs long enough to close it. What thesis shrinks needs longer ones, too.
+    const bool meshless = level(row_, kModel) == "meshless", shrinks = level(row_, kCoupling) == "thesis";
+    Shape shape{meshless ? fork(10, 0.02) : fork(shrinks ? 7 : 5, 0.001), {}, 1e5};
     shape.skin = finer(boundary(shape.cells));
     upper = lower = mine("upper", shape, {0, 0, kDrop}, kSpeed, kTurn);
     carry("upper");
