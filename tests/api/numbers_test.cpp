@@ -329,3 +329,12 @@ TEST(Numbers, QuaternionsOfAnyLength_AreNormalized) {
     test::ok(dfm_obstacle_destroy(o));
   }
 }
+
+TEST(Numbers, ImpulseThatGivesMoreThanLight_IsRefusedAndChangesNothing) {
+  Scene s;
+  const double at[3] = {0, 0, 0.1}, huge[3] = {1e300, 0, 0};
+  const uint64_t before = dfm_world_hash(s.w);
+  EXPECT_EQ(dfm_body_apply_impulse(s.body, at, huge), DFM_E_ARG);
+  test::says({"speed of light"});
+  EXPECT_EQ(dfm_world_hash(s.w), before);
+}

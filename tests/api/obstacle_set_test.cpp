@@ -62,6 +62,29 @@ TEST(ObstacleSet, Find_GivesTheHandleOrTheNearestName) {
   EXPECT_EQ(dfm_world_find_obstacle(s.world, nullptr, &found), DFM_E_ARG);
 }
 
+// It is the shape of a rigid body that has others alone.
+TEST(ObstacleSet, ShapeNone_IsRefused) {
+  test::Context context;
+  dfm_world world = test::make_world(context);
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  d.shape = DFM_SHAPE_NONE;
+  dfm_obstacle out = 0;
+  EXPECT_EQ(dfm_obstacle_create(world, &d, &out), DFM_E_ARG);
+  test::says({"shape 6 is unknown"});
+}
+
+TEST(ObstacleSet, MaterialThatIsGone_ComesBackWithASnapshot) {
+  OnATable s("coulomb", 0);
+  test::BodyOptions o;
+  const dfm_material felt = test::make_material(s.world, o);
+  test::ok(dfm_obstacle_set_material(s.table, felt));
+  const std::string bytes = test::snapshot(s.world);
+  test::ok(dfm_obstacle_set_material(s.table, 0));
+  test::ok(dfm_material_destroy(felt));
+  EXPECT_EQ(dfm_world_restore(s.world, bytes.data(), bytes.size()), DFM_OK) << dfm_last_error();
+  s.run(0.01);
+}
+
 // Sideways nothing is dragged, and what the friction remembers stays with the block's surface; downwards
 // contacts end.
 TEST(ObstacleSet, Teleport_DragsNothing_AndContactsThatAreGoneEnd) {

@@ -152,6 +152,20 @@ TEST(Tool, AtRest_ReportsTheWeightThatItCarries) {
   }
 }
 
+TEST(Tool, ItsShape_IsDestroyedWithItAlone) {
+  test::Context context;
+  const dfm_world w = test::make_world(context);
+  dfm_tool_def d = tool_def("probe", DFM_TOOL_ELLIPSOID, {0, 0, 0.1});
+  d.half_size[0] = d.half_size[1] = d.half_size[2] = 0.01;
+  const dfm_tool t = make(w, d);
+  dfm_obstacle shape = 0;
+  test::ok(dfm_world_find_obstacle(w, "probe.shape", &shape));
+  EXPECT_EQ(dfm_obstacle_destroy(shape), DFM_E_STATE);
+  test::says({"'probe.shape'", "tool 'probe'", "dfm_tool_destroy"});
+  test::ok(dfm_tool_destroy(t));
+  EXPECT_EQ(dfm_world_find_obstacle(w, "probe.shape", &shape), DFM_E_ARG);
+}
+
 TEST(Tool, GoesWhereItIsPut_InAnyNumberOfSubSteps) {
   Scene s;
   dfm_tool_def d = tool_def("grasper", DFM_TOOL_GRASPER, {0, 0, 0.06});

@@ -710,3 +710,12 @@ TEST(WriteScene, OfAStaticScene_LooksForEquilibriaAgain) {
   test::ok(dfm_scene_value(again, "/time/mode", mode, &bytes));
   EXPECT_STREQ(mode, "\"static\"");
 }
+
+TEST(WriteScene, TimeWithoutALimit_IsLeftOut) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  test::ok(dfm_world_set_budget(world, HUGE_VAL, 0));
+  const std::string path = folder_of("no_limit") + "/scene.json";
+  write(world, path);
+  EXPECT_NE(load(context, path), 0u);
+}

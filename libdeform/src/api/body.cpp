@@ -348,6 +348,14 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
     need(impulse, "impulse");
     if (!all_finite(point, 3) || !all_finite(impulse, 3)) refuse(b, ": point and impulse must be finite");
     const TriangleNearPoint near = closest_on_body(b, load3(point));
+    // no point of the triangle gets more than all of the impulse
+    for (int k = 0; k < 3; ++k)
+      b.surface.each_phyxel(b.surface.tri[size_t(3) * near.triangle + size_t(k)],
+                            [&](uint32_t phyxel, double) {
+                              const double mass = b.p.mass[phyxel];
+                              if (mass > 0)
+                                check_velocity("body", b.name.c_str(), (1 / mass) * load3(impulse));
+                            });
     disturb(b);
     const HostWork work(b);
     // dv = M^-1 N^T p: the change with the least kinetic energy that gives the point its new velocity

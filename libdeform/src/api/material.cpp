@@ -55,7 +55,10 @@ dfm_status dfm_material_create(dfm_world world, const dfm_material_def *def, dfm
       for (auto &other : w.materials)
         if (other->name == m->name)
           fail(DFM_E_ARG, "material '%s': the name is taken in this world; names are unique", name);
-    for (uint32_t i = 0; m->def.extra.values && i < m->def.extra.n; ++i) {
+    if (m->def.extra.n && !m->def.extra.values)
+      fail(DFM_E_ARG, "material '%s': %u extra entries are announced, but extra.values is NULL", name,
+           m->def.extra.n);
+    for (uint32_t i = 0; i < m->def.extra.n; ++i) {
       const dfm_param_value &v = m->def.extra.values[i];
       if (!v.key || !v.value)
         fail(DFM_E_ARG, "material '%s': extra entry %u has no %s", name, i, v.key ? "value" : "key");

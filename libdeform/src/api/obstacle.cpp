@@ -4,6 +4,7 @@
 
 #include "api/objects.h"
 #include "state/bounds.h"
+#include "state/tool.h"
 #include "step/stages.h"
 #include "world/create.h"
 #include "world/obstacle_change.h"
@@ -32,6 +33,10 @@ dfm_status dfm_obstacle_destroy(dfm_obstacle obstacle) {
     if (o.rigid && !o.added)
       fail(DFM_E_STATE, "'%s' is a rigid body; remove it with dfm_rigid_destroy, which removes its whole set",
            o.name.c_str());
+    for (const auto &t : o.world->tools)
+      if (t->has_shape(o))
+        fail(DFM_E_STATE, "'%s' is a part of tool '%s'; remove it with dfm_tool_destroy, which removes all",
+             o.name.c_str(), t->name.c_str());
     destroy_obstacle(o);
   });
 }

@@ -1,6 +1,7 @@
 #include "scene/write.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdarg>
 #include <cstring>
 
@@ -430,7 +431,7 @@ Written write_time(const SceneWriter &to) {
   else out["step"] = "auto";
   put_integrator(out, w.def.integrator);
   if (to.options.beside.equilibrium) out["mode"] = "static";
-  if (w.def.max_time > 0) out["max_time"] = w.def.max_time;
+  if (w.def.max_time > 0 && std::isfinite(w.def.max_time)) out["max_time"] = w.def.max_time;
   if (w.def.max_work > 0) out["max_work"] = double(w.def.max_work);
   return out;
 }

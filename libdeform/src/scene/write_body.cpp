@@ -161,7 +161,7 @@ void write_switches(SceneWriter &to, const Body &b, Written &out) {
             b.name.c_str());
   for (const Switch &s : b.switches) {
     Written entry = choice_of(to, s.to);
-    entry["t"] = s.t;
+    entry["t"] = std::max(s.t, 0.0);
     if (s.to.max_jump < HUGE_VAL) entry["max_jump"] = s.to.max_jump;
     out["switch"].push_back(std::move(entry));
   }

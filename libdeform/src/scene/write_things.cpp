@@ -75,11 +75,8 @@ bool has_added(const World &w, const RigidSet &set, uint32_t body) {
                      [&](const auto &o) { return o->rigid == &set && o->rigid_body == body && o->added; });
 }
 
-// Every tool of its kind has these.
 bool is_of_tool(const World &w, const Obstacle &o) {
-  return std::any_of(w.tools.begin(), w.tools.end(), [&](const auto &t) {
-    return t->set == o.rigid && (o.name == t->name + ".shape" || o.name == t->name + ".shaft");
-  });
+  return std::any_of(w.tools.begin(), w.tools.end(), [&](const auto &t) { return t->has_shape(o); });
 }
 
 void write_rigid_start(const RigidSet &set, uint32_t i, Written &out) {

@@ -11,6 +11,7 @@
 #include "dynamics/rigid/rigid_set.h"
 #include "dynamics/rigid/tool_host.h"
 #include "state/body.h"
+#include "state/obstacle.h"
 
 namespace dfm {
 
@@ -34,6 +35,10 @@ struct Tool {
     bool waits = false;            // its way of this step, or of failed ones before, is yet to be cut
   } cuts;
   bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
+  // Whether it is one of the shapes that every tool of its kind has beside its parts.
+  bool has_shape(const Obstacle &o) const {
+    return o.rigid == set && o.added && (o.name == name + ".shape" || o.name == name + ".shaft");
+  }
   // with its pieces
   bool cuts_body(const Body &b) const {
     const auto in = [&](uint64_t id) {

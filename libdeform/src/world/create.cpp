@@ -280,7 +280,7 @@ void make_voxels(Obstacle &o, const Memory &memory) {
 
 }  // namespace
 
-std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def) {
+std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, bool rigid) {
   auto owned = std::make_unique<Obstacle>();
   Obstacle &o = *owned;
   o.world = &w;
@@ -288,7 +288,7 @@ std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def) {
   o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
-  if (def.shape > DFM_SHAPE_NONE)
+  if (def.shape > DFM_SHAPE_NONE || (def.shape == DFM_SHAPE_NONE && !rigid))
     fail(DFM_E_ARG,
          "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS",
          name, def.shape);
@@ -342,7 +342,7 @@ Obstacle &add_obstacle(World &w, std::unique_ptr<Obstacle> obstacle) {
 }
 
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
-  return add_obstacle(w, make_obstacle(w, def));
+  return add_obstacle(w, make_obstacle(w, def, false));
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {

@@ -21,8 +21,9 @@ inline const char *integrator_name(uint32_t integrator) {
 Body &create_body(World &w, const dfm_body_def &def);
 Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def);
 // The same in two steps, for what has several parts: all are made before the world gets the first, so that
-// one that is refused leaves nothing behind. Only memory can be missing in add_obstacle().
-std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def);
+// one that is refused leaves nothing behind. rigid: of a rigid body. Only memory can be missing in
+// add_obstacle().
+std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, bool rigid);
 Obstacle &add_obstacle(World &w, std::unique_ptr<Obstacle> obstacle);
 // A further shape of the rigid body that another obstacle is.
 std::unique_ptr<Obstacle> make_rigid_shape(World &w, const std::string &body, const dfm_obstacle_def &def);

@@ -93,7 +93,7 @@ std::unique_ptr<Obstacle> make_part(World &w, const dfm_rigid_def &d) {
   o.category = d.category;
   o.collides_with = d.collides_with;
   o.user = d.user;
-  return make_obstacle(w, o);
+  return make_obstacle(w, o, true);
 }
 
 void query_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *data) {
@@ -163,7 +163,7 @@ std::unique_ptr<Obstacle> make_rigid_shape(World &w, const std::string &body, co
   if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0)
     fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name,
          body.c_str());
-  return make_obstacle(w, def);
+  return make_obstacle(w, def, true);
 }
 
 Obstacle &join_rigid_shape(Obstacle &body, std::unique_ptr<Obstacle> shape) {
