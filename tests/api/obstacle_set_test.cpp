@@ -73,18 +73,6 @@ TEST(ObstacleSet, ShapeNone_IsRefused) {
   test::says({"shape 6 is unknown"});
 }
 
-TEST(ObstacleSet, MaterialThatIsGone_ComesBackWithASnapshot) {
-  OnATable s("coulomb", 0);
-  test::BodyOptions o;
-  const dfm_material felt = test::make_material(s.world, o);
-  test::ok(dfm_obstacle_set_material(s.table, felt));
-  const std::string bytes = test::snapshot(s.world);
-  test::ok(dfm_obstacle_set_material(s.table, 0));
-  test::ok(dfm_material_destroy(felt));
-  EXPECT_EQ(dfm_world_restore(s.world, bytes.data(), bytes.size()), DFM_OK) << dfm_last_error();
-  s.run(0.01);
-}
-
 // Sideways nothing is dragged, and what the friction remembers stays with the block's surface; downwards
 // contacts end.
 TEST(ObstacleSet, Teleport_DragsNothing_AndContactsThatAreGoneEnd) {

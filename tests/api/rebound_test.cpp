@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "support.h"
+#include "world.h"
 
 namespace {
 
@@ -94,4 +95,38 @@ TEST(Rebound, IntegratorThatWillNotRebound_SaysSo) {
         << fall.explain(integrator);
   const Fall given(R"(, "restitution": 0.5)", R"("step": 0.016)");
   EXPECT_EQ(given.run("implicit_euler").summary.find(kWords), std::string::npos) << "the pair throws it back";
+}
+
+// What it touched is gone: nothing is told of it, and nothing of it is read.
+TEST(Rebound, WithoutAnythingToFallOn_IsNotTold) {
+  std::string told;
+  dfm_context_def of = dfm_context_def_default();
+  of.plugin_dir = DEFORM_PLUGIN_DIR;
+  of.user = &told;
+  of.log = [](void *user, int32_t, const char *text) { *static_cast<std::string *>(user) += text; };
+  dfm_context *context = nullptr;
+  test::ok(dfm_context_create(&of, &context));
+  const dfm_world w = test::make_world(context, {0, 0, -9.81});
+  const dfm_obstacle floor = test::add_plane(w, "floor");
+  test::BodyOptions o;
+  o.integrator = DFM_INTEGRATOR_TR_BDF2;
+  o.position = {0, 0, 0.1002};
+  const dfm_body ball = test::make_body(context, w, "ball", {0.1, 0, 0}, 60, o);
+  for (int i = 0; i < 30; ++i) test::ok(dfm_world_step(w, 1e-3, nullptr));
+  ASSERT_GT(test::stats(w).contacts, 0u);
+  test::ok(dfm_obstacle_destroy(floor));
+  const double none[3] = {};
+  test::ok(dfm_world_set_gravity(w, none));
+  test::set_velocity(ball, {0, 0, -20});
+  const uint32_t n = test::info_of(ball).npoint;
+  std::vector<uint32_t> points(n);
+  std::vector<double> up(3 * size_t{n});
+  for (uint32_t i = 0; i < n; ++i) {
+    points[i] = i;
+    up[3 * size_t{i} + 2] = test::measure(ball).mass / n * 15 / 1e-3;
+  }
+  test::ok(dfm_body_add_load(ball, n, points.data(), up.data(), 0, nullptr, nullptr, nullptr));
+  test::ok(dfm_world_step(w, 1e-3, nullptr));
+  EXPECT_EQ(told.find(kWords), std::string::npos) << told;
+  dfm_context_destroy(context);
 }

@@ -121,7 +121,7 @@ bool chosen_by_library(const World &w, double dt) {
 }
 
 bool has_impact(World &w, const StepContext &step) {
-  if (step.rows.soft() == 0 || w.prescribed.is_static()) return false;
+  if (!w.plan.touches() || step.rows.soft() == 0 || w.prescribed.is_static()) return false;
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
     const bool repeats =
