@@ -54,7 +54,7 @@ struct Drop {
 };
 
 TEST(CellWorlds, BodiesDroppedOnAFloor_BounceWithoutNewEnergyAndDoNotCross) {
-  for (const Kind &kind : {kBall, kBricks})
+  for (const Kind &kind : {kBall, kBricks, kFine})
     for (int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
       Drop d(kind, integrator);
       const double before = test::total_energy(d.body), h = 2e-3;
