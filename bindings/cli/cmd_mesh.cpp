@@ -194,8 +194,9 @@ void add_make(Command mesh, Globals &globals, int *exit_code) {
     if (name == "tube") sub.option("--inner", shape->inner, "inner radius, m").with_default();
     if (name == "torus") sub.option("--ring", shape->ring, "radius of the ring, m").with_default();
     if (name == "cylinder" || name == "tube") sub.option("--length", shape->length, "m").with_default();
-    if (name != "bricks" && name != "torus")
-      sub.option("--order", shape->order, "2: second-order tetrahedra")
+    if (name != "torus")
+      sub.option("--order", shape->order,
+                 name == "bricks" ? "2: hexahedra of 27 points" : "2: second-order tetrahedra")
           .with_default()
           .one_of({"1", "2"})
           .type_name("1|2");

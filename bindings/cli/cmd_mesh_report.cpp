@@ -183,11 +183,18 @@ void describe_cells(const dfm_mesh_info &i, bool crossings, Report &r) {
   r.measures = {{"volume", i.volume}};
   const auto count = [&](const char *name, uint32_t n) { r.lines.emplace_back(name, std::to_string(n)); };
   count("points", i.npoint);
-  const char *const kind = i.cell == DFM_CELL_HEX8    ? "hexahedra"
-                           : i.cell == DFM_CELL_TET10 ? "second-order tetrahedra"
-                                                      : nullptr;
-  if (kind) {
-    r.counts.push_back({i.cell == DFM_CELL_HEX8 ? "hexahedra" : "second_order_tets", i.ncell});
+  struct Kind {
+    uint32_t cell;
+    const char *name, *counted;
+  };
+  const char *kind = nullptr;
+  for (const Kind &of : {Kind{DFM_CELL_TET10, "second-order tetrahedra", "second_order_tets"},
+                         {DFM_CELL_HEX8, "hexahedra", "hexahedra"},
+                         {DFM_CELL_HEX20, "hexahedra of 20 points", "hexahedra_of_20_points"},
+                         {DFM_CELL_HEX27, "hexahedra of 27 points", "hexahedra_of_27_points"}}) {
+    if (of.cell != i.cell) continue;
+    kind = of.name;
+    r.counts.push_back({of.counted, i.ncell});
     r.lines.emplace_back("cells", std::to_string(i.ncell) + " " + kind);
   }
   count("tetrahedra", i.ntet);

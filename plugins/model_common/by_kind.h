@@ -7,7 +7,7 @@ namespace model {
 // Tet: the body of tetrahedra, of the model that Tet::kOf describes.
 template <class Tet>
 struct ByKind {
-  static constexpr uint32_t kCells = DFM_CELL_TET | DFM_CELL_HEX8 | DFM_CELL_TET10;
+  static constexpr uint32_t kCells = kAllCells;
   using Row = typename Tet::Row;
   const dfm_host *host = nullptr;
   bool by_cells = false;

@@ -111,6 +111,7 @@ class CellBody {
     const bool part = m.size >= offsetof(dfm_mesh, inside) + sizeof m.inside && m.inside;
     if (part) inside_.create_copy(h, m.inside, size_t{cells::kInside} * ncell_);
     cell_.create(h, ncell_);
+    node_.create(h, size_t(nodes_) * ncell_);
     block_.create(h, kind_, ncell_);
     force_.create(h, 3 * size_t(nodes_) * ncell_);
     drag_.create(h, npoint_);
@@ -151,7 +152,8 @@ class CellBody {
 
   // Whether the points of the cells have a plastic strain, which cannot change: it is state.
   bool plastic() const { return !points_.empty(); }
-  size_t state_size() const { return plastic() ? size_t(CellPoints::kState) * ncell_ : 0; }
+  uint32_t points() const { return uint32_t(cells::points_of(kind_)); }
+  size_t state_size() const { return plastic() ? points_.state() * ncell_ : 0; }
   bool lacks_state(const dfm_kin &k) const { return model::lacks_state(*this, of_.id, k); }
   const char *idle(uint32_t row) const {
     if (of_.row[1] >= 0 && row - uint32_t(of_.row[1]) - 1 < 3 && !(largest_of(kYield) > 0))
@@ -180,13 +182,13 @@ class CellBody {
   void bound(const dfm_kin &k, double *ksum, double *csum) const {
     const double flow = flow_at(k);
     for (uint32_t c = 0; c < ncell_; ++c) {
-      const Cell &cell = cell_[c];
+      const Node *const node = nodes_at(c);
       double more[kMaxNodes] = {}, grown = 1;
       if (of_.turns) growth(k, flow, c, grown, more);
       for (uint32_t a = 0; a < nodes_; ++a) {
         const uint32_t i = corner(c, a);
-        ksum[i] += grown * cell.row[a] + more[a];
-        csum[i] += at(kDampingStiffness, c) * grown * cell.row[a];
+        ksum[i] += grown * node[a].row + more[a];
+        csum[i] += at(kDampingStiffness, c) * grown * node[a].row;
       }
     }
     for (uint32_t i = 0; i < npoint_; ++i) csum[i] += drag_[i];
@@ -281,12 +283,14 @@ class CellBody {
   static constexpr double kMinStretch = 0.1;
 
   struct Cell {
-    double volume = 0;
-    double rest[kMaxNodes][3] = {};  // m, from the mean of the nodes
-    double mean[kMaxNodes][3] = {};  // 1/m, G
-    double row[kMaxNodes] = {};      // N/m, D_a of this cell
-    double share[kMaxNodes] = {};    // |G_a| g / w_a
-    double g = 0, excess = 0;        // sum |G_a| w_a, g max(|G_a| / (w_a D_a))
+    double volume;
+    double g, excess;  // sum |G_a| w_a, g max(|G_a| / (w_a D_a))
+  };
+  struct Node {      // of a cell
+    double rest[3];  // m, from the mean of the nodes
+    double mean[3];  // 1/m, G
+    double row;      // N/m, D_a of this cell
+    double share;    // |G_a| g / w_a
   };
   // One at the positions of a call.
   struct Moved {
@@ -348,9 +352,8 @@ class CellBody {
     return {lame_of(at(kYoung, c), at(kPoisson, c)).mu, at(kYield, c), at(kHardening, c),
             at(kPlasticLimit, c), flow};
   }
-  static const double *state_of(const dfm_kin &k, uint32_t c) {
-    return k.state + size_t(CellPoints::kState) * c;
-  }
+  const double *state_of(const dfm_kin &k, uint32_t c) const { return k.state + points_.state() * c; }
+  const Node *nodes_at(uint32_t c) const { return &node_[size_t(nodes_) * c]; }
   uint32_t corner(uint32_t c, uint32_t a) const { return cells_[size_t(nodes_) * c + a]; }
 
   template <class Piece>
@@ -384,12 +387,11 @@ class CellBody {
     if (!make_rest_cell(kind_, x, inside, Along(*this, c, fibers_).material, made, points_.of(c),
                         points_.inner_of(c)))
       throw kFlatCell;
-    Cell &out = cell_[c];
-    out.volume = made.volume;
+    cell_[c].volume = made.volume;
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t n = 0; n < 3; ++n) {
-        out.rest[a][n] = x[3 * a + n] - middle[n];
-        out.mean[a][n] = made.mean[a][n];
+        node_[size_t(nodes_) * c + a].rest[n] = x[3 * a + n] - middle[n];
+        node_[size_t(nodes_) * c + a].mean[n] = made.mean[a][n];
       }
     block_.set(c, made);
     for (size_t n = 0; n < block_.each(); ++n) norm_[block_.each() * c + n] = norm_of(block_.of(c) + 9 * n);
@@ -424,9 +426,10 @@ class CellBody {
     }
     for (uint32_t c = 0; c < ncell_; ++c) {
       Cell &cell = cell_[c];
+      Node *const node = &node_[size_t(nodes_) * c];
       double length[kMaxNodes], sum = 0;
       for (uint32_t a = 0; a < nodes_; ++a) {
-        const double *g = cell.mean[a];
+        const double *g = node[a].mean;
         length[a] = std::sqrt((g[0] * g[0] + g[1] * g[1]) + g[2] * g[2]);
         sum += length[a] * weight_[corner(c, a)];
       }
@@ -434,16 +437,16 @@ class CellBody {
       cell.excess = 0;
       for (uint32_t a = 0; a < nodes_; ++a) {
         const double w = weight_[corner(c, a)];
-        cell.row[a] = row_of(c, a) / w;
-        cell.share[a] = length[a] * sum / w;
-        cell.excess = std::max(cell.excess, cell.share[a] / cell.row[a]);
+        node[a].row = row_of(c, a) / w;
+        node[a].share = length[a] * sum / w;
+        cell.excess = std::max(cell.excess, node[a].share / node[a].row);
       }
     }
   }
 
   // Frame and displacements of a cell.
   void move(const dfm_kin &k, uint32_t c, Moved &m) const {
-    const Cell &cell = cell_[c];
+    const Node *const node = nodes_at(c);
     double middle[3] = {}, from[kMaxNodes][3], f[9] = {};
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t n = 0; n < 3; ++n) {
@@ -454,14 +457,14 @@ class CellBody {
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t i = 0; i < 3; ++i) {
         from[a][i] -= middle[i];
-        for (uint32_t j = 0; j < 3; ++j) f[3 * i + j] += from[a][i] * cell.mean[a][j];
+        for (uint32_t j = 0; j < 3; ++j) f[3 * i + j] += from[a][i] * node[a].mean[j];
       }
     if (of_.turns) rotation::polar_of(f, m.r);
     else rotation::identity(m.r);
     for (uint32_t a = 0; a < nodes_; ++a)
       for (uint32_t i = 0; i < 3; ++i) {
         m.d[a][i] = (m.r[i] * from[a][0] + m.r[3 + i] * from[a][1]) + m.r[6 + i] * from[a][2];
-        m.u[a][i] = m.d[a][i] - cell.rest[a][i];
+        m.u[a][i] = m.d[a][i] - node[a].rest[i];
       }
     for (uint32_t i = 0; i < 3; ++i)
       for (uint32_t j = 0; j < 3; ++j)
@@ -524,7 +527,7 @@ class CellBody {
       const double from[3] = {v[0] - middle[0], v[1] - middle[1], v[2] - middle[2]};
       for (uint32_t i = 0; i < 3; ++i)
         out[a][i] = (m.r[i] * from[0] + m.r[3 + i] * from[1]) + m.r[6 + i] * from[2];
-      cross(cell_[c].mean[a], out[a], part);
+      cross(nodes_at(c)[a].mean, out[a], part);
       for (int n = 0; n < 3; ++n) axial[n] += part[n];
     }
     if (!of_.turns) return;
@@ -548,7 +551,7 @@ class CellBody {
     }
     block_.apply(block_.of(c), pull, h);
     if (plastic()) {
-      double *const next = k.state_out ? k.state_out + size_t(CellPoints::kState) * c : nullptr;
+      double *const next = k.state_out ? k.state_out + points_.state() * c : nullptr;
       points_.relieve(c, law_of(flow, c), state_of(k, c), next, m.u, h);
     }
     for (uint32_t a = 0; of_.turns && a < nodes_; ++a) {
@@ -558,7 +561,7 @@ class CellBody {
     if (of_.turns) times(m.inverse, tau, turn);
     double *out = force_.data() + 3 * size_t(nodes_) * c;
     for (uint32_t a = 0; a < nodes_; ++a, out += 3) {
-      cross(turn, cell_[c].mean[a], part);
+      cross(turn, nodes_at(c)[a].mean, part);
       for (int n = 0; n < 3; ++n) part[n] -= h[a][n];
       times(m.r, part, out);
     }
@@ -580,9 +583,10 @@ class CellBody {
     block_.apply(block_.of(c), m.u, h);
     if (plastic()) points_.relieve(c, law_of(flow, c), state_of(k, c), nullptr, m.u, h);
     const Cell &cell = cell_[c];
+    const Node *const node = nodes_at(c);
     const auto square = [](const double *x) { return (x[0] * x[0] + x[1] * x[1]) + x[2] * x[2]; };
     for (uint32_t a = 0; a < nodes_; ++a) {
-      rows += cell.row[a] * square(m.u[a]);
+      rows += node[a].row * square(m.u[a]);
       pull[a] = std::sqrt(square(h[a]));
       all += pull[a] * weight_[corner(c, a)];
       for (uint32_t n = 0; n < 9; ++n) moment[n] += h[a][n / 3] * m.d[a][n % 3];
@@ -595,7 +599,7 @@ class CellBody {
     const double twist =
         alpha * all / cell.g + alpha * alpha * second * (1 + root * (1 + root + 2 * alpha * stretch));
     for (uint32_t a = 0; a < nodes_; ++a)
-      more[a] = twist * cell.share[a] + alpha * cell.g * pull[a] / weight_[corner(c, a)];
+      more[a] = twist * node[a].share + alpha * cell.g * pull[a] / weight_[corner(c, a)];
   }
 
   // blk -= by R P^T K P R^T. With Z_a = sum K_ab [u_b]x, Y = sum [u_a]x^T Z_a, C_a = A^-1 [G_a]x:
@@ -610,7 +614,7 @@ class CellBody {
       points_.soften(c, law_of(flow, c), state_of(k, c), m.u, soft, softened);
       own = softened;
     }
-    double z[kMaxNodes][9] = {}, turn[kMaxNodes][9] = {}, y[9] = {};
+    double z[kMaxNodes][9], turn[kMaxNodes][9], y[9] = {};
     for (uint32_t n = 0; of_.turns && n < 3; ++n) {
       // columns: of [u]x it is u x e_n, of A^-1 [G]x it is A^-1 (G x e_n)
       double unit[3] = {}, column[kMaxNodes][3], product[kMaxNodes][3], part[3];
@@ -622,7 +626,7 @@ class CellBody {
         cross(product[a], m.u[a], part);  // [u]x^T p = p x u
         for (uint32_t i = 0; i < 3; ++i) y[3 * i + n] += part[i];
         double g[3], t[3];
-        cross(cell_[c].mean[a], unit, g);
+        cross(nodes_at(c)[a].mean, unit, g);
         times(m.inverse, g, t);
         for (uint32_t i = 0; i < 3; ++i) turn[a][3 * i + n] = t[i];
       }
@@ -675,6 +679,7 @@ class CellBody {
   Buffer<double> inside_;              // [ncell,27] of a lattice, as dfm_mesh has it; else empty
   Buffer<uint32_t> cells_;             // [ncell,nodes]
   Buffer<Cell> cell_;                  // [ncell]
+  Buffer<Node> node_;                  // [ncell,nodes]
   CellBlocks block_;
   bool fibers_ = false;
   CellPoints points_;               // empty without yield

@@ -34,29 +34,33 @@ inline Yield yield_of(double stress, double hardening, double limit, double volu
 
 class CellPoints {
  public:
-  static constexpr uint32_t kState = cells::kWhole * plastic::kState;  // by cell
   // Material and flow of a cell; stresses not times a volume.
   struct Law { double mu, yield, hardening, limit, flow; };
   using Nodes = const double (*)[3];
 
   void create(const dfm_host *host, uint32_t kind, uint32_t ncell) {
     nodes_ = nodes_of(kind);
-    rows_ = nodes_ + (kind == DFM_CELL_HEX8 ? cells::kInner : 0);
-    points_.create(host, ncell);
+    rows_ = uint32_t(cells::rows_of(kind));
+    npoint_ = uint32_t(cells::points_of(kind));
+    points_.create(host, each() * ncell);
     if (rows_ > nodes_) inner_.create(host, ncell);
   }
   bool empty() const { return points_.empty(); }
+  size_t state() const { return size_t(npoint_) * plastic::kState; }  // by cell
   // Null where there are none.
-  cells::RestPoints *of(uint32_t c) { return points_.empty() ? nullptr : &points_[c]; }
+  cells::RestPoints of(uint32_t c) {
+    if (points_.empty()) return {};
+    double *const weight = &points_[each() * c];
+    return {weight, reinterpret_cast<double (*)[3]>(weight + npoint_)};
+  }
   cells::RestInner *inner_of(uint32_t c) { return inner_.empty() ? nullptr : &inner_[c]; }
 
   // Takes from f, elastic forces of the displacements u, those of the plastic strain after the flow, which
   // `next` gets unless it is null.
   void relieve(uint32_t c, const Law &law, const double *state, double *next, Nodes u, double (*f)[3]) const {
-    const cells::RestPoints &p = points_[c];
     double sum[cells::kMax][3] = {};
-    if (next) std::copy(state, state + kState, next);
-    each_point(c, law, state, u, [&](int n, const At &at) {
+    if (next) std::copy(state, state + this->state(), next);
+    each_point(c, law, state, u, [&](uint32_t n, const At &at) {
       PlasticState<Single> s = at.state;
       plastic::take_flow(at.flow, s);
       if (next) {
@@ -65,7 +69,7 @@ class CellPoints {
       }
       const double *e = s.strain, by = at.law.mu2;
       for (uint32_t a = 0; a < rows_; ++a) {
-        const double *g = p.g[n][a];
+        const double *g = at.g[a];
         sum[a][0] += by * ((e[0] * g[0] + e[3] * g[1]) + e[5] * g[2]);
         sum[a][1] += by * ((e[3] * g[0] + e[1] * g[1]) + e[4] * g[2]);
         sum[a][2] += by * ((e[5] * g[0] + e[4] * g[1]) + e[2] * g[2]);
@@ -79,7 +83,7 @@ class CellPoints {
   // J, beside the energy of the elastic cell.
   double energy(uint32_t c, const Law &law, const double *state, Nodes u) const {
     double sum = 0;
-    each_point(c, law, state, u, [&](int, const At &at) {
+    each_point(c, law, state, u, [&](uint32_t, const At &at) {
       sum += plastic::flow_energy<Single>(at.law, at.e, at.state, at.flow);
     });
     return sum;
@@ -89,10 +93,10 @@ class CellPoints {
   void mean_stress(uint32_t c, const Law &law, const double *state, Nodes u, double (&out)[6]) const {
     double volume = 0;
     std::fill(out, out + 6, 0.0);
-    each_point(c, law, state, u, [&](int n, const At &at) {
+    each_point(c, law, state, u, [&](uint32_t, const At &at) {
       PlasticState<Single> s = at.state;
       plastic::take_flow(at.flow, s);
-      volume += points_[c].weight[n];
+      volume += at.weight;
       for (int k = 0; k < 6; ++k) out[k] += at.law.mu2 * s.strain[k];
     });
     for (double &s : out) s /= volume;
@@ -100,12 +104,11 @@ class CellPoints {
 
   // Adds to the blocks of the cell's stiffness `by` times what the flow takes from it.
   void soften(uint32_t c, const Law &law, const double *state, Nodes u, double by, double *blocks) const {
-    const cells::RestPoints &p = points_[c];
-    each_point(c, law, state, u, [&](int n, const At &at) {
+    each_point(c, law, state, u, [&](uint32_t, const At &at) {
       double d[6][6] = {};
       if (!plastic::soften(at.law, at.flow, d)) return;
       double strain[6][3 * cells::kMax] = {}, stress[6][3 * kMaxNodes] = {};
-      cells::strain_of(int(rows_), p.g[n], strain);
+      cells::strain_of(int(rows_), at.g, strain);
       for (auto &row : strain) fold(c, row);
       for (int k = 0; k < 6; ++k)
         for (int l = 0; l < 6; ++l)
@@ -123,11 +126,15 @@ class CellPoints {
   template <class Ops>
   using PlasticState = plastic::PlasticState<Ops>;
   struct At {
+    double weight;
+    const double (*g)[3];
     plastic::PlasticLaw<Single> law;
     double e[6];
     PlasticState<Single> state;
     plastic::PlasticFlow<Single> flow;
   };
+
+  size_t each() const { return size_t(npoint_) * (1 + 3 * rows_); }
 
   // Forces on inner displacements become forces on the nodes.
   void fold(uint32_t c, double *f) const {
@@ -137,34 +144,37 @@ class CellPoints {
 
   template <class Use>
   void each_point(uint32_t c, const Law &of, const double *state, Nodes u, const Use &use) const {
-    const cells::RestPoints &p = points_[c];
+    const double *const weight = &points_[each() * c];
+    const auto g = reinterpret_cast<const double (*)[3]>(weight + npoint_);
     double d[3 * cells::kMax];
     std::copy_n(u[0], 3 * nodes_, d);
     for (uint32_t r = 3 * nodes_; r < 3 * rows_; ++r) {
       d[r] = 0;
       for (uint32_t j = 0; j < r; ++j) d[r] -= inner_[c].share[r - 3 * nodes_][j] * d[j];
     }
-    for (int n = 0; n < cells::kWhole && p.weight[n] > 0; ++n) {
+    for (uint32_t n = 0; n < npoint_ && weight[n] > 0; ++n) {
+      At at;
+      at.weight = weight[n];
+      at.g = g + size_t(n) * rows_;
       double h[9] = {};
       for (uint32_t a = 0; a < rows_; ++a)
-        for (uint32_t i = 0; i < 9; ++i) h[i] += d[3 * a + i / 3] * p.g[n][a][i % 3];
-      At at;
+        for (uint32_t i = 0; i < 9; ++i) h[i] += d[3 * a + i / 3] * at.g[a][i % 3];
       const double e[6] = {h[0], h[4], h[8], 0.5 * (h[1] + h[3]), 0.5 * (h[5] + h[7]), 0.5 * (h[2] + h[6])};
       std::copy(e, e + 6, at.e);
       const double *const from = state + plastic::kState * n;
       std::copy(from, from + 6, at.state.strain);
       at.state.length = from[6];
-      const plastic::Yield y = plastic::yield_of(of.yield, of.hardening, of.limit, p.weight[n]);
-      at.law = {2 * of.mu * p.weight[n],      y.stress, y.hardening, y.limit, of.flow,
+      const plastic::Yield y = plastic::yield_of(of.yield, of.hardening, of.limit, at.weight);
+      at.law = {2 * of.mu * at.weight,        y.stress, y.hardening, y.limit, of.flow,
                 of.flow > 0 ? 1 / of.flow : 0};
       plastic::find_flow<Single>(at.law, at.e, at.state, at.flow);
       use(n, at);
     }
   }
 
-  uint32_t nodes_ = 0, rows_ = 0;
-  Buffer<cells::RestPoints> points_;
-  Buffer<cells::RestInner> inner_;  // of hexahedra
+  uint32_t nodes_ = 0, rows_ = 0, npoint_ = 0;
+  Buffer<double> points_;           // [ncell,each()]: RestPoints of each
+  Buffer<cells::RestInner> inner_;  // of HEX8
 };
 
 }  // namespace model

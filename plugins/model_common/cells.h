@@ -1,6 +1,5 @@
 // Cells of any kind: their shape functions, and the stiffness of one at rest.
-// Orders of nodes are VTK's: the edges of a tetrahedron 01 12 02 03 13 23; a hexahedron around the bottom,
-// then around the top.
+// Orders of nodes are VTK's (plugin.h).
 //
 // TET10: quadratic shape functions; the 8-point rule of degree 3 integrates the stiffness of a straight cell
 // exactly and passes the patch test on curved ones. A mesh has about as many linear parts of the volume
@@ -16,6 +15,9 @@
 // - poisson near 1/2: the volume change is its projection on 1, xi, eta, zeta (B-bar, Hughes 1980,
 //   Generalization of selective integration procedures); the linear parts are those of bending, which the
 //   quadratic displacements relieve, so that one constraint is left per cell.
+// HEX20, HEX27: serendipity and triquadratic shape functions, 3 x 3 x 3 points. The same projection of the
+// volume change leaves four constraints per cell, against 12 and 24 displacements of a large mesh. It changes
+// nothing where displacements are quadratic and the cell a parallelepiped.
 // Of a hexahedron of a lattice the same integrals are over its material, by 3 x 3 x 3 points whose weights
 // are given (dfm_mesh.inside): in a box they are exact for all functions that occur. The quadratic
 // displacements lose their mean gradient over the material, again for constant stresses, and those that say
@@ -34,8 +36,6 @@
 #include "tetrahedron.h"
 
 namespace model {
-
-constexpr uint32_t kMaxNodes = 10;
 
 // Largest singular value, or a little more: the largest eigenvalue of the symmetric m^T m is at most mean +
 // sqrt(2/3) |deviator|, equal where the other two are.
@@ -70,10 +70,11 @@ struct RestCell {
 
 namespace cells {
 
-constexpr int kInner = 3;         // quadratic displacements of a hexahedron
-constexpr int kMax = 8 + kInner;  // gradients at a point: no other kind has more
+constexpr int kInner = 3;               // quadratic displacements of a HEX8
+constexpr int kMax = 27, kInside = 27;  // gradients at a point, and points, are no more
 static_assert(kMax >= int(kMaxNodes));
-constexpr int kWhole = 8, kInside = 27;  // points of the rules
+constexpr int rows_of(uint32_t kind) { return int(nodes_of(kind)) + (kind == DFM_CELL_HEX8 ? kInner : 0); }
+constexpr int points_of(uint32_t kind) { return nodes_of(kind) > 10 ? 27 : 8; }  // whole cells
 constexpr double kTie = 0.02;
 constexpr double kThin = 1e-9;       // of the square of a function: it depends on those before it
 constexpr double kSwell = 14.0 / 3;  // bulk over shear modulus, at poisson 0.4
@@ -81,12 +82,12 @@ constexpr double kSwell = 14.0 / 3;  // bulk over shear modulus, at poisson 0.4
 // The strain at the points of a cell, as displacements of its nodes give it: sum d_a (x) g_a over its nodes
 // and inner displacements. Weights m^3, 0: no such point.
 struct RestPoints {
-  double weight[kWhole];
-  double g[kWhole][kMax][3];
+  double *weight = nullptr;  // [points]
+  double (*g)[3] = nullptr;  // [points,rows]
 };
 // The inner displacements of a hexahedron, at rest under elastic stresses: component r is minus the sum of
 // share[r] times all components before it.
-struct RestInner { double share[3 * kInner][3 * kMax]; };
+struct RestInner { double share[3 * kInner][3 * (8 + kInner)]; };
 
 // At one of the points of a rule.
 struct Point {
@@ -115,31 +116,52 @@ inline void tet10(int n, Point &p) {
   }
 }
 
-inline void hex8(Point &p) {
-  constexpr int kSign[8][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1}, {-1, 1, -1},
-                               {-1, -1, 1},  {1, -1, 1},  {1, 1, 1},  {-1, 1, 1}};
-  for (int k = 0; k < 8; ++k)
-    for (int c = 0; c < 3; ++c) {
-      const int i = (c + 1) % 3, j = (c + 2) % 3;
-      p.local[k][c] = 0.125 * kSign[k][c] * (1 + kSign[k][i] * p.at[i]) * (1 + kSign[k][j] * p.at[j]);
-    }
+// Of the 3 x 3 x 3 points.
+inline double whole_share(int n) {
+  constexpr double kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  return kShare[n % 3] * kShare[n / 3 % 3] * kShare[n / 9];
 }
 
-inline void hex8_place(int n, const double *inside, Point &p) {
+inline void hexahedron(int nodes, Point &p) {
+  constexpr int kAt[27][3] = {{-1, -1, -1}, {1, -1, -1}, {1, 1, -1},  {-1, 1, -1}, {-1, -1, 1}, {1, -1, 1},
+                              {1, 1, 1},    {-1, 1, 1},  {0, -1, -1}, {1, 0, -1},  {0, 1, -1},  {-1, 0, -1},
+                              {0, -1, 1},   {1, 0, 1},   {0, 1, 1},   {-1, 0, 1},  {-1, -1, 0}, {1, -1, 0},
+                              {1, 1, 0},    {-1, 1, 0},  {-1, 0, 0},  {1, 0, 0},   {0, -1, 0},  {0, 1, 0},
+                              {0, 0, -1},   {0, 0, 1},   {0, 0, 0}};
+  for (int k = 0; k < nodes; ++k) {
+    double f[3], d[3], along = -2;
+    bool corner = true;
+    for (int c = 0; c < 3; ++c) {
+      const double s = kAt[k][c], x = p.at[c];
+      const bool middle = kAt[k][c] == 0, square = nodes == 27;
+      f[c] = middle ? 1 - x * x : 0.5 * (1 + s * x) * (square ? s * x : 1);
+      d[c] = middle ? -2 * x : square ? x + 0.5 * s : 0.5 * s;
+      along += s * x;
+      corner &= !middle;
+    }
+    for (int c = 0; c < 3; ++c) {
+      const int i = (c + 1) % 3, j = (c + 2) % 3;
+      p.local[k][c] = d[c] * f[i] * f[j];
+      if (nodes == 20 && corner) p.local[k][c] = (along * d[c] + kAt[k][c] * f[c]) * f[i] * f[j];
+    }
+  }
+}
+
+inline void hexahedron_place(int nodes, int n, const double *inside, Point &p) {
   constexpr double kGauss = 0.57735026918962576451, kThree = 0.77459666924148337704;
   constexpr int kHigh[8] = {0, 1, 3, 2, 4, 5, 7, 6};  // bits by axis
+  const bool three = inside || nodes > 8;
   for (int c = 0, step = 1; c < 3; ++c, step *= 3)
-    p.at[c] = inside ? kThree * (n / step % 3 - 1) : kHigh[n] >> c & 1 ? kGauss : -kGauss;
-  p.weight = inside ? 8 * inside[n] : 1;
+    p.at[c] = three ? kThree * (n / step % 3 - 1) : kHigh[n] >> c & 1 ? kGauss : -kGauss;
+  p.weight = inside ? 8 * inside[n] : three ? 8 * whole_share(n) : 1;
 }
 
 // The weights of a cell that is all material. Those of others may be negative, so that no potential of the
 // flow at their points has a least value: such a cell flows by its mean strain, which has no more energy
 // than the elastic cell.
 inline bool is_whole(const double *inside) {
-  constexpr double kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
   for (int n = 0; n < kInside; ++n)
-    if (std::fabs(inside[n] - kShare[n % 3] * kShare[n / 3 % 3] * kShare[n / 9]) > 1e-9) return false;
+    if (std::fabs(inside[n] - whole_share(n)) > 1e-9) return false;
   return true;
 }
 
@@ -261,33 +283,32 @@ inline bool make_rest_tetrahedron(const double *x, const Lame &m, RestCell &out)
   return true;
 }
 
-// x [nodes,3] m; inside [27] or null. at_points may be null, and is for cells that are no first-order
-// tetrahedra; with it hexahedra need inner. False if the Jacobian is not positive at a point: the cell is
+// x [nodes,3] m; inside [27] or null. at_points may be empty, and is for cells that are no first-order
+// tetrahedra; with it HEX8 need inner. False if the Jacobian is not positive at a point: the cell is
 // inverted or flat there.
 inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside, const CellMaterial &material,
-                           RestCell &out, cells::RestPoints *at_points = nullptr,
+                           RestCell &out, const cells::RestPoints &at_points = {},
                            cells::RestInner *inner = nullptr) {
   using namespace cells;
   const Lame &m = material.lame;
   if (kind == DFM_CELL_TET) return make_rest_tetrahedron(x, m, out);
-  const bool hex = kind == DFM_CELL_HEX8;
-  const int nodes = int(nodes_of(kind)), rows = hex ? nodes + kInner : nodes,
-            points = inside ? kInside : kWhole;
+  const int nodes = int(nodes_of(kind)), rows = rows_of(kind), points = inside ? kInside : points_of(kind);
+  const bool hex = kind != DFM_CELL_TET10, inner_rows = rows > nodes;
   const auto look = [&](int n, Point &p) {
-    hex ? hex8_place(n, inside, p) : tet10(n, p);
-    if (hex) hex8(p);
+    hex ? hexahedron_place(nodes, n, inside, p) : tet10(n, p);
+    if (hex) hexahedron(nodes, p);
     return jacobian_of(uint32_t(nodes), x, p);
   };
   Point q[kInside], center{};
-  if (hex) hex8(center);
-  if (hex && !jacobian_of(uint32_t(nodes), x, center)) return false;
+  if (inner_rows) hexahedron(nodes, center);
+  if (inner_rows && !jacobian_of(uint32_t(nodes), x, center)) return false;
   out = RestCell();
   double spurious[kInner][3] = {};  // m^2, integrals of the quadratic displacements' gradients
   for (int n = 0; n < points; ++n) {
     if (!look(n, q[n])) return false;
     q[n].weight *= q[n].jacobian;
     for (int a = 0; a < nodes; ++a) gradient(q[n].inverse, q[n].local[a], 1, q[n].g[a]);
-    for (int k = 0; hex && k < kInner; ++k) {
+    for (int k = 0; inner_rows && k < kInner; ++k) {
       double local[3] = {};
       local[k] = q[n].at[k];
       gradient(center.inverse, local, center.jacobian / q[n].jacobian, q[n].g[nodes + k]);
@@ -303,10 +324,10 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
     for (int k = 0; k < kInner; ++k)
       for (int c = 0; c < 3; ++c) q[n].g[nodes + k][c] -= spurious[k][c] / out.volume;
   double theta[kInside][kMax][3];
-  for (int n = 0; n < points; ++n) std::copy_n(&q[n].g[0][0], 3 * kMax, &theta[n][0][0]);
+  for (int n = 0; n < points; ++n) std::copy_n(&q[n].g[0][0], 3 * rows, &theta[n][0][0]);
   const int kept = hex ? project(q, points, rows, theta) : 0;
   for (int n = 0; n < points; ++n)
-    for (int k = 0; hex && k < kInner; ++k)
+    for (int k = 0; inner_rows && k < kInner; ++k)
       for (int c = 0; c < 3 && !(kept >> (k + 1) & 1); ++c) q[n].g[nodes + k][c] = theta[n][nodes + k][c] = 0;
   // 2 mu deviator : deviator + bulk theta^2
   const double bulk = m.lambda + 2 * m.mu / 3;
@@ -329,13 +350,12 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
           }
       }
   eliminate(k, 3 * nodes, 3 * rows);
-  if (at_points && !inside) {
-    *at_points = RestPoints();
+  if (at_points.weight && !inside) {
     for (int n = 0; n < points; ++n) {
-      at_points->weight[n] = q[n].weight;
-      std::copy_n(q[n].g[0], 3 * rows, at_points->g[n][0]);
+      at_points.weight[n] = q[n].weight;
+      std::copy_n(q[n].g[0], 3 * rows, at_points.g[n * rows]);
     }
-    if (hex) *inner = RestInner();
+    if (inner_rows) *inner = RestInner();
     for (int r = 3 * nodes; r < 3 * rows; ++r)
       for (int j = 0; j < r && k[r][r] > 0; ++j) inner->share[r - 3 * nodes][j] = k[r][j] / k[r][r];
   }
@@ -347,13 +367,14 @@ inline bool make_rest_cell(uint32_t kind, const double *x, const double *inside,
   for (int i = 0; i < 3 * nodes; ++i)
     for (int j = 0; j < 3 * nodes; ++j)
       out.stiffness[i][j] += kTie * (out.volume / whole.volume * whole.stiffness[i][j] - out.stiffness[i][j]);
-  if (at_points && !is_whole(inside)) {
-    *at_points = RestPoints();
+  if (at_points.weight && !is_whole(inside)) {
+    std::fill_n(at_points.weight, points_of(kind), 0.0);
+    std::fill_n(at_points.g[0], 3 * rows, 0.0);
     *inner = RestInner();
-    at_points->weight[0] = out.volume;
+    at_points.weight[0] = out.volume;
     for (int a = 0; a < nodes; ++a)
       for (int c = 0; c < 3; ++c)
-        at_points->g[0][a][c] = out.mean[a][c] + kTie * (whole.mean[a][c] - out.mean[a][c]);
+        at_points.g[a][c] = out.mean[a][c] + kTie * (whole.mean[a][c] - out.mean[a][c]);
   }
   return true;
 }

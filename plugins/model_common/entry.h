@@ -44,8 +44,15 @@ constexpr uint32_t cells_of() {
   if constexpr (requires { Body::kCells; }) return Body::kCells;
   else return DFM_CELL_TET;
 }
+constexpr uint32_t kAllCells =
+    DFM_CELL_TET | DFM_CELL_TET10 | DFM_CELL_HEX8 | DFM_CELL_HEX20 | DFM_CELL_HEX27;
+constexpr uint32_t kMaxNodes = 27;
 constexpr uint32_t nodes_of(uint32_t kind) {
-  return kind == DFM_CELL_TET10 ? 10 : kind == DFM_CELL_HEX8 ? 8 : 4;
+  return kind == DFM_CELL_HEX27   ? 27
+         : kind == DFM_CELL_HEX20 ? 20
+         : kind == DFM_CELL_TET10 ? 10
+         : kind == DFM_CELL_HEX8  ? 8
+                                  : 4;
 }
 
 // Why a model on these kinds of cells, with edges, cannot use the mesh; NULL if it can.

@@ -89,11 +89,14 @@ dfm_status state_init(const void *self, double *state) {
 }
 
 // The plastic strain at the points of a cell, of which a first-order tetrahedron has one.
-const dfm_slot kPoint = {DFM_PER_CELL, model::plastic::kState, DFM_SLOT_SCALAR, 0},
-               kPoints = {DFM_PER_CELL, model::CellPoints::kState, DFM_SLOT_SCALAR, 0};
+constexpr dfm_slot slot_of(uint32_t points) {
+  return {DFM_PER_CELL, points * model::plastic::kState, DFM_SLOT_SCALAR, 0};
+}
+const dfm_slot kPoint = slot_of(1), kEight = slot_of(8), kMany = slot_of(27);
 const dfm_slots kNoSlots = {sizeof(dfm_slots), 0, nullptr, 0, 0},
                 kSlots = {sizeof(dfm_slots), 1, &kPoint, 0, 0},
-                kSlotsOfPoints = {sizeof(dfm_slots), 1, &kPoints, 0, 0};
+                kSlotsOfEight = {sizeof(dfm_slots), 1, &kEight, 0, 0},
+                kSlotsOfMany = {sizeof(dfm_slots), 1, &kMany, 0, 0};
 
 constexpr uint32_t kCaps =
     DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_INSIDE;
@@ -118,7 +121,10 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
   if (!strcmp(id, DFM_EXT_SLOTS)) {
     const AnyBody &body = *static_cast<const AnyBody *>(self);
-    return !body.plastic() ? &kNoSlots : body.by_cells ? &kSlotsOfPoints : &kSlots;
+    return !body.plastic()            ? &kNoSlots
+           : !body.by_cells           ? &kSlots
+           : body.cells.points() == 8 ? &kSlotsOfEight
+                                      : &kSlotsOfMany;
   }
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;

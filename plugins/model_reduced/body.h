@@ -221,7 +221,7 @@ class Body {
 };
 
 struct Modal : Body {
-  static constexpr uint32_t kCells = DFM_CELL_TET | DFM_CELL_HEX8 | DFM_CELL_TET10;
+  static constexpr uint32_t kCells = model::kAllCells;
   Modal() : Body(kModalId, false) {}
 };
 struct Condensed : Body {

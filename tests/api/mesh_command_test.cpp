@@ -150,6 +150,12 @@ TEST(MeshCommand, MakeOfSecondOrder_IsOfCells) {
   };
   EXPECT_TRUE(has(made(obj, "2").err, "--order 2 is of cells, and this is a surface"));
   EXPECT_EQ(made(vtu, "3").exit_code, 2);
+  const std::string bricks = folder() + "/bricks.vtk", msh = folder() + "/bricks.msh";
+  ASSERT_EQ(
+      test::deform({"mesh", "make", "bricks", "--cells", "10", "--order", "2", "--out", bricks}).exit_code,
+      0);
+  ASSERT_EQ(test::deform({"mesh", "convert", bricks, msh}).exit_code, 0);
+  EXPECT_TRUE(has(test::deform({"mesh", "info", msh}).out, "10 hexahedra of 27 points"));
   EXPECT_EQ(made(vtu, "2").exit_code, 0);
   const auto info = test::deform({"mesh", "info", vtu});
   EXPECT_TRUE(has(info.out, "second-order tetrahedra"));

@@ -15,10 +15,12 @@ struct Case {
   bool turns() const { return std::strcmp(module, "model_corotational_fem") == 0; }
 };
 std::string name_of(const testing::TestParamInfo<Case> &info) {
-  return std::string(info.param.turns() ? "Corotational" : "Linear") + (info.param.cut ? "Cut"
-                                                                        : info.param.kind == DFM_CELL_TET10
-                                                                            ? "Tet10"
-                                                                            : "Hex8");
+  return std::string(info.param.turns() ? "Corotational" : "Linear") +
+         (info.param.cut                      ? "Cut"
+          : info.param.kind == DFM_CELL_TET10 ? "Tet10"
+          : info.param.kind == DFM_CELL_HEX8  ? "Hex8"
+          : info.param.kind == DFM_CELL_HEX20 ? "Hex20"
+                                              : "Hex27");
 }
 const dfm_type &type_by(const char *module) {
   static std::map<std::string, const dfm_type *> known;
@@ -54,9 +56,10 @@ struct Body : ModelInstance {
   }
 };
 
-// A block with inner points, distorted; of tetrahedra with curved edges too.
+// A block with inner points, distorted; of second order with curved edges too.
 Mesh distorted(uint32_t kind) {
   if (kind == DFM_CELL_HEX8) return brick_bar(3, 3, 3, {0.1, 0.12, 0.09}, 0.25);
+  if (kind != DFM_CELL_TET10) return with_middles(brick_bar(3, 2, 2, {0.1, 0.12, 0.09}, 0.15), kind, 0.03);
   return second_order(kuhn_bar(2, 2, 2, 0.1, 0.15), 0.03);
 }
 bool inner(const Mesh &m, uint32_t i) {
@@ -74,21 +77,27 @@ bool inner(const Mesh &m, uint32_t i) {
 Mesh Case::mesh() const { return cut ? cut_bars() : distorted(kind); }
 
 class CellBody : public testing::TestWithParam<Case> {};
-INSTANTIATE_TEST_SUITE_P(Both, CellBody,
-                         testing::Values(Case{"model_linear_fem", DFM_CELL_TET10},
-                                         Case{"model_linear_fem", DFM_CELL_HEX8},
-                                         Case{"model_linear_fem", DFM_CELL_HEX8, true},
-                                         Case{"model_corotational_fem", DFM_CELL_TET10},
-                                         Case{"model_corotational_fem", DFM_CELL_HEX8},
-                                         Case{"model_corotational_fem", DFM_CELL_HEX8, true}),
-                         name_of);
+INSTANTIATE_TEST_SUITE_P(
+    Both, CellBody,
+    testing::Values(Case{"model_linear_fem", DFM_CELL_TET10}, Case{"model_linear_fem", DFM_CELL_HEX8},
+                    Case{"model_linear_fem", DFM_CELL_HEX8, true}, Case{"model_linear_fem", DFM_CELL_HEX20},
+                    Case{"model_linear_fem", DFM_CELL_HEX27}, Case{"model_corotational_fem", DFM_CELL_HEX20},
+                    Case{"model_corotational_fem", DFM_CELL_HEX27},
+                    Case{"model_corotational_fem", DFM_CELL_TET10},
+                    Case{"model_corotational_fem", DFM_CELL_HEX8},
+                    Case{"model_corotational_fem", DFM_CELL_HEX8, true}),
+    name_of);
 // Of others the material ends inside the cells, so inner points carry its border.
 class WholeCellBody : public CellBody {};
 INSTANTIATE_TEST_SUITE_P(Both, WholeCellBody,
                          testing::Values(Case{"model_linear_fem", DFM_CELL_TET10},
                                          Case{"model_linear_fem", DFM_CELL_HEX8},
+                                         Case{"model_linear_fem", DFM_CELL_HEX20},
+                                         Case{"model_linear_fem", DFM_CELL_HEX27},
                                          Case{"model_corotational_fem", DFM_CELL_TET10},
-                                         Case{"model_corotational_fem", DFM_CELL_HEX8}),
+                                         Case{"model_corotational_fem", DFM_CELL_HEX8},
+                                         Case{"model_corotational_fem", DFM_CELL_HEX20},
+                                         Case{"model_corotational_fem", DFM_CELL_HEX27}),
                          name_of);
 
 constexpr double kNone[3][3] = {};
@@ -197,9 +206,10 @@ double field_error(uint32_t kind, uint32_t n) {
     return Vec{e * sy * sz, 0.6 * e * cy * sz, 0.8 * e * sy * cz};
   };
   const double h = 1.0 / n;
-  const Mesh m = kind == DFM_CELL_HEX8  ? brick_bar(n, n, n, {h, h, h})
-                 : kind == DFM_CELL_TET ? kuhn_bar(n, n, n, h)
-                                        : second_order(kuhn_bar(n, n, n, h));
+  const Mesh m = kind == DFM_CELL_HEX8    ? brick_bar(n, n, n, {h, h, h})
+                 : kind == DFM_CELL_TET   ? kuhn_bar(n, n, n, h)
+                 : kind == DFM_CELL_TET10 ? second_order(kuhn_bar(n, n, n, h))
+                                          : with_middles(brick_bar(n, n, n, {h, h, h}), kind);
   Host host;
   Body b(host, {"model_linear_fem", kind}, m);
   const Dense k = tangent(b, 1, 0);
@@ -237,8 +247,33 @@ TEST(CellBars, ErrorOfASmoothField_FallsByTheOrderOfTheCells) {
   const double hex8 = field_error(DFM_CELL_HEX8, 3) / field_error(DFM_CELL_HEX8, 6);
   EXPECT_GT(std::log2(tet10), 2.7);
   EXPECT_GT(std::log2(hex8), 1.8);
+  for (const uint32_t kind : {DFM_CELL_HEX20, DFM_CELL_HEX27})
+    EXPECT_GT(std::log2(field_error(kind, 2) / field_error(kind, 4)), 2.7) << kind;
   // beside first-order tetrahedra with the same points
   EXPECT_LT(field_error(DFM_CELL_TET10, 4), 0.5 * field_error(DFM_CELL_TET, 8));
+}
+
+// The gradient of y z^2 - y^3/3 + x y z: quadratic, without volume change or loads.
+TEST(CellBars, QuadraticFields_LeaveInnerPointsOfBricksInBalance) {
+  for (const uint32_t kind : {DFM_CELL_HEX20, DFM_CELL_HEX27})
+    for (const double poisson : {0.3, 0.4999}) {
+      Host host;
+      const Mesh m = with_middles(brick_bar(3, 2, 2, {0.1, 0.12, 0.09}), kind);
+      Body b(host, {"model_linear_fem", kind}, m, poisson);
+      for (uint32_t i = 0; i < b.size(); ++i) {
+        const Vec x = m.at(i);
+        b.set(b.x, i,
+              x + Vec{x[1] * x[2], x[2] * x[2] - x[1] * x[1] + x[0] * x[2], 2 * x[1] * x[2] + x[0] * x[1]});
+      }
+      b.forces();
+      uint32_t n = 0;
+      for (uint32_t i = 0; i < b.size(); ++i)
+        if (inner(m, i)) {
+          EXPECT_LT(norm(b.get(b.f, i)), 1e-12 * kYoung / (1 - 2 * poisson)) << kind << ' ' << i;
+          ++n;
+        }
+      EXPECT_GE(n, 8u);
+    }
 }
 
 // The displacement u = 2 (a.x) x - |x|^2 a has no shear. What resists it in a lone cell is the linear part

@@ -64,6 +64,68 @@ inline Mesh brick_bar(uint32_t nx, uint32_t ny, uint32_t nz, Vec h, double noise
   return m;
 }
 
+// The same bricks as HEX20 or HEX27; `noise` shifts the new nodes by that share of the first edge.
+inline Mesh with_middles(const Mesh &m, uint32_t kind, double noise = 0) {
+  const std::vector<uint32_t> of[19] = {{0, 1},
+                                        {1, 2},
+                                        {2, 3},
+                                        {3, 0},
+                                        {4, 5},
+                                        {5, 6},
+                                        {6, 7},
+                                        {7, 4},
+                                        {0, 4},
+                                        {1, 5},
+                                        {2, 6},
+                                        {3, 7},
+                                        {0, 3, 4, 7},
+                                        {1, 2, 5, 6},
+                                        {0, 1, 4, 5},
+                                        {2, 3, 6, 7},
+                                        {0, 1, 2, 3},
+                                        {4, 5, 6, 7},
+                                        {0, 1, 2, 3, 4, 5, 6, 7}};
+  Mesh out;
+  out.kind = kind;
+  out.rest = m.rest;
+  std::map<std::vector<uint32_t>, uint32_t> known;
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> u(-noise, noise);
+  out.mass.assign(m.npoint(), 0);
+  for (uint32_t c = 0; c < m.ncell(); ++c) {
+    const uint32_t *const q = &m.cells[8 * size_t(c)];
+    const Vec d = m.at(q[6]) - m.at(q[0]);
+    out.cells.insert(out.cells.end(), q, q + 8);
+    for (uint32_t k = 0; k + 8 < out.nodes(); ++k) {
+      std::vector<uint32_t> key;
+      Vec middle{};
+      for (const uint32_t n : of[k]) {
+        key.push_back(q[n]);
+        middle = middle + (1.0 / double(of[k].size())) * m.at(q[n]);
+      }
+      std::sort(key.begin(), key.end());
+      const auto [at, fresh] = known.insert({key, uint32_t(out.rest.size() / 3)});
+      if (fresh) {
+        for (const double x : middle) out.rest.push_back(x + norm(m.at(q[1]) - m.at(q[0])) * u(random));
+        out.mass.push_back(0);
+      }
+      out.cells.push_back(at->second);
+    }
+    for (uint32_t k = 0; k < out.nodes(); ++k) {
+      const double twenty = k < 8 ? 7.0 / 248 : 16.0 / 248;
+      const double share = kind == DFM_CELL_HEX20 ? twenty
+                                                  : (k < 8    ? 1
+                                                     : k < 20 ? 4
+                                                     : k < 26 ? 16
+                                                              : 64) /
+                                                        216.0;
+      out.mass[out.cells[out.nodes() * size_t(c) + k]] += 1000 * d[0] * d[1] * d[2] * share;
+    }
+  }
+  out.edges = m.edges;
+  return out;
+}
+
 // Weights of the three Gauss points for integrals over [-1,end] in place of [-1,1], in its length.
 inline std::array<double, 3> part_rule(double end) {
   const double g = std::sqrt(0.6), m0 = (end + 1) / 2, m1 = (end * end - 1) / 4,

@@ -161,7 +161,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"model_fills_its_slots", "V03", "7 in reserved"},
         Case{"model_fills_a_row", "V03", "5 in reserved"},
         Case{"model_table_without_function", "V03", "has no function"},
-        Case{"model_without_bound", "V03", "bound is NULL"}, Case{"model_of_unheard_cells", "V03", "0x40"},
+        Case{"model_without_bound", "V03", "bound is NULL"}, Case{"model_of_unheard_cells", "V03", "0x100"},
         Case{"model_cannot_change", "V03", "no set_params"}, Case{"solver_of_unheard_kind", "V03", "0x4"},
         Case{"model_refuses_in_silence", "V04", "without a reason"},
         Case{"model_allocates", "V05", "calls malloc"}, Case{"model_writes_between", "V06", "stride"},

@@ -100,7 +100,13 @@ struct Mesh {
   uint32_t kind = DFM_CELL_TET;
   std::vector<double> rest, mass, inside;  // inside: of hexahedra in part material
   std::vector<uint32_t> cells, edges;
-  uint32_t nodes() const { return kind == DFM_CELL_TET10 ? 10 : kind == DFM_CELL_HEX8 ? 8 : 4; }
+  uint32_t nodes() const {
+    return kind == DFM_CELL_HEX27   ? 27
+           : kind == DFM_CELL_HEX20 ? 20
+           : kind == DFM_CELL_TET10 ? 10
+           : kind == DFM_CELL_HEX8  ? 8
+                                    : 4;
+  }
   uint32_t npoint() const { return uint32_t(rest.size() / 3); }
   uint32_t ncell() const { return uint32_t(cells.size() / nodes()); }
   Vec at(uint32_t i) const { return {rest[3 * i], rest[3 * i + 1], rest[3 * i + 2]}; }

@@ -21,9 +21,12 @@ std::vector<Kind> kinds() {
   for (uint32_t c = 0; c < cut.ncell(); ++c)  // the upper layer is in part material
     for (uint32_t q = 0; q < 27; ++q)
       cut.inside.push_back(whole[q % 3] * whole[q / 3 % 3] * (c % 2 ? part : whole)[q / 9]);
-  return {{"second-order tetrahedra", second_order(kuhn_bar(6, 2, 2, 0.1, 0.1), 0.02)},
-          {"hexahedra", brick_bar(6, 2, 2, {0.1, 0.1, 0.1}, 0.2)},
-          {"lattice", std::move(cut)}};
+  return {
+      {"second-order tetrahedra", second_order(kuhn_bar(6, 2, 2, 0.1, 0.1), 0.02)},
+      {"hexahedra", brick_bar(6, 2, 2, {0.1, 0.1, 0.1}, 0.2)},
+      {"hexahedra of 20 points", with_middles(brick_bar(4, 1, 1, {0.15, 0.2, 0.2}), DFM_CELL_HEX20, 0.02)},
+      {"hexahedra of 27 points", with_middles(brick_bar(4, 1, 1, {0.15, 0.2, 0.2}), DFM_CELL_HEX27, 0.02)},
+      {"lattice", std::move(cut)}};
 }
 
 // Bits of the points near x = 0: curved edges leave the plane.

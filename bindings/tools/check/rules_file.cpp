@@ -243,8 +243,8 @@ void check_law(const dfm_type &type, const dfm_friction &law) {
 
 // Numbers that must agree, and functions that some parameters and claims require.
 void check_model(const dfm_type &type, const dfm_model &model) {
-  constexpr uint32_t kCells =
-      DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX8 | DFM_CELL_TET10;
+  constexpr uint32_t kCells = DFM_CELL_POINT | DFM_CELL_EDGE | DFM_CELL_TRI | DFM_CELL_TET | DFM_CELL_HEX8 |
+                              DFM_CELL_TET10 | DFM_CELL_HEX20 | DFM_CELL_HEX27;
   if (model.cells & ~kCells)
     broken("cells has bits that this ABI does not know (%#x); use DFM_CELL_*", model.cells & ~kCells);
   for (uint32_t i = 0; i < type.nparam && !model.set_params; ++i)

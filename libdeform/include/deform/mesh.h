@@ -13,7 +13,7 @@ enum { DFM_MESH_ANY = 0, DFM_MESH_CELLS = 1, DFM_MESH_SURFACE = 2 };
  * OFF (doc/reference/mesh_files.md). The first bytes, else the ending, tell the format. Memory is bounded
  * by the size of the file. Each repair is counted in dfm_mesh_info and has a sentence in its warnings and
  * the log.
- * Cells are tetrahedra, also of second order, or hexahedra. Inverted ones are reversed, unused points and
+ * Cells are tetrahedra or hexahedra, both also of second order. Inverted ones are reversed, unused points and
  * duplicate cells removed. A cell without volume is refused: it has no rest shape.
  * A surface is the file's triangles, or the boundary of its cells. Polygons are divided into triangles.
  * Coincident points are merged, triangles without area and duplicates removed, and triangles oriented so
@@ -71,8 +71,8 @@ typedef struct dfm_mesh_info {
   double area;
   const double *points; /* [npoint,3] */
   const uint32_t *tets; /* [ntet,4] */
-  /* [ncell,k] points in the order of plugin.h, for dfm_body_def.cells; each cell is then 8 (second-order
-   * tetrahedra) or 6 (hexahedra) consecutive ones of tets. NULL where the cells are the tets */
+  /* [ncell,k] points in the order of plugin.h, for dfm_body_def.cells; each cell is then 8 (TET10), 6 (HEX8),
+   * 22 (HEX20) or 48 (HEX27) consecutive ones of tets. NULL where the cells are the tets */
   const uint32_t *cells;
   /* [nface,3], [nface]: triangles and the group of each (UINT32_MAX: none), of a surface all, outward;
    * beside cells those of the file that belong to a group, some perhaps inside, for dfm_body_def.groups */
@@ -103,8 +103,9 @@ DFM_API dfm_status dfm_mesh_get_info(dfm_mesh_handle mesh, dfm_mesh_info *out);
  * (binary), STL (binary, single precision), OFF, VTK or VTU; OBJ, VTK and VTU keep groups, PLY by number.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_write(dfm_mesh_handle mesh, const char *path);
-/** The same shape with second-order tetrahedra: points in the middles of the edges, groups kept. @return
- * DFM_OK; DFM_E_UNSUPPORTED other cells, or those of a filled surface; DFM_E_NOMEM; DFM_E_HANDLE no cells.
+/** The same shape with second-order tetrahedra, or hexahedra of 27 points: more points in the middles of the
+ * edges, of hexahedra of faces and cells too, groups kept. @return DFM_OK; DFM_E_UNSUPPORTED second-order
+ * cells, or those of a filled surface or lattice; DFM_E_NOMEM; DFM_E_HANDLE no cells.
  * Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_second_order(dfm_mesh_handle mesh, dfm_mesh_handle *out);
 /** Fills a closed surface with cells of a lattice. Small holes, flipped and touching triangles are allowed:

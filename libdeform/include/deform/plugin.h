@@ -174,8 +174,10 @@ enum {
   DFM_CAP_INSIDE = 128             /* accepts dfm_mesh.inside */
 };
 /* [ncell,k] points: 4 corners; those and then the middles of the edges 01 12 02 03 13 23, k = 10; 8 corners,
- * around the bottom, then around the top */
-enum { DFM_CELL_TET = 8, DFM_CELL_HEX8 = 16, DFM_CELL_TET10 = 32 };
+ * around the bottom, then around the top; those and then the middles of the edges 01 12 23 30 45 56 67 74 04
+ * 15 26 37, k = 20; those and then the middles of the faces 0473 1265 0154 3267 0321 4567 and of the cell,
+ * k = 27 */
+enum { DFM_CELL_TET = 8, DFM_CELL_HEX8 = 16, DFM_CELL_TET10 = 32, DFM_CELL_HEX20 = 64, DFM_CELL_HEX27 = 128 };
 typedef struct dfm_mesh {             /* rest configuration; borrowed during create() only */
   uint32_t size, npoint, ncell, cell; /* cell: one DFM_CELL_* */
   /* [npoint,3] m, before the body's pose; after it for a model without DFM_CAP_ROTATION_INVARIANT */

@@ -87,18 +87,18 @@ void tet_weights(Vec3 x, const Vec3 c[4], double w[4]) {
 // its center: one step in a box. False where it does not get there, far outside a distorted cell.
 bool hexahedron_weights(Vec3 x, const Vec3 c[8], Vec3 &at, double w[8]) {
   constexpr int kSteps = 20;
-  constexpr uint32_t kAll[8] = {0, 1, 2, 3, 4, 5, 6, 7};
-  double points[24];
-  for (size_t k = 0; k < 8; ++k) store3(points + 3 * k, c[k]);
   const double near2 = 1e-28 * norm2(c[6] - c[0]);
   at = {};
   for (int step = 0; step < kSteps; ++step) {
-    hexahedron_shapes(at, w);
-    Vec3 left = x;
+    Vec3 left = x, along[3], slope[8];
+    hexahedron_shapes(8, at, w, slope);
     for (int k = 0; k < 8; ++k) left -= w[k] * c[k];
     if (norm2(left) <= near2) return true;
-    Vec3 along[3];
-    hexahedron_jacobian(points, 3, kAll, at, along);
+    for (int k = 0; k < 8; ++k) {
+      along[0] += slope[k].x * c[k];
+      along[1] += slope[k].y * c[k];
+      along[2] += slope[k].z * c[k];
+    }
     const Vec3 n0 = cross(along[1], along[2]), n1 = cross(along[2], along[0]), n2 = cross(along[0], along[1]);
     const double inverse = 1 / dot(along[0], n0);
     at += inverse * Vec3{dot(left, n0), dot(left, n1), dot(left, n2)};

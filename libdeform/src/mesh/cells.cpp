@@ -1,7 +1,6 @@
 #include "mesh/cells.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "core/error.h"
 #include "deform/plugin.h"
@@ -12,40 +11,39 @@ namespace dfm {
 namespace {
 
 constexpr uint32_t kNoPoint = UINT32_MAX;
-constexpr CellKind kKinds[] = {{DFM_CELL_TET, 4, 1, "tetrahedra", 4, 10},
-                               {DFM_CELL_TET10, 10, 8, "second-order tetrahedra", 11, 24},
-                               {DFM_CELL_HEX8, 8, 6, "hexahedra", 5, 12}};
+constexpr uint8_t kMshTet10[] = {0, 1, 2, 3, 4, 5, 6, 7, 9, 8};
+constexpr uint8_t kMshHex[] = {0,  1,  2,  3,  4,  5,  6,  7,  8,  11, 16, 9,  17, 10,
+                               18, 19, 12, 15, 13, 14, 24, 22, 20, 21, 23, 25, 26};
+constexpr CellKind kKinds[] = {
+    {DFM_CELL_TET, 4, 1, "tetrahedra", 4, 10, "Tetrahedra", nullptr},
+    {DFM_CELL_TET10, 10, 8, "second-order tetrahedra", 11, 24, "TetrahedraP2", kMshTet10},
+    {DFM_CELL_HEX8, 8, 6, "hexahedra", 5, 12, "Hexahedra", nullptr},
+    {DFM_CELL_HEX20, 20, 22, "hexahedra of 20 points", 17, 25, nullptr, kMshHex},
+    {DFM_CELL_HEX27, 27, 48, "hexahedra of 27 points", 12, 29, nullptr, kMshHex}};
 // middles of the edges 01 12 02 03 13 23 are 4 to 9
-constexpr uint32_t kTets[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
-                                  {6, 8, 7, 4}, {6, 8, 9, 7}, {6, 8, 5, 9}, {6, 8, 4, 5}};
-constexpr uint32_t kQuads[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
-                                   {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};  // outward
+constexpr uint8_t kTets[8][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
+                                 {6, 8, 7, 4}, {6, 8, 9, 7}, {6, 8, 5, 9}, {6, 8, 4, 5}};
+using Quads = uint8_t[6][4];  // outward
+constexpr Quads kQuads = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
+// The middles of the edges of each face, and those at each corner, facing away from it.
+constexpr Quads kMiddles = {{11, 10, 9, 8},  {12, 13, 14, 15}, {8, 17, 12, 16},
+                            {9, 18, 13, 17}, {10, 19, 14, 18}, {11, 16, 15, 19}};
+constexpr uint8_t kAtCorner[8][3] = {{8, 11, 16},  {8, 17, 9},   {10, 9, 18},  {10, 19, 11},
+                                     {12, 16, 15}, {12, 13, 17}, {14, 18, 13}, {14, 15, 19}};
+constexpr uint8_t kHexEdges[12][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6},
+                                      {6, 7}, {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}};
+// Coordinates of the nodes of a hexahedron, and the node at each place, the first coordinate fastest.
+constexpr int8_t kPlace[27][3] = {
+    {-1, -1, -1}, {1, -1, -1}, {1, 1, -1},  {-1, 1, -1}, {-1, -1, 1}, {1, -1, 1}, {1, 1, 1},
+    {-1, 1, 1},   {0, -1, -1}, {1, 0, -1},  {0, 1, -1},  {-1, 0, -1}, {0, -1, 1}, {1, 0, 1},
+    {0, 1, 1},    {-1, 0, 1},  {-1, -1, 0}, {1, -1, 0},  {1, 1, 0},   {-1, 1, 0}, {-1, 0, 0},
+    {1, 0, 0},    {0, -1, 0},  {0, 1, 0},   {0, 0, -1},  {0, 0, 1},   {0, 0, 0}};
+constexpr uint8_t kGrid[27] = {0,  8,  1,  11, 24, 9,  3, 10, 2,  16, 22, 17, 20, 26,
+                               21, 19, 23, 18, 4,  12, 5, 15, 25, 13, 7,  14, 6};
 
-// Whether a node of a hexahedron lies on the high side of an axis.
-bool high_side(uint32_t node, int axis) {
-  return axis == 2 ? node >= 4 : axis == 1 ? node % 4 >= 2 : node % 4 == 1 || node % 4 == 2;
-}
-
-}  // namespace
-
-const CellKind &cell_kind(uint32_t kind) {
-  for (const CellKind &k : kKinds)
-    if (k.kind == kind) return k;
-  fail(DFM_E_ARG, "%u is no kind of cell; expected DFM_CELL_TET, DFM_CELL_TET10 or DFM_CELL_HEX8", kind);
-}
-
-void tets_of(const CellKind &kind, const uint32_t *cell, uint32_t *out) {
-  if (kind.nodes == 4) {
-    std::copy_n(cell, 4, out);
-    return;
-  }
-  if (kind.nodes == 10) {
-    for (const auto &tet : kTets)
-      for (const uint32_t node : tet) *out++ = cell[node];
-    return;
-  }
-  const uint32_t least = *std::min_element(cell, cell + 8);
-  for (const auto &quad : kQuads) {
+// Tetrahedra from the least of the points to the quadrangles that lack it.
+uint32_t *tets_from(uint32_t least, const Quads &quads, const uint32_t *cell, uint32_t *out) {
+  for (const auto &quad : quads) {
     uint32_t first = 0;
     for (uint32_t k = 1; k < 4; ++k)
       if (cell[quad[k]] < cell[quad[first]]) first = k;
@@ -53,6 +51,64 @@ void tets_of(const CellKind &kind, const uint32_t *cell, uint32_t *out) {
     const auto at = [&](uint32_t k) { return cell[quad[(first + k) % 4]]; };
     for (const uint32_t node : {least, at(0), at(1), at(2), least, at(0), at(2), at(3)}) *out++ = node;
   }
+  return out;
+}
+
+Vec3 place_of(uint32_t node) {
+  return {double(kPlace[node][0]), double(kPlace[node][1]), double(kPlace[node][2])};
+}
+
+// Of the place by the three coordinates there, its determinant; points [n,stride].
+double jacobian(uint32_t nodes, const double *points, size_t stride, const uint32_t *cell, Vec3 at) {
+  double value[kMostNodes];
+  Vec3 slope[kMostNodes], along[3];
+  hexahedron_shapes(nodes, at, value, slope);
+  for (uint32_t k = 0; k < nodes; ++k) {
+    const Vec3 x = load3(points + stride * cell[k]);
+    along[0] += slope[k].x * x;
+    along[1] += slope[k].y * x;
+    along[2] += slope[k].z * x;
+  }
+  return dot(along[0], cross(along[1], along[2]));
+}
+
+}  // namespace
+
+std::span<const CellKind> cell_kinds() { return kKinds; }
+
+const CellKind &cell_kind(uint32_t kind) {
+  for (const CellKind &k : kKinds)
+    if (k.kind == kind) return k;
+  fail(DFM_E_ARG, "%u is no kind of cell; expected one of DFM_CELL_TET, TET10, HEX8, HEX20 and HEX27", kind);
+}
+
+void tets_of(const CellKind &kind, const uint32_t *cell, uint32_t *out) {
+  if (kind.nodes == 4) std::copy_n(cell, 4, out);
+  if (kind.nodes == 8) tets_from(*std::min_element(cell, cell + 8), kQuads, cell, out);
+  if (kind.nodes == 10)
+    for (const auto &tet : kTets)
+      for (const uint32_t node : tet) *out++ = cell[node];
+  if (kind.nodes == 20) {
+    const uint32_t least = *std::min_element(cell + 8, cell + 20);
+    out = tets_from(least, kMiddles, cell, out);
+    for (uint32_t k = 0; k < 8; ++k) {
+      const uint32_t a = cell[kAtCorner[k][0]], b = cell[kAtCorner[k][1]], c = cell[kAtCorner[k][2]];
+      for (const uint32_t node : {cell[k], a, b, c}) *out++ = node;
+      if (a == least || b == least || c == least) continue;
+      for (const uint32_t node : {least, a, c, b}) *out++ = node;
+    }
+  }
+  if (kind.nodes == 27)
+    for (uint32_t part = 0; part < 8; ++part) {
+      uint32_t of[8];
+      for (uint32_t k = 0; k < 8; ++k) {
+        uint32_t at = 0;
+        for (uint32_t axis = 0, step = 1; axis < 3; ++axis, step *= 3)
+          at += step * ((part >> axis & 1) + (kPlace[k][axis] > 0));
+        of[k] = cell[kGrid[at]];
+      }
+      out = tets_from(*std::min_element(of, of + 8), kQuads, of, out);
+    }
 }
 
 Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<uint32_t> &cells) {
@@ -62,26 +118,42 @@ Array<uint32_t> tets_of(const Memory &memory, const CellKind &kind, const Array<
   return out;
 }
 
+void turn_over(const CellKind &kind, uint32_t *cell) {
+  const auto swap = [&](std::initializer_list<std::pair<int, int>> pairs) {
+    for (const auto &[i, j] : pairs) std::swap(cell[i], cell[j]);
+  };
+  if (kind.nodes == 10) swap({{2, 3}, {5, 8}, {6, 7}});
+  else swap({{0, 4}, {1, 5}, {2, 6}, {3, 7}});
+  if (kind.nodes >= 20) swap({{8, 12}, {9, 13}, {10, 14}, {11, 15}});
+  if (kind.nodes == 27) swap({{24, 25}});
+}
+
 void mass_shares(const CellKind &kind, const double *points, const uint32_t *cell, double *out) {
-  if (kind.nodes != 8) {
+  if (kind.nodes == 4 || kind.nodes == 10) {
     for (uint32_t k = 0; k < kind.nodes; ++k) out[k] = kind.nodes == 4 ? 0.25 : k < 4 ? 1.0 / 36 : 4.0 / 27;
     return;
   }
-  constexpr double kGauss = 0.57735026918962576451;
-  std::fill_n(out, 8, 0.0);
+  constexpr double kGauss = 0.57735026918962576451, kShare[3] = {5.0 / 18, 8.0 / 18, 5.0 / 18};
+  std::fill_n(out, kind.nodes, 0.0);
   double all = 0;
-  for (uint32_t q = 0; q < 8; ++q) {
-    const auto at = [&](int axis) { return high_side(q, axis) ? kGauss : -kGauss; };
-    const Vec3 place{at(0), at(1), at(2)};
-    double shape[8];
-    Vec3 along[3];
-    hexahedron_shapes(place, shape);
-    hexahedron_jacobian(points, 3, cell, place, along);
-    const double weight = dot(along[0], cross(along[1], along[2]));
-    all += weight;
-    for (uint32_t k = 0; k < 8; ++k) out[k] += weight * shape[k];
+  const uint32_t n = kind.nodes == 8 ? 8 : 27;
+  for (uint32_t q = 0; q < n; ++q) {
+    const Vec3 place = kind.nodes == 8    ? kGauss * place_of(q)
+                       : kind.nodes == 20 ? inside_place(q)
+                                          : place_of(q);
+    double weight = jacobian(kind.nodes, points, 3, cell, place), shape[kMostNodes];
+    Vec3 slope[kMostNodes];
+    if (kind.nodes == 20) weight *= kShare[q % 3] * kShare[q / 3 % 3] * kShare[q / 9];
+    for (int axis = 0; kind.nodes == 27 && axis < 3; ++axis) weight *= kPlace[q][axis] ? 1 : 4;
+    hexahedron_shapes(kind.nodes, place, shape, slope);
+    for (uint32_t k = 0; k < kind.nodes; ++k) {
+      const double share = weight * (kind.nodes == 20 ? shape[k] * shape[k] : shape[k]);
+      out[k] += share;
+      if (kind.nodes == 20) all += share;
+    }
+    if (kind.nodes != 20) all += weight;
   }
-  for (uint32_t k = 0; k < 8; ++k) out[k] /= all;
+  for (uint32_t k = 0; k < kind.nodes; ++k) out[k] /= all;
 }
 
 Vec3 inside_place(uint32_t point) {
@@ -89,34 +161,35 @@ Vec3 inside_place(uint32_t point) {
   return {kAt[point % 3], kAt[point / 3 % 3], kAt[point / 9]};
 }
 
-void hexahedron_shapes(Vec3 at, double out[8]) {
-  for (uint32_t k = 0; k < 8; ++k)
-    out[k] = 0.125 * (high_side(k, 0) ? 1 + at.x : 1 - at.x) * (high_side(k, 1) ? 1 + at.y : 1 - at.y) *
-             (high_side(k, 2) ? 1 + at.z : 1 - at.z);
-}
-
-void hexahedron_jacobian(const double *points, size_t stride, const uint32_t *cell, Vec3 at, Vec3 along[3]) {
-  Vec3 out[3];
-  for (uint32_t k = 0; k < 8; ++k) {
-    const Vec3 x = load3(points + stride * cell[k]);
-    const double sx = high_side(k, 0) ? 1 : -1, sy = high_side(k, 1) ? 1 : -1, sz = high_side(k, 2) ? 1 : -1;
-    const double px = 1 + sx * at.x, py = 1 + sy * at.y, pz = 1 + sz * at.z;
-    out[0] += (0.125 * sx * py * pz) * x;
-    out[1] += (0.125 * sy * pz * px) * x;
-    out[2] += (0.125 * sz * px * py) * x;
+void hexahedron_shapes(uint32_t nodes, Vec3 at, double *value, Vec3 *slope) {
+  const double x[3] = {at.x, at.y, at.z};
+  for (uint32_t k = 0; k < nodes; ++k) {
+    double f[3], d[3], along = -2;
+    int middles = 0;
+    for (int c = 0; c < 3; ++c) {
+      const double s = kPlace[k][c];
+      const bool middle = kPlace[k][c] == 0, square = nodes == 27;
+      f[c] = middle ? 1 - x[c] * x[c] : 0.5 * (1 + s * x[c]) * (square ? s * x[c] : 1);
+      d[c] = middle ? -2 * x[c] : square ? x[c] + 0.5 * s : 0.5 * s;
+      along += s * x[c];
+      middles += middle;
+    }
+    value[k] = f[0] * f[1] * f[2];
+    slope[k] = {d[0] * f[1] * f[2], d[1] * f[2] * f[0], d[2] * f[0] * f[1]};
+    if (nodes != 20 || middles) continue;
+    slope[k] = along * slope[k] + value[k] * place_of(k);
+    value[k] *= along;
   }
-  std::copy_n(out, 3, along);
 }
 
 bool inverted_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside) {
-  Vec3 sum, along[3];
+  Vec3 sum;
   double all = 0;
   for (uint32_t q = 0; q < kInsidePoints; ++q) {
     sum += inside[q] * inside_place(q);
     all += inside[q];
   }
-  hexahedron_jacobian(points, stride, cell, (1 / all) * sum, along);
-  return dot(along[0], cross(along[1], along[2])) < 0;
+  return jacobian(8, points, stride, cell, (1 / all) * sum) < 0;
 }
 
 void each_inside(const double *points, size_t stride, const uint32_t *cell, const double *inside,
@@ -124,11 +197,10 @@ void each_inside(const double *points, size_t stride, const uint32_t *cell, cons
   for (uint32_t q = 0; q < kInsidePoints; ++q) {
     const Vec3 at = inside_place(q);
     double shape[8];
-    hexahedron_shapes(at, shape);
-    Vec3 place, along[3];
+    Vec3 place, slope[8];
+    hexahedron_shapes(8, at, shape, slope);
     for (uint32_t k = 0; k < 8; ++k) place += shape[k] * load3(points + stride * cell[k]);
-    hexahedron_jacobian(points, stride, cell, at, along);
-    use(8 * inside[q] * dot(along[0], cross(along[1], along[2])), place);
+    use(8 * inside[q] * jacobian(8, points, stride, cell, at), place);
   }
 }
 
@@ -139,23 +211,27 @@ Array<uint32_t> RestMesh::cell_groups() const {
 }
 
 RestMesh second_order(const RestMesh &mesh) {
-  if (mesh.cell != DFM_CELL_TET)
-    fail(DFM_E_UNSUPPORTED, "only first-order tetrahedra become second-order ones; these cells are %s",
+  const bool hexahedra = mesh.cell == DFM_CELL_HEX8;
+  if (mesh.cell != DFM_CELL_TET && !hexahedra)
+    fail(DFM_E_UNSUPPORTED, "only cells of first order become second-order ones; these cells are %s",
          cell_kind(mesh.cell).name);
-  if (!mesh.share.empty())
+  if (!mesh.share.empty() || !mesh.inside.empty())
     fail(DFM_E_UNSUPPORTED,
          "the cells of a filled surface are only in part material, which second-order cells cannot be; mesh "
          "the shape instead");
   const Memory &memory = *mesh.memory;
-  const CellKind &kind = cell_kind(DFM_CELL_TET10);
+  const CellKind &kind = cell_kind(hexahedra ? DFM_CELL_HEX27 : DFM_CELL_TET10);
+  const uint32_t tets = cell_kind(mesh.cell).tets;
   RestMesh out(memory);
   out.cell = kind.kind;
   out.points = mesh.points;
   out.groups = mesh.groups;
   out.file_point = mesh.file_point;
-  for (const uint32_t t : mesh.file_cell) out.file_cell.insert(out.file_cell.end(), kind.tets, t);
+  for (size_t t = 0; t < mesh.file_cell.size(); t += tets)
+    out.file_cell.insert(out.file_cell.end(), kind.tets, mesh.file_cell[t]);
   out.warnings = mesh.warnings;
   uint32_t last = *std::max_element(out.file_point.begin(), out.file_point.end());
+  // of hexahedra also one diagonal of each face and cell
   const Array<uint32_t> edges = unique_edges(mesh.tets);
   for (size_t e = 0; e < edges.size(); e += 2) {
     const auto at = [&](size_t k) { return load3(&mesh.points[3 * size_t{edges[k]}]); };
@@ -175,19 +251,52 @@ RestMesh second_order(const RestMesh &mesh) {
     const bool found = lo < edges.size() / 2 && std::pair(edges[2 * lo], edges[2 * lo + 1]) == key;
     return found ? uint32_t(mesh.npoint() + lo) : kNoPoint;
   };
-  for (size_t t = 0; t < mesh.tets.size(); t += 4) {
-    const uint32_t *q = &mesh.tets[t];
-    out.cells.insert(out.cells.end(), q, q + 4);
-    for (const auto &[a, b] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}})
-      out.cells.push_back(middle(q[a], q[b]));
-    out.tet_group.insert(out.tet_group.end(), kind.tets, mesh.tet_group[t / 4]);
+  // The middle of a face or cell, of which each corner has its opposite in `far`.
+  const auto add_middle = [&](const uint32_t *cell, std::span<const uint8_t> near, const uint8_t *far) {
+    size_t least = 0;
+    Vec3 sum;
+    for (size_t k = 0; k < near.size(); ++k) {
+      if (cell[near[k]] < cell[near[least]]) least = k;
+      sum += load3(&mesh.points[3 * size_t{cell[near[k]]}]);
+    }
+    const uint32_t at = middle(cell[near[least]], cell[far[least]]);
+    store3(&out.points[3 * size_t{at}], (1 / double(near.size())) * sum);
+    out.cells.push_back(at);
+  };
+  const uint32_t corners = cell_kind(mesh.cell).nodes;
+  for (size_t t = 0; t < mesh.ntet(); t += tets) {
+    const uint32_t *const q = &mesh.nodes()[corners * (t / tets)];
+    out.cells.insert(out.cells.end(), q, q + corners);
+    out.tet_group.insert(out.tet_group.end(), kind.tets, mesh.tet_group[t]);
+    if (!hexahedra) {
+      for (const auto &[a, b] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}})
+        out.cells.push_back(middle(q[a], q[b]));
+      continue;
+    }
+    for (const auto &[a, b] : kHexEdges) out.cells.push_back(middle(q[a], q[b]));
+    for (const size_t f : {5, 3, 2, 4, 0, 1}) {
+      const uint8_t (&n)[4] = kQuads[f], far[] = {n[2], n[3], n[0], n[1]};
+      add_middle(q, n, far);
+    }
+    constexpr uint8_t kNear[] = {0, 1, 2, 3, 4, 5, 6, 7}, kFar[] = {6, 7, 4, 5, 2, 3, 0, 1};
+    add_middle(q, kNear, kFar);
   }
   out.tets = tets_of(memory, kind, out.cells);
   for (size_t t = 0; t < mesh.tri_group.size(); ++t) {
     const uint32_t *q = &mesh.tris[3 * t];
     const uint32_t a = middle(q[0], q[1]), b = middle(q[1], q[2]), c = middle(q[2], q[0]);
     const bool face = a != kNoPoint && b != kNoPoint && c != kNoPoint;  // a file may name other triangles
-    if (face) out.tris.insert(out.tris.end(), {q[0], a, c, a, q[1], b, c, b, q[2], a, b, c});
+    // of hexahedra about the middle of the face, which is that of its diagonal
+    const uint32_t around[6] = {q[0], a, q[1], b, q[2], c};
+    const auto length2 = [&](int k) {
+      return norm2(load3(&mesh.points[3 * size_t{q[k]}]) - load3(&mesh.points[3 * size_t{q[(k + 1) % 3]}]));
+    };
+    if (face && hexahedra) {
+      const int longest = length2(0) > std::max(length2(1), length2(2)) ? 1 : length2(1) > length2(2) ? 3 : 5;
+      for (int k = 1; k < 5; ++k)
+        out.tris.insert(out.tris.end(),
+                        {around[longest], around[(longest + k) % 6], around[(longest + k + 1) % 6]});
+    } else if (face) out.tris.insert(out.tris.end(), {q[0], a, c, a, q[1], b, c, b, q[2], a, b, c});
     else out.tris.insert(out.tris.end(), q, q + 3);
     out.tri_group.insert(out.tri_group.end(), face ? 4 : 1, mesh.tri_group[t]);
   }

@@ -81,11 +81,7 @@ void turn_cells(const std::string &path, RawMesh &raw) {
     };
     count();
     if (2 * n > kind.tets) {  // reflected
-      const auto swap = [&](std::initializer_list<std::pair<int, int>> pairs) {
-        for (const auto &[i, j] : pairs) std::swap(cell[i], cell[j]);
-      };
-      if (kind.nodes == 8) swap({{0, 4}, {1, 5}, {2, 6}, {3, 7}});
-      else swap({{2, 3}, {5, 8}, {6, 7}});
+      turn_over(kind, cell);
       tets_of(kind, cell, &raw.tets[4 * kind.tets * c]);
       ++raw.turned;
       count();

@@ -4,7 +4,6 @@
 #include <algorithm>
 
 #include "deform/plugin.h"
-#include "mesh/cells.h"
 
 namespace dfm {
 
@@ -18,25 +17,27 @@ void MshReader::begin_elements(int64_t type) {
              : type == 93 ? Element{125, 3}
                           : kKnown[type > 0 && type < 32 ? type : 0];
   if (element_.points == 0) in_.refuse("element type %lld is not known; 4 is a tetrahedron", ll(type));
-  cell_ = type == kTet ? DFM_CELL_TET : type == 11 ? DFM_CELL_TET10 : type == 5 ? DFM_CELL_HEX8 : 0;
+  cell_ = nullptr;
+  for (const CellKind &kind : cell_kinds())
+    if (kind.msh == type) cell_ = &kind;
+  curved_face_ = type == 9 || type == 10 || type == 16;
   if (element_.dimension == 3 && !cell_) {
     const bool tet = type >= 29 && type <= 31;
     in_.unsupported(tet ? "tetrahedra above second order (element type %lld, %u points); %s"
-                        : "element type %lld (%u points) is a prism, a pyramid or a hexahedron above first "
-                          "order; tetrahedra of first and second order and hexahedra of 8 points are read: "
-                          "mesh the volume with these; then %s",
+                        : "element type %lld (%u points) is a prism, a pyramid or a hexahedron above second "
+                          "order; tetrahedra and hexahedra of first and second order are read: mesh the "
+                          "volume with these; then %s",
                     ll(type), element_.points, kConvertMsh);
   }
 }
 
 void MshReader::add_element(uint32_t group) {
-  uint32_t corners[10];
-  const bool second = element_.points == 6 && element_.dimension == 2;
-  if (element_.dimension == 3 || second || (element_.points <= 4 && element_.dimension == 2)) {
+  uint32_t corners[kMostNodes];
+  if (cell_ || curved_face_ || (element_.points <= 4 && element_.dimension == 2)) {
     for (uint32_t k = 0; k < element_.points; ++k)
-      corners[cell_ == DFM_CELL_TET10 ? kMshTet10[k] : k] = nodes_.find(in_, tags_[k]);
-    if (element_.dimension == 3) out_.add_cell(in_, cell_, corners, group);
-    else if (second) out_.add_second_triangle(in_, corners, group);
+      corners[cell_ && cell_->in_msh ? cell_->in_msh[k] : k] = nodes_.find(in_, tags_[k]);
+    if (cell_) out_.add_cell(in_, cell_->kind, corners, group);
+    else if (curved_face_) out_.add_second_order(in_, corners, element_.points, group);
     else out_.add_polygon(in_, corners, element_.points, group);
     return;
   }
@@ -107,8 +108,8 @@ void MshReader::run() {
   if (!nodes || !elements)
     in_.refuse("no %s section; the file is truncated or holds no mesh", nodes ? "$Elements" : "$Nodes");
   if (curved_ && out_.tets.empty() && out_.tris.empty())
-    in_.unsupported("%llu second- or higher-order triangles or quadrangles and nothing straight; %s",
-                    ull(curved_), kConvertMsh);
+    in_.unsupported("%llu triangles or quadrangles above second order and nothing straight; %s", ull(curved_),
+                    kConvertMsh);
 }
 
 void read_msh(Cursor &in, RawMesh &out) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstdint>
 
+#include "mesh/cells.h"
 #include "mesh/numbers.h"
 #include "mesh/raw_mesh.h"
 
@@ -65,10 +66,11 @@ class MshReader {
   bool four_, first_four_, wide_;
   Numbers nodes_;
   Array<Entity> entities_;
-  Element element_{0, 0};  // of begin_elements()
-  uint32_t cell_ = 0;      // its kind of volume cell, 0 for none
-  int64_t tags_[125];      // as many as any element has
-  uint64_t curved_ = 0;    // faces of second and higher order
+  Element element_{0, 0};           // of begin_elements()
+  const CellKind *cell_ = nullptr;  // if it is a volume cell
+  bool curved_face_ = false;        // a face of second order
+  int64_t tags_[125];               // as many as any element has
+  uint64_t curved_ = 0;             // faces of second and higher order
 };
 
 }  // namespace dfm

@@ -146,10 +146,23 @@ void RawMesh::add_polygon(const Cursor &at, const uint32_t *corners, size_t n, u
   keep_points(corners, n, in_group);
 }
 
-void RawMesh::add_second_triangle(const Cursor &at, const uint32_t *nodes, uint32_t in_group) {
-  for (const auto &[a, b, c] : {std::array{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}})
-    add_triangle(at, nodes[a], nodes[b], nodes[c], in_group);
-  keep_points(nodes, 6, in_group);
+void RawMesh::add_second_order(const Cursor &at, const uint32_t *nodes, size_t n, uint32_t in_group) {
+  const auto add = [&](int a, int b, int c) { add_triangle(at, nodes[a], nodes[b], nodes[c], in_group); };
+  const auto add_quadrangle = [&](const std::array<int, 4> &of) {
+    uint32_t corners[4];
+    for (size_t k = 0; k < 4; ++k) corners[k] = nodes[of[k]];
+    add_polygon(at, corners, 4, in_group);
+  };
+  if (n == 6)
+    for (const auto &[a, b, c] : {std::array{0, 3, 5}, {3, 1, 4}, {5, 4, 2}, {3, 4, 5}}) add(a, b, c);
+  if (n == 8) {
+    for (const auto &[a, b, c] : {std::array{0, 4, 7}, {1, 5, 4}, {2, 6, 5}, {3, 7, 6}}) add(a, b, c);
+    add_quadrangle({4, 5, 6, 7});
+  }
+  if (n == 9)
+    for (const auto &of : {std::array{0, 4, 8, 7}, {4, 1, 5, 8}, {8, 5, 2, 6}, {7, 8, 6, 3}})
+      add_quadrangle(of);
+  keep_points(nodes, n, in_group);
 }
 
 void RawMesh::add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group) {

@@ -33,8 +33,9 @@ struct RawMesh : RestMesh {
     if (in_group == kNoGroup) return;
     groups[in_group].points.insert(groups[in_group].points.end(), points_of, points_of + n);
   }
-  // Corners, then the middles of the edges 01 12 20: four triangles, as those of a second-order tetrahedron.
-  void add_second_triangle(const Cursor &at, const uint32_t *nodes, uint32_t in_group);
+  // Corners, then the middles of the edges around, n = 6 or 8, then that of the face, n = 9: triangles as
+  // those of a second-order cell.
+  void add_second_order(const Cursor &at, const uint32_t *nodes, size_t n, uint32_t in_group);
   // Triangles (i, i+1, i+2), every second one turned.
   void add_strip(const Cursor &at, const uint32_t *corners, size_t n, uint32_t in_group);
   // Room for n more: readers that know a valid count call it once, and no array is grown by copying.

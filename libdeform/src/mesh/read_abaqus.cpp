@@ -203,17 +203,17 @@ class AbaqusReader {
       // STRI65 has 6 nodes, S4R5 has 4
       std::from_chars(number.data(), number.data() + (dimension == 3 ? number.size() : 1), n);
     }
-    for (const uint32_t k : {DFM_CELL_TET, DFM_CELL_TET10, DFM_CELL_HEX8})
-      if (dimension == 3 && cell_kind(k).nodes == n) kind = k;
+    for (const CellKind &k : cell_kinds())  // where faces have middles, these files number them otherwise
+      if (dimension == 3 && k.nodes == n && n < 27) kind = k.kind;
     if (dimension == 3 && !kind) {
       in_.seek(keyword_at_);
       in_.unsupported(
-          "elements of type %s; tetrahedra of 4 and 10 nodes (C3D4, C3D10) and hexahedra of 8 (C3D8) are "
-          "read: mesh the volume with one of these",
+          "elements of type %s; tetrahedra of 4 and 10 nodes (C3D4, C3D10) and hexahedra of 8 and 20 "
+          "(C3D8, C3D20) are read: mesh the volume with one of these",
           Cursor::quote(*type).c_str());
     }
     if (dimension == 1) return;  // lines
-    if (!kind && n != 3 && n != 4 && n != 6) {
+    if (!kind && n != 3 && n != 4 && n != 6 && n != 8) {
       passed_over_.insert(Cursor::quote(*type));
       return;
     }
@@ -228,7 +228,7 @@ class AbaqusReader {
   }
 
   void read_element(uint32_t kind, uint32_t n) {
-    uint32_t nodes[10];
+    uint32_t nodes[kMostNodes];
     for (uint32_t k = 0; k < n; ++k) {
       std::string_view word = in_.line_word();
       while (word.empty() && data()) word = in_.line_word();
@@ -239,7 +239,7 @@ class AbaqusReader {
       return out_.add_cell(in_, kind, nodes, kNoGroup);
     }
     const uint32_t first = out_.ntri();
-    if (n == 6) out_.add_second_triangle(in_, nodes, kNoGroup);
+    if (n > 4) out_.add_second_order(in_, nodes, n, kNoGroup);
     else out_.add_polygon(in_, nodes, n, kNoGroup);
     places_.push_back({first, out_.ntri() - first});
   }

@@ -77,7 +77,7 @@ class MeditReader {
       const int32_t reference = in_.in_32_bits(in_.integer("an element's reference"), "reference");
       const uint32_t group = out_.group(in_, dimension, reference);
       if (dimension == 3) out_.add_cell(in_, kind, corner, group);
-      else if (corners == 6) out_.add_second_triangle(in_, corner, group);
+      else if (corners == 6) out_.add_second_order(in_, corner, 6, group);
       else if (dimension == 2) out_.add_polygon(in_, corner, corners, group);
       else out_.keep_points(corner, corners, group);
     }

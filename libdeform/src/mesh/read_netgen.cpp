@@ -85,7 +85,7 @@ class NetgenReader {
       in_.line();
       const uint32_t group = out_.group(in_, dimension, number);
       if (dimension == 3) out_.add_cell(in_, second ? DFM_CELL_TET10 : DFM_CELL_TET, nodes, group);
-      else if (second) out_.add_second_triangle(in_, nodes, group);
+      else if (second) out_.add_second_order(in_, nodes, 6, group);
       else out_.add_polygon(in_, nodes, size_t(corners), group);
     }
   }

@@ -109,7 +109,7 @@ class TetgenReader {
         face[3 + k] = (*at)[2];
         ++found;
       }
-      if (found == 3) out_.add_second_triangle(in, face, in_group);
+      if (found == 3) out_.add_second_order(in, face, 6, in_group);
       else out_.add_polygon(in, face, 3, in_group);
     }
   }

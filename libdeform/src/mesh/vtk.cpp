@@ -32,19 +32,24 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
                ? out_.group(in, dimension, static_cast<int32_t>(label))
                : kNoGroup;
   };
-  for (const uint32_t kind : {DFM_CELL_TET, DFM_CELL_TET10, DFM_CELL_HEX8}) {
-    const CellKind &of = cell_kind(kind);
+  for (const CellKind &of : cell_kinds()) {
     if (of.vtk != type) continue;
     if (n != of.nodes)
       in.refuse("cell %zu is of type %d, %s, with %zu points; expected %u", cell, type, of.name, n, of.nodes);
-    return out_.add_cell(in, kind, corners, group(3));
+    return out_.add_cell(in, of.kind, corners, group(3));
   }
-  if (is_one_of({5, 6, 7, 8, 9, 22})) {  // triangle, strip, polygon, pixel, quadrangle, second-order triangle
-    const size_t expected = type == 5 ? 3 : type == 22 ? 6 : type >= 8 ? 4 : 0;
+  // triangle, strip, polygon, pixel, quadrangle, and of second order: triangle, quadrangle of 8 and 9 points
+  if (is_one_of({5, 6, 7, 8, 9, 22, 23, 28})) {
+    const size_t expected = type == 5    ? 3
+                            : type == 22 ? 6
+                            : type == 23 ? 8
+                            : type == 28 ? 9
+                            : type >= 8  ? 4
+                                         : 0;
     if (expected ? n != expected : n < 3)
       in.refuse("cell %zu (type %d) has %zu points; expected %zu%s", cell, type, n, expected ? expected : 3,
                 expected ? "" : " or more");
-    if (type == 22) return out_.add_second_triangle(in, corners, group(2));
+    if (type >= 22) return out_.add_second_order(in, corners, n, group(2));
     if (type == 6) return out_.add_strip(in, corners, n, group(2));
     if (type != 8) return out_.add_polygon(in, corners, n, group(2));
     // a pixel's corners go row by row
@@ -52,7 +57,7 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
     return out_.add_polygon(in, around, 4, group(2));
   }
   if (is_one_of({1, 2, 3, 4})) return out_.keep_points(corners, n, group(type > 2));  // points, lines
-  curved_ += is_one_of({23, 28, 30, 34, 36, 69, 70, 76, 77});
+  curved_ += is_one_of({30, 34, 36, 69, 70, 76, 77});
   if (is_one_of({71, 78, 79, 80}))
     in.unsupported(
         "cell %zu is a tetrahedron above second order (type %d); write cells of first or second order (for "

@@ -140,8 +140,11 @@ void write_vtu(const RestMesh &mesh, const std::string &path) {
 }
 
 void write_medit(const RestMesh &mesh, const std::string &path) {
-  AtomicFile out(path);
   const CellKind &kind = cell_kind(mesh.cell);
+  if (!kind.medit)
+    fail(DFM_E_UNSUPPORTED, "%s: %s are not written to Medit files; write .msh, .msh2, .vtk or .vtu",
+         path.c_str(), kind.name);
+  AtomicFile out(path);
   out.write("MeshVersionFormatted 2\nDimension\n3\nVertices\n" + std::to_string(mesh.npoint()) + "\n");
   TextRows rows(out);
   for (size_t i = 0; i < mesh.points.size(); i += 3) {
@@ -149,10 +152,7 @@ void write_medit(const RestMesh &mesh, const std::string &path) {
     rows.put(0, '\n');
   }
   rows.elements("Triangles", 3, mesh.tris, mesh.tri_group, mesh);
-  rows.elements(kind.nodes == 4    ? "Tetrahedra"
-                : kind.nodes == 10 ? "TetrahedraP2"
-                                   : "Hexahedra",
-                kind.nodes, mesh.nodes(), mesh.cell_groups(), mesh);
+  rows.elements(kind.medit, kind.nodes, mesh.nodes(), mesh.cell_groups(), mesh);
   out.write("End\n");
   out.commit();
 }

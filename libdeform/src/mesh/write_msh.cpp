@@ -23,18 +23,17 @@ struct Run {
   uint32_t group, corners;
   const uint32_t *points;
   uint64_t n;
+  const uint8_t *in_msh;  // mesh/cells.h
   // Of element t, in the file's order.
-  uint32_t point(uint64_t t, uint32_t k) const {
-    return points[corners * t + (type == cell_kind(DFM_CELL_TET10).msh ? kMshTet10[k] : k)];
-  }
+  uint32_t point(uint64_t t, uint32_t k) const { return points[corners * t + (in_msh ? in_msh[k] : k)]; }
 };
 
 void add_runs(std::vector<Run> &runs, int32_t dimension, int32_t type, uint32_t corners,
-              const Array<uint32_t> &points, const Array<uint32_t> &group) {
+              const Array<uint32_t> &points, const Array<uint32_t> &group, const uint8_t *in_msh = nullptr) {
   for (size_t t = 0; t < group.size();) {
     size_t end = t + 1;
     while (end < group.size() && group[end] == group[t]) ++end;
-    runs.push_back({dimension, type, group[t], corners, &points[corners * t], end - t});
+    runs.push_back({dimension, type, group[t], corners, &points[corners * t], end - t, in_msh});
     t = end;
   }
 }
@@ -46,11 +45,11 @@ std::vector<Run> runs_of(const RestMesh &mesh, const Array<uint32_t> &cell_group
   for (uint32_t g = 0; g < mesh.groups.size(); ++g) {
     const Array<uint32_t> &points = mesh.groups[g].points;
     if (mesh.groups[g].dimension == 0 && !points.empty())
-      runs.push_back({0, 15, g, 1, points.data(), points.size()});
+      runs.push_back({0, 15, g, 1, points.data(), points.size(), nullptr});
   }
   add_runs(runs, 2, 2, 3, mesh.tris, mesh.tri_group);
   const CellKind &kind = cell_kind(mesh.cell);
-  add_runs(runs, 3, kind.msh, kind.nodes, mesh.nodes(), cell_groups);
+  add_runs(runs, 3, kind.msh, kind.nodes, mesh.nodes(), cell_groups, kind.in_msh);
   return runs;
 }
 

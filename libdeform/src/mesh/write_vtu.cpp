@@ -2,6 +2,7 @@
 #include <bit>
 
 #include "core/file.h"
+#include "mesh/cells.h"
 #include "mesh/vtk.h"
 
 namespace dfm {
@@ -105,7 +106,9 @@ void write_vtu(const std::string &path, const VtuGrid &grid) {
   for (uint64_t c = 1; c <= ncell; ++c)
     put_number(c <= grid.ncell ? c * grid.corners : cell_corners + 3 * (c - grid.ncell));
   out.put<uint64_t>(ncell);
-  const uint8_t cell = grid.corners == 3 ? 5 : grid.corners == 4 ? 10 : grid.corners == 8 ? 12 : 24;
+  uint8_t cell = 5;
+  for (const CellKind &kind : cell_kinds())
+    if (kind.nodes == grid.corners) cell = kind.vtk;
   for (uint32_t c = 0; c < ncell; ++c) out.put<uint8_t>(c < grid.ncell ? cell : 5);
   out.write("\n  </AppendedData>\n</VTKFile>\n");
   out.commit();

@@ -216,8 +216,6 @@ MadeMesh read_made(const Node &node) {
   }
   made.cells = read_count(node.member("cells", 1000), 1, 1e8);
   made.order = read_count(node.member("order", 1), 1, 2);
-  if (bricks && made.order == 2)
-    node.at("order").fail("bricks are of first order; leave it out, or make a beam");
   return made;
 }
 

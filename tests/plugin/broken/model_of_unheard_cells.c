@@ -1,3 +1,3 @@
 /* V03: takes a kind of cell that has no name. */
-#define CELLS (DFM_CELL_TET | 64)
+#define CELLS (DFM_CELL_TET | 256)
 #include "net.h"

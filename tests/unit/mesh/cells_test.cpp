@@ -25,14 +25,20 @@ void expect_refusal(const std::string &text, dfm_status status, const std::vecto
 const Memory &kMemory = Memory::standard();
 
 RestMesh made(uint32_t kind) {
-  if (kind == DFM_CELL_HEX8) return make_bricks(kMemory, 0.3, 0.2, 0.2, 12);
+  const RestMesh bricks = make_bricks(kMemory, 0.3, 0.2, 0.2, 12);
+  if (kind == DFM_CELL_HEX8) return bricks;
+  if (kind == DFM_CELL_HEX27) return second_order(bricks);
+  if (kind == DFM_CELL_HEX20) return test::of_twenty(second_order(bricks));
   return second_order(make_beam(kMemory, 0.3, 0.2, 0.2, 100));
 }
 
 class Cells : public testing::TestWithParam<uint32_t> {};
-INSTANTIATE_TEST_SUITE_P(Kinds, Cells, testing::Values(DFM_CELL_TET10, DFM_CELL_HEX8), [](const auto &of) {
-  return of.param == DFM_CELL_HEX8 ? std::string("Hex8") : std::string("Tet10");
-});
+INSTANTIATE_TEST_SUITE_P(Kinds, Cells,
+                         testing::Values(DFM_CELL_TET10, DFM_CELL_HEX8, DFM_CELL_HEX20, DFM_CELL_HEX27),
+                         [](const auto &of) {
+                           const std::string nodes = std::to_string(cell_kind(of.param).nodes);
+                           return (of.param == DFM_CELL_TET10 ? "Tet" : "Hex") + nodes;
+                         });
 
 // All are positive, fill the box, and have no other boundary than the box, whatever the numbers of points.
 TEST_P(Cells, Tetrahedra_FillTheShapeAndMeet) {
@@ -72,10 +78,10 @@ TEST_P(Cells, MassShares_ArePositiveAndHaveTheCenterOfTheCell) {
   const CellKind &kind = cell_kind(mesh.cell);
   RestMesh moved = mesh;
   for (size_t k = 0; k < moved.points.size(); k += 3) moved.points[k] *= 1 + moved.points[k + 1];  // a taper
-  const bool straight = kind.nodes == 10;
+  const bool straight = kind.nodes == 10 || kind.nodes == 20;
   const RestMesh &of = straight ? mesh : moved;
   for (size_t c = 0; c < of.cells.size() / kind.nodes; ++c) {
-    double share[10], sum = 0, volume = 0;
+    double share[kMostNodes], sum = 0, volume = 0;
     Vec3 center, mean;
     mass_shares(kind, of.points.data(), &of.cells[kind.nodes * c], share);
     for (uint32_t k = 0; k < kind.nodes; ++k) {
@@ -100,6 +106,10 @@ TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
   for (uint32_t t = 0; t < mesh.ntet() / 2 / kind.tets * kind.tets; ++t) mesh.tet_group[t] = 0;
   for (const char *ending : {"msh", "msh2", "vtk", "vtu", "mesh"}) {
     const std::string path = test::scratch("cells") + "/a." + ending;
+    if (!kind.medit && std::string(ending) == "mesh") {
+      EXPECT_THROW(write_mesh(mesh, path), Error);
+      continue;
+    }
     ASSERT_TRUE(write_mesh(mesh, path));
     const RestMesh back = read_mesh(kMemory, path, DFM_MESH_CELLS);
     EXPECT_EQ(back.cell, mesh.cell) << ending;
@@ -108,6 +118,67 @@ TEST_P(Cells, Files_GiveBackCellsGroupsAndPoints) {
     EXPECT_EQ(back.points, mesh.points) << ending;
     EXPECT_EQ(back.tet_group, mesh.tet_group) << ending;
     EXPECT_TRUE(back.warnings.empty()) << ending << ": " << back.warnings[0];
+  }
+}
+
+// Their sum is 1, that of the slopes 0, and each is 1 at its node.
+TEST(HexahedronShapes, SumToOneAndAreOneAtTheirNodes) {
+  for (const uint32_t nodes : {8u, 20u, 27u}) {
+    const RestMesh cell = second_order(make_bricks(kMemory, 2, 2, 2, 1));
+    double value[kMostNodes];
+    Vec3 slope[kMostNodes];
+    for (uint32_t n = 0; n < nodes; ++n) {
+      const Vec3 at = load3(&cell.points[3 * size_t{cell.cells[n]}]) - Vec3{1, 1, 1};
+      hexahedron_shapes(nodes, at, value, slope);
+      for (uint32_t k = 0; k < nodes; ++k) EXPECT_EQ(value[k], double(k == n)) << nodes;
+    }
+    hexahedron_shapes(nodes, {0.3, -0.8, 0.1}, value, slope);
+    EXPECT_NEAR(std::accumulate(value, value + nodes, 0.0), 1, 1e-15);
+    EXPECT_LT(norm(std::accumulate(slope, slope + nodes, Vec3{})), 1e-15);
+  }
+}
+
+// Whether each triangle of the mesh is one of the boundary.
+bool on_boundary(const RestMesh &mesh) {
+  std::set<std::set<uint32_t>> faces;
+  const auto add = [](std::set<std::set<uint32_t>> &to, const Array<uint32_t> &of) {
+    for (size_t f = 0; f < of.size(); f += 3) to.insert({of[f], of[f + 1], of[f + 2]});
+  };
+  add(faces, boundary_triangles(mesh.tets));
+  const size_t n = faces.size();
+  add(faces, mesh.tris);
+  return faces.size() == n;
+}
+
+// Gmsh's order: corners, edges 01 03 04 12 15 23 26 37 45 47 56 67, faces below, y low, x low, x high, y
+// high, above, middle.
+TEST(CellFiles, GmshsHexahedraOfSecondOrder_AreReordered) {
+  const int of[27][3] = {{0, 0, 0}, {2, 0, 0}, {2, 2, 0}, {0, 2, 0}, {0, 0, 2}, {2, 0, 2}, {2, 2, 2},
+                         {0, 2, 2}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {2, 1, 0}, {2, 0, 1}, {1, 2, 0},
+                         {2, 2, 1}, {0, 2, 1}, {1, 0, 2}, {0, 1, 2}, {2, 1, 2}, {1, 2, 2}, {1, 1, 0},
+                         {1, 0, 1}, {0, 1, 1}, {2, 1, 1}, {1, 2, 1}, {1, 1, 2}, {1, 1, 1}};
+  for (const uint32_t nodes : {20u, 27u}) {
+    std::string text = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n" + std::to_string(nodes) + "\n", list;
+    for (uint32_t k = 0; k < nodes; ++k) {
+      text += std::to_string(k + 1);
+      for (const int x : of[k]) text += " " + std::to_string(x);
+      text += "\n";
+      list += " " + std::to_string(k + 1);
+    }
+    text += "$EndNodes\n$Elements\n2\n1 " +
+            std::string(nodes == 20 ? "16 2 7 1 1 2 3 4 9 12 14 10\n" : "10 2 7 1 1 2 3 4 9 12 14 10 21\n") +
+            "2 " + std::string(nodes == 20 ? "17" : "12") + " 2 0 1" + list + "\n$EndElements\n";
+    const RestMesh mesh = finish_mesh("a.msh", parse_raw(kMemory, "a.msh", text.data(), text.size()));
+    const RestMesh unit = second_order(make_bricks(kMemory, 2, 2, 2, 1));
+    ASSERT_EQ(mesh.cells.size(), nodes);
+    for (uint32_t k = 0; k < nodes; ++k)
+      EXPECT_EQ(norm(load3(&mesh.points[3 * size_t{mesh.cells[k]}]) -
+                     load3(&unit.points[3 * size_t{unit.cells[k]}])),
+                0)
+          << k;
+    EXPECT_EQ(mesh.turned, 0u);
+    EXPECT_EQ(mesh.tri_group.size(), nodes == 20 ? 6u : 8u);
+    EXPECT_TRUE(on_boundary(mesh));
   }
 }
 
@@ -135,18 +206,6 @@ TEST(CellFiles, ReflectedCells_AreTurned) {
       parsed("a.msh", kMsh22 + kTen + "$Elements\n1\n1 11 2 0 1 1 3 2 4 7 6 5 8 10 9\n$EndElements\n");
   EXPECT_EQ(mesh.turned, 1u);
   EXPECT_NEAR(mesh_statistics(mesh).volume, 8.0 / 6, 1e-14);
-}
-
-// Whether each triangle of the mesh is one of the boundary.
-bool on_boundary(const RestMesh &mesh) {
-  std::set<std::set<uint32_t>> faces;
-  const auto add = [](std::set<std::set<uint32_t>> &to, const Array<uint32_t> &of) {
-    for (size_t f = 0; f < of.size(); f += 3) to.insert({of[f], of[f + 1], of[f + 2]});
-  };
-  add(faces, boundary_triangles(mesh.tets));
-  const size_t n = faces.size();
-  add(faces, mesh.tris);
-  return faces.size() == n;
 }
 
 TEST(CellFiles, GroupsOfQuadrangles_AreTrianglesOfTheBoundary) {
@@ -220,7 +279,7 @@ TEST(CellFiles, WhatIsNoBody_IsRefused) {
   RestMesh filled = make_beam(kMemory, 1, 1, 1, 50);
   filled.share.assign(filled.ntet(), 0.5);
   EXPECT_THROW(second_order(filled), Error);
-  EXPECT_THROW(second_order(made(DFM_CELL_HEX8)), Error);
+  EXPECT_THROW(second_order(made(DFM_CELL_HEX27)), Error);
   EXPECT_THROW(cell_kind(7), Error);
 }
 

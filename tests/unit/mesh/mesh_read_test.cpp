@@ -377,7 +377,8 @@ TEST(MeshRead, MshStructure_IsChecked) {
   expect_refusal("m.msh", kMsh22 + "$PhysicalNames\n1\n3 1 body\n$EndPhysicalNames\n", DFM_E_FORMAT,
                  {"double quotes"});
   const std::string hexes = "$Elements\n1 1 1 1\n3 1 6 1\n1 1 2 3 4 1 2\n$EndElements\n";
-  expect_refusal("m.msh", kMsh41 + nodes + hexes, DFM_E_UNSUPPORTED, {"prism", "hexahedra of 8 points"});
+  expect_refusal("m.msh", kMsh41 + nodes + hexes, DFM_E_UNSUPPORTED,
+                 {"prism", "hexahedra of first and second order"});
   expect_refusal(
       "m.msh",
       kMsh41 + nodes +

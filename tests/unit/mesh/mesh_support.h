@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/error.h"
+#include "deform/plugin.h"
+#include "mesh/cells.h"
 #include "mesh/mesh.h"
 #include "support.h"
 
@@ -66,6 +69,25 @@ inline std::optional<dfm::Error> refusal_of_text(const std::string &name, const 
   const std::string path = scratch("mesh") + "/" + name;
   write_file(path, text);
   return refusal(path);
+}
+
+// The first 20 points of each cell, and no others.
+inline dfm::RestMesh of_twenty(const dfm::RestMesh &mesh) {
+  dfm::RestMesh out;
+  out.cell = DFM_CELL_HEX20;
+  std::map<uint32_t, uint32_t> number;
+  for (size_t c = 0; c < mesh.cells.size(); ++c)
+    if (c % 27 < 20) number.emplace(mesh.cells[c], 0);
+  for (auto &[p, n] : number) {
+    n = out.npoint();
+    out.points.insert(out.points.end(), &mesh.points[3 * size_t{p}], &mesh.points[3 * size_t{p}] + 3);
+    out.file_point.push_back(n);
+  }
+  for (size_t c = 0; c < mesh.cells.size(); ++c)
+    if (c % 27 < 20) out.cells.push_back(number.at(mesh.cells[c]));
+  out.tets = dfm::tets_of(dfm::Memory::standard(), dfm::cell_kind(out.cell), out.cells);
+  out.tet_group.assign(out.ntet(), dfm::kNoGroup);
+  return out;
 }
 
 }  // namespace test

@@ -378,13 +378,9 @@ class Reader {
     r.edge = info.edge_median;
     r.stiffens = bending_of_tetrahedra(std::clamp(material(b).def.poisson, 0.0, 0.49));
     r.hexahedra = info.cell == DFM_CELL_HEX8;
-    if (r.hexahedra) {
-      r.edge = std::cbrt(info.volume / info.ncell);
-      r.stiffens = kBendingOfHexahedra;
-    } else if (info.cell == DFM_CELL_TET10) {
-      r.edge *= 2;
-      r.stiffens = kBendingOfSecondOrder;
-    }
+    if (info.cell == DFM_CELL_TET10) r.edge *= 2;
+    else if (info.cell != DFM_CELL_TET) r.edge = std::cbrt(info.volume / info.ncell);
+    if (info.cell != DFM_CELL_TET) r.stiffens = r.hexahedra ? kBendingOfHexahedra : kBendingOfSecondOrder;
     r.edge *= b.scale;
     r.cell_size = info.wave_path * b.scale;
   }
