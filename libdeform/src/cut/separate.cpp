@@ -194,12 +194,12 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     w.changed = true;
   };
   try {
-    std::vector<CutTarget> targets{{b.id, b.slot, FeatureMap(before->surface, b.surface)}};
+    std::vector<CutTarget> targets{{b.id, b.slot, &b, FeatureMap(before->surface, b.surface)}};
     for (const Body *const p : pieces)
-      targets.push_back(
-          {p->id, uint32_t(w.bodies.size() + targets.size() - 1), FeatureMap(before->surface, p->surface)});
-    Lasting lasting(w, targets);
-    reserve_events(w, w.store.n + w.attachments.size() + pieces.size());
+      targets.push_back({p->id, uint32_t(w.bodies.size() + targets.size() - 1), p,
+                         FeatureMap(before->surface, p->surface)});
+    Lasting lasting(w, *before, targets);
+    reserve_ends(w, pieces.size());
     put(false);
     exchange(w, lasting);
     try {
@@ -214,7 +214,6 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     exchange(b, *before);
     throw;
   }
-  w.changed = true;  // without the attachments that have ended
   b.separate.waits = false;
   out.pieces += parts.pieces;
   double kinetic_now = kinetic_of(b), elastic_now = elastic_energy(b);
