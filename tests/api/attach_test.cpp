@@ -2,6 +2,8 @@
 #include <cstring>
 #include <functional>
 
+#include "cut_scenes.h"
+#include "obstacle.h"
 #include "rigid.h"
 #include "stack.h"
 
@@ -88,6 +90,39 @@ dfm_body_measure rigid_measure(dfm_rigid r) {
   m.size = sizeof m;
   test::ok(dfm_rigid_get_measure(r, &m));
   return m;
+}
+
+// Cells with a point at this height, where the body has been made.
+std::vector<uint32_t> cells_at(dfm_body b, double z) {
+  const dfm_body_info i = test::cutting::info(b);
+  std::vector<double> rest(3 * size_t{i.npoint});
+  std::vector<uint32_t> tets(4 * size_t{i.ntet}), out;
+  test::ok(dfm_body_get_rest(b, i.npoint, rest.data(), i.ntet, tets.data()));
+  for (uint32_t c = 0; c < i.ntet; ++c)
+    if (std::any_of(&tets[4 * size_t{c}], &tets[4 * size_t{c}] + 4,
+                    [&](uint32_t p) { return std::fabs(rest[3 * size_t{p} + 2] - z) < 1e-9; }))
+      out.push_back(c);
+  return out;
+}
+// Removes them, or separates what lies below a plane from the rest.
+void remove_at(dfm_body b, double z) {
+  const std::vector<uint32_t> cells = cells_at(b, z);
+  ASSERT_FALSE(cells.empty());
+  test::ok(dfm_body_remove_cells(b, uint32_t(cells.size()), cells.data(), nullptr));
+}
+void separate_at(dfm_body b, double z) {
+  test::cutting::cut(b, test::cutting::plane(2, z, DFM_CUT_SPLIT));
+  dfm_cut_info made = test::cutting::request();
+  test::ok(dfm_body_separate(b, nullptr, &made));
+  ASSERT_EQ(made.pieces, 1u);
+}
+dfm_body block(const World &s, const char *name, double z) {
+  test::BodyOptions o;
+  o.name = name;
+  o.model = "corotational_fem";
+  o.young = 2e5;
+  o.position = {0, 0, z};
+  return test::make_body(s.context, s.w, "beam", {0.1, 0.1, 0.1}, 400, o);
 }
 
 struct Case {
@@ -422,6 +457,65 @@ TEST(Attach, Detach_LetsTheTwoTouchAgain) {
   s.run(0.1);
   EXPECT_FALSE(test::contacts(s.w).empty());
   EXPECT_LT(info(beam, again).stretch, 1e-8);
+}
+
+TEST(Attach, EndedOrTakenAlongByACut_TheOverlapIsFound) {
+  for (const bool removed : {true, false}) {
+    SCOPED_TRACE(removed);
+    World s({0, 0, 0});
+    const dfm_body cube = block(s, "cube", 0);
+    const test::Triangles box = test::box_surface({0.2, 0.2, 0.025}, 1);
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    d.shape = DFM_SHAPE_MESH;
+    d.npoint = uint32_t(box.points.size() / 3);
+    d.points = box.points.data();
+    d.ntriangle = uint32_t(box.tris.size() / 3);
+    d.triangles = box.tris.data();
+    d.pose.position[2] = 0.005;  // 30 mm of the cube are in it
+    dfm_obstacle floor = 0;
+    test::ok(dfm_obstacle_create(s.w, &d, &floor));
+    attach(cube, floor);
+    s.run(1e-3);
+    EXPECT_TRUE(test::listed(dfm_world_overlaps, s.w).empty());
+    if (removed) remove_at(cube, 0.1);
+    else separate_at(cube, 0.0601);
+    s.run(1e-3);
+    const std::vector<dfm_overlap> found = test::listed(dfm_world_overlaps, s.w);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].a, cube);
+    EXPECT_TRUE(found[0].flags & DFM_OVERLAP_ASIDE);
+  }
+}
+
+TEST(Attach, ACutFarFromIt_TakesNoPointOfIt) {
+  for (const bool removed : {true, false}) {
+    SCOPED_TRACE(removed);
+    World s({0, 0, 0});
+    const dfm_body lower = block(s, "lower", 0), upper = block(s, "upper", 0.102);
+    const uint32_t held = attach(upper, lower, false);
+    const uint32_t n = info(upper, held).nsurfel;
+    if (removed) remove_at(lower, 0);
+    else separate_at(lower, 0.034);
+    EXPECT_EQ(info(upper, held).nsurfel, n);
+    EXPECT_LT(info(upper, held).stretch, 1e-12) << "its places have not moved";
+    dfm_body rest = 0;  // what it lies on pushes at a distance
+    if (!removed) test::ok(dfm_world_find_body(s.w, "lower.1", &rest));
+    if (rest) test::ok(dfm_body_destroy(rest));
+    const double kick[] = {0.01, 0.02, 0}, at[] = {0.05, 0, 0.202};
+    test::ok(dfm_body_apply_impulse(upper, at, kick));
+    const auto sum = [&] {
+      Momenta m;
+      for (const dfm_body b : {lower, upper}) m.add(test::measure(b));
+      return m;
+    };
+    const Momenta before = sum();
+    s.run(0.05);
+    const Momenta now = sum();
+    for (size_t k = 0; k < 3; ++k) {
+      EXPECT_NEAR(now.linear[k], before.linear[k], 1e-12);
+      EXPECT_NEAR(now.angular[k], before.angular[k], 1e-9);
+    }
+  }
 }
 
 TEST(Attach, EitherSide_MayGo) {

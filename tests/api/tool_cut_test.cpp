@@ -233,6 +233,36 @@ TEST(ToolCut, WhatIsSet_CanBeRead_AndTakenBack) {
   EXPECT_EQ(parts(s.body), 1u);
 }
 
+TEST(ToolCut, PiecesOfAPiece_AreCutToo_AndThoseOfAWholeThatIsDestroyed) {
+  for (const bool whole : {false, true}) {
+    SCOPED_TRACE(whole);
+    Cube s;
+    const dfm_separate_def rule = dfm_separate_def_default();
+    test::ok(dfm_body_set_separate(s.body, &rule));
+    dfm_body piece = 0, other = 0;
+    test::cutting::cut(s.body, test::cutting::plane(1, 0.0001, DFM_CUT_SPLIT));
+    test::ok(dfm_world_find_body(s.w, "cube.1", &piece));
+    const double y = test::measure(piece).com[1] > 0 ? 0.015 : -0.015;  // beside the body
+    const dfm_tool t = make(s.w, DFM_TOOL_BLADE, {0.0005, 0.008, 0.02}, {0.011, y, 0.05});
+    cuts(t, DFM_CUT_SPLIT, whole ? s.body : piece);
+    test::cutting::cut(piece, test::cutting::plane(2, 0.0001, DFM_CUT_SPLIT));
+    test::ok(dfm_world_find_body(s.w, "cube.2", &other));
+    if (whole) test::ok(dfm_body_destroy(s.body));
+    dfm_body listed[4] = {};
+    uint32_t n = 0;
+    test::ok(dfm_tool_cuts(t, nullptr, nullptr, 4, listed, &n));
+    EXPECT_EQ(std::count(listed, listed + n, other), 1);
+    std::set<uint64_t> cut;
+    for (int i = 0; i < 50; ++i) {
+      move(s.w, t, {0.011, y, 0.05 - 0.001 * i}, {0.011, y, 0.049 - 0.001 * i}, 1);
+      ASSERT_EQ(force_on(t), 0) << i;
+      for (const dfm_contact_event &e : test::listed(dfm_world_events, s.w))
+        if (e.kind == uint32_t{DFM_EVENT_CUT}) cut.insert(e.a);
+    }
+    EXPECT_TRUE(cut.count(piece) && cut.count(other));
+  }
+}
+
 TEST(ToolCut, WhatCannotCut_IsRefused) {
   Cube s, modal("modal");
   const dfm_tool grasper = make(s.w, DFM_TOOL_GRASPER, {0.001, 0.002, 0.01}, {0, 0, 0.1});

@@ -76,10 +76,8 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
   end_idle(w);
   std::unique_ptr<BodyShape> before = take_shape(b, made, false, ahead);
   try {
-    Lasting lasting(w, {{b.id, b.slot, made.features}});
-    reserve_events(w, w.store.n + w.attachments.size());
-    for (const Attachment &a : lasting.attachments)
-      if (a.surfels.empty()) w.overlaps.place(a.body);  // what it held together may touch now
+    Lasting lasting(w, *before, {{b.id, b.slot, &b, made.features}});
+    reserve_ends(w, 0);
     exchange(w, lasting);
     w.changed = true;
     try {
@@ -88,9 +86,7 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
       exchange(w, lasting);
       throw;
     }
-    const size_t attached = w.attachments.size();
     end_what_went(w, lasting);
-    if (w.attachments.size() != attached) w.changed = true;
   } catch (...) {
     exchange(b, *before);
     throw;

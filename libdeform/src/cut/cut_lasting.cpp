@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "step/stages.h"
+#include "world/attach.h"
 
 namespace dfm {
 namespace {
@@ -15,9 +16,31 @@ Found find(const std::vector<CutTarget> &targets, size_t kind, uint32_t feature)
   return {};
 }
 
+// Gives a place the numbers of the target that has the corners that carry it; kNone: none has. A fourth
+// anchor that this target does not have is replaced.
+uint32_t carry_place(const BodyShape &before, const std::vector<CutTarget> &targets, Place &p) {
+  Vec3 x;
+  for (size_t k = 0; k < kAnchors; ++k) x += p.weight[k] * before.surface.sum(p.node[k], before.p.x.data());
+  Found now[kAnchors];
+  uint32_t target = kNone;
+  for (size_t k = 0; k < kAnchors; ++k) {
+    now[k] = find(targets, 0, p.node[k]);
+    p.node[k] = now[k].feature == kNone ? 0 : now[k].feature;
+    if (k == 3 || p.weight[k] == 0) continue;
+    if (now[k].target == kNone || (target != kNone && now[k].target != target)) return kNone;
+    target = now[k].target;
+  }
+  if (p.weight[3] == 0 || now[3].target == target) return target;
+  if (!std::all_of(now, now + 3, [&](const Found &f) { return f.target == target; })) return kNone;
+  p.weight[0] += p.weight[3];
+  lift(*targets[target].body, x, p);
+  return target;
+}
+
 // Divides an attachment: each target gets those of its places that are still there. The stiffness of the
 // whole is the sum over its places.
-void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vector<Attachment> &out) {
+void carry(const Attachment &a, const BodyShape &before, const std::vector<CutTarget> &targets,
+           std::vector<Attachment> &out) {
   const uint64_t id = targets[0].id;
   const bool own = a.body == id, anchored = !a.obstacle && a.to == id;
   if (!own && !anchored) return out.push_back(a);
@@ -34,19 +57,13 @@ void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vect
   for (size_t i = 0; i < a.surfels.size(); ++i) {
     const Found surfel = own ? find(targets, 0, a.surfels[i]) : Found{0, a.surfels[i]};
     uint32_t target = surfel.target;
-    uint32_t node[kAnchors];
-    bool there = target != kNone, placed = false;
-    for (size_t k = 0; !a.obstacle && k < kAnchors; ++k) {
-      node[k] = a.node[kAnchors * i + k];
-      if (!anchored) continue;
-      const Found at = find(targets, 0, node[k]);
-      node[k] = at.feature == kNone ? 0 : at.feature;
-      if (a.weight[kAnchors * i + k] == 0) continue;
-      there = there && at.target != kNone && (!placed || at.target == target);
-      target = at.target;
-      placed = true;
+    Place at{};
+    if (!a.obstacle) {
+      std::copy_n(&a.node[kAnchors * i], kAnchors, at.node);
+      std::copy_n(&a.weight[kAnchors * i], kAnchors, at.weight);
     }
-    if (!there) continue;
+    if (anchored && target != kNone) target = carry_place(before, targets, at);
+    if (target == kNone) continue;
     Attachment &part = out[begin + target];
     part.surfels.push_back(surfel.feature);
     for (size_t k = 0; k < 3; ++k) {
@@ -54,8 +71,8 @@ void carry(const Attachment &a, const std::vector<CutTarget> &targets, std::vect
       part.impulse.push_back(a.impulse[3 * i + k]);
     }
     for (size_t k = 0; !a.obstacle && k < kAnchors; ++k) {
-      part.node.push_back(node[k]);
-      part.weight.push_back(a.weight[kAnchors * i + k]);
+      part.node.push_back(at.node[k]);
+      part.weight.push_back(at.weight[k]);
     }
   }
   for (size_t t = begin; t < out.size(); ++t) {
@@ -108,12 +125,12 @@ bool renumber(Crossing &c, const std::vector<CutTarget> &targets, const World &w
 
 }  // namespace
 
-Lasting::Lasting(const World &w, const std::vector<CutTarget> &targets)
+Lasting::Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets)
     : crossings(w.store.crossings.get_allocator()),
       contacts(w.report.contacts.get_allocator()),
       id_a(w.store.id_a),
       id_b(w.store.id_b) {
-  for (const Attachment &a : w.attachments) carry(a, targets, attachments);
+  for (const Attachment &a : w.attachments) carry(a, before, targets, attachments);
   for (Crossing c : w.store.crossings)
     if (renumber(c, targets, w)) crossings.push_back(c);
   std::sort(crossings.begin(), crossings.end());
@@ -138,6 +155,11 @@ void exchange(World &w, Lasting &other) noexcept {
   w.store.id_b.swap(other.id_b);
 }
 
+void reserve_ends(World &w, size_t pieces) {
+  reserve_events(w, w.store.n + w.attachments.size() + pieces);
+  w.overlaps.placed.reserve(w.overlaps.placed.size() + w.attachments.size());
+}
+
 void end_what_went(World &w, const Lasting &lasting) {
   for (uint32_t i = 0; i < w.report.n; ++i) {
     if (!lasting.ended[i]) continue;
@@ -151,7 +173,14 @@ void end_what_went(World &w, const Lasting &lasting) {
     a.released = true;
     add_event(w, DFM_EVENT_RELEASE, a.body, a.to, a.number, w.time);
   }
-  std::erase_if(w.attachments, [](const Attachment &a) { return a.surfels.empty(); });
+  if (std::erase_if(w.attachments, [](const Attachment &a) { return a.surfels.empty(); })) w.changed = true;
+  for (const Attachment &a : lasting.attachments) {
+    const auto same = [&](const Attachment &b) {
+      return b.body == a.body && b.to == a.to && b.obstacle == a.obstacle;
+    };
+    if (!a.released && std::none_of(w.attachments.begin(), w.attachments.end(), same))
+      w.overlaps.place(a.body);
+  }
 }
 
 }  // namespace dfm

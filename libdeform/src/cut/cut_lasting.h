@@ -13,6 +13,7 @@ namespace dfm {
 struct CutTarget {
   uint64_t id;
   uint32_t slot;
+  const Body *body;
   FeatureMap map;
 };
 
@@ -23,12 +24,14 @@ struct Lasting {
   Array<uint64_t> id_a, id_b;    // of the store
   std::vector<uint8_t> ended;    // [contacts of the store] 1: its feature is gone
 
-  // Of the body whose id and slot the first target has.
-  Lasting(const World &w, const std::vector<CutTarget> &targets);
+  // Of the body whose id and slot the first target has. before: its shape before the cut.
+  Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets);
 };
 
 void exchange(World &w, Lasting &other) noexcept;
-// Ends contacts whose feature is gone and attachments without points; reserve_cut_events() came before.
+void reserve_ends(World &w, size_t pieces);
+// Ends contacts whose feature is gone and attachments without points. The next search for overlaps covers
+// what is not attached any more. lasting: after exchange(); reserve_ends() came before.
 void end_what_went(World &w, const Lasting &lasting);
 
 }  // namespace dfm

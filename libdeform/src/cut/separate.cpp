@@ -14,6 +14,7 @@
 #include "plugin/context.h"
 #include "plugin/on_behalf.h"
 #include "state/obstacle.h"
+#include "state/tool.h"
 #include "state/world.h"
 #include "step/overlap/overlap.h"
 #include "step/stages.h"
@@ -190,16 +191,22 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
   const std::unique_ptr<BodyShape> before = cut_body(b, std::move(rest.mesh), std::move(rest.open), true);
   const auto put = [&](bool rolled_back) {
     for (Body *const p : pieces) set_place(w, *p, false, rolled_back);
+    for (const auto &t : w.tools)  // they have room, and the ids of pieces are the highest
+      if (rolled_back)
+        std::erase_if(t->cuts.bodies, [&](uint64_t id) { return id >= w.next_id - pieces.size(); });
+      else if (t->cuts_body(b))
+        for (const Body *const p : pieces) t->cuts.bodies.push_back(p->id);
     w.next_id += rolled_back ? -uint64_t{parts.pieces} : parts.pieces;
     w.changed = true;
   };
   try {
-    std::vector<CutTarget> targets{{b.id, b.slot, FeatureMap(before->surface, b.surface)}};
+    std::vector<CutTarget> targets{{b.id, b.slot, &b, FeatureMap(before->surface, b.surface)}};
     for (const Body *const p : pieces)
-      targets.push_back(
-          {p->id, uint32_t(w.bodies.size() + targets.size() - 1), FeatureMap(before->surface, p->surface)});
-    Lasting lasting(w, targets);
-    reserve_events(w, w.store.n + w.attachments.size() + pieces.size());
+      targets.push_back({p->id, uint32_t(w.bodies.size() + targets.size() - 1), p,
+                         FeatureMap(before->surface, p->surface)});
+    Lasting lasting(w, *before, targets);
+    reserve_ends(w, pieces.size());
+    for (const auto &t : w.tools) t->cuts.bodies.reserve(t->cuts.bodies.size() + pieces.size());
     put(false);
     exchange(w, lasting);
     try {
@@ -214,7 +221,6 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     exchange(b, *before);
     throw;
   }
-  w.changed = true;  // without the attachments that have ended
   b.separate.waits = false;
   out.pieces += parts.pieces;
   double kinetic_now = kinetic_of(b), elastic_now = elastic_energy(b);

@@ -273,6 +273,8 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
     check_may_cut(*b, b->model);
     ids.push_back(b->id);
   }
+  for (const auto &b : w.bodies)  // which stay in the list when their whole is destroyed
+    if (b->piece_of && std::count(ids.begin(), ids.end(), b->piece_of)) ids.push_back(b->id);
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   if (how == DFM_CUT_SPLIT)  // now, since it takes longer than a step

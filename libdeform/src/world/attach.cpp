@@ -65,41 +65,13 @@ std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
   return out;
 }
 
-// Weights on three corners of a triangle and one surfel off its plane that give the point x and every linear
-// field: a point attached at a small distance then rotates with the surface, and forces on it conserve
-// angular momentum. corner[3] has weight 0 if x is in the plane.
-struct Place {
-  uint32_t node[kAnchors];
-  double weight[kAnchors];
-};
 Place place_on(const Body &b, const TriangleNearPoint &near, Vec3 x) {
-  const Surface &s = b.surface;
-  const auto at = [&](uint32_t i) { return b.surface.sum(i, b.p.x.data()); };
   Place p{};
   for (uint32_t k = 0; k < 3; ++k) {
-    p.node[k] = s.tri[3 * size_t{near.triangle} + k];
+    p.node[k] = b.surface.tri[3 * size_t{near.triangle} + k];
     p.weight[k] = near.at.weight[k];
   }
-  p.node[3] = p.node[0];
-  const Vec3 a = at(p.node[0]), e1 = at(p.node[1]) - a, e2 = at(p.node[2]) - a;
-  Vec3 off = x - a;
-  for (uint32_t k = 1; k < 3; ++k) off -= p.weight[k] * (k == 1 ? e1 : e2);
-  if (!(norm(off) > 1e-12 * s.median_edge)) return p;
-  const Vec3 normal = normalized(cross(e1, e2));
-  double farthest = 0;
-  for (uint32_t i = 0; i < s.nsurfel; ++i)
-    if (const double height = std::fabs(dot(normal, at(i) - a)); height > farthest) {
-      farthest = height;
-      p.node[3] = i;
-    }
-  if (!(farthest > 1e-6 * s.median_edge)) return p;
-  const Vec3 e3 = at(p.node[3]) - a;
-  p.weight[3] = dot(normal, x - a) / dot(normal, e3);
-  const Vec3 r = x - a - p.weight[3] * e3;  // in the plane
-  const double g11 = norm2(e1), g22 = norm2(e2), g12 = dot(e1, e2), det = g11 * g22 - g12 * g12;
-  p.weight[1] = (g22 * dot(e1, r) - g12 * dot(e2, r)) / det;
-  p.weight[2] = (g11 * dot(e2, r) - g12 * dot(e1, r)) / det;
-  p.weight[0] = 1 - p.weight[1] - p.weight[2] - p.weight[3];
+  lift(b, x, p);
   return p;
 }
 
@@ -142,6 +114,32 @@ const Attachment &attachment_of(const Body &b, uint32_t number) {
 }
 
 }  // namespace
+
+void lift(const Body &b, Vec3 x, Place &p) {
+  const Surface &s = b.surface;
+  const auto at = [&](uint32_t i) { return b.surface.sum(i, b.p.x.data()); };
+  p.node[3] = p.node[0];
+  p.weight[3] = 0;
+  const Vec3 a = at(p.node[0]), e1 = at(p.node[1]) - a, e2 = at(p.node[2]) - a;
+  Vec3 off = x - a;
+  for (uint32_t k = 1; k < 3; ++k) off -= p.weight[k] * (k == 1 ? e1 : e2);
+  if (!(norm(off) > 1e-12 * s.median_edge)) return;
+  const Vec3 normal = normalized(cross(e1, e2));
+  double farthest = 0;
+  for (uint32_t i = 0; i < s.nsurfel; ++i)
+    if (const double height = std::fabs(dot(normal, at(i) - a)); height > farthest) {
+      farthest = height;
+      p.node[3] = i;
+    }
+  if (!(farthest > 1e-6 * s.median_edge)) return;
+  const Vec3 e3 = at(p.node[3]) - a;
+  p.weight[3] = dot(normal, x - a) / dot(normal, e3);
+  const Vec3 r = x - a - p.weight[3] * e3;  // in the plane
+  const double g11 = norm2(e1), g22 = norm2(e2), g12 = dot(e1, e2), det = g11 * g22 - g12 * g12;
+  p.weight[1] = (g22 * dot(e1, r) - g12 * dot(e2, r)) / det;
+  p.weight[2] = (g11 * dot(e2, r) - g12 * dot(e1, r)) / det;
+  p.weight[0] = 1 - p.weight[1] - p.weight[2] - p.weight[3];
+}
 
 uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle *obstacle) {
   World &w = *b.world;
