@@ -240,16 +240,19 @@ TEST(ReadSurface, OffRefusals_NamePlaceAndReason) {
   expect_refusal("a.off", "hello\n", DFM_E_FORMAT, {"a.off:1:", "'hello'", "COFF"});
 }
 
-TEST(ReadSurface, CurvedFacesAlone_AreRefusedWithTheWayToConvert) {
+TEST(ReadSurface, CurvedFacesAlone_AreReadUpToSecondOrder) {
   const std::string nodes =
       "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n1 0 0 0\n2 2 0 0\n3 2 2 0\n4 0 2 0\n5 1 0 0\n6 2 1 "
       "0\n7 1 2 0\n8 0 1 0\n$EndNodes\n";
-  expect_refusal("a.msh", nodes + "$Elements\n1\n1 16 0 1 2 3 4 5 6 7 8\n$EndElements\n", DFM_E_UNSUPPORTED,
-                 {"second- or higher-order", "gmsh -3"});
   EXPECT_EQ(parse("a.msh", nodes + "$Elements\n1\n1 9 0 1 2 3 5 6 7\n$EndElements\n").ntri(), 4u);
-  expect_refusal("a.vtk",
-                 "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n0 0 0 2 0 "
-                 "0 2 2 0 0 2 0 1 0 0 2 1 0 1 2 0 0 1 0\n"
-                 "CELLS 1 9\n8 0 1 2 3 4 5 6 7\nCELL_TYPES 1\n23\n",
-                 DFM_E_UNSUPPORTED, {"second- or higher-order", "-order 1"});
+  EXPECT_EQ(parse("a.msh", nodes + "$Elements\n1\n1 16 0 1 2 3 4 5 6 7 8\n$EndElements\n").ntri(), 6u);
+  // a triangle of third order has ten points, one here in twice
+  expect_refusal("a.msh", nodes + "$Elements\n1\n1 21 0 1 2 3 4 5 6 7 8 1 2\n$EndElements\n",
+                 DFM_E_UNSUPPORTED, {"above second order"});
+  const std::string grid =
+      "# vtk DataFile Version 3.0\nt\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float\n0 0 0 2 0 "
+      "0 2 2 0 0 2 0 1 0 0 2 1 0 1 2 0 0 1 0\n"
+      "CELLS 1 9\n8 0 1 2 3 4 5 6 7\nCELL_TYPES 1\n";
+  EXPECT_EQ(parse("a.vtk", grid + "23\n").ntri(), 6u);
+  expect_refusal("a.vtk", grid + "36\n", DFM_E_UNSUPPORTED, {"second- or higher-order", "-order 1"});
 }
