@@ -23,7 +23,7 @@ PYTHON ?= $(firstword $(wildcard /usr/bin/python3) python3)
 help:
 	@echo "make demo             two soft cylinders with and without friction: table, picture, out/demo/"
 	@echo "make view [SCENE=..]  the same scene in a window"
-	@echo "make tools            left out by the demo: check, cost, calibrate, friction, scans, ccd, rollback, Bullet"
+	@echo "make tools            left out by the demo: check, cost, calibrate, friction, scans, ccd, rollback"
 	@echo "make test             the whole test suite"
 	@echo "make bench            the figures: kernels and full steps"
 	@echo "make bench-contact    contact problems of others (FCLIB, Siconos): CONTACT_PROBLEMS=folder"

@@ -118,7 +118,8 @@ TEST(Rebound, WithoutAnythingToFallOn_IsNotTold) {
   const double none[3] = {};
   test::ok(dfm_world_set_gravity(w, none));
   test::set_velocity(ball, {0, 0, -20});
-  const uint32_t n = test::info_of(ball).npoint;
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(ball, 0, nullptr, nullptr, &n));
   std::vector<uint32_t> points(n);
   std::vector<double> up(3 * size_t{n});
   for (uint32_t i = 0; i < n; ++i) {
