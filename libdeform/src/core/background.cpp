@@ -116,12 +116,13 @@ Background::~Background() {
 void Background::start(std::shared_ptr<Job> job) noexcept {
   if (room_->of_process != forks()) return;
   try {
-    if (!room_->thread.joinable()) room_->thread = std::thread([this] { room_->work(); });
     {
       const std::unique_lock lock = room_->locked();
       if (!lock) return;
       room_->jobs.push_back(std::move(job));
     }
+    // made where the first job is there: a new thread that looks for one would hold the lock
+    if (!room_->thread.joinable()) room_->thread = std::thread([this] { room_->work(); });
     room_->begin.notify_one();
   } catch (...) {  // no thread, or no memory: who needs it does it
   }
