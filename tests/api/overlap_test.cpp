@@ -288,3 +288,28 @@ TEST(Overlap, OfFilteredPair_DoesNotCount) {
   EXPECT_EQ(overlaps(w).size(), 1u);
   dfm_world_destroy(w);
 }
+
+// What the host has excluded while the pair was set aside remains so when the two are apart.
+TEST(Overlap, OfPairExcludedWhileSetAside_HasNoContactAfterwards) {
+  for (const bool by_masks : {false, true}) {
+    test::Context c;
+    const dfm_world w = test::make_world(c, {});
+    test::add_plane(w, "floor", {0, 0, -1});
+    const dfm_body a = ball(c, w, "a", {}, 0.1, 200), b = ball(c, w, "b", {0.15, 0, 0}, 0.1, 200);
+    test::run(w, 1e-3, 1e-3);
+    ASSERT_EQ(overlaps(w).size(), 1u);
+    if (by_masks) {
+      test::ok(dfm_body_set_filter(a, 1, 1));
+      test::ok(dfm_body_set_filter(b, 2, 2));
+    } else {
+      test::ok(dfm_world_filter_pair(w, "a", "b", false));
+    }
+    test::run(w, 1e-3, 1e-3);
+    test::set_velocity(a, {-1, 0, 0});
+    test::run(w, 0.1, 1e-3);  // 0.25 apart
+    test::set_velocity(a, {1, 0, 0});
+    test::run(w, 0.1, 1e-3);
+    EXPECT_LT(test::measure(b).velocity[0], 1e-9) << by_masks;
+    dfm_world_destroy(w);
+  }
+}

@@ -161,7 +161,7 @@ void take_back(World &w, const Overlap &f) {
   if (std::erase_if(w.overlaps.suspended, [&](const SuspendedPair &p) {
         return p.a == f.a && p.b == f.b && (p.obstacle != 0) == f.obstacle;
       }))
-    w.pairs.filter.set(f.a, f.b, f.obstacle, true);
+    w.pairs.filter.set_aside(f.a, f.b, f.obstacle, false);
 }
 
 }  // namespace
@@ -197,7 +197,7 @@ void resolve_overlaps(World &w) {
   for (const Overlap &f : left) {
     if (!f.suspended || o.report_only || o.is_suspended(f.a, f.b, f.obstacle)) continue;
     o.suspended.push_back({f.a, f.b, f.obstacle});
-    w.pairs.filter.set(f.a, f.b, f.obstacle, false);
+    w.pairs.filter.set_aside(f.a, f.b, f.obstacle, true);
   }
   o.found.assign(found.begin(), found.end());  // an interrupt gives back what was there, in this memory
   o.reported = left.empty();
@@ -211,7 +211,7 @@ void keep_suspended(World &w) {
   };
   std::erase_if(w.overlaps.suspended, gone);
   std::erase_if(w.overlaps.found, gone);
-  for (const SuspendedPair &p : w.overlaps.suspended) w.pairs.filter.set(p.a, p.b, p.obstacle, false);
+  for (const SuspendedPair &p : w.overlaps.suspended) w.pairs.filter.set_aside(p.a, p.b, p.obstacle, true);
 }
 
 void release_overlaps(World &w) {
@@ -220,7 +220,7 @@ void release_overlaps(World &w) {
   std::erase_if(w.overlaps.suspended, [&](const SuspendedPair &p) {
     const uint32_t j = p.obstacle ? w.obstacle(p.b)->slot : w.body(p.b)->slot;
     if (sides.look({w.body(p.a)->slot, j, p.obstacle != 0}, w.offset, true).through) return false;
-    w.pairs.filter.set(p.a, p.b, p.obstacle, true);
+    w.pairs.filter.set_aside(p.a, p.b, p.obstacle, false);
     return true;
   });
 }
