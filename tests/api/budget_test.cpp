@@ -4,6 +4,7 @@
 #include <cmath>
 #include <ctime>
 #include <thread>
+#include <utility>
 
 #include "rigid.h"
 #include "stack.h"
@@ -49,7 +50,6 @@ struct Seen {
   uint64_t hash, steps;
   uint32_t events = 0;  // that wait to be read
   std::vector<double> forces;
-  std::string snapshot;
   explicit Seen(dfm_world w) : hash(dfm_world_hash(w)), steps(test::stats(w).steps) {
     for (const dfm_contact &c : test::contacts(w)) forces.push_back(c.fn);
     dfm_world_events(w, 0, nullptr, &events);
@@ -375,6 +375,69 @@ TEST(Interrupt, AnywhereInAStep_LeavesTheStateAsBefore) {
     ASSERT_EQ(dfm_world_hash(tried.world), dfm_world_hash(plain.world)) << "step " << i;
   }
   EXPECT_GT(stopped, 100);
+}
+
+// A step of one sub-step, of which nothing is saved in advance: what its first stages have written is undone.
+TEST(Interrupt, WithinTheOnlySubStep_LeavesNothingOfIt) {
+  struct Stop {
+    test::Context context;
+    dfm_world world = test::make_world(context);
+    bool within = false, asked = false;
+    static void pre_solve(void *user, dfm_contact_choice *) {
+      Stop &s = *static_cast<Stop *>(user);
+      if (std::exchange(s.asked, false)) test::ok(dfm_world_interrupt(s.world));
+    }
+    void discard(double dt) {
+      if (within) asked = true;
+      else test::ok(dfm_world_interrupt(world));
+      EXPECT_EQ(dfm_world_step(world, dt, nullptr), DFM_DISCARD);
+    }
+  };
+  Stop first, second;  // stopped before and after the stages have begun
+  second.within = true;
+  for (Stop *s : {&first, &second}) {
+    test::add_plane(s->world, "floor");
+    test::BodyOptions o;
+    o.position = {0, 0, 0.1};
+    o.velocity = {0, 0, -0.1};
+    test::make_body(s->context, s->world, "ball", {0.1, 0, 0}, 200, o);
+    const dfm_vector_key keys[2] = {{0, {0, 0, -9.81}}, {10, {5, 0, -9.81}}};
+    test::ok(dfm_world_set_gravity_keys(s->world, 2, keys));
+    test::ok(dfm_world_set_pre_solve(s->world, &Stop::pre_solve, s));
+    for (int i = 0; i < 20; ++i) test::ok(dfm_world_step(s->world, 1e-5, nullptr));
+    for (int i = 0; i < 3; ++i) s->discard(1e-5);
+    ASSERT_EQ(test::stats(s->world).last_substeps, 1u);
+  }
+  // the work of the steps that were stopped is all that differs, behind the checksum
+  constexpr size_t kHead = 40;
+  const std::string a = test::snapshot(first.world), b = test::snapshot(second.world);
+  ASSERT_EQ(a.size(), b.size());
+  const size_t from = size_t(std::mismatch(a.begin() + kHead, a.end(), b.begin() + kHead).first - a.begin());
+  const size_t to = size_t(a.rend() - std::mismatch(a.rbegin(), a.rend(), b.rbegin()).first);
+  EXPECT_LE(to - from, sizeof(uint64_t));
+}
+
+// What pairs that sleep bore in the last step is told by its length, not by that of a step that was stopped.
+TEST(Interrupt, BetweenSteps_LeavesTheImpulsesOfTheLastOne) {
+  Busy b;
+  dfm_rigid flyer = 0;
+  test::ok(dfm_world_find_rigid(b.world, "flyer", &flyer));
+  test::ok(dfm_rigid_destroy(flyer));
+  bool asleep = false;
+  for (int i = 0; i < 2000; ++i) test::ok(dfm_world_step(b.world, kStep, nullptr));
+  test::ok(dfm_body_is_asleep(b.lower, &asleep));
+  ASSERT_TRUE(asleep);
+  const auto parts = [&] {
+    std::vector<double> out;
+    for (const dfm_pair_impulse &p : test::listed(dfm_world_pair_impulses, b.world))
+      out.insert(out.end(), p.part, p.part + 8);
+    return out;
+  };
+  const std::vector<double> before = parts();
+  EXPECT_FALSE(before.empty());
+  test::ok(dfm_world_interrupt(b.world));
+  EXPECT_EQ(dfm_world_step(b.world, 2 * kStep, nullptr), DFM_DISCARD);
+  EXPECT_EQ(parts(), before);
 }
 
 // A step of thousands of sub-steps, asked to stop from another thread: this one or, should it have been over

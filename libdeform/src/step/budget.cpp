@@ -15,6 +15,7 @@
 #include "step/context.h"
 #include "step/impact.h"
 #include "step/messages.h"
+#include "step/overlap/overlap.h"
 #include "step/rigid/tool_touch.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
@@ -107,33 +108,20 @@ bool holds(StepContext &step, uint64_t units) {
 template <class Stream>
 void changing(Stream &s, World &w) {
   s.one(w.time);
-  s.one(w.bound.step);
-  s.one(w.bound.inverted);
-  s.one(w.bound.age);
-  s.one(w.bound.strain);
-  s.one(w.bound.body);
-  s.one(w.bound.point);
-  s.one(w.gravity.now);
   s.one(w.offset);
   s.many(w.overlaps.found);
-  s.many(w.overlaps.suspended);
   s.one(w.overlaps.reported);
   s.one(w.step_count);
   s.one(w.sleepers);
-  s.one(w.watch);
   for (auto &b : w.bodies) {
     s.many(b->p.x);
     s.many(b->p.v);
     s.many(b->p.dampers.v);
     s.many(b->p.dampers.slow);
     s.many(b->model.state);
-    s.many(b->surfel_impulse);
     s.many(b->anchor);
     s.one(b->contact_impulse);
-    s.one(b->energy);
-    s.one(b->changes);
     s.one(b->sleep_state);
-    s.one(b->bound);
     for (BladeTrack &track : b->blades) s.many(track.cut_work);
   }
   for (auto &o : w.obstacles) {
@@ -182,11 +170,29 @@ void reserve_others(World &w, StepContext &step) {
   step.tools->next_report().touching.reserve(w.rigid_report.touching.size());
 }
 
-// Data that the step changes at its start, before it is known whether more must be saved.
+// Data that a sub-step changes before it is known whether more must be saved: an interrupt ends it before it
+// moves anything.
 template <class Stream>
 void changed_at_once(Stream &s, World &w) {
+  s.one(w.bound.step);
+  s.one(w.bound.inverted);
+  s.one(w.bound.age);
+  s.one(w.bound.strain);
+  s.one(w.bound.body);
+  s.one(w.bound.point);
+  s.one(w.gravity.now);
+  s.one(w.watch);
+  s.many(w.overlaps.suspended);
   s.many(w.step_impulses.pairs);
+  s.one(w.step_impulses.start);
+  s.one(w.step_impulses.length);
   s.one(w.step_impulses.idle);
+  for (auto &b : w.bodies) {
+    s.many(b->surfel_impulse);
+    s.one(b->energy);
+    s.one(b->changes);
+    s.one(b->bound);
+  }
   s.one(w.sizes);
   s.one(w.integrator_times.changes);
   for (auto &t : w.tools) {
@@ -213,6 +219,7 @@ void return_to_start(World &w, StepContext &step) {
     ByteReader first(step.budget.start, kStart);
     changed_at_once(first, w);  // of tools; the rest was saved after the step had changed them
   }
+  keep_suspended(w);  // release_overlaps() may have let some touch
   const uint64_t cheapened = w.stats.cheapened;
   w.stats = step.budget.stats;
   w.stats.cheapened = cheapened;
@@ -322,6 +329,11 @@ void charge(World &w, StepContext &step, const Spent &spent) {
   charge(w, step, spent.work);
 }
 
+void save_at_once(World &w, StepContext &step) {
+  ByteWriter to(step.budget.start);
+  changed_at_once(to, w);
+}
+
 void save_start(World &w, StepContext &step) {
   Budget &b = step.budget;
   if (b.kept) return;
@@ -357,8 +369,6 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   b.span = w.def.max_time;
   b.end = b.span > 0 ? now() + b.span : 0;
   b.start.clear();
-  ByteWriter to(b.start);
-  changed_at_once(to, w);
   dfm_status status = DFM_DISCARD;
   const Tasks::Step awake(w.context->tasks);
   const double impact_until = w.impact_until;

@@ -78,7 +78,9 @@ bool may_check(const World &w, StepContext &step);
 // the same.
 void write_down(World &w, StepContext &step, std::string &out);
 void restore_start(World &w, StepContext &step, std::string_view from);
-// The state before the step is saved once, before any of it changes.
+// After prepare(), whose results an interrupt leaves: what every step changes before it moves anything.
+void save_at_once(World &w, StepContext &step);
+// The whole state before the step is saved once, before any of it changes.
 void save_start(World &w, StepContext &step);
 
 // Requests the present step of a world (or the next one, if none runs) to stop. Async-signal-safe. Returns

@@ -275,6 +275,7 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   step.offered = chosen_by_library(w, dt) ? dt : 0;
   drop_released(w);
   prepare(w);
+  save_at_once(w, step);
   check_target_speeds(w, dt);
   check_tool_ways(w, dt);
   release_overlaps(w);
