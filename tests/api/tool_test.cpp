@@ -591,6 +591,49 @@ struct Device {
 
 }  // namespace
 
+// What says nothing yet keeps the tool in place, whatever else would move it.
+TEST(Tool, ADeviceWithNothingNew_HoldsItsToolAgainstKeysAndHost) {
+  for (const double stiffness : {0.0, 300.0}) {
+    Scene s;
+    dfm_tool_def d = tool_def("keyed", DFM_TOOL_SPHERE, {0, 0, 0.1});
+    d.stiffness = stiffness;
+    d.turn_stiffness = stiffness;
+    const dfm_pose_key keys[] = {{0, pose({0, 0, 0.1})}, {0.1, pose({0.01, 0, 0.1})}};
+    d.keys = keys;
+    d.nkey = 2;
+    const dfm_tool keyed = make(s.w, d);
+    d.name = "free";
+    d.nkey = 0;
+    const dfm_tool free = make(s.w, d);
+    Device device;
+    device.says = DFM_DISCARD;
+    const dfm_device table = device.table();
+    for (const dfm_tool t : {keyed, free}) test::ok(dfm_tool_set_device(t, &table));
+    const dfm_pose aside = pose({0.001, 0, 0.1});
+    test::ok(dfm_tool_set_pose(free, &aside, nullptr));
+    for (int i = 0; i < 10; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+    for (const dfm_tool t : {keyed, free}) {
+      EXPECT_EQ(state(t).pose.position[0], 0) << stiffness;
+      EXPECT_EQ(state(t).device.position[0], 0) << stiffness;
+    }
+  }
+}
+
+// A step that a device refuses changes no model either that is due in it.
+TEST(Tool, ADeviceThatRefusesTheStep_LeavesModelsAsTheyAre) {
+  Scene s;
+  Device device;
+  device.says = DFM_E_STATE;
+  const dfm_device table = device.table();
+  test::ok(dfm_tool_set_device(make(s.w, tool_def("probe", DFM_TOOL_SPHERE, {0, 0, 0.2})), &table));
+  dfm_switch due = dfm_switch_default();
+  due.type = "linear_fem";
+  test::ok(dfm_body_set_switches(s.block, 1, &due));
+  const std::string before = test::snapshot(s.w);
+  EXPECT_EQ(dfm_world_step(s.w, 1e-3, nullptr), DFM_E_STATE);
+  EXPECT_TRUE(test::snapshot(s.w) == before);
+}
+
 TEST(Tool, ADevice_IsReadBeforeAndWrittenAfterEachStep) {
   Scene s;
   const dfm_tool t = make(s.w, tool_def("probe", DFM_TOOL_SPHERE, {0, 0, 0.0245}));

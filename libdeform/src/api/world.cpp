@@ -222,8 +222,8 @@ dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
     if (const double floor = shortest_step(w, dt); dt < floor)
       fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
     uint32_t bits = 0;
+    read_devices(w, w.time + dt);  // may refuse the step
     make_switches(w, dt);
-    read_devices(w, w.time + dt);
     begin_cuts(w);
     const double before = w.time;
     const dfm_status s = step_within_budget(w, dt, &bits);

@@ -409,6 +409,11 @@ void set_device(Tool &t, const dfm_device *device) {
     fail(DFM_E_ARG, "tool '%s': the device has no read(); it is needed, write() may be NULL", t.name.c_str());
   t.device = device ? *device : dfm_device{};
   t.mute = false;
+  if (!device) return;
+  ToolValues v = t.values();  // it stands until the device moves it
+  store_place(v.target, t.motion.coupled() ? load_place(v.device) : load_pose(t.set->state[0]));
+  v.keyed = v.measured = 0;
+  t.store(v);
 }
 
 void read_devices(World &w, double end) {
