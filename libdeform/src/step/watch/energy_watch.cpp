@@ -60,14 +60,15 @@ bool unbooked(const World &w, const Body &b) {
 }
 
 // The work of the holders of driven points, by the trapezoid of the force: the force at the start of this
-// sub-step counts for half of the displacement of the one before, and, if `now`, for half of this one's.
-double work_of_holders(const World &w, const StepContext &step, const Body &b, bool now) {
+// sub-step counts for half of the displacement of the one before, and for half of that in `time`, s, of this
+// one.
+double work_of_holders(const World &w, const StepContext &step, const Body &b, double time) {
   double sum = 0;
   for (const Driven &d : step.driven) {
     if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
     const size_t at = size_t(d.velocity - b.p.v.data());
     const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity.now[int(at % kStride)];
-    sum -= 0.5 * force * (w.watch.last_h * d.before + (now ? step.h * *d.velocity : 0));
+    sum -= 0.5 * force * (w.watch.last_h * d.before + time * *d.velocity);
   }
   return sum;
 }
@@ -147,7 +148,7 @@ bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
   if (steps_itself(b) && (!hides(b) || b.dynamics->abilities().late) &&
       !b.dynamics->free_motion(sub_step_of(w, step), again))
     return false;
-  const double half_done = ends ? 0 : work_of_holders(w, step, b, false) + work_of_new_size(w, step, b);
+  const double half_done = ends ? 0 : work_of_holders(w, step, b, 0) + work_of_new_size(w, step, b);
   out = {kinetic,
          elastic,
          elastic + potential + (ends ? kinetic : cross) - (b.energy.work + half_done),
@@ -446,7 +447,7 @@ void book_energy(World &w, StepContext &step, double motion) {
       if (!steps_itself(b)) ages = kAges;
       continue;
     }
-    if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, true);
+    if (!step.driven.empty()) b.energy.work += work_of_holders(w, step, b, motion * step.h);
     if (books(b)) b.energy.work += work_of_new_size(w, step, b);
     if (books(b) && books_loads(b)) book_loads(step, b, motion);
     if (books(b) && motion < 1 && step.acts_in_full(i)) book_unmoved(b, motion);
