@@ -257,6 +257,35 @@ TEST(WriteScene, Tools_AreWrittenWithKeysCouplingAndCuts) {
   }
 }
 
+// The widest opening is read again; what the host has set on parts alone is reported.
+TEST(WriteScene, JawsWideOpen_AreReadAgainAndPartsReported) {
+  test::Context context;
+  const dfm_world world = test::make_world(context);
+  dfm_tool_def d = dfm_tool_def_default();
+  d.name = "jaws";
+  d.shape = DFM_TOOL_GRASPER;
+  std::fill(d.half_size, d.half_size + 3, 0.005);
+  d.opening = 3;
+  const dfm_tool jaws = test::tools::make(world, d);
+  const std::string path = folder_of("jaws") + "/jaws.json";
+  EXPECT_EQ(all(write(world, path)), "");
+  dfm_tool again = 0;
+  test::ok(dfm_world_find_tool(load(context, path), "jaws", &again));
+  test::ok(dfm_tool_get_def(again, &d));
+  EXPECT_EQ(d.opening, 3);
+
+  const std::vector<dfm_rigid> parts = test::listed(dfm_tool_parts, jaws);
+  dfm_material_def rough = dfm_material_def_default();
+  rough.name = "rough";
+  dfm_material material = 0;
+  test::ok(dfm_material_create(world, &rough, &material));
+  test::ok(dfm_obstacle_set_sensor(parts[1], true));
+  test::ok(dfm_obstacle_set_material(parts[0], material));
+  const std::string notes = all(write(world, path, DFM_SCENE_PARTIAL));
+  EXPECT_NE(notes.find("sensors touch"), std::string::npos) << notes;
+  EXPECT_NE(notes.find("material of the first"), std::string::npos) << notes;
+}
+
 // One sentence for each thing that a scene has no word for: without the flag it ends the call, and neither
 // the scene nor its folder is there.
 TEST(WriteScene, WhatASceneCannotSay_IsRefusedOrReported) {

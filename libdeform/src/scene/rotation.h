@@ -5,6 +5,7 @@
 namespace dfm::scene {
 
 inline constexpr double kRadian = 0.017453292519943295;  // of a degree
+inline constexpr double kWidest = 3 / kRadian;           // degrees, of an opening: 3 rad, as in tool.h
 
 // axis need not be unit, but not zero. Multiples of 90 degrees come out to the last bit, and the same on
 // every machine: libm's sine is not used, since its last bit depends on the processor and the start state

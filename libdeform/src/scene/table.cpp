@@ -221,7 +221,6 @@ namespace {
 
 constexpr char kPose[] = "t,x,y,z,qx,qy,qz,qw", kOpening[] = "t,x,y,z,qx,qy,qz,qw,opening_deg";
 constexpr uint64_t kMaxRows = 4000000;  // more than an hour at 1 kHz
-constexpr double kWidest = 170;         // degrees
 
 }  // namespace
 

@@ -82,6 +82,15 @@ void note_rigid_tool(SceneWriter &to, const Tool &t, const ToolValues &v) {
   if (!std::all_of(to.w.obstacles.begin(), to.w.obstacles.end(),
                    [&](const auto &o) { return o->rigid != t.set || is_own(o); }))
     to.note("tool '%s': the shapes that were added to its parts are left out", name);
+  const auto any_part = [&](const auto &f) {
+    return std::any_of(to.w.obstacles.begin(), to.w.obstacles.end(),
+                       [&](const auto &o) { return o->rigid == t.set && is_own(o) && f(*o); });
+  };
+  const Obstacle &first = *to.w.obstacle(t.set->obstacle[0]);
+  if (any_part([](const Obstacle &o) { return o.sensor; }))
+    to.note("tool '%s': in the scene its parts that are sensors touch", name);
+  if (any_part([&](const Obstacle &o) { return o.material != first.material; }))
+    to.note("tool '%s': in the scene all of its parts are of the material of the first", name);
   if (t.device.read) to.note("tool '%s': its device is left out; in the scene the tool stands", name);
   const bool led = !t.keys.empty() || !t.opening_keys.empty();
   if (led && ((v.keyed == 0 && !t.keys.empty()) || (v.opening_keyed == 0 && !t.opening_keys.empty())))
