@@ -37,6 +37,20 @@ struct Block {
 
 double norm(const double *a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
 
+// Three numbers for each point, of that name in a file of the surface.
+std::vector<double> vectors(const std::string &path, const std::string &name) {
+  const std::string file = test::read_file(path);
+  const size_t at = file.find("offset=\"", file.find("Name=\"" + name + "\""));
+  const size_t data = file.find("<AppendedData");
+  if (at == std::string::npos || data == std::string::npos) return {NAN};
+  const char *const first = file.data() + file.find('_', data) + 1 + std::stoul(file.substr(at + 8));
+  uint64_t bytes = 0;
+  std::memcpy(&bytes, first, sizeof bytes);
+  std::vector<double> out(bytes / sizeof(double));
+  std::memcpy(out.data(), first + sizeof bytes, bytes);
+  return out;
+}
+
 }  // namespace
 
 TEST(Coupled, RestingBlock_CarriesItsWeightAndEveryImpulseArrives) {
@@ -264,18 +278,27 @@ TEST(Coupled, SurfaceFile_HoldsTheTrueDisplacement) {
   const dfm_body b = test::make_body(context, w, "beam", kSize, 60, o);
   const std::string path = test::scratch("coupling") + "/skin.vtu";
   test::ok(dfm_debug_write_surface(b, path.c_str()));
-  const std::string file = test::read_file(path);
-  const size_t head = file.find("Name=\"u\"");
-  const size_t at = file.find("offset=\"", head);
-  const size_t data = file.find("<AppendedData");
-  ASSERT_NE(at, std::string::npos);
-  const char *const first =
-      file.data() + file.find('_', data) + 1 + std::stoul(file.substr(at + 8)) + sizeof(uint64_t);
-  for (uint32_t i = 0; i < skin.npoint(); ++i) {
-    double u[3];
-    std::memcpy(u, first + 24 * size_t{i}, sizeof u);
-    for (int k = 0; k < 3; ++k) EXPECT_NEAR(u[k], 0, 1e-15) << "it rests at its pose";
-  }
+  for (const double u : vectors(path, "u")) EXPECT_NEAR(u, 0, 1e-15) << "it rests at its pose";
+}
+
+// Forces of a floor that is there no more are not told.
+TEST(Coupled, SurfaceFile_HasNoForcesOfWhatIsGone) {
+  test::Context context;
+  const dfm_world w = test::make_world(context);
+  const dfm_obstacle floor = test::add_plane(w, "floor");
+  const dfm_body b = test::make_body(context, w, "beam", kSize, 60, {});
+  const std::string path = test::scratch("coupling") + "/falls.vtu";
+  const auto most = [&] {
+    test::ok(dfm_debug_write_surface(b, path.c_str()));
+    double out = 0;
+    for (const double f : vectors(path, "force")) out = std::max(out, std::fabs(f));
+    return out;
+  };
+  for (int i = 0; i < 20; ++i) test::ok(dfm_world_step(w, 1e-3, nullptr));
+  EXPECT_GT(most(), 0);
+  test::ok(dfm_obstacle_destroy(floor));
+  test::ok(dfm_world_step(w, 1e-3, nullptr));
+  EXPECT_EQ(most(), 0);
 }
 
 // An error in a surface is one sentence, and no body is created.

@@ -22,9 +22,8 @@ dfm_status dfm_surface_velocities(dfm_body body, uint32_t capacity, double *xyz,
 dfm_status dfm_surface_forces(dfm_body body, uint32_t capacity, double *xyz, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
     const double h = b.impulse_time();
-    const bool acts = b.world->plan.touches() && h > 0;
     copy_vectors(b.surface.nsurfel, capacity, xyz, n, [&](uint32_t s) {
-      return acts ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
+      return h > 0 ? (1 / h) * load3(&b.surfel_impulse[size_t(3) * s]) : Vec3{};
     });
   });
 }

@@ -28,6 +28,9 @@ double Body::young() const {
   return 0;
 }
 
-double Body::impulse_time() const { return sleep_state.h > 0 ? sleep_state.h : world->report.h; }
+double Body::impulse_time() const {
+  if (!world->plan.touches()) return 0;
+  return sleep_state.h > 0 ? sleep_state.h : world->report.h;
+}
 
 }  // namespace dfm

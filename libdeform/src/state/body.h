@@ -193,7 +193,7 @@ struct Body : BodyShape, BodyState {
   ~Body();
   bool loads_vary() const;
   double young() const;         // Pa, the largest of all cells; 0: the model has no such parameter
-  double impulse_time() const;  // s that surfel_impulse belongs to
+  double impulse_time() const;  // s that surfel_impulse belongs to; 0: nothing may touch any more
 };
 
 }  // namespace dfm
