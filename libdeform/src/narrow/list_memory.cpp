@@ -1,6 +1,7 @@
 #include "narrow/list_memory.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace dfm {
 namespace {
@@ -31,7 +32,8 @@ void ListMemory::follow(const Array<Candidate> &list, Tasks *tasks) {
   for (size_t r = 0; r < runs.size(); ++r) {
     const auto same = [&](const Run &o) { return same_run(o.of, runs[r].of); };
     const auto found = std::find_if(old_runs.begin() + std::ptrdiff_t(next), old_runs.end(), same);
-    if (found == old_runs.end()) continue;
+    // nothing is known any more beyond the turn of a plane, whose motion has no bound
+    if (found == old_runs.end() || !std::isfinite(found->way)) continue;
     before[r] = static_cast<uint32_t>(found - old_runs.begin());
     next = size_t{before[r]} + 1;
   }
