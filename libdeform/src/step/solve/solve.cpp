@@ -230,6 +230,7 @@ bool short_enough(World &w, StepContext &step) {
   while (longest > 0 && step.h > parts * longest) parts *= 2;  // zero: the step's own check refuses it
   if (parts == 1) return true;
   expire_bound(w);
+  w.bound.strain = kBoundStrain;  // all that the bound allows for, so that it is evaluated
   step.length.divide(step.h, parts);
   return false;
 }
