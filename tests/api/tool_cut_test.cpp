@@ -571,6 +571,7 @@ TEST(ToolCut, StepThatFailsHalfWay_LeavesNoBridge) {
         test::ok(dfm_body_add_load(far, 1, &point, huge, 2, grow, nullptr, &load));
         ASSERT_EQ(dfm_world_step(c->w, 1e-3, nullptr), DFM_E_DIVERGED);
         ASSERT_GT(dfm_world_time(c->w), now);
+        EXPECT_EQ(test::stats(c->w).time, dfm_world_time(c->w));
         test::ok(dfm_body_remove_load(far, load));
         const std::string kept = test::snapshot(c->w);
         test::ok(dfm_world_restore(c->w, kept.data(), kept.size()));

@@ -7,7 +7,7 @@ namespace dfm::scene {
 namespace {
 
 constexpr Range kOpening{0, kWidest, false, false};
-constexpr Range kLate{0, 0.1, false, false};     // s
+constexpr Range kLate{0, 0.1, false, false};  // s
 
 bool has_jaws(uint32_t shape) { return shape == DFM_TOOL_GRASPER || shape == DFM_TOOL_SCISSORS; }
 

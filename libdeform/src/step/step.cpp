@@ -215,18 +215,23 @@ void divide_rest(World &w, Division &rest) {
   rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
 }
 
-// The bound evaluated again, if it is due: more sub-steps where it has fallen. done: of this step.
+// An impact that is too dear ends, and is not begun again. done: sub-steps of this step; returns how many more
+// it needs.
+double end_dear_impact(World &w, StepContext &step, uint32_t done, Division &rest, double more) {
+  if (done + more <= w.def.max_substeps || !end_impact(w)) return more;
+  prepare_bound(w);
+  step.offered = 0;
+  divide_rest(w, rest);
+  return rest.left();
+}
+
+// The bound evaluated again, if it is due: more sub-steps where it has fallen.
 dfm_status follow_bound(World &w, StepContext &step, uint32_t done, Division &rest, uint32_t *trouble) {
   if (!bound_expired(w)) return DFM_OK;
   update_bound(w);
   if (w.bound.inverted) *trouble |= DFM_TROUBLE_INVERTED;
-  double more = rest.left() * cut_finer(w.sizes, rest.size(), w.bound.step);
-  if (!(done + more <= w.def.max_substeps) && end_impact(w)) {
-    prepare_bound(w);
-    step.offered = 0;  // an impact that is too dear is not begun again
-    divide_rest(w, rest);
-    more = rest.left();
-  }
+  const double finer = cut_finer(w.sizes, rest.size(), w.bound.step);
+  const double more = end_dear_impact(w, step, done, rest, rest.left() * finer);
   if (!(done + more <= w.def.max_substeps)) return refuse_rest(w, rest.goal);
   if (!(more > rest.left())) return DFM_OK;
   if (!(w.watch.size_before > 0)) w.watch.size_before = rest.size();
@@ -238,22 +243,30 @@ dfm_status follow_bound(World &w, StepContext &step, uint32_t done, Division &re
 // All sub-steps of a step of dt, at first n, until the budget is used up. done: how many were taken.
 dfm_status take_substeps(World &w, StepContext &step, double dt, uint32_t n, uint32_t &done,
                          uint32_t *trouble) {
-  struct Hands {  // also where this throws
+  struct Taken {  // also where this fails or throws
     World &w;
     double start;
-    ~Hands() { take_back_work(w, start); }
-  } hands{w, w.time};
+    uint32_t &done;
+    ~Taken() {
+      take_back_work(w, start);
+      w.stats.last_substeps = done;
+      w.stats.substeps_max = std::max(w.stats.substeps_max, done);
+      w.stats.time = w.time;
+      w.step_impulses.length = w.time - start;
+    }
+  } taken{w, w.time, done};
   for (Division rest(w.time, dt, n); !rest.over();) {
     if (const dfm_status refused = follow_bound(w, step, done, rest, trouble)) return refused;
     allow_for_bound(w, step);
     step.budget.to_come = rest.left() - 1;
-    step.length.most_parts = double(w.def.max_substeps - done) / rest.left();
+    step.length.most_parts = std::max(0.0, double(w.def.max_substeps) - done) / rest.left();
     const double from = w.time;
     if (!advance(w, step, rest.next(), rest.goal, rest.last(), trouble)) {
       if (!step.in_impact) return DFM_E_DIVERGED;
       begin_impact(w);
       prepare_bound(w);
       divide_rest(w, rest);
+      end_dear_impact(w, step, done, rest, rest.left());
       *trouble |= DFM_TROUBLE_SUBSTEPS;
       continue;
     }
@@ -296,14 +309,10 @@ dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble) {
   const double start = w.time;
   uint32_t done = 0;
   if (const dfm_status failed = take_substeps(w, step, dt, n, done, trouble)) return failed;
-  w.stats.last_substeps = done;
-  w.stats.substeps_max = std::max(w.stats.substeps_max, done);
   drop_released(w);
-  w.step_impulses.length = w.time - start;
   end_tools(w, w.time - start);
   ++w.step_count;
   w.stats.steps = w.step_count;
-  w.stats.time = w.time;
   follow_impact(w, w.time - start);
   return DFM_OK;
 }
@@ -324,10 +333,10 @@ bool advance(World &w, StepContext &step, double end, double goal, bool last, ui
     // only where the budget of the step has room for one piece more
     if (step.length.next_piece > 0 && step.length.next_piece < step.rest && may_repeat(w, step))
       step.h = step.length.next_piece;
+    view_obstacles(w, step);
     // waking changes state that a later failure must restore
     if (step.h < step.left || (w.def.sleep && !all_idle(w, step))) save_start(w, step);
     charge(w, step, 1);
-    view_obstacles(w, step);
     wake_attached(w, step);
     wake_cut(w, step);
     if (all_idle(w, step)) {
