@@ -269,6 +269,20 @@ TEST(CellMaterials, WrongOnes_AreRefused) {
   b.create();
 }
 
+// What the def has a member for, and what is there already, is no further entry.
+TEST(CellMaterials, EntriesGivenTwice_AreRefused) {
+  Block b;
+  const double x = 0.4;
+  const dfm_param_value twice[] = {{"friction", &x, 1}, {"friction", &x, 1}}, young{"young", &x, 1};
+  dfm_material_def d = dfm_material_def_default();
+  dfm_material out = 0;
+  for (const auto &extra : {dfm_params{sizeof(dfm_params), 2, twice}, {sizeof(dfm_params), 1, &young}}) {
+    d.extra = extra;
+    EXPECT_EQ(dfm_material_create(b.world, &d, &out), DFM_E_ARG);
+    test::says({"a second time"});
+  }
+}
+
 TEST(Fields, ParametersWhileRunning_LeaveTheFieldAlone) {
   Block b;
   b.def.material = b.material("gel", 1000, 1e4);
