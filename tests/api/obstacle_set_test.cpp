@@ -228,6 +228,24 @@ TEST(ObstacleSet, Snapshot_HoldsBeltFilterAndMaterial) {
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(b.world));
 }
 
+// A material may be destroyed, and what is made of it keeps it: also from a snapshot.
+TEST(ObstacleSet, Snapshot_HoldsAMaterialThatIsDestroyed) {
+  OnATable a("coulomb", 0.05);
+  dfm_material_def m = dfm_material_def_default();
+  m.name = "felt";
+  dfm_material felt = 0;
+  test::ok(dfm_material_create(a.world, &m, &felt));
+  test::ok(dfm_obstacle_set_material(a.table, felt));
+  const std::string kept = test::snapshot(a.world);
+  a.run(0.05);
+  const uint64_t hash = dfm_world_hash(a.world);
+  test::ok(dfm_obstacle_set_material(a.table, 0));
+  test::ok(dfm_material_destroy(felt));
+  ASSERT_EQ(dfm_world_restore(a.world, kept.data(), kept.size()), DFM_OK) << dfm_last_error();
+  a.run(0.05);
+  EXPECT_EQ(dfm_world_hash(a.world), hash);
+}
+
 TEST(ObstacleSet, ARigidBody_HasAFilterAndAMaterial_NoBelt) {
   test::Context context;
   const dfm_world world = test::make_world(context, {0, 0, 0});

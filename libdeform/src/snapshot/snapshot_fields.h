@@ -196,12 +196,6 @@ inline uint64_t last_id(const World &w) {
   return last;
 }
 
-// A destroyed material remains in the bodies made of it.
-inline bool knows_material(const World &w, const std::string &name) {
-  return std::any_of(w.materials.begin(), w.materials.end(), [&](auto &m) { return m->name == name; }) ||
-         std::any_of(w.obstacles.begin(), w.obstacles.end(), [&](auto &o) { return o->material == name; });
-}
-
 // s; no bound of a body in SI units is smaller, and a smaller one would stop the world
 inline constexpr double kMinStep = 1e-15;
 
@@ -490,10 +484,8 @@ void fields(Stream &s, W &w, const World &like) {
     s.value("velocity_surface", o.def.velocity_surface, must::finite);
     s.value("category", o.def.category, must::any);
     s.value("collides_with", o.def.collides_with, must::any);
-    s.array("material", o.zone.material, kAnyCount, must::any);
+    s.array("material", o.zone.material, kAnyCount, must::any);  // one that may be destroyed
     s.value("material's friction", o.zone.friction, must::not_negative);
-    s.must_hold("material", "a material of this world",
-                [&] { return o.zone.material.empty() || knows_material(like, o.zone.material); });
   });
   at = 0;
   s.members("sets of rigid bodies", w.rigid_sets, like.rigid_sets.size(), [&](auto &entry) {
