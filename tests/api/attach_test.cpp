@@ -717,6 +717,7 @@ TEST(Attach, WhatDoesNotFit_IsRefused) {
     d.nsurfel = 0;
     d.box = nowhere;
   });
+  refuse(DFM_E_ARG, {"max_distance", "obstacle"}, [&](auto &d) { d.max_distance = 1; });
   refuse(DFM_E_ARG, {"no group 'lid'"}, [&](auto &d) { d.group = "lid"; });
   refuse(DFM_E_ARG, {"positive"}, [&](auto &d) { d.stiffness = -1; });
   refuse(DFM_E_ARG, {"positive"}, [&](auto &d) { d.release = NAN; });
