@@ -395,8 +395,10 @@ Written write_body(SceneWriter &to, Body &b) {
   write_switches(to, b, out);
   if (b.sensor) out["sensor"] = true;
   if (!b.cut.open.empty())
-    to.note("body '%s' has been cut: the scene has it as it is now, but the two sides of a slit do not touch",
-            b.name.c_str());
+    to.note(
+        "body '%s' has been cut: the scene has it as it is now, but its cut faces are not set back, and the "
+        "two sides of a slit do not touch",
+        b.name.c_str());
   return out;
 }
 
