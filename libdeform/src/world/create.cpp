@@ -346,12 +346,12 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {
+  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size());  // the last that may fail
   end_idle(w);
   drop_attachments(w, id);
   close_slot(w, id, obstacle);
   end_sensor_overlaps(w, id);
   ContactStore &s = w.store;
-  reserve_events(w, s.n);
   for (uint32_t i = 0; i < s.n; ++i)
     if ((s.id_a[i] == id || s.id_b[i] == id)) {
       if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
