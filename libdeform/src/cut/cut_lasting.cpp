@@ -115,8 +115,8 @@ bool renumber(Crossing &c, const std::vector<CutTarget> &targets, const World &w
   const bool a = c.id_a == targets[0].id, b = c.id_b == targets[0].id;
   bool there = !a || renumber(targets, id, 1, c.id_a, c.edge_a);
   there &= !b || renumber(targets, id, 1, c.id_b, c.edge_b);
-  // of two bodies the older one is side a; an obstacle is side b
-  if (c.id_b < c.id_a && slot_of(w, c.id_b) != kNone) {
+  // of two bodies the older one is side a, and new pieces have no slot yet; an obstacle is side b
+  if (c.id_b < c.id_a && obstacle_slot_of(w, c.id_b) == kNone) {
     std::swap(c.id_a, c.id_b);
     std::swap(c.edge_a, c.edge_b);
   }
