@@ -79,6 +79,7 @@ void keep_integrator(Body &b, const Integrator &was) {
 
 void keep_params(Body &b, const BodyShape &before) {
   const std::vector<double> values = before.model.params;
+  b.switched_off.requested = before.switched_off.requested;
   if (values == b.model.params) return;
   if (const dfm_status s = b.model.put_params(values, b.dynamics->abilities().claims); s != DFM_OK)
     fail(s, "body '%s': model '%s' does not take its present parameters for the cells that are left",
