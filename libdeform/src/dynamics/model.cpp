@@ -155,10 +155,10 @@ dfm_status ModelInstance::put_params(const std::vector<double> &values, uint32_t
   return s == DFM_OK ? DFM_E_UNSUPPORTED : s;
 }
 
-void ModelInstance::start() {
-  std::fill(state.begin(), state.end(), 0.0);
-  if (!state.empty() && ops->state_init &&
-      call("state_init", [&] { return ops->state_init(self, state.data()); }) != DFM_OK)
+void ModelInstance::put_initial(Array<double> &to) const {
+  to.assign(state.size(), 0.0);
+  if (!to.empty() && ops->state_init &&
+      call("state_init", [&] { return ops->state_init(self, to.data()); }) != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' could not initialize its state", type->id);
 }
 

@@ -92,7 +92,8 @@ struct ModelInstance {
   std::string idle_reason(uint32_t row) const;
   uint32_t limited_cells() const;  // at the last bound
   void swap(ModelInstance &other) noexcept;
-  void start();  // sets the initial state; throws Error
+  void start() { put_initial(state); }      // throws Error
+  void put_initial(Array<double> &) const;  // the state that it starts from; throws Error
   void commit_state() {
     if (!state.empty()) state.swap(state_out);
   }

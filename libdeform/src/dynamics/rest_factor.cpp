@@ -46,7 +46,7 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
   rest_ = p_.x;
   if (rests_unplaced(*model_.type))
     for (uint32_t i = 0; i < p_.n; ++i) store3(&rest_[size_t{kStride} * i], load3(&p_.rest[size_t{3} * i]));
-  state_.assign(model_.state.begin(), model_.state.end());
+  model_.put_initial(state_);  // not the present state: a world that is restored has made this at another one
   for (Array<double> *a : {&diagonal_, &b_, &y_, &arm_}) a->assign(size_t{3} * p_.n, 0.0);
   turned_.assign(size_t{9} * p_.n, 0.0);
   for (size_t k = 0; k < turned_.size(); ++k) turned_[k] = k % 9 % 4 == 0;
