@@ -215,8 +215,8 @@ void divide_rest(World &w, Division &rest) {
   rest.again(w.time, uint32_t(choose_substeps(w.sizes, rest.goal - w.time, w.bound.step)));
 }
 
-// An impact that is too dear ends, and is not begun again. done: sub-steps of this step; returns how many more
-// it needs.
+// An impact that is too dear ends, and is not begun again. done: sub-steps of this step; returns how many
+// more it needs.
 double end_dear_impact(World &w, StepContext &step, uint32_t done, Division &rest, double more) {
   if (done + more <= w.def.max_substeps || !end_impact(w)) return more;
   prepare_bound(w);
