@@ -40,7 +40,7 @@ double plain_ns(uint32_t nodes, uint32_t cells) {
   const std::vector<double> k(9 * blocks.each() * cells, 1.0);
   std::vector<double> u(3 * size_t(nodes) * cells, 1e-3), out(u.size());
   const auto at = [&](std::vector<double> &of, uint32_t c) {
-    return reinterpret_cast<double(*)[3]>(&of[3 * size_t(nodes) * c]);
+    return reinterpret_cast<double (*)[3]>(&of[3 * size_t(nodes) * c]);
   };
   return least_ns(300, [&] {
     for (uint32_t c = 0; c < cells; ++c) blocks.apply(&k[9 * blocks.each() * c], at(u, c), at(out, c));
@@ -51,7 +51,9 @@ double plain_ns(uint32_t nodes, uint32_t cells) {
 
 int main(int argc, char **argv) {
   bench::Csv table(argc, argv, "model,cells,points,kind,ns_per_cell,plain_ns_per_cell,bytes_per_cell");
-  constexpr struct { uint32_t kind, nodes, across; } kKinds[] = {
+  constexpr struct {
+    uint32_t kind, nodes, across;
+  } kKinds[] = {
       {DFM_CELL_TET10, 10, 4}, {DFM_CELL_HEX8, 8, 7}, {DFM_CELL_HEX20, 20, 4}, {DFM_CELL_HEX27, 27, 4}};
   for (const char *model : {"model_linear_fem", "model_corotational_fem"})
     for (const auto &of : kKinds) {
