@@ -1,7 +1,8 @@
-// Benchmarks of elasticity by second-order tetrahedra and hexahedra, each against its converged value
-// (reference/elasticity/cases.json) or its closed form: NAFEMS LE1, LE10, LE11 (The Standard NAFEMS
-// Benchmarks, 1990), Cook's membrane (1974), the twisted beam of MacNeal and Harder (1985), Lame's cylinder
-// and sphere; orders of convergence, patch tests and frequencies. static_test.cpp has first-order tetrahedra.
+// Benchmarks of elasticity by second-order tetrahedra and hexahedra of 8, 20 and 27 points, each against its
+// converged value (reference/elasticity/cases.json) or its closed form: NAFEMS LE1, LE10, LE11 (The Standard
+// NAFEMS Benchmarks, 1990), Cook's membrane (1974), the twisted beam of MacNeal and Harder (1985), Lame's
+// cylinder and sphere; orders of convergence, patch tests and frequencies. static_test.cpp has first-order
+// tetrahedra.
 #include <cstring>
 #include <random>
 
@@ -10,6 +11,8 @@
 namespace {
 
 using test::Counts;
+using test::kHex20;
+using test::kHex27;
 using test::kHex8;
 using test::kTet10;
 using test::MappedSolid;
@@ -230,11 +233,29 @@ TEST(Benchmarks, ValuesOfTheTable_AreReached) {
       {"sphere, poisson 0.499", sphere_widens<499>, kTet10, {2, 2, 2}, outward_of_sphere(0.499), 0.01},
       {"sphere, poisson 0.499", sphere_widens<499>, kHex8, {10, 10, 10}, outward_of_sphere(0.499), 0.01},
       {"sphere, hoop stress", hoop_of_sphere, kTet10, {4, 5, 5}, kPressure * 5 / 7, 0.01},
+      {"Cook, slab", cook_slab, kHex20, {16, 16, 1}, 25.071512047568202, 0.01},
+      {"Cook, poisson 0.4999", cook_plane_strain, kHex20, {24, 24, 1}, 19.427921689478026, 0.01},
+      {"twisted beam, y", twisted_y, kHex20, {12, 2, 1}, 0.0017532043130333605, 0.01},
+      {"twisted beam, z", twisted_z, kHex20, {12, 2, 1}, 0.005422969874624581, 0.01},
+      {"bar", bar, kHex20, {20, 1, 1}, 0.4003982437917666, 0.01},
+      {"cylinder", cylinder_widens<300>, kHex20, {2, 4, 1}, outward(kInner, 0.3), 0.01},
+      {"cylinder, poisson 0.499", cylinder_widens<499>, kHex20, {2, 4, 1}, outward(kInner, 0.499), 0.01},
+      {"sphere", sphere_widens<300>, kHex20, {2, 2, 2}, outward_of_sphere(0.3), 0.01},
+      {"sphere, poisson 0.499", sphere_widens<499>, kHex20, {2, 2, 2}, outward_of_sphere(0.499), 0.01},
+      {"Cook, slab", cook_slab, kHex27, {16, 16, 1}, 25.071512047568202, 0.01},
+      {"Cook, poisson 0.4999", cook_plane_strain, kHex27, {24, 24, 1}, 19.427921689478026, 0.01},
+      {"twisted beam, y", twisted_y, kHex27, {12, 2, 1}, 0.0017532043130333605, 0.01},
+      {"twisted beam, z", twisted_z, kHex27, {12, 2, 1}, 0.005422969874624581, 0.01},
+      {"bar", bar, kHex27, {20, 1, 1}, 0.4003982437917666, 0.01},
+      {"cylinder", cylinder_widens<300>, kHex27, {2, 4, 1}, outward(kInner, 0.3), 0.01},
+      {"cylinder, poisson 0.499", cylinder_widens<499>, kHex27, {2, 4, 1}, outward(kInner, 0.499), 0.01},
+      {"sphere", sphere_widens<300>, kHex27, {2, 2, 2}, outward_of_sphere(0.3), 0.01},
+      {"sphere, poisson 0.499", sphere_widens<499>, kHex27, {2, 2, 2}, outward_of_sphere(0.499), 0.01},
   };
   for (const Row &r : rows)
     EXPECT_NEAR(r.value(r.kind, r.n) / r.reference, 1, r.tolerance)
-        << r.name << (r.kind == kHex8 ? ", hexahedra " : ", second-order tetrahedra ") << r.n[0] << " x "
-        << r.n[1] << " x " << r.n[2];
+        << r.name << ", " << test::cells_of(r.kind).name << ' ' << r.n[0] << " x " << r.n[1] << " x "
+        << r.n[2];
 }
 
 // Errors of displacement and strain in the mean square over the cylinder.

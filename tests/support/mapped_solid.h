@@ -1,5 +1,5 @@
-// Solids of second-order tetrahedra or hexahedra whose bricks are maps of the unit cube, with consistent
-// loads, in static equilibrium.
+// Solids of second-order tetrahedra or of hexahedra of 8, 20 or 27 points whose bricks are maps of the unit
+// cube, with consistent loads, in static equilibrium.
 #pragma once
 #include <deform/plugin.h>
 
@@ -17,7 +17,21 @@ namespace test {
 
 using Vec = std::array<double, 3>;
 using Counts = std::array<uint32_t, 3>;
-constexpr uint32_t kTet10 = DFM_CELL_TET10, kHex8 = DFM_CELL_HEX8;
+constexpr uint32_t kTet10 = DFM_CELL_TET10, kHex8 = DFM_CELL_HEX8, kHex20 = DFM_CELL_HEX20,
+                   kHex27 = DFM_CELL_HEX27;
+struct Cells {
+  const char *name;
+  size_t nodes;
+  uint32_t tetrahedra;  // that the library counts for each
+  int vtk;
+};
+inline const Cells &cells_of(uint32_t kind) {
+  static const std::map<uint32_t, Cells> all = {{kTet10, {"second-order tetrahedra", 10, 8, 24}},
+                                                {kHex8, {"hexahedra", 8, 6, 12}},
+                                                {kHex20, {"hexahedra of 20 points", 20, 22, 25}},
+                                                {kHex27, {"hexahedra of 27 points", 27, 48, 29}}};
+  return all.at(kind);
+}
 
 inline Vec minus(const Vec &a, const Vec &b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
 inline Vec cross(const Vec &a, const Vec &b) {
@@ -26,26 +40,34 @@ inline Vec cross(const Vec &a, const Vec &b) {
 inline double dot(const Vec &a, const Vec &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 constexpr size_t kTetEdge[6][2] = {{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}};
+// between two corners; a face or the whole between two that are opposite
+constexpr size_t kHexMiddle[19][2] = {{0, 1}, {1, 2}, {2, 3}, {3, 0}, {4, 5}, {5, 6}, {6, 7},
+                                      {7, 4}, {0, 4}, {1, 5}, {2, 6}, {3, 7}, {0, 7}, {1, 6},
+                                      {0, 5}, {3, 6}, {0, 2}, {4, 6}, {0, 6}};
 // Place of a node in the cell's own coordinates: 0 to 1 of a tetrahedron, -1 to 1 of a hexahedron.
 inline Vec node_place(uint32_t kind, size_t k) {
-  if (kind == kHex8)
+  const size_t corners = kind == kTet10 ? 4 : 8;
+  if (k >= corners) {
+    const size_t (&ends)[2] = kind == kTet10 ? kTetEdge[k - 4] : kHexMiddle[k - 8];
+    const Vec a = node_place(kind, ends[0]), b = node_place(kind, ends[1]);
+    return {0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2])};
+  }
+  if (kind != kTet10)
     return {k % 4 == 1 || k % 4 == 2 ? 1.0 : -1.0, k % 4 >= 2 ? 1.0 : -1.0, k >= 4 ? 1.0 : -1.0};
   Vec x{};
-  if (k > 0 && k < 4) x[k - 1] = 1;
-  for (size_t e = 0; k >= 4 && e < 2; ++e)
-    if (const size_t corner = kTetEdge[k - 4][e]; corner) x[corner - 1] += 0.5;
+  if (k > 0) x[k - 1] = 1;
   return x;
 }
 
 // Shape functions of a cell at a point in its own coordinates, with its place, Jacobian and their gradients.
 struct Shape {
-  double n[10] = {}, local[10][3] = {}, g[10][3] = {};  // g 1/m
+  double n[27] = {}, local[27][3] = {}, g[27][3] = {};  // g 1/m
   double jacobian = 0;                                  // m3
   Vec at{};                                             // m
 
   Shape(uint32_t kind, const Vec &q, const double *points, const uint32_t *cell) {
-    const size_t nodes = kind == kHex8 ? 8 : 10;
-    kind == kHex8 ? hexahedron(q) : tetrahedron(q);
+    const size_t nodes = cells_of(kind).nodes;
+    kind == kTet10 ? tetrahedron(q) : hexahedron(kind, q);
     Vec j[3] = {};  // rows by the cell's coordinates
     for (size_t a = 0; a < nodes; ++a)
       for (size_t r = 0; r < 3; ++r) {
@@ -61,14 +83,23 @@ struct Shape {
   }
 
  private:
-  void hexahedron(const Vec &q) {
-    for (size_t a = 0; a < 8; ++a) {
-      const Vec s = node_place(kHex8, a);
-      n[a] = 0.125 * (1 + s[0] * q[0]) * (1 + s[1] * q[1]) * (1 + s[2] * q[2]);
+  // Products of functions of one coordinate: linear, quadratic, or, with 20 points, linear at corners, whose
+  // product is then multiplied by s.q - 2, and across an edge.
+  void hexahedron(uint32_t kind, const Vec &q) {
+    for (size_t a = 0; a < cells_of(kind).nodes; ++a) {
+      const Vec s = node_place(kind, a);
+      double f[3], d[3];
       for (size_t c = 0; c < 3; ++c) {
-        const size_t d = (c + 1) % 3, e = (c + 2) % 3;
-        local[a][c] = 0.125 * s[c] * (1 + s[d] * q[d]) * (1 + s[e] * q[e]);
+        const bool linear = kind != kHex27 && s[c] != 0;
+        f[c] = s[c] == 0 ? 1 - q[c] * q[c] : 0.5 * (1 + s[c] * q[c]) * (linear ? 1 : s[c] * q[c]);
+        d[c] = s[c] == 0 ? -2 * q[c] : linear ? 0.5 * s[c] : q[c] + 0.5 * s[c];
       }
+      const double whole = f[0] * f[1] * f[2];
+      const bool corner = kind == kHex20 && a < 8;
+      const double more = corner ? dot(s, q) - 2 : 1;
+      n[a] = whole * more;
+      for (size_t c = 0; c < 3; ++c)
+        local[a][c] = d[c] * f[(c + 1) % 3] * f[(c + 2) % 3] * more + (corner ? whole * s[c] : 0);
     }
   }
   void tetrahedron(const Vec &q) {
@@ -108,7 +139,7 @@ struct Grid {
 
   // Bricks that touch share their points.
   Grid(uint32_t kind_of_cells, const std::vector<Brick> &bricks)
-      : kind(kind_of_cells), nodes(kind_of_cells == kHex8 ? 8 : 10) {
+      : kind(kind_of_cells), nodes(cells_of(kind_of_cells).nodes) {
     for (const Brick &b : bricks) add(b);
   }
   size_t npoint() const { return points.size() / 3; }
@@ -137,7 +168,7 @@ struct Grid {
       out << '\n';
     }
     out << "CELL_TYPES " << ncell() << '\n';
-    for (size_t c = 0; c < ncell(); ++c) out << (kind == kHex8 ? "12\n" : "24\n");
+    for (size_t c = 0; c < ncell(); ++c) out << cells_of(kind).vtk << '\n';
     return path;
   }
 
@@ -172,9 +203,14 @@ struct Grid {
             add_tetrahedra(b, {2 * i, 2 * j, 2 * k}, left_handed);
             continue;
           }
-          for (size_t a = 0; a < 8; ++a) {
-            const Vec s = node_place(kHex8, a);
-            cells.push_back(add_point(b, {i + (s[0] > 0), j + (s[1] > 0), k + ((s[2] > 0) != left_handed)}));
+          for (size_t a = 0; a < nodes; ++a) {
+            const Vec s = node_place(kind, a);
+            const double half = kind == kHex8 ? 0.5 : 1;
+            const auto along = [&](uint32_t cell, double side) {
+              return uint32_t(half * (2 * cell + 1 + side));
+            };
+            cells.push_back(
+                add_point(b, {along(i, s[0]), along(j, s[1]), along(k, left_handed ? -s[2] : s[2])}));
           }
         }
   }
@@ -219,8 +255,8 @@ struct MappedSolid : Grid {
     constexpr size_t kTet[4][3] = {{1, 2, 3}, {0, 2, 3}, {0, 1, 3}, {0, 1, 2}};
     constexpr size_t kHex[6][3] = {{0, 1, 3}, {4, 5, 7}, {0, 1, 4}, {3, 2, 7}, {0, 3, 4}, {1, 2, 5}};
     for (size_t c = 0; c < ncell(); ++c)
-      for (size_t f = 0; f < (kind == kHex8 ? 6 : 4); ++f) {
-        const size_t (&corner)[3] = kind == kHex8 ? kHex[f] : kTet[f];
+      for (size_t f = 0; f < (kind == kTet10 ? 4 : 6); ++f) {
+        const size_t (&corner)[3] = kind == kTet10 ? kTet[f] : kHex[f];
         const Vec from = node_place(kind, corner[0]), along[2] = {minus(node_place(kind, corner[1]), from),
                                                                   minus(node_place(kind, corner[2]), from)};
         const auto off_face = [&](size_t k) {
@@ -238,7 +274,7 @@ struct MappedSolid : Grid {
       for (size_t s = 0; s < 64; ++s) {
         const double a = kGauss[s % 4], b = kGauss[s / 4 % 4], d = kGauss[s / 16];
         const double weight = kWeight[s % 4] * kWeight[s / 4 % 4] * kWeight[s / 16];
-        const bool hex = kind == kHex8;
+        const bool hex = kind != kTet10;
         const Shape at =
             shape(c, hex ? Vec{2 * a - 1, 2 * b - 1, 2 * d - 1} : Vec{a, (1 - a) * b, (1 - a) * (1 - b) * d});
         use(cell(c), at, at.jacobian * weight * (hex ? 8 : (1 - a) * (1 - a) * (1 - b)));
@@ -276,7 +312,7 @@ struct MappedSolid : Grid {
   double stress(
       const Vec &where, size_t axis,
       const std::function<double(const Vec &)> &initial = [](const Vec &) { return 0.0; }) const {
-    const uint32_t each = kind == kHex8 ? 6 : 8;
+    const uint32_t each = cells_of(kind).tetrahedra;
     std::vector<double> all(6 * each * ncell());
     ok(dfm_body_stress(body.body, uint32_t(each * ncell()), all.data()));
     std::vector<uint8_t> near(npoint());
@@ -290,7 +326,7 @@ struct MappedSolid : Grid {
       for (const size_t c : patch)
         for (size_t k = 0; k < nodes; ++k) near[cell(c)[k]] = 1;
     }
-    const Vec middle = kind == kHex8 ? Vec{} : Vec{0.25, 0.25, 0.25};
+    const Vec middle = kind == kTet10 ? Vec{0.25, 0.25, 0.25} : Vec{};
     double far = 0;
     for (const size_t c : patch)
       for (const double d : minus(shape(c, middle).at, where)) far = std::max(far, std::abs(d));
@@ -318,7 +354,7 @@ struct MappedSolid : Grid {
                  const std::function<Vec(const Vec &)> &traction) {
     for (size_t s = 0; s < 16; ++s) {
       const double a = kGauss[s % 4], b = kGauss[s / 4];
-      const bool hex = kind == kHex8;
+      const bool hex = kind != kTet10;
       const double first = hex ? a : a * (1 - b), second = hex ? b : a * b;
       Vec q;
       for (size_t r = 0; r < 3; ++r) q[r] = from[r] + first * along[0][r] + second * along[1][r];

@@ -100,7 +100,7 @@ class Solve final : public SolveLaws {
     const std::vector<uint32_t> contacts = all_contacts();
     const uint32_t block = 0;
     ContactRows::Motions motions;
-    rows_.motions(contacts, {&block, 1}, motions);
+    rows_.motions({&block, 1}, motions);
     result_.rank = motions.rank;
     ImplicitSystem *const none = nullptr;
     std::vector<double> q = problem_.q;

@@ -90,7 +90,6 @@ class ContactNewton {
   Array<uint32_t> dof_of_node_;  // of single points; kNone
   ContactRows::Motions motions_;
   Array<Row> row_;
-  Array<uint32_t> index_;  // rows of the part, for motions()
   Array<uint32_t> entry_;  // [row_+1] into node_, jac_
   Array<uint32_t> node_;
   Array<double> jac_;    // [entries,9] rows: the contact's axes

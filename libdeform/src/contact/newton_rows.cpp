@@ -10,12 +10,12 @@
 namespace dfm {
 
 ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
-  use_memory(m, node_of_dof_, dof_of_node_, row_, index_, entry_, node_, jac_, seen_, bias_, heavy_, v_,
-             base_, g_, kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_,
-             response_, slope_, frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_,
-             matrix_, places_, analysed_, r_, base_r_, of_v_);
-  use_memory(m, motions_.g, motions_.s, motions_.columns, motions_.left, motions_.first_column,
-             motions_.column_count, motions_.first_value);
+  use_memory(m, node_of_dof_, dof_of_node_, row_, entry_, node_, jac_, seen_, bias_, heavy_, v_, base_, g_,
+             kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
+             frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_, matrix_, places_,
+             analysed_, r_, base_r_, of_v_);
+  use_memory(m, motions_.g, motions_.s, motions_.touched, motions_.columns, motions_.left,
+             motions_.first_column, motions_.column_count, motions_.first_value);
 }
 
 void ContactNewton::begin(ContactRows &rows, const RowsPart &part, std::span<ImplicitSystem *const> systems,
@@ -102,11 +102,9 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
   });
   points_ = nodes_;
   // blocks: their motions, from where the impulses of the start have brought them
-  index_.clear();
-  each_row(part_.contacts, [&](uint32_t i) { index_.push_back(i); });
-  each_row(part_.bonds, [&](uint32_t i) { index_.push_back(i); });
   motions_.rank = 0;
-  if (!part_.blocks.empty()) rows.motions(index_, part_.blocks, motions_);
+  motions_.touched.clear();
+  if (!part_.blocks.empty()) rows.motions(part_.blocks, motions_);
   nodes_ += (motions_.rank + 2) / 3;
   v_.resize(size_t{kStride} * nodes_, 0.0);
   heavy_.resize(size_t{kStride} * nodes_, 0.0);
@@ -127,9 +125,7 @@ void ContactNewton::list_rows() {
   jac_.clear();
   seen_.clear();
   const bool turns = motions_.rank > 0 && !motions_.s.empty();
-  const size_t width = (size_t{motions_.rank} + 3) & ~size_t{3};
   const auto add = [&](uint32_t i, Kind kind) {
-    const size_t k = row_.size();
     row_.push_back({i, kind});
     const double *const f = &rows.frame[size_t{9} * i];
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
@@ -141,24 +137,13 @@ void ContactNewton::list_rows() {
           jac_.push_back(inverse_[3 * size_t{node} + c] > 0 ? rows.weight[j] * f[3 * r + c] : 0);
       if (turns) seen_.insert(seen_.end(), jac_.end() - 9, jac_.end());
     }
-    for (uint32_t q = 0; points_ + q < nodes_; ++q) {
-      const size_t columns = std::min<size_t>(3, motions_.rank - 3 * size_t{q});
-      double part[9] = {};
-      const auto take = [&](const Array<double> &from) {
-        bool any = false;
-        for (size_t r = 0; r < 3; ++r)
-          for (size_t c = 0; c < columns; ++c) {
-            part[3 * r + c] = from[(3 * k + r) * width + 3 * size_t{q} + c];
-            any |= part[3 * r + c] != 0;
-          }
-        return any;
-      };
-      if (!take(motions_.g)) continue;
+    if (motions_.rank > 0) rows.motion_row(i, motions_);
+    for (const uint32_t q : motions_.touched) {
+      const double *const of = &motions_.g[size_t{9} * q];
+      if (std::all_of(of, of + 9, [](double x) { return x == 0; })) continue;
       node_.push_back(points_ + q);
-      jac_.insert(jac_.end(), part, part + 9);
-      if (!turns) continue;
-      take(motions_.s);
-      seen_.insert(seen_.end(), part, part + 9);
+      jac_.insert(jac_.end(), of, of + 9);
+      if (turns) seen_.insert(seen_.end(), &motions_.s[size_t{9} * q], &motions_.s[size_t{9} * q] + 9);
     }
     entry_.push_back(static_cast<uint32_t>(node_.size()));
   };

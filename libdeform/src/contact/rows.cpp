@@ -538,20 +538,18 @@ constexpr double kRounding = 1e-13;
 
 // Each block's response is R = L L^T, by Cholesky's method that takes the largest diagonal next (Higham 1990)
 // and stops where nothing is left: the columns of L are motions that answer unit impulses.
-void ContactRows::motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks,
-                          Motions &out) const {
-  Array<double> &g = out.g, &columns = out.columns, &left = out.left;
-  Array<size_t> &first_column = out.first_column, &column_count = out.column_count,
-                &first_value = out.first_value;
+void ContactRows::motions(std::span<const uint32_t> of_blocks, Motions &out) const {
+  Array<double> &columns = out.columns, &left = out.left;
   columns.clear();
-  for (Array<size_t> *a : {&first_column, &column_count, &first_value}) a->assign(blocks.size(), 0);
+  for (Array<size_t> *a : {&out.first_column, &out.column_count, &out.first_value})
+    a->assign(blocks.size(), 0);
   size_t found = 0;
   for (const uint32_t number : of_blocks) {
     const Block &b = blocks[number];
     const size_t size = size_t(3) * b.count, start = columns.size();
     const auto value = [&](size_t row, size_t column) { return response(b, column, row / 3, row % 3); };
-    first_column[number] = found;
-    first_value[number] = start;
+    out.first_column[number] = found;
+    out.first_value[number] = start;
     left.resize(size);
     double top = 0;
     for (size_t k = 0; k < size; ++k) top = std::max(top, left[k] = value(k, k));
@@ -571,47 +569,55 @@ void ContactRows::motions(std::span<const uint32_t> contacts, std::span<const ui
       }
       left[pivot] = 0;
     }
-    column_count[number] = found - first_column[number];
+    out.column_count[number] = found - out.first_column[number];
   }
   out.rank = static_cast<uint32_t>(found);
-  const size_t width = (found + 3) & ~size_t{3};
-  g.assign(size_t(3) * contacts.size() * width, 0.0);
-  out.s.resize(arc.empty() ? 0 : g.size());
-  for (size_t k = 0; k < contacts.size(); ++k) {
-    const uint32_t i = contacts[k];
-    const double *const f = &frame[size_t(9) * i];
-    double *const to = &g[3 * k * width];
-    // use(column of G, values of the motion at dof d)
-    const auto each_motion = [&](uint32_t d, auto &&use) {
-      const uint32_t number = block[d];
-      if (number == kNone) return;
-      const Block &b = blocks[number];
-      for (size_t c = 0; c < column_count[number]; ++c)
-        use(first_column[number] + c,
-            &columns[first_value[number] + c * 3 * b.count + size_t(3) * (d - b.first)]);
-    };
-    // what each motion of its block makes of the contact's velocity
-    const auto put = [&](uint32_t d, auto &&change) {
-      each_motion(d, [&](size_t column, const double *at) {
-        const Vec3 u = change(at);
-        for (size_t row = 0; row < 3; ++row) to[row * width + column] += dot(load3(f + 3 * row), u);
-      });
-    };
-    for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
-      put(dof[j], [&](const double *at) { return weight[j] * load3(at); });
-    each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
-      put(d, [&](const double *at) { return sign * (load3(at) + dfm::cross(load3(at + 3), r)); });
-    });
-    if (arc.empty()) continue;
-    double *const seen = &out.s[3 * k * width];
-    std::copy_n(to, 3 * width, seen);
-    each_rigid(i, [&](uint32_t d, Vec3, double sign, const double *turns) {
-      each_motion(d, [&](size_t column, const double *at) {
-        for (size_t row = 0; row < 3; ++row)
-          seen[row * width + column] += sign * dot(load3(turns + 3 * row), load3(at + 3));
-      });
-    });
+  const size_t triples = (found + 2) / 3;
+  out.g.assign(9 * triples, 0.0);
+  out.s.assign(arc.empty() ? 0 : out.g.size(), 0.0);
+  out.touched.clear();
+}
+
+void ContactRows::motion_row(uint32_t i, Motions &out) const {
+  for (const uint32_t q : out.touched) {
+    std::fill_n(&out.g[size_t{9} * q], 9, 0.0);
+    if (!out.s.empty()) std::fill_n(&out.s[size_t{9} * q], 9, 0.0);
   }
+  out.touched.clear();
+  const double *const f = &frame[size_t(9) * i];
+  // use(column of G, values of the motion at dof d)
+  const auto each_motion = [&](uint32_t d, auto &&use) {
+    const uint32_t number = block[d];
+    if (number == kNone) return;
+    const Block &b = blocks[number];
+    for (size_t c = 0; c < out.column_count[number]; ++c)
+      use(out.first_column[number] + c,
+          &out.columns[out.first_value[number] + c * 3 * b.count + size_t(3) * (d - b.first)]);
+  };
+  const auto add = [](Array<double> &to, size_t column, const double *by, Vec3 u) {
+    for (size_t row = 0; row < 3; ++row)
+      to[9 * (column / 3) + 3 * row + column % 3] += dot(load3(by + 3 * row), u);
+  };
+  // what each motion of its block makes of the contact's velocity
+  const auto put = [&](uint32_t d, auto &&change) {
+    each_motion(d, [&](size_t column, const double *at) {
+      if (out.touched.empty() || out.touched.back() != column / 3)
+        out.touched.push_back(static_cast<uint32_t>(column / 3));
+      add(out.g, column, f, change(at));
+    });
+  };
+  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
+    put(dof[j], [&](const double *at) { return weight[j] * load3(at); });
+  each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *) {
+    put(d, [&](const double *at) { return sign * (load3(at) + dfm::cross(load3(at + 3), r)); });
+  });
+  std::sort(out.touched.begin(), out.touched.end());
+  out.touched.erase(std::unique(out.touched.begin(), out.touched.end()), out.touched.end());
+  if (arc.empty()) return;
+  for (const uint32_t q : out.touched) std::copy_n(&out.g[size_t{9} * q], 9, &out.s[size_t{9} * q]);
+  each_rigid(i, [&](uint32_t d, Vec3, double sign, const double *turns) {
+    each_motion(d, [&](size_t column, const double *at) { add(out.s, column, turns, sign * load3(at + 3)); });
+  });
 }
 
 }  // namespace dfm

@@ -198,17 +198,20 @@ struct ContactRows {
   void apply_last();
   // y of a part from the impulses alone: sweeps have left it not finite, or with their rounding
   void restore(const RowsPart &part);
-  // G [3 contacts, padded]: velocities change by G G^T impulse through these blocks; with arcs, by S G^T
-  // impulse. Padded: rank rounded up to fours, with zeros.
+  // What blocks can do: velocities change by G G^T impulse through them, with arcs by S G^T impulse, q = G^T
+  // impulse in triples.
   struct Motions {
+    // [triples,3,3] rows of G, and with arcs of S, of one contact; triples that are not touched are 0
     Array<double> g, s;
+    Array<uint32_t> touched;  // ascending
     uint32_t rank = 0;
     // columns of the blocks, what is left of a diagonal; [blocks] first column, columns, and place of their
     // first value
     Array<double> columns, left;
     Array<size_t> first_column, column_count, first_value;
   };
-  void motions(std::span<const uint32_t> contacts, std::span<const uint32_t> of_blocks, Motions &out) const;
+  void motions(std::span<const uint32_t> of_blocks, Motions &out) const;
+  void motion_row(uint32_t i, Motions &out) const;  // sets g, s, touched
   // Rigid bodies begin again: y has their velocities without impulses, or their responses have changed.
   void restart_rigids();
 
