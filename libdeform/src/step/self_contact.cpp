@@ -160,11 +160,10 @@ bool crosses_another(SelfBody &b, uint32_t triangle) {
   if (b.crosses[triangle] != unasked) return b.crosses[triangle] == yes;
   b.crosses[triangle] = no;
   b.list.near_triangle(triangle, [&](uint32_t other) {
-    if (b.crosses[triangle] == yes ||
-        share_a_corner(&s.tri[3 * size_t{triangle}], &s.tri[3 * size_t{other}]) ||
-        !(edges_pierce(s, triangle, s, other) || edges_pierce(s, other, s, triangle)))
-      return;
-    b.crosses[triangle] = b.crosses[other] = yes;
+    if (b.crosses[triangle] != yes &&
+        !share_a_corner(&s.tri[3 * size_t{triangle}], &s.tri[3 * size_t{other}]) &&
+        triangles_cross(s, triangle, s, other))
+      b.crosses[triangle] = b.crosses[other] = yes;
   });
   return b.crosses[triangle] == yes;
 }
