@@ -290,7 +290,7 @@ void follow_list(SelfBody &s, double offset) {
   s.pairs.follow(s.body->surface, s.rest, s.list.renewals(), offset);
 }
 
-void stage_self(World &w, StepContext &step) {
+bool stage_self(World &w, StepContext &step, uint32_t *) {
   if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
   const bool listed = w.plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
   for (auto &s : step.self_bodies) {
@@ -308,6 +308,7 @@ void stage_self(World &w, StepContext &step) {
                        s->pairs, step.lent, step.contacts);
   }
   count_self(w, step);
+  return true;
 }
 
 bool cover_self(World &w, StepContext &step) {
