@@ -33,6 +33,7 @@
 #include "cells.h"
 #include "edges.h"
 #include "entry.h"
+#include "even_rows.h"
 #include "fibers.h"
 #include "params.h"
 #include "rotation.h"
@@ -277,8 +278,6 @@ class CellBody {
 
  private:
   static constexpr uint32_t kParallelCells = 500, kGrain = 64;
-  static constexpr int kWeightSteps = 20;
-  static constexpr double kMinWeight = 1e-3;
   // Least sum of two stretches that turns a frame: nearer to a reflection the forces are no gradient.
   static constexpr double kMinStretch = 0.1;
 
@@ -409,21 +408,11 @@ class CellBody {
     return sum;
   }
 
-  // Weights by a few steps toward the Perron vector of the row sums over the masses, then the rows.
   void find_rows() {
-    std::fill(weight_.data(), weight_.data() + npoint_, 1.0);
-    for (int step = 0; step < kWeightSteps; ++step) {
-      std::fill(next_.data(), next_.data() + npoint_, 0.0);
+    even_rows(npoint_, mass_.data(), weight_.data(), next_.data(), [&](double *out) {
       for (uint32_t c = 0; c < ncell_; ++c)
-        for (uint32_t a = 0; a < nodes_; ++a) next_[corner(c, a)] += row_of(c, a);
-      double most = 0;
-      for (uint32_t i = 0; i < npoint_; ++i) {
-        next_[i] = mass_[i] > 0 ? next_[i] / mass_[i] : 0;
-        most = std::max(most, next_[i]);
-      }
-      for (uint32_t i = 0; i < npoint_; ++i)
-        weight_[i] = most > 0 ? std::max(next_[i] / most, kMinWeight) : 1;
-    }
+        for (uint32_t a = 0; a < nodes_; ++a) out[corner(c, a)] += row_of(c, a);
+    });
     for (uint32_t c = 0; c < ncell_; ++c) {
       Cell &cell = cell_[c];
       Node *const node = &node_[size_t(nodes_) * c];

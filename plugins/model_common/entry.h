@@ -183,30 +183,32 @@ void destroy(void *self) {
   h->release(h->ctx, self, sizeof(Body), 64);
 }
 
-// The table of a model with forces, an energy and a stiffness; state_init may be NULL.
+// The table of a model without forces, energy and stiffness; state_init may be NULL.
 template <class Body>
-constexpr dfm_model table(uint32_t caps, decltype(dfm_model::create) create,
-                          decltype(dfm_model::set_params) set_params,
-                          decltype(dfm_model::state_init) state_init,
-                          decltype(dfm_model::extension) extension) {
-  using Of = Ops<Body>;
-  return {sizeof(dfm_model),
-          caps,
-          cells_of<Body>(),
-          0,
-          nullptr,
-          create,
-          destroy<Body>,
-          set_params,
-          state_init,
-          Of::add_forces,
-          Of::bound,
-          Of::energy,
-          Of::pattern,
-          Of::stiffness,
-          extension,
-          0,
-          0};
+constexpr dfm_model bare_table(uint32_t caps, decltype(dfm_model::create) create,
+                               decltype(dfm_model::set_params) set_params,
+                               decltype(dfm_model::state_init) state_init,
+                               decltype(dfm_model::extension) extension) {
+  dfm_model t{};
+  t.size = sizeof t;
+  t.caps = caps;
+  t.cells = cells_of<Body>();
+  t.create = create;
+  t.destroy = destroy<Body>;
+  t.set_params = set_params;
+  t.state_init = state_init;
+  t.extension = extension;
+  return t;
+}
+template <class Body, class... Of>
+constexpr dfm_model table(Of... of) {
+  dfm_model t = bare_table<Body>(of...);
+  t.add_forces = Ops<Body>::add_forces;
+  t.bound = Ops<Body>::bound;
+  t.energy = Ops<Body>::energy;
+  t.pattern = Ops<Body>::pattern;
+  t.stiffness = Ops<Body>::stiffness;
+  return t;
 }
 
 }  // namespace model

@@ -3,6 +3,7 @@
 // (2.25), (2.26), 2.1.2 and 7.1); the bodies step themselves.
 #include <cstring>
 
+#include "../model_common/stepper.h"
 #include "cells.h"
 #include "deform/plugin_draft.h"
 #include "gpu_body.h"
@@ -65,73 +66,32 @@ const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 template <class Of>
 struct Tables {
   using One = Body<Of>;
-  using Ops = model::Ops<One>;
-  static One &body(void *self) { return *static_cast<One *>(self); }
+  using Ops = model::StepperOps<One>;
 
   static dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
     return model::create<One>(h, m, Of::kId, self);
   }
   static dfm_status set_params(void *self, const double *params) {
-    One &of = body(self);
+    One &of = *static_cast<One *>(self);
     return model::in_range(of.host, Of::kId, kParams, Of::kParams, params) ? model::change(of, params)
                                                                            : DFM_E_ARG;
   }
-  static dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
-    dfm_status status = DFM_OK;
-    const dfm_status lacks = Ops::with_state(self, k, [&](One &of) { status = of.predict(*k, f, u); });
-    return lacks == DFM_OK ? status : lacks;
-  }
-  static dfm_status respond_many(void *self, const dfm_kin *, uint32_t n, const uint32_t *surfel,
-                                 uint32_t nrhs, const double *p, double *du) {
-    for (uint32_t r = 0; r < nrhs; ++r)
-      body(self).respond(n, surfel, p + size_t(3) * n * r, du + size_t(3) * n * r);
-    return DFM_OK;
-  }
-  static dfm_status respond(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
-                            double *du) {
-    return respond_many(self, k, n, surfel, 1, p, du);
-  }
-  static dfm_status diagonal(void *self, const dfm_kin *, uint32_t n, const uint32_t *surfel, double *w) {
-    body(self).diagonal(n, surfel, w);
-    return DFM_OK;
-  }
-  static dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
-    return Ops::with_state(self, k, [&](One &of) { of.commit(*k, p, x, v); });
-  }
-  static const dfm_fact *facts(const void *self, uint32_t *n) {
-    *n = One::kFactCount;
-    return static_cast<const One *>(self)->facts();
-  }
-  static constexpr dfm_stepper kStepper = {
-      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
-  static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
-
   static const void *extension(const void *, const char *id) {
-    if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+    if (!strcmp(id, "dfm.stepper/1")) return &Ops::kStepper;
     if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
     if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
-    if (!strcmp(id, DFM_EXT_FACTS)) return &kFacts;
+    if (!strcmp(id, DFM_EXT_FACTS)) return &Ops::kFacts;
     if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
     return nullptr;
   }
   static constexpr dfm_model model(uint32_t caps) {
-    return {sizeof(dfm_model),
-            caps | DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
-            DFM_CELL_TET,
-            One::kSlotCount,
-            One::kSlots,
-            create,
-            model::destroy<One>,
-            set_params,
-            nullptr,
-            nullptr,
-            Ops::bound,
-            Ops::energy,
-            nullptr,
-            nullptr,
-            extension,
-            0,
-            0};
+    dfm_model t = model::bare_table<One>(caps | DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
+                                         create, set_params, nullptr, extension);
+    t.nslot = One::kSlotCount;
+    t.slots = One::kSlots;
+    t.bound = Ops::bound;
+    t.energy = Ops::energy;
+    return t;
   }
   static constexpr dfm_type type(const char *name, const char *source, const char *const *effects,
                                  const dfm_model *of) {

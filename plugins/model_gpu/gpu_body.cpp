@@ -239,27 +239,30 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
 // An impulse changes the velocity of its points, and moves them by that over the step: the scheme of one
 // sub-step.
 template <class Of>
-void Body<Of>::respond(uint32_t n, const uint32_t *surfel, const double *p, double *du) {
-  for (uint32_t k = 0; k < n; ++k)
-    for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
-      for (size_t a = 0; a < 3; ++a)
-        impulse_[3 * size_t(surfel_point_[e]) + a] += surfel_weight_[e] * p[3 * size_t(k) + a];
-  for (uint32_t k = 0; k < n; ++k)
-    for (int a = 0; a < 3; ++a) {
-      double sum = 0;
-      for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e) {
-        const uint32_t i = surfel_point_[e];
-        sum += surfel_weight_[e] * (free_inverse_mass(i, a) * impulse_[3 * size_t(i) + size_t(a)]);
+void Body<Of>::respond(const dfm_kin &, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+                       double *du) {
+  for (; nrhs > 0; --nrhs, p += 3 * size_t(n), du += 3 * size_t(n)) {
+    for (uint32_t k = 0; k < n; ++k)
+      for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
+        for (size_t a = 0; a < 3; ++a)
+          impulse_[3 * size_t(surfel_point_[e]) + a] += surfel_weight_[e] * p[3 * size_t(k) + a];
+    for (uint32_t k = 0; k < n; ++k)
+      for (int a = 0; a < 3; ++a) {
+        double sum = 0;
+        for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e) {
+          const uint32_t i = surfel_point_[e];
+          sum += surfel_weight_[e] * (free_inverse_mass(i, a) * impulse_[3 * size_t(i) + size_t(a)]);
+        }
+        du[3 * size_t(k) + size_t(a)] = sum;
       }
-      du[3 * size_t(k) + size_t(a)] = sum;
-    }
-  for (uint32_t k = 0; k < n; ++k)
-    for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
-      std::fill_n(&impulse_[3 * size_t(surfel_point_[e])], 3, 0.0);
+    for (uint32_t k = 0; k < n; ++k)
+      for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)
+        std::fill_n(&impulse_[3 * size_t(surfel_point_[e])], 3, 0.0);
+  }
 }
 
 template <class Of>
-void Body<Of>::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
+void Body<Of>::diagonal(const dfm_kin &, uint32_t n, const uint32_t *surfel, double *w) const {
   std::fill_n(w, 9 * size_t(n), 0.0);
   for (uint32_t k = 0; k < n; ++k)
     for (uint32_t e = surfel_row_[surfel[k]]; e < surfel_row_[surfel[k] + 1]; ++e)

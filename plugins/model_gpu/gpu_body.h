@@ -37,8 +37,9 @@ class Body {
   }
 
   dfm_status predict(const dfm_kin &k, const double *f, double *u_s);
-  void respond(uint32_t n, const uint32_t *surfel, const double *p, double *du);
-  void diagonal(uint32_t n, const uint32_t *surfel, double *w) const;
+  void respond(const dfm_kin &, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+               double *du);
+  void diagonal(const dfm_kin &, uint32_t n, const uint32_t *surfel, double *w) const;
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
   void bound(const dfm_kin &k, double *ksum, double *csum) { parts_.bound(k, ksum, csum); }
   double energy(const dfm_kin &k);

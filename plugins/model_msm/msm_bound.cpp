@@ -18,13 +18,11 @@
 // By the positions: |d(V t)|^2 <= 1.544 Qm^2/432, |d2(V t)| <= 0.776 sqrt(Qm).
 #include <algorithm>
 
+#include "../model_common/even_rows.h"
 #include "msm_body.h"
 
 namespace msm {
 namespace {
-
-constexpr int kWeightSteps = 20;
-constexpr double kMinWeight = 1e-3;  // far from the stiffest place weights need not fall any lower
 
 void row_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
@@ -112,30 +110,23 @@ void Body::find_weights(Room &room) {
         gradient[4 * size_t(c) + a] = __builtin_sqrt(k * ((r[0] * r[0] + r[1] * r[1]) + r[2] * r[2]));
       }
     }
-  std::fill(weight.data(), weight.data() + npoint, 1.0);
   Buffer<double> &stiff = room.tangent;
   for (uint32_t e = 0; e < nedge; ++e) stiff[e] = tangent(e);
-  for (int step = 0; step < kWeightSteps; ++step) {
-    for (uint32_t i = 0; i < npoint; ++i) next[i] = own[i] * weight[i];
+  model::even_rows(npoint, mass.data(), weight.data(), next.data(), [&](double *out) {
+    for (uint32_t i = 0; i < npoint; ++i) out[i] = own[i] * weight[i];
     for (uint32_t e = 0; e < nedge; ++e) {
       const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-      next[i] += stiff[e] * weight[j];
-      next[j] += stiff[e] * weight[i];
+      out[i] += stiff[e] * weight[j];
+      out[j] += stiff[e] * weight[i];
     }
     for (uint32_t c = 0; volume_on && c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
       const double *g = gradient.data() + 4 * size_t(c);
       const double sum =
           (g[0] * weight[q[0]] + g[1] * weight[q[1]]) + (g[2] * weight[q[2]] + g[3] * weight[q[3]]);
-      for (int a = 0; a < 4; ++a) next[q[a]] += g[a] * sum;
+      for (int a = 0; a < 4; ++a) out[q[a]] += g[a] * sum;
     }
-    double most = 0;
-    for (uint32_t i = 0; i < npoint; ++i) {
-      next[i] = mass[i] > 0 ? next[i] / mass[i] : 0;
-      most = std::max(most, next[i]);
-    }
-    for (uint32_t i = 0; i < npoint; ++i) weight[i] = most > 0 ? std::max(next[i] / most, kMinWeight) : 1;
-  }
+  });
   std::fill(coupled.data(), coupled.data() + npoint, 0.0);
   for (uint32_t e = 0; e < nedge; ++e) {
     const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];

@@ -3,7 +3,7 @@
 // boundary.md).
 #include <cstring>
 
-#include "../model_common/entry.h"
+#include "../model_common/stepper.h"
 #include "body.h"
 
 namespace reduced {
@@ -29,7 +29,7 @@ namespace {
 // Ops and extensions of a type whose instances are of the class B.
 template <class B>
 struct Entry {
-  using Ops = model::Ops<B>;
+  using Ops = model::StepperOps<B>;
 
   static dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
     return model::create<B>(h, m, B().name(), self);
@@ -40,25 +40,6 @@ struct Entry {
   static dfm_status state_init(const void *, double *state) {
     *state = 0;
     return DFM_OK;
-  }
-  static dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
-    dfm_status status = DFM_OK;
-    const dfm_status given = Ops::with_state(self, k, [&](B &body) { status = body.predict(*k, f, u); });
-    return given == DFM_OK ? status : given;
-  }
-  static dfm_status respond_many(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel,
-                                 uint32_t nrhs, const double *p, double *du) {
-    return Ops::with_state(self, k, [&](B &body) { body.respond(*k, n, surfel, nrhs, p, du); });
-  }
-  static dfm_status respond(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
-                            double *du) {
-    return respond_many(self, k, n, surfel, 1, p, du);
-  }
-  static dfm_status diagonal(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w) {
-    return Ops::with_state(self, k, [&](B &body) { body.diagonal(*k, n, surfel, w); });
-  }
-  static dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
-    return Ops::with_state(self, k, [&](B &body) { body.commit(*k, p, x, v); });
   }
   static dfm_status commit_near(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
     return Ops::with_state(self, k, [&](B &body) { body.commit_near(*k, p, x, v); });
@@ -77,28 +58,19 @@ struct Entry {
   }
   static constexpr dfm_late_points kLate = {sizeof(dfm_late_points), 0, commit_near, points, look, sums};
 
-  static constexpr dfm_stepper kStepper = {
-      sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr, respond_many};
-
-  static const dfm_fact *facts(const void *self, uint32_t *n) {
-    *n = B::kFactCount;
-    return static_cast<const B *>(self)->facts();
-  }
   static constexpr dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0},
                                             {"damping", kDampingMass, 0, 0}};
   static constexpr dfm_effect_rows kEffectRows = model::rows_of(kOff);
-  static constexpr dfm_facts kFacts = {sizeof(dfm_facts), sizeof(dfm_fact), facts};
-
   static const void *extension(const void *self, const char *id) {
     const B &body = *static_cast<const B *>(self);
-    if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+    if (!strcmp(id, "dfm.stepper/1")) return &Ops::kStepper;
     if (!strcmp(id, DFM_EXT_LATE_POINTS)) return body.can_be_late() ? &kLate : nullptr;
     if (!strcmp(id, DFM_EXT_SLOTS)) return body.slots();
     if (!strcmp(id, DFM_EXT_CELL_ENERGY)) return &Ops::kCellEnergy;
     if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
     if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
     if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
-    if (!strcmp(id, DFM_EXT_FACTS)) return &kFacts;
+    if (!strcmp(id, DFM_EXT_FACTS)) return &Ops::kFacts;
     if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
     return nullptr;
   }
@@ -107,24 +79,15 @@ struct Entry {
   // late: Body::slots.
   static constexpr dfm_slot kSlots[] = {{DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
 
-  static constexpr dfm_model kModel = {sizeof(dfm_model),
-                                       DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT |
+  static constexpr dfm_model kModel = [] {
+    dfm_model t = model::bare_table<B>(DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT |
                                            (model::cells_of<B>() == DFM_CELL_TET ? 0 : DFM_CAP_INSIDE),
-                                       model::cells_of<B>(),
-                                       1,
-                                       kSlots,
-                                       create,
-                                       model::destroy<B>,
-                                       set_params,
-                                       state_init,
-                                       nullptr,
-                                       nullptr,
-                                       Ops::energy,
-                                       nullptr,
-                                       nullptr,
-                                       extension,
-                                       0,
-                                       0};
+                                       create, set_params, state_init, extension);
+    t.nslot = 1;
+    t.slots = kSlots;
+    t.energy = Ops::energy;
+    return t;
+  }();
 };
 
 const char *const kEffects[] = {"large_rotation", "damping", nullptr};

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "../model_common/buffer.h"
-#include "../model_common/entry.h"
+#include "../model_common/stepper.h"
 
 namespace shape {
 
@@ -78,11 +78,21 @@ struct Body {
   const char *idle(Param row) const;
   void init_state(double *state) const;
 
+  bool lacks_state(const dfm_kin &k) const {
+    if (!k.state) model::complain(host, kId, "the host gives no state; every cluster has one");
+    return !k.state;
+  }
+  // Frames are those of the last predict(), which has to be of the same step.
+  bool lacks_step(const dfm_kin &k) const {
+    const bool lacks = frames_of != k.t || step_of != k.dt;
+    if (lacks) model::complain(host, kId, "asked for answers in a step that was not predicted");
+    return lacks;
+  }
   void predict(const dfm_kin &k, const double *f, double *u_s);
-  void respond(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p, double *du);
-  void diagonal(uint32_t n, const uint32_t *surfel, double *w) const;
+  void respond(const dfm_kin &, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+               double *du);
+  void diagonal(const dfm_kin &, uint32_t n, const uint32_t *surfel, double *w) const;
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
-  bool predicted(const dfm_kin &k) const { return frames_of == k.t && step_of == k.dt; }
 
  private:
   Buffer<double> rest;        // [npoint,3] m

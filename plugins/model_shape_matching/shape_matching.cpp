@@ -8,7 +8,7 @@
 namespace shape {
 
 namespace {
-using Ops = model::Ops<Body>;
+using Ops = model::StepperOps<Body>;
 constexpr uint32_t kRun = DFM_PARAM_RUNTIME;
 const char *const kModes[] = {"rigid", "linear", "quadratic", nullptr};
 }  // namespace
@@ -47,61 +47,12 @@ dfm_status state_init(const void *self, double *state) {
   return DFM_OK;
 }
 
-bool lacks_state(const Body &body, const dfm_kin &k) {
-  if (!k.state) model::complain(body.host, kId, "the host gives no state; every cluster has one");
-  return !k.state;
-}
-
-dfm_status predict(void *self, const dfm_kin *k, const double *f, double *u) {
-  Body &body = *static_cast<Body *>(self);
-  if (lacks_state(body, *k)) return DFM_E_STATE;
-  body.predict(*k, f, u);
-  return DFM_OK;
-}
-
-// Frames are those of the last predict(), which has to be of the same step.
-dfm_status of_step(const Body &body, const dfm_kin &k) {
-  if (body.predicted(k)) return DFM_OK;
-  model::complain(body.host, kId, "asked for answers in a step that was not predicted");
-  return DFM_E_STATE;
-}
-
-dfm_status respond_many(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, uint32_t nrhs,
-                        const double *p, double *du) {
-  Body &body = *static_cast<Body *>(self);
-  const dfm_status status = of_step(body, *k);
-  if (status == DFM_OK) body.respond(n, surfel, nrhs, p, du);
-  return status;
-}
-
-dfm_status respond(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, const double *p,
-                   double *du) {
-  return respond_many(self, k, n, surfel, 1, p, du);
-}
-
-dfm_status diagonal(void *self, const dfm_kin *k, uint32_t n, const uint32_t *surfel, double *w) {
-  const Body &body = *static_cast<const Body *>(self);
-  const dfm_status status = of_step(body, *k);
-  if (status == DFM_OK) body.diagonal(n, surfel, w);
-  return status;
-}
-
-dfm_status commit(void *self, const dfm_kin *k, const double *p, double *x, double *v) {
-  Body &body = *static_cast<Body *>(self);
-  const dfm_status status = of_step(body, *k);
-  if (status == DFM_OK) body.commit(*k, p, x, v);
-  return status;
-}
-
-const dfm_stepper kStepper = {sizeof(dfm_stepper), 0, predict, respond, diagonal, commit, nullptr,
-                              respond_many};
-
 const dfm_effect_row kOff[] = {
     {"damping", kDamping, 0, 0}, {"damping", kDampingMass, 0, 0}, {"plasticity", kCreep, 0, 0}};
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
 const void *extension(const void *self, const char *id) {
-  if (!strcmp(id, "dfm.stepper/1")) return &kStepper;
+  if (!strcmp(id, "dfm.stepper/1")) return &Ops::kStepper;
   if (!strcmp(id, DFM_EXT_SLOTS)) return &static_cast<const Body *>(self)->slots;
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
@@ -111,23 +62,9 @@ const void *extension(const void *self, const char *id) {
 
 const char *const kEffects[] = {"large_rotation", "damping", "plasticity", nullptr};
 
-const dfm_model kModel = {sizeof(dfm_model),
-                          DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,
-                          DFM_CELL_TET,
-                          0,
-                          nullptr,
-                          create,
-                          model::destroy<Body>,
-                          set_params,
-                          state_init,
-                          nullptr,
-                          nullptr,
-                          nullptr,
-                          nullptr,
-                          nullptr,
-                          extension,
-                          0,
-                          0};
+const dfm_model kModel =
+    model::bare_table<Body>(DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE, create,
+                            set_params, state_init, extension);
 
 const dfm_type kType =
     dfm::plugin::type(DFM_KIND_MODEL, kId, "shape matching (plausible)", "0.1.0", "MIT",

@@ -375,7 +375,8 @@ void Body::changed(uint32_t point, double *out) const {
   }
 }
 
-void Body::respond(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p, double *du) {
+void Body::respond(const dfm_kin &, uint32_t n, const uint32_t *surfel, uint32_t nrhs, const double *p,
+                   double *du) {
   touch(n, surfel);
   for (uint32_t r = 0; r < nrhs; ++r, p += 3 * size_t(n), du += 3 * size_t(n)) {
     push(n, surfel, p);
@@ -392,7 +393,7 @@ void Body::respond(uint32_t n, const uint32_t *surfel, uint32_t nrhs, const doub
 }
 
 // A bound: without clusters, the points alone would answer more.
-void Body::diagonal(uint32_t n, const uint32_t *surfel, double *w) const {
+void Body::diagonal(const dfm_kin &, uint32_t n, const uint32_t *surfel, double *w) const {
   std::fill(w, w + 9 * size_t(n), 0.0);
   for (uint32_t s = 0; s < n; ++s)
     for (uint32_t e = row[surfel[s]]; e < row[surfel[s] + 1]; ++e)

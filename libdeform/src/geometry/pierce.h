@@ -33,4 +33,8 @@ inline bool edges_pierce(const Surface &from, uint32_t s, const Surface &to, uin
   return false;
 }
 
+inline bool triangles_cross(const Surface &a, uint32_t s, const Surface &b, uint32_t t) {
+  return edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s);
+}
+
 }  // namespace dfm

@@ -10,7 +10,6 @@
 #include "core/handle.h"
 #include "core/path.h"
 #include "friction/laws.h"
-#include "friction/pair_rules.h"
 #include "mesh/mesh.h"
 #include "plugin/context.h"
 #include "plugin/shared_object.h"
@@ -19,7 +18,7 @@
 #include "scene/scene.h"
 #include "snapshot/snapshot.h"
 #include "snapshot/snapshot_structure.h"
-#include "state/obstacle.h"
+#include "state/partner.h"
 #include "state/tool.h"
 #include "world/create.h"
 
@@ -336,28 +335,19 @@ Written write_friction(SceneWriter &to) {
   return out;
 }
 
-// A thing of the scene: what its world's rules and masks see, and the name that it has in the scene.
-struct Touching {
-  PairSide side;
-  std::string name;
-  uint64_t id;
-  uint32_t category, collides_with;
-  const Obstacle *shape;  // null: of a body
-};
-
+// Things of the scene, and their names there.
+using Touching = std::pair<Partner, std::string>;
 std::vector<Touching> touching_of(const World &w) {
   std::vector<Touching> out;
-  for (const auto &b : w.bodies)
-    out.push_back(
-        {{b->name, {}, b->material, b->whole_name}, b->name, b->id, b->category, b->collides_with, nullptr});
+  for (const auto &b : w.bodies) out.push_back({partner_of(*b), b->name});
   for (const auto &o : w.obstacles)
     if (const Obstacle *const s = shape_in_scene(w, *o); s && s->def.shape != DFM_SHAPE_NONE)
-      out.push_back({{s->name, {}, s->material}, o->name, s->id, s->def.category, s->def.collides_with, s});
+      out.push_back({partner_of(*s), o->name});
   return out;
 }
 
 // Whether anything would keep them apart: no two obstacles, nor two shapes of a rigid body or a tool.
-bool may_meet(const Touching &a, const Touching &b) {
+bool may_meet(const Partner &a, const Partner &b) {
   if (!a.shape || !b.shape) return true;
   const RigidSet *const set = a.shape->rigid;
   if (!set || set != b.shape->rigid) return set || b.shape->rigid;
@@ -375,15 +365,13 @@ Written write_filters(SceneWriter &to) {
   const std::vector<Touching> things = touching_of(w);
   for (size_t i = 0; i < things.size(); ++i)
     for (size_t k = i + 1; k < things.size(); ++k) {
-      const Touching &a = things[i], &b = things[k];
+      const auto &[a, name_a] = things[i];
+      const auto &[b, name_b] = things[k];
       if (!may_meet(a, b)) continue;
-      const FilterRule *const rule = best_rule(w.filters, a.side, b.side);
-      const bool allowed =
-          rule ? rule->collide : (a.category & b.collides_with) && (b.category & a.collides_with);
-      const bool touch = allowed && !refused.contains(std::minmax(a.id, b.id));
-      const FilterRule *const written = best_rule(kept, {a.name, {}, a.side.material, a.side.whole},
-                                                  {b.name, {}, b.side.material, b.side.whole});
-      if (touch != (!written || written->collide)) pairs.push_back({{a.name, b.name}, touch});
+      const bool touch = a.meets(b, w.filters) && !refused.contains(std::minmax(a.id, b.id));
+      const FilterRule *const written = best_rule(kept, {name_a, {}, a.side.material, a.side.whole},
+                                                  {name_b, {}, b.side.material, b.side.whole});
+      if (touch != (!written || written->collide)) pairs.push_back({{name_a, name_b}, touch});
     }
   Written out = Written::array();
   for (const auto *const list : {&rules, &pairs})

@@ -30,20 +30,21 @@ void begin_bodies(World &w, StepContext &step) {
 namespace {
 // From this number of cells on models divide their work among all threads themselves.
 constexpr size_t kLargeBody = 10000;
-bool fewer_than_threads_and_large(const World &w, Active active) {
+bool fewer_than_threads_and_large(const World &w, std::span<const uint32_t> active) {
   return active.size() < w.context->tasks.threads() &&
          std::ranges::all_of(active, [&](uint32_t i) { return w.bodies[i]->tets.size() >= 4 * kLargeBody; });
 }
 }  // namespace
 
-bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble) {
+bool stage_model(World &w, StepContext &step, uint32_t *trouble) {
+  const SubStep now = sub_step_of(w, step);
   const auto forces = [&](Body &b) {
     // booked with them: work of what holds driven points, and what another size of sub-steps changes
     const bool keep = !b.motions.empty() || w.watch.size_before > 0;
     return b.dynamics->add_forces(now, keep);
   };
-  const uint32_t together = fewer_than_threads_and_large(w, active) ? kOnThisThread : kPointsToPull;
-  const Body *const failed = each_active(w, active, together, forces);
+  const uint32_t together = fewer_than_threads_and_large(w, step.active) ? kOnThisThread : kPointsToPull;
+  const Body *const failed = each_active(w, step.active, together, forces);
   if (!failed) return true;
   *trouble |= DFM_TROUBLE_PLUGIN;
   set_last_error(
@@ -66,10 +67,11 @@ bool tells_why(const World &w, const Body &b, const SubStep &now) {
 }
 }  // namespace
 
-bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble) {
+bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
+  const SubStep now = sub_step_of(w, step);
   const bool touches = w.plan.touches();
-  const Body *const failed = each_active(w, active, kPointsToMove, [&](Body &b) {
-    const bool moved = b.dynamics->free_motion(now, kinetic[b.slot]);
+  const Body *const failed = each_active(w, step.active, kPointsToMove, [&](Body &b) {
+    const bool moved = b.dynamics->free_motion(now, step.free_kinetic[b.slot]);
     if (touches && b.surface.identity())
       gather_surface(b.surface, b.p.x.data(), b.dynamics->unknowns().of_points());
     return moved;
@@ -95,8 +97,8 @@ bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &k
 }
 
 // Surfels coupled to several phyxels: rows of N are independent, so they are divided among the threads.
-void stage_gather(World &w, Active active) {
-  for (const uint32_t i : active) {
+bool stage_gather(World &w, StepContext &step, uint32_t *) {
+  for (const uint32_t i : step.active) {
     const auto &b = w.bodies[i];
     if (b->surface.identity()) continue;
     const double *const v = b->dynamics->unknowns().of_points();
@@ -104,16 +106,18 @@ void stage_gather(World &w, Active active) {
       gather_rows(b->surface, b->p.x.data(), v, begin, end);
     });
   }
+  return true;
 }
 
-void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                 const PairFilter &filter, double h, double offset, Tasks &tasks, BroadPhase &out) {
+bool stage_broad(World &w, StepContext &step, uint32_t *) {
   try {
-    out.update(bodies, obstacles, filter, h, offset, &tasks);
+    step.broad.update(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset,
+                      &w.context->tasks);
   } catch (...) {
-    out.clear();  // out of memory while making its lists: they are rebuilt next time
+    step.broad.clear();  // out of memory while making its lists: they are rebuilt next time
     throw;
   }
+  return true;
 }
 
 }  // namespace dfm

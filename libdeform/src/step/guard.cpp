@@ -323,41 +323,36 @@ bool are_parts(const StepContext &step, const Candidate &c) {
   return a.whole && a.whole == b.whole;
 }
 
-// The same for parts of one body, by feature: their teeth may cross in one place and not in another.
-bool triangles_cross(StepContext &step, const Candidate &c, bool swap) {
-  const uint32_t low = swap ? c.slot_b : c.slot_a, high = swap ? c.slot_a : c.slot_b;
-  if (!cross_at_start(step, low, high, false)) return false;
+const Guard::Through &crossing(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle) {
   Guard &g = step.guard;
-  const Surface &a = *step.body_views[low].surface, &b = *step.body_views[high].surface;
-  const auto first = [&](uint32_t slot_a, uint32_t slot_b) {
-    return std::lower_bound(g.crossed.begin(), g.crossed.end(), Guard::Crossed{slot_a, slot_b, 0, 0});
-  };
-  if (const auto at = first(low, high); at == g.crossed.end() || at->a != low || at->b != high) {
-    step.broad.near_triangles_of(low, high, false, [&](uint32_t s, uint32_t t) {
-      if (edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s)) g.crossed.push_back({low, high, s, t});
-    });
-    std::sort(g.crossed.begin(), g.crossed.end());
-  }
-  const auto has = [](const Surface &s, uint32_t t, int kind, uint32_t feature) {
-    const uint32_t *const corner = &s.tri[3 * size_t{t}], *const e = &s.tri_edge[3 * size_t{t}];
-    if (kind == 2) return t == feature;
-    return kind == 0 ? corner[0] == feature || corner[1] == feature || corner[2] == feature
-                     : e[0] == feature || e[1] == feature || e[2] == feature;
-  };
-  const int kind_a = c.kind == kEdgeEdge ? 1 : 0, kind_b = c.kind == kEdgeEdge ? 1 : 2;
-  for (auto at = first(low, high); at != g.crossed.end() && at->a == low && at->b == high; ++at)
-    if (has(a, at->s, swap ? kind_b : kind_a, swap ? c.feature_b : c.feature_a) &&
-        has(b, at->t, swap ? kind_a : kind_b, swap ? c.feature_a : c.feature_b))
-      return true;
-  return false;
+  for (const Guard::Through &t : g.through)
+    if (t.a == slot_a && t.b == slot_b && t.obstacle == obstacle) return t;
+  Guard::Through found{slot_a, slot_b, obstacle, {}};
+  const Surface &a = *step.body_views[slot_a].surface;
+  const Surface &b = obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
+  step.broad.near_triangles_of(slot_a, slot_b, obstacle, [&](uint32_t s, uint32_t t) {
+    if (triangles_cross(a, s, b, t)) found.triangles.push_back({s, t});
+  });
+  return g.through.emplace_back(std::move(found));
 }
 
 // Two surfaces that cross at the start (as placed by the user) are not guarded: guarding them would keep them
-// crossed.
+// crossed. Parts of one body by feature: their teeth may cross in one place and not in another.
 bool cross_at_start(StepContext &step, const Candidate &c) {
   const bool swap = !c.obstacle && c.slot_b < c.slot_a;
-  if (!c.obstacle && are_parts(step, c)) return triangles_cross(step, c, swap);
-  return cross_at_start(step, swap ? c.slot_b : c.slot_a, swap ? c.slot_a : c.slot_b, c.obstacle);
+  const uint32_t low = swap ? c.slot_b : c.slot_a, high = swap ? c.slot_a : c.slot_b;
+  const auto &crossed = crossing(step, low, high, c.obstacle).triangles;
+  if (c.obstacle || !are_parts(step, c)) return !crossed.empty();
+  const auto has = [&](uint32_t slot, uint32_t t, int kind, uint32_t feature) {
+    const Surface &s = *step.body_views[slot].surface;
+    const uint32_t *const of = (kind == 0 ? s.tri : s.tri_edge).data() + 3 * size_t{t};
+    return kind == 2 ? t == feature : of[0] == feature || of[1] == feature || of[2] == feature;
+  };
+  const int kind_a = c.kind == kEdgeEdge ? 1 : 0, kind_b = c.kind == kEdgeEdge ? 1 : 2;
+  return std::any_of(crossed.begin(), crossed.end(), [&](const auto &at) {
+    const auto [a, b] = swap ? std::pair(at.second, at.first) : at;
+    return has(c.slot_a, a, kind_a, c.feature_a) && has(c.slot_b, b, kind_b, c.feature_b);
+  });
 }
 
 // For pairs of a body with itself that has open faces, or of two parts of one body.
@@ -445,17 +440,7 @@ void take_safe_part(World &w, StepContext &step, bool lets_slits, double safe) {
 }  // namespace
 
 bool cross_at_start(StepContext &step, uint32_t slot_a, uint32_t slot_b, bool obstacle) {
-  Guard &g = step.guard;
-  for (const Guard::Through &t : g.through)
-    if (t.a == slot_a && t.b == slot_b && t.obstacle == obstacle) return t.yes;
-  const Surface &a = *step.body_views[slot_a].surface;
-  const Surface &b = obstacle ? *step.obstacle_views[slot_b].surface : *step.body_views[slot_b].surface;
-  bool yes = false;
-  step.broad.near_triangles_of(slot_a, slot_b, obstacle, [&](uint32_t s, uint32_t t) {
-    yes = yes || edges_pierce(a, s, b, t) || edges_pierce(b, t, a, s);
-  });
-  g.through.push_back({slot_a, slot_b, obstacle, yes});
-  return yes;
+  return !crossing(step, slot_a, slot_b, obstacle).triangles.empty();
 }
 
 void follow_pairs(World &w, StepContext &step, bool fresh) {

@@ -28,17 +28,13 @@ struct Guard {
   Array<Common> common;     // [bodies] of the surfels' velocities without contact
   uint64_t lists = 0;       // number of rebuilds of broad/ when `memory` began
   uint64_t placements = 0;  // World::placements that `memory` knows of
+  // Of each tested pair the triangles that cross at the start: of a, of b.
   struct Through {
     uint32_t a, b;
-    bool obstacle, yes;
+    bool obstacle;
+    std::vector<std::pair<uint32_t, uint32_t>> triangles;
   };
-  std::vector<Through> through;  // tested pairs: whether they cross at the start
-  // Of parts of one body: triangles that cross there, of the lower slot first; ascending by the slots
-  struct Crossed {
-    uint32_t a, b, s, t;
-    auto operator<=>(const Crossed &) const = default;
-  };
-  std::vector<Crossed> crossed;
+  std::vector<Through> through;
   struct Kept {
     uint64_t key;
     uint32_t more;
@@ -59,7 +55,6 @@ struct Guard {
   void start() {
     kept.clear();
     through.clear();
-    crossed.clear();
     motion = 1;
     solves = 0;
     acted = resolving = lets_slits = false;

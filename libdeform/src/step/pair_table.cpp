@@ -6,11 +6,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "friction/pair_rules.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
-#include "state/obstacle.h"
-#include "state/world.h"
+#include "state/partner.h"
 #include "step/context.h"
 #include "step/pair_table.h"
 
@@ -26,13 +24,9 @@ uint32_t zone_count(const World &w, uint32_t thing) {
   return thing < w.bodies.size() ? static_cast<uint32_t>(w.bodies[thing]->zones.list.size()) : 1;
 }
 
-const std::string &name_of(const World &w, uint32_t thing) {
-  const size_t nb = w.bodies.size();
-  return thing < nb ? w.bodies[thing]->name : w.obstacles[thing - nb]->name;
-}
-
-std::string_view whole_of(const World &w, uint32_t thing) {
-  return thing < w.bodies.size() ? std::string_view(w.bodies[thing]->whole_name) : std::string_view();
+PairSide side_of(const World &w, uint32_t thing, const SurfaceZones::Zone &zone) {
+  const PairSide whole = partner_of(w, thing).side;
+  return {whole.name, zone.group, zone.material, whole.whole};
 }
 
 // No rule: Coulomb's law with the geometric mean of the two materials' coefficients.
@@ -47,8 +41,7 @@ uint32_t default_law(World &w, double a, double b) {
 
 const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone &za, uint32_t b,
                             const SurfaceZones::Zone &zb) {
-  return best_rule(w.friction, {name_of(w, a), za.group, za.material, whole_of(w, a)},
-                   {name_of(w, b), zb.group, zb.material, whole_of(w, b)});
+  return best_rule(w.friction, side_of(w, a, za), side_of(w, b, zb));
 }
 
 // The zones of the two sides of a contact.

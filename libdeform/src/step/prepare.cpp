@@ -13,12 +13,11 @@
 #include "body/implicit_system.h"
 #include "body/obstacle_mesh.h"
 #include "core/error.h"
-#include "friction/pair_rules.h"
 #include "geometry/voxel_grid.h"
 #include "plan/integrators.h"
 #include "plugin/context.h"
 #include "state/bounds.h"
-#include "state/obstacle.h"
+#include "state/partner.h"
 #include "state/tool.h"
 #include "step/overlap/overlap.h"
 #include "step/pair_table.h"
@@ -55,14 +54,6 @@ class PairKinds {
   std::vector<Pair> pairs_;
 };
 
-// As whole things, and by zone. Text that a side refers to lives in the world.
-PairSide side_of(const World &w, uint32_t thing) {
-  const size_t nb = w.bodies.size();
-  if (thing >= nb) return {w.obstacles[thing - nb]->name, {}, w.obstacles[thing - nb]->material};
-  const Body &b = *w.bodies[thing];
-  return {b.name, {}, b.material, b.whole_name};
-}
-
 // What each pattern of the rules weighs at this side.
 template <class Rule>
 void weigh(const std::vector<Rule> &rules, const PairSide &side, std::vector<uint64_t> &key) {
@@ -70,9 +61,10 @@ void weigh(const std::vector<Rule> &rules, const PairSide &side, std::vector<uin
     for (const std::string &pattern : r.between) key.push_back(uint64_t(pattern_weight(pattern, side)));
 }
 
+// As a whole thing, and by zone.
 std::vector<uint64_t> key_of(const World &w, uint32_t thing) {
   std::vector<uint64_t> key;
-  const PairSide side = side_of(w, thing);
+  const PairSide side = partner_of(w, thing).side;
   weigh(w.filters, side, key);
   const auto add = [&](const SurfaceZones::Zone &zone) {
     key.push_back(std::bit_cast<uint64_t>(zone.friction));
@@ -99,7 +91,7 @@ PairKinds::Pair &PairKinds::of(uint32_t a, uint32_t b) {
   uint32_t &at = at_[size_t{kind_[a]} * n_ + kind_[b]];
   if (at == kNone) {
     at = uint32_t(pairs_.size());
-    pairs_.push_back({best_rule(w_.filters, side_of(w_, a), side_of(w_, b)), {}});
+    pairs_.push_back({best_rule(w_.filters, partner_of(w_, a).side, partner_of(w_, b).side), {}});
   }
   return pairs_[at];
 }
@@ -222,28 +214,6 @@ void view_rigids(World &w, SceneFacts &facts) {
   }
 }
 
-// A possible partner of a body: another body, or an obstacle.
-struct Partner {
-  uint64_t id;
-  uint32_t category, collides_with;
-  PairSide side;
-  bool has_shape, sensor;
-};
-Partner partner_of(const World &w, const StepContext &step, uint32_t thing) {
-  const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
-  if (thing < nb) {
-    const Body &b = *w.bodies[thing];
-    return {b.id, b.category, b.collides_with, {b.name, {}, b.material, b.whole_name}, true, b.sensor};
-  }
-  const Obstacle &o = *w.obstacles[thing - nb];
-  return {o.id,
-          o.def.category,
-          o.def.collides_with,
-          {o.name, {}, o.material},
-          step.obstacle_views[o.slot].shape != Shape::none,
-          o.sensor};
-}
-
 bool before_pair(const PairDecision &l, const PairDecision &r) { return l.a != r.a ? l.a < r.a : l.b < r.b; }
 
 // For a pair allowed by masks and rules: whether one is a sensor, or the host refuses. The host is called if
@@ -251,7 +221,7 @@ bool before_pair(const PairDecision &l, const PairDecision &r) { return l.a != r
 bool refused(const World &w, const StepContext &step, uint32_t i, uint32_t j, const Partner &a,
              const Partner &b, std::vector<PairDecision> &decisions) {
   if (a.sensor || b.sensor) return true;
-  if (!w.may_touch.call || !b.has_shape) return false;
+  if (!w.may_touch.call || !b.has_shape()) return false;
   if (j < i) return !w.pairs.filter.may_touch(step.body_views[j], step.body_views[i]);
   const auto find = [](const std::vector<PairDecision> &in, const PairDecision &pair) {
     const auto at = std::lower_bound(in.begin(), in.end(), pair, before_pair);
@@ -329,7 +299,7 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   std::vector<uint8_t> reported;  // by law: its effects are listed once, however many pairs use it
   const std::vector<uint8_t> attached = attached_bodies(w);
   std::vector<Partner> things;
-  for (uint32_t i = 0; i < width; ++i) things.push_back(partner_of(w, step, i));
+  for (uint32_t i = 0; i < width; ++i) things.push_back(partner_of(w, i));
   PairKinds kinds(w);
   for (uint32_t i = 0; i < nb; ++i) {
     const Partner &a = things[i];
@@ -338,17 +308,14 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
       const bool is_body = j < nb;
       const Partner &b = things[j];
       PairKinds::Pair &pair = kinds.of(i, j);
-      bool touch = (a.category & b.collides_with) && (b.category & a.collides_with);
-      if (pair.filter) {
-        if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, pair.filter->collide);
-        touch = pair.filter->collide;
-      }
+      bool touch = a.meets(b, pair.filter);
+      if (pair.filter && (!is_body || i < j)) w.pairs.filter.set(a.id, b.id, !is_body, touch);
       if (touch && ((attached[i] && parted(w, i, j)) || cut_through(w, i, j) ||
                     refused(w, step, i, j, a, b, decisions))) {
         if (!is_body || i < j) w.pairs.filter.set(a.id, b.id, !is_body, false);
         touch = false;
       }
-      if (!touch || !b.has_shape) continue;
+      if (!touch || !b.has_shape()) continue;
       if (is_body) facts.body_pairs += i < j;
       else ++facts.obstacle_pairs;
       if (pair.law.found()) {

@@ -1,6 +1,7 @@
 // Prescribed gravity, loads, springs, and motions of held points.
 #include "state/spring.h"
 #include "state/world.h"
+#include "step/context.h"
 #include "step/stages.h"
 #include "step/watch/energy_watch.h"
 
@@ -30,10 +31,10 @@ void each_held_place(const Body &b, double t, const std::function<void(uint32_t,
   }
 }
 
-void stage_motion(World &w, double h, double rest, Array<Driven> &driven) {
+bool stage_motion(World &w, StepContext &step, uint32_t *) {
   // Held velocities are the only state that changes before a sub-step has succeeded; the previous values are
   // kept.
-  const double end = w.prescribed.at(w.time + h);
+  const double end = w.prescribed.at(w.time + step.h);
   if (!w.gravity.keys.empty()) change_gravity(w, vector_at(w.gravity.keys, end));
   for (auto &b : w.bodies) {
     if (b->sleep_state.asleep) continue;
@@ -42,7 +43,7 @@ void stage_motion(World &w, double h, double rest, Array<Driven> &driven) {
         set_loads(*b, t, w.prescribed.share);
         for (const Spring &spring : b->springs) {
           if (w.prescribed.is_static()) add_spring_force(*b, spring, end, 0);
-          else add_spring_force(*b, spring, w.time, h);
+          else add_spring_force(*b, spring, w.time, step.h);
         }
       };
       if (b->dynamics->abilities().parts) {
@@ -51,16 +52,17 @@ void stage_motion(World &w, double h, double rest, Array<Driven> &driven) {
       }
       set(end);
     }
-    each_held_place(*b, w.prescribed.at(w.time + rest), [&](uint32_t point, Vec3 to) {
+    each_held_place(*b, w.prescribed.at(w.time + step.rest), [&](uint32_t point, Vec3 to) {
       const size_t at = size_t(point) * kStride;
-      const Vec3 v = (1 / rest) * (to - load3(&b->p.x[at]));
+      const Vec3 v = (1 / step.rest) * (to - load3(&b->p.x[at]));
       for (int k = 0; k < 3; ++k)
         if (b->p.held[point] & (1 << k)) {
-          driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
+          step.driven.push_back({&b->p.v[at + size_t(k)], b->p.v[at + size_t(k)]});
           b->p.v[at + size_t(k)] = v[k];
         }
     });
   }
+  return true;
 }
 
 void undo_motion(Array<Driven> &driven) {

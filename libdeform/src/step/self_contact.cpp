@@ -160,11 +160,10 @@ bool crosses_another(SelfBody &b, uint32_t triangle) {
   if (b.crosses[triangle] != unasked) return b.crosses[triangle] == yes;
   b.crosses[triangle] = no;
   b.list.near_triangle(triangle, [&](uint32_t other) {
-    if (b.crosses[triangle] == yes ||
-        share_a_corner(&s.tri[3 * size_t{triangle}], &s.tri[3 * size_t{other}]) ||
-        !(edges_pierce(s, triangle, s, other) || edges_pierce(s, other, s, triangle)))
-      return;
-    b.crosses[triangle] = b.crosses[other] = yes;
+    if (b.crosses[triangle] != yes &&
+        !share_a_corner(&s.tri[3 * size_t{triangle}], &s.tri[3 * size_t{other}]) &&
+        triangles_cross(s, triangle, s, other))
+      b.crosses[triangle] = b.crosses[other] = yes;
   });
   return b.crosses[triangle] == yes;
 }
@@ -291,7 +290,7 @@ void follow_list(SelfBody &s, double offset) {
   s.pairs.follow(s.body->surface, s.rest, s.list.renewals(), offset);
 }
 
-void stage_self(World &w, StepContext &step) {
+bool stage_self(World &w, StepContext &step, uint32_t *) {
   if (!w.plan.has(StageRole::finds_contacts)) step.contacts.clear();
   const bool listed = w.plan.has(StageRole::lists_pairs);  // that stage has computed the speeds
   for (auto &s : step.self_bodies) {
@@ -309,6 +308,7 @@ void stage_self(World &w, StepContext &step) {
                        s->pairs, step.lent, step.contacts);
   }
   count_self(w, step);
+  return true;
 }
 
 bool cover_self(World &w, StepContext &step) {

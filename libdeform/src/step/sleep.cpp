@@ -191,7 +191,7 @@ bool all_idle(const World &w, const StepContext &step) {
 }
 
 // At the end of a sub-step that has been committed; allocates nothing.
-void stage_sleep(World &w, StepContext &step) {
+bool stage_sleep(World &w, StepContext &step, uint32_t *) {
   const double end = w.time + step.h;
   step.woken.clear();
   bool tired = false;
@@ -209,7 +209,7 @@ void stage_sleep(World &w, StepContext &step) {
     }
     tired |= b.sleep_state.quiet_time >= w.def.sleep_time;
   }
-  if (!tired || end < last_time(w.gravity.keys)) return;
+  if (!tired || end < last_time(w.gravity.keys)) return true;
 
   const size_t n = w.plan.touches() ? step.contacts.size() : 0;
   step.islands.start(static_cast<uint32_t>(w.bodies.size()));
@@ -250,6 +250,7 @@ void stage_sleep(World &w, StepContext &step) {
       any = true;
     }
   if (any) gather_active(w);
+  return true;
 }
 
 void fall_asleep(World &w, StepContext &step, Body &b, double end) {

@@ -65,33 +65,30 @@ void reopen_integrators(World &w);
 void set_gravity_now(World &w);  // from its keys, at the present time
 dfm_status run_step(World &w, StepContext &step, double dt, uint32_t *trouble);
 
-using Active = std::span<const uint32_t>;  // slots of the bodies that stages work on, ascending
 // A held velocity component set by this sub-step.
 struct Driven { double *velocity, before; };
 
-// Held points go straight to where they have to be at the end of the planned sub-step, `rest` from now, as
-// obstacles do (Obstacle::end_pose).
-void stage_motion(World &w, double h, double rest, Array<Driven> &driven);
+// Held points go straight to where they have to be at the end of the planned sub-step, as obstacles do
+// (Obstacle::end_pose).
+bool stage_motion(World &w, StepContext &step, uint32_t *trouble);
 // b.p.load at time t; loads that nothing varies over time times share. Springs are not in it.
 void set_loads(Body &b, double t, double share);
 // Prescribed positions of moving held points at time t.
 void each_held_place(const Body &b, double t, const std::function<void(uint32_t point, Vec3 to)> &use);
 void undo_motion(Array<Driven> &driven);  // held velocities as before stage_motion()
-bool stage_model(World &w, Active active, const SubStep &now, uint32_t *trouble);
-// kinetic: [bodies] J, of the active ones, out.
-bool stage_predict(World &w, Active active, const SubStep &now, Array<double> &kinetic, uint32_t *trouble);
+bool stage_model(World &w, StepContext &step, uint32_t *trouble);
+bool stage_predict(World &w, StepContext &step, uint32_t *trouble);
 bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble);  // rigid.cpp
-void stage_gather(World &w, Active active);
-void stage_broad(std::span<const BodyView> bodies, std::span<const ObstacleView> obstacles,
-                 const PairFilter &filter, double h, double offset, Tasks &tasks, BroadPhase &out);
+bool stage_gather(World &w, StepContext &step, uint32_t *trouble);
+bool stage_broad(World &w, StepContext &step, uint32_t *trouble);
 Next stage_narrow(World &w, StepContext &step, uint32_t *trouble);  // narrow.cpp
-void stage_self(World &w, StepContext &step);                       // self_contact.cpp
+bool stage_self(World &w, StepContext &step, uint32_t *trouble);    // self_contact.cpp
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble);   // solve.cpp
 // rigid.cpp: end states, stored separately until keep_rigids()
 Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble);
 Next stage_guard(World &w, StepContext &step, uint32_t *trouble);  // guard.cpp
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble);
-void stage_sleep(World &w, StepContext &step);  // sleep.cpp
+bool stage_sleep(World &w, StepContext &step, uint32_t *trouble);  // sleep.cpp
 
 SubStep sub_step_of(const World &w, const StepContext &step);
 void begin_bodies(World &w, StepContext &step);  // before a sub-step and its repetitions

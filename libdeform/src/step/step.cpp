@@ -36,71 +36,41 @@
 namespace dfm {
 namespace {
 
-// The rows of the table that pass to a stage the parts of world and context that it reads and writes;
-// doc/concepts/architecture.md lists these parts.
-namespace row {
-
-Next motion(World &w, StepContext &step, uint32_t *) {
-  stage_motion(w, step.h, step.rest, step.driven);
-  return Next::stage;
+using Succeeds = bool (*)(World &w, StepContext &step, uint32_t *trouble);
+template <Succeeds stage>
+Next row(World &w, StepContext &step, uint32_t *trouble) {
+  return go_on(stage(w, step, trouble));
 }
-Next model(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage_model(w, step.active, sub_step_of(w, step), trouble));
+bool predict(World &w, StepContext &step, uint32_t *trouble) {
+  return stage_predict(w, step, trouble) && watch_energy(w, step, trouble);
 }
-Next predict(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage_predict(w, step.active, sub_step_of(w, step), step.free_kinetic, trouble) &&
-               watch_energy(w, step, trouble));
-}
-Next rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
-  return go_on(stage_rigid_predict(w, step, trouble));
-}
-Next gather(World &w, StepContext &step, uint32_t *) {
-  stage_gather(w, step.active);
-  return Next::stage;
-}
-Next broad(World &w, StepContext &step, uint32_t *) {
-  stage_broad(step.body_views, step.obstacle_views, w.pairs.filter, step.h, w.offset, w.context->tasks,
-              step.broad);
-  return Next::stage;
-}
-Next self(World &w, StepContext &step, uint32_t *) {
-  stage_self(w, step);
-  return Next::stage;
-}
-Next solve(World &w, StepContext &step, uint32_t *trouble) {
+bool solve(World &w, StepContext &step, uint32_t *trouble) {
   const bool solved = stage_solve(w, step, trouble);
   step.guard.resolving = false;
-  return go_on(solved);
+  return solved;
 }
-Next distribute(World &, StepContext &step, uint32_t *) {
+bool distribute(World &, StepContext &step, uint32_t *) {
   step.ended = false;
   report_impulses(step);
-  return Next::stage;
+  return true;
 }
-Next commit(World &w, StepContext &step, uint32_t *trouble) { return go_on(stage_commit(w, step, trouble)); }
-Next sleep(World &w, StepContext &step, uint32_t *) {
-  stage_sleep(w, step);
-  return Next::stage;
-}
-
-}  // namespace row
 
 constexpr Stage kTable[] = {
-    {"motion", row::motion, cost::prescribed, when::motion},
-    {"model", row::model, cost::cells, when::model},
-    {"predict", row::predict, cost::points, when::predict},
-    {"rigid predict", row::rigid_predict, cost::rigid_states, when::rigid_predict},
-    {"gather", row::gather, cost::weights, when::gather},
-    {"broad", row::broad, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
+    {"motion", row<stage_motion>, cost::prescribed, when::motion},
+    {"model", row<stage_model>, cost::cells, when::model},
+    {"predict", row<predict>, cost::points, when::predict},
+    {"rigid predict", row<stage_rigid_predict>, cost::rigid_states, when::rigid_predict},
+    {"gather", row<stage_gather>, cost::weights, when::gather},
+    {"broad", row<stage_broad>, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
     {"narrow", stage_narrow, cost::candidates, when::narrow, StageRole::finds_contacts},
-    {"self contact", row::self, cost::self_surfels, when::self},
-    {"contact+friction", row::solve, cost::contacts_and_sweeps, when::solve, StageRole::solves},
+    {"self contact", row<stage_self>, cost::self_surfels, when::self},
+    {"contact+friction", row<solve>, cost::contacts_and_sweeps, when::solve, StageRole::solves},
     {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
-    {"distribute", row::distribute, cost::contacts_and_surfels, when::distribute,
+    {"distribute", row<distribute>, cost::contacts_and_surfels, when::distribute,
      StageRole::reports_impulses},
     {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
-    {"commit", row::commit, cost::points, when::commit},
-    {"sleep", row::sleep, cost::awake, when::sleep},
+    {"commit", row<stage_commit>, cost::points, when::commit},
+    {"sleep", row<stage_sleep>, cost::awake, when::sleep},
 };
 
 using Clock = std::chrono::steady_clock;
@@ -409,13 +379,10 @@ bool catch_up(World &w, StepContext &step, uint32_t *trouble) {
   {
     const Restored all{w};
     step.active.swap(step.woken);
-    const SubStep now = sub_step_of(w, step);
-    if (!stage_model(w, step.active, now, trouble)) return false;
-    if (!stage_predict(w, step.active, now, step.free_kinetic, trouble)) return false;
-    stage_gather(w, step.active);
+    if (!stage_model(w, step, trouble) || !stage_predict(w, step, trouble)) return false;
+    stage_gather(w, step, trouble);
   }
-  row::broad(w, step, trouble);
-  return true;
+  return stage_broad(w, step, trouble);
 }
 
 // The place of a role among the planned stages.

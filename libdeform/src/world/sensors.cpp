@@ -2,18 +2,12 @@
 
 #include <algorithm>
 
-#include "friction/pair_rules.h"
-#include "state/obstacle.h"
+#include "state/partner.h"
 #include "step/stages.h"
 #include "world/find.h"
 
 namespace dfm {
 namespace {
-
-PairSide side_of(const Thing &t) {
-  return t.body ? PairSide{t.body->name, {}, t.body->material, t.body->whole_name}
-                : PairSide{t.obstacle->name, {}, t.obstacle->material};
-}
 
 bool of_one_rigid(const Thing &a, const Thing &b) {
   return a.obstacle && b.obstacle && a.obstacle->rigid && a.obstacle->rigid == b.obstacle->rigid &&
@@ -22,9 +16,8 @@ bool of_one_rigid(const Thing &a, const Thing &b) {
 
 // Whether they could touch if neither were a sensor.
 bool may_meet(const World &w, const Thing &a, const Thing &b) {
-  if (of_one_rigid(a, b)) return false;
-  if (const FilterRule *const rule = best_rule(w.filters, side_of(a), side_of(b))) return rule->collide;
-  return (a.category() & b.collides_with()) && (b.category() & a.collides_with());
+  const auto partner = [](const Thing &t) { return t.body ? partner_of(*t.body) : partner_of(*t.obstacle); };
+  return !of_one_rigid(a, b) && partner(a).meets(partner(b), w.filters);
 }
 
 std::vector<Sensed> sensed_now(World &w) {

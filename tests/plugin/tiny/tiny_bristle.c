@@ -36,37 +36,10 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_friction law = {sizeof(dfm_friction),
-                                 DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA,
-                                 DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE,
-                                 2,
-                                 slots,
-                                 eval,
-                                 NULL,
-                                 NULL,
-                                 NULL,
-                                 NULL,
-                                 0,
-                                 0,
-                                 NULL};
-static const char *const effects[] = {"presliding", NULL};
-static const dfm_type type = {sizeof(dfm_type),
-                              DFM_KIND_FRICTION,
-                              "org.tiny.bristle",
-                              "bristle",
-                              "1.0",
-                              "MIT",
-                              "Prandtl 1928",
-                              rows,
-                              2,
-                              sizeof(dfm_param),
-                              effects,
-                              &law};
-static const dfm_type *const types[] = {&type};
-static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
-
-const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi;
-  (void)host_abi_min;
-  return DFM_ABI_OK(host) ? &plugin : NULL;
-}
+#define ID "org.tiny.bristle"
+#define NEEDS (DFM_NEED_FN | DFM_NEED_VT | DFM_NEED_AREA)
+#define EFFECTS "presliding", NULL
+#define SOURCE "Prandtl 1928"
+#define NSLOT 2
+#define SLOTS slots
+#include "law_type.h"

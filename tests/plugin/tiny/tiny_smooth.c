@@ -21,37 +21,6 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
   return DFM_OK;
 }
 
-static const dfm_friction law = {sizeof(dfm_friction),
-                                 DFM_NEED_FN | DFM_NEED_VT,
-                                 DFM_FRIC_ISOTROPIC | DFM_FRIC_PASSIVE,
-                                 0,
-                                 NULL,
-                                 eval,
-                                 NULL,
-                                 NULL,
-                                 NULL,
-                                 NULL,
-                                 0,
-                                 0,
-                                 NULL};
-static const char *const effects[] = {NULL};
-static const dfm_type type = {sizeof(dfm_type),
-                              DFM_KIND_FRICTION,
-                              "org.tiny.smooth",
-                              "smooth",
-                              "1.0",
-                              "MIT",
-                              "test",
-                              rows,
-                              2,
-                              sizeof(dfm_param),
-                              effects,
-                              &law};
-static const dfm_type *const types[] = {&type};
-static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
-
-const dfm_plugin *dfm_plugin_entry(const dfm_host *host, uint32_t host_abi, uint32_t host_abi_min) {
-  (void)host_abi;
-  (void)host_abi_min;
-  return DFM_ABI_OK(host) ? &plugin : NULL;
-}
+#define ID "org.tiny.smooth"
+#define NEEDS (DFM_NEED_FN | DFM_NEED_VT)
+#include "law_type.h"
