@@ -6,15 +6,11 @@
 namespace {
 
 using namespace test::tools;
+using test::go;
 using test::Vec;
 
 constexpr double kG = 9.81;
 constexpr double kStep[] = {1e-3, 1.0 / 60};
-
-void go(dfm_world w, double dt, double time) {
-  for (int i = 0; i < std::lround(time / dt); ++i)
-    ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
-}
 
 dfm_obstacle add_box(dfm_world w, const char *name, Vec half, Vec at) {
   dfm_obstacle_def d = dfm_obstacle_def_default();

@@ -8,6 +8,8 @@
 namespace {
 
 using namespace test::tools;
+using test::go;
+using test::push;
 using test::Vec;
 
 constexpr double kG = 9.81;
@@ -15,18 +17,6 @@ constexpr double kStep[] = {1e-3, 1.0 / 60};
 
 std::vector<dfm_pair_impulse> impulses(dfm_world w) { return test::listed(dfm_world_pair_impulses, w); }
 std::vector<dfm_contact_event> events(dfm_world w) { return test::listed(dfm_world_events, w); }
-
-void go(dfm_world w, double dt, double time) {
-  for (int i = 0; i < std::lround(time / dt); ++i)
-    ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
-}
-
-void push(dfm_rigid r, Vec velocity, Vec spin = {}) {
-  dfm_rigid_state s = test::state(r);
-  std::copy(velocity.begin(), velocity.end(), s.velocity);
-  std::copy(spin.begin(), spin.end(), s.spin);
-  test::ok(dfm_rigid_set_state(r, &s));
-}
 
 const char *const kFloors[] = {"plane", "box", "triangles", "fixed body"};
 // Its top is the plane z = 0.

@@ -7,6 +7,8 @@
 namespace {
 
 using namespace test::tools;
+using test::go;
+using test::push;
 using test::Vec;
 
 constexpr double kG = 9.81;
@@ -83,18 +85,6 @@ dfm_rigid put(dfm_world w, const std::string &kind, double low, const char *name
   const dfm_pose lies = pose({0.013, -0.021, low + half[2]}, {1, 0, 0}, std::acos(0.0));
   if (kind == "capsule") d.pose = lies;
   return test::create(w, {d})[0];
-}
-
-void push(dfm_rigid r, Vec velocity, Vec spin = {}) {
-  dfm_rigid_state s = test::state(r);
-  std::copy(velocity.begin(), velocity.end(), s.velocity);
-  std::copy(spin.begin(), spin.end(), s.spin);
-  test::ok(dfm_rigid_set_state(r, &s));
-}
-
-void go(dfm_world w, double dt, double time) {
-  for (int i = 0; i < std::lround(time / dt); ++i)
-    ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
 }
 
 // m, of its center and of what is 5 cm from it

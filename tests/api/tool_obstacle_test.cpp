@@ -89,12 +89,6 @@ void step_to(dfm_world w, dfm_tool t, const dfm_pose &p, double dt) {
   ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
 }
 
-Vec force_on(dfm_tool t) {
-  double force[3], torque[3];
-  test::ok(dfm_tool_force(t, force, torque));
-  return rotate(state(t).pose.rotation, test::vec(force));
-}
-
 Vec fed_back(dfm_tool t) {
   double force[3], torque[3];
   test::ok(dfm_tool_feedback(t, force, torque));
@@ -106,21 +100,6 @@ double moved(const dfm_tool_state &a, const dfm_tool_state &b) {
   double turn = 0;
   for (size_t k = 0; k < 4; ++k) turn = std::max(turn, std::fabs(a.pose.rotation[k] - b.pose.rotation[k]));
   return test::apart(test::vec(a.pose.position), test::vec(b.pose.position)) + 0.1 * turn;
-}
-
-// J, in its motion and in the coupling to its device.
-double energy(dfm_tool t) {
-  dfm_tool_def d = dfm_tool_def_default();
-  test::ok(dfm_tool_get_def(t, &d));
-  const dfm_tool_state s = state(t);
-  double motion = 0, spring = 0, same = 0;
-  for (int k = 0; k < 3; ++k) {
-    motion += d.mass * s.velocity[k] * s.velocity[k] + d.inertia * s.spin[k] * s.spin[k];
-    spring += d.stiffness * std::pow(s.device.position[k] - s.pose.position[k], 2);
-  }
-  for (int k = 0; k < 4; ++k) same += s.device.rotation[k] * s.pose.rotation[k];
-  const double angle = 2 * std::acos(std::min(std::fabs(same), 1.0));
-  return 0.5 * (motion + spring + d.turn_stiffness * angle * angle);
 }
 
 }  // namespace
@@ -180,7 +159,7 @@ TEST(ToolObstacle, AJitteringDevice_MakesNoEnergy) {
                                    axis, 0.1 * any(random));
           if (any(random) > -0.4) test::ok(dfm_tool_set_pose(t, &to, nullptr));  // 30 % are lost
           ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
-          const double has = energy(t), net = has - state(t).work;
+          const double has = tool_energy(t), net = has - state(t).work;
           most = std::max(most, has);
           rise = std::max(rise, net - before);
           before = net;

@@ -27,27 +27,8 @@ dfm_tool_def coupled(const char *name, uint32_t shape, dfm_pose at, Vec half, do
   return d;
 }
 
-Vec force_on(dfm_tool t) {
-  double force[3], torque[3];
-  test::ok(dfm_tool_force(t, force, torque));
-  return rotate(state(t).pose.rotation, test::vec(force));
-}
 void move(dfm_tool t, dfm_pose to) { test::ok(dfm_tool_set_pose(t, &to, nullptr)); }
 void step(dfm_world w, double dt = 1e-3) { test::ok(dfm_world_step(w, dt, nullptr)); }
-
-double energy(dfm_tool t) {
-  dfm_tool_def d = dfm_tool_def_default();
-  test::ok(dfm_tool_get_def(t, &d));
-  const dfm_tool_state s = state(t);
-  double motion = 0, spring = 0, same = 0;
-  for (int k = 0; k < 3; ++k) {
-    motion += d.mass * s.velocity[k] * s.velocity[k] + d.inertia * s.spin[k] * s.spin[k];
-    spring += d.stiffness * std::pow(s.device.position[k] - s.pose.position[k], 2);
-  }
-  for (int k = 0; k < 4; ++k) same += s.device.rotation[k] * s.pose.rotation[k];
-  const double angle = 2 * std::acos(std::min(std::fabs(same), 1.0));
-  return 0.5 * (motion + spring + d.turn_stiffness * angle * angle);
-}
 
 }  // namespace
 
@@ -197,7 +178,7 @@ TEST(ToolRub, ShakenAtRandom_TheyMakeNoEnergy) {
                     5e-4 * any(random)},
                    axis, 0.05 * any(random)));
       step(w);
-      const double has = energy(a) + energy(b), given = state(a).work + state(b).work;
+      const double has = tool_energy(a) + tool_energy(b), given = state(a).work + state(b).work;
       largest = std::max(largest, has);
       ASSERT_LT(has, given + 1e-9 * (1 + largest)) << i;
       met = std::max(met, test::norm(force_on(b)));

@@ -43,22 +43,6 @@ Felt felt(dfm_tool t) {
   return {f, {own[0] + arm[0], own[1] + arm[1], own[2] + arm[2]}};
 }
 
-// J, in its motion and in the coupling to its device.
-double energy(dfm_tool t) {
-  dfm_tool_def d = dfm_tool_def_default();
-  test::ok(dfm_tool_get_def(t, &d));
-  const dfm_tool_state s = state(t);
-  double motion = 0, spring = 0;
-  for (int k = 0; k < 3; ++k) {
-    motion += d.mass * s.velocity[k] * s.velocity[k] + d.inertia * s.spin[k] * s.spin[k];
-    spring += d.stiffness * std::pow(s.device.position[k] - s.pose.position[k], 2);
-  }
-  double same = 0;
-  for (int k = 0; k < 4; ++k) same += s.device.rotation[k] * s.pose.rotation[k];
-  const double angle = 2 * std::acos(std::min(std::fabs(same), 1.0));
-  return 0.5 * (motion + spring + d.turn_stiffness * angle * angle);
-}
-
 }  // namespace
 
 // Two balls whose devices go 4 mm into each other stand apart by the contact offset, each spring half as far
@@ -132,11 +116,11 @@ TEST(ToolTouch, Energy_NeverRises) {
       const dfm_pose to = pose({0.01, 0.003, 0.002});
       test::ok(dfm_tool_set_pose(a, &to, nullptr));
       test::ok(dfm_world_step(w, dt, nullptr));
-      double before = energy(a) + energy(b), pushed = 0;
+      double before = tool_energy(a) + tool_energy(b), pushed = 0;
       const double first = before;
       for (int i = 0; i < int(1 / dt); ++i) {
         test::ok(dfm_world_step(w, dt, nullptr));
-        const double now = energy(a) + energy(b);
+        const double now = tool_energy(a) + tool_energy(b);
         ASSERT_LT(now, before + 1e-9 * first) << i;
         before = now;
         pushed = std::max(pushed, test::norm(felt(b).force));

@@ -470,4 +470,18 @@ inline Vec rotate(Vec x, Vec axis, double angle) {
          (dot(axis, x) * (1 - std::cos(angle))) * axis;
 }
 
+inline bool same_bits(const std::vector<double> &a, const std::vector<double> &b) {
+  return a.size() == b.size() && !std::memcmp(a.data(), b.data(), a.size() * sizeof(double));
+}
+
+inline uint64_t fnv(const std::vector<double> &values) {
+  uint64_t hash = 14695981039346656037ull;
+  for (const double value : values) {
+    unsigned char bytes[sizeof value];
+    std::memcpy(bytes, &value, sizeof value);
+    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211ull;
+  }
+  return hash;
+}
+
 }  // namespace model_test

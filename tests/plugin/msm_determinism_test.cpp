@@ -29,20 +29,6 @@ std::vector<double> results(Host &host, const char *simd, const Mesh &mesh, cons
   return all;
 }
 
-bool same_bits(const std::vector<double> &a, const std::vector<double> &b) {
-  return a.size() == b.size() && !std::memcmp(a.data(), b.data(), a.size() * sizeof(double));
-}
-
-uint64_t fnv(const std::vector<double> &values) {
-  uint64_t hash = 14695981039346656037ull;
-  for (const double value : values) {
-    unsigned char bytes[sizeof value];
-    std::memcpy(bytes, &value, sizeof value);
-    for (const unsigned char byte : bytes) hash = (hash ^ byte) * 1099511628211ull;
-  }
-  return hash;
-}
-
 Params at_defaults(double poisson) {
   Params p = {2e5, poisson, 0.003, 0, -1};
   p.collapse = 3;

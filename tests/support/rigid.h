@@ -135,4 +135,16 @@ inline dfm_body soft_ball(dfm_context *c, dfm_world w, Vec at, Vec speed = {}, d
   return make_body(c, w, "ball", {0.1}, 400, o);
 }
 
+inline void go(dfm_world w, double dt, double time) {
+  for (int i = 0; i < std::lround(time / dt); ++i)
+    ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+}
+
+inline void push(dfm_rigid r, Vec velocity, Vec spin = {}) {
+  dfm_rigid_state s = test::state(r);
+  std::copy(velocity.begin(), velocity.end(), s.velocity);
+  std::copy(spin.begin(), spin.end(), s.spin);
+  test::ok(dfm_rigid_set_state(r, &s));
+}
+
 }  // namespace test

@@ -71,4 +71,25 @@ inline dfm_tool_state state(dfm_tool t) {
   return s;
 }
 
+inline Vec force_on(dfm_tool t) {
+  double force[3], torque[3];
+  test::ok(dfm_tool_force(t, force, torque));
+  return rotate(state(t).pose.rotation, test::vec(force));
+}
+
+// J, in its motion and in the coupling to its device.
+inline double tool_energy(dfm_tool t) {
+  dfm_tool_def d = dfm_tool_def_default();
+  test::ok(dfm_tool_get_def(t, &d));
+  const dfm_tool_state s = state(t);
+  double motion = 0, spring = 0, same = 0;
+  for (int k = 0; k < 3; ++k) {
+    motion += d.mass * s.velocity[k] * s.velocity[k] + d.inertia * s.spin[k] * s.spin[k];
+    spring += d.stiffness * std::pow(s.device.position[k] - s.pose.position[k], 2);
+  }
+  for (int k = 0; k < 4; ++k) same += s.device.rotation[k] * s.pose.rotation[k];
+  const double angle = 2 * std::acos(std::min(std::fabs(same), 1.0));
+  return 0.5 * (motion + spring + d.turn_stiffness * angle * angle);
+}
+
 }  // namespace test::tools
