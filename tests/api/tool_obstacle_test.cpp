@@ -159,7 +159,7 @@ TEST(ToolObstacle, AJitteringDevice_MakesNoEnergy) {
                                    axis, 0.1 * any(random));
           if (any(random) > -0.4) test::ok(dfm_tool_set_pose(t, &to, nullptr));  // 30 % are lost
           ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
-          const double has = energy(t), net = has - state(t).work;
+          const double has = tool_energy(t), net = has - state(t).work;
           most = std::max(most, has);
           rise = std::max(rise, net - before);
           before = net;

@@ -178,7 +178,7 @@ TEST(ToolRub, ShakenAtRandom_TheyMakeNoEnergy) {
                     5e-4 * any(random)},
                    axis, 0.05 * any(random)));
       step(w);
-      const double has = energy(a) + energy(b), given = state(a).work + state(b).work;
+      const double has = tool_energy(a) + tool_energy(b), given = state(a).work + state(b).work;
       largest = std::max(largest, has);
       ASSERT_LT(has, given + 1e-9 * (1 + largest)) << i;
       met = std::max(met, test::norm(force_on(b)));

@@ -116,11 +116,11 @@ TEST(ToolTouch, Energy_NeverRises) {
       const dfm_pose to = pose({0.01, 0.003, 0.002});
       test::ok(dfm_tool_set_pose(a, &to, nullptr));
       test::ok(dfm_world_step(w, dt, nullptr));
-      double before = energy(a) + energy(b), pushed = 0;
+      double before = tool_energy(a) + tool_energy(b), pushed = 0;
       const double first = before;
       for (int i = 0; i < int(1 / dt); ++i) {
         test::ok(dfm_world_step(w, dt, nullptr));
-        const double now = energy(a) + energy(b);
+        const double now = tool_energy(a) + tool_energy(b);
         ASSERT_LT(now, before + 1e-9 * first) << i;
         before = now;
         pushed = std::max(pushed, test::norm(felt(b).force));

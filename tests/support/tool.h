@@ -78,7 +78,7 @@ inline Vec force_on(dfm_tool t) {
 }
 
 // J, in its motion and in the coupling to its device.
-inline double energy(dfm_tool t) {
+inline double tool_energy(dfm_tool t) {
   dfm_tool_def d = dfm_tool_def_default();
   test::ok(dfm_tool_get_def(t, &d));
   const dfm_tool_state s = state(t);
