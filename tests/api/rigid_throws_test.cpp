@@ -152,6 +152,77 @@ TEST(RigidThrows, NothingPasses) {
       }
 }
 
+// Small round things that fly at each other, up to 100 m/s in steps of 10 ms, lose the speed at which they
+// meet, and what the first one throws meets the third one: they end in the order in which they began.
+TEST(RigidThrows, RoundThingsMeet) {
+  const double r = 5e-3;
+  for (const char *kinds : {"oo", "oo-", "ooo", "-oo", "o-o", "oo8", "---"})
+    for (const double speed : {1.0, 10.0, 30.0, 100.0})
+      for (const double aside : {0.0, 0.5, 0.9}) {
+        const size_t n = std::string(kinds).size();
+        if (n == 3 && aside > 0) continue;
+        SCOPED_TRACE(std::string(kinds) + ", " + std::to_string(speed) + " m/s, " + std::to_string(aside));
+        test::Context context;
+        const dfm_world w = test::make_world(context, {});
+        std::vector<dfm_rigid> things;
+        for (size_t i = 0; i < n; ++i) {
+          const std::string name = "thing" + std::to_string(i);
+          dfm_rigid_def d =
+              test::box(name.c_str(), {r, r, r}, 1, {0.2 * double(i), i == 1 ? 2 * r * aside : 0, 0});
+          d.shape = kinds[i] == 'o' ? DFM_SHAPE_SPHERE : kinds[i] == '-' ? DFM_SHAPE_CAPSULE : DFM_SHAPE_BOX;
+          d.radius = r;
+          d.half_length = 3 * r;
+          if (i == 0) d.velocity[0] = speed;
+          if (n == 2 && i == 1) d.velocity[0] = -speed;
+          things.push_back(test::create(w, {d})[0]);
+        }
+        for (int i = 0; i * 0.01 * speed < 0.7; ++i) {
+          ASSERT_EQ(dfm_world_step(w, 0.01, nullptr), DFM_OK) << dfm_last_error();
+          for (size_t k = 0; k + 1 < n; ++k) {
+            const Vec a = test::vec(test::state(things[k]).position),
+                      b = test::vec(test::state(things[k + 1]).position);
+            EXPECT_GT(test::apart(a, b), 2 * r - 1e-5) << i;
+            EXPECT_TRUE(aside > 0 || a[0] < b[0]) << i;
+          }
+        }
+        const double meets = std::sqrt(1 - aside * aside) * speed;  // m/s, along the line of centers
+        const Vec after = test::vec(test::state(things[0]).velocity);
+        EXPECT_GT(test::apart(after, {speed, 0, 0}), (n == 2 ? 0.85 : 0.45) * meets);
+      }
+}
+
+// A ball that another one makes fast within a sub-step touches what it grazes on its way, and has left at the
+// end.
+TEST(RigidThrows, WhatIsHit_GrazesNothingUnseen) {
+  const double r = 0.1, small = 5e-3;
+  for (const double way : {0.02, 0.03, 0.04})
+    for (const bool capsule : {false, true}) {
+      SCOPED_TRACE(std::to_string(way) + (capsule ? ", capsule" : ", ball"));
+      test::Context context;
+      const dfm_world w = test::make_world(context, {});
+      dfm_rigid_def d = test::box("first", {r, r, r}, 1);
+      d.shape = DFM_SHAPE_SPHERE;
+      d.radius = r;
+      d.velocity[0] = 100;
+      d.category = 2;
+      test::create(w, {d});
+      d.name = "second";
+      d.category = 1;
+      d.velocity[0] = 0;
+      d.pose.position[0] = 2 * r + 0.09;
+      test::create(w, {d});
+      dfm_rigid_def c = test::box("grazed", {small, small, small}, 1,
+                                  {d.pose.position[0] + way, r + small - 0.25 * way * way / r, 0});
+      c.shape = capsule ? DFM_SHAPE_CAPSULE : DFM_SHAPE_SPHERE;  // the axis of a capsule is along z
+      c.radius = small;
+      c.half_length = small;
+      c.collides_with = ~2u;
+      const dfm_rigid grazed = test::create(w, {c})[0];
+      for (int i = 0; i < 3; ++i) ASSERT_EQ(dfm_world_step(w, 0.01, nullptr), DFM_OK) << dfm_last_error();
+      EXPECT_GT(test::state(grazed).velocity[1], 0.1);
+    }
+}
+
 // What slides on a plate that turns is cut into many pieces: each begins near the length of the one before,
 // not with all that is left of the sub-step.
 TEST(RigidThrows, PiecesAreFoundInFewAttempts) {

@@ -508,6 +508,64 @@ TEST(RigidTouch, HeapsOfBoxes_MakeNoEnergy) {
 
 namespace {
 
+// m, how far two boxes of the same size overlap along the axis where it is least; not above 0: not at all
+double overlap(const dfm_rigid_state &a, const dfm_rigid_state &b, const Vec &half) {
+  Vec of_a[3], of_b[3], apart;
+  for (size_t k = 0; k < 3; ++k) {
+    Vec e{};
+    e[k] = 1;
+    of_a[k] = rotate(a.rotation, e);
+    of_b[k] = rotate(b.rotation, e);
+    apart[k] = b.position[k] - a.position[k];
+  }
+  double least = HUGE_VAL;
+  const auto look = [&](const Vec &n) {
+    const double length = test::norm(n);
+    if (!(length > 1e-3)) return;
+    double reach = 0;
+    for (size_t k = 0; k < 3; ++k)
+      reach += half[k] * (std::fabs(test::dot(n, of_a[k])) + std::fabs(test::dot(n, of_b[k])));
+    least = std::min(least, (reach - std::fabs(test::dot(n, apart))) / length);
+  };
+  for (const Vec &p : of_a) {
+    look(p);
+    for (const Vec &q : of_b)
+      look({p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]});
+  }
+  for (const Vec &q : of_b) look(q);
+  return least;
+}
+
+}  // namespace
+
+// A box falls on another one, turns past its face, and lies on edges that did not face each other before.
+TEST(RigidTouch, EdgesThatTurnTowardsEachOther_Meet) {
+  for (const auto &[dt, spin] : {std::pair(1e-3, -2.0), std::pair(1e-3, -5.0), std::pair(1e-3, -14.0),
+                                 std::pair(1.0 / 60, -2.0), std::pair(1.0 / 60, -5.0)})
+    for (int run = 0; run < 4; ++run) {
+      double deepest = 0;
+      test::Context context;
+      const dfm_world w = test::make_world(context, {0, 0, -kG});
+      const Vec half = {0.05, 0.06, 0.04};
+      dfm_rigid_def lower = test::box("lower", half, 1),
+                    upper = test::box("upper", half, 1, {0.013, 0.01 + 0.011 * run, 0.1});
+      lower.fixed = 1;
+      const dfm_rigid a = test::create(w, {lower})[0], b = test::create(w, {upper})[0];
+      dfm_rigid_state s = test::state(b);
+      s.rotation[2] = std::sin(0.1 + 0.1 * run);
+      s.rotation[3] = std::cos(0.1 + 0.1 * run);
+      s.spin[0] = spin;
+      test::ok(dfm_rigid_set_state(b, &s));
+      for (int i = 0; i * dt < 0.3; ++i) {
+        ASSERT_EQ(dfm_world_step(w, dt, nullptr), DFM_OK) << dfm_last_error();
+        deepest = std::max(deepest, overlap(test::state(a), test::state(b), half));
+      }
+      EXPECT_LT(deepest, 1e-4) << "m, " << spin << " rad/s, " << dt << " s, " << run;
+    }
+}
+
+namespace {
+
 struct ShaftFall { double deepest = 0, made = 0, start = 0, last = 0; };  // m, J
 
 // Twenty boxes that fall into a shaft of six times their size, moved by `shift` at the start.

@@ -252,18 +252,25 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   points_free_ = true;
 }
 
-// The rigid body's share in the change of relative velocity by the impulse a on the soft body and -a on the
-// rigid one.
+// The rigid bodies' share in the change of relative velocity by an impulse a on one side, -a on the other.
 Vec3 ContactRows::rigid_diagonal(uint32_t i, Vec3 a) const {
-  const Block &b = blocks[block[rigid[i]]];
-  const Vec3 r = load3(&arm[size_t(3) * i]), m = dfm::cross(r, a);
-  const size_t own = rigid[i] - b.first;
-  double p[6] = {a.x, a.y, a.z, m.x, m.y, m.z}, v[6];
-  for (size_t row = 0; row < 6; ++row) {
-    v[row] = 0;
-    for (size_t k = 0; k < 6; ++k) v[row] += response(b, 3 * own + k, own + row / 3, row % 3) * p[k];
-  }
-  return load3(v) + dfm::cross(load3(v + 3), r);
+  Vec3 sum;
+  each_rigid(i, [&](uint32_t from, Vec3 at, double by, const double *) {
+    const Vec3 p = by * a, moment = dfm::cross(at, p);
+    const double q[6] = {p.x, p.y, p.z, moment.x, moment.y, moment.z};
+    each_rigid(i, [&](uint32_t to, Vec3 r, double sign, const double *) {
+      if (block[to] != block[from]) return;
+      const Block &b = blocks[block[from]];
+      double v[6];
+      for (size_t row = 0; row < 6; ++row) {
+        v[row] = 0;
+        for (size_t k = 0; k < 6; ++k)
+          v[row] += response(b, 3 * size_t(from - b.first) + k, to - b.first + row / 3, row % 3) * q[k];
+      }
+      sum += sign * (load3(v) + dfm::cross(load3(v + 3), r));
+    });
+  });
+  return sum;
 }
 
 // 1/kg: what the implicit bodies of contact i answer as a whole; their nodes have the rest.
@@ -295,8 +302,20 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
                                response(b, column + 2, at, row) * a.z);
     }
   }
-  if (!rigid.empty() && rigid[i] != kNone) sum += rigid_diagonal(i, a);
+  if (!rigid.empty()) sum += rigid_diagonal(i, a);
   return sum;
+}
+
+void ContactRows::set_diagonal(uint32_t i) {
+  const double *const f = &frame[size_t(9) * i];
+  const Vec3 normal = load3(f), t1 = load3(f + 3), t2 = load3(f + 6);
+  const double body = whole_response(i);
+  const Vec3 w0 = diagonal(i, normal), w1 = diagonal(i, t1), w2 = diagonal(i, t2);
+  wn[i] = dot(normal, w0) + body;
+  cross[2 * size_t(i)] = dot(t1, w0);
+  cross[2 * size_t(i) + 1] = dot(t2, w0);
+  const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
+  wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b) + body;
 }
 
 namespace {
@@ -415,18 +434,11 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
     store3(&drive[size_t(i) * 3], in_frame(f, v));
     const double from = start_depth.empty() ? 0 : start_depth[i];
     rate[i] = bias_velocity(contacts[i].distance + from, offset, h, planned, most);
-    const Vec3 w0 = diagonal(i, normal);
-    const double body = whole_response(i);
-    wn[i] = dot(normal, w0) + body;
+    set_diagonal(i);
     // min(c l, m) balances the opening speed of a depth `indentation` at most: no load presses it deeper.
     compliance[3 * size_t(i)] = contacts[i].indentation > 0 ? kSoft * wn[i] : 0;
     compliance[3 * size_t(i) + 1] = kCloses * contacts[i].indentation / planned;
     compliance[3 * size_t(i) + 2] = 0;
-    cross[2 * size_t(i)] = dot(t1, w0);
-    cross[2 * size_t(i) + 1] = dot(t2, w0);
-    const Vec3 w1 = diagonal(i, t1), w2 = diagonal(i, t2);
-    const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
-    wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b) + body;
   };
   each_row_in_blocks(soft(), tasks, fill);
   if (nbond) finish_bonds(bonds);

@@ -144,8 +144,7 @@ struct ContactRows {
 
   explicit ContactRows(const Memory &memory);
   // Expands contacts to dofs. Blocks get their dofs and counts; the caller gives their responses, then calls
-  // finish(). Of contacts between rigid things it also gives drive, rate, compliance, wn, wt, cross and
-  // impulse.
+  // finish(). Of contacts between rigid things it also gives drive, rate, compliance and impulse.
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
              const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {},
              std::span<const RigidSides> between_rigids = {});
@@ -187,7 +186,8 @@ struct ContactRows {
 
   // 1/kg: the estimate of what implicit bodies answer as a whole, in wn and wt of this row; 0 without any
   double whole_response(uint32_t i) const;
-  Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;  // of W a of a contact: the rigid body's part
+  Vec3 rigid_diagonal(uint32_t i, Vec3 a) const;  // of W a of a contact: the rigid bodies' part
+  void set_diagonal(uint32_t i);  // wn, wt, cross of a contact, from its frame and the responses
   // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
   Vec3 velocity(uint32_t i, const double *of) const;

@@ -206,10 +206,6 @@ int query_rigid_ends(World &w, uint32_t *trouble) {
 
 Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   sum_rigid_impulses(w, step);
-  if (step.tools->finds_more(w, step)) {
-    step.rigid_again = true;
-    return Next::solve;
-  }
   step.tools->list(w, step);
   const int end = query_rigid_ends(w, trouble);
   if (end == 0) return Next::stop;

@@ -23,7 +23,6 @@ constexpr double kHeld = 1e-9;     // of the answer without joints: less is roun
 constexpr double kStronger = 0.1;  // of what a place yields where a motor holds that is not at its limit yet
 constexpr double kMaxStrong = 1e-6;  // of it: no place gives less
 constexpr double kDriven = 0.01;     // sine: a motor moves a place along a direction
-constexpr double kNever = 1e3;       // m/s, to part by: such a place has no impulse
 constexpr double kRank = 1e-12;      // of the answer without joints: less is rounding
 
 bool is_moved(const RigidSet &set, uint32_t body) { return set.group[body] != DFM_RIGID_STILL; }
@@ -159,24 +158,6 @@ double ToolTouch::softness_of_motor(const Row &row) const {
   return strong_ / kHeld * rounding_of(row, row.normal);
 }
 
-// The host's motors have been decided again: all rows are given their new answers.
-void ToolTouch::renew_rows() {
-  passes_ = 0;
-  changed_ = HUGE_VAL;
-  for (uint32_t i = 0; i < rows_.size(); ++i) {
-    Row &row = rows_[i];
-    if (!(jointed(row.a) && sides_[row.a.tool].drives) && !(jointed(row.b) && sides_[row.b.tool].drives))
-      continue;
-    set_responses(row);
-    if (!(row.inverse > 0)) {  // no longer moved by anything: nothing is asked of it
-      row.inverse = kHeld / rounding_of(row, row.normal);
-      row.rate = -kNever;
-      row.impulse = row.opens = 0;
-    }
-    if (!(row.response > 0 && row.impulse > 0)) row.along[0] = row.along[1] = 0;
-  }
-}
-
 void ToolTouch::request_again(Moved &m) {
   for (uint32_t g = 0; g < m.set->ngroup; ++g)
     if (m.jointed[g] && m.first[g] != kNone) request_response(m, g);
@@ -187,7 +168,7 @@ void ToolTouch::renew(const RigidSet &set) {
   if (!m) return;
   m->free.assign(set.velocity.begin(), set.velocity.end());
   request_again(*m);
-  renew_rows();
+  begin_passes();
 }
 
 // Where motors hold against rows: their places give less.
@@ -198,7 +179,7 @@ bool ToolTouch::press_harder() {
           [](const Row &row) { return !row.pair->jaw && row.soft > 0 && row.impulse > 0; }))
     return false;
   strong_ *= kStronger;
-  renew_rows();
+  begin_passes();
   return true;
 }
 

@@ -35,9 +35,10 @@ std::string ToolTouch::row_names(const World &w, uint32_t row) const {
 
 // Seen from the other side the normal and the first tangent are the opposite ones, and the second tangent,
 // their product, stays: forces, slips and deflections change their sign along it alone.
-void ToolTouch::list_contact(const World &w, uint32_t i, const ContactState &state, uint32_t first) {
+void ToolTouch::list_contact(const World &w, const StepContext &step, uint32_t i) {
   const Row &row = rows_[i];
   const Pair &pair = *row.pair;
+  const uint32_t r = step.rows.soft() + i;
   const double side = pair.b_first ? -1 : 1;
   const Vec3 v = slip(row);
   RigidContact c{};
@@ -54,20 +55,16 @@ void ToolTouch::list_contact(const World &w, uint32_t i, const ContactState &sta
   c.slip[1] = side * dot(row.tangent[1], v);
   c.gap = row.gap - offset_;
   c.law = pair.law;
-  c.sticks = row.response > 0 && state.mode[first + i] == 1;
+  c.sticks = step.rows.wt[r] > 0 && step.state.mode[r] == 1;
   c.began = match_[i] == kNone;
   for (size_t s = 0; s < std::min<size_t>(2, w.pairs.laws[pair.law]->nstate); ++s)
-    c.bristle[s] = (s == 1 ? side : 1) * state.bristle_out[s * state.stride + first + i];
+    c.bristle[s] = (s == 1 ? side : 1) * step.state.bristle_out[s * step.state.stride + r];
   next_report_.contacts.push_back(c);
 }
 
+// Memory for it is needed before the sub-step is final.
 void ToolTouch::list(const World &w, const StepContext &step) {
   keep_next(step.state, step.rows.soft());
-  list_contacts(w, step.state, step.rows.soft());
-}
-
-// Memory for it is needed before the sub-step is final.
-void ToolTouch::list_contacts(const World &w, const ContactState &state, uint32_t first) {
   RigidReport &to = next_report_;
   const Array<RigidPair> &before = w.rigid_report.touching;
   to.h = h_;
@@ -78,7 +75,7 @@ void ToolTouch::list_contacts(const World &w, const ContactState &state, uint32_
   for (uint32_t i = 0; i < rows_.size(); ++i) {
     const Row &row = rows_[i];
     const RigidPair pair{row.pair->id[row.pair->b_first], row.pair->id[!row.pair->b_first]};
-    if (row.impulse > 0) list_contact(w, i, state, first);
+    if (row.impulse > 0) list_contact(w, step, i);
     else if (!(row.gap - offset_ < kApart * offset_) ||
              !std::binary_search(before.begin(), before.end(), pair))
       continue;

@@ -11,6 +11,12 @@
 #include "step/rigid/tool_touch.h"
 
 namespace dfm {
+namespace {
+
+constexpr double kFace = 1e5;    // N/m, of a place on the face of a jaw
+constexpr double kOpenUpTo = 1;  // m/s: what a load could change that keeps a place from opening
+
+}  // namespace
 
 const ToolTouch::Moved *ToolTouch::known(const RigidSet &set) const {
   const auto at = std::find_if(sides_.begin(), sides_.end(), [&](const Moved &m) { return m.set == &set; });
@@ -35,9 +41,13 @@ RigidPlace ToolTouch::place_of(const Side &side) const {
   return {kNone, 0, center(side)};
 }
 
-std::span<const RigidSides> ToolTouch::sides(const StepContext &step) {
+void ToolTouch::begin_passes() {
   passes_ = 0;
   changed_ = HUGE_VAL;
+}
+
+std::span<const RigidSides> ToolTouch::sides(const StepContext &step) {
+  begin_passes();
   places_.clear();
   group_size_.assign(step.rigid_groups.begin(), step.rigid_groups.end());
   group_size_.insert(group_size_.end(), alone_.size(), 1);
@@ -122,24 +132,36 @@ void ToolTouch::set_arcs(const Row &row, ContactRows &to, uint32_t r) const {
   set(row.b, -1, to.arc);
 }
 
-void ToolTouch::fill_row(const Row &row, ContactRows &to, uint32_t r) const {
+// How the two sides yield. Where nothing can move along the normal, wn is zero and the row has no impulse;
+// where nothing can move across it, wt is.
+void ToolTouch::set_responses(Row &row, ContactRows &to, uint32_t r) const {
+  to.set_diagonal(r);
+  double &wn = to.wn[r], &wt = to.wt[r];
+  const bool held = !(wn > rounding_of(row, row.normal));
+  row.soft = row.pair->jaw ? 1 / (h_ * h_ * kFace) : held && motor_holds(row) ? softness_of_motor(row) : 0;
+  wn = held ? row.soft : wn + row.soft;
+  if (held || !(wt > rounding_of(row, row.tangent[0]))) wt = 0;
+  const bool opens = row.pair->frees && !held && row.rate > 0;
+  // of the rate of a place that opens, the load takes back a share
+  store3(&to.compliance[3 * size_t{r}], {opens ? kOpens * offset_ * wn / (planned_ * kOpenUpTo) : row.soft,
+                                         opens ? row.rate : std::numeric_limits<double>::max(), 0});
+  if (!(wn > 0)) row.impulse = 0;
+  if (!(wt > 0 && row.impulse > 0)) row.along[0] = row.along[1] = 0;
+}
+
+void ToolTouch::fill_row(Row &row, ContactRows &to, uint32_t r) const {
   const auto at = [&](const Side &side) { return velocity_at(first_of(side), side.arm); };
   const Vec3 without = at(row.a) - at(row.b);
   store3(&to.drive[3 * size_t{r}],
          {-(dot(row.normal, without) + row.lift), -dot(row.tangent[0], without + row.bend),
           -dot(row.tangent[1], without + row.bend)});
   if (row.pair->frees) set_arcs(row, to, r);
+  set_responses(row, to, r);
   store3(&to.impulse[3 * size_t{r}], {row.impulse, row.along[0], row.along[1]});
   to.rate[r] = -row.rate;
-  to.wn[r] = 1 / row.inverse;
-  to.wt[r] = row.response;
-  for (size_t k = 0; k < 2; ++k) to.cross[2 * size_t{r} + k] = dot(row.tangent[k], row.pressed);
-  const bool opens = row.opens > 0;
-  store3(&to.compliance[3 * size_t{r}],
-         {opens ? row.opens : row.soft, opens ? row.rate : std::numeric_limits<double>::max(), 0});
 }
 
-void ToolTouch::put(ContactRows &to, ContactState &state) const {
+void ToolTouch::put(ContactRows &to, ContactState &state) {
   if (rows_.empty()) return;
   if (std::any_of(rows_.begin(), rows_.end(), [](const Row &row) { return row.pair->frees; }))
     for (Array<double> *arc : {&to.arc, &to.arc_a}) arc->assign(9 * size_t{to.all()}, 0.0);

@@ -65,16 +65,28 @@ void ToolTouch::take_last(const World &w, const StepContext &step) {
 
 // `now` is that without soft bodies.
 void ToolTouch::add_rows_to_velocities(const StepContext &step) {
-  for (Moved &m : sides_)
+  for (Moved &m : sides_) {
     for (size_t k = 0; k < m.now.size(); ++k) m.now[k] = m.free[k] + m.turn[k];
-  for (const Row &row : rows_)
-    for (const Side *side : {&row.a, &row.b}) {
-      Moved &m = sides_[side->tool];
-      const Vec3 p = side == &row.a ? row.given() : -row.given();
-      if (const RigidPlace place = place_of(*side); place.group != kNone)
-        for (const RigidMember &member : members(step, place.group))
-          add_response(*side, p, member.body, &m.now[6 * size_t{member.body}]);
+    if (m.set) std::fill(m.set->impulse.begin(), m.set->impulse.end(), 0.0);
+  }
+  add_impulses();
+  for (Moved &m : sides_) {
+    for (const Moved::Jaw &jaw : m.jaws) {
+      const double *const p = &m.set->impulse[6 * size_t{jaw.part}];
+      const double rate = jaw.softness * (dot(jaw.lever, load3(p)) + dot(jaw.axis, load3(p + 3)));
+      add3(&m.now[6 * size_t{jaw.part}], rate * jaw.lever);
+      add3(&m.now[6 * size_t{jaw.part} + 3], rate * jaw.axis);
     }
+    for (uint32_t g = 0; m.responds && g < m.set->ngroup; ++g) {
+      if (m.first[g] == kNone) continue;
+      const auto bodies = members(step, m.set->first_group + g);
+      for (size_t r = 0; r < m.wide[g]; ++r)
+        for (size_t c = 0; c < m.wide[g]; ++c)
+          m.now[6 * size_t{bodies[r / 6].body} + r % 6] +=
+              m.response[m.first[g] + r * m.wide[g] + c] *
+              m.set->impulse[6 * size_t{bodies[c / 6].body} + c % 6];
+    }
+  }
 }
 
 // Impulses of rows that contradict each other may be large while what they do cancels, and an impact repeats

@@ -10,13 +10,11 @@
 namespace dfm {
 namespace {
 
-constexpr double kSame = 1e-9;  // relative: squared distances that differ by less are equal
-// Component of a normal; with a smaller one it counts as on the border of the cone of an edge. So a rod along
-// a face touches both borders of the face, also if it is not quite parallel to it.
-constexpr double kAlong = 1e-3;
-constexpr double kFlat = 1e-6;  // rad: faces that differ by less have no edge between them
-constexpr double kSharp = 0.1;  // sine: by more, all edges of a sharp corner fall from its mean normal
-constexpr double kSteep = 0.1;  // component of a normal; with a smaller one a plane bounds no axis
+constexpr double kSame = 1e-9;   // relative: squared distances that differ by less are equal
+constexpr double kFlat = 1e-6;   // rad: faces that differ by less have no edge between them
+constexpr double kSharp = 0.1;   // sine: by more, all edges of a sharp corner fall from its mean normal
+constexpr double kCross = 1e-6;  // sine between edges that have a normal
+constexpr double kSteep = 0.1;   // component of a normal; with a smaller one a plane bounds no axis
 
 Vec3 least(Vec3 a, Vec3 b) { return {std::min(a.x, b.x), std::min(a.y, b.y), std::min(a.z, b.z)}; }
 Vec3 most(Vec3 a, Vec3 b) { return {std::max(a.x, b.x), std::max(a.y, b.y), std::max(a.z, b.z)}; }
@@ -28,10 +26,27 @@ bool ToolBox::holds(Vec3 from, Vec3 to) const {
   return a.x <= hi.x && a.y <= hi.y && a.z <= hi.z && b.x >= lo.x && b.y >= lo.y && b.z >= lo.z;
 }
 
-bool ToolShape::Edge::is_outward(Vec3 n) const {
+bool ToolShape::Edge::is_outward(Vec3 n, double turn) const {
   for (int k = 0; k < faces; ++k)
-    if (!(dot(n, beside[k]) < kAlong)) return false;
+    if (!(dot(n, beside[k]) < turn)) return false;
   return true;
+}
+
+bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, double turn, Vec3 &n) {
+  n = cross(p.to - p.from, q.to - q.from);
+  const double sine = norm(n), d = norm(apart);
+  const auto outward = [&](double by) { return q.is_outward(n, by) && p.is_outward(-n, by); };
+  if (p.faces == 0 || q.faces == 0 || !(sine > kCross * norm(p.to - p.from) * norm(q.to - q.from))) {
+    if (!(d > 0)) return false;
+    n = (1 / d) * apart;
+    return outward(turn);
+  }
+  n = (1 / sine) * n;
+  if (outward(kAlong)) return true;
+  n = -n;
+  if (outward(kAlong)) return true;
+  if (dot(n, apart) < 0) n = -n;
+  return outward(turn);
 }
 
 bool ToolShape::takes_part(const ObstacleView &o) { return o.shape != Shape::none; }

@@ -12,6 +12,10 @@ namespace dfm {
 
 struct ObstacleMesh;
 
+// Component of a normal; with a smaller one it counts as on the border of the cone of an edge. So a rod along
+// a face touches both borders of the face, also if it is not quite parallel to it.
+constexpr double kAlong = 1e-3;
+
 // m, from its position to no point of it; not of a plane
 inline double ball_around(const ObstacleView &v) {
   return v.shape == Shape::box ? norm(v.half_size) : v.extent + v.radius + v.half_length;
@@ -31,8 +35,8 @@ class ToolShape {
     uint32_t number = 0;
     uint32_t end[2] = {};  // numbers of the corners
     bool flat = false;     // its faces lie in one plane: what touches it touches them or their border
-    // Whether a motion along n leaves the shape here.
-    bool is_outward(Vec3 n) const;
+    // Whether a motion along n leaves the shape here, or does so once the two have turned by so much.
+    bool is_outward(Vec3 n, double turn) const;
   };
 
   static bool takes_part(const ObstacleView &view);
@@ -58,13 +62,15 @@ class ToolShape {
   };
   const std::vector<Corner> &corners() const { return corners_; }
   const std::vector<Edge> &edges() const { return edges_; }
-  // f(a, b, c), counter-clockwise seen from outside: triangles near the box, or all of a box; none of others.
+  // f(a, b, c), counter-clockwise seen from outside: triangles near the box, or all of a box; the axis of a
+  // round shape, as one that has no area; none of planes and voxels.
   template <class F>
   void each_triangle(F &&f) const {
     for (const uint32_t t : triangles_) {
       const uint32_t *const c = &surface_->tri[3 * size_t{t}];
       f(node(c[0]), node(c[1]), node(c[2]));
     }
+    if (round_ > 0) f(shape_.end(0), shape_.end(1), shape_.end(1));
     if (shape_.view().shape != Shape::box) return;
     for (uint32_t k = 0; k < 3; ++k)
       for (uint32_t side = 0; side < 2; ++side) {
@@ -98,5 +104,11 @@ class ToolShape {
   std::vector<Edge> edges_;
   std::vector<uint32_t> triangles_, near_edges_;
 };
+
+// The normal of two edges, from q to p, if both edges are left along it. It follows from the two directions
+// alone, so it stays the same for edges that have passed each other. apart: from q to p, where they are
+// nearest. turn: rad, by which the two may turn against each other, at least kAlong, which holds for
+// edges that have passed each other.
+bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, double turn, Vec3 &n);
 
 }  // namespace dfm

@@ -1,13 +1,14 @@
-// Free bodies so fast that they could pass through something thin within a sub-step. Rows are made where two
-// things are nearest at the start of the sub-step; things that turn or slide far meet elsewhere. After a
-// solve the paths of corners, edges and centers are tested; if one crosses the other thing, the sub-step is
-// repeated shorter, so that it ends before the crossing and rows are made near it.
+// What goes so far in a sub-step that its rows, made where two things are nearest at the start, may not keep
+// it apart from what it meets: fast things, and what an impulse makes fast. Once the ends of the sub-step are
+// known, the paths of corners and edges are followed by the guard's conservative advancement (ccd/). If they
+// meet the other thing, the sub-step is repeated shorter: it ends before that, and rows are made there.
 #include <algorithm>
 #include <cmath>
 
 #include "body/obstacle_mesh.h"
 #include "ccd/toi_guard_motion.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "geometry/closest.h"
 #include "math/turn.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -20,112 +21,109 @@ namespace dfm {
 namespace {
 
 constexpr double kFar = 0.5;     // of the least thickness: what goes less is kept apart by its rows
-constexpr double kDeep = 2;      // of d_c, by which a corner may end deeper in the other
-constexpr double kCore = 0.5;    // of its radius, that a round thing keeps from the other
-constexpr double kAims = 0.9;    // of the way to where it would cross
+constexpr double kDeep = 2;      // of d_c, by which a sub-step may make a gap smaller than at its start
+constexpr double kMeet = 0.5;    // of d_c: what comes as near has met
+constexpr double kWithin = 0.1;  // of that: it may be found this far above
 constexpr double kMinCut = 0.1;  // of a sub-step, by which it is repeated
 constexpr double kMinSubstep = 1.0 / 4096;  // of a planned sub-step
 
-// The motion of a shape in the sub-step, and the longest path of its points.
+// The motion of a shape in the sub-step.
 struct Way {
   Pose from, to;
-  double most = 0;
+  Way(const Obstacle &o, const ObstacleView &v, double h)
+      : from{v.position, v.rotation},
+        to(is_moved(o) ? shape_pose(o, o.rigid->next[o.rigid_body])
+                       : Pose{v.position + h * v.velocity, turned(v.rotation, h * v.spin)}) {}
 };
 
-// In the frame of the other shape, which stays where it is at the start.
-Vec3 end_seen(const Way &own, const Way &other, Vec3 p) {
-  const Vec3 at =
-      own.to.position + rotate(own.to.rotation, rotate_back(own.from.rotation, p - own.from.position));
-  return other.from.position +
-         rotate(other.from.rotation, rotate_back(other.to.rotation, at - other.to.position));
+// rad; a sphere does not look turned
+double turn_of(const Way &way, const ObstacleView &v) {
+  return v.shape == Shape::sphere ? 0 : norm(rotation_vector(way.to.rotation * conjugate(way.from.rotation)));
 }
 
-// The fraction of the path from p to q at which it passes through the triangle; above 1: it does not.
-double crossing(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c, bool both_ways) {
-  const Vec3 n = cross(b - a, c - a);
-  const double from = dot(n, p - a), to = dot(n, q - a);
-  if (!(from > 0 && to < 0) && !(both_ways && from < 0 && to > 0)) return HUGE_VAL;
-  const double t = from / (from - to), least = -1e-9 * norm2(n);
-  const Vec3 at = p + t * (q - p);
-  for (const auto &[x, y] : {std::pair(a, b), std::pair(b, c), std::pair(c, a)})
-    if (dot(n, cross(y - x, at - x)) < least) return HUGE_VAL;
-  return t;
+// m, the longest path of its points
+double longest(const Way &way, const ObstacleView &v, double turn) {
+  return norm(way.to.position - way.from.position) +
+         (turn > 0 && v.shape != Shape::plane ? turn * ball_around(v) : 0);
 }
 
-// The smallest fraction of its path at which something of `own` passes through the surface of `other`.
-double faces_crossed(const ToolShape &own, const Way &way, const ToolShape &other, const Way &still,
-                     double deep, double thin) {
+// How two things move against each other: as seen from the second one, which stays where it is at the start.
+struct Sight {
+  const ToolShape &own, &other;
+  const Way &way, &still;
+  double offset, thin;
+
+  Vec3 end(Vec3 p) const {
+    const Vec3 at =
+        way.to.position + rotate(way.to.rotation, rotate_back(way.from.rotation, p - way.from.position));
+    return still.from.position +
+           rotate(still.from.rotation, rotate_back(still.to.rotation, at - still.to.position));
+  }
+  // By how much features that start with this gap are moved apart, so that it may become smaller by kDeep.
+  double lift(double gap) const { return std::max(0.0, (kDeep + kMeet) * offset - gap); }
+  double met(const narrow::PairMotion &m) const {
+    const double near = std::min(kMeet * offset, narrow::kShare * m.distance(0));
+    return near > 0 ? m.touch(near, kWithin * near).t : HUGE_VAL;
+  }
+  double corners() const;
+  double edges() const;
+};
+
+void put(dfm_motion &m, Vec3 from, Vec3 to) {
+  store3(m.p0, from);
+  store3(m.p1, to);
+}
+
+// The smallest fraction of the motion after which a corner meets the other shape; above 1: none does.
+double Sight::corners() const {
   double first = HUGE_VAL;
+  narrow::PairMotion m;
+  m.edges = false;
+  m.round = own.round() + other.round();
   for (const ToolShape::Corner &corner : own.corners()) {
-    const Vec3 p = corner.at, q = end_seen(way, still, p);
-    narrow::PairMotion m;
-    m.edges = false;
-    store3(m.m[0].p0, p);
-    store3(m.m[0].p1, q);
-    const double core = kCore * own.round();
-    // What is slightly inside already starts at the surface, and may stay as deep.
+    Vec3 p = corner.at, q = end(p);
     ObstaclePoint from, to;
-    Vec3 start = p;
-    double allowed = deep;
-    if (other.closest(p, own.round() + thin, from) && from.distance > -thin) {
-      const double gap = from.distance - own.round();
-      if (core > 0 && other.closest(q, own.round() + thin, to) &&
-          to.distance - own.round() < std::min(gap, 0.0) - deep)
-        first = std::min(first, 0.5);
-      if (!(core > 0) && gap < 0.5 * deep) {
-        start = from.point + 0.5 * deep * from.normal;
-        allowed += std::max(0.0, -gap);
-      }
+    if (other.closest(p, own.round() + thin, from)) {
+      const double gap = from.distance - own.round(), most = std::max(gap, 0.0) + kDeep * offset;
+      if (other.closest(q, own.round() + thin, to) && from.distance - to.distance > most)
+        first = std::min(first, most / (from.distance - to.distance));
+      const Vec3 apart = lift(gap) * from.normal;
+      p += apart;
+      q += apart;
     }
+    put(m.m[0], p, q);
     other.each_triangle([&](Vec3 a, Vec3 b, Vec3 c) {
-      if (!(core > 0)) {
-        const Vec3 n = cross(b - a, c - a);
-        if (dot(n, q - a) < -allowed * norm(n)) first = std::min(first, crossing(start, q, a, b, c, false));
-        return;
-      }
-      for (const auto &[k, x] : {std::pair(1, a), std::pair(2, b), std::pair(3, c)}) {
-        store3(m.m[k].p0, x);
-        store3(m.m[k].p1, x);
-      }
-      if (m.far_apart(core) || !(m.distance(0) > core)) return;
-      first = std::min(first, m.touch(core, 0.1 * core).t);
+      if (!other.round() && !(dot(cross(b - a, c - a), p - a) > 0)) return;
+      put(m.m[1], a, a);
+      put(m.m[2], b, b);
+      put(m.m[3], c, c);
+      if (!m.far_apart(kMeet * offset)) first = std::min(first, met(m));
     });
   }
   return first;
 }
 
-double edges_crossed(const ToolShape &own, const Way &way, const ToolShape &other, const Way &still,
-                     double deep) {
+double Sight::edges() const {
   double first = HUGE_VAL;
-  const double core = kCore * (own.round() + other.round());
+  narrow::PairMotion m;
+  m.edges = true;
+  m.round = own.round() + other.round();
   for (const ToolShape::Edge &e : own.edges()) {
-    Vec3 p = end_seen(way, still, e.from), q = end_seen(way, still, e.to);
-    narrow::PairMotion m;
-    m.edges = true;
-    for (const auto &[k, from, to] : {std::tuple(0, e.from, p), std::tuple(1, e.to, q)}) {
-      store3(m.m[k].p0, from);
-      store3(m.m[k].p1, to);
-    }
-    const auto shorter = [&](Vec3 from, Vec3 to) {
-      const double length = norm(to - from);
-      return length > deep ? to - (deep / length) * (to - from) : from;
-    };
-    p = shorter(e.from, p);
-    q = shorter(e.to, q);
+    const Vec3 p = end(e.from), q = end(e.to);
     for (const ToolShape::Edge &f : other.edges()) {
-      store3(m.m[2].p0, f.from);
-      store3(m.m[2].p1, f.from);
-      store3(m.m[3].p0, f.to);
-      store3(m.m[3].p1, f.to);
-      if (m.far_apart(core)) continue;
-      if (core > 0) {
-        if (m.distance(0) > core) first = std::min(first, m.touch(core, 0.1 * core).t);
-        continue;
+      put(m.m[0], e.from, p);
+      put(m.m[1], e.to, q);
+      put(m.m[2], f.from, f.from);
+      put(m.m[3], f.to, f.to);
+      if (m.far_apart(kMeet * offset)) continue;
+      const SegmentPoints near = closest_segments(e.from, e.to, f.from, f.to);
+      const Vec3 on_e = e.from + near.s * (e.to - e.from), on_f = f.from + near.t * (f.to - f.from);
+      if (Vec3 n; between(e, f, on_e - on_f, kAlong, n)) {
+        const Vec3 apart = lift(dot(n, on_e - on_f) - m.round) * n;
+        put(m.m[0], e.from + apart, p + apart);
+        put(m.m[1], e.to + apart, q + apart);
       }
-      // the surface that the edge sweeps, as two triangles
-      const bool met = crossing(f.from, f.to, e.from, e.to, q, true) <= 1 ||
-                       crossing(f.from, f.to, e.from, q, p, true) <= 1;
-      if (met) first = std::min(first, 0.5);
+      first = std::min(first, met(m));
     }
   }
   return first;
@@ -153,48 +151,45 @@ double ToolTouch::thickness(const Obstacle &o) {
   return d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE ? 2 * d.radius : HUGE_VAL;
 }
 
-bool ToolTouch::stays_out(const World &w, StepContext &step) {
-  if (!(thinnest_ < HUGE_VAL)) return true;
-  const auto way_of = [&](const Obstacle &o) {
-    const ObstacleView &v = step.obstacle_views[o.slot];
-    Way out;
-    out.from = {v.position, v.rotation};
-    out.to = is_moved(o) ? shape_pose(o, o.rigid->next[o.rigid_body])
-                         : Pose{v.position + step.h * v.velocity, turned(v.rotation, step.h * v.spin)};
-    const double turn = norm(rotation_vector(out.to.rotation * conjugate(out.from.rotation)));
-    out.most = norm(out.to.position - out.from.position);
-    if (turn > 0 && v.shape != Shape::plane && v.shape != Shape::sphere) out.most += turn * ball_around(v);
-    return out;
+// Whether the two go further, or turn by more, than their rows keep them apart. Rows hold to first order;
+// what turning adds is at most the way times the angle.
+bool ToolTouch::goes_far(const Pair &pair) const {
+  const double way = ways_[pair.a] + ways_[pair.b], turn = turns_[pair.a] + turns_[pair.b];
+  return way > std::min(kFar * pair.thin, pair.reach) || turn > pair.turn || way * turn > pair.dent;
+}
+
+// The fraction of the sub-step after which the two meet; above 1: they do not.
+double ToolTouch::meeting(const World &w, const StepContext &step, const Pair &pair, ToolShape &a,
+                          ToolShape &b) const {
+  if (!cull_facing(a, b, ways_[pair.a] + ways_[pair.b] + offset_, true)) return HUGE_VAL;
+  const auto way_of = [&](uint32_t i) {
+    return Way(*w.obstacles[i], step.obstacle_views[w.obstacles[i]->slot], step.h);
   };
-  ways_.resize(w.obstacles.size());
-  double most = 0;
-  for (size_t i = 0; i < ways_.size(); ++i) {
-    const Obstacle &o = *w.obstacles[i];
-    const ObstacleView &v = step.obstacle_views[o.slot];
-    const bool goes = is_moved(o) || v.moves();
-    ways_[i] = goes && ToolShape::takes_part(v) ? way_of(o).most : 0;
-    most = std::max(most, ways_[i]);
+  const Way at_a = way_of(pair.a), at_b = way_of(pair.b);
+  const Sight from_b{a, b, at_a, at_b, offset_, pair.thin}, from_a{b, a, at_b, at_a, offset_, pair.thin};
+  return std::min({from_b.corners(), from_a.corners(), from_b.edges()});
+}
+
+bool ToolTouch::stays_out(World &w, StepContext &step) {
+  if (sets_.empty()) return true;
+  ways_.clear();
+  turns_.clear();
+  for (const auto &o : w.obstacles) {
+    const ObstacleView &v = step.obstacle_views[o->slot];
+    const Way way(*o, v, step.h);
+    const bool moves = is_moved(*o) || v.moves();
+    turns_.push_back(moves ? turn_of(way, v) : 0);
+    ways_.push_back(moves ? longest(way, v, turns_.back()) : 0);
   }
-  if (!(2 * most > kFar * thinnest_)) return true;
   double first = HUGE_VAL;
-  for (const Pair &pair : pairs_) {
-    const double far = ways_[pair.a] + ways_[pair.b];
-    if (!pair.frees || !(far > kFar * pair.thin)) continue;
-    const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
-    const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
-    if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
-    shapes_[0].take(va, a.mesh.get());
-    shapes_[1].take(vb, b.mesh.get());
-    ToolShape &of_a = shapes_[0], &of_b = shapes_[1];
-    if (of_a.endless() || of_b.endless() || !of_a.has_corners() || !of_b.has_corners()) continue;
-    const Way at_a = way_of(a), at_b = way_of(b);
-    if (!cull_facing(of_a, of_b, far + offset_, true)) continue;
-    const double deep = kDeep * offset_;
-    first = std::min({first, faces_crossed(of_a, at_a, of_b, at_b, deep, pair.thin),
-                      faces_crossed(of_b, at_b, of_a, at_a, deep, pair.thin),
-                      edges_crossed(of_a, at_a, of_b, at_b, deep)});
+  if (std::ranges::any_of(pairs_, [&](const Pair &pair) { return !pair.jaw && goes_far(pair); }))
+    each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side, Side) {
+      if (!pair.jaw && goes_far(pair)) first = std::min(first, meeting(w, step, pair, a, b));
+    });
+  if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) {
+    warn_driven(w, step);
+    return true;
   }
-  if (!(first <= 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step)) return true;
   step.length.repeat_grown(std::max(kMinCut, kAims * first));
   return false;
 }

@@ -21,12 +21,8 @@ namespace dfm {
 namespace {
 
 constexpr double kDone = 1e-2;             // of what slips may be off by at rest: less changes nothing
-constexpr double kOpenUpTo = 1;            // m/s: what a load could change that keeps a place from opening
-constexpr double kFace = 1e5;              // N/m, of a place on the face of a jaw
 constexpr double kDent = 5e-4;             // m, Pair::dent, of what is not thin
-constexpr double kCross = 1e-6;            // sine between edges that have a normal
 constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
-constexpr double kAims = 0.9;              // of kArc, where a sub-step is repeated
 constexpr double kMinSubstep = 1.0 / 256;  // of a planned sub-step
 constexpr double kNear = 0.5;    // of the least thickness: no row with an impulse is longer, no dent deeper
 constexpr double kFaster = 0.5;  // of the change by the pass before: else passes end
@@ -57,22 +53,6 @@ bool kept_apart(const Obstacle &a, const Obstacle &b) {
 bool without_corners(const Obstacle &o) { return o.def.shape == DFM_SHAPE_PLANE || o.grid; }
 
 PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
-
-// The normal of two edges, from q to p, if both edges are left along it. It follows from the two directions
-// alone, so it stays the same for edges that have passed each other.
-bool between(const ToolShape::Edge &p, const ToolShape::Edge &q, Vec3 apart, Vec3 &n) {
-  n = cross(p.to - p.from, q.to - q.from);
-  const double sine = norm(n), d = norm(apart);
-  if (p.faces == 0 || q.faces == 0 || !(sine > kCross * norm(p.to - p.from) * norm(q.to - q.from))) {
-    if (!(d > 0)) return false;
-    n = (1 / d) * apart;
-    return q.is_outward(n) && p.is_outward(-n);
-  }
-  n = (1 / sine) * n;
-  if (q.is_outward(n) && p.is_outward(-n)) return true;
-  n = -n;
-  return q.is_outward(n) && p.is_outward(-n);
-}
 
 // Of the rotation vectors that end in the same attitude, whole turns apart, the one nearest to `like`: a ball
 // that rolls fast turns more than once in a sub-step.
@@ -105,7 +85,6 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
   passing_.clear();
   rows_.clear();  // of bodies that may be gone
   sides_.clear();
-  thinnest_ = HUGE_VAL;
   sets_.clear();
   alone_.clear();
   walls_.clear();
@@ -135,7 +114,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
         touch = rule->collide;
       if (!touch || belong_together(w, a, b)) continue;
       if (!apart) {
-        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0, 0});
+        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0, 0, 0, 0});
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
@@ -146,8 +125,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       const bool frees = !of_tool(a) && !of_tool(b), jaw = is_jaw(a) || is_jaw(b);
       facts.rigid_pairs += frees;
       const uint32_t wall_a = wall(i), wall_b = wall(j);
-      const auto thick = [&](const Obstacle &o) { return frees || of_tool(o) ? thickness(o) : HUGE_VAL; };
-      const double least = std::min(thick(a), thick(b));
+      const double thin = std::min(thickness(a), thickness(b));
       pairs_.push_back({i,
                         j,
                         law_of_obstacles(w, a, b),
@@ -156,9 +134,10 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
                         jaw,
                         b_first(a, b),
                         {wall_a, wall_b},
-                        frees ? least : HUGE_VAL,
-                        std::min(kDent, kNear * least)});
-      thinnest_ = std::min(thinnest_, pairs_.back().thin);
+                        thin,
+                        std::min(kDent, kNear * thin),
+                        HUGE_VAL,
+                        HUGE_VAL});
     }
   facts.rigid_rows = !pairs_.empty();
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
@@ -178,37 +157,6 @@ Vec3 ToolTouch::speed(const Row &row, const std::vector<double> Moved::*of) cons
 }
 
 bool ToolTouch::Moved::gives(const Obstacle &to) const { return responds || (to.rigid && !jaws.empty()); }
-
-// Adds to v, m/s and rad/s [6] of a body, what an impulse on a side of the same set changes.
-void ToolTouch::add_response(const Side &by, Vec3 impulse, uint32_t body, double *v) const {
-  const Moved &m = sides_[by.tool];
-  const Vec3 moment = cross(by.arm, impulse);
-  if (responds(by) && m.set->group[body] == m.set->group[by.part]) {
-    const double p[6] = {impulse.x, impulse.y, impulse.z, moment.x, moment.y, moment.z};
-    const size_t g = m.set->group[body], wide = m.wide[g];
-    const double *const to_body =
-        &m.response[m.first[g] + 6 * (m.set->place[body] * wide + m.set->place[by.part])];
-    for (size_t r = 0; r < 6; ++r)
-      for (size_t c = 0; c < 6; ++c) v[r] += to_body[r * wide + c] * p[c];
-  }
-  for (const Moved::Jaw &jaw : m.jaws) {
-    if (jaw.part != by.part || body != by.part) continue;
-    const double rate = jaw.softness * (dot(jaw.lever, impulse) + dot(jaw.axis, moment));
-    add3(v, rate * jaw.lever);
-    add3(v + 3, rate * jaw.axis);
-  }
-}
-
-// The relative velocity that an impulse on a, and its opposite on b, makes.
-Vec3 ToolTouch::response_to(const Row &row, Vec3 impulse) const {
-  const auto at = [&](const Side &side) {
-    double v[6] = {};
-    for (const Side *by : {&row.a, &row.b})
-      if (by->tool == side.tool) add_response(*by, by == &row.a ? impulse : -impulse, side.part, v);
-    return velocity_at(v, side.arm);
-  };
-  return at(row.a) - at(row.b);
-}
 
 Vec3 ToolTouch::center(const Side &side) const {
   const Moved &m = sides_[side.tool];
@@ -310,28 +258,11 @@ Vec3 ToolTouch::belt(const Side &side) const {
   return m.set ? Vec3{} : m.belt[side.part];
 }
 
-double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) {
-  Moved &m = sides_[side.tool];
-  const double *const v = &m.seen[6 * size_t{side.part}];
+double ToolTouch::fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const {
+  const double *const v = &sides_[side.tool].free[6 * size_t{side.part}];
   const double arm = shape.endless() ? norm(other.position() - center(side)) + other.reach()
                                      : norm(shape.position() - center(side)) + shape.reach();
-  m.arm[side.part] = std::max(m.arm[side.part], arm);
   return norm(load3(v)) + norm(load3(v + 3)) * arm;
-}
-
-// Whether impulses have made a body so fast that it may meet what no row looks at. Rows are then to be found
-// by its new velocity.
-bool ToolTouch::outruns_rows() {
-  bool any = false;
-  for (Moved &m : sides_)
-    for (size_t i = 0; m.set && i < m.arm.size(); ++i) {
-      const double *const now = &m.now[6 * i];
-      const auto speed_of = [&](const double *v) { return norm(load3(v)) + norm(load3(v + 3)) * m.arm[i]; };
-      if (!(m.arm[i] > 0) || speed_of(now) <= kReach * speed_of(&m.seen[6 * i]) + offset_ / h_) continue;
-      std::copy_n(now, 6, &m.seen[6 * i]);
-      any = true;
-    }
-  return any;
 }
 
 void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal,
@@ -350,35 +281,12 @@ void ToolTouch::add_row(const Pair &pair, Name name, Side a, Side b, const Place
   row.far = gap > kNear * pair.thin;
   row.normal = normal;
   row.key = key_of(pair.id, name);
-  if (pair.jaw) {
-    row.soft = 1 / (h_ * h_ * kFace);
-    row.rate = (offset_ - gap) / h_;
-  } else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
+  if (pair.jaw) row.rate = (offset_ - gap) / h_;
+  else if (gap >= offset_) row.rate = -(gap - offset_) / h_;
   else if (gap < 0.5 * offset_) row.rate = std::min(0.5 * offset_ - gap, kOpens * offset_) / planned_;
   row.tangent[0] = any_tangent(normal);
   row.tangent[1] = cross(normal, row.tangent[0]);
-  set_responses(row);
-  if (!(row.inverse > 0)) return;  // neither yields
   rows_.push_back(row);
-}
-
-// How the two sides yield along the normal (inverse 0: they do not) and in the tangent plane.
-void ToolTouch::set_responses(Row &row) {
-  const Vec3 pressed = response_to(row, row.normal);
-  const double w = dot(row.normal, pressed);
-  const bool held = !(w > rounding_of(row, row.normal));
-  row.inverse = row.response = 0;
-  row.pressed = pressed;
-  if (!row.pair->jaw) row.soft = held && motor_holds(row) ? softness_of_motor(row) : 0;
-  if (held && !(row.soft > 0)) return;
-  row.inverse = 1 / (w + row.soft);
-  if (held) return;
-  if (row.pair->frees && row.rate > 0) row.opens = kOpens * offset_ / (planned_ * kOpenUpTo * row.inverse);
-  const Vec3 first = response_to(row, row.tangent[0]), second = response_to(row, row.tangent[1]);
-  const double p = dot(row.tangent[0], first), q = dot(row.tangent[1], second),
-               both = dot(row.tangent[0], second);
-  row.response = 0.5 * (p + q) + std::sqrt(0.25 * (p - q) * (p - q) + both * both);
-  if (!(row.response > rounding_of(row, row.tangent[0]))) row.response = 0;
 }
 
 // Finds the features of each shape that are this near to the box of the other. Returns false if there are
@@ -404,8 +312,12 @@ bool ToolTouch::cull_facing(ToolShape &a, ToolShape &b, double far, bool flat) {
 
 // Adds rows of the corners of each against the other, and of edges that cross. Returns m, the depth of the
 // deepest corner; 0: none is inside.
-double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-  const double reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
+double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+  const double reach = pair.reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
+  const auto turns = [&](const Side &side) {
+    return h_ * norm(load3(&sides_[side.tool].free[6 * size_t{side.part} + 3]));
+  };
+  pair.turn = kAlong + kReach * (turns(at_a) + turns(at_b));
   const double far = reach + offset_;
   if (!cull_facing(a, b, far, pair.jaw)) return 0;
   for (const Side *side : {&at_a, &at_b}) take_response(*side);
@@ -438,7 +350,7 @@ double ToolTouch::add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at
       if (!(near_by.s > 0 && near_by.s < 1 && near_by.t > 0 && near_by.t < 1)) continue;
       const Vec3 on_a = p.from + near_by.s * (p.to - p.from), on_b = q.from + near_by.t * (q.to - q.from);
       Vec3 n;
-      if (!between(p, q, on_a - on_b, n)) continue;
+      if (!between(p, q, on_a - on_b, pair.turn, n)) continue;
       const double gap = dot(n, on_a - on_b) - round;
       if (gap < -(round > 0 ? kDent : pair.dent)) continue;
       add_row(pair, {kEdges, p.number, q.number}, at_a, at_b,
@@ -461,7 +373,7 @@ ToolTouch::Side ToolTouch::side_of(const Obstacle &o, uint32_t wall) const {
 
 // Calls f(pair, the two shapes, their sides) for all pairs that may touch and of which one yields.
 void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &f) {
-  for (const Pair &pair : pairs_) {
+  for (Pair &pair : pairs_) {
     const Obstacle &a = *w.obstacles[pair.a], &b = *w.obstacles[pair.b];
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
@@ -474,7 +386,7 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
 }
 
 void ToolTouch::find(const World &w, const StepContext &step) {
-  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+  each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
     const double deep = add_rows(pair, a, b, at_a, at_b);
     if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
   });
@@ -511,7 +423,6 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     m.free.assign(6 * n, 0.0);
     m.turn.assign(6 * n, 0.0);
     m.reach.assign(n, 0.0);
-    m.arm.assign(n, 0.0);
     m.touched = m.responds = m.drives = false;
     m.jaws.clear();
     m.response.clear();
@@ -526,7 +437,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
         store3(&m.free[6 * i], v.velocity);
         store3(&m.free[6 * i + 3], v.spin);
       }
-      m.now = m.seen = m.free;
+      m.now = m.free;
       continue;
     }
     RigidSet &set = *m.set;
@@ -546,7 +457,7 @@ void ToolTouch::take_sets(World &w, StepContext &step) {
     for (const auto &t : w.tools)
       if (t->set == m.set && t->has_jaws()) list_jaws(m, static_cast<uint32_t>(step.rigid_groups.size()));
     if (m.responds) straighten(m);
-    m.now = m.seen = m.free;
+    m.now = m.free;
   }
 }
 
@@ -592,11 +503,9 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   h_ = step.h;
   planned_ = step.length.planned;
   strong_ = 1;
-  hits_found_ = 0;
   take_sets(w, step);
-  warn_driven(w, step);
   find(w, step);
-  if (rows_.empty() && !add_hits(w, step)) return true;
+  if (rows_.empty()) return true;
   if (!follows_arcs(w, step)) return false;
   for (Moved &m : sides_)
     if (!m.responds) straighten(m);  // jaws that move alone turn by what is rigid only
@@ -613,7 +522,6 @@ void ToolTouch::correct() {
     if (m.responds || !rows_.empty()) straighten(m);
     if (m.drives) request_again(m);
   }
-  renew_rows();
 }
 
 }  // namespace dfm

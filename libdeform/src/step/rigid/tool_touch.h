@@ -22,7 +22,7 @@
 //            does
 //   joints   bodies that joints connect are one group, whose response contains the joints (tool_joints.cpp)
 //   order    The rows are part of the one contact problem of a sub-step (step/solve/solve.cpp). What turning
-//            adds, motors and hits depend on its solution: follow() updates them, and the solve goes on
+//            adds and motors depend on its solution: follow() updates them, and the solve goes on
 #pragma once
 #include <array>
 #include <cstdint>
@@ -70,7 +70,7 @@ class ToolTouch {
   // m/s, rad/s [6] of a body without contact, with what turning adds. alone: of a jaw that moves alone.
   // False: it follows its poses, with what rigid things do to its jaws, or nothing of its set is known here.
   bool free_velocity(const RigidSet &set, uint32_t body, bool alone, double *out) const;
-  void put(ContactRows &to, ContactState &state) const;
+  void put(ContactRows &to, ContactState &state);
   // Called after the hosts have predicted their velocities again.
   void correct();
   // Takes impulses and velocities of a solve. left: m/s along normals, that it has left.
@@ -80,15 +80,13 @@ class ToolTouch {
   bool press_harder();              // where motors hold; false: as hard as they can
   // Updates what turning adds, from the present solution. Returns whether the solve must go on.
   bool follow(World &w, StepContext &step);
-  // Looks for what meets by the present solution without a row. Returns whether there are new rows.
-  bool finds_more(World &w, StepContext &step);
   // Called once the rows are final: what the world is to keep of them.
   void list(const World &w, const StepContext &step);
   // Whether the sub-step is short enough for the spin of what touches. False: as for begin().
   bool follows_arcs(const World &w, StepContext &step) const;
-  // Called after the hosts have ended their sub-step: whether no fast free body has passed through something.
-  // False: as for begin().
-  bool stays_out(const World &w, StepContext &step);
+  // Called after the hosts have ended their sub-step: whether nothing that yields has met on its way what its
+  // rows do not keep it apart from. False: as for begin().
+  bool stays_out(World &w, StepContext &step);
   // Turns the ends of the jaws.
   void turn_jaws();
   // Called at the end of an accepted sub-step: moves what lasts to the world.
@@ -111,11 +109,12 @@ class ToolTouch {
   struct Pair {
     uint32_t a, b, law;
     uint64_t id[2];
-    bool frees, jaw;   // none is of a tool; one is a jaw
-    bool b_first;      // reports have b first
-    uint32_t wall[2];  // number among walls_; kNone: it is in a set
-    double thin;       // m, least thickness of the two
-    double dent;       // m: edges that are further on the wrong side do not touch there
+    bool frees, jaw;     // none is of a tool; one is a jaw
+    bool b_first;        // reports have b first
+    uint32_t wall[2];    // number among walls_; kNone: it is in a set
+    double thin;         // m, least thickness of the two
+    double dent;         // m: edges that are further on the wrong side do not touch there
+    double reach, turn;  // m, rad: how far its rows of this sub-step keep the two apart
   };
   struct Row {
     const Pair *pair;
@@ -123,11 +122,7 @@ class ToolTouch {
     uint64_t key;              // lasting name
     Vec3 normal, tangent[2];   // from b to a
     double rate;               // m/s, that u_n must reach
-    double soft;               // 1/kg, of the face of a jaw
-    double opens;              // 1/kg: of the rate, if above zero, the load takes back min(opens p, rate)
-    double inverse;            // kg
-    double response;           // 1/kg, the largest one in the tangent plane; 0: does not rub
-    Vec3 pressed;              // 1/kg, the change of velocity by a unit impulse along the normal
+    double soft;               // 1/kg, of the face of a jaw, or of a motor that holds
     double impulse, along[2];  // N s on a: along the normal and the tangents
     Vec3 bend;                 // m/s, what turning adds to the slip beyond the first order, and belts
     bool far;                  // the gap is large beside the thickness of the two
@@ -146,8 +141,6 @@ class ToolTouch {
     std::vector<double> free, now;    // [6n] m/s, rad/s: without contact, at the present impulses
     std::vector<double> turn;         // [6n] what impulses change beyond the response
     std::vector<double> reach;        // [n] m, of its rows from its center
-    std::vector<double> seen;         // [6n] m/s, rad/s, by which rows have been found
-    std::vector<double> arm;          // [n] m, of what may touch, from its center
     bool responds;                    // the response is not zero
     bool touched;                     // a row is its own
     bool drives;                      // it has motors
@@ -163,34 +156,23 @@ class ToolTouch {
     bool gives(const Obstacle &to) const;
   };
   // Which features of the two meet.
-  enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges, kHitEdges };
+  enum Meeting : uint32_t { kCornerOfA, kCornerOfB, kEdges };
   struct Name {
     Meeting kind;
     uint32_t first, second;
   };
   // bone_a, bone_b: corners, or points of edges or faces, without the radius around them
   struct Place { Vec3 at, bone_a, bone_b; };
-  struct Hit {
-    const Pair *pair;
-    Name name;
-    Side a, b;
-    Place place;
-    Vec3 normal;
-    double gap;
-  };
   Vec3 speed(const Row &row, const std::vector<double> Moved::*of = &Moved::now) const;
-  void add_response(const Side &by, Vec3 impulse, uint32_t body, double *v) const;
-  Vec3 response_to(const Row &row, Vec3 impulse) const;
   void find(const World &w, const StepContext &step);
-  using Visit = std::function<void(const Pair &, ToolShape &, ToolShape &, Side, Side)>;
+  using Visit = std::function<void(Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f);
   static bool cull_facing(ToolShape &a, ToolShape &b, double far, bool flat);
-  double add_rows(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
+  double add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
   void add_row(const Pair &pair, Name name, Side a, Side b, const Place &place, Vec3 normal, double gap,
                double reach);
   static uint64_t key_of(const uint64_t pair[2], Name name);
-  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other);
-  bool outruns_rows();
+  double fastest(const ToolShape &shape, const Side &side, const ToolShape &other) const;
   Vec3 center(const Side &side) const;
   void list_jaws(Moved &m, uint32_t groups);
   void straighten(Moved &m) const;
@@ -201,7 +183,6 @@ class ToolTouch {
   double follow_arc(Row &row) const;
   Vec3 spin(const Side &side) const;
   Vec3 belt(const Side &side) const;
-  void set_responses(Row &row);
   double follow_spin();
   const Moved *known(const RigidSet &set) const;
   Moved *known(const RigidSet &set) { return const_cast<Moved *>(std::as_const(*this).known(set)); }
@@ -210,7 +191,8 @@ class ToolTouch {
   bool responds(const Side &side) const;
   static void add_jaw(const Moved::Jaw &jaw, double *matrix, size_t wide);
   RigidPlace place_of(const Side &side) const;
-  void fill_row(const Row &row, ContactRows &to, uint32_t r) const;
+  void fill_row(Row &row, ContactRows &to, uint32_t r) const;
+  void set_responses(Row &row, ContactRows &to, uint32_t r) const;
   void set_arcs(const Row &row, ContactRows &to, uint32_t r) const;
   // tool_joints.cpp
   bool belong_together(const World &w, const Obstacle &a, const Obstacle &b);
@@ -223,15 +205,14 @@ class ToolTouch {
   bool motor_holds(const Row &row) const;
   bool is_driven(const Side &side, Vec3 along) const;
   double softness_of_motor(const Row &row) const;
-  void renew_rows();
+  void begin_passes();
   void request_again(Moved &m);
   static void clean_response(Moved &m, uint32_t group);
   // tool_swept.cpp
   static double thickness(const Obstacle &o);
-  // tool_hits.cpp
-  Vec3 end_of(const Side &side, Vec3 p) const;
-  void find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b);
-  bool add_hits(const World &w, const StepContext &step);
+  bool goes_far(const Pair &pair) const;
+  double meeting(const World &w, const StepContext &step, const Pair &pair, ToolShape &a, ToolShape &b) const;
+  // tool_warnings.cpp
   double depth(ToolShape &a, ToolShape &b, bool edges) const;
   void warn_driven(const World &w, const StepContext &step);
   void warn_deep(const World &w, const Pair &pair, double deep, bool driven);
@@ -247,22 +228,21 @@ class ToolTouch {
   Vec3 slip(const Row &row) const;
   void keep_next(const ContactState &state, uint32_t first);
   // tool_report.cpp
-  void list_contact(const World &w, uint32_t row, const ContactState &state, uint32_t first);
-  void list_contacts(const World &w, const ContactState &state, uint32_t first);
+  void list_contact(const World &w, const StepContext &step, uint32_t row);
   void report(World &w) noexcept;
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
   static constexpr double kReach = 2;    // rows look so many times as far as a thing goes
   static constexpr double kOff = 0.2;    // of d_c, that places may be off after a sub-step
+  static constexpr double kAims = 0.9;   // of what is allowed, where a sub-step is repeated
 
   double h_ = 0, offset_ = 0;
-  double planned_ = 0;        // s, the sub-step before it was shortened
-  std::vector<double> ways_;  // [obstacles] m, of any point in the sub-step
-  double off_ = 0;            // m, that places with load or joints may be off after a solve
-  double left_ = 0;           // m/s along normals, that the last solve has left
-  double strong_ = 1;         // of the answer without joints, that places give where a motor holds
-  double thinnest_ = 0;       // m, of the pairs of free bodies
+  double planned_ = 0;                // s, the sub-step before it was shortened
+  std::vector<double> ways_, turns_;  // [obstacles] m, of any point in the sub-step; rad
+  double off_ = 0;                    // m, that places with load or joints may be off after a solve
+  double left_ = 0;                   // m/s along normals, that the last solve has left
+  double strong_ = 1;                 // of the answer without joints, that places give where a motor holds
   std::vector<Pair> pairs_,
       passing_;                   // passing: nothing keeps the two apart, and no filter excludes them
   std::vector<RigidSet *> sets_;  // that take part
@@ -270,14 +250,13 @@ class ToolTouch {
   std::vector<Moved> sides_;      // of this sub-step; kept for their memory, as shapes_ are
   ToolShape shapes_[2];
   std::vector<Row> rows_;
-  std::vector<Hit> hits_;
   std::vector<RigidMember> alone_;  // jaws that move alone, by group behind those of the hosts
   std::vector<RigidSides> places_;
-  std::vector<uint32_t> group_size_;      // bodies by world-wide group; behind them one for each jaw alone
-  uint32_t passes_ = 0, hits_found_ = 0;  // since motors were decided; of this sub-step
-  double changed_ = 0;                    // m/s, by the pass before
-  DisjointSets islands_;                  // of groups that rows connect
-  std::vector<uint32_t> first_group_;     // scratch
+  std::vector<uint32_t> group_size_;   // bodies by world-wide group; behind them one for each jaw alone
+  uint32_t passes_ = 0;                // since motors were decided
+  double changed_ = 0;                 // m/s, by the pass before
+  DisjointSets islands_;               // of groups that rows connect
+  std::vector<uint32_t> first_group_;  // scratch
   // m/s, the largest of places with and without the impulses of the start
   struct StartSpeeds { double with = 0, without = 0; };
   std::vector<StartSpeeds> start_speeds_;          // scratch

@@ -1,10 +1,7 @@
-// Tools so fast that they do not meet where they are nearest at the start of the sub-step. After a solve the
-// guard's time of impact (ccd/) is computed along the straight paths of capsules. A pair that meets becomes a
-// row, linearized at its hit time, and all rows are solved again, at most four times.
+// Warnings of rigid things that are deep in each other, or pass through each other because neither yields.
 #include <algorithm>
 
 #include "body/obstacle_mesh.h"
-#include "ccd/toi_guard_motion.h"
 #include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
@@ -20,9 +17,10 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMaxHits = 4;  // further solves
-constexpr double kSlow = 5e-4;    // m in a sub-step: what moves by less is kept apart by its rows
 constexpr uint32_t kLooks = 16;   // pieces of an edge whose ends are tested
+constexpr double kDeep = 0.02;    // of the smaller one's reach: a smaller depth is not reported
+constexpr uint64_t kSeldom = 16;  // steps between two tests of driven tools against triangles
+
 // Whether the bounding spheres of the two, or that of one and a plane, do not meet.
 bool balls_apart(const ObstacleView &a, const ObstacleView &b) {
   if (a.shape == Shape::plane && b.shape == Shape::plane) return true;
@@ -48,85 +46,12 @@ bool cuts(const World &w, const Obstacle &o) {
                      [&](const auto &t) { return t->set == o.rigid && !t->cuts.bodies.empty(); });
 }
 
-constexpr double kDeep = 0.02;    // of the smaller one's reach: a smaller depth is not reported
-constexpr double kWithin = 0.1;   // of the floor: a hit may be found this far above it
-constexpr uint64_t kSeldom = 16;  // steps between two tests of driven tools against triangles
-
 }  // namespace
 
 // Whether the depth is reported.
 bool ToolTouch::inside(const ToolShape &a, const ToolShape &b, double deep) const {
   const double smaller = std::min(a.endless() ? HUGE_VAL : a.reach(), b.endless() ? HUGE_VAL : b.reach());
   return deep > offset_ + kDeep * smaller;
-}
-
-// The place of p at the end of the sub-step, by the present velocities.
-Vec3 ToolTouch::end_of(const Side &side, Vec3 p) const {
-  const Moved &m = sides_[side.tool];
-  const size_t at = 6 * size_t{side.part};
-  const Vec3 from = center(side), way = load3(&m.now[at]), spin = load3(&m.now[at + 3]);
-  return from + h_ * way + rotate(turned(Quat{}, h_ * spin), p - from);
-}
-
-void ToolTouch::find_hits(const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-  const double far = h_ * (fastest(a, at_a, b) + fastest(b, at_b, a));
-  if (far < kSlow || !cull_facing(a, b, 2 * far + offset_, pair.jaw)) return;
-  const double floor = 0.5 * offset_;
-  narrow::PairMotion m;
-  m.edges = true;
-  m.round = a.round() + b.round();
-  const auto put = [&](size_t k, const Side &side, const ToolShape::Edge &e) {
-    store3(m.m[k].p0, e.from);
-    store3(m.m[k].p1, end_of(side, e.from));
-    store3(m.m[k + 1].p0, e.to);
-    store3(m.m[k + 1].p1, end_of(side, e.to));
-  };
-  const auto place = [&](size_t k, double s, double t) {
-    const auto at = [&](const dfm_motion &x) { return load3(x.p0) + t * (load3(x.p1) - load3(x.p0)); };
-    return at(m.m[k]) + s * (at(m.m[k + 1]) - at(m.m[k]));
-  };
-  for (const ToolShape::Edge &p : a.edges()) {
-    put(0, at_a, p);
-    for (const ToolShape::Edge &q : b.edges()) {
-      put(2, at_b, q);
-      if (m.far_apart(floor) || !(m.distance(0) > floor)) continue;
-      const ToiHit hit = m.touch(floor, kWithin * floor);
-      if (!(hit.t <= 1)) continue;
-      const Vec3 apart = place(0, hit.at[0], hit.t) - place(2, hit.at[1], hit.t);
-      if (!(norm(apart) > 0)) continue;
-      const Vec3 n = normalized(apart), on_a = place(0, hit.at[0], 0), on_b = place(2, hit.at[1], 0);
-      // The normal is that of the hit, so the two may overlap along it now: that must not push them apart,
-      // which would add energy.
-      const double gap = std::max(dot(n, on_a - on_b) - m.round, offset_);
-      hits_.push_back(
-          {&pair, {kHitEdges, p.number, q.number}, at_a, at_b, {0.5 * (on_a + on_b), on_a, on_b}, n, gap});
-    }
-  }
-}
-
-// Pairs that meet on the way become rows, and no row has an impulse yet. Returns false if there are none.
-bool ToolTouch::add_hits(const World &w, const StepContext &step) {
-  hits_.clear();
-  each_pair(w, step, [&](const Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-    if (a.round() > 0 && b.round() > 0) find_hits(pair, a, b, at_a, at_b);
-  });
-  if (hits_.empty()) return false;
-  for (const Hit &hit : hits_) {
-    std::erase_if(rows_, [&](const Row &row) { return row.key == key_of(hit.pair->id, hit.name); });
-    add_row(*hit.pair, hit.name, hit.a, hit.b, hit.place, hit.normal, hit.gap, HUGE_VAL);
-  }
-  return true;
-}
-
-bool ToolTouch::finds_more(World &w, StepContext &step) {
-  if (rows_.empty() || hits_found_ == kMaxHits || is_used_up(step)) return false;
-  if (outruns_rows()) {
-    rows_.clear();
-    find(w, step);
-  } else if (!add_hits(w, step)) return false;
-  take_last(w, step);
-  ++hits_found_;
-  return true;
 }
 
 // m, how deep one reaches into the other now, by its corners and, if `edges`, along its edges; 0: not at all.
@@ -231,9 +156,7 @@ void ToolTouch::warn_driven(const World &w, const StepContext &step) {
     }
     ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
     const double deep = depth(shape_a, shape_b, true);
-    hits_.clear();
-    if (!(deep > offset_)) find_hits(pair, shape_a, shape_b, at_a, at_b);
-    if (!(deep > offset_) && hits_.empty()) continue;
+    if (!(deep > offset_) && !(goes_far(pair) && meeting(w, step, pair, shape_a, shape_b) <= 1)) continue;
     reported_.push_back({pair.id[0], pair.id[1]});
     w.context->logf(DFM_LOG_WARNING,
                     "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly "
