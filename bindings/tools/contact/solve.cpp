@@ -97,7 +97,6 @@ class Solve final : public SolveLaws {
   // share of its largest entry that is added to the diagonal where a run has found no solution: a W that
   // is assembled with errors has negative eigenvalues, and rows may contradict each other by as much.
   void run() {
-    const std::vector<uint32_t> contacts = all_contacts();
     const uint32_t block = 0;
     ContactRows::Motions motions;
     rows_.motions({&block, 1}, motions);
@@ -177,11 +176,6 @@ class Solve final : public SolveLaws {
       for (size_t r = 0; r < W.rows; ++r)
         for (size_t c = 0; c < W.rows; ++c) *to++ = 0.5 * (W(r, c) + W(c, r)) + (r == c ? added * most : 0);
     });
-  }
-  std::vector<uint32_t> all_contacts() const {
-    std::vector<uint32_t> out(n_);
-    for (uint32_t i = 0; i < n_; ++i) out[i] = i;
-    return out;
   }
   // m/s, that the impulse of contact i is off by at velocity u
   double left(uint32_t i, Vec3 u) const {

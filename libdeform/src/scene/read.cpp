@@ -355,6 +355,8 @@ void read_materials(const Node &scene, Definition &def, ReadContext &context) {
           std::any_of(own.begin(), own.end(), [&](const Key &k) { return key == k.name; }))
         continue;
       const Node value = node.member(key);
+      if (key == "damping_mass" || key == "damping_stiffness")
+        value.fail("of a material it is \"damping\": {\"%s\": ..}", key.c_str() + 8);
       m.extra.keys.push_back(key);
       m.extra.values.push_back(key == "friction" || key == "fracture_energy"
                                    ? std::vector<double>{value.number(kNotNegative)}

@@ -89,7 +89,9 @@ void note_rigid_tool(SceneWriter &to, const Tool &t, const ToolValues &v) {
   const Obstacle &first = *to.w.obstacle(t.set->obstacle[0]);
   if (any_part([](const Obstacle &o) { return o.sensor; }))
     to.note("tool '%s': in the scene its parts that are sensors touch", name);
-  if (any_part([&](const Obstacle &o) { return o.material != first.material; }))
+  if (any_part([&](const Obstacle &o) {
+        return o.material != first.material || o.zone.friction != first.zone.friction;
+      }))
     to.note("tool '%s': in the scene all of its parts are of the material of the first", name);
   if (t.device.read) to.note("tool '%s': its device is left out; in the scene the tool stands", name);
   const bool led = !t.keys.empty() || !t.opening_keys.empty();

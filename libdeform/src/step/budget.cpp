@@ -110,7 +110,6 @@ void changing(Stream &s, World &w) {
   s.one(w.time);
   s.one(w.offset);
   s.many(w.overlaps.found);
-  s.one(w.overlaps.reported);
   s.one(w.step_count);
   s.one(w.sleepers);
   for (auto &b : w.bodies) {
@@ -132,7 +131,6 @@ void changing(Stream &s, World &w) {
     s.many(set->state);
     s.many(set->extra);
     s.many(set->total);
-    s.many(set->impulse);
     s.one(set->last_h);
   }
   for (auto *const store : {&w.store, &w.tool_store}) {
@@ -183,6 +181,7 @@ void changed_at_once(Stream &s, World &w) {
   s.one(w.gravity.now);
   s.one(w.watch);
   s.many(w.overlaps.suspended);
+  s.one(w.overlaps.reported);
   s.many(w.step_impulses.pairs);
   s.one(w.step_impulses.start);
   s.one(w.step_impulses.length);
@@ -193,6 +192,7 @@ void changed_at_once(Stream &s, World &w) {
     s.one(b->changes);
     s.one(b->bound);
   }
+  for (auto &set : w.rigid_sets) s.many(set->impulse);
   s.one(w.sizes);
   s.one(w.integrator_times.changes);
   for (auto &t : w.tools) {

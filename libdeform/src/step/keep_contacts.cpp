@@ -58,6 +58,8 @@ void end_contacts(World &w) {
     if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
   each_column([](const ContactColumn &, auto &values) { values.clear(); }, s);
   s.n = w.report.n = 0;
+  w.report.h = 0;
+  for (auto &b : w.bodies) std::fill(b->surfel_impulse.begin(), b->surfel_impulse.end(), 0.0);
   w.stats.contacts = w.stats.sticking = 0;
 }
 

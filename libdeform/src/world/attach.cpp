@@ -152,7 +152,9 @@ uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle 
   for (uint32_t i = 0; i < meant.size(); ++i)
     if (meant[i]) a.surfels.push_back(i);
   if (!other && def.max_distance > 0)
-    fail(DFM_E_ARG, "body '%s': max_distance is for attachments to bodies, and '%s' is an obstacle",
+    fail(DFM_E_ARG,
+         "body '%s': max_distance is for attachments to bodies, and '%s' is an obstacle "
+         "or rigid",
          b.name.c_str(), obstacle->name.c_str());
   if (other) place_on_body(b, def, *other, a);
   else place_on_obstacle(b, *obstacle, a);

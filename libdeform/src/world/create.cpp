@@ -346,7 +346,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {
-  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size());  // the last that may fail
+  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size() + w.rigid_report.touching.size());
   end_idle(w);
   drop_attachments(w, id);
   close_slot(w, id, obstacle);

@@ -257,6 +257,7 @@ void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
   checked(t, pose);
   if (velocity && !all_finite(velocity, 6))
     fail(DFM_E_ARG, "tool '%s': the given velocity is not finite", t.name.c_str());
+  if (t.device.read) return;
   ToolValues v = t.values();
   store_place(v.target, to_pose(pose));
   v.keyed = 0;

@@ -17,10 +17,10 @@ namespace {
 constexpr double kSteep = 10;
 constexpr double kForgiven = 1;  // s
 
-// Of the step that begins: where it leads, by keys or by what was said.
+// Of the step that begins: where it leads, by keys or by what was said; by its device if it has one.
 ToolValues aimed(const Tool &tool, double end) {
   ToolValues v = tool.values();
-  if (v.keyed != 0) store_place(v.target, pose_at(tool.keys, end));
+  if (v.keyed != 0 && !tool.device.read) store_place(v.target, pose_at(tool.keys, end));
   if (v.opening_keyed != 0) v.target_opening = scale_at(tool.opening_keys, end);
   return v;
 }
