@@ -289,6 +289,24 @@ TEST(Overlap, OfFilteredPair_DoesNotCount) {
   dfm_world_destroy(w);
 }
 
+TEST(Overlap, InAStepThatIsInterrupted_IsToldByTheNext) {
+  test::Context c;
+  dfm_world w = test::make_world(c, {});
+  test::add_plane(w, "floor", {0, 0, -0.1});
+  ball(c, w, "a", {}, 0.1, 200);
+  ball(c, w, "b", {0.15, 0, 0}, 0.1, 200);
+  const auto stop = [](void *user, dfm_contact_choice *) {
+    test::ok(dfm_world_interrupt(*static_cast<dfm_world *>(user)));
+  };
+  test::ok(dfm_world_set_pre_solve(w, stop, &w));
+  ASSERT_EQ(dfm_world_step(w, 1e-5, nullptr), DFM_DISCARD);
+  test::ok(dfm_world_set_pre_solve(w, nullptr, nullptr));
+  uint32_t trouble = 0;
+  test::ok(dfm_world_step(w, 1e-5, &trouble));
+  EXPECT_TRUE(trouble & DFM_TROUBLE_OVERLAP);
+  dfm_world_destroy(w);
+}
+
 // What the host has excluded while the pair was set aside remains so when the two are apart.
 TEST(Overlap, OfPairExcludedWhileSetAside_HasNoContactAfterwards) {
   for (const bool by_masks : {false, true}) {

@@ -159,6 +159,7 @@ TEST(SceneErrors, Ranges_AreChecked) {
        {"/materials/gel/poisson=0.5", {"/materials/gel/poisson", "0.5"}},
        {"/materials/gel/density=-1000", {"/materials/gel/density", "above 0"}},
        {"/materials/gel/damping/mass=-1", {"/materials/gel/damping/mass", "at least 0"}},
+       {"/materials/gel/damping_mass=1", {"/materials/gel/damping_mass", "\"damping\": {\"mass\""}},
        {"/bodies/0/pose/scale=0", {"/bodies/0/pose/scale", "above 0"}},
        {"/bodies/0/pose/rotation/axis=[0,0,0]", {"/bodies/0/pose/rotation/axis", "zero"}},
        {"/obstacles/0/normal=[0,0,0]", {"/obstacles/0/normal", "zero"}},

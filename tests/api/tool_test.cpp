@@ -605,16 +605,20 @@ TEST(Tool, ADeviceWithNothingNew_HoldsItsToolAgainstKeysAndHost) {
     d.name = "free";
     d.nkey = 0;
     const dfm_tool free = make(s.w, d);
+    const std::string led = test::snapshot(s.w);  // by its keys
     Device device;
     device.says = DFM_DISCARD;
     const dfm_device table = device.table();
     for (const dfm_tool t : {keyed, free}) test::ok(dfm_tool_set_device(t, &table));
     const dfm_pose aside = pose({0.001, 0, 0.1});
     test::ok(dfm_tool_set_pose(free, &aside, nullptr));
-    for (int i = 0; i < 10; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
-    for (const dfm_tool t : {keyed, free}) {
-      EXPECT_EQ(state(t).pose.position[0], 0) << stiffness;
-      EXPECT_EQ(state(t).device.position[0], 0) << stiffness;
+    for (const bool restored : {false, true}) {
+      if (restored) test::ok(dfm_world_restore(s.w, led.data(), led.size()));
+      for (int i = 0; i < 10; ++i) test::ok(dfm_world_step(s.w, 1e-3, nullptr));
+      for (const dfm_tool t : {keyed, free}) {
+        EXPECT_EQ(state(t).pose.position[0], 0) << stiffness << restored;
+        EXPECT_EQ(state(t).device.position[0], 0) << stiffness << restored;
+      }
     }
   }
 }
