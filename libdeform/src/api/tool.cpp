@@ -59,7 +59,8 @@ dfm_status dfm_tool_parts(dfm_tool tool, uint32_t capacity, dfm_rigid *out, uint
 dfm_status dfm_tool_set_pose(dfm_tool tool, const dfm_pose *pose, const double velocity[6]) {
   return as_status(to_change<tool_of>, tool, [&](Tool &t) {
     need(pose, "pose");
-    set_tool_pose(t, *pose, velocity);
+    if (t.device.read) check_target(t, *pose, velocity);
+    else set_tool_pose(t, *pose, velocity);
   });
 }
 

@@ -253,11 +253,14 @@ void destroy_tool(Tool &t) {
   std::erase_if(w.tools, [&](auto &p) { return p.get() == &t; });
 }
 
-void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
+void check_target(Tool &t, const dfm_pose &pose, const double *velocity) {
   checked(t, pose);
   if (velocity && !all_finite(velocity, 6))
     fail(DFM_E_ARG, "tool '%s': the given velocity is not finite", t.name.c_str());
-  if (t.device.read) return;
+}
+
+void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
+  check_target(t, pose, velocity);
   ToolValues v = t.values();
   store_place(v.target, to_pose(pose));
   v.keyed = 0;

@@ -13,7 +13,9 @@ struct World;
 
 Tool &create_tool(World &w, const dfm_tool_def &def);
 void destroy_tool(Tool &tool);
-void set_tool_pose(Tool &tool, const dfm_pose &pose, const double *velocity);  // velocity: [6] or NULL
+// velocity: [6] or NULL; set_tool_pose() checks them
+void check_target(Tool &tool, const dfm_pose &pose, const double *velocity);
+void set_tool_pose(Tool &tool, const dfm_pose &pose, const double *velocity);
 void set_tool_opening(Tool &tool, double angle);
 void follow_keys(Tool &tool);
 void keys_at(const Tool &tool, double t, dfm_pose &pose, double &opening);
