@@ -1,8 +1,5 @@
 // Time of the forces of second-order tetrahedra and hexahedra per cell, through the plugin ABI, beside the
-// products of their stiffness alone, and bytes per cell. `--csv FILE --commit ID`
-// appends the figures. The least of the repetitions counts: others share the machine.
-#include <time.h>
-
+// products of their stiffness alone, and bytes per cell. `--csv FILE --commit ID` appends the figures.
 #include "cell_meshes.h"
 #include "machine.h"
 #include "model_common/cell_blocks.h"
@@ -10,22 +7,7 @@
 namespace {
 
 using namespace model_test;
-
-double thread_ns() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e9 * double(t.tv_sec) + double(t.tv_nsec);
-}
-template <class Work>
-double least_ns(int repetitions, const Work &work) {
-  double least = 1e300;
-  for (int n = 0; n < repetitions; ++n) {
-    const double start = thread_ns();
-    work();
-    least = std::min(least, thread_ns() - start);
-  }
-  return least;
-}
+using bench::least_ns;
 
 Mesh mesh_of(uint32_t kind, uint32_t across) {
   if (kind == DFM_CELL_TET10) return second_order(kuhn_bar(across, across, across, 0.01, 0));

@@ -2,8 +2,6 @@
 // the cells alone (bound/corot_bound.h), for every instruction set, and bytes per tetrahedron. `--csv FILE
 // --commit ID` appends the figures; --mesh FILE takes another mesh than the fine cylinder. The least of the
 // repetitions counts: others share the machine.
-#include <time.h>
-
 #include "bound/corot_bound.h"
 #include "corot_host.h"
 #include "machine.h"
@@ -11,22 +9,7 @@
 namespace {
 
 using namespace corot_test;
-
-double thread_ns() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e9 * double(t.tv_sec) + double(t.tv_nsec);
-}
-template <class Work>
-double least_ns(int repetitions, const Work &work) {
-  double least = 1e300;
-  for (int n = 0; n < repetitions; ++n) {
-    const double start = thread_ns();
-    work();
-    least = std::min(least, thread_ns() - start);
-  }
-  return least;
-}
+using bench::least_ns;
 
 struct Row {
   std::string isa, what;

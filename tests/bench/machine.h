@@ -1,5 +1,7 @@
 // Where figures were taken: the first two columns of results/*.csv. Which rows such a table has already.
 #pragma once
+#include <time.h>
+
 #include <algorithm>
 #include <cstdio>
 #include <cstring>
@@ -22,6 +24,27 @@ inline std::string machine() {
   for (std::string line; std::getline(in, line);)
     if (line.rfind("model name", 0) == 0) return line.substr(line.find(':') + 2);
   return "unknown";
+}
+
+// s of processor time: of this thread, of the program.
+inline double seconds_of(clockid_t clock) {
+  timespec t{};
+  clock_gettime(clock, &t);
+  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
+}
+inline double cpu_seconds() { return seconds_of(CLOCK_THREAD_CPUTIME_ID); }
+inline double process_seconds() { return seconds_of(CLOCK_PROCESS_CPUTIME_ID); }
+
+// The least of the repetitions counts: others share the machine.
+template <class Work>
+double least_ns(int repetitions, const Work &work) {
+  double least = 1e300;
+  for (int n = 0; n < repetitions; ++n) {
+    const double start = cpu_seconds();
+    work();
+    least = std::min(least, 1e9 * (cpu_seconds() - start));
+  }
+  return least;
 }
 
 // A sentence as one column.

@@ -2,8 +2,6 @@
 // runs) of reading and repair, and bytes per tetrahedron through the context's memory: the most while
 // reading, and what stays. Figures to reach: 5 s, 600 and 400 bytes. --cells N for another number, --csv
 // FILE appends rows.
-#include <sys/resource.h>
-
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -13,17 +11,6 @@
 #include "../unit/mesh/mesh_support.h"
 #include "machine.h"
 #include "mesh/raw_mesh.h"
-
-namespace {
-
-double cpu_seconds() {
-  rusage u{};
-  getrusage(RUSAGE_SELF, &u);
-  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
-         1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
-
-}  // namespace
 
 int main(int argc, char **argv) {
   uint32_t cells = 1000000;
@@ -43,12 +30,12 @@ int main(int argc, char **argv) {
     double parse = std::numeric_limits<double>::max(), whole = parse;
     size_t peak = 0, held = 0;
     for (int run = 0; run < kRuns; ++run) {
-      const double before = cpu_seconds();
+      const double before = bench::process_seconds();
       test::CountedMemory memory;
       dfm::RawMesh raw = dfm::read_raw(memory.hooks, path);
-      parse = std::min(parse, cpu_seconds() - before);
+      parse = std::min(parse, bench::process_seconds() - before);
       const dfm::RestMesh mesh = dfm::finish_mesh(path, std::move(raw));
-      whole = std::min(whole, cpu_seconds() - before);
+      whole = std::min(whole, bench::process_seconds() - before);
       peak = memory.peak;
       held = memory.held;
     }

@@ -7,11 +7,10 @@
 #include <benchmark/benchmark.h>
 #include <sys/utsname.h>
 
-#include <time.h>
-
 #include <fstream>
 
 #include "bound/msm_bound.h"
+#include "machine.h"
 #include "model_msm/msm_body.h"
 #include "msm_host.h"
 
@@ -141,12 +140,6 @@ void plain(benchmark::State &state, Kernel kernel, int layout) {
   }
 }
 
-double thread_ns() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e9 * double(t.tv_sec) + double(t.tv_nsec);
-}
-
 // What an option costs: median over eleven pairs of (time with it) / (time without), and its time per spring.
 struct Pair { double ratio, ns; };
 Pair cost_of(const char *isa, const Params &without, const Params &with, const Fields &fields,
@@ -165,12 +158,12 @@ Pair cost_of(const char *isa, const Params &without, const Params &with, const F
     double h = 1;
     double least = 1e300;
     for (int run = 0; run < 6; ++run) {
-      const double start = thread_ns();
+      const double start = 1e9 * bench::cpu_seconds();
       for (int n = 0; n < 20; ++n) {
         if (row_sums) b.ops->bound(b.self, &kin, k.data(), c.data(), &h);
         else b.ops->add_forces(b.self, &kin, b.f);
       }
-      least = std::min(least, (thread_ns() - start) / 20);
+      least = std::min(least, (1e9 * bench::cpu_seconds() - start) / 20);
     }
     return least;
   };

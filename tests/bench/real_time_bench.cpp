@@ -31,12 +31,6 @@
 
 namespace {
 
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
-}
-
 double wall_seconds() {
   timespec t{};
   clock_gettime(CLOCK_MONOTONIC, &t);
@@ -102,9 +96,9 @@ Run run(dfm_scene scene, dfm_world world, double duration, double step, bool pla
       if (const double now = wall_seconds(); now > next) next = now;
       sleep_until(next);
     }
-    const double at = paced ? next : cpu_seconds();
+    const double at = paced ? next : bench::cpu_seconds();
     ok(dfm_world_step(world, step, nullptr));
-    out.seconds.push_back((paced ? wall_seconds() : cpu_seconds()) - at);
+    out.seconds.push_back((paced ? wall_seconds() : bench::cpu_seconds()) - at);
     out.cut.push_back(has_cut(world) ? 1 : !out.cut.empty() && out.cut.back() == 1 ? 2 : 0);
     const std::map<std::string, double> now = profile(world);
     out.stages.emplace_back();
@@ -279,10 +273,10 @@ int main(int argc, char **argv) {
   options.set = texts.data();
   dfm_scene scene = 0;
   dfm_world world = 0;
-  const double start = cpu_seconds();
+  const double start = bench::cpu_seconds();
   ok(dfm_scene_open(context, argv[1], &options, &scene));
   ok(dfm_scene_world(scene, &world));
-  const double made = cpu_seconds() - start;
+  const double made = bench::cpu_seconds() - start;
   dfm_scene_settings settings{};
   settings.size = sizeof settings;
   ok(dfm_scene_get_settings(scene, &settings));

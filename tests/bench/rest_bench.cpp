@@ -1,23 +1,16 @@
 // What rest costs. A world of 100 bodies that sleep, per step, with nothing awake and with one body awake
 // among them; the same bodies kept awake; and how even the steps of a resting scene are: percentiles of
 // processor time per step at 1 kHz. Memory is counted in tests/api/memory_test.cpp.
-#include <time.h>
-
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
 #include <vector>
 
 #include "coupled.h"
+#include "machine.h"
 #include "support.h"
 
 namespace {
-
-double cpu_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
-}
 
 // A hundred blocks of 100 cells on a floor, two high: 50 islands.
 struct Field {
@@ -55,9 +48,9 @@ std::vector<double> times(dfm_world w, int n, double h, Counts *counts = nullptr
   std::vector<double> t;
   t.reserve(size_t(n));
   for (int i = 0; i < n; ++i) {
-    const double at = cpu_seconds();
+    const double at = bench::cpu_seconds();
     test::ok(dfm_world_step(w, h, nullptr));
-    t.push_back(cpu_seconds() - at);
+    t.push_back(bench::cpu_seconds() - at);
     if (!counts) continue;
     const dfm_world_stats s = test::stats(w);
     counts->substeps.push_back(s.last_substeps);
@@ -99,9 +92,9 @@ dfm_world make_stack(const test::Context &c) {
 // Work that is the same each time and takes about `seconds`: what its times differ by is the machine's.
 std::vector<double> empty_loops(int n, double seconds) {
   const auto turn = [](uint64_t turns) {
-    const double at = cpu_seconds();
+    const double at = bench::cpu_seconds();
     for (uint64_t i = 0; i < turns; ++i) __asm__ volatile("" : "+r"(i));
-    return cpu_seconds() - at;
+    return bench::cpu_seconds() - at;
   };
   double least = turn(100000);
   for (int i = 0; i < 20; ++i) least = std::min(least, turn(100000));

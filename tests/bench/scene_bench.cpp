@@ -3,8 +3,6 @@
 // to reach and where the time goes;
 // --csv FILE appends rows; --only TEXT takes scenes whose name contains it; --law NAME puts that law, with
 // the same coefficient, into their first rule.
-#include <sys/resource.h>
-
 #include <cstdio>
 #include <cstring>
 #include <string>
@@ -22,13 +20,6 @@ struct Case {
   double settle, timed;  // s simulated before and during the measurement
   double reach;          // full steps per second; 0: none stated
 };
-
-double cpu_seconds() {
-  rusage u{};
-  getrusage(RUSAGE_SELF, &u);
-  return double(u.ru_utime.tv_sec + u.ru_stime.tv_sec) +
-         1e-6 * double(u.ru_utime.tv_usec + u.ru_stime.tv_usec);
-}
 
 [[noreturn]] void die(const std::string &what) {
   std::fprintf(stderr, "scene_bench: %s: %s\n", what.c_str(), dfm_last_error());
@@ -71,20 +62,20 @@ void run(dfm_context *context, const Case &c, std::FILE *csv, const std::string 
   dfm_stage_time t0[16], t1[16];
   uint32_t n = 0;
   dfm_world_profile(world, 16, t0, &n);
-  const double start = cpu_seconds();
+  const double start = bench::process_seconds();
   // Slices of the timed part: the fastest tells what the machine can do, the whole what it did.
   double fastest = 0;
   long total = 0;
   uint64_t contacts = 0, sweeps = 0, slices = 20;
   for (uint64_t k = 0; k < slices; ++k) {
-    const double at = cpu_seconds();
+    const double at = bench::process_seconds();
     const long done = steps(c.timed / double(slices));
     total += done;
-    fastest = std::max(fastest, double(done) / (cpu_seconds() - at));
+    fastest = std::max(fastest, double(done) / (bench::process_seconds() - at));
     contacts += stats().contacts;
     sweeps += stats().sweeps;
   }
-  const double rate = double(total) / (cpu_seconds() - start);
+  const double rate = double(total) / (bench::process_seconds() - start);
   dfm_world_profile(world, 16, t1, &n);
   const dfm_world_stats after = stats();
   const double substeps = double(after.substeps - before.substeps) / double(total);

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <functional>
 #include <map>
 #include <memory>
@@ -24,12 +23,6 @@
 namespace {
 
 using Points = std::vector<double>;
-
-double processor_seconds() {
-  timespec t{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return double(t.tv_sec) + 1e-9 * double(t.tv_nsec);
-}
 
 double median(std::vector<double> values) {
   std::nth_element(values.begin(), values.begin() + long(values.size() / 2), values.end());
@@ -112,12 +105,12 @@ void trees(const Rows &rows, const std::string &name, double t, const std::vecto
     double least[2] = {HUGE_VAL, HUGE_VAL};
     dfm::BoxTree tree(dfm::Memory::standard());
     for (int repetition = 0; repetition < 5; ++repetition) {
-      const double t0 = processor_seconds();
+      const double t0 = bench::cpu_seconds();
       tree.build(skin.tri, x.data());
-      const double t1 = processor_seconds();
+      const double t1 = bench::cpu_seconds();
       tree.refit(skin.tri, x.data());
       least[0] = std::min(least[0], t1 - t0);
-      least[1] = std::min(least[1], processor_seconds() - t1);
+      least[1] = std::min(least[1], bench::cpu_seconds() - t1);
     }
     build += least[0];
     refit += least[1];
@@ -431,10 +424,10 @@ void anisotropy(dfm_context *context, const Rows &rows) {
     for (int spell = 0; spell < 60; ++spell)
       for (int k = 0; k < 3; ++k) {
         const int steps = cells < 1000 ? 200 : 10;
-        const double start = processor_seconds();
+        const double start = bench::cpu_seconds();
         for (int i = 0; i < steps; ++i)
           if (dfm_world_step(worlds[k]->world, 1e-5, nullptr) != DFM_OK) die("step");
-        least[k] = std::min(least[k], (processor_seconds() - start) / steps);
+        least[k] = std::min(least[k], (bench::cpu_seconds() - start) / steps);
       }
     static const char *const kNames[3] = {"isotropic", "softer along an axis", "stiffer along an axis"};
     for (int k = 0; k < 3; ++k) rows.add("6.2", size + ": " + kNames[k], cells, 1e3 * least[k], "ms");

@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cstdio>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 #include <set>
 
@@ -58,8 +57,6 @@ std::vector<Case> cases() {
   return out;
 }
 
-double cpu_seconds() { return double(std::clock()) / CLOCKS_PER_SEC; }
-
 }  // namespace
 
 int main(int argc, char **argv) {
@@ -94,7 +91,7 @@ int main(int argc, char **argv) {
   for (const Case &c : cases()) {
     if (done.count(c.name) || c.name.find(only) == std::string::npos) continue;
     if (std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count() > seconds) continue;
-    const double cpu = cpu_seconds();
+    const double cpu = bench::process_seconds();
     const Result r = run_case(context, c, steps, 100);
     const bool keeps = !r.stopped && r.least > -0.02 && r.most < 0.02;
     bad += !keeps;
@@ -102,7 +99,7 @@ int main(int argc, char **argv) {
                  bench::machine().c_str(), bench::compiler(), commit.c_str(), c.name.c_str(),
                  static_cast<unsigned long long>(r.steps), static_cast<unsigned long long>(r.substeps),
                  static_cast<unsigned long long>(r.changes), r.scale, r.least, r.most, r.trend, r.lowest,
-                 r.highest, static_cast<unsigned long long>(r.inverted), cpu_seconds() - cpu);
+                 r.highest, static_cast<unsigned long long>(r.inverted), bench::process_seconds() - cpu);
     std::fflush(table);
     std::printf("%-30s %9llu %7llu %12.4g %10.2e %10.2e %10.2e %s\n", c.name.c_str(),
                 static_cast<unsigned long long>(r.steps), static_cast<unsigned long long>(r.changes), r.scale,
