@@ -484,8 +484,10 @@ void fields(Stream &s, W &w, const World &like) {
     s.value("velocity_surface", o.def.velocity_surface, must::finite);
     s.value("category", o.def.category, must::any);
     s.value("collides_with", o.def.collides_with, must::any);
-    s.array("material", o.zone.material, kAnyCount, must::any);  // one that may be destroyed
+    s.array("material", o.zone.material, kAnyCount, must::any);
     s.value("material's friction", o.zone.friction, must::not_negative);
+    s.must_hold("material", "a name, of one that may be destroyed",
+                [&] { return o.zone.material.find('\0') == std::string::npos; });
   });
   at = 0;
   s.members("sets of rigid bodies", w.rigid_sets, like.rigid_sets.size(), [&](auto &entry) {
