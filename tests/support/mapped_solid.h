@@ -318,7 +318,8 @@ struct MappedSolid : Grid {
     std::vector<uint8_t> near(npoint());
     near[nearest(where)] = 1;
     std::vector<size_t> patch;
-    for (int ring = 0; ring < 2; ++ring) {
+    // three cells along an axis determine a quadratic function; a brick has six tetrahedra
+    for (int ring = 0; ring < (kind == kTet10 ? 2 : 3); ++ring) {
       patch.clear();
       for (size_t c = 0; c < ncell(); ++c)
         if (std::any_of(cell(c), cell(c) + nodes, [&](uint32_t i) { return near[i] != 0; }))
@@ -327,15 +328,24 @@ struct MappedSolid : Grid {
         for (size_t k = 0; k < nodes; ++k) near[cell(c)[k]] = 1;
     }
     const Vec middle = kind == kTet10 ? Vec{0.25, 0.25, 0.25} : Vec{};
-    double far = 0;
-    for (const size_t c : patch)
-      for (const double d : minus(shape(c, middle).at, where)) far = std::max(far, std::abs(d));
+    double far = 0, lo[3], hi[3];
+    std::fill(lo, lo + 3, HUGE_VAL);
+    std::fill(hi, hi + 3, -HUGE_VAL);
+    for (const size_t c : patch) {
+      const Vec d = minus(shape(c, middle).at, where);
+      for (size_t a = 0; a < 3; ++a) {
+        far = std::max(far, std::abs(d[a]));
+        lo[a] = std::min(lo[a], d[a]);
+        hi[a] = std::max(hi[a], d[a]);
+      }
+    }
     Dense normal(10, 10);
     std::vector<double> right(10);
     for (const size_t c : patch) {
       const Vec at = shape(c, middle).at;
       Vec d = minus(at, where);
-      for (double &x : d) x /= far;
+      // one layer of cells says nothing of what changes across it
+      for (size_t a = 0; a < 3; ++a) d[a] = hi[a] - lo[a] > 1e-6 * far ? d[a] / far : 0;
       const double f[10] = {1,           d[0],        d[1],        d[2],        d[0] * d[0],
                             d[1] * d[1], d[2] * d[2], d[0] * d[1], d[1] * d[2], d[2] * d[0]};
       const double value = all[6 * each * c + axis] - (3 * lambda + 2 * mu) * initial(at);
@@ -344,7 +354,7 @@ struct MappedSolid : Grid {
         for (size_t j = 0; j < 10; ++j) normal(i, j) += f[i] * f[j];
       }
     }
-    // one layer of cells says nothing of some of these functions, which then stay small
+    // functions of which the patch says nothing stay small
     for (size_t i = 0; i < 10; ++i) normal(i, i) += 1e-12 * normal(0, 0);
     return solved(normal, right)[0];
   }
