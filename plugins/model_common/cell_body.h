@@ -120,8 +120,7 @@ class CellBody {
     next_.create(h, npoint_);
     norm_.create(h, block_.each() * ncell_);
     find_places();
-    const double yield = of.row[1] < 0 ? 0 : m.params[of.row[1]];
-    if (model::largest_of(field_[kYield], yield, ncell_) > 0) points_.create(h, kind_, ncell_);
+    if (of.row[1] >= 0 && may_yield(field_[kYield], m.params[of.row[1]])) points_.create(h, kind_, ncell_);
     apply_params(m.params);
   }
 

@@ -17,6 +17,8 @@ inline void complain(const dfm_host *h, const char *who, const char *what) {
   h->log(h->ctx, 3, 0, text);
 }
 
+inline bool has_direction(const double *a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2] > 0; }
+
 // Values of all rows end to end; false after the reason was logged.
 inline bool in_range(const dfm_host *h, const char *who, const dfm_param *rows, uint32_t nrow,
                      const double *values) {
@@ -59,6 +61,8 @@ constexpr uint32_t nodes_of(uint32_t kind) {
 inline const char *wrong_with(const dfm_mesh &m, uint32_t kinds) {
   if (!(m.cell & kinds))
     return kinds == DFM_CELL_TET ? "the cells must be tetrahedra" : "the cells are of an unknown kind";
+  if (m.size >= offsetof(dfm_mesh, inside) + sizeof m.inside && m.inside && m.cell != DFM_CELL_HEX8)
+    return "parts of cells are material, which is for hexahedra of 8 points";
   if (!m.npoint || !m.ncell || !m.nedge || !m.edges || !m.cells || !m.rest || !m.mass)
     return "the mesh has no cells, points or edges";
   for (size_t n = 0; n < nodes_of(m.cell) * size_t(m.ncell); ++n)
@@ -121,6 +125,19 @@ dfm_status change_in_range(void *self, const char *who, const dfm_param (&rows)[
   return in_range(body.host, who, rows, kCount, values) ? change(body, values) : DFM_E_ARG;
 }
 
+// No exception leaves a call of the host.
+template <class Use>
+dfm_status answered(const Use &use) {
+  try {
+    use();
+  } catch (const std::bad_alloc &) {
+    return DFM_E_NOMEM;
+  } catch (...) {
+    return DFM_E_FATAL;
+  }
+  return DFM_OK;
+}
+
 // Ops and extensions as calls of the Body. Its lacks_state(k) is true, and has said so, where the host gives
 // none that it needs; rows of its parameters are numbered by its Row.
 template <class Body>
@@ -128,9 +145,7 @@ struct Ops {
   template <class Use>
   static dfm_status with_state(void *self, const dfm_kin *k, const Use &use) {
     Body &body = *static_cast<Body *>(self);
-    if (body.lacks_state(*k)) return DFM_E_STATE;
-    use(body);
-    return DFM_OK;
+    return body.lacks_state(*k) ? DFM_E_STATE : answered([&] { use(body); });
   }
   static dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
     return with_state(self, k, [&](Body &body) { body.add_forces(*k, f); });

@@ -13,9 +13,8 @@ struct StepperOps : Ops<Body> {
   template <class Use>
   static dfm_status in_step(void *self, const dfm_kin *k, const Use &use) {
     if constexpr (requires(Body &b) { b.lacks_step(*k); }) {
-      if (static_cast<Body *>(self)->lacks_step(*k)) return DFM_E_STATE;
-      use(*static_cast<Body *>(self));
-      return DFM_OK;
+      Body &body = *static_cast<Body *>(self);
+      return body.lacks_step(*k) ? DFM_E_STATE : answered([&] { use(body); });
     } else {
       return with_state(self, k, use);
     }

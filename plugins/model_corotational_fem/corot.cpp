@@ -62,8 +62,7 @@ bool check_params(const dfm_host *h, const double *values) {
     complain(h, "parameter creep is between -1 and 0; give -1 (at once), 0 (no flow) or a positive rate");
     return false;
   }
-  const double *a = values + kAxis;
-  if (a[0] != 0 || a[1] != 0 || a[2] != 0) return true;
+  if (model::has_direction(values + kAxis)) return true;
   complain(h, "parameter anisotropy_axis is zero; give a direction");
   return false;
 }

@@ -135,8 +135,7 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
     bulk.create(host, 2 * size_t(npoint));
     point_change.create(host, 2 * size_t(npoint));
   }
-  params[kYield] = m.params[kYield];
-  made_plastic = largest_of(kYield) > 0;
+  made_plastic = may_yield(field[kYield], m.params[kYield]);
   if (plastic()) plastic_group.create(host, groups);
   apply_params(m.params);
 }

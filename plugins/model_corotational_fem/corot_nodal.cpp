@@ -12,11 +12,14 @@
 // second derivative is in the turns of corot_bound.cpp. Dampers have the rate in place of the change, with
 // weights damp k V/4.
 #include "../model_common/edges.h"
+#include "../model_common/index.h"
 #include "../model_common/rotation.h"
 #include "corot_body.h"
 
 namespace corot {
 namespace {
+
+constexpr char kTooMany[] = "more than 4 billion pairs of points";
 
 void share_pass(void *user, uint32_t begin, uint32_t end) {
   const Call &call = *static_cast<const Call *>(user);
@@ -81,9 +84,9 @@ void Body::find_patches(Patches &to) const {
   to.pair_begin.create(host, size_t(npoint) + 1);
   for (size_t n = 0; n < 2 * size_t(nedge); ++n) ++to.begin[edges[n] + 1];
   for (uint32_t i = 0; i < npoint; ++i) {
-    const uint32_t size = to.begin[i + 1] + 1;
-    to.begin[i + 1] = to.begin[i] + size;
-    to.pair_begin[i + 1] = to.pair_begin[i] + size * (size + 1) / 2;
+    const uint64_t size = to.begin[i + 1] + uint64_t{1};
+    to.begin[i + 1] = model::after(to.begin[i], size, kTooMany);
+    to.pair_begin[i + 1] = model::after(to.pair_begin[i], size * (size + 1) / 2, kTooMany);
   }
   to.point.create(host, to.begin[npoint]);
   Buffer<uint32_t> next;
@@ -182,7 +185,7 @@ void Body::add_dyads(size_t kind, double by, double *blk) const {
 void Body::add_nodal(const dfm_kin &k, double a, double b, double *blk) {
   find_gradients(k, false);
   add_dyads(0, a, blk);
-  if (damp.empty() || !(b > 0)) return;
+  if (damp.empty() || b == 0) return;
   find_gradients(k, true);
   add_dyads(1, b, blk);
 }

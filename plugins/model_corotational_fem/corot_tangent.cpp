@@ -256,9 +256,9 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
             sum +=
                 a * (shape.axis[i][e] * entry_of(modes, e, l, principal[m], principal[n]) * shape.axis[j][l]);
         for (int e = 0; e < 3; ++e) sum += twist[e] * (turned[e][m][i] * turned[e][n][j]);
-        for (int e = 0; change_by > 0 && e < 6; ++e)
+        for (int e = 0; change_by != 0 && e < 6; ++e)
           for (int l = 0; l < 6; ++l) sum += change_by * (change[m][i][e] * (d[e][l] * change[n][j][l]));
-        for (int e = 0; flow_by > 0 && e < 6; ++e)
+        for (int e = 0; flow_by != 0 && e < 6; ++e)
           for (int l = 0; l < 6; ++l) sum += flow_by * (change[m][i][e] * (soft[e][l] * change[n][j][l]));
         in_frame[i][j] = sum;
       }

@@ -50,8 +50,7 @@ bool valid(const dfm_host *h, const double *values) {
     complain(h, "parameter volume is between -1 and 0; give -1 (from poisson), 0 (off) or a positive number");
     return false;
   }
-  const double *a = values + kAxis;
-  if (!(a[0] != 0 || a[1] != 0 || a[2] != 0)) {
+  if (!model::has_direction(values + kAxis)) {
     complain(h, "parameter anisotropy_axis is zero; give a direction");
     return false;
   }

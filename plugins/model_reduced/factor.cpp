@@ -29,8 +29,9 @@ bool Factor::use_host_solver(const dfm_host *host, const std::vector<uint32_t> &
 // The first [nrhs,n,3] of wide_, whose results are stored behind the room for kLanes of them.
 void Factor::solve_by_host(uint32_t nrhs) const {
   double *const b = wide_.data();
-  if (direct_->solver->solve(self_, nrhs, b, b + kLanes * 3 * size_t(n_), 0) != DFM_OK)
-    throw "the host's solver failed";
+  const dfm_status status = direct_->solver->solve(self_, nrhs, b, b + kLanes * 3 * size_t(n_), 0);
+  if (status == DFM_E_NOMEM) throw std::bad_alloc();
+  if (status != DFM_OK) throw "the host's solver failed";
 }
 
 void Factor::inverse_at(const Kernels &kernels, uint32_t nsel, const uint32_t *sel, double *w) const {

@@ -126,10 +126,7 @@ void Body::find_columns(uint32_t n, const uint32_t *surfel) {
   for (uint32_t c = 0; c < n; ++c)
     for (size_t a = 0; a < 3; ++a) {
       const size_t column = 3 * size_t(surfel[c]) + a;
-      if (!known_[column]) {
-        known_[column] = 1;
-        wanted[many++] = column;
-      }
+      if (!known_[column]) wanted[many++] = column;
       if (many == kLanes || (many && c + 1 == n && a == 2)) {
         make_columns(many, wanted);
         many = 0;
@@ -154,6 +151,7 @@ void Body::make_columns(size_t many, const size_t *wanted) {
     for (size_t j = 0; j < size(); ++j) w_[j] = f[kLanes * j + l] - w_[j];
     for (size_t i = 0; i < elastic_.npoint; ++i)
       for (size_t a = 0; a < 3; ++a) column[3 * size_t(place_[i]) + a] = w_[3 * i + a];
+    known_[wanted[l]] = 1;
   }
 }
 

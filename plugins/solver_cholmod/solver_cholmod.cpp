@@ -18,6 +18,7 @@ class Cholmod {
     cholmod_start(&common_);
     common_.print = 0;
     common_.error_handler = nullptr;
+    common_.final_ll = 1;  // LDL' would take negative pivots; L L' says that the matrix is not definite
     try {
       build(nb, ij);
     } catch (...) {

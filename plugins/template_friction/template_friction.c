@@ -33,7 +33,7 @@ static dfm_status eval(const dfm_friction_in *in, dfm_friction_out *out) {
     }
     if (out->limit) out->limit[i] = cone;
     if (out->mode) out->mode[i] = (uint8_t)(in->fn[i] > 0 ? 1 + (share < 1) : 0); /* open, stick, slip */
-    if (out->stored) out->stored[i] = 0.5 * share * share * trial * trial / k;
+    if (out->stored) out->stored[i] = 0.5 * share * share * trial * length(t);
   }
   return DFM_OK;
 }

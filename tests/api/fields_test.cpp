@@ -323,3 +323,26 @@ TEST(Fields, Snapshot_NeedsTheSameFields) {
   test::run(same.world, 0.05, 1e-3);
   EXPECT_EQ(dfm_world_hash(a.world), dfm_world_hash(same.world));
 }
+
+// What a cut leaves has the state of the whole, plastic strains too, where none of its cells yields.
+TEST(Fields, PartWithoutCellsThatYield_IsSeparated) {
+  Block b;
+  const std::vector<double> yield = halves<double>(b, 0, 1e4);
+  const dfm_cell_field field{"yield", yield.data(), 1};
+  b.def.material = b.material("gel", 1000, 1e5);
+  b.def.model = "corotational_fem";
+  b.def.nfield = 1;
+  b.def.fields = &field;
+  const dfm_body body = b.create();
+  dfm_cut_def cut = dfm_cut_def_default();
+  cut.shape = DFM_CUT_PLANE;
+  cut.how = DFM_CUT_SPLIT;
+  cut.blade[2] = 0.07;
+  cut.blade[5] = 1;
+  dfm_cut_info done{};
+  done.size = sizeof done;
+  test::ok(dfm_body_cut(body, &cut, &done));
+  test::ok(dfm_body_separate(body, nullptr, &done));
+  EXPECT_EQ(done.pieces, 1u);
+  test::run(b.world, 0.01, 1e-3);
+}

@@ -128,6 +128,7 @@ TEST(CorotParameters, ErrorsNameWhatIsWrong) {
   refused({{"poisson", {0.5}}}, {}, "poisson");
   refused({}, {{"young", {-1}}}, "field young of cell 0");
   refused({{"anisotropy_axis", {0, 0, 0}}}, {}, "anisotropy_axis");
+  refused({{"anisotropy_axis", {1e-170, 0, 0}}}, {}, "anisotropy_axis");  // has no length in doubles
   refused({{"anisotropy_young", {1e6}}, {"energy", {1}}}, {}, "energy");
   refused({{"anisotropy_young", {1e3}}, {"poisson", {0.45}}}, {}, "anisotropy_young");
   refused({{"locking", {1}}, {"energy", {2}}}, {}, "locking nodal");

@@ -15,12 +15,15 @@ inline std::vector<uint32_t> pattern_of(const ModelInstance &b) {
   return ij;
 }
 
-// a df/dx + b df/dv as one matrix.
+// a df/dx + b df/dv as one matrix. Implicit steps ask for it with negative factors.
 inline Dense tangent(const ModelInstance &body, double a, double b) {
   const std::vector<uint32_t> ij = pattern_of(body);
   std::vector<double> blk(9 * (ij.size() / 2));
   const dfm_kin k = body.kin();
   EXPECT_EQ(body.ops->stiffness(body.self, &k, a, b, blk.data()), DFM_OK);
+  std::vector<double> opposite(blk.size());
+  EXPECT_EQ(body.ops->stiffness(body.self, &k, -a, -b, opposite.data()), DFM_OK);
+  for (size_t n = 0; n < blk.size(); ++n) EXPECT_EQ(opposite[n], -blk[n]) << "of factors " << a << " and " << b;
   Dense out(3 * body.size(), 3 * body.size());
   for (size_t n = 0; n < ij.size() / 2; ++n)
     for (size_t r = 0; r < 3; ++r)

@@ -5,6 +5,7 @@
 
 #include "core/error.h"
 #include "core/names.h"
+#include "plugin/boundary.h"
 #include "plugin/registry.h"
 
 namespace dfm {
@@ -115,6 +116,7 @@ std::vector<double> pack_params(const dfm_type &type, std::span<const dfm_param_
   if (type.kind == DFM_KIND_FRICTION && law_of(type).check) {
     char why[256] = "";
     dfm_status status = DFM_E_FATAL;
+    const Boundary boundary(type.id, "check");
     try {
       status = law_of(type).check(packed.data(), why, sizeof why);
     } catch (...) {
