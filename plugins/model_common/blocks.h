@@ -6,8 +6,9 @@
 #include <algorithm>
 
 #include "block_points.h"
-#include "buffer.h"
+#include "lists.h"
 #include "partition.h"
+#include "pieces.h"
 
 namespace model {
 
@@ -38,10 +39,12 @@ struct Blocks {
     return b;
   }
 
-  // Calls fn for all blocks, on the host's workers if that is faster.
-  void for_each_block(bool parallel, void (*fn)(void *, uint32_t, uint32_t), void *user) {
-    if (parallel && host->parallel_for) return host->parallel_for(host->ctx, nblock, grain, fn, user);
-    fn(user, 0, nblock);
+  // use(n, begin) for all blocks, begin that of the piece, on the host's workers if that is faster.
+  template <class Use>
+  void for_each_block(bool parallel, const Use &use) const {
+    in_pieces(host, parallel, nblock, grain, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t n = begin; n < end; ++n) use(n, begin);
+    });
   }
 
   // Adds the halo values of other blocks to the points of block n.
@@ -128,21 +131,14 @@ struct Blocks {
 
   // Halo sums by owner, sources in block order: the order of the sums depends on the mesh and not on threads.
   void build_merge(const Order &l) {
-    merge_begin.create(host, size_t(nblock) + 1);
-    const auto each = [&](auto &&use) {
+    const auto each = [&](const auto &use) {
       for (uint32_t b = 0; b < nblock; ++b)
-        for (uint32_t n = block[b].owned; n < block[b].local; ++n) use(b, n, l.rank[block[b].point[n]]);
+        for (uint32_t n = block[b].owned; n < block[b].local; ++n) {
+          const uint32_t r = l.rank[block[b].point[n]], owner = l.block_of[r];
+          use(owner, Merge{slot_begin[b] + n, slot_begin[owner] + (r - l.begin[owner])});
+        }
     };
-    each([&](uint32_t, uint32_t, uint32_t r) { ++merge_begin[l.block_of[r] + 1]; });
-    for (uint32_t b = 0; b < nblock; ++b) merge_begin[b + 1] += merge_begin[b];
-    merge.create(host, merge_begin[nblock]);
-    Buffer<uint32_t> at;
-    at.create(host, nblock);
-    std::copy(merge_begin.data(), merge_begin.data() + nblock, at.data());
-    each([&](uint32_t b, uint32_t n, uint32_t r) {
-      const uint32_t owner = l.block_of[r];
-      merge[at[owner]++] = {slot_begin[b] + n, slot_begin[owner] + (r - l.begin[owner])};
-    });
+    make_lists(host, nblock, each, merge_begin, merge);
   }
 };
 

@@ -24,7 +24,6 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <cstring>
 
 #include "buffer.h"
@@ -35,8 +34,11 @@
 #include "entry.h"
 #include "even_rows.h"
 #include "fibers.h"
+#include "lists.h"
 #include "params.h"
+#include "pieces.h"
 #include "rotation.h"
+#include "small.h"
 #include "small_range.h"
 
 namespace model {
@@ -162,21 +164,14 @@ class CellBody {
   }
 
   void add_forces(const dfm_kin &k, double *f) {
-    Call call{this, &k, f, flow_at(k)};
-    run(
-        ncell_,
-        [](void *user, uint32_t begin, uint32_t end) {
-          const Call &of = *static_cast<const Call *>(user);
-          for (uint32_t c = begin; c < end; ++c) of.body->force_of(*of.k, of.flow, c);
-        },
-        call);
-    run(
-        npoint_,
-        [](void *user, uint32_t begin, uint32_t end) {
-          const Call &of = *static_cast<const Call *>(user);
-          for (uint32_t i = begin; i < end; ++i) of.body->sum_point(*of.k, i, of.f);
-        },
-        call);
+    const double flow = flow_at(k);
+    const bool parallel = ncell_ >= kParallelCells;
+    in_pieces(host, parallel, ncell_, kGrain, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t c = begin; c < end; ++c) force_of(k, flow, c);
+    });
+    in_pieces(host, parallel, npoint_, kGrain, [&](uint32_t begin, uint32_t end) {
+      for (uint32_t i = begin; i < end; ++i) sum_point(k, i, f);
+    });
   }
 
   void bound(const dfm_kin &k, double *ksum, double *csum) const {
@@ -295,12 +290,6 @@ class CellBody {
     double r[9], s[9], inverse[9];  // R, S, A^-1
     double d[kMaxNodes][3], u[kMaxNodes][3];
   };
-  struct Call {
-    CellBody *body;
-    const dfm_kin *k;
-    double *f;
-    double flow;
-  };
   // The material of a cell; refuses constants along the axis without a positive energy.
   struct Along {
     CellMaterial material;
@@ -320,11 +309,8 @@ class CellBody {
   };
 
   static bool refuse(const dfm_host *h, const Of &of, const char *key) {
-    char text[200];
-    std::snprintf(text, sizeof text,
-                  "parameter %s is for first-order tetrahedra alone; leave it out, or give a mesh of those",
-                  key);
-    complain(h, of.id, text);
+    say(h, 3, of.id,
+        "parameter %s is for first-order tetrahedra alone; leave it out, or give a mesh of those", key);
     return false;
   }
   double at(Param which, uint32_t c) const {
@@ -338,10 +324,7 @@ class CellBody {
     const char *const wrong = plastic() && fibers                    ? plastic::kNoFibers
                               : !plastic() && largest_of(kYield) > 0 ? plastic::kMadeWithout
                                                                      : nullptr;
-    if (wrong) {
-      complain(host, of_.id, wrong);
-      throw Refused{};
-    }
+    if (wrong) model::refuse(host, of_.id, "%s", wrong);
     for (uint32_t c = 0; fibers && c < ncell_; ++c) (void)Along(*this, c, true);
     return fibers;
   }
@@ -354,23 +337,12 @@ class CellBody {
   const Node *nodes_at(uint32_t c) const { return &node_[size_t(nodes_) * c]; }
   uint32_t corner(uint32_t c, uint32_t a) const { return cells_[size_t(nodes_) * c + a]; }
 
-  template <class Piece>
-  void run(uint32_t n, Piece piece, Call &call) const {
-    if (ncell_ >= kParallelCells && host->parallel_for)
-      host->parallel_for(host->ctx, n, kGrain, piece, &call);
-    else piece(&call, 0, n);
-  }
-
   // Places of each point in the list of nodes of all cells, ascending.
   void find_places() {
-    const size_t n = size_t(nodes_) * ncell_;
-    begin_.create(host, size_t(npoint_) + 1);
-    place_.create(host, n);
-    for (size_t k = 0; k < n; ++k) ++begin_[cells_[k] + 1];
-    for (uint32_t i = 0; i < npoint_; ++i) begin_[i + 1] += begin_[i];
-    Buffer<uint32_t> next;
-    next.create_copy(host, begin_.data(), npoint_);
-    for (size_t k = 0; k < n; ++k) place_[next[cells_[k]]++] = uint32_t(k);
+    const auto each = [&](const auto &use) {
+      for (size_t k = 0; k < size_t(nodes_) * ncell_; ++k) use(cells_[k], uint32_t(k));
+    };
+    make_lists(host, npoint_, each, begin_, place_);
   }
 
   void make_cell(uint32_t c) {
@@ -454,15 +426,13 @@ class CellBody {
         m.d[a][i] = (m.r[i] * from[a][0] + m.r[3 + i] * from[a][1]) + m.r[6 + i] * from[a][2];
         m.u[a][i] = m.d[a][i] - node[a].rest[i];
       }
-    for (uint32_t i = 0; i < 3; ++i)
-      for (uint32_t j = 0; j < 3; ++j)
-        m.s[3 * i + j] = (m.r[i] * f[j] + m.r[3 + i] * f[3 + j]) + m.r[6 + i] * f[6 + j];
+    transposed_matrix_product(m.r, f, m.s);
     if (of_.turns) invert_turn(m);
   }
 
   // A^-1, no eigenvalue of A less than kMinStretch.
   static void invert_turn(Moved &m) {
-    double a[3][3], v[3][3], far = 0;
+    double a[3][3], far = 0;
     const double trace = (m.s[0] + m.s[4]) + m.s[8];
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
@@ -471,31 +441,10 @@ class CellBody {
         far += off * off;
       }
     if (far < 1) {  // no eigenvalue is less than 1
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c) {
-          const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-          m.inverse[3 * c + r] = a[r1][c1] * a[r2][c2] - a[r1][c2] * a[r2][c1];
-        }
-      const double det = (a[0][0] * m.inverse[0] + a[0][1] * m.inverse[3]) + a[0][2] * m.inverse[6];
-      for (double &x : m.inverse) x /= det;
+      invert(&a[0][0], m.inverse);
       return;
     }
-    jacobi(a, v);
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        double sum = 0;
-        for (int n = 0; n < 3; ++n) sum += v[i][n] * v[j][n] / std::max(a[n][n], kMinStretch);
-        m.inverse[3 * i + j] = sum;
-      }
-  }
-
-  static void cross(const double *a, const double *b, double *out) {
-    out[0] = a[1] * b[2] - a[2] * b[1];
-    out[1] = a[2] * b[0] - a[0] * b[2];
-    out[2] = a[0] * b[1] - a[1] * b[0];
-  }
-  static void times(const double *m, const double *x, double *out) {
-    for (int i = 0; i < 3; ++i) out[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2];
+    spectral_inverse(a, m.inverse, [](double x, double) { return std::max(x, kMinStretch); });
   }
 
   double energy_of(const dfm_kin &k, double flow, uint32_t c, Moved &m) const {
@@ -519,7 +468,7 @@ class CellBody {
       for (int n = 0; n < 3; ++n) axial[n] += part[n];
     }
     if (!of_.turns) return;
-    times(m.inverse, axial, w);
+    product(m.inverse, axial, w);
     for (uint32_t a = 0; a < nodes_; ++a) {
       cross(w, m.d[a], part);
       for (int n = 0; n < 3; ++n) out[a][n] -= part[n];
@@ -546,12 +495,12 @@ class CellBody {
       cross(m.u[a], h[a], part);
       for (int n = 0; n < 3; ++n) tau[n] += part[n];
     }
-    if (of_.turns) times(m.inverse, tau, turn);
+    if (of_.turns) product(m.inverse, tau, turn);
     double *out = force_.data() + 3 * size_t(nodes_) * c;
     for (uint32_t a = 0; a < nodes_; ++a, out += 3) {
       cross(turn, nodes_at(c)[a].mean, part);
       for (int n = 0; n < 3; ++n) part[n] -= h[a][n];
-      times(m.r, part, out);
+      product(m.r, part, out);
     }
   }
 
@@ -605,17 +554,17 @@ class CellBody {
     double z[kMaxNodes][9], turn[kMaxNodes][9], y[9] = {};
     for (uint32_t n = 0; of_.turns && n < 3; ++n) {
       // columns: of [u]x it is u x e_n, of A^-1 [G]x it is A^-1 (G x e_n)
-      double unit[3] = {}, column[kMaxNodes][3], product[kMaxNodes][3], part[3];
+      double unit[3] = {}, column[kMaxNodes][3], result[kMaxNodes][3], part[3];
       unit[n] = 1;
       for (uint32_t a = 0; a < nodes_; ++a) cross(m.u[a], unit, column[a]);
-      block_.apply(own, column, product);
+      block_.apply(own, column, result);
       for (uint32_t a = 0; a < nodes_; ++a) {
-        for (uint32_t i = 0; i < 3; ++i) z[a][3 * i + n] = product[a][i];
-        cross(product[a], m.u[a], part);  // [u]x^T p = p x u
+        for (uint32_t i = 0; i < 3; ++i) z[a][3 * i + n] = result[a][i];
+        cross(result[a], m.u[a], part);  // [u]x^T p = p x u
         for (uint32_t i = 0; i < 3; ++i) y[3 * i + n] += part[i];
         double g[3], t[3];
         cross(nodes_at(c)[a].mean, unit, g);
-        times(m.inverse, g, t);
+        product(m.inverse, g, t);
         for (uint32_t i = 0; i < 3; ++i) turn[a][3 * i + n] = t[i];
       }
     }

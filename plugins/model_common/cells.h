@@ -33,6 +33,7 @@
 
 #include "entry.h"
 #include "material.h"
+#include "small.h"
 #include "tetrahedron.h"
 
 namespace model {
@@ -171,15 +172,8 @@ inline bool jacobian_of(uint32_t nodes, const double *x, Point &p) {
   for (uint32_t a = 0; a < nodes; ++a)
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) j[3 * r + c] += x[3 * a + uint32_t(r)] * p.local[a][c];
-  for (int r = 0; r < 3; ++r)
-    for (int c = 0; c < 3; ++c) {
-      const int r1 = (r + 1) % 3, r2 = (r + 2) % 3, c1 = (c + 1) % 3, c2 = (c + 2) % 3;
-      p.inverse[3 * c + r] = j[3 * r1 + c1] * j[3 * r2 + c2] - j[3 * r1 + c2] * j[3 * r2 + c1];
-    }
-  p.jacobian = (j[0] * p.inverse[0] + j[1] * p.inverse[3]) + j[2] * p.inverse[6];
-  if (!(p.jacobian > 0)) return false;
-  for (double &v : p.inverse) v /= p.jacobian;
-  return true;
+  p.jacobian = invert(j, p.inverse);
+  return p.jacobian > 0;
 }
 
 // Gradient of a function with these derivatives, times by.

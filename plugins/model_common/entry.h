@@ -3,18 +3,38 @@
 #pragma once
 #include <deform/plugin.hpp>
 
+#include <cstdarg>
 #include <cstdio>
+#include <iterator>
 #include <new>
 
 namespace model {
 
 struct Refused {};  // thrown after the reason was logged
 
-// `who` begins the message, `what` ends without a full stop.
-inline void complain(const dfm_host *h, const char *who, const char *what) {
-  char text[256];
-  snprintf(text, sizeof text, "%s: %s.", who, what);
-  h->log(h->ctx, 3, 0, text);
+// At a level of dfm_host.log; `who` begins the message, `what` ends without a full stop.
+[[gnu::format(printf, 4, 0)]] inline void say(const dfm_host *h, int32_t level, const char *who,
+                                              const char *what, va_list values) {
+  char own[360], text[400];
+  vsnprintf(own, sizeof own, what, values);
+  snprintf(text, sizeof text, "%s: %s.", who, own);
+  h->log(h->ctx, level, 0, text);
+}
+[[gnu::format(printf, 4, 5)]] inline void say(const dfm_host *h, int32_t level, const char *who,
+                                              const char *what, ...) {
+  va_list values;
+  va_start(values, what);
+  say(h, level, who, what, values);
+  va_end(values);
+}
+inline void complain(const dfm_host *h, const char *who, const char *what) { say(h, 3, who, "%s", what); }
+[[noreturn, gnu::format(printf, 3, 4)]] inline void refuse(const dfm_host *h, const char *who,
+                                                           const char *what, ...) {
+  va_list values;
+  va_start(values, what);
+  say(h, 3, who, what, values);
+  va_end(values);
+  throw Refused{};
 }
 
 inline bool has_direction(const double *a) { return a[0] * a[0] + a[1] * a[1] + a[2] * a[2] > 0; }
@@ -25,10 +45,8 @@ inline bool in_range(const dfm_host *h, const char *who, const dfm_param *rows, 
   for (uint32_t r = 0; r < nrow; ++r)
     for (uint32_t w = 0; w < rows[r].width; ++w, ++values) {
       if (*values >= rows[r].min && *values <= rows[r].max) continue;
-      char text[200];
-      snprintf(text, sizeof text, "parameter %s = %g %s is outside %g .. %g", rows[r].key, *values,
-               rows[r].unit, rows[r].min, rows[r].max);
-      complain(h, who, text);
+      say(h, 3, who, "parameter %s = %g %s is outside %g .. %g", rows[r].key, *values, rows[r].unit,
+          rows[r].min, rows[r].max);
       return false;
     }
   return true;
@@ -137,6 +155,19 @@ dfm_status answered(const Use &use) {
   }
   return DFM_OK;
 }
+
+// Entries of a model whose parameters need only be in the range of their rows.
+template <class Body, const char *const &kWho, auto &kRows>
+struct InRange {
+  static dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
+    *self = nullptr;
+    return in_range(h, kWho, kRows, std::size(kRows), m->params) ? model::create<Body>(h, m, kWho, self)
+                                                                 : DFM_E_ARG;
+  }
+  static dfm_status set_params(void *self, const double *params) {
+    return change_in_range<Body>(self, kWho, kRows, params);
+  }
+};
 
 // Ops and extensions as calls of the Body. Its lacks_state(k) is true, and has said so, where the host gives
 // none that it needs; rows of its parameters are numbered by its Row.

@@ -16,14 +16,11 @@ inline Fiber fiber_of_cell(const dfm_host *h, const char *who, uint32_t c, doubl
                         or_else(shear_along, lame_of(young, poisson).mu)};
   Fiber out;
   if (fiber_of(t, out)) return out;
-  char text[240];
-  snprintf(
-      text, sizeof text,
+  refuse(
+      h, who,
       "anisotropy_young %g, anisotropy_poisson %g and anisotropy_shear %g with young %g and poisson %g have "
       "no positive energy in cell %u; raise anisotropy_young or lower anisotropy_poisson",
       t.young_along, t.poisson_along, t.shear_along, young, poisson, c);
-  complain(h, who, text);
-  throw Refused{};
 }
 
 }  // namespace model

@@ -19,11 +19,8 @@ void take_fields(const dfm_host *host, const char *who, const dfm_param *rows, u
       if (!(row.flags & DFM_PARAM_PER_CELL) || std::strcmp(m.field_keys[k], row.key)) continue;
       const bool axis = row.width == 3;
       const auto refuse = [&](uint32_t cell, double value) {
-        char text[200];
-        std::snprintf(text, sizeof text, "field %s of cell %u is %g; %g .. %g %s is expected%s", row.key,
-                      cell, value, row.min, row.max, row.unit, axis ? ", and an axis that is not zero" : "");
-        complain(host, who, text);
-        throw Refused{};
+        model::refuse(host, who, "field %s of cell %u is %g; %g .. %g %s is expected%s", row.key, cell, value,
+                      row.min, row.max, row.unit, axis ? ", and an axis that is not zero" : "");
       };
       const double *values = m.fields[k];
       for (uint32_t c = 0; c < m.ncell; ++c) {

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "polar_lanes.h"
+#include "small.h"
 
 namespace model {
 
@@ -46,6 +47,20 @@ inline void jacobi(double (&a)[kN][kN], double (&v)[kN][kN]) {
   }
 }
 
+// out [kN,kN] = sum of v v^T / divisor(value, largest value) over the eigenvectors v of the symmetric a, which
+// is overwritten; divisor 0: the vector is left out.
+template <int kN, class Divisor>
+inline void spectral_inverse(double (&a)[kN][kN], double *out, const Divisor &divisor) {
+  double v[kN][kN], most = 0;
+  jacobi(a, v);
+  for (int k = 0; k < kN; ++k) most = a[k][k] > most ? a[k][k] : most;
+  for (int e = 0; e < kN * kN; ++e) out[e] = 0;
+  for (int k = 0; k < kN; ++k) {
+    const double by = divisor(a[k][k], most);
+    for (int e = 0; by != 0 && e < kN * kN; ++e) out[e] += v[e / kN][k] * v[e % kN][k] / by;
+  }
+}
+
 namespace rotation {
 
 inline void identity(double *r) {
@@ -85,8 +100,7 @@ inline void from_quaternion(const double *q, double *r) {
 // the matrix is not safely positive definite.
 inline bool correction(const double *f, const double *r, double *w) {
   double a[9], b[3];
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) a[3 * i + j] = (r[i] * f[j] + r[3 + i] * f[3 + j]) + r[6 + i] * f[6 + j];
+  transposed_matrix_product(r, f, a);
   b[0] = a[7] - a[5];
   b[1] = a[2] - a[6];
   b[2] = a[3] - a[1];

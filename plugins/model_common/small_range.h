@@ -4,7 +4,6 @@
 #pragma once
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "entry.h"
 
@@ -33,14 +32,12 @@ class SmallRange {
     if (warnings_ > 0 && !(most.beyond > kMuchFarther * reported_)) return;
     reported_ = most.beyond;
     ++warnings_;
-    char text[320];
-    std::snprintf(text, sizeof text,
-                  "%s: cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: "
-                  "beyond %.0f degrees or %.0f %% this model treats rotation as strain, so the body swells "
-                  "and its forces are wrong; corotational_fem has no such limit.",
-                  who, most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn),
-                  100 * kLargestStrain);
-    host->log(host->ctx, 2, 0, text);
+    say(host, 2, who,
+        "cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: beyond %.0f "
+        "degrees "
+        "or %.0f %% this model treats rotation as strain, so the body swells and its forces are wrong; "
+        "corotational_fem has no such limit",
+        most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn), 100 * kLargestStrain);
   }
 
  private:

@@ -1,10 +1,9 @@
 // Selects among the kernels compiled for several vector widths.
 #pragma once
-#include <deform/plugin.h>
-
-#include <cstdio>
 #include <cstdlib>
 #include <cstring>
+
+#include "entry.h"
 
 namespace model {
 
@@ -32,13 +31,8 @@ inline Width choose_width(const dfm_host *host, const char *who) {
   if (!std::strcmp(forced, "sse2")) return kSse2;
   if (!std::strcmp(forced, "avx2") && avx2) return kAvx2;
   if (!std::strcmp(forced, "avx512") && avx512) return kAvx512;
-  char text[200];
-  std::snprintf(
-      text, sizeof text,
-      "%s: DEFORM_SIMD is none of sse2, avx2, avx512 or this processor lacks it; the best it has is "
-      "used.",
-      who);
-  host->log(host->ctx, 2, 0, text);
+  say(host, 2, who,
+      "DEFORM_SIMD is none of sse2, avx2, avx512 or this processor lacks it; the best it has is used");
   return best;
 }
 

@@ -7,77 +7,40 @@
 
 namespace corot {
 
-// `moves`: with velocities.
-Block load_block(const Call &call, uint32_t n, uint32_t begin, bool moves) {
-  Body &body = *call.body;
-  Block b = body.lend(n, begin);
-  b.state = call.k->state;
-  b.state_out = call.k->state_out;
-  b.flow = call.flow;
-  b.per_flow = call.flow > 0 ? 1 / call.flow : 0;
-  body.kernels->load(b, call.k->x, moves ? call.k->v : nullptr, call.k->stride);
+Block Body::load_block(const dfm_kin &k, uint32_t n, uint32_t begin, bool moves) {
+  Block b = lend(n, begin);
+  b.state = k.state;
+  b.state_out = k.state_out;
+  b.flow = flow_at(k);
+  b.per_flow = b.flow > 0 ? 1 / b.flow : 0;
+  kernels->load(b, k.x, moves ? k.v : nullptr, k.stride);
   for (uint32_t i = 0; b.nodal && i < b.local; ++i) {
-    const double *change = body.point_change.data() + 2 * size_t(b.point[i]);
+    const double *change = point_change.data() + 2 * size_t(b.point[i]);
     b.p[8 * size_t(i) + 3] = change[0];
     b.p[8 * size_t(i) + 7] = change[1];
   }
   return b;
 }
 
-namespace {
-
-void force_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    body.kernels->forces(load_block(call, n, begin, !body.damp.empty()));
-  }
-}
-
-void merge_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
-    body.merge_block(*body.kernels, n);
-    for (uint32_t i = 0; !body.point_drag.empty() && i < b.owned; ++i) {
-      const double c = body.point_drag[b.point[i]];
-      const double *v = call.k->v + size_t(call.k->stride) * b.point[i];
-      for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
-    }
-    body.kernels->store(b, call.f, call.k->stride);
-  }
-}
-
-void energy_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    body.kernels->energies(load_block(call, n, begin, false));
-  }
-}
-
-// f: [ncell,6] stresses
-void stress_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block b = load_block(call, n, begin, false);
-    body.kernels->stresses(b, b.cell, call.f);
-  }
-}
-
-}  // namespace
-
 double Body::flow_at(const dfm_kin &k) const {
   return plastic() ? model::plastic::flow_in(params[kCreep], k.dt) : 0;
 }
 
 void Body::add_forces(const dfm_kin &k, double *f_out) {
-  Call call(this, &k, f_out);
   if (nodal()) dilate(k);
-  for_each_block(ncell >= kParallelCells, force_pass, &call);
-  for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
+  for_each_block(ncell >= kParallelCells, [&](uint32_t n, uint32_t begin) {
+    kernels->forces(load_block(k, n, begin, !damp.empty()));
+  });
+  for_each_block(ncell >= kParallelMergeCells, [&](uint32_t n, uint32_t) {
+    const Block &b = block[n];
+    merge_block(*kernels, n);
+    for (uint32_t i = 0; !point_drag.empty() && i < b.owned; ++i) {
+      const double c = point_drag[b.point[i]];
+      const double *v = k.v + size_t(k.stride) * b.point[i];
+      for (int a = 0; a < 3; ++a) b.f[4 * size_t(i) + a] -= c * v[a];
+    }
+    kernels->store(b, f_out, k.stride);
+  });
 }
 
 // Uses the logarithm, which kernels do not have: one cell at a time.
@@ -110,9 +73,11 @@ double Body::direct_energy(const dfm_kin &k, size_t place) const {
 }
 
 void Body::fill_energies(const dfm_kin &k) {
-  Call call(this, &k, nullptr);
   if (nodal()) dilate(k);
-  if (choice(kEnergy) == kLinear) return for_each_block(ncell >= kParallelCells, energy_pass, &call);
+  if (choice(kEnergy) == kLinear)
+    return for_each_block(ncell >= kParallelCells, [&](uint32_t n, uint32_t begin) {
+      kernels->energies(load_block(k, n, begin, false));
+    });
   for (size_t place = 0; place < lanes(); ++place)
     if (cell_id[place] != kNone) value[place] = direct_energy(k, place);
 }
@@ -130,9 +95,11 @@ void Body::cell_energy(const dfm_kin &k, double *out) {
 }
 
 void Body::cell_stress(const dfm_kin &k, double *out) {
-  Call call(this, &k, out);
   if (nodal()) dilate(k);
-  for_each_block(ncell >= kParallelCells, stress_pass, &call);
+  for_each_block(ncell >= kParallelCells, [&](uint32_t n, uint32_t begin) {
+    const Block b = load_block(k, n, begin, false);
+    kernels->stresses(b, b.cell, out);
+  });
   for (size_t n = 0; n < 6 * size_t(ncell); ++n) out[n] = volume[n / 6] > 0 ? out[n] / volume[n / 6] : 0;
 }
 

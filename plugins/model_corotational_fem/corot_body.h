@@ -137,6 +137,8 @@ struct Body : model::Blocks<Block> {
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk);
 
  private:
+  // Block n with its points packed in, `moves`: with velocities; see lend().
+  Block load_block(const dfm_kin &k, uint32_t n, uint32_t begin, bool moves);
   void take_mesh(const dfm_mesh &m);
   void take_fields(const dfm_mesh &m);
   struct Layout;
@@ -171,18 +173,6 @@ struct Body : model::Blocks<Block> {
   void find_effects();
   void find_rows(Room &room);
 };
-
-// Arguments of the passes over blocks.
-struct Call {
-  Body *body;
-  const dfm_kin *k;
-  double *f;
-  double flow;
-  Call(Body *of, const dfm_kin *at, double *out) : body(of), k(at), f(out), flow(of->flow_at(*at)) {}
-};
-
-// Block n with its points packed in; see Body::lend.
-Block load_block(const Call &call, uint32_t n, uint32_t begin, bool moves);
 
 // Gradient of a cell at the positions of its corners, from the rest gradients of its lane; row-major.
 void gradient_of(const Group &group, uint32_t lane, const double *const *x, double *f);

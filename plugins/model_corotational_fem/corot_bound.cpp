@@ -37,17 +37,6 @@
 #include "corot_body.h"
 
 namespace corot {
-namespace {
-
-void twist_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    body.kernels->twists(load_block(call, n, begin, false));
-  }
-}
-
-}  // namespace
 
 void Body::cell_elasticity(size_t place, double (*d)[6]) const {
   const Group &g = group[place / kGroup];
@@ -82,9 +71,9 @@ void Body::find_rows(Room &room) {
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  Call call(this, &k, nullptr);
   if (nodal()) dilate(k);
-  for_each_block(ncell >= kParallelCells, twist_pass, &call);
+  for_each_block(ncell >= kParallelCells,
+                 [&](uint32_t n, uint32_t begin) { kernels->twists(load_block(k, n, begin, false)); });
   for (uint32_t i = 0; i < npoint; ++i) {
     ksum[i] += choice(kEnergy) == kLinear ? rest_rows[i] : 0;
     csum[i] += damp_rows[i] + (point_drag.empty() ? 0 : point_drag[i]);

@@ -17,36 +17,20 @@
 #include "corot_body.h"
 
 namespace corot {
-namespace {
-
-constexpr char kTooMany[] = "more than 4 billion pairs of points";
-
-void share_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) body.kernels->dilate(load_block(call, n, begin, !body.damp.empty()));
-}
-
-void change_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
-    body.merge_block(*body.kernels, n);
-    for (uint32_t i = 0; i < b.owned; ++i)
-      for (size_t m = 0; m < 2; ++m) {
-        const double all = body.bulk[2 * size_t(b.point[i]) + m];
-        body.point_change[2 * size_t(b.point[i]) + m] = all > 0 ? b.f[4 * size_t(i) + m] / all : 0;
-      }
-  }
-}
-
-}  // namespace
 
 void Body::dilate(const dfm_kin &k) {
-  Call call(this, &k, nullptr);
-  for_each_block(ncell >= kParallelCells, share_pass, &call);
-  for_each_block(ncell >= kParallelMergeCells, change_pass, &call);
+  for_each_block(ncell >= kParallelCells, [&](uint32_t n, uint32_t begin) {
+    kernels->dilate(load_block(k, n, begin, !damp.empty()));
+  });
+  for_each_block(ncell >= kParallelMergeCells, [&](uint32_t n, uint32_t) {
+    const Block &b = block[n];
+    merge_block(*kernels, n);
+    for (uint32_t i = 0; i < b.owned; ++i)
+      for (size_t m = 0; m < 2; ++m) {
+        const double all = bulk[2 * size_t(b.point[i]) + m];
+        point_change[2 * size_t(b.point[i]) + m] = all > 0 ? b.f[4 * size_t(i) + m] / all : 0;
+      }
+  });
 }
 
 void Body::find_bulk() {
@@ -80,24 +64,18 @@ Body::Patches &Body::ready_patches() const {
 
 // The points of the cells around a point are itself and its neighbors along edges.
 void Body::find_patches(Patches &to) const {
-  to.begin.create(host, size_t(npoint) + 1);
+  const auto each = [&](const auto &use) {
+    for (uint32_t i = 0; i < npoint; ++i) use(i, i);
+    for (size_t n = 0; n < 2 * size_t(nedge); ++n) use(edges[n], edges[n ^ 1u]);
+  };
+  model::make_lists(host, npoint, each, to.begin, to.point);
   to.pair_begin.create(host, size_t(npoint) + 1);
-  for (size_t n = 0; n < 2 * size_t(nedge); ++n) ++to.begin[edges[n] + 1];
   for (uint32_t i = 0; i < npoint; ++i) {
-    const uint64_t size = to.begin[i + 1] + uint64_t{1};
-    to.begin[i + 1] = model::after(to.begin[i], size, kTooMany);
-    to.pair_begin[i + 1] = model::after(to.pair_begin[i], size * (size + 1) / 2, kTooMany);
-  }
-  to.point.create(host, to.begin[npoint]);
-  Buffer<uint32_t> next;
-  next.create(host, npoint);
-  for (uint32_t i = 0; i < npoint; ++i) {
-    next[i] = to.begin[i];
-    to.point[next[i]++] = i;
-  }
-  for (size_t n = 0; n < 2 * size_t(nedge); ++n) to.point[next[edges[n]]++] = edges[n ^ 1u];
-  for (uint32_t i = 0; i < npoint; ++i)
+    const uint64_t size = to.begin[i + 1] - to.begin[i];
+    to.pair_begin[i + 1] =
+        model::after(to.pair_begin[i], size * (size + 1) / 2, "more than 4 billion pairs of points");
     std::sort(to.point.data() + to.begin[i], to.point.data() + to.begin[i + 1]);
+  }
 }
 
 // Points two edges away: counted, then listed.

@@ -32,26 +32,19 @@ model::Fiber Body::fiber_at(uint32_t c) const {
 }
 
 void Body::make_room(Room &room) const {
-  if (has_fibers() && choice(kEnergy) != kLinear) {
-    complain(host,
-             "anisotropy works with the energy corotational only; choose it, or leave the constants along "
-             "the axis at auto");
-    throw model::Refused{};
-  }
-  if (nodal() && (has_fibers() || choice(kEnergy) != kLinear)) {
-    complain(host,
-             "locking nodal works with the energy corotational and without anisotropy only; choose these, or "
-             "locking none");
-    throw model::Refused{};
-  }
-  if (!plastic() && largest_of(kYield) > 0) {
-    complain(host, model::plastic::kMadeWithout);
-    throw model::Refused{};
-  }
-  if (plastic() && (has_fibers() || choice(kEnergy) != kLinear)) {
-    complain(host, model::plastic::kNoFibers);
-    throw model::Refused{};
-  }
+  if (has_fibers() && choice(kEnergy) != kLinear)
+    model::refuse(
+        host, kId,
+        "anisotropy works with the energy corotational only; choose it, or leave the constants along "
+        "the axis at auto");
+  if (nodal() && (has_fibers() || choice(kEnergy) != kLinear))
+    model::refuse(
+        host, kId,
+        "locking nodal works with the energy corotational and without anisotropy only; choose these, or "
+        "locking none");
+  if (!plastic() && largest_of(kYield) > 0) model::refuse(host, kId, "%s", model::plastic::kMadeWithout);
+  if (plastic() && (has_fibers() || choice(kEnergy) != kLinear))
+    model::refuse(host, kId, "%s", model::plastic::kNoFibers);
   if (has_fibers()) room.fiber.create(host, groups);
   if (has_dampers()) {
     room.damp.create(host, lanes());

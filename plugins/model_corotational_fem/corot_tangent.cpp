@@ -18,16 +18,11 @@ namespace corot {
 namespace {
 
 using namespace model::plastic;
+using model::cross;
+using model::product;
 using model::rotation::Single;
 
 constexpr double kMin = 1e-12;  // two stretches that cancel, over the trace
-
-void cross(const double *x, const double *y, double *out) {
-  for (int k = 0; k < 3; ++k) out[k] = x[(k + 1) % 3] * y[(k + 2) % 3] - x[(k + 2) % 3] * y[(k + 1) % 3];
-}
-void turn(const double *r, const double *x, double *out) {
-  for (int k = 0; k < 3; ++k) out[k] = (r[3 * k] * x[0] + r[3 * k + 1] * x[1]) + r[3 * k + 2] * x[2];
-}
 
 // A cell at one shape: rotation, rest gradients, S with its axes (columns) and stretches.
 struct Shape {
@@ -144,12 +139,12 @@ void take_turned(const double *r, const double (*m)[3], double *out) {
   for (int j = 0; j < 3; ++j) {
     const double column[3] = {m[0][j], m[1][j], m[2][j]};
     double out_column[3];
-    turn(r, column, out_column);
+    product(r, column, out_column);
     for (int i = 0; i < 3; ++i) half[i][j] = out_column[i];
   }
   for (int i = 0; i < 3; ++i) {
     double row[3];
-    turn(r, half[i], row);
+    product(r, half[i], row);
     for (int j = 0; j < 3; ++j) out[3 * i + j] -= row[j];
   }
 }
@@ -280,7 +275,7 @@ void Body::add_collapse(size_t place, const double *const *x, const double (*g)[
   if (!(det < kFlat)) return;
   const double by =
       a * collapse_of<Single>(params[kCollapse], det, own.mu2[lane], own.lambda[lane]).stiffness;
-  for (int m = 0; m < 4; ++m) turn(cofactor, g[m], area[m]);
+  for (int m = 0; m < 4; ++m) product(cofactor, g[m], area[m]);
   each_block(slots[place / kGroup], lane, blk, [&](int m, int n, double *out) {
     for (int k = 0; k < 9; ++k) out[k] -= by * (area[m][k / 3] * area[n][k % 3]);
   });
@@ -319,10 +314,7 @@ void Body::add_stiffness(const dfm_kin &k, double a, double b, double *blk) {
     for (uint32_t c = 0; c < ncell; ++c)
       if (volume[c] > 0) add_exact(k, c, a, b, blk);
   } else {
-    for (uint32_t n = 0; n < nblock; ++n) {
-      Call call(this, &k, nullptr);
-      kernels->tangents(load_block(call, n, 0, false), a, b, blk);
-    }
+    for (uint32_t n = 0; n < nblock; ++n) kernels->tangents(load_block(k, n, 0, false), a, b, blk);
     for (uint32_t c = 0; plastic() && c < ncell; ++c)
       if (volume[c] > 0) add_softening(k, c, a, blk);
   }

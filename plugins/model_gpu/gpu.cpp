@@ -50,8 +50,7 @@ std::unique_ptr<Stepper> open_stepper(const dfm_host *host, const char *who, Cho
     }
     return std::make_unique<VulkanStepper>(std::move(vulkan), npoint);
   } catch (const std::string &why) {
-    model::complain(host, who, why.c_str());
-    throw model::Refused{};
+    model::refuse(host, who, "%s", why.c_str());
   }
 }
 

@@ -72,8 +72,7 @@ void Body<Of>::apply_params(const double *values) {
       throw;
     }
   } catch (const std::string &why) {
-    model::complain(host, Of::kId, why.c_str());
-    throw model::Refused{};
+    model::refuse(host, Of::kId, "%s", why.c_str());
   }
   const char **effect = active_effects;
   if (Of::kParams > kPoisson) *effect++ = "volume";
@@ -199,12 +198,10 @@ dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
     const double all = k.dt / stable - kRounding,
                  steps = all <= 1 ? 1 : std::ceil(k.dt / (Of::kShare * stable) - kRounding);
     if (!(steps <= kMaxSteps)) {
-      char text[160];
-      std::snprintf(text, sizeof text,
-                    "a step of %g s needs %.3g sub-steps of %.3g s; soften or coarsen the body, lower its "
-                    "damping, or take a shorter step",
-                    k.dt, steps, k.dt / steps);
-      model::complain(host, Of::kId, text);
+      model::say(host, 3, Of::kId,
+                 "a step of %g s needs %.3g sub-steps of %.3g s; soften or coarsen the body, lower its "
+                 "damping, or take a shorter step",
+                 k.dt, steps, k.dt / steps);
       return DFM_DISCARD;
     }
     const bool moved = take_points(k) || unlike_, loaded = take_loads(f, k.stride) || unlike_;
@@ -306,17 +303,11 @@ void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v)
 // Sums of blocks of springs or cells, in the order of the blocks.
 template <class Of>
 double Body<Of>::energy(const dfm_kin &k) {
-  struct Shape {
-    Body *body;
-    const dfm_kin *k;
-  } shape{this, &k};
-  const auto blocks = [](void *user, uint32_t begin, uint32_t end) {
-    const Shape &of = *static_cast<const Shape *>(user);
-    for (uint32_t at = begin; at < end; at += kGrain)
-      of.body->block_energy_[at / kGrain] = of.body->parts_.energy(*of.k, at, std::min(at + kGrain, end));
-  };
   const uint32_t count = parts_.count();
-  host->parallel_for(host->ctx, count, kGrain, blocks, &shape);
+  model::in_pieces(host, true, count, kGrain, [&](uint32_t begin, uint32_t end) {
+    for (uint32_t at = begin; at < end; at += kGrain)
+      block_energy_[at / kGrain] = parts_.energy(k, at, std::min(at + kGrain, end));
+  });
   double sum = 0;
   for (uint32_t at = 0; at < count; at += kGrain) sum += block_energy_[at / kGrain];
   return sum;

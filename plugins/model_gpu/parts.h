@@ -34,11 +34,9 @@ struct Parts {
   // f(n) for each of `all`, on the host's workers.
   template <class F>
   static void each(const dfm_host *host, uint32_t all, const F &f) {
-    const auto some = [](void *user, uint32_t begin, uint32_t end) {
-      const F &one = *static_cast<const F *>(user);
-      for (size_t i = begin; i < end; ++i) one(i);
-    };
-    host->parallel_for(host->ctx, all, kGrain, some, const_cast<F *>(&f));
+    model::in_pieces(host, true, all, kGrain, [&](uint32_t begin, uint32_t end) {
+      for (size_t i = begin; i < end; ++i) f(i);
+    });
   }
 };
 

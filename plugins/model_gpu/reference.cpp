@@ -7,16 +7,6 @@ namespace {
 
 constexpr uint32_t kGrain = 1024;
 
-struct Task {
-  const Work::Pass *pass;
-  Call call;
-};
-
-void do_some(void *user, uint32_t begin, uint32_t end) {
-  const Task &task = *static_cast<const Task *>(user);
-  task.pass->some(task.call, begin, end);
-}
-
 }  // namespace
 
 size_t lay_out(Buffer<uvec2> &row, uint32_t npoint) {
@@ -58,19 +48,20 @@ void Reference::take(const Work &work) {
 
 const char *Reference::run(uint32_t n, double h, const Dampers &dampers, bool, bool) {
   *highest_ = 0;
-  Task task{};
+  Call call{};
   for (uint32_t a = 0; a < kHighest - kOwn; ++a)
-    task.call.array[kOwn + a] = own_[a].empty() ? const_cast<void *>(work_.array[a].data) : own_[a].data();
-  task.call.array[kLoad] = load;
-  task.call.array[kHighest] = highest_;
+    call.array[kOwn + a] = own_[a].empty() ? const_cast<void *>(work_.array[a].data) : own_[a].data();
+  call.array[kLoad] = load;
+  call.array[kHighest] = highest_;
   for (uint32_t k = 0; k < n; ++k) {
     dvec4 *const now[6] = {place, speed, seen, next_place_, next_speed_, next_seen_};
     constexpr Binding to[6] = {kPlace, kSpeed, kSeen, kNextPlace, kNextSpeed, kNextSeen};
-    for (int a = 0; a < 6; ++a) task.call.array[to[a]] = now[a];
+    for (int a = 0; a < 6; ++a) call.array[to[a]] = now[a];
     for (uint32_t p = 0; p < work_.npass; ++p) {
-      task.pass = &work_.pass[p];
-      task.call.now = dampers.constants(h, task.pass->count);
-      host_->parallel_for(host_->ctx, task.pass->count, kGrain, do_some, &task);
+      const Work::Pass &pass = work_.pass[p];
+      call.now = dampers.constants(h, pass.count);
+      model::in_pieces(host_, true, pass.count, kGrain,
+                       [&](uint32_t begin, uint32_t end) { pass.some(call, begin, end); });
     }
     std::swap(place, next_place_);
     std::swap(speed, next_speed_);

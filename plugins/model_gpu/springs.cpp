@@ -2,6 +2,7 @@
 
 #include "../model_common/edges.h"
 #include "../model_common/even_rows.h"
+#include "../model_common/small.h"
 #include "../model_common/spring_directions.h"
 #include "as_cpp.h"
 
@@ -12,21 +13,18 @@ namespace {
 constexpr double kShortestEdge = 1e-6, kLongestEdge = 1e4;
 constexpr uint32_t kNone = ~0u;
 
-double square_between(const double *x, const double *y) {
-  const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
-  return (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
-}
+using model::square_between;
 
 double volume_of(const double *x0, const double *x1, const double *x2, const double *x3) {
   const auto from = [&](const double *x, double *d) {
     for (int a = 0; a < 3; ++a) d[a] = x[a] - x0[a];
   };
-  double a[3], b[3], c[3];
+  double a[3], b[3], c[3], normal[3];
   from(x1, a);
   from(x2, b);
   from(x3, c);
-  const double normal[3] = {b[1] * c[2] - b[2] * c[1], b[2] * c[0] - b[0] * c[2], b[0] * c[1] - b[1] * c[0]};
-  return std::fabs((a[0] * normal[0] + a[1] * normal[1]) + a[2] * normal[2]) / 6;
+  model::cross(b, c, normal);
+  return std::fabs(model::dot(a, normal)) / 6;
 }
 
 // The kernel: its functions are members here.

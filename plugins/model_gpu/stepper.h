@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "../model_common/buffer.h"
+#include "../model_common/pieces.h"
 
 namespace gpu {
 

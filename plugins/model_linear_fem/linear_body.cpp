@@ -19,7 +19,6 @@ namespace {
 
 // From this size on rows go through the host's parallel_for, in pieces of this many points.
 constexpr uint32_t kParallelCells = 10000, kGrain = 512;
-double dot(const double *u, const double *w) { return (u[0] * w[0] + u[1] * w[1]) + u[2] * w[2]; }
 
 // out -= K d, of a block or (second end of an edge) its transpose.
 void take_product(const double *k, bool transposed, const double *d, double *out) {
@@ -27,12 +26,6 @@ void take_product(const double *k, bool transposed, const double *d, double *out
   for (int r = 0; r < 3; ++r)
     out[r] -= (k[row * r] * d[0] + k[row * r + column] * d[1]) + k[row * r + 2 * column] * d[2];
 }
-
-struct Call {
-  const Body *body;
-  const dfm_kin *k;
-  double *f;
-};
 
 }  // namespace
 
@@ -60,24 +53,16 @@ void Body::take_fields(const dfm_mesh &m) {
 }
 
 void Body::find_rows() {
-  row_begin.create(host, size_t(npoint) + 1);
+  const auto each = [&](const auto &use) {
+    for (uint32_t n = 0; n < 2 * nedge; ++n) use(edges[n], n);
+  };
+  model::make_lists(host, npoint, each, row_begin, row_edge);
   row_point.create(host, 2 * size_t(nedge));
-  row_edge.create(host, 2 * size_t(nedge));
-  for (size_t n = 0; n < 2 * size_t(nedge); ++n) ++row_begin[edges[n] + 1];
-  for (uint32_t i = 0; i < npoint; ++i) row_begin[i + 1] += row_begin[i];
-  Buffer<uint32_t> next;
-  next.create(host, npoint);
-  std::copy(row_begin.data(), row_begin.data() + npoint, next.data());
-  for (uint32_t n = 0; n < 2 * nedge; ++n) {
-    const uint32_t slot = next[edges[n]]++;
-    row_point[slot] = edges[n ^ 1u];
-    row_edge[slot] = n;
-  }
+  for (size_t s = 0; s < 2 * size_t(nedge); ++s) row_point[s] = edges[row_edge[s] ^ 1u];
 }
 
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
-  if (!model::in_range(h, kId, kParams, kParamCount, m.params)) throw model::Refused{};
   take_mesh(m);
   take_fields(m);
   find_rows();
@@ -126,7 +111,7 @@ void Body::add_cell(uint32_t c, const Tetrahedron &t, const model::Lame &m, doub
     const bool ordered = q[kEdgeOf[n][0]] < q[kEdgeOf[n][1]];
     const double *const ga = t.g[kEdgeOf[n][ordered ? 0 : 1]];
     const double *const gb = t.g[kEdgeOf[n][ordered ? 1 : 0]];
-    const double across = m.mu * dot(ga, gb);
+    const double across = m.mu * model::dot(ga, gb);
     const size_t first = 9 * size_t(cell_edge[6 * size_t(c) + n]);
     for (size_t r = 0; r < 3; ++r)
       for (size_t s = 0; s < 3; ++s) {
@@ -171,14 +156,8 @@ void Body::force_rows(const dfm_kin &k, double *f, uint32_t begin, uint32_t end)
 }
 
 void Body::add_forces(const dfm_kin &k, double *f) const {
-  Call call{this, &k, f};
-  const auto piece = [](void *user, uint32_t begin, uint32_t end) {
-    const Call &of = *static_cast<const Call *>(user);
-    of.body->force_rows(*of.k, of.f, begin, end);
-  };
-  if (ncell >= kParallelCells && host->parallel_for)
-    host->parallel_for(host->ctx, npoint, kGrain, piece, &call);
-  else piece(&call, 0, npoint);
+  model::in_pieces(host, ncell >= kParallelCells, npoint, kGrain,
+                   [&](uint32_t begin, uint32_t end) { force_rows(k, f, begin, end); });
 }
 
 void Body::bound(const dfm_kin &, double *k, double *c) const {

@@ -39,9 +39,6 @@ struct Body {
   void pattern(uint32_t *ij) const;
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk) const;
 
-  // Rows [begin, end) of the forces.
-  void force_rows(const dfm_kin &k, double *f, uint32_t begin, uint32_t end) const;
-
  private:
   Buffer<double> field[kParamCount];  // [ncell] values by cell in place of a parameter's; empty without
   Buffer<double> rest, mass;          // [npoint,3] m, [npoint] kg
@@ -57,6 +54,9 @@ struct Body {
   Buffer<double> ksum, csum;    // [npoint] of the bound
   bool damping_on = false, drag_on = false;
   model::SmallRange range;
+
+  // Rows [begin, end) of the forces.
+  void force_rows(const dfm_kin &k, double *f, uint32_t begin, uint32_t end) const;
 
   double at(Param which, uint32_t c) const { return field[which].empty() ? params[which] : field[which][c]; }
   void take_mesh(const dfm_mesh &m);

@@ -21,13 +21,7 @@ const dfm_param kParams[kParamCount] = {
 
 namespace {
 
-dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
-  return model::create<AnyBody>(h, m, kId, self);
-}
-
-dfm_status set_params(void *self, const double *params) {
-  return model::change_in_range<AnyBody>(self, kId, kParams, params);
-}
+using Entry = model::InRange<AnyBody, kId, kParams>;
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
@@ -44,7 +38,7 @@ const char *const kEffects[] = {"damping", nullptr};
 
 const dfm_model kModel = model::table<AnyBody>(
     DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_CONSTANT_STIFFNESS | DFM_CAP_INSIDE,
-    create, set_params, nullptr, extension);
+    Entry::create, Entry::set_params, nullptr, extension);
 
 const dfm_type kType =
     dfm::plugin::type(DFM_KIND_MODEL, kId, "linear elasticity", "0.1.0", "MIT",

@@ -32,13 +32,7 @@ const dfm_param kParams[kParamCount] = {
 
 namespace {
 
-dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
-  return model::create<Body>(h, m, kId, self);
-}
-
-dfm_status set_params(void *self, const double *params) {
-  return model::change_in_range<Body>(self, kId, kParams, params);
-}
+using Entry = model::InRange<Body, kId, kParams>;
 
 const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
@@ -54,7 +48,7 @@ const char *const kEffects[] = {"large_rotation", "damping", nullptr};
 
 const dfm_model kModel =
     model::table<Body>(DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
-                       create, set_params, nullptr, extension);
+                       Entry::create, Entry::set_params, nullptr, extension);
 
 const dfm_type kType =
     dfm::plugin::type(DFM_KIND_MODEL, kId, "meshless elasticity", "0.1.0", "MIT",

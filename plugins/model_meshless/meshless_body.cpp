@@ -20,22 +20,9 @@ namespace {
 constexpr uint32_t kParallelPoints = 2000, kGrain = 64;
 constexpr double kSmall = 1e-24;  // residuals that turn nothing: their square over that of the offsets
 
-struct Call {
-  Body *body;
-  const dfm_kin *k;
-  double *f;
-};
+using model::matrix_product;
+using model::transposed_matrix_product;
 
-void multiply(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      out[3 * i + j] = (a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j]) + a[3 * i + 2] * b[6 + j];
-}
-// a^T b
-void multiply_turned(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) out[3 * i + j] = (a[i] * b[j] + a[3 + i] * b[3 + j]) + a[6 + i] * b[6 + j];
-}
 void add_product(const double *a, const double *x, double *out) {
   for (int i = 0; i < 3; ++i) out[i] += (a[3 * i] * x[0] + a[3 * i + 1] * x[1]) + a[3 * i + 2] * x[2];
 }
@@ -45,7 +32,7 @@ void add_product(const double *a, const double *x, double *out) {
 void shape_of(const double *f, Shape &out) {
   double s[9], sym[3][3];
   model::rotation::polar_of(f, out.rotation);
-  multiply_turned(out.rotation, f, s);
+  transposed_matrix_product(out.rotation, f, s);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) sym[i][j] = 0.5 * (s[3 * i + j] + s[3 * j + i]);
   model::jacobi(sym, out.axis);
@@ -57,11 +44,11 @@ void shape_of(const double *f, Shape &out) {
 void stress_of(Strain strain, const Solid &c, const double *f, double *out) {
   double r[9], s[9];
   if (strain == kGreen) {
-    multiply_turned(f, f, s);
+    transposed_matrix_product(f, f, s);
     for (int k = 0; k < 9; ++k) s[k] = 0.5 * (s[k] - (k % 4 == 0));
     const double pressure = c.lambda * ((s[0] + s[4]) + s[8]);
     for (int k = 0; k < 9; ++k) s[k] = 2 * c.mu * s[k] + (k % 4 == 0 ? pressure : 0);
-    return multiply(f, s, out);
+    return matrix_product(f, s, out);
   }
   model::rotation::polar_of(f, r);
   double change = -3;
@@ -132,12 +119,12 @@ void Body::find_stress(const dfm_kin &k, uint32_t point) {
   if (c.damping > 0) {
     double *const change = rate.data() + 9 * size_t(point), e[9], s[9], damper[9];
     gradient_of(k.v, k.stride, point, change);
-    multiply_turned(f, change, e);
+    transposed_matrix_product(f, change, e);
     const double pressure = c.lambda * ((e[0] + e[4]) + e[8]);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
         s[3 * i + j] = c.damping * (c.mu * (e[3 * i + j] + e[3 * j + i]) + (i == j ? pressure : 0));
-    multiply(f, s, damper);
+    matrix_product(f, s, damper);
     for (int n = 0; n < 9; ++n) p[n] += damper[n];
   }
   for (int n = 0; n < 9; ++n) p[n] *= c.volume;
@@ -146,20 +133,15 @@ void Body::find_stress(const dfm_kin &k, uint32_t point) {
 
 // Inverse of sum w (|r|^2 - r r^T) on the turns that move the residuals [n,3] of the neighbors.
 void Body::turning_inverse(const double *residuals, uint32_t point, double *out) const {
-  double j[3][3] = {}, v[3][3], most = 0;
+  double j[3][3] = {};
   for (uint32_t n = begin[point]; n < begin[point + 1]; ++n) {
     const double *const r = residuals + 3 * size_t(n - begin[point]);
     const double w = weight[n], square = (r[0] * r[0] + r[1] * r[1]) + r[2] * r[2];
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) j[a][b] += w * ((a == b ? square : 0) - r[a] * r[b]);
   }
-  model::jacobi(j, v);
-  for (int a = 0; a < 3; ++a) most = j[a][a] > most ? j[a][a] : most;
-  for (int e = 0; e < 9; ++e) out[e] = 0;
-  for (int a = 0; a < 3; ++a) {
-    if (!(j[a][a] > kSmall && j[a][a] > 1e-10 * most)) continue;
-    for (int e = 0; e < 9; ++e) out[e] += v[e / 3][a] * v[e % 3][a] / j[a][a];
-  }
+  model::spectral_inverse(j, out,
+                          [](double x, double most) { return x > kSmall && x > 1e-10 * most ? x : 0; });
 }
 
 void Body::add_force(const dfm_kin &k, double *f, uint32_t point) const {
@@ -174,7 +156,7 @@ void Body::add_force(const dfm_kin &k, double *f, uint32_t point) const {
   for (uint32_t n = begin[point]; residuals && n < begin[point + 1]; ++n)
     for (size_t a = 0; a < 3; ++a) sum[a] += pull[3 * size_t(n) + a];
   for (uint32_t b = back_begin[point]; b < back_begin[point + 1]; ++b) {
-    const uint32_t i = back_point[b], n = back_place[b];
+    const auto [i, n] = back[b];
     take(i, slope.data() + 3 * size_t(n));
     if (!(solid[i].residual > 0)) continue;
     for (size_t a = 0; a < 3; ++a) sum[a] -= pull[3 * size_t(n) + a];
@@ -184,34 +166,20 @@ void Body::add_force(const dfm_kin &k, double *f, uint32_t point) const {
   for (int a = 0; a < 3; ++a) out[a] += drag > 0 ? sum[a] - drag * v[a] : sum[a];
 }
 
-void Body::for_points(void (*piece)(void *, uint32_t, uint32_t), void *user) const {
-  if (npoint >= kParallelPoints && host->parallel_for)
-    host->parallel_for(host->ctx, npoint, kGrain, piece, user);
-  else piece(user, 0, npoint);
+template <class F>
+void Body::for_points(const F &f) const {
+  model::in_pieces(host, npoint >= kParallelPoints, npoint, kGrain, [&](uint32_t first, uint32_t end) {
+    for (uint32_t i = first; i < end; ++i) f(i);
+  });
 }
 
 void Body::add_forces(const dfm_kin &k, double *f) {
-  Call call{this, &k, f};
-  const auto stresses = [](void *user, uint32_t first, uint32_t end) {
-    const Call &of = *static_cast<const Call *>(user);
-    for (uint32_t i = first; i < end; ++i) of.body->find_stress(*of.k, i);
-  };
-  const auto forces = [](void *user, uint32_t first, uint32_t end) {
-    const Call &of = *static_cast<const Call *>(user);
-    for (uint32_t i = first; i < end; ++i) of.body->add_force(*of.k, of.f, i);
-  };
-  for_points(stresses, &call);
-  for_points(forces, &call);
+  for_points([&](uint32_t i) { find_stress(k, i); });
+  for_points([&](uint32_t i) { add_force(k, f, i); });
 }
 
 void Body::find_gradients(const dfm_kin &k) {
-  Call call{this, &k, nullptr};
-  const auto gradients = [](void *user, uint32_t first, uint32_t end) {
-    const Call &of = *static_cast<const Call *>(user);
-    for (uint32_t i = first; i < end; ++i)
-      of.body->gradient_of(of.k->x, of.k->stride, i, of.body->gradient.data() + 9 * size_t(i));
-  };
-  for_points(gradients, &call);
+  for_points([&](uint32_t i) { gradient_of(k.x, k.stride, i, gradient.data() + 9 * size_t(i)); });
 }
 
 // J/m3, of the gradient.

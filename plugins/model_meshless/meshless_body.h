@@ -3,8 +3,10 @@
 #pragma once
 #include <deform/plugin.h>
 
-#include "../model_common/buffer.h"
 #include "../model_common/entry.h"
+#include "../model_common/lists.h"
+#include "../model_common/pieces.h"
+#include "../model_common/small.h"
 
 namespace meshless {
 
@@ -61,10 +63,6 @@ struct Body {
   void pattern(uint32_t *ij) const;
   void add_stiffness(const dfm_kin &k, double a, double b, double *blk);
 
-  // One point, for passes in any cut: its gradient and what follows; what acts on it.
-  void find_stress(const dfm_kin &k, uint32_t point);
-  void add_force(const dfm_kin &k, double *f, uint32_t point) const;
-
  private:
   Buffer<double> rest, mass;          // [npoint,3] m, [npoint] kg
   Buffer<double> cell_volume;         // [ncell] m3, 0 for what is turned inside out
@@ -74,7 +72,9 @@ struct Body {
   Buffer<uint32_t> begin, neighbor;  // [npoint + 1]
   Buffer<double> slope, weight;      // [.,3] 1/m, [.] 1/m2
   // The same by neighbor: points whose neighbor a point is, ascending, and its place among theirs.
-  Buffer<uint32_t> back_begin, back_point, back_place;
+  struct Back { uint32_t point, place; };
+  Buffer<uint32_t> back_begin;
+  Buffer<Back> back;
   Buffer<double> volume;                // [npoint] m3
   Buffer<double> around, shared;        // [npoint] m3, a quarter of its cells; J/m3 of the energy there
   Buffer<Solid> solid;                  // [npoint]
@@ -106,7 +106,11 @@ struct Body {
   void turning_inverse(const double *residuals, uint32_t point, double *out) const;
   double density_at(uint32_t point) const;
   double energy_at(const dfm_kin &k, uint32_t point) const;
-  void for_points(void (*piece)(void *, uint32_t, uint32_t), void *user) const;
+  template <class F>
+  void for_points(const F &f) const;
+  // One point, for passes in any cut: its gradient and what follows; what acts on it.
+  void find_stress(const dfm_kin &k, uint32_t point);
+  void add_force(const dfm_kin &k, double *f, uint32_t point) const;
   void find_gradients(const dfm_kin &k);
   uint32_t stencil_of(uint32_t point, double *g, double *h) const;
   void add_point(const dfm_kin &k, uint32_t point, double a, double b, double *blk);

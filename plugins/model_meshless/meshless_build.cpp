@@ -20,11 +20,6 @@ constexpr uint32_t kNearest = 10;
 // Least eigenvalue of the moments over the largest: what a neighborhood that spans space well has.
 constexpr double kFlat = 1e-3;
 
-double distance2(const double *a, const double *b) {
-  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-  return (x * x + y * y) + z * z;
-}
-
 // Points by cubes of a grid, for those near a place.
 struct Grid {
   const double *rest;
@@ -54,16 +49,10 @@ struct Grid {
     for (int a = 0; a < 3; ++a) room *= std::max(high[a] - low[a], 1e-3 * size);
     cell = 2 * dfm_pow(room / npoint, 1.0 / 3);
     for (int a = 0; a < 3; ++a) n[a] = uint32_t((high[a] - low[a]) / cell) + 1;
-    begin.create(host, size_t(n[0]) * n[1] * n[2] + 1);
-    point.create(host, npoint);
-    for (uint32_t i = 0; i < npoint; ++i) ++begin[cube(rest + 3 * size_t(i)) + 1];
-    for (size_t c = 0; c < size_t(n[0]) * n[1] * n[2]; ++c) begin[c + 1] += begin[c];
-    Buffer<uint32_t> next;
-    next.create(host, size_t(n[0]) * n[1] * n[2]);
-    for (uint32_t i = 0; i < npoint; ++i) {
-      const uint32_t c = cube(rest + 3 * size_t(i));
-      point[begin[c] + next[c]++] = i;
-    }
+    const auto each = [&](const auto &use) {
+      for (uint32_t i = 0; i < npoint; ++i) use(cube(rest + 3 * size_t(i)), i);
+    };
+    model::make_lists(host, size_t(n[0]) * n[1] * n[2], each, begin, point);
   }
   // Calls use(j, distance squared) of every point within the radius of point i but itself.
   template <class Use>
@@ -79,7 +68,7 @@ struct Grid {
         for (uint32_t w = from[2]; w <= to[2]; ++w) {
           const size_t c = (size_t(u) * n[1] + v) * n[2] + w;
           for (uint32_t p = begin[c]; p < begin[c + 1]; ++p) {
-            const double d = distance2(x, rest + 3 * size_t(point[p]));
+            const double d = model::square_between(x, rest + 3 * size_t(point[p]));
             if (point[p] != i && d < radius * radius) use(point[p], d);
           }
         }
@@ -139,7 +128,6 @@ double mean_distance(const Grid &grid, uint32_t i, uint32_t npoint) {
 
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
-  if (!model::in_range(h, kId, kParams, kParamCount, m.params)) throw model::Refused{};
   std::copy(m.params, m.params + kParamCount, params);
   npoint = m.npoint;
   ncell = m.ncell;
@@ -228,19 +216,11 @@ void Body::find_neighbors() {
 }
 
 void Body::find_back() {
-  back_begin.create(host, size_t(npoint) + 1);
-  back_point.create(host, begin[npoint]);
-  back_place.create(host, begin[npoint]);
-  for (uint32_t n = 0; n < begin[npoint]; ++n) ++back_begin[neighbor[n] + 1];
-  for (uint32_t i = 0; i < npoint; ++i) back_begin[i + 1] += back_begin[i];
-  Buffer<uint32_t> next;
-  next.create(host, npoint);
-  for (uint32_t i = 0; i < npoint; ++i)
-    for (uint32_t n = begin[i]; n < begin[i + 1]; ++n) {
-      const uint32_t j = neighbor[n], place = back_begin[j] + next[j]++;
-      back_point[place] = i;
-      back_place[place] = n;
-    }
+  const auto each = [&](const auto &use) {
+    for (uint32_t i = 0; i < npoint; ++i)
+      for (uint32_t n = begin[i]; n < begin[i + 1]; ++n) use(neighbor[n], Back{i, n});
+  };
+  model::make_lists(host, npoint, each, back_begin, back);
 }
 
 void Body::offset(uint32_t point, uint32_t place, double *out) const {

@@ -33,7 +33,7 @@ double norm_of(const Solid &c, const double *a, const double *b) {
   return std::max(std::sqrt(0.5 * (sum + root)), std::fabs(n));
 }
 
-double dot(const double *a, const double *b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
+using model::dot;
 
 void cut_negative(Modes &m) {
   double a[3][3], v[3][3];
@@ -165,7 +165,7 @@ void Body::make_pattern() const {
         for (uint32_t m = begin[i]; m < begin[i + 1]; ++m) meet(neighbor[m]);
       };
       stencil(p);
-      for (uint32_t b = back_begin[p]; b < back_begin[p + 1]; ++b) stencil(back_point[b]);
+      for (uint32_t b = back_begin[p]; b < back_begin[p + 1]; ++b) stencil(back[b].point);
       for (uint32_t m = 0; m < n; ++m) seen[row[m]] = 0;
       if (!fill) {
         first[p + 1] = model::after(first[p], n, "more than 4 billion pairs of points");

@@ -133,7 +133,7 @@ dfm_status prepare_single(void *self) {
 dfm_status add_single_forces(void *self, const dfm_kin *k, double *f) {
   Body &body = *static_cast<Body *>(self);
   if (!body.has_single()) return DFM_E_STATE;
-  body.add_single_forces(*k, f);
+  body.add_forces(*k, f, true);
   return DFM_OK;
 }
 

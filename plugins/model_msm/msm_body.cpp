@@ -7,51 +7,6 @@
 #include "msm_body.h"
 
 namespace msm {
-namespace {
-
-void force_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  const Damping damping = body.damping();
-  const double damp = body.damp_scale() * body.params[kDampingStiffness];
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block b = body.lend(n, begin);
-    body.kernels->load(b, call.k->x, damping != kUndamped ? call.k->v : nullptr, call.k->stride);
-    if (call.branch) body.kernels->branches[damping](b, damp, *call.branch);
-    else body.kernels->springs[body.form()][damping](b, damp);
-    if (body.cells_on) body.kernels->cells(b);
-  }
-}
-
-void single_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  const SingleKernels &kernels = *body.kernels->single;
-  const Damping damping = body.damping();
-  const float damp = float(body.damp_scale() * body.params[kDampingStiffness]);
-  for (uint32_t n = begin; n < end; ++n) {
-    SingleBlock b = body.single.block[n];
-    b.at = reinterpret_cast<SinglePoint *>(body.lend(n, begin).p);
-    const float unit = kernels.load(b, call.k->x, damping != kUndamped ? call.k->v : nullptr, call.k->stride);
-    kernels.forces[body.form() != kPlain][damping][body.cells_on](b, unit, damp);
-  }
-}
-
-void merge_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  const double *const drags = body.point_drag.empty() ? nullptr : body.point_drag.data();
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
-    body.merge_block(*body.kernels, n);
-    if (body.drag_on)
-      body.kernels->drag(b, body.mass.data(), drags, body.params[kDampingMass], call.k->v, call.k->stride);
-    if (call.take) call.take(call.user, n, b.owned, b.point, b.f);
-    else body.kernels->store(b, call.f, call.k->stride);
-  }
-}
-
-}  // namespace
 
 const Kernels *choose_kernels(const dfm_host *host) {
   const model::Width width = model::choose_width(host, "msm");
@@ -93,27 +48,41 @@ bool Body::lacks_state(const dfm_kin &k) const {
   return true;
 }
 
-void Body::add_forces(const dfm_kin &k, double *f_out) {
-  Call call{this, &k, f_out};
-  sum_forces(call, false);
+template <class Store>
+void Body::sum_forces(const dfm_kin &k, bool in_single, const Store &store) {
+  const Branch branch = branch_at(k);
+  if (has_branch() && k.state_out) k.state_out[nedge] = branch.next;
+  const Damping how = damping();
+  const double all = damp_scale() * params[kDampingStiffness], *const v = how != kUndamped ? k.v : nullptr;
+  for_each_block(ncell >= kParallelCells, [&](uint32_t n, uint32_t begin) {
+    const Block b = lend(n, begin);
+    if (in_single) {
+      SingleBlock s = single.block[n];
+      s.at = reinterpret_cast<SinglePoint *>(b.p);
+      const float unit = kernels->single->load(s, k.x, v, k.stride);
+      kernels->single->forces[form() != kPlain][how][cells_on](s, unit, float(all));
+      return;
+    }
+    kernels->load(b, k.x, v, k.stride);
+    if (has_branch()) kernels->branches[how](b, all, branch);
+    else kernels->springs[form()][how](b, all);
+    if (cells_on) kernels->cells(b);
+  });
+  const double *const drags = point_drag.empty() ? nullptr : point_drag.data();
+  for_each_block(ncell >= kParallelMergeCells, [&](uint32_t n, uint32_t) {
+    const Block &b = block[n];
+    merge_block(*kernels, n);
+    if (drag_on) kernels->drag(b, mass.data(), drags, params[kDampingMass], k.v, k.stride);
+    store(n, b);
+  });
 }
 
-void Body::add_single_forces(const dfm_kin &k, double *f_out) {
-  Call call{this, &k, f_out};
-  sum_forces(call, true);
+void Body::add_forces(const dfm_kin &k, double *f_out, bool in_single) {
+  sum_forces(k, in_single, [&](uint32_t, const Block &b) { kernels->store(b, f_out, k.stride); });
 }
 
 void Body::part_forces(const dfm_kin &k, bool in_single, dfm_take_part_fn take, void *user) {
-  Call call{this, &k, nullptr, nullptr, take, user};
-  sum_forces(call, in_single);
-}
-
-void Body::sum_forces(Call &call, bool in_single) {
-  const Branch branch = branch_at(*call.k);
-  if (has_branch()) call.branch = &branch;
-  if (has_branch() && call.k->state_out) call.k->state_out[nedge] = branch.next;
-  for_each_block(ncell >= kParallelCells, in_single ? single_pass : force_pass, &call);
-  for_each_block(ncell >= kParallelMergeCells, merge_pass, &call);
+  sum_forces(k, in_single, [&](uint32_t n, const Block &b) { take(user, n, b.owned, b.point, b.f); });
 }
 
 // T = k (L - L0 - part q), q the dashpot's extension: a plain spring of the same stiffness and a rest length
@@ -125,7 +94,7 @@ void Body::rest_of_branches(uint32_t n, const dfm_kin &k) {
     const uint32_t e = spring_edge[s];
     if (e == kNone) continue;
     const uint32_t *ends = edges.data() + 2 * size_t(e);
-    const double dd = square_of(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]);
+    const double dd = square_between(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]);
     const double more = __builtin_sqrt(dd + tilt[s]) - rest[s];
     rest_now[s] = rest[s] + branch.part * ((1 - branch.kept) * more - branch.state[e]);
   }

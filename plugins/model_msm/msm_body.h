@@ -9,6 +9,7 @@
 
 #include "../model_common/blocks.h"
 #include "../model_common/entry.h"
+#include "../model_common/small.h"
 #include "msm_kernel.h"
 
 namespace msm {
@@ -70,8 +71,6 @@ struct Single {
     for (Buffer<float> *each : {&bulk, &volume6, &collapse, &limit}) each->create(h, ncell);
   }
 };
-
-struct Call;
 
 struct Body : model::Blocks<Block> {
   using Row = Param;
@@ -166,8 +165,8 @@ struct Body : model::Blocks<Block> {
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
 
-  void add_forces(const dfm_kin &k, double *f_out);
-  void add_single_forces(const dfm_kin &k, double *f_out);  // after prepare_single()
+  void add_forces(const dfm_kin &k, double *f_out,
+                  bool in_single = false);  // in_single: see prepare_single()
   // the same, block by block; in_single: after prepare_single()
   void part_forces(const dfm_kin &k, bool in_single, dfm_take_part_fn take, void *user);
   void bound(const dfm_kin &k, double *ksum, double *csum);
@@ -208,22 +207,17 @@ struct Body : model::Blocks<Block> {
   void fill_stiffness();
   void fill_single();
   void find_weights(Room &room);
-  void sum_forces(Call &call, bool in_single);
+  // store(n, b): takes the sums of block n
+  template <class Store>
+  void sum_forces(const dfm_kin &k, bool in_single, const Store &store);
+  // use(i, |A_i|, sums): of all springs and cells of the point, for all points
+  template <class Use>
+  void each_row(const dfm_kin &k, const Use &use);
   double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
   struct SpringTangent { double along, across; };  // N/m
   SpringTangent spring_tangent(uint32_t e, double square, const Branch &branch) const;
   void add_springs(const dfm_kin &k, double a, double b, double *blk) const;
   void add_cells(const dfm_kin &k, double a, double *blk) const;
-};
-
-// Arguments of the passes over blocks.
-struct Call {
-  Body *body;
-  const dfm_kin *k;
-  double *f = nullptr;
-  const Branch *branch = nullptr;
-  dfm_take_part_fn take = nullptr;  // in place of f
-  void *user = nullptr;
 };
 
 // Best kernels of this processor, or those that DEFORM_SIMD names.
@@ -235,14 +229,12 @@ inline double volume6_of(const double *x0, const double *x1, const double *x2, c
   const double a[3] = {x1[0] - x0[0], x1[1] - x0[1], x1[2] - x0[2]};
   const double c[3] = {x2[0] - x0[0], x2[1] - x0[1], x2[2] - x0[2]};
   const double d[3] = {x3[0] - x0[0], x3[1] - x0[1], x3[2] - x0[2]};
-  const double g[3] = {c[1] * d[2] - c[2] * d[1], c[2] * d[0] - c[0] * d[2], c[0] * d[1] - c[1] * d[0]};
-  return (a[0] * g[0] + a[1] * g[1]) + a[2] * g[2];
+  double g[3];
+  model::cross(c, d, g);
+  return model::dot(a, g);
 }
-inline double square_of(const double *x, const double *y) {
-  const double d[3] = {y[0] - x[0], y[1] - x[1], y[2] - x[2]};
-  return (d[0] * d[0] + d[1] * d[1]) + d[2] * d[2];
-}
-inline double length_of(const double *x, const double *y) { return __builtin_sqrt(square_of(x, y)); }
+using model::square_between;
+inline double length_of(const double *x, const double *y) { return __builtin_sqrt(square_between(x, y)); }
 
 // Energy of a cell from its corners, its stiffness over 36 V0, six volumes at rest and its limit.
 double cell_energy_of(const double *const *x, double bulk, double collapse, double rest, double limit);

@@ -24,21 +24,6 @@
 namespace msm {
 namespace {
 
-void row_pass(void *user, uint32_t begin, uint32_t end) {
-  const Call &call = *static_cast<const Call *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    Block b = body.lend(n, begin);
-    if (body.has_branch() && call.k->state) {
-      body.rest_of_branches(n, *call.k);
-      b.rest = body.rest_now.data() + (b.stiffness - body.stiffness.data());
-    }
-    body.kernels->load(b, call.k->x, nullptr, call.k->stride);
-    body.kernels->spring_rows[body.form()](b);
-    if (body.cells_on) body.kernels->cell_rows(b);
-  }
-}
-
 // A bound of |A_i| that turning the body does not change: the largest eigenvalue of a symmetric 3 x 3 matrix
 // is at most mean + sqrt(2/3) |deviator| (equal where the other two eigenvalues are), and each spring adds at
 // most its stiffness.
@@ -48,35 +33,29 @@ double norm_of(const double *a, double spring_sum) {
   return std::min(mean + __builtin_sqrt(deviator2 * (2.0 / 3)), spring_sum);
 }
 
-struct RowCall : Call { double *ksum, *csum; };  // csum NULL: the springs' diagonal alone
-
-void merge_row_pass(void *user, uint32_t begin, uint32_t end) {
-  const RowCall &call = *static_cast<const RowCall *>(user);
-  Body &body = *call.body;
-  for (uint32_t n = begin; n < end; ++n) {
-    const Block &b = body.block[n];
-    body.kernels->merge_rows(body.row.data(), body.merge.data() + body.merge_begin[n],
-                             body.merge_begin[n + 1] - body.merge_begin[n]);
-    for (uint32_t s = 0; s < b.owned; ++s) {
-      const uint32_t i = b.point[s];
-      const double *row = b.row + 8 * size_t(s), own = norm_of(row, body.spring_sum[i]);
-      if (!call.csum) {
-        call.ksum[i] = own;
-        continue;
-      }
-      const double springs = own + (body.edge_tilt.empty() ? body.coupled[i] : row[3]);
-      const double damp =
-          body.damp_most.empty() ? body.damp_scale() * body.params[kDampingStiffness] : body.damp_most[i];
-      call.ksum[i] += std::max(springs + row[7] / body.weight[i], body.rest_rows[i]);
-      // A damper's n n^T is at most its spring's part of A_i over k.
-      call.csum[i] +=
-          damp * springs +
-          (body.point_drag.empty() ? body.params[kDampingMass] : body.point_drag[i]) * body.mass[i];
-    }
-  }
-}
-
 }  // namespace
+
+template <class Use>
+void Body::each_row(const dfm_kin &k, const Use &use) {
+  for_each_block(ncell >= kParallelCells, [&](uint32_t n, uint32_t begin) {
+    Block b = lend(n, begin);
+    if (has_branch() && k.state) {
+      rest_of_branches(n, k);
+      b.rest = rest_now.data() + (b.stiffness - stiffness.data());
+    }
+    kernels->load(b, k.x, nullptr, k.stride);
+    kernels->spring_rows[form()](b);
+    if (cells_on) kernels->cell_rows(b);
+  });
+  for_each_block(ncell >= kParallelMergeCells, [&](uint32_t n, uint32_t) {
+    const Block &b = block[n];
+    kernels->merge_rows(row.data(), merge.data() + merge_begin[n], merge_begin[n + 1] - merge_begin[n]);
+    for (uint32_t s = 0; s < b.owned; ++s) {
+      const double *const sums = b.row + 8 * size_t(s);
+      use(b.point[s], norm_of(sums, spring_sum[b.point[s]]), sums);
+    }
+  });
+}
 
 void Body::find_weights(Room &room) {
   // Along a spring at rest a tilted one is softer by (L0/L)^2, a turned one by L0/L.
@@ -93,9 +72,7 @@ void Body::find_weights(Room &room) {
   dfm_kin at_rest{};
   at_rest.x = rest_point.data();
   at_rest.stride = 3;
-  RowCall diagonal{{this, &at_rest}, own.data(), nullptr};
-  for_each_block(ncell >= kParallelCells, row_pass, static_cast<Call *>(&diagonal));
-  for_each_block(ncell >= kParallelMergeCells, merge_row_pass, &diagonal);
+  each_row(at_rest, [&](uint32_t i, double norm, const double *) { own[i] = norm; });
   if (volume_on)
     for (uint32_t c = 0; c < ncell; ++c) {
       const uint32_t *q = cells.data() + 4 * size_t(c);
@@ -142,9 +119,13 @@ void Body::find_weights(Room &room) {
 }
 
 void Body::bound(const dfm_kin &k, double *ksum, double *csum) {
-  RowCall call{{this, &k}, ksum, csum};
-  for_each_block(ncell >= kParallelCells, row_pass, static_cast<Call *>(&call));
-  for_each_block(ncell >= kParallelMergeCells, merge_row_pass, &call);
+  each_row(k, [&](uint32_t i, double norm, const double *sums) {
+    const double springs = norm + (edge_tilt.empty() ? coupled[i] : sums[3]);
+    const double most = damp_most.empty() ? damp_scale() * params[kDampingStiffness] : damp_most[i];
+    ksum[i] += std::max(springs + sums[7] / weight[i], rest_rows[i]);
+    // A damper's n n^T is at most its spring's part of A_i over k.
+    csum[i] += most * springs + (point_drag.empty() ? params[kDampingMass] : point_drag[i]) * mass[i];
+  });
 }
 
 }  // namespace msm

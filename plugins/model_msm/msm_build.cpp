@@ -60,17 +60,11 @@ struct Body::Layout : Order {
 };
 
 void Body::order_springs(Layout &l) const {
-  l.row.create(host, size_t(npoint) + 1);
-  l.edge.create(host, nedge);
-  const auto low = [&](uint32_t e) {
-    return std::min(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]);
+  const auto each = [&](const auto &use) {
+    for (uint32_t e = 0; e < nedge; ++e)
+      use(std::min(l.rank[edges[2 * size_t(e)]], l.rank[edges[2 * size_t(e) + 1]]), e);
   };
-  for (uint32_t e = 0; e < nedge; ++e) ++l.row[low(e) + 1];
-  for (uint32_t r = 0; r < npoint; ++r) l.row[r + 1] += l.row[r];
-  Buffer<uint32_t> next;
-  next.create(host, npoint);
-  std::copy(l.row.data(), l.row.data() + npoint, next.data());
-  for (uint32_t e = 0; e < nedge; ++e) l.edge[next[low(e)]++] = e;
+  model::make_lists(host, npoint, each, l.row, l.edge);
   for (uint32_t r = 0; r < npoint; ++r)
     std::sort(l.edge.data() + l.row[r], l.edge.data() + l.row[r + 1],
               [&](uint32_t a, uint32_t b) { return high_rank(l, a) < high_rank(l, b); });
@@ -86,7 +80,6 @@ void Body::order_cells(Layout &l) const {
   Buffer<uint32_t> block_of_cell;
   l.cell_order.create(host, ncell);
   block_of_cell.create(host, ncell);
-  l.cell_begin.create(host, size_t(nblock) + 1);
   const auto lowest = [&](uint32_t c) { return lowest_rank(l, cells.data() + 4 * size_t(c)); };
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t of[4], best = 0, best_count = 0;
@@ -100,15 +93,12 @@ void Body::order_cells(Layout &l) const {
       }
     }
     block_of_cell[c] = best;
-    ++l.cell_begin[best + 1];
   }
-  for (uint32_t b = 0; b < nblock; ++b) l.cell_begin[b + 1] += l.cell_begin[b];
   Buffer<uint64_t> key;  // {lowest rank, cell}
-  Buffer<uint32_t> next;
-  key.create(host, ncell);
-  next.create(host, nblock);
-  std::copy(l.cell_begin.data(), l.cell_begin.data() + nblock, next.data());
-  for (uint32_t c = 0; c < ncell; ++c) key[next[block_of_cell[c]]++] = uint64_t(lowest(c)) << 32 | c;
+  const auto each = [&](const auto &use) {
+    for (uint32_t c = 0; c < ncell; ++c) use(block_of_cell[c], uint64_t(lowest(c)) << 32 | c);
+  };
+  model::make_lists(host, nblock, each, l.cell_begin, key);
   for (uint32_t b = 0; b < nblock; ++b)
     std::sort(key.data() + l.cell_begin[b], key.data() + l.cell_begin[b + 1]);
   for (uint32_t n = 0; n < ncell; ++n) l.cell_order[n] = uint32_t(key[n]);

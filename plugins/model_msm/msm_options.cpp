@@ -68,7 +68,7 @@ void Body::find_tilts(Room &room) {
       if (!by_cell) edge_tilt[e] = squared(0, e);
       const uint32_t *ends = edges.data() + 2 * size_t(e);
       edge_rest[e] = __builtin_sqrt(
-          square_of(rest_point.data() + 3 * size_t(ends[0]), rest_point.data() + 3 * size_t(ends[1])) +
+          square_between(rest_point.data() + 3 * size_t(ends[0]), rest_point.data() + 3 * size_t(ends[1])) +
           edge_tilt[e]);
     }
   }

@@ -24,11 +24,7 @@ void add_dyad(double *blk, double s, const double *u, const double *w) {
     for (int c = 0; c < 3; ++c) blk[3 * r + c] += (s * u[r]) * w[c];
 }
 
-void cross(const double *u, const double *w, double *out) {
-  out[0] = u[1] * w[2] - u[2] * w[1];
-  out[1] = u[2] * w[0] - u[0] * w[2];
-  out[2] = u[0] * w[1] - u[1] * w[0];
-}
+using model::cross;
 
 // Six volumes that count of four corners, and their gradient by each corner.
 double counted_volume6(const double *const *x, double limit, double (*gradient)[3]) {
@@ -41,7 +37,7 @@ double counted_volume6(const double *const *x, double limit, double (*gradient)[
   for (int n = 0; n < 3; ++n) gradient[0][n] = -((gradient[1][n] + gradient[2][n]) + gradient[3][n]);
   const double six = volume6_of(x[0], x[1], x[2], x[3]);
   double q = 0;
-  for (const auto &pair : kEdgeOf) q += square_of(x[pair[0]], x[pair[1]]);
+  for (const auto &pair : kEdgeOf) q += square_between(x[pair[0]], x[pair[1]]);
   if (!(q > limit)) return six;
   const double u = limit / q, power = __builtin_sqrt(u) * u;
   const double share = power * (2.5 - 1.5 * u), by_q = -3.75 * (power * (1 - u)) / q;
@@ -79,7 +75,7 @@ void Body::add_springs(const dfm_kin &k, double a, double b, double *blk) const 
     const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
     const double *const xi = k.x + size_t(k.stride) * i;
     const double *const xj = k.x + size_t(k.stride) * j;
-    const double square = square_of(xi, xj);
+    const double square = square_between(xi, xj);
     const SpringTangent t = spring_tangent(e, square, branch);
     double along = a * t.along;
     const double across = a * t.across;

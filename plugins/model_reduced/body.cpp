@@ -90,14 +90,11 @@ void Body::check_size(uint32_t nsurfel, uint32_t npoint) const {
   const double bytes = 8.0 * 9 * double(nsurfel) * npoint;
   constexpr double kMax = 2147483648.0;
   if (bytes <= kMax) return;
-  char text[200];
-  std::snprintf(
-      text, sizeof text,
+  model::refuse(
+      host, id_,
       "the response at rest of %u surfels and %u points may take %.1f GB, more than 2; use the model modal, "
       "or a coarser mesh",
       nsurfel, npoint, bytes / 1e9);
-  model::complain(host, id_, text);
-  throw model::Refused{};
 }
 
 void Body::reserve() {
@@ -125,18 +122,15 @@ void Body::describe() {
   if (params_[kModes] > modes_.count)
     std::snprintf(note_, sizeof note_, "%u modes are used; the mesh has %u, and at most %u are taken",
                   modes_.count, modes_.available, kMaxModes);
-  char text[200];
   constexpr double kTurn = 6.283185307179586;
   const double lowest = std::sqrt(modes_.lambda[0]) / kTurn,
                highest = std::sqrt(modes_.lambda[modes_.count - 1]) / kTurn;
-  std::snprintf(text, sizeof text,
-                "%s: %u modes, %.4g to %.4g Hz, %.0f %% of the static response at the surface.", id_,
-                modes_.count, lowest, highest, 100 * modes_.share);
   facts_[0] = {"modes", "modes that the body has", "1", double(modes_.count)};
   facts_[1] = {"lowest", "frequency of the lowest mode", "Hz", lowest};
   facts_[2] = {"highest", "frequency of the highest mode", "Hz", highest};
   facts_[3] = {"share", "share of the static response at the surface that its modes hold", "1", modes_.share};
-  host->log(host->ctx, 1, 0, text);
+  model::say(host, 1, id_, "%u modes, %.4g to %.4g Hz, %.0f %% of the static response at the surface",
+             modes_.count, lowest, highest, 100 * modes_.share);
 }
 
 bool Body::lacks_state(const dfm_kin &k) const {

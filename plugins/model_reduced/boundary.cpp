@@ -17,7 +17,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "../model_common/entry.h"
 #include "small.h"
@@ -40,8 +39,6 @@ double angle_of(double y, double x) {
   for (int n = 23; n > 0; n -= 2) sum = 1.0 / n - t * t * sum;
   return 8 * t * sum;
 }
-
-double dot(const double *a, const double *b) { return (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]; }
 
 // Integrals of a triangle's points y against a point x, or over x too; r = y - x.
 struct Integrals {
@@ -238,13 +235,10 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
     }
   }
   if (ntriangle() > kMaxTriangles) {
-    char text[200];
-    std::snprintf(text, sizeof text,
+    model::refuse(host, id,
                   "%zu triangles; boundary elements of more than %zu are refused, because time grows "
                   "with their cube; take a coarser surface, or the model condensed",
                   ntriangle(), kMaxTriangles);
-    model::complain(host, id, text);
-    throw model::Refused{};
   }
   // The first point of each piece leads its others.
   std::vector<uint32_t> leader(m.npoint);
@@ -255,11 +249,9 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   };
   for (size_t c = 0; c < 4 * m.ncell; ++c) leader[lead(m.cells[c])] = lead(m.cells[c / 4 * 4]);
   for (size_t c = 0; c < 4 * m.ncell; ++c)
-    if (lead(m.cells[c]) != lead(m.cells[0])) {
-      model::complain(host, id,
-                      "the cells are separate pieces; boundary elements take one: make a body of each");
-      throw model::Refused{};
-    }
+    if (lead(m.cells[c]) != lead(m.cells[0]))
+      model::refuse(host, id,
+                    "the cells are separate pieces; boundary elements take one: make a body of each");
   for (uint32_t i = 0; i < m.npoint; ++i) {
     if (place[i] == 0) {
       place[i] = uint32_t(point.size());
@@ -396,13 +388,10 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
     }
   lead_inner(id, kernels, t, rest, young, poisson, traction);
   make_rigid_exact(rest, block);
-  char text[200];
-  std::snprintf(
-      text, sizeof text,
-      "%s: %zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
-      "forces under rigid motions are %.2g of the stiffness.",
-      id, many, asymmetry_, rigid_error_);
-  host_->log(host_->ctx, asymmetry_ > 1e-3 ? 2 : 1, 0, text);
+  model::say(host_, asymmetry_ > 1e-3 ? 2 : 1, id,
+             "%zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
+             "forces under rigid motions are %.2g of the stiffness",
+             many, asymmetry_, rigid_error_);
 }
 
 // u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u.
@@ -439,14 +428,11 @@ void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vec
         }
       }
       if (std::fabs(solid + 4 * kPi) < 1) continue;  // NaN on an edge
-      char text[200];
-      std::snprintf(
-          text, sizeof text,
+      model::refuse(
+          host_, id,
           "point %u is a corner of cells, but not inside their border: flat cells are there; remove "
           "them, or take the model condensed",
           inner[i]);
-      model::complain(host_, id, text);
-      throw model::Refused{};
     }
     for (size_t l = 0; kLanes * l < columns; ++l) {
       double sum[kLanes * kLanes] = {};

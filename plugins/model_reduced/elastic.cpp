@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "../model_common/edges.h"
 #include "../model_common/params.h"
@@ -86,14 +85,11 @@ void Elastic::take(const dfm_mesh &m, const char *id) {
   npoint = m.npoint;
   ncell = m.ncell;
   if (npoint > kMaxPoints) {
-    char text[200];
-    std::snprintf(text, sizeof text,
+    model::refuse(host_, id,
                   "%u points; more than %u are refused, because their factor and modes take about a minute; "
                   "take a coarser "
                   "mesh, which a fine surface may hang on, or corotational_fem",
                   npoint, kMaxPoints);
-    model::complain(host_, id, text);
-    throw model::Refused{};
   }
   young_ = m.params[kYoung];
   poisson_ = m.params[kPoisson];
@@ -280,14 +276,11 @@ void Elastic::factorize() {
 void Elastic::take_surface(const dfm_mesh &m, const char *id) {
   for (const uint32_t key : {kYoung, kPoisson})
     if (!field_[key].empty()) {
-      char text[200];
-      std::snprintf(
-          text, sizeof text,
+      model::refuse(
+          host_, id,
           "%s differs by cell, and boundary elements have one material; give one value (for a surface "
           "\"fill\": {\"cells\": 0}), or take the model condensed",
           kParams[key].key);
-      model::complain(host_, id, text);
-      throw model::Refused{};
     }
   edges_.create_copy(host_, surface_.edges.data(), surface_.edges.size());
   nedge_ = uint32_t(surface_.edges.size() / 2);
@@ -323,22 +316,10 @@ void Elastic::compliance_of_eight(const double *f, double *u) const { respond<kL
 
 // Held bodies alone: of a floating one the inertia forces act at all points.
 void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) const {
-  const size_t rows = 3 * size_t(n);
-  if (by_surface_) {
-    std::vector<double> eight(kLanes * 3 * size_t(npoint));
-    for (size_t first = 0; first < rows; first += kLanes) {
-      const size_t many = std::min(kLanes, rows - first);
-      std::fill(eight.begin(), eight.end(), 0.0);
-      for (size_t l = 0; l < many; ++l)
-        eight[kLanes * (3 * size_t(points[(first + l) / 3]) + (first + l) % 3) + l] = 1;
-      compliance_of_eight(eight.data(), eight.data());
-      for (size_t l = 0; l < many; ++l)
-        for (size_t j = 0; j < rows; ++j)
-          w[(first + l) * rows + j] = eight[kLanes * (3 * size_t(points[j / 3]) + j % 3) + l];
-    }
-    return;
-  }
+  if (by_surface_)
+    return responses_at(npoint, n, points, w, [&](double *eight) { compliance_of_eight(eight, eight); });
   factor_.inverse_at(*kernels, n, points, w);
+  const size_t rows = 3 * size_t(n);
   const auto fixed = [&](size_t j) { return is_held(3 * size_t(points[j / 3]) + j % 3); };
   for (size_t i = 0; i < rows; ++i)
     for (size_t j = 0; j < rows; ++j)

@@ -39,18 +39,7 @@ void Factor::inverse_at(const Kernels &kernels, uint32_t nsel, const uint32_t *s
     if (direct_->inverse_at(self_, nsel, sel, w) != DFM_OK) throw std::bad_alloc();
     return;
   }
-  const size_t rows = 3 * size_t(nsel);
-  std::vector<double> eight(kLanes * 3 * size_t(n_));
-  for (size_t first = 0; first < rows; first += kLanes) {
-    const size_t many = std::min(kLanes, rows - first);
-    std::fill(eight.begin(), eight.end(), 0.0);
-    for (size_t l = 0; l < many; ++l)
-      eight[kLanes * (3 * size_t(sel[(first + l) / 3]) + (first + l) % 3) + l] = 1;
-    solve_eight(kernels, eight.data(), eight.data());
-    for (size_t l = 0; l < many; ++l)
-      for (size_t j = 0; j < rows; ++j)
-        w[(first + l) * rows + j] = eight[kLanes * (3 * size_t(sel[j / 3]) + j % 3) + l];
-  }
+  responses_at(n_, nsel, sel, w, [&](double *eight) { solve_eight(kernels, eight, eight); });
 }
 
 void Factor::solve(const double *b, double *x) const {

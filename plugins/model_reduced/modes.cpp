@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "../model_common/entry.h"
 
@@ -11,12 +10,7 @@ namespace {
 
 constexpr double kTurn = 6.283185307179586;
 
-[[noreturn]] void refuse(const dfm_host *host, const char *id, const char *format, double a, double b) {
-  char text[200];
-  std::snprintf(text, sizeof text, format, a, b);
-  model::complain(host, id, text);
-  throw model::Refused{};
-}
+using model::refuse;
 
 struct Search {
   const Elastic &body;
@@ -110,10 +104,10 @@ void Modes::create(const dfm_host *host, const char *id, const dfm_mesh &m, cons
     if (!by_rule || enough || (found < wanted || wanted == available)) break;
     if (wanted < most) continue;
     if (frequency > 0)
-      refuse(host, id, "more than %.0f modes lie below the frequency %g Hz; give a lower one, or modes",
-             double(kMaxModes), frequency);
-    refuse(host, id, "%.0f modes hold %.3g of the static response, less than share; give less, or modes",
-           double(kMaxModes), shares.back());
+      refuse(host, id, "more than %u modes lie below the frequency %g Hz; give a lower one, or modes",
+             kMaxModes, frequency);
+    refuse(host, id, "%u modes hold %.3g of the static response, less than share; give less, or modes",
+           kMaxModes, shares.back());
   }
   if (!number)
     refuse(host, id, "no mode lies below the frequency %g Hz; the lowest has %.4g Hz", frequency,
@@ -128,9 +122,7 @@ void Modes::create(const dfm_host *host, const char *id, const dfm_mesh &m, cons
     lambda[k] = search.lambda(k);
     for (size_t j = 0; j < search.size; ++j) w[j] = search.pairs.vector[k][j] / search.root[j];
     shape.set(k, w.data());
-    char text[100];
-    std::snprintf(text, sizeof text, "%s: mode %u has %.15g Hz.", id, k + 1, search.hertz(k));
-    host->log(host->ctx, 0, 0, text);
+    model::say(host, 0, id, "mode %u has %.15g Hz", k + 1, search.hertz(k));
   }
 }
 

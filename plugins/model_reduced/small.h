@@ -1,27 +1,25 @@
-// Vectors of three and matrices of nine numbers, row-major.
+// Vectors of three and matrices of nine numbers, row-major, beyond those of all models.
 #pragma once
 #include <deform/elementary.h>
 
 #include <cmath>
 #include <cstddef>
 
+#include "../model_common/small.h"
+
 namespace reduced {
+
+using model::dot;
+using model::matrix_product;
+using model::product;
 
 inline void cross_add(const double *a, const double *b, double scale, double *out) {
   out[0] += scale * (a[1] * b[2] - a[2] * b[1]);
   out[1] += scale * (a[2] * b[0] - a[0] * b[2]);
   out[2] += scale * (a[0] * b[1] - a[1] * b[0]);
 }
-inline void product(const double *m, const double *x, double *out) {
-  for (int i = 0; i < 3; ++i) out[i] = (m[3 * i] * x[0] + m[3 * i + 1] * x[1]) + m[3 * i + 2] * x[2];
-}
 inline void transposed_product(const double *m, const double *x, double *out) {
   for (int i = 0; i < 3; ++i) out[i] = (m[i] * x[0] + m[3 + i] * x[1]) + m[6 + i] * x[2];
-}
-inline void matrix_product(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      out[3 * i + j] = (a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j]) + a[3 * i + 2] * b[6 + j];
 }
 
 // The upper triangle of the moment of inertia of a mass m at r is added to out.

@@ -6,6 +6,7 @@
 #include <deform/plugin.h>
 #include <deform/plugin_draft.h>
 
+#include <algorithm>
 #include <functional>
 #include <vector>
 
@@ -18,6 +19,23 @@ using model::Buffer;
 
 constexpr const char *kIndefinite =
     "the stiffness of the mesh is not positive definite: it has flat cells, or parts that nothing holds";
+
+// w [3 n,3 n]: of unit loads at n of all points, each named once, what solve(eight) makes of kLanes side by
+// side, [all,3,kLanes] in place.
+template <class Solve>
+void responses_at(size_t all, uint32_t n, const uint32_t *points, double *w, const Solve &solve) {
+  const size_t rows = 3 * size_t(n);
+  std::vector<double> eight(kLanes * 3 * all);
+  const auto at = [&](size_t j) { return kLanes * (3 * size_t(points[j / 3]) + j % 3); };
+  for (size_t first = 0; first < rows; first += kLanes) {
+    const size_t many = std::min(kLanes, rows - first);
+    std::fill(eight.begin(), eight.end(), 0.0);
+    for (size_t l = 0; l < many; ++l) eight[at(first + l) + l] = 1;
+    solve(eight.data());
+    for (size_t l = 0; l < many; ++l)
+      for (size_t j = 0; j < rows; ++j) w[(first + l) * rows + j] = eight[at(j) + l];
+  }
+}
 
 // A = L L^T of the points in an order that keeps L sparse. Column block j of L holds that of its point with
 // itself (a triangle), then the blocks of the points below, in rising order.

@@ -1,7 +1,6 @@
 // From where a body is to where its step leads: without contact, and what impulses change of that.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "../model_common/entry.h"
 #include "body.h"
@@ -41,13 +40,11 @@ void Body::name_aliases() {
   while (first < modes_.count && modes_.lambda[first] * h_ * h_ <= kPi * kPi) ++first;
   if (first == modes_.count) return;
   named_ = true;
-  char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "%s: %u of %u modes, from %.4g Hz on, lie above the Nyquist frequency %.4g Hz of the step %g s: "
-      "their oscillation is dropped, their share of the response at rest is kept.",
-      id_, modes_.count - first, modes_.count, std::sqrt(modes_.lambda[first]) / (2 * kPi), 0.5 / h_, h_);
-  host->log(host->ctx, 2, 0, text);
+  model::say(
+      host, 2, id_,
+      "%u of %u modes, from %.4g Hz on, lie above the Nyquist frequency %.4g Hz of the step %g s: their "
+      "oscillation is dropped, their share of the response at rest is kept",
+      modes_.count - first, modes_.count, std::sqrt(modes_.lambda[first]) / (2 * kPi), 0.5 / h_, h_);
 }
 
 dfm_status Body::predict(const dfm_kin &k, const double *f, double *u_s) {
@@ -319,12 +316,10 @@ void Body::warn_gradient(double time, double most, const char *where, uint32_t w
   outside_ = time;
   if (!(most > 2 * reported_)) return;
   reported_ = most;
-  char text[240];
-  std::snprintf(text, sizeof text,
-                "%s: the displacement gradient reaches %.2g %s %u: above %g the strains of this model are "
-                "wrong; corotational_fem has no such limit.",
-                id_, most, where, which, kLargestGradient);
-  host->log(host->ctx, 2, 0, text);
+  model::say(host, 2, id_,
+             "the displacement gradient reaches %.2g %s %u: above %g the strains of this model are wrong; "
+             "corotational_fem has no such limit",
+             most, where, which, kLargestGradient);
 }
 
 }  // namespace reduced

@@ -3,7 +3,6 @@
 // overlap. So every point has a cluster, and the same mesh always has the same ones.
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "../model_common/index.h"
 #include "../model_common/rotation.h"
@@ -15,11 +14,6 @@ namespace {
 // Factor of the mass of fully held points in a cluster's fit and momentum: the cluster hangs on them.
 constexpr double kHeavy = 1e7;
 
-double distance2(const double *a, const double *b) {
-  const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
-  return (x * x + y * y) + z * z;
-}
-
 // What those of n points that `use` takes span: 0 nothing, 1 a point, 2 a line, 3 more.
 template <class At, class Use>
 int span_of(const At &at, uint32_t n, const Use &use) {
@@ -28,7 +22,7 @@ int span_of(const At &at, uint32_t n, const Use &use) {
   for (uint32_t k = 0; k < n; ++k) {
     if (!use(k)) continue;
     if (!first) first = at(k);
-    const double d = distance2(at(k), first);
+    const double d = model::square_between(at(k), first);
     if (d > far) {
       far = d;
       second = at(k);
@@ -39,7 +33,7 @@ int span_of(const At &at, uint32_t n, const Use &use) {
     if (!use(k)) continue;
     double along = 0;
     for (int a = 0; a < 3; ++a) along += (at(k)[a] - first[a]) * (second[a] - first[a]);
-    off = std::max(off, distance2(at(k), first) - along * along / far);
+    off = std::max(off, model::square_between(at(k), first) - along * along / far);
   }
   return off > 1e-8 * far ? 3 : 2;
 }
@@ -47,7 +41,6 @@ int span_of(const At &at, uint32_t n, const Use &use) {
 
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
-  if (!model::in_range(h, kId, kParams, kParamCount, m.params)) throw model::Refused{};
   std::copy(m.params, m.params + kParamCount, params);
   npoint = m.npoint;
   nsurfel = m.row ? m.nsurfel : 0;
@@ -93,12 +86,12 @@ void Body::make_clusters() {
   Buffer<uint32_t> center;
   near.create(host, npoint);
   center.create(host, wanted);
-  for (uint32_t i = 0; i < npoint; ++i) near[i] = distance2(x(i), middle);
+  for (uint32_t i = 0; i < npoint; ++i) near[i] = model::square_between(x(i), middle);
   double reach = HUGE_VAL;
   for (ncluster = 0; ncluster < wanted && reach > 0; ++ncluster) {
     center[ncluster] = uint32_t(std::max_element(near.data(), near.data() + npoint) - near.data());
     for (uint32_t i = 0; i < npoint; ++i) {
-      const double d = distance2(x(i), x(center[ncluster]));
+      const double d = model::square_between(x(i), x(center[ncluster]));
       near[i] = ncluster ? std::min(near[i], d) : d;
     }
     reach = std::sqrt(*std::max_element(near.data(), near.data() + npoint));
@@ -139,12 +132,9 @@ void Body::check_cohesion() const {
     }
   }
   if (count == ncluster) return;
-  char text[160];
-  std::snprintf(text, sizeof text,
+  model::refuse(host, kId,
                 "%u clusters of %u points do not hold together; take fewer clusters, or a larger overlap",
                 ncluster, npoint);
-  model::complain(host, kId, text);
-  throw model::Refused{};
 }
 
 // near [npoint] m2: from the nearest center.
@@ -153,7 +143,8 @@ void Body::list_members(const uint32_t *center, const double *near, double reach
     for (uint32_t i = 0; i < npoint; ++i) {
       const double most = std::sqrt(near[i]) + reach;
       for (uint32_t c = 0; c < ncluster; ++c) {
-        const double away = distance2(rest.data() + 3 * size_t(i), rest.data() + 3 * size_t(center[c]));
+        const double away =
+            model::square_between(rest.data() + 3 * size_t(i), rest.data() + 3 * size_t(center[c]));
         if (std::sqrt(away) <= most) use(i, c);
       }
     }

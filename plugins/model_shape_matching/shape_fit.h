@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "../model_common/rotation.h"
+#include "../model_common/small.h"
 #include "shape_body.h"
 
 namespace shape {
@@ -12,36 +13,24 @@ namespace shape {
 // counts as `most` at least.
 template <int kN>
 inline void inverse_of(const double *matrix, double least, double *out, double most = 0) {
-  double a[kN][kN], v[kN][kN];
-  for (int i = 0; i < kN; ++i)
-    for (int j = 0; j < kN; ++j) a[i][j] = matrix[kN * i + j];
-  model::jacobi(a, v);
-  for (int i = 0; i < kN; ++i) most = a[i][i] > most ? a[i][i] : most;
-  for (int i = 0; i < kN * kN; ++i) out[i] = 0;
-  for (int k = 0; k < kN; ++k) {
-    if (!(a[k][k] > least * most)) continue;
-    for (int i = 0; i < kN; ++i)
-      for (int j = 0; j < kN; ++j) out[kN * i + j] += v[i][k] * v[j][k] / a[k][k];
-  }
+  double a[kN][kN];
+  for (int e = 0; e < kN * kN; ++e) a[e / kN][e % kN] = matrix[e];
+  model::spectral_inverse(a, out, [&](double x, double largest) {
+    return x > least * (largest > most ? largest : most) ? x : 0;
+  });
 }
 constexpr double kFlat = 1e-10;  // of moments, least
 
 // The root of the inverse, and that of the determinant; what is flat has neither.
 inline void roots_of(const double *matrix, double *out, double *content) {
-  double a[3][3], v[3][3], most = 0;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) a[i][j] = matrix[3 * i + j];
-  model::jacobi(a, v);
-  for (int i = 0; i < 3; ++i) most = a[i][i] > most ? a[i][i] : most;
-  for (int i = 0; i < 9; ++i) out[i] = 0;
+  double a[3][3];
+  for (int e = 0; e < 9; ++e) a[e / 3][e % 3] = matrix[e];
   *content = 1;
-  for (int k = 0; k < 3; ++k) {
-    const bool flat = !(a[k][k] > kFlat * most);
-    const double root = flat ? 0 : std::sqrt(a[k][k]);
+  model::spectral_inverse(a, out, [&](double x, double most) {
+    const double root = x > kFlat * most ? std::sqrt(x) : 0;
     *content *= root;
-    for (int i = 0; i < 3 && !flat; ++i)
-      for (int j = 0; j < 3; ++j) out[3 * i + j] += v[i][k] * v[j][k] / root;
-  }
+    return root;
+  });
 }
 
 inline int width_of(Mode mode) { return mode == kQuadratic ? kBasis : 3; }

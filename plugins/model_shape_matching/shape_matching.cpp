@@ -34,13 +34,7 @@ const dfm_param kParams[kParamCount] = {
 
 namespace {
 
-dfm_status create(const dfm_host *h, const dfm_mesh *m, void **self) {
-  return model::create<Body>(h, m, kId, self);
-}
-
-dfm_status set_params(void *self, const double *params) {
-  return model::change_in_range<Body>(self, kId, kParams, params);
-}
+using Entry = model::InRange<Body, kId, kParams>;
 
 dfm_status state_init(const void *self, double *state) {
   static_cast<const Body *>(self)->init_state(state);
@@ -63,8 +57,8 @@ const void *extension(const void *self, const char *id) {
 const char *const kEffects[] = {"large_rotation", "damping", "plasticity", nullptr};
 
 const dfm_model kModel =
-    model::bare_table<Body>(DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE, create,
-                            set_params, state_init, extension);
+    model::bare_table<Body>(DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE, Entry::create,
+                            Entry::set_params, state_init, extension);
 
 const dfm_type kType =
     dfm::plugin::type(DFM_KIND_MODEL, kId, "shape matching (plausible)", "0.1.0", "MIT",

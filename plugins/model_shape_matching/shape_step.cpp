@@ -7,13 +7,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "shape_fit.h"
 
 namespace shape {
 
 namespace {
+
+using model::cross;
+using model::matrix_product;
+using model::product;
+using model::transposed_matrix_product;
 
 constexpr double kPi = 3.14159265358979323846;
 // det A below which goals leave the fit for the rigid ones: a cluster that is flat or turned inside out has
@@ -29,17 +33,6 @@ constexpr double kMaxLed = 4;
 double determinant(const double *a) {
   return (a[0] * (a[4] * a[8] - a[5] * a[7]) + a[1] * (a[5] * a[6] - a[3] * a[8])) +
          a[2] * (a[3] * a[7] - a[4] * a[6]);
-}
-void multiply(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      out[3 * i + j] = (a[3 * i] * b[j] + a[3 * i + 1] * b[3 + j]) + a[3 * i + 2] * b[6 + j];
-}
-void apply(const double *a, const double *x, double *out) {
-  for (int i = 0; i < 3; ++i) out[i] = (a[3 * i] * x[0] + a[3 * i + 1] * x[1]) + a[3 * i + 2] * x[2];
-}
-void cross(const double *a, const double *b, double *out) {
-  for (int i = 0; i < 3; ++i) out[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
 }
 
 // A root of x (x - s) = m without cancellation: the greater one, or where `smaller` (s > 0 > m) the other.
@@ -92,11 +85,9 @@ void sides_of_volume(const double *s, double volume, double *x) {
 // energy from it.
 void nearest_of_volume(const double *moments, const Cluster &c, double *out) {
   double b[9], turn[9], s[3][3], v[3][3], strain[9];
-  multiply(moments, c.root_inverse, b);
+  matrix_product(moments, c.root_inverse, b);
   model::rotation::polar_of(b, turn);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      strain[3 * i + j] = (turn[i] * b[j] + turn[3 + i] * b[3 + j]) + turn[6 + i] * b[6 + j];
+  transposed_matrix_product(turn, b, strain);
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) s[i][j] = 0.5 * (strain[3 * i + j] + strain[3 * j + i]);
   model::jacobi(s, v);
@@ -106,8 +97,8 @@ void nearest_of_volume(const double *moments, const Cluster &c, double *out) {
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       strain[3 * i + j] = (v[i][0] * x[0] * v[j][0] + v[i][1] * x[1] * v[j][1]) + v[i][2] * x[2] * v[j][2];
-  multiply(turn, strain, kept);
-  multiply(kept, c.root_inverse, out);
+  matrix_product(turn, strain, kept);
+  matrix_product(kept, c.root_inverse, out);
 }
 
 // Vector from the center, whose rounding error is subtracted: a cluster that has collapsed to one point must
@@ -136,13 +127,11 @@ void Body::warn_softened(double h) {
   const double longest = std::sqrt(kMaxLed) * params[kReferenceStep] / -dfm_log(1 - params[kStiffness]);
   if (warned_softened || ncluster == 1 || h <= longest) return;
   warned_softened = true;
-  char text[240];
-  std::snprintf(
-      text, sizeof text,
-      "%s: at the step %g s clusters move against each other more softly than asked; up to %.3g s they "
-      "are as stiff as asked.",
-      kId, h, longest);
-  host->log(host->ctx, 2, 0, text);
+  model::say(
+      host, 2, kId,
+      "at the step %g s clusters move against each other more softly than asked; up to %.3g s they are "
+      "as stiff as asked",
+      h, longest);
 }
 
 void Body::fit(uint32_t c, const dfm_kin &k) {
@@ -157,7 +146,7 @@ void Body::fit(uint32_t c, const dfm_kin &k) {
   }
   const auto from = [&](uint32_t m, double *out) {
     const double *const at = q.data() + 3 * size_t(begin + m);
-    if (f.flowed) return apply(f.plastic, at, out);
+    if (f.flowed) return product(f.plastic, at, out);
     std::copy(at, at + 3, out);
   };
   f.now = cluster[c];
@@ -196,12 +185,9 @@ void Body::fit(uint32_t c, const dfm_kin &k) {
   for (int i = 0; i < 9; ++i) linear[i] = full[kBasis * (i / 3) + i % 3];
   inverse_of<3>(inertia, kTurned, f.inverse_inertia, kPoint * f.now.mass * (f.now.size * f.now.size));
   model::rotation::polar_of(linear, turn);
-  multiply(linear, f.now.linear_inverse, stretched);
+  matrix_product(linear, f.now.linear_inverse, stretched);
   f.volume = determinant(stretched);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j)
-      f.stretch[3 * i + j] =
-          (turn[i] * stretched[j] + turn[3 + i] * stretched[3 + j]) + turn[6 + i] * stretched[6 + j];
+  transposed_matrix_product(turn, stretched, f.stretch);
   find_goal(turn, linear, full, f);
 }
 
@@ -234,7 +220,7 @@ void Body::to_goal(uint32_t point, double *d) const {
     const Frame &f = frame[point_cluster[m]];
     const double *at = q.data() + 3 * size_t(point_place[m]);
     if (f.flowed) {
-      apply(f.plastic, at, flowed);
+      product(f.plastic, at, flowed);
       at = flowed;
     }
     basis_of(f.now, mode(), at, b);
@@ -266,7 +252,7 @@ void Body::add_momentum(uint32_t point, const double *w) {
 void Body::make_rigid(uint32_t c) {
   double *const v = momentum.data() + 6 * size_t(c), spin[3];
   for (int a = 0; a < 3; ++a) v[a] /= cluster[c].mass;
-  apply(frame[c].inverse_inertia, v + 3, spin);
+  product(frame[c].inverse_inertia, v + 3, spin);
   std::copy(spin, spin + 3, v + 3);
 }
 
@@ -440,7 +426,7 @@ void Body::flow(const dfm_kin &k) const {
     }
     std::copy_n(f.plastic, kPlastic, out);
     if (!(rate > 0 && f.volume > kCrushed && std::sqrt(strain) > params[kYield])) continue;
-    multiply(by, f.plastic, now);
+    matrix_product(by, f.plastic, now);
     const double volume = determinant(now);
     if (!(volume > 0)) continue;
     const double scale = dfm_pow(volume, -1.0 / 3);

@@ -23,7 +23,8 @@ inline Dense tangent(const ModelInstance &body, double a, double b) {
   EXPECT_EQ(body.ops->stiffness(body.self, &k, a, b, blk.data()), DFM_OK);
   std::vector<double> opposite(blk.size());
   EXPECT_EQ(body.ops->stiffness(body.self, &k, -a, -b, opposite.data()), DFM_OK);
-  for (size_t n = 0; n < blk.size(); ++n) EXPECT_EQ(opposite[n], -blk[n]) << "of factors " << a << " and " << b;
+  for (size_t n = 0; n < blk.size(); ++n)
+    EXPECT_EQ(opposite[n], -blk[n]) << "of factors " << a << " and " << b;
   Dense out(3 * body.size(), 3 * body.size());
   for (size_t n = 0; n < ij.size() / 2; ++n)
     for (size_t r = 0; r < 3; ++r)

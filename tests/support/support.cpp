@@ -53,7 +53,8 @@ CommandResult deform(std::vector<std::string> args) {
   args.insert(args.begin(), DEFORM_COMMAND);
   if (draws) {  // LeakSanitizer's own tracer crashes while a thread of the software driver ends
     const char *const given = std::getenv("ASAN_OPTIONS");
-    args.insert(args.begin(), {"env", std::string("ASAN_OPTIONS=") + (given ? given : "") + ":detect_leaks=0"});
+    args.insert(args.begin(),
+                {"env", std::string("ASAN_OPTIONS=") + (given ? given : "") + ":detect_leaks=0"});
   }
   return run(args);
 }

@@ -49,23 +49,6 @@ CutShape shape_of(const Body &b, const dfm_cut_def &def) {
   return s;
 }
 
-dfm_cut_info info_of(const CutReport &r) {
-  dfm_cut_info out{};
-  out.cells = r.removed;
-  out.left = r.left;
-  out.points = r.copies;
-  out.parts = r.parts;
-  out.area = r.area;
-  out.mass = r.mass;
-  store3(out.momentum, r.momentum);
-  out.kinetic = r.kinetic;
-  out.elastic = r.elastic;
-  out.pieces = r.pieces;
-  out.fracture = r.fracture;
-  store3(out.force, r.force);
-  return out;
-}
-
 SeparateRule rule_of(const Body &b, const dfm_separate_def *def) {
   const dfm_separate_def own = def ? take_def(def, dfm_separate_def_default()) : dfm_separate_def_default();
   check_flags(own, 0, "dfm_separate_def");
@@ -89,7 +72,7 @@ dfm_status dfm_body_cut(dfm_body body, const dfm_cut_def *def, dfm_cut_info *out
     check_flags(own, 0, "dfm_cut_def");
     const CutShape shape = shape_of(b, own);
     const CutReport report = make_cut(b, shape, own.how, own.most);
-    if (out) copy_out(out, info_of(report));
+    if (out) copy_out<dfm_cut_info>(out, report);
   });
 }
 
@@ -119,7 +102,7 @@ dfm_status dfm_body_remove_cells(dfm_body body, uint32_t n, const uint32_t *cell
     }
     CutReport report = remove_cells(b, removed);
     separate_if_requested(b, report);
-    if (out) copy_out(out, info_of(report));
+    if (out) copy_out<dfm_cut_info>(out, report);
   });
 }
 
@@ -145,7 +128,7 @@ dfm_status dfm_body_separate(dfm_body body, const dfm_separate_def *def, dfm_cut
     const SeparateRule rule = rule_of(b, def);
     CutReport report;
     separate(b, rule, report);
-    if (out) copy_out(out, info_of(report));
+    if (out) copy_out<dfm_cut_info>(out, report);
   });
 }
 

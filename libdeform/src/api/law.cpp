@@ -31,10 +31,7 @@ struct Prepared {
            dfm_status_name(status));
   }
   ~Prepared() {
-    call_plugin(host, type, "release", [&] {
-      law_of(type).release(&host, data);
-      return DFM_OK;
-    });
+    call_plugin(host, type, "release", [&] { law_of(type).release(&host, data); });
   }
   Prepared(const Prepared &) = delete;
 };

@@ -41,6 +41,10 @@ void destroy_world(uint64_t handle) {
   delete w;
 }
 
+void check_gravity(const double *g) {
+  if (!all_finite(g, 3)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
+}
+
 void check_max_time(double seconds) {
   if (!(seconds >= 0))
     fail(DFM_E_ARG, "max_time is %g s; give the wall time that a step may take, or 0 for no limit", seconds);
@@ -132,8 +136,7 @@ dfm_status dfm_world_create(dfm_context *context, const dfm_world_def *def, dfm_
     need(out, "out");
     auto w = std::make_unique<World>(&used(*context));
     w->def = take_def(def, dfm_world_def_default());
-    for (double g : w->def.gravity)
-      if (!std::isfinite(g)) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
+    check_gravity(w->def.gravity);
     if (!(w->def.contact_offset >= 0 && std::isfinite(w->def.contact_offset)) ||
         !(w->def.contact_tolerance >= 0 && std::isfinite(w->def.contact_tolerance)))
       fail(DFM_E_ARG,
@@ -186,8 +189,7 @@ dfm_status dfm_world_destroy(dfm_world world) {
 dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(gravity, "gravity");
-    for (int k = 0; k < 3; ++k)
-      if (!std::isfinite(gravity[k])) fail(DFM_E_ARG, "gravity is not finite; give m/s2");
+    check_gravity(gravity);
     store3(w.def.gravity, load3(gravity));
     w.gravity.keys.clear();
     wake_all(w);

@@ -9,6 +9,7 @@
 #include <span>
 
 #include "core/disjoint_sets.h"
+#include "core/lists.h"
 #include "geometry/closest.h"
 #include "math/vec3.h"
 #include "mesh/topology_tri.h"
@@ -75,13 +76,10 @@ void find_patches(const Array<Vec3> &normal, Surface &out) {
 }
 
 void find_fans(Surface &out) {
-  out.fan_begin.assign(out.nsurfel + 1, 0);
-  for (const uint32_t s : out.tri) ++out.fan_begin[s + 1];
-  for (uint32_t s = 0; s < out.nsurfel; ++s) out.fan_begin[s + 1] += out.fan_begin[s];
-  out.fan.resize(out.tri.size());
-  Array<uint32_t> next(out.fan_begin);
-  for (uint32_t t = 0; t < out.ntri; ++t)
-    for (int k = 0; k < 3; ++k) out.fan[next[out.tri[3 * t + k]]++] = t;
+  const auto each = [&](const auto &use) {
+    for (uint32_t k = 0; k < 3 * out.ntri; ++k) use(out.tri[k], k / 3);
+  };
+  make_lists(out.nsurfel, each, out.fan_begin, out.fan);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include "contact/friction_kernel.h"
 #include "contact/newton.h"
 #include "contact/solve_settings.h"
+#include "core/lists.h"
 
 namespace dfm {
 
@@ -454,18 +455,13 @@ void ContactNewton::shape() {
     for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a)
       for (uint32_t b = a; b < entry_[k + 1]; ++b) add(node_[a], node_[b]);
   const size_t n = pairs_.size() / 2;
-  begin_.assign(nodes_ + size_t{1}, 0);
-  for (size_t p = 0; p < n; ++p) ++begin_[pairs_[2 * p] + 1];
-  for (uint32_t k = 0; k < nodes_; ++k) begin_[k + 1] += begin_[k];
-  by_lower_.resize(n);
-  for (size_t p = 0; p < n; ++p) by_lower_[begin_[pairs_[2 * p]]++] = uint32_t(p);
+  list_by(nodes_, n, [&](size_t p) { return pairs_[2 * p]; }, begin_, by_lower_);
   ij_.clear();
   place_.resize(n);
   number_.assign(nodes_, kNone);
-  for (uint32_t i = 0, p = 0; i < nodes_; ++i) {  // begin_[i] is now where those of i end
-    const uint32_t first = p;
+  for (uint32_t i = 0; i < nodes_; ++i) {
     higher_.clear();
-    for (; p < begin_[i]; ++p) {
+    for (uint32_t p = begin_[i]; p < begin_[i + 1]; ++p) {
       const uint32_t j = pairs_[2 * size_t{by_lower_[p]} + 1];
       if (number_[j] == i) continue;
       number_[j] = i;
@@ -476,7 +472,8 @@ void ContactNewton::shape() {
       number_[j] = uint32_t(ij_.size() / 2);
       ij_.insert(ij_.end(), {i, j});
     }
-    for (p = first; p < begin_[i]; ++p) place_[by_lower_[p]] = number_[pairs_[2 * size_t{by_lower_[p]} + 1]];
+    for (uint32_t p = begin_[i]; p < begin_[i + 1]; ++p)
+      place_[by_lower_[p]] = number_[pairs_[2 * size_t{by_lower_[p]} + 1]];
     for (const uint32_t j : higher_) number_[j] = kNone;
   }
   pattern_ = {nodes_, static_cast<uint32_t>(ij_.size() / 2), ij_.data()};

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/error.h"
+#include "core/lists.h"
 #include "cut/body_shape.h"
 #include "mesh/mesh.h"
 #include "plugin/context.h"
@@ -18,12 +19,8 @@ namespace {
 // Maps previous points to present points, with the share of each copy in the mass of all copies.
 class Copies {
  public:
-  Copies(const CutMesh &mesh, const Body &b, uint32_t before) : begin_(before + 1) {
-    for (const uint32_t p : mesh.point) ++begin_[p + 1];
-    for (uint32_t p = 0; p < before; ++p) begin_[p + 1] += begin_[p];
-    std::vector<uint32_t> next(begin_.begin(), begin_.end() - 1);
-    copy_.resize(mesh.point.size());
-    for (uint32_t i = 0; i < mesh.point.size(); ++i) copy_[next[mesh.point[i]]++] = i;
+  Copies(const CutMesh &mesh, const Body &b, uint32_t before) {
+    list_by(before, mesh.point.size(), [&](uint32_t i) { return mesh.point[i]; }, begin_, copy_);
     share_.assign(copy_.size(), 1);
     for (uint32_t p = 0; p < before; ++p) {
       double mass = 0;

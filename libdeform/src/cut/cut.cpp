@@ -49,7 +49,7 @@ void sum_up_removed(const BodyShape &before, const CutMesh &mesh, const Body &b,
   for (uint32_t i = 0; i < before.p.n; ++i) {
     const double mass = std::fabs(lost[i]) > kRounding * before.p.mass[i] ? lost[i] : 0;
     out.mass += mass;
-    out.momentum += mass * before.p.v_at(i);
+    add3(out.momentum, mass * before.p.v_at(i));
   }
 }
 
@@ -58,9 +58,9 @@ void sum_up_removed(const BodyShape &before, const CutMesh &mesh, const Body &b,
 CutReport empty(Body &b) {
   World &w = *b.world;
   CutReport out;
-  out.removed = b.ncell();
+  out.cells = b.ncell();
   out.mass = b.mass;
-  for (uint32_t i = 0; i < b.p.n; ++i) out.momentum += b.p.mass[i] * b.p.v_at(i);
+  for (uint32_t i = 0; i < b.p.n; ++i) add3(out.momentum, b.p.mass[i] * b.p.v_at(i));
   out.kinetic = kinetic_of(b);
   out.elastic = elastic_energy(b);
   reserve_places(w, 0);
@@ -78,15 +78,8 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
   try {
     Lasting lasting(w, *before, {{b.id, b.slot, &b, made.features}});
     reserve_ends(w, 0);
-    exchange(w, lasting);
     w.changed = true;
-    try {
-      prepare(w);
-    } catch (...) {
-      exchange(w, lasting);
-      throw;
-    }
-    end_what_went(w, lasting);
+    prepare_with(w, lasting);
   } catch (...) {
     exchange(b, *before);
     throw;
@@ -100,11 +93,11 @@ CutReport cut(Body &b, const Array<uint8_t> &removed, OpenFaces &&open) {
   CutReport out;
   CutMesh mesh = make_cut_mesh(m, b.p.n, b.ncell(), b.tets.data(), removed, open.own, b.inner);
   if (mesh.cell.empty()) return empty(b);
-  out.removed = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
+  out.cells = b.ncell() - static_cast<uint32_t>(mesh.cell.size());
   // all memory is taken before the cut is made, because a cut that is made must be reported
   out.parts = count_parts(m, uint32_t(mesh.point.size()), uint32_t(mesh.cell.size()), mesh.tets.data());
   std::vector<uint8_t> seen(b.p.n);
-  for (const uint32_t p : mesh.point) out.copies += std::exchange(seen[p], uint8_t{1});
+  for (const uint32_t p : mesh.point) out.points += std::exchange(seen[p], uint8_t{1});
   std::vector<double> mass(b.p.mass.begin(), b.p.mass.end());
   const double elastic = elastic_energy(b), kinetic = kinetic_of(b);
   const HostWork work(b);
@@ -249,7 +242,7 @@ CutReport split_by_blade(Body &b, const CutShape &requested, uint32_t most) {
   out.opened = static_cast<uint32_t>(n);
   out.fracture = work;
   if (requested.kind == CutKind::plane) return out;  // a plane has no way: no force, and nothing to continue
-  if (norm2(way) > 0) out.force = (-work / norm2(way)) * way;
+  if (norm2(way) > 0) store3(out.force, (-work / norm2(way)) * way);
   // without memory for it, the next blade here starts anew
   found_memory([&] { sweep.keep(b); });
   return out;

@@ -4,6 +4,7 @@
 #include <new>
 
 #include "core/error.h"
+#include "deform/cut.h"
 #include "geometry/cut_shape.h"
 #include "state/body.h"
 
@@ -12,19 +13,9 @@ namespace dfm {
 struct BodyShape;
 struct MadeShape;
 
-struct CutReport {
-  uint32_t removed = 0;             // cells
-  uint32_t opened = 0;              // faces
-  uint32_t left = 0;                // cells that the shape meets, but the limit leaves in the body
-  uint32_t copies = 0;              // of points
-  uint32_t parts = 0;               // that the body consists of now
-  uint32_t pieces = 0;              // bodies that have come off it
-  double area = 0;                  // m2 at rest of triangles that are new in the surface
-  double mass = 0;                  // kg, taken away
-  Vec3 momentum;                    // N s, taken away
-  double kinetic = 0, elastic = 0;  // J, taken away; elastic NaN where the model gives none
-  double fracture = 0;              // J, that opening the faces takes
-  Vec3 force;                       // N, on the blade; over the way of the blade it takes that work
+struct CutReport : dfm_cut_info {
+  uint32_t opened = 0;  // faces
+  CutReport() : dfm_cut_info{} {}
 };
 
 // The functions that follow throw Error; then nothing has changed.

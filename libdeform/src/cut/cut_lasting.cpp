@@ -147,6 +147,8 @@ Lasting::Lasting(const World &w, const BodyShape &before, const std::vector<CutT
   }
 }
 
+namespace {
+
 void exchange(World &w, Lasting &other) noexcept {
   w.attachments.swap(other.attachments);
   w.store.crossings.swap(other.crossings);
@@ -155,12 +157,21 @@ void exchange(World &w, Lasting &other) noexcept {
   w.store.id_b.swap(other.id_b);
 }
 
+}  // namespace
+
 void reserve_ends(World &w, size_t pieces) {
   reserve_events(w, w.store.n + w.attachments.size() + pieces);
   w.overlaps.placed.reserve(w.overlaps.placed.size() + w.attachments.size());
 }
 
-void end_what_went(World &w, const Lasting &lasting) {
+void prepare_with(World &w, Lasting &lasting) {
+  exchange(w, lasting);
+  try {
+    prepare(w);
+  } catch (...) {
+    exchange(w, lasting);
+    throw;
+  }
   for (uint32_t i = 0; i < w.report.n; ++i) {
     if (!lasting.ended[i]) continue;
     if (w.store.touching[i])

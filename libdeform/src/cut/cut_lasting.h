@@ -28,10 +28,10 @@ struct Lasting {
   Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets);
 };
 
-void exchange(World &w, Lasting &other) noexcept;
 void reserve_ends(World &w, size_t pieces);
-// Ends contacts whose feature is gone and attachments without points. The next search for overlaps covers
-// what is not attached any more. lasting: after exchange(); reserve_ends() came before.
-void end_what_went(World &w, const Lasting &lasting);
+// Prepares the world with it, ends contacts whose feature is gone and attachments without points; if it fails,
+// the world has what it had. The next search for overlaps covers what is not attached any more. After
+// reserve_ends().
+void prepare_with(World &w, Lasting &lasting);
 
 }  // namespace dfm

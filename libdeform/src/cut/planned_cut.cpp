@@ -118,7 +118,7 @@ void make_planned_cuts(World &w, double dt) {
       b.planned_cuts.insert(b.planned_cuts.begin(), cut);  // there is room
       throw;
     }
-    const uint32_t n = cut.how == DFM_CUT_SPLIT ? done.opened : done.removed;
+    const uint32_t n = cut.how == DFM_CUT_SPLIT ? done.opened : done.cells;
     note(made, b, cut, n > 0);
     if (n == 0) continue;
     add_event(w, DFM_EVENT_CUT, b.id, b.id, n, w.time);

@@ -137,12 +137,12 @@ void report_removed(const Body &b, const Parts &parts, CutReport &out) {
   std::vector<uint8_t> seen(b.p.n);
   for (size_t c = 0; c < parts.of.size(); ++c) {
     if (parts.to[parts.of[c]] != kGoes) continue;
-    ++out.removed;
+    ++out.cells;
     for (size_t k = 0; k < 4; ++k) {
       const uint32_t p = b.tets[4 * c + k];
       if (std::exchange(seen[p], uint8_t{1})) continue;
       out.mass += b.p.mass[p];
-      out.momentum += b.p.mass[p] * b.p.v_at(p);
+      add3(out.momentum, b.p.mass[p] * b.p.v_at(p));
     }
   }
 }
@@ -208,15 +208,12 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     reserve_ends(w, pieces.size());
     for (const auto &t : w.tools) t->cuts.bodies.reserve(t->cuts.bodies.size() + pieces.size());
     put(false);
-    exchange(w, lasting);
     try {
-      prepare(w);
+      prepare_with(w, lasting);
     } catch (...) {
-      exchange(w, lasting);
       put(true);
       throw;
     }
-    end_what_went(w, lasting);
   } catch (...) {
     exchange(b, *before);
     throw;

@@ -31,21 +31,14 @@ double largest_eigenvalue(const double (&a)[6], Vec3 &vector) {
         const double theta = (m[q][q] - m[p][p]) / (2 * m[p][q]);
         const double tangent = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
         const double c = 1 / std::sqrt(tangent * tangent + 1), s = tangent * c;
-        for (auto &row : m) {
-          const double x = row[p], y = row[q];
-          row[p] = c * x - s * y;
-          row[q] = s * x + c * y;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double x = m[p][k], y = m[q][k];
-          m[p][k] = c * x - s * y;
-          m[q][k] = s * x + c * y;
-        }
-        for (auto &row : v) {
-          const double x = row[p], y = row[q];
-          row[p] = c * x - s * y;
-          row[q] = s * x + c * y;
-        }
+        const auto turn = [&](double &x, double &y) {
+          const double old = x;
+          x = c * old - s * y;
+          y = s * old + c * y;
+        };
+        for (auto &row : m) turn(row[p], row[q]);
+        for (int k = 0; k < 3; ++k) turn(m[p][k], m[q][k]);
+        for (auto &row : v) turn(row[p], row[q]);
       }
   int most = 0;
   for (int k = 1; k < 3; ++k)
@@ -185,7 +178,7 @@ void tear_bodies(World &w) {
     if (faces.empty()) continue;
     reserve_cut_events(w, 1);
     CutReport done = open_faces(b, faces);
-    add_event(w, DFM_EVENT_TEAR, b.id, b.id, done.copies, w.time);
+    add_event(w, DFM_EVENT_TEAR, b.id, b.id, done.points, w.time);
     separate_if_requested(b, done);
   }
 }

@@ -30,13 +30,8 @@ ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       stiffness_(points.n, 0.0, memory),
       damping_(points.n, 0.0, memory) {
   use_memory(memory, part_kinetic_, reached_, before_, lagged_, drag_, load_);
-  uint32_t parts = 0;  // after a failure: none, and forces come for all points at once
-  if (model.part_forces)
-    model.call("parts", [&] {
-      parts = model.part_forces->parts(model.self);
-      return DFM_OK;
-    });
-  part_kinetic_.resize(parts);
+  if (model.part_forces)  // after a failure: none, and forces come for all points at once
+    part_kinetic_.resize(model.ask("parts", [&] { return model.part_forces->parts(model.self); }));
 }
 
 bool ExplicitPoints::row_sums(const dfm_kin &k, double &cell) {

@@ -87,31 +87,26 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
 }
 
 std::optional<std::vector<dfm_slot>> ModelInstance::query_extensions() {
-  const void *tables[9] = {};
-  const char *const ids[] = {"dfm.stepper/1", DFM_EXT_SLOTS,       DFM_EXT_EFFECTS,
-                             DFM_EXT_IDLE,    DFM_EXT_LIMITED,     DFM_EXT_CAPS,
-                             DFM_EXT_F32,     DFM_EXT_LATE_POINTS, DFM_EXT_PART_FORCES};
-  if (ops->extension)
-    call("extension", [&] {
-      for (size_t i = 0; i < std::size(ids); ++i) tables[i] = ops->extension(self, ids[i]);
-      return DFM_OK;
-    });
-  stepper = copy_table<dfm_stepper>(tables[0], kStepperHead, type->id, "dfm_stepper");
+  const auto take = [&]<class T>(std::optional<T> &to, const char *extension_id, size_t head,
+                                 const char *name) {
+    to = copy_table<T>(extension(extension_id), head, type->id, name);
+  };
+  take(stepper, "dfm.stepper/1", kStepperHead, "dfm_stepper");
   if (stepper && !(stepper->predict && stepper->respond && stepper->commit))
     fail(DFM_E_UNSUPPORTED,
          "model '%s' steps itself without predict, respond and commit; report it to its author", type->id);
-  effects = copy_table<dfm_effects>(tables[2], kOneFunction, type->id, "dfm_effects");
-  idle = copy_table<dfm_idle>(tables[3], kOneFunction, type->id, "dfm_idle");
-  limited = copy_table<dfm_limited>(tables[4], kOneFunction, type->id, "dfm_limited");
-  claims = copy_table<dfm_caps>(tables[5], kOneFunction, type->id, "dfm_caps");
-  f32 = copy_table<dfm_f32>(tables[6], kF32Head, type->id, "dfm_f32");
-  part_forces = copy_table<dfm_part_forces>(tables[8], kPartForces, type->id, "dfm_part_forces");
+  take(effects, DFM_EXT_EFFECTS, kOneFunction, "dfm_effects");
+  take(idle, DFM_EXT_IDLE, kOneFunction, "dfm_idle");
+  take(limited, DFM_EXT_LIMITED, kOneFunction, "dfm_limited");
+  take(claims, DFM_EXT_CAPS, kOneFunction, "dfm_caps");
+  take(f32, DFM_EXT_F32, kF32Head, "dfm_f32");
+  take(part_forces, DFM_EXT_PART_FORCES, kPartForces, "dfm_part_forces");
   if (part_forces && !(part_forces->parts && part_forces->forces)) part_forces.reset();
-  late = copy_table<dfm_late_points>(tables[7], kLatePoints, type->id, "dfm_late_points");
+  take(late, DFM_EXT_LATE_POINTS, kLatePoints, "dfm_late_points");
   if (late && !(stepper && late->commit && late->points && late->look)) late.reset();
   if (query_caps() != DFM_OK)
     fail(DFM_E_FATAL, "model '%s' failed to report its abilities; see the log", type->id);
-  return copy_slots(type->id, static_cast<const dfm_slots *>(tables[1]), false);
+  return copy_slots(type->id, static_cast<const dfm_slots *>(extension(DFM_EXT_SLOTS)), false);
 }
 
 void ModelInstance::use_single() {
@@ -131,10 +126,7 @@ void ModelInstance::use_single() {
 dfm_status ModelInstance::query_caps() noexcept {
   uint32_t hold = ~uint32_t{0};
   if (claims && claims->active) {
-    const auto query = [&] {
-      hold = claims->active(self);
-      return DFM_OK;
-    };
+    const auto query = [&] { hold = claims->active(self); };
     if (const dfm_status s = call("caps", query); s != DFM_OK) return s;
   }
   caps_ = ops->caps & hold;
@@ -162,47 +154,16 @@ void ModelInstance::put_initial(Array<double> &to) const {
     fail(DFM_E_FATAL, "model '%s' could not initialize its state", type->id);
 }
 
-void ModelInstance::swap(ModelInstance &other) noexcept {
-  std::swap(type, other.type);
-  std::swap(ops, other.ops);
-  std::swap(host, other.host);
-  std::swap(stepper, other.stepper);
-  std::swap(late, other.late);
-  std::swap(effects, other.effects);
-  std::swap(idle, other.idle);
-  std::swap(limited, other.limited);
-  std::swap(claims, other.claims);
-  std::swap(f32, other.f32);
-  std::swap(part_forces, other.part_forces);
-  std::swap(single, other.single);
-  std::swap(caps_, other.caps_);
-  std::swap(self, other.self);
-  params.swap(other.params);
-  slots.swap(other.slots);
-  state.swap(other.state);
-  state_out.swap(other.state_out);
-}
-
 bool ModelInstance::works(std::string_view effect) const {
   if (!effects || !effects->active) return true;
-  const char *const *active = nullptr;
-  call("effects", [&] {
-    active = effects->active(self);
-    return DFM_OK;
-  });
+  const char *const *active = ask("effects", [&] { return effects->active(self); });
   for (; active && *active; ++active)
     if (effect == *active) return true;
   return false;
 }
 
 const void *ModelInstance::extension(const char *id) const noexcept {
-  const void *table = nullptr;
-  if (ops->extension)
-    call("extension", [&] {
-      table = ops->extension(self, id);
-      return DFM_OK;
-    });
-  return table;
+  return ops->extension ? ask("extension", [&] { return ops->extension(self, id); }) : nullptr;
 }
 
 std::vector<EffectRow> ModelInstance::effect_rows() const {
@@ -210,22 +171,12 @@ std::vector<EffectRow> ModelInstance::effect_rows() const {
 }
 
 uint32_t ModelInstance::limited_cells() const {
-  uint32_t n = 0;
-  if (limited && limited->count)
-    call("limited", [&] {
-      n = limited->count(self);
-      return DFM_OK;
-    });
-  return n;
+  return limited && limited->count ? ask("limited", [&] { return limited->count(self); }) : 0;
 }
 
 std::string ModelInstance::idle_reason(uint32_t row) const {
-  const char *why = nullptr;
-  if (idle && idle->why)
-    call("idle", [&] {
-      why = idle->why(self, row);
-      return DFM_OK;
-    });
+  if (!idle || !idle->why) return "";
+  const char *const why = ask("idle", [&] { return idle->why(self, row); });
   return why ? why : "";
 }
 

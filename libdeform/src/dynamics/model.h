@@ -18,7 +18,8 @@ namespace dfm {
 // The state in which a model is asked: [n,4] places and velocities of the points, and its own values.
 dfm_kin kin_at(double time, double h, const double *x, const double *v, const double *state);
 
-struct ModelInstance {
+// What an instance consists of: all that two exchange.
+struct ModelParts {
   const dfm_type *type = nullptr;
   const dfm_model *ops = nullptr;
   const dfm_host *host = nullptr;
@@ -37,6 +38,11 @@ struct ModelInstance {
   std::vector<dfm_slot> slots;     // of its state
   Array<double> state, state_out;  // slots end to end
 
+ protected:
+  uint32_t caps_ = 0;
+};
+
+struct ModelInstance : ModelParts {
   ModelInstance() = default;
   // exchange the two
   ModelInstance(ModelInstance &&other) noexcept { swap(other); }
@@ -45,11 +51,7 @@ struct ModelInstance {
     return *this;
   }
   ~ModelInstance() {
-    if (self && ops->destroy)
-      call("destroy", [&] {
-        ops->destroy(self);
-        return DFM_OK;
-      });
+    if (self && ops->destroy) call("destroy", [&] { ops->destroy(self); });
   }
 
   // Creates the instance and its state; throws Error, which names the plugin, if it refuses.
@@ -60,6 +62,13 @@ struct ModelInstance {
   template <class F>
   dfm_status call(const char *what, F &&f) const noexcept {
     return call_plugin(*host, *type, what, f);
+  }
+  // What f returns; after a failure zero or null.
+  template <class F>
+  auto ask(const char *what, F &&f) const noexcept {
+    decltype(f()) answer{};
+    call(what, [&] { answer = f(); });
+    return answer;
   }
   // DFM_CAP_* that hold with the present parameters. Use this and not dfm_model.caps, which holds for some
   // parameters of the type only.
@@ -91,7 +100,7 @@ struct ModelInstance {
   // Why the parameter of this row has no effect now; empty if it has one.
   std::string idle_reason(uint32_t row) const;
   uint32_t limited_cells() const;  // at the last bound
-  void swap(ModelInstance &other) noexcept;
+  void swap(ModelInstance &other) noexcept { std::swap<ModelParts>(*this, other); }
   void start() { put_initial(state); }      // throws Error
   void put_initial(Array<double> &) const;  // the state that it starts from; throws Error
   void commit_state() {
@@ -101,7 +110,6 @@ struct ModelInstance {
  private:
   std::optional<std::vector<dfm_slot>> query_extensions();  // and its own state slots; throws Error
   dfm_status query_caps() noexcept;                         // after an error caps_ is unchanged
-  uint32_t caps_ = 0;
 };
 
 // Whether a model of this type is created with the rest positions before the pose of the body is applied.

@@ -53,11 +53,7 @@ std::vector<LeftOut> left_out_of(const LawInstance &law) {
 }
 
 LawInstance::~LawInstance() {
-  if (ops->prepare && ops->release)
-    call_plugin(*host, *type, "release", [&] {
-      ops->release(host, data);
-      return DFM_OK;
-    });
+  if (ops->prepare && ops->release) call_plugin(*host, *type, "release", [&] { ops->release(host, data); });
 }
 
 LawBatches::LawBatches(const Memory &m) {

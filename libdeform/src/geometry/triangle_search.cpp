@@ -42,10 +42,7 @@ TriangleOnRay first_on_ray(const Triangles &m, Vec3 o, Vec3 unit, double limit, 
     }
   };
   nearest_first(m.tree, most, own.nodes, bound, leaf);
-  if (count) {
-    count->nodes += own.nodes;
-    count->triangles += own.triangles;
-  }
+  own.add_to(count);
   return best;
 }
 
@@ -84,10 +81,7 @@ TriangleNearPoint closest_to(const Triangles &m, Vec3 p, DistanceKey key, double
     }
   };
   nearest_first(m.tree, reach2, own.nodes, bound, leaf);
-  if (count) {
-    count->nodes += own.nodes;
-    count->triangles += own.triangles;
-  }
+  own.add_to(count);
   return best;
 }
 

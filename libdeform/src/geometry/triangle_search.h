@@ -25,6 +25,11 @@ struct Triangles {
 struct SearchCount {
   uint64_t nodes = 0;
   uint64_t triangles = 0;
+  void add_to(SearchCount *all) const {
+    if (!all) return;
+    all->nodes += nodes;
+    all->triangles += triangles;
+  }
 };
 
 struct TriangleOnRay {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "core/lists.h"
 #include "math/ldlt_solver.h"
 #include "math/pcg_solver.h"
 #include "math/vec3.h"
@@ -66,12 +67,7 @@ void CoarseSpace::form_patches(const BlockRows &rows) {
     else ++patches_;
   }
   for (uint32_t &p : patch_) p = std::min(p, patches_);
-  member_begin_.assign(size_t{patches_} + 2, 0);
-  for (uint32_t i = 0; i < n_; ++i) ++member_begin_[patch_[i] + 1];
-  for (uint32_t p = 0; p <= patches_; ++p) member_begin_[p + 1] += member_begin_[p];
-  member_.resize(n_);
-  std::vector<uint32_t> at(member_begin_.begin(), member_begin_.end() - 1);
-  for (uint32_t i = 0; i < n_; ++i) member_[at[patch_[i]]++] = i;
+  list_by(size_t{patches_} + 1, n_, [&](uint32_t i) { return patch_[i]; }, member_begin_, member_);
 }
 
 void CoarseSpace::analyse(const BlockRows &rows, uint32_t n) {

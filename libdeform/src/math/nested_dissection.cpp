@@ -6,6 +6,8 @@
 #include <Eigen/SparseCore>
 #include <Eigen/OrderingMethods>
 
+#include "core/lists.h"
+
 namespace dfm {
 namespace {
 
@@ -20,16 +22,12 @@ struct Dissection {
   uint32_t parts = 0;
 
   Dissection(const BlockPattern &p, const double *x, uint32_t *order)
-      : pattern(p), places(x), next(order), begin(size_t{p.n} + 1, 0), part(p.n, 0), local(p.n, 0) {
-    for (uint32_t b = 0; b < p.nb; ++b)
-      if (p.ij[2 * b] != p.ij[2 * b + 1])
-        for (int side = 0; side < 2; ++side) ++begin[p.ij[2 * b + side] + 1];
-    for (uint32_t i = 0; i < p.n; ++i) begin[i + 1] += begin[i];
-    other.resize(begin[p.n]);
-    std::vector<uint32_t> at(begin.begin(), begin.end() - 1);
-    for (uint32_t b = 0; b < p.nb; ++b)
-      if (p.ij[2 * b] != p.ij[2 * b + 1])
-        for (int side = 0; side < 2; ++side) other[at[p.ij[2 * b + side]]++] = p.ij[2 * b + 1 - side];
+      : pattern(p), places(x), next(order), part(p.n, 0), local(p.n, 0) {
+    const auto each = [&](const auto &use) {
+      for (uint32_t k = 0; k < 2 * p.nb; ++k)
+        if (p.ij[k] != p.ij[k ^ 1u]) use(p.ij[k], p.ij[k ^ 1u]);
+    };
+    make_lists(p.n, each, begin, other);
   }
 
   double place(uint32_t i, size_t axis) const { return places[3 * size_t{i} + axis]; }

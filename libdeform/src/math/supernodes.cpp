@@ -2,8 +2,9 @@
 #include "math/supernodes.h"
 
 #include <algorithm>
-#include <numeric>
 #include <vector>
+
+#include "core/lists.h"
 
 namespace dfm {
 
@@ -17,18 +18,13 @@ struct Graph {  // neighbors of column j that come later, or earlier
 
 Graph neighbors(const BlockPattern &pattern, const Array<uint32_t> &place, bool later) {
   Graph g;
-  g.begin.assign(size_t{pattern.n} + 1, 0);
   const auto each = [&](auto &&f) {
     for (uint32_t b = 0; b < pattern.nb; ++b) {
       const uint32_t i = place[pattern.ij[2 * size_t{b}]], j = place[pattern.ij[2 * size_t{b} + 1]];
       if (i != j) f(later ? std::min(i, j) : std::max(i, j), later ? std::max(i, j) : std::min(i, j));
     }
   };
-  each([&](uint32_t own, uint32_t) { ++g.begin[own + 1]; });
-  std::partial_sum(g.begin.begin(), g.begin.end(), g.begin.begin());
-  g.other.resize(g.begin.back());
-  std::vector<uint32_t> at(g.begin.begin(), g.begin.end() - 1);
-  each([&](uint32_t own, uint32_t other) { g.other[at[own]++] = other; });
+  make_lists(pattern.n, each, g.begin, g.other);
   return g;
 }
 

@@ -18,6 +18,7 @@
 
 #include "core/disjoint_sets.h"
 #include "core/error.h"
+#include "core/lists.h"
 #include "mesh/fill_lattice.h"
 #include "mesh/mesh.h"
 
@@ -200,12 +201,11 @@ uint32_t drop_empty_pieces(const Memory &memory, Filling &f) {
 // Cells around each point, as rows.
 struct Around {
   Array<uint32_t> row, cell;
-  Around(const Memory &memory, const Filling &f)
-      : row(f.sites.size() + 1, 0u, memory), cell(f.tets.size(), memory) {
-    for (const uint32_t p : f.tets) ++row[p + 1];
-    for (size_t p = 1; p < row.size(); ++p) row[p] += row[p - 1];
-    Array<uint32_t> at = row;
-    for (size_t i = 0; i < f.tets.size(); ++i) cell[at[f.tets[i]]++] = uint32_t(i / 4);
+  Around(const Memory &memory, const Filling &f) : row(memory), cell(memory) {
+    const auto each = [&](const auto &use) {
+      for (size_t i = 0; i < f.tets.size(); ++i) use(f.tets[i], uint32_t(i / 4));
+    };
+    make_lists(f.sites.size(), each, row, cell);
   }
   // Cells that share a point with c, once per shared point.
   template <class Visit>

@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "core/disjoint_sets.h"
+#include "core/lists.h"
 #include "math/extent.h"
 #include "mesh/cells.h"
 #include "mesh/faces.h"
@@ -13,7 +14,6 @@ namespace dfm {
 namespace {
 
 // Lists by their lowest point are short, so that sorting is done within them and not over all.
-//   begin [points + 1] where the items of each lowest point begin; items in any order
 // key(item): the lowest point.
 template <class Item, class Key>
 void sort_by_lowest(Array<Item> &items, const Key &key) {
@@ -21,14 +21,13 @@ void sort_by_lowest(Array<Item> &items, const Key &key) {
   for (const Item &f : items) most = std::max(most, key(f));
   // numbers far beyond the items would make the table larger than the work
   if (items.empty() || most > 4 * items.size() + 64) return std::sort(items.begin(), items.end());
-  Array<uint32_t> begin(size_t{most} + 2, 0u, items.get_allocator());
-  for (const Item &f : items) ++begin[key(f) + 1];
-  for (size_t p = 1; p < begin.size(); ++p) begin[p] += begin[p - 1];
-  Array<Item> sorted(items.size(), Item{}, items.get_allocator());
-  for (const Item &f : items) sorted[begin[key(f)]++] = f;  // begin is then the end of each list
-  uint32_t first = 0;
-  for (size_t p = 0; p + 1 < begin.size(); first = begin[p++])
-    std::sort(sorted.begin() + first, sorted.begin() + begin[p]);
+  Array<uint32_t> begin(items.get_allocator());
+  Array<Item> sorted(items.get_allocator());
+  const auto each = [&](const auto &use) {
+    for (const Item &f : items) use(key(f), f);
+  };
+  make_lists(size_t{most} + 1, each, begin, sorted);
+  for (size_t p = 0; p <= most; ++p) std::sort(sorted.begin() + begin[p], sorted.begin() + begin[p + 1]);
   items.swap(sorted);
 }
 

@@ -7,7 +7,7 @@
 
 namespace dfm {
 
-// run(f) calls into the plugin.
+// run(f) calls into the plugin. An f that returns nothing succeeds if it returns.
 dfm_status run_plugin(const dfm_host &host, const dfm_type &type, const char *what,
                       dfm_status (*run)(const void *f), const void *f) noexcept;
 
@@ -16,7 +16,9 @@ dfm_status call_plugin(const dfm_host &host, const dfm_type &type, const char *w
   return run_plugin(
       host, type, what,
       [](const void *g) -> dfm_status {
-        return (*static_cast<std::remove_reference_t<F> *>(const_cast<void *>(g)))();
+        auto &run = *static_cast<std::remove_reference_t<F> *>(const_cast<void *>(g));
+        if constexpr (!std::is_void_v<decltype(run())>) return run();
+        else return run(), DFM_OK;
       },
       &f);
 }

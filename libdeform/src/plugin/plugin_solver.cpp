@@ -14,10 +14,7 @@ PluginSolver::~PluginSolver() { release(); }
 void PluginSolver::release() noexcept {
   ready_ = false;
   if (!self_) return;
-  call_plugin(host_, type_, "release", [&] {
-    ops_.release(self_);
-    return DFM_OK;
-  });
+  call_plugin(host_, type_, "release", [&] { ops_.release(self_); });
   self_ = nullptr;
 }
 

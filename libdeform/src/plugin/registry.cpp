@@ -183,10 +183,7 @@ std::vector<dfm_slot> law_slots(const dfm_type &type, const dfm_host &host, cons
   const dfm_friction &law = law_of(type);
   if (!law.state) return {law.slots, law.slots + law.nslot};
   const dfm_slots *own = nullptr;
-  call_plugin(host, type, "state", [&] {
-    own = law.state(params);
-    return DFM_OK;
-  });
+  call_plugin(host, type, "state", [&] { own = law.state(params); });
   if (!own) bad_type(type.id, "it does not report the state that its parameters need");
   return *copy_slots(type.id, own, true);
 }

@@ -172,12 +172,7 @@ void reserve_others(World &w, StepContext &step) {
 // moves anything.
 template <class Stream>
 void changed_at_once(Stream &s, World &w) {
-  s.one(w.bound.step);
-  s.one(w.bound.inverted);
-  s.one(w.bound.age);
-  s.one(w.bound.strain);
-  s.one(w.bound.body);
-  s.one(w.bound.point);
+  s.one(w.bound);
   s.one(w.gravity.now);
   s.one(w.watch);
   s.many(w.overlaps.suspended);

@@ -61,11 +61,7 @@ std::vector<BodyFact> body_facts(const Body &b) {
       copy_table<dfm_facts>(b.model.extension(DFM_EXT_FACTS), kFactsHead, b.model.type->id, "dfm_facts");
   if (!table || !table->list || table->row_size < kFactHead) return out;
   uint32_t n = 0;
-  const dfm_fact *facts = nullptr;
-  b.model.call("facts", [&] {
-    facts = table->list(b.model.self, &n);
-    return DFM_OK;
-  });
+  const dfm_fact *const facts = b.model.ask("facts", [&] { return table->list(b.model.self, &n); });
   for (uint32_t i = 0; facts && i < n; ++i) {
     const dfm_fact f = row_at(facts, table->row_size, i);
     if (f.key && f.label && f.unit) out.push_back({f.key, f.label, f.unit, f.value});

@@ -61,7 +61,7 @@ TEST(PluginSolver, RefusedMatrix_NamesThePlugin) {
     EXPECT_EQ(e.sentence, "solver 'org.tiny.cholesky' cannot take a matrix of 125 points; see the log");
   }
   EXPECT_FALSE(solver->factor(large.blk.data()));  // no matrix to factor
-  solver->analyse(small.pattern());  // and it can still be used
+  solver->analyse(small.pattern());                // and it can still be used
   EXPECT_TRUE(solver->factor(small.blk.data()));
 }
 

@@ -78,6 +78,8 @@ class Builtin {
 
   void free_motion(const dfm_rigid_step &step, const Group &g);
   void hold(const dfm_rigid_step &step, const Group &g, std::span<double> velocity);
+  void add_impulse(const JointRow &r, double impulse, std::vector<double> &velocity,
+                   std::vector<Vec3> &momentum) const;
   void assemble(const dfm_rigid_step &step, Group &g);
   void start_from(const dfm_rigid_step &step, const Group &g, const double *impulse);
   double move_by(const dfm_rigid_step &step, const Group &g, std::span<const double> x);
@@ -181,18 +183,23 @@ void Builtin::start_from(const dfm_rigid_step &step, const Group &g, const doubl
     motor_[j] = 0;
     if (drive_[j] != Drive::pushes && drive_[j] != Drive::pulls) continue;
     motor_[j] = (drive_[j] == Drive::pushes ? step.h : -step.h) * step.extra[kMotor * j + 1];
-    const JointRow row = drive_row(joints_[j], states(step));
-    auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
-      if (part == DFM_RIGID_WORLD || group_[part] == DFM_RIGID_STILL) return;
-      add3(&base_[6 * size_t{part}], (parts_[part].inverse_mass * motor_[j]) * l);
-      base_momentum_[part] += motor_[j] * a;
-    };
-    add(row.a, row.la, row.aa);
-    add(row.b, row.lb, row.ab);
+    add_impulse(drive_row(joints_[j], states(step)), motor_[j], base_, base_momentum_);
   }
   for (const uint32_t i : g.parts)
     store3(&base_[6 * size_t{i} + 3], free_spin(load_quat(step.state[i].rotation), parts_[i].inverse_moments,
                                                 base_momentum_[i], step.h));
+}
+
+// Of a row on both of its parts, as far as they move.
+void Builtin::add_impulse(const JointRow &r, double impulse, std::vector<double> &velocity,
+                          std::vector<Vec3> &momentum) const {
+  const auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
+    if (part == DFM_RIGID_WORLD || group_[part] == DFM_RIGID_STILL) return;
+    add3(&velocity[6 * size_t{part}], (parts_[part].inverse_mass * impulse) * l);
+    momentum[part] += impulse * a;
+  };
+  add(r.a, r.la, r.aa);
+  add(r.b, r.lb, r.ab);
 }
 
 // end_ and end_momentum_ with the rows' impulses x. target_: by how much more their rates must change.
@@ -202,16 +209,7 @@ double Builtin::move_by(const dfm_rigid_step &step, const Group &g, std::span<co
     std::copy_n(&base_[6 * size_t{i}], 6, &end_[6 * size_t{i}]);
     end_momentum_[i] = base_momentum_[i];
   }
-  for (size_t k = 0; k < g.rows.size(); ++k) {
-    const JointRow &r = g.rows[k];
-    auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
-      if (part == DFM_RIGID_WORLD || group_[part] == DFM_RIGID_STILL) return;
-      add3(&end_[6 * size_t{part}], (parts_[part].inverse_mass * x[k]) * l);
-      end_momentum_[part] += x[k] * a;
-    };
-    add(r.a, r.la, r.aa);
-    add(r.b, r.lb, r.ab);
-  }
+  for (size_t k = 0; k < g.rows.size(); ++k) add_impulse(g.rows[k], x[k], end_, end_momentum_);
   for (const uint32_t i : g.parts) {
     const Quat q = load_quat(step.state[i].rotation);
     const Vec3 w = free_spin(q, parts_[i].inverse_moments, end_momentum_[i], step.h);

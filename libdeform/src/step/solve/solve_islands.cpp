@@ -9,6 +9,7 @@
 
 #include "contact/bonds.h"
 #include "contact/solve_settings.h"
+#include "core/lists.h"
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
@@ -280,21 +281,17 @@ size_t SolveIslands::find_pairs(const StepContext &step) {
   return of_contacts;
 }
 
-// begin_[k] is then the end of island k's, where that of the next one begins.
 void SolveIslands::split(std::span<const Pair> pairs, Array<RowRun> &out) {
   const auto of = [&](const Pair &p) { return joined_.of[size_t(&p - pairs_.data())]; };
-  begin_.assign(size_t{count_} + 1, 0);
-  uint32_t last = kNone;
-  for (const Pair &p : pairs)
-    if (const uint32_t k = of(p); k != std::exchange(last, k)) ++begin_[k + 1];
-  for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
-  out.resize(begin_[count_]);
-  last = kNone;
-  for (const Pair &p : pairs) {
-    const uint32_t k = of(p);
-    if (k != std::exchange(last, k)) out[begin_[k]++] = p.rows;
-    else out[begin_[k] - 1].n += p.rows.n;
-  }
+  const auto each = [&](const auto &use) {
+    for (size_t i = 0; i < pairs.size();) {
+      const uint32_t k = of(pairs[i]);
+      RowRun run = pairs[i].rows;
+      while (++i < pairs.size() && of(pairs[i]) == k) run.n += pairs[i].rows.n;
+      use(k, run);
+    }
+  };
+  make_lists(count_, each, begin_, out);
 }
 
 void SolveIslands::assign_rows(size_t of_contacts) {
@@ -318,14 +315,8 @@ void SolveIslands::assign_rows(size_t of_contacts) {
 }
 
 void SolveIslands::sort_blocks(const Array<ContactRows::Block> &blocks) {
-  const auto of_block = [&](const ContactRows::Block &b) {
-    return owner_.empty() ? 0 : joined_.of[owner_[b.first]];
-  };
-  begin_.assign(size_t{count_} + 1, 0);
-  for (const ContactRows::Block &b : blocks) ++begin_[of_block(b) + 1];
-  for (uint32_t k = 0; k < count_; ++k) begin_[k + 1] += begin_[k];
-  block_.resize(blocks.size());
-  for (uint32_t b = 0; b < blocks.size(); ++b) block_[begin_[of_block(blocks[b])]++] = b;
+  const auto of_block = [&](uint32_t b) { return owner_.empty() ? 0 : joined_.of[owner_[blocks[b].first]]; };
+  list_by(count_, blocks.size(), of_block, begin_, block_);
 }
 
 void SolveIslands::prepare(const World &w, StepContext &step) {

@@ -115,11 +115,10 @@ class SolveIslands {
   size_t find_pairs(const StepContext &step);  // returns how many are of contacts
   // Rows of these pairs by island.
   void split(std::span<const Pair> pairs, Array<RowRun> &out);
-  // What an island has of `all`, whose ends by island are begin_.
+  // What an island has of `all`, whose lists by island begin_ has.
   template <class T>
   std::span<const T> slice(const Array<T> &all, uint32_t island) const {
-    const uint32_t begin = island ? begin_[island - 1] : 0;
-    return {all.data() + begin, begin_[island] - begin};
+    return {all.data() + begin_[island], begin_[island + 1] - begin_[island]};
   }
   // Each island gets its contacts and bonds.
   void assign_rows(size_t of_contacts);
