@@ -47,7 +47,7 @@ inline void jacobi(double (&a)[kN][kN], double (&v)[kN][kN]) {
   }
 }
 
-// out [kN,kN] = sum of v v^T / divisor(value, largest value) over the eigenvectors v of the symmetric a, which
+// out [kN,kN] = sum of v v^T / divisor(value, largest value) over the eigenvectors v of the symmetric a, that
 // is overwritten; divisor 0: the vector is left out.
 template <int kN, class Divisor>
 inline void spectral_inverse(double (&a)[kN][kN], double *out, const Divisor &divisor) {

@@ -29,9 +29,9 @@ struct Lasting {
 };
 
 void reserve_ends(World &w, size_t pieces);
-// Prepares the world with it, ends contacts whose feature is gone and attachments without points; if it fails,
-// the world has what it had. The next search for overlaps covers what is not attached any more. After
-// reserve_ends().
+// Prepares the world with it, and ends contacts whose feature is gone and attachments without points; after a
+// failure the world has what it had. The next search for overlaps covers what is not attached any more. Comes
+// after reserve_ends().
 void prepare_with(World &w, Lasting &lasting);
 
 }  // namespace dfm

@@ -17,8 +17,12 @@ dfm_status call_plugin(const dfm_host &host, const dfm_type &type, const char *w
       host, type, what,
       [](const void *g) -> dfm_status {
         auto &run = *static_cast<std::remove_reference_t<F> *>(const_cast<void *>(g));
-        if constexpr (!std::is_void_v<decltype(run())>) return run();
-        else return run(), DFM_OK;
+        if constexpr (!std::is_void_v<decltype(run())>) {
+          return run();
+        } else {
+          run();
+          return DFM_OK;
+        }
       },
       &f);
 }
