@@ -16,6 +16,16 @@ std::vector<double> vector(const JsonValue &line, const char *key) {
   return out;
 }
 
+std::vector<uint32_t> below(double n, const JsonValue &line, const char *key) {
+  std::vector<uint32_t> out;
+  for (const double number : line.numbers(key)) {
+    if (!(number >= 0 && number < n))
+      throw Failure(kBadInput, "the body has none of these " + std::string(key));
+    out.push_back(uint32_t(number));
+  }
+  return out;
+}
+
 void cross(const double a[3], const double b[3], double out[3]) {
   for (int k = 0; k < 3; ++k) out[k] = a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3];
 }
@@ -47,10 +57,10 @@ const BodyView &ByHand::body(const JsonValue &line) const {
 }
 
 void ByHand::pull(const JsonValue &line) {
-  const std::vector<double> points = line.numbers("points"), weights = line.numbers("weights");
+  const std::vector<uint32_t> places = below(0x1p32, line, "points");  // the library knows how many there are
+  const std::vector<double> weights = line.numbers("weights");
   const std::vector<double> to = vector(line, "to");
-  if (weights.size() != points.size()) throw Failure(kBadInput, "a pull needs one weight for each point");
-  const std::vector<uint32_t> places(points.begin(), points.end());
+  if (weights.size() != places.size()) throw Failure(kBadInput, "a pull needs one weight for each point");
   dfm_spring_def def = {};
   def.size = sizeof def;
   def.npoint = uint32_t(places.size());
@@ -80,14 +90,10 @@ void ByHand::drag(const JsonValue &line) {
     need(dfm_rigid_get_measure(d.thing, &m));
   } else {
     const BodyView &of = body(line);
-    const std::vector<double> corners = line.numbers("corners");
+    d.corners = below(of.nsurfel, line, "corners");
     d.weights = line.numbers("weights");
-    if (corners.size() != 3 || d.weights.size() != 3)
+    if (d.corners.size() != 3 || d.weights.size() != 3)
       throw Failure(kBadInput, "a drag needs three corners and one weight for each");
-    for (const double c : corners) {
-      if (!(c >= 0 && c < of.nsurfel)) throw Failure(kBadInput, "the body has no corner of this number");
-      d.corners.push_back(uint32_t(c));
-    }
     d.thing = of.handle;
     need(dfm_body_get_measure(of.handle, &m));
   }

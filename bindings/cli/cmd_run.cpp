@@ -83,6 +83,7 @@ constexpr const char *kTeeth =
 
 void check_saves(const SceneFile &scene, const RunOptions &options) {
   const double duration = scene.settings().duration;
+  if (!options.saves.empty() || !options.save_scene.empty()) make_folder(options.out);  // they may lie there
   if (!options.saves.empty()) refuse_static(scene, "--save");
   if (options.record) refuse_static(scene, "--record");
   if (!options.save_scene.empty()) check_scene_path(scene, options.save_scene);

@@ -2,8 +2,9 @@
 
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <cstdint>
+#include <cstdio>
+#include <cstring>
 #include <set>
 
 namespace cli {
@@ -111,6 +112,21 @@ const std::vector<JsonValue> &JsonValue::list(const std::string &key) const {
 
 namespace {
 
+bool is_number(const std::string &text) {
+  const char *at = text.c_str();
+  const auto take = [&](const char *any) { return *at && std::strchr(any, *at) && ++at; };
+  const auto digits = [&] {
+    const bool some = take("0123456789");
+    while (take("0123456789")) continue;
+    return some;
+  };
+  take("-");
+  if (!take("0") && !digits()) return false;
+  if (take(".") && !digits()) return false;
+  if (take("eE") && (take("+-"), !digits())) return false;
+  return !*at;
+}
+
 class Reader {
  public:
   explicit Reader(const std::string &text) : s_(text) {}
@@ -127,7 +143,10 @@ class Reader {
     while (i_ < s_.size() && std::string(",]} \t\r\n").find(s_[i_]) == std::string::npos) ++i_;
     out.text = s_.substr(begin, i_ - begin);
     out.kind = out.text == "null" ? JsonValue::null : JsonValue::literal;
-    return i_ > begin;
+    const bool word = out.text == "null" || out.text == "true" || out.text == "false";
+    if (word || is_number(out.text)) return true;
+    i_ = begin;
+    return false;
   }
   bool end() {
     space();

@@ -560,5 +560,7 @@ TEST(Cost, WhatCannotBeStudied_IsReportedInOneSentence) {
           "did you mean \"tip\"?");
   refused("nothing_to_apply", bar(R"("duration": 0.02)"),
           {"--axes", "time", "--target", "1e-30", "--apply", "x.json"}, "nothing to apply");
+  refused("applied_to_itself", bar(R"("duration": 0.02)"),
+          {"--apply", test::scratch("cost_applied_to_itself") + "/scene.json"}, "this is the scene itself");
   refused("budget_sign", bar(R"("duration": 0.02)"), {"--budget", "-1"}, "expected a finite number above 0");
 }

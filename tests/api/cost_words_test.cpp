@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "cost/calibrate.h"
@@ -158,11 +159,74 @@ TEST(CostSubject, EndsOfATurnedBody_LieInTheFrameOfItsMesh) {
       }
 }
 
+TEST(CostSubject, SceneAppliedBehindALink_FindsItsFiles) {
+  const std::string mesh = test::scratch("cost_subject") + "/cube", far = test::scratch("cost_far/away"),
+                    link = test::scratch("cost_subject") + "/link";
+  test::write_file(mesh + ".node", "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n");
+  test::write_file(mesh + ".ele", "1 4 0\n0 0 1 2 3\n");
+  std::filesystem::remove(link);
+  std::filesystem::create_directory_symlink(far, link);
+  write_applied(subject_of("linked", R"({"name": "one", "mesh": "cube.ele"})"), two_choices(0.01),
+                link + "/applied.json");
+  JsonValue scene;
+  ASSERT_TRUE(parse_json(test::read_file(link + "/applied.json"), scene));
+  EXPECT_TRUE(std::filesystem::exists(link + "/" + scene.list("bodies").at(0).get("mesh")));
+}
+
 // Other meshes have other nodes of these numbers.
 TEST(CostSubject, BodyHeldByNumbersOfNodes_KeepsItsCells) {
   EXPECT_EQ(why_cells_stay(subject_of("box", bar(R"(, "fix": [{"box": [[-1, -1, -1], [0, 1, 1]]}])"))), "");
   EXPECT_TRUE(has(why_cells_stay(subject_of("fix", bar(R"(, "fix": [{"points": [0, 1, 2]}])"))),
                   "body 'bar' has fix by points"));
+  test::write_file(test::scratch("cost_subject") + "/corner.obj",
+                   "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n");
+  EXPECT_TRUE(has(why_cells_stay(subject_of("surface", R"({"name": "organ", "mesh": "corner.obj",
+      "fill": {"cells": 0}, "model": {"type": "boundary"}})")),
+                  "body 'organ' has no cells"));
+}
+
+// The scene names one of them.
+TEST(CostSubject, FingerprintOfATetGenMesh_IsOfAllItsFiles) {
+  const std::string mesh = test::scratch("cost_subject") + "/one";
+  test::write_file(mesh + ".ele", "1 4 0\n0 0 1 2 3\n");
+  const auto fingerprint = [&](const char *top) {
+    test::write_file(mesh + ".node", "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 " + std::string(top) + "\n");
+    return subject_of("tetgen", R"({"name": "one", "mesh": "one.ele"})").fingerprint;
+  };
+  EXPECT_NE(fingerprint("1"), fingerprint("1.5"));
+}
+
+// What a run has left that was cut is no result of the run that takes its place.
+TEST(CostRuns, RunThatIsStartedAgain_HasNothingOfTheEarlierOne) {
+  const Subject subject = subject_of("again", bar(""));
+  Runs runs(subject, test::scratch("cost_runs"), 1, 100, false);
+  Job job;
+  job.set = {{"/bodies/0/model/type", "\"none such\""}};
+  job.limit = 100;
+  runs.prepare(job);
+  std::filesystem::create_directories(job.folder);
+  test::write_file(job.folder + "/summary.json", R"({"cpu_s": 5, "simulated_s": 5, "steps": 5})");
+  test::write_file(job.folder + "/bodies.csv", "t,body\n5,bar\n");
+  job.outcome = {};
+  runs.run({&job}, 1);
+  EXPECT_EQ(job.outcome.state, Outcome::refused) << job.outcome.sentence;
+  EXPECT_EQ(job.outcome.made, 0);
+  EXPECT_EQ(job.outcome.cpu, 0);
+}
+
+// A comma and quotes in a label stay in its cell.
+TEST(CostReport, TableOfChoices_HasOneCellPerColumn) {
+  const Subject subject = subject_of("table", bar(""));
+  Study study = two_choices(0.01);
+  study.rows.resize(1);
+  Knobs knobs;
+  knobs.cells = 2;
+  knobs.self = "\"auto\"";
+  study.rows[0].job.label = label_of(knobs);
+  const std::string text = csv_text(subject, study);
+  EXPECT_TRUE(has(text, "\n0,\"cells x2, self auto\",")) << text;
+  study.rows[0].job.label = "a \"b\"";
+  EXPECT_TRUE(has(csv_text(subject, study), "\n0,\"a \"\"b\"\"\","));
 }
 
 // As --apply renames them where it writes into another folder.

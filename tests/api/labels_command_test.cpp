@@ -112,9 +112,13 @@ TEST(LabelsCommand, TableThatTheUserHasChanged_IsNotReplaced) {
   EXPECT_EQ(refused.exit_code, 2);
   EXPECT_TRUE(has(refused.err, table + ": ") && has(refused.err, "--table")) << refused.err;
   EXPECT_EQ(test::read_file(table), changed);
-  words.insert(words.end(), {"--table", table});
-  EXPECT_EQ(test::deform(words).exit_code, 0);
-  EXPECT_EQ(test::read_file(table), changed);
+  test::write_file(out + "/other.json", changed + "\n");
+  words.insert(words.end(), {"--table", ""});
+  for (const std::string &given : {table, out + "/other.json"}) {
+    words.back() = given;
+    EXPECT_EQ(test::deform(words).exit_code, 0);
+    EXPECT_EQ(test::read_file(table), changed) << given;
+  }
 }
 
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
@@ -224,6 +228,10 @@ TEST(LabelsCommand, WrongInput_IsReportedInOneSentence) {
   with_table(begin + R"("labels": {"1": {"colour": "red"}}})", "/labels/1/colour: no such key");
   with_table(begin + R"("labels": {"1": {"skip": true}, "2": {"skip": true}}})", "no label is left");
   with_table(begin + R"("labels": )", "wrong.json:1");
+  for (const char *number : {"1e4Pa", "True", ".5", "0x10", "01", "1.", "NaN", "-"})
+    with_table(R"({"format": "deform-labels", "version": 1, "materials": {"gel": {"young": )" +
+                   std::string(number) + "}}}",
+               "this is not JSON");
   with_table(begin + R"("labels": {"1": {"material": "gel", "name": "gel"}},)"
                      R"( "bodies": {"gel": {"surface": {"mesh": "a.obj"}}}})",
              "/bodies/gel/surface: expected {\"from\": \"boundary\"}, for a body that is cut or torn");

@@ -154,7 +154,8 @@ TEST(Replay, RunIntoItsOwnFolder_ContinuesFromItsRecordingAndARefusedOneDeletesN
 // that are loaded nor what tells one build of them from another.
 TEST(Replay, SavedState_NamesWhatTheSceneCallsByVersion) {
   const Folder f;
-  const std::string state = f.path + "/mid.state";
+  fs::remove_all(f.path + "/run");
+  const std::string state = f.path + "/run/mid.state";  // in a folder that the run makes
   ASSERT_EQ(f.run({"--out", f.path + "/run", "--save", "0.02", state}).exit_code, 0);
   const std::string text = test::read_file(state), head = text.substr(0, text.find('\n'));
   const std::string version = dfm_version(nullptr, nullptr, nullptr), row = R"(\{"id": "org.deform.)";

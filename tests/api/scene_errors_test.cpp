@@ -222,6 +222,9 @@ TEST(SceneErrors, Springs_ReportWhereTheyPullAndEnd) {
 TEST(SceneErrors, Names_AreUniqueAndKnown) {
   check({{"/bodies/0/material=\"gle\"", {"/bodies/0/material", "did you mean \"gel\"?"}},
          {"/obstacles/0/name=\"block\"", {"/obstacles/0/name", "taken"}},
+         {"/rigid={\"bodies\":[{\"name\":\"r\",\"shape\":\"sphere\",\"radius\":1,\"mass\":1},"
+          "{\"name\":\"q\",\"id\":50,\"shape\":\"sphere\",\"radius\":1,\"mass\":1}]}",
+          {"/rigid/bodies/1/id", "follow that of the first"}},
          {"/contact/friction/0/between=[\"blok\",\"*\"]",
           {"/contact/friction/0/between/0", "did you mean \"block\"?"}},
          {"/contact/friction/0/between=[\"block\"]", {"/contact/friction/0/between", "two sides"}},

@@ -232,6 +232,14 @@ TEST(WriteScene, Tools_AreWrittenWithKeysCouplingAndCuts) {
   dfm_body block = 0;
   test::ok(dfm_world_find_body(world, "block", &block));
   EXPECT_EQ(all(write(world, folder + "/again.json", DFM_SCENE_PARTIAL)).find("tool '"), std::string::npos);
+  dfm_tool pin = 0;
+  test::ok(dfm_world_find_tool(world, "pin", &pin));
+  const dfm_pose away = {{0.21, 0, 0}, {0, 0, 0, 1}};
+  test::ok(dfm_tool_set_pose(pin, &away, nullptr));
+  steps(world, 1, 1e-3);
+  EXPECT_NE(all(write(world, folder + "/again.json", DFM_SCENE_PARTIAL))
+                .find("tool 'pin': in the scene it rests where its device is"),
+            std::string::npos);
   const dfm_world start = load(context, path);
   const std::vector<unsigned char> before = [&] {
     EXPECT_EQ(all(write(start, folder + "/start.json", DFM_SCENE_SNAPSHOT)), "");
@@ -628,6 +636,29 @@ TEST(WriteScene, SnapshotOfAnEarlierScene_IsRemoved) {
   EXPECT_TRUE(std::filesystem::exists(folder + "/made_files/snapshot.state"));
   write(world, folder + "/made.json");
   EXPECT_FALSE(std::filesystem::exists(folder + "/made_files/snapshot.state"));
+}
+
+// As where the disk is full: one of its files cannot be written.
+TEST(WriteScene, FailedCall_LeavesTheFilesOfAnEarlierScene) {
+  test::Context context;
+  const std::string folder = folder_of("failed"), first = folder + "/first.json",
+                    made = folder + "/made.json";
+  const auto world_of = [&](const char *size) {
+    test::write_file(first, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1}, "bodies": [
+      {"name": "a", "mesh": {"make": "beam", "size": )" +
+                                std::string(size) + R"(, "cells": 50}},
+      {"name": "b", "mesh": {"make": "beam", "size": [0.2, 0.1, 0.1], "cells": 50},
+       "pose": {"position": [0, 0, 1]}}]})");
+    return load(context, first);
+  };
+  std::filesystem::create_directories(folder);
+  write(world_of("[0.2, 0.1, 0.1]"), made);
+  const auto before = test::read_file(folder + "/made_files/a.vtu");
+  std::filesystem::create_directories(folder + "/made_files/.part/b.vtu");
+  const dfm_world other = world_of("[0.4, 0.1, 0.1]");
+  EXPECT_EQ(dfm_world_write_scene(other, made.c_str(), nullptr, nullptr), DFM_E_IO);
+  EXPECT_EQ(test::read_file(folder + "/made_files/a.vtu"), before);
+  EXPECT_FALSE(std::filesystem::exists(folder + "/made_files/.part"));
 }
 
 TEST(WriteScene, WrongArguments_AreReportedInOneSentence) {

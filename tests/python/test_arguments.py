@@ -256,6 +256,8 @@ class Arguments(unittest.TestCase):
                     ("radius", lambda: world.add_obstacle("sphere", radius=-1)),
                     ("radius", lambda: world.add_obstacle("sphere", radius=math.nan)),
                     ("half_size", lambda: world.add_obstacle("box", half_size=(1, -1, 1))),
+                    ("scale and cells are of the mesh", lambda: world.add_obstacle("box", scale=1e-3)),
+                    ("scale and cells are of the mesh", lambda: world.add_obstacle("box", cells=9)),
                     ("mass", lambda: world.add_rigid("sphere", mass=-1)),
                     ("radius", lambda: world.add_tool("sphere", radius=math.nan)),
                     ("radius", lambda: deform.TetMesh.ball(-1)),

@@ -199,6 +199,8 @@ class Said(InAFolder):
         np.testing.assert_allclose(spread.correlation[0, 1],
                                    inverse[0, 1] / np.sqrt(inverse[0, 0] * inverse[1, 1]), rtol=1e-12)
         self.assertAlmostEqual(spread.quantile, 2.0484, 4)  # t(0.975, 28): 90 % for two at once
+        exact = Spread(np.stack([t, 0 * t], axis=1), [0 * t], 0.9)  # the data that the model itself gave
+        np.testing.assert_array_equal(exact.half, [0, np.inf])
         alike = Spread(np.stack([t, t * (1 + 1e-9)], axis=1) * 1e3, [residuals], 0.95)
         self.assertRegex(alike.sentences(["a", "b"])[0], r"a and b cannot be told apart .*a \+1.00, b -1.00")
 

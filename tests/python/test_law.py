@@ -214,6 +214,15 @@ class InPython(unittest.TestCase):
             deform.friction("lugre", "spring_pul")
 
 
+    def test_a_normal_force_that_nothing_reads_is_refused(self):
+        case = {"law": "coulomb", "params": {"mu": 0.5}, "input": {"kind": "sine_velocity"}}
+        for kind, given, words in (("sine_velocity_sine_load", {}, "F0 of its input"),
+                                   (None, {"case": case}, "a case holds its own")):
+            with self.assertRaisesRegex(deform.ArgumentError, words):
+                deform.friction("coulomb", kind, normal=100, **given)
+        with self.assertRaisesRegex(deform.ArgumentError, "a case holds its own"):
+            deform.friction("coulomb", "force_ramps", case=case)
+
     def test_what_refuse_raises_in_another_process(self):
         refuses = type("Refuses", (Tanh,), {"id": "com.example.refuses",
                                             "refuse": lambda self, params: params["nu"]})
@@ -248,6 +257,11 @@ class Validator(unittest.TestCase):
         self.assertEqual({row["id"]: row["result"] for row in rules},
                          {"V03": "pass", "V04": "pass", "V05": "skip", "V07": "pass", "F01": "pass",
                           "F02": "pass", "F16": "pass"}, str(rules))
+
+    def test_rules_of_a_file_alone_run_nothing(self):
+        with mock.patch("subprocess.run", side_effect=AssertionError):
+            row, = Bristle().check(only=["V05"])
+        self.assertEqual((row["id"], row["result"]), ("V05", "skip"))
 
     def test_rules_that_are_broken(self):
         rules = Pushes().check(only=["F01", "F03"])

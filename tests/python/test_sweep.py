@@ -176,6 +176,9 @@ class Designs(InAFolder):
                 ({"parameters": {"mu": {"at": "mu", "values": [1]}}}, "expected a JSON pointer"),
                 ({"parameters": {"mu": {"at": MU, "from": 0, "to": 1, "scale": "log"}}}, "begins above 0"),
                 ({"quantities": {"x": {"table": "probs", "column": "x"}}}, "expected one of .*probes"),
+                ({"parameters": {"mu": {"at": MU, "values": [1], "whole": True}}},
+                 '"values" and "whole" exclude'),
+                ({"quantities": {"x": {"summary": "/steps", "take": "max"}}}, '"summary" and "take" exclude'),
                 ({"quantities": {"mu": {"summary": "/steps"}}}, "is a parameter already"),
                 ({"quantities": {"said": {"summary": "/steps"}}}, '"said" is a column of every sweep'),
                 ({"parameters": {"a": {"at": MU, "values": [1]}, "b": {"at": MU, "values": [1]}}},
@@ -421,6 +424,10 @@ class Outputs(InAFolder):
         self.command("sweep", study.name, "--out", self.out.name, "--export", "slurm")
         array = self.out / "array.sh"
         self.assertIn("#SBATCH --array=0-9", array.read_text())
+        for ignored in (["--only", "3", "--parquet"], ["--export", "slurm", "--retry"],
+                        ["--export", "slurm", "--workers", "2"]):
+            said = self.command("sweep", study, "--out", self.out, *ignored, code=2)
+            self.assertIn("omit one of them", said.stderr)
         wide = self.folder / "my study.json"
         shutil.copy(study, wide)
         self.command("sweep", wide, "--out", self.folder / "wide", "--export", "slurm")

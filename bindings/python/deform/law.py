@@ -167,6 +167,14 @@ class PythonLaw:
         result ("pass", "fail", "skip"), detail. Rules about a compiled file (memory, symbols, static
         variables) are skipped. only: ids of rules. Takes half a minute."""
         wanted = [rule for rule in only or _RULES if rule not in _OF_THE_FILE]
+        rows = [{"id": rule, "title": "", "result": "skip", "detail": "of a compiled file"}
+                for rule in _OF_THE_FILE if rule in (only or _RULES)]
+        if wanted:
+            rows += self._checked(wanted, seed)
+        return Table(sorted(rows, key=lambda row: (row["id"][0] != "V", row["id"])),
+                     ["id", "result", "title", "detail"])
+
+    def _checked(self, wanted: Sequence[str], seed: int) -> list[dict[str, Any]]:
         with self.served() as (file, environment):
             arguments = [command_path(), "plugin", "check", file, "--json", "--seed", seed, "--limit", 60]
             for rule in wanted:
@@ -176,11 +184,7 @@ class PythonLaw:
         if done.returncode not in (0, 1):
             raise Error(done.stderr.strip().removeprefix("deform: "))
         said = json.loads(done.stdout)
-        rows = said["rules"] + [row for kind in said["types"] for row in kind["rules"]]
-        rows += [{"id": rule, "title": "", "result": "skip", "detail": "of a compiled file"}
-                 for rule in _OF_THE_FILE if rule in (only or _RULES)]
-        return Table(sorted(rows, key=lambda row: (row["id"][0] != "V", row["id"])),
-                     ["id", "result", "title", "detail"])
+        return said["rules"] + [row for kind in said["types"] for row in kind["rules"]]
 
 
 class Bridge:

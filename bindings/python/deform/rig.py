@@ -37,29 +37,34 @@ _UNITS = {"t": "time (s)", "x": "displacement (m)", "v": "velocity (m/s)", "F": 
           "F_ba": "break-away force (N)", "Fx": "Fx (N)", "Fy": "Fy (N)"}
 
 
-def friction(law: Any, kind: str = "sine_velocity", *, normal: float = 1.0,
+def friction(law: Any, kind: str | None = None, *, normal: float | None = None,
              input: Mapping[str, Any] | None = None, case: Any = None, step: float | None = None,
              **params: Any) -> dict[str, np.ndarray]:
     """Drives one contact of 1 m2 by a law and returns its rows, an array for each column (t, x, v, F, z,
     ...; SI).
 
-    law: a name, a plugin file, or a PythonLaw. kind: what drives it: "sine_velocity", "bias_sine_force",
-    "spring_pull", "force_ramps", "displacement_path", "circle_velocity", "sine_velocity_sine_load"; input:
-    its numbers, where others than the usual ones are wanted. normal: N. case: a whole case instead, as a
-    dict or the path of a JSON file. params: of the law, by key. step: s, the longest; not given: 1e-4, of a
-    Python law 1e-3, on a displacement path, which is slow, 1e-2."""
+    law: a name, a plugin file, or a PythonLaw. kind: what drives it: "sine_velocity" (the default),
+    "bias_sine_force", "spring_pull", "force_ramps", "displacement_path", "circle_velocity",
+    "sine_velocity_sine_load" (normal force: F0 of its input); input: its numbers, where others than the usual
+    ones are wanted. normal: N (1). case: a whole case instead, as a dict or the path of a JSON file. params:
+    of the law, by key. step: s, the longest; not given: 1e-4, of a Python law 1e-3, on a displacement path,
+    which is slow, 1e-2."""
     if isinstance(law, type) and issubclass(law, PythonLaw):
         law = law()
+    if normal is not None and kind == "sine_velocity_sine_load":
+        raise ArgumentError('the normal force of this kind is F0 of its input: give input={"F0": ...}',
+                            "DFM_E_ARG")
     if case is None:
+        kind = kind or "sine_velocity"
         choice("input", kind, INPUTS)
         known = law.parameters if isinstance(law, PythonLaw) else Law(law).type.parameters
         usual = {row.key: row.default for row in known if row.width == 1 and not row.names}
         if "mu" in params:
             usual = {key: value for key, value in usual.items() if key not in ("mu_C", "mu_S")}
-        case = {"mass": normal / 9.81, "gravity": 9.81, "params": {**usual, **params},
-                "input": {"kind": kind, **{**INPUTS[kind], **(input or {})}}}
-    elif params or input:
-        raise ArgumentError("a case holds its own input and params", "DFM_E_ARG")
+        case = {"mass": (1 if normal is None else normal) / 9.81, "gravity": 9.81,
+                "params": {**usual, **params}, "input": {"kind": kind, **{**INPUTS[kind], **(input or {})}}}
+    elif params or input or kind or normal is not None:
+        raise ArgumentError("a case holds its own input, params and normal force", "DFM_E_ARG")
     elif not isinstance(case, Mapping):
         case = json.loads(pathlib.Path(case).read_text())
     if step is None:
@@ -76,13 +81,14 @@ def friction(law: Any, kind: str = "sine_velocity", *, normal: float = 1.0,
     return {column: np.array([float(row[column]) for row in table]) for column in (table[0] if table else [])}
 
 
-def plot_friction(law: Any, kind: str = "sine_velocity", *, path: Any = None, **options: Any) -> Any:
+def plot_friction(law: Any, kind: str | None = None, *, path: Any = None, **options: Any) -> Any:
     """What friction() gives, as a matplotlib Figure (matplotlib is needed); path: where to write it, too."""
     try:
         from matplotlib.figure import Figure
     except ImportError as missing:
         raise ImportError("plot_friction needs matplotlib: pip install matplotlib") from missing
     rows = friction(law, kind, **options)
+    kind = kind or ("case" if "case" in options else "sine_velocity")
     panels = [pair for pair in _PANELS.get(kind, []) if pair[0] in rows and pair[1] in rows]
     if not panels:
         names = list(rows)

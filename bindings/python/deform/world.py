@@ -394,6 +394,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.category = whole(category, "category")
         definition.collides_with = whole(collides_with, "collides_with")
         definition.material, cells = self._material(material), whole(cells, "cells")
+        if mesh is None and (scale != 1 or cells != 0):
+            raise ArgumentError("scale and cells are of the mesh of an obstacle; give mesh, too", "DFM_E_ARG")
         if mesh is not None:
             mesh = surface_of(mesh, "the mesh of an obstacle")
             p, t = _scaled(mesh.points, scale), mesh.triangles
@@ -605,8 +607,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
     def stable_step(self) -> float:
         """s, a step that is not cut into sub-steps; inf if nothing bounds it."""
         out = ctypes.c_double()
-        self.free()
-        check(quick.dfm_world_stable_step(self.handle, ctypes.byref(out), None, None))
+        self.call(lib.dfm_world_stable_step, self.handle, ctypes.byref(out), None, None)
         if self._raised is not None:
             raise self._take_raised()  # type: ignore[misc]
         return out.value

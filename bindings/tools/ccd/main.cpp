@@ -13,6 +13,7 @@
 #include "file.h"
 #include "json_text.h"
 #include "messages.h"
+#include "output.h"
 
 namespace cli {
 namespace {
@@ -34,14 +35,6 @@ struct CcdQuery {
   dfm_motion motion[4];
 };
 
-std::vector<std::string> cells_of(const std::string &line) {
-  std::vector<std::string> cells(1);
-  for (const char c : line)
-    if (c == ',') cells.emplace_back();
-    else if (c != '\r') cells.back() += c;
-  return cells;
-}
-
 class QueryFile {
  public:
   explicit QueryFile(const std::string &path) : path_(path) {
@@ -49,7 +42,7 @@ class QueryFile {
     for (size_t at = 0; at < text.size();) {
       const size_t end = std::min(text.find('\n', at), text.size());
       ++line_;
-      const std::vector<std::string> cells = cells_of(text.substr(at, end - at));
+      const std::vector<std::string> cells = csv_cells(text.substr(at, end - at));
       at = end + 1;
       if (cells.size() == 1 && cells[0].empty()) continue;
       if (names_.empty()) header(cells);

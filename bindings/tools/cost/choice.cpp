@@ -134,7 +134,7 @@ std::string label_of(const Knobs &knobs) {
   }
   if (!knobs.tolerance.empty()) add("tolerance " + knobs.tolerance + " m/s");
   if (!knobs.law.empty()) add("law " + knobs.law);
-  if (!knobs.self.empty()) add("self " + knobs.self);
+  if (!knobs.self.empty()) add("self " + (knobs.self == "\"auto\"" ? "auto" : knobs.self));
   if (!knobs.guard.empty()) add("guard " + knobs.guard);
   return out.empty() ? "the scene as it is" : out;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -39,6 +40,9 @@ std::vector<std::string> split(const std::vector<std::string> &lists) {
 
 int cost_of(CostOptions options, Globals &globals) {
   if (options.out.empty()) options.out = out_folder(options.scene, "cost");
+  std::error_code absent;
+  if (std::filesystem::equivalent(path_of(options.apply), path_of(options.scene), absent))
+    return fail("--apply " + options.apply + ": this is the scene itself; give another name");
   options.study.axes = split(options.study.axes);
   const cost::Subject subject = cost::read_subject(options.scene, globals);
   make_folder(options.out);

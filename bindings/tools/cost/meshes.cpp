@@ -27,6 +27,8 @@ std::string why_cells_stay(const Subject &subject) {
     if (!part.empty() && !subject.find(body + "/fill"))
       return "body '" + subject.bodies[i].name + "' has " + part +
              ", which belongs to the cells of its mesh and not to others";
+    if (const JsonValue *const cells = subject.find(body + "/fill/cells"); cells && cells->text == "0")
+      return "body '" + subject.bodies[i].name + "' has no cells, only its surface";
     if (mesh->kind == JsonValue::object) continue;
     if (subject.find(body + "/surface/mesh"))
       return "body '" + subject.bodies[i].name + "' has a separate surface";

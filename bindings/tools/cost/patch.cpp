@@ -50,14 +50,15 @@ JsonValue scene_patch(const Subject &subject, const Study &study) {
 
 void write_applied(const Subject &subject, const Study &study, const std::string &path) {
   JsonValue scene = patched(subject, study);
-  const fs::path folder = fs::absolute(path).parent_path();
   std::error_code error;
-  fs::create_directories(folder, error);
+  fs::create_directories(fs::absolute(path).parent_path(), error);
+  const fs::path folder = fs::weakly_canonical(fs::absolute(path).parent_path());
   for (const std::string &pointer : file_pointers(scene)) {
     JsonValue name = *at_pointer(scene, pointer);
     if (fs::path(name.text).is_absolute()) continue;
-    const fs::path file = fs::absolute(fs::path(subject.folder) / name.text).lexically_normal();
-    name.text = file.lexically_relative(folder.lexically_normal()).generic_string();
+    // canonical, since .. behind a symbolic link leads elsewhere
+    const fs::path file = fs::weakly_canonical(fs::absolute(fs::path(subject.folder) / name.text));
+    name.text = file.lexically_relative(folder).generic_string();
     set_pointer(scene, pointer, name);
   }
   write_whole(path, json_lines(scene));

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "file.h"
+#include "output.h"
 
 namespace fs = std::filesystem;
 
@@ -33,20 +34,11 @@ Table read_table(const std::string &path) {
   std::error_code error;
   if (!fs::exists(path, error)) return out;
   const std::string text = read_file(path, uint64_t(1) << 30, "a table");
-  Row row(1);
-  bool head = true;
-  for (const char c : text) {
-    if (c == ',') {
-      row.emplace_back();
-    } else if (c != '\n') {
-      row.back() += c;
-    } else {
-      if (head)
-        for (size_t i = 0; i < row.size(); ++i) out.columns[row[i]] = i;
-      else if (row.size() == out.columns.size()) out.rows.push_back(row);
-      head = false;
-      row.assign(1, "");
-    }
+  for (size_t at = 0, end; (end = text.find('\n', at)) != std::string::npos; at = end + 1) {
+    const Row row = csv_cells(text.substr(at, end - at));
+    if (at == 0)
+      for (size_t i = 0; i < row.size(); ++i) out.columns[row[i]] = i;
+    else if (row.size() == out.columns.size()) out.rows.push_back(row);
   }
   return out;
 }

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "messages.h"
+#include "output.h"
 
 namespace cli::cost {
 namespace {
@@ -413,7 +414,7 @@ std::string table_text(const Subject &subject, const Study &study) {
 
 std::string csv_text(const Subject &subject, const Study &study) {
   std::string out = "index,label,axes,model,integrator,step,cells,law,precision,cpu_s_per_s,state,headline";
-  for (const std::string &name : study.quantities) out += "," + name;
+  for (const std::string &name : study.quantities) out += "," + csv_cell(name);
   out += "\n";
   const auto cell = [](double x) { return std::isfinite(x) ? number(x) : std::string(); };
   const char *const states[] = {"not run", "done", "unstable", "refused", "cut"};
@@ -422,9 +423,10 @@ std::string csv_text(const Subject &subject, const Study &study) {
     const Described d = describe(subject, row);
     std::string axes;
     for (const std::string &axis : row.candidate.axes) axes += (axes.empty() ? "" : "+") + axis;
-    out += std::to_string(i) + ",\"" + row.job.label + "\"," + axes + "," + d.model + "," + d.integrator +
-           "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.law + "," + d.precision + "," +
-           cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," + cell(row.headline);
+    out += std::to_string(i) + "," + csv_cell(row.job.label) + "," + axes + "," + d.model + "," +
+           d.integrator + "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.law + "," +
+           d.precision + "," + cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," +
+           cell(row.headline);
     for (const std::string &name : study.quantities) {
       const auto found = row.error.find(name);
       out += "," + (found == row.error.end() ? "" : cell(found->second));

@@ -315,8 +315,12 @@ Subject read_subject(const std::string &path, Globals &globals) {
   read_offers(scene.context(), out, files);
   Hash hash;
   hash.add(text);
-  for (const std::string &pointer : file_pointers(out.scene))
-    hash.add_file((fs::path(out.folder) / out.find(pointer)->text).string());
+  for (const std::string &pointer : file_pointers(out.scene)) {
+    fs::path file = fs::path(out.folder) / out.find(pointer)->text;
+    hash.add_file(file.string());
+    for (const char *part : {".ele", ".node", ".face"})  // a mesh of TetGen is several files
+      hash.add_file(file.replace_extension(part).string());
+  }
   Dl_info library = {};
   if (dladdr(reinterpret_cast<void *>(&dfm_scene_open), &library) != 0 && library.dli_fname)
     hash.add_file(library.dli_fname);

@@ -78,8 +78,8 @@ class Maker {
           o_.out + "/labels.json and give it by --table");
     const std::string own = o_.out + "/labels.json";  // the user changes it
     std::error_code absent;
-    writes_table_ = !std::filesystem::equivalent(cli::path_of(o_.table), cli::path_of(own), absent);
-    if (o_.table.empty() && std::filesystem::exists(cli::path_of(own), absent) &&
+    writes_table_ = !std::filesystem::exists(cli::path_of(own), absent);
+    if (o_.table.empty() && !writes_table_ &&
         cli::read_file(own, 64u << 20, "a table of labels") != table_text(table_, volume_) + "\n")
       refuse(own, "a table with other entries is there already; give it by --table, or remove it");
     std::vector<bool> kept(volume_.value.size(), false);

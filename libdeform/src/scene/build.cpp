@@ -606,6 +606,9 @@ class Builder {
       b.def.name = b.name.c_str();
       b.def.material = material(b.material);
       const uint32_t number = uint32_t(bodies.size());
+      if (const uint64_t id = world().next_id + number; b.id && b.id != id)
+        fail(DFM_E_ARG, "%s: %s/id: expected %llu, since ids of rigid bodies follow that of the first",
+             def_.file.c_str(), b.pointer.c_str(), static_cast<unsigned long long>(id));
       bool tied = b.def.fixed != 0;
       for (const RigidBody &other : rigid.bodies)
         for (const Joint &j : other.joints) tied = tied || &other == &b || j.with == b.name;

@@ -72,7 +72,7 @@ Written sine_of(const dfm_sine &s, bool scalar) {
   return out;
 }
 
-Written value_of(const dfm_param &row, const double *values) {
+Written value_of(const dfm_param &row, const double *values, uint32_t n) {
   const bool whole = row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM);
   const auto number = [&](double x) { return whole ? Written(int64_t(x)) : Written(x); };
   if ((row.flags & DFM_PARAM_AUTO) && values[0] == row.def) return "auto";
@@ -81,7 +81,7 @@ Written value_of(const dfm_param &row, const double *values) {
     return number(values[0]);
   }
   Written out = Written::array();
-  for (uint32_t k = 0; k < row.width; ++k) out.push_back(number(values[k]));
+  for (uint32_t k = 0; k < n; ++k) out.push_back(number(values[k]));
   return out;
 }
 
@@ -91,7 +91,7 @@ Written params_of(const dfm_type &type, const std::vector<double> &values) {
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width) {
     const dfm_param &row = type.params[i];
     if (std::any_of(&values[at], &values[at] + row.width, [&](double x) { return x != row.def; }))
-      out[row.key] = value_of(row, &values[at]);
+      out[row.key] = value_of(row, &values[at], row.width);
   }
   return out;
 }
@@ -538,6 +538,29 @@ void print(const Written &value, const std::string &before, std::string &out) {
   out += "\n" + before + (value.is_object() ? "}" : "]");
 }
 
+// Those of an earlier scene stay until all are written. Nothing is allocated while an error is on its way.
+void write_files(const SceneWriter &to) {
+  if (to.files.empty()) return;
+  struct Fresh {
+    std::vector<std::filesystem::path> paths;  // of the files, then their folder
+    std::error_code error;
+    ~Fresh() {
+      for (const auto &p : paths) std::filesystem::remove(p, error);
+    }
+  } fresh;
+  const std::filesystem::path folder = path_of(beside(to.path, ".part"));
+  for (const SceneWriter::File &f : to.files) fresh.paths.push_back(folder / path_of(f.name));
+  fresh.paths.push_back(folder);
+  std::filesystem::create_directory(folder, fresh.error);
+  for (size_t i = 0; i < to.files.size(); ++i) to.files[i].write(name_of(fresh.paths[i]));
+  for (size_t i = 0; i < to.files.size(); ++i) {
+    const std::string into = beside(to.path, to.files[i].name);
+    std::filesystem::rename(fresh.paths[i], path_of(into), fresh.error);
+    if (fresh.error)
+      fail(DFM_E_IO, "%s: cannot be replaced: %s", into.c_str(), fresh.error.message().c_str());
+  }
+}
+
 constexpr const char *kSnapshot = "snapshot.state";
 
 // A snapshot fits a world that was made in the same way, so the scene is read and compared.
@@ -577,7 +600,7 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
          "without it",
          path.c_str(), to.first.c_str(), more.c_str());
   }
-  for (const SceneWriter::File &f : to.files) f.write(beside(path, f.name));
+  write_files(to);
   scene.write(text + "\n");
   scene.commit();
   std::error_code absent;  // that of an earlier scene

@@ -81,7 +81,7 @@ Written sine_of(const dfm_sine &sine, bool scalar);
 bool moves(const dfm_sine &sine);
 // Parameters by key, those that are not at the table's default.
 Written params_of(const dfm_type &type, const std::vector<double> &values);
-Written value_of(const dfm_param &row, const double *values);
+Written value_of(const dfm_param &row, const double *values, uint32_t n);  // n: how many there are
 bool same_bits(const void *a, const void *b, size_t bytes);
 
 Written write_body(SceneWriter &to, Body &b);

@@ -100,7 +100,7 @@ void write_choice(const dfm_type &type, const std::vector<GivenParam> &given, Wr
   out["type"] = type.id;
   for (const GivenParam &p : given) {
     const dfm_param *const row = find_row(type, p.key.c_str());
-    if (row) out["params"][p.key] = value_of(*row, p.values);
+    if (row) out["params"][p.key] = value_of(*row, p.values, p.width);
     else if (p.values[0] == 1) out["precision"] = "single";
   }
 }

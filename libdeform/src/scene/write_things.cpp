@@ -192,9 +192,8 @@ Written write_rigid(SceneWriter &to) {
     for (Written &row : rows)
       if (!row.is_null()) bodies.push_back(std::move(row));
   }
-  // ids are consecutive where there is one set; those of others would not be
-  if (sets.size() > 1)
-    for (Written &row : bodies) row.erase("id");
+  // those behind the first have ids that follow its own; ids of several sets would not
+  for (size_t i = sets.size() > 1 ? 0 : 1; i < bodies.size(); ++i) bodies[i].erase("id");
   return out;
 }
 

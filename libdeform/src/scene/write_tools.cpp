@@ -94,6 +94,13 @@ void note_rigid_tool(SceneWriter &to, const Tool &t, const ToolValues &v) {
       }))
     to.note("tool '%s': in the scene all of its parts are of the material of the first", name);
   if (t.device.read) to.note("tool '%s': its device is left out; in the scene the tool stands", name);
+  // a matter of the present state, which a snapshot holds
+  const dfm_rigid_state &s = t.set->state[0];
+  const Pose at = load_pose(s), device = load_place(v.device);
+  const bool moves = std::any_of(s.velocity, s.velocity + 3, [](double x) { return x != 0; }) ||
+                     std::any_of(s.spin, s.spin + 3, [](double x) { return x != 0; });
+  if (!to.options.snapshot && t.motion.coupled() && (moves || !same_bits(&at, &device, sizeof at)))
+    to.note("tool '%s': in the scene it rests where its device is", name);
   const bool led = !t.keys.empty() || !t.opening_keys.empty();
   if (led && ((v.keyed == 0 && !t.keys.empty()) || (v.opening_keyed == 0 && !t.opening_keys.empty())))
     to.note("tool '%s': the host leads it now and not its keys, which are left out", name);

@@ -51,6 +51,11 @@ def _only(text: str | None) -> tuple[int, int] | None:
 
 
 def _sweep(given: Any) -> int:
+    for option, ignored in (("export", ("only", "retry", "parquet", "workers", "executor", "address")),
+                            ("only", ("parquet",))):
+        for other in ignored if getattr(given, option) else ():
+            if getattr(given, other) not in (None, False, "", "local"):
+                raise ArgumentError(f"--{option} makes nothing of --{other}; omit one of them", "DFM_E_ARG")
     if given.export:
         print(f"written: {export(given.study, given.export, out=given.out)}")
         return 0
@@ -91,7 +96,9 @@ def main() -> int:
         print(f"deform: {what}: {error.strerror}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
-        print("deform: interrupted; what is done is kept, and the next call goes on", file=sys.stderr)
+        kept = "what is done is kept, and the next call goes on"
+        print(f"deform: interrupted; {kept if given.command == 'sweep' else 'a fit keeps nothing'}",
+              file=sys.stderr)
         return 130
 
 

@@ -140,7 +140,7 @@ def read_parameter(name: str, at: Place) -> Parameter:
     at.keys(["at", "unit", "values", "from", "to", "scale", "count", "whole", "start"], ["at"])
     to, unit = pointers(at, "at"), at.text("unit", "")
     if at.has("values"):
-        for key in ("from", "to", "scale", "count", "start"):
+        for key in ("from", "to", "scale", "count", "whole", "start"):
             if at.has(key):
                 raise at.fail(f'"values" and "{key}" exclude each other: give the values, or a range')
         return Parameter(name, to, unit, at.list("values"))
@@ -180,6 +180,9 @@ def read_quantity(at: Place) -> tuple[dict[str, Any], str]:
         raise at.fail('a quantity is read from "summary" (a JSON pointer into summary.json) or from '
                       '"table": give one of them')
     if at.has("summary"):
+        for key in ("where", "column", "take"):
+            if at.has(key):
+                raise at.fail(f'"summary" and "{key}" exclude each other: that is of a table')
         pointer = at.text("summary")
         if not pointer.startswith("/"):
             raise at.of("summary").fail(f'expected a JSON pointer as /steps, found "{pointer}"')

@@ -36,7 +36,8 @@ class Spread:
         # along singular vector k the data bear a displacement of 1/s_k
         unit = np.sqrt(np.array(
             [sum(0.0 if v == 0 else (v * w) ** 2 for v, w in zip(rows[:, i], inverse)) for i in range(p)]))
-        self.deviation = self.scatter * unit / math.sqrt(self.share)
+        scaled = [u if math.isinf(u) else self.scatter * u for u in unit]  # the scatter may be 0
+        self.deviation = np.array(scaled) / math.sqrt(self.share)
         self.half = self.quantile * self.deviation
         self.jacobian, self.residuals = jacobian, np.concatenate(residuals)
         with np.errstate(invalid="ignore", divide="ignore"):
