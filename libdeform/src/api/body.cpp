@@ -53,11 +53,11 @@ void drop_motions(Body &b, std::span<const uint32_t> points) {
   std::erase_if(b.motions, [](const HeldMotion &m) { return m.points.empty(); });
 }
 
-// Held components keep the velocity of the hold: zero unless a motion moves them.
+// Held components keep the velocity of the hold, which dampers see at once: zero unless a motion moves them.
 void stop_held(Body &b) {
-  for (uint32_t i = 0; i < b.p.n; ++i)
-    for (int k = 0; k < 3; ++k)
-      if (b.p.held[i] & (1 << k)) b.p.v[size_t(i) * kStride + size_t(k)] = 0;
+  for (Array<double> *const v : {&b.p.v, &b.p.dampers.v, &b.p.dampers.slow})
+    for (size_t at = 0; at < v->size(); ++at)
+      if (b.p.held[at / kStride] & (1 << at % kStride)) (*v)[at] = 0;
 }
 
 // Constant lasting loads are summed once; varying ones are summed in the motion stage. Changes by the host

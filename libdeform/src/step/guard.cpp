@@ -169,7 +169,7 @@ bool withstands_impacts(World &w, StepContext &step) {
     gain = std::max(gain, gain_of(w, step, b, i));
     if (g.change[i] > 0 && gravity_exceeds_bound(w, b) && meets(w, step, i)) bring_check_forward(w, b);
     if (!(step.h * g.change[i] > kBoundStrain * b.surface.median_edge)) continue;
-    if (!b.dynamics->unknowns().diagonal || !std::isfinite(b.bound.found.step)) continue;
+    if (!b.dynamics->unknowns().diagonal) continue;
     const Impact impact = impact_on(step, b, i);
     if (impact.strain > kBoundStrain) expire_bound(w);
     if (impact.kinetic > step.free_kinetic[i]) hard = std::max(hard, impact.strain);

@@ -79,7 +79,7 @@ std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &na
   return options;
 }
 
-// The longest explicit sub-step of the body, for the choice of the integrator.
+// The longest explicit sub-step of the body, for the choice of the integrator and the plan of impacts.
 void query_explicit_bound(const World &w, double time, Body &b) {
   Integrator &out = b.integrator;
   StepBound bound;
@@ -92,12 +92,13 @@ Pose rest_frame(const Body &b) { return rests_unplaced(*b.model.type) ? Pose{} :
 
 }  // namespace
 
-void measure_explicit(Body &b) {
+void measure_explicit(const World &w, Body &b) {
   const ExplicitTime found = b.dynamics->measure(rest_frame(b), b.shape == 0);
   b.integrator.share = found.share;
   const bool had = b.p.dampers.lag > 0;
   b.p.dampers.lag = found.lag;
   if (had != (found.lag > 0)) relax_dampers(b.p);
+  query_explicit_bound(w, w.time, b);
 }
 
 bool rest_rows(const Body &b, double share, RestRows &out) {
@@ -263,8 +264,7 @@ void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> val
   b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                              implicit ? &*implicit : nullptr);
   if (implicit) return;
-  measure_explicit(b);
-  query_explicit_bound(w, w.time, b);
+  measure_explicit(w, b);
 }
 
 }  // namespace

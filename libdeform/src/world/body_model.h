@@ -31,7 +31,7 @@ std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &ty
 std::unique_ptr<MadeModel> make_body_instance(World &w, Body &b, const dfm_type &type, ModelOrigin origin);
 void set_dynamics(World &w, Body &b, const double *bound_at);
 // How long its explicit sub-steps may be, with its present parameters.
-void measure_explicit(Body &b);
+void measure_explicit(const World &w, Body &b);
 // What bounds its explicit sub-steps at rest, with this share of the row sums of stiffness; 1: for certain.
 // False: nothing, or its points do not move explicitly.
 bool rest_rows(const Body &b, double share, RestRows &out);

@@ -336,8 +336,8 @@ std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, b
 
 Obstacle &add_obstacle(World &w, std::unique_ptr<Obstacle> obstacle) {
   Obstacle &o = *obstacle;
-  add_to_world(w, Kind::obstacle, std::move(obstacle), w.obstacles);
   wake_all(w);  // it may be where a body sleeps
+  add_to_world(w, Kind::obstacle, std::move(obstacle), w.obstacles);
   return o;
 }
 

@@ -182,7 +182,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
   b.integrator.share = 1;                         // what holds if it cannot be measured
-  if (b.dynamics->unknowns().diagonal) measure_explicit(b);
+  if (b.dynamics->unknowns().diagonal) measure_explicit(*b.world, b);
 }
 
 }  // namespace dfm

@@ -67,7 +67,8 @@ double work_of_holders(const World &w, const StepContext &step, const Body &b, d
   for (const Driven &d : step.driven) {
     if (d.velocity < b.p.v.data() || d.velocity >= b.p.v.data() + b.p.v.size()) continue;
     const size_t at = size_t(d.velocity - b.p.v.data());
-    const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity.now[int(at % kStride)];
+    const double force = b.p.f[at] + b.p.mass[at / kStride] * w.gravity.now[int(at % kStride)] -
+                         (books_loads(b) ? b.p.load[at] : 0);
     sum -= 0.5 * force * (w.watch.last_h * d.before + time * *d.velocity);
   }
   return sum;
