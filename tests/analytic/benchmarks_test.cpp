@@ -6,6 +6,7 @@
 #include <cstring>
 #include <random>
 
+#include "dense.h"
 #include "mapped_solid.h"
 
 namespace {
@@ -81,7 +82,8 @@ double le11(uint32_t kind, Counts n) {
   const auto strain = [](const Vec &x) { return 2.3e-4 * (std::hypot(x[0], x[1]) + x[2]); };
   s.warm(strain);
   s.solve();
-  return s.stress({1, 0, 0}, 2, strain);
+  const Vec where = {1, 0, 0};
+  return s.stress(where, 2) - (3 * s.lambda + 2 * s.mu) * strain(where);
 }
 
 // A solid between x = 0, which is held, and x = length, on which a unit force acts along an axis.
@@ -261,7 +263,7 @@ TEST(Benchmarks, ValuesOfTheTable_AreReached) {
       {"cylinder, hoop stress", hoop_of_cylinder, 0, {6, 12, 1}, kPressure * 5 / 3, 0.01},
       {"sphere", sphere_widens<300>, 0, {2, 2, 2}, outward_of_sphere(0.3), 0.01},
       {"sphere, poisson 0.499", sphere_widens<499>, 0, {2, 2, 2}, outward_of_sphere(0.499), 0.01},
-      {"sphere, hoop stress", hoop_of_sphere, 0, {8, 8, 8}, kPressure * 5 / 7, 0.01},
+      {"sphere, hoop stress", hoop_of_sphere, 0, {6, 8, 8}, kPressure * 5 / 7, 0.01},
   };
   for (Row r : both)
     for (const uint32_t kind : {kHex20, kHex27}) {

@@ -235,7 +235,7 @@ constexpr const char *kScene = R"({"format": "deform-scene", "version": 1,
   "time": {"duration": 0.02, "step": 0.01},
   "bodies": [
     {"name": "second", "mesh": {"make": "beam", "size": [0.4, 0.1, 0.1], "cells": 48, "order": 2},
-     "model": {"type": "corotational_fem"}, "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]]}]},
+     "device": "auto", "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]]}]},
     {"name": "bricks", "mesh": {"make": "bricks", "size": [0.4, 0.1, 0.1], "cells": 4},
      "model": {"type": "linear_fem"}, "pose": {"position": [0, 1, 0]},
      "fix": [{"box": [[-1, -1, -1], [0.001, 1, 1]]}]}]})";
@@ -245,6 +245,9 @@ TEST(CellWorlds, Scene_MakesThemAndAWrittenSceneHasThem) {
   const std::string folder = test::scratch("cell_scene"), path = folder + "/scene.json";
   const test::Written both(context, folder, kScene);
   for (const char *name : {"second", "bricks"}) both.same(name);
+  dfm_body_info second{};
+  test::ok(dfm_body_get_info(both.same("second"), &second));
+  EXPECT_STREQ(second.model, "org.deform.corotational_fem");  // it names none
   std::string bricks = kScene;
   bricks.replace(bricks.find("\"beam\""), 6, "\"bricks\"");
   const test::Written of_bricks(context, folder, bricks.c_str());

@@ -226,6 +226,7 @@ std::vector<Call> body_calls() {
        }},
       {"body_energy_density", [](uint64_t h) { return dfm_body_energy_density(h, 64, numbers); }},
       {"body_stress", [](uint64_t h) { return dfm_body_stress(h, 10, numbers); }},
+      {"body_point_stress", [](uint64_t h) { return dfm_body_point_stress(h, 10, numbers); }},
       {"surface_positions", [](uint64_t h) { return dfm_surface_positions(h, 0, nullptr, &count); }},
       {"surface_velocities", [](uint64_t h) { return dfm_surface_velocities(h, 0, nullptr, &count); }},
       {"surface_normals", [](uint64_t h) { return dfm_surface_normals(h, 0, nullptr, &count); }},

@@ -12,8 +12,8 @@ LEVELS = [["core"], ["math"], ["geometry"], ["mesh", "plugin"], ["body"], ["dyna
 RANK = {folder: rank for rank, folders in enumerate(LEVELS) for folder in folders}
 # api/ holds one thin file per public header, and scene.h is one of them.
 ALLOWED_BESIDE = {("api", "scene")}
-LOOKS_INSIDE = ("tests/unit/", "tests/bench/", "tests/fuzz/", "tests/determinism/", "bindings/tools/contact/",
-                "bindings/tools/rollback/")
+LOOKS_INSIDE = ("tests/unit/", "tests/bench/", "tests/fuzz/", "tests/determinism/", "bindings/tools/check/",
+                "bindings/tools/contact/", "bindings/tools/rollback/")
 
 # A third party's name stands in one folder: (who, include, use in the code, folder).
 THIRD_PARTIES = [

@@ -67,7 +67,7 @@ class Meshes(unittest.TestCase):
             self.assertEqual(mesh.inside.shape, (mesh.info.ncell, 27))
             self.assertAlmostEqual(mesh.volume / surface.volume, 1, delta=1e-12)
             with deform.World(gravity=(0, 0, 0)) as world:
-                body = world.add_body(mesh, surface=surface, model="corotational_fem")
+                body = world.add_body(mesh, surface=surface)
                 np.testing.assert_allclose(body.positions, surface.points, atol=1e-9)
                 self.assertAlmostEqual(body.measure.mass / (1000 * surface.volume), 1, delta=1e-12)
         self.assertIsNone(deform.TetMesh.fill(surface, cells=100).inside)

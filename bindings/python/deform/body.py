@@ -281,6 +281,14 @@ class Body(_Part):
             return quick.dfm_body_stress(handle, rows, address)
         return self._look("stress", lambda: Column(fill, self.handle, self.ntet, 6))
 
+    @property
+    def point_stress(self) -> np.ndarray:
+        """The same at the phyxels, [npoint,6] Pa, fitted to the cells around each; a view."""
+        def fill(handle: int, rows: int, address: int, count: Any) -> int:
+            count._obj.value = self.npoint
+            return quick.dfm_body_point_stress(handle, rows, address)
+        return self._look("point_stress", lambda: Column(fill, self.handle, self.npoint, 6))
+
     def hold(self, points: Any, axes: str = "xyz") -> None:
         """Holds components ("xyz", "z", "": none, which releases) of points, given by their numbers."""
         if not isinstance(axes, str) or not set(axes) <= set("xyz"):

@@ -6,8 +6,10 @@
 #include <cstddef>
 #include <cstring>
 #include <map>
+#include <numeric>
 #include <set>
 
+#include "mesh/cells.h"
 #include "slots.h"
 
 namespace cli::check {
@@ -72,9 +74,11 @@ bool below(const std::vector<double> &m, size_t width, double shift) {
 
 std::string with(const Variant &variant) { return "with " + variant.name; }
 
+uint32_t Solid::nodes() const { return dfm::cell_kind(cell).nodes; }
+
 double Solid::volume(uint32_t c) const {
   const uint32_t *const q = &cells[nodes() * size_t(c)];
-  if (cell != DFM_CELL_HEX8) return volume_of(q);
+  if (cell == DFM_CELL_TET || cell == DFM_CELL_TET10) return dfm::tet_volume(rest.data(), q);
   // a bilinear face halves what is between its two pairs of triangles
   constexpr uint32_t kFace[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
                                     {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
@@ -82,53 +86,30 @@ double Solid::volume(uint32_t c) const {
   for (const auto &f : kFace)
     for (const auto &[i, j, k] : {std::array{0, 1, 2}, {0, 2, 3}, {0, 1, 3}, {1, 2, 3}}) {
       const uint32_t tet[4] = {q[0], q[f[i]], q[f[j]], q[f[k]]};
-      sum += volume_of(tet) / 2;
+      sum += dfm::tet_volume(rest.data(), tet) / 2;
     }
   return sum;
 }
 
-double Solid::volume_of(const uint32_t *q) const {
-  double e[3][3], n[3];
-  for (size_t k = 0; k < 3; ++k)
-    for (size_t a = 0; a < 3; ++a) e[k][a] = rest[3 * size_t(q[k + 1]) + a] - rest[3 * size_t(q[0]) + a];
-  cross(e[1], e[2], n);
-  return (e[0][0] * n[0] + e[0][1] * n[1] + e[0][2] * n[2]) / 6;
+void Solid::find_properties(Held held) {
+  const size_t n = rest.size() / 3;
+  mass.assign(n, 0.0);
+  fixed.assign(n, 0);
+  for (size_t i = 0; i < n && held == Held::one_side; ++i)
+    if (rest[3 * i] < kCube / 4) fixed[i] = 7;
+  for (uint32_t c = 0; c < ncell(); ++c) {
+    const uint32_t *const q = &cells[nodes() * size_t(c)];
+    double share[dfm::kMostNodes];
+    dfm::mass_shares(dfm::cell_kind(cell), rest.data(), q, share);
+    for (uint32_t k = 0; k < nodes(); ++k) mass[q[k]] += kDensity * volume(c) * share[k];
+  }
+  find_edges();
 }
 
-// Those of the tetrahedra that a body divides the cell into (mesh/cells.h).
 void Solid::find_edges() {
-  constexpr uint32_t kTets[][4] = {{0, 4, 6, 7}, {4, 1, 5, 8}, {6, 5, 2, 9}, {7, 8, 9, 3},
-                                   {6, 8, 7, 4}, {6, 8, 9, 7}, {6, 8, 5, 9}, {6, 8, 4, 5}};
-  constexpr uint32_t kQuads[][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
-                                    {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
-  std::set<std::pair<uint32_t, uint32_t>> all;
-  for (uint32_t c = 0; c < ncell(); ++c) {
-    const uint32_t *const q = &cells[size_t{nodes()} * c];
-    const auto add = [&](uint32_t a, uint32_t b) {
-      if (a != b) all.insert(std::minmax(a, b));
-    };
-    const auto add_all = [&](const uint32_t *of) {
-      for (const auto &[k, l] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}})
-        add(q[of[k]], q[of[l]]);
-    };
-    constexpr uint32_t kWhole[] = {0, 1, 2, 3};
-    if (nodes() == 4) add_all(kWhole);
-    if (nodes() == 10)
-      for (const auto &tet : kTets) add_all(tet);
-    if (nodes() != 8) continue;
-    const uint32_t least = *std::min_element(q, q + 8);
-    for (uint32_t k = 0; k < 8; ++k) add(least, q[k]);
-    for (const auto &quad : kQuads) {
-      uint32_t first = 0;
-      for (uint32_t k = 0; k < 4; ++k) {
-        add(q[quad[k]], q[quad[(k + 1) % 4]]);
-        if (q[quad[k]] < q[quad[first]]) first = k;
-      }
-      add(q[quad[first]], q[quad[(first + 2) % 4]]);
-    }
-  }
-  edges.clear();
-  for (const auto &[i, j] : all) edges.insert(edges.end(), {i, j});
+  const dfm::Array<uint32_t> all = dfm::unique_edges(
+      dfm::tets_of(dfm::Memory::standard(), dfm::cell_kind(cell), {cells.begin(), cells.end()}));
+  edges.assign(all.begin(), all.end());
 }
 
 Solid block(uint32_t nx, uint32_t ny, uint32_t nz, Held held) {
@@ -139,7 +120,6 @@ Solid block(uint32_t nx, uint32_t ny, uint32_t nz, Held held) {
     for (uint32_t y = 0; y <= ny; ++y)
       for (uint32_t x = 0; x <= nx; ++x) {
         for (const uint32_t a : {x, y, z}) out.rest.push_back(kCube * (a + random.uniform(-0.1, 0.1)));
-        out.fixed.push_back(held == Held::one_side && x == 0 ? 7 : 0);
       }
   // a cube as six tetrahedra around its diagonal: from one corner to the other along the axes, in each order
   constexpr int kOrders[6][3] = {{0, 1, 2}, {1, 2, 0}, {2, 0, 1}, {0, 2, 1}, {2, 1, 0}, {1, 0, 2}};
@@ -154,49 +134,47 @@ Solid block(uint32_t nx, uint32_t ny, uint32_t nz, Held held) {
             out.cells.push_back(number(at[0], at[1], at[2]));
           }
         }
-  out.mass.assign(out.fixed.size(), 0.0);
-  for (uint32_t c = 0; c < out.ncell(); ++c) {
-    uint32_t *const q = &out.cells[4 * size_t(c)];
-    if (out.volume(c) < 0) std::swap(q[2], q[3]);
-    for (int k = 0; k < 4; ++k) out.mass[q[k]] += kDensity * out.volume(c) / 4;
-  }
-  out.find_edges();
+  for (size_t c = 0; c < out.cells.size(); c += 4)
+    if (dfm::tet_volume(out.rest.data(), &out.cells[c]) < 0) std::swap(out.cells[c + 2], out.cells[c + 3]);
+  out.find_properties(held);
   couple(out);
   return out;
 }
 
 Solid with_cells(const Solid &of, uint32_t cell) {
   if (of.cell == cell) return of;
+  const bool tetrahedra = cell == DFM_CELL_TET10;
+  dfm::RestMesh mesh;
+  mesh.points = {of.rest.begin(), of.rest.end()};
+  for (uint32_t c = 0; c < of.ncell(); c += 6) {  // the first three go along x y, y z and z x
+    const uint32_t *const q = &of.cells[4 * size_t(c)];
+    if (tetrahedra) mesh.tets.insert(mesh.tets.end(), q, q + 24);
+    else
+      for (const uint32_t k : {0, 1, 2, 5, 9, 10, 3, 6}) mesh.cells.push_back(q[k]);
+  }
+  if (!tetrahedra) {
+    mesh.cell = DFM_CELL_HEX8;
+    mesh.tets = dfm::tets_of(*mesh.memory, dfm::cell_kind(DFM_CELL_HEX8), mesh.cells);
+  }
+  mesh.tet_group.resize(mesh.ntet());
+  mesh.file_point.resize(mesh.npoint());
+  if (cell != DFM_CELL_HEX8) mesh = dfm::second_order(mesh);
+  const size_t nodes = dfm::cell_kind(cell).nodes, given = dfm::cell_kind(mesh.cell).nodes;
   Solid out = of;
   out.cell = cell;
   out.cells.clear();
-  if (cell == DFM_CELL_HEX8) {
-    for (uint32_t c = 0; c < of.ncell(); c += 6) {  // the first three go along x y, y z and z x
-      const uint32_t *const q = &of.cells[4 * size_t(c)];
-      for (const uint32_t k : {0, 1, 2, 5, 9, 10, 3, 6}) out.cells.push_back(q[k]);
+  std::vector<uint32_t> to(mesh.npoint(), UINT32_MAX);  // middles of faces are left out of 20 points
+  std::iota(to.begin(), to.begin() + of.npoint(), 0u);
+  for (size_t n = 0; n < mesh.cells.size(); ++n) {
+    const uint32_t i = mesh.cells[n];
+    if (n % given >= nodes) continue;
+    if (to[i] == UINT32_MAX) {
+      to[i] = static_cast<uint32_t>(out.rest.size() / 3);
+      out.rest.insert(out.rest.end(), &mesh.points[3 * size_t(i)], &mesh.points[3 * size_t(i)] + 3);
     }
-    out.find_edges();
-    return out;
+    out.cells.push_back(to[i]);
   }
-  std::map<std::pair<uint32_t, uint32_t>, uint32_t> middle;
-  out.mass.assign(of.npoint(), 0.0);
-  for (uint32_t c = 0; c < of.ncell(); ++c) {
-    const uint32_t *const q = &of.cells[4 * size_t(c)];
-    out.cells.insert(out.cells.end(), q, q + 4);
-    for (const auto &[k, l] : {std::pair{0, 1}, {1, 2}, {0, 2}, {0, 3}, {1, 3}, {2, 3}}) {
-      const auto [at, fresh] = middle.insert({std::minmax(q[k], q[l]), out.npoint()});
-      if (fresh) {
-        for (size_t a = 0; a < 3; ++a)
-          out.rest.push_back((of.rest[3 * size_t(q[k]) + a] + of.rest[3 * size_t(q[l]) + a]) / 2);
-        out.mass.push_back(0);
-        out.fixed.push_back(of.fixed[q[k]] & of.fixed[q[l]]);
-      }
-      out.cells.push_back(at->second);
-    }
-    for (size_t k = 0; k < 10; ++k)
-      out.mass[out.cells[10 * size_t(c) + k]] += kDensity * of.volume(c) * (k < 4 ? 1.0 / 36 : 4.0 / 27);
-  }
-  out.find_edges();
+  out.find_properties(of.fixed[0] ? Held::one_side : Held::nothing);
   return out;
 }
 
@@ -206,28 +184,45 @@ const dfm_model &model_of(const Subject &subject) {
   return *static_cast<const dfm_model *>(subject.type->ops);
 }
 
+namespace {
+
+std::vector<const dfm::CellKind *> kinds_of(const Subject &subject) {
+  std::vector<const dfm::CellKind *> out;
+  for (const dfm::CellKind &kind : dfm::cell_kinds())
+    if (model_of(subject).cells & kind.kind) out.push_back(&kind);
+  return out;
+}
+
+}  // namespace
+
+bool takes_solids(const Subject &subject) { return !kinds_of(subject).empty(); }
+
+Variant defaults_of(const Subject &subject) {
+  if (!takes_solids(subject))
+    skip("the model accepts no cells with a volume, of which all meshes of this check consist");
+  return {"the defaults", default_params(*subject.type), kinds_of(subject)[0]->kind};
+}
+
 std::vector<Variant> variants(const Subject &subject) {
   const dfm_type &type = *subject.type;
-  if (!(model_of(subject).cells & DFM_CELL_TET))
-    skip("the model does not accept tetrahedra, and all meshes of this check consist of them");
-  const std::vector<double> defaults = default_params(type);
-  std::vector<Variant> wanted = {{"the defaults", defaults}};
+  const Variant defaults = defaults_of(subject);
+  std::vector<Variant> wanted = {defaults};
   size_t at = 0;
   for (uint32_t i = 0; i < type.nparam; at += std::clamp(type.params[i].width, 1u, 16u), ++i) {
     const dfm_param &row = type.params[i];
     const auto add = [&](const std::string &name, double value) {
-      wanted.push_back({std::string(row.key) + " = " + name, defaults});
+      wanted.push_back({std::string(row.key) + " = " + name, defaults.params, defaults.cell});
       wanted.back().params[at] = value;
     };
     if (std::strcmp(row.key, "damping_stiffness") == 0 && row.def == 0 && row.max >= 1e-3) add("1e-3", 1e-3);
     for (uint32_t k = 0; (row.flags & DFM_PARAM_ENUM) && row.names && row.names[k]; ++k)
       if (k != row.def) add(row.names[k], k);
   }
-  for (const auto &[name, cell] : {std::pair<const char *, uint32_t>{"hexahedra", DFM_CELL_HEX8},
-                                   {"second-order tetrahedra", DFM_CELL_TET10}})
-    for (size_t k = 0, n = wanted.size(); (model_of(subject).cells & cell) && k < std::min<size_t>(n, 2); ++k)
+  const size_t n = std::min<size_t>(wanted.size(), 2);
+  for (const dfm::CellKind *kind : kinds_of(subject))
+    for (size_t k = 0; kind->kind != defaults.cell && k < n; ++k)
       if (k == 0 || wanted[k].name.starts_with("damping_stiffness"))
-        wanted.push_back({wanted[k].name + " and " + name, wanted[k].params, cell});
+        wanted.push_back({wanted[k].name + " and " + kind->name, wanted[k].params, kind->kind});
   std::vector<Variant> out;
   const Solid solid = block(1, 1, 1);
   for (Variant &v : wanted) {

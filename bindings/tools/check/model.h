@@ -27,25 +27,23 @@ using Numbers = std::vector<double, Aligned64<double>>;
 // Tetrahedra of a block of cubes with edges of `kCube`, its points shifted at random. Surfels are some of its
 // points, and as many blends of three.
 constexpr double kCube = 0.1;  // m
+enum class Held { nothing, one_side };
 struct Solid {
-  uint32_t cell = DFM_CELL_TET;  // with the nodes of plugin.h
+  uint32_t cell = DFM_CELL_TET;
   std::vector<double> rest, mass, weight;
   std::vector<uint32_t> cells, edges, row, col;
   std::vector<uint8_t> fixed;
   uint32_t npoint() const { return static_cast<uint32_t>(mass.size()); }
-  uint32_t nodes() const { return cell == DFM_CELL_TET10 ? 10 : cell == DFM_CELL_HEX8 ? 8 : 4; }
+  uint32_t nodes() const;
   uint32_t ncell() const { return static_cast<uint32_t>(cells.size() / nodes()); }
   uint32_t nedge() const { return static_cast<uint32_t>(edges.size() / 2); }
   uint32_t nsurfel() const { return static_cast<uint32_t>(row.size() - 1); }
   double volume(uint32_t c) const;
+  void find_properties(Held held);  // masses, held points and edges, of points and cells
   void find_edges();
-
- private:
-  double volume_of(const uint32_t *tet) const;
 };
-enum class Held { nothing, one_side };
 Solid block(uint32_t x, uint32_t y, uint32_t z, Held held = Held::nothing);
-// The same block of other cells: cubes, or tetrahedra with points in the middles of their edges.
+// The same block of other cells: cubes, or cells of second order whose edges are straight.
 Solid with_cells(const Solid &tetrahedra, uint32_t cell);
 Solid small_block(Held held = Held::nothing);  // 48 points: arrays of 64-byte lines at every stride
 
@@ -55,8 +53,11 @@ Solid small_block(Held held = Held::nothing);  // 48 points: arrays of 64-byte l
 struct Variant {
   std::string name;  // "the defaults", "energy = stvk"
   std::vector<double> params;
-  uint32_t cell = DFM_CELL_TET;
+  uint32_t cell;
 };
+bool takes_solids(const Subject &subject);  // of some kind of cells
+// With the first kind of cells that the model takes.
+Variant defaults_of(const Subject &subject);
 std::vector<Variant> variants(const Subject &subject);
 
 const dfm_model &model_of(const Subject &subject);

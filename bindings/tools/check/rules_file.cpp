@@ -289,10 +289,9 @@ void check_effect_rows(const dfm_type &type, const dfm_effect_rows &table) {
 // What an instance answers to extension(): tables that begin with their size, nothing where it has none.
 void check_tables(const Subject &subject) {
   const dfm_model &model = model_of(subject);
-  if (!model.extension || !(model.cells & DFM_CELL_TET)) return;
+  if (!model.extension || !takes_solids(subject)) return;
   const Solid solid = small_block();
-  const Variant defaults = {"the defaults", default_params(*subject.type)};
-  const Body body(subject, solid, defaults, 4, Body::Refusal::is_reported);
+  const Body body(subject, solid, defaults_of(subject), 4, Body::Refusal::is_reported);
   if (!body.made()) return;
   constexpr size_t one = 2 * sizeof(uint32_t) + sizeof(void *);
   const struct {

@@ -446,10 +446,9 @@ std::string bad_point_returns(const Subject &subject) {
 }
 
 void use_model(const Subject &subject) {
-  if (!(model_of(subject).cells & DFM_CELL_TET)) return;
+  if (!takes_solids(subject)) return;
   Random random(subject.seed);
-  const Variant defaults = {"the defaults", default_params(*subject.type)};
-  Body body(subject, block(1, 1, 1), defaults, 4, Body::Refusal::is_reported);
+  Body body(subject, block(1, 1, 1), defaults_of(subject), 4, Body::Refusal::is_reported);
   if (!body.made()) return;
   body.shake(0.01 * kCube, 0.01, random);
   StepCalls step(body);

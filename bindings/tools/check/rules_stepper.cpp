@@ -153,7 +153,8 @@ std::string cost_grows_with_cells(const Subject &subject) {
   // 27 times as many cells: what grows with their square costs 27 times as much for each
   if (!(many <= 6 * few))
     broken(
-        "a cell costs %.3g us in a body of 384 cells and %.3g us in one of 10,368, so the cost grows faster "
+        "a cell costs %.3g us in a body and %.3g us in one of 27 times as many cells, so the cost grows "
+        "faster "
         "than the body; visit each cell and its points once",
         1e6 * few, 1e6 * many);
   return text("%.3g us for each cell", 1e6 * many);

@@ -48,7 +48,7 @@ typedef struct dfm_body_def {
   const double *points;  /* [npoint,3] rest positions before pose, m; copied */
   const uint32_t *tets;  /* [ntet,4] positive volume; copied */
   dfm_material material; /* 0: dfm_material_def_default() */
-  const char *model;     /* short name or full id; NULL: "msm" */
+  const char *model;     /* short name or full id; NULL: msm, or corotational_fem for cells msm refuses */
   /* of the model; a further key "precision": its forces in explicit steps, 0 double, 1 single */
   dfm_params model_params;
   dfm_pose pose;
@@ -88,7 +88,7 @@ typedef struct dfm_body_def {
 
 /** dfm_body_def_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_body_def_default_sized(uint32_t size, dfm_body_def *out);
-/** No mesh, model msm, category 1, collides with all. Threads: Any thread. Since 0.1. */
+/** No mesh, no named model, category 1, collides with all. Threads: Any thread. Since 0.1. */
 static inline dfm_body_def dfm_body_def_default(void) {
   dfm_body_def out;
   dfm_body_def_default_sized((uint32_t)sizeof out, &out);
@@ -223,6 +223,10 @@ DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, dou
  * @return DFM_OK; DFM_E_UNSUPPORTED the model does not provide it; DFM_E_ARG capacity too small;
  * DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out);
+/** The same at the phyxels, [npoint,6]: there, of the quadratic functions that fit the stresses of the cells
+ * around each. Where materials meet it is between theirs. @param capacity of out in phyxels
+ * @return as dfm_body_stress(). Threads: Any thread. Not during step. Since 0.1. */
+DFM_API dfm_status dfm_body_point_stress(dfm_body body, uint32_t capacity, double *out);
 #ifdef __cplusplus
 }
 #endif

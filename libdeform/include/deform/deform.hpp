@@ -207,6 +207,9 @@ class Body : public Handle<dfm_body, struct BodyKind>,
   auto stress(std::span<double> out) const {
     return E::done(dfm_body_stress(raw_, rows(out.size(), 6), out.data()));
   }
+  auto point_stress(std::span<double> out) const {
+    return E::done(dfm_body_point_stress(raw_, rows(out.size(), 6), out.data()));
+  }
 
   auto hold(std::span<const uint32_t> points, uint8_t axes = 7) const {
     return E::done(dfm_body_hold(raw_, rows(points.size(), 1), points.data(), axes));

@@ -403,3 +403,9 @@ dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out) {
     cell_stress(b, out);
   });
 }
+
+dfm_status dfm_body_point_stress(dfm_body body, uint32_t capacity, double *out) {
+  return as_status(body_of, body, [&](Body &b) {
+    if (room(b.p.n, capacity, out, nullptr)) point_stress(b, out);
+  });
+}

@@ -332,7 +332,7 @@ class Builder {
     d.cell = mesh.info.cell;
     d.cells = mesh.info.cells;
     d.material = material(b.material);
-    d.model = b.model.c_str();
+    d.model = b.model.empty() ? nullptr : b.model.c_str();
     d.model_params = b.params.view();
     d.fixed = fixed.data();
     d.nfield = uint32_t(fields.size());

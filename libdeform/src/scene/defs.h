@@ -133,7 +133,7 @@ struct Thing {
 struct Body : Thing {
   dfm_body_def def = dfm_body_def_default();
   std::string mesh, model, nodal_bc;
-  bool model_open = false;  // the planner chooses; `model` holds a placeholder
+  bool model_open = false;  // the planner chooses; else, where `model` is empty, the library by the cells
   // of `model`, which the processor moves, or the model that a card moves; device.h chooses and clears it
   std::optional<std::string> device;
   MadeMesh made;

@@ -9,6 +9,7 @@
 #include "plugin/params.h"
 #include "plugin/quiet.h"
 #include "scene/build.h"
+#include "scene/load.h"
 #include "scene/planner/planner.h"
 #include "state/world.h"
 #include "world/body_effects.h"
@@ -54,14 +55,14 @@ std::string lost(const std::vector<std::string> &here, const std::vector<std::st
 class Chooser {
  public:
   Chooser(dfm_context *context, const Definition &def, json &tree)
-      : context_(context), def_(def), types_(context->registry), tree_(tree) {}
+      : context_(context), def_(def), types_(context->registry), tree_(tree), files_(context, def) {}
 
   json run() {
     json out = json::array();
     for (size_t i = 0; i < def_.bodies.size(); ++i) {
       const Body &b = def_.bodies[i];
       if (!b.device) continue;
-      const dfm_type &own = *types_.try_find(DFM_KIND_MODEL, b.model);
+      const dfm_type &own = files_.model(b);
       const dfm_type *const card = on_card(types_, own);
       const bool requested = *b.device == "gpu";
       std::string why = card ? "" : no_model(own);
@@ -214,6 +215,7 @@ class Chooser {
   const Definition &def_;
   const Registry &types_;
   json &tree_;
+  MeshFiles files_;
   Measured measured_;
   std::vector<BodyRegime> regimes_;
   std::string faster_;

@@ -9,6 +9,7 @@
 #include "core/path.h"
 #include "mesh/cells.h"
 #include "plugin/context.h"
+#include "world/body_model.h"
 
 namespace dfm::scene {
 namespace {
@@ -250,6 +251,11 @@ BodyMesh MeshFiles::load(const Body &b) {
   }
   if (!whole && !made && !b.has_scale) warn_unit(b, out);
   return out;
+}
+
+const dfm_type &MeshFiles::model(const Body &b) {
+  const Registry &types = context_->registry;
+  return b.model.empty() ? default_model(types, load(b).info.cell) : types.find(DFM_KIND_MODEL, b.model);
 }
 
 // Files of triangles name no unit, and most programs that write them count in millimeters.

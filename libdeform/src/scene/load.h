@@ -25,6 +25,7 @@ class MeshFiles {
   std::string path_of(const std::string &path) const;  // relative to the scene file
   // Cells, surface and groups of a body, scaled. Borrows from this object.
   BodyMesh load(const Body &body);
+  const dfm_type &model(const Body &body);  // that it names, or that of its cells
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
   // rest is borrowed from this object.
   void load(Obstacle &obstacle, std::vector<double> &points);

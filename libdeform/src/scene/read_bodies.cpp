@@ -323,7 +323,7 @@ void read_device(const Node &body, const dfm_type *named, const Registry &types,
   if (!body.has("device")) return;
   const Node node = body.member("device");
   const std::string device = node.word("device");
-  const dfm_type *const other = off_card(types, *named);
+  const dfm_type *const other = named ? off_card(types, *named) : nullptr;
   if (device != "gpu" && other)
     node.fail("%s is the model of a graphics card; name %s in /model/type, or take \"device\": \"gpu\"",
               named->id, other->id);
@@ -342,10 +342,14 @@ Body read_body(const Node &node, ReadContext &context) {
   const Node model = node.part("model");
   if (context.planned) b.model_open = !model.has("type") || model.value()["type"] == "auto";
   if (b.model_open) check_open(node, model);
-  if (!model.has("type") || b.model_open) model.value()["type"] = "msm";
-  const dfm_type *const type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
+  // Parameters are read as those of a model before the cells are known.
+  if (!model.has("type") && (model.has("params") || node.has("fields") || node.has("anisotropy")))
+    model.value()["type"] = "msm";
+  const dfm_type *type = nullptr;
+  if (model.has("type") && !b.model_open)
+    type = read_type(model.member("type"), DFM_KIND_MODEL, context.types);
   read_device(node, type, context.types, b);
-  b.model = type->id;
+  if (type) b.model = type->id;
   b.def.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
   read_precision(model, b.params);

@@ -37,6 +37,11 @@ bool needs_single(const dfm_type &type, const ModelParams &params) {
 
 }  // namespace
 
+const dfm_type &default_model(const Registry &types, uint32_t cell) {
+  const dfm_type &springs = types.find(DFM_KIND_MODEL, "msm");
+  return model_of(springs).cells & cell ? springs : types.find(DFM_KIND_MODEL, "corotational_fem");
+}
+
 std::vector<GivenParam> rows_of(const ModelParams &params) {
   std::vector<GivenParam> out;
   const char *key = params.keys.c_str();

@@ -11,6 +11,8 @@ struct MadeModel : BodyModel { Dampers dampers; };
 // Throw Error for another integrator than DFM_INTEGRATOR_*, and for parameters without values.
 void check_integrator(const std::string &body, int32_t integrator);
 void check_given(const Body &b, const dfm_params &params);
+// The model of a body that names none, by its kind of cells, DFM_CELL_*.
+const dfm_type &default_model(const Registry &types, uint32_t cell);
 // Copies the parameters of the type. Throws Error for others.
 ModelParams keep_params(const dfm_type &type, const dfm_params &given);
 // One by one; they point into the values of `params`.

@@ -142,7 +142,9 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
 }
 
 void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials &materials) {
-  const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, def.model ? def.model : "msm");
+  const Registry &types = w.context->registry;
+  const dfm_type &type =
+      def.model ? types.find(DFM_KIND_MODEL, def.model) : default_model(types, b.cell_type);
   check_fields(type, def, b.name);
   keep_composition(w, b, def, materials);
   ModelOrigin origin{keep_params(type, def.model_params),

@@ -11,6 +11,7 @@ double elastic_energy(Body &b);    // J; NaN if the model has none
 void energy_density(Body &b, double *out);
 // [ntet,6] Pa; throws if the model has none
 void cell_stress(Body &b, double *out);
+void point_stress(Body &b, double *out);  // the same at its points, [npoint,6]
 bool offers(const Body &b, const char *extension);
 void set_model_params(Body &b, const dfm_params &params);  // runtime rows only; throws Error
 

@@ -419,7 +419,7 @@ class Reader {
       r.speed = std::sqrt(r.speed * r.speed + 2 * g_ * way);
     }
     r.turns = !r.held && (r.touches || length(b.def.spin) > 0);
-    if (!b.model_open) r.model = short_name(*types_.try_find(DFM_KIND_MODEL, b.model));
+    if (!b.model_open) r.model = short_name(files_.model(b));
     const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
     if (b.device == "gpu" && named == DFM_INTEGRATOR_AUTO) r.scheme = 0;
