@@ -3,9 +3,8 @@ find_program(DEFORM_EM_CONFIG em-config REQUIRED)
 execute_process(COMMAND ${DEFORM_EM_CONFIG} EMSCRIPTEN_ROOT OUTPUT_VARIABLE root
   OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
 include(${root}/cmake/Modules/Platform/Emscripten.cmake)
-# Exceptions and vectors as the processor has them; one thread. What Debian's standard library lacks of C++20
-# is added to every file.
-set(CMAKE_CXX_FLAGS_INIT "-fwasm-exceptions -msimd128 -include ${CMAKE_CURRENT_LIST_DIR}/missing.h")
+# Exceptions and vectors as the processor has them; one thread.
+set(CMAKE_CXX_FLAGS_INIT "-fwasm-exceptions -msimd128")
 set(CMAKE_C_FLAGS_INIT "-msimd128")
 set(CMAKE_EXE_LINKER_FLAGS_INIT "-fwasm-exceptions")
 # Debian's linker finds its parser of JavaScript only where it is told.

@@ -1,5 +1,5 @@
-// What C++20 has and the standard library of Debian 12's emscripten (libc++ 13) lacks, as far as it is used
-// here. Every file of a build for WebAssembly includes it first; beside a newer library it is empty.
+// What C++20 has and LLVM's standard library lacks, as far as it is used here: versions below 20 (macOS, Debian's
+// packages), and 13, that of Debian 12's emscripten. Every file of a build with such a version includes it first.
 #pragma once
 #ifdef __cplusplus
 #include <algorithm>
@@ -26,7 +26,7 @@ constexpr To bit_cast(const From &from) noexcept {
 }
 #endif
 
-#ifndef __cpp_lib_smart_ptr_for_overwrite
+#if _LIBCPP_VERSION < 16000
 template <class T>
 unique_ptr<T> make_unique_for_overwrite(size_t n) {
   return unique_ptr<T>(new remove_extent_t<T>[n]);
