@@ -72,7 +72,7 @@ check_cxx_source_compiles("#ifndef __x86_64__\n#error\n#endif\nint main() { retu
 check_cxx_source_compiles("#include <version>\n#if !defined(_LIBCPP_VERSION) || _LIBCPP_VERSION >= 200000\n#error\n#endif\nint main() { return 0; }"
   DEFORM_OLD_LIBCXX)
 if(DEFORM_OLD_LIBCXX)
-  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-include ${CMAKE_CURRENT_LIST_DIR}/libcxx.h>")
+  add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-include \"${CMAKE_CURRENT_LIST_DIR}/libcxx.h\">")
 endif()
 # What is the system's lies in files named *_posix.cpp and *_windows.cpp.
 macro(deform_own_sources list)

@@ -9,6 +9,12 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#if !defined(__EMSCRIPTEN__)
+#include <locale.h>
+#if __has_include(<xlocale.h>)
+#include <xlocale.h>
+#endif
+#endif
 #include <functional>
 #include <iterator>
 #include <memory>
@@ -102,6 +108,15 @@ auto max(R &&r) {
 #endif
 
 #if _LIBCPP_VERSION < 200000
+// Not by the locale of the program.
+inline double number_at(const char *text, char **end) {
+#ifdef __EMSCRIPTEN__
+  return std::strtod(text, end);
+#else
+  static const locale_t plain = newlocale(LC_NUMERIC_MASK, "C", locale_t{});
+  return strtod_l(text, end, plain);
+#endif
+}
 // By strtod, which rounds as from_chars has to; it takes white space, "+" and hexadecimal digits too.
 inline from_chars_result from_chars(const char *first, const char *last, double &value) {
   size_t n = 0;
@@ -110,7 +125,7 @@ inline from_chars_result from_chars(const char *first, const char *last, double 
   if (text.empty() || text[0] == '+') return {first, errc::invalid_argument};
   char *end = nullptr;
   errno = 0;
-  const double x = std::strtod(text.c_str(), &end);
+  const double x = number_at(text.c_str(), &end);
   const char *const behind = first + (end - text.c_str());
   if (behind == first) return {first, errc::invalid_argument};
   if (errno == ERANGE) return {behind, errc::result_out_of_range};

@@ -13,8 +13,8 @@ namespace model {
 struct Refused {};  // thrown after the reason was logged
 
 // At a level of dfm_host.log; `who` begins the message, `what` ends without a full stop.
-[[gnu::format(printf, 4, 0)]] inline void say(const dfm_host *h, int32_t level, const char *who,
-                                              const char *what, va_list values) {
+[[gnu::format(printf, 4, 0)]] inline void vsay(const dfm_host *h, int32_t level, const char *who,
+                                               const char *what, va_list values) {
   char own[360], text[400];
   vsnprintf(own, sizeof own, what, values);
   snprintf(text, sizeof text, "%s: %s.", who, own);
@@ -24,7 +24,7 @@ struct Refused {};  // thrown after the reason was logged
                                               const char *what, ...) {
   va_list values;
   va_start(values, what);
-  say(h, level, who, what, values);
+  vsay(h, level, who, what, values);
   va_end(values);
 }
 inline void complain(const dfm_host *h, const char *who, const char *what) { say(h, 3, who, "%s", what); }
@@ -32,7 +32,7 @@ inline void complain(const dfm_host *h, const char *who, const char *what) { say
                                                            const char *what, ...) {
   va_list values;
   va_start(values, what);
-  say(h, 3, who, what, values);
+  vsay(h, 3, who, what, values);
   va_end(values);
   throw Refused{};
 }

@@ -33,13 +33,8 @@ void PluginSolver::analyse(const BlockPattern &pattern) {
 }
 
 bool PluginSolver::factor(const double *blk) {
-  const auto query = [&] { return ops_.factor(self_, blk); };
-  const dfm_status status = self_ ? call_plugin(host_, type_, "factor", query) : DFM_DISCARD;
-  ready_ = status == DFM_OK;
-  if (ready_ || status == DFM_DISCARD) return ready_;  // DISCARD: the matrix is not positive definite
-  if (status == DFM_E_NOMEM)
-    fail(DFM_E_NOMEM, "the memory does not suffice for solver '%s' to factor %u points", type_.id, n_);
-  fail(DFM_E_FATAL, "solver '%s' cannot factor a matrix of %u points; see the log", type_.id, n_);
+  ready_ = self_ && call_plugin(host_, type_, "factor", [&] { return ops_.factor(self_, blk); }) == DFM_OK;
+  return ready_;
 }
 
 bool PluginSolver::solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) {

@@ -14,8 +14,8 @@ namespace {
 
 constexpr size_t kTerms = 10, kComponents = 6;
 constexpr int kPair[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
-constexpr double kFlat = 1e-6;   // of its size: a patch has one layer of cells across
-constexpr double kWeak = 1e-12;  // functions of which the patch says nothing stay small
+constexpr double kFlat = 1e-6;                    // of its size: a patch has one layer of cells across
+constexpr double kWeak = 1e-12, kWeakest = 1e-9;  // terms of which the patch says nothing stay small
 
 // Of a cell: its middle, and the means over it of products of the coordinates from there, in the order
 // of kPair.
@@ -42,8 +42,8 @@ class Fit {
   }
   // Gauss's elimination of a positive definite matrix leaves the constant, which is last.
   void solve(double *out) {
-    const double weak = kWeak * normal_[kTerms - 1][kTerms - 1];
-    for (size_t i = 0; i < kTerms; ++i) normal_[i][i] += weak;
+    const double cells = normal_[kTerms - 1][kTerms - 1];
+    for (size_t i = 0; i + 1 < kTerms; ++i) normal_[i][i] += (i < 6 ? kWeakest : kWeak) * cells;
     for (size_t k = 0; k + 1 < kTerms; ++k)
       for (size_t i = k + 1; i < kTerms; ++i) {
         const double times = normal_[i][k] / normal_[k][k];

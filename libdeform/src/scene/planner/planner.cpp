@@ -11,6 +11,7 @@
 #include "scene/device.h"
 #include "scene/load.h"
 #include "scene/place.h"
+#include "world/body_model.h"
 
 namespace dfm::scene {
 namespace {
@@ -419,7 +420,9 @@ class Reader {
       r.speed = std::sqrt(r.speed * r.speed + 2 * g_ * way);
     }
     r.turns = !r.held && (r.touches || length(b.def.spin) > 0);
-    if (!b.model_open) r.model = short_name(files_.model(b));
+    if (!b.model_open)
+      r.model = short_name(b.model.empty() ? default_model(types_, info.cell)
+                                           : types_.find(DFM_KIND_MODEL, b.model));
     const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
     if (b.device == "gpu" && named == DFM_INTEGRATOR_AUTO) r.scheme = 0;
