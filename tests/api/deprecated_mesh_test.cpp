@@ -185,6 +185,6 @@ TEST(DeprecatedMesh, SizeOfZero_IsThatOfTheFirstStruct) {
   test::ok(dfm_tetmesh_get_info(mesh, reinterpret_cast<dfm_tetmesh_info *>(&old.info)));
   EXPECT_EQ(old.info.size, sizeof old.info);
   EXPECT_EQ(old.info.npoint, 8u);
-  EXPECT_STREQ(old.info.warnings, "1 point that no tetrahedron uses was dropped\n");
+  EXPECT_STREQ(old.info.warnings, "1 point that no cell uses was dropped\n");
   EXPECT_EQ(old.behind, 77u);
 }

@@ -219,6 +219,8 @@ TEST(LabelVolume, WrongFile_IsRefusedInOneSentence) {
       {replaced(head, "type: short", "type: float") + data, "labels are whole numbers"},
       {replaced(head, "type: short\n", "") + data, "no field \"type\""},
       {replaced(head, "endian: little\n", "") + data, "no field \"endian\""},
+      {replaced(zipped, "endian: little\n", "") + stream, "no field \"endian\""},
+      {replaced(head, "kinds: domain domain domain", "line skip: 4294967296") + data, "lines to skip"},
       {replaced(head, "sizes: 4 3 2", "sizes: 4 3") + data, "sizes has 2 numbers"},
       {replaced(head, "sizes: 4 3 2", "sizes: 4 3 0") + data, "axis 2 has 0 voxels"},
       {replaced(head, "sizes: 4 3 2", "sizes: 60000 60000 60000") + data, "more than 4 GiB"},
@@ -231,6 +233,7 @@ TEST(LabelVolume, WrongFile_IsRefusedInOneSentence) {
       {replaced(meta, "MET_SHORT", "MET_FLOAT") + data, "MET_FLOAT"},
       {replaced(meta, "NDims = 3", "NDims = 2") + data, "3 axes"},
       {replaced(meta, "BinaryData = True", "BinaryData = False") + data, "stored as text"},
+      {replaced(meta, "BinaryData = True\n", "") + data, "stored as text"},
       {replaced(meta, "ElementDataFile = LOCAL\n", ""), "no \"ElementDataFile\""},
       {"\x1f\x8b" + data, "NIfTI"},
       {"solid x\n", "neither NRRD nor MetaImage"},
@@ -239,6 +242,17 @@ TEST(LabelVolume, WrongFile_IsRefusedInOneSentence) {
     const std::string reported = sentence(bytes);
     EXPECT_NE(reported.find(words), std::string::npos) << "no '" << words << "' in: " << reported;
     EXPECT_EQ(reported.find('\n'), std::string::npos) << reported;
+  }
+}
+
+TEST(LabelVolume, BytesBeyondTheVoxels_AreReported) {
+  const std::string data = bytes_of(kVoxels, 2, false), more = data + "\1";
+  const std::string raw = nrrd_header("short", false, "raw"), zipped = nrrd_header("short", false, "gzip");
+  const auto notes = [](const std::string &bytes) { return labels::read_labels("x", bytes, 1e-3).notes; };
+  for (const std::string &whole : {raw + data, zipped + packed(data, 31)}) EXPECT_TRUE(notes(whole).empty());
+  for (const std::string &longer : {raw + more, zipped + packed(more, 31)}) {
+    ASSERT_EQ(notes(longer).size(), 1u);
+    EXPECT_NE(notes(longer)[0].find("more bytes follow"), std::string::npos) << notes(longer)[0];
   }
 }
 

@@ -40,7 +40,7 @@ TEST(MeshCommand, Info_PrintsCountsGroupsAndWarnings) {
        {"points            8", "tetrahedra        6", "surface triangles 12", "edges             19",
         "volume            1 m3", "skin (triangles, 8 points)", "high end (cells, 6 points)",
         "explicit sub-step about 0.4082 m", "m: least altitude 0.707 m, alone 0.408 m",
-        "warning: 1 point that no tetrahedron uses was dropped"})
+        "warning: 1 point that no cell uses was dropped"})
     EXPECT_TRUE(has(r.out, word)) << word << " not in\n" << r.out;
 }
 
@@ -369,13 +369,13 @@ TEST(MeshApi, Read_ReportsWarningsAndLendsArrays) {
   dfm_mesh_handle mesh = 0;
   ASSERT_EQ(dfm_mesh_load(c.context, own("cube_msh41_bin_be.msh").c_str(), DFM_MESH_CELLS, &mesh), DFM_OK)
       << dfm_last_error();
-  EXPECT_TRUE(has(c.log, "cube_msh41_bin_be.msh: 1 point that no tetrahedron uses was dropped")) << c.log;
+  EXPECT_TRUE(has(c.log, "cube_msh41_bin_be.msh: 1 point that no cell uses was dropped")) << c.log;
   dfm_mesh_info info = {};
   info.size = sizeof info;
   ASSERT_EQ(dfm_mesh_get_info(mesh, &info), DFM_OK);
   EXPECT_EQ(info.npoint, 8u);
   EXPECT_EQ(info.ngroup, 3u);
-  EXPECT_STREQ(info.warnings, "1 point that no tetrahedron uses was dropped\n");
+  EXPECT_STREQ(info.warnings, "1 point that no cell uses was dropped\n");
   EXPECT_EQ(info.file_point[2], 3u);
   EXPECT_STREQ(info.group_names[info.cell_group[5]], "high end");
   EXPECT_EQ(info.group_dimension[0], 2u);

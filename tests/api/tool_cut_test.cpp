@@ -398,6 +398,23 @@ TEST(ToolCut, DrivenBlade_FeelsTheEnergyOfTheCut) {
   }
 }
 
+// Eight others stand in the body, where each leaves a track of its own.
+TEST(ToolCut, NinthEdgeInABody_PaysAsTheFirst) {
+  Tough s(0, all);
+  for (int k = 0; k < 8; ++k) {
+    dfm_tool_def d = test::cutting::knife();
+    const std::string name = "blade " + std::to_string(k);
+    d.name = name.c_str();
+    d.pose.position[0] = 0.002 * k - 0.015;
+    d.pose.position[2] = 0;
+    dfm_tool stands = 0;
+    test::ok(dfm_tool_create(s.w, &d, &stands));
+    cuts(stands, DFM_CUT_SPLIT, s.body);
+  }
+  s.down(-0.03, 0.2);
+  EXPECT_NEAR(s.work, s.kEnergy * s.kArea, 1e-9 * s.kEnergy * s.kArea);
+}
+
 // The sides are held: the body bends under the blade, and the work beyond that of the cut goes into it.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(ToolCut, DrivenBlade_BendsTheBody) {

@@ -123,6 +123,7 @@ class Collector {
     out_.value = {0};
     index_ = {{0, 0}};
   }
+  bool surplus() const { return surplus_; }  // more bytes came than the voxels have
   bool full() const { return out_.voxel.size() == wanted_; }
   uint64_t missing() const { return (wanted_ - out_.voxel.size()) * encoding_.bytes - nheld_; }
 
@@ -137,6 +138,7 @@ class Collector {
       nheld_ = 0;
       out_.voxel.push_back(index_of(decoded()));
     }
+    surplus_ = surplus_ || n > 0;
   }
 
   // Labels in ascending order, whatever the order in which voxels showed them.
@@ -195,6 +197,7 @@ class Collector {
   uint16_t last_index_ = 0;
   unsigned char held_[8] = {};
   size_t nheld_ = 0;
+  bool surplus_ = false;
 };
 
 [[noreturn]] void truncated(const std::string &path, uint64_t missing) {
@@ -214,18 +217,22 @@ void inflate_into(const std::string &path, std::string_view packed, uint64_t ski
     ~Stream() { inflateEnd(&z); }
   } stream;
   z_stream &z = stream.z;
-  z.next_in = reinterpret_cast<Bytef *>(const_cast<char *>(packed.data()));
-  z.avail_in = uInt(packed.size());
   std::vector<char> block(kBlock);
-  while (!out.full()) {
+  while (!out.surplus()) {
+    if (z.avail_in == 0) {  // by blocks: zlib counts in 32 bits
+      z.next_in = reinterpret_cast<Bytef *>(const_cast<char *>(packed.data()));
+      z.avail_in = uInt(std::min(packed.size(), kBlock));
+      packed.remove_prefix(z.avail_in);
+    }
     z.next_out = reinterpret_cast<Bytef *>(block.data());
     z.avail_out = uInt(block.size());
     const int code = inflate(&z, Z_NO_FLUSH);
     const size_t n = block.size() - z.avail_out, skipped = size_t(std::min(uint64_t(n), skip));
     skip -= skipped;
     out.take(block.data() + skipped, n - skipped);
-    if (code == Z_STREAM_END && z.avail_in > 0 && !out.full()) inflateReset(&z);
-    else if (code == Z_BUF_ERROR || (code == Z_OK && z.avail_in == 0 && z.avail_out > 0)) break;
+    if (code == Z_STREAM_END && z.avail_in + packed.size() > 0 && !out.full()) inflateReset(&z);
+    else if (code == Z_BUF_ERROR || (code == Z_OK && z.avail_in + packed.size() == 0 && z.avail_out > 0))
+      break;
     else if (code == Z_STREAM_END) break;
     else if (code == Z_MEM_ERROR) throw std::bad_alloc();
     else if (code != Z_OK)
@@ -257,7 +264,7 @@ void take_voxels(const std::string &path, const Stored &stored, std::string_view
   bytes = skipped(path, stored, bytes, promised);
   if (!stored.encoding.compressed) {
     if (bytes.size() < promised) truncated(path, promised - bytes.size());
-    out.take(bytes.data(), size_t(promised));
+    out.take(bytes.data(), bytes.size());
     return;
   }
   if (promised / kMaxDeflated > bytes.size()) truncated(path, promised - bytes.size() * kMaxDeflated);
@@ -292,6 +299,9 @@ void read_voxels(const std::string &path, std::string_view bytes, const Stored &
   Collector collector(file, stored.encoding, out);
   take_voxels(file, stored, held, promised, collector);
   collector.sort();
+  if (collector.surplus())
+    out.notes.push_back(
+        "more bytes follow than the header's voxels have, and were left out; check its sizes and its type");
 }
 
 // Axes that span a space, with steps that a volume of an organ may have.

@@ -7,16 +7,11 @@
 namespace labels {
 namespace {
 
-struct Type {
-  const char *name;
-  uint32_t bytes;
-  bool is_signed;
-};
 // MET_LONG has 4 bytes in a MetaImage.
-const Type kTypes[] = {{"MET_CHAR", 1, true},       {"MET_UCHAR", 1, false}, {"MET_SHORT", 2, true},
-                       {"MET_USHORT", 2, false},    {"MET_INT", 4, true},    {"MET_UINT", 4, false},
-                       {"MET_LONG", 4, true},       {"MET_ULONG", 4, false}, {"MET_LONG_LONG", 8, true},
-                       {"MET_ULONG_LONG", 8, false}};
+const Type kTypes[] = {{"met_char", 1, true},         {"met_uchar", 1, false},
+                       {"met_short", 2, true},        {"met_ushort", 2, false},
+                       {"met_int,met_long", 4, true}, {"met_uint,met_ulong", 4, false},
+                       {"met_long_long", 8, true},    {"met_ulong_long", 8, false}};
 
 class Reader : private HeaderLines {
  public:
@@ -47,7 +42,10 @@ class Reader : private HeaderLines {
     if (equals == std::string_view::npos)
       refuse_line("expected \"Key = value\", found %s", quoted_part(text).c_str());
     const std::string_view key = trimmed(text.substr(0, equals)), value = trimmed(text.substr(equals + 1));
-    if (key == "ElementDataFile") return data_file(value);
+    if (key == "ElementDataFile") {
+      if (lower(value) != "local") data_file(value);
+      return false;
+    }
     if (key == "NDims") dims(value);
     else if (key == "DimSize") sizes_ = numbers(value, 3, "DimSize");
     else if (key == "ElementSpacing") spacing_ = numbers(value, 3, "ElementSpacing");
@@ -55,14 +53,14 @@ class Reader : private HeaderLines {
     else if (key == "Offset" || key == "Position" || key == "Origin") origin_ = numbers(value, 3, "Offset");
     else if (key == "TransformMatrix" || key == "Rotation" || key == "Orientation")
       direction_ = numbers(value, 9, "TransformMatrix");
-    else if (key == "ElementType") type(value);
+    else if (key == "ElementType") type(value, kTypes, "MET_CHAR to MET_ULONG_LONG");
     else if (key == "ElementNumberOfChannels") channels(value);
-    else if (key == "BinaryData") binary(value);
+    else if (key == "BinaryData") binary_ = truth(value);
     else if (key == "BinaryDataByteOrderMSB" || key == "ElementByteOrderMSB")
       stored_.encoding.big_endian = truth(value);
     else if (key == "CompressedData") stored_.encoding.compressed = truth(value);
     else if (key == "HeaderSize") header_size(value);
-    else if (key == "DistanceUnits") unit(value);
+    else if (key == "DistanceUnits") stored_.unit = unit(value);
     return true;
   }
 
@@ -94,48 +92,17 @@ class Reader : private HeaderLines {
     if (!to_number(value, n) || n != 1)
       refuse_line("a voxel has %s values; a label map has one per voxel", quoted_part(value).c_str());
   }
-  void binary(std::string_view value) const {
-    if (!truth(value))
-      refuse_line("the voxels are stored as text, which is not read; save the file with BinaryData = True");
-  }
   void header_size(std::string_view value) {
     if (!to_number(value, stored_.skip) || stored_.skip < -1)
       refuse_line("expected how many bytes precede the voxels, or -1, as HeaderSize, found %s",
                   quoted_part(value).c_str());
   }
-  void unit(std::string_view value) {
-    stored_.unit = unit_of(value);
-    if (stored_.unit == 0)
-      refuse_line("unknown unit of length %s; known are um, mm, cm, dm, m and inch; give it by --unit",
-                  quoted_part(value).c_str());
-  }
-
-  void type(std::string_view value) {
-    for (const Type &t : kTypes)
-      if (value == t.name) {
-        stored_.encoding.bytes = t.bytes;
-        stored_.encoding.is_signed = t.is_signed;
-        return;
-      }
-    refuse_line(
-        "the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
-        "from MET_CHAR to MET_ULONG_LONG",
-        quoted_part(value).c_str());
-  }
-
-  bool data_file(std::string_view value) {
-    if (value.empty()) refuse_line("expected LOCAL or the name of a file as ElementDataFile");
-    if (value == "LOCAL" || value == "Local" || value == "local") return false;
-    if (value.substr(0, 4) == "LIST" || value.find('%') != std::string_view::npos)
-      refuse_line(
-          "the data are a list or a pattern of files, which is not read; save all slices in one file");
-    stored_.file = value;
-    return false;
-  }
 
   void finish() {
     if (stored_.encoding.bytes == 0) missing("ElementType");
     if (sizes_.empty()) missing("DimSize");
+    if (!binary_)
+      refuse(path_, "the voxels are stored as text, which is not read; save the file with BinaryData = True");
     if (stored_.file.empty()) stored_.skip = 0;  // the voxels of a .mha follow the header
     for (size_t k = 0; k < 3; ++k) {
       const double n = sizes_[k];
@@ -151,7 +118,7 @@ class Reader : private HeaderLines {
   }
 
   std::vector<double> sizes_, spacing_, origin_, direction_ = std::vector<double>(9, 0.0);
-  Stored stored_;
+  bool binary_ = false;  // without the key the voxels are text
 };
 
 }  // namespace

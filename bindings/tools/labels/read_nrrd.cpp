@@ -10,11 +10,6 @@
 namespace labels {
 namespace {
 
-struct Type {
-  const char *names;  // separated by commas
-  uint32_t bytes;
-  bool is_signed;
-};
 const Type kTypes[] = {
     {"signed char,int8,int8_t", 1, true},
     {"uchar,unsigned char,uint8,uint8_t", 1, false},
@@ -24,15 +19,6 @@ const Type kTypes[] = {
     {"uint,unsigned int,uint32,uint32_t", 4, false},
     {"longlong,long long,long long int,signed long long,signed long long int,int64,int64_t", 8, true},
     {"ulonglong,unsigned long long,unsigned long long int,uint64,uint64_t", 8, false}};
-
-bool is_one_of(const std::string &word, std::string_view names) {
-  while (!names.empty()) {
-    const size_t comma = std::min(names.find(','), names.size());
-    if (names.substr(0, comma) == word) return true;
-    names.remove_prefix(std::min(comma + 1, names.size()));
-  }
-  return false;
-}
 
 class Reader : private HeaderLines {
  public:
@@ -77,7 +63,7 @@ class Reader : private HeaderLines {
   }
 
   bool field(const std::string &name, std::string_view value) {
-    if (name == "type") type(value);
+    if (name == "type") type(value, kTypes, "int8 to uint64");
     else if (name == "dimension") dimension_ = count(value, "dimension", 16);
     else if (name == "sizes") sizes_ = numbers<int64_t>(value, "sizes");
     else if (name == "spacings") spacings_ = spacings(value);
@@ -88,24 +74,11 @@ class Reader : private HeaderLines {
     else if (name == "space dimension") count(value, "space dimension", 8);
     else if (name == "encoding") encoding(value);
     else if (name == "endian") endian(value);
-    else if (name == "byte skip" || name == "byteskip") stored_.skip = skip(value, -1);
-    else if (name == "line skip" || name == "lineskip") stored_.skip_lines = uint32_t(skip(value, 0));
-    else if (name == "data file" || name == "datafile") return data_file(value);
+    else if (name == "byte skip" || name == "byteskip") stored_.skip = skip(value, -1, int64_t(1) << 32);
+    else if (name == "line skip" || name == "lineskip")
+      stored_.skip_lines = uint32_t(skip(value, 0, UINT32_MAX));
+    else if (name == "data file" || name == "datafile") data_file(value);
     return true;  // the others say nothing about where a voxel lies
-  }
-
-  void type(std::string_view value) {
-    const std::string word = lower(value);
-    for (const Type &t : kTypes)
-      if (is_one_of(word, t.names)) {
-        stored_.encoding.bytes = t.bytes;
-        stored_.encoding.is_signed = t.is_signed;
-        return;
-      }
-    refuse_line(
-        "the voxels are of the type %s, and labels are whole numbers; save the label map with a type "
-        "from int8 to uint64",
-        quoted_part(value).c_str());
   }
 
   uint32_t count(std::string_view value, const char *what, int64_t most) const {
@@ -116,9 +89,9 @@ class Reader : private HeaderLines {
     return uint32_t(n);
   }
 
-  int64_t skip(std::string_view value, int64_t least) const {
+  int64_t skip(std::string_view value, int64_t least, int64_t most) const {
     int64_t n = 0;
-    if (!to_number(value, n) || n < least || n > (int64_t(1) << 32))
+    if (!to_number(value, n) || n < least || n > most)
       refuse_line("expected how many bytes or lines to skip, found %s", quoted_part(value).c_str());
     return n;
   }
@@ -191,13 +164,10 @@ class Reader : private HeaderLines {
       const std::string_view word = trimmed(value.substr(begin + 1, end - begin - 1));
       value.remove_prefix(end + 1);
       if (word.empty() || word == "???" || lower(word) == "none") continue;
-      const double unit = unit_of(word);
-      if (unit == 0)
-        refuse_line("unknown unit of length %s; known are um, mm, cm, dm, m and inch; give it by --unit",
-                    quoted_part(word).c_str());
-      if (found != 0 && found != unit)
+      const double meters = unit(word);
+      if (found != 0 && found != meters)
         refuse_line("the axes have different units; write all lengths in millimeters");
-      found = unit;
+      found = meters;
     }
     if (found != 0) stored_.unit = found;
   }
@@ -221,15 +191,6 @@ class Reader : private HeaderLines {
     ordered_ = true;
   }
 
-  bool data_file(std::string_view value) {
-    if (value.empty()) refuse_line("expected the name of a file as data file");
-    if (value.substr(0, 4) == "LIST" || value.find('%') != std::string_view::npos)
-      refuse_line(
-          "the data are a list or a pattern of files, which is not read; save all slices in one file");
-    stored_.file = value;
-    return true;
-  }
-
   [[noreturn]] void missing(const char *what) const {
     refuse(path_, "the header has no field \"%s\"; save the label map again as NRRD", what);
   }
@@ -242,7 +203,7 @@ class Reader : private HeaderLines {
     if (!encoded_) missing("encoding");
     if (dimension_ == 0) missing("dimension");
     if (sizes_.empty()) missing("sizes");
-    if (stored_.encoding.bytes > 1 && !ordered_ && !stored_.encoding.compressed) missing("endian");
+    if (stored_.encoding.bytes > 1 && !ordered_) missing("endian");
     if (sizes_.size() != dimension_)
       refuse(path_, "dimension is %u, and sizes has %zu numbers; save the label map again as NRRD",
              dimension_, sizes_.size());
@@ -300,7 +261,6 @@ class Reader : private HeaderLines {
   std::vector<std::optional<std::array<double, 3>>> directions_;
   std::map<int64_t, std::string> segment_name_;
   std::map<int64_t, int64_t> segment_;
-  Stored stored_;
 };
 
 }  // namespace

@@ -52,7 +52,8 @@ typedef struct dfm_mesh_info {
       overlapping_faces, ngroup;
   /* m3, of an open surface without meaning; m */
   double volume, edge_min, edge_median, edge_max;
-  /* mean ratio, 1 for a regular tetrahedron; of triangles 4 sqrt(3) area / sum l2; bins of 0.1 */
+  /* mean ratio of the tetrahedra, 1 for a regular one, of a cube's 6 0.756; of triangles 4 sqrt(3) area /
+   * sum l2; bins of 0.1 */
   double quality_min, quality_mean;
   uint32_t quality_histogram[10];
   double lo[3], hi[3];
@@ -99,8 +100,8 @@ typedef struct dfm_mesh_info {
 DFM_API dfm_status dfm_mesh_get_info(dfm_mesh_handle mesh, dfm_mesh_info *out);
 /** Writes by file name ending, to a temporary file that is then renamed. Cells: binary MSH 4.1 ("*.msh"),
  * MSH 2.2 ("*.msh2"), legacy VTK ("*.vtk"), VTU ("*.vtu") or Medit ("*.mesh", groups by number alone),
- * with groups of cells and triangles, in MSH also of points; groups of lines are lost. Surfaces: OBJ, PLY
- * (binary), STL (binary, single precision), OFF, VTK or VTU; OBJ, VTK and VTU keep groups, PLY by number.
+ * with groups of cells and triangles, in MSH also of points; groups of lines are lost. Surfaces: OBJ, PLY,
+ * STL (binary, single precision), OFF, VTK or VTU; OBJ, VTK and VTU keep groups, PLY by number.
  * @return DFM_OK; DFM_E_IO; DFM_E_UNSUPPORTED another ending. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_write(dfm_mesh_handle mesh, const char *path);
 /** The same shape with second-order tetrahedra, or hexahedra of 27 points: more points in the middles of the

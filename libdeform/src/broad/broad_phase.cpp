@@ -498,8 +498,7 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
   const double near = kRounding * (a.margin + thing.margin + recovery_depth(*a.surface));
   const double near_bulges = kRounding * (a.surface->bulge_sum * a.margin + thing.margin);
   const double widest = bulges ? std::max(near, near_bulges + largest_bulge(fa)) : near;
-  const double round = kind == Shape::sphere || kind == Shape::capsule ? shape.view().radius : 0;
-  const double limit = near + round, limit2 = limit * limit;
+  const double limit = near + shape.view().radius, limit2 = limit * limit;
   Box bounds{{0, 0, 0, 0}, {0, 0, 0, 0}};
   if (kind != Shape::plane) shape.bounds(bounds.lo, bounds.hi);
   const Vec3 n = shape.axis(2);
@@ -520,12 +519,10 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
     return false;
   };
   const auto triangle_near = [&](uint32_t t) {
-    const uint32_t points = kind == Shape::box ? 8 : 2;
-    for (uint32_t c = 0; c < points; ++c) {
-      const Vec3 p = kind == Shape::box ? shape.corner(c) : shape.end(int(c));
-      if (closest_on_triangle(p, fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)).distance2 <= limit2)
+    for (uint32_t c = 0; c < shape.points(); ++c)
+      if (closest_on_triangle(shape.point(c), fa.corner(t, 0), fa.corner(t, 1), fa.corner(t, 2)).distance2 <=
+          limit2)
         return true;
-    }
     return false;
   };
   // The obstacle, which is convex, lies behind the plane through what is nearest to the middle of the patch.
@@ -547,7 +544,7 @@ bool BroadPhase::list_obstacle(const Body &a, const Thing &thing, Found &found) 
           bulge_near(sides[0]) || bulge_near(sides[1]))
         found.ee.push_back(edge);
     }
-    if ((kind != Shape::plane && triangle_near(t)) || bulge_near(t)) found.fv.push_back(t);
+    if (triangle_near(t) || bulge_near(t)) found.fv.push_back(t);
   });
   for (Array<uint64_t> *list : {&found.vf, &found.ee, &found.fv})
     for (uint64_t &f : *list) f <<= 32;

@@ -135,15 +135,13 @@ class Judge {
     }
   }
   void triangle(uint32_t candidate, const ObstacleShape &shape, const dfm_motion path[3]) {
-    const Shape kind = shape.view().shape;
     narrow::PairMotion m;
     m.edges = false;
     std::copy_n(path, 3, m.m + 1);
-    if (kind != Shape::box) m.round = shape.view().radius;
-    const uint32_t points = kind == Shape::box ? 8 : kind == Shape::sphere ? 1 : 2;
-    for (uint32_t k = 0; k < points; ++k) {
-      m.m[0] = still(kind == Shape::box ? shape.corner(k) : shape.end(int(k)));
-      feature(candidate, kind == Shape::box ? 12 + k : k, m);
+    m.round = shape.view().radius;
+    for (uint32_t k = 0; k < shape.points(); ++k) {
+      m.m[0] = still(shape.point(k));
+      feature(candidate, shape.view().shape == Shape::box ? 12 + k : k, m);
     }
   }
   void feature(uint32_t candidate, uint32_t part, const narrow::PairMotion &m) {

@@ -1,5 +1,7 @@
-// What an error says about names: a wrong one, and one of a file within a command.
+// Names as errors and files have them: a wrong one, one of a group, one of a file within a command.
 #pragma once
+#include <algorithm>
+
 #include "core/error.h"
 
 namespace dfm {
@@ -10,6 +12,12 @@ inline std::string did_you_mean(const std::string &wrong, const std::vector<std:
                                 char quote = '"') {
   const std::string near = nearest(wrong, valid);
   return near.empty() ? "" : std::string("; did you mean ") + quote + near + quote + "?";
+}
+
+// A name in a format where it ends with its line.
+inline std::string one_line(std::string name) {
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, '_');
+  return name;
 }
 
 // A path within a command that the reader can copy: quoted where a shell would split or change it.

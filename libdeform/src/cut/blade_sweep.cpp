@@ -28,7 +28,7 @@
 namespace dfm {
 namespace {
 
-constexpr size_t kMaxTracks = 8;  // blades that cut a body by turns
+constexpr auto kMaxTracks = 8;  // of blades of no tool that cut a body by turns
 // of the largest distance between neighbors: how far from the edge sides are kept
 constexpr double kKept = 2;
 // of the median edge: a blade that has moved forward this far has begun to cut; a body this far from it is
@@ -365,14 +365,18 @@ double BladeSweep::energy(size_t n) {
   return taken;
 }
 
-BladeTrack &BladeSweep::keep(Body &b) {
+BladeTrack &BladeSweep::keep(Body &b, uint64_t part) {
   if (track_ == b.blades.size()) {
-    if (b.blades.size() == kMaxTracks) b.blades.erase(b.blades.begin());
+    const auto of_part = [&](const BladeTrack &t) { return t.part == part; };
+    if (part) std::erase_if(b.blades, of_part);
+    else if (std::count_if(b.blades.begin(), b.blades.end(), of_part) == kMaxTracks)
+      b.blades.erase(std::find_if(b.blades.begin(), b.blades.end(), of_part));
     b.blades.emplace_back();
     use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides, b.blades.back().cut_work);
     track_ = b.blades.size() - 1;
   }
   BladeTrack &t = b.blades[track_];
+  if (part) t.part = part;
   store3(t.edge, blade_.corner[3]);
   store3(t.edge + 3, blade_.corner[2]);
   t.x.assign(b.p.x.begin(), b.p.x.end());

@@ -38,7 +38,7 @@ class BladeSweep {
   // keep().
   double energy(size_t n);
   // The body remembers the edge, after faces have been opened and before anything else has changed.
-  BladeTrack &keep(Body &b);
+  BladeTrack &keep(Body &b, uint64_t part = 0);
 
  private:
   struct Face { uint32_t i, j; };  // of cells_

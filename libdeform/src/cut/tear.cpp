@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cut/blade_sweep.h"
 #include "cut/separate.h"
 #include "mesh/cut_mesh.h"
 #include "state/material.h"
@@ -49,7 +50,7 @@ double largest_eigenvalue(const double (&a)[6], Vec3 &vector) {
 
 class Tear {
  public:
-  explicit Tear(const Body &b) : b_(b), ncell_(b.ncell()), points_(b.p.n) {
+  explicit Tear(Body &b) : b_(b), ncell_(b.ncell()), points_(b.p.n) {
     for (const Material &m : b.composition.materials) limits_.push_back(m.entry(kTearKey, 0));
     for (uint32_t c = 0; c < ncell_; ++c) add(c);
   }
@@ -60,15 +61,14 @@ class Tear {
     find_weakest();
     if (weakest_.empty()) return out;
     mark();
-    each_inner_face(b_.world->memory(), ncell_, b_.tets.data(), [&](uint32_t i, uint32_t j) {
-      for (int k = 0; k < 4; ++k) {
-        const uint32_t point = b_.tets[size_t{4} * i + size_t(k)];
-        if (points_[point].split && shares(j, point) && side(i, point) != side(j, point)) {
-          out.push_back(open_face(i, j));
-          return;
-        }
-      }
-    });
+    if (b_.inner.empty()) b_.inner = inner_faces(b_);
+    for (size_t f = 0; f < b_.inner.size(); f += 2) {
+      const uint32_t i = b_.inner[f], j = b_.inner[f + 1], *const point = &b_.tets[size_t{4} * i];
+      if (std::any_of(point, point + 4, [&](uint32_t p) {
+            return points_[p].split && shares(j, p) && side(i, p) != side(j, p);
+          }))
+        out.push_back(open_face(i, j));
+    }
     return out;
   }
 
@@ -159,7 +159,7 @@ class Tear {
     }
   }
 
-  const Body &b_;
+  Body &b_;
   uint32_t ncell_;
   std::vector<double> limits_;
   std::vector<Point> points_;

@@ -156,8 +156,7 @@ void split(const Tool &t, Body &b, uint32_t &n) {
         n += uint32_t(met.size());
       }
     }
-    BladeTrack &track = sweep.keep(b);
-    track.part = id;
+    BladeTrack &track = sweep.keep(b, id);
     const Pose place = load_pose(t.set->state[part]);
     forget_far(b, edge, place, track);
     opening.charge(b, place, track);

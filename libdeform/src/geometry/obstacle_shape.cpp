@@ -14,9 +14,19 @@ ObstacleShape::ObstacleShape(const ObstacleView &view) : view_(view) {
     e[k] = 1;
     axis_[k] = normalized(rotate(view.rotation, e));
   }
-  const double half = view.shape == Shape::capsule ? view.half_length : 0;
-  end_[0] = view.position - half * axis_[2];
-  end_[1] = view.position + half * axis_[2];
+  if (view.shape != Shape::capsule) view_.half_length = 0;
+  if (view.shape != Shape::capsule && view.shape != Shape::sphere) view_.radius = 0;
+  end_[0] = view.position - view_.half_length * axis_[2];
+  end_[1] = view.position + view_.half_length * axis_[2];
+}
+
+uint32_t ObstacleShape::points() const {
+  switch (view_.shape) {
+    case Shape::box: return 8;
+    case Shape::capsule: return 2;
+    case Shape::sphere: return 1;
+    default: return 0;
+  }
 }
 
 Vec3 ObstacleShape::corner(uint32_t i) const {

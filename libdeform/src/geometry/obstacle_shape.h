@@ -18,10 +18,14 @@ struct ObstaclePoint {
 class ObstacleShape {
  public:
   explicit ObstacleShape(const ObstacleView &view);
-  const ObstacleView &view() const { return view_; }
-  Vec3 axis(int k) const { return axis_[k]; }  // local x, y, z
+  const ObstacleView &view() const { return view_; }  // radius and half length 0 where the shape has none
+  Vec3 axis(int k) const { return axis_[k]; }         // local x, y, z
   // sphere: the center, twice; capsule: centers of its caps
   Vec3 end(int k) const { return end_[k]; }
+  // The shape is the hull of these points, widened by its radius: a box's corners, a capsule's ends, the
+  // center of a sphere. A plane has none.
+  uint32_t points() const;
+  Vec3 point(uint32_t k) const { return view_.shape == Shape::box ? corner(k) : end_[k]; }
 
   // Box: corner i lies at + along axis k where bit k is set. Edges 4k..4k+3 run along axis k. Faces 2k
   // (toward -axis k), 2k+1 (toward +).

@@ -6,6 +6,7 @@
 #include "deform/plugin.h"
 #include "math/vec3.h"
 #include "mesh/faces.h"
+#include "mesh/finish.h"
 
 namespace dfm {
 namespace {
@@ -300,17 +301,8 @@ RestMesh second_order(const RestMesh &mesh) {
     else out.tris.insert(out.tris.end(), q, q + 3);
     out.tri_group.insert(out.tri_group.end(), face ? 4 : 1, mesh.tri_group[t]);
   }
-  for (MeshGroup &g : out.groups) {
-    if (g.dimension < 2) continue;
-    const uint32_t index = uint32_t(&g - out.groups.data());
-    const Array<uint32_t> &of = g.dimension == 3 ? out.tets : out.tris;
-    const Array<uint32_t> &group = g.dimension == 3 ? out.tet_group : out.tri_group;
-    const size_t width = g.dimension == 3 ? 4 : 3;
-    for (size_t t = 0; t < group.size(); ++t)
-      if (group[t] == index) g.points.insert(g.points.end(), &of[width * t], &of[width * t] + width);
-    std::sort(g.points.begin(), g.points.end());
-    g.points.erase(std::unique(g.points.begin(), g.points.end()), g.points.end());
-  }
+  add_to_groups(out.groups, out.tet_group, out.tets);
+  add_to_groups(out.groups, out.tri_group, out.tris);
   return out;
 }
 

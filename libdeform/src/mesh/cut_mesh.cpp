@@ -29,7 +29,7 @@ DisjointSets join_corners(const Memory &memory, uint32_t npoint, uint32_t ntet, 
       else corners.join(4 * a + uint32_t(k), other);
     }
   };
-  if (inner.empty()) each_inner_face(memory, ntet, tets, join_across);
+  if (inner.empty()) each_inner_face(sorted_faces(memory, ntet, tets), join_across);
   else
     for (size_t f = 0; f < inner.size(); f += 2) join_across(inner[f], inner[f + 1]);
   return corners;

@@ -37,10 +37,6 @@ void each_inner_face(const Array<TetFace> &faces, Use &&use) {
     if (j == i + 2) use(faces[i].owner >> 2, faces[i + 1].owner >> 2);
   }
 }
-template <class Use>
-void each_inner_face(const Memory &memory, uint32_t ntet, const uint32_t *tets, Use &&use) {
-  each_inner_face(sorted_faces(memory, ntet, tets), use);
-}
 // [n,2] these cells.
 Array<uint32_t> inner_faces(const Array<TetFace> &faces);
 

@@ -6,7 +6,7 @@
 
 #include "core/error.h"
 #include "math/vec3.h"
-#include "mesh/mesh.h"
+#include "mesh/finish.h"
 
 namespace dfm {
 namespace {
@@ -115,15 +115,11 @@ RestMesh fan_surface(const RestMesh &surface) {
       out.tris.insert(out.tris.end(), &surface.tris[3 * size_t(t)], &surface.tris[3 * size_t(t)] + 3);
       out.tri_group.push_back(surface.tri_group[t]);
     }
-  for (uint32_t g = 0; g < out.groups.size(); ++g) {
-    std::vector<uint32_t> points;
-    for (size_t k = 0; k < out.tris.size(); ++k)
-      if (out.tri_group[k / 3] == g) points.push_back(out.tris[k]);
-    std::sort(points.begin(), points.end());
-    points.erase(std::unique(points.begin(), points.end()), points.end());
-    out.groups[g].dimension = 2;
-    out.groups[g].points.assign(points.begin(), points.end());
+  for (MeshGroup &g : out.groups) {
+    g.dimension = 2;
+    g.points.clear();
   }
+  add_to_groups(out.groups, out.tri_group, out.tris);
   return out;
 }
 

@@ -82,6 +82,8 @@ void turn_cells(const std::string &path, RawMesh &raw) {
     count();
     if (2 * n > kind.tets) {  // reflected
       turn_over(kind, cell);
+      if (double *const w = raw.inside.empty() ? nullptr : &raw.inside[kInsidePoints * c])
+        std::swap_ranges(w, w + kInsidePoints / 3, w + 2 * kInsidePoints / 3);  // its third coordinate
       tets_of(kind, cell, &raw.tets[4 * kind.tets * c]);
       ++raw.turned;
       count();
@@ -124,12 +126,7 @@ void renumber(RawMesh &raw) {
     for (uint32_t &p : group.points) p = number[p];
     group.points.erase(std::remove(group.points.begin(), group.points.end(), kNoGroup), group.points.end());
   }
-  for (size_t i = 0; i < raw.tet_group.size(); ++i)
-    if (raw.tet_group[i] != kNoGroup) {
-      Array<uint32_t> &points = raw.groups[raw.tet_group[i]].points;
-      points.insert(points.end(), &raw.tets[4 * i], &raw.tets[4 * i] + 4);
-    }
-  for (MeshGroup &group : raw.groups) sort_once(group.points);
+  add_to_groups(raw.groups, raw.tet_group, raw.tets);
 }
 
 // Groups by dimension and number, whatever order the file has them in.
@@ -189,7 +186,7 @@ void add_warnings(RestMesh &mesh, uint32_t crowded) {
     warn(format("%u face%s shared by more than two cells; the cells there overlap", crowded,
                 crowded == 1 ? " is" : "s are"));
   add_count(mesh.warnings, mesh.dropped_cells, "duplicate cell", "", "dropped");
-  add_count(mesh.warnings, mesh.dropped_points, "point", " that no tetrahedron uses", "dropped");
+  add_count(mesh.warnings, mesh.dropped_points, "point", " that no cell uses", "dropped");
   if (s.duplicate_points)
     warn(format("%u point%s %s exactly at another point's place; cells that meet there are not joined",
                 s.duplicate_points, plural(s.duplicate_points), s.duplicate_points == 1 ? "lies" : "lie"));
@@ -233,6 +230,16 @@ void sort_once(Array<uint32_t> &points) {
   std::sort(points.begin(), points.end());
   points.erase(std::unique(points.begin(), points.end()), points.end());
   points.shrink_to_fit();
+}
+
+void add_to_groups(std::vector<MeshGroup> &groups, const Array<uint32_t> &group,
+                   const Array<uint32_t> &corners) {
+  const size_t width = group.empty() ? 0 : corners.size() / group.size();
+  for (size_t i = 0; i < group.size(); ++i)
+    if (group[i] != kNoGroup)
+      groups[group[i]].points.insert(groups[group[i]].points.end(), &corners[width * i],
+                                     &corners[width * i] + width);
+  for (MeshGroup &g : groups) sort_once(g.points);
 }
 
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell) {
@@ -293,6 +300,7 @@ RestMesh finish_mesh(const std::string &path, RawMesh &&raw) {
     fail(DFM_E_FORMAT, "%s: no tetrahedra in this file; a body needs a volume mesh or a closed surface",
          path.c_str());
   check_points(path, raw.points);
+  check_shares(raw);
   if (raw.cells.empty()) {
     refuse_flat(path, raw);
     turn_negative(raw);
@@ -303,7 +311,6 @@ RestMesh finish_mesh(const std::string &path, RawMesh &&raw) {
   if (raw.dropped_cells && !raw.cells.empty())
     fail(DFM_E_FORMAT, "%s: cells lie on one another; write each of the %s once", path.c_str(),
          cell_kind(raw.cell).name);
-  check_shares(raw);
   renumber(raw);
   sort_groups(raw);
   uint32_t crowded = 0;

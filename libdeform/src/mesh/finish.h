@@ -15,6 +15,9 @@ inline constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of 
 Array<uint32_t> keep_points(RawMesh &raw, const Array<uint32_t> &used);
 void check_points(const std::string &path, const Array<double> &points);
 void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each once
+// The points of cells or triangles, of each the group, into their groups.
+void add_to_groups(std::vector<MeshGroup> &groups, const Array<uint32_t> &group,
+                   const Array<uint32_t> &corners);
 // Drops cells with the same four corners as an earlier cell; returns how many. file_cell (may be null):
 // numbers of the kept cells, if any is dropped.
 uint32_t drop_duplicate_cells(RawMesh &raw, Array<uint32_t> *file_cell = nullptr);

@@ -176,13 +176,23 @@ class AbaqusReader {
     return &sets.all[at->second];
   }
 
+  // The next of the fields of a line between commas; one that is blank is 0.
+  std::string_view field() {
+    const std::string_view text = in_.rest().substr(0, in_.rest().find_first_of(",\n"));
+    in_.skip(text.size(), "a field");
+    const bool more = in_.rest().substr(0, 1) == ",";
+    in_.skip(more, "a field");
+    const std::string_view word = trimmed(text);
+    return more && word.empty() ? "0" : word;
+  }
+
   void read_nodes() {
     Set *const set = set_called(node_sets_, parameter("nset"));
     for (; data(); in_.line()) {
       if (out_.npoint() == kMaxPoints) in_.unsupported("more than %u points", kMaxPoints);
       if (set) set->members.push_back(out_.npoint());
-      nodes_.add(in_.to_integer(in_.line_word(), "a node's number"));
-      for (int k = 0; k < 3; ++k) out_.points.push_back(in_.to_real(in_.line_word(), "a node's coordinate"));
+      nodes_.add(in_.to_integer(field(), "a node's number"));
+      for (int k = 0; k < 3; ++k) out_.points.push_back(in_.to_real(field(), "a node's coordinate"));
     }
   }
 

@@ -1,7 +1,7 @@
 // STL, ASCII ("solid", facets of three vertices, "endsolid"; several solids, any case) and binary (80 bytes
 // of anything, the number of triangles,
 // 50 bytes each). Corners are points of their own; finish_surface joins them. A binary file may begin with
-//    "solid" too, so its size decides.
+// "solid" too, so its size decides, and a byte 0, which no text has.
 #include <bit>
 
 #include "mesh/raw_mesh.h"
@@ -17,7 +17,8 @@ class StlReader {
 
   void run() {
     const size_t size = in_.left();
-    const bool solid = Cursor::is_word(Cursor(in_).word(), "solid");
+    const bool solid = Cursor::is_word(Cursor(in_).word(), "solid") &&
+                       in_.rest().substr(0, kHead).find('\0') == std::string_view::npos;
     const bool room = size >= kHead;
     if (room) in_.skip(kHead - 4, "the head");
     in_.binary = room;
@@ -30,7 +31,7 @@ class StlReader {
     if (solid) return read_text();
     if (!room)
       in_.refuse(
-          "%zu bytes that do not begin with 'solid'; expected an ASCII STL, or a binary one of at least %zu "
+          "%zu bytes; expected an ASCII STL, which begins with 'solid', or a binary one of at least %zu "
           "bytes",
           size, kHead);
     in_.binary = true;

@@ -119,7 +119,9 @@ class VtkReader {
     const std::string kind = vtk_lower(form);
     if (kind != "ascii" && kind != "binary")
       in_.refuse("expected ASCII or BINARY, found %s", Cursor::quote(form).c_str());
-    in_.expect("DATASET", "ASCII or BINARY");
+    const std::string_view keyword = in_.word();
+    if (!Cursor::is_word(keyword, "dataset"))
+      in_.refuse("expected DATASET after ASCII or BINARY, found %s", Cursor::quote(keyword).c_str());
     const std::string_view dataset = in_.word();
     polydata_ = vtk_lower(dataset) == "polydata";
     if (!polydata_ && vtk_lower(dataset) != "unstructured_grid")

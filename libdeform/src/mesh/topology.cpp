@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/disjoint_sets.h"
 #include "core/lists.h"
@@ -193,11 +194,12 @@ void measure_cells(const RestMesh &mesh, dfm_mesh_info &s) {
   }
   s.npiece = count_pieces(memory, s.npoint, mesh.tets, 4);
   s.duplicate_points = count_duplicate_points(mesh);
+  size_t flat = SIZE_MAX;  // the last such cell
   put_qualities(s.ntet, s, [&](size_t t) {
     const uint32_t *tet = &mesh.tets[4 * t];
     const double q = tet_quality(mesh.points.data(), tet);
     s.volume += tet_volume(mesh.points.data(), tet);
-    s.flat_cells += q < 0.01;
+    if (const size_t c = t * s.ncell / s.ntet; q < 0.01) s.flat_cells += std::exchange(flat, c) != c;
     return q;
   });
   s.wave_path = wave_path(mesh);

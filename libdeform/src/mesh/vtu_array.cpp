@@ -208,8 +208,11 @@ std::optional<XmlTag> next_tag(Cursor &in) {
       in.skip(1, "a tag");
       continue;
     }
-    const size_t end = rest.find('>');
-    if (end == rest.npos) in.refuse("an XML tag has no end: the file is truncated");
+    size_t end = 0;
+    for (char quote = 0; end < rest.size() && (quote || rest[end] != '>'); ++end)
+      if (rest[end] == quote) quote = 0;
+      else if (!quote && (rest[end] == '"' || rest[end] == '\'')) quote = rest[end];
+    if (end == rest.size()) in.refuse("an XML tag has no end: the file is truncated");
     rest = rest.substr(1, end - 1);
     XmlTag tag;
     tag.closes = !rest.empty() && rest.front() == '/';

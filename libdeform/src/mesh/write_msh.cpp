@@ -4,6 +4,7 @@
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "math/extent.h"
 #include "deform/plugin.h"
 #include "mesh/cells.h"
@@ -76,7 +77,7 @@ void put_names(AtomicFile &out, const RestMesh &mesh, const std::vector<uint32_t
   out.write("$PhysicalNames\n" + std::to_string(groups.size()) + "\n");
   for (const uint32_t g : groups)
     out.write(std::to_string(mesh.groups[g].dimension) + " " + std::to_string(mesh.groups[g].tag) + " \"" +
-              mesh.groups[g].name + "\"\n");
+              one_line(mesh.groups[g].name) + "\"\n");
   out.write("$EndPhysicalNames\n");
 }
 

@@ -8,6 +8,7 @@
 #include "core/error.h"
 #include "math/vec3.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "mesh/topology_tri.h"
 
 namespace dfm {
@@ -19,10 +20,13 @@ void put_points(AtomicFile &out, const RestMesh &mesh, const char *before) {
         format("%s%.17g %.17g %.17g\n", before, mesh.points[p], mesh.points[p + 1], mesh.points[p + 2]));
 }
 
-// A name ends with its line.
-std::string one_line(std::string name) {
-  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < ' '; }, '_');
-  return name;
+// A backslash at the end of a name would continue its line, and a word that begins with # be a comment.
+std::string obj_name(const std::string &name) {
+  std::string out = one_line(name);
+  for (size_t i = 0; i < out.size(); ++i)
+    if ((out[i] == '#' && (i == 0 || out[i - 1] == ' ')) || (out[i] == '\\' && i + 1 == out.size()))
+      out[i] = '_';
+  return out;
 }
 
 void put_obj(AtomicFile &out, const RestMesh &mesh) {
@@ -32,7 +36,7 @@ void put_obj(AtomicFile &out, const RestMesh &mesh) {
   for (uint32_t t = 0; t < mesh.ntri(); ++t) {
     if (mesh.tri_group[t] != group) {
       group = mesh.tri_group[t];
-      out.write("g " + (group == kNoGroup ? "default" : one_line(mesh.groups[group].name)) + "\n");
+      out.write("g " + (group == kNoGroup ? "default" : obj_name(mesh.groups[group].name)) + "\n");
     }
     const uint32_t *c = &mesh.tris[3 * size_t(t)];
     out.write(format("f %u %u %u\n", c[0] + 1, c[1] + 1, c[2] + 1));

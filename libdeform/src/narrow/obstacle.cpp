@@ -274,16 +274,14 @@ void edge_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
 // Faces against the center of a sphere, the ends of a capsule's axis, the corners of a box.
 void triangle_obstacle(const Pair &pair, Run run, Array<ContactPoint> &out) {
   const ObstacleShape &shape = *pair.shape;
-  const Shape kind = shape.view().shape;
-  const bool box = kind == Shape::box;
-  const double radius = box ? 0 : shape.view().radius, depth = recovery_depth(*pair.a.surface);
-  const uint32_t points = kind == Shape::plane ? 0 : box ? 8 : kind == Shape::sphere ? 1 : 2;
+  const bool box = shape.view().shape == Shape::box;
+  const double radius = shape.view().radius, depth = recovery_depth(*pair.a.surface);
   for (const Candidate &candidate : run) {
     const std::span<const uint32_t> corner(&pair.a.surface->tri[3 * size_t{candidate.feature_a}], 3);
     const Vec3 a = pair.xa(corner[0]), b = pair.xa(corner[1]), d = pair.xa(corner[2]);
     const Vec3 m = normalized(cross(b - a, d - a));
-    for (uint32_t k = 0; k < points; ++k) {
-      const Vec3 c = box ? shape.corner(k) : shape.end(int(k));
+    for (uint32_t k = 0; k < shape.points(); ++k) {
+      const Vec3 c = shape.point(k);
       const TrianglePoint q = closest_on_triangle(c, a, b, d);
       const double plane = dot(m, c - q.point), distance = plane - radius;
       // Over the face, its border included: there rounding may put a point beside both of two triangles.

@@ -111,7 +111,7 @@ struct Structure {
   // DFM_CELL_*; nodes of cells that are not first-order tetrahedra, of which `tets` has several each in turn
   uint32_t cell_type = 8;
   Array<uint32_t> cells;
-  Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: no blade has come near yet
+  Array<uint32_t> inner;  // [n,2] cells on both sides of inner faces; empty: not needed so far
   Surface surface;
   SurfaceZones zones;
   double smooth = 0;  // degrees, of make_bulges(); 0: faces are flat

@@ -17,7 +17,7 @@ Pose Obstacle::pose_at_time(double t) const {
   return p;
 }
 
-ObstacleShape Obstacle::standing() const {
+ObstacleView Obstacle::view() const {
   ObstacleView v{};
   v.shape = Shape(def.shape);
   v.position = pose.position;
@@ -26,7 +26,7 @@ ObstacleShape Obstacle::standing() const {
   v.radius = def.radius;
   v.half_length = def.half_length;
   v.extent = mesh ? mesh->extent : grid ? grid->extent() : 0;
-  return ObstacleShape(v);
+  return v;
 }
 
 }  // namespace dfm

@@ -6,11 +6,11 @@
 
 #include "body/zones.h"
 #include "deform/deform.h"
+#include "geometry/obstacle_shape.h"
 #include "state/motion.h"
 
 namespace dfm {
 
-class ObstacleShape;
 struct ObstacleMesh;
 struct RigidSet;
 class SearchTree;
@@ -51,7 +51,9 @@ struct Obstacle : ObstacleState {
   Obstacle();
   ~Obstacle();
   Pose pose_at_time(double t) const;
-  ObstacleShape standing() const;  // where it is now; of a mesh and voxels the extent alone
+  // Shape and size, where it is now; of a mesh and voxels the extent alone.
+  ObstacleView view() const;
+  ObstacleShape standing() const { return ObstacleShape(view()); }
   // Of a sub-step, in a step whose remaining time from t is `left`. rest: s, to the end of the planned
   // sub-step, of which this is a piece if h is less. The obstacle goes straight to where it has to be then:
   // what it was held back earlier, it catches up in that time and not in the first piece, however short.

@@ -170,28 +170,18 @@ void view_bodies(World &w, StepContext &step, SceneFacts &facts) {
 }
 
 ObstacleView view_of(Obstacle &o) {
-  ObstacleView v{};
+  ObstacleView v = o.view();
   v.slot = o.slot;
   v.category = o.def.category;
   v.collides_with = o.def.collides_with;
   v.id = o.id;
-  v.shape = Shape(o.def.shape);
   if (v.shape == Shape::none) v.category = v.collides_with = 0;
-  v.position = o.pose.position;
-  v.rotation = o.pose.rotation;
-  v.half_size = load3(o.def.half_size);
-  v.radius = o.def.radius;
-  v.half_length = o.def.half_length;
   v.belt = load3(o.def.velocity_surface);
   if (o.mesh) {
     o.mesh->place(v.position, v.rotation, {}, {});
     v.surface = &o.mesh->surface;
-    v.extent = o.mesh->extent;
   }
-  if (o.grid) {
-    v.grid = o.grid.get();
-    v.extent = o.grid->extent();
-  }
+  v.grid = o.grid.get();
   return v;
 }
 

@@ -208,6 +208,13 @@ TEST(CellFiles, ReflectedCells_AreTurned) {
   EXPECT_NEAR(mesh_statistics(mesh).volume, 8.0 / 6, 1e-14);
 }
 
+TEST(CellFiles, FlatHexahedron_IsOneCell) {
+  RestMesh cell = make_bricks(kMemory, 1, 1, 1, 1);
+  ASSERT_EQ(cell.cells.size(), 8u);
+  for (size_t k = 2; k < cell.points.size(); k += 3) cell.points[k] *= 5e-4;
+  EXPECT_EQ(mesh_statistics(cell).flat_cells, 1u);
+}
+
 TEST(CellFiles, GroupsOfQuadrangles_AreTrianglesOfTheBoundary) {
   const int top[4] = {5, 6, 7, 8};
   for (int first = 0; first < 4; ++first) {

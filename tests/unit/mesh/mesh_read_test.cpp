@@ -282,7 +282,7 @@ TEST(MeshRead, Locale_HasNoInfluence) {
 
 TEST(MeshRead, LongLinesAndCarriageReturns_AreFine) {
   std::string text = "# vtk DataFile Version 3.0\r\n" + std::string(100000, 'x');
-  text += "\r\nASCII\r\nDATASET UNSTRUCTURED_GRID\r\nPOINTS 4 double\r\n";
+  text += "\r\nASCII\r\ndataset unstructured_grid\r\nPOINTS 4 double\r\n";
   text += "0 0 0 1 0 0 0 1 0" + std::string(70000, ' ') +
           "\t0 0 1\r\nCELLS 1 5\r\n4 0 1 2 3\r\nCELL_TYPES 1\r\n10";
   EXPECT_EQ(read_text("long.vtk", text).ntet(), 1u);

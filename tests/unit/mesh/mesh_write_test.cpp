@@ -145,6 +145,36 @@ TEST(MeshWrite, Vtu_HasTheShareOfFilledCells) {
   expect_same_bits(m, read_mesh(Memory::standard(), folder() + "/share.vtk", DFM_MESH_CELLS));
 }
 
+// A program that mirrors points leaves cells with negative volume, and the weights of their material.
+TEST(MeshWrite, MirroredLattice_HasItsMaterialWhereItWas) {
+  RestMesh m = make_lattice(make_ball_surface(Memory::standard(), 0.1, 320), 60, 0);
+  ASSERT_FALSE(m.inside.empty());
+  for (size_t k = 0; k < m.points.size(); k += 3) m.points[k] *= -1;
+  write_mesh(m, folder() + "/mirrored.vtu");
+  const RestMesh back = read_mesh(Memory::standard(), folder() + "/mirrored.vtu", DFM_MESH_CELLS);
+  ASSERT_EQ(back.turned, m.cells.size() / 8);
+  ASSERT_EQ(back.inside.size(), m.inside.size());
+  for (size_t c = 0; c < back.turned; ++c) {
+    Vec3 was, is;
+    const auto moment = [&](const RestMesh &of, Vec3 &sum) {
+      each_inside(of.points.data(), 3, &of.cells[8 * c], &of.inside[kInsidePoints * c],
+                  [&](double volume, Vec3 place) { sum += volume * place; });
+    };
+    moment(m, was);
+    moment(back, is);
+    EXPECT_LT(norm(is + was), 1e-15) << "cell " << c;  // of negative volume before
+  }
+}
+
+TEST(MeshWrite, GroupName_EndsWithItsLine) {
+  RestMesh m = grouped();
+  m.groups[0].name = "two\nlines";
+  for (const char *name : {"/n.msh", "/n.msh2"}) {
+    write_mesh(m, folder() + name);
+    EXPECT_EQ(read_mesh(Memory::standard(), folder() + name, DFM_MESH_CELLS).groups[0].name, "two_lines");
+  }
+}
+
 TEST(MeshWrite, FailedWrite_LeavesOldFileAndNothingElse) {
   const std::string home = test::scratch("mesh_write_failed");
   std::filesystem::remove_all(home);

@@ -200,6 +200,13 @@ TEST(Abaqus, Sets_AreGroupsHoweverTheyAreWritten) {
   EXPECT_TRUE(mesh.warnings.empty());
 }
 
+TEST(Abaqus, BlankCoordinate_IsZero) {
+  const RestMesh mesh = parsed(
+      "*NODE\n1, 0, , 0\n2, 1., , ,\n3, 0, 1, 0, 0., 0., 1.\n4, , , 1, 0., 0., 1.\n"
+      "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n");
+  EXPECT_EQ(mesh.points, (Array<double>{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}));
+}
+
 TEST(Abaqus, SectionsDivideTheCells_WhateverOtherSetsSay) {
   const std::string two = kFour +
                           "5, 1, 1, 1\n*ELEMENT, TYPE=C3D4, ELSET=all\n1, 1, 2, 3, 4\n2, 2, 5, 3, 4\n"
@@ -278,7 +285,6 @@ TEST(Abaqus, WhatWouldLosePartOfTheMesh_IsRefused) {
   refuse(kTet + "7, 1, 2, 3, 4\n", DFM_E_FORMAT, {"element number 7 is given twice"});
   refuse("*NODE\n1, 0, 0\n", DFM_E_FORMAT, {"a.inp:2:", "coordinate", "end of the line"});
   refuse("*NODE\n1, 0, 0, nan\n", DFM_E_FORMAT, {"a.inp:2:", "finite", "'nan'"});
-  refuse("*NODE\n1, 0, , 0\n", DFM_E_FORMAT, {"coordinate"});
   refuse(kFour + "4, 0, 0, 1\n", DFM_E_FORMAT, {"node number 4 is given twice"});
   refuse(kTet + "*NSET, NSET=a\nnone\n", DFM_E_FORMAT, {"a.inp:9:", "'none'", "a set that stands before"});
   refuse(kTet + "*NSET\n1\n", DFM_E_FORMAT, {"nset=NAME"});

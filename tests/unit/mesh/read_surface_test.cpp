@@ -222,6 +222,7 @@ TEST(ReadSurface, StlRefusals_NamePlaceAndReason) {
   EXPECT_EQ(parse("a.stl", binary + "tail").ntri(), 1u);  // some writers append a few bytes
   binary[80] = 2;
   expect_refusal("a.stl", binary, DFM_E_FORMAT, {"2 triangles", "184"});
+  expect_refusal("a.stl", "solid x " + binary.substr(8), DFM_E_FORMAT, {"2 triangles", "truncated"});
   binary[80] = 0;
   // 50 bytes more than promised: a part would be lost
   expect_refusal("a.stl", binary, DFM_E_FORMAT, {"0 triangles", "count is wrong"});

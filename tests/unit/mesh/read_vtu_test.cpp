@@ -99,6 +99,7 @@ TEST(ReadVtu, GroupsOfCells_AreKnownByTheirArray) {
   EXPECT_EQ(groups("material", "Int32", "0"), "");
   EXPECT_EQ(groups("material", "Float64", "5"), "");
   EXPECT_EQ(groups("temperature", "Int32", "5"), "");
+  EXPECT_EQ(groups("a>b, it's", "Int32", "5"), "");
 }
 
 TEST(ReadVtu, CompressedArray_MayUnpackToSixtyFourTimesItsFile) {

@@ -60,6 +60,17 @@ TEST(WriteSurface, Groups_ComeBackWhereTheFormatHasThem) {
   }
 }
 
+TEST(WriteSurface, ObjGroupNames_CostNoFace) {
+  RestMesh m = ball_in_groups();
+  m.groups[0].name = "old\\parts\\";
+  m.groups[1].name = "#2 and #3#";
+  const RestMesh back = there_and_back(m, ".obj");
+  ASSERT_EQ(back.tris, m.tris);
+  ASSERT_EQ(back.tri_group, m.tri_group);
+  EXPECT_EQ(back.groups[0].name, "old\\parts_");
+  EXPECT_EQ(back.groups[1].name, "_2 and _3#");
+}
+
 TEST(WriteSurface, PlyGroups_ComeBackByNumber) {
   const RestMesh m = ball_in_groups(), back = there_and_back(m, ".ply");
   ASSERT_EQ(back.groups.size(), 2u);

@@ -92,6 +92,21 @@ TEST(SmoothThrow, At20MetersPerSecond_StaysOutside) {
     }
 }
 
+// Below the floor, and over it: the radius that the definition of any shape has is none of a plane.
+TEST(SmoothThrow, BallInAPlane_GoesOnAsideWithoutFriction) {
+  test::Context context;
+  const dfm_world world = test::make_world(context, {0, 0, 0});
+  test::set_friction(world, 0);
+  test::add_plane(world, "floor");
+  test::BodyOptions soft;
+  soft.smooth = 60;
+  soft.position = {0.62, 0, 0.06};
+  soft.velocity = {-1, 0, 0};
+  const dfm_body ball = test::make_body(context, world, "ball", {kRadius, 0, 0}, 500, soft);
+  test::run(world, 0.05, 2e-4);
+  EXPECT_NEAR(test::measure(ball).velocity[0], -1, 0.01);
+}
+
 TEST(SmoothThrow, WhatIsNoAngle_IsRefused) {
   test::Context context;
   const dfm_world world = test::make_world(context);

@@ -316,7 +316,7 @@ double OverlapSides::slack(const OverlapPair &p) { return round(p) ? 0 : other(p
 double OverlapSides::reach(const OverlapPair &p, Vec3 direction) {
   if (round(p)) {
     const ObstacleShape s = shape(p);
-    return std::max(dot(s.end(0), direction), dot(s.end(1), direction)) + (plane(p) ? 0 : s.view().radius);
+    return std::max(dot(s.end(0), direction), dot(s.end(1), direction)) + s.view().radius;
   }
   const OverlapSkin &b = other(p);
   double most = -std::numeric_limits<double>::infinity();

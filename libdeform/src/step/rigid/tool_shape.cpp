@@ -55,7 +55,7 @@ void ToolShape::take(const ObstacleView &view, ObstacleMesh *mesh) {
   shape_ = ObstacleShape(view);
   mesh_ = mesh;
   surface_ = view.surface;
-  round_ = view.shape == Shape::sphere || view.shape == Shape::capsule ? view.radius : 0;
+  round_ = shape_.view().radius;
   edges_.clear();
   corners_.clear();
   triangles_.clear();

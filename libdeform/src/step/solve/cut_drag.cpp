@@ -54,8 +54,9 @@ bool has_dues(const Body &b) {
 void forget_dues(World &w, const Tool &t) {
   for (auto &b : w.bodies) {
     if (t.cuts.how == DFM_CUT_SPLIT && t.cuts_body(*b)) continue;
-    for (BladeTrack &track : b->blades)
-      if (std::ranges::find(t.set->obstacle, track.part) != t.set->obstacle.end()) track.cut_work.clear();
+    std::erase_if(b->blades, [&](const BladeTrack &track) {
+      return std::ranges::find(t.set->obstacle, track.part) != t.set->obstacle.end();
+    });
   }
 }
 
