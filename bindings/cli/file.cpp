@@ -36,4 +36,19 @@ File new_file(const std::string &path) {
   return File(file, std::fclose);
 }
 
+std::string csv_cell(const std::string &text) {
+  if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
+  std::string out = "\"";
+  for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
+  return out + '"';
+}
+
+std::vector<std::string> csv_cells(const std::string &line) {
+  std::vector<std::string> cells(1);
+  for (const char c : line)
+    if (c == ',') cells.emplace_back();
+    else if (c != '\r') cells.back() += c;
+  return cells;
+}
+
 }  // namespace cli

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace cli {
 
@@ -20,5 +21,8 @@ using File = std::unique_ptr<FILE, int (*)(FILE *)>;
 File new_file(const std::string &path);
 bool may_write_beside(const std::string &path);           // into its folder; false: errno says why
 [[noreturn]] void cannot_write(const std::string &path);  // for the reason in errno
+
+std::string csv_cell(const std::string &text);                // in quotes where it needs them
+std::vector<std::string> csv_cells(const std::string &line);  // of numbers and names, without quotes
 
 }  // namespace cli

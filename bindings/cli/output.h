@@ -13,9 +13,6 @@
 
 namespace cli {
 
-std::string csv_cell(const std::string &text);                // in quotes where it needs them
-std::vector<std::string> csv_cells(const std::string &line);  // of numbers and names, without quotes
-
 // A table that is only ever whole rows: a block of rows is collected and written at once.
 class Csv {
  public:

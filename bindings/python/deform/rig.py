@@ -88,7 +88,11 @@ def plot_friction(law: Any, kind: str | None = None, *, path: Any = None, **opti
     except ImportError as missing:
         raise ImportError("plot_friction needs matplotlib: pip install matplotlib") from missing
     rows = friction(law, kind, **options)
-    kind = kind or ("case" if "case" in options else "sine_velocity")
+    case = options.get("case")
+    if case is not None:
+        case = case if isinstance(case, Mapping) else json.loads(pathlib.Path(case).read_text())
+        kind = case["input"]["kind"]
+    kind = kind or "sine_velocity"
     panels = [pair for pair in _PANELS.get(kind, []) if pair[0] in rows and pair[1] in rows]
     if not panels:
         names = list(rows)

@@ -13,7 +13,6 @@
 #include "file.h"
 #include "json_text.h"
 #include "messages.h"
-#include "output.h"
 
 namespace cli {
 namespace {

@@ -8,7 +8,6 @@
 #include <set>
 
 #include "file.h"
-#include "output.h"
 
 namespace fs = std::filesystem;
 

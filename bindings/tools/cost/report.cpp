@@ -6,8 +6,8 @@
 #include <cstring>
 #include <map>
 
+#include "file.h"
 #include "messages.h"
-#include "output.h"
 
 namespace cli::cost {
 namespace {

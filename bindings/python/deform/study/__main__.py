@@ -55,7 +55,7 @@ def _sweep(given: Any) -> int:
                             ("only", ("parquet",))):
         for other in ignored if getattr(given, option) else ():
             if getattr(given, other) not in (None, False, "", "local"):
-                raise ArgumentError(f"--{option} makes nothing of --{other}; omit one of them", "DFM_E_ARG")
+                raise ArgumentError(f"--{option} ignores --{other}: omit one of the two", "DFM_E_ARG")
     if given.export:
         print(f"written: {export(given.study, given.export, out=given.out)}")
         return 0
