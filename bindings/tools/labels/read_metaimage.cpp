@@ -102,7 +102,9 @@ class Reader : private HeaderLines {
     if (stored_.encoding.bytes == 0) missing("ElementType");
     if (sizes_.empty()) missing("DimSize");
     if (!binary_)
-      refuse(path_, "the voxels are stored as text, which is not read; save the file with BinaryData = True");
+      refuse(path_,
+             "BinaryData is False or missing, so the voxels are text, which is not read; write BinaryData "
+             "= True into the header if they are binary, else save the file anew");
     if (stored_.file.empty()) stored_.skip = 0;  // the voxels of a .mha follow the header
     for (size_t k = 0; k < 3; ++k) {
       const double n = sizes_[k];

@@ -366,10 +366,14 @@ double BladeSweep::energy(size_t n) {
 }
 
 BladeTrack &BladeSweep::keep(Body &b, uint64_t part) {
+  const auto of_part = [&](const BladeTrack &t) { return t.part == part; };
+  for (size_t i = b.blades.size(); part && i-- > 0;)  // a part of a tool has one
+    if (i != track_ && of_part(b.blades[i])) {
+      b.blades.erase(b.blades.begin() + std::ptrdiff_t(i));
+      track_ -= i < track_;
+    }
   if (track_ == b.blades.size()) {
-    const auto of_part = [&](const BladeTrack &t) { return t.part == part; };
-    if (part) std::erase_if(b.blades, of_part);
-    else if (std::count_if(b.blades.begin(), b.blades.end(), of_part) == kMaxTracks)
+    if (!part && std::count_if(b.blades.begin(), b.blades.end(), of_part) == kMaxTracks)
       b.blades.erase(std::find_if(b.blades.begin(), b.blades.end(), of_part));
     b.blades.emplace_back();
     use_memory(b.world->memory(), b.blades.back().x, b.blades.back().sides, b.blades.back().cut_work);

@@ -176,14 +176,14 @@ class AbaqusReader {
     return &sets.all[at->second];
   }
 
-  // The next of the fields of a line between commas; one that is blank is 0.
+  // The next of the fields of a line, which end at commas; one that is blank is 0. Without commas words are.
   std::string_view field() {
-    const std::string_view text = in_.rest().substr(0, in_.rest().find_first_of(",\n"));
-    in_.skip(text.size(), "a field");
-    const bool more = in_.rest().substr(0, 1) == ",";
-    in_.skip(more, "a field");
-    const std::string_view word = trimmed(text);
-    return more && word.empty() ? "0" : word;
+    const std::string_view line = in_.rest().substr(0, in_.rest().find('\n'));
+    const size_t comma = line.find(',');
+    if (comma == line.npos) return in_.line_word();
+    in_.skip(comma + 1, "a field");
+    const std::string_view word = trimmed(line.substr(0, comma));
+    return word.empty() ? "0" : word;
   }
 
   void read_nodes() {

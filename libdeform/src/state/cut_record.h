@@ -58,7 +58,7 @@ struct BladeTrack {
   double way[2] = {};       // m, that each end has moved
   Array<BladeSide> sides;   // of cells near it, ascending
   double credit = 0;        // J, zero or less: the sum of work since it was last the largest
-  uint64_t part = 0;        // id of the obstacle that is the tool's part, where it owes anything
+  uint64_t part = 0;        // id of the obstacle that is the tool's part; 0: of dfm_body_cut
   Array<CutWork> cut_work;  // by point, ascending
 };
 

@@ -13,7 +13,7 @@ struct World;
 // Whether cutting the body takes energy: one of its materials has "fracture_energy" above 0.
 bool tough(const Body &b);
 bool has_dues(const Body &b);
-// What a tool owes to bodies that it no longer splits: nothing would pay it, nor forget it.
+// Ends the tracks of a tool in bodies that it no longer splits, with what it owes: nothing would pay that.
 void forget_dues(World &w, const Tool &t);
 
 // Appends the rows of this sub-step to the bonds; `again`: as make_bonds().
