@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <cstring>
 #include <iterator>
 #include <utility>
 
@@ -20,7 +21,9 @@ std::vector<uint32_t> below(double n, const JsonValue &line, const char *key) {
   std::vector<uint32_t> out;
   for (const double number : line.numbers(key)) {
     if (!(number >= 0 && number < n))
-      throw Failure(kBadInput, "the body has none of these " + std::string(key));
+      throw Failure(kBadInput, '"' + std::string(key) + "\": the body has no " +
+                                   std::string(key, std::strlen(key) - 1) + " " + cli::number(number) +
+                                   "; record again");
     out.push_back(uint32_t(number));
   }
   return out;

@@ -142,6 +142,22 @@ std::string prepare(const SceneFile &scene, const RunOptions &options) {
   return from;
 }
 
+// As prepare(); a refused run leaves no folder that it has made.
+std::string prepare_or_leave_nothing(const SceneFile &scene, const RunOptions &options) {
+  namespace fs = std::filesystem;
+  std::error_code error;
+  std::vector<fs::path> made;
+  for (fs::path at = fs::absolute(path_of(options.out)); at.has_relative_path() && !fs::exists(at, error);
+       at = at.parent_path())
+    made.push_back(at);
+  try {
+    return prepare(scene, options);
+  } catch (...) {
+    for (const fs::path &empty : made) fs::remove(empty, error);
+    throw;
+  }
+}
+
 class Runner {
  public:
   // from: snapshot to go on from, empty: the scene's start, where the world is now.
@@ -532,7 +548,7 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
   if (const std::string short_of = planned_sentence(planned); !short_of.empty()) warn(short_of);
   if (!globals.quiet && !globals.json) print_choice(planned);
   check_first_step(scene);
-  const std::string from = prepare(scene, options);
+  const std::string from = prepare_or_leave_nothing(scene, options);
   RunResult result;
   Checks checks;
   results_lie_in(options.out);

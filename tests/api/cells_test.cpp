@@ -188,6 +188,13 @@ TEST(CellWorlds, StressAndEnergy_AreThatOfTheCell) {
   for (uint32_t t = 0; t < d.ntet; ++t)
     for (uint32_t k = 0; k < 6; ++k) EXPECT_EQ(stress[6 * t + k], stress[6 * (t / 6 * 6) + k]);
   EXPECT_NE(stress[0], stress[6 * size_t(d.ntet - 1)]);
+  for (size_t i = 0; i < x.size(); ++i) x[i] = d.points[i] * (i % 3 == 0 ? 1.1 : 1);
+  test::ok(dfm_body_set_state(body, d.npoint, x.data(), nullptr));
+  test::ok(dfm_body_stress(body, d.ntet, stress.data()));
+  std::vector<double> there(6 * size_t(d.npoint));
+  EXPECT_EQ(dfm_body_point_stress(body, d.npoint - 1, there.data()), DFM_E_ARG);
+  test::ok(dfm_body_point_stress(body, d.npoint, there.data()));
+  for (size_t i = 0; i < there.size(); ++i) EXPECT_NEAR(there[i], stress[i % 6], 1e-9 * stress[0]) << i;
   dfm_world_destroy(world);
 }
 

@@ -163,14 +163,17 @@ TEST(CostSubject, SceneAppliedBehindALink_FindsItsFiles) {
   const std::string mesh = test::scratch("cost_subject") + "/cube", far = test::scratch("cost_far/away"),
                     link = test::scratch("cost_subject") + "/link";
   test::write_file(mesh + ".node", "4 3 0 0\n0 0 0 0\n1 1 0 0\n2 0 1 0\n3 0 0 1\n");
-  test::write_file(mesh + ".ele", "1 4 0\n0 0 1 2 3\n");
+  test::write_file(mesh + "_stored", "1 4 0\n0 0 1 2 3\n");
+  std::filesystem::remove(mesh + ".ele");
+  std::filesystem::create_symlink("cube_stored", mesh + ".ele");
   std::filesystem::remove(link);
   std::filesystem::create_directory_symlink(far, link);
   write_applied(subject_of("linked", R"({"name": "one", "mesh": "cube.ele"})"), two_choices(0.01),
                 link + "/applied.json");
   JsonValue scene;
   ASSERT_TRUE(parse_json(test::read_file(link + "/applied.json"), scene));
-  EXPECT_TRUE(std::filesystem::exists(link + "/" + scene.list("bodies").at(0).get("mesh")));
+  const std::string found = link + "/" + scene.list("bodies").at(0).get("mesh");
+  EXPECT_TRUE(std::filesystem::exists(found) && found.ends_with("/cube.ele")) << found;
 }
 
 // Other meshes have other nodes of these numbers.
@@ -209,7 +212,8 @@ TEST(CostRuns, RunThatIsStartedAgain_HasNothingOfTheEarlierOne) {
   test::write_file(job.folder + "/bodies.csv", "t,body\n5,bar\n");
   job.outcome = {};
   runs.run({&job}, 1);
-  EXPECT_EQ(job.outcome.state, Outcome::refused) << job.outcome.sentence;
+  EXPECT_EQ(job.outcome.state, Outcome::refused);
+  EXPECT_TRUE(has(job.outcome.sentence, "none such")) << job.outcome.sentence;
   EXPECT_EQ(job.outcome.made, 0);
   EXPECT_EQ(job.outcome.cpu, 0);
 }

@@ -1,7 +1,8 @@
 // deform.hpp: what ends what, errors in both ways, spans and their lengths, callables through the C API, no
 // allocation of its own.
-#include <cstring>
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include <deform/deform.hpp>
 #include <gtest/gtest.h>
@@ -187,6 +188,12 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   const double force[6] = {0, 0, 1, 0, 0, 1};
   EXPECT_THROW((void)s.ball.add_load(points, std::span(force).first(5)), deform::Error);
   EXPECT_THROW(s.ball.set_state(x, std::span(v).first(v.size() - 3)), deform::Error);
+  std::vector<double> stress(6 * size_t(s.ball.info().npoint));
+  EXPECT_EQ(values::Body(s.ball.get()).point_stress(stress).status(), DFM_E_UNSUPPORTED) << "of msm";
+  ASSERT_EQ(dfm_body_set_model(s.ball.get(), "corotational_fem", nullptr), DFM_OK);
+  s.ball.point_stress(stress);
+  EXPECT_GT(*std::max_element(stress.begin(), stress.end()), 0);
+  EXPECT_THROW(s.ball.point_stress(std::span(stress).first(6)), deform::Error);
   const auto refused = values::Body(s.ball.get()).set_state(x, std::span(v).first(3));
   EXPECT_EQ(refused.status(), deform::spans_disagree);
   EXPECT_NE(std::string(refused.what()).find("length"), std::string::npos);

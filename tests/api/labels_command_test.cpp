@@ -116,7 +116,9 @@ TEST(LabelsCommand, TableThatTheUserHasChanged_IsNotReplaced) {
   words.insert(words.end(), {"--table", ""});
   for (const std::string &given : {table, out + "/other.json"}) {
     words.back() = given;
-    EXPECT_EQ(test::deform(words).exit_code, 0);
+    const auto done = test::deform(words);
+    EXPECT_EQ(done.exit_code, 0);
+    EXPECT_EQ(has(done.err, table + " differs and is left as it is"), given != table) << done.err;
     EXPECT_EQ(test::read_file(table), changed) << given;
   }
 }

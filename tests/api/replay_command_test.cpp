@@ -125,6 +125,8 @@ TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
   says(test::deform({"run", f.scene, "--set", "/time/mode=\"static\"", "--set", "/bodies/0/switch=[]",
                      "--out", other, "--save", "0.05", f.path + "/x.state"}),
        "equilibria");
+  says(f.run({"--out", other + "/deep", "--save", "9", other + "/deep/x.state"}), "the run ends at");
+  EXPECT_FALSE(fs::exists(other));
 }
 
 // The folder of the run holds what an earlier run wrote, and the state to continue from.

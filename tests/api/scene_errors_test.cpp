@@ -224,7 +224,7 @@ TEST(SceneErrors, Names_AreUniqueAndKnown) {
          {"/obstacles/0/name=\"block\"", {"/obstacles/0/name", "taken"}},
          {"/rigid={\"bodies\":[{\"name\":\"r\",\"shape\":\"sphere\",\"radius\":1,\"mass\":1},"
           "{\"name\":\"q\",\"id\":50,\"shape\":\"sphere\",\"radius\":1,\"mass\":1}]}",
-          {"/rigid/bodies/1/id", "follow that of the first"}},
+          {"/rigid/bodies/1/id", "follow the first; omit it"}},
          {"/contact/friction/0/between=[\"blok\",\"*\"]",
           {"/contact/friction/0/between/0", "did you mean \"block\"?"}},
          {"/contact/friction/0/between=[\"block\"]", {"/contact/friction/0/between", "two sides"}},

@@ -219,24 +219,30 @@ TEST(BrokenLaw, EveryBrokenLaw_IsInTheTable) {
         << entry.path();
 }
 
+// What a model of forces alone is not asked; V10 needs a sanitizer.
+const std::vector<std::string> kSkipsOfSound{"V10", "M14", "M18", "M19", "M20", "M22", "M23"};
+
 TEST(BrokenLaw, CorrectTemplates_PassEveryRule) {
   const test::CommandResult r = check(broken("sound"));
   EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
   EXPECT_GE(rules_that("pass", r.out).size(), 20u) << r.out;
   // Both kinds of models together are asked every rule.
   const test::CommandResult forces = check(broken("model_sound")),
-                            steps = check(broken("model_sound_stepper")),
-                            second = check(broken("model_sound_second"));
+                            steps = check(broken("model_sound_stepper"));
   EXPECT_EQ(forces.exit_code, 0) << forces.out << forces.err;
   EXPECT_EQ(steps.exit_code, 0) << steps.out << steps.err;
-  EXPECT_EQ(second.exit_code, 0) << second.out << second.err;
-  for (const test::CommandResult &sound : {forces, second})
-    EXPECT_EQ(rules_that("skip", sound.out),
-              SANITIZED ? (std::vector<std::string>{"M14", "M18", "M19", "M20", "M22", "M23"})
-                        : (std::vector<std::string>{"V10", "M14", "M18", "M19", "M20", "M22", "M23"}))
-        << sound.out;
+  std::vector<std::string> skips = kSkipsOfSound;
+  if (SANITIZED) skips.erase(skips.begin());
+  EXPECT_EQ(rules_that("skip", forces.out), skips) << forces.out;
   for (const char *rule : {"M03", "M10", "M14", "M16", "M18", "M19"})
     EXPECT_NE(steps.out.find(std::string(rule) + " pass"), std::string::npos) << steps.out;
+}
+
+// unsanitized: its rules have limits of time; other tests run them
+TEST(BrokenLaw, CorrectTemplateOfSecondOrder_PassesEveryRule) {
+  const test::CommandResult r = check(broken("model_sound_second"));
+  EXPECT_EQ(r.exit_code, 0) << r.out << r.err;
+  EXPECT_EQ(rules_that("skip", r.out), kSkipsOfSound) << r.out;
 }
 
 // A law that never answers costs two rules, not all of them.

@@ -210,6 +210,10 @@ class InPython(unittest.TestCase):
         self.assertAlmostEqual(rows["F"].max(), 3, delta=1e-9)
         figure = deform.plot_friction("lugre", "displacement_path", normal=10)
         self.assertEqual(len(figure.axes), 1)
+        case = {"law": "coulomb", "mass": 1, "params": {"mu": 0.5},
+                "input": {"kind": "force_ramps", "rates": [1, 10]}}
+        axis, = deform.plot_friction("coulomb", case=case).axes
+        self.assertEqual(axis.get_xscale(), "log")
         with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'spring_pull'"):
             deform.friction("lugre", "spring_pul")
 

@@ -26,7 +26,8 @@ class Views(unittest.TestCase):
     def test_looks_share_memory_and_copy_nothing(self):
         world, body = dropped()
         self.assertGreater(body.positions.nbytes, 8000)
-        for owner, names in ((body, SURFACE + POINTS + ("stress", "measure")), (world, LISTS + ("stats",))):
+        of_body = SURFACE + POINTS + ("stress", "point_stress", "measure")
+        for owner, names in ((body, of_body), (world, LISTS + ("stats",))):
             for name in names:
                 with self.subTest(name):
                     address = self.address(getattr(owner, name))
@@ -65,6 +66,7 @@ class Views(unittest.TestCase):
         world, body = dropped()
         looks = {"positions": lambda: body.positions, "height": lambda: body.positions[:, 2],
                  "points": lambda: body.points, "stress": lambda: body.stress[0],
+                 "point stress": lambda: body.point_stress[0],
                  "contacts": lambda: world.contacts, "fn": lambda: world.contacts["fn"][1:],
                  "row": lambda: world.contacts[0], "measure": lambda: body.measure,
                  "com": lambda: body.measure.com, "stats": lambda: world.stats}

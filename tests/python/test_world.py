@@ -100,6 +100,9 @@ class Building(unittest.TestCase):
             ball(world, model="corotational_fem", params={"rotation": "qr"})
             with self.assertRaisesRegex(deform.ArgumentError, "did you mean 'qr'"):
                 ball(world, model="corotational_fem", params={"rotation": "qrr"})
+            bricks = deform.TetMesh.bricks((0.1, 0.1, 0.1), cells=8)
+            with self.assertRaisesRegex(deform.ArgumentError, "corotational_fem: parameter energy is for"):
+                world.add_body(bricks, params={"energy": "stvk"})  # read as of their default model
 
     def test_rigid_body_falls_on_soft_one(self):
         with deform.World() as world:

@@ -49,7 +49,9 @@ CommandResult run(const std::vector<std::string> &argv) {
 
 CommandResult deform(std::vector<std::string> args) {
   const auto has = [&](const char *word) { return std::find(args.begin(), args.end(), word) != args.end(); };
-  const bool draws = has("--frames") || (has("replay") && has("--out"));
+  const bool pictures = !std::getenv("DEFORM_RENDER_BACKEND");
+  const bool draws =
+      has("--frames") || (has("replay") && (has("--out") || has("--states"))) || (has("cost") && pictures);
   args.insert(args.begin(), DEFORM_COMMAND);
   if (draws) {  // LeakSanitizer's own tracer crashes while a thread of the software driver ends
     const char *const given = std::getenv("ASAN_OPTIONS");

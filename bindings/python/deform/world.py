@@ -296,9 +296,10 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  mass_scaling: float = 0, smooth: float = 0) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
-        model: "msm", "corotational_fem" (default: the first that takes the cells), ...; params: of the
-        model, by key. material: of add_material, or its entries as a dict. position [3] m, rotation [4] (a
-        quaternion x, y, z, w), velocity [3] m/s, spin [3] rad/s. fixed: [n] True for points that are held,
+        model: "msm" (default for first-order tetrahedra), "corotational_fem" (default for other cells), ...;
+        params: of the model, by key. material: of add_material, or its entries as a dict. position [3] m,
+        rotation [4] (a quaternion x, y, z, w), velocity [3] m/s, spin [3] rad/s. fixed: [n] True for points
+        that are held,
         or bits 1 x, 2 y, 4 z of components that are; or [n,3] True for these. surface: a finer one that
         hangs on the cells, a TriMesh or the path of its file. fields: model parameters that differ by cell,
         [m] or [m,width] by key. scale: of the points of mesh and surface, 0.001 where they are in
@@ -330,7 +331,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         keep += [x, cells]
         definition.npoint, definition.ntet = len(x), len(cells)
         definition.points, definition.tets = x.ctypes.data, cells.ctypes.data
-        values = self.context.params("model", model or "msm", params or {})
+        usual = "msm" if definition.cell in (0, _abi.DFM_CELL_TET) else "corotational_fem"
+        values = self.context.params("model", model or usual, params or {})
         definition.name, definition.model = encoded(name), encoded(model)
         definition.model_params = values.struct
         definition.material = self._material(material)

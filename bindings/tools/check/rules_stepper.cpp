@@ -153,7 +153,7 @@ std::string cost_grows_with_cells(const Subject &subject) {
   // 27 times as many cells: what grows with their square costs 27 times as much for each
   if (!(many <= 6 * few))
     broken(
-        "a cell costs %.3g us in a body and %.3g us in one of 27 times as many cells, so the cost grows "
+        "a cell costs %.3g us in a small body and %.3g us in one of 27 times the cells, so the cost grows "
         "faster "
         "than the body; visit each cell and its points once",
         1e6 * few, 1e6 * many);

@@ -57,8 +57,9 @@ void write_applied(const Subject &subject, const Study &study, const std::string
     JsonValue name = *at_pointer(scene, pointer);
     if (fs::path(name.text).is_absolute()) continue;
     // canonical, since .. behind a symbolic link leads elsewhere
-    const fs::path file = fs::weakly_canonical(fs::absolute(fs::path(subject.folder) / name.text));
-    name.text = file.lexically_relative(folder).generic_string();
+    const fs::path file = fs::absolute(fs::path(subject.folder) / name.text);
+    const fs::path from = fs::weakly_canonical(file.parent_path());  // a linked file keeps its own name
+    name.text = (from / file.filename()).lexically_relative(folder).generic_string();
     set_pointer(scene, pointer, name);
   }
   write_whole(path, json_lines(scene));

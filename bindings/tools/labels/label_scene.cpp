@@ -79,9 +79,13 @@ class Maker {
     const std::string own = o_.out + "/labels.json";  // the user changes it
     std::error_code absent;
     writes_table_ = !std::filesystem::exists(cli::path_of(own), absent);
-    if (o_.table.empty() && !writes_table_ &&
-        cli::read_file(own, 64u << 20, "a table of labels") != table_text(table_, volume_) + "\n")
-      refuse(own, "a table with other entries is there already; give it by --table, or remove it");
+    if (!writes_table_ &&
+        cli::read_file(own, 64u << 20, "a table of labels") != table_text(table_, volume_) + "\n") {
+      if (o_.table.empty())
+        refuse(own, "a table with other entries is there already; give it by --table, or remove it");
+      if (!std::filesystem::equivalent(cli::path_of(own), cli::path_of(o_.table), absent))
+        warn(own + " differs and is left as it is; the scene is of " + o_.table);
+    }
     std::vector<bool> kept(volume_.value.size(), false);
     for (const Entry &e : table_.entries) kept[e.label] = true;
     count_.assign(volume_.value.size(), 0);

@@ -223,9 +223,9 @@ DFM_API dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, dou
  * @return DFM_OK; DFM_E_UNSUPPORTED the model does not provide it; DFM_E_ARG capacity too small;
  * DFM_E_HANDLE. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out);
-/** The same at the phyxels, [npoint,6]: there, of the quadratic functions that fit the stresses of the cells
- * around each. Where materials meet it is between theirs. @param capacity of out in phyxels
- * @return as dfm_body_stress(). Threads: Any thread. Not during step. Since 0.1. */
+/** The same at the phyxels, [npoint,6]: of quadratics in the rest positions that fit the cells around
+ * each; smoothed across materials. Takes memory: for pictures, not steps. @param capacity of out in phyxels
+ * @return as dfm_body_stress(); DFM_E_NOMEM. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_body_point_stress(dfm_body body, uint32_t capacity, double *out);
 #ifdef __cplusplus
 }

@@ -607,7 +607,7 @@ class Builder {
       b.def.material = material(b.material);
       const uint32_t number = uint32_t(bodies.size());
       if (const uint64_t id = world().next_id + number; b.id && b.id != id)
-        fail(DFM_E_ARG, "%s: %s/id: expected %llu, since ids of rigid bodies follow that of the first",
+        fail(DFM_E_ARG, "%s: %s/id: expected %llu, since ids of rigid bodies follow the first; omit it",
              def_.file.c_str(), b.pointer.c_str(), static_cast<unsigned long long>(id));
       bool tied = b.def.fixed != 0;
       for (const RigidBody &other : rigid.bodies)
