@@ -69,8 +69,11 @@ endif()
 # The compiler says what it compiles for, as to the code that calls them: -m32 changes no name of a processor.
 include(CheckCXXSourceCompiles)
 check_cxx_source_compiles("#ifndef __x86_64__\n#error\n#endif\nint main() { return 0; }" DEFORM_X86_64)
-check_cxx_source_compiles("#include <version>\n#if !defined(_LIBCPP_VERSION) || _LIBCPP_VERSION >= 200000\n#error\n#endif\nint main() { return 0; }"
-  DEFORM_OLD_LIBCXX)
+check_cxx_source_compiles("#include <version>
+#if !defined(_LIBCPP_VERSION) || _LIBCPP_VERSION >= 200000
+#error
+#endif
+int main() { return 0; }" DEFORM_OLD_LIBCXX)
 if(DEFORM_OLD_LIBCXX)
   add_compile_options("$<$<COMPILE_LANGUAGE:CXX>:SHELL:-include \"${CMAKE_CURRENT_LIST_DIR}/libcxx.h\">")
 endif()

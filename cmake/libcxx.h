@@ -1,5 +1,6 @@
-// What C++20 has and LLVM's standard library lacks, as far as it is used here: versions below 20 (macOS, Debian's
-// packages), and 13, that of Debian 12's emscripten. Every file of a build with such a version includes it first.
+// What C++20 has and LLVM's standard library lacks, as far as it is used here: versions below 20 (macOS,
+// Debian's packages), and 13, that of Debian 12's emscripten. Every file of a build with such a version
+// includes it first.
 #pragma once
 #ifdef __cplusplus
 #include <algorithm>

@@ -42,8 +42,8 @@ inline double largest_of(const Buffer<double> &field, double value, uint32_t nce
   return field.empty() ? value : *std::max_element(field.data(), field.data() + ncell);
 }
 
-// Whether cells have a plastic state. What a cut leaves of a body has that of the whole, so it does not follow
-// from whether any of these cells yields.
+// Whether cells have a plastic state. What a cut leaves of a body has that of the whole, so it does not
+// follow from whether any of these cells yields.
 inline bool may_yield(const Buffer<double> &field, double value) { return !field.empty() || value > 0; }
 
 // Sets `params` to `values`, calls make() for the memory that they need, and restores them if it throws.
