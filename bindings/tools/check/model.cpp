@@ -156,7 +156,7 @@ Solid with_cells(const Solid &of, uint32_t cell) {
     mesh.cell = DFM_CELL_HEX8;
     mesh.tets = dfm::tets_of(*mesh.memory, dfm::cell_kind(DFM_CELL_HEX8), mesh.cells);
   }
-  mesh.tet_group.resize(mesh.ntet());
+  mesh.tet_group.assign(mesh.ntet(), dfm::kNoGroup);
   mesh.file_point.resize(mesh.npoint());
   if (cell != DFM_CELL_HEX8) mesh = dfm::second_order(mesh);
   const size_t nodes = dfm::cell_kind(cell).nodes, given = dfm::cell_kind(mesh.cell).nodes;

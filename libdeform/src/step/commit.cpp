@@ -92,7 +92,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     if (reads_points(w, b)) b.dynamics->see_points();
     ++b.x_version;
     b.sleep_state.h = 0;
-    book_change_work(w, b, moved.h);
+    book_change_work(w, b, now.h);
     if (!w.plan.touches()) return true;
     Vec3 sum;
     for (uint32_t s = 0; s < b.surface.nsurfel; ++s) sum += load3(&b.surfel_impulse[3 * size_t(s)]);
