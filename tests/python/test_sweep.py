@@ -427,7 +427,7 @@ class Outputs(InAFolder):
         for ignored in (["--only", "3", "--parquet"], ["--export", "slurm", "--retry"],
                         ["--export", "slurm", "--workers", "2"]):
             said = self.command("sweep", study, "--out", self.out, *ignored, code=2)
-            self.assertIn("omit one of them", said.stderr)
+            self.assertIn("omit one of the two", said.stderr)
         wide = self.folder / "my study.json"
         shutil.copy(study, wide)
         self.command("sweep", wide, "--out", self.folder / "wide", "--export", "slurm")

@@ -296,17 +296,16 @@ class World(Queries, Reports, Tools, OfThisProcess):
                  mass_scaling: float = 0, smooth: float = 0) -> Body:
         """A body of a mesh (a TetMesh or the path of its file), or of points [n,3] m and tets [m,4].
 
-        model: "msm" (default for first-order tetrahedra), "corotational_fem" (default for other cells), ...;
-        params: of the model, by key. material: of add_material, or its entries as a dict. position [3] m,
-        rotation [4] (a quaternion x, y, z, w), velocity [3] m/s, spin [3] rad/s. fixed: [n] True for points
-        that are held,
-        or bits 1 x, 2 y, 4 z of components that are; or [n,3] True for these. surface: a finer one that
-        hangs on the cells, a TriMesh or the path of its file. fields: model parameters that differ by cell,
-        [m] or [m,width] by key. scale: of the points of mesh and surface, 0.001 where they are in
-        millimeters. on: an obstacle, onto which the body is moved from its position along gravity.
-        mass_scaling: share of its mass, at most 0.1, that may be moved to the points that bound explicit
-        sub-steps. smooth: degrees; across edges with smaller
-        angles the body touches planes, spheres, boxes and capsules as a curved surface.
+        model: "msm" (default for first-order tetrahedra), "corotational_fem" (default for other cells),
+        ...; params: of the model, by key. material: of add_material, or its entries as a dict. position [3]
+        m, rotation [4] (a quaternion x, y, z, w), velocity [3] m/s, spin [3] rad/s. fixed: [n] True for
+        points that are held, or bits 1 x, 2 y, 4 z of components that are; or [n,3] True for these.
+        surface: a finer one that hangs on the cells, a TriMesh or the path of its file. fields: model
+        parameters that differ by cell, [m] or [m,width] by key. scale: of the points of mesh and surface,
+        0.001 where they are in millimeters. on: an obstacle, onto which the body is moved from its position
+        along gravity. mass_scaling: share of its mass, at most 0.1, that may be moved to the points that
+        bound explicit sub-steps. smooth: degrees; across edges with smaller angles the body touches planes,
+        spheres, boxes and capsules as a curved surface.
         """
         if isinstance(mesh, (str, bytes)) or hasattr(mesh, "__fspath__"):
             mesh = TetMesh.read(mesh)
@@ -610,7 +609,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
     def stable_step(self) -> float:
         """s, a step that is not cut into sub-steps; inf if nothing bounds it."""
         out = ctypes.c_double()
-        self.call(lib.dfm_world_stable_step, self.handle, ctypes.byref(out), None, None)
+        self.free()
+        check(quick.dfm_world_stable_step(self.handle, ctypes.byref(out), None, None))
         if self._raised is not None:
             raise self._take_raised()  # type: ignore[misc]
         return out.value
