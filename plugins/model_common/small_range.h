@@ -34,9 +34,8 @@ class SmallRange {
     ++warnings_;
     say(host, 2, who,
         "cell %u is turned by %.0f degrees and strained by %.0f %% against the rest shape: beyond %.0f "
-        "degrees "
-        "or %.0f %% this model treats rotation as strain, so the body swells and its forces are wrong; "
-        "corotational_fem has no such limit",
+        "degrees or %.0f %% this model treats rotation as strain, so the body swells and its forces are "
+        "wrong; corotational_fem has no such limit",
         most.cell, degrees_of(most.turn), 100 * most.strain, degrees_of(kLargestTurn), 100 * kLargestStrain);
   }
 

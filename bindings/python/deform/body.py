@@ -265,29 +265,26 @@ class Body(_Part):
         return self._look("measure", lambda: Report(quick.dfm_body_get_measure, self.handle,
                                                     _abi.dfm_body_measure))
 
+    def _filled(self, name: str, function: Any, rows: str, width: int) -> np.ndarray:
+        def fill(handle: int, capacity: int, address: int, count: Any) -> int:
+            count._obj.value = getattr(self, rows)  # which a cut changes
+            return function(handle, capacity, address)
+        return self._look(name, lambda: Column(fill, self.handle, getattr(self, rows), width))
+
     @property
     def energy_density(self) -> np.ndarray:
         """Of each cell, [ntet] J/m3; a view."""
-        def fill(handle: int, rows: int, address: int, count: Any) -> int:
-            count._obj.value = self.ntet
-            return quick.dfm_body_energy_density(handle, rows, address)
-        return self._look("energy_density", lambda: Column(fill, self.handle, self.ntet, 0))
+        return self._filled("energy_density", quick.dfm_body_energy_density, "ntet", 0)
 
     @property
     def stress(self) -> np.ndarray:
         """Cauchy stress of each cell, [ntet,6] Pa: xx yy zz xy yz zx, world axes, tension > 0; a view."""
-        def fill(handle: int, rows: int, address: int, count: Any) -> int:
-            count._obj.value = self.ntet
-            return quick.dfm_body_stress(handle, rows, address)
-        return self._look("stress", lambda: Column(fill, self.handle, self.ntet, 6))
+        return self._filled("stress", quick.dfm_body_stress, "ntet", 6)
 
     @property
     def point_stress(self) -> np.ndarray:
         """The same at the phyxels, [npoint,6] Pa, fitted to the cells around each; a view."""
-        def fill(handle: int, rows: int, address: int, count: Any) -> int:
-            count._obj.value = self.npoint
-            return quick.dfm_body_point_stress(handle, rows, address)
-        return self._look("point_stress", lambda: Column(fill, self.handle, self.npoint, 6))
+        return self._filled("point_stress", quick.dfm_body_point_stress, "npoint", 6)
 
     def hold(self, points: Any, axes: str = "xyz") -> None:
         """Holds components ("xyz", "z", "": none, which releases) of points, given by their numbers."""

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/lists.h"
 #include "core/memory.h"
 #include "math/extent.h"
 #include "mesh/cells.h"
@@ -91,10 +92,11 @@ void point_stress(Body &b, double *out) {
   Array<Moments> moments(ncell, memory);
   for (size_t c = 0; c < ncell; ++c)
     moments[c] = moments_of(b.p.rest.data(), &b.tets[4 * kind.tets * c], kind.tets);
-  Array<uint32_t> row(size_t{b.p.n} + 2, memory), around(nodes.size(), memory);
-  for (const uint32_t i : nodes) ++row[i + 2];
-  for (size_t i = 2; i < row.size(); ++i) row[i] += row[i - 1];
-  for (size_t n = 0; n < nodes.size(); ++n) around[row[nodes[n] + 1]++] = uint32_t(n / kind.nodes);
+  Array<uint32_t> row(memory), around(memory);
+  const auto each = [&](const auto &use) {
+    for (size_t n = 0; n < nodes.size(); ++n) use(nodes[n], uint32_t(n / kind.nodes));
+  };
+  make_lists(b.p.n, each, row, around);
 
   // three cells along an axis determine a quadratic function; a brick has six tetrahedra
   const size_t rings = kind.nodes == 4 || kind.nodes == 10 ? 2 : 3;
