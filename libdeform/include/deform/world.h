@@ -241,8 +241,8 @@ DFM_API dfm_status dfm_world_untangle(dfm_world world, uint32_t *left);
 
 /** The longest step that needs no sub-steps: (4, 5, 6, 7) 2^k s, at most 0.9 of the proven bound; +INFINITY
  * without a bound. It can be passed to dfm_world_step each time: it follows the bound down at once and up
- * with delay, so that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has the bound
- * itself. IMPLICIT_EULER and TR_BDF2 have no bound; for them it follows the error of the last step, up to
+ * with delay, so that steps change rarely (doc/concepts/step.md). dfm_world_stats.stable_step has 0.9 of the
+ * bound. IMPLICIT_EULER and TR_BDF2 have no bound; for them it follows the error of the last step, up to
  * 1/30 s (doc/concepts/implicit.md).
  * @param dt          out, s
  * @param body,point  out, the point that determines the bound; may be NULL
