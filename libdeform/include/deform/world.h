@@ -135,7 +135,7 @@ enum {
 };
 /** Advances the world by dt. A step longer than the stable one is divided into equal sub-steps, each with a
  * contact solve; their number is 1, 2, 3 or (4, 5, 6, 7) 2^k.
- * @param dt       s, at least 1e-9 times (1 + distance of a body from the origin in meters): below that the
+ * @param dt       s, at least 1e-9, and 1e-9 for each meter of the largest coordinate: below that the
  *                 rounding of positions dominates
  * @param trouble  out, DFM_TROUBLE_* bits; may be NULL
  * @return DFM_OK, also where the budget (max_time, max_work) was used up before dt: at least one sub-step was
