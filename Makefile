@@ -68,7 +68,7 @@ build/bench/build.ninja: | setup-bench
 build/fuzz/build.ninja build/asan/build.ninja: | setup-fuzz
 build/wasm/build.ninja: | setup-wasm
 build/arm64/build.ninja build/windows/build.ninja: | setup-ports
-build/%/build.ninja: | setup
+build/%/build.ninja: CMakePresets.json | setup
 	cmake --preset $*
 
 # With a display the window is built too, for `deform view`.
@@ -79,7 +79,7 @@ demo: setup build/release/build.ninja
 
 view: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer
-	@build/release/bin/deform view $(SCENE)
+	@build/release/bin/deform view "$(SCENE)"
 
 tools: setup build/release/build.ninja
 	$(BUILD) release --target deform_tools

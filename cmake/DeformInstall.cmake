@@ -72,7 +72,7 @@ if(PROJECT_IS_TOP_LEVEL AND DEFORM_SHARED AND NOT CMAKE_CROSSCOMPILING)
   install(CODE "execute_process(COMMAND \"${DEFORM_PYTHON}\" -B
       \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\"
       \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
-      ${PROJECT_VERSION} \"${files}\")" COMPONENT library)
+      ${PROJECT_VERSION} \"${files}\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT library)
 endif()
 # The pages, in the places that they have in the source tree, so that links between them hold; and what they
 # link to outside of their folder, which abi.installed_tree checks.
@@ -138,9 +138,16 @@ set(deform_adapter_pc_private "")
 if(NOT DEFORM_SHARED)
   set(deform_adapter_pc_private "-lstdc++ -lm")
 endif()
+set(engine_ode "the Open Dynamics Engine, double precision")
+set(engine_bullet "Bullet, single precision")
+set(engine_bullet64 "Bullet, double precision")
+set(requires_ode "ode >= 0.16 ode < 0.17")
+set(requires_bullet "bullet >= 3.24 bullet < 4")
+set(requires_bullet64 "bullet-float64 >= 3.24 bullet-float64 < 4")
 foreach(adapter IN LISTS deform_adapters)
-  string(REGEX REPLACE "64$" "" folder ${adapter})
-  configure_file(${PROJECT_SOURCE_DIR}/cmake/deform_${adapter}.pc.in
+  set(deform_pc_engine ${engine_${adapter}})
+  set(deform_pc_requires ${requires_${adapter}})
+  configure_file(${PROJECT_SOURCE_DIR}/cmake/deform_adapter.pc.in
     ${PROJECT_BINARY_DIR}/cmake/deform_${adapter}.pc @ONLY)
   install(FILES ${PROJECT_BINARY_DIR}/cmake/deform_${adapter}.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig
     COMPONENT ${adapter})

@@ -14,9 +14,11 @@ if [ ! -x $tool/clang_format/data/bin/clang-format ]; then
     exit 77
   fi
 fi
-files() { git -c safe.directory='*' ls-files -z '*.c' '*.h' '*.cpp' '*.hpp'; }
+files=$(mktemp)
+trap 'rm -f "$files"' EXIT
+git -c safe.directory='*' ls-files -z '*.c' '*.h' '*.cpp' '*.hpp' >"$files"
 case ${1:-write} in
-  write) files | xargs -0 $tool/clang_format/data/bin/clang-format -i ;;
-  check) files | xargs -0 $tool/clang_format/data/bin/clang-format --dry-run --Werror ;;
+  write) xargs -0r $tool/clang_format/data/bin/clang-format -i <"$files" ;;
+  check) xargs -0r $tool/clang_format/data/bin/clang-format --dry-run --Werror <"$files" ;;
   *) echo "usage: cmake/format.sh [write|check]"; exit 2 ;;
 esac

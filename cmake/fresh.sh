@@ -9,7 +9,7 @@ if [ ! -w . ] && [ ! -w build ]; then
   echo "deform: $here is not writable for $(id -un); copy it or build elsewhere: cmake -S $here -B FOLDER" >&2
   exit 1
 fi
-for name in release bench fuzz asan tsan wasm arm64 windows; do
+for name in release dev bench fuzz asan tsan clang static static_clang wasm arm64 windows wheel; do
   cache=build/$name/CMakeCache.txt
   [ -f "$cache" ] || continue
   source=$(sed -n 's/^CMAKE_HOME_DIRECTORY:INTERNAL=//p' "$cache")

@@ -371,6 +371,8 @@ def main():
     if given.obj:
         os.makedirs(given.obj, exist_ok=True)
     rtp = given.url.startswith("rtp://")
+    if rtp and given.send:
+        arguments.error("--send: RTP brings pictures alone; give the URL that `deform serve` has printed")
     connection, scene, seen = (RtpConnection if rtp else Connection)(given.url, 60), Scene(), 0
     for request in given.send:
         connection.send(json.loads(request))

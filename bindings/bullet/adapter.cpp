@@ -131,20 +131,17 @@ Adapter::Object *Adapter::known(const btCollisionObject *object, int place) cons
   return at == by_id_.end() ? nullptr : at->second;
 }
 
-// Returns an error before anything has changed.
-dfm_status Adapter::check() const {
-  const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
+// Of an object whose shapes are not known.
+dfm_status Adapter::check(const btCollisionObject *object) const {
   std::vector<Part> parts;
-  for (int i = 0; i < all.size(); ++i) {
-    const btCollisionShape *unknown = nullptr;
-    if (known(all[i], i) || !traits_of(all[i]).takes_part) continue;
-    if (!parts_of(all[i]->getCollisionShape(), {}, parts, unknown))
-      return failed(DFM_E_UNSUPPORTED,
-                    "collision object %p has a %s, which soft bodies cannot touch; call "
-                    "dfm_bullet_set_object with ignore = 1, or replace it by a triangle mesh",
-                    address(all[i]), unknown->getName());
-  }
-  return DFM_OK;
+  const btCollisionShape *unknown = nullptr;
+  if (!traits_of(object).takes_part || parts_of(object->getCollisionShape(), {}, parts, unknown))
+    return DFM_OK;
+  return failed(
+      DFM_E_UNSUPPORTED,
+      "collision object %p has a %s, which soft bodies cannot touch; call dfm_bullet_set_object with "
+      "ignore = 1, or replace it by a triangle mesh",
+      address(object), unknown->getName());
 }
 
 // Compares bytes: Traits has no padding.
@@ -162,14 +159,14 @@ bool Adapter::has_parts(const Object &o, const btCollisionShape *shape) {
 // Reads only objects that the world lists: any other one may have been deleted by its owner.
 dfm_status Adapter::look(double h) {
   const Timer timer(sync_seconds_);
-  TRY(check());
   const btCollisionObjectArray &all = engine_.world->getCollisionObjectArray();
   for (auto &o : objects_) o->found = false;
   for (int i = 0; i < all.size(); ++i) {
     Object *const found = known(all[i], i);
-    if (!found) continue;
-    Object &o = *found;
-    o.found = !o.stale && same(o.traits, traits_of(all[i])) && has_parts(o, all[i]->getCollisionShape());
+    if (found)
+      found->found = !found->stale && same(found->traits, traits_of(all[i])) &&
+                     has_parts(*found, all[i]->getCollisionShape());
+    if (!found || !found->found) TRY(check(all[i]));  // before anything has changed
   }
   TRY(drop());
   if (objects_.size() != static_cast<size_t>(all.size()))
@@ -204,6 +201,7 @@ dfm_status Adapter::bind_body(Object &o) {
   if (const btMultiBodyLinkCollider *const link = btMultiBodyLinkCollider::upcast(o.id)) {
     auto made = std::make_unique<LinkMember>();
     made->body = link->m_multiBody;
+    made->collider = link;
     made->link = link->m_link;
     made->read();
     o.body->member = std::move(made);
@@ -287,22 +285,13 @@ dfm_status Adapter::follow(Object &o, double h) {
 dfm_status Adapter::tick(double h) {
   trouble_ = 0;
   TRY(look(h));
-  dfm_status status = DFM_OK;
-  {
-    engine_.gather();
-    engine_.callers_step = h;
-    const Stepping stepping(engine_, world_);
-    status = dfm_world_step(world_, h, &trouble_);
-  }
   ++ticks_;
-  dfm_status states_status = states_.poll(world_);
-  for (auto &o : objects_) {
-    const dfm_status of_body = o->body ? o->body->after(status, states_) : dfm_status{DFM_OK};
-    if (states_status == DFM_OK) states_status = of_body;
-  }
-  bool restored = false;
-  TRY(clock_.poll(world_, restored));
-  return status != DFM_OK ? status : states_status;
+  engine_.gather();
+  engine_.callers_step = h;
+  return step_both(engine_, world_, h, &trouble_, states_, clock_, [&](auto &&update) {
+    for (auto &o : objects_)
+      if (o->body) update(*o->body);
+  });
 }
 
 dfm_status Adapter::step(double dt, int max_sub_steps, double fixed, int *ticks) {

@@ -105,7 +105,7 @@ class Adapter {
   static void after_tick(btDynamicsWorld *world, btScalar h);
   dfm_status tick(double h);
   dfm_status look(double h);
-  dfm_status check() const;
+  dfm_status check(const btCollisionObject *object) const;
   static bool same(const Traits &a, const Traits &b);
   bool has_parts(const Object &o, const btCollisionShape *shape);
   Traits traits_of(const btCollisionObject *object) const;

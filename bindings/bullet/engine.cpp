@@ -143,8 +143,6 @@ std::array<double, 2> BulletMember::idle_limits() const {
 dfm_rigid_state LinkMember::state() const {
   std::vector<btVector3> w(static_cast<size_t>(body->getNumLinks()) + 1), v(w.size());
   body->compTreeLinkVelocities(w.data(), v.data());  // in the links' own frames, the base first
-  const btMultiBodyLinkCollider *const collider =
-      link < 0 ? body->getBaseCollider() : body->getLinkCollider(link);
   const auto at = static_cast<size_t>(link + 1);
   return state_of(from_bullet(collider->getWorldTransform()), from_bullet(body->localDirToWorld(link, v[at])),
                   from_bullet(body->localDirToWorld(link, w[at])));

@@ -62,6 +62,7 @@ struct BulletMember : AnyMember {
 struct LinkMember : AnyMember {
   LinkMember() : AnyMember(true) {}
   btMultiBody *body = nullptr;
+  const btMultiBodyLinkCollider *collider = nullptr;
   int link = -1;
 
   dfm_rigid_state state() const override;

@@ -18,10 +18,12 @@ constexpr double kFriction = 0.70710678118654752440;
 
 class BulletWorld : public OwnWorld {
  public:
-  BulletWorld(const dfm_rigid_set_def &set, uint32_t *group);
+  explicit BulletWorld(const dfm_rigid_set_def &set);
   ~BulletWorld() override;
   BulletWorld(const BulletWorld &) = delete;
   BulletWorld &operator=(const BulletWorld &) = delete;
+  // apart from the constructor, so that the destructor empties Bullet's world when the set is refused
+  void make(const dfm_rigid_set_def &set, uint32_t *group);
 
  protected:
   Member *make_body(const dfm_rigid_def &def, uint32_t number) override;
@@ -86,7 +88,7 @@ uint32_t touching(const dfm_rigid_set_def &set, uint32_t fixed) {
   return n;
 }
 
-BulletWorld::BulletWorld(const dfm_rigid_set_def &set, uint32_t *group)
+BulletWorld::BulletWorld(const dfm_rigid_set_def &set)
     : OwnWorld(bullet_kind().host, engine_),
       dispatcher_(&configuration_),
       broadphase_(static_cast<int>(set.nbody)),
@@ -99,6 +101,9 @@ BulletWorld::BulletWorld(const dfm_rigid_set_def &set, uint32_t *group)
   engine_.world = &world_;
   engine_.falls = true;
   engine_.collided = [this] { contacts_.collided(world_); };
+}
+
+void BulletWorld::make(const dfm_rigid_set_def &set, uint32_t *group) {
   build(set, group);
   engine_.gather();
   engine_.begin(0);
@@ -108,7 +113,8 @@ BulletWorld::~BulletWorld() {
   engine_.end();
   for (const Tie &t : ties_)
     if (t.constraint) world_.removeConstraint(t.constraint.get());
-  for (const Body &b : bodies_) world_.removeRigidBody(b.body.get());
+  for (const Body &b : bodies_)
+    if (b.body) world_.removeRigidBody(b.body.get());
 }
 
 Member *BulletWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
@@ -187,9 +193,10 @@ void BulletWorld::drive(size_t number, double velocity, double max, double h) {
 }  // namespace
 
 dfm_status create_own_world(const dfm_rigid_set_def &set, void **self, uint32_t *group, uint32_t *nextra) {
-  auto *const own = new BulletWorld(set, group);
-  *self = static_cast<Host *>(own);
+  auto own = std::make_unique<BulletWorld>(set);
+  own->make(set, group);
   *nextra = own->extra();
+  *self = static_cast<Host *>(own.release());
   return DFM_OK;
 }
 

@@ -138,7 +138,9 @@ bool Part::operator==(const Part &o) const {
 }
 
 bool is_still(const btCollisionShape *shape, const std::vector<Part> &parts) {
-  if (parts.size() != 1 || parts[0].shape != shape || parts[0].type != shape->getShapeType()) return false;
+  if (parts.size() != 1 || parts[0].shape != shape || parts[0].type != shape->getShapeType() ||
+      !same(parts[0].local, {}))
+    return false;
   const double *const size = parts[0].size;
   switch (parts[0].type) {  // sizes include the scaling
     case BOX_SHAPE_PROXYTYPE: {

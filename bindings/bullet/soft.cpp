@@ -69,8 +69,20 @@ struct Filled {
 dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, const dfm_body_def &like,
                 uint32_t cells, dfm_body *out) {
   Arrays a = arrays_of(body);
-  dfm_body_def def = dfm_body_def_default();
-  std::memcpy(static_cast<void *>(&def), &like, std::min<size_t>(sizeof def, like.size));
+  dfm_body_def given = dfm_body_def_default(), def = given;
+  std::memcpy(static_cast<void *>(&given), &like, std::min<size_t>(sizeof given, like.size));
+  def.flags = given.flags;
+  def.name = given.name;
+  def.material = given.material;
+  def.model = given.model;
+  def.model_params = given.model_params;
+  def.category = given.category;
+  def.collides_with = given.collides_with;
+  def.user = given.user;
+  def.integrator = given.integrator;
+  def.cookie = given.cookie;
+  def.mass_scaling = given.mass_scaling;
+  def.smooth = given.smooth;
   store(def.velocity, a.velocity);
   Filled filled;
   dfm_surface_def skin{};

@@ -164,12 +164,6 @@ void Pull::move(const Vec &to) {
   simulation_.act(line.add("do", "\"move\"").add("to", text_of(to_ + offset_)));
 }
 
-void Pull::release() {
-  if (!holds()) return;
-  cli::JsonObject line;
-  simulation_.act(line.add("do", "\"release\""));
-}
-
 Vec Pull::place() const {
   if (rigid_) {
     dfm_rigid_state state = {};

@@ -20,7 +20,7 @@ class Pull {
   // The tool that the ray meets first; -1: it meets something else first, or nothing.
   int tool_at(const Grip &grip, const render::Vec &origin, const render::Vec &direction) const;
   void move(const render::Vec &to);  // m, where the mouse is
-  void release();
+  void release() { simulation_.release(); }
   bool holds() const { return simulation_.hand().pulls(); }
   render::Vec place() const;                     // m, of the picked place of the surface, now
   const render::Vec &to() const { return to_; }  // m

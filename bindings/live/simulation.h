@@ -22,6 +22,7 @@ class Simulation {
   // What by_hand.h lists; recorded where a recording runs. Throws cli::Failure.
   void act(const cli::JsonObject &line);
   const cli::ByHand &hand() const { return hand_; }
+  void release();  // what the hand pulls
   void start_recording(const cli::RunOptions &options);
   // How many states it has.
   uint32_t stop_recording();
@@ -36,7 +37,6 @@ class Simulation {
 
  private:
   void was_set();
-  void release();
   double interval() const;  // s, between recorded states
 
   const cli::SceneFile &scene_;

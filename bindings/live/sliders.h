@@ -12,7 +12,7 @@ struct Slider {
   std::string name;   // as scripts say it: "mu:upper:floor"
   std::string label;  // as the panel says it
   const char *format = "%.3g";
-  double low = 0, high = 1, value = 0, first = 0;
+  double low = 0, high = 1, value = 0, first = 0, saved = 0;
   bool logarithmic = false;
   std::function<void(double)> apply;  // throws cli::Failure where the library refuses
 };

@@ -231,23 +231,12 @@ std::vector<dBodyID> Adapter::hidden_bodies() const {
 dfm_status Adapter::step(double dt) {
   trouble = 0;
   TRY(sync());
-  dfm_status status = DFM_OK;
-  {
-    engine_.gather(hidden_bodies());
-    engine_.callers_step = dt;
-    const Stepping stepping(engine_, world_);
-    status = dfm_world_step(world_, dt, &trouble);
-  }
   ++steps_;
-  // The status of the step comes first, then those of the bodies; all bodies are updated after an error.
-  dfm_status states_status = states_.poll(world_);
-  for (auto &b : bodies_) {
-    const dfm_status of_body = b->after(status, states_);
-    if (states_status == DFM_OK) states_status = of_body;
-  }
-  bool restored = false;
-  TRY(clock_.poll(world_, restored));
-  return status != DFM_OK ? status : states_status;
+  engine_.gather(hidden_bodies());
+  engine_.callers_step = dt;
+  return step_both(engine_, world_, dt, &trouble, states_, clock_, [&](auto &&update) {
+    for (auto &b : bodies_) update(*b);
+  });
 }
 
 dfm_status Adapter::obstacle(dGeomID geom, dfm_obstacle *out) {

@@ -16,6 +16,14 @@
 namespace dfm_ode_detail {
 namespace {
 
+// What a geom stands for. ODE's own bits let a pair touch if either body's say so; here both must (body.h).
+struct Shape {
+  uint32_t number, category, collides_with;
+  bool may_touch(const Shape &o) const { return category & o.collides_with && o.category & collides_with; }
+};
+const Shape &shape_of(dGeomID geom) { return *static_cast<Shape *>(dGeomGetData(geom)); }
+uint32_t number_of(dGeomID geom) { return shape_of(geom).number; }
+
 class OdeWorld : public OwnWorld {
  public:
   OdeWorld() : OwnWorld("ode", engine_) {}
@@ -46,7 +54,7 @@ class OdeWorld : public OwnWorld {
   OdeEngine engine_;
   dSpaceID space_ = nullptr;
   std::vector<OdeMember> members_;  // by number in the set; body null: fixed
-  std::vector<uint32_t> numbers_;   // the data of geoms
+  std::vector<Shape> shapes_;       // the data of geoms
   std::vector<Tie> ties_;           // ODE keeps the address of each feedback
   RigidFriction near_;
   // In the order in which ODE finds them, which depends on where the bodies have been; contact joints are
@@ -60,8 +68,6 @@ class OdeWorld : public OwnWorld {
   void collide_in_order();
 };
 
-uint32_t number_of(dGeomID geom) { return *static_cast<uint32_t *>(dGeomGetData(geom)); }
-
 Member *OdeWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   dGeomID geom = nullptr;
   const double *const a = def.half_size;
@@ -72,11 +78,8 @@ Member *OdeWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   dQuaternion q;
   to_ode(unit({def.pose.rotation[0], def.pose.rotation[1], def.pose.rotation[2], def.pose.rotation[3]}), q);
   const double *const x = def.pose.position;
-  if (geom) {
-    dGeomSetData(geom, &numbers_[number]);
-    dGeomSetCategoryBits(geom, def.category);
-    dGeomSetCollideBits(geom, def.collides_with);
-  }
+  shapes_[number] = {number, def.category, def.collides_with};
+  if (geom) dGeomSetData(geom, &shapes_[number]);
   if (def.fixed) {
     if (geom) {
       dGeomSetPosition(geom, x[0], x[1], x[2]);
@@ -160,14 +163,14 @@ void OdeWorld::make_world(const dfm_rigid_set_def &set) {
   near_.group = engine_.contacts;
   engine_.friction = &near_;
   engine_.near_callback = [](void *data, dGeomID a, dGeomID b) {
+    if (!shape_of(a).may_touch(shape_of(b))) return;
     if (number_of(a) > number_of(b)) std::swap(a, b);
     static_cast<OdeWorld *>(data)->pairs_.emplace_back(a, b);
   };
   engine_.near_data = this;
   engine_.collided = [this] { collide_in_order(); };
   members_.resize(set.nbody);
-  numbers_.resize(set.nbody);
-  for (uint32_t i = 0; i < set.nbody; ++i) numbers_[i] = i;
+  shapes_.resize(set.nbody);
   ties_.resize(set.njoint);
 }
 

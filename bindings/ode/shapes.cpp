@@ -163,7 +163,7 @@ Triangles convex_triangles(uint32_t npoint, const double *points, uint32_t npoly
   for (uint32_t f = 0; f < npolygon; ++f) {
     const uint32_t n = *polygons++;
     if (n < 3) wrong = "polygon " + std::to_string(f) + " has " + std::to_string(n) + " corners";
-    for (uint32_t k = 0; k < n; ++k)
+    for (uint32_t k = 0; k < n && wrong.empty(); ++k)
       if (polygons[k] >= npoint)
         wrong = "polygon " + std::to_string(f) + " names point " + std::to_string(polygons[k]) + " of " +
                 std::to_string(npoint);

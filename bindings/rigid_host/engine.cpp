@@ -125,10 +125,11 @@ void Engine::end(double time) {
 }
 
 void Engine::open(const dfm_rigid_step &step) {
-  if (open_ && step.t == t_) {  // repeated from the same states
-    if (stepped_) restore(false);
-  } else {
+  const bool repeated = open_ && step.t == t_, as_long = step.h == h_;  // from the same states
+  if (repeated && stepped_) restore(!as_long);
+  if (!repeated || !as_long) {
     Timer timer(engine_seconds);
+    stepped_ &= !repeated;
     prepare(step);
   }
   open_ = true;

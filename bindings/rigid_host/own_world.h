@@ -40,7 +40,7 @@ class OwnWorld : public Host {
   struct Wrench { Vec force, moment; };
 
   OwnWorld(const char *host, Engine &engine) : host_(host), engine_(engine) {}
-  // From the constructor of what derives: its members and joints, group by number in the set.
+  // Members and joints, group by number in the set; may refuse half way.
   void build(const dfm_rigid_set_def &set, uint32_t *group);
 
   virtual Member *make_body(const dfm_rigid_def &def, uint32_t number) = 0;  // null: fixed

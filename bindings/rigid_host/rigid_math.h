@@ -41,6 +41,7 @@ inline Vec rotate(Quat q, Vec v) {
 inline Quat turn_by(Vec r) {
   int halvings = 1;
   Vec half = 0.5 * r;
+  if (!std::isfinite(r.x + r.y + r.z)) return {NAN, NAN, NAN, NAN};
   for (; dot(half, half) > 0.0625; ++halvings) half = 0.5 * half;
   const double s = dot(half, half);
   const double sine = 1 - s / 6 * (1 - s / 20 * (1 - s / 42 * (1 - s / 72 * (1 - s / 110 * (1 - s / 156)))));

@@ -57,6 +57,26 @@ struct Clock {
   dfm_status poll(dfm_world world, bool &restored);
 };
 
+// A step of the dfm_world and with it of the engine. The status of the step comes first, then those of the
+// bodies; all bodies are updated after an error. each: calls what it is given for every Seated.
+template <class Each>
+dfm_status step_both(Engine &engine, dfm_world world, double h, uint32_t *trouble, States &states,
+                     Clock &clock, Each &&each) {
+  dfm_status status = DFM_OK;
+  {
+    const Stepping stepping(engine, world);
+    status = dfm_world_step(world, h, trouble);
+  }
+  dfm_status of_states = states.poll(world);
+  each([&](Seated &body) {
+    const dfm_status of_body = body.after(status, states);
+    if (of_states == DFM_OK) of_states = of_body;
+  });
+  bool restored = false;
+  TRY(clock.poll(world, restored));
+  return status != DFM_OK ? status : of_states;
+}
+
 // The caller may have destroyed the obstacle that represents a shape: then the shape takes no further part.
 dfm_status unbind(dfm_obstacle &obstacle);
 // A shape without a body that the caller has moved: its surface comes along within the next step.

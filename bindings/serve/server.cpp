@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <new>
 
 #include "cli/messages.h"
 #include "cli/packets.h"
@@ -106,13 +107,23 @@ struct Server::Call {
       default: return 0;
     }
   }
+
+  // -1 drops the viewer: an exception may not pass through libwebsockets.
+  template <lws_callback_function f>
+  static int shielded(lws *wsi, lws_callback_reasons reason, void *user, void *in, size_t n) {
+    try {
+      return f(wsi, reason, user, in, n);
+    } catch (const std::bad_alloc &) {
+      return -1;
+    }
+  }
 };
 
 Server::Server(uint16_t port, std::string token, Pack pack)
     : token_(std::move(token)), pack_(pack), frame_(message_of(nullptr, 0)) {
   static const lws_protocols protocols[] = {
-      {"http", &Call::page, sizeof(Http), 0, 0, nullptr, 0},
-      {"dfm.stream.1", &Call::stream, sizeof(Viewer), kLongestText, 0, nullptr, 0},
+      {"http", &Call::shielded<&Call::page>, sizeof(Http), 0, 0, nullptr, 0},
+      {"dfm.stream.1", &Call::shielded<&Call::stream>, sizeof(Viewer), kLongestText, 0, nullptr, 0},
       {nullptr, nullptr, 0, 0, 0, nullptr, 0}};
   // a viewer that answers no ping is gone
   static const lws_retry_bo_t patience = {nullptr, 0, 0, 20, 40, 0};

@@ -68,11 +68,6 @@ std::string free_name(const std::function<std::string(uint32_t)> &name) {
     if (std::string path = name(n); !std::filesystem::exists(cli::path_of(path), absent)) return path;
 }
 
-std::string text_of(const render::Vec &v) {
-  const double x[3] = {v.x, v.y, v.z};
-  return cli::json_vector(x);
-}
-
 }  // namespace
 
 Stage::Stage(const Options &options, const cli::Globals &globals, const cli::Recording *replay)
@@ -305,6 +300,7 @@ void App::save() {
     });
     stage_->simulation.save(path);
     saved_ = path;
+    for (live::Slider &s : stage_->sliders) s.saved = s.value;
     message_ = "Saved: " + saved_;
   });
 }
@@ -316,6 +312,7 @@ void App::load() {
   }
   attempt([&] {
     stage_->simulation.load(saved_);
+    for (live::Slider &s : stage_->sliders) s.value = s.saved;
     stage_->grip.forget();
     stage_->plots.clear();
     wanted_ = stage_->simulation.time();
@@ -396,9 +393,9 @@ void App::shot(const std::string &name) {
     for (size_t i = 0; i < stage_->grip.count(); ++i) {
       const live::Felt felt = stage_->grip.felt(i);
       cli::JsonObject tool;
-      tools.add(stage_->grip.name(i), tool.add("at", text_of(felt.at))
-                                          .add("force", text_of(felt.force))
-                                          .add("torque", text_of(felt.torque))
+      tools.add(stage_->grip.name(i), tool.add("at", live::text_of(felt.at))
+                                          .add("force", live::text_of(felt.force))
+                                          .add("torque", live::text_of(felt.torque))
                                           .text());
     }
     row.add("shot", cli::quoted(path))

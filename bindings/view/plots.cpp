@@ -58,6 +58,7 @@ void Plots::sample() {
   const double t = simulation_.time();
   if (!plots_[0].times.empty() && t <= plots_[0].times.back()) return;
   const cli::SceneFile &scene = simulation_.scene();
+  scene.renew_list();
   double kinetic = 0, elastic = 0;
   for (const cli::BodyView &body : scene.bodies()) {
     const dfm_body_measure m = cli::body_measure(body);

@@ -28,7 +28,6 @@ struct ScriptLine {
 
 class Script {
  public:
-  Script() = default;
   // Throws cli::Failure: file, line, what was expected.
   explicit Script(const std::string &path);
   // Inputs of the frame that ends at t, and the sliders and shots of this frame.

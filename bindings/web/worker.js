@@ -4,6 +4,8 @@
 const kPicture = 1 / 30;  // s
 const refuse = error => postMessage(JSON.stringify({ refused: String(error) }));
 async function begin({ module, files, scene }) {
+  const early = [];
+  onmessage = message => early.push(message);
   const deform = await makeDeform({
     instantiateWasm(imports, done) {
       WebAssembly.instantiate(module, imports).then(done).catch(refuse);
@@ -16,9 +18,10 @@ async function begin({ module, files, scene }) {
     deform.FS.writeFile(path, bytes);
   }
   const call = (name, ...given) => deform.ccall(name, "number", given.map(x => typeof x), given);
-  onmessage = ({ data }) => data === "join" ? call("deform_join") : call("deform_ask", data);
   const runs = call("deform_open", scene);
+  onmessage = ({ data }) => data === "join" ? call("deform_join") : call("deform_ask", data);
   call("deform_join");
+  early.forEach(onmessage);
   if (!runs) return;
   let next = performance.now();
   const picture = () => {

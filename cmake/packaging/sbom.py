@@ -123,14 +123,16 @@ def main():
                 "creationInfo": {"created": created, "creators": ["Tool: deform-sbom"]}, "packages": rows,
                 "relationships": [{"spdxElementId": a, "relationshipType": kind, "relatedSpdxElement": b}
                                   for a, kind, b in relations]}
-    out.mkdir(parents=True, exist_ok=True)
-    (out / "deform.spdx.json").write_text(json.dumps(document, indent=1) + "\n")
     texts = {}
     for name, _ in sorted(inside | copied):
         if name.startswith(TOOLCHAIN):
             continue
-        text = pathlib.Path(f"/usr/share/doc/{name}/copyright").read_text(errors="replace")
-        texts.setdefault(text, []).append(name)
+        notice = pathlib.Path(f"/usr/share/doc/{name}/copyright")
+        if not notice.exists():
+            sys.exit(f"sbom: {notice}, the license of what is shipped, is missing: reinstall {name} with it")
+        texts.setdefault(notice.read_text(errors="replace"), []).append(name)
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "deform.spdx.json").write_text(json.dumps(document, indent=1) + "\n")
     (out / "third_party.txt").write_text("".join(
         f"==== {', '.join(names)}\n\n{text.rstrip()}\n\n" for text, names in texts.items()))
     print(f"{out}/deform.spdx.json: {len(found)} programs and libraries, {len(packages)} packages")

@@ -103,10 +103,7 @@ int main(void) {
   TRY(dfm_context_create(NULL, &context));
   const dfm_world_def world_def = dfm_world_def_default();
   TRY(dfm_world_create(context, &world_def, &soft));
-  if (make_ball(context, soft, &ball)) {
-    fprintf(stderr, "%s\n", dfm_last_error());
-    return 1;
-  }
+  if (make_ball(context, soft, &ball)) return 1;
   TRY(dfm_body_get_measure(ball, &m));
   gripper g = make_gripper(2 * m.mass * 9.81 / (2 * mu)); /* twice what friction needs */
 

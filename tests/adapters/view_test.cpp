@@ -428,6 +428,19 @@ TEST_F(Viewer, SavedState_IsLoadedWithItsBitsAndByDeformRun) {
   EXPECT_TRUE(std::filesystem::exists(folder_ + "/002.state"));
 }
 
+// The panel says what counts again; with panels, so that they are compared.
+TEST_F(Viewer, LoadedState_TakesTheSlidersBack) {
+  const std::string begin = "0 key t\n0 slider gravity 5\n0.02 key f5\n",
+                    end = "0.06 key f9\n0.1 shot a.png\n";
+  const test::CommandResult kept = view(begin + end);
+  ASSERT_EQ(kept.exit_code, 0) << kept.err;
+  const render::Image before = picture("a.png");
+  std::filesystem::remove(folder_ + "/000.state");
+  const test::CommandResult moved = view(begin + "0.04 slider gravity 15\n" + end);
+  ASSERT_EQ(moved.exit_code, 0) << moved.err;
+  EXPECT_EQ(different(before, picture("a.png")), 0u);
+}
+
 // The clock of the window counts from the start of the scene.
 TEST_F(Viewer, ReplayOfASceneThatBeginsLater_PlaysAtOnce) {
   const std::vector<std::string> later = {"--set", "/time/start=5"};
@@ -477,6 +490,20 @@ TEST_F(Viewer, Stroke_CutsTheBlockAndIsReplayed) {
   const test::CommandResult again = test::deform({"replay", second, "--out", folder_ + "/again"});
   EXPECT_EQ(again.exit_code, 0) << again.err;
   EXPECT_NE(again.out.find("the same bits in all "), std::string::npos) << again.out;
+}
+
+// A stroke makes a body of its own of a part; it is gone where the scene goes back to before.
+TEST_F(Viewer, SceneThatGoesBackToBeforeACut_HasNoPieces) {
+  const std::vector<std::string> parts{"--set", "/bodies/0/separate={}"};
+  const std::string cut = "0 key space\n0 key x\n0.04 drag 160 10 160 230 0.06\n0.12 shot cut.png\n";
+  for (const char *back : {"0.15 key r\n", "0.15 key f9\n"}) {
+    const test::CommandResult done =
+        view("0 shot whole.png\n0 key f5\n" + cut + back + "0.2 shot back.png\n", parts);
+    ASSERT_EQ(done.exit_code, 0) << back << done.err;
+    EXPECT_FALSE(reported(done, "cut.png", "block.1").empty()) << done.out;
+    EXPECT_EQ(height(done, "back.png") > 0, true);
+    EXPECT_EQ(done.out.find("block.1", done.out.find("back.png")), std::string::npos) << done.out;
+  }
 }
 
 TEST_F(Viewer, ImpossibleInput_IsReportedInOneSentence) {

@@ -7,13 +7,14 @@ doors_test.py SOURCE_DIR
 """
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
 
-FRESH, SETUP, LIST = "cmake/fresh.sh", "cmake/setup.sh", "cmake/deps.txt"
+FRESH, SETUP, LIST, FORM = "cmake/fresh.sh", "cmake/setup.sh", "cmake/deps.txt", "cmake/format.sh"
 
 
 class Doors(unittest.TestCase):
@@ -22,7 +23,7 @@ class Doors(unittest.TestCase):
         self.addCleanup(folder.cleanup)
         self.root = pathlib.Path(folder.name) / "tree"
         (self.root / "cmake").mkdir(parents=True)
-        for name in (FRESH, SETUP, LIST):
+        for name in (FRESH, SETUP, LIST, FORM):
             shutil.copy(SOURCE / name, self.root / name)
 
     def configured(self, name, source, generator="Ninja"):
@@ -69,6 +70,22 @@ class Doors(unittest.TestCase):
         build = self.configured("release", self.root.parent / "where it was")
         self.assertIn("build/release was configured by Ninja for", self.fresh())
         self.assertEqual(self.names(build), ["object.o"])
+
+    def test_a_moved_tree_whose_wheel_was_built(self):
+        for name in ("wheel", "clang", "static_clang"):
+            build = self.configured(name, self.root.parent / "where it was")
+            self.assertIn(f"build/{name} was configured by Ninja for", self.fresh())
+            self.assertEqual(self.names(build), ["object.o"])
+
+    def test_form_of_no_repository(self):
+        version = re.search(r"^version=(\S+)$", (self.root / FORM).read_text(), re.M)[1]
+        tool = self.root / f"build/tools/clang-format-{version}/clang_format/data/bin/clang-format"
+        tool.parent.mkdir(parents=True)
+        tool.symlink_to(shutil.which("true"))
+        check = [self.root / FORM, "check"]
+        self.assertNotEqual(subprocess.run(check, capture_output=True).returncode, 0)
+        subprocess.run(["git", "-C", self.root, "init", "--quiet"], check=True)
+        self.assertEqual(subprocess.run(check, capture_output=True).returncode, 0)
 
     def test_another_generator(self):
         build = self.configured("asan", self.root, "Unix Makefiles")

@@ -49,6 +49,11 @@ else (function () {
     var script = document.createElement("script");
     script.src = index;
     script.onload = then;
+    script.onerror = function () {
+      loading = false;
+      results.hidden = false;
+      results.textContent = "The index of the search could not be loaded: reload this page.";
+    };
     document.head.appendChild(script);
   }
 

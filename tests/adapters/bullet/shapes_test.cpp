@@ -154,6 +154,47 @@ TEST(BulletShapes, ThatChange_AreSeenInTheNextTick) {
   EXPECT_EQ(dfm_bullet_obstacle(b.adapter, body, 1, &moved), DFM_E_ARG);
 }
 
+TEST(BulletShapes, ChildOfACompoundThatBecomesTheShape_StandsWhereTheObjectIs) {
+  Bullet b;
+  auto *const cube = b.shape<btBoxShape>(bt({0.1, 0.1, 0.1}));
+  auto *const around = b.shape<btCompoundShape>();
+  around->addChildShape(at({1, 0, 0}), cube);
+  btRigidBody *const body = b.body(around, 0);
+  b.step();
+  body->setCollisionShape(cube);
+  b.step();
+  dfm_obstacle leaf = 0;
+  ok(dfm_bullet_obstacle(b.adapter, body, 0, &leaf));
+  dfm_pose pose{};
+  ok(dfm_obstacle_get_pose(leaf, &pose));
+  EXPECT_EQ(pose.position[0], 0);
+}
+
+namespace {
+
+struct Unheard : btEmptyShape {
+  Unheard() { m_shapeType = INVALID_SHAPE_PROXYTYPE; }
+};
+
+}  // namespace
+
+// Of an object that is known already, too.
+TEST(BulletShapes, ThatBecomeUnknown_AreRefused) {
+  Bullet b;
+  btRigidBody *const body = b.box({0.1, 0.1, 0.1}, 0, {});
+  b.step();
+  body->setCollisionShape(b.shape<Unheard>());
+  b.world.stepSimulation(btScalar(1e-3), 0);
+  EXPECT_EQ(dfm_bullet_last_tick(b.adapter, nullptr), DFM_E_UNSUPPORTED);
+  EXPECT_EQ(b.stats().shapes, 1u);
+  dfm_bullet_object left_out{};
+  left_out.size = sizeof left_out;
+  left_out.ignore = 1;
+  ok(dfm_bullet_set_object(b.adapter, body, &left_out));
+  b.step();
+  EXPECT_EQ(b.stats().shapes, 0u);
+}
+
 // Filters of Bullet count for soft bodies too, whose category is 1.
 TEST(BulletShapes, MaskWithoutSoftBodies_LetsThemThrough) {
   Bullet b;

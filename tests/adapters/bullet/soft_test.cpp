@@ -31,8 +31,7 @@ struct Cube {
   }
 };
 
-dfm_body taken(Bullet &b, const Cube &cube, uint32_t cells) {
-  dfm_body_def like = dfm_body_def_default();
+dfm_body taken(Bullet &b, const Cube &cube, uint32_t cells, dfm_body_def like = dfm_body_def_default()) {
   dfm_material_def gel = dfm_material_def_default();
   like.name = "cube";
   ok(dfm_material_create(b.soft, &gel, &like.material));
@@ -55,6 +54,30 @@ TEST(BulletSoft, Tetrahedra_AreTakenWithHeldNodesAndVelocity) {
   for (int i = 0; i < 300; ++i) b.step(1e-2);
   EXPECT_GT(measure(body).com[2], 0.05);  // it hangs by what is held
   EXPECT_LT(measure(body).com[2], 0.1);
+}
+
+// The def of another body: its mesh, and the arrays that go by that mesh, are not read.
+TEST(BulletSoft, DefOfAnotherBody_GivesNoMeshAndNoPlace) {
+  Bullet b;
+  Cube cube;
+  cube.append_faces();
+  cube.body->setVelocity(btVector3(0, 0, 0));
+  const double corners[12] = {0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
+  const uint32_t tet[4] = {0, 1, 2, 3};
+  const std::unique_ptr<uint8_t[]> fixed(new uint8_t[4]{7, 7, 7, 7});
+  dfm_body_def like = dfm_body_def_default();
+  like.points = corners;
+  like.tets = tet;
+  like.npoint = 4;
+  like.ntet = 1;
+  like.fixed = fixed.get();
+  like.pose.position[2] = 1;
+  like.spin[0] = 1;
+  const dfm_body body = taken(b, cube, 300, like);
+  EXPECT_NEAR(measure(body).com[2], 0.1, 1e-3);
+  EXPECT_NEAR(measure(body).angular[0], 0, 1e-9);
+  for (int i = 0; i < 10; ++i) b.step(1e-2);
+  EXPECT_LT(measure(body).velocity[2], -0.9);  // nothing of it is held
 }
 
 TEST(BulletSoft, FacesThatClose_AreFilled) {

@@ -129,6 +129,65 @@ TEST(OdeFriction, SnapshotOfTheAdapter_HasTheBristles) {
       << dfm_last_error();
 }
 
+namespace {
+
+// The law of bristle_law.h, which notes the step of each evaluation; 0: a near callback.
+std::vector<double> noted;
+const dfm_plugin *entry_noted(const dfm_host *host, uint32_t abi, uint32_t least) {
+  const dfm_plugin *const known = dfm_plugin_entry_bristle(host, abi, least);
+  if (!known) return nullptr;
+  static dfm_friction ops;
+  static dfm_type type;
+  static const dfm_type *const types[] = {&type};
+  static dfm_plugin plugin;
+  ops = *static_cast<const dfm_friction *>(known->types[0]->ops);
+  ops.eval = [](const dfm_friction_in *in, dfm_friction_out *out) {
+    noted.push_back(in->dt);
+    return eval(in, out);
+  };
+  type = *known->types[0];
+  type.ops = &ops;
+  type.id = "test.noted";
+  plugin = *known;
+  plugin.types = types;
+  return &plugin;
+}
+
+}  // namespace
+
+// A sub-step that the guard repeats as a shorter one is collided anew: its contact joints are of its length.
+TEST(OdeFriction, SubStepRepeatedShorter_HasItsOwnContacts) {
+  struct Data { dfm_ode adapter; } data{};
+  const auto callback = [](void *user, dGeomID a, dGeomID b) {
+    noted.push_back(0);
+    ok(dfm_ode_contact(static_cast<Data *>(user)->adapter, a, b, nullptr));
+  };
+  Ode ode({0, 0, -9.81}, 0, callback, &data);
+  data.adapter = ode.adapter;
+  ok(dfm_plugin_register_static(ode.context, entry_noted, "noted"));
+  ok(use(ode, "test.noted", {{"mu", 0.5}, {"sigma0", 1e6}}));
+  soft_bed(ode, 2e3);
+  const dGeomID floor = dCreatePlane(ode.space, 0, 0, 1, -1);
+  dGeomSetCategoryBits(floor, 4);
+  dGeomSetCollideBits(floor, 4);
+  ode.ball(0.05, 1, {0, 0, -0.95}, {1, 0, 0});
+  const dGeomID shot = dBodyGetFirstGeom(ode.ball(0.015, 1, {0.15, 0.15, 0.125}, {0, 0, -60}));
+  dGeomSetCategoryBits(shot, 2);
+  dGeomSetCollideBits(shot, 1);
+  noted.clear();
+  ode.run(0.05, 2e-3);
+  size_t collided = 0, finished = 0;
+  for (size_t i = 0; i + 2 < noted.size(); ++i) {
+    if (noted[i] != 0 || noted[i + 1] == 0) continue;
+    ++collided;
+    if (noted[i + 2] == 0) continue;
+    ++finished;
+    EXPECT_EQ(noted[i + 2], noted[i + 1]);
+  }
+  EXPECT_GT(finished, 5u);
+  EXPECT_GT(collided, finished);  // some were repeated
+}
+
 // A near callback of the caller's that leaves the contact to dfm_ode_contact.
 TEST(OdeFriction, OwnNearCallback_MayUseTheLaw) {
   struct Data {

@@ -104,4 +104,8 @@ TEST_F(OdeHpp, SpansTooShort_AreRefusedBeforeTheCall) {
   const auto ode = deform::attach_ode(s.soft, s.def);
   const double heights[3] = {};
   EXPECT_EQ(values::Ode(ode.get()).set_heights(s.geom, 1, 1, 2, 2, heights).status(), deform::spans_disagree);
+  const double points[9] = {};
+  for (const std::vector<uint32_t> &polygons : {std::vector<uint32_t>{3, 0, 1, 2}, {3, 0, 1, 2, 3, 0, 1}})
+    EXPECT_EQ(values::Ode(ode.get()).set_convex(s.geom, points, 2, polygons).status(),
+              deform::spans_disagree);
 }

@@ -328,3 +328,53 @@ TEST(OwnWorld, BodiesThatOverlap_AreNotThrownInShortSteps) {
   run(w, 0.05, 1e-3);
   EXPECT_GT(state(bodies[1]).position[0] - state(bodies[0]).position[0], 0.099);
 }
+
+// What was made before the body that is refused goes in order; the next set is made.
+TEST(OwnWorld, SetThatIsRefusedHalfMade_LeavesNothingBehind) {
+  Context c;
+  ok(register_engine());
+  const dfm_world w = make_world(c);
+  std::vector<dfm_rigid_def> bodies = {box("a", {0.05, 0.05, 0.05}, 1),
+                                       box("b", {0.05, 0.05, 0.05}, 1, {0.1, 0, 0}),
+                                       box("c", {0.05, 0.05, 0.05}, 1, {2e9, 0, 0})};
+  const dfm_joint_def hinge = joint(DFM_JOINT_HINGE, 0, 1, {0.05, 0, 0});
+  const dfm_rigid_set_def set = {sizeof set, 3, 1, 0, bodies.data(), &hinge, nullptr};
+  dfm_rigid out[3];
+  EXPECT_LT(dfm_rigid_create(w, kEngine, &set, out), 0);
+  EXPECT_NE(std::string(dfm_last_error()).find("body 2"), std::string::npos) << dfm_last_error();
+  bodies[2].pose.position[0] = 1;
+  create(w, bodies, {hinge}, kEngine);
+  run(w, 0.01, 1e-3);
+}
+
+// Filters hold as everywhere else: both bodies must want to touch.
+TEST(OwnWorld, BodiesOfWhichOneDoesNotWantTo_DoNotTouch) {
+  for (const uint32_t floor_wants : {1u, 3u}) {
+    Context c;
+    ok(register_engine());
+    const dfm_world w = make_world(c);
+    std::vector<dfm_rigid_def> bodies = {box("falls", {0.05, 0.05, 0.05}, 1, {0, 0, 0.051}),
+                                         box("floor", {0.5, 0.5, 0.05}, 1, {0, 0, -0.05})};
+    bodies[0].category = 2;
+    bodies[1].fixed = 1;
+    bodies[1].collides_with = floor_wants;
+    const std::vector<dfm_rigid> made = create(w, bodies, {}, kEngine);
+    run(w, 0.2, 1e-3);
+    EXPECT_EQ(state(made[0]).position[2] > 0.04, floor_wants == 3);
+  }
+}
+
+// So small a moment that the spin is infinite: the step fails, and ends.
+TEST(OwnWorld, MomentsNearZero_EndInAStatus) {
+  Context c;
+  ok(register_engine());
+  const dfm_world w = make_world(c);
+  dfm_rigid_def dust = part("dust", 1, {1e-310, 1e-310, 1e-310}, {0, 0, 0});
+  dust.spin[0] = dust.spin[1] = dust.spin[2] = 1;
+  const dfm_rigid_set_def set = {sizeof set, 1, 0, 0, &dust, nullptr, nullptr};
+  dfm_rigid out = 0;
+  uint32_t trouble = 0;
+  if (dfm_rigid_create(w, kEngine, &set, &out) == DFM_OK) {
+    EXPECT_LT(dfm_world_step(w, 1e-3, &trouble), 0);
+  }
+}

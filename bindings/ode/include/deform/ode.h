@@ -122,7 +122,8 @@ DFM_API dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const
 DFM_API dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made);
 
 /** Properties of a geom that ODE does not have. Setting them creates its obstacle again, so its contacts end.
- * Geoms without a name are called "obstacleN". */
+ * Geoms without a name are called "obstacleN". They, and the arrays below, go by the address of the geom: set
+ * them again for one that was destroyed and made again between two steps. */
 typedef struct dfm_ode_geom {
   uint32_t size, ignore; /* 1: soft bodies do not see it */
   const char *name;      /* NULL: none */

@@ -79,8 +79,13 @@ class Ode : public Handle<dfm_ode, struct OdeKind> {
   // points [n,3]; polygons: number of corners, then corners, for each of `count`.
   auto set_convex(dGeomID geom, std::span<const double> points, uint32_t count,
                   std::span<const uint32_t> polygons) const {
+    size_t end = 0;
+    uint32_t f = 0;
+    for (; f < count && end < polygons.size(); ++f) end += size_t{1} + polygons[end];
     return E::done(
-        dfm_ode_set_convex(raw_, geom, rows(points.size(), 3), points.data(), count, polygons.data()));
+        f < count || end > polygons.size()
+            ? spans_disagree
+            : dfm_ode_set_convex(raw_, geom, rows(points.size(), 3), points.data(), count, polygons.data()));
   }
   // heights [nz,nx].
   auto set_heights(dGeomID geom, double width, double depth, uint32_t nx, uint32_t nz,

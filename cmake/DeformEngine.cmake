@@ -1,0 +1,16 @@
+# Sets VARIABLE in the cache where the program of a SOURCE, linked with LIBRARY, ends with 0; for another
+# system, where it links.
+function(deform_engine_fits variable library source)
+  if(DEFINED ${variable})
+    return()
+  endif()
+  if(CMAKE_CROSSCOMPILING)
+    set(ran 0)
+    try_compile(built ${source}.built ${source} LINK_LIBRARIES ${library})
+  else()
+    try_run(ran built ${source}.built ${source} LINK_LIBRARIES ${library})
+  endif()
+  if(built AND ran STREQUAL "0")
+    set(${variable} TRUE CACHE INTERNAL "the engine found is one that its adapter can take")
+  endif()
+endfunction()
