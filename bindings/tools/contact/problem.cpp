@@ -1,7 +1,6 @@
 #include "problem.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "body/phyxels.h"
 #include "core/byte_stream.h"

@@ -27,6 +27,7 @@ class LinearMotion final : public ImplicitSystem {
   bool residual(const double *v, double *r) override;
   bool matrix(const uint32_t *at, double *blk) override;
   void take(const double *) override {}
+  const double *blocks() const { return blocks_.data(); }  // [nb,9] A
   template <class Transfer>
   void transfer(Transfer &t);
   bool is_valid() const;  // do sizes and numbers fit each other?
