@@ -31,8 +31,12 @@ dfm_context *make_context(const Globals &globals);
 // The next make_context() returns this one, which its caller then owns.
 void offer_context(dfm_context *context);
 
+// Writes contact problems of a world from now on: unsolved ones, and every `every`-th (0: no other).
+using CaptureProblems = void(dfm_world world, const std::string &folder, uint32_t every);
+
 // Each adds its subcommand; the callback stores its exit code in *exit_code.
-void add_run(Command app, Globals &globals, int *exit_code);
+// capture: for --contact-problems; null: the command becomes deform-capture there.
+void add_run(Command app, Globals &globals, int *exit_code, CaptureProblems *capture);
 void add_replay(Command app, Globals &globals, int *exit_code);
 void add_mesh(Command app, Globals &globals, int *exit_code);
 void add_plugin(Command app, Globals &globals, int *exit_code);

@@ -14,6 +14,7 @@
 
 #include "arguments.h"
 #include "attachments.h"
+#include "become.h"
 #include "frames.h"
 #include "impulses.h"
 #include "interrupt.h"
@@ -132,7 +133,7 @@ std::string prepare(const SceneFile &scene, const RunOptions &options) {
   }
   if (!options.problems.empty()) {
     make_folder(options.problems);
-    need(dfm_debug_contact_problems(scene.world(), options.problems.c_str(), options.every));
+    options.capture(scene.world(), options.problems, options.every);
   }
   if (options.from.empty()) return "";
   const std::string start = snapshot_of(scene);
@@ -603,7 +604,7 @@ void add_run_options(Command sub, RunOptions &options) {
   sub.flag("--check", options.check, "count crossing triangles in every step, not only in recorded states");
 }
 
-void add_run(Command app, Globals &globals, int *exit_code) {
+void add_run(Command app, Globals &globals, int *exit_code, CaptureProblems *capture) {
   auto options = std::make_shared<RunOptions>();
   Command sub = app.command("run", "simulates a scene and writes figures and pictures");
   add_run_options(sub, *options);
@@ -629,6 +630,9 @@ void add_run(Command app, Globals &globals, int *exit_code) {
   sub.calls([=, &globals] {
     if (options->every > 0 && options->problems.empty())
       throw Failure(kBadInput, "--contact-problems-every needs --contact-problems DIR");
+    if (!options->problems.empty() && !capture)
+      become("run --contact-problems", "deform-capture", globals.words, kMadeByTools);
+    options->capture = capture;
     for (const auto &[at, path] : *saves) {
       if (!(at >= 0) || !std::isfinite(at))
         throw Failure(kBadInput, "--save: expected a finite time of 0 s or more, found " + number(at));

@@ -6,7 +6,7 @@
 
 int main(int argc, char **argv) {
   return cli::command_line(argc, argv, [](cli::Command top, cli::Globals &globals, int *exit_code) {
-    cli::add_run(top, globals, exit_code);
+    cli::add_run(top, globals, exit_code, nullptr);
     cli::add_replay(top, globals, exit_code);
     cli::add_explain(top, globals, exit_code, nullptr);
     cli::add_program(top, globals, cli::kCalibrate);

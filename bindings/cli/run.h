@@ -27,10 +27,11 @@ struct RunOptions {
     std::string path;
   };
   std::vector<Save> saves;
-  std::string from;        // a state to go on from; empty: the scene's start
-  bool record = false;     // every recorded state, as a state file
-  std::string problems;    // folder for contact problems; empty: none are written
-  uint32_t every = 0;      // of them that is written, beside the unsolved ones; 0: none
+  std::string from;      // a state to go on from; empty: the scene's start
+  bool record = false;   // every recorded state, as a state file
+  std::string problems;  // folder for contact problems; empty: none are written
+  uint32_t every = 0;    // of them that is written, beside the unsolved ones; 0: none
+  CaptureProblems *capture = nullptr;
   std::string stream;      // "rtp://ADDRESS:PORT"; empty: nowhere
   std::string save_scene;  // where the world of the end is written as a scene; empty: nowhere
   // in place of dfm_world_step(), where another program steps; empty: none does

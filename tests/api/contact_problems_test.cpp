@@ -6,7 +6,6 @@
 
 #include "deform/deform.h"
 #include "support.h"
-#include "world.h"
 
 namespace fs = std::filesystem;
 
@@ -94,11 +93,19 @@ TEST(ContactProblems, EveryWithoutAFolder_IsRefused) {
   EXPECT_NE(r.err.find("needs --contact-problems DIR"), std::string::npos) << r.err;
 }
 
-TEST(ContactProblems, FolderThatIsNotThere_EndsTheWritingAndNotTheStep) {
-  const test::Context c;
-  const dfm_world w = test::make_world(c);
-  test::add_plane(w, "floor");
-  test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, {});
-  test::ok(dfm_debug_contact_problems(w, "/nonexistent/folder", 1));
-  test::run(w, 0.005, 1e-3);
+// In /proc no file can be made.
+TEST(ContactProblems, FolderThatTakesNoFiles_EndsTheWritingAndNotTheRun) {
+  const Folder f;
+  const test::CommandResult r = test::deform({"run", f.scene, "--out", f.path + "/out", "--contact-problems",
+                                              "/proc", "--contact-problems-every", "1"});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  const size_t at = r.err.find("no more contact problems are written: ");
+  EXPECT_LT(at, r.err.size()) << r.err;
+  EXPECT_EQ(r.err.find("no more contact problems", at + 1), std::string::npos) << r.err;
+}
+
+TEST(ContactProblems, CallOfTheLibrary_SaysWhatWritesThem) {
+  EXPECT_EQ(dfm_debug_contact_problems(0, nullptr, 0), DFM_OK);
+  EXPECT_EQ(dfm_debug_contact_problems(0, "folder", 0), DFM_E_UNSUPPORTED);
+  EXPECT_NE(std::string(dfm_last_error()).find("--contact-problems"), std::string::npos);
 }

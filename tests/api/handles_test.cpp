@@ -114,7 +114,6 @@ std::vector<Call> world_calls() {
       {"world_set_may_touch", [](uint64_t h) { return dfm_world_set_may_touch(h, nullptr, nullptr); }},
       {"world_ask_again", [](uint64_t h) { return dfm_world_ask_again(h, 0, 0); }},
       {"world_set_pre_solve", [](uint64_t h) { return dfm_world_set_pre_solve(h, nullptr, nullptr); }},
-      {"debug_contact_problems", [](uint64_t h) { return dfm_debug_contact_problems(h, nullptr, 0); }},
       {"debug_draw",
        [](uint64_t h) {
          return dfm_debug_draw(

@@ -196,7 +196,6 @@ Calls world_calls(Scene &s, bool step_only) {
       {"world_swaps", [&] { return dfm_world_swaps(s.w, 0, nullptr, &n); }},
       {"world_events", [&] { return dfm_world_events(s.w, 0, nullptr, &n); }},
       {"world_hold_begin", [&] { return dfm_world_hold_begin(s.w); }},
-      {"debug_contact_problems", [&] { return dfm_debug_contact_problems(s.w, nullptr, 0); }},
       {"world_set_may_touch", [&] { return dfm_world_set_may_touch(s.w, nullptr, nullptr); }},
       {"world_ask_again", [&] { return dfm_world_ask_again(s.w, 0, 0); }},
       {"world_set_pre_solve", [&] { return dfm_world_set_pre_solve(s.w, nullptr, nullptr); }},

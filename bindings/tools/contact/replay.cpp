@@ -80,13 +80,8 @@ class Responder {
  public:
   explicit Responder(LinearMotion &m)
       : m_(m), solver_(Memory::standard()), x_(3 * size_t{m.n}), b_(x_.size()) {
-    const BlockPattern p = m.pattern();
-    std::vector<uint32_t> at(p.nb);
-    for (uint32_t b = 0; b < p.nb; ++b) at[b] = b;
-    std::vector<double> blocks(9 * size_t{p.nb});
-    m.matrix(at.data(), blocks.data());
-    solver_.analyse(p);
-    if (!solver_.factor(blocks.data())) fail(DFM_E_FORMAT, "the matrix of an implicit body has no factor");
+    solver_.analyse(m.pattern());
+    if (!solver_.factor(m.blocks())) fail(DFM_E_FORMAT, "the matrix of an implicit body has no factor");
   }
   // of its points, [n,3] N s
   const std::vector<double> &of(const std::vector<double> &impulses) {
@@ -117,8 +112,7 @@ LocalProblem Replay::form() {
   const ContactState &s = p_.state;
   const size_t n = rows.n;
   LocalProblem out;
-  const auto remembers = [&](uint8_t f) { return f == kSmoothLaw; };
-  if (!part_.nbond && std::none_of(s.form.begin(), s.form.begin() + std::ptrdiff_t(n), remembers))
+  if (!part_.nbond && std::count(s.form.begin(), s.form.begin() + std::ptrdiff_t(n), kSmoothLaw) == 0)
     for (size_t i = 0; i < n; ++i)
       out.mu.push_back(s.form[i] == kSetValuedLaw && s.fn[i] > 0 ? s.limit[i] / s.fn[i] : 0);
   std::vector<std::unique_ptr<Responder>> responders;

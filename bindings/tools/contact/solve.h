@@ -1,11 +1,11 @@
-// One contact problem by the library's solver, ContactNewton: a captured one (contact/problem.h) as the step
+// One contact problem by the library's solver, ContactNewton: a captured one (problem.h) as the step
 // would solve it, and one of others (read_problem.h) to Siconos' own tolerance.
 #pragma once
 #include <cmath>
 #include <cstdint>
 
-#include "contact/problem.h"
 #include "deform/base.h"
+#include "problem.h"
 #include "read_problem.h"
 
 namespace contact {

@@ -1,4 +1,4 @@
-/* deform/debug.h -- files that show a state: VTU of phyxels and surfels, contact problems. */
+/* deform/debug.h -- files that show a state: VTU of phyxels and surfels. */
 #ifndef DEFORM_DEBUG_H
 #define DEFORM_DEBUG_H
 #include "deform/base.h"
@@ -26,15 +26,6 @@ enum { DFM_DRAW_CONTACTS = 1, DFM_DRAW_FORCES = 2, DFM_DRAW_BOXES = 4 };
 typedef void (*dfm_draw_line_fn)(void *user, const double a[3], const double b[3], uint32_t rgb);
 /** Calls line for each; what is a sum of DFM_DRAW_*. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line, void *user);
-/** From now on, steps write contact problems to files of this folder, which must exist: those that are not
- * solved to their tolerance, and every `every`-th one (0: no other), counted over groups of bodies that touch
- * each other. `deform contact` solves them. Results stay the same; steps are slower and allocate memory.
- * Writing ends with a warning in the log when a file cannot be written.
- * @param world   world handle
- * @param folder  NULL: no longer
- * @return DFM_OK; DFM_E_HANDLE; DFM_E_BUSY
- * Threads: One thread at a time per world. Not during step. Since 0.1. */
-DFM_API dfm_status dfm_debug_contact_problems(dfm_world world, const char *folder, uint32_t every);
 #ifdef __cplusplus
 }
 #endif

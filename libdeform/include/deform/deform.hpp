@@ -505,9 +505,6 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
     call.rethrow();
     return E::done(s);
   }
-  auto contact_problems(Text folder, uint32_t every = 0) const {
-    return E::done(dfm_debug_contact_problems(raw_, folder.c_str, every));
-  }
 };
 
 // ---- scenes -----------------------------------------------------------------------------------------------

@@ -404,4 +404,10 @@ DFM_DEPRECATED dfm_status dfm_body_query_triangles(dfm_body body, const dfm_quer
   if (status >= 0 && n) *n = list.n;
   return status;
 }
+/* Contact problems: a program beside the command writes them. */
+DFM_DEPRECATED dfm_status dfm_debug_contact_problems(dfm_world world, const char *folder, uint32_t every) {
+  (void)world;
+  (void)every;
+  return folder ? dfm_fail(DFM_E_UNSUPPORTED, "`deform run --contact-problems` writes them") : DFM_OK;
+}
 #endif

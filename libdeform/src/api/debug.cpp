@@ -6,7 +6,6 @@
 #include "math/extent.h"
 #include "mesh/mesh.h"
 #include "step/context.h"
-#include "step/solve/capture.h"
 #include "world/measure.h"
 #include "world/queries.h"
 
@@ -129,11 +128,5 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
           draw(p, q, 0x808080);
         }
     }
-  });
-}
-
-dfm_status dfm_debug_contact_problems(dfm_world world, const char *folder, uint32_t every) {
-  return as_status(to_change<world_of>, world, [&](World &w) {
-    w.steps->capture = folder ? std::make_unique<Capture>(Capture{folder, every}) : nullptr;
   });
 }

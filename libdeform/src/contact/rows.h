@@ -117,28 +117,6 @@ struct ContactRows {
 
   Array<double> whole_of;  // [sources] DofSource::whole
 
-  // What a column has an entry for; side: a row, where some row has a rigid body.
-  enum class Per { dof, row, contact, side };
-  // f(column, values of an entry, Per): what rows keep in a file, in its order.
-  template <class F>
-  static void each_column(const F &f) {
-    f(&ContactRows::source, 1, Per::dof);
-    f(&ContactRows::point, 1, Per::dof);
-    f(&ContactRows::block, 1, Per::dof);
-    f(&ContactRows::rigid, 1, Per::side);
-    f(&ContactRows::alone, 4, Per::dof);
-    f(&ContactRows::y_free, 4, Per::dof);
-    f(&ContactRows::arm, 3, Per::side);
-    f(&ContactRows::frame, 9, Per::row);
-    f(&ContactRows::drive, 3, Per::row);
-    f(&ContactRows::rate, 1, Per::contact);
-    f(&ContactRows::compliance, 3, Per::contact);
-    f(&ContactRows::wn, 1, Per::row);
-    f(&ContactRows::wt, 1, Per::row);
-    f(&ContactRows::cross, 2, Per::contact);
-    f(&ContactRows::impulse, 3, Per::row);
-  }
-
   // m/s, at most, at which a depth is opened; 0: a tenth of the rest distance per sub-step
   double recovery = 0;
 
@@ -216,7 +194,7 @@ struct ContactRows {
   void restart_rigids();
 
  private:
-  friend struct ContactProblem;  // keeps them in a file
+  friend struct ContactProblem;  // bindings/tools/contact keeps them in a file
   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
   Array<uint32_t> dof_of_point_, dof_of_node_;
   bool points_free_ = false;  // all of dof_of_point_ are kNone

@@ -16,8 +16,6 @@ namespace dfm {
 class ByteWriter {
  public:
   explicit ByteWriter(std::string &out) : out_(out) {}
-  // Whether what only some have follows.
-  static bool more(bool has) { return has; }
   template <class T>
   void one(const T &x) {
     static_assert(std::is_trivially_copyable_v<T>);
@@ -42,7 +40,6 @@ class ByteReader {
   // what: they are, for the error of bytes that do not fit
   ByteReader(std::string_view in, const char *what) : left_(in), what_(what) {}
   bool ended() const { return left_.empty(); }
-  bool more(bool) const { return !ended(); }
   template <class T>
   void one(T &x) {
     std::memcpy(&x, next(1, sizeof x), sizeof x);

@@ -2,7 +2,6 @@
 
 #include "step/rigid/tool_touch.h"
 #include "step/self_contact.h"
-#include "step/solve/capture.h"
 #include "step/solve/solve_islands.h"
 
 namespace dfm {

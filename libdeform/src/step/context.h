@@ -1,6 +1,7 @@
 // Buffers of a step, by the stage that writes them. None of them is state, and none is in a snapshot. Lasting
 // state is in World (state/world.h).
 #pragma once
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -28,9 +29,9 @@ namespace dfm {
 class ImplicitSystem;
 struct RigidSet;
 struct SelfBody;
+struct SolveIsland;
 class SolveIslands;
 class ToolTouch;
-struct Capture;
 
 struct RigidMember {
   RigidSet *set;
@@ -87,7 +88,8 @@ struct StepContext {
   Array<double> bond_impulse;  // [bonds,3] N s, initial values of the next solve of this sub-step
   ContactState state;
   std::unique_ptr<SolveIslands> solve_islands;
-  std::unique_ptr<Capture> capture;                     // null: no problems are written
+  // Of a program beside the library: before an island is solved, on its thread; with null after all are.
+  std::function<void(const SolveIsland *)> on_solve;
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
   uint32_t passes = 0, sweeps = 0;                      // of the island with the most

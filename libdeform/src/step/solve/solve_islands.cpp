@@ -13,7 +13,6 @@
 #include "plugin/context.h"
 #include "state/world.h"
 #include "step/context.h"
-#include "step/solve/capture.h"
 #include "step/solve/friction_memory.h"
 #include "step/solve/tolerance.h"
 #include "step/stages.h"
@@ -143,7 +142,7 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
              [&](uint32_t i) { own.tolerance.normal[i] = own.tolerance.tangent[i] = sought; });
   }
   find_slip_back(w, step, own);
-  if (step.capture) own.problem = take_problem(w, step, own);
+  if (step.on_solve) step.on_solve(&own);
   if (!own.implicit) {
     const SweepLimits limits{w.def.max_sweeps, w.def.max_passes, start_residual(step, own)};
     const bool done = own.sweeping.solve(step.rows, own.part, step.state, own.laws, own.tolerance, limits,
@@ -392,7 +391,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   });
   for (const SolveIsland &own : all)
     if (own.open) charge(w, step, own.spent);
-  if (step.capture) write_problems(w, step);
+  if (step.on_solve) step.on_solve(nullptr);
   const SolveIsland *bad = nullptr;
   for (const SolveIsland &own : all) {
     if (!own.open) continue;

@@ -11,7 +11,6 @@
 
 #include "contact/newton.h"
 #include "contact/sweeps.h"
-#include "contact/problem.h"
 #include "contact/solver.h"
 #include "friction/laws.h"
 #include "step/budget.h"
@@ -65,7 +64,6 @@ struct SolveIsland {
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
   std::exception_ptr thrown;
-  std::unique_ptr<ContactProblem> problem;  // as it was given to the solve, of a capture
   // of all solves of the sub-step
   bool open = true;  // it is to be solved
   uint32_t all_passes = 0, all_sweeps = 0;

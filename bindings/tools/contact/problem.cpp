@@ -1,7 +1,6 @@
-#include "contact/problem.h"
+#include "problem.h"
 
 #include <algorithm>
-#include <utility>
 
 #include "body/phyxels.h"
 #include "core/byte_stream.h"
@@ -12,9 +11,34 @@ namespace {
 
 constexpr std::string_view kHead = "deform contact problem 1\n";
 
+// What a column has an entry for; side: a row, where some row has a rigid body.
+enum class Per { dof, row, contact, side };
+// f(column, values of an entry, Per): what rows keep in a file, in its order.
+template <class F>
+void each_column(const F &f) {
+  f(&ContactRows::source, 1, Per::dof);
+  f(&ContactRows::point, 1, Per::dof);
+  f(&ContactRows::block, 1, Per::dof);
+  f(&ContactRows::rigid, 1, Per::side);
+  f(&ContactRows::alone, 4, Per::dof);
+  f(&ContactRows::y_free, 4, Per::dof);
+  f(&ContactRows::arm, 3, Per::side);
+  f(&ContactRows::frame, 9, Per::row);
+  f(&ContactRows::drive, 3, Per::row);
+  f(&ContactRows::rate, 1, Per::contact);
+  f(&ContactRows::compliance, 3, Per::contact);
+  f(&ContactRows::wn, 1, Per::row);
+  f(&ContactRows::wt, 1, Per::row);
+  f(&ContactRows::cross, 2, Per::contact);
+  f(&ContactRows::impulse, 3, Per::row);
+}
+
+// Whether what only some have follows.
+bool more(const ByteWriter &, bool has) { return has; }
+bool more(const ByteReader &from, bool) { return !from.ended(); }
+
 template <class C>
 void copy_rows(const C &from, size_t width, const std::vector<uint32_t> &rows, C &to) {
-  to.clear();
   for (const uint32_t i : rows)
     to.insert(to.end(), from.begin() + std::ptrdiff_t(width * i),
               from.begin() + std::ptrdiff_t(width * (i + 1)));
@@ -96,8 +120,6 @@ void LinearMotion::transfer(Transfer &t) {
 // number: of the dofs that are taken, in their order.
 void ContactProblem::take_blocks(const ContactRows &from, const std::vector<uint32_t> &number) {
   rows.block.assign(rows.ndof, kNone);
-  rows.blocks.clear();
-  rows.response_.clear();
   for (const ContactRows::Block &b : from.blocks) {
     if (number[b.first] == kNone) continue;
     const auto values = from.response_.begin() + std::ptrdiff_t(b.response);
@@ -130,17 +152,15 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   rows.nrigid =
       static_cast<uint32_t>(std::ranges::count_if(contacts, [&](uint32_t i) { return i >= from.soft(); }));
   rows.nbond = part.nbond;
-  ContactRows::each_column([&](auto column, size_t width, ContactRows::Per per) {
-    if (per == ContactRows::Per::side && from.rigid.empty()) (rows.*column).clear();
-    else
+  each_column([&](auto column, size_t width, Per per) {
+    if (per != Per::side || !from.rigid.empty())
       copy_rows(from.*column, width,
-                per == ContactRows::Per::dof       ? dofs
-                : per == ContactRows::Per::contact ? contacts
-                                                   : list,
+                per == Per::dof       ? dofs
+                : per == Per::contact ? contacts
+                                      : list,
                 rows.*column);
   });
   take_blocks(from, number);
-  rows.whole_of.clear();
   for (size_t s = 0; s < systems.size(); ++s) {
     if (sources[s] == kNone) continue;
     rows.whole_of.push_back(from.whole_of[s]);
@@ -156,10 +176,6 @@ bool ContactProblem::take(const ContactRows &from, const RowsPart &part, const C
   for (ContactRows::Block &b : rows.blocks)
     if (b.source != kNone) b.source = sources[b.source];
   rows.begin.assign(1, 0);
-  rows.dof.clear();
-  rows.weight.clear();
-  rows.rigid_a.clear();
-  for (Array<double> *a : {&rows.arm_a, &rows.arc, &rows.arc_a}) a->clear();
   for (const uint32_t i : list) {
     for (uint32_t j = from.begin[i]; j < from.begin[i + 1]; ++j) {
       rows.dof.push_back(number[from.dof[j]]);
@@ -207,7 +223,7 @@ void ContactProblem::transfer(Transfer &t) {
   t.many(rows.begin);
   t.many(rows.dof);
   t.many(rows.weight);
-  ContactRows::each_column([&](auto column, size_t, ContactRows::Per) { t.many(rows.*column); });
+  each_column([&](auto column, size_t, Per) { t.many(rows.*column); });
   t.many(rows.whole_of);
   t.count(rows.blocks);
   for (ContactRows::Block &b : rows.blocks) {
@@ -229,7 +245,7 @@ void ContactProblem::transfer(Transfer &t) {
   t.many(state.bristle);
   t.count(motions);
   for (LinearMotion &m : motions) m.transfer(t);
-  if (!t.more(rows.nrigid > 0)) return;
+  if (!more(t, rows.nrigid > 0)) return;
   t.one(rows.nrigid);
   t.many(rows.rigid_a);
   for (Array<double> *a : {&rows.arm_a, &rows.arc, &rows.arc_a}) t.many(*a);
@@ -251,8 +267,7 @@ void ContactProblem::check() const {
               rows.bond.size() == rows.nbond && state.law.size() == stride && state.area.size() == stride &&
               state.dwell.size() == stride && (state.scale.empty() || state.scale.size() == n) &&
               state.bristle.size() == stride * state.nstate;
-  ContactRows::each_column([&](auto column, size_t width, ContactRows::Per per) {
-    using Per = ContactRows::Per;
+  each_column([&](auto column, size_t width, Per per) {
     const size_t entries = per == Per::dof ? ndof : per == Per::contact ? n : all;
     good = good && ((rows.*column).size() == width * entries || (per == Per::side && rows.rigid.empty()));
   });

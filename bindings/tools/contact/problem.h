@@ -27,6 +27,7 @@ class LinearMotion final : public ImplicitSystem {
   bool residual(const double *v, double *r) override;
   bool matrix(const uint32_t *at, double *blk) override;
   void take(const double *) override {}
+  const double *blocks() const { return blocks_.data(); }  // [nb,9] A
   template <class Transfer>
   void transfer(Transfer &t);
   bool is_valid() const;  // do sizes and numbers fit each other?
@@ -54,8 +55,8 @@ struct ContactProblem {
   ContactState state;                 // what the laws start from, and the law of each contact
   std::vector<LinearMotion> motions;  // by source of the rows' dofs
 
-  // The rows of this part with their bodies and the start of the laws, which the caller names. False: a model
-  // cannot tell its forces.
+  // Of an empty problem: the rows of this part with their bodies and the start of the laws, which the caller
+  // names. False: a model cannot tell its forces.
   bool take(const ContactRows &from, const RowsPart &part, const ContactState &of,
             std::span<ImplicitSystem *const> systems);
   std::string bytes();
