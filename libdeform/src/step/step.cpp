@@ -125,14 +125,12 @@ double least_sub_steps(const World &w, double dt) { return std::ceil(dt / w.boun
 dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
   const Body *const b = w.bound.body;
   const bool implicit = b && !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS);
-  set_last_error(
-      format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
-             "whose point %u bounds the step, lower its damping, or take a shorter step",
-             dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
-             implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
-             w.bound.point)
-          .c_str());
-  *trouble |= DFM_TROUBLE_SUBSTEPS;
+  fail_step(trouble, DFM_TROUBLE_SUBSTEPS,
+            "a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
+            "whose point %u bounds the step, lower its damping, or take a shorter step",
+            dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
+            implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
+            w.bound.point);
   return DFM_DISCARD;
 }
 // The bound has fallen so far within the step that the rest of it needs too many.

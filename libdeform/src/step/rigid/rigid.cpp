@@ -22,13 +22,10 @@ namespace {
 bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
                  uint32_t *trouble) {
   need_memory(fault.status);
-  *trouble |= DFM_TROUBLE_PLUGIN;
   const std::string why =
       said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
-  set_last_error(format("%s, rigid body '%s' and those with it: host '%s' %s; %s", at_step(w).c_str(),
-                        set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str())
-                     .c_str());
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s, rigid body '%s' and those with it: host '%s' %s; %s",
+                   at_step(w).c_str(), set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str());
 }
 
 }  // namespace

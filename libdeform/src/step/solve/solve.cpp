@@ -241,12 +241,10 @@ bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t
     step.length.repeat(0.5);
     return false;
   }
-  set_last_error(format("%s: no state was found in which its forces and contacts agree, not even in a "
-                        "sub-step of %g s; take a smaller step, or lower the stiffness",
-                        at_step(w, *w.bodies[own.implicit_body]).c_str(), step.h)
-                     .c_str());
-  *trouble |= DFM_TROUBLE_NONFINITE;
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_NONFINITE,
+                   "%s: no state was found in which its forces and contacts agree, not even in a sub-step of "
+                   "%g s; take a smaller step, or lower the stiffness",
+                   at_step(w, *w.bodies[own.implicit_body]).c_str(), step.h);
 }
 
 // False: the sub-step is to be repeated, up to where a body lands that a restitution throws back.
@@ -281,11 +279,8 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
   double nan_flag = 0;
   for (double l : step.rows.impulse) nan_flag += 0.0 * l;
-  if (bad || nan_flag != 0) {
-    *trouble |= bad ? report_failed_solve(w, step, bad->bad, bad->batches.failed())
-                    : report_failed_solve(w, step, nullptr, kNone);
-    return false;
-  }
+  if (bad) return report_failed_solve(w, step, bad->bad, bad->batches.failed(), trouble);
+  if (nan_flag != 0) return report_failed_solve(w, step, nullptr, kNone, trouble);
   step.bond_impulse.assign(step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n,
                            step.rows.impulse.end());
   // laws may have been evaluated at slips that differ from the solution

@@ -391,10 +391,8 @@ Balance take_balance(World &w, StepContext &step) {
 
 // Ends the run, with this sentence. The next step is checked again.
 bool stop_for_energy(World &w, uint32_t *trouble, const std::string &why) {
-  *trouble |= DFM_TROUBLE_ENERGY;
   w.watch.age = kEvery;
-  set_last_error(why.c_str());
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_ENERGY, "%s", why.c_str());
 }
 
 }  // namespace
