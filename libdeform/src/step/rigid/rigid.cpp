@@ -114,7 +114,7 @@ RigidSet &set_of_group(World &w, uint32_t group) {
 }  // namespace
 
 void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
-  step.rows.set_response(block, [&](double *matrix) {
+  step.rows.set_response(block, false, [&](double *matrix) {
     if (step.tools->fill_response(block.group, matrix)) return;
     RigidSet &set = set_of_group(w, block.group);
     if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))

@@ -35,7 +35,7 @@ namespace {
 void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
   const Body &b = *w.bodies[block.source];
   const uint32_t *const surfels = &step.rows.point[block.first];
-  step.rows.set_responses(block, [&](double *responses) {
+  step.rows.set_response(block, true, [&](double *responses) {
     if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
       fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
            b.model.type->id, b.name.c_str());
