@@ -128,7 +128,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   for (Array<double> *a : {&drive, &impulse}) a->resize(size_t(3) * all());
   for (Array<double> *a : {&wn, &wt}) a->resize(all());
   compliance.resize(size_t(3) * n);
-  this->cross.resize(size_t(2) * n);
+  cross.resize(size_t(2) * n);
   rate.resize(n);
   uint32_t nnode = 0, npoint = 0;
   for (const DofSource &s : sources) {
