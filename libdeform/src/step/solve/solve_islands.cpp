@@ -37,7 +37,7 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
 
 void begin_newton(StepContext &step, SolveIsland &own) {
   if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
-  own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
+  own.newton->begin(step.rows, own.part, step.systems, step.state, own, step.h);
 }
 
 // After sweeps. Where rows contradict each other, the better result counts. tolerance, normal: m/s, as of
@@ -54,7 +54,7 @@ void solve_rigid(StepContext &step, SolveIsland &own, double tolerance, double n
   if (found && !own.bad && own.residual.speed <= swept) return;
   own.bad = nullptr;  // a law that fails on the way need not fail there
   put_impulses(step.rows, own.part, own.swept.data());
-  own.laws.judge(own.residual);
+  own.judge(own.residual);
 }
 
 // Evaluates the laws at the present state, and its residual. False: a law has failed.
@@ -80,9 +80,10 @@ double normal_tolerance(const World &w, const StepContext &step, const SolveIsla
 
 // Evaluates the laws at the warm start.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
-  own.laws.begin(w, step, own);
+  own.world = &w;
+  own.step = &step;
   if (own.implicit) begin_newton(step, own);
-  if (evaluate_laws(w, step, own)) own.laws.slopes();
+  if (evaluate_laws(w, step, own)) own.slopes();
 }
 
 // m/s, of the velocities of bodies: that of the contact that needs most.
@@ -146,8 +147,8 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (step.capture) own.problem = take_problem(w, step, own);
   if (!own.implicit) {
     const SweepLimits limits{w.def.max_sweeps, w.def.max_passes, start_residual(step, own)};
-    const bool done = own.sweeping.solve(step.rows, own.part, step.state, own.laws, own.tolerance, limits,
-                                         step.h, own.residual);
+    const bool done =
+        own.sweeping.solve(step.rows, own.part, step.state, own, own.tolerance, limits, step.h, own.residual);
     own.sweeps = own.sweeping.count();
     if (done) return;
     if (own.all_rigid) {
@@ -166,26 +167,26 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 
 }  // namespace
 
-bool IslandLaws::evaluate_local(const double *response, double slip) {
-  own_->bad = own_->batches.evaluate_local(step_->h, response, slip, 0, step_->state);
-  return !own_->bad;
+bool SolveIsland::evaluate_local(const double *response, double slip) {
+  bad = batches.evaluate_local(step->h, response, slip, 0, step->state);
+  return !bad;
 }
 
-bool IslandLaws::slopes() {
-  if ((own_->bad = own_->batches.slopes(step_->h, step_->state))) return false;
-  if (own_->batches.differences()) linearize(step_->rows, own_->part, step_->h, step_->state);
+bool SolveIsland::slopes() {
+  if ((bad = batches.slopes(step->h, step->state))) return false;
+  if (batches.differences()) linearize(step->rows, part, step->h, step->state);
   return true;
 }
 
-bool IslandLaws::judge(Residual &residual) {
-  if (!evaluate_laws(*w_, *step_, *own_)) return false;
-  residual = own_->residual = residual_of(step_->rows, own_->part, step_->state, step_->h, own_->tolerance);
+bool SolveIsland::judge(Residual &found) {
+  if (!evaluate_laws(*world, *step, *this)) return false;
+  found = residual = residual_of(step->rows, part, step->state, step->h, tolerance);
   return true;
 }
 
-void IslandLaws::spend(uint64_t rows) { dfm::spend(*w_, *step_, own_->spent, rows); }
+void SolveIsland::spend(uint64_t rows) { dfm::spend(*world, *step, spent, rows); }
 
-bool IslandLaws::goes_on() { return !solve_ends(*step_, own_->spent); }
+bool SolveIsland::goes_on() { return !solve_ends(*step, spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
   use_memory(m, pairs_, owner_, sides_, between_rigids_, of_cuts_, order_, contact_, bond_, block_, begin_);
@@ -355,7 +356,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     if (!own.open) continue;
     rows += own.part.all();
     own.part.alone = step.rows.is_alone(own.part);
-    own.start();
+    own.passes = own.sweeps = 0;
     own.failed = false;
     own.spent = {0, 0, own.part.all(), false};
     own.residual = {};
