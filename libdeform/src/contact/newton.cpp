@@ -219,14 +219,12 @@ void ContactNewton::put_rows() {
   ContactRows &rows = *rows_;
   for (size_t k = 0; k < row_.size(); ++k) std::copy_n(&l_[3 * k], 3, &rows.impulse[size_t{3} * row_[k].row]);
   rows.restore(part_);
-  const auto put = [&](uint32_t i) {
+  each_row(part_, [&](uint32_t i) {
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
       const uint32_t d = rows.dof[j], node = node_of_dof_[d];
       if (node != kNone) std::copy_n(&v_[size_t{kStride} * node], 3, &rows.y[size_t{kStride} * d]);
     }
-  };
-  each_row(part_.contacts, put);
-  each_row(part_.bonds, put);
+  });
 }
 
 void ContactNewton::scale_penalties(double by) {

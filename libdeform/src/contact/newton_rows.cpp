@@ -54,11 +54,9 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
   node_of_dof_.resize(rows.ndof);
   nodes_ = 0;
   const auto each_dof = [&](auto &&f) {
-    const auto of_row = [&](uint32_t i) {
+    each_row(part_, [&](uint32_t i) {
       for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) f(rows.dof[j]);
-    };
-    each_row(part_.contacts, of_row);
-    each_row(part_.bonds, of_row);
+    });
   };
   const auto system_of = [&](uint32_t d) -> ImplicitSystem * {
     return rows.block[d] == kNone ? systems[rows.source[d]] : nullptr;
@@ -156,12 +154,10 @@ void ContactNewton::list_rows() {
 void ContactNewton::set_bias() {
   ContactRows &rows = *rows_;
   bias_.resize(3 * row_.size());
-  const auto clear = [&](uint32_t i) {
+  each_row(part_, [&](uint32_t i) {
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
       if (rows.block[rows.dof[j]] == kNone) std::fill_n(&rows.y[size_t{kStride} * rows.dof[j]], 3, 0.0);
-  };
-  each_row(part_.contacts, clear);
-  each_row(part_.bonds, clear);
+  });
   for (const uint32_t number : part_.blocks) {
     const size_t first = size_t{kStride} * rows.blocks[number].first;
     std::copy_n(&rows.y_free[first], size_t{kStride} * rows.blocks[number].count, &rows.y[first]);
@@ -369,10 +365,7 @@ bool ContactNewton::find_slopes(bool frozen) {
     }
     if (!(rho_t > 0)) continue;
     if (s.form[i] == kSmoothLaw && s.fn[i] > 0) {
-      const Slope d = dissipative_slope(s, i);
-      const double t = h_ / rho_t;
-      const double m11 = 1 - t * d.a, m22 = 1 - t * d.d, m12 = -t * d.b, m21 = -t * d.c,
-                   det = m11 * m22 - m12 * m21;
+      const auto [d, m11, m12, m21, m22, det] = linear_law(s, i, h_ / rho_t);
       // X = (I - D/rho)^-1; G_tt = -X D, G_tn = X (dft/dfn) G_nn
       const double x11 = m22 / det, x12 = -m12 / det, x21 = -m21 / det, x22 = m11 / det;
       G[4] = -h_ * (x11 * d.a + x12 * d.c);

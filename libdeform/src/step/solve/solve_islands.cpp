@@ -98,12 +98,10 @@ double motion_tolerance(const SolveIsland &own) {
 bool take_least_work(ContactRows &rows, const RowsPart &part) {
   const double share = share_of_least_work(rows, part);
   if (share == 1) return false;
-  const auto scale = [&](uint32_t i) {
+  each_row(part, [&](uint32_t i) {
     double *const l = &rows.impulse[3 * size_t{i}];
     store3(l, share * load3(l));
-  };
-  each_row(part.contacts, scale);
-  each_row(part.bonds, scale);
+  });
   rows.restore(part);
   return true;
 }
@@ -331,16 +329,14 @@ void SolveIslands::prepare(const World &w, StepContext &step) {
     own.between_rigids = between_rigids_[k];
     own.all_rigid = own.part.nbond == 0 && own.part.contacts.front().first >= step.rows.soft();
     for (const uint32_t b : own.part.blocks) own.rigid = own.rigid || blocks[b].group != kNone;
-    const auto moves_implicit = [&](uint32_t i) {
+    each_row(own.part, [&](uint32_t i) {
       for (uint32_t j = step.rows.begin[i]; j < step.rows.begin[i + 1]; ++j) {
         const uint32_t d = step.rows.dof[j];
         if (step.rows.block[d] != kNone || !step.systems[step.rows.source[d]]) continue;
         own.implicit = true;
         own.implicit_body = step.rows.source[d];
       }
-    };
-    each_row(own.part.contacts, moves_implicit);
-    each_row(own.part.bonds, moves_implicit);
+    });
     own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
   }
 }
@@ -410,12 +406,10 @@ void take_part_of_contact(const World &w, StepContext &step, double share) {
   full.assign(w.bodies.size(), 0);
   const std::span<SolveIsland> all = step.solve_islands->all();
   const auto each_body = [&](const SolveIsland &own, auto &&f) {
-    const auto of_row = [&](uint32_t i) {
+    each_row(own.part, [&](uint32_t i) {
       for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
         if (const uint32_t s = rows.source[rows.dof[j]]; s != kNone) f(s);
-    };
-    each_row(own.part.contacts, of_row);
-    each_row(own.part.bonds, of_row);
+    });
   };
   const auto keeps = [&](const SolveIsland &own) {
     bool any = own.implicit || !own.part.blocks.empty();
