@@ -31,8 +31,7 @@ bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, ui
 }  // namespace
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
-  for (auto &o : w.obstacles)
-    if (o->id == id) return *o;
+  if (Obstacle *const o = w.obstacle(id)) return *o;
   fail(DFM_E_FATAL, "a rigid body has lost its shape");
 }
 
@@ -42,12 +41,10 @@ Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
   return o.added ? load_pose(s) * o.local : load_pose(s);
 }
 
-// Mean velocity of a shape's origin for this motion of its body, as ObstacleView::velocity_at.
-Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
-  if (!o.added) return velocity;
-  const Vec3 arm = rotate(load_quat(start.rotation), o.local.position), turn = load3(start.spin);
-  const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
-  return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
+Vec3 mean_velocity_at(const Obstacle &o, const double *v, Vec3 arm, double h) {
+  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
+  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
+  return velocity_at(v, arm) + (0.5 * h) * second + (h * h / 6) * third;
 }
 
 void place_rigids(World &w) {
@@ -93,7 +90,9 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
     ObstacleView &view = step.obstacle_views[o->slot];
-    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), step.h);
+    view.velocity = o->added
+                        ? mean_velocity_at(*o, v, rotate(load_quat(s.rotation), o->local.position), step.h)
+                        : load3(v);
     view.spin = load3(v + 3);
     view.linear = view.spin - load3(s.spin);
     if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);

@@ -107,14 +107,15 @@ class ToolTouch {
   };
   // Two obstacles that may touch, by their places in World::obstacles.
   struct Pair {
-    uint32_t a, b, law;
+    uint32_t a, b;
     uint64_t id[2];
-    bool frees, jaw;     // none is of a tool; one is a jaw
-    bool b_first;        // reports have b first
-    uint32_t wall[2];    // number among walls_; kNone: it is in a set
-    double thin;         // m, least thickness of the two
-    double dent;         // m: edges that are further on the wrong side do not touch there
-    double reach, turn;  // m, rad: how far its rows of this sub-step keep the two apart
+    uint32_t law = 0;
+    bool frees = true, jaw = false;     // none is of a tool; one is a jaw
+    bool b_first = false;               // reports have b first
+    uint32_t wall[2] = {kNone, kNone};  // number among walls_; kNone: it is in a set
+    double thin = 0;                    // m, least thickness of the two
+    double dent = 0;                    // m: edges that are further on the wrong side do not touch there
+    double reach = HUGE_VAL, turn = HUGE_VAL;  // m, rad: how far its rows of this sub-step keep the two apart
   };
   struct Row {
     const Pair *pair;

@@ -99,13 +99,9 @@ void part(World &w, Attachment &a) {
 
 }  // namespace
 
-// Its displacement over the sub-step to third order in the initial spin, as for shapes (shape_velocity).
 Vec3 place_velocity(const Obstacle &o, Vec3 x, const StepContext &step) {
-  const Vec3 arm = x - step.rigid_places[o.slot].center;
-  const double *const v = &o.rigid->first[6 * size_t{o.rigid_body}];
-  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
-  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
-  return load3(v) + cross(load3(v + 3), arm) + (0.5 * step.h) * second + (step.h * step.h / 6) * third;
+  return mean_velocity_at(o, &o.rigid->first[6 * size_t{o.rigid_body}], x - step.rigid_places[o.slot].center,
+                          step.h);
 }
 
 Pose attached_frame(const Obstacle &o) { return o.rigid ? load_pose(o.rigid->state[o.rigid_body]) : o.pose; }
