@@ -255,7 +255,6 @@ void keep_friction(World &w, StepContext &step, Buffers &r) {
 }
 
 bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
-  step.passes = step.sweeps = 0;
   step.residual = {};
   uint32_t nnode = 0;
   for (const BodyView &v : step.body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);

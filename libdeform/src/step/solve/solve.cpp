@@ -200,14 +200,18 @@ const SolveIsland *solve_revised(World &w, StepContext &step) {
 }
 
 // Takes the largest residual of all islands, and the passes and sweeps of the island that needed most.
-void add_up(StepContext &step) {
-  step.passes = step.sweeps = 0;
-  step.residual = {};
+void add_up(World &w, StepContext &step) {
+  dfm_world_stats &s = w.stats;
+  s.passes = s.sweeps = 0;
   for (const SolveIsland &own : step.solve_islands->all()) {
-    step.passes = std::max(step.passes, own.all_passes);
-    step.sweeps = std::max(step.sweeps, own.all_sweeps);
+    s.passes = std::max(s.passes, own.all_passes);
+    s.sweeps = std::max(s.sweeps, own.all_sweeps);
     step.residual = larger(step.residual, own.residual);
   }
+  s.residual = step.residual.speed;
+  s.passes_max = std::max(s.passes_max, s.passes);
+  s.sweeps_max = std::max(s.sweeps_max, s.sweeps);
+  s.residual_max = std::max(s.residual_max, s.residual);
 }
 
 // False: the sub-step is to be repeated, with the integrator that contacts need.
@@ -261,7 +265,6 @@ bool cut_at_landing(World &w, StepContext &step) {
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   call_pre_solve(w, step);
   if (!contacts_taken(w, step) || !short_enough(w, step)) return false;
-  step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);
   if (!cut_at_landing(w, step)) return false;
@@ -274,7 +277,6 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   }
   share_work(w, step);
   const SolveIsland *const bad = solve_revised(w, step);
-  add_up(step);
   for (const SolveIsland &own : step.solve_islands->all())
     if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
   double nan_flag = 0;
@@ -286,12 +288,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   // laws may have been evaluated at slips that differ from the solution
   std::swap(step.state.vt, step.state.slip);
   update_stick_drift(w, step);
-  w.stats.passes = step.passes;
-  w.stats.sweeps = step.sweeps;
-  w.stats.residual = step.residual.speed;
-  w.stats.passes_max = std::max(w.stats.passes_max, step.passes);
-  w.stats.sweeps_max = std::max(w.stats.sweeps_max, step.sweeps);
-  w.stats.residual_max = std::max(w.stats.residual_max, w.stats.residual);
+  add_up(w, step);
   reserve_contacts(w, step);
   return true;
 }
