@@ -54,13 +54,9 @@ void ContactNewton::multiply_bodies(const double *in, double *out) const {
   std::fill_n(out, size_t{3} * nodes_, 0.0);
   for (const uint32_t b : at_) {
     const uint32_t i = pattern_.ij[2 * size_t{b}], j = pattern_.ij[2 * size_t{b} + 1];
-    const double *const a = &matrix_[9 * size_t{b}], *const x = in + 3 * size_t{j};
-    double *const y = out + 3 * size_t{i};
-    for (size_t r = 0; r < 3; ++r) y[r] += a[3 * r] * x[0] + a[3 * r + 1] * x[1] + a[3 * r + 2] * x[2];
-    if (i == j) continue;
-    const double *const z = in + 3 * size_t{i};
-    double *const to = out + 3 * size_t{j};
-    for (size_t c = 0; c < 3; ++c) to[c] += a[c] * z[0] + a[3 + c] * z[1] + a[6 + c] * z[2];
+    const double *const a = &matrix_[9 * size_t{b}];
+    add3(out + 3 * size_t{i}, in_frame(a, load3(in + 3 * size_t{j})));
+    if (i != j) add3(out + 3 * size_t{j}, from_frame(a, load3(in + 3 * size_t{i})));
   }
 }
 
@@ -79,7 +75,7 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
       G = s;
     }
     const Vec3 u = times(k, in, 3);
-    add_transposed(k, {dot(load3(G), u), dot(load3(G + 3), u), dot(load3(G + 6), u)}, out);
+    add_transposed(k, in_frame(G, u), out);
   }
 }
 

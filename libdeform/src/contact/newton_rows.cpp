@@ -177,9 +177,8 @@ void ContactNewton::set_bias() {
     // motions of blocks as the start impulses have made them
     for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
       if (node_[e] < points_) continue;
-      const double *const j = &jac_[size_t{9} * e], *const l = &rows.impulse[size_t{3} * i];
-      double *const q = &v_[size_t{kStride} * node_[e]];
-      for (size_t c = 0; c < 3; ++c) q[c] += j[c] * l[0] + j[3 + c] * l[1] + j[6 + c] * l[2];
+      const Vec3 l = load3(&rows.impulse[size_t{3} * i]);
+      add3(&v_[size_t{kStride} * node_[e]], from_frame(&jac_[size_t{9} * e], l));
     }
   }
 }
@@ -209,9 +208,7 @@ void ContactNewton::set_penalties(double factor) {
 }
 
 Vec3 ContactNewton::entry_times(uint32_t e, const double *x) const {
-  const double *const j = &(seen_.empty() ? jac_ : seen_)[size_t{9} * e];
-  return {j[0] * x[0] + j[1] * x[1] + j[2] * x[2], j[3] * x[0] + j[4] * x[1] + j[5] * x[2],
-          j[6] * x[0] + j[7] * x[1] + j[8] * x[2]};
+  return in_frame(&(seen_.empty() ? jac_ : seen_)[size_t{9} * e], load3(x));
 }
 
 Vec3 ContactNewton::times(uint32_t k, const double *x, size_t stride) const {
@@ -221,13 +218,8 @@ Vec3 ContactNewton::times(uint32_t k, const double *x, size_t stride) const {
 }
 
 void ContactNewton::add_transposed(uint32_t k, Vec3 z, double *to) const {
-  for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
-    const double *const j = &jac_[size_t{9} * e];
-    double *const at = to + size_t{3} * node_[e];
-    at[0] += j[0] * z.x + j[3] * z.y + j[6] * z.z;
-    at[1] += j[1] * z.x + j[4] * z.y + j[7] * z.z;
-    at[2] += j[2] * z.x + j[5] * z.y + j[8] * z.z;
-  }
+  for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e)
+    add3(to + size_t{3} * node_[e], from_frame(&jac_[size_t{9} * e], z));
 }
 
 void ContactNewton::evaluate_bond(uint32_t k) {

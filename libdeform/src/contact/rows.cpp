@@ -461,9 +461,7 @@ Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
     const double *const v = of + size_t(d) * 4;
     const Vec3 spin = load3(v + 4);
     u += sign * (load3(v) + dfm::cross(spin, r));
-    if (turns)
-      turned +=
-          sign * Vec3{dot(load3(turns), spin), dot(load3(turns + 3), spin), dot(load3(turns + 6), spin)};
+    if (turns) turned += sign * in_frame(turns, spin);
   });
   const double *const f = &frame[size_t(i) * 9];
   return in_frame(f, u) + turned - load3(&drive[size_t(i) * 3]);
@@ -493,8 +491,7 @@ void ContactRows::apply_to_rigids(uint32_t i, Vec3 p) {
 }
 
 void ContactRows::apply(uint32_t i, Vec3 q) {
-  const double *const f = &frame[size_t(i) * 9];
-  const Vec3 p = from_frame(f, &q.x);
+  const Vec3 p = from_frame(&frame[size_t(i) * 9], q);
   apply_to_rigids(i, p);
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
@@ -510,10 +507,7 @@ void ContactRows::restart_rigids() {
   for (const Block &b : blocks)
     if (b.group != kNone)
       std::copy_n(&y[size_t(4) * b.first], size_t(4) * b.count, &y_free[size_t(4) * b.first]);
-  for (uint32_t i = 0; i < all(); ++i) {
-    const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
-    apply_to_rigids(i, from_frame(f, q));
-  }
+  for (uint32_t i = 0; i < all(); ++i) apply_to_rigids(i, world_impulse(i));
 }
 
 namespace {

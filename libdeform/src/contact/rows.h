@@ -24,6 +24,10 @@
 
 namespace dfm {
 
+inline Vec3 from_frame(const double *f, Vec3 v) {
+  return v.x * load3(f) + v.y * load3(f + 3) + v.z * load3(f + 6);
+}
+
 // Where a body's dofs come from.
 struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
@@ -187,6 +191,9 @@ struct ContactRows {
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
   Vec3 velocity(uint32_t i, const double *of) const;
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
+  Vec3 world_impulse(uint32_t i) const {       // the row's own
+    return from_frame(&frame[size_t(9) * i], load3(&impulse[size_t(3) * i]));
+  }
   // Begins a solve: y_free is y as it is, and y has the impulses of the last one. Those without a normal part
   // go as a whole, for there is no friction without it: they come from hits that have turned a contact, and
   // from fixed limits.

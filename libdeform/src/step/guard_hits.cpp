@@ -252,9 +252,8 @@ void guard_add_hits(World &w, StepContext &step) {
   g.kept.clear();
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
-    const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
     const Guard::Kept *const k = find_kept(g.kept_before, c);
-    g.kept.push_back({c.key, c.more, from_frame(f, l), step.rows.rate[i], k && k->hit});
+    g.kept.push_back({c.key, c.more, step.rows.world_impulse(i), step.rows.rate[i], k && k->hit});
   }
   for (const GuardHit &hit : g.hits) {
     ContactPoint c;
@@ -303,11 +302,8 @@ void guard_impulses(StepContext &step) {
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const Guard::Kept *const k = find_kept(step.guard.kept, step.contacts[i]);
     if (!k) continue;
-    const double *const f = &step.rows.frame[size_t(i) * 9];
-    double *const l = &step.rows.impulse[size_t(i) * 3];
-    l[0] = std::max(0.0, dot(load3(f), k->impulse));
-    l[1] = dot(load3(f + 3), k->impulse);
-    l[2] = dot(load3(f + 6), k->impulse);
+    const Vec3 l = in_frame(&step.rows.frame[size_t(i) * 9], k->impulse);
+    store3(&step.rows.impulse[size_t(i) * 3], {std::max(0.0, l.x), l.y, l.z});
   }
 }
 

@@ -141,11 +141,9 @@ uint32_t join_rows(StepContext &step) {
     const auto is_same = [&](const ContactPoint &c) { return c.key == row->key; };
     const size_t from = size_t(row - step.contacts.begin()),
                  to = size_t(std::find_if(step.contacts.begin(), end, is_same) - step.contacts.begin());
-    const double *const f = &step.rows.frame[9 * from], *const t = &step.rows.frame[9 * to];
-    double *const l = &step.rows.impulse[3 * from], *const sum = &step.rows.impulse[3 * to];
-    const Vec3 p = from_frame(f, l);
-    for (size_t k = 0; k < 3; ++k) sum[k] += dot(load3(t + 3 * k), p);
-    std::fill_n(l, 3, 0.0);
+    const Vec3 p = step.rows.world_impulse(uint32_t(from));
+    add3(&step.rows.impulse[3 * to], in_frame(&step.rows.frame[9 * to], p));
+    store3(&step.rows.impulse[3 * from], {});
   }
   return uint32_t(end - step.contacts.begin());
 }

@@ -149,11 +149,10 @@ void sum_rigid_impulses(World &w, StepContext &step) {
   for (uint32_t i = 0; i < rows.all(); ++i) {
     if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
     const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
-    const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
-    const Vec3 p = from_frame(f, l);
+    const Vec3 p = -rows.world_impulse(i);
     double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
-    store3(to, load3(to) - p);
-    store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+    add3(to, p);
+    add3(to + 3, cross(load3(&rows.arm[size_t(3) * i]), p));
   }
 }
 
