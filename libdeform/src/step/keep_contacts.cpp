@@ -104,21 +104,21 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
   to.area[i] = step.state.area[i];
   to.start_depth[i] = step.rows.start_depth[i];
-  const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
   // A hold counts from hold_begin on: contacts that stick in the first sub-step after it and in every one
   // since.
   const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
   const bool holds = w.hold.on && stick && (first || carried);
-  to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
-  to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
+  for (size_t k = 0; k < 2; ++k) {
+    const double slip = step.state.vt[step.state.stride * k + i];
+    to.path[2 * size_t{i} + k] = holds ? (carried ? w.store.path[2 * size_t{m} + k] : 0) + step.h * slip : 0;
+    w.report.slip[2 * size_t{i} + k] = slip;
+  }
   to.touching[i] = now;
   to.held[i] = holds;
   to.began[i] = now && !before;
   step.before[i] = before;
   w.report.contacts[i] = c;
   w.report.contacts[i].area = step.state.area[i];
-  w.report.slip[2 * i] = v1;
-  w.report.slip[2 * i + 1] = v2;
   w.report.mode[i] = step.state.mode[i];
 }
 
