@@ -185,10 +185,9 @@ void restart_rigids(World &w, StepContext &step) {
   step.rows.restart_rigids();
 }
 
-// 1: all have ended their step; 2: a host requests another solve; 0: failed.
-int query_rigid_ends(World &w, uint32_t *trouble) {
+// again: whether a host requests another solve.
+bool query_rigid_ends(World &w, bool &again, uint32_t *trouble) {
   const uint64_t said = sentences();
-  bool again = false;
   for (auto &set : w.rigid_sets)
     if (const HostFault fault = set->take_impulses()) return host_failed(w, *set, fault, said, trouble);
   for (auto &set : w.rigid_sets) {
@@ -196,15 +195,15 @@ int query_rigid_ends(World &w, uint32_t *trouble) {
     if (const HostFault fault = set->end_state(one)) return host_failed(w, *set, fault, said, trouble);
     again |= one;
   }
-  return again ? 2 : 1;
+  return true;
 }
 
 Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   sum_rigid_impulses(w, step);
   step.tools->list(w, step);
-  const int end = query_rigid_ends(w, trouble);
-  if (end == 0) return Next::stop;
-  step.rigid_again = end == 2 && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
+  bool again = false;
+  if (!query_rigid_ends(w, again, trouble)) return Next::stop;
+  step.rigid_again = again && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
                      step.rows.all() > 0;
   if (step.rigid_again) {
     ++step.rigid_rounds;

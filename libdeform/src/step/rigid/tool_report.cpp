@@ -89,8 +89,9 @@ size_t ToolTouch::most_events(const World &w) const {
   return next_report_.touching.size() + w.rigid_report.touching.size();
 }
 
-// At the end of a sub-step that stands; allocates nothing.
-void ToolTouch::report(World &w) noexcept {
+// Allocates nothing.
+void ToolTouch::keep(World &w) noexcept {
+  if (w.tool_store.n > 0 || next_.n > 0) std::swap(w.tool_store, next_);
   RigidReport &now = next_report_;
   if (now.touching.empty() && now.contacts.empty() && w.rigid_report.touching.empty() &&
       w.rigid_report.contacts.empty())

@@ -378,13 +378,6 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
   }
 }
 
-void ToolTouch::find(const World &w, const StepContext &step) {
-  each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-    const double deep = add_rows(pair, a, b, at_a, at_b);
-    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
-  });
-}
-
 // The terms of turning beyond the first order and spins depend on the solution.
 bool ToolTouch::follow(World &w, StepContext &step) {
   if (rows_.empty()) return false;
@@ -497,7 +490,10 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   planned_ = step.length.planned;
   strong_ = 1;
   take_sets(w, step);
-  find(w, step);
+  each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+    const double deep = add_rows(pair, a, b, at_a, at_b);
+    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
+  });
   if (rows_.empty()) return true;
   if (!follows_arcs(w, step)) return false;
   for (Moved &m : sides_)

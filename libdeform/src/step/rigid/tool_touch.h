@@ -165,7 +165,6 @@ class ToolTouch {
   // bone_a, bone_b: corners, or points of edges or faces, without the radius around them
   struct Place { Vec3 at, bone_a, bone_b; };
   Vec3 speed(const Row &row, const std::vector<double> Moved::*of = &Moved::now) const;
-  void find(const World &w, const StepContext &step);
   using Visit = std::function<void(Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f);
   static bool cull_facing(ToolShape &a, ToolShape &b, double far, bool flat);
@@ -203,9 +202,8 @@ class ToolTouch {
   double response_without_joints(const Side &side, Vec3 along) const;
   bool jointed(const Side &side) const;
   double rounding_of(const Row &row, Vec3 along) const;
-  bool motor_holds(const Row &row) const;
-  bool is_driven(const Side &side, Vec3 along) const;
   double softness_of_motor(const Row &row) const;
+  bool is_driven(const Side &side, Vec3 along) const;
   void begin_passes();
   void request_again(Moved &m);
   static void clean_response(Moved &m, uint32_t group);
@@ -230,7 +228,6 @@ class ToolTouch {
   void keep_next(const ContactState &state, uint32_t first);
   // tool_report.cpp
   void list_contact(const World &w, const StepContext &step, uint32_t row);
-  void report(World &w) noexcept;
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
