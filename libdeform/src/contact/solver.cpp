@@ -149,10 +149,27 @@ void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
   take_impulses(rows, part, from_.data());
 }
 
-namespace {
+Residual larger(const Residual &a, const Residual &b) {
+  return {std::max(a.relative, b.relative), std::max(a.required, b.required), std::max(a.speed, b.speed),
+          std::max(a.normal, b.normal)};
+}
 
-Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Tolerance &tolerance, Residual r) {
+Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                     const Tolerance &tolerance) {
+  Residual r;
   double nan_flag = 0;
+  if (part.alone)
+    for (const RowRun &run : part.contacts)
+      r = larger(r, rows.kernels().residual(
+                        rows.view(run), law.view(run.first),
+                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
+                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
+  else
+    each_row(part.contacts, [&, view = law.view()](uint32_t i) {
+      if (!(rows.wn[i] > 0)) return;
+      const Vec3 u = rows.velocity(i);
+      add_residual(rows, view, tolerance, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], r, nan_flag);
+    });
   each_row(part.bonds, [&](uint32_t row) {
     const double left = norm(bond_residual(rows, row));
     nan_flag += 0.0 * left;
@@ -162,39 +179,6 @@ Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Toleran
   });
   if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
   return r;
-}
-
-Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &law, double h,
-                  const Tolerance &tolerance) {
-  Residual r;
-  double nan_flag = 0;
-  each_row(part.contacts, [&](uint32_t i) {
-    if (!(rows.wn[i] > 0)) return;
-    const Vec3 u = rows.velocity(i);
-    add_residual(rows, law, tolerance, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], r, nan_flag);
-  });
-  if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
-  return r;
-}
-
-}  // namespace
-
-Residual larger(const Residual &a, const Residual &b) {
-  return {std::max(a.relative, b.relative), std::max(a.required, b.required), std::max(a.speed, b.speed),
-          std::max(a.normal, b.normal)};
-}
-
-Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                     const Tolerance &tolerance) {
-  Residual r;
-  if (part.alone)
-    for (const RowRun &run : part.contacts)
-      r = larger(r, rows.kernels().residual(
-                        rows.view(run), law.view(run.first),
-                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
-                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
-  else r = residual(rows, part, law.view(), h, tolerance);
-  return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
 }
 
 double share_of_least_work(const ContactRows &rows, const RowsPart &part) {

@@ -31,21 +31,21 @@
 namespace dfm {
 namespace {
 
-// Responses between the touched surfels of bodies whose points respond to each other's impulses.
-void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
-  const Body &b = *w.bodies[block.source];
-  const uint32_t *const surfels = &step.rows.point[block.first];
-  step.rows.set_response(block, true, [&](double *responses) {
-    if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
-      fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
-           b.model.type->id, b.name.c_str());
-  });
-}
-
+// Responses between the touched surfels of bodies whose points respond to each other's impulses, and of groups
+// of rigid bodies.
 void fill_responses(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
-    if (block.group == kNone) fill_response(w, step, block);
-    else rigid_response(w, step, block);
+    if (block.group != kNone) {
+      rigid_response(w, step, block);
+      continue;
+    }
+    const Body &b = *w.bodies[block.source];
+    const uint32_t *const surfels = &step.rows.point[block.first];
+    step.rows.set_response(block, true, [&](double *responses) {
+      if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
+        fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
+             b.model.type->id, b.name.c_str());
+    });
   }
 }
 

@@ -299,18 +299,17 @@ void SolveIslands::assign_rows(size_t of_contacts) {
     for (const RowRun &r : runs) n += r.n;
     return n;
   };
-  split({pairs_.data(), of_contacts}, contact_);
-  for (uint32_t k = 0; k < count_; ++k) {
-    RowsPart &part = islands_[k].part;
-    part.contacts = slice(contact_, k);
-    part.n = rows_of(part.contacts);
-  }
-  split({pairs_.data() + of_contacts, pairs_.size() - of_contacts}, bond_);
-  for (uint32_t k = 0; k < count_; ++k) {
-    RowsPart &part = islands_[k].part;
-    part.bonds = slice(bond_, k);
-    part.nbond = rows_of(part.bonds);
-  }
+  const auto assign = [&](std::span<const Pair> pairs, Array<RowRun> &runs, auto rows, auto number) {
+    split(pairs, runs);
+    for (uint32_t k = 0; k < count_; ++k) {
+      RowsPart &part = islands_[k].part;
+      part.*rows = slice(runs, k);
+      part.*number = rows_of(part.*rows);
+    }
+  };
+  const std::span<const Pair> all(pairs_);
+  assign(all.first(of_contacts), contact_, &RowsPart::contacts, &RowsPart::n);
+  assign(all.subspan(of_contacts), bond_, &RowsPart::bonds, &RowsPart::nbond);
 }
 
 void SolveIslands::sort_blocks(const Array<ContactRows::Block> &blocks) {

@@ -204,17 +204,16 @@ void book_contact(World &w, StepContext &step) {
 double work_of_contact(const World &w, const StepContext &step, const Body &b, const double *way) {
   const Phyxels &p = b.p;
   double contact = 0;
-  if (w.plan.touches()) {
-    const Turning turning = steps_itself(b) ? Turning{} : turning_of(p, way, step.h);
-    for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
-      const double *const q = &b.surfel_impulse[3 * size_t(s)];
-      if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
-      b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
-        const Vec3 arc = turning.arc(load3(way + size_t(point) * kStride));
-        for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
-          if (p.moves(at)) contact += weight * q[k] * (way[at] + arc[int(k)]);
-      });
-    }
+  if (!w.plan.touches()) return contact;
+  const Turning turning = steps_itself(b) ? Turning{} : turning_of(p, way, step.h);
+  for (uint32_t s = 0; s < b.surface.nsurfel; ++s) {
+    const double *const q = &b.surfel_impulse[3 * size_t(s)];
+    if (q[0] == 0 && q[1] == 0 && q[2] == 0) continue;
+    b.surface.each_phyxel(s, [&](uint32_t point, double weight) {
+      const Vec3 arc = turning.arc(load3(way + size_t(point) * kStride));
+      for (size_t k = 0, at = size_t(point) * kStride; k < 3; ++k, ++at)
+        if (p.moves(at)) contact += weight * q[k] * (way[at] + arc[int(k)]);
+    });
   }
   return contact;
 }
