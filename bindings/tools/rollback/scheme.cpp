@@ -255,7 +255,6 @@ void keep_friction(World &w, StepContext &step, Buffers &r) {
 }
 
 bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
-  step.passes = step.sweeps = 0;
   step.residual = {};
   uint32_t nnode = 0;
   for (const BodyView &v : step.body_views) nnode = std::max(nnode, v.first_node + v.surface->nsurfel);
@@ -267,10 +266,8 @@ bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   make_rows(w, step);
   set_forces(w, step, r);
   for (SolveIsland &island : step.solve_islands->all())
-    if (const LawInstance *bad = island.batches.evaluate(step.h, step.state)) {
-      *trouble |= report_failed_solve(w, step, bad, island.batches.failed());
-      return false;
-    }
+    if (const LawInstance *bad = island.batches.evaluate(step.h, step.state))
+      return report_failed_solve(w, step, bad, island.batches.failed(), trouble);
   w.stats.passes = step.rows.n > 0;
   w.stats.sweeps = 0;
   w.stats.residual = 0;

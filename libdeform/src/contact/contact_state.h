@@ -58,7 +58,6 @@ struct ContactState {
     form.resize(stride);
     linear.resize(n);
     origin.resize(n);
-    clear_padding();
   }
 
   // from contact i on
@@ -67,17 +66,6 @@ struct ContactState {
             ft.data() + i,    dft_dvt.data() + i, dft_dfn.data() + i,
             limit.data() + i, mode.data() + i,    form.data() + i,
             linear.data() + i};
-  }
-
-  // Laws may be evaluated in these columns, including places beyond n: these have the values of an open
-  // contact.
-  void clear_padding() {
-    const auto clear = [&](Array<double> &a) {
-      for (size_t end = stride; end <= a.size(); end += stride)
-        for (size_t k = end - (stride - n); k < end; ++k) a[k] = 0;
-    };
-    if (n == stride) return;
-    for (Array<double> *a : {&fn, &area, &dwell, &vt, &ft_stop, &bristle}) clear(*a);
   }
 };
 

@@ -54,13 +54,9 @@ void ContactNewton::multiply_bodies(const double *in, double *out) const {
   std::fill_n(out, size_t{3} * nodes_, 0.0);
   for (const uint32_t b : at_) {
     const uint32_t i = pattern_.ij[2 * size_t{b}], j = pattern_.ij[2 * size_t{b} + 1];
-    const double *const a = &matrix_[9 * size_t{b}], *const x = in + 3 * size_t{j};
-    double *const y = out + 3 * size_t{i};
-    for (size_t r = 0; r < 3; ++r) y[r] += a[3 * r] * x[0] + a[3 * r + 1] * x[1] + a[3 * r + 2] * x[2];
-    if (i == j) continue;
-    const double *const z = in + 3 * size_t{i};
-    double *const to = out + 3 * size_t{j};
-    for (size_t c = 0; c < 3; ++c) to[c] += a[c] * z[0] + a[3 + c] * z[1] + a[6 + c] * z[2];
+    const double *const a = &matrix_[9 * size_t{b}];
+    add3(out + 3 * size_t{i}, in_frame(a, load3(in + 3 * size_t{j})));
+    if (i != j) add3(out + 3 * size_t{j}, from_frame(a, load3(in + 3 * size_t{i})));
   }
 }
 
@@ -79,7 +75,7 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
       G = s;
     }
     const Vec3 u = times(k, in, 3);
-    add_transposed(k, {dot(load3(G), u), dot(load3(G + 3), u), dot(load3(G + 6), u)}, out);
+    add_transposed(k, in_frame(G, u), out);
   }
 }
 
@@ -219,14 +215,12 @@ void ContactNewton::put_rows() {
   ContactRows &rows = *rows_;
   for (size_t k = 0; k < row_.size(); ++k) std::copy_n(&l_[3 * k], 3, &rows.impulse[size_t{3} * row_[k].row]);
   rows.restore(part_);
-  const auto put = [&](uint32_t i) {
+  each_row(part_, [&](uint32_t i) {
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) {
       const uint32_t d = rows.dof[j], node = node_of_dof_[d];
       if (node != kNone) std::copy_n(&v_[size_t{kStride} * node], 3, &rows.y[size_t{kStride} * d]);
     }
-  };
-  each_row(part_.contacts, put);
-  each_row(part_.bonds, put);
+  });
 }
 
 void ContactNewton::scale_penalties(double by) {

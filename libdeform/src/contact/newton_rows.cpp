@@ -54,11 +54,9 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
   node_of_dof_.resize(rows.ndof);
   nodes_ = 0;
   const auto each_dof = [&](auto &&f) {
-    const auto of_row = [&](uint32_t i) {
+    each_row(part_, [&](uint32_t i) {
       for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j) f(rows.dof[j]);
-    };
-    each_row(part_.contacts, of_row);
-    each_row(part_.bonds, of_row);
+    });
   };
   const auto system_of = [&](uint32_t d) -> ImplicitSystem * {
     return rows.block[d] == kNone ? systems[rows.source[d]] : nullptr;
@@ -156,12 +154,10 @@ void ContactNewton::list_rows() {
 void ContactNewton::set_bias() {
   ContactRows &rows = *rows_;
   bias_.resize(3 * row_.size());
-  const auto clear = [&](uint32_t i) {
+  each_row(part_, [&](uint32_t i) {
     for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
       if (rows.block[rows.dof[j]] == kNone) std::fill_n(&rows.y[size_t{kStride} * rows.dof[j]], 3, 0.0);
-  };
-  each_row(part_.contacts, clear);
-  each_row(part_.bonds, clear);
+  });
   for (const uint32_t number : part_.blocks) {
     const size_t first = size_t{kStride} * rows.blocks[number].first;
     std::copy_n(&rows.y_free[first], size_t{kStride} * rows.blocks[number].count, &rows.y[first]);
@@ -181,9 +177,8 @@ void ContactNewton::set_bias() {
     // motions of blocks as the start impulses have made them
     for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
       if (node_[e] < points_) continue;
-      const double *const j = &jac_[size_t{9} * e], *const l = &rows.impulse[size_t{3} * i];
-      double *const q = &v_[size_t{kStride} * node_[e]];
-      for (size_t c = 0; c < 3; ++c) q[c] += j[c] * l[0] + j[3 + c] * l[1] + j[6 + c] * l[2];
+      const Vec3 l = load3(&rows.impulse[size_t{3} * i]);
+      add3(&v_[size_t{kStride} * node_[e]], from_frame(&jac_[size_t{9} * e], l));
     }
   }
 }
@@ -213,9 +208,7 @@ void ContactNewton::set_penalties(double factor) {
 }
 
 Vec3 ContactNewton::entry_times(uint32_t e, const double *x) const {
-  const double *const j = &(seen_.empty() ? jac_ : seen_)[size_t{9} * e];
-  return {j[0] * x[0] + j[1] * x[1] + j[2] * x[2], j[3] * x[0] + j[4] * x[1] + j[5] * x[2],
-          j[6] * x[0] + j[7] * x[1] + j[8] * x[2]};
+  return in_frame(&(seen_.empty() ? jac_ : seen_)[size_t{9} * e], load3(x));
 }
 
 Vec3 ContactNewton::times(uint32_t k, const double *x, size_t stride) const {
@@ -225,13 +218,8 @@ Vec3 ContactNewton::times(uint32_t k, const double *x, size_t stride) const {
 }
 
 void ContactNewton::add_transposed(uint32_t k, Vec3 z, double *to) const {
-  for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) {
-    const double *const j = &jac_[size_t{9} * e];
-    double *const at = to + size_t{3} * node_[e];
-    at[0] += j[0] * z.x + j[3] * z.y + j[6] * z.z;
-    at[1] += j[1] * z.x + j[4] * z.y + j[7] * z.z;
-    at[2] += j[2] * z.x + j[5] * z.y + j[8] * z.z;
-  }
+  for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e)
+    add3(to + size_t{3} * node_[e], from_frame(&jac_[size_t{9} * e], z));
 }
 
 void ContactNewton::evaluate_bond(uint32_t k) {
@@ -369,10 +357,7 @@ bool ContactNewton::find_slopes(bool frozen) {
     }
     if (!(rho_t > 0)) continue;
     if (s.form[i] == kSmoothLaw && s.fn[i] > 0) {
-      const Slope d = dissipative_slope(s, i);
-      const double t = h_ / rho_t;
-      const double m11 = 1 - t * d.a, m22 = 1 - t * d.d, m12 = -t * d.b, m21 = -t * d.c,
-                   det = m11 * m22 - m12 * m21;
+      const auto [d, m11, m12, m21, m22, det] = linear_law(s, i, h_ / rho_t);
       // X = (I - D/rho)^-1; G_tt = -X D, G_tn = X (dft/dfn) G_nn
       const double x11 = m22 / det, x12 = -m12 / det, x21 = -m21 / det, x22 = m11 / det;
       G[4] = -h_ * (x11 * d.a + x12 * d.c);

@@ -16,6 +16,11 @@ const ContactKernels &contact_kernels() {
   return contact_kernels_sse2();
 }
 
+// Sources are in ascending order of their first nodes.
+uint32_t source_of_node(std::span<const DofSource> sources, uint32_t node) {
+  return uint32_t(std::ranges::upper_bound(sources, node, {}, &DofSource::first_node) - sources.begin()) - 1;
+}
+
 }  // namespace
 
 ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()), loops_(contact_kernels()) {
@@ -68,12 +73,6 @@ void ContactRows::build_rigid(std::span<const ContactPoint> contacts, const Rigi
 void ContactRows::set_rigid_sides(std::span<const RigidSides> between_rigids) {
   rigid_a.assign(all(), kNone);
   arm_a.resize(size_t(3) * all());
-  frame.resize(size_t(9) * all());
-  for (Array<double> *a : {&drive, &impulse}) a->resize(size_t(3) * all());
-  for (Array<double> *a : {&wn, &wt}) a->resize(all());
-  compliance.resize(size_t(3) * n);
-  this->cross.resize(size_t(2) * n);
-  rate.resize(n);
   for (uint32_t i = soft(); i < n; ++i) {
     const RigidSides &c = between_rigids[i - soft()];
     const auto set = [&](const RigidPlace &r, Array<uint32_t> &of, Array<double> &arms) {
@@ -100,20 +99,16 @@ void ContactRows::clear() {
 // that angular momentum is kept to rounding.
 void ContactRows::set_arms(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
                            const RigidPlaces &rigids, std::span<const Bond> bonds) {
-  uint32_t s = 0;
   const auto set = [&](uint32_t i, const auto &c) {
     if (!c.obstacle || rigids.of_obstacle[c.slot_b].group == kNone) return;
     const RigidPlace &r = rigids.of_obstacle[c.slot_b];
     rigid[i] = dof_of_group_[r.group] + 2 * r.place;
     Vec3 at;
     for (uint32_t k = 0; k < c.nnode; ++k) {
-      while (c.node[k] < sources[s].first_node || c.node[k] >= sources[s].first_node + sources[s].nnode)
-        s = (s + 1) % uint32_t(sources.size());
-      const uint32_t surfel = c.node[k] - sources[s].first_node;
-      const double *const x = sources[s].place
-                                  ? sources[s].place + size_t(sources[s].surface->point[surfel]) * 4
-                                  : &sources[s].surface->x[size_t(surfel) * 4];
-      at += c.weight[k] * load3(x);
+      const DofSource &s = sources[source_of_node(sources, c.node[k])];
+      const uint32_t surfel = c.node[k] - s.first_node;
+      at += c.weight[k] * load3(s.place ? s.place + size_t(s.surface->point[surfel]) * 4
+                                        : &s.surface->x[size_t(surfel) * 4]);
     }
     store3(&arm[size_t(3) * i], at - r.center);
   };
@@ -129,6 +124,12 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   nrigid = static_cast<uint32_t>(between_rigids.size());
   n = static_cast<uint32_t>(contacts.size()) + nrigid;
   nbond = static_cast<uint32_t>(bonds.size());
+  frame.resize(size_t(9) * all());
+  for (Array<double> *a : {&drive, &impulse}) a->resize(size_t(3) * all());
+  for (Array<double> *a : {&wn, &wt}) a->resize(all());
+  compliance.resize(size_t(3) * n);
+  cross.resize(size_t(2) * n);
+  rate.resize(n);
   uint32_t nnode = 0, npoint = 0;
   for (const DofSource &s : sources) {
     nnode = std::max(nnode, s.first_node + s.nnode);
@@ -137,15 +138,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
   clear();
   for (const DofSource &s : sources) whole_of.push_back(s.whole);
 
-  auto source_of = [&](uint32_t node) {
-    // sources are in ascending first_node order
-    uint32_t lo = 0, hi = static_cast<uint32_t>(sources.size());
-    while (hi - lo > 1) {
-      const uint32_t mid = (lo + hi) / 2;
-      (sources[mid].first_node <= node ? lo : hi) = mid;
-    }
-    return lo;
-  };
+  const auto source_of = [&](uint32_t node) { return source_of_node(sources, node); };
   // Pass 1: touched surfels of self-stepping bodies, ascending, one block each.
   if (std::ranges::any_of(sources, [](const DofSource &s) { return !s.diagonal; }))
     dof_of_node_.assign(nnode, kNone);
@@ -197,18 +190,8 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
     const double *const share = contact ? contacts[i].weight : bonds[i - n].weight;
     begin.push_back(static_cast<uint32_t>(dof.size()));
     const uint32_t row = begin.back();
+    // Entries of other contacts in the table are recognized: they do not match the columns of this row.
     auto add = [&](uint32_t d, double w) {
-      for (uint32_t j = row; j < dof.size(); ++j)
-        if (dof[j] == d) {
-          weight[j] += w;
-          return;
-        }
-      dof.push_back(d);
-      weight.push_back(w);
-    };
-    // The same by a table, for long rows. Entries of other contacts are recognized: they do not match the
-    // columns of this row.
-    auto add_far = [&](uint32_t d, double w) {
       if (d >= place_.size()) place_.resize(d + 1);
       const uint32_t at = place_[d];
       if (at >= row && at < dof.size() && dof[at] == d) {
@@ -227,8 +210,7 @@ void ContactRows::build(std::span<const ContactPoint> contacts, std::span<const 
       } else if (surface.identity()) {
         add(dof_of(s, surface.point[surfel]), share[k]);
       } else {
-        surface.each_phyxel(surfel,
-                            [&](uint32_t phyxel, double w) { add_far(dof_of(s, phyxel), share[k] * w); });
+        surface.each_phyxel(surfel, [&](uint32_t phyxel, double w) { add(dof_of(s, phyxel), share[k] * w); });
       }
     }
   }
@@ -413,14 +395,7 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
 
 void ContactRows::finish(std::span<const ContactPoint> contacts, const double *tangents, double h,
                          double planned, double offset, std::span<const Bond> bonds, Tasks *tasks) {
-  frame.resize(size_t(all()) * 9);
-  drive.resize(size_t(all()) * 3);
-  rate.resize(n);
-  compliance.resize(size_t(n) * 3);
-  wn.resize(all());
-  wt.resize(all());
-  cross.resize(size_t(n) * 2);
-  impulse.resize(size_t(all()) * 3);
+  impulse.resize(size_t(3) * all());  // the start has those of contacts alone
   const double most = recovery > 0 ? recovery * planned : kOpens * offset;
   const auto fill = [&](uint32_t i) {
     const Vec3 normal = load3(contacts[i].normal);
@@ -486,9 +461,7 @@ Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
     const double *const v = of + size_t(d) * 4;
     const Vec3 spin = load3(v + 4);
     u += sign * (load3(v) + dfm::cross(spin, r));
-    if (turns)
-      turned +=
-          sign * Vec3{dot(load3(turns), spin), dot(load3(turns + 3), spin), dot(load3(turns + 6), spin)};
+    if (turns) turned += sign * in_frame(turns, spin);
   });
   const double *const f = &frame[size_t(i) * 9];
   return in_frame(f, u) + turned - load3(&drive[size_t(i) * 3]);
@@ -518,8 +491,7 @@ void ContactRows::apply_to_rigids(uint32_t i, Vec3 p) {
 }
 
 void ContactRows::apply(uint32_t i, Vec3 q) {
-  const double *const f = &frame[size_t(i) * 9];
-  const Vec3 p = from_frame(f, &q.x);
+  const Vec3 p = from_frame(&frame[size_t(i) * 9], q);
   apply_to_rigids(i, p);
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
@@ -535,10 +507,7 @@ void ContactRows::restart_rigids() {
   for (const Block &b : blocks)
     if (b.group != kNone)
       std::copy_n(&y[size_t(4) * b.first], size_t(4) * b.count, &y_free[size_t(4) * b.first]);
-  for (uint32_t i = 0; i < all(); ++i) {
-    const double *const f = &frame[size_t(i) * 9], *const q = &impulse[size_t(i) * 3];
-    apply_to_rigids(i, from_frame(f, q));
-  }
+  for (uint32_t i = 0; i < all(); ++i) apply_to_rigids(i, world_impulse(i));
 }
 
 namespace {

@@ -24,6 +24,10 @@
 
 namespace dfm {
 
+inline Vec3 from_frame(const double *f, Vec3 v) {
+  return v.x * load3(f) + v.y * load3(f + 3) + v.z * load3(f + 6);
+}
+
 // Where a body's dofs come from.
 struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body
@@ -126,19 +130,14 @@ struct ContactRows {
   void build(std::span<const ContactPoint> contacts, std::span<const DofSource> sources,
              const RigidPlaces &rigids = {}, std::span<const Bond> bonds = {},
              std::span<const RigidSides> between_rigids = {});
-  // fill(matrix) writes the block's response, [3 count, 3 count] row-major, 1/kg.
+  // fill(matrix) writes the block's response, [3 count, 3 count] 1/kg: by rows, or by columns, which are what
+  // unit impulses change one after another.
   template <class Fill>
-  void set_response(const Block &b, const Fill &fill) {
-    unit_response_.resize(size_t(9) * b.count * b.count);
+  void set_response(const Block &b, bool by_columns, const Fill &fill) {
+    const size_t wide = size_t(3) * b.count;
+    unit_response_.resize(wide * wide);
     fill(unit_response_.data());
-    take_response(b, size_t(3) * b.count, 1);
-  }
-  // The same where fill(answers) writes what unit impulses change one after another, [3 count, 3 count].
-  template <class Fill>
-  void set_responses(const Block &b, const Fill &fill) {
-    unit_response_.resize(size_t(9) * b.count * b.count);
-    fill(unit_response_.data());
-    take_response(b, 1, size_t(3) * b.count);
+    take_response(b, by_columns ? 1 : wide, by_columns ? wide : 1);
   }
   // Frames from normals and tangents [n,3], W diagonals, rates. planned: s, time in which a depth closes;
   // longer than h where the guard has cut it, or depths would turn into speed. tasks: null: on this thread
@@ -170,6 +169,9 @@ struct ContactRows {
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
   Vec3 velocity(uint32_t i, const double *of) const;
   void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
+  Vec3 world_impulse(uint32_t i) const {       // the row's own
+    return from_frame(&frame[size_t(9) * i], load3(&impulse[size_t(3) * i]));
+  }
   // Begins a solve: y_free is y as it is, and y has the impulses of the last one. Those without a normal part
   // go as a whole, for there is no friction without it: they come from hits that have turned a contact, and
   // from fixed limits.
@@ -198,7 +200,7 @@ struct ContactRows {
   // this sub-step's dof of a phyxel, of a surfel of a self-stepping body; kNone
   Array<uint32_t> dof_of_point_, dof_of_node_;
   bool points_free_ = false;  // all of dof_of_point_ are kNone
-  // the place of a dof of a coupled surface in the row being made
+  // the place of a dof in the row being made
   Array<uint32_t> place_;
   Array<uint32_t> dof_of_group_;  // first dof of a rigid group
   const DenseKernels &kernels_;

@@ -58,18 +58,14 @@ void ContactRows::restore(const RowsPart &part) {
   for (const uint32_t b : part.blocks)
     std::copy_n(&y_free[size_t(4) * blocks[b].first], size_t(4) * blocks[b].count,
                 &y[size_t(4) * blocks[b].first]);
-  const auto free = [&](uint32_t i) {
+  each_row(part, [&](uint32_t i) {
     for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
       if (block[dof[j]] == kNone) std::copy_n(&y_free[size_t(4) * dof[j]], 4, &y[size_t(4) * dof[j]]);
-  };
-  const auto push = [&](uint32_t i) {
+  });
+  each_row(part, [&](uint32_t i) {
     const Vec3 l = load3(&impulse[size_t(i) * 3]);
     if (l.x != 0 || l.y != 0 || l.z != 0) apply(i, l);
-  };
-  each_row(part.contacts, free);
-  each_row(part.bonds, free);
-  each_row(part.contacts, push);
-  each_row(part.bonds, push);
+  });
 }
 
 void take_impulses(const ContactRows &rows, const RowsPart &part, double *to) {

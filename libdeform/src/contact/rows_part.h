@@ -25,6 +25,13 @@ void each_row(std::span<const RowRun> runs, F &&f) {
     for (uint32_t i = r.first; i < r.first + r.n; ++i) f(i);
 }
 
+// f(row): contacts, then bonds.
+template <class F>
+void each_row(const RowsPart &part, F &&f) {
+  each_row(part.contacts, f);
+  each_row(part.bonds, f);
+}
+
 // f(row) for all rows < n, which cannot fail, in blocks; tasks: null: on this thread alone. A block
 // takes some microseconds.
 inline constexpr uint32_t kRowsTogether = 32;

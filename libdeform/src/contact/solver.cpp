@@ -8,15 +8,6 @@
 #include "contact/solve_settings.h"
 
 namespace dfm {
-namespace {
-
-double normal_impulse(const ContactRows &rows, uint32_t i, double un) {
-  return normal_impulse(rows.impulse[size_t(i) * 3], un + rows.rate[i], rows.wn[i],
-                        &rows.compliance[size_t(i) * 3]);
-}
-
-}  // namespace
-
 void set_trial(const ContactRows &rows, const RowsPart &part, double h, const double *response,
                ContactState &s) {
   each_row(part.contacts, [&](uint32_t i) {
@@ -25,8 +16,9 @@ void set_trial(const ContactRows &rows, const RowsPart &part, double h, const do
     // The law of a contact without impulse gets the normal force that would close it, at least the one that
     // changes its velocity by 1e-6 m/s: its law's limit per normal force must be known, or a contact that
     // opens and closes would lose its friction in every other pass.
-    s.fn[i] =
-        rows.wn[i] > 0 ? std::max(l[0] > 0 ? l[0] : normal_impulse(rows, i, u.x), 1e-6 / rows.wn[i]) / h : 0;
+    const double wn = rows.wn[i], *const compliance = &rows.compliance[size_t(i) * 3];
+    const auto closing = [&] { return normal_impulse(l[0], u.x + rows.rate[i], wn, compliance); };
+    s.fn[i] = wn > 0 ? std::max(l[0] > 0 ? l[0] : closing(), 1e-6 / wn) / h : 0;
     s.vt[i] = s.slip[i] = u.y;
     s.vt[s.stride + i] = s.slip[s.stride + i] = u.z;
     const double wt = response[i];
@@ -109,13 +101,11 @@ void Acceleration::start(const ContactRows &rows, const RowsPart &part) {
   df_.resize(size_t(kWindow) * n_);
   dg_.resize(size_t(kWindow) * n_);
   double *to = metric_.data();
-  const auto measure = [&](uint32_t i) {
+  each_row(part, [&](uint32_t i) {
     to[0] = std::sqrt(rows.wn[i]);
     to[1] = to[2] = std::sqrt(rows.wt[i]);
     to += 3;
-  };
-  each_row(part.contacts, measure);
-  each_row(part.bonds, measure);
+  });
   from_.resize(n_);
   for (uint32_t k = values; k < n_; ++k) metric_[k] = from_[k] = 0;
   take_impulses(rows, part, from_.data());
@@ -159,10 +149,27 @@ void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
   take_impulses(rows, part, from_.data());
 }
 
-namespace {
+Residual larger(const Residual &a, const Residual &b) {
+  return {std::max(a.relative, b.relative), std::max(a.required, b.required), std::max(a.speed, b.speed),
+          std::max(a.normal, b.normal)};
+}
 
-Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Tolerance &tolerance, Residual r) {
+Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
+                     const Tolerance &tolerance) {
+  Residual r;
   double nan_flag = 0;
+  if (part.alone)
+    for (const RowRun &run : part.contacts)
+      r = larger(r, rows.kernels().residual(
+                        rows.view(run), law.view(run.first),
+                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
+                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
+  else
+    each_row(part.contacts, [&, view = law.view()](uint32_t i) {
+      if (!(rows.wn[i] > 0)) return;
+      const Vec3 u = rows.velocity(i);
+      add_residual(rows, view, tolerance, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], r, nan_flag);
+    });
   each_row(part.bonds, [&](uint32_t row) {
     const double left = norm(bond_residual(rows, row));
     nan_flag += 0.0 * left;
@@ -172,39 +179,6 @@ Residual with_bonds(const ContactRows &rows, const RowsPart &part, const Toleran
   });
   if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
   return r;
-}
-
-Residual residual(const ContactRows &rows, const RowsPart &part, const LawView &law, double h,
-                  const Tolerance &tolerance) {
-  Residual r;
-  double nan_flag = 0;
-  each_row(part.contacts, [&](uint32_t i) {
-    if (!(rows.wn[i] > 0)) return;
-    const Vec3 u = rows.velocity(i);
-    add_residual(rows, law, tolerance, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], r, nan_flag);
-  });
-  if (nan_flag != 0) r.relative = r.required = std::numeric_limits<double>::infinity();
-  return r;
-}
-
-}  // namespace
-
-Residual larger(const Residual &a, const Residual &b) {
-  return {std::max(a.relative, b.relative), std::max(a.required, b.required), std::max(a.speed, b.speed),
-          std::max(a.normal, b.normal)};
-}
-
-Residual residual_of(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
-                     const Tolerance &tolerance) {
-  Residual r;
-  if (part.alone)
-    for (const RowRun &run : part.contacts)
-      r = larger(r, rows.kernels().residual(
-                        rows.view(run), law.view(run.first),
-                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
-                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
-  else r = residual(rows, part, law.view(), h, tolerance);
-  return part.nbond ? with_bonds(rows, part, tolerance, r) : r;
 }
 
 double share_of_least_work(const ContactRows &rows, const RowsPart &part) {

@@ -20,6 +20,18 @@ constexpr double kUnlikeRest = 0.5;
 // allow. At the body's own frequency and decay they see a velocity that is off by so much at most.
 constexpr double kStiffening = 3, kError = 0.02;
 constexpr double kNoDrag = 1e-6;  // of row sums of damping: rounding
+
+FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h) {
+  return {h,          gravity,         p.mass.data(),  p.v.data(), p.inv_mass.data(),
+          p.x.data(), p.v_free.data(), p.x_end.data(), p.n};
+}
+
+// v_free for free components, and x_end where it leads; held components keep the velocity they carry. Returns
+// its kinetic energy, J, which is not finite where a component is not.
+double predict(const PointsKernels &loops, Phyxels &p, const SubStep &now) {
+  const double g[kStride] = {now.gravity.x, now.gravity.y, now.gravity.z, 0};
+  return loops.predict(free_motion_of(p, g, now.h), p.n, p.f.data());
+}
 }  // namespace
 
 ExplicitPoints::ExplicitPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
@@ -306,8 +318,8 @@ bool ExplicitPoints::move_parts(const SubStep &now) {
 }
 
 bool ExplicitPoints::free_motion(const SubStep &now, double &kinetic) {
-  kinetic = moved_ ? std::accumulate(part_kinetic_.begin(), part_kinetic_.end(), 0.0)
-                   : predict(loops_, p_, now.gravity, now.h);
+  kinetic =
+      moved_ ? std::accumulate(part_kinetic_.begin(), part_kinetic_.end(), 0.0) : predict(loops_, p_, now);
   in_place_ = false;
   reached_.clear();
   // A lightest point at the limit has so much alone; who has less need not be looked at point by point.
@@ -322,7 +334,8 @@ bool ExplicitPoints::end_state(const SubStep &now, const double *surfel_impulse,
   free_again(now);
   in_place_ = !touched || surface_.identity();
   if (!in_place_) {
-    find_end(loops_, p_, touched, now.h);
+    loops_.end(p_.n, now.h, p_.x.data(), p_.v_free.data(), p_.inv_mass.data(),
+               touched ? p_.impulse.data() : nullptr, p_.x_end.data(), p_.v_end.data());
     return true;
   }
   if (!touched) return true;

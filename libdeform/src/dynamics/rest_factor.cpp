@@ -14,18 +14,15 @@ Vec3 times3(const double *m, Vec3 a) {
           m[6] * a.x + m[7] * a.y + m[8] * a.z};
 }
 
-double determinant3(const double *m) {
-  return m[0] * (m[4] * m[8] - m[5] * m[7]) + m[1] * (m[5] * m[6] - m[3] * m[8]) +
-         m[2] * (m[3] * m[7] - m[4] * m[6]);
-}
-
-void inverse3(const double *m, double *out) {
+// Returns the determinant of m.
+double inverse3(const double *m, double *out) {
   const double a = m[4] * m[8] - m[5] * m[7], b = m[5] * m[6] - m[3] * m[8], c = m[3] * m[7] - m[4] * m[6];
   const double det = m[0] * a + m[1] * b + m[2] * c;
   const double adjoint[9] = {a, m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
                              b, m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
                              c, m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
   for (int k = 0; k < 9; ++k) out[k] = adjoint[k] / det;
+  return det;
 }
 
 // determinant of an inertia over the cube of its mean: below it the points are on a line
@@ -143,9 +140,10 @@ void RestFactor::find_rigid(const double *x) {
   if (!(mean > 0)) return;
   for (double &value : inertia) value /= mean;
   // rotation about the line of the points moves nothing
-  if (!(determinant3(inertia) > kOnALine))
+  if (!(inverse3(inertia, rigid_.inverse) > kOnALine)) {
     for (int j = 0; j < 3; ++j) inertia[4 * j] += kOnALine;
-  inverse3(inertia, rigid_.inverse);
+    inverse3(inertia, rigid_.inverse);
+  }
   for (double &value : rigid_.inverse) value /= mean;
 }
 

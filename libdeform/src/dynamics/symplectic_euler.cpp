@@ -13,21 +13,6 @@ const PointsKernels &points_kernels() {
   return points_kernels_sse2();
 }
 
-double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h) {
-  const double g[kStride] = {gravity.x, gravity.y, gravity.z, 0};
-  return loops.predict(free_motion_of(p, g, h), p.n, p.f.data());
-}
-
-FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h) {
-  return {h,          gravity,         p.mass.data(),  p.v.data(), p.inv_mass.data(),
-          p.x.data(), p.v_free.data(), p.x_end.data(), p.n};
-}
-
-void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h) {
-  loops.end(p.n, h, p.x.data(), p.v_free.data(), p.inv_mass.data(), touched ? p.impulse.data() : nullptr,
-            p.x_end.data(), p.v_end.data());
-}
-
 double stable_step(const Phyxels &p, const double *ksum, const double *csum, uint32_t *worst) {
   constexpr double kBeyond = 1 + 1e-9;  // more than rounding
   double best = std::numeric_limits<double>::infinity(), q = 0;

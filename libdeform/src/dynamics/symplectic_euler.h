@@ -12,12 +12,6 @@
 namespace dfm {
 
 const PointsKernels &points_kernels();  // the widest of this processor
-// v_free for free components, and x_end where it leads; held components keep the velocity they carry. Returns
-// its kinetic energy, J, which is not finite where a component is not.
-double predict(const PointsKernels &loops, Phyxels &p, Vec3 gravity, double h);
-FreeMotion free_motion_of(Phyxels &p, const double *gravity, double h);  // gravity: [4]
-// v_end = v_free + M^-1 impulse (impulse may be absent: `touched` false), x_end = x + h v_end.
-void find_end(const PointsKernels &loops, Phyxels &p, bool touched, double h);
 
 // Largest stable sub-step. For every mode of K - w^2 M with dampers C taken from the start of the step the
 // scheme is stable iff h^2 k + 2 h c <= 4 m; with Gershgorin row sums this holds for the whole matrix if it

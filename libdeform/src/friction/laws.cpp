@@ -141,38 +141,9 @@ void LawBatches::reuse_slopes(uint32_t i, ContactState &s) {
   o.hold = e1 * e1 + e2 * e2 <= kGood * kGood * (p1 * p1 + p2 * p2) ? o.made : uint8_t(kNoSlope);
 }
 
-namespace {
-
-// Whether the law reads and writes the columns of `state` themselves: these are all contacts, in their order.
-bool in_place(std::span<const uint32_t> index, const ContactState &state) {
-  return index.size() == state.n && state.scale.empty();
-}
-
-}  // namespace
-
 dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint32_t> index, double h,
                                    const ContactState &state) {
   const uint32_t n = static_cast<uint32_t>(index.size()), needs = law.ops->needs, S = law.nstate;
-  dfm_friction_in in{};
-  in.size = sizeof in;
-  in.n = n;
-  in.dt = h;
-  in.params = law.params.data();
-  in.data = law.data;
-  const auto set = [&](uint32_t stride, const double *fn, const double *vt, const double *stop,
-                       const double *area, const double *dwell, const double *bristle) {
-    in.stride = stride;
-    in.fn = fn;
-    in.vt = vt;
-    in.ft_stop = stop;
-    in.area = needs & DFM_NEED_AREA ? area : nullptr;
-    in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
-    in.state = bristle;
-    return in;
-  };
-  if (in_place(index, state))
-    return set(state.stride, state.fn.data(), state.vt.data(), state.ft_stop.data(), state.area.data(),
-               state.dwell.data(), state.bristle.data());
   const size_t column = (n + 7) & ~7u;
   in_.assign(column * (7 + S), 0.0);
   double *const fn = in_.data();
@@ -192,33 +163,37 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
     stop[column + k] = state.ft_stop[state.stride + i];
     for (uint32_t s = 0; s < S; ++s) bristle[s * column + k] = state.bristle[size_t(s) * state.stride + i];
   }
-  return set(uint32_t(column), fn, vt, stop, area, dwell, bristle);
+  dfm_friction_in in{};
+  in.size = sizeof in;
+  in.n = n;
+  in.stride = static_cast<uint32_t>(column);
+  in.dt = h;
+  in.params = law.params.data();
+  in.data = law.data;
+  in.fn = fn;
+  in.vt = vt;
+  in.ft_stop = stop;
+  in.area = needs & DFM_NEED_AREA ? area : nullptr;
+  in.dwell = needs & DFM_NEED_DWELL ? dwell : nullptr;
+  in.state = bristle;
+  return in;
 }
 
 const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h,
                                         ContactState &state) {
   const dfm_friction_in in = inputs(law, index, h, state);
-  const bool own = in_place(index, state), given = law.ops->flags & DFM_FRIC_JACOBIAN;
+  const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
   const size_t column = in.stride, stride = state.stride, S = law.nstate;
+  out_.resize(column * (11 + S));
+  mode_.resize(column);
   dfm_friction_out out{};
   out.size = sizeof out;
-  if (own) {
-    out.ft = state.ft.data();
-    out.dft_dvt = state.dft_dvt.data();
-    out.dft_dfn = state.dft_dfn.data();
-    out.limit = state.limit.data();
-    out.state = state.bristle_out.data();
-    out.mode = state.mode.data();
-  } else {
-    out_.resize(column * (11 + S));
-    mode_.resize(column);
-    out.ft = out_.data();
-    out.dft_dvt = out.ft + 2 * column;
-    out.dft_dfn = out.dft_dvt + 4 * column;
-    out.limit = out.dft_dfn + 2 * column;
-    out.state = out.limit + 3 * column;
-    out.mode = mode_.data();
-  }
+  out.ft = out_.data();
+  out.dft_dvt = out.ft + 2 * column;
+  out.dft_dfn = out.dft_dvt + 4 * column;
+  out.limit = out.dft_dfn + 2 * column;
+  out.state = out.limit + 3 * column;
+  out.mode = mode_.data();
   if (!given) out.dft_dvt = out.dft_dfn = nullptr;
   failed_ = kNone;
   if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
@@ -238,13 +213,11 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     each_result([&](const double *from, size_t width, Array<double> &to) {
       for (size_t c = 0; c < width; ++c) {
         nan_flag += 0.0 * from[c * column + k];
-        if (!own) to[c * stride + i] = from[c * column + k];
+        to[c * stride + i] = from[c * column + k];
       }
     });
-    if (!own) {
-      state.limit[i] = out.limit[k];
-      state.mode[i] = out.mode[k];
-    }
+    state.limit[i] = out.limit[k];
+    state.mode[i] = out.mode[k];
     if (!given) reuse_slopes(i, state);
     // the poison of NaN and infinity is not zero; a limit of +inf is valid: no limit
     if (failed_ == kNone && !(nan_flag == 0 && out.limit[k] >= 0)) failed_ = i;

@@ -96,7 +96,6 @@ class LawBatches {
   Array<uint32_t> selected_;  // contacts of local_ that are evaluated together
   bool has_smooth_ = false, remembers_ = false, differences_ = false;
   uint32_t failed_ = kNone;
-  // in in_, or, of all contacts of the sub-step, state's own columns
   dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                          const ContactState &state);
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h,

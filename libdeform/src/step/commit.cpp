@@ -3,7 +3,6 @@
 #include <cmath>
 #include <limits>
 
-#include "core/error.h"
 #include "plugin/on_behalf.h"
 #include "step/by_body.h"
 #include "step/context.h"
@@ -54,13 +53,10 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble) {
   });
   step.ended = true;
   if (!failed) return true;
-  *trouble |= DFM_TROUBLE_PLUGIN;
-  set_last_error(
-      format("%s: model '%s' could not end its step, or ended it with something not finite; take a "
-             "smaller step or change the model",
-             at_step(w, *failed).c_str(), failed->model.type->id)
-          .c_str());
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_PLUGIN,
+                   "%s: model '%s' could not end its step, or ended it with something not finite; take a "
+                   "smaller step or change the model",
+                   at_step(w, *failed).c_str(), failed->model.type->id);
 }
 
 bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {

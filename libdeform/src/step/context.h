@@ -92,7 +92,6 @@ struct StepContext {
   std::function<void(const SolveIsland *)> on_solve;
   struct { Array<double> normal, tangent; } tolerance;  // [contacts] of all islands
   Residual residual;                                    // the worst of all islands
-  uint32_t passes = 0, sweeps = 0;                      // of the island with the most
   Array<double> disturbance, impulse_before_rebuild;
   Array<double> tangents;
   // [contacts] m/s, at which sides leave each other at least; empty where no pair has a restitution

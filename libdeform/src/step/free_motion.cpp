@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "body/make_surface.h"
-#include "core/error.h"
 #include "plugin/context.h"
 #include "state/bounds.h"
 #include "step/by_body.h"
@@ -46,24 +45,18 @@ bool stage_model(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t together = fewer_than_threads_and_large(w, step.active) ? kOnThisThread : kPointsToPull;
   const Body *const failed = each_active(w, step.active, together, forces);
   if (!failed) return true;
-  *trouble |= DFM_TROUBLE_PLUGIN;
-  set_last_error(
-      format("%s: model '%s' could not compute its forces; take a smaller step or change the model",
-             at_step(w, *failed).c_str(), failed->model.type->id)
-          .c_str());
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_PLUGIN,
+                   "%s: model '%s' could not compute its forces; take a smaller step or change the model",
+                   at_step(w, *failed).c_str(), failed->model.type->id);
 }
 
 namespace {
-// A model that steps itself has refused: called again while its log is captured, so that its reason becomes
-// the error.
-bool tells_why(const World &w, const Body &b, const SubStep &now) {
-  if (!b.model.stepper) return false;
+// The reason of a model that steps itself and has refused: it is called again while its log is captured.
+std::string reason_of(const Body &b, const SubStep &now) {
+  if (!b.model.stepper) return {};
   const Overheard why;
   double kinetic = 0;
-  if (b.dynamics->free_motion(now, kinetic) || !*why.text()) return false;
-  set_last_error(format("%s: %s", at_step(w, b).c_str(), why.text()).c_str());
-  return true;
+  return b.dynamics->free_motion(now, kinetic) ? std::string() : why.text();
 }
 }  // namespace
 
@@ -78,22 +71,18 @@ bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
   });
   if (!failed) return true;
   const Body &b = *failed;
-  if (tells_why(w, b, now)) {
-    *trouble |= DFM_TROUBLE_PLUGIN;
-    return false;
-  }
-  *trouble |= DFM_TROUBLE_NONFINITE;
+  if (const std::string why = reason_of(b, now); !why.empty())
+    return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: %s", at_step(w, b).c_str(), why.c_str());
   const Unknowns unknowns = b.dynamics->unknowns();
   const size_t n = unknowns.of_points() ? b.p.n : b.surface.nsurfel;
   const double speed = largest_coordinate(unknowns.velocity, n, kStride);
   const std::string what = speed > kLight && std::isfinite(speed)
                                ? format("a point would move at %.3g m/s, faster than light", speed)
                                : "forces or velocities are not finite";
-  set_last_error(format("%s: %s (model '%s'); take a smaller step, or look for loads and parameters that are "
-                        "too large",
-                        at_step(w, b).c_str(), what.c_str(), b.model.type->id)
-                     .c_str());
-  return false;
+  return fail_step(
+      trouble, DFM_TROUBLE_NONFINITE,
+      "%s: %s (model '%s'); take a smaller step, or look for loads and parameters that are too large",
+      at_step(w, b).c_str(), what.c_str(), b.model.type->id);
 }
 
 // Surfels coupled to several phyxels: rows of N are independent, so they are divided among the threads.

@@ -468,10 +468,7 @@ void check_motion(const World &w, StepContext &step, uint32_t i) {
 // Next::stop: trouble, or the sub-step is to be repeated, shorter.
 Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.solves == 0) step.guard.kept.clear();
-  if (overloaded(step)) {
-    *trouble |= report_jam(w, step);
-    return Next::stop;
-  }
+  if (overloaded(step)) return go_on(report_jam(w, step, trouble));
   if (!find_ends(w, step, trouble)) return Next::stop;
   bound_speeds(w, step);
   follow_ends(w, step);
@@ -514,10 +511,7 @@ Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
     set_fraction(w, step, 1);
     take_safe_part(w, step, true, safe);
   }
-  if (jammed(w, step)) {
-    *trouble |= report_jam(w, step);
-    return Next::stop;
-  }
+  if (jammed(w, step)) return go_on(report_jam(w, step, trouble));
   if (!withstands_impacts(w, step)) return Next::stop;
   w.stats.guard_lost += (1 - step.guard.motion) * step.h;
   return Next::stage;

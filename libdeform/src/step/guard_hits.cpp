@@ -83,29 +83,22 @@ class HitContact {
     (weight < 0 ? on_b_ : on_a_) += std::fabs(weight) * at;
   }
   void on_body(ContactPoint &out) {
-    const Surface &b = *step_.body_views[c_.slot_b].surface;
+    const bool edges = c_.kind == kEdgeEdge;
     out.kind = c_.kind;
-    if (c_.kind == kEdgeEdge) {
-      out.type_a = 1;
-      const uint32_t *const eb = &b.edge[2 * size_t{c_.feature_b}];
-      add_feature(out, 1, c_.feature_a);
-      add(out, c_.slot_b, eb[0], hit_.at[1] - 1);
-      add(out, c_.slot_b, eb[1], -hit_.at[1]);
-    } else {
-      add_feature(out, 0, c_.feature_a);
-      for (int k = 0; k < 3; ++k)
-        add(out, c_.slot_b, b.tri[3 * size_t{c_.feature_b} + size_t(k)], -hit_.at[k]);
-    }
+    out.type_a = edges;
+    add_feature(out, false, edges ? 1 : 0, c_.feature_a);
+    add_feature(out, true, edges ? 1 : 2, c_.feature_b);
     middle_ = 0.5 * (on_a_ + on_b_);
   }
-  void add_feature(ContactPoint &out, int kind, uint32_t feature) {
-    const uint32_t *const corner = narrow::corners_of(*step_.body_views[c_.slot_a].surface, kind, feature);
-    if (kind == 0) add(out, c_.slot_a, corner[0], 1);
-    if (kind == 1) {
-      add(out, c_.slot_a, corner[0], 1 - hit_.at[0]);
-      add(out, c_.slot_a, corner[1], hit_.at[0]);
-    }
-    for (int k = 0; kind == 2 && k < 3; ++k) add(out, c_.slot_a, corner[k], hit_.at[k]);
+  // Of corner k of a surfel, an edge or a triangle of one side.
+  double weight_of(bool b, int kind, int k) const {
+    if (kind != 1) return kind == 0 ? 1 : hit_.at[k];
+    return k == 0 ? 1 - hit_.at[b] : hit_.at[b];
+  }
+  void add_feature(ContactPoint &out, bool b, int kind, uint32_t feature) {
+    const uint32_t slot = b ? c_.slot_b : c_.slot_a;
+    const uint32_t *const corner = narrow::corners_of(*step_.body_views[slot].surface, kind, feature);
+    for (int k = 0; k <= kind; ++k) add(out, slot, corner[k], (b ? -1 : 1) * weight_of(b, kind, k));
   }
   // The point of the obstacle: from its present position to that at the end without this contact.
   void carry(Vec3 from, Vec3 to) {
@@ -116,7 +109,7 @@ class HitContact {
   void on_shape(ContactPoint &out) {
     const ObstacleView &v = step_.obstacle_views[c_.slot_b];
     out.type_a = c_.kind;
-    add_feature(out, c_.kind, c_.feature_a);
+    add_feature(out, false, c_.kind, c_.feature_a);
     // The point of the shape at the hit: the nearest to the body's point at the hit time.
     ObstacleView at = v;
     at.position = v.position + hit_.t * (end_.position - v.position);
@@ -140,12 +133,12 @@ class HitContact {
     out.type_a = c_.kind;
     out.feature_a = vertex ? c_.feature_b : c_.feature_a;
     out.feature_b = vertex ? c_.feature_a : c_.feature_b;
-    add_feature(out, c_.kind, out.feature_a);
+    add_feature(out, false, c_.kind, out.feature_a);
     const int corners = vertex ? 1 : c_.kind == 1 ? 2 : 3;
     const uint32_t *const corner = narrow::corners_of(*mesh.surface, corners - 1, out.feature_b);
     Vec3 from, to;
     for (int k = 0; k < corners; ++k) {
-      const double weight = vertex ? 1 : corners == 3 ? hit_.at[k] : k ? hit_.at[1] : 1 - hit_.at[1];
+      const double weight = weight_of(true, corners - 1, k);
       from += weight * load3(&mesh.surface->x[4 * size_t{corner[k]}]);
       to += weight * load3(scene.end(mesh, corner[k]));
     }
@@ -259,9 +252,8 @@ void guard_add_hits(World &w, StepContext &step) {
   g.kept.clear();
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const ContactPoint &c = step.contacts[i];
-    const double *const f = &step.rows.frame[size_t(i) * 9], *const l = &step.rows.impulse[size_t(i) * 3];
     const Guard::Kept *const k = find_kept(g.kept_before, c);
-    g.kept.push_back({c.key, c.more, from_frame(f, l), step.rows.rate[i], k && k->hit});
+    g.kept.push_back({c.key, c.more, step.rows.world_impulse(i), step.rows.rate[i], k && k->hit});
   }
   for (const GuardHit &hit : g.hits) {
     ContactPoint c;
@@ -310,11 +302,8 @@ void guard_impulses(StepContext &step) {
   for (uint32_t i = 0; i < step.rows.soft(); ++i) {
     const Guard::Kept *const k = find_kept(step.guard.kept, step.contacts[i]);
     if (!k) continue;
-    const double *const f = &step.rows.frame[size_t(i) * 9];
-    double *const l = &step.rows.impulse[size_t(i) * 3];
-    l[0] = std::max(0.0, dot(load3(f), k->impulse));
-    l[1] = dot(load3(f + 3), k->impulse);
-    l[2] = dot(load3(f + 6), k->impulse);
+    const Vec3 l = in_frame(&step.rows.frame[size_t(i) * 9], k->impulse);
+    store3(&step.rows.impulse[size_t(i) * 3], {std::max(0.0, l.x), l.y, l.z});
   }
 }
 

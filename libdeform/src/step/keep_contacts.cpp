@@ -104,21 +104,21 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   to.dwell[i] = now ? step.state.dwell[i] + step.h : 0;
   to.area[i] = step.state.area[i];
   to.start_depth[i] = step.rows.start_depth[i];
-  const double v1 = step.state.vt[i], v2 = step.state.vt[step.state.stride + i];
   // A hold counts from hold_begin on: contacts that stick in the first sub-step after it and in every one
   // since.
   const bool first = w.time <= w.hold.start, carried = !first && m != kNone && w.store.held[m];
   const bool holds = w.hold.on && stick && (first || carried);
-  to.path[2 * i] = holds ? (carried ? w.store.path[2 * m] : 0) + step.h * v1 : 0;
-  to.path[2 * i + 1] = holds ? (carried ? w.store.path[2 * m + 1] : 0) + step.h * v2 : 0;
+  for (size_t k = 0; k < 2; ++k) {
+    const double slip = step.state.vt[step.state.stride * k + i];
+    to.path[2 * size_t{i} + k] = holds ? (carried ? w.store.path[2 * size_t{m} + k] : 0) + step.h * slip : 0;
+    w.report.slip[2 * size_t{i} + k] = slip;
+  }
   to.touching[i] = now;
   to.held[i] = holds;
   to.began[i] = now && !before;
   step.before[i] = before;
   w.report.contacts[i] = c;
   w.report.contacts[i].area = step.state.area[i];
-  w.report.slip[2 * i] = v1;
-  w.report.slip[2 * i + 1] = v2;
   w.report.mode[i] = step.state.mode[i];
 }
 
@@ -141,11 +141,9 @@ uint32_t join_rows(StepContext &step) {
     const auto is_same = [&](const ContactPoint &c) { return c.key == row->key; };
     const size_t from = size_t(row - step.contacts.begin()),
                  to = size_t(std::find_if(step.contacts.begin(), end, is_same) - step.contacts.begin());
-    const double *const f = &step.rows.frame[9 * from], *const t = &step.rows.frame[9 * to];
-    double *const l = &step.rows.impulse[3 * from], *const sum = &step.rows.impulse[3 * to];
-    const Vec3 p = from_frame(f, l);
-    for (size_t k = 0; k < 3; ++k) sum[k] += dot(load3(t + 3 * k), p);
-    std::fill_n(l, 3, 0.0);
+    const Vec3 p = step.rows.world_impulse(uint32_t(from));
+    add3(&step.rows.impulse[3 * to], in_frame(&step.rows.frame[9 * to], p));
+    store3(&step.rows.impulse[3 * from], {});
   }
   return uint32_t(end - step.contacts.begin());
 }

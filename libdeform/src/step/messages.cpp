@@ -1,6 +1,5 @@
 #include "step/messages.h"
 
-#include "core/error.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 
@@ -26,6 +25,16 @@ std::string names_of(const World &w, uint64_t a, uint64_t b) {
   if (a == b) return format("body '%s' on itself", first);
   return w.body(b) ? format("bodies '%s' and '%s'", first, second)
                    : format("body '%s' on obstacle '%s'", first, second);
+}
+
+bool fail_step(uint32_t *trouble, uint32_t bit, const char *text, ...) {
+  va_list args;
+  va_start(args, text);
+  const std::string sentence = vformat(text, args);
+  va_end(args);
+  *trouble |= bit;
+  set_last_error(sentence.c_str());
+  return false;
 }
 
 }  // namespace dfm

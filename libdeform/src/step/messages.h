@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "core/error.h"
+
 namespace dfm {
 
 struct Body;
@@ -12,5 +14,9 @@ std::string at_step(const World &w);                           // "step 12"
 std::string at_step(const World &w, const Body &b);            // "step 12, body 'a'"
 const std::string &name_of(const World &w, uint64_t id);       // of a body or an obstacle; "?": it is gone
 std::string names_of(const World &w, uint64_t a, uint64_t b);  // "body 'a' on obstacle 'b'", of what touches
+
+// Of a stage that fails, with the bit of its trouble: the sentence, as of printf, is the last error. Returns
+// false.
+bool fail_step(uint32_t *trouble, uint32_t bit, const char *format, ...) DEFORM_PRINTF(3, 4);
 
 }  // namespace dfm

@@ -163,22 +163,16 @@ uint32_t contact_law(const World &w, const ContactPoint &c) {
 }
 
 void rename_law(World &w, const FrictionRule &rule, uint32_t to) {
-  ContactStore &tools = w.tool_store;
-  for (uint32_t m = 0; m < tools.n; ++m) {
-    if (tools.law[m] != rule.law) continue;
-    const uint32_t a = thing_of(w, tools.id_a[m]), b = thing_of(w, tools.id_b[m]);
-    if (a != kNone && b != kNone && rule_of(w, a, zone_at(w, a, 0), b, zone_at(w, b, 0)) == &rule)
-      tools.law[m] = to;
-  }
-  ContactStore &s = w.store;
-  for (uint32_t m = 0; m < s.n; ++m) {
-    if (s.law[m] != rule.law) continue;
-    const uint32_t a = thing_of(w, s.id_a[m]), b = thing_of(w, s.id_b[m]);
-    if (a == kNone || b == kNone) continue;
-    // Nothing is reported after a restore, until the next step.
-    const Zones zones = m < w.report.n ? zones_of(w, w.report.contacts[m]) : Zones{0, 0};
-    if (rule_of(w, a, zone_at(w, a, zones.a), b, zone_at(w, b, zones.b)) == &rule) s.law[m] = to;
-  }
+  for (ContactStore *const s : {&w.tool_store, &w.store})
+    for (uint32_t m = 0; m < s->n; ++m) {
+      if (s->law[m] != rule.law) continue;
+      const uint32_t a = thing_of(w, s->id_a[m]), b = thing_of(w, s->id_b[m]);
+      if (a == kNone || b == kNone) continue;
+      // Rigid things have one zone each. Nothing is reported after a restore, until the next step.
+      const bool reported = s == &w.store && m < w.report.n;
+      const Zones zones = reported ? zones_of(w, w.report.contacts[m]) : Zones{0, 0};
+      if (rule_of(w, a, zone_at(w, a, zones.a), b, zone_at(w, b, zones.b)) == &rule) s->law[m] = to;
+    }
 }
 
 }  // namespace dfm

@@ -35,23 +35,9 @@ namespace {
 // match them, by name, group and material, and their zones have the same coefficients. Rules are then asked
 // once for two kinds, and not for each pair: a body that shatters has hundreds of pieces, all of one or two
 // kinds, and the tables of pairs are made again after each cut and each separation.
-class PairKinds {
- public:
-  explicit PairKinds(const World &w);
-
-  struct Pair {
-    const FilterRule *filter;  // nullptr: no rule names the pair
-    PairLaw law;               // of the first pair of these kinds that may touch; kept by the caller
-  };
-  // Things a (a body) and b: bodies by slot, then obstacles. Valid until the next call.
-  Pair &of(uint32_t a, uint32_t b);
-
- private:
-  const World &w_;
-  std::vector<uint32_t> kind_;  // by thing
-  uint32_t n_ = 0;              // of kinds
-  std::vector<uint32_t> at_;    // [n_,n_] index into pairs_; kNone: not asked yet
-  std::vector<Pair> pairs_;
+struct PairOfKinds {
+  const FilterRule *filter = nullptr;  // nullptr: no rule names the pair
+  PairLaw law;                         // of the first pair of these kinds that may touch
 };
 
 // What each pattern of the rules weighs at this side.
@@ -77,23 +63,13 @@ std::vector<uint64_t> key_of(const World &w, uint32_t thing) {
   return key;
 }
 
-PairKinds::PairKinds(const World &w) : w_(w) {
-  std::map<std::vector<uint64_t>, uint32_t> known;
-  for (uint32_t thing = 0; thing < w.bodies.size() + w.obstacles.size(); ++thing) {
-    const auto [at, fresh] = known.try_emplace(key_of(w, thing), n_);
-    n_ += fresh;
-    kind_.push_back(at->second);
-  }
-  at_.assign(size_t{n_} * n_, kNone);
-}
-
-PairKinds::Pair &PairKinds::of(uint32_t a, uint32_t b) {
-  uint32_t &at = at_[size_t{kind_[a]} * n_ + kind_[b]];
-  if (at == kNone) {
-    at = uint32_t(pairs_.size());
-    pairs_.push_back({best_rule(w_.filters, partner_of(w_, a).side, partner_of(w_, b).side), {}});
-  }
-  return pairs_[at];
+// By thing: bodies by slot, then obstacles.
+std::vector<size_t> kinds_of(const World &w) {
+  std::map<std::vector<uint64_t>, size_t> known;
+  std::vector<size_t> out;
+  for (uint32_t thing = 0; thing < w.bodies.size() + w.obstacles.size(); ++thing)
+    out.push_back(known.try_emplace(key_of(w, thing), known.size()).first->second);
+  return out;
 }
 
 // Rest distance d_c: 1e-3 of the median surface edge, at least 64 rounding units of the largest coordinate,
@@ -290,14 +266,17 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   const std::vector<uint8_t> attached = attached_bodies(w);
   std::vector<Partner> things;
   for (uint32_t i = 0; i < width; ++i) things.push_back(partner_of(w, i));
-  PairKinds kinds(w);
+  const std::vector<size_t> kind = kinds_of(w);
+  std::map<std::pair<size_t, size_t>, PairOfKinds> kinds;
   for (uint32_t i = 0; i < nb; ++i) {
     const Partner &a = things[i];
     for (uint32_t j = 0; j < width; ++j) {
       if (j == i) continue;
       const bool is_body = j < nb;
       const Partner &b = things[j];
-      PairKinds::Pair &pair = kinds.of(i, j);
+      const auto [known, fresh] = kinds.try_emplace({kind[i], kind[j]});
+      PairOfKinds &pair = known->second;
+      if (fresh) pair.filter = best_rule(w.filters, a.side, b.side);
       bool touch = a.meets(b, pair.filter);
       if (pair.filter && (!is_body || i < j)) w.pairs.filter.set(a.id, b.id, !is_body, touch);
       if (touch && ((attached[i] && parted(w, i, j)) || cut_through(w, i, j) ||

@@ -221,7 +221,7 @@ bool stage_sleep(World &w, StepContext &step, uint32_t *) {
   const double creep = tangent_at_rest(w, step.h);
   for (const uint32_t i : step.active) {
     const Body &b = *w.bodies[i];
-    if (!(b.sleep_state.quiet_time >= w.def.sleep_time && rest_start(b) <= end))
+    if (!(b.sleep_state.quiet_time >= w.def.sleep_time && rest_start(b) <= end) || has_dues(b))
       step.stirred[step.islands.of[i]] = 1;
   }
   for (size_t i = 0; i < n; ++i) {
@@ -241,8 +241,6 @@ bool stage_sleep(World &w, StepContext &step, uint32_t *) {
     if (w.obstacles[slot]->rigid || step.obstacle_views[slot].moves())
       step.stirred[step.islands.of[slot_of(w, a.body)]] = 1;
   }
-  for (const uint32_t i : step.active)
-    if (has_dues(*w.bodies[i])) step.stirred[step.islands.of[i]] = 1;
   bool any = false;
   for (const uint32_t i : step.active)
     if (!step.stirred[step.islands.of[i]]) {

@@ -1,73 +1,46 @@
-#include "step/stage_costs.h"
+#include <string_view>
+#include <utility>
 
-#include "core/error.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "state/world.h"
 #include "step/context.h"
 #include "step/self_contact.h"
+#include "step/stages.h"
 
-namespace dfm::cost {
-namespace {
+namespace dfm {
 
-template <class F>
-size_t sum(const World &w, F &&of) {
-  size_t n = 0;
-  for (const auto &b : w.bodies) n += of(*b);
-  return n;
-}
-size_t surfels(const World &w) {
-  return sum(w, [](const Body &b) { return b.surface.nsurfel; });
-}
-
-}  // namespace
-
-std::string prescribed(const World &) { return "what is prescribed"; }
-
-std::string cells(const World &w) {
-  return format("%zu cells", sum(w, [](const Body &b) { return size_t{b.ncell()}; }));
-}
-
-std::string points(const World &w) {
-  return format("%zu points", sum(w, [](const Body &b) { return b.p.n; }));
-}
-
-std::string rigid_states(const World &w) {
-  size_t n = 0;
-  for (const auto &set : w.rigid_sets) n += set->defs.size();
-  return format("%zu states", n);
-}
-
-std::string weights(const World &w) {
-  return format("%zu weights", sum(w, [](const Body &b) { return b.surface.weight.size(); }));
-}
-
-std::string surfels_and_triangles(const World &w) {
-  const size_t triangles = sum(w, [](const Body &b) { return b.surface.ntri; });
-  return format("%zu surfels every sub-step; %zu triangles whenever a skin is used up", surfels(w),
-                triangles);
-}
-
-std::string candidates(const World &) { return "candidate pairs"; }
-
-std::string candidates_near(const World &) {
-  return "candidate pairs that may come nearer than d_c / 2 within the sub-step";
-}
-
-std::string self_surfels(const World &w) {
-  size_t n = 0, t = 0;
-  for (const auto &s : w.steps->self_bodies) {
-    n += s->body->surface.nsurfel;
-    t += s->body->surface.ntri;
+std::string cost_of(const World &w, const Stage &stage) {
+  size_t cells = 0, points = 0, weights = 0, surfels = 0, triangles = 0, states = 0;
+  size_t self_surfels = 0, self_triangles = 0;
+  for (const auto &b : w.bodies) {
+    cells += b->ncell();
+    points += b->p.n;
+    weights += b->surface.weight.size();
+    surfels += b->surface.nsurfel;
+    triangles += b->surface.ntri;
   }
-  return format(
-      "%zu surfels every sub-step, and what of them is near; %zu triangles whenever a skin is used up", n, t);
+  for (const auto &set : w.rigid_sets) states += set->defs.size();
+  for (const auto &s : w.steps->self_bodies) {
+    self_surfels += s->body->surface.nsurfel;
+    self_triangles += s->body->surface.ntri;
+  }
+  const std::pair<std::string_view, size_t> counts[] = {
+      {"{cells}", cells},
+      {"{points}", points},
+      {"{weights}", weights},
+      {"{surfels}", surfels},
+      {"{triangles}", triangles},
+      {"{states}", states},
+      {"{self surfels}", self_surfels},
+      {"{self triangles}", self_triangles},
+      {"{awake}", w.steps->active.size()},
+      {"{bodies}", w.bodies.size()},
+  };
+  std::string text = stage.cost;
+  for (const auto &[name, n] : counts)
+    if (const size_t at = text.find(name); at != std::string::npos)
+      text.replace(at, name.size(), std::to_string(n));
+  return text;
 }
 
-std::string contacts_and_sweeps(const World &) { return "contacts x sweeps, laws once per pass"; }
-
-std::string contacts_and_surfels(const World &w) { return format("contacts and %zu surfels", surfels(w)); }
-
-std::string awake(const World &w) {
-  return format("velocities of %zu awake bodies of %zu", w.steps->active.size(), w.bodies.size());
-}
-
-}  // namespace dfm::cost
+}  // namespace dfm

@@ -35,11 +35,12 @@ inline Next go_on(bool succeeded) { return succeeded ? Next::stage : Next::stop;
 struct Stage {
   const char *name;
   Next (*run)(World &w, StepContext &step, uint32_t *trouble);
-  std::string (*cost)(const World &w);           // what its cost grows with
+  const char *cost;                              // what its cost grows with; {..}: a count of cost_of()
   StageChoice (*when)(const SceneFacts &facts);  // whether it runs, and why
   StageRole role = StageRole::none;
 };
 std::span<const Stage> stage_table();
+std::string cost_of(const World &w, const Stage &stage);  // stage_costs.cpp: Stage::cost with its counts
 Plan make_plan(const SceneFacts &facts);  // throws Error if nothing provides a requested effect
 
 // Choices that prepare() would make again but a restored world keeps, because they were made at an earlier
@@ -104,12 +105,11 @@ void make_rows(World &w, StepContext &step);  // makes rows from contacts, with 
 // match: of the contact in the store; kNone: the most that its pair has left.
 double start_depth(const World &w, const StepContext &step, const ContactPoint &c, uint32_t match,
                    double depth);
-// Sets the last error. law: failed at this contact, or kNone; null: a value is not finite. Returns the
-// trouble bit.
-uint32_t report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact);
-// Sets the last error: the guard allows no further motion, and the contact solve has no solution. Returns the
-// trouble bit.
-uint32_t report_jam(World &w, StepContext &step);
+// As fail_step(). law: failed at this contact, or kNone; null: a value is not finite.
+bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact,
+                         uint32_t *trouble);
+// As fail_step(): the guard allows no further motion, and the contact solve has no solution.
+bool report_jam(World &w, StepContext &step, uint32_t *trouble);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 // Of lists to which keep_contacts() and keep_rigids() add.
 void reserve_reports(World &w, const StepContext &step);

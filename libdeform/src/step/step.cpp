@@ -27,7 +27,6 @@
 #include "step/rigid/tools.h"
 #include "step/solve/attach.h"
 #include "step/solve/cut_drag.h"
-#include "step/stage_costs.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/step_impulses.h"
@@ -56,21 +55,27 @@ bool distribute(World &, StepContext &step, uint32_t *) {
 }
 
 constexpr Stage kTable[] = {
-    {"motion", row<stage_motion>, cost::prescribed, when::motion},
-    {"model", row<stage_model>, cost::cells, when::model},
-    {"predict", row<predict>, cost::points, when::predict},
-    {"rigid predict", row<stage_rigid_predict>, cost::rigid_states, when::rigid_predict},
-    {"gather", row<stage_gather>, cost::weights, when::gather},
-    {"broad", row<stage_broad>, cost::surfels_and_triangles, when::broad, StageRole::lists_pairs},
-    {"narrow", stage_narrow, cost::candidates, when::narrow, StageRole::finds_contacts},
-    {"self contact", row<stage_self>, cost::self_surfels, when::self},
-    {"contact+friction", row<solve>, cost::contacts_and_sweeps, when::solve, StageRole::solves},
-    {"rigid commit", stage_rigid_commit, cost::rigid_states, when::rigid_commit},
-    {"distribute", row<distribute>, cost::contacts_and_surfels, when::distribute,
+    {"motion", row<stage_motion>, "what is prescribed", when::motion},
+    {"model", row<stage_model>, "{cells} cells", when::model},
+    {"predict", row<predict>, "{points} points", when::predict},
+    {"rigid predict", row<stage_rigid_predict>, "{states} states", when::rigid_predict},
+    {"gather", row<stage_gather>, "{weights} weights", when::gather},
+    {"broad", row<stage_broad>,
+     "{surfels} surfels every sub-step; {triangles} triangles whenever a skin is used up", when::broad,
+     StageRole::lists_pairs},
+    {"narrow", stage_narrow, "candidate pairs", when::narrow, StageRole::finds_contacts},
+    {"self contact", row<stage_self>,
+     "{self surfels} surfels every sub-step, and what of them is near; {self triangles} triangles whenever a "
+     "skin is used up",
+     when::self},
+    {"contact+friction", row<solve>, "contacts x sweeps, laws once per pass", when::solve, StageRole::solves},
+    {"rigid commit", stage_rigid_commit, "{states} states", when::rigid_commit},
+    {"distribute", row<distribute>, "contacts and {surfels} surfels", when::distribute,
      StageRole::reports_impulses},
-    {"guard", stage_guard, cost::candidates_near, when::guard, StageRole::guards},
-    {"commit", row<stage_commit>, cost::points, when::commit},
-    {"sleep", row<stage_sleep>, cost::awake, when::sleep},
+    {"guard", stage_guard, "candidate pairs that may come nearer than d_c / 2 within the sub-step",
+     when::guard, StageRole::guards},
+    {"commit", row<stage_commit>, "{points} points", when::commit},
+    {"sleep", row<stage_sleep>, "velocities of {awake} awake bodies of {bodies}", when::sleep},
 };
 
 using Clock = std::chrono::steady_clock;
@@ -125,14 +130,12 @@ double least_sub_steps(const World &w, double dt) { return std::ceil(dt / w.boun
 dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
   const Body *const b = w.bound.body;
   const bool implicit = b && !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS);
-  set_last_error(
-      format("a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
-             "whose point %u bounds the step, lower its damping, or take a shorter step",
-             dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
-             implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
-             w.bound.point)
-          .c_str());
-  *trouble |= DFM_TROUBLE_SUBSTEPS;
+  fail_step(trouble, DFM_TROUBLE_SUBSTEPS,
+            "a step of %g s needs %g sub-steps of %g s (max_substeps %u): %ssoften or coarsen body '%s', "
+            "whose point %u bounds the step, lower its damping, or take a shorter step",
+            dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
+            implicit ? "let bodies move by tr_bdf2 or implicit_euler, " : "", b ? b->name.c_str() : "?",
+            w.bound.point);
   return DFM_DISCARD;
 }
 // The bound has fallen so far within the step that the rest of it needs too many.

@@ -28,7 +28,7 @@ struct Pair {
     rows.build({}, {}, {{}, bodies}, {}, {&contact, 1});
     rows.y_free.assign(rows.y.begin(), rows.y.end());
     for (const ContactRows::Block &b : rows.blocks)
-      rows.set_response(b, [&](double *matrix) {
+      rows.set_response(b, false, [&](double *matrix) {
         const Ball &ball = b.group == 0 ? kA : kB;
         std::fill_n(matrix, 36, 0.0);
         for (size_t k = 0; k < 6; ++k) matrix[7 * k] = 1 / (k < 3 ? ball.mass : ball.inertia);

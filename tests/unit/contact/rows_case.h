@@ -195,8 +195,8 @@ class RowsCase {
           for (size_t r = 0; r < 3 * block.count; ++r)
             *results++ = response_(unknown_of(block, r), unknown_of(block, c));
       };
-      if (block.group == kNone) rows.set_responses(block, by_columns);
-      else rows.set_response(block, by_rows);
+      if (block.group == kNone) rows.set_response(block, true, by_columns);
+      else rows.set_response(block, false, by_rows);
     }
     std::vector<double> tangents(3 * contacts.size());
     for (size_t i = 0; i < contacts.size(); ++i) store3(&tangents[3 * i], frame(i, 1));

@@ -191,7 +191,7 @@ TEST(Solver, ContactWithARigidBodyThatStands_IsSolvedAmongPoints) {
   Problem quick({3, 4, 6}, 0.3, {{}, {}, {}}), slow({3, 4, 6}, 0.3, {{}, {}, {}});
   for (Problem *const p : {&quick, &slow}) {
     for (const ContactRows::Block &block : p->rows.blocks)
-      p->rows.set_response(block,
+      p->rows.set_response(block, false,
                            [&](double *matrix) { std::fill_n(matrix, 9 * block.count * block.count, 0.0); });
     for (uint32_t i = 0; i < 3; ++i) p->rows.apply(i, -taken[i]);
     p->request();

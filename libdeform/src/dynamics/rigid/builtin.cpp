@@ -19,6 +19,7 @@
 #include "core/disjoint_sets.h"
 #include "core/error.h"
 #include "dynamics/rigid/host.h"
+#include "dynamics/rigid/host_table.h"
 #include "dynamics/rigid/joints.h"
 #include "math/turn.h"
 
@@ -96,15 +97,10 @@ Builtin::Builtin(const dfm_rigid_set_def &set, uint32_t *group) {
   const uint32_t n = set.nbody;
   const std::span<const dfm_rigid_def> bodies(set.bodies, n);
   parts_.resize(n);
-  momentum_.resize(n);
-  free_.resize(6 * size_t{n});
-  mean_.resize(6 * size_t{n});
-  motor_.resize(set.njoint);
-  end_.resize(6 * size_t{n});
-  base_.resize(6 * size_t{n});
-  end_momentum_.resize(n);
-  base_momentum_.resize(n);
   moved_.resize(n);
+  for (std::vector<double> *v : {&free_, &mean_, &end_, &base_}) v->resize(6 * size_t{n});
+  for (std::vector<Vec3> *v : {&momentum_, &end_momentum_, &base_momentum_}) v->resize(n);
+  motor_.resize(set.njoint);
   drive_.resize(set.njoint);
   for (uint32_t i = 0; i < n; ++i) {
     RigidPart &p = parts_[i];
@@ -407,19 +403,7 @@ void Builtin::commit(const dfm_rigid_step &step, const double *impulse, dfm_rigi
 
 // ---- the table --------------------------------------------------------------------------------------------
 
-template <class F>
-dfm_status shielded(F &&f) noexcept {
-  try {
-    f();
-    return DFM_OK;
-  } catch (const std::bad_alloc &) {
-    return DFM_E_NOMEM;
-  } catch (...) {
-    return DFM_E_FATAL;
-  }
-}
-
-Builtin &self_of(void *self) { return *static_cast<Builtin *>(self); }
+using Table = HostTable<Builtin>;
 
 dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
   return shielded([&] {
@@ -428,30 +412,19 @@ dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *g
     *nextra = static_cast<uint32_t>(b->extra());
   });
 }
-void destroy(void *self) { delete static_cast<Builtin *>(self); }
-dfm_status predict(void *self, const dfm_rigid_step *step, double *velocity) {
-  return shielded([&] { self_of(self).predict(*step, velocity); });
-}
-dfm_status respond(void *self, const dfm_rigid_step *step, uint32_t group, double *matrix) {
-  return shielded([&] { self_of(self).respond(*step, group, matrix); });
-}
 dfm_status revise(void *self, const dfm_rigid_step *step, const double *impulse, double *velocity,
                   uint32_t *changed) {
-  return shielded([&] { *changed = self_of(self).revise(*step, impulse, velocity); });
-}
-dfm_status commit(void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state,
-                  double *extra) {
-  return shielded([&] { self_of(self).commit(*step, impulse, state, extra); });
+  return shielded([&] { *changed = Table::of(self).revise(*step, impulse, velocity); });
 }
 dfm_status set_motor(void *self, uint32_t joint, double velocity, double max, double *extra) {
-  if (!self_of(self).joint(joint)) return DFM_E_ARG;
+  if (!Table::of(self).joint(joint)) return DFM_E_ARG;
   extra[kMotor * joint] = velocity;
   extra[kMotor * joint + 1] = max;
   return DFM_OK;
 }
 dfm_status joint(void *self, const dfm_rigid_state *state, const double *extra, uint32_t number,
                  double *position, double *rate, double *effort) {
-  const RigidJoint *const j = self_of(self).joint(number);
+  const RigidJoint *const j = Table::of(self).joint(number);
   if (!j) return DFM_E_ARG;
   const size_t last = std::max(j->a, j->b == DFM_RIGID_WORLD ? 0 : j->b);
   return shielded([&] {
@@ -470,19 +443,13 @@ dfm_status joint(void *self, const dfm_rigid_state *state, const double *extra, 
 }  // namespace
 
 const dfm_rigid_host &builtin_host() {
-  static const dfm_rigid_host table = {sizeof(dfm_rigid_host),
-                                       0,
-                                       nullptr,
-                                       create,
-                                       destroy,
-                                       predict,
-                                       respond,
-                                       commit,
-                                       set_motor,
-                                       joint,
-                                       revise,
-                                       nullptr,
-                                       nullptr};
+  static const dfm_rigid_host table = [] {
+    dfm_rigid_host t = Table::make(create);
+    t.set_motor = set_motor;
+    t.joint = joint;
+    t.revise = revise;
+    return t;
+  }();
   return table;
 }
 

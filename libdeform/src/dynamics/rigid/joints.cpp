@@ -5,10 +5,21 @@
 namespace dfm {
 namespace {
 
-// Present pose of one side of a joint.
-Pose side(uint32_t part, std::span<const dfm_rigid_state> state) {
-  return part == DFM_RIGID_WORLD ? Pose{} : load_pose(state[part]);
-}
+// Present poses of the two sides of a joint; its anchor from their origins, and how far a's is from b's.
+struct Sides {
+  Pose a, b;
+  Vec3 arm_a, arm_b, apart;
+  Sides(const RigidJoint &j, std::span<const dfm_rigid_state> state)
+      : a(load_pose(state[j.a])),
+        b(j.b == DFM_RIGID_WORLD ? Pose{} : load_pose(state[j.b])),
+        arm_a(rotate(a.rotation, j.anchor_a)),
+        arm_b(rotate(b.rotation, j.anchor_b)),
+        apart(a.position + arm_a - (b.position + arm_b)) {}
+  // rotation vector, beyond that of the joint as it was created
+  Vec3 turned(const RigidJoint &j) const {
+    return rotation_vector(a.rotation * conjugate(b.rotation * j.turn));
+  }
+};
 
 // share of a row's diagonal that remains after elimination by earlier rows
 constexpr double kRedundant = 1e-12;
@@ -26,10 +37,10 @@ JointRow point_row(const RigidJoint &j, Vec3 arm_a, Vec3 arm_b, Vec3 t, double e
 
 JointRow spin_row(const RigidJoint &j, Vec3 t, double error) { return {j.a, j.b, {}, t, {}, -t, error}; }
 
-// M^-1 J^T of one side.
-void response(Vec3 l, Vec3 a, const RigidPart &part, const dfm_rigid_state &state, Vec3 &dv, Vec3 &dw) {
-  dv = part.inverse_mass * l;
-  dw = in_axes(load_quat(state.rotation), part.inverse_moments, a);
+// Adds M^-1 J^T of one side to a velocity [6].
+void respond(Vec3 l, Vec3 a, const RigidPart &part, const dfm_rigid_state &state, double *velocity) {
+  add3(velocity, part.inverse_mass * l);
+  add3(velocity + 3, in_axes(load_quat(state.rotation), part.inverse_moments, a));
 }
 
 }  // namespace
@@ -54,9 +65,8 @@ RigidJoint make_joint(const dfm_joint_def &def, std::span<const dfm_rigid_def> b
 }
 
 void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std::vector<JointRow> &out) {
-  const Pose a = side(j.a, state), b = side(j.b, state);
-  const Vec3 arm_a = rotate(a.rotation, j.anchor_a), arm_b = rotate(b.rotation, j.anchor_b);
-  const Vec3 apart = a.position + arm_a - (b.position + arm_b);
+  const Sides now(j, state);
+  const auto &[a, b, arm_a, arm_b, apart] = now;
   if (j.type == DFM_JOINT_SLIDER) {
     // Sides and axis belong to b, so the force acts on b where a's anchor is.
     for (const Vec3 &s : j.side_b) {
@@ -73,20 +83,16 @@ void hold_rows(const RigidJoint &j, std::span<const dfm_rigid_state> state, std:
       out.push_back(spin_row(j, cross(n, t), dot(n, t)));  // d/dt (n . t) = (w_a - w_b) . (n x t)
     }
   } else if (j.type != DFM_JOINT_BALL) {
-    const Vec3 off = rotation_vector(a.rotation * conjugate(b.rotation * j.turn));
+    const Vec3 off = now.turned(j);
     for (int k = 0; k < 3; ++k) out.push_back(spin_row(j, unit_vector(k), off[k]));
   }
 }
 
 JointRow drive_row(const RigidJoint &j, std::span<const dfm_rigid_state> state) {
-  const Pose a = side(j.a, state), b = side(j.b, state);
-  const Vec3 axis = rotate(b.rotation, j.axis_b);
-  if (j.type == DFM_JOINT_HINGE)
-    return spin_row(j, axis, dot(rotation_vector(a.rotation * conjugate(b.rotation * j.turn)), axis));
-  const Vec3 arm_a = rotate(a.rotation, j.anchor_a);
-  const Vec3 arm_b = rotate(b.rotation, j.anchor_b);
-  const Vec3 apart = a.position + arm_a - (b.position + arm_b);
-  return point_row(j, arm_a, arm_b + apart, axis, dot(apart, axis));
+  const Sides now(j, state);
+  const Vec3 axis = rotate(now.b.rotation, j.axis_b);
+  if (j.type == DFM_JOINT_HINGE) return spin_row(j, axis, dot(now.turned(j), axis));
+  return point_row(j, now.arm_a, now.arm_b + now.apart, axis, dot(now.apart, axis));
 }
 
 double row_rate(const JointRow &r, std::span<const double> v) {
@@ -105,14 +111,8 @@ void JointSystem::build(std::span<const JointRow> rows, std::span<const RigidPar
   for (size_t i = 0; i < n_; ++i) {
     const JointRow &r = rows[i];
     double *const m = &responses_[12 * i];
-    Vec3 dv, dw;
-    response(r.la, r.aa, parts[r.a], state[r.a], dv, dw);
-    store3(m, dv);
-    store3(m + 3, dw);
-    if (r.b == DFM_RIGID_WORLD) continue;
-    response(r.lb, r.ab, parts[r.b], state[r.b], dv, dw);
-    store3(m + 6, dv);
-    store3(m + 9, dw);
+    respond(r.la, r.aa, parts[r.a], state[r.a], m);
+    if (r.b != DFM_RIGID_WORLD) respond(r.lb, r.ab, parts[r.b], state[r.b], m + 6);
   }
   // Lower triangle of A: row i times the response of row k, for the parts that they share.
   for (size_t i = 0; i < n_; ++i)
@@ -167,12 +167,8 @@ void JointSystem::push(std::span<const JointRow> rows, std::span<const double> x
   for (size_t i = 0; i < rows.size(); ++i) {
     const JointRow &r = rows[i];
     auto add = [&](uint32_t part, Vec3 l, Vec3 a) {
-      if (part == DFM_RIGID_WORLD) return;
-      Vec3 dv, dw;
-      response(x[i] * l, x[i] * a, parts[part], state[part], dv, dw);
-      double *const v = &velocity[6 * size_t{part}];
-      add3(v, dv);
-      add3(v + 3, dw);
+      if (part != DFM_RIGID_WORLD)
+        respond(x[i] * l, x[i] * a, parts[part], state[part], &velocity[6 * size_t{part}]);
     };
     add(r.a, r.la, r.aa);
     add(r.b, r.lb, r.ab);

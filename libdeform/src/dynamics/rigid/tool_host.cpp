@@ -16,6 +16,7 @@
 #include <new>
 
 #include "core/error.h"
+#include "dynamics/rigid/host_table.h"
 #include "math/turn.h"
 
 namespace dfm {
@@ -27,13 +28,17 @@ constexpr double kWhole = 1 - 1e-9;
 struct Frame {
   Vec3 velocity, spin;  // mean over the sub-step
 };
+Frame mean_between(const Pose &from, const Pose &to, double h) {
+  return {(1 / h) * (to.position - from.position),
+          (1 / h) * rotation_vector(to.rotation * conjugate(from.rotation))};
+}
 
 class ToolHost {
  public:
   explicit ToolHost(const ToolMotion &motion) : motion_(motion) {}
   bool late() const { return motion_.late > 0; }
   void predict(const dfm_rigid_step &step, double *velocity) const;
-  void respond(const dfm_rigid_step &step, double *matrix) const;
+  void respond(const dfm_rigid_step &step, uint32_t group, double *matrix) const;
   void commit(const dfm_rigid_step &step, const double *impulse, dfm_rigid_state *state, double *extra) const;
 
  private:
@@ -80,21 +85,17 @@ ToolHost::Ways ToolHost::ways(const dfm_rigid_step &step) const {
 
 Frame ToolHost::move(const dfm_rigid_step &step, const Ways &w, Vec3 p, Vec3 turn) const {
   const double h = step.h;
-  const Vec3 way = w.device.position - w.start.position;
-  const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(w.start.rotation));
-  if (!motion_.coupled()) return {(1 / h) * way, (1 / h) * turned_by};
-  const Pose device = load_place(w.values.device);
-  Vec3 velocity = (1 / h) * (w.device.position - device.position);
-  Vec3 spin = (1 / h) * rotation_vector(w.device.rotation * conjugate(device.rotation));
-  if (w.values.measured == kToolMeasured) {
-    velocity = load3(w.values.target_velocity);
-    spin = load3(w.values.target_velocity + 3);
-  }
+  if (!motion_.coupled()) return mean_between(w.start, w.device, h);
+  const auto [way, turned_by] = mean_between(w.start, w.device, 1);
+  const Frame device = w.values.measured == kToolMeasured
+                           ? Frame{load3(w.values.target_velocity), load3(w.values.target_velocity + 3)}
+                           : mean_between(load_place(w.values.device), w.device, h);
   const dfm_rigid_state &s = step.state[0];
   return {mobility(h) * (motion_.mass * load3(s.velocity) +
-                         h * (motion_.stiffness * way + motion_.damping * velocity) + p),
-          turn_mobility(h) * (motion_.inertia * load3(s.spin) +
-                              h * (motion_.turn_stiffness * turned_by + motion_.turn_damping * spin) + turn)};
+                         h * (motion_.stiffness * way + motion_.damping * device.velocity) + p),
+          turn_mobility(h) *
+              (motion_.inertia * load3(s.spin) +
+               h * (motion_.turn_stiffness * turned_by + motion_.turn_damping * device.spin) + turn)};
 }
 
 Pose ToolHost::end_of(const dfm_rigid_step &step, const Ways &w, const Frame &mean) const {
@@ -107,13 +108,14 @@ void ToolHost::predict(const dfm_rigid_step &step, double *velocity) const {
   const Ways w = ways(step);
   const Pose end = end_of(step, w, move(step, w, {}, {}));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
-    const Pose from = load_pose(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
-    store3(velocity + 6 * i, (1 / step.h) * (to.position - from.position));
-    store3(velocity + 6 * i + 3, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
+    const Frame mean =
+        mean_between(load_pose(step.state[i]), part_place(motion_.parts[i], end, w.opening), step.h);
+    store3(velocity + 6 * i, mean.velocity);
+    store3(velocity + 6 * i + 3, mean.spin);
   }
 }
 
-void ToolHost::respond(const dfm_rigid_step &step, double *matrix) const {
+void ToolHost::respond(const dfm_rigid_step &step, uint32_t, double *matrix) const {
   const size_t n = motion_.parts.size(), width = 6 * n;
   const double a = mobility(step.h), b = turn_mobility(step.h);
   for (size_t j = 0; j < width; ++j) {
@@ -144,8 +146,7 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
   const Pose end = end_of(step, w, mean);
   ToolValues v = w.values;
   const Pose device = motion_.coupled() ? load_place(v.device) : w.start;
-  const Vec3 way = w.device.position - device.position;
-  const Vec3 turned_by = rotation_vector(w.device.rotation * conjugate(device.rotation));
+  const auto [way, turned_by] = mean_between(device, w.device, 1);
   // The reaction on the tool is the impulse that it received minus the part that moves it; without a coupling
   // all of it.
   Vec3 held = -p, held_turn = -turn;
@@ -167,11 +168,11 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
   if (late())  // sub-steps do not change them
     std::memcpy(extra + kToolValues, step.extra + kToolValues, kToolPastValues * sizeof(double));
   for (size_t i = 0; i < motion_.parts.size(); ++i) {
-    const Pose from = load_pose(step.state[i]), to = part_place(motion_.parts[i], end, w.opening);
-    dfm_rigid_state &s = state[i];
-    store_pose(s, to);
-    store3(s.velocity, (1 / step.h) * (to.position - from.position));
-    store3(s.spin, (1 / step.h) * rotation_vector(to.rotation * conjugate(from.rotation)));
+    const Pose to = part_place(motion_.parts[i], end, w.opening);
+    const Frame own = mean_between(load_pose(step.state[i]), to, step.h);
+    store_pose(state[i], to);
+    store3(state[i].velocity, own.velocity);
+    store3(state[i].spin, own.spin);
   }
   // exactly: part 0 is the frame
   store3(state[0].velocity, mean.velocity);
@@ -179,8 +180,6 @@ void ToolHost::commit(const dfm_rigid_step &step, const double *impulse, dfm_rig
 }
 
 // ---- the table --------------------------------------------------------------------------------------------
-
-const ToolHost &self_of(void *self) { return *static_cast<const ToolHost *>(self); }
 
 dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *group, uint32_t *nextra) {
   if (!set->data) {
@@ -192,20 +191,6 @@ dfm_status create(void *, const dfm_rigid_set_def *set, void **self, uint32_t *g
   *self = made;
   for (uint32_t i = 0; i < set->nbody; ++i) group[i] = 0;
   *nextra = kToolValues + (made->late() ? kToolPastValues : 0);
-  return DFM_OK;
-}
-void destroy(void *self) { delete static_cast<ToolHost *>(self); }
-dfm_status predict(void *self, const dfm_rigid_step *step, double *velocity) {
-  self_of(self).predict(*step, velocity);
-  return DFM_OK;
-}
-dfm_status respond(void *self, const dfm_rigid_step *step, uint32_t, double *matrix) {
-  self_of(self).respond(*step, matrix);
-  return DFM_OK;
-}
-dfm_status commit(void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state,
-                  double *extra) {
-  self_of(self).commit(*step, impulse, state, extra);
   return DFM_OK;
 }
 
@@ -230,16 +215,7 @@ Pose part_place(const ToolMotion::Part &part, const Pose &tool, double opening) 
 }
 
 const dfm_rigid_host &tool_host() {
-  static const dfm_rigid_host table = [] {
-    dfm_rigid_host t{};
-    t.size = sizeof t;
-    t.create = create;
-    t.destroy = destroy;
-    t.predict = predict;
-    t.respond = respond;
-    t.commit = commit;
-    return t;
-  }();
+  static const dfm_rigid_host table = HostTable<ToolHost>::make(create);
   return table;
 }
 

@@ -22,20 +22,16 @@ namespace {
 bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, uint64_t said,
                  uint32_t *trouble) {
   need_memory(fault.status);
-  *trouble |= DFM_TROUBLE_PLUGIN;
   const std::string why =
       said != sentences() ? last_error() : "take a smaller step or look at its masses and motors";
-  set_last_error(format("%s, rigid body '%s' and those with it: host '%s' %s; %s", at_step(w).c_str(),
-                        set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str())
-                     .c_str());
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s, rigid body '%s' and those with it: host '%s' %s; %s",
+                   at_step(w).c_str(), set.defs[0].name, set.host_name.c_str(), fault.what, why.c_str());
 }
 
 }  // namespace
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
-  for (auto &o : w.obstacles)
-    if (o->id == id) return *o;
+  if (Obstacle *const o = w.obstacle(id)) return *o;
   fail(DFM_E_FATAL, "a rigid body has lost its shape");
 }
 
@@ -45,12 +41,10 @@ Pose shape_pose(const Obstacle &o, const dfm_rigid_state &s) {
   return o.added ? load_pose(s) * o.local : load_pose(s);
 }
 
-// Mean velocity of a shape's origin for this motion of its body, as ObstacleView::velocity_at.
-Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h) {
-  if (!o.added) return velocity;
-  const Vec3 arm = rotate(load_quat(start.rotation), o.local.position), turn = load3(start.spin);
-  const Vec3 first = cross(turn, arm), second = cross(turn, first), third = cross(turn, second);
-  return velocity + cross(spin, arm) + (0.5 * h) * second + (h * h / 6) * third;
+Vec3 mean_velocity_at(const Obstacle &o, const double *v, Vec3 arm, double h) {
+  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
+  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
+  return velocity_at(v, arm) + (0.5 * h) * second + (h * h / 6) * third;
 }
 
 void place_rigids(World &w) {
@@ -96,7 +90,9 @@ bool stage_rigid_predict(World &w, StepContext &step, uint32_t *trouble) {
     const dfm_rigid_state &s = o->rigid->state[o->rigid_body];
     const double *const v = &o->rigid->velocity[6 * size_t{o->rigid_body}];
     ObstacleView &view = step.obstacle_views[o->slot];
-    view.velocity = shape_velocity(*o, s, load3(v), load3(v + 3), step.h);
+    view.velocity = o->added
+                        ? mean_velocity_at(*o, v, rotate(load_quat(s.rotation), o->local.position), step.h)
+                        : load3(v);
     view.spin = load3(v + 3);
     view.linear = view.spin - load3(s.spin);
     if (o->mesh) o->mesh->place(view.position, view.rotation, view.velocity, view.spin);
@@ -117,7 +113,7 @@ RigidSet &set_of_group(World &w, uint32_t group) {
 }  // namespace
 
 void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
-  step.rows.set_response(block, [&](double *matrix) {
+  step.rows.set_response(block, false, [&](double *matrix) {
     if (step.tools->fill_response(block.group, matrix)) return;
     RigidSet &set = set_of_group(w, block.group);
     if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
@@ -153,11 +149,10 @@ void sum_rigid_impulses(World &w, StepContext &step) {
   for (uint32_t i = 0; i < rows.all(); ++i) {
     if (rows.rigid[i] == kNone || (i >= rows.soft() && i < rows.n)) continue;
     const Obstacle &o = *w.obstacles[i < rows.n ? step.contacts[i].slot_b : step.bonds[i - rows.n].slot_b];
-    const double *const f = &rows.frame[size_t(9) * i], *const l = &rows.impulse[size_t(3) * i];
-    const Vec3 p = from_frame(f, l);
+    const Vec3 p = -rows.world_impulse(i);
     double *const to = &o.rigid->impulse[6 * size_t{o.rigid_body}];
-    store3(to, load3(to) - p);
-    store3(to + 3, load3(to + 3) - cross(load3(&rows.arm[size_t(3) * i]), p));
+    add3(to, p);
+    add3(to + 3, cross(load3(&rows.arm[size_t(3) * i]), p));
   }
 }
 
@@ -190,10 +185,9 @@ void restart_rigids(World &w, StepContext &step) {
   step.rows.restart_rigids();
 }
 
-// 1: all have ended their step; 2: a host requests another solve; 0: failed.
-int query_rigid_ends(World &w, uint32_t *trouble) {
+// again: whether a host requests another solve.
+bool query_rigid_ends(World &w, bool &again, uint32_t *trouble) {
   const uint64_t said = sentences();
-  bool again = false;
   for (auto &set : w.rigid_sets)
     if (const HostFault fault = set->take_impulses()) return host_failed(w, *set, fault, said, trouble);
   for (auto &set : w.rigid_sets) {
@@ -201,15 +195,15 @@ int query_rigid_ends(World &w, uint32_t *trouble) {
     if (const HostFault fault = set->end_state(one)) return host_failed(w, *set, fault, said, trouble);
     again |= one;
   }
-  return again ? 2 : 1;
+  return true;
 }
 
 Next stage_rigid_commit(World &w, StepContext &step, uint32_t *trouble) {
   sum_rigid_impulses(w, step);
   step.tools->list(w, step);
-  const int end = query_rigid_ends(w, trouble);
-  if (end == 0) return Next::stop;
-  step.rigid_again = end == 2 && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
+  bool again = false;
+  if (!query_rigid_ends(w, again, trouble)) return Next::stop;
+  step.rigid_again = again && step.rigid_rounds < DFM_RIGID_MOST_AGAIN && w.plan.has(StageRole::solves) &&
                      step.rows.all() > 0;
   if (step.rigid_again) {
     ++step.rigid_rounds;

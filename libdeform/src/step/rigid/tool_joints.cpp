@@ -129,9 +129,11 @@ double ToolTouch::rounding_of(const Row &row, Vec3 along) const {
 }
 
 // A place that does not yield because a motor holds has a row nevertheless. It gives at first as a free body
-// would, then less and less (press_harder), until its impulse takes the motor to its limit.
-bool ToolTouch::motor_holds(const Row &row) const {
-  return is_driven(row.a, row.normal) || is_driven(row.b, row.normal);
+// would, then less and less (press_harder), until its impulse takes the motor to its limit. 1/kg, so much; 0:
+// no motor holds.
+double ToolTouch::softness_of_motor(const Row &row) const {
+  const bool holds = is_driven(row.a, row.normal) || is_driven(row.b, row.normal);
+  return holds ? strong_ / kHeld * rounding_of(row, row.normal) : 0;
 }
 
 // Whether a motor of its group moves the place along this direction. If none does, joints hold it as well,
@@ -152,10 +154,6 @@ bool ToolTouch::is_driven(const Side &side, Vec3 along) const {
     const Vec3 arm = at - load3(s.position) - rotate(turn, load3(j.anchor) - load3(was.position));
     return std::fabs(dot(axis, cross(arm, along))) > kDriven * norm(arm);
   });
-}
-
-double ToolTouch::softness_of_motor(const Row &row) const {
-  return strong_ / kHeld * rounding_of(row, row.normal);
 }
 
 void ToolTouch::request_again(Moved &m) {

@@ -89,8 +89,9 @@ size_t ToolTouch::most_events(const World &w) const {
   return next_report_.touching.size() + w.rigid_report.touching.size();
 }
 
-// At the end of a sub-step that stands; allocates nothing.
-void ToolTouch::report(World &w) noexcept {
+// Allocates nothing.
+void ToolTouch::keep(World &w) noexcept {
+  if (w.tool_store.n > 0 || next_.n > 0) std::swap(w.tool_store, next_);
   RigidReport &now = next_report_;
   if (now.touching.empty() && now.contacts.empty() && w.rigid_report.touching.empty() &&
       w.rigid_report.contacts.empty())
@@ -124,14 +125,9 @@ void end_rigid_contacts(World &w, uint64_t id) {
 }
 
 void find_touching(const World &w, const ContactStore &of, Array<RigidPair> &out) {
-  const auto thing = [&](uint64_t id) -> const Obstacle * {
-    for (const auto &o : w.obstacles)
-      if (o->id == id) return o.get();
-    return nullptr;
-  };
   out.clear();
   for (uint32_t i = 0; i < of.n; ++i) {
-    const Obstacle *const a = thing(of.id_a[i]), *const b = thing(of.id_b[i]);
+    const Obstacle *const a = w.obstacle(of.id_a[i]), *const b = w.obstacle(of.id_b[i]);
     if (!a || !b) continue;
     const bool turned = ToolTouch::b_first(*a, *b);
     out.push_back(turned ? RigidPair{b->id, a->id} : RigidPair{a->id, b->id});

@@ -138,7 +138,7 @@ void ToolTouch::set_responses(Row &row, ContactRows &to, uint32_t r) const {
   to.set_diagonal(r);
   double &wn = to.wn[r], &wt = to.wt[r];
   const bool held = !(wn > rounding_of(row, row.normal));
-  row.soft = row.pair->jaw ? 1 / (h_ * h_ * kFace) : held && motor_holds(row) ? softness_of_motor(row) : 0;
+  row.soft = row.pair->jaw ? 1 / (h_ * h_ * kFace) : held ? softness_of_motor(row) : 0;
   wn = held ? row.soft : wn + row.soft;
   if (held || !(wt > rounding_of(row, row.tangent[0]))) wt = 0;
   const bool opens = row.pair->frees && !held && row.rate > 0;

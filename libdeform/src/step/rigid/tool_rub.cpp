@@ -161,9 +161,4 @@ void ToolTouch::keep_next(const ContactState &state, uint32_t first) {
   to.order();
 }
 
-void ToolTouch::keep(World &w) noexcept {
-  if (w.tool_store.n > 0 || next_.n > 0) std::swap(w.tool_store, next_);
-  report(w);
-}
-
 }  // namespace dfm

@@ -113,8 +113,9 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
         touch = rule->collide;
       if (!touch || belong_together(w, a, b)) continue;
+      Pair pair{i, j, {a.id, b.id}};
       if (!apart) {
-        passing_.push_back({i, j, 0, {a.id, b.id}, true, false, false, {kNone, kNone}, 0, 0, 0, 0});
+        passing_.push_back(pair);
         for (const Obstacle *const o : {&a, &b})
           if (!is_wall(*o) && (cornerless || !is_free(*o)) && (o == &a ? is_wall(b) : is_wall(a)) &&
               std::find(facts.rigid_alone.begin(), facts.rigid_alone.end(), o->name) ==
@@ -122,22 +123,16 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
             facts.rigid_alone.push_back(o->name);
         continue;
       }
-      const bool frees = !of_tool(a) && !of_tool(b), jaw = is_jaw(a) || is_jaw(b);
-      facts.rigid_pairs += frees;
-      const uint32_t wall_a = wall(i), wall_b = wall(j);
-      const double thin = std::min(thickness(a), thickness(b));
-      pairs_.push_back({i,
-                        j,
-                        law_of_obstacles(w, a, b),
-                        {a.id, b.id},
-                        frees,
-                        jaw,
-                        b_first(a, b),
-                        {wall_a, wall_b},
-                        thin,
-                        std::min(kDent, kNear * thin),
-                        HUGE_VAL,
-                        HUGE_VAL});
+      pair.law = law_of_obstacles(w, a, b);
+      pair.frees = !of_tool(a) && !of_tool(b);
+      pair.jaw = is_jaw(a) || is_jaw(b);
+      pair.b_first = b_first(a, b);
+      pair.wall[0] = wall(i);
+      pair.wall[1] = wall(j);
+      pair.thin = std::min(thickness(a), thickness(b));
+      pair.dent = std::min(kDent, kNear * pair.thin);
+      facts.rigid_pairs += pair.frees;
+      pairs_.push_back(pair);
     }
   facts.rigid_rows = !pairs_.empty();
   for (const Pair &pair : pairs_) w.pairs.tool_law.push_back(pair.law);
@@ -326,22 +321,20 @@ double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Si
   // A corner meets an edge or a corner of the other only on its leading side. Other near features are not in
   // the way, such as the vertices of a floor beside the lower edge of a box that slides over it.
   bool face = true;
-  for (const ToolShape::Corner &c : a.corners()) {
-    const auto &[corner, number] = c;
-    if (!b.closest(corner, far + a.round(), o, &face) || !(face || a.may_meet(c, -o.normal))) continue;
-    const double gap = o.distance - a.round();
-    deepest = std::max(deepest, -gap);
-    add_row(pair, {kCornerOfA, number, 0}, at_a, at_b,
-            {o.point + 0.5 * gap * o.normal, corner, o.point - b.round() * o.normal}, o.normal, gap, reach);
-  }
-  for (const ToolShape::Corner &c : b.corners()) {
-    const auto &[corner, number] = c;
-    if (!a.closest(corner, far + b.round(), o, &face) || !(face || b.may_meet(c, -o.normal))) continue;
-    const double gap = o.distance - b.round();
-    deepest = std::max(deepest, -gap);
-    add_row(pair, {kCornerOfB, number, 0}, at_a, at_b,
-            {o.point + 0.5 * gap * o.normal, o.point - a.round() * o.normal, corner}, -o.normal, gap, reach);
-  }
+  const auto add_corners = [&](const ToolShape &own, const ToolShape &other, bool of_a) {
+    for (const ToolShape::Corner &c : own.corners()) {
+      if (!other.closest(c.at, far + own.round(), o, &face) || !(face || own.may_meet(c, -o.normal)))
+        continue;
+      const double gap = o.distance - own.round();
+      deepest = std::max(deepest, -gap);
+      const Vec3 met = o.point - other.round() * o.normal;
+      add_row(pair, {of_a ? kCornerOfA : kCornerOfB, c.number, 0}, at_a, at_b,
+              {o.point + 0.5 * gap * o.normal, of_a ? c.at : met, of_a ? met : c.at},
+              of_a ? o.normal : -o.normal, gap, reach);
+    }
+  };
+  add_corners(a, b, true);
+  add_corners(b, a, false);
   const double round = a.round() + b.round();
   for (const ToolShape::Edge &p : a.edges())
     for (const ToolShape::Edge &q : b.edges()) {
@@ -383,13 +376,6 @@ void ToolTouch::each_pair(const World &w, const StepContext &step, const Visit &
     shapes_[1].take(vb, b.mesh.get());
     f(pair, shapes_[0], shapes_[1], at_a, at_b);
   }
-}
-
-void ToolTouch::find(const World &w, const StepContext &step) {
-  each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
-    const double deep = add_rows(pair, a, b, at_a, at_b);
-    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
-  });
 }
 
 // The terms of turning beyond the first order and spins depend on the solution.
@@ -504,7 +490,10 @@ bool ToolTouch::begin(World &w, StepContext &step) {
   planned_ = step.length.planned;
   strong_ = 1;
   take_sets(w, step);
-  find(w, step);
+  each_pair(w, step, [&](Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
+    const double deep = add_rows(pair, a, b, at_a, at_b);
+    if (!pair.jaw && inside(a, b, deep)) warn_deep(w, pair, deep, false);
+  });
   if (rows_.empty()) return true;
   if (!follows_arcs(w, step)) return false;
   for (Moved &m : sides_)

@@ -107,14 +107,15 @@ class ToolTouch {
   };
   // Two obstacles that may touch, by their places in World::obstacles.
   struct Pair {
-    uint32_t a, b, law;
+    uint32_t a, b;
     uint64_t id[2];
-    bool frees, jaw;     // none is of a tool; one is a jaw
-    bool b_first;        // reports have b first
-    uint32_t wall[2];    // number among walls_; kNone: it is in a set
-    double thin;         // m, least thickness of the two
-    double dent;         // m: edges that are further on the wrong side do not touch there
-    double reach, turn;  // m, rad: how far its rows of this sub-step keep the two apart
+    uint32_t law = 0;
+    bool frees = true, jaw = false;     // none is of a tool; one is a jaw
+    bool b_first = false;               // reports have b first
+    uint32_t wall[2] = {kNone, kNone};  // number among walls_; kNone: it is in a set
+    double thin = 0;                    // m, least thickness of the two
+    double dent = 0;                    // m: edges that are further on the wrong side do not touch there
+    double reach = HUGE_VAL, turn = HUGE_VAL;  // m, rad: how far its rows of this sub-step keep the two apart
   };
   struct Row {
     const Pair *pair;
@@ -164,7 +165,6 @@ class ToolTouch {
   // bone_a, bone_b: corners, or points of edges or faces, without the radius around them
   struct Place { Vec3 at, bone_a, bone_b; };
   Vec3 speed(const Row &row, const std::vector<double> Moved::*of = &Moved::now) const;
-  void find(const World &w, const StepContext &step);
   using Visit = std::function<void(Pair &, ToolShape &, ToolShape &, Side, Side)>;
   void each_pair(const World &w, const StepContext &step, const Visit &f);
   static bool cull_facing(ToolShape &a, ToolShape &b, double far, bool flat);
@@ -202,9 +202,8 @@ class ToolTouch {
   double response_without_joints(const Side &side, Vec3 along) const;
   bool jointed(const Side &side) const;
   double rounding_of(const Row &row, Vec3 along) const;
-  bool motor_holds(const Row &row) const;
-  bool is_driven(const Side &side, Vec3 along) const;
   double softness_of_motor(const Row &row) const;
+  bool is_driven(const Side &side, Vec3 along) const;
   void begin_passes();
   void request_again(Moved &m);
   static void clean_response(Moved &m, uint32_t group);
@@ -229,7 +228,6 @@ class ToolTouch {
   void keep_next(const ContactState &state, uint32_t first);
   // tool_report.cpp
   void list_contact(const World &w, const StepContext &step, uint32_t row);
-  void report(World &w) noexcept;
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches

@@ -146,16 +146,15 @@ void ToolTouch::warn_driven(const World &w, const StepContext &step) {
     if ((!wall_a && can_move(at_a, b)) || (!wall_b && can_move(at_b, a)) || reported(pair)) continue;
     const ObstacleView &va = step.obstacle_views[a.slot], &vb = step.obstacle_views[b.slot];
     if (!ToolShape::takes_part(va) || !ToolShape::takes_part(vb)) continue;
-    const bool mesh = va.surface || vb.surface;
-    if (wall_a || wall_b) {
-      if (cuts(w, wall_a ? b : a) || balls_apart(va, vb) || (mesh && w.step_count % kSeldom != 0)) continue;
-      ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
-      const double deep = depth(shape_a, shape_b, !mesh);
+    const bool wall = wall_a || wall_b, mesh = va.surface || vb.surface;
+    if (wall && (cuts(w, wall_a ? b : a) || balls_apart(va, vb) || (mesh && w.step_count % kSeldom != 0)))
+      continue;
+    ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
+    const double deep = depth(shape_a, shape_b, !(wall && mesh));
+    if (wall) {
       if (inside(shape_a, shape_b, deep)) warn_deep(w, pair, deep, true);
       continue;
     }
-    ToolShape shape_a(va, a.mesh.get()), shape_b(vb, b.mesh.get());
-    const double deep = depth(shape_a, shape_b, true);
     if (!(deep > offset_) && !(goes_far(pair) && meeting(w, step, pair, shape_a, shape_b) <= 1)) continue;
     reported_.push_back({pair.id[0], pair.id[1]});
     w.context->logf(DFM_LOG_WARNING,

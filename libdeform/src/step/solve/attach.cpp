@@ -14,17 +14,6 @@
 namespace dfm {
 namespace {
 
-void set_nodes(const StepContext &step, const Attachment &a, size_t i, uint32_t slot_b, Bond &b) {
-  const BodyView &other = step.body_views[slot_b];
-  for (uint32_t k = 0; k < kAnchors; ++k) {
-    const double weight = a.weight[kAnchors * i + k];
-    if (weight == 0) continue;
-    b.node[b.nnode] = other.first_node + a.node[kAnchors * i + k];
-    b.weight[b.nnode] = -weight;
-    ++b.nnode;
-  }
-}
-
 // The gap is closed within the planned sub-step; within a piece of it that the guard has cut, which may be of
 // any length, it would throw the body. A gap beyond d_c, made by a host, closes by at most d_c, or at
 // recovery_speed, for the same reason.
@@ -69,7 +58,11 @@ void add_bonds(World &w, StepContext &step, const Attachment &a) {
       }
     } else {
       b.slot_b = slot_of(w, a.to);
-      set_nodes(step, a, i, b.slot_b, b);
+      for (size_t k = kAnchors * i; k < kAnchors * (i + 1); ++k) {
+        if (a.weight[k] == 0) continue;
+        b.node[b.nnode] = step.body_views[b.slot_b].first_node + a.node[k];
+        b.weight[b.nnode++] = -a.weight[k];
+      }
     }
     if (spring > 0) {
       b.rate = (step.h * a.stiffness * share / spring) * gap;
@@ -99,13 +92,9 @@ void part(World &w, Attachment &a) {
 
 }  // namespace
 
-// Its displacement over the sub-step to third order in the initial spin, as for shapes (shape_velocity).
 Vec3 place_velocity(const Obstacle &o, Vec3 x, const StepContext &step) {
-  const Vec3 arm = x - step.rigid_places[o.slot].center;
-  const double *const v = &o.rigid->first[6 * size_t{o.rigid_body}];
-  const Vec3 turn = load3(o.rigid->state[o.rigid_body].spin);
-  const Vec3 second = cross(turn, cross(turn, arm)), third = cross(turn, second);
-  return load3(v) + cross(load3(v + 3), arm) + (0.5 * step.h) * second + (step.h * step.h / 6) * third;
+  return mean_velocity_at(o, &o.rigid->first[6 * size_t{o.rigid_body}], x - step.rigid_places[o.slot].center,
+                          step.h);
 }
 
 Pose attached_frame(const Obstacle &o) { return o.rigid ? load_pose(o.rigid->state[o.rigid_body]) : o.pose; }

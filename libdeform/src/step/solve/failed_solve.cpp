@@ -3,7 +3,6 @@
 #include <string>
 
 #include "contact/contact_state.h"
-#include "core/error.h"
 #include "friction/laws.h"
 #include "state/obstacle.h"
 #include "state/world.h"
@@ -71,41 +70,34 @@ LawInputs law_inputs(const StepContext &step, const LawInstance &law, uint32_t i
 
 }  // namespace
 
-uint32_t report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact) {
+bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, uint32_t contact,
+                         uint32_t *trouble) {
   const uint32_t at = law ? contact : spoilt(step);
   const std::string where = at_step(w) + ", " + sides(w, step, at);
   constexpr const char *kDo = "take a smaller step, reduce the loads or change the law";
   const LawInputs in = law && at != kNone ? law_inputs(step, *law, at) : LawInputs{"", true};
-  if (!law || !in.is_valid) {
-    set_last_error(
-        format(
-            "%s: the contact solve is not finite%s; %s", where.c_str(),
-            law ? (", so that law '" + std::string(law->type->id) + "' was evaluated at " + in.text).c_str()
-                : "",
-            kDo)
-            .c_str());
-    return DFM_TROUBLE_NONFINITE;
-  }
+  if (!law || !in.is_valid)
+    return fail_step(
+        trouble, DFM_TROUBLE_NONFINITE, "%s: the contact solve is not finite%s; %s", where.c_str(),
+        law ? (", so that law '" + std::string(law->type->id) + "' was evaluated at " + in.text).c_str() : "",
+        kDo);
   const std::string what = at == kNone
                                ? "returned an error"
                                : "returned a value that is not finite, or a limit below zero, at " + in.text;
-  set_last_error(
-      format("%s: friction law '%s' %s; %s", where.c_str(), law->type->id, what.c_str(), kDo).c_str());
-  return DFM_TROUBLE_PLUGIN;
+  return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: friction law '%s' %s; %s", where.c_str(), law->type->id,
+                   what.c_str(), kDo);
 }
 
-uint32_t report_jam(World &w, StepContext &step) {
+bool report_jam(World &w, StepContext &step, uint32_t *trouble) {
   uint32_t worst = kNone;
   for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
   const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
   const std::string held = c && c->obstacle ? describe_held_at(w, c->slot_a, c->slot_b) : std::string();
-  set_last_error(
-      format("%s, %s: squeezed until nothing can move; %s", at_step(w).c_str(), sides(w, step, worst).c_str(),
-             held.empty() ? "open what closes on it, move that more slowly, or make the body stiffer"
-                          : held.c_str())
-          .c_str());
-  return DFM_TROUBLE_UNCONVERGED;
+  return fail_step(trouble, DFM_TROUBLE_UNCONVERGED, "%s, %s: squeezed until nothing can move; %s",
+                   at_step(w).c_str(), sides(w, step, worst).c_str(),
+                   held.empty() ? "open what closes on it, move that more slowly, or make the body stiffer"
+                                : held.c_str());
 }
 
 }  // namespace dfm

@@ -31,21 +31,21 @@
 namespace dfm {
 namespace {
 
-// Responses between the touched surfels of bodies whose points respond to each other's impulses.
-void fill_response(World &w, StepContext &step, const ContactRows::Block &block) {
-  const Body &b = *w.bodies[block.source];
-  const uint32_t *const surfels = &step.rows.point[block.first];
-  step.rows.set_responses(block, [&](double *responses) {
-    if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
-      fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
-           b.model.type->id, b.name.c_str());
-  });
-}
-
+// Responses between the touched surfels of bodies whose points respond to each other's impulses, and of groups
+// of rigid bodies.
 void fill_responses(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
-    if (block.group == kNone) fill_response(w, step, block);
-    else rigid_response(w, step, block);
+    if (block.group != kNone) {
+      rigid_response(w, step, block);
+      continue;
+    }
+    const Body &b = *w.bodies[block.source];
+    const uint32_t *const surfels = &step.rows.point[block.first];
+    step.rows.set_response(block, true, [&](double *responses) {
+      if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
+        fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
+             b.model.type->id, b.name.c_str());
+    });
   }
 }
 
@@ -200,14 +200,18 @@ const SolveIsland *solve_revised(World &w, StepContext &step) {
 }
 
 // Takes the largest residual of all islands, and the passes and sweeps of the island that needed most.
-void add_up(StepContext &step) {
-  step.passes = step.sweeps = 0;
-  step.residual = {};
+void add_up(World &w, StepContext &step) {
+  dfm_world_stats &s = w.stats;
+  s.passes = s.sweeps = 0;
   for (const SolveIsland &own : step.solve_islands->all()) {
-    step.passes = std::max(step.passes, own.all_passes);
-    step.sweeps = std::max(step.sweeps, own.all_sweeps);
+    s.passes = std::max(s.passes, own.all_passes);
+    s.sweeps = std::max(s.sweeps, own.all_sweeps);
     step.residual = larger(step.residual, own.residual);
   }
+  s.residual = step.residual.speed;
+  s.passes_max = std::max(s.passes_max, s.passes);
+  s.sweeps_max = std::max(s.sweeps_max, s.sweeps);
+  s.residual_max = std::max(s.residual_max, s.residual);
 }
 
 // False: the sub-step is to be repeated, with the integrator that contacts need.
@@ -241,12 +245,10 @@ bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t
     step.length.repeat(0.5);
     return false;
   }
-  set_last_error(format("%s: no state was found in which its forces and contacts agree, not even in a "
-                        "sub-step of %g s; take a smaller step, or lower the stiffness",
-                        at_step(w, *w.bodies[own.implicit_body]).c_str(), step.h)
-                     .c_str());
-  *trouble |= DFM_TROUBLE_NONFINITE;
-  return false;
+  return fail_step(trouble, DFM_TROUBLE_NONFINITE,
+                   "%s: no state was found in which its forces and contacts agree, not even in a sub-step of "
+                   "%g s; take a smaller step, or lower the stiffness",
+                   at_step(w, *w.bodies[own.implicit_body]).c_str(), step.h);
 }
 
 // False: the sub-step is to be repeated, up to where a body lands that a restitution throws back.
@@ -263,7 +265,6 @@ bool cut_at_landing(World &w, StepContext &step) {
 bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   call_pre_solve(w, step);
   if (!contacts_taken(w, step) || !short_enough(w, step)) return false;
-  step.passes = step.sweeps = 0;
   step.residual = {};
   make_rows(w, step);
   if (!cut_at_landing(w, step)) return false;
@@ -276,27 +277,18 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   }
   share_work(w, step);
   const SolveIsland *const bad = solve_revised(w, step);
-  add_up(step);
   for (const SolveIsland &own : step.solve_islands->all())
     if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
   double nan_flag = 0;
   for (double l : step.rows.impulse) nan_flag += 0.0 * l;
-  if (bad || nan_flag != 0) {
-    *trouble |= bad ? report_failed_solve(w, step, bad->bad, bad->batches.failed())
-                    : report_failed_solve(w, step, nullptr, kNone);
-    return false;
-  }
+  if (bad) return report_failed_solve(w, step, bad->bad, bad->batches.failed(), trouble);
+  if (nan_flag != 0) return report_failed_solve(w, step, nullptr, kNone, trouble);
   step.bond_impulse.assign(step.rows.impulse.begin() + std::ptrdiff_t{3} * step.rows.n,
                            step.rows.impulse.end());
   // laws may have been evaluated at slips that differ from the solution
   std::swap(step.state.vt, step.state.slip);
   update_stick_drift(w, step);
-  w.stats.passes = step.passes;
-  w.stats.sweeps = step.sweeps;
-  w.stats.residual = step.residual.speed;
-  w.stats.passes_max = std::max(w.stats.passes_max, step.passes);
-  w.stats.sweeps_max = std::max(w.stats.sweeps_max, step.sweeps);
-  w.stats.residual_max = std::max(w.stats.residual_max, w.stats.residual);
+  add_up(w, step);
   reserve_contacts(w, step);
   return true;
 }

@@ -36,7 +36,7 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
 
 void begin_newton(StepContext &step, SolveIsland &own) {
   if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
-  own.newton->begin(step.rows, own.part, step.systems, step.state, own.laws, step.h);
+  own.newton->begin(step.rows, own.part, step.systems, step.state, own, step.h);
 }
 
 // After sweeps. Where rows contradict each other, the better result counts. tolerance, normal: m/s, as of
@@ -53,7 +53,7 @@ void solve_rigid(StepContext &step, SolveIsland &own, double tolerance, double n
   if (found && !own.bad && own.residual.speed <= swept) return;
   own.bad = nullptr;  // a law that fails on the way need not fail there
   put_impulses(step.rows, own.part, own.swept.data());
-  own.laws.judge(own.residual);
+  own.judge(own.residual);
 }
 
 // Evaluates the laws at the present state, and its residual. False: a law has failed.
@@ -79,9 +79,10 @@ double normal_tolerance(const World &w, const StepContext &step, const SolveIsla
 
 // Evaluates the laws at the warm start.
 void start_island(const World &w, StepContext &step, SolveIsland &own) {
-  own.laws.begin(w, step, own);
+  own.world = &w;
+  own.step = &step;
   if (own.implicit) begin_newton(step, own);
-  if (evaluate_laws(w, step, own)) own.laws.slopes();
+  if (evaluate_laws(w, step, own)) own.slopes();
 }
 
 // m/s, of the velocities of bodies: that of the contact that needs most.
@@ -96,12 +97,10 @@ double motion_tolerance(const SolveIsland &own) {
 bool take_least_work(ContactRows &rows, const RowsPart &part) {
   const double share = share_of_least_work(rows, part);
   if (share == 1) return false;
-  const auto scale = [&](uint32_t i) {
+  each_row(part, [&](uint32_t i) {
     double *const l = &rows.impulse[3 * size_t{i}];
     store3(l, share * load3(l));
-  };
-  each_row(part.contacts, scale);
-  each_row(part.bonds, scale);
+  });
   rows.restore(part);
   return true;
 }
@@ -145,8 +144,8 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
   if (step.on_solve) step.on_solve(&own);
   if (!own.implicit) {
     const SweepLimits limits{w.def.max_sweeps, w.def.max_passes, start_residual(step, own)};
-    const bool done = own.sweeping.solve(step.rows, own.part, step.state, own.laws, own.tolerance, limits,
-                                         step.h, own.residual);
+    const bool done =
+        own.sweeping.solve(step.rows, own.part, step.state, own, own.tolerance, limits, step.h, own.residual);
     own.sweeps = own.sweeping.count();
     if (done) return;
     if (own.all_rigid) {
@@ -165,26 +164,26 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 
 }  // namespace
 
-bool IslandLaws::evaluate_local(const double *response, double slip) {
-  own_->bad = own_->batches.evaluate_local(step_->h, response, slip, 0, step_->state);
-  return !own_->bad;
+bool SolveIsland::evaluate_local(const double *response, double slip) {
+  bad = batches.evaluate_local(step->h, response, slip, 0, step->state);
+  return !bad;
 }
 
-bool IslandLaws::slopes() {
-  if ((own_->bad = own_->batches.slopes(step_->h, step_->state))) return false;
-  if (own_->batches.differences()) linearize(step_->rows, own_->part, step_->h, step_->state);
+bool SolveIsland::slopes() {
+  if ((bad = batches.slopes(step->h, step->state))) return false;
+  if (batches.differences()) linearize(step->rows, part, step->h, step->state);
   return true;
 }
 
-bool IslandLaws::judge(Residual &residual) {
-  if (!evaluate_laws(*w_, *step_, *own_)) return false;
-  residual = own_->residual = residual_of(step_->rows, own_->part, step_->state, step_->h, own_->tolerance);
+bool SolveIsland::judge(Residual &found) {
+  if (!evaluate_laws(*world, *step, *this)) return false;
+  found = residual = residual_of(step->rows, part, step->state, step->h, tolerance);
   return true;
 }
 
-void IslandLaws::spend(uint64_t rows) { dfm::spend(*w_, *step_, own_->spent, rows); }
+void SolveIsland::spend(uint64_t rows) { dfm::spend(*world, *step, spent, rows); }
 
-bool IslandLaws::goes_on() { return !solve_ends(*step_, own_->spent); }
+bool SolveIsland::goes_on() { return !solve_ends(*step, spent); }
 
 SolveIslands::SolveIslands(const Memory &m) : memory_(m), joined_(m) {
   use_memory(m, pairs_, owner_, sides_, between_rigids_, of_cuts_, order_, contact_, bond_, block_, begin_);
@@ -299,18 +298,17 @@ void SolveIslands::assign_rows(size_t of_contacts) {
     for (const RowRun &r : runs) n += r.n;
     return n;
   };
-  split({pairs_.data(), of_contacts}, contact_);
-  for (uint32_t k = 0; k < count_; ++k) {
-    RowsPart &part = islands_[k].part;
-    part.contacts = slice(contact_, k);
-    part.n = rows_of(part.contacts);
-  }
-  split({pairs_.data() + of_contacts, pairs_.size() - of_contacts}, bond_);
-  for (uint32_t k = 0; k < count_; ++k) {
-    RowsPart &part = islands_[k].part;
-    part.bonds = slice(bond_, k);
-    part.nbond = rows_of(part.bonds);
-  }
+  const auto assign = [&](std::span<const Pair> pairs, Array<RowRun> &runs, auto rows, auto number) {
+    split(pairs, runs);
+    for (uint32_t k = 0; k < count_; ++k) {
+      RowsPart &part = islands_[k].part;
+      part.*rows = slice(runs, k);
+      part.*number = rows_of(part.*rows);
+    }
+  };
+  const std::span<const Pair> all(pairs_);
+  assign(all.first(of_contacts), contact_, &RowsPart::contacts, &RowsPart::n);
+  assign(all.subspan(of_contacts), bond_, &RowsPart::bonds, &RowsPart::nbond);
 }
 
 void SolveIslands::sort_blocks(const Array<ContactRows::Block> &blocks) {
@@ -329,16 +327,14 @@ void SolveIslands::prepare(const World &w, StepContext &step) {
     own.between_rigids = between_rigids_[k];
     own.all_rigid = own.part.nbond == 0 && own.part.contacts.front().first >= step.rows.soft();
     for (const uint32_t b : own.part.blocks) own.rigid = own.rigid || blocks[b].group != kNone;
-    const auto moves_implicit = [&](uint32_t i) {
+    each_row(own.part, [&](uint32_t i) {
       for (uint32_t j = step.rows.begin[i]; j < step.rows.begin[i + 1]; ++j) {
         const uint32_t d = step.rows.dof[j];
         if (step.rows.block[d] != kNone || !step.systems[step.rows.source[d]]) continue;
         own.implicit = true;
         own.implicit_body = step.rows.source[d];
       }
-    };
-    each_row(own.part.contacts, moves_implicit);
-    each_row(own.part.bonds, moves_implicit);
+    });
     own.batches.gather(w.pairs.laws, own.part.contacts, step.state);
   }
 }
@@ -354,7 +350,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     if (!own.open) continue;
     rows += own.part.all();
     own.part.alone = step.rows.is_alone(own.part);
-    own.start();
+    own.passes = own.sweeps = 0;
     own.failed = false;
     own.spent = {0, 0, own.part.all(), false};
     own.residual = {};
@@ -408,12 +404,10 @@ void take_part_of_contact(const World &w, StepContext &step, double share) {
   full.assign(w.bodies.size(), 0);
   const std::span<SolveIsland> all = step.solve_islands->all();
   const auto each_body = [&](const SolveIsland &own, auto &&f) {
-    const auto of_row = [&](uint32_t i) {
+    each_row(own.part, [&](uint32_t i) {
       for (uint32_t j = rows.begin[i]; j < rows.begin[i + 1]; ++j)
         if (const uint32_t s = rows.source[rows.dof[j]]; s != kNone) f(s);
-    };
-    each_row(own.part.contacts, of_row);
-    each_row(own.part.bonds, of_row);
+    });
   };
   const auto keeps = [&](const SolveIsland &own) {
     bool any = own.implicit || !own.part.blocks.empty();

@@ -21,29 +21,9 @@ namespace dfm {
 struct StepContext;
 struct World;
 
-struct SolveIsland;
-
-// What a solve asks of an island.
-class IslandLaws final : public SolveLaws {
- public:
-  void begin(const World &w, StepContext &step, SolveIsland &own) {
-    w_ = &w;
-    step_ = &step;
-    own_ = &own;
-  }
-  bool evaluate_local(const double *response, double slip) override;
-  bool slopes() override;
-  bool judge(Residual &residual) override;
-  void spend(uint64_t rows) override;
-  bool goes_on() override;
-
- private:
-  const World *w_ = nullptr;
-  StepContext *step_ = nullptr;
-  SolveIsland *own_ = nullptr;
-};
-
-struct SolveIsland {
+struct SolveIsland final : SolveLaws {
+  const World *world = nullptr;  // of the present solve
+  StepContext *step = nullptr;
   RowsPart part;
   bool implicit = false;        // some body of it moves implicitly
   uint32_t implicit_body = 0;   // slot of one of these
@@ -53,7 +33,6 @@ struct SolveIsland {
   LawBatches batches;
   Sweeps sweeping;
   std::unique_ptr<ContactNewton> newton;  // null until it is needed
-  IslandLaws laws;
   Tolerance tolerance;
   std::vector<double> swept;  // [rows,3] N s, scratch
   // of the last solve
@@ -69,7 +48,11 @@ struct SolveIsland {
   uint32_t all_passes = 0, all_sweeps = 0;
 
   explicit SolveIsland(const Memory &m) : batches(m), sweeping(m) {}
-  void start() { passes = sweeps = 0; }  // begins with the first pass
+  bool evaluate_local(const double *response, double slip) override;
+  bool slopes() override;
+  bool judge(Residual &found) override;
+  void spend(uint64_t rows) override;
+  bool goes_on() override;
 };
 
 class SolveIslands {

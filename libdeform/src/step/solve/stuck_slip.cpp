@@ -17,7 +17,6 @@
 #include "step/solve/friction_memory.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "contact/rows_part.h"
 #include "contact/solve_settings.h"
@@ -36,12 +35,6 @@ bool holds_places(const World &w) {
   if (w.prescribed.is_static()) return false;
   return std::any_of(w.pairs.laws.begin(), w.pairs.laws.end(),
                      [](const LawInstance *law) { return is_projection(*law); });
-}
-
-// In integers: most contacts of a sliding body owe nothing, and each is asked several times.
-bool any(const double *e) {
-  const auto bits = [e](int k) { return std::bit_cast<uint64_t>(e[k]); };
-  return (bits(0) | bits(1) | bits(2)) << 1 != 0;
 }
 
 Vec3 at_most(double most, Vec3 v) {
@@ -69,7 +62,7 @@ void find_slip_back(const World &w, StepContext &step, SolveIsland &own) {
     if (m == kNone || w.store.law[m] != step.state.law[i]) return;
     const double *const e = &w.store.stick_drift[3 * size_t{m}];
     store3(stick_drift + 3 * size_t{i}, load3(e));
-    drifts = drifts || any(e);
+    drifts = drifts || e[0] != 0 || e[1] != 0 || e[2] != 0;
   });
   own.drifts = drifts;
   if (!drifts) return;
