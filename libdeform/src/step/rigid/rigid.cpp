@@ -34,8 +34,7 @@ bool host_failed(const World &w, const RigidSet &set, const HostFault &fault, ui
 }  // namespace
 
 Obstacle &rigid_obstacle(World &w, uint64_t id) {
-  for (auto &o : w.obstacles)
-    if (o->id == id) return *o;
+  if (Obstacle *const o = w.obstacle(id)) return *o;
   fail(DFM_E_FATAL, "a rigid body has lost its shape");
 }
 
@@ -308,6 +307,7 @@ void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, 
   if (!set.host.joint)
     fail(DFM_E_UNSUPPORTED, "rigid host '%s' says nothing about its joints", set.host_name.c_str());
   check_joint(set, joint, DFM_OK);
+  const std::lock_guard one_at_a_time(set.querying);
   double p, r, e;
   check_joint(set, joint, set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e));
   if (position) *position = p;
