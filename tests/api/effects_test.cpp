@@ -270,3 +270,29 @@ TEST(Effects, ThatAreLeftOut_StayOutWhenParametersChange) {
             std::string::npos)
       << plan(w);
 }
+
+TEST(Effects, ThatAreLeftOut_LetParametersChangeAfterARestore) {
+  test::Context c;
+  dfm_world w = 0;
+  dfm_body body = 0;
+  test::ok(make(c, {{"friction", "guard"}}, &w, &body));
+  const std::string start = test::snapshot(w);
+  const auto go_back = [&] { test::ok(dfm_world_restore(w, start.data(), start.size())); };
+  const auto set_young = [&](double young) {
+    const dfm_param_value value = {"young", &young, 1};
+    const dfm_params params = {sizeof params, 1, &value};
+    test::ok(dfm_body_set_params(body, &params));
+  };
+  const auto hash_after = [&] {
+    test::run(w, 0.02, 1e-3);
+    return dfm_world_hash(w);
+  };
+  set_young(3e5);
+  const uint64_t changed = hash_after();
+  go_back();
+  set_young(2e5);
+  go_back();
+  set_young(3e5);
+  EXPECT_EQ(hash_after(), changed);
+  dfm_world_destroy(w);
+}

@@ -465,3 +465,34 @@ TEST(Hpp, Calls_AllocateNothing) {
   EXPECT_EQ(test::heap_calls, before);
   EXPECT_GT(n, 0u);
 }
+
+TEST(Hpp, EmptySpansWithRoomBehindThem_AreNotWritten) {
+  Scene s;
+  std::vector<double> x, v(3 * s.ball.info().npoint);
+  x.reserve(8);
+  x.push_back(7);
+  const double *const at = x.data();
+  x.clear();
+  s.ball.state(x, v);
+  EXPECT_EQ(*at, 7);
+  x.assign(v.size(), 0);
+  s.ball.set_state({}, v);
+  s.ball.state(x, {});
+  EXPECT_GT(*std::max_element(x.begin(), x.end()), 0.1);
+}
+
+TEST(Hpp, ADefThatTakesAnotherMesh_KeepsNothingOfTheFirst) {
+  deform::BodyDef def;
+  const double inside[27] = {};
+  const uint32_t brick[8] = {};
+  def.cell = DFM_CELL_HEX8;
+  def.cells = brick;
+  def.cell_inside = def.cell_share = inside;
+  const std::vector<double> points(12);
+  const std::vector<uint32_t> tets = {0, 1, 2, 3};
+  def.set_mesh(points, tets);
+  EXPECT_EQ(def.cells, nullptr);
+  EXPECT_EQ(def.cell_inside, nullptr);
+  EXPECT_EQ(def.cell_share, nullptr);
+  EXPECT_EQ(def.cell, dfm_body_def_default().cell);
+}

@@ -331,3 +331,74 @@ TEST(Overlap, OfPairExcludedWhileSetAside_HasNoContactAfterwards) {
     dfm_world_destroy(w);
   }
 }
+
+TEST(Overlap, FoundBeforeFurtherThingsCome_IsReportedByTheStep) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "a", {});
+  ball(c, w, "b", {0.1, 0, 0});
+  double step = 0;
+  test::ok(dfm_world_stable_step(w, &step, nullptr, nullptr));  // searches
+  ball(c, w, "elsewhere", {3, 0, 0});
+  uint32_t trouble = 0;
+  ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK) << dfm_last_error();
+  EXPECT_TRUE(trouble & DFM_TROUBLE_OVERLAP);
+  EXPECT_EQ(overlaps(w).size(), 1u);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfAPairThatTheHostMovesApart_HasContactAtOnce) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  const dfm_body a = ball(c, w, "a", {}), b = ball(c, w, "b", {0.1, 0, 0});
+  test::run(w, 1e-3, 1e-3);
+  uint32_t n = 0;
+  test::ok(dfm_body_get_state(a, 0, nullptr, nullptr, &n));
+  std::vector<double> x(3 * size_t{n});
+  test::ok(dfm_body_get_state(a, n, x.data(), nullptr, &n));
+  for (size_t i = 0; i < x.size(); i += 3) x[i] -= 0.102;  // 2 mm from b
+  test::ok(dfm_body_set_state(a, n, x.data(), nullptr));
+  test::set_velocity(a, {2, 0, 0});
+  test::run(w, 0.02, 1e-3);  // two steps later it would be inside
+  EXPECT_GT(test::measure(b).velocity[0], 0.5);
+  test::ok(dfm_world_find_overlaps(w, &n));
+  EXPECT_EQ(n, 0u);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, OfACoarseBodyALittleInAFineOne_IsNotSetAside) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  test::BodyOptions o;
+  o.name = "fine";
+  test::make_body(c, w, "beam", {0.3, 0.3, 0.06}, 20000, o);
+  o.name = "coarse";
+  o.position = {0.05, 0.05, 0.0595};
+  test::make_body(c, w, "beam", {0.2, 0.2, 0.2}, 12, o);
+  const auto found = overlaps(w);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_GT(found[0].enclosed, 100u);
+  EXPECT_FALSE(found[0].flags & DFM_OVERLAP_ASIDE);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, WithAFlatOpenMesh_IsFound) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "ball", {});
+  const test::Triangles sheet{{-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0}, {0, 1, 2, 0, 2, 3}};
+  thing(w, DFM_SHAPE_MESH, 0, &sheet);
+  EXPECT_EQ(overlaps(w).size(), 1u);
+  dfm_world_destroy(w);
+}
+
+TEST(Overlap, WithAPointThatNoTriangleHas_IsNone) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "ball", {1, 0, 0});
+  test::Triangles box = test::box_surface({0.1, 0.1, 0.1}, 1);
+  box.points.insert(box.points.end(), {1, 0, 0});
+  thing(w, DFM_SHAPE_MESH, 0, &box);
+  EXPECT_TRUE(overlaps(w).empty());
+  dfm_world_destroy(w);
+}

@@ -714,3 +714,25 @@ TEST(RigidTouch, FastSpinInFreeFlight_KeepsEnergy) {
       }
     }
 }
+
+// A rod put 5 mm into the middle of another one that crosses it is led out on its own side.
+TEST(RigidTouch, RodsThatCrossInEachOther_AreLedApart) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {0, 0, -kG});
+  const auto rod = [](const char *name, Vec axis, double height) {
+    dfm_rigid_def d = test::box(name, {0.1, 0.1, 1}, 1);
+    d.shape = DFM_SHAPE_CAPSULE;
+    d.radius = 0.1;
+    d.half_length = 1;
+    d.pose = pose({0, 0, height}, axis, std::acos(0.0));
+    return d;
+  };
+  dfm_rigid_def low = rod("low", {0, 1, 0}, 0);
+  low.fixed = 1;
+  test::create(w, {low});
+  const dfm_rigid high = test::create(w, {rod("high", {1, 0, 0}, 0.195)})[0];
+  test::run(w, 1, 1e-3);
+  EXPECT_GT(test::state(high).position[2], 0.195);
+  EXPECT_LT(test::state(high).position[2], 0.21);
+  dfm_world_destroy(w);
+}

@@ -178,11 +178,11 @@ class Body : public Handle<dfm_body, struct BodyKind>,
                         : x.size() < v.size() ? x.size()
                                               : v.size();
     return produce<E, uint32_t>(
-        [&](uint32_t &n) { return dfm_body_get_state(raw_, rows(room, 3), x.data(), v.data(), &n); });
+        [&](uint32_t &n) { return dfm_body_get_state(raw_, rows(room, 3), given(x), given(v), &n); });
   }
   auto set_state(std::span<const double> x, std::span<const double> v) const {
     if (!x.empty() && !v.empty() && x.size() != v.size()) return E::done(spans_disagree);
-    return E::done(dfm_body_set_state(raw_, rows(x.empty() ? v.size() : x.size(), 3), x.data(), v.data()));
+    return E::done(dfm_body_set_state(raw_, rows(x.empty() ? v.size() : x.size(), 3), given(x), given(v)));
   }
   auto positions() const {
     return collect<E, 3>(
@@ -199,7 +199,7 @@ class Body : public Handle<dfm_body, struct BodyKind>,
         raw_);
   }
   auto rest(std::span<double> x, std::span<uint32_t> tets) const {
-    return E::done(dfm_body_get_rest(raw_, rows(x.size(), 3), x.data(), rows(tets.size(), 4), tets.data()));
+    return E::done(dfm_body_get_rest(raw_, rows(x.size(), 3), given(x), rows(tets.size(), 4), given(tets)));
   }
   auto energy_density(std::span<double> out) const {
     return E::done(dfm_body_energy_density(raw_, rows(out.size(), 1), out.data()));
@@ -471,7 +471,7 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
   auto snapshot(std::span<std::byte> out) const {
     return produce<E, size_t>([&](size_t &bytes) {
       bytes = out.size();
-      return dfm_world_snapshot(raw_, out.data(), &bytes);
+      return dfm_world_snapshot(raw_, given(out), &bytes);
     });
   }
   auto snapshot() const {

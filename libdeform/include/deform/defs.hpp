@@ -49,6 +49,9 @@ struct BodyDef : dfm_body_def {
     points = p.data();
     ntet = static_cast<uint32_t>(t.size() / 4);
     tets = t.data();
+    cells = nullptr;
+    cell_inside = cell_share = nullptr;
+    cell = dfm_body_def_default().cell;
   }
   template <class Mesh>
   auto set_mesh(const Mesh &mesh) {

@@ -397,7 +397,9 @@ DFM_DEPRECATED dfm_status dfm_body_query_triangles(dfm_body body, const dfm_quer
   if (!shape) return dfm_fail(DFM_E_ARG, "shape is NULL");
   if (capacity > 0 && !triangles)
     return dfm_fail(DFM_E_ARG, "the out argument is NULL, and capacity above 0");
-  each = *shape;
+  each = dfm_query_shape_default(); /* a program of 0.1 has fewer members */
+  memcpy(&each, shape, shape->size < sizeof each ? shape->size : sizeof each);
+  if (each.size > sizeof each) each.size = (uint32_t)sizeof each;
   each.flags |= DFM_QUERY_EACH;
   filter.only = body;
   status = dfm_world_query(info.world, &each, NULL, 0, &filter, dfm_query_list_triangle, &list);

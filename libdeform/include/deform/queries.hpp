@@ -147,7 +147,7 @@ class BodyQueries : public SensorQueries<E, Self> {
   // Returns the number of vertices; an empty span only asks.
   auto surface_vertices(const dfm_vertex_layout &layout, std::span<std::byte> out) const {
     return produce<E, uint32_t>(
-        [&](uint32_t &n) { return dfm_surface_vertices(body(), &layout, out.size(), out.data(), &n); });
+        [&](uint32_t &n) { return dfm_surface_vertices(body(), &layout, out.size(), given(out), &n); });
   }
 
  private:

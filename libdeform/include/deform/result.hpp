@@ -256,6 +256,11 @@ inline typename E::template Out<T> produce(F &&f) {
 constexpr uint32_t rows(size_t numbers, uint32_t width) noexcept {
   return static_cast<uint32_t>(numbers / width);
 }
+// An empty span may have memory behind it that nobody means.
+template <class T>
+constexpr T *given(std::span<T> values) noexcept {
+  return values.empty() ? nullptr : values.data();
+}
 
 // [n, W] numbers through one of the counted functions: into the caller's memory, returning n, or
 // into a vector.

@@ -387,25 +387,25 @@ dfm_status dfm_body_is_asleep(dfm_body body, bool *asleep) {
 }
 
 dfm_status dfm_body_get_measure(dfm_body body, dfm_body_measure *out) {
-  return as_status([&] { copy_out(out, measure(body_of(body))); });
+  return as_status([&] { copy_out(out, measure(still_body_of(body))); });
 }
 
 dfm_status dfm_body_energy_density(dfm_body body, uint32_t capacity, double *out) {
-  return as_status(body_of, body, [&](Body &b) {
+  return as_status(still_body_of, body, [&](Body &b) {
     if (!room(b.ncell(), capacity, out, nullptr)) return;
     energy_density(b, out);
   });
 }
 
 dfm_status dfm_body_stress(dfm_body body, uint32_t capacity, double *out) {
-  return as_status(body_of, body, [&](Body &b) {
+  return as_status(still_body_of, body, [&](Body &b) {
     if (!room(b.ncell(), capacity, out, nullptr)) return;
     cell_stress(b, out);
   });
 }
 
 dfm_status dfm_body_point_stress(dfm_body body, uint32_t capacity, double *out) {
-  return as_status(body_of, body, [&](Body &b) {
+  return as_status(still_body_of, body, [&](Body &b) {
     if (room(b.p.n, capacity, out, nullptr)) point_stress(b, out);
   });
 }

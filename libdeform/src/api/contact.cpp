@@ -313,8 +313,9 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
       const uint32_t body = turned ? c.slot_b : c.slot_a;
       // the center at the time of the contact points: at the start of the sub-step
       if (!known[body]) {
-        const dfm_body_measure m = measure(*w.bodies[body]);
-        com[body] = load3(m.com) - w.report.h * load3(m.velocity);
+        w.bodies[body]->dynamics->see_points();
+        const CenterMotion now = center_motion(*w.bodies[body]);
+        com[body] = now.place - w.report.h * now.velocity;
         known[body] = 1;
       }
       const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];

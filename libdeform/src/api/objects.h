@@ -54,6 +54,11 @@ inline Body &body_of(dfm_body h) {
   if (!b.world->busy) b.dynamics->see_points();
   return b;
 }
+// For calls that ask the model, which a step may be using.
+inline Body &still_body_of(dfm_body h) {
+  if (any_body_of(h).world->busy) Call::refuse("world");
+  return body_of(h);
+}
 // For calls that read all points of all bodies.
 inline World &whole(World &w) {
   for (auto &b : w.bodies) b->dynamics->see_points();

@@ -8,6 +8,7 @@
 #include "plugin/context.h"
 #include "scene/scene.h"
 #include "scene/write.h"
+#include "step/stages.h"
 
 using namespace dfm;
 using scene::Scene;
@@ -145,6 +146,7 @@ void write_scene(const char *call, World &w, const char *path, const dfm_scene_w
   uint32_t local_notes = 0;
   if (!notes) notes = &local_notes;
   *notes = 0;
+  if (options.snapshot) prepare(w);  // pairs that are set aside, and d_c, are state
   writing::write_scene(w, path, options, *notes);
 }
 

@@ -322,7 +322,7 @@ dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
   return as_status(whole_to_change, world, [&](World &w) {
     prepare(w);
     const bool reported = w.overlaps.reported;
-    w.overlaps.all = w.overlaps.report_only = true;
+    const Overlaps::Mode mode(w.overlaps, &Overlaps::report_only);
     prepare(w);
     w.overlaps.reported = reported;
     if (n) *n = static_cast<uint32_t>(w.overlaps.found.size());
@@ -331,7 +331,7 @@ dfm_status dfm_world_find_overlaps(dfm_world world, uint32_t *n) {
 
 dfm_status dfm_world_untangle(dfm_world world, uint32_t *left) {
   return as_status(whole_to_change, world, [&](World &w) {
-    w.overlaps.all = w.overlaps.untangle = true;
+    const Overlaps::Mode mode(w.overlaps, &Overlaps::untangle);
     prepare(w);
     const auto &found = w.overlaps.found;
     if (left)
@@ -346,8 +346,9 @@ double dfm_world_time(dfm_world world) {
 }
 
 uint64_t dfm_world_hash(dfm_world world) {
-  World *const w = static_cast<World *>(handle_find(Kind::world, world));
-  return w ? world_hash(whole(*w)) : 0;
+  uint64_t hash = 0;
+  as_status([&] { hash = world_hash(whole(not_in_step(world_of(world)))); });
+  return hash;
 }
 
 dfm_status dfm_world_snapshot(dfm_world world, void *buffer, size_t *bytes) {

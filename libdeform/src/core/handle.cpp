@@ -97,8 +97,7 @@ void handle_destroy(uint64_t handle) noexcept {
   slot.object = nullptr;
   slot.kind = Kind::none;
   slot.generation = (slot.generation + 1) & 0xffffff;
-  if (slot.generation == 0) slot.generation = 1;
-  t.free.push_back(index - 1);
+  if (slot.generation != 0) t.free.push_back(index - 1);  // else an old handle would be valid again
 }
 
 void *handle_require(Kind kind, uint64_t handle) {

@@ -66,6 +66,12 @@ inline uint64_t mix(uint64_t hash, uint64_t value) {
   hash *= 0xc4ceb9fe1a85ec53ull;
   return hash ^ hash >> 29;
 }
+// The patch that a face or an edge of b belongs to. kind: of the contact.
+inline uint32_t patch_of(const Surface &b, uint8_t kind, uint32_t feature) {
+  if (kind != kEdgeEdge) return b.patch[feature];
+  const uint32_t *const sides = &b.edge_tri[2 * size_t{feature}];
+  return b.patch[sides[0] != kNone ? sides[0] : sides[1]];
+}
 // a, b: the surfaces of the sides; b null where patches have no names. ordinal: distinguishes contacts of one
 // feature with one patch, in the order of b's features.
 inline uint64_t contact_key(const ContactPoint &c, const Surface &a, uint64_t id_a, const Surface *b,

@@ -350,10 +350,7 @@ void Group::resolve(Array<ContactPoint> &out) {
 
 void name_contacts(const Pair &pair, size_t begin, Array<ContactPoint> &out) {
   const Surface &b = *pair.b->surface;
-  const auto patch = [&](const ContactPoint &c) {
-    const uint32_t *const sides = &b.edge_tri[2 * size_t{c.feature_b}];
-    return b.patch[c.type_a == 0 ? c.feature_b : sides[0] != kNone ? sides[0] : sides[1]];
-  };
+  const auto patch = [&](const ContactPoint &c) { return patch_of(b, c.kind, c.feature_b); };
   for (size_t i = begin, end = begin; i < out.size(); i = end) {
     uint32_t touching = 0;
     for (; end < out.size() && out[end].type_a == out[i].type_a && out[end].feature_a == out[i].feature_a;

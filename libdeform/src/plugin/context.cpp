@@ -1,6 +1,8 @@
 #include "plugin/context.h"
 
+#include <bit>
 #include <cstdarg>
+#include <cstdint>
 #include <cstdio>
 #include <cstring>
 #include <memory>
@@ -92,6 +94,7 @@ namespace {
 dfm_context &self(void *ctx) { return *static_cast<dfm_context *>(ctx); }
 
 void *host_alloc(void *ctx, size_t bytes, size_t align) {
+  if (!std::has_single_bit(align) || bytes > SIZE_MAX - align) return nullptr;
   const dfm::Memory &memory = self(ctx).memory;
   return memory.alloc(memory.user, bytes, align);
 }

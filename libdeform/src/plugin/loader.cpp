@@ -123,19 +123,23 @@ void Loader::note_log(const char *text) noexcept {
 }
 
 // Does not allocate, since memory may have run out.
+void Loader::shut_down(const Module &module) noexcept {
+  const Boundary boundary(module.file.c_str(), "shutdown");
+  try {
+    if (module.shutdown) module.shutdown();
+  } catch (...) {
+    char text[512];
+    std::snprintf(text, sizeof text, "%s: its shutdown threw an exception", module.file.c_str());
+    host_.log(host_.ctx, DFM_LOG_WARNING, 0, text);
+  }
+}
+
 Loader::~Loader() {
   while (!modules_.empty()) {
     const Module module = std::move(modules_.back());
     modules_.pop_back();
     const std::lock_guard one_at_a_time(door);
-    const Boundary boundary(module.file.c_str(), "shutdown");
-    try {
-      if (module.shutdown) module.shutdown();
-    } catch (...) {
-      char text[512];
-      std::snprintf(text, sizeof text, "%s: its shutdown threw an exception", module.file.c_str());
-      host_.log(host_.ctx, DFM_LOG_WARNING, 0, text);
-    }
+    shut_down(module);
     SharedObject::close(module.image);
   }
 }
@@ -210,7 +214,7 @@ void Loader::keep(Module &&module, const dfm_plugin &plugin) {
     modules_.reserve(modules_.size() + 1);
     registry_.add(plugin, module.file);
   } catch (...) {
-    if (plugin.shutdown) plugin.shutdown();
+    shut_down(module);
     throw;
   }
   modules_.push_back(std::move(module));

@@ -43,6 +43,7 @@ class Loader {
   };
   const Module *loaded_from(uint64_t device, uint64_t inode) const;  // null: no module
   void keep(Module &&module, const dfm_plugin &plugin);
+  void shut_down(const Module &module) noexcept;
   void enter(dfm_plugin_fn entry, const std::string &file, dfm_plugin &plugin);
   void scan_if_there(const std::string &directory, bool must_exist);
   Registry &registry_;

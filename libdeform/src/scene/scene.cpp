@@ -108,14 +108,13 @@ void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
     return;
   }
   need(p, dfm_body_get_state(body, 0, nullptr, nullptr, &n));
-  x_.resize(3 * size_t(n));
-  v_.resize(3 * size_t(n));
-  need(p, dfm_body_get_state(body, n, x_.data(), v_.data(), &n));
+  std::vector<double> x(3 * size_t(n)), v(3 * size_t(n));
+  need(p, dfm_body_get_state(body, n, x.data(), v.data(), &n));
   for (int k = 0; k < 3; ++k) {
     position[k] = velocity[k] = 0;
     for (int c = 0; c < 4; ++c) {
-      position[k] += p.weights[c] * x_[3 * size_t(points[c]) + size_t(k)];
-      velocity[k] += p.weights[c] * v_[3 * size_t(points[c]) + size_t(k)];
+      position[k] += p.weights[c] * x[3 * size_t(points[c]) + size_t(k)];
+      velocity[k] += p.weights[c] * v[3 * size_t(points[c]) + size_t(k)];
     }
   }
 }

@@ -40,7 +40,6 @@ class Scene {
   Definition definition_;
   std::vector<ProbePoint> probes_;
   std::unique_ptr<Tree> tree_;
-  std::vector<double> x_, v_;  // of the body that a probe reads
 };
 
 }  // namespace dfm::scene

@@ -59,19 +59,19 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
                                                     const Staged &t) {
   std::vector<std::unique_ptr<LawInstance>> laws;
   for (const StagedLaw &l : t.laws) {
-    const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, l.id);
-    if (l.params.size() != packed_width(type))
-      fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored",
-           type.id);
-    if (!snapshot::in_range(type, l.params))
-      s.refuse("law parameters", "values in the range of the law's table");
-    laws.push_back(std::make_unique<LawInstance>(type, w.context->host, l.params));
+    const auto type_of = [&](const std::string &id, const std::vector<double> &params) -> const dfm_type & {
+      const dfm_type &type = w.context->registry.find(DFM_KIND_FRICTION, id);
+      if (params.size() != packed_width(type))
+        fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored",
+             type.id);
+      if (!snapshot::in_range(type, params))
+        s.refuse("law parameters", "values in the range of the law's table");
+      return type;
+    };
+    laws.push_back(std::make_unique<LawInstance>(type_of(l.id, l.params), w.context->host, l.params));
     laws.back()->restitution = l.restitution;
-    for (const auto &own : w.laws)
-      if (own->type == &type && own->params == l.params) {
-        laws.back()->requested_type = own->requested_type;
-        laws.back()->requested = own->requested;
-      }
+    laws.back()->requested_type = &type_of(l.requested_id, l.requested);
+    laws.back()->requested = l.requested;
   }
   return laws;
 }
@@ -294,6 +294,7 @@ void exchange(World &w, Staged &t) noexcept {
       std::swap(b.integrator, other.integrator);
       std::swap(b.p.dampers, other.p.dampers);
     }
+    b.switched_off.requested.swap(other.switched_off.requested);
     std::swap<BodyState>(b, other);
     std::swap<OnPoints>(b, other);
     b.ahead.faces.swap(other.ahead.faces);
@@ -414,7 +415,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
     // Rebuilds tables and plan; choices that prepare() would make again are set to those of the snapshot.
     const RestoredChoice choice{staged.gravity.now, staged.bound, staged.offset};
     w.changed = true;
-    w.overlaps.all = w.overlaps.report_only = true;
+    const Overlaps::Mode mode(w.overlaps, &Overlaps::report_only);
     w.sleepers = 0;  // prepare() counts them
     prepare(w, &choice);
   } catch (...) {

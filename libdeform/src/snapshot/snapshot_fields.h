@@ -45,6 +45,7 @@ struct StagedBody : BodyState, OnPoints {
     Array<double> state;
     std::vector<double> params;
   } model;
+  struct { std::vector<double> requested; } switched_off;
   ModelOrigin origin;
   Integrator integrator;
   std::unique_ptr<MadeModel> made;  // if the body has another model than in the snapshot
@@ -60,8 +61,8 @@ struct StagedRigids {
 };
 struct StagedTool { Tool::Cuts cuts; };
 struct StagedLaw {
-  std::string id;
-  std::vector<double> params;
+  std::string id, requested_id;
+  std::vector<double> params, requested;
   double restitution = kNoRestitution;
 };
 struct Staged : WorldState {
@@ -140,6 +141,8 @@ T &object(const std::unique_ptr<T> &x) {
 
 inline std::string id_of(const LawInstance &law) { return law.type->id; }
 inline std::string &id_of(StagedLaw &law) { return law.id; }
+inline std::string requested_id_of(const LawInstance &law) { return law.requested_type->id; }
+inline std::string &requested_id_of(StagedLaw &law) { return law.requested_id; }
 inline std::string id_of(const ModelInstance &model) { return model.type->id; }
 inline std::string &id_of(decltype(StagedBody::model) &model) { return model.id; }
 
@@ -273,6 +276,11 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.array("model parameters", b.model.params, alike ? like.model.params.size() : kAnyCount, must::finite);
   s.must_hold("model parameters", "values in the range of the model's table",
               [&] { return !alike || in_range(*like.model.type, b.model.params); });
+  s.array("requested parameters", b.switched_off.requested, kAnyCount, must::finite);
+  s.must_hold("requested parameters", "none, or values in the range of the model's table", [&] {
+    const std::vector<double> &values = b.switched_off.requested;
+    return values.empty() || !alike || in_range(*like.model.type, values);
+  });
   s.value("first model", b.first_model, must::any);
   switch_fields(s, b);
 }
@@ -427,6 +435,8 @@ void fields(Stream &s, W &w, const World &like) {
     s.array("law", id_of(l), kAnyCount, must::any);
     s.must_hold("law", "the name of a law", [&] { return !id_of(l).empty(); });
     s.array("law parameters", l.params, kAnyCount, must::finite);
+    s.array("requested law", requested_id_of(l), kAnyCount, must::any);
+    s.array("requested law's parameters", l.requested, kAnyCount, must::finite);
     s.value("law's restitution", l.restitution,
             must::Be{[](double x) { return x == kNoRestitution || (x >= 0 && x <= 1); }, "from 0 to 1"});
   });

@@ -1,6 +1,7 @@
 // A soft body: its points, surface, model, dynamics, and its prescribed loads and motions.
 #pragma once
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -169,6 +170,7 @@ struct Body : BodyShape, BodyState {
   bool tears = false;   // a material of its cells tears at a limited strain
   void *user = nullptr;
 
+  std::mutex querying;       // one query of the model at a time, from any thread
   uint64_t x_version = 1;    // increases whenever p.x may have changed
   bool emptied = false;      // a cut has removed all cells; the body is in World::emptied
   uint64_t piece_of = 0;     // id of the body, made by the host, of which this one is a piece; 0: none

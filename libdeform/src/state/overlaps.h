@@ -35,6 +35,17 @@ struct Overlaps {
       return p.a == a && p.b == b && (p.obstacle != 0) == obstacle;
     });
   }
+  // Of one search of everything. all stays where it fails: the next one covers no less.
+  class Mode {
+   public:
+    Mode(Overlaps &o, bool Overlaps::*mode) : of_(o), mode_(mode) { o.all = o.*mode = true; }
+    ~Mode() { of_.*mode_ = false; }
+    Mode(const Mode &) = delete;
+
+   private:
+    Overlaps &of_;
+    bool Overlaps::*mode_;
+  };
   bool is_pending() const { return all || !placed.empty(); }
   void place(uint64_t id) {
     if (std::find(placed.begin(), placed.end(), id) == placed.end()) placed.push_back(id);

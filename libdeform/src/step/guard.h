@@ -57,7 +57,7 @@ struct Guard {
     through.clear();
     motion = 1;
     solves = 0;
-    acted = resolving = lets_slits = false;
+    resolving = lets_slits = false;
   }
   void forget() { memory.forget(); }  // positions or d_c have changed other than by a step
 };

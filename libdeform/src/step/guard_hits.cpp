@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <tuple>
+#include <utility>
 
+#include "body/obstacle_mesh.h"
 #include "ccd/toi_guard_motion.h"
 #include "dynamics/rigid/rigid_set.h"
 #include "math/turn.h"
@@ -100,6 +102,19 @@ class HitContact {
     const uint32_t *const corner = narrow::corners_of(*step_.body_views[slot].surface, kind, feature);
     for (int k = 0; k <= kind; ++k) add(out, slot, corner[k], (b ? -1 : 1) * weight_of(b, kind, k));
   }
+  // Where a point of the obstacle would be at the end without contact, by the velocity of its body that the
+  // rows start from. end: with the contact so far; that of what contact does not move.
+  Vec3 free_end(Vec3 from, Vec3 end) const {
+    const Obstacle &o = *w_.obstacles[c_.slot_b];
+    if (!is_moved(o)) return end;
+    const ObstacleView &v = step_.obstacle_views[c_.slot_b];
+    const double *const first = &o.rigid->first[6 * size_t{o.rigid_body}];
+    const Vec3 velocity =
+        shape_velocity(o, o.rigid->state[o.rigid_body], load3(first), load3(first + 3), step_.h);
+    return v.position + step_.h * velocity +
+           rotate(turned(v.rotation, step_.h * load3(first + 3)),
+                  rotate_back(v.rotation, from - v.position));
+  }
   // The point of the obstacle: from its present position to that at the end without this contact.
   void carry(Vec3 from, Vec3 to) {
     start_ -= from;
@@ -119,12 +134,8 @@ class HitContact {
     const Vec3 local = rotate_back(at.rotation, o.point - at.position);
     now_ = o.distance > 0 ? on_a_ - o.point : o.normal;
     middle_ = 0.5 * (on_a_ + o.point);
-    GuardPose to = end_;
-    if (const Obstacle &rigid = *w_.obstacles[c_.slot_b]; is_moved(rigid)) {
-      const double *const free = &rigid.rigid->velocity[6 * size_t{rigid.rigid_body}];
-      to = {v.position + step_.h * load3(free), turned(v.rotation, step_.h * load3(free + 3))};
-    }
-    carry(v.position + rotate(v.rotation, local), to.position + rotate(to.rotation, local));
+    const Vec3 from = v.position + rotate(v.rotation, local);
+    carry(from, free_end(from, end_.position + rotate(end_.rotation, local)));
   }
   void on_mesh(ContactPoint &out) {
     GuardScene &scene = step_.guard.scene;
@@ -145,7 +156,7 @@ class HitContact {
     const Vec3 then = from + hit_.t * (to - from);
     now_ = on_a_ - then;
     middle_ = 0.5 * (on_a_ + then);
-    carry(from, to);
+    carry(from, free_end(from, to));
   }
 
   World &w_;
@@ -162,18 +173,26 @@ bool same_features(const ContactPoint &l, const ContactPoint &r) {
          l.type_a == r.type_a && l.feature_a == r.feature_a && l.feature_b == r.feature_b;
 }
 
-uint64_t free_key(const World &w, const StepContext &step, const ContactPoint &c) {
-  const uint64_t id_a = w.bodies[c.slot_a]->id;
-  const Surface &a = w.bodies[c.slot_a]->surface;
-  const uint64_t id_b = id_of_b(w, c);
-  const Surface *const b = c.obstacle ? nullptr : &w.bodies[c.slot_b]->surface;
-  uint32_t patch = c.feature_b;
-  if (b) {
-    const uint32_t *const t = c.kind == kEdgeEdge ? &b->edge_tri[2 * size_t{c.feature_b}] : &c.feature_b;
-    patch = b->patch[c.kind == kEdgeEdge && t[0] == kNone ? t[1] : t[0]];
+// The first key of these features that no contact has.
+uint64_t free_key(const World &w, const StepContext &step, ContactPoint c) {
+  const Surface *a = &w.bodies[c.slot_a]->surface, *b = nullptr;
+  uint64_t id_a = w.bodies[c.slot_a]->id, id_b = id_of_b(w, c);
+  if (!c.obstacle) {
+    b = &w.bodies[c.slot_b]->surface;
+  } else if (step.obstacle_views[c.slot_b].shape == Shape::mesh) {
+    // named as contacts of two bodies (narrow/mesh_obstacle.cpp)
+    b = &w.obstacles[c.slot_b]->mesh->surface;
+    if (c.type_a == 2) {
+      std::swap(a, b);
+      std::swap(id_a, id_b);
+      std::swap(c.feature_a, c.feature_b);
+    }
+    c.type_a = c.kind = c.type_a == 1 ? kEdgeEdge : kVertexFace;
+    c.obstacle = 0;
   }
+  const uint32_t patch = b ? narrow::patch_of(*b, c.kind, c.feature_b) : c.feature_b;
   for (uint32_t ordinal = 0;; ++ordinal) {
-    const uint64_t key = narrow::contact_key(c, a, id_a, b, id_b, patch, ordinal);
+    const uint64_t key = narrow::contact_key(c, *a, id_a, b, id_b, patch, ordinal);
     if (std::none_of(step.contacts.begin(), step.contacts.end(),
                      [&](const ContactPoint &o) { return o.key == key; }))
       return key;

@@ -31,6 +31,15 @@
 #include "world/triangle_list.h"
 
 namespace dfm {
+std::string name_of(World &w, const char *given, const char *kind) {
+  if (given) return given;
+  std::string name;
+  uint64_t number = w.next_id;
+  do name = kind + std::to_string(number++);
+  while (w.find_body(name) || w.find_obstacle(name));
+  return name;
+}
+
 namespace {
 
 void check_name(World &w, const std::string &name, const char *kind) {
@@ -179,7 +188,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   Body &b = *owned;
   b.world = &w;
   b.search = std::make_unique<SearchTree>(w.memory());
-  b.name = def.name ? def.name : "body" + std::to_string(w.next_id);
+  b.name = name_of(w, def.name, "body");
   check_name(w, b.name, "body");
   check_mesh(def, b.name);
   if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) ||
@@ -287,7 +296,7 @@ std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, b
   Obstacle &o = *owned;
   o.world = &w;
   o.search = std::make_unique<SearchTree>(w.meters.obstacles.memory());
-  o.name = def.name ? def.name : "obstacle" + std::to_string(w.next_id);
+  o.name = name_of(w, def.name, "obstacle");
   check_name(w, o.name, "obstacle");
   const char *const name = o.name.c_str();
   if (def.shape > DFM_SHAPE_NONE || (def.shape == DFM_SHAPE_NONE && !rigid))
@@ -403,8 +412,8 @@ void destroy_body(Body &b) {
   }
   if (!b.piece_of) orphan_pieces(w, b);
   if (!b.emptied) {
+    end_contacts(w, b.id, false);  // may lack memory, so first
     w.sensors -= b.sensor;
-    end_contacts(w, b.id, false);
   }
   w.tearing -= b.tears;
   forget(w, b.handle, b.name);
@@ -414,8 +423,8 @@ void destroy_body(Body &b) {
 
 void destroy_obstacle(Obstacle &o) {
   World &w = *o.world;
+  end_contacts(w, o.id, true);  // may lack memory, so first
   w.sensors -= o.sensor;
-  end_contacts(w, o.id, true);
   forget(w, o.handle, o.name);
   std::erase_if(w.obstacles, [&](auto &p) { return p.get() == &o; });
 }

@@ -32,5 +32,7 @@ void destroy_body(Body &b);
 void destroy_obstacle(Obstacle &o);
 // Ends the attachments and contacts, with their events, of a body or obstacle that leaves the simulation.
 void end_contacts(World &w, uint64_t id, bool obstacle);
+// given, or where that is null kind and a number: that of the next id, or the first free one above it.
+std::string name_of(World &w, const char *given, const char *kind);
 
 }  // namespace dfm

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <mutex>
 
 #include "core/error.h"
 #include "mesh/cells.h"
@@ -23,8 +24,18 @@ double kinetic_of(const Body &b) {
   return sum;
 }
 
+CenterMotion center_motion(const Body &b) {
+  Vec3 com, momentum;
+  for (uint32_t i = 0; i < b.p.n; ++i) {
+    com += b.p.mass[i] * b.p.x_at(i);
+    momentum += b.p.mass[i] * b.p.v_at(i);
+  }
+  return {(1 / b.mass) * com, (1 / b.mass) * momentum, momentum};
+}
+
 double elastic_energy(Body &b) {
   if (!b.model.can(DFM_CAP_ENERGY)) return NAN;
+  const std::lock_guard one_at_a_time(b.querying);
   double joule = 0;
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
   const OnBehalf prefix(b.name);
@@ -37,17 +48,9 @@ dfm_body_measure measure(Body &b) {
   m.mass = b.mass;
   m.rest_volume = b.rest_volume;
   const Phyxels &p = b.p;
-  Vec3 com, momentum;
-  double kinetic = 0, fastest = 0;
-  for (uint32_t i = 0; i < p.n; ++i) {
-    const Vec3 x = p.x_at(i), v = p.v_at(i);
-    com += p.mass[i] * x;
-    momentum += p.mass[i] * v;
-    kinetic += 0.5 * p.mass[i] * norm2(v);
-    fastest = std::max(fastest, norm2(v));
-  }
-  com = (1 / b.mass) * com;
-  const Vec3 velocity = (1 / b.mass) * momentum;
+  const auto [com, velocity, momentum] = center_motion(b);
+  double fastest = 0;
+  for (uint32_t i = 0; i < p.n; ++i) fastest = std::max(fastest, norm2(p.v_at(i)));
   Vec3 angular;
   for (uint32_t i = 0; i < p.n; ++i) angular += p.mass[i] * cross(p.x_at(i) - com, p.v_at(i) - velocity);
   m.inverted = inverted_cells(b);
@@ -63,7 +66,7 @@ dfm_body_measure measure(Body &b) {
   store3(m.contact_impulse,
          b.contact_impulse +
              (b.sleep_state.asleep ? b.world->time - b.sleep_state.since : 0) * b.sleep_state.force);
-  m.kinetic = kinetic;
+  m.kinetic = kinetic_of(b);
   m.speed_max = std::sqrt(fastest);
   m.elastic = elastic_energy(b);
   return m;
@@ -80,6 +83,7 @@ void query_by_cell(Body &b, const char *id, const char *name, const char *what, 
       copy_table<Table>(b.model.extension(id), 2 * sizeof(uint32_t) + sizeof(void *), type, name);
   if (!table || !entry_of(*table))
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no %s per cell", type, b.name.c_str(), what);
+  const std::lock_guard one_at_a_time(b.querying);
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
   const char *const entry = name + std::strlen("dfm_");
   if (b.model.call(entry, [&] { return entry_of(*table)(b.model.self, &k, out); }) != DFM_OK)
@@ -169,16 +173,21 @@ void set_model_params(Body &b, const dfm_params &params) {
   if (!b.model.ops->set_params)
     fail(DFM_E_UNSUPPORTED, "model '%s' accepts no parameters during a run", type.id);
   const EffectsAtWork before(b.model);
-  set_values(b, values);
   std::vector<uint8_t> by_cell = differs_by_cell(type, b.fields);
-  const auto works = [&](const std::string &effect) { return b.model.works(effect); };
-  if (b.world->selection.listed() &&
-      leave_out(type, b.model.effect_rows(), b.world->selection, works, values, by_cell)) {
-    set_values(b, values);
-  }
   b.switched_off.by_cell.resize(type.nparam);
   const bool cells = std::count(b.switched_off.by_cell.begin(), b.switched_off.by_cell.end(), 1) > 0;
-  b.switched_off.requested = requested == values && !cells ? std::vector<double>() : requested;
+  const std::vector<double> present = b.model.params;
+  set_values(b, values);
+  try {
+    const auto works = [&](const std::string &effect) { return b.model.works(effect); };
+    if (b.world->selection.listed() &&
+        leave_out(type, b.model.effect_rows(), b.world->selection, works, values, by_cell))
+      set_values(b, values);
+    b.switched_off.requested = requested == values && !cells ? std::vector<double>() : requested;
+  } catch (...) {
+    set_values(b, present);
+    throw;
+  }
   values_changed(*b.world);
   if (before.changed()) b.world->changed = true;  // the plan names the effects that parameters call for
   b.integrator.share = 1;                         // what holds if it cannot be measured

@@ -103,7 +103,9 @@ void query_host(RigidSet &set, const std::vector<dfm_joint_def> &joints, void *d
   uint32_t nextra = 0;
   const char *const host = set.host_name.c_str();
   const uint64_t said = sentences();
-  const dfm_status status = set.host.create(set.host.user, &def, &set.self, set.group.data(), &nextra);
+  void *made = nullptr;
+  const dfm_status status = set.host.create(set.host.user, &def, &made, set.group.data(), &nextra);
+  if (status == DFM_OK) set.self = made;  // of a call that fails nothing is left to destroy
   need_memory(status);
   if (status != DFM_OK) {
     const std::string why = sentences() != said ? last_error()
@@ -150,6 +152,7 @@ void destroy_rigids(RigidSet &set) {
   std::vector<uint64_t> ids;  // including additional shapes
   for (auto &o : w.obstacles)
     if (o->rigid == &set) ids.push_back(o->id);
+  for (const uint64_t id : ids) end_contacts(w, id, true);  // may lack memory, so for all before any is gone
   for (const uint64_t id : ids) destroy_obstacle(rigid_obstacle(w, id));
   std::erase_if(w.rigid_sets, [&](auto &s) { return s.get() == &set; });
   w.changed = true;
@@ -160,7 +163,7 @@ std::unique_ptr<Obstacle> make_rigid_shape(World &w, const std::string &body, co
   if (def.shape == DFM_SHAPE_PLANE || def.shape == DFM_SHAPE_NONE)
     fail(DFM_E_ARG, "shape '%s' of rigid body '%s' is %s; add a sphere, a box, a capsule, a mesh or voxels",
          name, body.c_str(), def.shape == DFM_SHAPE_PLANE ? "a plane, which has no inside" : "none");
-  if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0)
+  if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0 || norm2(load3(def.sine.amplitude)) > 0)
     fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name,
          body.c_str());
   return make_obstacle(w, def, true);

@@ -192,7 +192,7 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
   auto owned = std::make_unique<Tool>();
   Tool &t = *owned;
   t.world = &w;
-  t.name = def.name ? def.name : "tool" + std::to_string(w.next_id);
+  t.name = name_of(w, def.name, "tool");
   const char *const name = t.name.c_str();
   check_def(def, name);
   t.def = def;

@@ -2,6 +2,7 @@
 // (dynamics/dynamics.h), each for all bodies of the host at once; step/rigid/rigid.cpp uses the results.
 #pragma once
 #include <cstdint>
+#include <mutex>
 #include <span>
 #include <string>
 #include <vector>
@@ -52,6 +53,7 @@ struct RigidSet {
   Array<double> total;   // [n,3] N s of contact since creation
   double last_h = 0;     // s, of the last sub-step; 0: none yet
   bool of_tool = false;  // its bodies are parts of a tool (state/tool.h)
+  std::mutex querying;   // one query of the host at a time, from any thread
 
   // As Dynamics: throws std::bad_alloc if the host has no memory.
   void begin(const SubStep &now);  // sets the inputs of the host until the next sub-step

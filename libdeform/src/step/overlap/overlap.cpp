@@ -1,6 +1,7 @@
 #include "step/overlap/overlap.h"
 
 #include <algorithm>
+#include <iterator>
 
 #include "body/obstacle_mesh.h"
 #include "contact/reach.h"
@@ -29,8 +30,7 @@ bool deep(const World &w, const OverlapPair &p, const Crossed &c) {
   if (p.obstacle && !w.obstacles[p.b]->mesh) return false;
   const Surface &a = w.bodies[p.a]->surface;
   const Surface &b = p.obstacle ? w.obstacles[p.b]->mesh->surface : w.bodies[p.b]->surface;
-  return c.coincide || c.depth > std::min(recovery_depth(a), recovery_depth(b)) ||
-         2 * c.enclosed > (p.obstacle ? a.nsurfel : std::min(a.nsurfel, b.nsurfel));
+  return c.coincide || c.mostly || c.depth > std::min(recovery_depth(a), recovery_depth(b));
 }
 
 uint64_t other_id(const World &w, const OverlapPair &p) {
@@ -172,6 +172,16 @@ void resolve_overlaps(World &w) {
   Overlaps &o = w.overlaps;
   if (!o.is_pending()) return;
   std::vector<Overlap> found = find_overlaps(w);
+  const auto placed = [&](uint64_t id) { return std::binary_search(o.placed.begin(), o.placed.end(), id); };
+  if (o.report_only) {
+    for (Overlap &f : found) f.suspended = o.is_suspended(f.a, f.b, f.obstacle);
+  } else {  // what is elsewhere now is judged anew
+    std::erase_if(o.suspended, [&](const SuspendedPair &p) {
+      if (!placed(p.a) && !placed(p.b)) return false;
+      w.pairs.filter.set_aside(p.a, p.b, p.obstacle, false);
+      return true;
+    });
+  }
   const bool untangles = w.def.flags & DFM_WORLD_UNTANGLE || o.untangle;
   if (untangles && !o.report_only) {
     // parts of one body are where contact has left them, and it goes on to move them apart
@@ -199,10 +209,13 @@ void resolve_overlaps(World &w) {
     o.suspended.push_back({f.a, f.b, f.obstacle});
     w.pairs.filter.set_aside(f.a, f.b, f.obstacle, true);
   }
+  if (!o.reported)  // no step has reported these yet
+    std::copy_if(o.found.begin(), o.found.end(), std::back_inserter(found),
+                 [&](const Overlap &f) { return !o.all && !placed(f.a) && !placed(f.b); });
   o.found.assign(found.begin(), found.end());  // an interrupt gives back what was there, in this memory
-  o.reported = left.empty();
+  o.reported = o.reported && left.empty();
   o.placed.clear();
-  o.all = o.report_only = o.untangle = false;
+  o.all = false;
 }
 
 void keep_suspended(World &w) {

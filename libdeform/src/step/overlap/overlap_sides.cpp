@@ -68,6 +68,7 @@ void count_enclosed(const OverlapSkin &a, OverlapSkin &b, double least, Crossed 
   if (deeper) {
     out.through = true;
     out.enclosed += static_cast<uint32_t>(in.size());
+    out.mostly = out.mostly || 2 * in.size() > a.nsurfel();
   }
 }
 
@@ -116,7 +117,10 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Obstacle &o)
       for (uint32_t k = 0; k < 3; ++k) box.push_back(i >> k & 1 ? o.def.half_size[k] : -o.def.half_size[k]);
     points = &box;
   } else {
-    own_.tri.assign(o.triangles.begin(), o.triangles.end());
+    // of a mesh without the points that no triangle has
+    const Array<uint32_t> &faces = o.mesh ? o.mesh->surface.tri : o.triangles;
+    own_.tri.assign(faces.begin(), faces.end());
+    if (o.mesh) points = &o.mesh->local;
     closed_ = o.grid || (o.mesh && o.mesh->closed);
     if (o.grid) slack_ = 0.5 * o.grid->cell();
   }
@@ -195,7 +199,7 @@ Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_n
   Crossed out;
   if (!b.room() && !a.room())
     for (int k = 0; k < 3; ++k)
-      if (!(std::min(a.hi()[k], b.hi()[k]) - std::max(a.lo()[k], b.lo()[k]) > 0)) return out;
+      if (!(std::min(a.hi()[k], b.hi()[k]) >= std::max(a.lo()[k], b.lo()[k]))) return out;  // a floor is flat
   const double least = offset + a.slack() + b.slack();
   double edges = 0;
   near_pairs(a.tree(), b.tree(), 0, stack, [&](uint32_t p, uint32_t q, double) {

@@ -61,6 +61,7 @@ struct Crossed {
   double depth = 0;       // m
   bool through = false;   // deeper than the rest distance: more than touching
   bool coincide = false;  // no surface separates the sides
+  bool mostly = false;    // more than half of the surfels of one side are inside the other
 };
 // `yes_or_no`: only `through` is needed.
 Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_no,

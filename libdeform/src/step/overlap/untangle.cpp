@@ -34,9 +34,10 @@ class Untangler {
   explicit Untangler(World &w)
       : w_(w), sides_(w), shift_(w.bodies.size()), groups_(w.memory(), uint32_t(w.bodies.size())) {
     for (auto &b : w.bodies) {
-      // what is attached to it would draw it back to where it was
+      // what it is attached to would draw it back to where it was
       const bool attached = std::any_of(w.attachments.begin(), w.attachments.end(), [&](const Attachment &x) {
-        return !x.released && x.obstacle && x.body == b->id && x.stiffness == 0 && x.damping == 0;
+        const bool has = x.body == b->id || (!x.obstacle && x.to == b->id);
+        return !x.released && has && x.stiffness == 0 && x.damping == 0;
       });
       movable_.push_back(b->p.held_anywhere() == 0 && !attached && b->dynamics->abilities().placed);
     }

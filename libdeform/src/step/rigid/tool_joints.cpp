@@ -36,8 +36,9 @@ bool is_simple(const ObstacleView &v) {
 bool hangs_on(const World &w, const Obstacle &body, const Obstacle &obstacle) {
   ObstacleView v = w.steps->obstacle_views[obstacle.slot];
   if (!is_simple(v)) return false;
-  v.position = load3(obstacle.def.pose.position);
-  v.rotation = unit_quat(obstacle.def.pose.rotation);
+  const Pose start = obstacle.pose_at_time(0);
+  v.position = start.position;
+  v.rotation = start.rotation;
   const ToolShape shape(v, nullptr);
   return std::any_of(body.rigid->joints.begin(), body.rigid->joints.end(), [&](const dfm_joint_def &j) {
     ObstaclePoint o;

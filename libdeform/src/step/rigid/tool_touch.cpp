@@ -345,7 +345,8 @@ double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Si
       Vec3 n;
       if (!between(p, q, on_a - on_b, pair.turn, n)) continue;
       const double gap = dot(n, on_a - on_b) - round;
-      if (gap < -(round > 0 ? kDent : pair.dent)) continue;
+      if (round == 0 && gap < -pair.dent) continue;  // of round ones the side is known until the axes pass
+      deepest = std::max(deepest, -gap);
       add_row(pair, {kEdges, p.number, q.number}, at_a, at_b,
               {on_b + (b.round() + 0.5 * gap) * n, on_a, on_b}, n, gap, reach);
     }
