@@ -8,7 +8,6 @@
 #include "body/obstacle_mesh.h"
 #include "ccd/toi_guard_motion.h"
 #include "dynamics/rigid/rigid_set.h"
-#include "math/turn.h"
 #include "narrow/detail.h"
 #include "narrow/parts.h"
 #include "state/obstacle.h"
@@ -18,6 +17,7 @@
 #include "step/rigid/rigid.h"
 #include "step/self_contact.h"
 #include "step/sides.h"
+#include "step/solve/attach.h"
 #include "step/solve/pre_solve.h"
 
 namespace dfm {
@@ -106,14 +106,7 @@ class HitContact {
   // rows start from. end: with the contact so far; that of what contact does not move.
   Vec3 free_end(Vec3 from, Vec3 end) const {
     const Obstacle &o = *w_.obstacles[c_.slot_b];
-    if (!is_moved(o)) return end;
-    const ObstacleView &v = step_.obstacle_views[c_.slot_b];
-    const double *const first = &o.rigid->first[6 * size_t{o.rigid_body}];
-    const Vec3 velocity =
-        shape_velocity(o, o.rigid->state[o.rigid_body], load3(first), load3(first + 3), step_.h);
-    return v.position + step_.h * velocity +
-           rotate(turned(v.rotation, step_.h * load3(first + 3)),
-                  rotate_back(v.rotation, from - v.position));
+    return is_moved(o) ? from + step_.h * place_velocity(o, from, step_) : end;
   }
   // The point of the obstacle: from its present position to that at the end without this contact.
   void carry(Vec3 from, Vec3 to) {

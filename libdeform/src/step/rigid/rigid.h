@@ -34,7 +34,6 @@ bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool 
 void restart_rigids(World &w, StepContext &step);  // then, once the rows are finished again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);  // of the body that the shape belongs to
-Vec3 shape_velocity(const Obstacle &o, const dfm_rigid_state &start, Vec3 velocity, Vec3 spin, double h);
 bool is_moved(const Obstacle &o);                                 // the shape of a body that its host moves
 // pose of a body's shape for this state of the body
 Pose shape_pose(const Obstacle &shape, const dfm_rigid_state &body);
