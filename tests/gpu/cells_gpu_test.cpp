@@ -32,7 +32,8 @@ void take_shape(Body &b, const std::array<Vec, 3> &to) {
 double stable_at_last(const Stepper &b) { return b.state[3 * size_t(b.size())]; }
 
 class Drawn : public testing::TestWithParam<uint32_t> {};
-INSTANTIATE_TEST_SUITE_P(Models, Drawn, testing::Values(kSprings, kCells, kSofter, kStiffer, kMaxwell, kSls),
+INSTANTIATE_TEST_SUITE_P(Models, Drawn,
+                         testing::Values(kSprings, kCells, kSofter, kStiffer, kMaxwell, kSls, kAll),
                          [](const auto &one) { return kNames[one.param]; });
 
 // Forces and dampers of one sub-step, also where the kernel finds the frame in its second way.

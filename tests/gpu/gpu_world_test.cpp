@@ -9,8 +9,8 @@
 
 namespace {
 
-// A model, or its springs with branches.
-const std::string kRelaxing = "msm_gpu relaxing";
+// A model, its springs with branches, or by themselves.
+const std::string kRelaxing = "msm_gpu relaxing", kAlone = "msm_gpu alone";
 std::string type_of(const std::string &model) { return model.substr(0, model.find(' ')); }
 
 struct World {
@@ -33,10 +33,12 @@ struct World {
     o.young = young;
     o.damping_stiffness = 1e-3;
     d.material = test::make_material(world, o);
-    const double sls = 2, time = 0.01;
+    const double sls = 2, time = 0.01, none = 0;
     std::vector<dfm_param_value> params;
     if (type.ends_with("_gpu")) params.push_back({"device", &device, 1});
-    if (type != model) params.insert(params.end(), {{"damper", &sls, 1}, {"relaxation_time", &time, 1}});
+    if (model.ends_with("relaxing"))
+      params.insert(params.end(), {{"damper", &sls, 1}, {"relaxation_time", &time, 1}});
+    if (model == kAlone) params.insert(params.end(), {{"volume", &none, 1}, {"collapse", &none, 1}});
     d.model_params = {sizeof(dfm_params), uint32_t(params.size()), params.data()};
     d.pose.position[2] = z;
     test::ok(dfm_body_create(world, &d, &body));
@@ -179,6 +181,16 @@ TEST_P(GpuWorld, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
   }
   EXPECT_EQ(hash[0], hash[1]);
   EXPECT_NEAR(height[0], height[2], 1e-5);
+}
+
+// rho g L/E = 0.75: springs alone do not tell a cell from its mirror image.
+TEST(MsmGpuWorld, SoftBlockReleased_InvertsNoCell) {
+  World whole("msm_gpu", kReference, "coulomb", 0.5, {0, 0, -9.81}, 1e-3, 1308);
+  World alone(kAlone, kReference, "coulomb", 0.5, {0, 0, -9.81}, 1e-3, 1308);
+  for (const World *w : {&whole, &alone}) test::run(w->world, 0.5, 1.0 / 60);
+  EXPECT_EQ(test::stats(whole.world).inverted_max, 0u);
+  EXPECT_GT(test::stats(alone.world).inverted_max, 10u);
+  EXPECT_GT(whole.now().com[2], 0.015);
 }
 
 // Two bodies, one on the other, submit from two threads at once.
