@@ -18,3 +18,23 @@
 #define KEPT call.now.kept
 #define PER_LAG call.now.per_lag
 #define DAMPING call.now.damping
+#define WAS call.now.was
+#define KEEP call.now.keep
+#define NEXT call.now.next
+#define PART call.now.part
+#define CORNER(i) call.of<const uvec4>(kCorners)[i]
+#define SHAPE(i) call.of<const dvec4>(kShapes)[i]
+#define VOLUME(i) call.of<const dvec4>(kShapes)[i]
+#define FORCE(i, value) call.of<dvec4>(kForces)[i] = value
+#define CORNER_ROW(i) call.of<const uvec2>(kCornerRows)[i]
+#define CORNER_FORCE(i) call.of<const dvec4>(kForces)[i]
+#define REST_ROW(i) call.of<const double>(kRestRows)[i]
+#define RAISE(rate) call.raise(rate)
+#define SPRING_ROW(i) call.of<const uvec2>(kSpringRows)[i]
+#define SPRING(i) call.of<const uvec4>(kSprings)[i]
+#define OPTIONS(i) call.of<const uvec2>(kOptions)[i]
+#define STRETCH(i) call.of<const double>(kStretches)[i]
+#define NEXT_STRETCH(i, value) call.of<double>(kStretches)[i] = value
+#define HAS_CELLS call.has(kWithCells)
+#define HAS_OPTIONS call.has(kWithOptions)
+#define HAS_BRANCHES call.has(kWithBranches)

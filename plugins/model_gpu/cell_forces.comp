@@ -3,11 +3,9 @@
 #extension GL_EXT_control_flow_attributes : require
 // The device's side of cell_forces.glsl: one invocation per cell.
 #include "points.glsl"
-layout(std430, binding = 6) readonly buffer Corners { uvec4 corners[]; };
-layout(std430, binding = 7) readonly buffer Shapes { dvec4 shapes[]; };
-layout(std430, binding = 8) writeonly buffer Forces { dvec4 forces[]; };
-#define IN(name, n) double name[n]
-#define OUT(name, n) precise inout double name[n]
+layout(std430, binding = 10) readonly buffer Corners { uvec4 corners[]; };
+layout(std430, binding = 11) readonly buffer Shapes { dvec4 shapes[]; };
+layout(std430, binding = 12) writeonly buffer Forces { dvec4 forces[]; };
 #define CORNER(i) corners[i]
 #define SHAPE(i) shapes[i]
 #define FORCE(i, value) forces[i] = value

@@ -1,37 +1,14 @@
-// Second pass: each point adds up the forces of its corners, always in the same order, and moves. The highest
-// rate of all is that of the step bound at this shape: 1 / h with h^2 D/m + 2 h E/m = 4; dampers
-// with a lag count in D, over the lag.
+// Second pass of a sub-step of cells: each point takes the forces of its corners, and moves.
 #include "motion.glsl"
+#include "corners.glsl"
 void move_corners(uint i) {
   const dvec4 x = PLACE(i);
   const dvec4 v = SPEED(i);
   const dvec4 load = LOAD(i);
-  const uvec2 row = ROW(i);
-  precise double fx = 0.0;
-  precise double fy = 0.0;
-  precise double fz = 0.0;
-  precise float stiffer = 0.0f;
-  precise float damped = 0.0f;
-  // four at a time; behind a point's last corner lie others', which are read and not used
-  for (uint n = 0u; n < row.y; n += 4u) {
-    dvec4 f[4];
-    UNROLLED for (uint k = 0u; k < 4u; ++k) f[k] = CORNER_FORCE(row.x + 32u * (n + k));
-    UNROLLED for (uint k = 0u; k < 4u; ++k) {
-      if (n + k < row.y) {
-        fx += f[k].x;
-        fy += f[k].y;
-        fz += f[k].z;
-        const uvec2 more = unpackDouble2x32(f[k].w);
-        stiffer += uintBitsToFloat(more.x);
-        damped += uintBitsToFloat(more.y);
-      }
-    }
-  }
-  precise double rest = REST_ROW(i);   // 1/s2, D/m
-  precise double of_dampers = double(DAMPING) * rest;
-  precise double stiff = (rest + double(PER_LAG) * of_dampers) + x.w * double(stiffer);
-  precise double damper = ((PER_LAG > 0.0f ? double(0.0f) : of_dampers) + load.w) + x.w * double(damped);
-  precise double rate = 0.25 * (damper + sqrt(damper * damper + 4.0 * stiff));
-  if (uint(v.w) != 7u) RAISE(float(rate));   // a held point does not move
-  end_step(i, x, v, load, fx, fy, fz);
+  precise double f[3];
+  f[0] = 0.0;
+  f[1] = 0.0;
+  f[2] = 0.0;
+  add_corners(i, x, v, load, f);
+  end_step(i, x, v, load, f[0], f[1], f[2]);
 }

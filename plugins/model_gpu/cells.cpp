@@ -1,7 +1,5 @@
 #include "cells.h"
 
-#include <atomic>
-
 #include "../model_common/cell_rows.h"
 #include "../model_common/material.h"
 #include "as_cpp.h"
@@ -12,22 +10,10 @@ namespace {
 // The kernels: their functions are members here.
 struct CellForces {
   const Call &call;
-#define CORNER(i) call.of<const uvec4>(kOwn + 1)[i]
-#define SHAPE(i) call.of<const dvec4>(kOwn + 2)[i]
-#define FORCE(i, value) call.of<dvec4>(kOwn + 3)[i] = value
 #include "cell_forces.glsl"
 };
 struct CellMotion {
   const Call &call;
-#define ROW(i) call.of<const uvec2>(kOwn)[i]
-#define CORNER_FORCE(i) call.of<const dvec4>(kOwn + 3)[i]
-#define REST_ROW(i) call.of<const double>(kOwn + 4)[i]
-#define RAISE(rate) raise(*call.of<uint32_t>(kHighest), rate)
-  static void raise(uint32_t &to, float value) {
-    const std::atomic_ref<uint32_t> all(to);
-    const uint32_t bits = std::bit_cast<uint32_t>(value);
-    for (uint32_t seen = all; seen < bits && !all.compare_exchange_weak(seen, bits);) {}
-  }
 #include "cell_motion.glsl"
 };
 
@@ -40,42 +26,32 @@ void move_points(const Call &call, uint32_t begin, uint32_t end) {
   for (uint32_t i = begin; i < end; ++i) points.move_corners(i);
 }
 
-// Of one of the three entries of a cell, 32 cells side by side.
-size_t place_of(size_t c, size_t part) { return c / kSide * kSide * 3 + part * kSide + c % kSide; }
-
 }  // namespace
 
+const Cells::Rows Cells::kRows = {{
+    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5,
+     DFM_PARAM_RUNTIME | DFM_PARAM_LOG_SCALE | DFM_PARAM_PER_CELL, 1, nullptr},
+    {"damping_stiffness", "damping over stiffness", "s", 0, 10, 0, DFM_PARAM_RUNTIME, 1, nullptr},
+    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, DFM_PARAM_RUNTIME, 1, nullptr},
+    kDeviceRow,
+    {"poisson", "Poisson ratio", "1", -0.99, 0.4999, 0.3, DFM_PARAM_RUNTIME | DFM_PARAM_PER_CELL, 1, nullptr},
+}};
+
 void Cells::create(const dfm_host *h, const dfm_mesh &m) {
-  take_points(h, m.npoint);
-  std::copy(m.mass, m.mass + npoint, mass.data());
-  model::take_fields(h, kId, gpu::kParams, kParams, m, field_, [](uint32_t, double) { return true; });
+  take_points(h, m);
+  model::take_fields(h, kId, kRows.of, kParamCount, m, field_, [](uint32_t, double) { return true; });
   ncell_ = m.ncell;
+  drawn = true;
   cells_.create_copy(h, m.cells, 4 * size_t(ncell_));
   rest_.create(h, ncell_);
-  entries_ = (size_t(ncell_) + kSide - 1) / kSide * kSide * 3;
-  corners_.create(h, entries_);
-  shapes_.create(h, entries_);
+  corners_.create(h, npoint, ncell_, cells_.data());
+  shapes_.create(h, corners_.entries);
   twist_share_.create(h, 4 * size_t(ncell_));
-  places_.create(h, npoint);
-  row_by_mass_.create(h, npoint);
-  for (Buffer<double> *each : {&twist_, &damper_}) each->create(h, ncell_);
-  for (size_t n = 0; n < 4 * size_t(ncell_); ++n) ++places_[cells_[n]].y;
-  room_ = gpu::lay_out(places_, npoint);
-  Buffer<uint32_t> next;
-  next.create(h, npoint);
   for (size_t c = 0; c < ncell_; ++c) {
-    const uint32_t *const q = cells_.data() + 4 * c;
-    const double *x[4];
-    uint32_t to[4];
-    for (int a = 0; a < 4; ++a) {
-      x[a] = m.rest + 3 * size_t(q[a]);
-      to[a] = places_[q[a]].x + kSide * next[q[a]]++;
-    }
+    const auto at = [&](int a) { return m.rest + 3 * size_t(cells_[4 * c + size_t(a)]); };
     model::Tetrahedron &shape = rest_[c].shape;
     // a cell without volume gets zero gradients, and so no stiffness
-    shape.volume = model::make_tetrahedron(x[0], x[1], x[2], x[3], shape) ? std::fabs(shape.volume) : 0;
-    corners_[place_of(c, 0)] = {q[0], q[1], q[2], q[3]};
-    corners_[place_of(c, 1)] = {to[0], to[1], to[2], to[3]};
+    shape.volume = model::make_tetrahedron(at(0), at(1), at(2), at(3), shape) ? std::fabs(shape.volume) : 0;
   }
 }
 
@@ -88,11 +64,16 @@ void Cells::fill(const double *params) {
     of.mu2 = 2 * lame.mu * of.shape.volume;
     of.lambda = lame.lambda * of.shape.volume;
     const double *a = of.shape.g[1], *b = of.shape.g[2], *e = of.shape.g[3];
-    shapes_[place_of(c, 0)] = {a[0], a[1], a[2], b[0]};
-    shapes_[place_of(c, 1)] = {b[1], b[2], e[0], e[1]};
-    shapes_[place_of(c, 2)] = {e[2], of.mu2, of.lambda, 0};
+    shapes_[Corners::entry_of(c, 0)] = {a[0], a[1], a[2], b[0]};
+    shapes_[Corners::entry_of(c, 1)] = {b[1], b[2], e[0], e[1]};
+    shapes_[Corners::entry_of(c, 2)] = {e[2], of.mu2, of.lambda, 0};
   }
   find_rows();
+  const char **effect = active_effects;
+  *effect++ = "volume";
+  *effect++ = "large_rotation";
+  if (damping > 0 || drag > 0) *effect++ = "damping";
+  *effect = nullptr;
 }
 
 void Cells::find_rows() {
@@ -119,12 +100,8 @@ void Cells::find_rows() {
                      row[cells_[corner]] += own;
                      twist_share_[corner] = float(turn);
                    });
-  for (uint32_t i = 0; i < npoint; ++i) row_by_mass_[i] = row[i] / mass[i];
-  for (size_t c = 0; c < ncell_; ++c) {
-    const float *s = twist_share_.data() + 4 * c;
-    corners_[place_of(c, 2)] = {std::bit_cast<uint>(s[0]), std::bit_cast<uint>(s[1]),
-                                std::bit_cast<uint>(s[2]), std::bit_cast<uint>(s[3])};
-  }
+  corners_.put_rows(row.data(), mass.data(), npoint);
+  for (size_t c = 0; c < ncell_; ++c) corners_.put_shares(c, twist_share_.data() + 4 * c);
 }
 
 void Cells::strain(const dfm_kin &k, size_t c, double (&f)[9], double (&r)[9], double (&e)[6]) const {
@@ -142,42 +119,29 @@ void Cells::strain(const dfm_kin &k, size_t c, double (&f)[9], double (&r)[9], d
   of.strain_of(r, f, e);
 }
 
-// What each shape adds to the rows at rest, as the kernel counts it. After a step the kernel has found the
-// sub-step that no point asks to be shorter; as dampers, points ask for that and leave room to what else acts
-// on them. The worst point at rest is named.
-void Cells::bound(const dfm_kin &k, double *ksum, double *csum) {
-  constexpr double kOthers = 1 - 1e-6;
-  if (const double last = k.state[3 * size_t(npoint)]; last > 0) {
-    const double stable = std::min(last, longest);  // parameters may have changed since
-    for (uint32_t i = 0; i < npoint; ++i) csum[i] += (i == worst ? 1 : kOthers) * (2 * mass[i] / stable);
-    return;
-  }
-  each(host, ncell_, [&](size_t c) {
+// What each shape adds to the rows at rest, as the kernel counts it.
+void Cells::add_growth(const dfm_kin &k, double *ksum, double *csum) {
+  for (size_t c = 0; c < ncell_; ++c) {
     const Call none{};
     double f[9], r[9], e[6];
     strain(k, c, f, r, e);
     const dvec2 more = CellForces{none}.growth_of(f, e, rest_[c].mu2, rest_[c].lambda);
-    twist_[c] = more.x + (lag > 0 ? damping * more.y / lag : 0);
-    damper_[c] = lag > 0 ? 0 : damping * more.y;
-  });
-  for (uint32_t i = 0; i < npoint; ++i) {
-    ksum[i] += stiff(i);
-    csum[i] += damper(i);
-  }
-  for (size_t n = 0; n < 4 * size_t(ncell_); ++n) {
-    ksum[cells_[n]] += twist_[n / 4] * double(twist_share_[n]);
-    csum[cells_[n]] += damper_[n / 4] * double(twist_share_[n]);
+    const double twist = more.x + (lag > 0 ? damping * more.y / lag : 0),
+                 damper = lag > 0 ? 0 : damping * more.y;
+    for (size_t n = 4 * c; n < 4 * c + 4; ++n) {
+      ksum[cells_[n]] += twist * double(twist_share_[n]);
+      csum[cells_[n]] += damper * double(twist_share_[n]);
+    }
   }
 }
 
 Work Cells::work() const {
-  return {{{kCellForces, ncell_, find_forces}, {kCellMotion, npoint, move_points}},
-          2,
-          {{sizeof(uvec2) * npoint, places_.data()},
-           {sizeof(uvec4) * entries_, corners_.data()},
-           {sizeof(dvec4) * entries_, shapes_.data()},
-           {sizeof(dvec4) * room_, nullptr},
-           {sizeof(double) * npoint, row_by_mass_.data()}}};
+  Work w;
+  w.add(kCellForces, 0, ncell_, find_forces);
+  w.add(kCellMotion, 0, npoint, move_points);
+  corners_.add_to(w, npoint);
+  w.array[kShapes] = {sizeof(dvec4) * corners_.entries, shapes_.data()};
+  return w;
 }
 
 double Cells::energy(const dfm_kin &k, uint32_t begin, uint32_t end) const {

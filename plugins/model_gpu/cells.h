@@ -2,6 +2,7 @@
 // moves points by. Equations: doc/models/corotational_fem.md, doc/models/corotational_fem_gpu.md.
 #pragma once
 #include "../model_common/tetrahedron.h"
+#include "corners.h"
 #include "parts.h"
 
 namespace gpu {
@@ -9,18 +10,25 @@ namespace gpu {
 class Cells : public Parts {
  public:
   static constexpr const char *kId = "org.deform.corotational_fem_gpu";
-  static constexpr uint32_t kParams = kParamCount;
-  static constexpr const char *kLongest =
-      "sub-step that is stable near rest; where cells are drawn far, shorter";
-  static constexpr double kShare = 0.9;  // of a sub-step that is stable: shapes change on the way
+  enum Param : uint32_t { kYoung, kDampingStiffness, kDampingMass, kDevice, kPoisson, kParamCount };
+  static constexpr uint32_t kValueCount = kParamCount;
+  struct Rows { dfm_param of[kParamCount]; };
+  static const Rows kRows;
+  static bool valid(const dfm_host *h, const double *values) {
+    return model::in_range(h, kId, kRows.of, kParamCount, values);
+  }
   static constexpr dfm_fact kCount = {"cells", "tetrahedra, each read once in a sub-step", "1", 0};
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void fill(const double *params);
-  void bound(const dfm_kin &k, double *ksum, double *csum);
+  // Adds what the present shape asks of the rows of the bound.
+  void add_growth(const dfm_kin &k, double *ksum, double *csum);
   Work work() const;
   uint32_t count() const { return ncell_; }
+  uint32_t energies() const { return ncell_; }
   double energy(const dfm_kin &k, uint32_t begin, uint32_t end) const;
+  const char *idle(Param) const { return nullptr; }
+  const char *active_effects[4] = {};  // NULL-terminated
 
  private:
   struct Rest {
@@ -28,16 +36,12 @@ class Cells : public Parts {
     double mu2, lambda;
   };  // mu2, lambda times the volume, N m
   uint32_t ncell_ = 0;
-  size_t room_ = 0, entries_ = 0;  // for the forces of corners; of corners_ and shapes_
-  Buffer<uint32_t> cells_;         // [ncell,4]
+  Buffer<uint32_t> cells_;  // [ncell,4]
   Buffer<Rest> rest_;
-  Buffer<double> field_[gpu::kParamCount];
-  Buffer<uvec2> places_;        // [npoint] of a point's corners: the first, how many
-  Buffer<uvec4> corners_;       // points, places of their forces, twist_share as float; 32 cells side by side
-  Buffer<dvec4> shapes_;        // gradients of corners 1 to 3, mu2, lambda
-  Buffer<float> twist_share_;   // [ncell,4] row of a corner per stiffness against turning
-  Buffer<double> row_by_mass_;  // [npoint] 1/s2
-  Buffer<double> twist_, damper_;  // [ncell] of bound()
+  Buffer<double> field_[kParamCount];
+  Corners corners_;
+  Buffer<dvec4> shapes_;       // gradients of corners 1 to 3, mu2, lambda
+  Buffer<float> twist_share_;  // [ncell,4] row of a corner per stiffness against turning
 
   double of(Param which, const double *params, uint32_t c) const {
     return field_[which].empty() ? params[which] : field_[which][c];

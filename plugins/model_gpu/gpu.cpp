@@ -1,4 +1,4 @@
-// org.deform.msm_gpu and org.deform.corotational_fem_gpu: the springs and dampers of org.deform.msm, the
+// org.deform.msm_gpu and org.deform.corotational_fem_gpu: the springs and cells of org.deform.msm, the
 // cells of org.deform.corotational_fem, moved in explicit sub-steps on a compute device (Zerbato 2010,
 // (2.25), (2.26), 2.1.2 and 7.1); the bodies step themselves.
 #include <cstring>
@@ -13,9 +13,6 @@
 namespace gpu {
 
 namespace {
-constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL;
-const char *const kDevices[] = {"auto", "hardware", "software", "reference", nullptr};
-
 // One device for each choice, open until the last host has gone, since opening takes longer than the set-up
 // of a body. No static variable here has a destructor: it would leave memory when the file is unloaded.
 struct Devices { std::shared_ptr<Vulkan> open[3]; };
@@ -23,17 +20,6 @@ std::mutex one;
 uint32_t hosts = 0;
 Devices *devices = nullptr;
 }  // namespace
-
-const dfm_param kParams[kParamCount] = {
-    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
-    {"damping_stiffness", "damping over stiffness", "s", 0, 10, 0, kRun, 1, nullptr},
-    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun, 1, nullptr},
-    {"device",
-     "auto: a graphics card, else a software driver; hardware: a card or none; software: that driver; "
-     "reference: the processor",
-     "1", 0, 3, kAuto, DFM_PARAM_ENUM, 1, kDevices},
-    {"poisson", "Poisson ratio", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1, nullptr},
-};
 
 std::unique_ptr<Stepper> open_stepper(const dfm_host *host, const char *who, Choice choice, uint32_t npoint) {
   try {
@@ -56,8 +42,12 @@ std::unique_ptr<Stepper> open_stepper(const dfm_host *host, const char *who, Cho
 
 namespace {
 
-const dfm_effect_row kOff[] = {{"damping", kDampingStiffness, 0, 0}, {"damping", kDampingMass, 0, 0}};
-const dfm_effect_rows kEffectRows = model::rows_of(kOff);
+const dfm_effect_row kOfCells[] = {{"damping", Cells::kDampingStiffness, 0, 0},
+                                   {"damping", Cells::kDampingMass, 0, 0}};
+template <class Of>
+const dfm_effect_rows kEffectRows = model::rows_of(kOfCells);
+template <>
+const dfm_effect_rows kEffectRows<Springs> = model::rows_of(msm::kOff);
 // state follows by slot
 const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 
@@ -72,44 +62,47 @@ struct Tables {
   }
   static dfm_status set_params(void *self, const double *params) {
     One &of = *static_cast<One *>(self);
-    return model::in_range(of.host, Of::kId, kParams, Of::kParams, params) ? model::change(of, params)
-                                                                           : DFM_E_ARG;
+    return Of::valid(of.host, params) ? model::change(of, params) : DFM_E_ARG;
   }
-  static const void *extension(const void *, const char *id) {
+  static dfm_status state_init(const void *self, double *state) {
+    static_cast<const One *>(self)->begin(state);
+    return DFM_OK;
+  }
+  static constexpr dfm_slots kSlots = {sizeof(dfm_slots), 2, One::kSlots, 0, 0},
+                             kWithBranches = {sizeof(dfm_slots), 4, One::kSlots, 0, 0};
+  static const void *extension(const void *self, const char *id) {
+    if (!strcmp(id, DFM_EXT_SLOTS))
+      return static_cast<const One *>(self)->has_branch() ? &kWithBranches : &kSlots;
     if (!strcmp(id, "dfm.stepper/1")) return &Ops::kStepper;
     if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
-    if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
+    if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows<Of>;
+    if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
     if (!strcmp(id, DFM_EXT_FACTS)) return &Ops::kFacts;
     if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
     return nullptr;
   }
   static constexpr dfm_model model(uint32_t caps) {
     dfm_model t = model::bare_table<One>(caps | DFM_CAP_ENERGY | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT,
-                                         create, set_params, nullptr, extension);
-    t.nslot = One::kSlotCount;
-    t.slots = One::kSlots;
+                                         create, set_params, state_init, extension);
     t.bound = Ops::bound;
     t.energy = Ops::energy;
     return t;
   }
   static constexpr dfm_type type(const char *name, const char *source, const char *const *effects,
                                  const dfm_model *of) {
-    dfm_type t =
-        dfm::plugin::type(DFM_KIND_MODEL, Of::kId, name, "0.1.0", "MIT", source, kParams, effects, of);
-    t.nparam = Of::kParams;
-    return t;
+    return dfm::plugin::type(DFM_KIND_MODEL, Of::kId, name, "0.1.0", "MIT", source, Of::kRows.of, effects,
+                             of);
   }
 };
 
 const dfm_model kSpringModel = Tables<Springs>::model(DFM_CAP_PLAUSIBLE);
 const dfm_model kCellModel = Tables<Cells>::model(0);
-const char *const kSpringEffects[] = {"large_rotation", "damping", nullptr};
 const char *const kCellEffects[] = {"volume", "large_rotation", "damping", nullptr};
 const dfm_type kSpringType = Tables<Springs>::type(
     "mass-spring on a compute device",
     "Zerbato 2010, (2.25), (2.26) and 7.1; Van Gelder 1998, Approximate simulation of elastic membranes by "
     "triangulated spring meshes",
-    kSpringEffects, &kSpringModel);
+    msm::kEffects, &kSpringModel);
 const dfm_type kCellType = Tables<Cells>::type(
     "corotational finite elements on a compute device",
     "Zerbato 2010, (2.1)-(2.13) corrected, and 7.1; Mueller and Gross 2004, Interactive virtual materials",

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kMaxSteps = 1e6;
 constexpr double kRounding = 1e-6;  // rates of the kernels are binary32
+constexpr double kShare = 0.9;      // of a sub-step that is stable, where shapes change it on the way
 constexpr double kStrain = 1e-5;    // whose energy is that of a small one
 // Dampers with a lag are at most so stiff, relative to what is beside them; a mode at the own frequency
 // loses so much of its damping, and is so much faster, at most.
@@ -22,7 +23,7 @@ constexpr double kStiffening = 3, kError = 0.02;
 template <class Of>
 void Body<Of>::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
-  if (!model::in_range(h, Of::kId, kParams, Of::kParams, m.params)) throw model::Refused{};
+  if (!Of::valid(h, m.params)) throw model::Refused{};
   npoint_ = m.npoint;
   inverse_mass_.create(h, npoint_);
   held_.create(h, npoint_);
@@ -32,9 +33,8 @@ void Body<Of>::create(const dfm_host *h, const dfm_mesh &m) {
   }
   parts_.create(h, m);
   rest_.create_copy(h, m.rest, 3 * size_t(npoint_));
-  block_energy_.create(h, parts_.count() / kGrain + 1);
   take_surface(m);
-  const Choice choice = Choice(uint32_t(m.params[kDevice]));
+  const Choice choice = Choice(uint32_t(m.params[Of::kDevice]));
   if (choice == kReference) stepper_ = std::make_unique<Reference>(h, npoint_);
   else stepper_ = open_stepper(h, Of::kId, choice, npoint_);
   for (uint32_t i = 0; i < npoint_; ++i) {
@@ -60,6 +60,7 @@ template <class Of>
 void Body<Of>::apply_params(const double *values) {
   const auto take = [&] {
     parts_.fill(params_);
+    block_energy_.create(host, parts_.energies() / kGrain + 1);
     stepper_->take(parts_.work());
     find_lag();
   };
@@ -74,15 +75,18 @@ void Body<Of>::apply_params(const double *values) {
   } catch (const std::string &why) {
     model::refuse(host, Of::kId, "%s", why.c_str());
   }
-  const char **effect = active_effects;
-  if (Of::kParams > kPoisson) *effect++ = "volume";
-  *effect++ = "large_rotation";
-  if (params_[kDampingStiffness] > 0 || params_[kDampingMass] > 0) *effect++ = "damping";
-  *effect = nullptr;
-  facts_[0] = {"longest_step", Of::kLongest, "s", Of::kShare * parts_.longest};
+  facts_[0] = {"longest_step",
+               parts_.drawn ? "sub-step that is stable near rest; where cells are drawn far, shorter"
+                            : "sub-step that is stable in every shape",
+               "s", share() * parts_.longest};
   facts_[1] = Of::kCount;
   facts_[1].value = double(parts_.count());
   facts_[2] = {"on_processor", stepper_->device(), "1", stepper_->on_processor() ? 1.0 : 0.0};
+}
+
+template <class Of>
+double Body<Of>::share() const {
+  return parts_.drawn ? kShare : 1;
 }
 
 template <class Of>
@@ -135,26 +139,53 @@ template <class Of>
 void Body<Of>::find_lag() {
   parts_.lag = 0;
   parts_.longest = longest();
-  const double ratio = params_[kDampingStiffness];
+  const double ratio = parts_.damping;
   if (ratio > 0) {
     const double w = own_frequency();
     parts_.lag = std::min({ratio / kStiffening, std::sqrt(kError) / w, 2 * kError / (ratio * w * w)});
     if (!(longest() > parts_.longest)) parts_.lag = 0;
     parts_.longest = longest();
   }
-  dampers_ = {float(ratio), parts_.lag > 0 ? float(1 / parts_.lag) : 0};
+  dampers_ = {float(ratio), parts_.lag > 0 ? float(1 / parts_.lag) : 0, parts_.branches.part,
+              parts_.branches.time};
+}
+
+template <class Of>
+void Body<Of>::begin(double *state) const {
+  std::fill(state, state + parts_.of_stretch(parts_.branches.n), 0.0);
+  if (has_branch()) state[parts_.of_stretch(parts_.branches.n)] = 1;
+}
+
+// After a step the kernel has found the sub-step that no point asks to be shorter; as dampers, points ask for
+// that and leave room to what else acts on them. The worst point at rest is named.
+template <class Of>
+void Body<Of>::bound(const dfm_kin &k, double *ksum, double *csum) {
+  constexpr double kOthers = 1 - 1e-6;
+  if (const double last = k.state[parts_.of_longest()]; parts_.drawn && last > 0) {
+    const double stable = std::min(last, parts_.longest);  // parameters may have changed since
+    for (uint32_t i = 0; i < npoint_; ++i)
+      csum[i] += (i == parts_.worst ? 1 : kOthers) * (2 * parts_.mass[i] / stable);
+    return;
+  }
+  for (uint32_t i = 0; i < npoint_; ++i) {
+    ksum[i] += parts_.stiff(i);
+    csum[i] += parts_.damper(i);
+  }
+  if (parts_.drawn) parts_.add_growth(k, ksum, csum);
 }
 
 template <class Of>
 bool Body<Of>::take_points(const dfm_kin &k) {
   std::atomic<bool> moved = false;
-  const bool lagged = dampers_.per_lag > 0, begun = k.state[3 * size_t(npoint_)] > 0;
+  const bool lagged = dampers_.per_lag > 0, begun = k.state[parts_.of_longest()] > 0;
+  const auto differ = [](double &to, double from) {
+    const bool differs = std::bit_cast<uint64_t>(to) != std::bit_cast<uint64_t>(from);
+    to = from;
+    return differs;
+  };
   each_point([&](size_t i) {
-    bool differ = false;
-    const auto put = [&](double &to, double from) {
-      differ |= std::bit_cast<uint64_t>(to) != std::bit_cast<uint64_t>(from);
-      to = from;
-    };
+    bool changed = false;
+    const auto put = [&](double &to, double from) { changed |= differ(to, from); };
     const double *const x = k.x + i * k.stride, *const v = k.v + i * k.stride;
     dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i];
     put(place.x, x[0]);
@@ -169,8 +200,12 @@ bool Body<Of>::take_points(const dfm_kin &k) {
       put(stepper_->seen[i].y, u[1]);
       put(stepper_->seen[i].z, u[2]);
     }
-    if (differ) moved.store(true, std::memory_order_relaxed);
+    if (changed) moved.store(true, std::memory_order_relaxed);
   });
+  const Branches &of = parts_.branches;
+  for (size_t s = 0; s < of.room; ++s)
+    if (of.edge_of[s] != ~0u && differ(stepper_->stretch[s], k.state[parts_.of_stretch(of.edge_of[s])]))
+      moved = true;
   return moved;
 }
 
@@ -179,7 +214,7 @@ bool Body<Of>::take_loads(const double *f, uint32_t stride) {
   std::atomic<bool> changed = false;
   each_point([&](size_t i) {
     const double *const of = f + i * stride, per = inverse_mass_[i];
-    const dvec4 now{of[0] * per, of[1] * per, of[2] * per, params_[kDampingMass]};
+    const dvec4 now{of[0] * per, of[1] * per, of[2] * per, parts_.drag_of(i)};
     dvec4 &load = stepper_->load[i];
     if (now.x == load.x && now.y == load.y && now.z == load.z && now.w == load.w) return;
     load = now;
@@ -191,12 +226,13 @@ bool Body<Of>::take_loads(const double *f, uint32_t stride) {
 template <class Of>
 dfm_status Body<Of>::predict(const dfm_kin &k, const double *f, double *u_s) {
   double stable = parts_.longest;
-  if (const double last = k.state[3 * size_t(npoint_)]; last > 0) stable = std::min(stable, last);
+  if (const double last = k.state[parts_.of_longest()]; last > 0) stable = std::min(stable, last);
   h_ = k.dt;
+  if (has_branch()) dampers_.was = k.state[parts_.of_stretch(parts_.branches.n)];
   for (;;) {
     // a step that is stable as a whole, as those in contact are, is not divided
     const double all = k.dt / stable - kRounding,
-                 steps = all <= 1 ? 1 : std::ceil(k.dt / (Of::kShare * stable) - kRounding);
+                 steps = all <= 1 ? 1 : std::ceil(k.dt / (share() * stable) - kRounding);
     if (!(steps <= kMaxSteps)) {
       model::say(host, 3, Of::kId,
                  "a step of %g s needs %.3g sub-steps of %.3g s; soften or coarsen the body, lower its "
@@ -271,7 +307,10 @@ void Body<Of>::diagonal(const dfm_kin &, uint32_t n, const uint32_t *surfel, dou
 template <class Of>
 void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v) {
   const bool lagged = dampers_.per_lag > 0;
-  k.state_out[3 * size_t(npoint_)] = shape_;
+  k.state_out[parts_.of_longest()] = shape_;
+  const Branches &of = parts_.branches;
+  for (size_t e = 0; e < of.n; ++e) k.state_out[parts_.of_stretch(e)] = stepper_->stretch[of.end_of[e]];
+  if (of.n) k.state_out[parts_.of_stretch(of.n)] = dampers_.after(part_).was;
   each_point([&](size_t i) {
     const dvec4 &place = stepper_->place[i], &speed = stepper_->speed[i],
                 &seen = lagged ? stepper_->seen[i] : speed;
@@ -303,7 +342,7 @@ void Body<Of>::commit(const dfm_kin &k, const double *p_s, double *x, double *v)
 // Sums of blocks of springs or cells, in the order of the blocks.
 template <class Of>
 double Body<Of>::energy(const dfm_kin &k) {
-  const uint32_t count = parts_.count();
+  const uint32_t count = parts_.energies();
   model::in_pieces(host, true, count, kGrain, [&](uint32_t begin, uint32_t end) {
     for (uint32_t at = begin; at < end; at += kGrain)
       block_energy_[at / kGrain] = parts_.energy(k, at, std::min(at + kGrain, end));

@@ -19,14 +19,18 @@ std::unique_ptr<Stepper> open_stepper(const dfm_host *host, const char *who, Cho
 template <class Of>
 class Body {
  public:
-  using Row = Param;
+  using Row = typename Of::Param;
   const dfm_host *host = nullptr;
-  const char *active_effects[4] = {};  // NULL-terminated
+  const char *const *active() const { return parts_.active_effects; }
+  const char *idle(Row which) const { return parts_.idle(which); }
   // m/s, the velocity that dampers see; s, the longest sub-step that is stable at the worst shape of the last
-  // step, 0 before the first
+  // step, 0 before the first; of branches alone m, r, and b of the last sub-step
   static constexpr dfm_slot kSlots[] = {{DFM_PER_POINT, 3, DFM_SLOT_VECTOR, 0},
+                                        {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0},
+                                        {DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0},
                                         {DFM_PER_INSTANCE, 1, DFM_SLOT_SCALAR, 0}};
-  static constexpr uint32_t kSlotCount = 2;
+  bool has_branch() const { return parts_.branches.n > 0; }
+  void begin(double *state) const;
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void apply_params(const double *values);
@@ -41,14 +45,14 @@ class Body {
                double *du);
   void diagonal(const dfm_kin &, uint32_t n, const uint32_t *surfel, double *w) const;
   void commit(const dfm_kin &k, const double *p_s, double *x, double *v);
-  void bound(const dfm_kin &k, double *ksum, double *csum) { parts_.bound(k, ksum, csum); }
+  void bound(const dfm_kin &k, double *ksum, double *csum);
   double energy(const dfm_kin &k);
   static constexpr uint32_t kFactCount = 3;
   const dfm_fact *facts() const { return facts_; }
 
  private:
   Of parts_;
-  double params_[Of::kParams] = {};
+  double params_[Of::kValueCount] = {};
   uint32_t npoint_ = 0, nsurfel_ = 0;
   Buffer<double> inverse_mass_;  // [npoint] 1/kg
   Buffer<uint8_t> held_;
@@ -65,6 +69,7 @@ class Body {
   double shape_ = 0;  // s, stable at its worst shape
   dfm_fact facts_[kFactCount] = {};
 
+  double share() const;
   void take_surface(const dfm_mesh &m);
   double own_frequency();
   void find_lag();

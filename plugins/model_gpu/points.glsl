@@ -5,14 +5,18 @@ layout(std430, binding = 1) readonly buffer Speeds { dvec4 speed[]; };
 layout(std430, binding = 2) readonly buffer Loads { dvec4 loads[]; };
 layout(std430, binding = 3) writeonly buffer NextPlaces { dvec4 next_place[]; };
 layout(std430, binding = 4) writeonly buffer NextSpeeds { dvec4 next_speed[]; };
-layout(std430, binding = 11) readonly buffer Seen { dvec4 seen[]; };
-layout(std430, binding = 12) writeonly buffer NextSeen { dvec4 next_seen[]; };
+layout(std430, binding = 5) readonly buffer Seen { dvec4 seen[]; };
+layout(std430, binding = 6) writeonly buffer NextSeen { dvec4 next_seen[]; };
 layout(push_constant) uniform Now {
   double step;     // s
   double kept;     // share of v - u
   uint count;      // of invocations
   float damping;   // s
   float per_lag;   // 1/s
+  double was;      // of branches (doc/models/msm_gpu.md): b of the sub-step before
+  double keep;     // E and b of this one
+  double next;
+  double part;     // share of the stiffness
 };
 #define PLACE(i) place[i]
 #define SPEED(i) speed[i]
@@ -25,5 +29,11 @@ layout(push_constant) uniform Now {
 #define STEP step
 #define KEPT kept
 #define PER_LAG per_lag
+#define IN(name, n) double name[n]
+#define OUT(name, n) precise inout double name[n]
 #define UNROLLED [[unroll]]
 #define DAMPING damping
+#define WAS was
+#define KEEP keep
+#define NEXT next
+#define PART part

@@ -8,21 +8,26 @@
 namespace gpu {
 namespace {
 
-constexpr uint32_t kSpringStep[] = {
+constexpr uint32_t kOfSprings[] = {
 #include "spring_step.inc"
 };
-constexpr uint32_t kForces[] = {
+constexpr uint32_t kOfCells[] = {
 #include "cell_forces.inc"
 };
-constexpr uint32_t kMotion[] = {
+constexpr uint32_t kOfMotion[] = {
 #include "cell_motion.inc"
+};
+constexpr uint32_t kOfVolumes[] = {
+#include "volume_forces.inc"
 };
 struct Code {
   size_t bytes;
   const uint32_t *words;
 };
-constexpr Code kCode[kKernels] = {
-    {sizeof kSpringStep, kSpringStep}, {sizeof kForces, kForces}, {sizeof kMotion, kMotion}};
+constexpr Code kCode[kKernels] = {{sizeof kOfSprings, kOfSprings},
+                                  {sizeof kOfCells, kOfCells},
+                                  {sizeof kOfMotion, kOfMotion},
+                                  {sizeof kOfVolumes, kOfVolumes}};
 
 void must(VkResult result, const char *what) {
   if (result == VK_SUCCESS) return;
@@ -49,7 +54,6 @@ Vulkan::Vulkan(Wanted wanted) {
     open_instance();
     open_device(choose(wanted));
     make_layout();
-    for (uint32_t k = 0; k < kKernels; ++k) make_pipeline(Kernel(k));
   } catch (...) {
     close();
     throw;
@@ -166,7 +170,17 @@ void Vulkan::make_layout() {
   must(CreatePipelineLayout(device, &whole, nullptr, &layout), "vkCreatePipelineLayout");
 }
 
-void Vulkan::make_pipeline(Kernel kernel) {
+void Vulkan::need(Kernel kernel, uint32_t options) {
+  const std::lock_guard<std::mutex> one(one_);
+  VkPipeline &to = pipeline[kernel][options];
+  if (to) return;
+  VkBool32 on[3];
+  VkSpecializationMapEntry entries[3];
+  for (uint32_t n = 0; n < 3; ++n) {
+    on[n] = options >> n & 1;
+    entries[n] = {n, uint32_t(n * sizeof on[0]), sizeof on[0]};
+  }
+  const VkSpecializationInfo constants{3, entries, sizeof on, on};
   VkShaderModuleCreateInfo code{};
   code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
   code.codeSize = kCode[kernel].bytes;
@@ -179,8 +193,9 @@ void Vulkan::make_pipeline(Kernel kernel) {
   info.stage.stage = VK_SHADER_STAGE_COMPUTE_BIT;
   info.stage.module = module;
   info.stage.pName = "main";
+  info.stage.pSpecializationInfo = &constants;
   info.layout = layout;
-  const VkResult made = CreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &pipeline[kernel]);
+  const VkResult made = CreateComputePipelines(device, VK_NULL_HANDLE, 1, &info, nullptr, &to);
   DestroyShaderModule(device, module, nullptr);
   must(made, "vkCreateComputePipelines");
 }
@@ -188,7 +203,8 @@ void Vulkan::make_pipeline(Kernel kernel) {
 void Vulkan::close() {
   if (device) {
     DeviceWaitIdle(device);
-    for (const VkPipeline each : pipeline) DestroyPipeline(device, each, nullptr);
+    for (const auto &of_kernel : pipeline)
+      for (const VkPipeline each : of_kernel) DestroyPipeline(device, each, nullptr);
     DestroyPipelineLayout(device, layout, nullptr);
     DestroyDescriptorSetLayout(device, set_layout, nullptr);
     DestroyDevice(device, nullptr);

@@ -47,7 +47,7 @@ class Vulkan {
   uint32_t family = 0;
   VkDescriptorSetLayout set_layout = VK_NULL_HANDLE;
   VkPipelineLayout layout = VK_NULL_HANDLE;
-  VkPipeline pipeline[kKernels] = {};
+  VkPipeline pipeline[kKernels][kCombinations] = {};  // made where a body needs them
 #define DEFORM_GPU_DECLARE(name) PFN_vk##name name = nullptr;
   DEFORM_GPU_OF_INSTANCE(DEFORM_GPU_DECLARE)
   DEFORM_GPU_OF_DEVICE(DEFORM_GPU_DECLARE)
@@ -56,6 +56,7 @@ class Vulkan {
   // Memory that the device reads fastest, or that the processor reads and writes (mapped); throws.
   uint32_t memory_type(uint32_t allowed, bool mapped) const;
   VkResult submit(VkCommandBuffer commands, VkFence done);
+  void need(Kernel kernel, uint32_t options);  // makes the pipeline; throws
 
  private:
   VkInstance instance_ = VK_NULL_HANDLE;
@@ -67,7 +68,6 @@ class Vulkan {
   VkPhysicalDevice choose(Wanted wanted);
   void open_device(VkPhysicalDevice chosen);
   void make_layout();
-  void make_pipeline(Kernel kernel);
   void close();
 };
 

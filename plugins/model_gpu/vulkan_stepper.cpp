@@ -54,7 +54,6 @@ void VulkanStepper::open() {
   speed = place + npoint_;
   seen = speed + npoint_;
   load = seen + npoint_;
-  std::memset(static_cast<void *>(place), 0, 4 * bytes());
   const VkDescriptorPoolSize size{VK_DESCRIPTOR_TYPE_STORAGE_BUFFER, 2 * kBindings};
   VkDescriptorPoolCreateInfo sets{};
   sets.sType = VK_STRUCTURE_TYPE_DESCRIPTOR_POOL_CREATE_INFO;
@@ -93,8 +92,8 @@ void VulkanStepper::close() {
   vk.DestroyFence(vk.device, done_, nullptr);
   vk.DestroyCommandPool(vk.device, pool_, nullptr);
   vk.DestroyDescriptorPool(vk.device, sets_, nullptr);
-  for (Array *array :
-       {&place_[0], &place_[1], &speed_[0], &speed_[1], &seen_[0], &seen_[1], &load_, &rate_, &shared_})
+  for (Array *array : {&place_[0], &place_[1], &speed_[0], &speed_[1], &seen_[0], &seen_[1], &load_, &rate_,
+                       &shared_, &stretch_, &shared_stretch_})
     drop(*array);
   for (Array &array : own_) drop(array);
 }
@@ -119,6 +118,8 @@ void VulkanStepper::make(Array &array, size_t size, bool mapped) {
   must(vk.AllocateMemory(vk.device, &memory, nullptr, &array.memory), "vkAllocateMemory");
   must(vk.BindBufferMemory(vk.device, array.buffer, array.memory, 0), "vkBindBufferMemory");
   if (mapped) must(vk.MapMemory(vk.device, array.memory, 0, VK_WHOLE_SIZE, 0, &array.mapped), "vkMapMemory");
+  if (mapped) std::memset(array.mapped, 0, size);
+  array.bytes = size;
 }
 
 void VulkanStepper::drop(Array &array) {
@@ -127,19 +128,17 @@ void VulkanStepper::drop(Array &array) {
   array = {};
 }
 
-// Set 0 reads the first of two arrays and writes the second, set 1 the reverse.
+// Set 0 reads the first of two arrays and writes the second, set 1 the reverse. That of the rate stands for
+// arrays that a kernel names and its options leave out.
 void VulkanStepper::describe() {
   const Vulkan &vk = *vulkan_;
   for (uint32_t s = 0; s < 2; ++s) {
-    VkBuffer buffers[kBindings] = {place_[s].buffer, speed_[s].buffer, load_.buffer, place_[1 - s].buffer,
-                                   speed_[1 - s].buffer};
-    for (uint32_t n = 0; n < kHighest - kOwn; ++n) buffers[kOwn + n] = own_[n].buffer;
-    buffers[kHighest] = rate_.buffer;
-    buffers[kSeen] = seen_[s].buffer;
-    buffers[kNextSeen] = seen_[1 - s].buffer;
+    VkBuffer buffers[kBindings] = {place_[s].buffer,     speed_[s].buffer,     load_.buffer,
+                                   place_[1 - s].buffer, speed_[1 - s].buffer, seen_[s].buffer,
+                                   seen_[1 - s].buffer,  rate_.buffer,         stretch_.buffer};
+    for (uint32_t n = kOwn; n < kBindings; ++n) buffers[n] = own_[n].buffer;
     for (uint32_t b = 0; b < kBindings; ++b) {
-      if (!buffers[b]) continue;
-      const VkDescriptorBufferInfo whole{buffers[b], 0, VK_WHOLE_SIZE};
+      const VkDescriptorBufferInfo whole{buffers[b] ? buffers[b] : rate_.buffer, 0, VK_WHOLE_SIZE};
       VkWriteDescriptorSet write{};
       write.sType = VK_STRUCTURE_TYPE_WRITE_DESCRIPTOR_SET;
       write.dstSet = set_[s];
@@ -191,17 +190,32 @@ void VulkanStepper::upload(const Array &to, const void *from, size_t size) {
   drop(staging);
 }
 
+// Arrays whose size has changed are made anew, and what was recorded with the old ones is not used again.
 void VulkanStepper::take(const Work &work) {
-  const bool first = !work_.npass;
-  for (uint32_t p = 0; first && p < work.npass; ++p)
+  for (uint32_t p = 0; p < work.npass; ++p) {
     if ((work.pass[p].count + kGroup - 1) / kGroup > vulkan_->limits.maxComputeWorkGroupCount[0])
       throw "the body has more points or cells than the device " + vulkan_->name +
           " takes in one call; take a coarser mesh";
-  for (uint32_t n = 0; first && n < kHighest - kOwn; ++n)
-    if (work.array[n].bytes) make(own_[n], work.array[n].bytes, false);
-  if (first) describe();
+    vulkan_->need(work.pass[p].kernel, work.pass[p].options);
+  }
+  bool anew = work.npass != work_.npass || !std::equal(work.pass, work.pass + work.npass, work_.pass);
+  work_.npass = 0;
+  const auto remake = [&](Array &array, size_t bytes, bool mapped) {
+    if (array.bytes == bytes) return;
+    anew = true;
+    drop(array);
+    if (bytes) make(array, bytes, mapped);
+  };
+  for (uint32_t n = kOwn; n < kBindings; ++n) remake(own_[n], work.array[n].bytes, false);
+  remake(stretch_, sizeof(double) * work.nstretch, false);
+  remake(shared_stretch_, sizeof(double) * work.nstretch, true);
+  stretch = static_cast<double *>(shared_stretch_.mapped);
+  if (anew) {
+    std::fill(recorded_, recorded_ + kBatches, Batch{});
+    describe();
+  }
   work_ = work;
-  for (uint32_t n = 0; n < kHighest - kOwn; ++n)
+  for (uint32_t n = kOwn; n < kBindings; ++n)
     if (work.array[n].data) upload(own_[n], work.array[n].data, work.array[n].bytes);
 }
 
@@ -211,6 +225,7 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
     const VkBufferCopy part{at, to_at, bytes()};
     vk.CmdCopyBuffer(commands, from.buffer, to.buffer, 1, &part);
   };
+  const VkBufferCopy stretches{0, 0, stretch_.bytes};
   if (const VkResult begun = begin(commands); begun != VK_SUCCESS) return begun;
   order(commands, kCompute | kCopy | kProcessor, kCompute | kCopy);
   const bool lagged = batch.dampers.per_lag > 0;
@@ -218,17 +233,19 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
     copy(shared_, 0, place_[batch.from], 0);
     copy(shared_, bytes(), speed_[batch.from], 0);
     if (lagged) copy(shared_, 2 * bytes(), seen_[batch.from], 0);
+    if (stretch) vk.CmdCopyBuffer(commands, shared_stretch_.buffer, stretch_.buffer, 1, &stretches);
   }
   if (batch.loaded) copy(shared_, 3 * bytes(), load_, 0);
   if (batch.moved || batch.loaded) order(commands, kCopy, kCompute);
+  const Dampers later = batch.dampers.after(batch.h);
   for (uint32_t k = 0; k < batch.n; ++k) {
     vk.CmdBindDescriptorSets(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.layout, 0, 1,
                              &set_[(batch.from + k) % 2], 0, nullptr);
     for (uint32_t p = 0; p < work_.npass; ++p) {
       const Work::Pass &pass = work_.pass[p];
       if (k + p > 0) order(commands, kCompute, kCompute);
-      vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline[pass.kernel]);
-      const Constants now = batch.dampers.constants(batch.h, pass.count);
+      vk.CmdBindPipeline(commands, VK_PIPELINE_BIND_POINT_COMPUTE, vk.pipeline[pass.kernel][pass.options]);
+      const Constants now = (k ? later : batch.dampers).constants(batch.h, pass.count);
       vk.CmdPushConstants(commands, vk.layout, VK_SHADER_STAGE_COMPUTE_BIT, 0, sizeof now, &now);
       vk.CmdDispatch(commands, (pass.count + kGroup - 1) / kGroup, 1, 1);
     }
@@ -239,6 +256,7 @@ VkResult VulkanStepper::record(VkCommandBuffer commands, const Batch &batch) con
     copy(place_[end], 0, shared_, 0);
     copy(speed_[end], 0, shared_, bytes());
     if (lagged) copy(seen_[end], 0, shared_, 2 * bytes());
+    if (stretch) vk.CmdCopyBuffer(commands, stretch_.buffer, shared_stretch_.buffer, 1, &stretches);
     order(commands, kCompute | kCopy, kProcessor);
   }
   return vk.EndCommandBuffer(commands);
@@ -249,7 +267,13 @@ const char *VulkanStepper::run(uint32_t n, double h, const Dampers &dampers, boo
   *highest_ = 0;
   for (uint32_t taken = 0; taken < n;) {
     const uint32_t some = std::min(n - taken, kMaxSteps);
-    const Batch batch{some, now_, moved && !taken, loaded && !taken, taken + some == n, h, dampers};
+    const Batch batch{some,
+                      now_,
+                      moved && !taken,
+                      loaded && !taken,
+                      taken + some == n,
+                      h,
+                      taken ? dampers.after(h) : dampers};
     const uint32_t slot = batch.from + 2 * batch.moved + 4 * batch.loaded + 8 * batch.seen;
     VkResult result = VK_SUCCESS;
     if (!(recorded_[slot] == batch)) {

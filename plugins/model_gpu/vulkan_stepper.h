@@ -20,6 +20,7 @@ class VulkanStepper : public Stepper {
     VkBuffer buffer = VK_NULL_HANDLE;
     VkDeviceMemory memory = VK_NULL_HANDLE;
     void *mapped = nullptr;
+    size_t bytes = 0;
   };
   // Sub-steps from array `from` on, with the copies before and after them.
   struct Batch {
@@ -35,7 +36,7 @@ class VulkanStepper : public Stepper {
   std::shared_ptr<Vulkan> vulkan_;
   uint32_t npoint_, now_ = 0;  // which of place_, speed_ and seen_ is the present
   Work work_{};
-  Array place_[2], speed_[2], seen_[2], load_, own_[kHighest - kOwn], rate_, shared_;
+  Array place_[2], speed_[2], seen_[2], load_, own_[kBindings], rate_, shared_, stretch_, shared_stretch_;
   VkDescriptorPool sets_ = VK_NULL_HANDLE;
   VkDescriptorSet set_[2] = {};
   VkCommandPool pool_ = VK_NULL_HANDLE;

@@ -7,53 +7,12 @@
 
 namespace msm {
 
-namespace {
 using Ops = model::Ops<Body>;
-constexpr uint32_t kRun = DFM_PARAM_RUNTIME, kCell = DFM_PARAM_PER_CELL;
-const char *const kKinds[] = {"softer", "stiffer", nullptr};
-const char *const kForces[] = {"B", "A", nullptr};
-const char *const kDampers[] = {"voigt", "maxwell", "sls", nullptr};
-}  // namespace
-
-const dfm_param kParams[kParamCount] = {
-    {"young", "Young's modulus", "Pa", 1e-3, 1e13, 1e5, kRun | DFM_PARAM_LOG_SCALE | kCell, 1, nullptr},
-    {"poisson", "Poisson ratio; the model gives 1/4 and more", "1", -0.99, 0.4999, 0.3, kRun | kCell, 1,
-     nullptr},
-    {"damping_stiffness", "damper over stiffness of each spring", "s", 0, 1e3, 0, kRun | kCell, 1, nullptr},
-    {"damping_mass", "drag over mass of each point", "1/s", 0, 1e6, 0, kRun | kCell, 1, nullptr},
-    {"volume",
-     "volume stiffness in bulk moduli E/(3(1-2 nu)); 0: off; auto, -1: what makes poisson the body's ratio",
-     "1", kFromPoisson, 1e6, kFromPoisson, kRun | kCell | DFM_PARAM_AUTO, 1, nullptr},
-    {"collapse", "stiffness against collapse of a cell below 0.6 of its volume, over young; 0: off", "1", 0,
-     1e3, 3, kRun | kCell, 1, nullptr},
-    {"anisotropy_slope", "slope of the extra coordinates; 0: isotropic", "1", 0, 1e3, 0, kRun | kCell, 1,
-     nullptr},
-    {"anisotropy_kind", "what the body is along the axis", "1", 0, 1, kSofter, kRun | DFM_PARAM_ENUM, 1,
-     kKinds},
-    {"anisotropy_form", "force of a tilted spring: projected (B) or turned back (A)", "1", 0, 1, kFormB,
-     DFM_PARAM_ENUM, 1, kForces},
-    {"damper", "voigt: beside the spring; maxwell: behind it; sls: a spring beside both", "1", 0, 2, kVoigt,
-     DFM_PARAM_ENUM, 1, kDampers},
-    {"relaxation_ratio", "sls: stiffness of the branch over that of the spring", "1", 1e-6, 1e3, 1, kRun, 1,
-     nullptr},
-    {"relaxation_time", "maxwell and sls: dashpot over stiffness of the branch", "s", 1e-9, 1e9, 0.1,
-     kRun | DFM_PARAM_LOG_SCALE, 1, nullptr},
-    {"anisotropy_axis", "axis of the anisotropy; its length does not matter", "1", -1e6, 1e6, 1, kRun | kCell,
-     3, nullptr},
-};
 
 void complain(const dfm_host *h, const char *what) { model::complain(h, kId, what); }
 
 bool valid(const dfm_host *h, const double *values) {
-  if (!model::in_range(h, kId, kParams, kParamCount, values)) return false;
-  if (values[kVolume] < 0 && values[kVolume] != kFromPoisson) {
-    complain(h, "parameter volume is between -1 and 0; give -1 (from poisson), 0 (off) or a positive number");
-    return false;
-  }
-  if (!model::has_direction(values + kAxis)) {
-    complain(h, "parameter anisotropy_axis is zero; give a direction");
-    return false;
-  }
+  if (!model::in_range(h, kId, kParams, kParamCount, values) || !fit_together(h, kId, values)) return false;
   if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt) {
     complain(h,
              "parameter anisotropy_form A works with damper voigt only, since with other dampers its force "
@@ -151,9 +110,6 @@ const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
 const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
-const dfm_effect_row kOff[] = {{"volume", kVolume, 0, 0},       {"damping", kDampingStiffness, 0, 0},
-                               {"damping", kDampingMass, 0, 0}, {"damping", kDamper, 0, kVoigt},
-                               {"anisotropy", kSlope, 0, 0},    {"deform.relaxation", kDamper, 0, kVoigt}};
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
 const void *extension(const void *self, const char *id) {
@@ -169,9 +125,6 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
   return nullptr;
 }
-
-const char *const kEffects[] = {"volume",     "damping",           "large_rotation",
-                                "anisotropy", "deform.relaxation", nullptr};
 
 const dfm_model kModel = model::table<Body>(
     DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_PLAUSIBLE,

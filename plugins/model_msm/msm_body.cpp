@@ -1,8 +1,6 @@
 // The ops on the blocks. Forces run in two passes: each block loads its points, sums its springs and cells
 // into its own array, halo included; then each block adds up, in block order, what the others' halos hold for
 // its points. No two workers write the same place, and the mesh alone determines the order of every sum.
-#include <deform/elementary.h>
-
 #include "../model_common/width.h"
 #include "msm_body.h"
 
@@ -22,21 +20,14 @@ const Kernels *choose_kernels(const dfm_host *host) {
 Branch Body::branch_at(const dfm_kin &k) const {
   Branch b{};
   if (!has_branch() || !k.state) return b;
-  const double x = k.dt / params[kRelaxationTime];
   b.part = part();
   b.state = k.state;
   b.state_out = k.state_out;
   b.kept = k.state[nedge];
   b.follow = 1 - b.part * (1 - b.kept);
-  if (x > 0.25) {
-    b.keep = dfm_exp(-x);
-    b.next = (1 - b.keep) / x;
-  } else {  // 1 - E would lose digits: its series over x
-    double series = 1;
-    for (int n = 14; n > 1; --n) series = 1 - x / n * series;
-    b.next = series;
-    b.keep = 1 - x * series;
-  }
+  const Decay decay = decay_of(k.dt / params[kRelaxationTime]);
+  b.keep = decay.keep;
+  b.next = decay.next;
   return b;
 }
 

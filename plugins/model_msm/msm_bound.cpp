@@ -74,19 +74,7 @@ void Body::find_weights(Room &room) {
   at_rest.stride = 3;
   each_row(at_rest, [&](uint32_t i, double norm, const double *) { own[i] = norm; });
   if (volume_on)
-    for (uint32_t c = 0; c < ncell; ++c) {
-      const uint32_t *q = cells.data() + 4 * size_t(c);
-      const double *x[4], v0 = cell_volume6[c] / 6;
-      for (int a = 0; a < 4; ++a) x[a] = rest_point.data() + 3 * size_t(q[a]);
-      for (int a = 0; a < 4; ++a) {
-        const double *o = x[(a + 1) & 3], *y = x[(a + 2) & 3], *z = x[(a + 3) & 3];
-        const double u[3] = {y[0] - o[0], y[1] - o[1], y[2] - o[2]};
-        const double w[3] = {z[0] - o[0], z[1] - o[1], z[2] - o[2]};
-        const double r[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-        const double k = v0 > 0 ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
-        gradient[4 * size_t(c) + a] = __builtin_sqrt(k * ((r[0] * r[0] + r[1] * r[1]) + r[2] * r[2]));
-      }
-    }
+    for (uint32_t c = 0; c < ncell; ++c) rest_gradients(c, gradient.data() + 4 * size_t(c));
   Buffer<double> &stiff = room.tangent;
   for (uint32_t e = 0; e < nedge; ++e) stiff[e] = tangent(e);
   model::even_rows(npoint, mass.data(), weight.data(), next.data(), [&](double *out) {

@@ -1,8 +1,6 @@
 // Builds blocks from a mesh: rows of springs in quads, halos, and the sums of forces between blocks.
 #include <algorithm>
 
-#include "../model_common/edges.h"
-#include "../model_common/spring_directions.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -12,45 +10,10 @@ constexpr double kNoLimit = 1e150;  // of a cell that fills up a block
 
 void Body::take_mesh(const dfm_mesh &m) {
   npoint = m.npoint;
-  ncell = m.ncell;
-  nedge = m.nedge;
+  Material::take_mesh(host, kId, m);
   mass.create_copy(host, m.mass, npoint);
-  shape.create(host, nedge);
-  edge_volume.create(host, nedge);
-  edge_length.create(host, nedge);
+  for (Buffer<double> *each : {&weight, &spring_sum, &coupled, &rest_rows}) each->create(host, npoint);
   edge_energy.create(host, nedge);
-  rest_point.create_copy(host, m.rest, 3 * size_t(npoint));
-  weight.create(host, npoint);
-  spring_sum.create(host, npoint);
-  coupled.create(host, npoint);
-  rest_rows.create(host, npoint);
-  edges.create_copy(host, m.edges, 2 * size_t(nedge));
-  cells.create_copy(host, m.cells, 4 * size_t(ncell));
-  cell_edge.create(host, 6 * size_t(ncell));
-  cell_volume6.create(host, ncell);
-  for (uint32_t e = 0; e < nedge; ++e)
-    edge_length[e] =
-        length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
-  Buffer<uint32_t> row_of_edges;
-  row_of_edges.create(host, size_t(npoint) + 1);
-  model::find_rows(edges.data(), nedge, npoint, row_of_edges.data());
-  for (uint32_t c = 0; c < ncell; ++c) {
-    uint32_t *q = cells.data() + 4 * size_t(c);
-    const auto six = [&] {
-      const double *x[4];
-      for (int a = 0; a < 4; ++a) x[a] = m.rest + 3 * size_t(q[a]);
-      return volume6_of(x[0], x[1], x[2], x[3]);
-    };
-    if (six() < 0) std::swap(q[2], q[3]);  // a volume below the one at rest is then less of it
-    cell_volume6[c] = six();
-    const double volume = cell_volume6[c] / 6;
-    uint32_t *const e = cell_edge.data() + 6 * size_t(c);
-    model::find_edges_by_rows(edges.data(), row_of_edges.data(), q, e);
-    for (int n = 0; n < 6; ++n) edge_volume[e[n]] += volume;
-  }
-  per_modulus.create(host, nedge);
-  model::find_directions(nedge, edges.data(), rest_point.data(), edge_length.data(), edge_volume.data(),
-                         per_modulus.data());
 }
 
 struct Body::Layout : Order {
@@ -210,7 +173,6 @@ void Body::create(const dfm_host *h, const dfm_mesh &m) {
   if (!valid(h, m.params)) throw Refused{};
   kernels = choose_kernels(h);
   take_mesh(m);
-  take_fields(m);
   build_blocks();
   apply_params(m.params);
 }

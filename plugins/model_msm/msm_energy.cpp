@@ -36,18 +36,6 @@ double turned_energy(double l, double l0, double tilt2) {
   return t0 * t0 * 0.25 * (0.5 * (q * q) + q * bq - 0.5 * (bq * bq) - 2 * b * less_log(q, grown));
 }
 
-double cell_energy_of(const double *const *x, double bulk, double collapse, double rest, double limit) {
-  double q = 0;
-  for (int a = 1; a < 4; ++a)
-    for (int b = 0; b < a; ++b) q += square_between(x[a], x[b]);
-  const double u = limit / std::max(q, limit);
-  const double now = volume6_of(x[0], x[1], x[2], x[3]) * (__builtin_sqrt(u) * u * (2.5 - 1.5 * u));
-  const double kept = std::min(std::max(now, kMinVolume * rest), kMaxVolume * rest), more = kept - rest;
-  const double lost = std::max(kCollapseBelow * rest - kept, 0.0);
-  return 0.5 * bulk * (more * more) + 0.5 * collapse * (lost * lost) +
-         (bulk * more - collapse * lost) * (now - kept);
-}
-
 double Body::spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const {
   const uint32_t *ends = edges.data() + 2 * size_t(e);
   const double dd = square_between(k.x + size_t(k.stride) * ends[0], k.x + size_t(k.stride) * ends[1]);

@@ -3,6 +3,8 @@
 //   lattice   points of a cube, each with springs to its 26 neighbors: many sub-steps in one submission; one
 //             and its end back; one with points and loads on the way there, too, as in contact
 //   cells     tetrahedra of a cube, the same
+//   springs   of those tetrahedra; volumes: with the volume terms that msm has by default; tilted, relaxing:
+//             with extra coordinates, with branches
 //   body      steps of a body of tetrahedra through the model's own functions, arrays of the host included
 // The bytes of a sub-step count each array once: what other points' places and velocities cost beyond that is
 // up to the cache. `gpu_bench --device software` takes a software driver, --most N bodies of up to N springs
@@ -102,13 +104,12 @@ struct Lattice {
 struct Block {
   std::vector<double> x, mass, weights;
   std::vector<uint32_t> cells, edges, rows, points;
-  double params[kParamCount] = {1e5, 1e-4, 0, 0, 0.3};
   dfm_mesh mesh{};
   uint32_t npoint() const { return uint32_t(x.size() / 3); }
   explicit Block(uint32_t side);
 };
 
-void start(const std::vector<double> &x, double inverse_mass, Stepper &s) {
+void start(const Parts &of, const std::vector<double> &x, double inverse_mass, Stepper &s) {
   std::mt19937 random(2);
   std::uniform_real_distribution<double> u(-1, 1);
   for (uint32_t i = 0; i < x.size() / 3; ++i) {
@@ -118,22 +119,41 @@ void start(const std::vector<double> &x, double inverse_mass, Stepper &s) {
     s.seen[i] = s.speed[i];
     s.load[i] = {0, 0, -9.81, 0.1};
   }
+  std::fill_n(s.stretch, of.branches.room, 0.0);
 }
 
 constexpr double kOfSpring = sizeof(uvec4), kOfPoint = sizeof(uvec2) + 5 * sizeof(dvec4);  // bytes
 // A cell's corners, shape, and forces there and back; its points are read once more.
 constexpr double kOfCell = 3 * sizeof(uvec4) + (3 + 2 * 4) * sizeof(dvec4);
 constexpr double kMoreOfPoint = sizeof(double) + sizeof(dvec4);
+constexpr double kOfVolume = 3 * sizeof(uvec4) + (1 + 2 * 4) * sizeof(dvec4);
 
 double gigabytes(const Springs &of, float) {
-  return 1e-9 * (2 * kOfSpring * of.count() + kOfPoint * of.npoint);
+  const double end = kOfSpring + (of.edge_tilt.empty() ? 0 : sizeof(uvec2)) +
+                     (of.branches.n ? 2 * sizeof(double) : 0),
+               cells = of.cells_on ? kOfVolume * of.ncell + (kMoreOfPoint + sizeof(uvec2)) * of.npoint : 0;
+  return 1e-9 * (2 * end * of.count() + kOfPoint * of.npoint + cells);
 }
 double gigabytes(const Cells &of, float damping) {
   const double speeds = damping > 0 ? sizeof(dvec4) : 0;
   return 1e-9 * (kOfCell * of.count() + (kOfPoint + kMoreOfPoint + speeds) * of.npoint);
 }
 
+// The defaults of a model, and what is not.
+template <class Of>
+std::vector<double> values_of(std::initializer_list<std::pair<uint32_t, double>> own) {
+  std::vector<double> out;
+  for (const dfm_param &row : Of::kRows.of) out.insert(out.end(), row.width, row.def);
+  for (const auto &[at, value] : own) out[at] = value;
+  return out;
+}
+constexpr double kDamping = 1e-4;  // s
+
 constexpr double kStep = 1e-4;  // s, stable on the lattice and in the cells
+
+Dampers dampers_of(const Parts &of, float damping) {
+  return {damping, 0, of.branches.part, of.branches.time};
+}
 
 // m, how far a point of the device is from that of the reference after some sub-steps, at most.
 template <class Of>
@@ -144,8 +164,8 @@ double difference(const Of &parts, const std::vector<double> &x, double inverse_
   const uint32_t n = parts.count() > 500000 ? 4 : 100;
   double most = 0;
   for (Stepper *s : {static_cast<Stepper *>(&device), static_cast<Stepper *>(&processor)}) {
-    start(x, inverse_mass, *s);
-    if (const char *why = s->run(n, kStep, {damping}, true, true)) std::printf("%s\n", why);
+    start(parts, x, inverse_mass, *s);
+    if (const char *why = s->run(n, kStep, dampers_of(parts, damping), true, true)) std::printf("%s\n", why);
     if (s->highest() * kStep > 1) std::printf("%g 1/s: too long a step\n", double(s->highest()));
   }
   for (uint32_t i = 0; i < parts.npoint; ++i) {
@@ -183,9 +203,10 @@ void passes(const char *kind, const Of &parts, const std::vector<double> &x, dou
   for (const float damping : {0.0f, 1e-4f}) {
     const double off = difference(parts, x, inverse_mass, s, damping);
     const auto row = [&](const char *what, uint32_t n, bool moved, bool loaded) {
-      start(x, inverse_mass, s);
-      s.run(1, kStep, {damping}, true, true);
-      const double step = time_of([&] { s.run(n, kStep, {damping}, moved, loaded); }) / n;
+      start(parts, x, inverse_mass, s);
+      const Dampers dampers = dampers_of(parts, damping);
+      s.run(1, kStep, dampers, true, true);
+      const double step = time_of([&] { s.run(n, kStep, dampers, moved, loaded); }) / n;
       const double rate = parts.count() / step, speed = gigabytes(parts, damping) / step;
       std::printf(
           "%s: %-15s %8u %7u points %s %9.3f us a sub-step, %8.3g/s, %6.1f GB/s, %3.0f %% of a copy, %.2g m "
@@ -251,7 +272,6 @@ Block::Block(uint32_t side) {
   mesh.rest = x.data();
   mesh.cells = cells.data();
   mesh.mass = mass.data();
-  mesh.params = params;
   mesh.nedge = uint32_t(pairs.size());
   mesh.edges = edges.data();
   mesh.nsurfel = uint32_t(points.size());
@@ -261,9 +281,20 @@ Block::Block(uint32_t side) {
 }
 
 template <class Of>
-void body(const char *kind, Block &block, Choice choice, const std::string &name, double copy,
-          bench::Csv &out) {
-  block.params[kDevice] = choice;
+void passes_of(const char *kind, Block &block, const std::vector<double> &values,
+               const std::shared_ptr<Vulkan> &vulkan, double copy, bench::Csv &out) {
+  block.mesh.params = values.data();
+  Of parts;
+  parts.create(&host, block.mesh);
+  parts.fill(values.data());
+  passes(kind, parts, block.x, 1000, vulkan, copy, out);
+}
+
+template <class Of>
+void body(const char *kind, Block &block, std::vector<double> values, Choice choice, const std::string &name,
+          double copy, bench::Csv &out) {
+  values[Of::kDevice] = choice;
+  block.mesh.params = values.data();
   const uint32_t n = block.npoint();
   Body<Of> b;
   const double made = seconds([&] { b.create(&host, block.mesh); });
@@ -295,8 +326,8 @@ void body(const char *kind, Block &block, Choice choice, const std::string &name
                 kind, steps, count, n, 1e6 * step, steps / step, made);
     if (out.csv)
       std::fprintf(out.csv, "%s,%s,%s,%.0f,%u,%g,%u,%.4f,%.4g,,%.1f,\n", out.head.c_str(),
-                   bench::quoted(name).c_str(), kind, count, n, block.params[kDampingStiffness], steps,
-                   1e6 * step / steps, rate, copy);
+                   bench::quoted(name).c_str(), kind, count, n, kDamping, steps, 1e6 * step / steps, rate,
+                   copy);
   }
 }
 
@@ -325,13 +356,25 @@ int main(int argc, char **argv) {
       if (6.0 * side * side * side > most) continue;
       Block block(side);
       if (cells) {
-        Cells parts;
-        parts.create(&host, block.mesh);
-        parts.fill(block.params);
-        passes("cells", parts, block.x, 1000, vulkan, copy, out);
-        body<Cells>("body of cells", block, choice, vulkan->name, copy, out);
+        const auto values = values_of<Cells>({{Cells::kDampingStiffness, kDamping}});
+        passes_of<Cells>("cells", block, values, vulkan, copy, out);
+        body<Cells>("body of cells", block, values, choice, vulkan->name, copy, out);
       }
-      if (springs) body<Springs>("body", block, choice, vulkan->name, copy, out);
+      if (springs) {
+        const std::pair<uint32_t, double> damped{msm::kDampingStiffness, kDamping},
+            no_volume{msm::kVolume, 0}, no_collapse{msm::kCollapse, 0};
+        const auto alone = values_of<Springs>({damped, no_volume, no_collapse}),
+                   whole = values_of<Springs>({damped});
+        passes_of<Springs>("springs", block, alone, vulkan, copy, out);
+        passes_of<Springs>("volumes", block, whole, vulkan, copy, out);
+        passes_of<Springs>("tilted", block, values_of<Springs>({no_volume, no_collapse, {msm::kSlope, 1}}),
+                           vulkan, copy, out);
+        passes_of<Springs>("relaxing", block,
+                           values_of<Springs>({no_volume, no_collapse, {msm::kDamper, msm::kStandardLinear}}),
+                           vulkan, copy, out);
+        body<Springs>("body", block, alone, choice, vulkan->name, copy, out);
+        body<Springs>("body with volumes", block, whole, choice, vulkan->name, copy, out);
+      }
     }
   } catch (const std::string &why) {
     std::printf("no figures: %s\n", why.c_str());

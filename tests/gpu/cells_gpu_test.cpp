@@ -1,4 +1,4 @@
-// What only the cells of the plugin model_gpu have: frames in every shape, and a bound that depends on it.
+// What cells of the plugin model_gpu have: forces in every shape, and a bound that depends on it.
 #include "gpu_host.h"
 
 namespace {
@@ -28,13 +28,21 @@ void take_shape(Body &b, const std::array<Vec, 3> &to) {
   }
 }
 
+// s, of the worst shape of the last step, as the state has it.
+double stable_at_last(const Stepper &b) { return b.state[3 * size_t(b.size())]; }
+
+class Drawn : public testing::TestWithParam<uint32_t> {};
+INSTANTIATE_TEST_SUITE_P(Models, Drawn,
+                         testing::Values(kSprings, kCells, kSofter, kStiffer, kMaxwell, kSls, kAll),
+                         [](const auto &one) { return kNames[one.param]; });
+
 // Forces and dampers of one sub-step, also where the kernel finds the frame in its second way.
-TEST(CorotationalFemGpu, InEveryShape_MovesAsTheProcessorsModel) {
+TEST_P(Drawn, InEveryShape_MovesAsTheProcessorsModel) {
   for (const auto &shape : shapes()) {
     const Params p = {{"young", 2e5}, {"poisson", 0.4}, {"damping_stiffness", 1e-4}, {"damping_mass", 0.5}};
-    Bodies b(kCells, bar(), p);
+    Bodies b(GetParam(), bar(), p);
     NEEDS_DRIVER(b);
-    Plain plain(b.host, kCells, bar(), p);
+    Plain plain(b.host, GetParam(), bar(), p);
     ASSERT_EQ(plain.status, DFM_OK) << b.host.logged;
     take_shape(plain, shape);
     plain.shake(1e-5, 0.2);
@@ -86,8 +94,8 @@ TEST(CorotationalFemGpu, Bound_IsThatOfTheProcessorsModelInEveryShape) {
 
 // A sheet that is drawn to twice its size is stiffer than at rest: a step is taken again in shorter parts,
 // and nothing tells it from those.
-TEST(CorotationalFemGpu, DrawnFar_TakesShorterSubSteps) {
-  Bodies b(kCells, bar(), {{"poisson", 0.45}}), parts(kCells, bar(), {{"poisson", 0.45}});
+TEST_P(Drawn, DrawnFar_TakesShorterSubSteps) {
+  Bodies b(GetParam(), bar(), {{"poisson", 0.45}}), parts(GetParam(), bar(), {{"poisson", 0.45}});
   NEEDS_DRIVER(b);
   const auto wide = shapes()[4];
   const double h = fact(*b.device, "longest_step");
@@ -98,8 +106,10 @@ TEST(CorotationalFemGpu, DrawnFar_TakesShorterSubSteps) {
   }
   b.device->step();
   int n = 2;
+  const std::vector<double> initial = parts.device->state;
   for (bool same = false; !same && n < 20; n += !same) {
     Stepper &part = *parts.device;
+    part.state = initial;
     take_shape(part, wide);
     std::fill(part.v, part.v + 4 * size_t(part.size()), 0.0);
     part.shake(1e-4, 0.1);
@@ -112,11 +122,11 @@ TEST(CorotationalFemGpu, DrawnFar_TakesShorterSubSteps) {
 
 // Between two walls that hold it at 2.5 times its length: in steps that are not taken again the energy is
 // 40 times as high after 2,000 of them, and not finite soon after.
-TEST(CorotationalFemGpu, HeldFarDrawn_StaysStable) {
+TEST_P(Drawn, HeldFarDrawn_StaysStable) {
   const Mesh m = bar();
   std::vector<uint8_t> ends(m.npoint(), 0);
   for (uint32_t i = 0; i < m.npoint(); ++i) ends[i] = m.at(i)[0] < 1e-9 || m.at(i)[0] > 0.08 - 1e-9 ? 7 : 0;
-  Bodies b(kCells, m, {{"poisson", 0.45}}, ends);
+  Bodies b(GetParam(), m, {{"poisson", 0.45}}, ends);
   Stepper &body = *b.processor;
   take_shape(body, {{{2.5, 0, 0}, {0, 0.75, 0}, {0, 0, 0.75}}});
   body.dt = fact(body, "longest_step");
@@ -130,28 +140,32 @@ TEST(CorotationalFemGpu, HeldFarDrawn_StaysStable) {
 }
 
 // The step bound of the shape, as the kernel finds it and as the rows of bound() give it.
-TEST(CorotationalFemGpu, State_IsTheStepOfTheRowsInEveryShape) {
+TEST_P(Drawn, State_IsTheStepOfTheRowsInEveryShape) {
   for (const auto &shape : shapes()) {
     const Mesh m = bar();
-    Bodies b(kCells, m, {{"poisson", 0.45}, {"damping_stiffness", 1e-4}, {"damping_mass", 0.5}}, clamp_of(m));
+    Bodies b(GetParam(), m, {{"poisson", 0.45}, {"damping_stiffness", 1e-4}, {"damping_mass", 0.5}},
+             clamp_of(m));
     NEEDS_DRIVER(b);
     for (Stepper *each : {b.device.get(), b.processor.get()}) {
       take_shape(*each, shape);
       const double stable = stable_step(*each, clamp_of(m));
       each->dt = 1e-4 * stable;
       each->step();
-      EXPECT_NEAR(each->state.back(), stable, 1e-5 * stable) << shape[0][0] << " " << shape[2][2];
-      EXPECT_NEAR(stable_step(*each, clamp_of(m)), each->state.back(), 1e-9 * stable);
+      EXPECT_NEAR(stable_at_last(*each), stable, 1e-5 * stable) << shape[0][0] << " " << shape[2][2];
+      EXPECT_NEAR(stable_step(*each, clamp_of(m)), stable_at_last(*each), 1e-9 * stable);
     }
   }
 }
 
 // The first step finds that the shape asks for shorter sub-steps, and those after it begin with them.
-TEST(CorotationalFemGpu, StaysFarDrawn_TakesNoOtherStepTwice) {
+class Held : public Drawn {};
+INSTANTIATE_TEST_SUITE_P(Models, Held, testing::Values(kSprings, kCells),
+                         [](const auto &one) { return kNames[one.param]; });
+TEST_P(Held, StaysFarDrawn_TakesNoOtherStepTwice) {
   const Mesh m = bar();
   std::vector<uint8_t> ends(m.npoint(), 0);
   for (uint32_t i = 0; i < m.npoint(); ++i) ends[i] = m.at(i)[0] < 1e-9 || m.at(i)[0] > 0.08 - 1e-9 ? 7 : 0;
-  Bodies b(kCells, m, {{"poisson", 0.45}, {"damping_stiffness", 1e-4}}, ends);
+  Bodies b(GetParam(), m, {{"poisson", 0.45}, {"damping_stiffness", 1e-4}}, ends);
   Stepper &body = *b.processor;
   take_shape(body, {{{2.5, 0, 0}, {0, 0.75, 0}, {0, 0, 0.75}}});
   body.dt = 40 * fact(body, "longest_step");
@@ -163,8 +177,8 @@ TEST(CorotationalFemGpu, StaysFarDrawn_TakesNoOtherStepTwice) {
   };
   int again = 0;
   for (int n = 0; n < 50; ++n) {
-    const double stable =
-        std::min(body.state.back() > 0 ? body.state.back() : HUGE_VAL, fact(body, "longest_step") / 0.9);
+    const double stable = std::min(stable_at_last(body) > 0 ? stable_at_last(body) : HUGE_VAL,
+                                   fact(body, "longest_step") / 0.9);
     const uint32_t once = 2 * uint32_t(std::ceil(body.dt / (0.9 * stable) - 1e-6)) + 3;
     passes = 0;
     body.step();
@@ -175,8 +189,8 @@ TEST(CorotationalFemGpu, StaysFarDrawn_TakesNoOtherStepTwice) {
 }
 
 // The device says when a step was too long as the processor does.
-TEST(CorotationalFemGpu, DrawnFarOnTheSoftwareDriver_HasTheBitsOfTheReference) {
-  Bodies b(kCells, bar(), {{"poisson", 0.45}, {"damping_stiffness", 1e-5}}, {}, software);
+TEST_P(Drawn, DrawnFarOnTheSoftwareDriver_HasTheBitsOfTheReference) {
+  Bodies b(GetParam(), bar(), {{"poisson", 0.45}, {"damping_stiffness", 1e-5}}, {}, software);
   NEEDS_DRIVER(b);
   for (Stepper *each : {b.device.get(), b.processor.get()}) {
     take_shape(*each, shapes()[4]);
@@ -195,8 +209,9 @@ TEST(CorotationalFemGpu, FieldsByCell_AreThoseOfTheProcessorsModel) {
     fields["poisson"].push_back(0.1 * (c % 5));
   }
   Host host;
-  const std::vector<double> row = row_of(gpu(kCells), {{"device", reference}}), none = Plain::row(kCells, {});
-  ModelInstance own(host, gpu(kCells), m, row, 4, fields), plain(host, Plain::of(kCells), m, none, 4, fields);
+  const std::vector<double> row = row_of(gpu(kCells), {{"device", reference}}),
+                            none = row_of(cpu(kCells), {});
+  ModelInstance own(host, gpu(kCells), m, row, 4, fields), plain(host, cpu(kCells), m, none, 4, fields);
   ASSERT_EQ(own.status, DFM_OK) << host.logged;
   for (ModelInstance *each : {&own, &plain}) each->shake(1e-3, 0);
   EXPECT_NEAR(own.energy(), plain.energy(), 1e-10 * plain.energy());

@@ -9,9 +9,24 @@ namespace gpu_test {
 using namespace stepper_test;
 
 enum Device { automatic, hardware, software, reference };
-// Models of the plugin, and what they are models of.
-enum Which : uint32_t { kSprings, kCells };
-inline const dfm_type &gpu(uint32_t which) { return type_of("model_gpu", which); }
+// Models of the plugin, and what they are models of: springs as msm has them by default, by themselves, with
+// extra coordinates, with branches, with both; cells.
+enum Which : uint32_t { kSprings, kCells, kAlone, kSofter, kStiffer, kMaxwell, kSls, kAll };
+constexpr const char *kNames[] = {"springs", "cells", "alone", "softer", "stiffer", "maxwell", "sls", "all"};
+inline const dfm_type &gpu(uint32_t which) { return type_of("model_gpu", which == kCells); }
+inline const dfm_type &cpu(uint32_t which) {
+  return type_of(which == kCells ? "model_corotational_fem" : "model_msm");
+}
+inline Params with(uint32_t which, Params p) {
+  if (which == kAlone) p["volume"] = p["collapse"] = 0;
+  if (which == kSofter || which == kStiffer || which == kAll) p["anisotropy_slope"] = 2;
+  if (which == kStiffer) p["anisotropy_kind"] = 1;
+  if (which == kMaxwell || which == kSls || which == kAll) {
+    p["damper"] = which == kMaxwell ? 1 : 2;
+    p["relaxation_time"] = 0.02;
+  }
+  return p;
+}
 
 // A body on the device and on the processor. Without a driver the test is skipped; where Mesa's software
 // driver is installed, it fails.
@@ -22,6 +37,7 @@ struct Bodies {
   Bodies(uint32_t which, const Mesh &m, Params p = {}, const std::vector<uint8_t> &fixed = {},
          Device on = automatic)
       : mesh(m) {
+    p = with(which, p);
     p["device"] = on;
     device = std::make_unique<Stepper>(host, gpu(which), mesh, p, fixed);
     p["device"] = reference;
@@ -60,20 +76,13 @@ struct Plain : ModelInstance {
   Vec gravity{};
   std::vector<uint8_t> held;
   Plain(Host &h, uint32_t which, const Mesh &m, const Params &p, std::vector<uint8_t> fixed = {})
-      : ModelInstance(h, of(which), m, row(which, p), 4, {}, fixed), held(std::move(fixed)) {
+      : ModelInstance(h, cpu(which), m, row_of(cpu(which), with(which, p)), 4, {}, fixed),
+        held(std::move(fixed)) {
     held.resize(m.npoint());
   }
-  static const dfm_type &of(uint32_t which) {
-    return type_of(which == kCells ? "model_corotational_fem" : "model_msm");
-  }
-  static std::vector<double> row(uint32_t which, Params p) {
-    if (which == kSprings) p["volume"] = p["collapse"] = 0;
-    std::vector<double> values = row_of(of(which), p);
-    values.resize(values.size() + 2, 1.0);  // the axis, which is three wide
-    return values;
-  }
   void sub_step(double h) {
-    forces();
+    dt = h;
+    forces_and_step();
     for (uint32_t i = 0; i < size(); ++i) {
       if (!held[i]) set(v, i, get(v, i) + h * ((1 / mesh.mass[i]) * get(f, i) + gravity));
       set(x, i, get(x, i) + h * get(v, i));

@@ -7,8 +7,16 @@ namespace {
 using namespace gpu_test;
 
 class Gpu : public testing::TestWithParam<uint32_t> {};
-INSTANTIATE_TEST_SUITE_P(Models, Gpu, testing::Values(uint32_t(kSprings), uint32_t(kCells)),
-                         [](const auto &one) { return one.param == kCells ? "cells" : "springs"; });
+INSTANTIATE_TEST_SUITE_P(Models, Gpu, testing::Range(0u, uint32_t(std::size(kNames))),
+                         [](const auto &one) { return kNames[one.param]; });
+
+// Those that have a period.
+class Swinging : public Gpu {};
+INSTANTIATE_TEST_SUITE_P(Models, Swinging, testing::Values(kSprings, kCells, kAlone, kSofter),
+                         [](const auto &one) { return kNames[one.param]; });
+class Damped : public Gpu {};
+INSTANTIATE_TEST_SUITE_P(Models, Damped, testing::Values(kCells, kAlone),
+                         [](const auto &one) { return kNames[one.param]; });
 
 // Neither a number of points that fills groups, nor one that does not.
 TEST_P(Gpu, OnTheSoftwareDriver_HasTheBitsOfTheReference) {
@@ -78,7 +86,7 @@ TEST_P(Gpu, LongStep_IsThatOfItsSubSteps) {
   while (longest > fact(*b.device, "longest_step")) longest /= 2;
   constexpr int kParts = 2048;  // and no rounding in h / n
   for (Stepper *each : {b.device.get(), parts.device.get()}) {
-    each->shake(2e-3, 0.3);
+    each->shake(2e-4, 0.3);
     each->pull({0, 0, -9.81});
   }
   b.device->dt = longest * kParts;
@@ -98,9 +106,9 @@ TEST_P(Gpu, SubStep_IsThatOfTheProcessorsModel) {
   const Mesh m = read_msh(test::mesh_dir() + "/bars/bar_u3.msh");
   const double young = 2e5, damping = 1e-4, drag = 0.5;
   Host host;
-  Stepper b(
-      host, gpu(GetParam()), m,
-      {{"young", young}, {"damping_stiffness", damping}, {"damping_mass", drag}, {"device", reference}});
+  Params own = with(GetParam(), {{"young", young}, {"damping_stiffness", damping}, {"damping_mass", drag}});
+  own["device"] = reference;
+  Stepper b(host, gpu(GetParam()), m, own);
   Plain plain(host, GetParam(), m,
               {{"young", young}, {"damping_stiffness", damping}, {"damping_mass", drag}});
   ASSERT_EQ(b.status, DFM_OK) << host.logged;
@@ -146,7 +154,7 @@ TEST_P(Gpu, StepOfTheBound_IsOneSubStep) {
   }
 }
 
-TEST_P(Gpu, StretchedBar_HasThePeriodOfTheProcessorsModel) {
+TEST_P(Swinging, StretchedBar_HasThePeriodOfTheProcessorsModel) {
   const Mesh m = kuhn_bar(12, 2, 2, 0.02);
   const double young = 1e6;
   Bodies b(GetParam(), m, {{"young", young}}, clamp_of(m));
@@ -165,14 +173,16 @@ TEST_P(Gpu, StretchedBar_HasThePeriodOfTheProcessorsModel) {
       period([&] { b.device->step(); }, [&] { return b.device->get(b.device->x, tip)[0] - m.at(tip)[0]; }, h);
   const double processor =
       period([&] { plain.sub_step(h); }, [&] { return plain.get(plain.x, tip)[0] - m.at(tip)[0]; }, h);
-  // of a slender rod: 4 l / sqrt(E / rho)
-  EXPECT_NEAR(processor, 4 * 0.24 / std::sqrt(young / 1000), 0.05 * processor);
+  // of a slender rod: 4 l / sqrt(E / rho); a volume term makes this mesh of cubes stiffer
+  if (GetParam() == kCells || GetParam() == kAlone) {
+    EXPECT_NEAR(processor, 4 * 0.24 / std::sqrt(young / 1000), 0.05 * processor);
+  }
   EXPECT_NEAR(device, processor, 1e-6 * processor);
 }
 
 // The lag of the dampers allows sub-steps that dampers which see the velocity do not, and takes 2 % of the
 // first mode's damping at most.
-TEST_P(Gpu, StiffDampers_SlowTheFirstModeAsInShortSteps) {
+TEST_P(Damped, StiffDampers_SlowTheFirstModeAsInShortSteps) {
   const Mesh m = kuhn_bar(12, 2, 2, 0.02);
   const double w = 1.5707963267948966 / 0.24 * std::sqrt(1e6 / 1000);  // rad/s
   const Params p = {{"young", 1e6}, {"damping_stiffness", 2 * 0.1 / w}};
@@ -210,7 +220,7 @@ TEST_P(Gpu, StiffDampers_SlowTheFirstModeAsInShortSteps) {
   EXPECT_LT(off, 0.03 * most);
 }
 
-TEST_P(Gpu, HangingBar_SagsAsTheProcessorsModel) {
+TEST_P(Swinging, HangingBar_SagsAsTheProcessorsModel) {
   const Mesh m = kuhn_bar(8, 2, 2, 0.02);
   const double young = 5e4, drag = 60;
   Bodies b(GetParam(), m, {{"young", young}, {"damping_mass", drag}}, clamp_of(m));
@@ -229,6 +239,39 @@ TEST_P(Gpu, HangingBar_SagsAsTheProcessorsModel) {
   EXPECT_LT(norm(b.device->get(b.device->v, tip)), 1e-8);
 }
 
+// What branches have stretched is theirs, not the spring's: after some relaxation times the body has crept,
+// by steps of several lengths, as on the processor.
+TEST(MsmGpu, HangingBarWithBranches_CreepsAsTheProcessorsModel) {
+  const Mesh m = kuhn_bar(6, 2, 2, 0.02);
+  for (const Which which : {kMaxwell, kSls}) {
+    const Params p = {{"young", 5e5}, {"damping_mass", 60}, {"damping_stiffness", 1e-5}};
+    Bodies b(which, m, p, clamp_of(m));
+    NEEDS_DRIVER(b);
+    Plain plain(b.host, which, m, p, clamp_of(m));
+    plain.gravity = {9.81, 0, -1};
+    double longest = 1;
+    while (longest > fact(*b.device, "longest_step")) longest /= 2;
+    for (Stepper *each : {b.device.get(), b.processor.get()}) {
+      each->pull(plain.gravity);
+      for (int n = 0; n < 40; ++n) {
+        each->dt = n % 2 ? longest : 32 * longest;
+        each->step();
+      }
+    }
+    const int parts = int(std::ceil(32 * longest / fact(*b.device, "longest_step") - 1e-9));
+    for (int n = 0; n < 40; ++n)
+      for (int k = 0; k < (n % 2 ? 1 : parts); ++k) plain.sub_step(n % 2 ? longest : 32 * longest / parts);
+    expect_same_bits(*b.device, *b.processor, "40 steps");
+    const uint32_t tip = m.npoint() - 1;
+    const Vec sag = plain.get(plain.x, tip) - m.at(tip);
+    EXPECT_GT(norm(sag), 1e-5);
+    EXPECT_LE(norm(b.device->get(b.device->x, tip) - plain.get(plain.x, tip)), 1e-6 * norm(sag));
+    EXPECT_NEAR(b.device->energy(), plain.energy(), 1e-5 * plain.energy());
+    for (size_t e = 0; e < plain.state.size(); ++e)
+      EXPECT_NEAR(b.device->state[3 * size_t(m.npoint()) + 1 + e], plain.state[e], 1e-6);
+  }
+}
+
 // A force has the same bits at both ends of its spring and lies along it.
 TEST_P(Gpu, FreeBody_KeepsItsMomenta) {
   const Mesh m = kuhn_bar(5, 3, 3, 0.02, 0.2);
@@ -241,12 +284,12 @@ TEST_P(Gpu, FreeBody_KeepsItsMomenta) {
   const Vec momentum = body.momentum(), turning = body.angular_momentum(), middle = axis_sum(body, body.x);
   for (int n = 0; n < 1000; ++n) body.step();
   EXPECT_LE(norm(body.momentum() - momentum), 1e-12 * norm(momentum));
-  EXPECT_LE(norm(body.angular_momentum() - turning), 1e-11 * norm(turning));
+  EXPECT_LE(norm(body.angular_momentum() - turning), 1e-12 * norm(turning));
   EXPECT_LE(norm(axis_sum(body, body.x) - middle - 1000 * body.dt * momentum), 1e-11 * norm(momentum));
 }
 
 // A thousand steps of a body without damping; the scheme's own swing is h omega / 2 at most.
-TEST_P(Gpu, UndampedBody_KeepsItsEnergy) {
+TEST_P(Swinging, UndampedBody_KeepsItsEnergy) {
   const Mesh m = kuhn_bar(5, 3, 3, 0.02, 0.2);
   Bodies b(GetParam(), m);
   Stepper &body = *b.processor;
@@ -301,24 +344,35 @@ double largest_eigenvalue(Plain &b, double shift) {
   return found - shift;
 }
 
-// Rows count every shape: torn out to three times its length, sheared, crushed.
-TEST(MsmGpu, LongestStep_IsStableInEveryShape) {
+// Rows count every shape: torn out to three times its length, sheared, crushed, turned inside out. Springs
+// have the same in all of them, cells those of the shape.
+TEST(MsmGpu, StepOfTheShape_IsStableThere) {
   const Mesh m = kuhn_bar(4, 3, 3, 0.02, 0.2);
-  Bodies b(kSprings, m);
-  const double h = fact(*b.processor, "longest_step"), most = 4 / (h * h);
-  double highest = 0;
-  for (const Vec size : {Vec{1, 1, 1}, Vec{3, 3, 3}, Vec{3, 0.3, 1}, Vec{0.5, 0.5, 0.5}, Vec{1, 1, 0}}) {
-    Plain plain(b.host, kSprings, m, {});
-    for (uint32_t i = 0; i < m.npoint(); ++i) {
-      const Vec x = m.at(i);
-      plain.set(plain.x, i, {size[0] * x[0] + 0.5 * x[1], size[1] * x[1], size[2] * x[2]});
+  const std::vector<uint8_t> free(m.npoint(), 0);
+  const Params p = {{"poisson", 0.45}};
+  for (const Which which : {kAlone, kSprings, kSofter, kStiffer}) {
+    double highest = 0;
+    for (const Vec size :
+         {Vec{1, 1, 1}, Vec{3, 3, 3}, Vec{3, 0.3, 1}, Vec{0.5, 0.5, 0.5}, Vec{1, 1, 0}, Vec{1, 1, -1}}) {
+      Bodies b(which, m, p);
+      Plain plain(b.host, which, m, p);
+      for (ModelInstance *each :
+           {static_cast<ModelInstance *>(&plain), static_cast<ModelInstance *>(b.processor.get())}) {
+        for (uint32_t i = 0; i < m.npoint(); ++i) {
+          const Vec x = m.at(i);
+          each->set(each->x, i, {size[0] * x[0] + 0.5 * x[1], size[1] * x[1], size[2] * x[2]});
+        }
+        each->shake(1e-3, 0);
+      }
+      const double h = stable_step(*b.processor, free), most = 4 / (h * h);
+      EXPECT_LE(h, fact(*b.processor, "longest_step") / (which == kAlone ? 1 : 0.9) * (1 + 1e-9));
+      const double now = largest_eigenvalue(plain, 4 * most);
+      EXPECT_LE(now, most) << kNames[which] << " " << size[0] << " " << size[1] << " " << size[2];
+      highest = std::max(highest, now / most);
     }
-    plain.shake(1e-3, 0);
-    const double now = largest_eigenvalue(plain, 4 * most);
-    EXPECT_LE(now, most) << size[0] << " " << size[1] << " " << size[2];
-    highest = std::max(highest, now);
+    // and no step that is much too short: rows count a tilted spring as one that is not
+    EXPECT_GT(highest, which == kAlone || which == kSprings ? 0.4 : 0.3) << kNames[which];
   }
-  EXPECT_GT(highest, 0.4 * most);  // and no step that is much too short
 }
 
 TEST_P(Gpu, ParametersInRange_MayChangeAndOthersAreRefused) {
@@ -326,7 +380,7 @@ TEST_P(Gpu, ParametersInRange_MayChangeAndOthersAreRefused) {
   Bodies b(GetParam(), m, {{"young", 1e5}}), stiff(GetParam(), m, {{"young", 4e5}});
   NEEDS_DRIVER(b);
   const double longest = fact(*b.device, "longest_step");
-  std::vector<double> row = row_of(gpu(GetParam()), {{"young", 4e5}});
+  std::vector<double> row = row_of(gpu(GetParam()), with(GetParam(), {{"young", 4e5}}));
   ASSERT_EQ(b.device->ops->set_params(b.device->self, row.data()), DFM_OK);
   EXPECT_NEAR(fact(*b.device, "longest_step"), longest / 2, 1e-12 * longest);
   for (Stepper *each : {b.device.get(), stiff.device.get()}) {
@@ -336,6 +390,76 @@ TEST_P(Gpu, ParametersInRange_MayChangeAndOthersAreRefused) {
   expect_same_bits(*b.device, *stiff.device, "after a change");
   row[1] = -1;
   EXPECT_EQ(b.device->ops->set_params(b.device->self, row.data()), DFM_E_ARG);
+}
+
+// Cells get their terms, springs their tilts, where there were none, and lose them again.
+TEST(MsmGpu, TermsThatComeAndGo_AreThoseOfABodyThatHasThem) {
+  const Mesh m = kuhn_bar(3, 3, 3, 0.02, 0.2);
+  Bodies b(kAlone, m);
+  NEEDS_DRIVER(b);
+  for (const Params &p : {Params{{"volume", 2}, {"poisson", 0.4}, {"collapse", 0}}, Params{},
+                          Params{{"anisotropy_slope", 2}, {"collapse", 5}, {"volume", 0}},
+                          Params{{"volume", 0}, {"collapse", 0}}}) {
+    const std::vector<double> values = row_of(gpu(kSprings), p);
+    Bodies fresh(kSprings, m, p);
+    for (Stepper *each : {b.device.get(), b.processor.get()}) {
+      ASSERT_EQ(each->ops->set_params(each->self, values.data()), DFM_OK) << b.host.logged;
+      for (uint32_t i = 0; i < m.npoint(); ++i) each->set(each->x, i, m.at(i));
+      std::fill(each->v, each->v + 4 * size_t(m.npoint()), 0.0);
+      std::fill(each->state.begin(), each->state.end(), 0.0);
+    }
+    for (Stepper *each : {b.device.get(), b.processor.get(), fresh.device.get(), fresh.processor.get()}) {
+      each->shake(1e-3, 0.1);
+      for (int n = 0; n < 3; ++n) each->step();
+    }
+    expect_same_bits(*b.device, *fresh.device, "on the device");
+    expect_same_bits(*b.processor, *fresh.processor, "on the processor");
+  }
+}
+
+// What may come by cell does so for the device, too.
+TEST(MsmGpu, FieldsByCell_MoveAsTheProcessorsModel) {
+  const Mesh m = kuhn_bar(4, 3, 3, 0.02, 0.2);
+  Fields fields;
+  for (uint32_t c = 0; c < m.ncell(); ++c) {
+    fields["young"].push_back(1e5 * (1 + c % 3));
+    fields["poisson"].push_back(0.1 * (c % 5));
+    fields["volume"].push_back(c % 4);
+    fields["collapse"].push_back(c % 3);
+    fields["damping_stiffness"].push_back(c % 2 ? 1e-4 : 0);
+    fields["damping_mass"].push_back(c % 5);
+    fields["anisotropy_slope"].push_back(0.5 * (c % 4));
+    for (const double a : {1.0, double(c % 2), -0.5}) fields["anisotropy_axis"].push_back(a);
+  }
+  Host host;
+  ModelInstance own(host, gpu(kSprings), m, row_of(gpu(kSprings), {{"device", reference}}), 4, fields),
+      plain(host, cpu(kSprings), m, row_of(cpu(kSprings), {}), 4, fields);
+  ASSERT_EQ(own.status, DFM_OK) << host.logged;
+  const double h = own.dt = 1e-6;
+  for (ModelInstance *each : {&own, &plain}) each->shake(1e-3, 0.2);
+  EXPECT_NEAR(own.energy(), plain.energy(), 1e-10 * plain.energy());
+  const auto *ops = static_cast<const dfm_stepper *>(own.ops->extension(own.self, "dfm.stepper/1"));
+  std::vector<double> u(3 * size_t(m.npoint())), none(u), x(4 * size_t(m.npoint())), v(x);
+  dfm_kin k = own.kin();
+  k.state_out = own.state_out.data();
+  ASSERT_EQ(ops->predict(own.self, &k, own.f, u.data()), DFM_OK) << host.logged;
+  ASSERT_EQ(ops->commit(own.self, &k, none.data(), x.data(), v.data()), DFM_OK);
+  plain.forces();
+  double most = 0, off = 0;
+  for (uint32_t i = 0; i < m.npoint(); ++i) {
+    const Vec change = (h / m.mass[i]) * plain.get(plain.f, i), before = plain.get(plain.v, i);
+    most = std::max(most, norm(change));
+    off = std::max(off, norm(own.get(v.data(), i) - (before + change)));
+  }
+  EXPECT_GT(most, 1e-5);
+  EXPECT_LE(off, 1e-6 * most);
+}
+
+TEST(MsmGpu, FormA_IsRefused) {
+  Host host;
+  Stepper none(host, gpu(kSprings), kuhn_bar(2, 2, 2, 0.02), {{"anisotropy_form", 1}, {"device", reference}});
+  EXPECT_EQ(none.status, DFM_E_ARG);
+  EXPECT_NE(host.logged.find("anisotropy_form A"), std::string::npos) << host.logged;
 }
 
 TEST(MsmGpu, EdgesBeyondTheRangeOfAFloat_AreRefused) {
@@ -350,14 +474,14 @@ TEST_P(Gpu, FailingAllocator_LeavesNothingBehind) {
   size_t calls = 0;
   {
     Host counting;
-    Stepper body(counting, gpu(GetParam()), m, {{"device", reference}});
+    Stepper body(counting, gpu(GetParam()), m, with(GetParam(), {{"device", reference}}));
     calls = counting.calls;
   }
   for (size_t n = 0; n < calls; ++n) {
     Host host;
     host.fail_at = n;
     {
-      Stepper body(host, gpu(GetParam()), m, {{"device", reference}});
+      Stepper body(host, gpu(GetParam()), m, with(GetParam(), {{"device", reference}}));
       EXPECT_EQ(body.status, DFM_E_NOMEM) << n;
       body.self = nullptr;
     }

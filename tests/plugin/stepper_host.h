@@ -6,7 +6,7 @@ namespace stepper_test {
 
 using namespace model_test;
 
-// Values by key; what is not named has its default.
+// Values by key, for each component of a wide one; what is not named has its default.
 using Params = std::map<std::string, double>;
 
 inline std::vector<double> row_of(const dfm_type &type, const Params &p) {
@@ -15,7 +15,7 @@ inline std::vector<double> row_of(const dfm_type &type, const Params &p) {
   for (uint32_t n = 0; n < type.nparam; ++n) {
     const auto given = p.find(type.params[n].key);
     used += given != p.end();
-    values.push_back(given != p.end() ? given->second : type.params[n].def);
+    values.insert(values.end(), type.params[n].width, given != p.end() ? given->second : type.params[n].def);
   }
   EXPECT_EQ(used, p.size()) << "a parameter that the model lacks";
   return values;
