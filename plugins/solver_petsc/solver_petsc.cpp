@@ -42,7 +42,7 @@ struct Data {  // root's
   const uint32_t *ij = nullptr;
   const double *in = nullptr;
   double *out = nullptr;
-  bool done = true;
+  dfm_status status = DFM_OK;
   PetscInt iterations = 0;
 };
 
@@ -111,14 +111,13 @@ class System {
     PCFailedReason reason;
     PetscCall(KSPGetPC(solver_, &pc));
     PetscCall(PCGetFailedReason(pc, &reason));
-    if (reason == PC_FACTOR_OUTMEMORY) return PETSC_ERR_MEM;
-    root.done = reason == PC_NOERROR;
-    if (method_ != kMumps || !root.done) return 0;
+    if (reason != PC_NOERROR) root.status = reason == PC_FACTOR_OUTMEMORY ? DFM_E_NOMEM : DFM_DISCARD;
+    if (method_ != kMumps || root.status != DFM_OK) return 0;
     Mat triangle;
-    PetscInt negative = 0;
+    PetscInt negative = 0;  // pivots
     PetscCall(PCFactorGetMatrix(pc, &triangle));
     PetscCall(MatMumpsGetInfog(triangle, 12, &negative));
-    root.done = negative == 0;
+    if (negative > 0) root.status = DFM_DISCARD;
     return 0;
   }
 
@@ -133,7 +132,7 @@ class System {
     KSPConvergedReason reason;
     PetscCall(KSPGetConvergedReason(solver_, &reason));
     PetscCall(KSPGetIterationNumber(solver_, &root.iterations));
-    root.done = reason > 0;
+    if (reason < 0) root.status = DFM_DISCARD;
     return move(x_, whole_, root.out, SCATTER_FORWARD);
   }
 
@@ -167,7 +166,8 @@ struct Process {
   char said[300] = "";  // PETSc's reason of the last failure
   std::mutex door;
 };
-Process &process = *new Process;
+alignas(Process) unsigned char room[sizeof(Process)];
+Process &process = *new (room) Process;
 
 PetscErrorCode take_reason(MPI_Comm, int, const char *function, const char *, PetscErrorCode code,
                            PetscErrorType type, const char *text, void *) {
@@ -325,7 +325,8 @@ dfm_status call(const dfm_host &host, const char *what, Order order, Data &data)
                   "MPI_THREAD_SERIALIZED, or run with one thread");
   PetscErrorCode failed = process.size > 1 ? share(order) : 0;
   if (!failed) failed = quietly([&] { return perform(order, data); });
-  if (!failed) return data.done ? DFM_OK : DFM_DISCARD;
+  if (!failed && data.status == DFM_E_NOMEM) failure(host, what, PETSC_ERR_MEM);  // known to all ranks
+  if (!failed) return data.status;
   const dfm_status status = failure(host, what, failed);
   if (process.size > 1) abandon();
   return status;
