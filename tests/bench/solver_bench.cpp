@@ -4,7 +4,7 @@
 //
 // --large: conjugate gradients alone, 4,000 to 1,000,000 points (8 GB), also the matrix of equilibrium.
 // --cells (may be repeated): a cylinder of that many cells and the named solvers alone, without 64 right-hand
-// sides and W. `mpirun -n 2 solver_bench ..` measures solver_petsc with two ranks, which then stand for threads.
+// sides and W. `mpirun -n 2 solver_bench ..`: solver_petsc with two ranks, in the column of threads.
 //
 // Linear elasticity, E 1e5 Pa, nu 0.3, density 1,000 kg/m^3, step 1/60 s, one end held. `analyse` is paid
 // once, `factor` whenever the matrix changes; `solve` is per right-hand side, one at a time and 64 together,
