@@ -306,7 +306,7 @@ constexpr dfm_solver table = {
     sizeof(dfm_solver),           Method == petsc::kMumps ? uint32_t(DFM_SOLVER_DIRECT) : 0u,
     dp::guarded<analyse<Method>>, dp::guarded<factor>,
     dp::guarded<solve>,           release};
-constexpr const char *licence = "Apache-2.0 AND BSD-2-Clause; Debian's PETSc: GPL-2.0-or-later";
+constexpr const char *licence = "MIT; GPL-2.0-or-later with Debian's PETSc";
 const dfm_type gamg =
     dp::type(DFM_KIND_SOLVER, "org.deform.petsc_gamg", "PETSc: conjugate gradients, GAMG", "1.0.0", licence,
              "Balay et al., PETSc/TAO users manual, ANL-21/39", nullptr, &table<petsc::kGamg>);

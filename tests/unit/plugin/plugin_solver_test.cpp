@@ -1,11 +1,13 @@
 // A linear solver of a plugin behind the interface of the library's own.
 #include "plugin/plugin_solver.h"
 
+#ifdef DEFORM_PETSC
 #include <dlfcn.h>
 #include <signal.h>
 
 #include <cmath>
 #include <thread>
+#endif
 
 #include "../../plugin/tiny_support.h"
 #include "../math/grid_system.h"
