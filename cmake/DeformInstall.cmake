@@ -43,6 +43,11 @@ endif()
 if(TARGET solver_cholmod)
   install(TARGETS solver_cholmod LIBRARY DESTINATION ${deform_plugin_dir} COMPONENT cholmod EXCLUDE_FROM_ALL)
 endif()
+if(TARGET solver_petsc)
+  set(where ${CMAKE_INSTALL_LIBDIR}/deform/petsc)
+  install(TARGETS solver_petsc deform-petsc-rank LIBRARY DESTINATION ${where} COMPONENT petsc EXCLUDE_FROM_ALL
+    RUNTIME DESTINATION ${where} COMPONENT petsc EXCLUDE_FROM_ALL)
+endif()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/libdeform/include/deform DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
   COMPONENT dev FILES_MATCHING PATTERN "*.h" PATTERN "*.hpp")
 install(FILES ${PROJECT_SOURCE_DIR}/libdeform/schema/deform-scene.schema.json

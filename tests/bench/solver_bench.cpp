@@ -1,15 +1,18 @@
 // What each linear solver costs on the matrix of an implicit step, four sizes of a cylinder.
 //
-//   solver_bench [--csv FILE --commit HASH] [--plugin FILE --solver NAME] [--large]
+//   solver_bench [--csv FILE --commit HASH] [--plugin FILE --solver NAME] [--cells N] [--large]
 //
 // --large: conjugate gradients alone, 4,000 to 1,000,000 points (8 GB), also the matrix of equilibrium.
+// --cells (may be repeated): a cylinder of that many cells and the named solvers alone, without 64 right-hand
+// sides and W. `mpirun -n 2 solver_bench ..`: solver_petsc with two ranks, in the column of threads.
 //
 // Linear elasticity, E 1e5 Pa, nu 0.3, density 1,000 kg/m^3, step 1/60 s, one end held. `analyse` is paid
 // once, `factor` whenever the matrix changes; `solve` is per right-hand side, one at a time and 64 together,
 // to 1e-8 in the solver's norm; `restricted` is S A^-1 S^T of as many points of the surface as
-// stated. Best of some rounds.
+// stated. Best of some rounds: processor time of one thread, real time of two.
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -45,13 +48,25 @@ struct CountedMemory {
   }
 };
 
+double real_seconds() {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+}
+
+// What a plugin logs of its iterations.
+void note_iterations(void *user, int32_t, const char *text) {
+  std::sscanf(text, "%*[^:]: %u iterations", static_cast<uint32_t *>(user));
+}
+
+uint32_t logged_iterations = 0;
+double (*seconds)() = real_seconds;
+
 // Best of as many rounds as fit into half a second, at least two.
 double best_ms(const std::function<void()> &f) {
   double best = HUGE_VAL, total = 0;
   for (int round = 0; round < 2 || (total < 0.5 && round < 20); ++round) {
-    const auto begin = std::chrono::steady_clock::now();
+    const double begin = seconds();
     f();
-    const double s = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double s = seconds() - begin;
     best = std::min(best, s);
     total += s;
   }
@@ -60,8 +75,10 @@ double best_ms(const std::function<void()> &f) {
 
 // "pcg_one_level": told no places, so it has block Jacobi alone. "pcg_static": the matrix of equilibrium.
 void measure(const bench::Csv &sink, const dfm_context &context, const char *label, uint32_t threads,
-             const test::BlockSystem &system, uint32_t ntet) {
+             const test::BlockSystem &system, uint32_t ntet, bool whole) {
   CountedMemory counted;
+  seconds = threads == 1 ? bench::process_seconds : real_seconds;
+  logged_iterations = 0;
   const bool one_level = std::strcmp(label, "pcg_one_level") == 0;
   const char *const name = std::strncmp(label, "pcg", 3) == 0 ? "pcg" : label;
   dfm::Tasks tasks(threads, nullptr, nullptr);
@@ -74,7 +91,7 @@ void measure(const bench::Csv &sink, const dfm_context &context, const char *lab
     if (!solver->factor(system.blk.data())) std::puts("not positive definite");
   });
   const size_t rows = 3 * size_t{system.n};
-  const size_t nrhs = solver->direct() ? kMany : 1;
+  const size_t nrhs = whole && solver->direct() ? kMany : 1;
   std::vector<double> b(rows * nrhs), x(rows * nrhs);
   for (size_t k = 0; k < b.size(); ++k) b[k] = double((k * 7919) % 1000) / 1000 - 0.3;
   dfm::SolveInfo info;
@@ -82,16 +99,16 @@ void measure(const bench::Csv &sink, const dfm_context &context, const char *lab
     std::fill(x.begin(), x.end(), 0.0);
     solver->solve(1, b.data(), x.data(), kTolerance, info);
   });
-  const uint32_t iterations = info.iterations;
+  const uint32_t iterations = info.iterations + logged_iterations;
   double many = 0;
-  if (solver->direct()) {
+  if (nrhs > 1) {
     many = best_ms([&] { solver->solve(kMany, b.data(), x.data(), kTolerance, info); }) / kMany;
     // bytes of solving, without those of 64 right-hand sides and of W
   }
   const double bytes = double(counted.peak) / ntet;
   double restricted[2] = {0, 0};
   std::vector<uint32_t> sel;
-  if (auto *const ldlt = dynamic_cast<dfm::LdltSolver *>(solver.get()))
+  if (auto *const ldlt = dynamic_cast<dfm::LdltSolver *>(solver.get()); ldlt && whole)
     for (uint32_t k = 0; k < 2; ++k) {
       // the lowest points: a body that lies on the ground
       std::vector<uint32_t> order(system.n);
@@ -133,13 +150,26 @@ int main(int argc, char **argv) {
     steps.push_back(HUGE_VAL);
   }
   dfm_context *context = nullptr;
-  const dfm_context_def def = dfm_context_def_default();
+  dfm_context_def def = dfm_context_def_default();
+  def.user = &logged_iterations;
+  def.log = note_iterations;
   if (dfm_context_create(&def, &context) != DFM_OK) return 1;
+  const char *const launched = std::getenv("OMPI_COMM_WORLD_SIZE");
+  const uint32_t ranks = launched ? uint32_t(std::atoi(launched)) : 1;
+  std::vector<const char *> chosen;
+  std::vector<uint32_t> cells_chosen;
   for (int n = 1; n + 1 < argc; n += 2) {
     if (!std::strcmp(argv[n], "--plugin") && dfm_plugin_load(context, argv[n + 1]) != DFM_OK)
       std::puts(dfm_last_error());
-    if (!std::strcmp(argv[n], "--solver")) names.push_back(argv[n + 1]);
+    if (!std::strcmp(argv[n], "--solver")) chosen.push_back(argv[n + 1]);
+    if (!std::strcmp(argv[n], "--cells")) cells_chosen.push_back(uint32_t(std::atoi(argv[n + 1])));
   }
+  const bool whole = cells_chosen.empty();
+  if (!whole) {
+    names.clear();
+    sizes = cells_chosen;
+  }
+  names.insert(names.end(), chosen.begin(), chosen.end());
   for (const uint32_t cells : sizes) {
     const dfm::RestMesh mesh = dfm::make_cylinder(dfm::Memory::standard(), 0.05, 0.2, cells);
     for (const double h : steps) {
@@ -148,8 +178,12 @@ int main(int argc, char **argv) {
       for (uint32_t i = 0; i < system.n; ++i) mask[i] = system.points[3 * size_t{i} + 2] < 1e-9 ? 7 : 0;
       dfm::hold_components(system.pattern(), mask.data(), system.blk.data());
       for (const char *name : names)
-        for (const uint32_t threads : {1u, 2u})
-          measure(sink, *context, std::isinf(h) ? "pcg_static" : name, threads, system, mesh.ntet());
+        if (std::strncmp(name, "petsc_", 6) == 0) {
+          measure(sink, *context, name, ranks, system, mesh.ntet(), whole);
+        } else {
+          for (const uint32_t threads : {1u, 2u})
+            measure(sink, *context, std::isinf(h) ? "pcg_static" : name, threads, system, mesh.ntet(), whole);
+        }
     }
   }
   dfm_context_destroy(context);

@@ -1,6 +1,14 @@
 // A linear solver of a plugin behind the interface of the library's own.
 #include "plugin/plugin_solver.h"
 
+#ifdef DEFORM_PETSC
+#include <dlfcn.h>
+#include <signal.h>
+
+#include <cmath>
+#include <thread>
+#endif
+
 #include "../../plugin/tiny_support.h"
 #include "../math/grid_system.h"
 #include "core/error.h"
@@ -93,6 +101,92 @@ TEST(PluginSolver, Cholmod_EqualsTheOwnFactorization) {
     }
   }
   EXPECT_LT(test::worst(results[1], results[0]), 1e-11);
+}
+#endif
+
+#ifdef DEFORM_PETSC
+constexpr const char *kPetsc[] = {"petsc_gamg", "petsc_hypre", "petsc_mumps"};
+
+struct WithPetsc : tiny::Context {
+  WithPetsc() { EXPECT_EQ(dfm_plugin_load(c, DEFORM_PETSC), DFM_OK) << dfm_last_error(); }
+  std::unique_ptr<dfm::LinearSolver> solver(const char *name, const test::Grid &g) const {
+    auto made = dfm::make_solver({name, g.n, false, 0}, *c, memory(), nullptr);
+    made->analyse(g.pattern());
+    return made;
+  }
+};
+
+void equal_the_own(const WithPetsc &context, const char *name) {
+  const test::Grid g = test::grid(9, 8, 7, 0.05), twice = [&] {
+    test::Grid other = g;
+    for (double &v : other.blk) v *= 2;
+    return other;
+  }();
+  const std::vector<double> b = test::noise(3 * size_t{g.n}, 1);
+  const auto solver = context.solver(name, g);
+  dfm::SolveInfo info;
+  for (const test::Grid *matrix : {&twice, &g}) {
+    std::vector<double> x = test::noise(b.size(), 2);  // any start
+    ASSERT_TRUE(solver->factor(matrix->blk.data())) << name;
+    ASSERT_TRUE(solver->solve(1, b.data(), x.data(), 1e-12, info)) << name;
+    EXPECT_LT(test::worst(x, test::direct_solution(*matrix, b)), 1e-10) << name;
+  }
+  std::vector<double> x = test::noise(2 * b.size(), 3), zeros = b;
+  zeros.resize(2 * b.size(), 0.0);
+  ASSERT_TRUE(solver->solve(2, zeros.data(), x.data(), 1e-12, info)) << name;
+  EXPECT_EQ(std::vector<double>(x.begin() + ptrdiff_t(b.size()), x.end()),
+            std::vector<double>(b.size(), 0.0));
+}
+
+// Also run by two ranks: petsc_ranks.py.
+TEST(PluginSolver, Petsc_EqualsTheOwnFactorization) {
+  const WithPetsc context;
+  for (const char *name : kPetsc) equal_the_own(context, name);
+}
+
+TEST(PluginSolver, Petsc_MatrixThatIsNotPositiveDefinite_IsReported) {
+  const WithPetsc context;
+  for (const char *name : kPetsc)
+    for (test::Grid bad : {test::grid(9, 8, 7, -1.0), test::grid(2, 1, 1, -1.0), test::grid(3, 3, 3, 1.0)}) {
+      if (bad.n == 27) bad.blk[4] = NAN;
+      const auto solver = context.solver(name, bad);
+      std::vector<double> b(3 * size_t{bad.n}, 0.0), x = b;
+      for (size_t k = 0; k < b.size(); ++k) b[k] = double(k % 7) - 3;
+      dfm::SolveInfo info;
+      EXPECT_FALSE(solver->factor(bad.blk.data()) && solver->solve(1, b.data(), x.data(), 1e-9, info))
+          << name << ", " << bad.n << " points";
+    }
+}
+
+TEST(PluginSolver, Petsc_LeavesTheHandlersOfSignals) {
+  struct sigaction before[32], after;
+  for (int k = 1; k < 32; ++k) sigaction(k, nullptr, &before[k]);
+  const WithPetsc context;
+  equal_the_own(context, "petsc_gamg");
+  for (int k = 1; k < 32; ++k) {
+    sigaction(k, nullptr, &after);
+    EXPECT_EQ(before[k].sa_handler, after.sa_handler) << k;
+  }
+}
+
+// The host starts MPI before and ends it while a solver lives.
+TEST(PluginSolver, Petsc_ServesAHostThatUsesMpi) {
+  void *const file = dlopen(DEFORM_PETSC, RTLD_NOW);
+  ASSERT_TRUE(file) << dlerror();
+  using Init = int (*)(int *, char ***);
+  ASSERT_EQ(reinterpret_cast<Init>(dlsym(file, "MPI_Init"))(nullptr, nullptr), 0);
+  {
+    const WithPetsc context;
+    equal_the_own(context, "petsc_gamg");
+    const test::Grid g = test::grid(3, 3, 3, 1.0);
+    const auto solver = context.solver("petsc_mumps", g);
+    dfm_status elsewhere = DFM_OK;  // MPI_Init promises one thread
+    std::thread([&] { elsewhere = solver->factor(g.blk.data()) ? DFM_OK : DFM_E_UNSUPPORTED; }).join();
+    EXPECT_EQ(elsewhere, DFM_E_UNSUPPORTED);
+    EXPECT_TRUE(solver->factor(g.blk.data()));
+    ASSERT_EQ(reinterpret_cast<int (*)()>(dlsym(file, "MPI_Finalize"))(), 0);
+    EXPECT_FALSE(solver->factor(g.blk.data()));
+  }
 }
 #endif
 
