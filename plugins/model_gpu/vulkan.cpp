@@ -103,8 +103,11 @@ VkPhysicalDevice Vulkan::choose(Wanted wanted) {
     GetPhysicalDeviceFeatures(one, &features);
     const int rank = rank_of(about.deviceType);
     seen += (seen.empty() ? "" : ", ") + std::string(about.deviceName).substr(0, 40);
+    const bool binds = about.limits.maxPerStageDescriptorStorageBuffers >= kBindings;
     if (!features.shaderFloat64) seen += " without shaderFloat64";
-    if (!features.shaderFloat64 || about.apiVersion < VK_API_VERSION_1_1 || rank >= best_rank) continue;
+    else if (!binds) seen += " with too few storage buffers";
+    if (!features.shaderFloat64 || !binds || about.apiVersion < VK_API_VERSION_1_1 || rank >= best_rank)
+      continue;
     if (wanted != Wanted::automatic && (wanted == Wanted::software) != (rank == kSoftware)) continue;
     best = one;
     best_rank = rank;
