@@ -32,7 +32,7 @@ struct PairLaw {
 };
 // Fills the tables for things a and b (bodies by slot, then obstacles). used: their laws, out.
 PairLaw find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
-// The same with what find_law has returned for two things of the same kinds (PairOfKinds in step/prepare.cpp).
+// The same with what find_law has returned for two things of the same kinds (PairOfKinds, step/prepare.cpp).
 void put_law(World &w, uint32_t a, uint32_t b, const PairLaw &known);
 // The law of two obstacles, of which a tool is one.
 uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b);

@@ -16,8 +16,8 @@ struct Obstacle;
 // Of a body with this velocity and spin [6], at an arm from its center.
 inline Vec3 velocity_at(const double *v, Vec3 arm) { return load3(v) + cross(load3(v + 3), arm); }
 
-// The same of the body of this shape, as a mean over h seconds: its displacement to third order in the initial
-// spin (ObstacleView::velocity_at).
+// The same of the body of this shape, as a mean over h seconds: its displacement to third order in the
+// initial spin (ObstacleView::velocity_at).
 Vec3 mean_velocity_at(const Obstacle &o, const double *v, Vec3 arm, double h);
 
 // Throws Error; then the world is unchanged. out: [nbody] handles.

@@ -31,8 +31,8 @@
 namespace dfm {
 namespace {
 
-// Responses between the touched surfels of bodies whose points respond to each other's impulses, and of groups
-// of rigid bodies.
+// Responses between the touched surfels of bodies whose points respond to each other's impulses, and of
+// groups of rigid bodies.
 void fill_responses(World &w, StepContext &step) {
   for (const ContactRows::Block &block : step.rows.blocks) {
     if (block.group != kNone) {
