@@ -41,9 +41,8 @@ class BodyCuts {
   }
   // [npoint], [ntet]; either may be empty.
   auto origins(std::span<uint32_t> points, std::span<uint32_t> cells) const {
-    return E::done(dfm_body_origins(
-        body(), static_cast<uint32_t>(points.size()), given(points),
-        static_cast<uint32_t>(cells.size()), given(cells)));
+    return E::done(dfm_body_origins(body(), static_cast<uint32_t>(points.size()), given(points),
+                                    static_cast<uint32_t>(cells.size()), given(cells)));
   }
   auto separate(const dfm_separate_def &def = SeparateDef()) const {
     return produce<E, dfm_cut_info>([&](dfm_cut_info &info) {

@@ -5,10 +5,10 @@
 namespace dfm {
 
 dfm_body_measure measure(Body &b);
-double kinetic_of(const Body &b);  // J
+double kinetic_of(const Body &b);                         // J
 struct CenterMotion { Vec3 place, velocity, momentum; };  // of the center of mass: m, m/s, kg m/s
 CenterMotion center_motion(const Body &b);
-double elastic_energy(Body &b);    // J; NaN if the model has none
+double elastic_energy(Body &b);  // J; NaN if the model has none
 // [ntet] J/m3; throws if the model has none
 void energy_density(Body &b, double *out);
 // [ntet,6] Pa; throws if the model has none
