@@ -275,7 +275,9 @@ TEST(Effects, ThatAreLeftOut_LetParametersChangeAfterARestore) {
   test::Context c;
   dfm_world w = 0;
   dfm_body body = 0;
-  test::ok(make(c, {{"friction", "guard"}}, &w, &body));
+  Options o;
+  o.effects = {"friction", "guard"};
+  test::ok(make(c, o, &w, &body));
   const std::string start = test::snapshot(w);
   const auto go_back = [&] { test::ok(dfm_world_restore(w, start.data(), start.size())); };
   const auto set_young = [&](double young) {

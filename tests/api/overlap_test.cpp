@@ -402,3 +402,18 @@ TEST(Overlap, WithAPointThatNoTriangleHas_IsNone) {
   EXPECT_TRUE(overlaps(w).empty());
   dfm_world_destroy(w);
 }
+
+TEST(Overlap, UntangledBeforeTheStep_IsNoTrouble) {
+  test::Context c;
+  const dfm_world w = test::make_world(c, {});
+  ball(c, w, "a", {});
+  ball(c, w, "b", {0.15, 0, 0});
+  double step = 0;
+  test::ok(dfm_world_stable_step(w, &step, nullptr, nullptr));  // searches
+  uint32_t left = 1, trouble = 0;
+  test::ok(dfm_world_untangle(w, &left));
+  EXPECT_EQ(left, 0u);
+  ASSERT_EQ(dfm_world_step(w, 1e-3, &trouble), DFM_OK) << dfm_last_error();
+  EXPECT_FALSE(trouble & DFM_TROUBLE_OVERLAP);
+  dfm_world_destroy(w);
+}

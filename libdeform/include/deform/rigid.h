@@ -102,7 +102,8 @@ typedef struct dfm_rigid_host {
    * @param group  out, [nbody]: bodies that respond to each other's impulses share a number; the numbers
    * 0, 1, 2, .. are used without gaps; or DFM_RIGID_STILL
    * @param nextra out, number of further state values that the world keeps for this instance (motors, caches
-   * that must survive restore); they start at 0 */
+   * that must survive restore); they start at 0
+   * After an error *self is not looked at: destroy is not called. */
   dfm_status (*create)(void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group,
                        uint32_t *nextra);
   void (*destroy)(void *self);

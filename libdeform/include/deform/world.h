@@ -253,8 +253,8 @@ DFM_API dfm_status dfm_world_stable_step(dfm_world world, double *dt, dfm_body *
 DFM_API double dfm_world_time(dfm_world world);
 
 /** FNV-1a hash, 64 bits, of x, v, model state, contact keys and bristles, in id order, and of the model and
- * its parameters for bodies whose model differs from that at the first step; 0 for a stale handle.
- * Threads: Any thread. Not during step. Since 0.1. */
+ * its parameters for bodies whose model differs from that at the first step; 0 for a stale handle
+ * and during a step. Threads: Any thread. Not during step. Since 0.1. */
 DFM_API uint64_t dfm_world_hash(dfm_world world);
 /** Writes the whole state on which later results depend. buffer NULL: *bytes gets the size needed. Too small:
  * DFM_E_ARG and the size.

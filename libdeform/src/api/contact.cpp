@@ -374,7 +374,7 @@ dfm_status dfm_world_pair_impulses_sized(dfm_world world, uint32_t row_size, uin
                                          dfm_pair_impulse *out, uint32_t *n) {
   return as_status([&] {
     Rows<dfm_pair_impulse> rows(out, row_size, "dfm_pair_impulse");
-    const World &w = world_of(world);
+    const World &w = not_in_step(world_of(world));
     Array<StepImpulses::Pair> pairs(w.memory());
     list_impulses(w, pairs);
     if (!room(pairs.size(), capacity, out, n)) return;

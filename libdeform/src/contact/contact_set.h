@@ -57,8 +57,8 @@ struct Crossing {
 inline uint32_t side_b(const ContactPoint &c) { return c.slot_b | (c.obstacle ? 0x80000000u : 0u); }
 
 // A contact's frame [9], normal and tangents: the vector of these components, and the components of a vector.
-inline Vec3 from_frame(const double *f, const double *v) {
-  return v[0] * load3(f) + v[1] * load3(f + 3) + v[2] * load3(f + 6);
+inline Vec3 from_frame(const double *f, Vec3 v) {
+  return v.x * load3(f) + v.y * load3(f + 3) + v.z * load3(f + 6);
 }
 inline Vec3 in_frame(const double *f, Vec3 v) {
   return {dot(load3(f), v), dot(load3(f + 3), v), dot(load3(f + 6), v)};

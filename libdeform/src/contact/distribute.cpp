@@ -53,7 +53,7 @@ void distribute(std::span<const ContactPoint> contacts, const double *frame, con
   for (size_t i = 0; i < contacts.size(); ++i) {
     const double *const f = frame + 9 * i, *const l = impulse + 3 * i;
     if (l[0] == 0 && l[1] == 0 && l[2] == 0) continue;
-    const Vec3 p = from_frame(f, l);
+    const Vec3 p = from_frame(f, load3(l));
     add(contacts[i], p);
   }
   for (size_t k = 0; k < bonds.size(); ++k) add(bonds[k], load3(bond_impulse + 3 * k));

@@ -24,10 +24,6 @@
 
 namespace dfm {
 
-inline Vec3 from_frame(const double *f, Vec3 v) {
-  return v.x * load3(f) + v.y * load3(f + 3) + v.z * load3(f + 6);
-}
-
 // Where a body's dofs come from.
 struct DofSource {
   uint32_t first_node = 0, nnode = 0;    // world-wide surfel numbers of the body

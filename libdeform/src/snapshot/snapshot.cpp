@@ -64,8 +64,7 @@ std::vector<std::unique_ptr<LawInstance>> make_laws(const SnapshotReader &s, con
       if (params.size() != packed_width(type))
         fail(DFM_E_FORMAT, "the snapshot was made with another version of law '%s'; nothing was restored",
              type.id);
-      if (!snapshot::in_range(type, params))
-        s.refuse("law parameters", "values in the range of the law's table");
+      if (!snapshot::fits(type, params)) s.refuse("law parameters", "values in the range of the law's table");
       return type;
     };
     laws.push_back(std::make_unique<LawInstance>(type_of(l.id, l.params), w.context->host, l.params));
@@ -101,8 +100,11 @@ void make_models(const SnapshotReader &s, World &w, Staged &t) {
       std::swap(other.made->dampers, other.p.dampers);
       ModelInstance &made = other.made->model;
       if (made.state.size() != other.model.state.size()) s.refuse("model state", "as many as the model has");
-      if (made.params.size() != other.model.params.size() || !snapshot::in_range(type, other.model.params))
+      std::vector<double> &requested = other.switched_off.requested;
+      if (!snapshot::fits(type, other.model.params) ||
+          (!requested.empty() && !snapshot::fits(type, requested)))
         s.refuse("model parameters", "values in the range of the model's table");
+      other.made->switched_off.requested.swap(requested);
       made.state.swap(other.model.state);
     } else {
       // of a snapshot from before the choice, what is known of the body's own remains
@@ -291,10 +293,10 @@ void exchange(World &w, Staged &t) noexcept {
     } else {
       b.model.state.swap(other.model.state);
       b.model.params.swap(other.model.params);
+      b.switched_off.requested.swap(other.switched_off.requested);
       std::swap(b.integrator, other.integrator);
       std::swap(b.p.dampers, other.p.dampers);
     }
-    b.switched_off.requested.swap(other.switched_off.requested);
     std::swap<BodyState>(b, other);
     std::swap<OnPoints>(b, other);
     b.ahead.faces.swap(other.ahead.faces);

@@ -171,7 +171,8 @@ bool below(const List &list, uint32_t n) {
   return std::all_of(list.begin(), list.end(), [n](uint32_t i) { return i < n; });
 }
 
-inline bool in_range(const dfm_type &type, const std::vector<double> &values) {
+inline bool fits(const dfm_type &type, const std::vector<double> &values) {
+  if (values.size() != packed_width(type)) return false;
   try {
     pack_params(type, param_rows(type, values));
     return true;
@@ -275,11 +276,11 @@ void model_fields(Stream &s, B &b, const Body &like) {
   s.array("model state", b.model.state, alike ? like.model.state.size() : kAnyCount, must::finite);
   s.array("model parameters", b.model.params, alike ? like.model.params.size() : kAnyCount, must::finite);
   s.must_hold("model parameters", "values in the range of the model's table",
-              [&] { return !alike || in_range(*like.model.type, b.model.params); });
+              [&] { return !alike || fits(*like.model.type, b.model.params); });
   s.array("requested parameters", b.switched_off.requested, kAnyCount, must::finite);
   s.must_hold("requested parameters", "none, or values in the range of the model's table", [&] {
     const std::vector<double> &values = b.switched_off.requested;
-    return values.empty() || !alike || in_range(*like.model.type, values);
+    return values.empty() || !alike || fits(*like.model.type, values);
   });
   s.value("first model", b.first_model, must::any);
   switch_fields(s, b);

@@ -170,10 +170,10 @@ struct Body : BodyShape, BodyState {
   bool tears = false;   // a material of its cells tears at a limited strain
   void *user = nullptr;
 
-  std::mutex querying;       // one query of the model at a time, from any thread
-  uint64_t x_version = 1;    // increases whenever p.x may have changed
-  bool emptied = false;      // a cut has removed all cells; the body is in World::emptied
-  uint64_t piece_of = 0;     // id of the body, made by the host, of which this one is a piece; 0: none
+  std::recursive_mutex querying;  // one query of the model at a time, from any thread
+  uint64_t x_version = 1;         // increases whenever p.x may have changed
+  bool emptied = false;           // a cut has removed all cells; the body is in World::emptied
+  uint64_t piece_of = 0;          // id of the body, made by the host, of which this one is a piece; 0: none
   std::string whole_name;    // name of that body; its rules of friction and contact apply to this piece too
   bool rolled_back = false;  // a piece that a restore has removed; it is in World::rolled_back
   CutsAhead ahead;

@@ -35,16 +35,20 @@ struct Overlaps {
       return p.a == a && p.b == b && (p.obstacle != 0) == obstacle;
     });
   }
-  // Of one search of everything. all stays where it fails: the next one covers no less.
+  // Of one search of everything; where that fails, the next one is what it would have been.
   class Mode {
    public:
-    Mode(Overlaps &o, bool Overlaps::*mode) : of_(o), mode_(mode) { o.all = o.*mode = true; }
-    ~Mode() { of_.*mode_ = false; }
+    Mode(Overlaps &o, bool Overlaps::*mode) : of_(o), mode_(mode), all_(o.all) { o.all = o.*mode = true; }
+    ~Mode() {
+      of_.*mode_ = false;
+      of_.all = of_.all && all_;
+    }
     Mode(const Mode &) = delete;
 
    private:
     Overlaps &of_;
     bool Overlaps::*mode_;
+    const bool all_;
   };
   bool is_pending() const { return all || !placed.empty(); }
   void place(uint64_t id) {

@@ -8,6 +8,7 @@
 #include "body/obstacle_mesh.h"
 #include "ccd/toi_guard_motion.h"
 #include "dynamics/rigid/rigid_set.h"
+#include "math/turn.h"
 #include "narrow/detail.h"
 #include "narrow/parts.h"
 #include "state/obstacle.h"
@@ -17,7 +18,6 @@
 #include "step/rigid/rigid.h"
 #include "step/self_contact.h"
 #include "step/sides.h"
-#include "step/solve/attach.h"
 #include "step/solve/pre_solve.h"
 
 namespace dfm {
@@ -106,7 +106,10 @@ class HitContact {
   // rows start from. end: with the contact so far; that of what contact does not move.
   Vec3 free_end(Vec3 from, Vec3 end) const {
     const Obstacle &o = *w_.obstacles[c_.slot_b];
-    return is_moved(o) ? from + step_.h * place_velocity(o, from, step_) : end;
+    if (!is_moved(o)) return end;
+    const double *const first = &o.rigid->first[6 * size_t{o.rigid_body}];
+    const Vec3 center = step_.rigid_places[o.slot].center;
+    return center + step_.h * load3(first) + rotate(turned({}, step_.h * load3(first + 3)), from - center);
   }
   // The point of the obstacle: from its present position to that at the end without this contact.
   void carry(Vec3 from, Vec3 to) {

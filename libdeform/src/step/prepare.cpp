@@ -36,6 +36,7 @@ namespace {
 // once for two kinds, and not for each pair: a body that shatters has hundreds of pieces, all of one or two
 // kinds, and the tables of pairs are made again after each cut and each separation.
 struct PairOfKinds {
+  bool known = false;
   const FilterRule *filter = nullptr;  // nullptr: no rule names the pair
   PairLaw law;                         // of the first pair of these kinds that may touch
 };
@@ -63,12 +64,13 @@ std::vector<uint64_t> key_of(const World &w, uint32_t thing) {
   return key;
 }
 
-// By thing: bodies by slot, then obstacles.
-std::vector<size_t> kinds_of(const World &w) {
+// By thing: bodies by slot, then obstacles. n: out, how many there are.
+std::vector<size_t> kinds_of(const World &w, size_t &n) {
   std::map<std::vector<uint64_t>, size_t> known;
   std::vector<size_t> out;
   for (uint32_t thing = 0; thing < w.bodies.size() + w.obstacles.size(); ++thing)
     out.push_back(known.try_emplace(key_of(w, thing), known.size()).first->second);
+  n = known.size();
   return out;
 }
 
@@ -266,17 +268,18 @@ void make_pair_tables(World &w, StepContext &step, SceneFacts &facts) {
   const std::vector<uint8_t> attached = attached_bodies(w);
   std::vector<Partner> things;
   for (uint32_t i = 0; i < width; ++i) things.push_back(partner_of(w, i));
-  const std::vector<size_t> kind = kinds_of(w);
-  std::map<std::pair<size_t, size_t>, PairOfKinds> kinds;
+  size_t nkind = 0;
+  const std::vector<size_t> kind = kinds_of(w, nkind);
+  std::vector<PairOfKinds> kinds(nkind * nkind);
   for (uint32_t i = 0; i < nb; ++i) {
     const Partner &a = things[i];
     for (uint32_t j = 0; j < width; ++j) {
       if (j == i) continue;
       const bool is_body = j < nb;
       const Partner &b = things[j];
-      const auto [known, fresh] = kinds.try_emplace({kind[i], kind[j]});
-      PairOfKinds &pair = known->second;
-      if (fresh) pair.filter = best_rule(w.filters, a.side, b.side);
+      PairOfKinds &pair = kinds[nkind * kind[i] + kind[j]];
+      if (!pair.known) pair.filter = best_rule(w.filters, a.side, b.side);
+      pair.known = true;
       bool touch = a.meets(b, pair.filter);
       if (pair.filter && (!is_body || i < j)) w.pairs.filter.set(a.id, b.id, !is_body, touch);
       if (touch && ((attached[i] && parted(w, i, j)) || cut_through(w, i, j) ||

@@ -69,7 +69,7 @@ void add(const World &w, double at, double time, Array<StepImpulses::Pair> &pair
     if (turned) std::swap(a, b);
     if (!pair || pair->a != a || pair->b != b) pair = &pair_of(pairs, a, b);
     const double normal = scale * l[0];
-    if (a != b) pair->now += (turned ? -scale : scale) * from_frame(f, l);
+    if (a != b) pair->now += (turned ? -scale : scale) * from_frame(f, load3(l));
     pair->now_normal += normal;
     pair->place += normal * load3(c.point);
   }

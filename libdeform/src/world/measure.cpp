@@ -79,11 +79,11 @@ template <class Table, class Entry>
 void query_by_cell(Body &b, const char *id, const char *name, const char *what, size_t width,
                    const Entry &entry_of, double *out) {
   const char *const type = b.model.type->id;
+  const std::lock_guard one_at_a_time(b.querying);
   const auto table =
       copy_table<Table>(b.model.extension(id), 2 * sizeof(uint32_t) + sizeof(void *), type, name);
   if (!table || !entry_of(*table))
     fail(DFM_E_UNSUPPORTED, "model '%s' of body '%s' offers no %s per cell", type, b.name.c_str(), what);
-  const std::lock_guard one_at_a_time(b.querying);
   const dfm_kin k = b.dynamics->kin(b.world->time, 0);
   const char *const entry = name + std::strlen("dfm_");
   if (b.model.call(entry, [&] { return entry_of(*table)(b.model.self, &k, out); }) != DFM_OK)

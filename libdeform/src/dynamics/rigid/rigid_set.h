@@ -50,10 +50,10 @@ struct RigidSet {
   Array<double> first;
   // [n,6] the same velocity with the host's present data
   Array<double> revised;
-  Array<double> total;   // [n,3] N s of contact since creation
-  double last_h = 0;     // s, of the last sub-step; 0: none yet
-  bool of_tool = false;  // its bodies are parts of a tool (state/tool.h)
-  std::mutex querying;   // one query of the host at a time, from any thread
+  Array<double> total;            // [n,3] N s of contact since creation
+  double last_h = 0;              // s, of the last sub-step; 0: none yet
+  bool of_tool = false;           // its bodies are parts of a tool (state/tool.h)
+  std::recursive_mutex querying;  // one query of the host at a time, from any thread
 
   // As Dynamics: throws std::bad_alloc if the host has no memory.
   void begin(const SubStep &now);  // sets the inputs of the host until the next sub-step

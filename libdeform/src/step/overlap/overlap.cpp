@@ -1,7 +1,6 @@
 #include "step/overlap/overlap.h"
 
 #include <algorithm>
-#include <iterator>
 
 #include "body/obstacle_mesh.h"
 #include "contact/reach.h"
@@ -172,7 +171,10 @@ void resolve_overlaps(World &w) {
   Overlaps &o = w.overlaps;
   if (!o.is_pending()) return;
   std::vector<Overlap> found = find_overlaps(w);
-  const auto placed = [&](uint64_t id) { return std::binary_search(o.placed.begin(), o.placed.end(), id); };
+  const auto placed = [&](uint64_t id) {
+    const auto has = [&](uint64_t x) { return std::binary_search(o.placed.begin(), o.placed.end(), x); };
+    return has(id) || has(id | kPiece);
+  };
   if (o.report_only) {
     for (Overlap &f : found) f.suspended = o.is_suspended(f.a, f.b, f.obstacle);
   } else {  // what is elsewhere now is judged anew
@@ -209,11 +211,14 @@ void resolve_overlaps(World &w) {
     o.suspended.push_back({f.a, f.b, f.obstacle});
     w.pairs.filter.set_aside(f.a, f.b, f.obstacle, true);
   }
-  if (!o.reported)  // no step has reported these yet
-    std::copy_if(o.found.begin(), o.found.end(), std::back_inserter(found),
-                 [&](const Overlap &f) { return !o.all && !placed(f.a) && !placed(f.b); });
+  bool reported = left.empty();
+  for (const Overlap &f : o.found) {  // those of an earlier search that no step has reported yet
+    if (o.reported || o.all || f.separated || placed(f.a) || placed(f.b)) continue;
+    found.push_back(f);
+    reported = false;
+  }
   o.found.assign(found.begin(), found.end());  // an interrupt gives back what was there, in this memory
-  o.reported = o.reported && left.empty();
+  o.reported = reported;
   o.placed.clear();
   o.all = false;
 }

@@ -306,7 +306,7 @@ bool ToolTouch::cull_facing(ToolShape &a, ToolShape &b, double far, bool flat) {
 }
 
 // Adds rows of the corners of each against the other, and of edges that cross. Returns m, the depth of the
-// deepest corner; 0: none is inside.
+// deepest of them; 0: none is inside.
 double ToolTouch::add_rows(Pair &pair, ToolShape &a, ToolShape &b, Side at_a, Side at_b) {
   const double reach = pair.reach = kReach * h_ * (fastest(a, at_a, b) + fastest(b, at_b, a)) + offset_;
   const auto turns = [&](const Side &side) {

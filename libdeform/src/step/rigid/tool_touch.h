@@ -114,7 +114,7 @@ class ToolTouch {
     bool b_first = false;               // reports have b first
     uint32_t wall[2] = {kNone, kNone};  // number among walls_; kNone: it is in a set
     double thin = 0;                    // m, least thickness of the two
-    double dent = 0;                    // m: edges that are further on the wrong side do not touch there
+    double dent = 0;  // m: sharp edges that are further on the wrong side do not touch there
     double reach = HUGE_VAL, turn = HUGE_VAL;  // m, rad: how far its rows of this sub-step keep the two apart
   };
   struct Row {
