@@ -126,7 +126,7 @@ void Engine::end(double time) {
 
 void Engine::open(const dfm_rigid_step &step) {
   const bool repeated = open_ && step.t == t_, as_long = step.h == h_;  // from the same states
-  if (repeated && stepped_) restore(!as_long);
+  if (repeated && (stepped_ || !as_long)) restore(!as_long);
   if (!repeated || !as_long) {
     Timer timer(engine_seconds);
     stepped_ &= !repeated;

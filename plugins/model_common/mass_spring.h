@@ -198,6 +198,10 @@ struct Material {
   // over 36 V0; both 0 for a cell that is flat at rest or cut
   struct CellStiffness { double bulk, collapse; };
   CellStiffness cell_stiffness(uint32_t c) const;
+  bool has_volume(uint32_t c) const {  // none: it is flat at rest
+    const double side = edge_length[cell_edge[6 * size_t(c)]];
+    return cell_volume6[c] / 6 > 1e-12 * side * side * side;
+  }
   double collapse_share(uint32_t c) const;
   double limit_of(uint32_t c) const {
     double sum = 0;
@@ -384,10 +388,10 @@ inline double Material::collapse_share(uint32_t c) const {
 
 // A cell that is flat at rest has no volume to keep, and neither has one that lost a spring (it is cut).
 inline Material::CellStiffness Material::cell_stiffness(uint32_t c) const {
-  const double v0 = cell_volume6[c] / 6, side = edge_length[cell_edge[6 * size_t(c)]];
+  const double v0 = cell_volume6[c] / 6;
   for (int n = 0; !edge_off.empty() && n < 6; ++n)
     if (edge_off[cell_edge[6 * size_t(c) + n]]) return {0, 0};
-  if (!(v0 > 1e-12 * side * side * side)) return {0, 0};
+  if (!has_volume(c)) return {0, 0};
   const double unit = at(kYoung, c) / (36 * v0), ratio = volume_ratio(c);
   return {ratio * unit, std::max(at(kCollapse, c) * collapse_share(c) - ratio, 0.0) * unit};
 }
@@ -401,7 +405,7 @@ inline void Material::rest_gradients(uint32_t c, double *out) const {
     const double u[3] = {y[0] - o[0], y[1] - o[1], y[2] - o[2]};
     const double w[3] = {z[0] - o[0], z[1] - o[1], z[2] - o[2]};
     const double r[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2], u[0] * w[1] - u[1] * w[0]};
-    const double k = v0 > 0 ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
+    const double k = has_volume(c) ? volume_ratio(c) * at(kYoung, c) / (36 * v0) : 0;
     out[a] = __builtin_sqrt(k * ((r[0] * r[0] + r[1] * r[1]) + r[2] * r[2]));
   }
 }

@@ -32,17 +32,17 @@ struct Order {
   double tolerance;
 };
 
-// PETSc and MPI of this process: one call at a time, whichever thread it comes from. Never destroyed, because
-// matrices that are left when MPI has ended cannot be.
+// PETSc and MPI of this process: one call at a time, whichever thread it comes from; a log function of the
+// host may make another one. Never destroyed, because matrices that are left when MPI has ended cannot be.
 struct Process {
   enum { kNew, kRunning, kEnded } state = kNew;
-  bool own_mpi = false, own_petsc = false;
+  bool own_mpi = false, own_petsc = false, working = false;  // working: in MPI or PETSc
   int size = 1, rank = 0, threads = 0, next = 0;
   pid_t pid = 0;
   MPI_Comm comm = MPI_COMM_NULL;
   std::map<int, System> systems;
   char said[300] = "";  // PETSc's reason of the last failure
-  std::mutex door;
+  std::recursive_mutex door;
 };
 alignas(Process) unsigned char room[sizeof(Process)];
 Process &process = *new (room) Process;
@@ -98,8 +98,6 @@ PetscErrorCode start_mpi() {
 }
 
 PetscErrorCode start() {
-  // threads and the handler of exit() stay when the last context closes
-  dlopen(own_file().c_str(), RTLD_NOW | RTLD_NODELETE);
   struct sigaction handlers[32];  // MPI installs its own; these are the host's matter
   for (int k = 1; k < 32; ++k) sigaction(k, nullptr, &handlers[k]);
   const PetscErrorCode failed = start_mpi();
@@ -154,7 +152,12 @@ PetscErrorCode share(Order &order) {
 
 void finish() {
   if (process.state == Process::kNew || gone()) return;
-  const std::lock_guard one_at_a_time(process.door);
+  const std::unique_lock one_at_a_time(process.door, std::try_to_lock);
+  if (!one_at_a_time || process.working) {  // exit() in the middle of a call: ranks cannot be asked to end
+    process.state = Process::kEnded;
+    if (process.size > 1) MPI_Abort(process.comm, 1);
+    return;
+  }
   Order end{kEnd, 0, 0, 0, 0};
   Data none;
   if (process.rank == 0 && process.size > 1) share(end);
@@ -187,22 +190,23 @@ dfm_status failure(const dfm_host &host, const char *what, PetscErrorCode code) 
 }
 
 dfm_status call(const dfm_host &host, const char *what, Order order, Data &data) {
+  if (process.pid && process.pid != getpid())  // its lock may be held for ever
+    return refuse(host, DFM_E_STATE, "petsc: this process is a child of the one that started MPI");
   const std::lock_guard one_at_a_time(process.door);
   *process.said = 0;
   if (process.state == Process::kNew)
     if (const PetscErrorCode failed = quietly(start)) return failure(host, "its start", failed);
-  if (gone())
-    return refuse(host, DFM_E_STATE,
-                  "petsc: MPI has ended, or this process is a child of the one that started it; release all "
-                  "bodies before");
+  if (gone()) return refuse(host, DFM_E_STATE, "petsc: MPI has ended; release all bodies before");
   int main_thread = 0;
   MPI_Is_thread_main(&main_thread);
   if (process.threads < MPI_THREAD_SERIALIZED && !main_thread)
     return refuse(host, DFM_E_UNSUPPORTED,
                   "petsc: the host started MPI for its main thread alone; start it with "
                   "MPI_THREAD_SERIALIZED, or run with one thread");
+  process.working = true;
   PetscErrorCode failed = process.size > 1 ? share(order) : 0;
   if (!failed) failed = quietly([&] { return perform(order, data); });
+  process.working = false;
   if (!failed && data.status == DFM_E_NOMEM) failure(host, what, PETSC_ERR_MEM);  // known to all ranks
   if (!failed) return data.status;
   const dfm_status status = failure(host, what, failed);
