@@ -26,7 +26,7 @@ HELD = {**FALL, "time": {"duration": 1, "step": 0.5, "mode": "static"}, "obstacl
 ENVIRONMENT = {**os.environ, "DEFORM_PLUGIN_PATH": str(pathlib.Path(PLUGIN).parent),
                "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OMPI_ALLOW_RUN_AS_ROOT": "1",
                "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1", "OMPI_MCA_rmaps_base_oversubscribe": "1",
-               "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}   # containers may forbid it, with a warning
+               "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}   # containers warn where they forbid it
 TWO = [MPIRUN, "-n", "2"]
 
 
