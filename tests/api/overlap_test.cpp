@@ -179,7 +179,9 @@ TEST(Overlap, OfBodyInsideBody_IsFoundAndOfBodyInRoomIsNot) {
   EXPECT_GT(found[0].enclosed, 50u);
   const test::Triangles room = test::inside_out(test::box_surface({0.5, 0.5, 0.5}, 1));
   thing(w, DFM_SHAPE_MESH, 0, &room);
-  EXPECT_EQ(overlaps(w).size(), 0u);  // of what was made since: the room
+  const auto still = overlaps(w);  // what no step has reported, and nothing with the room
+  ASSERT_EQ(still.size(), 1u);
+  EXPECT_EQ(still[0].b, found[0].b);
   dfm_world_destroy(w);
 }
 
@@ -359,7 +361,7 @@ TEST(Overlap, OfAPairThatTheHostMovesApart_HasContactAtOnce) {
   for (size_t i = 0; i < x.size(); i += 3) x[i] -= 0.102;  // 2 mm from b
   test::ok(dfm_body_set_state(a, n, x.data(), nullptr));
   test::set_velocity(a, {2, 0, 0});
-  test::run(w, 0.02, 1e-3);  // two steps later it would be inside
+  test::run(w, 0.1, 1e-3);  // two steps later it would be inside
   EXPECT_GT(test::measure(b).velocity[0], 0.5);
   test::ok(dfm_world_find_overlaps(w, &n));
   EXPECT_EQ(n, 0u);
