@@ -220,8 +220,8 @@ typedef struct dfm_overlap {
 DFM_API dfm_status dfm_world_overlaps_sized(dfm_world world, uint32_t row_size, uint32_t capacity,
                                             dfm_overlap *out, uint32_t *n);
 /** Overlaps found by the last check, and earlier ones that no step has reported. The library checks things
- * that were created, placed or restored once, in the next call that needs the plan (a step at the latest), and
- * not in every step. Filtered pairs are left out.
+ * that were created, placed or restored once, in the next call that needs the plan (a step at the latest),
+ * and not in every step. Filtered pairs are left out.
  * capacity 0 with out NULL only counts.
  * @return DFM_OK; DFM_E_ARG too small; DFM_E_HANDLE; DFM_E_BUSY. Threads: Not during step. Since 0.1. */
 static inline dfm_status dfm_world_overlaps(dfm_world world, uint32_t capacity, dfm_overlap *out,
