@@ -199,7 +199,7 @@ Crossed cross_skins(OverlapSkin &a, OverlapSkin &b, double offset, bool yes_or_n
   Crossed out;
   if (!b.room() && !a.room())
     for (int k = 0; k < 3; ++k)
-      if (!(std::min(a.hi()[k], b.hi()[k]) >= std::max(a.lo()[k], b.lo()[k]))) return out;  // a floor is flat
+      if (!(a.hi()[k] > b.lo()[k] && b.hi()[k] > a.lo()[k])) return out;  // a floor may be flat
   const double least = offset + a.slack() + b.slack();
   double edges = 0;
   near_pairs(a.tree(), b.tree(), 0, stack, [&](uint32_t p, uint32_t q, double) {
