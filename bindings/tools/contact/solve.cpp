@@ -172,7 +172,7 @@ class Solve final : public SolveLaws {
   void set_response(double added) {
     const Matrix &W = problem_.W;
     const double most = *std::max_element(W.value.begin(), W.value.end());
-    rows_.set_response(rows_.blocks[0], [&](double *to) {
+    rows_.set_response(rows_.blocks[0], false, [&](double *to) {
       for (size_t r = 0; r < W.rows; ++r)
         for (size_t c = 0; c < W.rows; ++c) *to++ = 0.5 * (W(r, c) + W(c, r)) + (r == c ? added * most : 0);
     });
