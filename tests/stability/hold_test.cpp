@@ -89,7 +89,8 @@ TEST_P(Hold, ImplicitBodies_DoNotCreep) {
   held("pinch", 1.05, 1.0 / 60, "corotational_fem");
   // far below their limit, and soft on soft: these slide or creep where contact starts from the free motion
   held("pull", 0.5, 1.0 / 60, "msm");
-  held("pinch", 1.05, 1.0 / 60, "msm");
+  // at 1.05 how many contacts stick all the time is chance: 1 to 8 for steps of 1/75 to 1/59 s
+  held("pinch", 1.2, 1.0 / 60, "msm");
 }
 
 // At a step far below what the bodies ask for, the solve's noise has the least time to die away between
