@@ -60,12 +60,6 @@ const char *launched_rank() {
   return rank ? rank : std::getenv("PMI_RANK");
 }
 
-std::string own_file() {
-  Dl_info self;
-  dladdr(reinterpret_cast<const void *>(&own_file), &self);
-  return self.dli_fname;
-}
-
 void finish();
 
 PetscErrorCode start_mpi() {
@@ -321,6 +315,12 @@ const dfm_type mumps =
     dp::type(DFM_KIND_SOLVER, "org.deform.petsc_mumps", "PETSc: factorization by MUMPS", "1.0.0", licence,
              "Amestoy, Duff, L'Excellent and Koster 2001, SIAM J. Matrix Anal. Appl. 23 (1)", nullptr,
              &table<petsc::kMumps>);
+
+std::string own_file() {
+  Dl_info self;
+  dladdr(reinterpret_cast<const void *>(&own_file), &self);
+  return self.dli_fname;
+}
 
 // Rank 0 starts MPI at once, because the others wait for it; these become deform-petsc-rank. A host that
 // started MPI before keeps its ranks.
