@@ -133,14 +133,14 @@ function(deform_precompile target)
 endfunction()
 
 # DEFORM_UNITY compiles files of a folder together, for a third of the work: what costs is headers and
-# templates, the same ones in each file. All presets but dev and clang use it, release for all but the tests.
-# cmake/unity_groups.py keeps apart what collides, anew when a file changes. CI's release build compiles each
-# file but the tests by itself, and dev all, so that a missing #include is an error there.
+# templates, the same ones in each file. All presets but dev, clang and static_clang use it.
+# cmake/unity_groups.py keeps apart what collides, anew when a file changes. Where each file is compiled by
+# itself, a missing #include is an error: dev does so, and CI by static_clang and clang.
 if(DEFORM_UNITY)
   include(DeformPython)
 endif()
 function(deform_unity target)
-  if(NOT DEFORM_UNITY OR DEFORM_UNITY STREQUAL "TESTS")
+  if(NOT DEFORM_UNITY)
     return()
   endif()
   get_target_property(sources ${target} SOURCES)

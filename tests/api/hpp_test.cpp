@@ -366,6 +366,12 @@ TEST(Hpp, RigidBodies_GoByTheirSet) {
   EXPECT_THROW(s.world.add_rigids(set, std::span(out).first(1)), deform::Error) << "room for one of two";
   s.world.add_rigids(set, out);
   EXPECT_EQ(s.world.rigids().size(), 3u);
+  dfm_rigid_state states[3];
+  dfm_rigid ids[3];
+  EXPECT_THROW(s.world.rigid_states(states, std::span(ids).first(2)), deform::Error) << "a name for two of three";
+  EXPECT_EQ(s.world.rigid_states(states, ids), 3u);
+  EXPECT_EQ(ids[2], out[1]);
+  EXPECT_EQ(states[2].position[0], 1);
   deform::Rigid(out[1]).destroy();
   EXPECT_EQ(s.world.rigids().size(), 1u);
 }
@@ -406,6 +412,21 @@ TEST(Hpp, Cuts_AreMadeAtOnceOrPlanned) {
   EXPECT_TRUE(s.ball.pieces().empty());
   EXPECT_TRUE(s.world.step(1e-3));
   EXPECT_GE(s.ball.pieces().size(), 1u);
+  s.ball.set_cut_delay(0.01);
+  EXPECT_EQ(s.ball.cut_delay(), 0.01);
+  EXPECT_EQ(s.ball.waiting_faces(), 0u);
+  deform::ToolDef knife;
+  knife.name = "knife";
+  knife.shape = DFM_TOOL_BLADE;
+  knife.half_size[0] = knife.half_size[1] = knife.half_size[2] = 0.01;
+  knife.pose.position[2] = 1;
+  const deform::Tool tool = s.world.add_tool(knife);
+  const dfm_body bodies[] = {s.ball.get()};
+  tool.set_cuts(DFM_CUT_SPLIT, bodies, 7);
+  uint32_t how = 0, most = 0;
+  EXPECT_EQ(tool.cuts(&how, &most), std::vector<dfm_body>{s.ball.get()});
+  EXPECT_EQ(how, uint32_t{DFM_CUT_SPLIT});
+  EXPECT_EQ(most, 7u);
   s.ball.plan_cut(2e-3, plane);
   s.ball.plan_no_cuts();
   EXPECT_THROW(s.ball.plan_cut(0, plane), deform::Error) << "it is past";

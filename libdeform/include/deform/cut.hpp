@@ -58,6 +58,10 @@ class BodyCuts {
   auto cut_delay() const {
     return produce<E, double>([&](double &delay) { return dfm_body_cut_delay(body(), &delay, nullptr); });
   }
+  // Faces that wait to open.
+  auto waiting_faces() const {
+    return produce<E, uint32_t>([&](uint32_t &n) { return dfm_body_cut_delay(body(), nullptr, &n); });
+  }
   auto pieces() const { return collect_handles<E, Self>(dfm_body_pieces, body()); }
 
  private:

@@ -400,10 +400,11 @@ class World : public Handle<dfm_world, struct WorldKind>, public WorldQueries<E,
   auto bodies(std::span<dfm_body> out) const { return fill<E, 1>(dfm_world_bodies, raw_, out); }
   auto obstacles(std::span<dfm_obstacle> out) const { return fill<E, 1>(dfm_world_obstacles, raw_, out); }
   auto rigids(std::span<dfm_rigid> out) const { return fill<E, 1>(dfm_world_rigids, raw_, out); }
-  // Of all rigid bodies, in the order of rigids().
-  auto rigid_states(std::span<dfm_rigid_state> out) const {
+  // Of all rigid bodies, in the order of rigids(); `rigids`: empty, or which body each is.
+  auto rigid_states(std::span<dfm_rigid_state> out, std::span<dfm_rigid> rigids = {}) const {
     return produce<E, uint32_t>([&](uint32_t &n) {
-      return dfm_world_rigid_states(raw_, uint32_t(out.size()), nullptr, out.data(), &n);
+      if (!rigids.empty() && rigids.size() != out.size()) return spans_disagree;
+      return dfm_world_rigid_states(raw_, uint32_t(out.size()), given(rigids), out.data(), &n);
     });
   }
 

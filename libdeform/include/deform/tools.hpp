@@ -67,11 +67,11 @@ class Tool : public Handle<dfm_tool, struct ToolKind> {
   auto set_cuts(uint32_t how, std::span<const dfm_body> bodies, uint32_t most = 0) const {
     return E::done(dfm_tool_set_cuts(raw_, how, most, static_cast<uint32_t>(bodies.size()), bodies.data()));
   }
-  // The bodies, as raw handles.
-  auto cuts() const {
+  // The bodies, as raw handles; how, most: as in set_cuts, may be null.
+  auto cuts(uint32_t *how = nullptr, uint32_t *most = nullptr) const {
     return produce<E, std::vector<dfm_body>>([&](std::vector<dfm_body> &out) {
       uint32_t n = 0;
-      const dfm_status s = dfm_tool_cuts(raw_, nullptr, nullptr, 0, nullptr, &n);
+      const dfm_status s = dfm_tool_cuts(raw_, how, most, 0, nullptr, &n);
       if (s < 0 || n == 0) return s;
       out.resize(n);
       return dfm_tool_cuts(raw_, nullptr, nullptr, n, out.data(), &n);
