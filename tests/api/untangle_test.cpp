@@ -193,6 +193,30 @@ TEST(Untangle, BodyLargerThanItsRoom_StaysAndIsNamed) {
   dfm_world_destroy(w);
 }
 
+// A large ball between two planes that are too close for it; where it goes to and fro, a small one has room
+// beside it, out of a held one.
+TEST(Untangle, BodyThatGoesBack_FindsNoOtherInItsPlace) {
+  test::Context c;
+  const dfm_world w = untangling(c);
+  const std::array<double, 3> n{std::sqrt(1 - 0.09), 0, 0.3};
+  ball(c, w, {0, 0, 0.15}, 0.2);
+  ball(c, w, {0.231 * n[0], 0, 0.15 + 0.231 * n[2]}, 0.03);
+  hold_all(ball(c, w, {0.283 * n[0], 0, 0.15 + 0.283 * n[2]}, 0.03));
+  dfm_obstacle_def plane = dfm_obstacle_def_default();
+  dfm_obstacle o = 0;
+  test::ok(dfm_obstacle_create(w, &plane, &o));
+  plane.pose = {{0, 0, 0.3}, {1, 0, 0, 0}};
+  test::ok(dfm_obstacle_create(w, &plane, &o));
+  const auto found = overlaps(w);
+  ASSERT_EQ(found.size(), 3u) << "with each plane, and the small one with the held one";
+  left(w);
+  for (const dfm_overlap &now : overlaps(w))
+    EXPECT_TRUE(std::any_of(found.begin(), found.end(), [&](const dfm_overlap &f) {
+      return f.a == now.a && f.b == now.b;
+    })) << "two that did not overlap before";
+  dfm_world_destroy(w);
+}
+
 TEST(Untangle, ByCall_PartsWhatIsAsideAndTakesItBack) {
   test::Context c;
   const dfm_world w = test::make_world(c, {});

@@ -52,7 +52,8 @@ class Untangler {
       if (!any) break;
       pairs = through();
     }
-    if (!pairs.empty()) restore_positions(pairs);
+    // What goes back may find another body in its place: that one goes back too.
+    for (; !pairs.empty(); pairs = through()) restore_positions(pairs);
     for (Overlap &f : found) {
       const OverlapPair p = pair_of(f);
       f.separated = moved(p) && !overlap(p);
