@@ -142,6 +142,9 @@ TEST(RigidHost, OfAnotherEngine_TakesPartInTheSolve) {
     EXPECT_TRUE(trouble & DFM_TROUBLE_PLUGIN);
     EXPECT_NE(std::strstr(dfm_last_error(), "lift"), nullptr) << dfm_last_error();
     EXPECT_EQ(dfm_world_hash(w), before);
+    double after[3];
+    ok(dfm_rigid_contact_wrench(plate, after, moment));
+    EXPECT_TRUE(std::equal(after, after + 3, force)) << "that of the last sub-step which was kept";
     // No motors in this host.
     EXPECT_EQ(dfm_rigid_set_motor(plate, 0, 1, 1), DFM_E_UNSUPPORTED);
   }
@@ -158,9 +161,14 @@ TEST(RigidBodies, HashAndSnapshotOnThreads_CoverThem) {
   EXPECT_GT(stats(a).contacts, 3u);
   EXPECT_EQ(dfm_world_hash(a), dfm_world_hash(b));
   const std::string data = snapshot(a);
+  double force[3], restored[3], moment[3];
+  ok(dfm_rigid_contact_wrench(plate, force, moment));
   run(a, 0.2, 1e-3);
   const uint64_t end = dfm_world_hash(a);
+  run(b, 0.01, 1e-3);
   ASSERT_EQ(dfm_world_restore(b, data.data(), data.size()), DFM_OK) << dfm_last_error();
+  ok(dfm_rigid_contact_wrench(other, restored, moment));
+  EXPECT_TRUE(std::equal(force, force + 3, restored));
   run(b, 0.2, 1e-3);
   EXPECT_EQ(dfm_world_hash(b), end);
   // The hash depends on a pose and on the target of a motor.

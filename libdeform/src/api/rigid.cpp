@@ -1,5 +1,7 @@
 #include "deform/rigid.h"
 
+#include <algorithm>
+
 #include "api/objects.h"
 #include "state/obstacle.h"
 #include "step/rigid/rigid.h"
@@ -143,11 +145,9 @@ dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double mom
   return as_status(rigid_of, rigid, [&](const Obstacle &o) {
     need(force, "force");
     need(moment, "moment");
-    const double h = o.rigid->last_h, *const p = &o.rigid->impulse[6 * size_t{o.rigid_body}];
-    for (int k = 0; k < 3; ++k) {
-      force[k] = h > 0 ? p[k] / h : 0;
-      moment[k] = h > 0 ? p[3 + k] / h : 0;
-    }
+    const double *const wrench = &o.rigid->wrench[6 * size_t{o.rigid_body}];
+    std::copy_n(wrench, 3, force);
+    std::copy_n(wrench + 3, 3, moment);
   });
 }
 

@@ -326,7 +326,7 @@ void exchange(World &w, Staged &t) noexcept {
     set.extra.swap(other.extra);
     set.motors.swap(other.motors);
     set.total.swap(other.total);
-    std::swap(set.last_h, other.last_h);
+    set.wrench.swap(other.wrench);
   }
   for (size_t i = 0; i < w.tools.size(); ++i) std::swap(w.tools[i]->cuts, t.tools[i].cuts);
   std::swap<WorldState>(w, t);

@@ -55,9 +55,8 @@ struct StagedBody : BodyState, OnPoints {
 struct StagedObstacle : ObstacleState { dfm_obstacle_def def{}; };
 struct StagedRigids {
   Array<dfm_rigid_state> state;
-  Array<double> extra, total;
+  Array<double> extra, total, wrench;
   Array<RigidMotor> motors;
-  double last_h = 0;
 };
 struct StagedTool { Tool::Cuts cuts; };
 struct StagedLaw {
@@ -86,7 +85,7 @@ struct Staged : WorldState {
     for (StagedBody &b : bodies)
       use_memory(m, b.p.x, b.p.v, b.p.dampers.v, b.p.dampers.slow, b.p.load, b.p.held, b.model.state,
                  b.surfel_impulse, b.anchor);
-    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total, r.motors);
+    for (StagedRigids &r : rigid_sets) use_memory(m, r.state, r.extra, r.total, r.wrench, r.motors);
   }
 };
 
@@ -515,6 +514,7 @@ void fields(Stream &s, W &w, const World &like) {
                      },
                      "a finite speed and a finite limit that is not negative"});
     s.array("impulse", r.total, l.total.size(), must::finite);
+    s.array("contact wrench", r.wrench, l.wrench.size(), must::finite);
   });
   at = 0;
   s.members("tools", w.tools, like.tools.size(), [&](auto &entry) {

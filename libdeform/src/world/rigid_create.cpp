@@ -213,6 +213,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   set.impulse.assign(6 * n, 0.0);
   set.revised.assign(6 * n, 0.0);
   set.total.assign(3 * n, 0.0);
+  set.wrench.assign(6 * n, 0.0);
   w.rigid_sets.reserve(w.rigid_sets.size() + 1);
   std::vector<std::unique_ptr<Obstacle>> parts;
   for (uint32_t i = 0; i < n; ++i) {

@@ -24,7 +24,7 @@ bool finite_values(std::span<const dfm_rigid_state> states) {
 RigidSet::RigidSet(World &w, const Memory &m, const std::string &name)
     : world(&w), host_name(name), host(find_host(name)) {
   use_memory(m, state, next, motors);
-  use_memory(m, extra, next_extra, velocity, impulse, first, revised, total);
+  use_memory(m, extra, next_extra, velocity, impulse, first, revised, total, wrench);
 }
 
 RigidSet::~RigidSet() {
@@ -91,7 +91,7 @@ void RigidSet::commit(const SubStep &now, double fraction) {
   extra.swap(next_extra);
   for (uint32_t i = 0; i < defs.size(); ++i)
     for (uint32_t k = 0; k < 3; ++k) total[3 * i + k] += impulse[6 * i + k];
-  last_h = now.h;
+  for (size_t k = 0; k < wrench.size(); ++k) wrench[k] = impulse[k] / now.h;
 }
 
 }  // namespace dfm

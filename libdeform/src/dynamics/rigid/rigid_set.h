@@ -51,7 +51,7 @@ struct RigidSet {
   // [n,6] the same velocity with the host's present data
   Array<double> revised;
   Array<double> total;            // [n,3] N s of contact since creation
-  double last_h = 0;              // s, of the last sub-step; 0: none yet
+  Array<double> wrench;           // [n,6] N, N m: mean of contact in the last sub-step that was kept
   bool of_tool = false;           // its bodies are parts of a tool (state/tool.h)
   std::recursive_mutex querying;  // one query of the host at a time, from any thread
 
