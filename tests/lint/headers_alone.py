@@ -1,18 +1,29 @@
 #!/usr/bin/env python3
-"""Each public header compiles alone in every language that a host may speak.
+"""Each public header compiles alone in every language that a host may speak; by clang, the headers for C also
+for Windows with Microsoft's compiler, whose C library is a few declarations here.
 
 headers_alone.py INCLUDE_DIR COMPILER...    C compilers; each is tried as C and as C++ (gcc -x c++, clang -x
                                             c++)
 """
+import atexit
 import pathlib
 import shutil
 import subprocess
 import sys
+import tempfile
 
 FLAGS = ["-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror"]
 CPP20 = {"attach.hpp", "cut.hpp", "defs.hpp", "deform.hpp", "models.hpp", "obstacles.hpp", "queries.hpp",
          "tools.hpp", "result.hpp"}   # std::span
 LANGUAGES = {"c99": "c", "c17": "c", "c++17": "c++", "c++20": "c++"}
+MICROSOFT = {"math.h": "#define INFINITY __builtin_inff()\n#define NAN __builtin_nanf(\"\")\n",
+             "string.h": "void *memcpy(void *, const void *, __SIZE_TYPE__);\n"}
+
+
+def targets(compiler, language, library):
+    yield []
+    if compiler == "clang" and language == "c":
+        yield ["--target=x86_64-pc-windows-msvc", "-ffreestanding", "-fms-compatibility", "-isystem", library]
 
 
 def main():
@@ -22,6 +33,10 @@ def main():
         print(f"no headers in {include}/deform")
         return 1
     failed = tried = 0
+    library = tempfile.mkdtemp()
+    atexit.register(shutil.rmtree, library)
+    for name, text in MICROSOFT.items():
+        (pathlib.Path(library) / name).write_text(text)
     for compiler in filter(shutil.which, compilers):
         for standard, language in LANGUAGES.items():
             for header in headers:
@@ -30,13 +45,13 @@ def main():
                     continue
                 # Twice: a header without a working guard fails.
                 source = f'#include "deform/{header.name}"\n' * 2 + "extern int nothing_else;\n"
-                run = subprocess.run([compiler, "-x", language, f"-std={standard}", *FLAGS, f"-I{include}",
-                                      "-"], input=source,
-                                     capture_output=True, text=True)
-                tried += 1
-                if run.returncode:
-                    failed += 1
-                    print(f"{compiler} {standard} {header.name}:\n{run.stderr}")
+                for target in targets(compiler, language, library):
+                    run = subprocess.run([compiler, *target, "-x", language, f"-std={standard}", *FLAGS,
+                                          f"-I{include}", "-"], input=source, capture_output=True, text=True)
+                    tried += 1
+                    if run.returncode:
+                        failed += 1
+                        print(f"{compiler} {' '.join(target)} {standard} {header.name}:\n{run.stderr}")
     print(f"{tried} compilations, {failed} failed")
     return 1 if failed or not tried else 0
 
