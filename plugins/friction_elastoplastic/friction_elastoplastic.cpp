@@ -142,9 +142,11 @@ DEFORM_PASS inline void hold(Block &b) {
   }
 }
 
+// Newton's steps within a bracket, which is halved where they do not shrink by half in two passes: f has an
+// inflection where i > 1, about which they may go to and fro.
 template <bool kPlain>
 DEFORM_PASS inline void solve(Return &t, double *active, const Exponent &e) {
-  double low[kLanes], high[kLanes], flows = 1;
+  double low[kLanes], high[kLanes], last[kLanes], before[kLanes], flows = 1;
   EACH_LANE (k) {
     const double lambda = t.lambda[k];
     const double elastic = t.top[k] < lambda ? t.top[k] : lambda;
@@ -157,6 +159,7 @@ DEFORM_PASS inline void solve(Return &t, double *active, const Exponent &e) {
     const double start = full >= 1.0 ? full : t.p[k] < 0.3 ? high[k] : full > middle ? full : middle;
     t.rho[k] = start > low[k] ? (start < high[k] ? start : high[k]) : low[k];
     t.rho[k] = active[k] > 0 ? t.rho[k] : t.top[k];
+    last[k] = before[k] = 1e300;
   }
   for (int pass = 0; pass < 100 && flows > 0; ++pass) {
     flows = 0;
@@ -169,10 +172,14 @@ DEFORM_PASS inline void solve(Return &t, double *active, const Exponent &e) {
       const double up = excess > 0 ? rho : high[k];
       const double down = excess > 0 ? low[k] : rho;
       const double next = rho - excess / (1.0 + t.p[k] * y.slope);
-      const double to = next >= down && next <= up ? next : 0.5 * (down + up), moved = std::fabs(to - rho);
+      const bool shrinks = kPlain || std::fabs(next - rho) <= 0.5 * before[k];
+      const double to = next >= down && next <= up && shrinks ? next : 0.5 * (down + up);
+      const double moved = std::fabs(to - rho);
       high[k] = active[k] > 0 ? up : high[k];
       low[k] = active[k] > 0 ? down : low[k];
       t.rho[k] = active[k] > 0 ? to : rho;
+      before[k] = last[k];
+      last[k] = moved;
       active[k] = moved > 4e-16 * rho ? active[k] : 0.0;
     }
     EACH_LANE (k) flows += active[k];

@@ -211,7 +211,7 @@ class CellBody {
     }
   }
 
-  // Of the mean strain in the frame, turned into the axes of the world.
+  // Of the mean strain in the frame, turned into the axes of the world; where frames turn, s S / det S.
   void cell_stress(const dfm_kin &k, double *stress) const {
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     const double flow = flow_at(k);
@@ -221,7 +221,7 @@ class CellBody {
       const Along along(*this, c, fibers_);
       const Lame l = along.material.lame;
       const double trace = ((m.s[0] + m.s[4]) + m.s[8]) - 3;
-      double twice[6], own[6], less[6] = {}, local[9], half[9] = {};
+      double twice[6], own[6], less[6] = {}, local[9], half[9];
       for (int n = 0; n < 6; ++n) {
         twice[n] = m.s[3 * kRow[n] + kCol[n]] + m.s[3 * kCol[n] + kRow[n]];
         own[n] = l.mu * twice[n] + (n < 3 ? l.lambda * trace - 2 * l.mu : 0);
@@ -237,9 +237,14 @@ class CellBody {
       if (plastic()) points_.mean_stress(c, law_of(flow, c), state_of(k, c), m.u, less);
       for (int n = 0; n < 6; ++n)
         local[3 * kRow[n] + kCol[n]] = local[3 * kCol[n] + kRow[n]] = own[n] - less[n];
-      for (int i = 0; i < 3; ++i)
-        for (int j = 0; j < 3; ++j)
-          for (int n = 0; n < 3; ++n) half[3 * i + j] += m.r[3 * i + n] * local[3 * n + j];
+      if (of_.turns) {
+        double both[9], area[3];
+        matrix_product(local, m.s, both);
+        cross(m.s + 3, m.s + 6, area);
+        const double over = 1 / std::max(std::fabs(dot(m.s, area)), kMinVolume);
+        for (int n = 0; n < 9; ++n) local[n] = 0.5 * over * (both[n] + both[3 * (n % 3) + n / 3]);
+      }
+      matrix_product(m.r, local, half);
       for (int n = 0; n < 6; ++n) {
         double sum = 0;
         for (int o = 0; o < 3; ++o) sum += half[3 * kRow[n] + o] * m.r[3 * kCol[n] + o];
@@ -272,6 +277,8 @@ class CellBody {
 
  private:
   static constexpr uint32_t kParallelCells = 500, kGrain = 64;
+  // The volume, over that at rest, that a flatter cell counts as having in its Cauchy stress.
+  static constexpr double kMinVolume = 1e-3;
   // Least sum of two stretches that turns a frame: nearer to a reflection the forces are no gradient.
   static constexpr double kMinStretch = 0.1;
 

@@ -101,8 +101,10 @@ constexpr uint32_t kCaps =
     DFM_CAP_ENERGY | DFM_CAP_STIFFNESS | DFM_CAP_DAMPING | DFM_CAP_ROTATION_INVARIANT | DFM_CAP_INSIDE;
 
 // The energy is not stationary in a frame by Gram-Schmidt, so forces are no gradient and have a moment.
+// Energies of the gradient need no frame.
 uint32_t caps_of(const void *self) {
-  const bool gradient = uint32_t(static_cast<const AnyBody *>(self)->tet.params[kRotation]) != kQr;
+  const auto &params = static_cast<const AnyBody *>(self)->tet.params;
+  const bool gradient = uint32_t(params[kRotation]) != kQr || uint32_t(params[kEnergy]) != kLinear;
   return gradient ? kCaps : kCaps & ~uint32_t(DFM_CAP_ENERGY | DFM_CAP_ROTATION_INVARIANT);
 }
 

@@ -18,6 +18,7 @@
 // The damper works on dS/dt, whose mixed entries in the axes of S are (s_i A_ij + s_j A_ji)/(s_i + s_j), A
 // = R^T dF/dt. Their squares are at most (A_ij^2 + A_ji^2)(1 + d^2)/2, d = (s_i - s_j)/(s_i + s_j), where R
 // K_e R^T has the halves without d: the row of the damper grows by damp 2 mu d^2 V times the same factors.
+// Where lambda < 0, its part takes from both matrices, and the rows are those without it.
 // With fibers stress and S have different axes. Let D be the elasticity, |D| its largest eigenvalue. dS is
 // the symmetric part of A less a matrix of norm at most d |A|/sqrt 2, which adds |D| (sqrt 2 d + d^2/2);
 // and stress : d2S adds |stress| (6 sqrt(1 + d^2)/p + 6 s^2/p^3), p the least sum of two stretches, s the
@@ -56,7 +57,11 @@ void Body::find_rows(Room &room) {
     for (int k = 0; k < 9; ++k) shape.g[k / 3 + 1][k % 3] = group[place / kGroup].g[k][place % kGroup];
     for (int a = 0; a < 3; ++a) shape.g[0][a] = -((shape.g[1][a] + shape.g[2][a]) + shape.g[3][a]);
     double d[6][6];
-    cell_elasticity(place, d);
+    const Group &own = group[place / kGroup];
+    const size_t lane = place % kGroup;
+    const model::Lame pressed{std::max(own.lambda[lane], 0.0), own.mu2[lane] / 2};
+    if (fiber.empty()) model::elasticity_matrix(pressed, d);
+    else cell_elasticity(place, d);
     model::block_norms(shape, d, room.blocks.data() + 10 * size_t(c));
   }
   std::fill(rest_rows.data(), rest_rows.data() + npoint, 0.0);

@@ -14,15 +14,21 @@ struct Collapse {
   typename Ops::V pressure, stiffness, energy;
 };
 
-// det: J. mu2, lambda: 2 mu V and lambda V, which make E V.
+// E V of a cell without fibers, of 2 mu V and lambda V.
+template <class Ops>
+static inline __attribute__((always_inline)) typename Ops::V young_of(typename Ops::V mu2,
+                                                                      typename Ops::V lambda) {
+  const typename Ops::V half = Ops::splat(0.5), sum = lambda + half * mu2 + Ops::splat(1e-300);
+  return half * (mu2 * (Ops::splat(3) * lambda + mu2)) / sum;
+}
+
+// det: J. young: E V.
 template <class Ops>
 static inline __attribute__((always_inline)) Collapse<Ops> collapse_of(double collapse, typename Ops::V det,
-                                                                       typename Ops::V mu2,
-                                                                       typename Ops::V lambda) {
+                                                                       typename Ops::V young) {
   using V = typename Ops::V;
-  const V zero = Ops::splat(0), one = Ops::splat(1), half = Ops::splat(0.5);
-  const V sum = lambda + half * mu2 + Ops::splat(1e-300);
-  const V c = Ops::splat(collapse) * (half * (mu2 * (Ops::splat(3) * lambda + mu2)) / sum);
+  const V zero = Ops::splat(0), one = Ops::splat(1);
+  const V c = Ops::splat(collapse) * young;
   const V u = Ops::more(one - Ops::splat(1 / kFlat) * det, zero), in = Ops::less(u, one), out = u - in;
   const V square = in * in;
   const V way = Ops::splat(0.25) * (square * square) + (out + Ops::splat(1.5) * (out * out));

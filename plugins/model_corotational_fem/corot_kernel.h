@@ -28,6 +28,7 @@ struct FiberGroup {
   double axis[3][kGroup];
   double alpha[kGroup], beta[kGroup], shear[kGroup];  // shear: 2 (mu_along - mu)
   double most[kGroup];                                // largest eigenvalue of the elasticity, or more
+  double young[kGroup];                               // across the axis
 };
 
 // Plastic cells (model_common/plastic.h): constants of the material, the first two times the volume.

@@ -393,7 +393,9 @@ DEFORM_INLINE bool resists(const model::Polar<Wide> &o, double flat = kFlat) {
   return __builtin_expect(mask_above(splat(flat), o.det) != 0, 0);
 }
 DEFORM_INLINE Collapse<Wide> collapse_of(const Block &b, const Four &q, v4 det) {
-  return collapse_of<Wide>(b.collapse, det, load4(q.group->mu2 + q.at), load4(q.group->lambda + q.at));
+  const v4 young = b.fiber ? load4(b.fiber[q.group - b.group].young + q.at)
+                           : young_of<Wide>(load4(q.group->mu2 + q.at), load4(q.group->lambda + q.at));
+  return collapse_of<Wide>(b.collapse, det, young);
 }
 
 // P V of four cells; f is lost where there are dampers.

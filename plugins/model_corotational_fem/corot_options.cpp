@@ -94,6 +94,7 @@ void Body::fill_material(Room &room) {
     out.beta[lane] = constants.beta * v;
     out.shear[lane] = 2 * (constants.mu_along - constants.mu) * v;
     out.most[lane] = model::largest_modulus(constants) * v;
+    out.young[lane] = at(kYoung, like) * v;
   }
   size_t groups_at = 0;
   for (uint32_t b = 0; b < nblock; ++b) {
@@ -139,6 +140,8 @@ const char *Body::idle(Param which) const {
   if ((which == kHardening || which == kCreep || which == kPlasticLimit) && !(largest_of(kYield) > 0))
     return model::plastic::kIdle;
   if (which == kCollapse && choice(kEnergy) != kLinear) return "energy is not corotational";
+  if (which == kRotation && choice(kEnergy) != kLinear && !has_dampers())
+    return "energy is not corotational and there are no dampers";
   if (which == kAxis && !has_fibers()) return model::kNoAxis;
   return nullptr;
 }

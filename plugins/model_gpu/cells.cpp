@@ -86,7 +86,7 @@ void Cells::find_rows() {
     model::Tetrahedron shape = rest_[c].shape;
     shape.volume = 1;  // the constants hold it
     double d[6][6];
-    model::elasticity_matrix(model::Lame{rest_[c].lambda, 0.5 * rest_[c].mu2}, d);
+    model::elasticity_matrix(model::Lame{std::max(double(rest_[c].lambda), 0.0), 0.5 * rest_[c].mu2}, d);
     model::block_norms(shape, d, norms.data() + 10 * c);
     for (size_t a = 0; a < 4; ++a) {
       const double *g = shape.g[a];

@@ -55,6 +55,27 @@ TEST(CorotForces, ShakenBody_HasNoNetForceOrTorque) {
       }
 }
 
+// A quarter of the volume: u = 1/2, so W = K young u^4/8 more, also where fibers have other moduli.
+TEST(CorotForces, Collapse_CountsYoungWithFibersToo) {
+  for (const double poisson : {0.3, -0.6}) {
+    Params p = {{"young", {2e5}},
+                {"poisson", {poisson}},
+                {"anisotropy_young", {1e6}},
+                {"anisotropy_poisson", {0.0}},
+                {"anisotropy_axis", {1, 0, 0}}};
+    double energy[2];
+    for (const double collapse : {0.0, 30.0}) {
+      p["collapse"] = {collapse};
+      Host host;
+      Instance b(host, kuhn_bar(2, 2, 2, 0.1, 0), p);
+      ASSERT_EQ(b.status, DFM_OK) << host.logged;
+      for (uint32_t i = 0; i < b.size(); ++i) b.x[4 * size_t(i) + 2] *= 0.25;
+      energy[collapse > 0] = b.energy();
+    }
+    EXPECT_NEAR(energy[1] - energy[0], 30 * 2e5 / 128 * 0.008, 1e-9 * energy[1]) << poisson;
+  }
+}
+
 // With Gram-Schmidt in place of the polar rotation the strain is not symmetric and a torque is left.
 TEST(CorotForces, GramSchmidt_LeavesATorque) {
   Host host;

@@ -329,3 +329,25 @@ TEST_F(Elastoplastic, PreslidingLoops_MatchTheReference) {
 }
 
 }  // namespace
+
+// About the inflection of the yield function with a large exponent, where Newton's steps alone go to and fro
+// and end at one of two forces by the parity of the passes.
+TEST_F(Elastoplastic, LargeExponent_ChangesSmoothlyWithTheSpeed) {
+  const Law l = make({0.0498, 0.0498, 0.01, 2, 1.455e7, 0, 0, 0.01, 0, 0.5485, 8, 0});
+  In in;
+  in.fn = 0.00194649;
+  in.h = 0.00119741;
+  in.area = 2.041e-6;
+  in.state[0] = -4.64757e-7;
+  in.state[1] = -2.52301e-6;
+  double before = 0, most = 0;
+  for (int k = 0; k <= 400; ++k) {
+    const double s = 0.9 + 0.2 * k / 400;
+    in.v[0] = -0.115721 * s;
+    in.v[1] = -0.0824217 * s;
+    const double force = rules::norm(rules::evaluate(l, in).f);
+    if (k > 0) most = std::max(most, std::fabs(force - before));
+    before = force;
+  }
+  EXPECT_LT(most, 0.01 * 0.0498 * in.fn) << "the speeds are 0.05 % apart";
+}

@@ -22,7 +22,7 @@ enum { DFM_MESH_ANY = 0, DFM_MESH_CELLS = 1, DFM_MESH_SURFACE = 2 };
  * @return DFM_OK; DFM_E_ARG; DFM_E_IO; DFM_E_FORMAT (file, line or byte, what was expected; there are no
  * cells); DFM_E_UNSUPPORTED (how to convert); DFM_E_NOMEM. Threads: Any thread. Since 0.1. */
 DFM_API dfm_status dfm_mesh_load(dfm_context *context, const char *path, uint32_t what, dfm_mesh_handle *out);
-/** Generators, SI units, with about n tetrahedra, the nearest number that the shape's lattice allows,
+/** Generators, SI units, with about n cells ("bricks": hexahedra), the nearest number that a lattice allows,
  * more if cells would otherwise be longer than twice their width; of a DFM_MESH_SURFACE, which is closed,
  * with about n near-equilateral triangles.
  * "cylinder": size = {radius, length, 0}, axis z from 0 to length, base at the origin; "beam": size = {x,

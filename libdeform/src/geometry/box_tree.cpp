@@ -78,8 +78,8 @@ bool BoxTree::renew(std::span<const uint32_t> corners, const double *x) {
   return true;
 }
 
-// Splits at the median of the longest axis; ties by triangle number, so that the tree depends on
-// the input alone.
+// Splits at the median of the longest axis; ties by triangle number, so that which triangles a leaf has
+// depends on the input alone.
 uint32_t BoxTree::split(uint32_t begin, uint32_t end) {
   const uint32_t self = uint32_t(node_.size());
   if (end - begin <= kLeaf) {

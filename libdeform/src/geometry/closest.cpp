@@ -8,6 +8,8 @@ namespace {
 
 // squared sine below which a cross product is too inaccurate to decide by
 constexpr double kSolid = 1e-12;
+// the rounding's square root: below this squared sine the places of two lines err by more than this share
+constexpr double kParallel = 1.5e-8;
 
 TrianglePoint on_corner(Vec3 p, Vec3 a, int corner) {
   TrianglePoint r{a, {0, 0, 0}, norm2(p - a), TriangleFeature(4 + corner)};
@@ -77,9 +79,11 @@ SegmentPoints closest_segments(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1) {
   if (nn > 1e-24 * a * c) {
     const double b = dot(u, w), d = dot(u, r), e = dot(w, r);
     const double s = (b * e - c * d) / nn, t = (a * e - b * d) / nn;
-    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) return {s, t, norm2(r + s * u - t * w)};
+    if (s >= 0 && s <= 1 && t >= 0 && t <= 1) offer(s, t);
+    if (best.distance2 >= 0 && nn > kParallel * a * c) return best;
   }
-  // The minimum lies on the border of the square of parameters, so at one of the four ends.
+  // The minimum lies on the border of the square of parameters, so at one of the four ends; of nearly parallel
+  // segments one of these is as near.
   offer(0, closest_on_segment(p0, q0, q1));
   offer(1, closest_on_segment(p1, q0, q1));
   offer(closest_on_segment(q0, p0, p1), 0);

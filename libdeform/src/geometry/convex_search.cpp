@@ -61,8 +61,8 @@ int winding_by_ray(const Triangles &m, Vec3 p) {
     const double slack = kRaySlack * length_scale(m.tree, p);
     const RayBoxes boxes(p, d, {slack, slack, slack});
     turns = 0;
-    // The three products of neighbors are each other's negatives to the bit, so no ray slips between two
-    // triangles; only one that meets an edge exactly is not clear.
+    const ShearedRay ray(p, d);
+    // Only a ray that meets an edge exactly is not clear.
     const bool clear = walk(
         m.tree,
         [&](const Box &b) {
@@ -71,14 +71,11 @@ int winding_by_ray(const Triangles &m, Vec3 p) {
         },
         [&](uint32_t place) {
           const uint32_t t = m.tree.triangles()[place];
-          const Vec3 a = m.corner(t, 0) - p, b = m.corner(t, 1) - p, c = m.corner(t, 2) - p;
-          const double u = dot(d, cross(b, c)), v = dot(d, cross(c, a)), w = dot(d, cross(a, b));
-          const bool inward = u >= 0 && v >= 0 && w >= 0, outward = u <= 0 && v <= 0 && w <= 0;
-          if (!inward && !outward) return true;
-          if (u == 0 || v == 0 || w == 0) return false;
-          const Vec3 n = cross(b - a, c - a);
-          const double along = dot(n, a);  // of the sign of d . n where the triangle lies ahead
-          if (dot(n, d) > 0 ? along > 0 : along < 0) turns += dot(n, d) > 0 ? 1 : -1;
+          const ShearedRay::Products at = ray.of(m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+          if (!at.meets()) return true;
+          if (at.a == 0 || at.b == 0 || at.c == 0) return false;
+          const bool outward = at.sum() > 0;
+          if (outward ? at.along > 0 : at.along < 0) turns += outward ? 1 : -1;
           return true;
         });
     if (clear) break;

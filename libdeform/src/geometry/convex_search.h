@@ -69,6 +69,7 @@ void all_on_ray(const Triangles &m, Vec3 o, Vec3 unit, const double &limit, F &&
   if (m.tree.empty()) return;
   const double slack = kRaySlack * length_scale(m.tree, o);
   const RayBoxes boxes(o, unit, {slack, slack, slack});
+  const ShearedRay ray(o, unit);
   walk(
       m.tree,
       [&](const Box &b) {
@@ -78,7 +79,7 @@ void all_on_ray(const Triangles &m, Vec3 o, Vec3 unit, const double &limit, F &&
       [&](uint32_t place) {
         const RayBoxes::Span inside = boxes.meet(m.tree.triangle_boxes()[place]);
         const uint32_t t = m.tree.triangles()[place];
-        const double at = ray_triangle(o, unit, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+        const double at = ray_triangle(ray, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
         if (at >= inside.near && at <= inside.far && at <= limit && at < kFar) f(at, t);
         return true;
       });

@@ -1,6 +1,8 @@
 #include "geometry/triangle_search.h"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "geometry/tree_walk.h"
 
@@ -11,13 +13,33 @@ constexpr double kPointSlack = 1e-9;  // of all lengths: far above the rounding 
 
 }  // namespace
 
-double ray_triangle(Vec3 o, Vec3 d, Vec3 a, Vec3 b, Vec3 c) {
-  const Vec3 e1 = b - a, e2 = c - a, p = cross(d, e2);
-  const double det = dot(e1, p);
-  if (det == 0) return kFar;
-  const Vec3 s = o - a, q = cross(s, e1);
-  const double u = dot(s, p) / det, v = dot(d, q) / det, t = dot(e2, q) / det;
-  return u >= 0 && v >= 0 && u + v <= 1 && t >= 0 ? t : kFar;
+ShearedRay::ShearedRay(Vec3 o, Vec3 d) : o_(o), z_(0) {
+  for (int k = 1; k < 3; ++k)
+    if (std::fabs(d[k]) > std::fabs(d[z_])) z_ = k;
+  x_ = (z_ + 1) % 3;
+  y_ = (z_ + 2) % 3;
+  if (d[z_] < 0) std::swap(x_, y_);
+  scale_ = 1 / d[z_];
+  shear_x_ = d[x_] * scale_;
+  shear_y_ = d[y_] * scale_;
+}
+
+ShearedRay::Products ShearedRay::of(Vec3 a, Vec3 b, Vec3 c) const {
+  struct Corner { double x, y, z; };
+  const auto sheared = [&](Vec3 p) -> Corner {
+    const Vec3 r = p - o_;
+    return {r[x_] - shear_x_ * r[z_], r[y_] - shear_y_ * r[z_], scale_ * r[z_]};
+  };
+  const Corner p = sheared(a), q = sheared(b), r = sheared(c);
+  Products out{q.x * r.y - q.y * r.x, r.x * p.y - r.y * p.x, p.x * q.y - p.y * q.x, 0};
+  out.along = out.a * p.z + out.b * q.z + out.c * r.z;
+  return out;
+}
+
+double ray_triangle(const ShearedRay &ray, Vec3 a, Vec3 b, Vec3 c) {
+  const ShearedRay::Products p = ray.of(a, b, c);
+  const double t = p.along / p.sum();
+  return p.meets() && p.sum() != 0 && t >= 0 ? t : kFar;
 }
 
 TriangleOnRay first_on_ray(const Triangles &m, Vec3 o, Vec3 unit, double limit, SearchCount *count) {
@@ -25,6 +47,7 @@ TriangleOnRay first_on_ray(const Triangles &m, Vec3 o, Vec3 unit, double limit, 
   if (m.tree.empty()) return best;
   const double slack = kRaySlack * length_scale(m.tree, o);
   const RayBoxes boxes(o, unit, {slack, slack, slack});
+  const ShearedRay ray(o, unit);
   SearchCount own;
   double most = limit;
   const auto bound = [&](const Box &b) { return boxes.first(b); };
@@ -34,7 +57,7 @@ TriangleOnRay first_on_ray(const Triangles &m, Vec3 o, Vec3 unit, double limit, 
       if (!(inside.near <= inside.far && inside.near <= most)) continue;
       ++own.triangles;
       const uint32_t t = m.tree.triangles()[i];
-      const double at = ray_triangle(o, unit, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+      const double at = ray_triangle(ray, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
       if (!(at >= inside.near && at <= inside.far && at < kFar)) continue;
       if (!(at < most || (at == most && t < best.triangle))) continue;
       most = at;

@@ -42,8 +42,28 @@ struct TriangleNearPoint {
   TrianglePoint at{};
 };
 
-// Moeller and Trumbore 1997: distance along the ray, or infinity. Both sides count.
-double ray_triangle(Vec3 o, Vec3 d, Vec3 a, Vec3 b, Vec3 c);
+// A ray, in coordinates in which it runs along an axis (Woop, Benthin and Wald 2013). The product of an edge is
+// the other's negative to the bit in its two triangles, and has the right sign or is zero, so no ray slips
+// between triangles, at an edge or a corner.
+class ShearedRay {
+ public:
+  ShearedRay(Vec3 o, Vec3 d);
+  // Products of the edges opposite to a, b and c: of one sign where the ray's line meets the triangle, that of
+  // normal . direction. along: the way to it times their sum.
+  struct Products {
+    double a, b, c, along;
+    double sum() const { return a + b + c; }
+    bool meets() const { return (a >= 0 && b >= 0 && c >= 0) || (a <= 0 && b <= 0 && c <= 0); }
+  };
+  Products of(Vec3 a, Vec3 b, Vec3 c) const;
+
+ private:
+  Vec3 o_;
+  int x_, y_, z_;
+  double shear_x_, shear_y_, scale_;
+};
+// Distance along the ray, or infinity. Both sides count.
+double ray_triangle(const ShearedRay &ray, Vec3 a, Vec3 b, Vec3 c);
 
 // Up to and with `limit`. A triangle counts where it is met inside of its box, to 1e-8 of all lengths: where
 // a ray grazes it by less than 1e-7 rad the numbers mean no more than that.

@@ -223,6 +223,8 @@ RestMesh second_order(const RestMesh &mesh) {
   const Memory &memory = *mesh.memory;
   const CellKind &kind = cell_kind(hexahedra ? DFM_CELL_HEX27 : DFM_CELL_TET10);
   const uint32_t tets = cell_kind(mesh.cell).tets;
+  if (uint64_t{mesh.ntet()} / tets * kind.tets >= kMaxTets)
+    fail(DFM_E_UNSUPPORTED, "the second-order cells would be more than %u tetrahedra", kMaxTets - 1);
   RestMesh out(memory);
   out.cell = kind.kind;
   out.points = mesh.points;
@@ -252,6 +254,7 @@ RestMesh second_order(const RestMesh &mesh) {
     const bool found = lo < edges.size() / 2 && std::pair(edges[2 * lo], edges[2 * lo + 1]) == key;
     return found ? uint32_t(mesh.npoint() + lo) : kNoPoint;
   };
+  Array<uint8_t> of_quad(edges.size() / 2, 0, memory);  // middle of a face of four corners or of a cell
   // The middle of a face or cell, of which each corner has its opposite in `far`.
   const auto add_middle = [&](const uint32_t *cell, std::span<const uint8_t> near, const uint8_t *far) {
     size_t least = 0;
@@ -262,6 +265,7 @@ RestMesh second_order(const RestMesh &mesh) {
     }
     const uint32_t at = middle(cell[near[least]], cell[far[least]]);
     store3(&out.points[3 * size_t{at}], (1 / double(near.size())) * sum);
+    of_quad[at - mesh.npoint()] = 1;
     out.cells.push_back(at);
   };
   const uint32_t corners = cell_kind(mesh.cell).nodes;
@@ -289,14 +293,11 @@ RestMesh second_order(const RestMesh &mesh) {
     const bool face = a != kNoPoint && b != kNoPoint && c != kNoPoint;  // a file may name other triangles
     // of hexahedra about the middle of the face, which is that of its diagonal
     const uint32_t around[6] = {q[0], a, q[1], b, q[2], c};
-    const auto length2 = [&](int k) {
-      return norm2(load3(&mesh.points[3 * size_t{q[k]}]) - load3(&mesh.points[3 * size_t{q[(k + 1) % 3]}]));
-    };
     if (face && hexahedra) {
-      const int longest = length2(0) > std::max(length2(1), length2(2)) ? 1 : length2(1) > length2(2) ? 3 : 5;
+      const int middle_of = of_quad[a - mesh.npoint()] ? 1 : of_quad[b - mesh.npoint()] ? 3 : 5;
       for (int k = 1; k < 5; ++k)
         out.tris.insert(out.tris.end(),
-                        {around[longest], around[(longest + k) % 6], around[(longest + k + 1) % 6]});
+                        {around[middle_of], around[(middle_of + k) % 6], around[(middle_of + k + 1) % 6]});
     } else if (face) out.tris.insert(out.tris.end(), {q[0], a, c, a, q[1], b, c, b, q[2], a, b, c});
     else out.tris.insert(out.tris.end(), q, q + 3);
     out.tri_group.insert(out.tri_group.end(), face ? 4 : 1, mesh.tri_group[t]);

@@ -94,7 +94,7 @@ uint32_t merge_points(RawMesh &raw) {
 // Programs that compute a seam or a pole twice write coordinates that differ in the last digits: of a double,
 // of a single, or of a text with six digits (1e-5 of the value at most). A gap as narrow as that is no
 // opening. Only points on open edges are merged, within 1e-5 of the largest coordinate and a thousandth of
-// the open edges there, so that no shape is lost. The first point of a place, in file order, is looked up.
+// the edges there, so that no shape is lost. The first point of a place, in file order, is looked up.
 constexpr double kRounding = 1e-5, kOfEdge = 1e-3;
 
 class Rims {
@@ -102,7 +102,8 @@ class Rims {
   explicit Rims(RawMesh &raw) : raw_(raw) {}
 
   uint32_t merge() {
-    const Array<uint64_t> edges = open_edges();
+    const Array<TriEdge> all = sorted_edges(*raw_.memory, count(raw_), raw_.tris.data());
+    const Array<uint64_t> edges = open_edges(all);
     double reach = 0, longest = 0;
     for (const uint64_t e : edges) {
       longest = std::max(longest, distance(first_end(e), second_end(e)));
@@ -111,7 +112,7 @@ class Rims {
     }
     width_ = std::min(kRounding * reach, kOfEdge * longest);
     if (!(width_ > 0)) return 0;
-    find_ends(edges);
+    find_ends(edges, all);
     uint32_t merged = 0;
     std::unordered_map<uint32_t, uint32_t> into;
     std::unordered_multimap<uint64_t, uint32_t> first;  // by cell of a grid of that width
@@ -136,8 +137,7 @@ class Rims {
   static uint32_t first_end(uint64_t edge) { return uint32_t(edge >> 32); }
   static uint32_t second_end(uint64_t edge) { return uint32_t(edge); }
 
-  Array<uint64_t> open_edges() const {
-    const Array<TriEdge> edges = sorted_edges(*raw_.memory, count(raw_), raw_.tris.data());
+  Array<uint64_t> open_edges(const Array<TriEdge> &edges) const {
     Array<uint64_t> out{*raw_.memory};
     for (size_t i = 0, j = 0; i < edges.size(); i = j) {
       while (j < edges.size() && edges[j].key == edges[i].key) ++j;
@@ -146,13 +146,17 @@ class Rims {
     return out;
   }
 
-  // Their ends, with the shortest of the edges there that is longer than rounding.
-  void find_ends(const Array<uint64_t> &edges) {
-    for (const uint64_t e : edges) {
-      const double length = distance(first_end(e), second_end(e));
-      for (const uint32_t p : {first_end(e), second_end(e)}) {
-        double &least = open_.try_emplace(p, DBL_MAX).first->second;
-        if (length > width_) least = std::min(least, length);
+  // Their ends, with the shortest of all edges there that is longer than rounding, or the longest.
+  void find_ends(const Array<uint64_t> &open, const Array<TriEdge> &all) {
+    for (const uint64_t e : open)
+      for (const uint32_t p : {first_end(e), second_end(e)}) open_.try_emplace(p, 0);
+    for (const TriEdge &e : all) {
+      const double length = distance(first_end(e.key), second_end(e.key));
+      for (const uint32_t p : {first_end(e.key), second_end(e.key)}) {
+        const auto at = open_.find(p);
+        if (at == open_.end()) continue;
+        double &edge = at->second;
+        if (edge <= width_ ? length > edge : length > width_ && length < edge) edge = length;
       }
     }
   }
@@ -417,10 +421,10 @@ void add_warnings(RestMesh &mesh, const Repairs &done) {
 RestMesh finish_surface(const std::string &path, RawMesh &&raw) {
   if (raw.tris.empty() && raw.tets.empty())
     fail(DFM_E_FORMAT,
-         "%s: no triangles in this file; a surface needs triangles, or polygons to cut into them",
+         "%s: no triangles; a surface needs triangles, or polygons to cut into them",
          path.c_str());
   if (raw.tris.size() >= kCrowdedEdge)
-    fail(DFM_E_UNSUPPORTED, "%s: %zu triangles; up to %u are read", path.c_str(), raw.tris.size() / 3,
+    fail(DFM_E_UNSUPPORTED, "%s: %zu triangles; at most %u are possible", path.c_str(), raw.tris.size() / 3,
          kCrowdedEdge / 3);
   check_points(path, raw.points);
   raw.tri_group.resize(count(raw), kNoGroup);

@@ -379,7 +379,8 @@ Lattice lay(const RestMesh &surface, const Grid &grid) {
 // The size that gives the nearest number of cells.
 Lattice seek(const RestMesh &surface, const Extent &box, double volume, uint32_t cells) {
   Lattice best;
-  double size = std::cbrt(volume / cells), apart = HUGE_VAL;
+  // a tiny surface has no volume in numbers
+  double size = std::max(std::cbrt(volume / cells), box.longest() / kMaxCells), apart = HUGE_VAL;
   uint32_t before[3] = {};
   for (int tries = 0; tries < kTries && apart > 0; ++tries) {
     // of a thin shape that lies askew most of the box is empty

@@ -11,7 +11,6 @@
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMaxGroups = 1u << 16;  // limit on the number of names of a file
 // Corners of a polygon up to which its ears are looked for, which takes the cube of them at worst.
 constexpr size_t kMaxEars = 512;
 constexpr double kRounding = 1e-12;  // of areas, of the polygon's

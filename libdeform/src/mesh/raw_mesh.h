@@ -10,6 +10,8 @@
 
 namespace dfm {
 
+inline constexpr uint32_t kMaxGroups = 1u << 16;  // of a file
+
 struct RawMesh : RestMesh {
   explicit RawMesh(const Memory &m) : RestMesh(m) { cell = 0; }  // until the first one
   // share: how much of each tetrahedron is material, where the file says so of all; inside, of hexahedra,

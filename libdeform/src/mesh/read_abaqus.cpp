@@ -176,13 +176,18 @@ class AbaqusReader {
     return &sets.all[at->second];
   }
 
-  // The next of the fields of a line, which end at commas; one that is blank is 0. Without commas words are.
+  // The next of the fields of a line, which end at commas; one that is blank or left out is 0. Without commas
+  // words are.
   std::string_view field() {
     const std::string_view line = in_.rest().substr(0, in_.rest().find('\n'));
     const size_t comma = line.find(',');
-    if (comma == line.npos) return in_.line_word();
-    in_.skip(comma + 1, "a field");
-    const std::string_view word = trimmed(line.substr(0, comma));
+    std::string_view word;
+    if (comma == line.npos) {
+      word = in_.line_word();
+    } else {
+      in_.skip(comma + 1, "a field");
+      word = trimmed(line.substr(0, comma));
+    }
     return word.empty() ? "0" : word;
   }
 

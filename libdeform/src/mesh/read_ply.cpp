@@ -81,8 +81,9 @@ class PlyReader {
     const std::string_view name = in_.line_word();
     const int64_t number = in_.to_integer(in_.line_word(), "the number of elements");
     if (number < 0) in_.refuse("promises %lld elements; a count cannot be negative", ll(number));
-    for (const Element &e : elements_)
-      if (e.name == name) in_.refuse("element %s is declared twice", Cursor::quote(name).c_str());
+    if (name == "vertex" || name == "face")  // others are passed over
+      for (const Element &e : elements_)
+        if (e.name == name) in_.refuse("element %s is declared twice", Cursor::quote(name).c_str());
     if (name == "vertex") npoint_ = in_.small(static_cast<uint64_t>(number), "vertices");
     elements_.push_back({name, number, {}});
   }

@@ -66,11 +66,11 @@ class StlReader {
     }
   }
 
-  void keyword(const char *wanted, const char *after) {
-    const std::string_view word = in_.word();
+  void expect(std::string_view word, const char *wanted, const char *after) {
     if (!Cursor::is_word(word, wanted))
       in_.refuse("expected '%s' after %s, found %s", wanted, after, Cursor::quote(word).c_str());
   }
+  void keyword(const char *wanted, const char *after) { expect(in_.word(), wanted, after); }
 
   void read_text() {
     for (std::string_view word = in_.word(); !word.empty(); word = in_.word()) {
@@ -94,8 +94,11 @@ class StlReader {
         group_ = out_.named_group(in_, 2, name);
         fresh = false;
       }
-      in_.line();  // the normal: follows from the corners, and some files have none
-      keyword("outer", "a facet's normal");
+      // the normal follows from the corners, and some files have none
+      std::string_view after = in_.word();
+      while (!after.empty() && !Cursor::is_word(after, "outer") && !Cursor::is_word(after, "vertex"))
+        after = in_.word();
+      expect(after, "outer", "a facet's normal");
       keyword("loop", "'outer'");
       for (int k = 0; k < 3; ++k) {
         keyword("vertex", "'outer loop' or another vertex");

@@ -362,7 +362,7 @@ class VtkReader {
       const Number type = number_type(in_, in_.word());
       if (name == kVtkGroupNumber && width == 2 && type == Number::i32)
         read_whole(product(2, tuples), type, "numbers of groups", "a group's number",
-                   [&](int64_t v) { sink_.group_numbers.push_back(v); });
+                   [&](int64_t v) { sink_.add_number(v); });
       else if (name == kVtkGroupName && width == 1 && type == Number::text) read_strings(tuples, true);
       else if (name == kVtkGroupName && width == 1 && type == Number::u8)
         read_whole(tuples, type, "characters of names", "a character of a group's name",

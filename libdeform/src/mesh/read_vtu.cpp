@@ -245,7 +245,7 @@ class VtuReader {
         if (!a.in.binary) a.in.skip_space();
         if (a.in.left() == 0) break;
         const int64_t v = a.in.integer(a.type, "a value of the field data");
-        if (name == kVtkGroupNumber) sink_.group_numbers.push_back(v);
+        if (name == kVtkGroupNumber) sink_.add_number(v);
         else sink_.add_letter(v);
       }
     }

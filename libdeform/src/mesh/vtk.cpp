@@ -58,15 +58,16 @@ void VtkCells::add(const Cursor &in, uint8_t type, const uint32_t *corners, size
   }
   if (is_one_of({1, 2, 3, 4})) return out_.keep_points(corners, n, group(type > 2));  // points, lines
   curved_ += is_one_of({30, 34, 36, 69, 70, 76, 77});
-  if (is_one_of({71, 78, 79, 80}))
+  if (is_one_of({64, 71, 78}))
     in.unsupported(
         "cell %zu is a tetrahedron above second order (type %d); write cells of first or second order (for "
         "instance gmsh -order 2)",
         cell, type);
-  if (is_one_of({11, 13, 14, 15, 16, 25, 26, 27, 29, 31, 32, 33, 37, 41, 42, 72, 73, 74}))
+  if (is_one_of({11, 13, 14, 15, 16, 26, 27, 31, 32, 33, 37, 41, 42, 65, 66, 67, 72, 73, 74, 79, 80, 81}))
     in.unsupported(
         "cell %zu is a volume cell of type %d (voxel, wedge, pyramid, polyhedron, or a hexahedron above "
-        "first order); tetrahedra (types 10 and 24) and hexahedra (12) are read: mesh the shape with these",
+        "second order); tetrahedra (types 10 and 24) and hexahedra (12, 25 and 29) are read: mesh the shape "
+        "with these",
         cell, type);
 }
 
@@ -76,15 +77,17 @@ void VtkCells::finish(const Cursor &in) {
         "%llu second- or higher-order faces and nothing straight; write first-order cells (for instance gmsh "
         "-order 1)",
         ull(curved_));
-  for (MeshGroup &g : out_.groups)
-    for (size_t k = 0; k < names_.size() && 2 * k + 1 < group_numbers.size(); ++k)
-      if (group_numbers[2 * k] == g.dimension && group_numbers[2 * k + 1] == g.tag && !names_[k].empty())
-        g.name = names_[k];
+  for (size_t k = 0; k < names_.size() && 2 * k + 1 < numbers_.size(); ++k) {
+    const int64_t dimension = numbers_[2 * k], tag = numbers_[2 * k + 1];
+    if (names_[k].empty() || dimension != int32_t(dimension) || tag != int32_t(tag)) continue;
+    if (out_.has_group(int32_t(dimension), int32_t(tag)))
+      out_.groups[out_.group(in, int32_t(dimension), int32_t(tag))].name = names_[k];
+  }
 }
 
 void VtkCells::add_letter(int64_t letter) {
   if (letter) name_ += static_cast<char>(letter);
-  else names_.push_back(std::exchange(name_, {}));
+  else add_name(std::exchange(name_, {}));
 }
 
 }  // namespace dfm

@@ -32,10 +32,14 @@ class VtkCells {
   void finish(const Cursor &in);
 
   // Names for groups, as our writer leaves them: pairs of dimension and number, and names whose letters are
-  // each followed by a zero, or whole.
-  std::vector<int64_t> group_numbers;
+  // each followed by a zero, or whole. Those beyond the number of groups that a file may have name none.
+  void add_number(int64_t number) {
+    if (numbers_.size() < 2 * kMaxGroups) numbers_.push_back(number);
+  }
   void add_letter(int64_t letter);
-  void add_name(std::string_view name) { names_.emplace_back(name); }
+  void add_name(std::string_view name) {
+    if (names_.size() < kMaxGroups) names_.emplace_back(name);
+  }
 
  private:
   RawMesh &out_;
@@ -43,6 +47,7 @@ class VtkCells {
   uint64_t curved_ = 0;
   std::string name_;
   std::vector<std::string> names_;
+  std::vector<int64_t> numbers_;
 };
 
 }  // namespace dfm

@@ -118,6 +118,23 @@ TEST(ConvexGap, SegmentsAndBoxes_MatchClosedForms) {
   }
 }
 
+// Segments beside each other, of length one, a little askew: as near as their closest ends, or nearer.
+TEST(ClosestSegments, NearlyParallel_AreNoFartherThanTheirEnds) {
+  Random r;
+  for (int i = 0; i < 20000; ++i) {
+    const double askew = std::pow(10, r.number(-12, -3));
+    const Vec3 p0 = r.in_box(1), along = dfm::rotate(r.turn(), {1, 0, 0});
+    const Vec3 q0 = p0 + r.number(-0.9, 0.9) * along + 1e-3 * dfm::any_tangent(along);
+    const Vec3 p1 = p0 + along, q1 = q0 + along + askew * r.in_box(1);
+    const double d = std::sqrt(dfm::closest_segments(p0, p1, q0, q1).distance2);
+    const auto to = [](Vec3 p, Vec3 a, Vec3 b) {
+      return dfm::norm(p - a - dfm::closest_on_segment(p, a, b) * (b - a));
+    };
+    const double ends = std::min({to(p0, q0, q1), to(p1, q0, q1), to(q0, p0, p1), to(q1, p0, p1)});
+    ASSERT_LE(d, ends) << i << ", " << askew;
+  }
+}
+
 TEST(ConvexGap, ShapesWithoutSize_GiveFiniteResults) {
   const Vec3 p{1, 2, 3};
   EXPECT_FALSE(dfm::convex_gap(ball(p, 0), ball(p, 0)).apart);
@@ -254,12 +271,40 @@ TEST(ConvexSearch, ThroughATree_GivesTheBitsOfEveryTriangle) {
   }
 }
 
+// A cube of twelve triangles, looking outward.
+constexpr Vec3 kCube[8] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                           {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+constexpr int kCubeFaces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                                   {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+
+TEST(TriangleSearch, RaysAtCornersAndEdges_NeverSlipThrough) {
+  Random r;
+  for (int i = 0; i < 300; ++i) {
+    const dfm::Quat q = r.turn();
+    const Vec3 shift = r.in_box(1);
+    Vec3 x[8];
+    for (int k = 0; k < 8; ++k) x[k] = dfm::rotate(q, kCube[k]) + shift;
+    Soup soup;
+    for (const auto &f : kCubeFaces) soup.add(x[f[0]], x[f[1]], x[f[2]]);
+    const dfm::Triangles m = soup.renew();
+    const Vec3 middle = 0.5 * (x[0] + x[7]), o = middle + dfm::rotate(r.turn(), {4, 0, 0});
+    const auto met = [&](Vec3 p) {
+      const double way = dfm::norm(p - o);
+      EXPECT_LE(dfm::first_on_ray(m, o, (1 / way) * (p - o), 10).distance, way * (1 + 1e-9)) << i;
+    };
+    for (const Vec3 p : x) met(0.999999 * (p - middle) + middle);
+    // exactly on what triangles share, up to the rounding of the point
+    for (const auto &f : kCubeFaces)
+      for (int k = 0; k < 3; ++k) {
+        met(x[f[k]] + 1e-12 * (middle - x[f[k]]));
+        met(x[f[k]] + r.number(0, 1) * (x[f[(k + 1) % 3]] - x[f[k]]) + 1e-12 * (middle - x[f[k]]));
+      }
+  }
+}
+
 TEST(ConvexSearch, WindingByRay_DistinguishesInsideFromOutside) {
-  Soup soup;  // a cube of twelve triangles, looking outward
-  const Vec3 x[8] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
-  const int faces[12][3] = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
-                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
-  for (const auto &f : faces) soup.add(x[f[0]], x[f[1]], x[f[2]]);
+  Soup soup;
+  for (const auto &f : kCubeFaces) soup.add(kCube[f[0]], kCube[f[1]], kCube[f[2]]);
   const dfm::Triangles m = soup.renew();
   Random r;
   for (int i = 0; i < 5000; ++i) {

@@ -170,6 +170,25 @@ TEST(FinishSurface, FartherApart_IsNotMerged) {
   EXPECT_EQ(finished(open).npoint(), 16u);
 }
 
+// Its edges are shorter than what rounding is taken to be beside a large triangle far out.
+TEST(FinishSurface, SmallOpenTubeBesideALargeTriangle_KeepsItsPoints) {
+  constexpr uint32_t n = 20;
+  Soup s;
+  s.points = {{100, 0, 0}, {99, 0, 0}, {100, 1, 0}};
+  s.tris = {{0, 1, 2}};
+  for (const double z : {0.0, 1e-3})
+    for (uint32_t i = 0; i < n; ++i) {
+      const double angle = 2 * 3.14159265358979 * i / n;
+      s.points.push_back({3e-3 * std::cos(angle), 3e-3 * std::sin(angle), z});
+    }
+  for (uint32_t i = 0; i < n; ++i) {
+    const uint32_t a = 3 + i, b = 3 + (i + 1) % n;
+    s.tris.push_back({a, b, b + n});
+    s.tris.push_back({a, b + n, a + n});
+  }
+  EXPECT_EQ(finished(s).npoint(), 3 + 2 * n);
+}
+
 TEST(FinishSurface, TurnedAtRandom_FacesOutward) {
   for (const uint32_t every : {1u, 2u, 3u, 4u}) {
     const RestMesh m = finished(turned(box({}, {1, 1, 1}), every));

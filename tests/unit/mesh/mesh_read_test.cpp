@@ -338,6 +338,8 @@ TEST(MeshRead, VtkStructure_IsChecked) {
   expect_refusal("v.vtk", kVtk + eight + "12\n", DFM_E_FORMAT, {"cell 0", "distorted", "order its points"});
   expect_refusal("v.vtk", kVtk + eight + "24\n", DFM_E_FORMAT, {"8 points", "expected 10"});
   expect_refusal("v.vtk", kVtk + eight + "71\n", DFM_E_UNSUPPORTED, {"above second order", "-order 2"});
+  for (const char *type : {"67\n", "79\n", "81\n"})  // of any order; Bezier hexahedron, pyramid
+    expect_refusal("v.vtk", kVtk + eight + type, DFM_E_UNSUPPORTED, {"volume cell of type", "29"});
 }
 
 TEST(MeshRead, MshStructure_IsChecked) {

@@ -200,9 +200,9 @@ TEST(Abaqus, Sets_AreGroupsHoweverTheyAreWritten) {
   EXPECT_TRUE(mesh.warnings.empty());
 }
 
-TEST(Abaqus, BlankCoordinate_IsZero) {
+TEST(Abaqus, BlankOrMissingCoordinate_IsZero) {
   const RestMesh mesh = parsed(
-      "*NODE\n1, 0, , 0\n2, 1., , ,\n3, 0, 1, 0, 0., 0., 1.\n4, , , 1, 0., 0., 1.\n"
+      "*NODE\n1, 0, , 0\n2, 1.\n3, 0, 1,\n4, , , 1, 0., 0., 1.\n"
       "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n");
   EXPECT_EQ(mesh.points, (Array<double>{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1}));
 }

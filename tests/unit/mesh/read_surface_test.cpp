@@ -2,6 +2,7 @@
 // refusal names its place.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <map>
 
 #include "mesh/raw_mesh.h"
@@ -209,6 +210,10 @@ TEST(ReadSurface, StlRefusals_NamePlaceAndReason) {
   const std::string facet =
       "facet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\n";
   EXPECT_EQ(parse("a.stl", "solid\n" + facet + "endsolid").ntri(), 1u);
+  std::string line = facet;  // white space is free
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  EXPECT_EQ(parse("a.stl", "solid\n" + line + "endsolid").ntri(), 1u);
+  expect_refusal("a.stl", "solid\nfacet normal 0 0 1\nvertex 0 0 0\n", DFM_E_FORMAT, {"'outer'", "'vertex'"});
   expect_refusal("a.stl", "solid\n" + facet, DFM_E_FORMAT, {"'facet' or 'endsolid'", "end of the file"});
   expect_refusal("a.stl", "solid\n" + facet + "endsolid\nfacet", DFM_E_FORMAT, {"a.stl:10:", "'solid'"});
   expect_refusal("a.stl", "solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nendloop\n",

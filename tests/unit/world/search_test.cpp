@@ -24,7 +24,7 @@ using dfm::Vec3;
 dfm::TriangleOnRay every_triangle(const dfm::Triangles &m, Vec3 o, Vec3 d, double limit) {
   dfm::TriangleOnRay best;
   for (uint32_t t = 0; t < m.corners.size() / 3; ++t) {
-    const double at = dfm::ray_triangle(o, d, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
+    const double at = dfm::ray_triangle({o, d}, m.corner(t, 0), m.corner(t, 1), m.corner(t, 2));
     if (at <= limit && at < best.distance) best = {at, t};
   }
   return best;
@@ -108,7 +108,7 @@ dfm_query_hit every_triangle(dfm::World &w, Vec3 o, Vec3 d) {
     for (uint32_t t = 0; t < b->surface.ntri; ++t) {
       Vec3 x[3];
       for (size_t k = 0; k < 3; ++k) x[k] = b->surface.sum(b->surface.tri[3 * size_t{t} + k], b->p.x.data());
-      const double at = dfm::ray_triangle(o, d, x[0], x[1], x[2]);
+      const double at = dfm::ray_triangle({o, d}, x[0], x[1], x[2]);
       if (!(at < hit.distance)) continue;
       hit.distance = at;
       hit.thing = b->handle;
@@ -126,7 +126,7 @@ dfm_query_hit every_triangle(dfm::World &w, Vec3 o, Vec3 d) {
     if (ob->def.shape == DFM_SHAPE_PLANE && -at_o.z / at_d.z >= 0) met(-at_o.z / at_d.z, kNone);
     for (size_t i = 0; i < ob->triangles.size(); i += 3) {
       const auto x = [&](size_t k) { return dfm::load3(&ob->points[size_t{3} * ob->triangles[i + k]]); };
-      met(dfm::ray_triangle(at_o, at_d, x(0), x(1), x(2)), uint32_t(i / 3));
+      met(dfm::ray_triangle({at_o, at_d}, x(0), x(1), x(2)), uint32_t(i / 3));
     }
   }
   return hit;
