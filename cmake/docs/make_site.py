@@ -57,13 +57,17 @@ def broken(site):
 
 
 def add_live(made, site):
-    """The page of `make wasm` where it has been made, and the link to it."""
+    """The page of `make wasm` where it has been made, and the links to it: README's lead there at once."""
     if not (made / "index.html").is_file():
         return
     shutil.copytree(made, site / "live", dirs_exist_ok=True)
     page = site / "libdeform/doc/howto/webassembly.html"
     name = "<code>live/index.html</code>"
     page.write_text(page.read_text().replace(name, f'<a href="../../../live/index.html">{name}</a>'))
+    page = site / "index.html"
+    contents, mark, text = page.read_text().partition("<article>")
+    text = text.replace('"libdeform/doc/howto/webassembly.html"', '"live/index.html"')
+    page.write_text(contents + mark + text)
 
 
 def main():

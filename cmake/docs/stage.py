@@ -102,6 +102,8 @@ class Stage:
 
     def _staged(self, path):
         """Where a file of the repository stands in the folder; it is put there."""
+        if path == HEADERS[0]:
+            return "api/index.md"
         here = self.root / path
         self.wanted.append(path)
         if here.is_dir():

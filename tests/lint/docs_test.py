@@ -142,6 +142,10 @@ class Site(unittest.TestCase):
                     there = posixpath.normpath(posixpath.join(posixpath.dirname(path), target))
                     self.assertIn(there, self.stage.files, f"{path}: {target}")
 
+    def test_front_page_leads_to_the_demo_and_the_reference(self):
+        for target in ("libdeform/doc/howto/webassembly.md", "api/index.md"):
+            self.assertIn(f"]({target})", self.stage.files["README.md"])
+
     def test_contents_follow_the_reading_order(self):
         sections = [next(iter(entry)) for entry in self.stage.nav]
         self.assertEqual(sections[:3], ["Reading order", "Overview", "First steps"])

@@ -35,6 +35,10 @@ GOOD = {
     "CMakePresets.json": '{"testPresets": [{"name": "base"}, {"name": "asan", "filter": {"exclude": '
                          '{"name": "it\\\\.Tree\\\\.(Finds_|IsSorted$)|Wide/.*_(a|b)$"}}}]}\n',
     "Makefile": "all:\n\techo\n",
+    "SECURITY.md": "| program | reads | in `make soak` |\n|---|---|---|\n"
+                   "| `fuzz_obj`, `ply` | a mesh | 5,000 each |\n| `fuzz_law` | laws | 300 |\n",
+    "tests/fuzz/CMakeLists.txt": "deform_add_fuzz(law law 300)\nforeach(reader obj ply)\n"
+                                 "  deform_add_fuzz(${reader} mesh 5000 ${seeds})\nendforeach()\n",
     "CMakeLists.txt": "# no -ffast-math here\nadd_compile_options(-ffp-contract=off -mno-fma)\n",
     ".ci/run": "#!/bin/sh\n",
     "examples/01_hello.c": HELLO,
@@ -217,6 +221,10 @@ BAD = {
                                       f'{{"name": "{name}"}}}}}}]}}\n')
                 for name in ("Tree|Gone", "Tree.(Finds|Loses)_", "(Tree|Wide/.*_a|Narrow/.*_a)",
                              "Forest.Finds_$|Tree.Finds_$")],
+    "fuzzers": [("SECURITY.md", "| `fuzz_gone` | nothing | 3 |\n"),
+                ("SECURITY.md", "=| `fuzz_obj`, `ply` | a mesh | 5,000 each |\n"),
+                ("SECURITY.md", "=| `fuzz_obj`, `ply` | a mesh | 6,000 each |\n"
+                                "| `fuzz_law` | laws | 300 |\n")],
     "walks": [("README.md", "`explain` in `tree.cpp`\n"), ("README.md", "`log` in\n`gone.cpp`\n")],
     "versions": [
         ("CMakeLists.txt", "project(deform VERSION 0.2.0)\n"), ("CHANGELOG.md", "## 0.2.0 (unreleased)\n"),

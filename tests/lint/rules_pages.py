@@ -169,6 +169,22 @@ def shipped(tree):
                     yield path, line, f"{name} is not in {needed} (CONTRIBUTING.md, How to add)"
 
 
-RULES = {"walks": walks, "names": names, "scene_keys": scene_keys, "shipped": shipped,
+def fuzzers(tree):
+    """The table of SECURITY.md has the fuzz programs that are built, and their inputs in `make soak`."""
+    page, lists = "SECURITY.md", "tests/fuzz/CMakeLists.txt"
+    if page not in tree.paths or lists not in tree.paths:
+        return
+    readers = re.findall(r"foreach\(reader (.*)\)", tree.text(lists))
+    built = {(name, int(inputs)) for names, inputs in re.findall(r"^ *deform_add_fuzz\((\S+) \w+ (\d+)",
+                                                                 tree.text(lists), re.M)
+             for name in names.replace("${reader}", *readers).split()}
+    said = {(name, int(re.match(r"[\d,]+", inputs)[0].replace(",", "")))
+            for names, inputs in re.findall(r"^\| (`fuzz_.*?) \| .* \| (.*) \|$", tree.text(page), re.M)
+            for name in re.findall(r"`(?:fuzz_)?(\w+)`", names)}
+    for name, inputs in sorted(built ^ said):
+        yield page, 1, f"fuzz_{name} with {inputs} inputs is in this table or in {lists}, not in both"
+
+
+RULES = {"fuzzers": fuzzers, "walks": walks, "names": names, "scene_keys": scene_keys, "shipped": shipped,
          "links": links, "citations": citations,
          "reading_order": reading_order, "pictures": pictures}
