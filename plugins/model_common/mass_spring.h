@@ -91,6 +91,12 @@ inline bool fit_together(const dfm_host *h, const char *who, const double *value
     model::complain(h, who, "parameter anisotropy_axis is zero; give a direction");
     return false;
   }
+  if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt) {
+    model::complain(h, who,
+                    "parameter anisotropy_form A works with damper voigt only, since with other dampers its "
+                    "force has no energy; choose form B");
+    return false;
+  }
   return true;
 }
 
@@ -171,6 +177,7 @@ struct Material {
   bool damping_on = false, drag_on = false;
 
   uint32_t choice(Param which) const { return uint32_t(params[which]); }
+  bool is_turned() const { return !edge_tilt.empty() && choice(kAxisForm) == kFormA; }
   // Branches: a spring of share `part` of the stiffness in series with a dashpot.
   bool has_branch() const { return choice(kDamper) != kVoigt; }
   double part() const {

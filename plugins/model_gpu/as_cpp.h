@@ -38,3 +38,4 @@
 #define HAS_CELLS call.has(kWithCells)
 #define HAS_OPTIONS call.has(kWithOptions)
 #define HAS_BRANCHES call.has(kWithBranches)
+#define TURNED call.has(kTurned)

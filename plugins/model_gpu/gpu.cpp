@@ -3,6 +3,7 @@
 // (2.25), (2.26), 2.1.2 and 7.1); the bodies step themselves.
 #include <cstring>
 
+#include "../model_common/spring_mask.h"
 #include "../model_common/stepper.h"
 #include "cells.h"
 #include "deform/plugin_draft.h"
@@ -50,6 +51,7 @@ template <>
 const dfm_effect_rows kEffectRows<Springs> = model::rows_of(msm::kOff);
 // state follows by slot
 const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
+const dfm_seen_velocity kSeenVelocity = {sizeof(dfm_seen_velocity), 0};
 
 // The tables of the model on bodies Of.
 template <class Of>
@@ -79,6 +81,9 @@ struct Tables {
     if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
     if (!strcmp(id, DFM_EXT_FACTS)) return &Ops::kFacts;
     if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;
+    if (!strcmp(id, DFM_EXT_SEEN_VELOCITY)) return &kSeenVelocity;
+    if constexpr (std::is_same_v<Of, Springs>)
+      if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &msm::SpringMask<One>::kTable;
     return nullptr;
   }
   static constexpr dfm_model model(uint32_t caps) {

@@ -134,7 +134,7 @@ double Body<Of>::own_frequency() {
   return std::sqrt(slowest);
 }
 
-// As the library finds that of a body that it moves itself (doc/concepts/step.md, dampers).
+// Of first order (doc/models/msm_gpu.md), where that of the library is of the second (doc/concepts/step.md).
 template <class Of>
 void Body<Of>::find_lag() {
   parts_.lag = 0;

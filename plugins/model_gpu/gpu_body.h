@@ -20,7 +20,17 @@ template <class Of>
 class Body {
  public:
   using Row = typename Of::Param;
+  static constexpr const char *kName = Of::kId;
   const dfm_host *host = nullptr;
+  Of &springs() { return parts_; }
+  const Of &springs() const { return parts_; }
+  void mask_changed()
+    requires requires(Of &of) { of.put_stiffness(); }
+  {
+    unlike_ = true;
+    parts_.put_stiffness();
+    stepper_->take(parts_.work());
+  }
   const char *const *active() const { return parts_.active_effects; }
   const char *idle(Row which) const { return parts_.idle(which); }
   // m/s, the velocity that dampers see; s, the longest sub-step that is stable at the worst shape of the last

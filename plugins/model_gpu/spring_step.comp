@@ -8,6 +8,7 @@
 layout(constant_id = 0) const bool has_cells = false;
 layout(constant_id = 1) const bool has_options = false;
 layout(constant_id = 2) const bool has_branches = false;
+layout(constant_id = 3) const bool turned = false;
 layout(std430, binding = 8) buffer Stretches { double stretches[]; };
 layout(std430, binding = 14) readonly buffer SpringRows { uvec2 spring_rows[]; };
 layout(std430, binding = 15) readonly buffer Springs { uvec4 springs[]; };
@@ -15,6 +16,7 @@ layout(std430, binding = 16) readonly buffer Options { uvec2 options[]; };
 #define HAS_CELLS has_cells
 #define HAS_OPTIONS has_options
 #define HAS_BRANCHES has_branches
+#define TURNED turned
 #define SPRING_ROW(i) spring_rows[i]
 #define SPRING(i) springs[i]
 #define OPTIONS(i) options[i]

@@ -9,7 +9,7 @@
 // the body at rest is free of forces wherever it is, and a spring pulls along its own line, which keeps the
 // angular momentum. The factor before d is binary32; a spring computes the same one at both ends. With a
 // branch, whose stretch is p = r + WAS e, it is k ((1 - PART) e + PART p) / L, e = L - L0; r is kept at both
-// ends, with the same bits.
+// ends, with the same bits. A tilted spring that is TURNED (form A) pulls L / |d| times as strongly.
 #include "motion.glsl"
 #include "corners.glsl"
 // The root of binary32 and a step of Newton's method from there.
@@ -48,7 +48,8 @@ void move_point(uint i) {
       precise double rest = packDouble2x32(uvec2(spring[k].z, spring[k].w));
       precise float stiffness = uintBitsToFloat(spring[k].y);
       precise float damper = DAMPING * stiffness;
-      precise float now = float(square);
+      const precise float plain = float(square);
+      precise float now = plain;
       precise float before = float(rest);
       precise float tilt = 0.0f;
       if (HAS_OPTIONS) {   // w^2, share of DAMPING
@@ -71,7 +72,8 @@ void move_point(uint i) {
       }
       precise double rate = ((w[k].x - u.x) * dx + (w[k].y - u.y) * dy) + (w[k].z - u.z) * dz;
       precise float factor = stiffness * stretch + damper * (float(rate) / now);
-      if (n + k < row.y && now > 1e-20f) {   // two points at one place: no direction, no force
+      if (TURNED) factor = factor * sqrt(now / plain);
+      if (n + k < row.y && plain > 1e-20f) {   // two points at one place: no direction, no force
         precise double scale = double(factor);
         f[0] += scale * dx;
         f[1] += scale * dy;

@@ -1,6 +1,7 @@
 #include "springs.h"
 
 #include "../model_common/even_rows.h"
+#include "../model_common/spring_energy.h"
 #include "as_cpp.h"
 
 namespace gpu {
@@ -40,11 +41,7 @@ void find_forces(const Call &call, uint32_t begin, uint32_t end) {
 constinit const Springs::Rows Springs::kRows;
 
 bool Springs::valid(const dfm_host *h, const double *values) {
-  if (!model::in_range(h, kId, kRows.of, kParamCount, values) || !msm::fit_together(h, kId, values))
-    return false;
-  if (uint32_t(values[msm::kAxisForm]) != msm::kFormA) return true;
-  model::complain(h, kId, "anisotropy_form A is computed on the processor alone; choose form B, or take msm");
-  return false;
+  return model::in_range(h, kId, kRows.of, kParamCount, values) && msm::fit_together(h, kId, values);
 }
 
 void Springs::create(const dfm_host *h, const dfm_mesh &m) {
@@ -103,11 +100,15 @@ void Springs::fill(const double *values) {
   drawn = cells_on;
   if (has_branch())
     branches = {nspring_, room_, edge_of_.data(), end_of_.data(), part(), params[msm::kRelaxationTime]};
-  for (uint32_t e = 0; e < nspring_; ++e) stiffness_[e] = full_stiffness(e);
-  put(stiffness_.data(), rest_square_.data());
+  put_stiffness();
   put_options();
-  put_cells();
   find_rows();
+}
+
+void Springs::put_stiffness() {
+  for (uint32_t e = 0; e < nspring_; ++e) stiffness_[e] = stiffness_of(e);
+  put(stiffness_.data(), rest_square_.data());
+  put_cells();
 }
 
 void Springs::put_options() {
@@ -138,7 +139,8 @@ void Springs::put_cells() {
 // Row sums of springs that hold in every shape: the derivative of a spring, k [(1 - s) d d^T/L^2 + s I] with
 // s = 1 - L0/L, is at most k in norm for s <= 1. So D_i = sum_j k_ij (1 + w_j / w_i) for any weights w > 0,
 // and the step is stable if h^2 D + 2 h F <= 4 m, F = damping_stiffness D + damping_mass m
-// (doc/models/msm.md, step bound). Cells add what their shape asks for, here that at rest.
+// (doc/models/msm.md, step bound), with springs that are off, too. Cells add what their shape asks for, here
+// that at rest.
 void Springs::find_rows() {
   Buffer<double> weight, next, gradient;
   weight.create(host, npoint);
@@ -148,8 +150,9 @@ void Springs::find_rows() {
   const auto add_springs = [&](double *out) {
     for (uint32_t e = 0; e < nspring_; ++e) {
       const uint32_t i = edges[2 * size_t(e)], j = edges[2 * size_t(e) + 1];
-      out[i] += stiffness_[e] * (weight[i] + weight[j]);
-      out[j] += stiffness_[e] * (weight[i] + weight[j]);
+      const double both = full_stiffness(e) * (weight[i] + weight[j]);
+      out[i] += both;
+      out[j] += both;
     }
   };
   const auto add_cells = [&](double *out) {
@@ -199,7 +202,7 @@ void Springs::add_growth(const dfm_kin &k, double *ksum, double *) {
 
 Work Springs::work() const {
   Work w;
-  uint32_t with = kWithOptions * !options_.empty() | kWithBranches * (branches.n > 0);
+  uint32_t with = kWithOptions * !options_.empty() | kWithBranches * (branches.n > 0) | kTurned * is_turned();
   if (cells_on) {
     with |= kWithCells;
     w.add(kVolumeForces, 0, ncell, find_forces);
@@ -215,7 +218,7 @@ Work Springs::work() const {
 }
 
 double Springs::energy(const dfm_kin &k, uint32_t begin, uint32_t end) const {
-  const double *const state = branches.n ? k.state : nullptr;
+  const double *const state = branches.n && k.state ? k.state + of_stretch(0) : nullptr;
   const auto at = [&](uint32_t i) { return k.x + size_t(i) * k.stride; };
   double sum = 0;
   for (size_t n = begin; n < end; ++n) {
@@ -227,15 +230,7 @@ double Springs::energy(const dfm_kin &k, uint32_t begin, uint32_t end) const {
       sum += msm::cell_energy_of(x, of.x, of.y, of.z, of.w);
       continue;
     }
-    const double square = square_between(at(edges[2 * n]), at(edges[2 * n + 1]));
-    const double tilt = edge_tilt.empty() ? 0 : edge_tilt[n];
-    const double stretch = std::sqrt(square + tilt) - rest_length(uint32_t(n));
-    double counts = stretch * stretch;
-    if (state) {
-      const double own = state[of_stretch(n)] + state[of_stretch(nspring_)] * stretch;
-      counts = (1 - branches.part) * counts + branches.part * (own * own);
-    }
-    sum += 0.5 * stiffness_[n] * counts;
+    sum += msm::spring_energy(*this, uint32_t(n), k, state);
   }
   return sum;
 }

@@ -26,6 +26,7 @@ class Springs : public Parts, public msm::Material {
 
   void create(const dfm_host *h, const dfm_mesh &m);
   void fill(const double *values);
+  void put_stiffness();  // of springs that are on, and of their cells
   // Adds what the present shape asks of the rows of the bound.
   void add_growth(const dfm_kin &k, double *ksum, double *csum);
   Work work() const;

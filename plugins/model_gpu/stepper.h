@@ -75,8 +75,9 @@ struct Dampers {
   Constants constants(double h, uint32_t count) const;
 };
 
-// What a pass has beside its springs; the bits of Call.options.
-enum Option : uint32_t { kWithCells = 1, kWithOptions = 2, kWithBranches = 4, kCombinations = 8 };
+// What a pass has beside its springs, and their form; the bits of Call.options.
+enum Option : uint32_t { kWithCells = 1, kWithOptions = 2, kWithBranches = 4, kTurned = 8 };
+constexpr uint32_t kOptionBits = 4, kCombinations = 1u << kOptionBits;
 
 struct Call {
   void *array[kBindings];

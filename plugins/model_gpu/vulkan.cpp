@@ -177,13 +177,13 @@ void Vulkan::need(Kernel kernel, uint32_t options) {
   const std::lock_guard<std::mutex> one(one_);
   VkPipeline &to = pipeline[kernel][options];
   if (to) return;
-  VkBool32 on[3];
-  VkSpecializationMapEntry entries[3];
-  for (uint32_t n = 0; n < 3; ++n) {
+  VkBool32 on[kOptionBits];
+  VkSpecializationMapEntry entries[kOptionBits];
+  for (uint32_t n = 0; n < kOptionBits; ++n) {
     on[n] = options >> n & 1;
     entries[n] = {n, uint32_t(n * sizeof on[0]), sizeof on[0]};
   }
-  const VkSpecializationInfo constants{3, entries, sizeof on, on};
+  const VkSpecializationInfo constants{kOptionBits, entries, sizeof on, on};
   VkShaderModuleCreateInfo code{};
   code.sType = VK_STRUCTURE_TYPE_SHADER_MODULE_CREATE_INFO;
   code.codeSize = kCode[kernel].bytes;

@@ -3,6 +3,7 @@
 // as corrected in doc/models/msm.md, which derives the constants.
 #include <stdio.h>
 
+#include "../model_common/spring_mask.h"
 #include "msm_body.h"
 
 namespace msm {
@@ -12,14 +13,7 @@ using Ops = model::Ops<Body>;
 void complain(const dfm_host *h, const char *what) { model::complain(h, kId, what); }
 
 bool valid(const dfm_host *h, const double *values) {
-  if (!model::in_range(h, kId, kParams, kParamCount, values) || !fit_together(h, kId, values)) return false;
-  if (uint32_t(values[kAxisForm]) == kFormA && uint32_t(values[kDamper]) != kVoigt) {
-    complain(h,
-             "parameter anisotropy_form A works with damper voigt only, since with other dampers its force "
-             "has no energy; choose form B");
-    return false;
-  }
-  return true;
+  return model::in_range(h, kId, kParams, kParamCount, values) && fit_together(h, kId, values);
 }
 
 namespace {
@@ -48,27 +42,6 @@ uint32_t limited(const void *self) {
   uint32_t n = 0;
   for (uint32_t b = 0; body.cells_on && b < body.nblock; ++b) n += body.limited[b];
   return n;
-}
-
-dfm_status set_mask(void *self, uint32_t n, const uint32_t *edges, uint8_t on) {
-  Body &body = *static_cast<Body *>(self);
-  for (uint32_t k = 0; k < n; ++k)
-    if (edges[k] >= body.nedge) {
-      complain(body.host, "the spring to switch does not exist; nothing was changed");
-      return DFM_E_ARG;
-    }
-  try {
-    body.mask_springs(n, edges, on != 0);
-  } catch (...) {
-    return DFM_E_NOMEM;
-  }
-  return DFM_OK;
-}
-
-dfm_status get_mask(const void *self, uint8_t *on) {
-  const Body &body = *static_cast<const Body *>(self);
-  for (uint32_t e = 0; e < body.nedge; ++e) on[e] = body.edge_off.empty() || !body.edge_off[e];
-  return DFM_OK;
 }
 
 const dfm_slot kBranchSlots[] = {{DFM_PER_EDGE, 1, DFM_SLOT_SCALAR, 0},
@@ -108,7 +81,6 @@ const dfm_part_forces kPartForces = {sizeof(dfm_part_forces), 0, parts, part_for
 const dfm_f32 kSingle = {sizeof(dfm_f32), 0, prepare_single, add_single_forces};
 const dfm_topology kTopology = {sizeof(dfm_topology), 0, nullptr};
 const dfm_limited kLimited = {sizeof(dfm_limited), 0, limited};
-const dfm_spring_mask kSpringMask = {sizeof(dfm_spring_mask), 0, set_mask, get_mask};
 
 const dfm_effect_rows kEffectRows = model::rows_of(kOff);
 
@@ -119,7 +91,7 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;
   if (!strcmp(id, DFM_EXT_IDLE)) return &Ops::kIdle;
   if (!strcmp(id, DFM_EXT_LIMITED)) return &kLimited;
-  if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &kSpringMask;
+  if (!strcmp(id, DFM_EXT_SPRING_MASK)) return &SpringMask<Body>::kTable;
   if (!strcmp(id, DFM_EXT_F32)) return &kSingle;
   if (!strcmp(id, DFM_EXT_PART_FORCES)) return &kPartForces;
   if (!strcmp(id, DFM_EXT_TOPOLOGY)) return &kTopology;

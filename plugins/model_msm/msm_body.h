@@ -42,6 +42,7 @@ struct Single {
 
 struct Body : model::Blocks<Block>, Material {
   using Row = Param;
+  static constexpr const char *kName = kId;
   // From this size on blocks go through the host's parallel_for; below it waking a worker costs more than it
   // saves. Summing the blocks is a twentieth of the work.
   static constexpr uint32_t kParallelCells = 10000, kParallelMergeCells = 100000;
@@ -67,7 +68,7 @@ struct Body : model::Blocks<Block>, Material {
   const char *keeps_double() const;  // why forces in single precision are not available; NULL if they are
   void prepare_single();
 
-  Form form() const { return edge_tilt.empty() ? kPlain : choice(kAxisForm) == kFormA ? kTurned : kTilted; }
+  Form form() const { return edge_tilt.empty() ? kPlain : is_turned() ? kTurned : kTilted; }
   Damping damping() const { return !damping_on ? kUndamped : edge_damp.empty() ? kUniform : kPerSpring; }
 
   Branch branch_at(const dfm_kin &k) const;
@@ -88,7 +89,9 @@ struct Body : model::Blocks<Block>, Material {
   bool lacks_state(const dfm_kin &k) const;
   double energy(const dfm_kin &k) const;
   void cell_energy(const dfm_kin &k, double *density);
-  void mask_springs(uint32_t n, const uint32_t *which, bool on);
+  Material &springs() { return *this; }
+  const Material &springs() const { return *this; }
+  void mask_changed();
   void rest_of_branches(uint32_t n, const dfm_kin &k);  // fills rest_now of block n
   // Blocks of the tangent: the points, then the springs. See msm_tangent.cpp.
   uint32_t pairs() const { return npoint + nedge; }
@@ -117,7 +120,6 @@ struct Body : model::Blocks<Block>, Material {
   // use(i, |A_i|, sums): of all springs and cells of the point, for all points
   template <class Use>
   void each_row(const dfm_kin &k, const Use &use);
-  double spring_energy(uint32_t e, const dfm_kin &k, const Branch &branch) const;
   struct SpringTangent { double along, across; };  // N/m
   SpringTangent spring_tangent(uint32_t e, double square, const Branch &branch) const;
   void add_springs(const dfm_kin &k, double a, double b, double *blk) const;
@@ -126,8 +128,5 @@ struct Body : model::Blocks<Block>, Material {
 
 // Best kernels of this processor, or those that DEFORM_SIMD names.
 const Kernels *choose_kernels(const dfm_host *host);
-
-// Energy of form A over k, the integral of L - L0 over l from rest to l. See msm_energy.cpp.
-double turned_energy(double l, double l0, double tilt2);
 
 }  // namespace msm

@@ -1,5 +1,5 @@
 // Energies on vectors of four doubles, and the drag on a block's points. A sum takes one spring or cell
-// after the other, as msm_energy.cpp does, so it has the same bits at every width. Internal linkage only.
+// after the other, as spring_energy.h does, so it has the same bits at every width. Internal linkage only.
 #pragma once
 #include "msm_kernel_quad.h"
 

@@ -69,9 +69,7 @@ void Body::apply_params(const double *values) {
 
 // The rows of the step bound keep counting a spring that is off: a bound it stays, and a cut need not look
 // for new weights.
-void Body::mask_springs(uint32_t n, const uint32_t *which, bool on) {
-  if (edge_off.empty()) edge_off.create(host, nedge);
-  for (uint32_t k = 0; k < n; ++k) edge_off[which[k]] = !on;
+void Body::mask_changed() {
   fill_stiffness();
   fill_single();
 }

@@ -33,7 +33,7 @@ double stable_at_last(const Stepper &b) { return b.state[3 * size_t(b.size())]; 
 
 class Drawn : public testing::TestWithParam<uint32_t> {};
 INSTANTIATE_TEST_SUITE_P(Models, Drawn,
-                         testing::Values(kSprings, kCells, kSofter, kStiffer, kMaxwell, kSls, kAll),
+                         testing::Values(kSprings, kCells, kSofter, kStiffer, kTurned, kMaxwell, kSls, kAll),
                          [](const auto &one) { return kNames[one.param]; });
 
 // Forces and dampers of one sub-step, also where the kernel finds the frame in its second way.

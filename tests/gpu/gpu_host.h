@@ -10,17 +10,19 @@ using namespace stepper_test;
 
 enum Device { automatic, hardware, software, reference };
 // Models of the plugin, and what they are models of: springs as msm has them by default, by themselves, with
-// extra coordinates, with branches, with both; cells.
-enum Which : uint32_t { kSprings, kCells, kAlone, kSofter, kStiffer, kMaxwell, kSls, kAll };
-constexpr const char *kNames[] = {"springs", "cells", "alone", "softer", "stiffer", "maxwell", "sls", "all"};
+// extra coordinates, which turn forces or do not, with branches, with both; cells.
+enum Which : uint32_t { kSprings, kCells, kAlone, kSofter, kStiffer, kTurned, kMaxwell, kSls, kAll };
+constexpr const char *kNames[] = {"springs", "cells",   "alone", "softer", "stiffer",
+                                  "turned",  "maxwell", "sls",   "all"};
 inline const dfm_type &gpu(uint32_t which) { return type_of("model_gpu", which == kCells); }
 inline const dfm_type &cpu(uint32_t which) {
   return type_of(which == kCells ? "model_corotational_fem" : "model_msm");
 }
 inline Params with(uint32_t which, Params p) {
   if (which == kAlone) p["volume"] = p["collapse"] = 0;
-  if (which == kSofter || which == kStiffer || which == kAll) p["anisotropy_slope"] = 2;
+  if (which == kSofter || which == kStiffer || which == kTurned || which == kAll) p["anisotropy_slope"] = 2;
   if (which == kStiffer) p["anisotropy_kind"] = 1;
+  if (which == kTurned) p["anisotropy_form"] = 1;
   if (which == kMaxwell || which == kSls || which == kAll) {
     p["damper"] = which == kMaxwell ? 1 : 2;
     p["relaxation_time"] = 0.02;

@@ -12,7 +12,7 @@ INSTANTIATE_TEST_SUITE_P(Models, Gpu, testing::Range(0u, uint32_t(std::size(kNam
 
 // Those that have a period.
 class Swinging : public Gpu {};
-INSTANTIATE_TEST_SUITE_P(Models, Swinging, testing::Values(kSprings, kCells, kAlone, kSofter),
+INSTANTIATE_TEST_SUITE_P(Models, Swinging, testing::Values(kSprings, kCells, kAlone, kSofter, kTurned),
                          [](const auto &one) { return kNames[one.param]; });
 class Damped : public Gpu {};
 INSTANTIATE_TEST_SUITE_P(Models, Damped, testing::Values(kCells, kAlone),
@@ -116,6 +116,7 @@ TEST_P(Gpu, SubStep_IsThatOfTheProcessorsModel) {
   b.dt = 0.9 * fact(b, "longest_step");
   b.shake(1e-3, 0.2);
   plain.shake(1e-3, 0.2);
+  EXPECT_NEAR(b.energy(), plain.energy(), 1e-10 * plain.energy());
   b.step();
   const std::vector<double> before(plain.v, plain.v + 4 * size_t(m.npoint()));
   plain.sub_step(b.dt);
@@ -350,7 +351,7 @@ TEST(MsmGpu, StepOfTheShape_IsStableThere) {
   const Mesh m = kuhn_bar(4, 3, 3, 0.02, 0.2);
   const std::vector<uint8_t> free(m.npoint(), 0);
   const Params p = {{"poisson", 0.45}};
-  for (const Which which : {kAlone, kSprings, kSofter, kStiffer}) {
+  for (const Which which : {kAlone, kSprings, kSofter, kStiffer, kTurned}) {
     double highest = 0;
     for (const Vec size :
          {Vec{1, 1, 1}, Vec{3, 3, 3}, Vec{3, 0.3, 1}, Vec{0.5, 0.5, 0.5}, Vec{1, 1, 0}, Vec{1, 1, -1}}) {
@@ -455,11 +456,61 @@ TEST(MsmGpu, FieldsByCell_MoveAsTheProcessorsModel) {
   EXPECT_LE(off, 1e-6 * most);
 }
 
-TEST(MsmGpu, FormA_IsRefused) {
-  Host host;
-  Stepper none(host, gpu(kSprings), kuhn_bar(2, 2, 2, 0.02), {{"anisotropy_form", 1}, {"device", reference}});
-  EXPECT_EQ(none.status, DFM_E_ARG);
-  EXPECT_NE(host.logged.find("anisotropy_form A"), std::string::npos) << host.logged;
+// Springs across a plane go off and on: so they move as the processor's, and then as if they had stayed on.
+TEST(MsmGpu, SpringsThatAreOff_AreThoseOfTheProcessorsModel) {
+  const Mesh m = kuhn_bar(6, 3, 3, 0.02, 0.2);
+  for (const Which which : {kSprings, kSls}) {
+    Bodies b(which, m, {{"damping_stiffness", 1e-5}}), whole(which, m, {{"damping_stiffness", 1e-5}});
+    NEEDS_DRIVER(b);
+    Plain plain(b.host, which, m, {{"damping_stiffness", 1e-5}});
+    std::vector<uint32_t> cut;
+    for (uint32_t e = 0; e < m.edges.size() / 2; ++e)
+      if ((m.at(m.edges[2 * e])[0] < 0.05) != (m.at(m.edges[2 * e + 1])[0] < 0.05)) cut.push_back(e);
+    const auto mask = [&](ModelInstance &of, bool on) {
+      const auto *table =
+          static_cast<const dfm_spring_mask *>(of.ops->extension(of.self, DFM_EXT_SPRING_MASK));
+      ASSERT_EQ(table->set(of.self, uint32_t(cut.size()), cut.data(), on), DFM_OK) << b.host.logged;
+      std::vector<uint8_t> all(m.edges.size() / 2, 7);
+      ASSERT_EQ(table->get(of.self, all.data()), DFM_OK);
+      EXPECT_EQ(std::count(all.begin(), all.end(), 0), on ? 0 : long(cut.size()));
+      const uint32_t none[] = {0, uint32_t(all.size())};
+      EXPECT_EQ(table->set(of.self, 2, none, 0), DFM_E_ARG);
+    };
+    const double h = 0.1 * fact(*b.device, "longest_step");
+    for (ModelInstance *each :
+         {static_cast<ModelInstance *>(b.device.get()), static_cast<ModelInstance *>(b.processor.get()),
+          static_cast<ModelInstance *>(&plain)}) {
+      mask(*each, false);
+      each->shake(1e-3, 0.2);
+    }
+    EXPECT_NEAR(b.processor->energy(), plain.energy(), 1e-10 * plain.energy());
+    const std::vector<double> before(plain.v, plain.v + 4 * size_t(m.npoint()));
+    plain.sub_step(h);
+    for (Stepper *each : {b.device.get(), b.processor.get()}) {
+      each->dt = h;
+      each->step();
+      double most = 0, off = 0;
+      for (uint32_t i = 0; i < m.npoint(); ++i) {
+        most = std::max(most, norm(plain.get(plain.v, i) - plain.get(before.data(), i)));
+        off = std::max(off, norm(plain.get(plain.v, i) - each->get(each->v, i)));
+      }
+      EXPECT_GT(most, 1e-5);
+      EXPECT_LE(off, 1e-6 * most);
+    }
+    for (Stepper *each : {b.device.get(), b.processor.get(), whole.device.get(), whole.processor.get()}) {
+      mask(*each, true);
+      each->ops->state_init(each->self, each->state.data());
+      for (uint32_t i = 0; i < m.npoint(); ++i) {
+        const double bend = std::sin(100 * m.at(i)[0]);
+        each->set(each->x, i, m.at(i) + Vec{0, 1e-3 * bend, 0});
+        each->set(each->v, i, {0, 0, bend});
+      }
+      each->dt = 4 * h;
+      for (int n = 0; n < 3; ++n) each->step();
+    }
+    expect_same_bits(*b.device, *whole.device, "on again");
+    expect_same_bits(*b.processor, *whole.processor, "on again");
+  }
 }
 
 TEST(MsmGpu, EdgesBeyondTheRangeOfAFloat_AreRefused) {

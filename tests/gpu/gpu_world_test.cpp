@@ -9,8 +9,8 @@
 
 namespace {
 
-// A model, its springs with branches, or by themselves.
-const std::string kRelaxing = "msm_gpu relaxing", kAlone = "msm_gpu alone";
+// A model, its springs with branches, tilted with forces of form A, or by themselves.
+const std::string kRelaxing = "msm_gpu relaxing", kTurned = "msm_gpu turned", kAlone = "msm_gpu alone";
 std::string type_of(const std::string &model) { return model.substr(0, model.find(' ')); }
 
 struct World {
@@ -33,11 +33,13 @@ struct World {
     o.young = young;
     o.damping_stiffness = 1e-3;
     d.material = test::make_material(world, o);
-    const double sls = 2, time = 0.01, none = 0;
+    const double sls = 2, time = 0.01, slope = 2, form_a = 1, none = 0;
     std::vector<dfm_param_value> params;
     if (type.ends_with("_gpu")) params.push_back({"device", &device, 1});
     if (model.ends_with("relaxing"))
       params.insert(params.end(), {{"damper", &sls, 1}, {"relaxation_time", &time, 1}});
+    if (model.ends_with("turned"))
+      params.insert(params.end(), {{"anisotropy_slope", &slope, 1}, {"anisotropy_form", &form_a, 1}});
     if (model == kAlone) params.insert(params.end(), {{"volume", &none, 1}, {"collapse", &none, 1}});
     d.model_params = {sizeof(dfm_params), uint32_t(params.size()), params.data()};
     d.pose.position[2] = z;
@@ -81,10 +83,15 @@ double normal_force(dfm_world world) {
 }
 
 class GpuWorld : public testing::TestWithParam<std::string> {};
+class GpuWorldState : public GpuWorld {};
+constexpr auto name_of = [](const testing::TestParamInfo<std::string> &one) {
+  const std::string type = type_of(one.param);
+  return one.param == type ? type : one.param.substr(type.size() + 1);
+};
 INSTANTIATE_TEST_SUITE_P(Models, GpuWorld, testing::Values("msm_gpu", "corotational_fem_gpu", kRelaxing),
-                         [](const auto &one) {
-                           return one.param == kRelaxing ? "relaxing" : type_of(one.param);
-                         });
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Models, GpuWorldState,
+                         testing::Values("msm_gpu", "corotational_fem_gpu", kRelaxing, kTurned), name_of);
 
 std::string on_the_processor(std::string model) { return model.erase(model.find("_gpu"), 4); }
 
@@ -143,7 +150,7 @@ TEST_P(GpuWorld, OnASlope_SlidesWithCoulombsAcceleration) {
   EXPECT_NEAR((w.now().velocity[0] - before) / 0.4, 9.81 * (std::sin(theta) - mu * std::cos(theta)), 0.01);
 }
 
-TEST_P(GpuWorld, SavedInContact_ContinuesWithTheSameBits) {
+TEST_P(GpuWorldState, SavedInContact_ContinuesWithTheSameBits) {
   const auto make = [] {
     return std::make_unique<World>(GetParam(), device(), "lugre", 0.5, std::array<double, 3>{1, 0, -9.81},
                                    0.01);
@@ -159,9 +166,41 @@ TEST_P(GpuWorld, SavedInContact_ContinuesWithTheSameBits) {
   EXPECT_EQ(dfm_world_hash(a->world), dfm_world_hash(b->world));
 }
 
+// Sheared, then as at rest: what dampers saw before moves nothing. All points but one stop: dampers between
+// them see that at once.
+TEST(GpuWorldVelocity, SetByTheHost_IsWhatDampersSee) {
+  constexpr double h = 1e-4;  // the processor damps where steps change
+  for (const std::string model : {"msm_gpu", "corotational_fem_gpu"}) {
+    double lost[2];
+    for (const bool card : {false, true}) {
+      World w(card ? model : on_the_processor(model), kReference, "none", 0, {0, 0, 0}, 0.2);
+      uint32_t n = 0;
+      test::ok(dfm_body_get_state(w.body, 0, nullptr, nullptr, &n));
+      std::vector<double> x(3 * size_t{n}), v(x);
+      test::ok(dfm_body_get_state(w.body, n, x.data(), nullptr, &n));
+      for (size_t i = 0; i < n; ++i) v[3 * i] = 20 * x[3 * i + 2];
+      test::ok(dfm_body_set_state(w.body, n, x.data(), v.data()));
+      test::run(w.world, 2e-3, h);
+      std::fill(v.begin(), v.end(), 0.0);
+      test::ok(dfm_body_set_state(w.body, n, x.data(), v.data()));
+      test::run(w.world, h, h);
+      EXPECT_LT(w.now().speed_max, 1e-9) << model << card;
+      for (size_t i = 0; i < n; ++i) v[3 * i] = 1;
+      test::ok(dfm_body_set_state(w.body, n, x.data(), v.data()));
+      test::run(w.world, h, h);
+      std::fill(v.begin() + 3, v.end(), 0.0);
+      test::ok(dfm_body_set_state(w.body, n, x.data(), v.data()));
+      test::run(w.world, h, h);
+      lost[card] = 1 - w.now().speed_max;
+    }
+    EXPECT_GT(lost[0], 0.03) << model;
+    EXPECT_NEAR(lost[1], lost[0], 0.05 * lost[0]) << model;
+  }
+}
+
 // The cells under a sphere go, and with them their springs: the rest moves as what is left of the processor's
 // body would, and as the same cut of another one does.
-TEST_P(GpuWorld, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
+TEST_P(GpuWorldState, CutWhileItMoves_ContinuesWithTheCellsThatAreLeft) {
   uint64_t hash[2];
   double height[3];
   for (int n = 0; n < 3; ++n) {
@@ -212,7 +251,7 @@ TEST_P(GpuWorld, OnTwoWorkers_HasTheSameBits) {
 }
 
 // A card may round a square root and a quotient otherwise.
-TEST_P(GpuWorld, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
+TEST_P(GpuWorldState, OnASoftwareDriverAndOnTheProcessor_HasTheSameBits) {
   if (!is_there(kSoftware)) GTEST_SKIP() << "no such driver";
   World a(GetParam(), kSoftware, "lugre", 0.5, {1, 0, -9.81}, 0.01);
   World b(GetParam(), kReference, "lugre", 0.5, {1, 0, -9.81}, 0.01);
@@ -249,6 +288,48 @@ TEST(GpuCommand, WithoutADriver_SaysWhatToInstallAndTheReferenceStillRuns) {
   EXPECT_NE(none.err.find("take the model without _gpu"), std::string::npos) << none.err;
   EXPECT_NE(none.err.find("mesa-vulkan-drivers"), std::string::npos) << none.err;
   EXPECT_EQ(processor.exit_code, 0) << processor.err;
+}
+
+// A sphere is pressed 9 mm into a block that lies on voxels, and dragged: normal and friction forces of both
+// pairs within 1 % of the processor's, and the point below it.
+TEST(GpuCommand, ProbeOnABlockOnVoxels_PushesAsOnTheProcessor) {
+  const std::string folder = test::scratch("gpu_probe"), file = folder + "/scene.json";
+  test::Context context;
+  dfm_mesh_handle surface = 0;
+  const double slab[3] = {0.3, 0.3, 0.1};
+  test::ok(dfm_mesh_make(context, "beam", slab, DFM_MESH_SURFACE, 200, &surface));
+  test::ok(dfm_mesh_write(surface, (folder + "/slab.ply").c_str()));
+  test::write_file(file, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.3, "step": 0.001},
+ "materials": {"tissue": {"density": 1000, "young": 5e4, "damping": {"mass": 5, "stiffness": 0.004}}},
+ "bodies": [{"name": "block", "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 200},
+   "material": "tissue", "pose": {"position": [0, 0, 0.1001]}, "model": {"type": "msm"}}],
+ "obstacles": [
+   {"name": "slab", "shape": "voxels", "mesh": "slab.ply", "cells": 4000,
+    "pose": {"position": [-0.1, -0.1, 0]}},
+   {"name": "probe", "shape": "sphere", "radius": 0.03, "pose": {"position": [0.05, 0.05, 0.232]},
+    "motion": {"keyframes": [{"t": 0, "position": [0.05, 0.05, 0.232]},
+      {"t": 0.1, "position": [0.05, 0.05, 0.222]}, {"t": 0.3, "position": [0.06, 0.05, 0.222]}]}}],
+ "contact": {"friction": [{"between": ["*", "*"], "law": "coulomb", "params": {"mu": 0.3}}]},
+ "probes": [{"name": "tip", "body": "block", "point": [0.05, 0.05, 0.1]}], "output": {"every": 0.1}})");
+  for (const std::string model : {"msm", "corotational_fem"}) {
+    std::vector<double> found[2];
+    for (const bool card : {false, true}) {
+      const std::string type = model + (card ? R"(_gpu", "params": {"device": "reference"})" : R"(")");
+      const test::CommandResult r = test::deform(
+          {"run", file, "--out", folder + "/out", "--set", R"(/bodies/0/model={"type": ")" + type + "}"});
+      ASSERT_EQ(r.exit_code, 0) << r.err;
+      const auto pairs = test::read_csv(folder + "/out/contacts.csv"),
+                 tip = test::read_csv(folder + "/out/probes.csv");
+      for (size_t row = pairs.size() - 2; row < pairs.size(); ++row)
+        for (const size_t column : {5, 6}) found[card].push_back(std::stod(pairs[row][column]));
+      for (const size_t column : {2, 3, 4}) found[card].push_back(std::stod(tip.back()[column]));
+    }
+    ASSERT_EQ(found[0].size(), 7u);
+    for (size_t k = 0; k < 7; ++k) {
+      EXPECT_GT(found[0][k], k < 4 ? 3 : 0.03) << model;
+      EXPECT_NEAR(found[1][k], found[0][k], k < 4 ? 0.01 * found[0][k] : 2e-4) << model << " " << k;
+    }
+  }
 }
 
 // A machine that must have a card fails without one.
@@ -363,10 +444,6 @@ TEST(GpuScene, DeviceBesideAnAccuracy_IsThatOfTheModelThatThePlannerTakes) {
 // The card has fewer effects than the processor, and no scene loses one without a word.
 TEST(GpuScene, WhatTheCardLacks_IsReported) {
   if (device() == kReference) GTEST_SKIP() << "no driver";
-  const test::CommandResult turned =
-      explain_on("gpu", R"("type": "msm", "params": {"anisotropy_slope": 1, "anisotropy_form": "A"})", true);
-  EXPECT_NE(turned.exit_code, 0);
-  EXPECT_TRUE(says(turned, "/bodies/0/device: ") && says(turned, "anisotropy_form A")) << turned.err;
   const test::CommandResult other =
       explain_on("gpu", R"("type": "corotational_fem", "params": {"energy": "stvk"})", true);
   EXPECT_NE(other.exit_code, 0);
@@ -390,6 +467,24 @@ TEST(GpuScene, WhatTheCardLacks_IsReported) {
     EXPECT_EQ(either.exit_code, 0) << either.err;
     EXPECT_EQ(either.err, "");
     EXPECT_TRUE(says(either, "runs on: cpu, by ")) << either.out;
+  }
+}
+
+// Whatever reads the scene once more, a scale that it does not say stays one that it does not say.
+TEST(GpuScene, SizeInMillimeters_IsReportedWithEveryDevice) {
+  const std::string file = test::scratch("millimeters") + "/tet.obj";
+  test::write_file(file, "v 0 0 0\nv 90 0 0\nv 0 90 0\nv 0 0 90\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n");
+  const std::string body =
+      R"("mesh": ")" + file + R"(", "fill": {"cells": 50}, "pose": {"position": [0, 0, 1]}, )";
+  for (const auto &[on, model] : {std::array{"cpu", "msm"}, std::array{"auto", "msm"},
+                                  std::array{"auto", "condensed"}, std::array{"gpu", "msm"}}) {
+    if (std::string_view(on) == "gpu" && device() == kReference) continue;
+    const test::CommandResult r =
+        explain_on(on, std::string(R"("type": ")") + model + "\"", true, "", "", body);
+    EXPECT_EQ(r.exit_code, 0) << r.err;
+    const size_t first = r.err.find("is in millimeters, set \"scale\"");
+    EXPECT_NE(first, std::string::npos) << on << " " << model << ": " << r.err;
+    EXPECT_EQ(r.err.find("is in millimeters, set", first + 1), std::string::npos) << r.err;
   }
 }
 

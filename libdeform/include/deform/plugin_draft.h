@@ -32,6 +32,12 @@ typedef struct dfm_topology {
 /* ---- self-stepping models: state that lives off the host ---------------------------------------------- */
 /* Type of dfm_stepper.fetch: copies what lives off the host. [step] */
 typedef dfm_status (*dfm_fetch_fn)(void *self, uint32_t what, double *dst);
+/* ---- self-stepping models: dampers that see velocities with a lag ------------------------------------- */
+/* Extension "dfm.seen_velocity/1" of a model: slot number `slot` of its state, a vector by point, follows the
+ * velocities of the points. A host that sets velocities writes them there, too. It stays a draft until a
+ * model of another author has it. */
+#define DFM_EXT_SEEN_VELOCITY "dfm.seen_velocity/1"
+typedef struct dfm_seen_velocity { uint32_t size, slot; } dfm_seen_velocity;
 /* ---- models: forces in single precision ------------------------------------------------------------- */
 /* Extension "dfm.f32/1" of a model: the forces of add_forces once more, computed in single precision inside
  * the model. Positions, velocities, forces and state stay binary64 here; bound, energy and stiffness have one

@@ -215,7 +215,7 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
         if (x) b.p.x[size_t(i) * kStride + size_t(k)] = x[size_t(3) * i + size_t(k)];
         if (v) b.p.v[size_t(i) * kStride + size_t(k)] = v[size_t(3) * i + size_t(k)];
       }
-    if (v) relax_dampers(b.p);
+    if (v) b.relax_dampers();
     b.dynamics->points_changed();
     disturb(b);
     if (x) lose_energy(b);

@@ -14,12 +14,6 @@ void Phyxels::size(const Memory &m, uint32_t points) {
     *a = zeros(size_t{kStride} * n);
 }
 
-void relax_dampers(Phyxels &p) {
-  for (Array<double> *a : {&p.dampers.v, &p.dampers.slow})
-    if (p.dampers.lag > 0) a->assign(p.v.begin(), p.v.end());
-    else a->clear();
-}
-
 Extent extent_of(const double *x, size_t n, size_t stride) {
   Extent out;
   for (size_t i = 0; i < n; ++i) out.add(load3(x + stride * i));

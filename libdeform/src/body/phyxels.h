@@ -48,7 +48,6 @@ struct LumpedMass { double volume, mass; };
 LumpedMass lump_mass(uint32_t npoint, const double *rest, uint32_t ntet, const uint32_t *tets, double density,
                      const double *cell_density, const double *share, double *mass);
 void update_inverse_mass(Phyxels &p);  // and least_mass
-void relax_dampers(Phyxels &p);        // as if v had been the same for long
 
 Extent extent_of(const double *x, size_t n, size_t stride);  // of n points
 double tet_volume(const double *x, uint32_t stride, const uint32_t tet[4]);

@@ -83,7 +83,19 @@ void ModelInstance::create(const dfm_type &t, const dfm_host &h, const dfm_mesh 
   const size_t nstate = model_state_size(slots, mesh.npoint, mesh.ncell, mesh.nedge);
   state = Array<double>(nstate, 0.0, memory);
   state_out = state;
+  find_seen(mesh);
   start();
+}
+
+void ModelInstance::find_seen(const dfm_mesh &mesh) {
+  const auto seen = copy_table<dfm_seen_velocity>(extension(DFM_EXT_SEEN_VELOCITY), sizeof(dfm_seen_velocity),
+                                                  type->id, "dfm_seen_velocity");
+  if (!seen) return;
+  if (seen->slot >= slots.size() || slots[seen->slot].unit != DFM_PER_POINT ||
+      slots[seen->slot].kind != DFM_SLOT_VECTOR)
+    bad_type(type->id, "dfm_seen_velocity.slot is no vector by point of its state");
+  seen_at = model_state_size(std::span(slots).first(seen->slot), mesh.npoint, mesh.ncell, mesh.nedge);
+  nseen = size_t{3} * mesh.npoint;
 }
 
 std::optional<std::vector<dfm_slot>> ModelInstance::query_extensions() {

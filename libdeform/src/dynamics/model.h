@@ -37,6 +37,7 @@ struct ModelParts {
   std::vector<double> params;
   std::vector<dfm_slot> slots;     // of its state
   Array<double> state, state_out;  // slots end to end
+  size_t seen_at = 0, nseen = 0;   // of `state`: velocities that dampers see with a lag; 0: none
 
  protected:
   uint32_t caps_ = 0;
@@ -99,7 +100,8 @@ struct ModelInstance : ModelParts {
   std::vector<EffectRow> effect_rows() const;  // the model's extension "dfm.effect_rows/1"
   // Why the parameter of this row has no effect now; empty if it has one.
   std::string idle_reason(uint32_t row) const;
-  uint32_t limited_cells() const;  // at the last bound
+  uint32_t limited_cells() const;                                                // at the last bound
+  std::span<double> seen_velocity() { return {state.data() + seen_at, nseen}; }  // [n,3] m/s, or empty
   void swap(ModelInstance &other) noexcept { std::swap<ModelParts>(*this, other); }
   void start() { put_initial(state); }      // throws Error
   void put_initial(Array<double> &) const;  // the state that it starts from; throws Error
@@ -109,6 +111,7 @@ struct ModelInstance : ModelParts {
 
  private:
   std::optional<std::vector<dfm_slot>> query_extensions();  // and its own state slots; throws Error
+  void find_seen(const dfm_mesh &mesh);                     // throws Error
   dfm_status query_caps() noexcept;                         // after an error caps_ is unchanged
 };
 

@@ -57,7 +57,8 @@ dfm_pose read_pose(const Node &holder, const char *kind, double *scale) {
   const Node node = holder.member("pose").object(kind);
   node.vector("position", pose.position, 0, 0, 0);
   read_rotation(node, pose.rotation);
-  if (scale) *scale = node.number("scale", 1.0, kPositive);
+  // no default is written back: MeshFiles warns of units where the scene says no scale
+  if (scale && node.has("scale")) *scale = node.member("scale").number(kPositive);
   return pose;
 }
 
@@ -353,7 +354,7 @@ Body read_body(const Node &node, ReadContext &context) {
   b.def.integrator = integrator_of(node);
   if (model.has("params")) b.params = read_params(model.member("params"), type);
   read_precision(model, b.params);
-  b.has_scale = node.has("pose") && node.member("pose").has("scale");  // reading fills in the default
+  b.has_scale = node.has("pose") && node.member("pose").has("scale");
   b.def.pose = read_pose(node, "pose", &b.scale);
   if (node.has("place")) b.on = node.member("place").object("place").at("on").text();
   node.vector("velocity", b.def.velocity, 0, 0, 0);

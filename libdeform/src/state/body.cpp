@@ -19,6 +19,14 @@ bool Body::loads_vary() const {
   });
 }
 
+void Body::relax_dampers() {
+  for (Array<double> *a : {&p.dampers.v, &p.dampers.slow})
+    if (p.dampers.lag > 0) a->assign(p.v.begin(), p.v.end());
+    else a->clear();
+  const std::span<double> seen = model.seen_velocity();
+  for (size_t at = 0; at < seen.size(); ++at) seen[at] = p.v[kStride * (at / 3) + at % 3];
+}
+
 double Body::young() const {
   for (const CellField &f : fields)
     if (f.key == "young") return *std::max_element(f.values.begin(), f.values.end());

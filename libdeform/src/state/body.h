@@ -194,6 +194,7 @@ struct Body : BodyShape, BodyState {
   Body();
   ~Body();
   bool loads_vary() const;
+  void relax_dampers();         // as if the velocities had been the same for long
   double young() const;         // Pa, the largest of all cells; 0: the model has no such parameter
   double impulse_time() const;  // s that surfel_impulse belongs to; 0: nothing may touch any more
 };

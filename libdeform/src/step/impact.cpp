@@ -100,7 +100,7 @@ size_t turn(World &w, Chosen from, Chosen to) {
     b->integrator.used =
         to == Chosen::in_impact ? uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER} : implicit_integrator(w, *b);
     b->bound.known = false;
-    relax_dampers(b->p);
+    b->relax_dampers();
   }
   ++w.integrator_times.changes;
   w.changed = true;

@@ -356,7 +356,7 @@ void choose_integrators(World &w) {
       const ImplicitOptions chosen = implicit_choice(w, b);
       b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                                  now ? &chosen : nullptr);
-      relax_dampers(b.p);
+      b.relax_dampers();
       b.integrator.used = now ? implicit_integrator(w, b) : uint32_t{DFM_INTEGRATOR_SYMPLECTIC_EULER};
       if (now) {
         SchemeCount &own = reported[chosen.second_order];

@@ -263,7 +263,7 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   w.stats.sleep_energy += kinetic;
   add3(w.stats.sleep_momentum, momentum);
   std::fill(p.v.begin(), p.v.end(), 0.0);
-  relax_dampers(p);
+  b.relax_dampers();
   std::fill(p.v_free.begin(), p.v_free.end(), 0.0);
   b.dynamics->points_changed();
   gather_surface(b.surface, p.x.data(), p.v.data());  // detection continues to see it at its place

@@ -102,7 +102,7 @@ void measure_explicit(const World &w, Body &b) {
   b.integrator.share = found.share;
   const bool had = b.p.dampers.lag > 0;
   b.p.dampers.lag = found.lag;
-  if (had != (found.lag > 0)) relax_dampers(b.p);
+  if (had != (found.lag > 0)) b.relax_dampers();
   query_explicit_bound(w, w.time, b);
 }
 

@@ -381,7 +381,7 @@ class Settling {
     for (One &one : bodies_) {
       Phyxels &p = one.body->p;
       std::fill(p.v.begin(), p.v.end(), 0.0);
-      relax_dampers(p);
+      one.body->relax_dampers();
       set_loads(*one.body, w_.time, w_.prescribed.share);  // without springs
       weigh(one, h);
     }
