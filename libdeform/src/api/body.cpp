@@ -89,12 +89,11 @@ void springs_changed(Body &b) {
 }
 
 Spring make_spring(const Body &b, const dfm_spring_def &d) {
-  const char *const name = b.name.c_str();
   if (!b.dynamics->abilities().springs)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': springs are integrated explicitly and need a model with a step bound, which model "
-         "'%s' does not have; choose another model",
-         name, b.model.type->id);
+    refuse(b, DFM_E_UNSUPPORTED,
+           ": springs are integrated explicitly and need a model with a step bound, which model '%s' does "
+           "not have; choose another model",
+           b.model.type->id);
   check_points(b, d.npoint, d.points);
   if (d.npoint == 0) refuse(b, ": a spring needs at least one point");
   if (d.nkey && !d.keys) refuse(b, ": %u keys are announced, but keys is NULL", d.nkey);
@@ -103,7 +102,7 @@ Spring make_spring(const Body &b, const dfm_spring_def &d) {
            d.stiffness, d.damping);
   Spring s{b.next_load, {d.points, d.points + d.npoint}, {}, {}, load3(d.to), d.stiffness, d.damping};
   if (d.nkey) s.keys.assign(d.keys, d.keys + d.nkey);
-  check_keys(s.keys, name);
+  check_keys(s.keys, b.name.c_str());
   double sum = 0, nan_flag = 0;
   for (uint32_t i = 0; i < d.npoint; ++i) {
     const double w = d.weights ? d.weights[i] : b.p.mass[d.points[i]];
@@ -202,11 +201,11 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
     for (size_t i = 0; i < size_t(3) * n; ++i)
       if ((x && !std::isfinite(x[i])) || (v && !std::isfinite(v[i])))
         refuse(b, ": the state of point %zu is not finite; nothing was changed", i / 3);
-    for (uint32_t i = 0; v && i < n; ++i) check_velocity("body", b.name.c_str(), load3(v + size_t(3) * i));
+    for (uint32_t i = 0; v && i < n; ++i) check_velocity(b, load3(v + size_t(3) * i));
     if (x) {
       const double far = largest_coordinate(x, n, 3);
-      check_resolved(b.name.c_str(), far, b.surface.median_edge);
-      check_place(*b.world, "body", b.name.c_str(), far);
+      check_resolved(b, far, b.surface.median_edge);
+      check_place(*b.world, b, far);
     }
     const HostWork work(b);
     for (uint32_t i = 0; i < n; ++i)
@@ -239,10 +238,10 @@ dfm_status dfm_body_hold(dfm_body body, uint32_t n, const uint32_t *points, uint
     check_points(b, n, points);
     if (axes > 7) fail(DFM_E_ARG, "axes is %u; it is a sum of 1 (x), 2 (y) and 4 (z)", unsigned(axes));
     if (b.model.stepper)
-      fail(DFM_E_UNSUPPORTED,
-           "body '%s': model '%s' steps itself and must know the held points when the body is created; give "
-           "dfm_body_def.fixed",
-           b.name.c_str(), b.model.type->id);
+      refuse(b, DFM_E_UNSUPPORTED,
+             ": model '%s' steps itself and must know the held points when the body is created; give "
+             "dfm_body_def.fixed",
+             b.model.type->id);
     const HostWork work(b);
     if (axes == 0) drop_motions(b, {points, n});
     for (uint32_t i = 0; i < n; ++i) b.p.held[points[i]] = axes;
@@ -353,8 +352,7 @@ dfm_status dfm_body_apply_impulse(dfm_body body, const double point[3], const do
       b.surface.each_phyxel(b.surface.tri[size_t(3) * near.triangle + size_t(k)],
                             [&](uint32_t phyxel, double) {
                               const double mass = b.p.mass[phyxel];
-                              if (mass > 0)
-                                check_velocity("body", b.name.c_str(), (1 / mass) * load3(impulse));
+                              if (mass > 0) check_velocity(b, (1 / mass) * load3(impulse));
                             });
     disturb(b);
     const HostWork work(b);

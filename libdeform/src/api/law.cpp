@@ -228,8 +228,7 @@ dfm_status evaluate(Law &law, const dfm_friction_in *given_in, dfm_friction_out 
   if (status < 0) fail(status, "law %s failed with %s", law.type.id, dfm_status_name(status));
   batch.finish();
   if (status == DFM_OK && !finite(*batch.in(), *batch.out(), nstate)) {
-    law.context.logf(DFM_LOG_WARNING, "%s: eval wrote a value that is not finite; the batch is discarded",
-                     law.type.id);
+    law.context.warn("%s: eval wrote a value that is not finite; the batch is discarded", law.type.id);
     return DFM_DISCARD;
   }
   return status;

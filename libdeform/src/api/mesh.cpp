@@ -78,7 +78,7 @@ const RestMesh &surface_of(const MeshObject &object, dfm_mesh_handle handle) {
 // Moves a mesh into a context. from: logs its warnings with this before each.
 void keep(dfm_context &context, RestMesh &&mesh, dfm_mesh_handle *out, const char *from = nullptr) {
   if (from)
-    for (const std::string &w : mesh.warnings) context.logf(DFM_LOG_WARNING, "%s: %s", from, w.c_str());
+    for (const std::string &w : mesh.warnings) context.warn("%s: %s", from, w.c_str());
   *out = keep_live(context, Kind::mesh, std::make_unique<MeshObject>(context, std::move(mesh)),
                    end_live<Kind::mesh, MeshObject>);
 }
@@ -178,10 +178,9 @@ dfm_status dfm_mesh_write(dfm_mesh_handle mesh, const char *path) {
     need(path, "path");
     const MeshObject &object = mesh_of(mesh);
     if (!write_mesh(object.mesh, path))
-      object.context.logf(
-          DFM_LOG_WARNING,
-          "%s does not keep how much of each cell is material: a body of this file counts every cell "
-          "whole in mass and stiffness; write %s",
+      object.context.warn(
+          "%s does not keep how much of each cell is material: a body of this file counts every cell whole "
+          "in mass and stiffness; write %s",
           path, object.info.inside ? ".vtu, which keeps it" : ".vtu or .vtk, which keep it");
   });
 }

@@ -1,6 +1,5 @@
 // Objects of handles, for the files of api/: each function throws Error(DFM_E_HANDLE).
 #pragma once
-#include <cstdarg>
 #include <cstring>
 #include <functional>
 #include <memory>
@@ -38,15 +37,12 @@ inline Body &any_body_of(dfm_body h) { return part_of<Body>(Kind::body, h); }
 inline Body &shown_body_of(dfm_body h) {
   Body &b = any_body_of(h);
   if (b.rolled_back)
-    fail(DFM_E_STATE,
-         "body '%s' does not exist in the restored snapshot, which is older than the cut that made it; "
-         "destroy it, or restore a later snapshot",
-         b.name.c_str());
+    refuse(b, DFM_E_STATE,
+           " does not exist in the restored snapshot, which is older than the cut that made it; destroy it, "
+           "or restore a later snapshot");
   if (b.emptied)
-    fail(DFM_E_STATE,
-         "body '%s' has no cells left: a cut has taken them all; destroy it, or restore a snapshot from "
-         "before",
-         b.name.c_str());
+    refuse(b, DFM_E_STATE,
+           " has no cells left: a cut has taken them all; destroy it, or restore a snapshot from before");
   return b;
 }
 inline Body &body_of(dfm_body h) {
@@ -131,16 +127,6 @@ inline dfm_context &used(dfm_context &context) {
 inline dfm_context &exclusive(dfm_context &context) {
   Call::now().need_alone(&context, "context");
   return used(context);
-}
-
-// Error(DFM_E_ARG) with the body's name before the sentence.
-[[noreturn]] inline void refuse(const Body &b, const char *sentence, ...) DEFORM_PRINTF(2, 3);
-inline void refuse(const Body &b, const char *sentence, ...) {
-  va_list rest;
-  va_start(rest, sentence);
-  const std::string text = vformat(sentence, rest);
-  va_end(rest);
-  fail(DFM_E_ARG, "body '%s'%s", b.name.c_str(), text.c_str());
 }
 
 inline void need(const void *p, const char *name) {

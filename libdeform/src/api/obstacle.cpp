@@ -61,8 +61,8 @@ Obstacle &movable(dfm_obstacle obstacle, const dfm_pose *pose) {
   if (o.rigid) fail(DFM_E_STATE, "'%s' is a rigid body; move it with dfm_rigid_set_state", o.name.c_str());
   for (int i = 0; i < 4; ++i)
     if (!std::isfinite(pose->rotation[i]) || (i < 3 && !std::isfinite(pose->position[i])))
-      fail(DFM_E_ARG, "obstacle '%s': the target pose is not finite", o.name.c_str());
-  check_place(*o.world, "obstacle", o.name.c_str(), largest_coordinate(pose->position, 1, 3));
+      refuse(o, ": the target pose is not finite");
+  check_place(*o.world, o, largest_coordinate(pose->position, 1, 3));
   return o;
 }
 

@@ -141,7 +141,7 @@ void write_scene(const char *call, World &w, const char *path, const dfm_scene_w
   options.beside = std::move(beside);
   options.note = [&](const std::string &sentence) {
     if (d.note) d.note(d.user, sentence.c_str());
-    else w.context->logf(DFM_LOG_WARNING, "%s: %s", path, sentence.c_str());
+    else w.context->warn("%s: %s", path, sentence.c_str());
   };
   uint32_t local_notes = 0;
   if (!notes) notes = &local_notes;

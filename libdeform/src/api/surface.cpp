@@ -45,9 +45,8 @@ dfm_status dfm_surface_triangles(dfm_body body, uint32_t capacity, uint32_t *tri
 dfm_status dfm_surface_points(dfm_body body, uint32_t capacity, uint32_t *point, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
     if (!b.surface.identity())
-      fail(DFM_E_UNSUPPORTED,
-           "body '%s': each of its surfels depends on several points, so there is no single point per surfel",
-           b.name.c_str());
+      refuse(b, DFM_E_UNSUPPORTED,
+             ": each of its surfels depends on several points, so there is no single point per surfel");
     if (room(b.surface.nsurfel, capacity, point, n))
       std::copy(b.surface.point.begin(), b.surface.point.begin() + b.surface.nsurfel, point);
   });

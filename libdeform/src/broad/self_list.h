@@ -58,8 +58,6 @@ class SelfList {
   // Wide: the next rebuild uses the widest skin, independent of the motion; for a body that may touch itself
   // later, whose list is not traversed.
   void set_wide(bool wide) { wide_ = wide; }
-  // The skin is made to last for about this many sub-steps of the present motion.
-  void set_skin_steps(double steps) { skin_steps_ = steps; }
 
  private:
   static constexpr double kDistanceRounding = 1 + 1e-9;  // margins hold in spite of rounded distances
@@ -74,7 +72,8 @@ class SelfList {
   template <class Wanted>
   void add(uint32_t a, uint32_t b, double limit, const Wanted &wanted);
   const Surface &surface_;
-  double skin_steps_ = 24, margin_ = -1;  // negative: no lists yet
+  // skin_steps_: sub-steps of the present motion that a skin is made to last; margin_ negative: no lists yet
+  double skin_steps_ = 24, margin_ = -1;
   BoxTree tree_;
   RigidReference at_;               // positions that the lists refer to
   double longest_ = 0, moved_ = 0;  // m, edge of that time; what displaced() said at the last update()

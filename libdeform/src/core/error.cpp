@@ -73,6 +73,27 @@ void fail(dfm_status status, const char *format, ...) {
   throw Error(status, std::move(text));
 }
 
+namespace {
+
+[[noreturn]] void refuse(const Named &whose, dfm_status status, const char *sentence, va_list args) {
+  const std::string text = vformat(sentence, args);
+  fail(status, "%s '%s'%s", whose.kind, whose.name, text.c_str());
+}
+
+}  // namespace
+
+void refuse(const Named &whose, const char *sentence, ...) {
+  va_list args;
+  va_start(args, sentence);
+  refuse(whose, DFM_E_ARG, sentence, args);
+}
+
+void refuse(const Named &whose, dfm_status status, const char *sentence, ...) {
+  va_list args;
+  va_start(args, sentence);
+  refuse(whose, status, sentence, args);
+}
+
 std::string format(const char *format, ...) {
   va_list args;
   va_start(args, format);

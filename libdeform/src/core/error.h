@@ -27,6 +27,18 @@ struct Error : std::exception {
 // printf-style; the message is one sentence: what was wrong, where, and what to do.
 [[noreturn]] void fail(dfm_status status, const char *format, ...) DEFORM_PRINTF(2, 3);
 std::string format(const char *format, ...) DEFORM_PRINTF(1, 2);
+
+// What a sentence is about: it begins with "body 'NAME'". T::kKind: the word.
+struct Named {
+  const char *kind, *name;
+  Named(const char *k, const char *n) : kind(k), name(n) {}
+  template <class T>
+    requires requires { T::kKind; }
+  Named(const T &thing) : kind(T::kKind), name(thing.name.c_str()) {}
+};
+[[noreturn]] void refuse(const Named &whose, const char *sentence, ...) DEFORM_PRINTF(2, 3);  // DFM_E_ARG
+[[noreturn]] void refuse(const Named &whose, dfm_status status, const char *sentence, ...)
+    DEFORM_PRINTF(3, 4);
 std::string vformat(const char *format, va_list args);
 
 // Makes a text safe for any terminal: control characters (file names may contain them) become \uXXXX, bytes

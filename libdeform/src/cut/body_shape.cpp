@@ -82,8 +82,8 @@ void keep_params(Body &b, const BodyShape &before) {
   b.switched_off.requested = before.switched_off.requested;
   if (values == b.model.params) return;
   if (const dfm_status s = b.model.put_params(values, b.dynamics->abilities().claims); s != DFM_OK)
-    fail(s, "body '%s': model '%s' does not take its present parameters for the cells that are left",
-         b.name.c_str(), b.model.type->id);
+    refuse(b, s, ": model '%s' does not take its present parameters for the cells that are left",
+           b.model.type->id);
   b.model.params = values;
 }
 

@@ -119,9 +119,9 @@ void carry_state(const BodyShape &before, const CutMesh &mesh, const std::vector
     return l.unit == r.unit && l.width == r.width && l.kind == r.kind;
   };
   if (!std::equal(old.slots.begin(), old.slots.end(), now.slots.begin(), now.slots.end(), same))
-    fail(DFM_E_FATAL,
-         "body '%s': model '%s' has another state for the cells that are left; report it to its author",
-         b.name.c_str(), now.type->id);
+    refuse(b, DFM_E_FATAL,
+           ": model '%s' has another state for the cells that are left; report it to its author",
+           now.type->id);
   size_t from = 0, to = 0;
   for (const dfm_slot &slot : now.slots) {
     const bool by_point = slot.unit == DFM_PER_POINT, by_cell = slot.unit == DFM_PER_CELL,
@@ -153,8 +153,8 @@ void carry_state(const BodyShape &before, const CutMesh &mesh, const std::vector
   const dfm_status s =
       now.call("carry", [&] { return table->carry(old.self, now.self, &maps, now.state.data()); });
   if (s != DFM_OK)
-    fail(s < 0 ? s : DFM_E_FATAL, "body '%s': model '%s' cannot continue with the remaining cells: %s",
-         b.name.c_str(), now.type->id, *why.text() ? why.text() : dfm_status_name(s));
+    refuse(b, s < 0 ? s : DFM_E_FATAL, ": model '%s' cannot continue with the remaining cells: %s",
+           now.type->id, *why.text() ? why.text() : dfm_status_name(s));
 }
 
 std::vector<uint32_t> surfels_before(const Body &before, const CutMesh &mesh, const Surface &now) {

@@ -164,14 +164,12 @@ void set_bound(World &w, const WorldBound &before, double share, double dt) {
 }  // namespace
 
 void set_cut_delay(Body &b, double delay) {
-  const char *const name = b.name.c_str();
   if (!(delay >= 0 && std::isfinite(delay)))
-    fail(DFM_E_ARG, "body '%s': cuts cannot wait for %g s; give the seconds until faces open, or 0", name,
-         delay);
+    refuse(b, ": cuts cannot wait for %g s; give the seconds until faces open, or 0", delay);
   if (b.piece_of)
-    fail(DFM_E_STATE,
-         "body '%s' is a piece of '%s', and its cuts wait as long as those of that body; set it there", name,
-         b.whole_name.c_str());
+    refuse(b, DFM_E_STATE,
+           " is a piece of '%s', and its cuts wait as long as those of that body; set it there",
+           b.whole_name.c_str());
   if (delay > 0) check_may_cut(b, b.model);
   std::vector<Body *> all;  // it and its pieces
   for (const auto *list : {&b.world->bodies, &b.world->emptied, &b.world->rolled_back})
@@ -179,9 +177,9 @@ void set_cut_delay(Body &b, double delay) {
       if (other.get() == &b || other->piece_of == b.id) all.push_back(other.get());
   for (const Body *const other : all)
     if (!other->ahead.faces.empty() && !other->emptied && !other->rolled_back)
-      fail(DFM_E_STATE,
-           "body '%s': %zu faces wait to be opened; set how long its cuts wait before a tool cuts it",
-           other->name.c_str(), other->ahead.faces.size() + other->ahead.later.size());
+      refuse(*other, DFM_E_STATE,
+             ": %zu faces wait to be opened; set how long its cuts wait before a tool cuts it",
+             other->ahead.faces.size() + other->ahead.later.size());
   std::vector<std::shared_ptr<const Body>> structures;  // now: the first step has no time for it
   for (const Body *const other : all) structures.push_back(delay > 0 ? structure_of(*other) : nullptr);
   for (size_t i = 0; i < all.size(); ++i) {

@@ -47,10 +47,9 @@ void warn(const World &w, const std::vector<Made> &all) {
     const auto whole = [&](auto &b) { return b->id == m.whole || b->piece_of == m.whole; };
     const auto b = std::find_if(w.bodies.begin(), w.bodies.end(), whole);
     if (m.met || b == w.bodies.end()) continue;
-    w.context->logf(
-        DFM_LOG_WARNING,
-        "body '%s': its cut at %g s has met no %s; give the place where the body is at that time, in "
-        "the axes of the world%s",
+    w.context->warn(
+        "body '%s': its cut at %g s has met no %s; give the place where the body is at that time, in the "
+        "axes of the world%s",
         ((*b)->piece_of ? (*b)->whole_name : (*b)->name).c_str(), m.t,
         m.splits ? "closed face between two cells" : "cell",
         m.splits ? ", and no slice thinner than a cell" : "");

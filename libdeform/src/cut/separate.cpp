@@ -239,11 +239,9 @@ void separate_if_requested(Body &b, CutReport &out) {
     return;
   }
   if (!std::exchange(b.separate.waits, true))
-    b.world->context->logf(
-        DFM_LOG_WARNING,
-        "body '%s': there is no memory to make its parts bodies of their own; they stay in "
-        "it, and the next steps try again",
-        b.name.c_str());
+    b.world->context->warn(b,
+                           ": there is no memory to make its parts bodies of their own; they stay in it, and "
+                           "the next steps try again");
 }
 
 void separate_if_requested(Body &b) {

@@ -240,25 +240,22 @@ void remove(const Tool &t, Body &b, uint32_t &n) {
 }  // namespace
 
 void check_tool_cuts(const Tool &t, uint32_t how) {
-  const char *const name = t.name.c_str();
   if (how > DFM_CUT_SPLIT)
-    fail(DFM_E_ARG, "tool '%s' has the unknown way of cutting %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", name,
-         how);
+    refuse(t, " has the unknown way of cutting %u; use DFM_CUT_REMOVE or DFM_CUT_SPLIT", how);
   if (t.def.shape == DFM_TOOL_GRASPER || t.def.shape == DFM_TOOL_MESH)
-    fail(DFM_E_ARG,
-         "tool '%s' cannot cut: a %s has neither an edge nor a volume; use a blade, scissors, a sphere, a "
-         "capsule, a box or an ellipsoid",
-         name, t.def.shape == DFM_TOOL_MESH ? "mesh" : "grasper");
+    refuse(t,
+           " cannot cut: a %s has neither an edge nor a volume; use a blade, scissors, a sphere, a capsule, "
+           "a box or an ellipsoid",
+           t.def.shape == DFM_TOOL_MESH ? "mesh" : "grasper");
   if (how == DFM_CUT_SPLIT && !has_edge(t))
-    fail(DFM_E_ARG,
-         "tool '%s' cannot open faces, since it has no edge; let it remove cells (DFM_CUT_REMOVE), or use a "
-         "blade or scissors",
-         name);
+    refuse(t,
+           " cannot open faces, since it has no edge; let it remove cells (DFM_CUT_REMOVE), or use a blade "
+           "or scissors");
   if (t.def.shape == DFM_TOOL_BLADE && how == DFM_CUT_SPLIT && t.def.half_size[0] > t.def.half_size[1])
-    fail(DFM_E_ARG,
-         "tool '%s' cannot cut: the edge of a blade runs along y, and its half_size is %g m along x, the "
-         "thickness, and %g m along y; exchange the two",
-         name, t.def.half_size[0], t.def.half_size[1]);
+    refuse(t,
+           " cannot cut: the edge of a blade runs along y, and its half_size is %g m along x, the thickness, "
+           "and %g m along y; exchange the two",
+           t.def.half_size[0], t.def.half_size[1]);
 }
 
 void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodies) {
@@ -267,8 +264,8 @@ void set_cuts(Tool &t, uint32_t how, uint32_t most, std::span<Body *const> bodie
   std::vector<uint64_t> ids;
   for (const Body *const b : bodies) {
     if (b->world != &w)
-      fail(DFM_E_HANDLE, "tool '%s' and body '%s', which it should cut, belong to different worlds",
-           t.name.c_str(), b->name.c_str());
+      refuse(t, DFM_E_HANDLE, " and body '%s', which it should cut, belong to different worlds",
+             b->name.c_str());
     check_may_cut(*b, b->model);
     ids.push_back(b->id);
   }

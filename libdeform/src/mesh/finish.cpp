@@ -98,17 +98,12 @@ void turn_cells(const std::string &path, RawMesh &raw) {
 
 // Triangles without a group add nothing to the boundary of the cells.
 void keep_grouped_triangles(RawMesh &raw, const Array<uint32_t> &number) {
-  size_t kept = 0;
-  for (size_t t = 0; t < raw.tri_group.size(); ++t) {
-    const uint32_t *c = &raw.tris[3 * t];
-    if (raw.tri_group[t] == kNoGroup || number[c[0]] == kNoGroup || number[c[1]] == kNoGroup ||
-        number[c[2]] == kNoGroup)
-      continue;
-    for (size_t k = 0; k < 3; ++k) raw.tris[3 * kept + k] = number[c[k]];
-    raw.tri_group[kept++] = raw.tri_group[t];
-  }
-  raw.tris.resize(3 * kept);
-  raw.tri_group.resize(kept);
+  keep_triangles(raw, [&](uint32_t t) {
+    const uint32_t *const c = &raw.tris[3 * size_t(t)];
+    return raw.tri_group[t] != kNoGroup &&
+           std::none_of(c, c + 3, [&](uint32_t p) { return number[p] == kNoGroup; });
+  });
+  for (uint32_t &p : raw.tris) p = number[p];
   raw.tris.shrink_to_fit();
   raw.tri_group.shrink_to_fit();
 }

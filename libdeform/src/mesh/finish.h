@@ -1,5 +1,6 @@
 // Shared by the repair of tetrahedral meshes and of surfaces.
 #pragma once
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -13,6 +14,20 @@ inline constexpr double kLargestCoordinate = 1e100;  // m; beyond it squares of 
 // Keeps the used points, in the file's order: moves them together and fills file_point. Returns their new
 // numbers, kNoGroup for the others.
 Array<uint32_t> keep_points(RawMesh &raw, const Array<uint32_t> &used);
+// Keeps triangles for which keep(number) is true; returns the number of the others.
+template <class Keep>
+uint32_t keep_triangles(RawMesh &raw, const Keep &keep) {
+  uint32_t kept = 0;
+  const uint32_t n = uint32_t(raw.tris.size() / 3);
+  for (uint32_t t = 0; t < n; ++t)
+    if (keep(t)) {
+      std::copy_n(&raw.tris[3 * size_t(t)], 3, &raw.tris[3 * size_t(kept)]);
+      raw.tri_group[kept++] = raw.tri_group[t];
+    }
+  raw.tris.resize(3 * size_t(kept));
+  raw.tri_group.resize(kept);
+  return n - kept;
+}
 void check_points(const std::string &path, const Array<double> &points);
 void sort_once(Array<uint32_t> &points);  // points of a group: ascending, each once
 // The points of cells or triangles, of each the group, into their groups.

@@ -35,20 +35,6 @@ Corners3 sorted_corners(const uint32_t *c) {
   return key;
 }
 
-template <class Keep>
-uint32_t keep_triangles(RawMesh &raw, const Keep &keep) {
-  uint32_t kept = 0;
-  const uint32_t n = count(raw);
-  for (uint32_t t = 0; t < n; ++t)
-    if (keep(t)) {
-      std::copy_n(corners(raw, t), 3, &raw.tris[3 * size_t(kept)]);
-      raw.tri_group[kept++] = raw.tri_group[t];
-    }
-  raw.tris.resize(3 * size_t(kept));
-  raw.tri_group.resize(kept);
-  return n - kept;
-}
-
 // ---- points at one place ----------------------------------------------------------------------------------
 
 uint64_t place_hash(const double *p) {
@@ -377,13 +363,9 @@ void sort_groups(RawMesh &raw) {
     place[g] = uint32_t(groups.size());
     groups.push_back({raw.groups[g].name, 2, raw.groups[g].tag, Array<uint32_t>(*raw.memory)});
   }
-  for (size_t t = 0; t < raw.tri_group.size(); ++t) {
-    if (raw.tri_group[t] == kNoGroup) continue;
-    raw.tri_group[t] = place[raw.tri_group[t]];
-    Array<uint32_t> &points = groups[raw.tri_group[t]].points;
-    points.insert(points.end(), &raw.tris[3 * t], &raw.tris[3 * t] + 3);
-  }
-  for (MeshGroup &group : groups) sort_once(group.points);
+  for (uint32_t &g : raw.tri_group)
+    if (g != kNoGroup) g = place[g];
+  add_to_groups(groups, raw.tri_group, raw.tris);
   raw.groups = std::move(groups);
 }
 

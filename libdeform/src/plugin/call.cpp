@@ -18,10 +18,10 @@ dfm_status run_plugin(const dfm_host &host, const dfm_type &type, const char *wh
     threw = true;
   }
   if (const char *changed = boundary.restore(); changed && context.left_changed.first(&type))
-    context.logf(DFM_LOG_WARNING,
-                 "%s: %s changed %s and did not restore it; the library restored it, and will do so again "
-                 "without a message; a plugin must not change the floating-point environment",
-                 type.id, what, changed);
+    context.warn(
+        "%s: %s changed %s and did not restore it; the library restored it, and will do so again without a "
+        "message; a plugin must not change the floating-point environment",
+        type.id, what, changed);
   if (threw)
     context.logf(DFM_LOG_ERROR,
                  "%s: %s threw an exception; a plugin must not (wrap its entries in dfm::plugin::guarded)",

@@ -193,11 +193,32 @@ void dfm_context::log(int32_t level, const char *utf8) const noexcept {
 }
 
 void dfm_context::logf(int32_t level, const char *format, ...) const noexcept {
-  char text[1024];
   va_list args;
   va_start(args, format);
-  std::vsnprintf(text, sizeof text, format, args);
+  log_line(level, nullptr, format, args);
   va_end(args);
+}
+
+void dfm_context::warn(const char *format, ...) const noexcept {
+  va_list args;
+  va_start(args, format);
+  log_line(DFM_LOG_WARNING, nullptr, format, args);
+  va_end(args);
+}
+
+void dfm_context::warn(const dfm::Named &whose, const char *sentence, ...) const noexcept {
+  va_list args;
+  va_start(args, sentence);
+  log_line(DFM_LOG_WARNING, &whose, sentence, args);
+  va_end(args);
+}
+
+void dfm_context::log_line(int32_t level, const dfm::Named *whose, const char *format,
+                           va_list args) const noexcept {
+  char text[1024] = "";
+  if (whose) std::snprintf(text, sizeof text, "%s '%s'", whose->kind, whose->name);
+  const size_t before = std::strlen(text);
+  std::vsnprintf(text + before, sizeof text - before, format, args);
   char line[sizeof text];
   dfm::printable(text, line, sizeof line);
   log(level, line);

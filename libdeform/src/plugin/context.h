@@ -24,6 +24,8 @@ struct dfm_context {
   // Logs to the host's hook; without one, warnings and errors go to stderr.
   void log(int32_t level, const char *utf8) const noexcept;
   void logf(int32_t level, const char *format, ...) const noexcept DEFORM_PRINTF(3, 4);
+  void warn(const char *format, ...) const noexcept DEFORM_PRINTF(2, 3);
+  void warn(const dfm::Named &whose, const char *sentence, ...) const noexcept DEFORM_PRINTF(3, 4);
   void trace_begin(const char *zone) const {
     if (hooks.trace_begin) hooks.trace_begin(hooks.user, zone);
   }
@@ -48,6 +50,7 @@ struct dfm_context {
   std::atomic<bool> ending{false};
 
  private:
+  void log_line(int32_t level, const dfm::Named *whose, const char *format, va_list args) const noexcept;
   std::mutex live_mutex_;
   std::vector<std::pair<uint64_t, void (*)(uint64_t)>> live_;
 };

@@ -67,8 +67,8 @@ bool Selection::lists(const std::string &effect) const {
 }
 
 void warn_of(const dfm_context &context, const LeftOut &o) {
-  context.logf(DFM_LOG_WARNING, "%s: the list of effects does not contain %s, which the scene needs: %s",
-               o.of.c_str(), o.effect.c_str(), o.by.c_str());
+  context.warn("%s: the list of effects does not contain %s, which the scene needs: %s", o.of.c_str(),
+               o.effect.c_str(), o.by.c_str());
 }
 
 std::vector<EffectRow> copy_effect_rows(const dfm_type &type, const void *from) {

@@ -65,10 +65,10 @@ void warn_back_side(dfm_context *context, const World &world, Vec3 gravity) {
     const Vec3 d = rotate(back, gravity);
     for (const auto &b : world.bodies) {
       if (!b || !meets_a_back(*o, rotate(back, center(*b) - o->pose.position), d)) continue;
-      context->logf(DFM_LOG_WARNING,
-                    "body '%s' would fall on the back of obstacle '%s': its mesh is open and acts only on "
-                    "the side that its triangles face; reverse the order of their corners in the file",
-                    b->name.c_str(), o->name.c_str());
+      context->warn(*b,
+                    " would fall on the back of obstacle '%s': its mesh is open and acts only on the side "
+                    "that its triangles face; reverse the order of their corners in the file",
+                    o->name.c_str());
       break;
     }
   }
@@ -100,10 +100,10 @@ void warn_long_step(dfm_context *context, const World &world, double step) {
     if (!b || b->integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER || b->model.stepper) continue;
     const double size = size_of_free(*b);
     if (!(size > 0) || fall <= kFall * size) continue;
-    context->logf(DFM_LOG_WARNING,
-                  "body '%s' is %.3g m in size and falls %.3g m in a step of %.3g s: landing takes many "
-                  "sub-steps and most of the time; take a time.step of %.2g s, or \"auto\"",
-                  b->name.c_str(), size, fall, step, std::sqrt(2 * kShort * size / g));
+    context->warn(*b,
+                  " is %.3g m in size and falls %.3g m in a step of %.3g s: landing takes many sub-steps and "
+                  "most of the time; take a time.step of %.2g s, or \"auto\"",
+                  size, fall, step, std::sqrt(2 * kShort * size / g));
     return;  // one sentence for the scene
   }
 }
@@ -424,10 +424,10 @@ class Builder {
       to.max_jump = s.max_jump;
       switches.push_back(to);
       if (s.t > 0 && s.t >= def_.begin + end_of_changes())
-        context_->logf(DFM_LOG_WARNING,
-                       "body '%s': its change to '%s' at %g s (%s/t) is never made, because no step begins "
-                       "then or later; give an earlier time, or a longer /time/duration",
-                       b.name.c_str(), s.model.type.c_str(), s.t, s.pointer.c_str());
+        context_->warn(b,
+                       ": its change to '%s' at %g s (%s/t) is never made, because no step begins then or "
+                       "later; give an earlier time, or a longer /time/duration",
+                       s.model.type.c_str(), s.t, s.pointer.c_str());
     }
     if (!switches.empty())
       def_.require(dfm_body_set_switches(body, uint32_t(switches.size()), switches.data()), pointer);
@@ -452,21 +452,20 @@ class Builder {
     for (size_t i = 0; i < b.switches.size(); ++i) {
       const ModelChoice &to = b.switches[i].to;
       if (last ? alike(*last, to) : is_made_so(b, to))
-        context_->logf(
-            DFM_LOG_WARNING,
-            "body '%s': its change at %g s (%s/%zu) is to the model that the body already has then, '%s' "
-            "with the same parameters: it only resets the state of the model (plastic strain, for example)",
-            b.name.c_str(), b.switches[i].t, pointer.c_str(), i, to.type.c_str());
+        context_->warn(
+            b,
+            ": its change at %g s (%s/%zu) is to the model that the body already has then, '%s' with the "
+            "same parameters: it only resets the state of the model (plastic strain, for example)",
+            b.switches[i].t, pointer.c_str(), i, to.type.c_str());
       last = &to;
     }
     for (const dfm::SwitchRule &r : b.rule)
       for (const ModelChoice *other : {&r.touching, &r.near})
         if (!other->type.empty() && alike(*other, r.far))
-          context_->logf(DFM_LOG_WARNING,
-                         "body '%s': the rule at %s names '%s' with the same parameters for \"far\" and for "
-                         "\"%s\", so it changes nothing between them",
-                         b.name.c_str(), pointer.c_str(), r.far.type.c_str(),
-                         other == &r.near ? "near" : "touching");
+          context_->warn(b,
+                         ": the rule at %s names '%s' with the same parameters for \"far\" and for \"%s\", "
+                         "so it changes nothing between them",
+                         pointer.c_str(), r.far.type.c_str(), other == &r.near ? "near" : "touching");
   }
   static bool alike(const ModelChoice &a, const ModelChoice &b) {
     return a.type == b.type && a.params == b.params &&
@@ -682,10 +681,10 @@ class Builder {
   void plan_cut(const Cut &c) const {
     def_.require(dfm_body_plan_cut(find_body(c.body, c.pointer), c.t, &c.def), c.pointer);
     if (c.t > def_.begin + def_.duration)
-      context_->logf(DFM_LOG_WARNING,
-                     "body '%s': its cut at %g s (%s/t) is never made, because the run ends before; give an "
-                     "earlier time, or a longer /time/duration",
-                     c.body.c_str(), c.t, c.pointer.c_str());
+      context_->warn(
+          "body '%s': its cut at %g s (%s/t) is never made, because the run ends before; give an earlier "
+          "time, or a longer /time/duration",
+          c.body.c_str(), c.t, c.pointer.c_str());
   }
 
   void add_friction(Friction &f) {

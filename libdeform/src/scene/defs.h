@@ -131,6 +131,7 @@ struct Thing {
 };
 
 struct Body : Thing {
+  static constexpr char kKind[] = "body";
   dfm_body_def def = dfm_body_def_default();
   std::string mesh, model, nodal_bc;
   bool model_open = false;  // the planner chooses; else, where `model` is empty, the library by the cells

@@ -104,10 +104,10 @@ std::string MeshFiles::make(const Body &b) {
   }
   const dfm_mesh_info info = info_of(mesh, b.pointer + "/mesh");
   if (info.ncell > 2 * uint64_t{m.cells} && info.ncell > m.cells + kCheapCells)
-    context_->logf(DFM_LOG_WARNING,
-                   "body '%s': its %s has %u cells, not about %u: cells are about as long as thick, and no "
-                   "fewer of them fit into its thickness; make it thicker for fewer",
-                   b.name.c_str(), m.kind.c_str(), info.ncell, m.cells);
+    context_->warn(b,
+                   ": its %s has %u cells, not about %u: cells are about as long as thick, and no fewer of "
+                   "them fit into its thickness; make it thicker for fewer",
+                   m.kind.c_str(), info.ncell, m.cells);
   return name;
 }
 
@@ -150,10 +150,10 @@ dfm_mesh_handle MeshFiles::filling(const std::string &path, const Body &b) {
       once(format("fill %u ", wanted) + path, b.pointer + (b.fill ? "/fill" : "/mesh"),
            [&](dfm_mesh_handle *made) { return dfm_mesh_fill(skin, wanted, made); });
   if (!b.fill)
-    context_->logf(DFM_LOG_WARNING,
-                   "body '%s': %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": "
+    context_->warn(b,
+                   ": %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": "
                    "{\"cells\": N} chooses",
-                   b.name.c_str(), path.c_str(), info_of(mesh, b.pointer + "/mesh").ntet);
+                   path.c_str(), info_of(mesh, b.pointer + "/mesh").ntet);
   return mesh;
 }
 
@@ -263,10 +263,10 @@ void MeshFiles::warn_unit(const Body &b, const BodyMesh &mesh) const {
   double longest = 0;
   for (int k = 0; k < 3; ++k) longest = std::max(longest, mesh.hi[k] - mesh.lo[k]);
   if (longest > kLongestBody)
-    context_->logf(DFM_LOG_WARNING,
-                   "body '%s' is %.3g m long: if %s is in millimeters, set \"scale\": 0.001 in its \"pose\" "
-                   "(1 if it is in meters)",
-                   b.name.c_str(), longest, b.mesh.c_str());
+    context_->warn(b,
+                   " is %.3g m long: if %s is in millimeters, set \"scale\": 0.001 in its \"pose\" (1 if it "
+                   "is in meters)",
+                   longest, b.mesh.c_str());
 }
 
 // A cut needs the border of the cells as surface, which is not the shape that the file has.
@@ -274,16 +274,15 @@ void MeshFiles::warn_voxel_steps(const Body &b, const BodyMesh &mesh) const {
   const dfm_mesh_info &cells = mesh.info;
   double filled = 0;  // cells of the lattice are alike
   for (uint32_t t = 0; t < cells.ntet; ++t) filled += mesh.share_of(t);
-  context_->logf(
-      DFM_LOG_WARNING,
-      "body '%s' is drawn and touches with the %u triangles around its %u cells, in steps of about "
-      "%.2g m and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
-      "\"boundary\"%s make smaller steps",
-      b.name.c_str(), cells.ntriangle, mesh.info.inside ? cells.ncell : cells.ntet,
-      b.scale * cells.edge_median, 100 * (cells.ntet / filled - 1), mesh.skin.ntriangle,
-      b.made.kind.empty() ? b.mesh.c_str() : "the surface",
-      mesh.info.inside ? "; more cells (\"lattice\")"
-                       : ", as a body that is cut needs it; more cells (\"fill\")");
+  context_->warn(b,
+                 " is drawn and touches with the %u triangles around its %u cells, in steps of about %.2g m "
+                 "and with %.0f %% more volume, not with the %u triangles of %s: \"surface\" says "
+                 "\"boundary\"%s make smaller steps",
+                 cells.ntriangle, mesh.info.inside ? cells.ncell : cells.ntet, b.scale * cells.edge_median,
+                 100 * (cells.ntet / filled - 1), mesh.skin.ntriangle,
+                 b.made.kind.empty() ? b.mesh.c_str() : "the surface",
+                 mesh.info.inside ? "; more cells (\"lattice\")"
+                                  : ", as a body that is cut needs it; more cells (\"fill\")");
 }
 
 void MeshFiles::load(Obstacle &o, std::vector<double> &points) {

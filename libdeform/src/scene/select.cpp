@@ -103,6 +103,17 @@ std::vector<uint32_t> skin_triangles(const Selection &where, const BodyMesh &mes
   return out;
 }
 
+// Points of the skin: of the triangles of a group, or those in the box.
+std::vector<uint8_t> skin_marks(const Selection &where, const BodyMesh &mesh) {
+  std::vector<uint8_t> out(mesh.skin.npoint, 0);
+  if (where.group.empty())
+    for (uint32_t s = 0; s < out.size(); ++s) out[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
+  else
+    for (const uint32_t t : skin_triangles(where, mesh))
+      for (int k = 0; k < 3; ++k) out[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
+  return out;
+}
+
 // f(point, weight) for those that a point of the skin follows, as in the body's coupling.
 template <class F>
 void each_point_of(const BodyMesh &mesh, uint32_t s, F f) {
@@ -162,10 +173,8 @@ std::vector<uint32_t> select_group(const Selection &where, const BodyMesh &mesh,
   if (group == mesh.info.ngroup) {
     if (find_group(where.group, mesh.skin.group_names, mesh.skin.ngroup) == mesh.skin.ngroup)
       no_group(where, mesh, file);
-    std::vector<uint8_t> surfel(mesh.skin.npoint, 0), point(mesh.info.npoint, 0);
-    for (uint32_t t : skin_triangles(where, mesh))
-      for (int k = 0; k < 3; ++k) surfel[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
-    mark_cells(surfel, mesh, point);
+    std::vector<uint8_t> point(mesh.info.npoint, 0);
+    mark_cells(skin_marks(where, mesh), mesh, point);
     std::vector<uint32_t> out = marked(point);
     if (out.empty()) refuse(where, "group", file, "the group \"" + where.group + "\" has no triangle");
     return out;
@@ -183,34 +192,22 @@ std::vector<uint32_t> select(const Selection &where, const BodyMesh &mesh, const
   if (!where.points.empty()) return select_nodes(where, mesh, file);
   std::vector<uint8_t> point(mesh.info.npoint, 0);
   for (uint32_t i = 0; i < mesh.info.npoint; ++i) point[i] = in_box(where, mesh, &mesh.points[3 * size_t(i)]);
-  if (mesh.filled) {
-    std::vector<uint8_t> surfel(mesh.skin.npoint, 0);
-    for (uint32_t s = 0; s < mesh.skin.npoint; ++s)
-      surfel[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
-    mark_cells(surfel, mesh, point);
-  }
+  if (mesh.filled) mark_cells(skin_marks(where, mesh), mesh, point);
   std::vector<uint32_t> out = marked(point);
   if (out.empty()) refuse(where, "box", file, "no point of the body lies in this box; " + span_of(mesh));
   return out;
 }
 
 std::vector<uint32_t> select_skin(const Selection &where, const BodyMesh &mesh, const std::string &file) {
-  std::vector<uint8_t> marks(mesh.skin.npoint, 0);
-  if (!where.group.empty()) {
-    for (const uint32_t t : skin_triangles(where, mesh))
-      for (int k = 0; k < 3; ++k) marks[mesh.skin.triangles[3 * size_t(t) + size_t(k)]] = 1;
-  } else if (!where.points.empty()) {
-    for (const uint32_t s : where.points) {
-      if (s >= mesh.skin.npoint)
-        refuse(where, "points", file,
-               format("the body's surface has the points 0 to %u, and no point %u", mesh.skin.npoint - 1, s));
-      marks[s] = 1;
-    }
-  } else {
-    for (uint32_t s = 0; s < mesh.skin.npoint; ++s)
-      marks[s] = in_box(where, mesh, &mesh.skin.points[3 * size_t(s)]);
+  std::vector<uint8_t> listed(mesh.skin.npoint, 0);
+  for (const uint32_t s : where.points) {
+    if (s >= listed.size())
+      refuse(where, "points", file,
+             format("the body's surface has the points 0 to %u, and no point %u", mesh.skin.npoint - 1, s));
+    listed[s] = 1;
   }
-  std::vector<uint32_t> out = marked(marks);
+  const bool by_points = where.group.empty() && !where.points.empty();
+  std::vector<uint32_t> out = marked(by_points ? listed : skin_marks(where, mesh));
   if (!out.empty()) return out;
   if (!where.group.empty()) no_group(where, mesh, file);
   refuse(where, "box", file, "no point of the body's surface lies in the box; " + span_of(mesh));

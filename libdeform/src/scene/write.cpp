@@ -107,6 +107,14 @@ void SceneWriter::note(const char *text, ...) {
   remark(line);
 }
 
+void SceneWriter::note(const Named &whose, const char *text, ...) {
+  va_list rest;
+  va_start(rest, text);
+  const std::string line = vformat(text, rest);
+  va_end(rest);
+  note("%s '%s'%s", whose.kind, whose.name, line.c_str());
+}
+
 namespace {
 
 std::string folder_name(const std::string &path) { return name_of(path_of(path).stem()) + "_files"; }

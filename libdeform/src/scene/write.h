@@ -52,6 +52,7 @@ struct SceneWriter {
   std::set<std::string> model_keys{};                                      // parameters of any loaded model
 
   void note(const char *text, ...) DEFORM_PRINTF(2, 3);
+  void note(const Named &whose, const char *text, ...) DEFORM_PRINTF(3, 4);
   // A remark for the user who runs the scene: refuses nothing, and is not counted.
   void remark(const std::string &sentence) const {
     if (options.note) options.note(sentence);

@@ -61,8 +61,7 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
     const size_t m = b.composition.of.empty() ? 0 : b.composition.of[t];
     if (keys[m] == out.value("material", "")) continue;
     if (keys[m].empty()) {
-      to.note("body '%s': cells without a material lie beside others; a scene gives them '%s'",
-              b.name.c_str(), b.material.c_str());
+      to.note(b, ": cells without a material lie beside others; a scene gives them '%s'", b.material.c_str());
       break;
     }
     mesh.tet_group[t] = group_number(mesh.groups, material_group(keys[m]), 3);
@@ -131,8 +130,8 @@ void write_fields(SceneWriter &to, const Body &b, Written &out) {
   for (const CellField &f : b.composition.given) {
     const dfm_param *const row = find_row(*b.model.type, f.key.c_str());
     if (!row || !(row->flags & DFM_PARAM_PER_CELL)) {
-      to.note("body '%s': the field '%s' is left out, since the model '%s' has no such parameter",
-              b.name.c_str(), f.key.c_str(), b.model.type->id);
+      to.note(b, ": the field '%s' is left out, since the model '%s' has no such parameter", f.key.c_str(),
+              b.model.type->id);
       continue;
     }
     std::string rows = scene::columns_of(f.width) + "\n";
@@ -157,8 +156,7 @@ void note_state(SceneWriter &to, const std::string &sentence) {
 
 void write_switches(SceneWriter &to, const Body &b, Written &out) {
   if (!b.switches.empty() && !b.rule.empty())
-    to.note("body '%s': a scene has either changes of the model by time or a rule; the rule is left out",
-            b.name.c_str());
+    to.note(b, ": a scene has either changes of the model by time or a rule; the rule is left out");
   for (const Switch &s : b.switches) {
     Written entry = choice_of(to, s.to);
     entry["t"] = std::max(s.t, 0.0);
@@ -255,10 +253,10 @@ void write_held(SceneWriter &to, const Body &b, Written &out) {
     for (size_t i = 0; i < m.points.size(); ++i)
       away = std::max(away, norm(load3(&m.start[3 * i]) - made_at(b, m.points[i])));
     if (away > 1e-9 * b.surface.median_edge)
-      to.note(
-          "body '%s': held points move from where they stood when their motion was given, up to %g m from "
-          "the rest shape; a scene moves them from the rest shape",
-          b.name.c_str(), away);
+      to.note(b,
+              ": held points move from where they stood when their motion was given, up to %g m from the "
+              "rest shape; a scene moves them from the rest shape",
+              away);
   }
 }
 
@@ -322,10 +320,10 @@ void write_springs(SceneWriter &to, const Body &b, Written &out) {
   for (const Spring &s : b.springs) {
     Written entry;
     if (!write_spring_place(b, s, entry)) {
-      to.note(
-          "body '%s': a spring pulls at %zu points with its own weights, which a scene cannot describe; it "
-          "is left out",
-          b.name.c_str(), s.points.size());
+      to.note(b,
+              ": a spring pulls at %zu points with its own weights, which a scene cannot describe; it is "
+              "left out",
+              s.points.size());
       continue;
     }
     if (s.keys.empty()) entry["to"] = vector_of(s.to);
@@ -344,8 +342,7 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     const Obstacle *const thing = to.w.obstacle(a.to);
     const std::string name = other ? other->name : thing ? thing->name : "";
     if (!to.has(name)) {
-      to.note("body '%s': its attachment to '%s' is left out, since the scene does not have that",
-              b.name.c_str(), name.c_str());
+      to.note(b, ": its attachment to '%s' is left out, since the scene does not have that", name.c_str());
       continue;
     }
     Written entry;
@@ -362,8 +359,8 @@ void write_attachments(SceneWriter &to, const Body &b, Written &out) {
     for (size_t i = 0; i < a.surfels.size(); ++i)
       away = std::max(away, norm(b.surface.sum(a.surfels[i], b.p.x.data()) - attached_place(to.w, a, i)));
     if (away > 1e-6 * b.surface.median_edge)
-      to.note("body '%s': its attachment to '%s' is stretched by %g m now; in the scene it is at rest there",
-              b.name.c_str(), name.c_str(), away);
+      to.note(b, ": its attachment to '%s' is stretched by %g m now; in the scene it is at rest there",
+              name.c_str(), away);
   }
 }
 
@@ -389,16 +386,14 @@ Written write_body(SceneWriter &to, Body &b) {
                        {"crumbs", scene::word_of("crumbs", b.separate.removes)}};
   if (b.ahead.delay > 0) out["cut_delay"] = b.ahead.delay;
   if (!b.ahead.faces.empty())
-    to.note(
-        "body '%s': %zu faces that a tool has come through wait to be opened; in the scene they stay closed",
-        b.name.c_str(), b.ahead.faces.size() + b.ahead.later.size());
+    to.note(b, ": %zu faces that a tool has come through wait to be opened; in the scene they stay closed",
+            b.ahead.faces.size() + b.ahead.later.size());
   write_switches(to, b, out);
   if (b.sensor) out["sensor"] = true;
   if (!b.cut.open.empty())
-    to.note(
-        "body '%s' has been cut: the scene has it as it is now, but its cut faces are not set back, and the "
-        "two sides of a slit do not touch",
-        b.name.c_str());
+    to.note(b,
+            " has been cut: the scene has it as it is now, but its cut faces are not set back, and the two "
+            "sides of a slit do not touch");
   return out;
 }
 

@@ -43,8 +43,7 @@ Written write_obstacle(SceneWriter &to, const Obstacle &o) {
     store_pose(now, o.pose);
     out["start"] = {{"position", vector_of(now.position)}, {"rotation", rotation_of(now.rotation)}};
   }
-  if (o.has_target)
-    to.note("obstacle '%s': the pose that it is to reach in the next step is left out", o.name.c_str());
+  if (o.has_target) to.note(o, ": the pose that it is to reach in the next step is left out");
   const double *const belt = o.def.velocity_surface;
   if (belt[0] != 0 || belt[1] != 0 || belt[2] != 0) out["velocity_surface"] = vector_of(belt);
   to.put_material(out, o);
@@ -221,9 +220,8 @@ void write_cuts(SceneWriter &to, const Body &b, Written &out) {
         put(entry, "pose", pose_of(Pose{s.position, s.rotation}));
     }
     if (s.kind != CutKind::plane && s.kind != CutKind::blade && norm2(s.way) > 0)
-      to.note(
-          "body '%s': the shape of its cut at %g s has a motion; in the scene it stands where that begins",
-          b.name.c_str(), c.t);
+      to.note(b, ": the shape of its cut at %g s has a motion; in the scene it stands where that begins",
+              c.t);
     entry["mode"] = scene::word_of("cut_mode", c.how);
     if (c.most > 0) entry["most"] = c.most;
     out.push_back(std::move(entry));

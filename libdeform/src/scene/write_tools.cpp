@@ -76,34 +76,33 @@ void write_cuts(const SceneWriter &to, const Tool &t, Written &out) {
 }
 
 void note_rigid_tool(SceneWriter &to, const Tool &t, const ToolValues &v) {
-  const char *const name = t.name.c_str();
   const std::string own[] = {t.name + ".shape", t.name + ".shaft"};
   const auto is_own = [&](const auto &o) { return !o->added || o->name == own[0] || o->name == own[1]; };
   if (!std::all_of(to.w.obstacles.begin(), to.w.obstacles.end(),
                    [&](const auto &o) { return o->rigid != t.set || is_own(o); }))
-    to.note("tool '%s': the shapes that were added to its parts are left out", name);
+    to.note(t, ": the shapes that were added to its parts are left out");
   const auto any_part = [&](const auto &f) {
     return std::any_of(to.w.obstacles.begin(), to.w.obstacles.end(),
                        [&](const auto &o) { return o->rigid == t.set && is_own(o) && f(*o); });
   };
   const Obstacle &first = *to.w.obstacle(t.set->obstacle[0]);
   if (any_part([](const Obstacle &o) { return o.sensor; }))
-    to.note("tool '%s': in the scene its parts that are sensors touch", name);
+    to.note(t, ": in the scene its parts that are sensors touch");
   if (any_part([&](const Obstacle &o) {
         return o.material != first.material || o.zone.friction != first.zone.friction;
       }))
-    to.note("tool '%s': in the scene all of its parts are of the material of the first", name);
-  if (t.device.read) to.note("tool '%s': its device is left out; in the scene the tool stands", name);
+    to.note(t, ": in the scene all of its parts are of the material of the first");
+  if (t.device.read) to.note(t, ": its device is left out; in the scene the tool stands");
   // a matter of the present state, which a snapshot holds
   const dfm_rigid_state &s = t.set->state[0];
   const Pose at = load_pose(s), device = load_place(v.device);
   const bool moves = std::any_of(s.velocity, s.velocity + 3, [](double x) { return x != 0; }) ||
                      std::any_of(s.spin, s.spin + 3, [](double x) { return x != 0; });
   if (!to.options.snapshot && t.motion.coupled() && (moves || !same_bits(&at, &device, sizeof at)))
-    to.note("tool '%s': in the scene it rests where its device is", name);
+    to.note(t, ": in the scene it rests where its device is");
   const bool led = !t.keys.empty() || !t.opening_keys.empty();
   if (led && ((v.keyed == 0 && !t.keys.empty()) || (v.opening_keyed == 0 && !t.opening_keys.empty())))
-    to.note("tool '%s': the host leads it now and not its keys, which are left out", name);
+    to.note(t, ": the host leads it now and not its keys, which are left out");
 }
 
 }  // namespace

@@ -162,6 +162,7 @@ struct BodyState {
 };
 
 struct Body : BodyShape, BodyState {
+  static constexpr char kKind[] = "body";
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
   uint32_t slot = 0;

@@ -52,29 +52,28 @@ double largest_coordinate(const double *x, size_t n, size_t stride) {
   return far;
 }
 
-void check_velocity(const char *what, const char *name, Vec3 velocity, Vec3 spin, double radius) {
+void check_velocity(const Named &whose, Vec3 velocity, Vec3 spin, double radius) {
   const double speed = farthest(velocity) + farthest(spin) * radius;
   if (!(speed <= kLight))
-    fail(DFM_E_ARG,
-         "%s '%s': a velocity of %.4g m/s (spin included) is above the speed of light; give a smaller one",
-         what, name, speed);
+    refuse(whose, ": a velocity of %.4g m/s (spin included) is above the speed of light; give a smaller one",
+           speed);
 }
 
-void check_place(const World &w, const char *what, const char *name, double far) {
+void check_place(const World &w, const Named &whose, double far) {
   const double least = kUnits * kUnit * far;
   if (w.offset > 0 && !w.bodies.empty() && !(least <= w.offset))
-    fail(DFM_E_ARG,
-         "%s '%s': a coordinate is %.4g m, where neighboring numbers are %.3g m apart, too coarse for the "
-         "contact offset of %g m; move the scene nearer to the origin",
-         what, name, far, kUnit * far, w.offset);
+    refuse(whose,
+           ": a coordinate is %.4g m, where neighboring numbers are %.3g m apart, too coarse for the contact "
+           "offset of %g m; move the scene nearer to the origin",
+           far, kUnit * far, w.offset);
 }
 
-void check_resolved(const char *name, double far, double edge) {
+void check_resolved(const Body &b, double far, double edge) {
   if (!(kUnits * kUnit * far <= 0.1 * edge))
-    fail(DFM_E_ARG,
-         "body '%s': a coordinate is %.4g m, where neighboring numbers are %.3g m apart, too coarse for "
-         "contact between edges of %g m; move the scene nearer to the origin",
-         name, far, kUnit * far, edge);
+    refuse(b,
+           ": a coordinate is %.4g m, where neighboring numbers are %.3g m apart, too coarse for contact "
+           "between edges of %g m; move the scene nearer to the origin",
+           far, kUnit * far, edge);
 }
 
 double thickness(const Body &b) {
@@ -95,10 +94,10 @@ void check_offset(const World &w) {
              "a contact offset of %g m is too large for body '%s', whose mean thickness is %.3g m: give at "
              "most a tenth of that, or leave the offset out",
              w.offset, b->name.c_str(), thick);
-    check_place(w, "body", b->name.c_str(), largest_coordinate(b->p.x.data(), b->p.n, kStride));
+    check_place(w, *b, largest_coordinate(b->p.x.data(), b->p.n, kStride));
   }
   for (auto &o : w.obstacles)
-    check_place(w, o->rigid ? "rigid body" : "obstacle", o->name.c_str(), farthest(o->pose.position));
+    check_place(w, {o->rigid ? "rigid body" : "obstacle", o->name.c_str()}, farthest(o->pose.position));
 }
 
 void check_motion_speed(const World &w, const Obstacle &o) {

@@ -3,6 +3,7 @@
 #pragma once
 #include <cstddef>
 
+#include "core/error.h"
 #include "math/vec3.h"
 #include "state/motion.h"
 
@@ -15,13 +16,13 @@ struct Body;
 struct Obstacle;
 struct World;
 
-// Throw DFM_E_ARG, in one sentence that names `what` (a body, an obstacle, a rigid body with its name).
+// Throw DFM_E_ARG, in one sentence that names the thing.
 // radius: m, of the thing that rotates
-void check_velocity(const char *what, const char *name, Vec3 velocity, Vec3 spin = {}, double radius = 0);
+void check_velocity(const Named &whose, Vec3 velocity, Vec3 spin = {}, double radius = 0);
 // m, largest coordinate; where d_c is known
-void check_place(const World &w, const char *what, const char *name, double farthest);
+void check_place(const World &w, const Named &whose, double farthest);
 // of a body: by its own median edge
-void check_resolved(const char *name, double farthest, double edge);
+void check_resolved(const Body &b, double farthest, double edge);
 // all of them, once d_c is chosen
 void check_offset(const World &w);
 // Mean thickness of a body: 2 V / A, the thickness of a sheet, the radius of a rod, two thirds of

@@ -16,15 +16,13 @@
 
 namespace dfm {
 
-CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std::string &body,
-                             const Material &plain) {
+CellMaterials cell_materials(const World &w, const dfm_body_def &def, const Body &b, const Material &plain) {
   CellMaterials out;
   auto find = [&](dfm_material handle) -> const Material & {
     if (!handle) return plain;
     const Material &m = resolve<Material>(Kind::material, handle);
     if (m.world != &w)
-      fail(DFM_E_HANDLE, "body '%s': its material '%s' belongs to another world", body.c_str(),
-           m.name.c_str());
+      refuse(b, DFM_E_HANDLE, ": its material '%s' belongs to another world", m.name.c_str());
     return m;
   };
   const Material &whole = find(def.material);
@@ -46,13 +44,11 @@ CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std:
   return out;
 }
 
-void check_share(const dfm_body_def &def, const std::string &body) {
+void check_share(const dfm_body_def &def, const Body &b) {
   for (uint32_t t = 0; def.cell_share && t < def.ntet; ++t)
     if (!(def.cell_share[t] > 0 && def.cell_share[t] <= 1))
-      fail(DFM_E_ARG,
-           "body '%s': the share of cell %u is %g; it must lie above 0 and be at most 1 (leave empty cells "
-           "out)",
-           body.c_str(), t, def.cell_share[t]);
+      refuse(b, ": the share of cell %u is %g; it must lie above 0 and be at most 1 (leave empty cells out)",
+             t, def.cell_share[t]);
 }
 
 namespace {
@@ -142,49 +138,43 @@ std::vector<double> values_of(const dfm_type &type, const dfm_params &given, con
                      });
 }
 
-[[noreturn]] void unknown_field(const dfm_type &type, const std::string &body, const char *key) {
+[[noreturn]] void unknown_field(const dfm_type &type, const Body &b, const char *key) {
   std::vector<std::string> keys;
   for (uint32_t i = 0; i < type.nparam; ++i)
     if (type.params[i].flags & DFM_PARAM_PER_CELL) keys.push_back(type.params[i].key);
   const std::string meant =
       find_row(type, key) ? ", it holds for the whole body" : did_you_mean(key, keys, '\'');
   const std::string has = keys.empty() ? "it takes no parameter by cell" : "by cell it takes: " + join(keys);
-  fail(DFM_E_ARG, "body '%s': field '%s': %s has no such parameter by cell%s; %s", body.c_str(), key, type.id,
-       meant.c_str(), has.c_str());
+  refuse(b, ": field '%s': %s has no such parameter by cell%s; %s", key, type.id, meant.c_str(), has.c_str());
 }
 
-void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t ntet,
-                        const std::string &body) {
+void check_field_values(const dfm_param &row, const dfm_cell_field &f, uint32_t ntet, const Body &b) {
   if (f.width != row.width)
-    fail(DFM_E_ARG, "body '%s': field '%s' has %u value%s per cell, %u expected", body.c_str(), f.key,
-         f.width, f.width == 1 ? "" : "s", row.width);
+    refuse(b, ": field '%s' has %u value%s per cell, %u expected", f.key, f.width, f.width == 1 ? "" : "s",
+           row.width);
   const bool whole = row.flags & (DFM_PARAM_INTEGER | DFM_PARAM_ENUM);
   for (size_t i = 0; i < size_t(ntet) * row.width; ++i)
     if (!(f.values[i] >= row.min && f.values[i] <= row.max) ||
         (whole && f.values[i] != std::floor(f.values[i])))
-      fail(DFM_E_ARG, "body '%s': field '%s': cell %zu is %g; expected a %s in [%g, %g]%s%s", body.c_str(),
-           f.key, i / row.width, f.values[i], whole ? "whole number" : "number", row.min, row.max,
-           std::strcmp(row.unit, "1") == 0 ? "" : " ", std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
+      refuse(b, ": field '%s': cell %zu is %g; expected a %s in [%g, %g]%s%s", f.key, i / row.width,
+             f.values[i], whole ? "whole number" : "number", row.min, row.max,
+             std::strcmp(row.unit, "1") == 0 ? "" : " ", std::strcmp(row.unit, "1") == 0 ? "" : row.unit);
 }
 
 }  // namespace
 
-void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body) {
-  if (def.nfield && !def.fields)
-    fail(DFM_E_ARG, "body '%s': %u fields are announced, but fields is NULL", body.c_str(), def.nfield);
+void check_fields(const dfm_type &type, const dfm_body_def &def, const Body &b) {
+  if (def.nfield && !def.fields) refuse(b, ": %u fields are announced, but fields is NULL", def.nfield);
   for (uint32_t n = 0; n < def.nfield; ++n) {
     const dfm_cell_field &f = def.fields[n];
-    if (!f.key || !f.values)
-      fail(DFM_E_ARG, "body '%s': field %u has no %s", body.c_str(), n, f.key ? "values" : "key");
-    if (!by_cell(type, f.key)) unknown_field(type, body, f.key);
+    if (!f.key || !f.values) refuse(b, ": field %u has no %s", n, f.key ? "values" : "key");
+    if (!by_cell(type, f.key)) unknown_field(type, b, f.key);
     for (uint32_t k = 0; k < n; ++k)
-      if (std::strcmp(def.fields[k].key, f.key) == 0)
-        fail(DFM_E_ARG, "body '%s': the field '%s' is given twice", body.c_str(), f.key);
+      if (std::strcmp(def.fields[k].key, f.key) == 0) refuse(b, ": the field '%s' is given twice", f.key);
     for (uint32_t k = 0; def.model_params.values && k < def.model_params.n; ++k)
       if (def.model_params.values[k].key && std::strcmp(def.model_params.values[k].key, f.key) == 0)
-        fail(DFM_E_ARG, "body '%s': '%s' is given both as one value and as a field; keep one", body.c_str(),
-             f.key);
-    check_field_values(*find_row(type, f.key), f, def.ntet, body);
+        refuse(b, ": '%s' is given both as one value and as a field; keep one", f.key);
+    check_field_values(*find_row(type, f.key), f, def.ntet, b);
   }
 }
 
@@ -224,10 +214,10 @@ void scale_by_share(const Body &b, const World &w, const char *model, const Row 
   };
   if (!(field ? std::ranges::any_of(field->values, is_used) : is_used(*row.of(0)))) return;
   if (!(p.flags & DFM_PARAM_PER_CELL)) {
-    w.context->logf(DFM_LOG_WARNING,
-                    "body '%s': %s takes one '%s' for all cells, so that of cells that are filled in part is "
-                    "as large as that of full ones",
-                    b.name.c_str(), model, p.key);
+    w.context->warn(b,
+                    ": %s takes one '%s' for all cells, so that of cells that are filled in part is as large "
+                    "as that of full ones",
+                    model, p.key);
     return;
   }
   if (!field) {
@@ -256,7 +246,7 @@ std::vector<uint8_t> differs_by_cell(const dfm_type &type, const std::vector<Cel
 
 std::vector<double> model_values(const World &w, const Body &b, const dfm_type &type, const dfm_body_def &def,
                                  const CellMaterials &cells, std::vector<CellField> &fields) {
-  check_fields(type, def, b.name);
+  check_fields(type, def, b);
   std::vector<std::vector<double>> packed;
   for (const Material *m : cells.list) packed.push_back(values_of(type, def.model_params, *m));
   size_t at = 0;
@@ -273,11 +263,11 @@ std::vector<double> model_values(const World &w, const Body &b, const dfm_type &
       std::copy_n(given->values, field->values.size(), field->values.begin());
     } else if (row.differs(&other)) {
       if (!(p.flags & DFM_PARAM_PER_CELL))
-        fail(DFM_E_ARG,
-             "body '%s': %s takes one '%s' for all cells, but its materials '%s' and '%s' differ in it (%g "
-             "and %g); give it in the model's parameters",
-             b.name.c_str(), type.id, p.key, cells.list[0]->name.c_str(), cells.list[other]->name.c_str(),
-             *row.of(0), *row.of(other));
+        refuse(b,
+               ": %s takes one '%s' for all cells, but its materials '%s' and '%s' differ in it (%g and %g); "
+               "give it in the model's parameters",
+               type.id, p.key, cells.list[0]->name.c_str(), cells.list[other]->name.c_str(), *row.of(0),
+               *row.of(other));
       field = add_field(fields, w, p, "materials", def.ntet);
       for (uint32_t t = 0; t < def.ntet; ++t)
         std::copy_n(row.of(cells.of[t]), p.width, &field->values[size_t(t) * p.width]);

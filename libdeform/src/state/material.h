@@ -37,17 +37,16 @@ struct CellMaterials {
 };
 
 // Throws Error(HANDLE) if the handle is no material, or one of another world. `plain` is used for handle 0.
-CellMaterials cell_materials(const World &w, const dfm_body_def &def, const std::string &body,
-                             const Material &plain);
+CellMaterials cell_materials(const World &w, const dfm_body_def &def, const Body &b, const Material &plain);
 
 // Throws Error(ARG) for a share outside (0,1].
-void check_share(const dfm_body_def &def, const std::string &body);
+void check_share(const dfm_body_def &def, const Body &b);
 
 // Lumped mass of all points into b.p.mass; b.mass and b.rest_volume.
 void lump_body(Body &b, const dfm_body_def &def, const CellMaterials &cells);
 
 // Throws Error(ARG) for fields of the def that the model does not support, or that are invalid.
-void check_fields(const dfm_type &type, const dfm_body_def &def, const std::string &body);
+void check_fields(const dfm_type &type, const dfm_body_def &def, const Body &b);
 
 // Values of the model's parameters for the whole body, as its table orders them; those that differ by cell go
 // to `fields`. Of the def only model_params, ntet and fields count. A parameter comes from the def's fields,

@@ -28,6 +28,7 @@ struct ObstacleState {
 };
 
 struct Obstacle : ObstacleState {
+  static constexpr char kKind[] = "obstacle";
   World *world = nullptr;
   uint64_t id = 0, handle = 0;
   uint32_t slot = 0;

@@ -16,6 +16,7 @@
 namespace dfm {
 
 struct Tool {
+  static constexpr char kKind[] = "tool";
   World *world = nullptr;
   uint64_t handle = 0;
   std::string name;

@@ -76,11 +76,11 @@ void warn_impact(World &w, const StepContext &step, const Body &b, double speed)
   w.integrator_times.reported_impact = true;
   const uint64_t a = w.bodies[at->slot_a]->id;
   const std::string &other = name_of(w, a == b.id ? id_of_b(w, *at) : a);
-  w.context->logf(
-      DFM_LOG_WARNING,
-      "body '%s' falls on '%s' at %.3g m/s (t = %.4g s) and will not rebound: %s; give the pair a "
-      "restitution, move the body by symplectic_euler, or take steps much shorter than the impact",
-      b.name.c_str(), other.c_str(), speed, w.time, why_no_rebound(b.integrator.used));
+  w.context->warn(
+      b,
+      " falls on '%s' at %.3g m/s (t = %.4g s) and will not rebound: %s; give the pair a restitution, move "
+      "the body by symplectic_euler, or take steps much shorter than the impact",
+      other.c_str(), speed, w.time, why_no_rebound(b.integrator.used));
 }
 
 // Changes the integrator of all bodies of this choice, or of none. Returns how many.

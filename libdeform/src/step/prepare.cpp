@@ -378,8 +378,7 @@ void choose_integrators(World &w) {
     const SchemeCount &own = reported[second_order];
     if (!own.first) continue;
     w.integrator_times.reported = true;
-    w.context->logf(
-        DFM_LOG_WARNING,
+    w.context->warn(
         "%s integrated by %s, which damps %s, since explicit integration would take %.0f sub-steps of %.3g s "
         "per step; set the integrator of a body to choose one",
         names_of(own.first->name, own.count).c_str(), second_order ? "tr_bdf2" : "implicit_euler",

@@ -71,13 +71,12 @@ void warn_squeezed(World &w) {
     if (!(s.pressure > std::max(kFlat * young, s.weight))) s.since = w.time;
     if (w.time - s.since < kLasts) continue;
     s.reported = true;
-    w.context->logf(
-        DFM_LOG_WARNING,
-        "body '%s' is pressed flat: the things that touch it press with %.3g Pa on average (half of "
-        "its contact forces over volume^(2/3)), above half its Young's modulus of %.3g Pa; give it a "
-        "stiffer material (\"young\": %.2g loses about 10 %% of its height), or let lighter things "
-        "press on it",
-        b.name.c_str(), s.pressure, young, kHolds * s.pressure);
+    w.context->warn(
+        b,
+        " is pressed flat: the things that touch it press with %.3g Pa on average (half of its contact "
+        "forces over volume^(2/3)), above half its Young's modulus of %.3g Pa; give it a stiffer material "
+        "(\"young\": %.2g loses about 10 %% of its height), or let lighter things press on it",
+        s.pressure, young, kHolds * s.pressure);
   }
 }
 

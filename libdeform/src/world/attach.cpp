@@ -17,27 +17,23 @@ namespace {
 // [nsurfel] 1: selected
 std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
   const Surface &s = b.surface;
-  const char *const name = b.name.c_str();
   std::vector<uint8_t> out(s.nsurfel);
   if ((def.npoint && !def.points) || (def.nsurfel && !def.surfels))
-    fail(DFM_E_ARG, "body '%s': points or surfels to attach are announced, but the list is NULL", name);
+    refuse(b, ": points or surfels to attach are announced, but the list is NULL");
   if (def.npoint && !s.identity())
-    fail(DFM_E_ARG,
-         "body '%s' has its own surface, whose surfels are not points of the body; name surfels, a group or "
-         "a box",
-         name);
+    refuse(b,
+           " has its own surface, whose surfels are not points of the body; name surfels, a group or a box");
   if (def.npoint) {
     std::vector<uint32_t> surfel(b.p.n, kNone);
     for (uint32_t i = 0; i < s.nsurfel; ++i) surfel[s.point[i]] = i;
     for (uint32_t k = 0; k < def.npoint; ++k) {
-      if (def.points[k] >= b.p.n)
-        fail(DFM_E_ARG, "body '%s' has no point %u to attach; it has %u", name, def.points[k], b.p.n);
+      if (def.points[k] >= b.p.n) refuse(b, " has no point %u to attach; it has %u", def.points[k], b.p.n);
       if (const uint32_t i = surfel[def.points[k]]; i != kNone) out[i] = 1;
     }
   }
   for (uint32_t k = 0; k < def.nsurfel; ++k) {
     if (def.surfels[k] >= s.nsurfel)
-      fail(DFM_E_ARG, "body '%s' has no surfel %u to attach; it has %u", name, def.surfels[k], s.nsurfel);
+      refuse(b, " has no surfel %u to attach; it has %u", def.surfels[k], s.nsurfel);
     out[def.surfels[k]] = 1;
   }
   if (def.group) {
@@ -53,7 +49,7 @@ std::vector<uint8_t> selected(const Body &b, const dfm_attach_def &def) {
           for (size_t k = 0; k < 3; ++k) out[s.tri[3 * size_t{t} + k]] = 1;
     }
     if (!known)
-      fail(DFM_E_ARG, "the surface of body '%s' has no group '%s'%s", name, def.group,
+      fail(DFM_E_ARG, "the surface of body '%s' has no group '%s'%s", b.name.c_str(), def.group,
            did_you_mean(def.group, groups, '\'').c_str());
   }
   for (uint32_t i = 0; def.box && i < s.nsurfel; ++i) {
@@ -99,18 +95,17 @@ void place_on_obstacle(const Body &b, const Obstacle &o, Attachment &a) {
 void check_values(const Body &b, const dfm_attach_def &def) {
   for (const double x : {def.max_distance, def.stiffness, def.damping, def.release})
     if (!(x >= 0 && std::isfinite(x)))
-      fail(DFM_E_ARG,
-           "body '%s': max_distance, stiffness, damping and release of an attachment are zero or positive, "
-           "and finite",
-           b.name.c_str());
+      refuse(
+          b,
+          ": max_distance, stiffness, damping and release of an attachment are zero or positive, and finite");
   if (def.box && !std::all_of(def.box, def.box + 6, [](double x) { return !std::isnan(x); }))
-    fail(DFM_E_ARG, "body '%s': the box of an attachment is not a number", b.name.c_str());
+    refuse(b, ": the box of an attachment is not a number");
 }
 
 const Attachment &attachment_of(const Body &b, uint32_t number) {
   for (const Attachment &a : b.world->attachments)
     if (a.body == b.id && a.number == number && !a.released) return a;
-  fail(DFM_E_ARG, "body '%s' has no attachment %u", b.name.c_str(), number);
+  refuse(b, " has no attachment %u", number);
 }
 
 }  // namespace
@@ -144,25 +139,22 @@ void lift(const Body &b, Vec3 x, Place &p) {
 uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle *obstacle) {
   World &w = *b.world;
   check_values(b, def);
-  if (other == &b) fail(DFM_E_ARG, "body '%s' cannot be attached to itself", b.name.c_str());
+  if (other == &b) refuse(b, " cannot be attached to itself");
   if ((other ? other->world : obstacle->world) != &w)
-    fail(DFM_E_HANDLE, "body '%s' cannot be attached to an object of another world", b.name.c_str());
+    refuse(b, DFM_E_HANDLE, " cannot be attached to an object of another world");
   Attachment a;
   const std::vector<uint8_t> meant = selected(b, def);
   for (uint32_t i = 0; i < meant.size(); ++i)
     if (meant[i]) a.surfels.push_back(i);
   if (!other && def.max_distance > 0)
-    fail(DFM_E_ARG,
-         "body '%s': max_distance is for attachments to bodies, and '%s' is an obstacle "
-         "or rigid",
-         b.name.c_str(), obstacle->name.c_str());
+    refuse(b, ": max_distance is for attachments to bodies, and '%s' is an obstacle or rigid",
+           obstacle->name.c_str());
   if (other) place_on_body(b, def, *other, a);
   else place_on_obstacle(b, *obstacle, a);
   if (a.surfels.empty())
-    fail(DFM_E_ARG,
-         "body '%s': nothing of its surface is attached: the points, surfels, group and box of the def name "
-         "none that is near enough",
-         b.name.c_str());
+    refuse(b,
+           ": nothing of its surface is attached: the points, surfels, group and box of the def name none "
+           "that is near enough");
   a.number = b.next_load;
   a.body = b.id;
   a.to = other ? other->id : obstacle->id;

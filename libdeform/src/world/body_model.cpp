@@ -55,26 +55,25 @@ std::vector<GivenParam> rows_of(const ModelParams &params) {
   return out;
 }
 
-void check_integrator(const std::string &body, int32_t integrator) {
+void check_integrator(const Body &b, int32_t integrator) {
   if (integrator < DFM_INTEGRATOR_AUTO || integrator > DFM_INTEGRATOR_TR_BDF2)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': integrator %d is not available; use DFM_INTEGRATOR_AUTO, "
-         "DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
-         body.c_str(), integrator);
+    refuse(b, DFM_E_UNSUPPORTED,
+           ": integrator %d is not available; use DFM_INTEGRATOR_AUTO, DFM_INTEGRATOR_SYMPLECTIC_EULER, "
+           "DFM_INTEGRATOR_IMPLICIT_EULER or DFM_INTEGRATOR_TR_BDF2",
+           integrator);
 }
 
 void check_given(const Body &b, const dfm_params &params) {
   if (params.n && !params.values)
-    fail(DFM_E_ARG, "body '%s': %u parameters are announced, but params.values is NULL", b.name.c_str(),
-         params.n);
+    refuse(b, ": %u parameters are announced, but params.values is NULL", params.n);
 }
 
 namespace {
 
 // None: its points move explicitly, or the integrator is not chosen yet (out.open).
-std::optional<ImplicitOptions> implicit_of(const World &w, const std::string &name, int32_t requested,
+std::optional<ImplicitOptions> implicit_of(const World &w, const Body &b, int32_t requested,
                                            Integrator &out) {
-  check_integrator(name, requested);
+  check_integrator(b, requested);
   const int32_t which = requested == DFM_INTEGRATOR_AUTO ? w.def.integrator : requested;
   out.open = which == DFM_INTEGRATOR_AUTO;
   if (out.open || which == DFM_INTEGRATOR_SYMPLECTIC_EULER) return std::nullopt;
@@ -111,16 +110,14 @@ bool rest_rows(const Body &b, double share, RestRows &out) {
 }
 
 void set_scaled_mass(Body &b, double share) {
-  const char *const name = b.name.c_str();
   if (!(share > 0 && share <= kMaxScaled))
-    fail(DFM_E_ARG, "body '%s': mass_scaling %g; it is a share of the body's mass in [0, %g]", name, share,
-         kMaxScaled);
+    refuse(b, ": mass_scaling %g; it is a share of the body's mass in [0, %g]", share, kMaxScaled);
   RestRows rows;
   if (!rest_rows(b, 1, rows))
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': mass_scaling lengthens the explicit sub-steps of a body, and nothing bounds those of "
-         "this one (model %s%s); leave it out",
-         name, b.model.type->id, b.model.stepper ? ", which steps itself" : "");
+    refuse(b, DFM_E_UNSUPPORTED,
+           ": mass_scaling lengthens the explicit sub-steps of a body, and nothing bounds those of this one "
+           "(model %s%s); leave it out",
+           b.model.type->id, b.model.stepper ? ", which steps itself" : "");
   std::vector<double> mass;
   b.scaling = scale_mass(b.p, rows, share, mass);
   std::copy(mass.begin(), mass.end(), b.p.mass.begin());
@@ -253,7 +250,7 @@ void make_selected(World &w, Body &b, const dfm_type &type, std::vector<double> 
 
 void make_model(World &w, Body &b, const dfm_type &type, std::vector<double> values, int32_t integrator,
                 MadeModel &out) {
-  const auto implicit = implicit_of(w, b.name, integrator, out.integrator);
+  const auto implicit = implicit_of(w, b, integrator, out.integrator);
   const OnBehalf prefix(b.name);
   make_selected(w, b, type, std::move(values), out);
   // the dynamics of a body refer to its own instance and points, which are the new ones by now
@@ -283,7 +280,7 @@ std::unique_ptr<MadeModel> make_body_instance(World &w, Body &b, const dfm_type 
 }
 
 void set_dynamics(World &w, Body &b, const double *bound_at) {
-  const auto implicit = implicit_of(w, b.name, static_cast<int32_t>(b.integrator.used), b.integrator);
+  const auto implicit = implicit_of(w, b, static_cast<int32_t>(b.integrator.used), b.integrator);
   b.dynamics = make_dynamics(w.meters.dynamics.memory(), b.p, b.surface, b.model, b.edges,
                              implicit ? &*implicit : nullptr);
   if (!implicit && bound_at) query_explicit_bound(w, *bound_at, b);
@@ -331,11 +328,10 @@ std::unique_ptr<MadeModel> make_body_model(World &w, Body &b, const dfm_type &ty
   return out;
 }
 
-void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
-                       int32_t integrator) {
+void warn_of_own_steps(const Body &b, const ModelInstance &model, int32_t integrator) {
   if (!model.stepper || integrator == DFM_INTEGRATOR_AUTO) return;
-  w.context->logf(DFM_LOG_WARNING, "body '%s': model '%s' steps itself, so its integrator, %s, is not used",
-                  body.c_str(), model.type->id, integrator_name(uint32_t(integrator)));
+  b.world->context->warn(b, ": model '%s' steps itself, so its integrator, %s, is not used", model.type->id,
+                         integrator_name(uint32_t(integrator)));
 }
 
 uint64_t model_hash(const Body &b) {

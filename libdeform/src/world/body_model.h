@@ -9,7 +9,7 @@ namespace dfm {
 struct MadeModel : BodyModel { Dampers dampers; };
 
 // Throw Error for another integrator than DFM_INTEGRATOR_*, and for parameters without values.
-void check_integrator(const std::string &body, int32_t integrator);
+void check_integrator(const Body &b, int32_t integrator);
 void check_given(const Body &b, const dfm_params &params);
 // The model of a body that names none, by its kind of cells, DFM_CELL_*.
 const dfm_type &default_model(const Registry &types, uint32_t cell);
@@ -41,8 +41,7 @@ bool rest_rows(const Body &b, double share, RestRows &out);
 // again. Throws Error.
 void set_scaled_mass(Body &b, double share);
 // Logs a message if an integrator is named for a body whose model steps itself.
-void warn_of_own_steps(const World &w, const std::string &body, const ModelInstance &model,
-                       int32_t integrator);
+void warn_of_own_steps(const Body &b, const ModelInstance &model, int32_t integrator);
 // Hash of type and origin, to compare bodies that are equal otherwise.
 uint64_t model_hash(const Body &b);
 // The values that these parameters, or the origin's, and the composition specify, in the order of the type's

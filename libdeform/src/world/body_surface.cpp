@@ -19,28 +19,23 @@ constexpr double kMaxSupport = 10;
 // surface
 constexpr double kWarnOutside = 0.02;
 
-void check_surface(const dfm_surface_def &def, const char *name) {
+void check_surface(const dfm_surface_def &def, const Body &b) {
   if (def.size < sizeof(dfm_surface_def))
-    fail(DFM_E_ARG, "body '%s': surface->size is %u, expected %zu; set it to sizeof", name, def.size,
-         sizeof(dfm_surface_def));
+    refuse(b, ": surface->size is %u, expected %zu; set it to sizeof", def.size, sizeof(dfm_surface_def));
   if (def.coupling < DFM_COUPLING_BARYCENTRIC || def.coupling > DFM_COUPLING_THESIS)
-    fail(DFM_E_ARG, "body '%s': surface->coupling %d is unknown; use DFM_COUPLING_BARYCENTRIC, MLS or THESIS",
-         name, def.coupling);
+    refuse(b, ": surface->coupling %d is unknown; use DFM_COUPLING_BARYCENTRIC, MLS or THESIS", def.coupling);
   if (!(def.support >= 0 && def.support <= kMaxSupport))
-    fail(DFM_E_ARG,
-         "body '%s': surface->support is %g mean distances; it must lie between 0 (which means 3) and %g",
-         name, def.support, kMaxSupport);
-  check_triangles(def, "body", name, "surface ");
+    refuse(b, ": surface->support is %g mean distances; it must lie between 0 (which means 3) and %g",
+           def.support, kMaxSupport);
+  check_triangles(def, b, "surface ");
   std::vector<uint8_t> used(def.npoint);
   for (size_t i = 0; i < size_t{3} * def.ntriangle; ++i) used[def.triangles[i]] = 1;
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!used[i])
-      fail(DFM_E_ARG, "body '%s': surface point %u belongs to no triangle; drop it (dfm_mesh_create does)",
-           name, i);
+    if (!used[i]) refuse(b, ": surface point %u belongs to no triangle; drop it (dfm_mesh_create does)", i);
 }
 
 // A closed surface that faces inward would exchange inside and outside.
-void check_outward(const Surface &s, const char *name) {
+void check_outward(const Surface &s, const Body &b) {
   for (uint32_t e = 0; e < 2 * s.nedge; ++e)
     if (s.edge_tri[e] == kNone) return;
   const Vec3 origin = load3(&s.x[0]);
@@ -50,9 +45,7 @@ void check_outward(const Surface &s, const char *name) {
     volume += dot(x(0), cross(x(1), x(2))) / 6;
   }
   if (volume < 0)
-    fail(DFM_E_ARG,
-         "body '%s': its surface is closed and faces inward; reverse its triangles (dfm_mesh_create does)",
-         name);
+    refuse(b, ": its surface is closed and faces inward; reverse its triangles (dfm_mesh_create does)");
 }
 
 void couple(Body &b, const dfm_surface_def &def) {
@@ -69,20 +62,19 @@ void couple(Body &b, const dfm_surface_def &def) {
   Coupling c = def.coupling == DFM_COUPLING_MLS      ? couple_mls(m, in)
                : def.coupling == DFM_COUPLING_THESIS ? couple_thesis(m, in)
                                                      : couple_barycentric(m, in);
-  const char *const name = b.name.c_str();
   const Extent box = extent_of(b.p.rest.data(), b.p.n, 3);
   const double size = norm(box.hi - box.lo);
   if (c.farthest > size)
-    fail(DFM_E_ARG,
-         "body '%s': its surface lies up to %g m from its cells, which are %g m across; both must be in the "
-         "same frame and unit (m)",
-         name, c.farthest, size);
+    refuse(b,
+           ": its surface lies up to %g m from its cells, which are %g m across; both must be in the same "
+           "frame and unit (m)",
+           c.farthest, size);
   // the cells of a lattice need not cover its surface
   if (b.inside.empty() && c.farthest > kWarnOutside * size)
-    b.world->context->logf(DFM_LOG_WARNING,
-                           "body '%s': %u of %u surfels hang on the nearest cell from outside, the farthest "
-                           "%g m away; cells that cover the surface follow it better",
-                           name, c.outside, def.npoint, c.farthest);
+    b.world->context->warn(b,
+                           ": %u of %u surfels hang on the nearest cell from outside, the farthest %g m "
+                           "away; cells that cover the surface follow it better",
+                           c.outside, def.npoint, c.farthest);
   wear_coupling(std::move(c), b.surface);
 }
 
@@ -96,11 +88,11 @@ void warn_long_edges(const Body &b) {
     longest =
         std::max(longest, norm(load3(&s.x[size_t{4} * s.edge[e]]) - load3(&s.x[size_t{4} * s.edge[e + 1]])));
   if (longest > kLongestEdge * (1 + 1e-6) * cells)
-    b.world->context->logf(
-        DFM_LOG_WARNING,
-        "body '%s': its surface has edges of up to %.3g m, and the cells that fill it of up to %.3g m, so it "
-        "will sink into what it touches; split edges longer than %.3g m, or let a scene fill the body",
-        b.name.c_str(), longest, cells, kLongestEdge * cells);
+    b.world->context->warn(
+        b,
+        ": its surface has edges of up to %.3g m, and the cells that fill it of up to %.3g m, so it will "
+        "sink into what it touches; split edges longer than %.3g m, or let a scene fill the body",
+        longest, cells, kLongestEdge * cells);
 }
 
 }  // namespace
@@ -108,12 +100,11 @@ void warn_long_edges(const Body &b) {
 void make_body_surface(Body &b, const dfm_surface_def *def, double smooth) {
   const Memory &m = b.world->memory();
   if (!(smooth >= 0 && smooth <= 180))
-    fail(DFM_E_ARG, "body '%s': smooth %g; it is an angle between faces in degrees, 0 (flat faces) to 180",
-         b.name.c_str(), smooth);
+    refuse(b, ": smooth %g; it is an angle between faces in degrees, 0 (flat faces) to 180", smooth);
   if (def) {
-    check_surface(*def, b.name.c_str());
+    check_surface(*def, b);
     make_surface(m, def->npoint, def->points, def->triangles, def->ntriangle, b.surface);
-    check_outward(b.surface, b.name.c_str());
+    check_outward(b.surface, b);
     if (!b.share.empty() || !b.inside.empty()) warn_long_edges(b);
     couple(b, *def);
   } else {

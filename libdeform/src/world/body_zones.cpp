@@ -17,26 +17,23 @@ TriangleList triangles_of(const Surface &s) {
 }
 
 void check_groups(const dfm_surface_groups &g, const Body &b, uint32_t npoint) {
-  const char *const name = b.name.c_str();
-  if (g.size < sizeof g)
-    fail(DFM_E_ARG, "body '%s': groups->size is %u, expected %zu; set it to sizeof", name, g.size, sizeof g);
+  if (g.size < sizeof g) refuse(b, ": groups->size is %u, expected %zu; set it to sizeof", g.size, sizeof g);
   if ((g.ngroup && !g.names) || (g.ntriangle && !g.group))
-    fail(DFM_E_ARG, "body '%s': %u groups and %u triangles are announced, but groups->%s is NULL", name,
-         g.ngroup, g.ntriangle, g.ngroup && !g.names ? "names" : "group");
+    refuse(b, ": %u groups and %u triangles are announced, but groups->%s is NULL", g.ngroup, g.ntriangle,
+           g.ngroup && !g.names ? "names" : "group");
   for (uint32_t k = 0; k < g.ngroup; ++k)
-    if (!g.names[k] || !*g.names[k]) fail(DFM_E_ARG, "body '%s': surface group %u has no name", name, k);
+    if (!g.names[k] || !*g.names[k]) refuse(b, ": surface group %u has no name", k);
   if (!g.triangles && g.ntriangle != b.surface.ntri)
-    fail(DFM_E_ARG,
-         "body '%s': groups are given for %u triangles in the surface's order, which has %u; give "
-         "groups->triangles to name some of them",
-         name, g.ntriangle, b.surface.ntri);
+    refuse(b,
+           ": groups are given for %u triangles in the surface's order, which has %u; give groups->triangles "
+           "to name some of them",
+           g.ntriangle, b.surface.ntri);
   for (uint32_t t = 0; t < g.ntriangle; ++t) {
     if (g.group[t] != UINT32_MAX && g.group[t] >= g.ngroup)
-      fail(DFM_E_ARG, "body '%s': triangle %u of groups is in group %u of %u", name, t, g.group[t], g.ngroup);
+      refuse(b, ": triangle %u of groups is in group %u of %u", t, g.group[t], g.ngroup);
     for (uint32_t k = 0; g.triangles && k < 3; ++k)
       if (g.triangles[size_t{3} * t + k] >= npoint)
-        fail(DFM_E_ARG, "body '%s': triangle %u of groups names point %u of %u", name, t,
-             g.triangles[size_t{3} * t + k], npoint);
+        refuse(b, ": triangle %u of groups names point %u of %u", t, g.triangles[size_t{3} * t + k], npoint);
   }
 }
 

@@ -55,14 +55,13 @@ void check_unpaid(const Body &b, const ChangeBook &before, Swap &swap) {
   if (std::isfinite(swap.max_jump)) limit = std::max(limit, swap.max_jump);
   if (before.unpaid + jump <= limit) return;
   swap.unpaid = true;
-  fail(
-      DFM_DISCARD,
-      "body '%s': from '%s' to '%s' its elastic energy would rise by %.3g J, and earlier changes have put in "
-      "%.3g J that it has not lost since; together that is more than the %.3g J that changes may put in by "
-      "default (a tenth of its largest energy; its elastic energy, where nothing is left of earlier "
-      "changes); change the model where the body is less deformed and has turned less, give its material "
-      "damping, or set max_jump, which counts instead where it is larger; nothing was changed",
-      b.name.c_str(), swap.from->id, swap.to->id, jump, std::max(0.0, before.unpaid), limit);
+  refuse(b, DFM_DISCARD,
+         ": from '%s' to '%s' its elastic energy would rise by %.3g J, and earlier changes have put in %.3g "
+         "J that it has not lost since; together that is more than the %.3g J that changes may put in by "
+         "default (a tenth of its largest energy; its elastic energy, where nothing is left of earlier "
+         "changes); change the model where the body is less deformed and has turned less, give its material "
+         "damping, or set max_jump, which counts instead where it is larger; nothing was changed",
+         swap.from->id, swap.to->id, jump, std::max(0.0, before.unpaid), limit);
 }
 
 void book_change(const Body &b, ChangeBook &book, const Swap &swap) {

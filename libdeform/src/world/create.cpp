@@ -49,37 +49,34 @@ void check_name(World &w, const std::string &name, const char *kind) {
     fail(DFM_E_ARG, "%s '%s': the name is taken in this world; names are unique", kind, name.c_str());
 }
 
-void check_mesh(const dfm_body_def &def, const std::string &name) {
+void check_mesh(const dfm_body_def &def, const Body &b) {
   if (def.npoint < 4 || def.ntet < 1 || !def.points || !def.tets)
-    fail(DFM_E_ARG, "body '%s' has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron",
-         name.c_str(), def.npoint, def.ntet);
+    refuse(b, " has %u points and %u tetrahedra; it needs at least 4 points and 1 tetrahedron", def.npoint,
+           def.ntet);
   const bool others = def.cell != 0 && def.cell != DFM_CELL_TET;
   if (others != (def.cells != nullptr))
-    fail(DFM_E_ARG,
-         "body '%s': cell is %u and cells is %s; tetrahedra need no cells, and other kinds need both, as "
-         "dfm_mesh_get_info gives them",
-         name.c_str(), def.cell, def.cells ? "set" : "NULL");
+    refuse(b,
+           ": cell is %u and cells is %s; tetrahedra need no cells, and other kinds need both, as "
+           "dfm_mesh_get_info gives them",
+           def.cell, def.cells ? "set" : "NULL");
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!all_finite(def.points + size_t(3) * i, 3))
-      fail(DFM_E_ARG, "body '%s': point %u is not finite", name.c_str(), i);
+    if (!all_finite(def.points + size_t(3) * i, 3)) refuse(b, ": point %u is not finite", i);
   std::vector<uint8_t> used(def.npoint);
   for (uint32_t t = 0; t < def.ntet; ++t) {
     const uint32_t *const c = def.tets + size_t(4) * t;
     for (int k = 0; k < 4; ++k) {
-      if (c[k] >= def.npoint)
-        fail(DFM_E_ARG, "body '%s': tetrahedron %u names point %u of %u", name.c_str(), t, c[k], def.npoint);
+      if (c[k] >= def.npoint) refuse(b, ": tetrahedron %u names point %u of %u", t, c[k], def.npoint);
       used[c[k]] = 1;
     }
     if (!(tet_volume(def.points, 3, c) > 0))
-      fail(DFM_E_ARG,
-           "body '%s': tetrahedron %u has no positive volume; reverse or remove it (deform mesh info shows "
-           "such cells)",
-           name.c_str(), t);
+      refuse(
+          b,
+          ": tetrahedron %u has no positive volume; reverse or remove it (deform mesh info shows such cells)",
+          t);
   }
   const auto unused = std::find(used.begin(), used.end(), uint8_t(0));
   if (unused != used.end())
-    fail(DFM_E_ARG, "body '%s': point %td belongs to no tetrahedron and would have no mass; drop it",
-         name.c_str(), unused - used.begin());
+    refuse(b, ": point %td belongs to no tetrahedron and would have no mass; drop it", unused - used.begin());
 }
 
 void place_phyxels(Body &b, const dfm_body_def &def) {
@@ -112,16 +109,16 @@ void keep_composition(World &w, Body &b, const dfm_body_def &def, const CellMate
 
 void take_inside(Body &b, const dfm_body_def &def) {
   if (b.cell_type != DFM_CELL_HEX8)
-    fail(DFM_E_UNSUPPORTED, "body '%s': cell_inside is for hexahedra; its cells are %s", b.name.c_str(),
-         cell_kind(b.cell_type).name);
+    refuse(b, DFM_E_UNSUPPORTED, ": cell_inside is for hexahedra; its cells are %s",
+           cell_kind(b.cell_type).name);
   const size_t n = b.cells.size() / 8 * kInsidePoints;
   b.inside = Array<double>(def.cell_inside, def.cell_inside + n, b.cells.get_allocator());
   for (size_t c = 0; c < n; c += kInsidePoints) {
     double material = 0;
     for (size_t q = 0; q < kInsidePoints; ++q) material += b.inside[c + q];
     if (!(material > 0 && material < HUGE_VAL))
-      fail(DFM_E_ARG, "body '%s': the weights of cell %zu in cell_inside sum to %g; expected more than 0",
-           b.name.c_str(), c / kInsidePoints, material);
+      refuse(b, ": the weights of cell %zu in cell_inside sum to %g; expected more than 0", c / kInsidePoints,
+             material);
   }
 }
 
@@ -139,12 +136,9 @@ void take_points(World &w, Body &b, const dfm_body_def &def) {
     b.cell_type = kind.kind;
     b.cells = Array<uint32_t>(def.cells, def.cells + size_t(def.ntet / kind.tets) * kind.nodes, m);
     if (def.ntet % kind.tets || tets_of(m, kind, b.cells) != b.tets)
-      fail(DFM_E_ARG,
-           "body '%s': its tetrahedra are not those of its %s; give both as dfm_mesh_get_info does",
-           b.name.c_str(), kind.name);
+      refuse(b, ": its tetrahedra are not those of its %s; give both as dfm_mesh_get_info does", kind.name);
     if (def.cell_share)
-      fail(DFM_E_UNSUPPORTED, "body '%s': cell_share is for tetrahedra; %s take cell_inside, if any",
-           b.name.c_str(), kind.name);
+      refuse(b, DFM_E_UNSUPPORTED, ": cell_share is for tetrahedra; %s take cell_inside, if any", kind.name);
   }
   if (def.cell_inside) take_inside(b, def);
   if (def.cell_share) b.share = Array<double>(def.cell_share, def.cell_share + def.ntet, m);
@@ -154,7 +148,7 @@ void take_model(World &w, Body &b, const dfm_body_def &def, const CellMaterials 
   const Registry &types = w.context->registry;
   const dfm_type &type =
       def.model ? types.find(DFM_KIND_MODEL, def.model) : default_model(types, b.cell_type);
-  check_fields(type, def, b.name);
+  check_fields(type, def, b);
   keep_composition(w, b, def, materials);
   ModelOrigin origin{keep_params(type, def.model_params),
                      to_pose(def.pose),
@@ -190,14 +184,14 @@ Body &create_body(World &w, const dfm_body_def &def) {
   b.search = std::make_unique<SearchTree>(w.memory());
   b.name = name_of(w, def.name, "body");
   check_name(w, b.name, "body");
-  check_mesh(def, b.name);
+  check_mesh(def, b);
   if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) ||
       !all_finite(def.velocity, 3) || !all_finite(def.spin, 3))
-    fail(DFM_E_ARG, "body '%s': pose, velocity and spin must be finite", b.name.c_str());
+    refuse(b, ": pose, velocity and spin must be finite");
   Material plain;
   plain.def = dfm_material_def_default();
-  const CellMaterials materials = cell_materials(w, def, b.name, plain);
-  check_share(def, b.name);
+  const CellMaterials materials = cell_materials(w, def, b, plain);
+  check_share(def, b);
   if (def.material) b.material = resolve<Material>(Kind::material, def.material).name;
   b.category = def.category;
   b.collides_with = def.collides_with;
@@ -208,11 +202,11 @@ Body &create_body(World &w, const dfm_body_def &def) {
   update_inverse_mass(b.p);
   place_phyxels(b, def);
   const double far = largest_coordinate(b.p.x.data(), b.p.n, kStride);
-  check_velocity("body", b.name.c_str(), load3(def.velocity), load3(def.spin), far);
+  check_velocity(b, load3(def.velocity), load3(def.spin), far);
 
   b.edges = unique_edges(w.memory(), def.ntet, b.tets.data());
   make_body_surface(b, def.surface, def.smooth);
-  check_resolved(b.name.c_str(), far, b.surface.median_edge);
+  check_resolved(b, far, b.surface.median_edge);
   if (def.surface) {
     b.coupling = def.surface->coupling;
     b.support = def.surface->support;
@@ -229,7 +223,7 @@ Body &create_body(World &w, const dfm_body_def &def) {
   add_to_world(w, Kind::body, std::move(owned), w.bodies);
   w.tearing += b.tears;
   warn_of_idle(b);
-  warn_of_own_steps(w, b.name, b.model, def.integrator);
+  warn_of_own_steps(b, b.model, def.integrator);
   for (const LeftOut &o : left_out_of(b)) warn_of(*w.context, o);
   return b;
 }
@@ -240,7 +234,7 @@ constexpr uint32_t kVoxelCells = 262144, kMaxVoxelCells = 1u << 28, kFewestVoxel
 
 // Points and triangles of a mesh or of voxels: checked and kept.
 void take_triangles(Obstacle &o, const dfm_obstacle_def &def) {
-  check_triangles(def, "obstacle", o.name.c_str(), "");
+  check_triangles(def, o, "");
   const Memory &m = o.world->meters.obstacles.memory();
   o.points = Array<double>(def.points, def.points + size_t(3) * def.npoint, m);
   o.triangles = Array<uint32_t>(def.triangles, def.triangles + size_t(3) * def.ntriangle, m);
@@ -259,34 +253,27 @@ double signed_volume(const Obstacle &o) {
 }
 
 void make_voxels(Obstacle &o, const Memory &memory) {
-  const char *const name = o.name.c_str();
   const uint32_t cells = o.def.cells ? o.def.cells : kVoxelCells;
   if (cells < kFewestVoxelCells || cells > kMaxVoxelCells)
-    fail(DFM_E_ARG, "obstacle '%s': %u cells; a grid has between %u and %u", name, cells, kFewestVoxelCells,
-         kMaxVoxelCells);
+    refuse(o, ": %u cells; a grid has between %u and %u", cells, kFewestVoxelCells, kMaxVoxelCells);
   if (!ObstacleMesh(memory, o.def.npoint, o.points.data(), o.def.ntriangle, o.triangles.data()).closed)
-    fail(
-        DFM_E_ARG,
-        "obstacle '%s': voxels need a closed surface, and this one has open edges or edges of more than two "
-        "triangles, so no place is inside or outside; close it, or use the shape mesh, which takes open ones",
-        name);
+    refuse(o,
+           ": voxels need a closed surface, and this one has open edges or edges of more than two triangles, "
+           "so no place is inside or outside; close it, or use the shape mesh, which takes open ones");
   if (!(signed_volume(o) > 0))
-    fail(DFM_E_ARG,
-         "obstacle '%s': its surface encloses no volume or faces inward; reverse its triangles "
-         "(dfm_mesh_create does)",
-         name);
+    refuse(o,
+           ": its surface encloses no volume or faces inward; reverse its triangles (dfm_mesh_create does)");
   o.grid = std::make_unique<VoxelGrid>(memory, o.points.data(), o.def.ntriangle, o.triangles.data(), cells);
   const VoxelGrid &g = *o.grid;
   o.world->context->logf(DFM_LOG_INFO,
                          "obstacle '%s': voxels of %g m in %.1f MB; distances are wrong by at most %g m at "
                          "the centers of its triangles",
-                         name, g.cell(), 1e-6 * double(g.bytes()), g.error());
+                         o.name.c_str(), g.cell(), 1e-6 * double(g.bytes()), g.error());
   if (g.error() > 0.25 * g.cell())
-    o.world->context->logf(
-        DFM_LOG_WARNING,
-        "obstacle '%s': its voxels of %g m are too coarse: distances are wrong by %g m somewhere, as where "
-        "walls are thinner than two cells; ask for more cells or use the shape mesh",
-        name, g.cell(), g.error());
+    o.world->context->warn(o,
+                           ": its voxels of %g m are too coarse: distances are wrong by %g m somewhere, as "
+                           "where walls are thinner than two cells; ask for more cells or use the shape mesh",
+                           g.cell(), g.error());
 }
 
 }  // namespace
@@ -298,36 +285,31 @@ std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, b
   o.search = std::make_unique<SearchTree>(w.meters.obstacles.memory());
   o.name = name_of(w, def.name, "obstacle");
   check_name(w, o.name, "obstacle");
-  const char *const name = o.name.c_str();
   if (def.shape > DFM_SHAPE_NONE || (def.shape == DFM_SHAPE_NONE && !rigid))
-    fail(DFM_E_ARG,
-         "obstacle '%s': shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS",
-         name, def.shape);
+    refuse(o, ": shape %u is unknown; use DFM_SHAPE_PLANE, SPHERE, BOX, CAPSULE, MESH or VOXELS", def.shape);
   if (!all_finite(def.pose.position, 3) || !all_finite(def.pose.rotation, 4) ||
       !all_finite(def.velocity_surface, 3) || !all_finite(def.sine.amplitude, 3) ||
       !all_finite(&def.sine.frequency, 1) || !all_finite(&def.sine.phase, 1))
-    fail(DFM_E_ARG, "obstacle '%s': pose, sine and velocity_surface must be finite", name);
+    refuse(o, ": pose, sine and velocity_surface must be finite");
   if ((def.shape == DFM_SHAPE_SPHERE || def.shape == DFM_SHAPE_CAPSULE) &&
       !(def.radius > 0 && std::isfinite(def.radius)))
-    fail(DFM_E_ARG, "obstacle '%s': radius %g m; it must be positive and finite", name, def.radius);
+    refuse(o, ": radius %g m; it must be positive and finite", def.radius);
   if (def.shape == DFM_SHAPE_CAPSULE && !(def.half_length >= 0 && std::isfinite(def.half_length)))
-    fail(DFM_E_ARG, "obstacle '%s': half_length %g m; it must be finite and not negative", name,
-         def.half_length);
+    refuse(o, ": half_length %g m; it must be finite and not negative", def.half_length);
   if (def.shape == DFM_SHAPE_BOX)
     for (double s : def.half_size)
       if (!(s > 0 && std::isfinite(s)))
-        fail(DFM_E_ARG, "obstacle '%s': half_size %g m; all three must be positive and finite", name, s);
+        refuse(o, ": half_size %g m; all three must be positive and finite", s);
   if (def.material) {
     const Material &m = resolve<Material>(Kind::material, def.material);
-    if (m.world != &w) fail(DFM_E_HANDLE, "obstacle '%s': its material belongs to another world", name);
+    if (m.world != &w) refuse(o, DFM_E_HANDLE, ": its material belongs to another world");
     o.material = m.name;
     o.zone = {"", m.name, friction_of(m)};
   }
   o.def = def;
-  if (def.nkey && !def.keys)
-    fail(DFM_E_ARG, "obstacle '%s': %u keys are announced, but keys is NULL", name, def.nkey);
+  if (def.nkey && !def.keys) refuse(o, ": %u keys are announced, but keys is NULL", def.nkey);
   if (def.nkey) o.keys.assign(def.keys, def.keys + def.nkey);
-  check_keys(o.keys, name);
+  check_keys(o.keys, o.name.c_str());
   o.def.keys = nullptr;
   o.def.nkey = 0;
   o.def.points = nullptr;
@@ -340,7 +322,7 @@ std::unique_ptr<Obstacle> make_obstacle(World &w, const dfm_obstacle_def &def, b
   if (def.shape == DFM_SHAPE_VOXELS) make_voxels(o, w.meters.obstacles.memory());
   o.pose = o.pose_at_time(w.time);
   check_motion_speed(w, o);
-  check_velocity("obstacle", name, load3(def.velocity_surface));
+  check_velocity(o, load3(def.velocity_surface));
   o.def.name = o.name.c_str();
   return owned;
 }

@@ -370,10 +370,11 @@ class Settling {
 
   void check_balance(const One &one) const {
     if (!one.body->springs.empty() || norm(one.net) <= kBalance * one.all) return;
-    fail(DFM_E_DIVERGED,
-         "body '%s' has no equilibrium: nothing holds it, and its loads sum to [%g, %g, %g] N; hold some of "
-         "its points (fix), or balance its loads",
-         one.body->name.c_str(), one.net.x, one.net.y, one.net.z);
+    dfm::refuse(
+        *one.body, DFM_E_DIVERGED,
+        " has no equilibrium: nothing holds it, and its loads sum to [%g, %g, %g] N; hold some of its "
+        "points (fix), or balance its loads",
+        one.net.x, one.net.y, one.net.z);
   }
 
   // Stops all bodies, too.
@@ -502,10 +503,11 @@ class Settling {
   }
 
   [[noreturn]] void refuse(const One &one, uint32_t steps, double h) const {
-    fail(DFM_E_DIVERGED,
-         "body '%s' finds no rest at %g of the loads: the last of %u steps from rest (%g s) has moved it by "
-         "%g m, and %g N at a point are not balanced (the largest load or reaction is %g N); %s",
-         one.body->name.c_str(), w_.prescribed.share, steps, h, one.moved, one.left, one.scale, advice(one));
+    dfm::refuse(
+        *one.body, DFM_E_DIVERGED,
+        " finds no rest at %g of the loads: the last of %u steps from rest (%g s) has moved it by %g m, "
+        "and %g N at a point are not balanced (the largest load or reaction is %g N); %s",
+        w_.prescribed.share, steps, h, one.moved, one.left, one.scale, advice(one));
   }
 
   // The result becomes the present state; the steps of the search leave no trace.
@@ -560,10 +562,10 @@ void check_equilibrium(const World &w) {
          "static mode does not support moving rigid bodies; remove them, or run the world in time");
   for (const auto &b : w.bodies)
     if (b->model.stepper)
-      fail(DFM_E_UNSUPPORTED,
-           "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
-           "another model",
-           b->name.c_str(), b->model.type->id);
+      refuse(*b, DFM_E_UNSUPPORTED,
+             ": model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose another "
+             "model",
+             b->model.type->id);
 }
 
 void find_equilibrium(World &w, const dfm_equilibrium_def &def, dfm_equilibrium_info &info) {

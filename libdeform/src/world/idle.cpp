@@ -82,8 +82,8 @@ std::vector<IdleParam> idle_params(const Body &b) {
 void warn_of_idle(const Body &b) {
   for (const IdleParam &p : idle_params(b))
     if (p.chosen)
-      b.world->context->logf(DFM_LOG_WARNING, "body '%s': %s has no effect%s: %s", b.name.c_str(),
-                             p.key.c_str(), p.unknown ? "" : ", or another one than it names", p.why.c_str());
+      b.world->context->warn(b, ": %s has no effect%s: %s", p.key.c_str(),
+                             p.unknown ? "" : ", or another one than it names", p.why.c_str());
 }
 
 }  // namespace dfm

@@ -23,27 +23,24 @@ std::optional<dfm_topology> topology_of(const ModelInstance &model) {
 }
 
 void check_may_cut(const Body &b, const ModelInstance &model) {
-  const char *const name = b.name.c_str();
   if (!b.cells.empty())
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s' can be neither cut nor torn: its cells are %s; give it a mesh of first-order tetrahedra",
-         name, cell_kind(b.cell_type).name);
+    refuse(b, DFM_E_UNSUPPORTED,
+           " can be neither cut nor torn: its cells are %s; give it a mesh of first-order tetrahedra",
+           cell_kind(b.cell_type).name);
   if (!b.surface.identity())
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s' can be neither cut nor torn: it has its own surface; create it with the boundary of its "
-         "cells as surface (in a scene: \"surface\": {\"from\": \"boundary\"}), which is then drawn and "
-         "touches: steps as large as its %u cells in place of %u triangles",
-         name, b.ncell(), b.surface.ntri);
+    refuse(b, DFM_E_UNSUPPORTED,
+           " can be neither cut nor torn: it has its own surface; create it with the boundary of its cells "
+           "as surface (in a scene: \"surface\": {\"from\": \"boundary\"}), which is then drawn and touches: "
+           "steps as large as its %u cells in place of %u triangles",
+           b.ncell(), b.surface.ntri);
   if (b.scaling.moved > 0)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s' can be neither cut nor torn: mass has been moved between its points; create it without "
-         "mass_scaling",
-         name);
+    refuse(b, DFM_E_UNSUPPORTED,
+           " can be neither cut nor torn: mass has been moved between its points; create it without "
+           "mass_scaling");
   if (!topology_of(model))
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s' can be neither cut nor torn: model '%s' needs all of its cells; take msm or "
-         "corotational_fem",
-         name, model.type->id);
+    refuse(b, DFM_E_UNSUPPORTED,
+           " can be neither cut nor torn: model '%s' needs all of its cells; take msm or corotational_fem",
+           model.type->id);
 }
 
 bool may_tear(const Body &b) {

@@ -133,15 +133,13 @@ void set_values(Body &b, const std::vector<double> &values) {
   const char *const type = b.model.type->id;
   const dfm_status status = b.model.put_params(values, b.dynamics->abilities().claims);
   if (status == DFM_E_NOMEM)
-    fail(DFM_E_NOMEM, "body '%s': model '%s' ran out of memory with these parameters; nothing was changed",
-         b.name.c_str(), type);
+    refuse(b, DFM_E_NOMEM, ": model '%s' ran out of memory with these parameters; nothing was changed", type);
   if (status == DFM_E_UNSUPPORTED && b.dynamics->abilities().claims)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': model '%s' does not accept these parameters during a run, or its stiffness matrix would "
-         "change in kind; set the model again with them (dfm_body_set_model)",
-         b.name.c_str(), type);
-  if (status != DFM_OK)
-    fail(DFM_E_ARG, "body '%s': model '%s' refuses these parameters; see the log", b.name.c_str(), type);
+    refuse(b, DFM_E_UNSUPPORTED,
+           ": model '%s' does not accept these parameters during a run, or its stiffness matrix would change "
+           "in kind; set the model again with them (dfm_body_set_model)",
+           type);
+  if (status != DFM_OK) refuse(b, ": model '%s' refuses these parameters; see the log", type);
   b.model.params = values;
 }
 
@@ -154,10 +152,10 @@ void set_model_params(Body &b, const dfm_params &params) {
   for (const dfm_param_value &value : given)
     for (const CellField &f : b.fields)
       if (value.key && f.key == value.key)
-        fail(DFM_E_ARG,
-             "body '%s': parameter '%s' differs by cell (from %s), so one value cannot replace it during a "
-             "run; create the body again",
-             b.name.c_str(), f.key.c_str(), f.from.c_str());
+        refuse(b,
+               ": parameter '%s' differs by cell (from %s), so one value cannot replace it during a run; "
+               "create the body again",
+               f.key.c_str(), f.from.c_str());
   const std::vector<double> &before_requested =
       b.switched_off.requested.empty() ? b.model.params : b.switched_off.requested;
   const std::vector<double> requested = changed_params(type, given, before_requested);
@@ -168,8 +166,7 @@ void set_model_params(Body &b, const dfm_params &params) {
   for (uint32_t i = 0; i < type.nparam; at += type.params[i++].width)
     if (!(type.params[i].flags & DFM_PARAM_RUNTIME) &&
         !std::equal(&values[at], &values[at] + type.params[i].width, &b.model.params[at]))
-      fail(DFM_E_ARG, "body '%s': parameter '%s' of model '%s' cannot change during a run", b.name.c_str(),
-           type.params[i].key, type.id);
+      refuse(b, ": parameter '%s' of model '%s' cannot change during a run", type.params[i].key, type.id);
   if (!b.model.ops->set_params)
     fail(DFM_E_UNSUPPORTED, "model '%s' accepts no parameters during a run", type.id);
   const EffectsAtWork before(b.model);

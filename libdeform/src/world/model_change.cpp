@@ -152,15 +152,15 @@ void check_surface(World &w, Body &b) {
     }
   if (b.sleep_state.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
   if (!knows)
-    fail(DFM_DISCARD,
-         "body '%s': model '%s' cannot continue from the present shape; change the model where the body is "
-         "nearer to its rest shape; nothing was changed",
-         b.name.c_str(), b.model.type->id);
+    refuse(b, DFM_DISCARD,
+           ": model '%s' cannot continue from the present shape; change the model where the body is nearer "
+           "to its rest shape; nothing was changed",
+           b.model.type->id);
   if (most > kSurfaceStays * size_of(b))
-    fail(DFM_DISCARD,
-         "body '%s': model '%s' would move the surface by %g m at once, and at most %g m are allowed; change "
-         "the model where the body is nearer to its rest shape; nothing was changed",
-         b.name.c_str(), b.model.type->id, most, kSurfaceStays * size_of(b));
+    refuse(b, DFM_DISCARD,
+           ": model '%s' would move the surface by %g m at once, and at most %g m are allowed; change the "
+           "model where the body is nearer to its rest shape; nothing was changed",
+           b.model.type->id, most, kSurfaceStays * size_of(b));
 }
 
 // Effects of the scene's list that only the old model provides.
@@ -173,35 +173,34 @@ void check_effects(const World &w, const Body &b, const ModelInstance &old, cons
     const auto &offered = w.steps->facts.offered;
     const auto is = [&](const SceneFacts::Provider &p) { return p.effect == effect; };
     if (std::count_if(offered.begin(), offered.end(), is) > 1) continue;
-    fail(DFM_E_ARG,
-         "body '%s': effect '%s' is asked for, and with model '%s' nothing in the scene would provide it; "
-         "take it from the list of effects, or choose a model that has it; nothing was changed",
-         b.name.c_str(), effect.c_str(), fresh.type->id);
+    refuse(b,
+           ": effect '%s' is asked for, and with model '%s' nothing in the scene would provide it; take it "
+           "from the list of effects, or choose a model that has it; nothing was changed",
+           effect.c_str(), fresh.type->id);
   }
 }
 
 void check_springs(const Body &b, const dfm_type &type, const Dynamics &moves) {
   if (b.springs.empty() || moves.abilities().springs) return;
-  fail(DFM_E_UNSUPPORTED,
-       "body '%s': springs are integrated explicitly and need a model with a step bound, which '%s' does not "
-       "have; remove its springs first; nothing was changed",
-       b.name.c_str(), type.id);
+  refuse(b, DFM_E_UNSUPPORTED,
+         ": springs are integrated explicitly and need a model with a step bound, which '%s' does not have; "
+         "remove its springs first; nothing was changed",
+         type.id);
 }
 
 void check_jump(const Body &b, const Swap &swap) {
   if (std::isinf(swap.max_jump)) return;
   const double jump = std::fabs(swap.after - swap.before);
   if (std::isnan(jump))
-    fail(DFM_DISCARD,
-         "body '%s': '%s' or '%s' gives no energy, so the jump from one to the other cannot be held to "
-         "max_jump (%g J); leave max_jump out; nothing was changed",
-         b.name.c_str(), swap.from->id, swap.to->id, swap.max_jump);
+    refuse(b, DFM_DISCARD,
+           ": '%s' or '%s' gives no energy, so the jump from one to the other cannot be held to max_jump (%g "
+           "J); leave max_jump out; nothing was changed",
+           swap.from->id, swap.to->id, swap.max_jump);
   if (jump > swap.max_jump)
-    fail(
-        DFM_DISCARD,
-        "body '%s': from '%s' to '%s' its elastic energy would jump from %g J to %g J, by more than "
-        "max_jump (%g J); raise it, or change the model where the body is less deformed; nothing was changed",
-        b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after, swap.max_jump);
+    refuse(b, DFM_DISCARD,
+           ": from '%s' to '%s' its elastic energy would jump from %g J to %g J, by more than max_jump (%g "
+           "J); raise it, or change the model where the body is less deformed; nothing was changed",
+           swap.from->id, swap.to->id, swap.before, swap.after, swap.max_jump);
 }
 
 // A model whose forces do not rotate with the body has strain if the body has rotated.
@@ -209,8 +208,7 @@ void warn_of_jump(const World &w, const Body &b, const Swap &swap) {
   const double jump = std::fabs(swap.after - swap.before);
   const double has = std::min(swap.before, swap.after) + kinetic_of(b);
   if (!std::isinf(swap.max_jump) || !(jump > has + rounded_energy(b))) return;
-  w.context->logf(
-      DFM_LOG_WARNING,
+  w.context->warn(
       "t = %g s, body '%s': from '%s' to '%s' its elastic energy jumps from %g J to %g J, by more than all "
       "the energy it has; change the model where it is less deformed and has turned less, or give max_jump",
       w.time, b.name.c_str(), swap.from->id, swap.to->id, swap.before, swap.after);
@@ -271,13 +269,13 @@ void rehearse(Body &b, ModelChoice &to, double t, uint32_t &integrator, bool at_
   if (b.tears || cut_by_any(b) || (!b.planned_cuts.empty() && b.planned_cuts.back().t > t))
     check_may_cut(b, made->model);
   to.stable = stable_with(b, *made);
-  if (named) warn_of_own_steps(w, b.name, made->model, static_cast<int32_t>(to.integrator));
+  if (named) warn_of_own_steps(b, made->model, static_cast<int32_t>(to.integrator));
   if (!w.changed) check_effects(w, b, b.model, made->model);
   if (at_rest && made->model.stepper)
-    fail(DFM_E_UNSUPPORTED,
-         "body '%s': model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose "
-         "another model",
-         b.name.c_str(), type.id);
+    refuse(
+        b, DFM_E_UNSUPPORTED,
+        ": model '%s' steps itself and gives no stiffness, which an equilibrium needs; choose another model",
+        type.id);
   // one whose forces do not rotate with the body is valid at the present placement only
   const bool lasts = rests_unplaced(type);
   if (lasts && spares.size() < kSpares) keep_spare(spares, *made);
@@ -293,7 +291,7 @@ bool is_made_so(const Body &b, const ModelChoice &c) {
 ModelChoice choose_model(const Body &b, const char *type, const dfm_params &params, int32_t integrator) {
   const dfm_type &found = b.world->context->registry.find(DFM_KIND_MODEL, type);
   check_given(b, params);
-  check_integrator(b.name, integrator);
+  check_integrator(b, integrator);
   ModelChoice out;
   out.type = found.id;
   if (integrator != DFM_INTEGRATOR_AUTO) out.integrator = static_cast<uint32_t>(integrator);
@@ -302,7 +300,7 @@ ModelChoice choose_model(const Body &b, const char *type, const dfm_params &para
   for (const dfm_param_value &v : own) {
     if (!limit(v)) continue;
     if (!v.value || v.width != 1 || !(*v.value > 0) || out.max_jump < HUGE_VAL)
-      fail(DFM_E_ARG, "body '%s': max_jump is one number of joules above 0, given once", b.name.c_str());
+      refuse(b, ": max_jump is one number of joules above 0, given once");
     out.max_jump = *v.value;
   }
   std::erase_if(own, limit);
@@ -373,7 +371,7 @@ void check_first_step(World &w, Body &b) {
   double kinetic = 0;
   const SubStep now{w.time, kInstant, w.gravity.now, HUGE_VAL, w.gravity.now};
   if (b.dynamics->free_motion(now, kinetic) || !*why.text()) return;
-  fail(DFM_E_UNSUPPORTED, "body '%s': %s", b.name.c_str(), why.text());
+  refuse(b, DFM_E_UNSUPPORTED, ": %s", why.text());
 }
 
 void keep_swap(World &w, const Swap &swap) {
@@ -389,8 +387,7 @@ bool try_change(World &w, Body &b, const ModelChoice &to, bool report) {
   } catch (const Error &e) {
     if (e.status != DFM_DISCARD) throw;
     swap.refused = true;
-    if (report && !(swap.unpaid && b.changes.reported))
-      w.context->logf(DFM_LOG_WARNING, "t = %g s: %s", w.time, e.what());
+    if (report && !(swap.unpaid && b.changes.reported)) w.context->warn("t = %g s: %s", w.time, e.what());
   }
   b.changes.reported = b.changes.reported || swap.unpaid;
   if (report || !swap.refused) keep_swap(w, swap);

@@ -15,9 +15,8 @@ namespace dfm {
 
 void set_belt(Obstacle &o, Vec3 velocity) {
   World &w = *o.world;
-  if (!std::isfinite(velocity.x + velocity.y + velocity.z))
-    fail(DFM_E_ARG, "obstacle '%s': velocity_surface must be finite", o.name.c_str());
-  check_velocity("obstacle", o.name.c_str(), velocity);
+  if (!std::isfinite(velocity.x + velocity.y + velocity.z)) refuse(o, ": velocity_surface must be finite");
+  check_velocity(o, velocity);
   if (o.rigid)
     fail(DFM_E_STATE, "'%s' is a rigid body, which has no belt; its motors drive it (dfm_rigid_set_motor)",
          o.name.c_str());
@@ -43,8 +42,7 @@ void set_material(Obstacle &o, const Material *material) {
   World &w = *o.world;
   SurfaceZones::Zone zone{"", "", kDefaultFriction};
   if (material) {
-    if (material->world != &w)
-      fail(DFM_E_HANDLE, "obstacle '%s': its material belongs to another world", o.name.c_str());
+    if (material->world != &w) refuse(o, DFM_E_HANDLE, ": its material belongs to another world");
     zone = {"", material->name, friction_of(*material)};
   }
   const uint64_t handle = material ? material->handle : 0;

@@ -55,13 +55,12 @@ void warn_of_own_weight(const World &w, Body &b) {
   const double weight = b.mass / b.rest_volume * g * (hi - lo);
   if (!(weight > kCollapses * young)) return;
   b.squeezed.weight = weight;
-  w.context->logf(
-      DFM_LOG_WARNING,
-      "body '%s' is %.3g m high, and the pressure of its own weight (density x gravity x height = %.3g Pa) "
-      "is above half its Young's modulus of %.3g Pa, so it collapses; if its mesh is in millimeters, "
-      "multiply the points by 0.001 (in a scene: \"scale\": 0.001 in its \"pose\"); if it is not, give "
-      "it a stiffer material (\"young\": %.2g loses about 5 %% of its height)",
-      b.name.c_str(), hi - lo, weight, young, kHolds * weight);
+  w.context->warn(b,
+                  " is %.3g m high, and the pressure of its own weight (density x gravity x height = %.3g "
+                  "Pa) is above half its Young's modulus of %.3g Pa, so it collapses; if its mesh is in "
+                  "millimeters, multiply the points by 0.001 (in a scene: \"scale\": 0.001 in its \"pose\"); "
+                  "if it is not, give it a stiffer material (\"young\": %.2g loses about 5 %% of its height)",
+                  hi - lo, weight, young, kHolds * weight);
 }
 
 }  // namespace dfm

@@ -15,45 +15,39 @@ namespace {
 bool zero(const double *p) { return p[0] == 0 && p[1] == 0 && p[2] == 0; }
 
 // Shape, pose and material are checked when the obstacle is created.
-void check_body(dfm_rigid_def &d, const char *name) {
+void check_body(dfm_rigid_def &d, const Named &whose) {
   if (d.shape != DFM_SHAPE_SPHERE && d.shape != DFM_SHAPE_BOX && d.shape != DFM_SHAPE_CAPSULE &&
       d.shape != DFM_SHAPE_NONE)
-    fail(DFM_E_ARG,
-         "rigid body '%s': shape %u; it can be a sphere, a box or a capsule, or DFM_SHAPE_NONE with any "
-         "shapes added by dfm_rigid_add_shape",
-         name, d.shape);
+    refuse(whose,
+           ": shape %u; it can be a sphere, a box or a capsule, or DFM_SHAPE_NONE with any shapes added by "
+           "dfm_rigid_add_shape",
+           d.shape);
   if (d.shape == DFM_SHAPE_NONE && !d.fixed && zero(d.inertia))
-    fail(DFM_E_ARG, "rigid body '%s' has no shape to take its inertia from; give all three moments", name);
+    refuse(whose, " has no shape to take its inertia from; give all three moments");
   if (!all_finite(d.pose.position, 3) || !all_finite(d.pose.rotation, 4) || !all_finite(d.velocity, 3) ||
       !all_finite(d.spin, 3))
-    fail(DFM_E_ARG, "rigid body '%s': pose, velocity and spin must be finite", name);
+    refuse(whose, ": pose, velocity and spin must be finite");
   if (!all_finite(d.half_size, 3) || !all_finite(&d.radius, 1) || !all_finite(&d.half_length, 1))
-    fail(DFM_E_ARG, "rigid body '%s': half_size, radius and half_length must be finite", name);
-  check_velocity("rigid body", name, load3(d.velocity), load3(d.spin), 1);
+    refuse(whose, ": half_size, radius and half_length must be finite");
+  check_velocity(whose, load3(d.velocity), load3(d.spin), 1);
   if (d.fixed) {
     if (!zero(d.velocity) || !zero(d.spin))
-      fail(DFM_E_ARG,
-           "rigid body '%s' is fixed and has a velocity; drop one (an obstacle's motion is prescribed)",
-           name);
+      refuse(whose, " is fixed and has a velocity; drop one (an obstacle's motion is prescribed)");
     d.mass = 0;
     d.inertia[0] = d.inertia[1] = d.inertia[2] = 0;
     return;
   }
   if (!(d.mass > 0 && std::isfinite(d.mass)))
-    fail(DFM_E_ARG, "rigid body '%s': mass %g kg; it must be positive and finite, or the body fixed", name,
-         d.mass);
+    refuse(whose, ": mass %g kg; it must be positive and finite, or the body fixed", d.mass);
   if (zero(d.inertia)) solid_inertia(d, d.inertia);
   const double *const i = d.inertia, slack = 1e-9 * (i[0] + i[1] + i[2]);
   for (int k = 0; k < 3; ++k)
     if (!(i[k] > 0 && std::isfinite(i[k])))
-      fail(DFM_E_ARG, "rigid body '%s': moment of inertia %g kg m2; all three must be positive and finite",
-           name, i[k]);
+      refuse(whose, ": moment of inertia %g kg m2; all three must be positive and finite", i[k]);
   for (int k = 0; k < 3; ++k)
     if (i[k] > i[(k + 1) % 3] + i[(k + 2) % 3] + slack)
-      fail(DFM_E_ARG,
-           "rigid body '%s': moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other "
-           "two",
-           name, i[0], i[1], i[2]);
+      refuse(whose, ": moments of inertia %g, %g, %g kg m2; no body has one above the sum of the other two",
+             i[0], i[1], i[2]);
 }
 
 void check_joint(const dfm_joint_def &j, uint32_t number, const std::vector<dfm_rigid_def> &bodies) {
@@ -194,7 +188,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   for (uint32_t i = 0; i < def.nbody; ++i) {
     dfm_rigid_def d = def.bodies[i];
     names.push_back(d.name ? d.name : "rigid" + std::to_string(w.next_id + i));
-    check_body(d, names.back().c_str());
+    check_body(d, {"rigid body", names.back().c_str()});
     store_quat(d.pose.rotation, unit_quat(d.pose.rotation));
     set.defs.push_back(d);
   }

@@ -27,70 +27,64 @@ constexpr uint32_t kRefinements = 2;  // of an ellipsoid: 320 triangles
 
 bool jawed(const dfm_tool_def &d) { return d.shape == DFM_TOOL_GRASPER || d.shape == DFM_TOOL_SCISSORS; }
 
-void check_opening(double angle, const char *name) {
-  if (!(angle >= 0 && angle <= kWidest))
-    fail(DFM_E_ARG, "tool '%s': an opening of %g rad; give 0 to %g", name, angle, kWidest);
+void check_opening(double angle, const Tool &t) {
+  if (!(angle >= 0 && angle <= kWidest)) refuse(t, ": an opening of %g rad; give 0 to %g", angle, kWidest);
 }
 
-void check_coupling(const dfm_tool_def &d, const char *name) {
+void check_coupling(const dfm_tool_def &d, const Tool &t) {
   const double values[] = {d.stiffness, d.damping, d.turn_stiffness, d.turn_damping, d.mass, d.inertia};
   for (const double x : values)
     if (!(x >= 0 && std::isfinite(x)))
-      fail(DFM_E_ARG,
-           "tool '%s': stiffness, damping, turn_stiffness, turn_damping, mass and inertia must be finite and "
-           "not negative, found %g",
-           name, x);
+      refuse(t,
+             ": stiffness, damping, turn_stiffness, turn_damping, mass and inertia must be finite and not "
+             "negative, found %g",
+             x);
   if (!(d.late >= 0 && d.late <= kLatest))
-    fail(DFM_E_ARG, "tool '%s': a device that is %g s late; give 0 to %g s", name, d.late, kLatest);
+    refuse(t, ": a device that is %g s late; give 0 to %g s", d.late, kLatest);
   if (!(d.stiffness > 0)) {
-    if (d.late > 0)
-      fail(DFM_E_ARG, "tool '%s': late applies to coupled tools only; give a stiffness, or leave it 0", name);
-    if (d.flags & DFM_TOOL_PASSIVE)
-      fail(DFM_E_ARG, "tool '%s': DFM_TOOL_PASSIVE is for a coupled tool; give a stiffness", name);
+    if (d.late > 0) refuse(t, ": late applies to coupled tools only; give a stiffness, or leave it 0");
+    if (d.flags & DFM_TOOL_PASSIVE) refuse(t, ": DFM_TOOL_PASSIVE is for a coupled tool; give a stiffness");
     if (d.damping > 0 || d.turn_stiffness > 0 || d.turn_damping > 0)
-      fail(DFM_E_ARG,
-           "tool '%s' has parameters of a coupling, but its stiffness is 0, which means no coupling; give a "
-           "stiffness, or leave damping, turn_stiffness and turn_damping 0",
-           name);
+      refuse(t,
+             " has parameters of a coupling, but its stiffness is 0, which means no coupling; give a "
+             "stiffness, or leave damping, turn_stiffness and turn_damping 0");
     return;
   }
   if (!(d.turn_stiffness > 0))
-    fail(DFM_E_ARG, "tool '%s' is coupled with %g N/m but has no turn_stiffness; give one in N m/rad", name,
-         d.stiffness);
+    refuse(t, " is coupled with %g N/m but has no turn_stiffness; give one in N m/rad", d.stiffness);
   if (!(d.mass > 0 && d.inertia > 0))
-    fail(DFM_E_ARG, "tool '%s' is coupled, so it needs a mass and an inertia above 0; found %g kg, %g kg m2",
-         name, d.mass, d.inertia);
+    refuse(t, " is coupled, so it needs a mass and an inertia above 0; found %g kg, %g kg m2", d.mass,
+           d.inertia);
 }
 
-void check_sizes(const dfm_tool_def &d, const char *name) {
+void check_sizes(const dfm_tool_def &d, const Tool &t) {
   const bool boxes =
       jawed(d) || d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE || d.shape == DFM_TOOL_ELLIPSOID;
   for (const double s : d.half_size)
     if (boxes && !(s > 0 && std::isfinite(s)))
-      fail(DFM_E_ARG, "tool '%s': half_size %g m; all three must be positive and finite", name, s);
+      refuse(t, ": half_size %g m; all three must be positive and finite", s);
   if ((d.shape == DFM_TOOL_SPHERE || d.shape == DFM_TOOL_CAPSULE) &&
       !(d.radius > 0 && std::isfinite(d.radius)))
-    fail(DFM_E_ARG, "tool '%s': radius %g m; it must be positive and finite", name, d.radius);
+    refuse(t, ": radius %g m; it must be positive and finite", d.radius);
   if (!(d.radius >= 0 && std::isfinite(d.radius)) || !(d.half_length >= 0 && std::isfinite(d.half_length)))
-    fail(DFM_E_ARG, "tool '%s': radius %g m and half_length %g m must be finite and not negative", name,
-         d.radius, d.half_length);
+    refuse(t, ": radius %g m and half_length %g m must be finite and not negative", d.radius, d.half_length);
 }
 
-void check_def(const dfm_tool_def &d, const char *name) {
+void check_def(const dfm_tool_def &d, const Tool &t) {
   if (d.shape > DFM_TOOL_BLADE)
-    fail(DFM_E_ARG,
-         "tool '%s': shape %u is unknown; use DFM_TOOL_SPHERE, CAPSULE, BOX, MESH, GRASPER, SCISSORS, "
-         "ELLIPSOID or BLADE",
-         name, d.shape);
+    refuse(t,
+           ": shape %u is unknown; use DFM_TOOL_SPHERE, CAPSULE, BOX, MESH, GRASPER, SCISSORS, ELLIPSOID or "
+           "BLADE",
+           d.shape);
   if (!all_finite(d.pose.position, 3) || !all_finite(d.pose.rotation, 4))
-    fail(DFM_E_ARG, "tool '%s': its pose must be finite", name);
-  check_sizes(d, name);
-  check_coupling(d, name);
-  check_opening(d.opening, name);
+    refuse(t, ": its pose must be finite");
+  check_sizes(d, t);
+  check_coupling(d, t);
+  check_opening(d.opening, t);
   if (!jawed(d) && (d.opening != 0 || d.nopening))
-    fail(DFM_E_ARG, "tool '%s' has no jaws to open; only a grasper and scissors have", name);
+    refuse(t, " has no jaws to open; only a grasper and scissors have");
   if ((d.nkey && !d.keys) || (d.nopening && !d.opening_keys))
-    fail(DFM_E_ARG, "tool '%s': keys are announced, but they are NULL", name);
+    refuse(t, ": keys are announced, but they are NULL");
 }
 
 // Its frame first, then the jaws; the frame has the shape of the tool if a rigid body can have it.
@@ -181,8 +175,8 @@ void start_at(Tool &t, const Pose &place) {
 
 Tool &checked(Tool &t, const dfm_pose &pose) {
   if (!all_finite(pose.position, 3) || !all_finite(pose.rotation, 4))
-    fail(DFM_E_ARG, "tool '%s': the given pose is not finite", t.name.c_str());
-  check_place(*t.world, "tool", t.name.c_str(), largest_coordinate(pose.position, 1, 3));
+    refuse(t, ": the given pose is not finite");
+  check_place(*t.world, t, largest_coordinate(pose.position, 1, 3));
   return t;
 }
 
@@ -193,14 +187,13 @@ Tool &create_tool(World &w, const dfm_tool_def &def) {
   Tool &t = *owned;
   t.world = &w;
   t.name = name_of(w, def.name, "tool");
-  const char *const name = t.name.c_str();
-  check_def(def, name);
+  check_def(def, t);
   t.def = def;
   if (def.nkey) t.keys.assign(def.keys, def.keys + def.nkey);
   if (def.nopening) t.opening_keys.assign(def.opening_keys, def.opening_keys + def.nopening);
-  check_keys(t.keys, name);
-  check_keys(t.opening_keys, name);
-  for (const dfm_scale_key &k : t.opening_keys) check_opening(k.value, name);
+  check_keys(t.keys, t.name.c_str());
+  check_keys(t.opening_keys, t.name.c_str());
+  for (const dfm_scale_key &k : t.opening_keys) check_opening(k.value, t);
   if (!t.keys.empty()) store_pose(t.def.pose, pose_at(t.keys, w.time));
   if (!t.opening_keys.empty()) t.def.opening = scale_at(t.opening_keys, w.time);
   t.motion.stiffness = def.stiffness;
@@ -255,8 +248,7 @@ void destroy_tool(Tool &t) {
 
 void check_target(Tool &t, const dfm_pose &pose, const double *velocity) {
   checked(t, pose);
-  if (velocity && !all_finite(velocity, 6))
-    fail(DFM_E_ARG, "tool '%s': the given velocity is not finite", t.name.c_str());
+  if (velocity && !all_finite(velocity, 6)) refuse(t, ": the given velocity is not finite");
 }
 
 void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
@@ -270,8 +262,8 @@ void set_tool_pose(Tool &t, const dfm_pose &pose, const double *velocity) {
 }
 
 void set_tool_opening(Tool &t, double angle) {
-  if (!t.has_jaws()) fail(DFM_E_ARG, "tool '%s' has no jaws to open", t.name.c_str());
-  check_opening(angle, t.name.c_str());
+  if (!t.has_jaws()) refuse(t, " has no jaws to open");
+  check_opening(angle, t);
   ToolValues v = t.values();
   v.target_opening = angle;
   v.opening_keyed = 0;
@@ -281,8 +273,7 @@ void set_tool_opening(Tool &t, double angle) {
 namespace {
 
 void need_keys(const Tool &t) {
-  if (t.keys.empty() && t.opening_keys.empty())
-    fail(DFM_E_ARG, "tool '%s' has no keys; give it some when it is made", t.name.c_str());
+  if (t.keys.empty() && t.opening_keys.empty()) refuse(t, " has no keys; give it some when it is made");
 }
 
 }  // namespace
@@ -290,8 +281,7 @@ void need_keys(const Tool &t) {
 void follow_keys(Tool &t) {
   need_keys(t);
   if (t.device.read)
-    fail(DFM_E_ARG, "tool '%s' is moved by a device; remove the device first (dfm_tool_set_device with NULL)",
-         t.name.c_str());
+    refuse(t, " is moved by a device; remove the device first (dfm_tool_set_device with NULL)");
   ToolValues v = t.values();
   v.keyed = t.keys.empty() ? 0 : 1;
   v.opening_keyed = t.opening_keys.empty() ? 0 : 1;
@@ -301,8 +291,7 @@ void follow_keys(Tool &t) {
 
 void keys_at(const Tool &t, double time, dfm_pose &pose, double &opening) {
   need_keys(t);
-  if (!std::isfinite(time))
-    fail(DFM_E_ARG, "tool '%s': the time at which its keys are asked for is not finite", t.name.c_str());
+  if (!std::isfinite(time)) refuse(t, ": the time at which its keys are asked for is not finite");
   const ToolValues v = t.values();
   store_pose(pose, t.keys.empty() ? load_place(v.target) : pose_at(t.keys, time));
   opening = t.opening_keys.empty() ? v.target_opening : scale_at(t.opening_keys, time);
@@ -367,11 +356,8 @@ void tool_feedback(const Tool &t, double force[3], double torque[3]) {
 // Assigns each surfel to the nearest part, so that none is held twice.
 std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint32_t capacity) {
   World &w = *t.world;
-  if (b.world != &w)
-    fail(DFM_E_HANDLE, "tool '%s' and the body that it should grab belong to different worlds",
-         t.name.c_str());
-  if (!(reach >= 0 && std::isfinite(reach)))
-    fail(DFM_E_ARG, "tool '%s': a reach of %g m; give 0 or more", t.name.c_str(), reach);
+  if (b.world != &w) refuse(t, DFM_E_HANDLE, " and the body that it should grab belong to different worlds");
+  if (!(reach >= 0 && std::isfinite(reach))) refuse(t, ": a reach of %g m; give 0 or more", reach);
   prepare(w);  // for d_c
   const double limit = reach > 0 ? reach : 2 * w.offset;
   std::vector<std::vector<uint32_t>> held(t.parts.size());
@@ -392,8 +378,8 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint3
   const auto holding =
       size_t(std::count_if(held.begin(), held.end(), [](auto &list) { return !list.empty(); }));
   if (holding > capacity)
-    fail(DFM_E_ARG, "tool '%s' would hold '%s' with %d parts, and there is room for %u attachments",
-         t.name.c_str(), b.name.c_str(), int(holding), capacity);
+    refuse(t, " would hold '%s' with %d parts, and there is room for %u attachments", b.name.c_str(),
+           int(holding), capacity);
   std::vector<uint32_t> out;
   for (size_t part = 0; part < held.size(); ++part) {
     if (held[part].empty()) continue;
@@ -409,8 +395,7 @@ std::vector<uint32_t> grab(Tool &t, Body &b, double reach, double release, uint3
 }
 
 void set_device(Tool &t, const dfm_device *device) {
-  if (device && !device->read)
-    fail(DFM_E_ARG, "tool '%s': the device has no read(); it is needed, write() may be NULL", t.name.c_str());
+  if (device && !device->read) refuse(t, ": the device has no read(); it is needed, write() may be NULL");
   t.device = device ? *device : dfm_device{};
   t.mute = false;
   if (!device) return;
@@ -437,7 +422,7 @@ void read_devices(World &w, double end) {
       checked(*t, s.pose);
       if ((s.flags & DFM_DEVICE_VELOCITY) && !all_finite(s.velocity, 6))
         fail(DFM_E_ARG, "the device of tool '%s' gives a velocity that is not finite", t->name.c_str());
-      if (s.flags & DFM_DEVICE_OPENING) check_opening(s.opening, t->name.c_str());
+      if (s.flags & DFM_DEVICE_OPENING) check_opening(s.opening, *t);
     }
     samples.push_back(s);
   }
@@ -458,7 +443,7 @@ void write_devices(World &w) {
     const ToolValues v = t->values();
     if (t->device.write(t->device.user, w.time, v.given, v.given + 3) >= 0) continue;
     t->mute = true;
-    w.context->logf(DFM_LOG_WARNING, "the device of tool '%s' no longer takes forces", t->name.c_str());
+    w.context->warn("the device of tool '%s' no longer takes forces", t->name.c_str());
   }
 }
 

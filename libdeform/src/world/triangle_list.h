@@ -11,24 +11,21 @@
 
 namespace dfm {
 
-// Def: of a surface or of an obstacle. kind, name: of the thing; part: of what in messages.
+// Def: of a surface or of an obstacle. part: of what in messages.
 template <class Def>
-void check_triangles(const Def &def, const char *kind, const char *name, const char *part) {
+void check_triangles(const Def &def, const Named &whose, const char *part) {
   if (def.npoint < 3 || def.ntriangle < 1 || !def.points || !def.triangles)
-    fail(DFM_E_ARG,
-         "%s '%s': its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle",
-         kind, name, def.npoint, def.ntriangle);
+    refuse(whose, ": its surface has %u points and %u triangles; it needs at least 3 points and 1 triangle",
+           def.npoint, def.ntriangle);
   for (uint32_t i = 0; i < def.npoint; ++i)
-    if (!all_finite(def.points + size_t{3} * i, 3))
-      fail(DFM_E_ARG, "%s '%s': %spoint %u is not finite", kind, name, part, i);
+    if (!all_finite(def.points + size_t{3} * i, 3)) refuse(whose, ": %spoint %u is not finite", part, i);
   for (uint32_t t = 0; t < def.ntriangle; ++t) {
     const uint32_t *const c = def.triangles + size_t{3} * t;
     for (int k = 0; k < 3; ++k)
       if (c[k] >= def.npoint)
-        fail(DFM_E_ARG, "%s '%s': %striangle %u names point %u of %u", kind, name, part, t, c[k], def.npoint);
+        refuse(whose, ": %striangle %u names point %u of %u", part, t, c[k], def.npoint);
     if (c[0] == c[1] || c[1] == c[2] || c[2] == c[0])
-      fail(DFM_E_ARG, "%s '%s': %striangle %u names a point twice; drop it (dfm_mesh_create does)", kind,
-           name, part, t);
+      refuse(whose, ": %striangle %u names a point twice; drop it (dfm_mesh_create does)", part, t);
   }
 }
 

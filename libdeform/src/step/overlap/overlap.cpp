@@ -113,10 +113,9 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
 void warn(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
   const Obstacle *const thing = o.obstacle ? w.obstacle(o.b) : nullptr;
   const std::string &name = thing ? thing->name : w.body(o.b)->name;
-  w.context->logf(
-      DFM_LOG_WARNING,
-      "body '%s' and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
-      w.body(o.a)->name.c_str(),
+  w.context->warn(
+      *w.body(o.a),
+      " and %s '%s' overlap by %.3g m (%u pairs of triangles cross, %u surface points inside): %s",
       !thing                  ? "body"
       : !thing->rigid         ? "obstacle"
       : thing->rigid->of_tool ? "tool"
@@ -145,8 +144,7 @@ void warn_of_parts(World &w, const std::vector<Overlap> &found) {
     if (!(deepest->depth > kReportAgain * at->second)) continue;
     at->second = deepest->depth;
     const Body &a = *w.body(deepest->a), &b = *w.body(deepest->b);
-    w.context->logf(
-        DFM_LOG_WARNING,
+    w.context->warn(
         "parts of body '%s' came off with their faces in each other, by up to %.3g m ('%s' and '%s'; %zu "
         "%s): teeth of a cut or tear are as large as the cells; contact moves them apart slowly, smaller "
         "cells or layers of cells along a cut make smaller teeth",
@@ -204,7 +202,7 @@ void resolve_overlaps(World &w) {
   for (const Overlap &f : left)
     if (!f.whole && n++ < kSentences) warn(w, sides, f, untangles);
   if (n > kSentences)
-    w.context->logf(DFM_LOG_WARNING, "%zu more pairs overlap; dfm_world_overlaps lists them", n - kSentences);
+    w.context->warn("%zu more pairs overlap; dfm_world_overlaps lists them", n - kSentences);
   warn_of_parts(w, left);
   for (const Overlap &f : left) {
     if (!f.suspended || o.report_only || o.is_suspended(f.a, f.b, f.obstacle)) continue;

@@ -201,8 +201,7 @@ class Untangler {
 
   void report_failure(const OverlapPair &p) const {
     const std::string &b = p.obstacle ? w_.obstacles[p.b]->name : w_.bodies[p.b]->name;
-    w_.context->logf(DFM_LOG_WARNING, "untangle cannot separate '%s' and '%s': %s",
-                     w_.bodies[p.a]->name.c_str(), b.c_str(),
+    w_.context->warn("untangle cannot separate '%s' and '%s': %s", w_.bodies[p.a]->name.c_str(), b.c_str(),
                      moves(p) ? "it finds no free place for them, so they stay where they are"
                               : "neither may be moved as a whole, since points of them are held or attached, "
                                 "or they step themselves");

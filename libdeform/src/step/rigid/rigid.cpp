@@ -264,8 +264,8 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
   if (!is_moved(o)) fail(DFM_E_ARG, "rigid body '%s' is fixed and cannot be moved", o.name.c_str());
   if (!finite_values({&given, 1}))
     fail(DFM_E_ARG, "rigid body '%s': the given state is not finite", o.name.c_str());
-  check_velocity("rigid body", o.name.c_str(), load3(given.velocity), load3(given.spin), 1);
-  check_place(*o.world, "rigid body", o.name.c_str(), largest_coordinate(given.position, 1, 3));
+  check_velocity({"rigid body", o.name.c_str()}, load3(given.velocity), load3(given.spin), 1);
+  check_place(*o.world, {"rigid body", o.name.c_str()}, largest_coordinate(given.position, 1, 3));
   dfm_rigid_state &s = set.state[o.rigid_body];
   s = given;
   store_quat(s.rotation, unit_quat(given.rotation));

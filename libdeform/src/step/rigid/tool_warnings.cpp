@@ -92,21 +92,19 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
     reported_.push_back({pair.id[0], pair.id[1]});
     if (!corners) {
       const Obstacle &body = is_moved(a) ? a : b;
-      w.context->logf(
-          DFM_LOG_WARNING,
-          "the center of '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because rigid "
-          "bodies meet planes and voxels with their corners, which voxels have none of; give it "
-          "triangles or boxes as its shape, or filter the pair",
+      w.context->warn(
+          "the center of '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because rigid bodies "
+          "meet planes and voxels with their corners, which voxels have none of; give it triangles or boxes "
+          "as its shape, or filter the pair",
           body.name.c_str(), deep, (&body == &a ? b : a).name.c_str(), w.time);
       continue;
     }
     const auto held = [](const Obstacle &o) { return is_moved(o) && o.rigid->host_name != "builtin"; };
     const Obstacle &body = held(a) ? a : b, &other = held(a) ? b : a;
-    w.context->logf(DFM_LOG_WARNING,
-                    "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because host '%s' "
-                    "does not know of it; make both bodies of this host (what stands: \"fixed\"), or filter "
-                    "the pair",
-                    body.name.c_str(), deep, other.name.c_str(), w.time, body.rigid->host_name.c_str());
+    w.context->warn(
+        "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because host '%s' does not "
+        "know of it; make both bodies of this host (what stands: \"fixed\"), or filter the pair",
+        body.name.c_str(), deep, other.name.c_str(), w.time, body.rigid->host_name.c_str());
   }
 }
 
@@ -118,15 +116,14 @@ void ToolTouch::warn_deep(const World &w, const Pair &pair, double deep, bool dr
   const bool first = pair.wall[0] != kNone;
   const Obstacle &own = *w.obstacles[first ? pair.b : pair.a], &other = *w.obstacles[first ? pair.a : pair.b];
   if (driven)
-    w.context->logf(DFM_LOG_WARNING,
-                    "tool '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because it goes exactly "
-                    "where it is told; give it a \"coupling\" (stiffness), or filter the pair",
-                    own.name.c_str(), deep, other.name.c_str(), w.time);
+    w.context->warn({"tool", own.name.c_str()},
+                    " is %.3g m deep in '%s' at %.6g s and goes through it, because it goes exactly where it "
+                    "is told; give it a \"coupling\" (stiffness), or filter the pair",
+                    deep, other.name.c_str(), w.time);
   else
-    w.context->logf(
-        DFM_LOG_WARNING,
-        "'%s' is %.3g m deep in '%s' at %.6g s, which contact opens by %.2g m in a sub-step only; "
-        "place it outside, or filter the pair",
+    w.context->warn(
+        "'%s' is %.3g m deep in '%s' at %.6g s, which contact opens by %.2g m in a sub-step only; place it "
+        "outside, or filter the pair",
         own.name.c_str(), deep, other.name.c_str(), w.time, kOpens * offset_);
 }
 
@@ -157,11 +154,10 @@ void ToolTouch::warn_driven(const World &w, const StepContext &step) {
     }
     if (!(deep > offset_) && !(goes_far(pair) && meeting(w, step, pair, shape_a, shape_b) <= 1)) continue;
     reported_.push_back({pair.id[0], pair.id[1]});
-    w.context->logf(DFM_LOG_WARNING,
-                    "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly "
-                    "where they are told; give one of them a \"coupling\" (stiffness), or filter the pair",
-                    a.name.c_str(), b.name.c_str(), w.time,
-                    deep > offset_ ? format(" (%.3g m deep)", deep).c_str() : "");
+    w.context->warn(
+        "tools '%s' and '%s' have met at %.6g s%s and pass each other, because both go exactly where they "
+        "are told; give one of them a \"coupling\" (stiffness), or filter the pair",
+        a.name.c_str(), b.name.c_str(), w.time, deep > offset_ ? format(" (%.3g m deep)", deep).c_str() : "");
   }
 }
 
