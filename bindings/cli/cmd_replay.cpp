@@ -50,8 +50,7 @@ int show(const Recording &recording, const ReplayOptions &options, const Globals
     std::printf("{\"pictures\": %zu, \"folder\": %s}\n", recording.states.size(),
                 quoted(as_utf8(pictures)).c_str());
   else if (!globals.quiet)
-    std::printf("%zu pictures of recorded states: %s\n", recording.states.size(),
-                shown(pictures).c_str());
+    std::printf("%zu pictures of recorded states: %s\n", recording.states.size(), shown(pictures).c_str());
   return kDone;
 }
 
@@ -79,8 +78,9 @@ int simulate(const Recording &recording, const ReplayOptions &options, const Glo
 int replay(ReplayOptions options, const Globals &globals) {
   const Recording recording = read_recording(options.folder);
   if (!std::filesystem::exists(path_of(recording.scene)))
-    throw Failure(kBadInput, recording.scene + ": the scene of the recording is not there; put it back, or "
-                                               "correct \"scene\" in " +
+    throw Failure(kBadInput, recording.scene +
+                                 ": the scene of the recording is not there; put it back, or "
+                                 "correct \"scene\" in " +
                                  options.folder + "/recording/run.json");
   only_outputs(options.set);
   if (options.out.empty()) options.out = options.folder + "/replay";

@@ -59,11 +59,9 @@ void remove_earlier(const std::string &folder) {
   find(folder, "plots\\.png(\\.part[0-9]*(-[0-9]+)?)?");
   find(folder, "(attachments|contacts|probes|sensors|tools)\\.csv");
   find(folder, "(summary\\.json|.*\\.csv)\\.part[0-9]*(-[0-9]+)?");
-  find(folder + "/states",
-       "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
+  find(folder + "/states", "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
   find(folder + "/nodes", ".*\\.csv(\\.part[0-9]*(-[0-9]+)?)?");
-  find(folder + "/recording",
-       "(run\\.json|states\\.csv|[0-9]{6}\\.state)(\\.part[0-9]*(-[0-9]+)?)?");
+  find(folder + "/recording", "(run\\.json|states\\.csv|[0-9]{6}\\.state)(\\.part[0-9]*(-[0-9]+)?)?");
   find(folder, "bodies\\.csv");
   if (!found.empty() && !is_of_a_run(folder))
     throw Failure(kBadInput, name_of(found.front()) +

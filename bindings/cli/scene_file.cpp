@@ -151,9 +151,7 @@ std::string SceneFile::pointer_of(const std::string &body) const {
   return "/bodies/" + std::to_string(at == places_.end() ? places_.size() : at->second);
 }
 
-std::string SceneFile::explain() const {
-  return explain_text(world_);
-}
+std::string SceneFile::explain() const { return explain_text(world_); }
 
 std::string explain_text(dfm_world world) {
   size_t bytes = 0;

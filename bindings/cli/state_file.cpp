@@ -159,7 +159,9 @@ void check_scene_path(const SceneFile &scene, const std::string &path) {
 
 void check_state_path(const std::string &path) {
   const std::filesystem::path file = path_of(path);
-  const auto refuse = [&](const std::string &why) { throw Failure(kBadInput, "--save " + path + ": " + why); };
+  const auto refuse = [&](const std::string &why) {
+    throw Failure(kBadInput, "--save " + path + ": " + why);
+  };
   if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
   if (std::filesystem::is_directory(file)) refuse("a folder of that name is there");
   if (std::filesystem::exists(file) && !holds(path, kFormat))

@@ -274,7 +274,8 @@ TEST(FrictionCommand, CaseWithAByteOrderMark_IsRead) {
 }
 
 TEST(FrictionCommand, DriveFasterThanItsSteps_IsRefused) {
-  const std::string fast = file("fast.json", R"({"law": "coulomb", "mass": 1, "params": {"mu": 0.5},
+  const std::string fast = file("fast.json", R"({"law": "coulomb",
+    "params": {"mu": 0.5}, "mass": 1, "gravity": 9.81,
     "input": {"kind": "sine_velocity", "V": 0.02, "freq": 1e12, "T": 2, "dt": 0.002}})");
   expect_refused({"friction", fast}, {"/input/freq", "--step"});
 }

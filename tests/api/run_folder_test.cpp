@@ -155,8 +155,7 @@ TEST(RunFolder, LinksInItsPlace_AreReplacedAndNotFollowed) {
     fs::create_symlink(dir + "/victim_" + name, dir + "/out/" + name);
   }
   ASSERT_EQ(run(dir).exit_code, 0);
-  for (const std::string &name : names)
-    EXPECT_EQ(test::read_file(dir + "/victim_" + name), precious) << name;
+  for (const std::string &name : names) EXPECT_EQ(test::read_file(dir + "/victim_" + name), precious) << name;
   for (const char *name : {"bodies.csv", "contacts.csv", "probes.csv", "summary.json"})
     EXPECT_FALSE(fs::is_symlink(dir + "/out/" + name)) << name;
 }

@@ -264,8 +264,6 @@ class Arguments(unittest.TestCase):
                     ("max_sweeps is -1; expected", lambda: deform.World(max_sweeps=-1)),
                     ("load_steps is 0; expected a whole number from 1", lambda: world.equilibrium(0)),
                     ("collides_with is -1; expected", lambda: body.set_filter(1, -1)),
-                    ("size has 1 numbers; expected 2", lambda: world.picture(size=(5,))),
-                    ("color_range has 1 numbers; expected 2", lambda: world.picture(color_range=5)),
                     ("load is -1; expected a whole number", lambda: body.remove_load(-1))):
                 with self.subTest(sentence):
                     self.refused(sentence, function)

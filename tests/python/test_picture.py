@@ -73,7 +73,8 @@ class Pictures(unittest.TestCase):
             away = world.picture(eye=(0, -2, 0.3), look_at=(3, 0, 0.3), size=(160, 120), label=False)
             self.assertLess(abs(int(away.rgb[60, 80, 2]) - int(away.rgb[60, 80, 0])), 40)
             self.assertEqual(world._repr_png_()[:4], b"\x89PNG")
-            for wrong in ({"color": "colour"}, {"eye": (0, 0, 1)}, {"size": (0, 10)}):
+            for wrong in ({"color": "colour"}, {"eye": (0, 0, 1)}, {"size": (0, 10)}, {"size": (5,)},
+                          {"color": "speed", "color_range": 5}):
                 with self.assertRaises(deform.ArgumentError):
                     world.picture(**wrong)
             with self.assertRaisesRegex(deform.ArgumentError, "1 to 8192 each are allowed"):

@@ -46,8 +46,9 @@ os.register_at_fork(after_in_child=_forget)
 def _native() -> Any:
     global _module
     if _forked:
-        raise UnsupportedError("no pictures in a process forked from one that has drawn, whose driver it lacks; "
-                               "start it by 'spawn' (multiprocessing.get_context)", "DFM_E_UNSUPPORTED")
+        raise UnsupportedError("no pictures in a process forked from one that has drawn, whose driver it "
+                               "lacks; start it by 'spawn' (multiprocessing.get_context)",
+                               "DFM_E_UNSUPPORTED")
     if _module is None:
         path = PATH.resolve().parent / _MODULE
         if not path.exists():
@@ -208,7 +209,8 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
          value_range: tuple[float, float], upright: Upright, t: float) -> Picture:
     """Draws surfaces (points [n,3] m, triangles [m,3], color [3], values [n] 0..1 or None) and obstacles,
     with a legend of what the values mean."""
-    key = width, height = tuple(int(n) for n in vector(size, "size", 2))
+    across, down = vector(size, "size", 2)
+    key = width, height = int(across), int(down)
     if not (0 < width <= _LARGEST and 0 < height <= _LARGEST):
         raise ArgumentError(f"a picture of {width} x {height} pixels; 1 to {_LARGEST} each are allowed",
                             "DFM_E_ARG")

@@ -483,9 +483,10 @@ void note_omissions(SceneWriter &to) {
         if (registered ? is_bundled(path) : path_of(path).parent_path() == path_of(u.shipped)) return;
         if (!u.noted.insert(type->id).second) return;
         if (registered)
-          u.to->remark(format("'%s' is registered by this program: to run the scene, name the folder of a "
-                              "plugin that offers it in DEFORM_PLUGIN_PATH",
-                              type->id));
+          u.to->remark(
+              format("'%s' is registered by this program: to run the scene, name the folder of a "
+                     "plugin that offers it in DEFORM_PLUGIN_PATH",
+                     type->id));
         else
           u.to->remark(
               format("'%s' comes from %s, which must be loaded to run the scene: name its folder in "
