@@ -187,6 +187,7 @@ class Designs(InAFolder):
                 ({"set": {"/a=1": 2}}, "/set: expected an object"),
                 ({"limit_s": -1}, "/limit_s: expected a number above 0"),
                 ({"scene": "none.json"}, "none.json: cannot be opened"),
+                ({"scene": "a\udcff.json"}, "/scene: the path of this file is not UTF-8"),
                 ({"design": {"method": "sobl"}}, "expected one of .*sobol"),
                 ({"design": {"method": "random"}}, 'needs "runs"'),
                 ({"design": {"method": "grid", "runs": 50}}, '/design: unknown key "runs"'),

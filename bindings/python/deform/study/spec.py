@@ -273,7 +273,10 @@ def _input(at: Place, folder: pathlib.Path) -> tuple[str, str]:
     kind = "scene" if at.has("scene") else "rig"
     path = (folder / at.text(kind)).absolute()  # a worker may run in another folder
     try:
+        str(path).encode()
         read_json(path)
+    except UnicodeEncodeError:  # workers get it as JSON
+        raise at.of(kind).fail("the path of this file is not UTF-8; rename it or its folder") from None
     except OSError as error:
         raise at.of(kind).fail(f"{path}: cannot be opened: {error.strerror}") from None
     except ValueError as error:
