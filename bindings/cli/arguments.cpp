@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <type_traits>
 
 namespace cli {
 
@@ -64,7 +65,13 @@ Command Command::command(const std::string &name, const std::string &about) {
 
 template <class Value>
 Argument Command::option(const std::string &name, Value &value, const std::string &about) {
-  return Argument(app_->add_option(name, value, about));
+  CLI::Option *const option = app_->add_option(name, value, about);
+  if constexpr (std::is_unsigned_v<Value>)  // whose conversion takes -1 for the largest
+    option->check([](const std::string &text) {
+      return text.starts_with('-') ? "expected a whole number, 0 or more, found \"" + text + "\""
+                                   : std::string();
+    });
+  return Argument(option);
 }
 template Argument Command::option(const std::string &, std::string &, const std::string &);
 template Argument Command::option(const std::string &, double &, const std::string &);

@@ -11,12 +11,6 @@
 namespace cli {
 namespace {
 
-std::vector<double> vector(const JsonValue &line, const char *key) {
-  std::vector<double> out = line.numbers(key);
-  if (out.size() != 3) throw Failure(kBadInput, std::string("expected three numbers under \"") + key + "\"");
-  return out;
-}
-
 std::vector<uint32_t> below(double n, const JsonValue &line, const char *key) {
   std::vector<uint32_t> out;
   for (const double number : line.numbers(key)) {
@@ -62,7 +56,7 @@ const BodyView &ByHand::body(const JsonValue &line) const {
 void ByHand::pull(const JsonValue &line) {
   const std::vector<uint32_t> places = below(0x1p32, line, "points");  // the library knows how many there are
   const std::vector<double> weights = line.numbers("weights");
-  const std::vector<double> to = vector(line, "to");
+  const std::vector<double> to = line.numbers("to", 3);
   if (weights.size() != places.size()) throw Failure(kBadInput, "a pull needs one weight for each point");
   dfm_spring_def def = {};
   def.size = sizeof def;
@@ -79,7 +73,7 @@ void ByHand::pull(const JsonValue &line) {
 
 void ByHand::drag(const JsonValue &line) {
   Drag d;
-  d.to = vector(line, "to");
+  d.to = line.numbers("to", 3);
   d.stiffness = line.scalar("stiffness");
   d.damping = line.scalar("damping");
   d.rigid = line.find("rigid") != nullptr;
@@ -89,7 +83,7 @@ void ByHand::drag(const JsonValue &line) {
     for (const RigidView &r : scene_.rigids())
       if (r.name == line.get("rigid")) d.thing = r.handle;
     if (!d.thing) throw Failure(kBadInput, "there is no rigid body '" + line.get("rigid") + "'");
-    d.place = vector(line, "place");
+    d.place = line.numbers("place", 3);
     need(dfm_rigid_get_measure(d.thing, &m));
   } else {
     const BodyView &of = body(line);
@@ -104,7 +98,7 @@ void ByHand::drag(const JsonValue &line) {
   drag_ = std::move(d);
 }
 
-void ByHand::at(double place[3], double velocity[3]) const {
+bool ByHand::at(double place[3], double velocity[3]) const {
   if (drag_.rigid) {
     dfm_rigid_state state = {};
     need(dfm_rigid_get_state(drag_.thing, &state));
@@ -115,13 +109,14 @@ void ByHand::at(double place[3], double velocity[3]) const {
       place[k] = state.position[k] + arm[k];
       velocity[k] = state.velocity[k] + turn[k];
     }
-    return;
+    return true;
   }
   uint32_t n = 0;
   std::fill_n(place, 3, 0.0);
   std::fill_n(velocity, 3, 0.0);
   for (const BodyView &b : scene_.bodies()) {
     if (b.handle != drag_.thing) continue;
+    if (std::ranges::max(drag_.corners) >= b.nsurfel) return false;
     std::vector<double> x(3 * size_t(b.nsurfel)), v(x.size());
     need(dfm_surface_positions(b.handle, b.nsurfel, x.data(), &n));
     need(dfm_surface_velocities(b.handle, b.nsurfel, v.data(), &n));
@@ -132,6 +127,7 @@ void ByHand::at(double place[3], double velocity[3]) const {
       }
     }
   }
+  return true;
 }
 
 // Backward Euler of the spring and the damper on a point of an eighth of the mass: no solid body's surface
@@ -140,7 +136,10 @@ void ByHand::before_step(double h) {
   tools_.before_step(h);
   if (!drag_.thing) return;
   double x[3], v[3], impulse[3], arm[3];
-  at(x, v);
+  if (!at(x, v)) {  // a cut has taken the place
+    drag_.thing = 0;
+    return;
+  }
   const double share = 1 / (1 + h * (drag_.damping + h * drag_.stiffness) / (drag_.mass / 8));
   for (size_t k = 0; k < 3; ++k) {
     drag_.force[k] = share * (drag_.stiffness * (drag_.to[k] - x[k] - h * v[k]) - drag_.damping * v[k]);
@@ -157,9 +156,8 @@ void ByHand::before_step(double h) {
 }
 
 void ByHand::cut(const JsonValue &line) const {
-  const std::vector<double> blade = line.numbers("blade");
   dfm_cut_def def = dfm_cut_def_default();
-  if (blade.size() != std::size(def.blade)) throw Failure(kBadInput, "a blade has twelve numbers");
+  const std::vector<double> blade = line.numbers("blade", std::size(def.blade));
   def.shape = DFM_CUT_BLADE;
   def.how = DFM_CUT_SPLIT;
   std::copy(blade.begin(), blade.end(), def.blade);
@@ -183,11 +181,11 @@ void ByHand::act(const JsonValue &line) {
   } else if (what == "drag") {
     drag(line);
   } else if (what == "move" && drag_.thing) {
-    drag_.to = vector(line, "to");
+    drag_.to = line.numbers("to", 3);
   } else if (what == "release" && drag_.thing) {
     drag_.thing = 0;
   } else if (what == "move" && body_) {
-    need(dfm_body_set_spring_target(body_, spring_, vector(line, "to").data()));
+    need(dfm_body_set_spring_target(body_, spring_, line.numbers("to", 3).data()));
   } else if (what == "release" && body_) {
     // over in any case: a cut may have taken its points
     need(dfm_body_remove_spring(std::exchange(body_, 0), spring_));
@@ -198,7 +196,7 @@ void ByHand::act(const JsonValue &line) {
   } else if (what == "cut") {
     cut(line);
   } else if (what == "gravity") {
-    need(dfm_world_set_gravity(scene_.world(), vector(line, "to").data()));
+    need(dfm_world_set_gravity(scene_.world(), line.numbers("to", 3).data()));
   } else if (what == "friction") {
     const JsonValue *const sides = line.find("between");
     if (!sides || sides->items.size() != 2) throw Failure(kBadInput, "friction needs two sides");

@@ -65,7 +65,7 @@ class ByHand {
   void pull(const JsonValue &line);
   void drag(const JsonValue &line);
   void cut(const JsonValue &line) const;
-  void at(double place[3], double velocity[3]) const;  // of what is dragged, now
+  bool at(double place[3], double velocity[3]) const;  // of what is dragged, now; false: it is gone
   const BodyView &body(const JsonValue &line) const;
 
   const SceneFile &scene_;

@@ -9,6 +9,7 @@
 
 #include "arguments.h"
 #include "become.h"
+#include "file.h"
 #include "messages.h"
 #include "progress.h"
 #include "system.h"
@@ -107,6 +108,7 @@ int convert_file(MeshSession &s, const std::string &in, const std::string &out,
 }
 
 int convert(const Globals &globals, const std::string &in, const std::string &out) {
+  refuse_same("OUT", out, in);
   MeshSession s(globals);
   std::vector<std::string> lost;
   {

@@ -1,6 +1,7 @@
 // deform plugin list | info ID | check FILE
 #include <cstdio>
 #include <cstring>
+#include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +11,7 @@
 #include "cli.h"
 #include "json_text.h"
 #include "messages.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -196,8 +198,9 @@ int info(const Globals &globals, const std::string &id) {
   std::vector<Type> types;
   if (id.find('/') != std::string::npos) {
     if (dfm_plugin_load(context.get(), id.c_str()) < 0) return fail(dfm_last_error());
+    std::error_code absent;
     for (const Type &t : look(context.get()).types)
-      if (t.file == id) types.push_back(t);
+      if (std::filesystem::equivalent(path_of(t.file), path_of(id), absent)) types.push_back(t);
   } else {
     types = matching(look(context.get()), id);
   }

@@ -5,6 +5,7 @@
 
 #include "arguments.h"
 #include "frames.h"
+#include "json_text.h"
 #include "messages.h"
 #include "recording.h"
 #include "run.h"
@@ -44,9 +45,12 @@ int show(const Recording &recording, const ReplayOptions &options, const Globals
     read_state(scene, state.path);
     frames->draw(state.t);
   }
-  if (!globals.quiet)
-    std::printf("%zu pictures of recorded states: %s\n", recording.states.size(),
-                shown(options.out + "/frames").c_str());
+  const std::string pictures = options.out + "/frames";
+  if (globals.json)
+    std::printf("{\"pictures\": %zu, \"folder\": %s}\n", recording.states.size(),
+                quoted(as_utf8(pictures)).c_str());
+  else if (!globals.quiet)
+    std::printf("%zu pictures of recorded states: %s\n", recording.states.size(), shown(pictures).c_str());
   return kDone;
 }
 
@@ -73,6 +77,11 @@ int simulate(const Recording &recording, const ReplayOptions &options, const Glo
 
 int replay(ReplayOptions options, const Globals &globals) {
   const Recording recording = read_recording(options.folder);
+  if (!std::filesystem::exists(path_of(recording.scene)))
+    throw Failure(kBadInput, recording.scene +
+                                 ": the scene of the recording is not there; put it back, or "
+                                 "correct \"scene\" in " +
+                                 options.folder + "/recording/run.json");
   only_outputs(options.set);
   if (options.out.empty()) options.out = options.folder + "/replay";
   std::error_code absent;

@@ -87,10 +87,12 @@ void check_saves(const SceneFile &scene, const RunOptions &options) {
   if (!options.saves.empty() || !options.save_scene.empty()) make_folder(options.out);  // they may lie there
   if (!options.saves.empty()) refuse_static(scene, "--save");
   if (options.record) refuse_static(scene, "--record");
-  if (!options.save_scene.empty()) check_scene_path(scene, options.save_scene);
+  if (!options.save_scene.empty()) {
+    check_scene_path(scene, options.save_scene);
+    refuse_same("--save-scene", options.save_scene, options.out + "/summary.json");
+  }
   for (const RunOptions::Save &save : options.saves) {
-    if (!may_write_beside(save.path))
-      throw Failure(kBadInput, "--save " + save.path + ": cannot be written there: " + std::strerror(errno));
+    check_state_path(save.path);
     if (save.at > duration * (1 + 1e-9))
       throw Failure(kBadInput, "--save " + save.path + ": the run ends at " + seconds(duration) +
                                    ", before " + seconds(save.at) +
@@ -113,8 +115,8 @@ void check_from(const SceneFile &scene, const std::string &path) {
                                  "; give a longer --time, counted from the scene's start");
 }
 
+// A run that ends early writes them too.
 void check_states(const SceneFile &scene) {
-  if (!scene.settings().states) return;
   for (const BodyView &body : scene.bodies())
     for (const BodyView &other : scene.bodies())
       if (other.name == body.name + "_surface")
@@ -129,16 +131,16 @@ std::string prepare(const SceneFile &scene, const RunOptions &options) {
   check_states(scene);
   if (!options.stream.empty()) {
     refuse_static(scene, "--stream");
-    rtp_url(options.stream, "--stream");
+    check_sink(options.stream);
   }
   if (!options.problems.empty()) {
     make_folder(options.problems);
     options.capture(scene.world(), options.problems, options.every);
   }
   if (options.from.empty()) return "";
-  const std::string start = snapshot_of(scene);
+  const std::string start = snapshot_of(scene.world());
   check_from(scene, options.from);
-  std::string from = snapshot_of(scene);
+  std::string from = snapshot_of(scene.world());
   restore(scene, start);
   return from;
 }
@@ -218,7 +220,7 @@ class Runner {
     if (result_.hold_begun) end_hold();
     outputs_.write_nodes();
     if (plots_) plots_->write(options_.out + "/plots.png");
-    if (!options_.save_scene.empty()) write_as_scene(scene_, options_.save_scene);
+    if (!options_.save_scene.empty()) save_scene();
     result_.impulses = impulses_.json();
     result_.sensors = sensors_.json();
     add_unwatched(scene_, result_);  // models may have changed
@@ -227,6 +229,7 @@ class Runner {
 
   const RunResult &result() const { return result_; }
   const Checks &checks() const { return checker_.result(); }
+  const std::optional<Failure> &unsaved() const { return unsaved_; }
 
   // Sentences that the summary must hold whether or not anybody reads the terminal.
   std::vector<std::string> remarks() const {
@@ -361,6 +364,16 @@ class Runner {
     if (!scene_.value(scene_.pointer_of(whole) + "/separate").empty())
       return std::string(", where it is cut or torn: ") + kTeeth;
     return "; take a shorter step, or set \"separate\" of body '" + whole + "' to make its parts bodies";
+  }
+
+  // The summary is written, whatever becomes of the scene.
+  void save_scene() {
+    try {
+      write_as_scene(scene_, options_.save_scene);
+    } catch (const Failure &failure) {
+      keep_warning(failure.what());
+      unsaved_ = failure;
+    }
   }
 
   double frame_interval() const {
@@ -532,6 +545,7 @@ class Runner {
   static constexpr double kSlowStep = 0.02;  // s; after a longer step the progress is shown at once
   double last_step_ = 0;                     // s, wall time
   RunResult result_;
+  std::optional<Failure> unsaved_;
   Mark mark_ = {};
 };
 
@@ -552,6 +566,7 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
   const std::string from = prepare_or_leave_nothing(scene, options);
   RunResult result;
   Checks checks;
+  std::optional<Failure> unsaved;
   results_lie_in(options.out);
   catch_signals();
   {
@@ -561,6 +576,7 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
     for (const std::string &fault : runner.faults()) warn(fault);
     result = runner.result();
     checks = runner.checks();
+    unsaved = runner.unsaved();
   }
   const std::string summary = summary_json(scene, options, result, checks);
   write_whole(options.out + "/summary.json", summary);
@@ -585,6 +601,7 @@ void run_scene(RunOptions options, const Globals &globals, Comparison *compariso
     throw Failure(kInterrupted, options.scene + ": " + text + "; what was recorded until then is in " +
                                     options.out + ", its last state in states/last_*.vtu");
   }
+  if (unsaved) throw *unsaved;
 }
 
 void add_run_options(Command sub, RunOptions &options) {

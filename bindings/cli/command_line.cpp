@@ -154,7 +154,9 @@ int cli::command_line(int argc, char **argv, AddCommands *add) {
   std::set_terminate(before_main);
   cli::guard_leaving();
   try {
-    return cli::leave(run(argc, argv, add));
+    const int code = run(argc, argv, add);
+    if ((std::fflush(stdout) == 0 && !std::ferror(stdout)) || code != cli::kDone) return cli::leave(code);
+    std::fputs("deform: standard output cannot be written; what it got may be cut short\n", stderr);
   } catch (const std::bad_alloc &) {
     std::fputs("deform: out of memory\n", stderr);
   } catch (const std::exception &error) {

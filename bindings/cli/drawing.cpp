@@ -42,6 +42,7 @@ Drawing::Drawing(const SceneFile &scene, const std::string &color)
 
 void Drawing::make(const BodyView &body, Buffers &b) {
   b.of = body.handle;
+  b.shape = body.shape;
   b.xyz.resize(3 * size_t(body.nsurfel));
   b.vectors.resize(3 * size_t(body.nsurfel));
   b.scalar.assign(body.nsurfel, 0.f);
@@ -118,7 +119,7 @@ void Drawing::add_bodies(render::Scene &out) {
   for (size_t i = 0; i < buffers_.size(); ++i) {
     const BodyView &body = scene_.bodies()[i];
     scene_.renew(i);
-    if (buffers_[i].scalar.size() != body.nsurfel) {  // torn: a split point brings surfels
+    if (buffers_[i].shape != body.shape) {  // cut or torn
       make(body, buffers_[i]);
       if (color_ == "stress") buffers_[i].stress.emplace(body, buffers_[i].xyz);
     }

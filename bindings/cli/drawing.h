@@ -48,6 +48,7 @@ class Drawing {
  private:
   struct Buffers {
     dfm_body of = 0;
+    uint32_t shape = 0;
     std::vector<double> xyz, vectors;
     std::vector<float> scalar;
     std::optional<SurfaceStress> stress;

@@ -2,6 +2,9 @@
 
 #include <cerrno>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <string_view>
 
 #include "messages.h"
 #include "system.h"
@@ -23,6 +26,22 @@ void write_whole(const std::string &path, const std::string &text) {
 
 void cannot_write(const std::string &path) {
   throw Failure(kBadInput, path + ": cannot be written: " + std::strerror(errno));
+}
+
+bool holds(const std::string &path, const std::string &words) {
+  char head[256];
+  std::ifstream file(path_of(path), std::ios::binary);
+  file.read(head, sizeof head);
+  return std::string_view(head, size_t(file.gcount())).find(words) != std::string_view::npos;
+}
+
+void refuse_same(const std::string &option, const std::string &out, const std::string &in) {
+  namespace fs = std::filesystem;
+  std::error_code absent;
+  if (fs::equivalent(path_of(out), path_of(in), absent) ||
+      fs::weakly_canonical(path_of(out), absent) == fs::weakly_canonical(path_of(in), absent))
+    throw Failure(kBadInput,
+                  option + " " + out + ": this is " + in + ", which would be overwritten; give another name");
 }
 
 bool may_write_beside(const std::string &path) {

@@ -34,13 +34,6 @@ void turn_between(const double from[4], const double to[4], double out[3]) {
 // Of a way, in a step of h at that speed at most.
 double share_of(double way, double speed, double h) { return way > speed * h ? speed * h / way : 1; }
 
-std::vector<double> numbers(const JsonValue &line, const char *key, size_t n) {
-  std::vector<double> out = line.numbers(key);
-  if (out.size() != n)
-    throw Failure(kBadInput, "expected " + std::to_string(n) + " numbers under \"" + key + "\"");
-  return out;
-}
-
 }  // namespace
 
 void turned(const double from[4], const double turn[3], double out[4]) {
@@ -64,7 +57,7 @@ HeldTools::Held &HeldTools::held(const std::string &name) {
 }
 
 void HeldTools::lead(const JsonValue &line) {
-  const std::vector<double> to = numbers(line, "to", 3), rotation = numbers(line, "rotation", 4);
+  const std::vector<double> to = line.numbers("to", 3), rotation = line.numbers("rotation", 4);
   Held &h = held(line.get("tool"));
   std::copy_n(to.data(), 3, h.to.position);
   std::copy_n(rotation.data(), 4, h.to.rotation);

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <set>
 
+#include "messages.h"
+
 namespace cli {
 
 std::string quoted(const std::string &text) {
@@ -27,6 +29,23 @@ std::string quoted(const std::string &text) {
     }
   }
   return out + "\"";
+}
+
+std::string as_utf8(std::string text) {
+  for (size_t i = 0; i < text.size();) {
+    const auto byte = [&](size_t k) {
+      return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0;
+    };
+    const unsigned lead = byte(0);
+    const size_t n = lead < 0x80 ? 1 : lead >= 0xc2 && lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
+    bool good = lead < 0x80 || (lead >= 0xc2 && lead <= 0xf4);
+    for (size_t k = 1; k < n; ++k) good = good && byte(k) >> 6 == 2;
+    if (n == 3) good = good && (lead > 0xe0 || byte(1) >= 0xa0) && (lead != 0xed || byte(1) < 0xa0);
+    if (n == 4) good = good && (lead > 0xf0 || byte(1) >= 0x90) && (lead < 0xf4 || byte(1) < 0x90);
+    if (!good) text[i] = '?';
+    i += good ? n : 1;
+  }
+  return text;
 }
 
 std::string number(double x) {
@@ -104,12 +123,6 @@ std::vector<double> JsonValue::numbers(const std::string &key) const {
   return out;
 }
 
-const std::vector<JsonValue> &JsonValue::list(const std::string &key) const {
-  static const std::vector<JsonValue> none;
-  const JsonValue *v = find(key);
-  return v ? v->items : none;
-}
-
 namespace {
 
 bool is_number(const std::string &text) {
@@ -127,9 +140,38 @@ bool is_number(const std::string &text) {
   return !*at;
 }
 
+double number_in(const JsonValue &value, const std::string &key) {
+  if (value.kind != JsonValue::literal || !is_number(value.text))
+    throw Failure(kBadInput, "expected a number under \"" + key + "\"");
+  return std::strtod(value.text.c_str(), nullptr);
+}
+
+}  // namespace
+
+double JsonValue::number(const std::string &key) const {
+  const JsonValue *const v = find(key);
+  return number_in(v ? *v : JsonValue(), key);
+}
+
+std::vector<double> JsonValue::numbers(const std::string &key, size_t n) const {
+  std::vector<double> out;
+  for (const JsonValue &item : list(key)) out.push_back(number_in(item, key));
+  if (out.size() != n)
+    throw Failure(kBadInput, "expected " + std::to_string(n) + " numbers under \"" + key + "\"");
+  return out;
+}
+
+const std::vector<JsonValue> &JsonValue::list(const std::string &key) const {
+  static const std::vector<JsonValue> none;
+  const JsonValue *v = find(key);
+  return v ? v->items : none;
+}
+
+namespace {
+
 class Reader {
  public:
-  explicit Reader(const std::string &text) : s_(text) {}
+  explicit Reader(const std::string &text) : s_(text), i_(text.starts_with("\xef\xbb\xbf") ? 3 : 0) {}
   bool value(JsonValue &out, int depth) {
     space();
     if (i_ >= s_.size() || depth > 64) return false;
@@ -244,7 +286,7 @@ class Reader {
     return take('}');
   }
   const std::string &s_;
-  size_t i_ = 0;
+  size_t i_;  // behind the mark of UTF-8 that editors may begin with
   std::string why_ = "this is not JSON";
 };
 

@@ -8,6 +8,8 @@
 namespace cli {
 
 std::string quoted(const std::string &text);
+// What readers of JSON take: names in files, and sentences that cut one, need not be UTF-8.
+std::string as_utf8(std::string text);
 std::string number(double x);  // shortest text that reads back the same; "null" for what JSON cannot hold
 
 // Builds "{...}" or "[...]"; values are JSON text already.
@@ -36,6 +38,9 @@ struct JsonValue {
   double scalar(const std::string &key) const;                       // 0 where absent
   const std::vector<JsonValue> &list(const std::string &key) const;  // items of a member, none where absent
   std::vector<double> numbers(const std::string &key) const;
+  // As above, and throw Failure where there is no number, or where there are not n.
+  double number(const std::string &key) const;
+  std::vector<double> numbers(const std::string &key, size_t n) const;
 };
 struct JsonMember {
   std::string name;

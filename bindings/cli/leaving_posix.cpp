@@ -176,6 +176,7 @@ void guard_leaving() {
   std::at_quick_exit(at_exit_handler);
   catch_crashes();
   catch_interrupts();
+  std::signal(SIGXFSZ, SIG_IGN);  // a file beyond the limit: what writes it says so
 }
 
 int leave(int exit_code) {

@@ -1,10 +1,12 @@
 // How the command's parts stop with a sentence, and what is kept of the library's warnings.
 #pragma once
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "cli.h"
+#include "deform/plugin.h"
 #include "shown.h"
 
 namespace cli {
@@ -54,6 +56,8 @@ class Quiet {
   bool before_;
 };
 
+// The context's copies of rows have the size of this header's.
+inline std::span<const dfm_param> params_of(const dfm_type &type) { return {type.params, type.nparam}; }
 // Of a type of a plugin: "law", "model", "solver".
 const char *kind_name(uint32_t kind);
 // The valid name nearest to a wrong one, for "did you mean"; empty when nothing is near.

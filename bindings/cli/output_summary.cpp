@@ -386,7 +386,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   if (run.stream.frames) out.add("stream", stream_json(scene, run.stream));
   if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
   out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
-  return indented(out.text());
+  return as_utf8(indented(out.text()));
 }
 
 namespace {

@@ -32,6 +32,7 @@ constexpr auto kListens = std::chrono::seconds(5);  // who steers is gone after 
 // Of --stream, whose token is no part of it.
 RtpUrl sink(const std::string &url) {
   RtpUrl out = rtp_url(url, "--stream");
+  if (out.host.empty()) throw Failure(kBadInput, "--stream " + url + ": expected rtp://ADDRESS:PORT");
   if (!out.token.empty())
     throw Failure(kBadInput, "--stream " + url + ": no token belongs here; `deform serve` has --token");
   return out;
@@ -84,6 +85,8 @@ std::vector<unsigned char> control_packet(uint32_t source, size_t head, const st
   std::memcpy(&out[8], kControl, 4);
   return out;
 }
+
+void check_sink(const std::string &url) { os::close_socket(rtp_socket(sink(url), "--stream", true)); }
 
 RtpSender::RtpSender(dfm_world world, const std::string &url, std::string token)
     : world_(world),

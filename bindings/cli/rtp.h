@@ -56,6 +56,9 @@ struct RtpUrl { std::string host, port, token; };
 RtpUrl rtp_url(const std::string &url, const std::string &what);
 int rtp_socket(const RtpUrl &url, const std::string &what, bool connected);  // to it, else bound to it
 
+// As RtpSender does, which sends what it can: throws Failure.
+void check_sink(const std::string &url);
+
 class RtpSender {
  public:
   // url: "rtp://ADDRESS:PORT". token: of who may steer, from that address alone; empty: nobody. Throws

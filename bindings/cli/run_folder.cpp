@@ -9,6 +9,7 @@
 #include <regex>
 #include <vector>
 
+#include "file.h"
 #include "messages.h"
 #include "system.h"
 
@@ -19,18 +20,20 @@ namespace {
 
 // By readdir: the iterators of the standard library allocate inside functions that must not throw, so memory
 // that runs out there ends the process.
-void remove_matching(const std::string &folder, const char *pattern) {
+void find_matching(const std::string &folder, const char *pattern, std::vector<fs::path> &found) {
   const std::regex names(pattern);
-  std::vector<fs::path> found;
   const std::unique_ptr<DIR, int (*)(DIR *)> open(opendir(folder.c_str()), &closedir);
   for (const dirent *entry; open && (entry = readdir(open.get()));)
     if (std::regex_match(entry->d_name, names)) found.push_back(path_of(folder) / path_of(entry->d_name));
-  for (const fs::path &path : found) {
-    std::error_code refused;
-    if (!fs::remove(path, refused) && refused)
-      throw Failure(kBadInput,
-                    name_of(path) + ": left by an earlier run, and cannot be removed: " + refused.message());
-  }
+}
+
+// A run that was killed has its table of bodies, perhaps without a row.
+bool is_of_a_run(const std::string &folder) {
+  std::error_code absent;
+  return holds(folder + "/summary.json", "\"deform-summary\"") ||
+         holds(folder + "/recording/run.json", "\"deform-recording\"") ||
+         holds(folder + "/bodies.csv", "t,body,com_x") ||
+         (fs::file_size(path_of(folder + "/bodies.csv"), absent) == 0 && !absent);
 }
 
 // What a link leads to may hold files of the same names that are no run's. A folder is not replaced as a file
@@ -47,18 +50,30 @@ void refuse_linked_folders(const std::string &folder) {
 }
 
 // Files of an earlier run would look like results of this one. The summary is removed first: without it the
-// rest is not taken for a complete run. Files that a killed process was writing are removed too.
+// rest is not taken for a complete run, and what tells that there was one last. Files that a killed process
+// was writing are removed too. Pictures alone, of `deform replay --states`, have their numbers.
 void remove_earlier(const std::string &folder) {
-  remove_matching(folder, "summary\\.json");
-  remove_matching(folder, "plots\\.png(\\.part[0-9]*(-[0-9]+)?)?");
-  remove_matching(folder, "(attachments|bodies|contacts|probes|sensors|tools)\\.csv");
-  remove_matching(folder, "(summary\\.json|.*\\.csv)\\.part[0-9]*(-[0-9]+)?");
-  remove_matching(folder + "/states",
-                  "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
-  remove_matching(folder + "/nodes", ".*\\.csv(\\.part[0-9]*(-[0-9]+)?)?");
-  remove_matching(folder + "/recording",
-                  "(run\\.json|states\\.csv|[0-9]{6}\\.state)(\\.part[0-9]*(-[0-9]+)?)?");
-  remove_matching(folder + "/frames", "frame_.*\\.png(\\.part[0-9]*(-[0-9]+)?)?");
+  std::vector<fs::path> found;
+  const auto find = [&](const std::string &in, const char *pattern) { find_matching(in, pattern, found); };
+  find(folder, "summary\\.json");
+  find(folder, "plots\\.png(\\.part[0-9]*(-[0-9]+)?)?");
+  find(folder, "(attachments|contacts|probes|sensors|tools)\\.csv");
+  find(folder, "(summary\\.json|.*\\.csv)\\.part[0-9]*(-[0-9]+)?");
+  find(folder + "/states", "(.*_[0-9]{6}|last_.*)\\.vtu|index\\.csv|.*\\.(vtu|csv)\\.part[0-9]*(-[0-9]+)?");
+  find(folder + "/nodes", ".*\\.csv(\\.part[0-9]*(-[0-9]+)?)?");
+  find(folder + "/recording", "(run\\.json|states\\.csv|[0-9]{6}\\.state)(\\.part[0-9]*(-[0-9]+)?)?");
+  find(folder, "bodies\\.csv");
+  if (!found.empty() && !is_of_a_run(folder))
+    throw Failure(kBadInput, name_of(found.front()) +
+                                 ": a run would remove this file, which no run wrote; give another folder "
+                                 "with --out");
+  find(folder + "/frames", "frame_[0-9]{6,}\\.png(\\.part[0-9]*(-[0-9]+)?)?");
+  for (const fs::path &path : found) {
+    std::error_code refused;
+    if (!fs::remove(path, refused) && refused)
+      throw Failure(kBadInput,
+                    name_of(path) + ": left by an earlier run, and cannot be removed: " + refused.message());
+  }
 }
 
 }  // namespace
@@ -71,7 +86,7 @@ void make_folder(const std::string &path) {
                                  (error ? error.message() : "a file of that name is there"));
 }
 
-RunFolder::RunFolder(const std::string &path) {
+HeldFolder::HeldFolder(const std::string &path) {
   make_folder(path);
   const os::Hold hold = os::hold_folder(path, held_);
   if (hold == os::Hold::impossible)
@@ -80,18 +95,16 @@ RunFolder::RunFolder(const std::string &path) {
     throw Failure(kBadInput, path +
                                  ": another run is writing into this folder; wait for its end, or give "
                                  "another one with --out");
-  try {
-    if (hold == os::Hold::unlocked)
-      warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) +
-           "); let no other run write into it meanwhile");
-    refuse_linked_folders(path);
-    remove_earlier(path);
-  } catch (...) {
-    os::let_go(held_);
-    throw;
-  }
+  if (hold == os::Hold::unlocked)
+    warn(path + ": this file system cannot lock the folder (" + std::strerror(errno) +
+         "); let no other run write into it meanwhile");
 }
 
-RunFolder::~RunFolder() { os::let_go(held_); }
+HeldFolder::~HeldFolder() { os::let_go(held_); }
+
+RunFolder::RunFolder(const std::string &path) : held_(path) {
+  refuse_linked_folders(path);
+  remove_earlier(path);
+}
 
 }  // namespace cli

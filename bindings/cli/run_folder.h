@@ -8,17 +8,25 @@ namespace cli {
 
 void make_folder(const std::string &path);
 
-class RunFolder {
+class HeldFolder {
  public:
-  // Throws Failure where another run holds the folder. The hold is a lock of the system's and ends with the
-  // process, however that ends.
-  explicit RunFolder(const std::string &path);
-  ~RunFolder();
-  RunFolder(const RunFolder &) = delete;
-  RunFolder &operator=(const RunFolder &) = delete;
+  // Makes it. Throws Failure where another run holds the folder. The hold is a lock of the system's and ends
+  // with the process, however that ends.
+  explicit HeldFolder(const std::string &path);
+  ~HeldFolder();
+  HeldFolder(const HeldFolder &) = delete;
+  HeldFolder &operator=(const HeldFolder &) = delete;
 
  private:
   std::intptr_t held_;
+};
+
+class RunFolder {
+ public:
+  explicit RunFolder(const std::string &path);
+
+ private:
+  HeldFolder held_;
 };
 
 }  // namespace cli

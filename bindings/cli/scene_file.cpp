@@ -37,6 +37,7 @@ namespace {
 
 void read_shape(const dfm_body_info &info, BodyView &body) {
   body.cut = body.npoint > 0;  // it had another shape before
+  ++body.shape;
   body.npoint = info.npoint;
   body.ntet = info.ntet;
   body.nsurfel = info.nsurfel;
@@ -150,11 +151,13 @@ std::string SceneFile::pointer_of(const std::string &body) const {
   return "/bodies/" + std::to_string(at == places_.end() ? places_.size() : at->second);
 }
 
-std::string SceneFile::explain() const {
+std::string SceneFile::explain() const { return explain_text(world_); }
+
+std::string explain_text(dfm_world world) {
   size_t bytes = 0;
-  need(dfm_world_explain(world_, nullptr, &bytes));
+  need(dfm_world_explain(world, nullptr, &bytes));
   std::string text(bytes, '\0');
-  need(dfm_world_explain(world_, text.data(), &bytes));
+  need(dfm_world_explain(world, text.data(), &bytes));
   text.resize(text.find('\0') == std::string::npos ? text.size() : text.find('\0'));
   return text;
 }

@@ -15,6 +15,7 @@ struct BodyView {
   std::string name, model;
   uint32_t number = 0;  // in the order in which bodies have come; it stays the same throughout a run
   uint32_t npoint = 0, ntet = 0, nsurfel = 0;
+  uint32_t shape = 0;  // changes with its points, cells or triangles
   double rest_volume = 0;
   bool cut = false;                 // it has been cut, or is a piece that came off
   dfm_body whole = 0;               // a piece: the body that the scene has made; else the body itself
@@ -77,5 +78,7 @@ class SceneFile {
   mutable std::map<uint64_t, std::string> names_;
   mutable std::map<uint64_t, uint32_t> numbers_;
 };
+
+std::string explain_text(dfm_world world);  // of dfm_world_explain
 
 }  // namespace cli

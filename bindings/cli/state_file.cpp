@@ -152,10 +152,20 @@ void check_scene_path(const SceneFile &scene, const std::string &path) {
   };
   if (file.extension() != ".json" || file.stem().empty())
     refuse("the name of a scene file must end in .json");
-  std::error_code error;
-  if (std::filesystem::equivalent(file, path_of(scene.path()), error))
-    refuse("this is the scene that is being run, which would be overwritten; give another name");
+  refuse_same("--save-scene", path, scene.path());
+  if (std::filesystem::is_directory(file)) refuse("a folder of that name is there");
   if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
+}
+
+void check_state_path(const std::string &path) {
+  const std::filesystem::path file = path_of(path);
+  const auto refuse = [&](const std::string &why) {
+    throw Failure(kBadInput, "--save " + path + ": " + why);
+  };
+  if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
+  if (std::filesystem::is_directory(file)) refuse("a folder of that name is there");
+  if (std::filesystem::exists(file) && !holds(path, kFormat))
+    refuse("a file that holds no state is there and would be overwritten; give another name");
 }
 
 void write_as_scene(const SceneFile &scene, const std::string &path) {
@@ -171,16 +181,16 @@ void write_as_scene(const SceneFile &scene, const std::string &path) {
   need(dfm_scene_write(scene.scene(), path.c_str(), &def, nullptr));
 }
 
-std::string snapshot_of(const SceneFile &scene) {
+std::string snapshot_of(dfm_world world) {
   size_t bytes = 0;
-  need(dfm_world_snapshot(scene.world(), nullptr, &bytes));
+  need(dfm_world_snapshot(world, nullptr, &bytes));
   std::string snapshot(bytes, '\0');
-  need(dfm_world_snapshot(scene.world(), snapshot.data(), &bytes));
+  need(dfm_world_snapshot(world, snapshot.data(), &bytes));
   return snapshot;
 }
 
 void write_state(const SceneFile &scene, const std::string &path) {
-  const std::string snapshot = snapshot_of(scene);
+  const std::string snapshot = snapshot_of(scene.world());
   write_whole(path, head_of(scene, snapshot.size()) + snapshot);
 }
 

@@ -18,10 +18,9 @@ constexpr size_t kBrief = 256;  // bytes of each text that goes in one datagram
 constexpr double kFar = 1e6;  // m, of a viewer's coordinates
 
 std::string list_of(const cli::JsonValue &line, const char *key, size_t n) {
-  const std::vector<double> x = line.numbers(key);
-  if (x.size() != n || !std::all_of(x.begin(), x.end(), [](double v) { return std::fabs(v) <= kFar; }))
-    throw cli::Failure(cli::kBadInput,
-                       std::string("expected ") + std::to_string(n) + " numbers under \"" + key + "\"");
+  const std::vector<double> x = line.numbers(key, n);
+  if (!std::ranges::all_of(x, [](double v) { return std::fabs(v) <= kFar; }))
+    throw cli::Failure(cli::kBadInput, std::string("a number under \"") + key + "\" is too large");
   return cli::json_numbers(x);
 }
 
@@ -31,24 +30,6 @@ render::Vec vector(const cli::JsonValue &line, const char *key) {
 }
 
 const char *yes(bool x) { return x ? "true" : "false"; }
-
-// What browsers take as text: names in files, and sentences that cut one, need not be UTF-8.
-std::string as_utf8(std::string text) {
-  for (size_t i = 0; i < text.size();) {
-    const auto byte = [&](size_t k) {
-      return i + k < text.size() ? static_cast<unsigned char>(text[i + k]) : 0;
-    };
-    const unsigned lead = byte(0);
-    const size_t n = lead < 0x80 ? 1 : lead >= 0xc2 && lead < 0xe0 ? 2 : lead < 0xf0 ? 3 : 4;
-    bool good = lead < 0x80 || (lead >= 0xc2 && lead <= 0xf4);
-    for (size_t k = 1; k < n; ++k) good = good && byte(k) >> 6 == 2;
-    if (n == 3) good = good && (lead > 0xe0 || byte(1) >= 0xa0) && (lead != 0xed || byte(1) < 0xa0);
-    if (n == 4) good = good && (lead > 0xf0 || byte(1) >= 0x90) && (lead < 0xf4 || byte(1) < 0x90);
-    if (!good) text[i] = '?';
-    i += good ? n : 1;
-  }
-  return text;
-}
 
 }  // namespace
 
@@ -125,7 +106,8 @@ void Session::handle(const std::string &what, const cli::JsonValue &line, uint32
     cli::JsonObject cut;
     simulation_.act(cut.add("do", "\"cut\"").add("blade", list_of(line, "blade", 12)));
   } else if (what == "run") {
-    running_ = line.get("on") == "true";
+    const cli::JsonValue *const on = line.find("on");
+    running_ = on && on->kind == cli::JsonValue::literal && on->text == "true";
     if (running_ && simulation_.at_end()) simulation_.go_on();
     wanted_ = simulation_.time();
   } else if (what == "step") {
@@ -184,7 +166,7 @@ std::string Session::brief_state(uint32_t viewer, size_t turn) const {
   if (!sliders_.empty()) out.add("sliders", cli::json_array({slider_text(sliders_[turn % sliders_.size()])}));
   if (const uint32_t n = scene_.settings().nprobe)
     out.add("probes", cli::json_array({probe(uint32_t(turn % n), kBrief)}));
-  return as_utf8(out.text());
+  return cli::as_utf8(out.text());
 }
 
 std::string Session::whole_state() const {
@@ -193,7 +175,7 @@ std::string Session::whole_state() const {
   for (uint32_t i = 0; i < scene_.settings().nprobe; ++i) probes.push_back(probe(i));
   cli::JsonObject out = state();
   out.add("sliders", cli::json_array(sliders)).add("probes", cli::json_array(probes));
-  return as_utf8(out.text());
+  return cli::as_utf8(out.text());
 }
 
 cli::JsonObject Session::state(size_t most) const {

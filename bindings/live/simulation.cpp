@@ -9,12 +9,7 @@
 namespace live {
 
 Simulation::Simulation(const cli::SceneFile &scene, double start)
-    : scene_(scene), world_(scene.world()), hand_(scene), start_(start) {
-  size_t bytes = 0;
-  cli::need(dfm_world_snapshot(world_, nullptr, &bytes));
-  first_.resize(bytes);
-  cli::need(dfm_world_snapshot(world_, first_.data(), &bytes));
-}
+    : scene_(scene), world_(scene.world()), hand_(scene), start_(start), first_(cli::snapshot_of(world_)) {}
 
 double Simulation::time() const { return dfm_world_time(world_) - start_; }
 

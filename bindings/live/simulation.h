@@ -46,7 +46,7 @@ class Simulation {
   double recorded_step_ = 0, recorded_at_ = 0, next_record_ = 0;  // s
   double start_;                                                  // s, of the scene
   bool beyond_ = false;
-  std::vector<char> first_;  // snapshot
+  std::string first_;  // snapshot
   std::string trouble_;
   double step_ms_ = 0;
 };

@@ -77,11 +77,8 @@ bool takes_young(const cli::SceneFile &scene, const std::string &model) {
   const auto look = [](void *user, const dfm_type *type, const char *) {
     Sought &s = *static_cast<Sought *>(user);
     if (s.model != type->id) return;
-    const char *const rows = reinterpret_cast<const char *>(type->params);
-    for (uint32_t i = 0; i < type->nparam; ++i) {
-      const auto *const row = reinterpret_cast<const dfm_param *>(rows + size_t(i) * type->param_size);
-      s.found |= std::strcmp(row->key, "young") == 0 && (row->flags & DFM_PARAM_RUNTIME) != 0;
-    }
+    for (const dfm_param &row : cli::params_of(*type))
+      s.found |= std::strcmp(row.key, "young") == 0 && (row.flags & DFM_PARAM_RUNTIME) != 0;
   };
   cli::need(dfm_plugin_visit(scene.context(), look, &sought));
   return sought.found;
@@ -131,7 +128,7 @@ void set_slider(std::vector<Slider> &sliders, const cli::JsonValue &request) {
   const auto slider =
       std::find_if(sliders.begin(), sliders.end(), [&](const Slider &s) { return s.name == name; });
   if (slider == sliders.end()) throw cli::Failure(cli::kBadInput, "there is no slider \"" + name + "\"");
-  const double value = request.scalar("value");
+  const double value = request.number("value");
   if (!(value >= slider->low && value <= slider->high))
     throw cli::Failure(cli::kBadInput, "slider \"" + name + "\": the value is outside of its range");
   slider->apply(value);

@@ -105,16 +105,14 @@ class Rig {
       if (entry.second != 0)
         add_slider(entry.first, entry.first + " of the motion", entry.second,
                    [&entry](double x) { entry.second = x; });
-    const char *const rows = reinterpret_cast<const char *>(law.type().params);
-    for (uint32_t i = 0; i < law.type().nparam; ++i) {
-      const auto *const row = reinterpret_cast<const dfm_param *>(rows + size_t(i) * law.type().param_size);
-      if (row->width > 1 || row->flags & (DFM_PARAM_ENUM | DFM_PARAM_INTEGER | DFM_PARAM_LIST)) continue;
-      const std::string unit = row->unit == std::string_view("1") ? "" : std::string(", ") + row->unit;
-      const auto apply = [this, key = std::string(row->key)](double x) {
+    for (const dfm_param &row : cli::params_of(law.type())) {
+      if (row.width > 1 || row.flags & (DFM_PARAM_ENUM | DFM_PARAM_INTEGER | DFM_PARAM_LIST)) continue;
+      const std::string unit = row.unit == std::string_view("1") ? "" : std::string(", ") + row.unit;
+      const auto apply = [this, key = std::string(row.key)](double x) {
         std::erase_if(case_.params, [&](const cli::CaseParam &p) { return p.key == key; });
         case_.params.push_back({key, {x}, ""});
       };
-      add_slider(row->key, row->key + unit, law.param(row->key, 0), apply, row->min, row->max);
+      add_slider(row.key, row.key + unit, law.param(row.key, 0), apply, row.min, row.max);
     }
   }
 

@@ -105,6 +105,7 @@ TEST(CcdCommand, BadFiles_AreRefusedWithTheirLine) {
   expect_refused({"ccd", good(), "--root", "brant"}, {"--root", "brant", "did you mean \"brent\""});
   expect_refused({"ccd", good(), "--separation", "-1"}, {"min_separation"});
   expect_refused({"ccd", good(), "--csv", folder() + "/no/such/folder.csv"}, {"no/such/folder.csv"});
+  expect_refused({"ccd", good(), "--csv", good()}, {"would be overwritten"});
   expect_refused({"ccd"}, {"QUERIES"});
 }
 

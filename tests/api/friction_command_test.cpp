@@ -255,6 +255,31 @@ TEST(FrictionCommand, LawThatGivesNaN_StopsWithItsRows) {
   expect_refused({"friction", word, "--law", tiny("tiny_nan")}, {"/params/where", "foot", "dft_dvt"});
 }
 
+TEST(FrictionCommand, InputsAndOtherFiles_AreNotOverwritten) {
+  const std::string good = file("own.json", push()), text = test::read_file(good);
+  expect_refused({"friction", good, "--csv", good}, {"--csv", "would be overwritten"});
+  expect_refused({"friction", good, "--plot", folder() + "/own.txt"}, {"--plot", ".png"});
+  EXPECT_EQ(test::read_file(good), text);
+  test::write_file(folder() + "/own.csv", "measured\n");
+  const test::CommandResult r =
+      test::run({"/usr/bin/env", "DEFORM_PYTHON=/nonexistent/python3", DEFORM_COMMAND, "friction", good,
+                 "--plot", folder() + "/own.png"});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_TRUE(has(r.err, "own.csv") && has(r.err, "--csv")) << r.err;
+  EXPECT_EQ(test::read_file(folder() + "/own.csv"), "measured\n");
+}
+
+TEST(FrictionCommand, CaseWithAByteOrderMark_IsRead) {
+  EXPECT_EQ(test::deform({"friction", file("mark.json", "\xef\xbb\xbf" + push()), "--quiet"}).exit_code, 0);
+}
+
+TEST(FrictionCommand, DriveFasterThanItsSteps_IsRefused) {
+  const std::string fast = file("fast.json", R"({"law": "coulomb",
+    "params": {"mu": 0.5}, "mass": 1, "gravity": 9.81,
+    "input": {"kind": "sine_velocity", "V": 0.02, "freq": 1e12, "T": 2, "dt": 0.002}})");
+  expect_refused({"friction", fast}, {"/input/freq", "--step"});
+}
+
 TEST(FrictionCommand, PlotWithoutMatplotlib_KeepsTheRows) {
   const std::string good = file("good.json", push());
   const std::string picture = folder() + "/alone.png";

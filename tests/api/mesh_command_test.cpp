@@ -256,6 +256,13 @@ TEST(MeshCommand, ConvertSurfaces_ThereAndBackKeepsTheBytes) {
   EXPECT_EQ(test::read_file(a), test::read_file(e));
 }
 
+TEST(MeshCommand, ConvertIntoItsInput_IsRefused) {
+  const std::string mesh = std::string(DEFORM_SOURCE_DIR) + "/examples/data/block.msh";
+  const test::CommandResult r = test::deform({"mesh", "convert", mesh, mesh});
+  EXPECT_EQ(r.exit_code, 2);
+  EXPECT_NE(r.err.find("would be overwritten"), std::string::npos) << r.err;
+}
+
 TEST(MeshCommand, ConvertWithGroups_ReportsWhatIsLost) {
   const std::string file = folder() + "/groups.obj";
   test::write_file(file, "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng a\nf 1 2 3\ng b\nf 2 4 3\n");

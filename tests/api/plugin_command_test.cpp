@@ -89,6 +89,8 @@ TEST(PluginCommand, InfoOfAFile_LoadsIt) {
   const auto r = test::deform({"plugin", "info", std::string(DEFORM_PLUGIN_DIR) + "/friction_none.so"});
   EXPECT_EQ(r.exit_code, 0) << r.err;
   EXPECT_TRUE(has(r.out, "org.deform.none")) << r.out;
+  const auto same = test::deform({"plugin", "info", std::string(DEFORM_PLUGIN_DIR) + "/./friction_none.so"});
+  EXPECT_EQ(same.out, r.out) << same.err;
 }
 
 TEST(PluginCommand, UnknownId_ExitsTwoAndListsWhatThereIs) {

@@ -127,6 +127,10 @@ TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {
        "equilibria");
   says(f.run({"--out", other + "/deep", "--save", "9", other + "/deep/x.state"}), "the run ends at");
   EXPECT_FALSE(fs::exists(other));
+  const std::string pictures = test::deform({"replay", out, "--states", "--json"}).out;
+  EXPECT_TRUE(pictures.empty() || pictures.starts_with("{\"pictures\": 7, ")) << pictures;
+  fs::rename(f.scene, f.path + "/moved.json");
+  says(test::deform({"replay", out}), "recording/run.json");
 }
 
 // The folder of the run holds what an earlier run wrote, and the state to continue from.
@@ -135,10 +139,16 @@ TEST(Replay, RunIntoItsOwnFolder_ContinuesFromItsRecordingAndARefusedOneDeletesN
   const std::string out = f.path + "/own", recording = out + "/recording/000001.state";
   ASSERT_EQ(f.run({"--out", out, "--time", "0.03", "--record"}).exit_code, 0);
   const std::string summary = test::read_file(out + "/summary.json"), state = test::read_file(recording);
+  fs::create_directory(f.path + "/folder.json");
   for (const std::vector<std::string> &refused :
        std::vector<std::vector<std::string>>{{"--save", "9", f.path + "/x.state"},
                                              {"--from", f.path + "/none"},
                                              {"--save-scene", f.path + "/scene.vtu"},
+                                             {"--save-scene", f.path + "/folder.json"},
+                                             {"--save", "0.01", f.scene},
+                                             {"--save", "0.01", f.path},
+                                             {"--stream", "rtp://:5004"},
+                                             {"--stream", "rtp://127.0.0.1:5004?token=a"},
                                              {"--stream", "nowhere"}}) {
     std::vector<std::string> arguments = {"--out", out, "--time", "0.03"};
     arguments.insert(arguments.end(), refused.begin(), refused.end());
@@ -146,6 +156,7 @@ TEST(Replay, RunIntoItsOwnFolder_ContinuesFromItsRecordingAndARefusedOneDeletesN
     EXPECT_EQ(test::read_file(out + "/summary.json"), summary) << refused[0];
     EXPECT_EQ(test::read_file(recording), state) << refused[0];
   }
+  EXPECT_EQ(test::read_file(f.scene), kScene);
   const std::string hash = f.hash("own");
   const test::CommandResult rest = f.run({"--out", out, "--time", "0.03", "--from", recording});
   EXPECT_EQ(rest.exit_code, 0) << rest.err;
@@ -222,4 +233,5 @@ TEST(SaveScene, WrongNames_AreReportedBeforeTheFirstStep) {
   refused(f.path + "/scene.vtu", "must end in .json");
   refused(f.path + "/no/such/scene.json", "cannot be written there");
   refused(f.scene, "give another name");
+  refused(f.path + "/never/./summary.json", "give another name");
 }

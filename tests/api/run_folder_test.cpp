@@ -2,7 +2,9 @@
 // its way to terminal and tables.
 #include <gtest/gtest.h>
 
+#include <fcntl.h>
 #include <signal.h>
+#include <sys/file.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -88,6 +90,7 @@ TEST(RunFolder, LeftoversOfKilledRuns_AreRemovedAndOtherFilesKept) {
         "states/last_block.vtu", "frames/frame_000001.png.part12", "frames/frame_000001.png",
         "nodes/ghost.csv", "contacts.csv"})
     test::write_file(dir + "/out/" + name, "old");
+  test::write_file(dir + "/out/bodies.csv", "");  // which tells that a run was here
   for (const char *name : {"notes.txt", "states/own.vtu", "frames/film.mp4", "my_table.csv"})
     test::write_file(dir + "/out/" + name, "own");
   ASSERT_EQ(run(dir, {"--set", "/output/contacts=false"}).exit_code, 0);
@@ -100,18 +103,59 @@ TEST(RunFolder, LeftoversOfKilledRuns_AreRemovedAndOtherFilesKept) {
   EXPECT_EQ(files, 7u) << "three of the run, four of the user";
 }
 
+TEST(RunFolder, FilesThatNoRunWrote_AreKept) {
+  const std::string dir = fresh("foreign");
+  fs::create_directories(dir + "/out/nodes");
+  for (const std::string name : {"/out/bodies.csv", "/out/nodes/measured.csv"}) {
+    test::write_file(dir + name, "t,x\n0,1\n");
+    expect_sentence(run(dir), {dir + name, "no run wrote", "--out"});
+    EXPECT_EQ(test::read_file(dir + name), "t,x\n0,1\n");
+    fs::remove(dir + name);
+  }
+  EXPECT_EQ(run(dir).exit_code, 0);
+}
+
+TEST(RunFolder, OfAStudyThatRuns_IsHeld) {
+  const std::string dir = fresh("study");
+  fs::create_directories(dir + "/out");
+  const int held = open((dir + "/out").c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(flock(held, LOCK_EX), 0);
+  expect_sentence(test::deform({"cost", dir + "/scene.json", "--budget", "1", "--out", dir + "/out"}),
+                  {dir + "/out", "another run"});
+  close(held);
+}
+
+TEST(RunFolder, WhatCannotBeWritten_EndsWithASentence) {
+  const std::string dir = fresh("full"), command = DEFORM_COMMAND, scene = "'" + dir + "/scene.json'";
+  const auto shell = [](const std::string &words) { return test::run({"/bin/sh", "-c", words}); };
+  expect_sentence(shell("'" + command + "' explain " + scene + " > /dev/full"), {"standard output"});
+  expect_sentence(shell("ulimit -f 1; exec '" + command + "' run " + scene + " --quiet --time 0.1 --out '" +
+                        dir + "/out'"),
+                  {"cannot be written"});
+  expect_sentence(run(dir, {"--jitter", "-1"}), {"--jitter", "a whole number, 0 or more"});
+}
+
+TEST(RunFolder, SummaryOfASceneWhoseNameIsNoUtf8_IsJson) {
+  const std::string dir = fresh("name"), scene = dir + "/n\xff.json";
+  test::write_file(scene, kScene);
+  ASSERT_EQ(test::deform({"run", scene, "--quiet", "--out", dir + "/out"}).exit_code, 0);
+  const std::string summary = test::read_file(dir + "/out/summary.json");
+  EXPECT_NE(summary.find("n?.json"), std::string::npos);
+  EXPECT_EQ(summary.find('\xff'), std::string::npos);
+}
+
 TEST(RunFolder, LinksInItsPlace_AreReplacedAndNotFollowed) {
   const std::string dir = fresh("links");
   fs::create_directories(dir + "/out");
   const std::vector<std::string> names = {"bodies.csv", "contacts.csv", "probes.csv", "summary.json",
                                           "summary.json.part"};
+  const std::string precious = R"({"format": "deform-summary"})";
   for (const std::string &name : names) {
-    test::write_file(dir + "/victim_" + name, "precious");
+    test::write_file(dir + "/victim_" + name, precious);
     fs::create_symlink(dir + "/victim_" + name, dir + "/out/" + name);
   }
   ASSERT_EQ(run(dir).exit_code, 0);
-  for (const std::string &name : names)
-    EXPECT_EQ(test::read_file(dir + "/victim_" + name), "precious") << name;
+  for (const std::string &name : names) EXPECT_EQ(test::read_file(dir + "/victim_" + name), precious) << name;
   for (const char *name : {"bodies.csv", "contacts.csv", "probes.csv", "summary.json"})
     EXPECT_FALSE(fs::is_symlink(dir + "/out/" + name)) << name;
 }

@@ -218,6 +218,10 @@ class Arguments(unittest.TestCase):
                     ("parameter 'mu' is None; expected a number", lambda: world.add_friction(mu=None)),
                     ("dt is '1'; expected a number", lambda: deform.Law("coulomb")([1], [[0], [0]], "1")),
                     ("vt is .*; expected an array", lambda: deform.Law("coulomb")([1], "fast", 1)),
+                    ("mass_scaling is '1'; expected", lambda: world.add_body(mesh, mass_scaling="1")),
+                    ("smooth is None; expected", lambda: world.add_body(mesh, smooth=None)),
+                    ("restitution is '1'; expected", lambda: world.add_friction(restitution="1")),
+                    (r"set is \['/a=1'\]; expected a dict", lambda: deform.Scene("a.json", set=["/a=1"])),
                     ("max_distance is '1'; expected", lambda: world.query_closest((0, 0, 0), "1"))):
                 with self.subTest(sentence):
                     self.refused(sentence, function)
@@ -227,6 +231,18 @@ class Arguments(unittest.TestCase):
             self.assertEqual(world.time, 0)
             world.step(np.float32(1e-3))
             world.step(np.array(1e-3))
+
+    def test_names_are_texts_of_utf8(self):
+        """Others were cut at a character 0, or could not be read again."""
+        with deform.World() as world:
+            world.add_obstacle("plane", name="floor")
+            for name in ("a\0b", "a\udcff"):
+                for function in (lambda: world.add_obstacle("plane", name=name),
+                                 lambda: world.add_friction("floor", name),
+                                 lambda: world.find_obstacle(name), lambda: world.add_tool(name=name),
+                                 lambda: world.add_rigid(name=name)):
+                    self.refused("expected characters of UTF-8", function)
+            self.assertEqual([thing.name for thing in world.obstacles], ["floor"])
 
     def test_whole_numbers_are_whole_and_not_negative(self):
         """ctypes takes a negative number for one of four billions."""
@@ -241,6 +257,10 @@ class Arguments(unittest.TestCase):
                     ("cells is -5; expected a whole number from 0",
                      lambda: world.add_obstacle("voxels", mesh=surface, cells=-5)),
                     ("cells is nan; expected a whole number", lambda: deform.TetMesh.ball(1, math.nan)),
+                    ("jitter is -1; expected", lambda: deform.Scene("none.json", jitter=-1)),
+                    ("threads is 4294967297; expected", lambda: deform.Context(2**32 + 1)),
+                    ("most is -1; expected",
+                     lambda: world.query(deform.Shape.sphere(1), (0, 0, 1), most=-1)),
                     ("max_sweeps is -1; expected", lambda: deform.World(max_sweeps=-1)),
                     ("load_steps is 0; expected a whole number from 1", lambda: world.equilibrium(0)),
                     ("collides_with is -1; expected", lambda: body.set_filter(1, -1)),

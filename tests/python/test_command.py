@@ -39,6 +39,11 @@ class Command(unittest.TestCase):
         with self.assertRaisesRegex(deform.Error, "rnu"):
             deform.command("rnu")
 
+    def test_warnings_are_logged(self):
+        with self.assertLogs("deform", "WARNING") as said:
+            deform.friction("coulomb", mux=1)
+        self.assertRegex(said.output[0], "left out: mux")
+
     def test_explain(self):
         self.assertIn("stable", deform.explain(SCENES / "slope_block.json"))
 

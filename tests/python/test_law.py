@@ -1,6 +1,7 @@
 """Friction laws from Python: those that are loaded, and laws as Python classes, by themselves, in a world,
 on the rig and before the validator."""
 import gc
+import signal
 import socket
 import struct
 import tempfile
@@ -69,6 +70,23 @@ class Raises(Tanh):
 
     def evaluate(self, x, out):
         raise RuntimeError("out of ideas")
+
+
+class Bare(deform.PythonLaw):
+    """Without parameters."""
+
+    id = "com.example.bare"
+
+    def evaluate(self, x, out):
+        out.limit[:] = 0.5 * x.fn
+        out.ft[:] = -out.limit * np.tanh(1e3 * x.vt)
+
+
+class Refuses(Tanh):
+    id = "com.example.refuses_wrongly"
+
+    def refuse(self, params):
+        raise LookupError("of refuse")
 
 
 class Shapes(Tanh):
@@ -183,6 +201,49 @@ class InPython(unittest.TestCase):
             deform.Law(Raises)(fn=[1], vt=[[0], [0]], dt=1e-3)
         self.assertIsInstance(caught.exception.__cause__, RuntimeError)
 
+    def test_a_law_without_parameters(self):
+        limit = deform.Law(Bare)(fn=[2], vt=[[1], [0]], dt=1e-3)["limit"]
+        np.testing.assert_array_equal(limit, [1])
+        self.assertLess(slide(Bare), 0.1)
+
+    def test_an_error_is_of_the_call_that_met_it(self):
+        with deform.World() as world:
+            with self.assertRaises(deform.ArgumentError) as caught:
+                world.add_friction(law=Refuses)
+            self.assertIsInstance(caught.exception.__cause__, LookupError)
+            with self.assertRaises(deform.ArgumentError) as caught:
+                world.add_friction(law=Bristle, mu=7)
+            self.assertIsNone(caught.exception.__cause__)
+        with self.assertRaises(deform.Error) as caught:
+            deform.Law(Refuses)(fn=[1], vt=[[0], [0]], dt=1e-3)
+        self.assertIsInstance(caught.exception.__cause__, LookupError)
+
+    def test_interrupts_end_a_step_in_a_law(self):
+        """Also where the signal comes while the library computes, between two calls of the law."""
+        def raises(self, x, out):
+            raise KeyboardInterrupt
+
+        def hears(self, x, out):
+            Bare.evaluate(self, x, out)
+            signal.raise_signal(signal.SIGINT)
+        for evaluate in (raises, hears):
+            law = type("Law", (Bare,), {"id": f"com.example.{evaluate.__name__}", "evaluate": evaluate})
+            with self.subTest(evaluate.__name__), self.assertRaises(KeyboardInterrupt):
+                slide(law)
+        main, slow = threading.get_ident(), threading.Event()
+
+        def waits(self, x, out):
+            Bare.evaluate(self, x, out)
+            slow.set()
+        law = type("Law", (Bare,), {"id": "com.example.waits", "evaluate": waits})
+        for _ in range(20):
+            slow.clear()
+            kill = threading.Thread(target=lambda: slow.wait() and signal.pthread_kill(main, signal.SIGINT))
+            kill.start()
+            with self.assertRaises(KeyboardInterrupt):
+                slide(law, time=30)
+            kill.join()
+
     def test_forces_that_nothing_reads(self):
         """A law that returned its force, or wrote it to another name, was one without friction."""
         def returns(self, x, out):
@@ -201,6 +262,8 @@ class InPython(unittest.TestCase):
         for wrong in ({"id": "bristle"}, {"id": "com.example.a", "state": ["vector"]},
                       {"id": "com.example.b", "needs": ["speed"]},
                       {"id": "com.example.d", "parameters": [("mu", 0.3)]},
+                      {"id": "com.example.e", "parameters": [deform.Parameter("fn", "", "1", 0, 1, 0)]},
+                      {"id": "com.example.f", "parameters": [deform.Parameter("a b", "", "1", 0, 1, 0)]},
                       {"id": "com.example.c", "parameters": [deform.Parameter("mu", "", "1", 1, 0, 2)]}):
             with self.subTest(wrong), self.assertRaises(deform.Error):
                 deform.Law(type("Wrong", (Bristle,), wrong))

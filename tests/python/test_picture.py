@@ -6,7 +6,9 @@ import json
 import os
 import pathlib
 import re
+import signal
 import struct
+import subprocess
 import sys
 import tempfile
 import unittest
@@ -71,7 +73,8 @@ class Pictures(unittest.TestCase):
             away = world.picture(eye=(0, -2, 0.3), look_at=(3, 0, 0.3), size=(160, 120), label=False)
             self.assertLess(abs(int(away.rgb[60, 80, 2]) - int(away.rgb[60, 80, 0])), 40)
             self.assertEqual(world._repr_png_()[:4], b"\x89PNG")
-            for wrong in ({"color": "colour"}, {"eye": (0, 0, 1)}, {"size": (0, 10)}):
+            for wrong in ({"color": "colour"}, {"eye": (0, 0, 1)}, {"size": (0, 10)}, {"size": (5,)},
+                          {"color": "speed", "color_range": 5}):
                 with self.assertRaises(deform.ArgumentError):
                     world.picture(**wrong)
             with self.assertRaisesRegex(deform.ArgumentError, "1 to 8192 each are allowed"):
@@ -86,6 +89,21 @@ class Pictures(unittest.TestCase):
             np.testing.assert_array_equal(world.picture(**camera, label=False).rgb, plain)
             self.assertLess(abs(int(empty[60, 80, 2]) - int(empty[60, 80, 0])), 40)
         self.assertIsNone(world._repr_png_())
+
+    def test_a_forked_process_is_told_that_it_cannot_draw(self):
+        """It waited for the threads of the parent's driver."""
+        code = ("import os, deform; world = deform.World(); world.picture(size=(40, 30))\n"
+                "child = os.fork()\n"
+                "try: child or world.picture(size=(40, 30))\n"
+                "except deform.UnsupportedError: os._exit(7)\n"
+                "print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))")
+        with subprocess.Popen([sys.executable, "-B", "-c", code], stdout=subprocess.PIPE, text=True,
+                              start_new_session=True) as process:
+            try:
+                self.assertEqual(process.communicate(timeout=60)[0], "7\n")
+            except subprocess.TimeoutExpired:
+                os.killpg(process.pid, signal.SIGKILL)
+                raise
 
     def test_every_quantity_has_its_colors_and_a_legend(self):
         with deform.World(integrator="implicit_euler") as world:

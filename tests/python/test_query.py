@@ -105,6 +105,13 @@ class Queries(Scenery):
             shape.box((1, 1))
 
 
+class OfThisProgram(deform.PythonLaw):
+    id = "com.example.here"
+
+    def evaluate(self, x, out):
+        pass
+
+
 class Decisions(unittest.TestCase):
     def test_pairs_that_may_not_touch_pass(self):
         with deform.World() as world:
@@ -148,6 +155,17 @@ class Decisions(unittest.TestCase):
             world.set_pre_solve(lambda contact: setattr(contact, "enabled", False))
             world.run(0.1, dt=1e-3)
             self.assertLess(body.measure.com[2], 0.04)
+
+    def test_a_contact_is_gone_after_the_call(self):
+        kept = []
+        with deform.World() as world:
+            world.add_obstacle("plane")
+            ball(world, "ball", (0, 0, 0.1))
+            world.set_pre_solve(kept.append)
+            world.step(1e-3)
+            for use in (lambda: kept[0].gap, lambda: setattr(kept[0], "enabled", False)):
+                with self.assertRaisesRegex(deform.StateError, "only during the call"):
+                    use()
 
     def test_what_a_function_raises_discards_the_step_and_comes_out(self):
         with deform.World() as world:
@@ -274,6 +292,10 @@ class Export(unittest.TestCase):
                     world.write_scene(path)
                 left_out, = world.write_scene(pathlib.Path(folder) / "part.json", partial=True)
                 self.assertIn("changes contacts", left_out)
+                world.set_pre_solve(None)
+                world.add_friction(law=OfThisProgram)
+                self.assertRegex(" ".join(world.write_scene(path.with_name("law.json"))),
+                                 "'com.example.here' is registered by this program")
             with deform.Scene(path) as scene:
                 self.assertEqual(scene.world.hash, first)
                 scene.world.run(0.01, dt=1e-4)

@@ -187,8 +187,16 @@ class Designs(InAFolder):
                 ({"set": {"/a=1": 2}}, "/set: expected an object"),
                 ({"limit_s": -1}, "/limit_s: expected a number above 0"),
                 ({"scene": "none.json"}, "none.json: cannot be opened"),
+                ({"scene": "a\udcff.json"}, "/scene: the path of this file is not UTF-8"),
                 ({"design": {"method": "sobl"}}, "expected one of .*sobol"),
-                ({"design": {"method": "random"}}, 'needs "runs"')):
+                ({"design": {"method": "random"}}, 'needs "runs"'),
+                ({"design": {"method": "grid", "runs": 50}}, '/design: unknown key "runs"'),
+                ({"parameters": {"mu": {"at": MU, "from": 1, "to": 2, "count": 3}}}, '"count" is of'),
+                ({"optimizer": {"seed": 3}}, '/optimizer: unknown key "seed"'),
+                ({"limit_s": 10**400}, "/limit_s: expected a number"),
+                ({"format": "deform-scene", "time": {}}, "this is a scene; a study names one"),
+                ({"residuals": [{"measured": "m.csv", "sigma": 1, "table": "bodies", "column": "x",
+                                 "columns": [["t"], "x"]}]}, "expected two names of columns")):
             with self.assertRaisesRegex(deform.FormatError, sentence):
                 points(read_study({**sweep_study(self.scene), **changes}))
 
@@ -457,6 +465,21 @@ class Outputs(InAFolder):
                 deform.sweep(study, out=self.folder / "other", executor="dask", address="tcp://127.0.0.1:1")
         with Dask(1) as pool, self.assertRaisesRegex(deform.Error, "Dask cannot make runs: KeyError"):
             list(pool.map([{}]))
+
+    def test_options_that_would_be_ignored(self):
+        self.assertIn("address is of the executor dask",
+                      self.command("sweep", self.study(), "--address", "tcp://127.0.0.1:1", code=2).stderr)
+        with self.assertRaisesRegex(deform.ArgumentError, "has its own workers"):
+            deform.sweep(sweep_study(self.scene), out=self.out, executor="dask", workers=2,
+                         address="tcp://127.0.0.1:1")
+
+    def test_files_with_a_byte_order_mark_and_any_name(self):
+        scene = self.folder / "box_bom.json"
+        scene.write_bytes(b"\xef\xbb\xbf" + self.scene.read_bytes())
+        study = self.folder / "st\udcff.json"
+        study.write_text("\ufeff" + json.dumps(sweep_study(scene, design={"method": "random", "runs": 1})))
+        self.command("sweep", study, "--out", self.out)
+        self.assertTrue((self.out / "sweep.html").exists())
 
     def test_command_says_what_is_missing(self):
         self.assertEqual(self.command("sweep", self.study(), "--out", self.scene / "out", code=2).stderr,

@@ -119,6 +119,9 @@ def main():
         state_of(second, lambda s: s["control"] == number)
         second.send(to_low)
         state_of(second, lambda s: s["sliders"][0]["value"] == slider["low"])
+        second.send({**to_low, "value": "high"})
+        state_of(second, lambda s: "expected a number" in s["message"])
+        assert state_of(second)["sliders"][0]["value"] == slider["low"], "no number"
         second.send({"do": "slider", "name": "no such", "value": 1})
         state_of(second, lambda s: "no such" in s["message"])
         second.send({"do": "run", "on": True})

@@ -7,6 +7,9 @@ from ._library import command_path, demo_scene
 
 if sys.argv[1:2] == ["demo"]:
     from .demo import demo
-    demo(command_path(), demo_scene(), pathlib.Path((sys.argv[2:3] or ["deform_demo"])[0]))
+    out = (sys.argv[2:] or ["deform_demo"])[0]
+    if out.startswith("-"):
+        sys.exit(__doc__)
+    demo(command_path(), demo_scene(), pathlib.Path(out))
 else:
     main()

@@ -2,6 +2,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import tempfile
 from typing import Any, Mapping, Sequence
 
 from ._library import ArgumentError, Diverged, Error, command_path
+
+_LOG = logging.getLogger("deform")
 
 
 def main() -> None:
@@ -23,6 +26,8 @@ def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> st
     done = subprocess.run([str(command_path()), *map(str, arguments)], capture_output=True, text=True,
                           env={**os.environ, **(environment or {})})
     if done.returncode == 0:
+        for line in done.stderr.splitlines():
+            _LOG.warning("%s", line.removeprefix("deform: "))
         return done.stdout
     said = done.stderr.strip() or f"deform {arguments[0]} ended with {done.returncode}"
     raise {2: ArgumentError, 3: Diverged}.get(done.returncode, Error)(said.removeprefix("deform: "))
@@ -90,6 +95,7 @@ def cost(scene: Any, *, budget: float = 120, target: float | None = None, axes: 
     for the scene with the cheapest choice."""
     with tempfile.TemporaryDirectory() as folder:
         arguments = ["cost", scene, "--json", "--budget", budget, "--out", out or folder]
+        axes = [axes] if isinstance(axes, str) else axes
         for option, value in (("--target", target), ("--axes", ",".join(axes) if axes else None),
                               ("--apply", apply)):
             if value is not None:

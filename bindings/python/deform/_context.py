@@ -13,8 +13,8 @@ from typing import Any, Iterable, Iterator, Mapping
 import numpy as np
 
 from . import _abi
-from ._library import ArgumentError, Error, check, default, encoded, lib, quick
-from ._values import array_of
+from ._library import ArgumentError, Error, check, default, encoded, error, lib, quick
+from ._values import array_of, whole
 
 _LOG = logging.getLogger("deform")
 _LEVELS = {_abi.DFM_LOG_DEBUG: logging.DEBUG, _abi.DFM_LOG_INFO: logging.INFO,
@@ -164,7 +164,7 @@ class Context:
 
     def __init__(self, threads: int = 1):
         definition = default(_abi.dfm_context_def)
-        definition.threads = threads
+        definition.threads = whole(threads, "threads")
         definition.log = ctypes.cast(_log, ctypes.c_void_p).value
         out = ctypes.c_void_p()
         check(lib.dfm_context_create(ctypes.byref(definition), ctypes.byref(out)))
@@ -219,13 +219,21 @@ class Context:
         self.keep.append(bridge)
         return bridge.id
 
-    def raise_of_law(self) -> BaseException | None:
-        """What a Python law has raised since the last look."""
-        for bridge in self._laws:
-            raised = bridge.take_error()
-            if raised is not None:
-                return raised
-        return None
+    def raised_by_law(self) -> BaseException | None:
+        """What a Python law has raised since the last look; what is no error, as KeyboardInterrupt, first."""
+        raised = [found for bridge in self._laws if (found := bridge.take_error()) is not None]
+        return min(raised, key=lambda found: isinstance(found, Exception), default=None)
+
+    def failed(self, status: int, sentence: str | None = None,
+               raised: BaseException | None = None) -> BaseException:
+        """The exception that a failed call raises. An error that a Python law has raised is its cause; what
+        is no error is raised itself."""
+        raised = raised or self.raised_by_law()
+        if raised is not None and not isinstance(raised, Exception):
+            return raised
+        said = error(status, sentence)
+        said.__cause__ = raised
+        return said
 
 
 _default: Context | None = None

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Callable
 import numpy as np
 
 from ._library import PATH, ArgumentError, Error, StateError, UnsupportedError, quick
-from ._values import real, whole
+from ._values import finite_or_none, real, whole
 from .body import Body
 from .picture import upright_of
 
@@ -55,15 +55,6 @@ def _forget() -> None:
 
 
 os.register_at_fork(after_in_child=_forget)
-
-
-def _finite(x: Any) -> Any:
-    """The same, with None for numbers that JSON cannot hold."""
-    if isinstance(x, float):
-        return x if math.isfinite(x) else None
-    if isinstance(x, dict):
-        return {key: _finite(value) for key, value in x.items()}
-    return [_finite(value) for value in x] if isinstance(x, list) else x
 
 
 def _numbers(request: dict[str, Any], key: str, n: int) -> np.ndarray:
@@ -352,7 +343,7 @@ class Server:
             self._shapes = shapes
             scene = self.world.stream(scene=True, frame=self._frame)
             self._native.deform_serve_scene(self._served, scene, len(scene), b"", 0)
-        state = json.dumps(_finite(self._state()), allow_nan=False).encode()
+        state = json.dumps(finite_or_none(self._state()), allow_nan=False).encode()
         self._native.deform_serve_state(self._served, state)
         self._native.deform_serve_frame(self._served, frame, len(frame))
         self._frame += 1

@@ -23,6 +23,15 @@ def _all() -> list[Any]:
             continue
 
 
+def interrupt() -> None:
+    """Ends the step that the main thread is in."""
+    main = threading.main_thread().ident
+    for world in _all():
+        if world._busy == main:
+            world._stop = True
+            quick.dfm_world_interrupt(world.handle)
+
+
 def _listen(reader: int, previous: int) -> None:
     """Reads the numbers of signals; previous: the former wakeup descriptor (asyncio), -1: none."""
     while True:
@@ -33,11 +42,7 @@ def _listen(reader: int, previous: int) -> None:
         except OSError:
             continue
         if signal.SIGINT in heard:
-            main = threading.main_thread().ident
-            for world in _all():
-                if world._busy == main:
-                    world._stop = True
-                    quick.dfm_world_interrupt(world.handle)
+            interrupt()
 
 
 def _forget() -> None:

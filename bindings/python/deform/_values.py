@@ -3,7 +3,9 @@ from __future__ import annotations
 
 import ctypes
 import json
+import math
 import numbers
+import pathlib
 from typing import Any
 
 import numpy as np
@@ -28,6 +30,11 @@ def real(value: Any, what: str) -> float:
         raise ArgumentError(f"{what} is a number beyond the range of a float", "DFM_E_ARG") from None
 
 
+def read_json(path: Any) -> Any:
+    """Of a file, which editors may have begun with a byte order mark."""
+    return json.loads(pathlib.Path(path).read_text("utf-8-sig"))
+
+
 def json_of(value: Any) -> str:
     """As JSON, NumPy's numbers and arrays too."""
     def plain(given: Any) -> Any:
@@ -35,6 +42,15 @@ def json_of(value: Any) -> str:
             return given.tolist()
         raise KindError(f"{given!r} is no value of JSON; expected numbers, texts, lists, dicts", "DFM_E_ARG")
     return json.dumps(value, default=plain)
+
+
+def finite_or_none(value: Any) -> Any:
+    """The same, with None for numbers that JSON cannot hold."""
+    if isinstance(value, dict):
+        return {key: finite_or_none(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [finite_or_none(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def whole(value: Any, what: str, least: int = 0, bits: int = 32) -> int:
@@ -70,7 +86,15 @@ def text(value: Any, what: str) -> bytes:
     """A text as the library takes it."""
     if not isinstance(value, str):
         raise KindError(f"{what} is {_shown(value)}; expected a text", "DFM_E_ARG")
+    if "\0" in value or any("\ud800" <= letter <= "\udfff" for letter in value):
+        raise ArgumentError(f"{what} is {_shown(value)}; expected characters of UTF-8, none of them 0",
+                            "DFM_E_ARG")
     return value.encode()
+
+
+def name_or_none(value: Any) -> bytes | None:
+    """A name as the library takes it; None: it makes one."""
+    return None if value is None else text(value, "name")
 
 
 def vector(values: Any, what: str, width: int = 3) -> Any:

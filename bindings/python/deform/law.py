@@ -8,6 +8,7 @@ import pathlib
 import socket
 import struct
 import subprocess
+import sys
 import tempfile
 import threading
 import weakref
@@ -20,12 +21,14 @@ import numpy as np
 from . import _abi
 from ._context import Context, Parameter, Params, PluginType, default_context, read_type
 from ._library import PATH, ArgumentError, Error, check, command_path, encoded, lib, quick
+from ._signals import interrupt
 from ._values import array_of, real
 from ._command import Table
 
 NEEDS = {"fn": _abi.DFM_NEED_FN, "vt": _abi.DFM_NEED_VT, "ft_stop": _abi.DFM_NEED_FT_STOP,
          "area": _abi.DFM_NEED_AREA, "dwell": _abi.DFM_NEED_DWELL}
 _INPUTS = (("fn", 1), ("vt", 2), ("ft_stop", 2), ("area", 1), ("dwell", 1))
+_GIVEN = ("n", "dt", "state", *NEEDS)  # to evaluate, beside the parameters
 _EvalFn = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p)
 _CheckFn = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t)
 _EntryFn = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32)
@@ -40,6 +43,11 @@ def _columns(address: int, columns: int, stride: int, n: int) -> np.ndarray:
     memory = (ctypes.c_double * (columns * stride)).from_address(address)
     whole: np.ndarray = np.frombuffer(memory, dtype=np.float64)  # type: ignore[call-overload]
     return whole.reshape(columns, stride)[:, :n]
+
+
+def _packed(address: int | None, width: int) -> np.ndarray:
+    """A copy of all parameters; the library has no address for none."""
+    return np.array((ctypes.c_double * width).from_address(address)) if address else np.zeros(0)
 
 
 class PythonLaw:
@@ -166,6 +174,7 @@ class PythonLaw:
         """Holds the law to the rules of `deform plugin check`, each in a process of its own: rows id, title,
         result ("pass", "fail", "skip"), detail. Rules about a compiled file (memory, symbols, static
         variables) are skipped. only: ids of rules. Takes half a minute."""
+        only = [only] if isinstance(only, str) else only
         wanted = [rule for rule in only or _RULES if rule not in _OF_THE_FILE]
         rows = [{"id": rule, "title": "", "result": "skip", "detail": "of a compiled file"}
                 for rule in _OF_THE_FILE if rule in (only or _RULES)]
@@ -187,12 +196,33 @@ class PythonLaw:
         return said["rules"] + [row for kind in said["types"] for row in kind["rules"]]
 
 
+_unraisable: Any = None
+
+
+def _catch_unraisable() -> None:
+    """Where the handler of a signal raises as a callback begins, before its `try`, ctypes gives the exception
+    to this hook alone."""
+    global _unraisable
+    if _unraisable is not None:
+        return
+    _unraisable = sys.unraisablehook
+
+    def hook(said: Any) -> None:
+        frame = said.exc_traceback and said.exc_traceback.tb_frame
+        if frame is None or frame.f_code not in (Bridge.evaluate.__code__, Bridge.refuse.__code__):
+            return _unraisable(said)
+        frame.f_locals["self"].error = said.exc_value
+        interrupt()
+    sys.unraisablehook = hook
+
+
 class Bridge:
     """C tables of a Python law, and the functions that the library calls."""
 
     def __init__(self, law: PythonLaw, name: str):
         self.law, self.id = law, name
         self.error: BaseException | None = None
+        _catch_unraisable()
         if not law.id or "." not in law.id:
             raise ArgumentError(f"a law needs an id in reverse-DNS form, such as 'com.example.tanh', not "
                                 f"'{law.id}'", "DFM_E_ARG")
@@ -200,6 +230,9 @@ class Bridge:
             if not isinstance(given, Parameter):
                 raise ArgumentError(f"{law.id}: parameters has {given!r}; expected rows "
                                     "deform.Parameter(key, label, unit, min, max, default)", "DFM_E_ARG")
+            if given.key in _GIVEN or not given.key.isidentifier():
+                raise ArgumentError(f"{law.id}: a parameter has the key '{given.key}'; expected a Python "
+                                    f"name that is none of {', '.join(_GIVEN)}", "DFM_E_ARG")
         rows = (_abi.dfm_param * max(len(law.parameters), 1))()
         for row, given in zip(rows, law.parameters):
             row.key, row.label, row.unit = (encoded(t) for t in (given.key, given.label, given.unit))
@@ -240,7 +273,7 @@ class Bridge:
             x = _abi.dfm_friction_in.from_address(given)
             out = _abi.dfm_friction_out.from_address(wanted)
             n, stride = x.n, x.stride
-            params = np.array((ctypes.c_double * max(self.law.width(), 1)).from_address(x.params))
+            params = _packed(x.params, self.law.width())
             inputs: dict[str, Any] = {}
             for key, columns in _INPUTS:
                 address = getattr(x, key)
@@ -261,10 +294,9 @@ class Bridge:
             self.error = self.error or raised
             return _abi.DFM_E_FATAL
 
-    def refuse(self, params: int, why: int, capacity: int) -> int:
+    def refuse(self, params: int | None, why: int, capacity: int) -> int:
         """dfm_friction.check."""
-        values = np.array((ctypes.c_double * max(self.law.width(), 1)).from_address(params))
-        status, sentence = self.checked(values)
+        status, sentence = self.checked(_packed(params, self.law.width()))
         if sentence and why and capacity:
             said = sentence[:capacity - 1] + b"\0"
             ctypes.memmove(why, said, len(said))
@@ -411,8 +443,10 @@ class Law:
         values = Params(params)
         packed = np.empty(sum(row.width for row in self.type.parameters))
         count = ctypes.c_uint32()
-        check(quick.dfm_law_pack(self.handle, ctypes.byref(values.struct), packed.size, packed.ctypes.data,
-                                 ctypes.byref(count)))
+        status = quick.dfm_law_pack(self.handle, ctypes.byref(values.struct), packed.size,
+                                    packed.ctypes.data, ctypes.byref(count))
+        if status < 0:
+            raise self._context.failed(status)
         slip, lane, dwelt = column(vt, 2, "vt"), column(area, 1, "area"), column(dwell, 1, "dwell")
         if ft_stop is None:
             speed = np.hypot(*slip)
@@ -434,13 +468,8 @@ class Law:
             setattr(wanted, key, array.ctypes.data)
         status = lib.dfm_law_eval(self.handle, ctypes.byref(given), ctypes.byref(wanted))
         if status != _abi.DFM_OK:
-            raised = self._context.raise_of_law()
-            if status < 0:
-                try:
-                    check(status)
-                except Error as failed:
-                    raise failed from raised
-            raise Error("the law gave a value that is not finite", "DFM_DISCARD") from raised
+            raise self._context.failed(status, None if status < 0 else
+                                       "the law gave a value that is not finite")
         return out
 
     def __repr__(self) -> str:

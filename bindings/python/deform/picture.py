@@ -5,6 +5,7 @@ import contextlib
 import ctypes
 import json
 import math
+import os
 import pathlib
 import struct
 import tempfile
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 _lock = threading.Lock()
 _module: Any = None
 _renderers: dict[tuple[int, int], int] = {}
+_forked = False  # from a process that has drawn
 _MODULE = "libdeform_python.so"
 _LARGEST = 8192   # pixels, of the renderer
 _THROUGH = 0.45   # of a contact patch that something hides
@@ -32,8 +34,21 @@ COLORS = {"speed": ("speed", "m/s"), "contact": ("contact force", "N"), "displac
           "stress": ("von Mises stress", "Pa")}
 
 
+def _forget() -> None:
+    """In a forked process: threads are the parent's, those of its driver and who holds the lock."""
+    global _lock, _forked
+    _lock, _forked = threading.Lock(), bool(_renderers)
+
+
+os.register_at_fork(after_in_child=_forget)
+
+
 def _native() -> Any:
     global _module
+    if _forked:
+        raise UnsupportedError("no pictures in a process forked from one that has drawn, whose driver it "
+                               "lacks; start it by 'spawn' (multiprocessing.get_context)",
+                               "DFM_E_UNSUPPORTED")
     if _module is None:
         path = PATH.resolve().parent / _MODULE
         if not path.exists():
@@ -194,7 +209,8 @@ def draw(surfaces: Iterable[tuple[Any, Any, Sequence[float], Any]], obstacles: I
          value_range: tuple[float, float], upright: Upright, t: float) -> Picture:
     """Draws surfaces (points [n,3] m, triangles [m,3], color [3], values [n] 0..1 or None) and obstacles,
     with a legend of what the values mean."""
-    key = width, height = int(size[0]), int(size[1])
+    across, down = vector(size, "size", 2)
+    key = width, height = int(across), int(down)
     if not (0 < width <= _LARGEST and 0 < height <= _LARGEST):
         raise ArgumentError(f"a picture of {width} x {height} pixels; 1 to {_LARGEST} each are allowed",
                             "DFM_E_ARG")
@@ -297,7 +313,7 @@ def ends(value_range: Sequence[float] | None, values: Iterable[np.ndarray | None
     """The values at the ends of the colors: those given, or 0 and the largest."""
     if value_range is None:
         return 0.0, max((float(v.max(initial=0)) for v in values if v is not None), default=0.0)
-    low, high = (float(value) for value in value_range)
+    low, high = vector(value_range, "color_range", 2)
     if not low < high:
         raise ArgumentError(f"color_range is {low:g} to {high:g}; the second value must be larger",
                             "DFM_E_ARG")

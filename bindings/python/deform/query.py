@@ -10,7 +10,7 @@ import numpy as np
 
 from . import _abi
 from ._context import choice
-from ._library import ArgumentError, check, default, encoded, lib, quick
+from ._library import ArgumentError, StateError, check, default, encoded, lib, quick
 from ._values import pose_of, real, vector, whole
 from .body import EVERYTHING, Body, Obstacle
 from .mesh import points_of
@@ -92,6 +92,17 @@ class Hit:
     point: np.ndarray
     normal: np.ndarray
     inside: bool = False
+
+
+class _Ended:
+    """Stands for the library's memory once the call of it is over."""
+
+    def __getattr__(self, _key: str) -> Any:
+        raise StateError("a ContactChoice is valid only during the call that gets it; keep the values that "
+                         "you need", "DFM_E_STATE")
+
+    def __setattr__(self, key: str, _value: Any) -> None:
+        getattr(self, key)
 
 
 class ContactChoice:
@@ -283,7 +294,7 @@ class Queries:
         A Shape.point meets surfaces alone: on a path it is a ray. each: all triangles of a thing, and where
         a ray leaves it, in place of its nearest hit. most: so many hits at most."""
         self.free()
-        query, capacity = _Query(self, filter), 16 if most is None else most
+        query, capacity = _Query(self, filter), 16 if most is None else whole(most, "most")
         if not isinstance(shape, Shape):
             raise TypeError(f"a query asks with a deform.Shape, not {shape!r}")
         struct = _abi.dfm_query_shape.from_buffer_copy(shape.struct)
@@ -415,8 +426,9 @@ class Queries:
         self.free()
 
         def call_host(_user: int, address: int) -> None:
-            self._call(lambda: function(  # type: ignore[misc]
-                ContactChoice(self, _abi.dfm_contact_choice.from_address(address))))
+            choice = ContactChoice(self, _abi.dfm_contact_choice.from_address(address))
+            self._call(function, choice)  # type: ignore[arg-type]
+            choice._of = _Ended()
         call = None if function is None else _PreSolveFn(call_host)
         check(quick.dfm_world_set_pre_solve(self.handle, ctypes.cast(call, ctypes.c_void_p) if call else None,
                                             None))

@@ -14,7 +14,7 @@ import numpy as np
 from ._context import choice
 from ._library import ArgumentError
 from ._command import command
-from ._values import json_of
+from ._values import json_of, read_json
 from .law import Law, PythonLaw
 
 INPUTS: dict[str, dict[str, Any]] = {
@@ -66,7 +66,7 @@ def friction(law: Any, kind: str | None = None, *, normal: float | None = None,
     elif params or input or kind or normal is not None:
         raise ArgumentError("a case holds its own input, params and normal force", "DFM_E_ARG")
     elif not isinstance(case, Mapping):
-        case = json.loads(pathlib.Path(case).read_text())
+        case = read_json(case)
     if step is None:
         slow = case.get("input", {}).get("kind") == "displacement_path"
         step = 1e-2 if slow else 1e-3 if isinstance(law, PythonLaw) else 1e-4
@@ -90,7 +90,7 @@ def plot_friction(law: Any, kind: str | None = None, *, path: Any = None, **opti
     rows = friction(law, kind, **options)
     case = options.get("case")
     if case is not None:
-        case = case if isinstance(case, Mapping) else json.loads(pathlib.Path(case).read_text())
+        case = case if isinstance(case, Mapping) else read_json(case)
         kind = case["input"]["kind"]
     kind = kind or "sine_velocity"
     panels = [pair for pair in _PANELS.get(kind, []) if pair[0] in rows and pair[1] in rows]

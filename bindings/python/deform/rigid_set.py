@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 
 from . import _abi
 from ._context import word
-from ._library import OfThisProcess, default, encoded, sized
-from ._values import pose_of, real, vector, whole
+from ._library import OfThisProcess, default, sized
+from ._values import name_or_none, pose_of, real, vector, whole
 
 if TYPE_CHECKING:
     from .world import World
@@ -50,7 +50,7 @@ class RigidDef:
     def struct(self, world: World) -> _abi.dfm_rigid_def:
         out = default(_abi.dfm_rigid_def)
         out.shape = word("shape", self.shape, {k: SHAPES[k] for k in ("sphere", "box", "capsule")})
-        out.name, out.fixed = encoded(self.name), self.fixed
+        out.name, out.fixed = name_or_none(self.name), self.fixed
         out.pose = pose_of(self.position, self.rotation)
         for key in ("mass", "radius", "half_length"):
             setattr(out, key, real(getattr(self, key), key))

@@ -14,7 +14,7 @@ from . import _abi
 from ._arrays import row_type
 from ._context import Context, default_context
 from ._library import ArgumentError, OfThisProcess, check, encoded, lib, quick, read_text, sized
-from ._values import json_of, real
+from ._values import KindError, json_of, real, whole
 from .picture import Picture, Solid, Upright, body_values, draw, ends, palette, scaled, solids, upright_of
 from .query import write_scene
 from .world import Trouble, World
@@ -55,10 +55,12 @@ class Scene(OfThisProcess):
                                 "pathlib.Path('scene.json').write_text(json.dumps(scene))", "DFM_E_ARG")
         if context is None:
             context = default_context() if threads == 1 else Context(threads)
+        if not isinstance(set or {}, Mapping):
+            raise KindError(f"set is {set!r}; expected a dict of values by JSON pointer", "DFM_E_ARG")
         words = [encoded(f"{pointer}={json_of(value)}") for pointer, value in (set or {}).items()]
         pointers = (ctypes.c_char_p * max(len(words), 1))(*words)
         options = _abi.dfm_scene_options(ctypes.sizeof(_abi.dfm_scene_options), len(words),
-                                         ctypes.addressof(pointers), jitter)
+                                         ctypes.addressof(pointers), whole(jitter, "jitter", bits=64))
         out, world = ctypes.c_uint64(), ctypes.c_uint64()
         check(lib.dfm_scene_open(context.address, encoded(path), ctypes.byref(options), ctypes.byref(out)))
         self.handle, self.path = out.value, str(path)

@@ -8,8 +8,8 @@ import numpy as np
 
 from . import _abi
 from ._context import choice, listed
-from ._library import ArgumentError, check, default, encoded, lib, quick, sized
-from ._values import pose_of, real, text, vector, whole
+from ._library import ArgumentError, check, default, lib, quick, sized
+from ._values import name_or_none, pose_of, real, text, vector, whole
 from .body import EVERYTHING, Body, Obstacle, handle_of
 from .cut import CUT_WAYS
 from .mesh import TriMesh, surface_of
@@ -192,7 +192,7 @@ class Tools:
         hand gets."""
         definition = default(_abi.dfm_tool_def)
         definition.shape = TOOL_SHAPES[choice("shape", shape, TOOL_SHAPES)]
-        definition.name = encoded(name)
+        definition.name = name_or_none(name)
         definition.pose = pose_of(position, rotation)
         definition.half_size = vector(half_size, "half_size")
         if radius is None:  # the library's default is for shapes that have one; a shaft is only on request

@@ -15,10 +15,9 @@ import numpy as np
 from . import _abi
 from ._arrays import Report, Rows
 from ._context import Context, Params, choice, default_context, listed, strings, word
-from ._library import (ArgumentError, BusyError, OfThisProcess, check, default, encoded, error, lib, quick,
-                       sized)
+from ._library import ArgumentError, BusyError, OfThisProcess, check, default, encoded, lib, quick, sized
 from ._signals import watch
-from ._values import array_of, pose_of, real, text, vector, whole
+from ._values import array_of, name_or_none, pose_of, real, text, vector, whole
 from .body import EVERYTHING, Body, Obstacle, Rigid, handle_of, held_bits, vector_keys
 from .mesh import TetMesh, TriMesh, cells_of, points_of, surface_of
 from .picture import Shown, Upright
@@ -58,7 +57,7 @@ def _side(given: Any) -> bytes:
     if not isinstance(name, str):
         raise ArgumentError("a side of a rule is a body, an obstacle, a tool, a material, or a text, not "
                             f"{given!r}", "DFM_E_ARG")
-    return name.encode()
+    return text(name, "a side of a rule")
 
 
 def _scaled(points: np.ndarray, scale: float) -> np.ndarray:
@@ -131,7 +130,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition = default(_abi.dfm_world_def)
         definition.gravity = vector(gravity, "gravity")
         definition.integrator = word("integrator", integrator, INTEGRATORS)
-        definition.step, definition.sleep = real(step, "step"), int(sleep)
+        definition.step, definition.sleep = real(step, "step"), bool(sleep)
         definition.self_contact = word("self_contact", self_contact, SELF_CONTACT)
         words = None if effects is None else strings(effects)
         definition.effects = None if words is None else ctypes.addressof(words)
@@ -223,7 +222,9 @@ class World(Queries, Reports, Tools, OfThisProcess):
     def call(self, function: Any, *arguments: Any) -> None:
         """Such a call; raises what its status means."""
         with self.alone():
-            check(function(*arguments))
+            status = function(*arguments)
+        if status < 0:
+            raise self.context.failed(status)
 
     def _created(self, function: Any, definition: Any) -> int:
         """The handle of what a function of the library makes in this world."""
@@ -231,18 +232,18 @@ class World(Queries, Reports, Tools, OfThisProcess):
         self.call(function, self.handle, ctypes.byref(definition), ctypes.byref(out))
         return out.value
 
-    def accept(self, status: int) -> int:
-        """Raises what a status means, a discarded call included; what a Python law has raised is its
-        cause."""
-        if status == _abi.DFM_OK:
+    def accept(self, status: int, by_law: BaseException | None = None) -> int:
+        """Raises what a status means, a discarded call included; by_law: what a Python law has raised, if it
+        was asked already."""
+        if status == _abi.DFM_OK and (by_law is None or isinstance(by_law, Exception)):
             return status
+        raised = self.context.failed(status, raised=by_law)
         own = self._take_raised()
         if own is not None:
             raise own
-        raised = error(status)
         if status == _abi.DFM_DISCARD:
             raised.trouble = Trouble(self._bits.value)  # type: ignore[attr-defined]
-        raise raised from self.context.raise_of_law()
+        raise raised
 
     # ---- contents --------------------------------------------------------------------------------------
 
@@ -254,7 +255,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition = default(_abi.dfm_material_def)
         self._check_entries(extra)
         values = Params(extra)
-        definition.name = encoded(name)
+        definition.name = name_or_none(name)
         for key, value in (("density", density), ("young", young), ("poisson", poisson),
                            ("damping_mass", damping_mass), ("damping_stiffness", damping_stiffness)):
             setattr(definition, key, real(value, f"{key} of a material"))
@@ -332,7 +333,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.points, definition.tets = x.ctypes.data, cells.ctypes.data
         usual = "msm" if definition.cell in (0, _abi.DFM_CELL_TET) else "corotational_fem"
         values = self.context.params("model", model or usual, params or {})
-        definition.name, definition.model = encoded(name), encoded(model)
+        definition.name, definition.model = name_or_none(name), encoded(model)
         definition.model_params = values.struct
         definition.material = self._material(material)
         definition.pose = pose_of(position, rotation)
@@ -364,8 +365,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
             keep.append(field)
         definition.nfield, definition.fields = len(fields or {}), ctypes.addressof(rows)
         definition.integrator = word("integrator", integrator, INTEGRATORS)
-        definition.mass_scaling = mass_scaling
-        definition.smooth = smooth
+        definition.mass_scaling = real(mass_scaling, "mass_scaling")
+        definition.smooth = real(smooth, "smooth")
         definition.category = whole(category, "category")
         definition.collides_with = whole(collides_with, "collides_with")
         return self._know(self._body(self._created(lib.dfm_body_create, definition)))
@@ -384,7 +385,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         velocity_surface: of a belt, [3] m/s."""
         definition = default(_abi.dfm_obstacle_def)
         definition.shape = word("shape", shape, SHAPES)
-        definition.name = encoded(name)
+        definition.name = name_or_none(name)
         if rotation is not None and normal is not None:
             raise ArgumentError("an obstacle is turned by rotation or by normal, not by both", "DFM_E_ARG")
         turned = _turn(normal) if normal is not None else rotation if rotation is not None else (0, 0, 0, 1)
@@ -497,7 +498,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         definition.between[:] = (ctypes.c_void_p * 2).from_buffer(between)[:]
         definition.law, definition.params = name.encode(), values.struct
         if restitution is not None:
-            definition.flags, definition.restitution = _abi.DFM_FRICTION_RESTITUTION, restitution
+            definition.flags = _abi.DFM_FRICTION_RESTITUTION
+            definition.restitution = real(restitution, "restitution")
         self.call(lib.dfm_world_add_friction, self.handle, ctypes.byref(definition))
 
     def set_friction(self, a: Any, b: Any, **params: Any) -> None:
@@ -538,10 +540,11 @@ class World(Queries, Reports, Tools, OfThisProcess):
             raise
         finally:
             self._busy = 0
-        if status:
-            if self._by_signal():  # whose handler has not raised
+        if status or self.context._laws:
+            by_law = self.context.raised_by_law()
+            if status and self._by_signal() and by_law is None:  # by a handler that has not raised
                 return self.step(seconds)
-            self.accept(status)
+            self.accept(status, by_law)
         if self._raised is not None:
             raise self._take_raised()  # type: ignore[misc]
         return Trouble(self._bits.value) if self._bits.value else _NO_TROUBLE
@@ -590,10 +593,12 @@ class World(Queries, Reports, Tools, OfThisProcess):
         except BaseException:  # raised by the handler of a signal
             self._stop = False
             raise
-        if status == _abi.DFM_DISCARD and self._stop:  # by a signal whose handler has not raised
+        by_law = self.context.raised_by_law() if status else None
+        if status == _abi.DFM_DISCARD and self._stop:  # by a signal
             self._stop = False
-            return self.equilibrium(load_steps, load_from=load_from, load_to=load_to, time=time)
-        self.accept(status)
+            if by_law is None:  # and a handler that has not raised
+                return self.equilibrium(load_steps, load_from=load_from, load_to=load_to, time=time)
+        self.accept(status, by_law)
 
     def interrupt(self) -> None:
         """Asks the step that runs in another thread to stop; it raises Discarded there. Any thread."""

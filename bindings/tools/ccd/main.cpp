@@ -214,6 +214,7 @@ int ccd(const CcdOptions &options, const Globals &globals) {
     throw Failure(kBadInput, "--root is \"" + options.root +
                                  "\", expected bisection, regula_falsi, brent or conservative" +
                                  did_you_mean(options.root, kRoots));
+  if (!options.csv.empty()) refuse_same("--csv", options.csv, options.file);
   const QueryFile file(options.file);
   std::string rows = "id,hit,t,evaluations\n";
   const Tally tally = run_queries(options, file.queries(), rows);

@@ -19,6 +19,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "progress.h"
+#include "scene_file.h"
 #include "run_folder.h"
 #include "system.h"
 
@@ -51,12 +52,10 @@ double hardware_of(dfm_context *context, const std::string &model) {
       [](void *user, const dfm_type *type, const char *) {
         Requests &of = *static_cast<Requests *>(user);
         if (type->kind != DFM_KIND_MODEL || *of.id != type->id) return;
-        for (uint32_t i = 0; i < type->nparam; ++i) {
-          const auto *const row = reinterpret_cast<const dfm_param *>(
-              reinterpret_cast<const char *>(type->params) + size_t(i) * type->param_size);
-          if (std::string_view(row->key) != "device" || !row->names) continue;
-          for (int k = 0; row->names[k]; ++k)
-            if (std::string_view(row->names[k]) == "hardware") of.found = k;
+        for (const dfm_param &row : params_of(*type)) {
+          if (std::string_view(row.key) != "device" || !row.names) continue;
+          for (int k = 0; row.names[k]; ++k)
+            if (std::string_view(row.names[k]) == "hardware") of.found = k;
         }
       },
       &requested));
@@ -111,12 +110,8 @@ class Bar {
   }
   // s, what the step is proven for; the plan has the part that is used (doc/concepts/step.md)
   double bound() const {
-    size_t bytes = 0;
-    need(dfm_world_explain(world_, nullptr, &bytes));
-    std::string text(bytes, '\0');
-    need(dfm_world_explain(world_, text.data(), &bytes));
     JsonValue plan;
-    const bool good = parse_json(text.substr(0, text.find('\0')), plan);
+    const bool good = parse_json(explain_text(world_), plan);
     const JsonValue *const step = good ? plan.find("step") : nullptr;
     if (!step) throw Failure(kBadInput, "the plan of a bar has no step");
     return step->scalar("stable_s") / kUsed;

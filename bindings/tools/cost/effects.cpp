@@ -13,6 +13,7 @@
 #include "json_text.h"
 #include "messages.h"
 #include "progress.h"
+#include "state_file.h"
 
 namespace cli {
 namespace {
@@ -29,13 +30,8 @@ double processor_time() { return double(std::clock()) / CLOCKS_PER_SEC; }
 // A world that starts again and again from where it was.
 class Course {
  public:
-  Course(const SceneFile &scene, double step) : world_(scene.world()), step_(step) {
-    size_t bytes = 0;
-    need(dfm_world_snapshot(world_, nullptr, &bytes));
-    start_.resize(bytes);
-    need(dfm_world_snapshot(world_, start_.data(), &bytes));
-    start_.resize(bytes);
-  }
+  Course(const SceneFile &scene, double step)
+      : world_(scene.world()), step_(step), start_(snapshot_of(world_)) {}
   // s for n steps from the start
   double run(unsigned n) {
     need(dfm_world_restore(world_, start_.data(), start_.size()));
@@ -51,7 +47,7 @@ class Course {
  private:
   dfm_world world_;
   double step_;
-  std::vector<char> start_;
+  std::string start_;
 };
 
 bool works(const JsonValue &plan, const std::string &body, const std::string &effect) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 #include <thread>
 
@@ -40,12 +39,9 @@ std::vector<std::string> split(const std::vector<std::string> &lists) {
 
 int cost_of(CostOptions options, Globals &globals) {
   if (options.out.empty()) options.out = out_folder(options.scene, "cost");
-  std::error_code absent;
-  if (std::filesystem::equivalent(path_of(options.apply), path_of(options.scene), absent))
-    return fail("--apply " + options.apply + ": this is the scene itself; give another name");
+  if (!options.apply.empty()) refuse_same("--apply", options.apply, options.scene);
   options.study.axes = split(options.study.axes);
   const cost::Subject subject = cost::read_subject(options.scene, globals);
-  make_folder(options.out);
   const std::string cells_stay = cost::why_cells_stay(subject);
   cost::Study study;
   {

@@ -78,8 +78,8 @@ void read_bodies(const Table &bodies, Quantities &out) {
     const double sum = bodies.number(row, "kinetic_J") + bodies.number(row, "elastic_J");
     energy.try_emplace(t, 0).first->second += sum;
   }
-  Quantity &all = of(out, "energy", "energy", "J", 1);
   for (const auto &[t, joules] : energy) {
+    Quantity &all = of(out, "energy", "energy", "J", 1);
     all.t.push_back(t);
     all.values.push_back(joules);
   }

@@ -467,7 +467,7 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
   out.add("runs_started", std::to_string(study.started));
   JsonValue whole;
   parse_json(out.text(), whole);
-  return json_lines(whole);
+  return as_utf8(json_lines(whole));
 }
 
 }  // namespace cli::cost

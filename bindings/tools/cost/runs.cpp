@@ -102,7 +102,8 @@ double Outcome::predicted(double duration) const {
 }
 
 Runs::Runs(const Subject &subject, const std::string &out, unsigned parallel, double budget, bool progress)
-    : subject_(subject),
+    : held_(out),
+      subject_(subject),
       out_(out),
       parallel_(parallel),
       budget_(budget),
@@ -279,7 +280,8 @@ void Runs::take_result(Child &child, int status) {
     o.state = Outcome::refused;
     if (o.sentence.empty()) o.sentence = "the run ended with code " + std::to_string(code);
   }
-  store(job);
+  // What somebody else has killed says nothing of the choice: a later call makes it again.
+  if (child.notified || (code != 128 + SIGKILL && code != 128 + SIGTERM && code != kInterrupted)) store(job);
   ++done_;
 }
 

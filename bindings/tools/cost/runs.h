@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "choice.h"
+#include "run_folder.h"
 
 namespace cli::cost {
 
@@ -75,6 +76,7 @@ class Runs {
   void keep_spent() const;
   void show(size_t running, size_t waiting);
 
+  HeldFolder held_;
   const Subject &subject_;
   std::string out_;
   unsigned parallel_, started_ = 0;

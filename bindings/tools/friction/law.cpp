@@ -23,11 +23,8 @@ std::string short_name(const std::string &law) {
 bool shipped(const dfm_type &type) { return std::strncmp(type.id, "org.deform.", 11) == 0; }
 
 const dfm_param *row_of(const dfm_type &type, const std::string &key) {
-  for (uint32_t i = 0; i < type.nparam; ++i) {
-    const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type.params) +
-                                                          size_t(i) * type.param_size);
-    if (key == row->key) return row;
-  }
+  for (const dfm_param &row : params_of(type))
+    if (key == row.key) return &row;
   return nullptr;
 }
 
@@ -37,11 +34,8 @@ class Filler {
   Filler(const FrictionCase &rig, const dfm_type &type, double fn) : rig_(rig), type_(type), fn_(fn) {}
 
   void fill() {
-    for (uint32_t i = 0; i < type_.nparam; ++i) {
-      const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_.params) +
-                                                            size_t(i) * type_.param_size);
-      if (const CaseParam *p = rig_.param(row->key)) take(*row, *p);
-    }
+    for (const dfm_param &row : params_of(type_))
+      if (const CaseParam *p = rig_.param(row.key)) take(row, *p);
     level("mu_C", {"F_C"});
     level("mu_S", {"F_S", "F_C"});
     if (!row_of(type_, "mu_C")) level("mu", {"F_C"});
@@ -177,10 +171,7 @@ void RigLaw::fill_params(const FrictionCase &rig) {
 
 void RigLaw::warn_of(const FrictionCase &rig, const std::vector<std::string> &used) const {
   std::vector<std::string> names = kCaseKeys;
-  for (uint32_t i = 0; i < type_->nparam; ++i)
-    names.push_back(reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_->params) +
-                                                        size_t(i) * type_->param_size)
-                        ->key);
+  for (const dfm_param &row : params_of(*type_)) names.push_back(row.key);
   std::string lacks;
   for (const CaseParam &p : rig.params) {
     if (std::find(used.begin(), used.end(), p.key) != used.end()) continue;
@@ -197,11 +188,9 @@ void RigLaw::warn_of(const FrictionCase &rig, const std::vector<std::string> &us
 
 double RigLaw::param(const std::string &key, double otherwise, uint32_t at) const {
   size_t offset = 0;
-  for (uint32_t i = 0; i < type_->nparam; ++i) {
-    const auto *row = reinterpret_cast<const dfm_param *>(reinterpret_cast<const char *>(type_->params) +
-                                                          size_t(i) * type_->param_size);
-    if (key == row->key && at < row->width) return params_[offset + at];
-    offset += row->width;
+  for (const dfm_param &row : params_of(*type_)) {
+    if (key == row.key && at < row.width) return params_[offset + at];
+    offset += row.width;
   }
   return otherwise;
 }

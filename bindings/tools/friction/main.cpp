@@ -16,6 +16,7 @@
 #include "rig.h"
 #include "json_text.h"
 #include "messages.h"
+#include "system.h"
 
 namespace cli {
 namespace {
@@ -63,7 +64,7 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
     for (const std::string &w : warnings()) said.push_back(quoted(w));
     out.add("warnings", json_array(said));
     if (!result.stopped.empty()) out.add("stopped", quoted(result.stopped));
-    std::fputs(indented(out.text()).c_str(), stdout);
+    std::fputs(as_utf8(indented(out.text())).c_str(), stdout);
   } else if (!globals.quiet) {
     std::printf(
         "%s\n  law          %s\n  drive        %s\n  steps        %llu of at most %g s, %.2f evaluations "
@@ -86,9 +87,10 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
 // Without matplotlib the rows are kept beside where the picture would be.
 void picture(const FrictionOptions &options, const FrictionCase &rig, const RigLaw &law,
              const std::string &rows) {
-  const std::string beside = std::filesystem::path(options.plot).replace_extension(".csv").string();
+  const std::string beside = name_of(path_of(options.plot).replace_extension(".csv"));
   const std::string kept = options.csv.empty() ? beside : options.csv;
-  const std::string csv = options.csv.empty() ? options.plot + ".rows" : options.csv;
+  const std::string csv =
+      options.csv.empty() ? options.plot + ".rows" + std::to_string(getpid()) : options.csv;
   if (options.csv.empty()) write_whole(csv, rows);
   bool made = false;
   try {
@@ -100,6 +102,11 @@ void picture(const FrictionOptions &options, const FrictionCase &rig, const RigL
   }
   if (options.csv.empty()) std::remove(csv.c_str());
   if (made) return;
+  if (options.csv.empty() && std::filesystem::exists(path_of(beside)) &&
+      !holds(beside, rows.substr(0, rows.find('\n'))))
+    throw Failure(kBadInput, beside +
+                                 ": the rows would go here, for want of a python3 with matplotlib, and the "
+                                 "file is there; give --csv");
   if (options.csv.empty()) write_whole(kept, rows);
   warn(
       "no picture: no python3 with matplotlib was found; install it (Debian: python3-matplotlib) or name one "
@@ -110,6 +117,9 @@ void picture(const FrictionOptions &options, const FrictionCase &rig, const RigL
 int friction(const FrictionOptions &options, const Globals &globals) {
   if (!(options.step > 0) || !std::isfinite(options.step))
     throw Failure(kBadInput, "--step is not above 0, expected the longest step in s");
+  if (!options.csv.empty()) refuse_same("--csv", options.csv, options.file);
+  if (!options.plot.empty() && path_of(options.plot).extension() != ".png")
+    throw Failure(kBadInput, "--plot " + options.plot + ": the name of a picture must end in .png");
   const FrictionCase rig = read_case(options.file);
   RigLaw law(globals, rig, options.law);
   RigResult result;

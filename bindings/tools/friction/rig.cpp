@@ -278,6 +278,9 @@ class Rig {
     restart();
     const double end = case_.times.back();
     refuse_too_many(end / step_);
+    if (case_.drive == Drive::velocity && !(in("freq") * step_ <= 0.5))
+      throw Failure(kBadInput, case_.file + ": /input/freq: half a cycle is shorter than the step of " +
+                                   short_text(step_) + " s; reduce \"freq\", which is in Hz, or --step");
     const bool turns = case_.drive == Drive::circle || case_.drive == Drive::turn;
     const auto force_now = [&] { return (turns ? plane_length(fx_, fy_) : fx_) + 0.0; };
     const auto speed_now = [&] { return plane_length(v_.vx, v_.vy); };

@@ -1,6 +1,8 @@
 // deform-rollback, which `deform rollback SCENE.json` starts: `deform run` by the collision solution of
 // Zerbato (2010), for comparison.
+#include <cstring>
 #include <memory>
+#include <string>
 
 #include "arguments.h"
 #include "become.h"
@@ -17,8 +19,14 @@ void add_rollback(Command app, Globals &globals, int *exit_code) {
   add_run_options(sub, *options);
   sub.calls([=, &globals] {
     RunOptions run = *options;
-    run.set.insert(run.set.end(),
-                   {"/time/mode=dynamic", "/time/integrator=symplectic_euler", "/contact/guard=false"});
+    for (const char *const own :
+         {"/time/mode=dynamic", "/time/integrator=symplectic_euler", "/contact/guard=false"}) {
+      const std::string pointer(own, std::strchr(own, '=') + 1);
+      for (const std::string &set : options->set)
+        if (set.starts_with(pointer))
+          throw Failure(kBadInput, "--set " + set + ": the collision solution needs " + own + "; omit it");
+      run.set.push_back(own);
+    }
     dfm::rollback::Scheme scheme;
     run.step = [&scheme](dfm_world world, double dt, uint32_t *trouble) {
       const dfm_status status = scheme.step(world, dt, trouble);

@@ -287,6 +287,12 @@ void Loader::add_bundled() {
   }
 }
 
+bool is_bundled(const std::string &file) {
+  return std::ranges::any_of(static_plugins(), [&](const StaticPlugin &plugin) {
+    return file == "static:" + std::string(plugin.name);
+  });
+}
+
 void Loader::discover() {
   const char *const variable = "DEFORM_PLUGIN_PATH";
   const std::optional<std::string> path = os::trusted_environment(variable);

@@ -29,6 +29,8 @@ class SharedObject {
 // Directory of the plugins of this library (build tree or relocated installation), else the configured one;
 // empty if the plugins are linked into the library.
 std::string default_plugin_directory();
+// "static:NAME" of a plugin that is linked into this library (loader.cpp).
+bool is_bundled(const std::string &file);
 
 // Of the system: shared_object_posix.cpp, shared_object_windows.cpp. The file of this library, or of the
 // program that it is linked into; empty: unknown.

@@ -487,10 +487,15 @@ void note_omissions(SceneWriter &to) {
         Used &u = *static_cast<Used *>(user);
         const std::string path = file ? file : "";
         if (path.empty() || !u.ids.count(type->id)) return;
-        if (path.rfind("static:", 0) == 0 ? path.rfind("static:host", 0) != 0
-                                          : path_of(path).parent_path() == path_of(u.shipped))
-          return;
-        if (u.noted.insert(type->id).second)
+        const bool registered = path.rfind("static:", 0) == 0;
+        if (registered ? is_bundled(path) : path_of(path).parent_path() == path_of(u.shipped)) return;
+        if (!u.noted.insert(type->id).second) return;
+        if (registered)
+          u.to->remark(
+              format("'%s' is registered by this program: to run the scene, name the folder of a "
+                     "plugin that offers it in DEFORM_PLUGIN_PATH",
+                     type->id));
+        else
           u.to->remark(
               format("'%s' comes from %s, which must be loaded to run the scene: name its folder in "
                      "DEFORM_PLUGIN_PATH",

@@ -20,6 +20,7 @@ import time
 from typing import Any, Mapping, Sequence
 
 from .._library import FileError, command_path
+from .._values import read_json
 from .tables import finite, read_csv
 
 FOLDER = "deform-study-"
@@ -216,7 +217,7 @@ class Engine:
 
     def _rig(self, folder: pathlib.Path, file: str, values: Mapping[str, Any], limit: float) -> Results:
         folder.mkdir()
-        case = json.loads(pathlib.Path(file).read_text())
+        case = read_json(file)
         for pointer, value in values.items():
             try:
                 _set(case, pointer, value)

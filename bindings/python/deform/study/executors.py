@@ -122,6 +122,12 @@ EXECUTORS = ("local", "dask")
 def executor(name: str, workers: int | None = None, address: str = "") -> Local | Dask:
     if workers is not None and workers < 1:
         raise ArgumentError(f"workers is {workers}; it must be 1 or more", "DFM_E_ARG")
+    if address and name != "dask":
+        raise ArgumentError("address is of the executor dask: give that one, too, or omit address",
+                            "DFM_E_ARG")
+    if address and workers is not None:
+        raise ArgumentError("the scheduler at address has its own workers: omit workers, or address",
+                            "DFM_E_ARG")
     if name == "local":
         return Local(workers)
     if name == "dask":

@@ -11,6 +11,7 @@ import numpy as np
 
 from .._command import Table
 from .._library import ArgumentError, Error, UnsupportedError, write_whole
+from .._values import finite_or_none
 from . import plots
 from .engine import Failed
 from .executors import Dask, Local, executor as named_executor
@@ -52,7 +53,7 @@ class Fit(Table):
                   "curves": [{key: value.tolist() if isinstance(value, np.ndarray) else value
                               for key, value in curve.items()} for curve in self.curves]}
         written = [self.folder / "fit.json", self.folder / "fit.html"]
-        write_whole(written[0], (json.dumps(_finite(report), indent=1) + "\n").encode())
+        write_whole(written[0], (json.dumps(finite_or_none(report), indent=1) + "\n").encode())
         sentences, figures = list(self.notes), {}
         try:
             figures["fit"] = plots.png(self.figure())
@@ -63,15 +64,6 @@ class Fit(Table):
         write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures,
                                      [table(self, self.columns, {})]))
         return written
-
-
-def _finite(value: Any) -> Any:
-    """JSON has no other numbers."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_finite(item) for item in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 class Spent(Exception):

@@ -28,4 +28,5 @@ def page(title: str, sentences: Sequence[str], figures: Mapping[str, bytes], tab
     drawn = "".join(f'<p><img alt="{escape(name)}" src="data:image/png;base64,'
                     f'{base64.b64encode(data).decode()}"></p>' for name, data in figures.items())
     return (f'<!doctype html><html lang="en"><meta charset="utf-8"><title>{escape(title)}</title>'
-            f'<style>{STYLE}</style><h1>{escape(title)}</h1>{said}{drawn}{"".join(tables)}</html>\n').encode()
+            f'<style>{STYLE}</style><h1>{escape(title)}</h1>{said}{drawn}{"".join(tables)}</html>\n').encode(
+                errors="replace")

@@ -8,6 +8,7 @@ import json
 import math
 import os.path
 import pathlib
+import sys
 from dataclasses import dataclass, field
 from typing import Any, Callable, Iterable, Mapping
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from .._context import Context
 from .._library import PATH, FileError, FormatError, command_path
-from .._values import json_of
+from .._values import json_of, read_json
 from .tables import finite, read_csv
 
 TABLES = {"bodies", "contacts", "probes", "attachments", "sensors", "tools", "rows"}
@@ -59,7 +60,7 @@ class Place:
             return default
         at = self.of(key)
         if isinstance(at.value, bool) or not isinstance(at.value, (int, float)) or not (
-                above < at.value < math.inf):
+                max(above, -sys.float_info.max) <= at.value <= sys.float_info.max) or at.value == above:
             of = "" if above == -math.inf else f" above {above:g}"
             raise at.fail(f"expected a number{of}, found {json.dumps(at.value)}")
         return float(at.value)
@@ -230,7 +231,7 @@ class Study:
         """Of each point: the same as long as its results would be, which depend on its values and on library,
         files, fixed values and what is read of a run."""
         of_file = functools.lru_cache(maxsize=None)(_of_file)  # the points of a study name the same few
-        inputs = [(of_file(file), _of_named(json.loads(pathlib.Path(file).read_text()), file, of_file), fixed,
+        inputs = [(of_file(file), _of_named(read_json(file), file, of_file), fixed,
                    _of_named(fixed, file, of_file)) for file, fixed in self.runs]
         digest = _of_json([_built(), self.kind, inputs, list(self.quantities.items())])
         keys = []
@@ -272,7 +273,10 @@ def _input(at: Place, folder: pathlib.Path) -> tuple[str, str]:
     kind = "scene" if at.has("scene") else "rig"
     path = (folder / at.text(kind)).absolute()  # a worker may run in another folder
     try:
-        json.loads(path.read_text())
+        str(path).encode()
+        read_json(path)
+    except UnicodeEncodeError:  # workers get it as JSON
+        raise at.of(kind).fail("the path of this file is not UTF-8; rename it or its folder") from None
     except OSError as error:
         raise at.of(kind).fail(f"{path}: cannot be opened: {error.strerror}") from None
     except ValueError as error:
@@ -321,7 +325,9 @@ def read_residual(at: Place, run: int, folder: pathlib.Path) -> Residual:
     at.keys(at.value, ["table", "column"])
     read = {**_column(at), "against": at.text("against", "t")}
     columns = at.list("columns", 2) if at.has("columns") else [read["against"], read["column"]]
-    x, y = read_columns(folder / at.text("measured"), columns[:2], at.of("measured"))
+    if len(columns) > 2 or not all(isinstance(name, str) for name in columns):
+        raise at.of("columns").fail(f"expected two names of columns, found {json.dumps(columns)}")
+    x, y = read_columns(folder / at.text("measured"), columns, at.of("measured"))
     if not np.all(np.diff(x) > 0):
         raise at.of("measured").fail(f'column "{columns[0]}" must increase from row to row')
     return Residual(at.text("name", read["column"]), run, read, x, y, np.full(len(y), sigma), unit,
@@ -335,13 +341,15 @@ def read_study(source: Any) -> Study:
     else:
         file = str(source)
         try:
-            value = json.loads(pathlib.Path(source).read_text())
+            value = read_json(source)
         except OSError as error:
             raise FileError(f"{file}: cannot be opened: {error.strerror}", "DFM_E_IO") from None
         except ValueError as error:
             raise FormatError(f"{file}: is not JSON: {error}", "DFM_E_FORMAT") from None
         folder = pathlib.Path(source).parent
     at = Place(value, file)
+    if isinstance(value, Mapping) and value.get("format") == "deform-scene":
+        raise at.fail('this is a scene; a study names one: {"scene": "FILE.json", "parameters": ...}')
     at.keys(["format", "version", "about", "scene", "rig", "set", "design", "parameters", "quantities",
              "residuals", "optimizer", "confidence", "limit_s"], ["parameters"])
     if at.text("format", "deform-study") != "deform-study" or at.whole("version", 1) != 1:
@@ -379,10 +387,17 @@ def read_study(source: Any) -> Study:
             runs.append(run)
         residuals.append(read_residual(place, runs.index(run), folder))
     design = at.of("design") if at.has("design") else Place({}, file, "/design")
-    design.keys(["method", "runs", "seed"])
-    method = design.text("method", "grid", ("grid", "list", "random", "latin_hypercube", "sobol"))
+    method = design.keys(["method", "runs", "seed"]).text(
+        "method", "grid", ("grid", "list", "random", "latin_hypercube", "sobol"))
+    if method in ("grid", "list"):
+        design.keys(["method"])
+    elif counted := [name for name in of.value if of.of(name).has("count")]:
+        raise of.of(counted[0]).fail(f'"count" is of the designs grid and list; {method} has "runs"')
     optimizer = at.of("optimizer") if at.has("optimizer") else Place({}, file, "/optimizer")
     optimizer.keys(["method", "step", "evaluations", "seed"])
+    search = optimizer.text("method", "least_squares", ("least_squares", "differential_evolution", "cma"))
+    if search == "least_squares":
+        optimizer.keys(["method", "step", "evaluations"])
     confidence = at.number("confidence", 0.95, 0)
     if confidence >= 1:
         raise at.of("confidence").fail(f"expected a number between 0 and 1, found {confidence:g}")
@@ -390,9 +405,6 @@ def read_study(source: Any) -> Study:
                  {"method": method, "runs": design.whole("runs", 0, 0),
                   "seed": design.whole("seed", 0, 0), "place": design},
                  residuals,
-                 {"method": optimizer.text("method", "least_squares",
-                                           ("least_squares", "differential_evolution", "cma")),
-                  "step": optimizer.number("step", 0.01, 1e-12),
-                  "evaluations": optimizer.whole("evaluations", 0, 0),
-                  "seed": optimizer.whole("seed", 0, 0)},
+                 {"method": search, "step": optimizer.number("step", 0.01, 1e-12),
+                  "evaluations": optimizer.whole("evaluations", 0, 0), "seed": optimizer.whole("seed", 0, 0)},
                  confidence, at.number("limit_s", 0.0, 0))
