@@ -131,7 +131,7 @@ void changing(Stream &s, World &w) {
     s.many(set->state);
     s.many(set->extra);
     s.many(set->total);
-    s.one(set->last_h);
+    s.many(set->wrench);
   }
   for (auto *const store : {&w.store, &w.tool_store}) {
     s.one(store->n);
