@@ -55,7 +55,7 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
   size_t own = 0;
   while (own + 1 < keys.size() && b.composition.materials[own].name != b.material) ++own;
   if (b.composition.materials[own].name == b.material) out["material"] = keys[own];
-  else if (!b.material.empty()) out["material"] = to.material(b.material, kDefaultFriction);
+  else if (!b.material.empty()) out["material"] = to.material(b.material, std::nullopt);
   if (out["material"].is_null() || out["material"] == "") out.erase("material");
   for (uint32_t t = 0; t < ntet; ++t) {
     const size_t m = b.composition.of.empty() ? 0 : b.composition.of[t];
