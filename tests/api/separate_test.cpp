@@ -3,6 +3,7 @@
 #include <map>
 
 #include "cut_scenes.h"
+#include "logged_context.h"
 
 namespace {
 
@@ -324,6 +325,21 @@ TEST(Separate, Crumbs_StayOrGoAsRequested) {
     }
     steps(s.w, 20);
   }
+}
+
+TEST(Separate, Log_CountsThePartsThatGo) {
+  test::LoggedContext context;
+  uint32_t loaded = 0;
+  test::ok(dfm_plugin_scan(context.context, DEFORM_PLUGIN_DIR, &loaded));
+  const dfm_world w = test::make_world(context.context, {0, 0, 0});
+  const dfm_body b = cube(context.context, w, "corotational_fem");
+  dfm_separate_def d = dfm_separate_def_default();
+  d.least_cells = 1000;
+  d.crumbs = DFM_CRUMBS_REMOVE;
+  test::ok(dfm_body_set_separate(b, &d));
+  cut(b, plane(0, 0.008, DFM_CUT_SPLIT));
+  EXPECT_NE(context.log.find(": 1 part of fewer than 1000 cells have been removed"), std::string::npos)
+      << context.log;
 }
 
 namespace {

@@ -370,9 +370,9 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
   gather_surface(out.surface, out.p.x.data(), out.p.v.data());
   return put(b, std::move(shape), [&](const BodyShape &had) {
     const BodyShape &before = &like == &b ? had : like;
-    ModelOrigin origin = before.origin;
-    origin.held.assign(b.p.n, 0);
-    make_model_again(b, before, std::move(origin));
+    b.model.type = before.model.type;
+    b.origin = before.origin;
+    b.origin.held.assign(b.p.n, 0);
   });
 }
 

@@ -33,7 +33,7 @@ struct Parts {
   Array<uint32_t> of;           // [ncell]
   std::vector<uint32_t> cells;  // by part
   std::vector<uint32_t> to;     // by part: number of its piece, kStays or kGoes
-  uint32_t n = 0, pieces = 0;
+  uint32_t n = 0, pieces = 0, heaviest = 0;
 };
 
 // Two parts with an open face between them; away2: 9 times the square of the distance of its sides now, m2.
@@ -64,9 +64,9 @@ std::vector<Opened> opened_between(const Body &b, const Array<uint32_t> &part) {
 // Crumbs that stay go with the part that lies nearest to them, across open faces, one by one from the
 // smallest distance on. What lies in the teeth of a part would otherwise be of another body than they are: it
 // would cross them, and contact of the two whole bodies would be off until they are apart.
-void lead_crumbs(const Body &b, const SeparateRule &rule, size_t heaviest, Parts &parts) {
+void lead_crumbs(const Body &b, const SeparateRule &rule, Parts &parts) {
   DisjointSets sets(b.world->memory(), parts.n);
-  const auto leads = [&](uint32_t i) { return i == heaviest || parts.cells[i] >= rule.least; };
+  const auto leads = [&](uint32_t i) { return i == parts.heaviest || parts.cells[i] >= rule.least; };
   for (const Opened &face : opened_between(b, parts.of)) {
     const uint32_t i = sets.root(face.a), j = sets.root(face.b);
     if (i == j || (leads(i) && leads(j))) continue;
@@ -92,12 +92,12 @@ Parts parts_of(const Body &b, const SeparateRule &rule) {
       if (!std::exchange(weighed[p], uint8_t{1})) mass[out.of[c]] += b.p.mass[p];
     }
   }
-  const size_t heaviest = size_t(std::max_element(mass.begin(), mass.end()) - mass.begin());
+  out.heaviest = uint32_t(std::max_element(mass.begin(), mass.end()) - mass.begin());
   for (uint32_t i = 0; i < out.n; ++i) {
     const bool small = out.cells[i] < rule.least;
-    out.to.push_back(i == heaviest ? kStays : !small ? out.pieces++ : rule.removes ? kGoes : kStays);
+    out.to.push_back(i == out.heaviest ? kStays : !small ? out.pieces++ : rule.removes ? kGoes : kStays);
   }
-  if (!rule.removes && out.pieces > 0) lead_crumbs(b, rule, heaviest, out);
+  if (!rule.removes && out.pieces > 0) lead_crumbs(b, rule, out);
   return out;
 }
 
@@ -149,7 +149,7 @@ void report_removed(const Body &b, const Parts &parts, CutReport &out) {
 
 void log_small_parts(const Body &b, const SeparateRule &rule, const Parts &parts) {
   uint32_t n = 0;
-  for (const uint32_t cells : parts.cells) n += cells < rule.least;
+  for (uint32_t i = 0; i < parts.n; ++i) n += i != parts.heaviest && parts.cells[i] < rule.least;
   if (n == 0) return;
   b.world->context->logf(DFM_LOG_INFO, "body '%s': %u %s of fewer than %u cells %s", b.name.c_str(), n,
                          n == 1 ? "part" : "parts", rule.least,

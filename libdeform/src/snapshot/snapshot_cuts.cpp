@@ -210,7 +210,7 @@ void SnapshotShapes::put(Body &b, CutRow *row) {
   undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
   if (row && row->piece_of != b.piece_of) refuse(b, "a piece: expected it of another body");
   set_place(w_, b, emptied, false);
-  if ((emptied && b.dynamics) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
+  if ((emptied && b.p.n > 0) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
   Body &like = whole_body(b);
   if (!like.surface.identity()) refuse(b, "cells left: expected a body that cells can be cut from");
   const std::shared_ptr<const WholeBody> whole = whole_of(like);

@@ -242,12 +242,13 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
   });
 }
 
-// Whether the body has the same model, with the same inputs, as in the snapshot.
+// Whether the body has the same model, with the same inputs, as in the snapshot; none has it whose cells the
+// restore has put.
 template <class B>
 bool made_alike(B &b, const Body &like) {
   const ModelOrigin &mine = b.origin, &other = like.origin;
   const auto bits = [](const Pose &a, const Pose &c) { return std::memcmp(&a, &c, sizeof a) == 0; };
-  return id_of(b.model) == like.model.type->id && mine.params == other.params &&
+  return like.dynamics && id_of(b.model) == like.model.type->id && mine.params == other.params &&
          bits(mine.frame, other.frame) && mine.integrator == other.integrator && mine.held == other.held &&
          b.integrator.used == like.integrator.used;
 }
