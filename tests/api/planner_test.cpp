@@ -353,7 +353,8 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
   const std::string none = folder() + "/none.json";
   for (const char *const key : {R"("accuracy": {"target": 0.1})", R"("budget": {"ms_per_step": 1})"}) {
     test::write_file(none, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1},
-      "obstacles": [{"name": "floor", "shape": "plane"}], )" + std::string(key) + "}");
+      "obstacles": [{"name": "floor", "shape": "plane"}], )" +
+                               std::string(key) + "}");
     expect_refused(none, {"there is no body to plan for"});
   }
   const std::string two = folder() + "/two.json";

@@ -259,22 +259,27 @@ void separate_what_waits(World &w) {
 }
 
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name) {
-  auto at = std::find_if(w.rolled_back.begin(), w.rolled_back.end(), [&](auto &p) { return p->id >= id; });
-  if (at == w.rolled_back.end() || (*at)->id != id) {
+  const uint64_t whole = of.piece_of ? of.piece_of : of.id;
+  const auto is_it = [&](const auto &p) { return p->piece_of == whole && p->name == name; };
+  auto at = std::ranges::find_if(w.rolled_back, is_it);
+  if (at == w.rolled_back.end()) {
     auto fresh = std::make_unique<Body>();
     fresh->world = &w;
-    fresh->id = id;
     fresh->rolled_back = true;
     fresh->handle = handle_create(Kind::body, fresh.get());
     at = w.rolled_back.insert(at, std::move(fresh));  // there is room
   }
   Body &b = **at;
+  for (const auto &p : w.rolled_back)
+    if (p->id == id) p->id += kMaxIds;
+  b.id = id;
+  std::ranges::sort(w.rolled_back, {}, [](const auto &p) { return p->id; });
   b.tears = of.tears;  // of none that a step sees
   b.sensor = of.sensor;
   b.name = name;
   b.material = of.material;
   b.user = of.user;
-  b.piece_of = of.piece_of ? of.piece_of : of.id;
+  b.piece_of = whole;
   b.whole_name = of.piece_of ? of.whole_name : of.name;
   static_cast<BodyState &>(b) = of;
   b.separate.waits = false;

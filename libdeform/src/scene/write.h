@@ -21,7 +21,7 @@ using Written = nlohmann::ordered_json;
 struct Beside {
   std::string probes, output;
   std::vector<std::string> probe_bodies;  // by probe: what has its cell now; empty: nothing
-  bool equilibrium = false;  // "time"/"mode" is "static"
+  bool equilibrium = false;               // "time"/"mode" is "static"
 };
 
 struct WriteOptions {

@@ -269,13 +269,15 @@ void write_nodal(SceneWriter &to, const Body &b, const std::map<uint32_t, Vec3> 
   out["nodal_bc"] = to.text_file(b.name + "_forces.csv", std::move(rows));
 }
 
+// In their order, in which they are added: those from before any that varies are a table.
 void write_loads(SceneWriter &to, const Body &b, Written &out) {
   std::map<uint32_t, Vec3> constant;
+  bool table = true;
   for (const Load &l : b.loads) {
-    const bool varies = !l.keys.empty() || moves(l.sine);
+    table = table && l.keys.empty() && !moves(l.sine);
     for (size_t i = 0; i < l.points.size(); ++i) {
       const Vec3 f = load3(&l.force[3 * i]);
-      if (!varies) {
+      if (table) {
         constant[l.points[i]] += f;
         continue;
       }

@@ -383,6 +383,7 @@ void contact_fields(Stream &s, C &c, uint64_t laws) {
         if constexpr (kind == V::finite) s.array(column.name, values, count, must::finite);
         else if constexpr (kind == V::not_negative) s.array(column.name, values, count, must::not_negative);
         else if constexpr (kind == V::flag) s.array(column.name, values, count, must::flag);
+        else if constexpr (kind == V::feature) s.array(column.name, values, count, must::at_most(2));
         else if constexpr (kind == V::law) s.array(column.name, values, count, must::below(laws));
         else s.array(column.name, values, count, must::any);
       },
