@@ -258,6 +258,26 @@ TEST(CutDelay, Snapshot_WhileFacesWait_GoesOnTheSameWay) {
 }
 
 // A cut by the host in between is not waited for, and what waits opens in what it has left.
+TEST(CutDelay, ParametersChanged_InBetween_AreThoseOfTheNewShape) {
+  Cube s({.delay = 0.010, .model = "corotational_fem"});
+  while (s.waiting() == 0) s.step();
+  const std::string waits = test::snapshot(s.w);
+  const double z = s.z;
+  const auto go_on = [&] {
+    const double young = 6e4;
+    const dfm_param_value value{"young", &young, 1};
+    const dfm_params params{sizeof params, 1, &value};
+    test::ok(dfm_body_set_params(s.body, &params));
+    s.steps(12);
+    return test::snapshot(s.w);
+  };
+  const std::string later = go_on();
+  ASSERT_GT(s.opened, 0u);
+  test::ok(dfm_world_restore(s.w, waits.data(), waits.size()));
+  s.z = z;
+  EXPECT_EQ(go_on(), later);
+}
+
 TEST(CutDelay, CutByTheHost_InBetween_LosesNoFace) {
   Cube s({.delay = 0.010});
   while (s.waiting() == 0) s.step();

@@ -264,6 +264,41 @@ TEST(Cut, Snapshot_UndoesACutAndMakesItAgain) {
   }
 }
 
+// Whatever model the body has by now: one that takes no parts does not matter.
+TEST(Cut, Snapshot_MakesTheModelThatItHas) {
+  for (const char *now : {"modal", "condensed"}) {
+    CubeAtRest s;
+    const std::string whole = test::snapshot(s.w);
+    cut(s.body, plane(0, 0.001, DFM_CUT_SPLIT));
+    steps(s.w, 3);
+    const std::string parted = test::snapshot(s.w);
+    steps(s.w, 5);
+    const uint64_t later = dfm_world_hash(s.w);
+    restore(s.w, whole);
+    test::ok(dfm_body_set_model(s.body, now, nullptr));
+    restore(s.w, parted);
+    EXPECT_EQ(test::snapshot(s.w), parted) << now;
+    steps(s.w, 5);
+    EXPECT_EQ(dfm_world_hash(s.w), later) << now;
+  }
+}
+
+TEST(Cut, Undone_LeavesTheStepsOfTheWholeBody) {
+  const auto stable_step = [](bool cuts) {
+    CubeAtRest s;
+    const std::string whole = test::snapshot(s.w);
+    if (cuts) cut(s.body, plane(0, 0.001, DFM_CUT_SPLIT));
+    restore(s.w, whole);
+    const double young = 6e4;
+    const dfm_param_value value{"young", &young, 1};
+    const dfm_params params{sizeof params, 1, &value};
+    test::ok(dfm_body_set_params(s.body, &params));
+    steps(s.w, 5);
+    return test::stats(s.w).stable_step;
+  };
+  EXPECT_EQ(stable_step(true), stable_step(false));
+}
+
 TEST(Cut, LoadsHoldsAndAttachments_FollowTheirPoints) {
   Cube s("msm", {0, 0, -1});
   dfm_obstacle_def d = dfm_obstacle_def_default();

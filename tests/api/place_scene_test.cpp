@@ -16,10 +16,11 @@ struct Placed {
   std::vector<double> points;  // of the body's surface
 
   // The body is a cube of 0.2 m whose corner is at its origin.
-  Placed(const std::string &obstacle, const std::string &pose, const std::string &more = "") {
+  Placed(const std::string &obstacle, const std::string &pose, const std::string &more = "",
+         const std::string &time = R"("duration": 0.1, "step": 0.001)") {
     const std::string path = test::scratch("place") + "/scene.json";
     test::write_file(path, R"({"format": "deform-scene", "version": 1,
-      "time": {"duration": 0.1, "step": 0.001},
+      "time": {)" + time + R"(},
       "bodies": [{"name": "cube", "mesh": {"make": "beam", "size": [0.2, 0.2, 0.2], "cells": 60},
                   "place": {"on": "table"}, "pose": )" +
                                pose + R"(}],
@@ -62,6 +63,14 @@ TEST(Place, OnABox_LiesOnItsTopWhereverItWas) {
     EXPECT_NEAR(p.lowest(), 0.9 + kGap, kClose) << height;
     EXPECT_NEAR(p.least([](const double *q) { return q[0]; }), 0.1, 1e-12) << "it moves up and down only";
   }
+}
+
+TEST(Place, OnWhatMoves_LiesOnItAtTheStart) {
+  const Placed p(R"("shape": "box", "half_size": [1, 1, 0.1],
+    "motion": {"keyframes": [{"t": 0, "position": [0, 0, 0]}, {"t": 1, "position": [0, 0, 1]}]})",
+                 R"({"position": [0, 0, 3]})", "", R"("start": 1, "duration": 0.1, "step": 0.001)");
+  ASSERT_EQ(p.status, DFM_OK) << dfm_last_error();
+  EXPECT_NEAR(p.lowest(), 1.1 + kGap, kClose);
 }
 
 TEST(Place, ARotatedBody_LiesOnItsLowestCorner) {

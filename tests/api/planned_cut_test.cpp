@@ -571,6 +571,20 @@ TEST(CutScene, Probe_FollowsItsCell) {
         if (there[i]) EXPECT_NEAR(now[i][k], before[i][k], 1e-12) << c.cuts << c.more << i;
         else EXPECT_TRUE(std::isnan(now[i][k])) << c.cuts << c.more << i;
       }
+    const std::string again = folder() + "/probes.json";
+    dfm_scene_write_def partial = dfm_scene_write_def_default();
+    partial.flags = DFM_SCENE_PARTIAL;
+    test::ok(dfm_scene_write(s.scene, again.c_str(), &partial, nullptr));
+    const Opened t(again);
+    ASSERT_EQ(t.status, DFM_OK) << dfm_last_error();
+    uint32_t next = 0;
+    for (size_t i = 0; i < 3; ++i) {
+      if (!there[i]) continue;
+      double x[3], v[3];
+      test::ok(dfm_scene_probe(t.scene, next++, nullptr, x, v));
+      for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(x[k], now[i][k], 1e-12) << c.cuts << c.more << i;
+    }
+    EXPECT_EQ(dfm_scene_probe(t.scene, next, nullptr, nullptr, nullptr), DFM_E_ARG);
   }
 }
 

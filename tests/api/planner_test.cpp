@@ -350,6 +350,13 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
   expect_refused(bar(R"("accuracy": {"target": 0.1, "quantity": "color"},)"),
                  {"/accuracy/quantity", "force"});
   expect_refused(bar(target, "", R"(, "mode": "static")"), {"/accuracy", "a static scene has no step"});
+  const std::string none = folder() + "/none.json";
+  for (const char *const key : {R"("accuracy": {"target": 0.1})", R"("budget": {"ms_per_step": 1})"}) {
+    test::write_file(none, R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1},
+      "obstacles": [{"name": "floor", "shape": "plane"}], )" +
+                               std::string(key) + "}");
+    expect_refused(none, {"there is no body to plan for"});
+  }
   const std::string two = folder() + "/two.json";
   test::write_file(two,
                    R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.1}, )" + target + R"(

@@ -3,6 +3,7 @@
 #include <map>
 
 #include "cut_scenes.h"
+#include "logged_context.h"
 
 namespace {
 
@@ -204,6 +205,57 @@ TEST(Separate, Snapshot_TakesPiecesBackWithTheirHandles) {
 }
 
 // An obstacle that comes after a restore has the number of the piece that is gone, and keeps its own handle.
+// What touched what is state, and not only what is reported: after a restore nothing is.
+TEST(Separate, RightAfterARestore_GivesThePiecesTheirContacts) {
+  CubeOnFloor s("corotational_fem", 5e4);
+  steps(s.w, 40);
+  cut(s.b, plane(0, 0.056, DFM_CUT_SPLIT));
+  steps(s.w, 3);
+  ASSERT_GT(test::stats(s.w).contacts, 0u);
+  const std::string before = test::snapshot(s.w);
+  separate(s.b);
+  const std::string parted = test::snapshot(s.w);
+  restore(s.w, before);
+  separate(s.b);
+  EXPECT_EQ(test::snapshot(s.w), parted);
+}
+
+TEST(Separate, Handle_IsThatOfTheBodyAndTheNameOfThePiece) {
+  test::Context context;
+  test::Stack s = test::make_stack(context);
+  const std::string before = test::snapshot(s.world);
+  const auto part = [&](dfm_body b) {
+    const dfm_separate_def d = dfm_separate_def_default();
+    test::ok(dfm_body_set_separate(b, &d));
+    EXPECT_EQ(cut(b, plane(0, 0.056, DFM_CUT_SPLIT)).pieces, 1u);
+    return pieces(b)[0];
+  };
+  const dfm_body lower = part(s.lower), upper = part(s.upper);
+  const std::string after = test::snapshot(s.world);
+  restore(s.world, before);
+  EXPECT_EQ(part(s.upper), upper) << "which has another number now";
+  EXPECT_EQ(part(s.lower), lower);
+  restore(s.world, after);
+  EXPECT_EQ(test::snapshot(s.world), after);
+  EXPECT_EQ(pieces(s.lower), std::vector<dfm_body>{lower});
+  EXPECT_EQ(pieces(s.upper), std::vector<dfm_body>{upper});
+}
+
+TEST(Separate, PieceThinnerThanTheGivenOffsetAllows_IsMade) {
+  test::Context context;
+  dfm_world_def def = dfm_world_def_default();
+  def.contact_offset = 2e-3;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(context, &def, &w));
+  test::BodyOptions o;
+  o.name = "cube";
+  const dfm_body b = test::make_body(context, w, "beam", {0.1, 0.1, 0.2}, 600, o);
+  const dfm_separate_def d = dfm_separate_def_default();
+  test::ok(dfm_body_set_separate(b, &d));
+  EXPECT_EQ(cut(b, plane(2, 0.015, DFM_CUT_SPLIT)).pieces, 1u);
+  steps(w, 3);
+}
+
 TEST(Separate, AnObstacleAfterARestore_IsNotThePieceThatIsGone) {
   test::Context context;
   const test::Stack s = test::make_stack(context);
@@ -324,6 +376,21 @@ TEST(Separate, Crumbs_StayOrGoAsRequested) {
     }
     steps(s.w, 20);
   }
+}
+
+TEST(Separate, Log_CountsThePartsThatGo) {
+  test::LoggedContext context;
+  uint32_t loaded = 0;
+  test::ok(dfm_plugin_scan(context.context, DEFORM_PLUGIN_DIR, &loaded));
+  const dfm_world w = test::make_world(context.context, {0, 0, 0});
+  const dfm_body b = cube(context.context, w, "corotational_fem");
+  dfm_separate_def d = dfm_separate_def_default();
+  d.least_cells = 1000;
+  d.crumbs = DFM_CRUMBS_REMOVE;
+  test::ok(dfm_body_set_separate(b, &d));
+  cut(b, plane(0, 0.008, DFM_CUT_SPLIT));
+  EXPECT_NE(context.log.find(": 1 part of fewer than 1000 cells have been removed"), std::string::npos)
+      << context.log;
 }
 
 namespace {

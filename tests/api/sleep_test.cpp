@@ -544,6 +544,20 @@ TEST(Wake, AfterASnapshotOfSleepers_GivesTheSameBits) {
   EXPECT_EQ(go_on(other), here);
 }
 
+// A snapshot without sleep has no places of calm, so there are none left when sleep is switched on again.
+TEST(Sleep, SwitchedOffAndOn_BeginsAsAfterARestore) {
+  const Rest s;
+  steps(s.world, 20);
+  test::ok(dfm_world_set_sleep(s.world, false));
+  steps(s.world, 20);
+  const std::string off = test::snapshot(s.world);
+  test::ok(dfm_world_set_sleep(s.world, true));
+  const std::string on = test::snapshot(s.world);
+  ASSERT_EQ(dfm_world_restore(s.world, off.data(), off.size()), DFM_OK) << dfm_last_error();
+  test::ok(dfm_world_set_sleep(s.world, true));
+  EXPECT_EQ(test::snapshot(s.world), on);
+}
+
 TEST(Sleep, Plan_ListsTheStageOnlyOnRequest) {
   for (const bool on : {false, true}) {
     const Rest s(on);

@@ -285,6 +285,40 @@ TEST(Snapshot, DamagedCutOrForeign_IsRefusedAndChangesNothing) {
   EXPECT_EQ(dfm_world_restore(s.world, nullptr, 10), DFM_E_ARG);
 }
 
+TEST(Snapshot, OfAWorldThatWasMadeOtherwise_IsRefused) {
+  test::Context c;
+  const auto refused = [&](const auto &make, auto first, auto second) {
+    const dfm_world from = test::make_world(c), to = test::make_world(c);
+    make(from, first);
+    make(to, second);
+    EXPECT_EQ(restore(to, snapshot(from)), DFM_E_FORMAT);
+    test::says({"another world"});
+  };
+  const auto body = [&](dfm_world w, double smooth) {
+    test::BodyOptions o;
+    o.smooth = smooth;
+    test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  };
+  refused(body, 0.0, 60.0);
+  const auto jointed = [](dfm_world w, const dfm_joint_def &j) {
+    test::create(w, {test::box("box", {0.1, 0.1, 0.1}, 1)}, {j});
+  };
+  const test::Vec at = {0, 0, 0.1};
+  const dfm_joint_def hinge = test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, at, {1, 0, 0});
+  refused(jointed, hinge, test::joint(DFM_JOINT_BALL, 0, DFM_RIGID_WORLD, at));
+  refused(jointed, hinge, test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, at, {0, 1, 0}));
+  refused(jointed, hinge, test::joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0.2}, {1, 0, 0}));
+  const auto tool = [](dfm_world w, uint32_t shape) {
+    dfm_tool_def d = dfm_tool_def_default();
+    d.name = "tool";
+    d.shape = shape;
+    for (double &h : d.half_size) h = 0.01;
+    dfm_tool out = 0;
+    test::ok(dfm_tool_create(w, &d, &out));
+  };
+  refused(tool, uint32_t{DFM_TOOL_BOX}, uint32_t{DFM_TOOL_BLADE});
+}
+
 TEST(Snapshot, IntoATooSmallBuffer_ReturnsTheNeededSize) {
   test::Context c;
   const test::Stack s = build(c);

@@ -113,8 +113,8 @@ static inline dfm_separate_def dfm_separate_def_default(void) {
  * pointer and this setting. Rules of friction and contact that name the body hold for its pieces too. Mass
  * and both momenta are kept. dfm_world_events has DFM_EVENT_PIECE for each; dfm_body_pieces lists them.
  * A snapshot from before takes the pieces back: calls with their handles then give DFM_E_STATE. Where a
- * piece of the same number comes again, by a later snapshot or as the run is repeated, it has its handle
- * again.
+ * piece of the same body and name comes again, by a later snapshot or as the run is repeated, it has its
+ * handle again.
  * @param def  NULL: the default
  * @param out  may be NULL; set its size, or 0. pieces, parts, and of parts that were removed cells, mass,
  * momentum

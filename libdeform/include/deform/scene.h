@@ -91,7 +91,7 @@ DFM_API dfm_status dfm_world_write_scene(dfm_world world, const char *path, cons
                                          uint32_t *notes);
 /** dfm_world_write_scene for the world of a scene, with what the scene has beside its world: "probes",
  * "output" and "time"/"mode". "accuracy" and "budget" are not written, since the world has what they chose. A
- * probe of a body that is gone is something that a scene cannot say.
+ * probe whose cell is gone is something that a scene cannot say; one whose cell is in a piece is the piece's.
  * @param def  NULL: no flags, the scene's duration; a step of 0 is the scene's
  * @return as dfm_world_write_scene. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_scene_write(dfm_scene scene, const char *path, const dfm_scene_write_def *def,

@@ -171,6 +171,12 @@ dfm_status dfm_scene_write(dfm_scene scene, const char *path, const dfm_scene_wr
     if (d.step == 0) d.step = has.step;
     writing::Beside beside;
     if (!has.probes.empty()) beside.probes = s.value("/probes");
+    for (size_t i = 0; i < s.probe_count(); ++i) {
+      uint32_t points[4];
+      const bool there = handle_find(Kind::body, s.probe(i).body);
+      const dfm_body body = there ? s.probe_body(i, points) : 0;
+      beside.probe_bodies.push_back(body ? shown_body_of(body).name : "");
+    }
     beside.output = s.value("/output");
     beside.equilibrium = has.equilibrium;
     write_scene("dfm_scene_write", exclusive(world_of(s.world())), path, d, std::move(beside), notes);

@@ -213,6 +213,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return as_status(whole_to_change, world, [&](World &w) {
     wake_all(w);
+    for (auto &b : w.bodies) b->anchor.clear();
     w.def.sleep = sleep;
     w.changed = true;
   });

@@ -53,6 +53,8 @@ struct Crossing {
   auto operator<=>(const Crossing &) const = default;
 };
 
+inline uint8_t type_b(const ContactPoint &c) { return c.kind == kEdgeEdge ? 1 : 2; }
+
 // A number of its side b: of a body's slot, or, with the top bit, of an obstacle's.
 inline uint32_t side_b(const ContactPoint &c) { return c.slot_b | (c.obstacle ? 0x80000000u : 0u); }
 

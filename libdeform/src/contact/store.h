@@ -13,7 +13,7 @@ struct ContactState;
 class Tasks;
 
 // Description of a column for code that handles all columns. `values`: valid values in a snapshot.
-enum class ColumnValues : uint8_t { any, finite, not_negative, flag, law };
+enum class ColumnValues : uint8_t { any, finite, not_negative, flag, feature, law };
 // widths: number of columns of the state; not by contact, or not always present
 inline constexpr uint32_t kPerState = ~0u, kOwnLength = ~0u - 1;
 struct ContactColumn {
@@ -36,7 +36,10 @@ struct ContactStore {
   uint32_t n = 0, nstate = 0;
   double h = 0;  // s, the sub-step that the impulses belong to
   Array<uint64_t> key;
-  Array<uint64_t> id_a, id_b;     // ids of the pair (obstacles have ids of the same sequence)
+  Array<uint64_t> id_a, id_b;  // ids of the pair (obstacles have ids of the same sequence)
+  // as in ContactPoint; type_b: what feature_b of a body is
+  Array<uint32_t> feature_a, feature_b;
+  Array<uint8_t> type_a, type_b;
   Array<uint32_t> by_key;         // indices in ascending key order
   Array<double> normal, tangent;  // [n,3]
   Array<double> impulse;          // [n,3] in the frame
@@ -66,6 +69,10 @@ void each_column(F &&f, Store &...c) {
   f(ColumnOf<V::any>{{"contact key", 1, true}}, c.key...);
   f(ColumnOf<V::any>{{"contact body", 1}}, c.id_a...);
   f(ColumnOf<V::any>{{"contact partner", 1}}, c.id_b...);
+  f(ColumnOf<V::any>{{"contact feature", 1}}, c.feature_a...);
+  f(ColumnOf<V::any>{{"contact partner's feature", 1}}, c.feature_b...);
+  f(ColumnOf<V::feature>{{"kind of feature", 1}}, c.type_a...);
+  f(ColumnOf<V::feature>{{"kind of partner's feature", 1}}, c.type_b...);
   f(ColumnOf<V::finite>{{"contact normal", 3}}, c.normal...);
   f(ColumnOf<V::finite>{{"contact tangent", 3}}, c.tangent...);
   f(ColumnOf<V::finite>{{"contact impulse", 3}}, c.impulse...);

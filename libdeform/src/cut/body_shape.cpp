@@ -81,7 +81,8 @@ void keep_params(Body &b, const BodyShape &before) {
   const std::vector<double> values = before.model.params;
   b.switched_off.requested = before.switched_off.requested;
   if (values == b.model.params) return;
-  if (const dfm_status s = b.model.put_params(values, b.dynamics->abilities().claims); s != DFM_OK)
+  if (const dfm_status s = b.model.put_params(values, b.dynamics ? b.dynamics->abilities().claims : 0);
+      s != DFM_OK)
     refuse(b, s, ": model '%s' does not take its present parameters for the cells that are left",
            b.model.type->id);
   b.model.params = values;
@@ -260,6 +261,7 @@ std::unique_ptr<MadeShape> make_shape(const Body &b, CutMesh &&mesh, Array<uint6
   put_at_rest(like.p);
   weigh(like);
   exchange(like, *make_body_instance(w, like, *b.model.type, std::move(origin)));
+  keep_params(like, b);
   like.integrator.used = b.integrator.used;
   like.p.dampers.lag = b.p.dampers.lag;
   if (open_time) {
@@ -287,7 +289,6 @@ std::unique_ptr<BodyShape> take_shape(Body &b, MadeShape &made, bool parts, bool
     set_dynamics(w, b, ahead ? nullptr : &w.time);
     if (ahead) b.integrator.step = step;
     keep_integrator(b, before.integrator);
-    keep_params(b, before);
     carry_state(before, mesh, made.edge, b);
     b.former_surface.reset(new FormerSurface{before.shape, b.shape, made.features, std::move(made.list)});
   } catch (...) {
@@ -316,6 +317,8 @@ std::unique_ptr<Body> structure_of(const Body &b) {
   out->integrator = b.integrator;
   out->p.dampers.lag = b.p.dampers.lag;
   out->model.type = b.model.type;
+  out->model.params = b.model.params;
+  out->switched_off = b.switched_off;
   return out;
 }
 
@@ -370,9 +373,9 @@ std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_
   gather_surface(out.surface, out.p.x.data(), out.p.v.data());
   return put(b, std::move(shape), [&](const BodyShape &had) {
     const BodyShape &before = &like == &b ? had : like;
-    ModelOrigin origin = before.origin;
-    origin.held.assign(b.p.n, 0);
-    make_model_again(b, before, std::move(origin));
+    b.model.type = before.model.type;
+    b.origin = before.origin;
+    b.origin.held.assign(b.p.n, 0);
   });
 }
 

@@ -51,9 +51,9 @@ std::unique_ptr<BodyShape> cut_body(Body &b, CutMesh &&mesh, Array<uint64_t> &&o
 // dropped. Throws Error; then the piece is unchanged.
 void shape_piece(const Body &from, CutMesh &&mesh, Array<uint64_t> &&open, Body &piece);
 
-// Gives `b` the shape of a snapshot: a mesh cut from the whole body of `b`. Its state is that at rest. names:
-// of the surface; null: the whole body, which has no own names. like: provides the model and its inputs: `b`
-// itself, or the body of which it is a piece.
+// Gives `b` the shape of a snapshot: a mesh cut from the whole body of `b`. Its state is that at rest, and it
+// has no model yet. names: of the surface; null: the whole body, which has no own names. like: `b` itself, or
+// the body of which it is a piece.
 std::unique_ptr<BodyShape> restore_shape(Body &b, const Body &like, std::shared_ptr<const WholeBody> whole,
                                          CutMesh &&mesh, Array<uint64_t> &&open, FeatureNames *names);
 

@@ -93,7 +93,9 @@ bool is_of(const Body &structure, const Body &b) {
   return structure.shape == b.shape && structure.model.type == b.model.type && mine.params == its.params &&
          mine.held == its.held && mine.integrator == its.integrator &&
          std::memcmp(&mine.frame, &its.frame, sizeof mine.frame) == 0 &&
-         structure.integrator.used == b.integrator.used;
+         structure.integrator.used == b.integrator.used && structure.model.params == b.model.params &&
+         structure.switched_off.requested == b.switched_off.requested &&
+         structure.p.dampers.lag == b.p.dampers.lag;
 }
 
 void renew_structure(Body &b) {

@@ -90,31 +90,22 @@ void carry(const Attachment &a, const BodyShape &before, const std::vector<CutTa
   else out.erase(std::remove_if(first, out.end(), [&](auto &x) { return !holds(x); }), out.end());
 }
 
-// Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone.
-template <class Number>
-bool renumber(const std::vector<CutTarget> &targets, Number CutTarget::*number, size_t kind, Number &at,
-              uint32_t &feature) {
+// Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone, and the number
+// of its feature is 0. slot: in the report, or null.
+bool renumber(const std::vector<CutTarget> &targets, size_t kind, uint64_t &id, uint32_t &feature,
+              uint32_t *slot = nullptr) {
+  if (id != targets[0].id) return true;
   const Found now = find(targets, kind, feature);
+  feature = now.feature == kNone ? 0 : now.feature;
   if (now.target == kNone) return false;
-  at = targets[now.target].*number;
-  feature = now.feature;
+  id = targets[now.target].id;
+  if (slot) *slot = targets[now.target].slot;
   return true;
 }
 
-bool renumber(ContactPoint &c, const std::vector<CutTarget> &targets) {
-  const auto slot = &CutTarget::slot;
-  const bool a = c.slot_a == targets[0].slot, b = !c.obstacle && c.slot_b == targets[0].slot;
-  bool there = !a || renumber(targets, slot, c.type_a, c.slot_a, c.feature_a);
-  there &= !b || renumber(targets, slot, c.kind == kEdgeEdge ? 1 : 2, c.slot_b, c.feature_b);
-  if (!there) c.feature_a = c.feature_b = 0;  // of a contact that has ended
-  return there;
-}
-
 bool renumber(Crossing &c, const std::vector<CutTarget> &targets, const World &w) {
-  const auto id = &CutTarget::id;
-  const bool a = c.id_a == targets[0].id, b = c.id_b == targets[0].id;
-  bool there = !a || renumber(targets, id, 1, c.id_a, c.edge_a);
-  there &= !b || renumber(targets, id, 1, c.id_b, c.edge_b);
+  bool there = renumber(targets, 1, c.id_a, c.edge_a);
+  there &= renumber(targets, 1, c.id_b, c.edge_b);
   // of two bodies the older one is side a, and new pieces have no slot yet; an obstacle is side b
   if (c.id_b < c.id_a && obstacle_slot_of(w, c.id_b) == kNone) {
     std::swap(c.id_a, c.id_b);
@@ -129,21 +120,24 @@ Lasting::Lasting(const World &w, const BodyShape &before, const std::vector<CutT
     : crossings(w.store.crossings.get_allocator()),
       contacts(w.report.contacts.get_allocator()),
       id_a(w.store.id_a),
-      id_b(w.store.id_b) {
+      id_b(w.store.id_b),
+      feature_a(w.store.feature_a),
+      feature_b(w.store.feature_b) {
   for (const Attachment &a : w.attachments) carry(a, before, targets, attachments);
+  std::ranges::stable_sort(attachments, {}, &Attachment::body);
   for (Crossing c : w.store.crossings)
     if (renumber(c, targets, w)) crossings.push_back(c);
   std::sort(crossings.begin(), crossings.end());
   contacts = w.report.contacts;
   ended.assign(w.store.n, 0);
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    const bool a = contacts[i].slot_a == targets[0].slot;
-    const bool b = !contacts[i].obstacle && contacts[i].slot_b == targets[0].slot;
-    ended[i] = !renumber(contacts[i], targets);
-    for (const CutTarget &t : targets) {
-      if (a && !ended[i] && contacts[i].slot_a == t.slot) id_a[i] = t.id;
-      if (b && !ended[i] && contacts[i].slot_b == t.slot) id_b[i] = t.id;
-    }
+  for (uint32_t i = 0; i < w.store.n; ++i) {
+    ContactPoint *const c = i < w.report.n ? &contacts[i] : nullptr;
+    bool there = renumber(targets, w.store.type_a[i], id_a[i], feature_a[i], c ? &c->slot_a : nullptr);
+    there &= renumber(targets, w.store.type_b[i], id_b[i], feature_b[i], c ? &c->slot_b : nullptr);
+    ended[i] = !there;
+    if (!c) continue;
+    c->feature_a = feature_a[i];
+    c->feature_b = feature_b[i];
   }
 }
 
@@ -155,6 +149,8 @@ void exchange(World &w, Lasting &other) noexcept {
   w.report.contacts.swap(other.contacts);
   w.store.id_a.swap(other.id_a);
   w.store.id_b.swap(other.id_b);
+  w.store.feature_a.swap(other.feature_a);
+  w.store.feature_b.swap(other.feature_b);
 }
 
 }  // namespace
@@ -172,12 +168,12 @@ void prepare_with(World &w, Lasting &lasting) {
     exchange(w, lasting);
     throw;
   }
-  for (uint32_t i = 0; i < w.report.n; ++i) {
+  for (uint32_t i = 0; i < w.store.n; ++i) {
     if (!lasting.ended[i]) continue;
     if (w.store.touching[i])
       add_event(w, DFM_EVENT_END, w.store.id_a[i], w.store.id_b[i], w.store.key[i], w.time);
     w.store.touching[i] = 0;
-    std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
+    if (i < w.report.n) std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
   }
   for (Attachment &a : w.attachments) {
     if (!a.surfels.empty() || a.released) continue;

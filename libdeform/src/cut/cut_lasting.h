@@ -21,8 +21,9 @@ struct Lasting {
   std::vector<Attachment> attachments;
   Array<Crossing> crossings;
   Array<ContactPoint> contacts;  // of the report
-  Array<uint64_t> id_a, id_b;    // of the store
-  std::vector<uint8_t> ended;    // [contacts of the store] 1: its feature is gone
+  Array<uint64_t> id_a, id_b;    // of the store, as the next two
+  Array<uint32_t> feature_a, feature_b;
+  std::vector<uint8_t> ended;  // [contacts of the store] 1: its feature is gone
 
   // Of the body whose id and slot the first target has. before: its shape before the cut.
   Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets);

@@ -33,7 +33,7 @@ struct Parts {
   Array<uint32_t> of;           // [ncell]
   std::vector<uint32_t> cells;  // by part
   std::vector<uint32_t> to;     // by part: number of its piece, kStays or kGoes
-  uint32_t n = 0, pieces = 0;
+  uint32_t n = 0, pieces = 0, heaviest = 0;
 };
 
 // Two parts with an open face between them; away2: 9 times the square of the distance of its sides now, m2.
@@ -64,9 +64,9 @@ std::vector<Opened> opened_between(const Body &b, const Array<uint32_t> &part) {
 // Crumbs that stay go with the part that lies nearest to them, across open faces, one by one from the
 // smallest distance on. What lies in the teeth of a part would otherwise be of another body than they are: it
 // would cross them, and contact of the two whole bodies would be off until they are apart.
-void lead_crumbs(const Body &b, const SeparateRule &rule, size_t heaviest, Parts &parts) {
+void lead_crumbs(const Body &b, const SeparateRule &rule, Parts &parts) {
   DisjointSets sets(b.world->memory(), parts.n);
-  const auto leads = [&](uint32_t i) { return i == heaviest || parts.cells[i] >= rule.least; };
+  const auto leads = [&](uint32_t i) { return i == parts.heaviest || parts.cells[i] >= rule.least; };
   for (const Opened &face : opened_between(b, parts.of)) {
     const uint32_t i = sets.root(face.a), j = sets.root(face.b);
     if (i == j || (leads(i) && leads(j))) continue;
@@ -92,12 +92,12 @@ Parts parts_of(const Body &b, const SeparateRule &rule) {
       if (!std::exchange(weighed[p], uint8_t{1})) mass[out.of[c]] += b.p.mass[p];
     }
   }
-  const size_t heaviest = size_t(std::max_element(mass.begin(), mass.end()) - mass.begin());
+  out.heaviest = uint32_t(std::max_element(mass.begin(), mass.end()) - mass.begin());
   for (uint32_t i = 0; i < out.n; ++i) {
     const bool small = out.cells[i] < rule.least;
-    out.to.push_back(i == heaviest ? kStays : !small ? out.pieces++ : rule.removes ? kGoes : kStays);
+    out.to.push_back(i == out.heaviest ? kStays : !small ? out.pieces++ : rule.removes ? kGoes : kStays);
   }
-  if (!rule.removes && out.pieces > 0) lead_crumbs(b, rule, heaviest, out);
+  if (!rule.removes && out.pieces > 0) lead_crumbs(b, rule, out);
   return out;
 }
 
@@ -149,7 +149,7 @@ void report_removed(const Body &b, const Parts &parts, CutReport &out) {
 
 void log_small_parts(const Body &b, const SeparateRule &rule, const Parts &parts) {
   uint32_t n = 0;
-  for (const uint32_t cells : parts.cells) n += cells < rule.least;
+  for (uint32_t i = 0; i < parts.n; ++i) n += i != parts.heaviest && parts.cells[i] < rule.least;
   if (n == 0) return;
   b.world->context->logf(DFM_LOG_INFO, "body '%s': %u %s of fewer than %u cells %s", b.name.c_str(), n,
                          n == 1 ? "part" : "parts", rule.least,
@@ -257,22 +257,27 @@ void separate_what_waits(World &w) {
 }
 
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name) {
-  auto at = std::find_if(w.rolled_back.begin(), w.rolled_back.end(), [&](auto &p) { return p->id >= id; });
-  if (at == w.rolled_back.end() || (*at)->id != id) {
+  const uint64_t whole = of.piece_of ? of.piece_of : of.id;
+  const auto is_it = [&](const auto &p) { return p->piece_of == whole && p->name == name; };
+  auto at = std::ranges::find_if(w.rolled_back, is_it);
+  if (at == w.rolled_back.end()) {
     auto fresh = std::make_unique<Body>();
     fresh->world = &w;
-    fresh->id = id;
     fresh->rolled_back = true;
     fresh->handle = handle_create(Kind::body, fresh.get());
     at = w.rolled_back.insert(at, std::move(fresh));  // there is room
   }
   Body &b = **at;
+  for (const auto &p : w.rolled_back)
+    if (p->id == id) p->id += kMaxIds;
+  b.id = id;
+  std::ranges::sort(w.rolled_back, {}, [](const auto &p) { return p->id; });
   b.tears = of.tears;  // of none that a step sees
   b.sensor = of.sensor;
   b.name = name;
   b.material = of.material;
   b.user = of.user;
-  b.piece_of = of.piece_of ? of.piece_of : of.id;
+  b.piece_of = whole;
   b.whole_name = of.piece_of ? of.whole_name : of.name;
   static_cast<BodyState &>(b) = of;
   b.separate.waits = false;

@@ -15,8 +15,9 @@ void separate_if_requested(Body &b);
 // Tries again for parts that wait.
 void separate_what_waits(World &w);
 
-// A piece without a shape, with this id and name, in World::rolled_back: the one that had the id before a
-// restore undid it, or a new one. `of` made it, or is the body that the host made.
+// A piece without a shape, with this id and name, in World::rolled_back: the one of that body and name that a
+// restore has undone, or a new one. `of` made it, or is the body that the host made. Another one that had the
+// id gets one above kMaxIds.
 Body &place_for_piece(World &w, const Body &of, uint64_t id, const std::string &name);
 
 }  // namespace dfm

@@ -489,9 +489,20 @@ class Builder {
 
   void add_loads(dfm_body body, const Body &b, const BodyMesh &mesh,
                  const std::vector<NodalRow> &nodal) const {
+    std::vector<uint32_t> points;
+    std::vector<double> forces;
+    for (const NodalRow &row : nodal) {
+      if (row.force[0] == 0 && row.force[1] == 0 && row.force[2] == 0) continue;
+      points.push_back(row.point);
+      forces.insert(forces.end(), row.force, row.force + 3);
+    }
+    if (!points.empty())
+      def_.require(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr,
+                                     nullptr, nullptr),
+                   b.pointer + "/nodal_bc");
     for (const Force &f : b.forces) {
       const Shared shared = share(f, mesh, def_.file);
-      std::vector<double> forces;
+      forces.clear();
       for (double w : shared.weights)
         for (double t : f.total) forces.push_back(w * t);
       const bool sine = f.sine.amplitude[0] != 0;
@@ -500,17 +511,6 @@ class Builder {
                             uint32_t(f.keys.size()), f.keys.data(), sine ? &f.sine : nullptr, nullptr),
           f.where.pointer);
     }
-    std::vector<uint32_t> points;
-    std::vector<double> forces;
-    for (const NodalRow &row : nodal) {
-      if (row.force[0] == 0 && row.force[1] == 0 && row.force[2] == 0) continue;
-      points.push_back(row.point);
-      forces.insert(forces.end(), row.force, row.force + 3);
-    }
-    if (points.empty()) return;
-    def_.require(dfm_body_add_load(body, uint32_t(points.size()), points.data(), forces.data(), 0, nullptr,
-                                   nullptr, nullptr),
-                 b.pointer + "/nodal_bc");
   }
 
   // The cell that contains a point of the body at rest, or the nearest one if the point is close to it.

@@ -4,10 +4,12 @@
 #include <cmath>
 
 #include "core/error.h"
+#include "core/handle.h"
 #include "deform/query.h"
 #include "deform/world.h"
 #include "math/turn.h"
 #include "math/vec3.h"
+#include "state/world.h"
 
 namespace dfm::scene {
 namespace {
@@ -47,11 +49,12 @@ double reach_of(const dfm_obstacle_def &o) {
 
 // m, along `up` (unit), negative where it is down: how far points [n,3] move so that their convex hull
 // touches the obstacle from above. It is found in a world of its own by the queries that any program has.
-double lift_onto(dfm_context *context, const dfm_obstacle_def &on, const std::vector<double> &points,
-                 const double up_[3]) {
+double lift_onto(dfm_context *context, const dfm_obstacle_def &on, double time,
+                 const std::vector<double> &points, const double up_[3]) {
   Scratch scratch;
   const dfm_world_def empty = dfm_world_def_default();
   need(dfm_world_create(context, &empty, &scratch.world));
+  resolve<World>(Kind::world, scratch.world).time = time;
   dfm_obstacle_def def = on;
   def.material = 0;
   dfm_obstacle obstacle = 0;
@@ -107,7 +110,7 @@ dfm_pose put_on(dfm_context *context, const Definition &def, MeshFiles &files, c
   store3(up, norm(down) > 0 ? (-1 / norm(down)) * down : Vec3{0, 0, 1});
   double lift = 0;
   try {
-    lift = lift_onto(context, o.def, points, up);
+    lift = lift_onto(context, o.def, def.begin, points, up);
   } catch (const Error &e) {
     def.refuse(b.pointer + "/place", e.what(), e.status);
   }

@@ -196,7 +196,7 @@ dfm_sine read_sine(const Node &sine, bool scalar) {
   sine.object("sine");
   if (scalar) out.amplitude[0] = sine.at("amplitude").number();
   else sine.at("amplitude").vector(out.amplitude);
-  out.frequency = sine.at("frequency").number(kNotNegative);
+  out.frequency = sine.at("frequency").number();
   out.phase = sine.number("phase", 0.0);
   return out;
 }
@@ -272,6 +272,7 @@ void read_wanted(const Node &scene, Definition &def) {
   const Node wanted = scene.member(key);
   if (def.equilibrium) wanted.fail("a static scene has no step to choose; remove \"%s\" or /time/mode", key);
   wanted.object(key);
+  if (scene.items("bodies").empty()) wanted.fail("there is no body to plan for; remove \"%s\"", key);
   if (scene.has("accuracy")) {
     def.wanted.target = wanted.at("target").number(Range{0, 1, true, true});
   } else {
@@ -287,8 +288,8 @@ void read_solver(const Node &scene, Definition &def) {
   if (solver.has("tolerance"))
     def.world.solver_tolerance = solver.member("tolerance").number(Range{0, 1, true, true});
   if (solver.has("max_iterations"))
-    def.world.solver_iterations = read_count(solver.member("max_iterations"), 1, 1e9);
-  if (solver.has("newton")) def.world.newton_iterations = read_count(solver.member("newton"), 1, 1e9);
+    def.world.solver_iterations = read_count(solver.member("max_iterations"), 1, UINT32_MAX);
+  if (solver.has("newton")) def.world.newton_iterations = read_count(solver.member("newton"), 1, UINT32_MAX);
 }
 
 void read_effects(const Node &scene, Definition &def) {
@@ -423,7 +424,7 @@ void read_contact(const Node &scene, Definition &def, const ReadContext &context
   if (contact.has("offset")) w.contact_offset = contact.member("offset").number(kPositive);
   if (contact.has("recovery_speed")) w.recovery_speed = contact.member("recovery_speed").number(kPositive);
   if (contact.has("obstacle_speed")) w.obstacle_speed = contact.member("obstacle_speed").number(kPositive);
-  if (contact.has("max_sweeps")) w.max_sweeps = read_count(contact.member("max_sweeps"), 1, 1e6);
+  if (contact.has("max_sweeps")) w.max_sweeps = read_count(contact.member("max_sweeps"), 1, UINT32_MAX);
   if (contact.has("friction") && !contact.value()["friction"].is_array())
     contact.member("friction")
         .fail(

@@ -183,7 +183,7 @@ Attach read_attach(const Node &entry) {
 dfm_separate_def read_separate(const Node &node) {
   dfm_separate_def def = dfm_separate_def_default();
   node.object("separate");
-  def.least_cells = node.has("least_cells") ? read_count(node.at("least_cells"), 1, 1e9) : 1;
+  def.least_cells = node.has("least_cells") ? read_count(node.at("least_cells"), 1, UINT32_MAX) : 1;
   def.crumbs = number_of("crumbs", node.word("crumbs", "stay", "crumbs"));
   return def;
 }

@@ -91,18 +91,23 @@ bool find_cell(const ProbePoint &p, dfm_body body, uint32_t points[4]) {
 
 }  // namespace
 
+dfm_body Scene::probe_body(size_t i, uint32_t points[4]) const {
+  const ProbePoint &p = probes_[i];
+  if (find_cell(p, p.body, points)) return p.body;
+  uint32_t n = 0;
+  need(p, dfm_body_pieces(p.body, 0, nullptr, &n));
+  std::vector<dfm_body> pieces(n);
+  if (n > 0) need(p, dfm_body_pieces(p.body, n, pieces.data(), &n));
+  for (const dfm_body piece : pieces)
+    if (find_cell(p, piece, points)) return piece;
+  return 0;
+}
+
 void Scene::probe_state(size_t i, double position[3], double velocity[3]) {
   const ProbePoint &p = probes_[i];
-  dfm_body body = p.body;
   uint32_t n = 0, points[4];
-  bool found = find_cell(p, body, points);
-  if (!found) {
-    need(p, dfm_body_pieces(p.body, 0, nullptr, &n));
-    std::vector<dfm_body> pieces(n);
-    if (n > 0) need(p, dfm_body_pieces(p.body, n, pieces.data(), &n));
-    for (size_t k = 0; k < pieces.size() && !found; ++k) found = find_cell(p, body = pieces[k], points);
-  }
-  if (!found) {
+  const dfm_body body = probe_body(i, points);
+  if (!body) {
     std::fill_n(position, 3, std::numeric_limits<double>::quiet_NaN());
     std::fill_n(velocity, 3, std::numeric_limits<double>::quiet_NaN());
     return;

@@ -29,7 +29,9 @@ class Scene {
   const Definition &definition() const { return definition_; }
   size_t probe_count() const { return probes_.size(); }
   const ProbePoint &probe(size_t i) const { return probes_[i]; }
-  // NAN once a cut has taken the probe's cell.
+  // Which has the probe's cell, the body or a piece of it, and the cell's points there; 0: none has.
+  dfm_body probe_body(size_t i, uint32_t points[4]) const;
+  // NAN where none has.
   void probe_state(size_t i, double position[3], double velocity[3]);
   std::string value(const std::string &pointer) const;  // JSON text; throws where nothing is
 

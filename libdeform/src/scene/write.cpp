@@ -238,17 +238,17 @@ std::string SceneWriter::material(const Material &m) {
   return key;
 }
 
-std::string SceneWriter::material(const std::string &name, double friction) {
+std::string SceneWriter::material(const std::string &name, std::optional<double> friction) {
   for (const auto &[key, known] : material_keys) {
     const auto at = known.second.find("friction");
     const double of_it = at == known.second.end() ? kDefaultFriction : at->get<double>();
-    if (!name.empty() && known.first == name && of_it == friction) return key;
+    if (!name.empty() && known.first == name && of_it == friction.value_or(of_it)) return key;
   }
   Material m = plain_material();
   m.name = name;
-  if (friction != kDefaultFriction) {
+  if (friction.value_or(kDefaultFriction) != kDefaultFriction) {
     m.extra_keys = {"friction"};
-    m.extra_values = {{friction}};
+    m.extra_values = {{*friction}};
   }
   return material(m);
 }
@@ -447,13 +447,14 @@ Written write_solver(const World &w) {
 Written write_probes(SceneWriter &to) {
   Written out;
   if (to.options.beside.probes.empty()) return out;
-  for (const Written &probe : Written::parse(to.options.beside.probes)) {
-    const std::string body = probe.at("body");
-    const Body *const of = to.w.find_body(body);
-    if (of && !of->emptied) out.push_back(probe);
+  size_t i = 0;
+  for (Written probe : Written::parse(to.options.beside.probes)) {
+    const std::string &now = to.options.beside.probe_bodies[i++], was = probe.at("body");
+    probe["body"] = now;
+    if (!now.empty()) out.push_back(std::move(probe));
     else
-      to.note("probe '%s' is left out, since there is nothing left of its body '%s'",
-              probe.at("name").get<std::string>().c_str(), body.c_str());
+      to.note("probe '%s' is left out, since its cell of body '%s' is gone",
+              probe.at("name").get<std::string>().c_str(), was.c_str());
   }
   return out;
 }

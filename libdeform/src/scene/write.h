@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -19,7 +20,8 @@ using Written = nlohmann::ordered_json;
 // What a scene has that its world does not know of. Values are JSON text, empty where there is none.
 struct Beside {
   std::string probes, output;
-  bool equilibrium = false;  // "time"/"mode" is "static"
+  std::vector<std::string> probe_bodies;  // by probe: what has its cell now; empty: nothing
+  bool equilibrium = false;               // "time"/"mode" is "static"
 };
 
 struct WriteOptions {
@@ -61,7 +63,8 @@ struct SceneWriter {
   std::string file(const std::string &name, std::function<void(const std::string &path)> write);
   // The key of a material; empty: it is that of things without one. Adds it to `materials`.
   std::string material(const Material &m);
-  std::string material(const std::string &name, double friction);  // of a thing that has no more of it
+  // Of a thing that has no more of it; without a friction: of a body none of whose cells has it.
+  std::string material(const std::string &name, std::optional<double> friction);
   void put_material(Written &out, const Obstacle &of);
   std::string text_file(const std::string &name, std::string text);
   std::string triangles(const std::string &name, const Obstacle &of);  // of a mesh, as a file

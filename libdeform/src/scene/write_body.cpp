@@ -55,7 +55,7 @@ void write_cells(SceneWriter &to, const Body &b, Written &out) {
   size_t own = 0;
   while (own + 1 < keys.size() && b.composition.materials[own].name != b.material) ++own;
   if (b.composition.materials[own].name == b.material) out["material"] = keys[own];
-  else if (!b.material.empty()) out["material"] = to.material(b.material, kDefaultFriction);
+  else if (!b.material.empty()) out["material"] = to.material(b.material, std::nullopt);
   if (out["material"].is_null() || out["material"] == "") out.erase("material");
   for (uint32_t t = 0; t < ntet; ++t) {
     const size_t m = b.composition.of.empty() ? 0 : b.composition.of[t];
@@ -267,13 +267,15 @@ void write_nodal(SceneWriter &to, const Body &b, const std::map<uint32_t, Vec3> 
   out["nodal_bc"] = to.text_file(b.name + "_forces.csv", std::move(rows));
 }
 
+// In their order, in which they are added: those from before any that varies are a table.
 void write_loads(SceneWriter &to, const Body &b, Written &out) {
   std::map<uint32_t, Vec3> constant;
+  bool table = true;
   for (const Load &l : b.loads) {
-    const bool varies = !l.keys.empty() || moves(l.sine);
+    table = table && l.keys.empty() && !moves(l.sine);
     for (size_t i = 0; i < l.points.size(); ++i) {
       const Vec3 f = load3(&l.force[3 * i]);
-      if (!varies) {
+      if (table) {
         constant[l.points[i]] += f;
         continue;
       }

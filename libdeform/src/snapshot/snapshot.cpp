@@ -129,6 +129,11 @@ struct Things {
   const Body *body(uint64_t id) const { return w.body(id); }
   const Obstacle *obstacle(uint64_t id) const { return w.obstacle(id); }
   bool known(uint64_t id) const { return body(id) || obstacle(id); }
+  // Whether a feature of a body may have this number.
+  bool feature(uint64_t id, uint8_t type, uint32_t number) const {
+    const Body *const b = body(id);
+    return !b || number < (type == 0 ? b->surface.nsurfel : type == 1 ? b->surface.nedge : b->surface.ntri);
+  }
   // Whether an edge may have this number. Edge numbers of primitives are only compared and index nothing.
   bool edge(uint64_t id, uint32_t number) const {
     if (const Body *const b = body(id)) return number < b->surface.nedge;
@@ -144,6 +149,9 @@ bool good_contacts(const Staged &t, const Things &things) {
   for (uint32_t i = 0; i < c.n; ++i) {
     const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
     if (!(norm2(n) < 1.01 && norm2(u) < 1.01)) return false;
+    if (!things.feature(c.id_a[i], c.type_a[i], c.feature_a[i]) ||
+        !things.feature(c.id_b[i], c.type_b[i], c.feature_b[i]))
+      return false;
     // Contacts of removed things remain until the next sub-step, without touching.
     if (c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id ||
         (c.touching[i] && !(things.body(c.id_a[i]) && things.known(c.id_b[i]))))

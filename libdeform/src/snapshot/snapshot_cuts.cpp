@@ -159,30 +159,22 @@ Body &SnapshotShapes::whole_body(Body &b) {
   refuse(b, "a piece: expected one of a body of this world");
 }
 
-// Of a piece that a restore has removed.
-void SnapshotShapes::change_id(Body &b, uint64_t id) {
-  undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
-  b.id = id;
-  sort_rolled_back(w_);
-}
-
-// Adds the pieces of the snapshot and removes the others; their shapes follow later. After a rewind, a piece
-// of another body may have the id of one in the snapshot: it is set aside under another id.
+// Adds the pieces of the snapshot and removes the others; their shapes follow later.
 void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
   const std::vector<Body *> bodies = all_bodies(w_);
   reserve_places(w_, rows.size());
-  undo_.reserve(3 * (bodies.size() + rows.size()));
+  undo_.reserve(3 * (bodies.size() + w_.rolled_back.size() + rows.size()));
+  const auto note = [&](Body &b) { undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr}); };
+  for (const auto &p : w_.rolled_back) note(*p);
   const auto move = [&](Body &b, bool rolled_back) {
-    undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
+    note(b);
     set_place(w_, b, b.emptied && rolled_back, rolled_back);
   };
   for (Body *const b : bodies) {
     if (!b->piece_of) continue;
     const auto row = std::ranges::find(rows, b->id, &CutRow::id);
-    const bool there = row != rows.end();
-    if (there && row->piece_of == b->piece_of && row->name == b->name) continue;
+    if (row != rows.end() && row->piece_of == b->piece_of && row->name == b->name) continue;
     move(*b, true);
-    if (there && b->id < kMaxIds) change_id(*b, kMaxIds + b->id);
   }
   for (const CutRow &r : rows) {
     const std::vector<Body *> now = all_bodies(w_);
@@ -195,11 +187,6 @@ void SnapshotShapes::find_pieces(const std::vector<CutRow> &rows) {
            "the snapshot is damaged: piece '%s': expected one of a body of this world, with a name of its "
            "own; nothing was restored",
            r.name.c_str());
-    const auto suspended = std::find_if(w_.rolled_back.begin(), w_.rolled_back.end(), [&](const auto &p) {
-      return p->id == kMaxIds + r.id && p->piece_of == r.piece_of && p->name == r.name;
-    });
-    const bool taken = std::ranges::any_of(w_.rolled_back, [&](const auto &p) { return p->id == r.id; });
-    if (suspended != w_.rolled_back.end() && !taken) change_id(**suspended, r.id);
     move(place_for_piece(w_, **whole, r.id, r.name), false);
   }
 }
@@ -210,7 +197,7 @@ void SnapshotShapes::put(Body &b, CutRow *row) {
   undo_.push_back({&b, b.id, b.emptied, b.rolled_back, nullptr});
   if (row && row->piece_of != b.piece_of) refuse(b, "a piece: expected it of another body");
   set_place(w_, b, emptied, false);
-  if ((emptied && b.dynamics) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
+  if ((emptied && b.p.n > 0) || (row ? has_shape(b, *row) : !b.cut.whole)) return;
   Body &like = whole_body(b);
   if (!like.surface.identity()) refuse(b, "cells left: expected a body that cells can be cut from");
   const std::shared_ptr<const WholeBody> whole = whole_of(like);

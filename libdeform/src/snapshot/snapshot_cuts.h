@@ -57,7 +57,6 @@ class SnapshotShapes {
     bool emptied, rolled_back;
     std::unique_ptr<BodyShape> shape;  // null: unchanged
   };
-  void change_id(Body &b, uint64_t id);
   void find_pieces(const std::vector<CutRow> &rows);
   Body &whole_body(Body &b);
   void put(Body &b, CutRow *row);

@@ -241,12 +241,13 @@ void prescribed_fields(Stream &s, B &b, const Body &like) {
   });
 }
 
-// Whether the body has the same model, with the same inputs, as in the snapshot.
+// Whether the body has the same model, with the same inputs, as in the snapshot; none has it whose cells the
+// restore has put.
 template <class B>
 bool made_alike(B &b, const Body &like) {
   const ModelOrigin &mine = b.origin, &other = like.origin;
   const auto bits = [](const Pose &a, const Pose &c) { return std::memcmp(&a, &c, sizeof a) == 0; };
-  return id_of(b.model) == like.model.type->id && mine.params == other.params &&
+  return like.dynamics && id_of(b.model) == like.model.type->id && mine.params == other.params &&
          bits(mine.frame, other.frame) && mine.integrator == other.integrator && mine.held == other.held &&
          b.integrator.used == like.integrator.used;
 }
@@ -381,6 +382,7 @@ void contact_fields(Stream &s, C &c, uint64_t laws) {
         if constexpr (kind == V::finite) s.array(column.name, values, count, must::finite);
         else if constexpr (kind == V::not_negative) s.array(column.name, values, count, must::not_negative);
         else if constexpr (kind == V::flag) s.array(column.name, values, count, must::flag);
+        else if constexpr (kind == V::feature) s.array(column.name, values, count, must::at_most(2));
         else if constexpr (kind == V::law) s.array(column.name, values, count, must::below(laws));
         else s.array(column.name, values, count, must::any);
       },

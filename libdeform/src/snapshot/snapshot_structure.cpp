@@ -51,6 +51,7 @@ uint64_t make_of(const Body &b) {
   // for a body that has been cut: the original
   const WholeBody *const whole = b.cut.whole.get();
   if (b.ahead.delay > 0) h.add(b.ahead.delay);
+  if (b.smooth > 0) h.add(b.smooth);
   h.add(whole ? whole->npoint : b.p.n);
   h.add(whole ? whole->nsurfel : b.surface.nsurfel);
   h.list(b.material, whole ? whole->tets : b.tets, b.cells, b.inside, whole ? whole->rest : b.p.rest,
@@ -93,6 +94,11 @@ uint64_t rest_of_structure(const World &w) {
   for (auto &set : w.rigid_sets) {
     h.list(set->host_name);
     h.add(set->njoint);
+    for (const dfm_joint_def &j : set->joints) {
+      for (const uint32_t x : {j.type, j.body, j.with}) h.add(x);
+      h.add(j.anchor);
+      if (j.type == DFM_JOINT_HINGE || j.type == DFM_JOINT_SLIDER) h.add(j.axis);
+    }
     h.add(uint64_t(set->extra.size()));
     h.list(set->group);
     for (const dfm_rigid_def &d : set->defs) {
@@ -106,6 +112,7 @@ uint64_t rest_of_structure(const World &w) {
     for (const double x :
          {m.stiffness, m.damping, m.turn_stiffness, m.turn_damping, m.mass, m.inertia, m.late})
       h.add(x);
+    h.add(t->def.shape);
     h.add(t->def.flags);
     h.list(t->keys, t->opening_keys);
   }

@@ -25,9 +25,6 @@ struct ThingRows {
 
 ThingRows thing_rows(const World &w);
 
-// far more than any run makes, and far below an overflow
-inline constexpr uint64_t kMaxIds = uint64_t{1} << 48;
-
 template <class Stream, class Rows>
 void thing_fields(Stream &s, Rows &rows) {
   const auto list = [&](const char *what, const char *number, auto &things) {

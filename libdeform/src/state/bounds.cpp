@@ -88,7 +88,7 @@ double thickness(const Body &b) {
 
 void check_offset(const World &w) {
   for (auto &b : w.bodies) {
-    if (w.def.contact_offset > 0)
+    if (w.def.contact_offset > 0 && !b->cut.whole)  // no host chooses how thick what a cut leaves is
       if (const double thick = thickness(*b); !(w.offset <= kOfThickness * thick))
         fail(DFM_E_ARG,
              "a contact offset of %g m is too large for body '%s', whose mean thickness is %.3g m: give at "

@@ -105,6 +105,8 @@ struct Hold {
 // there is room for the next steps.
 inline constexpr size_t kMaxEvents = 65536;
 inline constexpr size_t kEventsAtOnce = 1024;
+// Ids are below it: far more than any run makes, and far below an overflow.
+inline constexpr uint64_t kMaxIds = uint64_t{1} << 48;
 
 // What lasts of a world beside its bodies and obstacles. Snapshots have it.
 struct WorldState {

@@ -93,6 +93,10 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   to.key[i] = c.key;
   to.id_a[i] = w.bodies[c.slot_a]->id;
   to.id_b[i] = id_of_b(w, c);
+  to.feature_a[i] = c.feature_a;
+  to.feature_b[i] = c.feature_b;
+  to.type_a[i] = c.type_a;
+  to.type_b[i] = type_b(c);
   to.law[i] = step.state.law[i];
   store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
   store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));

@@ -46,13 +46,13 @@ const FrictionRule *rule_of(const World &w, uint32_t a, const SurfaceZones::Zone
 
 // The zones of the two sides of a contact.
 struct Zones { uint32_t a, b; };
+uint32_t zone(const Body &b, uint8_t type, uint32_t feature, Vec3 outward) {
+  return b.zones.of.empty() ? 0 : zone_of(b.surface, b.zones.of, type, feature, outward);
+}
 Zones zones_of(const World &w, const ContactPoint &c) {
   const Vec3 normal = load3(c.normal);
-  const auto zone = [](const Body &b, uint8_t type, uint32_t feature, Vec3 outward) {
-    return b.zones.of.empty() ? 0 : zone_of(b.surface, b.zones.of, type, feature, outward);
-  };
   const uint32_t a = zone(*w.bodies[c.slot_a], c.type_a, c.feature_a, -normal);
-  return {a, c.obstacle ? 0 : zone(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, normal)};
+  return {a, c.obstacle ? 0 : zone(*w.bodies[c.slot_b], type_b(c), c.feature_b, normal)};
 }
 
 // Index among bodies and obstacles, or kNone.
@@ -163,15 +163,19 @@ uint32_t contact_law(const World &w, const ContactPoint &c) {
 }
 
 void rename_law(World &w, const FrictionRule &rule, uint32_t to) {
+  const size_t nb = w.bodies.size();
   for (ContactStore *const s : {&w.tool_store, &w.store})
     for (uint32_t m = 0; m < s->n; ++m) {
       if (s->law[m] != rule.law) continue;
       const uint32_t a = thing_of(w, s->id_a[m]), b = thing_of(w, s->id_b[m]);
       if (a == kNone || b == kNone) continue;
-      // Rigid things have one zone each. Nothing is reported after a restore, until the next step.
-      const bool reported = s == &w.store && m < w.report.n;
-      const Zones zones = reported ? zones_of(w, w.report.contacts[m]) : Zones{0, 0};
-      if (rule_of(w, a, zone_at(w, a, zones.a), b, zone_at(w, b, zones.b)) == &rule) s->law[m] = to;
+      const Vec3 normal = load3(&s->normal[3 * size_t{m}]);  // rigid things have one zone each
+      const auto zone_of_side = [&](uint32_t thing, uint8_t type, uint32_t feature, Vec3 outward) {
+        return zone_at(w, thing, thing < nb ? zone(*w.bodies[thing], type, feature, outward) : 0);
+      };
+      if (rule_of(w, a, zone_of_side(a, s->type_a[m], s->feature_a[m], -normal), b,
+                  zone_of_side(b, s->type_b[m], s->feature_b[m], normal)) == &rule)
+        s->law[m] = to;
     }
 }
 

@@ -61,7 +61,7 @@ void warn_squeezed(World &w) {
     Body &b = *one;
     if (b.squeezed.reported || b.sleep_state.asleep || b.surfel_impulse.empty()) continue;
     // The sides of a cut, and pieces, press on each other in ways that this sum says nothing of.
-    if (b.shape != 0 || b.piece_of != 0) continue;
+    if (b.cut.whole || b.piece_of != 0) continue;
     const double young = b.young();
     if (!(young > 0)) continue;
     Squeezed &s = b.squeezed;

@@ -164,15 +164,15 @@ uint32_t attach(Body &b, const dfm_attach_def &def, Body *other, const Obstacle 
   a.damping = def.damping;
   a.release = def.release;
   a.impulse.assign(3 * a.surfels.size(), 0.0);
-  w.attachments.push_back(std::move(a));
-  ++b.next_load;
+  // by body: the order in which they are solved follows from what there is, not from who came first
+  w.attachments.insert(std::ranges::upper_bound(w.attachments, a.body, {}, &Attachment::body), std::move(a));
   for (Body *one : {&b, other}) {
     if (!one) continue;
     wake(w, *one);
     forget_energy(*one);
   }
   w.changed = true;
-  return w.attachments.back().number;
+  return b.next_load++;
 }
 
 void detach(Body &b, uint32_t number) {

@@ -97,7 +97,7 @@ Pose rest_frame(const Body &b) { return rests_unplaced(*b.model.type) ? Pose{} :
 }  // namespace
 
 void measure_explicit(const World &w, Body &b) {
-  const ExplicitTime found = b.dynamics->measure(rest_frame(b), b.shape == 0);
+  const ExplicitTime found = b.dynamics->measure(rest_frame(b), !b.cut.whole);
   b.integrator.share = found.share;
   const bool had = b.p.dampers.lag > 0;
   b.p.dampers.lag = found.lag;
