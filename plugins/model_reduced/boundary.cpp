@@ -468,7 +468,8 @@ void Boundary::add_stiffness(size_t row, size_t column, const Table &f, double *
     }
 }
 
-// u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u: U to both, K to follow_.
+// u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u: U goes to both, K to
+// follow_.
 void Boundary::add_inner(const char *id, const std::vector<Triangle> &t, const double *rest, double young,
                          double poisson, Tiles &both) {
   const Kelvin kelvin(young, poisson);

@@ -316,15 +316,15 @@ void Elastic::compliance_of_eight(const double *f, double *u) const { respond<kL
 
 // Held bodies alone: of a floating one the inertia forces act at all points.
 void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) const {
-  if (by_surface_)
+  if (by_surface_) {
+    const bool inside = !std::all_of(points, points + n, [&](uint32_t i) { return leads(i); });
     return responses_at(npoint, n, points, w, [&](double *eight) {
-      bool inside = false;
-      for (uint32_t i = 0; i < n; ++i) inside = inside || !leads(points[i]);
       if (inside) return compliance_of_eight(eight, eight);
       for (const uint32_t j : given_) std::fill_n(eight + kLanes * j, kLanes, 0.0);
       surface_.solve<kLanes>(eight);
       for (const uint32_t j : given_) std::fill_n(eight + kLanes * j, kLanes, 0.0);
     });
+  }
   factor_.inverse_at(*kernels, n, points, w);
   const size_t rows = 3 * size_t(n);
   const auto fixed = [&](size_t j) { return is_held(3 * size_t(points[j / 3]) + j % 3); };

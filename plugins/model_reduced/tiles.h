@@ -11,7 +11,8 @@ namespace reduced {
 
 using model::Buffer;
 
-// Numbers by rows, each filled with zeros to an odd multiple of kLanes: rows of a part then share no cache lines.
+// Numbers by rows, each filled with zeros to an odd multiple of kLanes: the rows of a part then lie in
+// different sets of the cache.
 class Table {
  public:
   size_t rows = 0, columns = 0;
@@ -34,8 +35,6 @@ class Table {
 struct Tile {
   Table left, right;
   bool thin() const { return right.rows > 0; }
-  size_t rows() const { return left.rows; }
-  size_t columns() const { return thin() ? right.columns : left.columns; }
 };
 
 class Tiles {
