@@ -13,7 +13,7 @@ namespace reduced {
 void Body::create(const dfm_host *h, const dfm_mesh &m) {
   host = h;
   if (!model::in_range(h, id_, kParams, kParamCount, m.params)) throw model::Refused{};
-  if (condensed_) check_size(m.nsurfel, m.npoint);
+  if (condensed_) check_size(m.nsurfel, by_surface_ ? m.nsurfel : m.npoint);
   elastic_.create(h, id_, m, by_surface_);
   modes_.create(h, id_, m, elastic_, m.params);
   take_surface(m);
@@ -110,7 +110,7 @@ void Body::reserve() {
   lanes_.create(host, kLanes * row_width());
   responses_.create(host, kLanes * 3 * size_t(nsurfel_));
   if (!condensed_) return;
-  columns_.create_raw(host, 3 * size_t(nsurfel_) * size());  // memory that is not written costs nothing
+  columns_.create_raw(host, 9 * size_t(nsurfel_) * nlead_);  // memory that is not written costs nothing
   known_.create(host, 3 * size_t(nsurfel_));
   eight_.create(host, kLanes * size());
   between_.create(host, 12 * (size_t(nsurfel_) + kLanes));

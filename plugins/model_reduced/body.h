@@ -78,7 +78,7 @@ class Body {
   Buffer<double> twist_;     // [3,modes,modes] sum m W_k x W_l; floating
   Buffer<double> gradient_;  // [modes] the largest displacement gradient of a cell, per unit
   // Condensed: C_rest is the response at rest of what the modes leave out.
-  Buffer<double> columns_;  // [3 nsurfel, 3 npoint] of it to unit forces at surfels, as they are touched
+  Buffer<double> columns_;  // [3 nsurfel, 3 nlead_] of it to unit forces at surfels, as they are touched
   Buffer<uint8_t> known_;   // [3 nsurfel]
   Buffer<double> eight_;    // [3 npoint,8]
   Buffer<double> between_;  // [9,n] blocks of C_rest from one surfel to n; [3,n] what it answers
@@ -95,6 +95,7 @@ class Body {
   size_t at_impulse() const { return at_near() + 3 * size_t(nnear_); }
   uint32_t nnear_ = 0;  // points that a surfel depends on, or that are held
   uint32_t nfree_ = 0;  // of these, that are not held in all components
+  uint32_t nlead_ = 0;  // near, or not following others
   // [npoint] of points in columns_, the free near ones first, then the other near ones; and back
   Buffer<uint32_t> place_, point_;
   Buffer<double> near_response_;     // condensed: C_rest between the free near points, [3 nfree,3 nfree]

@@ -20,14 +20,13 @@
 
 #include "../model_common/entry.h"
 #include "small.h"
-#include "sparse.h"
 
 namespace reduced {
 
 namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
-constexpr size_t kMaxTriangles = 1600;
+constexpr size_t kCluster = 128;  // triangles, points
 constexpr int kDeepest = 3;
 
 // Of (x, y) against the axis x, in -pi .. pi: the angle is halved three times, then a series.
@@ -74,7 +73,40 @@ struct Kelvin {
   }
 };
 
+// Numbers of neighbors in space that lie behind each other, at most kCluster: halves of the longest side of
+// what holds them. place [n]: of each in that order.
+void divide(const std::vector<double> &x, uint32_t *own, size_t n, size_t parts, std::vector<size_t> &out) {
+  if (parts == 1) return out.push_back(n);
+  double most = -1;
+  size_t side = 0;
+  for (size_t a = 0; a < 3; ++a) {
+    const auto less = [&](uint32_t i, uint32_t j) { return x[3 * size_t(i) + a] < x[3 * size_t(j) + a]; };
+    const auto [low, high] = std::minmax_element(own, own + n, less);
+    const double length = x[3 * size_t(*high) + a] - x[3 * size_t(*low) + a];
+    if (!(length > most)) continue;
+    most = length;
+    side = a;
+  }
+  const size_t half = n * (parts / 2) / parts;
+  std::nth_element(own, own + half, own + n, [&](uint32_t i, uint32_t j) {
+    const double a = x[3 * size_t(i) + side], b = x[3 * size_t(j) + side];
+    return a < b || (a == b && i < j);
+  });
+  divide(x, own, half, parts / 2, out);
+  divide(x, own + half, n - half, parts - parts / 2, out);
+}
+
 }  // namespace
+
+// The order of places in space; numbers of components in each of its clusters.
+static std::vector<size_t> clusters_of(const std::vector<double> &x, std::vector<uint32_t> &order) {
+  order.resize(x.size() / 3);
+  for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
+  std::vector<size_t> out;
+  if (!order.empty()) divide(x, order.data(), order.size(), (order.size() + kCluster - 1) / kCluster, out);
+  for (size_t &n : out) n *= 3;
+  return out;
+}
 
 struct Boundary::Triangle {
   uint32_t corner[3];
@@ -234,12 +266,6 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
       place[i] = 0;
     }
   }
-  if (ntriangle() > kMaxTriangles) {
-    model::refuse(host, id,
-                  "%zu triangles; boundary elements of more than %zu are refused, because time grows "
-                  "with their cube; take a coarser surface, or the model condensed",
-                  ntriangle(), kMaxTriangles);
-  }
   // The first point of each piece leads its others.
   std::vector<uint32_t> leader(m.npoint);
   for (uint32_t i = 0; i < m.npoint; ++i) leader[i] = i;
@@ -265,128 +291,164 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
     for (size_t j = i + 1; j < point.size(); ++j) edges.insert(edges.end(), {point[i], point[j]});
 }
 
-double *Boundary::block_at(double *block, size_t i, size_t j) const {
+const double *Boundary::block_at(const double *block, size_t i, size_t j) const {
   const size_t npoint = point.size() + inner.size();
   return block + 9 * (i == j ? size_t(point[i]) : npoint + pair(i, j));
 }
 
-// single [pairs of triangles, 9] in the order of rows p and columns q >= p; both [3 surface in lanes of 8]
-void Boundary::add_pairs(const std::vector<Triangle> &t, double young, double poisson,
-                         std::vector<double> &single, std::vector<double> &both, double *block) {
+// single [triangles, triangles], both [triangles, points]. A row of triangles at a time; the stiffness takes
+// half of each integral and of the one in the other order.
+void Boundary::add_pairs(const std::vector<Triangle> &t, double young, double poisson, Tiles &single,
+                         Tiles &both, double *block) {
   const Kelvin kelvin(young, poisson);
-  const size_t rows = 3 * t.size();
-  const auto row_of = [&](size_t p, size_t i, size_t a, size_t b) -> double & {
-    const size_t column = 3 * i + b;
-    return both[(column / kLanes * rows + 3 * p + a) * kLanes + column % kLanes];
-  };
+  const size_t n = point.size();
   double largest = 0, apart = 0;
-  for (size_t p = 0; p < t.size(); ++p)
-    for (size_t q = p; q < t.size(); ++q) {
-      Integrals pair[2];  // over x in p, and over x in q
-      t[p].outer(t[q], t[p].y, 1, 0, pair[0]);
-      if (p == q) pair[1] = pair[0];
-      else t[q].outer(t[p], t[q].y, 1, 0, pair[1]);
-      double u[2][9], mean[9];
-      for (int side = 0; side < 2; ++side) kelvin.u(pair[side], u[side]);
-      for (int r = 0; r < 3; ++r)
-        for (int s = 0; s < 3; ++s) {
-          const double a = u[0][3 * r + s], b = u[1][3 * s + r];
-          mean[3 * r + s] = 0.5 * (a + b);
-          largest = std::max(largest, std::fabs(a));
-          apart = std::max(apart, std::fabs(a - b));
-        }
-      single.insert(single.end(), mean, mean + 9);
-      for (int side = 0; side < (p == q ? 1 : 2); ++side) {
-        const size_t at = side ? q : p;
-        const Triangle &y = side ? t[p] : t[q];
+  for (size_t cluster = 0; cluster < single.nrow(); ++cluster) {
+    const size_t first = single.row(cluster) / 3, until = single.row(cluster + 1) / 3;
+    Table row, column;
+    row.create(host_, 3 * (until - first), 3 * t.size());
+    column.create(host_, 3 * (until - first), 3 * n);
+    for (size_t p = first; p < until; ++p) {
+      std::vector<double> of_cross(9 * n), of_dot(3 * n);  // sums of g [ca]x, and of ca over r, by point
+      double *to[3], *at[3];
+      for (size_t r = 0; r < 3; ++r) {
+        to[r] = row.row(3 * (p - first) + r);
+        at[r] = column.row(3 * (p - first) + r);
+      }
+      for (size_t q = 0; q < t.size(); ++q) {
+        Integrals pair;
+        t[p].outer(t[q], t[p].y, 1, 0, pair);
+        double u[9], g[9];
+        kelvin.u(pair, u);
+        for (size_t r = 0; r < 3; ++r) std::copy_n(u + 3 * r, 3, to[r] + 3 * q);
+        const double over = kelvin.mu / (4 * kPi) * pair.inverse;
+        for (int a = 0; a < 9; ++a) g[a] = (a % 4 ? 0 : 2 * over) - 4 * kelvin.mu * kelvin.mu * u[a];
         for (int a = 0; a < 3; ++a) {
+          const size_t i = t[q].corner[a];
+          const double *const c = t[q].c[a];
           double k[9];
-          kelvin.double_layer(pair[side], u[side], a, y.c[a], k);
+          kelvin.double_layer(pair, u, a, c, k);
           for (size_t r = 0; r < 3; ++r)
-            for (size_t s = 0; s < 3; ++s) row_of(at, y.corner[a], r, s) += k[3 * r + s];
-          if (p == q)
-            for (size_t r = 0; r < 3; ++r) row_of(at, y.corner[a], r, r) += y.area / 6;
+            for (size_t s = 0; s < 3; ++s)
+              at[r][3 * order_[i] + s] += k[3 * r + s] + (p == q && r == s ? t[p].area / 6 : 0);
+          double *const cross = &of_cross[9 * i];
+          for (int r = 0; r < 3; ++r) {
+            const double *const from = g + 3 * r;
+            cross[3 * r] += from[1] * c[2] - from[2] * c[1];
+            cross[3 * r + 1] += from[2] * c[0] - from[0] * c[2];
+            cross[3 * r + 2] += from[0] * c[1] - from[1] * c[0];
+            of_dot[3 * i + size_t(r)] += over * c[r];
+          }
         }
       }
-      const double inverse = 0.5 * (pair[0].inverse + pair[1].inverse),
-                   over = kelvin.mu / (4 * kPi) * inverse;
-      double g[9];
-      for (int a = 0; a < 9; ++a) g[a] = (a % 4 ? 0 : 2 * over) - 4 * kelvin.mu * kelvin.mu * mean[a];
       for (int b = 0; b < 3; ++b)
-        for (int a = 0; a < 3; ++a) {
-          const double *const cb = t[p].c[b], *const ca = t[q].c[a];
-          double right[9], f[9];
-          for (int r = 0; r < 3; ++r) {  // g [ca]x
-            const double *const row = g + 3 * r;
-            right[3 * r] = row[1] * ca[2] - row[2] * ca[1];
-            right[3 * r + 1] = row[2] * ca[0] - row[0] * ca[2];
-            right[3 * r + 2] = row[0] * ca[1] - row[1] * ca[0];
+        for (size_t j = 0; j < n; ++j) {
+          const size_t i = t[p].corner[b];
+          const double *const c = t[p].c[b], *const x = &of_cross[9 * j], *const d = &of_dot[3 * j];
+          const double twice = 2 * dot(c, d);
+          double f[9];
+          for (int s = 0; s < 3; ++s) {  // -[c]x
+            f[s] = c[2] * x[3 + s] - c[1] * x[6 + s];
+            f[3 + s] = c[0] * x[6 + s] - c[2] * x[s];
+            f[6 + s] = c[1] * x[s] - c[0] * x[3 + s];
           }
-          for (int s = 0; s < 3; ++s) {  // -[cb]x right
-            f[s] = cb[2] * right[3 + s] - cb[1] * right[6 + s];
-            f[3 + s] = cb[0] * right[6 + s] - cb[2] * right[s];
-            f[6 + s] = cb[1] * right[s] - cb[0] * right[3 + s];
-          }
-          for (int r = 0; r < 3; ++r)
-            for (int s = 0; s < 3; ++s)
-              f[3 * r + s] += over * ((r == s ? 2 * dot(cb, ca) : 0) - cb[r] * ca[s]);
-          const size_t i = t[p].corner[b], j = t[q].corner[a];
-          if (p == q && i > j) continue;
-          double *const to = block_at(block, std::min(i, j), std::max(i, j));
+          double *const half = block_at(block, std::min(i, j), std::max(i, j));
           for (int r = 0; r < 3; ++r)
             for (int s = 0; s < 3; ++s) {
-              if (i <= j) to[3 * r + s] += f[3 * r + s];
-              else to[3 * r + s] += f[3 * s + r];
-              if (i == j && p != q) to[3 * r + s] += f[3 * s + r];
+              const double own = 0.5 * (f[3 * r + s] + ((r == s ? twice : 0) - c[r] * d[s]));
+              if (i <= j) half[3 * r + s] += own;
+              if (i >= j) half[3 * s + r] += own;
             }
         }
     }
+    for (size_t other = 0; other < single.ncolumn(); ++other) {
+      Table own, before;
+      const size_t from = single.column(other);
+      single.table(other, cluster, own);
+      for (size_t i = 0; i < own.rows; ++i)
+        for (size_t j = 0; j < own.columns; ++j) own.row(i)[j] = row.row(j)[from + i];
+      if (other > cluster) {
+        single.set(other, cluster, std::move(own));
+        continue;
+      }
+      Table mean;
+      single.table(cluster, other, mean);
+      if (other < cluster) single.get(cluster, other, before);
+      for (size_t i = 0; i < mean.rows; ++i)
+        for (size_t j = 0; j < mean.columns; ++j) {
+          const double a = own.row(j)[i], b = other < cluster ? before.row(i)[j] : own.row(i)[j];
+          mean.row(i)[j] = 0.5 * (a + b);
+          largest = std::max(largest, std::fabs(a));
+          apart = std::max(apart, std::fabs(a - b));
+        }
+      single.set(cluster, other, std::move(mean));
+    }
+    for (size_t other = 0; both.column(other) < 3 * n; ++other) {
+      Table own;
+      both.table(cluster, other, own);
+      for (size_t i = 0; i < own.rows; ++i)
+        std::copy_n(column.row(i) + both.column(other), own.columns, own.row(i));
+      both.set(cluster, other, std::move(own));
+    }
+  }
   asymmetry_ = apart / largest;
 }
 
 void Boundary::assemble(const char *id, const Kernels &kernels, const double *rest, double young,
                         double poisson, double *block) {
-  const size_t n = point.size(), many = ntriangle(), rows = 3 * many;
-  std::vector<Triangle> t(many);
+  const size_t many = ntriangle();
+  std::vector<Triangle> made(many), t(many);
   std::vector<double> places;
   for (size_t k = 0; k < many; ++k) {
     const uint32_t *const corner = triangles_.data() + 3 * k;
     const double *x[3];
     for (int a = 0; a < 3; ++a) x[a] = rest + 3 * size_t(point[corner[a]]);
-    t[k].take(corner, x);
-    places.insert(places.end(), t[k].center, t[k].center + 3);
+    made[k].take(corner, x);
+    places.insert(places.end(), made[k].center, made[k].center + 3);
   }
-  const size_t lanes = (3 * n + kLanes - 1) / kLanes;
-  std::vector<double> both(lanes * rows * kLanes), traction(both.size());
+  std::vector<uint32_t> kth;
+  const std::vector<size_t> triangles = clusters_of(places, kth);
+  for (size_t k = 0; k < many; ++k) t[k] = made[kth[k]];
+  const auto order = [&](const std::vector<uint32_t> &points, std::vector<uint32_t> &at,
+                         std::vector<uint32_t> &out) {
+    places.clear();
+    for (const uint32_t i : points)
+      places.insert(places.end(), rest + 3 * size_t(i), rest + 3 * (size_t(i) + 1));
+    const std::vector<size_t> clusters = clusters_of(places, at);
+    out.resize(points.size());
+    for (uint32_t k = 0; k < at.size(); ++k) out[at[k]] = k;
+    return clusters;
+  };
+  clusters_ = order(point, point_at_, order_);
+  const std::vector<size_t> inside = order(inner, inner_at_, inner_order_);
+  std::vector<size_t> columns = clusters_;
+  columns.insert(columns.end(), inside.begin(), inside.end());
+  packed_.create(host_, kLanes * 3 * (point.size() + inner.size()));
+  Tiles both;
+  both.create(host_, &kernels, triangles, columns);
+  follow_.create(host_, &kernels, inside, clusters_);
   {
-    std::vector<double> single;
-    single.reserve(9 * (many * (many + 1) / 2));
+    Tiles single;
+    single.create(host_, &kernels, triangles, triangles);
     add_pairs(t, young, poisson, single, both, block);
-    std::vector<uint32_t> ij;
-    ij.reserve(many * (many + 1));
-    for (uint32_t p = 0; p < many; ++p)
-      for (uint32_t q = p; q < many; ++q) ij.insert(ij.end(), {p, q});
-    Factor factor;
-    factor.create(host_, uint32_t(many), ij, single, places.data());
-    for (size_t l = 0; l < lanes; ++l)
-      factor.solve_eight(kernels, both.data() + l * rows * kLanes, traction.data() + l * rows * kLanes);
+    add_inner(id, t, rest, young, poisson, both);
+    single.factorize();
+    single.reduce(both);
   }
-  for (size_t l = 0; l < lanes; ++l)
-    for (size_t m = l; m < lanes; ++m) {
-      double sum[kLanes * kLanes] = {};
-      kernels.gram(rows, both.data() + l * rows * kLanes, traction.data() + m * rows * kLanes, sum);
-      for (size_t a = 0; a < kLanes; ++a)
-        for (size_t b = 0; b < kLanes; ++b) {
-          const size_t row = kLanes * l + a, column = kLanes * m + b;
-          if (column >= 3 * n || row / 3 > column / 3) continue;
-          // on the diagonal blocks of the lanes both orders are there; one of them is taken
-          double *const to = block_at(block, row / 3, column / 3);
-          to[3 * (row % 3) + column % 3] += sum[kLanes * a + b];
-          if (row / 3 == column / 3 && row / kLanes != column / kLanes)
-            to[3 * (column % 3) + row % 3] += sum[kLanes * a + b];
-        }
+  const size_t nsurface = clusters_.size();
+  for (size_t a = 0; a < columns.size(); ++a)
+    for (size_t b = 0; b < nsurface; ++b) {
+      if (a < nsurface && b > a) continue;
+      Table f;
+      if (a < nsurface) f.create(host_, columns[a], columns[b]);
+      else follow_.get(a - nsurface, b, f);
+      Tiles::subtract_gram(both, a, b, f);
+      if (a < nsurface) {
+        add_stiffness(both.column(a) / 3, both.column(b) / 3, f, block);
+        continue;
+      }
+      follow_.set(a - nsurface, b, std::move(f));
     }
-  lead_inner(id, kernels, t, rest, young, poisson, traction);
   make_rigid_exact(rest, block);
   model::say(host_, asymmetry_ > 1e-3 ? 2 : 1, id,
              "%zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
@@ -394,37 +456,44 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
              many, asymmetry_, rigid_error_);
 }
 
-// u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u.
-void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vector<Triangle> &t,
-                          const double *rest, double young, double poisson,
-                          const std::vector<double> &traction) {
+// block -= f, at clusters of points from which on
+void Boundary::add_stiffness(size_t row, size_t column, const Table &f, double *block) {
+  for (size_t a = 0; 3 * a < f.rows; ++a)
+    for (size_t b = 0; 3 * b < f.columns; ++b) {
+      const size_t i = point_at_[row + a], j = point_at_[column + b];
+      if (row == column && i > j) continue;
+      double *const to = block_at(block, std::min(i, j), std::max(i, j));
+      for (size_t r = 0; r < 3; ++r)
+        for (size_t s = 0; s < 3; ++s) to[i <= j ? 3 * r + s : 3 * s + r] -= f.row(3 * a + r)[3 * b + s];
+    }
+}
+
+// u(x) = sum of U t - K u for x inside (Somigliana's identity), t = W^-1 (1/2 + K) u: U goes to both, K to
+// follow_.
+void Boundary::add_inner(const char *id, const std::vector<Triangle> &t, const double *rest, double young,
+                         double poisson, Tiles &both) {
   const Kelvin kelvin(young, poisson);
-  const size_t rows = 3 * t.size(), columns = 3 * point.size(), own = 3 * inner.size(), row_size = padded();
-  follow_.create(host_, own * row_size);
-  packed_.create(host_, kLanes * (row_size + own));
-  std::vector<double> loads(rows * kLanes);
-  for (size_t first = 0; first < own; first += kLanes) {
-    const size_t many = std::min(kLanes, own - first);
-    for (size_t i = first / 3; 3 * i < first + many; ++i) {
+  for (size_t cluster = 0; cluster < follow_.nrow(); ++cluster) {
+    const size_t first = follow_.row(cluster) / 3, until = follow_.row(cluster + 1) / 3;
+    Table load, lead;
+    load.create(host_, 3 * t.size(), 3 * (until - first));
+    lead.create(host_, 3 * (until - first), 3 * point.size());
+    for (size_t k = first; k < until; ++k) {
+      const uint32_t i = inner[inner_at_[k]];
       double solid = 0;
       for (size_t q = 0; q < t.size(); ++q) {
         Integrals at;
-        t[q].inner(rest + 3 * size_t(inner[i]), false, at);
-        double u[9], k[9];
+        t[q].inner(rest + 3 * size_t(i), false, at);
+        double u[9], c[9];
         kelvin.u(at, u);
         solid += at.normal[0] + at.normal[1] + at.normal[2];
-        for (size_t r = 0; r < 3; ++r) {
-          const size_t row = 3 * i + r;
-          if (row < first || row >= first + many) continue;
-          for (size_t s = 0; s < 3; ++s) loads[(3 * q + s) * kLanes + row - first] = u[3 * r + s];
-        }
+        for (size_t r = 0; r < 3; ++r)
+          for (size_t s = 0; s < 3; ++s) load.row(3 * q + s)[3 * (k - first) + r] = u[3 * r + s];
         for (int a = 0; a < 3; ++a) {
-          kelvin.double_layer(at, u, a, t[q].c[a], k);
-          for (size_t r = 0; r < 3; ++r) {
-            const size_t row = 3 * i + r;
-            if (row < first || row >= first + many) continue;
-            for (size_t s = 0; s < 3; ++s) follow_[row * row_size + 3 * t[q].corner[a] + s] -= k[3 * r + s];
-          }
+          kelvin.double_layer(at, u, a, t[q].c[a], c);
+          for (size_t r = 0; r < 3; ++r)
+            for (size_t s = 0; s < 3; ++s)
+              lead.row(3 * (k - first) + r)[3 * order_[t[q].corner[a]] + s] += c[3 * r + s];
         }
       }
       if (std::fabs(solid + 4 * kPi) < 1) continue;  // NaN on an edge
@@ -432,15 +501,16 @@ void Boundary::lead_inner(const char *id, const Kernels &kernels, const std::vec
           host_, id,
           "point %u is a corner of cells, but not inside their border: flat cells are there; remove "
           "them, or take the model condensed",
-          inner[i]);
+          i);
     }
-    for (size_t l = 0; kLanes * l < columns; ++l) {
-      double sum[kLanes * kLanes] = {};
-      kernels.gram(rows, loads.data(), traction.data() + l * rows * kLanes, sum);
-      for (size_t a = 0; a < many; ++a)
-        for (size_t b = 0; b < kLanes && kLanes * l + b < columns; ++b)
-          follow_[(first + a) * row_size + kLanes * l + b] += sum[kLanes * a + b];
-    }
+    const auto cut = [&](Tiles &to, size_t r, size_t c, const Table &from, size_t i, size_t j) {
+      Table own;
+      to.table(r, c, own);
+      for (size_t n = 0; n < own.rows; ++n) std::copy_n(from.row(i + n) + j, own.columns, own.row(n));
+      to.set(r, c, std::move(own));
+    };
+    for (size_t r = 0; r < both.nrow(); ++r) cut(both, r, clusters_.size() + cluster, load, both.row(r), 0);
+    for (size_t c = 0; c < follow_.ncolumn(); ++c) cut(follow_, cluster, c, lead, 0, follow_.column(c));
   }
 }
 
@@ -506,62 +576,113 @@ void Boundary::make_rigid_exact(const double *rest, double *block) {
             b[3 * r + s] -=
                 force[k][3 * i + r] * rigid[k][3 * j + s] + rigid[k][3 * i + r] * force[k][3 * j + s];
     }
-  for (size_t row = 0; row < 3 * inner.size(); ++row) {
-    double *const follows = follow_.data() + row * padded();
-    for (const std::vector<double> &r : rigid) {
-      double missing = r[size + row];
-      for (size_t j = 0; j < size; ++j) missing -= follows[j] * r[j];
-      for (size_t j = 0; j < size; ++j) follows[j] += missing * r[j];
+  rigid_.create(host_, 6 * size);
+  missing_.create(host_, 6 * 3 * inner.size());
+  std::vector<double> lanes(kLanes * size), led(kLanes * 3 * inner.size());
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t j = 0; j < size; ++j)
+      lanes[kLanes * (3 * order_[j / 3] + j % 3) + k] = rigid_[6 * (3 * order_[j / 3] + j % 3) + k] =
+          rigid[k][j];
+  follow_.add<kLanes>(lanes.data(), led.data());  // -u of inner points
+  for (size_t k = 0; k < 6; ++k)
+    for (size_t j = 0; j < 3 * inner.size(); ++j) {
+      const size_t to = 3 * inner_order_[j / 3] + j % 3;
+      missing_[6 * to + k] = rigid[k][size + j] + led[kLanes * to + k];
     }
-  }
 }
 
+// -follow_ and what it misses of rigid motions.
 template <size_t kWide>
 void Boundary::gather(double *f) const {
-  const size_t size = 3 * point.size(), row_size = padded();
-  double *const own = packed_.data();
-  std::fill(own, own + kWide * size, 0.0);
+  const size_t size = 3 * point.size(), rows = 3 * inner.size();
+  double *const own = packed_.data(), *const from = own + kWide * size;
   bool any = false;
-  for (size_t row = 0; row < 3 * inner.size(); ++row) {
-    double *const from = f + kWide * (3 * size_t(inner[row / 3]) + row % 3);
-    if (std::all_of(from, from + kWide, [](double a) { return a == 0; })) continue;
-    any = true;
-    const double *const follows = follow_.data() + row_size * row;
-    for (size_t j = 0; j < size; ++j)
-      for (size_t w = 0; w < kWide; ++w) own[kWide * j + w] += follows[j] * from[w];
-    std::fill(from, from + kWide, 0.0);
+  std::fill(own, from + kWide * rows, 0.0);
+  for (size_t row = 0; row < rows; ++row)
+    for (size_t w = 0; w < kWide; ++w) {
+      double &force = f[kWide * (3 * size_t(inner[row / 3]) + row % 3) + w];
+      any = any || force != 0;
+      from[kWide * (3 * inner_order_[row / 3] + row % 3) + w] = -force;
+      force = 0;
+    }
+  if (!any) return;
+  follow_.add_transposed<kWide>(from, own);
+  double along[6][kWide] = {};
+  for (size_t row = 0; row < rows; ++row)
+    for (size_t k = 0; k < 6; ++k)
+      for (size_t w = 0; w < kWide; ++w) along[k][w] -= missing_[6 * row + k] * from[kWide * row + w];
+  for (size_t j = 0; j < size; ++j) {
+    const size_t at = 3 * order_[j / 3] + j % 3;
+    for (size_t w = 0; w < kWide; ++w) {
+      double sum = own[kWide * at + w];
+      for (size_t k = 0; k < 6; ++k) sum += rigid_[6 * at + k] * along[k][w];
+      f[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] += sum;
+    }
   }
-  for (size_t j = 0; any && j < size; ++j)
-    for (size_t w = 0; w < kWide; ++w)
-      f[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] += own[kWide * j + w];
 }
 
-// Of one vector eight sums side by side.
 template <size_t kWide>
-void Boundary::spread(const Kernels &kernels, double *u) const {
-  const size_t size = 3 * point.size(), row_size = padded(), rows = 3 * inner.size();
-  double *const own = packed_.data(), *const led = own + kLanes * row_size;
-  for (size_t j = 0; j < row_size; ++j)
+void Boundary::pack(const double *u) const {
+  std::fill(packed_.data(), packed_.data() + kWide * 3 * (point.size() + inner.size()), 0.0);
+  for (size_t j = 0; j < 3 * point.size(); ++j)
     for (size_t w = 0; w < kWide; ++w)
-      own[kWide * j + w] = j < size ? u[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] : 0;
-  if constexpr (kWide == 1) {
-    for (size_t row = 0; row < rows; ++row) {
-      const double *const follows = follow_.data() + row_size * row;
-      double sum[kLanes] = {};
-      for (size_t j = 0; j < row_size; j += kLanes)
-        for (size_t w = 0; w < kLanes; ++w) sum[w] += follows[j + w] * own[j + w];
-      led[row] = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
+      packed_[kWide * (3 * order_[j / 3] + j % 3) + w] = u[kWide * (3 * size_t(point[j / 3]) + j % 3) + w];
+}
+
+template <size_t kWide>
+void Boundary::spread(double *u) const {
+  const size_t size = 3 * point.size(), rows = 3 * inner.size();
+  pack<kWide>(u);
+  double *const own = packed_.data(), *const led = own + kWide * size;
+  follow_.add<kWide>(own, led);
+  double along[6][kWide] = {};
+  for (size_t j = 0; j < size; ++j)
+    for (size_t k = 0; k < 6; ++k)
+      for (size_t w = 0; w < kWide; ++w) along[k][w] += rigid_[6 * j + k] * own[kWide * j + w];
+  for (size_t row = 0; row < rows; ++row) {
+    const size_t at = 3 * inner_order_[row / 3] + row % 3;
+    for (size_t w = 0; w < kWide; ++w) {
+      double sum = -led[kWide * at + w];
+      for (size_t k = 0; k < 6; ++k) sum += missing_[6 * at + k] * along[k][w];
+      u[kWide * (3 * size_t(inner[row / 3]) + row % 3) + w] = sum;
     }
-  } else {
-    kernels.rows(follow_.data(), rows, row_size, own, led);
   }
-  for (size_t row = 0; row < rows; ++row)
-    std::copy_n(led + kWide * row, kWide, u + kWide * (3 * size_t(inner[row / 3]) + row % 3));
+}
+
+template <size_t kWide>
+void Boundary::solve(double *u) const {
+  pack<kWide>(u);
+  factor_.solve<kWide>(packed_.data());
+  for (size_t j = 0; j < 3 * point.size(); ++j)
+    for (size_t w = 0; w < kWide; ++w)
+      u[kWide * (3 * size_t(point[j / 3]) + j % 3) + w] = packed_[kWide * (3 * order_[j / 3] + j % 3) + w];
+}
+
+void Boundary::factorize(const Kernels &kernels, const double *block, const std::vector<uint8_t> &out) {
+  factor_.create(host_, &kernels, clusters_, clusters_);
+  for (size_t a = 0; a < clusters_.size(); ++a)
+    for (size_t b = 0; b <= a; ++b) {
+      Table own;
+      factor_.table(a, b, own);
+      for (size_t n = 0; n < own.rows; ++n)
+        for (size_t m = 0; m < own.columns; ++m) {
+          const size_t row = factor_.row(a) + n, column = factor_.column(b) + m;
+          const size_t i = point_at_[row / 3], j = point_at_[column / 3];
+          const double *const from = block_at(block, std::min(i, j), std::max(i, j));
+          const double value = i <= j ? from[3 * (row % 3) + column % 3] : from[3 * (column % 3) + row % 3];
+          const bool off = out[3 * size_t(point[i]) + row % 3] || out[3 * size_t(point[j]) + column % 3];
+          if (!off || row == column) own.row(n)[m] = value;
+        }
+      factor_.set(a, b, std::move(own));
+    }
+  factor_.factorize();
 }
 
 template void Boundary::gather<1>(double *) const;
 template void Boundary::gather<kLanes>(double *) const;
-template void Boundary::spread<1>(const Kernels &, double *) const;
-template void Boundary::spread<kLanes>(const Kernels &, double *) const;
+template void Boundary::spread<1>(double *) const;
+template void Boundary::spread<kLanes>(double *) const;
+template void Boundary::solve<1>(double *) const;
+template void Boundary::solve<kLanes>(double *) const;
 
 }  // namespace reduced

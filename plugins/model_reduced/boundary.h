@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "../model_common/buffer.h"
-#include "reduced_kernel.h"
+#include "tiles.h"
 
 namespace reduced {
 
@@ -26,12 +26,17 @@ class Boundary {
   void assemble(const char *id, const Kernels &kernels, const double *rest, double young, double poisson,
                 double *block);
 
+  // Of the stiffness without these components of all points, which are to be zero in solve.
+  void factorize(const Kernels &kernels, const double *block, const std::vector<uint8_t> &out);
+
   // kWide vectors side by side, [3 npoint,kWide]: forces of inner points go to the surface; displacements of
-  // the surface lead the inner points.
+  // the surface by forces at it; they lead the inner points.
   template <size_t kWide>
   void gather(double *f) const;
   template <size_t kWide>
-  void spread(const Kernels &kernels, double *u) const;
+  void solve(double *u) const;
+  template <size_t kWide>
+  void spread(double *u) const;
 
  private:
   struct Triangle;
@@ -42,15 +47,26 @@ class Boundary {
   double rigid_error_ = 0, asymmetry_ = 0;
   size_t ntriangle() const { return triangles_.size() / 3; }
   std::vector<uint32_t> triangles_;  // [.,3] counter-clockwise from outside, places in `point`
-  Buffer<double> follow_;            // [3 inner, padded 3 surface]
-  mutable Buffer<double> packed_;    // [padded 3 surface, kLanes]; behind it [3 inner, kLanes]
-  size_t padded() const { return (3 * point.size() + kLanes - 1) / kLanes * kLanes; }
-  void add_pairs(const std::vector<Triangle> &t, double young, double poisson, std::vector<double> &single,
-                 std::vector<double> &both, double *block);
+  // In the order of clusters: places in `point` and `inner`, and back; numbers of components.
+  std::vector<uint32_t> point_at_, order_, inner_at_, inner_order_;
+  std::vector<size_t> clusters_;
+  Tiles follow_;  // [3 inner, 3 surface], negative
+  Tiles factor_;
+  Buffer<double> rigid_,
+      missing_;                    // [.,6] rigid motions at the surface; of inner points, what follow_ misses
+  mutable Buffer<double> packed_;  // [3 surface, kLanes]; behind it [3 inner, kLanes]
+  template <size_t kWide>
+  void pack(const double *u) const;
+  void add_pairs(const std::vector<Triangle> &t, double young, double poisson, Tiles &single, Tiles &both,
+                 double *block);
+  void add_inner(const char *id, const std::vector<Triangle> &t, const double *rest, double young,
+                 double poisson, Tiles &both);
+  void add_stiffness(size_t row, size_t column, const Table &f, double *block);
   size_t pair(size_t i, size_t j) const { return i * (2 * point.size() - i - 1) / 2 + (j - i - 1); }
-  double *block_at(double *block, size_t i, size_t j) const;
-  void lead_inner(const char *id, const Kernels &kernels, const std::vector<Triangle> &t, const double *rest,
-                  double young, double poisson, const std::vector<double> &traction);
+  const double *block_at(const double *block, size_t i, size_t j) const;
+  double *block_at(double *block, size_t i, size_t j) const {
+    return const_cast<double *>(block_at(const_cast<const double *>(block), i, j));
+  }
   void make_rigid_exact(const double *rest, double *block);
 };
 

@@ -252,11 +252,11 @@ void Elastic::check_holding() const {
   if (inside) host_->log(host_->ctx, 2, 0, kInside);
 }
 
-// Given displacements have a row and a column of their own, and so have those of points that follow.
+// Given displacements have a row and a column of their own.
 void Elastic::factorize() {
   std::vector<uint8_t> out(3 * size_t(npoint));
   for (const uint32_t j : given_) out[j] = 1;
-  for (const uint32_t i : surface_.inner) std::fill_n(&out[3 * size_t(i)], 3, uint8_t(1));
+  if (by_surface_) return surface_.factorize(*kernels, block_.data(), out);
   double mean = 0;
   for (size_t i = 0; i < npoint; ++i) mean += (block_[9 * i] + block_[9 * i + 4]) + block_[9 * i + 8];
   mean /= double(3 * size_t(npoint));
@@ -290,8 +290,8 @@ void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bo
   host_ = host;
   kernels = choose_kernels(host, id);
   by_surface_ = by_surface;
-  if (by_surface) surface_.find(host, id, m);  // its limit is the lower one
   take(m, id);
+  if (by_surface) surface_.find(host, id, m);
   place_origin(m);
   if (by_surface) take_surface(m, id);
   else nedge_ = model::list_pairs(host, cells_.data(), ncell, nodes_, edges_);
@@ -316,8 +316,15 @@ void Elastic::compliance_of_eight(const double *f, double *u) const { respond<kL
 
 // Held bodies alone: of a floating one the inertia forces act at all points.
 void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) const {
-  if (by_surface_)
-    return responses_at(npoint, n, points, w, [&](double *eight) { compliance_of_eight(eight, eight); });
+  if (by_surface_) {
+    const bool inside = !std::all_of(points, points + n, [&](uint32_t i) { return leads(i); });
+    return responses_at(npoint, n, points, w, [&](double *eight) {
+      if (inside) return compliance_of_eight(eight, eight);
+      for (const uint32_t j : given_) std::fill_n(eight + kLanes * j, kLanes, 0.0);
+      surface_.solve<kLanes>(eight);
+      for (const uint32_t j : given_) std::fill_n(eight + kLanes * j, kLanes, 0.0);
+    });
+  }
   factor_.inverse_at(*kernels, n, points, w);
   const size_t rows = 3 * size_t(n);
   const auto fixed = [&](size_t j) { return is_held(3 * size_t(points[j / 3]) + j % 3); };
@@ -337,11 +344,13 @@ void Elastic::respond(const double *f, double *u) const {
   const auto solve = [&] {
     if (by_surface_) surface_.gather<kWide>(u);
     clear_given();
+    if (by_surface_) {
+      surface_.solve<kWide>(u);
+      surface_.spread<kWide>(u);
+      return clear_given();
+    }
     if constexpr (kWide == 1) factor_.solve(u, u);
     else factor_.solve_eight(*kernels, u, u);
-    if (!by_surface_) return;
-    surface_.spread<kWide>(*kernels, u);
-    clear_given();
   };
   std::copy(f, f + kWide * size, u);
   if (!floating) return solve();
@@ -378,18 +387,28 @@ void Elastic::multiply(const double *u, double scale, double *out) const {
   }
 }
 
+// By surface in two passes: the factor of tiles is that of block_ to a tolerance.
 void Elastic::follow(double *u) const {
   double *const f = work_.data();
   const size_t size = 3 * size_t(npoint);
-  std::fill(f, f + size, 0.0);
-  multiply(u, -1, f);
-  for (const uint32_t j : given_) f[j] = 0;
-  factor_.solve(f, f);
-  for (const uint32_t j : given_) f[j] = u[j];
-  std::copy(f, f + size, u);
+  for (int pass = 0; pass < (by_surface_ ? 2 : 1); ++pass) {
+    std::fill(f, f + size, 0.0);
+    multiply(u, -1, f);
+    for (const uint32_t j : given_) f[j] = 0;
+    if (by_surface_) surface_.solve<1>(f);
+    else factor_.solve(f, f);
+    for (const uint32_t j : given_) f[j] = 0;
+    for (size_t j = 0; j < size; ++j) u[j] += f[j];
+  }
+  lead(u);
+}
+
+void Elastic::lead(double *u) const {
   if (!by_surface_) return;
-  surface_.spread<1>(*kernels, u);
-  for (const uint32_t j : given_) u[j] = f[j];
+  for (const uint32_t i : surface_.inner) std::copy_n(u + 3 * size_t(i), 3, work_.data() + 3 * size_t(i));
+  surface_.spread<1>(u);
+  for (const uint32_t j : given_)
+    if (!leads(j / 3)) u[j] = work_[j];
 }
 
 // h = sum u_a g_a^T

@@ -6,6 +6,7 @@
 #pragma once
 #include <deform/plugin.h>
 
+#include <algorithm>
 #include <array>
 #include <vector>
 
@@ -44,6 +45,11 @@ class Elastic {
   void compliance_between(uint32_t n, const uint32_t *points, double *w) const;
   // u: held components given, all others zero; becomes the displacement at rest under no force
   void follow(double *u) const;
+  // Displacements of points that follow those of the others.
+  bool leads(uint32_t point) const {
+    return !std::binary_search(surface_.inner.begin(), surface_.inner.end(), point);
+  }
+  void lead(double *u) const;
   // [ncell] cells, by the displacement u [3 npoint] in the frame
   double largest_gradient(const double *u, uint32_t *where) const;
   double density(uint32_t c, const double *u) const;            // J/m3

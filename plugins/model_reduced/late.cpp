@@ -30,23 +30,30 @@ void Body::look(double *state) { state[kLead] = double(Lead::points_for_now); }
 
 // Order of the points: the near ones first. And the shape of the modes at these.
 void Body::take_near(const dfm_mesh &m) {
-  std::vector<uint8_t> near(elastic_.npoint, elastic_.floating);
+  std::vector<uint8_t> near(elastic_.npoint), leads(elastic_.npoint);
+  for (uint32_t i = 0; i < elastic_.npoint; ++i) {
+    leads[i] = elastic_.leads(i);
+    near[i] = elastic_.floating && leads[i];
+  }
   for (uint32_t e = 0; e < (nsurfel_ ? row_[nsurfel_] : 0); ++e) near[col_[e]] = 1;
   for (uint32_t i = 0; i < elastic_.npoint; ++i) near[i] = near[i] || elastic_.held[i];
   place_.create(host, elastic_.npoint);
   point_.create(host, elastic_.npoint);
   uint32_t next = 0;
-  const auto take = [&](bool now, bool whole) {
+  const auto take = [&](const std::vector<uint8_t> &these, bool whole) {
     for (uint32_t i = 0; i < elastic_.npoint; ++i)
-      if (bool(near[i]) == now && (elastic_.held[i] == 7) == whole) {
+      if (place_[i] == UINT32_MAX && these[i] && (elastic_.held[i] == 7) == whole) {
         point_[next] = i;
         place_[i] = next++;
       }
     return next;
   };
-  nfree_ = take(true, false);
-  nnear_ = take(true, true);
-  take(false, false);
+  std::fill(place_.data(), place_.data() + elastic_.npoint, UINT32_MAX);
+  nfree_ = take(near, false);
+  nnear_ = take(near, true);
+  nlead_ = take(leads, false);
+  near.assign(near.size(), 1);
+  take(near, false);
   if (!can_be_late()) return;
   nstate_ = condensed_ ? at_impulse() + 3 * size_t(nsurfel_) : at_pull();
   const size_t nslot = (nstate_ + kWidest - 1) / kWidest;

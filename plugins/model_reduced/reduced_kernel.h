@@ -17,6 +17,19 @@ struct FactorView {
   const double *block;
 };
 
+// c [m,n] += a b, or -= a b; a [m,k] by any strides, b [k,n] and c in rows, n and their lengths multiples of
+// kLanes.
+struct Product {
+  size_t m, n, k;
+  const double *a;
+  size_t row, column;  // of a, from one to the next
+  const double *b;
+  size_t b_row;
+  double *c;
+  size_t c_row;
+  bool minus;
+};
+
 struct Kernels {
   // sums[v][k][lane] += over the pieces, in[v] of n right-hand sides, n at most 3
   void (*project)(const double *w, size_t pieces, size_t nmode, uint32_t n, const double *const *in,
@@ -34,6 +47,7 @@ struct Kernels {
   void (*gram)(size_t n, const double *left, const double *right, double *sum);
   // right -= left h, both [n,kLanes], h [kLanes,kLanes]
   void (*take_off)(size_t n, const double *left, const double *h, double *right);
+  void (*multiply)(const Product &p);
 };
 
 const Kernels *kernels_sse2();

@@ -175,7 +175,48 @@ void take_off(size_t n, const double *left, const double *h, double *right) {
   }
 }
 
-constexpr Kernels kKernels = {project, expand, rows, turned, solve, gram, take_off};
+template <bool Minus, size_t R, size_t S>
+DEFORM_INLINE void multiply_part(const Product &p, size_t i, size_t j, size_t from, size_t until) {
+  V sum[R][S];
+  DEFORM_UNROLL for (size_t r = 0; r < R; ++r) DEFORM_UNROLL for (size_t s = 0; s < S; ++s) sum[r][s] =
+      load(p.c + (i + r) * p.c_row + j + s * kWidth);
+  for (size_t k = from; k < until; ++k) {
+    const double *const a = p.a + i * p.row + k * p.column, *const b = p.b + k * p.b_row + j;
+    V at[S];
+    DEFORM_UNROLL for (size_t s = 0; s < S; ++s) at[s] = load(b + s * kWidth);
+    DEFORM_UNROLL for (size_t r = 0; r < R; ++r) DEFORM_UNROLL for (size_t s = 0; s < S; ++s) sum[r][s] =
+        Minus ? sum[r][s] - a[r * p.row] * at[s] : sum[r][s] + a[r * p.row] * at[s];
+  }
+  DEFORM_UNROLL for (size_t r = 0; r < R; ++r) DEFORM_UNROLL for (size_t s = 0; s < S; ++s)
+      store(p.c + (i + r) * p.c_row + j + s * kWidth, sum[r][s]);
+}
+
+template <bool Minus, size_t S>
+DEFORM_INLINE void multiply_columns(const Product &p, size_t j, size_t from, size_t until) {
+  size_t i = 0;
+  for (; i + 4 <= p.m; i += 4) multiply_part<Minus, 4, S>(p, i, j, from, until);
+  for (; i < p.m; ++i) multiply_part<Minus, 1, S>(p, i, j, from, until);
+}
+
+// Rows of b in parts that stay in the first cache.
+template <bool Minus>
+DEFORM_INLINE void multiply_all(const Product &p) {
+  constexpr size_t kPart = 128, kColumns = 3;
+  for (size_t from = 0; from < p.k; from += kPart) {
+    const size_t until = from + kPart < p.k ? from + kPart : p.k;
+    size_t j = 0;
+    for (; j + kColumns * kWidth <= p.n; j += kColumns * kWidth)
+      multiply_columns<Minus, kColumns>(p, j, from, until);
+    for (; j < p.n; j += kWidth) multiply_columns<Minus, 1>(p, j, from, until);
+  }
+}
+
+void multiply(const Product &p) {
+  if (p.minus) multiply_all<true>(p);
+  else multiply_all<false>(p);
+}
+
+constexpr Kernels kKernels = {project, expand, rows, turned, solve, gram, take_off, multiply};
 
 }  // namespace
 }  // namespace reduced

@@ -147,10 +147,9 @@ void Body::make_columns(size_t many, const size_t *wanted) {
     const double *const in[] = {modal_.data()};
     double *const out[] = {w_.data()};
     modes_.shape.expand(1, in, out);
-    double *const column = columns_.data() + size() * wanted[l];
+    double *const column = columns_.data() + 3 * size_t(nlead_) * wanted[l];
     for (size_t j = 0; j < size(); ++j) w_[j] = f[kLanes * j + l] - w_[j];
-    for (size_t i = 0; i < elastic_.npoint; ++i)
-      for (size_t a = 0; a < 3; ++a) column[3 * size_t(place_[i]) + a] = w_[3 * i + a];
+    for (size_t j = 0; j < 3 * size_t(nlead_); ++j) column[j] = w_[3 * size_t(point_[j / 3]) + j % 3];
     known_[wanted[l]] = 1;
   }
 }
@@ -158,7 +157,7 @@ void Body::make_columns(size_t many, const size_t *wanted) {
 // C_rest from a component of a surfel's force to one of a near point's displacement.
 inline double Body::between(uint32_t surfel, size_t component, uint32_t point, size_t other) const {
   const size_t to = 3 * size_t(place_[point]) + other;
-  if (!can_be_late()) return columns_[size() * (3 * size_t(surfel) + component) + to];
+  if (!can_be_late()) return columns_[3 * size_t(nlead_) * (3 * size_t(surfel) + component) + to];
   const size_t rows = 3 * size_t(nfree_);
   if (to >= rows) return 0;
   double sum = 0;
@@ -266,12 +265,13 @@ void Body::add_displacement_at_rest(const double *p, double *out) {
     double local[3];
     transposed_product(at_.r, impulse, local);
     for (size_t a = 0; a < 3; ++a) {
-      const double *const column = columns_.data() + size() * (3 * size_t(s) + a);
+      const double *const column = columns_.data() + 3 * size_t(nlead_) * (3 * size_t(s) + a);
       const double times = scale * local[a];
-      for (size_t i = 0; i < elastic_.npoint; ++i)
-        for (size_t b = 0; b < 3; ++b) out[3 * i + b] += times * column[3 * size_t(place_[i]) + b];
+      for (size_t j = 0; j < 3 * size_t(nlead_); ++j)
+        out[3 * size_t(point_[j / 3]) + j % 3] += times * column[j];
     }
   }
+  elastic_.lead(out);
 }
 
 }  // namespace reduced

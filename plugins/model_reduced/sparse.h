@@ -1,7 +1,7 @@
 // A sparse symmetric positive definite matrix of 3 x 3 blocks: its factor, and the lowest eigenpairs that a
-// solve with it gives. Eigen stays inside sparse.cpp and lanczos.cpp and works while a body is created; what
-// a step calls is in factor.cpp, in an order of operations that no library decides. The factor is the host's
-// where it has one (dfm.direct/1), which is several times as fast.
+// solve with it gives. Eigen stays inside sparse.cpp, lanczos.cpp and tiles.cpp and works while a body is
+// created; what a step calls is in factor.cpp, in an order of operations that no library decides. The factor
+// is the host's where it has one (dfm.direct/1), which is several times as fast.
 #pragma once
 #include <deform/plugin.h>
 #include <deform/plugin_draft.h>

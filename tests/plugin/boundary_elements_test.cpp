@@ -130,11 +130,23 @@ TEST(Boundary, LShapedBodyUnderPressure_ShrinksByTheExactStrain) {
   EXPECT_LT(distance_from(b, l, {-4e-4, -4e-4, -4e-4}), 2e-4);
 }
 
-// u = -p (1 - 2 nu) / E r
+// Tiles of parts far from each other are products of thin matrices here.
 // unsanitized: too slow there; shorter tests run the same code
-TEST(Boundary, SphereOfAThousandTrianglesUnderPressure_IsWithinAPercent) {
-  const Mesh m = fan_of("ball", {0.1, 0, 0}, 1000);
-  EXPECT_NEAR(double(border_of(m).size()), 1000, 150);
+TEST(Boundary, LongBarInUniformTension_KeepsThatWithThinTiles) {
+  const Mesh m = kuhn_bar(32, 3, 3, 0.05);
+  EXPECT_EQ(border_of(m).size(), 804u);
+  Host host;
+  Stepper b(host, boundary(), m, {{"young", 1e5}, {"poisson", 0.3}, {"modes", 5}});
+  ASSERT_EQ(b.status, DFM_OK) << host.logged;
+  load(b, m, [](Vec n, Vec) { return Vec{100 * n[0], 0, 0}; });
+  settle_free(b);
+  EXPECT_LT(distance_from(b, m, {1e-3, -3e-4, -3e-4}), 2e-4);
+}
+
+// u = -p (1 - 2 nu) / E r
+void press_sphere(uint32_t triangles) {
+  const Mesh m = fan_of("ball", {0.1, 0, 0}, triangles);
+  EXPECT_NEAR(double(border_of(m).size()), triangles, 0.15 * triangles);
   Host host;
   Stepper b(host, boundary(), m, {{"young", 1e5}, {"poisson", 0.3}, {"modes", 5}});
   ASSERT_EQ(b.status, DFM_OK) << host.logged;
@@ -145,6 +157,12 @@ TEST(Boundary, SphereOfAThousandTrianglesUnderPressure_IsWithinAPercent) {
     EXPECT_NEAR(0.1 - norm(b.get(b.x, i)), 0.4 * 1000 / 1e5 * 0.1, 0.01 * 0.4 * 1000 / 1e5 * 0.1) << i;
   }
 }
+
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Boundary, SphereOfAThousandTrianglesUnderPressure_IsWithinAPercent) { press_sphere(1000); }
+
+// soak: minutes
+TEST(Boundary, SphereOfFiveThousandTrianglesUnderPressure_IsWithinAPercent) { press_sphere(5000); }
 
 // Lame's thick tube with free ends, whose stress grows twofold towards the hole as around Kirsch's:
 // u = p a^2 / (E (b^2 - a^2)) ((1 - nu) r + (1 + nu) b^2 / r).
@@ -183,8 +201,7 @@ TEST(Boundary, TubeUnderInnerPressure_WidensAsLameHasIt) {
 }
 
 // Held by single components at three points, the body follows any small rigid motion of them: no force.
-TEST(Boundary, RigidMotionOfWhatIsHeld_IsFollowedWithoutForce) {
-  const Mesh m = kuhn_bar(3, 2, 2, 0.05, 0.2);
+void move_what_is_held(const Mesh &m, double share) {
   std::vector<uint8_t> fixed(m.npoint());
   fixed[0] = 7;
   fixed[m.npoint() - 1] = 6;
@@ -199,14 +216,24 @@ TEST(Boundary, RigidMotionOfWhatIsHeld_IsFollowedWithoutForce) {
       if (fixed[i] >> a & 1) b.x[4 * i + a] += motion(i)[a];
   settle_held(b);
   for (uint32_t i = 0; i < b.size(); ++i)
-    EXPECT_LT(norm(b.get(b.x, i) - m.at(i) - motion(i)), 1e-10 * 4e-3) << i;
+    EXPECT_LT(norm(b.get(b.x, i) - m.at(i) - motion(i)), share * 4e-3) << i;
   const dfm_kin k = b.now();
   double energy = 0;
   ASSERT_EQ(b.ops->energy(b.self, &k, &energy), DFM_OK);
-  EXPECT_LT(std::abs(energy), 1e-10 * 0.05);  // 0.05 J: of strains as large as these displacements
+  EXPECT_LT(std::abs(energy), share * 0.05);  // 0.05 J: of strains as large as these displacements
   const size_t at = host.logged.find("the symmetry of the integrals is off by ");
   ASSERT_NE(at, std::string::npos) << host.logged;
   EXPECT_LT(std::strtod(host.logged.c_str() + at + 40, nullptr), 1e-4) << host.logged;
+}
+
+TEST(Boundary, RigidMotionOfWhatIsHeld_IsFollowedWithoutForce) {
+  move_what_is_held(kuhn_bar(3, 2, 2, 0.05, 0.2), 1e-10);
+}
+
+// To what two passes with a factor of thin tiles leave.
+// unsanitized: too slow there; shorter tests run the same code
+TEST(Boundary, RigidMotionOfALongBar_IsFollowedWithoutForce) {
+  move_what_is_held(kuhn_bar(32, 3, 3, 0.05), 1e-6);
 }
 
 // A cantilever of 10 to 1 under a force at its end: w = F L^3 / (3 E I) (1 + shear), on few triangles.
@@ -325,17 +352,6 @@ TEST(Boundary, FlatCellsAtTheBorderAndSeparatePieces_AreRefusedInASentence) {
   for (uint32_t i = 4; i < 8; ++i) two.cells.push_back(i);
   two.finish();
   EXPECT_NE(why_refused(two).find("separate pieces"), std::string::npos);
-}
-
-TEST(Boundary, WhatItCannotTake_IsRefusedInASentence) {
-  const Mesh m = kuhn_bar(16, 16, 16, 0.01);
-  Host host;
-  const Stepper b(host, boundary(), m);
-  EXPECT_EQ(b.status, DFM_E_ARG);
-  EXPECT_NE(host.logged.find("3072 triangles; boundary elements of more than 1600 are refused"),
-            std::string::npos)
-      << host.logged;
-  EXPECT_EQ(host.live, 0u);
 }
 
 // N, between a cube of 0.1 m and the planes that press it by 2 %, on which it sticks.
