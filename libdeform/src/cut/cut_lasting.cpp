@@ -90,8 +90,8 @@ void carry(const Attachment &a, const BodyShape &before, const std::vector<CutTa
   else out.erase(std::remove_if(first, out.end(), [&](auto &x) { return !holds(x); }), out.end());
 }
 
-// Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone, and the number
-// of its feature is 0. slot: in the report, or null.
+// Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone, and its
+// feature has number 0. slot: in the report, or null.
 bool renumber(const std::vector<CutTarget> &targets, size_t kind, uint64_t &id, uint32_t &feature,
               uint32_t *slot = nullptr) {
   if (id != targets[0].id) return true;
