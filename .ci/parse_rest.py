@@ -24,9 +24,6 @@ def compiled(entry):
 
 def parse(entry):
     words = shlex.split(entry["command"])
-    while "-include-pch" in words:   # headers that this build has not precompiled
-        at = words.index("-include-pch") - 1
-        del words[at:at + 4]
     if "-o" in words:
         at = words.index("-o")
         del words[at:at + 2]

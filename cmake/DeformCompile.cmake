@@ -119,10 +119,12 @@ endfunction()
 
 # The standard library's headers, parsed once per target: a third of what a file costs to compile. Builds by
 # gcc without a sanitizer do without: out of a precompiled header gcc 12 warns of the standard library's own
-# code (its bug 105329), and there a file that lacks an #include is an error. Files with flags of their own
-# cannot share the headers. A host that builds the library within its own project decides for itself.
+# code (its bug 105329). So do those that compile each file by itself, where one that lacks an #include is an
+# error. Files with flags of their own cannot share the headers. A host that builds the library within its own
+# project decides for itself.
 function(deform_precompile target)
-  if(NOT PROJECT_IS_TOP_LEVEL OR (CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT DEFORM_SANITIZE))
+  if(NOT PROJECT_IS_TOP_LEVEL OR NOT DEFORM_UNITY
+     OR (CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT DEFORM_SANITIZE))
     return()
   endif()
   target_precompile_headers(${target} PRIVATE <algorithm> <array> <atomic> <cmath> <cstdint> <cstdio>

@@ -126,8 +126,9 @@ bool ByHand::at(double place[3], double velocity[3]) const {
         velocity[k] += drag_.weights[c] * v[3 * size_t(drag_.corners[c]) + k];
       }
     }
+    return true;
   }
-  return true;
+  return false;
 }
 
 // Backward Euler of the spring and the damper on a point of an eighth of the mass: no solid body's surface

@@ -20,7 +20,7 @@ using File = std::unique_ptr<FILE, int (*)(FILE *)>;
 // that a link's target stays what it is.
 File new_file(const std::string &path);
 bool holds(const std::string &path, const std::string &words);  // among its first bytes
-// Throws Failure where an output would overwrite what is read, or another output.
+// Throws Failure where an output would overwrite what is read.
 void refuse_same(const std::string &option, const std::string &out, const std::string &in);
 bool may_write_beside(const std::string &path);           // into its folder; false: errno says why
 [[noreturn]] void cannot_write(const std::string &path);  // for the reason in errno

@@ -153,8 +153,8 @@ void check_scene_path(const SceneFile &scene, const std::string &path) {
   if (file.extension() != ".json" || file.stem().empty())
     refuse("the name of a scene file must end in .json");
   refuse_same("--save-scene", path, scene.path());
-  if (std::filesystem::is_directory(file)) refuse("a folder of that name is there");
   if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
+  if (std::error_code none; std::filesystem::is_directory(file, none)) refuse("a folder of that name is there");
 }
 
 void check_state_path(const std::string &path) {
@@ -163,8 +163,12 @@ void check_state_path(const std::string &path) {
     throw Failure(kBadInput, "--save " + path + ": " + why);
   };
   if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
-  if (std::filesystem::is_directory(file)) refuse("a folder of that name is there");
-  if (std::filesystem::exists(file) && !holds(path, kFormat))
+  std::error_code none;
+  const std::filesystem::file_status there = std::filesystem::status(file, none);
+  if (std::filesystem::is_directory(there)) refuse("a folder of that name is there");
+  const bool empty = std::filesystem::is_regular_file(there) && std::filesystem::file_size(file, none) == 0;
+  if (std::filesystem::exists(there) && !empty &&
+      !(std::filesystem::is_regular_file(there) && holds(path, kFormat)))
     refuse("a file that holds no state is there and would be overwritten; give another name");
 }
 

@@ -367,6 +367,15 @@ TEST(Cost, Budget_EndsRunsThatWouldTakeHours) {
   EXPECT_EQ(s.result.exit_code, 2);
   EXPECT_NE(s.result.err.find("no run came to its end within the budget"), std::string::npos) << s.result.err;
   EXPECT_NE(s.result.err.find("--budget"), std::string::npos) << s.result.err;
+  // runs that were cut are made again, in their folders
+  test::deform({"cost", s.scene, "--out", s.out, "--quiet", "--budget", "3"});
+  size_t kept = 0;
+  for (const auto &entry : fs::recursive_directory_iterator(s.out))
+    if (entry.path().filename() == "outcome.json") {
+      ++kept;
+      EXPECT_EQ(test::read_file(entry.path().string()).find("no run wrote"), std::string::npos) << entry.path();
+    }
+  EXPECT_GT(kept, 0u);
 }
 
 // Long implicit steps stop a ball dead on the floor; against one of them a scene that does so looks exact.

@@ -257,7 +257,6 @@ TEST(CutDelay, Snapshot_WhileFacesWait_GoesOnTheSameWay) {
   }
 }
 
-// A cut by the host in between is not waited for, and what waits opens in what it has left.
 TEST(CutDelay, ParametersChanged_InBetween_AreThoseOfTheNewShape) {
   Cube s({.delay = 0.010, .model = "corotational_fem"});
   while (s.waiting() == 0) s.step();
@@ -278,6 +277,7 @@ TEST(CutDelay, ParametersChanged_InBetween_AreThoseOfTheNewShape) {
   EXPECT_EQ(go_on(), later);
 }
 
+// A cut by the host in between is not waited for, and what waits opens in what it has left.
 TEST(CutDelay, CutByTheHost_InBetween_LosesNoFace) {
   Cube s({.delay = 0.010});
   while (s.waiting() == 0) s.step();

@@ -204,7 +204,6 @@ TEST(Separate, Snapshot_TakesPiecesBackWithTheirHandles) {
   }
 }
 
-// An obstacle that comes after a restore has the number of the piece that is gone, and keeps its own handle.
 // What touched what is state, and not only what is reported: after a restore nothing is.
 TEST(Separate, RightAfterARestore_GivesThePiecesTheirContacts) {
   CubeOnFloor s("corotational_fem", 5e4);
@@ -256,6 +255,7 @@ TEST(Separate, PieceThinnerThanTheGivenOffsetAllows_IsMade) {
   steps(w, 3);
 }
 
+// An obstacle that comes after a restore has the number of the piece that is gone, and keeps its own handle.
 TEST(Separate, AnObstacleAfterARestore_IsNotThePieceThatIsGone) {
   test::Context context;
   const test::Stack s = test::make_stack(context);

@@ -177,7 +177,7 @@ def fuzzers(tree):
     readers = re.findall(r"foreach\(reader (.*)\)", tree.text(lists))
     built = {(name, int(inputs)) for names, inputs in re.findall(r"^ *deform_add_fuzz\((\S+) \w+ (\d+)",
                                                                  tree.text(lists), re.M)
-             for name in names.replace("${reader}", *readers).split()}
+             for name in names.replace("${reader}", " ".join(readers)).split()}
     said = {(name, int(re.match(r"[\d,]+", inputs)[0].replace(",", "")))
             for names, inputs in re.findall(r"^\| (`fuzz_.*?) \| .* \| (.*) \|$", tree.text(page), re.M)
             for name in re.findall(r"`(?:fuzz_)?(\w+)`", names)}

@@ -27,7 +27,7 @@ def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> st
                           env={**os.environ, **(environment or {})})
     if done.returncode == 0:
         for line in done.stderr.splitlines():
-            _LOG.warning("%s", line.removeprefix("deform: "))
+            _LOG.warning("%s", line.removeprefix("deform: ").removeprefix("warning: "))
         return done.stdout
     said = done.stderr.strip() or f"deform {arguments[0]} ended with {done.returncode}"
     raise {2: ArgumentError, 3: Diverged}.get(done.returncode, Error)(said.removeprefix("deform: "))

@@ -219,9 +219,10 @@ class Context:
         self.keep.append(bridge)
         return bridge.id
 
-    def raised_by_law(self) -> BaseException | None:
-        """What a Python law has raised since the last look; what is no error, as KeyboardInterrupt, first."""
-        raised = [found for bridge in self._laws if (found := bridge.take_error()) is not None]
+    def raised_by_law(self, failed: bool = True) -> BaseException | None:
+        """What a Python law has raised since the last look; what is no error, as KeyboardInterrupt, first. After
+        a call that has not failed nothing else: an error is that of a call of another thread."""
+        raised = [found for bridge in self._laws if (found := bridge.take_error(failed)) is not None]
         return min(raised, key=lambda found: isinstance(found, Exception), default=None)
 
     def failed(self, status: int, sentence: str | None = None,

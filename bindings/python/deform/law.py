@@ -196,24 +196,17 @@ class PythonLaw:
         return said["rules"] + [row for kind in said["types"] for row in kind["rules"]]
 
 
-_unraisable: Any = None
+_unraisable: Any = None   # the hook before
 
 
-def _catch_unraisable() -> None:
+def _hook(said: Any) -> None:
     """Where the handler of a signal raises as a callback begins, before its `try`, ctypes gives the exception
     to this hook alone."""
-    global _unraisable
-    if _unraisable is not None:
-        return
-    _unraisable = sys.unraisablehook
-
-    def hook(said: Any) -> None:
-        frame = said.exc_traceback and said.exc_traceback.tb_frame
-        if frame is None or frame.f_code not in (Bridge.evaluate.__code__, Bridge.refuse.__code__):
-            return _unraisable(said)
-        frame.f_locals["self"].error = said.exc_value
-        interrupt()
-    sys.unraisablehook = hook
+    frame = said.exc_traceback and said.exc_traceback.tb_frame
+    if frame is None or frame.f_code not in (Bridge.evaluate.__code__, Bridge.refuse.__code__):
+        return _unraisable(said)
+    frame.f_locals["self"].error = said.exc_value
+    interrupt()
 
 
 class Bridge:
@@ -222,7 +215,9 @@ class Bridge:
     def __init__(self, law: PythonLaw, name: str):
         self.law, self.id = law, name
         self.error: BaseException | None = None
-        _catch_unraisable()
+        global _unraisable
+        if sys.unraisablehook is not _hook:
+            _unraisable, sys.unraisablehook = sys.unraisablehook, _hook
         if not law.id or "." not in law.id:
             raise ArgumentError(f"a law needs an id in reverse-DNS form, such as 'com.example.tanh', not "
                                 f"'{law.id}'", "DFM_E_ARG")
@@ -263,7 +258,9 @@ class Bridge:
         self.entry = _EntryFn(lambda _host, _abi_number, _abi_min: address)
         self.keep = [rows, table, effects, types]
 
-    def take_error(self) -> BaseException | None:
+    def take_error(self, failed: bool) -> BaseException | None:
+        if not failed and isinstance(self.error, Exception):
+            return None
         raised, self.error = self.error, None
         return raised
 

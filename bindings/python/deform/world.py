@@ -541,7 +541,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         finally:
             self._busy = 0
         if status or self.context._laws:
-            by_law = self.context.raised_by_law()
+            by_law = self.context.raised_by_law(bool(status))
             if status and self._by_signal() and by_law is None:  # by a handler that has not raised
                 return self.step(seconds)
             self.accept(status, by_law)

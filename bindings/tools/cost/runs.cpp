@@ -179,10 +179,9 @@ void Runs::start(Job &job, Child &out) {
     kill(out.pid, SIGCONT);
     return;
   }
+  std::error_code error;
+  std::filesystem::remove_all(job.folder, error);  // an earlier try
   make_folder(job.folder);
-  // those of an earlier try
-  for (const char *file : {"/outcome.json", "/summary.json", "/bodies.csv"})
-    std::remove((job.folder + file).c_str());
   std::vector<std::string> words = {beside("deform"), "run", subject_.path, "--out", job.folder, "--quiet"};
   for (const auto *const settings : {&subject_.planned, &std::as_const(job.set)})
     for (const auto &[pointer, value] : *settings) {
