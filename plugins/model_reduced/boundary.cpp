@@ -27,6 +27,7 @@ namespace {
 
 constexpr double kPi = 0x1.921fb54442d18p+1;
 constexpr size_t kCluster = 128;  // triangles, points
+constexpr size_t kMaxTriangles = 10000;
 constexpr int kDeepest = 3;
 
 // Of (x, y) against the axis x, in -pi .. pi: the angle is halved three times, then a series.
@@ -73,10 +74,13 @@ struct Kelvin {
   }
 };
 
-// Numbers of neighbors in space that lie behind each other, at most kCluster: halves of the longest side of
-// what holds them. place [n]: of each in that order.
+// Orders the n numbers of `own` by neighbors in space, in so many parts of like size, each by number: halves of
+// the longest side of what holds them. out: the sizes of the parts.
 void divide(const std::vector<double> &x, uint32_t *own, size_t n, size_t parts, std::vector<size_t> &out) {
-  if (parts == 1) return out.push_back(n);
+  if (parts == 1) {
+    std::sort(own, own + n);
+    return out.push_back(n);
+  }
   double most = -1;
   size_t side = 0;
   for (size_t a = 0; a < 3; ++a) {
@@ -96,10 +100,8 @@ void divide(const std::vector<double> &x, uint32_t *own, size_t n, size_t parts,
   divide(x, own + half, n - half, parts - parts / 2, out);
 }
 
-}  // namespace
-
 // The order of places in space; numbers of components in each of its clusters.
-static std::vector<size_t> clusters_of(const std::vector<double> &x, std::vector<uint32_t> &order) {
+std::vector<size_t> clusters_of(const std::vector<double> &x, std::vector<uint32_t> &order) {
   order.resize(x.size() / 3);
   for (uint32_t i = 0; i < order.size(); ++i) order[i] = i;
   std::vector<size_t> out;
@@ -107,6 +109,8 @@ static std::vector<size_t> clusters_of(const std::vector<double> &x, std::vector
   for (size_t &n : out) n *= 3;
   return out;
 }
+
+}  // namespace
 
 struct Boundary::Triangle {
   uint32_t corner[3];
@@ -266,6 +270,11 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
       place[i] = 0;
     }
   }
+  if (ntriangle() > kMaxTriangles)
+    model::refuse(host, id,
+                  "%zu triangles; more than %zu are refused, because their matrices take minutes and gigabytes; "
+                  "take a coarser mesh, which a fine surface may hang on",
+                  ntriangle(), kMaxTriangles);
   // The first point of each piece leads its others.
   std::vector<uint32_t> leader(m.npoint);
   for (uint32_t i = 0; i < m.npoint; ++i) leader[i] = i;

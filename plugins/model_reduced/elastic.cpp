@@ -86,9 +86,8 @@ void Elastic::take(const dfm_mesh &m, const char *id) {
   ncell = m.ncell;
   if (npoint > kMaxPoints) {
     model::refuse(host_, id,
-                  "%u points; more than %u are refused, because their factor and modes take about a minute; "
-                  "take a coarser "
-                  "mesh, which a fine surface may hang on, or corotational_fem",
+                  "%u points; more than %u are refused, because their factor and modes take minutes; take a "
+                  "coarser mesh, which a fine surface may hang on, or corotational_fem",
                   npoint, kMaxPoints);
   }
   young_ = m.params[kYoung];
@@ -284,6 +283,7 @@ void Elastic::take_surface(const dfm_mesh &m, const char *id) {
     }
   edges_.create_copy(host_, surface_.edges.data(), surface_.edges.size());
   nedge_ = uint32_t(surface_.edges.size() / 2);
+  std::vector<uint32_t>().swap(surface_.edges);  // 8 bytes a pair
 }
 
 void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bool by_surface) {

@@ -75,8 +75,7 @@ void fail(dfm_status status, const char *format, ...) {
 
 namespace {
 
-[[noreturn]] void refuse(const Named &whose, dfm_status status, const char *sentence, va_list args) {
-  const std::string text = vformat(sentence, args);
+[[noreturn]] void refuse(const Named &whose, dfm_status status, const std::string &text) {
   fail(status, "%s '%s'%s", whose.kind, whose.name, text.c_str());
 }
 
@@ -85,13 +84,17 @@ namespace {
 void refuse(const Named &whose, const char *sentence, ...) {
   va_list args;
   va_start(args, sentence);
-  refuse(whose, DFM_E_ARG, sentence, args);
+  const std::string text = vformat(sentence, args);
+  va_end(args);
+  refuse(whose, DFM_E_ARG, text);
 }
 
 void refuse(const Named &whose, dfm_status status, const char *sentence, ...) {
   va_list args;
   va_start(args, sentence);
-  refuse(whose, status, sentence, args);
+  const std::string text = vformat(sentence, args);
+  va_end(args);
+  refuse(whose, status, text);
 }
 
 std::string format(const char *format, ...) {

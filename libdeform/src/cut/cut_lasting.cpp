@@ -170,8 +170,8 @@ void prepare_with(World &w, Lasting &lasting) {
   }
   for (uint32_t i = 0; i < w.store.n; ++i) {
     if (!lasting.ended[i]) continue;
-    if (w.store.touching[i])
-      add_event(w, DFM_EVENT_END, w.store.id_a[i], w.store.id_b[i], w.store.key[i], w.time);
+    if (w.store.touching[i])  // of the pair that began
+      add_event(w, DFM_EVENT_END, lasting.id_a[i], lasting.id_b[i], w.store.key[i], w.time);
     w.store.touching[i] = 0;
     if (i < w.report.n) std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
   }

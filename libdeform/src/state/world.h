@@ -120,7 +120,7 @@ struct WorldState {
   dfm_world_stats stats{};
   std::vector<FrictionRule> friction;
   std::vector<FilterRule> filters;
-  std::vector<Attachment> attachments;  // in order of creation
+  std::vector<Attachment> attachments;  // by body, each in order of creation
   ContactStore store;
   ContactStore tool_store;  // of tools with each other and with rigid bodies (step/rigid/tool_touch.h)
   Report report;
