@@ -55,8 +55,9 @@ dfm_status open_build(const Build &build, const dfm_rigid_host *&table) {
     if (o.table) o.file = build.files[i];
   }
   table = o.table;
-  return table ? dfm_status{DFM_OK} : refuse("host \"" + std::string(build.host) + "\": " + why +
-                                   "; build (`make tools`) or install libdeform_bullet");
+  return table ? dfm_status{DFM_OK}
+               : refuse("host \"" + std::string(build.host) + "\": " + why +
+                        "; build (`make tools`) or install libdeform_bullet");
 }
 
 struct Instance {

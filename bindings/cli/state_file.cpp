@@ -154,7 +154,8 @@ void check_scene_path(const SceneFile &scene, const std::string &path) {
     refuse("the name of a scene file must end in .json");
   refuse_same("--save-scene", path, scene.path());
   if (!may_write_beside(path)) refuse(std::string("cannot be written there: ") + std::strerror(errno));
-  if (std::error_code none; std::filesystem::is_directory(file, none)) refuse("a folder of that name is there");
+  if (std::error_code none; std::filesystem::is_directory(file, none))
+    refuse("a folder of that name is there");
 }
 
 void check_state_path(const std::string &path) {

@@ -273,8 +273,8 @@ void Body::add_collapse(size_t place, const double *const *x, const double (*g)[
   for (int k = 0; k < 3; ++k) cross(grad + 3 * ((k + 1) % 3), grad + 3 * ((k + 2) % 3), cofactor + 3 * k);
   const double det = (grad[0] * cofactor[0] + grad[1] * cofactor[1]) + grad[2] * cofactor[2];
   if (!(det < kFlat)) return;
-  const double young = fiber.empty() ? young_of<Single>(own.mu2[lane], own.lambda[lane])
-                                     : fiber[place / kGroup].young[lane];
+  const double young =
+      fiber.empty() ? young_of<Single>(own.mu2[lane], own.lambda[lane]) : fiber[place / kGroup].young[lane];
   const double by = a * collapse_of<Single>(params[kCollapse], det, young).stiffness;
   for (int m = 0; m < 4; ++m) product(cofactor, g[m], area[m]);
   each_block(slots[place / kGroup], lane, blk, [&](int m, int n, double *out) {

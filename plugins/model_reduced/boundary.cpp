@@ -74,8 +74,8 @@ struct Kelvin {
   }
 };
 
-// Orders the n numbers of `own` by neighbors in space, in so many parts of like size, each by number: halves of
-// the longest side of what holds them. out: the sizes of the parts.
+// Orders the n numbers of `own` by neighbors in space, in so many parts of like size, each by number: halves
+// of the longest side of what holds them. out: the sizes of the parts.
 void divide(const std::vector<double> &x, uint32_t *own, size_t n, size_t parts, std::vector<size_t> &out) {
   if (parts == 1) {
     std::sort(own, own + n);
@@ -271,10 +271,11 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
     }
   }
   if (ntriangle() > kMaxTriangles)
-    model::refuse(host, id,
-                  "%zu triangles; more than %zu are refused, because their matrices take minutes and gigabytes; "
-                  "take a coarser mesh, which a fine surface may hang on",
-                  ntriangle(), kMaxTriangles);
+    model::refuse(
+        host, id,
+        "%zu triangles; more than %zu are refused, because their matrices take minutes and gigabytes; "
+        "take a coarser mesh, which a fine surface may hang on",
+        ntriangle(), kMaxTriangles);
   // The first point of each piece leads its others.
   std::vector<uint32_t> leader(m.npoint);
   for (uint32_t i = 0; i < m.npoint; ++i) leader[i] = i;

@@ -52,7 +52,8 @@ class Boundary {
   std::vector<size_t> clusters_;
   Tiles follow_;  // [3 inner, 3 surface], negative
   Tiles factor_;
-  Buffer<double> rigid_, missing_;  // [.,6] rigid motions at the surface; of inner points, what follow_ misses
+  Buffer<double> rigid_,
+      missing_;                    // [.,6] rigid motions at the surface; of inner points, what follow_ misses
   mutable Buffer<double> packed_;  // [3 surface, kLanes]; behind it [3 inner, kLanes]
   template <size_t kWide>
   void pack(const double *u) const;

@@ -373,7 +373,8 @@ TEST(Cost, Budget_EndsRunsThatWouldTakeHours) {
   for (const auto &entry : fs::recursive_directory_iterator(s.out))
     if (entry.path().filename() == "outcome.json") {
       ++kept;
-      EXPECT_EQ(test::read_file(entry.path().string()).find("no run wrote"), std::string::npos) << entry.path();
+      EXPECT_EQ(test::read_file(entry.path().string()).find("no run wrote"), std::string::npos)
+          << entry.path();
     }
   EXPECT_GT(kept, 0u);
 }

@@ -368,7 +368,8 @@ TEST(Hpp, RigidBodies_GoByTheirSet) {
   EXPECT_EQ(s.world.rigids().size(), 3u);
   dfm_rigid_state states[3];
   dfm_rigid ids[3];
-  EXPECT_THROW(s.world.rigid_states(states, std::span(ids).first(2)), deform::Error) << "a name for two of three";
+  EXPECT_THROW(s.world.rigid_states(states, std::span(ids).first(2)), deform::Error)
+      << "a name for two of three";
   EXPECT_EQ(s.world.rigid_states(states, ids), 3u);
   EXPECT_EQ(ids[2], out[1]);
   EXPECT_EQ(states[2].position[0], 1);

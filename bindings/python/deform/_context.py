@@ -220,8 +220,8 @@ class Context:
         return bridge.id
 
     def raised_by_law(self, failed: bool = True) -> BaseException | None:
-        """What a Python law has raised since the last look; what is no error, as KeyboardInterrupt, first. After
-        a call that has not failed nothing else: an error is that of a call of another thread."""
+        """What a Python law has raised since the last look; what is no error, as KeyboardInterrupt, first.
+        After a call that has not failed nothing else: an error is that of a call of another thread."""
         raised = [found for bridge in self._laws if (found := bridge.take_error(failed)) is not None]
         return min(raised, key=lambda found: isinstance(found, Exception), default=None)
 

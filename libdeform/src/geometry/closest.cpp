@@ -82,8 +82,8 @@ SegmentPoints closest_segments(Vec3 p0, Vec3 p1, Vec3 q0, Vec3 q1) {
     if (s >= 0 && s <= 1 && t >= 0 && t <= 1) offer(s, t);
     if (best.distance2 >= 0 && nn > kParallel * a * c) return best;
   }
-  // The minimum lies on the border of the square of parameters, so at one of the four ends; of nearly parallel
-  // segments one of these is as near.
+  // The minimum lies on the border of the square of parameters, so at one of the four ends; of nearly
+  // parallel segments one of these is as near.
   offer(0, closest_on_segment(p0, q0, q1));
   offer(1, closest_on_segment(p1, q0, q1));
   offer(closest_on_segment(q0, p0, p1), 0);

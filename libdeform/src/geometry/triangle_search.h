@@ -42,14 +42,14 @@ struct TriangleNearPoint {
   TrianglePoint at{};
 };
 
-// A ray, in coordinates in which it runs along an axis (Woop, Benthin and Wald 2013). The product of an edge is
-// the other's negative to the bit in its two triangles, and has the right sign or is zero, so no ray slips
+// A ray, in coordinates in which it runs along an axis (Woop, Benthin and Wald 2013). The product of an edge
+// is the other's negative to the bit in its two triangles, and has the right sign or is zero, so no ray slips
 // between triangles, at an edge or a corner.
 class ShearedRay {
  public:
   ShearedRay(Vec3 o, Vec3 d);
-  // Products of the edges opposite to a, b and c: of one sign where the ray's line meets the triangle, that of
-  // normal . direction. along: the way to it times their sum.
+  // Products of the edges opposite to a, b and c: of one sign where the ray's line meets the triangle, that
+  // of normal . direction. along: the way to it times their sum.
   struct Products {
     double a, b, c, along;
     double sum() const { return a + b + c; }

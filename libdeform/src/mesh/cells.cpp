@@ -224,7 +224,8 @@ RestMesh second_order(const RestMesh &mesh) {
   const CellKind &kind = cell_kind(hexahedra ? DFM_CELL_HEX27 : DFM_CELL_TET10);
   const uint32_t tets = cell_kind(mesh.cell).tets;
   if (uint64_t{mesh.ntet()} / tets * kind.tets >= kMaxTets)
-    fail(DFM_E_UNSUPPORTED, "the second-order cells would be more than %u tetrahedra; take fewer cells", kMaxTets - 1);
+    fail(DFM_E_UNSUPPORTED, "the second-order cells would be more than %u tetrahedra; take fewer cells",
+         kMaxTets - 1);
   RestMesh out(memory);
   out.cell = kind.kind;
   out.points = mesh.points;

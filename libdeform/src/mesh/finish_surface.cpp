@@ -402,8 +402,7 @@ void add_warnings(RestMesh &mesh, const Repairs &done) {
 
 RestMesh finish_surface(const std::string &path, RawMesh &&raw) {
   if (raw.tris.empty() && raw.tets.empty())
-    fail(DFM_E_FORMAT,
-         "%s: no triangles; a surface needs triangles, or polygons to cut into them",
+    fail(DFM_E_FORMAT, "%s: no triangles; a surface needs triangles, or polygons to cut into them",
          path.c_str());
   if (raw.tris.size() >= kCrowdedEdge)
     fail(DFM_E_UNSUPPORTED, "%s: %zu triangles; at most %u are possible", path.c_str(), raw.tris.size() / 3,

@@ -240,10 +240,9 @@ TEST(CellFiles, GroupsOfQuadrangles_AreTrianglesOfTheBoundary) {
 // The bottom's diagonal is shorter than its long sides.
 TEST(SecondOrder, GroupedFaceOfASkewHexahedron_StaysOnTheBoundary) {
   const RestMesh mesh = second_order(parsed(
-      "a.msh", kMsh22 +
-                   "$Nodes\n8\n1 0 0 0\n2 1 0 0\n3 0.134 0.5 0\n4 -0.866 0.5 0\n5 0 0 1\n6 1 0 1\n"
-                   "7 0.134 0.5 1\n8 -0.866 0.5 1\n$EndNodes\n"
-                   "$Elements\n2\n1 3 2 7 1 1 2 3 4\n2 5 2 0 1 1 2 3 4 5 6 7 8\n$EndElements\n"));
+      "a.msh", kMsh22 + "$Nodes\n8\n1 0 0 0\n2 1 0 0\n3 0.134 0.5 0\n4 -0.866 0.5 0\n5 0 0 1\n6 1 0 1\n"
+                        "7 0.134 0.5 1\n8 -0.866 0.5 1\n$EndNodes\n"
+                        "$Elements\n2\n1 3 2 7 1 1 2 3 4\n2 5 2 0 1 1 2 3 4 5 6 7 8\n$EndElements\n"));
   EXPECT_EQ(mesh.tri_group.size(), 8u);
   EXPECT_TRUE(on_boundary(mesh));
 }
