@@ -390,3 +390,13 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   expect_refused(bar(R"("accuracy": {"target": 0.2},)"), {"costs.json", "/version", "calibrate again"});
   std::remove((folder() + "/deform/costs.json").c_str());
 }
+
+// What models that step themselves do not take.
+TEST(PlannerScene, BodyWithASpringCutsOrScaledMass_GetsAModelThatTakesThem) {
+  for (const char *keys :
+       {R"("springs": [{"point": [0.4, 0.05, 0.05], "to": [0.5, 0.05, 0.05], "stiffness": 100}], )",
+        R"("separate": {}, )", R"("mass_scaling": 0.05, )"}) {
+    const test::CommandResult r = test::deform({"explain", bar(R"("accuracy": {"target": 0.2},)", keys)});
+    EXPECT_EQ(r.exit_code, 0) << keys << r.err;
+  }
+}
