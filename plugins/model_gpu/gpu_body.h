@@ -24,11 +24,9 @@ class Body {
   const dfm_host *host = nullptr;
   Of &springs() { return parts_; }
   const Of &springs() const { return parts_; }
-  void mask_changed()
-    requires requires(Of &of) { of.put_stiffness(); }
-  {
+  void mask_changed() {
     unlike_ = true;
-    parts_.put_stiffness();
+    if constexpr (requires { parts_.put_stiffness(); }) parts_.put_stiffness();
     stepper_->take(parts_.work());
   }
   const char *const *active() const { return parts_.active_effects; }
