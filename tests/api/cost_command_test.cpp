@@ -571,6 +571,6 @@ TEST(Cost, WhatCannotBeStudied_IsReportedInOneSentence) {
   refused("nothing_to_apply", bar(R"("duration": 0.02)"),
           {"--axes", "time", "--target", "1e-30", "--apply", "x.json"}, "nothing to apply");
   refused("applied_to_itself", bar(R"("duration": 0.02)"),
-          {"--apply", test::scratch("cost_applied_to_itself") + "/scene.json"}, "this is the scene itself");
+          {"--apply", test::scratch("cost_applied_to_itself") + "/scene.json"}, "which would be overwritten");
   refused("budget_sign", bar(R"("duration": 0.02)"), {"--budget", "-1"}, "expected a finite number above 0");
 }

@@ -258,7 +258,7 @@ class Bridge:
         self.entry = _EntryFn(lambda _host, _abi_number, _abi_min: address)
         self.keep = [rows, table, effects, types]
 
-    def take_error(self, failed: bool) -> BaseException | None:
+    def take_error(self, failed: bool = True) -> BaseException | None:
         if not failed and isinstance(self.error, Exception):
             return None
         raised, self.error = self.error, None

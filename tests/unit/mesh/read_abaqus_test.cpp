@@ -283,7 +283,6 @@ TEST(Abaqus, WhatWouldLosePartOfTheMesh_IsRefused) {
   refuse(kFour + "*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4, 5\n", DFM_E_FORMAT, {"a.inp:7:", "more than the 4"});
   refuse(kFour + "*ELEMENT\n1, 1, 2, 3, 4\n", DFM_E_FORMAT, {"a.inp:6:", "TYPE=C3D4"});
   refuse(kTet + "7, 1, 2, 3, 4\n", DFM_E_FORMAT, {"element number 7 is given twice"});
-  refuse("*NODE\n1, 0, 0\n", DFM_E_FORMAT, {"a.inp:2:", "coordinate", "end of the line"});
   refuse("*NODE\n1, 0, 0, nan\n", DFM_E_FORMAT, {"a.inp:2:", "finite", "'nan'"});
   refuse(kFour + "4, 0, 0, 1\n", DFM_E_FORMAT, {"node number 4 is given twice"});
   refuse(kTet + "*NSET, NSET=a\nnone\n", DFM_E_FORMAT, {"a.inp:9:", "'none'", "a set that stands before"});
