@@ -211,7 +211,8 @@ class CellBody {
     }
   }
 
-  // Of the mean strain in the frame, turned into the axes of the world; where frames turn, s S / det S.
+  // Of the mean strain in the frame, turned into the axes of the world; where frames turn,
+  // (s - [q]x) S / det S with the q that makes it symmetric.
   void cell_stress(const dfm_kin &k, double *stress) const {
     constexpr int kRow[6] = {0, 1, 2, 0, 1, 2}, kCol[6] = {0, 1, 2, 1, 2, 0};
     const double flow = flow_at(k);
@@ -238,8 +239,17 @@ class CellBody {
       for (int n = 0; n < 6; ++n)
         local[3 * kRow[n] + kCol[n]] = local[3 * kCol[n] + kRow[n]] = own[n] - less[n];
       if (of_.turns) {
-        double both[9], area[3];
+        double both[9], axial[3], q[3], area[3], less_of[3];
         matrix_product(local, m.s, both);
+        for (size_t n = 0; n < 3; ++n) {
+          const size_t i = (n + 1) % 3, j = (n + 2) % 3;
+          axial[n] = both[3 * j + i] - both[3 * i + j];
+        }
+        product(m.inverse, axial, q);
+        for (size_t j = 0; j < 3; ++j) {
+          cross(q, m.s + 3 * j, less_of);
+          for (size_t i = 0; i < 3; ++i) both[3 * i + j] -= less_of[i];
+        }
         cross(m.s + 3, m.s + 6, area);
         const double over = 1 / std::max(std::fabs(dot(m.s, area)), kMinVolume);
         for (int n = 0; n < 9; ++n) local[n] = 0.5 * over * (both[n] + both[3 * (n % 3) + n / 3]);

@@ -392,7 +392,7 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
 }
 
 // What models that step themselves do not take.
-TEST(PlannerScene, BodyWithASpringCutsOrScaledMass_GetsAModelThatTakesThem) {
+TEST_F(PlannerScene, BodyWithASpringCutsOrScaledMass_GetsAModelThatTakesThem) {
   for (const char *keys :
        {R"("springs": [{"point": [0.4, 0.05, 0.05], "to": [0.5, 0.05, 0.05], "stiffness": 100}], )",
         R"("separate": {}, )", R"("mass_scaling": 0.05, )"}) {

@@ -166,7 +166,7 @@ TEST(SceneErrors, Ranges_AreChecked) {
        {"/contact/friction/0/params/mu=-0.1", {"/contact/friction/0/params/mu", "number from 0"}},
        {"/contact/friction/0/restitution=1.1", {"/contact/friction/0/restitution", "from 0 to 1"}},
        {"/contact/friction/0/restitution=-0.1", {"/contact/friction/0/restitution", "number"}},
-       {"/contact/max_sweeps=0", {"/contact/max_sweeps", "whole number from 1 to 1000000, found 0"}},
+       {"/contact/max_sweeps=0", {"/contact/max_sweeps", "whole number from 1 to 4294967295, found 0"}},
        {"/contact/max_sweeps=1.5", {"/contact/max_sweeps", "whole number", "1.5"}},
        {"/output/every=0", {"/output/every", "above 0"}},
        {"/output/camera={\"eye\":[1,1,1],\"look_at\":[1,1,1]}", {"/output/camera", "same point"}},

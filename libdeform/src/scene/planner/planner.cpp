@@ -356,8 +356,8 @@ class Reader {
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
-  // "gpu" asks for one that a card computes, too, with its defaults. What steps itself takes no springs and no
-  // scaled mass, and is not cut.
+  // "gpu" asks for one that a card computes, too, with its defaults. What steps itself takes no springs and
+  // no scaled mass, and is not cut.
   std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
