@@ -356,15 +356,14 @@ class Reader {
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
-  // "gpu" asks for one that a card computes, too, with its defaults. What steps itself takes no springs and
-  // no scaled mass, and is not cut.
+  // "gpu" asks for one that a card computes, too, with its defaults. What steps itself takes no springs.
   std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.try_find(DFM_KIND_MODEL, m.id);
       if (!type || off_card(types_, *type) || !(model_of(*type).cells & cell)) continue;
       if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
-      if (m.steps_itself && (may_be_cut() || !b.springs.empty() || b.def.mass_scaling > 0)) continue;
+      if (m.steps_itself && !b.springs.empty()) continue;
       out.push_back(m.id);
     }
     return out;
