@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """Parses, with its own compiler and flags, each file of a configured build that another build has not
-compiled by itself. Warnings are errors where the build says so. Files below tests/ are left out.
+compiled. Warnings are errors where the build says so. Files below tests/ are left out: gcc compiles them.
 
 parse_rest.py CONFIGURED_BUILD COMPILED_BUILD
 """
@@ -8,6 +8,7 @@ import concurrent.futures
 import json
 import os
 import pathlib
+import re
 import shlex
 import subprocess
 import sys
@@ -17,13 +18,22 @@ def compile_commands(build):
     return json.loads((pathlib.Path(build) / "compile_commands.json").read_text())
 
 
-def compiled(entry):
+def sources(entry):
+    """The file that a command has compiled, or those that it has compiled together."""
     words = shlex.split(entry["command"])
-    return (pathlib.Path(entry["directory"]) / words[words.index("-o") + 1]).exists()
+    if not (pathlib.Path(entry["directory"]) / words[words.index("-o") + 1]).exists():
+        return []
+    path = pathlib.Path(entry["file"])
+    if path.parent.name != "Unity":
+        return [entry["file"]]
+    return re.findall(r'^#include "(.+)"', path.read_text(), re.M)
 
 
 def parse(entry):
     words = shlex.split(entry["command"])
+    while "-include-pch" in words:   # headers that this build has not precompiled
+        at = words.index("-include-pch") - 1
+        del words[at:at + 4]
     if "-o" in words:
         at = words.index("-o")
         del words[at:at + 2]
@@ -32,15 +42,15 @@ def parse(entry):
 
 
 def main():
-    configured, other = sys.argv[1:]
-    seen = {entry["file"] for entry in compile_commands(other) if compiled(entry)}
+    configured, compiled = sys.argv[1:]
+    seen = {file for entry in compile_commands(compiled) for file in sources(entry)}
     tests = str(pathlib.Path(__file__).resolve().parent.parent / "tests")
     rest = []
     for entry in compile_commands(configured):
         if entry["file"] not in seen and not entry["file"].startswith((tests, entry["directory"])):
             rest.append(entry)
     if not rest:
-        sys.exit(f"{configured} has no file that {other} has not compiled: name a build with more parts")
+        sys.exit(f"{configured} has no file that {compiled} has not compiled: name a build with more parts")
     with concurrent.futures.ThreadPoolExecutor(os.cpu_count()) as pool:
         results = list(pool.map(parse, rest))
     for _, text in results:

@@ -119,12 +119,10 @@ endfunction()
 
 # The standard library's headers, parsed once per target: a third of what a file costs to compile. Builds by
 # gcc without a sanitizer do without: out of a precompiled header gcc 12 warns of the standard library's own
-# code (its bug 105329). So do those that compile each file by itself, where one that lacks an #include is an
-# error. Files with flags of their own cannot share the headers. A host that builds the library within its own
-# project decides for itself.
+# code (its bug 105329), and in `dev` a file that lacks an #include is an error. Files with flags of their own
+# cannot share the headers. A host that builds the library within its own project decides for itself.
 function(deform_precompile target)
-  if(NOT PROJECT_IS_TOP_LEVEL OR NOT DEFORM_UNITY
-     OR (CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT DEFORM_SANITIZE))
+  if(NOT PROJECT_IS_TOP_LEVEL OR (CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND NOT DEFORM_SANITIZE))
     return()
   endif()
   target_precompile_headers(${target} PRIVATE <algorithm> <array> <atomic> <cmath> <cstdint> <cstdio>
@@ -137,7 +135,8 @@ endfunction()
 # DEFORM_UNITY compiles files of a folder together, for a third of the work: what costs is headers and
 # templates, the same ones in each file. All presets but dev, clang and static_clang use it.
 # cmake/unity_groups.py keeps apart what collides, anew when a file changes. Where each file is compiled by
-# itself, a missing #include is an error: dev does so, and CI by static_clang and clang.
+# itself, a missing #include of ours is an error: in dev, where the standard's is one, too, and in CI's
+# static_clang.
 if(DEFORM_UNITY)
   include(DeformPython)
 endif()
