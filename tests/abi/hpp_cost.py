@@ -6,6 +6,7 @@ member compiles, without exceptions too, and may stand in two units of one progr
 hpp_cost.py OBJDUMP INCLUDE_DIR SOURCE COMPILER...    compilers that are not there are passed by
 """
 import itertools
+import os
 import pathlib
 import re
 import shutil
@@ -78,7 +79,7 @@ def main():
     objdump, include, source, *compilers = sys.argv[1:]
     dearer, tried = 0, 0
     with tempfile.TemporaryDirectory() as folder:
-        for compiler in dict.fromkeys(filter(shutil.which, compilers)):
+        for compiler in {os.path.realpath(path): c for c in compilers if (path := shutil.which(c))}.values():
             for mode in PAIRS:
                 dearer += check(objdump, include, source, compiler, mode, folder)
                 tried += 1

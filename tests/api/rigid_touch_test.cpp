@@ -323,7 +323,7 @@ TEST(RigidTouch, Tumbling_StaysInside) {
 // in a step in which another one strikes it. Starts that differ by nanometers make other heaps.
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, Heaps_StayBetweenTheirWalls) {
-  for (const double shift : {0.0, 5e-9, 11e-9, 18e-9}) {
+  for (const double shift : {0.0, 11e-9}) {
     SCOPED_TRACE(shift);
     test::Context context;
     const dfm_world w = test::make_world(context, {0, 0, -kG});
@@ -472,7 +472,7 @@ TEST(RigidTouch, VoxelsOnAPlane_AreReported) {
 // unsanitized: too slow there; shorter tests run the same code
 TEST(RigidTouch, HeapsOfBoxes_MakeNoEnergy) {
   const double dt = 1.0 / 60;
-  for (int shift = 0; shift < 8; ++shift) {
+  for (int shift = 0; shift < 4; ++shift) {
     SCOPED_TRACE(shift);
     test::Context context;
     const dfm_world w = test::make_world(context, {0, 0, -kG});
@@ -670,16 +670,6 @@ TEST(RigidTouch, APlateOnAPlate_IsLiftedOff) {
 
 // They jam, turn and carry each other: no corner goes into a wall or the floor, few boxes into others, and no
 // step makes energy.
-// unsanitized: too slow there; shorter tests run the same code
-TEST(RigidTouch, BoxesInAShaft_StayInside) {
-  ShaftFall fall;
-  fall_into_shaft(0, fall);
-  EXPECT_LT(fall.deepest, 2e-5) << "m";
-  EXPECT_LT(fall.made, 1e-6 * fall.start) << "J in a step";
-  EXPECT_LT(fall.last, 0.4 * fall.start) << "they have fallen";
-  EXPECT_LT(fall.overlaps, 100);
-}
-
 // soak: a minute; the table of doc/decisions/rigid_bodies_and_tools.md has the deepest of these
 TEST(RigidTouch, EightShafts_AreNotPassed) {
   double deepest = 0;
@@ -690,6 +680,8 @@ TEST(RigidTouch, EightShafts_AreNotPassed) {
     std::printf("%d: pairs and steps over 1 mm deep %d, energy left %.3f\n", i, fall.overlaps,
                 fall.last / fall.start);
     EXPECT_LT(fall.made, 1e-6 * fall.start) << i;
+    EXPECT_LT(fall.last, 0.4 * fall.start) << i << ": they have fallen";
+    EXPECT_LT(fall.overlaps, 100) << i;
   }
   std::printf("deepest of eight shafts: %.3g m\n", deepest);
   EXPECT_LT(deepest, 5e-6);

@@ -6,6 +6,7 @@ headers_alone.py INCLUDE_DIR COMPILER...    C compilers; each is tried as C and 
                                             c++)
 """
 import atexit
+import os
 import pathlib
 import shutil
 import subprocess
@@ -15,9 +16,16 @@ import tempfile
 FLAGS = ["-fsyntax-only", "-Wall", "-Wextra", "-Wpedantic", "-Wshadow", "-Werror"]
 CPP20 = {"attach.hpp", "cut.hpp", "defs.hpp", "deform.hpp", "models.hpp", "obstacles.hpp", "queries.hpp",
          "tools.hpp", "result.hpp"}   # std::span
-LANGUAGES = {"c99": "c", "c17": "c", "c++17": "c++", "c++20": "c++"}
+LANGUAGES = {"c99": "c", "c++17": "c++", "c++20": "c++"}
 MICROSOFT = {"math.h": "#define INFINITY __builtin_inff()\n#define NAN __builtin_nanf(\"\")\n",
              "string.h": "void *memcpy(void *, const void *, __SIZE_TYPE__);\n"}
+
+
+def standards(header):
+    """The oldest of each language that the header is for."""
+    if header.suffix == ".h":
+        return ("c99", "c++17")
+    return ("c++20",) if header.name in CPP20 else ("c++17",)
 
 
 def targets(compiler, language, library):
@@ -37,11 +45,10 @@ def main():
     atexit.register(shutil.rmtree, library)
     for name, text in MICROSOFT.items():
         (pathlib.Path(library) / name).write_text(text)
-    for compiler in filter(shutil.which, compilers):
+    for compiler in {os.path.realpath(path): c for c in compilers if (path := shutil.which(c))}.values():
         for standard, language in LANGUAGES.items():
             for header in headers:
-                if (header.suffix == ".hpp" and language == "c" or header.name in CPP20
-                    and standard != "c++20"):
+                if standard not in standards(header):
                     continue
                 # Twice: a header without a working guard fails.
                 source = f'#include "deform/{header.name}"\n' * 2 + "extern int nothing_else;\n"
