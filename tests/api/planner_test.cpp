@@ -391,11 +391,19 @@ TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
   std::remove((folder() + "/deform/costs.json").c_str());
 }
 
-// Models that step themselves do not take it.
-TEST_F(PlannerScene, BodyWithASpring_GetsAModelThatTakesIt) {
-  const test::CommandResult r = test::deform(
-      {"explain",
-       bar(R"("accuracy": {"target": 0.2},)",
-           R"("springs": [{"point": [0.4, 0.05, 0.05], "to": [0.5, 0.05, 0.05], "stiffness": 100}], )")});
-  EXPECT_EQ(r.exit_code, 0) << r.err;
+// The cheapest model, which is modal without these, takes none of them.
+TEST_F(PlannerScene, WhatTheSceneAsksFor_ExcludesModelsThatDoNotTakeIt) {
+  const char *const kAsks[][2] = {
+      {"", R"("springs": [{"point": [0.4, 0.05, 0.05], "to": [0.5, 0.05, 0.05], "stiffness": 100}], )"},
+      {"", R"("separate": {}, )"},
+      {"", R"("mass_scaling": 0.05, )"},
+      {R"("effects": ["volume"], )", ""},
+      {R"("cuts": [{"body": "bar", "t": 0.05, "shape": "plane", "point": [0.2, 0, 0], "normal": [1, 0, 0]}], )",
+       ""},
+  };
+  for (const auto &[of_scene, of_body] : kAsks) {
+    const test::CommandResult r =
+        test::deform({"explain", bar(std::string(of_scene) + R"("accuracy": {"target": 0.4},)", of_body)});
+    EXPECT_EQ(r.exit_code, 0) << of_scene << of_body << r.err;
+  }
 }

@@ -713,4 +713,25 @@ Built build(dfm_context *context, Definition &def, uint64_t jitter_seed) {
   return Builder(context, def, jitter_seed).run();
 }
 
+Built build_alone(dfm_context *context, const Definition &def, const Body &body, const std::string &model,
+                  Params params) {
+  Definition alone = def;
+  alone.bodies = {body};
+  alone.bodies[0].model = model;
+  alone.bodies[0].params = std::move(params);
+  alone.bodies[0].on.clear();
+  alone.bodies[0].attach.clear();
+  alone.obstacles.clear();
+  alone.rigid = {};
+  alone.friction.clear();
+  alone.filters.clear();
+  alone.probes.clear();
+  std::erase_if(alone.cuts, [&](const Cut &c) { return c.body != body.name; });
+  std::erase_if(alone.tools, [&](Tool &t) {
+    return std::erase_if(t.cuts.bodies, [&](const std::string &name) { return name != body.name; }),
+           t.cuts.bodies.empty();
+  });
+  return build(context, alone, 0);
+}
+
 }  // namespace dfm::scene

@@ -23,22 +23,8 @@ constexpr double kFrame = 1.0 / 60;  // s, where the scene names no step
 // scene is built.
 std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,
                                     const std::string &model, Params params) {
-  Definition alone;
-  alone.file = def.file;
-  alone.folder = def.folder;
-  alone.world = def.world;
-  alone.solver = def.solver;
-  alone.materials = def.materials;
-  alone.duration = def.duration;
-  alone.step = def.step;
-  alone.equilibrium = def.equilibrium;
-  Body &b = alone.bodies.emplace_back(body);
-  b.model = model;
-  b.params = std::move(params);
-  b.on.clear();
-  b.attach.clear();
   const Quiet quiet;
-  const Built built = build(context, alone, 0);
+  const Built built = build_alone(context, def, body, model, std::move(params));
   std::vector<std::string> out;
   for (const BodyEffect &e : body_effects(*resolve<World>(Kind::world, built.world).find_body(body.name)))
     if (e.works) out.push_back(e.name);

@@ -8,6 +8,8 @@
 #include "math/extent.h"
 #include "math/turn.h"
 #include "plugin/context.h"
+#include "plugin/quiet.h"
+#include "scene/build.h"
 #include "scene/device.h"
 #include "scene/load.h"
 #include "scene/place.h"
@@ -119,6 +121,9 @@ bool convex(const Skin &s, double edge) {
   }
   return true;
 }
+
+// A card steps so, and mass is scaled for such steps.
+bool explicit_alone(const Body &b) { return b.device == "gpu" || b.def.mass_scaling > 0; }
 
 class Reader {
  public:
@@ -356,17 +361,29 @@ class Reader {
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
-  // "gpu" asks for one that a card computes, too, with its defaults. What steps itself takes no springs.
+  // "gpu" asks for one that a card computes, too, with its defaults. Where the scene asks for more than motion,
+  // those that take the body; where none does, building the scene says why.
   std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.try_find(DFM_KIND_MODEL, m.id);
       if (!type || off_card(types_, *type) || !(model_of(*type).cells & cell)) continue;
       if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
-      if (m.steps_itself && !b.springs.empty()) continue;
       out.push_back(m.id);
     }
-    return out;
+    if (b.springs.empty() && !may_be_cut() && !(b.def.mass_scaling > 0) && def_.effects_auto) return out;
+    std::vector<std::string> able = out;
+    std::erase_if(able, [&](const std::string &id) { return !takes(b, id); });
+    return able.empty() ? out : able;
+  }
+  bool takes(const Body &b, const std::string &model) const {
+    const Quiet quiet;
+    try {
+      dfm_world_destroy(build_alone(context_, def_, b, model, {}).world);
+    } catch (const Error &) {
+      return false;
+    }
+    return true;
   }
 
   // Of cells that are seen as several tetrahedra each, the edges are not those of these.
@@ -426,7 +443,7 @@ class Reader {
                                            : types_.find(DFM_KIND_MODEL, b.model));
     const int32_t named = b.def.integrator != DFM_INTEGRATOR_AUTO ? b.def.integrator : def_.world.integrator;
     if (named != DFM_INTEGRATOR_AUTO) r.scheme = named - DFM_INTEGRATOR_SYMPLECTIC_EULER;
-    if (b.device == "gpu" && named == DFM_INTEGRATOR_AUTO) r.scheme = 0;
+    if (explicit_alone(b) && named == DFM_INTEGRATOR_AUTO) r.scheme = 0;
     r.models = b.model_open ? candidates(measured, b, mesh.info.cell) : std::vector<std::string>{};
     return r;
   }
@@ -518,7 +535,7 @@ json plan_scene(dfm_context *context, const Definition &def, json &tree) {
   for (size_t i = 0; i < bodies.size(); ++i) {
     const BodyWay &way = plan.way.bodies[i];
     const Body &b = def.bodies[i];
-    if (b.device == "gpu" && b.def.integrator == DFM_INTEGRATOR_AUTO)
+    if (explicit_alone(b) && b.def.integrator == DFM_INTEGRATOR_AUTO)
       write(b.pointer + "/integrator", scheme_name(way.scheme));
     if (b.model_open) write(b.pointer + "/model/type", way.model);
     if (lattice[i] > 0) {
