@@ -372,13 +372,13 @@ TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {
 
 // unsanitized: too slow there; shorter tests run the same code
 TEST_F(PlannerScene, Calibrate_WritesWhatScenesTake) {
-  const test::CommandResult r = test::deform({"calibrate", "--model", "modal", "--quiet"});
+  const test::CommandResult r = test::deform({"calibrate", "--model", "shape_matching", "--quiet"});
   ASSERT_EQ(r.exit_code, 0) << r.err;
   EXPECT_TRUE(has(r.out, folder() + "/deform/costs.json")) << r.out;
   const std::string costs = test::read_file(folder() + "/deform/costs.json");
   EXPECT_TRUE(has(costs, "\"version\": 4") && has(costs, "\"short_ns_per_point\"")) << costs;
   const test::CommandResult planned = test::deform({"explain", bar(R"("accuracy": {"target": 0.2},)")});
-  EXPECT_TRUE(has(planned.out, "--set /bodies/0/model/type=modal")) << planned.out;
+  EXPECT_TRUE(has(planned.out, "--set /bodies/0/model/type=shape_matching")) << planned.out;
   // costs of one model: a scene that names another cannot be planned by them
   expect_refused(bar(R"("accuracy": {"target": 0.2},)", R"("model": {"type": "msm"}, )"),
                  {"/accuracy", "deform calibrate"});

@@ -213,6 +213,7 @@ ToiQuery real_query(Random &random, double motion) {
 
 class ToiRandom : public testing::TestWithParam<int> {};
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST_P(ToiRandom, WholeCoordinates_AgreeWithIntegerArithmetic) {
   Random random(11);
   int sure = 0, hits = 0;

@@ -96,6 +96,7 @@ TEST(Dampers, WithALag_TheFirstModeIsDampedAsByRayleigh) {
 
 // Kinetic and elastic energy as the scheme keeps them, and what is stored in the dampers, only fall, whatever
 // moves, at the longest sub-step.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Dampers, WithALag_EnergyOnlyFalls) {
   for (const char *model : {"linear_fem", "corotational_fem"}) {
     const Bar bar(model, 3e-3, 2, 200);
@@ -184,6 +185,7 @@ TEST(Dampers, ATurnedBody_HasTheSameSubStep) {
 }
 
 // An impact that explicit sub-steps would take too long for stays implicit: the step does not fail.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Dampers, AnImpactThatIsTooDear_StaysImplicit) {
   for (const double young : {3e7, 3.5e7}) {
     const test::Context context;

@@ -105,6 +105,7 @@ TEST(Fill, CleanSurface_SharesSumUpToTheEnclosedVolume) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, PartsThinnerThanHalfACell_AreNamed) {
   const auto thin = [](const RestMesh &surface, uint32_t cells) {
     for (const std::string &w : fill_surface(surface, cells).warnings)
@@ -267,6 +268,7 @@ TEST(Fill, Shares_NeverBelowTheFloorOfTheirNeighborhood) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Fill, HolesAndFlippedTriangles_ChangeTheVolumeByLittle) {
   const RestMesh clean = test::sphere_surface(0.5, 4);
   const double volume = test::enclosed(clean);

@@ -64,6 +64,7 @@ TEST(StepSizes, OfferedStep_IsARungNotAboveTheStableOneAndNotCut) {
 
 // A bound that wobbles by 30 % for ever, at any period: sizes change with the logarithm of the number of
 // sub-steps, then once in some 1e4.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(StepSizes, BoundThatSwings_ChangesThemEverMoreRarely) {
   for (const bool fed_back : {false, true})
     for (const double period : {2.0, 31.0, 700.0, 9000.0, 2e5}) {

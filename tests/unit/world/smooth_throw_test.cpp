@@ -46,6 +46,7 @@ struct ThrowTarget {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SmoothThrow, At20MetersPerSecond_StaysOutside) {
   for (const ThrowTarget &o :
        {ThrowTarget{Shape::plane, DFM_SHAPE_PLANE, 0, 0}, ThrowTarget{Shape::box, DFM_SHAPE_BOX, 0, 0},
