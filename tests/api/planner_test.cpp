@@ -398,7 +398,8 @@ TEST_F(PlannerScene, WhatTheSceneAsksFor_ExcludesModelsThatDoNotTakeIt) {
       {"", R"("separate": {}, )"},
       {"", R"("mass_scaling": 0.05, )"},
       {R"("effects": ["volume"], )", ""},
-      {R"("cuts": [{"body": "bar", "t": 0.05, "shape": "plane", "point": [0.2, 0, 0], "normal": [1, 0, 0]}], )",
+      {R"("cuts": [{"body": "bar", "t": 0.05, "shape": "plane", "point": [0.2, 0, 0],
+                    "normal": [1, 0, 0]}], )",
        ""},
   };
   for (const auto &[of_scene, of_body] : kAsks) {

@@ -727,10 +727,9 @@ Built build_alone(dfm_context *context, const Definition &def, const Body &body,
   alone.filters.clear();
   alone.probes.clear();
   std::erase_if(alone.cuts, [&](const Cut &c) { return c.body != body.name; });
-  std::erase_if(alone.tools, [&](Tool &t) {
-    return std::erase_if(t.cuts.bodies, [&](const std::string &name) { return name != body.name; }),
-           t.cuts.bodies.empty();
-  });
+  for (Tool &t : alone.tools)
+    std::erase_if(t.cuts.bodies, [&](const std::string &name) { return name != body.name; });
+  std::erase_if(alone.tools, [](const Tool &t) { return t.cuts.bodies.empty(); });
   return build(context, alone, 0);
 }
 

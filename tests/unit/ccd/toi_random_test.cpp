@@ -265,6 +265,7 @@ TEST(ToiConservative, ExactTouches_AreNeverMissedAndNeverLate) {
   }
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToiConservative, BeforeTheResult_FeaturesAreApart) {
   Random random(14);
   int hits = 0;

@@ -73,6 +73,7 @@ TEST(SurfaceFiles, OneSurfaceInManyFormats_IsOneSurface) {
   EXPECT_GE(n, 16u);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(SurfaceFiles, BoundaryOfABody_EnclosesItsVolume) {
   uint32_t n = 0;
   for (const char *folder : {"bars", "misc", "spheres", "formats", "nasty", "bench"})

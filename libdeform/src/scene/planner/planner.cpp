@@ -361,8 +361,8 @@ class Reader {
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
-  // "gpu" asks for one that a card computes, too, with its defaults. Where the scene asks for more than motion,
-  // those that take the body; where none does, building the scene says why.
+  // "gpu" asks for one that a card computes, too, with its defaults. Where the scene asks for more than
+  // motion, those that take the body; where none does, building the scene says why.
   std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
