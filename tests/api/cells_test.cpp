@@ -53,6 +53,7 @@ struct Drop {
   ~Drop() { dfm_world_destroy(world); }
 };
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CellWorlds, BodiesDroppedOnAFloor_BounceWithoutNewEnergyAndDoNotCross) {
   for (const Kind &kind : {kBall, kBricks, kFine})
     for (int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
@@ -80,6 +81,7 @@ TEST(CellWorlds, BodiesDroppedOnAFloor_BounceWithoutNewEnergyAndDoNotCross) {
 
 // Modes and condensation of such cells: a block on a slope that friction holds neither creeps nor sinks, and
 // goes on from a snapshot with the same bits.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(CellWorlds, BlocksOfModesOnASlope_NeitherCreepNorSink) {
   constexpr double kTilt = 0.3;
   struct Slope {

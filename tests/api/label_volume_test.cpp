@@ -346,6 +346,7 @@ TEST(LabelSurface, OfABall_IsSmooth) {
 }
 
 // Noise touches itself along edges everywhere: what is made of it is still the boundary of solids.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(LabelSurface, OfNoise_IsClosed) {
   std::mt19937 random(7);
   for (int round = 0; round < 6; ++round) {

@@ -71,6 +71,7 @@ struct Resting {
 
 }  // namespace
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Lattice, PebbleOnAFloor_RestsWithItsWeightAndDoesNotCreep) {
   for (const int32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER})
     for (const uint32_t cells : {8u, 64u}) {
@@ -89,6 +90,7 @@ TEST(Lattice, PebbleOnAFloor_RestsWithItsWeightAndDoesNotCreep) {
 }
 
 // Condensed to its surface the pebble sags as its cells do, but for their large strains.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Lattice, PebbleOfModes_RestsAndCondensedItSagsAsItsCells) {
   std::vector<double> sag;
   for (const char *const model : {"corotational_fem", "modal", "condensed"}) {

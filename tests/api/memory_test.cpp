@@ -101,6 +101,7 @@ TEST(Memory, ASettledStep_AllocatesNothing) {
   EXPECT_EQ(hooks.wrong_align, 0);
 }
 
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Memory, ASettledStepOnTrianglesAndVoxels_AllocatesNothing) {
   Hooks hooks;
   const dfm_context_def def = hooks.def();

@@ -558,6 +558,7 @@ TEST(Run, Frames_AreDrawnAtTheirRate) {
 
 // A block pressed on the floor is stressed, so its picture is another one than by body. Springs tell no
 // stress.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(Run, FramesByStress_ShowIt) {
   const auto picture = [&](const char *name, const char *color, const char *model) {
     const Outcome r = run(name, {"--frames", "100", "--time", "0.02", "--set", color, "--set", model});

@@ -470,6 +470,7 @@ TEST(ToolCut, FreeBody_IsDraggedByTheBlade_AndMomentumIsKept) {
 }
 
 // On a virtual coupling both give way.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolCut, CoupledBlade_PaysTheEnergyOfTheCut_AndIsHeldBack) {
   for (const uint32_t integrator : {DFM_INTEGRATOR_SYMPLECTIC_EULER, DFM_INTEGRATOR_IMPLICIT_EULER}) {
     Tough s(2000, all, "corotational_fem", integrator);
@@ -509,6 +510,7 @@ TEST(ToolCut, CoupledBlade_StandsWhereTheHandIsTooWeak) {
 }
 
 // The energy due is part of a snapshot.
+// unsanitized: too slow there; shorter tests run the same code
 TEST(ToolCut, SnapshotOfABladeThatOwes_GoesOnTheSameWay) {
   Tough s(0, sides);
   s.down(0.03, 0.2);
