@@ -325,7 +325,7 @@ void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) 
       for (const uint32_t j : given_) std::fill_n(eight + kLanes * j, kLanes, 0.0);
     });
   }
-  factor_.inverse_at(*kernels, n, points, w);
+  factor_.inverse_at(n, points, w);
   const size_t rows = 3 * size_t(n);
   const auto fixed = [&](size_t j) { return is_held(3 * size_t(points[j / 3]) + j % 3); };
   for (size_t i = 0; i < rows; ++i)
@@ -350,7 +350,7 @@ void Elastic::respond(const double *f, double *u) const {
       return clear_given();
     }
     if constexpr (kWide == 1) factor_.solve(u, u);
-    else factor_.solve_eight(*kernels, u, u);
+    else factor_.solve_eight(u, u);
   };
   std::copy(f, f + kWide * size, u);
   if (!floating) return solve();
