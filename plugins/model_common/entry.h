@@ -182,9 +182,8 @@ template <class Body>
 struct Ops {
   template <class Use>
   static dfm_status with_state(void *self, const dfm_kin *k, const Use &use) {
-    return on(*static_cast<Body *>(self), [&](auto &body) {
-      return body.lacks_state(*k) ? DFM_E_STATE : answered([&] { use(body); });
-    });
+    return on(*static_cast<Body *>(self),
+              [&](auto &body) { return body.lacks_state(*k) ? DFM_E_STATE : answered([&] { use(body); }); });
   }
   static dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
     return with_state(self, k, [&](auto &body) { body.add_forces(*k, f); });

@@ -1,5 +1,5 @@
-// A gradient as F = R S, and the second derivative of an energy of it in the axes of S (Smith, de Goes and Kim
-// 2019, Analytic eigensystems for isotropic distortion energies).
+// A gradient as F = R S, and the second derivative of an energy of it in the axes of S (Smith, de Goes and
+// Kim 2019, Analytic eigensystems for isotropic distortion energies).
 #pragma once
 #include <algorithm>
 

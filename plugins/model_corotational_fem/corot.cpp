@@ -123,9 +123,9 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_SLOTS)) {
     const AnyBody &body = *static_cast<const AnyBody *>(self);
     return body.with([](auto &b) { return !b.plastic(); }) ? &kNoSlots
-           : !body.by_cells           ? &kSlots
-           : body.cells.points() == 8 ? &kSlotsOfEight
-                                      : &kSlotsOfMany;
+           : !body.by_cells                                ? &kSlots
+           : body.cells.points() == 8                      ? &kSlotsOfEight
+                                                           : &kSlotsOfMany;
   }
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;

@@ -213,8 +213,7 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
       for (int j = 0; j < 3; ++j) {
         double sum = frame_by * frame[3 * i + j];
         for (int e = 0; direct && e < 3; ++e)
-          for (int l = 0; l < 3; ++l)
-            sum += a * (shape.axis[i][e] * elastic[3 * e + l] * shape.axis[j][l]);
+          for (int l = 0; l < 3; ++l) sum += a * (shape.axis[i][e] * elastic[3 * e + l] * shape.axis[j][l]);
         for (int e = 0; e < 3; ++e) sum += twist[e] * (turned[e][m][i] * turned[e][n][j]);
         for (int e = 0; change_by != 0 && e < 6; ++e)
           for (int l = 0; l < 6; ++l) sum += change_by * (change[m][i][e] * (d[e][l] * change[n][j][l]));

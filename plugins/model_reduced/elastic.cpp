@@ -165,7 +165,7 @@ void Elastic::add_cell(uint32_t c, const model::RestCell &cell) {
     }
 }
 
-// Gram and Schmidt's method, twice, by mass.
+// Orthonormal by mass.
 void Elastic::find_rigid() {
   const size_t size = 3 * size_t(npoint);
   rigid.create(host_, 6 * size);
@@ -180,16 +180,9 @@ void Elastic::find_rigid() {
     for (size_t j = 0; j < size; ++j) sum += mass[j / 3] * a[j] * b[j];
     return sum;
   };
-  for (size_t k = 0; k < 6; ++k) {
-    double *const own = rigid.data() + k * size;
-    for (int twice = 0; twice < 2; ++twice)
-      for (size_t n = 0; n < k; ++n) {
-        const double *const before = rigid.data() + n * size, along = product_of(own, before);
-        for (size_t j = 0; j < size; ++j) own[j] -= along * before[j];
-      }
-    const double scale = 1 / std::sqrt(product_of(own, own));
-    for (size_t j = 0; j < size; ++j) own[j] *= scale;
-  }
+  double *row[6];
+  for (size_t k = 0; k < 6; ++k) row[k] = rigid.data() + k * size;
+  orthonormalize(row, size, product_of);
 }
 
 // Of three points far from each other.

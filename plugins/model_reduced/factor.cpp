@@ -12,8 +12,7 @@ Factor::~Factor() {
 void Factor::create(const dfm_host *host, uint32_t n, const std::vector<uint32_t> &ij,
                     const std::vector<double> &blk, const double *places) {
   n_ = n;
-  if (host->extension)
-    direct_ = static_cast<const dfm_direct *>(host->extension(host->ctx, DFM_HOST_DIRECT));
+  if (host->extension) direct_ = static_cast<const dfm_direct *>(host->extension(host->ctx, DFM_HOST_DIRECT));
   if (!direct_ || direct_->size < sizeof(dfm_direct)) throw "the host has no solver \"" DFM_HOST_DIRECT "\"";
   if (direct_->analyse(host, n_, uint32_t(ij.size() / 2), ij.data(), places, &self_) != DFM_OK) {
     self_ = nullptr;

@@ -1,6 +1,6 @@
-// A sparse symmetric positive definite matrix of 3 x 3 blocks: its factor by the host's solver (dfm.direct/1),
-// and the lowest eigenpairs that a solve with it gives. Eigen stays inside lanczos.cpp and tiles.cpp and works
-// while a body is created.
+// A sparse symmetric positive definite matrix of 3 x 3 blocks: its factor by the host's solver
+// (dfm.direct/1), and the lowest eigenpairs that a solve with it gives. Eigen stays inside lanczos.cpp and
+// tiles.cpp and works while a body is created.
 #pragma once
 #include <deform/plugin.h>
 #include <deform/plugin_draft.h>
