@@ -28,28 +28,6 @@ inline uint32_t find_edge(const uint32_t *edges, uint32_t nedge, uint32_t a, uin
   return lo;
 }
 
-// row [npoint + 1]: where the edges begin whose lower ends these points are.
-inline void find_rows(const uint32_t *edges, uint32_t nedge, uint32_t npoint, uint32_t *row) {
-  uint32_t e = 0;
-  for (uint32_t i = 0; i <= npoint; ++i) {
-    while (e < nedge && edges[2 * size_t(e)] < i) ++e;
-    row[i] = e;
-  }
-}
-
-// Numbers of the edges of a cell, for all cells of a mesh.
-inline void find_edges_by_rows(const uint32_t *edges, const uint32_t *row, const uint32_t *cell,
-                               uint32_t *out) {
-  for (int n = 0; n < 6; ++n) {
-    const uint32_t a = cell[kEdgeOf[n][0]], b = cell[kEdgeOf[n][1]];
-    const uint32_t low = a < b ? a : b, high = a < b ? b : a;
-    uint32_t e = row[low];
-    while (e < row[low + 1] && edges[2 * size_t(e) + 1] != high) ++e;
-    if (e == row[low + 1]) throw "a cell has an edge that the mesh's edge list lacks";
-    out[n] = e;
-  }
-}
-
 // Numbers of the edges of a cell.
 inline void find_edges(const uint32_t *edges, uint32_t nedge, const uint32_t *cell, uint32_t *out) {
   for (int n = 0; n < 6; ++n) out[n] = find_edge(edges, nedge, cell[kEdgeOf[n][0]], cell[kEdgeOf[n][1]]);

@@ -122,11 +122,18 @@ dfm_status create(const dfm_host *h, const dfm_mesh *m, const char *who, void **
   return status;
 }
 
+// What the instance is made of: one of the two bodies of ByKind, else the body itself.
+template <class Body, class Use>
+auto on(Body &body, const Use &use) {
+  if constexpr (requires { body.by_cells; }) return body.with(use);
+  else return use(body);
+}
+
 // New values for an instance; body.apply_params(values) changes nothing if it throws.
 template <class Body>
 dfm_status change(Body &body, const double *values) {
   try {
-    body.apply_params(values);
+    on(body, [&](auto &b) { b.apply_params(values); });
   } catch (const Refused &) {
     return DFM_E_ARG;
   } catch (...) {
@@ -175,44 +182,48 @@ template <class Body>
 struct Ops {
   template <class Use>
   static dfm_status with_state(void *self, const dfm_kin *k, const Use &use) {
-    Body &body = *static_cast<Body *>(self);
-    return body.lacks_state(*k) ? DFM_E_STATE : answered([&] { use(body); });
+    return on(*static_cast<Body *>(self),
+              [&](auto &body) { return body.lacks_state(*k) ? DFM_E_STATE : answered([&] { use(body); }); });
   }
   static dfm_status add_forces(void *self, const dfm_kin *k, double *f) {
-    return with_state(self, k, [&](Body &body) { body.add_forces(*k, f); });
+    return with_state(self, k, [&](auto &body) { body.add_forces(*k, f); });
   }
   static dfm_status bound(void *self, const dfm_kin *k, double *ksum, double *csum, double *) {
-    return with_state(self, k, [&](Body &body) { body.bound(*k, ksum, csum); });
+    return with_state(self, k, [&](auto &body) { body.bound(*k, ksum, csum); });
   }
   static dfm_status energy(void *self, const dfm_kin *k, double *joule) {
-    return with_state(self, k, [&](Body &body) { *joule = body.energy(*k); });
+    return with_state(self, k, [&](auto &body) { *joule = body.energy(*k); });
   }
   static dfm_status pattern(const void *self, uint32_t *nb, uint32_t *ij) {
-    const Body &body = *static_cast<const Body *>(self);
     try {
-      *nb = body.pairs();
-      if (ij) body.pattern(ij);
+      on(*static_cast<const Body *>(self), [&](auto &body) {
+        *nb = body.pairs();
+        if (ij) body.pattern(ij);
+      });
     } catch (...) {
       return DFM_E_NOMEM;
     }
     return DFM_OK;
   }
   static dfm_status stiffness(void *self, const dfm_kin *k, double a, double b, double *blk) {
-    return with_state(self, k, [&](Body &body) { body.add_stiffness(*k, a, b, blk); });
+    return with_state(self, k, [&](auto &body) { body.add_stiffness(*k, a, b, blk); });
   }
   static dfm_status cell_energy(void *self, const dfm_kin *k, double *density) {
-    return with_state(self, k, [&](Body &body) { body.cell_energy(*k, density); });
+    return with_state(self, k, [&](auto &body) { body.cell_energy(*k, density); });
   }
   static dfm_status cell_stress(void *self, const dfm_kin *k, double *stress) {
-    return with_state(self, k, [&](Body &body) { body.cell_stress(*k, stress); });
+    return with_state(self, k, [&](auto &body) { body.cell_stress(*k, stress); });
   }
   static const char *const *active_effects(const void *self) {
     if constexpr (requires(const Body &b) { b.active(); }) return static_cast<const Body *>(self)->active();
-    else return static_cast<const Body *>(self)->active_effects;
+    else
+      return on(*static_cast<const Body *>(self),
+                [](auto &b) -> const char *const * { return b.active_effects; });
   }
   static const char *idle(const void *self, uint32_t row) {
     using Row = typename Body::Row;
-    return row < Row::kParamCount ? static_cast<const Body *>(self)->idle(Row(row)) : nullptr;
+    const auto why = [&](auto &body) { return body.idle(Row(row)); };
+    return row < Row::kParamCount ? on(*static_cast<const Body *>(self), why) : nullptr;
   }
   static constexpr dfm_cell_energy kCellEnergy = {sizeof(dfm_cell_energy), 0, cell_energy};
   static constexpr dfm_cell_stress kCellStress = {sizeof(dfm_cell_stress), 0, cell_stress};

@@ -252,9 +252,6 @@ inline void Material::take_mesh(const dfm_host *host, const char *who, const dfm
   for (uint32_t e = 0; e < nedge; ++e)
     edge_length[e] =
         length_of(m.rest + 3 * size_t(edges[2 * size_t(e)]), m.rest + 3 * size_t(edges[2 * size_t(e) + 1]));
-  Buffer<uint32_t> row_of_edges;
-  row_of_edges.create(host, size_t(npoint) + 1);
-  model::find_rows(edges.data(), nedge, npoint, row_of_edges.data());
   for (uint32_t c = 0; c < ncell; ++c) {
     uint32_t *q = cells.data() + 4 * size_t(c);
     const auto six = [&] {
@@ -266,7 +263,7 @@ inline void Material::take_mesh(const dfm_host *host, const char *who, const dfm
     cell_volume6[c] = six();
     const double volume = cell_volume6[c] / 6;
     uint32_t *const e = cell_edge.data() + 6 * size_t(c);
-    model::find_edges_by_rows(edges.data(), row_of_edges.data(), q, e);
+    model::find_edges(edges.data(), nedge, q, e);
     for (int n = 0; n < 6; ++n) edge_volume[e[n]] += volume;
   }
   per_modulus.create(host, nedge);

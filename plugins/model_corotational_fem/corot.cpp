@@ -83,7 +83,7 @@ dfm_status set_params(void *self, const double *params) {
 }
 
 dfm_status state_init(const void *self, double *state) {
-  std::fill_n(state, static_cast<const AnyBody *>(self)->state_size(), 0.0);
+  std::fill_n(state, static_cast<const AnyBody *>(self)->with([](auto &b) { return b.state_size(); }), 0.0);
   return DFM_OK;
 }
 
@@ -122,10 +122,10 @@ const void *extension(const void *self, const char *id) {
   if (!strcmp(id, DFM_EXT_CELL_STRESS)) return &Ops::kCellStress;
   if (!strcmp(id, DFM_EXT_SLOTS)) {
     const AnyBody &body = *static_cast<const AnyBody *>(self);
-    return !body.plastic()            ? &kNoSlots
-           : !body.by_cells           ? &kSlots
-           : body.cells.points() == 8 ? &kSlotsOfEight
-                                      : &kSlotsOfMany;
+    return body.with([](auto &b) { return !b.plastic(); }) ? &kNoSlots
+           : !body.by_cells                                ? &kSlots
+           : body.cells.points() == 8                      ? &kSlotsOfEight
+                                                           : &kSlotsOfMany;
   }
   if (!strcmp(id, DFM_EXT_EFFECTS)) return &Ops::kActiveEffects;
   if (!strcmp(id, DFM_EXT_EFFECT_ROWS)) return &kEffectRows;

@@ -9,8 +9,8 @@
 // change of S (the damper's times its fading, see strain_rate in corot_kernel_cells.h). What fibers under
 // stress change as S turns against their axes is left out.
 #include "../model_common/edges.h"
+#include "../model_common/modes.h"
 #include "../model_common/plastic.h"
-#include "../model_common/rotation.h"
 #include "corot_body.h"
 #include "corot_collapse.h"
 
@@ -68,13 +68,7 @@ void frame_at(const Group &group, uint32_t lane, const double *const *x, Shape &
   for (int k = 0; k < 9; ++k) out.g[k / 3 + 1][k % 3] = group.g[k][lane];
   for (int k = 0; k < 3; ++k) out.g[0][k] = -((out.g[1][k] + out.g[2][k]) + out.g[3][k]);
   gradient_of(group, lane, x, f);
-  model::rotation::polar_of(f, out.r);
-  for (int k = 0; k < 3; ++k)
-    for (int l = 0; l < 3; ++l) {
-      const double kl = (out.r[k] * f[l] + out.r[3 + k] * f[3 + l]) + out.r[6 + k] * f[6 + l];
-      const double lk = (out.r[l] * f[k] + out.r[3 + l] * f[3 + k]) + out.r[6 + l] * f[6 + k];
-      out.s[k][l] = 0.5 * (kl + lk);
-    }
+  model::split(f, out.r, out.s);
 }
 
 void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &out) {
@@ -86,51 +80,22 @@ void shape_at(const Group &group, uint32_t lane, const double *const *x, Shape &
   out.trace = (s[0][0] + s[1][1]) + s[2][2];
 }
 
-// Second derivative of an energy of the gradient in the axes of S (Smith, de Goes and Kim 2019, Analytic
-// eigensystems for isotropic distortion energies): a 3 x 3 block for the stretches, and for each pair i < j
-// its turn (i against j) and its shear. Negative values are set to zero.
-struct Modes { double stretch[3][3], turn[3], shear[3]; };  // pair k: the axes other than k
-void modes_of(uint32_t energy, const double *s, double mu2, double lambda, Modes &out) {
+// Negative values are set to zero.
+void modes_of(uint32_t energy, const double *s, double mu2, double lambda, model::Modes &out) {
   const double n = (s[0] * s[0] + s[1] * s[1]) + s[2] * s[2], det = s[0] * s[1] * s[2];
   const double m = 2.0 / 3 * mu2, l = lambda + 5.0 / 12 * mu2, pull = m - m / (n + 1);
-  const double pressure = l * (det - 1) - 0.75 * m, trace = 0.5 * lambda * (n - 3), mu = 0.5 * mu2;
-  double a[3][3], v[3][3];
-  for (int i = 0; i < 3; ++i)
+  const double pressure = l * (det - 1) - 0.75 * m;
+  if (energy == kVenant) model::venant_modes(lambda, 0.5 * mu2, s, out);
+  for (int i = 0; energy != kVenant && i < 3; ++i) {
     for (int j = 0; j < 3; ++j) {
-      const int k = 3 - i - j;  // the third axis, where i and j differ
-      if (energy == kVenant) {
-        a[i][j] = lambda * (s[i] * s[j]) + (i == j ? trace + mu * (3 * (s[i] * s[i]) - 1) : 0);
-      } else {
-        const double u = s[(i + 1) % 3] * s[(i + 2) % 3], w = s[(j + 1) % 3] * s[(j + 2) % 3];
-        a[i][j] =
-            2 * m / ((n + 1) * (n + 1)) * (s[i] * s[j]) + l * (u * w) + (i == j ? pull : pressure * s[k]);
-      }
+      const double u = s[(i + 1) % 3] * s[(i + 2) % 3], w = s[(j + 1) % 3] * s[(j + 2) % 3];
+      out.stretch[i][j] = 2 * m / ((n + 1) * (n + 1)) * (s[i] * s[j]) + l * (u * w) +
+                          (i == j ? pull : pressure * s[3 - i - j]);
     }
-  model::jacobi(a, v);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      out.stretch[i][j] = 0;
-      for (int k = 0; k < 3; ++k) out.stretch[i][j] += std::max(a[k][k], 0.0) * (v[i][k] * v[j][k]);
-    }
-  for (int k = 0; k < 3; ++k) {
-    const double x = s[(k + 1) % 3], y = s[(k + 2) % 3], squares = x * x + y * y;
-    const double turn_by = energy == kVenant ? trace + mu * (squares - x * y - 1) : pull + pressure * s[k];
-    const double shear = energy == kVenant ? trace + mu * (squares + x * y - 1) : pull - pressure * s[k];
-    out.turn[k] = std::max(turn_by, 0.0);
-    out.shear[k] = std::max(shear, 0.0);
+    out.turn[i] = pull + pressure * s[i];
+    out.shear[i] = pull - pressure * s[i];
   }
-}
-// Entry (i, j) of block (m, n) in the axes of S: p, q the gradients of the two corners there.
-double entry_of(const Modes &modes, int i, int j, const double *p, const double *q) {
-  double sum = modes.stretch[i][j] * (p[i] * q[j]);
-  for (int k = 0; k < 3; ++k) {
-    const int x = (k + 1) % 3, y = (k + 2) % 3;
-    if (i == k || j == k) continue;
-    // a motion along x shears by q_y, along y by q_x; it turns by q_y and -q_x
-    const double left = i == x ? p[y] : p[x], right = j == x ? q[y] : q[x];
-    sum += 0.5 * (modes.shear[k] + (i == j ? modes.turn[k] : -modes.turn[k])) * (left * right);
-  }
-  return sum;
+  model::cut_negative(out);
 }
 
 // out -= r m r^T
@@ -204,7 +169,7 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
   shape_at(own, lane, x, shape);
   const double share = shape.share(), damping = damp.empty() ? 0 : b * damp[place] * (share * share);
   const bool direct = choice(kEnergy) != kLinear;
-  Modes modes{};
+  model::Modes modes{};
   double principal[4][3];
   if (direct) modes_of(choice(kEnergy), shape.stretch, own.mu2[lane], own.lambda[lane], modes);
   double d[6][6], soft[6][6], change[4][3][6], turned[3][4][3], twist[3] = {};
@@ -241,15 +206,14 @@ void Body::add_exact(const dfm_kin &k, uint32_t c, double a, double b, double *b
     if (pair > 0) twist[m] = 0.5 * a * std::max(0.0, own.mu2[lane] + 2 * pull / pair);
   }
   const auto add_block = [&](int m, int n, double *out) {
-    double frame[9], in_frame[3][3];
+    double frame[9], elastic[9] = {}, in_frame[3][3];
     model::stiffness_block(rest, soft, m, n, frame);
+    if (direct) model::elastic_block(modes, principal[m], principal[n], elastic);
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
         double sum = frame_by * frame[3 * i + j];
         for (int e = 0; direct && e < 3; ++e)
-          for (int l = 0; l < 3; ++l)
-            sum +=
-                a * (shape.axis[i][e] * entry_of(modes, e, l, principal[m], principal[n]) * shape.axis[j][l]);
+          for (int l = 0; l < 3; ++l) sum += a * (shape.axis[i][e] * elastic[3 * e + l] * shape.axis[j][l]);
         for (int e = 0; e < 3; ++e) sum += twist[e] * (turned[e][m][i] * turned[e][n][j]);
         for (int e = 0; change_by != 0 && e < 6; ++e)
           for (int l = 0; l < 6; ++l) sum += change_by * (change[m][i][e] * (d[e][l] * change[n][j][l]));

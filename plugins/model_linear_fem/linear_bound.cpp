@@ -8,48 +8,25 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../model_common/rotation.h"
 #include "linear_body.h"
 
 namespace linear {
-namespace {
-
-// Eigenvalues of a symmetric 3x3 matrix, in any order, by Jacobi's rotations; s is destroyed.
-void eigenvalues(double (*s)[3], double *out) {
-  for (int sweep = 0; sweep < 8; ++sweep)
-    for (int p = 0; p < 2; ++p)
-      for (int q = p + 1; q < 3; ++q) {
-        if (s[p][q] == 0) continue;
-        const double theta = (s[q][q] - s[p][p]) / (2 * s[p][q]);
-        const double t = (theta < 0 ? -1 : 1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), sine = t * c;
-        const int r = 3 - p - q;
-        const double rp = s[r][p], rq = s[r][q], pq = s[p][q];
-        s[p][p] -= t * pq;
-        s[q][q] += t * pq;
-        s[p][q] = s[q][p] = 0;
-        s[r][p] = s[p][r] = c * rp - sine * rq;
-        s[r][q] = s[q][r] = sine * rp + c * rq;
-      }
-  for (int n = 0; n < 3; ++n) out[n] = s[n][n];
-}
-
-}  // namespace
-
 double largest_stiffness(const Tetrahedron &t, const model::Lame &m) {
-  double spread[3][3] = {}, a[3], stretch[3][3], value[3];
+  double spread[3][3] = {}, a[3], stretch[3][3], axes[3][3];
   for (const double *g : t.g)
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) spread[r][c] += g[r] * g[c];
-  eigenvalues(spread, a);
-  for (double &x : a) x = std::max(x, 0.0);
+  model::jacobi(spread, axes);
+  for (int r = 0; r < 3; ++r) a[r] = std::max(spread[r][r], 0.0);
   double most = 0;
   for (int r = 0; r < 3; ++r) {
     most = std::max(most, m.mu * (a[r] + a[(r + 1) % 3]));
     for (int c = 0; c < 3; ++c)
       stretch[r][c] = m.lambda * std::sqrt(a[r] * a[c]) + (r == c ? 2 * m.mu * a[r] : 0);
   }
-  eigenvalues(stretch, value);
-  for (double x : value) most = std::max(most, x);
+  model::jacobi(stretch, axes);
+  for (int r = 0; r < 3; ++r) most = std::max(most, stretch[r][r]);
   return t.volume * most * (1 + 1e-12);  // rounding of the eigenvalues
 }
 

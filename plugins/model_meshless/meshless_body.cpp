@@ -30,13 +30,10 @@ void add_product(const double *a, const double *x, double *out) {
 }  // namespace
 
 void shape_of(const double *f, Shape &out) {
-  double s[9], sym[3][3];
-  model::rotation::polar_of(f, out.rotation);
-  transposed_matrix_product(out.rotation, f, s);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) sym[i][j] = 0.5 * (s[3 * i + j] + s[3 * j + i]);
-  model::jacobi(sym, out.axis);
-  for (int i = 0; i < 3; ++i) out.stretch[i] = sym[i][i];
+  double s[3][3];
+  model::split(f, out.rotation, s);
+  model::jacobi(s, out.axis);
+  for (int i = 0; i < 3; ++i) out.stretch[i] = s[i][i];
 }
 
 // corotational: mu |S - 1|^2 + lambda/2 (tr S - 3)^2, P = 2 mu (F - R) + lambda (tr S - 3) R

@@ -5,12 +5,14 @@
 
 #include "../model_common/entry.h"
 #include "../model_common/lists.h"
+#include "../model_common/modes.h"
 #include "../model_common/pieces.h"
 #include "../model_common/small.h"
 
 namespace meshless {
 
 using model::Buffer;
+using model::Modes;
 
 // Rows of the parameter table, each one wide.
 enum Param : uint32_t {
@@ -40,10 +42,6 @@ struct Solid {
 
 // The shape at a point: F = R S, S = V diag(stretch) V^T.
 struct Shape { double rotation[9], stretch[3], axis[3][3]; };
-
-// Second derivative of the energy density in the axes of S: stretches among each other, and for the pair of
-// axes other than k its turn against the material's frame and its shear.
-struct Modes { double stretch[3][3], turn[3], shear[3]; };
 
 struct Body {
   const dfm_host *host = nullptr;
@@ -115,7 +113,6 @@ struct Body {
   uint32_t stencil_of(uint32_t point, double *g, double *h) const;
   void add_point(const dfm_kin &k, uint32_t point, double a, double b, double *blk);
   void find_twists(const dfm_kin &k, uint32_t point, uint32_t n, double *twist, double *inverse);
-  static void elastic_block(const Modes &m, const double *ya, const double *yb, double *out);
 };
 
 void shape_of(const double *gradient, Shape &out);

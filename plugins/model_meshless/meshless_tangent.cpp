@@ -1,5 +1,4 @@
-// Second derivatives: of the energy of a gradient in the axes of S (Smith, de Goes and Kim 2019, Analytic
-// eigensystems for isotropic distortion energies), and of the points that share a gradient.
+// Second derivatives of the points that share a gradient.
 //
 // The step bound. The stiffness K is a sum over points, K_i <= volume (K_rest + excess G) + residual h in
 // the order of matrices: K_rest the stiffness at rest in the frame of R, G = slope_a.slope_b, excess no less
@@ -11,7 +10,6 @@
 #include <cmath>
 
 #include "../model_common/index.h"
-#include "../model_common/rotation.h"
 #include "meshless_body.h"
 
 namespace meshless {
@@ -35,21 +33,6 @@ double norm_of(const Solid &c, const double *a, const double *b) {
 
 using model::dot;
 
-void cut_negative(Modes &m) {
-  double a[3][3], v[3][3];
-  std::copy(&m.stretch[0][0], &m.stretch[0][0] + 9, &a[0][0]);
-  model::jacobi(a, v);
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      m.stretch[i][j] = 0;
-      for (int k = 0; k < 3; ++k) m.stretch[i][j] += std::max(a[k][k], 0.0) * (v[i][k] * v[j][k]);
-    }
-  for (int k = 0; k < 3; ++k) {
-    m.turn[k] = std::max(m.turn[k], 0.0);
-    m.shear[k] = std::max(m.shear[k], 0.0);
-  }
-}
-
 // By how much an eigenvalue may be above that at rest.
 double excess_of(const Solid &c, const Modes &m) {
   double most = 0;
@@ -64,22 +47,14 @@ double excess_of(const Solid &c, const Modes &m) {
 }  // namespace
 
 void modes_of(Strain strain, const Solid &c, const double *s, Modes &out) {
+  if (strain == kGreen) return model::venant_modes(c.lambda, c.mu, s, out);
   const double trace = (s[0] + s[1]) + s[2];
-  const double green = 0.5 * c.lambda * (((s[0] * s[0] + s[1] * s[1]) + s[2] * s[2]) - 3);
   for (int i = 0; i < 3; ++i) {
-    const double x = s[(i + 1) % 3], y = s[(i + 2) % 3], squares = x * x + y * y - 1;
-    for (int j = 0; j < 3; ++j)
-      out.stretch[i][j] =
-          strain == kGreen ? c.lambda * (s[i] * s[j]) + (i == j ? green + c.mu * (3 * (s[i] * s[i]) - 1) : 0)
-                           : c.lambda + (i == j ? 2 * c.mu : 0);
-    if (strain == kGreen) {
-      out.turn[i] = green + c.mu * (squares - x * y);
-      out.shear[i] = green + c.mu * (squares + x * y);
-    } else {
-      const double pair = std::max(x + y, std::max(kMinPair * std::fabs(trace), 1e-3));
-      out.turn[i] = 2 * c.mu + (2 * c.lambda * (trace - 3) - 4 * c.mu) / pair;
-      out.shear[i] = 2 * c.mu;
-    }
+    const double x = s[(i + 1) % 3], y = s[(i + 2) % 3];
+    for (int j = 0; j < 3; ++j) out.stretch[i][j] = c.lambda + (i == j ? 2 * c.mu : 0);
+    const double pair = std::max(x + y, std::max(kMinPair * std::fabs(trace), 1e-3));
+    out.turn[i] = 2 * c.mu + (2 * c.lambda * (trace - 3) - 4 * c.mu) / pair;
+    out.shear[i] = 2 * c.mu;
   }
 }
 
@@ -214,7 +189,7 @@ void Body::add_point(const dfm_kin &k, uint32_t point, double a, double b, doubl
   Modes m;
   shape_of(f, s);
   modes_of(strain(), c, s.stretch, m);
-  cut_negative(m);
+  model::cut_negative(m);
   double u[9], ff[9], inverse[9];  // R V, F F^T
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) {
@@ -235,7 +210,7 @@ void Body::add_point(const dfm_kin &k, uint32_t point, double a, double b, doubl
       const uint32_t to = q ? neighbor[begin[point] + q - 1] : point;
       if (from > to) continue;
       double one[9], block[9];
-      elastic_block(m, y + 3 * size_t(p), y + 3 * size_t(q), one);
+      model::elastic_block(m, y + 3 * size_t(p), y + 3 * size_t(q), one);
       const double left = h[size_t(n) * p + q];
       for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j) {
@@ -280,21 +255,6 @@ void Body::find_twists(const dfm_kin &k, uint32_t point, uint32_t n, double *twi
       twist[e] -= cross[e];
     }
   }
-}
-
-void Body::elastic_block(const Modes &m, const double *ya, const double *yb, double *out) {
-  for (int p = 0; p < 3; ++p)
-    for (int q = 0; q < 3; ++q) {
-      double sum = m.stretch[p][q] * (ya[p] * yb[q]);
-      if (p != q) {
-        const int k = 3 - p - q;
-        sum += 0.5 * (m.shear[k] - m.turn[k]) * (ya[q] * yb[p]);
-      } else {
-        for (int r = 0; r < 3; ++r)
-          if (r != p) sum += 0.5 * (m.shear[3 - p - r] + m.turn[3 - p - r]) * (ya[r] * yb[r]);
-      }
-      out[3 * p + q] = sum;
-    }
 }
 
 }  // namespace meshless

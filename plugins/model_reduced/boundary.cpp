@@ -393,13 +393,8 @@ void Boundary::add_pairs(const std::vector<Triangle> &t, double young, double po
         }
       single.set(cluster, other, std::move(mean));
     }
-    for (size_t other = 0; both.column(other) < 3 * n; ++other) {
-      Table own;
-      both.table(cluster, other, own);
-      for (size_t i = 0; i < own.rows; ++i)
-        std::copy_n(column.row(i) + both.column(other), own.columns, own.row(i));
-      both.set(cluster, other, std::move(own));
-    }
+    for (size_t other = 0; both.column(other) < 3 * n; ++other)
+      both.cut(cluster, other, column, 0, both.column(other));
   }
   asymmetry_ = apart / largest;
 }
@@ -513,14 +508,8 @@ void Boundary::add_inner(const char *id, const std::vector<Triangle> &t, const d
           "them, or take the model condensed",
           i);
     }
-    const auto cut = [&](Tiles &to, size_t r, size_t c, const Table &from, size_t i, size_t j) {
-      Table own;
-      to.table(r, c, own);
-      for (size_t n = 0; n < own.rows; ++n) std::copy_n(from.row(i + n) + j, own.columns, own.row(n));
-      to.set(r, c, std::move(own));
-    };
-    for (size_t r = 0; r < both.nrow(); ++r) cut(both, r, clusters_.size() + cluster, load, both.row(r), 0);
-    for (size_t c = 0; c < follow_.ncolumn(); ++c) cut(follow_, cluster, c, lead, 0, follow_.column(c));
+    for (size_t r = 0; r < both.nrow(); ++r) both.cut(r, clusters_.size() + cluster, load, both.row(r), 0);
+    for (size_t c = 0; c < follow_.ncolumn(); ++c) follow_.cut(cluster, c, lead, 0, follow_.column(c));
   }
 }
 
@@ -529,7 +518,8 @@ void Boundary::add_inner(const char *id, const std::vector<Triangle> &t, const d
 void Boundary::make_rigid_exact(const double *rest, double *block) {
   const size_t n = point.size(), size = 3 * n, all = size + 3 * inner.size();
   std::vector<double> rigid[6], force[6];
-  const auto along = [&](const std::vector<double> &a, const std::vector<double> &b) {
+  double *row[6];
+  const auto along = [&](const double *a, const double *b) {
     double sum = 0;
     for (size_t j = 0; j < size; ++j) sum += a[j] * b[j];
     return sum;
@@ -546,14 +536,9 @@ void Boundary::make_rigid_exact(const double *rest, double *block) {
         own[3 * i + (k + 2) % 3] = x[(k + 1) % 3];
       }
     }
-    for (int twice = 0; twice < 2; ++twice)
-      for (size_t l = 0; l < k; ++l) {
-        const double part = along(own, rigid[l]);
-        for (size_t j = 0; j < all; ++j) own[j] -= part * rigid[l][j];
-      }
-    const double scale = 1 / std::sqrt(along(own, own));
-    for (double &x : own) x *= scale;
+    row[k] = own.data();
   }
+  orthonormalize(row, all, along);
   double norm = 0, left = 0;
   for (size_t k = 0; k < 6; ++k) {
     force[k].assign(size, 0.0);
@@ -567,13 +552,13 @@ void Boundary::make_rigid_exact(const double *rest, double *block) {
             if (k == 0) norm += (i == j ? 1 : 2) * b[3 * r + s] * b[3 * r + s];
           }
       }
-    left += along(force[k], force[k]);
+    left += along(force[k].data(), force[k].data());
   }
   rigid_error_ = std::sqrt(left / norm);
   // P K P = K - g r^T - r g^T,  g = K r - r (r^T K r)/2
   double between[6][6];
   for (size_t k = 0; k < 6; ++k)
-    for (size_t l = 0; l < 6; ++l) between[k][l] = along(rigid[k], force[l]);
+    for (size_t l = 0; l < 6; ++l) between[k][l] = along(row[k], force[l].data());
   for (size_t k = 0; k < 6; ++k)
     for (size_t l = 0; l < 6; ++l)
       for (size_t j = 0; j < size; ++j) force[k][j] -= 0.5 * between[l][k] * rigid[l][j];

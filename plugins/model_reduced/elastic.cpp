@@ -165,7 +165,7 @@ void Elastic::add_cell(uint32_t c, const model::RestCell &cell) {
     }
 }
 
-// Gram and Schmidt's method, twice, by mass.
+// Orthonormal by mass.
 void Elastic::find_rigid() {
   const size_t size = 3 * size_t(npoint);
   rigid.create(host_, 6 * size);
@@ -180,16 +180,9 @@ void Elastic::find_rigid() {
     for (size_t j = 0; j < size; ++j) sum += mass[j / 3] * a[j] * b[j];
     return sum;
   };
-  for (size_t k = 0; k < 6; ++k) {
-    double *const own = rigid.data() + k * size;
-    for (int twice = 0; twice < 2; ++twice)
-      for (size_t n = 0; n < k; ++n) {
-        const double *const before = rigid.data() + n * size, along = product_of(own, before);
-        for (size_t j = 0; j < size; ++j) own[j] -= along * before[j];
-      }
-    const double scale = 1 / std::sqrt(product_of(own, own));
-    for (size_t j = 0; j < size; ++j) own[j] *= scale;
-  }
+  double *row[6];
+  for (size_t k = 0; k < 6; ++k) row[k] = rigid.data() + k * size;
+  orthonormalize(row, size, product_of);
 }
 
 // Of three points far from each other.
@@ -325,7 +318,7 @@ void Elastic::compliance_between(uint32_t n, const uint32_t *points, double *w) 
       for (const uint32_t j : given_) std::fill_n(eight + kLanes * j, kLanes, 0.0);
     });
   }
-  factor_.inverse_at(*kernels, n, points, w);
+  factor_.inverse_at(n, points, w);
   const size_t rows = 3 * size_t(n);
   const auto fixed = [&](size_t j) { return is_held(3 * size_t(points[j / 3]) + j % 3); };
   for (size_t i = 0; i < rows; ++i)
@@ -350,7 +343,7 @@ void Elastic::respond(const double *f, double *u) const {
       return clear_given();
     }
     if constexpr (kWide == 1) factor_.solve(u, u);
-    else factor_.solve_eight(*kernels, u, u);
+    else factor_.solve_eight(u, u);
   };
   std::copy(f, f + kWide * size, u);
   if (!floating) return solve();

@@ -10,13 +10,6 @@ namespace reduced {
 constexpr size_t kLanes = 8;
 constexpr size_t kPiece = 32;  // numbers of a mode side by side in a basis
 
-// The lower triangle of a factor by block columns; see sparse.h.
-struct FactorView {
-  uint32_t n;
-  const uint32_t *begin, *row;
-  const double *block;
-};
-
 // c [m,n] += a b, or -= a b; a [m,k] by any strides, b [k,n] and c in rows, n and their lengths multiples of
 // kLanes.
 struct Product {
@@ -41,8 +34,6 @@ struct Kernels {
   void (*rows)(const double *rows, size_t nrow, size_t width, const double *y, double *out);
   // out[3,n] = scale r (C f), C [9,n] the blocks of n points, r [9] row-major; n a multiple of kLanes
   void (*turned)(const double *blocks, size_t n, const double *r, const double *f, double scale, double *out);
-  // L L^T y = b for kLanes right-hand sides side by side, y [n,3,kLanes] in the factor's order
-  void (*solve)(const FactorView &l, double *y);
   // sum[kLanes,kLanes] += left^T right, both [n,kLanes]
   void (*gram)(size_t n, const double *left, const double *right, double *sum);
   // right -= left h, both [n,kLanes], h [kLanes,kLanes]

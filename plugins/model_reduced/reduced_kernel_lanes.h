@@ -109,48 +109,6 @@ void turned(const double *blocks, size_t n, const double *r, const double *f, do
   }
 }
 
-// Each register of lanes goes through the factor by itself as far as the three numbers of a point.
-void solve(const FactorView &f, double *y) {
-  constexpr size_t kPoint = 3 * kLanes;
-  for (size_t j = 0; j < f.n; ++j) {
-    const double *const d = f.block + 9 * size_t(f.begin[j]);
-    for (size_t part = 0; part < kLanes; part += kWidth) {
-      double *const own = y + kPoint * j + part;
-      const V y0 = load(own) / d[0], y1 = (load(own + kLanes) - d[3] * y0) / d[4],
-              y2 = ((load(own + 2 * kLanes) - d[6] * y0) - d[7] * y1) / d[8];
-      store(own, y0);
-      store(own + kLanes, y1);
-      store(own + 2 * kLanes, y2);
-      for (uint32_t s = f.begin[j] + 1; s < f.begin[j + 1]; ++s) {
-        const double *const l = f.block + 9 * size_t(s);
-        double *const to = y + kPoint * f.row[s] + part;
-        DEFORM_UNROLL for (size_t r = 0; r < 3; ++r)
-            store(to + r * kLanes,
-                  load(to + r * kLanes) - ((l[3 * r] * y0 + l[3 * r + 1] * y1) + l[3 * r + 2] * y2));
-      }
-    }
-  }
-  for (size_t j = f.n; j-- > 0;)
-    for (size_t part = 0; part < kLanes; part += kWidth) {
-      double *const own = y + kPoint * j + part;
-      V y0 = load(own), y1 = load(own + kLanes), y2 = load(own + 2 * kLanes);
-      for (uint32_t s = f.begin[j] + 1; s < f.begin[j + 1]; ++s) {
-        const double *const l = f.block + 9 * size_t(s);
-        const double *const from = y + kPoint * f.row[s] + part;
-        const V x0 = load(from), x1 = load(from + kLanes), x2 = load(from + 2 * kLanes);
-        y0 -= (l[0] * x0 + l[3] * x1) + l[6] * x2;
-        y1 -= (l[1] * x0 + l[4] * x1) + l[7] * x2;
-        y2 -= (l[2] * x0 + l[5] * x1) + l[8] * x2;
-      }
-      const double *const d = f.block + 9 * size_t(f.begin[j]);
-      y2 = y2 / d[8];
-      y1 = (y1 - d[7] * y2) / d[4];
-      store(own, ((y0 - d[3] * y1) - d[6] * y2) / d[0]);
-      store(own + kLanes, y1);
-      store(own + 2 * kLanes, y2);
-    }
-}
-
 void gram(size_t n, const double *left, const double *right, double *sum) {
   for (size_t part = 0; part < kLanes; part += kWidth) {
     V s[kLanes];
@@ -216,7 +174,7 @@ void multiply(const Product &p) {
   else multiply_all<false>(p);
 }
 
-constexpr Kernels kKernels = {project, expand, rows, turned, solve, gram, take_off, multiply};
+constexpr Kernels kKernels = {project, expand, rows, turned, gram, take_off, multiply};
 
 }  // namespace
 }  // namespace reduced

@@ -10,6 +10,7 @@
 namespace reduced {
 
 using model::dot;
+using model::invert;
 using model::matrix_product;
 using model::product;
 
@@ -38,16 +39,18 @@ inline void mirror_upper(double *a) {
   a[7] = a[5];
 }
 
-// Of a symmetric positive definite matrix.
-inline void inverse(const double *a, double *out) {
-  const double c0 = a[4] * a[8] - a[5] * a[7], c1 = a[5] * a[6] - a[3] * a[8], c2 = a[3] * a[7] - a[4] * a[6];
-  const double d = 1 / ((a[0] * c0 + a[1] * c1) + a[2] * c2);
-  out[0] = c0 * d;
-  out[1] = out[3] = c1 * d;
-  out[2] = out[6] = c2 * d;
-  out[4] = (a[0] * a[8] - a[2] * a[6]) * d;
-  out[5] = out[7] = (a[2] * a[3] - a[0] * a[5]) * d;
-  out[8] = (a[0] * a[4] - a[1] * a[3]) * d;
+// Gram and Schmidt's method, twice, on the rows[n,size].
+template <size_t kN, class Product>
+inline void orthonormalize(double *const (&row)[kN], size_t size, const Product &product_of) {
+  for (size_t k = 0; k < kN; ++k) {
+    for (int twice = 0; twice < 2; ++twice)
+      for (size_t l = 0; l < k; ++l) {
+        const double along = product_of(row[k], row[l]);
+        for (size_t j = 0; j < size; ++j) row[k][j] -= along * row[l][j];
+      }
+    const double scale = 1 / std::sqrt(product_of(row[k], row[k]));
+    for (size_t j = 0; j < size; ++j) row[k][j] *= scale;
+  }
 }
 
 // out = exp([w]) r, Rodrigues' formula; w is the rotation's axis times its angle.

@@ -1,7 +1,6 @@
-// A sparse symmetric positive definite matrix of 3 x 3 blocks: its factor, and the lowest eigenpairs that a
-// solve with it gives. Eigen stays inside sparse.cpp, lanczos.cpp and tiles.cpp and works while a body is
-// created; what a step calls is in factor.cpp, in an order of operations that no library decides. The factor
-// is the host's where it has one (dfm.direct/1), which is several times as fast.
+// A sparse symmetric positive definite matrix of 3 x 3 blocks: its factor by the host's solver
+// (dfm.direct/1), and the lowest eigenpairs that a solve with it gives. Eigen stays inside lanczos.cpp and
+// tiles.cpp and works while a body is created.
 #pragma once
 #include <deform/plugin.h>
 #include <deform/plugin_draft.h>
@@ -37,8 +36,6 @@ void responses_at(size_t all, uint32_t n, const uint32_t *points, double *w, con
   }
 }
 
-// A = L L^T of the points in an order that keeps L sparse. Column block j of L holds that of its point with
-// itself (a triangle), then the blocks of the points below, in rising order.
 class Factor {
  public:
   Factor() = default;
@@ -46,26 +43,20 @@ class Factor {
   Factor &operator=(const Factor &) = delete;
   ~Factor();
   // ij [nb,2], i <= j, and blk [nb,9] row-major as in dfm_solver; places [n,3] m. Throws a sentence where
-  // the matrix is not positive definite.
+  // the matrix is not positive definite, or the host has no solver.
   void create(const dfm_host *host, uint32_t n, const std::vector<uint32_t> &ij,
               const std::vector<double> &blk, const double *places);
-  void solve(const double *b, double *x) const;                                // [n,3] each; may be the same
-  void solve_eight(const Kernels &kernels, const double *b, double *x) const;  // [n,3,kLanes]
+  void solve(const double *b, double *x) const;        // [n,3] each; may be the same
+  void solve_eight(const double *b, double *x) const;  // [n,3,kLanes]
   // w[3 nsel,3 nsel]: rows and columns of the inverse at these points, each named once
-  void inverse_at(const Kernels &kernels, uint32_t nsel, const uint32_t *sel, double *w) const;
+  void inverse_at(uint32_t nsel, const uint32_t *sel, double *w) const;
 
  private:
   uint32_t n_ = 0;
-  const dfm_direct *direct_ = nullptr;  // the host's; else what follows is the factor
+  const dfm_direct *direct_ = nullptr;
   void *self_ = nullptr;
-  mutable Buffer<double> wide_;  // [2,kLanes,n,3] of the host's: right-hand sides and solutions
-  bool use_host_solver(const dfm_host *host, const std::vector<uint32_t> &ij, const std::vector<double> &blk,
-                       const double *places);
-  void solve_by_host(uint32_t nrhs) const;
-  Buffer<uint32_t> place_;          // [n] of a point in the order
-  Buffer<uint32_t> begin_, row_;    // [n + 1], [entries / 9]
-  Buffer<double> block_;            // [entries / 9, 9] row-major
-  mutable Buffer<double> ordered_;  // [n,3,kLanes]
+  mutable Buffer<double> wide_;  // [2,kLanes,n,3] right-hand sides and solutions
+  void solve_wide(uint32_t nrhs) const;
 };
 
 // y = C x for kLanes vectors side by side, [size,kLanes] each, not the same: C symmetric, >= 0.

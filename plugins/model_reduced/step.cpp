@@ -113,7 +113,7 @@ void Body::advance_frame() {
   }
   for (size_t a = 0; a < 3; ++a)
     for (size_t n = 0; n < modes_.count; ++n) swung[a] += coupling_[a * modes_.count + n] * qd_[n];
-  inverse(inertia_, inverted);
+  invert(inertia_, inverted);
   product(at_.r, spin_, spin);
   for (int pass = 0; pass < kMidpointPasses; ++pass) {
     for (size_t a = 0; a < 3; ++a) world[a] = 0.5 * h_ * spin[a];
@@ -198,7 +198,7 @@ void Body::match_moment(const double *wanted, const double *c, const double *vel
   }
   mirror_upper(inertia);
   for (size_t a = 0; a < 3; ++a) moment[a] = wanted[a] - moment[a];
-  inverse(inertia, inverted);
+  invert(inertia, inverted);
   product(inverted, moment, spin);
   for (size_t i = 0; i < elastic_.npoint; ++i) {
     double r[3];

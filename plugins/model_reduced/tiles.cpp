@@ -207,6 +207,13 @@ void Tiles::set(size_t i, size_t j, Table &&from) {
   compress(std::move(from), norm, at(i, j));
 }
 
+void Tiles::cut(size_t i, size_t j, const Table &from, size_t row, size_t column) {
+  Table own;
+  table(i, j, own);
+  for (size_t n = 0; n < own.rows; ++n) std::copy_n(from.row(row + n) + column, own.columns, own.row(n));
+  set(i, j, std::move(own));
+}
+
 void Tiles::get(size_t i, size_t j, Table &out) const {
   const Tile &t = at(i, j);
   table(i, j, out);

@@ -50,7 +50,8 @@ class Tiles {
     out.create(host_, row_[i + 1] - row_[i], column_[j + 1] - column_[j]);
   }
 
-  void set(size_t i, size_t j, Table &&from);  // thin, if it can be
+  void set(size_t i, size_t j, Table &&from);                                  // thin, if it can be
+  void cut(size_t i, size_t j, const Table &from, size_t row, size_t column);  // from a larger table
   void get(size_t i, size_t j, Table &out) const;
   // Of the lower triangle of a positive definite matrix its factor, inverted on the diagonal. Throws
   // kIndefinite.

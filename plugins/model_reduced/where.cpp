@@ -251,7 +251,7 @@ void Body::find_spin() {
   for (size_t a = 0; a < 3; ++a)
     for (size_t b = 0; b < 3; ++b)
       for (size_t l = 0; l < count; ++l) left[3 * a + b] -= row[a][l] * row[b][l];
-  inverse(left, inverted);
+  invert(left, inverted);
   product(inverted, right, spin_);
   for (size_t l = 0; l < count; ++l)
     qd_[l] -= (row[0][l] * spin_[0] + row[1][l] * spin_[1]) + row[2][l] * spin_[2];

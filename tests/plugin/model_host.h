@@ -1,6 +1,7 @@
 // A host of a page for model plugins: services, meshes, an instance with its arrays. Sees deform/plugin.h and
-// its draft alone, as a third party's host would.
+// its draft alone, as a third party's host would; the direct solver that it offers is the library's.
 #pragma once
+#include <deform/base.h>
 #include <deform/plugin.h>
 #include <deform/plugin_draft.h>
 #include <dlfcn.h>
@@ -37,6 +38,22 @@ inline double norm(Vec a) { return std::sqrt(dot(a, a)); }
 // What stays as it is behind the end of each allocation.
 constexpr size_t kBehind = 256;
 constexpr char kUntouched = 0x5a;
+
+inline const void *library_solver() {
+  static const void *given = nullptr;
+  if (given) return given;
+  dfm_context_def def = dfm_context_def_default();
+  def.plugin_dir = DEFORM_SOURCE_DIR;  // has none
+  dfm_context *context = nullptr;
+  EXPECT_EQ(dfm_context_create(&def, &context), DFM_OK);
+  const dfm_plugin_fn ask = [](const dfm_host *host, uint32_t, uint32_t) -> const dfm_plugin * {
+    given = host->extension(host->ctx, DFM_HOST_DIRECT);
+    return nullptr;
+  };
+  EXPECT_EQ(dfm_plugin_register_static(context, ask, "ask"), DFM_E_UNSUPPORTED);
+  dfm_context_destroy(context);
+  return given;
+}
 
 // Services. `shuffle` > 0: parallel_for hands out its pieces in a random cut and order.
 struct Host {
@@ -82,6 +99,9 @@ struct Host {
       }
       std::shuffle(pieces.begin(), pieces.end(), random);
       for (auto [b, e] : pieces) fn(user, b, e);
+    };
+    table.extension = [](void *, const char *id) {
+      return std::strcmp(id, DFM_HOST_DIRECT) == 0 ? library_solver() : nullptr;
     };
   }
 };

@@ -2,7 +2,7 @@
 from __future__ import annotations
 
 import csv
-import json
+import importlib.util
 import os
 import pathlib
 import tempfile
@@ -11,6 +11,7 @@ from typing import Any, Mapping
 
 import numpy as np
 
+from . import rig_plot
 from ._context import choice
 from ._library import ArgumentError
 from ._command import command
@@ -27,14 +28,6 @@ INPUTS: dict[str, dict[str, Any]] = {
     "sine_velocity_sine_load": {"F0": 10.0, "a_open": 1.2, "freq": 1.0, "V": 0.01, "vfreq": 0.2, "T": 5.0,
                                 "dt": 0.005},
 }
-_PANELS = {"sine_velocity": [("t", "F"), ("v", "F")], "displacement_path": [("x", "F")],
-           "bias_sine_force": [("t", "x"), ("t", "F"), ("x", "F")],
-           "spring_pull": [("t", "x"), ("t", "v"), ("t", "F")], "force_ramps": [("rate", "F_ba")],
-           "circle_velocity": [("t", "Fx"), ("Fx", "Fy")],
-           "sine_velocity_sine_load": [("t", "F_elastic"), ("Fn", "F_elastic")]}
-_UNITS = {"t": "time (s)", "x": "displacement (m)", "v": "velocity (m/s)", "F": "friction force (N)",
-          "Fn": "normal force (N)", "F_elastic": "elastic force (N)", "rate": "force rate (N/s)",
-          "F_ba": "break-away force (N)", "Fx": "Fx (N)", "Fy": "Fy (N)"}
 
 
 def friction(law: Any, kind: str | None = None, *, normal: float | None = None,
@@ -83,31 +76,16 @@ def friction(law: Any, kind: str | None = None, *, normal: float | None = None,
 
 def plot_friction(law: Any, kind: str | None = None, *, path: Any = None, **options: Any) -> Any:
     """What friction() gives, as a matplotlib Figure (matplotlib is needed); path: where to write it, too."""
-    try:
-        from matplotlib.figure import Figure
-    except ImportError as missing:
-        raise ImportError("plot_friction needs matplotlib: pip install matplotlib") from missing
+    if not importlib.util.find_spec("matplotlib"):
+        raise ImportError("plot_friction needs matplotlib: pip install matplotlib")
     rows = friction(law, kind, **options)
     case = options.get("case")
     if case is not None:
         case = case if isinstance(case, Mapping) else read_json(case)
         kind = case["input"]["kind"]
-    kind = kind or "sine_velocity"
-    panels = [pair for pair in _PANELS.get(kind, []) if pair[0] in rows and pair[1] in rows]
-    if not panels:
-        names = list(rows)
-        panels = [(names[0], other) for other in names[1:4]]
-    figure = Figure(figsize=(4.2 * len(panels), 3.3), dpi=100)
-    for axis, (across, up) in zip(np.atleast_1d(figure.subplots(1, len(panels))), panels):
-        axis.plot(rows[across], rows[up], "o-" if kind == "force_ramps" else "-", linewidth=1.2, markersize=4)
-        if kind == "force_ramps":
-            axis.set_xscale("log")
-        axis.set_xlabel(_UNITS.get(across, across))
-        axis.set_ylabel(_UNITS.get(up, up))
-        axis.grid(True, alpha=0.25)
     name = law if isinstance(law, str) else getattr(law, "id", None) or str(law)
-    figure.suptitle(f"{name}, {kind}", fontsize=10)
-    figure.tight_layout()
+    kind = kind or "sine_velocity"
+    figure = rig_plot.draw(rows, kind, f"{name}, {kind}")
     if path is not None:
         figure.savefig(path)
     return figure

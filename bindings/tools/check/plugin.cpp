@@ -1,13 +1,16 @@
 #include "check/plugin.h"
 
 #include <dlfcn.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 
 #include "check/environment.h"
 #include "check/watch.h"
+#include "deform/plugin_draft.h"
 
 namespace cli::check {
 namespace {
@@ -24,6 +27,18 @@ struct Arena {
   size_t used = 0;
 };
 thread_local Arena arena;
+
+// The service that the library gives a plugin; it works with the memory and threads of any host.
+const void *library_solver() {
+  static const void *given = nullptr;
+  const dfm_plugin_fn ask = [](const dfm_host *host, uint32_t, uint32_t) -> const dfm_plugin * {
+    given = host->extension(host->ctx, DFM_HOST_DIRECT);
+    return nullptr;
+  };
+  if (!given)
+    if (const BareContext context = bare_context()) dfm_plugin_register_static(context.get(), ask, "ask");
+  return given;
+}
 
 // Copies what both sides know of a struct that begins with its size; the rest stays zero.
 template <class T>
@@ -92,12 +107,26 @@ Host::Host() {
       end -= take;
     }
   };
-  table_.extension = [](void *, const char *) -> const void * { return nullptr; };
+  table_.extension = [](void *, const char *id) {
+    return id && std::strcmp(id, DFM_HOST_DIRECT) == 0 ? library_solver() : nullptr;
+  };
 }
 
 void Host::release_scratch() {
   if (!arena.bytes) arena.bytes = std::make_unique_for_overwrite<char[]>(Arena::kBytes);
   arena.used = 0;
+}
+
+BareContext bare_context() {
+  dfm_context *made = nullptr;
+  std::string folder = (std::filesystem::temp_directory_path() / "deform_check_XXXXXX").string();
+  dfm_context_def def = dfm_context_def_default();
+  if (mkdtemp(folder.data())) {
+    def.plugin_dir = folder.c_str();
+    dfm_context_create(&def, &made);
+    rmdir(folder.c_str());
+  }
+  return {made, dfm_context_destroy};
 }
 
 dfm_plugin_fn entry_of(void *image) {

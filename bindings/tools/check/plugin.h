@@ -67,6 +67,9 @@ class Plugin {
   std::vector<const dfm_type *> view_;
 };
 
+// A context of the library that has loaded no plugin; null where it cannot be had.
+using BareContext = std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)>;
+BareContext bare_context();
 // The entry of an opened image; null where it has none.
 dfm_plugin_fn entry_of(void *image);
 std::string name_of(const dfm_type &type, uint32_t number);  // its id, or "#0"

@@ -506,18 +506,10 @@ void runs_check(const dfm_friction &law, const std::vector<double> &params) {
 // Through the library, as a scene would: a value beside the range must not reach the law. What the library
 // refuses to load is V03's to say.
 void library_refuses(const Subject &subject) {
-  std::string folder = (std::filesystem::temp_directory_path() / "deform_check_XXXXXX").string();
-  if (!mkdtemp(folder.data())) return;
-  dfm_context_def def = dfm_context_def_default();
-  // with nothing in it: no other plugin may be loaded
-  def.plugin_dir = folder.c_str();
-  dfm_context *made = nullptr;
-  const dfm_status created = dfm_context_create(&def, &made);
-  rmdir(folder.c_str());
-  const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(made, dfm_context_destroy);
+  const BareContext context = bare_context();
   dfm_law law = 0;
-  if (created < 0 || dfm_plugin_load(made, subject.file.c_str()) < 0 ||
-      dfm_law_open(made, subject.type->id, &law) < 0)
+  if (!context || dfm_plugin_load(context.get(), subject.file.c_str()) < 0 ||
+      dfm_law_open(context.get(), subject.type->id, &law) < 0)
     return;
   if (dfm_law_pack(law, nullptr, 0, nullptr, nullptr) < 0)
     broken("the library refuses its defaults (%s); choose defaults that check accepts", dfm_last_error());

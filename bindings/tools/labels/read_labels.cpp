@@ -10,7 +10,7 @@
 #include <unordered_map>
 
 #include "file.h"
-#include "label_volume.h"
+#include "header_lines.h"
 #include "messages.h"
 
 namespace labels {
@@ -79,29 +79,14 @@ std::string quoted_part(std::string_view text) {
 
 double unit_of(std::string_view name) {
   const std::string word = lower(name);
-  const struct {
-    const char *name;
-    double meters;
-  } kUnits[] = {{"mm", 1e-3},
-                {"millimeter", 1e-3},
-                {"millimeters", 1e-3},
-                {"millimetre", 1e-3},
-                {"m", 1},
-                {"meter", 1},
-                {"meters", 1},
-                {"metre", 1},
-                {"cm", 1e-2},
-                {"centimeter", 1e-2},
-                {"dm", 1e-1},
-                {"um", 1e-6},
-                {"\xc2\xb5m", 1e-6},
-                {"\xce\xbcm", 1e-6},
-                {"micrometer", 1e-6},
-                {"micron", 1e-6},
-                {"inch", 0.0254},
-                {"in", 0.0254}};
-  for (const auto &u : kUnits)
-    if (word == u.name) return u.meters;
+  constexpr std::pair<double, const char *> kUnits[] = {{1e-3, "mm,millimeter,millimeters,millimetre"},
+                                                        {1, "m,meter,meters,metre"},
+                                                        {1e-2, "cm,centimeter"},
+                                                        {1e-1, "dm"},
+                                                        {1e-6, "um,\xc2\xb5m,\xce\xbcm,micrometer,micron"},
+                                                        {0.0254, "inch,in"}};
+  for (const auto &[meters, names] : kUnits)
+    if (is_one_of(word, names)) return meters;
   return 0;
 }
 

@@ -1,6 +1,8 @@
 // Names as errors and files have them: a wrong one, one of a group, one of a file within a command.
 #pragma once
 #include <algorithm>
+#include <cctype>
+#include <string_view>
 
 #include "core/error.h"
 
@@ -12,6 +14,13 @@ inline std::string did_you_mean(const std::string &wrong, const std::vector<std:
                                 char quote = '"') {
   const std::string near = nearest(wrong, valid);
   return near.empty() ? "" : std::string("; did you mean ") + quote + near + quote + "?";
+}
+
+// ASCII letters in lower case.
+inline std::string lower(std::string_view text) {
+  std::string out(text);
+  for (char &c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return out;
 }
 
 // A name in a format where it ends with its line.

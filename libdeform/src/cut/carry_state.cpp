@@ -65,15 +65,9 @@ Spring carried(const Spring &s, const Copies &copies, bool parts) {
 
 std::vector<uint32_t> edges_before(const Array<uint32_t> &before, const CutMesh &mesh,
                                    const Array<uint32_t> &now) {
-  std::vector<uint64_t> keys;
-  for (size_t e = 0; e < before.size(); e += 2) keys.push_back(uint64_t{before[e]} << 32 | before[e + 1]);
   std::vector<uint32_t> out;
-  for (size_t e = 0; e < now.size(); e += 2) {
-    const auto ends = std::minmax(mesh.point[now[e]], mesh.point[now[e + 1]]);
-    const uint64_t key = uint64_t{ends.first} << 32 | ends.second;
-    const auto at = std::lower_bound(keys.begin(), keys.end(), key);
-    out.push_back(at != keys.end() && *at == key ? uint32_t(at - keys.begin()) : kNone);
-  }
+  for (size_t e = 0; e < now.size(); e += 2)
+    out.push_back(edge_number(before, mesh.point[now[e]], mesh.point[now[e + 1]]));
   return out;
 }
 
@@ -190,19 +184,6 @@ class Names {
   uint32_t &next_;
 };
 
-uint32_t find_edge(const Surface &s, uint32_t a, uint32_t b) {
-  if (a == kNone || b == kNone) return kNone;
-  const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
-  const auto at = [&](uint32_t e) { return std::pair(s.edge[2 * size_t{e}], s.edge[2 * size_t{e} + 1]); };
-  uint32_t low = 0, high = s.nedge;
-  while (low < high) {
-    const uint32_t mid = low + (high - low) / 2;
-    if (at(mid) < key) low = mid + 1;
-    else high = mid;
-  }
-  return low < s.nedge && at(low) == key ? low : kNone;
-}
-
 uint32_t above_all(const Array<uint32_t> &names) {
   return names.empty() ? 0 : *std::max_element(names.begin(), names.end()) + 1;
 }
@@ -239,8 +220,9 @@ void name_features(const Body &b, const CutMesh &mesh, Surface &surface, CutReco
   Names surfels(before.name[0], before.nsurfel, record.next_name[0]);
   for (uint32_t s = 0; s < surface.nsurfel; ++s) surface.name[0].push_back(surfels.of(was[s]));
   Names edges(before.name[1], before.nedge, record.next_name[1]);
-  for (size_t e = 0; e < surface.edge.size(); e += 2)
-    surface.name[1].push_back(edges.of(find_edge(before, was[surface.edge[e]], was[surface.edge[e + 1]])));
+  const Array<uint32_t> &edge = surface.edge;
+  for (size_t e = 0; e < edge.size(); e += 2)
+    surface.name[1].push_back(edges.of(edge_number(before.edge, was[edge[e]], was[edge[e + 1]])));
   const TriangleList list(before.ntri, [&](size_t k) { return before.tri[k]; });
   std::vector<uint32_t> old(surface.ntri);
   Names triangles(before.name[2], before.ntri, record.next_name[2]);

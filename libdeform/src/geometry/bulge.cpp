@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "math/trig.h"
+#include "math/elementary.h"
 
 namespace dfm {
 namespace {
@@ -93,7 +93,7 @@ void make_bulges(Surface &surface, double degrees) {
   surface.bulge_from = Array<uint32_t>(surface.ntri, kNone, surface.tri.get_allocator());
   surface.bulge = Array<double>(size_t{9} * surface.ntri, 0.0, surface.x.get_allocator());
   surface.bulge_sum = 1;
-  Maker maker{surface, sin_turns(0.25 - degrees / 360),
+  Maker maker{surface, dfm_cospi(degrees / 180),
               Array<Vec3>(surface.ntri, Vec3{}, *surface.tri.get_allocator().memory),
               Array<uint32_t>(surface.tri.get_allocator())};
   for (uint32_t t = 0; t < surface.ntri; ++t)

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "deform/math.h"
-#include "math/trig.h"
+#include "math/elementary.h"
 #include "math/vec3.h"
 
 namespace dfm {
@@ -77,9 +77,9 @@ inline Quat slerp(Quat a, Quat b, double s) {
 inline Quat turned(Quat q, Vec3 r) {
   const double angle = norm(r);
   if (!(angle > 0)) return q;
-  const double half = angle / (4 * 3.14159265358979323846);  // half the angle in turns
-  const Vec3 v = (sin_turns(half) / angle) * r;
-  return unit(Quat{v.x, v.y, v.z, sin_turns(half + 0.25)} * q);
+  const double half = angle / (2 * 3.14159265358979323846);  // half the angle, over pi
+  const Vec3 v = (dfm_sinpi(half) / angle) * r;
+  return unit(Quat{v.x, v.y, v.z, dfm_cospi(half)} * q);
 }
 
 // The rotation vector of q along the shorter arc. Halving the arc needs square roots only; asin by its series

@@ -245,15 +245,8 @@ RestMesh second_order(const RestMesh &mesh) {
     out.file_point.push_back(++last);
   }
   const auto middle = [&](uint32_t a, uint32_t b) {
-    const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
-    size_t lo = 0, hi = edges.size() / 2;
-    while (lo < hi) {
-      const size_t at = (lo + hi) / 2;
-      if (std::pair(edges[2 * at], edges[2 * at + 1]) < key) lo = at + 1;
-      else hi = at;
-    }
-    const bool found = lo < edges.size() / 2 && std::pair(edges[2 * lo], edges[2 * lo + 1]) == key;
-    return found ? uint32_t(mesh.npoint() + lo) : kNoPoint;
+    const uint32_t e = edge_number(edges, a, b);
+    return e == kNoPoint ? kNoPoint : mesh.npoint() + e;
   };
   Array<uint8_t> of_quad(edges.size() / 2, 0, memory);  // middle of a face of four corners or of a cell
   // The middle of a face or cell, of which each corner has its opposite in `far`.

@@ -20,12 +20,12 @@
 #include "core/error.h"
 #include "core/lists.h"
 #include "mesh/fill_lattice.h"
+#include "mesh/generate.h"
 #include "mesh/mesh.h"
 
 namespace dfm {
 namespace {
 
-constexpr uint32_t kMaxCells = 100'000'000;
 constexpr double kShareFloor = 0.1;  // of the fullest cell around
 // A layer of cells of which a part s is material bends like one of its thickness and s times the modulus, so
 // 1/s^2 times too stiffly. It is told from a factor of four on, if a tenth of the material is concerned.
@@ -270,7 +270,7 @@ double raise_to_floor(const Memory &memory, Filling &f) {
 // ---- sentences --------------------------------------------------------------------------------------------
 
 void refuse_unfit(const RestMesh &surface, const FillSurface &s, uint32_t cells) {
-  if (cells < 1 || cells > kMaxCells) fail(DFM_E_ARG, "cells is %u; expected 1 to %u", cells, kMaxCells);
+  check_cells(cells);
   if (surface.ntri() == 0) fail(DFM_E_FORMAT, "the surface has no triangles; there is nothing to fill");
   if (!(s.area > 0)) fail(DFM_E_FORMAT, "the surface has no area; there is nothing to fill");
   const double whole = s.area + s.opening_area;

@@ -1,10 +1,10 @@
 // Selects the reader of a file: by its first bytes if these are unambiguous, else by the ending of its name.
 // Unsupported formats are refused with advice on conversion.
 #include <algorithm>
-#include <cctype>
 
 #include "core/error.h"
 #include "core/file.h"
+#include "core/names.h"
 #include "mesh/raw_mesh.h"
 
 namespace dfm {
@@ -147,9 +147,7 @@ const Format &choose(const std::string &path, std::string_view bytes, RawMesh &r
 std::string ending_of(const std::string &path) {
   const size_t slash = path.find_last_of('/'), dot = path.find_last_of('.');
   if (dot == std::string::npos || (slash != std::string::npos && dot < slash)) return "";
-  std::string text = path.substr(dot + 1);
-  for (char &c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
+  return lower(path.substr(dot + 1));
 }
 
 std::string mesh_kind(const std::string &path, std::string_view bytes) {

@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "core/names.h"
 #include "deform/plugin.h"
 #include "mesh/cells.h"
 #include "mesh/finish.h"
@@ -58,7 +59,7 @@ class AbaqusReader {
       if (is("*nset")) read_set(node_sets_, nodes_, "nset");
       else if (is("*elset")) read_set(element_sets_, elements_, "elset");
       else if (is("*solid section") && parameter("elset")) {
-        const auto set = element_sets_.index.find(key(*parameter("elset")));
+        const auto set = element_sets_.index.find(lower(*parameter("elset")));
         if (set != element_sets_.index.end()) element_sets_.all[set->second].section = true;
       }
     }
@@ -84,11 +85,6 @@ class AbaqusReader {
     std::map<std::string, uint32_t> index;  // by name in lower case
   };
 
-  static std::string key(std::string_view name) {
-    std::string out(name);
-    for (char &c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-    return out;
-  }
   bool is(std::string_view lower) const { return Cursor::is_word(keyword_, lower); }
   const std::string_view *parameter(std::string_view lower) const {
     for (const auto &[name, value] : parameters_)
@@ -171,7 +167,7 @@ class AbaqusReader {
 
   Set *set_called(Sets &sets, const std::string_view *name) {
     if (!name || name->empty()) return nullptr;
-    const auto [at, fresh] = sets.index.try_emplace(key(*name), uint32_t(sets.all.size()));
+    const auto [at, fresh] = sets.index.try_emplace(lower(*name), uint32_t(sets.all.size()));
     if (fresh) sets.all.push_back({*name, Array<uint32_t>(*out_.memory)});
     return &sets.all[at->second];
   }
@@ -269,7 +265,7 @@ class AbaqusReader {
     const bool generate = parameter("generate");
     for (; data(); in_.line()) {
       for (std::string_view word = in_.line_word(); !word.empty(); word = in_.line_word()) {
-        const auto other = sets.index.find(key(word));
+        const auto other = sets.index.find(lower(word));
         if (generate) {
           const int64_t first = in_.to_integer(word, "the first of a range"),
                         last = in_.to_integer(in_.line_word(), "the last of a range");

@@ -80,6 +80,18 @@ Array<uint32_t> boundary_triangles(const Array<TetFace> &faces, const uint32_t *
   return triangles;
 }
 
+uint32_t edge_number(const Array<uint32_t> &edges, uint32_t a, uint32_t b) {
+  const std::pair<uint32_t, uint32_t> key = std::minmax(a, b);
+  const auto at = [&](size_t e) { return std::pair(edges[2 * e], edges[2 * e + 1]); };
+  size_t low = 0, high = edges.size() / 2;
+  while (low < high) {
+    const size_t middle = (low + high) / 2;
+    if (at(middle) < key) low = middle + 1;
+    else high = middle;
+  }
+  return 2 * low < edges.size() && at(low) == key ? uint32_t(low) : UINT32_MAX;
+}
+
 Array<uint32_t> unique_edges(const Memory &memory, uint32_t ntet, const uint32_t *tets) {
   Array<uint64_t> keys{memory};
   keys.reserve(size_t(ntet) * 6);

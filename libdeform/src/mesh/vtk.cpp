@@ -1,19 +1,15 @@
 #include "mesh/vtk.h"
 
 #include <algorithm>
-#include <cctype>
 #include <utility>
 
+#include "core/names.h"
 #include "deform/plugin.h"
 #include "mesh/cells.h"
 
 namespace dfm {
 
-std::string vtk_lower(std::string_view text) {
-  std::string out(text.substr(0, 64));
-  for (char &c : out) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return out;
-}
+std::string vtk_lower(std::string_view text) { return lower(text.substr(0, 64)); }
 
 bool vtk_names_groups(std::string_view array) {
   static const char *const known[] = {kVtkGroup,  "gmsh:physical", "medit:ref",   "cellentityids",

@@ -139,8 +139,6 @@ std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, co
   return x;
 }
 
-constexpr double kFrame = 1.0 / 60;  // s, assumed step if the scene names none
-
 class Builder {
  public:
   Builder(dfm_context *context, Definition &def, uint64_t seed)

@@ -17,8 +17,6 @@
 namespace dfm::scene {
 namespace {
 
-constexpr double kFrame = 1.0 / 60;  // s, where the scene names no step
-
 // Effects that work in this body with this model, in a world without other things. Warnings come when the
 // scene is built.
 std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,

@@ -384,19 +384,14 @@ Body read_body(const Node &node, ReadContext &context) {
 
 // Which of the keys that place or size a shape belong to it.
 void check_shape_keys(const Node &node, const std::string &shape) {
-  const std::vector<std::pair<std::string, std::vector<std::string>>> wanted = {
-      {"plane", {"point", "normal"}},         {"sphere", {"radius"}}, {"box", {"half_size"}},
-      {"capsule", {"radius", "half_length"}}, {"mesh", {"mesh"}},     {"voxels", {"mesh", "cells"}}};
-  for (const auto &[name, keys] : wanted) {
-    for (const std::string &key : keys) {
-      bool mine = false;
-      for (const auto &[other, others] : wanted)
-        if (other == shape) mine = listed(others, key);
-      if (!mine && node.has(key.c_str()))
-        node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key.c_str(),
-                              name.c_str());
-    }
-  }
+  static const std::pair<const char *, std::vector<std::string>> kShapesOf[] = {
+      {"point", {"plane"}},   {"normal", {"plane"}},        {"radius", {"sphere", "capsule"}},
+      {"half_size", {"box"}}, {"half_length", {"capsule"}}, {"mesh", {"mesh", "voxels"}},
+      {"cells", {"voxels"}}};
+  for (const auto &[key, shapes] : kShapesOf)
+    if (node.has(key) && !listed(shapes, shape))
+      node.member(key).fail("the shape %s has no \"%s\"; that is for %s", shape.c_str(), key,
+                            shapes[0].c_str());
 }
 
 template <class Def>

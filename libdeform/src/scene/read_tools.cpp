@@ -2,14 +2,13 @@
 #include "scene/keys.h"
 #include "scene/read.h"
 #include "scene/rotation.h"
+#include "state/tool.h"
 
 namespace dfm::scene {
 namespace {
 
 constexpr Range kOpening{0, kWidest, false, false};
 constexpr Range kLate{0, 0.1, false, false};  // s
-
-bool has_jaws(uint32_t shape) { return shape == DFM_TOOL_GRASPER || shape == DFM_TOOL_SCISSORS; }
 
 // Which size a shape needs; jaws may have a shaft beside theirs.
 bool needs(uint32_t shape, const std::string &key) {
@@ -20,11 +19,11 @@ bool needs(uint32_t shape, const std::string &key) {
   return key == "half_size" && !round && shape != DFM_TOOL_MESH;
 }
 
-void check_keys(const Node &node, uint32_t shape) {
+void check_keys(const Node &node, const dfm_tool_def &d) {
   for (const char *key : {"radius", "half_size", "half_length", "mesh", "opening_deg"})
-    if (node.has(key) && !needs(shape, key) &&
-        !(has_jaws(shape) && listed({"radius", "half_length", "opening_deg"}, key)))
-      node.member(key).fail("a tool of the shape %s has no \"%s\"", word_of("tool_shape", shape).c_str(),
+    if (node.has(key) && !needs(d.shape, key) &&
+        !(has_jaws(d) && listed({"radius", "half_length", "opening_deg"}, key)))
+      node.member(key).fail("a tool of the shape %s has no \"%s\"", word_of("tool_shape", d.shape).c_str(),
                             key);
 }
 
@@ -88,9 +87,9 @@ Tool read_tool(const Node &node, ReadContext &context) {
   t.solid.id = read_id(node);
   const std::string shape = node.at("shape").word("tool_shape");
   t.def.shape = number_of("tool_shape", shape);
-  check_keys(node, t.def.shape);
+  check_keys(node, t.def);
   std::vector<std::string> names = {t.solid.name};
-  const bool jaws = has_jaws(t.def.shape), of_triangles = t.def.shape == DFM_TOOL_MESH;
+  const bool jaws = has_jaws(t.def), of_triangles = t.def.shape == DFM_TOOL_MESH;
   for (const char *part : {".left", ".right"})
     if (jaws) names.push_back(t.solid.name + part);
   if (jaws && node.has("radius")) names.push_back(t.solid.name + ".shaft");

@@ -2,50 +2,17 @@
 
 #include <cmath>
 
+#include "math/elementary.h"
+
 namespace dfm::scene {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
-
-// Taylor series on [-pi/4, pi/4], where the first term left out is below 1e-17.
-double sine(double x) {
-  const double s = x * x;
-  double sum = 0;
-  for (int k = 17; k >= 3; k -= 2) sum = (1.0 + sum) * -s / (k * (k - 1));
-  return x * (1.0 + sum);
-}
-
-double cosine(double x) {
-  const double s = x * x;
-  double sum = 0;
-  for (int k = 18; k >= 2; k -= 2) sum = (1.0 + sum) * -s / (k * (k - 1));
-  return 1.0 + sum;
-}
-
+// 45 degrees have one number for both, so that quarter turns are exact.
 void sine_cosine_deg(double degrees, double *s, double *c) {
-  const double turn = std::remainder(degrees, 360.0);  // exact, as are the next two
-  const double quarter = std::nearbyint(turn / 90.0), rest = (turn - 90.0 * quarter) * (kPi / 180.0);
-  double a = sine(rest), b = cosine(rest);
-  if (turn - 90.0 * quarter == 45.0) a = b = std::sqrt(0.5);
-  if (turn - 90.0 * quarter == -45.0) a = -(b = std::sqrt(0.5));
-  switch (((static_cast<int>(quarter) % 4) + 4) % 4) {
-    case 0:
-      *s = a;
-      *c = b;
-      break;
-    case 1:
-      *s = b;
-      *c = -a;
-      break;
-    case 2:
-      *s = -a;
-      *c = -b;
-      break;
-    default:
-      *s = -b;
-      *c = a;
-      break;
-  }
+  const double turn = std::remainder(degrees, 360.0);
+  *s = dfm_sinpi(turn / 180);
+  *c = dfm_cospi(turn / 180);
+  if (std::fabs(std::remainder(turn, 90.0)) == 45) *c = std::copysign(*s, *c);
 }
 
 }  // namespace

@@ -12,10 +12,6 @@
 namespace dfm::scene {
 namespace {
 
-double triangle_area(const double *a, const double *b, const double *c) {
-  return 0.5 * norm(cross(load3(b) - load3(a), load3(c) - load3(a)));
-}
-
 // Position of each point within the selection; UINT32_MAX: not selected.
 std::vector<uint32_t> ranks(const std::vector<uint32_t> &points, uint32_t npoint) {
   std::vector<uint32_t> rank(npoint, UINT32_MAX);
@@ -239,9 +235,7 @@ std::vector<double> share_by_area(const std::vector<uint32_t> &points, const Bod
     const uint32_t r[3] = {rank[triangles[i]], rank[triangles[i + 1]], rank[triangles[i + 2]]};
     if (r[0] == UINT32_MAX || r[1] == UINT32_MAX || r[2] == UINT32_MAX) continue;
     any = true;
-    const double *p = mesh.points.data();
-    const double third =
-        triangle_area(p + 3 * triangles[i], p + 3 * triangles[i + 1], p + 3 * triangles[i + 2]) / 3;
+    const double third = triangle_area(mesh.points.data(), &triangles[i]) / 3;
     for (uint32_t k : r) weights[k] += third;
   }
   if (!any) return {};
@@ -255,8 +249,7 @@ Shared share_on_skin(const std::vector<uint32_t> &triangles, const BodyMesh &mes
   std::vector<uint8_t> touched(mesh.info.npoint, 0);
   for (uint32_t t : triangles) {
     const uint32_t *c = skin.triangles + 3 * size_t(t);
-    const double *p = skin.points.data();
-    const double third = triangle_area(p + 3 * size_t(c[0]), p + 3 * size_t(c[1]), p + 3 * size_t(c[2])) / 3;
+    const double third = triangle_area(skin.points.data(), c) / 3;
     for (int k = 0; k < 3; ++k) surfel[c[k]] += third;
   }
   for (uint32_t s = 0; s < skin.npoint; ++s) {

@@ -8,6 +8,7 @@
 #include "core/file.h"
 #include "scene/rotation.h"
 #include "scene/table.h"
+#include "state/tool.h"
 
 namespace dfm::scene {
 namespace {
@@ -231,7 +232,7 @@ void read_hand(const std::string &path, Tool &tool) {
   if (!opens && header != kPose)
     fail(DFM_E_FORMAT, "%s:1: expected the header %s or %s", path.c_str(), kPose, kOpening);
   table.begin(header);
-  const bool jaws = tool.def.shape == DFM_TOOL_GRASPER || tool.def.shape == DFM_TOOL_SCISSORS;
+  const bool jaws = has_jaws(tool.def);
   double v[9];
   while (table.next(v)) {
     if (!tool.keys.empty() && !(v[0] > tool.keys.back().t))

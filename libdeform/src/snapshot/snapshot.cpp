@@ -374,9 +374,9 @@ uint64_t world_hash(const World &w) {
   return h.value;
 }
 
-void world_snapshot(const World &w, std::vector<unsigned char> &out, std::vector<SnapshotField> *map) {
+void world_snapshot(const World &w, std::vector<unsigned char> &out) {
   out.resize(sizeof(SnapshotHead));
-  SnapshotWriter s(out, map);
+  SnapshotWriter s(out);
   const ThingRows things = thing_rows(w);
   thing_fields(s, things);
   const std::vector<CutRow> cuts = cut_rows(w);

@@ -7,12 +7,9 @@
 namespace dfm {
 
 struct World;
-struct SnapshotField;
 
 uint64_t world_hash(const World &w);  // of what the results of later steps depend on
-// map: the location of each field, for tests; may be null.
-void world_snapshot(const World &w, std::vector<unsigned char> &out,
-                    std::vector<SnapshotField> *map = nullptr);
+void world_snapshot(const World &w, std::vector<unsigned char> &out);
 void world_restore(World &w, const void *data, size_t bytes);  // throws Error; then the world is unchanged
 
 }  // namespace dfm

@@ -35,14 +35,6 @@ inline uint64_t snapshot_checksum(const unsigned char *data, size_t bytes) {
   return h.value;
 }
 
-// The location of a field, for tests that damage each.
-struct SnapshotField {
-  const char *name;
-  size_t at, bytes;  // of its values; for a list, of its count
-  char kind;         // d: doubles, u: unsigned, f: flags, n: a count
-  bool checked;
-};
-
 // Valid values; `what` completes "expected".
 namespace must {
 
@@ -50,12 +42,9 @@ template <class Is>
 struct Be {
   Is is;
   const char *what;
-  bool checked = true;
 };
 template <class Is>
 Be(Is, const char *) -> Be<Is>;
-template <class Is>
-Be(Is, const char *, bool) -> Be<Is>;
 
 inline bool all_finite(double x) { return std::isfinite(x); }
 using dfm::all_finite;
@@ -68,7 +57,7 @@ inline bool all_finite(const dfm_sine &s) {
   return all_finite(s.amplitude) && all_finite(s.frequency) && all_finite(s.phase);
 }
 
-inline constexpr Be any{[](const auto &) { return true; }, "anything", false};
+inline constexpr Be any{[](const auto &) { return true; }, "anything"};
 inline constexpr Be finite{[](const auto &x) { return all_finite(x); }, "a finite number"};
 inline constexpr Be not_negative{[](double x) { return x >= 0 && std::isfinite(x); },
                                  "a finite number that is not negative"};
@@ -98,40 +87,29 @@ inline auto at_most(uint64_t n) {
 
 }  // namespace must
 
-template <class T>
-constexpr char snapshot_kind() {
-  if constexpr (std::is_same_v<T, bool>) return 'f';
-  else if constexpr (std::is_unsigned_v<T> || std::is_enum_v<T>) return 'u';
-  else return 'd';
-}
-
 // `count` of an array: exactly this; kAnyCount: as many as the bytes allow.
 inline constexpr uint64_t kAnyCount = ~uint64_t{0};
 
 class SnapshotWriter {
  public:
-  explicit SnapshotWriter(std::vector<unsigned char> &out, std::vector<SnapshotField> *map = nullptr)
-      : out_(out), map_(map) {}
+  explicit SnapshotWriter(std::vector<unsigned char> &out) : out_(out) {}
   void bytes(const void *p, size_t n) {
     const unsigned char *const from = static_cast<const unsigned char *>(p);
     if (n) out_.insert(out_.end(), from, from + n);
   }
   void where(const char *, const std::string &) {}
   template <class T, class B>
-  void value(const char *name, const T &x, const B &be) {
-    note(name, sizeof x, snapshot_kind<T>(), be.checked);
+  void value(const char *, const T &x, const B &) {
     bytes(&x, sizeof x);
   }
   template <class A, class B>
-  void array(const char *name, const A &a, uint64_t, const B &be) {
-    count(name, a.size());
-    using T = std::remove_cvref_t<decltype(a[0])>;
-    if (!a.empty()) note(name, a.size() * sizeof(T), snapshot_kind<T>(), be.checked);
-    bytes(a.data(), a.size() * sizeof(T));
+  void array(const char *, const A &a, uint64_t, const B &) {
+    count(a.size());
+    bytes(a.data(), a.size() * sizeof a[0]);
   }
   template <class A, class F>
-  void list(const char *name, const A &a, F f) {
-    count(name, a.size());
+  void list(const char *, const A &a, F f) {
+    count(a.size());
     for (const auto &x : a) f(x);
   }
   template <class A, class F>
@@ -142,15 +120,8 @@ class SnapshotWriter {
   void must_hold(const char *, const char *, F) {}
 
  private:
-  void count(const char *name, uint64_t n) {
-    note(name, sizeof n, 'n', true);
-    bytes(&n, sizeof n);
-  }
-  void note(const char *name, size_t bytes, char kind, bool checked) {
-    if (map_) map_->push_back({name, out_.size(), bytes, kind, checked});
-  }
+  void count(uint64_t n) { bytes(&n, sizeof n); }
   std::vector<unsigned char> &out_;
-  std::vector<SnapshotField> *map_;
 };
 
 // Allocates no more memory than the given bytes can fill, and refuses the whole snapshot if something does

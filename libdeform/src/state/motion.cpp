@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/error.h"
-#include "math/trig.h"
+#include "math/elementary.h"
 #include "math/turn.h"
 
 namespace dfm {
@@ -75,7 +75,7 @@ double scale_at(const std::vector<dfm_scale_key> &keys, double t) {
 }
 
 double sine_at(const dfm_sine &s, double t) {
-  return sin_turns(s.frequency * t + s.phase / 6.283185307179586476925);
+  return dfm_sinpi(2 * (s.frequency * t) + s.phase / 3.14159265358979323846);
 }
 
 void check_keys(const std::vector<dfm_pose_key> &keys, const char *what) {

@@ -15,6 +15,10 @@
 
 namespace dfm {
 
+inline bool has_jaws(const dfm_tool_def &d) {
+  return d.shape == DFM_TOOL_GRASPER || d.shape == DFM_TOOL_SCISSORS;
+}
+
 struct Tool {
   static constexpr char kKind[] = "tool";
   World *world = nullptr;
@@ -35,7 +39,7 @@ struct Tool {
     std::vector<Pose> from;        // places of its parts up to which it has cut; empty: it has never cut
     bool waits = false;            // its way of this step, or of failed ones before, is yet to be cut
   } cuts;
-  bool has_jaws() const { return def.shape == DFM_TOOL_GRASPER || def.shape == DFM_TOOL_SCISSORS; }
+  bool has_jaws() const { return dfm::has_jaws(def); }
   // Whether it is one of the shapes that every tool of its kind has beside its parts.
   bool has_shape(const Obstacle &o) const {
     return o.rigid == set && o.added && (o.name == name + ".shape" || o.name == name + ".shaft");

@@ -25,8 +25,6 @@ constexpr double kWidest = 3;         // rad, of an opening
 constexpr double kLatest = 0.1;       // s, of a device
 constexpr uint32_t kRefinements = 2;  // of an ellipsoid: 320 triangles
 
-bool jawed(const dfm_tool_def &d) { return d.shape == DFM_TOOL_GRASPER || d.shape == DFM_TOOL_SCISSORS; }
-
 void check_opening(double angle, const Tool &t) {
   if (!(angle >= 0 && angle <= kWidest)) refuse(t, ": an opening of %g rad; give 0 to %g", angle, kWidest);
 }
@@ -59,7 +57,7 @@ void check_coupling(const dfm_tool_def &d, const Tool &t) {
 
 void check_sizes(const dfm_tool_def &d, const Tool &t) {
   const bool boxes =
-      jawed(d) || d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE || d.shape == DFM_TOOL_ELLIPSOID;
+      has_jaws(d) || d.shape == DFM_TOOL_BOX || d.shape == DFM_TOOL_BLADE || d.shape == DFM_TOOL_ELLIPSOID;
   for (const double s : d.half_size)
     if (boxes && !(s > 0 && std::isfinite(s)))
       refuse(t, ": half_size %g m; all three must be positive and finite", s);
@@ -81,7 +79,7 @@ void check_def(const dfm_tool_def &d, const Tool &t) {
   check_sizes(d, t);
   check_coupling(d, t);
   check_opening(d.opening, t);
-  if (!jawed(d) && (d.opening != 0 || d.nopening))
+  if (!has_jaws(d) && (d.opening != 0 || d.nopening))
     refuse(t, " has no jaws to open; only a grasper and scissors have");
   if ((d.nkey && !d.keys) || (d.nopening && !d.opening_keys))
     refuse(t, ": keys are announced, but they are NULL");
@@ -111,7 +109,7 @@ std::vector<dfm_rigid_def> parts_of(const dfm_tool_def &d, const std::string &na
   std::vector<dfm_rigid_def> out{frame};
   const Vec3 half = load3(d.half_size);
   for (const double side : {1.0, -1.0}) {
-    if (!jawed(d)) break;
+    if (!has_jaws(d)) break;
     const Vec3 beside = d.shape == DFM_TOOL_GRASPER ? Vec3{side * half.x, 0, 0} : Vec3{0, side * half.y, 0};
     motion.parts.push_back({{beside - Vec3{0, 0, half.z}, {}}, -0.5 * side});
     names.push_back(name + (side > 0 ? ".left" : ".right"));
@@ -136,7 +134,7 @@ std::vector<std::unique_ptr<Obstacle>> make_shapes(World &w, const dfm_tool_def 
   shape.collides_with = d.collides_with;
   shape.user = d.user;
   shape.radius = d.radius;
-  if (jawed(d) && d.radius > 0) {
+  if (has_jaws(d) && d.radius > 0) {
     const std::string shaft = name + ".shaft";
     shape.name = shaft.c_str();
     shape.shape = DFM_SHAPE_CAPSULE;

@@ -11,6 +11,9 @@
 #include "rigid.h"
 #include "sealed_snapshot.h"
 #include "snapshot/snapshot.h"
+#include "snapshot/snapshot_cuts.h"
+#include "snapshot/snapshot_fields.h"
+#include "snapshot/snapshot_things.h"
 
 namespace {
 
@@ -88,13 +91,74 @@ dfm_world build(dfm_context *c) {
 
 using test::inside;
 
+// The location of a field.
+struct Field {
+  const char *name;
+  size_t at, bytes;  // of its values; for a list, of its count
+  char kind;         // d: doubles, u: unsigned, f: flags, n: a count
+  bool checked;
+};
+// Notes where the writer of a snapshot puts each field.
+class FieldMap {
+ public:
+  void where(const char *, const std::string &) {}
+  template <class T, class B>
+  void value(const char *name, const T &x, const B &) {
+    note<T, B>(name, sizeof x);
+  }
+  template <class A, class B>
+  void array(const char *name, const A &a, uint64_t, const B &) {
+    using T = std::remove_cvref_t<decltype(a[0])>;
+    count(name);
+    if (!a.empty()) note<T, B>(name, a.size() * sizeof(T));
+  }
+  template <class A, class F>
+  void list(const char *name, const A &a, F f) {
+    count(name);
+    for (const auto &x : a) f(x);
+  }
+  template <class A, class F>
+  void members(const char *name, const A &a, uint64_t, F f) {
+    list(name, a, f);
+  }
+  template <class F>
+  void must_hold(const char *, const char *, F) {}
+  std::vector<Field> fields;
+  size_t at = sizeof(dfm::SnapshotHead);
+
+ private:
+  void count(const char *name) {
+    fields.push_back({name, at, 8, 'n', true});
+    at += 8;
+  }
+  template <class T, class B>
+  void note(const char *name, size_t bytes) {
+    const bool whole = std::is_unsigned_v<T> || std::is_enum_v<T>;
+    fields.push_back({name, at, bytes,
+                      std::is_same_v<T, bool> ? 'f'
+                      : whole                 ? 'u'
+                                              : 'd',
+                      !std::is_same_v<B, std::remove_const_t<decltype(dfm::must::any)>>});
+    at += bytes;
+  }
+};
+
 struct Taken {
   Bytes bytes;
-  std::vector<dfm::SnapshotField> map;
+  std::vector<Field> map;
 };
-Taken take(dfm_world w) {
+Taken take(dfm_world world) {
   Taken t;
-  dfm::world_snapshot(inside(w), t.bytes, &t.map);
+  const dfm::World &w = inside(world);
+  dfm::world_snapshot(w, t.bytes);
+  FieldMap map;
+  const auto things = dfm::thing_rows(w);
+  const auto cuts = dfm::cut_rows(w);
+  dfm::thing_fields(map, things);
+  dfm::cut_fields(map, cuts);
+  dfm::snapshot::fields(map, w, w);
+  EXPECT_EQ(map.at, t.bytes.size());
+  t.map = std::move(map.fields);
   return t;
 }
 
@@ -189,7 +253,7 @@ TEST_F(DamagedSnapshot, OfAnotherVersion_IsNamed) {
 TEST_F(DamagedSnapshot, ForgedFieldByField_IsRefusedUnderItsName) {
   const double inf = std::numeric_limits<double>::infinity(), nan = std::numeric_limits<double>::quiet_NaN();
   int forged = 0;
-  for (const dfm::SnapshotField &f : good.map) {
+  for (const Field &f : good.map) {
     if (!f.checked) continue;
     const auto forge = [&](auto value, size_t at, const char *what) {
       Bytes bad = good.bytes;
@@ -240,7 +304,7 @@ TEST_F(DamagedSnapshot, ForgedForAWorldOfOtherIds_IsRefusedAndChangesNothing) {
   test::ok(dfm_obstacle_create(w, &again, &jaw));
   hash = dfm_world_hash(w);
   state = take(w).bytes;
-  for (const dfm::SnapshotField &f : good.map) {
+  for (const Field &f : good.map) {
     if (!f.checked || (f.kind != 'd' && f.kind != 'u')) continue;
     Bytes bad = good.bytes;
     if (f.kind == 'd') put(bad, f.at, std::numeric_limits<double>::quiet_NaN());
@@ -255,7 +319,7 @@ TEST_F(DamagedSnapshot, ForgedForAWorldOfOtherIds_IsRefusedAndChangesNothing) {
 }
 
 TEST_F(DamagedSnapshot, WithAStepBoundThatNoSubStepCanHave_IsRefused) {
-  for (const dfm::SnapshotField &f : good.map) {
+  for (const Field &f : good.map) {
     if (std::string(f.name) != "step bound") continue;
     for (const double bound : {0.0, 5e-312, 1e-300, -1.0}) {
       Bytes bad = good.bytes;
@@ -293,7 +357,7 @@ TEST_F(DamagedSnapshot, ForgedAtRandom_IsRefusedOrTheWorldContinues) {
 // are small in the file and large in memory.
 TEST_F(DamagedSnapshot, ThatClaimsMuchMemory_TakesNoMoreThanAFewTimesItsBytes) {
   constexpr size_t kPadding = 1 << 20;
-  for (const dfm::SnapshotField &f : good.map) {
+  for (const Field &f : good.map) {
     if (f.kind != 'n') continue;
     Bytes bad = good.bytes;
     bad.insert(bad.begin() + std::ptrdiff_t(f.at) + 8, kPadding, 0);

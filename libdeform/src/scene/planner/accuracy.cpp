@@ -10,7 +10,6 @@ namespace dfm {
 namespace {
 
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kFrame = 1.0 / 60;  // s, where the scene names no step
 // Of the proven step: 0.9 is used, and of that the next size below of four to the octave, in the mean over
 // all sizes sum (1 - a/b) / ln 2 over the four pairs of neighbors a < b.
 constexpr double kOffered = 0.9 * 0.9155;

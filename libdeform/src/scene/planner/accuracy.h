@@ -22,6 +22,7 @@ const char *scheme_name(Scheme scheme);  // as a scene names it
 // s, the steps at which costs are measured: implicit time and models that step themselves at both, because a
 // shorter step takes fewer iterations.
 inline constexpr double kCostStep = 1.0 / 60, kShortCostStep = kCostStep / 16;
+inline constexpr double kFrame = kCostStep;  // s, where the scene names no step
 struct CostAt {
   double points = 0, ns = 0;  // of a body; processor time of one sub-step per point
   double short_ns = 0;        // the same at the short step; 0: not measured
