@@ -54,6 +54,10 @@ static_assert(!kMixed<deform::Law, deform::Material> && !kMixed<deform::Mesh, de
               !kMixed<deform::Scene, deform::World>);
 static_assert(!kMixed<deform::Rigid, deform::Body> &&
               !std::is_convertible_v<deform::Obstacle, deform::Rigid>);
+// A mesh that would end with the statement is not taken.
+template <class M>
+constexpr bool kTaken = requires(deform::BodyDef def, M mesh) { def.set_mesh(std::forward<M>(mesh)); };
+static_assert(kTaken<const deform::Unique<deform::Mesh> &> && !kTaken<deform::Unique<deform::Mesh>>);
 static_assert(std::is_convertible_v<deform::Rigid, deform::Obstacle> &&
               !std::is_convertible_v<uint64_t, deform::Body>);
 
