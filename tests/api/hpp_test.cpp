@@ -158,6 +158,19 @@ TEST(Hpp, Step_DistinguishesADiscardedStep) {
   EXPECT_THROW((void)world.step(-1), deform::Error);
 }
 
+TEST(Hpp, ADiscardedChange_IsAnErrorInBothWays) {
+  const Scene s;
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(s.world.step(1e-3));
+  const deform::Params none({{"max_jump", 1e-12}});
+  const auto r = values::Body(s.ball.get()).set_model("corotational_fem", none);
+  EXPECT_FALSE(r);
+  EXPECT_EQ(r.status(), DFM_DISCARD);
+  EXPECT_STRNE(r.what(), "");
+  EXPECT_THROW(s.ball.set_model("corotational_fem", none), deform::Error);
+  s.world.interrupt();
+  EXPECT_THROW((void)s.world.equilibrium(), deform::Error);
+}
+
 TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   const Scene s;
   for (int i = 0; i < 20; ++i) EXPECT_TRUE(s.world.step(1e-3));
