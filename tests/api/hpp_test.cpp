@@ -156,6 +156,9 @@ TEST(Hpp, Step_DistinguishesADiscardedStep) {
   EXPECT_TRUE(v && v->discarded) << "no error: nothing failed, the host may ask for less";
   EXPECT_EQ(v.status(), DFM_DISCARD);
   EXPECT_THROW((void)world.step(-1), deform::Error);
+  uint32_t trouble = DFM_TROUBLE_OVERLAP;
+  EXPECT_EQ(dfm_world_step(world.get(), -1, &trouble), DFM_E_ARG);
+  EXPECT_EQ(trouble, 0u) << "nothing of the step before";
 }
 
 TEST(Hpp, ADiscardedChange_IsAnErrorInBothWays) {
@@ -184,6 +187,9 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   ASSERT_EQ(dfm_body_get_state(s.ball.get(), info.npoint, nullptr, c.data(), &n), DFM_OK);
   EXPECT_EQ(v, c);
   EXPECT_EQ(s.ball.velocities(), c);
+  uint32_t few = 0;
+  EXPECT_EQ(dfm_body_get_rest(s.ball.get(), info.npoint, c.data(), 0, &few), DFM_E_ARG);
+  EXPECT_EQ(v, c) << "untouched";
 
   std::vector<double> surface(3 * info.nsurfel);
   EXPECT_EQ(s.ball.surface_positions(surface), info.nsurfel);
