@@ -74,13 +74,13 @@ void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
   } catch (...) {
     a->of_tick_ = dfm_fail(DFM_E_FATAL, "bullet: internal error: an unexpected exception");
   }
-  if (a->of_tick_ < 0) a->sentence_ = dfm_last_error();
-  if (a->of_tick_ < 0 && a->of_call_ == DFM_OK) {
+  if (a->of_tick_ != DFM_OK) a->sentence_ = dfm_last_error();
+  if (a->of_tick_ != DFM_OK && a->of_call_ == DFM_OK) {
     a->of_call_ = a->of_tick_;
     a->call_sentence_ = a->sentence_;
   }
   // without bodies that take part, the adapter has not stepped Bullet: the tick does it
-  if (a->of_tick_ < 0 || !a->engine_.members.empty())
+  if (a->of_tick_ != DFM_OK || !a->engine_.members.empty())
     a->vacated_ = std::make_unique<Vacated>(*a->engine_.world);
 }
 
@@ -298,12 +298,12 @@ dfm_status Adapter::step(double dt, int max_sub_steps, double fixed, int *ticks)
   of_call_ = DFM_OK;
   const int n = engine_.world->stepSimulation(btScalar(dt), max_sub_steps, btScalar(fixed));
   if (ticks) *ticks = n;
-  return of_call_ < 0 ? dfm_fail(of_call_, call_sentence_.c_str()) : dfm_status{DFM_OK};
+  return of_call_ != DFM_OK ? dfm_fail(of_call_, call_sentence_.c_str()) : of_call_;
 }
 
 dfm_status Adapter::last_tick(uint32_t *trouble) const {
   if (trouble) *trouble = trouble_;
-  return of_tick_ < 0 ? dfm_fail(of_tick_, sentence_.c_str()) : of_tick_;
+  return of_tick_ != DFM_OK ? dfm_fail(of_tick_, sentence_.c_str()) : of_tick_;
 }
 
 bool Adapter::in_world(const btCollisionObject *object) const {

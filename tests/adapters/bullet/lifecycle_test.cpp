@@ -73,6 +73,16 @@ TEST(BulletLifecycle, TickCallbacksOfTheCaller_AreCalledAroundTheTick) {
   EXPECT_EQ(b.world.getWorldUserInfo(), &info);
 }
 
+TEST(BulletLifecycle, InterruptedTick_IsToldByTheStep) {
+  Bullet b;
+  const btRigidBody *const ball = b.ball(0.1, 1, {0, 0, 1});
+  ok(dfm_world_interrupt(b.soft));
+  EXPECT_EQ(dfm_bullet_step(b.adapter, 0.01, 0, 0.01, nullptr), DFM_DISCARD);
+  EXPECT_NE(std::string(dfm_last_error()).find("interrupted"), std::string::npos) << dfm_last_error();
+  EXPECT_EQ(velocity(ball)[2], 0);
+  ok(dfm_bullet_step(b.adapter, 0.01, 0, 0.01, nullptr));
+}
+
 TEST(BulletLifecycle, FreeBody_FallsByTheWorldsGravityAndForces) {
   Bullet b;
   btRigidBody *const stone = b.ball(0.1, 2, {0, 0, 5});
