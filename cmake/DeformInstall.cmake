@@ -74,10 +74,12 @@ if(PROJECT_IS_TOP_LEVEL AND DEFORM_SHARED AND NOT CMAKE_CROSSCOMPILING)
     endif()
   endforeach()
   list(JOIN files "\" \"" files)
-  install(CODE "execute_process(COMMAND \"${DEFORM_PYTHON}\" -B
-      \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\"
-      \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
-      ${PROJECT_VERSION} \"${files}\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT library)
+  if(Python3_Interpreter_FOUND)
+    install(CODE "execute_process(COMMAND \"${DEFORM_PYTHON}\" -B
+        \"${PROJECT_SOURCE_DIR}/cmake/packaging/sbom.py\" \"${PROJECT_BINARY_DIR}\"
+        \"\$ENV{DESTDIR}\${CMAKE_INSTALL_PREFIX}/${CMAKE_INSTALL_DOCDIR}\"
+        ${PROJECT_VERSION} \"${files}\" COMMAND_ERROR_IS_FATAL ANY)" COMPONENT library)
+  endif()
 endif()
 # The pages, in the places that they have in the source tree, so that links between them hold; and what they
 # link to outside of their folder, which abi.installed_tree checks.

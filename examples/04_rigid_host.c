@@ -21,7 +21,7 @@ static host_t host;
 static dfm_status create(void *user, const dfm_rigid_set_def *set, void **self, uint32_t *group,
                          uint32_t *nextra) {
   if (set->nbody != 1 || set->njoint != 0) return DFM_E_UNSUPPORTED;
-  ((host_t *)user)->mass = set->bodies[0].mass;
+  ((host_t *)user)->mass = dfm_rigid_set_body(set, 0)->mass;
   *self = user;
   group[0] = 0;
   *nextra = 0; /* one group: bodies of a group answer each other's impulses */

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace dfm_bullet_detail {
 namespace {
@@ -40,11 +41,11 @@ Pose towards(const Pose &from, const Pose &to, Vec v, Vec w, double h) {
 
 }  // namespace
 
-Adapter::Adapter(dfm_world world, btDiscreteDynamicsWorld &bullet)
-    : world_(world), theirs_before_(bullet.*Opened::pre_tick()), theirs_after_(bullet.*Opened::tick()) {
+Adapter::Adapter(dfm_world world, const dfm_bullet_def &def) : world_(world) {
+  btDiscreteDynamicsWorld &bullet = static_cast<btDiscreteDynamicsWorld &>(*def.world);
   engine_.world = &bullet;
-  bullet.*Opened::pre_tick() = before_tick;
-  bullet.*Opened::tick() = after_tick;
+  theirs_before_ = std::exchange(bullet.*Opened::pre_tick(), before_tick);
+  theirs_after_ = std::exchange(bullet.*Opened::tick(), after_tick);
   Worlds &w = worlds();
   const std::lock_guard lock(w.mutex);
   w.all[&bullet] = this;
@@ -66,6 +67,11 @@ Adapter::~Adapter() {
 void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
   Adapter *const a = adapter_of(world);
   if (!a) return;
+  const struct InTick {
+    bool &is;
+    explicit InTick(bool &flag) : is(flag) { is = true; }
+    ~InTick() { is = false; }
+  } in_tick(a->in_tick_);
   if (a->theirs_before_) a->theirs_before_(world, h);
   try {
     a->of_tick_ = a->tick(h);
@@ -74,13 +80,13 @@ void Adapter::before_tick(btDynamicsWorld *world, btScalar h) {
   } catch (...) {
     a->of_tick_ = dfm_fail(DFM_E_FATAL, "bullet: internal error: an unexpected exception");
   }
-  if (a->of_tick_ < 0) a->sentence_ = dfm_last_error();
-  if (a->of_tick_ < 0 && a->of_call_ == DFM_OK) {
+  if (a->of_tick_ != DFM_OK) a->sentence_ = dfm_last_error();
+  if (a->of_tick_ != DFM_OK && a->of_call_ == DFM_OK) {
     a->of_call_ = a->of_tick_;
     a->call_sentence_ = a->sentence_;
   }
   // without bodies that take part, the adapter has not stepped Bullet: the tick does it
-  if (a->of_tick_ < 0 || !a->engine_.members.empty())
+  if (a->of_tick_ != DFM_OK || !a->engine_.members.empty())
     a->vacated_ = std::make_unique<Vacated>(*a->engine_.world);
 }
 
@@ -98,11 +104,7 @@ const Adapter::Props *Adapter::props_of(const btCollisionObject *object) const {
 
 Adapter::Traits Adapter::traits_of(const btCollisionObject *object) const {
   Traits t;
-  if (const btBroadphaseProxy *const proxy = object->getBroadphaseHandle()) {
-    t.handle = proxy->m_uniqueId;
-    t.group = proxy->m_collisionFilterGroup;
-    t.mask = proxy->m_collisionFilterMask;
-  }
+  if (const btBroadphaseProxy *const proxy = object->getBroadphaseHandle()) t.handle = proxy->m_uniqueId;
   const Props *const props = props_of(object);
   t.takes_part = object->hasContactResponse() && !(props && props->ignore);
   if (const btMultiBodyLinkCollider *const link = btMultiBodyLinkCollider::upcast(object)) {
@@ -119,6 +121,11 @@ Adapter::Traits Adapter::traits_of(const btCollisionObject *object) const {
   t.along = from_bullet(body->getLinearFactor());
   t.about = from_bullet(body->getAngularFactor());
   return t;
+}
+
+Adapter::Filter Adapter::filter_of(const btCollisionObject *object) {
+  const btBroadphaseProxy *const proxy = object->getBroadphaseHandle();
+  return proxy ? Filter{proxy->m_collisionFilterGroup, proxy->m_collisionFilterMask} : Filter{};
 }
 
 dfm_status Adapter::sync() { return look(0); }
@@ -168,17 +175,27 @@ dfm_status Adapter::look(double h) {
                      has_parts(*found, all[i]->getCollisionShape());
     if (!found || !found->found) TRY(check(all[i]));  // before anything has changed
   }
+  for (auto &o : objects_) {
+    if (!o->found || o->filter == filter_of(o->id)) continue;
+    o->filter = filter_of(o->id);
+    o->pose = from_bullet(o->id->getWorldTransform());
+    for (size_t i = 0; i < o->obstacles.size(); ++i) {
+      if (!o->body) o->sent[i] = o->pose * o->local[i];
+      TRY(set_filter(o->obstacles[i], static_cast<uint32_t>(o->filter.group),
+                     static_cast<uint32_t>(o->filter.mask), o->body ? nullptr : &o->sent[i]));
+    }
+  }
   TRY(drop());
   if (objects_.size() != static_cast<size_t>(all.size()))
     for (int i = 0; i < all.size(); ++i)
       if (!by_id_.count(all[i])) TRY(bind(all[i]));
   if (!props_.empty()) std::erase_if(props_, [&](const auto &p) { return !by_id_.count(p.first); });
+  TRY(clock_.poll(world_));
   for (auto &o : objects_) TRY(follow(*o, h));
-  bool restored = false;
-  TRY(clock_.poll(world_, restored));
   TRY(states_.poll(world_));
   for (auto &o : objects_)
-    if (o->body) TRY(o->body->agree(restored, states_));
+    if (o->body) TRY(o->body->agree(clock_.restored, states_));
+  clock_.restored = false;
   return DFM_OK;
 }
 
@@ -231,8 +248,8 @@ dfm_status Adapter::bind_leaf(Object &o, size_t leaf) {
   Triangles made;
   Pose local;
   describe(o.parts[leaf], def, local, made);
-  def.category = static_cast<uint32_t>(o.traits.group);
-  def.collides_with = static_cast<uint32_t>(o.traits.mask);
+  def.category = static_cast<uint32_t>(o.filter.group);
+  def.collides_with = static_cast<uint32_t>(o.filter.mask);
   std::string name;
   if (const Props *const props = props_of(o.id)) {
     name = props->name;
@@ -256,6 +273,7 @@ dfm_status Adapter::bind(const btCollisionObject *id) {
   Object &o = *made;
   o.id = id;
   o.traits = traits_of(id);
+  o.filter = filter_of(id);
   o.pose = from_bullet(id->getWorldTransform());
   const btCollisionShape *unknown = nullptr;
   if (o.traits.takes_part) parts_of(id->getCollisionShape(), {}, o.parts, unknown);
@@ -270,7 +288,10 @@ dfm_status Adapter::bind(const btCollisionObject *id) {
 
 // An object that forces do not move was moved by the caller: its surface follows within the next step.
 dfm_status Adapter::follow(Object &o, double h) {
-  if (o.body || o.obstacles.empty() || h == 0) return DFM_OK;
+  if (o.body || o.obstacles.empty()) return DFM_OK;
+  for (size_t i = 0; clock_.restored && i < o.obstacles.size(); ++i)
+    if (o.obstacles[i]) TRY(find_again(o.obstacles[i], o.sent[i]));
+  if (h == 0) return DFM_OK;
   const Pose target = from_bullet(o.id->getWorldTransform());
   const btRigidBody *const body = btRigidBody::upcast(o.id);
   const bool driven = body && body->isKinematicObject();
@@ -298,12 +319,12 @@ dfm_status Adapter::step(double dt, int max_sub_steps, double fixed, int *ticks)
   of_call_ = DFM_OK;
   const int n = engine_.world->stepSimulation(btScalar(dt), max_sub_steps, btScalar(fixed));
   if (ticks) *ticks = n;
-  return of_call_ < 0 ? dfm_fail(of_call_, call_sentence_.c_str()) : dfm_status{DFM_OK};
+  return of_call_ != DFM_OK ? dfm_fail(of_call_, call_sentence_.c_str()) : of_call_;
 }
 
 dfm_status Adapter::last_tick(uint32_t *trouble) const {
   if (trouble) *trouble = trouble_;
-  return of_tick_ < 0 ? dfm_fail(of_tick_, sentence_.c_str()) : of_tick_;
+  return of_tick_ != DFM_OK ? dfm_fail(of_tick_, sentence_.c_str()) : of_tick_;
 }
 
 bool Adapter::in_world(const btCollisionObject *object) const {

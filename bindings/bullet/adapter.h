@@ -42,7 +42,7 @@ class Vacated {
 
 class Adapter {
  public:
-  Adapter(dfm_world world, btDiscreteDynamicsWorld &bullet);
+  Adapter(dfm_world world, const dfm_bullet_def &def);
   ~Adapter();
   Adapter(const Adapter &) = delete;
   Adapter &operator=(const Adapter &) = delete;
@@ -56,22 +56,29 @@ class Adapter {
   dfm_status debug_draw(uint32_t what) const;
   dfm_bullet_stats stats() const;
   dfm_status last_tick(uint32_t *trouble) const;
-  const btDynamicsWorld *bullet() const { return engine_.world; }
+  bool in_step() const { return in_tick_; }
+  const char *shares(dfm_world world, const dfm_bullet_def &def) const {
+    return def.world == engine_.world ? "world" : world == world_ ? "dfm_world" : nullptr;
+  }
 
  private:
-  // All properties that an object's obstacles follow from, except its pose.
+  struct Filter {
+    int group = 0, mask = 0;
+    bool operator==(const Filter &) const = default;
+  };
+  // All properties that an object's obstacles follow from, except its pose and filter.
   struct Traits {
     double mass = 0;
     Vec moments, along, about;
     int handle = 0;  // the broadphase's: another one after the object has been out of the world
-    int group = 0, mask = 0;
     int16_t moves = 0, takes_part = 0;  // 0 or 1
   };
-  static_assert(sizeof(Traits) == 10 * sizeof(double) + 4 * sizeof(int), "compared as bytes");
+  static_assert(sizeof(Traits) == 10 * sizeof(double) + 2 * sizeof(int), "compared as bytes");
   struct Body : Seated { std::unique_ptr<Member> member; };
   struct Object {
     const btCollisionObject *id;
     Traits traits;
+    Filter filter;
     std::vector<Part> parts;
     std::vector<dfm_obstacle> obstacles;  // empty: takes no part
     Pose pose;                            // of an object that forces do not move: target of its obstacles
@@ -99,6 +106,7 @@ class Adapter {
   double sync_seconds_ = 0;
   dfm_status of_tick_ = DFM_OK, of_call_ = DFM_OK;
   uint32_t trouble_ = 0;
+  bool in_tick_ = false;
   std::string sentence_, call_sentence_;
 
   static void before_tick(btDynamicsWorld *world, btScalar h);
@@ -109,6 +117,7 @@ class Adapter {
   static bool same(const Traits &a, const Traits &b);
   bool has_parts(const Object &o, const btCollisionShape *shape);
   Traits traits_of(const btCollisionObject *object) const;
+  static Filter filter_of(const btCollisionObject *object);
   Object *known(const btCollisionObject *object, int place) const;  // place: in the world's list
   const Props *props_of(const btCollisionObject *object) const;
   bool in_world(const btCollisionObject *object) const;

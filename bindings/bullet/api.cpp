@@ -1,9 +1,7 @@
 #include <dlfcn.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 
 #include "adapter.h"
 
@@ -33,7 +31,7 @@ namespace {
 
 template <class F>
 dfm_status with(dfm_bullet handle, F &&f) noexcept {
-  return dfm_rigid_detail::with<Adapter>(bullet_kind(), handle, f);
+  return between_steps<Adapter>(bullet_kind(), handle, f);
 }
 
 // Ends of structs in 0.1, the smallest that a caller may have (deform/base.h, "structs of another version").
@@ -52,6 +50,13 @@ dfm_status check_def(const dfm_bullet_def &d) {
         d.version, d.real_bytes, BT_BULLET_VERSION, sizeof(btScalar));
   if (const dfm_status s = check_bullet(); s != DFM_OK) return s;
   if (!d.world) return failed(DFM_E_ARG, "dfm_bullet_def: world is NULL; set it to that of your scene");
+  if (!dynamic_cast<btDiscreteDynamicsWorld *>(d.world) ||
+      d.world->getWorldType() != BT_DISCRETE_DYNAMICS_WORLD)
+    return failed(
+        DFM_E_UNSUPPORTED,
+        "the world is of btDynamicsWorldType %d; pass a btDiscreteDynamicsWorld (a btSimpleDynamicsWorld "
+        "has no ticks; make Bullet's own soft bodies bodies of the dfm_world)",
+        static_cast<int>(d.world->getWorldType()));
   if (d.flags)
     return failed(DFM_E_ARG, "dfm_bullet_def: flags is %u; leave it 0, since no flag is defined", d.flags);
   return DFM_OK;
@@ -62,45 +67,16 @@ dfm_status check_def(const dfm_bullet_def &d) {
 void dfm_bullet_def_default_sized(uint32_t real_bytes, uint32_t version, uint32_t size, dfm_bullet_def *out) {
   if (!out) return;
   dfm_bullet_def d{};
-  d.size = size;
   d.real_bytes = real_bytes;
   d.version = version;
-  std::memset(static_cast<void *>(out), 0, size);
-  std::memcpy(static_cast<void *>(out), &d, std::min<size_t>(size, sizeof d));
+  write_sized(out, d, size);
 }
 
 dfm_status dfm_bullet_attach(dfm_world world, const dfm_bullet_def *def, dfm_bullet *out) {
-  try {
-    if (!def) return missing("def");
-    if (!out) return missing("out");
-    if (const dfm_status s = check_def(*def); s != DFM_OK) return s;
-    auto *const bullet = dynamic_cast<btDiscreteDynamicsWorld *>(def->world);
-    if (!bullet || def->world->getWorldType() != BT_DISCRETE_DYNAMICS_WORLD)
-      return failed(
-          DFM_E_UNSUPPORTED,
-          "the world is of btDynamicsWorldType %d; pass a btDiscreteDynamicsWorld (a btSimpleDynamicsWorld "
-          "has no ticks; make Bullet's own soft bodies bodies of the dfm_world)",
-          static_cast<int>(def->world->getWorldType()));
-    if (const dfm_status s = register_host(bullet_kind()); s != DFM_OK) return s;
-    uint32_t n = 0;
-    if (const dfm_status s = dfm_world_bodies(world, 0, nullptr, &n); s != DFM_OK) return s;
-    return Registry<Adapter>::get().add(
-        [&](const Adapter &other) {
-          if (other.bullet() != bullet) return dfm_status{DFM_OK};
-          return dfm_fail(DFM_E_STATE, "this world already has an adapter; call dfm_bullet_detach first");
-        },
-        [&] { return std::make_shared<Adapter>(world, *bullet); }, out);
-  } catch (const std::bad_alloc &) {
-    return dfm_fail(DFM_E_NOMEM, "bullet: out of memory");
-  }
+  return attach<Adapter>(bullet_kind(), world, def, out, check_def);
 }
 
-dfm_status dfm_bullet_detach(dfm_bullet bullet) {
-  return with(bullet, [&](Adapter &) {
-    Registry<Adapter>::get().remove(bullet);
-    return dfm_status{DFM_OK};
-  });
-}
+dfm_status dfm_bullet_detach(dfm_bullet bullet) { return detach<Adapter>(bullet_kind(), bullet); }
 
 dfm_status dfm_bullet_step(dfm_bullet bullet, double dt, int max_sub_steps, double fixed, int *ticks) {
   return with(bullet, [&](Adapter &a) {
@@ -116,13 +92,7 @@ dfm_status dfm_bullet_last_tick(dfm_bullet bullet, uint32_t *trouble) {
 }
 
 dfm_status dfm_bullet_get_stats(dfm_bullet bullet, dfm_bullet_stats *out) {
-  return with(bullet, [&](Adapter &a) {
-    if (!out) return missing("out");
-    dfm_bullet_stats s = a.stats();
-    s.size = std::min<uint32_t>(out->size ? out->size : kFirstStats, sizeof s);
-    std::memcpy(static_cast<void *>(out), &s, s.size);
-    return dfm_status{DFM_OK};
-  });
+  return with(bullet, [&](Adapter &a) { return give(out, a.stats(), kFirstStats); });
 }
 
 dfm_status dfm_bullet_obstacle(dfm_bullet bullet, const btCollisionObject *object, uint32_t leaf,

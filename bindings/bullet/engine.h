@@ -90,6 +90,14 @@ class BulletEngine : public Engine {
  protected:
   void prepare(const dfm_rigid_step &step) override;
   void restore(bool given) override;
+  void keep_first() override {
+    first_ = saved_;
+    first_multi_ = multi_;
+  }
+  void take_first() override {
+    saved_.swap(first_);
+    multi_ = first_multi_;
+  }
   void take(Member &m, const dfm_rigid_state &given, const double *extra) override;
   void put_forces(double h) override;
   void run(double h) override;
@@ -114,10 +122,10 @@ class BulletEngine : public Engine {
   std::vector<std::pair<const btRigidBody *, bool>> listed_;      // the world's bodies then; may they move?
   std::vector<int> flags_;                                        // of saved_ bodies, while the engine steps
   std::vector<std::pair<btVector3, btVector3>> before_actions_;
-  MultiState multi_;
+  MultiState multi_, first_multi_;
   double predicted_ = 0;      // s: damped_v and damped_w are v and w after this time; 0: they are not known
   bool has_islands_ = false;  // Bullet's islands are up to date, but not sorted yet
-  std::vector<Saved> saved_;  // every body that may move, members first
+  std::vector<Saved> saved_, first_;  // every body that may move, members first
 
   std::vector<BulletMember *> bodies_;  // of members
   std::vector<LinkMember *> links_;

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstring>
-#include <utility>
 #include <vector>
 
 #include "deform/bullet.h"
@@ -121,11 +120,10 @@ dfm_status take(dfm_context *context, dfm_world world, const btSoftBody &body, c
                   "the btSoftBody has neither tetrahedra nor faces; the library needs a volume, which ropes "
                   "and bodies made only of links do not have");
   }
-  TRY(dfm_body_create(world, &def, out));
-  if (a.held.empty()) return DFM_OK;
-  const dfm_status held = dfm_body_hold(*out, static_cast<uint32_t>(a.held.size()), a.held.data(), 7);
-  if (held != DFM_OK) dfm_body_destroy(std::exchange(*out, 0));
-  return held;
+  std::vector<uint8_t> fixed(def.npoint);
+  for (const uint32_t point : a.held) fixed[point] = 7;
+  def.fixed = fixed.data();
+  return dfm_body_create(world, &def, out);
 }
 
 }  // namespace

@@ -100,21 +100,26 @@ dfm_status Adapter::look() {
     }
     const auto geom = by_geom_.find(seen_[i]);
     if (geom == by_geom_.end()) continue;
-    geom->second->found =
-        geom->second->signature == signatures_[i] && (body == by_body_.end() || body->second->found);
+    Geom &g = *geom->second;
+    g.found = g.signature == signatures_[i] && (body == by_body_.end() || body->second->found);
+    if (!g.found || g.signature.has_filter(signatures_[i])) continue;
+    g.signature = signatures_[i];
+    if (!g.signature.body) g.pose = pose_of(g.id);
+    TRY(set_filter(g.obstacle, g.signature.category, g.signature.collides,
+                   g.signature.body ? nullptr : &g.pose));
   }
   TRY(drop());
   if (geoms_.size() != seen_.size())
     for (size_t i = 0; i < seen_.size(); ++i)
       if (!by_geom_.count(seen_[i])) TRY(bind(seen_[i], signatures_[i]));
   std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
+  TRY(clock_.poll(world_));
   for (auto &g : geoms_) TRY(follow(*g));
-  bool restored = false;
-  TRY(clock_.poll(world_, restored));
-  if (restored && !keeps_friction_) near_.forget();
-  if (restored) keeps_friction_ = false;
+  if (clock_.restored && !keeps_friction_) near_.forget();
+  if (clock_.restored) keeps_friction_ = false;
   TRY(states_.poll(world_));
-  for (auto &b : bodies_) TRY(b->agree(restored, states_));
+  for (auto &b : bodies_) TRY(b->agree(clock_.restored, states_));
+  clock_.restored = false;
   return DFM_OK;
 }
 
@@ -198,8 +203,9 @@ dfm_status Adapter::bind(dGeomID id, const Signature &s) {
 }
 
 dfm_status Adapter::follow(Geom &g) {
-  return !g.obstacle || g.signature.body ? dfm_status{DFM_OK}
-                                         : dfm_rigid_detail::follow(g.obstacle, g.pose, pose_of(g.id));
+  if (!g.obstacle || g.signature.body) return DFM_OK;
+  if (clock_.restored) TRY(find_again(g.obstacle, g.pose));
+  return dfm_rigid_detail::follow(g.obstacle, g.pose, pose_of(g.id));
 }
 
 // Bodies that move with the known ones because joints lead to them.

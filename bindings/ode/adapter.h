@@ -32,8 +32,13 @@ class Adapter {
   RigidFriction &friction() { return near_; }
   dfm_ode_stats stats() const;
   uint32_t trouble = 0;
-  dWorldID ode_world() const { return engine_.world; }
-  dSpaceID ode_space() const { return space_; }
+  bool in_step() const { return engine_.in_step; }
+  const char *shares(dfm_world world, const dfm_ode_def &def) const {
+    return def.world == engine_.world ? "dWorldID"
+           : def.space == space_      ? "dSpaceID"
+           : world == world_          ? "dfm_world"
+                                      : nullptr;
+  }
 
  private:
   struct Body : Seated {

@@ -1,8 +1,6 @@
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstring>
-#include <new>
 
 #include "adapter.h"
 
@@ -12,7 +10,7 @@ namespace {
 
 template <class F>
 dfm_status with(dfm_ode handle, F &&f) noexcept {
-  return dfm_rigid_detail::with<Adapter>(ode_kind(), handle, f);
+  return between_steps<Adapter>(ode_kind(), handle, f);
 }
 
 // Ends of structs in 0.1, the smallest that a caller may have (deform/base.h, "structs of another version").
@@ -71,13 +69,11 @@ dfm_status check_ode() {
 void dfm_ode_def_default_sized(uint32_t real_bytes, const char *version, uint32_t size, dfm_ode_def *out) {
   if (!out) return;
   dfm_ode_def d{};
-  d.size = size;
   d.friction = 0.5;
   d.most_contacts = 8;
   d.real_bytes = real_bytes;
   d.version = version;
-  std::memset(static_cast<void *>(out), 0, size);
-  std::memcpy(static_cast<void *>(out), &d, std::min<size_t>(size, sizeof d));
+  write_sized(out, d, size);
 }
 
 dfm_status dfm_ode_register(void) {
@@ -86,33 +82,10 @@ dfm_status dfm_ode_register(void) {
 }
 
 dfm_status dfm_ode_attach(dfm_world world, const dfm_ode_def *def, dfm_ode *out) {
-  try {
-    if (!def) return missing("def");
-    if (!out) return missing("out");
-    if (const dfm_status s = check_def(*def); s != DFM_OK) return s;
-    if (const dfm_status s = register_host(ode_kind()); s != DFM_OK) return s;
-    uint32_t n = 0;
-    if (const dfm_status s = dfm_world_bodies(world, 0, nullptr, &n); s != DFM_OK) return s;
-    return Registry<Adapter>::get().add(
-        [&](const Adapter &other) {
-          if (other.ode_world() == def->world)
-            return dfm_fail(DFM_E_STATE, "this dWorldID already has an adapter; call dfm_ode_detach first");
-          if (other.ode_space() == def->space)
-            return dfm_fail(DFM_E_STATE, "this dSpaceID already has an adapter; call dfm_ode_detach first");
-          return dfm_status{DFM_OK};
-        },
-        [&] { return std::make_shared<Adapter>(world, *def); }, out);
-  } catch (const std::bad_alloc &) {
-    return dfm_fail(DFM_E_NOMEM, "ode: out of memory");
-  }
+  return attach<Adapter>(ode_kind(), world, def, out, check_def);
 }
 
-dfm_status dfm_ode_detach(dfm_ode ode) {
-  return with(ode, [&](Adapter &) {
-    Registry<Adapter>::get().remove(ode);
-    return dfm_status{DFM_OK};
-  });
-}
+dfm_status dfm_ode_detach(dfm_ode ode) { return detach<Adapter>(ode_kind(), ode); }
 
 dfm_status dfm_ode_step(dfm_ode ode, double dt) {
   return with(ode, [&](Adapter &a) {
@@ -131,13 +104,7 @@ dfm_status dfm_ode_trouble(dfm_ode ode, uint32_t *trouble) {
 }
 
 dfm_status dfm_ode_get_stats(dfm_ode ode, dfm_ode_stats *out) {
-  return with(ode, [&](Adapter &a) {
-    if (!out) return missing("out");
-    dfm_ode_stats s = a.stats();
-    s.size = std::min<uint32_t>(out->size ? out->size : kFirstStats, sizeof s);
-    std::memcpy(static_cast<void *>(out), &s, s.size);
-    return dfm_status{DFM_OK};
-  });
+  return with(ode, [&](Adapter &a) { return give(out, a.stats(), kFirstStats); });
 }
 
 dfm_status dfm_ode_obstacle(dfm_ode ode, dGeomID geom, dfm_obstacle *out) {
@@ -205,7 +172,7 @@ dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const char *l
 }
 
 dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made) {
-  return with(ode, [&](Adapter &adapter) {
+  return dfm_rigid_detail::with<Adapter>(ode_kind(), ode, [&](Adapter &adapter) {
     if (!a || !b) return missing(!a ? "a" : "b");
     if (dGeomIsSpace(a) || dGeomIsSpace(b))
       return failed(DFM_E_ARG, "a space is no geom; dSpaceCollide2 finds the geoms in it");

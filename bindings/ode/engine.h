@@ -83,6 +83,8 @@ class OdeEngine : public Engine {
  protected:
   void prepare(const dfm_rigid_step &step) override;
   void restore(bool given) override;
+  void keep_first() override { first_ = saved_; }
+  void take_first() override { saved_.swap(first_); }
   void take(Member &m, const dfm_rigid_state &given, const double *extra) override;
   void put_forces(double h) override;
   void run(double h) override;
@@ -113,7 +115,7 @@ class OdeEngine : public Engine {
   std::vector<dBodyID> bodies_;                 // of saved_, when number_ was made
   std::vector<Tie> ties_;                       // joints between two bodies that move, but for contacts
   // every body known: members in their order, then bodies without geoms
-  std::vector<Saved> saved_;
+  std::vector<Saved> saved_, first_;
   std::unordered_map<dBodyID, Idle> idle_;
   std::vector<Vec> turn_;  // per body of saved_, N m s
 

@@ -66,9 +66,8 @@ bool Signature::operator==(const Signature &o) const {
   const Vec p = local.position - o.local.position;
   const Quat q = local.rotation, r = o.local.rotation;
   return geom_class == o.geom_class && inner_class == o.inner_class && std::equal(size, size + 3, o.size) &&
-         mesh == o.mesh && triangles == o.triangles && category == o.category && collides == o.collides &&
-         enabled == o.enabled && body == o.body && dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z &&
-         q.w == r.w;
+         mesh == o.mesh && triangles == o.triangles && enabled == o.enabled && body == o.body &&
+         dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z && q.w == r.w;
 }
 
 Signature signature_of(dGeomID geom) {

@@ -20,8 +20,9 @@ struct Signature {
   uint32_t category = 0, collides = 0;
   bool enabled = true;
   dBodyID body = nullptr;
-  Pose local;  // in the body's frame; of a geom without a body: none
-  bool operator==(const Signature &o) const;
+  Pose local;                                 // in the body's frame; of a geom without a body: none
+  bool operator==(const Signature &o) const;  // but for the filter
+  bool has_filter(const Signature &o) const { return category == o.category && collides == o.collides; }
 };
 Signature signature_of(dGeomID geom);
 // of the shape, in the world; a plane: through its nearest point to the origin, z its normal

@@ -113,7 +113,8 @@ void Engine::begin(double time) {
 }
 
 void Engine::end(double time) {
-  if (open_ && time == t_) {
+  if (open_ && time != t_ && time == begun_) take_first();
+  if (open_ && (time == t_ || time == begun_)) {
     restore(true);
     stepped_ = false;  // friction forgets what it has seen of it
   }
@@ -130,6 +131,7 @@ void Engine::open(const dfm_rigid_step &step) {
   if (!repeated || !as_long) {
     Timer timer(engine_seconds);
     stepped_ &= !repeated;
+    if (open_ && !repeated && t_ == begun_) keep_first();
     prepare(step);
   }
   open_ = true;

@@ -117,7 +117,8 @@ class Engine {
 
   // Around a step of the dfm_world: forces that the caller put on bodies act over all of it. time: the
   // dfm_world's, s. A sub-step that it has not got past when all ends has failed, and the engine goes back to
-  // where that began; where it was the first one, the caller's forces are on the bodies again.
+  // where that began, or, with a dfm_world that was interrupted, to where the step began: then the caller's
+  // forces are on the bodies again.
   void begin(double time);
   void end(double time = std::numeric_limits<double>::quiet_NaN());
   void forget(Member *member) { std::erase(members, member); }
@@ -136,6 +137,9 @@ class Engine {
   virtual void prepare(const dfm_rigid_step &step) = 0;
   // All bodies as they were at the start of the sub-step. given: asleep or awake as before it, too.
   virtual void restore(bool given) = 0;
+  // The start of the step: that of the first sub-step, which is over; and it again, for restore().
+  virtual void keep_first() = 0;
+  virtual void take_first() = 0;
   // The world's state goes into the engine each time, so that what that does is a function of it to the last
   // bit, also after a restore or where the guard left out a part of the way. Sets m.start.
   virtual void take(Member &m, const dfm_rigid_state &given, const double *extra) = 0;

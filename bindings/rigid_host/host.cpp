@@ -30,9 +30,8 @@ class SeatHost : public Host {
   SeatHost(const EngineKind &kind, Seat &seat) : kind_(kind), seat_(seat), member_(*seat.member) {}
   dfm_status predict(const dfm_rigid_step &step, double *velocity) override {
     if (!member_.engine->in_step)
-      return failed(DFM_E_STATE,
-                    "a world with an adapter of host \"%s\" is stepped by %s, not by dfm_world_step",
-                    kind_.host, kind_.call);
+      return failed(DFM_E_STATE, "a world with an adapter of host \"%s\" is stepped by %s alone", kind_.host,
+                    kind_.call);
     member_.engine->predict(member_, step, 0, velocity);
     return DFM_OK;
   }

@@ -85,33 +85,59 @@ dfm_status Seated::after(dfm_status of_step, States &now) {
   return get_status;
 }
 
-dfm_status Clock::poll(dfm_world world, bool &restored) {
+dfm_status Clock::poll(dfm_world world) {
   dfm_world_stats now{};
   now.size = sizeof now;
   TRY(dfm_world_get_stats(world, &now));
-  restored = now.time != time || now.steps != steps;
+  restored |= now.time != time || now.steps != steps;
   time = now.time;
   steps = now.steps;
   return DFM_OK;
 }
 
-dfm_status unbind(dfm_obstacle &obstacle) {
-  const dfm_status status = obstacle ? dfm_obstacle_destroy(obstacle) : dfm_status{DFM_OK};
-  if (status != DFM_OK && status != DFM_E_HANDLE) return status;
+namespace {
+
+dfm_status unless_gone(dfm_obstacle &obstacle, dfm_status status) {
+  if (status != DFM_E_HANDLE) return status;
   obstacle = 0;
   return DFM_OK;
+}
+
+}  // namespace
+
+dfm_status unbind(dfm_obstacle &obstacle) {
+  if (obstacle) TRY(unless_gone(obstacle, dfm_obstacle_destroy(obstacle)));
+  obstacle = 0;
+  return DFM_OK;
+}
+
+dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collides_with, const Pose *place) {
+  if (!obstacle) return DFM_OK;
+  if (place) {
+    const dfm_pose pose = to_pose(*place);
+    TRY(unless_gone(obstacle, dfm_obstacle_teleport(obstacle, &pose)));
+  }
+  return unless_gone(obstacle, dfm_obstacle_set_filter(obstacle, category, collides_with));
+}
+
+dfm_status find_again(dfm_obstacle &obstacle, Pose &known) {
+  dfm_pose there;
+  const dfm_status status = dfm_obstacle_get_pose(obstacle, &there);
+  if (status == DFM_OK)
+    known = {load(there.position),
+             {there.rotation[0], there.rotation[1], there.rotation[2], there.rotation[3]}};
+  return unless_gone(obstacle, status);
 }
 
 dfm_status follow(dfm_obstacle &obstacle, Pose &known, const Pose &now) {
   const Vec p = now.position - known.position;
   const Quat q = now.rotation, r = known.rotation;
-  if (dot(p, p) == 0 && q.x == r.x && q.y == r.y && q.z == r.z && q.w == r.w) return DFM_OK;
+  const Vec turn{q.x - r.x, q.y - r.y, q.z - r.z};
+  constexpr double kRounding = 1e-14;  // the dfm_world normalizes rotations
+  if (dot(p, p) == 0 && dot(turn, turn) + (q.w - r.w) * (q.w - r.w) < kRounding * kRounding) return DFM_OK;
   known = now;
   const dfm_pose pose = to_pose(now);
-  const dfm_status status = dfm_obstacle_move_to(obstacle, &pose);
-  if (status != DFM_E_HANDLE) return status;
-  obstacle = 0;  // as in unbind
-  return DFM_OK;
+  return unless_gone(obstacle, dfm_obstacle_move_to(obstacle, &pose));
 }
 
 }  // namespace dfm_rigid_detail

@@ -1,6 +1,8 @@
 // What adapters of attached worlds share: bodies and obstacles that represent the engine's, and the handles
 // by which callers name an adapter.
 #pragma once
+#include <algorithm>
+#include <cstring>
 #include <memory>
 #include <mutex>
 #include <new>
@@ -54,7 +56,8 @@ struct Seated {
 struct Clock {
   double time = 0;
   uint64_t steps = 0;
-  dfm_status poll(dfm_world world, bool &restored);
+  bool restored = false;  // until both agree again
+  dfm_status poll(dfm_world world);
 };
 
 // A step of the dfm_world and with it of the engine. The status of the step comes first, then those of the
@@ -72,13 +75,17 @@ dfm_status step_both(Engine &engine, dfm_world world, double h, uint32_t *troubl
     const dfm_status of_body = body.after(status, states);
     if (of_states == DFM_OK) of_states = of_body;
   });
-  bool restored = false;
-  TRY(clock.poll(world, restored));
+  TRY(clock.poll(world));
+  clock.restored = false;
   return status != DFM_OK ? status : of_states;
 }
 
 // The caller may have destroyed the obstacle that represents a shape: then the shape takes no further part.
 dfm_status unbind(dfm_obstacle &obstacle);
+// place: of a shape without a body, which is put there without a motion, as if made again; null: of a body's
+dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collides_with, const Pose *place);
+// known: where the surface of a shape without a body is, after a restore of the dfm_world
+dfm_status find_again(dfm_obstacle &obstacle, Pose &known);
 // A shape without a body that the caller has moved: its surface comes along within the next step.
 dfm_status follow(dfm_obstacle &obstacle, Pose &known, const Pose &now);
 
@@ -119,21 +126,84 @@ class Registry {
   uint64_t next_ = 1;
 };
 
-// Runs f on an adapter; no exception leaves.
+// No exception leaves.
+template <class F>
+dfm_status guarded(const EngineKind &kind, F &&f) noexcept {
+  try {
+    return f();
+  } catch (const std::bad_alloc &) {
+    return failed(DFM_E_NOMEM, "%s: out of memory", kind.host);
+  } catch (...) {
+    return failed(DFM_E_FATAL, "%s: internal error: an unexpected exception", kind.host);
+  }
+}
+
+// Runs f on an adapter, also within its step.
 template <class Adapter, class F>
 dfm_status with(const EngineKind &kind, uint64_t handle, F &&f) noexcept {
-  try {
+  return guarded(kind, [&] {
     const std::shared_ptr<Adapter> a = Registry<Adapter>::get().find(handle);
     if (!a)
       return failed(DFM_E_HANDLE,
                     "adapter %llu of host \"%s\" does not exist; it has been detached, or never was",
                     static_cast<unsigned long long>(handle), kind.host);
     return f(*a);
-  } catch (const std::bad_alloc &) {
-    return failed(DFM_E_NOMEM, "%s: out of memory", kind.host);
-  } catch (...) {
-    return failed(DFM_E_FATAL, "%s: internal error: an unexpected exception", kind.host);
-  }
+  });
+}
+
+template <class Adapter, class F>
+dfm_status between_steps(const EngineKind &kind, uint64_t handle, F &&f) noexcept {
+  return with<Adapter>(kind, handle, [&](Adapter &a) {
+    if (a.in_step())
+      return failed(DFM_E_BUSY, "the adapter of host \"%s\" is in a step; call this before it or after it",
+                    kind.host);
+    return f(a);
+  });
+}
+
+// check: whether the def is one that the adapter takes
+template <class Adapter, class Def>
+dfm_status attach(const EngineKind &kind, dfm_world world, const Def *def, uint64_t *out,
+                  dfm_status (*check)(const Def &)) noexcept {
+  return guarded(kind, [&]() -> dfm_status {
+    if (!def || !out) return missing(!def ? "def" : "out");
+    TRY(check(*def));
+    TRY(register_host(kind));
+    uint32_t n = 0;
+    TRY(dfm_world_bodies(world, 0, nullptr, &n));
+    return Registry<Adapter>::get().add(
+        [&](const Adapter &other) {
+          const char *const shared = other.shares(world, *def);
+          return !shared ? dfm_status{DFM_OK}
+                         : failed(DFM_E_STATE, "this %s already has an adapter; call dfm_%s_detach first",
+                                  shared, kind.host);
+        },
+        [&] { return std::make_shared<Adapter>(world, *def); }, out);
+  });
+}
+
+template <class Adapter>
+dfm_status detach(const EngineKind &kind, uint64_t handle) noexcept {
+  return between_steps<Adapter>(kind, handle, [&](Adapter &) {
+    Registry<Adapter>::get().remove(handle);
+    return dfm_status{DFM_OK};
+  });
+}
+
+// A struct of any size that the caller may have (deform/base.h, "structs of another version").
+template <class Struct>
+void write_sized(Struct *out, Struct value, uint32_t size) {
+  value.size = size;
+  std::memset(static_cast<void *>(out), 0, size);
+  std::memcpy(static_cast<void *>(out), &value, std::min<size_t>(size, sizeof value));
+}
+
+// first: its size in 0.1
+template <class Struct>
+dfm_status give(Struct *out, const Struct &value, uint32_t first) {
+  if (!out) return missing("out");
+  write_sized(out, value, std::min<uint32_t>(out->size ? out->size : first, sizeof value));
+  return DFM_OK;
 }
 
 }  // namespace dfm_rigid_detail

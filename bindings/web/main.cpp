@@ -93,7 +93,7 @@ class Rig {
     s.name = name;
     s.label = label;
     s.value = value;
-    s.low = std::max(low, decade ? value / 10 : 0.0);
+    s.low = std::max(low, decade ? value / 10 : std::min(10 * value, 0.0));
     s.high = std::min(high, decade ? 10 * value : 1.0);
     s.logarithmic = decade && s.low > 0;
     s.apply = std::move(apply);

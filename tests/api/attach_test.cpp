@@ -518,6 +518,27 @@ TEST(Attach, ACutFarFromIt_TakesNoPointOfIt) {
   }
 }
 
+// The places may come to lie on two parts (axis 0), or all on a new one (axis 2).
+TEST(Attach, WhoseOtherBodyIsParted_StaysOneAndKeepsItsImpulse) {
+  for (const int axis : {0, 2}) {
+    SCOPED_TRACE(axis);
+    World s({0, 0, 0});
+    const dfm_body lower = block(s, "lower", 0), upper = block(s, "upper", 0.102);
+    const uint32_t held = attach(upper, lower, false);
+    const double kick[] = {0, 0, 0.02}, at[] = {0.05, 0.05, 0.202};
+    test::ok(dfm_body_apply_impulse(upper, at, kick));
+    s.run(0.01);
+    const dfm_attachment before = info(upper, held);
+    ASSERT_LT(before.impulse[2], -1e-4);
+    test::cutting::cut(lower, test::cutting::plane(axis, axis == 2 ? 0.0601 : 0.047, DFM_CUT_SPLIT));
+    dfm_cut_info made = test::cutting::request();
+    test::ok(dfm_body_separate(lower, nullptr, &made));
+    ASSERT_EQ(made.pieces, 1u);
+    EXPECT_EQ(test::listed(dfm_body_attachments, upper), std::vector<uint32_t>{held});
+    EXPECT_EQ(info(upper, held).impulse[2], before.impulse[2]);
+  }
+}
+
 TEST(Attach, EitherSide_MayGo) {
   for (const bool body_goes : {true, false}) {
     World s;

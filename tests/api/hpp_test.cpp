@@ -54,6 +54,10 @@ static_assert(!kMixed<deform::Law, deform::Material> && !kMixed<deform::Mesh, de
               !kMixed<deform::Scene, deform::World>);
 static_assert(!kMixed<deform::Rigid, deform::Body> &&
               !std::is_convertible_v<deform::Obstacle, deform::Rigid>);
+// A mesh that would end with the statement is not taken.
+template <class M>
+constexpr bool kTaken = requires(deform::BodyDef def, M mesh) { def.set_mesh(std::forward<M>(mesh)); };
+static_assert(kTaken<const deform::Unique<deform::Mesh> &> && !kTaken<deform::Unique<deform::Mesh>>);
 static_assert(std::is_convertible_v<deform::Rigid, deform::Obstacle> &&
               !std::is_convertible_v<uint64_t, deform::Body>);
 
@@ -152,6 +156,22 @@ TEST(Hpp, Step_DistinguishesADiscardedStep) {
   EXPECT_TRUE(v && v->discarded) << "no error: nothing failed, the host may ask for less";
   EXPECT_EQ(v.status(), DFM_DISCARD);
   EXPECT_THROW((void)world.step(-1), deform::Error);
+  uint32_t trouble = DFM_TROUBLE_OVERLAP;
+  EXPECT_EQ(dfm_world_step(world.get(), -1, &trouble), DFM_E_ARG);
+  EXPECT_EQ(trouble, 0u) << "nothing of the step before";
+}
+
+TEST(Hpp, ADiscardedChange_IsAnErrorInBothWays) {
+  const Scene s;
+  for (int i = 0; i < 20; ++i) ASSERT_TRUE(s.world.step(1e-3));
+  const deform::Params none({{"max_jump", 1e-12}});
+  const auto r = values::Body(s.ball.get()).set_model("corotational_fem", none);
+  EXPECT_FALSE(r);
+  EXPECT_EQ(r.status(), DFM_DISCARD);
+  EXPECT_STRNE(r.what(), "");
+  EXPECT_THROW(s.ball.set_model("corotational_fem", none), deform::Error);
+  s.world.interrupt();
+  EXPECT_THROW((void)s.world.equilibrium(), deform::Error);
 }
 
 TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
@@ -167,6 +187,9 @@ TEST(Hpp, Spans_ReadAndWriteWhatTheCFunctionsDo) {
   ASSERT_EQ(dfm_body_get_state(s.ball.get(), info.npoint, nullptr, c.data(), &n), DFM_OK);
   EXPECT_EQ(v, c);
   EXPECT_EQ(s.ball.velocities(), c);
+  uint32_t few = 0;
+  EXPECT_EQ(dfm_body_get_rest(s.ball.get(), info.npoint, c.data(), 0, &few), DFM_E_ARG);
+  EXPECT_EQ(v, c) << "untouched";
 
   std::vector<double> surface(3 * info.nsurfel);
   EXPECT_EQ(s.ball.surface_positions(surface), info.nsurfel);

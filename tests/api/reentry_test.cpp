@@ -298,6 +298,8 @@ Calls world_calls(Scene &s, bool step_only) {
                    return dfm_world_query(s.w, &q, nullptr, 0, nullptr, nullptr, &hits);
                  }},
                 {"surface_vertices", [&] { return dfm_surface_vertices(s.body, nullptr, 0, nullptr, &n); }},
+                {"body_get_state", [&] { return dfm_body_get_state(s.body, 0, nullptr, nullptr, &n); }},
+                {"debug_displacements", [&] { return dfm_debug_displacements(s.body, 0, nullptr, &n); }},
                 {"sensor_things", [&] { return dfm_sensor_things(s.body, 0, nullptr, &n); }},
                 {"world_hold",
                  [&] {

@@ -50,6 +50,9 @@ dfm_rigid_host lift_table(Lift *counts) {
     extra[0] = step->extra[0] + 1;
     return lift.fail_commit;
   };
+  t.joint = [](void *, const dfm_rigid_state *, const double *, uint32_t, double *, double *, double *) {
+    return dfm_fail(DFM_E_STATE, "the drive is locked; unlock it first");
+  };
   return t;
 }
 
@@ -106,7 +109,8 @@ TEST(RigidHost, OfAnotherEngine_TakesPartInTheSolve) {
     o.position = {0, 0, 0.101};
     o.name = "ball";
     const dfm_body ball = make_body(c, w, "ball", {0.1}, 300, o);
-    Set set{{box("plate", {0.1, 0.1, 0.02}, 1, {0, 0, 0.23})}, {}};
+    Set set{{box("plate", {0.1, 0.1, 0.02}, 1, {0, 0, 0.23})},
+            {joint(DFM_JOINT_HINGE, 0, DFM_RIGID_WORLD, {0, 0, 0.23}, {0, 1, 0})}};
     EXPECT_EQ(Set({{box("one", {0.1, 0.1, 0.1}, 1), box("two", {0.1, 0.1, 0.1}, 1, {1, 0, 0})}, {}})
                   .create(w, "lift"),
               DFM_E_FATAL);
@@ -145,10 +149,20 @@ TEST(RigidHost, OfAnotherEngine_TakesPartInTheSolve) {
     double after[3];
     ok(dfm_rigid_contact_wrench(plate, after, moment));
     EXPECT_TRUE(std::equal(after, after + 3, force)) << "that of the last sub-step which was kept";
+    EXPECT_EQ(dfm_rigid_joint(plate, 0, nullptr, nullptr, nullptr), DFM_E_STATE);
+    EXPECT_NE(std::strstr(dfm_last_error(), "unlock it"), nullptr) << dfm_last_error();
     // No motors in this host.
     EXPECT_EQ(dfm_rigid_set_motor(plate, 0, 1, 1), DFM_E_UNSUPPORTED);
   }
   EXPECT_EQ(counts.destroyed, counts.created);
+}
+
+TEST(RigidBodies, WithoutNames_TakeTheNextFreeOnes) {
+  Context c;
+  const dfm_world w = make_world(c);
+  for (int i = 10; i < 20; ++i) add_plane(w, ("rigid" + std::to_string(i)).c_str());
+  const Set two{{box(nullptr, {1, 1, 1}, 1), box(nullptr, {1, 1, 1}, 1, {9, 9, 9})}, {}};
+  EXPECT_EQ(two.create(w), DFM_OK) << dfm_last_error();
 }
 
 TEST(RigidBodies, HashAndSnapshotOnThreads_CoverThem) {

@@ -337,13 +337,22 @@ TEST(Wake, ByWhateverChangesOrReachesABody_TakesItsIslandAndNoOther) {
       {"floor removed", true, true, true, [](const Rest &s) { test::ok(dfm_obstacle_destroy(s.floor)); }},
       {"new obstacle", true, true, true, [](const Rest &s) { add_ball(s, 0.05); }},
       {"sleep off", true, true, true, [](const Rest &s) { test::ok(dfm_world_set_sleep(s.world, false)); }},
-      {"nothing", false, false, false, [](const Rest &) {}},
+      {"what is so already", false, false, false,
+       [](const Rest &s) {
+         const double same[3] = {0, 0, -9.81};
+         test::ok(dfm_world_set_gravity(s.world, same));
+         test::ok(dfm_world_set_sleep(s.world, true));
+         test::ok(dfm_body_set_filter(s.lower, 1, ~0u));
+         test::ok(dfm_world_filter_pair(s.world, "lower", "far", false));
+       }},
   };
   Rest s;
+  test::ok(dfm_world_filter_pair(s.world, "lower", "far", false));
   for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
   const std::string data = test::snapshot(s.world);
   for (const Waker &w : wakers) {
     const Rest t;  // a world of its own for each, put to sleep by the snapshot
+    test::ok(dfm_world_filter_pair(t.world, "lower", "far", false));
     ASSERT_EQ(dfm_world_restore(t.world, data.data(), data.size()), DFM_OK) << dfm_last_error();
     ASSERT_EQ(test::stats(t.world).asleep, 3u);
     w.act(t);

@@ -1,6 +1,6 @@
 /* deform/base.h -- version, export, status, hooks, context. SI units; C99, C++11 and later. Thread phrases of
- * every header: "Any thread." / "One thread at a time per world." / "Not during step." (within a callback of
- * the step: DFM_E_BUSY) / "Called from workers: must be re-entrant." */
+ * every header: "Any thread." / "One thread at a time per world." / "Not during step." (in a callback of the
+ * step: DFM_E_BUSY; a mere read may give what is there) / "Called from workers: must be re-entrant." */
 #ifndef DEFORM_BASE_H
 #define DEFORM_BASE_H
 #include <stdbool.h>

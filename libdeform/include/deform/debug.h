@@ -20,8 +20,8 @@ DFM_API dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, dou
 /** The same of the surfels: u of dfm_debug_write_surface. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n);
 
-/** Lines for a debug view: contact normals and friction forces of the last sub-step, swept boxes of
- * the surfaces. */
+/** Lines for a debug view: contact normals and contact forces of the last sub-step, boxes of the
+ * surfaces. */
 enum { DFM_DRAW_CONTACTS = 1, DFM_DRAW_FORCES = 2, DFM_DRAW_BOXES = 4 };
 typedef void (*dfm_draw_line_fn)(void *user, const double a[3], const double b[3], uint32_t rgb);
 /** Calls line for each; what is a sum of DFM_DRAW_*. Threads: Not during step. Since 0.1. */

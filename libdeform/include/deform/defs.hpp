@@ -57,6 +57,8 @@ struct BodyDef : dfm_body_def {
   auto set_mesh(const Mesh &mesh) {
     return mesh.give_to(*this);
   }
+  template <class Mesh>
+  void set_mesh(Unique<Mesh> &&) = delete;  // it would end before the body is made
 };
 
 // ---- what steps and queries return ------------------------------------------------------------------------

@@ -62,9 +62,9 @@ DFM_API dfm_status dfm_obstacle_get_pose(dfm_obstacle obstacle, dfm_pose *out);
 /** The def of its creation (name, points and triangles valid while it lives; keys are not returned). Threads:
  * Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_get_def(dfm_obstacle obstacle, dfm_obstacle_def *out);
-/** Sets the pose at the end of the next step; the obstacle moves there at constant rate. Replaces keys. A
- * step in which it would move faster than dfm_world_def.obstacle_speed is refused with DFM_E_ARG, and nothing
- * changes: take more steps, or teleport. Threads: Not during step. Since 0.1. */
+/** Sets the pose at the end of the next step; the obstacle moves there at constant rate. Replaces keys and
+ * sine. A step in which it would move faster than dfm_world_def.obstacle_speed is refused with DFM_E_ARG, and
+ * nothing changes: take more steps, or teleport. Threads: Not during step. Since 0.1. */
 DFM_API dfm_status dfm_obstacle_move_to(dfm_obstacle obstacle, const dfm_pose *pose);
 /** Sets the pose now, without a motion: nothing is pushed or dragged on the way. Replaces keys, sine and
  * target. Bodies that it then overlaps are found as after creation (dfm_world_overlaps). Contacts that it

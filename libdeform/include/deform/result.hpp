@@ -46,8 +46,8 @@ constexpr T sized() noexcept {
   return t;
 }
 
-// Parameters by key, without allocation: `const deform::Params p({{"mu_C", 0.4}, {"mu_S", 0.5}});` then p or
-// p.c where dfm_params is wanted.
+// Parameters by key, without allocation: `const deform::Params p({{"mu_C", 0.4}, {"mu_S", 0.5}});` then p
+// where dfm_params is wanted.
 struct Param {
   const char *key;
   double value;
@@ -102,21 +102,28 @@ inline dfm_status write_file(const char *path, const void *bytes, size_t n) noex
   return dfm_file_write(path, bytes, n);
 }
 
+// Whether a call that gives T was done. DFM_DISCARD is no error where T says it: StepReport, the bool of a
+// law.
+template <class T>
+constexpr bool is_done(dfm_status s) noexcept {
+  return s == DFM_OK || (s > 0 && (std::is_same_v<T, bool> || requires(T t) { t.discarded = true; }));
+}
+
 // A status with what the call gives. `if (result) use(*result); else log(result.what());`
 template <class T>
 class [[nodiscard]] Result {
  public:
-  constexpr explicit operator bool() const noexcept { return status_ >= 0; }
+  constexpr explicit operator bool() const noexcept { return is_done<T>(status_); }
   constexpr dfm_status status() const noexcept { return status_; }
   // Read it before this thread's next call that fails. "" where this one did not.
-  const char *what() const noexcept { return status_ < 0 ? sentence(status_) : ""; }
+  const char *what() const noexcept { return *this ? "" : sentence(status_); }
   // As the C function left it where the call failed: zero, or a handle that refers to nothing.
   constexpr T &operator*() & noexcept { return value_; }
   constexpr const T &operator*() const & noexcept { return value_; }
   constexpr T &&operator*() && noexcept { return std::move(value_); }
   constexpr T *operator->() noexcept { return &value_; }
   constexpr const T *operator->() const noexcept { return &value_; }
-  constexpr T value_or(T other) && { return status_ >= 0 ? std::move(value_) : std::move(other); }
+  constexpr T value_or(T other) && { return *this ? std::move(value_) : std::move(other); }
 
  private:
   friend struct Values;
@@ -127,9 +134,9 @@ class [[nodiscard]] Result {
 template <>
 class [[nodiscard]] Result<void> {
  public:
-  constexpr explicit operator bool() const noexcept { return status_ >= 0; }
+  constexpr explicit operator bool() const noexcept { return is_done<void>(status_); }
   constexpr dfm_status status() const noexcept { return status_; }
-  const char *what() const noexcept { return status_ < 0 ? sentence(status_) : ""; }
+  const char *what() const noexcept { return *this ? "" : sentence(status_); }
 
  private:
   friend struct Values;
@@ -183,8 +190,9 @@ struct Throw {
   using Out = T;
   // Out of line: its callers cost a test and a jump, as in C.
   [[noreturn, gnu::cold, gnu::noinline]] static void raise(dfm_status s) { throw Error(s); }
+  template <class T = void>
   static void done(dfm_status s) {
-    if (s < 0) [[unlikely]]
+    if (!is_done<T>(s)) [[unlikely]]
       raise(s);
   }
   template <class T>
@@ -197,7 +205,7 @@ struct Throw {
   }
   template <class T>
   static void end(T &, dfm_status s) {
-    done(s);
+    done<T>(s);
   }
 
   // A callable handed through the C API: what it throws waits on this side of it, and the remaining

@@ -1,7 +1,5 @@
 #include "deform/attach.h"
 
-#include <algorithm>
-
 #include "api/objects.h"
 #include "world/attach.h"
 
@@ -27,11 +25,11 @@ dfm_status dfm_body_detach(dfm_body body, uint32_t attachment) {
 
 dfm_status dfm_body_attachments(dfm_body body, uint32_t capacity, uint32_t *out, uint32_t *n) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    const auto own = [&](const Attachment &a) { return a.body == b.id && !a.released; };
-    const auto &list = b.world->attachments;
-    if (!room(size_t(std::count_if(list.begin(), list.end(), own)), capacity, out, n)) return;
-    for (const Attachment &a : list)
-      if (own(a)) *out++ = a.number;
+    std::vector<uint32_t> numbers;  // one may have several rows, where the other body has been parted
+    for (const Attachment &a : b.world->attachments)
+      if (a.body == b.id && !a.released && (numbers.empty() || numbers.back() != a.number))
+        numbers.push_back(a.number);
+    copy_list(numbers, capacity, out, n);
   });
 }
 

@@ -177,6 +177,7 @@ dfm_status dfm_body_set_user(dfm_body body, void *user) {
 
 dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collides_with) {
   return as_status(to_change<body_of>, body, [&](Body &b) {
+    if (b.category == category && b.collides_with == collides_with) return;
     b.category = category;
     b.collides_with = collides_with;
     disturb(b);
@@ -186,7 +187,7 @@ dfm_status dfm_body_set_filter(dfm_body body, uint32_t category, uint32_t collid
 }
 
 dfm_status dfm_body_get_state(dfm_body body, uint32_t capacity, double *x, double *v, uint32_t *n) {
-  return as_status(body_of, body, [&](const Body &b) {
+  return as_status(still_body_of, body, [&](const Body &b) {
     if (!room(b.p.n, capacity, x ? x : v, n)) return;
     for (uint32_t i = 0; i < b.p.n; ++i) {
       if (x) store3(x + size_t(3) * i, load3(&b.p.x[size_t(i) * kStride]));
@@ -228,8 +229,9 @@ dfm_status dfm_body_set_state(dfm_body body, uint32_t n, const double *x, const 
 dfm_status dfm_body_get_rest(dfm_body body, uint32_t capacity_points, double *x, uint32_t capacity_tets,
                              uint32_t *tets) {
   return as_status(shown_body_of, body, [&](const Body &b) {
-    if (x && room(b.p.n, capacity_points, x, nullptr)) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
+    const bool points = x && room(b.p.n, capacity_points, x, nullptr);
     if (tets && room(b.ncell(), capacity_tets, tets, nullptr)) std::copy(b.tets.begin(), b.tets.end(), tets);
+    if (points) std::copy(b.p.rest.begin(), b.p.rest.end(), x);
   });
 }
 
@@ -328,7 +330,7 @@ dfm_status dfm_body_set_spring_target(dfm_body body, uint32_t spring, const doub
 }
 
 dfm_status dfm_body_get_spring_force(dfm_body body, uint32_t spring, double force[3]) {
-  return as_status(body_of, body, [&](Body &b) {
+  return as_status(still_body_of, body, [&](Body &b) {
     need(force, "force");
     store3(force, spring_force(b, spring_of(b, spring), b.world->time, 0));
   });

@@ -228,7 +228,14 @@ dfm_status dfm_world_remove_friction(dfm_world world, const char *a, const char 
 
 dfm_status dfm_world_filter_pair(dfm_world world, const char *a, const char *b, bool collide) {
   return as_status(to_change<world_of>, world, [&](World &w) {
-    add_rule(w.filters, FilterRule{{side(w, a, false), side(w, b, false)}, collide});
+    FilterRule rule{{side(w, a, false), side(w, b, false)}, collide};
+    const auto there =
+        std::ranges::find_if(w.filters, [&](auto &r) { return same_pair(r.between, rule.between); });
+    // and no newer one that could decide otherwise
+    if (there != w.filters.end() &&
+        std::all_of(there, w.filters.end(), [&](auto &r) { return r.collide == collide; }))
+      return;
+    add_rule(w.filters, std::move(rule));
     if (collide) w.overlaps.all = true;
     wake_all(w);
     w.changed = true;

@@ -29,7 +29,7 @@ double von_mises(const double *s) {
 }  // namespace
 
 dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
-  return as_status(body_of, body, [&](Body &b) {
+  return as_status(still_body_of, body, [&](Body &b) {
     need(path, "path");
     const std::vector<double> x = packed(b.p.x, b.p.n), v = packed(b.p.v, b.p.n);
     std::vector<double> u(x.size()), energy, stress, mises;
@@ -58,7 +58,7 @@ dfm_status dfm_debug_write_body(dfm_body body, const char *path) {
 }
 
 dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
-  return as_status(body_of, body, [&](Body &b) {
+  return as_status(still_body_of, body, [&](Body &b) {
     need(path, "path");
     const uint32_t n = b.surface.nsurfel;
     std::vector<double> x(size_t(3) * n), v(size_t(3) * n), u(size_t(3) * n), force(size_t(3) * n);
@@ -82,13 +82,13 @@ dfm_status dfm_debug_write_surface(dfm_body body, const char *path) {
 }
 
 dfm_status dfm_debug_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
-  return as_status(body_of, body, [&](const Body &b) {
+  return as_status(still_body_of, body, [&](const Body &b) {
     copy_vectors(b.p.n, capacity, u, n, [&](uint32_t i) { return displacement(b, i); });
   });
 }
 
 dfm_status dfm_debug_surface_displacements(dfm_body body, uint32_t capacity, double *u, uint32_t *n) {
-  return as_status(body_of, body, [&](const Body &b) {
+  return as_status(still_body_of, body, [&](const Body &b) {
     copy_vectors(b.surface.nsurfel, capacity, u, n, [&](uint32_t s) { return surfel_displacement(b, s); });
   });
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "api/objects.h"
+#include "core/system.h"
 #include "plugin/call.h"
 #include "plugin/context.h"
 #include "plugin/params.h"
@@ -244,8 +245,7 @@ dfm_status dfm_law_open(dfm_context *context, const char *id_or_path, dfm_law *o
     if (!context || !id_or_path || !*id_or_path || !out)
       fail(DFM_E_ARG, "dfm_law_open: context, name and out are needed");
     const std::string name = id_or_path;
-    const bool path = name.find('/') != std::string::npos ||
-                      (name.size() > 3 && name.compare(name.size() - 3, 3, ".so") == 0);
+    const bool path = name.find_first_of("/\\") != std::string::npos || name.ends_with(os::kPluginEnding);
     used(*context);
     const dfm_type &type =
         path ? type_from_file(*context, id_or_path) : context->registry.find(DFM_KIND_FRICTION, name);

@@ -190,6 +190,7 @@ dfm_status dfm_world_set_gravity(dfm_world world, const double gravity[3]) {
   return as_status(to_change<world_of>, world, [&](World &w) {
     need(gravity, "gravity");
     check_gravity(gravity);
+    if (w.gravity.keys.empty() && std::equal(gravity, gravity + 3, w.def.gravity)) return;
     store3(w.def.gravity, load3(gravity));
     w.gravity.keys.clear();
     wake_all(w);
@@ -212,6 +213,7 @@ dfm_status dfm_world_set_gravity_keys(dfm_world world, uint32_t n, const dfm_vec
 
 dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
   return as_status(whole_to_change, world, [&](World &w) {
+    if (w.def.sleep == sleep) return;
     wake_all(w);
     for (auto &b : w.bodies) b->anchor.clear();
     w.def.sleep = sleep;
@@ -221,17 +223,18 @@ dfm_status dfm_world_set_sleep(dfm_world world, bool sleep) {
 
 dfm_status dfm_world_step(dfm_world world, double dt, uint32_t *trouble) {
   return as_status(to_change<world_of>, world, [&](World &w) -> dfm_status {
+    uint32_t bits = 0;
+    if (!trouble) trouble = &bits;
+    *trouble = 0;
     if (!(dt > 0 && std::isfinite(dt))) fail(DFM_E_ARG, "a step of %g s; it must be positive and finite", dt);
     if (const double floor = shortest_step(w, dt); dt < floor)
       fail(DFM_E_ARG, "%s", short_step(dt, floor).c_str());
-    uint32_t bits = 0;
     read_devices(w, w.time + dt);  // may refuse the step
     make_switches(w, dt);
     begin_cuts(w);
     const double before = w.time;
-    const dfm_status s = step_within_budget(w, dt, &bits);
+    const dfm_status s = step_within_budget(w, dt, trouble);
     const double passed = w.time - before;
-    if (trouble) *trouble = bits;
     if (s == DFM_OK) separate_what_waits(w);
     if (s == DFM_OK) cut_by_tools(w, passed);
     if (s == DFM_OK) make_planned_cuts(w, passed);

@@ -80,7 +80,7 @@ void carry(const Attachment &a, const BodyShape &before, const std::vector<CutTa
     out[t].stiffness *= share;
     out[t].damping *= share;
     if (targets.size() > 1) out[t].release *= share;
-    if (t > begin) out[t].total = {};
+    out[t].total = {};
   }
   // an attachment without points is reported only if none of its parts has any
   const auto holds = [](const Attachment &x) { return !x.surfels.empty(); };
@@ -88,6 +88,7 @@ void carry(const Attachment &a, const BodyShape &before, const std::vector<CutTa
   const bool any = std::any_of(first, out.end(), holds);
   if (!any) out.resize(begin + 1);
   else out.erase(std::remove_if(first, out.end(), [&](auto &x) { return !holds(x); }), out.end());
+  out[begin].total = a.total;
 }
 
 // Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone, and its

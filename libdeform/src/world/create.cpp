@@ -32,11 +32,15 @@
 
 namespace dfm {
 std::string name_of(World &w, const char *given, const char *kind) {
-  if (given) return given;
-  std::string name;
   uint64_t number = w.next_id;
-  do name = kind + std::to_string(number++);
-  while (w.find_body(name) || w.find_obstacle(name));
+  return name_of(w, given, kind, number);
+}
+
+std::string name_of(World &w, const char *given, const char *kind, uint64_t &number) {
+  const auto numbered = [&] { return kind + std::to_string(number); };
+  while (!given && (w.find_body(numbered()) || w.find_obstacle(numbered()))) ++number;
+  std::string name = given ? given : numbered();
+  ++number;
   return name;
 }
 

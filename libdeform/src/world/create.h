@@ -34,5 +34,7 @@ void destroy_obstacle(Obstacle &o);
 void end_contacts(World &w, uint64_t id, bool obstacle);
 // given, or where that is null kind and a number: that of the next id, or the first free one above it.
 std::string name_of(World &w, const char *given, const char *kind);
+// number: where to look for a free name; goes on behind it, for the next of a set
+std::string name_of(World &w, const char *given, const char *kind, uint64_t &number);
 
 }  // namespace dfm

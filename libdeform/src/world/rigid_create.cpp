@@ -185,9 +185,10 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   auto owned = std::make_unique<RigidSet>(w, w.memory(), host ? host : "builtin");
   RigidSet &set = *owned;
   std::vector<std::string> names;
+  uint64_t number = w.next_id;
   for (uint32_t i = 0; i < def.nbody; ++i) {
     dfm_rigid_def d = def.bodies[i];
-    names.push_back(d.name ? d.name : "rigid" + std::to_string(w.next_id + i));
+    names.push_back(name_of(w, d.name, "rigid", number));
     check_body(d, {"rigid body", names.back().c_str()});
     store_quat(d.pose.rotation, unit_quat(d.pose.rotation));
     set.defs.push_back(d);

@@ -16,6 +16,10 @@ struct Told : btMotionState {
 
 int before = 0, after = 0;
 void on_before(btDynamicsWorld *, btScalar) { ++before; }
+dfm_status left = DFM_OK;
+void on_leave(btDynamicsWorld *world, btScalar) {
+  left = dfm_bullet_detach(*static_cast<dfm_bullet *>(world->getWorldUserInfo()));
+}
 void on_after(btDynamicsWorld *world, btScalar) {
   ++after;
   EXPECT_GT(world->getNumCollisionObjects(), 0);  // the world has its content back
@@ -71,6 +75,41 @@ TEST(BulletLifecycle, TickCallbacksOfTheCaller_AreCalledAroundTheTick) {
   EXPECT_EQ(before, 4);
   EXPECT_EQ(after, 4);
   EXPECT_EQ(b.world.getWorldUserInfo(), &info);
+}
+
+TEST(BulletLifecycle, DetachBeforeATick_IsRefused) {
+  Bullet b;
+  ok(dfm_bullet_detach(b.adapter));
+  b.world.setInternalTickCallback(on_leave, &b.adapter, true);
+  dfm_bullet_def d = dfm_bullet_def_default();
+  d.world = &b.world;
+  ok(dfm_bullet_attach(b.soft, &d, &b.adapter));
+  b.ball(0.1, 1, {0, 0, 1});
+  b.step();
+  EXPECT_EQ(left, DFM_E_BUSY);
+}
+
+TEST(BulletLifecycle, InterruptedTick_IsToldByTheStep) {
+  Bullet b;
+  const btRigidBody *const ball = b.ball(0.1, 1, {0, 0, 1});
+  ok(dfm_world_interrupt(b.soft));
+  EXPECT_EQ(dfm_bullet_step(b.adapter, 0.01, 0, 0.01, nullptr), DFM_DISCARD);
+  EXPECT_NE(std::string(dfm_last_error()).find("interrupted"), std::string::npos) << dfm_last_error();
+  EXPECT_EQ(velocity(ball)[2], 0);
+  ok(dfm_bullet_step(b.adapter, 0.01, 0, 0.01, nullptr));
+}
+
+TEST(BulletLifecycle, MaskOfAnObject_ChangesInPlace) {
+  Bullet b;
+  btRigidBody *const box = b.box({0.1, 0.1, 0.1}, 1, {0, 0, 1});
+  dfm_obstacle before_it = 0, after_it = 0;
+  ok(dfm_bullet_obstacle(b.adapter, box, 0, &before_it));
+  box->getBroadphaseHandle()->m_collisionFilterMask = 6;
+  ok(dfm_bullet_obstacle(b.adapter, box, 0, &after_it));
+  EXPECT_EQ(before_it, after_it) << "rules that name it hold on";
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  ok(dfm_obstacle_get_def(after_it, &d));
+  EXPECT_EQ(d.collides_with, 6u);
 }
 
 TEST(BulletLifecycle, FreeBody_FallsByTheWorldsGravityAndForces) {
@@ -210,6 +249,23 @@ TEST(BulletLifecycle, Restore_TakesTheBodiesBack) {
   ok(dfm_world_restore(b.soft, shot.data(), shot.size()));
   b.run(0.1);
   EXPECT_EQ(later, position(box));
+}
+
+// Where a static object is, is Bullet's to say: after a restore its surface comes along again.
+TEST(BulletLifecycle, Restore_BringsTheSurfaceOfAMovedObjectToIt) {
+  Bullet b;
+  btRigidBody *const box = b.box({1, 1, 0.1}, 0, {0, 0, 0});
+  b.step();
+  const std::string shot = snapshot(b.soft);
+  box->setWorldTransform(at({0, 0, 0.0078125}));
+  b.step();
+  ok(dfm_world_restore(b.soft, shot.data(), shot.size()));
+  b.step();
+  dfm_obstacle o = 0;
+  dfm_pose pose{};
+  ok(dfm_bullet_obstacle(b.adapter, box, 0, &o));
+  ok(dfm_obstacle_get_pose(o, &pose));
+  EXPECT_EQ(pose.position[2], 0.0078125);
 }
 
 TEST(BulletLifecycle, WrongUse_IsReportedInOneSentence) {

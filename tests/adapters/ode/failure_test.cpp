@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <utility>
 
 #include "ode.h"
 
@@ -11,13 +12,15 @@ namespace {
 using namespace test;
 
 // A rigid host whose body stays where it is. Armed, it lets so many sub-steps go well and fails in the next
-// one, in the first call of `where`.
+// one, in the first call of `where`, or interrupts the world.
 struct Saboteur {
   enum Where { predict, commit };
   static inline Where where = predict;
   static inline int left = -1;
+  static inline dfm_world interrupts = 0;
   static inline double at = 0;  // s
-  static void arm(Where here, int good) {
+  static void arm(Where here, int good, dfm_world interrupted = 0) {
+    interrupts = interrupted;
     where = here;
     left = good;
     at = -1;
@@ -25,7 +28,8 @@ struct Saboteur {
   static dfm_status strike(Where here, const dfm_rigid_step *step) {
     if (here != where || step->t == at) return DFM_OK;
     at = step->t;
-    return left-- == 0 ? DFM_E_FATAL : DFM_OK;
+    if (left-- != 0) return DFM_OK;
+    return interrupts ? dfm_world_interrupt(interrupts) : dfm_status(DFM_E_FATAL);
   }
 
   // Asked after the sets that are there already.
@@ -125,9 +129,10 @@ void expect_alike(const std::array<Stand, 3> &a, const std::array<Stand, 3> &b) 
 
 // Nothing has moved: every body, its forces and its sleep are as before the call, and the next steps are
 // those of a world in which nothing had failed.
-TEST(OdeFailure, InTheFirstSubStep_LeavesNoTrace) {
-  for (const Saboteur::Where where : {Saboteur::predict, Saboteur::commit}) {
-    SCOPED_TRACE(where);
+TEST(OdeFailure, InTheFirstSubStepOrInterrupted_LeavesNoTrace) {
+  for (const auto &[where, interrupted] :
+       {std::pair{Saboteur::predict, false}, {Saboteur::commit, false}, {Saboteur::commit, true}}) {
+    SCOPED_TRACE(where + 2 * interrupted);
     Swing struck, calm;
     for (Swing *s : {&struck, &calm}) {
       for (int i = 0; i < 5; ++i) s->ode.step(kStep);
@@ -136,8 +141,8 @@ TEST(OdeFailure, InTheFirstSubStep_LeavesNoTrace) {
       dBodyAddTorque(s->box, 0, 0, 0.1);
     }
     const auto before = struck.stands();
-    Saboteur::arm(where, 0);
-    EXPECT_EQ(dfm_ode_step(struck.ode.adapter, kStep), DFM_E_DIVERGED);
+    Saboteur::arm(where, interrupted ? 3 : 0, interrupted ? struck.ode.soft : 0);
+    EXPECT_EQ(dfm_ode_step(struck.ode.adapter, kStep), interrupted ? DFM_DISCARD : DFM_E_DIVERGED);
     expect_alike(struck.stands(), before);
     EXPECT_EQ(dJointGetFeedback(struck.hinge), &struck.feedback);
     for (Swing *s : {&struck, &calm})

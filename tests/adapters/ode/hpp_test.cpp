@@ -89,6 +89,8 @@ TEST_F(OdeHpp, Snapshot_TakesBothWorldsBack) {
   for (int i = 0; i < 80; ++i) ASSERT_TRUE(ode.step(1e-3));
   std::vector<std::byte> saved(ode.snapshot({}));
   EXPECT_EQ(ode.snapshot(saved), saved.size());
+  EXPECT_EQ(ode.snapshot(std::span(saved).first(0)), saved.size())
+      << "an empty span asks, whatever is behind it";
   const auto run_on = [&] {
     for (int i = 0; i < 40; ++i) EXPECT_TRUE(ode.step(1e-3));
     return std::pair{s.soft.hash(), dBodyGetPosition(s.body)[2]};

@@ -96,6 +96,57 @@ TEST(OdeLifecycle, ObstacleDestroyedByTheCaller_LeavesTheAdapterAtWork) {
   EXPECT_EQ(s.ode.stats().bodies, 0u);
 }
 
+TEST(OdeLifecycle, BitsOfAGeom_ChangeInPlace) {
+  OnAPlate s;
+  const dGeomID shape = dBodyGetFirstGeom(s.plate);
+  for (const dGeomID g : {s.floor, shape}) {
+    dfm_obstacle before = 0, after = 0;
+    ok(dfm_ode_obstacle(s.ode.adapter, g, &before));
+    dGeomSetCollideBits(g, 6);
+    ok(dfm_ode_obstacle(s.ode.adapter, g, &after));
+    EXPECT_EQ(before, after) << "rules that name it hold on";
+    dfm_obstacle_def d = dfm_obstacle_def_default();
+    ok(dfm_obstacle_get_def(after, &d));
+    EXPECT_EQ(d.collides_with, 6u);
+  }
+  ASSERT_GT(stats(s.ode.soft).contacts, 0u);
+  dGeomSetCollideBits(shape, 0);
+  dGeomSetCategoryBits(shape, 0);
+  s.ode.run(0.02);
+  EXPECT_EQ(stats(s.ode.soft).contacts, 0u);
+}
+
+namespace {
+
+struct Asked {
+  dfm_ode adapter = 0;
+  int calls = 0, wrong = 0;
+};
+void ask(void *data, dGeomID a, dGeomID b) {
+  Asked &asked = *static_cast<Asked *>(data);
+  dfm_obstacle o = 0;
+  dfm_ode_geom props{};
+  ++asked.calls;
+  for (const dfm_status s :
+       {dfm_ode_obstacle(asked.adapter, a, &o), dfm_ode_set_geom(asked.adapter, a, &props),
+        dfm_ode_step(asked.adapter, 1e-3), dfm_ode_detach(asked.adapter)})
+    asked.wrong += s != DFM_E_BUSY;
+  asked.wrong += dfm_ode_contact(asked.adapter, a, b, nullptr) != DFM_OK;
+}
+
+}  // namespace
+
+TEST(OdeLifecycle, CallsFromTheNearCallback_AreRefusedButForContact) {
+  Asked asked;
+  Ode ode({0, 0, -9.81}, 0, ask, &asked);
+  asked.adapter = ode.adapter;
+  dCreatePlane(ode.space, 0, 0, 1, 0);
+  ode.ball(0.1, 1, {0, 0, 0.1});
+  ode.run(0.01);
+  EXPECT_GT(asked.calls, 0);
+  EXPECT_EQ(asked.wrong, 0);
+}
+
 // A body and a geom at the addresses of destroyed ones are new ones.
 TEST(OdeLifecycle, ReplacedBody_IsANewOne) {
   Ode ode({0, 0, 0});
@@ -509,6 +560,23 @@ TEST(OdeLifecycle, SnapshotOfAnotherScene_IsRefusedWithBothNumbers) {
       << why;
 }
 
+// Where a geom without a body is, is ODE's to say: after a restore its surface comes along again.
+TEST(OdeLifecycle, Restore_BringsTheSurfaceOfAMovedGeomToIt) {
+  Ode ode;
+  const dGeomID box = dCreateBox(ode.space, 1, 1, 0.02);
+  ode.step();
+  const std::vector<unsigned char> shot = ode.snapshot();
+  dGeomSetPosition(box, 0, 0, 0.01);
+  ode.step();
+  ok(dfm_ode_restore(ode.adapter, shot.data(), shot.size()));
+  ode.step();
+  dfm_obstacle o = 0;
+  dfm_pose pose{};
+  ok(dfm_ode_obstacle(ode.adapter, box, &o));
+  ok(dfm_obstacle_get_pose(o, &pose));
+  EXPECT_EQ(pose.position[2], 0.01);
+}
+
 TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
   Ode ode;
   ode.ball(0.1, 1, {0, 0, 1});
@@ -532,7 +600,14 @@ TEST(OdeLifecycle, WrongUse_IsReportedInOneSentence) {
   d.world = ode.world;
   refused(DFM_E_ARG, "dfm_ode_def: space is NULL");
   d.space = ode.space;
-  refused(DFM_E_STATE, "already has an adapter");
+  refused(DFM_E_STATE, "dWorldID already has an adapter");
+  d.world = dWorldCreate();
+  d.space = dSimpleSpaceCreate(nullptr);
+  refused(DFM_E_STATE, "dfm_world already has an adapter");
+  dSpaceDestroy(d.space);
+  dWorldDestroy(d.world);
+  d.world = ode.world;
+  d.space = ode.space;
   d.real_bytes = 4;
   refused(DFM_E_UNSUPPORTED, "4 bytes");
   d.real_bytes = 8;

@@ -5,7 +5,8 @@
  * objects are what soft bodies touch; rigid bodies feel the same impulses, inside the solve. Bullet keeps
  * its constraints, motors and rigid contacts; stepSimulation steps both worlds. Bullet's objects stay the
  * caller's: they may be made, moved, changed and removed between two steps, and the next step takes
- * notice. */
+ * notice. An object counts as removed and added again, so that rules of the dfm_world that name it end, where
+ * its shape, mass, factors or flags change. */
 #ifndef DEFORM_BULLET_H
 #define DEFORM_BULLET_H
 #include <btBulletDynamicsCommon.h>
@@ -51,7 +52,8 @@ static inline dfm_bullet_def dfm_bullet_def_default(void) {
   return out;
 }
 /** Takes the place of the world's tick callbacks, set before, and calls them: the first one before a tick,
- * the second one after it, with forces of theirs acting over the whole tick.
+ * the second one after it, with forces of theirs acting over the whole tick. In the first one, as in Bullet's
+ * callbacks within a tick, calls with the adapter are refused (DFM_E_BUSY).
  * @return DFM_OK; DFM_E_ARG; DFM_E_STATE the world has an adapter already; DFM_E_UNSUPPORTED the world is
  * none of rigid bodies (which kind, what to do), the program has another btScalar or Bullet than the library,
  * or both builds of Bullet are loaded; DFM_E_HANDLE; DFM_E_NOMEM. Threads: Not during step. Since 0.1. */
@@ -85,7 +87,7 @@ DFM_API dfm_status dfm_bullet_obstacle(dfm_bullet bullet, const btCollisionObjec
 DFM_API dfm_status dfm_bullet_rigid(dfm_bullet bullet, const btCollisionObject *body, dfm_rigid *out);
 
 /** Properties of an object that Bullet does not have. Setting them creates its obstacles again, so their
- * contacts end. Objects without a name are called "obstacleN". */
+ * contacts and the rules that name them end. Objects without a name are called "obstacleN". */
 typedef struct dfm_bullet_object {
   uint32_t size, ignore; /* 1: soft bodies do not see it */
   const char *name;      /* NULL: none; leaves after the first: name.1, name.2 */

@@ -4,7 +4,9 @@
  * An adapter joins a dWorldID and a dSpaceID to a dfm_world. The geoms of the space are what soft bodies
  * touch; bodies feel the same impulses, inside the solve. ODE keeps its joints, motors and rigid contacts;
  * dfm_ode_step steps both. ODE's objects stay the caller's: they may be made, moved, changed and destroyed
- * between two steps, and the next step takes notice. */
+ * between two steps, and the next step takes notice. A geom counts as destroyed and made again, so that rules
+ * of the dfm_world that name it end, where it is disabled or enabled, where its size changes, or the mass of
+ * its body. */
 #ifndef DEFORM_ODE_H
 #define DEFORM_ODE_H
 #include <ode/ode.h>
@@ -121,9 +123,11 @@ DFM_API dfm_status dfm_ode_set_friction(dfm_ode ode, dfm_context *context, const
  * dfm_ode_step. Since 0.1. */
 DFM_API dfm_status dfm_ode_contact(dfm_ode ode, dGeomID a, dGeomID b, int *made);
 
-/** Properties of a geom that ODE does not have. Setting them creates its obstacle again, so its contacts end.
+/** Properties of a geom that ODE does not have. Setting them creates its obstacle again, so its contacts
+ * and the rules that name it end.
  * Geoms without a name are called "obstacleN". They, and the arrays below, go by the address of the geom: set
- * them again for one that was destroyed and made again between two steps. */
+ * them again for one that was destroyed and made again between two steps. A new geom without a body, of the
+ * size and at the address of one that is gone, is taken for that one moved. */
 typedef struct dfm_ode_geom {
   uint32_t size, ignore; /* 1: soft bodies do not see it */
   const char *name;      /* NULL: none */

@@ -58,7 +58,7 @@ class Ode : public Handle<dfm_ode, struct OdeKind> {
   auto snapshot(std::span<std::byte> out) const {
     return produce<E, size_t>([&](size_t &bytes) {
       bytes = out.size();
-      return dfm_ode_snapshot(raw_, out.data(), &bytes);
+      return dfm_ode_snapshot(raw_, given(out), &bytes);
     });
   }
   auto restore(std::span<const std::byte> from) const {

@@ -277,13 +277,19 @@ void set_rigid_state(Obstacle &o, const dfm_rigid_state &given) {
 
 namespace {
 
-void check_joint(const RigidSet &set, uint32_t joint, dfm_status status) {
+// ask: the host about one of its joints. Includes its reason if it refuses with one.
+template <class Ask>
+void ask_joint(const RigidSet &set, uint32_t joint, Ask &&ask) {
   if (joint >= set.njoint)
     fail(DFM_E_ARG, "there is no joint %u; the set of rigid body '%s' has %u", joint, set.defs[0].name,
          set.njoint);
-  if (status != DFM_OK)
-    fail(DFM_E_ARG, "joint %u of the set of rigid body '%s' is neither hinge nor slider", joint,
-         set.defs[0].name);
+  const uint64_t said = sentences();
+  const dfm_status status = ask();
+  need_memory(status);
+  if (status == DFM_OK) return;
+  const std::string why = said != sentences() ? last_error() : "it is neither hinge nor slider";
+  fail(status < 0 ? status : DFM_E_ARG, "joint %u of the set of rigid body '%s': %s", joint, set.defs[0].name,
+       why.c_str());
 }
 
 }  // namespace
@@ -293,18 +299,17 @@ void set_rigid_motor(RigidSet &set, uint32_t joint, double velocity, double max)
   if (!std::isfinite(velocity) || !(max >= 0 && std::isfinite(max)))
     fail(DFM_E_ARG, "motor of joint %u: velocity %g and max %g must be finite, max not negative", joint,
          velocity, max);
-  check_joint(set, joint, DFM_OK);
-  check_joint(set, joint, set.host.set_motor(set.self, joint, velocity, max, set.extra.data()));
+  ask_joint(set, joint, [&] { return set.host.set_motor(set.self, joint, velocity, max, set.extra.data()); });
   set.motors[joint] = {velocity, max};
 }
 
 void rigid_joint(RigidSet &set, uint32_t joint, double *position, double *rate, double *effort) {
   if (!set.host.joint)
     fail(DFM_E_UNSUPPORTED, "rigid host '%s' says nothing about its joints", set.host_name.c_str());
-  check_joint(set, joint, DFM_OK);
   const std::lock_guard one_at_a_time(set.querying);
   double p, r, e;
-  check_joint(set, joint, set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e));
+  ask_joint(set, joint,
+            [&] { return set.host.joint(set.self, set.state.data(), set.extra.data(), joint, &p, &r, &e); });
   if (position) *position = p;
   if (rate) *rate = r;
   if (effort) *effort = e;
