@@ -187,8 +187,7 @@ test::CommandResult run_of(const std::string &text) {
   return test::deform({"run", folder + "/scene.json", "--out", folder + "/out"});
 }
 
-constexpr const char *kCause = "its attachment to 'jaw' holds ";
-constexpr const char *kRemedy = "give the attachment a \"stiffness\"";
+constexpr const char *kCause = "an attachment without \"stiffness\" holds points of it";
 
 }  // namespace
 
@@ -197,8 +196,6 @@ TEST(AttachScene, PointsInAnObstacle_AreReportedAtTheStart) {
   const test::CommandResult r = run_of(held_bar(0.12, "", ""));
   EXPECT_NE(r.err.find("body 'bar' and obstacle 'floor' overlap by"), std::string::npos) << r.err;
   EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
-  EXPECT_NE(r.err.find(kRemedy), std::string::npos) << r.err;
-  EXPECT_EQ(r.err.find("untangle"), std::string::npos) << r.err;
 }
 
 TEST(AttachScene, PointsPressedOnAnObstacle_EndTheRunWithTheirCause) {
@@ -207,7 +204,6 @@ TEST(AttachScene, PointsPressedOnAnObstacle_EndTheRunWithTheirCause) {
   EXPECT_NE(r.err.find("body 'bar' on obstacle 'floor': squeezed until nothing can move"), std::string::npos)
       << r.err;
   EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
-  EXPECT_NE(r.err.find(kRemedy), std::string::npos) << r.err;
 }
 
 // A jaw at this place touches what it holds.
@@ -227,7 +223,6 @@ TEST(AttachScene, PointsThatTouchWhatHoldsThem_StayThere) {
 TEST(AttachScene, PointsDeepInWhatHoldsThem_AreReportedAtTheStart) {
   const test::CommandResult r = run_of(touching_jaw("[-0.015, 0.025, 0.125]"));
   EXPECT_NE(r.err.find(kCause), std::string::npos) << r.err;
-  EXPECT_NE(r.err.find("leave out \"touch\""), std::string::npos) << r.err;
 }
 
 // What the sentences advise.

@@ -395,14 +395,16 @@ TEST(Overlap, WithAFlatOpenMesh_IsFound) {
 }
 
 TEST(Overlap, WithAPointThatNoTriangleHas_IsNone) {
-  test::Context c;
-  const dfm_world w = test::make_world(c, {});
-  ball(c, w, "ball", {1, 0, 0});
-  test::Triangles box = test::box_surface({0.1, 0.1, 0.1}, 1);
-  box.points.insert(box.points.end(), {1, 0, 0});
-  thing(w, DFM_SHAPE_MESH, 0, &box);
-  EXPECT_TRUE(overlaps(w).empty());
-  dfm_world_destroy(w);
+  for (const uint32_t shape : {DFM_SHAPE_MESH, DFM_SHAPE_VOXELS}) {
+    test::Context c;
+    const dfm_world w = test::make_world(c, {});
+    ball(c, w, "ball", {1, 0, 0});
+    test::Triangles box = test::box_surface({0.1, 0.1, 0.1}, 1);
+    box.points.insert(box.points.end(), {1, 0, 0});
+    thing(w, shape, 0, &box);
+    EXPECT_TRUE(overlaps(w).empty()) << shape;
+    dfm_world_destroy(w);
+  }
 }
 
 TEST(Overlap, UntangledBeforeTheStep_IsNoTrouble) {

@@ -13,7 +13,7 @@ using namespace test;
 // A host with one body that only moves along z, of 1 kg, and counts its calls.
 struct Lift {
   int created = 0, predicted = 0, responded = 0, committed = 0, destroyed = 0;
-  dfm_status fail_commit = DFM_OK;
+  dfm_status fail_commit = DFM_OK, fail_respond = DFM_OK;
 };
 
 dfm_rigid_host lift_table(Lift *counts) {
@@ -38,7 +38,7 @@ dfm_rigid_host lift_table(Lift *counts) {
     ++static_cast<Lift *>(self)->responded;
     std::fill(m, m + 36, 0.0);
     m[14] = 1;
-    return dfm_status(DFM_OK);
+    return static_cast<Lift *>(self)->fail_respond;
   };
   t.commit = [](void *self, const dfm_rigid_step *step, const double *impulse, dfm_rigid_state *state,
                 double *extra) {
@@ -145,6 +145,13 @@ TEST(RigidHost, OfAnotherEngine_TakesPartInTheSolve) {
     EXPECT_EQ(dfm_world_step(w, 1e-4, &trouble), DFM_E_DIVERGED);
     EXPECT_TRUE(trouble & DFM_TROUBLE_PLUGIN);
     EXPECT_NE(std::strstr(dfm_last_error(), "lift"), nullptr) << dfm_last_error();
+    EXPECT_EQ(dfm_world_hash(w), before);
+    counts.fail_commit = DFM_OK;
+    counts.fail_respond = DFM_E_FATAL;
+    trouble = 0;
+    EXPECT_EQ(dfm_world_step(w, 1e-4, &trouble), DFM_E_DIVERGED);
+    EXPECT_TRUE(trouble & DFM_TROUBLE_PLUGIN);
+    EXPECT_NE(std::strstr(dfm_last_error(), "does not answer impulses"), nullptr) << dfm_last_error();
     EXPECT_EQ(dfm_world_hash(w), before);
     double after[3];
     ok(dfm_rigid_contact_wrench(plate, after, moment));
@@ -337,6 +344,31 @@ TEST(RigidBodies, BadDefs_AreRefused) {
 }
 
 // One part is refused after another could have been made: state, reports and sleepers are as before.
+// A shape that is added counts in the largest speed, and has no belt: it moves with its body.
+TEST(RigidBodies, AddedShape_MovesWithItsBody) {
+  Context c;
+  const dfm_world w = make_world(c, {0, 0, 0});
+  dfm_rigid_def d = box("lump", {0.1, 0.1, 0.1}, 1);
+  d.shape = DFM_SHAPE_NONE;
+  for (double &i : d.inertia) i = 0.01;
+  d.spin[2] = 10;
+  const dfm_rigid lump = create(w, {d})[0];
+  dfm_obstacle_def of = dfm_obstacle_def_default();
+  of.shape = DFM_SHAPE_BOX;
+  of.pose.position[0] = 1;
+  for (double &half : of.half_size) half = 0.1;
+  of.velocity_surface[0] = 1;
+  dfm_obstacle shape = 0;
+  EXPECT_EQ(dfm_rigid_add_shape(lump, &of, &shape), DFM_E_ARG);
+  says({"'lump'", "no belt"});
+  of.velocity_surface[0] = 0;
+  ok(dfm_rigid_add_shape(lump, &of, &shape));
+  dfm_body_measure m{};
+  m.size = sizeof m;
+  ok(dfm_rigid_get_measure(lump, &m));
+  EXPECT_NEAR(m.speed_max, 10 * (1 + 0.1 * std::sqrt(3.0)), 1e-12);
+}
+
 TEST(RigidBodies, RefusedForItsLastPart_LeavesTheWorldAsItWas) {
   Context c;
   dfm_body ball = 0;

@@ -4,6 +4,7 @@
 
 #include "cut_scenes.h"
 #include "logged_context.h"
+#include "obstacle.h"
 
 namespace {
 
@@ -117,6 +118,26 @@ TEST(Separate, UpperPart_RestsOnTheLowerOne) {
     EXPECT_NEAR(std::fabs(force), weight, 0.05 * weight) << model;
     EXPECT_LT(most, 2 * weight) << model;  // no teeth that are wedged
   }
+}
+
+// A slit body falls on triangles, whose number among the things of the world was its own until another body
+// was removed: they are no part of it.
+TEST(Separate, ACutBodyOverTriangles_StaysWholeWhenAnotherIsRemoved) {
+  Cube s("msm", {0, 0, -9.81});
+  test::add_mesh(s.w, "floor", test::height_field(2, 80, [](double x, double y) {
+                   return 0.01 * std::sin(60 * x) * std::sin(60 * y);
+                 }));
+  test::BodyOptions o;
+  o.name = "later";
+  o.position = {0.3, 0, 0.06};
+  o.velocity = {3, 1, -2};
+  const dfm_body later = test::make_body(s.context, s.w, "beam", {0.1, 0.1, 0.1}, 40, o);
+  cut(later, plane(2, 0.11, DFM_CUT_SPLIT));
+  steps(s.w, 5);
+  test::ok(dfm_body_destroy(s.b));
+  steps(s.w, 50, 4e-3);
+  EXPECT_GT(test::stats(s.w).guard_solves, 0u);
+  EXPECT_GT(test::measure(later).com[2], 0.01);
 }
 
 TEST(Separate, Pieces_SleepAndWakeApart) {

@@ -363,6 +363,17 @@ TEST(Wake, ByWhateverChangesOrReachesABody_TakesItsIslandAndNoOther) {
   }
 }
 
+// Also before a step has put what is new in its place.
+TEST(Wake, BesideANewBody_IsCountedAtOnce) {
+  Rest s;
+  for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);
+  test::BodyOptions o;
+  o.position = {2, 0, 1};
+  test::make_body(s.context, s.world, "beam", {0.1, 0.1, 0.1}, 10, o);
+  test::ok(dfm_body_wake(s.far));
+  EXPECT_EQ(test::stats(s.world).asleep, 2u);
+}
+
 TEST(Wake, OfWhatStoodOnARemovedBody_ComesWithItsRemoval) {
   Rest s;
   for (dfm_body b : s.bodies()) ASSERT_GE(until_asleep(s.world, b), 0);

@@ -509,6 +509,34 @@ TEST(Running, FiltersChangedInContact_LetGoAndCatchAgain) {
 
 // ---- steps that cannot be taken ---------------------------------------------------------------------------
 
+TEST(Step, OfImplicitBodies_SaysWhatHoldsItBack) {
+  test::Context c;
+  dfm_world_def wd = dfm_world_def_default();
+  wd.integrator = DFM_INTEGRATOR_IMPLICIT_EULER;
+  wd.solver = "pcg";
+  wd.solver_iterations = 1;
+  dfm_world w = 0;
+  test::ok(dfm_world_create(c, &wd, &w));
+  test::BodyOptions o;
+  o.name = "soft";
+  o.model = "corotational_fem";
+  o.spin = {0, 0, 5};
+  const dfm_body body = test::make_body(c, w, "beam", {0.1, 0.1, 0.1}, 60, o);
+  uint32_t trouble = 0;
+  EXPECT_EQ(dfm_world_step(w, 0.1, &trouble), DFM_E_DIVERGED);
+  says({"body 'soft'", "equations of motion"});
+  const uint32_t point = 0;
+  dfm_spring_def d{};
+  d.size = sizeof d;
+  d.npoint = 1;
+  d.points = &point;
+  d.stiffness = 1e9;
+  uint32_t number = 0;
+  test::ok(dfm_body_add_spring(body, &d, &number));
+  EXPECT_EQ(dfm_world_step(w, 0.1, &trouble), DFM_DISCARD);
+  says({"soften the springs that pull body 'soft'"});
+}
+
 TEST(Step, WithALoadThatOverflows_DivergesAtTheLastGoodSubStepAndContinuesWithoutIt) {
   test::Context c;
   const test::Stack s = test::make_stack(c);

@@ -263,7 +263,7 @@ bool solve(World &w, StepContext &step, Buffers &r, uint32_t *trouble) {
   for (const BodyView &v : step.body_views) r.fractions.push_back(&r.fraction[v.first_node]);
   find_islands(w, step, r);
   find_points(w, step, r);
-  make_rows(w, step);
+  if (!make_rows(w, step, trouble)) return false;
   set_forces(w, step, r);
   for (SolveIsland &island : step.solve_islands->all())
     if (const LawInstance *bad = island.batches.evaluate(step.h, step.state))

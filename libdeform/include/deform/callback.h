@@ -41,7 +41,7 @@ typedef struct dfm_contact_choice {
   /* as in dfm_contact, but b is never 0: it may be an obstacle; a == b if a body touches itself */
   uint64_t a, b, key;
   uint32_t kind, feature_a, feature_b;
-  uint32_t substep;           /* contact solves since creation of the world */
+  uint32_t substep;           /* sub-steps taken since creation of the world */
   double time, dt;            /* s: at the start of the sub-step, and its length */
   double point[3], normal[3]; /* m, unit from b to a */
   double gap;                 /* m, distance of the surfaces less the rest distance */

@@ -203,8 +203,8 @@ DFM_API dfm_status dfm_rigid_set_state(dfm_rigid rigid, const dfm_rigid_state *s
 /** Mass, momenta and energies as for a soft body; elastic is 0, volume that of the shape. Threads: Any
  * thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_get_measure(dfm_rigid rigid, dfm_body_measure *out);
-/** Mean contact force (N) and moment about the center of mass (N m) on the body in the last sub-step.
- * Threads: Any thread. Not during step. Since 0.1. */
+/** Mean contact force (N) and moment about the center of mass (N m) on the body in the last sub-step; 0
+ * of a fixed one (dfm_world_contacts has its forces). Threads: Any thread. Not during step. Since 0.1. */
 DFM_API dfm_status dfm_rigid_contact_wrench(dfm_rigid rigid, double force[3], double moment[3]);
 /** Sets the motor of a joint of the set, numbered as in its def; `rigid` is any body of the set. max 0: off.
  * @return DFM_E_ARG no such joint, or it is no hinge or slider; DFM_E_UNSUPPORTED the host has no motors.

@@ -35,7 +35,7 @@ double obstacle_displacement(const ObstacleView &now, const ObstacleView &then, 
   return norm(now.position - then.position) + 2 * extent * std::sqrt(dx * dx + dy * dy + dz * dz + dw * dw);
 }
 
-// Compares shape, size and belt: a new obstacle under an old id needs new lists.
+// Compares shape and size: a new obstacle under an old id needs new lists.
 bool same_shape(const ObstacleView &a, const ObstacleView &b) {
   return a.shape == b.shape && a.surface == b.surface && a.grid == b.grid && a.slot == b.slot &&
          a.category == b.category && a.collides_with == b.collides_with && a.radius == b.radius &&

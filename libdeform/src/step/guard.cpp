@@ -259,6 +259,7 @@ void set_sides(World &w, StepContext &step) {
   for (size_t o = 0; o < w.obstacles.size(); ++o) {
     const ObstacleView &v = step.obstacle_views[o];
     GuardSide &s = scene.sides[nb + o];
+    s.whole = 0;  // a part of a body may have had this place
     const double turn = norm(v.spin);
     s.drift = step.h * v.velocity;
     s.spread =

@@ -134,7 +134,10 @@ void rouse(World &w, std::span<const uint32_t> slots) {
     }
     b.sleep_state = {false, 0, 0, b.sleep_state.h, {}};  // h: of its impulses, until the next ones
   }
-  if (!w.changed) gather_active(w);  // otherwise prepare(w) does it, since its views are out of date
+  if (!w.changed) return gather_active(w);
+  // the views are out of date, and prepare(w) makes the rest
+  const auto sleeps = [](const auto &b) { return b->sleep_state.asleep; };
+  w.sleepers = static_cast<uint32_t>(std::count_if(w.bodies.begin(), w.bodies.end(), sleeps));
 }
 
 void undo_waking(World &w, StepContext &step) {

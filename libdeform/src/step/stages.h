@@ -100,7 +100,8 @@ bool find_ends(World &w, StepContext &step, uint32_t *trouble);
 void keep_rigids(World &w, StepContext &step);  // after the sub-step has succeeded
 
 // solve.cpp
-void make_rows(World &w, StepContext &step);  // makes rows from contacts, with their stored data
+// Makes rows from contacts, with their stored data.
+bool make_rows(World &w, StepContext &step, uint32_t *trouble);
 // m, of a depth: the part that the contact was found with, less what has opened of it. It counts as distance.
 // match: of the contact in the store; kNone: the most that its pair has left.
 double start_depth(const World &w, const StepContext &step, const ContactPoint &c, uint32_t match,

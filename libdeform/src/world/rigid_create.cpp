@@ -160,6 +160,9 @@ std::unique_ptr<Obstacle> make_rigid_shape(World &w, const std::string &body, co
   if (def.nkey || def.sine.frequency != 0 || def.sine.phase != 0 || norm2(load3(def.sine.amplitude)) > 0)
     fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a motion of its own; it moves with its body", name,
          body.c_str());
+  if (norm2(load3(def.velocity_surface)) > 0)
+    fail(DFM_E_ARG, "shape '%s' of rigid body '%s' has a velocity_surface; a rigid body has no belt", name,
+         body.c_str());
   return make_obstacle(w, def, true);
 }
 

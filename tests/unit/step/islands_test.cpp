@@ -1,5 +1,10 @@
 #include "step/islands.h"
 
+#include "../world/inside.h"
+#include "step/context.h"
+#include "step/solve/solve_islands.h"
+#include "world.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -67,4 +72,27 @@ TEST(Islands, OfRandomPairs_AreTheConnectedComponentsInAnyOrder) {
     for (uint32_t i = 0; i < n; ++i) ASSERT_EQ(x.member[x.begin[x.of[i]]], lowest[i]);
     ASSERT_EQ(sets(x), sets(y));
   }
+}
+
+// Slip that an island takes back is that of this solve: a law that fails, or an interrupt, before it is known
+// leaves none.
+TEST(SolveIslands, InterruptedAtTheirStart_TakeBackNoSlipOfEarlierSubSteps) {
+  const test::Context context;
+  dfm_world w = test::make_world(context, {1, 0, -9.81});
+  test::add_plane(w, "floor");
+  test::set_friction(w, 0.5);
+  test::BodyOptions o;
+  o.position = {0, 0, 1e-4};
+  test::make_body(context, w, "beam", {0.1, 0.1, 0.1}, 40, o);
+  test::run(w, 0.2, 1e-3);
+  const auto drift = [&] {
+    const auto all = test::inside(w).steps->solve_islands->all();
+    return std::any_of(all.begin(), all.end(), [](const dfm::SolveIsland &own) { return own.drifts; });
+  };
+  EXPECT_TRUE(drift());
+  test::ok(dfm_world_set_pre_solve(
+      w, [](void *world, dfm_contact_choice *) { dfm_world_interrupt(*static_cast<dfm_world *>(world)); },
+      &w));
+  EXPECT_EQ(dfm_world_step(w, 1e-3, nullptr), DFM_DISCARD);
+  EXPECT_FALSE(drift());
 }

@@ -49,19 +49,20 @@ HostFault RigidSet::free_motion() {
   return {};
 }
 
-bool RigidSet::respond(uint32_t of_group, uint32_t bodies, double *matrix) {
+HostFault RigidSet::respond(uint32_t of_group, uint32_t bodies, double *matrix) {
   const size_t width = 6 * size_t{bodies};
   const dfm_status status = host.respond(self, &step, of_group, matrix);
-  need_memory(status);
-  return status == DFM_OK && all_finite(matrix, width * width);
+  if (status != DFM_OK || !all_finite(matrix, width * width)) return {status, "does not answer impulses"};
+  return {};
 }
 
-bool RigidSet::revise(bool &changed) {
+HostFault RigidSet::revise(bool &changed) {
   uint32_t any = 0;
   const dfm_status status = host.revise(self, &step, impulse.data(), revised.data(), &any);
-  need_memory(status);
   changed = any != 0;
-  return status == DFM_OK && all_finite(revised.data(), revised.size());
+  if (status != DFM_OK || !all_finite(revised.data(), revised.size()))
+    return {status, "does not answer contact"};
+  return {};
 }
 
 HostFault RigidSet::take_impulses() {

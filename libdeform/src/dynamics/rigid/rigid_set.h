@@ -58,10 +58,10 @@ struct RigidSet {
   // As Dynamics: throws std::bad_alloc if the host has no memory.
   void begin(const SubStep &now);  // sets the inputs of the host until the next sub-step
   HostFault free_motion();         // velocity
-  bool respond(uint32_t group, uint32_t bodies, double *matrix);  // [6 bodies, 6 bodies], 1/kg
+  HostFault respond(uint32_t group, uint32_t bodies, double *matrix);  // [6 bodies, 6 bodies], 1/kg
   // changed: with these impulses the response of the host differs; revised is then its velocity without
   // contact.
-  bool revise(bool &changed);
+  HostFault revise(bool &changed);
   HostFault take_impulses();                         // for all sets, before any set ends its sub-step
   HostFault end_state(bool &again);                  // next; again: the velocity has changed, solve again
   void commit(const SubStep &now, double fraction);  // share of the displacement

@@ -92,11 +92,9 @@ std::string hint_of_units(const Body &b, const Obstacle *o) {
 // The name under which the user has made it: a piece has come during the run, and cannot be put elsewhere.
 const std::string &made_name(const Body &b) { return b.piece_of ? b.whole_name : b.name; }
 
-std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
+std::string remedy(World &w, const Overlap &o, bool untangled) {
   const Body &a = *w.body(o.a);
   const Obstacle *const thing = o.obstacle ? w.obstacle(o.b) : nullptr;
-  if (const HeldIn held = held_in(w, sides, {a.slot, thing ? thing->slot : 0, o.obstacle}, w.offset); held.by)
-    return describe_held_in(w, held, thing->slot);
   const std::string what =
       o.suspended ? "contact between them is off until they are apart" : "contact pushes them apart slowly";
   const Body *const b = thing ? nullptr : w.body(o.b);
@@ -107,10 +105,10 @@ std::string remedy(World &w, OverlapSides &sides, const Overlap &o, bool untangl
                                 ? format("move '%s' at the start", first.c_str())
                                 : format("move '%s' or '%s' at the start", first.c_str(), second.c_str());
   return what + "; " + where + (untangled ? "" : ", or set \"untangle\"") +
-         (came ? "" : hint_of_units(a, thing));
+         (thing ? hint_of_attachment(w, a.id) : "") + (came ? "" : hint_of_units(a, thing));
 }
 
-void warn(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
+void warn(World &w, const Overlap &o, bool untangled) {
   const Obstacle *const thing = o.obstacle ? w.obstacle(o.b) : nullptr;
   const std::string &name = thing ? thing->name : w.body(o.b)->name;
   w.context->warn(
@@ -120,7 +118,7 @@ void warn(World &w, OverlapSides &sides, const Overlap &o, bool untangled) {
       : !thing->rigid         ? "obstacle"
       : thing->rigid->of_tool ? "tool"
                               : "rigid body",
-      name.c_str(), o.depth, o.crossings, o.enclosed, remedy(w, sides, o, untangled).c_str());
+      name.c_str(), o.depth, o.crossings, o.enclosed, remedy(w, o, untangled).c_str());
 }
 
 // Parts that came off with the teeth of their faces in each other. Nobody has put them there, and contact
@@ -197,10 +195,9 @@ void resolve_overlaps(World &w) {
     if (!f.separated) left.push_back(f);
     else take_back(w, f);
   }
-  OverlapSides sides(w);
   size_t n = 0;
   for (const Overlap &f : left)
-    if (!f.whole && n++ < kSentences) warn(w, sides, f, untangles);
+    if (!f.whole && n++ < kSentences) warn(w, f, untangles);
   if (n > kSentences)
     w.context->warn("%zu more pairs overlap; dfm_world_overlaps lists them", n - kSentences);
   warn_of_parts(w, left);

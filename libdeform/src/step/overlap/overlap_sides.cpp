@@ -117,18 +117,20 @@ OverlapSkin::OverlapSkin(const Memory &memory, const Obstacle &o)
       for (uint32_t k = 0; k < 3; ++k) box.push_back(i >> k & 1 ? o.def.half_size[k] : -o.def.half_size[k]);
     points = &box;
   } else {
-    // of a mesh without the points that no triangle has
-    const Array<uint32_t> &faces = o.mesh ? o.mesh->surface.tri : o.triangles;
-    own_.tri.assign(faces.begin(), faces.end());
-    if (o.mesh) points = &o.mesh->local;
+    own_.tri.assign(o.triangles.begin(), o.triangles.end());
     closed_ = o.grid || (o.mesh && o.mesh->closed);
     if (o.grid) slack_ = 0.5 * o.grid->cell();
   }
+  std::vector<uint32_t> used(own_.tri.begin(), own_.tri.end());  // points that triangles have
+  std::sort(used.begin(), used.end());
+  used.erase(std::unique(used.begin(), used.end()), used.end());
+  for (uint32_t &i : own_.tri)
+    i = static_cast<uint32_t>(std::lower_bound(used.begin(), used.end(), i) - used.begin());
   own_.ntri = static_cast<uint32_t>(own_.tri.size() / 3);
-  own_.nsurfel = static_cast<uint32_t>(points->size() / 3);
+  own_.nsurfel = static_cast<uint32_t>(used.size());
   x_.assign(size_t{4} * own_.nsurfel, 0.0);
   for (uint32_t i = 0; i < own_.nsurfel; ++i)
-    store3(&x_[size_t{4} * i], place(o.pose, load3(&(*points)[size_t{3} * i])));
+    store3(&x_[size_t{4} * i], place(o.pose, load3(&(*points)[size_t{3} * used[i]])));
   finish();
 }
 

@@ -112,14 +112,17 @@ RigidSet &set_of_group(World &w, uint32_t group) {
 
 }  // namespace
 
-void rigid_response(World &w, StepContext &step, const ContactRows::Block &block) {
+bool rigid_response(World &w, StepContext &step, const ContactRows::Block &block, uint32_t *trouble) {
+  bool given = true;
   step.rows.set_response(block, false, [&](double *matrix) {
     if (step.tools->fill_response(block.group, matrix)) return;
     RigidSet &set = set_of_group(w, block.group);
-    if (!set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
-      fail(DFM_E_FATAL, "rigid host '%s' does not answer impulses on '%s' and those with it",
-           set.host_name.c_str(), set.defs[0].name);
+    const uint64_t said = sentences();
+    if (const HostFault fault =
+            set.respond(block.group - set.first_group, step.rigid_groups[block.group], matrix))
+      given = host_failed(w, set, fault, said, trouble);
   });
+  return given;
 }
 
 // The velocities of rigid bodies without contact, less those that detection has used: a host that says
@@ -156,26 +159,25 @@ void sum_rigid_impulses(World &w, StepContext &step) {
   }
 }
 
-bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool &renewed) {
+bool follow_rigids(World &w, StepContext &step, double left, bool revises, Followed &out, uint32_t *trouble) {
   step.tools->take(step, left);
   sum_rigid_impulses(w, step);
-  renewed = false;
+  out = {};
+  const uint64_t said = sentences();
   for (auto &set : w.rigid_sets) {
     if (!revises || !set->host.revise) continue;
     bool changed = false;
-    if (!set->revise(changed))
-      fail(DFM_E_FATAL, "rigid host '%s' does not answer contact on '%s' and those with it",
-           set->host_name.c_str(), set->defs[0].name);
+    if (const HostFault fault = set->revise(changed)) return host_failed(w, *set, fault, said, trouble);
     if (!changed) continue;
     set->velocity.assign(set->revised.begin(), set->revised.end());
     step.tools->renew(*set);
-    renewed = true;
+    out.renewed = true;
   }
-  renewed = renewed || (revises && step.tools->press_harder());
-  if (!renewed && !step.tools->follow(w, step)) return false;
-  if (renewed)
+  out.renewed = out.renewed || (revises && step.tools->press_harder());
+  out.goes_on = out.renewed || step.tools->follow(w, step);
+  if (out.renewed)
     for (const ContactRows::Block &block : step.rows.blocks)
-      if (block.group != kNone) rigid_response(w, step, block);
+      if (block.group != kNone && !rigid_response(w, step, block, trouble)) return false;
   return true;
 }
 
@@ -251,9 +253,13 @@ dfm_body_measure measure_rigid(const RigidSet &set, uint32_t i) {
   store3(m.momentum, d.mass * v);
   store3(m.angular, L);
   m.kinetic = 0.5 * d.mass * norm2(v) + 0.5 * dot(w, L);
-  const double round =
-      d.shape == DFM_SHAPE_NONE ? 0 : d.radius + (d.shape == DFM_SHAPE_CAPSULE ? d.half_length : 0);
-  const double reach = d.shape == DFM_SHAPE_BOX ? norm(load3(d.half_size)) : round;
+  double reach = 0;
+  for (const auto &o : set.world->obstacles) {
+    if (o->rigid != &set || o->rigid_body != i) continue;
+    const bool round = o->def.shape == DFM_SHAPE_SPHERE || o->def.shape == DFM_SHAPE_CAPSULE;
+    const double own = o->standing().extent() + (round ? o->def.radius : 0);
+    reach = std::max(reach, own + (o->added ? norm(o->local.position) : 0));
+  }
   m.speed_max = norm(v) + norm(w) * reach;
   for (uint32_t k = 0; k < 3; ++k) m.contact_impulse[k] = set.total[3 * i + k];
   return m;

@@ -25,12 +25,13 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
 void destroy_rigids(RigidSet &set);  // throws Error if the host owns its bodies
 Obstacle &rigid_obstacle(World &w, uint64_t id);
 void place_rigids(World &w);  // World::prepare(): slots and groups
-void rigid_response(World &w, StepContext &step, const ContactRows::Block &group);
+bool rigid_response(World &w, StepContext &step, const ContactRows::Block &group, uint32_t *trouble);
 void sum_rigid_impulses(World &w, StepContext &step);  // of the rows, into every set
-// After a solve that has left `left` m/s along normals: whether it must go on, because turning or motors go
-// otherwise than it assumed. revises: hosts may decide again about motors; renewed: out, one has, so that
-// responses have changed.
-bool follow_rigids(World &w, StepContext &step, double left, bool revises, bool &renewed);
+// Whether a solve must go on, because turning or motors go otherwise than it assumed; renewed: a host has
+// decided again about motors, so that responses have changed.
+struct Followed { bool goes_on = false, renewed = false; };
+// After a solve that has left `left` m/s along normals. revises: hosts may decide again. False: one failed.
+bool follow_rigids(World &w, StepContext &step, double left, bool revises, Followed &out, uint32_t *trouble);
 void restart_rigids(World &w, StepContext &step);  // then, once the rows are finished again
 dfm_body_measure measure_rigid(const RigidSet &set, uint32_t body);
 void set_rigid_state(Obstacle &o, const dfm_rigid_state &state);  // of the body that the shape belongs to

@@ -6,15 +6,15 @@
 
 #include "body/obstacle_mesh.h"
 #include "dynamics/rigid/rigid_set.h"
-#include "friction/pair_rules.h"
 #include "geometry/closest.h"
 #include "math/turn.h"
-#include "state/obstacle.h"
+#include "state/partner.h"
 #include "state/tool.h"
 #include "state/world.h"
 #include "step/budget.h"
 #include "step/context.h"
 #include "step/pair_table.h"
+#include "step/solve/solve_islands.h"
 #include "step/solve/tolerance.h"
 
 namespace dfm {
@@ -51,8 +51,6 @@ bool kept_apart(const Obstacle &a, const Obstacle &b) {
 
 // Planes and voxels have neither corners nor edges, so two of them have no rows.
 bool without_corners(const Obstacle &o) { return o.def.shape == DFM_SHAPE_PLANE || o.grid; }
-
-PairSide names_of(const Obstacle &o) { return {o.name, o.zone.group, o.zone.material}; }
 
 // Of the rotation vectors that end in the same attitude, whole turns apart, the one nearest to `like`: a ball
 // that rolls fast turns more than once in a sub-step.
@@ -109,10 +107,7 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
       const bool cornerless = kept_apart(a, b) && without_corners(a) && without_corners(b);
       const bool apart = kept_apart(a, b) && !cornerless;
       if (!apart && !cornerless && !passes(a, b)) continue;
-      bool touch = (a.def.category & b.def.collides_with) != 0 && (b.def.category & a.def.collides_with) != 0;
-      if (const FilterRule *const rule = best_rule(w.filters, names_of(a), names_of(b)))
-        touch = rule->collide;
-      if (!touch || belong_together(w, a, b)) continue;
+      if (!partner_of(a).meets(partner_of(b), w.filters) || belong_together(w, a, b)) continue;
       Pair pair{i, j, {a.id, b.id}};
       if (!apart) {
         passing_.push_back(pair);
@@ -473,8 +468,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
   if (off_ > kOff * offset_) arrives = std::min(arrives, kMinSubstep * step.length.planned / step.h);
-  if ((!(turn > 0) && arrives == 1) || !(step.h > kMinSubstep * step.length.planned) || !may_repeat(w, step))
-    return true;
+  if ((!(turn > 0) && arrives == 1) || !may_shorten(step) || !may_repeat(w, step)) return true;
   step.length.repeat_grown(turn > 0 ? std::min(arrives, kAims * kArc / turn) : arrives);
   return false;
 }

@@ -90,21 +90,11 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
     const double deep = corners ? depth(shape_a, shape_b, true) : center_depth(shape_a, shape_b);
     if (!inside(shape_a, shape_b, deep)) continue;
     reported_.push_back({pair.id[0], pair.id[1]});
-    if (!corners) {
-      const Obstacle &body = is_moved(a) ? a : b;
-      w.context->warn(
-          "the center of '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because rigid bodies "
-          "meet planes and voxels with their corners, which voxels have none of; give it triangles or boxes "
-          "as its shape, or filter the pair",
-          body.name.c_str(), deep, (&body == &a ? b : a).name.c_str(), w.time);
-      continue;
-    }
-    const auto held = [](const Obstacle &o) { return is_moved(o) && o.rigid->host_name != "builtin"; };
-    const Obstacle &body = held(a) ? a : b, &other = held(a) ? b : a;
+    const Obstacle &body = is_moved(a) ? a : b, &other = is_moved(a) ? b : a;
     w.context->warn(
-        "rigid body '%s' is %.3g m deep in '%s' at %.6g s and goes through it, because host '%s' does not "
-        "know of it; make both bodies of this host (what stands: \"fixed\"), or filter the pair",
-        body.name.c_str(), deep, other.name.c_str(), w.time, body.rigid->host_name.c_str());
+        "'%s' is %.3g m deep in '%s' at %.6g s and goes through it; make both bodies of one host, of boxes "
+        "or triangles, or filter the pair",
+        body.name.c_str(), deep, other.name.c_str(), w.time);
   }
 }
 

@@ -46,26 +46,15 @@ std::string sides(const World &w, const StepContext &step, uint32_t i) {
   return names_of(w, w.bodies[c.slot_a]->id, id_of_b(w, c));
 }
 
-// The inputs of the law at a contact, and whether all are finite.
-struct LawInputs {
-  std::string text;
-  bool is_valid;
-};
-LawInputs law_inputs(const StepContext &step, const LawInstance &law, uint32_t i) {
-  const ContactState &s = step.state;
+// Whether the inputs of the law at a contact are finite.
+bool finite_inputs(const ContactState &s, const LawInstance &law, uint32_t i) {
   const size_t n = s.stride;
   double sum = 0;
-  const auto number = [&](double v) {
+  for (const double v :
+       {s.fn[i], s.vt[i], s.vt[n + i], s.ft_stop[i], s.ft_stop[n + i], s.area[i], s.dwell[i]})
     sum += 0.0 * v;
-    return format("%.9g", v);
-  };
-  std::string text = "normal force " + number(s.fn[i]) + " N, slip " + number(s.vt[i]) + " " +
-                     number(s.vt[n + i]) + " m/s, force that stops it " + number(s.ft_stop[i]) + " " +
-                     number(s.ft_stop[n + i]) + " N, area " + number(s.area[i]) + " m2, in contact for " +
-                     number(s.dwell[i]) + " s, step " + number(step.h) + " s, state";
-  for (uint32_t k = 0; k < law.nstate; ++k) text += " " + number(s.bristle[size_t{k} * n + i]);
-  if (law.nstate == 0) text += " none";
-  return {text, sum == 0};
+  for (uint32_t k = 0; k < law.nstate; ++k) sum += 0.0 * s.bristle[size_t{k} * n + i];
+  return sum == 0;
 }
 
 }  // namespace
@@ -75,15 +64,17 @@ bool report_failed_solve(World &w, StepContext &step, const LawInstance *law, ui
   const uint32_t at = law ? contact : spoilt(step);
   const std::string where = at_step(w) + ", " + sides(w, step, at);
   constexpr const char *kDo = "take a smaller step, reduce the loads or change the law";
-  const LawInputs in = law && at != kNone ? law_inputs(step, *law, at) : LawInputs{"", true};
-  if (!law || !in.is_valid)
-    return fail_step(
-        trouble, DFM_TROUBLE_NONFINITE, "%s: the contact solve is not finite%s; %s", where.c_str(),
-        law ? (", so that law '" + std::string(law->type->id) + "' was evaluated at " + in.text).c_str() : "",
-        kDo);
-  const std::string what = at == kNone
-                               ? "returned an error"
-                               : "returned a value that is not finite, or a limit below zero, at " + in.text;
+  if (!law || (at != kNone && !finite_inputs(step.state, *law, at)))
+    return fail_step(trouble, DFM_TROUBLE_NONFINITE, "%s: the contact solve is not finite; %s", where.c_str(),
+                     kDo);
+  const ContactState &s = step.state;
+  const std::string what =
+      at == kNone
+          ? "returned an error"
+          : format(
+                "returned a value that is not finite, or a limit below zero, at %.9g N and a slip of %.9g, "
+                "%.9g m/s",
+                s.fn[at], s.vt[at], s.vt[s.stride + at]);
   return fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: friction law '%s' %s; %s", where.c_str(), law->type->id,
                    what.c_str(), kDo);
 }
@@ -93,11 +84,12 @@ bool report_jam(World &w, StepContext &step, uint32_t *trouble) {
   for (uint32_t i = 0; i < step.rows.soft(); ++i)
     if (worst == kNone || step.rows.impulse[3 * size_t{i}] > step.rows.impulse[3 * size_t{worst}]) worst = i;
   const ContactPoint *const c = worst < step.contacts.size() ? &step.contacts[worst] : nullptr;
-  const std::string held = c && c->obstacle ? describe_held_at(w, c->slot_a, c->slot_b) : std::string();
-  return fail_step(trouble, DFM_TROUBLE_UNCONVERGED, "%s, %s: squeezed until nothing can move; %s",
-                   at_step(w).c_str(), sides(w, step, worst).c_str(),
-                   held.empty() ? "open what closes on it, move that more slowly, or make the body stiffer"
-                                : held.c_str());
+  return fail_step(
+      trouble, DFM_TROUBLE_UNCONVERGED,
+      "%s, %s: squeezed until nothing can move; open what closes on it, move that more slowly, or "
+      "make the body stiffer%s",
+      at_step(w).c_str(), sides(w, step, worst).c_str(),
+      c ? hint_of_attachment(w, w.bodies[c->slot_a]->id) : "");
 }
 
 }  // namespace dfm

@@ -33,20 +33,24 @@ namespace {
 
 // Responses between the touched surfels of bodies whose points respond to each other's impulses, and of
 // groups of rigid bodies.
-void fill_responses(World &w, StepContext &step) {
+bool fill_responses(World &w, StepContext &step, uint32_t *trouble) {
+  bool given = true;
   for (const ContactRows::Block &block : step.rows.blocks) {
+    if (!given) return false;
     if (block.group != kNone) {
-      rigid_response(w, step, block);
+      given = rigid_response(w, step, block, trouble);
       continue;
     }
     const Body &b = *w.bodies[block.source];
     const uint32_t *const surfels = &step.rows.point[block.first];
     step.rows.set_response(block, true, [&](double *responses) {
-      if (!b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses))
-        fail(DFM_E_FATAL, "model '%s' of body '%s' does not answer impulses; change the model",
-             b.model.type->id, b.name.c_str());
+      given =
+          b.dynamics->response(sub_step_of(w, step), block.count, surfels, responses) ||
+          fail_step(trouble, DFM_TROUBLE_PLUGIN, "%s: model '%s' does not answer impulses; change the model",
+                    at_step(w, b).c_str(), b.model.type->id);
     });
   }
+  return given;
 }
 
 // What a solid body answers at its surface, over the response of its mass: 2.5 at a ball.
@@ -108,7 +112,7 @@ void report_impulses(StepContext &step) {
 }
 
 // Makes rows of the contacts, with the impulses of the last sub-step, which are not applied yet.
-void make_rows(World &w, StepContext &step) {
+bool make_rows(World &w, StepContext &step, uint32_t *trouble) {
   const uint32_t n = static_cast<uint32_t>(step.contacts.size());
   const bool again = step.rigid_again || step.guard.resolving;
   if (step.rigid_again)
@@ -141,7 +145,7 @@ void make_rows(World &w, StepContext &step) {
   step.rows.build(step.contacts, step.sources, {step.rigid_places, step.tools->group_sizes()}, step.bonds,
                   between_rigids);
   start_rigids(w, step);
-  fill_responses(w, step);
+  if (!fill_responses(w, step, trouble)) return false;
   step.tangents.resize(size_t(3) * n);
   step.match.resize(n);
   warm_start(w.store, step.contacts, step.h, step.rows.impulse, step.state, step.tangents.data(),
@@ -166,19 +170,21 @@ void make_rows(World &w, StepContext &step) {
     std::copy_n(step.impulse_before_rebuild.begin(), 3 * size_t{n}, step.rows.impulse.begin());
   step.tools->put(step.rows, step.state);
   step.solve_islands->find(w, step);
+  return true;
 }
 
 namespace {
 
-// Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed.
-const SolveIsland *solve_revised(World &w, StepContext &step) {
+// Solves again, from the present impulses, until rigid bodies turn and drive as the solve assumed. bad: out,
+// an island with a law that fails. False: a rigid host has failed.
+bool solve_revised(World &w, StepContext &step, const SolveIsland *&bad, uint32_t *trouble) {
   const std::span<SolveIsland> all = step.solve_islands->all();
   for (SolveIsland &own : all) {
     own.all_passes = own.all_sweeps = 0;
     own.open = true;
   }
   for (uint32_t revisions = 0;;) {
-    const SolveIsland *const bad = solve_islands(w, step);
+    bad = solve_islands(w, step);
     double left = 0;
     for (SolveIsland &own : all) {
       if (own.between_rigids) left = std::max(left, own.residual.normal);
@@ -186,11 +192,12 @@ const SolveIsland *solve_revised(World &w, StepContext &step) {
       own.all_passes += own.passes;
       own.all_sweeps += own.sweeps;
     }
-    bool renewed = false;
-    if (bad || step.rows.rigid.empty() || !follow_rigids(w, step, left, revisions < kMaxRevisions, renewed))
-      return bad;
-    revisions += renewed;
-    if (renewed) {
+    if (bad || step.rows.rigid.empty()) return true;
+    Followed after;
+    if (!follow_rigids(w, step, left, revisions < kMaxRevisions, after, trouble)) return false;
+    if (!after.goes_on) return true;
+    if (after.renewed) {
+      ++revisions;
       finish_frames(w, step);
       finish_rates(w, step);
     }
@@ -266,7 +273,7 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
   call_pre_solve(w, step);
   if (!contacts_taken(w, step) || !short_enough(w, step)) return false;
   step.residual = {};
-  make_rows(w, step);
+  if (!make_rows(w, step, trouble)) return false;
   if (!cut_at_landing(w, step)) return false;
   step.rows.apply_last();
   if (step.rows.all() == 0) {
@@ -276,7 +283,8 @@ bool stage_solve(World &w, StepContext &step, uint32_t *trouble) {
     return true;
   }
   share_work(w, step);
-  const SolveIsland *const bad = solve_revised(w, step);
+  const SolveIsland *bad = nullptr;
+  if (!solve_revised(w, step, bad, trouble)) return false;
   for (const SolveIsland &own : step.solve_islands->all())
     if (own.failed && !own.bad) return retry_shorter(w, step, own, trouble);
   double nan_flag = 0;

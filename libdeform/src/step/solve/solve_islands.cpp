@@ -351,7 +351,7 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     rows += own.part.all();
     own.part.alone = step.rows.is_alone(own.part);
     own.passes = own.sweeps = 0;
-    own.failed = false;
+    own.failed = own.drifts = false;
     own.spent = {0, 0, own.part.all(), false};
     own.residual = {};
     own.bad = nullptr;

@@ -236,15 +236,12 @@ std::string describe_pair_gain(World &w) {
         "%s: friction law '%s' has put in %s; its force must point against the slip: "
         "change the law or its parameters (energy_watch sets the limit, 0 switches the watch off)",
         where.c_str(), law.c_str(), grown.c_str());
-  const uint32_t a = slot_of(w, worst->a), o = w.body(worst->b) ? kNone : obstacle_slot_of(w, worst->b);
-  const std::string held = a != kNone && o != kNone ? describe_held_at(w, a, o) : std::string();
-  return format("%s: their contact (law '%s'%s) has put in %s; %s", where.c_str(), law.c_str(),
-                models_of(w, *worst).c_str(), grown.c_str(),
-                held.empty()
-                    ? "take a shorter step, repair their surfaces, or, where a model of a plugin steps "
-                      "itself, check its response to impulses (energy_watch sets the limit, 0 switches "
-                      "the watch off)"
-                    : held.c_str());
+  return format(
+      "%s: their contact (law '%s'%s) has put in %s; take a shorter step, repair their surfaces, or, where a "
+      "model of a plugin steps itself, check its response to impulses (energy_watch sets the limit, 0 "
+      "switches the watch off)%s",
+      where.c_str(), law.c_str(), models_of(w, *worst).c_str(), grown.c_str(),
+      hint_of_attachment(w, worst->a));
 }
 
 void forget_pairs(World &w, uint64_t id) {
