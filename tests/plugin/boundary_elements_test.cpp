@@ -458,8 +458,8 @@ double reach_of_organ(const Vec &d) {
          (1 + 0.05 * std::sin(5 * d[0] + 2 * d[1]) * std::sin(4 * d[1] - 3 * d[2]));
 }
 
-// N, of a ball of 0.1 m that presses 1 mm deep from above into an organ, held at the bottom of its surface, of
-// 20 layers^3 cells, which become smaller toward the ball. Strains reach 2 %.
+// N, of a ball of 0.1 m that presses 1 mm deep from above into an organ, held at the bottom of its surface,
+// of 20 layers^3 cells, which become smaller toward the ball. Strains reach 2 %.
 double force_of_probed_organ(const char *model, uint32_t layers) {
   test::Context context(1);
   const dfm_world w = test::make_world(context, {0, 0, 0}, DFM_INTEGRATOR_IMPLICIT_EULER);
