@@ -123,6 +123,27 @@ class Said(InAFolder):
         # the ranges are as 10 and 4 on their logarithmic scales, and E/rho acts
         self.assertAlmostEqual(found.values["young"] / found.values["density"], 770, delta=8)
 
+    def test_friction_and_bristles_at_one_displacement(self):
+        """A pull of 0.2 mm: F = mu N (1 - exp(-sigma0 x / (mu N))), near its end alone and as a whole."""
+        case = {"id": "pull", "law": "lugre", "mass": 1, "gravity": 1,
+                "params": {"mu": 0.42, "sigma0": 3000, "sigma1": 0, "sigma2": 0},
+                "input": {"kind": "sine_velocity", "V": 2e-4 * math.pi, "freq": 1, "T": 0.5, "dt": 0.002},
+                "columns": ["t", "x", "F"]}
+        rows = deform.friction("lugre", case=case)
+        file, rig = self.folder / "pull.csv", self.folder / "pull.json"
+        rig.write_text(json.dumps(case))
+        study = {"rig": str(rig), "parameters": {
+            "mu": {"at": "/params/mu", "from": 0.2, "to": 1, "start": 0.6},
+            "sigma0": {"at": "/params/sigma0", "from": 1e3, "to": 1e4, "scale": "log", "start": 2e3,
+                       "unit": "N/m"}},
+            "residuals": [{"table": "rows", "column": "F", "measured": str(file), "columns": ["t", "F"],
+                           "sigma": 0.02}]}
+        for begin, told in (0.48, False), (0, True):  # s
+            file.write_text("t,F\n" + "".join(
+                f"{t!r},{F!r}\n" for t, F in zip(rows["t"].tolist(), rows["F"].tolist()) if t >= begin))
+            found = deform.fit(study, workers=2)
+            self.assertEqual("mu and sigma0 cannot be told apart by these data" not in str(found.notes), told)
+
     def test_a_search_that_was_stopped_claims_nothing(self):
         study = self.study(self.measured())
         for start in 0.7, 0.95:
