@@ -157,7 +157,7 @@ typedef struct dfm_equilibrium_def {
   double time; /* s that pass during the load steps, for keys and sines; 0 */
   /* residual force at a point over the largest load or reaction; 0: 1e-10, with contact 1e-6 */
   double tolerance;
-  /* steps from rest per round of relaxation, but those in which keys advance; 0: 500 */
+  /* steps from rest per load step, but those in which keys advance; 0: 500 */
   uint32_t max_iterations;
   uint32_t reserved;
   uint64_t cookie; /* set by the default function */

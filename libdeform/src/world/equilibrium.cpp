@@ -33,23 +33,16 @@ namespace dfm {
 namespace {
 
 // s, length of a step. The longer it is, the more the stiffness and the less the mass of a body decides its
-// end. Where nothing can touch anything, a step may last forever.
+// end. Where nothing can touch bodies that are held, a step may last forever. Below the second, a step that
+// fails ends the search.
 constexpr double kLongest = 1, kShortest = 1e-4;
-// Tolerances: of Newton's method and contact in a step, relative to the median edge of a body; of the motion
-// in the last step, relative to the size of the body; of forces at a point, relative to the largest load,
-// reaction or contact force (or their rounding); of contacts and friction, relative to the rest distance.
-constexpr double kGap = 0.01, kError = 1e-7, kContact = 2e-8, kMoves = 1e-6, kLeft = 1e-6;
+// Tolerances: of contact in a step, relative to the median edge of a body; of the motion in the last step,
+// relative to the size of the body, and of forces at a point and on a body that nothing holds, relative to
+// the largest load, reaction or contact force (or their rounding).
+constexpr double kContact = 2e-8, kLeft = 1e-6;
 constexpr double kAlone = 1e-10;  // of Newton's method and of forces where nothing can touch anything
-// Share of the tolerance, for the sum of forces on a body. What the sum of loads on a body that nothing holds
-// may be, relative to their norms.
-constexpr double kNet = 0.1, kBalance = 1e-9;
-// Limit on the motion of an unsupported body in a step: the median edge at first, less if steps are halved,
-// more if they converge well, up to this share of its size.
-constexpr double kReach = 0.25;
-constexpr double kLags = 0.5;     // share of inertia in the forces left, above which steps get longer
-constexpr uint32_t kSteps = 500;  // of a round
-constexpr uint32_t kRounds = 4;   // of relaxation
-constexpr uint32_t kRefused = 8;  // consecutive failed steps
+constexpr double kReach = 0.1;    // of its size, an edge at least: what a body may move in a step
+constexpr uint32_t kSteps = 500;  // of a load step
 constexpr double kAway = 10;      // of its size: a body in contact that has moved so far keeps sliding
 
 // Points on their way to an equilibrium, in steps of backward Euler from rest:
@@ -68,11 +61,9 @@ constexpr double kAway = 10;      // of its size: a body in contact that has mov
 
 class SettlingPoints : public ImplicitPoints {
  public:
-  // softness: [npoint] N/m, S. error: m, tolerance of Newton's method for points at rest. alone: nothing can
-  // touch them.
+  // softness: [npoint] N/m, S. alone: nothing can touch them.
   SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
-                 const ImplicitOptions &options, const std::vector<double> &softness, double error,
-                 bool alone);
+                 const ImplicitOptions &options, const std::vector<double> &softness, bool alone);
 
   // The contact forces to start with: impulses at the surfels [nsurfel,3] over h seconds; h 0: none.
   void start_from(const double *surfel_impulse, double h);
@@ -86,8 +77,8 @@ class SettlingPoints : public ImplicitPoints {
     return a;
   }
   // Flow is complete however long the step is.
-  dfm_kin kin(double time, double h, bool trial) const override {
-    return ImplicitPoints::kin(time, alone_ ? kForever : h, trial);
+  dfm_kin kin(double time, double, bool trial) const override {
+    return ImplicitPoints::kin(time, kForever, trial);
   }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
@@ -102,7 +93,7 @@ class SettlingPoints : public ImplicitPoints {
 
  private:
   bool alone_, whole_ = true;  // the guard has taken the whole step
-  double error_allowed_, stiffest_ = 0;
+  double stiffest_ = 0;
   double h_ = 0, share_ = 1, last_share_ = 1;  // s, of this step; of its way, and of that of the last step
   Array<double> way_;                          // [npoint,4] m, the whole way of the last step; 0: unknown
   Array<double> force_;                        // [npoint,3] N, contact forces of the last step
@@ -111,8 +102,8 @@ class SettlingPoints : public ImplicitPoints {
 
 SettlingPoints::SettlingPoints(const Memory &memory, Phyxels &points, Surface &surface, ModelInstance &model,
                                const ImplicitOptions &options, const std::vector<double> &softness,
-                               double error, bool alone)
-    : ImplicitPoints(memory, points, surface, model, options), alone_(alone), error_allowed_(error) {
+                               bool alone)
+    : ImplicitPoints(memory, points, surface, model, options), alone_(alone) {
   use_memory(memory, softness_, way_, force_, load_);
   force_.assign(size_t{3} * points.n, 0.0);
   way_.assign(size_t{kStride} * points.n, 0.0);
@@ -133,7 +124,7 @@ bool SettlingPoints::bound(double, double, const AddRowSums &, StepBound &out) {
 // With contact one linear correction only: with contact forces that do not rotate with the body, a standing
 // body may have no equilibrium near, and Newton's method would search for it forever.
 bool SettlingPoints::free_motion(const SubStep &now, double &kinetic) {
-  options_.rest = error_allowed_ / now.h;
+  options_.rest = kAlone * surface_.median_edge / now.h;
   h_ = now.h;
   share_ = 1;
   whole_ = true;
@@ -236,11 +227,10 @@ class Settling {
     double size, edge;           // m
     Vec3 contact_impulse;        // N s, before the search
     uint8_t held;                // components that are held at some point
-    double reach = 0;            // m, limit on its motion without contact in the next step
     double slid = 0;             // m moved since it has been in contact
     std::vector<double> last{};  // [npoint,4] m, at the start of the step
     double left = 0, scale = 0;  // N, largest component of unbalanced forces; of all forces
-    double moved = 0, lag = 0;   // m, in the last step; N, largest component of M / h^2 times it
+    double moved = 0;            // m, in the last step
     Vec3 net{};                  // N, sum of external forces
     double all = 0;              // N, sum of their norms
     double pull = 0;             // m/s2, acceleration by their sum
@@ -252,9 +242,8 @@ class Settling {
     options.rest_factor = false;
     if (options.solver == "auto" && b.p.n <= kFactoredAtRest) options.solver = "ldlt";
     options.newton = std::max(options.newton, ImplicitOptions{}.newton);
-    auto points =
-        std::make_unique<SettlingPoints>(w_.memory(), b.p, b.surface, b.model, options, softness_of(b),
-                                         (alone_ ? kAlone : kError) * b.surface.median_edge, alone_);
+    auto points = std::make_unique<SettlingPoints>(w_.memory(), b.p, b.surface, b.model, options,
+                                                   softness_of(b), alone_);
     if (!alone_) points->start_from(b.surfel_impulse.data(), b.impulse_time());
     SettlingPoints *const own = points.get();
     return {.body = &b,
@@ -276,12 +265,12 @@ class Settling {
     if (w_.gravity.keys.empty()) w_.gravity.now = to.share * load3(w_.def.gravity);
     for (One &one : bodies_) {
       set_loads(*one.body, w_.prescribed.at(w_.time), to.share);
-      one.reach = one.edge;
       one.slid = 0;
     }
-    for (uint32_t round = 0;; ++round) {
-      const uint32_t steps = come_to_rest(to);
-      if ((round > 0 && steps <= 1) || round == kRounds || !relax()) return;
+    uint32_t steps = 0;
+    for (uint32_t before = 0;; before = steps) {
+      come_to_rest(to, steps);
+      if ((before > 0 && steps <= before + 1) || !relax()) return;
     }
   }
 
@@ -291,66 +280,57 @@ class Settling {
     return any;
   }
 
-  // Number of steps, but for those in which prescribed motions go on.
-  uint32_t come_to_rest(const Station &to) {
+  // steps: of the load step, but for those in which prescribed motions go on.
+  void come_to_rest(const Station &to, uint32_t &steps) {
     const bool all_hang = std::ranges::all_of(bodies_, hangs);
     if (alone_ && !all_hang) w_.time = to.time;  // loads need not be balanced in between
-    weigh_all(kLongest);
+    weigh_all();
     for (One &one : bodies_) one.points->forget_way();
-    const double limit = alone_ ? kForever : kLongest;
-    double longest = all_hang ? limit : kLongest;
-    uint32_t refused = 0;
+    double longest = alone_ && all_hang ? kForever : kLongest;  // where no force is left over
     // Keys advance after bodies rest under the new loads: otherwise unloaded contacts would not carry bodies
     // along.
     bool goes_on = alone_ || w_.time >= to.time;
-    for (uint32_t steps = 0;;) {
+    for (;;) {
       const double h = length(longest);
       w_.prescribed.until = goes_on ? next_stop(to) : w_.time;
       const uint64_t pieces = w_.stats.substeps;
-      const bool taken = step(h);
-      const bool whole = taken && w_.stats.substeps == pieces + 1;
-      const double off = h * w_.stats.residual;  // m, of contacts
+      uint32_t trouble = 0;
+      const bool taken = step(h, trouble);
+      const bool solved = taken && !(trouble & DFM_TROUBLE_UNCONVERGED);
+      const bool whole = solved && w_.stats.substeps == pieces + 1;
       w_.time = w_.prescribed.at(w_.time);
       const bool there = w_.time >= to.time;
       ++info_.iterations;
       if (there || !goes_on) ++steps;
-      if (taken) refused = 0;
-      else if (++refused == kRefused)
+      if (!taken && h < kShortest)
         fail(DFM_E_DIVERGED,
              "no equilibrium was found, because a step from rest failed (%s); use more load_steps, hold what "
              "moves freely, or raise max_time and max_work",
              dfm_last_error());
-      weigh_all(h);
-      bool rests = taken && (alone_ || off <= kGap * w_.offset);
-      bool longer = !alone_;
+      weigh_all();
+      bool rests = solved;
       for (One &one : bodies_) {
         if (alone_) check_balance(one);
-        // not if Newton's method left more: it converges worse in longer steps, because tangents lack the
-        // stiffness of loads that turn a free body
-        longer = longer || one.lag > kLags * one.left;
         if (!whole || !there) one.points->forget_way();
-        one.reach =
-            whole ? std::min(1.5 * one.reach, std::max(one.edge, kReach * one.size)) : 0.5 * one.reach;
         one.slid = there && one.touches ? one.slid + one.moved : 0;
-        rests = rests && one.moved <= kMoves * one.size && balanced(one);
+        rests = rests && one.moved <= kLeft * one.size && balanced(one);
       }
-      if (rests && there) return steps;
+      if (rests && there) return;
       goes_on = goes_on || rests;
-      if (!whole) longest = std::min(kLongest, 0.5 * h);
-      else if (longer) longest = std::min(limit, 2 * h);
+      if (!whole) longest = std::min(kLongest, 0.5 * longest);
+      else if (longest < kLongest) longest *= 2;
       check_progress(steps, h);
     }
   }
 
   // Returns false if it failed; the world is then at the end of its last completed part.
-  bool step(double h) {
+  bool step(double h, uint32_t &trouble) {
     double edge = HUGE_VAL;
     for (One &one : bodies_) {
       one.last.assign(one.body->p.x.begin(), one.body->p.x.end());
       edge = std::min(edge, one.edge);
     }
     w_.def.contact_tolerance = kContact * edge / h;
-    uint32_t trouble = 0;
     const dfm_status status = step_within_budget(w_, h, &trouble);
     if (trouble & DFM_TROUBLE_INTERRUPTED)
       fail(DFM_DISCARD, "the search for an equilibrium was interrupted; the world is as before it");
@@ -364,12 +344,11 @@ class Settling {
   bool balanced(const One &one) const {
     const double rounding = kForceRounding * one.points->stiffest() *
                             largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride);
-    return (alone_ || norm(one.net) <= std::max(kNet * tolerance_ * one.all, rounding)) &&
-           one.left <= std::max(tolerance_ * one.scale, rounding);
+    return std::max(one.left, alone_ ? 0 : norm(one.net)) <= std::max(tolerance_ * one.scale, rounding);
   }
 
   void check_balance(const One &one) const {
-    if (!one.body->springs.empty() || norm(one.net) <= kBalance * one.all) return;
+    if (!one.body->springs.empty() || norm(one.net) <= tolerance_ * one.all) return;
     dfm::refuse(
         *one.body, DFM_E_DIVERGED,
         " has no equilibrium: nothing holds it, and its loads sum to [%g, %g, %g] N; hold some of its "
@@ -378,29 +357,27 @@ class Settling {
   }
 
   // Stops all bodies, too.
-  void weigh_all(double h) {
+  void weigh_all() {
     for (One &one : bodies_) {
       Phyxels &p = one.body->p;
       std::fill(p.v.begin(), p.v.end(), 0.0);
       one.body->relax_dampers();
       set_loads(*one.body, w_.time, w_.prescribed.share);  // without springs
-      weigh(one, h);
+      weigh(one);
     }
   }
 
-  // Computes the unbalanced forces at the present positions, with the contact forces of the last step of h
-  // seconds.
-  void weigh(One &one, double h) {
+  // Computes the unbalanced forces at the present positions, with the contact forces of the last step.
+  void weigh(One &one) {
     sum_loads(one);
     const Phyxels &p = one.body->p;
-    if (!one.rest->add_forces(w_.time, alone_ ? kForever : h)) one.left = HUGE_VAL;
+    if (!one.rest->add_forces(w_.time)) one.left = HUGE_VAL;
     double nan_flag = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
       most = std::max(most, std::fabs(p.f[at]));
       const double moved = one.last.empty() ? 0 : std::fabs(p.x[at] - one.last[at]);
       one.moved = std::max(one.moved, moved);
-      if (p.moves(at)) one.lag = std::max(one.lag, p.mass[at / kStride] * moved / (h * h));
       nan_flag += 0.0 * p.f[at];
     }
     if (nan_flag != 0) one.left = HUGE_VAL;
@@ -413,7 +390,7 @@ class Settling {
     Phyxels &p = b.p;
     const double *const contact = one.points->contact_force();
     loads_at_rest(w_, b, p.f.data());
-    one.scale = one.moved = one.lag = one.left = one.all = 0;
+    one.scale = one.moved = one.left = one.all = 0;
     one.touches = false;
     Vec3 center, torque;
     one.net = {};
@@ -439,12 +416,15 @@ class Settling {
     one.pull = norm(one.net) / b.mass + norm(torque) / inertia * std::sqrt(far);
   }
 
-  // Limits the next step so that an unsupported body moves no farther than its reach.
+  static double reach(const One &one) { return std::max(one.edge, kReach * one.size); }
+
+  // s, of the next step: forces that nothing balances move no body farther than its reach. So M / h^2 falls
+  // with them.
   double length(double longest) const {
-    double h = longest;
+    double most = 1;
     for (const One &one : bodies_)
-      if (!alone_ && !hangs(one) && one.pull > 0) h = std::min(h, std::sqrt(one.reach / one.pull));
-    return std::max(h, kShortest);
+      if (!alone_ && !hangs(one)) most = std::max(most, one.pull / reach(one));
+    return longest / std::sqrt(most);
   }
 
   // s, to which keys advance in the next step, so that no prescribed motion exceeds the reach of a body. The
@@ -452,20 +432,14 @@ class Settling {
   // mass.
   double next_stop(const Station &to) const {
     if (alone_) return to.time;
-    double part = to.time - w_.time, reach = HUGE_VAL;
-    for (const One &one : bodies_) reach = std::min(reach, one.reach);
-    while (part > kShortest && prescribed_way(part) > reach) part *= 0.5;
+    double part = to.time - w_.time, least = HUGE_VAL;
+    for (const One &one : bodies_) least = std::min(least, reach(one));
+    while (part > kShortest && prescribed_way(w_.time + part) > least) part *= 0.5;
     return std::min(to.time, w_.time + std::max(part, kShortest));
   }
 
-  // m, the largest prescribed motion in the next h seconds, also if it returns in between.
-  double prescribed_way(double h) const {
-    double most = 0;
-    for (const double part : {1.0, 0.5, 0.25, 0.125})
-      most = std::max(most, prescribed_distance(w_.time + part * h));
-    return most;
-  }
-  double prescribed_distance(double t) const {
+  // m, the largest prescribed motion until t.
+  double prescribed_way(double t) const {
     double most = 0, size = 0;
     for (const One &one : bodies_) {
       size = std::max(size, one.size);
