@@ -106,7 +106,7 @@ inline dfm_status write_file(const char *path, const void *bytes, size_t n) noex
 // law.
 template <class T>
 constexpr bool is_done(dfm_status s) noexcept {
-  return s == DFM_OK || (s > 0 && (std::is_same_v<T, bool> || requires(T t) { t.discarded = true; }));
+  return s == DFM_OK || (s > 0 && (std::is_same_v<T, bool> || requires { std::declval<T &>().discarded; }));
 }
 
 // A status with what the call gives. `if (result) use(*result); else log(result.what());`

@@ -77,8 +77,8 @@ class SettlingPoints : public ImplicitPoints {
     return a;
   }
   // Flow is complete however long the step is.
-  dfm_kin kin(double time, double, bool trial) const override {
-    return ImplicitPoints::kin(time, kForever, trial);
+  dfm_kin kin(double time, double h, bool trial) const override {
+    return ImplicitPoints::kin(time, alone_ ? kForever : h, trial);
   }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
