@@ -175,22 +175,21 @@ dfm_status Adapter::look(double h) {
                      has_parts(*found, all[i]->getCollisionShape());
     if (!found || !found->found) TRY(check(all[i]));  // before anything has changed
   }
+  TRY(clock_.poll(world_));
   for (auto &o : objects_) {
-    if (!o->found || o->filter == filter_of(o->id)) continue;
+    if (!o->found || (o->filter == filter_of(o->id) && !clock_.restored)) continue;
     o->filter = filter_of(o->id);
     o->pose = from_bullet(o->id->getWorldTransform());
-    for (size_t i = 0; i < o->obstacles.size(); ++i) {
-      if (!o->body) o->sent[i] = o->pose * o->local[i];
+    for (size_t i = 0; i < o->obstacles.size(); ++i)
       TRY(set_filter(o->obstacles[i], static_cast<uint32_t>(o->filter.group),
-                     static_cast<uint32_t>(o->filter.mask), o->body ? nullptr : &o->sent[i]));
-    }
+                     static_cast<uint32_t>(o->filter.mask), o->body ? nullptr : &o->sent[i],
+                     o->pose * o->local[i]));
   }
   TRY(drop());
   if (objects_.size() != static_cast<size_t>(all.size()))
     for (int i = 0; i < all.size(); ++i)
       if (!by_id_.count(all[i])) TRY(bind(all[i]));
   if (!props_.empty()) std::erase_if(props_, [&](const auto &p) { return !by_id_.count(p.first); });
-  TRY(clock_.poll(world_));
   for (auto &o : objects_) TRY(follow(*o, h));
   TRY(states_.poll(world_));
   for (auto &o : objects_)

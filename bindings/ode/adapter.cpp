@@ -89,6 +89,7 @@ dfm_status Adapter::look() {
   if (!own_near_) engine_.spaces.resize(1);  // the caller's callback knows how it wants nested spaces
   for (const dGeomID g : seen_) signatures_.push_back(signature_of(g));
   TRY(check(signatures_));
+  TRY(clock_.poll(world_));
   for (auto &g : geoms_) g->found = false;
   for (auto &b : bodies_) b->found = false;
   for (size_t i = 0; i < seen_.size(); ++i) {
@@ -102,18 +103,16 @@ dfm_status Adapter::look() {
     if (geom == by_geom_.end()) continue;
     Geom &g = *geom->second;
     g.found = g.signature == signatures_[i] && (body == by_body_.end() || body->second->found);
-    if (!g.found || g.signature.has_filter(signatures_[i])) continue;
+    if (!g.found || (g.signature.has_filter(signatures_[i]) && !clock_.restored)) continue;
     g.signature = signatures_[i];
-    if (!g.signature.body) g.pose = pose_of(g.id);
     TRY(set_filter(g.obstacle, g.signature.category, g.signature.collides,
-                   g.signature.body ? nullptr : &g.pose));
+                   g.signature.body ? nullptr : &g.pose, pose_of(g.id)));
   }
   TRY(drop());
   if (geoms_.size() != seen_.size())
     for (size_t i = 0; i < seen_.size(); ++i)
       if (!by_geom_.count(seen_[i])) TRY(bind(seen_[i], signatures_[i]));
   std::erase_if(props_, [&](const auto &p) { return !by_geom_.count(p.first); });
-  TRY(clock_.poll(world_));
   for (auto &g : geoms_) TRY(follow(*g));
   if (clock_.restored && !keeps_friction_) near_.forget();
   if (clock_.restored) keeps_friction_ = false;

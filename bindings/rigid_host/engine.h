@@ -137,7 +137,8 @@ class Engine {
   virtual void prepare(const dfm_rigid_step &step) = 0;
   // All bodies as they were at the start of the sub-step. given: asleep or awake as before it, too.
   virtual void restore(bool given) = 0;
-  // The start of the step: that of the first sub-step, which is over; and it again, for restore().
+  // The start of the step: that of the first sub-step, which is over; and it again, for restore(). Friction
+  // between the engine's own bodies keeps what the sub-steps left.
   virtual void keep_first() = 0;
   virtual void take_first() = 0;
   // The world's state goes into the engine each time, so that what that does is a function of it to the last

@@ -103,6 +103,14 @@ dfm_status unless_gone(dfm_obstacle &obstacle, dfm_status status) {
   return DFM_OK;
 }
 
+bool is_at(const Pose &known, const Pose &now) {
+  const Vec p = now.position - known.position;
+  const Quat q = now.rotation, r = known.rotation;
+  const Vec turn{q.x - r.x, q.y - r.y, q.z - r.z};
+  constexpr double kRounding = 1e-14;  // the dfm_world normalizes rotations
+  return dot(p, p) == 0 && dot(turn, turn) + (q.w - r.w) * (q.w - r.w) < kRounding * kRounding;
+}
+
 }  // namespace
 
 dfm_status unbind(dfm_obstacle &obstacle) {
@@ -111,10 +119,12 @@ dfm_status unbind(dfm_obstacle &obstacle) {
   return DFM_OK;
 }
 
-dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collides_with, const Pose *place) {
+dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collides_with, Pose *known,
+                      const Pose &now) {
   if (!obstacle) return DFM_OK;
-  if (place) {
-    const dfm_pose pose = to_pose(*place);
+  if (known && !is_at(*known, now)) {
+    *known = now;
+    const dfm_pose pose = to_pose(now);
     TRY(unless_gone(obstacle, dfm_obstacle_teleport(obstacle, &pose)));
   }
   return unless_gone(obstacle, dfm_obstacle_set_filter(obstacle, category, collides_with));
@@ -130,11 +140,7 @@ dfm_status find_again(dfm_obstacle &obstacle, Pose &known) {
 }
 
 dfm_status follow(dfm_obstacle &obstacle, Pose &known, const Pose &now) {
-  const Vec p = now.position - known.position;
-  const Quat q = now.rotation, r = known.rotation;
-  const Vec turn{q.x - r.x, q.y - r.y, q.z - r.z};
-  constexpr double kRounding = 1e-14;  // the dfm_world normalizes rotations
-  if (dot(p, p) == 0 && dot(turn, turn) + (q.w - r.w) * (q.w - r.w) < kRounding * kRounding) return DFM_OK;
+  if (is_at(known, now)) return DFM_OK;
   known = now;
   const dfm_pose pose = to_pose(now);
   return unless_gone(obstacle, dfm_obstacle_move_to(obstacle, &pose));

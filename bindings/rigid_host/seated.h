@@ -82,8 +82,10 @@ dfm_status step_both(Engine &engine, dfm_world world, double h, uint32_t *troubl
 
 // The caller may have destroyed the obstacle that represents a shape: then the shape takes no further part.
 dfm_status unbind(dfm_obstacle &obstacle);
-// place: of a shape without a body, which is put there without a motion, as if made again; null: of a body's
-dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collides_with, const Pose *place);
+// known: of a shape without a body, which is put where it is now without a motion, as if made again; null: of
+// a body's
+dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collides_with, Pose *known,
+                      const Pose &now);
 // known: where the surface of a shape without a body is, after a restore of the dfm_world
 dfm_status find_again(dfm_obstacle &obstacle, Pose &known);
 // A shape without a body that the caller has moved: its surface comes along within the next step.

@@ -397,7 +397,6 @@ TEST_F(PlannerScene, WhatTheSceneAsksFor_ExcludesModelsThatDoNotTakeIt) {
       {"", R"("springs": [{"point": [0.4, 0.05, 0.05], "to": [0.5, 0.05, 0.05], "stiffness": 100}], )"},
       {"", R"("separate": {}, )"},
       {"", R"("mass_scaling": 0.05, )"},
-      {R"("effects": ["volume"], )", ""},
       {R"("cuts": [{"body": "bar", "t": 0.05, "shape": "plane", "point": [0.2, 0, 0],
                     "normal": [1, 0, 0]}], )",
        ""},

@@ -343,7 +343,6 @@ TEST(RigidBodies, BadDefs_AreRefused) {
   EXPECT_NE(std::strstr(dfm_last_error(), "not a rigid body"), nullptr);
 }
 
-// One part is refused after another could have been made: state, reports and sleepers are as before.
 // A shape that is added counts in the largest speed, and has no belt: it moves with its body.
 TEST(RigidBodies, AddedShape_MovesWithItsBody) {
   Context c;
@@ -369,6 +368,7 @@ TEST(RigidBodies, AddedShape_MovesWithItsBody) {
   EXPECT_NEAR(m.speed_max, 10 * (1 + 0.1 * std::sqrt(3.0)), 1e-12);
 }
 
+// One part is refused after another could have been made: state, reports and sleepers are as before.
 TEST(RigidBodies, RefusedForItsLastPart_LeavesTheWorldAsItWas) {
   Context c;
   dfm_body ball = 0;

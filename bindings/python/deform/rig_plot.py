@@ -60,7 +60,8 @@ def main() -> None:
     with open(rows, newline="") as file:
         table = list(csv.DictReader(file))
     picture = io.BytesIO()
-    draw({name: [float(row[name]) for row in table] for name in table[0]}, kind, title).savefig(picture)
+    columns = {name: [float(row[name]) for row in table] for name in table[0]}
+    draw(columns, kind, title).savefig(picture, format="png")
     try:
         with open(out + ".part", "wb") as file:
             file.write(picture.getvalue())

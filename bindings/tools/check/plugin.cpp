@@ -107,6 +107,7 @@ Host::Host() {
       end -= take;
     }
   };
+  library_solver();  // before a rule watches
   table_.extension = [](void *, const char *id) {
     return id && std::strcmp(id, DFM_HOST_DIRECT) == 0 ? library_solver() : nullptr;
   };

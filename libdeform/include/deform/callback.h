@@ -3,8 +3,8 @@
  *
  * They are called on the thread that steps the world, never on workers, one at a time and in an order that
  * does not depend on the number of threads. Results have the same bits if the answers depend on the arguments
- * alone. Calls that change the world are refused with DFM_E_BUSY. Callbacks must not throw. Snapshots contain
- * neither functions nor answers: the host sets the functions again. A world without callbacks pays
+ * alone. Calls that change the world or read points get DFM_E_BUSY. Callbacks must not throw. Snapshots
+ * contain neither functions nor answers: the host sets the functions again. A world without callbacks pays
  * nothing. */
 #ifndef DEFORM_CALLBACK_H
 #define DEFORM_CALLBACK_H

@@ -1,3 +1,3 @@
-// exp, log and pow for code that runs in a step: the functions that plugins use too.
+// exp, log, pow and sines for code that runs in a step: the functions that plugins use too.
 #pragma once
 #include "deform/elementary.h"

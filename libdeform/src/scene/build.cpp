@@ -719,6 +719,7 @@ Built build_alone(dfm_context *context, const Definition &def, const Body &body,
   alone.bodies[0].params = std::move(params);
   alone.bodies[0].on.clear();
   alone.bodies[0].attach.clear();
+  alone.effects_auto = true;  // others in the scene may provide what the list names
   alone.obstacles.clear();
   alone.rigid = {};
   alone.friction.clear();

@@ -7,7 +7,7 @@
 namespace dfm::scene {
 namespace {
 
-// 45 degrees have one number for both, so that quarter turns are exact.
+// 45 degrees have one number for both, so that quarter turns have equal halves.
 void sine_cosine_deg(double degrees, double *s, double *c) {
   const double turn = std::remainder(degrees, 360.0);
   *s = dfm_sinpi(turn / 180);

@@ -76,12 +76,11 @@ bool stage_predict(World &w, StepContext &step, uint32_t *trouble) {
   const Unknowns unknowns = b.dynamics->unknowns();
   const size_t n = unknowns.of_points() ? b.p.n : b.surface.nsurfel;
   const double speed = largest_coordinate(unknowns.velocity, n, kStride);
-  const std::string what =
-      speed > kLight && std::isfinite(speed)
-          ? format("a point would move at %.3g m/s, faster than light", speed)
-      : !unknowns.system || !std::isfinite(speed)
-          ? "forces or velocities are not finite"
-          : "its equations of motion have no solution that was found, or forces are not finite";
+  const std::string what = speed > kLight && std::isfinite(speed)
+                               ? format("a point would move at %.3g m/s, faster than light", speed)
+                           : !unknowns.system || !std::isfinite(speed)
+                               ? "forces or velocities are not finite"
+                               : "its equations of motion were not solved, or forces are not finite";
   return fail_step(
       trouble, DFM_TROUBLE_NONFINITE,
       "%s: %s (model '%s'); take a smaller step, or look for loads and parameters that are too large",

@@ -129,21 +129,24 @@ double least_sub_steps(const World &w, double dt) { return std::ceil(dt / w.boun
 // The step needs more than max_substeps, and nothing has moved yet.
 dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
   const Body *const b = w.bound.body;
+  const bool explicit_points =
+      b && b->integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER && !b->model.stepper;
+  const char *const name = b ? b->name.c_str() : "?";
   fail_step(
       trouble, DFM_TROUBLE_SUBSTEPS,
-      "a step of %g s needs %g sub-steps of %g s (max_substeps %u): %s body '%s', whose point %u bounds "
-      "the step, or take a shorter step",
+      "a step of %g s needs %g sub-steps of %g s (max_substeps %u): %s%s '%s', whose point %u bounds the "
+      "step, or take a shorter step",
       dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
-      !b || b->integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER ? "soften the springs that pull"
-      : !b->model.stepper && b->model.can(DFM_CAP_STIFFNESS)
-          ? "let bodies move by tr_bdf2 or implicit_euler, soften, coarsen or damp less"
-          : "soften, coarsen or damp less",
-      b ? b->name.c_str() : "?", w.bound.point);
+      explicit_points && b->model.can(DFM_CAP_STIFFNESS) ? "let bodies move by tr_bdf2 or implicit_euler, "
+                                                         : "",
+      explicit_points || (b && b->model.stepper) ? "soften or coarsen body, or lower the damping of body"
+                                                 : "soften, or damp less, the springs that pull body",
+      name, w.bound.point);
   return DFM_DISCARD;
 }
 // The bound has fallen so far within the step that the rest of it needs too many.
 dfm_status refuse_rest(World &w, double goal) {
-  set_last_error(format("%s: by its shape or its contacts body '%s' has come to need so short sub-steps "
+  set_last_error(format("%s: by its shape or its contacts body '%s' has come to need sub-steps so short "
                         "that the rest of the step takes %g of %g s (max_substeps %u); take a shorter step",
                         at_step(w).c_str(), w.bound.body ? w.bound.body->name.c_str() : "?",
                         std::ceil((goal - w.time) / w.bound.step), w.bound.step, w.def.max_substeps)

@@ -76,7 +76,7 @@ class SettlingPoints : public ImplicitPoints {
     a.damps = false;  // its steps are not steps in time
     return a;
   }
-  // Flow is complete however long the step is.
+  // Without contact flow is complete however long the step is.
   dfm_kin kin(double time, double h, bool trial) const override {
     return ImplicitPoints::kin(time, alone_ ? kForever : h, trial);
   }
@@ -212,7 +212,7 @@ class Settling {
     for (One &one : bodies_) one.contact_impulse = one.body->contact_impulse;
     prepare(w_);
     for (uint32_t k = 1; k <= load_steps; ++k) {
-      reach(k == load_steps ? end_ : between(start_, end_, double(k) / load_steps));
+      come_to(k == load_steps ? end_ : between(start_, end_, double(k) / load_steps));
       ++info_.load_steps;
     }
     keep();
@@ -260,7 +260,7 @@ class Settling {
     for (One &one : bodies_) one.body->dynamics.swap(one.other);
   }
 
-  void reach(const Station &to) {
+  void come_to(const Station &to) {
     w_.prescribed = {to.time, to.share};
     if (w_.gravity.keys.empty()) w_.gravity.now = to.share * load3(w_.def.gravity);
     for (One &one : bodies_) {
@@ -284,9 +284,10 @@ class Settling {
   void come_to_rest(const Station &to, uint32_t &steps) {
     const bool all_hang = std::ranges::all_of(bodies_, hangs);
     if (alone_ && !all_hang) w_.time = to.time;  // loads need not be balanced in between
-    weigh_all();
+    weigh_all(kLongest);
     for (One &one : bodies_) one.points->forget_way();
-    double longest = alone_ && all_hang ? kForever : kLongest;  // where no force is left over
+    const double most = alone_ && all_hang ? kForever : kLongest;
+    double longest = most;  // where no force is left over
     // Keys advance after bodies rest under the new loads: otherwise unloaded contacts would not carry bodies
     // along.
     bool goes_on = alone_ || w_.time >= to.time;
@@ -302,12 +303,12 @@ class Settling {
       const bool there = w_.time >= to.time;
       ++info_.iterations;
       if (there || !goes_on) ++steps;
-      if (!taken && h < kShortest)
+      if (!taken && longest < kShortest)
         fail(DFM_E_DIVERGED,
              "no equilibrium was found, because a step from rest failed (%s); use more load_steps, hold what "
              "moves freely, or raise max_time and max_work",
              dfm_last_error());
-      weigh_all();
+      weigh_all(h);
       bool rests = solved;
       for (One &one : bodies_) {
         if (alone_) check_balance(one);
@@ -318,7 +319,7 @@ class Settling {
       if (rests && there) return;
       goes_on = goes_on || rests;
       if (!whole) longest = std::min(kLongest, 0.5 * longest);
-      else if (longest < kLongest) longest *= 2;
+      else longest = std::min(most, 2 * longest);
       check_progress(steps, h);
     }
   }
@@ -344,7 +345,8 @@ class Settling {
   bool balanced(const One &one) const {
     const double rounding = kForceRounding * one.points->stiffest() *
                             largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride);
-    return std::max(one.left, alone_ ? 0 : norm(one.net)) <= std::max(tolerance_ * one.scale, rounding);
+    return (alone_ || norm(one.net) <= std::max(tolerance_ * one.all, rounding)) &&
+           one.left <= std::max(tolerance_ * one.scale, rounding);
   }
 
   void check_balance(const One &one) const {
@@ -357,21 +359,22 @@ class Settling {
   }
 
   // Stops all bodies, too.
-  void weigh_all() {
+  void weigh_all(double h) {
     for (One &one : bodies_) {
       Phyxels &p = one.body->p;
       std::fill(p.v.begin(), p.v.end(), 0.0);
       one.body->relax_dampers();
       set_loads(*one.body, w_.time, w_.prescribed.share);  // without springs
-      weigh(one);
+      weigh(one, h);
     }
   }
 
-  // Computes the unbalanced forces at the present positions, with the contact forces of the last step.
-  void weigh(One &one) {
+  // Computes the unbalanced forces at the present positions, with the contact forces of the last step of h
+  // seconds.
+  void weigh(One &one, double h) {
     sum_loads(one);
     const Phyxels &p = one.body->p;
-    if (!one.rest->add_forces(w_.time)) one.left = HUGE_VAL;
+    if (!one.rest->add_forces(w_.time, alone_ ? kForever : h)) one.left = HUGE_VAL;
     double nan_flag = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;

@@ -182,6 +182,15 @@ Obstacle &add_rigid_shape(Obstacle &body, const dfm_obstacle_def &def) {
   return join_rigid_shape(body, make_rigid_shape(*body.world, body.name, def));
 }
 
+namespace {
+
+bool is_given(const dfm_rigid_set_def &def, const std::string &name) {
+  return std::any_of(def.bodies, def.bodies + def.nbody,
+                     [&](const dfm_rigid_def &d) { return d.name && name == d.name; });
+}
+
+}  // namespace
+
 void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uint64_t *out) {
   if (!def.nbody || !def.bodies) fail(DFM_E_ARG, "a set of rigid bodies needs at least one body");
   if (def.njoint && !def.joints) fail(DFM_E_ARG, "%u joints are announced, but joints is NULL", def.njoint);
@@ -192,6 +201,7 @@ void create_rigids(World &w, const char *host, const dfm_rigid_set_def &def, uin
   for (uint32_t i = 0; i < def.nbody; ++i) {
     dfm_rigid_def d = def.bodies[i];
     names.push_back(name_of(w, d.name, "rigid", number));
+    while (!d.name && is_given(def, names.back())) names.back() = name_of(w, nullptr, "rigid", number);
     check_body(d, {"rigid body", names.back().c_str()});
     store_quat(d.pose.rotation, unit_quat(d.pose.rotation));
     set.defs.push_back(d);

@@ -5,8 +5,8 @@
  * touch; bodies feel the same impulses, inside the solve. ODE keeps its joints, motors and rigid contacts;
  * dfm_ode_step steps both. ODE's objects stay the caller's: they may be made, moved, changed and destroyed
  * between two steps, and the next step takes notice. A geom counts as destroyed and made again, so that rules
- * of the dfm_world that name it end, where it is disabled or enabled, where its size changes, or the mass of
- * its body. */
+ * of the dfm_world that name it end, where it is disabled or enabled, where its size, offset or body
+ * changes, or the mass of its body. */
 #ifndef DEFORM_ODE_H
 #define DEFORM_ODE_H
 #include <ode/ode.h>

@@ -185,7 +185,38 @@ class Reader {
     return any;
   }
 
+  // The plan of these bodies. Where the scene asks for more than motion, each body is built alone with the
+  // model that is chosen for it, and planned again without one that does not take it. The last one stays:
+  // building the scene says why not.
+  PlannedWay plan(std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish) {
+    for (;;) {
+      PlannedWay out = plan_accuracy(bodies, measured, wish);
+      bool refused = false;
+      for (size_t i = 0; i < out.way.bodies.size(); ++i) {
+        std::vector<std::string> &models = bodies[i].models;
+        if (models.size() < 2 || takes(def_.bodies[i], out.way.bodies[i].model)) continue;
+        std::erase(models, out.way.bodies[i].model);
+        refused = true;
+      }
+      if (!refused) return out;
+    }
+  }
+
  private:
+  bool takes(const Body &b, const std::string &model) {
+    if (b.springs.empty() && !may_be_cut() && !(b.def.mass_scaling > 0)) return true;
+    const auto [found, first] = takes_.try_emplace({b.name, model});
+    if (!first) return found->second;
+    const Quiet quiet;
+    try {
+      dfm_world_destroy(build_alone(context_, def_, b, model, {}).world);
+      found->second = true;
+    } catch (const Error &) {
+      found->second = false;
+    }
+    return found->second;
+  }
+
   // Only first-order tetrahedra can be cut or torn.
   bool may_be_cut() const {
     return !def_.cuts.empty() ||
@@ -361,8 +392,7 @@ class Reader {
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
-  // "gpu" asks for one that a card computes, too, with its defaults. Where the scene asks for more than
-  // motion, those that take the body; where none does, building the scene says why.
+  // "gpu" asks for one that a card computes, too, with its defaults.
   std::vector<std::string> candidates(const Measured &measured, const Body &b, uint32_t cell) const {
     std::vector<std::string> out;
     for (const MeasuredModel &m : measured.models) {
@@ -371,19 +401,7 @@ class Reader {
       if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
       out.push_back(m.id);
     }
-    if (b.springs.empty() && !may_be_cut() && !(b.def.mass_scaling > 0) && def_.effects_auto) return out;
-    std::vector<std::string> able = out;
-    std::erase_if(able, [&](const std::string &id) { return !takes(b, id); });
-    return able.empty() ? out : able;
-  }
-  bool takes(const Body &b, const std::string &model) const {
-    const Quiet quiet;
-    try {
-      dfm_world_destroy(build_alone(context_, def_, b, model, {}).world);
-    } catch (const Error &) {
-      return false;
-    }
-    return true;
+    return out;
   }
 
   // Of cells that are seen as several tetrahedra each, the edges are not those of these.
@@ -455,7 +473,8 @@ class Reader {
   double g_ = 0, down_[3] = {};
   std::vector<BodyMesh> meshes_;
   std::vector<Extent> boxes_;
-  std::map<size_t, bool> convex_;  // bodies
+  std::map<size_t, bool> convex_;                              // bodies
+  std::map<std::pair<std::string, std::string>, bool> takes_;  // body, model
 };
 
 json way_json(const Way &way, const Definition &def) {
@@ -491,9 +510,9 @@ json plan_scene(dfm_context *context, const Definition &def, json &tree) {
   wish.step = def.step;
   const Measured measured = read_costs();
   Reader reader(context, def);
-  std::vector<BodyRegime> bodies = reader.run(measured);
-  const std::vector<BodyRegime> own = bodies;
-  PlannedWay plan = plan_accuracy(own, measured, wish);
+  std::vector<BodyRegime> own = reader.run(measured);
+  PlannedWay plan = reader.plan(own, measured, wish);
+  std::vector<BodyRegime> bodies = own;
   const Way of_own = plan.way;
   std::vector<double> lattice(own.size(), 0);
   bool unmeasured = false;
@@ -502,7 +521,7 @@ json plan_scene(dfm_context *context, const Definition &def, json &tree) {
     std::vector<double> sizes;
     if (!reader.lattices(own, 1 / (larger * kTetsOfHexahedron), measured, others, sizes, unmeasured))
       continue;
-    PlannedWay other = plan_accuracy(others, measured, wish);
+    PlannedWay other = reader.plan(others, measured, wish);
     if (!wins(other, plan, wish)) continue;
     plan = std::move(other);
     bodies = std::move(others);

@@ -104,8 +104,9 @@ std::string remedy(World &w, const Overlap &o, bool untangled) {
                             : first == second
                                 ? format("move '%s' at the start", first.c_str())
                                 : format("move '%s' or '%s' at the start", first.c_str(), second.c_str());
-  return what + "; " + where + (untangled ? "" : ", or set \"untangle\"") +
-         (thing ? hint_of_attachment(w, a.id) : "") + (came ? "" : hint_of_units(a, thing));
+  const std::string held = thing ? hint_of_attachment(w, a.id) : "";  // untangle moves none that is held
+  return what + "; " + where + (untangled || !held.empty() ? "" : ", or set \"untangle\"") + held +
+         (came ? "" : hint_of_units(a, thing));
 }
 
 void warn(World &w, const Overlap &o, bool untangled) {

@@ -307,12 +307,6 @@ Crossed OverlapSides::look(const OverlapPair &p, double least, bool yes_or_no) {
                   : cross_skins(body(p.a), other(p), least, yes_or_no, stack_);
 }
 
-double OverlapSides::depth(const OverlapPair &p, Vec3 x) {
-  if (round(p)) return -shape(p).closest(x).distance;
-  OverlapSkin &b = other(p);
-  return b.inside(x) ? b.distance(x) : -b.distance(x);
-}
-
 Vec3 OverlapSides::center(const OverlapPair &p) {
   return round(p) ? w_.obstacles[p.b]->pose.position : 0.5 * (other(p).lo() + other(p).hi());
 }

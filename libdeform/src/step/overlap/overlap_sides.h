@@ -83,8 +83,6 @@ class OverlapSides {
   // through: by more than `least`.
   Crossed look(const OverlapPair &p, double least, bool yes_or_no);
 
-  double depth(const OverlapPair &p, Vec3 x);  // m, of a place in b; negative: outside, by so much
-
   // Of side b.
   ObstacleShape shape(const OverlapPair &p) const;
   bool plane(const OverlapPair &p) const;

@@ -96,7 +96,9 @@ void ToolTouch::request_response(Moved &m, uint32_t g) {
   const size_t at = m.first[g] != kNone ? m.first[g] : m.response.size();
   if (m.first[g] == kNone) m.response.resize(at + m.wide[g] * m.wide[g], 0.0);
   m.first[g] = kNone;
-  if (set.respond(g, static_cast<uint32_t>(m.wide[g] / 6), &m.response[at])) return;
+  const HostFault fault = set.respond(g, static_cast<uint32_t>(m.wide[g] / 6), &m.response[at]);
+  need_memory(fault.status);
+  if (fault) return;
   m.first[g] = at;
   if (m.jointed[g]) clean_response(m, g);
 }

@@ -20,10 +20,9 @@
 namespace dfm {
 namespace {
 
-constexpr double kDone = 1e-2;             // of what slips may be off by at rest: less changes nothing
-constexpr double kDent = 5e-4;             // m, Pair::dent, of what is not thin
-constexpr double kSmallTurn = 0.05;        // rad in a sub-step, up to which a series has less rounding
-constexpr double kMinSubstep = 1.0 / 256;  // of a planned sub-step
+constexpr double kDone = 1e-2;       // of what slips may be off by at rest: less changes nothing
+constexpr double kDent = 5e-4;       // m, Pair::dent, of what is not thin
+constexpr double kSmallTurn = 0.05;  // rad in a sub-step, up to which a series has less rounding
 constexpr double kNear = 0.5;    // of the least thickness: no row with an impulse is longer, no dent deeper
 constexpr double kFaster = 0.5;  // of the change by the pass before: else passes end
 constexpr uint32_t kMaxPasses = 6;  // over what turning adds, until it changes no more
@@ -467,7 +466,7 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
     const double closes = std::min(0.0, h_ * dot(row.normal, speed(row)));
     if (row.impulse > 0 || room + closes < leaves) turn = std::max(turn, most);
   }
-  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinSubstep * step.length.planned / step.h);
+  if (off_ > kOff * offset_) arrives = std::min(arrives, kMinRepeated * step.length.planned / step.h);
   if ((!(turn > 0) && arrives == 1) || !may_shorten(step) || !may_repeat(w, step)) return true;
   step.length.repeat_grown(turn > 0 ? std::min(arrives, kAims * kArc / turn) : arrives);
   return false;

@@ -56,10 +56,6 @@ bool fill_responses(World &w, StepContext &step, uint32_t *trouble) {
 // What a solid body answers at its surface, over the response of its mass: 2.5 at a ball.
 constexpr double kWhole = 2.5;
 constexpr uint32_t kMaxRevisions = 12;  // of the responses of rigid hosts, within a sub-step
-// A sub-step in which the forces and contacts of a body do not agree is repeated with half its length, down
-// to this share of the planned one.
-constexpr double kMinSubstep = 1.0 / 256;
-
 // m/s, at which a depth opens that a pair was found with.
 constexpr double kRecoverySpeed = 8e-4;
 
@@ -103,7 +99,7 @@ double start_depth(const World &w, const StepContext &step, const ContactPoint &
   return std::max(0.0, std::min(left - opened, depth));
 }
 
-bool may_shorten(const StepContext &step) { return step.h > kMinSubstep * step.length.planned; }
+bool may_shorten(const StepContext &step) { return step.h > kMinRepeated * step.length.planned; }
 
 void report_impulses(StepContext &step) {
   const ContactRows &rows = step.rows;
