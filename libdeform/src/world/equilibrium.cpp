@@ -345,7 +345,8 @@ class Settling {
   bool balanced(const One &one) const {
     const double rounding = kForceRounding * one.points->stiffest() *
                             largest_coordinate(one.body->p.x.data(), one.body->p.n, kStride);
-    return (alone_ || norm(one.net) <= std::max(tolerance_ * one.all, rounding)) &&
+    const double carried = 0.5 * one.all;  // each force has one that it balances
+    return (alone_ || norm(one.net) <= std::max(tolerance_ * carried, rounding)) &&
            one.left <= std::max(tolerance_ * one.scale, rounding);
   }
 
