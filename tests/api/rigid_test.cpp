@@ -170,6 +170,13 @@ TEST(RigidBodies, WithoutNames_TakeTheNextFreeOnes) {
   for (int i = 10; i < 20; ++i) add_plane(w, ("rigid" + std::to_string(i)).c_str());
   const Set two{{box(nullptr, {1, 1, 1}, 1), box(nullptr, {1, 1, 1}, 1, {9, 9, 9})}, {}};
   EXPECT_EQ(two.create(w), DFM_OK) << dfm_last_error();
+
+  std::vector<std::string> names;
+  for (int i = 20; i < 60; ++i) names.push_back("rigid" + std::to_string(i));
+  std::vector<dfm_rigid_def> bodies = {box(nullptr, {1, 1, 1}, 1)};
+  for (const std::string &name : names) bodies.push_back(box(name.c_str(), {1, 1, 1}, 1));
+  const Set one_of_many{bodies, {}};
+  EXPECT_EQ(one_of_many.create(w), DFM_OK) << dfm_last_error();
 }
 
 TEST(RigidBodies, HashAndSnapshotOnThreads_CoverThem) {

@@ -258,6 +258,7 @@ TEST(BulletLifecycle, Restore_BringsTheSurfaceOfAMovedObjectToIt) {
   b.step();
   const std::string shot = snapshot(b.soft);
   box->setWorldTransform(at({0, 0, 0.0078125}));
+  box->getBroadphaseHandle()->m_collisionFilterMask = 6;
   b.step();
   ok(dfm_world_restore(b.soft, shot.data(), shot.size()));
   b.step();
@@ -266,6 +267,9 @@ TEST(BulletLifecycle, Restore_BringsTheSurfaceOfAMovedObjectToIt) {
   ok(dfm_bullet_obstacle(b.adapter, box, 0, &o));
   ok(dfm_obstacle_get_pose(o, &pose));
   EXPECT_EQ(pose.position[2], 0.0078125);
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  ok(dfm_obstacle_get_def(o, &d));
+  EXPECT_EQ(d.collides_with, 6u);
 }
 
 TEST(BulletLifecycle, WrongUse_IsReportedInOneSentence) {

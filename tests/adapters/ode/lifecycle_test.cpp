@@ -567,6 +567,7 @@ TEST(OdeLifecycle, Restore_BringsTheSurfaceOfAMovedGeomToIt) {
   ode.step();
   const std::vector<unsigned char> shot = ode.snapshot();
   dGeomSetPosition(box, 0, 0, 0.01);
+  dGeomSetCollideBits(box, 6);
   ode.step();
   ok(dfm_ode_restore(ode.adapter, shot.data(), shot.size()));
   ode.step();
@@ -575,6 +576,9 @@ TEST(OdeLifecycle, Restore_BringsTheSurfaceOfAMovedGeomToIt) {
   ok(dfm_ode_obstacle(ode.adapter, box, &o));
   ok(dfm_obstacle_get_pose(o, &pose));
   EXPECT_EQ(pose.position[2], 0.01);
+  dfm_obstacle_def d = dfm_obstacle_def_default();
+  ok(dfm_obstacle_get_def(o, &d));
+  EXPECT_EQ(d.collides_with, 6u);
 }
 
 TEST(OdeLifecycle, PlainWorldStep_IsRefused) {
