@@ -99,6 +99,27 @@ TEST(Equilibrium, SpringsAndTetrahedra_AreWhereTheyRestAfterALongTime) {
   }
 }
 
+// What relaxes on a floor is where it is after all time, however slowly it does.
+TEST(Equilibrium, OfABarOnAFloor_DoesNotWaitForItsRelaxation) {
+  double sag[2];
+  for (const double relaxation : {1e-2, 1e2}) {
+    Bar bar("msm", 0.3, {0, 0, -9.81}, false);
+    const double sls = 2;
+    const dfm_param_value values[] = {{"damper", &sls, 1}, {"relaxation_time", &relaxation, 1}};
+    const dfm_params params = {sizeof params, 2, values};
+    test::ok(dfm_body_set_model(bar.body, "msm", &params));
+    double low = 1e300;
+    for (size_t i = 2; i < bar.rest.size(); i += 3) low = std::min(low, bar.rest[i]);
+    test::add_plane(bar.world, "floor", {0, 0, low});
+    const double start = test::measure(bar.body).com[2];
+    dfm_equilibrium_info info = info_of();
+    test::ok(bar.find(dfm_equilibrium_def_default(), &info));
+    EXPECT_LT(info.iterations, 200u) << relaxation;
+    sag[relaxation > 1] = test::measure(bar.body).com[2] - start;
+  }
+  EXPECT_NEAR(sag[1] / sag[0], 1, 1e-4);
+}
+
 TEST(Equilibrium, LoadSteps_EndAtTheSamePlace) {
   Bar one("corotational_fem", 0.3, {0, 0, -9.81}), four("corotational_fem", 0.3, {0, 0, -9.81});
   dfm_equilibrium_def def = dfm_equilibrium_def_default();

@@ -9,12 +9,12 @@ AtRest::AtRest(const Memory &memory, Phyxels &points, ModelInstance &model) : p_
   zero_.assign(size_t{kStride} * p_.n, 0.0);
 }
 
-dfm_kin AtRest::kin(double time, double dt) const {
-  return kin_at(time, dt, p_.x.data(), zero_.data(), model_.state.data());
+dfm_kin AtRest::kin(double time) const {
+  return kin_at(time, kForever, p_.x.data(), zero_.data(), model_.state.data());
 }
 
-bool AtRest::add_forces(double time, double dt) {
-  const dfm_kin k = kin(time, dt);
+bool AtRest::add_forces(double time) {
+  const dfm_kin k = kin(time);
   return model_.call("add_forces", [&] { return model_.ops->add_forces(model_.self, &k, p_.f.data()); }) ==
          DFM_OK;
 }

@@ -16,10 +16,10 @@ class AtRest {
  public:
   AtRest(const Memory &memory, Phyxels &points, ModelInstance &model);
 
-  // In a step of dt seconds at the present positions, velocities zero.
-  dfm_kin kin(double time, double dt = kForever) const;
+  // At the present positions, velocities zero, relaxation and flow complete.
+  dfm_kin kin(double time) const;
   // Adds the forces of the model to points().f. Returns false if the model fails.
-  bool add_forces(double time, double dt = kForever);
+  bool add_forces(double time);
   // Sets the state of the model to its limit after infinite time (relaxed, flowed). Returns false if there is
   // no limit, or the model fails.
   bool relax(double time);

@@ -76,9 +76,9 @@ class SettlingPoints : public ImplicitPoints {
     a.damps = false;  // its steps are not steps in time
     return a;
   }
-  // Without contact flow is complete however long the step is.
-  dfm_kin kin(double time, double h, bool trial) const override {
-    return ImplicitPoints::kin(time, alone_ ? kForever : h, trial);
+  // Flow is complete however long the step is.
+  dfm_kin kin(double time, double, bool trial) const override {
+    return ImplicitPoints::kin(time, kForever, trial);
   }
   bool bound(double time, double share, const AddRowSums &outside, StepBound &out) override;
   bool free_motion(const SubStep &now, double &kinetic) override;
@@ -284,7 +284,7 @@ class Settling {
   void come_to_rest(const Station &to, uint32_t &steps) {
     const bool all_hang = std::ranges::all_of(bodies_, hangs);
     if (alone_ && !all_hang) w_.time = to.time;  // loads need not be balanced in between
-    weigh_all(kLongest);
+    weigh_all();
     for (One &one : bodies_) one.points->forget_way();
     const double most = alone_ && all_hang ? kForever : kLongest;
     double longest = most;  // where no force is left over
@@ -308,7 +308,7 @@ class Settling {
              "no equilibrium was found, because a step from rest failed (%s); use more load_steps, hold what "
              "moves freely, or raise max_time and max_work",
              dfm_last_error());
-      weigh_all(h);
+      weigh_all();
       bool rests = solved;
       for (One &one : bodies_) {
         if (alone_) check_balance(one);
@@ -360,22 +360,21 @@ class Settling {
   }
 
   // Stops all bodies, too.
-  void weigh_all(double h) {
+  void weigh_all() {
     for (One &one : bodies_) {
       Phyxels &p = one.body->p;
       std::fill(p.v.begin(), p.v.end(), 0.0);
       one.body->relax_dampers();
       set_loads(*one.body, w_.time, w_.prescribed.share);  // without springs
-      weigh(one, h);
+      weigh(one);
     }
   }
 
-  // Computes the unbalanced forces at the present positions, with the contact forces of the last step of h
-  // seconds.
-  void weigh(One &one, double h) {
+  // Computes the unbalanced forces at the present positions, with the contact forces of the last step.
+  void weigh(One &one) {
     sum_loads(one);
     const Phyxels &p = one.body->p;
-    if (!one.rest->add_forces(w_.time, alone_ ? kForever : h)) one.left = HUGE_VAL;
+    if (!one.rest->add_forces(w_.time)) one.left = HUGE_VAL;
     double nan_flag = 0;
     for (size_t at = 0; at < p.x.size(); ++at) {
       double &most = p.moves(at) || at % kStride == 3 ? one.left : one.scale;
