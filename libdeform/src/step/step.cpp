@@ -129,19 +129,18 @@ double least_sub_steps(const World &w, double dt) { return std::ceil(dt / w.boun
 // The step needs more than max_substeps, and nothing has moved yet.
 dfm_status refuse_step(World &w, double dt, uint32_t *trouble) {
   const Body *const b = w.bound.body;
-  const bool explicit_points =
-      b && b->integrator.used == DFM_INTEGRATOR_SYMPLECTIC_EULER && !b->model.stepper;
-  const char *const name = b ? b->name.c_str() : "?";
+  const bool steps_itself = b && b->model.stepper;
+  const bool springs = !b || (!steps_itself && b->integrator.used != DFM_INTEGRATOR_SYMPLECTIC_EULER);
   fail_step(
       trouble, DFM_TROUBLE_SUBSTEPS,
-      "a step of %g s needs %g sub-steps of %g s (max_substeps %u): %s%s '%s', whose point %u bounds the "
-      "step, or take a shorter step",
+      "a step of %g s needs %g sub-steps of %g s (max_substeps %u): %s%s body '%s', whose point %u bounds "
+      "the step, %s, or take a shorter step",
       dt, least_sub_steps(w, dt), w.bound.step, w.def.max_substeps,
-      explicit_points && b->model.can(DFM_CAP_STIFFNESS) ? "let bodies move by tr_bdf2 or implicit_euler, "
-                                                         : "",
-      explicit_points || (b && b->model.stepper) ? "soften or coarsen body, or lower the damping of body"
-                                                 : "soften, or damp less, the springs that pull body",
-      name, w.bound.point);
+      !springs && !steps_itself && b->model.can(DFM_CAP_STIFFNESS)
+          ? "let bodies move by tr_bdf2 or implicit_euler, "
+          : "",
+      springs ? "soften the springs that pull" : "soften or coarsen", b ? b->name.c_str() : "?",
+      w.bound.point, springs ? "damp them less" : "lower its damping");
   return DFM_DISCARD;
 }
 // The bound has fallen so far within the step that the rest of it needs too many.
