@@ -172,7 +172,7 @@ TEST(RigidBodies, WithoutNames_TakeTheNextFreeOnes) {
   EXPECT_EQ(two.create(w), DFM_OK) << dfm_last_error();
 
   std::vector<std::string> names;
-  for (int i = 20; i < 60; ++i) names.push_back("rigid" + std::to_string(i));
+  for (int i = 22; i < 60; ++i) names.push_back("rigid" + std::to_string(i));
   std::vector<dfm_rigid_def> bodies = {box(nullptr, {1, 1, 1}, 1)};
   for (const std::string &name : names) bodies.push_back(box(name.c_str(), {1, 1, 1}, 1));
   const Set one_of_many{bodies, {}};
