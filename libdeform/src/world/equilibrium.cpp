@@ -33,12 +33,12 @@ namespace dfm {
 namespace {
 
 // s, length of a step. The longer it is, the more the stiffness and the less the mass of a body decides its
-// end. Where nothing can touch bodies that are held, a step may last forever. Below the second, a step that
-// fails ends the search.
+// end. Where nothing can touch bodies that are held, a step may last forever. A search whose steps failures
+// have halved below the second ends.
 constexpr double kLongest = 1, kShortest = 1e-4;
 // Tolerances: of contact in a step, relative to the median edge of a body; of the motion in the last step,
-// relative to the size of the body, and of forces at a point and on a body that nothing holds, relative to
-// the largest load, reaction or contact force (or their rounding).
+// relative to the size of the body, of forces at a point to the largest load, reaction or contact force, and
+// of their sum over a body to half of their norms (or to their rounding).
 constexpr double kContact = 2e-8, kLeft = 1e-6;
 constexpr double kAlone = 1e-10;  // of Newton's method and of forces where nothing can touch anything
 constexpr double kReach = 0.1;    // of its size, an edge at least: what a body may move in a step

@@ -93,8 +93,7 @@ void ToolTouch::warn_passing(const World &w, const StepContext &step) {
     const Obstacle &body = is_moved(a) ? a : b, &other = is_moved(a) ? b : a;
     w.context->warn(
         "'%s' is %.3g m deep in '%s' at %.6g s and goes through it; make both (what stands: \"fixed\") "
-        "bodies of "
-        "one host, of boxes or triangles, or filter the pair",
+        "bodies of one host, of boxes or triangles, or filter the pair",
         body.name.c_str(), deep, other.name.c_str(), w.time);
   }
 }
