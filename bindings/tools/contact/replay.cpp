@@ -53,7 +53,6 @@ class Replay final : public SolveLaws {
   bool evaluate_local(const double *response, double slip) override {
     return !batches_.evaluate_local(p_.h, response, slip, 0, p_.state);
   }
-  bool slopes() override { return !batches_.slopes(p_.h, p_.state); }
   bool judge(Residual &residual) override {
     set_trial(p_.rows, part_, p_.h, p_.rows.wt.data(), p_.state);
     if (batches_.evaluate_local(p_.h, p_.rows.wt.data(), 0.1 * p_.rest, 1e-2, p_.state)) return false;

@@ -140,7 +140,6 @@ class Solve final : public SolveLaws {
     }
     return true;
   }
-  bool slopes() override { return true; }
   void spend(uint64_t) override {}
   bool goes_on() override { return true; }
   bool judge(Residual &residual) override {

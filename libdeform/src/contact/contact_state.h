@@ -32,17 +32,10 @@ struct ContactState {
   Array<uint8_t> mode;        // 0 open, 1 stick, 2 slip
   Array<uint8_t> form;        // LawForm
   Array<LinearLaw> linear;    // [n] of smooth laws, by linearize()
-  // [n] For slopes by differences: the force at which they were computed, and which of them are valid at the
-  // present result.
-  struct Origin {
-    double v[2], fn, f[2];
-    uint8_t made, hold;
-  };
-  Array<Origin> origin;
 
   void use(const Memory &m) {
     use_memory(m, law, fn, vt, ft_stop, area, dwell, bristle, ft, dft_dvt, dft_dfn, limit, bristle_out, mode,
-               form, slip, scale, linear, origin);
+               form, slip, scale, linear);
   }
   void resize(uint32_t count, uint32_t states) {
     n = count;
@@ -57,7 +50,6 @@ struct ContactState {
     mode.resize(stride);
     form.resize(stride);
     linear.resize(n);
-    origin.resize(n);
   }
 
   // from contact i on

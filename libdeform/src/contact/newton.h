@@ -37,7 +37,6 @@ class SolveLaws {
   // [rows], 1/kg (friction/local_solve.cpp); their slopes there. slip: m/s, that slips may be off by. False:
   // a law has failed.
   virtual bool evaluate_local(const double *response, double slip) = 0;
-  virtual bool slopes() = 0;
   // The residual of rows.impulse at rows.y; the state then has the laws there. False: a law has failed.
   virtual bool judge(Residual &residual) = 0;
   virtual void spend(uint64_t rows) = 0;  // that were swept, or multiplied
@@ -144,7 +143,7 @@ class ContactNewton {
   bool find_residual();
   bool evaluate(bool frozen);
   void evaluate_bond(uint32_t k);
-  bool find_slopes(bool frozen);
+  void find_slopes(bool frozen);
   void freeze();
   bool set_matrix();
   bool refactor();

@@ -323,10 +323,9 @@ void ContactNewton::freeze() {
 }
 
 // G = -dl/du of all rows at the last evaluate().
-bool ContactNewton::find_slopes(bool frozen) {
+void ContactNewton::find_slopes(bool frozen) {
   ContactState &s = *state_;
   const size_t n = s.stride;
-  if (!host_->slopes()) return false;
   std::fill(slope_.begin(), slope_.end(), 0.0);
   for (uint32_t k = 0; k < row_.size(); ++k) {
     const uint32_t i = row_[k].row;
@@ -395,7 +394,6 @@ bool ContactNewton::find_slopes(bool frozen) {
       G[8] -= h_ * viscous * t2 * e2;
     }
   }
-  return true;
 }
 
 // The part of G that is symmetric and has no negative eigenvalue.

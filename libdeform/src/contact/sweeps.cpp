@@ -92,7 +92,6 @@ bool Sweeps::solve(ContactRows &rows, const RowsPart &part, ContactState &state,
       if (left.required <= 1) return true;
       return left.speed <= limits.start ? ends : stop_sweeps();
     }
-    if (!laws.slopes()) return true;
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/error.h"
 #include "plugin/call.h"
@@ -56,9 +57,7 @@ LawInstance::~LawInstance() {
   if (ops->prepare && ops->release) call_plugin(*host, *type, "release", [&] { ops->release(host, data); });
 }
 
-LawBatches::LawBatches(const Memory &m) {
-  use_memory(m, order_, in_, out_, moved_, forces_, mode_, local_, selected_);
-}
+LawBatches::LawBatches(const Memory &m) { use_memory(m, order_, in_, out_, mode_, local_, selected_); }
 
 void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts,
                         ContactState &state) {
@@ -66,7 +65,7 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const 
   uint32_t n = 0, end = 0;
   for (const RowRun &r : contacts) n += r.n;
   order_.resize(n);
-  has_smooth_ = remembers_ = differences_ = false;
+  has_smooth_ = remembers_ = false;
   for (uint32_t l = 0; l < laws.size() && end < n; ++l) {
     const uint32_t begin = end;
     const LawForm form = laws[l]->form();
@@ -74,12 +73,10 @@ void LawBatches::gather(const std::vector<LawInstance *> &laws, std::span<const 
       if (state.law[i] != l) return;
       order_[end++] = i;
       state.form[i] = form;
-      state.origin[i].made = state.origin[i].hold = kNoSlope;
     });
     if (end == begin) continue;
     has_smooth_ |= form == kSmoothLaw;
     remembers_ |= laws[l]->nstate > 0;
-    differences_ |= !(laws[l]->ops->flags & DFM_FRIC_JACOBIAN);
     batches_.push_back({laws[l], begin, end - begin});
   }
 }
@@ -101,51 +98,11 @@ const LawInstance *LawBatches::evaluate(double h, ContactState &state) {
   return nullptr;
 }
 
-const LawInstance *LawBatches::slopes(double h, ContactState &state) {
-  for (const Batch &batch : batches_) {
-    if ((batch.law->ops->flags & DFM_FRIC_JACOBIAN) || batch.law->form() == kNoFriction) continue;
-    for (const Slopes which : {kByVt, kByFn}) {
-      selected_.clear();
-      for (uint32_t k = 0; k < batch.n; ++k) {
-        const uint32_t i = order_[batch.begin + k];
-        if (state.origin[i].hold & which) continue;
-        // The force of a sticking contact depends on its bristle and not on the normal force; the passes
-        // correct small deviations.
-        if (which == kByFn && state.mode[i] == 1) {
-          state.dft_dfn[i] = state.dft_dfn[state.stride + i] = 0;
-          state.origin[i].made |= which;
-          state.origin[i].hold |= which;
-        } else {
-          selected_.push_back(i);
-        }
-      }
-      if (selected_.empty()) continue;
-      if (const LawInstance *bad = difference(*batch.law, selected_, h, which, state)) return bad;
-    }
-  }
-  return nullptr;
-}
-
-// If slopes predict the change of force since they were computed to a tenth, each pass reduces the error to a
-// tenth; new slopes are not worth three evaluations.
-void LawBatches::reuse_slopes(uint32_t i, ContactState &s) {
-  constexpr double kGood = 0.1;
-  ContactState::Origin &o = s.origin[i];
-  if (!o.made) return;
-  const uint32_t n = s.stride;
-  const double v1 = s.vt[i] - o.v[0], v2 = s.vt[n + i] - o.v[1], fn = s.fn[i] - o.fn;
-  const double p1 = s.dft_dvt[i] * v1 + s.dft_dvt[n + i] * v2 + s.dft_dfn[i] * fn;
-  const double p2 =
-      s.dft_dvt[2 * size_t(n) + i] * v1 + s.dft_dvt[3 * size_t(n) + i] * v2 + s.dft_dfn[n + i] * fn;
-  const double e1 = s.ft[i] - o.f[0] - p1, e2 = s.ft[n + i] - o.f[1] - p2;
-  o.hold = e1 * e1 + e2 * e2 <= kGood * kGood * (p1 * p1 + p2 * p2) ? o.made : uint8_t(kNoSlope);
-}
-
 dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint32_t> index, double h,
                                    const ContactState &state) {
   const uint32_t n = static_cast<uint32_t>(index.size()), needs = law.ops->needs, S = law.nstate;
   const size_t column = (n + 7) & ~7u;
-  in_.assign(column * (7 + S), 0.0);
+  in_.assign(column * (8 + S), 0.0);  // the last one for call()
   double *const fn = in_.data();
   double *const vt = fn + column;
   double *const stop = vt + 2 * column;
@@ -179,10 +136,43 @@ dfm_friction_in LawBatches::inputs(const LawInstance &law, std::span<const uint3
   return in;
 }
 
+// Calls a law. Derivatives that it does not give are forward differences of its force: without them a steep
+// law (h w_t c > 1) would make the passes diverge. A difference is a millionth of the value, and at least a
+// tenth of the slip and of the force that the solve resolves.
+dfm_status LawBatches::call(const LawInstance &law, const dfm_friction_in &in, dfm_friction_out out) {
+  const auto eval = [&] {
+    return call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); });
+  };
+  if (law.ops->flags & DFM_FRIC_JACOBIAN) return eval();
+  const size_t s = in.stride;
+  double *const ft = out.ft, *const dv = std::exchange(out.dft_dvt, nullptr),
+                *const dn = std::exchange(out.dft_dfn, nullptr);
+  dfm_status status = eval();
+  out.state = out.limit = nullptr;
+  out.mode = nullptr;
+  double *const fn = in_.data(), *const vt = fn + s, *const kept = in_.data() + (7 + law.nstate) * s;
+  // moved: the column of in; to: [2,n]
+  const auto differ = [&](double *moved, double least, double *to) {
+    if (status != DFM_OK) return;
+    std::copy_n(moved, s, kept);
+    for (size_t k = 0; k < in.n; ++k) moved[k] += std::max(least, 1e-6 * std::fabs(kept[k]));
+    out.ft = to;
+    status = eval();
+    for (size_t r = 0; r < 2; ++r)
+      for (size_t k = 0; k < in.n; ++k)
+        to[r * s + k] = (to[r * s + k] - ft[r * s + k]) / (moved[k] - kept[k]);
+    std::copy_n(kept, s, moved);
+  };
+  differ(vt, 1e-7, dv);
+  differ(vt + s, 1e-7, dv + 2 * s);
+  std::swap_ranges(dv + s, dv + 2 * s, dv + 2 * s);  // row-major
+  differ(fn, 1e-9, dn);
+  return status;
+}
+
 const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const uint32_t> index, double h,
                                         ContactState &state) {
   const dfm_friction_in in = inputs(law, index, h, state);
-  const bool given = law.ops->flags & DFM_FRIC_JACOBIAN;
   const size_t column = in.stride, stride = state.stride, S = law.nstate;
   out_.resize(column * (11 + S));
   mode_.resize(column);
@@ -194,16 +184,13 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
   out.limit = out.dft_dfn + 2 * column;
   out.state = out.limit + 3 * column;
   out.mode = mode_.data();
-  if (!given) out.dft_dvt = out.dft_dfn = nullptr;
   failed_ = kNone;
-  if (call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) != DFM_OK)
-    return &law;
+  if (call(law, in, out) != DFM_OK) return &law;
 
-  // f(column of the result, columns, state's own): the results that this law gives, but for limit and mode
+  // f(column of the result, columns, state's own): the results but for limit and mode
   const auto each_result = [&](const auto &f) {
     f(out.ft, size_t{2}, state.ft);
     f(out.state, S, state.bristle_out);
-    if (!given) return;
     f(out.dft_dvt, size_t{4}, state.dft_dvt);
     f(out.dft_dfn, size_t{2}, state.dft_dfn);
   };
@@ -218,64 +205,13 @@ const LawInstance *LawBatches::evaluate(const LawInstance &law, std::span<const 
     });
     state.limit[i] = out.limit[k];
     state.mode[i] = out.mode[k];
-    if (!given) reuse_slopes(i, state);
     // the poison of NaN and infinity is not zero; a limit of +inf is valid: no limit
     if (failed_ == kNone && !(nan_flag == 0 && out.limit[k] >= 0)) failed_ = i;
   }
-  if (given && !state.scale.empty())
+  if (!state.scale.empty())
     for (const uint32_t i : index)
       for (const size_t at : {size_t{i}, stride + i}) state.dft_dfn[at] *= state.scale[i];
   return failed_ == kNone ? nullptr : &law;
-}
-
-// Derivatives of a law that does not give them, by forward differences: without them a steep law (h w_t c >
-// 1) would make the passes diverge. The difference is a millionth of the value, and at least a tenth of the
-// slip and of the force that the solve resolves.
-const LawInstance *LawBatches::difference(const LawInstance &law, std::span<const uint32_t> index, double h,
-                                          Slopes which, ContactState &state) {
-  dfm_friction_in in = inputs(law, index, h, state);
-  const size_t column = in.stride, n = state.stride;
-  const double *const fn = in.fn, *const vt = in.vt;
-  forces_.resize(2 * column);
-  dfm_friction_out out{};
-  out.size = sizeof out;
-  out.ft = forces_.data();
-  failed_ = kNone;
-  // to: the column of the 2x2 or 2x1 slope, of `width` columns
-  const auto differs = [&](const double *at, size_t columns, size_t c, const double *&input, double least,
-                           Array<double> &to, size_t width) {
-    moved_.assign(at, at + columns * column);
-    for (size_t k = 0; k < in.n; ++k)
-      moved_[c * column + k] += std::max(least, 1e-6 * std::fabs(at[c * column + k]));
-    input = moved_.data();
-    const bool evaluated =
-        call_plugin(*law.host, *law.type, "eval", [&] { return law.ops->eval(&in, &out); }) == DFM_OK;
-    input = at;
-    for (size_t r = 0; r < 2; ++r)
-      for (size_t k = 0; k < in.n; ++k) {
-        const double slope = (forces_[r * column + k] - state.ft[r * n + index[k]]) /
-                             (moved_[c * column + k] - at[c * column + k]);
-        to[(r * width + c) * n + index[k]] = slope;
-        if (failed_ == kNone && !std::isfinite(slope)) failed_ = index[k];
-      }
-    return evaluated;
-  };
-  bool evaluated = true;
-  if (which & kByVt)
-    evaluated =
-        differs(vt, 2, 0, in.vt, 1e-7, state.dft_dvt, 2) && differs(vt, 2, 1, in.vt, 1e-7, state.dft_dvt, 2);
-  if (evaluated && (which & kByFn)) evaluated = differs(fn, 1, 0, in.fn, 1e-9, state.dft_dfn, 1);
-  if ((which & kByFn) && !state.scale.empty())
-    for (const uint32_t i : index)
-      for (size_t r = 0; r < 2; ++r) state.dft_dfn[r * n + i] *= state.scale[i];
-  for (const uint32_t i : index) {
-    ContactState::Origin &o = state.origin[i];
-    // slopes computed at another trial belong to another force
-    if (!(o.hold & ~which)) o.made = kNoSlope;
-    const uint8_t made = o.made | which, hold = o.hold | which;
-    o = {{state.vt[i], state.vt[n + i]}, state.fn[i], {state.ft[i], state.ft[n + i]}, made, hold};
-  }
-  return evaluated && failed_ == kNone ? nullptr : &law;
 }
 
 }  // namespace dfm

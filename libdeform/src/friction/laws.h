@@ -54,13 +54,8 @@ class LawBatches {
   // threads may evaluate batches of disjoint contacts at once.
   void gather(const std::vector<LawInstance *> &laws, std::span<const RowRun> contacts, ContactState &state);
   // Evaluates every batch at the trial in state: force, limit, mode, trial state, and the slopes dft_dvt and
-  // dft_dfn of laws that give them. Returns nullptr, or the law that failed or returned a value that is not
-  // finite.
+  // dft_dfn. Returns nullptr, or the law that failed or returned a value that is not finite.
   const LawInstance *evaluate(double h, ContactState &state);
-  // Computes the slopes at the last evaluation, for laws that do not give them, by differences of the force.
-  // Called only if the solve continues, because they cost three more evaluations. Slopes of an earlier pass
-  // are kept if they have predicted the change of the force.
-  const LawInstance *slopes(double h, ContactState &state);
   // The same, but a smooth law is evaluated where the contact would come to rest alone
   // (friction/local_solve.cpp): state.vt moves there.
   //   wt     [n] 1/kg, how much slip an impulse makes at its own contact; with it ft_stop gives the slip
@@ -69,8 +64,7 @@ class LawBatches {
   const LawInstance *evaluate_local(double h, const double *wt, double least, double relative,
                                     ContactState &state);
   bool has_smooth() const { return has_smooth_; }
-  bool differences() const { return differences_; }  // whether any law gives no slopes
-  bool remembers() const { return remembers_; }      // whether any law has a state
+  bool remembers() const { return remembers_; }  // whether any law has a state
   // After a law has failed: the contact whose result is invalid; kNone: the law refused the whole batch.
   uint32_t failed() const { return failed_; }
 
@@ -83,32 +77,27 @@ class LawBatches {
   // from there.
   struct Local {
     uint32_t contact;
-    bool from_zero, last, fresh;
+    bool from_zero, last;
     double v[2], left, step[2], fraction;
   };
-  enum Slopes : uint8_t { kNoSlope = 0, kByVt = 1, kByFn = 2 };
   std::vector<Batch> batches_;
-  Array<uint32_t> order_;         // contacts by law, in contact order within each
-  Array<double> in_, out_;        // columns of one batch
-  Array<double> moved_, forces_;  // inputs and force beside the trial, for laws without derivatives
+  Array<uint32_t> order_;   // contacts by law, in contact order within each
+  Array<double> in_, out_;  // columns of one batch
   Array<uint8_t> mode_;
   Array<Local> local_;
   Array<uint32_t> selected_;  // contacts of local_ that are evaluated together
-  bool has_smooth_ = false, remembers_ = false, differences_ = false;
+  bool has_smooth_ = false, remembers_ = false;
   uint32_t failed_ = kNone;
   dfm_friction_in inputs(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                          const ContactState &state);
+  // in: of inputs()
+  dfm_status call(const LawInstance &law, const dfm_friction_in &in, dfm_friction_out out);
   const LawInstance *evaluate(const LawInstance &law, std::span<const uint32_t> contacts, double h,
                               ContactState &state);
   const LawInstance *solve_local(const Batch &batch, double h, const double *wt, double least,
                                  double relative, ContactState &state);
-  // Slopes by differences at the present trial. Returns the law if it fails.
-  const LawInstance *difference(const LawInstance &law, std::span<const uint32_t> contacts, double h,
-                                Slopes which, ContactState &state);
   // The result for contacts without friction, whose law is not evaluated.
   static void set_frictionless(std::span<const uint32_t> contacts, ContactState &state);
-  // whether earlier slopes are still valid at the last evaluation
-  static void reuse_slopes(uint32_t contact, ContactState &state);
 };
 
 }  // namespace dfm

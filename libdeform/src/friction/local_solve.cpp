@@ -80,8 +80,7 @@ const LawInstance *LawBatches::solve_local(const Batch &batch, double h, const d
   for (uint32_t k = 0; k < batch.n; ++k)
     if (const uint32_t i = order_[batch.begin + k];
         wt[i] > 0 && !is_accurate(s, i, h * wt[i], least, relative))
-      local_.push_back({i, false, false, false, {0, 0}, INFINITY, {0, 0}, 0});
-  const bool gives_slopes = batch.law->ops->flags & DFM_FRIC_JACOBIAN;
+      local_.push_back({i, false, false, {0, 0}, INFINITY, {0, 0}, 0});
   for (uint32_t pass = 1; !local_.empty(); ++pass) {
     size_t kept = 0;
     selected_.clear();
@@ -95,36 +94,27 @@ const LawInstance *LawBatches::solve_local(const Batch &batch, double h, const d
       // its size is no criterion.
       const bool nearer =
           size < 0.5 * c.left || (c.from_zero && size < c.left && g.a * c.step[0] + g.b * c.step[1] < 0);
-      c.fresh = false;
       if (std::isinf(c.left) || nearer) {
         if (pass == kMaxPasses) continue;
-        c.fresh = true;
         c.left = size;
         c.fraction = 1;
-        if (!gives_slopes && !(s.origin[i].hold & kByVt)) selected_.push_back(i);
+        newton_step(s, i, m, c.v, c.step);
       } else if (!c.from_zero && pass < kMaxPasses) {  // tangents at the present slip do not converge
-        c = {i, true, false, false, {0, 0}, INFINITY, {0, 0}, 0};
+        c = {i, true, false, {0, 0}, INFINITY, {0, 0}, 0};
       } else {
         c.fraction *= kCut;
       }
-      local_[kept++] = c;
-    }
-    local_.resize(kept);
-    if (local_.empty()) break;
-    if (!selected_.empty())
-      if (const LawInstance *bad = difference(*batch.law, selected_, h, kByVt, s)) return bad;
-    for (Local &c : local_) {
-      const uint32_t i = c.contact;
-      if (c.fresh) newton_step(s, i, h * wt[i], c.v, c.step);
       // The limit on passes, or on shortened steps, is reached: evaluate at the best slip again and
       // return that.
       c.last = pass >= kMaxPasses || (c.fraction > 0 && c.fraction < kMinFraction);
       if (c.last) c.fraction = 0;
       s.vt[i] = c.v[0] + c.fraction * c.step[0];
       s.vt[n + i] = c.v[1] + c.fraction * c.step[1];
+      selected_.push_back(i);
+      local_[kept++] = c;
     }
-    selected_.clear();
-    for (const Local &c : local_) selected_.push_back(c.contact);
+    local_.resize(kept);
+    if (local_.empty()) break;
     if (const LawInstance *bad = evaluate(*batch.law, selected_, h, s)) return bad;
     local_.erase(std::remove_if(local_.begin(), local_.end(), [](const Local &c) { return c.last; }),
                  local_.end());

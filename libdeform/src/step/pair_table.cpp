@@ -62,13 +62,13 @@ uint32_t thing_of(const World &w, uint64_t id) {
   return o == kNone ? kNone : static_cast<uint32_t>(w.bodies.size()) + o;
 }
 
+}  // namespace
+
 uint32_t law_of_zones(World &w, uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b) {
   const SurfaceZones::Zone &za = zone_at(w, a, zone_a), &zb = zone_at(w, b, zone_b);
   const FrictionRule *const rule = rule_of(w, a, za, b, zb);
   return rule ? rule->law : default_law(w, za.friction, zb.friction);
 }
-
-}  // namespace
 
 uint32_t add_law(World &w, const char *name, std::span<const dfm_param_value> values,
                  std::span<const uint8_t> free, double restitution) {
@@ -143,12 +143,6 @@ void put_law(World &w, uint32_t a, uint32_t b, const PairLaw &known) {
   if (known.zones == kNone) return;
   if (to.zone_table.empty()) to.zone_table.assign(w.bodies.size() * width, kNone);
   to.zone_table[a * width + b] = known.zones;
-}
-
-uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b) {
-  const FrictionRule *const rule =
-      best_rule(w.friction, {a.name, a.zone.group, a.zone.material}, {b.name, b.zone.group, b.zone.material});
-  return rule ? rule->law : default_law(w, a.zone.friction, b.zone.friction);
 }
 
 uint32_t contact_law(const World &w, const ContactPoint &c) {

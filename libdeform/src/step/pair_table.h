@@ -34,8 +34,7 @@ struct PairLaw {
 PairLaw find_law(World &w, uint32_t a, uint32_t b, std::vector<uint32_t> &used);
 // The same with what find_law has returned for two things of the same kinds (PairOfKinds, step/prepare.cpp).
 void put_law(World &w, uint32_t a, uint32_t b, const PairLaw &known);
-// The law of two obstacles, of which a tool is one.
-uint32_t law_of_obstacles(World &w, const Obstacle &a, const Obstacle &b);
+uint32_t law_of_zones(World &w, uint32_t a, uint32_t zone_a, uint32_t b, uint32_t zone_b);
 uint32_t pair_law(const World &w, uint32_t slot_a, bool obstacle, uint32_t slot_b);
 // That of its zones, where these have laws of their own.
 uint32_t contact_law(const World &w, const ContactPoint &c);

@@ -35,12 +35,11 @@ inline Next go_on(bool succeeded) { return succeeded ? Next::stage : Next::stop;
 struct Stage {
   const char *name;
   Next (*run)(World &w, StepContext &step, uint32_t *trouble);
-  const char *cost;                              // what its cost grows with; {..}: a count of cost_of()
+  const char *cost;                              // what its cost grows with
   StageChoice (*when)(const SceneFacts &facts);  // whether it runs, and why
   StageRole role = StageRole::none;
 };
 std::span<const Stage> stage_table();
-std::string cost_of(const World &w, const Stage &stage);  // stage_costs.cpp: Stage::cost with its counts
 Plan make_plan(const SceneFacts &facts);  // throws Error if nothing provides a requested effect
 
 // Choices that prepare() would make again but a restored world keeps, because they were made at an earlier

@@ -56,26 +56,22 @@ bool distribute(World &, StepContext &step, uint32_t *) {
 
 constexpr Stage kTable[] = {
     {"motion", row<stage_motion>, "what is prescribed", when::motion},
-    {"model", row<stage_model>, "{cells} cells", when::model},
-    {"predict", row<predict>, "{points} points", when::predict},
-    {"rigid predict", row<stage_rigid_predict>, "{states} states", when::rigid_predict},
-    {"gather", row<stage_gather>, "{weights} weights", when::gather},
-    {"broad", row<stage_broad>,
-     "{surfels} surfels every sub-step; {triangles} triangles whenever a skin is used up", when::broad,
+    {"model", row<stage_model>, "cells", when::model},
+    {"predict", row<predict>, "points", when::predict},
+    {"rigid predict", row<stage_rigid_predict>, "rigid bodies", when::rigid_predict},
+    {"gather", row<stage_gather>, "points of surfels", when::gather},
+    {"broad", row<stage_broad>, "surfels every sub-step; triangles whenever a skin is used up", when::broad,
      StageRole::lists_pairs},
     {"narrow", stage_narrow, "candidate pairs", when::narrow, StageRole::finds_contacts},
     {"self contact", row<stage_self>,
-     "{self surfels} surfels every sub-step, and what of them is near; {self triangles} triangles whenever a "
-     "skin is used up",
-     when::self},
+     "surfels every sub-step, and what of them is near; triangles whenever a skin is used up", when::self},
     {"contact+friction", row<solve>, "contacts x sweeps, laws once per pass", when::solve, StageRole::solves},
-    {"rigid commit", stage_rigid_commit, "{states} states", when::rigid_commit},
-    {"distribute", row<distribute>, "contacts and {surfels} surfels", when::distribute,
-     StageRole::reports_impulses},
+    {"rigid commit", stage_rigid_commit, "rigid bodies", when::rigid_commit},
+    {"distribute", row<distribute>, "contacts and surfels", when::distribute, StageRole::reports_impulses},
     {"guard", stage_guard, "candidate pairs that may come nearer than d_c / 2 within the sub-step",
      when::guard, StageRole::guards},
-    {"commit", row<stage_commit>, "{points} points", when::commit},
-    {"sleep", row<stage_sleep>, "velocities of {awake} awake bodies of {bodies}", when::sleep},
+    {"commit", row<stage_commit>, "points", when::commit},
+    {"sleep", row<stage_sleep>, "velocities of bodies that are awake", when::sleep},
 };
 
 using Clock = std::chrono::steady_clock;

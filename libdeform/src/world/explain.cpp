@@ -273,7 +273,7 @@ std::string explain(const World &w) {
   for (const PlannedStage &s : w.plan.stages) {
     const Stage &stage = stage_table()[s.row];
     stages.push_back("{\"name\":" + quote(stage.name) + ",\"why\":" + quote(s.why) +
-                     ",\"cost\":" + quote(cost_of(w, stage)) + "}");
+                     ",\"cost\":" + quote(stage.cost) + "}");
   }
   for (const AbsentStage &s : w.plan.absent)
     absent.push_back("{\"name\":" + quote(s.name) + ",\"why\":" + quote(s.why) + "}");

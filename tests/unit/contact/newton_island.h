@@ -136,7 +136,6 @@ class Laws final : public SolveLaws {
       else coulomb(law[i].mu, i, state_);
     return true;
   }
-  bool slopes() override { return true; }
   bool judge(Residual &residual) override {
     set_trial(rows_, part_, h_, rows_.wt.data(), state_);
     evaluate_local(rows_.wt.data(), 0);

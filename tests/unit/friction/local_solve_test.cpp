@@ -3,6 +3,8 @@
 #include "bristle_law.h"
 #include "friction/laws.h"
 #include "plugin/context.h"
+#include "plugin/params.h"
+#include "plugin/registry.h"
 
 namespace {
 
@@ -88,4 +90,58 @@ TEST(LocalSolve, AnyStiffnessAndStep_MeetsTheRadialReturn) {
             << "contact " << i << ", h " << h << ", sigma0 " << sigma0;
       }
     }
+}
+
+// Laws that ship, with and without the flag that they give derivatives. A factor on friction is part of the
+// derivative by the normal force.
+TEST(LocalSolve, LawWithoutDerivatives_GetsThemByDifferences) {
+  test::Context context;
+  const dfm_context &own = *static_cast<dfm_context *>(context);
+  constexpr uint32_t n = 203;
+  for (const char *name : {"dahl", "lugre", "elastoplastic", "coulomb"}) {
+    const dfm_type &type = own.registry.find(DFM_KIND_FRICTION, name);
+    dfm_friction ops = dfm::law_of(type);
+    ops.flags &= ~uint32_t{DFM_FRIC_JACOBIAN};
+    dfm_type without = type;
+    without.ops = &ops;
+    dfm::ContactState found[2];
+    for (dfm::ContactState &s : found) {
+      dfm::LawInstance law(&s == found ? type : without, own.host, dfm::pack_params(type, {}));
+      dfm::LawBatches batches(dfm::Memory::standard());
+      s.resize(n, law.nstate);
+      s.scale.assign(n, 0.7);
+      Numbers random;
+      const std::vector<double> wt(n);  // the laws are evaluated at vt
+      for (uint32_t i = 0; i < n; ++i) {
+        s.law[i] = 0;
+        s.dwell[i] = 0;
+        s.fn[i] = random.size(0.1, 10);
+        s.area[i] = random.size(1e-5, 1e-4);
+        for (uint32_t k = 0; k < 2; ++k) {
+          s.vt[k * s.stride + i] = random.size(1e-3, 1) * random.sign();
+          s.ft_stop[k * s.stride + i] = 100 * random.sign();
+        }
+        for (uint32_t k = 0; k < law.nstate; ++k) s.bristle[k * s.stride + i] = 1e-6 * random.sign();
+      }
+      const dfm::RowRun contacts{0, n};
+      const std::vector<double> vt(s.vt.begin(), s.vt.end());
+      batches.gather({&law}, {&contacts, 1}, s);
+      ASSERT_EQ(batches.evaluate_local(1e-4, wt.data(), 1e-8, 1e-4, s), nullptr) << name;
+      EXPECT_TRUE(std::equal(vt.begin(), vt.end(), s.vt.begin())) << name;
+    }
+    const auto &[given, by_differences] = found;
+    EXPECT_EQ(given.ft, by_differences.ft) << name;
+    EXPECT_EQ(given.bristle_out, by_differences.bristle_out) << name;
+    const auto compare = [&](const dfm::Array<double> &a, const dfm::Array<double> &b, uint32_t columns) {
+      for (uint32_t i = 0; i < n; ++i) {
+        double size = 0;
+        for (uint32_t c = 0; c < columns; ++c) size = std::max(size, std::fabs(a[c * given.stride + i]));
+        for (uint32_t c = 0; c < columns; ++c)
+          EXPECT_NEAR(b[c * given.stride + i], a[c * given.stride + i], 1e-3 * size + 1e-6)
+              << name << ", contact " << i << ", column " << c;
+      }
+    };
+    compare(given.dft_dvt, by_differences.dft_dvt, 4);
+    compare(given.dft_dfn, by_differences.dft_dfn, 2);
+  }
 }

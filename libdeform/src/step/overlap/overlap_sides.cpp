@@ -8,6 +8,7 @@
 
 #include "body/obstacle_mesh.h"
 #include "geometry/closest.h"
+#include "geometry/pierce.h"
 #include "geometry/tree_walk.h"
 #include "geometry/voxel_grid.h"
 
@@ -21,25 +22,10 @@ constexpr uint32_t kDepths = 2048;  // enclosed surfels whose depth is measured
 
 uint32_t stride_of(size_t n, uint32_t most) { return static_cast<uint32_t>(n / most + 1); }
 
-// The length of the edge p-q on the shorter side of a triangle that it crosses; negative: it does not cross.
-double pierce(Vec3 p, Vec3 q, Vec3 a, Vec3 b, Vec3 c) {
-  const double vp = tet_volume(a, b, c, p), vq = tet_volume(a, b, c, q);
-  if (!(vp * vq < 0)) return -1;
-  const double v0 = tet_volume(p, q, a, b), v1 = tet_volume(p, q, b, c), v2 = tet_volume(p, q, c, a);
-  if (!((v0 >= 0 && v1 >= 0 && v2 >= 0) || (v0 <= 0 && v1 <= 0 && v2 <= 0))) return -1;
-  const double area2 = norm(cross(b - a, c - a));
-  return area2 > 0 ? 6 * std::min(std::fabs(vp), std::fabs(vq)) / area2 : -1;
-}
-
 double cross_triangles(const OverlapSkin &a, uint32_t s, const OverlapSkin &b, uint32_t t) {
-  double most = -1;
-  for (int k = 0; k < 3; ++k) {
-    most = std::max(most, pierce(a.corner(s, k), a.corner(s, (k + 1) % 3), b.corner(t, 0), b.corner(t, 1),
-                                 b.corner(t, 2)));
-    most = std::max(most, pierce(b.corner(t, k), b.corner(t, (k + 1) % 3), a.corner(s, 0), a.corner(s, 1),
-                                 a.corner(s, 2)));
-  }
-  return most;
+  const Vec3 p[3] = {a.corner(s, 0), a.corner(s, 1), a.corner(s, 2)};
+  const Vec3 x[3] = {b.corner(t, 0), b.corner(t, 1), b.corner(t, 2)};
+  return std::max(edges_pierce(p, x), edges_pierce(x, p));
 }
 
 bool in_box(Vec3 p, const OverlapSkin &s) {
@@ -248,7 +234,9 @@ Crossed cross_shape(OverlapSkin &a, const ObstacleShape &b, double offset) {
                               closest_on_triangle(b.end(1), x[0], x[1], x[2]).distance2);
       for (int k = 0; k < 3; ++k)
         away2 = std::min(away2, closest_segments(x[k], x[(k + 1) % 3], b.end(0), b.end(1)).distance2);
-      if (pierce(b.end(0), b.end(1), x[0], x[1], x[2]) >= 0) away2 = 0;
+      const double sides[2] = {tet_volume(x[0], x[1], x[2], b.end(0)),
+                               tet_volume(x[0], x[1], x[2], b.end(1))};
+      if (pierce(b.end(0), b.end(1), x, sides[0], sides[1]) >= 0) away2 = 0;
       least = std::sqrt(away2) - view.radius;
       nearest = std::min(nearest, least);
     }

@@ -59,7 +59,7 @@ void ToolShape::take(const ObstacleView &view, ObstacleMesh *mesh) {
   edges_.clear();
   corners_.clear();
   triangles_.clear();
-  reach_ = (view.shape == Shape::sphere ? 0 : shape_.extent()) + round_;
+  reach_ = shape_.extent() + round_;
 }
 
 ToolBox ToolShape::bounds() const {

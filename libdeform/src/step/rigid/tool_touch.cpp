@@ -117,7 +117,8 @@ void ToolTouch::prepare(World &w, SceneFacts &facts) {
             facts.rigid_alone.push_back(o->name);
         continue;
       }
-      pair.law = law_of_obstacles(w, a, b);
+      const uint32_t nb = static_cast<uint32_t>(w.bodies.size());
+      pair.law = law_of_zones(w, nb + i, 0, nb + j, 0);
       pair.frees = !of_tool(a) && !of_tool(b);
       pair.jaw = is_jaw(a) || is_jaw(b);
       pair.b_first = b_first(a, b);

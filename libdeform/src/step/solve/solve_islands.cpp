@@ -82,7 +82,7 @@ void start_island(const World &w, StepContext &step, SolveIsland &own) {
   own.world = &w;
   own.step = &step;
   if (own.implicit) begin_newton(step, own);
-  if (evaluate_laws(w, step, own)) own.slopes();
+  evaluate_laws(w, step, own);
 }
 
 // m/s, of the velocities of bodies: that of the contact that needs most.
@@ -167,12 +167,6 @@ void solve_island(const World &w, StepContext &step, SolveIsland &own) {
 bool SolveIsland::evaluate_local(const double *response, double slip) {
   bad = batches.evaluate_local(step->h, response, slip, 0, step->state);
   return !bad;
-}
-
-bool SolveIsland::slopes() {
-  if ((bad = batches.slopes(step->h, step->state))) return false;
-  if (batches.differences()) linearize(step->rows, part, step->h, step->state);
-  return true;
 }
 
 bool SolveIsland::judge(Residual &found) {

@@ -49,7 +49,6 @@ struct SolveIsland final : SolveLaws {
 
   explicit SolveIsland(const Memory &m) : batches(m), sweeping(m) {}
   bool evaluate_local(const double *response, double slip) override;
-  bool slopes() override;
   bool judge(Residual &found) override;
   void spend(uint64_t rows) override;
   bool goes_on() override;
