@@ -50,8 +50,8 @@ typedef struct dfm_world_def {
   double sleep_speed;
   double sleep_time; /* s, 0.5 */
   /* DFM_SELF_ON: every surface can touch itself, as with "self_contact" in the list of effects;
-   * DFM_SELF_AUTO: only while it is folded or squeezed so far that it might; DFM_SELF_OFF: only if another
-   * effect needs it. dfm_world_filter_pair with the name of a body twice decides for that body
+   * DFM_SELF_AUTO: the same; DFM_SELF_OFF: only if another effect needs it.
+   * dfm_world_filter_pair with the name of a body twice decides for that body
    * (doc/concepts/self_contact.md) */
   uint32_t self_contact;
   uint32_t reserved;
@@ -293,7 +293,7 @@ typedef struct dfm_world_stats {
   uint64_t unconverged, guard_steps, rebuilds, refits; /* since creation */
   uint32_t inverted_max, substeps_max;                 /* since creation */
   double stable_step;                                  /* s, 0.9 of the bound at its last evaluation */
-  /* bodies that sleep now; bodies whose self contact was on in the last sub-step */
+  /* bodies that sleep now; bodies that touch themselves */
   uint32_t asleep, self_bodies;
   /* J and N s that bodies had when they fell asleep, sum since creation */
   double sleep_energy, sleep_momentum[3];
@@ -307,7 +307,7 @@ typedef struct dfm_world_stats {
   /* steps simplified because of their budget; steps abandoned because of dfm_world_interrupt */
   uint64_t cheapened, discarded;
   /* largest number at one time, since creation: cells so distorted that their model limited their stiffness;
-   * bodies whose self contact was on */
+   * bodies that touch themselves */
   uint32_t limited_max, self_max;
   /* J, kinetic and elastic energy of the bodies that the energy watch checks (the plan lists them): at the
    * first step; the maximum. Between two checks the kinetic energy of the motion without contact counts */

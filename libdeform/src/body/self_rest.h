@@ -71,7 +71,10 @@ inline constexpr double kClosedAtRest = 1e-2;
 
 // Two features of one surface: a surfel and a triangle without it, or two edges without a common end, the
 // lower one first.
-struct SelfPair { uint32_t a, b; };
+struct SelfPair {
+  uint32_t a, b;
+  double apart;  // m, at the positions to which the list refers
+};
 
 // What a pair is at rest.
 struct PairAtRest {

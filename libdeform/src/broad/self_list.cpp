@@ -10,9 +10,8 @@
 namespace dfm {
 namespace {
 
-constexpr double kSkinLeast = 0.02;  // of the median edge
-// if wider, every surfel would list the triangles of the second ring around it
-constexpr double kSkinMost = 0.2;
+// of the median edge: if wider, every surfel would list the triangles of the second ring around it
+constexpr double kSkin = 0.2;
 constexpr double kSpeedGrowth = 1.25;
 // share of the surfels above which the whole lists are renewed: a part takes twice as long for each triangle,
 // and what is left is out of date earlier
@@ -25,10 +24,18 @@ void sort_pairs(Array<SelfPair> &list, size_t from) {
     std::sort(list.begin() + std::ptrdiff_t(from), list.end(), before);
 }
 
+// Largest difference of two arrays [n,4], less that of their first rows; y null: of x itself. What all rows
+// have in common brings no two of them together.
+double largest_beside_first(uint32_t n, const double *x, const double *y) {
+  alignas(16) double common[4];
+  for (int k = 0; k < 4; ++k) common[k] = x[k] - (y ? y[k] : 0);
+  return largest_norm(n, x, y, common);
+}
+
 }  // namespace
 
 SelfList::SelfList(const Memory &m, const Surface &surface) : surface_(surface), tree_(m), at_(m) {
-  use_memory(m, vf_, ee_, scratch_, stack_, anew_[0], anew_[1], anew_[2]);
+  use_memory(m, x_, vf_, ee_, scratch_, stack_, anew_[0], anew_[1], anew_[2]);
 }
 
 // What one of two features adds to the reach of their contact. Two vertices of a pair are no further apart
@@ -51,29 +58,57 @@ bool SelfList::update(double h, double offset) {
   motion_ = deforming_motion(s, h);
   if (margin_ >= 0) {
     moved_ = at_.displaced(s);
+    place();
     if (!begun_ && kDistanceRounding * (moved_ + share(h, offset, 1)) <= margin_) return false;
   }
   if (!renew_part(h, offset, 0)) renew(h, offset, 0);
   return true;
 }
 
-void SelfList::update_ahead(double h, double offset) {
-  constexpr double kWider = 2;  // half of it is left to the motion until then
-  skin_steps_ *= kWider;
+// Keeps where the surfels are for moved_.
+void SelfList::place() {
+  x_.assign(surface_.x.begin(), surface_.x.end());
+  left_ = least_ - kDistanceRounding * 2 * moved_;
+}
+
+bool SelfList::beyond(double reach) const {
+  return kDistanceRounding * std::max(reach, self_recovery_depth(surface_)) < left_;
+}
+
+double SelfList::within(double h, double offset) const {
+  return kDistanceRounding * (std::max(2 * share(h, offset, 1), self_recovery_depth(surface_)) + 2 * moved_);
+}
+
+// A contact is made of a pair nearer than its reach, or than the recovery depth, so no pair that is further
+// apart makes one. Distances have fallen by no more than twice what a surfel has moved from where the lists
+// refer to, beyond any rigid motion: at the last update() beyond the one that fits best, and since then
+// beside the first surfel. What turns is measured anew once that does not suffice.
+bool SelfList::far(double h, double offset, double speed) {
+  const Surface &s = surface_;
+  if (s.ntri == 0) return true;
+  if (margin_ >= 0 && !begun_) {
+    const double moved = moved_ + largest_beside_first(s.nsurfel, s.x.data(), x_.data());
+    left_ = least_ - kDistanceRounding * 2 * moved;
+    motion_ = {0, speed};
+    if (beyond(2 * reach_share(h, offset, speed))) return true;
+    motion_.speed = largest_beside_first(s.nsurfel, s.v.data(), nullptr);
+    if (beyond(2 * reach_share(h, offset, motion_.speed))) return true;
+  }
   update(h, offset);
-  skin_steps_ /= kWider;
+  return beyond(2 * share(h, offset, 1));
+}
+
+bool SelfList::stays_far(double h, double offset, double change) {
+  if (surface_.ntri == 0 || beyond(2 * covers(h, offset, change))) return true;
+  update(h, offset);
+  cover(h, offset, change);
+  return beyond(2 * covers(h, offset, change));
 }
 
 bool SelfList::cover(double h, double offset, double change) {
   if (surface_.ntri == 0 || kDistanceRounding * (moved_ + covers(h, offset, change)) <= margin_) return false;
   if (!renew_part(h, offset, change)) renew(h, offset, change);
   return true;
-}
-
-double SelfList::skin_for(double now, double offset) const {
-  const double edge = surface_.median_edge;
-  if (wide_) return kSkinMost * edge;
-  return std::clamp(skin_steps_ * 0.5 * (now - offset), kSkinLeast * edge, kSkinMost * edge);
 }
 
 void SelfList::renew(double h, double offset, double change) {
@@ -86,9 +121,10 @@ void SelfList::renew(double h, double offset, double change) {
   if (tree_.empty() && s.tree) tree_.take(*s.tree);
   tree_.renew(s.tri, s.x.data());
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
-  const double margin = kDistanceRounding * now + skin_for(now, offset);
+  const double margin = kDistanceRounding * now + kSkin * s.median_edge;
   limit_ = kDistanceRounding * 2 * margin + self_recovery_depth(s);
   list(limit_);
+  find_least();
   margin_ = margin;
   ++renewals_;
 }
@@ -100,7 +136,7 @@ bool SelfList::renew_part(double h, double offset, double change) {
   if (margin_ < 0) return false;
   const double margin = std::exchange(margin_, -1);  // as in renew()
   const double now = std::max(share(h, offset, kSpeedGrowth), covers(h, offset, kSpeedGrowth * change));
-  const double room = margin / kDistanceRounding - now, wanted = skin_for(now, offset);
+  const double room = margin / kDistanceRounding - now, wanted = kSkin * s.median_edge;
   if (!begun_)
     for (const auto &[list, n] : {std::pair(&anew_[0], s.nsurfel), {&anew_[1], s.nedge}, {&anew_[2], s.ntri}})
       list->assign(n, 0);
@@ -113,6 +149,7 @@ bool SelfList::renew_part(double h, double offset, double change) {
   if (tree_.empty() && s.tree) tree_.take(*s.tree);
   tree_.renew(s.tri, at_.x().data());
   list_anew(limit_);
+  find_least();
   ++renewals_;
   if (!(kDistanceRounding * (moved_ + share(h, offset, 1)) <= margin &&
         kDistanceRounding * (moved_ + covers(h, offset, change)) <= margin))
@@ -120,6 +157,13 @@ bool SelfList::renew_part(double h, double offset, double change) {
   margin_ = margin;
   ++parts_;
   return true;
+}
+
+void SelfList::find_least() {
+  least_ = limit_;
+  for (const Array<SelfPair> *list : {&vf_, &ee_})
+    for (const SelfPair &pair : *list) least_ = std::min(least_, pair.apart);
+  place();
 }
 
 // An edge with a marked surfel, and a triangle with a marked surfel or edge, are marked.
@@ -147,16 +191,15 @@ void SelfList::follow(const SelfList &list, const FeatureMap &features, std::spa
                        const std::vector<uint32_t> &b, bool swap, Array<SelfPair> &to) {
     to.reserve(from.size());
     for (const SelfPair &pair : from) {
-      const SelfPair now{a[pair.a], b[pair.b]};
+      SelfPair now{a[pair.a], b[pair.b], pair.apart};
       if (now.a == kNone || now.b == kNone) continue;
-      to.push_back(swap && now.b < now.a ? SelfPair{now.b, now.a} : now);
+      if (swap && now.b < now.a) std::swap(now.a, now.b);
+      to.push_back(now);
     }
     sort_pairs(to, 0);
   };
   take(list.vf_, features.of[0], features.of[2], false, vf_);
   take(list.ee_, features.of[1], features.of[1], true, ee_);
-  wide_ = list.wide_;
-  skin_steps_ = list.skin_steps_;
   longest_ = longest_edge(s, at_.x().data());
   limit_ = list.limit_;  // the median edge may be another one now
   margin_ = std::min(list.margin_, (limit_ - self_recovery_depth(s)) / (2 * kDistanceRounding));
@@ -177,7 +220,7 @@ void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
       const uint32_t c0 = corner(face, 0), c1 = corner(face, 1), c2 = corner(face, 2);
       if (p != c0 && p != c1 && p != c2 && wanted(0, p, 2, face) &&
           triangle_within(at(p), at(c0), at(c1), at(c2), limit))
-        vf_.push_back({p, face});
+        vf_.push_back({p, face, std::sqrt(closest_on_triangle(at(p), at(c0), at(c1), at(c2)).distance2)});
     }
   };
   vertices(a, b);
@@ -191,7 +234,8 @@ void SelfList::add(uint32_t a, uint32_t b, double limit, const Wanted &wanted) {
       if (i == m || i == n || j == m || j == n) continue;
       const uint32_t f = s.tri_edge[3 * size_t{b} + l];
       if (!wanted(1, e, 1, f) || !segments_within(at(i), at(j), at(m), at(n), limit)) continue;
-      ee_.push_back({std::min(e, f), std::max(e, f)});
+      const double apart = std::sqrt(closest_segments(at(i), at(j), at(m), at(n)).distance2);
+      ee_.push_back({std::min(e, f), std::max(e, f), apart});
     }
   }
 }

@@ -33,12 +33,19 @@ class SelfList {
   // After update(), at the same positions: the same lists, rebuilt if they do not cover the motion of the
   // sub-step after its solve. change: m/s, largest change of a surfel's velocity by the solve.
   bool cover(double h, double offset, double change);
-  // In place of the first update(), of a surface that moves on until another one follows: with a wider skin.
-  void update_ahead(double h, double offset);
   // Continues the lists of a surface from before a cut. moved [nsurfel]: surfels that are not where they
   // were; features that the cut has made need no mark. Before the first update().
   void follow(const SelfList &before, const FeatureMap &features, std::span<const uint8_t> moved);
-  // m/s: no surfel was faster than that at the last update(), beyond the rigid motion that fits best.
+  // In place of update(): whether no two features without a common corner are within reach of a contact in
+  // this sub-step. Then nothing need be listed, and most calls compare one number. speed: m/s, no surfel is
+  // faster; infinite: not known.
+  bool far(double h, double offset, double speed);
+  // After far() of the same sub-step, which was true: whether they stay apart as cover() has it; else the
+  // lists are as after it.
+  bool stays_far(double h, double offset, double change);
+  // m: a pair whose `apart` is not less is out of reach of a contact. After update(), at the same positions.
+  double within(double h, double offset) const;
+  // m/s: no surfel was faster than that at the last update() or far(), beyond a rigid motion.
   double deforming() const { return motion_.speed; }
   // How often the lists were built, whole or in part.
   uint64_t renewals() const { return renewals_; }
@@ -55,30 +62,30 @@ class SelfList {
   const Array<SelfPair> &edge_edge() const { return ee_; }
   // m: every pair that is nearer than this now is listed. After update(), at the same positions.
   double covered() const { return limit_ - kDistanceRounding * 2 * moved_; }
-  // Wide: the next rebuild uses the widest skin, independent of the motion; for a body that may touch itself
-  // later, whose list is not traversed.
-  void set_wide(bool wide) { wide_ = wide; }
 
  private:
   static constexpr double kDistanceRounding = 1 + 1e-9;  // margins hold in spite of rounded distances
   double share(double h, double offset, double growth) const;
   double covers(double h, double offset, double change) const;
-  double skin_for(double now, double offset) const;
   void renew(double h, double offset, double change);
   bool renew_part(double h, double offset, double change);
   void mark_features();
+  void place();
+  void find_least();
+  bool beyond(double reach) const;
   void list(double limit);
   void list_anew(double limit);
   template <class Wanted>
   void add(uint32_t a, uint32_t b, double limit, const Wanted &wanted);
   const Surface &surface_;
-  // skin_steps_: sub-steps of the present motion that a skin is made to last; margin_ negative: no lists yet
-  double skin_steps_ = 24, margin_ = -1;
+  double margin_ = -1;  // m; negative: no lists yet
   BoxTree tree_;
   RigidReference at_;               // positions that the lists refer to
   double longest_ = 0, moved_ = 0;  // m, edge of that time; what displaced() said at the last update()
+  Array<double> x_;                 // [nsurfel,4] positions then
   double limit_ = 0;                // m, with which the lists were built
-  bool wide_ = false;
+  // m, every pair was as far apart at the positions to which the lists refer; is so now
+  double least_ = 0, left_ = -1;
   DeformingMotion motion_;
   uint64_t renewals_ = 0, parts_ = 0;
   Array<SelfPair> vf_, ee_;

@@ -51,7 +51,7 @@ struct ListJob : Background::Job {
       surface = from->surface;
       surface.x = x;
       surface.v = v;
-      list.update_ahead(h, offset);
+      list.update(h, offset);
       made = true;
     } catch (...) {  // the step after the cut lists them
     }

@@ -455,13 +455,15 @@ void Self::share_areas(size_t begin, size_t edges, Array<uint8_t> &lent) {
 template <bool Opened>
 void Self::find(SelfPairs &pairs, Array<uint8_t> &lent) {
   const size_t begin = out.size();
+  // copies are told by their places, not by where they are set back
+  const double within = Opened ? HUGE_VAL : pairs.within;
   const std::span<const SelfPair> vf = pairs.vertex_face, ee = pairs.edge_edge;
   for (size_t i = 0; i < vf.size(); ++i)
-    vertex_face<Opened>(vf[i].a, vf[i].b, Opened ? &pairs.of_face[i] : nullptr);
+    if (vf[i].apart < within) vertex_face<Opened>(vf[i].a, vf[i].b, Opened ? &pairs.of_face[i] : nullptr);
   if constexpr (Opened) keep_shallow(begin);
   const size_t edges = out.size();
   for (size_t i = 0; i < ee.size(); ++i)
-    edge_edge<Opened>(ee[i].a, ee[i].b, Opened ? &pairs.of_edges[i] : nullptr);
+    if (ee[i].apart < within) edge_edge<Opened>(ee[i].a, ee[i].b, Opened ? &pairs.of_edges[i] : nullptr);
   name_contacts(pair, begin, out);
   share_areas(begin, edges, lent);
 }

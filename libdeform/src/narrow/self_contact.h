@@ -32,6 +32,7 @@ struct SelfPairs {
   // [copies] m, by how much they may approach before features around them have to be tested
   // (doc/decisions/cutting.md)
   Array<double> slack;
+  double within = 0;  // m, pairs whose `apart` is not less are out of reach
   uint64_t renewals = 0;
   double offset = 0;
   // Of this sub-step. list: number of the present list.

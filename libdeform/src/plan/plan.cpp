@@ -57,7 +57,6 @@ std::string self_requested_by(const SceneFacts &f) {
     if (f.effects_listed ? listed(need) : std::any_of(f.offered.begin(), f.offered.end(), offers))
       return need;
   }
-  if (f.self_auto) return kSelfAuto;
   if (f.self_cut) return "a cut";
   return {};
 }

@@ -48,11 +48,11 @@ struct SceneFacts : Varying {
   std::vector<Provider> idle;
   std::vector<Provider> available;  // by every loaded plugin
   bool effects_listed = false;
-  bool sleep = false;                    // islands at rest may sleep
-  bool self = false, self_auto = false;  // contact.self
-  unsigned self_bodies = 0;              // bodies that may touch themselves, filters applied
-  bool self_cut = false;                 // one of them because it has been cut
-  std::vector<std::string> requested;    // where listed
+  bool sleep = false;                  // islands at rest may sleep
+  bool self = false;                   // contact.self
+  unsigned self_bodies = 0;            // bodies that may touch themselves, filters applied
+  bool self_cut = false;               // one of them because it has been cut
+  std::vector<std::string> requested;  // where listed
   bool operator==(const SceneFacts &) const = default;
 };
 
@@ -96,7 +96,6 @@ struct Plan {
   bool touches() const { return on_bodies && has(StageRole::solves); }
 };
 
-inline constexpr char kSelfAuto[] = "contact.self auto";
 // What calls for self contact: "contact.self", "effects", or the effect that needs it; "" if nothing does.
 std::string self_requested_by(const SceneFacts &facts);
 

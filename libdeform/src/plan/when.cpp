@@ -88,8 +88,7 @@ StageChoice self(const SceneFacts &f) {
   const std::string by = self_requested_by(f);
   if (f.self_bodies)
     return runs(count(f.self_bodies, "body", "bodies") + " may touch themselves (" +
-                (by.empty() ? "contact.filter" : by) + ")" +
-                (by == kSelfAuto ? ", each only while it folds so far that it may" : ""));
+                (by.empty() ? "contact.filter" : by) + ")");
   return left_out(by.empty() ? "not asked for (contact.self), and no effect needs it"
                   : f.bodies ? "filters take every body out"
                              : "no body");

@@ -1,6 +1,7 @@
 // Results of contacts after a completed sub-step: the store for the next one, events, the hold, the work of
 // friction, and the report.
 #include <algorithm>
+#include <utility>
 
 #include "friction/laws.h"
 #include "plugin/context.h"
@@ -60,7 +61,7 @@ void end_contacts(World &w) {
   s.n = w.report.n = 0;
   w.report.h = 0;
   for (auto &b : w.bodies) std::fill(b->surfel_impulse.begin(), b->surfel_impulse.end(), 0.0);
-  w.stats.contacts = w.stats.sticking = 0;
+  w.stats.contacts = w.stats.sticking = w.stats.self_bodies = 0;
 }
 
 void list_crossings(World &w, StepContext &step) {
@@ -220,7 +221,14 @@ void keep_contacts(World &w, StepContext &step) {
       add_event(w, DFM_EVENT_END, w.store.id_a[m], w.store.id_b[m], w.store.key[m], w.time + step.h);
   list_crossings(w, step);
   std::swap(w.store, step.next_store);
+  uint32_t touch_themselves = 0;
+  uint64_t last = 0;
+  for (uint32_t i = 0; i < w.store.n; ++i)
+    if (w.store.touching[i] && w.store.id_a[i] == w.store.id_b[i])
+      touch_themselves += std::exchange(last, w.store.id_a[i]) != w.store.id_a[i];
 
+  w.stats.self_bodies = touch_themselves;
+  w.stats.self_max = std::max(w.stats.self_max, touch_themselves);
   w.stats.contacts = touching;
   w.stats.sticking = sticking;
   w.stats.contacts_max = std::max(w.stats.contacts_max, touching);

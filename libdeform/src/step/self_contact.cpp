@@ -1,14 +1,14 @@
 // Self contact. A body's surface touches itself where the effect is on for it:
 //
-//   the scene asks    contact.self, or "self_contact" among its effects; "auto": while the body folds so far
-//                     that it may (broad/self_watch.h)
+//   the scene asks    contact.self, or "self_contact" among its effects
 //   an effect needs   plan/plan.cpp: cutting, folding
-//   a cut             has been made in the body: while it may touch itself; with open faces, always
+//   a cut             has been made in the body
 //   a filter rule     that names the body on both sides decides for this body, whatever the above say
 //
-// and where its model does not promise the effect itself. Contacts come behind those of pairs, body by body,
-// into the same solve; there both sides' weights fall on dofs of one body and are merged where they share
-// one, so the operator is exact (contact/rows.cpp).
+// and where its model does not promise the effect itself. In sub-steps in which no two of its features are
+// within reach of each other, nothing of it is listed or tested. Contacts come behind those of pairs, body by
+// body, into the same solve; there both sides' weights fall on dofs of one body and are merged where they
+// share one, so the operator is exact (contact/rows.cpp).
 #include "step/self_contact.h"
 
 #include <algorithm>
@@ -34,20 +34,13 @@ double median(std::vector<double> &v) {
 }
 
 // The last rule that names the body on both sides.
-uint8_t rule_of(const World &w, const Body &b, uint8_t otherwise) {
+bool rule_of(const World &w, const Body &b, bool otherwise) {
   const auto named = [&](const std::string &side) {
     return side == b.name || (!b.whole_name.empty() && side == b.whole_name);
   };
   for (const FilterRule &rule : w.filters)
-    if (named(rule.between[0]) && named(rule.between[1]))
-      otherwise = rule.collide ? DFM_SELF_ON : DFM_SELF_OFF;
+    if (named(rule.between[0]) && named(rule.between[1])) otherwise = rule.collide;
   return otherwise;
-}
-
-// What the body calls for, in addition to the setting of the world.
-uint8_t needed_by(const Body &b, uint8_t requested) {
-  if (!b.cut.whole || requested == DFM_SELF_ON) return requested;
-  return b.surface.slit ? uint8_t{DFM_SELF_ON} : uint8_t{DFM_SELF_AUTO};
 }
 
 bool promises(const Body &b) {
@@ -229,24 +222,20 @@ uint8_t uses_self_contact(const World &w) {
 
 bool lists_after_cut(const World &w, const Body &b) {
   const std::vector<std::unique_ptr<SelfBody>> &all = w.steps->self_bodies;
-  return !b.cut.whole && w.selection.wants(kSelfContact) && !promises(b) &&
-         rule_of(w, b, DFM_SELF_AUTO) != DFM_SELF_OFF &&
+  return !b.cut.whole && w.selection.wants(kSelfContact) && !promises(b) && rule_of(w, b, true) &&
          std::none_of(all.begin(), all.end(), [&](auto &s) { return s->id == b.id; });
 }
 
 void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vector<uint32_t> &used) {
-  facts.self = w.def.self_contact == DFM_SELF_ON;
-  const bool always = !self_requested_by(facts).empty();
-  facts.self_auto = w.def.self_contact == DFM_SELF_AUTO;
-  const uint8_t requested = always ? DFM_SELF_ON : facts.self_auto ? DFM_SELF_AUTO : DFM_SELF_OFF;
+  facts.self = w.def.self_contact != DFM_SELF_OFF;
+  const bool requested = !self_requested_by(facts).empty();
   std::vector<std::unique_ptr<SelfBody>> before;
   before.swap(step.self_bodies);
   for (auto &b : w.bodies) {
     const std::unique_ptr<FormerSurface> former = std::move(b->former_surface);
-    const uint8_t when =
-        w.selection.wants(kSelfContact) ? rule_of(w, *b, needed_by(*b, requested)) : uint8_t{DFM_SELF_OFF};
-    if (promises(*b) || when == DFM_SELF_OFF) continue;
-    facts.self_cut = facts.self_cut || b->cut.whole != nullptr;
+    const bool cut = b->cut.whole != nullptr;
+    if (promises(*b) || !w.selection.wants(kSelfContact) || !rule_of(w, *b, requested || cut)) continue;
+    facts.self_cut = facts.self_cut || cut;
     const auto same = std::find_if(before.begin(), before.end(),
                                    [&](auto &s) { return s && s->id == b->id && s->shape == b->shape; });
     step.self_bodies.push_back(same != before.end()
@@ -260,29 +249,11 @@ void choose_self_bodies(World &w, StepContext &step, SceneFacts &facts, std::vec
       if (own != before.end()) follow_cut(w, (*own)->list, (*own)->rest.way, former->features, self);
       else if (former->list) follow_cut(w, *former->list, {}, former->features, self);
     }
-    if (when == DFM_SELF_ON) self.watch.reset();
-    else if (!self.watch)
-      self.watch = std::make_unique<SelfWatch>(w.meters.detection.memory(), b->surface, self.rest, self.list);
     find_law(w, b->slot, b->slot, used);
     for (const uint32_t law : used) offer_law(*w.laws[law], facts);
   }
   facts.self_bodies = static_cast<unsigned>(step.self_bodies.size());
 }
-
-namespace {
-
-void switch_to(SelfBody &s, bool on) {
-  s.on = on;
-  s.list.set_wide(!on);
-}
-
-void count_self(World &w, StepContext &step) {
-  w.stats.self_bodies = static_cast<uint32_t>(
-      std::count_if(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->on; }));
-  w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
-}
-
-}  // namespace
 
 void follow_list(SelfBody &s, double offset) {
   s.pairs.vertex_face = s.list.vertex_face();
@@ -297,35 +268,32 @@ bool stage_self(World &w, StepContext &step, uint32_t *) {
     const BodyView &view = step.body_views[s->body->slot];
     s->crosses.clear();
     if (view.asleep) continue;
-    switch_to(*s, !s->watch ||
-                      s->watch->near(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL));
+    // copies of a point are nearer than they are set back
+    const bool opened = s->rest.opened.any();
+    if (opened) s->list.update(step.h, w.offset);
+    s->on = opened || !s->list.far(step.h, w.offset, listed ? step.broad.speed(s->body->slot) : HUGE_VAL);
     if (!s->on) continue;
-    s->list.update(step.h, w.offset);
+    s->pairs.within = s->list.within(step.h, w.offset);
     SelfBody *const self = s.get();
     const Tangled tangled = [self](uint32_t surfel) { return is_tangled(*self, surfel); };
     follow_list(*s, w.offset);
     find_self_contacts(view, s->rest, step.h, w.offset, w.plan.has(StageRole::guards) ? tangled : nullptr,
                        s->pairs, step.lent, step.contacts);
   }
-  count_self(w, step);
   return true;
 }
 
 bool cover_self(World &w, StepContext &step) {
   bool fresh = false;
   for (auto &s : step.self_bodies) {
-    const Body &b = *s->body;
-    if (step.body_views[b.slot].asleep) continue;
-    const double change = step.guard.change[b.slot];
+    const uint32_t slot = s->body->slot;
+    if (step.body_views[slot].asleep) continue;
+    const double change = step.guard.change[slot];
     // An impact may fold a surface within the sub-step that was far from itself before the solve.
-    if (!s->on && s->watch->meets(step.h, w.offset, change, [&](uint32_t surfel) {
-          return b.surface.sum(surfel, b.dynamics->end().mean);
-        }))
-      switch_to(*s, true);
-    if (s->on && s->list.cover(step.h, w.offset, change)) follow_list(*s, w.offset);
+    if (!s->on) s->on = !s->list.stays_far(step.h, w.offset, change);
+    else if (s->list.cover(step.h, w.offset, change)) follow_list(*s, w.offset);
     fresh |= s->joined != (s->on ? s->list.renewals() : 0);
   }
-  if (fresh) count_self(w, step);
   return fresh;
 }
 

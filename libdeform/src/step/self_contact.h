@@ -3,7 +3,6 @@
 #include <memory>
 
 #include "broad/self_list.h"
-#include "broad/self_watch.h"
 #include "narrow/self_contact.h"
 #include "plan/plan.h"
 
@@ -19,8 +18,7 @@ struct SelfBody {
   SelfRest rest;
   SelfList list;
   SelfPairs pairs;
-  std::unique_ptr<SelfWatch> watch;  // decides when; null: always
-  bool on = false;                   // in this sub-step
+  bool on = false;  // may touch itself in this sub-step
   // rebuild of `list` that is included in the guard's list; 0: not included
   uint64_t joined = 0;
   // [ntri] whether it crosses another one at the start of the sub-step: Crosses, as far as it has been asked

@@ -178,7 +178,7 @@ TEST(SelfList, Cut_ContinuesTheLists) {
     for (int step = 0; step < 100; ++step) {
       dent(before, kSquares, step, 0.01);
       if (!ahead) first.update(0.01, 1e-3);
-      else if (step == 70) first.update_ahead(0.01, 1e-3);
+      else if (step == 70) first.update(0.01, 1e-3);
     }
     Array<uint8_t> marks(s.nsurfel, 0);
     for (uint32_t i = 0; moved && i < s.nsurfel; ++i) marks[i] = i >= kPoints || on_line(i);
@@ -245,6 +245,81 @@ TEST(SelfList, RigidMotion_KeepsTheLists) {
       store3(&s.v[4 * size_t{i}], {-omega * (y.y) + 1000, omega * (y.x - step), -1000});
     }
     EXPECT_EQ(list.update(1e-3, 1e-3), step == 0) << "step " << step;
+  }
+}
+
+// m: of all pairs without a common corner, the least distance beyond the reach of their contact, or the depth
+// from which they are led back.
+double least_beyond(const Surface &s, double h, double offset) {
+  double least = HUGE_VAL;
+  const auto pair = [&](double distance, std::span<const uint32_t> a, std::span<const uint32_t> b) {
+    double speed = 0;
+    for (const uint32_t i : a)
+      for (const uint32_t j : b)
+        speed = std::max(speed, norm(load3(&s.v[4 * size_t{i}]) - load3(&s.v[4 * size_t{j}])));
+    least = std::min(least, distance - std::max(contact_reach(h, offset, speed), self_recovery_depth(s)));
+  };
+  for (uint32_t p = 0; p < s.nsurfel; ++p)
+    for (uint32_t t = 0; t < s.ntri; ++t) {
+      const uint32_t *c = &s.tri[3 * t];
+      if (c[0] != p && c[1] != p && c[2] != p)
+        pair(std::sqrt(closest_on_triangle(at(s, p), at(s, c[0]), at(s, c[1]), at(s, c[2])).distance2),
+             {&p, 1}, {c, 3});
+    }
+  for (uint32_t e = 0; e < s.nedge; ++e)
+    for (uint32_t f = e + 1; f < s.nedge; ++f) {
+      const uint32_t *a = &s.edge[2 * e], *b = &s.edge[2 * f];
+      if (a[0] != b[0] && a[0] != b[1] && a[1] != b[0] && a[1] != b[1])
+        pair(std::sqrt(closest_segments(at(s, a[0]), at(s, a[1]), at(s, b[0]), at(s, b[1])).distance2),
+             {a, 2}, {b, 2});
+    }
+  return least;
+}
+
+// A sheet that turns, drifts and is rolled up and unrolled: far is never said where a pair is within reach,
+// whatever is kept from the last look, and is said where all are well apart.
+TEST(SelfList, SheetThatRollsUpAndUnrolls_IsFarOnlyWhereNoPairIsWithinReach) {
+  constexpr uint32_t kSquares = 6;
+  Surface s = sheet(kSquares);
+  SelfList list(Memory::standard(), s);
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> u(-1, 1);
+  const double h = 1e-3, offset = 0.01;
+  uint32_t far_ones = 0, clear_ones = 0, near_ones = 0;
+  const Array<double> flat = s.x;
+  for (int step = 0; step < 400; ++step) {
+    const double bend = 1.25 * std::sin(0.015 * step), turn = 0.03 * step;  // 1/m; rad
+    for (uint32_t i = 0; i < s.nsurfel; ++i) {
+      const Vec3 x = load3(&flat[4 * size_t{i}]);
+      const double angle = bend * x.x, r = std::fabs(bend) > 1e-6 ? 1 / bend : 0;
+      const Vec3 rolled{r != 0 ? r * std::sin(angle) : x.x, x.y + 0.1 * step + 0.003 * bend * u(random),
+                        r != 0 ? r * (1 - std::cos(angle)) : 0};
+      store3(&s.x[4 * size_t{i}], {std::cos(turn) * rolled.x - std::sin(turn) * rolled.y,
+                                   std::sin(turn) * rolled.x + std::cos(turn) * rolled.y, rolled.z});
+      store3(&s.v[4 * size_t{i}], {30 * std::sin(0.2 * step) + u(random), 4 * u(random), u(random)});
+    }
+    const bool far = list.far(h, offset, step % 3 == 0 ? HUGE_VAL : largest_speed(s));
+    const double beyond = least_beyond(s, h, offset);
+    if (far) {
+      ASSERT_GT(beyond, 0) << "step " << step;
+    }
+    far_ones += far;
+    clear_ones += beyond > 0.45;
+    near_ones += !(beyond > 0);
+  }
+  EXPECT_GT(far_ones, 0.8 * clear_ones) << "of the looks at which all pairs are well apart";
+  EXPECT_GT(clear_ones, 20u);
+  EXPECT_GT(near_ones, 20u);
+  EXPECT_LT(list.renewals(), 390u) << "most looks need no new list";
+}
+
+// Speeds that an impact has changed, beyond what there was before the solve.
+TEST(SelfList, ImpactThatFoldsWithinTheSubStep_DoesNotStayFar) {
+  Surface s = sheet(6);
+  SelfList list(Memory::standard(), s);
+  for (const double change : {0.0, 10.0, 1000.0}) {
+    ASSERT_TRUE(list.far(1e-3, 0.01, 0));
+    EXPECT_EQ(list.stays_far(1e-3, 0.01, change), change < 500) << change << " m/s";
   }
 }
 
