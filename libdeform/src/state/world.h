@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "contact/report.h"
 #include "contact/store.h"
 #include "core/memory.h"
 #include "plan/plan.h"
@@ -123,13 +122,12 @@ struct WorldState {
   std::vector<Attachment> attachments;  // by body, each in order of creation
   ContactStore store;
   ContactStore tool_store;  // of tools with each other and with rigid bodies (step/rigid/tool_touch.h)
-  Report report;
   RigidReport rigid_report;
   std::vector<PairWork> work;             // sorted by (a, b)
   std::vector<dfm_contact_event> events;  // a restore drops them
   std::vector<Swap> swaps;                // not yet read by the host; a restore drops them
   explicit WorldState(const Memory &contacts)
-      : store(contacts), tool_store(contacts), report(contacts), rigid_report(contacts) {}
+      : store(contacts), tool_store(contacts), rigid_report(contacts) {}
 };
 
 // Memory of the parts of a world (dfm_world_memory). Each part allocates through its meter.

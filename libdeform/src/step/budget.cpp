@@ -139,9 +139,6 @@ void changing(Stream &s, World &w) {
     s.one(store->h);
     each_column([&](const ContactColumn &, auto &column) { s.many(column); }, *store);
   }
-  s.one(w.report.n);
-  s.one(w.report.h);
-  each_report_column([&](size_t, auto &column) { s.many(column); }, w.report);
   s.one(w.rigid_report.h);
   s.many(w.rigid_report.contacts);
   s.many(w.rigid_report.touching);
@@ -162,8 +159,6 @@ void reserve_others(World &w, StepContext &step) {
   const auto reserve = [](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); };
   each_column(reserve, w.store, step.next_store);
   each_column(reserve, w.tool_store, step.tools->next());
-  each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
-                     step.last_report);
   step.tools->next_report().contacts.reserve(w.rigid_report.contacts.size());
   step.tools->next_report().touching.reserve(w.rigid_report.touching.size());
 }

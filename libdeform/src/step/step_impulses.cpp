@@ -55,23 +55,27 @@ void end(const StepImpulses &s, double at, double time, Array<StepImpulses::Pair
   }
 }
 
-// The report's forces for `time`, s, from `at` on, added to pairs; a peak is the mean over this time.
+// The forces of the last sub-step for `time`, s, from `at` on, added to pairs; a peak is the mean over this
+// time.
 void add(const World &w, double at, double time, Array<StepImpulses::Pair> &pairs) {
-  const double scale = w.report.h > 0 ? time / w.report.h : 0;
+  const ContactStore &s = w.store;
+  const double scale = s.h > 0 ? time / s.h : 0;
   begin(pairs);
-  StepImpulses::Pair *pair = nullptr;  // contacts of a pair are adjacent
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
-    if (!(l[0] > 0)) continue;
-    const ContactPoint &c = w.report.contacts[i];
-    uint64_t a = w.store.id_a[i], b = w.store.id_b[i];
-    const bool turned = !c.obstacle && b < a;
-    if (turned) std::swap(a, b);
-    if (!pair || pair->a != a || pair->b != b) pair = &pair_of(pairs, a, b);
-    const double normal = scale * l[0];
-    if (a != b) pair->now += (turned ? -scale : scale) * from_frame(f, load3(l));
+  StepImpulses::Pair *pair = nullptr;
+  uint64_t a = 0, b = 0;  // contacts of a pair are adjacent
+  bool turned = false;
+  for (uint32_t i = 0; i < s.n; ++i) {
+    if (!s.bears(i)) continue;
+    if (s.id_a[i] != a || s.id_b[i] != b) {
+      a = s.id_a[i];
+      b = s.id_b[i];
+      turned = b < a && !w.obstacle(b);
+      pair = turned ? &pair_of(pairs, b, a) : &pair_of(pairs, a, b);
+    }
+    const double normal = scale * s.impulse[size_t(3) * i];
+    if (a != b) pair->now += (turned ? -scale : scale) * s.world_impulse(i);
     pair->now_normal += normal;
-    pair->place += normal * load3(c.point);
+    pair->place += normal * load3(&s.point[size_t(3) * i]);
   }
   end(w.step_impulses, at, time, pairs);
 }
@@ -88,11 +92,11 @@ void begin_impulses(StepImpulses &s, double start, double length) {
 void reserve_impulses(World &w, size_t contacts, size_t pairs) {
   Array<StepImpulses::Pair> &list = w.step_impulses.pairs;
   const size_t most = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
-  if (w.step_impulses.idle > 0) contacts += w.report.n;
+  if (w.step_impulses.idle > 0) contacts += w.store.n;
   list.reserve(list.size() + std::min(contacts, most) + pairs);
 }
 
-void add_impulses(World &w) { add(w, w.time, w.report.h, w.step_impulses.pairs); }
+void add_impulses(World &w) { add(w, w.time, w.store.h, w.step_impulses.pairs); }
 
 void add_rigid_impulses(World &w) {
   Array<StepImpulses::Pair> &pairs = w.step_impulses.pairs;

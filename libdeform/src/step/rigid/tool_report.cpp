@@ -64,7 +64,7 @@ void ToolTouch::list_contact(const World &w, const StepContext &step, uint32_t i
 
 // Memory for it is needed before the sub-step is final.
 void ToolTouch::list(const World &w, const StepContext &step) {
-  keep_next(step.state, step.rows.soft());
+  keep_next(step);
   RigidReport &to = next_report_;
   const Array<RigidPair> &before = w.rigid_report.touching;
   to.h = h_;

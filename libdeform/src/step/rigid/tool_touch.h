@@ -225,7 +225,7 @@ class ToolTouch {
   void add_rows_to_velocities(const StepContext &step);
   void drop_bad_starts(const StepContext &step);
   Vec3 slip(const Row &row) const;
-  void keep_next(const ContactState &state, uint32_t first);
+  void keep_next(const StepContext &step);
   // tool_report.cpp
   void list_contact(const World &w, const StepContext &step, uint32_t row);
 
