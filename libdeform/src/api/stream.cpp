@@ -10,6 +10,7 @@
 
 #include "api/objects.h"
 #include "core/hash.h"
+#include "step/sides.h"
 #include "world/queries.h"
 
 using namespace dfm;
@@ -202,18 +203,13 @@ void add_surface(const Body &b, uint32_t shape, Packets &out) {
 
 void add_contacts(const World &w, Packets &out) {
   out.chunk("CONT");
-  const ContactStore &s = w.store;
-  for (uint32_t i = 0; i < s.n; ++i) {
-    if (!s.bears(i)) continue;
-    out.add(load3(&s.point[3 * size_t{i}]));
-    out.add((1 / s.h) * s.world_impulse(i));
-    out.add(uint32_t{s.sticks[i]});
-  }
-  for (const RigidContact &c : w.rigid_report.contacts) {
-    out.add(c.point);
-    out.add((1 / w.rigid_report.h) * c.force());
-    out.add(uint32_t{c.sticks});
-  }
+  for (const ContactStore *const s : {&w.store, &w.tool_store})
+    for (uint32_t i = 0; i < s->n; ++i) {
+      if (!s->bears(i)) continue;
+      out.add(load3(&s->point[3 * size_t{i}]));
+      out.add(((b_first(w, *s, i) ? -1 : 1) / s->h) * s->world_impulse(i));
+      out.add(uint32_t{s->sticks[i]});
+    }
   out.end_chunk();
 }
 

@@ -171,11 +171,11 @@ bool good_contacts(const Staged &t, const Things &things) {
   return true;
 }
 
-bool good_tool_contacts(const Staged &t) {
+bool good_tool_contacts(const Staged &t, const Things &things) {
   const ContactStore &c = t.tool_store;
   if ((c.n > 0 && !(c.h > 0)) || !c.next_area.empty() || !c.crossings.empty()) return false;
   for (uint32_t i = 0; i < c.n; ++i) {
-    if (!good_frame(c, i) || c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id) return false;
+    if (!good_frame(c, i) || !things.obstacle(c.id_a[i]) || !things.obstacle(c.id_b[i])) return false;
   }
   return true;
 }
@@ -207,7 +207,7 @@ bool good_attachments(const std::vector<Attachment> &list, const Things &things)
 void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!s.at_end()) s.refuse("the end", "no bytes after the last field");
   if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
-  if (!good_tool_contacts(t)) s.refuse("contacts of tools", "contacts that tools can have");
+  if (!good_tool_contacts(t, {w})) s.refuse("contacts of tools", "contacts that tools can have");
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
   if (!valid_suspended(t.overlaps.suspended, {w}))
     s.refuse("pairs that are set aside", "bodies and obstacles that are there");
@@ -392,7 +392,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   make_models(s, w, staged);
   // derived data, therefore recomputed and not read
   for (ContactStore *const store : {&staged.store, &staged.tool_store}) store->order();
-  find_touching(w, staged.tool_store, staged.rigid_report.touching);
+  find_touching(w, staged.tool_store, staged.rigid_touching);
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(s, w, staged);
   const double offset = w.offset;
   const uint32_t sleepers = w.sleepers;

@@ -29,12 +29,12 @@ void reserve_contacts(World &w, StepContext &step) {
 }
 
 void reserve_reports(World &w, const StepContext &step) {
-  const size_t rigid = step.tools->next_report().touching.size();
+  const size_t rigid = step.tools->next_touching().size();
   size_t contacts = 0;
   if (w.plan.touches()) contacts = step.rows.soft() + (w.sleepers ? size_t{w.store.n} : 0);
   const size_t pairs = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
   w.work.reserve(w.work.size() + std::min(contacts, pairs) + rigid);
-  reserve_events(w, contacts + w.store.n + w.attachments.size() + step.tools->most_events(w));
+  reserve_events(w, contacts + w.store.n + w.attachments.size() + rigid + w.rigid_touching.size());
   reserve_impulses(w, contacts, rigid);
 }
 

@@ -6,13 +6,13 @@
 
 namespace dfm {
 
+struct ContactStore;
 struct World;
 
 void begin_impulses(StepImpulses &s, double start, double length);  // s
 // So that these cannot fail: contacts of bodies, pairs of rigid things
 void reserve_impulses(World &w, size_t contacts, size_t pairs);
-void add_impulses(World &w);        // of the sub-step that the store holds
-void add_rigid_impulses(World &w);  // of the one that the report of rigid things holds
+void add_impulses(World &w, const ContactStore &s);  // of the sub-step that one of its stores holds
 // Before the store changes: adds what sleepers have exchanged in the idle sub-steps up to now.
 void end_idle(World &w);
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out);

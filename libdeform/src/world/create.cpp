@@ -343,7 +343,7 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {
-  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size() + w.rigid_report.touching.size());
+  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size() + w.rigid_touching.size());
   end_idle(w);
   drop_attachments(w, id);
   if (obstacle) wake_touching(w, id);
