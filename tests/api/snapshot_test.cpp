@@ -195,6 +195,35 @@ TEST(Snapshot, AfterALawWithMemoryGaveWay_IsRestored) {
   test::ok(restore(s.world, data));
 }
 
+// What the last sub-step did can be read right after a restore, of bodies that are awake.
+TEST(Snapshot, TakenInContact_HasTheForcesOfTheLastSubStep) {
+  test::Context c;
+  const test::Stack s = build(c);
+  const auto forces = [&s] {
+    std::string out;
+    const auto add = [&out](const void *data, size_t bytes) {
+      out.append(static_cast<const char *>(data), bytes);
+    };
+    for (const dfm_contact &contact : test::contacts(s.world)) add(&contact, sizeof contact);
+    for (const dfm_pair_report &pair : test::pairs(s.world)) add(&pair, sizeof pair);
+    double wrench[6];
+    test::ok(dfm_world_pair_wrench(s.world, s.upper, s.lower, wrench, wrench, wrench + 3));
+    add(wrench, sizeof wrench);
+    std::vector<double> on_surface(3 * 1000);
+    uint32_t n = 0;
+    test::ok(dfm_surface_forces(s.upper, 1000, on_surface.data(), &n));
+    add(on_surface.data(), 3 * n * sizeof(double));
+    return out;
+  };
+  steps(s.world, 305);
+  ASSERT_GT(test::contacts(s.world).size(), 3u);
+  const std::string data = snapshot(s.world), then = forces();
+  steps(s.world, 100);
+  ASSERT_NE(forces(), then);
+  test::ok(restore(s.world, data));
+  EXPECT_TRUE(forces() == then);
+}
+
 // The host may give a rotation of any length.
 TEST(Snapshot, OfAnObstacleTurnedByALongQuaternion_IsRestored) {
   test::Context c;

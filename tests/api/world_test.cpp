@@ -433,8 +433,8 @@ TEST(Running, ABodyRemovedInContact_EndsItsContactsAndTheOthersContinue) {
   log = test::events(s.world);
   EXPECT_EQ(balance(log, DFM_EVENT_END), open);
   for (const auto &e : log) EXPECT_TRUE(e.kind == DFM_EVENT_END && (e.a == s.upper || e.b == s.upper));
-  EXPECT_EQ(test::contacts(s.world).size(), 0u)
-      << "no report of a sub-step that the removed body was part of";
+  EXPECT_GT(test::contacts(s.world).size(), 0u) << "of the other one, in the last sub-step";
+  for (const auto &k : test::contacts(s.world)) EXPECT_TRUE(k.body_a == s.lower && k.body_b == 0);
   steps(s.world, 300);
   for (const auto &k : test::contacts(s.world)) EXPECT_TRUE(k.body_a == s.lower && k.body_b == 0);
   const auto pairs = test::pairs(s.world);

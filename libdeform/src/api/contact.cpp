@@ -8,6 +8,7 @@
 #include "friction/laws.h"
 #include "friction/pair_rules.h"
 #include "state/obstacle.h"
+#include "step/sides.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
 #include "world/friction_rules.h"
@@ -68,117 +69,98 @@ std::string side(World &w, const char *text, bool grouped) {
        did_you_mean(s, given, '\'').c_str(), join(names).c_str());
 }
 
-// Whether a force acts between a and b. Contacts without force are not reported.
-bool touching(const World &w, uint32_t i) { return w.store.touching[i]; }
-
-struct Sides { uint64_t a, b; };
-Sides sides(const World &w, const ContactPoint &c) {
-  return {w.bodies[c.slot_a]->handle,
-          c.obstacle ? w.obstacles[c.slot_b]->handle : w.bodies[c.slot_b]->handle};
-}
-
-dfm_contact report(const World &w, uint32_t i) {
-  const ContactPoint &c = w.report.contacts[i];
-  const double h = w.report.h;
-  const double *const f = &w.report.frame[size_t(9) * i];
-  const double *const l = &w.report.impulse[size_t(3) * i];
+// Seen from the other side the normal and the first tangent are the opposite ones, and the second tangent,
+// their product, stays: forces, slips and deflections change their sign along it alone.
+dfm_contact report(const World &w, const ContactStore &s, uint32_t i) {
+  const bool rigid = &s == &w.tool_store, turned = b_first(w, s, i);
+  const double side = turned ? -1 : 1;
+  const uint64_t a = turned ? s.id_b[i] : s.id_a[i], b = turned ? s.id_a[i] : s.id_b[i];
+  const Obstacle *const obstacle = w.obstacle(b);
   dfm_contact out{};
-  if (l[0] > 0 && w.report.mode[i] == 1) out.flags |= DFM_CONTACT_STICKING;
-  if (w.store.began[i]) out.flags |= DFM_CONTACT_BEGAN;
-  if (c.type_a == 1) out.flags |= DFM_CONTACT_EDGE_A;
-  if (c.type_a == 2) out.flags |= DFM_CONTACT_TRIANGLE_A;
-  const Sides s = sides(w, c);
-  out.body_a = s.a;
-  out.body_b = c.obstacle && !w.obstacles[c.slot_b]->rigid ? 0 : s.b;
-  out.key = c.key;
-  out.feature_a = c.feature_a;
-  out.feature_b = c.obstacle ? c.slot_b : c.feature_b;
-  out.kind = c.obstacle ? uint32_t{DFM_CONTACT_PRIMITIVE} : c.kind;
-  out.law = w.store.law[i];
-  std::copy(c.point, c.point + 3, out.point);
-  std::copy(f, f + 3, out.normal);
-  std::copy(f + 3, f + 6, out.tangent);
-  out.gap = c.distance - w.offset;
-  out.area = c.area;
-  out.fn = l[0] / h;
-  for (int k = 0; k < 2; ++k) {
-    out.ft[k] = l[1 + k] / h;
-    out.slip[k] = w.report.slip[size_t(2) * i + size_t(k)];
+  if (s.sticks[i]) out.flags |= DFM_CONTACT_STICKING;
+  if (s.began[i]) out.flags |= DFM_CONTACT_BEGAN;
+  if (s.type_a[i] == 1) out.flags |= DFM_CONTACT_EDGE_A;
+  if (s.type_a[i] == 2) out.flags |= DFM_CONTACT_TRIANGLE_A;
+  out.body_a = w.handle_of(a);
+  out.body_b = obstacle && !obstacle->rigid ? 0 : w.handle_of(b);
+  out.key = s.key[i];
+  out.feature_a = rigid ? obstacle_slot_of(w, a) : s.feature_a[i];
+  out.feature_b = obstacle ? obstacle_slot_of(w, b) : s.feature_b[i];
+  out.kind = rigid              ? DFM_CONTACT_RIGID
+             : obstacle         ? DFM_CONTACT_PRIMITIVE
+             : s.type_b[i] == 1 ? DFM_CONTACT_EDGE_EDGE
+                                : DFM_CONTACT_VERTEX_FACE;
+  out.law = s.law[i];
+  std::copy_n(&s.point[size_t(3) * i], 3, out.point);
+  store3(out.normal, side * load3(&s.normal[size_t(3) * i]));
+  store3(out.tangent, side * load3(&s.tangent[size_t(3) * i]));
+  out.gap = s.gap[i];
+  out.area = rigid ? 0 : s.area[i];
+  out.fn = s.impulse[size_t(3) * i] / s.h;
+  for (size_t k = 0; k < 2; ++k) {
+    out.ft[k] = s.impulse[size_t(3) * i + 1 + k] / s.h;
+    out.slip[k] = s.slip[size_t(2) * i + k];
   }
-  for (uint32_t k = 0; k < 2 && k < w.store.nstate; ++k)
-    out.bristle[k] = w.store.bristle[size_t(w.store.nstate) * i + k];
+  for (uint32_t k = 0; k < std::min({2u, s.nstate, w.laws[s.law[i]]->nstate}); ++k)
+    out.bristle[k] = s.bristle[size_t(s.nstate) * i + k];
+  for (double *const along : {&out.ft[1], &out.slip[1], &out.bristle[1]}) *along *= side;
   return out;
 }
 
-dfm_contact report(const World &w, const RigidContact &c) {
-  const double h = w.rigid_report.h;
-  dfm_contact out{};
-  if (c.sticks) out.flags |= DFM_CONTACT_STICKING;
-  if (c.began) out.flags |= DFM_CONTACT_BEGAN;
-  out.feature_a = obstacle_slot_of(w, c.a);
-  out.feature_b = obstacle_slot_of(w, c.b);
-  const Obstacle &a = *w.obstacles[out.feature_a], &b = *w.obstacles[out.feature_b];
-  out.body_a = a.handle;
-  out.body_b = b.rigid ? b.handle : 0;
-  out.key = c.key;
-  out.kind = DFM_CONTACT_RIGID;
-  out.law = c.law;
-  store3(out.point, c.point);
-  store3(out.normal, c.normal);
-  store3(out.tangent, c.tangent);
-  out.gap = c.gap;
-  out.fn = c.impulse[0] / h;
-  for (int k = 0; k < 2; ++k) {
-    out.ft[k] = c.impulse[1 + k] / h;
-    out.slip[k] = c.slip[k];
-    out.bristle[k] = c.bristle[k];
-  }
-  return out;
-}
-
-// Resultants on a by id. Pairs are few: rows of a pair follow each other.
-struct PairRow {
-  uint64_t a, b;  // ids: the order of creation
-  dfm_pair_report report;
-};
-
-dfm_pair_report &row_of(const World &w, std::vector<PairRow> &pairs, uint64_t a, uint64_t b,
-                        const dfm_pair_report &first) {
-  auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(a, b),
-                             [](const PairRow &p, auto &k) { return std::pair(p.a, p.b) < k; });
-  if (at == pairs.end() || at->a != a || at->b != b) {
-    dfm_pair_report p = first;
-    for (const PairWork &work : w.work)
-      if ((work.a == a && work.b == b) || (work.a == b && work.b == a)) p.friction_work += work.friction;
-    at = pairs.insert(at, {a, b, p});
-  }
-  return at->report;
-}
-
-// The center of mass at the time of the contact points: at the start of the sub-step.
+// The center of mass at the time of the contact points: at the start of the sub-step, of h s.
 Vec3 center_of(const World &w, uint64_t id, double h) {
-  const Obstacle &o = *w.obstacles[obstacle_slot_of(w, id)];
+  if (Body *const b = w.body(id)) {
+    b->dynamics->see_points();
+    const CenterMotion now = center_motion(*b);
+    return now.place - h * now.velocity;
+  }
+  const Obstacle &o = *w.obstacle(id);
   if (!o.rigid) return o.pose.position;
   const dfm_rigid_state &s = o.rigid->state[o.rigid_body];
   return load3(s.position) - h * load3(s.velocity);
 }
 
-void add_rigid_pairs(const World &w, std::vector<PairRow> &pairs) {
-  const double h = w.rigid_report.h;
-  for (const RigidContact &c : w.rigid_report.contacts) {
-    dfm_pair_report first{};
-    first.a = w.handle_of(c.a);
-    first.b = w.handle_of(c.b);
-    first.law = c.law;
-    dfm_pair_report &p = row_of(w, pairs, c.a, c.b, first);
-    const Vec3 force = (1 / h) * c.force(), friction = force - (c.impulse[0] / h) * c.normal;
+// Resultants on a by id. Pairs are few: rows of a pair follow each other.
+struct PairRow {
+  uint64_t a, b;  // ids: the order of creation
+  Vec3 center;    // of a
+  dfm_pair_report report;
+};
+
+PairRow &row_of(const World &w, std::vector<PairRow> &pairs, uint64_t a, uint64_t b, uint32_t law, double h) {
+  auto at = std::lower_bound(pairs.begin(), pairs.end(), std::pair(a, b),
+                             [](const PairRow &p, auto &k) { return std::pair(p.a, p.b) < k; });
+  if (at == pairs.end() || at->a != a || at->b != b) {
+    dfm_pair_report p{};
+    p.a = w.handle_of(a);
+    p.b = w.handle_of(b);
+    p.law = law;
+    for (const PairWork &work : w.work)
+      if ((work.a == a && work.b == b) || (work.a == b && work.b == a)) p.friction_work += work.friction;
+    const bool known = at != pairs.begin() && at[-1].a == a;
+    at = pairs.insert(at, {a, b, known ? at[-1].center : center_of(w, a, h), p});
+  }
+  return *at;
+}
+
+void add_pairs(const World &w, const ContactStore &s, std::vector<PairRow> &pairs) {
+  for (uint32_t i = 0; i < s.n; ++i) {
+    if (!s.touching[i]) continue;
+    const PairSides sides = pair_sides(w, s, i);
+    PairRow &row = row_of(w, pairs, sides.a, sides.b, s.law[i], s.h);
+    dfm_pair_report &p = row.report;
+    const double scale = (sides.turned ? -1 : 1) / s.h, load = s.impulse[size_t(3) * i];
+    const Vec3 force = scale * s.world_impulse(i);
     ++p.count;
-    p.sticking += c.sticks;
-    p.normal += c.impulse[0] / h;
-    add3(p.force, force);
-    add3(p.friction, friction);
-    add3(p.moment, cross(c.point - center_of(w, c.a, h), force));
-    p.slip_max = std::max(p.slip_max, std::sqrt(c.slip[0] * c.slip[0] + c.slip[1] * c.slip[1]));
+    p.sticking += s.sticks[i];
+    p.normal += load / s.h;
+    if (sides.a != sides.b) {  // forces of a body on itself sum to zero
+      add3(p.force, force);
+      add3(p.friction, scale * s.friction_impulse(i));
+      add3(p.moment, cross(load3(&s.point[size_t(3) * i]) - row.center, force));
+    }
+    const double *const slip = &s.slip[size_t(2) * i];
+    if (load > 0) p.slip_max = std::max(p.slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
   }
 }
 
@@ -263,16 +245,11 @@ dfm_status dfm_world_contacts_sized(dfm_world world, uint32_t row_size, uint32_t
   return as_status([&] {
     Rows<dfm_contact> rows(out, row_size, "dfm_contact");
     const World &w = not_in_step(world_of(world));
-    uint32_t count = 0;
-    for (uint32_t i = 0; i < w.report.n; ++i) count += touching(w, i);
-    std::vector<const RigidContact *> rigid;
-    for (const RigidContact &c : w.rigid_report.contacts) rigid.push_back(&c);
-    if (!room(count + rigid.size(), capacity, out, n)) return;
-    if (w.report.n)
-      for (uint32_t i : w.store.by_key)
-        if (touching(w, i)) rows.add(report(w, i));
-    std::sort(rigid.begin(), rigid.end(), [](auto *c, auto *d) { return c->key < d->key; });
-    for (const RigidContact *c : rigid) rows.add(report(w, *c));
+    const auto count = size_t(std::count(w.store.touching.begin(), w.store.touching.end(), 1));
+    if (!room(count + w.tool_store.n, capacity, out, n)) return;
+    for (const ContactStore *const s : {&w.store, &w.tool_store})
+      for (const uint32_t i : s->by_key)
+        if (s->touching[i]) rows.add(report(w, *s, i));
   });
 }
 
@@ -299,48 +276,7 @@ dfm_status dfm_world_pairs_sized(dfm_world world, uint32_t row_size, uint32_t ca
     Rows<dfm_pair_report> rows(out, row_size, "dfm_pair_report");
     World &w = not_in_step(world_of(world));
     std::vector<PairRow> pairs;
-    std::vector<Vec3> com(w.bodies.size());
-    std::vector<uint8_t> known(w.bodies.size());
-    for (uint32_t i = 0; i < w.report.n; ++i) {
-      if (!touching(w, i)) continue;
-      const ContactPoint &c = w.report.contacts[i];
-      uint64_t ia = w.store.id_a[i], ib = w.store.id_b[i];
-      // vertex-face contacts of a pair come from both sides; the report's a is the body with the lower id
-      const bool turned = !c.obstacle && ib < ia;
-      Sides s = sides(w, c);
-      if (turned) {
-        std::swap(s.a, s.b);
-        std::swap(ia, ib);
-      }
-      dfm_pair_report first{};
-      first.a = s.a;
-      first.b = s.b;
-      first.law = w.store.law[i];
-      dfm_pair_report *const it = &row_of(w, pairs, ia, ib, first);
-      const uint32_t body = turned ? c.slot_b : c.slot_a;
-      // the center at the time of the contact points: at the start of the sub-step
-      if (!known[body]) {
-        w.bodies[body]->dynamics->see_points();
-        const CenterMotion now = center_motion(*w.bodies[body]);
-        com[body] = now.place - w.report.h * now.velocity;
-        known[body] = 1;
-      }
-      const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
-      const double scale = (turned ? -1 : 1) / w.report.h;
-      const Vec3 friction = scale * (l[1] * load3(f + 3) + l[2] * load3(f + 6));
-      const Vec3 force = scale * l[0] * load3(f) + friction;
-      ++it->count;
-      it->sticking += l[0] > 0 && w.report.mode[i] == 1;
-      it->normal += l[0] / w.report.h;
-      if (ia != ib) {  // forces of a body on itself sum to zero
-        add3(it->force, force);
-        add3(it->friction, friction);
-        add3(it->moment, cross(load3(c.point) - com[body], force));
-      }
-      const double *const slip = &w.report.slip[size_t(2) * i];
-      if (l[0] > 0) it->slip_max = std::max(it->slip_max, std::sqrt(slip[0] * slip[0] + slip[1] * slip[1]));
-    }
-    add_rigid_pairs(w, pairs);
+    for (const ContactStore *const s : {&w.store, &w.tool_store}) add_pairs(w, *s, pairs);
     if (!room(pairs.size(), capacity, out, n)) return;
     for (const PairRow &p : pairs) rows.add(p.report);
   });
@@ -354,24 +290,15 @@ dfm_status dfm_world_pair_wrench(dfm_world world, uint64_t a, uint64_t b, const 
     const uint64_t ia = id_of(w, a, "a"), ib = id_of(w, b, "b");
     const Vec3 about = load3(point);
     Vec3 sum, turn;
-    for (uint32_t i = 0; i < w.report.n; ++i) {
-      const bool straight = w.store.id_a[i] == ia && w.store.id_b[i] == ib;
-      const bool turned = w.store.id_a[i] == ib && w.store.id_b[i] == ia;
-      if (!touching(w, i) || !(straight || turned) || (straight && turned)) continue;
-      const double *const f = &w.report.frame[size_t(9) * i];
-      const double *const l = &w.report.impulse[size_t(3) * i];
-      const double scale = (turned ? -1 : 1) / w.report.h;
-      const Vec3 one = scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6));
-      sum += one;
-      turn += cross(load3(w.report.contacts[i].point) - about, one);
-    }
-    for (const RigidContact &c : w.rigid_report.contacts) {
-      const bool straight = c.a == ia && c.b == ib;
-      if (!straight && !(c.a == ib && c.b == ia)) continue;
-      const Vec3 one = ((straight ? 1 : -1) / w.rigid_report.h) * c.force();
-      sum += one;
-      turn += cross(c.point - about, one);
-    }
+    for (const ContactStore *const list : {&w.store, &w.tool_store})
+      for (uint32_t i = 0; i < list->n; ++i) {
+        const ContactStore &s = *list;
+        const bool straight = s.id_a[i] == ia && s.id_b[i] == ib, turned = s.id_a[i] == ib && s.id_b[i] == ia;
+        if (!s.touching[i] || straight == turned) continue;
+        const Vec3 one = ((turned ? -1 : 1) / s.h) * s.world_impulse(i);
+        sum += one;
+        turn += cross(load3(&s.point[size_t(3) * i]) - about, one);
+      }
     if (force) store3(force, sum);
     if (moment) store3(moment, turn);
   });

@@ -97,7 +97,9 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
   return as_status(to_read<world_of>, world, [&](const World &w) {
     if (!line) fail(DFM_E_ARG, "argument 'line' is NULL");
     double longest = 0;
-    for (uint32_t i = 0; i < w.report.n; ++i) longest = std::max(longest, w.report.impulse[size_t(3) * i]);
+    const ContactStore &c = w.store;
+    for (uint32_t i = 0; i < c.n; ++i)
+      if (c.touching[i]) longest = std::max(longest, c.impulse[size_t(3) * i]);
     // the strongest contact is drawn about five edges long
     const double scale = longest > 0 ? 1000 * w.offset / longest * 5 : 0;
     auto draw = [&](Vec3 a, Vec3 b, uint32_t rgb) {
@@ -106,13 +108,12 @@ dfm_status dfm_debug_draw(dfm_world world, uint32_t what, dfm_draw_line_fn line,
       store3(q, b);
       line(user, p, q, rgb);
     };
-    for (uint32_t i = 0; i < w.report.n; ++i) {
-      if (!w.store.touching[i]) continue;
-      const Vec3 at = load3(w.report.contacts[i].point);
-      const double *const f = &w.report.frame[size_t(9) * i], *const l = &w.report.impulse[size_t(3) * i];
-      if (what & DFM_DRAW_CONTACTS) draw(at, at + 1000 * w.offset * load3(f), 0x30a0ff);
-      if (what & DFM_DRAW_FORCES)
-        draw(at, at + scale * (l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6)), 0xff5030);
+    for (uint32_t i = 0; i < c.n; ++i) {
+      if (!c.touching[i]) continue;
+      const Vec3 at = load3(&c.point[size_t(3) * i]);
+      if (what & DFM_DRAW_CONTACTS)
+        draw(at, at + 1000 * w.offset * load3(&c.normal[size_t(3) * i]), 0x30a0ff);
+      if (what & DFM_DRAW_FORCES) draw(at, at + scale * c.world_impulse(i), 0xff5030);
     }
     if (!(what & DFM_DRAW_BOXES)) return;
     for (auto &b : w.bodies) {

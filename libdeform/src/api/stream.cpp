@@ -10,6 +10,7 @@
 
 #include "api/objects.h"
 #include "core/hash.h"
+#include "step/sides.h"
 #include "world/queries.h"
 
 using namespace dfm;
@@ -202,19 +203,13 @@ void add_surface(const Body &b, uint32_t shape, Packets &out) {
 
 void add_contacts(const World &w, Packets &out) {
   out.chunk("CONT");
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    const double *const f = &w.report.frame[9 * size_t{i}], *const l = &w.report.impulse[3 * size_t{i}];
-    if (!(l[0] > 0)) continue;
-    const Vec3 impulse = l[0] * load3(f) + l[1] * load3(f + 3) + l[2] * load3(f + 6);
-    out.add(load3(w.report.contacts[i].point));
-    out.add((1 / w.report.h) * impulse);
-    out.add(uint32_t{w.report.mode[i] == 1});
-  }
-  for (const RigidContact &c : w.rigid_report.contacts) {
-    out.add(c.point);
-    out.add((1 / w.rigid_report.h) * c.force());
-    out.add(uint32_t{c.sticks});
-  }
+  for (const ContactStore *const s : {&w.store, &w.tool_store})
+    for (uint32_t i = 0; i < s->n; ++i) {
+      if (!s->bears(i)) continue;
+      out.add(load3(&s->point[3 * size_t{i}]));
+      out.add(((b_first(w, *s, i) ? -1 : 1) / s->h) * s->world_impulse(i));
+      out.add(uint32_t{s->sticks[i]});
+    }
   out.end_chunk();
 }
 

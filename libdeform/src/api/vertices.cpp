@@ -69,18 +69,15 @@ void each_surfel(const Surface &s, uint32_t type, uint32_t feature, F &&f) {
 
 // Marks where loaded contacts stick or slide.
 void put_stick(const Body &b, const dfm_vertex_layout &l, bool sticks, unsigned char *out) {
-  const World &w = *b.world;
+  const ContactStore &c = b.world->store;
   const float value = sticks ? 1.0f : 0.5f;
-  const uint32_t slot = slot_of(w, b.id);  // b.slot may be that of before a removal
   const auto mark = [&](uint32_t s) {
     std::memcpy(out + size_t{l.stride} * s + l.stick, &value, sizeof value);
   };
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    const ContactPoint &c = w.report.contacts[i];
-    if (!(w.report.impulse[size_t(3) * i] > 0) || (w.report.mode[i] == 1) != sticks) continue;
-    if (c.slot_a == slot) each_surfel(b.surface, c.type_a, c.feature_a, mark);
-    if (!c.obstacle && c.slot_b == slot)
-      each_surfel(b.surface, c.kind == kEdgeEdge ? 1 : 2, c.feature_b, mark);
+  for (uint32_t i = 0; i < c.n; ++i) {
+    if (!c.bears(i) || c.sticks[i] != sticks) continue;
+    if (c.id_a[i] == b.id) each_surfel(b.surface, c.type_a[i], c.feature_a[i], mark);
+    if (c.id_b[i] == b.id) each_surfel(b.surface, c.type_b[i], c.feature_b[i], mark);
   }
 }
 

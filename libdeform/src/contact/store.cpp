@@ -72,7 +72,7 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
     bool reset = true;
     Vec3 t;
     if (m != kNone)
-      t = transport(load3(&old.tangent[size_t(m) * 3]), load3(&old.normal[size_t(m) * 3]), n, &reset);
+      t = transport(load3(&old.turned[size_t(m) * 3]), load3(&old.normal[size_t(m) * 3]), n, &reset);
     else t = any_tangent(n);
     store3(tangents + size_t(i) * 3, t);
     if (reset) {
@@ -80,8 +80,11 @@ void warm_start(const ContactStore &old, std::span<const ContactPoint> contacts,
       return;
     }
     // the first row of a contact bears its load
-    for (int k = 0; k < 3 && contacts[i].more == 0; ++k)
-      l[k] = scale * old.impulse[size_t(m) * 3 + size_t(k)];
+    if (contacts[i].more == 0) {
+      l[0] = scale * old.lasting[m];
+      l[1] = scale * old.impulse[size_t(m) * 3 + 1];
+      l[2] = scale * old.impulse[size_t(m) * 3 + 2];
+    }
     state.dwell[i] = old.dwell[m];
     // The columns have the width of the law with the largest state; the values of a law come first.
     if (old.law[m] == state.law[i])

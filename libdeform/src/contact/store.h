@@ -1,5 +1,5 @@
 // Lasting contacts: the data that a contact keeps from step to step, found by its key: warm start, bristle
-// state, events, hold measure.
+// state, events, hold measure, report of the last sub-step.
 #pragma once
 #include <span>
 
@@ -41,23 +41,37 @@ struct ContactStore {
   Array<uint32_t> feature_a, feature_b;
   Array<uint8_t> type_a, type_b;
   Array<uint32_t> by_key;         // indices in ascending key order
-  Array<double> normal, tangent;  // [n,3]
-  Array<double> impulse;          // [n,3] in the frame
-  Array<double> bristle;          // [n,nstate] row-major
-  Array<uint32_t> law;            // the law the bristles belong to
-  Array<double> dwell, area;      // s in contact, m2
+  Array<double> normal, tangent;  // [n,3]; the second tangent is their product
+  Array<double> impulse;          // [n,3] N s on a, in this frame
+  // The start of the next sub-step: N s along the normal, without what opened the contact; and [n,3] the
+  // tangent, turned with the surfaces.
+  Array<double> lasting, turned;
+  Array<double> point;        // [n,3] m, midway between the closest points
+  Array<double> gap, slip;    // m, distance less d_c; [n,2] m/s
+  Array<double> bristle;      // [n,nstate] row-major
+  Array<uint32_t> law;        // the law the bristles belong to
+  Array<double> dwell, area;  // s in contact, m2
   // m2, area in the next sub-step (contact/renewal.h); empty where no law counts by area
   Array<double> next_area;
   Array<double> start_depth;      // m, of what a pair was found with, less what has opened since
   Array<double> stick_drift;      // [n,3] m, slip to be taken back (step/solve/friction_memory.h)
   Array<double> path;             // [n,2] m, net slip since hold_begin, in the frame
   Array<uint8_t> touching, held;  // held: touched and stuck in every sub-step since hold_begin
-  Array<uint8_t> began;           // touched for the first time in the last step
+  Array<uint8_t> sticks, began;   // loaded, and at rest; touched for the first time in the last step
   Array<Crossing> crossings;      // edges that touch each other, ascending
 
   explicit ContactStore(const Memory &memory);
   uint32_t find(uint64_t key) const;  // index, or kNone
   void order();                       // by_key, from key
+  bool bears(uint32_t i) const { return touching[i] && impulse[size_t{3} * i] > 0; }
+  // N s on a: of friction, and in all
+  Vec3 friction_impulse(uint32_t i) const {
+    const Vec3 t = load3(&tangent[size_t{3} * i]), other = cross(load3(&normal[size_t{3} * i]), t);
+    return impulse[size_t{3} * i + 1] * t + impulse[size_t{3} * i + 2] * other;
+  }
+  Vec3 world_impulse(uint32_t i) const {
+    return impulse[size_t{3} * i] * load3(&normal[size_t{3} * i]) + friction_impulse(i);
+  }
   void drop(uint64_t id);  // contacts of a thing that goes; for stores without next_area and crossings
 };
 
@@ -76,6 +90,11 @@ void each_column(F &&f, Store &...c) {
   f(ColumnOf<V::finite>{{"contact normal", 3}}, c.normal...);
   f(ColumnOf<V::finite>{{"contact tangent", 3}}, c.tangent...);
   f(ColumnOf<V::finite>{{"contact impulse", 3}}, c.impulse...);
+  f(ColumnOf<V::finite>{{"lasting load", 1}}, c.lasting...);
+  f(ColumnOf<V::finite>{{"turned tangent", 3}}, c.turned...);
+  f(ColumnOf<V::finite>{{"contact point", 3}}, c.point...);
+  f(ColumnOf<V::finite>{{"contact gap", 1}}, c.gap...);
+  f(ColumnOf<V::finite>{{"slip", 2}}, c.slip...);
   f(ColumnOf<V::finite>{{"bristle", kPerState, true}}, c.bristle...);
   f(ColumnOf<V::law>{{"contact law", 1}}, c.law...);
   f(ColumnOf<V::not_negative>{{"dwell", 1}}, c.dwell...);
@@ -86,6 +105,7 @@ void each_column(F &&f, Store &...c) {
   f(ColumnOf<V::finite>{{"hold path", 2}}, c.path...);
   f(ColumnOf<V::flag>{{"touching", 1}}, c.touching...);
   f(ColumnOf<V::flag>{{"in hold", 1}}, c.held...);
+  f(ColumnOf<V::flag>{{"sticks", 1}}, c.sticks...);
   f(ColumnOf<V::flag>{{"began", 1, false, false}}, c.began...);
   f(ColumnOf<V::any>{{"crossings", kOwnLength, false, false}}, c.crossings...);
   f(ColumnOf<V::any>{{nullptr, 1, false, false}}, c.by_key...);

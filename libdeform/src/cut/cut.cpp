@@ -76,7 +76,7 @@ std::unique_ptr<BodyShape> put(Body &b, MadeShape &made, bool ahead) {
   end_idle(w);
   std::unique_ptr<BodyShape> before = take_shape(b, made, false, ahead);
   try {
-    Lasting lasting(w, *before, {{b.id, b.slot, &b, made.features}});
+    Lasting lasting(w, *before, {{b.id, &b, made.features}});
     reserve_ends(w, 0);
     w.changed = true;
     prepare_with(w, lasting);

@@ -92,15 +92,13 @@ void carry(const Attachment &a, const BodyShape &before, const std::vector<CutTa
 }
 
 // Gives a side of a contact, or of a crossing of edges, its present numbers; false: it is gone, and its
-// feature has number 0. slot: in the report, or null.
-bool renumber(const std::vector<CutTarget> &targets, size_t kind, uint64_t &id, uint32_t &feature,
-              uint32_t *slot = nullptr) {
+// feature has number 0.
+bool renumber(const std::vector<CutTarget> &targets, size_t kind, uint64_t &id, uint32_t &feature) {
   if (id != targets[0].id) return true;
   const Found now = find(targets, kind, feature);
   feature = now.feature == kNone ? 0 : now.feature;
   if (now.target == kNone) return false;
   id = targets[now.target].id;
-  if (slot) *slot = targets[now.target].slot;
   return true;
 }
 
@@ -119,7 +117,6 @@ bool renumber(Crossing &c, const std::vector<CutTarget> &targets, const World &w
 
 Lasting::Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets)
     : crossings(w.store.crossings.get_allocator()),
-      contacts(w.report.contacts.get_allocator()),
       id_a(w.store.id_a),
       id_b(w.store.id_b),
       feature_a(w.store.feature_a),
@@ -129,16 +126,11 @@ Lasting::Lasting(const World &w, const BodyShape &before, const std::vector<CutT
   for (Crossing c : w.store.crossings)
     if (renumber(c, targets, w)) crossings.push_back(c);
   std::sort(crossings.begin(), crossings.end());
-  contacts = w.report.contacts;
   ended.assign(w.store.n, 0);
   for (uint32_t i = 0; i < w.store.n; ++i) {
-    ContactPoint *const c = i < w.report.n ? &contacts[i] : nullptr;
-    bool there = renumber(targets, w.store.type_a[i], id_a[i], feature_a[i], c ? &c->slot_a : nullptr);
-    there &= renumber(targets, w.store.type_b[i], id_b[i], feature_b[i], c ? &c->slot_b : nullptr);
+    bool there = renumber(targets, w.store.type_a[i], id_a[i], feature_a[i]);
+    there &= renumber(targets, w.store.type_b[i], id_b[i], feature_b[i]);
     ended[i] = !there;
-    if (!c) continue;
-    c->feature_a = feature_a[i];
-    c->feature_b = feature_b[i];
   }
 }
 
@@ -147,7 +139,6 @@ namespace {
 void exchange(World &w, Lasting &other) noexcept {
   w.attachments.swap(other.attachments);
   w.store.crossings.swap(other.crossings);
-  w.report.contacts.swap(other.contacts);
   w.store.id_a.swap(other.id_a);
   w.store.id_b.swap(other.id_b);
   w.store.feature_a.swap(other.feature_a);
@@ -174,7 +165,6 @@ void prepare_with(World &w, Lasting &lasting) {
     if (w.store.touching[i])  // of the pair that began
       add_event(w, DFM_EVENT_END, lasting.id_a[i], lasting.id_b[i], w.store.key[i], w.time);
     w.store.touching[i] = 0;
-    if (i < w.report.n) std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
   }
   for (Attachment &a : w.attachments) {
     if (!a.surfels.empty() || a.released) continue;

@@ -12,7 +12,6 @@ namespace dfm {
 // A body that may have the features after the cut: the body itself first, then its pieces.
 struct CutTarget {
   uint64_t id;
-  uint32_t slot;
   const Body *body;
   FeatureMap map;
 };
@@ -20,12 +19,11 @@ struct CutTarget {
 struct Lasting {
   std::vector<Attachment> attachments;
   Array<Crossing> crossings;
-  Array<ContactPoint> contacts;  // of the report
-  Array<uint64_t> id_a, id_b;    // of the store, as the next two
+  Array<uint64_t> id_a, id_b;  // of the store, as the next two
   Array<uint32_t> feature_a, feature_b;
   std::vector<uint8_t> ended;  // [contacts of the store] 1: its feature is gone
 
-  // Of the body whose id and slot the first target has. before: its shape before the cut.
+  // Of the body whose id the first target has. before: its shape before the cut.
   Lasting(const World &w, const BodyShape &before, const std::vector<CutTarget> &targets);
 };
 

@@ -200,10 +200,8 @@ void separate(Body &b, const SeparateRule &rule, CutReport &out) {
     w.changed = true;
   };
   try {
-    std::vector<CutTarget> targets{{b.id, b.slot, &b, FeatureMap(before->surface, b.surface)}};
-    for (const Body *const p : pieces)
-      targets.push_back({p->id, uint32_t(w.bodies.size() + targets.size() - 1), p,
-                         FeatureMap(before->surface, p->surface)});
+    std::vector<CutTarget> targets{{b.id, &b, FeatureMap(before->surface, b.surface)}};
+    for (const Body *const p : pieces) targets.push_back({p->id, p, FeatureMap(before->surface, p->surface)});
     Lasting lasting(w, *before, targets);
     reserve_ends(w, pieces.size());
     for (const auto &t : w.tools) t->cuts.bodies.reserve(t->cuts.bodies.size() + pieces.size());

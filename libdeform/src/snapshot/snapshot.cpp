@@ -2,6 +2,7 @@
 // changes. Then the two are exchanged, which cannot fail; if the derived tables cannot be made, they are
 // exchanged back.
 #include <algorithm>
+#include <array>
 #include <cstring>
 
 #include "body/make_surface.h"
@@ -142,13 +143,18 @@ struct Things {
   }
 };
 
+// Whether contact i has directions that are not longer than unit vectors.
+bool good_frame(const ContactStore &c, uint32_t i) {
+  return std::ranges::all_of(std::array{&c.normal, &c.tangent, &c.turned},
+                             [i](auto *of) { return norm2(load3(&(*of)[3 * size_t{i}])) < 1.01; });
+}
+
 bool good_contacts(const Staged &t, const Things &things) {
   const ContactStore &c = t.store;
   if (c.n > 0 && !(c.h > 0)) return false;
   if (!c.next_area.empty() && c.next_area.size() != c.n) return false;
   for (uint32_t i = 0; i < c.n; ++i) {
-    const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
-    if (!(norm2(n) < 1.01 && norm2(u) < 1.01)) return false;
+    if (!good_frame(c, i)) return false;
     if (!things.feature(c.id_a[i], c.type_a[i], c.feature_a[i]) ||
         !things.feature(c.id_b[i], c.type_b[i], c.feature_b[i]))
       return false;
@@ -165,13 +171,11 @@ bool good_contacts(const Staged &t, const Things &things) {
   return true;
 }
 
-bool good_tool_contacts(const Staged &t) {
+bool good_tool_contacts(const Staged &t, const Things &things) {
   const ContactStore &c = t.tool_store;
   if ((c.n > 0 && !(c.h > 0)) || !c.next_area.empty() || !c.crossings.empty()) return false;
   for (uint32_t i = 0; i < c.n; ++i) {
-    const Vec3 n = load3(&c.normal[3 * size_t{i}]), u = load3(&c.tangent[3 * size_t{i}]);
-    if (!(norm2(n) < 1.01 && norm2(u) < 1.01) || c.id_a[i] >= t.next_id || c.id_b[i] >= t.next_id)
-      return false;
+    if (!good_frame(c, i) || !things.obstacle(c.id_a[i]) || !things.obstacle(c.id_b[i])) return false;
   }
   return true;
 }
@@ -199,36 +203,11 @@ bool good_attachments(const std::vector<Attachment> &list, const Things &things)
   });
 }
 
-bool good_report(const Staged &t, const World &w) {
-  const Report &r = t.report;
-  if (r.n != t.store.n) return false;
-  for (uint32_t i = 0; i < r.n; ++i) {
-    const ContactPoint &c = r.contacts[i];
-    const double *const values[] = {c.weight, c.point,    c.normal,      &c.distance,
-                                    &c.area,  c.velocity, &c.indentation};
-    const size_t counts[] = {4, 3, 3, 1, 1, 3, 1};
-    for (int k = 0; k < 7; ++k)
-      if (!must::all_finite(values[k], counts[k])) return false;
-    if (c.key != t.store.key[i] || c.kind > kPrimitive || c.more != 0 || c.nnode > 4 || c.type_a > 2)
-      return false;
-    if (!t.store.touching[i] && c.slot_a == kNone) continue;  // of a removed body
-    if (c.slot_a >= w.bodies.size()) return false;
-    if (!t.store.touching[i]) continue;
-    if (c.slot_b >= (c.obstacle ? w.obstacles.size() : w.bodies.size())) return false;
-    if (w.bodies[c.slot_a]->id != t.store.id_a[i] ||
-        (c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id) != t.store.id_b[i])
-      return false;
-    const Surface &s = w.bodies[c.slot_a]->surface;
-    if (c.feature_a >= (c.type_a == 0 ? s.nsurfel : c.type_a == 1 ? s.nedge : s.ntri)) return false;
-  }
-  return true;
-}
-
 // Throws Error if one is not met.
 void check(const SnapshotReader &s, const Staged &t, const World &w) {
   if (!s.at_end()) s.refuse("the end", "no bytes after the last field");
   if (!good_contacts(t, {w})) s.refuse("contacts", "contacts of bodies and obstacles that are there");
-  if (!good_tool_contacts(t)) s.refuse("contacts of tools", "contacts that tools can have");
+  if (!good_tool_contacts(t, {w})) s.refuse("contacts of tools", "contacts that tools can have");
   if (!good_work(t.work, {w})) s.refuse("friction work", "pairs that are there, in order");
   if (!valid_suspended(t.overlaps.suspended, {w}))
     s.refuse("pairs that are set aside", "bodies and obstacles that are there");
@@ -236,7 +215,6 @@ void check(const SnapshotReader &s, const Staged &t, const World &w) {
   size_t sleepers = 0;
   for (const StagedBody &b : t.bodies) sleepers += b.sleep_state.asleep;
   if (sleepers != t.sleepers) s.refuse("sleepers", "as many as sleep");
-  if (t.sleepers > 0 && !good_report(t, w)) s.refuse("report", "the contacts that are kept");
   for (size_t i = 0; i < t.rigid_sets.size(); ++i) {
     const RigidSet &set = *w.rigid_sets[i];
     for (size_t k = 0; k < set.group.size(); ++k)
@@ -312,7 +290,7 @@ void exchange(World &w, Staged &t) noexcept {
     b.ahead.job.swap(other.ahead.job);
     std::swap(b.ahead.open_time, other.ahead.open_time);
     b.bound.known = false;
-    if (!other.surfel_impulse.empty()) b.surfel_impulse.swap(other.surfel_impulse);
+    b.surfel_impulse.swap(other.surfel_impulse);
     if (b.sleep_state.asleep) gather_surface(b.surface, b.p.x.data(), b.p.v.data());
     update_inverse_mass(b.p);
   }
@@ -414,7 +392,7 @@ void world_restore(World &w, const void *data, size_t bytes) {
   make_models(s, w, staged);
   // derived data, therefore recomputed and not read
   for (ContactStore *const store : {&staged.store, &staged.tool_store}) store->order();
-  find_touching(w, staged.tool_store, staged.rigid_report.touching);
+  find_touching(w, staged.tool_store, staged.rigid_touching);
   std::vector<std::unique_ptr<LawInstance>> laws = make_laws(s, w, staged);
   const double offset = w.offset;
   const uint32_t sleepers = w.sleepers;

@@ -360,8 +360,7 @@ void body_fields(Stream &s, W &w, B &b, const Body &like) {
   s.must_hold("asleep", "a sleep that began in a sub-step before now, where bodies may sleep", [&] {
     return !b.sleep_state.asleep || (w.def.sleep && b.sleep_state.since <= w.time && b.sleep_state.h > 0);
   });
-  if (b.sleep_state.h > 0)
-    s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
+  s.array("surfel impulse", b.surfel_impulse, like.surfel_impulse.size(), must::finite);
   if (w.def.sleep) s.array("anchor", b.anchor, like.p.x.size(), must::finite);
   prescribed_fields(s, b, like);
   s.where("", "");
@@ -540,16 +539,6 @@ void fields(Stream &s, W &w, const World &like) {
   s.where("", "");
   s.array("friction work", w.work, kAnyCount,
           must::Be{[](const PairWork &x) { return is_valid(x); }, "finite work, rises not below zero"});
-  if (w.sleepers == 0) return;  // contacts that sleep are reported from what the last sub-step left
-  auto &r = w.report;
-  const uint64_t n = w.store.n;
-  s.value("reported contacts", r.n, must::at_most(n));
-  s.value("reported sub-step", r.h, must::positive);
-  s.array("report", r.contacts, n, must::any);
-  s.array("reported frame", r.frame, 9 * n, must::finite);
-  s.array("reported impulse", r.impulse, 3 * n, must::finite);
-  s.array("reported slip", r.slip, 2 * n, must::finite);
-  s.array("reported mode", r.mode, n, must::at_most(2));
 }
 
 }  // namespace dfm::snapshot

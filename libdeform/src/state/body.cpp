@@ -38,7 +38,7 @@ double Body::young() const {
 
 double Body::impulse_time() const {
   if (!world->plan.touches()) return 0;
-  return sleep_state.h > 0 ? sleep_state.h : world->report.h;
+  return sleep_state.h > 0 ? sleep_state.h : world->store.h;
 }
 
 }  // namespace dfm

@@ -20,7 +20,7 @@ struct StepImpulses {
   };
   Array<Pair> pairs;             // sorted by (a, b)
   double start = 0, length = 0;  // s, of the step
-  double idle = 0;               // s of this step in which all bodies slept: forces are those of the report
+  double idle = 0;               // s of this step in which all bodies slept: forces are those of the store
 };
 
 }  // namespace dfm

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "contact/report.h"
 #include "contact/store.h"
 #include "core/memory.h"
 #include "plan/plan.h"
@@ -19,7 +18,6 @@
 #include "state/impulses.h"
 #include "state/overlaps.h"
 #include "state/pair_tables.h"
-#include "state/rigid_report.h"
 #include "state/step_sizes.h"
 #include "state/world_bound.h"
 
@@ -41,7 +39,13 @@ struct FilterRule {
   std::string between[2];
   bool collide;
 };
-// Of a pair of ids, a body first, or of two rigid things as in RigidReport, J. Two are sums of the watch on
+// Two rigid things that touch, by ids. Side a is the one that gives way; where both do, or none, the older one.
+struct RigidPair {
+  uint64_t a, b;
+  auto operator<=>(const RigidPair &) const = default;
+};
+
+// Of a pair of ids, a body first, or of two rigid things as in RigidPair, J. Two are sums of the watch on
 // energies (step/watch/pair_energy.h), over sub-steps since each was last zero, and never below; that of
 // friction over all, where laws remember.
 struct PairWork {
@@ -123,13 +127,12 @@ struct WorldState {
   std::vector<Attachment> attachments;  // by body, each in order of creation
   ContactStore store;
   ContactStore tool_store;  // of tools with each other and with rigid bodies (step/rigid/tool_touch.h)
-  Report report;
-  RigidReport rigid_report;
+  Array<RigidPair> rigid_touching;        // ascending; the others of contacts in tool_store have no load
   std::vector<PairWork> work;             // sorted by (a, b)
   std::vector<dfm_contact_event> events;  // a restore drops them
   std::vector<Swap> swaps;                // not yet read by the host; a restore drops them
   explicit WorldState(const Memory &contacts)
-      : store(contacts), tool_store(contacts), report(contacts), rigid_report(contacts) {}
+      : store(contacts), tool_store(contacts), rigid_touching(contacts) {}
 };
 
 // Memory of the parts of a world (dfm_world_memory). Each part allocates through its meter.

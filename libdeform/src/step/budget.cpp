@@ -139,12 +139,7 @@ void changing(Stream &s, World &w) {
     s.one(store->h);
     each_column([&](const ContactColumn &, auto &column) { s.many(column); }, *store);
   }
-  s.one(w.report.n);
-  s.one(w.report.h);
-  each_report_column([&](size_t, auto &column) { s.many(column); }, w.report);
-  s.one(w.rigid_report.h);
-  s.many(w.rigid_report.contacts);
-  s.many(w.rigid_report.touching);
+  s.many(w.rigid_touching);
   for (Attachment &a : w.attachments) {
     s.many(a.impulse);
     s.one(a.h);
@@ -156,16 +151,13 @@ void changing(Stream &s, World &w) {
   s.count(w.events);  // steps only append to it, and the host may read it after many steps
 }
 
-// The stores and the reports are swapped with others at the end of sub-steps, so the saved data may have to
-// fit into the other ones.
+// The stores are swapped with others at the end of sub-steps, so the saved data may have to fit into the other
+// ones.
 void reserve_others(World &w, StepContext &step) {
   const auto reserve = [](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); };
   each_column(reserve, w.store, step.next_store);
   each_column(reserve, w.tool_store, step.tools->next());
-  each_report_column([](size_t, const auto &from, auto &to) { to.reserve(from.size()); }, w.report,
-                     step.last_report);
-  step.tools->next_report().contacts.reserve(w.rigid_report.contacts.size());
-  step.tools->next_report().touching.reserve(w.rigid_report.touching.size());
+  step.tools->next_touching().reserve(w.rigid_touching.size());
 }
 
 // Data that a sub-step changes before it is known whether more must be saved: an interrupt ends it before it

@@ -100,7 +100,7 @@ bool stage_commit(World &w, StepContext &step, uint32_t *trouble) {
     keep_contacts(w, step);
     keep_bonds(w, step);
     keep_cut_drags(w, step);
-    add_impulses(w);
+    add_impulses(w, w.store);
   }
   damp_changes_of_size(w, step);
   return true;

@@ -18,7 +18,6 @@ StepContext::StepContext(const Meters &meters)
       exchange(meters.contacts.memory()),
       renewal(meters.contacts.memory()),
       next_store(meters.contacts.memory()),
-      last_report(meters.contacts.memory()),
       islands(meters.steps.memory()) {
   use_memory(meters.steps.memory(), driven, free_kinetic, looks, in_full, near, touching, active, woken,
              stirred, roused.bodies, roused.dwell, roused.total);

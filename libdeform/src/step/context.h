@@ -141,7 +141,6 @@ struct StepContext {
   Array<uint32_t> goes_on;
   // trades places with the world's
   ContactStore next_store;
-  Report last_report;
   // sleep. If no body sleeps, `active` contains all bodies.
   Islands islands;
   // slots of active bodies, ascending; slots woken in this sub-step

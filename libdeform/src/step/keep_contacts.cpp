@@ -1,5 +1,5 @@
-// Results of contacts after a completed sub-step: the store for the next one, events, the hold, the work of
-// friction, and the report.
+// Results of contacts after a completed sub-step: the store for the next one and for reports, events, the
+// hold, and the work of friction.
 #include <algorithm>
 #include <utility>
 
@@ -21,10 +21,7 @@ namespace dfm {
 void reserve_contacts(World &w, StepContext &step) {
   const uint32_t n = step.rows.soft() + (w.sleepers ? w.store.n : 0), S = step.state.nstate;
   ContactStore &to = step.next_store;
-  // the report that keep_contacts(w, step) will write
-  Report &next = w.sleepers ? step.last_report : w.report;
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
-  each_report_column([&](size_t width, auto &column) { column.reserve(width * n); }, next);
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
   step.pairs_made.reserve(step.rows.soft());
   step.before.resize(n);
@@ -33,12 +30,12 @@ void reserve_contacts(World &w, StepContext &step) {
 }
 
 void reserve_reports(World &w, const StepContext &step) {
-  const size_t rigid = step.tools->next_report().touching.size();
+  const size_t rigid = step.tools->next_touching().size();
   size_t contacts = 0;
   if (w.plan.touches()) contacts = step.rows.soft() + (w.sleepers ? size_t{w.store.n} : 0);
   const size_t pairs = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
   w.work.reserve(w.work.size() + std::min(contacts, pairs) + rigid);
-  reserve_events(w, contacts + w.store.n + w.attachments.size() + step.tools->most_events(w));
+  reserve_events(w, contacts + w.store.n + w.attachments.size() + rigid + w.rigid_touching.size());
   reserve_impulses(w, contacts, rigid);
 }
 
@@ -58,28 +55,27 @@ void end_contacts(World &w) {
   for (uint32_t i = 0; i < s.n; ++i)
     if (s.touching[i]) add_event(w, DFM_EVENT_END, s.id_a[i], s.id_b[i], s.key[i], w.time);
   each_column([](const ContactColumn &, auto &values) { values.clear(); }, s);
-  s.n = w.report.n = 0;
-  w.report.h = 0;
+  s.n = 0;
+  s.h = 0;
   for (auto &b : w.bodies) std::fill(b->surfel_impulse.begin(), b->surfel_impulse.end(), 0.0);
   w.stats.contacts = w.stats.sticking = w.stats.self_bodies = 0;
 }
 
-void list_crossings(World &w, StepContext &step) {
-  Array<Crossing> &list = step.next_store.crossings;
+void list_crossings(StepContext &step) {
+  ContactStore &s = step.next_store;
+  Array<Crossing> &list = s.crossings;
   list.clear();
-  for (uint32_t i = 0; i < step.next_store.n; ++i) {
-    const ContactPoint &c = w.report.contacts[i];
-    if (c.type_a == 1 && step.next_store.touching[i])
-      list.push_back({step.next_store.id_a[i], step.next_store.id_b[i], c.feature_a, c.feature_b});
-  }
+  for (uint32_t i = 0; i < s.n; ++i)
+    if (s.type_a[i] == 1 && s.touching[i])
+      list.push_back({s.id_a[i], s.id_b[i], s.feature_a[i], s.feature_b[i]});
   // contacts between bodies are in this order already
   if (!std::is_sorted(list.begin(), list.end())) std::sort(list.begin(), list.end());
 }
 
 namespace {
 
-// Stores contact i for the next sub-step and for the report.
-void keep_contact(World &w, StepContext &step, uint32_t i) {
+// Stores contact i for the next sub-step and for reports.
+void keep_contact(const World &w, StepContext &step, uint32_t i) {
   const uint32_t S = step.state.nstate;
   ContactStore &to = step.next_store;
   const ContactPoint &c = step.contacts[i];
@@ -101,7 +97,11 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   to.law[i] = step.state.law[i];
   store3(&to.normal[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i]));
   store3(&to.tangent[size_t(3) * i], load3(&step.rows.frame[size_t(9) * i + 3]));
-  store3(&to.impulse[size_t(3) * i], {step.rows.load_without_opening(i), l[1], l[2]});
+  store3(&to.impulse[size_t(3) * i], load3(l));
+  to.lasting[i] = step.rows.load_without_opening(i);
+  store3(&to.turned[size_t(3) * i], load3(&to.tangent[size_t(3) * i]));
+  store3(&to.point[size_t(3) * i], load3(c.point));
+  to.gap[i] = c.distance - w.offset;
   // the law of this contact has `own` values of state; the other columns belong to laws with more
   const uint32_t own = now ? w.pairs.laws[step.state.law[i]]->nstate : 0;
   for (uint32_t s = 0; s < S; ++s)
@@ -116,15 +116,13 @@ void keep_contact(World &w, StepContext &step, uint32_t i) {
   for (size_t k = 0; k < 2; ++k) {
     const double slip = step.state.vt[step.state.stride * k + i];
     to.path[2 * size_t{i} + k] = holds ? (carried ? w.store.path[2 * size_t{m} + k] : 0) + step.h * slip : 0;
-    w.report.slip[2 * size_t{i} + k] = slip;
+    to.slip[2 * size_t{i} + k] = slip;
   }
   to.touching[i] = now;
   to.held[i] = holds;
+  to.sticks[i] = stick;
   to.began[i] = now && !before;
   step.before[i] = before;
-  w.report.contacts[i] = c;
-  w.report.contacts[i].area = step.state.area[i];
-  w.report.mode[i] = step.state.mode[i];
 }
 
 void book_friction(World &w, const StepContext &step) {
@@ -182,7 +180,6 @@ void keep_contacts(World &w, StepContext &step) {
   book_friction(w, step);
   const uint32_t n = join_rows(step), S = step.state.nstate;
   ContactStore &to = step.next_store;
-  if (w.sleepers) std::swap(w.report, step.last_report);
   to.n = n;
   to.nstate = S;
   to.h = step.h;
@@ -193,33 +190,23 @@ void keep_contacts(World &w, StepContext &step) {
       to);
   if (step.stick_drift.empty()) std::fill(to.stick_drift.begin(), to.stick_drift.end(), 0.0);
   else std::copy_n(step.stick_drift.begin(), size_t(3) * n, to.stick_drift.begin());
-  w.report.n = n;
-  w.report.h = step.h;
-  w.report.contacts.resize(n);
-  w.report.frame.assign(step.rows.frame.begin(), step.rows.frame.begin() + std::ptrdiff_t{9} * n);
-  w.report.impulse.assign(step.rows.impulse.begin(), step.rows.impulse.begin() + std::ptrdiff_t{3} * n);
-  w.report.slip.resize(size_t(2) * n);
-  w.report.mode.resize(n);
-
   each_row_in_blocks(n, &w.context->tasks, [&](uint32_t i) { keep_contact(w, step, i); });
   uint32_t touching = 0, sticking = 0;
   for (uint32_t i = 0; i < n; ++i) {
     const uint64_t a = to.id_a[i], b = to.id_b[i];
     if (to.began[i]) add_event(w, DFM_EVENT_BEGIN, a, b, to.key[i], w.time + step.h);
     if (step.before[i] && !to.touching[i]) add_event(w, DFM_EVENT_END, a, b, to.key[i], w.time + step.h);
-    const double *const l = &step.rows.impulse[size_t(i) * 3];
     touching += to.touching[i];
-    sticking += l[0] > 0 && step.state.mode[i] == 1;
+    sticking += to.sticks[i];
   }
   follow_load(w, step);
   turn_frames(w, step);
   order_keys(w, step);
   if (w.sleepers) carry_sleepers(w, step, &touching, &sticking);
   for (uint32_t m = 0; m < w.store.n; ++m)
-    if (w.store.touching[m] && step.goes_on[m] == kNone && !sleeps(w, step, m) &&
-        to.find(w.store.key[m]) == kNone)
+    if (w.store.touching[m] && step.goes_on[m] == kNone && to.find(w.store.key[m]) == kNone)
       add_event(w, DFM_EVENT_END, w.store.id_a[m], w.store.id_b[m], w.store.key[m], w.time + step.h);
-  list_crossings(w, step);
+  list_crossings(step);
   std::swap(w.store, step.next_store);
   uint32_t touch_themselves = 0;
   uint64_t last = 0;

@@ -13,6 +13,16 @@ inline uint64_t id_of_b(const World &w, const ContactPoint &c) {
   return c.obstacle ? w.obstacles[c.slot_b]->id : w.bodies[c.slot_b]->id;
 }
 
+// Whether lists of contacts have side b of the store as a: of two rigid things, if b alone gives way.
+bool b_first(const World &w, const ContactStore &s, uint32_t i);
+// The sides as reports of pairs have them, by ids; of two bodies a is the older one. turned: the store has
+// the other one first.
+struct PairSides {
+  uint64_t a, b;
+  bool turned;
+};
+PairSides pair_sides(const World &w, const ContactStore &s, uint32_t i);
+
 // Whether the body of this slot is one of them.
 inline bool is_side(const ContactPoint &c, uint32_t slot) {
   return c.slot_a == slot || (!c.obstacle && c.slot_b == slot);

@@ -19,6 +19,8 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
+#include <utility>
 
 #include "body/make_surface.h"
 #include "contact/reach.h"
@@ -276,12 +278,17 @@ void fall_asleep(World &w, StepContext &step, Body &b, double end) {
   b.bound.known = false;
 }
 
-// Contacts of sleeping bodies are appended to those of this sub-step, in the order of their keys. last_report
-// belongs to `store`.
+// Contacts of sleeping bodies are appended to those of this sub-step, in the order of their keys.
 void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking) {
   ContactStore &to = step.next_store;
   const uint32_t own = to.n;
   const double scale = w.store.h > 0 ? step.h / w.store.h : 0;  // impulses belong to a sub-step's length
+  uint64_t last = 0;                                            // contacts of a body are adjacent
+  bool rests = false;
+  const auto sleeps = [&](uint32_t m) {
+    if (std::exchange(last, w.store.id_a[m]) != w.store.id_a[m]) rests = asleep(w, last);
+    return rests;
+  };
   const auto carry = [&](uint32_t from, uint32_t end) {
     const auto copy = [=](const auto &source, auto &into, size_t width) {
       into.insert(into.end(), source.begin() + std::ptrdiff_t(from * width),
@@ -294,37 +301,33 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
         },
         w.store, to);
     if (step.shares) copy(w.store.next_area.empty() ? w.store.area : w.store.next_area, to.next_area, 1);
-    each_report_column([&](size_t width, const auto &source, auto &into) { copy(source, into, width); },
-                       step.last_report, w.report);
     if (to.nstate == w.store.nstate) copy(w.store.bristle, to.bristle, w.store.nstate);
     else
       for (uint32_t m = from; m < end; ++m)
         for (uint32_t s = 0; s < to.nstate; ++s)
           to.bristle.push_back(s < w.store.nstate ? w.store.bristle[size_t(w.store.nstate) * m + s] : 0);
+    std::iota(step.goes_on.begin() + from, step.goes_on.begin() + end, to.n);
     to.n += end - from;
   };
   // While the same bodies sleep, their contacts are the tail of the old store, and are taken over as a whole.
   uint32_t tail = w.store.n;
-  while (tail > 0 && sleeps(w, step, tail - 1) &&
-         (tail == w.store.n || w.store.key[tail - 1] < w.store.key[tail]))
+  while (tail > 0 && sleeps(tail - 1) && (tail == w.store.n || w.store.key[tail - 1] < w.store.key[tail]))
     --tail;
   uint32_t before = 0;
-  while (before < tail && !sleeps(w, step, before)) ++before;
+  while (before < tail && !sleeps(before)) ++before;
   if (before == tail) {
     carry(tail, w.store.n);
   } else {
     for (const uint32_t m : w.store.by_key)
-      if (sleeps(w, step, m)) carry(m, m + 1);
+      if (sleeps(m)) carry(m, m + 1);
   }
   to.began.resize(to.n, 0);
   to.by_key.resize(to.n);
-  w.report.n = to.n;
   for (size_t i = size_t(3) * own; i < size_t(3) * to.n; ++i) to.impulse[i] *= scale;
-  std::copy(to.impulse.begin() + std::ptrdiff_t(size_t(3) * own), to.impulse.end(),
-            w.report.impulse.begin() + std::ptrdiff_t(size_t(3) * own));
   for (uint32_t m = own; m < to.n; ++m) {
+    to.lasting[m] *= scale;
     *touching += to.touching[m];
-    *sticking += to.impulse[size_t(3) * m] > 0 && w.report.mode[m] == 1;
+    *sticking += to.sticks[m];
   }
 
   // Two sorted runs: this sub-step's, which `match` takes meanwhile, and the carried, whose places
@@ -334,39 +337,10 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
     to.by_key[k] = m == to.n || (i < own && to.key[step.match[i]] < to.key[m]) ? step.match[i++] : m++;
 }
 
-// Whether a contact of the old store belongs to sleeping bodies and stays as it is.
-bool sleeps(const World &w, const StepContext &step, uint32_t m) {
-  if (w.sleepers == 0) return false;
-  const uint32_t slot = step.last_report.contacts[m].slot_a;
-  return slot != kNone && w.bodies[slot]->sleep_state.asleep;
-}
-
 // Contacts of sleeping bodies stick: a hold that begins now counts them from now on.
 void hold_sleepers(World &w) {
   for (uint32_t m = 0; m < w.store.n; ++m)
     w.store.held[m] = w.store.impulse[size_t(3) * m] > 0 && asleep(w, w.store.id_a[m]);
-}
-
-// Called before a body or an obstacle is removed from the world: bodies that touched it wake, its contacts
-// name nothing and bear nothing until the next sub-step removes them, and higher slots in the contacts of
-// sleeping bodies move down by one.
-void close_slot(World &w, uint64_t id, bool obstacle) {
-  const uint32_t slot = obstacle ? obstacle_slot_of(w, id) : slot_of(w, id);
-  if (obstacle) wake_touching(w, id);
-  else wake(w, *w.bodies[slot]);
-  if (w.sleepers == 0) w.report.n = 0;
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    ContactPoint &c = w.report.contacts[i];
-    if (c.slot_a == kNone) continue;
-    const bool of_b = bool(c.obstacle) == obstacle;
-    if ((!obstacle && c.slot_a == slot) || (of_b && c.slot_b == slot)) {
-      c.slot_a = c.slot_b = kNone;
-      std::fill_n(w.report.impulse.begin() + std::ptrdiff_t{3} * i, 3, 0.0);
-      continue;
-    }
-    if (!obstacle && c.slot_a > slot) --c.slot_a;
-    if (of_b && c.slot_b > slot) --c.slot_b;
-  }
 }
 
 }  // namespace dfm

@@ -113,7 +113,7 @@ bool report_jam(World &w, StepContext &step, uint32_t *trouble);
 void reserve_contacts(World &w, StepContext &step);  // memory for keep_contacts()
 // Of lists to which keep_contacts() and keep_rigids() add.
 void reserve_reports(World &w, const StepContext &step);
-void keep_contacts(World &w, StepContext &step);  // store, events, hold, work, report; allocates nothing
+void keep_contacts(World &w, StepContext &step);  // store, events, hold, work; allocates nothing
 // all, with their events, if the plan has no stage for contacts
 void end_contacts(World &w);
 void reserve_events(World &w, size_t more);
@@ -130,9 +130,7 @@ void wake_all(World &w);
 void undo_waking(World &w, StepContext &step);  // of the sub-step, which has failed
 void wake_touching(World &w, uint64_t obstacle);
 bool all_idle(const World &w, const StepContext &step);
-bool sleeps(const World &w, const StepContext &step, uint32_t m);  // a contact of the store
 void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *sticking);
-void close_slot(World &w, uint64_t id, bool obstacle);
 void fall_asleep(World &w, StepContext &step, Body &b, double end);
 void hold_sleepers(World &w);  // hold_begin() while contacts sleep
 

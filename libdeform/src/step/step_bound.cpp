@@ -67,7 +67,7 @@ void warn_squeezed(World &w) {
     Squeezed &s = b.squeezed;
     const double gone = w.time - std::exchange(s.at, w.time),
                  share = std::clamp(gone / kLasts, 0.0, kMaxShare);
-    s.pressure += share * ((w.report.n > 0 ? mean_pressure(b) : 0) - s.pressure);
+    s.pressure += share * (mean_pressure(b) - s.pressure);
     if (!(s.pressure > std::max(kFlat * young, s.weight))) s.since = w.time;
     if (w.time - s.since < kLasts) continue;
     s.reported = true;

@@ -55,23 +55,25 @@ void end(const StepImpulses &s, double at, double time, Array<StepImpulses::Pair
   }
 }
 
-// The report's forces for `time`, s, from `at` on, added to pairs; a peak is the mean over this time.
-void add(const World &w, double at, double time, Array<StepImpulses::Pair> &pairs) {
-  const double scale = w.report.h > 0 ? time / w.report.h : 0;
+// The forces of contacts for `time`, s, from `at` on, added to pairs; a peak is the mean over this time.
+void add(const World &w, const ContactStore &s, double at, double time, Array<StepImpulses::Pair> &pairs) {
+  const double scale = s.h > 0 ? time / s.h : 0;
   begin(pairs);
-  StepImpulses::Pair *pair = nullptr;  // contacts of a pair are adjacent
-  for (uint32_t i = 0; i < w.report.n; ++i) {
-    const double *const l = &w.report.impulse[size_t(3) * i], *const f = &w.report.frame[size_t(9) * i];
-    if (!(l[0] > 0)) continue;
-    const ContactPoint &c = w.report.contacts[i];
-    uint64_t a = w.store.id_a[i], b = w.store.id_b[i];
-    const bool turned = !c.obstacle && b < a;
-    if (turned) std::swap(a, b);
-    if (!pair || pair->a != a || pair->b != b) pair = &pair_of(pairs, a, b);
-    const double normal = scale * l[0];
-    if (a != b) pair->now += (turned ? -scale : scale) * from_frame(f, load3(l));
+  StepImpulses::Pair *pair = nullptr;
+  uint32_t last = kNone;  // contacts of a pair are adjacent
+  bool turned = false;
+  for (uint32_t i = 0; i < s.n; ++i) {
+    if (!s.bears(i)) continue;
+    if (last == kNone || s.id_a[i] != s.id_a[last] || s.id_b[i] != s.id_b[last]) {
+      const PairSides sides = pair_sides(w, s, i);
+      pair = &pair_of(pairs, sides.a, sides.b);
+      turned = sides.turned;
+    }
+    last = i;
+    const double normal = scale * s.impulse[size_t(3) * i];
+    if (s.id_a[i] != s.id_b[i]) pair->now += (turned ? -scale : scale) * s.world_impulse(i);
     pair->now_normal += normal;
-    pair->place += normal * load3(c.point);
+    pair->place += normal * load3(&s.point[size_t(3) * i]);
   }
   end(w.step_impulses, at, time, pairs);
 }
@@ -88,36 +90,24 @@ void begin_impulses(StepImpulses &s, double start, double length) {
 void reserve_impulses(World &w, size_t contacts, size_t pairs) {
   Array<StepImpulses::Pair> &list = w.step_impulses.pairs;
   const size_t most = w.bodies.size() * (w.bodies.size() + w.obstacles.size());
-  if (w.step_impulses.idle > 0) contacts += w.report.n;
+  if (w.step_impulses.idle > 0) contacts += w.store.n;
   list.reserve(list.size() + std::min(contacts, most) + pairs);
 }
 
-void add_impulses(World &w) { add(w, w.time, w.report.h, w.step_impulses.pairs); }
-
-void add_rigid_impulses(World &w) {
-  Array<StepImpulses::Pair> &pairs = w.step_impulses.pairs;
-  begin(pairs);
-  for (const RigidContact &c : w.rigid_report.contacts) {
-    StepImpulses::Pair &pair = pair_of(pairs, c.a, c.b);
-    pair.now += c.force();
-    pair.now_normal += c.impulse[0];
-    pair.place += c.impulse[0] * c.point;
-  }
-  end(w.step_impulses, w.time, w.rigid_report.h, pairs);
-}
+void add_impulses(World &w, const ContactStore &s) { add(w, s, w.time, s.h, w.step_impulses.pairs); }
 
 void end_idle(World &w) {
   StepImpulses &s = w.step_impulses;
   if (!(s.idle > 0)) return;
   reserve_impulses(w, 0, 0);
-  add(w, w.time - s.idle, s.idle, s.pairs);
+  add(w, w.store, w.time - s.idle, s.idle, s.pairs);
   s.idle = 0;
 }
 
 void list_impulses(const World &w, Array<StepImpulses::Pair> &out) {
   out = w.step_impulses.pairs;
   const StepImpulses &s = w.step_impulses;
-  if (s.idle > 0) add(w, s.start + s.length - s.idle, s.idle, out);
+  if (s.idle > 0) add(w, w.store, s.start + s.length - s.idle, s.idle, out);
 }
 
 }  // namespace dfm

@@ -343,10 +343,11 @@ Obstacle &create_obstacle(World &w, const dfm_obstacle_def &def) {
 }
 
 void end_contacts(World &w, uint64_t id, bool obstacle) {
-  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size() + w.rigid_report.touching.size());
+  reserve_events(w, w.store.n + w.attachments.size() + w.sensed.size() + w.rigid_touching.size());
   end_idle(w);
   drop_attachments(w, id);
-  close_slot(w, id, obstacle);
+  if (obstacle) wake_touching(w, id);
+  else wake(w, *w.body(id));
   end_sensor_overlaps(w, id);
   ContactStore &s = w.store;
   for (uint32_t i = 0; i < s.n; ++i)

@@ -41,7 +41,7 @@ ContactStore store_of(std::vector<uint64_t> keys, uint32_t nstate = 0) {
   std::sort(s.by_key.begin(), s.by_key.end(), [&](uint32_t i, uint32_t j) { return keys[i] < keys[j]; });
   for (uint32_t i = 0; i < s.n; ++i) {
     s.normal[3 * i + 2] = 1;
-    s.tangent[3 * i] = 1;
+    s.tangent[3 * i] = s.turned[3 * i] = 1;
   }
   return s;
 }
@@ -180,6 +180,7 @@ TEST(WarmStart, TakesOverWhatTheContactOfTheKeyHas) {
   ContactStore old = store_of({20, 10}, 2);
   old.h = 2e-3;
   old.impulse = {1, 2, 3, 4, 5, 6};
+  old.lasting = {1, 4};
   old.bristle = {0.1, 0.2, 0.3, 0.4};
   old.dwell = {7, 8};
   old.law = {0, 1};
@@ -201,6 +202,7 @@ TEST(WarmStart, OfAContactThatTurnedOver_StartsAgain) {
   ContactStore old = store_of({10}, 1);
   old.h = 1e-3;
   old.impulse = {1, 2, 3};
+  old.lasting = {1};
   old.bristle = {0.5};
   old.dwell = {7};
   const Warm now(old, {contact_of(10, {0, 0, -1})}, 1e-3, 1, {0});

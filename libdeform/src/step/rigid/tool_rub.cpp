@@ -128,7 +128,8 @@ void ToolTouch::drop_bad_starts(const StepContext &step) {
 Vec3 ToolTouch::slip(const Row &row) const { return speed(row) + row.bend; }
 
 // Memory for it is needed before the sub-step is final.
-void ToolTouch::keep_next(const ContactState &state, uint32_t first) {
+void ToolTouch::keep_next(const StepContext &step) {
+  const ContactState &state = step.state;
   ContactStore &to = next_;
   uint32_t n = 0;
   for (const Row &row : rows_) n += row.impulse > 0;
@@ -150,12 +151,20 @@ void ToolTouch::keep_next(const ContactState &state, uint32_t first) {
     store3(&to.normal[3 * size_t{n}], row.normal);
     store3(&to.tangent[3 * size_t{n}], row.tangent[0]);
     store3(&to.impulse[3 * size_t{n}], {row.impulse, row.along[0], row.along[1]});
+    to.lasting[n] = row.impulse;
+    store3(&to.turned[3 * size_t{n}], row.tangent[0]);
+    store3(&to.point[3 * size_t{n}], row.at);
+    to.gap[n] = row.gap - offset_;
+    const uint32_t r = step.rows.soft() + i;
+    for (size_t k = 0; k < 2; ++k) to.slip[2 * size_t{n} + k] = dot(row.tangent[k], slip(row));
     for (uint32_t s = 0; s < to.nstate; ++s)
-      to.bristle[size_t{to.nstate} * n + s] = state.bristle_out[size_t{s} * state.stride + first + i];
+      to.bristle[size_t{to.nstate} * n + s] = state.bristle_out[size_t{s} * state.stride + r];
     to.law[n] = row.pair->law;
     to.dwell[n] = state_.dwell[i] + h_;
     to.area[n] = kArea;
     to.touching[n] = 1;
+    to.sticks[n] = step.rows.wt[r] > 0 && state.mode[r] == 1;
+    to.began[n] = match_[i] == kNone;
     ++n;
   }
   to.order();

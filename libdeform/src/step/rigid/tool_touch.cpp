@@ -72,7 +72,7 @@ bool passes(const Obstacle &a, const Obstacle &b) {
 
 }  // namespace
 
-ToolTouch::ToolTouch(const Memory &m) : islands_(m), next_(m), next_report_(m) {
+ToolTouch::ToolTouch(const Memory &m) : islands_(m), next_(m), next_touching_(m) {
   use_memory(m, start_, tangents_, match_, points_);
   state_.use(m);
 }
@@ -476,8 +476,6 @@ bool ToolTouch::follows_arcs(const World &w, StepContext &step) const {
 bool ToolTouch::begin(World &w, StepContext &step) {
   rows_.clear();
   off_ = left_ = 0;
-  next_report_.contacts.clear();
-  next_report_.touching.clear();
   offset_ = w.offset;
   if (!passing_.empty()) warn_passing(w, step);
   if (sets_.empty()) return true;

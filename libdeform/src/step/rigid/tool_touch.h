@@ -38,13 +38,13 @@
 #include "core/disjoint_sets.h"
 #include "friction/laws.h"
 #include "math/vec3.h"
-#include "state/rigid_report.h"
 #include "step/rigid/tool_shape.h"
 
 namespace dfm {
 
 struct Obstacle;
 struct RigidMember;
+struct RigidPair;
 struct RigidSet;
 struct SceneFacts;
 struct StepContext;
@@ -95,8 +95,7 @@ class ToolTouch {
   std::string row_names(const World &w, uint32_t row) const;  // of the two things, for messages
   // tool_report.cpp: for events, lists of contacts and sums of pairs
   static bool b_first(const Obstacle &a, const Obstacle &b);
-  RigidReport &next_report() { return next_report_; }
-  size_t most_events(const World &w) const;  // that keep() adds
+  Array<RigidPair> &next_touching() { return next_touching_; }
 
  private:
   struct Side {
@@ -225,9 +224,7 @@ class ToolTouch {
   void add_rows_to_velocities(const StepContext &step);
   void drop_bad_starts(const StepContext &step);
   Vec3 slip(const Row &row) const;
-  void keep_next(const ContactState &state, uint32_t first);
-  // tool_report.cpp
-  void list_contact(const World &w, const StepContext &step, uint32_t row);
+  void keep_next(const StepContext &step);
 
   static constexpr double kOpens = 0.1;  // of d_c in a sub-step, where two things are in each other
   static constexpr double kArc = 0.2;    // rad in a sub-step, of a free body that touches
@@ -265,7 +262,7 @@ class ToolTouch {
   Array<double> start_, tangents_;
   Array<uint32_t> match_;
   ContactStore next_;
-  RigidReport next_report_;
+  Array<RigidPair> next_touching_;
 };
 
 // Ends what the thing touches. At the removal of a thing.

@@ -239,7 +239,7 @@ void turn_frames(World &w, StepContext &step) {
                        : turn_of(*w.bodies[c.slot_b], c.kind == kEdgeEdge ? 1 : 2, c.feature_b, t, side);
     // half of the sum
     const Turn both{a.c * b.c - a.s * b.s, a.c * b.s + a.s * b.c}, mean = unit_turn(1 + both.c, both.s);
-    store3(&to.tangent[3 * size_t{i}], mean.c * t + mean.s * side);
+    store3(&to.turned[3 * size_t{i}], mean.c * t + mean.s * side);
   }
 }
 

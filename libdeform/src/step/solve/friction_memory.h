@@ -17,7 +17,7 @@ void share_areas(World &w, StepContext &step);
 void fit_bristles(World &w, StepContext &step);
 // After the commit: as bristles slide, areas move to where the load is (next_store.next_area).
 void follow_load(World &w, StepContext &step);
-// After the commit: frames of laws with tangent state (next_store.tangent) turn with the mean spin of the two
+// After the commit: frames of laws with tangent state (next_store.turned) turn with the mean spin of the two
 // surfaces about the normal.
 void turn_frames(World &w, StepContext &step);
 
