@@ -68,8 +68,8 @@ class Doors(unittest.TestCase):
 
     def test_names_between_bars(self):
         """The first that is installed or that apt knows; if there is none, apt says so of the last."""
-        (self.root / LIST).write_text("doors  new|old    one\ndoors  later|now  two\ndoors  gone|lost  three\n"
-                                      "doors  g++|cc     four\n")
+        (self.root / LIST).write_text("doors  new|old    one\ndoors  later|now  two\n"
+                                      "doors  gone|lost  three\ndoors  g++|cc     four\n")
         told = self.set_up_elsewhere(dpkg_query="echo installed old", id="echo 1000",
                                      apt_cache='case $2 in now | g++ | cc) echo "$2";; esac')
         self.assertEqual(told.returncode, 1)
