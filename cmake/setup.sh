@@ -17,22 +17,34 @@ if ! command -v dpkg-query >/dev/null; then
   [ -z "$lacks" ] || { echo "deform: not found:$lacks; install them, then call make again" >&2; exit 1; }
   exit 0
 fi
-present=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $names 2>/dev/null |
+present=$(dpkg-query -W -f '${db:Status-Status} ${Package}\n' $(echo $names | tr '|' ' ') 2>/dev/null |
   sed -n 's/^installed //p' || true)
-missing=
-for name in $names; do
-  echo "$present" | grep -qx "$name" || missing="$missing $name"
-done
+is_present() { echo "$present" | grep -qx "$1"; }
+# Of names between bars the first that is installed or that apt knows, else the last.
+chosen() {
+  for name in $(echo "$1" | tr '|' ' '); do
+    if is_present "$name" || [ -n "$(apt-cache madison "$name")" ]; then break; fi
+  done
+  echo "$name"
+}
+look() {
+  missing=
+  for name in $names; do
+    case $name in *'|'*) name=$(chosen "$name") ;; esac
+    is_present "$name" || missing="$missing $name"
+  done
+}
+look
 [ -n "$missing" ] || exit 0
 
 echo "deform: missing Debian packages:"
 for name in $missing; do
-  echo "$rows" | sed -n "s/^$name  */  $name: /p"
+  echo "$rows" | sed -n "s/^\([^ ]*|\)\{0,1\}$name\(|[^ ]*\)\{0,1\}  */  $name: /p"
 done
-line="apt-get install -y --no-install-recommends$missing"
+install="apt-get install -y --no-install-recommends"
 if [ "$(id -u)" != 0 ]; then
   echo "deform: installing them needs root; run this line, then call make again:" >&2
-  echo "  sudo $line" >&2
+  echo "  sudo $install$missing" >&2
   exit 1
 fi
 export DEBIAN_FRONTEND=noninteractive
@@ -40,4 +52,5 @@ if ! apt-get update -q; then
   echo "deform: apt-get update failed; check network and /etc/apt/sources.list" >&2
   exit 1
 fi
-$line || { echo "deform: apt could not install:$missing; see its message above" >&2; exit 1; }
+look   # now that apt knows what there is
+$install$missing || { echo "deform: apt could not install:$missing; see its message above" >&2; exit 1; }

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """cmake/fresh.sh: a build folder of a tree that was moved, or of another generator, is configured again; one
 that fits, and one that the user made, stay as they are. cmake/setup.sh on a system that is not Debian's names
-the packages and the programs that are missing.
+the packages and the programs that are missing; on Debian it takes the names that the distribution has.
 
 doors_test.py SOURCE_DIR
 """
@@ -42,16 +42,16 @@ class Doors(unittest.TestCase):
     def names(self, build):
         return sorted(path.name for path in build.iterdir())
 
-    def set_up_elsewhere(self, *programs):
-        """On a system without dpkg that has a few programs of a shell and these."""
+    def set_up_elsewhere(self, *programs, **scripts):
+        """On a system that has a few programs of a shell and these; without dpkg, if it is not among them."""
         folder = self.root.parent / "bin"
         folder.mkdir(exist_ok=True)
-        for program in ("sed", "dirname"):
+        for program in ("sed", "dirname", "tr", "grep"):
             if not (folder / program).exists():
                 (folder / program).symlink_to(shutil.which(program))
-        for program in programs:
-            (folder / program).write_text("#!/bin/sh\n")
-            (folder / program).chmod(0o755)
+        for program, script in [*((program, "") for program in programs), *scripts.items()]:
+            (folder / program.replace("_", "-")).write_text(f"#!/bin/sh\n{script}\n")
+            (folder / program.replace("_", "-")).chmod(0o755)
         return subprocess.run([self.root / SETUP, "doors"], env={"PATH": str(folder)}, capture_output=True,
                               text=True)
 
@@ -65,6 +65,16 @@ class Doors(unittest.TestCase):
         self.assertIn("libeigen3-dev", ready.stderr)
         self.configured("release", self.root)
         self.assertEqual(self.set_up_elsewhere().stderr, "")
+
+    def test_names_between_bars(self):
+        """The first that is installed or that apt knows; if there is none, apt says so of the last."""
+        (self.root / LIST).write_text("doors  new|old    one\ndoors  later|now  two\n"
+                                      "doors  gone|lost  three\ndoors  g++|cc     four\n")
+        told = self.set_up_elsewhere(dpkg_query="echo installed old", id="echo 1000",
+                                     apt_cache='case $2 in now | g++ | cc) echo "$2";; esac')
+        self.assertEqual(told.returncode, 1)
+        self.assertIn("sudo apt-get install -y --no-install-recommends now lost g++\n", told.stderr)
+        self.assertEqual(told.stdout.splitlines()[1:], ["  now: two", "  lost: three", "  g++: four"])
 
     def test_a_moved_tree(self):
         build = self.configured("release", self.root.parent / "where it was")

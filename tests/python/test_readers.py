@@ -1,4 +1,5 @@
 """What the command writes, read by programs of others: meshio, VTK and gmsh. No library of ours is loaded."""
+import functools
 import importlib.util
 import json
 import os
@@ -84,6 +85,38 @@ def by_gmsh(path):
         gmsh.finalize()
 
 
+@functools.cache
+def reads(reader, ending):
+    """Whether a reader can read what VTK itself writes. gmsh 4.13 reads none of its .vtk; meshio 5.3
+    reads its .vtu only by a Python whose base64 ends at the padding, as 3.13.5 of Debian 13 does not."""
+    if ending not in ("vtk", "vtu") or MISSING:
+        return True
+    import vtk
+    grid, points = vtk.vtkUnstructuredGrid(), vtk.vtkPoints()
+    for corner in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)):
+        points.InsertNextPoint(corner)
+    grid.SetPoints(points)
+    grid.InsertNextCell(vtk.VTK_TETRA, 4, range(4))
+    if ending == "vtk":
+        writer = vtk.vtkUnstructuredGridWriter()
+        writer.SetFileVersion(42)   # the last before offsets of cells
+        writer.SetFileTypeToBinary()
+    else:
+        writer = vtk.vtkXMLUnstructuredGridWriter()
+        writer.SetCompressorTypeToNone()
+        writer.EncodeAppendedDataOff()
+    writer.SetInputData(grid)
+    with tempfile.TemporaryDirectory() as folder:
+        path = pathlib.Path(folder) / f"of_vtk.{ending}"
+        writer.SetFileName(str(path))
+        writer.Write()
+        try:
+            return len(reader(path)[0]) == 4
+        except Exception as error:
+            print(f"{reader.__name__} cannot read VTK's own .{ending} ({error}): it does not read ours")
+            return False
+
+
 @unittest.skipIf(MISSING, f"no {' and '.join(MISSING)} (cmake/deps.txt)")
 class Readers(unittest.TestCase):
     @classmethod
@@ -107,13 +140,18 @@ class Readers(unittest.TestCase):
 
     def readers(self, path):
         """Which of them read a format; gmsh 4.8 has no VTU, OBJ and OFF, and knows MSH by .msh alone."""
-        yield "meshio", by_meshio(path)
+        ending = path.suffix[1:]
+        if reads(by_meshio, ending):
+            yield "meshio", by_meshio(path)
         if path.suffix in (".vtk", ".vtu", ".obj", ".ply", ".stl"):
             yield "vtk", by_vtk(path)
         if path.suffix == ".msh2":
             path = pathlib.Path(shutil.copy(path, path.with_suffix(".22.msh")))
-        if path.suffix in (".msh", ".vtk", ".mesh", ".ply", ".stl"):
+        if path.suffix in (".msh", ".vtk", ".mesh", ".ply", ".stl") and reads(by_gmsh, ending):
             yield "gmsh", by_gmsh(path)
+
+    def of_vtk(self, ending):
+        return [read for read in (by_meshio, by_vtk) if reads(read, ending)]
 
     def test_cells_in_every_format(self):
         for source in (self.folder / "plain.msh", self.folder / "filled.vtu", CUBE):
@@ -142,6 +180,8 @@ class Readers(unittest.TestCase):
         named = {(2, 7): "skin", (3, 1): "low", (3, 2): "high end"}
         for ending in ("msh", "msh2", "vtk", "vtu", "mesh"):
             path = self.written(CUBE, ending)
+            if not reads(by_meshio, ending):
+                continue
             data = by_meshio(path)[2]
             numbers = data[{"mesh": "medit:ref"}.get(ending, "gmsh:physical" if "msh" in ending else "group")]
             self.assertEqual([sorted(numbers[kind]) for kind in ("tetra", "triangle")],
@@ -152,14 +192,15 @@ class Readers(unittest.TestCase):
             self.assertEqual({tuple(reversed(number)): name for name, number in by_meshio(path)[3].items()},
                              {key: name for key, name in named.items()})
         for ending in ("vtk", "vtu"):
-            for read in (by_meshio, by_vtk):
+            for read in self.of_vtk(ending):
                 field = read(self.written(CUBE, ending))[3]
                 names = bytes(np.ravel(field["group_name"])).decode().split("\0")
                 numbers = np.reshape(field["group_number"], (-1, 2))
                 self.assertEqual(dict(zip(map(tuple, numbers.tolist()), names)), named, ending)
-            share = [by_meshio(self.folder / "filled.vtu")[2]["share"]["tetra"]]
-            share += [by_vtk(self.written(self.folder / "filled.vtu", ending))[2]["share"]]
-            np.testing.assert_array_equal(*map(np.ravel, share))
+            share = by_vtk(self.written(self.folder / "filled.vtu", ending))[2]["share"]
+            if reads(by_meshio, "vtu"):
+                ours = by_meshio(self.folder / "filled.vtu")[2]["share"]["tetra"]
+                np.testing.assert_array_equal(np.ravel(ours), np.ravel(share))
         for ending in ("obj", "ply"):
             groups = by_meshio(self.written(self.folder / "parts.obj", ending))[2]
             numbers = [set(np.ravel(values["triangle"])) for values in groups.values()]
@@ -178,25 +219,26 @@ class Readers(unittest.TestCase):
         states = sorted((self.folder / "out" / "states").glob("*.vtu"))
         self.assertEqual(len(states), 4 * 3)
         for path in states:
-            for read in (by_meshio, by_vtk):
+            for read in self.of_vtk("vtu"):
                 points, cells, data, _ = read(path)
                 kind = "triangle" if "_surface_" in path.name else "tetra"
                 self.assertEqual(list(cells), [kind], path.name)
                 self.assertGreater(volume(points, cells[kind], 3 if kind == "triangle" else 4), 0)
                 self.assertEqual({"energy_density", "stress", "von_mises"} <= set(data),
                                  kind == "tetra" and path.name.startswith("ball"), path.name)
-            arrays = meshio.read(path).point_data | by_vtk(path)[3]
-            self.assertEqual(np.shape(arrays["u"]), (len(points), 3), path.name)
+            self.assertEqual(np.shape(by_vtk(path)[3]["u"]), (len(points), 3), path.name)
         saved = list(self.folder.glob("saved*.vtu")) + list(self.folder.glob("saved*/*.vtu"))
         self.assertTrue(saved)
         for path in saved:
-            self.assertEqual(len(by_meshio(path)[0]), len(by_vtk(path)[0]))
+            self.assertEqual(len({len(read(path)[0]) for read in self.of_vtk("vtu")}), 1)
 
 
 class OfMeshio(unittest.TestCase):
     """Volume meshes that meshio writes, read by the command."""
 
     def test_formats_of_engineers(self):
+        if not reads(by_meshio, "vtu"):
+            self.skipTest("this meshio cannot read VTK's own .vtu")
         with tempfile.TemporaryDirectory() as folder:
             for make, order, kind, files in (("beam", 1, "tetra", "a.inp a.node a.mesh"),
                                              ("beam", 2, "tetra10", "a.inp"),
