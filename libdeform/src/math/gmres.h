@@ -17,8 +17,8 @@ class Gmres {
     double left = 1;  // residual over |b|
   };
   // x = P y with A P y ~ b, from x = 0, until the residual is `relative` of |b|, or `most` iterations are
-  // done. multiply(in, out): out = A in; precondition(in, out): out = P in. linear: P is; else x is the sum of
-  // what P gave, which is stored.
+  // done. multiply(in, out): out = A in; precondition(in, out): out = P in. linear: P is; else what P gave
+  // is stored, and x is a sum of it.
   template <class Multiply, class Precondition>
   Result run(size_t n, const double *b, double *x, double relative, uint32_t most, bool linear,
              const Multiply &multiply, const Precondition &precondition);
