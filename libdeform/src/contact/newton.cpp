@@ -79,27 +79,31 @@ void ContactNewton::multiply(const double *in, double *out, bool symmetric) cons
   }
 }
 
-// way = -(A + J'GJ)^-1 g to this relative residual, with the last factor while it is good enough.
+// way = -(A + J'GJ)^-1 g to this relative residual, with the last factor while it is good enough. What
+// conjugate gradients need of a matrix costs as much as some of their iterations, and is new each time.
 bool ContactNewton::find_way(bool symmetric, double tolerance) {
   find_slopes(symmetric);
   if (!(current_ || set_matrix())) return false;
   current_ = true;
   for (size_t k = 0; k < g_.size(); ++k) minus_[k] = inverse_[k] > 0 ? -g_[k] : 0;
   const auto by = [&](const double *in, double *out) { multiply(in, out, symmetric); };
+  bool definite = true;
   const auto precondition = [&](const double *in, double *out) {
     SolveInfo info;
-    factor_.solve(1, in, out, 0, info);
+    std::fill_n(out, g_.size(), 0.0);
+    solver_->solve(1, in, out, Set::accuracy, info);
+    definite = definite && !info.indefinite;
   };
   for (bool fresh : {false, true}) {
-    if (!fresh && (!factored_ || kept_for_ >= Set::inner)) continue;
+    if (!fresh && (!factored_ || !solver_->direct() || kept_for_ >= Set::inner)) continue;
     if (fresh && !refactor()) return false;
-    const Gmres::Result found =
-        gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, Set::inner, by, precondition);
+    const Gmres::Result found = gmres_.run(g_.size(), minus_.data(), way_.data(), tolerance, Set::inner,
+                                           solver_->direct(), by, precondition);
     products_ += found.iterations;
     kept_for_ = fresh ? 0 : kept_for_ + found.iterations;
     if (fresh || found.left <= tolerance) break;
   }
-  return true;
+  return definite;
 }
 
 // A step begins at v.

@@ -9,9 +9,10 @@
 //   outer pass    with multipliers lh and penalties rho (kg): v with g = 0, l_i(v) = P_i(lh_i - rho_i u_i),
 //                 then lh <- l(v). The normal part of P is the positive part, the friction part the law at
 //                 the normal impulse of this pass and the slip u + (l - lh)/rho.
-//   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J. It is
-//                 taken where it makes g smaller. Where it does not, limits of friction are frozen: g is then
-//                 the gradient of a convex function (but for arcs), and steps with a line search lower that.
+//   Newton step   (A + J'GJ) d = -g, G = -dl/du, by GMRES with the last factor of A + J' sym(G) J,
+//                 or, of many points, with conjugate gradients on that matrix. It is taken where it makes g
+//                 smaller. Where it does not, limits of friction are frozen: g is then the gradient of a
+//                 convex function (but for arcs), and steps with a line search lower that.
 //
 // Impulses of redundant contacts are not unique, velocities are: passes end by velocities. A contact that
 // sticks keeps lh, so that it acts as a spring of stiffness rho/h^2 with memory and does not creep, whatever
@@ -26,6 +27,7 @@
 #include "contact/solver.h"
 #include "math/gmres.h"
 #include "math/ldlt_solver.h"
+#include "math/pcg_solver.h"
 
 namespace dfm {
 
@@ -45,7 +47,7 @@ class SolveLaws {
 
 class ContactNewton {
  public:
-  explicit ContactNewton(const Memory &memory);
+  explicit ContactNewton(const Memory &memory, Tasks *tasks = nullptr);
 
   // systems: by source; null: not an implicit body. mass: of one. Rows and host stay valid until the solve
   // has ended. rows.impulse is the start of lh.
@@ -111,14 +113,16 @@ class ContactNewton {
   BlockPattern pattern_;
   Array<uint32_t> pairs_, begin_, by_lower_, number_, higher_;  // of shape()
   Array<uint32_t> ij_;                                          // [nb,2] the blocks of the matrix
-  Array<uint32_t> analysed_;        // ij_ of the order that factor_ has, by minimum degree
-  Array<uint32_t> place_;           // the block of each pair, of which are
-  std::span<const uint32_t> at_;    // those of the bodies' patterns
-  std::span<const uint32_t> own_;   // [nodes] the diagonal
-  std::span<const uint32_t> spot_;  // pairs of entries of each row
-  Array<double> places_;            // [nodes,3] m
-  Array<double> blocks_, matrix_;   // [nb,9] A + J' sym(G) J; A
+  Array<uint32_t> analysed_;                                    // ij_ of the order that factor_ has
+  Array<uint32_t> place_;                                       // the block of each pair, of which are
+  std::span<const uint32_t> at_;                                // those of the bodies' patterns
+  std::span<const uint32_t> own_;                               // [nodes] the diagonal
+  std::span<const uint32_t> spot_;                              // pairs of entries of each row
+  Array<double> places_;                                        // [nodes,3] m
+  Array<double> blocks_, matrix_;                               // [nb,9] A + J' sym(G) J; A
   LdltSolver factor_;
+  PcgSolver levels_;
+  LinearSolver *solver_ = nullptr;  // the one of these that serves the nodes
   bool factored_ = false, shaped_ = false;
   bool current_ = false;  // A is that at v, to the accuracy of a step's system
   Gmres gmres_;

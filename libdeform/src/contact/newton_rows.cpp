@@ -9,8 +9,14 @@
 #include "core/lists.h"
 
 namespace dfm {
+namespace {
 
-ContactNewton::ContactNewton(const Memory &m) : factor_(m), gmres_(m) {
+// Points of implicit bodies, from which conjugate gradients cost less than a factor of a few Newton steps.
+constexpr uint32_t kIterated = 1000;
+
+}  // namespace
+
+ContactNewton::ContactNewton(const Memory &m, Tasks *tasks) : factor_(m), levels_(m, tasks), gmres_(m) {
   use_memory(m, node_of_dof_, dof_of_node_, row_, entry_, node_, jac_, seen_, bias_, heavy_, v_, base_, g_,
              kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
              frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_, matrix_, places_,
@@ -109,7 +115,9 @@ void ContactNewton::number_nodes(std::span<ImplicitSystem *const> systems) {
   heavy_.resize(size_t{kStride} * nodes_, 0.0);
   inverse_.resize(size_t{3} * nodes_, 1.0);
   dof_of_node_.resize(nodes_, kNone);
-  // where a node lies decides about the order of elimination only
+  if (single_ >= kIterated) solver_ = &levels_;
+  else solver_ = &factor_;
+  // single points and motions have no place: a patch turns them about a wrong one, which costs iterations
   places_.assign(size_t{3} * nodes_, 0.0);
   for (const Body &b : bodies_)
     for (uint32_t k = 0; k < b.count; ++k)
@@ -487,11 +495,6 @@ bool ContactNewton::set_matrix() {
   return true;
 }
 
-namespace {
-// Nodes, from which the order by nested dissection has the sparser factor.
-constexpr uint32_t kDissected = 1000;
-}  // namespace
-
 bool ContactNewton::refactor() {
   std::copy(matrix_.begin(), matrix_.end(), blocks_.begin());
   size_t spot = 0;
@@ -521,18 +524,16 @@ bool ContactNewton::refactor() {
       }
     }
   }
-  const bool dissected = points_ >= kDissected;  // motions of blocks have no place
-  if (!factored_ && (dissected || analysed_ != ij_)) {
+  if (!factored_ && solver_ == &levels_) {
+    levels_.analyse(pattern_);
+  } else if (!factored_ && analysed_ != ij_) {
     analysed_.clear();
-    if (dissected) {
-      factor_.analyse(pattern_, places_.data());
-    } else {
-      factor_.analyse(pattern_);
-      analysed_.assign(ij_.begin(), ij_.end());
-    }
+    factor_.analyse(pattern_);
+    analysed_.assign(ij_.begin(), ij_.end());
   }
+  solver_->place(places_.data(), 3);
   ++factors_;
-  return factored_ = factor_.factor(blocks_.data());
+  return factored_ = solver_->factor(blocks_.data());
 }
 
 }  // namespace dfm

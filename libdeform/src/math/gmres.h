@@ -1,5 +1,5 @@
 // Generalized minimal residuals (Saad and Schultz 1986) for matrices that are known by their products, with a
-// preconditioner on the right.
+// preconditioner on the right, which need not be linear (flexible: Saad 1993).
 #pragma once
 #include <cmath>
 #include <cstddef>
@@ -17,13 +17,14 @@ class Gmres {
     double left = 1;  // residual over |b|
   };
   // x = P y with A P y ~ b, from x = 0, until the residual is `relative` of |b|, or `most` iterations are
-  // done. multiply(in, out): out = A in; precondition(in, out): out = P in.
+  // done. multiply(in, out): out = A in; precondition(in, out): out = P in. linear: P is; else what P gave
+  // is stored, and x is a sum of it.
   template <class Multiply, class Precondition>
-  Result run(size_t n, const double *b, double *x, double relative, uint32_t most, const Multiply &multiply,
-             const Precondition &precondition);
+  Result run(size_t n, const double *b, double *x, double relative, uint32_t most, bool linear,
+             const Multiply &multiply, const Precondition &precondition);
 
  private:
-  Array<double> basis_, product_;  // [most+1,n], [n]
+  Array<double> basis_, product_;  // [most+1,n], [n] or [most,n]
   Array<double> hessenberg_;       // [most,most+1], column after column
   Array<double> turn_, right_;     // rotations (cosine, sine); right-hand side
 
@@ -38,14 +39,15 @@ class Gmres {
 };
 
 template <class Multiply, class Precondition>
-Gmres::Result Gmres::run(size_t n, const double *b, double *x, double relative, uint32_t most,
+Gmres::Result Gmres::run(size_t n, const double *b, double *x, double relative, uint32_t most, bool linear,
                          const Multiply &multiply, const Precondition &precondition) {
   Result out;
   std::fill_n(x, n, 0.0);
   const double size = std::sqrt(dot(n, b, b));
   if (!(size > 0)) return {0, 0};
   basis_.resize(n * (size_t{most} + 1));
-  product_.resize(n);
+  const auto product = [&](uint32_t i) { return &product_[linear ? 0 : n * i]; };
+  product_.resize(linear ? n : n * most);
   hessenberg_.assign(size_t{most} * (most + 1), 0.0);
   turn_.resize(2 * size_t{most});
   right_.assign(size_t{most} + 1, 0.0);
@@ -55,8 +57,8 @@ Gmres::Result Gmres::run(size_t n, const double *b, double *x, double relative, 
   while (j < most) {
     double *const h = &hessenberg_[size_t{j} * (most + 1)];
     double *const next = &basis_[n * (j + 1)];
-    precondition(&basis_[n * j], product_.data());
-    multiply(product_.data(), next);
+    precondition(&basis_[n * j], product(j));
+    multiply(product(j), next);
     for (uint32_t i = 0; i <= j; ++i) {
       const double *const q = &basis_[n * i];
       h[i] = dot(n, q, next);
@@ -87,10 +89,13 @@ Gmres::Result Gmres::run(size_t n, const double *b, double *x, double relative, 
     for (uint32_t k = i + 1; k < j; ++k) right_[i] -= hessenberg_[size_t{k} * (most + 1) + i] * right_[k];
     right_[i] /= hessenberg_[size_t{i} * (most + 1) + i];
   }
-  std::fill_n(product_.begin(), n, 0.0);
-  for (uint32_t i = 0; i < j; ++i)
-    for (size_t k = 0; k < n; ++k) product_[k] += right_[i] * basis_[n * i + k];
-  precondition(product_.data(), x);
+  if (linear) std::fill_n(product_.begin(), n, 0.0);
+  double *const sum = linear ? product_.data() : x;
+  for (uint32_t i = 0; i < j; ++i) {
+    const double *const add = linear ? &basis_[n * i] : product(i);
+    for (size_t k = 0; k < n; ++k) sum[k] += right_[i] * add[k];
+  }
+  if (linear) precondition(sum, x);
   return out;
 }
 

@@ -35,7 +35,8 @@ double start_residual(const StepContext &step, const SolveIsland &own) {
 }
 
 void begin_newton(StepContext &step, SolveIsland &own) {
-  if (!own.newton) own.newton = std::make_unique<ContactNewton>(step.contact_memory);
+  if (!own.newton)
+    own.newton = std::make_unique<ContactNewton>(step.contact_memory, &own.world->context->tasks);
   own.newton->begin(step.rows, own.part, step.systems, step.state, own, step.h);
 }
 
