@@ -118,12 +118,12 @@ def configure(build, settings):
 
 
 def release_build():
-    """build/release where it can be packed: configured in this place, as Release, with a shared library; else
-    None. What is up to date there is not compiled again."""
+    """build/release where it can be packed: configured in this place, as Release, with a shared library that
+    installed programs look for in lib; else None. What is up to date there is not compiled again."""
     build = ROOT / "build" / "release"
     cache = build / "CMakeCache.txt"
     wanted = {f"CMAKE_HOME_DIRECTORY:INTERNAL={ROOT}", "CMAKE_BUILD_TYPE:STRING=Release",
-              "DEFORM_SHARED:BOOL=ON"}
+              "DEFORM_SHARED:BOOL=ON", "CMAKE_INSTALL_LIBDIR:PATH=lib"}
     return build if cache.exists() and wanted <= set(cache.read_text().splitlines()) else None
 
 
@@ -154,11 +154,13 @@ def _installed(prefix, settings):
 def native_files(prefix):
     """(path below deform/native, file) of what the wheel takes: the library under the name that the loader
     asks for."""
-    for libdir in sorted(p for p in prefix.glob("lib*") if p.is_dir()):
-        for path in sorted(libdir.rglob("*")):
-            inside = path.relative_to(libdir).as_posix()
-            if path.is_file() and LIBRARIES.fullmatch(inside):
-                yield f"lib/{inside}", path
+    if not list((prefix / "lib").glob("libdeform.so.*")):
+        raise SystemExit("deform: this build installs no libdeform.so to lib; configure it with "
+                         "-DDEFORM_SHARED=ON -DCMAKE_INSTALL_LIBDIR=lib")
+    for path in sorted((prefix / "lib").rglob("*")):
+        inside = path.relative_to(prefix / "lib").as_posix()
+        if path.is_file() and LIBRARIES.fullmatch(inside):
+            yield f"lib/{inside}", path
     for path in sorted((prefix / "bin").glob("deform*")):
         if path.name not in ("deform-view", "deform-serve"):  # which need libraries of a window, a network
             yield f"bin/{path.name}", path

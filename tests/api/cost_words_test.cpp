@@ -243,14 +243,24 @@ TEST(CostSubject, FilesOfTools_AreAmongThoseOfTheScene) {
 }
 
 // `deform calibrate --model` measures one of them.
-TEST(Costs, OfOtherModels_StayWhereThisMachineHasMeasuredThem) {
+TEST(Costs, OfOtherModels_AreThoseOfThisMachineElseTheShippedOnes) {
   const std::string path = test::scratch("costs_kept") + "/costs.json";
   test::write_file(path, R"({"format": "deform-costs", "version": 4, "machine": "this one", "models": [
     {"model": "msm", "wave_steps": 2}, {"model": "modal", "wave_steps": 3}]})");
-  EXPECT_EQ(kept_rows(path, "this one", {"modal"}),
-            std::vector<std::string>{R"({"model": "msm", "wave_steps": 2})"});
-  EXPECT_TRUE(kept_rows(path, "another one", {"modal"}).empty());
-  EXPECT_TRUE(kept_rows(path + ".none", "this one", {"modal"}).empty());
+  const std::string own = R"({"model": "msm", "wave_steps": 2})", ships = R"("machine": ")";
+  const std::vector<std::string> here = kept_rows(path, "this one", {"modal"});
+  ASSERT_GE(here.size(), 5u);
+  EXPECT_EQ(here[0], own);
+  for (size_t i = 0; i < here.size(); ++i) {
+    EXPECT_EQ(here[i].find(ships) == std::string::npos, i == 0) << here[i];
+    EXPECT_EQ(here[i].find(R"("model": "msm")") != std::string::npos, i == 0) << here[i];
+    EXPECT_EQ(here[i].find(R"("model": "modal")"), std::string::npos) << here[i];
+  }
+  for (const std::string &file : {path, path + ".none"}) {
+    const std::vector<std::string> shipped = kept_rows(file, "another one", {"modal"});
+    EXPECT_EQ(shipped.size(), here.size());
+    for (const std::string &row : shipped) EXPECT_NE(row.find(ships), std::string::npos) << row;
+  }
 }
 
 }  // namespace cli::cost

@@ -349,6 +349,15 @@ TEST(Explain, Costs_AreMeasuredOnRequest) {
   EXPECT_EQ(json.out.find("why_not"), std::string::npos) << json.out;
 }
 
+TEST(Explain, CostsOfAModelThatStepsItself_AreMeasuredAtTheStepOfARun) {
+  const test::CommandResult r =
+      test::deform({"explain", one_model("own_steps", R"({"type": "modal", "params": {"damping_mass": 2}})"),
+                    "--costs", "--set", "/time/step=\"auto\""});
+  EXPECT_EQ(r.exit_code, 0) << r.err;
+  EXPECT_EQ(r.out.find("a step of inf"), std::string::npos) << r.out;
+  EXPECT_NE(line_of(r.out, "damping").find(" us per step"), std::string::npos) << r.out;
+}
+
 TEST(Explain, CostsOfASceneWithoutSteps_AreRefused) {
   const std::string path = one_model("still", R"({"type": "corotational_fem"})");
   const test::CommandResult result =

@@ -238,6 +238,13 @@ TEST(LabelsCommand, WrongInput_IsReportedInOneSentence) {
                      R"( "bodies": {"gel": {"surface": {"mesh": "a.obj"}}}})",
              "/bodies/gel/surface: expected {\"from\": \"boundary\"}, for a body that is cut or torn");
   with_table("[]", "expected an object");
+  const std::string labels = begin + R"("labels": {"1": {"material": "gel", "name": "gel"}}, )";
+  with_table(labels + R"("scene": {"obstacles": {"name": "wall"}}})", "/scene/obstacles: expected a list");
+  with_table(labels + R"("scene": {"contact": [1, 2]}})", "/scene/contact: expected an object");
+  with_table(labels + R"("scene": {"contact": {"filter": {}}}})", "/scene/contact/filter: expected a list");
+  for (const std::string key : {"fix", "attach"})
+    with_table(labels + R"("bodies": {"gel": {")" + key + R"(": {"group": "a"}}}})",
+               "/bodies/gel/" + key + ": expected a list");
   const std::string whole = test::read_file(volume), cut = folder() + "/cut.nrrd",
                     none = folder() + "/none.nrrd";
   test::write_file(cut, whole.substr(0, whole.size() - 40));

@@ -186,6 +186,12 @@ TEST(SceneFields, Tables_AreCheckedWithTheirPlace) {
       {"cell,value\n3,1e4\n3,1e4\n", {"bad.csv:3:", "cell 3 has a row already"}},
       {"cell,value\n3,1e4,7\n", {"bad.csv:2:", "2 columns"}},
       {"value\n-5" + good.substr(9), {"field 'young': cell", "-5", "Pa"}}};
+  // spreadsheets begin a table with a byte order mark
+  const char *const use = R"(/bodies/0/fields={"young": "bad.csv"})";
+  test::write_file(path, good);
+  const uint64_t plain = Loaded({use}).hash_after(1);
+  test::write_file(path, "\xEF\xBB\xBF" + good);
+  EXPECT_EQ(Loaded({use}).hash_after(1), plain);
   for (const auto &[text, parts] : tables) {
     test::write_file(path, text);
     std::vector<std::string> all = parts;

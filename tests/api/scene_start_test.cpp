@@ -61,6 +61,24 @@ TEST(SceneStart, Flattened_LiesOnThePlaneLineOrPointOfItsFrame) {
   }
 }
 
+TEST(SceneStart, RotationOfAPlane_TurnsItsNormal) {
+  for (const auto &[degrees, expected] :
+       {std::pair<const char *, std::array<double, 3>>{"0", {1, 0, 0}}, {"90", {0, 1, 0}}}) {
+    const Opened s(std::string(R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},
+      "obstacles": [{"name": "wall", "shape": "plane", "normal": [1, 0, 0], "point": [-1, 0, 0],
+                     "start": {"rotation": {"axis": [0, 0, 1], "angle_deg": )") +
+                   degrees + "}}}]}");
+    ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+    dfm_obstacle wall = 0;
+    dfm_pose pose{};
+    test::ok(dfm_world_find_obstacle(s.world, "wall", &wall));
+    test::ok(dfm_obstacle_get_pose(wall, &pose));
+    const auto [x, y, z, w] = pose.rotation;
+    const double normal[3] = {2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)};
+    for (size_t k = 0; k < 3; ++k) EXPECT_NEAR(normal[k], expected[k], 1e-15) << degrees;
+  }
+}
+
 TEST(SceneStart, Inverted_HasTheNegativeVolume) {
   const Opened s(scene(R"({"invert": true})"));
   ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();

@@ -63,6 +63,17 @@ class ContactProblems(unittest.TestCase):
         self.assertIn("would replace", said)
         self.assertEqual(exported.read_bytes(), before)
 
+    def test_what_holds_no_contacts_is_refused(self):
+        (self.folder / "a.dat").write_text("3\n0\n0 0 0 0 0\n")
+        (self.folder / "b.dat").write_text("3 1 0 3 3 3 3 0.5 0 0 0 0.5 0 0 0 0.5 -1 3 4 10")
+        found, said = contact(self.folder, expected=1)
+        self.assertIn("a.dat: there are no contacts to solve", said)
+        self.assertEqual([problem["solved"] for problem in found["problems"]], [True])
+        (self.folder / "none").mkdir()
+        empty = subprocess.run([os.environ["DEFORM_COMMAND"], "contact", "--json", str(self.folder / "none")],
+                               capture_output=True, text=True)
+        self.assertEqual((empty.returncode, empty.stdout), (2, ""))
+
     def test_text_of_siconos_is_read_dense_in_blocks_and_global(self):
         # one contact of a mass of 2 that moves at (-1, 3, 4): it sticks at mu 10, and slides at 0.5
         dense = "3 1 0 3 3 3 3 0.5 0 0 0 0.5 0 0 0 0.5 "

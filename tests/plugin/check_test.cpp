@@ -111,6 +111,7 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(
         Case{"second_symbol", "V01", "broken_helper"}, Case{"wrong_abi", "V02", "draft 7"},
         Case{"deaf_to_abi", "V02", "cannot know"}, Case{"rows_nowhere", "V02", "row 1 of nparam 2"},
+        Case{"id_nowhere", "V02", "its id lies outside"}, Case{"id_of_two_lines", "V03", "reverse-DNS"},
         Case{"row_too_many", "V03", "row 3 of nparam 3"},
         Case{"rows_of_another_size", "V03", "row 2 of nparam 2"}, Case{"no_source", "V03", "\"source\""},
         Case{"without_eval", "V03", "set dfm_friction.eval"}, Case{"fills_reserved", "V03", "9 in reserved"},

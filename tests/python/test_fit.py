@@ -17,7 +17,7 @@ import scipy.stats
 
 import deform
 from deform.study.engine import Failed
-from deform.study.fit import Problem
+from deform.study.fit import Problem, _at_measured
 from deform.study.spec import read_study
 from deform.study.statistics import Spread
 from study_files import COM, MU, SPEED, write_box
@@ -240,6 +240,24 @@ class Said(InAFolder):
         (self.folder / "other.csv").write_text("a,b\n1,2,3\n")
         with self.assertRaisesRegex(deform.FormatError, 'other.csv has no column "t"; it has a, b'):
             read_study(self.study(self.folder / "other.csv"))
+        (self.folder / "other.csv").write_text("x" * 200000)
+        with self.assertRaisesRegex(deform.FormatError, "other.csv: is no table: field larger than"):
+            read_study(self.study(self.folder / "other.csv"))
+
+    def test_a_study_called_fit_is_not_replaced(self):
+        study = self.folder / "named" / "fit.json"
+        study.parent.mkdir()
+        study.write_text(json.dumps(self.study(self.measured())))
+        before = study.read_text()
+        with self.assertRaisesRegex(deform.FileError, "another program wrote this file"):
+            deform.fit(study, out=study.parent, workers=1)
+        self.assertEqual(study.read_text(), before)
+        study.unlink()
+        study = {**self.study(self.measured()), "parameters": {"mu": {"at": MU, "from": 0.1, "to": 1}},
+                 "set": {SPEED: TRUTH["v"]}}
+        for _ in range(2):  # its own it replaces
+            found = deform.fit(study, out=self.folder / "named", workers=1)
+            self.assertIn(self.folder / "named" / "fit.json", found.write())
 
     def test_wrong_studies(self):
         def refused(sentence, **changes):
@@ -252,6 +270,13 @@ class Said(InAFolder):
         refused('has no column "y"; it has t, x', residuals=[{**one, "columns": ["t", "y"]}])
         refused("/residuals/0/sigma: expected a number above 0", residuals=[{**one, "sigma": 0}])
         refused("lies outside of the range", parameters={"mu": {"at": MU, "from": 0.1, "to": 1, "start": 2}})
+        refused("give a larger sigma", residuals=[{**one, "sigma": 1e-300}])
+        refused("give a larger sigma", residuals=[{**one, "sigma": 1e-160}])
+        residual, = read_study(self.study(self.measured())).residuals
+        with self.assertRaisesRegex(Failed, 'several rows of the run have one time; .* by "where"'):
+            _at_measured(residual, [[0, 0, 1], [1, 2, 3]])
+        mu = {"mu": {"at": MU, "from": 0.1, "to": 1}}
+        refused("cma searches in two dimensions", parameters=mu, optimizer={"method": "cma"})
         refused("make the run longer", set={"/time/duration": 0.1})
         refused("the run at mu = .* failed: .*mu",
                 parameters={"mu": {"at": MU, "from": -2, "to": -1}})

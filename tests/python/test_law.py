@@ -169,6 +169,13 @@ class InPython(unittest.TestCase):
         self.assertEqual(deform.Law(second).type.id, "com.example.half.2")
         self.assertEqual(deform.Law(first).type.id, "com.example.half")
 
+    def test_short_name_of_two_laws_is_refused(self):
+        context = deform.Context()
+        names = context.use_law(Tanh), context.use_law(type("Other", (Tanh,), {"id": "org.other.tanh"}))
+        self.assertEqual([context.type("friction", name).id for name in names], list(names))
+        with self.assertRaisesRegex(deform.ArgumentError, "'tanh' is the short name of .*; give the id"):
+            context.type("friction", "tanh")
+
     def test_threads_give_the_same_bits(self):
         hashes = set()
         for threads in (1, 3):

@@ -25,6 +25,7 @@ from deform.study.engine import Engine, Failed, Results
 from deform.study.executors import Dask
 from deform.study.spec import read_study
 from deform.study.sweep import task_of
+from deform.study.tables import of_one_kind
 from study_files import BOX, MU, SPEED, sweep_study, write_box
 
 COMMAND = os.environ["DEFORM_COMMAND"]
@@ -194,6 +195,13 @@ class Designs(InAFolder):
                 ({"parameters": {"mu": {"at": MU, "from": 1, "to": 2, "count": 3}}}, '"count" is of'),
                 ({"optimizer": {"seed": 3}}, '/optimizer: unknown key "seed"'),
                 ({"limit_s": 10**400}, "/limit_s: expected a number"),
+                ({"limit_s": 1e10}, r"/limit_s: expected a number above 0 and at most 1e\+06"),
+                ({"parameters": {"mu": {"at": [], "values": [1]}}}, "expected a JSON pointer"),
+                ({"parameters": {"mu": {"at": MU, "from": -1e308, "to": 1e308}}}, "wider than numbers reach"),
+                ({"parameters": {"mu": {"at": MU, "from": 1e-300, "to": 1e300, "scale": "log"}}},
+                 "wider than numbers reach"),
+                ({"optimizer": {"method": "differential_evolution", "seed": 2**32}},
+                 "/optimizer/seed: expected a whole number, 0 to 4294967294"),
                 ({"format": "deform-scene", "time": {}}, "this is a scene; a study names one"),
                 ({"residuals": [{"measured": "m.csv", "sigma": 1, "table": "bodies", "column": "x",
                                  "columns": [["t"], "x"]}]}, "expected two names of columns")):
@@ -201,7 +209,41 @@ class Designs(InAFolder):
                 points(read_study({**sweep_study(self.scene), **changes}))
 
 
+    def test_a_key_that_is_given_twice_is_refused(self):
+        study = self.study()
+        study.write_text(study.read_text().replace('"v": {', '"mu": {'))
+        with self.assertRaisesRegex(deform.FormatError, 'the key "mu" is given twice in one object'):
+            read_study(study)
+
+    def test_planned_runs_depend_on_the_costs(self):
+        costs = self.folder / "costs.json"
+        with unittest.mock.patch.dict(os.environ, DEFORM_COSTS=str(costs)):
+            plain, planned, pointed = (read_study(sweep_study(self.scene, **changes)) for changes in (
+                {}, {"set": {"/accuracy": {"target": 0.1}}},
+                {"parameters": {"ms": {"at": "/budget/ms_per_step", "values": [1]}}}))
+            found = []
+            for text in "1", "2":
+                costs.write_text(text)
+                point = {"mu": 1, "v": 1, "ms": 1}
+                found.append([study.keys([point]) for study in (plain, planned, pointed)])
+        self.assertEqual([a == b for a, b in zip(*found)], [True, False, False])
+
+
 class Runs(InAFolder):
+    def test_workers_may_have_any_descriptor(self):
+        import resource
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        if hard < 1200:
+            self.skipTest("fewer than 1200 files may be open")
+        resource.setrlimit(resource.RLIMIT_NOFILE, (max(soft, 1200), hard))
+        self.addCleanup(resource.setrlimit, resource.RLIMIT_NOFILE, (soft, hard))
+        with open(os.devnull) as null:
+            held = [os.dup(null.fileno()) for _ in range(1050)]
+        self.addCleanup(lambda: [os.close(one) for one in held])
+        rows = deform.sweep(sweep_study(self.scene, design={"method": "random", "runs": 1}, limit_s=100),
+                            out=self.out, workers=1)
+        self.assertEqual(len(rows.done), 1)
+
     def test_box_slides_as_far_as_its_energy_takes_it(self):
         rows = deform.sweep(sweep_study(self.scene), out=self.out, workers=2)
         self.assertEqual(len(rows.done), 16)
@@ -398,6 +440,25 @@ class Kills(InAFolder):
 
 
 class Outputs(InAFolder):
+    def test_files_of_others_stay_as_they_are(self):
+        study = self.study(design={"method": "random", "runs": 1})
+        for name, options in (("runs.jsonl", ()), ("runs/0-9.jsonl", ()), ("runs/0-0.jsonl", ("--only", "0")),
+                              ("Snakefile", ("--export", "snakemake")), ("array.sh", ("--export", "slurm"))):
+            foreign = self.out / name
+            foreign.parent.mkdir(parents=True, exist_ok=True)
+            foreign.write_text('{"mine": 1}\n{"mine": 2}')
+            said = self.command("sweep", study, "--out", self.out, *options, code=2).stderr
+            self.assertIn(f"{foreign}: another program wrote this file", said)
+            self.assertEqual(foreign.read_text(), '{"mine": 1}\n{"mine": 2}')
+            foreign.unlink()
+            for _ in range(2):  # its own it replaces
+                self.command("sweep", study, "--out", self.out, *options)
+
+    def test_columns_of_one_kind(self):
+        self.assertEqual(of_one_kind([1, 0.5, None]), [1, 0.5, None])
+        self.assertEqual(of_one_kind(["a", None]), ["a", None])
+        self.assertEqual(of_one_kind([0.5, "auto", None]), ["0.5", "auto", None])
+
     def test_command_writes_tables_and_page(self):
         said = self.command("sweep", self.study(), "--out", self.out, "--workers", "2")
         self.assertIn("16 runs: 16 done, 0 failed", said.stdout)
@@ -419,6 +480,7 @@ class Outputs(InAFolder):
             said = self.command("sweep", study, "--out", self.out, "--parquet", code=2)
             self.assertRegex(said.stderr, "deform: Parquet needs pyarrow for .*sweep.csv\n$")
             self.assertTrue((self.out / "sweep.csv").exists())
+            self.assertTrue((self.out / "sweep.html").exists())
             return
         self.command("sweep", study, "--out", self.out, "--parquet")
         table = pyarrow.parquet.read_table(self.out / "sweep.parquet")

@@ -159,13 +159,19 @@ class Wheel(unittest.TestCase):
             self.assertIsNone(wheel_backend.release_build())
             build = pathlib.Path(name) / "build" / "release"
             build.mkdir(parents=True)
-            for place, kind, shared, taken in (
-                    ("/moved", "Release", "ON", False), (name, "Debug", "ON", False),
-                    (name, "Release", "OFF", False), (name, "Release", "ON", True)):
+            for place, kind, shared, libdir, taken in (
+                    ("/moved", "Release", "ON", "lib", False), (name, "Debug", "ON", "lib", False),
+                    (name, "Release", "OFF", "lib", False),
+                    (name, "Release", "ON", "lib/x86_64-linux-gnu", False),
+                    (name, "Release", "ON", "lib", True)):
                 (build / "CMakeCache.txt").write_text(
                     f"CMAKE_BUILD_TYPE:STRING={kind}\nCMAKE_HOME_DIRECTORY:INTERNAL={place}\n"
-                    f"DEFORM_SHARED:BOOL={shared}\n")
+                    f"DEFORM_SHARED:BOOL={shared}\nCMAKE_INSTALL_LIBDIR:PATH={libdir}\n")
                 self.assertEqual(wheel_backend.release_build(), build if taken else None)
+            (build / "lib" / "x86_64-linux-gnu").mkdir(parents=True)
+            (build / "lib" / "x86_64-linux-gnu" / "libdeform.so.0").touch()
+            with self.assertRaisesRegex(SystemExit, "installs no libdeform.so to lib"):
+                list(wheel_backend.native_files(build))
             commands = []
             with unittest.mock.patch.object(wheel_backend, "_run", lambda *words: commands.append(words)):
                 for settings, used in (({}, build), ({"prebuilt": "no"}, build.parent / "wheel"),

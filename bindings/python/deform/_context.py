@@ -188,7 +188,12 @@ class Context:
 
     def type(self, kind: str, name: str) -> PluginType | None:
         """The law or model of that short name or id; None where there is none."""
-        return next((t for t in self.types if t.kind == kind and name in (t.id, t.short_name)), None)
+        of_kind = {t.id: t for t in self.types if t.kind == kind}
+        named = [t for t in of_kind.values() if t.short_name == name]
+        if name not in of_kind and len(named) > 1:
+            ids = " and ".join(t.id for t in named)
+            raise ArgumentError(f"'{name}' is the short name of {ids}; give the id", "DFM_E_ARG")
+        return of_kind.get(name) or next(iter(named), None)
 
     def params(self, kind: str, name: str, values: Mapping[str, Any]) -> Params:
         """Values by key; a text names a value of an enumerated parameter."""

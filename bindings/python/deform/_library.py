@@ -184,8 +184,22 @@ def encoded(text: Any) -> bytes | None:
     return os.fspath(text).encode(errors="surrogateescape")  # names of files need not be UTF-8
 
 
-def write_whole(path: pathlib.Path, data: bytes) -> None:
-    """The file is there as a whole, or as it was before."""
+def refuse_foreign(path: pathlib.Path, mark: str) -> None:
+    """Refuses to change a file whose first bytes do not hold the mark of what is to be written there."""
+    try:
+        with open(path, "rb") as file:
+            found = file.read(256)
+    except FileNotFoundError:
+        return
+    if found and mark.encode() not in found:
+        raise FileError(f"{path}: another program wrote this file, which stays as it is; give another folder "
+                        f"(--out)", "DFM_E_IO")
+
+
+def write_whole(path: pathlib.Path, data: bytes, mark: str = "") -> None:
+    """The file is there as a whole, or as it was before. mark: of those that may be replaced."""
+    if mark:
+        refuse_foreign(path, mark)
     part = path.with_name(f"{path.name}.part{os.getpid()}")
     try:
         part.write_bytes(data)

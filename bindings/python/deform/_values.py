@@ -32,7 +32,17 @@ def real(value: Any, what: str) -> float:
 
 def read_json(path: Any) -> Any:
     """Of a file, which editors may have begun with a byte order mark."""
-    return json.loads(pathlib.Path(path).read_text("utf-8-sig"))
+    return json.loads(pathlib.Path(path).read_text("utf-8-sig"), object_pairs_hook=_once)
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """An object whose keys differ, as those of a scene do; the standard reader keeps the last of a key."""
+    out: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in out:
+            raise ValueError(f"the key {json.dumps(key)} is given twice in one object")
+        out[key] = value
+    return out
 
 
 def json_of(value: Any) -> str:

@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstring>
 #include <filesystem>
+#include <map>
 #include <memory>
 #include <set>
 #include <utility>
@@ -195,6 +196,9 @@ class Rules {
     // Rules that cannot run because there is no law are left out: the rule that reports the reason runs
     // beside them. So are those of a type that cannot be used.
     if (report_.types.empty() && !wants("V02")) one(report_.file, *find_rule("V02"), -1);
+    const bool told = std::ranges::any_of(
+        report_.file, [](const Line &line) { return line.verdict.result == Result::fail; });
+    if (!unlisted_.empty() && !told) add(report_.file, {find_rule("V03"), {Result::fail, unlisted_}, 0});
     for (size_t t = 0; t < report_.types.size(); ++t) {
       const TypeName &type = report_.types[t];
       report_.by_type.emplace_back();
@@ -222,6 +226,7 @@ class Rules {
       const Outcome a =
           in_own_process([&] { send_verdict({Result::pass, listed(request_.file)}); }, {request_.limit});
       types = a.verdict.detail;
+      if (!a.spoke) unlisted_ = "it " + a.ending + " while its types were listed; return constant tables";
       ended_ += a.late;
       hung_ = a.late;
     }
@@ -268,6 +273,7 @@ class Rules {
   Report report_;
   int ended_ = 0;  // rules that gave no verdict
   bool hung_ = false;
+  std::string unlisted_;  // why there is no list of types; empty: there is one, or it does not load
   std::set<std::string> skipped_;
 };
 
@@ -344,16 +350,19 @@ std::string file_of(const std::string &text, const Globals &globals) {
   if ((exists(here) && !is_directory(here)) || text.find('/') != std::string::npos) return text;
   const std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)> context(make_context(globals),
                                                                              dfm_context_destroy);
-  std::pair<std::string, std::string> named{text, text};
+  std::map<std::string, std::string> file_of_id;
   dfm_plugin_visit(
       context.get(),
       [](void *user, const dfm_type *type, const char *file) {
-        auto &[name, found] = *static_cast<std::pair<std::string, std::string> *>(user);
-        const char *const dot = std::strrchr(type->id, '.');
-        if (name == type->id || (dot && name == dot + 1)) found = file;
+        (*static_cast<std::map<std::string, std::string> *>(user))[type->id] = file;
       },
-      &named);
-  return named.second;
+      &file_of_id);
+  if (const auto whole = file_of_id.find(text); whole != file_of_id.end()) return whole->second;
+  std::erase_if(file_of_id, [&](const auto &one) { return !one.first.ends_with("." + text); });
+  if (file_of_id.size() > 1)
+    throw Failure(kBadInput, text + ": several plugins have this short name; give the id, as " +
+                                 file_of_id.begin()->first);
+  return file_of_id.empty() ? text : file_of_id.begin()->second;
 }
 
 void add_check(Command app, Globals &globals, int *exit_code) {

@@ -187,6 +187,20 @@ void Plugin::copy_type(const void *from, uint32_t number) {
                i + 1, type.nparam, kSizeOfTable);
       copy->rows.push_back(row);
     }
+  const auto lies_outside = [&](const char *what) {
+    broken("type #%u: its %s lies outside of its memory; point to text that ends with a 0", number, what);
+  };
+  const volatile char *byte = type.id;
+  if (!Fenced::guard([&] {
+         while (byte && *byte) ++byte;
+       }).empty())
+    lies_outside("id");
+  const char *const *effect = type.effects;
+  if (!Fenced::guard([&] {
+         for (; effect && *effect; ++effect)
+           for (byte = *effect; *byte;) ++byte;
+       }).empty())
+    lies_outside("list of effects");
   if (copy->rows.size() != type.nparam)
     broken(
         "type #%u: its table has %u rows of %u bytes at %p; set params, nparam and param_size "
@@ -225,7 +239,9 @@ void Plugin::close() {
 Plugin::~Plugin() { close(); }
 
 std::string name_of(const dfm_type &type, uint32_t number) {
-  return type.id && *type.id ? type.id : "#" + std::to_string(number);
+  std::string name = type.id && *type.id ? type.id : "#" + std::to_string(number);
+  std::replace_if(name.begin(), name.end(), [](unsigned char c) { return c < 32 || c == 127; }, '?');
+  return name;
 }
 
 const dfm_friction &law_of(const Subject &subject) {

@@ -72,7 +72,7 @@ using BareContext = std::unique_ptr<dfm_context, decltype(&dfm_context_destroy)>
 BareContext bare_context();
 // The entry of an opened image; null where it has none.
 dfm_plugin_fn entry_of(void *image);
-std::string name_of(const dfm_type &type, uint32_t number);  // its id, or "#0"
+std::string name_of(const dfm_type &type, uint32_t number);  // its id in one line, or "#0"
 const dfm_friction &law_of(const Subject &subject);
 bool promises(const dfm_type &type, const char *effect);
 

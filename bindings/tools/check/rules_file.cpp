@@ -426,7 +426,7 @@ std::string metadata_complete(const Subject &subject) {
                 {"source", type.source, "the paper and equation that it implements"}};
   if (!type.id || !reverse_dns(type.id))
     broken("its id \"%s\" is not in reverse-DNS form; use a name like \"org.example.mylaw\"",
-           type.id ? type.id : "");
+           name_of(type, subject.index).c_str());
   for (const auto &field : fields)
     if (!field.text || !*field.text)
       broken("its metadata lacks \"%s\" (%s); fill it in", field.key, field.remedy);

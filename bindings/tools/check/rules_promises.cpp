@@ -26,7 +26,7 @@ std::vector<std::vector<double>> candidates(const Subject &subject) {
     const dfm_param &row = type.params[i];
     std::vector<double> values;
     if (row.flags & (DFM_PARAM_ENUM | DFM_PARAM_INTEGER)) {
-      for (double v = row.min; v <= std::min(row.max, row.min + 8); ++v) values.push_back(v);
+      for (int k = 0; k <= 8 && row.min + k <= row.max; ++k) values.push_back(row.min + k);
     } else {
       for (const double factor : {1.5, 0.5, 10.0, 0.1}) values.push_back(row.def * factor);
       for (int decade = -4; decade <= 6; decade += 2) values.push_back(std::pow(10.0, decade));

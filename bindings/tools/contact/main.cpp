@@ -111,11 +111,11 @@ class Run {
 
   // Whether all have been read and solved.
   bool all() {
+    files_ = files_of(options_.paths);
     if (options_.json) std::printf("{\"problems\": [");
     else
       std::printf("%-44s %4s %9s %3s %5s %5s %6s %4s %8s %8s %7s  %s\n", "problem", "nc", "rank", "run",
                   "pass", "step", "prod", "fact", "error", "m/s", "s", "Siconos");
-    files_ = files_of(options_.paths);
     for (const std::string &path : files_) one(path);
     if (options_.json) std::printf("\n], \"kinds\": [");
     uint32_t solved = 0, read = 0;

@@ -34,6 +34,7 @@ struct GlobalProblem {
 LocalProblem padded(const Entries &W, const std::vector<double> &q, std::vector<double> mu, size_t dim) {
   const size_t n = mu.size();
   if (dim != 2 && dim != 3) refuse("rolling friction (dimension " + std::to_string(dim) + ")");
+  if (n == 0) refuse("there are no contacts to solve");
   if (W.rows != dim * n || W.columns != W.rows || q.size() != W.rows) refuse("sizes do not fit each other");
   LocalProblem out;
   out.W = Matrix(3 * n, 3 * n);

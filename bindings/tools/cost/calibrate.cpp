@@ -21,6 +21,7 @@
 #include "progress.h"
 #include "scene_file.h"
 #include "run_folder.h"
+#include "shipped_costs.h"
 #include "system.h"
 
 namespace cli {
@@ -385,6 +386,7 @@ class Calibration {
         left_out.push_back("the model " + m.id + " is not measured, earlier costs of it stay: " + why.what());
       }
     }
+    if (rows.empty()) throw Failure(kBadInput, "no model could be measured, so no costs are written");
     for (std::string &row : kept_rows(out, machine, measured)) rows.push_back(std::move(row));
     return JsonObject()
         .add("format", quoted("deform-costs"))
@@ -554,11 +556,21 @@ int calibrate(std::string out, const std::vector<std::string> &models, Globals &
 std::vector<std::string> kept_rows(const std::string &file, const std::string &machine,
                                    const std::vector<std::string> &measured) {
   std::vector<std::string> out;
-  JsonValue costs;
+  JsonValue costs, shipped;
+  std::vector<std::string> known = measured;
+  const auto take = [&](const JsonValue &row) {
+    if (std::ranges::find(known, row.get("model")) != known.end()) return;
+    out.push_back(json_text(row));
+    known.push_back(row.get("model"));
+  };
   if (std::filesystem::exists(path_of(file)) && parse_json(read_file(file, 64u << 20, "costs"), costs) &&
       costs.get("version") == "4" && costs.get("machine") == machine)
-    for (const JsonValue &row : costs.list("models"))
-      if (std::ranges::find(measured, row.get("model")) == measured.end()) out.push_back(json_text(row));
+    for (const JsonValue &row : costs.list("models")) take(row);
+  parse_json(dfm::scene::kShippedCosts, shipped);
+  for (JsonValue row : shipped.list("models")) {
+    if (!row.find("machine")) row.members.push_back({"machine", *shipped.find("machine")});
+    take(row);
+  }
   return out;
 }
 

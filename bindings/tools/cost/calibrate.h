@@ -7,7 +7,8 @@
 namespace cli {
 
 void add_calibrate(Command app, Globals &globals, int *exit_code);
-// Rows of a file of costs, as JSON, for models that are not measured now, if this machine has measured them.
+// Rows, as JSON, for models that are not measured now: of a file of costs, if this machine has measured them,
+// else those that the library ships.
 std::vector<std::string> kept_rows(const std::string &file, const std::string &machine,
                                    const std::vector<std::string> &measured);
 

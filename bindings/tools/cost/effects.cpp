@@ -14,6 +14,7 @@
 #include "messages.h"
 #include "progress.h"
 #include "state_file.h"
+#include "step_size.h"
 
 namespace cli {
 namespace {
@@ -85,9 +86,7 @@ struct Off {
 class Meter {
  public:
   Meter(const Globals &globals, SceneFile &scene, const std::vector<std::string> &set)
-      : globals_(globals), scene_(scene), set_(set), step_(scene.settings().step) {
-    if (!(step_ > 0)) need(dfm_world_stable_step(scene.world(), &step_, nullptr, nullptr));
-  }
+      : globals_(globals), scene_(scene), set_(set), step_(full_step(scene)) {}
 
   // still_on: of the plan without the effect
   EffectCost measure(const std::string &body, const std::string &effect, const Off &off,

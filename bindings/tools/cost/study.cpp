@@ -101,7 +101,10 @@ class Student {
     for (const SubjectBody &body : s_.bodies)
       for (size_t k = 0; k < body.ends.size(); ++k) {
         JsonObject probe;
-        probe.add("name", quoted(body.name + "_end" + std::to_string(k + 1))).add("body", quoted(body.name));
+        const std::string end = "_end" + std::to_string(k + 1), name = body.name + end;
+        // a name of the length that a name may have leaves no room
+        probe.add("name", quoted(name.size() > 100 ? std::to_string(&body - s_.bodies.data()) + end : name))
+            .add("body", quoted(body.name));
         probe.add("point", json_vector(body.ends[k].data()));
         probes.push_back(probe.text());
       }

@@ -60,6 +60,11 @@ class Reader {
       for (const JsonMember &key : s->members)
         for (const char *ours : {"format", "version", "materials", "bodies"})
           if (key.name == ours) refuse(path_, "/scene/%s: is written from the labels; remove it here", ours);
+      need_list(*s, "obstacles", "/scene");
+      if (const JsonValue *contact = s->find("contact")) {
+        need_object(*contact, "/scene/contact");
+        need_list(*contact, "filter", "/scene/contact");
+      }
       out_.scene = *s;
     }
     const JsonValue *list = root.find("labels");
@@ -77,6 +82,11 @@ class Reader {
   void need_object(const JsonValue &v, const std::string &pointer) const {
     if (v.kind != JsonValue::object)
       refuse(path_, "%s: expected an object, {...}", pointer.empty() ? "the file" : pointer.c_str());
+  }
+  void need_list(const JsonValue &v, const char *key, const std::string &pointer) const {
+    const JsonValue *m = v.find(key);
+    if (m && m->kind != JsonValue::array)
+      refuse(path_, "%s/%s: expected a list, [...]", pointer.c_str(), key);
   }
   void known(const JsonValue &v, const std::string &pointer, const std::vector<std::string> &keys) const {
     for (const JsonMember &m : v.members) {
@@ -181,6 +191,7 @@ class Reader {
   void body(const JsonMember &m) {
     const std::string pointer = "/bodies/" + escaped(m.name);
     need_object(m.value, pointer);
+    for (const char *key : {"fix", "attach"}) need_list(m.value, key, pointer);
     std::vector<std::string> names;
     for (Thing &t : out_.things) {
       if (t.obstacle) continue;

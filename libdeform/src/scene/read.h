@@ -61,7 +61,7 @@ Obstacle read_obstacle(const Node &node, ReadContext &context);
 void check_shape_keys(const Node &node, const std::string &shape);
 dfm_pose read_pose(const Node &holder, const char *kind, double *scale);
 // Reads a "start"; missing keys keep their usual values.
-dfm_pose read_placed(const Node &start, const dfm_pose &otherwise);
+dfm_pose read_placed(const Node &start, const dfm_pose &otherwise, Quat turn = {});
 uint64_t read_id(const Node &node);  // 0: none is given
 template <class Def>                 // dfm_obstacle_def, dfm_rigid_def
 void read_solid(const Node &node, const std::string &shape, Def &def);

@@ -40,10 +40,13 @@ void read_rotation(const Node &holder, double out[4]) {
 
 }  // namespace
 
-dfm_pose read_placed(const Node &start, const dfm_pose &otherwise) {
+dfm_pose read_placed(const Node &start, const dfm_pose &otherwise, Quat turn) {
   dfm_pose pose = otherwise;
   if (start.has("position")) start.member("position").vector(pose.position);
-  if (start.has("rotation")) read_rotation(start, pose.rotation);
+  if (start.has("rotation")) {
+    read_rotation(start, pose.rotation);
+    store_quat(pose.rotation, load_quat(pose.rotation) * turn);
+  }
   return pose;
 }
 
@@ -95,8 +98,7 @@ Selection read_selection(const Node &entry) {
 
 std::vector<dfm_pose_key> read_keys(const Node &motion, const dfm_pose &base, Quat turn) {
   return read_keyframes<dfm_pose_key>(motion, "motion_key", [&](const Node &node, dfm_pose_key &key) {
-    key.pose = read_placed(node, base);
-    if (node.has("rotation")) store_quat(key.pose.rotation, load_quat(key.pose.rotation) * turn);
+    key.pose = read_placed(node, base, turn);
   });
 }
 
@@ -452,7 +454,7 @@ Obstacle read_obstacle(const Node &node, ReadContext &context) {
     const Node start = node.member("start").object("obstacle_start");
     if (node.has("motion"))
       start.fail("a \"motion\" gives the place of the obstacle at every time; remove one of the two");
-    o.start = read_placed(start, o.def.pose);
+    o.start = read_placed(start, o.def.pose, turn);
   }
   return o;
 }

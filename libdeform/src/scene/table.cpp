@@ -30,7 +30,9 @@ class Table {
         expected_(std::move(expected)),
         bytes_(read_whole_file(Memory::standard(), path_,
                                std::max(kMiB, 2 * rows * uint64_t(columns) * kCellBytes),
-                               ("a table with the header " + expected_).c_str())) {}
+                               ("a table with the header " + expected_).c_str())) {
+    if (std::string_view(bytes_.data(), bytes_.size()).starts_with("\xEF\xBB\xBF")) at_ = 3;
+  }
   bool empty() const { return bytes_.empty(); }
 
   std::string first() {  // the first line

@@ -1,7 +1,7 @@
 /* The rest of a broken law: eval, tables and entry. Hooks, each a macro with a sound default: EFFECTS and
  * FLAGS what it promises, LANE the update of one contact, BEFORE_EVAL a statement at the head of eval,
- * AFTER_LANE one after each contact, STEP the step it uses, EVAL, CHECK, SLOTS, SOURCE, ROWS, NPARAM and
- * PARAM_SIZE of its parameter table; with OWN_ENTRY it brings its entry. */
+ * AFTER_LANE one after each contact, STEP the step it uses, EVAL, CHECK, SLOTS, ID, SOURCE, ROWS, NPARAM
+ * and PARAM_SIZE of its parameter table; with OWN_ENTRY it brings its entry. */
 #include "base.h"
 
 #ifndef SOURCE
@@ -30,6 +30,9 @@
 #endif
 #ifndef EVAL
 #define EVAL eval
+#endif
+#ifndef ID
+#define ID "org.broken.law"
 #endif
 #ifndef ROWS
 #define ROWS rows
@@ -96,18 +99,9 @@ static const dfm_friction ops = {sizeof(dfm_friction),
                                  0,
                                  NULL};
 static const char *const effects[] = {EFFECTS, NULL};
-static const dfm_type type = {sizeof(dfm_type),
-                              DFM_KIND_FRICTION,
-                              "org.broken.law",
-                              "a law of the tests",
-                              "1.0",
-                              "MIT",
-                              SOURCE,
-                              ROWS,
-                              NPARAM,
-                              PARAM_SIZE,
-                              effects,
-                              &ops};
+static const dfm_type type = {
+    sizeof(dfm_type), DFM_KIND_FRICTION, ID,  "a law of the tests", "1.0", "MIT", SOURCE, ROWS, NPARAM,
+    PARAM_SIZE,       effects,           &ops};
 static const dfm_type *const types[] = {&type};
 static const dfm_plugin plugin = {sizeof(dfm_plugin), DFM_ABI, DFM_ABI_DRAFT, 1, types, NULL};
 

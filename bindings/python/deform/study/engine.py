@@ -259,7 +259,7 @@ class Engine:
         try:
             to.write(json.dumps(request) + "\n")
             to.flush()
-            if limit and not select.select([replies], [], [], limit)[0]:
+            if limit and not _answers(replies, limit):
                 self._stop()
                 raise Failed(_over(limit))
             line = replies.readline()
@@ -268,6 +268,13 @@ class Engine:
         if not line.endswith("\n"):
             raise Died("the worker died")
         return json.loads(line)
+
+
+def _answers(pipe: Any, limit: float) -> bool:
+    """Whether there is something to read within so many seconds. select() knows 1,024 descriptors alone."""
+    waiting = select.poll()
+    waiting.register(pipe, select.POLLIN)
+    return bool(waiting.poll(1000 * limit))
 
 
 def _over(limit: float) -> str:

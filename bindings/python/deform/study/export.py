@@ -7,12 +7,13 @@ import shlex
 import sys
 from typing import Any
 
-from .._library import ArgumentError, command_path
+from .._library import ArgumentError, command_path, write_whole
 from .design import points
 from .spec import read_study
 from .sweep import out_folder
 
-SNAKEFILE = '''# Written by `deform sweep --export snakemake`. Run: snakemake -s {file} --cores N
+MARK = "# Written by `deform sweep --export"
+SNAKEFILE = MARK + ''' snakemake`. Run: snakemake -s {file} --cores N
 BLOCKS = {blocks}
 
 rule all:
@@ -25,8 +26,7 @@ rule block:
     shell: {run!r}
 '''
 
-SLURM = '''#!/bin/sh
-# Written by `deform sweep --export slurm`. Run: sbatch {file}; when it has ended: {gather}
+SLURM = "#!/bin/sh\n" + MARK + ''' slurm`. Run: sbatch {file}; when it has ended: {gather}
 #SBATCH --job-name={name}
 #SBATCH --array=0-{last}
 #SBATCH --cpus-per-task=1
@@ -52,14 +52,16 @@ def export(study: Any, kind: str, *, out: Any = None, block: int = 0) -> pathlib
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / ("Snakefile" if kind == "snakemake" else "array.sh")
     if kind == "slurm":
-        path.write_text(SLURM.format(file=shlex.quote(str(path)), gather=gather, name=shlex.quote(read.name),
-                                     n=n, most=n - 1, last=-(-n // block) - 1, block=block, run=run))
+        text = SLURM.format(file=shlex.quote(str(path)), gather=gather, name=shlex.quote(read.name),
+                            n=n, most=n - 1, last=-(-n // block) - 1, block=block, run=run)
+        write_whole(path, text.encode(), MARK)
         return path
     blocks = [f"{first}-{min(first + block, n) - 1}" for first in range(0, n, block)]
     braces = run.replace("{", "{{").replace("}", "}}")
-    path.write_text(SNAKEFILE.format(file=shlex.quote(str(path)), blocks=blocks,
-                                     done=str(folder / "runs" / "{block}.done"),
-                                     inputs=[str(pathlib.Path(study).absolute()), read.runs[0][0]],
-                                     gather=gather.replace("{", "{{").replace("}", "}}") + " || [ $? = 1 ]",
-                                     run=braces + " --only {wildcards.block}"))
+    text = SNAKEFILE.format(file=shlex.quote(str(path)), blocks=blocks,
+                            done=str(folder / "runs" / "{block}.done"),
+                            inputs=[str(pathlib.Path(study).absolute()), read.runs[0][0]],
+                            gather=gather.replace("{", "{{").replace("}", "}}") + " || [ $? = 1 ]",
+                            run=braces + " --only {wildcards.block}")
+    write_whole(path, text.encode(), MARK)
     return path

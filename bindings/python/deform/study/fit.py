@@ -10,7 +10,7 @@ from typing import Any, Callable, Mapping, Sequence
 import numpy as np
 
 from .._command import Table
-from .._library import ArgumentError, Error, UnsupportedError, write_whole
+from .._library import ArgumentError, Error, UnsupportedError, refuse_foreign, write_whole
 from .._values import finite_or_none
 from . import plots
 from .engine import Failed
@@ -21,6 +21,7 @@ from .statistics import Spread
 from .sweep import out_folder
 from .tables import titled
 
+MARK = '{\n "parameters": ['  # of fit.json; those of a study are an object
 ROUGH = 0.2  # relative change of a derivative with its step from which the residuals are no smooth function
 LEFT = 0.1   # of an interval's half width: what a search that has converged may leave of the way
 
@@ -53,7 +54,7 @@ class Fit(Table):
                   "curves": [{key: value.tolist() if isinstance(value, np.ndarray) else value
                               for key, value in curve.items()} for curve in self.curves]}
         written = [self.folder / "fit.json", self.folder / "fit.html"]
-        write_whole(written[0], (json.dumps(finite_or_none(report), indent=1) + "\n").encode())
+        write_whole(written[0], (json.dumps(finite_or_none(report), indent=1) + "\n").encode(), MARK)
         sentences, figures = list(self.notes), {}
         try:
             figures["fit"] = plots.png(self.figure())
@@ -161,6 +162,9 @@ def _at_measured(residual: Residual, read: Any) -> np.ndarray:
         return np.array([read])
     x, y = map(np.array, read)
     if not np.all(np.diff(x) > 0):
+        if residual.read["against"] == "t":
+            raise Failed(f'residual "{residual.name}": several rows of the run have one time; choose those '
+                         f'of one thing by "where"')
         raise Failed(f'residual "{residual.name}": the column "{residual.read["against"]}" of the run does '
                      f'not increase from row to row, so nothing can be read off between rows; use "against": '
                      f'"t"')
@@ -232,6 +236,9 @@ def _check(study: Study) -> None:
         if p.values or p.whole:
             raise ArgumentError(f'{study.file}: /parameters/{p.name}: a fit varies within a range: give '
                                 f'"from" and "to" without "values" and "whole"', "DFM_E_ARG")
+    if study.optimizer["method"] == "cma" and len(study.parameters) == 1:
+        raise ArgumentError(f'{study.file}: /optimizer/method: cma searches in two dimensions or more; one '
+                            f'parameter is found by "differential_evolution"', "DFM_E_ARG")
     n = sum(len(r.measured) for r in study.residuals)
     if n <= len(study.parameters):
         raise ArgumentError(f"{study.file}: /residuals: {n} measured numbers for {len(study.parameters)} "
@@ -251,13 +258,18 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
     sentence whenever the residuals have become smaller."""
     read = study if isinstance(study, Study) else read_study(study)
     _check(read)
+    refuse_foreign(out_folder(read, out) / "fit.json", MARK)  # before the search, not after it
     method, step = read.optimizer["method"], read.optimizer["step"]
     start = np.array([p.share(p.start) for p in read.parameters])
     with ExitStack() as stack:
         pool = stack.enter_context(named_executor(executor, workers, address))
         problem = Problem(read, pool, tell or (lambda _: None))
         at_start = problem.curves(start)
-        problem.residuals([start])  # the best, until a search finds a better one
+        with np.errstate(over="ignore"):
+            problem.residuals([start])  # the best, until a search finds a better one
+        if not math.isfinite(problem.best):
+            raise ArgumentError(f"{read.file}: /residuals: the sum of squares of residuals over sigma is no "
+                                f"number that a computer holds; give a larger sigma", "DFM_E_ARG")
         best, ended = _search(problem, start, method, read.optimizer, read.optimizer["evaluations"])
         searched = [] if ended or method == "least_squares" else [
             f'{method} was stopped by "evaluations" after {problem.evaluations} points, and least squares '

@@ -22,6 +22,8 @@ from .tables import finite, read_csv
 TABLES = {"bodies", "contacts", "probes", "attachments", "sensors", "tools", "rows"}
 OF_ROWS = ("state", "said", "seconds")  # what a sweep's rows say beside parameters and quantities
 TETGEN = (".ele", ".node", ".face")  # whichever a scene names, those beside it are read too
+LONGEST = 1e6         # s, of a run; poll() counts milliseconds in 32 bits
+MOST_SEED = 2**32 - 2  # NumPy's, of 32 bits, from 1 on for cma
 TAKES = ("last", "first", "min", "max", "mean", "change", "period", "peak_to_peak")
 
 
@@ -55,22 +57,26 @@ class Place:
     def has(self, key: str) -> bool:
         return key in self.value
 
-    def number(self, key: str, default: float | None = None, above: float = -math.inf) -> float:
+    def number(self, key: str, default: float | None = None, above: float = -math.inf,
+               most: float = sys.float_info.max) -> float:
         if default is not None and key not in self.value:
             return default
         at = self.of(key)
         if isinstance(at.value, bool) or not isinstance(at.value, (int, float)) or not (
-                max(above, -sys.float_info.max) <= at.value <= sys.float_info.max) or at.value == above:
+                max(above, -sys.float_info.max) <= at.value <= most) or at.value == above:
             of = "" if above == -math.inf else f" above {above:g}"
+            of += "" if most == sys.float_info.max else f" and at most {most:g}"
             raise at.fail(f"expected a number{of}, found {json.dumps(at.value)}")
         return float(at.value)
 
-    def whole(self, key: str, default: int | None = None, least: int = 1) -> int:
+    def whole(self, key: str, default: int | None = None, least: int = 1, most: int | None = None) -> int:
         if default is not None and key not in self.value:
             return default
         at = self.of(key)
-        if isinstance(at.value, bool) or not isinstance(at.value, int) or at.value < least:
-            raise at.fail(f"expected a whole number, {least} or more, found {json.dumps(at.value)}")
+        if isinstance(at.value, bool) or not isinstance(at.value, int) or at.value < least or (
+                most is not None and at.value > most):
+            to = f"{least} or more" if most is None else f"{least} to {most}"
+            raise at.fail(f"expected a whole number, {to}, found {json.dumps(at.value)}")
         return at.value
 
     def text(self, key: str, default: str | None = None, one_of: Iterable[str] = ()) -> str:
@@ -96,10 +102,9 @@ def is_pointer(value: Any) -> bool:
 def pointers(place: Place, key: str) -> list[str]:
     value = place.value[key]
     found = value if isinstance(value, list) else [value]
-    for pointer in found:
-        if not is_pointer(pointer):
-            raise place.of(key).fail(f"expected a JSON pointer into the scene, as /gravity/2, or a list of "
-                                     f"them, found {json.dumps(value)}")
+    if not found or not all(map(is_pointer, found)):
+        raise place.of(key).fail(f"expected a JSON pointer into the scene, as /gravity/2, or a list of "
+                                 f"them, found {json.dumps(value)}")
     return found
 
 
@@ -152,6 +157,8 @@ def read_parameter(name: str, at: Place) -> Parameter:
         raise at.fail(f'"from" ({low:g}) must be below "to" ({high:g})')
     if log and low <= 0:
         raise at.fail(f'a range with "scale": "log" begins above 0, and "from" is {low:g}')
+    if not math.isfinite(high / low if log else high - low):
+        raise at.fail(f"the range {low:g} to {high:g} is wider than numbers reach: give a narrower one")
     whole = at.value.get("whole", False)
     if not isinstance(whole, bool):
         raise at.of("whole").fail(f"expected true or false, found {json.dumps(whole)}")
@@ -231,8 +238,10 @@ class Study:
         """Of each point: the same as long as its results would be, which depend on its values and on library,
         files, fixed values and what is read of a run."""
         of_file = functools.lru_cache(maxsize=None)(_of_file)  # the points of a study name the same few
-        inputs = [(of_file(file), _of_named(read_json(file), file, of_file), fixed,
-                   _of_named(fixed, file, of_file)) for file, fixed in self.runs]
+        set_by_points = [at for p in self.parameters for at in p.at]
+        inputs = [(of_file(file), _of_named(scene, file, of_file), fixed, _of_named(fixed, file, of_file),
+                   _of_costs(scene, [*fixed, *set_by_points]))
+                  for file, fixed in self.runs for scene in [read_json(file)]]
         digest = _of_json([_built(), self.kind, inputs, list(self.quantities.items())])
         keys = []
         for values in map(self.values, points):
@@ -253,6 +262,14 @@ def _built() -> list[str]:
     """Of what makes the runs: the library, the command and all plugins."""
     plugins = (plugin.file for plugin in Context().types)
     return sorted(map(_of_file, {str(PATH), str(command_path()), *filter(None, plugins)}))
+
+
+def _of_costs(scene: Any, pointers: Iterable[str]) -> list[str]:
+    """Of the measured costs (bindings/cli/costs_file.cpp), where the planner chooses by them."""
+    settings = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
+    file = os.environ.get("DEFORM_COSTS") or f"{settings}/deform/costs.json"
+    keys = {pointer.split("/")[1] for pointer in pointers}.union(scene if isinstance(scene, Mapping) else ())
+    return [_of_file(file)] if keys & {"accuracy", "budget"} and os.path.isfile(file) else []
 
 
 def _of_named(value: Any, file: str, of_file: Callable[[str], str]) -> list[str]:
@@ -280,7 +297,7 @@ def _input(at: Place, folder: pathlib.Path) -> tuple[str, str]:
     except OSError as error:
         raise at.of(kind).fail(f"{path}: cannot be opened: {error.strerror}") from None
     except ValueError as error:
-        raise at.of(kind).fail(f"{path} is not JSON: {error}") from None
+        raise at.of(kind).fail(f"{path} cannot be read as JSON: {error}") from None
     return kind, str(path)
 
 
@@ -298,6 +315,8 @@ def read_columns(path: pathlib.Path, names: list[str], at: Place) -> list[np.nda
         rows = read_csv(path)
     except OSError as error:
         raise at.fail(f"{path}: cannot be opened: {error.strerror}") from None
+    except ValueError as error:
+        raise at.fail(f"{path}: {error}") from None
     out = []
     for name in names:
         if not rows or name not in rows[0]:
@@ -345,7 +364,7 @@ def read_study(source: Any) -> Study:
         except OSError as error:
             raise FileError(f"{file}: cannot be opened: {error.strerror}", "DFM_E_IO") from None
         except ValueError as error:
-            raise FormatError(f"{file}: is not JSON: {error}", "DFM_E_FORMAT") from None
+            raise FormatError(f"{file}: cannot be read as JSON: {error}", "DFM_E_FORMAT") from None
         folder = pathlib.Path(source).parent
     at = Place(value, file)
     if isinstance(value, Mapping) and value.get("format") == "deform-scene":
@@ -406,5 +425,6 @@ def read_study(source: Any) -> Study:
                   "seed": design.whole("seed", 0, 0), "place": design},
                  residuals,
                  {"method": search, "step": optimizer.number("step", 0.01, 1e-12),
-                  "evaluations": optimizer.whole("evaluations", 0, 0), "seed": optimizer.whole("seed", 0, 0)},
-                 confidence, at.number("limit_s", 0.0, 0))
+                  "evaluations": optimizer.whole("evaluations", 0, 0),
+                  "seed": optimizer.whole("seed", 0, 0, MOST_SEED)},
+                 confidence, at.number("limit_s", 0.0, 0, LONGEST))

@@ -9,9 +9,14 @@ import pathlib
 import time
 from typing import Any
 
-from .._library import FileError, StateError
+from .._library import FileError, StateError, refuse_foreign
 
+MARK = '", "point": {'  # in each line
 SYNC_EVERY = 1.0  # s: what a loss of power may cost; the end of a process costs nothing
+
+
+def _results(folder: pathlib.Path) -> list[pathlib.Path]:
+    return [folder / "runs.jsonl", *sorted((folder / "runs").glob("*.jsonl"))]
 
 
 class Store:
@@ -20,6 +25,8 @@ class Store:
     def __init__(self, folder: pathlib.Path, name: str = "runs.jsonl"):
         path = folder / name
         path.parent.mkdir(parents=True, exist_ok=True)
+        for file in {path, *_results(folder)}:
+            refuse_foreign(file, MARK)
         self.file = open(path, "ab")
         try:
             fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -32,7 +39,7 @@ class Store:
             raise FileError(f"{path}: cannot be locked: {error.strerror}; give a folder of another file "
                             f"system (--out)", "DFM_E_IO") from None
         self.rows: dict[str, dict[str, Any]] = {}
-        for other in [folder / "runs.jsonl", *sorted((folder / "runs").glob("*.jsonl"))]:
+        for other in _results(folder):
             if other != path and other.exists():
                 self._load(other.read_bytes())
         text = path.read_bytes()

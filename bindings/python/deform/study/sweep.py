@@ -44,9 +44,6 @@ class Sweep(Table):
         no figures."""
         written = [self.folder / "sweep.csv"]
         tables.write_csv(written[0], self, self.columns, self.units)
-        if parquet:
-            written.append(self.folder / "sweep.parquet")
-            tables.write_parquet(written[1], self, self.columns, self.units)
         sentences, figures = list(self.notes), {}
         try:
             figures = {name: plots.png(drawn) for name, drawn in self.figures().items()}
@@ -58,6 +55,9 @@ class Sweep(Table):
         written.append(self.folder / "sweep.html")
         write_whole(written[-1], page(f"Sweep {self.study.name}", sentences, figures,
                                       [table(self, self.columns, self.units)]))
+        if parquet:
+            written.append(self.folder / "sweep.parquet")
+            tables.write_parquet(written[-1], self, self.columns, self.units)
         return written
 
 

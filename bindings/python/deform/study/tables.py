@@ -16,7 +16,10 @@ Rows = Sequence[Mapping[str, Any]]
 
 def read_csv(path: pathlib.Path) -> list[dict[str, str]]:
     with open(path, newline="", encoding="utf-8-sig", errors="replace") as file:
-        return list(csv.DictReader(line for line in file if not line.startswith("#")))
+        try:
+            return list(csv.DictReader(line for line in file if not line.startswith("#")))
+        except csv.Error as error:
+            raise ValueError(f"is no table: {error}") from None
 
 
 def finite(rows: Sequence[Mapping[str, str]], name: str) -> list[float]:
@@ -45,6 +48,12 @@ def write_csv(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Map
     write_whole(path, text.getvalue().encode())
 
 
+def of_one_kind(column: Sequence[Any]) -> list[Any]:
+    """What a column of one type holds: texts, where numbers stand beside something else."""
+    kinds = {float if type(value) is int else type(value) for value in column if value is not None}
+    return [str(value) if len(kinds) > 1 and value is not None else value for value in column]
+
+
 def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
     try:
         import pyarrow as arrow
@@ -54,7 +63,7 @@ def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units:
                                f"rows are in sweep.csv", "DFM_E_UNSUPPORTED") from None
     arrays, fields = [], []
     for name in columns:
-        array = arrow.array([row.get(name) for row in rows])
+        array = arrow.array(of_one_kind([row.get(name) for row in rows]))
         arrays.append(array)
         metadata = {"unit": units[name]} if units.get(name) else None
         fields.append(arrow.field(name, array.type, metadata=metadata))
