@@ -49,6 +49,23 @@ void add_coefficient(Simulation &simulation, const std::string &a, const std::st
   out.push_back(s);
 }
 
+// A parameter of the model or law of that id, or of an id that ends so, if it may change mid-run; or NULL.
+const dfm_param *changeable(const cli::SceneFile &scene, const std::string &id, const char *key) {
+  struct Sought {
+    const std::string &id;
+    const char *key;
+    const dfm_param *found;
+  } sought{id, key, nullptr};
+  const auto look = [](void *user, const dfm_type *type, const char *) {
+    Sought &s = *static_cast<Sought *>(user);
+    if (s.id != type->id && !std::string(type->id).ends_with("." + s.id)) return;
+    for (const dfm_param &row : cli::params_of(*type))
+      if (std::strcmp(row.key, s.key) == 0 && (row.flags & DFM_PARAM_RUNTIME) != 0) s.found = &row;
+  };
+  cli::need(dfm_plugin_visit(scene.context(), look, &sought));
+  return sought.found;
+}
+
 void add_friction(Simulation &simulation, std::vector<Slider> &out) {
   cli::JsonValue rules;
   if (!cli::parse_json(simulation.scene().value("/contact/friction"), rules)) return;
@@ -56,32 +73,21 @@ void add_friction(Simulation &simulation, std::vector<Slider> &out) {
     const cli::JsonValue *const sides = rule.find("between"), *const params = rule.find("params");
     if (!sides || sides->items.size() != 2 || rule.get("law") == "none") continue;
     const std::string &a = sides->items[0].text, &b = sides->items[1].text;
-    const auto given = [&](const char *key) { return params ? params->get(key) : std::string(); };
-    const auto value = [&](const char *key) { return std::strtod(given(key).c_str(), nullptr); };
-    if (!given("mu_C").empty() && !given("mu_S").empty() && value("mu_C") != value("mu_S")) {
-      add_coefficient(simulation, a, b, "mu_C", value("mu_C"), out);
-      add_coefficient(simulation, a, b, "mu_S", value("mu_S"), out);
-    } else {
-      const char *const key = given("mu_C").empty() ? "mu" : "mu_C";
-      add_coefficient(simulation, a, b, "mu", given(key).empty() ? 0.5 : value(key), out);
-    }
+    std::vector<const dfm_param *> rows;
+    for (const char *key : {"mu", "mu_C", "mu_S"})
+      if (const dfm_param *row = changeable(simulation.scene(), rule.get("law"), key)) rows.push_back(row);
+    const auto value = [&](const dfm_param &row) {
+      for (const char *key : {row.key, "mu"})  // the file's shorthand for both
+        if (const std::string text = params ? params->get(key) : std::string(); !text.empty())
+          return std::strtod(text.c_str(), nullptr);
+      return row.def;
+    };
+    const auto as_first = [&](const dfm_param *row) { return value(*row) == value(*rows[0]); };
+    if (!rows.empty() && std::all_of(rows.begin(), rows.end(), as_first))
+      add_coefficient(simulation, a, b, "mu", value(*rows[0]), out);
+    else
+      for (const dfm_param *row : rows) add_coefficient(simulation, a, b, row->key, value(*row), out);
   }
-}
-
-// Whether the model of that id takes another Young's modulus while it runs.
-bool takes_young(const cli::SceneFile &scene, const std::string &model) {
-  struct Sought {
-    const std::string &model;
-    bool found;
-  } sought{model, false};
-  const auto look = [](void *user, const dfm_type *type, const char *) {
-    Sought &s = *static_cast<Sought *>(user);
-    if (s.model != type->id) return;
-    for (const dfm_param &row : cli::params_of(*type))
-      s.found |= std::strcmp(row.key, "young") == 0 && (row.flags & DFM_PARAM_RUNTIME) != 0;
-  };
-  cli::need(dfm_plugin_visit(scene.context(), look, &sought));
-  return sought.found;
 }
 
 void add_stiffness(Simulation &simulation, std::vector<Slider> &out) {
@@ -93,7 +99,7 @@ void add_stiffness(Simulation &simulation, std::vector<Slider> &out) {
     if (text.empty() && material.size() > 2)
       text = scene.value("/materials/" + material.substr(1, material.size() - 2) + "/young");
     const double young = std::strtod(text.c_str(), nullptr);
-    if (!(young > 0) || !takes_young(scene, body.model)) continue;
+    if (!(young > 0) || !changeable(scene, body.model, "young")) continue;
     Slider s;
     s.name = "young:" + body.name;
     s.label = "E  " + body.name + ", Pa";

@@ -36,7 +36,7 @@ void Orbit::shift(double right, double up) {
   target_ = target_ + v.right * (right * high) + v.up * (up * high);
 }
 
-void Orbit::zoom(double factor) { distance_ = std::clamp(distance_ * factor, 1e-4, 1e4); }
+void Orbit::zoom(double factor) { distance_ = std::max(distance_ * factor, 1e-9); }
 
 render::Camera Orbit::camera() const {
   const Vec level = x_ * std::cos(azimuth_) + render::cross(up_, x_) * std::sin(azimuth_);

@@ -257,11 +257,11 @@ struct Elastoplastic : bristle::Run<Elastoplastic> {
   // that is more than LuGre's rho above 2.
   static dfm_status prepare(const dfm_host *host, const double *params, void **data) {
     *data = nullptr;
-    const double beyond = params[lugre::kMuC] > 0 ? params[lugre::kMuS] / params[lugre::kMuC] - 1 : 0;
-    double power = beyond;
-    for (int k = 1; k < static_cast<int>(params[kI]); ++k) power *= beyond;
-    const bool steep = power > beyond;
-    lugre::warn(host, params, params[lugre::kSigma1] * params[lugre::kMuC] * (steep ? power : beyond),
+    const double level = params[lugre::kMuC], drop = params[lugre::kMuS] - level;
+    double power = drop;  // mu_C (rho - 1)^i; at a level of 0, where rho has no bound, LuGre's
+    for (int k = 1; level > 0 && k < static_cast<int>(params[kI]); ++k) power *= drop / level;
+    const bool steep = power > drop;
+    lugre::warn(host, params, params[lugre::kSigma1] * (steep ? power : drop),
                 steep ? "mu_C (mu_S/mu_C - 1)^i" : "(mu_S - mu_C)");
     return DFM_OK;
   }

@@ -226,7 +226,7 @@ void Elastic::find_pins() {
   for (const uint32_t r : chosen) given_.push_back(which[r]);
 }
 
-void Elastic::check_holding() const {
+void Elastic::check_holding(const char *id) const {
   std::vector<std::array<double, 6>> rows;
   std::vector<uint32_t> which, chosen;
   bool inside = false;
@@ -241,7 +241,7 @@ void Elastic::check_holding() const {
   if (!enough)
     throw "what is held leaves the body a rigid motion; hold three points that are not in a line, hold "
           "nothing, or use corotational_fem";
-  if (inside) host_->log(host_->ctx, 2, 0, kInside);
+  if (inside) model::say(host_, 2, id, "%s", kInside);
 }
 
 // Given displacements have a row and a column of their own.
@@ -295,7 +295,7 @@ void Elastic::create(const dfm_host *host, const char *id, const dfm_mesh &m, bo
     find_rigid();
     find_pins();
   } else {
-    check_holding();
+    check_holding(id);
     for (uint32_t j = 0; j < 3 * npoint; ++j)
       if (is_held(j)) given_.push_back(j);
   }

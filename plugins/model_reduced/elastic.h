@@ -84,7 +84,7 @@ class Elastic {
   void add_cell(uint32_t c, const model::RestCell &cell);
   void find_rigid();
   void find_pins();
-  void check_holding() const;
+  void check_holding(const char *id) const;
   void factorize();
   template <size_t kWide>
   void respond(const double *f, double *u) const;

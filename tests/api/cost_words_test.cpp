@@ -151,12 +151,14 @@ TEST(CostSubject, EndsOfATurnedBody_LieInTheFrameOfItsMesh) {
                                bar(R"(, "pose": {"rotation": {"axis": [0, 1, 0], "angle_deg": 60}})")),
                 q = subject_of("quaternion", bar(R"(, "pose": {"rotation": {"quaternion":
                                                    [0, 1, 0, 1.7320508075688772]}})"));
-  for (const Subject *of : {&s, &q})
+  for (const Subject *of : {&s, &q}) {
+    EXPECT_FALSE(of->bodies[0].ends.empty());
     for (const auto &end : of->bodies[0].ends)
       for (size_t k = 0; k < 3; ++k) {
         const double size = k == 0 ? 0.3 : 0.1;
         EXPECT_LT(std::min(std::fabs(end[k]), std::fabs(end[k] - size)), 1e-9) << k;
       }
+  }
 }
 
 TEST(CostSubject, SceneAppliedBehindALink_FindsItsFiles) {

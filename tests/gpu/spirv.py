@@ -32,8 +32,10 @@ def contracted(found):
 
 def main():
     glslang, folder = sys.argv[1], pathlib.Path(sys.argv[2])
-    wrong = 0
-    for shader in sorted(folder.glob("*.comp")):
+    shaders, wrong = sorted(folder.glob("*.comp")), 0
+    if not shaders:
+        sys.exit(f"{folder} has no shader")
+    for shader in shaders:
         kept = shader.with_suffix(".inc")
         with tempfile.TemporaryDirectory() as scratch:
             made = pathlib.Path(scratch) / "words"

@@ -96,7 +96,7 @@ class Expectations {
     const cli::JsonValue *v = find("known_failures", variant, "");
     if (!v) return "";
     for (const cli::JsonMember &m : v->members) {
-      if (name_of(c).rfind(m.name, 0) == 0) return m.value.text;
+      if ((name_of(c) + " ").starts_with(m.name + " ")) return m.value.text;
     }
     return "";
   }
