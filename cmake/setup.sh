@@ -23,7 +23,7 @@ is_present() { echo "$present" | grep -qx "$1"; }
 # Of names between bars the first that is installed or that apt knows, else the last.
 chosen() {
   for name in $(echo "$1" | tr '|' ' '); do
-    if is_present "$name" || [ -n "$(apt-cache madison "$name")" ]; then break; fi
+    if is_present "$name" || [ -n "$(apt-cache madison "$name" 2>/dev/null)" ]; then break; fi
   done
   echo "$name"
 }
@@ -31,6 +31,7 @@ look() {
   missing=
   for name in $names; do
     case $name in *'|'*) name=$(chosen "$name") ;; esac
+    case "$missing " in *" $name "*) continue ;; esac
     is_present "$name" || missing="$missing $name"
   done
 }

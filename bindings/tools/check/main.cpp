@@ -359,7 +359,8 @@ std::string file_of(const std::string &text, const Globals &globals) {
       &file_of_id);
   if (const auto whole = file_of_id.find(text); whole != file_of_id.end()) return whole->second;
   std::erase_if(file_of_id, [&](const auto &one) { return !one.first.ends_with("." + text); });
-  if (file_of_id.size() > 1)
+  const auto elsewhere = [&](const auto &one) { return one.second != file_of_id.begin()->second; };
+  if (std::any_of(file_of_id.begin(), file_of_id.end(), elsewhere))
     throw Failure(kBadInput, text + ": several plugins have this short name; give the id, as " +
                                  file_of_id.begin()->first);
   return file_of_id.empty() ? text : file_of_id.begin()->second;

@@ -93,6 +93,7 @@ bool ContactNewton::find_way(bool symmetric, double tolerance) {
     std::fill_n(out, g_.size(), 0.0);
     solver_->solve(1, in, out, Set::accuracy, info);
     definite = definite && !info.indefinite;
+    products_ += info.iterations;  // each as dear as one of those outside
   };
   for (bool fresh : {false, true}) {
     if (!fresh && (!factored_ || !solver_->direct() || kept_for_ >= Set::inner)) continue;

@@ -93,8 +93,7 @@ struct Background::Room {
   std::unique_lock<std::mutex> locked() {
     const auto until = std::chrono::steady_clock::now() + std::chrono::microseconds(50);
     std::unique_lock lock(mutex, std::try_to_lock);
-    while (!lock && std::chrono::steady_clock::now() < until && !lock.try_lock()) {
-    }
+    while (!lock && std::chrono::steady_clock::now() < until && !lock.try_lock()) {}
     return lock;
   }
 };

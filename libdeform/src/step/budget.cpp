@@ -151,8 +151,7 @@ void changing(Stream &s, World &w) {
   s.count(w.events);  // steps only append to it, and the host may read it after many steps
 }
 
-// The stores are swapped with others at the end of sub-steps, so the saved data may have to fit into the other
-// ones.
+// The stores are swapped with others at the end of sub-steps, so the saved data may have to fit into those.
 void reserve_others(World &w, StepContext &step) {
   const auto reserve = [](const ContactColumn &, const auto &from, auto &to) { to.reserve(from.size()); };
   each_column(reserve, w.store, step.next_store);
