@@ -39,7 +39,7 @@ struct FilterRule {
   std::string between[2];
   bool collide;
 };
-// Two rigid things that touch, by ids. Side a is the one that gives way; where both do, or none, the older one.
+// Two rigid things that touch, by ids. Side a is the one that gives way; where both or none do, the older.
 struct RigidPair {
   uint64_t a, b;
   auto operator<=>(const RigidPair &) const = default;
