@@ -129,7 +129,7 @@ TEST(LocalSolve, LawWithoutDerivatives_GetsThemByDifferences) {
       ASSERT_EQ(batches.evaluate_local(1e-4, wt.data(), 1e-8, 1e-4, s), nullptr) << name;
       EXPECT_TRUE(std::equal(vt.begin(), vt.end(), s.vt.begin())) << name;
     }
-    const auto &[given, by_differences] = found;
+    const auto &given = found[0], &by_differences = found[1];
     EXPECT_EQ(given.ft, by_differences.ft) << name;
     EXPECT_EQ(given.bristle_out, by_differences.bristle_out) << name;
     const auto compare = [&](const dfm::Array<double> &a, const dfm::Array<double> &b, uint32_t columns) {
