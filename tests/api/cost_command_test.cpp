@@ -235,6 +235,7 @@ TEST(Cost, Page_HoldsChartAndPicturesInOneFile) {
     ++held;
   EXPECT_EQ(held, drawn);
 #ifdef DEFORM_HAS_RENDER
+  EXPECT_GT(drawn, 0u);
   EXPECT_EQ(test::read_file(s.out + "/cost.png").substr(1, 3), "PNG");
 #endif
 }

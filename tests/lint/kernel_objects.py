@@ -8,6 +8,7 @@ keeps for everybody.
 """
 import os
 import pathlib
+import platform
 import re
 import subprocess
 import sys
@@ -39,6 +40,8 @@ def main():
     objects = sorted(pathlib.Path(folder) / name for folder, _, names in os.walk(build) for name in names
                      if re.search(r"_kernel_avx\w+\..*o$", name))  # os.walk: tests remove folders meanwhile
     found = check(nm, objdump, objects)
+    if not objects and platform.machine() == "x86_64":
+        found.append(f"{build}: no object of a wide kernel, though every build for this processor has them")
     print("\n".join(found))
     print(f"{len(objects)} wide kernel objects, {len(found)} findings")
     return 1 if found else 0

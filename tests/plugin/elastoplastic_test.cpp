@@ -136,6 +136,26 @@ TEST_F(Elastoplastic, PublishedParametersWithConstantSigma1_FailThatTest) {
             -0.01);
 }
 
+// Of constant sigma1 where that can add energy, whatever the level; not of the passive form.
+TEST_F(Elastoplastic, ParametersThatCanAddEnergy_AreWarnedOf) {
+  const auto warned = [&](double level, double form) {
+    bool said = false;
+    dfm_host host{};
+    host.size = sizeof host;
+    host.ctx = &said;
+    host.log = [](void *ctx, int32_t, uint32_t, const char *) { *static_cast<bool *>(ctx) = true; };
+    void *data = nullptr;
+    const std::vector<double> p = {level, 0.5, 0.01, 2, 1e4, 20, form, 0.01, 0.4, 0.7, 1, 0};
+    EXPECT_EQ(dev.ops->prepare(&host, p.data(), &data), DFM_OK);
+    dev.ops->release(&host, data);
+    return said;
+  };
+  for (const double level : {0.0, 0.15}) {
+    EXPECT_TRUE(warned(level, 1)) << level;
+    EXPECT_FALSE(warned(level, 0)) << level;
+  }
+}
+
 // Any path inside the elastic zone: the bristle is the displacement, to rounding, after any number of steps.
 TEST_F(Elastoplastic, InsideTheElasticZone_NothingIsLost) {
   for (const Law &l : {dev, cosine, cubic}) {

@@ -207,6 +207,9 @@ def check(serve, view, scene, out, display):
                 network.near.sendto(packet(wrong, {"do": "take"}), network.sender)
             states = [state_of(viewer) for _ in range(20)]
             assert states[-1]["sliders"][0]["value"] == 3.5 and not states[-1]["running"]
+            # the scene names mu_C alone; mu_S, which is another value by default, has a slider of its own
+            levels = {s["name"]: s["value"] for s in states[-1]["sliders"] if s["name"].startswith("mu")}
+            assert levels == {"mu_C:block:floor": 0.3, "mu_S:block:floor": 0.5}, levels
             network.near.sendto(packet(head, {"do": "take"}), network.sender)
             network.near.sendto(packet(then, state), network.sender)
             state_of(viewer, lambda state: state["sliders"][0]["value"] == 7)

@@ -175,7 +175,8 @@ bool good_tool_contacts(const Staged &t, const Things &things) {
   const ContactStore &c = t.tool_store;
   if ((c.n > 0 && !(c.h > 0)) || !c.next_area.empty() || !c.crossings.empty()) return false;
   for (uint32_t i = 0; i < c.n; ++i) {
-    if (!good_frame(c, i) || !things.obstacle(c.id_a[i]) || !things.obstacle(c.id_b[i])) return false;
+    if (!good_frame(c, i) || !c.touching[i] || !things.obstacle(c.id_a[i]) || !things.obstacle(c.id_b[i]))
+      return false;
   }
   return true;
 }

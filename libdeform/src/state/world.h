@@ -127,7 +127,7 @@ struct WorldState {
   std::vector<Attachment> attachments;  // by body, each in order of creation
   ContactStore store;
   ContactStore tool_store;  // of tools with each other and with rigid bodies (step/rigid/tool_touch.h)
-  Array<RigidPair> rigid_touching;        // ascending; the others of contacts in tool_store have no load
+  Array<RigidPair> rigid_touching;        // ascending; without a contact in tool_store: without load
   std::vector<PairWork> work;             // sorted by (a, b)
   std::vector<dfm_contact_event> events;  // a restore drops them
   std::vector<Swap> swaps;                // not yet read by the host; a restore drops them

@@ -9,6 +9,7 @@
 #include "state/world.h"
 #include "step/context.h"
 #include "step/rigid/tool_touch.h"
+#include "step/self_contact.h"
 #include "step/sides.h"
 #include "step/solve/friction_memory.h"
 #include "step/stages.h"
@@ -208,14 +209,8 @@ void keep_contacts(World &w, StepContext &step) {
       add_event(w, DFM_EVENT_END, w.store.id_a[m], w.store.id_b[m], w.store.key[m], w.time + step.h);
   list_crossings(step);
   std::swap(w.store, step.next_store);
-  uint32_t touch_themselves = 0;
-  uint64_t last = 0;
-  for (uint32_t i = 0; i < w.store.n; ++i)
-    if (w.store.touching[i] && w.store.id_a[i] == w.store.id_b[i])
-      touch_themselves += std::exchange(last, w.store.id_a[i]) != w.store.id_a[i];
-
-  w.stats.self_bodies = touch_themselves;
-  w.stats.self_max = std::max(w.stats.self_max, touch_themselves);
+  w.stats.self_bodies = count_self(w, step);
+  w.stats.self_max = std::max(w.stats.self_max, w.stats.self_bodies);
   w.stats.contacts = touching;
   w.stats.sticking = sticking;
   w.stats.contacts_max = std::max(w.stats.contacts_max, touching);

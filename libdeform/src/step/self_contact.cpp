@@ -216,8 +216,19 @@ SelfBody::SelfBody(const Memory &m, Body &b)
   b.self_rest.reset();
 }
 
-uint8_t uses_self_contact(const World &w) {
-  return w.selection.lists(kSelfContact) ? uint8_t{DFM_SELF_ON} : static_cast<uint8_t>(w.def.self_contact);
+bool uses_self_contact(const World &w) {
+  return w.selection.lists(kSelfContact) || w.def.self_contact != DFM_SELF_OFF;
+}
+
+uint32_t count_self(const World &w, StepContext &step) {
+  if (step.self_bodies.empty()) return 0;
+  for (auto &s : step.self_bodies) s->touches = false;
+  const ContactStore &c = w.store;
+  for (uint32_t i = 0; i < c.n; ++i)
+    if (c.touching[i] && c.id_a[i] == c.id_b[i])
+      if (SelfBody *const s = self_body(step, slot_of(w, c.id_a[i]))) s->touches = true;
+  return static_cast<uint32_t>(
+      std::count_if(step.self_bodies.begin(), step.self_bodies.end(), [](auto &s) { return s->touches; }));
 }
 
 bool lists_after_cut(const World &w, const Body &b) {

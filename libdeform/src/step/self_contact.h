@@ -18,7 +18,8 @@ struct SelfBody {
   SelfRest rest;
   SelfList list;
   SelfPairs pairs;
-  bool on = false;  // may touch itself in this sub-step
+  bool on = false;       // may touch itself in this sub-step
+  bool touches = false;  // of count_self()
   // rebuild of `list` that is included in the guard's list; 0: not included
   uint64_t joined = 0;
   // [ntri] whether it crosses another one at the start of the sub-step: Crosses, as far as it has been asked
@@ -30,8 +31,10 @@ struct SelfBody {
 // What follows from the cells of the body (state/body.h: self_rest keeps it where it is made in advance).
 SelfRest self_rest_of(const Memory &memory, Body &b);
 
-// DFM_SELF_*: the setting of the world (dfm_world_def.self_contact, or the effect in its list).
-uint8_t uses_self_contact(const World &w);
+// The setting of the world: dfm_world_def.self_contact, or the effect in its list.
+bool uses_self_contact(const World &w);
+// How many bodies touch themselves by the contacts of w.store.
+uint32_t count_self(const World &w, StepContext &step);
 // Would a cut have the surface of a body touch itself that has no lists of itself?
 bool lists_after_cut(const World &w, const Body &b);
 // For prepare(): fills step.self_bodies and the facts for the plan; finds the laws of bodies with themselves;

@@ -283,7 +283,7 @@ void carry_sleepers(World &w, StepContext &step, uint32_t *touching, uint32_t *s
   ContactStore &to = step.next_store;
   const uint32_t own = to.n;
   const double scale = w.store.h > 0 ? step.h / w.store.h : 0;  // impulses belong to a sub-step's length
-  uint64_t last = 0;                                            // contacts of a body are adjacent
+  uint64_t last = 0;  // contacts of a body are adjacent, where they have just fallen asleep
   bool rests = false;
   const auto sleeps = [&](uint32_t m) {
     if (std::exchange(last, w.store.id_a[m]) != w.store.id_a[m]) rests = asleep(w, last);

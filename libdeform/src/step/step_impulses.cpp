@@ -60,7 +60,7 @@ void add(const World &w, const ContactStore &s, double at, double time, Array<St
   const double scale = s.h > 0 ? time / s.h : 0;
   begin(pairs);
   StepImpulses::Pair *pair = nullptr;
-  uint32_t last = kNone;  // contacts of a pair are adjacent
+  uint32_t last = kNone;  // contacts of an awake pair are adjacent
   bool turned = false;
   for (uint32_t i = 0; i < s.n; ++i) {
     if (!s.bears(i)) continue;
