@@ -2,7 +2,7 @@
 # and runs; a second call installs and rebuilds nothing. The rest is for those who work on the library.
 PREFIX ?= /usr/local
 SCENE ?= examples/scenes/two_cylinders.json
-# How many compilers or tests run at a time; a compiler needs half a gigabyte of memory.
+# How many compilers or tests run at a time; a compiler needs two thirds of a gigabyte.
 JOBS ?= $(shell nproc)
 EXAMPLES = $(patsubst examples/%.c,example_%,$(wildcard examples/*.c))
 # A folder of contact problems in Siconos' text format or FCLIB's HDF5
