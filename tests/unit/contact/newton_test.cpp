@@ -366,7 +366,8 @@ TEST(ContactNewton, RowsThatContradictEachOther_EndUnconverged) {
     for (const bool with_body : {false, true}) {
       SCOPED_TRACE(testing::Message() << speed << " body " << with_body);
       Island island(with_body ? std::vector<double>{} : std::vector<double>{1.0},
-                    with_body ? std::vector<Vec3>{} : std::vector<Vec3>{{}}, with_body ? stiff_body(3) : nullptr);
+                    with_body ? std::vector<Vec3>{} : std::vector<Vec3>{{}},
+                    with_body ? stiff_body(3) : nullptr);
       for (const double side : {1.0, -1.0}) island.touch({{0, 1.0}}, true, {0, 0, side});
       island.build({0, 0.4});
       for (uint32_t i = 0; i < 2; ++i) island.rows.rate[i] = -speed;  // both walls close

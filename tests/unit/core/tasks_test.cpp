@@ -149,7 +149,9 @@ TEST(Tasks, ExceptionsOnThreeThreads_ReachTheCallerAsThatOfTheLowestNumber) {
         if (i % 10 == 7) throw i;
       });
       FAIL();
-    } catch (size_t i) { EXPECT_EQ(i, 7u); }
+    } catch (size_t i) {
+      EXPECT_EQ(i, 7u);
+    }
     EXPECT_TRUE(std::all_of(hit.begin(), hit.end(), [](const auto &h) { return h == 1; }));
   }
 }
