@@ -293,7 +293,7 @@ namespace {
 // Of the largest entry: less is the rounding of a held point, which has a row of zeros.
 constexpr double kMoves = 1e-12;
 
-// What nodes answer by themselves, and their bodies as a whole. Nodes that are held do not move with the body.
+// What nodes answer by themselves, and their bodies as a whole: with these, nodes that are held do not move.
 double with_whole(double own, double least, double whole) { return own > least ? own + whole : 0; }
 
 }  // namespace
