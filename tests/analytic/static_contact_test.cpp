@@ -119,6 +119,22 @@ TEST(StaticContact, CubeOnPlane_SinksByItsStaticSagUnderItsWeight) {
     }
 }
 
+// Points that are held where they touch feel no contact: the answer is that without the floor.
+TEST(StaticContact, CubeThatIsHeldOnItsFloor_SagsAsWithoutIt) {
+  test::Context context;
+  double found[2];
+  for (const bool floor : {false, true}) {
+    const dfm_world w = offset_world(context, {0, 0, -kG});
+    const dfm_body b = make_cube(context, w, cube("cube", 1e5, 0));
+    hold(b, 0, 7);
+    if (floor) test::add_plane(w, "floor");
+    test::ok(find(w));
+    found[floor] = height(b);
+    dfm_world_destroy(w);
+  }
+  EXPECT_NEAR(found[1], found[0], 1e-9);
+}
+
 // Rows of box_stack: cubes of edge 0.1 m with Poisson's ratio 0, shortening of a bar under its weight.
 TEST(StaticContact, ThreeCubes_CarryWhatIsAboveAndShortenAsABar) {
   const double young = 1e5, g = kG;

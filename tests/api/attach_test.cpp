@@ -695,7 +695,7 @@ TEST(Attach, Equilibrium_IsThatOfHeldPoints) {
   World s, t;
   const dfm_obstacle hook = s.hook();
   const dfm_body beam = s.beam("corotational_fem"), fixed = t.beam("corotational_fem");
-  attach(beam, hook);
+  const uint32_t number = attach(beam, hook);
   const double middle = test::measure(fixed).com[2];
   const std::vector<double> x = test::listed(dfm_surface_positions, fixed, 3);
   const std::vector<uint32_t> points = test::listed(dfm_surface_points, fixed);
@@ -708,6 +708,11 @@ TEST(Attach, Equilibrium_IsThatOfHeldPoints) {
   const double sag = middle - test::measure(fixed).com[2];
   EXPECT_GT(sag, 1e-5);
   EXPECT_NEAR(middle - test::measure(beam).com[2], sag, 1e-4 * sag);
+  dfm_attachment found{};
+  found.size = sizeof found;
+  test::ok(dfm_body_get_attachment(beam, number, &found));
+  EXPECT_NEAR(found.force[2], test::measure(beam).mass * kG, 1e-3);
+  EXPECT_EQ(found.impulse[2], 0);  // no time has passed
 }
 
 TEST(Attach, WhatDoesNotFit_IsRefused) {

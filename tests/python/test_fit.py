@@ -252,7 +252,10 @@ class Said(InAFolder):
         with self.assertRaisesRegex(deform.FileError, "another program wrote this file"):
             deform.fit(study, out=study.parent, workers=1)
         self.assertEqual(study.read_text(), before)
-        study.unlink()
+        foreign = study.rename(study.with_name("fit.html"))
+        with self.assertRaisesRegex(deform.FileError, "fit.html: another program wrote this file"):
+            deform.fit(json.loads(before), out=study.parent, workers=1)
+        foreign.unlink()
         study = {**self.study(self.measured()), "parameters": {"mu": {"at": MU, "from": 0.1, "to": 1}},
                  "set": {SPEED: TRUTH["v"]}}
         for _ in range(2):  # its own it replaces

@@ -442,7 +442,8 @@ class Kills(InAFolder):
 class Outputs(InAFolder):
     def test_files_of_others_stay_as_they_are(self):
         study = self.study(design={"method": "random", "runs": 1})
-        for name, options in (("runs.jsonl", ()), ("runs/0-9.jsonl", ()), ("runs/0-0.jsonl", ("--only", "0")),
+        for name, options in (("sweep.csv", ()), ("sweep.html", ()), ("curves.png", ()), ("runs.jsonl", ()),
+                              ("runs/0-9.jsonl", ()), ("runs/0-0.jsonl", ("--only", "0")),
                               ("Snakefile", ("--export", "snakemake")), ("array.sh", ("--export", "slurm"))):
             foreign = self.out / name
             foreign.parent.mkdir(parents=True, exist_ok=True)

@@ -188,8 +188,8 @@ def refuse_foreign(path: pathlib.Path, mark: str) -> None:
     """Refuses to change a file whose first bytes do not hold the mark of what is to be written there."""
     try:
         with open(path, "rb") as file:
-            found = file.read(256)
-    except FileNotFoundError:
+            found = file.read(4096)
+    except (FileNotFoundError, NotADirectoryError):
         return
     if found and mark.encode() not in found:
         raise FileError(f"{path}: another program wrote this file, which stays as it is; give another folder "

@@ -47,7 +47,7 @@ class Capture {
       for (const SolveIsland &own : w_.steps->solve_islands->all()) {
         const auto bytes = taken_.find(&own);
         if (bytes == taken_.end()) continue;
-        const bool failed = own.failed || own.bad || own.thrown || own.residual.required > 1;
+        const bool failed = own.failed || own.bad || own.residual.required > 1;
         const uint64_t number = ++solved_;
         if (!failed && (every_ == 0 || number % every_ != 0)) continue;
         AtomicFile file(format("%s/%06" PRIu64 "-%08" PRIu64 "%s.contact", folder_.c_str(), w_.step_count,

@@ -15,6 +15,13 @@ namespace dfm {
 
 using Set = SolveSettings;
 
+namespace {
+
+// rho w, at most: half of the digits are left to A in A + J'GJ.
+constexpr double kStiffest = 0x1p26;
+
+}  // namespace
+
 // m/s: what g would change of the velocities of points by themselves, of bodies as a whole, and, through the
 // motions of blocks, of contacts.
 double ContactNewton::error() const {
@@ -199,6 +206,10 @@ bool ContactNewton::frozen_steps() {
   return evaluate(false);
 }
 
+void ContactNewton::report() {
+  host_->spend(uint64_t{products_ - std::exchange(reported_, products_)} * part_.all());
+}
+
 // v with g = 0 for the present multipliers, up to a tolerance in m/s; left: the error. round: coupled and
 // frozen steps undo each other. With strong friction g may have no zero that they reach; it has one where rho
 // is small, since A then outweighs what is not symmetric.
@@ -208,6 +219,7 @@ bool ContactNewton::newton(double tolerance, double &left, bool &round) {
   if (!evaluate(false)) return false;
   uint32_t phases = 0;
   while ((left = error()) > tolerance && steps_ < limit_) {
+    report();
     bool failed = false;
     if (coupled_step(tolerance, left, failed)) continue;
     if (!failed && phases++ == Set::rounds) return round = true;
@@ -230,6 +242,7 @@ void ContactNewton::put_rows() {
 }
 
 void ContactNewton::scale_penalties(double by) {
+  by = std::min(by, kStiffest / stiff_);
   stiff_ *= by;
   for (double &rho : rho_) rho *= by;
   for (double &response : response_) response /= by;
@@ -254,7 +267,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     double off;
     bool round;
     if (!newton(goal, off, round)) return false;
-    if (round && steps_ < limit_) {
+    if (round && steps_ < limit_ && host_->goes_on()) {
       scale_penalties(1 / Set::penalty);
       slow = 0;
       v_.assign(before.begin(), before.end());
@@ -274,7 +287,7 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
       best_g_.assign(g_.begin(), g_.end());
       best_l_.assign(l_.begin(), l_.end());
     }
-    host_->spend(uint64_t{products_ - std::exchange(reported_, products_)} * part_.all());
+    report();
     if (found_ || steps_ >= limit_ || (spent = !host_->goes_on())) break;
     lh_.assign(l_.begin(), l_.end());
     double moved = 0;
@@ -282,10 +295,11 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     // Rows that contradict each other: multipliers change without end, velocities do not, however large the
     // penalties are. Those of nearly parallel rows change slowly, too.
     const bool still = passes_ > Set::rounds && moved <= Set::accuracy * tolerance;
-    const bool stalled = still && residual_.normal <= Set::contradiction * normal;
+    const bool stalled = still && residual_.speed <= Set::contradiction * normal;
     if (still && off <= tolerance) {
-      found_ = stood++ >= Set::rounds && stalled;
-      if (found_) break;
+      const bool most = stiff_ >= kStiffest, stands = stood++ >= Set::rounds;
+      found_ = stalled && (stands || most);
+      if (found_ || most) break;
       scale_penalties(Set::penalty);
     }
     aim = stalled ? off : now;

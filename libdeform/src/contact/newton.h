@@ -117,7 +117,8 @@ class ContactNewton {
   Array<uint32_t> place_;                                       // the block of each pair, of which are
   std::span<const uint32_t> at_;                                // those of the bodies' patterns
   std::span<const uint32_t> own_;                               // [nodes] the diagonal
-  std::span<const uint32_t> spot_;                              // pairs of entries of each row
+  Array<uint32_t> row_of_, begin_entry_, entry_by_node_;        // of entries
+  Array<double> stiff_jac_;                                     // [entries,9] S J, S = sym(G)
   Array<double> places_;                                        // [nodes,3] m
   Array<double> blocks_, matrix_;                               // [nb,9] A + J' sym(G) J; A
   LdltSolver factor_;
@@ -144,6 +145,14 @@ class ContactNewton {
   Vec3 entry_times(uint32_t e, const double *x) const;
   Vec3 times(uint32_t k, const double *x, size_t stride) const;  // J_k x
   void add_transposed(uint32_t k, Vec3 z, double *to) const;
+  // f(entry of the node, entry of the same row) for all such pairs, by row
+  template <class F>
+  void each_neighbor(uint32_t node, const F &f) const {
+    for (uint32_t p = begin_entry_[node]; p < begin_entry_[node + 1]; ++p) {
+      const uint32_t own = entry_by_node_[p], k = row_of_[own];
+      for (uint32_t e = entry_[k]; e < entry_[k + 1]; ++e) f(own, e);
+    }
+  }
   bool find_residual();
   bool evaluate(bool frozen);
   void evaluate_bond(uint32_t k);
@@ -167,6 +176,7 @@ class ContactNewton {
   bool gains(double normal) const;
   bool penalties_alone(double tolerance, uint32_t steps);
   void put_rows();
+  void report();  // the products, to the host
 };
 
 }  // namespace dfm

@@ -20,7 +20,7 @@ ContactNewton::ContactNewton(const Memory &m, Tasks *tasks) : factor_(m), levels
   use_memory(m, node_of_dof_, dof_of_node_, row_, entry_, node_, jac_, seen_, bias_, heavy_, v_, base_, g_,
              kept_, way_, minus_, inverse_, u_, l_, lh_, best_v_, best_g_, best_l_, rho_, response_, slope_,
              frozen_, pairs_, begin_, by_lower_, number_, higher_, ij_, place_, blocks_, matrix_, places_,
-             analysed_, r_, base_r_, of_v_);
+             analysed_, r_, base_r_, of_v_, row_of_, begin_entry_, entry_by_node_, stiff_jac_);
   use_memory(m, motions_.g, motions_.s, motions_.touched, motions_.columns, motions_.left,
              motions_.first_column, motions_.column_count, motions_.first_value);
 }
@@ -204,7 +204,8 @@ void ContactNewton::set_penalties(double factor) {
     rho_[2 * k + 1] = wt > 0 ? factor / wt : 0;
     if (row_[k].kind == Kind::bond) {
       const double soft = rows.bond[i - rows.n].soft;
-      rho_[2 * k] = std::min(rho_[2 * k], rho_[2 * k + 1]) + (soft > 0 ? factor / soft : 0);
+      const double most = std::max(wn, wt);
+      rho_[2 * k] = (most > 0 ? factor / most : 0) + (soft > 0 ? factor / soft : 0);
       rho_[2 * k + 1] = rho_[2 * k];
     }
     if (row_[k].kind == Kind::drag) {
@@ -428,8 +429,8 @@ void ContactNewton::symmetric_part(const double *G, double *out) {
   }
 }
 
-// The pattern of A + J' G J, which holds until begin(): blocks of the bodies, the diagonal, pairs of entries
-// of each row. Pairs of nodes are ordered by the lower one, then the higher ones of each.
+// The pattern of A + J' G J, which holds until begin(): blocks of the bodies, the diagonal, pairs of nodes of
+// each row. Pairs of nodes are ordered by the lower one, then the higher ones of each.
 void ContactNewton::shape() {
   pairs_.clear();
   const auto add = [&](uint32_t i, uint32_t j) {
@@ -440,24 +441,25 @@ void ContactNewton::shape() {
     b.pattern = pairs_.size() / 2;
     for (uint32_t k = 0; k < p.nb; ++k) add(b.first + p.ij[2 * size_t{k}], b.first + p.ij[2 * size_t{k} + 1]);
   }
-  const size_t blocks = pairs_.size() / 2;
-  for (uint32_t k = 0; k < nodes_; ++k) add(k, k);
-  for (size_t k = 0; k < row_.size(); ++k)
-    for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a)
-      for (uint32_t b = a; b < entry_[k + 1]; ++b) add(node_[a], node_[b]);
   const size_t n = pairs_.size() / 2;
   list_by(nodes_, n, [&](size_t p) { return pairs_[2 * p]; }, begin_, by_lower_);
+  row_of_.resize(node_.size());
+  for (uint32_t k = 0; k < row_.size(); ++k)
+    std::fill(row_of_.begin() + entry_[k], row_of_.begin() + entry_[k + 1], k);
+  list_by(nodes_, node_.size(), [&](size_t e) { return node_[e]; }, begin_entry_, entry_by_node_);
   ij_.clear();
-  place_.resize(n);
+  place_.resize(n + nodes_);
   number_.assign(nodes_, kNone);
   for (uint32_t i = 0; i < nodes_; ++i) {
-    higher_.clear();
-    for (uint32_t p = begin_[i]; p < begin_[i + 1]; ++p) {
-      const uint32_t j = pairs_[2 * size_t{by_lower_[p]} + 1];
-      if (number_[j] == i) continue;
+    higher_.assign(1, i);
+    number_[i] = i;
+    const auto meet = [&](uint32_t j) {
+      if (j < i || number_[j] == i) return;
       number_[j] = i;
       higher_.push_back(j);
-    }
+    };
+    for (uint32_t p = begin_[i]; p < begin_[i + 1]; ++p) meet(pairs_[2 * size_t{by_lower_[p]} + 1]);
+    each_neighbor(i, [&](uint32_t, uint32_t e) { meet(node_[e]); });
     std::sort(higher_.begin(), higher_.end());
     for (const uint32_t j : higher_) {
       number_[j] = uint32_t(ij_.size() / 2);
@@ -465,12 +467,12 @@ void ContactNewton::shape() {
     }
     for (uint32_t p = begin_[i]; p < begin_[i + 1]; ++p)
       place_[by_lower_[p]] = number_[pairs_[2 * size_t{by_lower_[p]} + 1]];
+    place_[n + i] = number_[i];
     for (const uint32_t j : higher_) number_[j] = kNone;
   }
   pattern_ = {nodes_, static_cast<uint32_t>(ij_.size() / 2), ij_.data()};
-  at_ = {place_.data(), blocks};
-  own_ = {place_.data() + blocks, nodes_};
-  spot_ = {place_.data() + blocks + nodes_, n - blocks - nodes_};
+  at_ = {place_.data(), n};
+  own_ = {place_.data() + n, nodes_};
   blocks_.resize(size_t{9} * pattern_.nb);
   matrix_.assign(size_t{9} * pattern_.nb, 0.0);
   shaped_ = true;
@@ -497,32 +499,31 @@ bool ContactNewton::set_matrix() {
 
 bool ContactNewton::refactor() {
   std::copy(matrix_.begin(), matrix_.end(), blocks_.begin());
-  size_t spot = 0;
+  stiff_jac_.resize(jac_.size());  // S J; zero where the row is open
   for (size_t k = 0; k < row_.size(); ++k) {
     double s[9];
     symmetric_part(&slope_[9 * k], s);
-    const bool any = s[0] != 0 || s[4] != 0 || s[8] != 0;
-    for (uint32_t a = entry_[k]; a < entry_[k + 1]; ++a) {
-      const double *const ja = &jac_[size_t{9} * a];
-      double sa[9];  // S J_a
-      for (int r = 0; r < 3; ++r)
-        for (int c = 0; c < 3; ++c)
-          sa[3 * r + c] = s[3 * r] * ja[c] + s[3 * r + 1] * ja[3 + c] + s[3 * r + 2] * ja[6 + c];
-      for (uint32_t b = a; b < entry_[k + 1]; ++b, ++spot) {
-        if (!any) continue;
-        const double *const jb = &jac_[size_t{9} * b];
-        double *const to = &blocks_[9 * size_t{spot_[spot]}];
-        // rows of the block: the lower node
-        const bool swap = node_[b] < node_[a];
-        for (int r = 0; r < 3; ++r)
-          for (int c = 0; c < 3; ++c) {
-            // (J_b' S J_a)[r,c]
-            const double value = jb[r] * sa[c] + jb[3 + r] * sa[3 + c] + jb[6 + r] * sa[6 + c];
-            if (swap) to[3 * r + c] += value;
-            else to[3 * c + r] += value;
-          }
-      }
-    }
+    for (size_t a = size_t{9} * entry_[k]; a < size_t{9} * entry_[k + 1]; a += 9)
+      for (size_t r = 0; r < 9; r += 3)
+        for (size_t c = 0; c < 3; ++c)
+          stiff_jac_[a + r + c] =
+              s[r] * jac_[a + c] + s[r + 1] * jac_[a + 3 + c] + s[r + 2] * jac_[a + 6 + c];
+  }
+  for (uint32_t i = 0, block = 0; i < nodes_; ++i) {
+    for (; block < pattern_.nb && ij_[2 * size_t{block}] == i; ++block)
+      number_[ij_[2 * size_t{block} + 1]] = block;
+    each_neighbor(i, [&](uint32_t own, uint32_t e) {
+      if (node_[e] < i) return;
+      // J_own' S J_e, by the product S J of the earlier of the two in their row
+      const uint32_t a = std::min(own, e), b = std::max(own, e);
+      const double *const sa = &stiff_jac_[size_t{9} * a], *const jb = &jac_[size_t{9} * b];
+      if (std::all_of(sa, sa + 9, [](double x) { return x == 0; })) return;  // most rows are open
+      double *const to = &blocks_[9 * size_t{number_[node_[e]]}];
+      for (size_t r = 0; r < 3; ++r)
+        for (size_t c = 0; c < 3; ++c)
+          to[own > e ? 3 * r + c : 3 * c + r] +=
+              jb[r] * sa[c] + jb[3 + r] * sa[3 + c] + jb[6 + r] * sa[6 + c];
+    });
   }
   if (!factored_ && solver_ == &levels_) {
     levels_.analyse(pattern_);

@@ -288,16 +288,29 @@ Vec3 ContactRows::diagonal(uint32_t i, Vec3 a) const {
   return sum;
 }
 
+namespace {
+
+// Of the largest entry: less is the rounding of a held point, which has a row of zeros.
+constexpr double kMoves = 1e-12;
+
+// What nodes answer by themselves, and their bodies as a whole: with these, nodes that are held do not move.
+double with_whole(double own, double least, double whole) { return own > least ? own + whole : 0; }
+
+}  // namespace
+
 void ContactRows::set_diagonal(uint32_t i) {
   const double *const f = &frame[size_t(9) * i];
   const Vec3 normal = load3(f), t1 = load3(f + 3), t2 = load3(f + 6);
   const double body = whole_response(i);
   const Vec3 w0 = diagonal(i, normal), w1 = diagonal(i, t1), w2 = diagonal(i, t2);
-  wn[i] = dot(normal, w0) + body;
+  const double own = dot(normal, w0);
   cross[2 * size_t(i)] = dot(t1, w0);
   cross[2 * size_t(i) + 1] = dot(t2, w0);
   const double a = dot(t1, w1), c = dot(t2, w2), b = dot(t1, w2);
-  wt[i] = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b) + body;
+  const double across = 0.5 * (a + c) + std::sqrt(0.25 * (a - c) * (a - c) + b * b);
+  const double least = kMoves * std::max(own, across);
+  wn[i] = with_whole(own, least, body);
+  wt[i] = with_whole(across, least, body);
 }
 
 namespace {
@@ -326,9 +339,6 @@ double bias_velocity(double distance, double offset, double h, double planned, d
   const double near = distance > 0 ? gap + kStays * offset : slow;
   return std::min(slow, near) / planned;
 }
-
-// Of the largest entry: less is the rounding of a held point, which has a row of zeros.
-constexpr double kMoves = 1e-12;
 
 // (W + soft)^-1 of the components in which anything moves.
 void invert(const Vec3 (&w)[3], Vec3 (&out)[3]) {
@@ -374,8 +384,8 @@ void ContactRows::finish_bonds(std::span<const Bond> bonds) {
       along[c] = 1;
       w[c] = diagonal(i, along);
     }
-    const double body = whole_response(i);
-    for (int c = 0; c < 3; ++c) w[c][c] += body;
+    const double body = whole_response(i), least = kMoves * std::max({w[0].x, w[1].y, w[2].z});
+    for (int c = 0; c < 3; ++c) w[c][c] = with_whole(w[c][c], least, body);
     wn[i] = w[0].x;
     wt[i] = std::max(w[1].y, w[2].z);
     BondRow &row = bond[k];

@@ -2,11 +2,12 @@
 // block writes to its own elements, or to a partial sum in slot begin/grain; the caller adds these in slot
 // order.
 #pragma once
-#include <atomic>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <exception>
 #include <memory>
-#include <new>
+#include <mutex>
 
 namespace dfm {
 
@@ -67,24 +68,29 @@ class Tasks {
   void *host_user_;
 };
 
-// f(i) for all i < n, blocks of `grain` on the threads of tasks (null: on this one). Where one has no memory,
-// std::bad_alloc reaches the caller: no exception may leave a worker.
+// f(i) for all i < n, blocks of `grain` on the threads of tasks (null: on this one). No exception may leave a
+// worker: the caller gets that of the lowest i.
 template <class F>
 void each_on(Tasks *tasks, size_t n, size_t grain, F &&f) {
   if (!tasks || !tasks->parallel() || n <= grain) {
     for (size_t i = 0; i < n; ++i) f(i);
     return;
   }
-  std::atomic<bool> failed{false};
+  std::mutex lock;
+  size_t first = n;
+  std::exception_ptr thrown;
   tasks->parallel_for(static_cast<uint32_t>(n), static_cast<uint32_t>(grain),
                       [&](uint32_t begin, uint32_t end) {
+                        uint32_t i = begin;
                         try {
-                          for (uint32_t i = begin; i < end; ++i) f(size_t{i});
-                        } catch (const std::bad_alloc &) {
-                          failed = true;
+                          for (; i < end; ++i) f(size_t{i});
+                        } catch (...) {
+                          const std::lock_guard held(lock);
+                          if (i < first) thrown = std::current_exception();
+                          first = std::min(first, size_t{i});
                         }
                       });
-  if (failed) throw std::bad_alloc();
+  if (thrown) std::rethrow_exception(thrown);
 }
 
 // How many forks lie between the process that asked first and this one; 0 where the system tells none. A

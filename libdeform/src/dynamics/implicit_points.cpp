@@ -193,11 +193,7 @@ bool ImplicitPoints::linearize() {
   if (known) return true;
   factor_h_ = 0;
   by_rest_ = false;
-  try {
-    if (!exact_) exact_ = new_solver();
-  } catch (const std::bad_alloc &) {  // on any thread that moves this body
-    return false;
-  }
+  if (!exact_) exact_ = new_solver();
   if (!assemble()) return false;
   // a constant matrix must not depend on the positions at the time when it was made
   if (stiffness_.constant()) exact_->place(p_.rest.data(), 3);

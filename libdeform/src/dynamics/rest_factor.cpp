@@ -72,11 +72,7 @@ bool RestFactor::query_stiffness() {
 bool RestFactor::prepare(double h) {
   if (h_ == h && held_ == p_.held && params_ == model_.params) return serves_;
   serves_ = false;
-  try {
-    if (!query_stiffness()) return false;
-  } catch (const std::bad_alloc &) {  // new parameters, on any thread that moves this body
-    return false;
-  }
+  if (!query_stiffness()) return false;
   h_ = h;
   held_ = p_.held;
   loose_ = p_.held_anywhere() == 0;

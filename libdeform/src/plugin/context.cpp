@@ -30,7 +30,7 @@ struct Direct {
   explicit Direct(const dfm_host &h)
       : host(h),
         memory{h.ctx, h.alloc, h.release},
-        tasks(kThreads, h.parallel_for, h.ctx),
+        tasks(h.parallel_for ? kThreads : 1, h.parallel_for, h.ctx),
         solver(memory, h.parallel_for ? &tasks : nullptr) {}
 };
 

@@ -13,12 +13,14 @@ class PluginSolver final : public LinearSolver {
 
   const char *name() const override { return type_.id; }
   bool direct() const override;
-  void analyse(const BlockPattern &pattern) override;  // throws Error, which names the plugin, if it fails
+  // Each throws Error, which names the plugin, if that fails; false: it says so of the matrix.
+  void analyse(const BlockPattern &pattern) override;
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
 
  private:
   void release() noexcept;
+  bool has_answered(dfm_status status) const;
 
   const dfm_type &type_;
   const dfm_solver &ops_;

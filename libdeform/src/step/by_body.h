@@ -28,29 +28,19 @@ inline uint32_t bodies_together(const World &w, std::span<const uint32_t> active
   return static_cast<uint32_t>(active.size());
 }
 
-// The first body, in id order, for which something failed, independent of the division of bodies among
-// threads.
-struct FirstFailure {
-  std::atomic<uint32_t> body{kNone};
-  void note(uint32_t i) {
-    uint32_t seen = body;
-    while (i < seen && !body.compare_exchange_weak(seen, i)) {}
-  }
-};
-
 // act(body) -> has it succeeded? The active bodies side by side. Returns the first, in id order, for which it
 // has not, or null.
 template <class Act>
 const Body *each_active(const World &w, std::span<const uint32_t> active, uint32_t worth, const Act &act) {
-  FirstFailure failed;
-  w.context->tasks.parallel_for(static_cast<uint32_t>(active.size()), bodies_together(w, active, worth),
-                                [&](uint32_t begin, uint32_t end) {
-                                  for (const uint32_t i : active.subspan(begin, end - begin)) {
-                                    const OnBehalf prefix(w.bodies[i]->name);
-                                    if (!act(*w.bodies[i])) failed.note(i);
-                                  }
-                                });
-  return failed.body == kNone ? nullptr : w.bodies[failed.body].get();
+  std::atomic<uint32_t> failed{kNone};
+  each_on(&w.context->tasks, active.size(), bodies_together(w, active, worth), [&](size_t k) {
+    Body &b = *w.bodies[active[k]];
+    const OnBehalf prefix(b.name);
+    if (act(b)) return;
+    uint32_t first = failed;
+    while (active[k] < first && !failed.compare_exchange_weak(first, active[k])) {}
+  });
+  return failed == kNone ? nullptr : w.bodies[failed].get();
 }
 
 }  // namespace dfm

@@ -121,22 +121,17 @@ void find_near(World &w) {
 bool keeps(const Body &b) { return b.sleep_state.asleep && b.bound.known; }
 
 // act(body) -> did it answer? Each body that does not keep what it had by itself; no worker is woken for a
-// world that sleeps.
+// world that sleeps. Throws Error for the first body, in id order, that did not.
 template <class Act>
 void update_each(World &w, const Act &act) {
   if (std::ranges::all_of(w.bodies, [](const auto &b) { return keeps(*b); })) return;
-  FirstFailure failed;
-  w.context->tasks.parallel_for(static_cast<uint32_t>(w.bodies.size()), 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t i = begin; i < end; ++i) {
-      Body &b = *w.bodies[i];
-      if (keeps(b)) continue;
-      const OnBehalf prefix(b.name);
-      if (!act(b)) failed.note(i);
-    }
+  each_on(&w.context->tasks, w.bodies.size(), 1, [&](size_t i) {
+    Body &b = *w.bodies[i];
+    if (keeps(b)) return;
+    const OnBehalf prefix(b.name);
+    if (!act(b))
+      fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
   });
-  if (failed.body == kNone) return;
-  const Body &b = *w.bodies[failed.body];
-  fail(DFM_E_FATAL, "model '%s' of body '%s' gives no step bound", b.model.type->id, b.name.c_str());
 }
 
 // Strain of the edge that stretches fastest until the next look. Who sleeps has a step too, which must not

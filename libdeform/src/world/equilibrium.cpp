@@ -416,7 +416,7 @@ class Settling {
       inertia += p.mass[i] * norm2(arm);
       far = std::max(far, norm2(arm));
     }
-    one.pull = norm(one.net) / b.mass + norm(torque) / inertia * std::sqrt(far);
+    one.pull = norm(one.net) / b.mass + (inertia > 0 ? norm(torque) / inertia * std::sqrt(far) : 0);
   }
 
   static double reach(const One &one) { return std::max(one.edge, kReach * one.size); }

@@ -46,6 +46,13 @@ class LinearSystem final : public ImplicitSystem {
     }
     return true;
   }
+  // Component c of point i moves as `speed` says, whatever acts on it.
+  void fix(uint32_t i, uint32_t c, double speed = 0) {
+    const size_t held = 3 * size_t{i} + c;
+    for (size_t k = 0; k < a_.rows; ++k) a_(held, k) = a_(k, held) = k == held ? 1 : 0;
+    free_[4 * size_t{i} + c] = speed;
+    inverse_[4 * size_t{i} + c] = 0;
+  }
   uint32_t assembled = 0;  // times
   bool matrix(const uint32_t *at, double *blk) override {
     ++assembled;

@@ -313,3 +313,75 @@ TEST(ContactNewton, SecondSolve_GivesTheSameBits) {
     EXPECT_EQ(p->newton.steps(), q->newton.steps());
   }
 }
+
+std::unique_ptr<LinearSystem> stiff_body(uint32_t points) {
+  std::mt19937 random(3);
+  return std::make_unique<LinearSystem>(points, 1, 10, random);
+}
+
+// Contacts of a point that is held have no impulse, and do not keep the others from their solution.
+TEST(ContactNewton, HeldPointOfABody_FeelsNoContact) {
+  for (const double gap : {-0.9, -0.5, 0.0}) {  // of the offset
+    auto body = stiff_body(4);
+    for (uint32_t c = 0; c < 3; ++c) body->fix(0, c);
+    Island island({}, {}, std::move(body));
+    for (uint32_t k = 0; k < 3; ++k) island.touch({{k, 1.0}}, true, {0, 0, 1}, k ? 0 : gap * Island::kOffset);
+    island.build({0, 0.4});
+    ASSERT_TRUE(island.solve()) << gap;
+    EXPECT_LE(island.newton.residual().required, 1) << gap;
+    EXPECT_LE(island.newton.passes(), 20) << gap;
+    EXPECT_EQ(norm(island.impulse(0)), 0) << gap;
+    for (uint32_t k = 1; k < 3; ++k) EXPECT_GE(island.relative(k).x, -Island::kTolerance) << gap;
+  }
+}
+
+// A law with a slope takes no part where the normal is held and the tangents are free.
+TEST(ContactNewton, NormalThatIsHeld_MakesNoFriction) {
+  auto body = stiff_body(3);
+  body->fix(0, 2);
+  Island island({}, {}, std::move(body));
+  for (uint32_t k = 0; k < 2; ++k) island.touch({{k, 1.0}}, true, {0, 0, 1}, k ? 0 : -0.7 * Island::kOffset);
+  island.build({300, 0.4, 1e-4, 2e-4});
+  ASSERT_TRUE(island.solve());
+  EXPECT_EQ(norm(island.impulse(0)), 0);
+}
+
+TEST(ContactNewton, BondOfAPointThatIsHeldAlongOneAxis_HoldsTheOthers) {
+  for (uint32_t axis = 0; axis < 3; ++axis) {
+    auto body = stiff_body(3);
+    body->fix(0, axis);
+    Island island({}, {}, std::move(body));
+    island.hold(0, kNone, 0, {-0.01, -0.02, -0.03});
+    island.build({});
+    ASSERT_TRUE(island.solve()) << axis;
+    EXPECT_LE(island.newton.residual().required, 1) << axis;
+    for (uint32_t c = 0; c < 3; ++c)
+      EXPECT_NEAR(island.velocity(0)[int(c)], c == axis ? 0 : 0.01 * (c + 1), 2e-6) << axis;
+  }
+}
+
+// Rows that cannot all be met end soon, with finite impulses, and say so.
+TEST(ContactNewton, RowsThatContradictEachOther_EndUnconverged) {
+  for (const double speed : {0.01, 1.0})
+    for (const bool with_body : {false, true}) {
+      SCOPED_TRACE(testing::Message() << speed << " body " << with_body);
+      Island island(with_body ? std::vector<double>{} : std::vector<double>{1.0},
+                    with_body ? std::vector<Vec3>{} : std::vector<Vec3>{{}},
+                    with_body ? stiff_body(3) : nullptr);
+      for (const double side : {1.0, -1.0}) island.touch({{0, 1.0}}, true, {0, 0, side});
+      island.build({0, 0.4});
+      for (uint32_t i = 0; i < 2; ++i) island.rows.rate[i] = -speed;  // both walls close
+      ASSERT_TRUE(island.solve());
+      EXPECT_GT(island.newton.residual().required, 1);
+      EXPECT_LT(island.newton.passes(), 60);
+      for (uint32_t i = 0; i < 2; ++i) EXPECT_LT(norm(island.impulse(i)), 1e12);
+    }
+}
+
+TEST(ContactNewton, BondsThatContradictEachOther_AreNotTakenForSolved) {
+  Island island({1.0}, {{}});
+  for (const double side : {1.0, -1.0}) island.hold(0, kNone, 0, {side, 0, 0});
+  island.build({});
+  ASSERT_TRUE(island.solve());
+  EXPECT_GT(island.newton.residual().required, 1);
+}

@@ -139,6 +139,23 @@ TEST(Tasks, JobsOnMoreThreadsThanProcessors_UseAsManyAsProcessors) {
   EXPECT_EQ(tasks.threads(), std::max(2u, processors));
 }
 
+TEST(Tasks, ExceptionsOnThreeThreads_ReachTheCallerAsThatOfTheLowestNumber) {
+  Tasks tasks(3, nullptr, nullptr);
+  for (int pass = 0; pass < 20; ++pass) {
+    std::vector<std::atomic<int>> hit(100);
+    try {
+      each_on(&tasks, hit.size(), 1, [&](size_t i) {
+        ++hit[i];
+        if (i % 10 == 7) throw i;
+      });
+      FAIL();
+    } catch (size_t i) {
+      EXPECT_EQ(i, 7u);
+    }
+    EXPECT_TRUE(std::all_of(hit.begin(), hit.end(), [](const auto &h) { return h == 1; }));
+  }
+}
+
 // A job does not end before its last block has, also where that takes so long that the owner sleeps.
 TEST(Tasks, ALongBlockOnTwoThreads_IsWaitedFor) {
   Tasks tasks(2, nullptr, nullptr);

@@ -258,7 +258,8 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
     sentence whenever the residuals have become smaller."""
     read = study if isinstance(study, Study) else read_study(study)
     _check(read)
-    refuse_foreign(out_folder(read, out) / "fit.json", MARK)  # before the search, not after it
+    for name, mark in (("fit.json", MARK), ("fit.html", "<title>Fit "), ("fit.png", plots.MARK)):
+        refuse_foreign(out_folder(read, out) / name, mark)  # before the search, not after it
     method, step = read.optimizer["method"], read.optimizer["step"]
     start = np.array([p.share(p.start) for p in read.parameters])
     with ExitStack() as stack:

@@ -10,6 +10,7 @@ from .._library import UnsupportedError
 from .spec import Parameter
 from .tables import titled
 
+MARK = "Software\0deform"  # in each picture
 BLUE, ORANGE, GRAY = "#2f6db3", "#d97b29", "#8a8a8a"
 
 
@@ -24,7 +25,7 @@ def figure(width: float, height: float) -> Any:
 
 def png(drawn: Any) -> bytes:
     out = io.BytesIO()
-    drawn.savefig(out, format="png")
+    drawn.savefig(out, format="png", metadata={"Software": "deform"})
     return out.getvalue()
 
 

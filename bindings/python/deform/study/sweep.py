@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 from typing import Any, Sequence
 
 from .._command import Table
-from .._library import ArgumentError, UnsupportedError, write_whole
+from .._library import ArgumentError, UnsupportedError, refuse_foreign, write_whole
 from . import plots, tables
 from .design import points
 from .executors import executor as named_executor
@@ -14,6 +14,10 @@ from .page import page, table
 from .progress import Progress
 from .spec import Study, read_study
 from .store import Store
+
+# What write() makes, and what tells that it was made by it.
+MARKS = {"sweep.csv": ",state,said,seconds", "sweep.html": "<title>Sweep ",
+         **dict.fromkeys(("curves.png", "map.png", "parallel.png"), plots.MARK)}
 
 
 class Sweep(Table):
@@ -96,6 +100,9 @@ def sweep(study: Any, *, out: Any = None, executor: str = "local", workers: int 
     if not 0 <= first <= last < len(keys):
         raise ArgumentError(f"runs {first} to {last} are not among the {len(keys)} of this study, which are "
                             f"counted from 0", "DFM_E_ARG")
+    if only is None:
+        for name, mark in MARKS.items():  # before the runs, not after them
+            refuse_foreign(folder / name, mark)
     with ExitStack() as stack:
         store = Store(folder, f"runs/{first}-{last}.jsonl" if only is not None else "runs.jsonl")
         stack.callback(store.close)

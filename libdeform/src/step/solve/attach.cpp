@@ -130,10 +130,10 @@ void keep_bonds(World &w, StepContext &step) {
     std::copy_n(l, a.impulse.size(), a.impulse.begin());
     l += a.impulse.size();
     a.h = step.h;
+    if (w.prescribed.is_static()) continue;  // the way to an equilibrium does not count
     const Vec3 p = a.sum();
     a.total += p;
-    // the way to an equilibrium does not count
-    if (!(a.release > 0 && norm(p) > a.release * step.h) || w.prescribed.is_static()) continue;
+    if (!(a.release > 0 && norm(p) > a.release * step.h)) continue;
     a.released = true;
     add_release(w, a, w.time + step.h);
   }

@@ -248,6 +248,7 @@ bool retry_shorter(World &w, StepContext &step, const SolveIsland &own, uint32_t
     step.length.repeat(0.5);
     return false;
   }
+  if (!own.implicit) return report_failed_solve(w, step, nullptr, kNone, trouble);
   return fail_step(trouble, DFM_TROUBLE_NONFINITE,
                    "%s: no state was found in which its forces and contacts agree, not even in a sub-step of "
                    "%g s; take a smaller step, or lower the stiffness",

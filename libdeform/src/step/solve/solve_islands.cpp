@@ -116,7 +116,7 @@ void limit_work(StepContext &step, SolveIsland &own) {
 }
 
 void solve_island(const World &w, StepContext &step, SolveIsland &own) {
-  if (own.bad || own.thrown) return;
+  if (own.bad) return;
   const double normal = normal_tolerance(w, step, own), least = tangent_at_rest(w, step.h);
   const ToleranceBounds bounds{least,
                                own.implicit              ? least
@@ -350,29 +350,20 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
     own.spent = {0, 0, own.part.all(), false};
     own.residual = {};
     own.bad = nullptr;
-    own.thrown = nullptr;
     own.tolerance.normal = step.tolerance.normal.data();
     own.tolerance.tangent = step.tolerance.tangent.data();
   }
   for (SolveIsland &own : all) own.spent.all = rows;
   const std::span<const uint32_t> order = step.solve_islands->by_size();
   const auto run = [&](auto &&job) {
-    w.context->tasks.parallel_for(static_cast<uint32_t>(order.size()), 1, [&](uint32_t begin, uint32_t end) {
-      for (uint32_t k = begin; k < end; ++k) {
-        SolveIsland &own = all[order[k]];
-        if (!own.open) continue;
-        try {
-          job(own);
-        } catch (...) {
-          own.thrown = std::current_exception();
-        }
-      }
+    each_on(&w.context->tasks, order.size(), 1, [&](size_t k) {
+      if (SolveIsland &own = all[order[k]]; own.open) job(own);
     });
   };
   run([&](SolveIsland &own) { start_island(w, step, own); });
   // tolerances of a body follow from all of its islands
   for (SolveIsland &own : all)
-    if (own.open && !own.bad && !own.thrown)
+    if (own.open && !own.bad)
       find_disturbance(step.rows, own.part, step.state, step.h, step.solve_islands->sides(),
                        step.disturbance.data());
   run([&](SolveIsland &own) {
@@ -386,7 +377,6 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   const SolveIsland *bad = nullptr;
   for (const SolveIsland &own : all) {
     if (!own.open) continue;
-    if (own.thrown) std::rethrow_exception(own.thrown);
     if (own.bad && !bad) bad = &own;
   }
   return bad;

@@ -5,7 +5,6 @@
 // bodies that touch each other move as if they were alone in the world, and several threads may solve several
 // islands.
 #pragma once
-#include <exception>
 #include <span>
 #include <vector>
 
@@ -42,7 +41,6 @@ struct SolveIsland final : SolveLaws {
   bool drifts = false;  // contacts of it owe slip (friction_memory.h)
   Spent spent;
   const LawInstance *bad = nullptr;  // the law that has failed
-  std::exception_ptr thrown;
   // of all solves of the sub-step
   bool open = true;  // it is to be solved
   uint32_t all_passes = 0, all_sweeps = 0;

@@ -161,13 +161,10 @@ bool look(World &w, const StepContext &step, Body &b, EnergySample &out) {
 
 // Each body by itself.
 void sum_energies(World &w, StepContext &step) {
-  const uint32_t n = static_cast<uint32_t>(step.active.size());
-  step.looks.resize(n);
-  w.context->tasks.parallel_for(n, 1, [&](uint32_t begin, uint32_t end) {
-    for (uint32_t k = begin; k < end; ++k) {
-      Body &b = *w.bodies[step.active[k]];
-      step.looks[k].known = watched(b) && look(w, step, b, step.looks[k]);
-    }
+  step.looks.resize(step.active.size());
+  each_on(&w.context->tasks, step.active.size(), 1, [&](size_t k) {
+    Body &b = *w.bodies[step.active[k]];
+    step.looks[k].known = watched(b) && look(w, step, b, step.looks[k]);
   });
 }
 
