@@ -26,6 +26,7 @@ constexpr double kCellsAcross = 96;  // by default the labels are at most so man
 constexpr uint32_t kFewestCells = 200;
 constexpr int kRefills = 2;  // until about the wanted number of cells is left
 constexpr size_t kFewVoxels = 27;
+constexpr size_t kNoThing = ~size_t(0);
 
 struct Handles {
   dfm_mesh_handle surface = 0;
@@ -86,11 +87,17 @@ class Maker {
       if (!std::filesystem::equivalent(cli::path_of(own), cli::path_of(o_.table), absent))
         warn(own + " differs and is left as it is; the scene is of " + o_.table);
     }
-    std::vector<bool> kept(volume_.value.size(), false);
-    for (const Entry &e : table_.entries) kept[e.label] = true;
+    thing_.assign(volume_.value.size(), kNoThing);
+    to_label_.assign(volume_.value.size(), "free");
+    to_thing_ = to_label_;
+    for (const Entry &e : table_.entries) {
+      thing_[e.label] = e.thing;
+      to_label_[e.label] = "to_" + e.name;
+      to_thing_[e.label] = "to_" + table_.things[e.thing].name;
+    }
     count_.assign(volume_.value.size(), 0);
     for (uint16_t &v : volume_.voxel) {
-      if (!kept[v]) v = 0;
+      if (thing_[v] == kNoThing) v = 0;
       ++count_[v];
     }
     const double cell = std::fabs(volume_.cell());
@@ -120,8 +127,8 @@ class Maker {
     if (volume_.voxels() > size_t(1) << 27)
       refuse(o_.volume, "%u x %u x %u voxels are left; give a larger --spacing", volume_.size[0],
              volume_.size[1], volume_.size[2]);
-    std::vector<uint32_t> group(volume_.value.size(), 0);
-    for (const Entry &e : table_.entries) group[e.label] = uint32_t(e.thing) + 1;
+    std::vector<uint32_t> group;
+    for (const size_t thing : thing_) group.push_back(uint32_t(thing + 1));
     repaired_ = compose(o_.volume, volume_, group);
     if (repaired_.voxels)
       warn(std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
@@ -137,31 +144,21 @@ class Maker {
                describe(e).c_str(), count_[e.label], report_.factor[0], report_.factor[1], report_.factor[2]);
   }
 
-  std::string beyond(uint16_t label) const {
-    if (label == kOutside) return "cut";
-    for (const Entry &e : table_.entries)
-      if (e.label == label) return "to_" + table_.things[e.thing].name;
-    return "free";
-  }
-
-  // Coordinates that read back the same, triangles in groups by what lies beyond them.
-  void write_obj(const std::string &path, const Shell &shell, const std::vector<std::string> &group) const {
+  // Coordinates that read back the same, triangles in groups by what lies beyond them. to: [value.size()]
+  static void write_obj(const std::string &path, const Shell &shell, const std::vector<std::string> &to) {
     std::string text = "# surface of a label; groups say what lies beyond\n";
     for (size_t i = 0; i < shell.points.size(); i += 3)
       text += "v " + number(shell.points[i]) + " " + number(shell.points[i + 1]) + " " +
               number(shell.points[i + 2]) + "\n";
-    std::vector<std::string> names = group;
-    std::sort(names.begin(), names.end());
-    names.erase(std::unique(names.begin(), names.end()), names.end());
-    for (const std::string &name : names) {
-      text += "g " + name + "\n";
-      for (size_t t = 0; t < group.size(); ++t)
-        if (group[t] == name) {
-          text += "f";
-          for (size_t i = 0; i < 3; ++i) text += " " + std::to_string(shell.triangles[3 * t + i] + 1);
-          text += "\n";
-        }
+    std::map<std::string, std::string> groups;
+    for (size_t t = 0; t < shell.beyond.size(); ++t) {
+      const uint16_t label = shell.beyond[t];
+      std::string &faces = groups[label == kOutside ? "cut" : to[label]];
+      faces += "f";
+      for (size_t i = 0; i < 3; ++i) faces += " " + std::to_string(shell.triangles[3 * t + i] + 1);
+      faces += "\n";
     }
+    for (const auto &[name, faces] : groups) text += "g " + name + "\n" + faces;
     cli::write_whole(path, text);
   }
 
@@ -170,16 +167,9 @@ class Maker {
     std::vector<bool> inside(volume_.value.size(), false);
     inside[e.label] = true;
     const Shell shell = shell_of(surfaces_, inside);
-    std::vector<std::string> group;
+    write_obj(o_.out + "/surfaces/" + e.name + ".obj", shell, to_label_);
     LabelReport r;
-    for (const uint16_t l : shell.beyond) {
-      std::string name = beyond(l);
-      for (const Entry &other : table_.entries)
-        if (other.label == l) name = "to_" + other.name;
-      group.push_back(name);
-      r.at_border = r.at_border || l == kOutside;
-    }
-    write_obj(o_.out + "/surfaces/" + e.name + ".obj", shell, group);
+    r.at_border = std::ranges::find(shell.beyond, kOutside) != shell.beyond.end();
     r.value = volume_.value[e.label];
     r.name = e.name;
     r.thing = table_.things[e.thing].name;
@@ -208,18 +198,18 @@ class Maker {
     for (const size_t e : t.entries) inside[table_.entries[e].label] = true;
     const Shell shell = shell_of(surfaces_, inside);
     report_.open_edges += shell.open_edges;
-    std::vector<std::string> group;
-    for (const uint16_t l : shell.beyond) group.push_back(beyond(l));
-    write_obj(o_.out + "/" + t.name + ".obj", shell, group);
+    write_obj(o_.out + "/" + t.name + ".obj", shell, to_thing_);
     ThingReport r;
     r.name = t.name;
     r.obstacle = t.obstacle;
     r.points = uint32_t(shell.from.size());
     r.triangles = uint32_t(shell.beyond.size());
     for (size_t p = 2; p < shell.points.size(); p += 3) lowest_ = std::min(lowest_, shell.points[p]);
-    if (!t.obstacle) add_borders(thing, shell, group, fill(t, shell, group, r));
+    if (!t.obstacle) add_borders(thing, shell, fill(t, shell, r));
     report_.things.push_back(r);
   }
+
+  size_t thing_at(uint16_t label) const { return label == kOutside ? kNoThing : thing_[label]; }
 
   static double triangle_area(const Shell &shell, size_t t) {
     double e[2][3], sum = 0;
@@ -237,7 +227,7 @@ class Maker {
 
   // A body is held where it meets an obstacle, and attached to bodies that come before it. edge: m, of its
   // cells
-  void add_borders(size_t thing, const Shell &shell, const std::vector<std::string> &group, double edge) {
+  void add_borders(size_t thing, const Shell &shell, double edge) {
     for (size_t other = 0; other < table_.things.size(); ++other) {
       const Thing &a = table_.things[thing], &b = table_.things[other];
       if (other == thing || a.obstacle || (!b.obstacle && other > thing)) continue;
@@ -247,8 +237,8 @@ class Maker {
       border.held = b.obstacle;
       std::vector<bool> on(shell.from.size(), false);
       double area = 0;
-      for (size_t t = 0; t < group.size(); ++t)
-        if (group[t] == "to_" + b.name) {
+      for (size_t t = 0; t < shell.beyond.size(); ++t)
+        if (thing_at(shell.beyond[t]) == other) {
           ++border.triangles;
           for (size_t i = 0; i < 3; ++i) on[shell.triangles[3 * t + i]] = true;
           area += triangle_area(shell, t);
@@ -288,16 +278,15 @@ class Maker {
   }
 
   // Makes them cells whose boundary can be the surface; none where the body is too thin.
-  static void fit(const Shell &shell, const std::vector<std::string> &group, double edge, Cells &cells,
-                  ThingReport &r) {
+  void fit(const Shell &shell, double edge, Cells &cells, ThingReport &r) const {
     const Fitted made = fit_cells(shell, cells.points, cells.tets, cells.share, edge);
     cells.points = made.points;
     cells.tets = made.tets;
     cells.share.assign(made.tets.size() / 4, 1.0);
     for (size_t f = 0; f < made.under.size(); ++f) {
-      const std::string &name = group[made.under[f]];
-      if (name.rfind("to_", 0) != 0) continue;
-      cells.beyond.push_back(name);
+      const uint16_t label = shell.beyond[made.under[f]];
+      if (thing_at(label) == kNoThing) continue;
+      cells.beyond.push_back(to_thing_[label]);
       cells.faces.insert(cells.faces.end(), &made.faces[3 * f], &made.faces[3 * f] + 3);
     }
     r.triangles = uint32_t(made.under.size());
@@ -307,7 +296,7 @@ class Maker {
   }
 
   // Returns the median edge of its cells, m.
-  double fill(const Thing &t, const Shell &shell, const std::vector<std::string> &group, ThingReport &r) {
+  double fill(const Thing &t, const Shell &shell, ThingReport &r) {
     Handles h;
     const auto need = [&](dfm_status status) {
       if (status < 0) refuse(o_.volume, "the body %s: %s", t.name.c_str(), dfm_last_error());
@@ -326,7 +315,7 @@ class Maker {
       r.quality_min = info.quality_min;
       r.quality_mean = info.quality_mean;
       if (!t.own_boundary) break;
-      fit(shell, group, info.edge_median, cells, r);
+      fit(shell, info.edge_median, cells, r);
       if (again == 0 || cells.share.size() >= 0.9 * wanted) break;
       // cells that are mostly outside have gone, fewer of each hundred the smaller they are
       requested =
@@ -682,8 +671,10 @@ class Maker {
   const Options &o_;
   Volume volume_;
   Table table_;
-  std::vector<size_t> count_;   // voxels per label, of the file
-  std::vector<double> target_;  // m3
+  std::vector<size_t> thing_;                     // of each label; kNoThing: left out
+  std::vector<std::string> to_label_, to_thing_;  // of each label: the group of triangles before it
+  std::vector<size_t> count_;                     // voxels per label, of the file
+  std::vector<double> target_;                    // m3
   Repaired repaired_;
   Surfaces surfaces_;
   std::vector<double> inverse_;  // rows that give voxels for meters
