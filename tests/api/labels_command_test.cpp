@@ -49,12 +49,13 @@ double number(const std::string &json, const std::string &pattern) {
   return std::stod(m[1]);
 }
 
-// A cube of one label.
-std::string cube(const std::string &out, const std::string &name) {
+// A cube of label 1; two voxels of label 2 touch it where asked for.
+std::string cube(const std::string &out, const std::string &name, bool touched = false) {
   const std::string volume = out + "/scan.nrrd";
   std::string voxels;
   for (int i = 0; i < 512; ++i)
     voxels += char(std::min({i % 8, i / 8 % 8, i / 64}) > 0 && std::max({i % 8, i / 8 % 8, i / 64}) < 7);
+  if (touched) voxels[7 + 8 * 3 + 64 * 3] = voxels[7 + 8 * 4 + 64 * 3] = 2;
   test::write_file(volume,
                    "NRRD0005\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 8 8 8\n"
                    "space directions: (5,0,0) (0,5,0) (0,0,5)\nencoding: raw\n"
@@ -121,6 +122,22 @@ TEST(LabelsCommand, TableThatTheUserHasChanged_IsNotReplaced) {
     EXPECT_EQ(has(done.err, table + " differs and is left as it is"), given != table) << done.err;
     EXPECT_EQ(test::read_file(table), changed) << given;
   }
+}
+
+// Cells are too coarse for so small a border: no face of theirs lies at it.
+TEST(LabelsCommand, BorderSmallerThanAFaceOfTheCells_HoldsNothing) {
+  const std::string out = test::scratch("labels_command_border"), table = out + "/table.json";
+  std::filesystem::remove_all(out + "/made");
+  test::write_file(table, R"({"format": "deform-labels", "version": 1,
+    "labels": {"1": {"name": "organ", "material": "gel"}, "2": {"name": "spine", "obstacle": true}},
+    "materials": {"gel": {"density": 1000, "young": 1e4}},
+    "bodies": {"organ": {"cells": 80, "surface": {"from": "boundary"}}}})");
+  const auto made = test::deform(
+      {"mesh", "from-labels", cube(out, "organ", true), "--table", table, "--out", out + "/made"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(has(made.err, "organ meets spine on less than a face of its cells")) << made.err;
+  const auto read = test::deform({"explain", out + "/made/scene.json"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {

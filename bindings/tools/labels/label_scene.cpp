@@ -205,7 +205,7 @@ class Maker {
     r.points = uint32_t(shell.from.size());
     r.triangles = uint32_t(shell.beyond.size());
     for (size_t p = 2; p < shell.points.size(); p += 3) lowest_ = std::min(lowest_, shell.points[p]);
-    if (!t.obstacle) add_borders(thing, shell, fill(t, shell, r));
+    if (!t.obstacle) fill(thing, shell, r);
     report_.things.push_back(r);
   }
 
@@ -225,26 +225,32 @@ class Maker {
     return std::sqrt(sum) / 2;
   }
 
-  // A body is held where it meets an obstacle, and attached to bodies that come before it. edge: m, of its
-  // cells
-  void add_borders(size_t thing, const Shell &shell, double edge) {
+  // A body is held where it meets an obstacle, and attached to bodies that come before it. surface: the
+  // body's own, on which its scene looks for the groups. edge: m, of its cells
+  void add_borders(size_t thing, const Shell &shell, const Shell &surface, double edge) {
     for (size_t other = 0; other < table_.things.size(); ++other) {
       const Thing &a = table_.things[thing], &b = table_.things[other];
       if (other == thing || a.obstacle || (!b.obstacle && other > thing)) continue;
+      const auto meets = [&](uint16_t label) { return thing_at(label) == other; };
+      if (std::ranges::none_of(shell.beyond, meets)) continue;
       Border border;
       border.a = a.name;
       border.b = b.name;
       border.held = b.obstacle;
-      std::vector<bool> on(shell.from.size(), false);
+      std::vector<bool> on(surface.points.size() / 3, false);
       double area = 0;
-      for (size_t t = 0; t < shell.beyond.size(); ++t)
-        if (thing_at(shell.beyond[t]) == other) {
+      for (size_t t = 0; t < surface.beyond.size(); ++t)
+        if (meets(surface.beyond[t])) {
           ++border.triangles;
-          for (size_t i = 0; i < 3; ++i) on[shell.triangles[3 * t + i]] = true;
-          area += triangle_area(shell, t);
+          for (size_t i = 0; i < 3; ++i) on[surface.triangles[3 * t + i]] = true;
+          area += triangle_area(surface, t);
         }
       border.points = uint32_t(std::count(on.begin(), on.end(), true));
-      if (border.triangles == 0) continue;
+      if (border.triangles == 0) {
+        warn("the body " + a.name + " meets " + b.name + " on less than a face of its cells, and is not " +
+             (border.held ? "held" : "attached") + " there; give it more cells");
+        continue;
+      }
       if (!border.held) set_stiffness(border, area, edge, a, b);
       report_.borders.push_back(border);
     }
@@ -265,8 +271,8 @@ class Maker {
 
   struct Cells {
     std::vector<double> points, share;
-    std::vector<uint32_t> tets, faces;  // faces: at neighbors, of a body whose surface is its cells' boundary
-    std::vector<std::string> beyond;    // group of each face
+    std::vector<uint32_t> tets;
+    Shell boundary;  // of a body whose surface it is
   };
 
   static Cells cells_in(const dfm_mesh_info &mesh) {
@@ -278,25 +284,22 @@ class Maker {
   }
 
   // Makes them cells whose boundary can be the surface; none where the body is too thin.
-  void fit(const Shell &shell, double edge, Cells &cells, ThingReport &r) const {
+  static void fit(const Shell &shell, double edge, Cells &cells, ThingReport &r) {
     const Fitted made = fit_cells(shell, cells.points, cells.tets, cells.share, edge);
     cells.points = made.points;
     cells.tets = made.tets;
     cells.share.assign(made.tets.size() / 4, 1.0);
-    for (size_t f = 0; f < made.under.size(); ++f) {
-      const uint16_t label = shell.beyond[made.under[f]];
-      if (thing_at(label) == kNoThing) continue;
-      cells.beyond.push_back(to_thing_[label]);
-      cells.faces.insert(cells.faces.end(), &made.faces[3 * f], &made.faces[3 * f] + 3);
-    }
+    cells.boundary.points = made.points;
+    cells.boundary.triangles = made.faces;
+    for (const uint32_t t : made.under) cells.boundary.beyond.push_back(shell.beyond[t]);
     r.triangles = uint32_t(made.under.size());
     r.quality_min = made.quality_min;
     r.quality_mean = made.quality_mean;
     r.farthest = made.farthest;
   }
 
-  // Returns the median edge of its cells, m.
-  double fill(const Thing &t, const Shell &shell, ThingReport &r) {
+  void fill(size_t thing, const Shell &shell, ThingReport &r) {
+    const Thing &t = table_.things[thing];
     Handles h;
     const auto need = [&](dfm_status status) {
       if (status < 0) refuse(o_.volume, "the body %s: %s", t.name.c_str(), dfm_last_error());
@@ -352,7 +355,7 @@ class Maker {
              " is smaller than a cell and has none; give more cells by --cells or in the table");
     }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, cells, of_cell);
-    return info.edge_median;
+    add_borders(thing, shell, t.own_boundary ? cells.boundary : shell, info.edge_median);
   }
 
   // Places in a cell that each label of this body has, of 35; where none has one, the nearest voxel's label.
@@ -473,11 +476,17 @@ class Maker {
   void write_vtk(const std::string &path, const Thing &t, const Cells &cells,
                  const std::vector<size_t> &of_cell) const {
     // groups: a label's cells by its entry, then the faces at neighbors
+    const Shell &boundary = cells.boundary;
+    std::vector<size_t> faces;
     std::map<std::string, size_t> borders;
-    for (const std::string &name : cells.beyond) borders.emplace(name, 0);
+    for (size_t f = 0; f < boundary.beyond.size(); ++f)
+      if (thing_at(boundary.beyond[f]) != kNoThing) {
+        faces.push_back(f);
+        borders.emplace(to_thing_[boundary.beyond[f]], 0);
+      }
     size_t last = table_.entries.size();
     for (auto &[name, number] : borders) number = ++last;
-    const size_t ntet = cells.share.size(), nface = cells.beyond.size();
+    const size_t ntet = cells.share.size(), nface = faces.size();
     const std::string ncell = std::to_string(ntet + nface),
                       ngroup = std::to_string(t.entries.size() + borders.size());
     std::string text =
@@ -500,13 +509,13 @@ class Maker {
       text += "\n";
     };
     for (size_t c = 0; c < ntet; ++c) row(&cells.tets[4 * c], 4);
-    for (size_t f = 0; f < nface; ++f) row(&cells.faces[3 * f], 3);
+    for (const size_t f : faces) row(&boundary.triangles[3 * f], 3);
     text += "CELL_TYPES " + ncell + "\n";
     for (size_t c = 0; c < ntet; ++c) text += "10\n";
     for (size_t f = 0; f < nface; ++f) text += "5\n";
     text += "CELL_DATA " + ncell + "\nSCALARS group int 1\nLOOKUP_TABLE default\n";
     for (const size_t e : of_cell) text += std::to_string(e + 1) + "\n";
-    for (const std::string &name : cells.beyond) text += std::to_string(borders[name]) + "\n";
+    for (const size_t f : faces) text += std::to_string(borders[to_thing_[boundary.beyond[f]]]) + "\n";
     if (!t.own_boundary) {
       text += "SCALARS share double 1\nLOOKUP_TABLE default\n";
       for (const double share : cells.share) text += number(share) + "\n";
