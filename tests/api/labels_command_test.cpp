@@ -140,6 +140,33 @@ TEST(LabelsCommand, BorderSmallerThanAFaceOfTheCells_HoldsNothing) {
   EXPECT_EQ(read.exit_code, 0) << read.err;
 }
 
+TEST(LabelsCommand, NamesInOtherLetters_StayApart) {
+  const std::string out = test::scratch("labels_command_names"), table = out + "/table.json";
+  std::filesystem::remove_all(out + "/made");
+  const auto make = [&](const std::string &first, const std::string &second) {
+    test::write_file(table, R"({"format": "deform-labels", "version": 1, "labels": {"1": )" + first +
+                                R"(, "2": )" + second +
+                                R"(}, "materials": {"gel": {"density": 1000, "young": 1e4}}})");
+    return test::deform({"mesh", "from-labels", cube(out, "a", true), "--table", table, "--out",
+                         out + "/made", "--cells", "300"});
+  };
+  const auto made = make(R"({"name": "a", "body": "肝臟", "material": "gel"})",
+                         R"({"name": "b", "body": "腎臟", "material": "gel"})");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(std::filesystem::exists(out + "/made/肝臟.vtk") &&
+              std::filesystem::exists(out + "/made/腎臟.vtk"));
+  const auto read = test::deform({"explain", out + "/made/scene.json"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+  const auto bodies = make(R"({"name": "a", "body": "left/lung", "material": "gel"})",
+                           R"({"name": "b", "body": "left_lung", "material": "gel"})");
+  EXPECT_EQ(bodies.exit_code, 2);
+  EXPECT_TRUE(has(bodies.err, "\"left/lung\" and \"left_lung\"")) << bodies.err;
+  const auto labels =
+      make(R"({"name": "left/lung", "material": "gel"})", R"({"name": "left_lung", "material": "gel"})");
+  EXPECT_EQ(labels.exit_code, 2);
+  EXPECT_TRUE(has(labels.err, "/labels/2/name: label 1 has the name left_lung")) << labels.err;
+}
+
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
   const std::string out = folder() + "/a folder's name";
   const auto fine =
