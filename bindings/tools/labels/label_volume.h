@@ -10,7 +10,7 @@
 
 namespace labels {
 
-// A file holds at most this many values that differ; an image of gray values holds more.
+// A file holds at most this many beside 0; an image of gray values holds more.
 constexpr size_t kMaxLabels = 1024;
 
 struct Volume {

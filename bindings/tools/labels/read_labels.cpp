@@ -161,12 +161,12 @@ class Collector {
     if (value == last_) return last_index_;
     const auto [entry, is_new] = index_.emplace(value, uint16_t(out_.value.size()));
     if (is_new) {
-      if (out_.value.size() == kMaxLabels)
-        refuse(
-            path_,
-            "more than %zu values differ, so these are gray values and not labels; give the label map that "
-            "a segmentation program writes",
-            kMaxLabels);
+      if (out_.value.size() == kMaxLabels + 1)
+        refuse(path_,
+               "more than %zu values differ from 0, so these are gray values and not labels; give the label "
+               "map that "
+               "a segmentation program writes",
+               kMaxLabels);
       out_.value.push_back(value);
     }
     last_ = value;
