@@ -68,6 +68,7 @@ std::string cube(const std::string &out, const std::string &name, bool touched =
 
 TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
   const std::string out = folder() + "/plain";
+  std::filesystem::remove_all(out);
   const auto made =
       test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "3000"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
@@ -167,6 +168,21 @@ TEST(LabelsCommand, NamesInOtherLetters_StayApart) {
   EXPECT_TRUE(has(labels.err, "/labels/2/name: label 1 has the name left_lung")) << labels.err;
 }
 
+TEST(LabelsCommand, SceneThatTheUserHasChanged_IsNotReplaced) {
+  const std::string out = test::scratch("labels_command_scene"), made = out + "/made",
+                    scene = made + "/scene.json";
+  std::filesystem::remove_all(made);
+  const std::vector<std::string> words = {"mesh",    "from-labels", cube(out, "liver"), "--out", made,
+                                          "--cells", "300"};
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(test::deform(words).exit_code, 0);
+  const std::string changed = test::read_file(scene) + "\n";
+  test::write_file(scene, changed);
+  const auto refused = test::deform(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_TRUE(has(refused.err, scene + ": ") && has(refused.err, "\"scene\"")) << refused.err;
+  EXPECT_EQ(test::read_file(scene), changed);
+}
+
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
   const std::string out = folder() + "/a folder's name";
   const auto fine =
@@ -183,6 +199,7 @@ TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
 
 TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   const std::string table = folder() + "/table.json", out = folder() + "/organs";
+  std::filesystem::remove_all(out);
   test::write_file(table, kTable);
   const auto made = test::deform(
       {"mesh", "from-labels", phantom("abdomen", "12"), "--table", table, "--out", out, "--json"});
@@ -205,6 +222,7 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
 
 TEST(LabelsCommand, BodiesThatAreCut_HaveCellsThatFollowTheirLabels) {
   const std::string table = folder() + "/cut_table.json", out = folder() + "/cut organs";
+  std::filesystem::remove_all(out);
   std::string text = kTable;
   const auto put = [&text](const std::string &before, const std::string &words) {
     text.insert(text.find(before), words);

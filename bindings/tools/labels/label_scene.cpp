@@ -12,6 +12,7 @@
 #include "label_fit.h"
 #include "messages.h"
 #include "run_folder.h"
+#include "state_file.h"
 #include "system.h"
 
 namespace labels {
@@ -57,6 +58,7 @@ class Maker {
   }
 
  private:
+  static std::string scene_hash(const std::string &text) { return cli::hash_text(cli::hash_of(text)); }
   void warn(const std::string &sentence) { report_.warnings.push_back(sentence); }
   std::string describe(const Entry &e) const {
     return "label " + std::to_string(volume_.value[e.label]) + " (" + e.name + ")";
@@ -87,6 +89,12 @@ class Maker {
       if (!std::filesystem::equivalent(cli::path_of(own), cli::path_of(o_.table), absent))
         warn(own + " differs and is left as it is; the scene is of " + o_.table);
     }
+    const std::string scene = o_.out + "/scene.json";
+    if (std::filesystem::exists(cli::path_of(scene), absent) &&
+        !cli::holds(o_.out + "/summary.json", scene_hash(cli::read_file(scene, 64u << 20, "a scene"))))
+      refuse(scene,
+             "not as this command has written it, and would be replaced; move what is your own to \"scene\" "
+             "and \"bodies\" of the table and remove it, or give another folder with --out");
     thing_.assign(volume_.value.size(), kNoThing);
     to_label_.assign(volume_.value.size(), "free");
     to_thing_ = to_label_;
@@ -649,7 +657,9 @@ class Maker {
     for (const auto &[key, value] : rest) out.add(key, value);
     JsonValue whole;
     cli::parse_json(out.text(), whole);
-    cli::write_whole(o_.out + "/scene.json", cli::json_lines(whole) + "\n");
+    const std::string text = cli::json_lines(whole) + "\n";
+    cli::write_whole(o_.out + "/scene.json", text);
+    report_.scene_hash = scene_hash(text);
   }
 
   // Looks from the front, a little from above, at all that there is.
