@@ -238,8 +238,8 @@ TEST(OwnWorldSnapshot, Restored_ReportsTheSameJointsAndContinuesBitByBit) {
   }
 }
 
-// A chain that a soft ball strikes, interrupted in each solve that the engine has asked for again: nothing has
-// changed.
+// A chain that a soft ball strikes, interrupted in each solve that the engine has asked for again: nothing
+// has changed.
 TEST(OwnWorldSnapshot, InterruptedAmidCorrections_LeavesNoTrace) {
   Context c;
   ok(register_engine());
