@@ -78,8 +78,8 @@ def reading_order(tree):
 
 
 def pictures(tree):
-    """Every picture is in the gallery, followed by what makes it: a script or a scene of the repository, named
-    at the head if not there."""
+    """Every picture is in the gallery, followed by what makes it: a script or a scene of the repository, at
+    the head if not there."""
     gallery = PAGES + "reference/gallery.md"
     content = tree.text(gallery) if gallery in tree.paths else ""
     parts = re.split(r"!\[[^\]]*\]\(\.\./images/([\w.]+)\)", content)
