@@ -135,6 +135,7 @@ class Maker {
     if (volume_.voxels() > size_t(1) << 27)
       refuse(o_.volume, "%u x %u x %u voxels are left; give a larger --spacing", volume_.size[0],
              volume_.size[1], volume_.size[2]);
+    inverse_ = volume_.inverse();
     std::vector<uint32_t> group;
     for (const size_t thing : thing_) group.push_back(uint32_t(thing + 1));
     repaired_ = compose(o_.volume, volume_, group);
@@ -220,17 +221,10 @@ class Maker {
   size_t thing_at(uint16_t label) const { return label == kOutside ? kNoThing : thing_[label]; }
 
   static double triangle_area(const Shell &shell, size_t t) {
-    double e[2][3], sum = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      const double x = shell.points[3 * size_t(shell.triangles[3 * t]) + k];
-      e[0][k] = shell.points[3 * size_t(shell.triangles[3 * t + 1]) + k] - x;
-      e[1][k] = shell.points[3 * size_t(shell.triangles[3 * t + 2]) + k] - x;
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      const double n = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
-      sum += n * n;
-    }
-    return std::sqrt(sum) / 2;
+    Vec p[3];
+    for (size_t i = 0; i < 3; ++i) p[i] = at(shell.points, shell.triangles[3 * t + i]);
+    const Vec n = cross(p[1] - p[0], p[2] - p[0]);
+    return std::sqrt(dot(n, n)) / 2;
   }
 
   // A body is held where it meets an obstacle, and attached to bodies that come before it. surface: the
@@ -374,10 +368,10 @@ class Maker {
       for (int b = 0; a + b <= kParts; ++b)
         for (int c = 0; a + b + c <= kParts; ++c) {
           const int parts[4] = {a, b, c, kParts - a - b - c};
-          double p[3] = {0, 0, 0};
+          Vec p = {0, 0, 0};
           for (int i = 0; i < 4; ++i)
-            for (int k = 0; k < 3; ++k)
-              p[k] += (parts[i] + 0.25) / (kParts + 1) * x[3 * size_t(tet[i]) + size_t(k)];
+            for (size_t k = 0; k < 3; ++k)
+              p[k] += (parts[i] + 0.25) / (kParts + 1) * x[3 * size_t(tet[i]) + k];
           ++found[label_at(p)];
         }
     std::map<size_t, int> out;
@@ -433,20 +427,9 @@ class Maker {
     return best;
   }
 
-  void index_of(const double p[3], double out[3]) {
-    if (inverse_.empty()) {
-      const auto &a = volume_.axis;
-      for (size_t k = 0; k < 3; ++k) {
-        const double *u = a[(k + 1) % 3], *w = a[(k + 2) % 3];
-        const double row[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2],
-                               u[0] * w[1] - u[1] * w[0]};
-        for (const double r : row) inverse_.push_back(r / volume_.cell());
-      }
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      out[k] = 0;
-      for (size_t c = 0; c < 3; ++c) out[k] += inverse_[3 * k + c] * (p[c] - volume_.origin[c]);
-    }
+  Vec index_of(const Vec &p) const {
+    const Vec arm = p - Vec{volume_.origin[0], volume_.origin[1], volume_.origin[2]};
+    return {dot(inverse_[0], arm), dot(inverse_[1], arm), dot(inverse_[2], arm)};
   }
   uint16_t voxel(int64_t i, int64_t j, int64_t k) const {
     if (i < 0 || j < 0 || k < 0 || i >= volume_.size[0] || j >= volume_.size[1] || k >= volume_.size[2])
@@ -454,16 +437,15 @@ class Maker {
     return volume_
         .voxel[size_t(i) + size_t(volume_.size[0]) * (size_t(j) + size_t(volume_.size[1]) * size_t(k))];
   }
-  uint16_t label_at(const double p[3]) {
-    double c[3];
-    index_of(p, c);
+  uint16_t label_at(const Vec &p) const {
+    const Vec c = index_of(p);
     return voxel(std::lround(c[0]), std::lround(c[1]), std::lround(c[2]));
   }
-  size_t nearest_label(const Thing &t, const double *x, const uint32_t *tet) {
-    double p[3] = {0, 0, 0}, c[3];
+  size_t nearest_label(const Thing &t, const double *x, const uint32_t *tet) const {
+    Vec p = {0, 0, 0};
     for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < 3; ++k) p[k] += x[3 * size_t(tet[i]) + size_t(k)] / 4;
-    index_of(p, c);
+      for (size_t k = 0; k < 3; ++k) p[k] += x[3 * size_t(tet[i]) + k] / 4;
+    const Vec c = index_of(p);
     size_t best = t.entries[0];
     double least = INFINITY;
     for (int64_t reach = 1; reach <= 64 && !std::isfinite(least); reach *= 2)
@@ -696,7 +678,7 @@ class Maker {
   std::vector<double> target_;                    // m3
   Repaired repaired_;
   Surfaces surfaces_;
-  std::vector<double> inverse_;  // rows that give voxels for meters
+  std::array<Vec, 3> inverse_;
   double lowest_ = INFINITY;
   Report report_;
   bool writes_table_ = true;

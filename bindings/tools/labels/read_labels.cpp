@@ -97,6 +97,15 @@ double Volume::cell() const {
          a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
 }
 
+std::array<Vec, 3> Volume::inverse() const {
+  Vec a[3];
+  for (size_t k = 0; k < 3; ++k) std::copy_n(axis[k], 3, a[k].begin());
+  std::array<Vec, 3> out = {cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])};
+  for (Vec &row : out)
+    for (double &x : row) x /= cell();
+  return out;
+}
+
 namespace {
 
 // Takes the voxels as they come, in blocks, so that the values of a large file are never there twice.
