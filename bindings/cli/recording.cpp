@@ -110,6 +110,7 @@ void Comparison::look(const SceneFile &scene) {
 }
 
 double Comparison::prepare(const SceneFile &scene, double own) {
+  if (!first_.empty()) return 0;
   if (recording_.acts.empty()) return own;
   if (next_ == recording_.states.size()) return 0;
   if (!hand_) hand_.emplace(scene);

@@ -52,7 +52,7 @@ class Comparison {
   explicit Comparison(const Recording &recording) : recording_(recording) {}
   void look(const SceneFile &scene);
   // Does what was done by hand at this time, and returns how long the next step is: `own`, unless recorded.
-  // 0: everything that was recorded has come.
+  // 0: everything that was recorded has come, or something differs.
   double prepare(const SceneFile &scene, double own);
   // Nothing where every state came and was the same; else what differed first.
   std::string sentence() const;

@@ -21,13 +21,6 @@ constexpr uint64_t kMaxState = uint64_t{1} << 33;  // bytes
 constexpr const char *kFormat = "deform-state", *kVersion = "1";
 constexpr const char *kSnapshot = "dfmsnap";  // how the bytes of dfm_world_snapshot begin
 
-// FNV-1a, 64 bit: against a mistaken file, not against forgery.
-uint64_t hash_of(const std::string &bytes) {
-  uint64_t hash = 14695981039346656037u;
-  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
-  return hash;
-}
-
 // Versions of the plugins that are loaded, by id.
 std::map<std::string, std::string> versions(const SceneFile &scene) {
   std::map<std::string, std::string> out;
@@ -122,6 +115,12 @@ std::string hash_text(uint64_t hash) {
   char text[24];
   std::snprintf(text, sizeof text, "%016llx", static_cast<unsigned long long>(hash));
   return text;
+}
+
+uint64_t hash_of(const std::string &bytes) {
+  uint64_t hash = 14695981039346656037u;
+  for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211u;
+  return hash;
 }
 
 uint64_t scene_hash(const SceneFile &scene) {

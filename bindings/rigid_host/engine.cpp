@@ -164,12 +164,9 @@ void Engine::classify(Member &m, const dfm_rigid_step &step, const double *extra
   m.plain.w =
       m.turns ? mean_spin(q, inverse(m.inertia.moments), m.turn_momentum, step.h) : w + step.h * pull.w;
   const Motion kept{load(extra + 6), load(extra + 9)};
-  m.drift = {};
-  if (!m.asleep) return;
-  if (extra[12] == kDrifts) {
-    m.drift = kept;
-    return;
-  }
+  const bool drifts = m.asleep && extra[12] == kDrifts;
+  m.drift = m.drifted = drifts ? kept : Motion{};
+  if (drifts || !m.asleep) return;
   const Motion carried = m.response(kept);  // b is what was in balance with this
   m.bias = {-1.0 * carried.v - (1 / step.h) * (m.plain.v - v),
             -1.0 * carried.w - (1 / step.h) * (m.plain.w - w)};
@@ -265,8 +262,8 @@ bool Engine::wake_sleepers(double h) {
     if (!m->asleep || m->kinematic) continue;
     const Motion push = m->response(m->impulse);
     const double left = std::max(0.0, 1 - h / kForget);
-    m->drift.v = left * m->drift.v + (m->plain.v - load(m->start.velocity)) + push.v + h * m->bias.v;
-    m->drift.w = left * m->drift.w + (m->plain.w - load(m->start.spin)) + push.w + h * m->bias.w;
+    m->drift.v = left * m->drifted.v + (m->plain.v - load(m->start.velocity)) + push.v + h * m->bias.v;
+    m->drift.w = left * m->drifted.w + (m->plain.w - load(m->start.spin)) + push.w + h * m->bias.w;
     const auto [speed, spin] = m->idle_limits();
     m->wakes = norm(m->drift.v) > speed || norm(m->drift.w) > spin;
     woken |= m->wakes;

@@ -80,7 +80,7 @@ struct Member {
   Vec turn_momentum;       // angular, at the start plus h T
   Motion impulse;
   dfm_rigid_state ended{};
-  Motion drift;                               // of a sleeping body: the velocity that it would have
+  Motion drifted, drift;                      // of a sleeping body: the velocity that it would have had, has
   std::array<double, 2> idle{}, next_idle{};  // sub-steps, s
 
   virtual ~Member() = default;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <utility>
 
 namespace dfm_rigid_detail {
 namespace {
@@ -124,7 +125,8 @@ void OwnWorld::predict_all(const dfm_rigid_step &step, double *velocity) {
     const double *const motor = step.extra + first_joint() + kMotor * k;
     if (j.made && j.type <= DFM_JOINT_SLIDER) drive(k, j.sign() * motor[0], motor[1], step.h);
   }
-  bool put = !remembers(step.extra + first_memory());
+  // also after a try that has ended before its commit, with what the engine made of corrections
+  bool put = std::exchange(predicted_, true) || !remembers(step.extra + first_memory());
   for (const uint32_t i : moving_) put |= !same(given_[i], step.state[i]);
   if (put) engine_.reopen();
   if (!engine_.is_open())
@@ -146,6 +148,7 @@ void OwnWorld::push(const dfm_rigid_step &, const double *impulse) {
 
 bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double *extra) {
   bool again = false;
+  predicted_ = false;
   std::memcpy(extra, step.extra, sizeof(double) * first_memory());
   std::memcpy(state, step.state, sizeof(dfm_rigid_state) * members_.size());
   call([&] {

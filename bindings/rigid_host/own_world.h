@@ -72,6 +72,7 @@ class OwnWorld : public Host {
   std::vector<uint32_t> moving_;   // group -> number
   std::vector<Joint> joints_;
   std::vector<dfm_rigid_state> given_;  // present states of the engine's bodies
+  bool predicted_ = false;              // and no commit since
 
   void predict_all(const dfm_rigid_step &step, double *velocity);
   uint32_t first_memory() const { return static_cast<uint32_t>(first_joint() + kMotor * joints_.size()); }

@@ -245,6 +245,19 @@ TEST(LabelVolume, WrongFile_IsRefusedInOneSentence) {
   }
 }
 
+// The background is none of them.
+TEST(LabelVolume, AsManyLabelsAsThereMayBe_AreRead) {
+  std::vector<int> voxels = {0};
+  for (int i = 1; i <= int(labels::kMaxLabels); ++i) voxels.push_back(i);
+  const auto read = [&](const char *sizes) {
+    const std::string head = replaced(nrrd_header("short", false, "raw"), "sizes: 4 3 2", sizes);
+    return labels::read_labels("x", head + bytes_of(voxels, 2, false), 1e-3).value.size();
+  };
+  EXPECT_EQ(read("sizes: 1025 1 1"), voxels.size());
+  voxels.push_back(int(labels::kMaxLabels) + 1);
+  EXPECT_THROW(read("sizes: 1026 1 1"), cli::Failure);
+}
+
 TEST(LabelVolume, BytesBeyondTheVoxels_AreReported) {
   const std::string data = bytes_of(kVoxels, 2, false), more = data + "\1";
   const std::string raw = nrrd_header("short", false, "raw"), zipped = nrrd_header("short", false, "gzip");

@@ -49,12 +49,13 @@ double number(const std::string &json, const std::string &pattern) {
   return std::stod(m[1]);
 }
 
-// A cube of one label.
-std::string cube(const std::string &out, const std::string &name) {
+// A cube of label 1; two voxels of label 2 touch it where asked for.
+std::string cube(const std::string &out, const std::string &name, bool touched = false) {
   const std::string volume = out + "/scan.nrrd";
   std::string voxels;
   for (int i = 0; i < 512; ++i)
     voxels += char(std::min({i % 8, i / 8 % 8, i / 64}) > 0 && std::max({i % 8, i / 8 % 8, i / 64}) < 7);
+  if (touched) voxels[7 + 8 * 3 + 64 * 3] = voxels[7 + 8 * 4 + 64 * 3] = 2;
   test::write_file(volume,
                    "NRRD0005\ntype: uchar\ndimension: 3\nspace: left-posterior-superior\nsizes: 8 8 8\n"
                    "space directions: (5,0,0) (0,5,0) (0,0,5)\nencoding: raw\n"
@@ -67,6 +68,7 @@ std::string cube(const std::string &out, const std::string &name) {
 
 TEST(LabelsCommand, WithoutATable_MakesOneBodyOfRegionsThatRuns) {
   const std::string out = folder() + "/plain";
+  std::filesystem::remove_all(out);
   const auto made =
       test::deform({"mesh", "from-labels", phantom("nodule", "4"), "--out", out, "--cells", "3000"});
   ASSERT_EQ(made.exit_code, 0) << made.err;
@@ -123,6 +125,64 @@ TEST(LabelsCommand, TableThatTheUserHasChanged_IsNotReplaced) {
   }
 }
 
+// Cells are too coarse for so small a border: no face of theirs lies at it.
+TEST(LabelsCommand, BorderSmallerThanAFaceOfTheCells_HoldsNothing) {
+  const std::string out = test::scratch("labels_command_border"), table = out + "/table.json";
+  std::filesystem::remove_all(out + "/made");
+  test::write_file(table, R"({"format": "deform-labels", "version": 1,
+    "labels": {"1": {"name": "organ", "material": "gel"}, "2": {"name": "spine", "obstacle": true}},
+    "materials": {"gel": {"density": 1000, "young": 1e4}},
+    "bodies": {"organ": {"cells": 80, "surface": {"from": "boundary"}}}})");
+  const auto made = test::deform(
+      {"mesh", "from-labels", cube(out, "organ", true), "--table", table, "--out", out + "/made"});
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(has(made.err, "organ meets spine on less than a face of its cells")) << made.err;
+  const auto read = test::deform({"explain", out + "/made/scene.json"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+}
+
+TEST(LabelsCommand, NamesInOtherLetters_StayApart) {
+  const std::string out = test::scratch("labels_command_names"), table = out + "/table.json";
+  std::filesystem::remove_all(out + "/made");
+  const auto make = [&](const std::string &first, const std::string &second) {
+    test::write_file(table, R"({"format": "deform-labels", "version": 1, "labels": {"1": )" + first +
+                                R"(, "2": )" + second +
+                                R"(}, "materials": {"gel": {"density": 1000, "young": 1e4}}})");
+    return test::deform({"mesh", "from-labels", cube(out, "a", true), "--table", table, "--out",
+                         out + "/made", "--cells", "300"});
+  };
+  const auto made = make(R"({"name": "a", "body": "肝臟", "material": "gel"})",
+                         R"({"name": "b", "body": "腎臟", "material": "gel"})");
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(std::filesystem::exists(out + "/made/肝臟.vtk") &&
+              std::filesystem::exists(out + "/made/腎臟.vtk"));
+  const auto read = test::deform({"explain", out + "/made/scene.json"});
+  EXPECT_EQ(read.exit_code, 0) << read.err;
+  const auto bodies = make(R"({"name": "a", "body": "left/lung", "material": "gel"})",
+                           R"({"name": "b", "body": "left_lung", "material": "gel"})");
+  EXPECT_EQ(bodies.exit_code, 2);
+  EXPECT_TRUE(has(bodies.err, "\"left/lung\" and \"left_lung\"")) << bodies.err;
+  const auto labels =
+      make(R"({"name": "left/lung", "material": "gel"})", R"({"name": "left_lung", "material": "gel"})");
+  EXPECT_EQ(labels.exit_code, 2);
+  EXPECT_TRUE(has(labels.err, "/labels/2/name: label 1 has the name left_lung")) << labels.err;
+}
+
+TEST(LabelsCommand, SceneThatTheUserHasChanged_IsNotReplaced) {
+  const std::string out = test::scratch("labels_command_scene"), made = out + "/made",
+                    scene = made + "/scene.json";
+  std::filesystem::remove_all(made);
+  const std::vector<std::string> words = {"mesh",    "from-labels", cube(out, "liver"), "--out", made,
+                                          "--cells", "300"};
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(test::deform(words).exit_code, 0);
+  const std::string changed = test::read_file(scene) + "\n";
+  test::write_file(scene, changed);
+  const auto refused = test::deform(words);
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_TRUE(has(refused.err, scene + ": ") && has(refused.err, "\"scene\"")) << refused.err;
+  EXPECT_EQ(test::read_file(scene), changed);
+}
+
 TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
   const std::string out = folder() + "/a folder's name";
   const auto fine =
@@ -139,6 +199,7 @@ TEST(LabelsCommand, ManyTriangles_AreReportedAndTheCommandCanBePasted) {
 
 TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
   const std::string table = folder() + "/table.json", out = folder() + "/organs";
+  std::filesystem::remove_all(out);
   test::write_file(table, kTable);
   const auto made = test::deform(
       {"mesh", "from-labels", phantom("abdomen", "12"), "--table", table, "--out", out, "--json"});
@@ -161,6 +222,7 @@ TEST(LabelsCommand, WithATable_MakesBodiesAnObstacleAndWhatHoldsThem) {
 
 TEST(LabelsCommand, BodiesThatAreCut_HaveCellsThatFollowTheirLabels) {
   const std::string table = folder() + "/cut_table.json", out = folder() + "/cut organs";
+  std::filesystem::remove_all(out);
   std::string text = kTable;
   const auto put = [&text](const std::string &before, const std::string &words) {
     text.insert(text.find(before), words);

@@ -80,6 +80,7 @@ TEST(Replay, StateThatIsNotTheRecordedOne_IsReportedWithItsTimeAndExitsWith1) {
   const test::CommandResult again = test::deform({"replay", out});
   EXPECT_EQ(again.exit_code, 1);
   EXPECT_NE(again.err.find("at t = 0.04"), std::string::npos) << again.err;
+  EXPECT_NE(test::read_file(out + "/replay/summary.json").find("\"simulated_s\": 0.04"), std::string::npos);
 }
 
 TEST(Replay, WhatDoesNotFit_IsReportedAndNothingIsLost) {

@@ -172,6 +172,22 @@ TEST(SceneStart, NodesOfABodyThatStartsFromATable_HaveDisplacementsFromRest) {
     for (size_t k = 0; k < 3; ++k) ASSERT_NEAR(std::stod(rows[i][1 + k]), k == 2 ? 0.25 : 0, 1e-9);
 }
 
+// Files of meshers have them: centers of arcs, points of the geometry.
+TEST(SceneStart, NodesWithoutCells_MayHaveARow) {
+  const std::string folder = test::scratch("scene_start_table_" + std::to_string(getpid()));
+  test::write_file(folder + "/mesh.msh",
+                   "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n2 9 9 9\n3 1 0 0\n4 0 1 0\n"
+                   "5 0 0 1\n$EndNodes\n$Elements\n1\n1 4 2 0 0 1 3 4 5\n$EndElements\n");
+  test::write_file(folder + "/table.csv",
+                   "node,x,y,z,vx,vy,vz\n0,0,0,2,0,0,0\n1,9,9,9,0,0,0\n2,1,0,2,0,0,0\n3,0,1,2,0,0,0\n"
+                   "4,0,0,3,0,0,0\n");
+  const Opened s(R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.01, "step": 0.001},
+    "bodies": [{"name": "other", "mesh": ")" +
+                 folder + R"(/mesh.msh", "start": {"state": ")" + folder + R"(/table.csv"}}]})");
+  ASSERT_EQ(s.status, DFM_OK) << dfm_last_error();
+  EXPECT_EQ(s.state("other")[0], (std::vector<double>{0, 0, 2, 1, 0, 2, 0, 1, 2, 0, 0, 3}));
+}
+
 TEST(SceneStart, Jitter_MovesTheChangedBodyToo) {
   const Opened still(scene(R"({"flatten": "point"})")), moved(scene(R"({"flatten": "point"})"), 3);
   ASSERT_EQ(moved.status, DFM_OK) << dfm_last_error();

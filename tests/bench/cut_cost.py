@@ -91,7 +91,8 @@ that cuts, and of one without a cut:
 |---|{rule}
 {rows}
 
-**The time of a cut depends on the size of the body, not on the tool, and hardly on the size of the cut**:
+**The time of a cut depends on the size of the body, hardly on its own; scissors, which cut twice, take
+twice as long**:
 {per_cell:.1f} us per cell of the whole body, since a cut rebuilds the body
 ([cutting]({concepts}/cutting.md#cost)). Cut much in few steps, or use few cells. A cut fits into a step of
 1 ms only in a body of less than about {room:.0f} cells.

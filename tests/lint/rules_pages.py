@@ -78,7 +78,8 @@ def reading_order(tree):
 
 
 def pictures(tree):
-    """Every picture is in the gallery, followed by what makes it: a script or a scene of the repository."""
+    """Every picture is in the gallery, followed by what makes it: a script or a scene of the repository, at
+    the head if not there."""
     gallery = PAGES + "reference/gallery.md"
     content = tree.text(gallery) if gallery in tree.paths else ""
     parts = re.split(r"!\[[^\]]*\]\(\.\./images/([\w.]+)\)", content)
@@ -87,8 +88,9 @@ def pictures(tree):
         if not path.startswith(PAGES + "images/") or not path.endswith(".png"):
             continue
         name = path.rpartition("/")[2]
-        makers = [m for m in re.findall(r"(?<![\w./])[\w./-]+\.(?:py|json)\b", shown.get(name, ""))
-                  if m in tree.paths]
+        named = ([m for m in re.findall(r"(?<![\w./])[\w./-]+\.(?:py|json)\b", text) if m in tree.paths]
+                 for text in (shown.get(name, ""), parts[0]))
+        makers = next(filter(None, named), [])
         if name not in shown:
             yield path, 1, f"is not in {gallery}; show it there and say what makes it"
         elif not makers:

@@ -14,15 +14,6 @@ constexpr int kRounds = 8;           // over all points; the last ones change li
 constexpr int kPasses = 4;           // that restore the volume
 constexpr uint32_t kNone = ~uint32_t(0);
 
-using Vec = std::array<double, 3>;
-Vec operator+(const Vec &a, const Vec &b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-Vec operator-(const Vec &a, const Vec &b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-Vec operator*(double s, const Vec &a) { return {s * a[0], s * a[1], s * a[2]}; }
-double dot(const Vec &a, const Vec &b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
-Vec cross(const Vec &a, const Vec &b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
 // Ericson, Real-Time Collision Detection, 5.1.5: the regions of the plane around a triangle in turn.
 Vec closest_of(const Vec &p, const Vec &a, const Vec &b, const Vec &c) {
   const Vec ab = b - a, ac = c - a, ap = p - a, bp = p - b, cp = p - c;
@@ -84,10 +75,7 @@ class Near {
  private:
   using Key = std::array<int64_t, 3>;
   static constexpr int64_t kMaxCubes = 16;  // a point of a cell that is half inside is nearer than two
-  Vec corner(uint32_t t, size_t i) const {
-    const double *x = &shell_.points[3 * size_t(shell_.triangles[3 * size_t(t) + i])];
-    return {x[0], x[1], x[2]};
-  }
+  Vec corner(uint32_t t, size_t i) const { return at(shell_.points, shell_.triangles[3 * size_t(t) + i]); }
   Key key(const Vec &p) const {
     Key out;
     for (size_t k = 0; k < 3; ++k) out[k] = int64_t(std::floor(p[k] / size_));
@@ -140,7 +128,7 @@ class Fit {
       for (uint32_t &v : cell) {
         if (number[v] == kNone) {
           number[v] = uint32_t(x_.size());
-          x_.push_back({points[3 * size_t(v)], points[3 * size_t(v) + 1], points[3 * size_t(v) + 2]});
+          x_.push_back(at(points, v));
         }
         v = number[v];
       }

@@ -12,6 +12,7 @@
 #include "label_fit.h"
 #include "messages.h"
 #include "run_folder.h"
+#include "state_file.h"
 #include "system.h"
 
 namespace labels {
@@ -26,6 +27,7 @@ constexpr double kCellsAcross = 96;  // by default the labels are at most so man
 constexpr uint32_t kFewestCells = 200;
 constexpr int kRefills = 2;  // until about the wanted number of cells is left
 constexpr size_t kFewVoxels = 27;
+constexpr size_t kNoThing = ~size_t(0);
 
 struct Handles {
   dfm_mesh_handle surface = 0;
@@ -56,6 +58,7 @@ class Maker {
   }
 
  private:
+  static std::string scene_hash(const std::string &text) { return cli::hash_text(cli::hash_of(text)); }
   void warn(const std::string &sentence) { report_.warnings.push_back(sentence); }
   std::string describe(const Entry &e) const {
     return "label " + std::to_string(volume_.value[e.label]) + " (" + e.name + ")";
@@ -86,11 +89,23 @@ class Maker {
       if (!std::filesystem::equivalent(cli::path_of(own), cli::path_of(o_.table), absent))
         warn(own + " differs and is left as it is; the scene is of " + o_.table);
     }
-    std::vector<bool> kept(volume_.value.size(), false);
-    for (const Entry &e : table_.entries) kept[e.label] = true;
+    const std::string scene = o_.out + "/scene.json";
+    if (std::filesystem::exists(cli::path_of(scene), absent) &&
+        !cli::holds(o_.out + "/summary.json", scene_hash(cli::read_file(scene, 64u << 20, "a scene"))))
+      refuse(scene,
+             "not as this command has written it, and would be replaced; move what is your own to \"scene\" "
+             "and \"bodies\" of the table and remove it, or give another folder with --out");
+    thing_.assign(volume_.value.size(), kNoThing);
+    to_label_.assign(volume_.value.size(), "free");
+    to_thing_ = to_label_;
+    for (const Entry &e : table_.entries) {
+      thing_[e.label] = e.thing;
+      to_label_[e.label] = "to_" + e.name;
+      to_thing_[e.label] = "to_" + table_.things[e.thing].name;
+    }
     count_.assign(volume_.value.size(), 0);
     for (uint16_t &v : volume_.voxel) {
-      if (!kept[v]) v = 0;
+      if (thing_[v] == kNoThing) v = 0;
       ++count_[v];
     }
     const double cell = std::fabs(volume_.cell());
@@ -120,8 +135,9 @@ class Maker {
     if (volume_.voxels() > size_t(1) << 27)
       refuse(o_.volume, "%u x %u x %u voxels are left; give a larger --spacing", volume_.size[0],
              volume_.size[1], volume_.size[2]);
-    std::vector<uint32_t> group(volume_.value.size(), 0);
-    for (const Entry &e : table_.entries) group[e.label] = uint32_t(e.thing) + 1;
+    inverse_ = volume_.inverse();
+    std::vector<uint32_t> group;
+    for (const size_t thing : thing_) group.push_back(uint32_t(thing + 1));
     repaired_ = compose(o_.volume, volume_, group);
     if (repaired_.voxels)
       warn(std::to_string(repaired_.voxels) + (repaired_.voxels == 1 ? " voxel has" : " voxels have") +
@@ -137,31 +153,21 @@ class Maker {
                describe(e).c_str(), count_[e.label], report_.factor[0], report_.factor[1], report_.factor[2]);
   }
 
-  std::string beyond(uint16_t label) const {
-    if (label == kOutside) return "cut";
-    for (const Entry &e : table_.entries)
-      if (e.label == label) return "to_" + table_.things[e.thing].name;
-    return "free";
-  }
-
-  // Coordinates that read back the same, triangles in groups by what lies beyond them.
-  void write_obj(const std::string &path, const Shell &shell, const std::vector<std::string> &group) const {
+  // Coordinates that read back the same, triangles in groups by what lies beyond them. to: [value.size()]
+  static void write_obj(const std::string &path, const Shell &shell, const std::vector<std::string> &to) {
     std::string text = "# surface of a label; groups say what lies beyond\n";
     for (size_t i = 0; i < shell.points.size(); i += 3)
       text += "v " + number(shell.points[i]) + " " + number(shell.points[i + 1]) + " " +
               number(shell.points[i + 2]) + "\n";
-    std::vector<std::string> names = group;
-    std::sort(names.begin(), names.end());
-    names.erase(std::unique(names.begin(), names.end()), names.end());
-    for (const std::string &name : names) {
-      text += "g " + name + "\n";
-      for (size_t t = 0; t < group.size(); ++t)
-        if (group[t] == name) {
-          text += "f";
-          for (size_t i = 0; i < 3; ++i) text += " " + std::to_string(shell.triangles[3 * t + i] + 1);
-          text += "\n";
-        }
+    std::map<std::string, std::string> groups;
+    for (size_t t = 0; t < shell.beyond.size(); ++t) {
+      const uint16_t label = shell.beyond[t];
+      std::string &faces = groups[label == kOutside ? "cut" : to[label]];
+      faces += "f";
+      for (size_t i = 0; i < 3; ++i) faces += " " + std::to_string(shell.triangles[3 * t + i] + 1);
+      faces += "\n";
     }
+    for (const auto &[name, faces] : groups) text += "g " + name + "\n" + faces;
     cli::write_whole(path, text);
   }
 
@@ -170,16 +176,9 @@ class Maker {
     std::vector<bool> inside(volume_.value.size(), false);
     inside[e.label] = true;
     const Shell shell = shell_of(surfaces_, inside);
-    std::vector<std::string> group;
+    write_obj(o_.out + "/surfaces/" + e.name + ".obj", shell, to_label_);
     LabelReport r;
-    for (const uint16_t l : shell.beyond) {
-      std::string name = beyond(l);
-      for (const Entry &other : table_.entries)
-        if (other.label == l) name = "to_" + other.name;
-      group.push_back(name);
-      r.at_border = r.at_border || l == kOutside;
-    }
-    write_obj(o_.out + "/surfaces/" + e.name + ".obj", shell, group);
+    r.at_border = std::ranges::find(shell.beyond, kOutside) != shell.beyond.end();
     r.value = volume_.value[e.label];
     r.name = e.name;
     r.thing = table_.things[e.thing].name;
@@ -208,53 +207,52 @@ class Maker {
     for (const size_t e : t.entries) inside[table_.entries[e].label] = true;
     const Shell shell = shell_of(surfaces_, inside);
     report_.open_edges += shell.open_edges;
-    std::vector<std::string> group;
-    for (const uint16_t l : shell.beyond) group.push_back(beyond(l));
-    write_obj(o_.out + "/" + t.name + ".obj", shell, group);
+    write_obj(o_.out + "/" + t.name + ".obj", shell, to_thing_);
     ThingReport r;
     r.name = t.name;
     r.obstacle = t.obstacle;
     r.points = uint32_t(shell.from.size());
     r.triangles = uint32_t(shell.beyond.size());
     for (size_t p = 2; p < shell.points.size(); p += 3) lowest_ = std::min(lowest_, shell.points[p]);
-    if (!t.obstacle) add_borders(thing, shell, group, fill(t, shell, group, r));
+    if (!t.obstacle) fill(thing, shell, r);
     report_.things.push_back(r);
   }
 
+  size_t thing_at(uint16_t label) const { return label == kOutside ? kNoThing : thing_[label]; }
+
   static double triangle_area(const Shell &shell, size_t t) {
-    double e[2][3], sum = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      const double x = shell.points[3 * size_t(shell.triangles[3 * t]) + k];
-      e[0][k] = shell.points[3 * size_t(shell.triangles[3 * t + 1]) + k] - x;
-      e[1][k] = shell.points[3 * size_t(shell.triangles[3 * t + 2]) + k] - x;
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      const double n = e[0][(k + 1) % 3] * e[1][(k + 2) % 3] - e[0][(k + 2) % 3] * e[1][(k + 1) % 3];
-      sum += n * n;
-    }
-    return std::sqrt(sum) / 2;
+    Vec p[3];
+    for (size_t i = 0; i < 3; ++i) p[i] = at(shell.points, shell.triangles[3 * t + i]);
+    const Vec n = cross(p[1] - p[0], p[2] - p[0]);
+    return std::sqrt(dot(n, n)) / 2;
   }
 
-  // A body is held where it meets an obstacle, and attached to bodies that come before it. edge: m, of its
-  // cells
-  void add_borders(size_t thing, const Shell &shell, const std::vector<std::string> &group, double edge) {
+  // A body is held where it meets an obstacle, and attached to bodies that come before it. surface: the
+  // body's own, on which its scene looks for the groups. edge: m, of its cells
+  void add_borders(size_t thing, const Shell &shell, const Shell &surface, double edge) {
     for (size_t other = 0; other < table_.things.size(); ++other) {
       const Thing &a = table_.things[thing], &b = table_.things[other];
       if (other == thing || a.obstacle || (!b.obstacle && other > thing)) continue;
+      const auto meets = [&](uint16_t label) { return thing_at(label) == other; };
+      if (std::ranges::none_of(shell.beyond, meets)) continue;
       Border border;
       border.a = a.name;
       border.b = b.name;
       border.held = b.obstacle;
-      std::vector<bool> on(shell.from.size(), false);
+      std::vector<bool> on(surface.points.size() / 3, false);
       double area = 0;
-      for (size_t t = 0; t < group.size(); ++t)
-        if (group[t] == "to_" + b.name) {
+      for (size_t t = 0; t < surface.beyond.size(); ++t)
+        if (meets(surface.beyond[t])) {
           ++border.triangles;
-          for (size_t i = 0; i < 3; ++i) on[shell.triangles[3 * t + i]] = true;
-          area += triangle_area(shell, t);
+          for (size_t i = 0; i < 3; ++i) on[surface.triangles[3 * t + i]] = true;
+          area += triangle_area(surface, t);
         }
       border.points = uint32_t(std::count(on.begin(), on.end(), true));
-      if (border.triangles == 0) continue;
+      if (border.triangles == 0) {
+        warn("the body " + a.name + " meets " + b.name + " on less than a face of its cells, and is not " +
+             (border.held ? "held" : "attached") + " there; give it more cells");
+        continue;
+      }
       if (!border.held) set_stiffness(border, area, edge, a, b);
       report_.borders.push_back(border);
     }
@@ -275,8 +273,8 @@ class Maker {
 
   struct Cells {
     std::vector<double> points, share;
-    std::vector<uint32_t> tets, faces;  // faces: at neighbors, of a body whose surface is its cells' boundary
-    std::vector<std::string> beyond;    // group of each face
+    std::vector<uint32_t> tets;
+    Shell boundary;  // of a body whose surface it is
   };
 
   static Cells cells_in(const dfm_mesh_info &mesh) {
@@ -288,26 +286,22 @@ class Maker {
   }
 
   // Makes them cells whose boundary can be the surface; none where the body is too thin.
-  static void fit(const Shell &shell, const std::vector<std::string> &group, double edge, Cells &cells,
-                  ThingReport &r) {
+  static void fit(const Shell &shell, double edge, Cells &cells, ThingReport &r) {
     const Fitted made = fit_cells(shell, cells.points, cells.tets, cells.share, edge);
     cells.points = made.points;
     cells.tets = made.tets;
     cells.share.assign(made.tets.size() / 4, 1.0);
-    for (size_t f = 0; f < made.under.size(); ++f) {
-      const std::string &name = group[made.under[f]];
-      if (name.rfind("to_", 0) != 0) continue;
-      cells.beyond.push_back(name);
-      cells.faces.insert(cells.faces.end(), &made.faces[3 * f], &made.faces[3 * f] + 3);
-    }
+    cells.boundary.points = made.points;
+    cells.boundary.triangles = made.faces;
+    for (const uint32_t t : made.under) cells.boundary.beyond.push_back(shell.beyond[t]);
     r.triangles = uint32_t(made.under.size());
     r.quality_min = made.quality_min;
     r.quality_mean = made.quality_mean;
     r.farthest = made.farthest;
   }
 
-  // Returns the median edge of its cells, m.
-  double fill(const Thing &t, const Shell &shell, const std::vector<std::string> &group, ThingReport &r) {
+  void fill(size_t thing, const Shell &shell, ThingReport &r) {
+    const Thing &t = table_.things[thing];
     Handles h;
     const auto need = [&](dfm_status status) {
       if (status < 0) refuse(o_.volume, "the body %s: %s", t.name.c_str(), dfm_last_error());
@@ -326,7 +320,7 @@ class Maker {
       r.quality_min = info.quality_min;
       r.quality_mean = info.quality_mean;
       if (!t.own_boundary) break;
-      fit(shell, group, info.edge_median, cells, r);
+      fit(shell, info.edge_median, cells, r);
       if (again == 0 || cells.share.size() >= 0.9 * wanted) break;
       // cells that are mostly outside have gone, fewer of each hundred the smaller they are
       requested =
@@ -363,7 +357,7 @@ class Maker {
              " is smaller than a cell and has none; give more cells by --cells or in the table");
     }
     write_vtk(o_.out + "/" + t.name + ".vtk", t, cells, of_cell);
-    return info.edge_median;
+    add_borders(thing, shell, t.own_boundary ? cells.boundary : shell, info.edge_median);
   }
 
   // Places in a cell that each label of this body has, of 35; where none has one, the nearest voxel's label.
@@ -374,10 +368,10 @@ class Maker {
       for (int b = 0; a + b <= kParts; ++b)
         for (int c = 0; a + b + c <= kParts; ++c) {
           const int parts[4] = {a, b, c, kParts - a - b - c};
-          double p[3] = {0, 0, 0};
+          Vec p = {0, 0, 0};
           for (int i = 0; i < 4; ++i)
-            for (int k = 0; k < 3; ++k)
-              p[k] += (parts[i] + 0.25) / (kParts + 1) * x[3 * size_t(tet[i]) + size_t(k)];
+            for (size_t k = 0; k < 3; ++k)
+              p[k] += (parts[i] + 0.25) / (kParts + 1) * x[3 * size_t(tet[i]) + k];
           ++found[label_at(p)];
         }
     std::map<size_t, int> out;
@@ -433,20 +427,9 @@ class Maker {
     return best;
   }
 
-  void index_of(const double p[3], double out[3]) {
-    if (inverse_.empty()) {
-      const auto &a = volume_.axis;
-      for (size_t k = 0; k < 3; ++k) {
-        const double *u = a[(k + 1) % 3], *w = a[(k + 2) % 3];
-        const double row[3] = {u[1] * w[2] - u[2] * w[1], u[2] * w[0] - u[0] * w[2],
-                               u[0] * w[1] - u[1] * w[0]};
-        for (const double r : row) inverse_.push_back(r / volume_.cell());
-      }
-    }
-    for (size_t k = 0; k < 3; ++k) {
-      out[k] = 0;
-      for (size_t c = 0; c < 3; ++c) out[k] += inverse_[3 * k + c] * (p[c] - volume_.origin[c]);
-    }
+  Vec index_of(const Vec &p) const {
+    const Vec arm = p - Vec{volume_.origin[0], volume_.origin[1], volume_.origin[2]};
+    return {dot(inverse_[0], arm), dot(inverse_[1], arm), dot(inverse_[2], arm)};
   }
   uint16_t voxel(int64_t i, int64_t j, int64_t k) const {
     if (i < 0 || j < 0 || k < 0 || i >= volume_.size[0] || j >= volume_.size[1] || k >= volume_.size[2])
@@ -454,16 +437,15 @@ class Maker {
     return volume_
         .voxel[size_t(i) + size_t(volume_.size[0]) * (size_t(j) + size_t(volume_.size[1]) * size_t(k))];
   }
-  uint16_t label_at(const double p[3]) {
-    double c[3];
-    index_of(p, c);
+  uint16_t label_at(const Vec &p) const {
+    const Vec c = index_of(p);
     return voxel(std::lround(c[0]), std::lround(c[1]), std::lround(c[2]));
   }
-  size_t nearest_label(const Thing &t, const double *x, const uint32_t *tet) {
-    double p[3] = {0, 0, 0}, c[3];
+  size_t nearest_label(const Thing &t, const double *x, const uint32_t *tet) const {
+    Vec p = {0, 0, 0};
     for (int i = 0; i < 4; ++i)
-      for (int k = 0; k < 3; ++k) p[k] += x[3 * size_t(tet[i]) + size_t(k)] / 4;
-    index_of(p, c);
+      for (size_t k = 0; k < 3; ++k) p[k] += x[3 * size_t(tet[i]) + k] / 4;
+    const Vec c = index_of(p);
     size_t best = t.entries[0];
     double least = INFINITY;
     for (int64_t reach = 1; reach <= 64 && !std::isfinite(least); reach *= 2)
@@ -484,11 +466,17 @@ class Maker {
   void write_vtk(const std::string &path, const Thing &t, const Cells &cells,
                  const std::vector<size_t> &of_cell) const {
     // groups: a label's cells by its entry, then the faces at neighbors
+    const Shell &boundary = cells.boundary;
+    std::vector<size_t> faces;
     std::map<std::string, size_t> borders;
-    for (const std::string &name : cells.beyond) borders.emplace(name, 0);
+    for (size_t f = 0; f < boundary.beyond.size(); ++f)
+      if (thing_at(boundary.beyond[f]) != kNoThing) {
+        faces.push_back(f);
+        borders.emplace(to_thing_[boundary.beyond[f]], 0);
+      }
     size_t last = table_.entries.size();
     for (auto &[name, number] : borders) number = ++last;
-    const size_t ntet = cells.share.size(), nface = cells.beyond.size();
+    const size_t ntet = cells.share.size(), nface = faces.size();
     const std::string ncell = std::to_string(ntet + nface),
                       ngroup = std::to_string(t.entries.size() + borders.size());
     std::string text =
@@ -511,13 +499,13 @@ class Maker {
       text += "\n";
     };
     for (size_t c = 0; c < ntet; ++c) row(&cells.tets[4 * c], 4);
-    for (size_t f = 0; f < nface; ++f) row(&cells.faces[3 * f], 3);
+    for (const size_t f : faces) row(&boundary.triangles[3 * f], 3);
     text += "CELL_TYPES " + ncell + "\n";
     for (size_t c = 0; c < ntet; ++c) text += "10\n";
     for (size_t f = 0; f < nface; ++f) text += "5\n";
     text += "CELL_DATA " + ncell + "\nSCALARS group int 1\nLOOKUP_TABLE default\n";
     for (const size_t e : of_cell) text += std::to_string(e + 1) + "\n";
-    for (const std::string &name : cells.beyond) text += std::to_string(borders[name]) + "\n";
+    for (const size_t f : faces) text += std::to_string(borders[to_thing_[boundary.beyond[f]]]) + "\n";
     if (!t.own_boundary) {
       text += "SCALARS share double 1\nLOOKUP_TABLE default\n";
       for (const double share : cells.share) text += number(share) + "\n";
@@ -651,7 +639,9 @@ class Maker {
     for (const auto &[key, value] : rest) out.add(key, value);
     JsonValue whole;
     cli::parse_json(out.text(), whole);
-    cli::write_whole(o_.out + "/scene.json", cli::json_lines(whole) + "\n");
+    const std::string text = cli::json_lines(whole) + "\n";
+    cli::write_whole(o_.out + "/scene.json", text);
+    report_.scene_hash = scene_hash(text);
   }
 
   // Looks from the front, a little from above, at all that there is.
@@ -682,11 +672,13 @@ class Maker {
   const Options &o_;
   Volume volume_;
   Table table_;
-  std::vector<size_t> count_;   // voxels per label, of the file
-  std::vector<double> target_;  // m3
+  std::vector<size_t> thing_;                     // of each label; kNoThing: left out
+  std::vector<std::string> to_label_, to_thing_;  // of each label: the group of triangles before it
+  std::vector<size_t> count_;                     // voxels per label, of the file
+  std::vector<double> target_;                    // m3
   Repaired repaired_;
   Surfaces surfaces_;
-  std::vector<double> inverse_;  // rows that give voxels for meters
+  std::array<Vec, 3> inverse_;
   double lowest_ = INFINITY;
   Report report_;
   bool writes_table_ = true;

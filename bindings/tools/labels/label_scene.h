@@ -45,6 +45,7 @@ struct Report {
   std::vector<ThingReport> things;
   std::vector<Border> borders;
   size_t open_edges = 0, crossing = 0, restored = 0;
+  std::string scene_hash;     // of scene.json: who changes it then does not lose it
   double largest_change = 0;  // of a label's volume, share of that of its voxels
   std::vector<std::string> warnings;
 };

@@ -22,17 +22,6 @@ constexpr double kReach = 0.49;  // voxels that a vertex may move along an axis
 constexpr double kInward = 0.6307, kOutward = -0.6732;
 constexpr int kVolumeRounds = 4;
 
-struct Point { double x[3]; };
-
-Point operator-(const Point &a, const Point &b) {
-  return {{a.x[0] - b.x[0], a.x[1] - b.x[1], a.x[2] - b.x[2]}};
-}
-Point cross(const Point &a, const Point &b) {
-  return {{a.x[1] * b.x[2] - a.x[2] * b.x[1], a.x[2] * b.x[0] - a.x[0] * b.x[2],
-           a.x[0] * b.x[1] - a.x[1] * b.x[0]}};
-}
-double dot(const Point &a, const Point &b) { return a.x[0] * b.x[0] + a.x[1] * b.x[1] + a.x[2] * b.x[2]; }
-
 // Solves the symmetric positive semidefinite system a x = b in place; what has no pivot stays 0.
 void solve(std::vector<double> &a, std::vector<double> &b, size_t n) {
   double largest = 0;
@@ -104,7 +93,7 @@ class Net {
       uint32_t &number = numbers[size_t(i) + row * size_t(j)];
       if (number == UINT32_MAX) {
         number = uint32_t(corner_.size());
-        corner_.push_back({{double(i) - 0.5, double(j) - 0.5, double(k) - 0.5}});
+        corner_.push_back({double(i) - 0.5, double(j) - 0.5, double(k) - 0.5});
       }
       return number;
     };
@@ -186,39 +175,39 @@ class Net {
   // Within reach of its corner; what lies on the border of the volume stays there.
   void place(uint32_t vertex, const double to[3]) {
     for (int k = 0; k < 3; ++k) {
-      const double c = corner_[vertex].x[k];
+      const double c = corner_[vertex][k];
       const bool on_border = c < 0 || c > double(n_[k]) - 1;
-      at_[vertex].x[k] = on_border ? c : std::min(std::max(to[k], c - kReach), c + kReach);
+      at_[vertex][k] = on_border ? c : std::min(std::max(to[k], c - kReach), c + kReach);
     }
   }
 
   void smooth(double weight) {
-    const std::vector<Point> old = at_;
+    const std::vector<Vec> old = at_;
     for (uint32_t v = 0; v < corner_.size(); ++v) {
       const uint32_t n = first_[v + 1] - first_[v];
       if (n == 0) continue;
       double to[3];
       for (int k = 0; k < 3; ++k) {
         double sum = 0;
-        for (uint32_t e = first_[v]; e < first_[v + 1]; ++e) sum += old[neighbor_[e]].x[k];
-        to[k] = old[v].x[k] + weight * (sum / n - old[v].x[k]);
+        for (uint32_t e = first_[v]; e < first_[v + 1]; ++e) sum += old[neighbor_[e]][k];
+        to[k] = old[v][k] + weight * (sum / n - old[v][k]);
       }
       place(v, to);
     }
   }
 
   // m, relative to the first voxel: smaller numbers lose fewer digits in volumes
-  Point meters(const Point &p) const {
-    Point out{};
+  Vec meters(const Vec &p) const {
+    Vec out{};
     for (int k = 0; k < 3; ++k)
-      for (int c = 0; c < 3; ++c) out.x[c] += p.x[k] * v_.axis[k][c];
+      for (int c = 0; c < 3; ++c) out[c] += p[k] * v_.axis[k][c];
     return out;
   }
 
   // The shorter diagonal divides a quadrilateral, of equal ones the first, whatever side is considered.
   bool first_diagonal(const Quad &q) const {
-    const Point d0 = meters(at_[q.corner[2]] - at_[q.corner[0]]),
-                d1 = meters(at_[q.corner[3]] - at_[q.corner[1]]);
+    const Vec d0 = meters(at_[q.corner[2]] - at_[q.corner[0]]),
+              d1 = meters(at_[q.corner[3]] - at_[q.corner[1]]);
     return dot(d0, d0) <= dot(d1, d1);
   }
   // Corners of its triangles, counter-clockwise seen from the front also where the axes are left-handed.
@@ -249,7 +238,7 @@ class Net {
     struct Pull {
       uint32_t vertex;
       uint16_t label;
-      Point gradient;
+      Vec gradient;
     };
     const size_t nlabel = v_.value.size();
     std::vector<Pull> pulls;
@@ -259,16 +248,16 @@ class Net {
       uint32_t t[2][3];
       triangles(q, t);
       for (const auto &c : t) {
-        const Point a = meters(at_[c[0]]), b = meters(at_[c[1]]), d = meters(at_[c[2]]);
-        Point normal = cross(b - a, d - a);
+        const Vec a = meters(at_[c[0]]), b = meters(at_[c[1]]), d = meters(at_[c[2]]);
+        Vec normal = cross(b - a, d - a);
         const double size = std::sqrt(dot(normal, normal));
-        for (double &x : normal.x) x /= 6;  // a third of the triangle's area, to each corner
+        for (double &x : normal) x /= 6;  // a third of the triangle's area, to each corner
         for (const uint32_t v : c) {
           area[v] += size / 6;
           pulls.push_back({v, q.behind, normal});
-          for (double &x : normal.x) x = -x;
+          for (double &x : normal) x = -x;
           pulls.push_back({v, q.front, normal});
-          for (double &x : normal.x) x = -x;
+          for (double &x : normal) x = -x;
         }
       }
     }
@@ -278,7 +267,7 @@ class Net {
     size_t n = 0;
     for (size_t i = 0; i < pulls.size(); ++i) {
       if (n > 0 && pulls[n - 1].vertex == pulls[i].vertex && pulls[n - 1].label == pulls[i].label)
-        for (int k = 0; k < 3; ++k) pulls[n - 1].gradient.x[k] += pulls[i].gradient.x[k];
+        for (int k = 0; k < 3; ++k) pulls[n - 1].gradient[k] += pulls[i].gradient[k];
       else pulls[n++] = pulls[i];
     }
     pulls.resize(n);
@@ -295,27 +284,17 @@ class Net {
     }
     solve(matrix, pressure, nlabel);
     pressure[0] = 0;
-    const std::array<Point, 3> inverse = inverse_axes();
+    const std::array<Vec, 3> inverse = v_.inverse();
     for (size_t begin = 0, end; begin < n; begin = end) {
-      Point step{};
+      Vec step{};
       for (end = begin; end < n && pulls[end].vertex == pulls[begin].vertex; ++end)
         for (int k = 0; k < 3; ++k)
-          step.x[k] += pressure[pulls[end].label] * pulls[end].gradient.x[k] / area[pulls[end].vertex];
+          step[k] += pressure[pulls[end].label] * pulls[end].gradient[k] / area[pulls[end].vertex];
       const uint32_t v = pulls[begin].vertex;
       double to[3];
-      for (size_t k = 0; k < 3; ++k) to[k] = at_[v].x[k] + dot(inverse[k], step);
+      for (size_t k = 0; k < 3; ++k) to[k] = at_[v][k] + dot(inverse[k], step);
       place(v, to);
     }
-  }
-
-  // Rows that give voxels for meters.
-  std::array<Point, 3> inverse_axes() const {
-    Point a[3];
-    for (int k = 0; k < 3; ++k) std::copy_n(v_.axis[k], 3, a[k].x);
-    std::array<Point, 3> out = {cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])};
-    for (Point &row : out)
-      for (double &x : row.x) x /= v_.cell();
-    return out;
   }
 
   // ---- nothing may cross ----
@@ -328,9 +307,9 @@ class Net {
       least = std::min(least, std::sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2]));
     for (int digits = 0; digits < 15 && per_meter_ * least < 1e4; ++digits) per_meter_ *= 10;
   }
-  Point world(uint32_t vertex) const {
-    Point out = meters(at_[vertex]);
-    for (int k = 0; k < 3; ++k) out.x[k] = std::round((out.x[k] + v_.origin[k]) * per_meter_) / per_meter_;
+  Vec world(uint32_t vertex) const {
+    Vec out = meters(at_[vertex]);
+    for (int k = 0; k < 3; ++k) out[k] = std::round((out[k] + v_.origin[k]) * per_meter_) / per_meter_;
     return out;
   }
 
@@ -339,8 +318,8 @@ class Net {
     const double *pa[3], *pb[3];
     int shared_a[3], shared_b[3], n = 0;
     for (int i = 0; i < 3; ++i) {
-      pa[i] = world_[a[i]].x;
-      pb[i] = world_[b[i]].x;
+      pa[i] = world_[a[i]].data();
+      pb[i] = world_[b[i]].data();
       for (int j = 0; j < 3; ++j)
         if (a[i] == b[j]) {
           shared_a[n] = i;
@@ -379,8 +358,8 @@ class Net {
     std::vector<Entry> entries;
     const auto corner = [&](uint32_t q, int k) {
       const uint32_t *c = quads_[q].corner;
-      double least = corner_[c[0]].x[k];
-      for (int i = 1; i < 4; ++i) least = std::min(least, corner_[c[i]].x[k]);
+      double least = corner_[c[0]][k];
+      for (int i = 1; i < 4; ++i) least = std::min(least, corner_[c[i]][k]);
       return int64_t(least + 0.75);
     };
     for (uint32_t q = 0; q < quads_.size(); ++q)
@@ -424,8 +403,8 @@ class Net {
   }
   bool boxes_meet(const uint32_t a[3], const uint32_t b[3]) const {
     for (int k = 0; k < 3; ++k) {
-      const double a0 = world_[a[0]].x[k], a1 = world_[a[1]].x[k], a2 = world_[a[2]].x[k];
-      const double b0 = world_[b[0]].x[k], b1 = world_[b[1]].x[k], b2 = world_[b[2]].x[k];
+      const double a0 = world_[a[0]][k], a1 = world_[a[1]][k], a2 = world_[a[2]][k];
+      const double b0 = world_[b[0]][k], b1 = world_[b[1]][k], b2 = world_[b[2]][k];
       if (std::max({a0, a1, a2}) < std::min({b0, b1, b2}) || std::max({b0, b1, b2}) < std::min({a0, a1, a2}))
         return false;
     }
@@ -444,7 +423,7 @@ class Net {
       for (uint32_t v = 0; v < corner_.size(); ++v) {
         if (!moves[v]) continue;
         const double keep = ++times[v] < 6 ? 0.5 : 0;
-        for (int k = 0; k < 3; ++k) at_[v].x[k] = corner_[v].x[k] + keep * (at_[v].x[k] - corner_[v].x[k]);
+        for (int k = 0; k < 3; ++k) at_[v][k] = corner_[v][k] + keep * (at_[v][k] - corner_[v][k]);
         times[v] = std::min<uint8_t>(times[v], 100);
       }
     }
@@ -454,7 +433,7 @@ class Net {
   void fill(Surfaces &out) const {
     out.volume = volumes();
     out.volume[0] = 0;
-    for (const Point &p : world_) out.points.insert(out.points.end(), p.x, p.x + 3);
+    for (const Vec &p : world_) out.points.insert(out.points.end(), p.begin(), p.end());
     for (const Quad &q : quads_) {
       uint32_t t[2][3];
       triangles(q, t);
@@ -468,8 +447,8 @@ class Net {
   const Volume &v_;
   const std::vector<double> &target_;
   int64_t n_[3];
-  double per_meter_ = 1;                    // steps of the decimals of coordinates
-  std::vector<Point> corner_, at_, world_;  // voxels, voxels, m
+  double per_meter_ = 1;                  // steps of the decimals of coordinates
+  std::vector<Vec> corner_, at_, world_;  // voxels, voxels, m
   std::vector<Quad> quads_;
   std::vector<uint32_t> first_, neighbor_;
 };
@@ -512,12 +491,10 @@ Shell shell_of(const Surfaces &s, const std::vector<bool> &inside) {
     out.open_edges += n != 2 || edges[i][2] == edges[i + 1][2];
   }
   if (!out.points.empty()) {
-    Point o;
-    std::copy_n(out.points.data(), 3, o.x);
+    const Vec o = at(out.points, 0);
     for (size_t t = 0; t < out.beyond.size(); ++t) {
-      Point p[3];
-      for (size_t i = 0; i < 3; ++i)
-        std::copy_n(&out.points[3 * size_t(out.triangles[3 * t + i])], 3, p[i].x);
+      Vec p[3];
+      for (size_t i = 0; i < 3; ++i) p[i] = at(out.points, out.triangles[3 * t + i]);
       out.volume += dot(p[0] - o, cross(p[1] - o, p[2] - o)) / 6;
     }
   }

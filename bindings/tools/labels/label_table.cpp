@@ -5,6 +5,7 @@
 
 #include "file.h"
 #include "messages.h"
+#include "shown.h"
 
 namespace labels {
 namespace {
@@ -14,16 +15,19 @@ using cli::JsonValue;
 
 constexpr uint64_t kMaxBytes = 16 << 20;
 constexpr uint32_t kMaxCells = 5000000;
+constexpr size_t kMaxName = 60;  // bytes
 
 // For names of files, bodies and groups alike.
 std::string plain_name(const std::string &name) {
   std::string out;
-  for (const char c : name) {
+  for (const char c : cli::shown(cli::as_utf8(name))) {  // without control characters
+    const bool goes_on = (c & 0xc0) == 0x80;             // a character of several bytes
+    if (out.size() >= kMaxName && !goes_on) break;
     const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') ||
-                       c == '_' || c == '-' || (c == '.' && !out.empty());
+                       (c & 0x80) != 0 || c == '_' || c == '-' || (c == '.' && !out.empty());
     out += plain ? c : '_';
   }
-  return out.substr(0, 60);
+  return out;
 }
 
 std::string escaped(const std::string &key) {  // of a JSON pointer
@@ -151,13 +155,14 @@ class Reader {
     e.name = text(m.value, "name", pointer);
     if (e.name.empty())
       e.name = named != volume_.name.end() ? named->second : "label_" + std::to_string(value);
-    e.name = plain_name(e.name);
     const bool obstacle = truth(m.value, "obstacle", pointer);
     std::string thing = text(m.value, "body", pointer);
     if (obstacle && !thing.empty())
       refuse(path_, "%s/body: an obstacle is no part of a body; remove \"body\" or \"obstacle\"",
              pointer.c_str());
-    thing = plain_name(thing.empty() ? e.name : thing);
+    const std::string given = thing.empty() ? e.name : thing;
+    thing = plain_name(given);
+    e.name = plain_name(e.name);
     e.material = text(m.value, "material", pointer);
     if (!obstacle && e.material.empty())
       refuse(path_,
@@ -172,13 +177,18 @@ class Reader {
     }
     for (const Entry &other : out_.entries)
       if (other.name == e.name)
-        refuse(path_, "%s/name: another label has the name %s", pointer.c_str(), e.name.c_str());
+        refuse(path_, "%s/name: label %lld has the name %s already; give another one", pointer.c_str(),
+               static_cast<long long>(volume_.value[other.label]), e.name.c_str());
     size_t t = 0;
     while (t < out_.things.size() && out_.things[t].name != thing) ++t;
     if (t == out_.things.size()) {
       out_.things.emplace_back();
       out_.things[t].name = thing;
       out_.things[t].obstacle = obstacle;
+      given_.push_back(given);
+    } else if (given_[t] != given) {
+      refuse(path_, "%s: \"%s\" and \"%s\" would both be called %s; give other names", pointer.c_str(),
+             given_[t].c_str(), given.c_str(), thing.c_str());
     } else if (obstacle || out_.things[t].obstacle) {
       refuse(path_, "%s: another label is the body or obstacle %s already; give it another name",
              pointer.c_str(), thing.c_str());
@@ -229,6 +239,7 @@ class Reader {
   const std::string &path_;
   const Volume &volume_;
   Table out_;
+  std::vector<std::string> given_;  // names of out_.things as the file has them
 };
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace labels {
 
 struct Entry {
   uint16_t label = 0;    // index into Volume::value
-  std::string name;      // of the label: letters, digits, '_', '-', '.'
+  std::string name;      // of the label: letters, digits, '_', '-', '.', what is not ASCII
   size_t thing = 0;      // of Table::things
   std::string material;  // of Table::materials
 };

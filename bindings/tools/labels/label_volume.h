@@ -8,9 +8,11 @@
 #include <string_view>
 #include <vector>
 
+#include "label_math.h"
+
 namespace labels {
 
-// A file holds at most this many values that differ; an image of gray values holds more.
+// A file holds at most this many beside 0; an image of gray values holds more.
 constexpr size_t kMaxLabels = 1024;
 
 struct Volume {
@@ -25,6 +27,7 @@ struct Volume {
   size_t voxels() const { return size_t(size[0]) * size[1] * size[2]; }
   // m3 of one voxel; below 0 where the axes are left-handed.
   double cell() const;
+  std::array<Vec, 3> inverse() const;  // rows that give voxels for meters
 };
 
 // How a header says that its voxels are stored.

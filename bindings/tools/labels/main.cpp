@@ -61,6 +61,7 @@ std::string report_json(const labels::Report &r, const std::string &out) {
                           .text());
   for (const std::string &w : r.warnings) warnings.push_back(quoted(w));
   return JsonObject()
+      .add("scene_hash", quoted(r.scene_hash))
       .add("scene", quoted(out + "/scene.json"))
       .add("voxels", size_json(r.size))
       .add("joined", size_json(r.factor))

@@ -97,6 +97,15 @@ double Volume::cell() const {
          a[0][2] * (a[1][0] * a[2][1] - a[1][1] * a[2][0]);
 }
 
+std::array<Vec, 3> Volume::inverse() const {
+  Vec a[3];
+  for (size_t k = 0; k < 3; ++k) std::copy_n(axis[k], 3, a[k].begin());
+  std::array<Vec, 3> out = {cross(a[1], a[2]), cross(a[2], a[0]), cross(a[0], a[1])};
+  for (Vec &row : out)
+    for (double &x : row) x /= cell();
+  return out;
+}
+
 namespace {
 
 // Takes the voxels as they come, in blocks, so that the values of a large file are never there twice.
@@ -161,12 +170,12 @@ class Collector {
     if (value == last_) return last_index_;
     const auto [entry, is_new] = index_.emplace(value, uint16_t(out_.value.size()));
     if (is_new) {
-      if (out_.value.size() == kMaxLabels)
-        refuse(
-            path_,
-            "more than %zu values differ, so these are gray values and not labels; give the label map that "
-            "a segmentation program writes",
-            kMaxLabels);
+      if (out_.value.size() == kMaxLabels + 1)
+        refuse(path_,
+               "more than %zu values differ from 0, so these are gray values and not labels; give the label "
+               "map that "
+               "a segmentation program writes",
+               kMaxLabels);
       out_.value.push_back(value);
     }
     last_ = value;

@@ -94,6 +94,13 @@ class Table {
   int columns_ = 0;
 };
 
+size_t node_of(const Table &table, double cell, size_t nodes) {
+  if (cell < 0 || cell != std::floor(cell) || cell >= double(nodes))
+    table.refuse(format("there is no node %g; the mesh file has the nodes 0 to %zu", cell, nodes - 1),
+                 DFM_E_ARG);
+  return size_t(cell);
+}
+
 }  // namespace
 
 // ---- by the mesh file's node numbers from 0 ---------------------------------------------------------------
@@ -109,11 +116,7 @@ std::vector<NodalRow> read_nodal(const std::string &path, const BodyMesh &mesh) 
   std::vector<NodalRow> rows;
   double cell[7];
   while (table.next(cell)) {
-    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()))
-      table.refuse(
-          format("there is no node %g; the mesh file has the nodes 0 to %zu", cell[0], point_of.size() - 1),
-          DFM_E_ARG);
-    NodalRow row = {point_of[size_t(cell[0])], 0, {cell[4], cell[5], cell[6]}};
+    NodalRow row = {point_of[node_of(table, cell[0], point_of.size())], 0, {cell[4], cell[5], cell[6]}};
     for (int k = 0; k < 3; ++k) {
       if (cell[1 + k] != 0 && cell[1 + k] != 1)
         table.refuse(format("fix%c is 0 or 1, found %g", "xyz"[k], cell[1 + k]), DFM_E_ARG);
@@ -142,14 +145,12 @@ StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   std::vector<uint8_t> seen(mesh.info.npoint, 0);
   double cell[7];
   while (table.next(cell)) {
-    if (cell[0] < 0 || cell[0] != std::floor(cell[0]) || cell[0] >= double(point_of.size()) ||
-        point_of[size_t(cell[0])] == UINT32_MAX)
-      table.refuse(format("no tetrahedron of the mesh file has a node %g", cell[0]), DFM_E_ARG);
-    const size_t point = point_of[size_t(cell[0])];
+    const uint32_t point = point_of[node_of(table, cell[0], point_of.size())];
+    if (point == UINT32_MAX) continue;  // of no cell
     if (seen[point]) table.refuse(format("node %g has a row already", cell[0]), DFM_E_ARG);
     seen[point] = 1;
-    std::copy_n(cell + 1, 3, &out.x[3 * point]);
-    std::copy_n(cell + 4, 3, &out.v[3 * point]);
+    std::copy_n(cell + 1, 3, &out.x[3 * size_t(point)]);
+    std::copy_n(cell + 4, 3, &out.v[3 * size_t(point)]);
   }
   const auto missing = std::find(seen.begin(), seen.end(), uint8_t(0));
   if (missing != seen.end())

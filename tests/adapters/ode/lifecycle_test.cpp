@@ -4,6 +4,7 @@
 
 #include <cstring>
 
+#include "obstacle.h"
 #include "ode.h"
 
 namespace {
@@ -289,6 +290,33 @@ TEST(OdeLifecycle, AutoDisabledPlate_SleepsUnderABallAndWakesWithoutIt) {
     woke |= bool(dBodyIsEnabled(plate));
   }
   EXPECT_TRUE(woke);
+}
+
+// What strikes far away makes the guard solve again: a sleeper counts each sub-step once nevertheless.
+TEST(OdeLifecycle, SleeperThatIsPushed_WakesAsSoonWhetherTheGuardSolvesAgainOrNot) {
+  int woke[2];
+  for (const bool strikes : {false, true}) {
+    Ode ode({0, 0, 0});
+    const dBodyID plate = ode.box({0.2, 0.2, 0.05}, 4, {0, 0, 0});
+    dBodySetAutoDisableLinearThreshold(plate, 0.1);
+    soft_ball(ode, {0, 0, 0.152}, {0, 0, -0.3});
+    dBodyDisable(plate);
+    add_mesh(ode.soft, "ground", height_field(0.5, 20, [](double x, double y) {
+               return 0.01 * std::sin(60 * x) * std::sin(60 * y) - 5;
+             }));
+    const char *const names[] = {"a", "b"};
+    for (int i = 0; i < 2 && strikes; ++i) {
+      BodyOptions o;
+      o.name = names[i];
+      o.position = {0, 0, -4.98 + 0.2 * i};
+      o.velocity = {3, 1, -20};
+      make_body(ode.context, ode.soft, "beam", {0.1, 0.1, 0.1}, 40, o);
+    }
+    int &steps = woke[strikes] = 0;
+    for (; !dBodyIsEnabled(plate) && steps < 300; ++steps) ode.step();
+    EXPECT_EQ(stats(ode.soft).guard_solves > 0, strikes);
+  }
+  EXPECT_EQ(woke[0], woke[1]);
 }
 
 // ODE counts steps until it disables a body that is slow. Where a stiff soft body divides the step into
