@@ -187,8 +187,8 @@ TEST(EnergyWatch, BallThatFallsOnASoftPad_IsNoGain) {
                         {1e5, 0.03, 0.3, 0.12, 600},
                         {1e4, 0.03, 0.3, 1.024, 1500},  // shorter after a piece that the guard has cut
                         {1e4, 0.05, 1, 1.04, 200},
-                        {1e5, 0.03, 0.3, 1.024, 200},  // cells that are strained by a tenth at once
-                        {1e5, 0.05, 1, 2.04, 200}};
+                        {1e5, 0.03, 0.5, 0.99, 300},  // cells that are strained by a tenth at once
+                        {1e5, 0.03, 0.5, 0.99, 450}};
   for (const Fall &f : falls) {
     const std::string out = test::scratch("energy_watch_ball"), scene = out + "/scene.json";
     test::write_file(scene, R"({"format": "deform-scene", "version": 1, "time": {"duration": 1},

@@ -462,6 +462,9 @@ void fields(Stream &s, W &w, const World &like) {
   s.value("age of the energies", w.watch.age, must::any);
   s.value("credit of the energies", w.watch.credit, must::any);
   s.value("last sub-step", w.watch.last_h, must::not_negative);
+  s.value("energy made by contact", w.watch.made, must::not_negative);
+  s.value("energy made by friction", w.watch.rubbed, must::finite);
+  s.value("pair that has made energy", w.watch.side, must::any);
   s.must_hold("last sub-step", "what the energy watch writes", [&] { return is_valid(w.watch); });
   s.value("contact offset", w.offset, must::positive);
   s.value("hold start", w.hold.start, must::finite);
@@ -538,7 +541,7 @@ void fields(Stream &s, W &w, const World &like) {
   contact_fields(s, w.tool_store, w.laws.size());
   s.where("", "");
   s.array("friction work", w.work, kAnyCount,
-          must::Be{[](const PairWork &x) { return is_valid(x); }, "finite work, rises not below zero"});
+          must::Be{[](const PairWork &x) { return std::isfinite(x.friction); }, "finite work"});
 }
 
 }  // namespace dfm::snapshot

@@ -26,7 +26,7 @@ struct SnapshotHead {
   uint64_t length, structure, checksum;  // checksum: of all bytes except its own
 };
 inline constexpr char kSnapshotMagic[8] = {'d', 'f', 'm', 's', 'n', 'a', 'p', 0};
-inline constexpr uint32_t kSnapshotVersion = 34;
+inline constexpr uint32_t kSnapshotVersion = 35;
 
 inline uint64_t snapshot_checksum(const unsigned char *data, size_t bytes) {
   Hash h;

@@ -37,7 +37,11 @@ struct EnergyWatch {
   // s, planned size of the sub-steps before it changed for the next one; 0: it did not. Not state: set in
   // each step
   double size_before = 0;
-  // the last check has stopped the run because of a pair: if the host then changes something, the sums start
+  // J, what contact has put into its sides (step/watch/contact_energy.h): beyond what recovery puts in, since
+  // the sum was last zero, and never below; by friction laws that remember, over the run
+  double made = 0, rubbed = 0;
+  uint64_t side[2] = {};  // ids of the pair that has put in most in the last sub-step in which one did
+  // the last check has stopped the run because of contact: if the host then changes something, the sums start
   // again; not state
   bool reported = false;
 };

@@ -45,17 +45,11 @@ struct RigidPair {
   auto operator<=>(const RigidPair &) const = default;
 };
 
-// Of a pair of ids, a body first, or of two rigid things as in RigidPair, J. Two are sums of the watch on
-// energies (step/watch/pair_energy.h), over sub-steps since each was last zero, and never below; that of
-// friction over all, where laws remember.
+// Of a pair of ids, a body first, or of two rigid things as in RigidPair.
 struct PairWork {
   uint64_t a, b;
-  double friction;     // work over the run
-  double rubbed = 0;   // that friction has put into both sides
-  double made = 0;     // that contact has, beyond what recovery puts in
-  uint64_t apart = 0;  // 0: still led to the rest distance from where they were placed
+  double friction;  // J, over the run
 };
-bool is_valid(const PairWork &p);  // could a world have come to it?
 
 struct Gravity {
   std::vector<dfm_vector_key> keys;

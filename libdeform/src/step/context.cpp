@@ -24,7 +24,7 @@ StepContext::StepContext(const Meters &meters)
   use_memory(meters.contacts.memory(), lent, contacts, tolerance.normal, tolerance.tangent, disturbance,
              impulse_before_rebuild, tangents, slip_back, stick_drift, match, sharing, target_area,
              keeps_area, ways, renewed, rebound_speed, motions, marked, bonds, bond_impulse, chosen, mean,
-             pairs_made, before, goes_on, given.list);
+             before, goes_on, given.list);
   state.use(meters.contacts.memory());
   use_memory(meters.detection.memory(), guard.joined, guard.near, guard.hits, guard.speed, guard.change,
              guard.common, guard.kept, guard.kept_before, guard.blocks.ranges);

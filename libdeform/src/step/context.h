@@ -22,7 +22,6 @@
 #include "step/stages.h"
 #include "step/step_length.h"
 #include "step/watch/energy_watch.h"
-#include "step/watch/pair_energy.h"
 
 namespace dfm {
 
@@ -134,8 +133,7 @@ struct StepContext {
   bool ended = false;  // find_ends() has been called since the last solve
   Guard guard;
   // commit
-  Array<double> mean;  // [dofs of rows,4] m/s, over the sub-step; of bodies
-  Array<PairMade> pairs_made;
+  Array<double> mean;     // [dofs of rows,4] m/s, over the sub-step; of bodies
   Array<uint8_t> before;  // [contacts] touched in the last sub-step
   // [contacts of the store] number of the contact that goes on from it, or kNone
   Array<uint32_t> goes_on;

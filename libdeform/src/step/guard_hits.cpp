@@ -44,13 +44,9 @@ class HitContact {
     out.feature_b = c_.feature_b;
     out.obstacle = c_.obstacle;
     out.distance = hit_.start;
-    if (!c_.obstacle) {
-      on_body(out);
-    } else {
-      out.kind = kPrimitive;
-      if (step_.obstacle_views[c_.slot_b].shape == Shape::mesh) on_mesh(out);
-      else on_shape(out);
-    }
+    out.kind = c_.obstacle ? uint8_t{kPrimitive} : c_.kind;
+    if (step_.guard.scene.closed_form(c_)) on_shape(out);
+    else on_surfaces(out);
     const double length = norm(now_);
     if (!(length > 0)) return false;
     const Vec3 n = (1 / length) * now_;
@@ -73,24 +69,20 @@ class HitContact {
     });
     return way;
   }
-  // Adds weight times a surfel to one side.
-  void add(ContactPoint &out, uint32_t slot, uint32_t surfel, double weight) {
-    const BodyView &b = step_.body_views[slot];
-    const Vec3 x = load3(&b.surface->x[4 * size_t{surfel}]);
-    const Vec3 end = load3(step_.guard.scene.end(step_.guard.scene.sides[slot], surfel));
-    narrow::add_node(out, b.first_node + surfel, weight);
-    start_ += weight * (x + set_back(step_.guard.scene.sides[slot], surfel, end - x));
+  // Adds weight times a surfel to one side. A mesh without dofs has no nodes.
+  void add(ContactPoint &out, bool b, uint32_t surfel, double weight) {
+    GuardSide &side = step_.guard.scene.side(c_, b);
+    const Vec3 x = load3(&side.surface->x[4 * size_t{surfel}]);
+    const Vec3 end = load3(step_.guard.scene.end(side, surfel));
+    if (!(b && c_.obstacle))
+      narrow::add_node(out, step_.body_views[b ? c_.slot_b : c_.slot_a].first_node + surfel, weight);
+    start_ += weight * (x + set_back(side, surfel, end - x));
     const Vec3 at = x + hit_.t * (end - x);
     now_ += weight * at;
-    (weight < 0 ? on_b_ : on_a_) += std::fabs(weight) * at;
-  }
-  void on_body(ContactPoint &out) {
-    const bool edges = c_.kind == kEdgeEdge;
-    out.kind = c_.kind;
-    out.type_a = edges;
-    add_feature(out, false, edges ? 1 : 0, c_.feature_a);
-    add_feature(out, true, edges ? 1 : 2, c_.feature_b);
-    middle_ = 0.5 * (on_a_ + on_b_);
+    (b ? on_b_ : on_a_) += std::fabs(weight) * at;
+    if (!b) return;
+    from_b_ += std::fabs(weight) * x;
+    to_b_ += std::fabs(weight) * end;
   }
   // Of corner k of a surfel, an edge or a triangle of one side.
   double weight_of(bool b, int kind, int k) const {
@@ -98,25 +90,20 @@ class HitContact {
     return k == 0 ? 1 - hit_.at[b] : hit_.at[b];
   }
   void add_feature(ContactPoint &out, bool b, int kind, uint32_t feature) {
-    const uint32_t slot = b ? c_.slot_b : c_.slot_a;
-    const uint32_t *const corner = narrow::corners_of(*step_.body_views[slot].surface, kind, feature);
-    for (int k = 0; k <= kind; ++k) add(out, slot, corner[k], (b ? -1 : 1) * weight_of(b, kind, k));
+    const uint32_t *const corner = narrow::corners_of(*step_.guard.scene.side(c_, b).surface, kind, feature);
+    for (int k = 0; k <= kind; ++k) add(out, b, corner[k], (b ? -1 : 1) * weight_of(b, kind, k));
   }
-  // Where a point of the obstacle would be at the end without contact, by the velocity of its body that the
-  // rows start from. end: with the contact so far; that of what contact does not move.
-  Vec3 free_end(Vec3 from, Vec3 end) const {
+  // m/s, of a point of the obstacle without contact, by the velocity of its body that the rows start from.
+  // end: where it comes with the contact so far; that of what contact does not move.
+  Vec3 way_of(Vec3 from, Vec3 end) const {
     const Obstacle &o = *w_.obstacles[c_.slot_b];
-    if (!is_moved(o)) return end;
-    const double *const first = &o.rigid->first[6 * size_t{o.rigid_body}];
-    const Vec3 center = step_.rigid_places[o.slot].center;
-    return center + step_.h * load3(first) + rotate(turned({}, step_.h * load3(first + 3)), from - center);
+    if (is_moved(o)) {
+      const double *const first = &o.rigid->first[6 * size_t{o.rigid_body}];
+      const Vec3 center = step_.rigid_places[o.slot].center;
+      end = center + step_.h * load3(first) + rotate(turned({}, step_.h * load3(first + 3)), from - center);
+    }
+    return (1 / step_.h) * (end - from);
   }
-  // The point of the obstacle: from its present position to that at the end without this contact.
-  void carry(Vec3 from, Vec3 to) {
-    start_ -= from;
-    obstacle_way_ = (1 / step_.h) * (to - from);
-  }
-
   void on_shape(ContactPoint &out) {
     const ObstacleView &v = step_.obstacle_views[c_.slot_b];
     out.type_a = c_.kind;
@@ -131,28 +118,18 @@ class HitContact {
     now_ = o.distance > 0 ? on_a_ - o.point : o.normal;
     middle_ = 0.5 * (on_a_ + o.point);
     const Vec3 from = v.position + rotate(v.rotation, local);
-    carry(from, free_end(from, end_.position + rotate(end_.rotation, local)));
+    start_ -= from;
+    obstacle_way_ = way_of(from, end_.position + rotate(end_.rotation, local));
   }
-  void on_mesh(ContactPoint &out) {
-    GuardScene &scene = step_.guard.scene;
-    GuardSide &mesh = scene.side(c_, true);
-    const bool vertex = c_.kind == 2;  // of the mesh
-    out.type_a = c_.kind;
-    out.feature_a = vertex ? c_.feature_b : c_.feature_a;
-    out.feature_b = vertex ? c_.feature_a : c_.feature_b;
-    add_feature(out, false, c_.kind, out.feature_a);
-    const int corners = vertex ? 1 : c_.kind == 1 ? 2 : 3;
-    const uint32_t *const corner = narrow::corners_of(*mesh.surface, corners - 1, out.feature_b);
-    Vec3 from, to;
-    for (int k = 0; k < corners; ++k) {
-      const double weight = weight_of(true, corners - 1, k);
-      from += weight * load3(&mesh.surface->x[4 * size_t{corner[k]}]);
-      to += weight * load3(scene.end(mesh, corner[k]));
-    }
-    const Vec3 then = from + hit_.t * (to - from);
-    now_ = on_a_ - then;
-    middle_ = 0.5 * (on_a_ + then);
-    carry(from, free_end(from, to));
+  // Of two bodies, or of a body and a mesh, whose vertex may meet a face of the body.
+  void on_surfaces(ContactPoint &out) {
+    const uint8_t kind = c_.obstacle ? c_.kind : c_.kind == kEdgeEdge;
+    out.type_a = kind;
+    if (kind == 2) std::swap(out.feature_a, out.feature_b);
+    add_feature(out, false, kind, out.feature_a);
+    add_feature(out, true, 2 - kind, out.feature_b);
+    middle_ = 0.5 * (on_a_ + on_b_);
+    if (c_.obstacle) obstacle_way_ = way_of(from_b_, to_b_);
   }
 
   World &w_;
@@ -161,7 +138,7 @@ class HitContact {
   const Candidate &c_;
   const GuardPose end_;  // of the obstacle
   // differences of the sides (b from a); places; m/s
-  Vec3 start_, now_, on_a_, on_b_, middle_, obstacle_way_;
+  Vec3 start_, now_, on_a_, on_b_, middle_, from_b_, to_b_, obstacle_way_;
 };
 
 bool same_features(const ContactPoint &l, const ContactPoint &r) {

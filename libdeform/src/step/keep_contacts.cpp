@@ -14,7 +14,6 @@
 #include "step/solve/friction_memory.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
-#include "step/watch/pair_energy.h"
 
 namespace dfm {
 
@@ -24,7 +23,6 @@ void reserve_contacts(World &w, StepContext &step) {
   ContactStore &to = step.next_store;
   each_column([&](const ContactColumn &column, auto &values) { values.reserve(column.entries(n, S)); }, to);
   step.mean.reserve(size_t{kStride} * step.rows.ndof);
-  step.pairs_made.reserve(step.rows.soft());
   step.before.resize(n);
   step.goes_on.reserve(w.store.n);
   reserve_reports(w, step);
@@ -47,6 +45,13 @@ void reserve_events(World &w, size_t more) {
 
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t) {
   w.events.push_back({sizeof(dfm_contact_event), kind, w.handle_of(a), w.handle_of(b), key, t});
+}
+
+void add_friction_work(World &w, uint64_t a, uint64_t b, double joule) {
+  auto it = std::lower_bound(w.work.begin(), w.work.end(), std::pair(a, b),
+                             [](const PairWork &p, auto &k) { return std::pair(p.a, p.b) < k; });
+  if (it == w.work.end() || it->a != a || it->b != b) it = w.work.insert(it, {a, b, 0});
+  it->friction += joule;
 }
 
 void end_contacts(World &w) {
@@ -131,8 +136,11 @@ void book_friction(World &w, const StepContext &step) {
     const ContactPoint &c = step.contacts[i];
     const double *const l = &step.rows.impulse[size_t(i) * 3];
     if (l[1] == 0 && l[2] == 0) continue;
-    work_of(w, {w.bodies[c.slot_a]->id, id_of_b(w, c), c.obstacle != 0}).friction +=
-        l[1] * step.state.vt[i] + l[2] * step.state.vt[step.state.stride + i];
+    const double work = l[1] * step.state.vt[i] + l[2] * step.state.vt[step.state.stride + i];
+    const uint64_t a = w.bodies[c.slot_a]->id, b = id_of_b(w, c);
+    // two bodies touch by surfels of either of them, and these contacts are one pair
+    if (!c.obstacle && b < a) add_friction_work(w, b, a, work);
+    else add_friction_work(w, a, b, work);
   }
 }
 

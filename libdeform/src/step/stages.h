@@ -118,6 +118,7 @@ void keep_contacts(World &w, StepContext &step);  // store, events, hold, work; 
 void end_contacts(World &w);
 void reserve_events(World &w, size_t more);
 void add_event(World &w, uint32_t kind, uint64_t a, uint64_t b, uint64_t key, double t);  // a, b: ids
+void add_friction_work(World &w, uint64_t a, uint64_t b, double joule);                   // a, b: ids
 
 // sleep.cpp
 uint32_t slot_of(const World &w, uint64_t id);           // of a body, or kNone

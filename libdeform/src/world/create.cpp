@@ -21,6 +21,7 @@
 #include "step/solve/attach.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
+#include "step/watch/contact_energy.h"
 #include "world/body_effects.h"
 #include "world/body_model.h"
 #include "world/body_surface.h"
@@ -357,6 +358,7 @@ void end_contacts(World &w, uint64_t id, bool obstacle) {
     }
   end_rigid_contacts(w, id);
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
+  forget_contact_gain(w);
   w.changed = true;
 }
 

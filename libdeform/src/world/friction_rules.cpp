@@ -12,7 +12,7 @@
 #include "state/world.h"
 #include "step/pair_table.h"
 #include "step/stages.h"
-#include "step/watch/pair_energy.h"
+#include "step/watch/contact_energy.h"
 
 namespace dfm {
 namespace {
@@ -68,7 +68,7 @@ bool bring_the_same(const LawInstance &a, const LawInstance &b) {
 
 // The law of the rule, with other parameter values.
 void put_params(World &w, FrictionRule &rule, std::vector<double> values, double restitution) {
-  forget_pairs(w, 0);
+  forget_contact_gain(w);
   std::unique_ptr<LawInstance> &law = w.laws[rule.law];
   auto fresh = make_law(w, *law->requested_type, std::move(values), restitution);
   const bool remembers = same_memory(*law, *fresh);

@@ -15,7 +15,6 @@
 #include "step/sides.h"
 #include "step/stages.h"
 #include "step/step_impulses.h"
-#include "step/watch/pair_energy.h"
 
 namespace dfm {
 namespace {
@@ -79,7 +78,7 @@ void ToolTouch::keep(World &w) noexcept {
     const double work = l[1] * slip[0] + l[2] * slip[1];
     if (work == 0) continue;
     const PairSides sides = pair_sides(w, s, i);
-    work_of(w, {sides.a, sides.b, true}).friction += work;
+    add_friction_work(w, sides.a, sides.b, work);
   }
   dfm::add_impulses(w, s);
 }

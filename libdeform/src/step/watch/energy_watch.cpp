@@ -12,7 +12,7 @@
 #include "step/messages.h"
 #include "step/solve/tolerance.h"
 #include "step/stages.h"
-#include "step/watch/pair_energy.h"
+#include "step/watch/contact_energy.h"
 
 namespace dfm {
 namespace {
@@ -339,7 +339,7 @@ namespace {
 // Whether the energies are to be computed: after kEvery sub-steps, and earlier if a body moves much faster.
 bool needs_check(const World &w, const StepContext &step) {
   const double limit = w.def.energy_watch * w.stats.energy_max;
-  bool needed = w.watch.age >= kEvery || pair_over(w);
+  bool needed = w.watch.age >= kEvery || contact_over(w);
   for (const uint32_t i : step.active) {
     const EnergyBook &e = w.bodies[i]->energy;
     const bool faster = step.free_kinetic[i] > 2 * e.kinetic + limit;
@@ -423,16 +423,16 @@ bool watch_energy(World &w, StepContext &step, uint32_t *trouble) {
                at_step(w, *worst.body).c_str(), worst.body->model.type->id, worst.rise, 100 * worst.share,
                largest));
   s.energy_max = std::max({s.energy_max, now.total, moving});
-  const std::string pair = describe_pair_gain(w);
-  w.watch.reported = !pair.empty();
-  return w.watch.reported ? stop_for_energy(w, trouble, pair) : true;
+  const std::string contact = describe_contact_gain(w);
+  w.watch.reported = !contact.empty();
+  return w.watch.reported ? stop_for_energy(w, trouble, contact) : true;
 }
 
 void book_energy(World &w, StepContext &step, double motion) {
   if (!watching(w)) return;
   if (w.plan.touches() && step.rows.all() > 0) {
     book_contact(w, step);
-    book_pairs(w, step);
+    book_contact_gain(w, step);
   }
   uint32_t ages = 1;
   for (const uint32_t i : step.active) {
@@ -456,7 +456,7 @@ void book_energy(World &w, StepContext &step, double motion) {
 // Of a hidden elastic energy as much is left as was there: at most what the body had and was given, less what
 // its place in gravity and in lasting loads has taken.
 void forget_energy(Body &b) {
-  forget_pairs(*b.world, b.id);
+  forget_contact_gain(*b.world);
   EnergyBook &e = b.energy;
   double hidden = 0;
   if (hides(b)) {
@@ -475,7 +475,7 @@ void forget_energy(Body &b) {
 }
 
 void lose_energy(Body &b) {
-  forget_pairs(*b.world, b.id);
+  forget_contact_gain(*b.world);
   b.energy = {};
   if (hides(b)) b.energy.base = kNoLimit;
 }
@@ -529,7 +529,7 @@ bool is_valid(const EnergyBook &e) {
 
 bool is_valid(const EnergyWatch &e) {
   return (e.age <= kEvery || e.age == ~0u) && e.credit <= kMaxCredit && e.last_h >= 0 &&
-         std::isfinite(e.last_h);
+         std::isfinite(e.last_h) && e.made >= 0 && std::isfinite(e.made) && std::isfinite(e.rubbed);
 }
 
 }  // namespace dfm
