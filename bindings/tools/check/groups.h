@@ -1,5 +1,7 @@
 // The rules by the files that hold them.
 #pragma once
+#include <functional>
+
 #include "check/check.h"
 
 namespace cli::check {
@@ -14,7 +16,10 @@ std::string unusable(const dfm_type &type);
 Check parameters_sane;
 // rules_process.cpp: what it does to the process it runs in
 std::string spelt(const std::string &name);  // a function as its author wrote it
-bool sanitized();                            // this program
+void needs_sanitizer();                      // of this program; else Skipped
+// While a call runs the plugin's own writable memory is read only; inside: any address in the plugin.
+void keeps_statics(const Subject &, const char *name, const void *inside, const char *remedy,
+                   const std::function<void()> &call);
 Check eval_keeps_to_itself, stays_in_its_arrays, unloads_without_leak, sanitizer_finds_nothing,
     writes_no_static;
 // rules_environment.cpp: what it leaves changed
