@@ -50,16 +50,6 @@ bool same_place(const btTransform &a, const btTransform &b) {
          same_bits(a.getBasis()[1], b.getBasis()[1]) && same_bits(a.getBasis()[2], b.getBasis()[2]);
 }
 
-dfm_rigid_state state_of(const Pose &p, Vec v, Vec w) {
-  dfm_rigid_state s{};
-  const double rotation[4] = {p.rotation.x, p.rotation.y, p.rotation.z, p.rotation.w};
-  std::copy(rotation, rotation + 4, s.rotation);
-  store(s.position, p.position);
-  store(s.velocity, v);
-  store(s.spin, w);
-  return s;
-}
-
 // Bullet corrects by the share of the caller's tick that a sub-step is.
 class SharedCorrection {
  public:
@@ -94,7 +84,8 @@ bool Stand::holds(const btTransform &t, const btVector3 &v_now, const btVector3 
 }
 
 dfm_rigid_state BulletMember::state() const {
-  return state_of(from_bullet(body->getWorldTransform()), from_bullet(body->getLinearVelocity()),
+  const Pose at = from_bullet(body->getWorldTransform());
+  return state_of(at.position, at.rotation, from_bullet(body->getLinearVelocity()),
                   from_bullet(body->getAngularVelocity()));
 }
 
@@ -143,8 +134,9 @@ std::array<double, 2> BulletMember::idle_limits() const {
 dfm_rigid_state LinkMember::state() const {
   std::vector<btVector3> w(static_cast<size_t>(body->getNumLinks()) + 1), v(w.size());
   body->compTreeLinkVelocities(w.data(), v.data());  // in the links' own frames, the base first
+  const Pose p = from_bullet(collider->getWorldTransform());
   const auto at = static_cast<size_t>(link + 1);
-  return state_of(from_bullet(collider->getWorldTransform()), from_bullet(body->localDirToWorld(link, v[at])),
+  return state_of(p.position, p.rotation, from_bullet(body->localDirToWorld(link, v[at])),
                   from_bullet(body->localDirToWorld(link, w[at])));
 }
 
@@ -418,9 +410,7 @@ void BulletEngine::finish(BulletMember &m, double h) {
 
 void BulletEngine::turned(Member &any, Quat to, Vec spin) {
   BulletMember &m = static_cast<BulletMember &>(any);  // links are turned by Bullet
-  const double rotation[4] = {to.x, to.y, to.z, to.w};
-  std::copy(rotation, rotation + 4, m.ended.rotation);
-  store(m.ended.spin, spin);
+  m.ended = state_of(load(m.ended.position), to, load(m.ended.velocity), spin);
 }
 
 void BulletEngine::rest(double h) {

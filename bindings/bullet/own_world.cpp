@@ -124,8 +124,8 @@ Member *BulletWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   const btVector3 inertia = def.fixed ? btVector3(0, 0, 0) : to_bullet(load(def.inertia));
   b.body = std::make_unique<btRigidBody>(
       btRigidBody::btRigidBodyConstructionInfo(btScalar(mass), nullptr, b.shape.get(), inertia));
-  const double *const q = def.pose.rotation;
-  b.body->setCenterOfMassTransform(to_bullet(Pose{load(def.pose.position), unit({q[0], q[1], q[2], q[3]})}));
+  b.body->setCenterOfMassTransform(
+      to_bullet(Pose{load(def.pose.position), unit(load_quat(def.pose.rotation))}));
   b.body->setFriction(btScalar(kFriction));
   b.body->setActivationState(DISABLE_DEACTIVATION);
   b.body->setUserIndex(static_cast<int>(number));

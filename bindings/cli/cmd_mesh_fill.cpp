@@ -41,8 +41,6 @@ void measure(Filled &out) {
 
 void print_json(const std::string &in, const std::string &file, uint32_t wanted, const Filled &f) {
   const auto whole = [](uint64_t n) { return std::to_string(n); };
-  std::vector<std::string> warnings;
-  for (const std::string &w : f.warnings) warnings.push_back(quoted(w));
   JsonObject out;
   out.add("surface", quoted(in))
       .add("file", quoted(file))
@@ -60,7 +58,7 @@ void print_json(const std::string &in, const std::string &file, uint32_t wanted,
   out.add("open_edges", whole(f.surface.open_edges))
       .add("holes", whole(f.surface.holes))
       .add("turned", whole(f.surface.turned));
-  out.add("warnings", json_array(warnings));
+  out.add("warnings", json_words(f.warnings));
   std::fputs(indented(out.text()).c_str(), stdout);
 }
 

@@ -264,11 +264,6 @@ void describe_surface(const dfm_mesh_info &i, bool crossings, Report &r) {
 
 void print_json(const std::string &file, const Report &r, const std::vector<std::string> &notes) {
   const auto whole = [](uint64_t n) { return std::to_string(n); };
-  const auto texts = [](const std::vector<std::string> &all) {
-    std::vector<std::string> out;
-    for (const std::string &s : all) out.push_back(quoted(s));
-    return json_array(out);
-  };
   std::vector<std::string> histogram, groups;
   for (const uint32_t n : r.histogram) histogram.push_back(whole(n));
   for (const Group &g : r.groups)
@@ -290,8 +285,10 @@ void print_json(const std::string &file, const Report &r, const std::vector<std:
       .add("hi", json_vector(r.hi))
       .add("edge", edge.text())
       .add("quality", quality.text());
-  out.add("defects", defects.text()).add("groups", json_array(groups)).add("warnings", texts(r.warnings));
-  if (!notes.empty()) out.add("lost", texts(notes));
+  out.add("defects", defects.text())
+      .add("groups", json_array(groups))
+      .add("warnings", json_words(r.warnings));
+  if (!notes.empty()) out.add("lost", json_words(notes));
   std::fputs(indented(out.text()).c_str(), stdout);
 }
 

@@ -57,12 +57,6 @@ std::string joined(const std::vector<std::string> &words) {
   return out.empty() ? "none" : out;
 }
 
-std::vector<std::string> quoted_all(const std::vector<std::string> &words) {
-  std::vector<std::string> out;
-  for (const auto &w : words) out.push_back(quoted(w));
-  return out;
-}
-
 JsonObject json_head(const Type &t) {
   JsonObject o;
   o.add("kind", quoted(kind_name(t.type->kind)))
@@ -70,7 +64,7 @@ JsonObject json_head(const Type &t) {
       .add("name", quoted(t.type->name));
   o.add("version", quoted(t.type->version))
       .add("file", quoted(t.file))
-      .add("effects", json_array(quoted_all(effects(*t.type))));
+      .add("effects", json_words(effects(*t.type)));
   return o;
 }
 
@@ -181,12 +175,11 @@ std::string json_info(const Type &t) {
         .add("runtime", flag(DFM_PARAM_RUNTIME))
         .add("per_cell", flag(DFM_PARAM_PER_CELL));
     o.add("auto", flag(DFM_PARAM_AUTO));
-    if (row.names) o.add("names", json_array(quoted_all(names_of(row))));
+    if (row.names) o.add("names", json_words(names_of(row)));
     rows.push_back(o.text());
   }
   JsonObject head = json_head(t);
-  if (t.type->kind != DFM_KIND_FRICTION)
-    head.add("capabilities", json_array(quoted_all(capabilities(*t.type))));
+  if (t.type->kind != DFM_KIND_FRICTION) head.add("capabilities", json_words(capabilities(*t.type)));
   return head.add("licence", quoted(t.type->licence))
       .add("source", quoted(t.type->source))
       .add("params", json_array(rows))

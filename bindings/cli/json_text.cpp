@@ -72,6 +72,12 @@ std::string json_array(const std::vector<std::string> &values) {
   return out + "]";
 }
 
+std::string json_words(const std::vector<std::string> &words) {
+  std::vector<std::string> items;
+  for (const std::string &w : words) items.push_back(quoted(w));
+  return json_array(items);
+}
+
 std::string json_numbers(std::span<const double> values) {
   std::vector<std::string> items;
   for (const double x : values) items.push_back(number(x));

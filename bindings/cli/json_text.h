@@ -22,6 +22,7 @@ class JsonObject {
   std::vector<std::pair<std::string, std::string>> members_;
 };
 std::string json_array(const std::vector<std::string> &values);
+std::string json_words(const std::vector<std::string> &words);  // quoted
 std::string json_numbers(std::span<const double> values);
 std::string json_vector(const double v[3]);
 std::string indented(const std::string &json);  // objects and arrays of objects on lines of their own

@@ -324,8 +324,6 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   const dfm_world_stats stats = world_stats(scene);
   JsonValue plan;
   parse_json(scene.explain(), plan);
-  std::vector<std::string> warning_texts;
-  for (const std::string &w : warnings()) warning_texts.push_back(quoted(w));
   JsonObject ms, solver, hold, effects, contacts, guard, budget, out;
   ms.add("median", number(1e3 * run.times.quantile(0.5))).add("p99", number(1e3 * run.times.quantile(0.99)));
   ms.add("max", number(1e3 * run.times.longest()));
@@ -385,7 +383,7 @@ std::string summary_json(const SceneFile &scene, const RunOptions &options, cons
   if (!run.sensors.empty()) out.add("sensors", run.sensors);
   if (run.stream.frames) out.add("stream", stream_json(scene, run.stream));
   if (const std::string planned = planned_json(scene); !planned.empty()) out.add("planner", planned);
-  out.add("stopped", stopped_json(run)).add("warnings", json_array(warning_texts));
+  out.add("stopped", stopped_json(run)).add("warnings", json_words(warnings()));
   return as_utf8(indented(out.text()));
 }
 

@@ -19,13 +19,11 @@ constexpr const char *kFormat = "deform-recording", *kVersion = "1", *kByHand = 
 constexpr uint64_t kMaxIndex = uint64_t{1} << 28;  // bytes
 
 std::string run_file(const SceneFile &scene, const RunOptions &options, bool by_hand) {
-  std::vector<std::string> set;
-  for (const std::string &s : options.set) set.push_back(quoted(s));
   JsonObject out;
   out.add("format", quoted(kFormat))
       .add("version", by_hand ? kByHand : kVersion)
       .add("scene", quoted(name_of(fs::absolute(path_of(scene.path())))))
-      .add("set", json_array(set))
+      .add("set", json_words(options.set))
       .add("jitter", std::to_string(options.jitter));
   return indented(out.text());
 }

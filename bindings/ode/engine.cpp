@@ -70,21 +70,8 @@ Inertia inertia_of(dBodyID body) {
 }
 
 dfm_rigid_state OdeMember::state() const {
-  dfm_rigid_state s{};
-  const dReal *const x = dBodyGetPosition(body);
-  const dReal *const v = dBodyGetLinearVel(body);
-  const dReal *const w = dBodyGetAngularVel(body);
-  const Quat q = unit(from_ode(dBodyGetQuaternion(body)) * inertia.axes);
-  for (int k = 0; k < 3; ++k) {
-    s.position[k] = x[k];
-    s.velocity[k] = v[k];
-    s.spin[k] = w[k];
-  }
-  s.rotation[0] = q.x;
-  s.rotation[1] = q.y;
-  s.rotation[2] = q.z;
-  s.rotation[3] = q.w;
-  return s;
+  return state_of(load(dBodyGetPosition(body)), unit(from_ode(dBodyGetQuaternion(body)) * inertia.axes),
+                  load(dBodyGetLinearVel(body)), load(dBodyGetAngularVel(body)));
 }
 
 std::array<dReal, 13> OdeMember::now() const {

@@ -76,7 +76,7 @@ Member *OdeWorld::make_body(const dfm_rigid_def &def, uint32_t number) {
   if (def.shape == DFM_SHAPE_CAPSULE) geom = dCreateCapsule(space_, def.radius, 2 * def.half_length);
   OdeMember &m = members_[number];
   dQuaternion q;
-  to_ode(unit({def.pose.rotation[0], def.pose.rotation[1], def.pose.rotation[2], def.pose.rotation[3]}), q);
+  to_ode(unit(load_quat(def.pose.rotation)), q);
   const double *const x = def.pose.position;
   shapes_[number] = {number, def.category, def.collides_with};
   if (geom) dGeomSetData(geom, &shapes_[number]);

@@ -131,14 +131,16 @@ void axes_of(const Box &box, Vec axes[3]) {
   axes[2] = Vec{2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)} * box.half[2];
 }
 
-void Shape::triangle(const Vec p[3], const Vec n[3], const float rgb[3]) {
-  for (int k = 0; k < 3; ++k) {
-    Vertex v{};
-    put(v.p, p[k] - origin);
-    put(v.n, n[k]);
-    std::copy_n(rgb, 3, v.rgb);
-    vertices.push_back(v);
-  }
+Vertex &Shape::vertex(const Vec &p, const Vec &n, const float rgb[3]) {
+  Vertex &v = vertices.emplace_back();
+  put(v.p, p - origin);
+  put(v.n, n);
+  std::copy_n(rgb, 3, v.rgb);
+  return v;
+}
+
+void Shape::quad(const Vec p[4], const Vec n[4], const float rgb[3]) {
+  for (const int k : {0, 1, 2, 0, 2, 3}) vertex(p[k], n[k], rgb);
 }
 
 void Shape::surface(const Surface &s) {
@@ -148,15 +150,11 @@ void Shape::surface(const Surface &s) {
     if (!(dot(f.normal[t], f.normal[t]) > 0)) continue;
     for (int k = 0; k < 3; ++k) {
       const uint32_t i = s.tri[3 * size_t(t) + k];
-      Vertex v{};
-      put(v.p, vec(s.xyz + 3 * size_t(i)) - origin);
-      put(v.n, corner_normal(s, f, t, i));
-      std::copy_n(s.rgb, 3, v.rgb);
+      Vertex &v = vertex(vec(s.xyz + 3 * size_t(i)), corner_normal(s, f, t, i), s.rgb);
       if (s.scalar && !std::isnan(s.scalar[i])) {
         v.value = std::clamp(s.scalar[i], 0.f, 1.f);
         v.has_value = 1;
       }
-      vertices.push_back(v);
     }
   }
 }
@@ -167,10 +165,8 @@ void Shape::box(const Vec &center, const Vec axes[3], const float rgb[3]) {
       const Vec n = unit(axes[k] * side), c = center + axes[k] * side;
       const Vec u = axes[(k + 1) % 3] * side, w = axes[(k + 2) % 3];  // `side` keeps the winding outward
       const Vec corner[4] = {c - u - w, c + u - w, c + u + w, c - u + w};
-      const Vec normals[3] = {n, n, n};
-      const Vec first[3] = {corner[0], corner[1], corner[2]}, second[3] = {corner[0], corner[2], corner[3]};
-      triangle(first, normals, rgb);
-      triangle(second, normals, rgb);
+      const Vec normals[4] = {n, n, n, n};
+      quad(corner, normals, rgb);
     }
 }
 
@@ -194,12 +190,7 @@ void Shape::revolve(const Vec &a, const Vec &axis, const std::vector<std::array<
         p[k] = a + out * q[0] + axis * q[1];
         n[k] = out * q[2] + axis * q[3];
       }
-      const Vec p1[3] = {p[0], p[1], p[2]};
-      const Vec n1[3] = {n[0], n[1], n[2]};
-      const Vec p2[3] = {p[0], p[2], p[3]};
-      const Vec n2[3] = {n[0], n[2], n[3]};
-      triangle(p1, n1, rgb);
-      triangle(p2, n2, rgb);
+      quad(p, n, rgb);
     }
 }
 
@@ -233,14 +224,11 @@ void Shape::ribbons(const Lines &lines, const View &view, double pixels_high) {
     for (int k = 0; k < 2; ++k) {
       const double depth = dot(view.eye - end[k], view.back);
       const Vec half = side * (0.5 * lines.width * 2 * view.tan_half * depth / pixels_high);
-      p[2 * k] = end[k] - half;
-      p[2 * k + 1] = end[k] + half;
+      p[k ? 3 : 0] = end[k] - half;
+      p[k ? 2 : 1] = end[k] + half;
     }
-    const Vec n[3] = {view.back, view.back, view.back};
-    const Vec first[3] = {p[0], p[1], p[3]};
-    const Vec second[3] = {p[0], p[3], p[2]};
-    triangle(first, n, lines.rgb);
-    triangle(second, n, lines.rgb);
+    const Vec n[4] = {view.back, view.back, view.back, view.back};
+    quad(p, n, lines.rgb);
   }
 }
 

@@ -45,7 +45,8 @@ struct Vertex { float p[3], n[3], rgb[3], value, has_value; };
 struct Shape {
   std::vector<Vertex> vertices;
   Vec origin;
-  void triangle(const Vec p[3], const Vec n[3], const float rgb[3]);
+  Vertex &vertex(const Vec &p, const Vec &n, const float rgb[3]);
+  void quad(const Vec p[4], const Vec n[4], const float rgb[3]);  // corners in order around it
   void surface(const Surface &s);
   void box(const Vec &center, const Vec axes[3], const float rgb[3]);  // axes carry the half lengths
   void sphere(const Sphere &s);

@@ -161,11 +161,8 @@ void add_planes(const Scene &scene, Frame &frame, const Bounds &extent) {
   batch(frame, b, [&] {
     const Vec x = g.x * g.radius, y = g.y * g.radius;
     const Vec corner[4] = {snapped - x - y, snapped + x - y, snapped + x + y, snapped - x + y};
-    const Vec n[3] = {frame.up, frame.up, frame.up};
-    for (const int k : {1, 2}) {
-      const Vec p[3] = {corner[0], corner[k], corner[k + 1]};
-      frame.shape.triangle(p, n, own ? floor->look.rgb : light);
-    }
+    const Vec n[4] = {frame.up, frame.up, frame.up, frame.up};
+    frame.shape.quad(corner, n, own ? floor->look.rgb : light);
   });
 }
 

@@ -30,21 +30,14 @@ void principal(double a[3][3], Vec &moments, Quat &axes) {
         const double t = (theta >= 0 ? 1 : -1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
         const double c = 1 / std::sqrt(t * t + 1);
         const double s = t * c;
-        for (int k = 0; k < 3; ++k) {
-          const double x = a[k][p], y = a[k][q];
-          a[k][p] = c * x - s * y;
-          a[k][q] = s * x + c * y;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double x = a[p][k], y = a[q][k];
-          a[p][k] = c * x - s * y;
-          a[q][k] = s * x + c * y;
-        }
-        for (int k = 0; k < 3; ++k) {
-          const double x = e[k][p], y = e[k][q];
-          e[k][p] = c * x - s * y;
-          e[k][q] = s * x + c * y;
-        }
+        const auto turn = [&](double &x, double &y) {
+          const double before = x;
+          x = c * before - s * y;
+          y = s * before + c * y;
+        };
+        for (int k = 0; k < 3; ++k) turn(a[k][p], a[k][q]);
+        for (int k = 0; k < 3; ++k) turn(a[p][k], a[q][k]);
+        for (int k = 0; k < 3; ++k) turn(e[k][p], e[k][q]);
       }
   }
   moments = {a[0][0], a[1][1], a[2][2]};
@@ -75,8 +68,10 @@ Vec mean_spin(Quat q, Vec inverse_moments, Vec L, double h) {
 
 }  // namespace
 
-Quat rotation_of(const dfm_rigid_state &s) {
-  return {s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+Quat rotation_of(const dfm_rigid_state &s) { return load_quat(s.rotation); }
+
+dfm_rigid_state state_of(Vec x, Quat q, Vec v, Vec w) {
+  return {{x.x, x.y, x.z}, {q.x, q.y, q.z, q.w}, {v.x, v.y, v.z}, {w.x, w.y, w.z}};
 }
 
 bool same(const dfm_rigid_state &a, const dfm_rigid_state &b) { return std::memcmp(&a, &b, sizeof a) == 0; }

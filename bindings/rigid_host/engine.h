@@ -40,6 +40,7 @@ struct Inertia {
 Inertia inertia_of(double mass, const double tensor[3][3]);
 
 Quat rotation_of(const dfm_rigid_state &s);
+dfm_rigid_state state_of(Vec position, Quat rotation, Vec velocity, Vec spin);
 bool same(const dfm_rigid_state &a, const dfm_rigid_state &b);  // to the bit
 // From the frame of a body to that of its principal axes.
 Pose in_principal_frame(const Inertia &inertia, const Pose &in_body);

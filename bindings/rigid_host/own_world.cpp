@@ -11,21 +11,11 @@ namespace {
 // The pose in `state`; for the world that of the origin.
 Pose pose_of(uint32_t number, const dfm_rigid_state *state) {
   if (number == DFM_RIGID_WORLD) return {};
-  const double *const q = state[number].rotation;
-  return {load(state[number].position), {q[0], q[1], q[2], q[3]}};
+  return {load(state[number].position), rotation_of(state[number])};
 }
 Motion motion_of(uint32_t number, const dfm_rigid_state *state) {
   if (number == DFM_RIGID_WORLD) return {};
   return {load(state[number].velocity), load(state[number].spin)};
-}
-
-dfm_rigid_state state_of(const dfm_rigid_def &def) {
-  dfm_rigid_state s{};
-  std::memcpy(s.position, def.pose.position, sizeof s.position);
-  std::memcpy(s.rotation, def.pose.rotation, sizeof s.rotation);
-  std::memcpy(s.velocity, def.velocity, sizeof s.velocity);
-  std::memcpy(s.spin, def.spin, sizeof s.spin);
-  return s;
 }
 
 // Largest values that an engine gets: a double still resolves a contact (1e-7 m at the bound), and squares
@@ -39,7 +29,7 @@ constexpr double kShare = 0.2, kFullShare = 1e-3;  // both engines' default; s
 }  // namespace
 
 void OwnWorld::check(const dfm_rigid_state &s, uint32_t number, const char *when) const {
-  const Quat q{s.rotation[0], s.rotation[1], s.rotation[2], s.rotation[3]};
+  const Quat q = rotation_of(s);
   const double turn = q.x * q.x + q.y * q.y + q.z * q.z + q.w * q.w;
   const auto within = [](const double *x, double most) {
     return std::fabs(x[0]) <= most && std::fabs(x[1]) <= most && std::fabs(x[2]) <= most;
@@ -60,7 +50,8 @@ void OwnWorld::build(const dfm_rigid_set_def &set, uint32_t *group) {
   given_.resize(set.nbody);
   for (uint32_t i = 0; i < set.nbody; ++i) {
     const dfm_rigid_def &def = *dfm_rigid_set_body(&set, i);
-    given_[i] = state_of(def);
+    given_[i] =
+        state_of(load(def.pose.position), load_quat(def.pose.rotation), load(def.velocity), load(def.spin));
     check(given_[i], i, "made");
     members_[i] = make_body(def, i);
     group[i] = members_[i] ? static_cast<uint32_t>(moving_.size()) : DFM_RIGID_STILL;

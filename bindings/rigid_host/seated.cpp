@@ -133,9 +133,7 @@ dfm_status set_filter(dfm_obstacle &obstacle, uint32_t category, uint32_t collid
 dfm_status find_again(dfm_obstacle &obstacle, Pose &known) {
   dfm_pose there;
   const dfm_status status = dfm_obstacle_get_pose(obstacle, &there);
-  if (status == DFM_OK)
-    known = {load(there.position),
-             {there.rotation[0], there.rotation[1], there.rotation[2], there.rotation[3]}};
+  if (status == DFM_OK) known = {load(there.position), load_quat(there.rotation)};
   return unless_gone(obstacle, status);
 }
 

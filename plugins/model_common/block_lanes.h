@@ -11,6 +11,15 @@ namespace {
 using model::BlockPoints;
 using model::Merge;
 
+// `v4` for templates that serve other vectors and single numbers, too.
+struct Wide {
+  typedef v4 V;
+  DEFORM_INLINE v4 splat(double a) { return lanes::splat(a); }
+  DEFORM_INLINE v4 root(v4 a) { return sqrt4(a); }
+  DEFORM_INLINE v4 more(v4 a, v4 b) { return max4(a, b); }
+  DEFORM_INLINE v4 less(v4 a, v4 b) { return min4(a, b); }
+};
+
 DEFORM_INLINE v4 point4(const BlockPoints &b, uint32_t n) { return load4(b.p + 8 * size_t(n)); }
 DEFORM_INLINE v4 velocity4(const BlockPoints &b, uint32_t n) { return load4(b.p + 8 * size_t(n) + 4); }
 DEFORM_INLINE void add_to(const BlockPoints &b, uint32_t n, v4 a) {

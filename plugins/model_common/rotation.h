@@ -8,6 +8,23 @@
 
 namespace model {
 
+// The rotation of Jacobi's methods in the plane of p and q, from the entries pp, qq and pq of what it is to
+// make diagonal.
+struct Givens {
+  double c, s;
+  Givens(double pp, double qq, double pq) {
+    const double theta = (qq - pp) / (2 * pq);
+    const double t = (theta < 0 ? -1 : 1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
+    c = 1 / std::sqrt(t * t + 1);
+    s = t * c;
+  }
+  void turn(double &x, double &y) const {
+    const double before = x;
+    x = c * before - s * y;
+    y = s * before + c * y;
+  }
+};
+
 // Eigenvalues on the diagonal of the symmetric a, eigenvectors in the columns of v: cyclic Jacobi.
 template <int kN>
 inline void jacobi(double (&a)[kN][kN], double (&v)[kN][kN]) {
@@ -24,25 +41,11 @@ inline void jacobi(double (&a)[kN][kN], double (&v)[kN][kN]) {
     for (int p = 0; p < kN; ++p)
       for (int q = p + 1; q < kN; ++q) {
         if (a[p][q] == 0) continue;
-        const double theta = (a[q][q] - a[p][p]) / (2 * a[p][q]);
-        const double t = (theta < 0 ? -1 : 1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-        for (int k = 0; k < kN; ++k) {
-          const double x = a[k][p], y = a[k][q];
-          a[k][p] = c * x - s * y;
-          a[k][q] = s * x + c * y;
-        }
-        for (int k = 0; k < kN; ++k) {
-          const double x = a[p][k], y = a[q][k];
-          a[p][k] = c * x - s * y;
-          a[q][k] = s * x + c * y;
-        }
+        const Givens by(a[p][p], a[q][q], a[p][q]);
+        for (int k = 0; k < kN; ++k) by.turn(a[k][p], a[k][q]);
+        for (int k = 0; k < kN; ++k) by.turn(a[p][k], a[q][k]);
+        for (int k = 0; k < kN; ++k) by.turn(v[k][p], v[k][q]);
         a[p][q] = a[q][p] = 0;
-        for (int k = 0; k < kN; ++k) {
-          const double x = v[k][p], y = v[k][q];
-          v[k][p] = c * x - s * y;
-          v[k][q] = s * x + c * y;
-        }
       }
   }
 }
@@ -224,15 +227,9 @@ inline void by_singular_values(const double *given, double *r) {
         const double pp = product(p, p), qq = product(q, q), pq = product(p, q);
         if (!(pq * pq > 1e-32 * pp * qq)) continue;
         turned = true;
-        const double theta = (qq - pp) / (2 * pq);
-        const double t = (theta < 0 ? -1 : 1) / (std::fabs(theta) + std::sqrt(theta * theta + 1));
-        const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+        const Givens by(pp, qq, pq);
         for (double *const m : both)
-          for (int k = 0; k < 9; k += 3) {
-            const double x = m[k + p], y = m[k + q];
-            m[k + p] = c * x - s * y;
-            m[k + q] = s * x + c * y;
-          }
+          for (int k = 0; k < 9; k += 3) by.turn(m[k + p], m[k + q]);
       }
   }
   int first = 0, last = 2;

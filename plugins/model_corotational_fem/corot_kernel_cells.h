@@ -65,13 +65,6 @@ static __attribute__((noinline)) void rotate_lanes(Rotate rotate, uint32_t which
   for (int k = 0; k < 9; ++k) r[k] = load4(to[k]);
 }
 
-struct Wide {
-  typedef v4 V;
-  static inline __attribute__((always_inline)) v4 splat(double a) { return lanes::splat(a); }
-  static inline __attribute__((always_inline)) v4 root(v4 a) { return sqrt4(a); }
-  static inline __attribute__((always_inline)) v4 more(v4 a, v4 b) { return max4(a, b); }
-  static inline __attribute__((always_inline)) v4 less(v4 a, v4 b) { return min4(a, b); }
-};
 DEFORM_INLINE void finish_rotation(const Block &b, const v4 *f, const model::Polar<Wide> &o, v4 *r) {
   model::polar_rotation(f, o, r);
   const uint32_t good = mask_above(o.divisor, splat(model::kPolarDivisor) * o.cube) &

@@ -7,9 +7,9 @@
 
 namespace msm {
 namespace {
-constexpr Kernels kKernels = {"avx2",       &single::kKernels, load_block,  {MSM_SPRINGS(springs)},
-                              MSM_BRANCHES, volume_cells,      MSM_ROWS,    merge_halo,
-                              merge_rows,   add_to_host,       MSM_ENERGIES};
+constexpr Kernels kKernels = {"avx2",       &single::kKernels,  load_block,  {MSM_SPRINGS(springs)},
+                              MSM_BRANCHES, volume_cells<Four>, MSM_ROWS,    merge_halo,
+                              merge_rows,   add_to_host,        MSM_ENERGIES};
 }  // namespace
 
 const Kernels *kernels_avx2() { return &kKernels; }

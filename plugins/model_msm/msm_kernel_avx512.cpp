@@ -93,163 +93,63 @@ DEFORM_INLINE __m512d corner(const Block &b, const Cell *c, int k, int n) {
                             _mm256_load_pd(b.p + 8 * size_t(c[k + 4].p[n])), 1);
 }
 
-struct Edges8 { __m512d x, y, z; };
-DEFORM_INLINE void gather_edges(const Block &b, const Cell *c, int n, __m512d o0, __m512d o1, __m512d o2,
-                                __m512d o3, Edges8 &out) {
-  out.x = _mm512_sub_pd(corner(b, c, 0, n), o0);
-  out.y = _mm512_sub_pd(corner(b, c, 1, n), o1);
-  out.z = _mm512_sub_pd(corner(b, c, 2, n), o2);
-  __m512d unused = _mm512_sub_pd(corner(b, c, 3, n), o3);
-  transpose(out.x, out.y, out.z, unused);
-}
-DEFORM_INLINE __m512d minor2(__m512d a, __m512d b, __m512d c, __m512d d) {
-  return _mm512_sub_pd(_mm512_mul_pd(a, b), _mm512_mul_pd(c, d));
-}
-DEFORM_INLINE void cross(const Edges8 &a, const Edges8 &b, Edges8 &out) {
-  out.x = minor2(a.y, b.z, a.z, b.y);
-  out.y = minor2(a.z, b.x, a.x, b.z);
-  out.z = minor2(a.x, b.y, a.y, b.x);
-}
-
-// Of eight cells: edges from their first corners, and for each the vector product of the other two.
-struct Shape8 { Edges8 e1, e2, e3, g1, g2, g3; };
-DEFORM_INLINE Shape8 shape8(const Block &b, const Cell *c) {
-  const __m512d o0 = corner(b, c, 0, 0), o1 = corner(b, c, 1, 0), o2 = corner(b, c, 2, 0),
-                o3 = corner(b, c, 3, 0);
-  Shape8 s;
-  gather_edges(b, c, 1, o0, o1, o2, o3, s.e1);
-  gather_edges(b, c, 2, o0, o1, o2, o3, s.e2);
-  gather_edges(b, c, 3, o0, o1, o2, o3, s.e3);
-  cross(s.e2, s.e3, s.g1);
-  cross(s.e3, s.e1, s.g2);
-  cross(s.e1, s.e2, s.g3);
-  return s;
-}
-
-struct Forces { __m512d f0, f1, f2, f3; };  // of cells k and k + 4 at one corner
-DEFORM_INLINE void forces_at(__m512d pressure, const Edges8 &g, Forces &f) {
-  f.f0 = _mm512_mul_pd(pressure, g.x);
-  f.f1 = _mm512_mul_pd(pressure, g.y);
-  f.f2 = _mm512_mul_pd(pressure, g.z);
-  f.f3 = _mm512_setzero_pd();
-  transpose(f.f0, f.f1, f.f2, f.f3);
-}
-DEFORM_INLINE void add(Forces &a, const Forces &b) {
-  a.f0 = _mm512_add_pd(a.f0, b.f0);
-  a.f1 = _mm512_add_pd(a.f1, b.f1);
-  a.f2 = _mm512_add_pd(a.f2, b.f2);
-  a.f3 = _mm512_add_pd(a.f3, b.f3);
-}
-// One cell after the other at each corner, corners 1 2 3 0, four cells at a time: the order of the
-// other kernels.
-DEFORM_INLINE void spread_low(const Block &b, const Cell *c, int n, const Forces &f) {
-  add_to(b, c[0].p[n], low(f.f0));
-  add_to(b, c[1].p[n], low(f.f1));
-  add_to(b, c[2].p[n], low(f.f2));
-  add_to(b, c[3].p[n], low(f.f3));
-}
-DEFORM_INLINE void spread_high(const Block &b, const Cell *c, int n, const Forces &f) {
-  add_to(b, c[4].p[n], high(f.f0));
-  add_to(b, c[5].p[n], high(f.f1));
-  add_to(b, c[6].p[n], high(f.f2));
-  add_to(b, c[7].p[n], high(f.f3));
-}
-
-DEFORM_INLINE __m512d dot(const Edges8 &a, const Edges8 &b) {
-  return _mm512_add_pd(_mm512_add_pd(_mm512_mul_pd(a.x, b.x), _mm512_mul_pd(a.y, b.y)),
-                       _mm512_mul_pd(a.z, b.z));
-}
-DEFORM_INLINE __m512d sum3(__m512d a, __m512d b, __m512d c) { return _mm512_add_pd(_mm512_add_pd(a, b), c); }
-DEFORM_INLINE Edges8 sum3(const Edges8 &a, const Edges8 &b, const Edges8 &c) {
-  return {sum3(a.x, b.x, c.x), sum3(a.y, b.y, c.y), sum3(a.z, b.z, c.z)};
-}
-DEFORM_INLINE __m512d pressure_of(const Block &b, uint32_t t, __m512d now) {
-  const __m512d rest = _mm512_load_pd(b.volume6 + t);
-  const __m512d below = _mm512_mul_pd(_mm512_set1_pd(kCollapseBelow), rest);
-  now = _mm512_max_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMinVolume), rest));
-  now = _mm512_min_pd(now, _mm512_mul_pd(_mm512_set1_pd(kMaxVolume), rest));
-  const __m512d pressure = _mm512_mul_pd(_mm512_load_pd(b.bulk + t), _mm512_sub_pd(rest, now));
-  if (!_mm512_cmp_pd_mask(below, now, _CMP_GT_OQ)) return pressure;
-  const __m512d lost = _mm512_max_pd(_mm512_sub_pd(below, now), _mm512_setzero_pd());
-  return _mm512_add_pd(pressure, _mm512_mul_pd(_mm512_load_pd(b.collapse + t), lost));
-}
-DEFORM_INLINE bool any_far(const Block &b, uint32_t t, __m512d q) {
-  return _mm512_cmp_pd_mask(q, _mm512_set1_pd(b.least_limit), _CMP_GT_OQ) &&
-         _mm512_cmp_pd_mask(q, _mm512_load_pd(b.limit + t), _CMP_GT_OQ);
-}
-DEFORM_INLINE __m512d squares(const Edges8 &e1, const Edges8 &e2, const Edges8 &e3) {
-  const Edges8 sum = sum3(e1, e2, e3);
-  return _mm512_sub_pd(_mm512_mul_pd(_mm512_set1_pd(4), sum3(dot(e1, e1), dot(e2, e2), dot(e3, e3))),
-                       dot(sum, sum));
-}
-DEFORM_INLINE __m512d fade(__m512d q, __m512d limit, __m512d &by_q) {
-  const __m512d most = _mm512_max_pd(q, limit);
-  const __m512d u = _mm512_div_pd(limit, most);
-  const __m512d one = _mm512_set1_pd(1);
-  const __m512d power = _mm512_mul_pd(_mm512_sqrt_pd(u), u);
-  by_q =
-      _mm512_div_pd(_mm512_mul_pd(_mm512_set1_pd(-3.75), _mm512_mul_pd(power, _mm512_sub_pd(one, u))), most);
-  return _mm512_mul_pd(power, _mm512_sub_pd(_mm512_set1_pd(2.5), _mm512_mul_pd(_mm512_set1_pd(1.5), u)));
-}
-DEFORM_INLINE void stretched_forces(const Block &b, uint32_t t, __m512d q, __m512d now, const Edges8 &e1,
-                                    const Edges8 &e2, const Edges8 &e3, Edges8 &g1, Edges8 &g2, Edges8 &g3) {
-  __m512d by_q;
-  const __m512d share = fade(q, _mm512_load_pd(b.limit + t), by_q);
-  const __m512d p = pressure_of(b, t, _mm512_mul_pd(now, share));
-  const __m512d along = _mm512_mul_pd(p, share);
-  const __m512d quarter = _mm512_set1_pd(0.25);
-  const __m512d inward = _mm512_mul_pd(_mm512_mul_pd(_mm512_set1_pd(8), p), _mm512_mul_pd(now, by_q));
-  const Edges8 sum = sum3(e1, e2, e3);
-  const Edges8 middle = {_mm512_mul_pd(quarter, sum.x), _mm512_mul_pd(quarter, sum.y),
-                         _mm512_mul_pd(quarter, sum.z)};
-  const auto part = [&](__m512d g, __m512d e, __m512d m) __attribute__((always_inline)) {
-    return _mm512_add_pd(_mm512_mul_pd(along, g), _mm512_mul_pd(inward, _mm512_sub_pd(e, m)));
-  };
-  const auto turn = [&](const Edges8 &e, Edges8 &g) __attribute__((always_inline)) {
-    g = {part(g.x, e.x, middle.x), part(g.y, e.y, middle.y), part(g.z, e.z, middle.z)};
-  };
-  turn(e1, g1);
-  turn(e2, g2);
-  turn(e3, g3);
-}
-
-static void volume_cells8(const Block &b) {
-  for (uint32_t t = 0; t < b.cells; t += 8) {
-    const Cell *c = b.cell + t;
-    if (b.ahead) fetch_cells(b, t);
-    auto [e1, e2, e3, g1, g2, g3] = shape8(b, c);
-    const __m512d volume6 = dot(e1, g1);
-    const __m512d q = squares(e1, e2, e3);
-    __m512d pressure = _mm512_set1_pd(1);
-    if (any_far(b, t, q)) {
-      stretched_forces(b, t, q, volume6, e1, e2, e3, g1, g2, g3);
-    } else {
-      pressure = pressure_of(b, t, volume6);
-      if (!_mm512_cmp_pd_mask(pressure, _mm512_setzero_pd(), _CMP_NEQ_UQ)) continue;
-    }
-    Forces f1, f2, f3, sum;
-    forces_at(pressure, g1, f1);
-    forces_at(pressure, g2, f2);
-    forces_at(pressure, g3, f3);
-    sum = f1;
-    add(sum, f2);
-    add(sum, f3);
-    spread_low(b, c, 1, f1);
-    spread_low(b, c, 2, f2);
-    spread_low(b, c, 3, f3);
-    take_from(b, c[0].p[0], low(sum.f0));
-    take_from(b, c[1].p[0], low(sum.f1));
-    take_from(b, c[2].p[0], low(sum.f2));
-    take_from(b, c[3].p[0], low(sum.f3));
-    spread_high(b, c, 1, f1);
-    spread_high(b, c, 2, f2);
-    spread_high(b, c, 3, f3);
-    take_from(b, c[4].p[0], high(sum.f0));
-    take_from(b, c[5].p[0], high(sum.f1));
-    take_from(b, c[6].p[0], high(sum.f2));
-    take_from(b, c[7].p[0], high(sum.f3));
+// Eight cells at a time.
+struct Eight {
+  typedef __m512d V;
+  static constexpr uint32_t kLanes = 8;
+  DEFORM_INLINE V splat(double a) { return _mm512_set1_pd(a); }
+  DEFORM_INLINE V load(const double *p) { return _mm512_load_pd(p); }
+  DEFORM_INLINE void store(double *p, V a) { _mm512_store_pd(p, a); }
+  DEFORM_INLINE V root(V a) { return _mm512_sqrt_pd(a); }
+  DEFORM_INLINE V more(V a, V b) { return _mm512_max_pd(a, b); }
+  DEFORM_INLINE V less(V a, V b) { return _mm512_min_pd(a, b); }
+  DEFORM_INLINE V abs(V a) { return _mm512_abs_pd(a); }
+  DEFORM_INLINE __mmask8 above(V a, V limit) { return _mm512_cmp_pd_mask(a, limit, _CMP_GT_OQ); }
+  DEFORM_INLINE bool any_above(V a, V limit) { return above(a, limit); }
+  DEFORM_INLINE uint32_t count_above(V a, V limit) { return uint32_t(__builtin_popcount(above(a, limit))); }
+  DEFORM_INLINE V choose_above(V a, V limit, V yes, V no) {
+    return _mm512_mask_blend_pd(above(a, limit), no, yes);
   }
-}
+  DEFORM_INLINE bool all_zero(V a) { return !_mm512_cmp_pd_mask(a, _mm512_setzero_pd(), _CMP_NEQ_UQ); }
+  DEFORM_INLINE V weights(const Block &b, const Cell *c, int n) {
+    const auto of = [&](int k) __attribute__((always_inline)) { return b.weight[c[k].p[n]]; };
+    return _mm512_setr_pd(of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7));
+  }
+  DEFORM_INLINE void gather(const Block &b, const Cell *c, Three<Eight> &e1, Three<Eight> &e2,
+                            Three<Eight> &e3) {
+    const V o0 = corner(b, c, 0, 0), o1 = corner(b, c, 1, 0), o2 = corner(b, c, 2, 0),
+            o3 = corner(b, c, 3, 0);
+    const auto edges = [&](int n, Three<Eight> &e) __attribute__((always_inline)) {
+      V unused = corner(b, c, 3, n) - o3;
+      e = {corner(b, c, 0, n) - o0, corner(b, c, 1, n) - o1, corner(b, c, 2, n) - o2};
+      transpose(e.x, e.y, e.z, unused);
+    };
+    edges(1, e1);
+    edges(2, e2);
+    edges(3, e3);
+  }
+  // One cell after the other at each corner, corners 1 2 3 0, four cells at a time: the order of the other
+  // kernels.
+  DEFORM_INLINE void spread(const Block &b, const Cell *c, V pressure, const Cells<Eight> &cells) {
+    V f[3][4];  // of corners, cells k and k + 4
+    const auto forces = [&](V *at, const Three<Eight> &g) __attribute__((always_inline)) {
+      at[0] = pressure * g.x;
+      at[1] = pressure * g.y;
+      at[2] = pressure * g.z;
+      at[3] = _mm512_setzero_pd();
+      transpose(at[0], at[1], at[2], at[3]);
+    };
+    forces(f[0], cells.g1);
+    forces(f[1], cells.g2);
+    forces(f[2], cells.g3);
+    for (int n = 0; n < 3; ++n)
+      for (int k = 0; k < 4; ++k) add_to(b, c[k].p[n + 1], low(f[n][k]));
+    for (int k = 0; k < 4; ++k) take_from(b, c[k].p[0], low((f[0][k] + f[1][k]) + f[2][k]));
+    for (int n = 0; n < 3; ++n)
+      for (int k = 0; k < 4; ++k) add_to(b, c[k + 4].p[n + 1], high(f[n][k]));
+    for (int k = 0; k < 4; ++k) take_from(b, c[k + 4].p[0], high((f[0][k] + f[1][k]) + f[2][k]));
+  }
+};
 
 // One spring's row sums, diagonal block and what is beside it, in a register.
 DEFORM_INLINE __m512d row_of_spring(int k, __m512d along, __m512d all, __m256d d) {
@@ -292,68 +192,14 @@ static void spring_rows8(const Block &b) {
   }
 }
 
-DEFORM_INLINE __m512d weights8(const Block &b, const Cell *c, int n) {
-  const auto of = [&](int k) __attribute__((always_inline)) { return b.weight[c[k].p[n]]; };
-  return _mm512_setr_pd(of(0), of(1), of(2), of(3), of(4), of(5), of(6), of(7));
-}
-DEFORM_INLINE __m512d norm8(const Edges8 &a) { return _mm512_sqrt_pd(dot(a, a)); }
-DEFORM_INLINE Edges8 minus(const Edges8 &a, const Edges8 &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-
-static void cell_rows8(const Block &b) {
-  uint32_t limited = 0;
-  for (uint32_t t = 0; t < b.cells; t += 8) {
-    const Cell *c = b.cell + t;
-    auto [e1, e2, e3, g1, g2, g3] = shape8(b, c);
-    const Edges8 a = minus(e2, e1), d = minus(e3, e2), h = minus(e1, e3);
-    const __m512d long1 = _mm512_max_pd(dot(e1, e1), dot(e2, e2)),
-                  long2 = _mm512_max_pd(dot(e3, e3), dot(a, a));
-    const __m512d long3 = _mm512_max_pd(dot(d, d), dot(h, h));
-    const __m512d longest = _mm512_sqrt_pd(_mm512_max_pd(_mm512_max_pd(long1, long2), long3));
-    const __m512d limit = _mm512_load_pd(b.limit + t), q = squares(e1, e2, e3);
-    const __mmask8 far = _mm512_cmp_pd_mask(q, limit, _CMP_GT_OQ);
-    __m512d now = dot(e1, g1);
-    if (far) {
-      __m512d by_q;
-      now = now * fade(q, limit, by_q);
-    }
-    const __m512d pressure = _mm512_abs_pd(pressure_of(b, t, now)), more = pressure * longest;
-    const __mmask8 counted =
-        _mm512_cmp_pd_mask(_mm512_set1_pd(kCollapseCounted) * _mm512_load_pd(b.volume6 + t), now, _CMP_GT_OQ);
-    const __m512d k = _mm512_load_pd(b.bulk + t) + _mm512_maskz_load_pd(counted, b.collapse + t);
-    const __m512d w0 = weights8(b, c, 0), w1 = weights8(b, c, 1), w2 = weights8(b, c, 2),
-                  w3 = weights8(b, c, 3);
-    const __m512d w = (w0 + w1) + (w2 + w3);
-    const __m512d n0 = norm8(sum3(g1, g2, g3)), n1 = norm8(g1), n2 = norm8(g2), n3 = norm8(g3);
-    const __m512d sum = (n0 * w0 + n1 * w1) + (n2 * w2 + n3 * w3);
-    alignas(64) double row[4][8];
-    const auto store = [&](int corner, __m512d own, __m512d weight) __attribute__((always_inline)) {
-      _mm512_store_pd(row[corner], k * (own * sum) + more * (w - weight));
-    };
-    store(0, n0, w0);
-    store(1, n1, w1);
-    store(2, n2, w2);
-    store(3, n3, w3);
-    if (far) {
-      const __m512d beyond = k * (_mm512_set1_pd(kFade1) * (limit * limit)) +
-                             pressure * (_mm512_set1_pd(kFade2) * _mm512_sqrt_pd(limit));
-      const __m512d weight[4] = {w0, w1, w2, w3};
-      for (int n = 0; n < 4; ++n) _mm512_mask_store_pd(row[n], far, beyond * weight[n]);
-      limited += uint32_t(__builtin_popcount(far));
-    }
-    for (int n = 0; n < 8; ++n)
-      for (int m = 0; m < 4; ++m) b.row[8 * size_t(c[n].p[m]) + 7] += row[m][n];
-  }
-  *b.limited = limited;
-}
-
 constexpr Kernels kKernels = {"avx512",
                               &single::kKernels,
                               load_block,
                               {MSM_SPRINGS(springs8)},
                               MSM_BRANCHES,
-                              volume_cells8,
+                              volume_cells<Eight>,
                               {spring_rows8, spring_rows<kTilted>, spring_rows<kTurned>},
-                              cell_rows8,
+                              cell_rows<Eight>,
                               merge_halo,
                               merge_rows,
                               add_to_host,

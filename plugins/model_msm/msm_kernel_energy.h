@@ -30,30 +30,28 @@ static inline double spring_energies(const SpringList &s, const double *x, uint3
   return sum;
 }
 
-DEFORM_INLINE Edges4 corners(const Block &b, const Cell *c, int n, const double *x, uint32_t stride) {
+DEFORM_INLINE Three<Four> corners(const Block &b, const Cell *c, int n, const double *x, uint32_t stride) {
   const auto at = [&](int k) __attribute__((always_inline)) {
     return load_xyz(x + size_t(stride) * b.point[c[k].p[n]]);
   };
-  Edges4 out = {at(0), at(1), at(2)};
+  Three<Four> out = {at(0), at(1), at(2)};
   v4 unused = at(3);
   transpose(out.x, out.y, out.z, unused);
   return out;
 }
-DEFORM_INLINE Edges4 operator-(const Edges4 &a, const Edges4 &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
 
 // Cells that fill up a block have no stiffness, so their energy is zero.
 static inline double cell_energies(const Block &b, const double *x, uint32_t stride, double sum) {
   for (uint32_t t = 0; t < b.cells; t += 4) {
     const Cell *c = b.cell + t;
-    const Edges4 x0 = corners(b, c, 0, x, stride), x1 = corners(b, c, 1, x, stride);
-    const Edges4 x2 = corners(b, c, 2, x, stride), x3 = corners(b, c, 3, x, stride);
-    const Edges4 e1 = x1 - x0, e2 = x2 - x0, e3 = x3 - x0, d21 = x2 - x1, d31 = x3 - x1, d32 = x3 - x2;
+    const Three<Four> x0 = corners(b, c, 0, x, stride), x1 = corners(b, c, 1, x, stride);
+    const Three<Four> x2 = corners(b, c, 2, x, stride), x3 = corners(b, c, 3, x, stride);
+    const Three<Four> e1 = x1 - x0, e2 = x2 - x0, e3 = x3 - x0, d21 = x2 - x1, d31 = x3 - x1, d32 = x3 - x2;
     const v4 q =
         ((((dot(e1, e1) + dot(e2, e2)) + dot(d21, d21)) + dot(e3, e3)) + dot(d31, d31)) + dot(d32, d32);
-    const v4 limit = load4(b.limit + t), u = limit / max4(q, limit), rest = load4(b.volume6 + t);
-    Edges4 g;
-    cross(e2, e3, g);
-    const v4 now = dot(e1, g) * (sqrt4(u) * u * (splat(2.5) - splat(1.5) * u));
+    const v4 rest = load4(b.volume6 + t);
+    v4 by_q;
+    const v4 now = dot(e1, cross(e2, e3)) * fade<Four>(q, load4(b.limit + t), by_q);
     const v4 kept = min4(max4(now, splat(kMinVolume) * rest), splat(kMaxVolume) * rest), more = kept - rest;
     const v4 lost = max4(splat(kCollapseBelow) * rest - kept, splat(0));
     const v4 bulk = load4(b.bulk + t), collapse = load4(b.collapse + t), half = splat(0.5);

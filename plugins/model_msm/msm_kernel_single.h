@@ -40,24 +40,21 @@ DEFORM_INLINE vf low_pairs(vf a, vf b) { return (vf)_mm_unpacklo_pd((RawPairs)a,
 DEFORM_INLINE vf high_pairs(vf a, vf b) { return (vf)_mm_unpackhi_pd((RawPairs)a, (RawPairs)b); }
 #endif
 
-DEFORM_INLINE vf all(float a) { return vf{} + a; }
-DEFORM_INLINE vf load(const float *p) { return *reinterpret_cast<const vf *>(p); }
-DEFORM_INLINE vf larger(vf a, vf b) { return a > b ? a : b; }
-DEFORM_INLINE vf smaller(vf a, vf b) { return a < b ? a : b; }
+struct Floats {
+  typedef vf V;
+  DEFORM_INLINE vf splat(double a) { return vf{} + float(a); }
+  DEFORM_INLINE vf load(const float *p) { return *reinterpret_cast<const vf *>(p); }
+  DEFORM_INLINE vf root(vf a) { return single::root(a); }
+  DEFORM_INLINE vf more(vf a, vf b) { return a > b ? a : b; }
+  DEFORM_INLINE vf less(vf a, vf b) { return a < b ? a : b; }
+  DEFORM_INLINE bool any_above(vf a, vf limit) { return any(a > limit); }
+};
+typedef msm::Three<Floats> Three;
 
 // Bits of to - from, of fixed-point places. One that is not finite is the least integer, and the difference
 // wraps: the force is no number then, whatever the bits.
 typedef uint32_t vu __attribute__((vector_size(4 * DEFORM_LANES)));
 DEFORM_INLINE vf between(vi from, vi to) { return (vf)((vu)to - (vu)from); }
-
-struct Three { vf x, y, z; };
-DEFORM_INLINE Three operator+(const Three &a, const Three &b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-DEFORM_INLINE Three operator-(const Three &a, const Three &b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-DEFORM_INLINE Three operator*(vf a, const Three &b) { return {a * b.x, a * b.y, a * b.z}; }
-DEFORM_INLINE vf dot(const Three &a, const Three &b) { return (a.x * b.x + a.y * b.y) + a.z * b.z; }
-DEFORM_INLINE Three cross(const Three &a, const Three &b) {
-  return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
-}
 
 // Row k holds in group g the vector of lane 4 g + k.
 DEFORM_INLINE Three columns(vf row0, vf row1, vf row2, vf row3) {
@@ -139,34 +136,15 @@ static inline float load_points(const SingleBlock &b, const double *x, const dou
 // L0^2)/(L + L0). What roots and quotients round is then a share of the stretch.
 template <bool kTilts, Damping kDamping>
 DEFORM_INLINE vf pull(const SingleBlock &s, size_t slot, vf dd, vf rate, float damp) {
-  const vf counted = kTilts ? dd + load(s.tilt + slot) : dd;
-  const vf rest = load(s.rest + slot), length = root(counted), sum = length + rest;
+  const vf counted = kTilts ? dd + Floats::load(s.tilt + slot) : dd;
+  const vf rest = Floats::load(s.rest + slot), length = root(counted), sum = length + rest;
   vf stretch = (counted - rest * rest) * length;
   if constexpr (kDamping != kUndamped) {
-    const vf factor = kDamping == kPerSpring ? load(s.damp + slot) : all(damp);
+    const vf factor = kDamping == kPerSpring ? Floats::load(s.damp + slot) : vf{} + damp;
     stretch = stretch + (factor * rate) * sum;
   }
-  const vf scale = load(s.stiffness + slot) * (stretch / (counted * sum));
+  const vf scale = Floats::load(s.stiffness + slot) * (stretch / (counted * sum));
   return dd <= kShortestSingle ? vf{} : scale;
-}
-
-DEFORM_INLINE vf pressure_of(const SingleBlock &b, size_t t, vf now) {
-  const vf rest = load(b.volume6 + t);
-  now = smaller(larger(now, float(kMinVolume) * rest), float(kMaxVolume) * rest);
-  return load(b.bulk + t) * (rest - now) +
-         load(b.collapse + t) * larger(float(kCollapseBelow) * rest - now, vf{});
-}
-
-// As the one of msm_kernel_quad.h: a lane that is within its limit gets pressure * g.
-DEFORM_INLINE void stretched_forces(const SingleBlock &b, size_t t, vf q, vf now, const Three &e1,
-                                    const Three &e2, const Three &e3, Three &g1, Three &g2, Three &g3) {
-  const vf limit = load(b.limit + t), most = larger(q, limit), u = limit / most, power = root(u) * u;
-  const vf by_q = -3.75f * (power * (1.0f - u)) / most, share = power * (2.5f - 1.5f * u);
-  const vf p = pressure_of(b, t, now * share), along = p * share, inward = (8.0f * p) * (now * by_q);
-  const Three middle = all(0.25f) * ((e1 + e2) + e3);
-  g1 = along * g1 + inward * (e1 - middle);
-  g2 = along * g2 + inward * (e2 - middle);
-  g3 = along * g3 + inward * (e3 - middle);
 }
 
 // One point of each lane's fan less a, in units and in m/s.
@@ -236,21 +214,21 @@ static inline void fans(const SingleBlock &b, float unit, float damp) {
         if constexpr (kCells) {
           const Three normal3 = cross(e1, e3);
           const size_t t = cell + kFans * (k - 1);
-          Three g1 = cross(e2, e3), g2 = zero - normal3, g3 = normal2;
-          const vf now = dot(e1, g1);
+          Cells<Floats> c = {e1, e2, e3, cross(e2, e3), zero - normal3, normal2};
+          const vf now = dot(e1, c.g1);
           const Three sum = (e1 + e2) + e3;
           const vf q = 4.0f * ((square1 + square2) + square3) - dot(sum, sum);
-          if (any(q > load(b.limit + t))) {
-            stretched_forces(b, t, q, now, e1, e2, e3, g1, g2, g3);
+          if (any(q > Floats::load(b.limit + t))) {
+            stretched_forces(b, t, q, now, c);
           } else {
-            const vf pressure = pressure_of(b, t, now);
-            g1 = pressure * g1;
-            g2 = pressure * g2;
-            g3 = pressure * g3;
+            const vf pressure = pressure_of<Floats>(b, t, now);
+            c.g1 = pressure * c.g1;
+            c.g2 = pressure * c.g2;
+            c.g3 = pressure * c.g3;
           }
-          at_b = at_b + g1;
-          at_ring = at_ring + g2;
-          here = here + g3;
+          at_b = at_b + c.g1;
+          at_ring = at_ring + c.g2;
+          here = here + c.g3;
           e2 = e3;
           square2 = square3;
           normal2 = normal3;

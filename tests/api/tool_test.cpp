@@ -347,7 +347,7 @@ TEST(Tool, LivesAndDies) {
   test::ok(dfm_world_find_tool(s.w, "pair", &found));
   EXPECT_EQ(found, pair);
   EXPECT_EQ(dfm_world_find_tool(s.w, "prob", &found), DFM_E_ARG);
-  test::says({"no tool 'prob'", "did you mean 'probe'"});
+  test::says({"no tool is named 'prob'", "did you mean 'probe'"});
   dfm_tool_def back{};
   back.size = sizeof back;
   test::ok(dfm_tool_get_def(probe, &back));

@@ -13,7 +13,7 @@ from typing import Any, Iterable, Iterator, Mapping
 import numpy as np
 
 from . import _abi
-from ._library import ArgumentError, Error, check, default, encoded, error, lib, quick
+from ._library import ArgumentError, Error, check, default, encoded, error, lib, quick, sized
 from ._values import array_of, whole
 
 _LOG = logging.getLogger("deform")
@@ -263,6 +263,37 @@ def listed(function: Any, *arguments: Any, kind: Any = ctypes.c_uint64) -> list[
     if count.value:
         check(function(*arguments, count.value, ctypes.byref(out), None))
     return list(out[:count.value])
+
+
+class Asked:
+    """What the library knows by a handle, and what is asked of it while no step of its world runs."""
+
+    __slots__ = ()
+    handle: int
+
+    def _free(self) -> None:
+        """BusyError while a step runs."""
+        raise NotImplementedError
+
+    def _ask(self, function: Any, *arguments: Any) -> None:
+        self._free()
+        check(function(self.handle, *arguments))
+
+    def _answer(self, kind: Any, function: Any, *arguments: Any) -> Any:
+        """What a call writes by its last argument: a number of C or a struct."""
+        out = sized(kind) if hasattr(kind, "size") else kind()
+        self._ask(function, *arguments, ctypes.byref(out))
+        return out
+
+    def _wrench(self, function: Any, *arguments: Any) -> tuple[np.ndarray, np.ndarray]:
+        """By its last two: a force and a moment, [3] each."""
+        force, moment = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
+        self._ask(function, *arguments, force, moment)
+        return np.array(force), np.array(moment)
+
+    def _listed(self, function: Any, *arguments: Any, kind: Any = ctypes.c_uint64) -> list[Any]:
+        self._free()
+        return listed(function, self.handle, *arguments, kind=kind)
 
 
 __all__ = ["Context", "Parameter", "Params", "PluginType", "default_context", "quick"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Column, Report
-from ._context import choice, listed
+from ._context import Asked
 from ._library import ArgumentError, OfThisProcess, check, default, encoded, lib, quick, sized
 from ._values import array_of, pose_of, real, text, vector, whole
 from .cut import CutInfo, cut_def, separate_def
@@ -81,7 +81,13 @@ def handle_of(thing: Any, kind: Any, expected: str) -> int:
     return int(thing.handle)
 
 
-class _Part(OfThisProcess):
+def things(of: Any, kind: Any, function: Any, *arguments: Any) -> list[Any]:
+    """What a function lists of a part of a world, as objects of its world; of this kind alone."""
+    found = map(of.world.owner, of._listed(function, *arguments))
+    return [thing for thing in found if isinstance(thing, kind)]
+
+
+class _Part(Asked, OfThisProcess):
     """What lives in a world under a handle. `user` is yours; a misspelled attribute is an error."""
 
     __slots__ = ("__weakref__", "_columns", "handle", "name", "user", "world")
@@ -94,8 +100,11 @@ class _Part(OfThisProcess):
         self.user: Any = None
         self._columns: dict[str, Any] = {}
 
-    def _look(self, key: str, make: Any) -> Any:
+    def _free(self) -> None:
         self.world.free()
+
+    def _look(self, key: str, make: Any) -> Any:
+        self._free()
         column = self._columns.get(key)
         if column is None:
             column = self._columns[key] = make()
@@ -108,17 +117,13 @@ class _Part(OfThisProcess):
     @property
     def is_sensor(self) -> bool:
         """Does it report what overlaps it, and push nothing (set_sensor)?"""
-        out = ctypes.c_bool()
-        self.world.free()
-        check(quick.dfm_is_sensor(self.handle, ctypes.byref(out)))
-        return out.value
+        return bool(self._answer(ctypes.c_bool, quick.dfm_is_sensor).value)
 
     @property
     def sensed(self) -> list[Body | Obstacle]:
         """What overlapped this sensor at the end of the last step: bodies, then obstacles and rigid bodies,
         each in order of creation. World.events tells what comes and goes."""
-        self.world.free()
-        return [self.world.owner(handle) for handle in listed(quick.dfm_sensor_things, self.handle)]
+        return things(self, _Part, quick.dfm_sensor_things)
 
     def __repr__(self) -> str:
         return f"<deform.{type(self).__name__} '{self.name}'>"
@@ -292,8 +297,7 @@ class Body(_Part):
             raise ArgumentError(f"axes is {axes!r}; expected a text of the letters x, y and z", "DFM_E_ARG")
         bits = sum(1 << "xyz".index(a) for a in set(axes))
         numbers = numbers_of(points)
-        self.world.free()
-        check(quick.dfm_body_hold(self.handle, numbers.size, numbers.ctypes.data, bits))
+        self._ask(quick.dfm_body_hold, numbers.size, numbers.ctypes.data, bits)
 
     def move_held(self, points: Any, times: Sequence[float], positions: Any) -> None:
         """Moves held points together along positions [n,3] m at times [n] s, relative to the first."""
@@ -305,27 +309,22 @@ class Body(_Part):
         for key, t, p in zip(keys, at, path):
             key.t = t
             key.pose.position[:] = p
-        self.world.free()
-        check(quick.dfm_body_move_held(self.handle, numbers.size, numbers.ctypes.data, len(path),
-                                       ctypes.byref(keys), None))
+        self._ask(quick.dfm_body_move_held, numbers.size, numbers.ctypes.data, len(path), keys, None)
 
     def add_load(self, points: Any, force: Any) -> int:
         """A lasting force [3] N on each of the points, or [n,3] N on each its own. Returns its number."""
-        numbers, out = numbers_of(points), ctypes.c_uint32()
+        numbers = numbers_of(points)
         given = array_of(force, "force", "3 numbers, or 3 for each point")
         if given.shape not in ((3,), (numbers.size, 3)):
             raise ArgumentError(f"force has the shape {given.shape}; expected (3,), or ({numbers.size}, 3): "
                                 "one for each point", "DFM_E_ARG")
         forces = np.ascontiguousarray(np.broadcast_to(given, (numbers.size, 3)))
-        self.world.free()
-        check(quick.dfm_body_add_load(self.handle, numbers.size, numbers.ctypes.data, forces.ctypes.data, 0,
-                                      None, None, ctypes.byref(out)))
-        return out.value
+        return int(self._answer(ctypes.c_uint32, quick.dfm_body_add_load, numbers.size, numbers.ctypes.data,
+                                forces.ctypes.data, 0, None, None).value)
 
     def remove_load(self, load: int) -> None:
         """Ends a load by the number that add_load returned."""
-        self.world.free()
-        check(quick.dfm_body_remove_load(self.handle, whole(load, "load")))
+        self._ask(quick.dfm_body_remove_load, whole(load, "load"))
 
     def add_spring(self, points: Any, to: Any, stiffness: float, damping: float = 0, *, weights: Any = None,
                    times: Any = None) -> int:
@@ -348,32 +347,24 @@ class Body(_Part):
             keys = vector_keys(times, to, "to")
             definition.nkey, definition.keys = len(keys), ctypes.addressof(keys)
         definition.stiffness, definition.damping = real(stiffness, "stiffness"), real(damping, "damping")
-        out = ctypes.c_uint32()
-        self.world.free()
-        check(quick.dfm_body_add_spring(self.handle, ctypes.byref(definition), ctypes.byref(out)))
-        return out.value
+        return int(self._answer(ctypes.c_uint32, quick.dfm_body_add_spring, ctypes.byref(definition)).value)
 
     def set_spring_target(self, spring: int, to: Any) -> None:
         """Moves the end of a spring to a place [3] m, at which it stays."""
-        self.world.free()
-        check(quick.dfm_body_set_spring_target(self.handle, whole(spring, "spring"), vector(to, "to")))
+        self._ask(quick.dfm_body_set_spring_target, whole(spring, "spring"), vector(to, "to"))
 
     def spring_force(self, spring: int) -> np.ndarray:
         """Force of a spring on the body now, [3] N."""
-        out = (ctypes.c_double * 3)()
-        self.world.free()
-        check(quick.dfm_body_get_spring_force(self.handle, whole(spring, "spring"), out))
-        return np.array(out)
+        return np.array(self._answer(ctypes.c_double * 3, quick.dfm_body_get_spring_force,
+                                     whole(spring, "spring")))
 
     def remove_spring(self, spring: int) -> None:
         """Ends a spring by the number that add_spring returned."""
-        self.world.free()
-        check(quick.dfm_body_remove_spring(self.handle, whole(spring, "spring")))
+        self._ask(quick.dfm_body_remove_spring, whole(spring, "spring"))
 
     def apply_impulse(self, point: Any, impulse: Any) -> None:
         """An impulse [3] N s at a point [3] m, on the nearest surface triangle."""
-        self.world.free()
-        check(quick.dfm_body_apply_impulse(self.handle, vector(point, "point"), vector(impulse, "impulse")))
+        self._ask(quick.dfm_body_apply_impulse, vector(point, "point"), vector(impulse, "impulse"))
 
     def set_params(self, **params: Any) -> None:
         """Changes run-time parameters of the body's model by key."""
@@ -404,14 +395,12 @@ class Body(_Part):
 
     def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
         """A pair touches if each one's category is among the bits that the other collides with."""
-        self.world.free()
-        check(quick.dfm_body_set_filter(self.handle, whole(category, "category"),
-                                        whole(collides_with, "collides_with")))
+        self._ask(quick.dfm_body_set_filter, whole(category, "category"),
+                  whole(collides_with, "collides_with"))
 
     def set_sensor(self, sensor: bool = True) -> None:
         """Makes it a sensor, which reports what overlaps it and pushes nothing; False: it touches again."""
-        self.world.free()
-        check(quick.dfm_body_set_sensor(self.handle, sensor))
+        self._ask(quick.dfm_body_set_sensor, sensor)
 
     def query_triangles(self, shape: Shape) -> np.ndarray:
         """Numbers of the surface triangles that a Shape touches or holds, [n], ascending."""
@@ -459,17 +448,13 @@ class Body(_Part):
     @property
     def attachments(self) -> list[int]:
         """Numbers of the attachments that hold now, in order of creation."""
-        self.world.free()
-        return listed(quick.dfm_body_attachments, self.handle, kind=ctypes.c_uint32)
+        return self._listed(quick.dfm_body_attachments, kind=ctypes.c_uint32)
 
     def attachment(self, number: int) -> _abi.dfm_attachment:
         """What it does, as the C struct: to (a handle), nsurfel, stiffness N/m, damping N s/m, release N,
         point [3] m (mean of its surfels), force [3] N and moment [3] N m about it on the body (means over the
         last sub-step), impulse [3] N s since it was made, stretch m."""
-        out = sized(_abi.dfm_attachment)
-        self.world.free()
-        check(quick.dfm_body_get_attachment(self.handle, whole(number, "number"), ctypes.byref(out)))
-        return out
+        return self._answer(_abi.dfm_attachment, quick.dfm_body_get_attachment, whole(number, "number"))
 
     def cut(self, shape: str = "blade", *, corners: Any = None, point: Any = None, normal: Any = None,
             position: Any = (0, 0, 0), rotation: Any = (0, 0, 0, 1), half_size: Any = None,
@@ -535,48 +520,36 @@ class Body(_Part):
     def cut_delay(self) -> float:
         """s, of set_cut_delay."""
         out = ctypes.c_double()
-        self.world.free()
-        check(quick.dfm_body_cut_delay(self.handle, ctypes.byref(out), None))
+        self._ask(quick.dfm_body_cut_delay, ctypes.byref(out), None)
         return out.value
 
     @property
     def cuts_waiting(self) -> int:
         """Number of faces that an edge has passed, and that open when the cut delay is over."""
-        out = ctypes.c_uint32()
-        self.world.free()
-        check(quick.dfm_body_cut_delay(self.handle, None, ctypes.byref(out)))
-        return out.value
+        return int(self._answer(ctypes.c_uint32, quick.dfm_body_cut_delay, None).value)
 
     @property
     def pieces(self) -> list[Body]:
         """Bodies that have come off it (set_separate), in order of creation; of a piece, those of the body
         that it came off."""
-        self.world.free()
-        pieces = map(self.world.owner, listed(quick.dfm_body_pieces, self.handle))
-        return [body for body in pieces if isinstance(body, Body)]
+        return things(self, Body, quick.dfm_body_pieces)
 
     @property
     def origins(self) -> tuple[np.ndarray, np.ndarray]:
         """Where points [npoint] and cells [ntet] come from: their numbers when the body was made. Copies of
         a point have its number."""
         points, cells = np.empty(self.npoint, np.uint32), np.empty(self.ntet, np.uint32)
-        self.world.free()
-        check(quick.dfm_body_origins(self.handle, len(points), points.ctypes.data, len(cells),
-                                     cells.ctypes.data))
+        self._ask(quick.dfm_body_origins, len(points), points.ctypes.data, len(cells), cells.ctypes.data)
         return points, cells
 
     def wake(self) -> None:
         """Ends the sleep of the body and of what touches it."""
-        self.world.free()
-        check(quick.dfm_body_wake(self.handle))
+        self._ask(quick.dfm_body_wake)
 
     @property
     def asleep(self) -> bool:
         """Whether the body sleeps: it rested long enough in a world with sleep=True, and is not stepped."""
-        out = ctypes.c_bool()
-        self.world.free()
-        check(quick.dfm_body_is_asleep(self.handle, ctypes.byref(out)))
-        return out.value
+        return bool(self._answer(ctypes.c_bool, quick.dfm_body_is_asleep).value)
 
     def write(self, path: Any) -> None:
         """Its points and cells as *.vtu."""
@@ -605,50 +578,38 @@ class Obstacle(_Part):
     @property
     def pose(self) -> tuple[np.ndarray, np.ndarray]:
         """position [3] m, rotation [4], a quaternion x, y, z, w."""
-        out = _abi.dfm_pose()
-        self.world.free()
-        check(quick.dfm_obstacle_get_pose(self.handle, ctypes.byref(out)))
+        out = self._answer(_abi.dfm_pose, quick.dfm_obstacle_get_pose)
         return np.array(out.position), np.array(out.rotation)
 
     def move_to(self, position: Any, rotation: Any = (0, 0, 0, 1)) -> None:
         """Where it is at the end of the next step; it moves there at constant speed."""
-        self.world.free()
-        check(quick.dfm_obstacle_move_to(self.handle, ctypes.byref(pose_of(position, rotation))))
+        self._ask(quick.dfm_obstacle_move_to, ctypes.byref(pose_of(position, rotation)))
 
     def teleport(self, position: Any, rotation: Any = (0, 0, 0, 1)) -> None:
         """Puts it there at once, without a motion."""
-        self.world.free()
-        check(quick.dfm_obstacle_teleport(self.handle, ctypes.byref(pose_of(position, rotation))))
+        self._ask(quick.dfm_obstacle_teleport, ctypes.byref(pose_of(position, rotation)))
 
     def set_sensor(self, sensor: bool = True) -> None:
         """Makes it a sensor, which reports what overlaps it and pushes nothing; False: it touches again."""
-        self.world.free()
-        check(quick.dfm_obstacle_set_sensor(self.handle, sensor))
+        self._ask(quick.dfm_obstacle_set_sensor, sensor)
 
     def set_velocity_surface(self, velocity: Any) -> None:
         """Velocity of its surface, a belt's, beside that of its pose: [3] m/s, in the world's axes."""
-        self.world.free()
-        check(quick.dfm_obstacle_set_velocity_surface(self.handle,
-                                                      vector(velocity, "velocity")))
+        self._ask(quick.dfm_obstacle_set_velocity_surface, vector(velocity, "velocity"))
 
     def set_filter(self, category: int = 1, collides_with: int = EVERYTHING) -> None:
         """A pair touches if each one's category is among the bits that the other collides with."""
-        self.world.free()
-        check(quick.dfm_obstacle_set_filter(self.handle, whole(category, "category"),
-                                            whole(collides_with, "collides_with")))
+        self._ask(quick.dfm_obstacle_set_filter, whole(category, "category"),
+                  whole(collides_with, "collides_with"))
 
     def set_material(self, material: Any = None) -> None:
         """Its material, of World.add_material or as a dict of entries, for friction by material; None: no
         material."""
-        self.world.free()
-        check(quick.dfm_obstacle_set_material(self.handle, self.world._material(material)))
+        self._ask(quick.dfm_obstacle_set_material, self.world._material(material))
 
     def definition(self) -> _abi.dfm_obstacle_def:
         """Its def as created, as the C struct."""
-        out = sized(_abi.dfm_obstacle_def)
-        self.world.free()
-        check(quick.dfm_obstacle_get_def(self.handle, ctypes.byref(out)))
-        return out
+        return self._answer(_abi.dfm_obstacle_def, quick.dfm_obstacle_get_def)
 
     def remove(self) -> None:
         """Takes the obstacle out of its world; its contacts end."""
@@ -661,10 +622,7 @@ class Rigid(Obstacle):
     __slots__ = ()
 
     def _state(self) -> _abi.dfm_rigid_state:
-        out = _abi.dfm_rigid_state()
-        self.world.free()
-        check(quick.dfm_rigid_get_state(self.handle, ctypes.byref(out)))
-        return out
+        return self._answer(_abi.dfm_rigid_state, quick.dfm_rigid_get_state)
 
     @property
     def position(self) -> np.ndarray:
@@ -700,15 +658,13 @@ class Rigid(Obstacle):
         """Of a hinge or slider of its set: position (rad or m since creation), rate (rad/s or m/s), and the
         motor's effort (N m or N)."""
         out = [ctypes.c_double() for _ in range(3)]
-        self.world.free()
-        check(quick.dfm_rigid_joint(self.handle, whole(number, "number"), *map(ctypes.byref, out)))
+        self._ask(quick.dfm_rigid_joint, whole(number, "number"), *map(ctypes.byref, out))
         return out[0].value, out[1].value, out[2].value
 
     def set_motor(self, velocity: float, max: float, number: int = 0) -> None:
         """Motor of a joint of its set: rad/s and N m, or m/s and N; max 0: off."""
-        self.world.free()
-        check(quick.dfm_rigid_set_motor(self.handle, whole(number, "number"), real(velocity, "velocity"),
-                                        real(max, "max")))
+        self._ask(quick.dfm_rigid_set_motor, whole(number, "number"), real(velocity, "velocity"),
+                  real(max, "max"))
 
     @property
     def measure(self) -> Any:
@@ -720,10 +676,7 @@ class Rigid(Obstacle):
     @property
     def wrench(self) -> tuple[np.ndarray, np.ndarray]:
         """Of contact in the last sub-step, means: force [3] N, moment [3] N m about the center of mass."""
-        force, moment = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
-        self.world.free()
-        check(quick.dfm_rigid_contact_wrench(self.handle, force, moment))
-        return np.array(force), np.array(moment)
+        return self._wrench(quick.dfm_rigid_contact_wrench)
 
     def remove(self) -> None:
         """Takes the whole set that it came with out of the world."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Callable, Iterable
 import numpy as np
 
 from . import _abi
-from ._context import choice
+from ._context import Asked, choice
 from ._library import ArgumentError, StateError, check, default, encoded, lib, quick
 from ._values import pose_of, real, vector, whole
 from .body import EVERYTHING, Body, Obstacle
@@ -264,12 +264,11 @@ class _Query:
         check(status)
 
 
-class Queries:
+class Queries(Asked):
     """What World has of deform/query.h, deform/callback.h and dfm_world_write_scene."""
 
     __slots__ = ("_known", "_raised")
 
-    handle: int
     _busy: int
     _raised: BaseException | None
     _known: dict[int, Any] | None
@@ -380,8 +379,9 @@ class Queries:
             check(quick.dfm_world_ask_again(self.handle, 0, 0))
         return raised
 
-    def _decide(self, key: str, keep: Any) -> None:
-        self._functions[key] = keep
+    def _decide(self, key: str, setter: Any, call: Any) -> None:
+        self._ask(setter, ctypes.cast(call, ctypes.c_void_p) if call else None, None)
+        self._functions[key] = call
         if any(f is not None for f in self._functions.values()):
             if self._known is None:
                 self._known = {thing.handle: thing for thing in [*self.bodies, *self.obstacles]}
@@ -398,23 +398,17 @@ class Queries:
         It is asked once for each pair that masks and rules let touch, in the thread that steps, and the
         answer is kept until ask_again(). It must not use the world beyond names and `==`. An exception in it
         discards the step, which raises it."""
-        self.free()
-
         def call_host(_user: int, a: int, b: int) -> bool:
             answer = self._call(lambda: bool(function(self._thing(a), self._thing(b))))  # type: ignore[misc]
             return True if answer is None else answer
-        call = None if function is None else _MayTouchFn(call_host)
-        check(quick.dfm_world_set_may_touch(self.handle, ctypes.cast(call, ctypes.c_void_p) if call else None,
-                                            None))
-        self._decide("may_touch", call)
+        self._decide("may_touch", quick.dfm_world_set_may_touch,
+                     None if function is None else _MayTouchFn(call_host))
 
     def ask_again(self, a: Body | Obstacle | None = None, b: Body | Obstacle | None = None) -> None:
         """Discards decisions of the function of set_may_touch: of the pair, of all pairs of a, or all."""
-        self.free()
         if a is None and b is not None:
             raise ArgumentError("ask_again takes a, a and b, or neither", "DFM_E_ARG")
-        check(quick.dfm_world_ask_again(self.handle, a.handle if a is not None else 0,
-                                        b.handle if b is not None else 0))
+        self._ask(quick.dfm_world_ask_again, *(0 if thing is None else thing.handle for thing in (a, b)))
 
     def set_pre_solve(self, function: Callable[[ContactChoice], None] | None) -> None:
         """A function that gets each contact, a ContactChoice, before it is solved, in every sub-step, and may
@@ -423,16 +417,12 @@ class Queries:
         A contact may come several times in a sub-step and must be answered alike each time. Contacts in reach
         need not touch yet. The function runs in the thread that steps, with the interpreter's lock, and must
         not use the world. An exception in it discards the step, which raises it."""
-        self.free()
-
         def call_host(_user: int, address: int) -> None:
             choice = ContactChoice(self, _abi.dfm_contact_choice.from_address(address))
             self._call(function, choice)  # type: ignore[arg-type]
             choice._of = _Ended()
-        call = None if function is None else _PreSolveFn(call_host)
-        check(quick.dfm_world_set_pre_solve(self.handle, ctypes.cast(call, ctypes.c_void_p) if call else None,
-                                            None))
-        self._decide("pre_solve", call)
+        self._decide("pre_solve", quick.dfm_world_set_pre_solve,
+                     None if function is None else _PreSolveFn(call_host))
 
     # ---- export ----------------------------------------------------------------------------------------
 

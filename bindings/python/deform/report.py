@@ -9,8 +9,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Rows
-from ._context import listed
-from ._library import check, lib, quick, read_text, sized
+from ._library import lib, quick, read_text
 from ._values import vector, whole
 from .body import Body, Obstacle, handle_of
 
@@ -22,9 +21,7 @@ class Reports:
 
     def law(self: Any, number: int) -> tuple[str, dict[str, Any]]:
         """The law of that number in contacts["law"] and pairs["law"]: its id, and its parameters by key."""
-        out = sized(_abi.dfm_law_info)
-        self.free()
-        check(quick.dfm_world_law_info(self.handle, whole(number, "number"), ctypes.byref(out)))
+        out = self._answer(_abi.dfm_law_info, quick.dfm_world_law_info, whole(number, "number"))
         rows = (_abi.dfm_param_value * out.params.n).from_address(out.params.values) if out.params.n else ()
         values = {row.key.decode(): (ctypes.c_double * row.width).from_address(row.value)[:] for row in rows}
         return out.id.decode(), {key: v[0] if len(v) == 1 else np.array(v) for key, v in values.items()}
@@ -53,42 +50,34 @@ class Reports:
                point: Sequence[float] = (0, 0, 0)) -> tuple[np.ndarray, np.ndarray]:
         """What contact with b did to a in the last sub-step: force [3] N, and moment [3] N m about a point
         [3] m; zeros where they do not touch."""
-        force, moment = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
         expected = "wrench needs two bodies or obstacles"
         sides = [handle_of(thing, (Body, Obstacle), expected) for thing in (a, b)]
-        self.free()
-        check(quick.dfm_world_pair_wrench(self.handle, *sides, vector(point, "point"), force, moment))
-        return np.array(force), np.array(moment)
+        return self._wrench(quick.dfm_world_pair_wrench, *sides, vector(point, "point"))
 
     def hold_begin(self: Any) -> None:
         """Starts a measurement of creep: contacts count that stick in every step from now on."""
-        self.free()
-        check(quick.dfm_world_hold_begin(self.handle))
+        self._ask(quick.dfm_world_hold_begin)
 
     @property
     def hold(self: Any) -> tuple[float, int]:
         """Creep since hold_begin, m/s: the largest way of a contact that has stuck throughout, over the time
         (nan: there is none); and the number of such contacts."""
         creep, count = ctypes.c_double(), ctypes.c_uint32()
-        self.free()
-        check(quick.dfm_world_hold(self.handle, ctypes.byref(creep), ctypes.byref(count)))
+        self._ask(quick.dfm_world_hold, ctypes.byref(creep), ctypes.byref(count))
         return creep.value, count.value
 
     @property
     def memory(self: Any) -> dict[str, int]:
         """Bytes that the world uses now, by part: bodies, dynamics, obstacles, detection, contacts, steps;
         and their total."""
-        out = sized(_abi.dfm_memory)
-        self.free()
-        check(quick.dfm_world_memory(self.handle, ctypes.byref(out)))
+        out = self._answer(_abi.dfm_memory, quick.dfm_world_memory)
         return {key: int(getattr(out, key)) for key, *_ in out._fields_ if key not in ("size", "reserved")}
 
     @property
     def profile(self: Any) -> dict[str, tuple[float, int]]:
         """Of each stage of the steps since the world was created: seconds by the clock, and calls."""
         row = _abi.dfm_stage_time
-        self.free()
-        stages = listed(quick.dfm_world_profile_sized, self.handle, ctypes.sizeof(row), kind=row)
+        stages = self._listed(quick.dfm_world_profile_sized, ctypes.sizeof(row), kind=row)
         return {stage.name.decode(): (stage.seconds, int(stage.calls)) for stage in stages}
 
     @property

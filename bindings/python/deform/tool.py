@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any, Mapping, Sequence
 import numpy as np
 
 from . import _abi
-from ._context import choice, listed
+from ._context import Asked, choice
 from ._library import ArgumentError, check, default, lib, quick, sized
-from ._values import name_or_none, pose_of, real, text, vector, whole
-from .body import EVERYTHING, Body, Obstacle, handle_of
+from ._values import name_or_none, pose_of, real, vector, whole
+from .body import EVERYTHING, Body, Obstacle, handle_of, things
 from .cut import CUT_WAYS
 from .mesh import TriMesh, surface_of
 
@@ -21,7 +21,7 @@ TOOL_SHAPES = {"sphere": 0, "capsule": 1, "box": 2, "mesh": 3, "grasper": 4, "sc
                "blade": 7}
 
 
-class Tool:
+class Tool(Asked):
     """A rigid thing that is moved once per step and feels what it touches. Made by World.add_tool."""
 
     __slots__ = ("handle", "name", "user", "world")
@@ -29,6 +29,9 @@ class Tool:
     def __init__(self, world: World, handle: int, name: str):
         self.user: Any = None
         self.world, self.handle, self.name = world, handle, name
+
+    def _free(self) -> None:
+        self.world.free()
 
     def __repr__(self) -> str:
         return f"<deform.Tool '{self.name}'>"
@@ -45,58 +48,44 @@ class Tool:
         velocity: [6] m/s and rad/s then, as the device of a coupled tool measures it; None: that of the way
         there. A coupled tool follows by its spring."""
         speed = None if velocity is None else vector(velocity, "velocity", 6)
-        self.world.free()
-        check(quick.dfm_tool_set_pose(self.handle, ctypes.byref(pose_of(position, rotation)), speed))
+        self._ask(quick.dfm_tool_set_pose, ctypes.byref(pose_of(position, rotation)), speed)
 
     def set_opening(self, angle: float) -> None:
         """Angle between the jaws at the end of the next step, rad, 0 to 3."""
-        self.world.free()
-        check(quick.dfm_tool_set_opening(self.handle, real(angle, "angle")))
+        self._ask(quick.dfm_tool_set_opening, real(angle, "angle"))
 
     def teleport(self, position: Any, rotation: Any = (0, 0, 0, 1)) -> None:
         """Puts it there at once, at rest, without a motion."""
-        self.world.free()
-        check(quick.dfm_tool_teleport(self.handle, ctypes.byref(pose_of(position, rotation))))
+        self._ask(quick.dfm_tool_teleport, ctypes.byref(pose_of(position, rotation)))
 
     def keys_at(self, t: float) -> tuple[np.ndarray, np.ndarray, float]:
         """Where its keys, of a scene, want it at t s, whether it follows them or not: position [3] m,
         rotation (a quaternion x, y, z, w) and opening rad. ArgumentError of a tool without keys."""
         pose, opening = _abi.dfm_pose(), ctypes.c_double()
-        self.world.free()
-        check(quick.dfm_tool_keys_at(self.handle, real(t, "t"), ctypes.byref(pose), ctypes.byref(opening)))
+        self._ask(quick.dfm_tool_keys_at, real(t, "t"), ctypes.byref(pose), ctypes.byref(opening))
         return np.array(pose.position), np.array(pose.rotation), opening.value
 
     def follow_keys(self) -> None:
         """Its keys, of a scene, lead it again from the next step on, after set_pose and set_opening; far from
         where they want it (keys_at), bring it near first."""
-        self.world.free()
-        check(quick.dfm_tool_follow_keys(self.handle))
-
-    def _felt(self, function: Any) -> tuple[np.ndarray, np.ndarray]:
-        force, torque = (ctypes.c_double * 3)(), (ctypes.c_double * 3)()
-        self.world.free()
-        check(function(self.handle, force, torque))
-        return np.array(force), np.array(torque)
+        self._ask(quick.dfm_tool_follow_keys)
 
     @property
     def force(self) -> tuple[np.ndarray, np.ndarray]:
         """What the world did to it in the last step: force [3] N and torque [3] N m about its origin, means
         over the step, in the tool's frame."""
-        return self._felt(quick.dfm_tool_force)
+        return self._wrench(quick.dfm_tool_force)
 
     @property
     def feedback(self) -> tuple[np.ndarray, np.ndarray]:
         """What a device has to put on the hand: force [3] N and torque [3] N m, in the device's frame."""
-        return self._felt(quick.dfm_tool_feedback)
+        return self._wrench(quick.dfm_tool_feedback)
 
     @property
     def state(self) -> _abi.dfm_tool_state:
         """As the C struct: pose and device (position [3] m, rotation x, y, z, w), velocity [3] m/s, spin [3]
         rad/s, opening rad, work and port_work J."""
-        out = sized(_abi.dfm_tool_state)
-        self.world.free()
-        check(quick.dfm_tool_get_state(self.handle, ctypes.byref(out)))
-        return out
+        return self._answer(_abi.dfm_tool_state, quick.dfm_tool_get_state)
 
     @property
     def position(self) -> np.ndarray:
@@ -116,9 +105,7 @@ class Tool:
     @property
     def parts(self) -> list[Obstacle]:
         """Its rigid bodies: frame or shaft, then the left and the right jaw."""
-        self.world.free()
-        parts = map(self.world.owner, listed(quick.dfm_tool_parts, self.handle))
-        return [part for part in parts if isinstance(part, Obstacle)]
+        return things(self, Obstacle, quick.dfm_tool_parts)
 
     def grab(self, body: Body, reach: float = 0, release: float = 0) -> list[int]:
         """Attaches what it touches, or what is nearer than `reach` (m), to its parts.
@@ -126,10 +113,8 @@ class Tool:
         release: N, a larger force ends the attachment; 0: none does. Returns numbers of the attachments, for
         Body.attachment and Body.detach; none where nothing is in reach."""
         out, n = (ctypes.c_uint32 * 3)(), ctypes.c_uint32()
-        self.world.free()
-        grabbed = handle_of(body, Body, "grab needs a body")
-        check(quick.dfm_tool_grab(self.handle, grabbed, real(reach, "reach"), real(release, "release"), 3,
-                                  out, ctypes.byref(n)))
+        self._ask(quick.dfm_tool_grab, handle_of(body, Body, "grab needs a body"), real(reach, "reach"),
+                  real(release, "release"), 3, out, ctypes.byref(n))
         return list(out[:n.value])
 
     def set_cuts(self, bodies: Sequence[Body], how: str | None = None, most: int = 0) -> None:
@@ -141,7 +126,8 @@ class Tool:
         if isinstance(bodies, Body):
             bodies = [bodies]
         if how is None:
-            how = "split" if self._shape() in (TOOL_SHAPES["blade"], TOOL_SHAPES["scissors"]) else "remove"
+            shape = self._answer(_abi.dfm_tool_def, quick.dfm_tool_get_def).shape
+            how = "split" if shape in (TOOL_SHAPES["blade"], TOOL_SHAPES["scissors"]) else "remove"
         expected = "set_cuts needs a list of bodies"
         if isinstance(bodies, str):
             raise ArgumentError(f"{expected}, not {bodies!r}", "DFM_E_ARG")
@@ -150,18 +136,10 @@ class Tool:
         self.world.call(lib.dfm_tool_set_cuts, self.handle, CUT_WAYS[choice("how", how, CUT_WAYS)],
                         whole(most, "most"), len(given), ctypes.byref(handles))
 
-    def _shape(self) -> int:
-        out = sized(_abi.dfm_tool_def)
-        self.world.free()
-        check(quick.dfm_tool_get_def(self.handle, ctypes.byref(out)))
-        return int(out.shape)
-
     @property
     def cuts(self) -> list[Body]:
         """The bodies that it cuts."""
-        self.world.free()
-        bodies = map(self.world.owner, listed(quick.dfm_tool_cuts, self.handle, None, None))
-        return [body for body in bodies if isinstance(body, Body)]
+        return things(self, Body, quick.dfm_tool_cuts, None, None)
 
     def remove(self) -> None:
         """Takes it out of its world with its parts; contacts and attachments end."""
@@ -224,7 +202,7 @@ class Tools:
     @property
     def tools(self: Any) -> list[Tool]:
         """In order of creation."""
-        return [self._tool(h) for h in self._handles(quick.dfm_world_tools)]
+        return [self._tool(h) for h in self._listed(quick.dfm_world_tools)]
 
     def find_tool(self: Any, name: str) -> Tool:
         """The tool of that name; ArgumentError names the nearest one."""

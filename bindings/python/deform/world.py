@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _abi
 from ._arrays import Report, Rows
-from ._context import Context, Params, choice, default_context, listed, strings, word
+from ._context import Context, Params, default_context, strings, word
 from ._library import ArgumentError, BusyError, OfThisProcess, check, default, encoded, lib, quick, sized
 from ._signals import watch
 from ._values import array_of, name_or_none, pose_of, real, text, vector, whole
@@ -208,6 +208,8 @@ class World(Queries, Reports, Tools, OfThisProcess):
         if self._busy:
             raise BusyError("the world is inside a step of another thread; look when that has returned",
                             "DFM_E_BUSY")
+
+    _free = free
 
     @contextlib.contextmanager
     def alone(self) -> Iterator[None]:
@@ -436,31 +438,24 @@ class World(Queries, Reports, Tools, OfThisProcess):
             body = self._bodies[handle] = Body(self, handle)
         return body
 
-    def _handles(self, function: Any) -> list[int]:
-        self.free()
-        return listed(function, self.handle)
-
     @property
     def bodies(self) -> list[Body]:
         """In order of creation."""
-        return [self._body(h) for h in self._handles(quick.dfm_world_bodies)]
+        return [self._body(h) for h in self._listed(quick.dfm_world_bodies)]
 
     @property
     def rigids(self) -> list[Rigid]:
         """Rigid bodies in order of creation, without the parts of tools."""
-        found = [self._obstacle(h) for h in self._handles(quick.dfm_world_rigids)]
+        found = [self._obstacle(h) for h in self._listed(quick.dfm_world_rigids)]
         return [rigid for rigid in found if isinstance(rigid, Rigid)]
 
     @property
     def obstacles(self) -> list[Obstacle]:
         """In order of creation, rigid bodies among them."""
-        return [self._obstacle(h) for h in self._handles(quick.dfm_world_obstacles)]
+        return [self._obstacle(h) for h in self._listed(quick.dfm_world_obstacles)]
 
     def _found(self, function: Any, name: str) -> int:
-        out = ctypes.c_uint64()
-        self.free()
-        check(function(self.handle, text(name, "name"), ctypes.byref(out)))
-        return out.value
+        return int(self._answer(ctypes.c_uint64, function, text(name, "name")).value)
 
     def find_body(self, name: str) -> Body:
         """The body of that name; ArgumentError names the nearest one."""
@@ -614,23 +609,20 @@ class World(Queries, Reports, Tools, OfThisProcess):
     def stable_step(self) -> float:
         """s, a step that is not cut into sub-steps; inf if nothing bounds it."""
         out = ctypes.c_double()
-        self.free()
-        check(quick.dfm_world_stable_step(self.handle, ctypes.byref(out), None, None))
+        self._ask(quick.dfm_world_stable_step, ctypes.byref(out), None, None)
         if self._raised is not None:
             raise self._take_raised()  # type: ignore[misc]
         return out.value
 
     def set_gravity(self, gravity: Sequence[float]) -> None:
         """[3] m/s2 from now on."""
-        self.free()
-        check(quick.dfm_world_set_gravity(self.handle, vector(gravity, "gravity")))
+        self._ask(quick.dfm_world_set_gravity, vector(gravity, "gravity"))
         self.shown.upright = Upright(0, gravity)
 
     def set_gravity_keys(self, times: Any, gravity: Any) -> None:
         """Gravity [n,3] m/s2 at times [n] s, linear between them; [] and [] end it."""
         keys = vector_keys(times, gravity if np.size(gravity) else np.empty((0, 3)), "gravity")
-        self.free()
-        check(quick.dfm_world_set_gravity_keys(self.handle, np.size(times), ctypes.byref(keys)))
+        self._ask(quick.dfm_world_set_gravity_keys, np.size(times), ctypes.byref(keys))
         if np.size(times):
             self.shown.upright = Upright(times, gravity)
         else:
@@ -638,8 +630,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
 
     def set_sleep(self, sleep: bool = True) -> None:
         """Lets islands at rest sleep from now on; False: wakes all bodies and keeps them awake."""
-        self.free()
-        check(quick.dfm_world_set_sleep(self.handle, bool(sleep)))
+        self._ask(quick.dfm_world_set_sleep, bool(sleep))
 
     def set_budget(self, max_time: float = 0, max_work: float | None = 0) -> None:
         """Limits of one step from now on. max_time: s by the clock, 0: none. max_work: units of work, counted
@@ -751,8 +742,7 @@ class World(Queries, Reports, Tools, OfThisProcess):
         except TypeError:
             raise ArgumentError("restore takes the bytes that World.snapshot() has returned, not a "
                                 f"{type(snapshot).__name__}", "DFM_E_ARG") from None
-        self.free()
-        check(quick.dfm_world_restore(self.handle, taken, len(taken)))
+        self._ask(quick.dfm_world_restore, taken, len(taken))
         self.shown.asked = False
         for body in list(self._bodies.values()):
             body._renew_name()  # a name that the library has made may be another one

@@ -37,19 +37,18 @@ struct Subject {
   double limit = 10;    // s of processor time that the rule may take
 };
 
+using Check = std::string(const Subject &);
 struct Rule {
   const char *id, *title;
   bool by_type;  // runs once for each type, else once for the file
-  // null: does not apply to that kind of type
-  std::string (*law)(const Subject &);  // also what runs for the file
-  std::string (*model)(const Subject &);
-  std::string (*solver)(const Subject &);
+  // null: does not apply to that kind of type; law: also what runs for the file
+  Check *law = nullptr, *model = nullptr, *solver = nullptr;
 };
 const std::vector<Rule> &rules();
 const Rule *find_rule(const std::string &id);
 
 // What runs for a type of this kind, DFM_KIND_*; null: nothing.
-std::string (*check_for(const Rule &rule, uint32_t kind))(const Subject &);
+Check *check_for(const Rule &rule, uint32_t kind);
 
 // Runs one rule here and now.
 Verdict run_here(const Rule &rule, const Subject &subject);

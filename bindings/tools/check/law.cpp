@@ -175,10 +175,18 @@ void Lanes::slip(uint32_t i, double x, double y) {
     vt[i] = x;
     vt[stride + i] = y;
   }
-  if (!law.needs(DFM_NEED_FT_STOP)) return;
   const double much = law.needs(DFM_NEED_FN) ? 1e6 * std::max(fn[i], 1e-6) : 1e6;
-  stop[i] = w > 0 ? -much * x / w : 0;
-  stop[stride + i] = w > 0 ? -much * y / w : 0;
+  stop_by(i, w > 0 ? -much * x / w : 0, w > 0 ? -much * y / w : 0);
+}
+
+void Lanes::stop_by(uint32_t i, double x, double y) {
+  if (!law.needs(DFM_NEED_FT_STOP)) return;
+  stop[i] = x;
+  stop[stride + i] = y;
+}
+
+void Lanes::press(double force) {
+  if (law.needs(DFM_NEED_FN)) std::fill_n(fn, n, force);
 }
 
 void Lanes::spoil_padding() {

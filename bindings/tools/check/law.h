@@ -10,6 +10,8 @@
 
 namespace cli::check {
 
+constexpr double kTurn = 6.283185307179586;
+
 std::vector<double> default_params(const dfm_type &type);
 // Defaults, but with a static level above the kinetic one where the table knows both and their defaults
 // agree: what a promise needs to be seen.
@@ -43,9 +45,11 @@ struct Lanes {
   void commit();                   // the trial state becomes the state
   // trial slip; with FT_STOP a stopping force far beyond any level, against it
   void slip(uint32_t i, double x, double y);
-  double ft(uint32_t i) const;           // norm
-  std::string inputs(uint32_t i) const;  // for a sentence: " at a slip of .."
-  void spoil_padding();                  // NaN in the input lanes beyond n
+  void stop_by(uint32_t i, double x, double y);  // another stopping force, N, of a law that takes one
+  void press(double force);                      // all lanes of a law that takes a normal force, N
+  double ft(uint32_t i) const;                   // norm
+  std::string inputs(uint32_t i) const;          // for a sentence: " at a slip of .."
+  void spoil_padding();                          // NaN in the input lanes beyond n
   // A lane's inputs from another batch, and whether its outputs, but for those that are NULL in `out`, are
   // those of another lane, bit by bit.
   void take(uint32_t i, const Lanes &from, uint32_t k);

@@ -54,9 +54,15 @@ void couple(Solid &out) {
 
 double length(const double *a) { return std::sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2]); }
 
-double largest(const Numbers &f) {
+double largest(std::span<const double> f) {
   double most = 0;
   for (const double a : f) most = std::max(most, std::fabs(a));
+  return most;
+}
+
+double most_apart(std::span<const double> a, std::span<const double> b) {
+  double most = 0;
+  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(a[i] - b[i]));
   return most;
 }
 
@@ -300,6 +306,12 @@ const void *Body::extension(const char *id) const {
 void Body::refused(const char *name, dfm_status status) const {
   broken("%s returns %s at a state of a body that moves; return finite values for every finite state", name,
          dfm_status_name(status));
+}
+
+std::vector<uint32_t> Body::surfels() const {
+  std::vector<uint32_t> out(solid.nsurfel());
+  std::iota(out.begin(), out.end(), 0u);
+  return out;
 }
 
 dfm_kin Body::kin() const {

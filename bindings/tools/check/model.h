@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <new>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -62,7 +63,14 @@ std::vector<Variant> variants(const Subject &subject);
 
 const dfm_model &model_of(const Subject &subject);
 
-class Body {
+// What the host has of a body between two steps.
+struct Moment {
+  Numbers x, v;
+  std::vector<double> state;
+  double t = 0;
+};
+
+class Body : public Moment {
  public:
   // Where create refuses: Broken, or made() is false.
   enum class Refusal { is_broken, is_reported };
@@ -79,6 +87,8 @@ class Body {
   bool can(uint32_t cap) const { return (caps & cap) != 0; }
   const void *extension(const char *id) const;
   uint32_t points() const { return solid.npoint(); }
+  std::vector<uint32_t> surfels() const;  // all
+  void take(const Moment &m) { Moment::operator=(m); }
   double *at(Numbers &of, uint32_t point) const { return of.data() + size_t(stride) * point; }
 
   dfm_kin kin() const;
@@ -118,29 +128,31 @@ class Body {
   uint32_t caps = 0;  // of the model, less what the parameters take away
   void *self = nullptr;
   const dfm_stepper *stepper = nullptr;
-  Numbers x, v;
-  std::vector<double> state;
-  double t = 0, dt = 1e-3;
+  double dt = 1e-3;
 
  private:
   [[noreturn]] void refused(const char *name, dfm_status status) const;
   std::string why_;
 };
 
-// Of a rule that checks several variants: named in its messages.
 std::string with(const Variant &variant);
 double length(const double *a);
-double largest(const Numbers &f);
+double largest(std::span<const double> f);
+double most_apart(std::span<const double> a, std::span<const double> b);
 // Does Cholesky's factorization of shift I - m, [width,width], exist? Only half of m is read.
 bool below(const std::vector<double> &m, size_t width, double shift);
 
-// Checks a rule for each variant; the result of a rule that all of them keep.
+// Checks a rule for each variant, with which its sentences begin; the result of a rule that all of them keep.
 template <class F>
 std::string for_variants(const Subject &subject, const F &rule) {
   const std::vector<Variant> all = variants(subject);
   for (const Variant &v : all) {
     stage("%s", with(v).c_str());
-    rule(v);
+    try {
+      rule(v);
+    } catch (const Broken &e) {
+      throw Broken(with(v) + ", " + e.what());
+    }
   }
   return text("%zu set%s of parameters", all.size(), all.size() == 1 ? "" : "s");
 }

@@ -9,16 +9,6 @@
 #include "plane.h"
 
 namespace cli::check {
-namespace {
-
-constexpr double kTurn = 6.283185307179586;
-
-void press(Lanes &b, double fn) {
-  if (b.law.needs(DFM_NEED_FN)) std::fill_n(b.fn, b.n, fn);
-}
-
-}  // namespace
-
 // ---- F15 --------------------------------------------------------------------------------------------------
 
 // The same 400 steps again and again, at rest, swinging, sliding and at random: what counts time or path
@@ -41,7 +31,7 @@ std::string state_stays_bounded(const Subject &subject) {
       std::fill(block.begin(), block.end(), 0.0);
       stage("block %d of %d steps of %g s", k + 1, kSteps, h);
       for (int step = 0; step < kSteps; ++step) {
-        press(b, s.fn);
+        b.press(s.fn);
         for (uint32_t i = 0; i < kRuns; ++i) {
           const double heading = random.uniform(0, kTurn);
           const double any = random.logarithmic(1e-6, 10);
@@ -92,7 +82,7 @@ void stays_on_the_line(const Law &law, const Scales &s) {
   constexpr int kWays[][2] = {{1, 0}, {0, 1}, {-1, 0}, {0, -1}};
   for (const double h : {1e-4, 1e-2}) {
     Lanes b(law, std::size(kWays));
-    press(b, s.fn);
+    b.press(s.fn);
     for (int step = 0; step < 60; ++step) {
       const double w = s.length() / h * (step < 20 ? 0.05 : step < 40 ? 1 : 20) * (step % 13 == 12 ? -1 : 1);
       for (uint32_t i = 0; i < b.n; ++i) b.slip(i, w * kWays[i][0], w * kWays[i][1]);
@@ -124,7 +114,7 @@ std::string opposes_slip(const Subject &subject) {
     constexpr uint32_t kPairs = 32;
     // the second half is the first, mirrored in the x axis
     Lanes b(law, 2 * kPairs);
-    press(b, s.fn);
+    b.press(s.fn);
     for (int step = 0; step < 60; ++step) {
       for (uint32_t i = 0; i < kPairs; ++i) {
         const double heading = random.uniform(0, kTurn);
@@ -134,10 +124,7 @@ std::string opposes_slip(const Subject &subject) {
           const uint32_t at = i + side * kPairs;
           const double x = std::cos(heading), y = side ? -std::sin(heading) : std::sin(heading);
           b.slip(at, w * x, w * y);
-          if (law.needs(DFM_NEED_FT_STOP)) {
-            b.stop[at] = -push * x;
-            b.stop[b.stride + at] = -push * y;
-          }
+          b.stop_by(at, -push * x, -push * y);
         }
       }
       b.must(h);
@@ -178,7 +165,7 @@ std::string converges_with_step(const Subject &subject) {
   for (const int cut : cuts) {
     const double h = kBetween / cut;
     Lanes b(law, kRuns);
-    press(b, s.fn);
+    b.press(s.fn);
     course.emplace_back();
     stage("steps of %g s", h);
     for (int k = 0; k < kSamples * cut; ++k) {

@@ -10,12 +10,7 @@
 namespace cli::check {
 namespace {
 
-constexpr double kTurn = 6.283185307179586;
 constexpr double kEverySteps[] = {1e-6, 1e-5, 1e-4, 1e-3, 1.0 / 240, 1.0 / 60, 1.0 / 30};
-
-void press(Lanes &b, double fn) {
-  if (b.law.needs(DFM_NEED_FN)) std::fill_n(b.fn, b.n, fn);
-}
 
 }  // namespace
 
@@ -57,7 +52,7 @@ std::string turns_with_frame(const Subject &subject) {
   double worst = 0;
   for (const double h : {1e-4, 1e-2}) {
     Lanes b(law, 361);
-    press(b, s.fn);
+    b.press(s.fn);
     for (int step = 0; step < 40; ++step) {
       // as the host turns the state with the frame
       const bool by_host = law.nstate > 0 && step % 8 == 7;
@@ -69,10 +64,7 @@ std::string turns_with_frame(const Subject &subject) {
       for (uint32_t i = 0; i < b.n; ++i) {
         const double turn = kTurn * i / 360;
         b.slip(i, w * std::cos(heading + turn), w * std::sin(heading + turn));
-        if (law.needs(DFM_NEED_FT_STOP)) {
-          b.stop[i] = -push * std::cos(heading + turn);
-          b.stop[b.stride + i] = -push * std::sin(heading + turn);
-        }
+        b.stop_by(i, -push * std::cos(heading + turn), -push * std::sin(heading + turn));
       }
       b.must(h);
       const double x = b.out_ft[0], y = b.out_ft[b.stride];
@@ -106,7 +98,7 @@ namespace {
 void finite_at_every_speed(const Law &law, const Scales &s) {
   const std::vector<double> speeds = decades(1e-6, 100, 4);
   Lanes b(law, static_cast<uint32_t>(speeds.size()));
-  press(b, s.fn);
+  b.press(s.fn);
   for (uint32_t i = 0; i < b.n; ++i) b.slip(i, speeds[i], 0);
   for (const double h : {1e-5, 1e-3, 1.0 / 60}) {
     b.must(h);
@@ -121,7 +113,7 @@ void loops_dissipate(const Law &law, const Scales &s) {
   const uint32_t kinds = 3, n = static_cast<uint32_t>(sizes.size()) * kinds;
   for (const double h : {1e-5, 1e-3, 1.0 / 60}) {
     Lanes b(law, n);
-    press(b, s.fn);
+    b.press(s.fn);
     std::vector<double> work(n, 0.0), moved(n, 0.0);
     for (int turn = 0; turn < 3; ++turn)
       for (int k = 0; k < kPoints; ++k) {
@@ -172,8 +164,7 @@ void gives_back_no_more(const Law &law, const Scales &s, Random &random) {
       b.slip(i, w * std::cos(heading), w * std::sin(heading));
       if (law.needs(DFM_NEED_FT_STOP)) {
         const double push = w > 0 ? s.level * random.logarithmic(0.01, 100) : 0;
-        b.stop[i] = -push * std::cos(heading);
-        b.stop[b.stride + i] = -push * std::sin(heading);
+        b.stop_by(i, -push * std::cos(heading), -push * std::sin(heading));
       }
     }
     b.must(h);
@@ -291,10 +282,7 @@ std::string derivatives_agree(const Subject &subject) {
         if (law.needs(DFM_NEED_FN)) b.fn[i] = s.fn * (k < 5 ? 1.0 : random.logarithmic(0.3, 3));
         b.slip(i, w * std::cos(heading), w * std::sin(heading));
         const double push = s.level * (i % 3 ? 30 : 0.3);
-        if (law.needs(DFM_NEED_FT_STOP)) {
-          b.stop[i] = -push * std::cos(heading);
-          b.stop[b.stride + i] = -push * std::sin(heading);
-        }
+        b.stop_by(i, -push * std::cos(heading), -push * std::sin(heading));
       }
       b.must(h);
       if (k < 5) b.commit();
@@ -394,7 +382,7 @@ namespace {
 std::vector<double> from_first_touch(const Law &law, const std::vector<double> &speeds, double fn, double h,
                                      int steps) {
   Lanes b(law, static_cast<uint32_t>(speeds.size()));
-  press(b, fn);
+  b.press(fn);
   std::vector<double> most(speeds.size(), 0.0);
   for (int k = 0; k < steps; ++k) {
     for (uint32_t i = 0; i < b.n; ++i) b.slip(i, speeds[i], 0);
@@ -422,7 +410,7 @@ std::string follows_normal_force(const Subject &subject) {
   Lanes b(law, static_cast<uint32_t>(2 * speeds.size()));
   for (size_t leg = 0; leg < path.size(); ++leg)
     for (int k = 0; k < (leg == 0 ? steps : 60); ++k) {
-      press(b, path[leg] * s.fn);
+      b.press(path[leg] * s.fn);
       for (uint32_t i = 0; i < b.n; ++i) {
         const double v = speeds[i / 2];
         b.slip(i, i % 2 && leg > 0 ? 0 : v, 0);

@@ -17,18 +17,12 @@ constexpr double kInfinite = std::numeric_limits<double>::infinity();
 // Contacts of every kind: open, at rest, presliding, sliding; with the states that a few steps make.
 void fill(Lanes &b, const Scales &s, Random &random) {
   for (uint32_t i = 0; i < b.n; ++i) {
-    const double angle = random.uniform(0, 6.283185307179586);
+    const double angle = random.uniform(0, kTurn);
     const double w = i % 7 == 0 ? 0 : random.logarithmic(1e-6, 10);
     if (b.law.needs(DFM_NEED_FN)) b.fn[i] = i % 11 == 0 ? 0 : s.fn * random.logarithmic(1e-2, 1e2);
-    if (b.law.needs(DFM_NEED_VT)) {
-      b.vt[i] = w * std::cos(angle);
-      b.vt[b.stride + i] = w * std::sin(angle);
-    }
+    b.slip(i, w * std::cos(angle), w * std::sin(angle));
     const double force = s.level * random.logarithmic(1e-3, 1e3);
-    if (b.law.needs(DFM_NEED_FT_STOP)) {
-      b.stop[i] = -force * std::cos(angle);
-      b.stop[b.stride + i] = -force * std::sin(angle);
-    }
+    b.stop_by(i, -force * std::cos(angle), -force * std::sin(angle));
     b.area[i] = random.logarithmic(0.1, 10);
     b.dwell[i] = random.logarithmic(1e-3, 10);
   }

@@ -23,11 +23,10 @@ double norm(const Numbers &f) { return std::sqrt(std::inner_product(f.begin(), f
 
 // The largest force when points are a percent of an edge off: what other forces are compared with.
 double force_scale(Body &body, Random &random) {
-  const Numbers x = body.x, v = body.v;
+  const Moment before = body;
   body.shake(0.01 * kCube, 0, random);
   const double most = largest(body.forces());
-  body.x = x;
-  body.v = v;
+  body.take(before);
   if (!(most > 0) || !std::isfinite(most))
     broken(
         "its largest force is %g N where every point of a body is displaced by 1 %% of an edge; add forces",
@@ -36,18 +35,16 @@ double force_scale(Body &body, Random &random) {
 }
 
 // A body that steps itself must not depend on where its rest pose lies.
-void rests(Body &body, const char *where, const Variant &variant) {
+void rests(Body &body, const char *where) {
   const Numbers before = body.x;
   const std::vector<double> u = body.predict(Numbers(body.x.size(), 0.0));
-  double most = 0;
-  for (const double a : u) most = std::max(most, std::fabs(a) * body.dt);
   body.commit(std::vector<double>(u.size(), 0.0));
-  for (size_t i = 0; i < before.size(); ++i) most = std::max(most, std::fabs(body.x[i] - before[i]));
+  const double most = std::max(body.dt * largest(u), most_apart(body.x, before));
   if (!(most <= 1e-9 * kCube))
     broken(
-        "%s a body at rest in its rest shape, %s, moves by %g m in a step without a load; make the rest "
+        "a body at rest in its rest shape, %s, moves by %g m in a step without a load; make the rest "
         "shape its goal",
-        with(variant).c_str(), where, most);
+        where, most);
 }
 
 }  // namespace
@@ -56,13 +53,13 @@ std::string rest_pose_is_free(const Subject &subject) {
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
     Body body(subject, small_block(), variant);
-    if (body.steps_itself()) return rests(body, "where it was made", variant);
+    if (body.steps_itself()) return rests(body, "where it was made");
     const double scale = force_scale(body, random), most = largest(body.forces());
     if (!(most <= 1e-9 * scale))
       broken(
-          "%s the rest pose has forces of %g N (%g N where points are displaced by 1 %% of an edge); take "
+          "the rest pose has forces of %g N (%g N where points are displaced by 1 %% of an edge); take "
           "lengths, volumes and frames at rest from dfm_mesh.rest",
-          with(variant).c_str(), most, scale);
+          most, scale);
   });
 }
 
@@ -77,7 +74,7 @@ std::string rigid_motion_is_free(const Subject &subject) {
       const double scale = body.steps_itself() ? 0 : force_scale(body, random);
       if (body.steps_itself()) {
         body.turn(kAxis, angle, kShift);
-        rests(body, "turned and shifted", variant);
+        rests(body, "turned and shifted");
         continue;
       }
       body.shake(kMiddle * kCube, 0, random);
@@ -89,20 +86,19 @@ std::string rigid_motion_is_free(const Subject &subject) {
       turned.turn(kAxis, angle, nowhere);
       body.turn(kAxis, angle, kShift);
       const Numbers after = body.forces();
-      double off = 0;
-      for (size_t n = 0; n < after.size(); ++n) off = std::max(off, std::fabs(after[n] - turned.x[n]));
+      const double off = most_apart(after, turned.x);
       if (!(off <= 1e-8 * std::max(scale, largest(before))))
         broken(
-            "%s the forces of a body that is turned by %g rad and shifted are off the forces turned by as "
+            "the forces of a body that is turned by %g rad and shifted are off the forces turned by as "
             "much by %g N of %g N, though it claims DFM_CAP_ROTATION_INVARIANT; measure strain in a frame "
             "that turns with the body, or drop the claim",
-            with(variant).c_str(), angle, off, largest(before));
+            angle, off, largest(before));
       if (!body.can(DFM_CAP_ENERGY)) continue;
       if (const double returned = body.energy(); !(std::fabs(returned - joule) <= 1e-8 * std::fabs(joule)))
         broken(
-            "%s the energy of a deformed shape is %.12g J and, turned by %g rad, %.12g J, though it claims "
+            "the energy of a deformed shape is %.12g J and, turned by %g rad, %.12g J, though it claims "
             "DFM_CAP_ROTATION_INVARIANT; measure strain in a frame that turns with the body",
-            with(variant).c_str(), joule, angle, returned);
+            joule, angle, returned);
     }
   });
 }
@@ -150,15 +146,15 @@ void keeps_momentum_of_steps(const Subject &subject, const Variant &variant) {
   Sums after = sums_of(body, body.v, body.solid.mass);
   if (!(apart(before.force, after.force) <= 1e-10 * before.size))
     broken(
-        "%s the momentum of a free body changes by %g kg m/s of %g in 20 steps; let inner forces or goals "
+        "the momentum of a free body changes by %g kg m/s of %g in 20 steps; let inner forces or goals "
         "not move the center of mass",
-        with(variant).c_str(), apart(before.force, after.force), before.size);
+        apart(before.force, after.force), before.size);
   if (body.can(DFM_CAP_ROTATION_INVARIANT) &&
       !(apart(before.torque, after.torque) <= 1e-9 * std::max(before.arm, after.arm)))
     broken(
-        "%s the angular momentum of a free body changes by %g kg m2/s of %g in 20 steps; let inner forces or "
+        "the angular momentum of a free body changes by %g kg m2/s of %g in 20 steps; let inner forces or "
         "goals have no moment",
-        with(variant).c_str(), apart(before.torque, after.torque), before.arm);
+        apart(before.torque, after.torque), before.arm);
 }
 
 }  // namespace
@@ -174,14 +170,14 @@ std::string forces_sum_to_zero(const Subject &subject) {
       const Sums s = sums_of(body, f, std::vector<double>(body.points(), 1.0));
       if (!(length(s.force) <= 1e-10 * s.size))
         broken(
-            "%s the forces of a free body sum to %g N (their absolute values to %g N); let the forces of "
+            "the forces of a free body sum to %g N (their absolute values to %g N); let the forces of "
             "each cell sum to zero, as those of an energy of differences do",
-            with(variant).c_str(), length(s.force), s.size);
+            length(s.force), s.size);
       if (body.can(DFM_CAP_ROTATION_INVARIANT) && !(length(s.torque) <= 1e-10 * s.arm))
         broken(
-            "%s the forces of a free body have a moment of %g N m (force times distance: %g N m); take "
+            "the forces of a free body have a moment of %g N m (force times distance: %g N m); take "
             "forces from an energy that does not change when the body turns",
-            with(variant).c_str(), length(s.torque), s.arm);
+            length(s.torque), s.arm);
     }
   });
 }
@@ -220,10 +216,10 @@ std::string forces_are_the_gradient(const Subject &subject) {
         worst = std::max(worst, best / size);
         if (!(best <= 1e-5 * size))
           broken(
-              "%s, points shaken by %g of an edge: along a random direction the forces do %.9g J/m of work "
+              "points shaken by %g of an edge: along a random direction the forces do %.9g J/m of work "
               "and the energy falls by %.9g J/m; let the forces be the negative gradient of the energy, with "
               "every term of both%s",
-              with(variant).c_str(), share, work, returned,
+              share, work, returned,
               body.state.empty() ? "" : " and both of dfm_kin.state, not of state_out");
       }
     }
@@ -251,67 +247,54 @@ std::vector<double> differences(Body &body, Numbers &of, double step) {
   return out;
 }
 
-double most_of(const std::vector<double> &m) {
-  double most = 0;
-  for (const double a : m) most = std::max(most, std::fabs(a));
-  return most;
-}
-
-double most_apart(const std::vector<double> &a, const std::vector<double> &b) {
-  double most = 0;
-  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(a[i] - b[i]));
-  return most;
-}
-
 struct Tangent {
   double share;      // of an edge, shaken
   double tolerance;  // of the largest entry; 0: what is left out may be anything
 };
 
-void tangent_agrees(Body &body, const Variant &variant, const Tangent &t, Random &random) {
+void tangent_agrees(Body &body, const Tangent &t, Random &random) {
   const size_t width = 3 * size_t(body.points());
   const std::vector<double> k = body.stiffness(1, 0), c = body.stiffness(0, 1), both = body.stiffness(2, 3);
-  const double most = most_of(k), damping = most_of(c);
+  const double most = largest(k), damping = largest(c);
   for (size_t i = 0; i < width; ++i)
     for (size_t j = 0; j < i; ++j)
       if (!(std::fabs(k[i * width + j] - k[j * width + i]) <= 1e-9 * most))
-        broken(
-            "%s the block of point %zu with itself is not symmetric (%g and %g N/m); give the symmetric part",
-            with(variant).c_str(), i / 3, k[i * width + j], k[j * width + i]);
+        broken("the block of point %zu with itself is not symmetric (%g and %g N/m); give the symmetric part",
+               i / 3, k[i * width + j], k[j * width + i]);
   for (size_t n = 0; n < k.size(); ++n)
     if (!(std::fabs(both[n] - (2 * k[n] + 3 * c[n])) <= 1e-9 * (2 * most + 3 * damping)))
       broken(
-          "%s stiffness(2, 3) is not 2 stiffness(1, 0) + 3 stiffness(0, 1) (%g and %g); return a df/dx + b "
+          "stiffness(2, 3) is not 2 stiffness(1, 0) + 3 stiffness(0, 1) (%g and %g); return a df/dx + b "
           "df/dv",
-          with(variant).c_str(), both[n], 2 * k[n] + 3 * c[n]);
+          both[n], 2 * k[n] + 3 * c[n]);
   if (!below(k, width, 1e-8 * most))
     broken(
-        "%s, points shaken by %g of an edge, stiffness has a positive direction; drop the terms that make it "
+        "points shaken by %g of an edge, stiffness has a positive direction; drop the terms that make it "
         "indefinite",
-        with(variant).c_str(), t.share);
+        t.share);
   if (damping > 0 && !below(c, width, 1e-8 * damping))
     broken(
-        "%s, points shaken by %g of an edge, the part of stiffness by velocity has a positive direction; "
+        "points shaken by %g of an edge, the part of stiffness by velocity has a positive direction; "
         "drop the terms that make it indefinite",
-        with(variant).c_str(), t.share);
+        t.share);
   if (t.tolerance > 0) {
     const std::vector<double> d = differences(body, body.x, 1e-5 * kCube);
-    if (const double off = most_apart(d, k); !(off <= t.tolerance * most_of(d)))
+    if (const double off = most_apart(d, k); !(off <= t.tolerance * largest(d)))
       broken(
-          "%s, points shaken by %g of an edge, stiffness is off the differences of the forces by %g of %g "
+          "points shaken by %g of an edge, stiffness is off the differences of the forces by %g of %g "
           "N/m; differentiate the forces, every term",
-          with(variant).c_str(), t.share, off, most_of(d));
+          t.share, off, largest(d));
   }
   if (!(t.tolerance > 0)) return;
   // the forces of dampers change with positions too, but are small where velocities are
   body.shake(0, 0.1, random);
   const std::vector<double> d = differences(body, body.v, 1e-3);
   if (const double off = most_apart(d, c);
-      !(off <= t.tolerance * std::max(most_of(d), damping) + 1e-12 * most))
+      !(off <= t.tolerance * std::max(largest(d), damping) + 1e-12 * most))
     broken(
-        "%s, points shaken by %g of an edge, the part of stiffness by velocity is off the differences of the "
+        "points shaken by %g of an edge, the part of stiffness by velocity is off the differences of the "
         "forces by %g of %g N s/m; differentiate the dampers too",
-        with(variant).c_str(), t.share, off, most_of(d));
+        t.share, off, largest(d));
 }
 
 }  // namespace
@@ -326,7 +309,7 @@ std::string stiffness_is_the_derivative(const Subject &subject) {
       Body body(subject, small_block(), variant);
       if (!body.can(DFM_CAP_STIFFNESS)) return;
       body.shake(t.share * kCube, 0, random);
-      tangent_agrees(body, variant, t, random);
+      tangent_agrees(body, t, random);
     }
   });
 }
@@ -344,9 +327,9 @@ std::string constant_stiffness_is_constant(const Subject &subject) {
     body.dt = 1.0 / 30;
     if (const double off = most_apart(before, body.stiffness(1, 0.1)); off != 0)
       broken(
-          "%s its stiffness at a deformed state is off that at rest by %g of %g N/m, though it claims "
+          "its stiffness at a deformed state is off that at rest by %g of %g N/m, though it claims "
           "DFM_CAP_CONSTANT_STIFFNESS; drop the claim",
-          with(variant).c_str(), off, most_of(before));
+          off, largest(before));
   });
 }
 
@@ -370,22 +353,21 @@ std::string dampers_take_energy(const Subject &subject) {
         changed = changed || f[n] != still[n];
         if (!damps && f[n] != still[n])
           broken(
-              "%s its forces change with velocities (%g N and %g N), though it does not claim "
+              "its forces change with velocities (%g N and %g N), though it does not claim "
               "DFM_CAP_DAMPING; claim it",
-              with(variant).c_str(), still[n], f[n]);
+              still[n], f[n]);
       }
       if (!(power <= 1e-10 * size))
         broken(
-            "%s its forces at random velocities, less those at rest, do %g W on the body, as dampers that "
+            "its forces at random velocities, less those at rest, do %g W on the body, as dampers that "
             "push; change the sign of the terms that depend on velocities",
-            with(variant).c_str(), power);
+            power);
     }
     // with another row, or with 0, it may have none
     if (damps && !changed && variant.name.find("damping_stiffness") != std::string::npos)
       broken(
-          "%s its forces do not change with velocities, though it claims DFM_CAP_DAMPING; add the terms that "
-          "the parameter stands for",
-          with(variant).c_str());
+          "its forces do not change with velocities, though it claims DFM_CAP_DAMPING; add the terms that "
+          "the parameter stands for");
   });
 }
 
@@ -416,7 +398,7 @@ std::string numbering_does_not_matter(const Subject &subject) {
     if (a.steps_itself()) {
       f = a.x;
       for (Body *body : {&a, &b}) body->advance(1e-3);
-      for (size_t n = 0; n < f.size(); ++n) scale = std::max(scale, std::fabs(a.x[n] - f[n]));
+      scale = most_apart(a.x, f);
       f = a.x;
       g = b.x;
     } else {
@@ -428,10 +410,10 @@ std::string numbering_does_not_matter(const Subject &subject) {
       for (int d = 0; d < 3; ++d)
         if (!(std::fabs(a.at(f, i)[d] - b.at(g, to[i])[d]) <= 1e-7 * scale))
           broken(
-              "%s point %u %s %.12g %s and, with points and cells numbered otherwise, %.12g; let no result "
+              "point %u %s %.12g %s and, with points and cells numbered otherwise, %.12g; let no result "
               "depend on numbers of points",
-              with(variant).c_str(), i, a.steps_itself() ? "goes to" : "has a force of", a.at(f, i)[d],
-              a.steps_itself() ? "m" : "N", b.at(g, to[i])[d]);
+              i, a.steps_itself() ? "goes to" : "has a force of", a.at(f, i)[d], a.steps_itself() ? "m" : "N",
+              b.at(g, to[i])[d]);
   });
 }
 
@@ -485,14 +467,14 @@ std::string collapsed_cells_stay_finite(const Subject &subject) {
       }
       discarded += status == DFM_DISCARD;
       if (status < 0)
-        broken("%s, %s, it returns %s; return a result, or DFM_DISCARD if a shorter step may help",
-               with(variant).c_str(), kCollapses[how], dfm_status_name(status));
+        broken("%s, it returns %s; return a result, or DFM_DISCARD if a shorter step may help",
+               kCollapses[how], dfm_status_name(status));
       for (size_t n = 0; n < out.size() && status == DFM_OK; ++n)
         if (!std::isfinite(out[n] + v[n]) || !std::isfinite(u[n % u.size()]))
           broken(
-              "%s, %s, it returns %g for point %zu; return finite values for shapes without volume and "
+              "%s, it returns %g for point %zu; return finite values for shapes without volume and "
               "lengths of zero",
-              with(variant).c_str(), kCollapses[how], out[n], n / body.stride);
+              kCollapses[how], out[n], n / body.stride);
     }
   });
   return discarded ? text("%s, %u discarded", summary.c_str(), discarded) : summary;
@@ -515,9 +497,9 @@ std::string cell_energy_sums(const Subject &subject) {
     for (uint32_t c = 0; c < body.solid.ncell(); ++c) sum += density[c] * body.solid.volume(c);
     if (const double whole = body.energy(); !(std::fabs(sum - whole) <= 1e-9 * std::fabs(whole)))
       broken(
-          "%s the energies of the cells sum to %.12g J and the body's is %.12g J; divide every term among "
+          "the energies of the cells sum to %.12g J and the body's is %.12g J; divide every term among "
           "the cells, over their volumes at rest",
-          with(variant).c_str(), sum, whole);
+          sum, whole);
   });
   if (!offered) skip("it does not offer " DFM_EXT_CELL_ENERGY);
   return summary;

@@ -27,8 +27,8 @@ class StepCalls {
         u(3 * size_t(body.solid.nsurfel()), 0.0),
         p(u.size(), 1e-4),
         du(u.size(), 0.0),
-        w(3 * u.size(), 0.0) {
-    for (uint32_t s = 0; s < body.solid.nsurfel(); ++s) surfels.push_back(s);
+        w(3 * u.size(), 0.0),
+        surfels(body.surfels()) {
     if (!body.can(DFM_CAP_STIFFNESS)) return;
     uint32_t n = 0;
     body.must("pattern", [&] { return body.ops.pattern(body.self, &n, nullptr); });
@@ -142,9 +142,9 @@ std::string step_keeps_to_itself(const Subject &subject) {
       ++calls;
       if (found)
         broken(
-            "%s %s calls %s, in its third step; allocate in create, and do not use files, environment, clock "
+            "%s calls %s, in its third step; allocate in create, and do not use files, environment, clock "
             "or random numbers",
-            with(variant).c_str(), name, spelt(found).c_str());
+            name, spelt(found).c_str());
       returned(name, status);
     });
   });
@@ -159,25 +159,9 @@ std::string step_writes_no_static(const Subject &subject) {
     StepCalls step(body);
     step.each([&](const char *name, const auto &call) { must_be_good(name, body.call(name, call)); });
     step.each([&](const char *name, const auto &call) {
-      const void *at = nullptr;
-      uintptr_t base = 0;
-      bool ours = false;
-      std::string trouble;
       stage("%s %s, static variables read only", with(variant).c_str(), name);
-      {
-        const Kept kept(name);
-        const StaticsLocked statics(reinterpret_cast<const void *>(body.ops.create));
-        base = statics.base;
-        trouble = Fenced::guard([&] { call(); }, &at);
-        ours = statics.hold(at);
-      }
-      subject.plugin->host().release_scratch();
-      if (trouble.empty()) return;
-      if (!ours) broken("%s %s; touch only the arrays that are given", name, trouble.c_str());
-      const std::string variable = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
-      broken("%s writes the static variable %s; keep it in the instance, or in a state slot", name,
-             variable.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
-                              : ("\"" + variable + "\"").c_str());
+      keeps_statics(subject, name, reinterpret_cast<const void *>(body.ops.create),
+                    "which instances share; keep it in the instance, or in a state slot", call);
     });
   });
 }
@@ -236,10 +220,8 @@ class FencedBody {
     }
     if (body_.stepper) {
       const dfm_stepper &stepper = *body_.stepper;
-      std::vector<uint32_t> surfels(s);
-      for (uint32_t i = 0; i < s; ++i) surfels[i] = i;
       Fenced list("surfel", sizeof(uint32_t) * s, place_);
-      std::memcpy(list.data(), surfels.data(), sizeof(uint32_t) * s);
+      std::memcpy(list.data(), body_.surfels().data(), sizeof(uint32_t) * s);
       list.lock();
       const auto *const which = static_cast<const uint32_t *>(list.data());
       const double *const load = points("f_ext", zero, true);
@@ -379,9 +361,9 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
         if (first.empty()) first = fenced.returned();
         if (std::memcmp(first.data(), fenced.returned().data(), first.size() * sizeof(double)) != 0)
           broken(
-              "%s its results have other bits at stride %u than at stride 4; step by dfm_kin.stride, and "
+              "its results have other bits at stride %u than at stride 4; step by dfm_kin.stride, and "
               "read three numbers for each point",
-              with(variant).c_str(), stride);
+              stride);
       }
     Random random(subject.seed);
     Body body(subject, small_block(), variant);
@@ -416,7 +398,7 @@ std::string model_same_bits(const Subject &subject) {
           !equal(first.x_end, with_that.x_end) || !equal(first.v_end, with_that.v_end) ||
           !equal(first.next, with_that.next) || !equal(first.du, with_that.du) ||
           !equal(first.w, with_that.w))
-        broken("%s the same state gives other bits %s; %s", with(variant).c_str(), what, remedy);
+        broken("the same state gives other bits %s; %s", what, remedy);
     };
     compare(again, "the second time", "keep nothing between calls but state slots");
     compare(elsewhere, "in another instance of the same body", "set everything in create, and share nothing");
@@ -439,8 +421,7 @@ std::string bad_point_returns(const Subject &subject) {
         for (const Numbers *out : {&step.f, &step.x_end, &step.v_end})
           for (const double a : *out) finite = finite && std::isfinite(a);
         if (std::isnan(bad) && place && finite && !refused)
-          broken("%s a position that is NaN gives finite results; return a NaN, or DFM_DISCARD",
-                 with(variant).c_str());
+          broken("a position that is NaN gives finite results; return a NaN, or DFM_DISCARD");
       }
   });
 }
@@ -459,10 +440,7 @@ void use_model(const Subject &subject) {
 }
 
 std::string instances_share_nothing(const Subject &subject) {
-  if (!sanitized())
-    skip(
-        "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
-        "plugin by the same compiler and -fsanitize");
+  needs_sanitizer();
   constexpr size_t kThreads = 4;
   std::vector<std::unique_ptr<Body>> bodies, alone;
   const Variant defaults = variants(subject).front();

@@ -43,7 +43,7 @@ void take(void *user, uint32_t part, uint32_t n, const uint32_t *point, const do
   }
 }
 
-void compare(const Body &body, const dfm_part_forces &table, const char *of) {
+void compare(const Body &body, const dfm_part_forces &table) {
   uint32_t parts = 0;
   body.must("parts", [&] {
     parts = table.parts(body.self);
@@ -51,8 +51,7 @@ void compare(const Body &body, const dfm_part_forces &table, const char *of) {
   });
   if (!parts) return;
   if (parts > body.points())
-    broken("%s it says that it has %u parts of %u points; each point is in one of them", of, parts,
-           body.points());
+    broken("it says that it has %u parts of %u points; each point is in one of them", parts, body.points());
   Given given;
   given.stride = body.stride;
   given.f.assign(body.x.size(), 0.0);
@@ -63,30 +62,26 @@ void compare(const Body &body, const dfm_part_forces &table, const char *of) {
   if (!now.empty()) k.state_out = now.data();
   body.must("forces of " DFM_EXT_PART_FORCES, [&] { return table.forces(body.self, &k, 0, take, &given); });
   if (given.part_beyond >= 0)
-    broken("%s it gives the forces of part %lld, and says that it has %u; number parts from 0", of,
+    broken("it gives the forces of part %lld, and says that it has %u; number parts from 0",
            static_cast<long long>(given.part_beyond), parts);
   if (given.point_beyond >= 0)
-    broken("%s it gives the force on point %lld of %u; give those of the mesh only", of,
+    broken("it gives the force on point %lld of %u; give those of the mesh only",
            static_cast<long long>(given.point_beyond), body.points());
   for (uint32_t p = 0; p < parts; ++p)
     if (given.part[p] != 1)
-      broken("%s it gives part %u %u times in one call; give each part once", of, p, given.part[p]);
+      broken("it gives part %u %u times in one call; give each part once", p, given.part[p]);
   for (uint32_t p = 0; p < body.points(); ++p)
-    if (given.point[p] != 1)
-      broken("%s point %u is in %u parts; put each point into one", of, p, given.point[p]);
-  if (given.fourth) broken("%s the fourth component of a force is not zero; write a zero there", of);
+    if (given.point[p] != 1) broken("point %u is in %u parts; put each point into one", p, given.point[p]);
+  if (given.fourth) broken("the fourth component of a force is not zero; write a zero there");
   Numbers wanted(body.x.size(), 0.0);
   if (!wanted_state.empty()) k.state_out = wanted_state.data();
   body.must("add_forces", [&] { return body.ops.add_forces(body.self, &k, wanted.data()); });
-  double off = 0;
-  for (size_t i = 0; i < wanted.size(); ++i) off = std::max(off, std::fabs(given.f[i] - wanted[i]));
+  const double off = most_apart(given.f, wanted);
   if (!(off <= kClose * largest(wanted)))
-    broken("%s forces given part by part are up to %.3g N off those of add_forces; give the same forces", of,
-           off);
+    broken("forces given part by part are up to %.3g N off those of add_forces; give the same forces", off);
   if (now != wanted_state)
-    broken("%s forces of " DFM_EXT_PART_FORCES
-           " writes another state_out than add_forces; write the same state",
-           of);
+    broken("forces of " DFM_EXT_PART_FORCES
+           " writes another state_out than add_forces; write the same state");
 }
 
 }  // namespace
@@ -100,7 +95,7 @@ std::string parts_are_the_whole(const Subject &subject) {
     if (!table || !table->parts || !table->forces) return;  // V03
     offered = true;
     body.shake(kShaken * kCube, 0.1, random);
-    compare(body, *table, with(variant).c_str());
+    compare(body, *table);
   });
   if (!offered) skip("it does not offer " DFM_EXT_PART_FORCES);
   return summary;

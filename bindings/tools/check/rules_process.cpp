@@ -38,7 +38,7 @@ namespace {
 void vary(Lanes &b, Random &random, double scale) {
   for (uint32_t i = 0; i < b.n; ++i) {
     const double w = i % 5 == 0 ? 0 : scale * random.logarithmic(1e-6, 10);
-    const double heading = random.uniform(0, 6.283185307179586);
+    const double heading = random.uniform(0, kTurn);
     if (b.law.needs(DFM_NEED_FN)) b.fn[i] = i % 9 == 0 ? 0 : random.logarithmic(1e-3, 1e5);
     b.slip(i, w * std::cos(heading), w * std::sin(heading));
   }
@@ -53,7 +53,12 @@ std::string spelt(const std::string &name) {
   if (name.rfind("_Zd", 0) == 0) return "operator delete";
   return name == "__cxa_allocate_exception" ? "throw" : name;
 }
-bool sanitized() { return DEFORM_SANITIZED; }
+void needs_sanitizer() {
+  if (!DEFORM_SANITIZED)
+    skip(
+        "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
+        "plugin by the same compiler and -fsanitize");
+}
 
 std::string eval_keeps_to_itself(const Subject &subject) {
   const Law law(subject, lively_params(subject));
@@ -351,10 +356,7 @@ std::string unloads_without_leak(const Subject &subject) {
 // ---- V10 --------------------------------------------------------------------------------------------------
 
 std::string sanitizer_finds_nothing(const Subject &subject) {
-  if (!DEFORM_SANITIZED)
-    skip(
-        "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
-        "plugin by the same compiler and -fsanitize");
+  needs_sanitizer();
   const Law law(subject, lively_params(subject));
   constexpr int kThreads = 4;
   constexpr int kRounds = 20;
@@ -390,9 +392,31 @@ std::string sanitizer_finds_nothing(const Subject &subject) {
 
 // ---- V14 --------------------------------------------------------------------------------------------------
 
-// While eval runs the plugin's own writable memory is read only. Tables made at the first call are there
-// by then; what is written after that is memory between calls, or between threads. Thread-local
-// variables are not seen.
+void keeps_statics(const Subject &subject, const char *name, const void *inside, const char *remedy,
+                   const std::function<void()> &call) {
+  const void *at = nullptr;
+  uintptr_t base = 0;
+  bool ours = false;
+  std::string trouble;
+  {
+    const Kept kept(name);
+    const StaticsLocked statics(inside);
+    base = statics.base;
+    trouble = Fenced::guard(call, &at);
+    ours = statics.hold(at);
+  }
+  subject.plugin->host().release_scratch();
+  if (trouble.empty()) return;
+  if (!ours) broken("%s %s; touch only the arrays that are given", name, trouble.c_str());
+  const uintptr_t offset = reinterpret_cast<uintptr_t>(at) - base;
+  const std::string variable = variable_at(subject.file, offset);
+  broken("%s writes the static variable %s, %s", name,
+         variable.empty() ? text("at %#zx of the file", offset).c_str() : ("\"" + variable + "\"").c_str(),
+         remedy);
+}
+
+// Tables made at the first call are there by then; what is written after that is memory between calls, or
+// between threads. Thread-local variables are not seen.
 std::string writes_no_static(const Subject &subject) {
   const Law law(subject, lively_params(subject));
   Random random(subject.seed);
@@ -401,27 +425,10 @@ std::string writes_no_static(const Subject &subject) {
     vary(b, random, 1e-2);
     b.in.dt = 1e-3;
     if (!locked) return static_cast<void>(b.must(1e-3));
-    const Kept kept("eval");
-    const void *at = nullptr;
-    uintptr_t base = 0;
-    bool ours = false;
     stage("batch of %u contacts, static variables read only", n);
-    std::string trouble;
-    {
-      const StaticsLocked statics(reinterpret_cast<const void *>(law.ops.eval));
-      base = statics.base;
-      trouble = Fenced::guard([&] { law.ops.eval(&b.in, &b.out); }, &at);
-      ours = statics.hold(at);
-    }
-    law.subject.plugin->host().release_scratch();
-    if (trouble.empty()) return;
-    if (!ours) broken("eval %s; touch only the arrays that are given", trouble.c_str());
-    const std::string name = variable_at(subject.file, reinterpret_cast<uintptr_t>(at) - base);
-    broken(
-        "eval writes the static variable %s, which threads and worlds share; keep it in a state slot, or on "
-        "the stack",
-        name.empty() ? text("at %#zx of the file", reinterpret_cast<uintptr_t>(at) - base).c_str()
-                     : ("\"" + name + "\"").c_str());
+    keeps_statics(subject, "eval", reinterpret_cast<const void *>(law.ops.eval),
+                  "which threads and worlds share; keep it in a state slot, or on the stack",
+                  [&] { law.ops.eval(&b.in, &b.out); });
   };
   for (const bool locked : {false, true})
     for (const uint32_t n : {8u, 1u, 1000u}) once(n, locked);

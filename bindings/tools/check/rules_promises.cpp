@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "check/groups.h"
-#include "check/law.h"
+#include "check/model.h"
 #include "check/runner.h"
 
 namespace cli::check {
@@ -159,12 +159,6 @@ std::vector<double> to_and_fro(double amplitude, int steps_per_leg, int legs) {
   return out;
 }
 
-double largest_difference(const std::vector<double> &a, const std::vector<double> &b) {
-  double most = 0;
-  for (size_t i = 0; i < a.size(); ++i) most = std::max(most, std::fabs(a[i] - b[i]));
-  return most;
-}
-
 }  // namespace
 
 std::string presliding_is_displacement(const Subject &subject) {
@@ -176,7 +170,7 @@ std::string presliding_is_displacement(const Subject &subject) {
   const std::vector<double> fast = along(law, s, path, 1.0 / 3000);
   const std::vector<double> slow = along(law, s, path, 1.0 / 300);
   const std::vector<double> slowest = along(law, s, path, 1.0 / 30);
-  const double early = largest_difference(fast, slow), late = largest_difference(slow, slowest);
+  const double early = most_apart(fast, slow), late = most_apart(slow, slowest);
   if (!(late <= 0.01 * s.level) || !(late <= 0.3 * early + 2e-5 * s.level))
     broken(
         "along one presliding path the force still changes by %.3g N when the rate falls from a tenth to a "

@@ -26,18 +26,17 @@ Numbers single_forces(const Body &body, const dfm_f32 &table) {
 }
 
 // False: the model has none with these parameters, and says why.
-bool prepared(const Body &body, const dfm_f32 &table, const Variant &variant) {
+bool prepared(const Body &body, const dfm_f32 &table) {
   const size_t said = body.subject.plugin->host().said().size();
   const dfm_status status = body.call("prepare", [&] { return table.prepare(body.self); });
   if (status == DFM_OK) return true;
   if (status == DFM_E_UNSUPPORTED && body.subject.plugin->host().said().size() > said) return false;
   if (status == DFM_E_UNSUPPORTED)
-    broken("%s prepare of " DFM_EXT_F32
-           " refuses without a reason; log the reason, then return DFM_E_UNSUPPORTED",
-           with(variant).c_str());
-  broken("%s prepare of " DFM_EXT_F32
+    broken("prepare of " DFM_EXT_F32
+           " refuses without a reason; log the reason, then return DFM_E_UNSUPPORTED");
+  broken("prepare of " DFM_EXT_F32
          " returns %d; return DFM_OK, or DFM_E_UNSUPPORTED after the reason was logged",
-         with(variant).c_str(), status);
+         status);
 }
 
 }  // namespace
@@ -50,31 +49,29 @@ std::string single_is_close(const Subject &subject) {
     const auto *table = static_cast<const dfm_f32 *>(body.extension(DFM_EXT_F32));
     if (!table || !table->prepare || !table->add_forces) return;  // V03
     offered = true;
-    if (!prepared(body, *table, variant)) return;
+    if (!prepared(body, *table)) return;
     body.shake(kShaken * kCube, 0, random);
     const Numbers wanted = body.forces(), found = single_forces(body, *table);
     const double scale = largest(wanted);
-    double off = 0, sum[3] = {}, all = 0;
+    double sum[3] = {}, all = 0;
     for (uint32_t i = 0; i < body.points(); ++i)
       for (size_t a = 0; a < 3; ++a) {
         const size_t at = size_t(body.stride) * i + a;
-        off = std::max(off, std::fabs(found[at] - wanted[at]));
         sum[a] += found[at];
         all += std::fabs(found[at]);
       }
-    if (!(off <= kClose * scale))
+    if (const double off = most_apart(found, wanted); !(off <= kClose * scale))
       broken(
-          "%s forces in single precision are up to %.3g N off those in double, whose largest is %.3g N; "
+          "forces in single precision are up to %.3g N off those in double, whose largest is %.3g N; "
           "compute the same forces",
-          with(variant).c_str(), off, scale);
+          off, scale);
     if (const double rest = length(sum); !(rest <= kSum * all))
       broken(
-          "%s forces in single precision sum to %.3g N (absolute values: %.3g N); add up each force and its "
+          "forces in single precision sum to %.3g N (absolute values: %.3g N); add up each force and its "
           "reaction in double, from the same rounded number",
-          with(variant).c_str(), rest, all);
+          rest, all);
     if (single_forces(body, *table) != found)
-      broken("%s forces in single precision differ between two calls; let them depend on dfm_kin only",
-             with(variant).c_str());
+      broken("forces in single precision differ between two calls; let them depend on dfm_kin only");
   });
   if (!offered) skip("it does not offer " DFM_EXT_F32);
   return summary;

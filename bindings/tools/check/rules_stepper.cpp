@@ -19,7 +19,7 @@ double safe_step(const Body &body) {
   return std::min(1e-3, 0.3 * body.longest_step());
 }
 
-bool same_bits(const Body &a, const Body &b) {
+bool same_bits(const Moment &a, const Moment &b) {
   const auto equal = [](const double *p, const double *q, size_t n) {
     return n == 0 || std::memcmp(p, q, n * sizeof(double)) == 0;
   };
@@ -75,13 +75,8 @@ std::string state_is_the_hosts(const Subject &subject) {
     run(one, 2, h);
     // What the host has of it goes to an instance that never was anywhere else.
     Body other(subject, small_block(), variant);
-    other.x = one.x;
-    other.v = one.v;
-    other.state = one.state;
-    other.t = one.t;
-    const Numbers x = one.x, v = one.v;
-    const std::vector<double> state = one.state;
-    const double t = one.t;
+    const Moment saved = one;
+    other.take(saved);
     for (Body *body : {&one, &other}) {
       run(*body, 6, h);
       poke(*body);
@@ -89,20 +84,13 @@ std::string state_is_the_hosts(const Subject &subject) {
     }
     if (!same_bits(one, other))
       broken(
-          "%s a body that is saved after 8 steps and continues in a new instance differs 10 steps later from "
+          "a body that is saved after 8 steps and continues in a new instance differs 10 steps later from "
           "one that was never saved (%g m), so it keeps data that the host cannot save; declare it as state "
           "slots, or compute it from positions and velocities",
-          with(variant).c_str(), [&] {
-            double most = 0;
-            for (size_t n = 0; n < one.x.size(); ++n) most = std::max(most, std::fabs(one.x[n] - other.x[n]));
-            return most;
-          }());
+          most_apart(one.x, other.x));
     // The same instance is taken back, as by rollback, with another one's steps in between.
     Body &again = one;
-    again.x = x;
-    again.v = v;
-    again.state = state;
-    again.t = t;
+    again.take(saved);
     Body between(subject, small_block(Held::one_side), variant, 4, Body::Refusal::is_reported);
     if (between.made()) {
       between.shake(0.05 * kCube, 0.1, random);
@@ -113,9 +101,8 @@ std::string state_is_the_hosts(const Subject &subject) {
     run(again, 3, h);
     if (!same_bits(again, other))
       broken(
-          "%s a body that is taken back 10 steps then moves differently; declare what it keeps as state "
-          "slots, and share nothing between instances",
-          with(variant).c_str());
+          "a body that is taken back 10 steps then moves differently; declare what it keeps as state "
+          "slots, and share nothing between instances");
   });
 }
 
@@ -216,21 +203,21 @@ std::string bound_is_honest(const Subject &subject) {
       const double h = body.longest_step();
       if (!(h > 0) || h > 1e6)
         broken(
-            "%s bound allows explicit steps of %g s for a free body, which is no bound; add row sums of the "
+            "bound allows explicit steps of %g s for a free body, which is no bound; add row sums of the "
             "stiffness",
-            with(variant).c_str(), h);
+            h);
       body.dt = h;
       const double over = quotient(body, h, random);
       if (!(over <= 1 + 1e-6))
         broken(
-            "%s, points shaken by %g of an edge, bound allows explicit steps of %g s, which is %.3g of the "
+            "points shaken by %g of an edge, bound allows explicit steps of %g s, which is %.3g of the "
             "stable step, so bodies would explode; let row sums cover the stiffness and twice the dampers",
-            with(variant).c_str(), share, h, std::sqrt(over));
+            share, h, std::sqrt(over));
       if (share == 0 && !(over >= 1.0 / 16))
         broken(
-            "%s bound allows explicit steps of %g s where %g s are stable, so a run needs %.0f times as many "
+            "bound allows explicit steps of %g s where %g s are stable, so a run needs %.0f times as many "
             "steps; sum only the rows of the stiffness of each point",
-            with(variant).c_str(), h, h / std::sqrt(over), 1 / std::sqrt(over));
+            h, h / std::sqrt(over), 1 / std::sqrt(over));
       narrow = std::max(narrow, 1 / std::sqrt(over));
       wide = std::min(wide, 1 / std::sqrt(over));
     }
@@ -249,15 +236,9 @@ Body &ready(Body &body, Random &random) {
   return body;
 }
 
-std::vector<uint32_t> all_surfels(const Body &body) {
-  std::vector<uint32_t> out;
-  for (uint32_t s = 0; s < body.solid.nsurfel(); ++s) out.push_back(s);
-  return out;
-}
-
 // [3n,3n] 1/kg: column c is the answer to a unit impulse.
 std::vector<double> response_of(const Body &body) {
-  const std::vector<uint32_t> surfels = all_surfels(body);
+  const std::vector<uint32_t> surfels = body.surfels();
   const size_t width = 3 * surfels.size();
   std::vector<double> out(width * width);
   for (size_t c = 0; c < width; ++c) {
@@ -282,7 +263,7 @@ std::string for_steppers(const Subject &subject, const F &rule) {
       if (!body.made()) continue;  // held bodies may be none of its
       only_steppers(body);
       stage("%s, %s", with(variant).c_str(), held == Held::nothing ? "free" : "one side held");
-      rule(ready(body, random), variant, random);
+      rule(ready(body, random), random);
     }
   });
 }
@@ -291,10 +272,10 @@ std::string for_steppers(const Subject &subject, const F &rule) {
 
 std::string commit_is_predict_and_respond(const Subject &subject) {
   double worst = 0;
-  const std::string summary = for_steppers(subject, [&](Body &body, const Variant &variant, Random &random) {
+  const std::string summary = for_steppers(subject, [&](Body &body, Random &random) {
     Numbers load(body.x.size(), 0.0);
     for (uint32_t i = 0; i < body.points(); ++i) body.at(load, i)[2] = -9.81 * body.solid.mass[i];
-    const std::vector<uint32_t> surfels = all_surfels(body);
+    const std::vector<uint32_t> surfels = body.surfels();
     const std::vector<double> u = body.predict(load);
     std::vector<double> p(3 * surfels.size());
     for (double &a : p) a = 1e-4 * random.uniform(-1, 1);
@@ -318,28 +299,27 @@ std::string commit_is_predict_and_respond(const Subject &subject) {
     // positions are rounded, and mean velocities are their differences
     if (!(most <= 1e-10 * speed + 1e-14 * way / body.dt))
       broken(
-          "%s commit moves a surfel by a mean velocity that is off predict plus respond by %g of %g m/s; "
+          "commit moves a surfel by a mean velocity that is off predict plus respond by %g of %g m/s; "
           "make commit use the velocities of predict and respond",
-          with(variant).c_str(), most, speed);
+          most, speed);
   });
   return text("%s, %.0e at most", summary.c_str(), worst);
 }
 
 std::string response_is_an_operator(const Subject &subject) {
-  return for_steppers(subject, [&](Body &body, const Variant &variant, Random &random) {
-    const std::vector<uint32_t> surfels = all_surfels(body);
+  return for_steppers(subject, [&](Body &body, Random &random) {
+    const std::vector<uint32_t> surfels = body.surfels();
     const size_t width = 3 * surfels.size();
     const std::vector<double> r = response_of(body);
-    double most = 0;
-    for (const double a : r) most = std::max(most, std::fabs(a));
+    const double most = largest(r);
     if (!(most > 0)) broken("respond always returns 0; return the response to impulses");
     for (size_t i = 0; i < width; ++i)
       for (size_t j = 0; j < i; ++j)
         if (!(std::fabs(r[i * width + j] - r[j * width + i]) <= 1e-10 * most))
           broken(
-              "%s respond is not symmetric: an impulse at surfel %zu moves surfel %zu by %.12g 1/kg, and the "
+              "respond is not symmetric: an impulse at surfel %zu moves surfel %zu by %.12g 1/kg, and the "
               "reverse gives %.12g; apply the same coupling on both sides",
-              with(variant).c_str(), j / 3, i / 3, r[i * width + j], r[j * width + i]);
+              j / 3, i / 3, r[i * width + j], r[j * width + i]);
     std::vector<double> p(width), sum(width, 0.0);
     for (double &a : p) a = random.uniform(-1, 1);
     for (size_t i = 0; i < width; ++i)
@@ -350,15 +330,14 @@ std::string response_is_an_operator(const Subject &subject) {
       work += p[i] * whole[i];
       if (!(std::fabs(whole[i] - sum[i]) <= 1e-10 * most * std::sqrt(double(width)) * 10))
         broken(
-            "%s respond is not linear: all impulses at once give %.12g m/s, and one by one %.12g m/s; "
+            "respond is not linear: all impulses at once give %.12g m/s, and one by one %.12g m/s; "
             "compute what depends on the state in predict",
-            with(variant).c_str(), whole[i], sum[i]);
+            whole[i], sum[i]);
     }
     std::vector<double> against = r;
     for (double &a : against) a = -a;
     if (!(work >= 0) || !below(against, width, 1e-10 * most))
-      broken("%s there are impulses p with p . respond(p) < 0; make respond positive semidefinite",
-             with(variant).c_str());
+      broken("there are impulses p with p . respond(p) < 0; make respond positive semidefinite");
     if (body.stepper->size < offsetof(dfm_stepper, respond_many) + sizeof(void *) ||
         !body.stepper->respond_many)
       return;
@@ -372,14 +351,14 @@ std::string response_is_an_operator(const Subject &subject) {
     for (size_t i = 0; i < width; ++i)
       for (size_t c = 0; c < width; ++c)
         if (!(std::fabs(many[c * width + i] - r[i * width + c]) <= 1e-12 * most))
-          broken("%s respond_many gives %.12g 1/kg where respond gives %.12g; let one call the other",
-                 with(variant).c_str(), many[c * width + i], r[i * width + c]);
+          broken("respond_many gives %.12g 1/kg where respond gives %.12g; let one call the other",
+                 many[c * width + i], r[i * width + c]);
   });
 }
 
 std::string diagonal_bounds_response(const Subject &subject) {
-  return for_steppers(subject, [&](Body &body, const Variant &variant, Random &) {
-    const std::vector<uint32_t> surfels = all_surfels(body);
+  return for_steppers(subject, [&](Body &body, Random &) {
+    const std::vector<uint32_t> surfels = body.surfels();
     const size_t width = 3 * surfels.size();
     const std::vector<double> r = response_of(body);
     std::vector<double> w(9 * surfels.size(), 0.0);
@@ -388,26 +367,15 @@ std::string diagonal_bounds_response(const Subject &subject) {
       return body.stepper->diagonal(body.self, &k, static_cast<uint32_t>(surfels.size()), surfels.data(),
                                     w.data());
     });
-    double most = 0;
-    for (const double a : r) most = std::max(most, std::fabs(a));
+    const double most = largest(r);
     for (size_t s = 0; s < surfels.size(); ++s) {
-      // w - R is positive semidefinite where Cholesky's factorization of it, a little raised, exists
-      double d[9], l[9] = {};
-      for (size_t a = 0; a < 9; ++a)
-        d[a] = w[9 * s + a] - r[(3 * s + a / 3) * width + 3 * s + a % 3] + (a % 4 == 0 ? 1e-10 * most : 0);
-      bool good = true;
-      for (size_t i = 0; i < 3; ++i)
-        for (size_t j = 0; j <= i; ++j) {
-          double sum = d[3 * i + j];
-          for (size_t q = 0; q < j; ++q) sum -= l[3 * i + q] * l[3 * j + q];
-          good = good && (i != j || sum > 0);
-          l[3 * i + j] = i == j ? std::sqrt(std::max(sum, 1e-300)) : sum / l[4 * j];
-        }
-      if (!good)
+      std::vector<double> over(9);  // R - w
+      for (size_t a = 0; a < 9; ++a) over[a] = r[(3 * s + a / 3) * width + 3 * s + a % 3] - w[9 * s + a];
+      if (!below(over, 3, 1e-10 * most))
         broken(
-            "%s the diagonal of surfel %zu (%.6g %.6g %.6g 1/kg) is below what respond answers there (%.6g "
+            "the diagonal of surfel %zu (%.6g %.6g %.6g 1/kg) is below what respond answers there (%.6g "
             "%.6g %.6g 1/kg); return the block itself, or more",
-            with(variant).c_str(), s, w[9 * s], w[9 * s + 4], w[9 * s + 8], r[(3 * s) * width + 3 * s],
+            s, w[9 * s], w[9 * s + 4], w[9 * s + 8], r[(3 * s) * width + 3 * s],
             r[(3 * s + 1) * width + 3 * s + 1], r[(3 * s + 2) * width + 3 * s + 2]);
     }
   });

@@ -26,12 +26,6 @@ std::string error_json(const std::map<std::string, double> &error) {
   return out.text();
 }
 
-std::string words_json(const std::vector<std::string> &words) {
-  std::vector<std::string> out;
-  for (const std::string &w : words) out.push_back(quoted(w));
-  return json_array(out);
-}
-
 std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   const Row &row = study.rows[i];
   const Outcome &o = row.job.outcome;
@@ -46,7 +40,7 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   out.add("label", quoted(row.job.label))
       .add("state", quoted(states[o.state]))
       .add("why", quoted(o.sentence));
-  out.add("axes", words_json(row.candidate.axes)).add("headline", number(row.headline));
+  out.add("axes", json_words(row.candidate.axes)).add("headline", number(row.headline));
   out.add("timed_alone", row.alone ? "true" : "false");
   out.add("steps", number(o.steps)).add("took_s", number(o.took));
   const double predicted = o.predicted(subject.duration);
@@ -448,8 +442,8 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
     scales.add(name, "{\"scale\": " + number(scale) + ", \"unit\": " + quoted(study.units.at(name)) + "}");
   JsonObject out;
   out.add("format", quoted("deform-cost")).add("version", "1").add("scene", quoted(subject.path));
-  out.add("quantities", words_json(study.quantities)).add("headline", words_json(study.headline));
-  out.add("says", words_json({error_text(subject, study), reference_text(study), pick_text(study)}));
+  out.add("quantities", json_words(study.quantities)).add("headline", json_words(study.headline));
+  out.add("says", json_words({error_text(subject, study), reference_text(study), pick_text(study)}));
   out.add("scales", scales.text()).add("reference", reference_json(study));
   out.add("choices", json_array(choices)).add("front", json_array(front));
   if (study.pick < 0) {

@@ -60,9 +60,7 @@ void print(const FrictionOptions &options, const Globals &globals, const Frictio
                         name.find("per_") != std::string::npos;
       out.add(name, list ? json_numbers(values) : number(values[0]));
     }
-    std::vector<std::string> said;
-    for (const std::string &w : warnings()) said.push_back(quoted(w));
-    out.add("warnings", json_array(said));
+    out.add("warnings", json_words(warnings()));
     if (!result.stopped.empty()) out.add("stopped", quoted(result.stopped));
     std::fputs(as_utf8(indented(out.text())).c_str(), stdout);
   } else if (!globals.quiet) {

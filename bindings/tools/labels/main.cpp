@@ -25,7 +25,7 @@ std::string size_json(const std::array<uint32_t, 3> &n) {
 }
 
 std::string report_json(const labels::Report &r, const std::string &out) {
-  std::vector<std::string> names, things, borders, warnings;
+  std::vector<std::string> names, things, borders;
   for (const labels::LabelReport &l : r.labels)
     names.push_back(JsonObject()
                         .add("label", std::to_string(l.value))
@@ -59,7 +59,6 @@ std::string report_json(const labels::Report &r, const std::string &out) {
                           .add("kind", b.held ? "\"held\"" : "\"attached\"")
                           .add("stiffness", number(b.stiffness))
                           .text());
-  for (const std::string &w : r.warnings) warnings.push_back(quoted(w));
   return JsonObject()
       .add("scene_hash", quoted(r.scene_hash))
       .add("scene", quoted(out + "/scene.json"))
@@ -72,7 +71,7 @@ std::string report_json(const labels::Report &r, const std::string &out) {
       .add("crossing_pairs", whole(r.crossing))
       .add("vertices_put_back", whole(r.restored))
       .add("largest_volume_change", number(r.largest_change))
-      .add("warnings", json_array(warnings))
+      .add("warnings", json_words(r.warnings))
       .text();
 }
 

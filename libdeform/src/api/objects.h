@@ -150,9 +150,11 @@ dfm_status as_status(Of of, uint64_t handle, F &&f) noexcept {
   return as_status([&] { return f(of(handle)); });
 }
 
+constexpr auto kAny = [](const auto &) { return true; };
+
 // The handle of the one with this name among those for which counts() is true. what: "tool", for the error.
-template <class All, class Counts>
-void find_named(const All &all, const char *what, const char *name, uint64_t *out, Counts counts) {
+template <class All, class Counts = decltype(kAny)>
+void find_named(const All &all, const char *what, const char *name, uint64_t *out, Counts counts = kAny) {
   need(name, "name");
   need(out, "out");
   std::vector<std::string> names;
@@ -164,7 +166,9 @@ void find_named(const All &all, const char *what, const char *name, uint64_t *ou
     }
     names.push_back(x->name);
   }
-  fail(DFM_E_ARG, "there is no %s '%s'%s", what, name, did_you_mean(name, names, '\'').c_str());
+  if (names.empty()) fail(DFM_E_ARG, "no %s is named '%s'; the world has none", what, name);
+  fail(DFM_E_ARG, "no %s is named '%s'%s; there are: %s", what, name, did_you_mean(name, names, '\'').c_str(),
+       join(names).c_str());
 }
 
 // Body or obstacle of this world.

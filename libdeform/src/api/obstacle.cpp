@@ -109,7 +109,5 @@ dfm_status dfm_obstacle_set_material(dfm_obstacle obstacle, dfm_material materia
 }
 
 dfm_status dfm_world_find_obstacle(dfm_world world, const char *name, dfm_obstacle *out) {
-  return as_status([&] {
-    find_named(world_of(world).obstacles, "obstacle", name, out, [](const Obstacle &) { return true; });
-  });
+  return as_status([&] { find_named(world_of(world).obstacles, "obstacle", name, out); });
 }

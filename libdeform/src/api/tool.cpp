@@ -44,8 +44,7 @@ dfm_status dfm_world_tools(dfm_world world, uint32_t capacity, dfm_tool *out, ui
 }
 
 dfm_status dfm_world_find_tool(dfm_world world, const char *name, dfm_tool *out) {
-  return as_status(
-      [&] { find_named(world_of(world).tools, "tool", name, out, [](const Tool &) { return true; }); });
+  return as_status([&] { find_named(world_of(world).tools, "tool", name, out); });
 }
 
 dfm_status dfm_tool_get_def(dfm_tool tool, dfm_tool_def *out) {

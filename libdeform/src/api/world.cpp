@@ -376,15 +376,8 @@ dfm_status dfm_world_find_body(dfm_world world, const char *name, dfm_body *out)
   return as_status(world_of, world, [&](World &w) {
     need(name, "name");
     need(out, "out");
-    const Body *const b = w.find_body(name);
-    if (!b) {
-      std::vector<std::string> names;
-      for (auto &x : w.bodies) names.push_back(x->name);
-      if (names.empty()) fail(DFM_E_ARG, "no body is named '%s'; the world has none", name);
-      fail(DFM_E_ARG, "no body is named '%s'%s; bodies: %s", name, did_you_mean(name, names, '\'').c_str(),
-           join(names).c_str());
-    }
-    *out = b->handle;
+    if (const Body *const b = w.find_body(name)) *out = b->handle;  // one without cells, too
+    else find_named(w.bodies, "body", name, out);
   });
 }
 
