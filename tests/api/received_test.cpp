@@ -177,11 +177,6 @@ TEST(Received, ThingsThatAreAddedAndRemoved_AreSeenSo) {
     EXPECT_EQ(r.meshes().at(number).radius, float(radius));
     EXPECT_EQ(r.meshes().at(number).position[0], 3);
     EXPECT_EQ(r.meshes().at(uint32_t(s.floor)).name, "floor");
-    EXPECT_FALSE(r.meshes().at(number).sensor);
-    test::ok(dfm_obstacle_set_sensor(sphere, true));
-    EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_SCENE, ++frame, 0, sphere)));
-    EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, frame)));
-    EXPECT_TRUE(r.present(number) && r.meshes().at(number).sensor);
     test::ok(dfm_obstacle_destroy(sphere));
     EXPECT_TRUE(read(r, stream(s.world, DFM_STREAM_FRAME, ++frame)));
     EXPECT_FALSE(r.present(number));

@@ -53,10 +53,8 @@ uint32_t shape_of(const Body &b) {
   for (const uint64_t lane : lanes) hash.add(lane);
   return static_cast<uint32_t>(hash.value ^ hash.value >> 32);
 }
-// Receivers read what is said of a shape once; of an obstacle's only whether it is a sensor ever changes.
-uint32_t shape_of(const Obstacle &o) {
-  return static_cast<uint32_t>(o.handle >> 32) ^ uint32_t { o.sensor } << 31;
-}
+// Nothing of an obstacle's shape ever changes.
+uint32_t shape_of(const Obstacle &o) { return static_cast<uint32_t>(o.handle >> 32); }
 
 // Packets of chunks, that all begin as the first one.
 class Packets {
