@@ -139,7 +139,6 @@ void OwnWorld::push(const dfm_rigid_step &, const double *impulse) {
 
 bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double *extra) {
   bool again = false;
-  predicted_ = false;
   std::memcpy(extra, step.extra, sizeof(double) * first_memory());
   std::memcpy(state, step.state, sizeof(dfm_rigid_state) * members_.size());
   call([&] {
@@ -148,6 +147,7 @@ bool OwnWorld::commit(const dfm_rigid_step &step, dfm_rigid_state *state, double
   for (const uint32_t i : moving_) check(state[i], i, "after the step");
   for (size_t k = 0; k < joints_.size(); ++k) extra[first_joint() + kMotor * k + 2] = effort(k, step.state);
   remember(extra + first_memory(), !again);
+  predicted_ = false;
   // Asked for another round, the engine goes back by itself; the world then gives the same start
   // state as before.
   if (again) return true;

@@ -253,13 +253,13 @@ class Said(InAFolder):
             deform.fit(study, out=study.parent, workers=1)
         self.assertEqual(study.read_text(), before)
         foreign = study.rename(study.with_name("fit.html"))
-        with self.assertRaisesRegex(deform.FileError, "fit.html: another program wrote this file"):
-            deform.fit(json.loads(before), out=study.parent, workers=1)
-        foreign.unlink()
         study = {**self.study(self.measured()), "parameters": {"mu": {"at": MU, "from": 0.1, "to": 1}},
                  "set": {SPEED: TRUTH["v"]}}
+        found = deform.fit(study, out=self.folder / "named", workers=1)
+        with self.assertRaisesRegex(deform.FileError, "fit.html: another program wrote this file"):
+            found.write()
+        foreign.unlink()
         for _ in range(2):  # its own it replaces
-            found = deform.fit(study, out=self.folder / "named", workers=1)
             self.assertIn(self.folder / "named" / "fit.json", found.write())
 
     def test_wrong_studies(self):

@@ -188,7 +188,7 @@ def refuse_foreign(path: pathlib.Path, mark: str) -> None:
     """Refuses to change a file whose first bytes do not hold the mark of what is to be written there."""
     try:
         with open(path, "rb") as file:
-            found = file.read(4096)
+            found = file.read(1 << 20)
     except (FileNotFoundError, NotADirectoryError):
         return
     if found and mark.encode() not in found:

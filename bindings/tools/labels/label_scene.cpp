@@ -93,7 +93,8 @@ class Maker {
     if (std::filesystem::exists(cli::path_of(scene), absent) &&
         !cli::holds(o_.out + "/summary.json", scene_hash(cli::read_file(scene, 64u << 20, "a scene"))))
       refuse(scene,
-             "not as this command has written it, and would be replaced; move what is your own to \"scene\" "
+             "not what summary.json beside it says that this command has written; move what is your own to "
+             "\"scene\" "
              "and \"bodies\" of the table and remove it, or give another folder with --out");
     thing_.assign(volume_.value.size(), kNoThing);
     to_label_.assign(volume_.value.size(), "free");
@@ -251,7 +252,7 @@ class Maker {
       if (border.triangles == 0) {
         warn("the body " + a.name + " meets " + b.name + " on less than a face of its cells, and is not " +
              (border.held ? "held" : "attached") + " there; give it more cells");
-        continue;
+        if (!border.held) continue;
       }
       if (!border.held) set_stiffness(border, area, edge, a, b);
       report_.borders.push_back(border);
@@ -531,6 +532,7 @@ class Maker {
     for (const Border &b : report_.borders) {
       if (b.a != t.name) continue;
       const std::string group = quoted("to_" + b.b);
+      if (b.triangles == 0) continue;
       if (b.held) fix.push_back(JsonObject().add("group", group).text());
       else
         attach.push_back(JsonObject()

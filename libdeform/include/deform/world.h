@@ -125,7 +125,7 @@ enum {
    * came off with their teeth in each other: dfm_world_overlaps lists the pairs; move one of each, unless
    * they are such parts, which contact moves apart (doc/concepts/overlaps.md) */
   DFM_TROUBLE_OVERLAP = 32,
-  /* a body, or the contact of a pair, gained energy without a cause (status DFM_E_DIVERGED): take a shorter
+  /* a body, or contact, gained energy without a cause (status DFM_E_DIVERGED): take a shorter
    * step, or add stiffness damping */
   DFM_TROUBLE_ENERGY = 64,
   /* the step was simplified because of max_time or max_work, or ended before dt with the time that they held

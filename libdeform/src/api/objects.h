@@ -150,7 +150,7 @@ dfm_status as_status(Of of, uint64_t handle, F &&f) noexcept {
   return as_status([&] { return f(of(handle)); });
 }
 
-constexpr auto kAny = [](const auto &) { return true; };
+inline constexpr auto kAny = [](const auto &) { return true; };
 
 // The handle of the one with this name among those for which counts() is true. what: "tool", for the error.
 template <class All, class Counts = decltype(kAny)>

@@ -69,7 +69,7 @@ class Tasks {
 };
 
 // f(i) for all i < n, blocks of `grain` on the threads of tasks (null: on this one). No exception may leave a
-// worker: the caller gets that of the lowest i.
+// worker: the caller gets that of the lowest i, and others may not have run.
 template <class F>
 void each_on(Tasks *tasks, size_t n, size_t grain, F &&f) {
   if (!tasks || !tasks->parallel() || n <= grain) {

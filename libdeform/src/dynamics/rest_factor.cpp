@@ -1,7 +1,6 @@
 #include "dynamics/rest_factor.h"
 
 #include <algorithm>
-#include <new>
 
 #include "math/polar.h"
 #include "math/vec3.h"
@@ -47,7 +46,7 @@ RestFactor::RestFactor(const Memory &memory, const Phyxels &points, ModelInstanc
   for (Array<double> *a : {&diagonal_, &b_, &y_, &arm_}) a->assign(size_t{3} * p_.n, 0.0);
   turned_.assign(size_t{9} * p_.n, 0.0);
   for (size_t k = 0; k < turned_.size(); ++k) turned_[k] = k % 9 % 4 == 0;
-  query_stiffness();  // steps run on any thread, where no memory may be allocated
+  query_stiffness();  // here, not in a step: it takes memory
 }
 
 // A model gives its stiffness at the state of its last force evaluation.

@@ -27,27 +27,25 @@ void PluginSolver::analyse(const BlockPattern &pattern) {
   const dfm_status status = call_plugin(host_, type_, "analyse", query);
   if (status == DFM_OK && self_) return;
   self_ = nullptr;  // a solver that fails has freed its data
-  has_answered(status == DFM_OK || status == DFM_DISCARD ? DFM_E_FATAL : status);
+  is_ok(status);
+  fail(DFM_E_FATAL, "solver '%s' cannot take a matrix of %u points; see the log", type_.id, n_);
 }
 
-// Throws what is no answer about the matrix.
-bool PluginSolver::has_answered(dfm_status status) const {
+bool PluginSolver::is_ok(dfm_status status) const {
   if (status == DFM_E_NOMEM)
     fail(DFM_E_NOMEM, "the memory does not suffice for solver '%s' and a matrix of %u points", type_.id, n_);
-  if (status < 0)
-    fail(DFM_E_FATAL, "solver '%s' cannot take a matrix of %u points; see the log", type_.id, n_);
   return status == DFM_OK;
 }
 
 bool PluginSolver::factor(const double *blk) {
-  ready_ = has_answered(call_plugin(host_, type_, "factor", [&] { return ops_.factor(self_, blk); }));
+  ready_ = self_ && is_ok(call_plugin(host_, type_, "factor", [&] { return ops_.factor(self_, blk); }));
   return ready_;
 }
 
 bool PluginSolver::solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) {
   info = {};
   const auto query = [&] { return ops_.solve(self_, nrhs, b, x, tolerance); };
-  return ready_ && has_answered(call_plugin(host_, type_, "solve", query));
+  return ready_ && is_ok(call_plugin(host_, type_, "solve", query));
 }
 
 std::unique_ptr<LinearSolver> make_solver(const SolverChoice &choice, const dfm_context &context,

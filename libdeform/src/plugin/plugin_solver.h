@@ -13,14 +13,14 @@ class PluginSolver final : public LinearSolver {
 
   const char *name() const override { return type_.id; }
   bool direct() const override;
-  // Each throws Error, which names the plugin, if that fails; false: it says so of the matrix.
+  // Throw Error, which names the plugin: analyse() if it fails, the others if there is no memory.
   void analyse(const BlockPattern &pattern) override;
   bool factor(const double *blk) override;
   bool solve(uint32_t nrhs, const double *b, double *x, double tolerance, SolveInfo &info) override;
 
  private:
   void release() noexcept;
-  bool has_answered(dfm_status status) const;
+  bool is_ok(dfm_status status) const;
 
   const dfm_type &type_;
   const dfm_solver &ops_;

@@ -96,7 +96,7 @@ class Table {
 
 size_t node_of(const Table &table, double cell, size_t nodes) {
   if (cell < 0 || cell != std::floor(cell) || cell >= double(nodes))
-    table.refuse(format("there is no node %g; the mesh file has the nodes 0 to %zu", cell, nodes - 1),
+    table.refuse(format("there is no node %g; the cells have the nodes 0 to %zu", cell, nodes - 1),
                  DFM_E_ARG);
   return size_t(cell);
 }
@@ -145,8 +145,9 @@ StartState read_start_state(const std::string &path, const BodyMesh &mesh) {
   std::vector<uint8_t> seen(mesh.info.npoint, 0);
   double cell[7];
   while (table.next(cell)) {
+    if (cell[0] >= double(point_of.size()) && cell[0] == std::floor(cell[0])) continue;  // of no cell
     const uint32_t point = point_of[node_of(table, cell[0], point_of.size())];
-    if (point == UINT32_MAX) continue;  // of no cell
+    if (point == UINT32_MAX) continue;  // as well
     if (seen[point]) table.refuse(format("node %g has a row already", cell[0]), DFM_E_ARG);
     seen[point] = 1;
     std::copy_n(cell + 1, 3, &out.x[3 * size_t(point)]);

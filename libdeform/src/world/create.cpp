@@ -358,7 +358,7 @@ void end_contacts(World &w, uint64_t id, bool obstacle) {
     }
   end_rigid_contacts(w, id);
   std::erase_if(w.work, [&](const PairWork &p) { return p.a == id || p.b == id; });
-  forget_contact_gain(w);
+  w.watch.made = w.watch.rubbed = 0;  // the limit is that of the bodies that are left
   w.changed = true;
 }
 

@@ -317,6 +317,7 @@ TEST(OdeLifecycle, SleeperThatIsPushed_WakesAsSoonWhetherTheGuardSolvesAgainOrNo
     EXPECT_EQ(stats(ode.soft).guard_solves > 0, strikes);
   }
   EXPECT_EQ(woke[0], woke[1]);
+  EXPECT_LT(woke[0], 300);
 }
 
 // ODE counts steps until it disables a body that is slow. Where a stiff soft body divides the step into

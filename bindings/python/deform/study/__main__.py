@@ -7,11 +7,12 @@ import signal
 import sys
 from typing import Any, NoReturn
 
-from .._library import ArgumentError, Error
+from .._library import ArgumentError, Error, refuse_foreign
 from .executors import EXECUTORS
 from .export import export
-from .fit import fit
-from .sweep import sweep
+from .fit import MARKS as FIT_MARKS, fit
+from .spec import read_study
+from .sweep import MARKS as SWEEP_MARKS, out_folder, sweep
 
 
 class Parser(argparse.ArgumentParser):
@@ -50,6 +51,12 @@ def _only(text: str | None) -> tuple[int, int] | None:
     return int(found[1]), int(found[2] or found[1])
 
 
+def _refuse_others(given: Any, marks: dict[str, str]) -> None:
+    """Before the runs: what could not be written after them."""
+    for name, mark in marks.items():
+        refuse_foreign(out_folder(read_study(given.study), given.out) / name, mark)
+
+
 def _sweep(given: Any) -> int:
     for option, ignored in (("export", ("only", "retry", "parquet", "workers", "executor", "address")),
                             ("only", ("parquet",))):
@@ -60,6 +67,8 @@ def _sweep(given: Any) -> int:
         print(f"written: {export(given.study, given.export, out=given.out)}")
         return 0
     only = _only(given.only)
+    if only is None:
+        _refuse_others(given, SWEEP_MARKS)
     rows = sweep(given.study, out=given.out, executor=given.executor, workers=given.workers,
                  address=given.address, retry=given.retry, only=only, progress=not given.quiet)
     if only is None:
@@ -74,6 +83,7 @@ def _sweep(given: Any) -> int:
 
 
 def _fit(given: Any) -> int:
+    _refuse_others(given, FIT_MARKS)
     tell = None if given.quiet else lambda sentence: print(sentence, file=sys.stderr, flush=True)
     found = fit(given.study, out=given.out, executor=given.executor, workers=given.workers,
                 address=given.address, tell=tell)

@@ -21,7 +21,8 @@ from .statistics import Spread
 from .sweep import out_folder
 from .tables import titled
 
-MARK = '{\n "parameters": ['  # of fit.json; those of a study are an object
+# What write() makes, and what tells that it was made by it: "parameters" of a study are an object.
+MARKS = {"fit.json": '{\n "parameters": [', "fit.html": "<title>Fit ", "fit.png": plots.MARK}
 ROUGH = 0.2  # relative change of a derivative with its step from which the residuals are no smooth function
 LEFT = 0.1   # of an interval's half width: what a search that has converged may leave of the way
 
@@ -54,16 +55,17 @@ class Fit(Table):
                   "curves": [{key: value.tolist() if isinstance(value, np.ndarray) else value
                               for key, value in curve.items()} for curve in self.curves]}
         written = [self.folder / "fit.json", self.folder / "fit.html"]
-        write_whole(written[0], (json.dumps(finite_or_none(report), indent=1) + "\n").encode(), MARK)
+        text = json.dumps(finite_or_none(report), indent=1) + "\n"
+        write_whole(written[0], text.encode(), MARKS["fit.json"])
         sentences, figures = list(self.notes), {}
         try:
             figures["fit"] = plots.png(self.figure())
             written.append(self.folder / "fit.png")
-            write_whole(written[-1], figures["fit"])
+            write_whole(written[-1], figures["fit"], plots.MARK)
         except UnsupportedError as missing:
             sentences.append(str(missing))
         write_whole(written[1], page(f"Fit {self.study.name}", sentences, figures,
-                                     [table(self, self.columns, {})]))
+                                     [table(self, self.columns, {})]), MARKS["fit.html"])
         return written
 
 
@@ -258,8 +260,7 @@ def fit(study: Any, *, out: Any = None, executor: str = "local", workers: int | 
     sentence whenever the residuals have become smaller."""
     read = study if isinstance(study, Study) else read_study(study)
     _check(read)
-    for name, mark in (("fit.json", MARK), ("fit.html", "<title>Fit "), ("fit.png", plots.MARK)):
-        refuse_foreign(out_folder(read, out) / name, mark)  # before the search, not after it
+    refuse_foreign(out_folder(read, out) / "fit.json", MARKS["fit.json"])  # before the search, not after it
     method, step = read.optimizer["method"], read.optimizer["step"]
     start = np.array([p.share(p.start) for p in read.parameters])
     with ExitStack() as stack:

@@ -6,7 +6,7 @@ from contextlib import ExitStack, closing
 from typing import Any, Sequence
 
 from .._command import Table
-from .._library import ArgumentError, UnsupportedError, refuse_foreign, write_whole
+from .._library import ArgumentError, UnsupportedError, write_whole
 from . import plots, tables
 from .design import points
 from .executors import executor as named_executor
@@ -47,7 +47,7 @@ class Sweep(Table):
         """sweep.csv, sweep.html and the figures; parquet: sweep.parquet, too. Without matplotlib the page has
         no figures."""
         written = [self.folder / "sweep.csv"]
-        tables.write_csv(written[0], self, self.columns, self.units)
+        tables.write_csv(written[0], self, self.columns, self.units, MARKS["sweep.csv"])
         sentences, figures = list(self.notes), {}
         try:
             figures = {name: plots.png(drawn) for name, drawn in self.figures().items()}
@@ -55,10 +55,10 @@ class Sweep(Table):
             sentences.append(str(missing))
         for name, data in figures.items():
             written.append(self.folder / f"{name}.png")
-            write_whole(written[-1], data)
+            write_whole(written[-1], data, plots.MARK)
         written.append(self.folder / "sweep.html")
         write_whole(written[-1], page(f"Sweep {self.study.name}", sentences, figures,
-                                      [table(self, self.columns, self.units)]))
+                                      [table(self, self.columns, self.units)]), MARKS["sweep.html"])
         if parquet:
             written.append(self.folder / "sweep.parquet")
             tables.write_parquet(written[-1], self, self.columns, self.units)
@@ -100,9 +100,6 @@ def sweep(study: Any, *, out: Any = None, executor: str = "local", workers: int 
     if not 0 <= first <= last < len(keys):
         raise ArgumentError(f"runs {first} to {last} are not among the {len(keys)} of this study, which are "
                             f"counted from 0", "DFM_E_ARG")
-    if only is None:
-        for name, mark in MARKS.items():  # before the runs, not after them
-            refuse_foreign(folder / name, mark)
     with ExitStack() as stack:
         store = Store(folder, f"runs/{first}-{last}.jsonl" if only is not None else "runs.jsonl")
         stack.callback(store.close)

@@ -39,13 +39,14 @@ def titled(name: str, units: Mapping[str, str]) -> str:
     return f"{name} [{units[name]}]" if units.get(name) else name
 
 
-def write_csv(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
+def write_csv(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str],
+              mark: str = "") -> None:
     text = io.StringIO(newline="")
     out = csv.writer(text)
     out.writerow([titled(name, units) for name in columns])
     for row in rows:
         out.writerow(["" if row.get(name) is None else row[name] for name in columns])
-    write_whole(path, text.getvalue().encode())
+    write_whole(path, text.getvalue().encode(), mark)
 
 
 def of_one_kind(column: Sequence[Any]) -> list[Any]:

@@ -114,7 +114,7 @@ void book_contact_gain(World &w, const StepContext &step) {
     const ContactPoint &c = all[i];
     const auto by_halves = [&](uint32_t slot) { return w.bodies[slot]->dynamics->abilities().energy; };
     const bool counts = booked(w, step, c), ends = c.obstacle || by_halves(c.slot_a) != by_halves(c.slot_b);
-    double pair = 0;
+    double made = 0, rubbed = 0;
     for (; i < all.size() && all[i].slot_a == c.slot_a && all[i].slot_b == c.slot_b &&
            all[i].obstacle == c.obstacle;
          ++i) {
@@ -122,12 +122,13 @@ void book_contact_gain(World &w, const StepContext &step) {
       const Made one = made_by(w, step, i, ends);
       // a law with memory returns the energy that it has stored
       const bool remembers = w.pairs.laws[step.state.law[i]]->nstate > 0;
-      sum.made += remembers ? one.normal : one.normal + one.friction;
-      sum.rubbed += remembers ? one.friction : 0;
-      pair += one.normal + one.friction;
+      made += remembers ? one.normal : one.normal + one.friction;
+      rubbed += remembers ? one.friction : 0;
     }
-    if (!(pair > most)) continue;
-    most = pair;
+    sum.made += made;
+    sum.rubbed += rubbed;
+    if (!(std::max(made, rubbed) > most)) continue;
+    most = std::max(made, rubbed);
     sum.side[0] = w.bodies[c.slot_a]->id;
     sum.side[1] = id_of_b(w, c);
   }
@@ -142,13 +143,11 @@ std::string describe_contact_gain(const World &w) {
   if (!contact_over(w)) return {};
   const auto [a, b] = w.watch.side;
   return format(
-      "%s, %s: contact with friction law '%s' has put in %.3g J more than it has taken (limit: %.3g J; %.3g "
-      "J "
-      "is the largest energy so far); take a shorter step, repair their surfaces, or, where a plugin's law "
-      "or "
-      "model takes part%s, check that the law's force points against the slip, and that a model that steps "
-      "itself moves by the response to impulses that it gives (energy_watch sets the limit, 0 switches the "
-      "watch off)%s",
+      "%s, %s: contact with friction law '%s' has put in %.3g J more than it has taken (limit: %.3g J; "
+      "%.3g J is the largest energy so far); take a shorter step, repair their surfaces, or, where a "
+      "plugin's law or model takes part%s, check that the law's force points against the slip, and that a "
+      "model that steps itself moves by the response to impulses that it gives (energy_watch sets the "
+      "limit, 0 switches the watch off)%s",
       at_step(w).c_str(), names_of(w, a, b).c_str(), law_of(w, a, b).c_str(), most_of(w.watch), limit_of(w),
       w.stats.energy_max, models_of(w, a, b).c_str(), hint_of_attachment(w, a));
 }
