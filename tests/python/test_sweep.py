@@ -552,7 +552,8 @@ class Outputs(InAFolder):
         self.assertRegex(self.command("sweep", code=2).stderr, "STUDY.json .*--help")
         full = unittest.mock.Mock(side_effect=OSError(28, "Full"))
         with unittest.mock.patch.multiple(command_line, sweep=full), \
-                unittest.mock.patch.multiple(sys, argv=["deform", "sweep", "x"], stderr=io.StringIO()), \
+                unittest.mock.patch.multiple(sys, argv=["deform", "sweep", str(self.study())],
+                                             stderr=io.StringIO()), \
                 unittest.mock.patch("signal.signal"):
             self.assertEqual(command_line.main(), 2)
             self.assertEqual(sys.stderr.getvalue(), "deform: the results cannot be written: Full\n")

@@ -43,16 +43,11 @@ std::array<std::atomic<uint64_t>, kMaxRequests> requests{};
 std::atomic<uint32_t> waiting{0};
 static_assert(std::atomic<uint64_t>::is_always_lock_free && std::atomic<uint32_t>::is_always_lock_free);
 
-bool take_request(uint64_t world) noexcept {
-  bool found = false;
+void take_request(uint64_t world) noexcept {
   for (auto &r : requests) {
     uint64_t is = world;
-    if (r.compare_exchange_strong(is, 0)) {
-      waiting.fetch_sub(1);
-      found = true;
-    }
+    if (r.compare_exchange_strong(is, 0)) waiting.fetch_sub(1);
   }
-  return found;
 }
 
 double now() {
@@ -259,7 +254,7 @@ void allow_for_bound(const World &w, StepContext &step) {
 
 void charge(World &w, StepContext &step, uint64_t units) {
   step.budget.work += units;
-  if (waiting.load(std::memory_order_relaxed) != 0 && take_request(w.handle)) throw StepInterrupted{};
+  if (requested(w.handle)) throw StepInterrupted{};
 }
 
 void share_work(const World &w, StepContext &step) {
@@ -361,6 +356,7 @@ dfm_status step_within_budget(World &w, double dt, uint32_t *trouble) {
   try {
     status = run_step(w, step, dt, trouble);
   } catch (const StepInterrupted &) {
+    take_request(w.handle);
     return_to_start(w, step);
     undo_impact(w, impact_until);  // may fail, and changes dampers and sizes
     return_to_start(w, step);
