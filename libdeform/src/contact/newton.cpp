@@ -297,9 +297,9 @@ bool ContactNewton::solve(double tolerance, double normal, uint32_t steps) {
     const bool still = passes_ > Set::rounds && moved <= Set::accuracy * tolerance;
     const bool stalled = still && residual_.speed <= Set::contradiction * normal;
     if (still && off <= tolerance) {
-      const bool most = stiff_ >= kStiffest, stands = stood++ >= Set::rounds;
-      found_ = stalled && (stands || most);
-      if (found_ || most) break;
+      const bool stiffest = stiff_ >= kStiffest, repeated = stood++ >= Set::rounds;
+      found_ = stalled && (repeated || stiffest);
+      if (found_ || stiffest) break;
       scale_penalties(Set::penalty);
     }
     aim = stalled ? off : now;

@@ -53,8 +53,9 @@ def _only(text: str | None) -> tuple[int, int] | None:
 
 def _refuse_others(given: Any, marks: dict[str, str]) -> None:
     """Before the runs: what could not be written after them."""
+    folder = out_folder(read_study(given.study), given.out)
     for name, mark in marks.items():
-        refuse_foreign(out_folder(read_study(given.study), given.out) / name, mark)
+        refuse_foreign(folder / name, mark)
 
 
 def _sweep(given: Any) -> int:
