@@ -32,8 +32,10 @@ def declared(line):
     found = TYPE.match(line)
     if not found and not constants and not re.match(r"(constexpr|const)\b[^(]*=", line):
         found = FUNCTION.match(line)
-    found = found or not constants and VALUE.match(line)
-    return constants + ([found.group(1) or found.group(2)] if found else [])
+    further = []
+    if not found and not constants and (found := VALUE.match(line)):
+        further = re.findall(r", (\w+)(?= = |\[|\{)", line[found.end():])
+    return constants + ([found.group(1) or found.group(2)] if found else []) + further
 
 
 class File:
