@@ -304,7 +304,6 @@ void ContactProblem::read(std::string_view bytes) {
   if (!reader.ended()) fail(DFM_E_FORMAT, "the contact problem is longer than it says");
   check();
   state.resize(rows.n, state.nstate);
-  rows.turn_frames();
   rows.y.assign(rows.y_free.begin(), rows.y_free.end());
   rows.restore(rows.whole());
 }

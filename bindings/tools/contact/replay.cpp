@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "body/phyxels.h"
-#include "contact/friction_kernel.h"
+#include "contact/row_law.h"
 #include "contact/newton.h"
 #include "core/error.h"
 #include "friction/laws.h"

@@ -5,10 +5,20 @@
 #include <cmath>
 #include <cstdint>
 
-#include "contact/contact_kernel.h"
 #include "core/memory.h"
 
 namespace dfm {
+
+// The part of a law's dft/dvt that dissipates: its symmetric part without the positive eigenvalue, and its
+// antisymmetric part, which does no work. [a b; c d], N s/m; v.D v <= 0 for every v.
+struct Slope { double a, b, c, d; };
+// How a law is solved: by its slopes, by projection on the disc of radius limit, or not at all (no force).
+enum LawForm : uint8_t { kSmoothLaw, kSetValuedLaw, kNoFriction };
+// Of a smooth law: slope D, and 1 - h w_t D as [m11 m12; m21 m22] with its determinant.
+struct LinearLaw {
+  Slope slope;
+  double m11, m12, m21, m22, det;
+};
 
 struct ContactState {
   uint32_t n = 0, stride = 0, nstate = 0;
@@ -51,15 +61,13 @@ struct ContactState {
     form.resize(stride);
     linear.resize(n);
   }
-
-  // from contact i on
-  LawView view(uint32_t i = 0) const {
-    return {stride,           fn.data() + i,      vt.data() + i,
-            ft.data() + i,    dft_dvt.data() + i, dft_dfn.data() + i,
-            limit.data() + i, mode.data() + i,    form.data() + i,
-            linear.data() + i};
-  }
 };
+
+// Residual of a state. Of each contact, m/s: r_n = |min(w_n lambda_n, u_n + gap/h)|, r_t = w_t |lambda_t -
+// law|. `relative` is the worst over its tolerance: at most 1 is converged. `required` is the same with
+// most_normal for normal[i]: the required accuracy; the rest may be left to the warm start of the next
+// sub-step. `normal` is the worst r_n alone, m/s.
+struct Residual { double relative = 0, required = 0, speed = 0, normal = 0; };
 
 inline Slope dissipative_slope(const ContactState &s, uint32_t i) {
   const uint32_t n = s.stride;

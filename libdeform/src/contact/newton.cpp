@@ -8,7 +8,7 @@
 
 #include "body/phyxels.h"
 #include "contact/bonds.h"
-#include "contact/friction_kernel.h"
+#include "contact/row_law.h"
 #include "contact/solve_settings.h"
 
 namespace dfm {

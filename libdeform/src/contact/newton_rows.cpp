@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "body/phyxels.h"
-#include "contact/friction_kernel.h"
+#include "contact/row_law.h"
 #include "contact/newton.h"
 #include "contact/solve_settings.h"
 #include "core/lists.h"

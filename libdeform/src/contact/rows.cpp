@@ -9,13 +9,6 @@
 namespace dfm {
 namespace {
 
-const ContactKernels &contact_kernels() {
-  if constexpr (kHasWider) {
-    if (doubles_at_once() >= 4) return contact_kernels_avx2();
-  }
-  return contact_kernels_sse2();
-}
-
 // Sources are in ascending order of their first nodes.
 uint32_t source_of_node(std::span<const DofSource> sources, uint32_t node) {
   return uint32_t(std::ranges::upper_bound(sources, node, {}, &DofSource::first_node) - sources.begin()) - 1;
@@ -23,11 +16,11 @@ uint32_t source_of_node(std::span<const DofSource> sources, uint32_t node) {
 
 }  // namespace
 
-ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()), loops_(contact_kernels()) {
-  use_memory(m, across_, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_,
-             unit_response_, frame, drive, rate, borne, start_depth, compliance, wn, wt, cross, impulse, bond,
-             dof_of_point_, dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_,
-             every_block_, whole_of);
+ContactRows::ContactRows(const Memory &m) : kernels_(dense_kernels()) {
+  use_memory(m, begin, dof, weight, y, y_free, alone, source, point, block, blocks, response_, unit_response_,
+             frame, drive, rate, borne, start_depth, compliance, wn, wt, cross, impulse, bond, dof_of_point_,
+             dof_of_node_, place_, rigid, arm, rigid_a, arm_a, arc, arc_a, dof_of_group_, every_block_,
+             whole_of);
 }
 
 // Of the dofs from `first` on.
@@ -427,7 +420,6 @@ void ContactRows::finish(std::span<const ContactPoint> contacts, const double *t
   };
   each_row_in_blocks(soft(), tasks, fill);
   if (nbond) finish_bonds(bonds);
-  turn_frames();
 }
 
 void ContactRows::soften_openings(std::span<const double> firm) {
@@ -453,19 +445,8 @@ double ContactRows::load_without_opening(uint32_t i) const {
   return l - by * by / most;
 }
 
-void ContactRows::turn_frames() {
-  constexpr size_t kMore = 4;  // doubles that a whole vector at the last contact may see
-  frame.resize(size_t(all()) * 9 + kMore);
-  drive.resize(size_t(all()) * 3 + kMore);
-  across_.resize(size_t(n) * 9 + kMore);
-  for (size_t i = 0; i < size_t(9) * n; i += 9)
-    for (size_t row = 0; row < 3; ++row)
-      for (size_t k = 0; k < 3; ++k) across_[i + 3 * k + row] = frame[i + 3 * row + k];
-}
-
-Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
-  Vec3 u;
-  for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(of + size_t(dof[j]) * 4);
+// u: what the dofs of the row give, in the world's axes.
+Vec3 ContactRows::velocity_with_rigids(uint32_t i, const double *of, Vec3 u) const {
   Vec3 turned;
   each_rigid(i, [&](uint32_t d, Vec3 r, double sign, const double *turns) {
     const double *const v = of + size_t(d) * 4;
@@ -473,8 +454,7 @@ Vec3 ContactRows::velocity(uint32_t i, const double *of) const {
     u += sign * (load3(v) + dfm::cross(spin, r));
     if (turns) turned += sign * in_frame(turns, spin);
   });
-  const double *const f = &frame[size_t(i) * 9];
-  return in_frame(f, u) + turned - load3(&drive[size_t(i) * 3]);
+  return in_frame(&frame[size_t(i) * 9], u) + turned - load3(&drive[size_t(i) * 3]);
 }
 
 // along: between values of one answer of unit_response_; across: from one answer to the next.
@@ -500,16 +480,12 @@ void ContactRows::apply_to_rigids(uint32_t i, Vec3 p) {
   });
 }
 
-void ContactRows::apply(uint32_t i, Vec3 q) {
-  const Vec3 p = from_frame(&frame[size_t(i) * 9], q);
+void ContactRows::apply_to_blocks(uint32_t i, Vec3 p) {
   apply_to_rigids(i, p);
   for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) {
     const uint32_t d = dof[j];
-    if (block[d] != kNone) {
-      response_apply(blocks[block[d]], d, weight[j] * p);
-      continue;
-    }
-    add3(&y[size_t(d) * 4], weight[j] * response_alone(d, p));
+    if (block[d] != kNone) response_apply(blocks[block[d]], d, weight[j] * p);
+    else add3(&y[size_t(d) * 4], weight[j] * response_alone(d, p));
   }
 }
 

@@ -15,7 +15,6 @@
 #include <span>
 
 #include "contact/bond.h"
-#include "contact/contact_kernel.h"
 #include "contact/contact_set.h"
 #include "contact/rows_part.h"
 #include "geometry/surface.h"
@@ -88,7 +87,7 @@ struct ContactRows {
   Array<double> arc, arc_a;
   Array<Block> blocks;
 
-  // [all,9] normal, tangent, normal x tangent; of a bond the world's axes. It and `drive` have a vector more.
+  // [all,9] normal, tangent, normal x tangent; of a bond the world's axes.
   Array<double> frame;
   Array<double> drive;        // [all,3] obstacle velocity in the frame
   Array<double> rate;         // [n] m/s: gap / h; a depth 0.2 gap / h, at least -0.1 d_c / h
@@ -148,13 +147,6 @@ struct ContactRows {
   // would push against it with as much again, and loads of depths that exclude each other would grow for
   // ever.
   double load_without_opening(uint32_t i) const;
-  void turn_frames();  // once `frame` and `drive` are known, for the kernels; finish() has done it
-
-  // Do all unknowns of the part answer their own impulses only? The contacts' loops then run in the kernels.
-  // So do those with rigid bodies that no impulse moves: the path of a tool is given.
-  bool is_alone(const RowsPart &part) const;
-  const ContactKernels &kernels() const { return loops_; }
-  RowsView view(RowRun contacts) const;
   RowsPart whole();  // all of them; valid until the next call
 
   // 1/kg: the estimate of what implicit bodies answer as a whole, in wn and wt of this row; 0 without any
@@ -163,9 +155,20 @@ struct ContactRows {
   void set_diagonal(uint32_t i);  // wn, wt, cross of a contact, from its frame and the responses
   // relative velocity of contact i in its frame (normal, t1, t2); of unknowns like y
   Vec3 velocity(uint32_t i) const { return velocity(i, y.data()); }
-  Vec3 velocity(uint32_t i, const double *of) const;
-  void apply(uint32_t i, Vec3 impulse_frame);  // changes y by an impulse given in the frame
-  Vec3 world_impulse(uint32_t i) const {       // the row's own
+  Vec3 velocity(uint32_t i, const double *of) const {
+    Vec3 u;
+    for (uint32_t j = begin[i]; j < begin[i + 1]; ++j) u += weight[j] * load3(of + size_t(dof[j]) * 4);
+    if (!rigid.empty()) return velocity_with_rigids(i, of, u);
+    return in_frame(&frame[size_t(i) * 9], u) - load3(&drive[size_t(i) * 3]);
+  }
+  // changes y by an impulse given in the frame
+  void apply(uint32_t i, Vec3 impulse_frame) {
+    const Vec3 p = from_frame(&frame[size_t(i) * 9], impulse_frame);
+    if (!blocks.empty()) return apply_to_blocks(i, p);
+    for (uint32_t j = begin[i]; j < begin[i + 1]; ++j)
+      add3(&y[size_t(dof[j]) * 4], weight[j] * response_alone(dof[j], p));
+  }
+  Vec3 world_impulse(uint32_t i) const {  // the row's own
     return from_frame(&frame[size_t(9) * i], load3(&impulse[size_t(3) * i]));
   }
   // Begins a solve: y_free is y as it is, and y has the impulses of the last one. Those without a normal part
@@ -200,8 +203,6 @@ struct ContactRows {
   Array<uint32_t> place_;
   Array<uint32_t> dof_of_group_;  // first dof of a rigid group
   const DenseKernels &kernels_;
-  const ContactKernels &loops_;
-  Array<double> across_;  // [n,9] frames transposed, and a vector more
   // per block [3 count columns, 4 count], 1/kg: what an impulse at one dof changes of all, as y has them
   Array<double> response_;
   Array<double> unit_response_;  // scratch
@@ -235,7 +236,8 @@ struct ContactRows {
   }
   void response_apply(const Block &b, uint32_t k, Vec3 p);
   void apply_to_rigids(uint32_t i, Vec3 p);
-  bool no_response(const Block &b) const;
+  void apply_to_blocks(uint32_t i, Vec3 p);
+  Vec3 velocity_with_rigids(uint32_t i, const double *of, Vec3 u) const;
   Vec3 diagonal(uint32_t i, Vec3 direction) const;
   void finish_bonds(std::span<const Bond> bonds);
 };

@@ -5,43 +5,12 @@
 
 namespace dfm {
 
-RowsView ContactRows::view(RowRun r) const {
-  const size_t i = r.first;
-  return {r.n,
-          begin.data() + i,
-          dof.data(),
-          weight.data(),
-          alone.data(),
-          frame.data() + 9 * i,
-          drive.data() + 3 * i,
-          across_.data() + 9 * i,
-          rate.data() + i,
-          wn.data() + i,
-          wt.data() + i,
-          cross.data() + 2 * i,
-          compliance.data() + 3 * i};
-}
-
-bool ContactRows::no_response(const Block &b) const {
-  if (b.group == kNone) return false;
-  const auto zero = [](double value) { return value == 0; };
-  const double *const responses = &response_[b.response], *const now = &y[size_t(4) * b.first];
-  return std::all_of(responses, responses + size_t(12) * b.count * b.count, zero) &&
-         std::all_of(now, now + size_t(4) * b.count, zero);
-}
-
-bool ContactRows::is_alone(const RowsPart &part) const {
-  return std::ranges::all_of(part.blocks, [&](uint32_t b) { return no_response(blocks[b]); });
-}
-
 RowsPart ContactRows::whole() {
   every_row_[0] = {0, n};
   every_row_[1] = {n, nbond};
   every_block_.resize(blocks.size());
   for (uint32_t b = 0; b < every_block_.size(); ++b) every_block_[b] = b;
-  RowsPart out{{&every_row_[0], 1}, {&every_row_[1], nbond ? size_t{1} : 0}, every_block_, n, nbond};
-  out.alone = is_alone(out);
-  return out;
+  return {{&every_row_[0], 1}, {&every_row_[1], nbond ? size_t{1} : 0}, every_block_, n, nbond};
 }
 
 void ContactRows::apply_last() {

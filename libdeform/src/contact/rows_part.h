@@ -14,7 +14,6 @@ struct RowsPart {
   std::span<const RowRun> contacts, bonds;  // ascending; the rows of bonds follow those of all contacts
   std::span<const uint32_t> blocks;         // ascending
   uint32_t n = 0, nbond = 0;                // contacts and bonds in it
-  bool alone = false;  // its unknowns answer their own impulses only (ContactRows::is_alone())
   uint32_t all() const { return n + nbond; }
 };
 

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "contact/bonds.h"
-#include "contact/friction_kernel.h"
+#include "contact/row_law.h"
 #include "contact/solve_settings.h"
 
 namespace dfm {
@@ -33,120 +33,27 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
   });
 }
 
-namespace {
-
-// As the kernel, where impulses at one dof change others.
-void solve_contacts(ContactRows &rows, const RowsPart &part, const LawView &law, double h) {
+void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h) {
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;  // both sides are held: nothing an impulse could change
-    const Vec3 u = rows.velocity(i);
-    double by[3];
-    if (solve_row(rows, law, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], by))
-      rows.apply(i, load3(by));
+    Vec3 by;
+    if (solve_row(rows, law, i, h, rows.velocity(i), &rows.impulse[size_t(i) * 3], by)) rows.apply(i, by);
   });
 }
 
-}  // namespace
-
-void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h) {
-  if (part.alone)
-    for (const RowRun &run : part.contacts)
-      rows.kernels().sweep(rows.view(run), law.view(run.first), h, rows.y.data(),
-                           rows.impulse.data() + size_t(3) * run.first);
-  else solve_contacts(rows, part, law.view(), h);
-}
-
-namespace {
-
-// Impulses, and the velocities with them, change by these, one row after the other.
 void leap(ContactRows &rows, const RowsPart &part, const double *jumps) {
   const auto change = [&](uint32_t i, Vec3 jump) {
-    rows.apply(i, jump);
-    double *const l = &rows.impulse[size_t(3) * i];
-    store3(l, load3(l) + jump);
-  };
-  if (part.alone)
-    for (const RowRun &run : part.contacts) {
-      rows.kernels().leap(rows.view(run), jumps, rows.y.data(), rows.impulse.data() + size_t(3) * run.first);
-      jumps += size_t(3) * run.n;
-    }
-  else
-    each_row(part.contacts, [&](uint32_t i) {
-      Vec3 jump = load3(jumps);
-      jumps += 3;
-      // a normal impulse never pulls, not in between either
-      jump.x = std::max(jump.x, -rows.impulse[size_t(3) * i]);
-      if (jump.x != 0 || jump.y != 0 || jump.z != 0) change(i, jump);
-    });
-  each_row(part.bonds, [&](uint32_t i) {
-    change(i, load3(jumps));
     jumps += 3;
+    if (jump.x == 0 && jump.y == 0 && jump.z == 0) return;
+    rows.apply(i, jump);
+    add3(&rows.impulse[size_t(3) * i], jump);
+  };
+  each_row(part.contacts, [&](uint32_t i) {
+    Vec3 jump = load3(jumps);
+    jump.x = std::max(jump.x, -rows.impulse[size_t(3) * i]);
+    change(i, jump);
   });
-}
-
-}  // namespace
-
-Acceleration::Acceleration(const Memory &m) { use_memory(m, metric_, from_, f_, g_, now_, df_, dg_); }
-
-void Acceleration::start(const ContactRows &rows, const RowsPart &part) {
-  const uint32_t values = 3 * part.all();
-  n_ = (values + 3) & ~3u;
-  count_ = next_ = 0;
-  first_ = true;
-  last_ = 0;
-  metric_.resize(n_);
-  f_.resize(n_);
-  g_.resize(n_);
-  now_.resize(n_);
-  df_.resize(size_t(kWindow) * n_);
-  dg_.resize(size_t(kWindow) * n_);
-  double *to = metric_.data();
-  each_row(part, [&](uint32_t i) {
-    to[0] = std::sqrt(rows.wn[i]);
-    to[1] = to[2] = std::sqrt(rows.wt[i]);
-    to += 3;
-  });
-  from_.resize(n_);
-  for (uint32_t k = values; k < n_; ++k) metric_[k] = from_[k] = 0;
-  take_impulses(rows, part, from_.data());
-}
-
-void Acceleration::follow(ContactRows &rows, const RowsPart &part) {
-  const ContactKernels &loops = rows.kernels();
-  take_impulses(rows, part, now_.data());
-  std::fill(now_.begin() + std::ptrdiff_t{3} * part.all(), now_.end(), 0.0);
-  double *const df = &df_[size_t(next_) * n_], *const dg = &dg_[size_t(next_) * n_];
-  loops.differences(n_, metric_.data(), now_.data(), from_.data(), f_.data(), g_.data(),
-                    first_ ? nullptr : df, dg);
-  double y[kWindow], gamma[kWindow] = {}, both[4];
-  loops.dots(n_, f_.data(), df, f_.data(), df, both);  // df is of use where there was an f before
-  const double size = both[0];
-  // the map has changed under us (contacts opened or began to slip): what was learned is void
-  if (!first_ && size > 4 * last_) {
-    count_ = next_ = 0;
-  } else if (!first_) {
-    count_ = std::max(count_, next_ + 1);
-    y[next_] = both[2];
-    gram_[next_][next_] = both[3];
-    // the other columns, two at a time
-    for (uint32_t k = 1; k < count_; k += 2) {
-      const uint32_t j = (next_ + k) % count_, other = (next_ + std::min(k + 1, count_ - 1)) % count_;
-      loops.dots(n_, &df_[size_t(j) * n_], &df_[size_t(other) * n_], df, f_.data(), both);
-      gram_[j][next_] = gram_[next_][j] = both[0];
-      gram_[other][next_] = gram_[next_][other] = both[2];
-      y[j] = both[1];
-      y[other] = both[3];
-    }
-    next_ = (next_ + 1) % kWindow;
-  }
-  first_ = false;
-  last_ = size;
-
-  if (count_ > 0 && least_combination(count_, gram_, y, gamma)) {
-    loops.combine(n_, count_, gamma, dg_.data(), now_.data());
-    leap(rows, part, now_.data());
-  }
-  take_impulses(rows, part, from_.data());
+  each_row(part.bonds, [&](uint32_t i) { change(i, load3(jumps)); });
 }
 
 Residual larger(const Residual &a, const Residual &b) {
@@ -158,18 +65,10 @@ Residual residual_of(const ContactRows &rows, const RowsPart &part, const Contac
                      const Tolerance &tolerance) {
   Residual r;
   double nan_flag = 0;
-  if (part.alone)
-    for (const RowRun &run : part.contacts)
-      r = larger(r, rows.kernels().residual(
-                        rows.view(run), law.view(run.first),
-                        {tolerance.normal + run.first, tolerance.tangent + run.first, tolerance.most_normal},
-                        h, rows.y.data(), rows.impulse.data() + size_t(3) * run.first));
-  else
-    each_row(part.contacts, [&, view = law.view()](uint32_t i) {
-      if (!(rows.wn[i] > 0)) return;
-      const Vec3 u = rows.velocity(i);
-      add_residual(rows, view, tolerance, i, h, {u.x, u.y, u.z}, &rows.impulse[size_t(i) * 3], r, nan_flag);
-    });
+  each_row(part.contacts, [&](uint32_t i) {
+    if (!(rows.wn[i] > 0)) return;
+    add_residual(rows, law, tolerance, i, h, rows.velocity(i), &rows.impulse[size_t(i) * 3], r, nan_flag);
+  });
   each_row(part.bonds, [&](uint32_t row) {
     const double left = norm(bond_residual(rows, row));
     nan_flag += 0.0 * left;
@@ -211,15 +110,14 @@ void each_side(const uint32_t *sides, uint32_t i, T *disturbance, F &&f) {
 
 }  // namespace
 
-void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state, double h,
+void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
                       const uint32_t *sides, double *disturbance) {
-  const LawView law = laws_state.view();
   each_row(part.contacts, [&](uint32_t i) {
     if (!(rows.wn[i] > 0)) return;
-    const Vec3 v = rows.velocity(i);
-    const double u[3] = {v.x, v.y, v.z}, *const l = &rows.impulse[size_t(i) * 3];
-    const bool friction = rows.wt[i] > 0 && (l[0] > 0 || laws_state.fn[i] > 0);
-    const double normal = normal_residual(rows, i, u[0], l);
+    const Vec3 u = rows.velocity(i);
+    const double *const l = &rows.impulse[size_t(i) * 3];
+    const bool friction = rows.wt[i] > 0 && (l[0] > 0 || law.fn[i] > 0);
+    const double normal = normal_residual(rows, i, u.x, l);
     const double tangent = friction ? tangent_residual(rows, law, i, h, u, l) : 0;
     each_side(sides, i, disturbance, [&](double *d) {
       d[0] = std::max(d[0], tangent);

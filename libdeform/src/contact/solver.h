@@ -4,7 +4,6 @@
 #pragma once
 #include "contact/contact_state.h"
 #include "contact/rows.h"
-#include "math/anderson.h"
 
 namespace dfm {
 
@@ -21,31 +20,11 @@ void linearize(const ContactRows &rows, const RowsPart &part, double h, ContactS
 // that new normal impulse. Bonds are swept behind it (bonds.h).
 void sweep(ContactRows &rows, const RowsPart &part, const ContactState &law, double h);
 
-// Anderson acceleration of the sweeps (Walker and Ni 2011, type II). A sweep is a fixed-point map G; where
-// contacts are nearly redundant (vertex-face beside edge-edge, two bodies' grids on each other) it converges
-// linearly and slowly. With f = G(lambda) - lambda of the last few sweeps, the next iterate is the
-// combination of their results whose f would be least, in the metric of the operator's diagonal; once the
-// active set is constant this is GMRES on the linear system. The state that is used is always one that a
-// plain sweep has left.
-class Acceleration {
- public:
-  explicit Acceleration(const Memory &memory);
-  void start(const ContactRows &rows, const RowsPart &part);  // before the first sweep of a pass
-  void follow(ContactRows &rows, const RowsPart &part);       // after a sweep that another one follows
+// Impulses of a part, and the velocities with them, change by jumps [3 rows], one row after the other; a
+// normal impulse never comes below zero.
+void leap(ContactRows &rows, const RowsPart &part, const double *jumps);
 
- private:
-  static constexpr uint32_t kWindow = kAndersonWindow;
-  uint32_t n_ = 0, count_ = 0, next_ = 0;  // values padded to fours, columns held, column to write
-  bool first_ = true;
-  double last_ = 0;
-  Array<double> metric_;       // [n] square roots of the diagonal
-  Array<double> from_;         // [n] iterate that the last sweep started from
-  Array<double> f_, g_, now_;  // [n] of the last sweep, f in the metric; scratch
-  Array<double> df_, dg_;      // [window,n] differences of successive f and g
-  double gram_[kWindow][kWindow] = {};
-};
-
-// Of the residuals (contact_kernel.h): a contact is good where both stay within what they may be off by:
+// Of residuals: a contact is good where both stay within what they may be off by:
 //   r_n <= normal[i]                      0.01 (d_c - d_g) / h: the gap is then off by less than a hundredth
 //                                         of its margin; less where laws remember
 //   r_t <= max(tangent[i], 1e-3 |slip|)   1e-6 m/s at rest, which bounds the creep of what sticks
@@ -68,7 +47,7 @@ Residual larger(const Residual &a, const Residual &b);
 // d of the bodies of a part: the largest r_t that the warm start leaves at any contact of the body, and the
 // largest of all r_n and r_t; no less than disturbance has already. sides: [contacts,2] numbers of bodies,
 // kNone: an obstacle; disturbance: [bodies,2].
-void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &laws_state, double h,
+void find_disturbance(const ContactRows &rows, const RowsPart &part, const ContactState &law, double h,
                       const uint32_t *sides, double *disturbance);
 // tangent[i] = max(bounds.tangent, 1e-2 d), d the larger one of the two bodies. A contact at rest is warm
 // started at its solution, so d vanishes and the bound at rest rules; while bodies shake, a hundredth of what

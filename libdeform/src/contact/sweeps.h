@@ -3,6 +3,7 @@
 #pragma once
 #include "contact/newton.h"
 #include "contact/solver.h"
+#include "math/anderson.h"
 
 namespace dfm {
 
@@ -11,7 +12,10 @@ struct SweepLimits {
   double start;  // m/s, the residual at the start
 };
 
-// The sweeps of one part of the rows, with what they keep between solves.
+// The sweeps of one part of the rows, with what they keep between solves. Where contacts are nearly redundant
+// (vertex-face beside edge-edge, two bodies' grids on each other) a sweep converges slowly; Anderson
+// acceleration, in the metric of the operator's diagonal, helps. The state that is used is always one that a
+// plain sweep has left.
 class Sweeps {
  public:
   explicit Sweeps(const Memory &memory);
@@ -30,9 +34,12 @@ class Sweeps {
   const Tolerance *tolerance_ = nullptr;
   double h_ = 0;
   uint32_t count_ = 0, most_ = 0;
-  Acceleration acceleration_;
-  Array<double> start_;  // [rows,3] impulses, of the part one after the other
+  Anderson anderson_;
+  // [rows,3] impulses, of the part one after the other: of the start; of the last sweep
+  Array<double> start_, from_, to_, jump_;
 
+  void begin_acceleration();  // before the first sweep of a pass
+  void accelerate();          // after a sweep that another one follows
   void sweep_once();
   bool pass();
   bool good(const Residual &left, double fraction) const;

@@ -55,11 +55,12 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
       memory_(memory),
       ways_(memory) {
   use_memory(memory, stage_x_, stage_v_, middle_, load_before_);
-  use_memory(memory, x_, v_, residual_, push_, change_, springs_, dampers_, scale_, weight_, held_, alone_);
+  use_memory(memory, x_, v_, residual_, push_, change_, there_, springs_, dampers_, scale_, weight_, held_,
+             alone_);
   x_.assign(size_t{kStride} * points.n, 0.0);
   v_ = alone_ = x_;
   if (options_.second_order) stage_x_ = stage_v_ = middle_ = load_before_ = x_;
-  for (Array<double> *a : {&residual_, &push_, &change_, &scale_, &weight_})
+  for (Array<double> *a : {&residual_, &push_, &change_, &there_, &scale_, &weight_})
     a->assign(size_t{3} * points.n, 0.0);
   held_.assign(points.n, 0);
   stiffness_.create(model, points.n);
@@ -75,7 +76,7 @@ ImplicitPoints::ImplicitPoints(const Memory &memory, Phyxels &points, Surface &s
   // a plugin's solver is made and analyzes between steps
   const SolverChoice choice{options_.solver.c_str(), p_.n, stiffness_.constant(), 0};
   if (rest_ && std::strcmp(solver_name(choice), "ldlt") != 0) exact_ = new_solver();
-  ways_.start(change_.size());
+  ways_.start(weight_);
 }
 
 std::unique_ptr<LinearSolver> ImplicitPoints::new_solver() const {
@@ -256,12 +257,12 @@ bool ImplicitPoints::take_first_way(const SubStep &now) {
 // inexact matrix. v: start, whose residual is known, and result. Returns false if the model fails, or a stage
 // of TR-BDF2 is not solved.
 bool ImplicitPoints::newton(Array<double> &v) {
-  ways_.start(change_.size());
   bool fresh = !take_rest();
+  ways_.start(weight_);
   for (uint32_t k = 0; k < options_.newton; ++k) {
     if (fresh) {
       if (!linearize()) return false;
-      ways_.start(change_.size());
+      ways_.start(weight_);
     }
     if (!solve_way(residual_)) return false;
     const double step = largest(change_), before = scaled_square(residual_);
@@ -348,7 +349,9 @@ bool ImplicitPoints::solve_way(const Array<double> &r) {
 void ImplicitPoints::accelerate(const Array<double> &v) {
   for (uint32_t i = 0; i < p_.n; ++i)
     for (uint32_t c = 0; c < 3; ++c) push_[size_t{3} * i + c] = v[size_t{kStride} * i + c];
-  ways_.next(push_.data(), change_.data(), weight_.data(), push_.data());
+  for (size_t k = 0; k < there_.size(); ++k) there_[k] = push_[k] + change_[k];
+  if (!ways_.next(push_.data(), there_.data(), push_.data())) return;
+  for (size_t k = 0; k < there_.size(); ++k) push_[k] += change_[k];
   if (-product(residual_, push_) > 0) change_.swap(push_);
 }
 

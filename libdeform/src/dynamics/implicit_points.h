@@ -88,21 +88,21 @@ class ImplicitPoints : public Dynamics, public ImplicitSystem {
     Vec3 gravity;
   };
   Stage stage_{};
-  bool staged_ = false;                // this sub-step uses TR-BDF2
-  Array<double> stage_x_, stage_v_;    // [npoint,4] m, m/s: x0, v0 of its stages
-  Array<double> middle_;               // [npoint,4] m/s, the end of its first stage
-  Array<double> load_before_;          // [npoint,4] N, at the start of the sub-step
-  Array<double> x_, v_;                // [npoint,4] m, m/s: state of the last force evaluation
-  Array<double> residual_;             // [npoint,3] N s
-  Array<double> push_, change_;        // [npoint,3] N s of contact; m/s, a solution
-  Array<double> springs_, dampers_;    // [npoint] N/m, N s/m of loads
-  Array<double> weight_, scale_;       // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
-  Array<uint8_t> held_;                // [npoint] as in the present factor
-  Array<double> alone_;                // [npoint,4] scale_
-  double moving_ = 0;                  // kg, of points that are not held
-  double factor_h_ = 0;                // s, of the present factor; 0: none
-  std::vector<double> factor_params_;  // of the model at that time, if its stiffness is constant
-  bool solved_ = false;                // v_end is the solution of a contact solve
+  bool staged_ = false;                  // this sub-step uses TR-BDF2
+  Array<double> stage_x_, stage_v_;      // [npoint,4] m, m/s: x0, v0 of its stages
+  Array<double> middle_;                 // [npoint,4] m/s, the end of its first stage
+  Array<double> load_before_;            // [npoint,4] N, at the start of the sub-step
+  Array<double> x_, v_;                  // [npoint,4] m, m/s: state of the last force evaluation
+  Array<double> residual_;               // [npoint,3] N s
+  Array<double> push_, there_, change_;  // [npoint,3] m/s: scratch; a solution
+  Array<double> springs_, dampers_;      // [npoint] N/m, N s/m of loads
+  Array<double> weight_, scale_;         // [npoint,3] kg, diagonal of A; 1/kg, its inverse; zero where held
+  Array<uint8_t> held_;                  // [npoint] as in the present factor
+  Array<double> alone_;                  // [npoint,4] scale_
+  double moving_ = 0;                    // kg, of points that are not held
+  double factor_h_ = 0;                  // s, of the present factor; 0: none
+  std::vector<double> factor_params_;    // of the model at that time, if its stiffness is constant
+  bool solved_ = false;                  // v_end is the solution of a contact solve
 
   std::unique_ptr<LinearSolver> new_solver() const;
   bool begin_stage(const SubStep &now);

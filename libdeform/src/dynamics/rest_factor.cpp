@@ -13,20 +13,6 @@ Vec3 times3(const double *m, Vec3 a) {
           m[6] * a.x + m[7] * a.y + m[8] * a.z};
 }
 
-// Returns the determinant of m.
-double inverse3(const double *m, double *out) {
-  const double a = m[4] * m[8] - m[5] * m[7], b = m[5] * m[6] - m[3] * m[8], c = m[3] * m[7] - m[4] * m[6];
-  const double det = m[0] * a + m[1] * b + m[2] * c;
-  const double adjoint[9] = {a, m[2] * m[7] - m[1] * m[8], m[1] * m[5] - m[2] * m[4],
-                             b, m[0] * m[8] - m[2] * m[6], m[2] * m[3] - m[0] * m[5],
-                             c, m[1] * m[6] - m[0] * m[7], m[0] * m[4] - m[1] * m[3]};
-  for (int k = 0; k < 9; ++k) out[k] = adjoint[k] / det;
-  return det;
-}
-
-// determinant of an inertia over the cube of its mean: below it the points are on a line
-constexpr double kOnALine = 1e-9;
-
 Vec3 times_transposed(const double *m, Vec3 a) {
   return {m[0] * a.x + m[3] * a.y + m[6] * a.z, m[1] * a.x + m[4] * a.y + m[7] * a.z,
           m[2] * a.x + m[5] * a.y + m[8] * a.z};
@@ -118,28 +104,9 @@ void RestFactor::find_turns(const double *x) {
 }
 
 void RestFactor::find_rigid(const double *x) {
-  rigid_ = {};
-  for (uint32_t i = 0; i < p_.n; ++i) {
-    rigid_.mass += p_.mass[i];
-    rigid_.center += p_.mass[i] * load3(x + size_t{kStride} * i);
-  }
-  rigid_.center = (1 / rigid_.mass) * rigid_.center;
-  double inertia[9] = {};
-  for (uint32_t i = 0; i < p_.n; ++i) {
-    const Vec3 r = load3(x + size_t{kStride} * i) - rigid_.center;
-    store3(&arm_[size_t{3} * i], r);
-    for (int j = 0; j < 3; ++j)
-      for (int k = 0; k < 3; ++k) inertia[3 * j + k] += p_.mass[i] * ((j == k ? norm2(r) : 0) - r[j] * r[k]);
-  }
-  const double mean = (inertia[0] + inertia[4] + inertia[8]) / 3;
-  if (!(mean > 0)) return;
-  for (double &value : inertia) value /= mean;
-  // rotation about the line of the points moves nothing
-  if (!(inverse3(inertia, rigid_.inverse) > kOnALine)) {
-    for (int j = 0; j < 3; ++j) inertia[4 * j] += kOnALine;
-    inverse3(inertia, rigid_.inverse);
-  }
-  for (double &value : rigid_.inverse) value /= mean;
+  const auto place = [x](uint32_t i) { return load3(x + size_t{kStride} * i); };
+  rigid_ = rigid_motion(p_.n, p_.mass.data(), place, [](uint32_t) { return Vec3{}; });
+  for (uint32_t i = 0; i < p_.n; ++i) store3(&arm_[size_t{3} * i], place(i) - rigid_.center);
 }
 
 void RestFactor::turn(const double *x) {
@@ -149,7 +116,8 @@ void RestFactor::turn(const double *x) {
 
 // (U^T M U)^-1
 RestFactor::Motion RestFactor::motion_of(Vec3 impulse, Vec3 moment) const {
-  return {(1 / rigid_.mass) * impulse, times3(rigid_.inverse, moment)};
+  const Vec3 *const turns = rigid_.turns;
+  return {(1 / rigid_.mass) * impulse, moment.x * turns[0] + moment.y * turns[1] + moment.z * turns[2]};
 }
 
 bool RestFactor::solve(const double *b, double *x) {

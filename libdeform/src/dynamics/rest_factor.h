@@ -12,6 +12,7 @@
 #pragma once
 #include <memory>
 
+#include "body/rigid_motion.h"
 #include "dynamics/dynamics.h"
 #include "dynamics/stiffness.h"
 #include "math/linear_solver.h"
@@ -51,12 +52,7 @@ class RestFactor {
   Array<double> turned_;  // [npoint,9] G, row-major
   Array<double> b_, y_;   // [npoint,3] scratch of solve
 
-  struct Rigid {
-    double mass;        // kg
-    Vec3 center;        // m
-    double inverse[9];  // 1/(kg m2), of the inertia about the center
-  };
-  Rigid rigid_ = {};
+  RigidMotion rigid_;  // of the body at the present positions, without its velocities
   Array<double> arm_;  // [npoint,3] m, from the center
 
   bool query_stiffness();

@@ -2,15 +2,31 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace dfm {
+namespace {
 
-bool least_combination(uint32_t count, const double (*gram)[kAndersonWindow], double *y, double *gamma) {
-  double l[kAndersonWindow][kAndersonWindow], trace = 0;
-  for (uint32_t j = 0; j < count; ++j) trace += gram[j][j];
-  for (uint32_t j = 0; j < count; ++j) {
+// One sum would wait for each addition; four sums run in parallel.
+double product(size_t n, const double *a, const double *b) {
+  double sum[4] = {};
+  size_t k = 0;
+  for (; k + 4 <= n; k += 4)
+    for (size_t lane = 0; lane < 4; ++lane) sum[lane] += a[k + lane] * b[k + lane];
+  for (; k < n; ++k) sum[k % 4] += a[k] * b[k];
+  return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+}  // namespace
+
+// The gamma that minimizes |f - sum gamma_j df_j|, from y = df_j . f (overwritten), by the normal equations,
+// slightly regularized, and Cholesky. False: the result is not usable.
+bool Anderson::combination(double (&y)[kWindow], double (&gamma)[kWindow]) const {
+  double l[kWindow][kWindow], trace = 0;
+  for (uint32_t j = 0; j < count_; ++j) trace += gram_[j][j];
+  for (uint32_t j = 0; j < count_; ++j) {
     for (uint32_t k = 0; k <= j; ++k) {
-      double sum = gram[j][k] + (j == k ? 1e-12 * trace : 0);
+      double sum = gram_[j][k] + (j == k ? 1e-12 * trace : 0);
       for (uint32_t m = 0; m < k; ++m) sum -= l[j][m] * l[k][m];
       if (j != k) l[j][k] = sum / l[k][k];
       else if (sum > 0) l[j][j] = std::sqrt(sum);
@@ -19,50 +35,55 @@ bool least_combination(uint32_t count, const double (*gram)[kAndersonWindow], do
     for (uint32_t k = 0; k < j; ++k) y[j] -= l[j][k] * y[k];
     y[j] /= l[j][j];
   }
-  for (uint32_t j = count; j-- > 0;) {
-    for (uint32_t k = j + 1; k < count; ++k) y[j] -= l[k][j] * gamma[k];
+  for (uint32_t j = count_; j-- > 0;) {
+    for (uint32_t k = j + 1; k < count_; ++k) y[j] -= l[k][j] * gamma[k];
     gamma[j] = y[j] / l[j][j];
   }
   return true;
 }
 
-Anderson::Anderson(const Memory &memory) { use_memory(memory, x_, f_, dx_, df_); }
+Anderson::Anderson(const Memory &memory) { use_memory(memory, metric_, f_, g_, df_, dg_); }
 
-void Anderson::start(size_t n) {
-  n_ = n;
+void Anderson::start(std::span<const double> weights, double growth) {
+  const size_t n = weights.size();
   count_ = slot_ = 0;
   first_ = true;
-  x_.resize(n);
-  f_.resize(n);
-  dx_.resize(kAndersonWindow * n);
-  df_.resize(kAndersonWindow * n);
+  growth_ = growth;
+  metric_.resize(n);
+  for (size_t k = 0; k < n; ++k) metric_[k] = std::sqrt(weights[k]);
+  for (Array<double> *a : {&f_, &g_}) a->resize(n);
+  for (Array<double> *a : {&df_, &dg_}) a->resize(kWindow * n);
 }
 
-void Anderson::next(const double *x, const double *f, const double *weight, double *d) {
-  const auto product = [&](const double *a, const double *b) {
-    double sum = 0;
-    for (size_t k = 0; k < n_; ++k) sum += weight[k] * (a[k] * b[k]);
-    return sum;
-  };
-  if (!first_) {
-    double *const dx = &dx_[slot_ * n_], *const df = &df_[slot_ * n_];
-    for (size_t k = 0; k < n_; ++k) {
-      dx[k] = x[k] - x_[k];
-      df[k] = f[k] - f_[k];
-    }
-    count_ = std::max(count_, slot_ + 1);
-    for (uint32_t j = 0; j < count_; ++j) gram_[j][slot_] = gram_[slot_][j] = product(&df_[j * n_], df);
-    slot_ = (slot_ + 1) % kAndersonWindow;
+bool Anderson::next(const double *x, const double *g, double *jump) {
+  const size_t n = metric_.size();
+  double *const df = &df_[slot_ * n], *const dg = &dg_[slot_ * n];
+  for (size_t k = 0; k < n; ++k) {
+    const double f = metric_[k] * (g[k] - x[k]);
+    df[k] = f - f_[k];
+    dg[k] = g[k] - g_[k];
+    f_[k] = f;
+    g_[k] = g[k];
   }
-  first_ = false;
-  std::copy_n(x, n_, x_.begin());
-  std::copy_n(f, n_, f_.begin());
-  double y[kAndersonWindow], gamma[kAndersonWindow] = {};
-  for (uint32_t j = 0; j < count_; ++j) y[j] = product(&df_[j * n_], f);
-  const bool usable = count_ > 0 && least_combination(count_, gram_, y, gamma);
-  std::copy_n(f_.begin(), n_, d);
-  for (uint32_t j = 0; usable && j < count_; ++j)
-    for (size_t k = 0; k < n_; ++k) d[k] -= gamma[j] * (dx_[j * n_ + k] + df_[j * n_ + k]);
+  const double size = product(n, f_.data(), f_.data());
+  const bool other = size > growth_ * std::exchange(last_, size);
+  if (std::exchange(first_, false)) return false;
+  if (other) {
+    count_ = slot_ = 0;
+    return false;
+  }
+  count_ = std::max(count_, slot_ + 1);
+  double y[kWindow], gamma[kWindow] = {};
+  for (uint32_t j = 0; j < count_; ++j) {
+    gram_[j][slot_] = gram_[slot_][j] = product(n, &df_[j * n], df);
+    y[j] = product(n, &df_[j * n], f_.data());
+  }
+  slot_ = (slot_ + 1) % kWindow;
+  if (!combination(y, gamma)) return false;
+  std::fill_n(jump, n, 0.0);
+  for (uint32_t j = 0; j < count_; ++j)
+    for (size_t k = 0; k < n; ++k) jump[k] -= gamma[j] * dg_[j * n + k];
+  return true;
 }
 
 }  // namespace dfm

@@ -1,35 +1,35 @@
-// Anderson acceleration (Walker and Ni 2011, type II) of a fixed-point map x -> x + f(x): the next iterate
-// starts from the combination of the last few iterates whose f would be smallest. For a linear map this is
-// equivalent to GMRES on its equation.
+// Anderson acceleration (Walker and Ni 2011, type II) of a fixed-point map x -> G(x): with f = G(x) - x of
+// the last few iterates, the next one is the combination of their results whose f would be least. For a
+// linear map this is equivalent to GMRES on its equation.
 #pragma once
+#include <cmath>
 #include <cstdint>
+#include <span>
 
 #include "core/memory.h"
 
 namespace dfm {
 
-inline constexpr uint32_t kAndersonWindow = 5;
-
-// Computes the gamma that minimizes |f - sum gamma_j df_j| from the products gram = df_i . df_j and y = df_j
-// . f (overwritten), by the normal equations, slightly regularized, and Cholesky. Returns false if the result
-// is not usable.
-bool least_combination(uint32_t count, const double (*gram)[kAndersonWindow], double *y, double *gamma);
-
 class Anderson {
  public:
   explicit Anderson(const Memory &memory);
-  void start(size_t n);
-  // f: the change by the map at x. d (output, may be f): from x to the next iterate; equal to f in
-  // the first call. weight [n]: weights of the norm.
-  void next(const double *x, const double *f, const double *weight, double *d);
+  // weights: of the norm of f. growth: of its square, from which on f is of another map, for which earlier
+  // iterates say nothing.
+  void start(std::span<const double> weights, double growth = HUGE_VAL);
+  // g: G(x). jump (output, may be x): from g to the next iterate. False: that is g.
+  bool next(const double *x, const double *g, double *jump);
 
  private:
-  size_t n_ = 0;
+  static constexpr uint32_t kWindow = 5;
   uint32_t count_ = 0, slot_ = 0;  // columns held, column to write
   bool first_ = true;
-  Array<double> x_, f_;    // [n] of the last call
-  Array<double> dx_, df_;  // [window,n] differences of successive calls
-  double gram_[kAndersonWindow][kAndersonWindow] = {};
+  double last_ = 0, growth_ = 0;  // square of the last f
+  Array<double> metric_;          // [n] roots of the weights
+  Array<double> f_, g_;           // [n] of the last call, f in the metric
+  Array<double> df_, dg_;         // [window,n] differences of successive calls
+  double gram_[kWindow][kWindow] = {};
+
+  bool combination(double (&y)[kWindow], double (&gamma)[kWindow]) const;
 };
 
 }  // namespace dfm

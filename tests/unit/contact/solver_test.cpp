@@ -6,6 +6,7 @@
 
 #include <cmath>
 
+#include "math/anderson.h"
 #include "near.h"
 #include "rows_case.h"
 #include "same_tolerance.h"
@@ -55,7 +56,6 @@ struct Groove {
       law.dft_dfn[law.stride + i] = 0;
     }
     linearize(rows, rows.whole(), 1e-3, law);
-    rows.turn_frames();
   }
   double friction(uint32_t i) const { return std::hypot(rows.impulse[3 * i + 1], rows.impulse[3 * i + 2]); }
 };
@@ -105,11 +105,16 @@ struct Problem : RowsCase {
   // One answer of the law, and `sweeps` on it.
   void pass(uint32_t sweeps) {
     request();
-    Acceleration acceleration{Memory::standard()};
-    acceleration.start(rows, rows.whole());
+    const RowsPart part = rows.whole();
+    std::vector<double> weights, from(3 * rows.n), to(3 * rows.n), jump(3 * rows.n);
+    for (uint32_t i = 0; i < rows.n; ++i) weights.insert(weights.end(), {rows.wn[i], rows.wt[i], rows.wt[i]});
+    Anderson anderson{Memory::standard()};
+    anderson.start(weights);
     for (uint32_t k = 0; k < sweeps; ++k) {
-      if (k > 0) acceleration.follow(rows, rows.whole());
-      sweep(rows, rows.whole(), state, kStep);
+      take_impulses(rows, part, from.data());
+      sweep(rows, part, state, kStep);
+      take_impulses(rows, part, to.data());
+      if (k + 1 < sweeps && anderson.next(from.data(), to.data(), jump.data())) leap(rows, part, jump.data());
     }
   }
   Vec3 impulse(uint32_t i) const { return load3(&rows.impulse[3 * size_t{i}]); }
@@ -181,34 +186,6 @@ TEST(Solver, CoupledContactsThatStick_MatchTheDenseSolution) {
     expect_near(two.impulse(i), taken[i], 1e-12);
     expect_near(two.rows.velocity(i), {}, 1e-12);
   }
-}
-
-// A rigid body that no impulse moves, as a tool on a given path, ties no contacts together: the loops that
-// know points alone give the same bits.
-TEST(Solver, ContactWithARigidBodyThatStands_IsSolvedAmongPoints) {
-  const std::vector<Vec3> taken = {{2, -0.1, 0.3}, {1, -0.5, 0.5}, {1, 0.4, 1}};
-  EXPECT_FALSE(RowsCase({3, 4, 6}).rows.whole().alone) << "it answers";
-  Problem quick({3, 4, 6}, 0.3, {{}, {}, {}}), slow({3, 4, 6}, 0.3, {{}, {}, {}});
-  for (Problem *const p : {&quick, &slow}) {
-    for (const ContactRows::Block &block : p->rows.blocks)
-      p->rows.set_response(block, false,
-                           [&](double *matrix) { std::fill_n(matrix, 9 * block.count * block.count, 0.0); });
-    for (uint32_t i = 0; i < 3; ++i) p->rows.apply(i, -taken[i]);
-    p->request();
-  }
-  RowsPart points = quick.rows.whole(), any = slow.rows.whole();
-  ASSERT_FALSE(points.blocks.empty());
-  ASSERT_TRUE(points.alone);
-  any.alone = false;
-  const test::SameTolerance tolerance{3, 0.5, 0.25, 4 * 0.5};
-  for (int k = 0; k < 20; ++k) {
-    sweep(quick.rows, points, quick.state, RowsCase::kStep);
-    sweep(slow.rows, any, slow.state, RowsCase::kStep);
-    ASSERT_EQ(quick.rows.impulse, slow.rows.impulse) << k;
-    EXPECT_EQ(residual_of(quick.rows, points, quick.state, RowsCase::kStep, tolerance).required,
-              residual_of(slow.rows, any, slow.state, RowsCase::kStep, tolerance).required);
-  }
-  EXPECT_GT(quick.impulse(0).x, 0);
 }
 
 // Signorini's and Coulomb's conditions at every contact, with velocities by the dense operator: an impulse

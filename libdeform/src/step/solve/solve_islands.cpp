@@ -344,7 +344,6 @@ const SolveIsland *solve_islands(World &w, StepContext &step) {
   for (SolveIsland &own : all) {
     if (!own.open) continue;
     rows += own.part.all();
-    own.part.alone = step.rows.is_alone(own.part);
     own.passes = own.sweeps = 0;
     own.failed = own.drifts = false;
     own.spent = {0, 0, own.part.all(), false};

@@ -1,50 +1,49 @@
-// The friction impulse by the linearized law of a contact. Internal linkage only.
+// The impulse of one contact by its linearized law, and the residual of its row.
 #pragma once
-#include "contact_kernel.h"
-#include "solve_settings.h"
+#include <algorithm>
+#include <cmath>
+
+#include "contact/contact_state.h"
+#include "contact/rows.h"
+#include "contact/solve_settings.h"
+#include "contact/solver.h"
 
 namespace dfm {
-namespace {
 
 struct Pair { double a, b; };
-
-static inline double larger(double a, double b) { return a < b ? b : a; }  // as std::max, also of a NaN
 
 // The normal impulse l of a contact: 0 <= l complementary to u_n + rate + min(c max(l - p, 0), m) >= 0, with
 // compliance = (c, m, p). For the present l and k = u_n + rate, the new l is a root of
 // k + wn (l' - l) + min(c max(l' - p, 0), m).
-static inline double normal_impulse(double l, double k, double wn, const double *compliance) {
+inline double normal_impulse(double l, double k, double wn, const double *compliance) {
   const double firm = l - k / wn;
-  if (compliance[0] == 0) return larger(0.0, firm);
+  if (compliance[0] == 0) return std::max(0.0, firm);
   const double soft = l - (k + compliance[0] * (l - compliance[2])) / (wn + compliance[0]);
-  return larger(0.0, larger(l - (k + compliance[1]) / wn, firm < soft ? firm : soft));
+  return std::max(0.0, std::max(l - (k + compliance[1]) / wn, firm < soft ? firm : soft));
 }
 // m/s, by which the load presses the contact in.
-static inline double yield_speed(double l, const double *compliance) {
-  const double all = compliance[0] * larger(0.0, l - compliance[2]);
+inline double yield_speed(double l, const double *compliance) {
+  const double all = compliance[0] * std::max(0.0, l - compliance[2]);
   return all < compliance[1] ? all : compliance[1];
 }
 
 // The point of the disc of this radius that is nearest to (a, b).
-static inline Pair on_disc(double a, double b, double radius) {
-  const double size = __builtin_sqrt(a * a + b * b);
+inline Pair on_disc(double a, double b, double radius) {
+  const double size = std::sqrt(a * a + b * b);
   if (size <= radius) return {a, b};
   return {radius / size * a, radius / size * b};
 }
 
 // Of the limit of a set-valued law that slips along the unit vector e: how it grows with the normal force,
-// and, N s/m, with the speed. State: ContactState, or its view.
-template <class State>
-__attribute__((always_inline)) static inline double limit_growth(const State &s, uint32_t i) {
+// and, N s/m, with the speed.
+inline double limit_growth(const ContactState &s, uint32_t i) {
   const size_t n = s.stride;
-  return __builtin_sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
+  return std::sqrt(s.dft_dfn[i] * s.dft_dfn[i] + s.dft_dfn[n + i] * s.dft_dfn[n + i]);
 }
-template <class State>
-__attribute__((always_inline)) static inline double viscous_slope(const State &s, uint32_t i, double e1,
-                                                                  double e2) {
+inline double viscous_slope(const ContactState &s, uint32_t i, double e1, double e2) {
   const size_t n = s.stride;
-  return larger(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
-                       e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
+  return std::max(0.0, -(e1 * (s.dft_dvt[i] * e1 + s.dft_dvt[n + i] * e2) +
+                         e2 * (s.dft_dvt[2 * n + i] * e1 + s.dft_dvt[3 * n + i] * e2)));
 }
 
 // The friction impulse by the linearized law, for the present impulse (l1, l2), slip (u1, u2) and new normal
@@ -70,22 +69,22 @@ __attribute__((always_inline)) static inline double viscous_slope(const State &s
 // several times as much friction, that with a normal impulse beside it, and so on until nothing is finite.
 //
 // Inline in the loops of sweeps and residuals: each calls it once per contact and iteration.
-__attribute__((always_inline)) static inline Pair friction_impulse(const LawView &s, uint32_t i, double h,
-                                                                   double wt, double l1, double l2, double ln,
-                                                                   double u1, double u2) {
+__attribute__((always_inline)) inline Pair friction_impulse(const ContactState &s, uint32_t i, double h,
+                                                            double wt, double l1, double l2, double ln,
+                                                            double u1, double u2) {
   const size_t n = s.stride;
   const double fn = s.fn[i];
   if (s.form[i] == kSetValuedLaw) {
     const double ratio = fn > 0 ? ln / (h * fn) : 0;
-    const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = __builtin_sqrt(a * a + b * b);
+    const double a = l1 - u1 / wt, b = l2 - u2 / wt, size = std::sqrt(a * a + b * b);
     double radius = h * s.limit[i] * ratio;
     if (s.mode[i] == 2) {
-      radius = larger(0.0, h * s.limit[i] + limit_growth(s, i) * (ln - h * fn));
-      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = __builtin_sqrt(v1 * v1 + v2 * v2);
+      radius = std::max(0.0, h * s.limit[i] + limit_growth(s, i) * (ln - h * fn));
+      const double v1 = s.vt[i], v2 = s.vt[n + i], speed = std::sqrt(v1 * v1 + v2 * v2);
       const double slope = speed > 0 ? viscous_slope(s, i, v1 / speed, v2 / speed) : 0;
       if (slope > 0) {
-        const double slip = larger(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
-        radius = larger(0.0, radius + h * slope * (slip - speed));
+        const double slip = std::max(0.0, wt * (size - radius + h * slope * speed) / (1 + wt * h * slope));
+        radius = std::max(0.0, radius + h * slope * (slip - speed));
       }
     }
     return on_disc(a, b, radius);
@@ -99,28 +98,24 @@ __attribute__((always_inline)) static inline Pair friction_impulse(const LawView
   const double r2 = h * (s.ft[n + i] + d21 * v1 + d22 * v2 + s.dft_dfn[n + i] * dfn);
   const double radius = fn > 0 ? s.limit[i] / fn * ln : 0;
   return on_disc((m22 * r1 - m12 * r2) / det, (m11 * r2 - m21 * r1) / det,
-                 s.mode[i] == 1 ? radius : larger(radius, h * s.limit[i]));
+                 s.mode[i] == 1 ? radius : std::max(radius, h * s.limit[i]));
 }
 
 // The step of a sweep at row i, whose sides move by u: by, out, is the change of its impulse l. False: there
-// is none. Rows: ContactRows, or their view.
-template <class Rows>
-__attribute__((always_inline)) static inline bool solve_row(const Rows &rows, const LawView &law, uint32_t i,
-                                                            double h, const double (&u)[3], double *l,
-                                                            double (&by)[3]) {
+// is none.
+inline bool solve_row(const ContactRows &rows, const ContactState &law, uint32_t i, double h, Vec3 u,
+                      double *l, Vec3 &by) {
   const double wn = rows.wn[i], wt = rows.wt[i];
-  const double ln = normal_impulse(l[0], u[0] + rows.rate[i], wn, &rows.compliance[3 * size_t(i)]),
+  const double ln = normal_impulse(l[0], u.x + rows.rate[i], wn, &rows.compliance[3 * size_t(i)]),
                d = ln - l[0];
   if (ln == 0 && l[0] == 0 && l[1] == 0 && l[2] == 0) return false;
   Pair t{0, 0};
   if (ln > 0 && wt > 0) {
     const double *const c = &rows.cross[2 * size_t(i)];
-    t = friction_impulse(law, i, h, wt, l[1], l[2], ln, u[1] + c[0] * d, u[2] + c[1] * d);
+    t = friction_impulse(law, i, h, wt, l[1], l[2], ln, u.y + c[0] * d, u.z + c[1] * d);
   }
   if (d == 0 && t.a == l[1] && t.b == l[2]) return false;
-  by[0] = d;
-  by[1] = t.a - l[1];
-  by[2] = t.b - l[2];
+  by = {d, t.a - l[1], t.b - l[2]};
   l[0] = ln;
   l[1] = t.a;
   l[2] = t.b;
@@ -128,47 +123,39 @@ __attribute__((always_inline)) static inline bool solve_row(const Rows &rows, co
 }
 
 // m/s, of row i; u: of its sides along the normal.
-template <class Rows>
-__attribute__((always_inline)) static inline double normal_residual(const Rows &rows, uint32_t i, double u,
-                                                                    const double *l) {
+inline double normal_residual(const ContactRows &rows, uint32_t i, double u, const double *l) {
   const double open = u + rows.rate[i] + yield_speed(l[0], &rows.compliance[3 * size_t(i)]),
                closed = rows.wn[i] * l[0];
-  return __builtin_fabs(open < closed ? open : closed);
+  return std::fabs(open < closed ? open : closed);
 }
 
 // The force of row i by its law, compared by the answer that both give together with the contact's own
 // response, not by the bare force: the difference is the velocity that is left to correct. Where a set-valued
 // law just slips, force and slip may differ in direction by much while that is tiny; a smooth law with a
 // steep slope c would count it 1 + h w_t c times.
-template <class Rows>
-__attribute__((always_inline)) static inline double tangent_residual(const Rows &rows, const LawView &law,
-                                                                     uint32_t i, double h,
-                                                                     const double (&u)[3], const double *l) {
-  const Pair t = friction_impulse(law, i, h, rows.wt[i], l[1], l[2], l[0], u[1], u[2]);
+inline double tangent_residual(const ContactRows &rows, const ContactState &law, uint32_t i, double h, Vec3 u,
+                               const double *l) {
+  const Pair t = friction_impulse(law, i, h, rows.wt[i], l[1], l[2], l[0], u.y, u.z);
   const double a = t.a - l[1], b = t.b - l[2];
-  return rows.wt[i] * __builtin_sqrt(a * a + b * b);
+  return rows.wt[i] * std::sqrt(a * a + b * b);
 }
 
-// Adds row i to the residual of a state. nan_flag: NaN if a value is not finite, which larger() passes over.
-template <class Rows, class Bounds>
-__attribute__((always_inline)) static inline void add_residual(const Rows &rows, const LawView &law,
-                                                               const Bounds &tolerance, uint32_t i, double h,
-                                                               const double (&u)[3], const double *l,
-                                                               Residual &r, double &nan_flag) {
-  const double normal = normal_residual(rows, i, u[0], l);
-  nan_flag += 0.0 * ((u[0] + u[1]) + (u[2] + l[0]));
-  r.relative = larger(r.relative, normal / tolerance.normal[i]);
-  r.required = larger(r.required, normal / tolerance.most_normal);
-  r.speed = larger(r.speed, normal);
-  r.normal = larger(r.normal, normal);
+// Adds row i to the residual of a state. nan_flag: NaN if a value is not finite; std::max() passes over it.
+inline void add_residual(const ContactRows &rows, const ContactState &law, const Tolerance &tolerance,
+                         uint32_t i, double h, Vec3 u, const double *l, Residual &r, double &nan_flag) {
+  const double normal = normal_residual(rows, i, u.x, l);
+  nan_flag += 0.0 * ((u.x + u.y) + (u.z + l[0]));
+  r.relative = std::max(r.relative, normal / tolerance.normal[i]);
+  r.required = std::max(r.required, normal / tolerance.most_normal);
+  r.speed = std::max(r.speed, normal);
+  r.normal = std::max(r.normal, normal);
   if (!(rows.wt[i] > 0) || !(l[0] > 0)) return;
   const double tangent = tangent_residual(rows, law, i, h, u, l);
-  const double slip = __builtin_sqrt(u[1] * u[1] + u[2] * u[2]);
-  const double share = tangent / larger(tolerance.tangent[i], SolveSettings::of_slip * slip);
-  r.relative = larger(r.relative, share);
-  r.required = larger(r.required, share);
-  r.speed = larger(r.speed, tangent);
+  const double slip = std::sqrt(u.y * u.y + u.z * u.z);
+  const double share = tangent / std::max(tolerance.tangent[i], SolveSettings::of_slip * slip);
+  r.relative = std::max(r.relative, share);
+  r.required = std::max(r.required, share);
+  r.speed = std::max(r.speed, tangent);
 }
 
-}  // namespace
 }  // namespace dfm
