@@ -356,11 +356,17 @@ TEST(Cost, QuantityThatIsZero_IsLeftOutOrRefused) {
     "materials": {"gel": {"density": 1000, "young": 5e4, "poisson": 0.3, "damping": {"stiffness": 0.001}}},
     "obstacles": [{"name": "floor", "shape": "plane"}], "bodies": [{"name": "rough")" +
       block + R"([0, 0, 0.0005]}}, {"name": "slick")" + block + R"([0, 1, 0.0005]}}],
-    "contact": {"friction": [{"between": ["slick", "floor"], "law": "none"}]}})";
+    "contact": {"friction": [{"between": ["slick", "floor"], "law": "none"}]},
+    "probes": [{"name": "com.rough", "body": "rough", "point": [0, 0, 0]}]})";
   const Study all = study("zero", scene, {"--axes", "time", "--budget", "60", "--quantity", "work"});
   ASSERT_EQ(all.result.exit_code, 0) << all.result.err;
   ASSERT_EQ(all.report.find("headline")->items.size(), 1u) << all.result.out;
   EXPECT_EQ(all.report.find("headline")->items[0].text, "work.rough/floor");
+  const auto named = [&](const char *name) {
+    return std::ranges::count(all.report.find("quantities")->items, name, &JsonValue::text);
+  };
+  EXPECT_EQ(named("com.rough"), 1);  // of the body
+  EXPECT_EQ(named("probe.com.rough"), 1);
   const std::string says = all.report.find("says")->items[0].text;
   EXPECT_NE(says.find("not of what is 0 in the reference: work.slick/floor"), std::string::npos) << says;
   EXPECT_FALSE(all.report.find("front")->items.empty()) << all.result.out;
