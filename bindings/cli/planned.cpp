@@ -31,6 +31,9 @@ void print_way(const JsonValue &way, const char *begin) {
               way.scalar("cpu_s_per_s"), way.scalar("ms_per_step"), each);
 }
 
+// "meets" is null where the prediction leaves something out: the choice is the one that is predicted to meet.
+bool nearest(const JsonValue &plan) { return plan.get("meets") == "false"; }
+
 }  // namespace
 
 std::string planned_json(const SceneFile &scene) {
@@ -47,7 +50,7 @@ void print_planned(const std::string &json) {
   for (const JsonValue &assumed : plan.list("assumed")) std::printf("  assumed: %s\n", assumed.text.c_str());
   for (const JsonValue &other : plan.list("considered")) print_way(other, "  possible: ");
   if (way) {
-    print_way(*way, plan.get("meets") == "true" ? "  chosen:   " : "  nearest:  ");
+    print_way(*way, nearest(plan) ? "  nearest:  " : "  chosen:   ");
     if (const std::string missed = plan.get("missed"); !missed.empty())
       std::printf("  missed:   %s; deform cost measures what each costs\n", missed.c_str());
     for (const JsonValue &b : way->list("bodies"))
@@ -64,14 +67,14 @@ void print_choice(const std::string &json) {
   JsonValue plan;
   if (json.empty() || !parse_json(json, plan)) return;
   if (const JsonValue *const way = plan.find("predicted"))
-    print_way(*way, plan.get("meets") == "true" ? "planner: " : "planner, nearest: ");
+    print_way(*way, nearest(plan) ? "planner, nearest: " : "planner: ");
 }
 
 std::string planned_sentence(const std::string &json) {
   JsonValue plan;
   if (json.empty() || !parse_json(json, plan) || plan.get("meets") == "true") return "";
-  return "planner: " + plan.get("missed") +
-         "; the nearest choice is simulated (see: deform explain; deform cost measures)";
+  return "planner: " + plan.get("missed") + (nearest(plan) ? "; the nearest choice is simulated" : "") +
+         " (see: deform explain; deform cost measures)";
 }
 
 }  // namespace cli

@@ -335,9 +335,46 @@ TEST(Cost, SceneWithAnAccuracy_IsStudiedAsPlanned) {
       EXPECT_EQ(choice.get("model"), model) << choice.get("label");
     }
   EXPECT_EQ(row(s.report, "0").get("model"), model);
+  // what makes a choice by hand takes the planner's request away, or that would plan anew
+  for (const JsonValue &choice : s.report.find("choices")->items)
+    if (const JsonValue &set = *choice.find("set"); !set.members.empty()) {
+      EXPECT_NE(set.find("/accuracy"), nullptr) << cli::json_text(set);
+      EXPECT_NE(set.find("/bodies/0/model/type"), nullptr) << cli::json_text(set);
+    }
   const std::string applied = test::read_file(s.folder + "/applied.json");
   EXPECT_EQ(applied.find("accuracy"), std::string::npos) << applied;
   EXPECT_EQ(test::deform({"explain", s.folder + "/applied.json"}).exit_code, 0);
+}
+
+// No error is relative to 0: the work of a pair without friction.
+TEST(Cost, QuantityThatIsZero_IsLeftOutOrRefused) {
+  const std::string block = R"(, "mesh": {"make": "beam", "size": [0.1, 0.1, 0.1], "cells": 60},
+    "velocity": [0.5, 0, 0], "model": {"type": "corotational_fem"}, "material": "gel",
+    "pose": {"position": )";
+  const std::string scene =
+      R"({"format": "deform-scene", "version": 1, "time": {"duration": 0.05},
+    "materials": {"gel": {"density": 1000, "young": 5e4, "poisson": 0.3, "damping": {"stiffness": 0.001}}},
+    "obstacles": [{"name": "floor", "shape": "plane"}], "bodies": [{"name": "rough")" +
+      block + R"([0, 0, 0.0005]}}, {"name": "slick")" + block + R"([0, 1, 0.0005]}}],
+    "contact": {"friction": [{"between": ["slick", "floor"], "law": "none"}]},
+    "probes": [{"name": "com.rough", "body": "rough", "point": [0, 0, 0]}]})";
+  const Study all = study("zero", scene, {"--axes", "time", "--budget", "60", "--quantity", "work"});
+  ASSERT_EQ(all.result.exit_code, 0) << all.result.err;
+  ASSERT_EQ(all.report.find("headline")->items.size(), 1u) << all.result.out;
+  EXPECT_EQ(all.report.find("headline")->items[0].text, "work.rough/floor");
+  const auto named = [&](const char *name) {
+    return std::ranges::count(all.report.find("quantities")->items, name, &JsonValue::text);
+  };
+  EXPECT_EQ(named("com.rough"), 1);  // of the body
+  EXPECT_EQ(named("probe.com.rough"), 1);
+  const std::string says = all.report.find("says")->items[0].text;
+  EXPECT_NE(says.find("not of what is 0 in the reference: work.slick/floor"), std::string::npos) << says;
+  EXPECT_FALSE(all.report.find("front")->items.empty()) << all.result.out;
+  const Study none =
+      study("zero", scene, {"--axes", "time", "--budget", "60", "--quantity", "work.slick/floor"});
+  EXPECT_EQ(none.result.exit_code, 2);
+  EXPECT_NE(none.result.err.find("work.slick/floor is 0 in the reference"), std::string::npos)
+      << none.result.err;
 }
 
 // A model of somebody else, whose dampers push instead of braking, is a choice like all that are loaded.

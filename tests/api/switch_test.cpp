@@ -165,6 +165,24 @@ TEST(SwitchOfAScene, Explain_ReportsWhatBoundsTheStepLater) {
   EXPECT_NE(free.find("while it touches something; nothing bounds its step"), std::string::npos) << free;
 }
 
+// Back at the model as it was made, the changes in between no longer matter to what bounds the next one.
+TEST(SwitchOfAScene, Explain_TakesTheIntegratorOfTheChangeBefore) {
+  const auto last = [](const std::string &before) {
+    const std::string out =
+        test::deform({"explain", scene(kStep, R"("model": {"type": "msm"}, "integrator": "symplectic_euler",
+                                               "switch": [)" +
+                                                  before + R"({"t": 0.008, "type": "linear_fem"}])")})
+            .out;
+    const size_t at = out.find("changes to org.deform.linear_fem");
+    return at == std::string::npos ? out : out.substr(at, out.find('\n', at) - at);
+  };
+  const std::string alone = last("");
+  EXPECT_NE(alone.find("explicit time is stable up to"), std::string::npos) << alone;
+  EXPECT_EQ(last(R"({"t": 0.002, "type": "corotational_fem", "integrator": "implicit_euler"},
+                    {"t": 0.004, "type": "msm", "integrator": "symplectic_euler"}, )"),
+            alone);
+}
+
 TEST(SwitchOfAScene, Explain_ListsIt) {
   const std::string by_time = test::deform({"explain", scene(kStep, kToModal)}).out;
   EXPECT_NE(by_time.find("changes to org.deform.modal  at 0.005 s"), std::string::npos) << by_time;

@@ -162,9 +162,9 @@ std::string page_html(const Subject &subject, const Study &study) {
                 "other runs ran beside.</p>\n"
                 "<p") +
          (study.converged ? "" : " class=\"warn\"") + ">" + escaped(reference_text(study)) + "</p>\n" +
-         svg_chart(subject, study) + "<h2>What to take</h2>\n<pre>" + escaped(pick_text(study)) + "</pre>\n" +
-         "<h2>The front: nothing cheaper is as accurate</h2>\n" + front_table(study) + own_mesh(study) +
-         pictures(study) + separated(study) + not_run(subject, study) + "</body></html>\n";
+         svg_chart(subject, study) + "<h2>What to take</h2>\n<pre>" + escaped(pick_text(subject, study)) +
+         "</pre>\n" + "<h2>The front: nothing cheaper is as accurate</h2>\n" + front_table(study) +
+         own_mesh(study) + pictures(study) + separated(study) + not_run(subject, study) + "</body></html>\n";
 }
 
 }  // namespace cli::cost

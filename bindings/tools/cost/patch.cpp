@@ -1,5 +1,6 @@
 #include "study.h"
 
+#include <algorithm>
 #include <filesystem>
 
 #include "cli.h"
@@ -10,17 +11,9 @@ namespace fs = std::filesystem;
 namespace cli::cost {
 namespace {
 
-// The pick's own settings, without what every run records.
-Settings settings_of_pick(const Study &study) {
-  Settings out;
-  for (const auto &setting : study.rows[size_t(study.pick)].job.set)
-    if (setting.first.rfind("/output/", 0) != 0 && setting.first != "/probes") out.push_back(setting);
-  return out;
-}
-
 JsonValue patched(const Subject &subject, const Study &study) {
   JsonValue scene = subject.scene;
-  for (const auto &[pointer, text] : settings_of_pick(study)) {
+  for (const auto &[pointer, text] : own_settings(study.rows[size_t(study.pick)])) {
     JsonValue value;
     if (parse_json(text, value)) set_pointer(scene, pointer, value);
   }
@@ -42,6 +35,23 @@ JsonValue difference(const JsonValue &from, const JsonValue &to) {
 }
 
 }  // namespace
+
+Settings own_settings(const Row &row) {
+  Settings out = row.job.set;
+  std::erase_if(out, [](auto &s) { return s.first.rfind("/output/", 0) == 0 || s.first == "/probes"; });
+  return out;
+}
+
+Settings settings_of_file(const Subject &subject, const Row &row) {
+  const Settings own = own_settings(row);
+  if (own.empty()) return {};
+  Settings out = subject.planned;
+  std::erase_if(out, [&](auto &s) {
+    return std::any_of(own.begin(), own.end(), [&](auto &o) { return o.first == s.first; });
+  });
+  out.insert(out.end(), own.begin(), own.end());
+  return out;
+}
 
 JsonValue scene_patch(const Subject &subject, const Study &study) {
   if (study.pick < 0) return {};

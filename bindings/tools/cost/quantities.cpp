@@ -56,7 +56,8 @@ void read_probes(const Table &probes, Quantities &out) {
   for (const Row &row : probes.rows) {
     const std::string &name = probes.text(row, "probe");
     if (!std::isfinite(probes.number(row, "x"))) continue;  // a cut has taken its cell
-    Quantity &q = of(out, families.count(name) ? "probe." + name : name, "probe", "m", 3);
+    Quantity &q =
+        of(out, families.count(name.substr(0, name.find('.'))) ? "probe." + name : name, "probe", "m", 3);
     q.t.push_back(probes.number(row, "t"));
     for (const char *c : {"x", "y", "z"}) q.values.push_back(probes.number(row, c));
     for (const char *c : {"vx", "vy", "vz"}) q.rates.push_back(probes.number(row, c));

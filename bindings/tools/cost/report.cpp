@@ -26,11 +26,22 @@ std::string error_json(const std::map<std::string, double> &error) {
   return out.text();
 }
 
+const char *word_of(Outcome::State state) {
+  constexpr const char *kWords[] = {"not run", "done", "unstable", "refused", "cut"};
+  return kWords[state];
+}
+
+std::string line_of(const Row &row, double error) {
+  char figures[80];
+  std::snprintf(figures, sizeof figures, "  %8s %9.3g%s ", percent(error).c_str(), row.cpu_per_s,
+                row.alone ? " " : "~");
+  return figures + row.job.label + "\n";
+}
+
 std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   const Row &row = study.rows[i];
   const Outcome &o = row.job.outcome;
   const Described d = describe(subject, row);
-  const char *const states[] = {"not run", "done", "unstable", "refused", "cut"};
   JsonObject out;
   out.add("model", quoted(d.model)).add("integrator", quoted(d.integrator)).add("step", number(d.step));
   out.add("cells", number(o.cells)).add("law", quoted(d.law));
@@ -38,7 +49,7 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   out.add("cpu_s_per_s", row.cpu_per_s > 0 ? number(row.cpu_per_s) : "null");
   out.add("unstable", o.state == Outcome::unstable ? "true" : "false");
   out.add("label", quoted(row.job.label))
-      .add("state", quoted(states[o.state]))
+      .add("state", quoted(word_of(o.state)))
       .add("why", quoted(o.sentence));
   out.add("axes", json_words(row.candidate.axes)).add("headline", number(row.headline));
   out.add("timed_alone", row.alone ? "true" : "false");
@@ -46,8 +57,7 @@ std::string choice_json(const Subject &subject, const Study &study, size_t i) {
   const double predicted = o.predicted(subject.duration);
   out.add("predicted_s", o.state == Outcome::cut && std::isfinite(predicted) ? number(predicted) : "null");
   JsonObject set;
-  for (const auto &[pointer, value] : row.job.set)
-    if (pointer.rfind("/output/", 0) != 0 && pointer != "/probes") set.add(pointer, value);
+  for (const auto &[pointer, value] : settings_of_file(subject, row)) set.add(pointer, value);
   out.add("set", set.text()).add("folder", quoted(row.job.folder));
   return out.text();
 }
@@ -305,7 +315,7 @@ std::string doubt_text(const Study &study) {
   return why_unproven(study) + ", so " + own + " may be larger" + bound;
 }
 
-std::string pick_text(const Study &study) {
+std::string pick_text(const Subject &subject, const Study &study) {
   const std::string target = percent(study.options.target);
   if (study.pick < 0 && study.check < 0)
     return "nothing can be said about " + target + ": nothing checks the reference\n" + next_text(study);
@@ -332,14 +342,9 @@ std::string pick_text(const Study &study) {
            formatted("%.3g", study.rows[size_t(nearly)].cpu_per_s) + " cpu " + study.cost_unit + ")\n" +
            next_text(study);
   else if (!study.proven) out += "  likely, not proven: " + doubt_text(study) + "\n" + next_text(study);
-  bool any = false;
-  for (const auto &[pointer, value] : row.job.set) {
-    if (pointer.rfind("/output/", 0) == 0 || pointer == "/probes") continue;
-    out += "  --set '" + pointer + "=" + value + "'\n";
-    any = true;
-  }
-  if (!any) out += "  nothing has to be changed\n";
-  return out;
+  const Settings set = settings_of_file(subject, row);
+  for (const auto &[pointer, value] : set) out += "  --set '" + pointer + "=" + value + "'\n";
+  return out + (set.empty() ? "  nothing has to be changed\n" : "");
 }
 
 std::string refusal_to_apply(const Study &study) {
@@ -359,6 +364,8 @@ std::string error_text(const Subject &subject, const Study &study) {
       names += " (until a cut takes it after " + formatted("%.4g", end->second) + " s)";
   }
   if (study.headline.size() > 6) names += ", ...";
+  for (size_t i = 0; i < study.zeros.size(); ++i)
+    names += (i ? ", " : "; not of what is 0 in the reference: ") + study.zeros[i];
   return "error of " + names + (study.headline.size() > 1 ? " (the largest)" : "") +
          (subject.at_rest ? ": of the end, " : ": root mean square over time, ") +
          "relative to how far the reference moves";
@@ -378,22 +385,10 @@ std::string table_text(const Subject &subject, const Study &study) {
   list_axes(study, out);
   out += "\nfront: nothing cheaper is as accurate (error " + short_reference(study) + "; cpu " +
          study.cost_unit + ", choice)\n";
-  for (const size_t i : study.front) {
-    const Row &row = study.rows[i];
-    char line[240];
-    std::snprintf(line, sizeof line, "  %8s %9.3g%s %s\n", percent(row.headline).c_str(), row.cpu_per_s,
-                  row.alone ? " " : "~", row.job.label.c_str());
-    out += line;
-  }
+  for (const size_t i : study.front) out += line_of(study.rows[i], study.rows[i].headline);
   if (const std::string here = mesh_text(study); !here.empty()) {
     out += here + "\n";
-    for (const size_t i : study.own_mesh.front) {
-      const Row &row = study.rows[i];
-      char line[240];
-      std::snprintf(line, sizeof line, "  %8s %9.3g%s %s\n", percent(study.own_mesh.error.at(i)).c_str(),
-                    row.cpu_per_s, row.alone ? " " : "~", row.job.label.c_str());
-      out += line;
-    }
+    for (const size_t i : study.own_mesh.front) out += line_of(study.rows[i], study.own_mesh.error.at(i));
   }
   const Row &own = study.rows[0];
   if (own.compared)
@@ -403,7 +398,7 @@ std::string table_text(const Subject &subject, const Study &study) {
     out += "  the scene as it is stops itself before its end, see \"unstable\"\n";
   else out += "  the scene as it is does not fit into the budget\n";
   for (const std::string &line : left_out(subject, study)) out += "  " + line + "\n";
-  return out + "\n" + pick_text(study);
+  return out + "\n" + pick_text(subject, study);
 }
 
 std::string csv_text(const Subject &subject, const Study &study) {
@@ -411,7 +406,6 @@ std::string csv_text(const Subject &subject, const Study &study) {
   for (const std::string &name : study.quantities) out += "," + csv_cell(name);
   out += "\n";
   const auto cell = [](double x) { return std::isfinite(x) ? number(x) : std::string(); };
-  const char *const states[] = {"not run", "done", "unstable", "refused", "cut"};
   for (size_t i = 0; i < study.rows.size(); ++i) {
     const Row &row = study.rows[i];
     const Described d = describe(subject, row);
@@ -419,7 +413,7 @@ std::string csv_text(const Subject &subject, const Study &study) {
     for (const std::string &axis : row.candidate.axes) axes += (axes.empty() ? "" : "+") + axis;
     out += std::to_string(i) + "," + csv_cell(row.job.label) + "," + axes + "," + d.model + "," +
            d.integrator + "," + cell(d.step) + "," + cell(row.job.outcome.cells) + "," + d.law + "," +
-           d.precision + "," + cell(row.cpu_per_s) + "," + states[row.job.outcome.state] + "," +
+           d.precision + "," + cell(row.cpu_per_s) + "," + word_of(row.job.outcome.state) + "," +
            cell(row.headline);
     for (const std::string &name : study.quantities) {
       const auto found = row.error.find(name);
@@ -443,7 +437,7 @@ std::string json_report(const Subject &subject, const Study &study, const JsonVa
   JsonObject out;
   out.add("format", quoted("deform-cost")).add("version", "1").add("scene", quoted(subject.path));
   out.add("quantities", json_words(study.quantities)).add("headline", json_words(study.headline));
-  out.add("says", json_words({error_text(subject, study), reference_text(study), pick_text(study)}));
+  out.add("says", json_words({error_text(subject, study), reference_text(study), pick_text(subject, study)}));
   out.add("scales", scales.text()).add("reference", reference_json(study));
   out.add("choices", json_array(choices)).add("front", json_array(front));
   if (study.pick < 0) {

@@ -24,7 +24,7 @@ std::string reference_text(const Study &study);
 // What every table says that shows errors: of what, against which run, how far that one may be off.
 std::string error_text(const Subject &subject, const Study &study);
 std::string short_reference(const Study &study);
-std::string pick_text(const Study &study);
+std::string pick_text(const Subject &subject, const Study &study);
 std::string mesh_doubt(const Study &study);  // of a choice on the scene's own mesh
 std::string doubt_text(const Study &study);  // why a choice for all meshes is likely, not proven
 std::string next_step(const Study &study);   // which budget says more, and what

@@ -450,8 +450,13 @@ class Student {
         throw Failure(kBadInput, "--quantity: there is no \"" + word + "\" in this scene, expected one of " +
                                      all + did_you_mean(word, out_.quantities));
       }
-      out_.headline.insert(out_.headline.end(), names.begin(), names.end());
+      for (const std::string &name : names)
+        (out_.scales.at(name) > 0 ? out_.headline : out_.zeros).push_back(name);
     }
+    if (out_.headline.empty())
+      throw Failure(kBadInput,
+                    "--quantity: " + out_.zeros[0] +
+                        " is 0 in the reference, and no error is relative to that; name another one");
   }
 
   // Of a row against another, by quantity.

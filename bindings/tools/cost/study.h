@@ -53,6 +53,7 @@ struct Study {
   std::map<std::string, double> scales;
   std::map<std::string, std::string> units;
   std::vector<std::string> quantities, headline;  // all; the given ones
+  std::vector<std::string> zeros;  // asked for, and 0 in the reference, so that no error is relative to it
   std::map<std::string, double> until;            // s: the last record of a probe that a cut has taken
   int reference = -1, check = -1, third = -1;     // rows: the finest, and those that it is checked by
   std::map<std::string, Limit> limits;            // by quantity: what the three say
@@ -83,7 +84,11 @@ Study make_study(const Subject &subject, const std::string &mesh_left_out, const
 // meshes.cpp: why the cells of this scene's bodies cannot vary; "" where they can.
 std::string why_cells_stay(const Subject &subject);
 
-// patch.cpp: the choice as a JSON merge patch (RFC 7396), and as a scene.
+// patch.cpp: the own settings of a choice, without what every run records; and what makes it from the file,
+// in which the planner's choice is not yet fixed. Empty: the scene as it is.
+Settings own_settings(const Row &row);
+Settings settings_of_file(const Subject &subject, const Row &row);
+// The choice as a JSON merge patch (RFC 7396), and as a scene.
 // It contains whole lists, because a merge patch cannot change a part of one. Null: nothing is chosen.
 JsonValue scene_patch(const Subject &subject, const Study &study);
 // Writes the scene with the pick's changes to `path`. Files keep their places: names are made relative to

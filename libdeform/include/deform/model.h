@@ -26,7 +26,7 @@ DFM_API dfm_status dfm_body_set_model(dfm_body body, const char *type, const dfm
 /** A scheduled change of model. */
 typedef struct dfm_switch {
   uint32_t size;      /* dfm_switch_default sets it */
-  int32_t integrator; /* DFM_INTEGRATOR_* after the change; AUTO: that of dfm_body_def */
+  int32_t integrator; /* DFM_INTEGRATOR_* after the change; AUTO: unchanged */
   double t;           /* s; the first step that begins at t or later makes it (to 1e-6 of the step) */
   const char *type;   /* short name or full id */
   dfm_params params;  /* copied */
@@ -35,7 +35,7 @@ typedef struct dfm_switch {
 } dfm_switch;
 /** dfm_switch_default into a def of any size (base.h). Threads: Any thread. Since 0.1. */
 DFM_API void dfm_switch_default_sized(uint32_t size, dfm_switch *out);
-/** t = 0, no model, any jump, the integrator of dfm_body_def. Threads: Any thread.
+/** t = 0, no model, any jump, the integrator unchanged. Threads: Any thread.
  * Since 0.1. */
 static inline dfm_switch dfm_switch_default(void) {
   dfm_switch out;

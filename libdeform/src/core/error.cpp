@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <cstring>
 
+#include "core/system.h"
+
 namespace dfm {
 namespace {
 
@@ -61,7 +63,7 @@ size_t edit_distance(const std::string &a, const std::string &b) {
 
 std::string vformat(const char *format, va_list args) {
   char text[1024];
-  std::vsnprintf(text, sizeof text, format, args);
+  os::print(text, sizeof text, format, args);
   return text;
 }
 

@@ -2,6 +2,7 @@
 // The dynamic linker's are in plugin/shared_object.h. Names are UTF-8. What returns false, -1 or null leaves
 // the reason in errno.
 #pragma once
+#include <cstdarg>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -47,6 +48,9 @@ bool list_folder(const std::string &folder, std::vector<std::string> &names);
 // files in the name of another user than the one who has set it.
 std::optional<std::string> environment(const char *name);
 std::optional<std::string> trusted_environment(const char *name);
+
+// vsnprintf with a decimal point, whatever the locale of the program.
+int print(char *text, size_t capacity, const char *format, va_list args);
 
 uint64_t memory_of_machine();  // bytes that this process may have
 // Large blocks begin at huge pages, if the system grants them on request: a step of a large body reads tens

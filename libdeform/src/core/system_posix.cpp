@@ -1,5 +1,6 @@
 #include <dirent.h>
 #include <fcntl.h>
+#include <locale.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -113,6 +114,14 @@ std::optional<std::string> trusted_environment(const char *name) {
 #else
   return issetugid() ? std::nullopt : environment(name);
 #endif
+}
+
+int print(char *text, size_t capacity, const char *format, va_list args) {
+  static const locale_t plain = newlocale(LC_ALL_MASK, "C", locale_t{});
+  const locale_t before = uselocale(plain);
+  const int n = std::vsnprintf(text, capacity, format, args);
+  uselocale(before);
+  return n;
 }
 
 uint64_t memory_of_machine() {

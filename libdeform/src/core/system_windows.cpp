@@ -1,12 +1,14 @@
 #include <dirent.h>
 #include <fcntl.h>
 #include <io.h>
+#include <locale.h>
 #include <process.h>
 #include <sys/stat.h>
 #include <windows.h>
 
 #include <algorithm>
 #include <cerrno>
+#include <cstdio>
 #include <cstdlib>
 #include <memory>
 #include <system_error>
@@ -101,6 +103,17 @@ std::optional<std::string> environment(const char *name) {
 }
 
 std::optional<std::string> trusted_environment(const char *name) { return environment(name); }
+
+int print(char *text, size_t capacity, const char *format, va_list args) {
+  const int mode = _configthreadlocale(_ENABLE_PER_THREAD_LOCALE);
+  char before[128];
+  std::snprintf(before, sizeof before, "%s", setlocale(LC_NUMERIC, nullptr));
+  setlocale(LC_NUMERIC, "C");
+  const int n = std::vsnprintf(text, capacity, format, args);
+  setlocale(LC_NUMERIC, before);
+  _configthreadlocale(mode);
+  return n;
+}
 
 uint64_t memory_of_machine() {
   MEMORYSTATUSEX status{};

@@ -9,6 +9,7 @@
 #include <new>
 
 #include "core/error.h"
+#include "core/system.h"
 #include "deform/plugin_draft.h"
 #include "math/ldlt_solver.h"
 #include "plugin/on_behalf.h"
@@ -218,7 +219,7 @@ void dfm_context::log_line(int32_t level, const dfm::Named *whose, const char *f
   char text[1024] = "";
   if (whose) std::snprintf(text, sizeof text, "%s '%s'", whose->kind, whose->name);
   const size_t before = std::strlen(text);
-  std::vsnprintf(text + before, sizeof text - before, format, args);
+  dfm::os::print(text + before, sizeof text - before, format, args);
   char line[sizeof text];
   dfm::printable(text, line, sizeof line);
   log(level, line);

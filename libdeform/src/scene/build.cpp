@@ -14,7 +14,6 @@
 #include "math/turn.h"
 #include "plugin/context.h"
 #include "scene/jitter.h"
-#include "scene/load.h"
 #include "scene/place.h"
 #include "scene/rotation.h"
 #include "scene/table.h"
@@ -141,22 +140,12 @@ std::vector<double> start_positions(const Start &start, const BodyMesh &mesh, co
 
 class Builder {
  public:
-  Builder(dfm_context *context, Definition &def, uint64_t seed)
-      : context_(context), def_(def), jittered_(seed != 0), jitter_(seed), files_(context, def) {}
+  Builder(dfm_context *context, Definition &def, MeshFiles &files, uint64_t seed)
+      : context_(context), def_(def), jittered_(seed != 0), jitter_(seed), files_(files) {}
   ~Builder() {
     if (world_) dfm_world_destroy(world_);
   }
   Builder(const Builder &) = delete;
-
-  // Adds the scene's key to errors of the called function.
-  template <class Call>
-  auto with_pointer(const std::string &pointer, Call &&call) const {
-    try {
-      return call();
-    } catch (const Error &e) {
-      def_.refuse(pointer, e.what(), e.status);
-    }
-  }
 
   Built run() {
     create_world();
@@ -178,11 +167,11 @@ class Builder {
     double step = 0;
     def_.require(dfm_world_stable_step(world_, &step, nullptr, nullptr),
                  def_.effects_auto ? "/bodies" : "/effects");
-    if (def_.equilibrium) with_pointer("/time/mode", [&] { check_equilibrium(world()); });
+    if (def_.equilibrium) def_.with_pointer("/time/mode", [&] { check_equilibrium(world()); });
     else if (def_.step > 0) warn_long_step(context_, world(), def_.step);
     // What a model that steps itself would refuse in the first step.
     for (const Body &b : def_.bodies)
-      with_pointer(b.pointer + "/model", [&] { check_first_step(world(), *world().find_body(b.name)); });
+      def_.with_pointer(b.pointer + "/model", [&] { check_first_step(world(), *world().find_body(b.name)); });
     for (const Cut &c : def_.cuts) plan_cut(c);  // before changes of models, which check them
     for (Body &b : def_.bodies) add_switches(b);
     return {std::exchange(world_, 0), std::move(probes_)};
@@ -305,12 +294,13 @@ class Builder {
     mesh.cell_weight = cell_weights(mesh, materials);
     std::vector<NodalRow> nodal;
     if (!b.nodal_bc.empty())
-      nodal =
-          with_pointer(b.pointer + "/nodal_bc", [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
+      nodal = def_.with_pointer(b.pointer + "/nodal_bc",
+                                [&] { return read_nodal(files_.path_of(b.nodal_bc), mesh); });
     std::vector<std::vector<double>> values;
     std::vector<dfm_cell_field> fields;
     for (const FieldFile &f : b.fields) {
-      values.push_back(with_pointer(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
+      values.push_back(
+          def_.with_pointer(f.pointer, [&] { return read_field(files_.path_of(f.path), f, mesh); }));
       fields.push_back({f.key.c_str(), values.back().data(), f.width});
     }
     std::vector<uint8_t> fixed(mesh.info.npoint, 0);
@@ -374,7 +364,7 @@ class Builder {
   void set_state(dfm_body body, const Body &b, const BodyMesh &mesh) {
     const std::string pointer = b.start.pointer + "/state";
     StartState state =
-        with_pointer(pointer, [&] { return read_start_state(files_.path_of(b.start.state), mesh); });
+        def_.with_pointer(pointer, [&] { return read_start_state(files_.path_of(b.start.state), mesh); });
     dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
     if (jittered_ && made.motions.empty()) jitter(state, mesh.size);  // else its points are placed by these
     if (!made.dynamics->abilities().placed)
@@ -438,7 +428,7 @@ class Builder {
     }
     warn_idle_changes(resolve<dfm::Body>(Kind::body, body), pointer);
     if (!def_.equilibrium) return;
-    with_pointer(pointer, [&] {
+    def_.with_pointer(pointer, [&] {
       dfm::Body &made = resolve<dfm::Body>(Kind::body, body);
       rehearse(made, made.switches, made.rule, true);
     });
@@ -595,7 +585,7 @@ class Builder {
   void create_rigid(Rigid &rigid) {
     if (rigid.bodies.empty()) {
       // a missing host is an error in any case
-      return with_pointer(rigid.pointer + "/host", [&] { find_host(rigid.host); });
+      return def_.with_pointer(rigid.pointer + "/host", [&] { find_host(rigid.host); });
     }
     std::vector<dfm_rigid_def> bodies;
     std::vector<dfm_joint_def> joints;
@@ -649,7 +639,7 @@ class Builder {
     t.def.name = t.solid.name.c_str();
     t.def.material = material(t.solid.material);
     if (!t.hand.empty())
-      with_pointer(t.solid.pointer + "/motion/file", [&] { read_hand(files_.path_of(t.hand), t); });
+      def_.with_pointer(t.solid.pointer + "/motion/file", [&] { read_hand(files_.path_of(t.hand), t); });
     t.def.nkey = uint32_t(t.keys.size());
     t.def.keys = t.keys.data();
     t.def.nopening = uint32_t(t.opening_keys.size());
@@ -701,18 +691,18 @@ class Builder {
   Jitter jitter_;
   dfm_world world_ = 0;
   std::map<std::string, dfm_material> materials_;
-  MeshFiles files_;
+  MeshFiles &files_;
   std::vector<ProbePoint> probes_;
 };
 
 }  // namespace
 
-Built build(dfm_context *context, Definition &def, uint64_t jitter_seed) {
-  return Builder(context, def, jitter_seed).run();
+Built build(dfm_context *context, Definition &def, MeshFiles &files, uint64_t jitter_seed) {
+  return Builder(context, def, files, jitter_seed).run();
 }
 
-Built build_alone(dfm_context *context, const Definition &def, const Body &body, const std::string &model,
-                  Params params) {
+Built build_alone(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
+                  const std::string &model, Params params) {
   Definition alone = def;
   alone.bodies = {body};
   alone.bodies[0].model = model;
@@ -729,7 +719,7 @@ Built build_alone(dfm_context *context, const Definition &def, const Body &body,
   for (Tool &t : alone.tools)
     std::erase_if(t.cuts.bodies, [&](const std::string &name) { return name != body.name; });
   std::erase_if(alone.tools, [](const Tool &t) { return t.cuts.bodies.empty(); });
-  return build(context, alone, 0);
+  return build(context, alone, files, 0);
 }
 
 }  // namespace dfm::scene

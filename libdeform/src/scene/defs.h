@@ -238,6 +238,15 @@ struct Definition {
   void require(dfm_status status, const std::string &pointer) const {
     if (status < 0) refuse(pointer, dfm_last_error(), status);
   }
+  // Adds the key to errors of the called function.
+  template <class Call>
+  auto with_pointer(const std::string &pointer, Call &&call) const {
+    try {
+      return call();
+    } catch (const Error &e) {
+      refuse(pointer, e.what(), e.status);
+    }
+  }
   dfm_world_def world = dfm_world_def_default();
   std::vector<dfm_vector_key> gravity_keys;
   std::string solver = "auto";  // of the implicit step

@@ -9,7 +9,6 @@
 #include "plugin/params.h"
 #include "plugin/quiet.h"
 #include "scene/build.h"
-#include "scene/load.h"
 #include "scene/planner/planner.h"
 #include "state/world.h"
 #include "world/body_effects.h"
@@ -19,10 +18,10 @@ namespace {
 
 // Effects that work in this body with this model, in a world without other things. Warnings come when the
 // scene is built.
-std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,
-                                    const std::string &model, Params params) {
+std::vector<std::string> effects_of(dfm_context *context, const Definition &def, MeshFiles &files,
+                                    const Body &body, const std::string &model, Params params) {
   const Quiet quiet;
-  const Built built = build_alone(context, def, body, model, std::move(params));
+  const Built built = build_alone(context, def, files, body, model, std::move(params));
   std::vector<std::string> out;
   for (const BodyEffect &e : body_effects(*resolve<World>(Kind::world, built.world).find_body(body.name)))
     if (e.works) out.push_back(e.name);
@@ -38,15 +37,15 @@ std::string lost(const std::vector<std::string> &here, const std::vector<std::st
 
 class Chooser {
  public:
-  Chooser(dfm_context *context, const Definition &def, json &tree)
-      : context_(context), def_(def), types_(context->registry), tree_(tree), files_(context, def) {}
+  Chooser(dfm_context *context, const Definition &def, MeshFiles &files, json &tree)
+      : context_(context), def_(def), types_(context->registry), tree_(tree), files_(files) {}
 
   json run() {
     json out = json::array();
     for (size_t i = 0; i < def_.bodies.size(); ++i) {
       const Body &b = def_.bodies[i];
       if (!b.device) continue;
-      const dfm_type &own = files_.model(b);
+      const dfm_type &own = own_model(b);
       const dfm_type *const card = on_card(types_, own);
       const bool requested = *b.device == "gpu";
       std::string why = card ? "" : no_model(own);
@@ -66,6 +65,11 @@ class Chooser {
   }
 
  private:
+  const dfm_type &own_model(const Body &b) {
+    const Quiet quiet;  // warnings come when the scene is built
+    return files_.model(b);
+  }
+
   std::string no_model(const dfm_type &own) const {
     std::vector<std::string> able;
     for (const dfm_type *t : types_.list(DFM_KIND_MODEL))
@@ -79,7 +83,7 @@ class Chooser {
     if (def_.equilibrium) return "the processor finds equilibria";
     if (regimes_.empty()) {
       measured_ = read_costs();
-      regimes_ = regimes(context_, def_, measured_);
+      regimes_ = regimes(context_, def_, files_, measured_);
     }
     const BodyRegime &b = regimes_[body];
     const double step = def_.step > 0 ? def_.step : kFrame;
@@ -146,10 +150,10 @@ class Chooser {
           name.c_str());
     Params left = left_for(b.params, own, card);
     if (!any_driver) set_hardware(card, left);
-    const std::vector<std::string> here = effects_of(context_, def_, b, own.id, b.params);
+    const std::vector<std::string> here = effects_of(context_, def_, files_, b, own.id, b.params);
     std::vector<std::string> there;
     try {
-      there = effects_of(context_, def_, b, card.id, std::move(left));
+      there = effects_of(context_, def_, files_, b, card.id, std::move(left));
     } catch (const Error &e) {
       const std::string why = e.what(), where = def_.file + ": ";
       return (why.starts_with(where) ? why.substr(where.size()) : why) + "; or take \"device\": \"cpu\"";
@@ -199,7 +203,7 @@ class Chooser {
   const Definition &def_;
   const Registry &types_;
   json &tree_;
-  MeshFiles files_;
+  MeshFiles &files_;
   Measured measured_;
   std::vector<BodyRegime> regimes_;
   std::string faster_;
@@ -207,19 +211,20 @@ class Chooser {
 
 }  // namespace
 
-bool whole_on_card(dfm_context *context, const Definition &def, const Body &body, const dfm_type &own) {
+bool whole_on_card(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
+                   const dfm_type &own) {
   const dfm_type *const card = on_card(context->registry, own);
   if (!card) return false;
-  const std::vector<std::string> here = effects_of(context, def, body, own.id, {});
+  const std::vector<std::string> here = effects_of(context, def, files, body, own.id, {});
   try {
-    return lost(here, effects_of(context, def, body, card->id, {})).empty();
+    return lost(here, effects_of(context, def, files, body, card->id, {})).empty();
   } catch (const Error &) {
     return true;
   }
 }
 
-json choose_devices(dfm_context *context, const Definition &def, json &tree) {
-  return Chooser(context, def, tree).run();
+json choose_devices(dfm_context *context, const Definition &def, MeshFiles &files, json &tree) {
+  return Chooser(context, def, files, tree).run();
 }
 
 }  // namespace dfm::scene

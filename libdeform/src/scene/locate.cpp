@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "geometry/closest.h"
 #include "math/extent.h"
 #include "scene/select.h"
 
@@ -14,23 +15,6 @@ double volume6(const double *const p[4]) {
 }
 
 namespace {
-
-// Distance of a point from a segment, and from a triangle: inside its prism the height, else the
-// nearest of its edges.
-double segment_distance(Vec3 p, Vec3 a, Vec3 b) {
-  const Vec3 u = b - a, v = p - a;
-  const double t = std::clamp(dot(u, v) / dot(u, u), 0.0, 1.0);
-  return norm(v - t * u);
-}
-
-double triangle_distance(const double *point, const double *const corner[3]) {
-  const Vec3 p = load3(point), c[3] = {load3(corner[0]), load3(corner[1]), load3(corner[2])};
-  const Vec3 u = c[1] - c[0], v = c[2] - c[0], w = p - c[0], n = cross(u, v);
-  const double s = dot(w, cross(v, n)), t = dot(u, cross(w, n)), whole = dot(n, n);
-  if (s >= 0 && t >= 0 && s + t <= whole) return std::fabs(dot(w, n)) / std::sqrt(whole);
-  return std::min(
-      {segment_distance(p, c[0], c[1]), segment_distance(p, c[1], c[2]), segment_distance(p, c[2], c[0])});
-}
 
 // Barycentric coordinates of the point in the cell, and its distance from it.
 double from_cell(const double *const corner[4], const double *point, double weights[4]) {
@@ -45,10 +29,11 @@ double from_cell(const double *const corner[4], const double *point, double weig
   }
   double away = inside ? 0 : INFINITY;
   for (int k = 0; k < 4 && !inside; ++k) {
-    const double *const face[3] = {corner[k == 0], corner[k <= 1 ? 2 : 1], corner[k <= 2 ? 3 : 2]};
-    away = std::min(away, triangle_distance(point, face));
+    const Vec3 a = load3(corner[k == 0]), b = load3(corner[k <= 1 ? 2 : 1]),
+               c = load3(corner[k <= 2 ? 3 : 2]);
+    away = std::min(away, closest_on_triangle(load3(point), a, b, c).distance2);
   }
-  return away;
+  return std::sqrt(away);
 }
 
 void corners_of(const BodyMesh &mesh, uint32_t cell, const double *corner[4]) {

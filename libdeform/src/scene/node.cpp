@@ -167,16 +167,13 @@ std::string Node::name() const {
   const std::string s = text();
   if (s.size() > 100) fail("a name has at most 100 bytes, found %zu", s.size());
   if (s[0] == '.') fail("a name does not begin with a dot, found \"%s\"", s.c_str());
-  for (size_t i = 0; i + 1 < s.size(); ++i)
-    if (s[i] == '\xc2' && static_cast<unsigned char>(s[i + 1]) >= 0x80 &&
-        static_cast<unsigned char>(s[i + 1]) < 0xa0)
-      fail("a name holds no control characters, found %s", excerpt(*value_).c_str());
-  for (unsigned char c : s)
-    if (c < 0x20 || c == 0x7f || std::string("/\\,:*=\"").find(char(c)) != std::string::npos)
-      fail(
-          "a name holds no control characters and none of / \\ , : * = \", since it stands in file names, "
-          "tables and \"between\"; found %s",
-          excerpt(*value_).c_str());
+  char plain[1024];
+  printable(s.c_str(), plain, sizeof plain);
+  if (s != plain || s.find_first_of("/\\,:*=\"") != s.npos)
+    fail(
+        "a name is UTF-8, and holds no control characters and none of / \\ , : * = \", since it stands in "
+        "file names, tables and \"between\"; found %s",
+        excerpt(*value_).c_str());
   return s;
 }
 

@@ -34,7 +34,8 @@ size_t string_end(const std::string &text, size_t i) {
   return std::min(i, text.size());
 }
 
-void scan(const std::string &text, const std::string &file) {
+// at: levels that lead to it
+void scan(const std::string &text, const std::string &file, size_t at = 0) {
   if (const size_t nul = text.find('\0'); nul != std::string::npos)
     refuse(file, text, nul,
            "not JSON: it contains a NUL character, and readers would ignore what follows; remove it");
@@ -42,7 +43,7 @@ void scan(const std::string &text, const std::string &file) {
   for (size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
     if (c == '{' || c == '[') {
-      if (keys.size() == kMaxDepth)
+      if (at + keys.size() >= kMaxDepth)
         refuse(file, text, i, format("brackets nested deeper than %zu levels", kMaxDepth));
       keys.emplace_back();
     } else if (c == '}' || c == ']') {
@@ -176,14 +177,18 @@ void apply_set(json &tree, const std::string &assignment, const std::string &fil
     fail(DFM_E_ARG, "--set %s: expected /json/pointer=value, e.g. --set /time/duration=2",
          assignment.c_str());
   const std::string pointer = assignment.substr(0, equals), text = assignment.substr(equals + 1);
-  scan(text, "--set " + pointer);
+  const std::vector<std::string> steps = steps_of(pointer);
+  if (steps.size() > kMaxDepth)
+    fail(DFM_E_ARG, "--set %.60s...: a pointer of %zu steps; a scene has at most %zu levels", pointer.c_str(),
+         steps.size(), kMaxDepth);
+  scan(text, "--set " + pointer, steps.size());
   json value = json::parse(text, nullptr, false);
   if (value.is_discarded()) value = text;  // a bare string
   // Objects on the way are created, so that "/output/every=0.1" works on a scene without "output"; what it
   // then holds is checked as ever.
   json *here = &tree;
   std::string so_far;
-  for (const std::string &step : steps_of(pointer)) {
+  for (const std::string &step : steps) {
     if (here->is_null()) *here = json::object();
     if (here->is_array() && step == "-") {
       here->push_back(nullptr);

@@ -39,20 +39,21 @@ Scene::Scene(dfm_context *context, const std::string &path, const dfm_scene_opti
     apply_set(tree_->root, options->set[i], path);
   }
   definition_ = read_scene(tree_->root, path, context->registry);
+  MeshFiles files(context, definition_);
   // The scene then says what was chosen, and is read as if its file had said so.
   json chosen, devices;
   if (definition_.wanted.any()) {
-    chosen = plan_scene(context, definition_, tree_->root);
+    chosen = plan_scene(context, definition_, files, tree_->root);
     definition_ = read_scene(tree_->root, path, context->registry);
   }
   if (std::ranges::any_of(definition_.bodies, [](const Body &b) { return b.device.has_value(); })) {
-    devices = choose_devices(context, definition_, tree_->root);
+    devices = choose_devices(context, definition_, files, tree_->root);
     definition_ = read_scene(tree_->root, path, context->registry);
   }
   if (!chosen.is_null())
     tree_->root[definition_.wanted.target > 0 ? "accuracy" : "budget"]["chosen"] = std::move(chosen);
   if (!devices.is_null()) tree_->root["devices"] = std::move(devices);
-  Built built = build(context, definition_, options ? options->jitter_seed : 0);
+  Built built = build(context, definition_, files, options ? options->jitter_seed : 0);
   world_ = built.world;
   probes_ = std::move(built.probes);
 }

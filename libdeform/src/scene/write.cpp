@@ -170,11 +170,12 @@ void SceneWriter::check_name(const char *kind, const std::string &name) const {
     if (name.empty()) fail(DFM_E_ARG, "it is empty");
     scene::Node(&text, "", &path).name();
   } catch (const Error &) {
-    fail(
-        DFM_E_ARG,
-        "%s: the name of %s '%s' cannot be used in a scene: a name has 1 to 100 bytes, does not begin with a "
-        "dot, and contains no control characters and none of / \\ , : * = \"; create it under another name",
-        path.c_str(), kind, name.c_str());
+    fail(DFM_E_ARG,
+         "%s: the name of %s '%s' cannot be used in a scene: a name has 1 to 100 bytes of UTF-8, does not "
+         "begin "
+         "with a dot, and contains no control characters and none of / \\ , : * = \"; create it under "
+         "another name",
+         path.c_str(), kind, name.c_str());
   }
 }
 
@@ -606,7 +607,13 @@ void write_scene(World &w, const std::string &path, const WriteOptions &options,
   for (const std::string &key : scene::model_keys(w.context->registry)) to.model_keys.insert(key);
   AtomicFile scene(path);  // what cannot be written is found out first
   std::string text;
-  print(write_root(to), "", text);
+  try {
+    print(write_root(to), "", text);
+  } catch (const Written::type_error &) {
+    fail(DFM_E_ARG,
+         "%s: a group of a surface has a name that is not UTF-8, which a scene must be; rename the group",
+         path.c_str());
+  }
   if (notes > 0 && !options.partial) {
     const std::string more = notes > 1 ? format(" (and %u more like it)", notes - 1) : "";
     fail(DFM_E_UNSUPPORTED,

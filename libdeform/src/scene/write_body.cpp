@@ -121,7 +121,14 @@ void write_model(SceneWriter &to, const Body &b, Written &out) {
     given.push_back({row.key, &now[at], row.width});
   }
   write_choice(type, given, out["model"]);
-  put_integrator(out, b.origin.integrator);
+  // A rule that leaves it to the library for one of its models means the body's, and names it for the others.
+  const auto open = [](const SwitchRule &r) {
+    const auto automatic = [](const ModelChoice &c) {
+      return !c.type.empty() && c.integrator == uint32_t{DFM_INTEGRATOR_AUTO};
+    };
+    return automatic(r.touching) || automatic(r.near) || automatic(r.far);
+  };
+  if (!b.switches.empty() || std::ranges::none_of(b.rule, open)) put_integrator(out, b.origin.integrator);
   if (b.scaling.requested > 0) out["mass_scaling"] = b.scaling.requested;
   if (b.smooth > 0) out["smooth"] = b.smooth;
 }

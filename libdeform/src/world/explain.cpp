@@ -21,16 +21,16 @@
 namespace dfm {
 namespace {
 
+// As JSON writes it: `printable` gives control characters as JSON does.
 std::string quote(const std::string &s) {
-  std::string out = "\"";
-  for (char c : s) {
-    if (c == '"' || c == '\\') {
-      out += '\\';
-      out += c;
-    } else if (static_cast<unsigned char>(c) < 0x20) out += format("\\u%04x", c);
-    else out += c;
+  std::string escaped;
+  for (const char c : s) {
+    if (c == '"' || c == '\\') escaped += '\\';
+    escaped += c;
   }
-  return out + "\"";
+  std::string out(6 * escaped.size() + 1, 0);
+  printable(escaped.c_str(), out.data(), out.size());
+  return std::string("\"") + out.c_str() + "\"";
 }
 
 const char *word_of(const Body &b) {

@@ -254,12 +254,11 @@ double stable_with(Body &b, MadeModel &made) {
   return known ? kBoundShare * bound.step : -1;
 }
 
-// A future change, at t or at any time from then on, of a body that has this integrator until then. named:
-// the change names its integrator.
-void rehearse(Body &b, ModelChoice &to, double t, uint32_t &integrator, bool at_rest, bool named,
+// A future change, at t or at any time from then on, of a body that has this integrator from then on. named:
+// the change names it.
+void rehearse(Body &b, ModelChoice &to, double t, uint32_t integrator, bool at_rest, bool named,
               std::vector<SpareModel> &spares) {
   World &w = *b.world;
-  if (to.integrator != kSameIntegrator) integrator = to.integrator;
   const dfm_type &type = w.context->registry.find(DFM_KIND_MODEL, to.type);
   ModelOrigin origin = origin_for(b, type, to);
   origin.integrator = integrator;
@@ -345,7 +344,9 @@ void rehearse(Body &b, std::vector<Switch> &switches, std::vector<SwitchRule> &r
   spares.reserve(kSpares);
   uint32_t integrator = b.origin.integrator;
   const auto one = [&](ModelChoice &to, double t, const std::string &when, bool named = false) {
-    if (to.type.empty() || (!at_rest && is_made_so(b, to))) return;
+    if (to.type.empty()) return;
+    if (to.integrator != kSameIntegrator) integrator = to.integrator;
+    if (!at_rest && is_made_so(b, to) && integrator == b.origin.integrator) return;
     try {
       rehearse(b, to, t, integrator, at_rest, named, spares);
     } catch (const Error &e) {

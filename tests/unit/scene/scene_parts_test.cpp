@@ -44,6 +44,25 @@ TEST(Parse, Nesting_IsBounded) {
   EXPECT_EQ(sentence_of(std::string(64, '[') + std::string(64, ']')), "");
 }
 
+// Levels of the pointer and of the value count together, or a long pointer would exhaust the stack.
+TEST(Parse, Nesting_IsBoundedInSettings) {
+  const auto levels = [](size_t n, const std::string &value) {
+    std::string pointer;
+    for (size_t i = 0; i < n; ++i) pointer += "/a";
+    json tree = json::object();
+    try {
+      apply_set(tree, pointer + "=" + value, "s.json");
+    } catch (const dfm::Error &e) {
+      return e.sentence;
+    }
+    return std::string();
+  };
+  EXPECT_EQ(levels(64, "1"), "");
+  EXPECT_EQ(levels(60, "[[[[]]]]"), "");
+  EXPECT_NE(levels(60, "[[[[[]]]]]").find("nested deeper than 64"), std::string::npos);
+  EXPECT_NE(levels(2000, "1").find("a pointer of 2000 steps; a scene has at most 64"), std::string::npos);
+}
+
 TEST(Parse, BadSyntax_NamesLineAndColumn) {
   EXPECT_NE(sentence_of("{\n  \"a\": 1\n  \"b\": 2\n}").find("s.json:3:"), std::string::npos);
   EXPECT_NE(sentence_of("{\"a\": NaN}").find("numbers must be finite"), std::string::npos);

@@ -312,9 +312,6 @@ class Planner {
           e.frequency / (2 * kPi), b.held ? on_mesh(b, e).c_str() : "", e.lasts, b.held ? "; held" : "; free",
           b.touches ? ", may touch something" : ", touches nothing"));
       if (dented(b)) out_.assumed.push_back(dent(b));
-      if (b.touches && !b.held)
-        out_.assumed.push_back(
-            format("body '%s': what its mesh does to its contacts is not predicted", b.name.c_str()));
       const double mesh = mesh_error(b, e) * wish_.weight;
       if (wish_.target > 0 && mesh > wish_.target)
         out_.assumed.push_back(

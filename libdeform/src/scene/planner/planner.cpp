@@ -1,18 +1,20 @@
 #include "scene/planner/planner.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdlib>
 #include <map>
 
+#include "friction/pair_rules.h"
 #include "math/extent.h"
 #include "math/turn.h"
 #include "plugin/context.h"
 #include "plugin/quiet.h"
 #include "scene/build.h"
 #include "scene/device.h"
-#include "scene/load.h"
 #include "scene/place.h"
+#include "scene/table.h"
+#include "state/motion.h"
 #include "world/body_model.h"
 
 namespace dfm::scene {
@@ -99,7 +101,11 @@ Extent box_of(const Obstacle &o, const std::vector<double> &scaled) {
 }
 
 // Three, as a person would write it.
-double round_to_digits(double x) { return std::strtod(format("%.3g", x).c_str(), nullptr); }
+double round_to_digits(double x) {
+  const std::string text = format("%.3g", x);
+  std::from_chars(text.data(), text.data() + text.size(), x);
+  return x;
+}
 
 std::string lattice_sentence(const Body &b, double size, const Way &lattice, const Way &own) {
   std::string out = format("body '%s': hexahedra (\"lattice\": {\"size\": %g}) take the place of its cells",
@@ -127,14 +133,30 @@ bool explicit_alone(const Body &b) { return b.device == "gpu" || b.def.mass_scal
 
 class Reader {
  public:
-  Reader(dfm_context *context, const Definition &def)
-      : context_(context), def_(def), types_(context->registry), files_(context, def) {
-    g_ = length(def.world.gravity);
-    for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? def.world.gravity[k] / g_ : 0;
+  Reader(dfm_context *context, const Definition &def, MeshFiles &files)
+      : context_(context), def_(def), types_(context->registry), files_(files) {
+    const auto &keys = def.gravity_keys;
+    Vec3 most = load3(def.world.gravity);
+    for (const double t : turns_of(keys))
+      if (const Vec3 g = vector_at(keys, t); norm2(g) > norm2(most) || t == def.begin) most = g;
+    double g[3];
+    store3(g, most);
+    g_ = length(g);
+    for (int k = 0; k < 3; ++k) down_[k] = g_ > 0 ? g[k] / g_ : 0;
+    for (const Obstacle &o : def.obstacles) obstacles_.push_back(as_it_begins(o));
+    for (const Tool &t : def.tools) obstacles_.push_back(as_it_begins(solid_of(t)));
   }
 
   std::vector<BodyRegime> run(const Measured &measured) {
-    for (const Body &b : def_.bodies) meshes_.push_back(files_.load(b));
+    const Quiet quiet;  // warnings come when the scene is built
+    for (const Body &b : def_.bodies) {
+      meshes_.push_back(files_.load(b));
+      nodal_.push_back(def_.with_pointer(b.pointer + "/nodal_bc", [&]() -> std::vector<NodalRow> {
+        if (b.nodal_bc.empty()) return {};
+        return read_nodal(files_.path_of(b.nodal_bc), meshes_.back());
+      }));
+      holds_.push_back(hold_of(b, meshes_.back(), nodal_.back()));
+    }
     for (size_t i = 0; i < meshes_.size(); ++i) {
       const Body &b = def_.bodies[i];
       const dfm_pose pose = b.on.empty() ? b.def.pose : put_on(context_, def_, files_, b, meshes_[i]);
@@ -149,6 +171,7 @@ class Reader {
   // edge in `sizes`, m. False: none has. `unmeasured`: one would, had its model measured costs.
   bool lattices(const std::vector<BodyRegime> &own, double times, const Measured &measured,
                 std::vector<BodyRegime> &out, std::vector<double> &sizes, bool &unmeasured) {
+    const Quiet quiet;
     out = own;
     sizes.assign(own.size(), 0);
     bool any = false;
@@ -185,16 +208,16 @@ class Reader {
     return any;
   }
 
-  // The plan of these bodies. Where the scene asks for more than motion, each body is built alone with the
-  // model that is chosen for it, and planned again without one that does not take it. The last one stays:
-  // building the scene says why not.
+  // The plan of these bodies. Where the scene asks for more than motion, or hinges a body, each is built
+  // alone with the model that is chosen for it, and planned again without one that does not take it. The last
+  // one stays: building the scene says why not.
   PlannedWay plan(std::vector<BodyRegime> &bodies, const Measured &measured, const Wish &wish) {
     for (;;) {
       PlannedWay out = plan_accuracy(bodies, measured, wish);
       bool refused = false;
       for (size_t i = 0; i < out.way.bodies.size(); ++i) {
         std::vector<std::string> &models = bodies[i].models;
-        if (models.size() < 2 || takes(def_.bodies[i], out.way.bodies[i].model)) continue;
+        if (models.size() < 2 || takes(i, out.way.bodies[i].model)) continue;
         std::erase(models, out.way.bodies[i].model);
         refused = true;
       }
@@ -202,14 +225,46 @@ class Reader {
     }
   }
 
+  // What acts on a body and is no part of its estimate.
+  std::vector<std::string> left_out(size_t i, const BodyRegime &r) const {
+    const Body &b = def_.bodies[i];
+    std::vector<std::string> out;
+    const auto add = [&](bool acts, const char *what) {
+      if (acts) out.push_back(what);
+    };
+    const auto to_it = [&](const Attach &a) { return a.to == b.name; };
+    add(!b.springs.empty(), "its springs");
+    add(std::ranges::any_of(b.fixes, [](const Fix &f) { return f.motion.any(); }),
+        "the motion of what is held");
+    add(holds_[i].any && !holds_[i].all, "points that are held along some axes only");
+    add(std::ranges::any_of(b.forces, [](const Force &f) { return f.sine.amplitude[0] != 0; }),
+        "resonance with a force that oscillates");
+    add(!r.held && r.load > g_, "the motion that its forces cause");
+    add(std::ranges::any_of(b.attach, [&](const Attach &a) { return !holds(a, false); }) ||
+            std::ranges::any_of(def_.bodies,
+                                [&](const Body &o) { return std::ranges::any_of(o.attach, to_it); }),
+        "what it is attached to");
+    add(b.start.kind != StartKind::rest, "a start in another shape");
+    add(def_.world.self_contact == DFM_SELF_ON, "contact with itself");
+    add(std::ranges::any_of(def_.rigid.bodies, [&](const RigidBody &o) { return may_meet(b, o); }),
+        "the motion of rigid bodies");
+    add(std::ranges::any_of(def_.tools,
+                            [&](const Tool &t) { return t.keys.empty() && may_meet(b, t.solid); }),
+        "the motion of tools without keyframes");
+    add(r.touches && !mesh_error_known(r), "what its mesh does to its contacts");
+    return out;
+  }
+
  private:
-  bool takes(const Body &b, const std::string &model) {
-    if (b.springs.empty() && !may_be_cut() && !(b.def.mass_scaling > 0)) return true;
+  bool takes(size_t i, const std::string &model) {
+    const Body &b = def_.bodies[i];
+    const bool hinged = holds_[i].any > 0 && holds_[i].all < 3;
+    if (b.springs.empty() && !may_be_cut() && !(b.def.mass_scaling > 0) && !hinged) return true;
     const auto [found, first] = takes_.try_emplace({b.name, model});
     if (!first) return found->second;
     const Quiet quiet;
     try {
-      dfm_world_destroy(build_alone(context_, def_, b, model, {}).world);
+      dfm_world_destroy(build_alone(context_, def_, files_, b, model, {}).world);
       found->second = true;
     } catch (const Error &) {
       found->second = false;
@@ -289,13 +344,54 @@ class Reader {
 
   static bool moves(const Obstacle &o) { return !o.keys.empty() || o.def.sine.frequency > 0; }
   static bool thrown(const Body &b) { return length(b.def.velocity) > 0 || length(b.def.spin) > 0; }
-  static bool fixed(const Body &b) { return !b.fixes.empty() || !b.nodal_bc.empty(); }
-  bool held(const Body &b) const {
-    const auto holds = [&](const Attach &a) {
-      return std::ranges::find(def_.obstacles, a.to, &Obstacle::name) != def_.obstacles.end() ||
-             std::ranges::any_of(def_.bodies, [&](const Body &o) { return o.name == a.to && fixed(o); });
+
+  // Points that are held, and those that are held along all axes.
+  struct Hold { long any = 0, all = 0; };
+  Hold hold_of(const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
+    std::vector<uint8_t> axes(mesh.info.npoint);
+    for (const Fix &f : b.fixes)
+      for (const uint32_t p : select(f.where, mesh, def_.file)) axes[p] |= f.axes;
+    for (const NodalRow &row : nodal) axes[row.point] |= row.axes;
+    return {long(axes.size()) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)};
+  }
+  // Whether the attachment holds the body, to an obstacle or to a body that is held; `moving`: to one that
+  // moves, too.
+  bool holds(const Attach &a, bool moving) const {
+    for (size_t k = 0; k < holds_.size(); ++k)
+      if (def_.bodies[k].name == a.to) return holds_[k].all > 0;
+    for (size_t k = 0; k < def_.obstacles.size(); ++k)
+      if (obstacles_[k].name == a.to) return moving || !moves(obstacles_[k]);
+    return false;
+  }
+  bool held(size_t i) const {
+    return holds_[i].all > 0 ||
+           std::ranges::any_of(def_.bodies[i].attach, [&](const Attach &a) { return holds(a, true); });
+  }
+
+  // The times at which what is linear between keys may be at its greatest in the run.
+  template <class Key>
+  std::vector<double> turns_of(const std::vector<Key> &keys) const {
+    if (keys.empty()) return {};
+    const double end = def_.begin + def_.duration;
+    std::vector<double> out = {def_.begin, end};
+    for (const Key &k : keys)
+      if (k.t > def_.begin && k.t < end) out.push_back(k.t);
+    return out;
+  }
+  // N, the greatest in the run.
+  double greatest(const Force &f) const {
+    double scale = f.keys.empty() ? 1 : 0;
+    for (const double t : turns_of(f.keys)) scale = std::max(scale, std::fabs(scale_at(f.keys, t)));
+    return scale * (1 + std::fabs(f.sine.amplitude[0])) * length(f.total);
+  }
+
+  bool may_meet(const Thing &a, const Thing &b) const {
+    const auto side = [&](const Thing &t) {
+      const auto m = std::ranges::find(def_.materials, t.material, &Material::name);
+      return PairSide{t.name, {}, m == def_.materials.end() ? std::string_view() : m->title};
     };
-    return fixed(b) || std::ranges::any_of(b.attach, holds);
+    const Filter *const rule = best_rule(def_.filters, side(a), side(b));
+    return !a.sensor && !b.sensor && (!rule || rule->collide);
   }
 
   // Jaws, blades and ellipsoids count as boxes. Without keys it is not known where the tool comes to.
@@ -310,12 +406,15 @@ class Reader {
     o.keys = t.keys;
     return o;
   }
-
-  // Something moves toward it, independent of gravity.
-  bool something_moves() const {
-    return std::any_of(def_.obstacles.begin(), def_.obstacles.end(), moves) || !def_.tools.empty() ||
-           !def_.rigid.bodies.empty() || (def_.bodies.size() + def_.obstacles.size() > 1 && one_is_thrown());
+  Obstacle as_it_begins(Obstacle o) const {
+    if (!o.keys.empty()) store_pose(o.def.pose, pose_at(o.keys, def_.begin));
+    if (!o.start) return o;
+    o.def.pose = *o.start;  // which ends its motion
+    o.def.sine = {};
+    o.keys.clear();
+    return o;
   }
+
   bool one_is_thrown() const { return std::any_of(def_.bodies.begin(), def_.bodies.end(), thrown); }
 
   // m, across the contact that a body has with an obstacle. Of a round one by how deep its poses enter the
@@ -356,13 +455,19 @@ class Reader {
 
   // How far a body falls until it touches something, and its narrowest contact.
   void find_contacts(size_t i, double falls, double &fall, BodyRegime &r) {
+    const Body &b = def_.bodies[i];
     const auto narrow = [&](double width, const std::string &name) {
       if (!(width < r.contact)) return;
       r.contact = width;
       r.met = "'" + name + "'";
     };
     const bool flies = one_is_thrown();
-    const auto meet = [&](Obstacle copy, bool comes) {
+    bool met = false;  // by what comes without gravity
+    for (size_t k = 0; k < obstacles_.size(); ++k) {
+      Obstacle copy = obstacles_[k];
+      if (!may_meet(b, copy)) continue;
+      const bool comes = k >= def_.obstacles.size() || moves(copy);
+      met |= comes || flies;
       std::vector<double> scaled;
       if (!copy.mesh.empty()) files_.load(copy, scaled);
       const bool plane = copy.def.shape == DFM_SHAPE_PLANE;
@@ -371,10 +476,11 @@ class Reader {
       fall = std::min(fall, least);
       if ((!r.held && least <= falls) || comes || flies) narrow(width_of(i, copy, scaled), copy.name);
       if (comes) add_approach(i, copy, r);
-    };
-    for (const Obstacle &o : def_.obstacles) meet(o, moves(o));
-    for (const Tool &t : def_.tools) meet(solid_of(t), true);
+    }
     for (const RigidBody &body : def_.rigid.bodies) {
+      if (!may_meet(b, body)) continue;
+      met = true;
+      r.presses = HUGE_VAL;
       const dfm_rigid_def &d = body.def;
       const bool round = d.shape == DFM_SHAPE_SPHERE || d.shape == DFM_SHAPE_CAPSULE;
       if (round) narrow(d.radius, body.name);
@@ -382,13 +488,14 @@ class Reader {
         narrow(flat_width(2 * d.half_size[0], 2 * d.half_size[1], 2 * d.half_size[2]), body.name);
     }
     for (size_t k = 0; k < boxes_.size(); ++k) {
-      if (k == i) continue;
+      if (k == i || !may_meet(b, def_.bodies[k])) continue;
+      met |= flies;
       const double down = fall_to_box(boxes_[i], down_, boxes_[k]),
                    up = fall_to_box(boxes_[k], down_, boxes_[i]);
       fall = std::min(fall, down);
-      r.meets_body =
-          r.meets_body || flies || (!r.held && down <= falls) || (!held(def_.bodies[k]) && up <= falls);
+      r.meets_body = r.meets_body || flies || (!r.held && down <= falls) || (!held(k) && up <= falls);
     }
+    r.touches = met || r.meets_body || (!r.held && fall <= falls);
   }
 
   // Models that take cells of this kind, and that the processor computes: "device" leaves it (device.h).
@@ -398,7 +505,7 @@ class Reader {
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.try_find(DFM_KIND_MODEL, m.id);
       if (!type || off_card(types_, *type) || !(model_of(*type).cells & cell)) continue;
-      if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
+      if (b.device == "gpu" && !whole_on_card(context_, def_, files_, b, *type)) continue;
       out.push_back(m.id);
     }
     return out;
@@ -436,17 +543,18 @@ class Reader {
     r.damping_mass = m.def.damping_mass;
     r.damping_stiffness = m.def.damping_stiffness;
     r.load = g_;
-    for (const Force &f : b.forces)
-      r.load += length(f.total) / (m.def.density * info.volume * std::pow(b.scale, 3));
-    r.held = held(b);
+    double force = 0;  // N
+    for (const Force &f : b.forces) force += greatest(f);
+    for (const NodalRow &row : nodal_[i]) force += length(row.force);
+    r.load += force / (m.def.density * info.volume * std::pow(b.scale, 3));
+    r.held = held(i);
     const double thrown = length(b.def.velocity);
     const double falls = g_ > 0 ? 0.5 * g_ * def_.duration * def_.duration : 0;
     double fall = HUGE_VAL;
-    r.presses = def_.rigid.bodies.empty() && !one_is_thrown() ? 0 : HUGE_VAL;
+    r.presses = one_is_thrown() ? HUGE_VAL : 0;
     find_contacts(i, falls, fall, r);
     r.below = fall;
     const double s = r.held ? HUGE_VAL : fall;
-    r.touches = s <= falls || r.meets_body || something_moves();
     r.speed = thrown + 0.5 * length(b.def.spin) * r.length;
     if (!r.held) {
       const double way = std::min(s, falls);
@@ -469,9 +577,13 @@ class Reader {
   dfm_context *context_;
   const Definition &def_;
   const Registry &types_;
-  MeshFiles files_;
-  double g_ = 0, down_[3] = {};
+  MeshFiles &files_;
+  double g_ = 0, down_[3] = {};      // the greatest gravity in the run
+  std::vector<Obstacle> obstacles_;  // as they begin, then those that tools are
+  // by body
   std::vector<BodyMesh> meshes_;
+  std::vector<std::vector<NodalRow>> nodal_;
+  std::vector<Hold> holds_;
   std::vector<Extent> boxes_;
   std::map<size_t, bool> convex_;                              // bodies
   std::map<std::pair<std::string, std::string>, bool> takes_;  // body, model
@@ -500,16 +612,17 @@ json way_json(const Way &way, const Definition &def) {
 
 }  // namespace
 
-std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Measured &measured) {
-  return Reader(context, def).run(measured);
+std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, MeshFiles &files,
+                                const Measured &measured) {
+  return Reader(context, def, files).run(measured);
 }
 
-json plan_scene(dfm_context *context, const Definition &def, json &tree) {
+json plan_scene(dfm_context *context, const Definition &def, MeshFiles &files, json &tree) {
   Wish wish = def.wanted;
   wish.duration = def.duration;
   wish.step = def.step;
   const Measured measured = read_costs();
-  Reader reader(context, def);
+  Reader reader(context, def, files);
   std::vector<BodyRegime> own = reader.run(measured);
   PlannedWay plan = reader.plan(own, measured, wish);
   std::vector<BodyRegime> bodies = own;
@@ -585,8 +698,19 @@ json plan_scene(dfm_context *context, const Definition &def, json &tree) {
   }
   json considered = json::array();
   for (const Way &w : plan.considered) considered.push_back(way_json(w, def));
+  // What is not predicted is not claimed.
+  std::vector<std::string> unknown;
+  for (size_t i = 0; i < bodies.size(); ++i)
+    if (const std::vector<std::string> what = reader.left_out(i, bodies[i]); !what.empty())
+      unknown.push_back(format("body '%s': the prediction leaves out %s", bodies[i].name.c_str(),
+                               join(what, ", ").c_str()));
+  plan.assumed.insert(plan.assumed.end(), unknown.begin(), unknown.end());
+  const bool claims = unknown.empty() || !(wish.target > 0) || !plan.meets;
+  if (!claims)
+    plan.missed = format("whether the target of %.3g %% is met is not known: ", 100 * wish.target) +
+                  join(unknown, "; ");
   json out = {{"costs", measured.machine},
-              {"meets", plan.meets},
+              {"meets", claims ? json(plan.meets) : json()},
               {"set", set},
               {"predicted", way_json(plan.way, def)},
               {"assumed", plan.assumed},

@@ -2,7 +2,7 @@
 // from the definition and its meshes, lets accuracy.h choose, and returns the corresponding scene keys.
 #pragma once
 #include "scene/planner/accuracy.h"
-#include "scene/defs.h"
+#include "scene/load.h"
 #include "scene/node.h"
 
 namespace dfm::scene {
@@ -12,10 +12,11 @@ namespace dfm::scene {
 Measured read_costs();
 
 // What the planner derives of each body.
-std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, const Measured &measured);
+std::vector<BodyRegime> regimes(dfm_context *context, const Definition &def, MeshFiles &files,
+                                const Measured &measured);
 
 // Chooses what the scene leaves open (model of a body, integrator, step, contact tolerance), writes it into
 // the tree and returns the value of /accuracy/chosen or /budget/chosen. Keys that the scene names are kept.
-json plan_scene(dfm_context *context, const Definition &def, json &tree);
+json plan_scene(dfm_context *context, const Definition &def, MeshFiles &files, json &tree);
 
 }  // namespace dfm::scene
