@@ -35,8 +35,11 @@ double angle_of(double y, double x) {
   if (x < 0) return (y < 0 ? -kPi : kPi) - angle_of(y, -x);
   double t = y / (x + std::sqrt(x * x + y * y));
   for (int n = 0; n < 2; ++n) t /= 1 + std::sqrt(1 + t * t);
+  constexpr double kParts[] = {1.0 / 23, 1.0 / 21, 1.0 / 19, 1.0 / 17, 1.0 / 15, 1.0 / 13,
+                               1.0 / 11, 1.0 / 9,  1.0 / 7,  1.0 / 5,  1.0 / 3,  1.0};
+  const double square = t * t;
   double sum = 0;
-  for (int n = 23; n > 0; n -= 2) sum = 1.0 / n - t * t * sum;
+  for (const double part : kParts) sum = part - square * sum;
   return 8 * t * sum;
 }
 
@@ -114,8 +117,11 @@ std::vector<size_t> clusters_of(const std::vector<double> &x, std::vector<uint32
 
 struct Boundary::Triangle {
   uint32_t corner[3];
-  double y[3][3], n[3], c[3][3], center[3];  // c: n x grad of a corner's shape function
+  double y[3][3], n[3], c[3][3], center[3];  // c: n x gradient of a corner's shape function
   double area, radius;                       // radius: about the center
+  // Of the side from each corner to the next: direction, outward normal in the plane, length. Gradients of
+  // the shape functions.
+  double along[3][3], beside[3][3], side[3], gradient[3][3];
 
   void take(const uint32_t *corners, const double *const *x) {
     double e[3], f[3];
@@ -142,6 +148,17 @@ struct Boundary::Triangle {
       }
       radius = std::max(radius, std::sqrt(dot(d, d)));
     }
+    for (int a = 0; a < 3; ++a) {
+      const int b = (a + 1) % 3;
+      for (int k = 0; k < 3; ++k) {
+        along[a][k] = y[b][k] - y[a][k];
+        beside[a][k] = gradient[a][k] = 0;
+      }
+      side[a] = std::sqrt(dot(along[a], along[a]));
+      for (double &k : along[a]) k /= side[a];
+      cross_add(along[a], n, 1, beside[a]);
+      cross_add(c[a], n, 1, gradient[a]);
+    }
   }
 
   // at x; own: x lies in the triangle, and the solid angle is its principal value, zero
@@ -164,19 +181,15 @@ struct Boundary::Triangle {
     double line[3] = {}, plane[9] = {}, inverse = 0;
     for (int a = 0; a < 3; ++a) {
       const int b = (a + 1) % 3;
-      double s[3], m[3] = {};
-      for (int k = 0; k < 3; ++k) s[k] = y[b][k] - y[a][k];
-      const double side = std::sqrt(dot(s, s));
-      for (double &k : s) k /= side;
-      cross_add(s, n, 1, m);
-      const double from = dot(to[a], s), until = from + side, t = dot(to[a], m);
+      const double *const s = along[a], *const m = beside[a];
+      const double from = dot(to[a], s), until = from + side[a], t = dot(to[a], m);
       const double f = from + until > 0 ? dfm_log((length[b] + until) / (length[a] + from))
                                         : dfm_log((length[a] - from) / (length[b] - until));
       inverse += t * f;
-      const double along = length[b] - length[a];
+      const double longer = length[b] - length[a];
       for (int i = 0; i < 3; ++i) {
         line[i] += f * m[i];
-        for (int j = 0; j < 3; ++j) plane[3 * i + j] -= m[i] * (t * f * m[j] + along * s[j]);
+        for (int j = 0; j < 3; ++j) plane[3 * i + j] -= m[i] * (t * f * m[j] + longer * s[j]);
       }
     }
     inverse -= height * solid;
@@ -187,11 +200,9 @@ struct Boundary::Triangle {
         out.dyad[3 * i + j] = plane[3 * i + j] + ((i == j) - n[i] * n[j]) * inverse +
                               height * (line[i] * n[j] + n[i] * line[j]) + height * solid * n[i] * n[j];
     for (int a = 0; a < 3; ++a) {
-      // grad of the shape function = c x n
-      double g[3] = {}, d[3];
-      cross_add(c[a], n, 1, g);
+      double d[3];
       for (int k = 0; k < 3; ++k) d[k] = -to[a][k];
-      out.normal[a] = (1 + dot(g, d)) * solid - height * dot(g, line);
+      out.normal[a] = (1 + dot(gradient[a], d)) * solid - height * dot(gradient[a], line);
     }
   }
 

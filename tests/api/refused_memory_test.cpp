@@ -3,6 +3,8 @@
 // a world that never missed any.
 #include "refused_memory.h"
 
+#include <algorithm>
+#include <array>
 #include <functional>
 
 #include "bristle_law.h"
@@ -142,13 +144,16 @@ dfm_world changing(dfm_context *c) {
   return w;
 }
 
+using Hashes = std::array<uint64_t, kSteps>;  // after each step
+
 // Steps with the n-th allocation from here on refused; what failed is tried again with memory back. Whether
-// the n-th was reached.
-bool walk(dfm_context *c, const Build &build, int64_t n, uint64_t expected, int *refused) {
+// the n-th was reached. Two more steps follow that, of every eighth walk all.
+bool walk(dfm_context *c, const Build &build, int64_t n, const Hashes &expected, int *refused) {
   const dfm_world w = build(c);
   Refusal::arm(n);
   bool armed = true, came = false;
-  for (int i = 0; i < kSteps; ++i) {
+  int last = kSteps - 1;
+  for (int i = 0; i <= last; ++i) {
     const int64_t kept = Refusal::refuse;
     const uint64_t before = dfm_world_hash(w);
     dfm_status status = dfm_world_step(w, kStep, nullptr);
@@ -156,6 +161,7 @@ bool walk(dfm_context *c, const Build &build, int64_t n, uint64_t expected, int 
       Refusal::disarm();
       armed = false;
       came = true;
+      if (n % 8 != 0) last = std::min(last, i + 2);
     }
     if (status == DFM_OK) continue;
     ++*refused;
@@ -167,7 +173,7 @@ bool walk(dfm_context *c, const Build &build, int64_t n, uint64_t expected, int 
     EXPECT_EQ(status, DFM_OK) << "allocation " << n << ", step " << i << ": " << dfm_last_error();
   }
   if (armed) Refusal::disarm();
-  EXPECT_EQ(dfm_world_hash(w), expected) << "allocation " << n;
+  EXPECT_EQ(dfm_world_hash(w), expected[size_t(last)]) << "allocation " << n;
   test::ok(dfm_world_destroy(w));
   return came;
 }
@@ -175,10 +181,13 @@ bool walk(dfm_context *c, const Build &build, int64_t n, uint64_t expected, int 
 void walk_all(const Build &build, int least) {
   dfm_context *const c = make_context();  // one: to load the plugins takes longer than the steps
   const dfm_world w = build(c);
-  for (int i = 0; i < kSteps; ++i) EXPECT_EQ(dfm_world_step(w, kStep, nullptr), DFM_OK) << dfm_last_error();
+  Hashes expected{};
+  for (uint64_t &hash : expected) {
+    EXPECT_EQ(dfm_world_step(w, kStep, nullptr), DFM_OK) << dfm_last_error();
+    hash = dfm_world_hash(w);
+  }
   EXPECT_EQ(test::stats(w).substeps_max, 1u);
   EXPECT_GT(test::contacts(w).size(), 0u) << "the scene has no contact: the walk would show little";
-  const uint64_t expected = dfm_world_hash(w);
   test::ok(dfm_world_destroy(w));
   int refused = 0;
   EXPECT_FALSE(walk(c, build, int64_t(1) << 40, expected, &refused));
@@ -209,17 +218,17 @@ namespace {
 
 constexpr double kCutStep = 1e-3;  // s
 
-// A cube that moves by a third of a cell in each step, and that a plane cuts in the second one.
+// A cube that moves by 6 mm in each step, and that a plane cuts in the second one.
 dfm_world flies(dfm_context *c, dfm_body *body) {
   const dfm_world w = test::make_world(c, {0, 0, 0});
   test::BodyOptions o;
   o.name = "cube";
   o.model = "corotational_fem";
   o.young = 3e4;
-  o.damping_stiffness = 2e-3;
+  o.damping_stiffness = 2e-4;
   o.position = {-0.02, -0.02, -0.032};
   o.velocity = {0, 0, 6};
-  *body = test::make_body(c, w, "beam", {0.04, 0.04, 0.04}, 40, o);
+  *body = test::make_body(c, w, "beam", {0.04, 0.04, 0.04}, 20, o);
   const dfm_separate_def rule = dfm_separate_def_default();
   test::ok(dfm_body_set_separate(*body, &rule));
   return w;

@@ -363,7 +363,7 @@ TEST(RigidJoints, Motors_ComeBackWithASnapshot) {
     void motor(double velocity, double max) { test::ok(dfm_rigid_set_motor(arm, 0, velocity, max)); }
     void restore(const std::string &data) { test::ok(dfm_world_restore(w, data.data(), data.size())); }
   };
-  for (const double max : {50.0, 1e6}) {
+  for (const double max : {50.0, 1e4}) {
     Arm a, anew;
     a.motor(1, max);
     go(a.w, 1e-3, 0.1);

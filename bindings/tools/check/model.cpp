@@ -184,7 +184,9 @@ Solid with_cells(const Solid &of, uint32_t cell) {
   return out;
 }
 
-Solid small_block(Held held) { return block(3, 3, 2, held); }
+Solid small_block(uint32_t cell, Held held) {
+  return block(3, 3, cell == DFM_CELL_TET || cell == DFM_CELL_HEX8 ? 2 : 1, held);
+}
 
 const dfm_model &model_of(const Subject &subject) {
   return *static_cast<const dfm_model *>(subject.type->ops);

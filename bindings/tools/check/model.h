@@ -46,7 +46,9 @@ struct Solid {
 Solid block(uint32_t x, uint32_t y, uint32_t z, Held held = Held::nothing);
 // The same block of other cells: cubes, or cells of second order whose edges are straight.
 Solid with_cells(const Solid &tetrahedra, uint32_t cell);
-Solid small_block(Held held = Held::nothing);  // 48 points: arrays of 64-byte lines at every stride
+// 48 points: arrays of 64-byte lines at every stride. For cells of second order, which have points at their
+// middles too, half as thick; still more cells than a SIMD register has lanes.
+Solid small_block(uint32_t cell = DFM_CELL_TET, Held held = Held::nothing);
 
 // Parameters with which rules are checked: the defaults, the defaults with damping, each word of each
 // enumeration, and the first two with the other kinds of cells that the model takes. What create refuses is

@@ -52,7 +52,7 @@ void rests(Body &body, const char *where) {
 std::string rest_pose_is_free(const Subject &subject) {
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     if (body.steps_itself()) return rests(body, "where it was made");
     const double scale = force_scale(body, random), most = largest(body.forces());
     if (!(most <= 1e-9 * scale))
@@ -69,7 +69,7 @@ std::string rigid_motion_is_free(const Subject &subject) {
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
     for (const double angle : {1e-3, 0.7, 3.0}) {
-      Body body(subject, small_block(), variant);
+      Body body(subject, small_block(variant.cell), variant);
       if (!body.can(DFM_CAP_ROTATION_INVARIANT)) return;
       const double scale = body.steps_itself() ? 0 : force_scale(body, random);
       if (body.steps_itself()) {
@@ -80,7 +80,7 @@ std::string rigid_motion_is_free(const Subject &subject) {
       body.shake(kMiddle * kCube, 0, random);
       const Numbers before = body.forces();
       const double joule = body.can(DFM_CAP_ENERGY) ? body.energy() : 0;
-      Body turned(subject, small_block(), variant);
+      Body turned(subject, small_block(variant.cell), variant);
       turned.x = before;
       const double nowhere[3] = {};
       turned.turn(kAxis, angle, nowhere);
@@ -137,7 +137,7 @@ double apart(const double *a, const double *b) {
 
 void keeps_momentum_of_steps(const Subject &subject, const Variant &variant) {
   Random random(subject.seed);
-  Body body(subject, small_block(), variant);
+  Body body(subject, small_block(variant.cell), variant);
   body.shake(kMiddle * kCube, 0.05, random);
   // The first step may take the velocities to what the model can have; from then on nothing may be lost.
   body.advance(1e-3);
@@ -162,7 +162,7 @@ void keeps_momentum_of_steps(const Subject &subject, const Variant &variant) {
 std::string forces_sum_to_zero(const Subject &subject) {
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     if (body.steps_itself()) return keeps_momentum_of_steps(subject, variant);
     for (const double share : {kMiddle, kLarge}) {
       body.shake(share * kCube, 0, random);
@@ -189,7 +189,7 @@ std::string forces_are_the_gradient(const Subject &subject) {
   double worst = 0;
   const std::string summary = for_variants(subject, [&](const Variant &variant) {
     for (const double share : {kMiddle, kLarge}) {
-      Body body(subject, small_block(), variant);
+      Body body(subject, small_block(variant.cell), variant);
       if (!body.can(DFM_CAP_ENERGY)) return;
       body.shake(share * kCube, 0, random);
       const Numbers f = body.forces(), x = body.x;
@@ -306,7 +306,7 @@ std::string stiffness_is_the_derivative(const Subject &subject) {
   return for_variants(subject, [&](const Variant &variant) {
     // At rest no part makes it indefinite, so none may be left out; what may is small where strains are.
     for (const Tangent &t : {Tangent{0, 1e-5}, Tangent{kSmall, 0.05}, Tangent{kLarge, 0}}) {
-      Body body(subject, small_block(), variant);
+      Body body(subject, small_block(variant.cell), variant);
       if (!body.can(DFM_CAP_STIFFNESS)) return;
       body.shake(t.share * kCube, 0, random);
       tangent_agrees(body, t, random);
@@ -320,7 +320,7 @@ std::string constant_stiffness_is_constant(const Subject &subject) {
     skip("it does not claim DFM_CAP_CONSTANT_STIFFNESS");
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     if (!body.can(DFM_CAP_CONSTANT_STIFFNESS)) return;
     const std::vector<double> before = body.stiffness(1, 0.1);
     body.shake(kLarge * kCube, 1, random);
@@ -338,7 +338,7 @@ std::string dampers_take_energy(const Subject &subject) {
   const bool damps = (model_of(subject).caps & DFM_CAP_DAMPING) != 0;
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     body.shake(kLarge * kCube, 0, random);
     const Numbers still = body.forces();
     bool changed = false;
@@ -374,7 +374,7 @@ std::string dampers_take_energy(const Subject &subject) {
 std::string numbering_does_not_matter(const Subject &subject) {
   Random random(subject.seed);
   return for_variants(subject, [&](const Variant &variant) {
-    const Solid one = with_cells(small_block(), variant.cell);
+    const Solid one = with_cells(small_block(variant.cell), variant.cell);
     const size_t nodes = one.nodes();
     Solid other = one;
     std::vector<uint32_t> to(one.npoint()), cell(one.ncell());
@@ -446,7 +446,7 @@ std::string collapsed_cells_stay_finite(const Subject &subject) {
   uint32_t discarded = 0;
   const std::string summary = for_variants(subject, [&](const Variant &variant) {
     for (size_t how = 0; how < std::size(kCollapses); ++how) {
-      Body body(subject, small_block(), variant);
+      Body body(subject, small_block(variant.cell), variant);
       collapse(body, how);
       stage("%s, %s", with(variant).c_str(), kCollapses[how]);
       Numbers out(body.x.size(), 0.0), v = out;
@@ -485,7 +485,7 @@ std::string cell_energy_sums(const Subject &subject) {
   Random random(subject.seed);
   bool offered = false;
   const std::string summary = for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     const auto *own = static_cast<const dfm_cell_energy *>(body.extension(DFM_EXT_CELL_ENERGY));
     if (!own || !own->cell_energy || !body.can(DFM_CAP_ENERGY)) return;
     offered = true;

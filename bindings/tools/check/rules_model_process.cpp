@@ -122,7 +122,7 @@ std::string step_keeps_to_itself(const Subject &subject) {
   uint32_t calls = 0;
   for_variants(subject, [&](const Variant &variant) {
     Random random(subject.seed);
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     body.shake(0.01 * kCube, 0.01, random);
     StepCalls step(body);
     const auto returned = [&](const char *name, dfm_status status) { must_be_good(name, status); };
@@ -154,7 +154,7 @@ std::string step_keeps_to_itself(const Subject &subject) {
 std::string step_writes_no_static(const Subject &subject) {
   return for_variants(subject, [&](const Variant &variant) {
     Random random(subject.seed);
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     body.shake(0.01 * kCube, 0.01, random);
     StepCalls step(body);
     step.each([&](const char *name, const auto &call) { must_be_good(name, body.call(name, call)); });
@@ -354,7 +354,7 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
     for (const uint32_t stride : {4u, 3u, 5u, 8u})
       for (const Fenced::Place place : {Fenced::at_end, Fenced::at_start}) {
         Random random(subject.seed);
-        Body body(subject, small_block(), variant, stride);
+        Body body(subject, small_block(variant.cell), variant, stride);
         body.shake(0.01 * kCube, 0.01, random);
         FencedBody fenced(body, place);
         fenced.run();
@@ -366,7 +366,7 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
               stride);
       }
     Random random(subject.seed);
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     body.shake(0.01 * kCube, 0.01, random);
     keeps_what_others_added(body);
   });
@@ -377,7 +377,8 @@ std::string model_stays_in_its_arrays(const Subject &subject) {
 std::string model_same_bits(const Subject &subject) {
   for_variants(subject, [&](const Variant &variant) {
     Random random(subject.seed);
-    Body body(subject, small_block(), variant), other(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant),
+        other(subject, small_block(variant.cell), variant);
     body.shake(0.01 * kCube, 0.01, random);
     other.x = body.x;
     other.v = body.v;
@@ -412,7 +413,7 @@ std::string bad_point_returns(const Subject &subject) {
     for (const double bad :
          {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e200})
       for (const bool place : {true, false}) {
-        Body body(subject, small_block(), variant);
+        Body body(subject, small_block(variant.cell), variant);
         StepCalls step(body);
         (place ? body.x : body.v)[size_t(body.stride) * 7 + 1] = bad;
         stage("%s, point 7 has %s %g", with(variant).c_str(), place ? "position" : "velocity", bad);

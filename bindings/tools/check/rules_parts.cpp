@@ -90,7 +90,7 @@ std::string parts_are_the_whole(const Subject &subject) {
   Random random(subject.seed);
   bool offered = false;
   const std::string summary = for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     const auto *table = static_cast<const dfm_part_forces *>(body.extension(DFM_EXT_PART_FORCES));
     if (!table || !table->parts || !table->forces) return;  // V03
     offered = true;

@@ -45,7 +45,7 @@ std::string single_is_close(const Subject &subject) {
   Random random(subject.seed);
   bool offered = false;
   const std::string summary = for_variants(subject, [&](const Variant &variant) {
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     const auto *table = static_cast<const dfm_f32 *>(body.extension(DFM_EXT_F32));
     if (!table || !table->prepare || !table->add_forces) return;  // V03
     offered = true;

@@ -52,7 +52,7 @@ uint64_t digest_of_model(const Subject &subject) {
   uint64_t hash = 0xcbf29ce484222325ull;
   for (const Variant &variant : variants(subject)) {
     Random random(subject.seed);
-    Body body(subject, small_block(), variant);
+    Body body(subject, small_block(variant.cell), variant);
     const double h = safe_step(body);
     body.shake(0.01 * kCube, 0.01, random);
     run(body, 4, h);
@@ -67,14 +67,14 @@ uint64_t digest_of_model(const Subject &subject) {
 std::string state_is_the_hosts(const Subject &subject) {
   return for_variants(subject, [&](const Variant &variant) {
     Random random(subject.seed);
-    Body one(subject, small_block(), variant);
+    Body one(subject, small_block(variant.cell), variant);
     const double h = safe_step(one);
     one.shake(0.01 * kCube, 0.01, random);
     run(one, 5, h);
     poke(one);
     run(one, 2, h);
     // What the host has of it goes to an instance that never was anywhere else.
-    Body other(subject, small_block(), variant);
+    Body other(subject, small_block(variant.cell), variant);
     const Moment saved = one;
     other.take(saved);
     for (Body *body : {&one, &other}) {
@@ -91,7 +91,7 @@ std::string state_is_the_hosts(const Subject &subject) {
     // The same instance is taken back, as by rollback, with another one's steps in between.
     Body &again = one;
     again.take(saved);
-    Body between(subject, small_block(Held::one_side), variant, 4, Body::Refusal::is_reported);
+    Body between(subject, small_block(variant.cell, Held::one_side), variant, 4, Body::Refusal::is_reported);
     if (between.made()) {
       between.shake(0.05 * kCube, 0.1, random);
       run(between, 2, h);
@@ -198,7 +198,7 @@ std::string bound_is_honest(const Subject &subject) {
   const std::string summary = for_variants(subject, [&](const Variant &variant) {
     Random random(subject.seed);
     for (const double share : {0.0, 0.05}) {
-      Body body(subject, small_block(), variant);
+      Body body(subject, small_block(variant.cell), variant);
       body.shake(share * kCube, 0, random);
       const double h = body.longest_step();
       if (!(h > 0) || h > 1e6)
@@ -259,7 +259,7 @@ std::string for_steppers(const Subject &subject, const F &rule) {
   return for_variants(subject, [&](const Variant &variant) {
     for (const Held held : {Held::nothing, Held::one_side}) {
       Random random(subject.seed);
-      Body body(subject, small_block(held), variant, 4, Body::Refusal::is_reported);
+      Body body(subject, small_block(variant.cell, held), variant, 4, Body::Refusal::is_reported);
       if (!body.made()) continue;  // held bodies may be none of its
       only_steppers(body);
       stage("%s, %s", with(variant).c_str(), held == Held::nothing ? "free" : "one side held");
