@@ -17,7 +17,7 @@
   X(Init) X(Terminate) X(GetError) X(WindowHint) X(CreateWindow) X(DestroyWindow) X(MakeContextCurrent) \
   X(GetProcAddress) X(SwapInterval) X(SwapBuffers) X(PollEvents) X(WaitEventsTimeout) X(WindowShouldClose) \
   X(GetFramebufferSize) X(GetWindowSize) X(GetWindowContentScale) X(SetKeyCallback) \
-  X(SetMouseButtonCallback) X(SetCursorPosCallback) X(SetScrollCallback) X(GetTime)
+  X(SetMouseButtonCallback) X(SetCursorPosCallback) X(SetScrollCallback) X(GetTime) X(GetKeyName)
 // clang-format on
 
 namespace view {
@@ -48,7 +48,14 @@ Glfw open_glfw() {
   return glfw;
 }
 
-std::string key_name(int key, int mods) {
+const std::string kWays[] = {"left", "right", "up", "down", "pageup", "pagedown"};
+
+// What the layout puts on a key that prints. GLFW's own letters are places on a US keyboard, for layouts
+// without Latin letters.
+std::string key_name(const Glfw &glfw, int key, int scancode, int mods) {
+  const char *const printed = key < GLFW_KEY_ESCAPE ? glfw.GetKeyName(key, scancode) : nullptr;
+  if (printed && static_cast<unsigned char>(*printed) < 0x80 && !printed[1])
+    return (*printed >= 'a' && *printed <= 'z') || *printed == '.' ? printed : "";
   if (key >= GLFW_KEY_A && key <= GLFW_KEY_Z) return std::string(1, char('a' + key - GLFW_KEY_A));
   if (key >= GLFW_KEY_F1 && key <= GLFW_KEY_F12) return "f" + std::to_string(key - GLFW_KEY_F1 + 1);
   static const struct {
@@ -58,13 +65,19 @@ std::string key_name(int key, int mods) {
                 {GLFW_KEY_RIGHT, "right"}, {GLFW_KEY_HOME, "home"},         {GLFW_KEY_PERIOD, "."},
                 {GLFW_KEY_UP, "up"},       {GLFW_KEY_DOWN, "down"},         {GLFW_KEY_PAGE_UP, "pageup"},
                 {GLFW_KEY_TAB, "tab"},     {GLFW_KEY_PAGE_DOWN, "pagedown"}};
-  static const std::string kWays[] = {"left", "right", "up", "down", "pageup", "pagedown"};
   for (const auto &k : kNames) {
     if (k.key != key) continue;
     const bool way = std::find(std::begin(kWays), std::end(kWays), k.name) != std::end(kWays);
     return (way && (mods & GLFW_MOD_SHIFT) ? "shift+" : "") + std::string(k.name);
   }
   return "";
+}
+
+// Held, a key that moves something goes on; what switches or writes does so once.
+bool repeats(const std::string &name) {
+  const std::string way = name.starts_with("shift+") ? name.substr(6) : name;
+  return way == "s" || way == "." || way == "j" || way == "k" ||
+         std::find(std::begin(kWays), std::end(kWays), way) != std::end(kWays);
 }
 
 // ImGui's own is a bitmap of 13 pixels; a machine with a desktop has one of these.
@@ -184,9 +197,9 @@ class GlfwWindow final : public Window {
 
   void listen() {
     one_ = this;
-    glfw_.SetKeyCallback(window_, [](GLFWwindow *w, int key, int, int action, int mods) {
-      const std::string name = key_name(key, mods);
-      if (name.empty() || action == GLFW_RELEASE) return;
+    glfw_.SetKeyCallback(window_, [](GLFWwindow *w, int key, int scancode, int action, int mods) {
+      const std::string name = key_name(of(w).glfw_, key, scancode, mods);
+      if (name.empty() || action == GLFW_RELEASE || (action == GLFW_REPEAT && !repeats(name))) return;
       Input in;
       in.kind = Input::key;
       in.name = name;

@@ -19,6 +19,7 @@ import unittest.mock
 import numpy as np
 
 import deform
+from deform._library import refuse_foreign
 from deform.study import __main__ as command_line
 from deform.study.design import points
 from deform.study.engine import Engine, Failed, Results
@@ -455,6 +456,18 @@ class Outputs(InAFolder):
             for _ in range(2):  # its own it replaces
                 self.command("sweep", study, "--out", self.out, *options)
 
+    def test_parquet_of_others_stays_as_it_is(self):
+        study = self.study(design={"method": "random", "runs": 1})
+        foreign = self.out / "sweep.parquet"
+        foreign.parent.mkdir(parents=True, exist_ok=True)
+        foreign.write_bytes(b"PAR1 mine PAR1")
+        said = self.command("sweep", study, "--out", self.out, "--parquet", code=2).stderr
+        self.assertIn(f"{foreign}: another program wrote this file", said)
+        self.command("sweep", study, "--out", self.out)  # does not write it
+        self.assertEqual(foreign.read_bytes(), b"PAR1 mine PAR1")
+        foreign.write_bytes(b"PAR1" + bytes(3 << 20) + b"deform sweep" + bytes(100))
+        refuse_foreign(foreign, "deform sweep")
+
     def test_columns_of_one_kind(self):
         self.assertEqual(of_one_kind([1, 0.5, None]), [1, 0.5, None])
         self.assertEqual(of_one_kind(["a", None]), ["a", None])
@@ -483,7 +496,8 @@ class Outputs(InAFolder):
             self.assertTrue((self.out / "sweep.csv").exists())
             self.assertTrue((self.out / "sweep.html").exists())
             return
-        self.command("sweep", study, "--out", self.out, "--parquet")
+        for _ in range(2):  # its own it replaces
+            self.command("sweep", study, "--out", self.out, "--parquet")
         table = pyarrow.parquet.read_table(self.out / "sweep.parquet")
         self.assertEqual(table.schema.field("v").metadata, {b"unit": b"m/s"})
         self.assertEqual(table.num_rows, 4)

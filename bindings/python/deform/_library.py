@@ -185,10 +185,13 @@ def encoded(text: Any) -> bytes | None:
 
 
 def refuse_foreign(path: pathlib.Path, mark: str) -> None:
-    """Refuses to change a file whose first bytes do not hold the mark of what is to be written there."""
+    """Refuses to change a file that has the mark of what is to be written there neither at its beginning nor
+    at its end."""
     try:
         with open(path, "rb") as file:
             found = file.read(1 << 20)
+            file.seek(max(file.tell(), os.fstat(file.fileno()).st_size - (1 << 20)))
+            found += file.read()
     except (FileNotFoundError, NotADirectoryError):
         return
     if found and mark.encode() not in found:

@@ -69,7 +69,8 @@ def _sweep(given: Any) -> int:
         return 0
     only = _only(given.only)
     if only is None:
-        _refuse_others(given, SWEEP_MARKS)
+        _refuse_others(given, {name: mark for name, mark in SWEEP_MARKS.items()
+                               if given.parquet or name != "sweep.parquet"})
     rows = sweep(given.study, out=given.out, executor=given.executor, workers=given.workers,
                  address=given.address, retry=given.retry, only=only, progress=not given.quiet)
     if only is None:

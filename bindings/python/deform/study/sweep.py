@@ -16,7 +16,7 @@ from .spec import Study, read_study
 from .store import Store
 
 # What write() makes, and what tells that it was made by it.
-MARKS = {"sweep.csv": ",state,said,seconds", "sweep.html": "<title>Sweep ",
+MARKS = {"sweep.csv": ",state,said,seconds", "sweep.html": "<title>Sweep ", "sweep.parquet": "deform sweep",
          **dict.fromkeys(("curves.png", "map.png", "parallel.png"), plots.MARK)}
 
 
@@ -61,7 +61,7 @@ class Sweep(Table):
                                       [table(self, self.columns, self.units)]), MARKS["sweep.html"])
         if parquet:
             written.append(self.folder / "sweep.parquet")
-            tables.write_parquet(written[-1], self, self.columns, self.units)
+            tables.write_parquet(written[-1], self, self.columns, self.units, MARKS["sweep.parquet"])
         return written
 
 

@@ -55,7 +55,8 @@ def of_one_kind(column: Sequence[Any]) -> list[Any]:
     return [str(value) if len(kinds) > 1 and value is not None else value for value in column]
 
 
-def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str]) -> None:
+def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units: Mapping[str, str],
+                  mark: str) -> None:
     try:
         import pyarrow as arrow
         import pyarrow.parquet
@@ -69,8 +70,9 @@ def write_parquet(path: pathlib.Path, rows: Rows, columns: Sequence[str], units:
         metadata = {"unit": units[name]} if units.get(name) else None
         fields.append(arrow.field(name, array.type, metadata=metadata))
     file = io.BytesIO()
-    arrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), file)
-    write_whole(path, file.getvalue())
+    schema = arrow.schema(fields, metadata={"written_by": mark})  # stands uncompressed at the file's end
+    arrow.parquet.write_table(arrow.Table.from_arrays(arrays, schema=schema), file)
+    write_whole(path, file.getvalue(), mark)
 
 
 def shown(value: Any) -> str:
