@@ -284,9 +284,9 @@ void Boundary::find(const dfm_host *host, const char *id, const dfm_mesh &m) {
   if (ntriangle() > kMaxTriangles)
     model::refuse(
         host, id,
-        "%zu triangles; more than %zu are refused, because their matrices take minutes and gigabytes; "
+        "%u triangles; more than %u are refused, because their matrices take minutes and gigabytes; "
         "take a coarser mesh, which a fine surface may hang on",
-        ntriangle(), kMaxTriangles);
+        unsigned(ntriangle()), unsigned(kMaxTriangles));
   // The first point of each piece leads its others.
   std::vector<uint32_t> leader(m.npoint);
   for (uint32_t i = 0; i < m.npoint; ++i) leader[i] = i;
@@ -467,9 +467,9 @@ void Boundary::assemble(const char *id, const Kernels &kernels, const double *re
     }
   make_rigid_exact(rest, block);
   model::say(host_, asymmetry_ > 1e-3 ? 2 : 1, id,
-             "%zu triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
+             "%u triangles; before they are made exact, the symmetry of the integrals is off by %.2g, and "
              "forces under rigid motions are %.2g of the stiffness",
-             many, asymmetry_, rigid_error_);
+             unsigned(many), asymmetry_, rigid_error_);
 }
 
 // block -= f, at clusters of points from which on

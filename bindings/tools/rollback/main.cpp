@@ -1,6 +1,5 @@
 // deform-rollback, which `deform rollback SCENE.json` starts: `deform run` by the collision solution of
 // Zerbato (2010), for comparison.
-#include <cstring>
 #include <memory>
 #include <string>
 
@@ -21,7 +20,7 @@ void add_rollback(Command app, Globals &globals, int *exit_code) {
     RunOptions run = *options;
     for (const char *const own :
          {"/time/mode=dynamic", "/time/integrator=symplectic_euler", "/contact/guard=false"}) {
-      const std::string pointer(own, std::strchr(own, '=') + 1);
+      const std::string whole = own, pointer = whole.substr(0, whole.find('=') + 1);
       for (const std::string &set : options->set)
         if (set.starts_with(pointer))
           throw Failure(kBadInput, "--set " + set + ": the collision solution needs " + own + "; omit it");
