@@ -7,14 +7,27 @@
 namespace dfm {
 namespace {
 
+using Two = double __attribute__((vector_size(16), aligned(8), may_alias));
+const Two &two(const double *at) { return *reinterpret_cast<const Two *>(at); }
+
 // One sum would wait for each addition; four sums run in parallel.
 double product(size_t n, const double *a, const double *b) {
-  double sum[4] = {};
+  Two low = {}, high = {};
   size_t k = 0;
-  for (; k + 4 <= n; k += 4)
-    for (size_t lane = 0; lane < 4; ++lane) sum[lane] += a[k + lane] * b[k + lane];
+  for (; k + 4 <= n; k += 4) {
+    low += two(a + k) * two(b + k);
+    high += two(a + k + 2) * two(b + k + 2);
+  }
+  double sum[4] = {low[0], low[1], high[0], high[1]};
   for (; k < n; ++k) sum[k % 4] += a[k] * b[k];
   return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+
+// to -= by a
+void subtract(size_t n, double by, const double *a, double *to) {
+  size_t k = 0;
+  for (; k + 2 <= n; k += 2) *reinterpret_cast<Two *>(to + k) -= by * two(a + k);
+  for (; k < n; ++k) to[k] -= by * a[k];
 }
 
 }  // namespace
@@ -81,8 +94,7 @@ bool Anderson::next(const double *x, const double *g, double *jump) {
   slot_ = (slot_ + 1) % kWindow;
   if (!combination(y, gamma)) return false;
   std::fill_n(jump, n, 0.0);
-  for (uint32_t j = 0; j < count_; ++j)
-    for (size_t k = 0; k < n; ++k) jump[k] -= gamma[j] * dg_[j * n + k];
+  for (uint32_t j = 0; j < count_; ++j) subtract(n, gamma[j], &dg_[j * n], jump);
   return true;
 }
 

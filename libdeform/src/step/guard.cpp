@@ -26,14 +26,12 @@
 #include "geometry/pierce.h"
 #include "math/turn.h"
 #include "plugin/context.h"
-#include "state/bounds.h"
 #include "state/obstacle.h"
 #include "state/world.h"
 #include "step/context.h"
 #include "step/move_obstacles.h"
 #include "step/self_contact.h"
 #include "step/sides.h"
-#include "step/solve/solve_islands.h"
 #include "step/stages.h"
 #include "step/step_bound.h"
 #include "step/watch/energy_watch.h"
@@ -393,24 +391,6 @@ bool wake_hit(World &w, StepContext &step) {
   return w.sleepers < before;
 }
 
-// An impulse that alone would move its point faster than light is opposed by others that grow with it: the
-// problem that it belongs to has no solution, and its rounding error becomes motion. Things that are in each
-// other have no solution either, but are led apart (concepts/overlaps.md).
-bool overloaded(const StepContext &step) {
-  if (!(step.residual.required > 1)) return false;
-  for (const SolveIsland &own : step.solve_islands->all()) {
-    if (!(own.residual.required > 1)) continue;
-    bool over = false, within = false;
-    each_row(own.part.contacts, [&](uint32_t i) {
-      if (i >= step.rows.soft()) return;
-      over = over || step.rows.wn[i] * step.rows.impulse[3 * size_t{i}] > kLight;
-      within = within || step.contacts[i].distance < 0;
-    });
-    if (over && !within) return true;
-  }
-  return false;
-}
-
 // No motion is left, and the contact solve has no solution: the bodies are jammed. Impulses that cannot help
 // would grow from sub-step to sub-step, and their rounding error would become motion. Only prescribed motion
 // can cause this, because a free body yields.
@@ -469,7 +449,6 @@ void check_motion(const World &w, StepContext &step, uint32_t i) {
 // Next::stop: trouble, or the sub-step is to be repeated, shorter.
 Next stage_guard(World &w, StepContext &step, uint32_t *trouble) {
   if (step.guard.solves == 0) step.guard.kept.clear();
-  if (overloaded(step)) return go_on(report_jam(w, step, trouble));
   if (!find_ends(w, step, trouble)) return Next::stop;
   bound_speeds(w, step);
   follow_ends(w, step);
