@@ -38,7 +38,7 @@ help:
 	@echo "make install PREFIX=  library, headers, plugins, command (default $(PREFIX))"
 	@echo "make wheel            the Python package for CPython 3.9 up, manylinux: build/dist/"
 	@echo "make wasm             scenes in a browser without a server: build/wasm/page/index.html"
-	@echo "make ports            the command for Linux on arm64 and for Windows, tested by qemu and Wine"
+	@echo "make ports            arm64 and Windows, tested by qemu and Wine; the wheel for Windows"
 	@echo "make deb              Debian packages of the same, build/release/packages/"
 	@echo "make packages         source archive, wheel; the same bytes from two folders: build/dist/"
 	@echo "make abi-report       build/abi/report.txt: what changed in the public headers, for release notes"
@@ -149,9 +149,11 @@ install: setup build/release/build.ninja
 	$(BUILD) release --target deform_viewer deform_tools
 	@cmake --install build/release --strip --prefix "$$(realpath -m -- "$(PREFIX)")"
 
+# $(call wheel_of,BUILD or no,FOLDER)
+wheel_of = @mkdir -p $(2) && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; \
+	  print(b.build_wheel('$(CURDIR)/$(2)', {'prebuilt': '$(1)'}))"
 wheel: setup
-	@mkdir -p build/dist && cd bindings/python && $(PYTHON) -B -c "import wheel_backend as b; \
-	  print(b.build_wheel('$(CURDIR)/build/dist', {'prebuilt': 'no'}))"
+	$(call wheel_of,no,build/dist)
 
 wasm: setup-wasm build/wasm/build.ninja
 	$(BUILD) wasm --target deform_page
@@ -167,6 +169,7 @@ ports: ports-built
 ports-built: setup-ports build/arm64/build.ninja build/windows/build.ninja
 	$(BUILD) arm64
 	$(BUILD) windows
+	$(call wheel_of,$(CURDIR)/build/windows,build/windows/dist)
 
 # What a release ships, from the source archive; compiles twice, in two folders, and compares.
 packages: setup

@@ -33,6 +33,7 @@ foreach(viewer view serve)
   endif()
 endforeach()
 install(TARGETS deform deform_headers EXPORT deformTargets
+  RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR} COMPONENT library
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT library NAMELINK_COMPONENT dev
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT dev)
 get_property(deform_plugins GLOBAL PROPERTY DEFORM_PLUGINS)

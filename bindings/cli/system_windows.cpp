@@ -1,4 +1,5 @@
 #include "system.h"
+#include "system_windows.h"
 
 #include <winsock2.h>
 #include <ws2tcpip.h>
@@ -59,14 +60,18 @@ void set_if_unset(const char *name, const std::string &value) {
   if (!std::getenv(name)) _wputenv_s(path_of(name).c_str(), path_of(value).c_str());
 }
 
-// There is no becoming: the program is waited for.
-void become(const std::string &program, const std::vector<std::string> &words) {
+std::intptr_t start(int how, const std::string &program, const std::vector<std::string> &words) {
   std::vector<std::wstring> quoted{quoted_word(program)};
   for (const std::string &word : words) quoted.push_back(quoted_word(word));
   std::vector<const wchar_t *> argv;
   for (const std::wstring &word : quoted) argv.push_back(word.c_str());
   argv.push_back(nullptr);
-  const std::intptr_t code = _wspawnv(_P_WAIT, path_of(program).c_str(), argv.data());
+  return _wspawnv(how, path_of(program).c_str(), argv.data());
+}
+
+// There is no becoming: the program is waited for.
+void become(const std::string &program, const std::vector<std::string> &words) {
+  const std::intptr_t code = start(_P_WAIT, program, words);
   if (code != -1) _exit(int(code));
 }
 

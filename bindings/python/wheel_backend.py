@@ -91,6 +91,8 @@ def _tag(files=()):
     platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
     machine = platform.removeprefix("linux_")
     programs = {inside: path for inside, path in files if inside.startswith(("bin/", "lib/"))}
+    if "bin/libdeform.dll" in programs:
+        return "py3-none-win_amd64"
     programs.pop(SERVER, None)
     own, first = {pathlib.PurePath(inside).name for inside in programs}, 28
     for path in programs.values():
@@ -154,14 +156,14 @@ def _installed(prefix, settings):
 def native_files(prefix):
     """(path below deform/native, file) of what the wheel takes: the library under the name that the loader
     asks for."""
-    if not list((prefix / "lib").glob("libdeform.so.*")):
+    if not [*prefix.glob("lib/libdeform.so.*"), *prefix.glob("bin/libdeform.dll")]:
         raise SystemExit("deform: this build installs no libdeform.so to lib; configure it with "
                          "-DDEFORM_SHARED=ON -DCMAKE_INSTALL_LIBDIR=lib")
     for path in sorted((prefix / "lib").rglob("*")):
         inside = path.relative_to(prefix / "lib").as_posix()
         if path.is_file() and LIBRARIES.fullmatch(inside):
             yield f"lib/{inside}", path
-    for path in sorted((prefix / "bin").glob("deform*")):
+    for path in sorted((prefix / "bin").glob("*deform*")):
         if path.name not in ("deform-view", "deform-serve"):  # which need libraries of a window, a network
             yield f"bin/{path.name}", path
     for folder in ("share/deform", "include/deform"):

@@ -23,11 +23,13 @@ LICENSES = {"libbullet": "Zlib", "libc6": "LGPL-2.1-or-later", "libcli11": "BSD-
             "libosmesa6": "MIT", "libpng": "libpng-2.0", "libssl": "Apache-2.0", "libstb": "MIT",
             "libvulkan": "Apache-2.0", "libwebsockets": "MIT", "linux-libc-dev":
             "GPL-2.0-only WITH Linux-syscall-note", "nlohmann-json3": "MIT", "zlib1g": "Zlib",
+            "libz-mingw-w64": "Zlib", "mingw-w64": "ZPL-2.1",
             "libcap": "BSD-3-Clause", "libsuitesparse": "GPL-2.0-or-later", "libcholmod": "GPL-2.0-or-later",
             "libassimp": "BSD-3-Clause", "libsimde": "MIT", "libspdlog": "MIT", "libfmt": "MIT",
-            **dict.fromkeys(("libgcc", "libstdc++", "gcc-"), "GPL-3.0-or-later WITH GCC-exception-3.1")}
+            **dict.fromkeys(("libgcc", "libstdc++", "gcc-", "g++-"),
+                            "GPL-3.0-or-later WITH GCC-exception-3.1")}
 # Headers of the compiler and the system, whose licenses ask for no notice in programs.
-TOOLCHAIN = ("libc6", "linux-libc", "libgcc", "libstdc++", "gcc-")
+TOOLCHAIN = ("libc6", "linux-libc", "libgcc", "libstdc++", "gcc-", "g++-")
 
 
 def said(*argv, **more):
@@ -86,7 +88,7 @@ def main():
     built = {path.name: path.resolve() for folder in ("bin", "lib", "lib/deform/*") for path in
              build.glob(f"{folder}/*") if path.name in shipped and path.is_file()}
     parts = [path.relative_to(build) for path in built.values()]
-    objects = re.findall(r" -o (\S+\.o) ", said("ninja", "-n", "-C", build, "-t", "commands", *parts))
+    objects = re.findall(r" -o (\S+\.o(?:bj)?) ", said("ninja", "-n", "-C", build, "-t", "commands", *parts))
     inside = set().union(*(headers.get(part, set()) for part in objects))
     linked, copied = set(), shipped - built.keys()
     for path in found:

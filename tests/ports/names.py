@@ -37,7 +37,7 @@ def main():
     for program in ("ccd", "rollback"):
         assert f"deform {program} --help" in deform(program, code=2), program
     for absent in ("sweep", "fit", "cost", "calibrate", "friction", "serve", "view", "contact",
-                   "explain --costs", "plugin check", "mesh from-labels", "mesh phantom"):
+                   "explain --costs", "mesh from-labels", "mesh phantom"):
         assert "the build for Windows has none" in deform(*absent.split(), "x", code=2), absent
     return 0
 

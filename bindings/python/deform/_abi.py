@@ -113,7 +113,7 @@ if _folder is None:
                       f"{', '.join(map(str, INCLUDES))}; install the package, or libdeform-dev")
 for _header in _HEADERS:
     try:
-        _read((_folder / f"{_header}.h").read_text())
+        _read((_folder / f"{_header}.h").read_text("utf-8"))
     except Exception as _error:
         raise ImportError(f"deform: {_folder / _header}.h cannot be read ({_error}); install the headers of "
                           "the package's own version") from _error

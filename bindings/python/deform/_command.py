@@ -18,13 +18,16 @@ def main() -> None:
     """Becomes the command: `deform run SCENE`, `deform cost SCENE`, ... (the console script)."""
     path = str(command_path())
     # `deform sweep` and `deform fit` come back to this interpreter
-    os.execve(path, [path, *sys.argv[1:]], {"DEFORM_PYTHON": sys.executable, **os.environ})
+    environment = {"DEFORM_PYTHON": sys.executable, **os.environ}
+    if os.name == "nt":  # there who has started this process would not wait for the other one
+        sys.exit(subprocess.call([path, *sys.argv[1:]], env=environment))
+    os.execve(path, [path, *sys.argv[1:]], environment)
 
 
 def command(*arguments: Any, environment: Mapping[str, str] | None = None) -> str:
     """Runs `deform ARGUMENTS...` and returns what it prints; raises its sentence where it fails."""
-    done = subprocess.run([str(command_path()), *map(str, arguments)], capture_output=True, text=True,
-                          env={**os.environ, **(environment or {})})
+    done = subprocess.run([str(command_path()), *map(str, arguments)], capture_output=True,
+                          encoding="utf-8", env={**os.environ, **(environment or {})})
     if done.returncode == 0:
         for line in done.stderr.splitlines():
             _LOG.warning("%s", line.removeprefix("deform: ").removeprefix("warning: "))

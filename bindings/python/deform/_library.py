@@ -15,6 +15,10 @@ from . import _abi
 
 ROOT = pathlib.Path(__file__).resolve().parent
 NATIVE = ROOT / "native"  # what the wheel carries: lib/, bin/, share/
+_LIBRARY, _COMMAND = (("bin/libdeform.dll", "bin/deform.exe") if os.name == "nt" else
+                      ("lib/libdeform.so.0", "bin/deform"))
+# Calls after_in_child in forked processes, where the system has them.
+at_fork = getattr(os, "register_at_fork", lambda after_in_child: None)
 
 
 class Error(Exception):
@@ -94,7 +98,7 @@ class OfThisProcess:
 
 def _path() -> pathlib.Path:
     given = os.environ.get("DEFORM_LIBRARY")
-    path = pathlib.Path(given) if given else NATIVE / "lib" / "libdeform.so.0"
+    path = pathlib.Path(given) if given else NATIVE / _LIBRARY
     if not path.exists():
         raise ImportError(f"{path} is not there: install the package (pip install .), or name a libdeform.so "
                           f"in the environment variable DEFORM_LIBRARY")
@@ -118,8 +122,8 @@ def command_path() -> pathlib.Path:
     """The `deform` command that belongs to the library: the wheel's own, or the one beside a build's
     library."""
     given = os.environ.get("DEFORM_COMMAND")
-    for path in ([pathlib.Path(given)] if given else [NATIVE / "bin" / "deform",
-                                                      PATH.resolve().parent.parent / "bin" / "deform"]):
+    for path in ([pathlib.Path(given)] if given else [NATIVE / _COMMAND,
+                                                      PATH.resolve().parent.parent / _COMMAND]):
         if path.exists():
             return path
     raise FileError(f"no deform command beside {PATH}; name one in the environment variable DEFORM_COMMAND",

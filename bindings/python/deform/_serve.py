@@ -4,7 +4,6 @@ from __future__ import annotations
 import ctypes
 import json
 import math
-import os
 import sys
 import time
 import weakref
@@ -12,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Callable
 
 import numpy as np
 
-from ._library import PATH, ArgumentError, Error, StateError, UnsupportedError, quick
+from ._library import PATH, ArgumentError, Error, StateError, UnsupportedError, at_fork, quick
 from ._values import finite_or_none, real, whole
 from .body import Body
 from .picture import upright_of
@@ -54,7 +53,7 @@ def _forget() -> None:
         server._served = server._pull = None
 
 
-os.register_at_fork(after_in_child=_forget)
+at_fork(after_in_child=_forget)
 
 
 def _numbers(request: dict[str, Any], key: str, n: int) -> np.ndarray:

@@ -3,13 +3,14 @@ whose step the main thread is in to stop, and the exception of the signal's hand
 """
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import threading
 import weakref
 from typing import Any
 
-from ._library import quick
+from ._library import at_fork, quick
 
 _worlds: weakref.WeakSet[Any] = weakref.WeakSet()
 _writer = -1
@@ -35,14 +36,12 @@ def interrupt() -> None:
 def _listen(reader: int, previous: int) -> None:
     """Reads the numbers of signals; previous: the former wakeup descriptor (asyncio), -1: none."""
     while True:
-        try:
+        with contextlib.suppress(OSError):
             heard = os.read(reader, 64)
+            if signal.SIGINT in heard:
+                interrupt()
             if previous >= 0:
                 os.write(previous, heard)
-        except OSError:
-            continue
-        if signal.SIGINT in heard:
-            interrupt()
 
 
 def _forget() -> None:
@@ -53,7 +52,7 @@ def _forget() -> None:
         _writer = -1
 
 
-os.register_at_fork(after_in_child=_forget)
+at_fork(after_in_child=_forget)
 
 
 def watch(world: Any) -> None:
@@ -65,6 +64,7 @@ def watch(world: Any) -> None:
     previous = signal.set_wakeup_fd(-1)
     if previous != _writer or _writer < 0:
         reader, _writer = os.pipe()
-        os.set_blocking(_writer, False)
+        with contextlib.suppress(AttributeError):  # Windows has it from Python 3.12 on
+            os.set_blocking(_writer, False)
         threading.Thread(target=_listen, args=(reader, previous), daemon=True, name="deform signals").start()
     signal.set_wakeup_fd(_writer, warn_on_full_buffer=False)

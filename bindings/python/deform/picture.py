@@ -5,7 +5,6 @@ import contextlib
 import ctypes
 import json
 import math
-import os
 import pathlib
 import struct
 import tempfile
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Iterable, Sequence
 
 import numpy as np
 
-from ._library import PATH, ArgumentError, Error, UnsupportedError, write_whole
+from ._library import PATH, ArgumentError, Error, UnsupportedError, at_fork, write_whole
 from .body import vector
 
 if TYPE_CHECKING:
@@ -40,7 +39,7 @@ def _forget() -> None:
     _lock, _forked = threading.Lock(), bool(_renderers)
 
 
-os.register_at_fork(after_in_child=_forget)
+at_fork(after_in_child=_forget)
 
 
 def _native() -> Any:

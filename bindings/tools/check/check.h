@@ -9,15 +9,16 @@
 #include <string>
 #include <vector>
 
+#include "core/error.h"
 #include "deform/deform.h"
 
 namespace cli::check {
 
 struct Broken : std::runtime_error { using std::runtime_error::runtime_error; };
 struct Skipped : std::runtime_error { using std::runtime_error::runtime_error; };
-[[noreturn]] void broken(const char *format, ...) __attribute__((format(printf, 1, 2)));
-[[noreturn]] void skip(const char *format, ...) __attribute__((format(printf, 1, 2)));
-std::string text(const char *format, ...) __attribute__((format(printf, 1, 2)));
+[[noreturn]] void broken(const char *format, ...) DEFORM_PRINTF(1, 2);
+[[noreturn]] void skip(const char *format, ...) DEFORM_PRINTF(1, 2);
+std::string text(const char *format, ...) DEFORM_PRINTF(1, 2);
 
 enum class Result { pass, fail, skip };
 struct Verdict {

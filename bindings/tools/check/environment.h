@@ -8,6 +8,8 @@
 
 namespace cli::check {
 
+int unmasked_exceptions();  // of floating-point numbers: they raise a signal
+
 // Encloses every call into the plugin. What the call leaves changed in the floating-point environment is
 // noted, for V11, and put back, so that no other rule judges what it has spoilt.
 class Kept {

@@ -1,7 +1,4 @@
 // deform-check, which `deform plugin check FILE` starts: a run of the rules and a report.
-#include <dlfcn.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -18,7 +15,9 @@
 #include "check/plugin.h"
 #include "check/runner.h"
 #include "json_text.h"
+#include "leaving.h"
 #include "messages.h"
+#include "system.h"
 
 namespace cli::check {
 namespace {
@@ -61,10 +60,10 @@ bool uses_types(const Rule &rule) { return std::string(rule.id) == "V09" || std:
 
 Subject subject_of(const Request &request) {
   Subject s;
-  s.file = std::filesystem::absolute(request.file).string();
+  s.file = cli::name_of(std::filesystem::absolute(path_of(request.file)));
   s.seed = request.seed;
   s.limit = request.limit;
-  s.command = std::filesystem::read_symlink("/proc/self/exe").string();
+  s.command = os::own_file();
   return s;
 }
 
@@ -115,8 +114,10 @@ std::string listed(const std::string &file) {
 
 int child(const Request &request) {
   report_to(request.report);
+  leave(kDone);  // how it ends is for the parent to judge
   if (request.digest >= 0) send_verdict({Result::pass, digest_text(request)});
   else if (const Rule *rule = find_rule(request.rule)) send_verdict(judge(request, *rule, request.type));
+  else send_verdict({Result::pass, listed(request.file)});
   return kDone;
 }
 
@@ -148,10 +149,11 @@ Line run_rule(const Request &request, const Rule &rule, int type) {
   if (request.in_process) return {&rule, judge(request, rule, type), 0};
   // V09 counts what is on the heap: only a fresh image has a heap without a past.
   const bool fresh = std::string(rule.id) == "V09";
-  const Outcome a =
-      fresh
-          ? in_fresh_process(subject_of(request).command, arguments(request, rule.id, type), {request.limit})
-          : in_own_process([&] { send_verdict(judge(request, rule, type)); }, {request.limit});
+  const std::string command = subject_of(request).command;
+  const std::vector<std::string> words = arguments(request, rule.id, type);
+  const Outcome a = fresh ? in_fresh_process(command, words, {request.limit})
+                          : in_own_process([&] { send_verdict(judge(request, rule, type)); }, command, words,
+                                           {request.limit});
   Line line{&rule, a.verdict, a.seconds, a.late, a.late || !a.spoke};
   const std::string found = sanitizer_line(a.said);
   if (!a.spoke)
@@ -224,7 +226,8 @@ class Rules {
       types = listed(request_.file);
     } else {
       const Outcome a =
-          in_own_process([&] { send_verdict({Result::pass, listed(request_.file)}); }, {request_.limit});
+          in_own_process([&] { send_verdict({Result::pass, listed(request_.file)}); },
+                         subject_of(request_).command, arguments(request_, "", -1), {request_.limit});
       types = a.verdict.detail;
       if (!a.spoke) unlisted_ = "it " + a.ending + " while its types were listed; return constant tables";
       ended_ += a.late;

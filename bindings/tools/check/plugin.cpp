@@ -1,24 +1,20 @@
 #include "check/plugin.h"
 
-#include <dlfcn.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <new>
 
 #include "check/environment.h"
+#include "check/image.h"
 #include "check/watch.h"
 #include "deform/plugin_draft.h"
+#include "system.h"
 
 namespace cli::check {
 namespace {
-
-void *aligned(size_t bytes, size_t align) {
-  void *p = nullptr;
-  return posix_memalign(&p, std::max(align, sizeof(void *)), bytes ? bytes : 1) == 0 ? p : nullptr;
-}
 
 // Scratch of one thread, taken beforehand: what eval takes is no call of the C library.
 struct Arena {
@@ -62,15 +58,16 @@ Host::Host() {
   table_.ctx = this;
   table_.alloc = [](void *ctx, size_t bytes, size_t align) {
     if (Watch::watching()) Watch::stop("dfm_host.alloc");
-    void *p = aligned(bytes, align);
-    if (p) static_cast<Host *>(ctx)->lent_[p] = bytes;
+    const std::align_val_t whole{std::max(align, sizeof(void *))};
+    void *p = ::operator new(bytes, whole, std::nothrow);
+    if (p) static_cast<Host *>(ctx)->lent_[p] = whole;
     return p;
   };
   table_.release = [](void *ctx, void *p, size_t, size_t) {
     if (Watch::watching()) Watch::stop("dfm_host.release");
     if (!p) return;
-    static_cast<Host *>(ctx)->lent_.erase(p);
-    std::free(p);
+    const auto lent = static_cast<Host *>(ctx)->lent_.extract(p);
+    if (lent) ::operator delete(p, lent.mapped());
   };
   table_.scratch = [](void *, size_t bytes) -> void * {
     if (!arena.bytes) arena.bytes = std::make_unique_for_overwrite<char[]>(Arena::kBytes);
@@ -120,28 +117,30 @@ void Host::release_scratch() {
 
 BareContext bare_context() {
   dfm_context *made = nullptr;
-  std::string folder = (std::filesystem::temp_directory_path() / "deform_check_XXXXXX").string();
+  static int number = 0;
+  std::error_code error;
+  const std::filesystem::path folder =
+      std::filesystem::temp_directory_path(error) / text("deform_check_%ld_%d", long(getpid()), number++);
   dfm_context_def def = dfm_context_def_default();
-  if (mkdtemp(folder.data())) {
-    def.plugin_dir = folder.c_str();
+  if (std::filesystem::create_directory(folder, error)) {
+    const std::string name = cli::name_of(folder);
+    def.plugin_dir = name.c_str();
     dfm_context_create(&def, &made);
-    rmdir(folder.c_str());
+    std::filesystem::remove(folder, error);
   }
   return {made, dfm_context_destroy};
 }
 
 dfm_plugin_fn entry_of(void *image) {
-  return reinterpret_cast<dfm_plugin_fn>(dlsym(image, "dfm_plugin_entry"));
+  return reinterpret_cast<dfm_plugin_fn>(symbol_of(image, "dfm_plugin_entry"));
 }
 
 Plugin::Plugin(const std::string &file) {
-  // dlopen searches the system's libraries for a name without a slash
-  char *resolved = realpath(file.c_str(), nullptr);
-  const std::string path = resolved ? resolved : file;
-  std::free(resolved);
+  std::string why;
   const Kept kept("loading it");
-  image_ = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
-  if (!image_) broken("the dynamic linker refuses it: %s; link what is missing, or leave it out", dlerror());
+  image_ = load_image(file, why);
+  if (!image_)
+    broken("the dynamic linker refuses it: %s; link what is missing, or leave it out", why.c_str());
   const dfm_plugin_fn entry = entry_of(image_);
   if (!entry)
     broken(
@@ -231,7 +230,7 @@ void Plugin::close() {
   types_.clear();
   const Kept kept("unloading it");
   if (shutdown_) shutdown_();
-  if (image_) dlclose(image_);
+  if (image_) unload_image(image_);
   shutdown_ = nullptr;
   image_ = nullptr;
 }

@@ -4,6 +4,7 @@
 #include <atomic>
 #include <map>
 #include <memory>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -29,7 +30,7 @@ class Host {
 
  private:
   dfm_host table_{};
-  std::map<void *, size_t> lent_;
+  std::map<void *, std::align_val_t> lent_;
   std::string said_;
 };
 

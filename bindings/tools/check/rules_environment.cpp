@@ -1,7 +1,7 @@
 // V11, V12: what a plugin leaves changed in the thread that calls it and in the process.
-#include <time.h>
-
+#include <chrono>
 #include <limits>
+#include <thread>
 
 #include "check/environment.h"
 #include "check/groups.h"
@@ -67,10 +67,8 @@ std::string keeps_process(const Subject &subject) {
       skip("it does not load or answer (other rules say why)");
     }
     // what is about to end may
-    for (int wait = 0; wait < 100 && Process::threads() > threads; ++wait) {
-      const timespec some{0, 1000000};
-      nanosleep(&some, nullptr);
-    }
+    for (int wait = 0; wait < 100 && Process::threads() > threads; ++wait)
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
     threads = Process::threads() - threads;
     for (int k = 0; k < 2; ++k) printed[k] = streams.text(k + 1);
   }

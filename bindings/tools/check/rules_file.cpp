@@ -1,9 +1,4 @@
 // V01 to V04: the file, its entry, and what it says of itself.
-#include <dlfcn.h>
-#include <elf.h>
-#include <link.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cctype>
 #include <cmath>
@@ -14,87 +9,16 @@
 
 #include "check/environment.h"
 #include "check/groups.h"
+#include "check/image.h"
 #include "check/law.h"
 #include "check/model.h"
 #include "check/runner.h"
 #include "check/watch.h"
 #include "deform/plugin_draft.h"
-#include "file.h"
 #include "messages.h"
 #include "slots.h"
 
 namespace cli::check {
-namespace {
-
-template <class T>
-std::vector<T> part(const std::string &bytes, uint64_t offset, uint64_t count) {
-  std::vector<T> out;
-  if (offset > bytes.size() || count > (bytes.size() - offset) / sizeof(T)) return out;
-  out.resize(count);
-  if (count) std::memcpy(out.data(), bytes.data() + offset, count * sizeof(T));
-  return out;
-}
-
-std::string bytes_of(const std::string &file) {
-  return read_file(file, uint64_t(1) << 30, "a plugin (a shared library)");
-}
-
-struct Symbol {
-  std::string name;
-  ElfW(Sym) entry;
-};
-// Symbols of that type of section (SHT_DYNSYM, SHT_SYMTAB); false: the file has no section headers.
-bool read_symbols(const std::string &bytes, unsigned type, std::vector<Symbol> &out) {
-  const auto header = part<ElfW(Ehdr)>(bytes, 0, 1);
-  if (header.empty()) return false;
-  const auto sections = part<ElfW(Shdr)>(bytes, header[0].e_shoff,
-                                         header[0].e_shentsize == sizeof(ElfW(Shdr)) ? header[0].e_shnum : 0);
-  for (const auto &section : sections) {
-    if (section.sh_type != type || section.sh_link >= sections.size()) continue;
-    const auto &strings = sections[section.sh_link];
-    const auto names = part<char>(bytes, strings.sh_offset, strings.sh_size);
-    for (const auto &s : part<ElfW(Sym)>(bytes, section.sh_offset, section.sh_size / sizeof(ElfW(Sym))))
-      out.push_back(
-          {s.st_name < names.size()
-               ? std::string(&names[s.st_name], strnlen(&names[s.st_name], names.size() - s.st_name))
-               : "",
-           s});
-  }
-  return !sections.empty();
-}
-
-// Defined symbols of the dynamic table that others may bind to.
-std::vector<std::string> exported(const std::string &file) {
-  const std::string bytes = bytes_of(file);
-  if (bytes.size() < sizeof(ElfW(Ehdr)) || std::memcmp(bytes.data(), ELFMAG, SELFMAG) != 0)
-    broken("it is not a shared library (ELF); build it with deform_add_plugin");
-  std::vector<Symbol> symbols;
-  if (!read_symbols(bytes, SHT_DYNSYM, symbols))
-    skip("the file has no section headers; run the check before you strip the file");
-  std::vector<std::string> out;
-  for (const Symbol &s : symbols) {
-    const int visibility = s.entry.st_other & 3, binding = s.entry.st_info >> 4;
-    if (s.entry.st_shndx == SHN_UNDEF || binding == STB_LOCAL || visibility == STV_HIDDEN ||
-        visibility == STV_INTERNAL)
-      continue;
-    if (!s.name.empty()) out.push_back(s.name);
-  }
-  std::sort(out.begin(), out.end());
-  return out;
-}
-
-}  // namespace
-
-std::string variable_at(const std::string &file, uint64_t address) {
-  std::vector<Symbol> symbols;
-  read_symbols(bytes_of(file), SHT_SYMTAB, symbols);
-  for (const Symbol &s : symbols) {
-    const bool inside =
-        address >= s.entry.st_value && address - s.entry.st_value < std::max<uint64_t>(s.entry.st_size, 1);
-    if (inside && (s.entry.st_info & 15) == STT_OBJECT) return s.name.substr(0, s.name.find('.'));
-  }
-  return "";
-}
 
 std::string exports_one_symbol(const Subject &subject) {
   std::vector<std::string> names = exported(subject.file);
@@ -127,7 +51,8 @@ const dfm_plugin *given_to(dfm_plugin_fn entry, uint32_t abi, uint32_t draft, ui
 std::string refuses_unknown_abi(const Subject &subject) {
   if (!subject.plugin) {
     const Kept kept("loading it");
-    void *image = dlopen(std::filesystem::absolute(subject.file).c_str(), RTLD_NOW | RTLD_LOCAL);
+    std::string why;
+    void *image = load_image(subject.file, why);
     if (image && !entry_of(image)) skip("it has no dfm_plugin_entry (V01)");
     const Plugin plugin(subject.file);  // says why it does not load
     return "";

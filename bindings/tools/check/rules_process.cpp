@@ -1,8 +1,4 @@
 // V05, V06, V09, V10: what a plugin does to the process it runs in.
-#include <dirent.h>
-#include <dlfcn.h>
-#include <malloc.h>
-
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -11,25 +7,10 @@
 
 #include "check/environment.h"
 #include "check/groups.h"
+#include "check/image.h"
 #include "check/law.h"
 #include "check/runner.h"
 #include "check/watch.h"
-
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-#define DEFORM_SANITIZED 1
-#elif defined(__has_feature)
-#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer)
-#define DEFORM_SANITIZED 1
-#endif
-#endif
-#ifndef DEFORM_SANITIZED
-#define DEFORM_SANITIZED 0
-#endif
-
-#if DEFORM_SANITIZED
-// not every compiler brings the header that declares it
-extern "C" size_t __sanitizer_get_current_allocated_bytes();
-#endif
 
 namespace cli::check {
 namespace {
@@ -54,7 +35,7 @@ std::string spelt(const std::string &name) {
   return name == "__cxa_allocate_exception" ? "throw" : name;
 }
 void needs_sanitizer() {
-  if (!DEFORM_SANITIZED)
+  if (!is_sanitized())
     skip(
         "this deform is not built with a sanitizer; build it by `cmake --preset asan` or `tsan`, and the "
         "plugin by the same compiler and -fsanitize");
@@ -262,31 +243,6 @@ std::string stays_in_its_arrays(const Subject &subject) {
 
 namespace {
 
-#if DEFORM_SANITIZED
-long heap_in_use() { return static_cast<long>(__sanitizer_get_current_allocated_bytes()); }
-#else
-long heap_in_use() { return static_cast<long>(mallinfo2().uordblks + mallinfo2().hblkhd); }
-#endif
-
-long pages_mapped() {
-  long pages = 0;
-  if (DEFORM_SANITIZED) return 0;
-  if (FILE *f = std::fopen("/proc/self/statm", "r")) {
-    if (std::fscanf(f, "%ld", &pages) != 1) pages = 0;
-    std::fclose(f);
-  }
-  return pages;
-}
-
-long files_open() {
-  long n = 0;
-  if (DIR *d = opendir("/proc/self/fd")) {
-    while (readdir(d)) ++n;
-    closedir(d);
-  }
-  return n;
-}
-
 void load_and_unload(const Subject &subject) {
   Plugin plugin(subject.file);
   for (const dfm_type *type : plugin.types()) {
@@ -324,9 +280,9 @@ std::string unloads_without_leak(const Subject &subject) {
   // bytes: less than one piece in each cycle is the C library's own housekeeping
   constexpr long kSmallestPiece = 24;
   // What is allocated once (caches of libc, the linker) is no leak: both halves after warm-up must grow.
-  struct Use { long heap, pages, files; } at[3] = {};
+  Use at[3] = {};
   for (int i = 0, mark = 0; i <= kCycles; ++i) {
-    if (i == 20 || i == 60 || i == 100) at[mark++] = {heap_in_use(), pages_mapped(), files_open()};
+    if (i == 20 || i == 60 || i == 100) at[mark++] = in_use();
     if (i == kCycles) break;
     stage("load-unload cycle %d", i + 1);
     load_and_unload(subject);
@@ -342,14 +298,10 @@ std::string unloads_without_leak(const Subject &subject) {
   if (const long left = each(&Use::pages); left > 0)
     broken("each load-unload cycle leaves %ld pages mapped; unmap in shutdown()", left);
   if (each(&Use::files) > 0) broken("each load-unload cycle leaves a file open; close in shutdown()");
-  const std::string path = std::string(subject.file);
-  if (void *still = dlopen(path.find('/') == std::string::npos ? ("./" + path).c_str() : path.c_str(),
-                           RTLD_NOW | RTLD_NOLOAD)) {
-    dlclose(still);
+  if (image_stays(subject.file))
     broken(
         "it stays in memory after it was unloaded; build it with deform_add_plugin (unique C++ symbols and "
         "-z nodelete keep a library)");
-  }
   return text("%d cycles", kCycles);
 }
 

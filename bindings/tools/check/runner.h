@@ -13,7 +13,7 @@ namespace cli::check {
 struct Limits { double seconds = 10, still = 5; };
 
 // What a rule is about to do: named where its process ends without an answer.
-void stage(const char *format, ...) __attribute__((format(printf, 1, 2)));
+void stage(const char *format, ...) DEFORM_PRINTF(1, 2);
 
 // The child's side: where stages and the verdict go; -1: this process is not a child.
 void report_to(int descriptor);
@@ -27,9 +27,11 @@ struct Outcome {
   double seconds = 0;  // processor time
   bool late = false;   // it was ended because it did not come back
 };
-// Runs work in a process of its own, which has loaded no plugin before, and waits within the limits.
-Outcome in_own_process(const std::function<void()> &work, const Limits &limits);
-// The same in a new process of this program, at other addresses; --report-to is added to the arguments.
+// Runs work in a process of its own, which has loaded no plugin before, and waits within the limits. A system
+// without fork() starts the command, which these arguments have do the same.
+Outcome in_own_process(const std::function<void()> &work, const std::string &command,
+                       const std::vector<std::string> &arguments, const Limits &limits);
+// A new process of this program, at other addresses; --report-to is added to the arguments.
 Outcome in_fresh_process(const std::string &command, std::vector<std::string> arguments,
                          const Limits &limits);
 // The digest, if a fresh process finds the same; else throws Broken. kind: "law"; input: "batches".

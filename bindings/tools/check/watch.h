@@ -1,12 +1,13 @@
 // Catches what eval must not do: calls of the C library that allocate, open, print or read the environment,
 // and touches of memory outside the arrays. Calls are caught by exchanging addresses: every function that a
-// loaded object calls in another one is in that object's table of addresses (global offset table), so
-// while eval runs, the entries of those names, in the plugin and in every library under it, point to ours.
+// loaded object calls in another one is in that object's table of addresses (global offset table; Windows:
+// import address table), so while eval runs, the entries of those names, in the plugin and in every library
+// under it that is not the system's, point to ours.
 // Nothing is forwarded: the first such call ends eval by a jump back to the rule. Not seen: bare system calls
 // in machine code, the variable `environ`, and a C library linked into the plugin.
 #pragma once
-#include <csetjmp>
 #include <cstdint>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -16,17 +17,7 @@ class Watch {
  public:
   Watch();  // finds the entries; the plugin must be loaded
   // Runs f; the name of the function that it called and may not, or null.
-  template <class F>
-  const char *run(F &&f) {
-    if (sigsetjmp(back, 0) == 0) {
-      exchange(true);
-      f();
-    }
-    exchange(false);
-    const char *name = caught;
-    caught = nullptr;
-    return name;
-  }
+  const char *run(const std::function<void()> &f);
   size_t entries() const { return slots_.size(); }
   [[noreturn]] static void stop(const char *name);  // for services that have no entry to exchange
   static bool watching() { return active; }
@@ -37,7 +28,8 @@ class Watch {
     void *ours, *theirs;
   };
   void exchange(bool ours);
-  static sigjmp_buf back;
+  void find();                                // the system's; calls look_at for each entry
+  void look_at(void **at, const char *name);  // if that is one of those, the entry is made writable
   static const char *caught;
   static bool active;
   std::vector<Slot> slots_;
@@ -55,9 +47,20 @@ class StaticsLocked {
   uintptr_t base = 0;  // of the loaded file
 
  private:
+  void find(const void *inside);  // the system's: base and ranges
   void protect(bool writable) const;
   std::vector<Range> ranges_;
 };
+
+// Pages of memory: their size, fresh ones that may not be touched (bad_alloc), given back, and what may be
+// done with them.
+namespace pages {
+enum class Access { none, read, write };
+size_t size();
+void *reserve(size_t bytes);
+void release(void *begin, size_t bytes);
+bool allow(void *begin, size_t bytes, Access access);
+}  // namespace pages
 
 // An array between two pages that may not be touched, at the end or at the start of what lies between them;
 // the rest holds a pattern.
@@ -76,20 +79,11 @@ class Fenced {
   bool spoilt(long *offset) const;
 
   // Runs f and turns a touch of a fence into a sentence; empty where there was none.
-  template <class F>
-  static std::string guard(F &&f, const void **at = nullptr) {
-    arm();
-    if (sigsetjmp(back, 1) == 0) f();
-    disarm();
-    if (at) *at = touched;
-    return sentence;
-  }
+  static std::string guard(const std::function<void()> &f, const void **at = nullptr);
+  // Of the handler of faults, on its way back; what: "reads", "writes", or "touches" where it is unknown.
+  static void tell(const void *at, const char *what);
 
  private:
-  static void arm();
-  static void disarm();
-  static void on_fault(int, void *info, void *context);
-  static sigjmp_buf back;
   static char sentence[256];
   static const void *touched;  // where; null where there was no touch
   static std::vector<Fenced *> all;

@@ -1,5 +1,5 @@
 /* V12: a thread of its own, which nobody ends. It is one function of the C library, and only one is started,
- * so that nothing crashes. */
+ * so that nothing crashes. Not for Windows: /proc, pause() */
 #define _DEFAULT_SOURCE
 #include <dirent.h>
 #include <pthread.h>

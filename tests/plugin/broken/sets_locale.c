@@ -1,4 +1,5 @@
-/* V12: sets a locale when its parameters are checked, as a formatter of messages may. */
+/* V12: sets a locale when its parameters are checked, as a formatter of messages may.
+ * Not for Windows: its locales have other names. */
 #include <locale.h>
 #include <stddef.h>
 #include <stdint.h>

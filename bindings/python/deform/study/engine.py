@@ -5,7 +5,6 @@ and keeps the library and its plugins loaded; a rig is a program of its own.
 """
 from __future__ import annotations
 
-import fcntl
 import json
 import math
 import os
@@ -21,6 +20,7 @@ from typing import Any, Mapping, Sequence
 
 from .._library import FileError, command_path
 from .._values import read_json
+from .store import hold
 from .tables import finite, read_csv
 
 FOLDER = "deform-study-"
@@ -309,14 +309,14 @@ def _own_folder(there: str) -> tuple[pathlib.Path, int]:
         except OSError:
             continue
         try:
-            fcntl.flock(mark, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            hold(mark)
             shutil.rmtree(old, ignore_errors=True)
         except OSError:
             pass
         os.close(mark)
     new = pathlib.Path(tempfile.mkdtemp(prefix="." + FOLDER, dir=there))
     mark = os.open(new, os.O_RDONLY)
-    fcntl.flock(mark, fcntl.LOCK_EX)
+    hold(mark)
     return new.rename(new.with_name(new.name[1:])), mark  # seen by others from here on, locked
 
 

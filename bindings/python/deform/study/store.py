@@ -2,17 +2,26 @@
 is done stays, and the next call goes on."""
 from __future__ import annotations
 
-import fcntl
 import json
 import os
 import pathlib
 import time
 from typing import Any
 
-from .._library import FileError, StateError, refuse_foreign
+from .._library import FileError, StateError, UnsupportedError, refuse_foreign
 
 MARK = '", "point": {'  # in each line
 SYNC_EVERY = 1.0  # s: what a loss of power may cost; the end of a process costs nothing
+
+
+def hold(file: Any) -> None:
+    """A lock that ends with this process; OSError: another one has it."""
+    try:
+        import fcntl
+    except ImportError:
+        raise UnsupportedError("sweep and fit lock their files in a way that this system has not",
+                               "DFM_E_UNSUPPORTED") from None
+    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _results(folder: pathlib.Path) -> list[pathlib.Path]:
@@ -29,7 +38,7 @@ class Store:
             refuse_foreign(file, MARK)
         self.file = open(path, "ab")
         try:
-            fcntl.flock(self.file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            hold(self.file)
         except BlockingIOError:
             self.file.close()
             raise StateError(f"{path}: another sweep writes here; wait for its end, or give another folder "
