@@ -127,6 +127,7 @@ TEST(Budget, OfImplicitBodies_TakesASubStep) {
   }
 }
 
+// unsanitized: long there; OfImplicitBodies_TakesASubStep runs the same code
 // A heap of them: solves that the budget ends leave no motion that the energy watch would have to end.
 TEST(Budget, OfImplicitBodiesInAHeap_MakesNoEnergy) {
   test::Context context;

@@ -213,6 +213,7 @@ TEST(Cost, Precision_IsAnAxisOfBodiesThatHaveSingle) {
   EXPECT_EQ(single, 1u);
 }
 
+// unsanitized: drawing takes the time there; every study writes a page
 TEST(Cost, Page_HoldsChartAndPicturesInOneFile) {
   const Study s =
       study("page", bar(R"("duration": 0.02, "step": 0.001)"), {"--axes", "time", "--budget", "300"}, true);
