@@ -346,13 +346,13 @@ class Reader {
   static bool thrown(const Body &b) { return length(b.def.velocity) > 0 || length(b.def.spin) > 0; }
 
   // Points that are held, and those that are held along all axes.
-  struct Hold { long any = 0, all = 0; };
+  struct Hold { ptrdiff_t any = 0, all = 0; };
   Hold hold_of(const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
     std::vector<uint8_t> axes(mesh.info.npoint);
     for (const Fix &f : b.fixes)
       for (const uint32_t p : select(f.where, mesh, def_.file)) axes[p] |= f.axes;
     for (const NodalRow &row : nodal) axes[row.point] |= row.axes;
-    return {long(axes.size()) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)};
+    return {ptrdiff_t(axes.size()) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)};
   }
   // Whether the attachment holds the body, to an obstacle or to a body that is held; `moving`: to one that
   // moves, too.
