@@ -148,7 +148,6 @@ class Reader {
   }
 
   std::vector<BodyRegime> run(const Measured &measured) {
-    const Quiet quiet;  // warnings come when the scene is built
     for (const Body &b : def_.bodies) {
       meshes_.push_back(files_.load(b));
       nodal_.push_back(def_.with_pointer(b.pointer + "/nodal_bc", [&]() -> std::vector<NodalRow> {
@@ -171,7 +170,6 @@ class Reader {
   // edge in `sizes`, m. False: none has. `unmeasured`: one would, had its model measured costs.
   bool lattices(const std::vector<BodyRegime> &own, double times, const Measured &measured,
                 std::vector<BodyRegime> &out, std::vector<double> &sizes, bool &unmeasured) {
-    const Quiet quiet;
     out = own;
     sizes.assign(own.size(), 0);
     bool any = false;
@@ -264,7 +262,7 @@ class Reader {
     if (!first) return found->second;
     const Quiet quiet;
     try {
-      dfm_world_destroy(build_alone(context_, def_, files_, b, model, {}).world);
+      dfm_world_destroy(build_alone(context_, def_, b, model, {}).world);
       found->second = true;
     } catch (const Error &) {
       found->second = false;
@@ -505,7 +503,7 @@ class Reader {
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.try_find(DFM_KIND_MODEL, m.id);
       if (!type || off_card(types_, *type) || !(model_of(*type).cells & cell)) continue;
-      if (b.device == "gpu" && !whole_on_card(context_, def_, files_, b, *type)) continue;
+      if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
       out.push_back(m.id);
     }
     return out;
