@@ -448,14 +448,18 @@ TEST_F(PlannerScene, Warnings_AreHeardOnce) {
   const std::string path = folder() + "/scene.json";
   test::write_file(path, R"({"format": "deform-scene", "version": 1, "accuracy": {"target": 0.4},
  "time": {"duration": 0.1}, "bodies": [{"name": "lobes", "model": {"type": "auto"},
-   "mesh": ")" DEFORM_SOURCE_DIR R"(/examples/data/lobes.stl"}]})");
+   "mesh": ")" DEFORM_SOURCE_DIR R"(/examples/data/lobes.stl"}], "obstacles": [{"name": "ground",
+   "shape": "mesh", "mesh": ")" DEFORM_SOURCE_DIR
+                         R"(/examples/data/terrain.obj", "pose": {"position": [0, 0, -5]}}]})");
   test::LoggedContext context;
   dfm_world world = 0;
   ASSERT_EQ(dfm_scene_load(context.context, path.c_str(), &world), DFM_OK) << dfm_last_error();
   dfm_world_destroy(world);
-  size_t times = 0;
-  for (size_t at = 0; (at = context.log.find("it is filled with", at)) != std::string::npos; ++at) ++times;
-  EXPECT_EQ(times, 1u) << context.log;
+  for (const char *const warning : {"it is filled with", "terrain.obj: the surface is open"}) {
+    size_t times = 0;
+    for (size_t at = 0; (at = context.log.find(warning, at)) != std::string::npos; ++at) ++times;
+    EXPECT_EQ(times, 1u) << context.log;
+  }
 }
 
 TEST_F(PlannerScene, WhatCannotBePlanned_IsReportedInOneSentence) {

@@ -701,8 +701,8 @@ Built build(dfm_context *context, Definition &def, MeshFiles &files, uint64_t ji
   return Builder(context, def, files, jitter_seed).run();
 }
 
-Built build_alone(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
-                  const std::string &model, Params params) {
+Built build_alone(dfm_context *context, const Definition &def, const Body &body, const std::string &model,
+                  Params params) {
   Definition alone = def;
   alone.bodies = {body};
   alone.bodies[0].model = model;
@@ -719,6 +719,7 @@ Built build_alone(dfm_context *context, const Definition &def, MeshFiles &files,
   for (Tool &t : alone.tools)
     std::erase_if(t.cuts.bodies, [&](const std::string &name) { return name != body.name; });
   std::erase_if(alone.tools, [](const Tool &t) { return t.cuts.bodies.empty(); });
+  MeshFiles files(context, alone);  // what it warns of is not heard, and those of the scene warn once
   return build(context, alone, files, 0);
 }
 

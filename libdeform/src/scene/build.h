@@ -12,7 +12,7 @@ struct Built {
 };
 Built build(dfm_context *context, Definition &def, MeshFiles &files, uint64_t jitter_seed);
 // A body with this model, its cuts and the tools that cut it, in a world without other things.
-Built build_alone(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
-                  const std::string &model, Params params);
+Built build_alone(dfm_context *context, const Definition &def, const Body &body, const std::string &model,
+                  Params params);
 
 }  // namespace dfm::scene

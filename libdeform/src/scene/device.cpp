@@ -18,10 +18,10 @@ namespace {
 
 // Effects that work in this body with this model, in a world without other things. Warnings come when the
 // scene is built.
-std::vector<std::string> effects_of(dfm_context *context, const Definition &def, MeshFiles &files,
-                                    const Body &body, const std::string &model, Params params) {
+std::vector<std::string> effects_of(dfm_context *context, const Definition &def, const Body &body,
+                                    const std::string &model, Params params) {
   const Quiet quiet;
-  const Built built = build_alone(context, def, files, body, model, std::move(params));
+  const Built built = build_alone(context, def, body, model, std::move(params));
   std::vector<std::string> out;
   for (const BodyEffect &e : body_effects(*resolve<World>(Kind::world, built.world).find_body(body.name)))
     if (e.works) out.push_back(e.name);
@@ -45,7 +45,7 @@ class Chooser {
     for (size_t i = 0; i < def_.bodies.size(); ++i) {
       const Body &b = def_.bodies[i];
       if (!b.device) continue;
-      const dfm_type &own = own_model(b);
+      const dfm_type &own = files_.model(b);
       const dfm_type *const card = on_card(types_, own);
       const bool requested = *b.device == "gpu";
       std::string why = card ? "" : no_model(own);
@@ -65,11 +65,6 @@ class Chooser {
   }
 
  private:
-  const dfm_type &own_model(const Body &b) {
-    const Quiet quiet;  // warnings come when the scene is built
-    return files_.model(b);
-  }
-
   std::string no_model(const dfm_type &own) const {
     std::vector<std::string> able;
     for (const dfm_type *t : types_.list(DFM_KIND_MODEL))
@@ -150,10 +145,10 @@ class Chooser {
           name.c_str());
     Params left = left_for(b.params, own, card);
     if (!any_driver) set_hardware(card, left);
-    const std::vector<std::string> here = effects_of(context_, def_, files_, b, own.id, b.params);
+    const std::vector<std::string> here = effects_of(context_, def_, b, own.id, b.params);
     std::vector<std::string> there;
     try {
-      there = effects_of(context_, def_, files_, b, card.id, std::move(left));
+      there = effects_of(context_, def_, b, card.id, std::move(left));
     } catch (const Error &e) {
       const std::string why = e.what(), where = def_.file + ": ";
       return (why.starts_with(where) ? why.substr(where.size()) : why) + "; or take \"device\": \"cpu\"";
@@ -211,13 +206,12 @@ class Chooser {
 
 }  // namespace
 
-bool whole_on_card(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
-                   const dfm_type &own) {
+bool whole_on_card(dfm_context *context, const Definition &def, const Body &body, const dfm_type &own) {
   const dfm_type *const card = on_card(context->registry, own);
   if (!card) return false;
-  const std::vector<std::string> here = effects_of(context, def, files, body, own.id, {});
+  const std::vector<std::string> here = effects_of(context, def, body, own.id, {});
   try {
-    return lost(here, effects_of(context, def, files, body, card->id, {})).empty();
+    return lost(here, effects_of(context, def, body, card->id, {})).empty();
   } catch (const Error &) {
     return true;
   }

@@ -11,7 +11,6 @@ json choose_devices(dfm_context *context, const Definition &def, MeshFiles &file
 
 // Whether a card moves the body by this model with its defaults without the loss of an effect. True where a
 // card refuses the body, too: choose_devices says why.
-bool whole_on_card(dfm_context *context, const Definition &def, MeshFiles &files, const Body &body,
-                   const dfm_type &own);
+bool whole_on_card(dfm_context *context, const Definition &def, const Body &body, const dfm_type &own);
 
 }  // namespace dfm::scene

@@ -143,13 +143,13 @@ dfm_mesh_handle MeshFiles::surface(const std::string &path, const std::string &p
   });
 }
 
-dfm_mesh_handle MeshFiles::filling(const std::string &path, const Body &b) {
+dfm_mesh_handle MeshFiles::filling(const std::string &path, const Body &b, bool warn) {
   const uint32_t wanted = b.fill.value_or(kFillCells);
   const dfm_mesh_handle skin = surface(path, b.pointer + "/mesh");
   const dfm_mesh_handle mesh =
       once(format("fill %u ", wanted) + path, b.pointer + (b.fill ? "/fill" : "/mesh"),
            [&](dfm_mesh_handle *made) { return dfm_mesh_fill(skin, wanted, made); });
-  if (!b.fill)
+  if (!b.fill && warn)
     context_->warn(b,
                    ": %s holds a surface and no cells; it is filled with %u tetrahedra; \"fill\": "
                    "{\"cells\": N} chooses",
@@ -229,7 +229,7 @@ void MeshFiles::split_skin(BodyMesh &out) {
 }
 
 BodyMesh MeshFiles::load(const Body &b) {
-  const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice();
+  const bool made = !b.made.kind.empty(), anew = b.fill || b.lattice(), warn = told_.insert(b.name).second;
   const std::string path = !made  ? path_of(b.mesh)
                            : anew ? make_surface(b)
                                   : make(b),
@@ -239,17 +239,17 @@ BodyMesh MeshFiles::load(const Body &b) {
   out.filled = !whole && b.fill != 0u;
   out.renumbered = out.filled || (cells_given && anew);
   check_keys(b, whole, out.renumbered);
-  take_cells(whole ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b), b, out);
+  take_cells(whole ? cells(path, pointer) : b.lattice() ? lattice(path, b) : filling(path, b, warn), b, out);
   out.wears_skin = !b.surface.mesh.empty() || (out.filled && !b.surface.boundary);
   if (!b.surface.mesh.empty()) {
     const std::string where = b.surface.pointer + "/mesh";
     take_skin(surface(path_of(b.surface.mesh), where), b, where, out);
   } else if (out.filled) {
     take_skin(surface(path, pointer), b, pointer, out);
-    if (!out.wears_skin) warn_voxel_steps(b, out);
+    if (!out.wears_skin && warn) warn_voxel_steps(b, out);
     split_skin(out);
   }
-  if (!whole && !made && !b.has_scale) warn_unit(b, out);
+  if (!whole && !made && !b.has_scale && warn) warn_unit(b, out);
   return out;
 }
 

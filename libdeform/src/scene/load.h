@@ -23,7 +23,7 @@ class MeshFiles {
   MeshFiles(const MeshFiles &) = delete;
 
   std::string path_of(const std::string &path) const;  // relative to the scene file
-  // Cells, surface and groups of a body, scaled. Borrows from this object.
+  // Cells, surface and groups of a body, scaled. Borrows from this object. The first call for a body warns.
   BodyMesh load(const Body &body);
   const dfm_type &model(const Body &body);  // that it names, or that of its cells
   // Triangles of an obstacle of shape mesh or voxels into its def. `points` takes those that are scaled; the
@@ -46,7 +46,7 @@ class MeshFiles {
   std::string make_surface(const Body &body);  // the same for `surface`
   dfm_mesh_handle cells(const std::string &path, const std::string &pointer);
   dfm_mesh_handle surface(const std::string &path, const std::string &pointer);
-  dfm_mesh_handle filling(const std::string &path, const Body &body);
+  dfm_mesh_handle filling(const std::string &path, const Body &body, bool warn);
   dfm_mesh_handle lattice(const std::string &path, const Body &body);
   void check_keys(const Body &body, bool has_cells, bool renumbered) const;
   void take_cells(dfm_mesh_handle mesh, const Body &body, BodyMesh &out) const;
@@ -59,6 +59,7 @@ class MeshFiles {
   const Definition &def_;
   std::set<std::string> surface_only_;
   std::map<std::string, dfm_mesh_handle> meshes_;  // by what is made, and its file or name
+  std::set<std::string> told_;                     // bodies of which was warned
   std::deque<Triangles> split_;                    // by body, lent to its BodyMesh
 };
 

@@ -148,7 +148,6 @@ class Reader {
   }
 
   std::vector<BodyRegime> run(const Measured &measured) {
-    const Quiet quiet;  // warnings come when the scene is built
     for (const Body &b : def_.bodies) {
       meshes_.push_back(files_.load(b));
       nodal_.push_back(def_.with_pointer(b.pointer + "/nodal_bc", [&]() -> std::vector<NodalRow> {
@@ -171,7 +170,6 @@ class Reader {
   // edge in `sizes`, m. False: none has. `unmeasured`: one would, had its model measured costs.
   bool lattices(const std::vector<BodyRegime> &own, double times, const Measured &measured,
                 std::vector<BodyRegime> &out, std::vector<double> &sizes, bool &unmeasured) {
-    const Quiet quiet;
     out = own;
     sizes.assign(own.size(), 0);
     bool any = false;
@@ -264,7 +262,7 @@ class Reader {
     if (!first) return found->second;
     const Quiet quiet;
     try {
-      dfm_world_destroy(build_alone(context_, def_, files_, b, model, {}).world);
+      dfm_world_destroy(build_alone(context_, def_, b, model, {}).world);
       found->second = true;
     } catch (const Error &) {
       found->second = false;
@@ -346,13 +344,13 @@ class Reader {
   static bool thrown(const Body &b) { return length(b.def.velocity) > 0 || length(b.def.spin) > 0; }
 
   // Points that are held, and those that are held along all axes.
-  struct Hold { long any = 0, all = 0; };
+  struct Hold { ptrdiff_t any = 0, all = 0; };
   Hold hold_of(const Body &b, const BodyMesh &mesh, const std::vector<NodalRow> &nodal) const {
     std::vector<uint8_t> axes(mesh.info.npoint);
     for (const Fix &f : b.fixes)
       for (const uint32_t p : select(f.where, mesh, def_.file)) axes[p] |= f.axes;
     for (const NodalRow &row : nodal) axes[row.point] |= row.axes;
-    return {long(axes.size()) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)};
+    return {ptrdiff_t(axes.size()) - std::ranges::count(axes, 0), std::ranges::count(axes, 7)};
   }
   // Whether the attachment holds the body, to an obstacle or to a body that is held; `moving`: to one that
   // moves, too.
@@ -505,7 +503,7 @@ class Reader {
     for (const MeasuredModel &m : measured.models) {
       const dfm_type *const type = types_.try_find(DFM_KIND_MODEL, m.id);
       if (!type || off_card(types_, *type) || !(model_of(*type).cells & cell)) continue;
-      if (b.device == "gpu" && !whole_on_card(context_, def_, files_, b, *type)) continue;
+      if (b.device == "gpu" && !whole_on_card(context_, def_, b, *type)) continue;
       out.push_back(m.id);
     }
     return out;
